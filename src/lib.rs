@@ -16,8 +16,8 @@
 //! | vary | [`sweep`] | a study, its scene | quantities over a grid of parameters |
 //! | show | [`report`] | results | SVG figures, one HTML page |
 //!
-//! The library reads no files and prints nothing: text and numbers in, typed values and text out. The program
-//! `wiperlab` opens the files.
+//! These modules read no files and print nothing: text and numbers in, typed values and text out. Only
+//! [`program`], the command-line program, opens files.
 //!
 //! # The equations
 //!
@@ -101,6 +101,7 @@ pub mod math;
 pub mod ode;
 pub mod plausibility;
 pub mod prelude;
+pub mod program;
 pub mod recording;
 pub mod report;
 pub mod section;

@@ -4,14 +4,14 @@ use super::code::{self, Use};
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Folder of the program, whose files are a crate of their own.
-const PROGRAM: &str = "bin/wiperlab/";
+/// Module of the program.
+const PROGRAM: &str = "program";
 
 /// A file of `src`.
 pub struct SourceFile {
     /// From `src`, with `/`.
     pub path: String,
-    /// Its module: the crate (`lib` or `program`), then names.
+    /// Its module: the crate (`lib` or `main`), then names.
     pub module: Vec<String>,
     /// Lines before its tests.
     pub lines_before_tests: usize,
@@ -39,20 +39,21 @@ impl SourceFile {
         }
     }
 
-    /// Top-level module of the library; `None` for the program and the root.
+    /// Top-level module of the library; `None` for the root.
     pub fn room(&self) -> Option<&str> {
         (self.module[0] == "lib").then(|| self.module.get(1).map(String::as_str)).flatten()
     }
 
-    /// Its module just below the crate.
+    /// Its module just below the crate; of the program, which is as large as the rest, the one below that.
     pub fn top_module(&self) -> (&str, &str) {
-        (&self.module[0], self.module.get(1).map_or("", String::as_str))
+        let below = |n: usize| self.module.get(n).map_or("", String::as_str);
+        if below(1) == PROGRAM { (below(1), below(2)) } else { (&self.module[0], below(1)) }
     }
 }
 
 fn module_of(path: &str) -> Vec<String> {
-    let (root, inside) = path.strip_prefix(PROGRAM).map_or(("lib", path), |inside| ("program", inside));
-    let inside = inside.trim_end_matches(".rs").trim_end_matches("/mod");
+    let root = if path == "main.rs" { "main" } else { "lib" };
+    let inside = path.trim_end_matches(".rs").trim_end_matches("/mod");
     let names = inside.split('/').filter(|name| !["lib", "main"].contains(name));
     std::iter::once(root).chain(names).map(str::to_owned).collect()
 }
@@ -148,15 +149,13 @@ fn who_uses_whom_is_read_from_the_text() {
         ),
         ("b.rs", "pub mod deep;\npub struct Other;\nfn f() { deep::go(); let x = 'a'; }\n"),
         ("b/deep.rs", "pub struct Deepest(super::super::a::Thing);\n"),
-        ("bin/wiperlab/main.rs", "mod b;\nuse wiperlab::a::Thing;\n"),
-        ("bin/wiperlab/b.rs", "use crate::c;\n"),
-        ("bin/wiperlab/c.rs", "pub fn c() { crate::b::b(); }\n"),
+        ("main.rs", "use wiperlab::a::Thing;\n"),
     ];
     let files: Vec<SourceFile> = made.iter().map(|(path, text)| SourceFile::new(path, text)).collect();
     let found: Vec<_> =
         edges(&files).into_iter().map(|(from, to)| (&files[from].path[..], &files[to].path[..])).collect();
-    let program = [("bin/wiperlab/b.rs", "bin/wiperlab/c.rs"), ("bin/wiperlab/c.rs", "bin/wiperlab/b.rs")];
-    let library =
-        [("a.rs", "b.rs"), ("a.rs", "b/deep.rs"), ("b.rs", "b/deep.rs"), ("b/deep.rs", "a/inner.rs")];
-    assert_eq!(found, [&library[..], &program[..]].concat());
+    assert_eq!(
+        found,
+        [("a.rs", "b.rs"), ("a.rs", "b/deep.rs"), ("b.rs", "b/deep.rs"), ("b/deep.rs", "a/inner.rs")]
+    );
 }

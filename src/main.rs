@@ -1,0 +1,7 @@
+//! The program `wiperlab`.
+
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    ExitCode::from(wiperlab::program::run(std::env::args_os().collect()))
+}

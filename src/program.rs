@@ -1,0 +1,68 @@
+//! The command-line program: parse, run, exit code. Everything that opens files, prints or shows progress is
+//! below this module; the Python package reads files by it, too.
+
+#[macro_use]
+mod output;
+
+mod accuracy;
+mod args;
+mod blade;
+mod collect;
+mod completions;
+mod count;
+mod demo;
+mod early_end;
+mod failure;
+mod figures;
+mod files;
+mod fit;
+mod global;
+mod help;
+mod import;
+mod init;
+mod inspect;
+mod inspection;
+mod interrupt;
+mod journal;
+mod load;
+mod man;
+mod method;
+mod modes;
+mod problem;
+mod progress;
+mod report;
+mod sensitivities;
+mod shards;
+mod simulate;
+mod spectrum;
+mod submit;
+mod sweep;
+mod table;
+mod time_limit;
+mod twin;
+mod watch;
+
+use clap::Parser;
+use std::ffi::OsString;
+
+/// Runs the program with its arguments, its name first, and gives the exit code. It answers signals, and may
+/// end the process to do so; a process runs it once.
+#[must_use]
+pub fn run(arguments: Vec<OsString>) -> u8 {
+    let program = match args::Program::try_parse_from(&arguments) {
+        Ok(program) => program,
+        Err(error) => {
+            let code = if error.use_stderr() { failure::BAD_INPUT } else { 0 };
+            return output::print_usage(&error, &arguments)
+                .map_or_else(|failure| failure.report(), |()| code);
+        }
+    };
+    if let Err(failure) = interrupt::listen().and_then(|()| program.global.apply()) {
+        return failure.report();
+    }
+    let ran = program.command.run(&program.global);
+    match ran.and_then(|outcome| output::check().map(|()| outcome)) {
+        Ok(outcome) => outcome.exit_code(),
+        Err(failure) => failure.report(),
+    }
+}

@@ -1,0 +1,142 @@
+//! `wiperlab demo`: the whole pipeline on the bundled synthetic recording.
+
+use crate::fit::result::{FitResult, Status};
+use crate::import::{Options, Scale, Source};
+use crate::program::count::count;
+use crate::program::failure::{Failure, Outcome};
+use crate::program::files::{self, Maker, Overwrite, Place, Writer};
+use crate::program::fit::print_summary;
+use crate::program::global::Global;
+use crate::program::import::import_into;
+use crate::program::problem::Problem;
+use crate::program::progress::say;
+use crate::program::report;
+use crate::program::spectrum::SpectrumArgs;
+use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis};
+use crate::twin::export::TRACK_NAMES;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+const NAME: &str = "actual-blade-twin";
+const EXPORT: &str = "synthetic-tracker-export.txt";
+const EXPORT_TEXT: &str = include_str!("../../data/actual-blade-twin/synthetic-tracker-export.txt");
+const TWIN: &str = include_str!("../../data/actual-blade-twin/twin.toml");
+const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
+const JOB: &str = include_str!("../../fits/actual-blade-twin/job.toml");
+
+/// Channel and window of the two spectra that the demo shows.
+const SPECTRA: [(&str, &str, &str); 2] =
+    [("low", "head-drop", "release+0.01..release+0.2"), ("high", "deflection", "release+0.01..release+0.1")];
+
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Folder for everything that the demo makes
+    #[arg(long, default_value = "demo", value_name = "DIR")]
+    pub out: PathBuf,
+    /// Most iterates of the fit: fewer are quicker and settle less (default: as many as it takes)
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub max_evaluations: Option<usize>,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+impl DemoArgs {
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        self.check()?;
+        let quiet = Global { quiet: true, ..global.clone() };
+        let data = self.out.join("data").join(NAME);
+        say(global.quiet, &format!("1/4 import    {EXPORT} -> {}", data.display()));
+        self.unpack()?;
+        import_export(&data, self.overwrite)?;
+
+        say(global.quiet, "2/4 spectrum  of the head's drop (low) and of the deflection (high)");
+        for (name, channel, window) in SPECTRA {
+            SpectrumArgs::new(&data, channel, window, &self.out.join("spectra").join(name), self.overwrite)
+                .run(&quiet)?;
+        }
+
+        let fit = self.out.join("fits").join(NAME);
+        say(global.quiet, &format!("3/4 fit       {} (some ten seconds)", fit.join("job.toml").display()));
+        let problem = Problem::load(&fit.join("job.toml"))?;
+        let solved = problem.solve(global, false, self.max_evaluations, self.overwrite)?;
+        if solved.result.status == Status::Interrupted {
+            return Ok(Outcome::StoppedEarly);
+        }
+
+        let page = self.out.join("reports").join(NAME);
+        say(global.quiet, &format!("4/4 report    {}", page.join("index.html").display()));
+        let missed = report::write(
+            &fit,
+            &page,
+            &Writer::new(Maker::Report, self.overwrite).csv(global.csv_dialect),
+            &quiet,
+        )?;
+        if !global.quiet {
+            print_summary(&solved);
+            print_truth(&solved.result)?;
+            print_line!("open {}", page.join("index.html").display());
+        }
+        Ok(if missed || solved.result.status != Status::Converged {
+            Outcome::StoppedEarly
+        } else {
+            Outcome::Done
+        })
+    }
+
+    /// Refuses before anything is written what one of the steps would refuse.
+    fn check(&self) -> Result<(), Failure> {
+        let steps: [(Maker, &str, &[&str]); 4] = [
+            (Maker::Import, "data", &[TRACE_FILE, DESCRIPTION_FILE, EXPORT]),
+            (Maker::Fit, "fits", &[files::RESULT]),
+            (Maker::Report, "reports", &["index.html", "report.json"]),
+            (Maker::Demo, "fits", &["job.toml"]),
+        ];
+        steps.iter().try_for_each(|(maker, folder, names)| {
+            let writer = Writer::new(*maker, self.overwrite);
+            Place::check(&self.out.join(folder).join(NAME), &writer, names).map(|_| ())
+        })
+    }
+
+    /// The bundled export, scene and job, laid out as a project has them.
+    fn unpack(&self) -> Result<(), Failure> {
+        let write = |folder: PathBuf, name: &str, text: &str| {
+            files::write_outputs(
+                &folder,
+                &Writer::new(Maker::Demo, self.overwrite),
+                &[(name, text.as_bytes().to_vec())],
+            )
+        };
+        write(self.out.join("data").join("scenes"), "actual-blade.toml", SCENE)?;
+        write(self.out.join("fits").join(NAME), "job.toml", JOB)
+    }
+}
+
+/// What `wiperlab import` does with the export, its scale and rate.
+fn import_export(folder: &Path, overwrite: Overwrite) -> Result<(), Failure> {
+    let [tip, head] = TRACK_NAMES;
+    let options = Options {
+        name: NAME.to_owned(),
+        frame_rate_hz: Some(5000.0),
+        scale: Some(Scale::parse("20um/px").map_err(Failure::internal)?),
+        y_axis: Some(YAxis::Up),
+        exposure_s: Some(5e-5),
+        tip: Some(tip.to_owned()),
+        head: Some(head.to_owned()),
+        twin: Some(("twin.toml".to_owned(), TWIN.to_owned())),
+        ..Options::default()
+    };
+    import_into(folder, &[Source::alone(EXPORT, EXPORT_TEXT.as_bytes().to_vec())], &options, overwrite)
+}
+
+/// The truth behind the synthetic recording, next to the estimates.
+fn print_truth(result: &FitResult) -> Result<(), Failure> {
+    let twin: toml::Table = TWIN.parse().map_err(Failure::internal)?;
+    let truth = twin.get("truth").and_then(toml::Value::as_table);
+    print_line!("{:<36} {:>12} {:>12}  in the interval", "parameter", "estimate", "truth");
+    for (name, p) in &result.parameters {
+        let Some(truth) = truth.and_then(|t| t.get(name)).and_then(toml::Value::as_float) else { continue };
+        let inside = p.lower_95.is_some_and(|l| l <= truth) && p.upper_95.is_some_and(|u| truth <= u);
+        print_line!("{name:<36} {:>12.6} {truth:>12.6}  {}", p.estimate, if inside { "yes" } else { "no" });
+    }
+    Ok(())
+}

@@ -1,0 +1,241 @@
+//! Reading and writing: outputs of a command appear all together or not at all, and replace nothing but what
+//! the command made itself.
+
+mod dialect;
+mod guard;
+mod input;
+mod kept;
+mod maker;
+mod marker;
+mod staged;
+
+use crate::program::failure::Failure;
+use crate::report::chart::{Figure, Medium};
+pub use dialect::CsvDialect;
+use guard::Guard;
+pub use input::{Size, check_size, is_standard_input, read, read_json, read_open, read_text, read_toml};
+pub use kept::{SIMULATION_SUMMARY, is_simulation_summary};
+pub use maker::{Maker, Overwrite, Writer};
+pub use marker::Marker;
+pub use staged::{Staging, check_free};
+use std::fs::File;
+use std::io::{self, BufWriter, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+
+/// What a fit found, in its folder.
+pub const RESULT: &str = "result.json";
+
+/// Name of a file or folder for messages and headings.
+pub fn display_name(path: &Path) -> String {
+    if is_standard_input(path) {
+        return "standard-input".to_owned();
+    }
+    let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    full.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// A path as a file in `folder` names it: from there, or in full where no way leads from one to the other.
+pub fn path_from(folder: &Path, path: &Path) -> Result<String, Failure> {
+    let in_full = |path: &Path| {
+        std::path::absolute(path).map_err(|error| {
+            Failure::Input(format!("{}: cannot be found from here: {error}", path.display()))
+        })
+    };
+    // (links are followed in what there is, as `..` behind a link leads elsewhere)
+    let real = |path: &Path| -> Result<PathBuf, Failure> {
+        let full = in_full(path)?;
+        let there = full.ancestors().find(|part| part.exists()).unwrap_or(Path::new(""));
+        let rest = full.strip_prefix(there).unwrap_or(Path::new(""));
+        Ok(there.canonicalize().map_or_else(|_| full.clone(), |there| there.join(rest)))
+    };
+    let target = real(path)?;
+    let way = pathdiff::diff_paths(&target, real(folder)?).unwrap_or(target);
+    way.to_str().map(|text| text.replace(std::path::MAIN_SEPARATOR, "/")).ok_or_else(|| {
+        Failure::Input(format!(
+            "{}: found a path that is no Unicode text, expected one that a TOML file can name; rename the folder",
+            path.display()
+        ))
+    })
+}
+
+/// Writes every file of a command into `folder` (made if missing): all are staged next to their places first,
+/// then renamed.
+pub fn write_outputs(
+    folder: &Path,
+    writer: &Writer,
+    files: &[(impl AsRef<str>, Vec<u8>)],
+) -> Result<(), Failure> {
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
+    Place::writable(folder)?;
+    stage_all(Staging::of(folder, writer, &names)?, files)
+}
+
+/// The same for files that no marker lists, of which the caller knows that they replace nothing of value.
+pub fn write_all(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
+    Place::writable(folder)?;
+    stage_all(Staging::unmarked(folder, &names)?, files)
+}
+
+fn stage_all(mut staging: Staging, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
+    for (name, bytes) in files {
+        staging.add(name.as_ref(), bytes.as_slice())?;
+    }
+    staging.place()
+}
+
+/// A figure as files: for the screen, and under `paper/` for a journal's column and page.
+pub fn drawn(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
+    let file = |name: String, medium| (name, figure.svg(medium).into_bytes());
+    [
+        file(format!("{name}.svg"), Medium::Screen),
+        file(format!("paper/{name}-85mm.svg"), Medium::Column),
+        file(format!("paper/{name}-170mm.svg"), Medium::Page),
+    ]
+}
+
+/// Text that is made piece by piece, as a reader.
+pub struct Pieces<I> {
+    pieces: I,
+    present: io::Cursor<Vec<u8>>,
+}
+
+impl<I: Iterator<Item = String>> Pieces<I> {
+    pub fn new(pieces: I) -> Self {
+        Self { pieces, present: io::Cursor::default() }
+    }
+}
+
+impl<I: Iterator<Item = String>> Read for Pieces<I> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        loop {
+            let read = self.present.read(buffer)?;
+            if read > 0 || buffer.is_empty() {
+                return Ok(read);
+            }
+            match self.pieces.next() {
+                Some(piece) => self.present = io::Cursor::new(piece.into_bytes()),
+                None => return Ok(0),
+            }
+        }
+    }
+}
+
+/// A folder for results that are written while they are computed: nothing is seen of them before all are
+/// complete, and nothing is left of them when the program is killed.
+#[derive(Debug)]
+pub struct Place {
+    folder: PathBuf,
+    writer: Writer,
+    /// Where the nameless files are kept meanwhile: the folder, or what there is of the way to it.
+    near: PathBuf,
+}
+
+impl Place {
+    /// Checks that `folder` is one or can be made, can be written to, and holds nothing that the files
+    /// `names` must not replace: asked before the work, as it is again when they are placed.
+    pub fn check(folder: &Path, writer: &Writer, names: &[&str]) -> Result<Self, Failure> {
+        let near = Self::writable(folder)?;
+        names.iter().try_for_each(|name| check_free(&folder.join(name)))?;
+        let guard = Guard::of(folder, writer, names)?;
+        names.iter().try_for_each(|name| guard.admit(name, None).map(|_| ()))?;
+        Ok(Self { folder: folder.to_owned(), writer: writer.clone(), near })
+    }
+
+    /// What there is of the way to a folder, which can be written to.
+    fn writable(folder: &Path) -> Result<PathBuf, Failure> {
+        let near = folder
+            .ancestors()
+            .find(|path| path.exists() || path.is_symlink())
+            .unwrap_or(Path::new(""))
+            .to_owned();
+        let near = if near.as_os_str().is_empty() { PathBuf::from(".") } else { near };
+        if !near.is_dir() {
+            let found = if near.exists() { "a file" } else { "a broken link" };
+            return Err(Failure::Input(format!(
+                "{}: is {found}, expected a folder for the results; choose another one",
+                near.display()
+            )));
+        }
+        tempfile::tempfile_in(&near).map_err(|error| {
+            Failure::Input(format!(
+                "{}: cannot be written: {error}; expected a folder for the results, so choose another one",
+                folder.display()
+            ))
+        })?;
+        Ok(near)
+    }
+
+    /// A file that is written to as it grows and gets its name when all are [finished](Self::finish).
+    pub fn file(&self, name: &'static str) -> Result<Growing, Failure> {
+        let path = self.folder.join(name);
+        let file = tempfile::tempfile_in(&self.near).map_err(|error| unwritable(&path, &error))?;
+        Ok(Growing { name, path, to: BufWriter::new(file), failed: None })
+    }
+
+    /// Puts the files that grew and the others into the folder under their names, or none of them.
+    pub fn finish(&self, files: Vec<Growing>, others: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
+        let files = files.into_iter().map(Growing::complete).collect::<Result<Vec<_>, _>>()?;
+        let others = others.iter().map(|(name, bytes)| (name.as_ref(), bytes.as_slice()));
+        let names: Vec<&str> =
+            files.iter().map(|(name, _)| *name).chain(others.clone().map(|(name, _)| name)).collect();
+        let mut staging = Staging::of(&self.folder, &self.writer, &names)?;
+        for (name, file) in files {
+            staging.add(name, file)?;
+        }
+        for (name, bytes) in others {
+            staging.add(name, bytes)?;
+        }
+        staging.place()
+    }
+}
+
+/// A file without a name for what does not fit into memory, in a folder or in what there is of the way to it.
+pub fn scratch(folder: &Path) -> Result<File, Failure> {
+    let near = Place::writable(folder)?;
+    tempfile::tempfile_in(&near).map_err(|error| unwritable(&near, &error))
+}
+
+/// A file on its way; after its first failure nothing more is written, and the failure is reported at the
+/// end.
+#[derive(Debug)]
+pub struct Growing {
+    name: &'static str,
+    path: PathBuf,
+    to: BufWriter<File>,
+    failed: Option<io::Error>,
+}
+
+impl Growing {
+    pub fn write(&mut self, text: &str) {
+        if self.failed.is_none() {
+            self.failed = self.to.write_all(text.as_bytes()).err();
+        }
+    }
+
+    /// The whole file, to be read from its start.
+    fn complete(self) -> Result<(&'static str, File), Failure> {
+        let Self { name, path, to, failed } = self;
+        let rewound = || {
+            let mut file = to.into_inner().map_err(io::IntoInnerError::into_error)?;
+            file.rewind()?;
+            Ok(file)
+        };
+        let file = failed.map_or_else(rewound, Err).map_err(|error| unwritable(&path, &error))?;
+        Ok((name, file))
+    }
+}
+
+impl Write for Growing {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        self.to.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.to.flush()
+    }
+}
+
+fn unwritable(path: &Path, error: &io::Error) -> Failure {
+    Failure::Internal(format!("{}: cannot be written: {error}", path.display()))
+}

@@ -1,0 +1,303 @@
+//! Files that appear all together or not at all: written next to their places under temporary names, then
+//! renamed.
+//!
+//! What is on the disk when: every file is flushed before any gets its name; then the folder's marker says
+//! what comes and what it replaces, and is flushed too; then the files are renamed one by one and the names
+//! flushed; at last the marker says what is there. So a reader meets each file old or new and whole, also
+//! after a loss of power, and the next run of the command can prove what it finds.
+
+use super::dialect::CsvDialect;
+use super::guard::{Guard, keep_measured};
+use super::maker::Writer;
+use super::marker::{Hashing, MARKER, Made, Marker};
+use super::unwritable;
+use crate::program::failure::Failure;
+use crate::program::interrupt;
+use crate::recording::files::TRACE_FILE;
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Read, Seek};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use tempfile::NamedTempFile;
+
+/// How passing names begin and end.
+const PASSING: (&str, &str) = (".wiperlab-", ".tmp");
+/// A file on its way is locked microseconds after it is made, and the lock goes with the program. One that is
+/// older than this and not locked belongs to a program that was killed.
+const ABANDONED: Duration = Duration::from_secs(60);
+
+/// Files of a command on their way into a folder. Dropped before [`Staging::place`], nothing is left of them.
+pub struct Staging {
+    folder: PathBuf,
+    guard: Option<(Guard, Writer)>,
+    files: Vec<Staged>,
+    made: MadeFolders,
+}
+
+/// A file under a temporary name next to its place.
+struct Staged {
+    name: String,
+    path: PathBuf,
+    file: NamedTempFile,
+    sha256: String,
+}
+
+impl Staging {
+    /// For the files `names`; refuses what [`Guard`] refuses.
+    pub fn of(folder: &Path, writer: &Writer, names: &[&str]) -> Result<Self, Failure> {
+        let guard = Guard::of(folder, writer, names)?;
+        Ok(Self { guard: Some((guard, writer.clone())), ..Self::free(folder, names)? })
+    }
+
+    /// For files of which the caller knows that nothing is lost with what they replace.
+    pub fn unmarked(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
+        keep_measured(folder, names)?;
+        Self::free(folder, names)
+    }
+
+    fn free(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
+        names.iter().try_for_each(|name| check_free(&folder.join(name)))?;
+        Ok(Self { folder: folder.to_owned(), guard: None, files: Vec::new(), made: MadeFolders::default() })
+    }
+
+    /// Writes a file next to its place; gives the hash of its contents.
+    pub fn add(&mut self, name: &str, contents: impl Read) -> Result<String, Failure> {
+        let path = self.folder.join(name);
+        self.made.make(path.parent().unwrap_or(Path::new("")))?;
+        let dialect = self.guard.as_ref().map_or(CsvDialect::Plain, |(_, writer)| writer.csv);
+        let is_table = name.ends_with(".csv") && name != TRACE_FILE;
+        let staged = match is_table && dialect.is_other() {
+            true => stage_table(&path, contents, dialect),
+            false => stage(&path, contents),
+        };
+        let (file, sha256) = staged.map_err(|error| unwritable(&path, &error))?;
+        self.files.push(Staged { name: name.to_owned(), path, file, sha256: sha256.clone() });
+        Ok(sha256)
+    }
+
+    /// Gives every file its name, or none.
+    pub fn place(self) -> Result<(), Failure> {
+        let (made, files) = (self.made, self.files); // (folders are dropped after what is in them)
+        let (folder, guard) = (self.folder, self.guard);
+        flush(&files)?;
+        let within: BTreeSet<PathBuf> =
+            files.iter().filter_map(|staged| staged.path.parent()).map(Path::to_owned).collect();
+        match guard {
+            None => rename(files)?,
+            Some((guard, writer)) => {
+                let plan = Plan::of(&folder, &guard, &writer, &files)?;
+                plan.announce()?;
+                rename(files)?;
+                sync(&within)?;
+                plan.settle()?;
+            }
+        }
+        sync(&within)?;
+        made.stay()?;
+        within.iter().for_each(|folder| clear(folder));
+        Ok(())
+    }
+}
+
+fn rename(files: Vec<Staged>) -> Result<(), Failure> {
+    let whole = interrupt::whole();
+    for staged in files {
+        staged.file.persist(&staged.path).map_err(|e| unwritable(&staged.path, &e.error))?;
+    }
+    whole.placed();
+    Ok(())
+}
+
+/// What the marker of a folder says while files get their names, and afterwards.
+struct Plan<'a> {
+    folder: &'a Path,
+    before: &'a Marker,
+    /// Of every file what it is and what it replaces: true before, between and after the renaming.
+    meanwhile: Marker,
+    after: Marker,
+    outdated: Vec<String>,
+}
+
+impl<'a> Plan<'a> {
+    fn of(folder: &'a Path, guard: &'a Guard, writer: &Writer, files: &[Staged]) -> Result<Self, Failure> {
+        let names: Vec<&str> = files.iter().map(|staged| staged.name.as_str()).collect();
+        let outdated = guard.outdated(&names);
+        let mut meanwhile = guard.marker.clone();
+        for staged in files {
+            let own = guard.admit(&staged.name, Some(&staged.sha256))?;
+            let made = Made {
+                by: writer.maker,
+                version: env!("CARGO_PKG_VERSION").to_owned(),
+                replaces: own.filter(|found| *found != staged.sha256),
+                sha256: staged.sha256.clone(),
+            };
+            meanwhile.files.insert(staged.name.clone(), made);
+        }
+        let mut after = meanwhile.clone();
+        after.files.retain(|name, _| !outdated.contains(name));
+        after.files.iter_mut().filter(|(name, _)| names.contains(&name.as_str())).for_each(|(_, made)| {
+            made.replaces = None;
+        });
+        Ok(Self { folder, before: &guard.marker, meanwhile, after, outdated })
+    }
+
+    fn announce(&self) -> Result<(), Failure> {
+        if self.meanwhile == *self.before { Ok(()) } else { self.write(&self.meanwhile) }
+    }
+
+    /// Removes what is outdated, then says what is there.
+    fn settle(&self) -> Result<(), Failure> {
+        for path in self.outdated.iter().map(|name| self.folder.join(name)) {
+            if let Err(error) = fs::remove_file(&path) {
+                warn_line!(
+                    "warning: {}: left from an earlier run, and cannot be removed: {error}",
+                    path.display()
+                );
+            }
+        }
+        if self.after == self.meanwhile { Ok(()) } else { self.write(&self.after) }
+    }
+
+    fn write(&self, marker: &Marker) -> Result<(), Failure> {
+        let path = self.folder.join(MARKER);
+        let written = stage(&path, marker.to_bytes()?.as_slice()).and_then(|(file, _)| {
+            file.as_file().sync_all()?;
+            file.persist(&path)?;
+            Ok(())
+        });
+        written.map_err(|error| unwritable(&path, &error))?;
+        sync(&BTreeSet::from([self.folder.to_owned()]))
+    }
+}
+
+/// Puts the names of files on the disk: a file that was flushed is found again after a loss of power only if
+/// its name was too. A file system that cannot flush folders does it by itself or not at all.
+fn sync(folders: &BTreeSet<PathBuf>) -> Result<(), Failure> {
+    #[cfg(unix)]
+    for folder in folders {
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let unknown =
+            |error: &io::Error| matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported);
+        match File::open(folder).and_then(|folder| folder.sync_all()) {
+            Err(error) if !unknown(&error) => return Err(unwritable(folder, &error)),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Folders that were made for files; those that stay empty go.
+#[derive(Default)]
+struct MadeFolders(Vec<PathBuf>);
+
+impl MadeFolders {
+    /// Makes a folder and what is missing of the way to it; the outermost is kept first.
+    fn make(&mut self, folder: &Path) -> Result<(), Failure> {
+        let missing: Vec<&Path> =
+            folder.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists()).collect();
+        let missing: Vec<PathBuf> = missing.into_iter().rev().map(Path::to_owned).collect();
+        self.0.extend_from_slice(&missing);
+        interrupt::passing_folders(missing, || fs::create_dir_all(folder))
+            .map_err(|error| unwritable(folder, &error))
+    }
+
+    /// They hold files now.
+    fn stay(mut self) -> Result<(), Failure> {
+        let parents = std::mem::take(&mut self.0);
+        sync(&parents.iter().filter_map(|made| made.parent()).map(Path::to_owned).collect())
+    }
+}
+
+impl Drop for MadeFolders {
+    fn drop(&mut self) {
+        for folder in self.0.iter().rev() {
+            // only an empty one goes; the failure itself is reported
+            let _ = fs::remove_dir(folder);
+        }
+    }
+}
+
+/// Refuses a place that something else than a file takes, or that no file can take: asked of all before any
+/// gets its name, so that none is left alone.
+pub fn check_free(path: &Path) -> Result<(), Failure> {
+    let taken = |at: &Path, found: &str, expected: &str| {
+        let at = at.display();
+        Err(Failure::Input(format!(
+            "{at}: is {found}, expected {expected} or nothing; remove it or choose another folder"
+        )))
+    };
+    let found = fs::symlink_metadata(path);
+    match path.parent() {
+        _ if path.is_dir() => taken(path, "a folder", "a file"),
+        Some(within) if within.exists() && !within.is_dir() => taken(within, "a file", "a folder"),
+        // (a name that is too long, for instance)
+        _ => found
+            .err()
+            .filter(|error| error.kind() != ErrorKind::NotFound)
+            .map_or(Ok(()), |error| Err(unwritable(path, &error))),
+    }
+}
+
+/// The file under a temporary name next to its place, locked where the file system can, and its hash.
+fn stage(path: &Path, contents: impl Read) -> io::Result<(NamedTempFile, String)> {
+    let within = path.parent().unwrap_or(Path::new(""));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(PASSING.0).suffix(PASSING.1).permissions(readable_by_all());
+    let mut file = interrupt::passing(|| builder.tempfile_in(within))?;
+    let _ = file.as_file().try_lock();
+    let mut contents = Hashing::new(contents);
+    io::copy(&mut contents, file.as_file_mut())?;
+    Ok((file, contents.finish()))
+}
+
+/// The same for a table in another dialect.
+fn stage_table(path: &Path, plain: impl Read, dialect: CsvDialect) -> io::Result<(NamedTempFile, String)> {
+    let mut converted = tempfile::tempfile_in(path.parent().unwrap_or(Path::new("")))?;
+    dialect.convert(plain, io::BufWriter::new(&mut converted))?;
+    converted.rewind()?;
+    stage(path, converted)
+}
+
+/// Removes what programs that were killed left in a folder on its way.
+fn clear(folder: &Path) {
+    let passing = |name: &str| name.starts_with(PASSING.0) && name.ends_with(PASSING.1);
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if passing(&entry.file_name().to_string_lossy()) && is_abandoned(&entry.path()) {
+            let _ = fs::remove_file(entry.path()); // (it does no harm; the next command tries again)
+        }
+    }
+}
+
+fn is_abandoned(path: &Path) -> bool {
+    let is_old = |found: &fs::Metadata| {
+        found.is_file() && found.modified().is_ok_and(|at| at.elapsed().is_ok_and(|age| age > ABANDONED))
+    };
+    fs::symlink_metadata(path).is_ok_and(|found| is_old(&found))
+        && File::open(path).is_ok_and(|file| file.try_lock().is_ok())
+}
+
+/// Flushes files to the disk side by side: one commit of the file system then serves many, where one after
+/// the other would wait for one each.
+fn flush(staged: &[Staged]) -> Result<(), Failure> {
+    const AT_ONCE: usize = 64;
+    let flushed =
+        |staged: &Staged| staged.file.as_file().sync_all().map_err(|error| unwritable(&staged.path, &error));
+    staged.chunks(AT_ONCE).try_for_each(|files| {
+        std::thread::scope(|scope| {
+            let waiting: Vec<_> = files.iter().map(|file| scope.spawn(move || flushed(file))).collect();
+            let stopped = |_| Err(Failure::Internal("a file could not be flushed to the disk".to_owned()));
+            waiting.into_iter().try_for_each(|handle| handle.join().unwrap_or_else(stopped))
+        })
+    })
+}
+
+/// What a new file gets from an ordinary program (the user's mask still applies); temporary files are private
+/// otherwise.
+#[cfg(unix)]
+fn readable_by_all() -> fs::Permissions {
+    std::os::unix::fs::PermissionsExt::from_mode(0o666)
+}
+
+#[cfg(test)]
+mod tests;

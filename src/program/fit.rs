@@ -1,0 +1,205 @@
+//! `wiperlab fit`.
+
+mod batch;
+mod divided;
+mod misfit;
+mod outputs;
+mod summary;
+mod traces;
+
+pub use batch::{Standing, check_folders};
+pub use divided::Collected;
+pub use summary::print_summary;
+
+use crate::fit::ledger::Progress;
+use crate::fit::result::{FitResult, Status};
+use crate::fit::stage::Stage;
+use crate::fit::{Context, FitError};
+use crate::journal::Shard;
+use crate::program::count::count;
+use crate::program::failure::{Failure, Outcome};
+use crate::program::files::{Maker, Overwrite, Writer};
+use crate::program::global::Global;
+use crate::program::interrupt;
+use crate::program::journal::{JOURNAL, JournalFile};
+use crate::program::load::warn_of;
+use crate::program::problem::Problem;
+use crate::program::time_limit::TimeLimit;
+use crate::program::{files, progress};
+use clap::Args;
+use indicatif::ProgressBar;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::{Duration, Instant};
+
+#[derive(Debug, Args)]
+pub struct FitArgs {
+    /// Job of the fit (fits/NAME/job.toml); several are fitted one after the other, each in a folder of its
+    /// own
+    #[arg(required = true, value_name = "JOB")]
+    pub jobs: Vec<PathBuf>,
+    /// Go on from the journal next to the job; without this a new one is begun and the old one kept as
+    /// journal.previous-1.jsonl (the next free number)
+    #[arg(long)]
+    pub resume: bool,
+    /// Most evaluations of the model, those of the journal included (default: what the job allows); of a fit
+    /// to traces most iterates of the search (default: as many as it takes)
+    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    pub max_evaluations: Option<usize>,
+    /// Of several jobs fit only every N-th from job K on (K from 0); each goes on from its journal, and one
+    /// whose result is there is left as it is. Of one job that fits traces make only every N-th chain of
+    /// iterates, into shards/K-of-N.jsonl next to it; `wiperlab collect JOB` puts the shards together
+    #[arg(long, value_name = "K/N")]
+    pub shard: Option<Shard>,
+    /// Stop after this time with what is done (exit code 3); such as 45min, 1h30min or 02:00:00
+    #[arg(long, value_name = "TIME")]
+    pub time_limit: Option<TimeLimit>,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+/// A result, and what it took.
+pub struct Solved {
+    pub result: FitResult,
+    /// How much of it was taken from journals.
+    pub replayed: usize,
+    pub wall: Duration,
+}
+
+impl FitArgs {
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        if let Some(TimeLimit(time)) = self.time_limit {
+            interrupt::limit(time);
+        }
+        match (self.jobs.as_slice(), self.shard) {
+            ([job], None) => self.fit(&Problem::load(job)?, self.resume, global),
+            ([job], Some(shard)) => self.shard_of(job, shard, global),
+            _ => self.run_batch(global),
+        }
+    }
+
+    fn fit(&self, problem: &Problem, resume: bool, global: &Global) -> Result<Outcome, Failure> {
+        for warning in crate::fit::warnings(problem.job()).iter().filter(|_| !global.quiet) {
+            warn_line!("warning: {warning}");
+        }
+        problem.doubts.iter().for_each(|(scene, findings)| warn_of(scene, findings, global));
+        let solved = problem.solve(global, resume, self.max_evaluations, self.overwrite)?;
+        Ok(solved.said(problem, global))
+    }
+}
+
+impl Solved {
+    /// Says what was found and where it is.
+    pub fn said(&self, problem: &Problem, global: &Global) -> Outcome {
+        if !global.quiet {
+            print_summary(self);
+        }
+        if !global.quiet && self.result.status != Status::Interrupted {
+            print_line!("written to {}", problem.folder.join(files::RESULT).display());
+        }
+        let done = self.result.status == Status::Converged && self.result.explains();
+        if done { Outcome::Done } else { Outcome::StoppedEarly }
+    }
+}
+
+impl Problem {
+    /// Fits, and writes the journal as it goes and the result at the end.
+    pub fn solve(
+        &self,
+        global: &Global,
+        resume: bool,
+        max_evaluations: Option<usize>,
+        overwrite: Overwrite,
+    ) -> Result<Solved, Failure> {
+        if !self.problem.traces().is_empty() {
+            return self.solve_traces(global, resume, max_evaluations, overwrite);
+        }
+        let writer = Writer::new(Maker::Fit, overwrite).csv(global.csv_dialect);
+        self.check_place(&writer)?;
+        let path = self.folder.join(JOURNAL);
+        let name = path.display().to_string();
+        let (mut sink, resumed) = JournalFile::open(&path, resume)?;
+        let bar = progress::bar(self.expected(max_evaluations) as u64, "fit", "evaluations", global.quiet);
+        let mut replayed = 0;
+        let journaled = Arc::new(AtomicUsize::new(resumed.as_ref().map_or(0, |found| found.records.len())));
+        let kept = self.kept(&name, "evaluations", self.resume_advice(), &journaled);
+        let stops = interrupt::stops(kept.clone());
+        let mut on_progress = |now: &Progress| {
+            show(&bar, now, replayed);
+            replayed = now.replayed;
+            if now.stage != Stage::Gate {
+                journaled.fetch_max(now.evaluations, Ordering::Relaxed);
+            }
+            interrupt::flow()
+        };
+        let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
+        let context = Context { max_evaluations, resume, ..self.problem.context() };
+        let clock = Instant::now();
+        let fitted = self.problem.fit_with(&context, &mut sink, &mut on_progress);
+        let result = fitted.map_err(|error| self.failure(&error))?;
+        let wall = clock.elapsed();
+        bar.finish_and_clear();
+        sink.finish()?;
+        if result.status == Status::Interrupted {
+            // an earlier result stays: what is new is in the journal, and a resumed fit gives its result
+            stops.finishing(&kept());
+        } else {
+            self.write(&result, &writer)?;
+        }
+        Ok(Solved { result, replayed, wall })
+    }
+
+    /// Why the fit did not run.
+    fn failure(&self, error: &FitError) -> Failure {
+        match error {
+            FitError::JournalWrite { .. } => Failure::Internal(error.to_string()),
+            FitError::Journal(_) | FitError::OtherSeed { .. } => Failure::input(error),
+            _ => Failure::Input(format!("{}: {error}", self.file)),
+        }
+    }
+
+    /// What is on the disk when the fit is interrupted.
+    fn kept(
+        &self,
+        journal: &str,
+        records: &'static str,
+        advice: String,
+        journaled: &Arc<AtomicUsize>,
+    ) -> impl Fn() -> String + Clone + use<> {
+        let (journal, journaled) = (journal.to_owned(), Arc::clone(journaled));
+        move || match journaled.load(Ordering::Relaxed) {
+            0 => "the search had not begun, and there is no journal of it".to_owned(),
+            count => format!("{journal} holds {count} {records}; {advice}"),
+        }
+    }
+
+    fn resume_advice(&self) -> String {
+        format!("go on with `wiperlab fit {} --resume`", self.file)
+    }
+
+    /// Evaluations to be expected, for the progress: the budget, and about what gate, profiles and twins
+    /// take.
+    fn expected(&self, max_evaluations: Option<usize>) -> usize {
+        let (job, parameters) = (self.job(), self.job().parameters.len());
+        let gate = crate::fit::gate::PROBES * (2 * parameters + 1);
+        let profiles = if job.intervals.profile { 60 * parameters } else { 0 };
+        let all = gate
+            + job.search.global_evaluations
+            + job.search.local_evaluations
+            + profiles
+            + 3 * job.intervals.bootstrap;
+        all.min(max_evaluations.unwrap_or(usize::MAX))
+    }
+}
+
+/// Moves the bar; the time left follows from the evaluations that are made, not from those that were just
+/// replayed.
+fn show(bar: &ProgressBar, now: &Progress, replayed_before: usize) {
+    bar.set_length(bar.length().unwrap_or(0).max(now.evaluations as u64));
+    bar.set_position(now.evaluations as u64);
+    if now.replayed > replayed_before {
+        bar.reset_eta();
+    }
+    bar.set_message(format!("{}, cost {:.4}", now.stage.word(), now.best_cost));
+}

@@ -1,0 +1,133 @@
+//! A fit to traces, with its journal of iterates.
+
+use super::Solved;
+use crate::fit::Ran;
+use crate::fit::iterates::{Journal, Step};
+use crate::fit::result::Status;
+use crate::fit::trace::Branch;
+use crate::fit::trace_ledger::{Division, TraceProgress};
+use crate::journal::Sink;
+use crate::program::failure::Failure;
+use crate::program::files::{Maker, Overwrite, Writer};
+use crate::program::global::Global;
+use crate::program::interrupt;
+use crate::program::journal::{JOURNAL, JournalFile};
+use crate::program::problem::Problem;
+use crate::program::progress;
+use indicatif::ProgressBar;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::time::Instant;
+
+/// Iterates that a stage takes, about, from the recovery study: for the estimate of the time left.
+const ITERATES_A_STAGE: usize = 14;
+/// Starts that most fits take: two that agree.
+const STARTS: usize = 2;
+/// Iterates that a twin takes, about, and a side of a parameter.
+const ITERATES_A_TWIN: usize = 5;
+const ITERATES_A_SIDE: usize = 2;
+
+/// A run of a fit to traces, or of its part in one that is divided.
+pub struct Run<'a> {
+    pub division: Division<'a>,
+    /// Name of the journal, and what it holds where it goes on.
+    pub journal: (&'a str, Option<&'a Journal>),
+    pub most: Option<usize>,
+    /// What to do with what is done when it stops early.
+    pub advice: String,
+    /// Whether progress is said where there is no terminal.
+    pub reports: bool,
+}
+
+impl Problem {
+    /// Fits the traces, and writes the journal as it goes and the result at the end.
+    pub fn solve_traces(
+        &self,
+        global: &Global,
+        resume: bool,
+        most: Option<usize>,
+        overwrite: Overwrite,
+    ) -> Result<Solved, Failure> {
+        let writer = Writer::new(Maker::Fit, overwrite).csv(global.csv_dialect);
+        self.check_place(&writer)?;
+        let path = self.folder.join(JOURNAL);
+        let (mut sink, resumed) = JournalFile::open::<Step>(&path, resume)?;
+        let journal = (&*path.to_string_lossy(), resumed.as_ref());
+        let (division, advice) = (Division::Whole, self.resume_advice());
+        let run = Run { division, journal, most, advice, reports: false };
+        let clock = Instant::now();
+        let (ran, replayed) = self.run_traces(run, &mut sink, global)?;
+        let wall = clock.elapsed();
+        sink.finish()?;
+        let Ran::Whole(result) = ran else {
+            return Err(Failure::Internal(format!("{}: the fit is not whole; please report it", self.file)));
+        };
+        // an earlier result of an interrupted fit stays: what is new is in the journal, and a resumed fit
+        // gives its result
+        if result.status != Status::Interrupted {
+            self.write(&result, &writer)?;
+        }
+        Ok(Solved { result: *result, replayed, wall })
+    }
+
+    /// Makes iterates into a journal; with the number of those that were there already.
+    pub fn run_traces(
+        &self,
+        run: Run<'_>,
+        sink: &mut dyn Sink,
+        global: &Global,
+    ) -> Result<(Ran, usize), Failure> {
+        let Run { division, journal: (name, resumed), most, advice, reports } = run;
+        let expected = self.expected_iterates(&division).min(most.unwrap_or(usize::MAX));
+        let bar = progress::bar(expected as u64, "fit", "iterates", global.quiet);
+        let reporter = progress::Reporter::new(&bar, reports && !global.quiet);
+        let journaled = Arc::new(AtomicUsize::new(resumed.map_or(0, |found| found.records.len())));
+        let kept = self.kept(name, "iterates", advice, &journaled);
+        let stops = interrupt::stops(kept.clone());
+        let mut replayed = 0;
+        let stages = self.problem.segment_s().to_vec();
+        let mut on_iterate = |now: &TraceProgress| {
+            show(&bar, now, replayed, &stages);
+            replayed = now.replayed;
+            journaled.fetch_max(now.iterates, Ordering::Relaxed);
+            reporter.report();
+            interrupt::flow()
+        };
+        let resume = resumed.map(|journal| (name, journal));
+        let fitted = self.problem.fit_divided(division, resume, most, sink, &mut on_iterate);
+        let ran = fitted.map_err(|error| self.failure(&error))?;
+        bar.finish_and_clear();
+        if matches!(&ran, Ran::Whole(result) if result.status == Status::Interrupted) {
+            stops.finishing(&kept());
+        }
+        Ok((ran, replayed))
+    }
+
+    fn expected_iterates(&self, division: &Division) -> usize {
+        let search = STARTS * self.problem.segment_s().len() * ITERATES_A_STAGE;
+        let (twins, parameters) = (self.job().intervals.bootstrap, self.job().parameters.len());
+        let branches = ITERATES_A_TWIN * twins + 2 * ITERATES_A_SIDE * parameters;
+        match division {
+            Division::Shard(shard, _) => search + branches / shard.of(),
+            Division::Whole | Division::Collected(_) => search + branches,
+        }
+    }
+}
+
+/// Moves the bar; the time left follows from the iterates that are made, not from those that were just
+/// replayed.
+fn show(bar: &ProgressBar, now: &TraceProgress, replayed_before: usize, stages: &[f64]) {
+    bar.set_length(bar.length().unwrap_or(0).max(now.iterates as u64));
+    bar.set_position(now.iterates as u64);
+    if now.replayed > replayed_before {
+        bar.reset_eta();
+    }
+    let (bad, all) = (now.bad_segments, now.segments);
+    let length_ms = 1e3 * stages.get(now.stage).copied().unwrap_or_default();
+    let chain = match Branch::of(now.start) {
+        None => format!("start {}", now.start + 1),
+        Some(Branch::Twin(twin)) => format!("twin {}", twin + 1),
+        Some(Branch::Shorter | Branch::Side { .. }) => "intervals".to_owned(),
+    };
+    bar.set_message(format!("{chain}, segments of {length_ms} ms, {bad} of {all} bad, cost {:.1}", now.cost));
+}

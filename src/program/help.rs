@@ -1,0 +1,153 @@
+//! `wiperlab help`: the help of the commands, and pages about files, windows and features.
+
+mod markdown;
+
+use crate::fit::job::Job;
+use crate::program::failure::{Failure, Outcome};
+use crate::program::output::{lines, result};
+use crate::recording::files::RecordingFile;
+use crate::section::Section;
+use crate::simulate::scene::Scene;
+use crate::sweep::Study;
+use crate::text::wrapped;
+use crate::toml_file::{KeyTable, nearest, reference};
+use crate::twin::spec::TwinSpec;
+use clap::{Args, Command};
+use markdown::{section, terminal};
+use serde_json::Value;
+
+/// Widest line of a page, characters.
+const WIDTH: usize = 96;
+
+#[derive(Debug, Args)]
+pub struct HelpArgs {
+    /// A command, such as `fit` or `journal merge`, or a page; all are listed without it
+    #[arg(value_name = "COMMAND|PAGE")]
+    pub words: Vec<String>,
+}
+
+/// What a page shows.
+enum Content {
+    /// Every key of a kind of file.
+    Keys(fn() -> Value),
+    /// A section of the documentation, by the text of its heading.
+    Section(&'static str, &'static str),
+    /// A whole page of the documentation.
+    Whole(&'static str),
+}
+
+/// A page, what it is about, and what it shows.
+type Page = (&'static str, &'static str, Content);
+
+const FITS: &str = include_str!("../../docs/fits.md");
+const SPECTRA: &str = include_str!("../../docs/spectra.md");
+const RELIABILITY: &str = include_str!("../../docs/reliability.md");
+const FIRST_HOUR: &str = include_str!("../../docs/first-hour.md");
+
+const PAGES: [Page; 12] = [
+    ("first-hour", "from a tracking export to a report, step by step", Content::Whole(FIRST_HOUR)),
+    ("scene", "every key of scene.toml", Content::Keys(Scene::schema)),
+    ("job", "every key of job.toml", Content::Keys(Job::schema)),
+    ("study", "every key of study.toml", Content::Keys(Study::schema)),
+    ("twin.toml", "every key of twin.toml", Content::Keys(TwinSpec::schema)),
+    ("recording", "every key of recording.toml", Content::Keys(RecordingFile::schema)),
+    ("section", "every key of section.toml", Content::Keys(Section::schema)),
+    ("windows", "what --window and `window` take", Content::Section(SPECTRA, "The window")),
+    ("components", "what the verdicts on components mean", Content::Section(SPECTRA, "Verdicts")),
+    ("features", "what a fit reads from recording and model", Content::Section(FITS, "Features")),
+    ("traces", "how a fit compares frame by frame", Content::Section(FITS, "Traces")),
+    ("exit-codes", "what the program returns to a shell", Content::Section(RELIABILITY, "Exit codes")),
+];
+
+/// The list of the pages, below the help of the program.
+pub fn pages() -> String {
+    let width = PAGES.iter().map(|(name, ..)| name.len()).max().unwrap_or_default();
+    let rows = PAGES.iter().map(|(name, about, _)| format!("  {name:<width$}  {about}"));
+    let rows: Vec<String> = rows.collect();
+    format!("Pages of `wiperlab help`:\n{}", rows.join("\n"))
+}
+
+impl HelpArgs {
+    pub fn run(&self, program: &mut Command) -> Result<Outcome, Failure> {
+        let page = match self.words.as_slice() {
+            [word] => find(word),
+            _ => None,
+        };
+        let text = match page {
+            Some(content) => content.text(),
+            None => self.of_command(program)?,
+        };
+        result(&lines(text.trim_end()));
+        Ok(Outcome::Done)
+    }
+
+    /// The help of the command that the words name.
+    fn of_command(&self, program: &mut Command) -> Result<String, Failure> {
+        program.build();
+        let mut command = program;
+        for (at, word) in self.words.iter().enumerate() {
+            let known: Vec<String> = command.get_subcommands().map(|c| c.get_name().to_owned()).collect();
+            let Some(next) = known.iter().position(|name| name == word) else {
+                return Err(self.unknown(at, &known));
+            };
+            command = command.get_subcommands_mut().nth(next).ok_or_else(|| self.unknown(at, &known))?;
+        }
+        Ok(command.render_long_help().to_string())
+    }
+
+    fn unknown(&self, at: usize, commands: &[String]) -> Failure {
+        let pages = PAGES.iter().map(|(name, ..)| *name).filter(|_| at == 0);
+        let known: Vec<&str> = commands.iter().map(String::as_str).chain(pages).collect();
+        let word = &self.words[at];
+        let advice = Some(nearest(word, &known)).filter(|advice| advice.starts_with("did you mean"));
+        let advice = advice.unwrap_or_else(|| "`wiperlab help` lists them".to_owned());
+        Failure::Input(format!("help: found `{word}`, expected a command or a page; {advice}"))
+    }
+}
+
+/// The page of a name; a kind of file has it with and without its ending, unless a command has that name.
+fn find(word: &str) -> Option<&'static Content> {
+    let stem = word.strip_suffix(".toml").unwrap_or(word);
+    let page = PAGES.iter().find(|(name, ..)| *name == word || *name == stem);
+    page.map(|(.., content)| content)
+}
+
+impl Content {
+    fn text(&self) -> String {
+        match self {
+            Self::Keys(schema) => keys(&reference(&schema())),
+            Self::Section(page, heading) => terminal(section(page, heading), WIDTH),
+            Self::Whole(page) => terminal(page, WIDTH),
+        }
+    }
+}
+
+/// The keys of a file as a page for the terminal.
+fn keys(tables: &[KeyTable]) -> String {
+    let mut text = String::new();
+    let mut add = |line: &str| {
+        text.push_str(line);
+        text.push('\n');
+    };
+    for table in tables {
+        if !table.name.is_empty() {
+            add("");
+            add(&table.name);
+        }
+        wrapped(&table.about, WIDTH).iter().for_each(|line| add(line));
+        add("");
+        for key in &table.keys {
+            let needed = if key.required { ", required" } else { "" };
+            let value = format!("({}{needed})", key.value);
+            let beside = format!("  {}  {value}", key.name);
+            if beside.chars().count() <= WIDTH {
+                add(&beside);
+            } else {
+                add(&format!("  {}", key.name));
+                wrapped(&value, WIDTH - 6).iter().for_each(|line| add(&format!("      {line}")));
+            }
+            wrapped(&key.meaning, WIDTH - 6).iter().for_each(|line| add(&format!("      {line}")));
+        }
+    }
+    text
+}

@@ -1,0 +1,156 @@
+//! SIGINT, SIGTERM and the time limit. A command that can stop is asked to and finishes with what it has; any
+//! other ends at once. Either way the program says what was computed and ends with the code of an early stop,
+//! and leaves neither half of its files nor a temporary one.
+
+use crate::program::failure::{Failure, STOPPED_EARLY};
+use crate::program::progress;
+use std::io;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
+use std::time::{Duration, Instant};
+use tempfile::NamedTempFile;
+
+/// How long a command that can stop may take to do so: with the rest, an answer comes within a second.
+const GRACE: Duration = Duration::from_millis(800);
+
+/// Whether the program was asked to stop.
+static ASKED: AtomicBool = AtomicBool::new(false);
+
+/// When a command that can stop does so by itself.
+static DEADLINE: OnceLock<Instant> = OnceLock::new();
+
+static STATE: Mutex<State> = Mutex::new(State { kept: None, finishing: false, passing: Vec::new() });
+
+/// What the end of the program has to know.
+struct State {
+    /// What is kept if the program ends now, where the command can stop.
+    kept: Option<Box<dyn Fn() -> String + Send>>,
+    /// Whether the command has stopped and writes what it has.
+    finishing: bool,
+    /// Temporary files that have no place yet, and folders made for them.
+    passing: Vec<PathBuf>,
+}
+
+/// Answers signals from now on.
+pub fn listen() -> Result<(), Failure> {
+    let mut signals = 0;
+    let answer = move || {
+        signals += 1;
+        ASKED.store(true, Ordering::Relaxed);
+        if signals > 1 || state().kept.is_none() {
+            end();
+        }
+        std::thread::spawn(end_if_it_does_not_stop);
+    };
+    ctrlc::set_handler(answer)
+        .map_err(|error| Failure::Internal(format!("signals cannot be answered: {error}")))
+}
+
+/// Whether a computation goes on.
+pub fn flow() -> ControlFlow<()> {
+    if ASKED.load(Ordering::Relaxed) || is_late() {
+        ControlFlow::Break(())
+    } else {
+        ControlFlow::Continue(())
+    }
+}
+
+/// From now on a computation may take this long.
+pub fn limit(time: Duration) {
+    if let Some(deadline) = Instant::now().checked_add(time) {
+        let _ = DEADLINE.set(deadline); // (asked for once)
+    }
+}
+
+fn is_late() -> bool {
+    DEADLINE.get().is_some_and(|deadline| Instant::now() >= *deadline)
+}
+
+/// A command that asks [`flow`] and stops; `kept` says what is on the disk if it does not in time.
+#[must_use]
+pub fn stops(kept: impl Fn() -> String + Send + 'static) -> Stops {
+    state().kept = Some(Box::new(kept));
+    Stops
+}
+
+/// While it lives, the command stops by itself.
+pub struct Stops;
+
+impl Stops {
+    /// The command has stopped and writes what it has: that takes what it takes, or until a second signal.
+    pub fn finishing(&self, what: &str) {
+        state().finishing = true;
+        progress::reached(); // the sentence says it better
+        let why = if ASKED.load(Ordering::Relaxed) { "interrupted" } else { "stopped at the time limit" };
+        warn_line!("{why}: {what}");
+    }
+}
+
+impl Drop for Stops {
+    fn drop(&mut self) {
+        let mut state = state();
+        (state.kept, state.finishing) = (None, false);
+    }
+}
+
+/// Makes a temporary file that goes when the program ends before the file has its place.
+pub fn passing(make: impl FnOnce() -> io::Result<NamedTempFile>) -> io::Result<NamedTempFile> {
+    let mut state = state();
+    let file = make()?;
+    state.passing.push(file.path().to_owned());
+    Ok(file)
+}
+
+/// Makes folders that go when the program ends before there is a file in them; the outermost is first.
+pub fn passing_folders(folders: Vec<PathBuf>, make: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+    let mut state = state();
+    make()?;
+    state.passing.extend(folders);
+    Ok(())
+}
+
+/// The program does not end while this is held: files that belong together get their names together.
+#[must_use]
+pub fn whole() -> Whole {
+    Whole(state())
+}
+
+/// See [`whole`].
+pub struct Whole(MutexGuard<'static, State>);
+
+impl Whole {
+    /// Every temporary file has its place.
+    pub fn placed(mut self) {
+        self.0.passing.clear();
+    }
+}
+
+fn state() -> MutexGuard<'static, State> {
+    STATE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+fn end_if_it_does_not_stop() {
+    std::thread::sleep(GRACE);
+    if !state().finishing {
+        end();
+    }
+}
+
+/// Ends the program; the state is held, so that nothing gets a name meanwhile.
+fn end() -> ! {
+    let state = state();
+    for path in state.passing.iter().rev() {
+        // (the next command clears what is left; of folders only an empty one goes)
+        let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
+    }
+    let kept = state.kept.as_ref().map_or_else(nothing_kept, |kept| kept());
+    let reached = progress::reached().map_or_else(String::new, |reached| format!("{reached}; "));
+    warn_line!("interrupted: {reached}{kept}");
+    std::process::exit(i32::from(STOPPED_EARLY))
+}
+
+fn nothing_kept() -> String {
+    "a file that was not complete is not written".to_owned()
+}

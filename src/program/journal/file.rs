@@ -1,0 +1,247 @@
+//! A journal on disk: locked, shortened by nothing but a torn line, and kept when a new one is begun.
+//!
+//! Every append waits until the disk has the lines (`fdatasync`), and a new file also until the disk has its
+//! name. What was counted or reported survives a power failure.
+
+use super::backup::set_aside;
+use crate::journal::{
+    End, Found, Header, Journal, JournalError, Kind, Record, Sink, Stream, has_whole_line, kind_of,
+};
+use crate::program::failure::Failure;
+use crate::program::files;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{BufRead, BufReader, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Name of a journal in the folder of its fit or study.
+pub const JOURNAL: &str = "journal.jsonl";
+
+/// Longest first line that is looked at, bytes.
+const LONGEST_HEADER: u64 = 1 << 24;
+
+/// A journal on disk.
+pub struct JournalFile {
+    path: PathBuf,
+    /// `None` before the first line of a new journal.
+    file: Option<File>,
+    /// What has to be done with what is there, before the first line is appended.
+    due: Option<Due>,
+    kind: Kind,
+}
+
+/// A journal that is written, and what it holds if it is to be resumed.
+type Opened<T> = Result<(JournalFile, Option<T>), Failure>;
+
+/// What looks at the records of a journal, one by one.
+type Each<'a, R> = dyn FnMut(&Header<<R as Record>::Body>, Found<R>) -> Result<(), JournalError> + 'a;
+
+/// What is done with a journal that is there.
+#[derive(Clone, Copy)]
+enum Due {
+    /// It is kept under another name: hours of work should not be lost because `--resume` was forgotten.
+    SetAside,
+    /// It is continued after this number of bytes, and a line end where the last line has none.
+    Continue { intact_bytes: u64, unended: bool },
+}
+
+impl JournalFile {
+    /// The journal at `path`, or where it will be, and what it holds if it is to be resumed; nothing is
+    /// changed before the first line.
+    pub fn open<R: Record>(path: &Path, resume: bool) -> Opened<Journal<R>> {
+        Self::opened(path, resume, |file, stream| {
+            files::check_size(path, file)?;
+            let journal = stream.whole().map_err(Failure::input)?;
+            let Journal { intact_bytes, torn, unended, .. } = journal;
+            Ok((journal, End { intact_bytes: intact_bytes as u64, torn, unended }))
+        })
+    }
+
+    /// The same where what it holds may be larger than memory: `each` sees its records one by one, and the
+    /// header is given back.
+    pub fn open_each<R: Record>(path: &Path, resume: bool, each: &mut Each<R>) -> Opened<Header<R::Body>> {
+        Self::opened(path, resume, |_, mut stream: Stream<R, _>| {
+            let header = stream.header().clone();
+            while let Some(found) = stream.record().map_err(Failure::input)? {
+                each(&header, found).map_err(Failure::input)?;
+            }
+            Ok((header, stream.end()))
+        })
+    }
+
+    /// Locks the file, and lets `take` read it where it is to be resumed and has a header.
+    fn opened<R: Record, T>(
+        path: &Path,
+        resume: bool,
+        take: impl FnOnce(&File, Stream<R, BufReader<&File>>) -> Result<(T, End), Failure>,
+    ) -> Opened<T> {
+        let name = path.display().to_string();
+        let mut opened = Self::locked(path, R::KIND)?;
+        let refused = |error: std::io::Error| Failure::Input(format!("{name}: cannot be read: {error}"));
+        let Some(file) = &opened.file else {
+            if resume {
+                opened.resume(&name, R::KIND, true, None);
+            }
+            return Ok((opened, None));
+        };
+        if !resume {
+            let mut start = Vec::new();
+            BufReader::new(file.take(LONGEST_HEADER)).read_until(b'\n', &mut start).map_err(refused)?;
+            check_own(&name, &start, R::KIND)?;
+            return Ok((opened, None));
+        }
+        let is_empty = file.metadata().map_err(refused)?.len() == 0;
+        let stream = Stream::<R, _>::open(&name, BufReader::new(file)).map_err(Failure::input)?;
+        let Some(stream) = stream else {
+            opened.resume(&name, R::KIND, is_empty, None);
+            return Ok((opened, None));
+        };
+        let is_unchecked = stream.header().is_unchecked();
+        let (taken, end) = take(file, stream)?;
+        opened.resume(&name, R::KIND, is_empty, Some((end, is_unchecked)));
+        Ok((opened, Some(taken)))
+    }
+
+    fn locked(path: &Path, kind: Kind) -> Result<Self, Failure> {
+        let file = locked(path, kind)?;
+        Ok(Self { path: path.to_owned(), file, due: Some(Due::SetAside), kind })
+    }
+
+    /// Notes how a journal goes on that ends like this, and has no checksums or has; `None` where it has no
+    /// complete header.
+    fn resume(&mut self, name: &str, kind: Kind, is_empty: bool, end: Option<(End, bool)>) {
+        self.due = Some(match end {
+            None => {
+                let lack = if is_empty { "" } else { "no complete header, so " };
+                warn_line!("warning: {name}: {lack}nothing to resume; starting over");
+                let empty = Due::Continue { intact_bytes: 0, unended: false };
+                if is_empty { empty } else { Due::SetAside }
+            }
+            Some((end, is_unchecked)) => {
+                warn_of(name, kind, end.torn, is_unchecked);
+                let End { intact_bytes, unended, .. } = end;
+                if is_unchecked { Due::SetAside } else { Due::Continue { intact_bytes, unended } }
+            }
+        });
+    }
+
+    /// Drops what is torn, also where nothing had to be appended.
+    pub fn finish(mut self) -> Result<(), Failure> {
+        self.prepare().map_err(|problem| Failure::Internal(format!("{}: {problem}", self.path.display())))
+    }
+
+    /// Does what is due.
+    fn prepare(&mut self) -> Result<(), String> {
+        let refused = |error: std::io::Error| error.to_string();
+        match (self.due.take(), &mut self.file) {
+            (Some(Due::Continue { intact_bytes, unended }), Some(file)) => {
+                file.set_len(intact_bytes).map_err(refused)?;
+                if unended { file.write_all(b"\n").map_err(refused) } else { Ok(()) }
+            }
+            (Some(Due::SetAside), Some(_)) => {
+                self.file = None;
+                let kept = set_aside(&self.path).map_err(refused)?;
+                warn_line!("{}: the old journal is kept as {}", self.path.display(), kept.display());
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn write(&mut self, lines: &str) -> Result<(), String> {
+        let refused = |error: std::io::Error| error.to_string();
+        self.prepare()?;
+        let file = match &mut self.file {
+            Some(file) => file,
+            none => none.insert(begin(&self.path, self.kind)?),
+        };
+        file.write_all(lines.as_bytes()).and_then(|()| file.sync_data()).map_err(refused)
+    }
+}
+
+impl Sink for JournalFile {
+    fn append(&mut self, lines: &str) -> Result<(), String> {
+        self.write(lines).map_err(|problem| format!("{}: {problem}", self.path.display()))
+    }
+}
+
+/// A new journal, whose name the disk has.
+fn begin(path: &Path, kind: Kind) -> Result<File, String> {
+    let refused = |error: std::io::Error| error.to_string();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    fs::create_dir_all(folder).map_err(refused)?;
+    let file = OpenOptions::new().create(true).append(true).open(path).map_err(refused)?;
+    lock(&file, kind)?;
+    sync_folder(folder);
+    Ok(file)
+}
+
+/// Waits until the disk has the names in a folder, where the system can.
+fn sync_folder(folder: &Path) {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let _ = File::open(folder).and_then(|folder| folder.sync_all()); // (Windows opens no folder)
+}
+
+fn warn_of(name: &str, kind: Kind, torn: bool, is_unchecked: bool) {
+    if torn {
+        let record = kind.record();
+        warn_line!(
+            "warning: {name}: the last line is incomplete and was dropped; its {record} is computed again"
+        );
+    }
+    if is_unchecked {
+        warn_line!("warning: {name}: {}", unchecked(kind));
+    }
+}
+
+/// What a journal of layout 2 lacks, in words.
+pub fn unchecked(kind: Kind) -> String {
+    format!(
+        "a journal of layout 2, whose lines have no checksums: a digit that was changed in what {} gave cannot be found",
+        match kind {
+            Kind::Fit => "an evaluation",
+            Kind::Trace => "an iterate",
+            Kind::Sweep => "a point",
+        }
+    )
+}
+
+/// The file, if there is one.
+pub fn locked(path: &Path, kind: Kind) -> Result<Option<File>, Failure> {
+    let refused = |problem: String| Failure::Input(format!("{}: {problem}", path.display()));
+    let file = match OpenOptions::new().read(true).append(true).open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => {
+            return Err(refused(format!(
+                "cannot be read and written: {error}; correct that, or move it away"
+            )));
+        }
+    };
+    if !file.metadata().is_ok_and(|found| found.is_file()) {
+        return Err(refused("found no regular file, expected a journal; move it away".to_owned()));
+    }
+    lock(&file, kind).map_err(refused)?;
+    Ok(Some(file))
+}
+
+/// Two programs that append to one file would tear each other's lines. File systems without locks are taken
+/// as they are.
+fn lock(file: &File, kind: Kind) -> Result<(), String> {
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(format!(
+            "another {kind} is writing this journal; wait until it has ended, or use a folder of its own"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Only a journal of the same kind of input, or what is left of one, gives way to a new one: a job may turn
+/// from features to traces.
+fn check_own(name: &str, bytes: &[u8], kind: Kind) -> Result<(), Failure> {
+    if !has_whole_line(bytes) || kind_of(bytes).is_some_and(|found| found.input() == kind.input()) {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{name}: found a file that is no journal of a {kind}; choose another folder, or move it away"
+    )))
+}

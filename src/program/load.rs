@@ -1,0 +1,144 @@
+//! Scenes from disk, and recordings: a folder with `trace.csv` and `recording.toml`, or a `trace.csv` alone.
+
+use crate::import::sha256;
+use crate::plausibility;
+use crate::program::failure::Failure;
+use crate::program::files::{self, Maker, Marker, SIMULATION_SUMMARY, is_simulation_summary};
+use crate::program::global::Global;
+use crate::recording::Recording;
+use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_recording};
+use crate::recording::quality::{Check, Finding, Severity};
+use crate::simulate::scene::Scene;
+use crate::text::text_sha256;
+use crate::toml_file;
+use std::path::{Path, PathBuf};
+
+/// Reads a scene that the user named, with the recording that drives it, if one does.
+pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
+    Ok(read_driven_scene(path)?.0)
+}
+
+/// The same with the place of the recording that drives it, if one does.
+pub fn read_driven_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
+    let mut driver = None;
+    let recording = |named: &str| {
+        let place = recording_of(path, named)?;
+        let loaded = load_recording(&place).map_err(|failure| failure.to_string())?;
+        driver = Some(place);
+        Ok(loaded.recording)
+    };
+    let scene = Scene::parse_with(&path.display().to_string(), &files::read_toml(path)?, recording);
+    scene.map(|scene| (scene, driver)).map_err(Failure::input)
+}
+
+/// Says what is hard to believe in a file.
+pub fn warn_of(file: &Path, findings: &[plausibility::Finding], global: &Global) {
+    for finding in findings.iter().filter(|_| !global.quiet) {
+        warn_line!("warning: {}: {finding}", file.display());
+    }
+}
+
+/// Where a scene's recording lies: from the working directory, or else from the scene's folder.
+pub fn recording_of(scene: &Path, named: &str) -> Result<PathBuf, String> {
+    let in_folder = scene.parent().unwrap_or(Path::new("")).join(named);
+    let places = [PathBuf::from(named), in_folder];
+    places.iter().find(|place| place.exists()).cloned().ok_or_else(|| {
+        let searched = places.each_ref().map(|place| format!("`{}`", place.display())).join(" and ");
+        format!("found no recording \"{named}\", searched {searched}; expected its folder (data/NAME) or its trace.csv, from the working directory or the scene's folder{}", toml_file::path_hint(named))
+    })
+}
+
+/// A recording with its description, where it has one.
+#[derive(Debug)]
+pub struct Loaded {
+    pub recording: Recording,
+    pub file: Option<RecordingFile>,
+}
+
+impl Loaded {
+    /// Sources that lie in the folder of the recording at `path` but are no longer what was imported.
+    pub fn changed_sources(&self, path: &Path) -> Option<Finding> {
+        let source = self.file.as_ref()?.source.as_ref()?;
+        let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
+        let changed = source.file.all().iter().zip(source.sha256.all()).filter(|(name, hash)| {
+            let copy = folder.join(name);
+            copy.is_file() && files::read(&copy).is_ok_and(|bytes| sha256(&bytes) != **hash)
+        });
+        let names: Vec<&str> = changed.map(|(name, _)| name.as_str()).collect();
+        let words = match names.len() {
+            0 => return None,
+            1 => format!("{} is not the file that was imported (its SHA-256 differs)", names[0]),
+            _ => format!("{} are not the files that were imported (their SHA-256 differ)", names.join(", ")),
+        };
+        Some(
+            Finding::new(Check::SourceChanged, Severity::Caution, names.len() as f64, "files", words)
+                .advise("import it into a new folder"),
+        )
+    }
+}
+
+/// Reads the recording at `path`: a folder, or a trace alone; a description next to the trace counts in
+/// either case.
+pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
+    let (folder, trace) = places(path)?;
+    let text = files::read_text(&trace)?;
+    let description = folder.join(DESCRIPTION_FILE);
+    let file = if description.is_file() && !files::is_standard_input(path) {
+        let shown = description.display().to_string();
+        Some(RecordingFile::parse(&shown, &files::read_toml(&description)?).map_err(Failure::input)?)
+    } else {
+        None
+    };
+    let name = files::display_name(if path.is_dir() { path } else { &trace });
+    let recording =
+        read_recording(&name, &trace.display().to_string(), &text, file.as_ref()).map_err(Failure::input)?;
+    let recording = if file.is_none() && is_simulated(&folder, &trace, &text)? {
+        marked_synthetic(recording)?
+    } else {
+        recording
+    };
+    Ok(Loaded { recording, file })
+}
+
+/// Whether a command made the trace without a description, as `simulate` does: the marker of its folder says
+/// so, or where there is none the summary of the simulation.
+fn is_simulated(folder: &Path, trace: &Path, text: &str) -> Result<bool, Failure> {
+    let (marker, _) = Marker::of(folder)?;
+    let name = trace.file_name().unwrap_or_default().to_string_lossy();
+    let Some(made) = marker.files.get(name.as_ref()) else {
+        return Ok(name == TRACE_FILE && is_simulation_summary(&folder.join(SIMULATION_SUMMARY)));
+    };
+    if made.by == Maker::Import || made.is(&text_sha256(text)) {
+        return Ok(made.by != Maker::Import);
+    }
+    Err(Failure::Input(format!(
+        "{}: found a trace that was changed or replaced since `wiperlab {by}` wrote it, so that nothing says whether a camera took it; expected what {by} wrote: run it again into another folder or, where the change is intended, copy the trace alone into a folder of its own",
+        trace.display(),
+        by = made.by.word()
+    )))
+}
+
+/// Folder and trace of a recording.
+fn places(path: &Path) -> Result<(PathBuf, PathBuf), Failure> {
+    if !path.is_dir() {
+        let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
+        return Ok((folder, path.to_owned()));
+    }
+    let trace = path.join(TRACE_FILE);
+    if !trace.is_file() {
+        let advice = "expected the folder of a recording, with `trace.csv` in it; make one with `wiperlab import`, or name a trace.csv";
+        return Err(Failure::Input(format!("{}: found no {TRACE_FILE}, {advice}", path.display())));
+    }
+    Ok((path.to_owned(), trace))
+}
+
+fn marked_synthetic(recording: Recording) -> Result<Recording, Failure> {
+    Recording::new(recording.name(), recording.grid(), recording.traces().clone(), true)
+        .map_err(Failure::internal)
+}
+
+/// Whether a file is written as a study: it has axes or maps, which no job has.
+pub fn is_study(file: &Path) -> Result<bool, Failure> {
+    let table: Option<toml::Table> = files::read_toml(file)?.parse().ok();
+    Ok(table.is_some_and(|table| ["axis", "map"].iter().any(|key| table.contains_key(*key))))
+}

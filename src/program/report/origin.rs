@@ -1,0 +1,126 @@
+//! Where the numbers of a fit come from: its files with their hashes, and the commands that make it again.
+
+use super::{Fit, JOB};
+use crate::import::sha256;
+use crate::program::failure::Failure;
+use crate::program::files;
+use crate::program::files::RESULT;
+use crate::program::load::{Loaded, load_recording, recording_of};
+use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE};
+use crate::report::{Provenance, SourceFile};
+use std::path::{Component, Path, PathBuf};
+
+pub fn provenance(fit: &Fit) -> Result<Provenance, Failure> {
+    let within = format!("fits/{}", fit.name);
+    let named = |path: &str| tidy(&within, path);
+    let mut files = vec![
+        hashed("job", named(JOB), &fit.folder.join(JOB), false)?,
+        hashed("result", named(RESULT), &fit.folder.join(RESULT), fit.result.synthetic)?,
+    ];
+    for condition in &fit.problem.job().conditions {
+        files.extend(scene(named(&condition.scene), &fit.problem.folder.join(&condition.scene))?);
+    }
+    for (named, (path, loaded)) in fit.problem.job().recordings().map(named).zip(fit.problem.recordings()) {
+        files.extend(recording("", &named, &path, loaded)?);
+    }
+    let mut once: Vec<SourceFile> = Vec::new();
+    for file in files {
+        if !once.contains(&file) {
+            once.push(file);
+        }
+    }
+    let commands = vec![format!("wiperlab fit {within}/{JOB}"), format!("wiperlab report {within}")];
+    let (version, seed, fingerprint) =
+        (fit.result.version.clone(), Some(fit.result.seed), fit.result.fingerprint.clone());
+    Ok(Provenance { version, seed, fingerprint, files: once, commands })
+}
+
+fn hashed(kind: &str, name: String, path: &Path, synthetic: bool) -> Result<SourceFile, Failure> {
+    Ok(SourceFile { kind: kind.to_owned(), name, sha256: sha256(&files::read(path)?), synthetic })
+}
+
+/// A scene, and the recording that drives it where one does.
+fn scene(name: String, path: &Path) -> Result<Vec<SourceFile>, Failure> {
+    let text = files::read_toml(path)?;
+    let mut found = vec![hashed("scene", name.clone(), path, false)?];
+    let written: toml::Table =
+        text.parse().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
+    let drive = written.get("drive").and_then(|drive| drive.get("recording")).and_then(toml::Value::as_str);
+    if let Some(named) = drive {
+        let at = recording_of(path, named)
+            .map_err(|problem| Failure::Input(format!("{}: {problem}", path.display())))?;
+        // named from the working directory, or else from the scene's folder
+        let shown = if at == Path::new(named) {
+            named.to_owned()
+        } else {
+            tidy(name.rsplit_once('/').map_or("", |(folder, _)| folder), named)
+        };
+        found.extend(recording("drive ", &shown, &at, &load_recording(&at)?)?);
+    }
+    Ok(found)
+}
+
+/// Trace, description and exports of a recording; the hashes of exports are those of its import.
+fn recording(role: &str, name: &str, path: &Path, loaded: &Loaded) -> Result<Vec<SourceFile>, Failure> {
+    let synthetic = loaded.recording.is_synthetic();
+    let (folder, within, trace) = match path.is_dir() {
+        true => (path.to_owned(), name.to_owned(), TRACE_FILE.to_owned()),
+        false => {
+            (path.parent().map_or_else(PathBuf::new, Path::to_owned), parent(name), files::display_name(path))
+        }
+    };
+    let placed = |file: &str| tidy(&within, file);
+    let mut found = vec![hashed(&format!("{role}trace"), placed(&trace), &folder.join(&trace), synthetic)?];
+    if loaded.file.is_some() {
+        found.push(hashed(
+            &format!("{role}description"),
+            placed(DESCRIPTION_FILE),
+            &folder.join(DESCRIPTION_FILE),
+            synthetic,
+        )?);
+    }
+    let exports = loaded.file.iter().filter_map(|file| file.source.as_ref());
+    let export = |(name, sha256): (&String, &String)| SourceFile {
+        kind: format!("{role}export"),
+        name: placed(name),
+        sha256: sha256.clone(),
+        synthetic,
+    };
+    found.extend(exports.flat_map(|source| {
+        source.file.all().iter().zip(source.sha256.all()).map(export).collect::<Vec<_>>()
+    }));
+    Ok(found)
+}
+
+fn parent(name: &str) -> String {
+    name.rsplit_once('/').map_or_else(String::new, |(folder, _)| folder.to_owned())
+}
+
+/// A path relative to where the folder `within` lies, without its detours; one that leads further up, or
+/// starts at the root, as written.
+fn tidy(within: &str, path: &str) -> String {
+    let whole = Path::new(within).join(path);
+    let mut parts: Vec<String> = Vec::new();
+    for part in whole.components() {
+        match part {
+            Component::Normal(name) => parts.push(name.to_string_lossy().into_owned()),
+            Component::CurDir => {}
+            Component::ParentDir if parts.pop().is_some() => {}
+            _ => return path.to_owned(),
+        }
+    }
+    parts.join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::tidy;
+
+    #[test]
+    fn paths_are_those_of_the_project() {
+        assert_eq!(tidy("fits/x", "../../data/scenes/a.toml"), "data/scenes/a.toml");
+        assert_eq!(tidy("fits/x", "job.toml"), "fits/x/job.toml");
+        assert_eq!(tidy("fits/x", "../../../elsewhere/a.toml"), "../../../elsewhere/a.toml");
+        assert_eq!(tidy("fits/x", "/root/a.toml"), "/root/a.toml");
+    }
+}

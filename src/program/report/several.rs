@@ -1,0 +1,97 @@
+//! Several fits side by side.
+
+use super::folder::{self, Output};
+use super::{Fit, reports_folder};
+use crate::program::failure::Failure;
+use crate::program::files::{self, Writer};
+use crate::program::global::Global;
+use crate::program::progress;
+use crate::report::comparison;
+use crate::report::several::{Fitted, compare, page, several_json};
+use std::path::{Path, PathBuf};
+
+/// Longest name of a folder that is made up: far from what file systems take, and still one that a person
+/// types.
+const LONGEST_NAME: usize = 100;
+
+/// Writes the comparison of fits; says whether any of them does not explain its recording or misses a
+/// component.
+pub fn write(
+    fits: &[PathBuf],
+    out: Option<&Path>,
+    writer: &Writer,
+    global: &Global,
+) -> Result<bool, Failure> {
+    distinct(fits)?;
+    let out = out.map_or_else(|| default_folder(fits), |out| Ok(out.to_owned()))?;
+    folder::check(&out, writer)?;
+    let steps = progress::steps("report", global.quiet);
+    steps.on("reading the fits, running and comparing their models");
+    let fits = fits.iter().map(|fit| Fit::load(fit)).collect::<Result<Vec<_>, _>>()?;
+    let best = fits.iter().map(Fit::best).collect::<Result<Vec<_>, _>>()?;
+    let reports = fits
+        .iter()
+        .zip(&best)
+        .map(|(fit, best)| fit.report(comparison::in_words, best))
+        .collect::<Result<Vec<_>, _>>()?;
+    let measured: Vec<_> = fits.iter().map(Fit::measured).collect();
+    let fitted = |((fit, report), (best, measured))| {
+        let fit: &Fit = fit;
+        Fitted { name: &fit.name, report, job: fit.problem.job(), measured, best }
+    };
+    let fitted: Vec<Fitted> = fits
+        .iter()
+        .zip(&reports)
+        .zip(best.iter().map(Vec::as_slice).zip(measured.iter().map(Vec::as_slice)))
+        .map(fitted)
+        .collect();
+    let several = compare(&fitted);
+    let json = several_json(&several).map_err(Failure::internal)?;
+    let output = Output {
+        figures: several.figures.iter().collect(),
+        json,
+        tables: &[],
+        page: page(&several),
+        summary: several.summary(),
+    };
+    drop(steps);
+    output.write(&out, writer, global)?;
+    Ok(!several.passes())
+}
+
+/// Refuses a fit that is given twice, and two fits that would go by the same name.
+fn distinct(fits: &[PathBuf]) -> Result<(), Failure> {
+    let place = |fit: &PathBuf| fit.canonicalize().unwrap_or_else(|_| fit.clone());
+    for (i, fit) in fits.iter().enumerate() {
+        for other in &fits[..i] {
+            if place(fit) == place(other) {
+                return Err(Failure::Input(format!(
+                    "{}: given twice, expected different fits; leave one out",
+                    fit.display()
+                )));
+            }
+            let name = files::display_name(fit);
+            if name == files::display_name(other) {
+                let (a, b) = (other.display(), fit.display());
+                return Err(Failure::Input(format!(
+                    "{b}: called `{name}` like {a}, expected fits of different names; rename one of the \
+                     folders"
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `reports/A-and-B` next to the first fit's folder `fits`.
+fn default_folder(fits: &[PathBuf]) -> Result<PathBuf, Failure> {
+    let name = fits.iter().map(|fit| files::display_name(fit)).collect::<Vec<_>>().join("-and-");
+    if name.len() > LONGEST_NAME {
+        let found = name.len();
+        return Err(Failure::Input(format!(
+            "FIT: the names of the fits make a folder name of {found} bytes, expected at most \
+             {LONGEST_NAME}; name a folder with --out DIR"
+        )));
+    }
+    Ok(fits.first().map(|fit| reports_folder(fit)).unwrap_or_default().join(name))
+}

@@ -1,0 +1,289 @@
+//! `wiperlab spectrum`.
+
+mod tables;
+
+use crate::program::count::count;
+use crate::program::failure::{Failure, Outcome};
+use crate::program::files::{Maker, Overwrite, Place, Writer, drawn, write_outputs};
+use crate::program::global::Global;
+use crate::program::load::{Loaded, load_recording};
+use crate::program::progress;
+use crate::recording::Recording;
+use crate::recording::channel::{Channel, Instants, Window};
+use crate::report::analysis::{AnalysedWindow, compared};
+use crate::report::chart::Figure;
+use crate::report::figure::spectrum::{self, Spectra};
+use crate::spectrum::{Analysis, Detrend, FASTEST_HZ, MAX_COMPONENTS, Record, Settings};
+use crate::twin::film::{Dropouts, film_like};
+use clap::Args;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// The tables of a spectrum.
+const TABLES: [&str; 4] = ["components.json", "spectrum.json", "spectrum.csv", "ridge.csv"];
+/// How the trend is chosen from the record.
+const AUTO: &str = "auto";
+/// Seed of the tracking noise with which a simulated trace is filmed.
+const FILM_SEED: u64 = 0;
+
+#[derive(Debug, Args)]
+pub struct SpectrumArgs {
+    /// A recording's folder, or a trace.csv alone
+    #[arg(value_name = "RECORDING")]
+    pub recording: PathBuf,
+    /// Quantity: deflection, head-drop, tip-x or head-x
+    #[arg(long, default_value = "deflection", value_name = "CHANNEL")]
+    pub channel: String,
+    /// Window: before, stick, flip or after (`after[2]`), seconds (`0.10..0.25`), or from found instants
+    /// (`release+0.02..release[2]-0.1`); default: all
+    #[arg(long, default_value = "..", value_name = "A..B", allow_hyphen_values = true)]
+    pub window: String,
+    /// What is removed first: auto, none, mean, line, cubic, polynomial:N or high-pass:HZ
+    #[arg(long, default_value = AUTO, value_name = "TREND")]
+    pub detrend: String,
+    /// Band in which components are sought, Hz; default: all
+    #[arg(long, value_name = "LO..HI", allow_hyphen_values = true)]
+    pub band: Option<String>,
+    /// Most components listed
+    #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N", value_parser = count,
+        allow_negative_numbers = true)]
+    pub max_components: usize,
+    /// Exposure of a frame, s (default: as recording.toml says)
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub exposure_s: Option<f64>,
+    /// Fastest oscillation that the blade may show, Hz: what could fold onto a component is looked for up to
+    /// it
+    #[arg(long, default_value_t = FASTEST_HZ, value_name = "HZ", allow_negative_numbers = true)]
+    pub fastest_hz: f64,
+    /// A recording whose camera the trace is seen through first: its rate, exposure, noise and lost frames;
+    /// both are analysed alike
+    #[arg(long, value_name = "RECORDING")]
+    pub like: Option<PathBuf>,
+    /// Folder for components.json, spectrum.json, the tables and the figures
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+/// The command line once checked.
+struct Request {
+    channel: Channel,
+    window: Window,
+    settings: Settings,
+}
+
+/// A recording, its window and what is in it.
+struct Studied {
+    recording: Recording,
+    exposure_s: Option<f64>,
+    frames: Range<usize>,
+    analysis: Analysis,
+    /// What was done, in words.
+    note: String,
+    /// What to try instead, where the window asks for it.
+    hint: Option<String>,
+}
+
+impl SpectrumArgs {
+    /// The command with its defaults.
+    pub fn new(recording: &Path, channel: &str, window: &str, out: &Path, overwrite: Overwrite) -> Self {
+        Self {
+            recording: recording.to_owned(),
+            channel: channel.to_owned(),
+            window: window.to_owned(),
+            detrend: AUTO.to_owned(),
+            band: None,
+            max_components: MAX_COMPONENTS,
+            exposure_s: None,
+            fastest_hz: FASTEST_HZ,
+            like: None,
+            out: out.to_owned(),
+            overwrite,
+        }
+    }
+
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        let request = self.request()?;
+        Place::check(&self.out, &self.writer(global), &TABLES)?;
+        let steps = progress::steps("spectrum", global.quiet);
+        steps.on("reading the recording");
+        let loaded = load_recording(&self.recording)?;
+        steps.on("analysing the window");
+        let Some(like) = &self.like else {
+            let studied = request.study(self.exposure_of(&loaded)?, loaded.recording)?;
+            let outputs = request.outputs(&studied)?;
+            drop(steps);
+            return self.finish(global, &request, &outputs, &[&studied]);
+        };
+        let model = load_recording(like)?;
+        let exposure_s = self.exposure_of(&model)?;
+        let filmed = film_like(&loaded.recording, &model.recording, exposure_s.unwrap_or(0.0), FILM_SEED)
+            .map_err(|e| {
+                Failure::Input(format!("{} like {}: {e}", self.recording.display(), like.display()))
+            })?;
+        let mut simulated = request.study(exposure_s, filmed.recording)?;
+        let frames = if filmed.dropouts == Dropouts::SameFrames {
+            "the same frames lost"
+        } else {
+            "as many frames lost"
+        };
+        simulated.note = format!(
+            "{}; seen as in {}: its rate, exposure and noise, {frames}",
+            simulated.note,
+            model.recording.name()
+        );
+        let measured = request.study(exposure_s, model.recording)?;
+        let mut outputs = request.outputs(&simulated)?;
+        outputs.push(("components-like.json".to_owned(), tables::components(&measured)?));
+        outputs.extend(drawn("comparison", &request.comparison(&simulated, &measured)));
+        drop(steps);
+        self.finish(global, &request, &outputs, &[&simulated, &measured])
+    }
+
+    fn finish(
+        &self,
+        global: &Global,
+        request: &Request,
+        outputs: &[(String, Vec<u8>)],
+        studied: &[&Studied],
+    ) -> Result<Outcome, Failure> {
+        write_outputs(&self.out, &self.writer(global), outputs)?;
+        if !global.quiet {
+            studied.iter().for_each(|studied| tables::summary(request.channel, studied));
+        }
+        Ok(Outcome::Done)
+    }
+
+    fn writer(&self, global: &Global) -> Writer {
+        Writer::new(Maker::Spectrum, self.overwrite).csv(global.csv_dialect)
+    }
+
+    /// Exposure as given, or as the recording says.
+    fn exposure_of(&self, loaded: &Loaded) -> Result<Option<f64>, Failure> {
+        match self.exposure_s {
+            Some(found) if !(found.is_finite() && found > 0.0) => Err(Failure::Input(format!(
+                "--exposure-s: found {found}, expected a time in seconds above 0, like 0.0002"
+            ))),
+            Some(exposure_s) => Ok(Some(exposure_s)),
+            None => Ok(loaded.file.as_ref().and_then(|file| file.camera.exposure_s)),
+        }
+    }
+
+    fn request(&self) -> Result<Request, Failure> {
+        let named =
+            |option: &str, error: &dyn std::fmt::Display| Failure::Input(format!("{option}: {error}"));
+        let channel = Channel::parse(&self.channel).map_err(|e| named("--channel", &e))?;
+        let window = Window::parse(&self.window).map_err(|e| named("--window", &e))?;
+        let detrend = (self.detrend != AUTO).then(|| Detrend::parse(&self.detrend)).transpose();
+        let detrend = detrend.map_err(|e| named("--detrend", &format!("{e}, or `{AUTO}`")))?;
+        let band_hz = self.band.as_deref().map(band).transpose()?;
+        if !(self.fastest_hz.is_finite() && self.fastest_hz > 0.0) {
+            return Err(Failure::Input(format!(
+                "--fastest-hz: found {}, expected a frequency in Hz above 0",
+                self.fastest_hz
+            )));
+        }
+        let settings = Settings {
+            detrend,
+            band_hz,
+            max_components: self.max_components,
+            fastest_hz: self.fastest_hz,
+            ..Settings::default()
+        };
+        Ok(Request { channel, window, settings })
+    }
+}
+
+impl Request {
+    fn study(&self, exposure_s: Option<f64>, recording: Recording) -> Result<Studied, Failure> {
+        let instants = Instants::find(&recording);
+        let frames = self.window.resolve(&recording, &instants).map_err(Failure::input)?;
+        let grid = recording.grid();
+        let samples = self.channel.samples(&recording);
+        let inside = samples.get(frames.clone()).unwrap_or_default(); // a resolved window lies inside
+        let record = Record { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
+        let refuse = |error| {
+            Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window))
+        };
+        let analysis = Analysis::of(&record, &self.settings).map_err(refuse)?;
+        let hint = flip_inside(&instants, (grid.time_s(frames.start), grid.time_s(frames.end)));
+        let frames = frames.start + analysis.left_out..frames.end;
+        let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
+        let cut = if analysis.left_out >= analysis.stride {
+            ", cut behind a flip that no trend describes"
+        } else {
+            ""
+        };
+        let kept = match analysis.stride {
+            1 => String::new(),
+            stride => {
+                format!(" (one of {stride} is tracked: {:.6} frames/s)", grid.frame_rate_hz / stride as f64)
+            }
+        };
+        let note = format!(
+            "{from_s:.4} s to {to_s:.4} s{cut}, {} frames{kept}, {} removed",
+            frames.len(),
+            analysis.removed
+        );
+        Ok(Studied { recording, exposure_s, frames, analysis, note, hint })
+    }
+
+    fn outputs(&self, studied: &Studied) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+        let shown = AnalysedWindow {
+            recording: &studied.recording,
+            channel: self.channel,
+            frames: studied.frames.clone(),
+            analysis: &studied.analysis,
+            note: studied.note.clone(),
+        };
+        let mut outputs = vec![
+            (TABLES[0].to_owned(), tables::components(studied)?),
+            (TABLES[1].to_owned(), tables::description(self, studied)?),
+            (TABLES[2].to_owned(), tables::spectrum(&studied.analysis)),
+            (TABLES[3].to_owned(), tables::ridge(&shown.course())),
+        ];
+        outputs.extend(shown.figures().iter().flat_map(|(name, figure)| drawn(name, figure)));
+        Ok(outputs)
+    }
+
+    /// Both spectra in one figure.
+    fn comparison(&self, simulated: &Studied, measured: &Studied) -> Figure {
+        let shown = Spectra {
+            quantity: self.channel.to_string(),
+            note: format!(
+                "spectra of {} and {}; model: {}; recording: {}",
+                measured.recording.name(),
+                simulated.recording.name(),
+                simulated.note,
+                measured.note
+            ),
+            synthetic: measured.recording.is_synthetic(),
+            ..compared(Some(&measured.analysis), Some(&simulated.analysis))
+        };
+        spectrum::figure(&Spectra { title: spectrum::strongest(&shown), ..shown })
+    }
+}
+
+/// What to do where the window holds a whole flip and more: nothing slow and steady describes both of its
+/// sides.
+fn flip_inside(instants: &Instants, (from_s, to_s): (f64, f64)) -> Option<String> {
+    let flips =
+        instants.reversals.iter().enumerate().filter_map(|(i, reversal)| Some((i + 1, reversal.flip?)));
+    let (k, flip) = flips.into_iter().find(|(_, flip)| from_s < flip.start_s && flip.end_s < to_s)?;
+    let after = if instants.reversals.len() > 1 { format!("after[{k}]") } else { "after".to_owned() };
+    Some(format!(
+        "the window holds the flip from {:.4} s to {:.4} s; `--window {after}` starts behind it",
+        flip.start_s, flip.end_s
+    ))
+}
+
+fn band(text: &str) -> Result<(f64, f64), Failure> {
+    let ends = text
+        .split_once("..")
+        .and_then(|(low, high)| Some((low.trim().parse().ok()?, high.trim().parse().ok()?)));
+    let ordered = ends.filter(|(low, high): &(f64, f64)| *low >= 0.0 && low < high && high.is_finite());
+    ordered.ok_or_else(|| {
+        Failure::Input(format!("--band: found `{text}`, expected two frequencies in Hz with `..` between them, the lower first, like `60..100`"))
+    })
+}

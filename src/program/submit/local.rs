@@ -1,0 +1,174 @@
+//! Tasks as processes on this machine: several at once, each with its cores. Then the shards are put
+//! together.
+
+use super::plan::Plan;
+use super::shell;
+use crate::program::failure::{BAD_INPUT, Failure, Outcome, STOPPED_EARLY};
+use crate::program::global::Global;
+use crate::program::{interrupt, progress};
+use std::fs::{self, File};
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::thread::sleep;
+use std::time::Duration;
+
+/// From one look at the processes to the next.
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// The command of a task, as words.
+fn command(plan: &Plan, task: usize) -> Vec<String> {
+    let mut words = plan.task();
+    words.extend(["--shard".to_owned(), format!("{task}/{}", plan.shards)]);
+    words.extend(["--threads".to_owned(), plan.threads.to_string()]);
+    if let Some(limit) = plan.time_limit() {
+        words.extend(["--time-limit".to_owned(), format!("{}s", limit.as_secs())]);
+    }
+    words
+}
+
+/// All commands on standard output.
+pub fn show(plan: &Plan) {
+    let commands = plan.tasks.iter().map(|task| command(plan, task));
+    for words in commands.chain([plan.collect()]) {
+        print_line!("{} {}", shell::quoted(&plan.program), shell::line(&words));
+    }
+}
+
+/// Runs the tasks, then puts the shards together.
+pub fn run(plan: &Plan, global: &Global) -> Result<Outcome, Failure> {
+    plan.make_logs()?;
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let at_once = (cores / plan.threads).max(1);
+    let kept = format!(
+        "the points that were done are in {}; the same command goes on",
+        plan.work.folder().display()
+    );
+    let stops = interrupt::stops({
+        let kept = kept.clone();
+        move || kept.clone()
+    });
+    let bar = progress::bar(plan.tasks.len() as u64, "submit", "tasks", global.quiet);
+    let mut tasks = plan.tasks.iter();
+    let (mut running, mut ended): (Vec<Task>, Vec<Ended>) = (Vec::new(), Vec::new());
+    loop {
+        if interrupt::flow().is_break() {
+            drop(running); // (they are killed)
+            bar.finish_and_clear();
+            stops.finishing(&kept);
+            return Ok(Outcome::StoppedEarly);
+        }
+        // what one refuses the others refuse too
+        let refused = ended.iter().any(Ended::is_refused);
+        while !refused && running.len() < at_once {
+            let Some(task) = tasks.next() else { break };
+            running.push(Task::start(plan, task)?);
+        }
+        if running.is_empty() {
+            break;
+        }
+        sleep(PAUSE);
+        let mut still = Vec::new();
+        for task in running {
+            match task.end()? {
+                Ok(end) => {
+                    bar.inc(1);
+                    ended.push(end);
+                }
+                Err(task) => still.push(task),
+            }
+        }
+        running = still;
+    }
+    bar.finish_and_clear();
+    if let Some(end) = ended.iter().find(|end| end.is_refused()) {
+        return Err(Failure::Input(end.message(plan)));
+    }
+    for end in ended.iter().filter(|end| end.has_failed()) {
+        warn_line!("warning: {}", end.message(plan));
+    }
+    drop(stops);
+    collect(plan, global)
+}
+
+/// The job at the end: it says by itself what is missing.
+fn collect(plan: &Plan, global: &Global) -> Result<Outcome, Failure> {
+    let mut command = Command::new(&plan.program);
+    command.args(plan.collect()).args(global.quiet.then_some("--quiet"));
+    let status = command.status().map_err(|error| unstarted(plan, &error))?;
+    match status.code() {
+        Some(0) => Ok(Outcome::Done),
+        Some(code) if code == i32::from(STOPPED_EARLY) => Ok(Outcome::StoppedEarly),
+        Some(code) if code == i32::from(BAD_INPUT) => {
+            Err(Failure::Input("the shards cannot be put together, see above".to_owned()))
+        }
+        _ => Err(Failure::Internal(format!("`wiperlab collect` failed ({status})"))),
+    }
+}
+
+fn unstarted(plan: &Plan, error: &std::io::Error) -> Failure {
+    Failure::Internal(format!("{}: cannot be started: {error}", plan.program))
+}
+
+/// A task that runs; dropped, it is killed, and loses the points on which it was working.
+struct Task {
+    number: usize,
+    child: Child,
+    log: PathBuf,
+}
+
+impl Task {
+    fn start(plan: &Plan, number: usize) -> Result<Self, Failure> {
+        let log = plan.logs().join(format!("{number}-of-{}.log", plan.shards));
+        let unmade = |error| Failure::Internal(format!("{}: cannot be written: {error}", log.display()));
+        let to = File::create(&log).map_err(unmade)?;
+        let both = to.try_clone().map_err(unmade)?;
+        let mut process = Command::new(&plan.program);
+        process.args(command(plan, number)).stdin(Stdio::null()).stdout(to).stderr(both);
+        let child = process.spawn().map_err(|error| unstarted(plan, &error))?;
+        Ok(Self { number, child, log })
+    }
+
+    /// How it has ended, or the task where it still runs.
+    fn end(mut self) -> Result<Result<Ended, Self>, Failure> {
+        let status = self.child.try_wait().map_err(Failure::internal)?;
+        Ok(match status {
+            Some(status) => Ok(Ended { number: self.number, status, log: self.log.clone() }),
+            None => Err(self),
+        })
+    }
+}
+
+impl Drop for Task {
+    fn drop(&mut self) {
+        let _ = self.child.kill(); // (it may have ended)
+        let _ = self.child.wait();
+    }
+}
+
+/// A task that has ended.
+struct Ended {
+    number: usize,
+    status: ExitStatus,
+    log: PathBuf,
+}
+
+impl Ended {
+    fn is_refused(&self) -> bool {
+        self.status.code() == Some(i32::from(BAD_INPUT))
+    }
+
+    /// Whether it neither did its points nor stopped at its time.
+    fn has_failed(&self) -> bool {
+        !self.status.success() && self.status.code() != Some(i32::from(STOPPED_EARLY))
+    }
+
+    /// Its last line, or where it printed nothing how it ended.
+    fn message(&self, plan: &Plan) -> String {
+        let text = fs::read(&self.log).unwrap_or_default();
+        let text = String::from_utf8_lossy(&text);
+        let said = text.lines().rev().find(|line| !line.trim().is_empty());
+        let said = said
+            .map_or_else(|| self.status.to_string(), |line| line.trim_start_matches("error: ").to_owned());
+        format!("shard {}/{}: {said} ({})", self.number, plan.shards, self.log.display())
+    }
+}

@@ -1,0 +1,144 @@
+//! What is divided among tasks: the commands that a task and the last job run.
+
+use crate::program::failure::Failure;
+use crate::program::files::{self, Maker, Overwrite, Writer};
+use crate::program::load::is_study;
+use crate::program::problem::Problem;
+use crate::program::{fit, sweep};
+use std::path::{Path, PathBuf};
+
+/// What is divided, by absolute paths.
+#[derive(Debug, Clone)]
+pub enum Work {
+    /// A parameter study, whose shards and results lie in a folder.
+    Study { study: String, out: String },
+    /// Jobs of fits, each of which is done whole, next to its file; and a folder for scripts and logs.
+    Jobs { jobs: Vec<String>, out: String },
+}
+
+impl Work {
+    /// A study or jobs that were read and checked as `wiperlab sweep` and `wiperlab fit` do.
+    pub fn load(files: &[PathBuf], out: Option<&Path>, overwrite: Overwrite) -> Result<Self, Failure> {
+        if let Some(name) = files.iter().find(|file| files::is_standard_input(file)) {
+            return Err(Failure::Input(format!(
+                "{}: found standard input, expected a file, as every task reads it; save it",
+                name.display()
+            )));
+        }
+        let mut studies = Vec::new();
+        for file in files {
+            studies.extend(is_study(file)?.then_some(file));
+        }
+        match (files, studies.as_slice(), out) {
+            ([study], [_], Some(out)) => Self::study(study, out, overwrite),
+            ([study], [_], None) => Err(Failure::Input(format!(
+                "{}: found a study without --out, expected the folder for its results; add --out DIR",
+                study.display()
+            ))),
+            (_, [], out) => Self::jobs(files, out),
+            (_, [study, ..], _) => Err(Failure::Input(format!(
+                "{}: found a study among {} files, expected one study alone or jobs of fits; submit it by itself",
+                study.display(),
+                files.len()
+            ))),
+        }
+    }
+
+    fn study(study: &Path, out: &Path, overwrite: Overwrite) -> Result<Self, Failure> {
+        let problem = sweep::Problem::load(study)?;
+        let writer = Writer::new(Maker::Sweep, overwrite);
+        problem.check_place(out, &writer, &sweep::Tables::default())?;
+        Ok(Self::Study { study: absolute(study)?, out: absolute(out)? })
+    }
+
+    fn jobs(jobs: &[PathBuf], out: Option<&Path>) -> Result<Self, Failure> {
+        fit::check_folders(jobs)?;
+        jobs.iter().try_for_each(|job| Problem::load(job).map(|_| ()))?;
+        let jobs = jobs.iter().map(|job| absolute(job)).collect::<Result<Vec<_>, _>>()?;
+        let out = match out {
+            Some(out) => absolute(out)?,
+            None => common(&jobs),
+        };
+        Ok(Self::Jobs { jobs, out })
+    }
+
+    /// Command of a task, without its shard.
+    pub fn task(&self) -> Vec<String> {
+        match self {
+            Self::Study { study, out } => words(&["sweep", study, "--out", out]),
+            Self::Jobs { jobs, .. } => [words(&["fit"]), jobs.clone()].concat(),
+        }
+    }
+
+    /// Command of the job at the end.
+    pub fn collect(&self, shards: usize) -> Vec<String> {
+        let shards = shards.to_string();
+        match self {
+            Self::Study { out, .. } => words(&["collect", out, "--shards", &shards]),
+            Self::Jobs { jobs, .. } => {
+                [words(&["collect"]), jobs.clone(), words(&["--shards", &shards])].concat()
+            }
+        }
+    }
+
+    /// Folder in which scripts and logs have theirs.
+    pub fn folder(&self) -> PathBuf {
+        let (Self::Study { out, .. } | Self::Jobs { out, .. }) = self;
+        Path::new(out).join(crate::program::shards::SHARDS)
+    }
+
+    /// Name for jobs: at most 15 letters and digits that every scheduler takes, as older PBS takes no more.
+    pub fn name(&self) -> String {
+        const LONGEST: usize = 15;
+        let stem = match self {
+            Self::Study { study, .. } => Path::new(study).file_stem().unwrap_or_default().to_string_lossy(),
+            Self::Jobs { .. } => "fits".into(),
+        };
+        let plain = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' });
+        "wl-".chars().chain(plain).take(LONGEST).collect::<String>().trim_end_matches('-').to_owned()
+    }
+}
+
+/// The folder in which all files lie, absolute.
+fn common(files: &[String]) -> String {
+    let mut folders = files.iter().filter_map(|file| Path::new(file).parent());
+    let first = folders.next().unwrap_or(Path::new("/"));
+    let shared = |some: &Path, other: &Path| -> PathBuf {
+        let both = some.components().zip(other.components());
+        both.take_while(|(a, b)| a == b).map(|(part, _)| part).collect()
+    };
+    folders.fold(first.to_owned(), |all, folder| shared(&all, folder)).to_string_lossy().into_owned()
+}
+
+fn words(words: &[&str]) -> Vec<String> {
+    words.iter().map(|word| (*word).to_owned()).collect()
+}
+
+/// A path as text that stands in a script and holds in every folder.
+pub fn absolute(path: &Path) -> Result<String, Failure> {
+    let refused = |problem: &str| Failure::Input(format!("{}: {problem}", path.display()));
+    let whole = std::path::absolute(path).map_err(|error| refused(&error.to_string()))?;
+    let text = whole.to_str().ok_or_else(|| {
+        refused("found a name that is not UTF-8, expected one that a script can hold; rename it")
+    })?;
+    if text.contains(char::is_control) {
+        let expected = "expected none, as scripts are read line by line; rename it";
+        return Err(refused(&format!(
+            "found a line break or another control character in the name, {expected}"
+        )));
+    }
+    Ok(text.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scripts_of_jobs_lie_where_all_jobs_do() {
+        let of = |files: &[&str]| common(&words(files));
+        assert_eq!(of(&["/a/fits/one/job.toml", "/a/fits/two/job.toml"]), "/a/fits");
+        assert_eq!(of(&["/a/fits/one/job.toml"]), "/a/fits/one");
+        assert_eq!(of(&["/a/x/job.toml", "/b/x/job.toml"]), "/");
+    }
+}

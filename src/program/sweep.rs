@@ -1,0 +1,67 @@
+//! `wiperlab sweep`.
+
+mod problem;
+mod results;
+mod shards;
+mod solve;
+mod tables;
+
+pub use problem::Problem;
+pub use shards::study_of;
+pub use tables::Tables;
+
+use crate::journal::Shard;
+use crate::program::failure::{Failure, Outcome};
+use crate::program::files::{self, Maker, Overwrite, Writer};
+use crate::program::global::Global;
+use crate::program::interrupt;
+use crate::program::journal::JOURNAL;
+use crate::program::time_limit::TimeLimit;
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub struct SweepArgs {
+    /// Study to run (sweep.toml): a scene, the parameters that are varied, and what is mapped
+    pub sweep: PathBuf,
+    /// Folder for sweep.csv, summary.json, one SVG a map, and journal.jsonl, which grows with every point
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+    /// Go on from the journal in DIR; without it a study starts over and the old journal is kept as
+    /// journal.previous-1.jsonl (the next free number)
+    #[arg(long)]
+    pub resume: bool,
+    /// Do only every N-th point from point K on (K from 0), into DIR/shards/K-of-N.jsonl; goes on from what
+    /// is there, and `wiperlab collect DIR` puts the shards together
+    #[arg(long, value_name = "K/N", conflicts_with_all = ["force", "Tables"])]
+    pub shard: Option<Shard>,
+    #[command(flatten)]
+    pub tables: Tables,
+    /// Stop after this time with what is done (exit code 3); such as 45min, 1h30min or 02:00:00
+    #[arg(long, value_name = "TIME")]
+    pub time_limit: Option<TimeLimit>,
+}
+
+impl SweepArgs {
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        let problem = Problem::load(&self.sweep)?;
+        if let Some(TimeLimit(time)) = self.time_limit {
+            interrupt::limit(time);
+        }
+        if let Some(shard) = self.shard {
+            return problem.solve_shard(&self.sweep, &self.out, shard, global);
+        }
+        let journal = self.out.join(JOURNAL);
+        files::check_free(&journal)?;
+        let writer = Writer::new(Maker::Sweep, self.overwrite).csv(global.csv_dialect);
+        problem.check_place(&self.out, &writer, &self.tables)?;
+        if !problem.solve(&journal, self.resume, global)? {
+            return Ok(Outcome::StoppedEarly);
+        }
+        let mut points = problem.collection(&self.out)?;
+        problem.add(&mut points, &journal)?;
+        problem.write(&mut points, &self.out, &writer, &self.tables, global)
+    }
+}

@@ -1,0 +1,131 @@
+//! A shard of a study, and which study the shards in a folder are of.
+
+use super::problem::Problem;
+use super::solve::Part;
+use crate::journal::Shard;
+use crate::program::failure::{Failure, Outcome};
+use crate::program::files;
+use crate::program::global::Global;
+use crate::program::shards::{SHARDS, journal_of, look_into, shard_files};
+use crate::sweep::journal::Point;
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::path::{Component, Path, PathBuf};
+
+/// Which study they are of.
+const NOTE: &str = "study.json";
+
+/// What the note says.
+#[derive(Serialize, Deserialize)]
+struct Note {
+    /// Path of the study from the folder of the results, with `/`; absolute where there is no such way.
+    study: String,
+}
+
+impl Problem {
+    /// Runs what no shard in the folder holds of a shard.
+    pub fn solve_shard(
+        &self,
+        study: &Path,
+        out: &Path,
+        shard: Shard,
+        global: &Global,
+    ) -> Result<Outcome, Failure> {
+        let journal = journal_of(out, shard);
+        files::check_free(&journal)?;
+        let elsewhere = self.elsewhere(out, shard)?;
+        note(study, out)?;
+        let part = Part {
+            shard,
+            resume: journal.exists(),
+            journal: &journal,
+            elsewhere,
+            advice: "the same command goes on".to_owned(),
+            reports: true,
+        };
+        if !self.solve_part(&part, global)? {
+            return Ok(Outcome::StoppedEarly);
+        }
+        if !global.quiet {
+            let count = shard.count(self.study.points());
+            print_line!("shard {shard}: its {count} points are done, see {}", journal.display());
+            print_line!("when every shard is: wiperlab collect {}", out.display());
+        }
+        Ok(Outcome::Done)
+    }
+
+    /// Which points the other shards hold: they need not be done again when a study is divided anew.
+    fn elsewhere(&self, out: &Path, own: Shard) -> Result<Vec<bool>, Failure> {
+        let header = self.header();
+        let mut held = vec![false; self.study.points()];
+        for (shard, path) in shard_files(out)?.into_iter().filter(|(shard, _)| *shard != own) {
+            look_into::<Point>(&path, &header, shard.meets(own), |found| {
+                if let Some(held) = held.get_mut(found.record.index) {
+                    *held = true;
+                }
+            })?;
+        }
+        Ok(held)
+    }
+}
+
+/// Says which study the shards are of, for whoever collects them.
+fn note(study: &Path, out: &Path) -> Result<(), Failure> {
+    let folder = out.join(SHARDS);
+    let made = |error| Failure::Internal(format!("{}: cannot be made: {error}", folder.display()));
+    fs::create_dir_all(&folder).map_err(made)?;
+    let absolute = |path: &Path| {
+        path.canonicalize()
+            .map_err(|error| Failure::Input(format!("{}: cannot be found: {error}", path.display())))
+    };
+    let study = way(&absolute(out)?, &absolute(study)?);
+    let note = serde_json::to_string(&Note { study }).map_err(Failure::internal)? + "\n";
+    if fs::read_to_string(folder.join(NOTE)).is_ok_and(|found| found == note) {
+        return Ok(());
+    }
+    files::write_all(&folder, &[(NOTE, note.into_bytes())])
+}
+
+/// The study whose shards are in a folder.
+pub fn study_of(out: &Path) -> Result<PathBuf, Failure> {
+    let path = out.join(SHARDS).join(NOTE);
+    let refused = |found: String| {
+        Failure::Input(format!(
+            "{}: {found}, expected the note that `wiperlab sweep --shard` writes; name the study with --study",
+            path.display()
+        ))
+    };
+    if !path.exists() {
+        return Err(refused("found no such file".to_owned()));
+    }
+    let note: Note = serde_json::from_str(&files::read_json(&path)?)
+        .map_err(|error| refused(format!("cannot be read: {error}")))?;
+    let study = out.join(note.study);
+    Ok(study.canonicalize().unwrap_or(study))
+}
+
+/// The way from a folder to a file, both absolute: a folder that several machines share may have another
+/// place on each.
+fn way(from: &Path, to: &Path) -> String {
+    let common = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
+    if !from.components().take(common).any(|part| matches!(part, Component::Normal(_))) {
+        return to.to_string_lossy().into_owned();
+    }
+    let up = from.components().skip(common).map(|_| "..".to_owned());
+    let down = to.components().skip(common).map(|part| part.as_os_str().to_string_lossy().into_owned());
+    up.chain(down).collect::<Vec<_>>().join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_way_to_a_study_holds_where_both_are_moved_together() {
+        let of = |from: &str, to: &str| way(Path::new(from), Path::new(to));
+        assert_eq!(of("/share/a/out", "/share/a/study.toml"), "../study.toml");
+        assert_eq!(of("/share/a/out/x", "/share/b/study.toml"), "../../../b/study.toml");
+        assert_eq!(of("/share/a", "/share/a/study.toml"), "study.toml");
+        assert_eq!(of("/share/a", "/home/study.toml"), "/home/study.toml");
+    }
+}

@@ -1,0 +1,110 @@
+//! The runs of a study, or of a part of it, into a journal.
+
+use super::problem::Problem;
+use crate::journal::{Found, Shard, Sink, header_line, line};
+use crate::program::failure::Failure;
+use crate::program::global::Global;
+use crate::program::interrupt;
+use crate::program::journal::JournalFile;
+use crate::program::progress;
+use crate::sweep::journal::Point;
+use crate::sweep::{self, Recheck, SweepError};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A part of a study on its way into a journal.
+pub struct Part<'a> {
+    pub shard: Shard,
+    pub journal: &'a Path,
+    /// Whether the journal goes on; without it a new one is begun.
+    pub resume: bool,
+    /// Points that other journals hold.
+    pub elsewhere: Vec<bool>,
+    /// What to do with what is done when it stops early.
+    pub advice: String,
+    /// Whether progress is said where there is no terminal.
+    pub reports: bool,
+}
+
+impl Problem {
+    /// Runs what the journal of the whole study does not hold; `false` where it was interrupted.
+    pub fn solve(&self, journal: &Path, resume: bool, global: &Global) -> Result<bool, Failure> {
+        let advice = "go on with --resume".to_owned();
+        let part =
+            Part { shard: Shard::WHOLE, journal, resume, elsewhere: Vec::new(), advice, reports: false };
+        self.solve_part(&part, global)
+    }
+
+    /// Runs what no journal holds of a part, and writes its journal as it goes; `false` where it was
+    /// interrupted.
+    pub fn solve_part(&self, part: &Part, global: &Global) -> Result<bool, Failure> {
+        let (header, name) = (self.header(), part.journal.display().to_string());
+        let points = self.study.points();
+        let mut known = part.elsewhere.clone();
+        known.resize(points, false);
+        let (mut own, mut seen) = (vec![false; points], 0);
+        let mut recheck = Recheck::new(points as u64);
+        let mut unchecked = String::new();
+        let mut each = |of: &sweep::journal::Header, found: Found<Point>| {
+            let index = found.record.index;
+            match own.get_mut(index) {
+                Some(before) if *before => return Err(crate::journal::again(&name, &found, "")),
+                Some(before) => *before = true,
+                None => {}
+            }
+            if of.is_unchecked() {
+                unchecked += &line(&found.record, seen);
+            }
+            seen += 1;
+            recheck.offer(found);
+            Ok(())
+        };
+        let (mut sink, found) = JournalFile::open_each::<Point>(part.journal, part.resume, &mut each)?;
+        if let Some(found) = &found {
+            found.check::<Point>(&name, &header).map_err(Failure::input)?;
+            recheck.check(&self.study, &self.scene, &name).map_err(Failure::input)?;
+        }
+        let opening = match &found {
+            Some(found) if !found.is_unchecked() => String::new(),
+            _ => header_line(&header) + &unchecked,
+        };
+        if !opening.is_empty() {
+            sink.append(&opening).map_err(Failure::Internal)?;
+        }
+        known.iter_mut().zip(&own).for_each(|(known, own)| *known |= own);
+        let all = part.shard.count(points);
+        let taken = (0..all).filter(|place| known.get(part.shard.index(*place)) == Some(&true)).count();
+        if taken > 0 {
+            progress::say(global.quiet, &format!("{taken} of {all} points are taken from the journal"));
+        }
+        let bar = progress::bar((all - taken) as u64, "sweep", "points", global.quiet);
+        let reporter = progress::Reporter::new(&bar, part.reports && !global.quiet);
+        let journaled = Arc::new(AtomicUsize::new(taken));
+        let kept = {
+            let (advice, journaled) = (part.advice.clone(), Arc::clone(&journaled));
+            move || {
+                let done = journaled.load(Ordering::Relaxed);
+                format!("{name} holds {done} of {all} points; {advice}")
+            }
+        };
+        let stops = interrupt::stops(kept.clone());
+        let done = || {
+            bar.inc(1);
+            journaled.fetch_add(1, Ordering::Relaxed);
+            reporter.report();
+        };
+        let due = |index: usize| known.get(index) != Some(&true);
+        let ran = sweep::run(&self.study, &self.scene, part.shard, &due, &mut sink, &done, &interrupt::flow);
+        bar.finish_and_clear();
+        sink.finish()?;
+        match ran {
+            Ok(()) => Ok(true),
+            Err(SweepError::Interrupted) => {
+                stops.finishing(&kept());
+                Ok(false)
+            }
+            Err(failed) => Err(Failure::internal(failed)),
+        }
+    }
+}

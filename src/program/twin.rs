@@ -1,0 +1,149 @@
+//! `wiperlab twin`.
+
+use crate::program::early_end::early_end;
+use crate::program::failure::{Failure, Outcome};
+use crate::program::figures::Figures;
+use crate::program::files::{self, Maker, Overwrite, Place, Writer};
+use crate::program::global::Global;
+use crate::program::load::read_scene;
+use crate::program::watch::Watch;
+use crate::recording::Recording;
+use crate::recording::files::{CameraEntry, DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_csv};
+use crate::recording::quality::quality;
+use crate::report::figure::twin as figure;
+use crate::simulate::Effort;
+use crate::simulate::scene::Scene;
+use crate::text::text_sha256;
+use crate::twin::spec::TwinSpec;
+use crate::twin::{Camera, View, export, observed_view, track, truth, view};
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, Args)]
+pub struct TwinArgs {
+    /// Specification of the twin: a scene and a camera (twin.toml)
+    pub spec: PathBuf,
+    /// Folder of the synthetic recording (data/NAME)
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub figures: Figures,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+impl TwinArgs {
+    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+        let file = self.spec.display().to_string();
+        let text = files::read_toml(&self.spec)?;
+        let spec = TwinSpec::parse(&file, &text).map_err(Failure::input)?;
+        let scene = read_scene(&self.spec.parent().unwrap_or(Path::new("")).join(&spec.scene))?;
+        let writer = Writer::new(Maker::Twin, self.overwrite);
+        Place::check(&self.out, &writer, &names(&spec))?;
+        self.figures.check(&[FIGURE], self.overwrite)?;
+        let [start_s, stop_s] = spec.window_in(&file, &scene).map_err(Failure::input)?;
+
+        let mut watch = Watch::of([scene.start_s, scene.run.stop_s], "twin", global);
+        let effort = Effort::of(&scene);
+        let seen = observed_view(&scene, &spec.camera, [start_s, stop_s], effort, &mut watch)
+            .map_err(Failure::input)?;
+        drop(watch);
+        let recording = track(&seen.recording, &files::display_name(&self.out), &spec.tracking)
+            .map_err(Failure::internal)?;
+        let mut description = description(&spec, &scene, &text, &recording)?;
+        let trace = trace_csv(&recording);
+        description.trace_sha256 = Some(text_sha256(&trace));
+        let mut outputs = vec![
+            (TRACE_FILE, trace.into_bytes()),
+            (DESCRIPTION_FILE, description.to_toml().map_err(Failure::internal)?.into_bytes()),
+        ];
+        if spec.tracker_export {
+            let table = toml::to_string(&description.twin).map_err(Failure::internal)?;
+            outputs.push((
+                EXPORT_FILE,
+                export::tracker_table(&recording, spec.tracking.metres_per_pixel).into_bytes(),
+            ));
+            outputs.push((SPEC_FILE, table.into_bytes()));
+        }
+        files::write_outputs(&self.out, &writer, &outputs)?;
+        let early = early_end(&seen.run);
+        if !global.quiet {
+            print_line!(
+                "synthetic recording of \"{}\": {} frames at {} 1/s",
+                scene.title(),
+                recording.grid().frames,
+                recording.grid().frame_rate_hz
+            );
+            print_line!("written to {}", self.out.display());
+        }
+        self.draw(&spec, &scene, &seen, &recording, global)?;
+        Ok(early.map_or(Outcome::Done, |how| {
+            warn_line!("warning: the simulation ended early and so does the recording: {how}");
+            Outcome::StoppedEarly
+        }))
+    }
+}
+
+impl TwinArgs {
+    /// The figure, where it is wanted: the motion between the frames takes a run of its own.
+    fn draw(
+        &self,
+        spec: &TwinSpec,
+        scene: &Scene,
+        seen: &View,
+        tracked: &Recording,
+        global: &Global,
+    ) -> Result<(), Failure> {
+        if self.figures.folder.is_none() {
+            return Ok(());
+        }
+        let grid = tracked.grid();
+        let ends_s = [grid.start_s, grid.time_s(grid.frames.saturating_sub(1))];
+        let camera = Camera { frame_rate_hz: figure::MOTION_SAMPLES * grid.frame_rate_hz, exposure_s: 0.0 };
+        let motion = view(scene, &camera, ends_s[0], ends_s[1], Effort::of(scene)).map_err(Failure::input)?;
+        let shown = figure::Twin {
+            title: &spec.title,
+            motion: &motion.recording,
+            seen: &seen.recording,
+            tracked,
+            exposure_s: spec.camera.exposure_s,
+            noise_m: spec.tracking.noise_px * spec.tracking.metres_per_pixel,
+            stick_s: &seen.stick_s,
+        };
+        self.figures.write(self.overwrite, global, || vec![(FIGURE, figure::figure(&shown))])
+    }
+}
+
+/// Name of the figure.
+const FIGURE: &str = "twin";
+/// The twin as an export of Tracker, and its specification with the truth.
+const EXPORT_FILE: &str = "synthetic-tracker-export.txt";
+const SPEC_FILE: &str = "twin.toml";
+
+/// Files that the specification asks for.
+fn names(spec: &TwinSpec) -> Vec<&'static str> {
+    let export = if spec.tracker_export { &[EXPORT_FILE, SPEC_FILE][..] } else { &[] };
+    [&[TRACE_FILE, DESCRIPTION_FILE], export].concat()
+}
+
+/// `recording.toml` with the whole specification and the truth behind it.
+fn description(
+    spec: &TwinSpec,
+    scene: &Scene,
+    text: &str,
+    recording: &Recording,
+) -> Result<RecordingFile, Failure> {
+    let exposure_s = (spec.camera.exposure_s > 0.0).then_some(spec.camera.exposure_s);
+    let camera = CameraEntry {
+        frame_rate_hz: spec.camera.frame_rate_hz,
+        exposure_s,
+        metres_per_pixel: Some(spec.tracking.metres_per_pixel),
+        y_axis: Some(YAxis::Up),
+    };
+    let mut twin: toml::Table = text.parse().map_err(Failure::internal)?;
+    twin.insert("truth".to_owned(), toml::Value::Table(truth(scene)));
+    let mut file = RecordingFile::new(camera, true);
+    file.quality = Some(quality(recording, exposure_s));
+    file.twin = Some(twin);
+    Ok(file)
+}
