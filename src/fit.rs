@@ -28,6 +28,7 @@ pub mod misfit;
 pub mod model;
 pub mod model_features;
 pub mod objective;
+pub mod posterior;
 mod problem;
 pub mod profile;
 mod recheck;

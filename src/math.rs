@@ -94,6 +94,13 @@ pub fn ln_1p(x: f64) -> f64 {
     libm::log1p(x)
 }
 
+/// The complementary error function.
+#[must_use]
+#[inline]
+pub fn erfc(x: f64) -> f64 {
+    libm::erfc(x)
+}
+
 /// The logarithm to base 10.
 #[must_use]
 #[inline]

@@ -30,6 +30,7 @@ mod method;
 mod modes;
 mod problem;
 mod progress;
+pub mod read;
 mod report;
 mod sensitivities;
 mod shards;
@@ -44,6 +45,25 @@ mod watch;
 
 use clap::Parser;
 use std::ffi::OsString;
+use std::path::PathBuf;
+use std::sync::OnceLock;
+
+/// Where the program lies, if it is not what the process runs.
+static PATH: OnceLock<PathBuf> = OnceLock::new();
+
+/// Path of the program, for jobs that start it again.
+fn path() -> Result<PathBuf, failure::Failure> {
+    let unknown =
+        |error| failure::Failure::Internal(format!("the path of this program is not known: {error}"));
+    PATH.get().map_or_else(|| std::env::current_exe().map_err(unknown), |path| Ok(path.clone()))
+}
+
+/// The same as [`run`] in a process that runs something else, such as Python: `path` starts the program.
+#[must_use]
+pub fn run_as(path: PathBuf, arguments: Vec<OsString>) -> u8 {
+    let _ = PATH.set(path); // (a process runs it once)
+    run(arguments)
+}
 
 /// Runs the program with its arguments, its name first, and gives the exit code. It answers signals, and may
 /// end the process to do so; a process runs it once.

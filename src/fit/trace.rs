@@ -8,6 +8,7 @@
 
 mod agreement;
 mod assess;
+mod at_point;
 mod branch;
 mod branches;
 mod build;
@@ -29,6 +30,7 @@ mod twin;
 mod unknown;
 
 pub use assess::{Assessment, Estimate};
+pub use at_point::{at_point, frame_residuals};
 pub use branch::{Branch, End, MOST_STARTS, MOST_TWINS};
 pub use build::Source;
 pub use chain::{advance, begin};

@@ -127,9 +127,14 @@ impl Problem {
         Ok(self.header_of(&model.map_err(|error| cannot(&error.to_string()))?))
     }
 
-    fn header_of(&self, model: &TraceModel) -> Header {
+    /// Names of the recordings whose traces are fitted.
+    pub(super) fn trace_names(&self) -> Vec<String> {
         let name = |condition: usize| self.job().conditions[condition].name.clone();
-        let recordings: Vec<String> = self.traces().iter().map(|trace| name(trace.condition)).collect();
+        self.traces().iter().map(|trace| name(trace.condition)).collect()
+    }
+
+    fn header_of(&self, model: &TraceModel) -> Header {
+        let recordings = self.trace_names();
         let unknowns = model.unknowns.0.iter().map(|unknown| Coordinate::of(unknown, &recordings)).collect();
         let segment_s = self.segment_s().iter().copied().map(Exact).collect();
         let body = Body { seed: self.job().search.seed, recordings, segment_s, unknowns };

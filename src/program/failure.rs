@@ -42,6 +42,7 @@ impl Failure {
         Self::Input(error.to_string())
     }
 
+    /// What should not happen.
     pub fn internal(error: impl std::fmt::Display) -> Self {
         Self::Internal(error.to_string())
     }

@@ -11,11 +11,10 @@ use crate::program::method::MethodArgs;
 use crate::program::sensitivities::{self, Sensitivities};
 use crate::program::table::Table;
 use crate::program::watch::Watch;
-use crate::recording::FrameGrid;
 use crate::recording::files::{HEADER, push_trace_row};
 use crate::report::figure::motion;
 use crate::simulate::outputs::{
-    Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, points_m, push_event, push_state,
+    Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, points_m, push_event, push_state, sample_times,
 };
 use crate::simulate::scene::{Output, Scene};
 use crate::simulate::{Effort, Observer, Piece, Sample, Status, Transition, run_with};
@@ -123,14 +122,6 @@ fn simulate(
     }
     place.finish(tables.into_iter().map(|table| table.file).collect(), &[(SIMULATION_SUMMARY, bytes)])?;
     Ok(summary)
-}
-
-/// The instants of the sampled outputs, s.
-fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> {
-    let (start_s, stop_s, rate) = (scene.start_s, scene.run.stop_s, scene.run.sample_rate_hz);
-    let frames = ((stop_s - start_s) * rate * (1.0 + 1e-12)).floor() as usize + 1;
-    let grid = FrameGrid { start_s, frame_rate_hz: rate, frames };
-    (0..frames).map(move |i| grid.time_s(i).min(stop_s))
 }
 
 /// Transitions to their table.

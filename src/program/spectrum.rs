@@ -103,6 +103,13 @@ impl SpectrumArgs {
         }
     }
 
+    /// The files of a recording at hand.
+    pub fn files(&self, recording: Recording) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+        let request = self.request()?;
+        let exposure_s = self.given_exposure_s()?;
+        request.outputs(&request.study(exposure_s, recording)?)
+    }
+
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let request = self.request()?;
         Place::check(&self.out, &self.writer(global), &TABLES)?;
@@ -161,12 +168,16 @@ impl SpectrumArgs {
 
     /// Exposure as given, or as the recording says.
     fn exposure_of(&self, loaded: &Loaded) -> Result<Option<f64>, Failure> {
+        let recorded = || loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
+        Ok(self.given_exposure_s()?.or_else(recorded))
+    }
+
+    fn given_exposure_s(&self) -> Result<Option<f64>, Failure> {
         match self.exposure_s {
             Some(found) if !(found.is_finite() && found > 0.0) => Err(Failure::Input(format!(
                 "--exposure-s: found {found}, expected a time in seconds above 0, like 0.0002"
             ))),
-            Some(exposure_s) => Ok(Some(exposure_s)),
-            None => Ok(loaded.file.as_ref().and_then(|file| file.camera.exposure_s)),
+            given => Ok(given),
         }
     }
 

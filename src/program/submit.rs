@@ -86,10 +86,9 @@ impl SubmitArgs {
             )));
         }
         let here = |error| Failure::Input(format!("the working directory cannot be found: {error}"));
-        let program = |error| Failure::Internal(format!("the path of this program is not known: {error}"));
         Ok(Plan {
             work: Work::load(&self.files, self.out.as_deref(), self.overwrite)?,
-            program: absolute(&std::env::current_exe().map_err(program)?)?,
+            program: absolute(&super::path()?)?,
             folder: absolute(&std::env::current_dir().map_err(here)?)?,
             shards: self.shards,
             tasks,

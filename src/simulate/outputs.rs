@@ -7,6 +7,7 @@ use super::{Effort, Impact, Observer, Piece, Run, Sample, Transition};
 use crate::blade::Linkage;
 use crate::math::gauss;
 use crate::plausibility::Finding;
+use crate::recording::FrameGrid;
 use serde::Serialize;
 use std::fmt::Write;
 use std::ops::ControlFlow;
@@ -276,6 +277,14 @@ pub fn model_parts(scene: &Scene) -> Vec<&'static str> {
 pub const STATE_HEADER: &str = "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode";
 /// Header of `events.csv`.
 pub const EVENTS_HEADER: &str = "time_s,from,to,cause";
+
+/// The instants of the sampled outputs of a scene, s.
+pub fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> + use<> {
+    let (start_s, stop_s, rate) = (scene.start_s, scene.run.stop_s, scene.run.sample_rate_hz);
+    let frames = ((stop_s - start_s) * rate * (1.0 + 1e-12)).floor() as usize + 1;
+    let grid = FrameGrid { start_s, frame_rate_hz: rate, frames };
+    (0..frames).map(move |i| grid.time_s(i).min(stop_s))
+}
 
 /// Tip and head of a sample as a recording has them, m: tip x, tip y, head x, head y.
 ///

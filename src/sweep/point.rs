@@ -4,11 +4,12 @@ use super::study::Study;
 use crate::feature::{Reader, Reading, Reason, RunRecord};
 use crate::recording::channel::Instants;
 use crate::simulate::outputs::{Audit, Transitions};
-use crate::simulate::scene::{Scene, StartKind};
+use crate::simulate::scene::{Scene, SceneError, StartKind};
 use crate::simulate::{Effort, Impact, Observer, Piece, Transition, equilibrium};
 use crate::text::panic_message;
 use crate::twin::{View, ViewError, observed_view};
 use serde::{Deserialize, Serialize};
+use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Right-hand sides after which a run is given up: some hundred times what a reversal costs, a
@@ -50,8 +51,18 @@ impl Outcome {
     /// Runs point `index` of a checked study; a panic is a reason like any other.
     #[must_use]
     pub fn of(study: &Study, scene: &Scene, index: usize) -> Self {
+        Self::of_scene(study, || study.scene_at(scene, index), || ControlFlow::Continue(()))
+    }
+
+    /// Runs a scene that a study did not choose; `flow` is asked during the run and may end it.
+    #[must_use]
+    pub fn of_scene(
+        study: &Study,
+        scene: impl FnOnce() -> Result<Scene, SceneError>,
+        flow: impl Fn() -> ControlFlow<()>,
+    ) -> Self {
         let attempt = || {
-            Self::attempt(study, scene, index)
+            Self::attempt(study, scene, flow)
                 .unwrap_or_else(|(ended, stopped_at_s)| Self::without_values(study, ended, stopped_at_s))
         };
         catch_unwind(AssertUnwindSafe(attempt)).unwrap_or_else(|payload| {
@@ -70,19 +81,22 @@ impl Outcome {
     }
 
     /// What the point gives; or why nothing can be read, and when the run ended, s.
-    fn attempt(study: &Study, scene: &Scene, index: usize) -> Result<Self, (Ended, Option<f64>)> {
-        let scene =
-            study.scene_at(scene, index).map_err(|error| (Ended::new(Reason::NoStart, error), None))?;
+    fn attempt(
+        study: &Study,
+        scene: impl FnOnce() -> Result<Scene, SceneError>,
+        flow: impl Fn() -> ControlFlow<()>,
+    ) -> Result<Self, (Ended, Option<f64>)> {
+        let scene = scene().map_err(|error| (Ended::new(Reason::NoStart, error), None))?;
         if !starts(&scene) {
             return Err((Ended::new(Reason::NoStart, ""), None));
         }
         let most_evaluations = scene.run.most_evaluations.unwrap_or(MOST_EVALUATIONS);
         let effort = Effort { most_evaluations, ..Effort::of(&scene) };
-        let mut watch = Watch::of(study);
+        let mut watch = Watch::of(study, flow);
         let span_s = [scene.start_s, scene.run.stop_s];
         let view = observed_view(&scene, &study.camera, span_s, effort, &mut watch).map_err(unseen)?;
         let View { recording, run, stick_s } = view;
-        let Watch { transitions: Transitions(transitions), audit } = watch;
+        let Watch { transitions: Transitions(transitions), audit, .. } = watch;
         let record = RunRecord { span_s, run, stick_s, transitions, audit };
         let instants = Instants::find(&recording);
         let reader = Reader::of_run(&recording, &instants, &record);
@@ -122,19 +136,23 @@ fn starts(scene: &Scene) -> bool {
 }
 
 /// What is noted of a run besides its traces: the transitions, and its extremes where a map needs them.
-struct Watch {
+struct Watch<F> {
     transitions: Transitions,
     audit: Option<Audit>,
+    flow: F,
 }
 
-impl Watch {
-    fn of(study: &Study) -> Self {
+impl<F> Watch<F> {
+    fn of(study: &Study, flow: F) -> Self {
         let audited = study.maps.iter().any(|map| map.reading.needs_audit());
-        Self { transitions: Transitions::default(), audit: audited.then(Audit::default) }
+        Self { transitions: Transitions::default(), audit: audited.then(Audit::default), flow }
     }
 }
 
-impl Observer for Watch {
+impl<F: Fn() -> ControlFlow<()>> Observer for Watch<F> {
+    fn flow(&self) -> ControlFlow<()> {
+        (self.flow)()
+    }
     fn piece(&mut self, piece: &Piece<'_>) {
         self.audit.iter_mut().for_each(|audit| audit.piece(piece));
     }

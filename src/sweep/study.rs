@@ -81,6 +81,17 @@ impl Study {
         })
     }
 
+    /// The same without axes, for points that come from elsewhere: it has one point, its scene.
+    ///
+    /// # Errors
+    /// [`StudyError`] at the first problem.
+    pub fn parse_maps(file: &str, text: &str) -> Result<Self, StudyError> {
+        let written: as_written::Study = parse(file, text)?;
+        check_format(file, written.format)?;
+        let value = |(key, problem): Refusal| StudyError::Value { file: file.to_owned(), key, problem };
+        Self::with_axes(&written, Vec::new()).map_err(value)
+    }
+
     /// Number of points.
     #[must_use]
     pub fn points(&self) -> usize {
@@ -175,8 +186,12 @@ impl Study {
                 format!("found \"{}\", expected the path of a scene, relative to this file", written.scene),
             );
         }
-        let camera = camera(&written.camera)?;
         let axes = axis::axes(&written.axis, written.sample.as_ref())?;
+        Self::with_axes(written, axes)
+    }
+
+    fn with_axes(written: &as_written::Study, axes: Vec<Axis>) -> Result<Self, Refusal> {
+        let camera = camera(&written.camera)?;
         let maps = map::maps(&written.map, camera.frame_rate_hz / 2.0)?;
         Ok(Self {
             title: written.title.clone(),

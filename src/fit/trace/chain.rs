@@ -14,7 +14,7 @@ use rayon::prelude::*;
 /// Most outer steps of a phase.
 pub(super) const MOST_STEPS: usize = 40;
 /// Most steps of a segment's state after one.
-const MOST_INNER: usize = 8;
+pub(super) const MOST_INNER: usize = 8;
 const FIRST_DAMPING: f64 = 1e-3;
 
 /// The first iterate of a search from a point.

@@ -1,0 +1,109 @@
+//! Jobs: the posterior density of their unknowns.
+
+use crate::errors;
+use crate::workers;
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use std::path::PathBuf;
+use std::sync::Arc;
+use wiperlab::fit::posterior::Posterior;
+use wiperlab::program::read;
+
+/// A job with its scenes and recordings.
+#[pyclass(module = "wiperlab", frozen, subclass, name = "Job")]
+pub struct Job {
+    posterior: Arc<Posterior>,
+    path: PathBuf,
+}
+
+type Point<'py> = PyReadonlyArray1<'py, f64>;
+
+impl Job {
+    fn point(&self, py: Python<'_>, of: &Point<'_>) -> PyResult<Vec<f64>> {
+        let (found, expected) = (of.as_array().len(), self.posterior.unknowns().len());
+        if found != expected {
+            let names = self.names().join(", ");
+            return Err(errors::input(py, format!("found {found} numbers, expected {expected}: {names}")));
+        }
+        Ok(of.as_array().iter().copied().collect())
+    }
+
+    fn number(
+        &self,
+        py: Python<'_>,
+        of: &Point<'_>,
+        what: impl Fn(&Posterior, &[f64]) -> f64 + Send,
+    ) -> PyResult<f64> {
+        let (point, posterior) = (self.point(py, of)?, Arc::clone(&self.posterior));
+        workers::run(py, None, move |_| what(&posterior, &point))
+    }
+}
+
+#[pymethods]
+impl Job {
+    #[new]
+    fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let read = workers::run(py, None, {
+            let path = path.clone();
+            move |_| read::problem(&path).map(Posterior::new)
+        })?;
+        let posterior = read.map_err(|failure| errors::failure(py, failure))?;
+        let refused = |error| errors::input(py, format!("{}: {error}", path.display()));
+        let posterior = Arc::new(posterior.map_err(refused)?);
+        // (as a process in another folder may read it again)
+        let path = std::path::absolute(&path).unwrap_or(path);
+        Ok(Self { posterior, path })
+    }
+
+    #[getter]
+    fn path(&self) -> PathBuf {
+        self.path.clone()
+    }
+
+    #[getter]
+    fn title(&self) -> &str {
+        &self.posterior.problem().job().title
+    }
+
+    /// SHA-256 of everything that decides the cost of a point.
+    #[getter]
+    fn fingerprint(&self) -> &str {
+        self.posterior.problem().fingerprint()
+    }
+
+    #[getter]
+    fn names(&self) -> Vec<String> {
+        self.posterior.unknowns().iter().map(|unknown| unknown.name.clone()).collect()
+    }
+
+    #[getter]
+    fn bounds(&self) -> Vec<(f64, f64)> {
+        self.posterior.unknowns().iter().map(|unknown| (unknown.bounds[0], unknown.bounds[1])).collect()
+    }
+
+    fn prior_transform<'py>(&self, py: Python<'py>, unit: Point<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let unit = self.point(py, &unit)?;
+        if let Some(found) = unit.iter().find(|u| !(0.0..=1.0).contains(*u)) {
+            return Err(errors::input(py, format!("found {found}, expected numbers from 0 to 1")));
+        }
+        Ok(PyArray1::from_vec(py, self.posterior.prior_transform(&unit)))
+    }
+
+    fn log_prior(&self, py: Python<'_>, x: Point<'_>) -> PyResult<f64> {
+        self.number(py, &x, Posterior::log_prior)
+    }
+
+    fn log_likelihood(&self, py: Python<'_>, x: Point<'_>) -> PyResult<f64> {
+        self.number(py, &x, Posterior::log_likelihood)
+    }
+
+    fn log_posterior(&self, py: Python<'_>, x: Point<'_>) -> PyResult<f64> {
+        self.number(py, &x, Posterior::log_density)
+    }
+
+    fn residuals<'py>(&self, py: Python<'py>, x: Point<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (point, posterior) = (self.point(py, &x)?, Arc::clone(&self.posterior));
+        let found = workers::run(py, None, move |_| posterior.residuals(&point))?;
+        Ok(PyArray1::from_vec(py, found.into_iter().map(|r| r.unwrap_or(f64::NAN)).collect()))
+    }
+}

@@ -1,0 +1,36 @@
+//! What of wiperlab Python calls: thin classes and functions, with the texts and arrays that the package
+//! `wiperlab` makes its own classes of.
+
+mod errors;
+mod job;
+mod many;
+mod recording;
+mod scene;
+mod workers;
+
+use pyo3::prelude::*;
+use std::ffi::OsString;
+use std::path::PathBuf;
+
+/// Runs the program and gives its exit code.
+#[pyfunction]
+#[pyo3(signature = (arguments, path = None))]
+fn run_program(py: Python<'_>, arguments: Vec<OsString>, path: Option<PathBuf>) -> u8 {
+    py.detach(|| match path {
+        Some(path) => wiperlab::program::run_as(path, arguments),
+        None => wiperlab::program::run(arguments),
+    })
+}
+
+#[pymodule]
+fn _wiperlab(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<scene::Scene>()?;
+    module.add_class::<recording::Recording>()?;
+    module.add_class::<job::Job>()?;
+    module.add_function(wrap_pyfunction!(scene::simulate_scene, module)?)?;
+    module.add_function(wrap_pyfunction!(many::simulate_points, module)?)?;
+    module.add_function(wrap_pyfunction!(recording::analyse, module)?)?;
+    module.add_function(wrap_pyfunction!(run_program, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,138 @@
+//! Recordings and their spectra.
+
+use crate::errors::{self, guarded};
+use crate::workers;
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::{PyBytes, PyDict};
+use std::path::PathBuf;
+use std::sync::Arc;
+use wiperlab::program::read::{self, Analysed};
+use wiperlab::recording::{self, FrameGrid, Traces};
+
+/// Tracked positions of tip and head on the frame grid.
+#[pyclass(module = "wiperlab", frozen, from_py_object)]
+#[derive(Clone)]
+pub struct Recording {
+    pub inner: Arc<recording::Recording>,
+    /// Exposure of a frame, s, where known.
+    #[pyo3(get)]
+    exposure_s: Option<f64>,
+}
+
+/// Columns of a recording that it may lack.
+const CONFIDENCES: [&str; 2] = ["tip_confidence", "head_confidence"];
+
+#[pymethods]
+impl Recording {
+    /// Reads the folder of a recording, or a trace.csv alone.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        let loaded = workers::run(py, None, move |_| read::recording(&path))?;
+        let (recording, exposure_s) = loaded.map_err(|failure| errors::failure(py, failure))?;
+        Ok(Self { inner: Arc::new(recording), exposure_s })
+    }
+
+    /// A recording from columns; a position that is not a number is one that was not tracked.
+    #[staticmethod]
+    #[pyo3(signature = (name, frame_rate_hz, columns, *, start_s = 0.0, exposure_s = None, synthetic = false))]
+    fn from_columns(
+        py: Python<'_>,
+        name: &str,
+        frame_rate_hz: f64,
+        columns: Bound<'_, PyDict>,
+        start_s: f64,
+        exposure_s: Option<f64>,
+        synthetic: bool,
+    ) -> PyResult<Self> {
+        guarded(py, || {
+            let column = |name: &str| -> PyResult<Option<Vec<Option<f64>>>> {
+                let Some(found) = columns.get_item(name)? else { return Ok(None) };
+                let found: PyReadonlyArray1<'_, f64> = found.extract().map_err(PyErr::from)?;
+                Ok(Some(found.as_array().iter().map(|x| (!x.is_nan()).then_some(*x)).collect()))
+            };
+            let frames = columns.values().iter().map(|c| c.len()).next().transpose()?.unwrap_or(0);
+            let place = |name: &str| Ok::<_, PyErr>(column(name)?.unwrap_or_else(|| vec![None; frames]));
+            let traces = Traces {
+                tip_x_m: place("tip_x_m")?,
+                tip_y_m: place("tip_y_m")?,
+                head_x_m: place("head_x_m")?,
+                head_y_m: place("head_y_m")?,
+                tip_confidence: column(CONFIDENCES[0])?,
+                head_confidence: column(CONFIDENCES[1])?,
+            };
+            let grid = FrameGrid { start_s, frame_rate_hz, frames };
+            let recording = recording::Recording::new(name, grid, traces, synthetic);
+            let inner = Arc::new(recording.map_err(|error| errors::input(py, format!("{name}: {error}")))?);
+            Ok(Self { inner, exposure_s })
+        })
+    }
+
+    /// Positions by column, in m, not a number where a point was not tracked.
+    fn columns<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let all = PyDict::new(py);
+        for (name, column) in self.inner.traces().columns() {
+            let column = column.iter().map(|x| x.unwrap_or(f64::NAN)).collect();
+            all.set_item(name, PyArray1::from_vec(py, column))?;
+        }
+        Ok(all)
+    }
+
+    #[getter]
+    fn time_s<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        let grid = self.inner.grid();
+        PyArray1::from_vec(py, (0..grid.frames).map(|i| grid.time_s(i)).collect())
+    }
+
+    #[getter]
+    fn name(&self) -> &str {
+        self.inner.name()
+    }
+
+    #[getter]
+    fn frame_rate_hz(&self) -> f64 {
+        self.inner.grid().frame_rate_hz
+    }
+
+    #[getter]
+    fn start_s(&self) -> f64 {
+        self.inner.grid().start_s
+    }
+
+    #[getter]
+    fn is_synthetic(&self) -> bool {
+        self.inner.is_synthetic()
+    }
+
+    fn __len__(&self) -> usize {
+        self.inner.grid().frames
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.inner == other.inner && self.exposure_s == other.exposure_s
+    }
+}
+
+/// The files that `wiperlab spectrum` writes, by name.
+#[pyfunction]
+#[pyo3(signature = (recording, channel, window, detrend, band_hz, max_components, exposure_s))]
+pub fn analyse<'py>(
+    py: Python<'py>,
+    recording: &Recording,
+    channel: String,
+    window: String,
+    detrend: String,
+    band_hz: Option<(f64, f64)>,
+    max_components: Option<usize>,
+    exposure_s: Option<f64>,
+) -> PyResult<Bound<'py, PyDict>> {
+    let exposure_s = exposure_s.or(recording.exposure_s);
+    let of = Analysed { channel, window, detrend, band_hz, max_components, exposure_s };
+    let inner = Arc::clone(&recording.inner);
+    let files = workers::run(py, None, move |_| read::spectrum((*inner).clone(), &of))?;
+    let all = PyDict::new(py);
+    for (name, bytes) in files.map_err(|failure| errors::failure(py, failure))? {
+        all.set_item(name, PyBytes::new(py, &bytes))?;
+    }
+    Ok(all)
+}

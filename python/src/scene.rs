@@ -1,0 +1,208 @@
+//! Scenes, and runs of them.
+
+use crate::errors::{self, guarded};
+use crate::workers;
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use wiperlab::program::read;
+use wiperlab::simulate::outputs::{Audit, Sampler, Summary, Transitions, points_m, sample_times};
+use wiperlab::simulate::{self, Effort, Observer, Piece, Sample, run_with};
+
+/// What makes a scene again.
+type Parts = (String, String, Option<PathBuf>, Vec<(String, f64)>);
+
+/// A blade, its friction, its drive and what is to be computed.
+#[pyclass(module = "wiperlab", frozen, from_py_object)]
+#[derive(Clone)]
+pub struct Scene {
+    pub inner: Arc<simulate::scene::Scene>,
+    file: String,
+    text: String,
+    driver: Option<PathBuf>,
+    set: Vec<(String, f64)>,
+}
+
+impl Scene {
+    fn made(py: Python<'_>, (file, text, driver, set): Parts) -> PyResult<Self> {
+        let recording = |named: &str| {
+            let path = driver.as_deref().unwrap_or(Path::new(named));
+            read::recording(path).map(|(recording, _)| recording).map_err(|error| error.to_string())
+        };
+        let scene = simulate::scene::Scene::parse_with(&file, &text, recording);
+        let scene = scene.map_err(|error| errors::input(py, error))?;
+        let with = |scene: simulate::scene::Scene, (name, value): &(String, f64)| scene.with(name, *value);
+        let inner = set.iter().try_fold(scene, with).map_err(|error| errors::input(py, error))?;
+        Ok(Self { inner: Arc::new(inner), file, text, driver, set })
+    }
+}
+
+#[pymethods]
+impl Scene {
+    /// Reads a scene file.
+    #[staticmethod]
+    fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
+        guarded(py, || {
+            let refused = |failure| errors::failure(py, failure);
+            let (_, driver) = read::scene(&path).map_err(refused)?;
+            let driver = driver.and_then(|path| std::path::absolute(path).ok());
+            let text = read::toml(&path).map_err(refused)?;
+            Self::made(py, (path.display().to_string(), text, driver, Vec::new()))
+        })
+    }
+
+    /// Reads the text of a scene file.
+    #[staticmethod]
+    #[pyo3(signature = (text, file = "scene.toml"))]
+    fn parse(py: Python<'_>, text: &str, file: &str) -> PyResult<Self> {
+        guarded(py, || Self::made(py, (file.to_owned(), text.to_owned(), None, Vec::new())))
+    }
+
+    /// A scene of its parts.
+    #[staticmethod]
+    fn of_parts(py: Python<'_>, parts: Parts) -> PyResult<Self> {
+        guarded(py, || Self::made(py, parts))
+    }
+
+    /// The same scene with other values of its parameters.
+    fn replace(&self, py: Python<'_>, values: Vec<(String, f64)>) -> PyResult<Self> {
+        guarded(py, || {
+            let with = |scene: simulate::scene::Scene, (name, value): &(String, f64)| scene.with(name, *value);
+            let inner = values.iter().try_fold((*self.inner).clone(), with);
+            let inner = Arc::new(inner.map_err(|error| errors::input(py, error))?);
+            Ok(Self { inner, set: [&self.set[..], &values].concat(), ..self.clone() })
+        })
+    }
+
+    /// Value of a parameter, however the file writes it.
+    fn value(&self, name: &str) -> Option<f64> {
+        self.inner.value(name)
+    }
+
+    /// The parameters as they are written.
+    fn written(&self) -> Vec<(&'static str, f64)> {
+        self.inner.written().collect()
+    }
+
+    #[getter]
+    fn title(&self) -> &str {
+        self.inner.title()
+    }
+
+    #[getter]
+    fn start_s(&self) -> f64 {
+        self.inner.start_s
+    }
+
+    #[getter]
+    fn stop_s(&self) -> f64 {
+        self.inner.run.stop_s
+    }
+
+    #[getter]
+    fn sample_rate_hz(&self) -> f64 {
+        self.inner.run.sample_rate_hz
+    }
+
+    /// Numbers that are hard to believe, a sentence each.
+    #[getter]
+    fn findings(&self) -> Vec<String> {
+        self.inner.findings().iter().map(ToString::to_string).collect()
+    }
+
+    fn __eq__(&self, other: &Self) -> bool {
+        self.inner == other.inner
+    }
+
+    /// What makes it again: name and text of its file, the recording that drives it, and what was replaced.
+    fn parts(&self) -> Parts {
+        (self.file.clone(), self.text.clone(), self.driver.clone(), self.set.clone())
+    }
+}
+
+/// Ends a run that was asked to stop.
+pub struct Asked<'a>(pub &'a AtomicBool);
+
+impl Asked<'_> {
+    pub fn flow(&self) -> ControlFlow<()> {
+        if self.0.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
+    }
+}
+
+impl Observer for Asked<'_> {
+    fn piece(&mut self, _: &Piece<'_>) {}
+    fn flow(&self) -> ControlFlow<()> {
+        Asked::flow(self)
+    }
+}
+
+/// Names of the columns of numbers, those of trace.csv and state.csv.
+const COLUMNS: [&str; 13] = [
+    "time_s",
+    "tip_x_m",
+    "tip_y_m",
+    "head_x_m",
+    "head_y_m",
+    "neck_angle_rad",
+    "lip_angle_rad",
+    "neck_rate_rad_per_s",
+    "lip_rate_rad_per_s",
+    "head_drop_m",
+    "tip_velocity_m_per_s",
+    "normal_force_n",
+    "friction_force_n",
+];
+
+/// Columns of samples, the modes among them, the columns of transitions, and the summary as JSON.
+type Ran<'py> = (Bound<'py, PyDict>, Vec<&'static str>, Bound<'py, PyDict>, String);
+
+/// Runs a scene; samples at its own rate, or at rising instants.
+#[pyfunction]
+#[pyo3(signature = (scene, times_s = None))]
+pub fn simulate_scene<'py>(
+    py: Python<'py>,
+    scene: &Scene,
+    times_s: Option<PyReadonlyArray1<'py, f64>>,
+) -> PyResult<Ran<'py>> {
+    let times: Vec<f64> = match times_s {
+        Some(times) => times.as_array().iter().copied().collect(),
+        None => sample_times(&scene.inner).collect(),
+    };
+    let scene = Arc::clone(&scene.inner);
+    let (columns, modes, transitions, summary) = workers::run(py, None, move |stop| {
+        let mut columns: Vec<Vec<f64>> = COLUMNS.iter().map(|_| Vec::with_capacity(times.len())).collect();
+        let mut modes = Vec::with_capacity(times.len());
+        let sampler = Sampler::new(times.into_iter(), |sample: &Sample| {
+            let Sample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, .. } = *sample;
+            let [tip_x, tip_y, head_x, head_y] = points_m(&scene.linkage, sample);
+            let angles = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
+            let rest = [head_drop_m, tip_velocity_m_per_s, normal_n, friction_n];
+            let row = [time_s, tip_x, tip_y, head_x, head_y].into_iter().chain(angles).chain(rest);
+            columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
+            modes.push(sample.mode.name());
+        });
+        let (mut audit, mut transitions) = (Audit::default(), Transitions::default());
+        let (effort, clock) = (Effort::of(&scene), std::time::Instant::now());
+        let mut observers = ((sampler, Asked(stop)), (&mut audit, &mut transitions));
+        let run = run_with(&scene, effort, &mut observers);
+        let wall_s = clock.elapsed().as_secs_f64();
+        let summary = serde_json::to_string(&Summary::new(&scene, &run, &audit, wall_s, &effort));
+        (columns, modes, transitions.0, summary)
+    })?;
+    let summary = summary.map_err(|error| errors::internal(py, error))?;
+    let samples = PyDict::new(py);
+    for (name, column) in COLUMNS.iter().zip(columns) {
+        samples.set_item(name, PyArray1::from_vec(py, column))?;
+    }
+    let events = PyDict::new(py);
+    let times = transitions.iter().map(|transition| transition.time_s).collect();
+    events.set_item("time_s", PyArray1::from_vec(py, times))?;
+    events.set_item("from", transitions.iter().map(|t| t.from.name()).collect::<Vec<_>>())?;
+    events.set_item("to", transitions.iter().map(|t| t.to.name()).collect::<Vec<_>>())?;
+    events.set_item("cause", transitions.iter().map(|t| t.cause.name()).collect::<Vec<_>>())?;
+    Ok((samples, modes, events, summary))
+}

@@ -1,0 +1,77 @@
+//! Work without the lock of the interpreter, in threads that a forked process makes anew, ended by Ctrl-C.
+
+use crate::errors;
+use pyo3::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::time::Duration;
+
+/// How often signals are looked at while others work.
+const POLL: Duration = Duration::from_millis(50);
+
+/// The threads of this process; those of a process that it was forked from do not run here.
+static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
+
+fn pool() -> Result<Arc<ThreadPool>, String> {
+    let mut held = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    let process = std::process::id();
+    if let Some((owner, pool)) = held.as_ref()
+        && *owner == process
+    {
+        return Ok(Arc::clone(pool));
+    }
+    let made = Arc::new(of_size(0)?);
+    // the threads of another process cannot be ended from here
+    std::mem::forget(held.replace((process, Arc::clone(&made))));
+    Ok(made)
+}
+
+fn of_size(threads: usize) -> Result<ThreadPool, String> {
+    ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| error.to_string())
+}
+
+/// Runs work on as many threads (on every core if `None`) while Python goes on; what it is given turns true
+/// once it is asked to stop.
+pub fn run<T: Send>(
+    py: Python<'_>,
+    threads: Option<usize>,
+    work: impl FnOnce(&AtomicBool) -> T + Send,
+) -> PyResult<T> {
+    let pool = threads.map_or_else(pool, |threads| of_size(threads).map(Arc::new));
+    let pool = pool.map_err(|error| errors::internal(py, format!("no threads can be started: {error}")))?;
+    let stop = AtomicBool::new(false);
+    let (done, changed) = (Mutex::new(None), Condvar::new());
+    let mut asked = None;
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            let result = catch_unwind(AssertUnwindSafe(|| pool.install(|| work(&stop))));
+            *done.lock().unwrap_or_else(PoisonError::into_inner) = Some(result);
+            changed.notify_one();
+        });
+        loop {
+            let is_done = py.detach(|| {
+                let guard = done.lock().unwrap_or_else(PoisonError::into_inner);
+                let waited = changed.wait_timeout_while(guard, POLL, |done| done.is_none());
+                waited.map_or(true, |(guard, _)| guard.is_some())
+            });
+            if is_done {
+                break;
+            }
+            if asked.is_none()
+                && let Err(signal) = py.check_signals()
+            {
+                stop.store(true, Ordering::Relaxed);
+                asked = Some(signal);
+            }
+        }
+    });
+    let done = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    match (asked, done) {
+        (Some(signal), _) => Err(signal),
+        (None, Some(Ok(result))) => Ok(result),
+        (None, Some(Err(panic))) => Err(errors::internal(py, errors::panic_text(&*panic))),
+        (None, None) => Err(errors::internal(py, "a thread ended without a result; please report it")),
+    }
+}

@@ -1,0 +1,270 @@
+//! The posterior density of a job's unknowns, for samplers and optimisers of others.
+//!
+//! `ln p(x) = ln p(data | x) + ln p(x)`, up to a constant of the data. Every unknown has a range, in which its
+//! prior is flat along its coordinate (its logarithm, or itself), or normal and cut off at the ends. Of a
+//! job on features the likelihood is `-cost / 2` without the priors' share ([`super::objective`]); of a job on
+//! traces it is `-chi^2 / 2` with the starting states of the segments at their most likely
+//! ([`super::trace::at_point`]).
+
+use super::axis::{Axis, Prior};
+use super::error::FitError;
+use super::iterates::Coordinate;
+use super::model_features::ModelFeatures;
+use super::objective::{Objective, residual};
+use super::problem::Problem;
+use super::run::axis;
+use super::scale::Spacing;
+use super::target::Target;
+use super::targets::targets;
+use super::trace::{TraceModel, at_point, frame_residuals};
+
+use crate::feature::Feature;
+use crate::math;
+use std::f64::consts::{LN_2, SQRT_2, TAU};
+
+/// An unknown: its range and its prior along a coordinate, which is its logarithm or itself.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unknown {
+    /// Key of the scene with its table; of a camera its recording and the quantity.
+    pub name: String,
+    /// Least and greatest value, in its SI unit.
+    pub bounds: [f64; 2],
+    /// Whether the coordinate is the logarithm.
+    pub is_log: bool,
+    /// Mean and standard deviation of a normal prior along the coordinate.
+    pub prior: Option<[f64; 2]>,
+}
+
+/// The posterior density of a problem's unknowns.
+pub struct Posterior {
+    problem: Problem,
+    unknowns: Vec<Unknown>,
+    data: Data,
+}
+
+enum Data {
+    Features { features: Vec<Feature>, targets: Vec<Target> },
+    Traces(Box<TraceModel>),
+}
+
+impl Posterior {
+    /// Of a problem on features or on traces; what is held out is left out.
+    ///
+    /// # Errors
+    /// [`FitError`] where a target cannot be measured, or a head that drives a model is not tracked.
+    pub fn new(problem: Problem) -> Result<Self, FitError> {
+        if let Some(model) = problem.trace_model() {
+            let model = model.map_err(|error| FitError::CannotBeFitted { why: error.to_string() })?;
+            let recordings = problem.trace_names();
+            let unknowns = model.unknowns.0.iter().map(|of| Unknown::along(&Coordinate::of(of, &recordings)));
+            let (unknowns, data) = (unknowns.collect(), Data::Traces(Box::new(model)));
+            return Ok(Self { problem, unknowns, data });
+        }
+        let job = problem.job();
+        let all = targets(job, problem.recordings())?;
+        let fitted = job.aims.iter().zip(all).filter(|(aim, _)| !aim.held_out);
+        let (features, targets) = fitted.map(|(aim, target)| (aim.feature.clone(), target)).unzip();
+        let unknowns = job.parameters.iter().map(|free| Unknown::of(&free.name, &axis(free))).collect();
+        Ok(Self { problem, unknowns, data: Data::Features { features, targets } })
+    }
+
+    /// The problem.
+    #[must_use]
+    pub fn problem(&self) -> &Problem {
+        &self.problem
+    }
+
+    /// The unknowns, in the order of every point.
+    #[must_use]
+    pub fn unknowns(&self) -> &[Unknown] {
+        &self.unknowns
+    }
+
+    /// The values at a place in the unit box: uniform places have the prior for density.
+    #[must_use]
+    pub fn prior_transform(&self, unit: &[f64]) -> Vec<f64> {
+        self.unknowns.iter().zip(unit).map(|(unknown, u)| unknown.quantile(*u)).collect()
+    }
+
+    /// Logarithm of the prior density, by the values; minus infinity beyond a bound.
+    #[must_use]
+    pub fn log_prior(&self, values: &[f64]) -> f64 {
+        self.unknowns.iter().zip(values).map(|(unknown, value)| unknown.log_density(*value)).sum()
+    }
+
+    /// Logarithm of the likelihood up to a constant; minus infinity where the model does not run.
+    #[must_use]
+    pub fn log_likelihood(&self, values: &[f64]) -> f64 {
+        match &self.data {
+            Data::Features { features, targets } => {
+                let seen = self.model(features, targets);
+                let flat = self.problem.job().parameters.iter().map(|free| Axis::from(free.bounds)).collect();
+                let found = Objective::new(flat, targets.clone(), &seen).evaluate_values(values.to_vec());
+                if found.failure.is_some() { f64::NEG_INFINITY } else { -found.cost / 2.0 }
+            }
+            Data::Traces(model) => {
+                let chi2 = at_point(model, self.problem.segment_s(), &coordinates(model, values))
+                    .map(|at| at.segments.iter().map(|segment| segment.chi2).sum::<f64>());
+                chi2.map_or(f64::NEG_INFINITY, |chi2| -chi2 / 2.0)
+            }
+        }
+    }
+
+    /// Logarithm of the posterior density up to a constant; the model runs only within the bounds.
+    #[must_use]
+    pub fn log_density(&self, values: &[f64]) -> f64 {
+        let prior = self.log_prior(values);
+        if prior == f64::NEG_INFINITY { prior } else { prior + self.log_likelihood(values) }
+    }
+
+    /// Distances of model and data in standard deviations: of the features in the order of the job, or of the
+    /// traces, recording by recording, tip before head, in every frame that is fitted. `None` where the model
+    /// shows none.
+    #[must_use]
+    pub fn residuals(&self, values: &[f64]) -> Vec<Option<f64>> {
+        match &self.data {
+            Data::Features { features, targets } => {
+                let seen = self.model(features, targets);
+                let found =
+                    Objective::new(Vec::new(), targets.clone(), &seen).evaluate_values(values.to_vec());
+                let one = |(at, target): (usize, &Target)| {
+                    found.features.get(at)?.observation().map(|shown| residual(shown, target))
+                };
+                targets.iter().enumerate().map(one).collect()
+            }
+            Data::Traces(model) => {
+                let at = at_point(model, self.problem.segment_s(), &coordinates(model, values));
+                frame_residuals(model, at.as_ref())
+            }
+        }
+    }
+
+    fn model(&self, features: &[Feature], targets: &[Target]) -> ModelFeatures<'_> {
+        let values = targets.iter().map(|target| target.value).collect();
+        ModelFeatures::new(self.problem.model(), features, values, self.problem.job().ensemble.members)
+    }
+}
+
+fn coordinates(model: &TraceModel, values: &[f64]) -> Vec<f64> {
+    model.unknowns.0.iter().zip(values).map(|(unknown, value)| unknown.coordinate(*value)).collect()
+}
+
+impl Unknown {
+    fn of(name: &str, axis: &Axis) -> Self {
+        let bounds = [axis.bounds.lower(), axis.bounds.upper()];
+        let is_log = axis.bounds.spacing() == Spacing::Log;
+        let prior = axis.prior.map(|prior| match prior {
+            Prior::Linear { mean, sd } => [mean, sd],
+            Prior::Log { mean_ln, sd_ln } => [mean_ln, sd_ln],
+        });
+        Self { name: name.to_owned(), bounds, is_log, prior }
+    }
+
+    fn along(coordinate: &Coordinate) -> Self {
+        let bounds = coordinate.range.map(|end| coordinate.value(end.0));
+        let unit = coordinate.per_unit.map_or(1.0, |unit| unit.0);
+        let prior = coordinate.prior.map(|[mean, sd]| [mean.0 * unit, sd.0 * unit]);
+        Self { name: coordinate.name.clone(), bounds, is_log: coordinate.per_unit.is_none(), prior }
+    }
+
+    fn coordinate(&self, value: f64) -> f64 {
+        if self.is_log { math::ln(value) } else { value }
+    }
+
+    /// Ends of the range in standard deviations from the prior's mean.
+    fn ends(&self, [mean, sd]: [f64; 2]) -> [f64; 2] {
+        self.bounds.map(|end| (self.coordinate(end) - mean) / sd)
+    }
+
+    fn quantile(&self, unit: f64) -> f64 {
+        let [low, high] = self.bounds.map(|end| self.coordinate(end));
+        let at = match self.prior {
+            None => low + unit * (high - low),
+            Some(prior) => {
+                let ends = self.ends(prior);
+                let below = |x: f64| share_between(ends[0], x) - unit * share_between(ends[0], ends[1]);
+                (prior[0] + prior[1] * root(below, ends)).clamp(low, high)
+            }
+        };
+        let value = if self.is_log { math::exp(at) } else { at };
+        value.clamp(self.bounds[0], self.bounds[1])
+    }
+
+    /// Logarithm of the prior density by the value.
+    fn log_density(&self, value: f64) -> f64 {
+        let [low, high] = self.bounds;
+        if !(low..=high).contains(&value) {
+            return f64::NEG_INFINITY;
+        }
+        // from the coordinate to the value
+        let slope = if self.is_log { -math::ln(value) } else { 0.0 };
+        let along = match self.prior {
+            None => -math::ln(self.coordinate(high) - self.coordinate(low)),
+            Some(prior @ [mean, sd]) => {
+                let [low, high] = self.ends(prior);
+                let off = (self.coordinate(value) - mean) / sd;
+                -off * off / 2.0 - math::ln(sd) - math::ln(TAU) / 2.0 - math::ln(share_between(low, high))
+            }
+        };
+        along + slope
+    }
+}
+
+/// Share of a standard normal distribution between two places; exact in either tail.
+fn share_between(from: f64, to: f64) -> f64 {
+    let above = |x: f64| math::erfc(x / SQRT_2) / 2.0;
+    if from > 0.0 { above(from) - above(to) } else { above(-to) - above(-from) }
+}
+
+/// Where a rising function is zero, to the last bit that halving reaches.
+fn root(of: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
+    // 38 deviations are as far as a normal density is above zero
+    (low, high) = (low.max(-38.0), high.min(38.0));
+    let halvings = (f64::MANTISSA_DIGITS as f64 + math::ln((high - low).max(2.0)) / LN_2) as usize;
+    for _ in 0..halvings {
+        let middle = low + (high - low) / 2.0;
+        if of(middle) < 0.0 { low = middle } else { high = middle }
+    }
+    low + (high - low) / 2.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn unknown(bounds: [f64; 2], is_log: bool, prior: Option<[f64; 2]>) -> Unknown {
+        Unknown { name: String::new(), bounds, is_log, prior }
+    }
+
+    /// The transform is the inverse of the integral of the density: differences of the one are the other.
+    #[test]
+    fn uniform_places_have_the_prior_for_density() {
+        let kinds = [
+            unknown([0.2, 0.8], false, None),
+            unknown([0.1, 10.0], true, None),
+            unknown([-1.0, 2.0], false, Some([0.5, 0.7])),
+            unknown([0.1, 10.0], true, Some([0.3, 0.5])),
+            unknown([5.0, 9.0], false, Some([0.0, 1.0])), // the tail alone
+        ];
+        for of in kinds {
+            assert!((of.quantile(0.0) - of.bounds[0]).abs() < 1e-9, "{of:?}");
+            assert!((of.quantile(1.0) - of.bounds[1]).abs() < 1e-9, "{of:?}");
+            for unit in [0.01, 0.3, 0.5, 0.9, 0.99] {
+                let h = 1e-6;
+                let slope = (of.quantile(unit + h) - of.quantile(unit - h)) / (2.0 * h);
+                let density = math::exp(of.log_density(of.quantile(unit)));
+                assert!((slope * density - 1.0).abs() < 1e-4, "{of:?} at {unit}: {}", slope * density);
+            }
+            assert_eq!(of.log_density(of.bounds[1] * 1.001), f64::NEG_INFINITY);
+        }
+    }
+
+    #[test]
+    fn shares_of_the_normal_distribution_are_those_of_tables() {
+        for (z, within) in [(1.0, 0.682_689_492_137_085_9), (2.0, 0.954_499_736_103_641_6)] {
+            assert!((share_between(-z, z) - within).abs() < 1e-15);
+        }
+        // Abramowitz and Stegun, table 26.1: 1 - P(5) = 2.86651572e-7
+        assert!((share_between(5.0, 38.0) / 2.866_515_718_791_94e-7 - 1.0).abs() < 1e-12);
+    }
+}
