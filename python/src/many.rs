@@ -37,13 +37,16 @@ pub fn simulate_points<'py>(
     study.check_scene("read", &scene).map_err(|error| errors::input(py, error))?;
     let rows: Vec<Vec<f64>> = points.rows().into_iter().map(|row| row.to_vec()).collect();
     let maps = study.maps.len();
-    let outcomes: Vec<Outcome> = workers::run(py, workers, move |stop| {
+    let outcomes: Option<Vec<Outcome>> = workers::run(py, workers, move |stop| {
         let at = |row: &Vec<f64>| -> Result<Model, SceneError> {
             let set = |scene: Model, (name, value): (&String, &f64)| scene.with(name, *value);
             names.iter().zip(row).try_fold((*scene).clone(), set)
         };
-        rows.par_iter().map(|row| Outcome::of_scene(&study, || at(row), || Asked(stop).flow())).collect()
+        let run = |row| Outcome::of_scene(&study, || at(row), || Asked(stop).flow());
+        rows.par_iter().map(|row| Asked(stop).flow().is_continue().then(|| run(row))).collect()
     })?;
+    // (what was asked to stop has raised)
+    let outcomes = outcomes.unwrap_or_default();
     let values = outcomes.iter().flat_map(|outcome| &outcome.values);
     let values: Vec<f64> = values.map(|value| *value.as_ref().unwrap_or(&f64::NAN)).collect();
     let status = outcomes.iter().map(Outcome::status).collect();

@@ -71,7 +71,8 @@ impl Scene {
     /// The same scene with other values of its parameters.
     fn replace(&self, py: Python<'_>, values: Vec<(String, f64)>) -> PyResult<Self> {
         guarded(py, || {
-            let with = |scene: simulate::scene::Scene, (name, value): &(String, f64)| scene.with(name, *value);
+            let with =
+                |scene: simulate::scene::Scene, (name, value): &(String, f64)| scene.with(name, *value);
             let inner = values.iter().try_fold((*self.inner).clone(), with);
             let inner = Arc::new(inner.map_err(|error| errors::input(py, error))?);
             Ok(Self { inner, set: [&self.set[..], &values].concat(), ..self.clone() })
@@ -177,7 +178,8 @@ pub fn simulate_scene<'py>(
         let mut columns: Vec<Vec<f64>> = COLUMNS.iter().map(|_| Vec::with_capacity(times.len())).collect();
         let mut modes = Vec::with_capacity(times.len());
         let sampler = Sampler::new(times.into_iter(), |sample: &Sample| {
-            let Sample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, .. } = *sample;
+            let Sample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, .. } =
+                *sample;
             let [tip_x, tip_y, head_x, head_y] = points_m(&scene.linkage, sample);
             let angles = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
             let rest = [head_drop_m, tip_velocity_m_per_s, normal_n, friction_n];

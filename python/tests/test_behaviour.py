@@ -53,7 +53,7 @@ def test_a_missing_file_is_also_the_usual_exception() -> None:
         (lambda s: wl.simulate_many(s, ["friction.a"], [[0.2]], read=[{"name": "x", "kind": "y"}]), "kind"),
         (lambda s: wl.simulate_many(s, ["friction.a"], [[0.2]], read=[]), "map"),
         (lambda s: wl.spectrum([1.0, 2.0, 3.0]), "frame_rate_hz"),
-        (lambda s: wl.spectrum(np.zeros(3), frame_rate_hz=1000.0), "samples"),
+        (lambda s: wl.spectrum(np.zeros(3), frame_rate_hz=1000.0), "found 3 frames"),
         (lambda s: wl.spectrum(np.zeros(100), frame_rate_hz=-1.0), "frame_rate_hz"),
         (lambda s: wl.Recording.from_arrays({"tip": [1.0]}, 100.0), "tip"),
         (lambda s: wl.Recording.from_arrays({"tip_x_m": [1.0, 2.0], "head_x_m": [1.0]}, 100.0), "head_x_m"),

@@ -41,7 +41,7 @@ def test_a_run(scene: wl.Scene, tmp_path: Path) -> None:
 
 
 def test_a_study(tmp_path: Path) -> None:
-    study = ROOT / "data/sweeps/actual-blade-flip.toml"
+    study = ROOT / "data/sweeps/flip.toml"
     axes = {"drive.amplitude_m": (0.02, 0.06), "friction.c": (0.1, 0.5)}
     text = study.read_text(encoding="utf-8").replace("points = 17", "points = 3")
     text = text.replace("../scenes/actual-blade.toml", str(SCENE))
@@ -52,7 +52,7 @@ def test_a_study(tmp_path: Path) -> None:
     X = np.array([[float(cell) for cell in rows[name]] for name in axes]).T
     assert len(X) == 9
     Y, status = wl.simulate_many(wl.Scene.load(SCENE), list(axes), X, read=tmp_path / "study.toml")
-    columns = [name for name in rows if name not in (*axes, "status", "stopped_at_s", "missing")]
+    columns = [name for name in rows if name not in (*axes, "status", "stopped_at_s", "missing", "source")]
     assert Y.shape == (9, len(columns))
     for value, name in zip(Y.T, columns):
         for found, cell in zip(value, rows[name]):
@@ -70,7 +70,7 @@ def test_a_spectrum(recording: wl.Recording, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     found = wl.spectrum(recording, "head-drop", "after")
     assert found.components == json.loads((tmp_path / "components.json").read_text())
-    assert found.components[0]["verdict"] == "clear"
+    assert abs(found.components[0]["frequency_hz"] - 74.8) < 1.0
     for name, cells in table(tmp_path / "spectrum.csv").items():
         assert_same(found.columns[name], cells)
     for name, figure in found.figures.items():
@@ -80,7 +80,6 @@ def test_a_spectrum(recording: wl.Recording, tmp_path: Path) -> None:
 def test_a_result() -> None:
     result = wl.Job(TRACES).result()
     assert dict(result) == json.loads((TRACES.parent / "result.json").read_text())
-    assert result.x.tolist() == [p["estimate"] for p in result["parameters"].values()]
 
 
 def test_the_version() -> None:

@@ -182,7 +182,12 @@ impl Unknown {
             None => low + unit * (high - low),
             Some(prior) => {
                 let ends = self.ends(prior);
-                let below = |x: f64| share_between(ends[0], x) - unit * share_between(ends[0], ends[1]);
+                let all = share_between(ends[0], ends[1]);
+                // from the nearer end, so that neither tail is lost to rounding
+                let below = |x: f64| match unit < 0.5 {
+                    true => share_between(ends[0], x) - unit * all,
+                    false => (1.0 - unit) * all - share_between(x, ends[1]),
+                };
                 (prior[0] + prior[1] * root(below, ends)).clamp(low, high)
             }
         };
@@ -245,6 +250,7 @@ mod tests {
             unknown([-1.0, 2.0], false, Some([0.5, 0.7])),
             unknown([0.1, 10.0], true, Some([0.3, 0.5])),
             unknown([5.0, 9.0], false, Some([0.0, 1.0])), // the tail alone
+            unknown([-20.0, 20.0], false, Some([0.0, 1.0])),
         ];
         for of in kinds {
             assert!((of.quantile(0.0) - of.bounds[0]).abs() < 1e-9, "{of:?}");

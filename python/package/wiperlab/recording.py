@@ -41,7 +41,7 @@ class Recording:
     @classmethod
     def from_arrays(
         cls,
-        columns: Mapping[str, ArrayLike],
+        columns: Mapping[str, ArrayLike] | pd.DataFrame,
         frame_rate_hz: float,
         *,
         start_s: float = 0.0,

@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from typing import Union
 
 from .errors import InputError, InternalError
@@ -30,7 +31,10 @@ def run(*arguments: Argument | Sequence[Argument], quiet: bool = True) -> int:
     words: list[str] = []
     for argument in arguments:
         alone = isinstance(argument, (str, os.PathLike))
-        words.extend(os.fspath(word) for word in ([argument] if alone else argument))  # type: ignore[arg-type, list-item, union-attr]
+        words.extend(os.fspath(word) for word in ([argument] if alone else argument))  # type: ignore[arg-type, union-attr]
+    # the package that is running, not one that lies in the working directory
+    paths = [str(Path(__file__).parents[1]), *filter(None, [os.environ.get("PYTHONPATH")])]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(paths), "PYTHONSAFEPATH": "1"}
     command = [sys.executable, "-m", "wiperlab", *words, *(["--quiet"] if quiet else [])]
     # in a group of its own: an interrupt reaches it once, from here
     own_group = {"creationflags": 0x00000200} if os.name == "nt" else {"start_new_session": True}
@@ -41,7 +45,8 @@ def run(*arguments: Argument | Sequence[Argument], quiet: bool = True) -> int:
         stderr=subprocess.PIPE,
         text=True,
         encoding="utf-8",
-        **own_group,  # type: ignore[call-overload]
+        env=environment,
+        **own_group,
     )
     try:
         said, refused = process.communicate()

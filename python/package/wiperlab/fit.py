@@ -160,11 +160,6 @@ class FitResult(Mapping[str, Any]):
         """Estimate, interval and verdict of each parameter."""
         return dict(self["parameters"])
 
-    @property
-    def x(self) -> NDArray[np.float64]:
-        """The estimates."""
-        return np.array([parameter["estimate"] for parameter in self.parameters.values()])
-
     def to_pandas(self) -> pd.DataFrame:
         """The parameters, a row each."""
         import pandas
