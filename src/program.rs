@@ -28,6 +28,7 @@ mod load;
 mod man;
 mod method;
 mod modes;
+mod place;
 mod problem;
 mod progress;
 pub mod read;
@@ -46,22 +47,11 @@ mod watch;
 use clap::Parser;
 use std::ffi::OsString;
 use std::path::PathBuf;
-use std::sync::OnceLock;
-
-/// Where the program lies, if it is not what the process runs.
-static PATH: OnceLock<PathBuf> = OnceLock::new();
-
-/// Path of the program, for jobs that start it again.
-fn path() -> Result<PathBuf, failure::Failure> {
-    let unknown =
-        |error| failure::Failure::Internal(format!("the path of this program is not known: {error}"));
-    PATH.get().map_or_else(|| std::env::current_exe().map_err(unknown), |path| Ok(path.clone()))
-}
 
 /// The same as [`run`] in a process that runs something else, such as Python: `path` starts the program.
 #[must_use]
 pub fn run_as(path: PathBuf, arguments: Vec<OsString>) -> u8 {
-    let _ = PATH.set(path); // (a process runs it once)
+    place::set(path);
     run(arguments)
 }
 

@@ -1,9 +1,9 @@
 //! The posterior density of a job's unknowns, for samplers and optimisers of others.
 //!
-//! `ln p(x) = ln p(data | x) + ln p(x)`, up to a constant of the data. Every unknown has a range, in which its
-//! prior is flat along its coordinate (its logarithm, or itself), or normal and cut off at the ends. Of a
-//! job on features the likelihood is `-cost / 2` without the priors' share ([`super::objective`]); of a job on
-//! traces it is `-chi^2 / 2` with the starting states of the segments at their most likely
+//! `ln p(x) = ln p(data | x) + ln p(x)`, up to a constant of the data. Every unknown has a range. In it its
+//! prior is flat along its coordinate (its logarithm, or itself), or normal and cut off at the ends. Of a job
+//! on features the likelihood is `-cost / 2` without the share of the priors ([`super::objective`]). Of a job
+//! on traces it is `-chi^2 / 2` with the starting states of the segments where they fit best
 //! ([`super::trace::at_point`]).
 
 use super::axis::{Axis, Prior};

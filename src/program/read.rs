@@ -17,7 +17,7 @@ pub fn scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
     read_driven_scene(path)
 }
 
-/// A recording: a folder with `trace.csv`, or a trace alone; with the exposure of its camera, s, where that is
+/// A recording: a folder with `trace.csv`, or a trace alone; with the exposure of a frame, s, where that is
 /// known.
 ///
 /// # Errors

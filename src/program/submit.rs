@@ -15,6 +15,7 @@ mod work;
 use crate::program::failure::{Failure, Outcome};
 use crate::program::files::{self, Maker, Overwrite, Size, Writer};
 use crate::program::global::Global;
+use crate::program::place;
 use crate::program::time_limit::TimeLimit;
 use clap::Args;
 use plan::Plan;
@@ -88,7 +89,7 @@ impl SubmitArgs {
         let here = |error| Failure::Input(format!("the working directory cannot be found: {error}"));
         Ok(Plan {
             work: Work::load(&self.files, self.out.as_deref(), self.overwrite)?,
-            program: absolute(&super::path()?)?,
+            program: absolute(&place::path()?)?,
             folder: absolute(&std::env::current_dir().map_err(here)?)?,
             shards: self.shards,
             tasks,

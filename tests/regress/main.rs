@@ -11,3 +11,4 @@ mod readers;
 mod reference;
 mod resume;
 mod structure;
+mod versions;
