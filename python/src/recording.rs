@@ -48,7 +48,7 @@ impl Recording {
         guarded(py, || {
             let column = |name: &str| -> PyResult<Option<Vec<Option<f64>>>> {
                 let Some(found) = columns.get_item(name)? else { return Ok(None) };
-                let found: PyReadonlyArray1<'_, f64> = found.extract().map_err(PyErr::from)?;
+                let found: PyReadonlyArray1<'_, f64> = found.extract()?;
                 Ok(Some(found.as_array().iter().map(|x| (!x.is_nan()).then_some(*x)).collect()))
             };
             let frames = columns.values().iter().map(|c| c.len()).next().transpose()?.unwrap_or(0);
@@ -116,6 +116,7 @@ impl Recording {
 /// The files that `wiperlab spectrum` writes, by name.
 #[pyfunction]
 #[pyo3(signature = (recording, channel, window, detrend, band_hz, max_components, exposure_s))]
+#[expect(clippy::too_many_arguments, reason = "a Python function has named arguments")]
 pub fn analyse<'py>(
     py: Python<'py>,
     recording: &Recording,
