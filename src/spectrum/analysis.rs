@@ -185,8 +185,10 @@ impl Analysis {
         let mut explained = search.run(trend).ok_or_else(too_few)?;
         let mut course = drifting::course(&search, &explained, settings.band_hz);
         search.coloured = true;
-        if let Some(drifting) = course.as_ref().and_then(Course::drifting) {
-            if let Some(pair) = search.paired(&explained) {
+        if let Some((drifting, range)) =
+            course.as_ref().and_then(|course| Some((course.drifting()?, course.range?)))
+        {
+            if let Some(pair) = search.paired(&explained, &range) {
                 // two that beat look like one that drifts
                 course = course.map(|course| Course { range: None, ..course });
                 explained = search.more_closely(pair).ok_or_else(too_few)?;

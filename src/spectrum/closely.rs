@@ -4,6 +4,8 @@
 use super::judge::DAMPED;
 use super::least_squares::{Term, nepers};
 use super::oscillations::{Explained, LOBE, Parts, Search, lobe};
+use super::shapes::NEAR;
+use super::time_frequency::Range;
 
 /// A term that leaves more than noise around it.
 pub(super) struct Doubtful {
@@ -22,7 +24,8 @@ impl Search<'_> {
         let terms = &parts.solved.terms;
         let doubtful = self.doubtful(explained);
         let ring_downs = self.with_ring_downs(explained, &doubtful);
-        let pairs = self.with_pairs(explained, &doubtful);
+        let leaving: Vec<usize> = doubtful.iter().map(|d| d.k).collect();
+        let pairs = self.with_pairs(explained, &leaving);
         let candidates = improved.into_iter().chain(ring_downs).chain(pairs);
         let known = |new: &Term| terms.iter().any(|t| t.cycles == new.cycles && t.nepers == new.nepers);
         let explains = |candidate: &Parts| {
@@ -41,9 +44,19 @@ impl Search<'_> {
         candidates.filter(explains).min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))
     }
 
-    /// With two steady lines where one was seen, if nothing but noise is left then.
-    pub(super) fn paired(&self, explained: &Explained) -> Option<Explained> {
-        let pairs = self.with_pairs(explained, &self.doubtful(explained));
+    /// With two steady lines where one was seen that drifts over a range, if nothing but noise is left then.
+    /// What drifts farther than the two may lie apart is no pair.
+    pub(super) fn paired(&self, explained: &Explained, range: &Range) -> Option<Explained> {
+        let inside = |t: &&Term| {
+            let hz = t.cycles * self.resolution_hz();
+            hz > range.low_hz && hz < range.high_hz
+        };
+        let pieces = explained.parts.solved.terms.iter().filter(inside).map(|t| t.cycles);
+        let (low, high) = pieces.fold((f64::INFINITY, 0.0), |(l, h): (f64, f64), c| (l.min(c), h.max(c)));
+        if high - low > NEAR {
+            return None;
+        }
+        let pairs = self.with_pairs(explained, &self.leaving(explained));
         let best = pairs.into_iter().min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))?;
         Some(self.explain(best)).filter(|paired| self.leaves_noise(paired))
     }

@@ -3,7 +3,6 @@
 //! A frequency that drifts, or an amplitude that falls in a line, can be taken to pieces too. So two are
 //! taken for one only if they leave nothing around them, and if neither explains more by growing or decaying.
 
-use super::closely::Doubtful;
 use super::least_squares::{Care, Free, Term};
 use super::oscillations::{Explained, Parts, Search};
 use super::shapes::near;
@@ -15,13 +14,13 @@ const WITHIN: f64 = 2.0;
 
 impl Search<'_> {
     /// The parts with two steady terms in the place of one that is doubtful.
-    pub(super) fn with_pairs(&self, explained: &Explained, doubtful: &[Doubtful]) -> Vec<Parts> {
+    pub(super) fn with_pairs(&self, explained: &Explained, doubtful: &[usize]) -> Vec<Parts> {
         let parts = &explained.parts;
-        let tried = |one: &Doubtful| {
-            let (alone, group) = (vec![one.k], near(&parts.solved.terms, one.k));
+        let tried = |one: &usize| {
+            let (alone, group) = (vec![*one], near(&parts.solved.terms, *one));
             let groups = if group.len() > 1 { vec![alone, group] } else { vec![alone] };
             let pairs = groups.into_iter().flat_map(|out| APART.map(|apart| (out.clone(), apart)));
-            pairs.filter_map(|(out, apart)| self.pair(parts, one.k, &out, apart)).collect::<Vec<_>>()
+            pairs.filter_map(|(out, apart)| self.pair(parts, *one, &out, apart)).collect::<Vec<_>>()
         };
         doubtful.iter().flat_map(tried).collect()
     }

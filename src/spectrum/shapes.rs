@@ -16,7 +16,7 @@ const FIRST: [f64; 3] = [0.3, 1.0, 1.0];
 const OF_A_TERM: f64 = 4.0;
 const MORE: f64 = 1.0;
 /// Distance of terms that may be pieces of one, resolutions.
-const NEAR: f64 = 5.0;
+pub(super) const NEAR: f64 = 5.0;
 /// Blocks that stand for the record: a few cycles more or less turn by little within one.
 const BLOCKS: usize = 128;
 /// Shares of the record in which an amplitude may fall to nothing.
@@ -61,12 +61,17 @@ impl Shape {
 
 impl Search<'_> {
     /// Terms that leave more than noise around them.
-    pub(super) fn doubtful(&self, explained: &Explained) -> Vec<Doubtful> {
-        let parts = &explained.parts;
-        let terms = &parts.solved.terms;
+    pub(super) fn leaving(&self, explained: &Explained) -> Vec<usize> {
+        let terms = &explained.parts.solved.terms;
         let leaves = |k: &usize| terms[*k].cycles > 0.0 && self.leaves_peak(explained, &terms[*k]);
-        let criterion = |k: usize| self.criterion_of_shapes(explained, k).min(self.criterion(parts));
-        (0..terms.len()).filter(leaves).map(|k| Doubtful { k, criterion: criterion(k) }).collect()
+        (0..terms.len()).filter(leaves).collect()
+    }
+
+    /// These, with what takes their place must explain more than.
+    pub(super) fn doubtful(&self, explained: &Explained) -> Vec<Doubtful> {
+        let least = self.criterion(&explained.parts);
+        let criterion = |k: usize| self.criterion_of_shapes(explained, k).min(least);
+        self.leaving(explained).into_iter().map(|k| Doubtful { k, criterion: criterion(k) }).collect()
     }
 
     /// Terms that may be the pieces of one: an even drift or fall in their place explains more.
@@ -74,16 +79,12 @@ impl Search<'_> {
         let parts = &explained.parts;
         let terms = &parts.solved.terms;
         let steady = self.criterion(parts);
-        let doubtful: Vec<Doubtful> =
-            self.doubtful(explained).into_iter().filter(|d| d.criterion < steady).collect();
         // alone, it is one line whatever it does; with others it may be in pieces
-        let near = |k: &usize| {
-            let piece = |d: &Doubtful, k: usize| (terms[d.k].cycles - terms[k].cycles).abs() < NEAR;
-            let pieces =
-                |d: &&Doubtful| (0..terms.len()).filter(|k| terms[*k].cycles > 0.0 && piece(d, *k)).count();
-            doubtful.iter().filter(|d| pieces(d) > 1).any(|d| piece(d, *k))
-        };
-        (0..terms.len()).filter(|k| terms[*k].cycles > 0.0).filter(near).collect()
+        let in_pieces =
+            |k: &usize| near(terms, *k).len() > 1 && self.criterion_of_shapes(explained, *k) < steady;
+        let whole: Vec<usize> = self.leaving(explained).into_iter().filter(in_pieces).collect();
+        let piece = |k: &usize| whole.iter().any(|one| (terms[*one].cycles - terms[*k].cycles).abs() < NEAR);
+        (0..terms.len()).filter(|k| terms[*k].cycles > 0.0).filter(piece).collect()
     }
 
     /// The criterion that an oscillation which drifts or fades evenly reaches in the place of term `k`, or of
