@@ -4,8 +4,11 @@
 use super::judge::DAMPED;
 use super::least_squares::{Term, nepers};
 use super::oscillations::{Explained, LOBE, Parts, Search, lobe};
-use super::shapes::NEAR;
 use super::time_frequency::Range;
+
+/// Range over which two lines that beat may seem to drift, resolutions: they lie at most four apart, and where
+/// they nearly cancel the frequency swings beyond both.
+const WIDEST_BEAT: f64 = 10.0;
 
 /// A term that leaves more than noise around it.
 pub(super) struct Doubtful {
@@ -47,13 +50,7 @@ impl Search<'_> {
     /// With two steady lines where one was seen that drifts over a range, if nothing but noise is left then.
     /// What drifts farther than the two may lie apart is no pair.
     pub(super) fn paired(&self, explained: &Explained, range: &Range) -> Option<Explained> {
-        let inside = |t: &&Term| {
-            let hz = t.cycles * self.resolution_hz();
-            hz > range.low_hz && hz < range.high_hz
-        };
-        let pieces = explained.parts.solved.terms.iter().filter(inside).map(|t| t.cycles);
-        let (low, high) = pieces.fold((f64::INFINITY, 0.0), |(l, h): (f64, f64), c| (l.min(c), h.max(c)));
-        if high - low > NEAR {
+        if range.high_hz - range.low_hz > WIDEST_BEAT * self.resolution_hz() {
             return None;
         }
         let pairs = self.with_pairs(explained, &self.leaving(explained));

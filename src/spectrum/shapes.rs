@@ -16,7 +16,7 @@ const FIRST: [f64; 3] = [0.3, 1.0, 1.0];
 const OF_A_TERM: f64 = 4.0;
 const MORE: f64 = 1.0;
 /// Distance of terms that may be pieces of one, resolutions.
-pub(super) const NEAR: f64 = 5.0;
+const NEAR: f64 = 5.0;
 /// Blocks that stand for the record: a few cycles more or less turn by little within one.
 const BLOCKS: usize = 128;
 /// Shares of the record in which an amplitude may fall to nothing.
