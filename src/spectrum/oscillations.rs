@@ -270,11 +270,13 @@ impl<'a> Search<'a> {
             .filter(|fitted| self.criterion(fitted) < self.criterion(parts))
     }
 
-    /// With the relaxation that lowers the rest most, if it does so by more than noise lets it.
+    /// With the relaxation that lowers the rest most, if it does so by more than noise lets it. One that is
+    /// there already has taken on as much of another as it could: both must move before the other shows.
     fn with_relaxation(&self, explained: &Explained) -> Option<Parts> {
         let parts = &explained.parts;
         let terms = &parts.solved.terms;
-        if terms.iter().filter(|t| t.cycles == 0.0).count() >= MOST_RELAXATIONS {
+        let relaxations = terms.iter().filter(|t| t.cycles == 0.0).count();
+        if relaxations >= MOST_RELAXATIONS {
             return None;
         }
         let with = |nepers: &f64| {
@@ -285,8 +287,12 @@ impl<'a> Search<'a> {
         let best =
             RELAXED.iter().filter_map(with).min_by(|a, b| a.solved.misfit.total_cmp(&b.solved.misfit))?;
         let noise_m = self.periodogram.deviation(explained.found.floor_m);
-        (parts.solved.misfit - best.solved.misfit > math::powi(RELAXATION_STANDS_OUT * noise_m, 2))
-            .then_some(best)
+        let least = parts.solved.misfit - math::powi(RELAXATION_STANDS_OUT * noise_m, 2);
+        if best.solved.misfit < least {
+            return Some(best);
+        }
+        let moved = || self.fitted(best.problem.clone(), &best.solved.terms, Care::Passing);
+        (relaxations > 0).then(moved).flatten().filter(|moved| moved.solved.misfit < least)
     }
 
     /// A sinusoid for each peak, largest first, but not for one in the lobe of a larger: a fast decay has the
