@@ -1,7 +1,8 @@
 //! Records too long to be taken apart: components from the windowed periodogram, judged by the same criteria.
 //!
 //! Decay and drift are not tried. Instead each component is read in pieces of the record: one that keeps its
-//! amplitude and phase is a steady line, any other is not known to be one.
+//! amplitude and phase is a steady line, any other is not known to be one, and its frequency only to the width
+//! of its peak.
 
 use super::{Analysis, Record, Removed};
 use crate::math;
@@ -18,6 +19,8 @@ const INDEPENDENT: f64 = 16.0;
 /// Scatter of a steady line over its pieces, as a share of its amplitude, or in that of the noise.
 const STEADY: f64 = 0.25;
 const STEADY_IN_NOISE: f64 = 1.7;
+/// Width of an even distribution over its deviation, the root of twelve.
+const EVEN: f64 = 3.464_101_615_137_754_6;
 /// Half width of the neighbourhood of which the noise is the median, resolutions.
 const NEIGHBOURHOOD: f64 = 40.0;
 /// Level over the noise there from which there is a component: once in a hundred spectra of a million frames.
@@ -46,6 +49,10 @@ pub(super) fn analysis(
         .par_iter()
         .map(|c| Evidence { stays: true, changes: !steady(c), ..Evidence::default() })
         .collect();
+    for (component, _) in components.iter_mut().zip(&evidence).filter(|(_, evidence)| evidence.changes) {
+        let width_hz = width_hz(&spectrum, component);
+        component.frequency_sd_hz = math::hypot(component.frequency_sd_hz, width_hz / EVEN);
+    }
     judge(&mut components, &evidence, &circumstances);
     spectrum.components = components;
     Ok(Analysis {
@@ -62,6 +69,16 @@ pub(super) fn analysis(
         multitaper: None,
         noise_floor_m: Vec::new(),
     })
+}
+
+/// Distance between the places where a peak has fallen to half of its top, Hz: the frequency of what changes
+/// lies somewhere between them.
+fn width_hz(spectrum: &Spectrum, c: &Component) -> f64 {
+    let top = spectrum.frequency_hz.partition_point(|hz| *hz < c.frequency_hz);
+    let (before, behind) = spectrum.amplitude_m.split_at(top.min(spectrum.amplitude_m.len()));
+    let stays = |a: &&f64| **a > c.amplitude_m / 2.0;
+    let bins = before.iter().rev().take_while(stays).count() + behind.iter().take_while(stays).count();
+    bins as f64 * spectrum.frequency_hz.get(1).copied().unwrap_or_default()
 }
 
 /// The noise floor around a frequency, m: noise need not be white.
