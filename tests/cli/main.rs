@@ -6,6 +6,8 @@ mod project;
 mod sealed;
 #[path = "../common/small_fit.rs"]
 mod small_fit;
+#[path = "../common/tracked.rs"]
+mod tracked;
 
 mod accuracy;
 mod batch;
@@ -13,6 +15,7 @@ mod blade;
 mod bounds;
 mod demo;
 mod divided;
+mod docs;
 mod estimates;
 mod figures;
 mod first_hour;
@@ -29,6 +32,7 @@ mod no_panic;
 mod options;
 mod output;
 mod outputs;
+mod page;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod readme;
