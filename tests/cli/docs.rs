@@ -42,6 +42,15 @@ use How::{As, Elsewhere, With};
 
 /// Commands that are not run as they stand: page, command, how, why.
 const OTHERWISE: &[(&str, &str, How, &str)] = &[
+    (".ci/advisories/README.md", CLONE, Elsewhere, "needs a network"),
+    (".ci/advisories/README.md", ".ci/deny renew target/advisory-db", Elsewhere, "needs a network"),
+    (".ci/advisories/README.md", ".ci/deny", Elsewhere, ".ci/run runs it"),
+    (
+        "CONTRIBUTING.md",
+        "cargo test --test browser -- --ignored",
+        Elsewhere,
+        "needs Chromium; .ci/run runs it",
+    ),
     ("README.md", "cargo run --release -- demo", Elsewhere, ".ci/run runs it"),
     ("README.md", "cargo test", Elsewhere, ".ci/run runs it"),
     (
@@ -105,6 +114,7 @@ const OTHERWISE: &[(&str, &str, How, &str)] = &[
         With("--shard 0/20", 0),
         "many seconds",
     ),
+    ("docs/hard-cases.md", "cargo test --test verify hard_cases", Elsewhere, "a test"),
     ("docs/install.md", "wiperlab demo", Elsewhere, "many seconds; .ci/run and tests/cli/demo.rs run it"),
     ("docs/install.md", ".ci/release", Elsewhere, "a build of minutes"),
     (
@@ -121,7 +131,10 @@ const OTHERWISE: &[(&str, &str, How, &str)] = &[
         "names of the reader",
     ),
     ("docs/sweeps.md", "wiperlab collect DIR", As(ALL_DONE, 0), "when all are done"),
+    ("fuzz/README.md", "fuzz/run 60", Elsewhere, "needs a nightly toolchain"),
+    ("fuzz/README.md", "fuzz/run 600 tracker scene", Elsewhere, "needs a nightly toolchain"),
 ];
+const CLONE: &str = "git clone --depth 1 https://github.com/rustsec/advisory-db target/advisory-db";
 const SUBMIT_STUDY: &str =
     "wiperlab submit STUDY --out DIR --scheduler slurm --shards 64 --threads 4 --time 1h30min";
 const SUBMIT_MISSING: &str = "wiperlab submit STUDY --out DIR --scheduler slurm --shards 64 --tasks 3,17";
@@ -227,6 +240,8 @@ macro_rules! pages {
 }
 
 pages! {
+    advisories: ".ci/advisories/README.md",
+    contributing: "CONTRIBUTING.md",
     readme: "README.md",
     data: "data/README.md",
     blade: "docs/blade.md",
@@ -234,19 +249,15 @@ pages! {
     figures: "docs/figures.md",
     fits: "docs/fits.md",
     gallery: "docs/gallery.md",
+    hard_cases: "docs/hard-cases.md",
     install: "docs/install.md",
     reports: "docs/reports.md",
     sweeps: "docs/sweeps.md",
+    fuzz: "fuzz/README.md",
 }
 
-/// Pages whose commands another test runs, or that have none to run here.
-const ELSEWHERE: [(&str, &str); 5] = [
-    ("docs/first-hour.md", "tests/cli/first_hour.rs runs them, with the numbers that the reader replaces"),
-    ("docs/hard-cases.md", "a test of the repository"),
-    ("CONTRIBUTING.md", "a test of the repository"),
-    ("fuzz/README.md", "need a nightly toolchain"),
-    (".ci/advisories/README.md", "need a network"),
-];
+/// Its commands are run by `first_hour.rs`, with the numbers that the reader replaces.
+const FIRST_HOUR: &str = "docs/first-hour.md";
 
 #[test]
 fn every_page_with_commands_is_run_here_or_says_why_not() {
@@ -254,7 +265,7 @@ fn every_page_with_commands_is_run_here_or_says_why_not() {
     let pages = files.iter().filter(|path| path.ends_with(".md"));
     let with: Vec<&str> =
         pages.map(String::as_str).filter(|page| !commands(&read_page(page)).is_empty()).collect();
-    let mut listed: Vec<&str> = PAGES.iter().copied().chain(ELSEWHERE.map(|(page, _)| page)).collect();
+    let mut listed: Vec<&str> = PAGES.iter().copied().chain([FIRST_HOUR]).collect();
     listed.sort_unstable();
     assert_eq!(listed, with);
     for (page, command, _, why) in OTHERWISE {
@@ -399,8 +410,7 @@ fn blocks_of_files_are_read_as_the_files_that_they_show() {
             assert!(known, "{page}: nothing is known of a block of `{}`", block.language);
             let has_code = ["docs/python.md", "python/README.md"].contains(&page.as_str());
             assert!(block.language != "python" || has_code, "{page}: not run by python/tests/test_docs.py");
-            // (the numbers that a reader replaces: tests/cli/first_hour.rs)
-            if block.language != "toml" || page == "docs/first-hour.md" {
+            if block.language != "toml" || page == FIRST_HOUR {
                 continue;
             }
             let part = PARTS.iter().find(|(of, start, ..)| of == page && block.text.starts_with(start));

@@ -6,6 +6,7 @@ mod project;
 mod sealed;
 #[path = "../common/small_fit.rs"]
 mod small_fit;
+#[cfg_attr(not(unix), allow(dead_code, reason = "commands of pages run where there is a shell"))]
 #[path = "../common/tracked.rs"]
 mod tracked;
 
@@ -32,6 +33,7 @@ mod no_panic;
 mod options;
 mod output;
 mod outputs;
+#[cfg_attr(not(unix), allow(dead_code, reason = "commands of pages run where there is a shell"))]
 mod page;
 #[cfg(feature = "parquet")]
 mod parquet;
