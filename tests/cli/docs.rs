@@ -283,10 +283,10 @@ fn asked(code: &str) -> Option<(Vec<String>, Vec<String>)> {
     let words: Vec<&str> = after.split(['|', ';', '\'', '`', ')']).next()?.split_whitespace().collect();
     let is_word =
         |word: &&&str| word.chars().all(|c| c.is_ascii_lowercase() || c == '-') && !word.starts_with('-');
-    let names = words.first().filter(|word| is_word(&word))?;
+    let names = words.first().filter(|word| is_word(word))?;
     let mut command = vec![(*names).to_owned()];
     if *names == "journal" {
-        command.extend(words.get(1).filter(|word| is_word(&word)).map(|word| (*word).to_owned()));
+        command.extend(words.get(1).filter(|word| is_word(word)).map(|word| (*word).to_owned()));
     }
     let options = words.iter().filter(|word| word.starts_with("--") && word.len() > 2);
     let options = options.map(|word| word.split(['=', ',', '.', ':']).next().unwrap().to_owned());

@@ -5,7 +5,7 @@ use crate::tracked::{root, tracked};
 use pulldown_cmark::{Event, Options, Parser, Tag, TagEnd};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// Where links of a page lead, and where links to its parts may lead.
 #[derive(Default)]
@@ -179,7 +179,7 @@ fn links_of_the_built_site_lead_to_its_files_and_their_parts() {
     assert!(broken.is_empty(), "{broken:#?}");
 }
 
-fn name(site: &Path, file: &PathBuf) -> String {
+fn name(site: &Path, file: &Path) -> String {
     file.strip_prefix(site).unwrap().to_str().unwrap().replace('\\', "/")
 }
 
