@@ -130,7 +130,7 @@ pub fn analyse<'py>(
     let exposure_s = exposure_s.or(recording.exposure_s);
     let of = Analysed { channel, window, detrend, band_hz, max_components, exposure_s };
     let inner = Arc::clone(&recording.inner);
-    let files = workers::run(py, None, move |_| read::spectrum((*inner).clone(), &of))?;
+    let files = workers::run_apart(py, move || read::spectrum((*inner).clone(), &of))?;
     let all = PyDict::new(py);
     for (name, bytes) in files.map_err(|failure| errors::failure(py, failure))? {
         all.set_item(name, PyBytes::new(py, &bytes))?;

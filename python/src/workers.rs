@@ -5,6 +5,7 @@ use pyo3::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuilder};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
@@ -32,6 +33,35 @@ fn of_size(threads: usize) -> Result<ThreadPool, String> {
     ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| error.to_string())
 }
 
+/// Runs work that cannot be asked to stop, on every core, while Python goes on. Ctrl-C leaves it to itself: it
+/// ends some time later, and what it gives is dropped.
+pub fn run_apart<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce() -> T + Send + 'static,
+) -> PyResult<T> {
+    let pool = pool().map_err(|error| no_threads(py, &error))?;
+    let (send, mut receive) = mpsc::channel();
+    pool.spawn(move || {
+        // (nobody waits any longer where this fails)
+        let _ = send.send(catch_unwind(AssertUnwindSafe(work)));
+    });
+    loop {
+        let receive = &mut receive;
+        match py.detach(move || receive.recv_timeout(POLL)) {
+            Ok(Ok(result)) => return Ok(result),
+            Ok(Err(panic)) => return Err(errors::internal(py, errors::panic_text(&*panic))),
+            Err(RecvTimeoutError::Timeout) => py.check_signals()?,
+            Err(RecvTimeoutError::Disconnected) => return Err(errors::internal(py, NO_RESULT)),
+        }
+    }
+}
+
+const NO_RESULT: &str = "a thread ended without a result; please report it";
+
+fn no_threads(py: Python<'_>, error: &str) -> PyErr {
+    errors::internal(py, format!("no threads can be started: {error}"))
+}
+
 /// Runs work on as many threads (on every core if `None`) while Python goes on; what it is given turns true
 /// once it is asked to stop.
 pub fn run<T: Send>(
@@ -40,7 +70,7 @@ pub fn run<T: Send>(
     work: impl FnOnce(&AtomicBool) -> T + Send,
 ) -> PyResult<T> {
     let pool = threads.map_or_else(pool, |threads| of_size(threads).map(Arc::new));
-    let pool = pool.map_err(|error| errors::internal(py, format!("no threads can be started: {error}")))?;
+    let pool = pool.map_err(|error| no_threads(py, &error))?;
     let stop = AtomicBool::new(false);
     let (done, changed) = (Mutex::new(None), Condvar::new());
     let mut asked = None;
@@ -72,6 +102,6 @@ pub fn run<T: Send>(
         (Some(signal), _) => Err(signal),
         (None, Some(Ok(result))) => Ok(result),
         (None, Some(Err(panic))) => Err(errors::internal(py, errors::panic_text(&*panic))),
-        (None, None) => Err(errors::internal(py, "a thread ended without a result; please report it")),
+        (None, None) => Err(errors::internal(py, NO_RESULT)),
     }
 }

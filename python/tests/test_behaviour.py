@@ -142,9 +142,21 @@ LONG = """
 """
 
 
+LONG_SIGNAL = """
+    import numpy as np, wiperlab as wl
+    samples = 1e-5 * np.random.default_rng(1).standard_normal(3_000_000)
+    print("ready", flush=True)
+    try:
+        wl.spectrum(samples, frame_rate_hz=5000.0)
+    except KeyboardInterrupt:
+        print("interrupted", flush=True)
+"""
+
+
 @pytest.mark.skipif(os.name == "nt", reason="signals of another kind")
-def test_ctrl_c_ends_many_runs_within_a_second() -> None:
-    code = textwrap.dedent(LONG.format(scene=str(SCENE)))
+@pytest.mark.parametrize("code", [LONG.format(scene=str(SCENE)), LONG_SIGNAL], ids=["runs", "spectrum"])
+def test_ctrl_c_ends_what_takes_long_within_a_second(code: str) -> None:
+    code = textwrap.dedent(code)
     process = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None and process.stdout.readline() == "ready\n"
     time.sleep(1.0)

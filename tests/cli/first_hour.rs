@@ -2,6 +2,7 @@
 //!
 //! `cargo test --test cli first_hour -- --include-ignored` makes all of it, some minutes.
 
+use crate::page;
 use crate::small_fit::Project;
 use serde_json::Value;
 use wiperlab::simulate::scene::Scene;
@@ -10,22 +11,10 @@ const PAGE: &str = include_str!("../../docs/first-hour.md");
 const SCENE: &str = include_str!("../../data/scenes/another-blade.toml");
 const TWIN: &str = include_str!("../../data/twins/another-blade.toml");
 
-/// Contents of the page's blocks of a language.
-fn blocks(language: &str) -> impl Iterator<Item = &'static str> {
-    let start = format!("```{language}\n");
-    PAGE.split("```").enumerate().filter(|(i, _)| i % 2 == 1).filter_map(move |(_, block)| {
-        let block: &'static str = block;
-        format!("```{block}").starts_with(&start).then(|| block.split_once('\n').unwrap().1)
-    })
-}
-
-fn commands() -> Vec<&'static str> {
-    blocks("sh").flat_map(str::lines).filter(|line| line.starts_with("wiperlab ")).collect()
-}
-
 /// The numbers that the reader replaces.
-fn edits() -> Vec<&'static str> {
-    blocks("toml").flat_map(str::lines).collect()
+fn edits() -> Vec<String> {
+    let blocks = page::blocks(PAGE).into_iter().filter(|block| block.language == "toml");
+    blocks.flat_map(|block| block.text.lines().map(str::to_owned).collect::<Vec<_>>()).collect()
 }
 
 fn project() -> Project {
@@ -36,7 +25,7 @@ fn project() -> Project {
 }
 
 /// Replaces numbers in a file; each must stand there once.
-fn edited(project: &Project, file: &str, edits: &[&str]) {
+fn edited(project: &Project, file: &str, edits: &[String]) {
     let mut text = project.read(file);
     for edit in edits {
         let key = edit.split_once('=').unwrap().0;
@@ -75,14 +64,14 @@ fn holds_the_truth(project: &Project, result: &str) {
 
 #[test]
 fn the_commands_of_the_page_lead_to_a_report_with_the_truth_in_its_intervals() {
-    let (project, commands) = (project(), commands());
+    let (project, commands) = (project(), page::commands(PAGE));
     let of_the_reader = commands.iter().filter(|line| !line.contains("wiperlab twin")).count();
     assert!(of_the_reader <= 8 && edits().len() == 3);
     for command in commands {
         if command.starts_with("wiperlab fit ") {
             edited(&project, "fits/film/scene.toml", &edits());
         }
-        run(&project, command);
+        run(&project, &command);
     }
     holds_the_truth(&project, "fits/film/result.json");
     let page = project.read("reports/film/index.html");

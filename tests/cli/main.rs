@@ -6,6 +6,9 @@ mod project;
 mod sealed;
 #[path = "../common/small_fit.rs"]
 mod small_fit;
+#[cfg_attr(not(unix), allow(dead_code, reason = "commands of pages run where there is a shell"))]
+#[path = "../common/tracked.rs"]
+mod tracked;
 
 mod accuracy;
 mod batch;
@@ -13,6 +16,7 @@ mod blade;
 mod bounds;
 mod demo;
 mod divided;
+mod docs;
 mod estimates;
 mod figures;
 mod first_hour;
@@ -29,6 +33,8 @@ mod no_panic;
 mod options;
 mod output;
 mod outputs;
+#[cfg_attr(not(unix), allow(dead_code, reason = "commands of pages run where there is a shell"))]
+mod page;
 #[cfg(feature = "parquet")]
 mod parquet;
 mod readme;

@@ -16,7 +16,7 @@ use tempfile::TempDir;
 const SCENE: &str = include_str!("../../data/scenes/light-blade.toml");
 
 /// Twelve short runs.
-const STUDY: &str = r#"format = 1
+pub const STUDY: &str = r#"format = 1
 title = "A small study"
 scene = "../scenes/light-blade.toml"
 

@@ -34,7 +34,7 @@ camera = { tilt_sd_deg = 0, scale_sd = 0, offset_sd_m = 0, clock_sd_s = 0 }
 "#;
 
 /// The recording: on the clock of its scene, so that the scene's drive serves.
-const TWIN: &str = r#"format = 1
+pub const TWIN: &str = r#"format = 1
 title = "short"
 scene = "scenes/actual-blade.toml"
 seed = 5

@@ -2,10 +2,13 @@
 
 #[path = "../common/ringing.rs"]
 mod ringing;
+#[path = "../common/tracked.rs"]
+mod tracked;
 
 #[path = "../../examples/reference.rs"]
 mod reference_pages;
 
+mod links;
 mod portable;
 mod readers;
 mod reference;
