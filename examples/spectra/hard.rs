@@ -169,6 +169,13 @@ fn coloured(frames: usize, first: f64, second: f64, draw: &mut Draw) -> Vec<f64>
     values.into_iter().map(|x| 1e-6 * x / rms).collect()
 }
 
+/// A ring-down that is over in a tenth of a long record, and a steady tone.
+fn ring_down_and_tone(frames: usize, draw: &mut Draw) -> Made {
+    let ring_down = Truth { amplitude_m: 1e-4, ..Truth::damped(78.4, 0.03, draw.phase()) };
+    let cycle = Truth::steady(900.5, draw.phase());
+    record(frames, vec![ring_down, cycle], 1e-6, draw, |_| 0.0)
+}
+
 fn of_noise(values: Vec<f64>) -> Made {
     let samples = values.into_iter().map(Some).collect();
     Made { samples, rate_hz: RATE_HZ, truths: Vec::new(), noise_m: 1e-6 }
@@ -317,9 +324,9 @@ kinds! {
         let truth = Truth { amplitude_m: 1e-4, ..Truth::damped(78.4, 0.03, d.phase()) };
         record(8192, vec![truth], 1e-6, d, |_| 0.0)
     };
-    "long", "78.4 Hz, 3 %, and 900 Hz, 10,000 frames" => |d| {
-        let ring_down = Truth { amplitude_m: 1e-4, ..Truth::damped(78.4, 0.03, d.phase()) };
-        let cycle = Truth::steady(900.5, d.phase());
-        record(10_000, vec![ring_down, cycle], 1e-6, d, |_| 0.0)
-    };
+    "long", "white, 20,000 frames" => |d| record(20_000, Vec::new(), 1e-6, d, |_| 0.0);
+    "long", "bare stroke, 20,000 frames" => |d| record(20_000, Vec::new(), 1e-6, d, |t| stroke(t, 4.0));
+    "long", "AR(1), 0.9, 20,000 frames" => |d| of_noise(coloured(20_000, 0.9, 0.0, d));
+    "long", "78.4 Hz, 3 %, and 900 Hz, 10,000 frames" => |d| ring_down_and_tone(10_000, d);
+    "long", "78.4 Hz, 3 %, and 900 Hz, 20,000 frames" => |d| ring_down_and_tone(20_000, d);
 }

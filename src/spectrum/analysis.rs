@@ -18,10 +18,9 @@ use crate::math;
 use reading::Reading;
 use std::f64::consts::TAU;
 
-/// Longest record that is taken apart, frames: more than a second at 5,000 frames/s. No cycle keeps its
-/// frequency for longer, and the time that it takes grows faster than the record; longer ones are read by
-/// their windowed periodogram.
-pub const LONGEST_FITTED: usize = 1 << 13;
+/// Longest record that is taken apart, frames: three seconds at 5,000 frames/s, which take about one. The time
+/// grows faster than the record; longer ones are read by their windowed periodogram.
+pub const LONGEST_FITTED: usize = 1 << 14;
 /// A record and the camera that took it.
 #[derive(Debug, Clone, Copy)]
 pub struct Record<'a> {
