@@ -187,11 +187,11 @@ fn narrow(cycles_wide: f64, draw: &mut Draw) -> Made {
     of_noise(coloured(FRAMES, 2.0 * radius * angle.cos(), -radius * radius, draw))
 }
 
-fn pair(resolutions: f64, draw: &mut Draw) -> Made {
+fn pair(resolutions: f64, snr_db: f64, draw: &mut Draw) -> Made {
     let hz = draw.within(300.0, 1500.0);
     let truths =
         vec![Truth::steady(hz, draw.phase()), Truth::steady(hz + resolutions / DURATION_S, draw.phase())];
-    plain(truths, 20.0, draw)
+    plain(truths, snr_db, draw)
 }
 
 /// A frequency that rises evenly by less than a ridge shows.
@@ -273,11 +273,12 @@ kinds! {
         let truth = Truth::steady(d.within(60.0, 100.0), d.phase());
         record(FRAMES, vec![truth], noise_m(20.0), d, tanh_tail)
     };
-    "pairs", "0.7 resolutions apart" => |d| pair(0.7, d);
-    "pairs", "1 resolution apart" => |d| pair(1.0, d);
-    "pairs", "1.5 resolutions apart" => |d| pair(1.5, d);
-    "pairs", "2 resolutions apart" => |d| pair(2.0, d);
-    "pairs", "2.5 resolutions apart" => |d| pair(2.5, d);
+    "pairs", "0.7 resolutions apart" => |d| pair(0.7, 20.0, d);
+    "pairs", "1 resolution apart" => |d| pair(1.0, 20.0, d);
+    "pairs", "1.5 resolutions apart" => |d| pair(1.5, 20.0, d);
+    "pairs", "1.6 resolutions apart, 60 dB" => |d| pair(1.6, 60.0, d);
+    "pairs", "2 resolutions apart" => |d| pair(2.0, 20.0, d);
+    "pairs", "2.5 resolutions apart" => |d| pair(2.5, 20.0, d);
     "relations", "902 Hz modulated by 20 %, and 78 Hz" => |d| modulated(0.2, d);
     "relations", "902 Hz modulated by 50 %, and 78 Hz" => |d| modulated(0.5, d);
     "relations", "7 times 131.3 Hz" => |d| multiple(7.0, 131.3, d);

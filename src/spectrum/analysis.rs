@@ -18,8 +18,8 @@ use crate::math;
 use reading::Reading;
 use std::f64::consts::TAU;
 
-/// Longest record that is taken apart, frames: three seconds at 5,000 frames/s, which take about one. The time
-/// grows faster than the record; longer ones are read by their windowed periodogram.
+/// Longest record that is taken apart, frames: three seconds at 5,000 frames/s, which take about one. The
+/// time grows faster than the record; longer ones are read by their windowed periodogram.
 pub const LONGEST_FITTED: usize = 1 << 14;
 /// A record and the camera that took it.
 #[derive(Debug, Clone, Copy)]

@@ -6,8 +6,8 @@ use super::least_squares::{Term, nepers};
 use super::oscillations::{Explained, LOBE, Parts, Search, lobe};
 use super::time_frequency::Range;
 
-/// Range over which two lines that beat may seem to drift, resolutions: they lie at most four apart, and where
-/// they nearly cancel the frequency swings beyond both.
+/// Range over which two lines that beat may seem to drift, resolutions: they lie at most four apart, and
+/// where they nearly cancel the frequency swings beyond both.
 const WIDEST_BEAT: f64 = 10.0;
 
 /// A term that leaves more than noise around it.

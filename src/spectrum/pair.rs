@@ -7,8 +7,8 @@ use super::least_squares::{Care, Free, Term};
 use super::oscillations::{Explained, Parts, Search};
 use super::shapes::near;
 
-/// Distances from which a fit of two starts, resolutions.
-const APART: [f64; 3] = [0.7, 1.2, 1.8];
+/// Where a fit of two starts, resolutions from the one: it lies between them, or has settled on either.
+const STARTS: [[f64; 2]; 5] = [[-0.35, 0.35], [-0.6, 0.6], [-0.9, 0.9], [0.0, 1.6], [-1.6, 0.0]];
 /// Resolutions from the one within which the two must lie.
 const WITHIN: f64 = 2.0;
 
@@ -19,19 +19,18 @@ impl Search<'_> {
         let tried = |one: &usize| {
             let (alone, group) = (vec![*one], near(&parts.solved.terms, *one));
             let groups = if group.len() > 1 { vec![alone, group] } else { vec![alone] };
-            let pairs = groups.into_iter().flat_map(|out| APART.map(|apart| (out.clone(), apart)));
-            pairs.filter_map(|(out, apart)| self.pair(parts, *one, &out, apart)).collect::<Vec<_>>()
+            let pairs = groups.into_iter().flat_map(|out| STARTS.map(|starts| (out.clone(), starts)));
+            pairs.filter_map(|(out, starts)| self.pair(parts, *one, &out, starts)).collect::<Vec<_>>()
         };
         doubtful.iter().flat_map(tried).collect()
     }
 
-    /// Two terms this far apart around term `k`, in the place of some.
-    fn pair(&self, parts: &Parts, k: usize, out: &[usize], apart: f64) -> Option<Parts> {
+    /// Two terms that start this far from term `k`, in the place of some.
+    fn pair(&self, parts: &Parts, k: usize, out: &[usize], starts: [f64; 2]) -> Option<Parts> {
         let one = parts.solved.terms[k];
-        let half = |sign: f64| Term::from_start(one.cycles + sign * apart / 2.0, 0.0, Free::Cycles);
         let all = &parts.solved.terms;
         let mut terms: Vec<Term> = (0..all.len()).filter(|k| !out.contains(k)).map(|k| all[k]).collect();
-        terms.extend([half(-1.0), half(1.0)]);
+        terms.extend(starts.map(|apart| Term::from_start(one.cycles + apart, 0.0, Free::Cycles)));
         if !self.has_frames_for(&parts.problem, &terms) {
             return None;
         }

@@ -1,8 +1,8 @@
 //! Records too long to be taken apart: components from the windowed periodogram, judged by the same criteria.
 //!
 //! Decay and drift are not tried. Instead each component is read in pieces of the record: one that keeps its
-//! amplitude and phase is a steady line, any other is not known to be one, and its frequency only to the width
-//! of its peak.
+//! amplitude and phase is a steady line, any other is not known to be one, and its frequency only to the
+//! width of its peak.
 
 use super::{Analysis, Record, Removed};
 use crate::math;
