@@ -1,0 +1,168 @@
+//! The stick-slip cycle as the spectrum reads it, against the sticks of the simulation that it is of:
+//! `cargo run --release --example cycles`.
+//!
+//! Each scene is recorded at 10,000 frames/s with 0.5 um of noise, and read in windows of several lengths
+//! between a release and the next hold. The truth is counted: the ends of the sticks are whole cycles apart.
+
+use wiperlab::recording::channel::Channel;
+use wiperlab::simulate::Effort;
+use wiperlab::simulate::scene::Scene;
+use wiperlab::spectrum::{Analysis, Component, Record, Settings};
+use wiperlab::twin::{Camera, Tracking, track, view};
+
+const SCENES: [(&str, &str); 4] = [
+    ("light blade", include_str!("../data/scenes/light-blade.toml")),
+    ("actual blade", include_str!("../data/scenes/actual-blade.toml")),
+    ("another blade", include_str!("../data/scenes/another-blade.toml")),
+    ("published simulation", include_str!("../data/scenes/published-simulation.toml")),
+];
+const CAMERA: Camera = Camera { frame_rate_hz: 10_000.0, exposure_s: 0.0 };
+const NOISE_M: f64 = 5e-7;
+/// Lengths of windows, s, and how far apart they begin, in their lengths.
+const LENGTHS_S: [f64; 3] = [0.075, 0.15, 0.3];
+const APART: f64 = 0.5;
+/// Fewest cycles of a window, and the most by which the sticks of one cycle follow later than the median.
+const FEWEST: usize = 12;
+const REGULAR: f64 = 2.0;
+
+/// What windows of a scene gave.
+#[derive(Default)]
+struct Count {
+    windows: usize,
+    named: usize,
+    /// Error of the mean over its deviation.
+    means: Vec<f64>,
+    /// The same of both ends of the range of those that drift, and the errors, Hz.
+    ends: Vec<f64>,
+    ends_hz: Vec<f64>,
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    println!(
+        "| scene | windows with a cycle | named | mean within two deviations | largest | drifting | ends within two deviations | rms Hz | largest Hz |"
+    );
+    println!("|---|---:|---:|---:|---:|---:|---:|---:|---:|");
+    for (name, text) in SCENES {
+        let scene = Scene::parse(name, text)?;
+        let seen = view(&scene, &CAMERA, scene.start_s, scene.run.stop_s, Effort::of(&scene))?;
+        let tracking = Tracking { metres_per_pixel: NOISE_M, noise_px: 1.0, dropout_fraction: 0.0, seed: 1 };
+        let recording = track(&seen.recording, name, &tracking)?;
+        let samples = Channel::Deflection.samples(&recording);
+        let ends_s: Vec<f64> = seen.stick_s.iter().map(|stick| stick[1]).collect();
+        let mut count = Count::default();
+        for length_s in LENGTHS_S {
+            let frames = (length_s * CAMERA.frame_rate_hz) as usize;
+            let step = (APART * frames as f64) as usize;
+            for first in (0..samples.len().saturating_sub(frames)).step_by(step) {
+                let from_s = recording.grid().time_s(first);
+                if let Some(cycles) = Cycles::between(&ends_s, from_s, from_s + length_s) {
+                    count.read(&samples[first..first + frames], from_s, &cycles)?;
+                }
+            }
+        }
+        count.print(name);
+    }
+    Ok(())
+}
+
+/// Ends of sticks that follow one another regularly.
+struct Cycles(Vec<f64>);
+
+impl Cycles {
+    /// Of a window that has nothing else; with two more on either side.
+    fn between(ends_s: &[f64], from_s: f64, to_s: f64) -> Option<Self> {
+        let first = ends_s.partition_point(|t| *t < from_s).checked_sub(2)?;
+        let last = ends_s.partition_point(|t| *t < to_s) + 1;
+        let inside = ends_s.get(first..=last).filter(|inside| inside.len() > FEWEST)?;
+        let mut periods: Vec<f64> = inside.windows(2).map(|pair| pair[1] - pair[0]).collect();
+        periods.sort_by(f64::total_cmp);
+        let median = periods[periods.len() / 2];
+        (periods[0] > median / REGULAR && periods[periods.len() - 1] < REGULAR * median)
+            .then(|| Self(inside.to_vec()))
+    }
+
+    /// Cycles since the first stick, by a straight line between two.
+    fn at(&self, time_s: f64) -> f64 {
+        let next = self.0.partition_point(|t| *t < time_s).clamp(1, self.0.len() - 1);
+        let (a, b) = (self.0[next - 1], self.0[next]);
+        (next - 1) as f64 + (time_s - a) / (b - a)
+    }
+
+    /// Least and greatest frequency of three cycles in a row that overlap a stretch of time by half.
+    fn range_hz(&self, from_s: f64, to_s: f64) -> (f64, f64) {
+        let three = self.0.windows(4).filter(|sticks| {
+            let middle_s = (sticks[0] + sticks[3]) / 2.0;
+            middle_s > from_s && middle_s < to_s
+        });
+        three
+            .map(|sticks| 3.0 / (sticks[3] - sticks[0]))
+            .fold((f64::INFINITY, 0.0), |(low, high), hz| (low.min(hz), high.max(hz)))
+    }
+
+    fn mean_hz(&self, from_s: f64, to_s: f64) -> f64 {
+        (self.at(to_s) - self.at(from_s)) / (to_s - from_s)
+    }
+}
+
+impl Count {
+    fn read(
+        &mut self,
+        samples: &[Option<f64>],
+        from_s: f64,
+        cycles: &Cycles,
+    ) -> Result<(), Box<dyn std::error::Error>> {
+        let record = Record { samples, frame_rate_hz: CAMERA.frame_rate_hz, exposure_s: None };
+        let analysis = Analysis::of(&record, &Settings::default())?;
+        let from_s = from_s + analysis.left_out as f64 / CAMERA.frame_rate_hz;
+        let to_s = from_s + analysis.left_m.len() as f64 / CAMERA.frame_rate_hz;
+        self.windows += 1;
+        let drifts = analysis.spectrum.components.iter().find(|c| c.range_hz.is_some());
+        let (component, [from_s, to_s]) = match (drifts, &analysis.ridge) {
+            (Some(component), Some(ridge)) => {
+                let point =
+                    |p: Option<f64>, end: Option<f64>, other: f64| end.or(p).map_or(other, |t| from_s + t);
+                let start =
+                    point(ridge.points.first().map(|p| p.time_s), ridge.start.map(|e| e.time_s), from_s);
+                let end = point(ridge.points.last().map(|p| p.time_s), ridge.end.map(|e| e.time_s), to_s);
+                (component, [start, end])
+            }
+            _ => {
+                let mean_hz = cycles.mean_hz(from_s, to_s);
+                let off = |c: &&Component| (c.frequency_hz - mean_hz).abs();
+                let nearest = analysis.spectrum.components.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+                let Some(component) = nearest.filter(|c| off(c) < 0.1 * mean_hz) else { return Ok(()) };
+                (component, [from_s, to_s])
+            }
+        };
+        self.named += 1;
+        self.means.push((component.frequency_hz - cycles.mean_hz(from_s, to_s)) / component.frequency_sd_hz);
+        if let Some(range) = component.range_hz {
+            let (low, high) = cycles.range_hz(from_s, to_s);
+            for (found, sd_hz, truth) in
+                [(range.low_hz, range.low_sd_hz, low), (range.high_hz, range.high_sd_hz, high)]
+            {
+                self.ends.push((found - truth) / sd_hz);
+                self.ends_hz.push(found - truth);
+            }
+        }
+        Ok(())
+    }
+
+    fn print(&self, name: &str) {
+        let within = |scaled: &[f64]| scaled.iter().filter(|x| x.abs() < 2.0).count();
+        let largest = |values: &[f64]| values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
+        let rms = (self.ends_hz.iter().map(|x| x * x).sum::<f64>() / self.ends_hz.len().max(1) as f64).sqrt();
+        println!(
+            "| {name} | {} | {} | {} of {} | {:.1} | {} | {} of {} | {rms:.1} | {:.1} |",
+            self.windows,
+            self.named,
+            within(&self.means),
+            self.means.len(),
+            largest(&self.means),
+            self.ends.len() / 2,
+            within(&self.ends),
+            self.ends.len(),
+            largest(&self.ends_hz)
+        );
+    }
+}
