@@ -19,11 +19,11 @@ const SCENES: [(&str, &str); 4] = [
 const CAMERA: Camera = Camera { frame_rate_hz: 10_000.0, exposure_s: 0.0 };
 const NOISE_M: f64 = 5e-7;
 /// Lengths of windows, s, and how far apart they begin, in their lengths.
-const LENGTHS_S: [f64; 3] = [0.075, 0.15, 0.3];
-const APART: f64 = 0.5;
+const LENGTHS_S: [f64; 4] = [0.05, 0.1, 0.15, 0.25];
+const APART: f64 = 0.25;
 /// Fewest cycles of a window, and the most by which the sticks of one cycle follow later than the median.
 const FEWEST: usize = 12;
-const REGULAR: f64 = 2.0;
+const REGULAR: f64 = 3.0;
 
 /// What windows of a scene gave.
 #[derive(Default)]

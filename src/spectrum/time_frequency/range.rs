@@ -47,20 +47,42 @@ impl Ridge {
 fn of(ridge: &Ridge) -> Option<Range> {
     // an end that was carried there with a wide deviation bounds nothing
     let known = |end: &&RidgeEnd| end.frequency_sd_hz < AGREES / ridge.segment_s;
-    let ends =
-        ridge.start.iter().chain(&ridge.end).filter(known).map(|end| (end.frequency_hz, end.frequency_sd_hz));
-    let confirmed = ridge
-        .parts()
-        .flat_map(|part| (0..part.len()).filter(|i| is_confirmed(ridge, part, *i)).map(move |i| &part[i]));
+    let start = ridge.start.as_ref().filter(known).zip(ridge.points.first());
+    let end = ridge.end.as_ref().filter(known).zip(ridge.points.last());
+    let ends = start
+        .iter()
+        .chain(&end)
+        .map(|(end, point)| (end.frequency_hz, math::hypot(end.frequency_sd_hz, off_hz(end, point))));
+    let confirmed = ridge.parts().flat_map(|part| {
+        let outer = |i: usize| {
+            let carried = |end: Option<(&RidgeEnd, &RidgePoint)>| end.is_some_and(|(_, p)| p == &part[i]);
+            (i == 0 || i + 1 == part.len()) && !carried(start) && !carried(end)
+        };
+        let with_sd = move |i: usize| (&part[i], if outer(i) { beyond_hz(ridge, &part[i]) } else { 0.0 });
+        (0..part.len()).filter(|i| is_confirmed(ridge, part, *i)).map(with_sd).collect::<Vec<_>>()
+    });
     let bent = bend_hz(ridge);
     let all: Vec<(f64, f64)> = confirmed
-        .map(|p| (p.frequency_hz, p.frequency_sd_hz))
+        .map(|(p, beyond)| (p.frequency_hz, math::hypot(p.frequency_sd_hz, beyond)))
         .chain(ends)
         .map(|(hz, sd_hz)| (hz, math::hypot(sd_hz, bent)))
         .collect();
     let (low_hz, low_sd_hz) = all.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let (high_hz, high_sd_hz) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
     Some(Range { low_hz, low_sd_hz, high_hz, high_sd_hz })
+}
+
+/// What the frequency changes by in the outer half of the segment of a point beyond which the course is not
+/// known, Hz: it may go on.
+fn beyond_hz(ridge: &Ridge, point: &RidgePoint) -> f64 {
+    (point.rate_hz_per_s * ridge.segment_s / 2.0).abs()
+}
+
+/// A third of the distance between an end and where the rate of the point next to it leads, Hz: a course that
+/// bends there leaves a part of it open.
+fn off_hz(end: &RidgeEnd, point: &RidgePoint) -> f64 {
+    let led_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s);
+    (end.frequency_hz - led_hz).abs() / 3.0
 }
 
 /// What a course that bends is read off by where it turns, Hz: a fit of a changing but steady rate to a
