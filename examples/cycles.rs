@@ -14,16 +14,20 @@ const SCENES: [(&str, &str); 4] = [
     ("light blade", include_str!("../data/scenes/light-blade.toml")),
     ("actual blade", include_str!("../data/scenes/actual-blade.toml")),
     ("another blade", include_str!("../data/scenes/another-blade.toml")),
-    ("published simulation", include_str!("../data/scenes/published-simulation.toml")),
+    ("published experiment", include_str!("../data/scenes/published-experiment.toml")),
 ];
 const CAMERA: Camera = Camera { frame_rate_hz: 10_000.0, exposure_s: 0.0 };
 const NOISE_M: f64 = 5e-7;
 /// Lengths of windows, s, and how far apart they begin, in their lengths.
 const LENGTHS_S: [f64; 4] = [0.05, 0.1, 0.15, 0.25];
 const APART: f64 = 0.25;
-/// Fewest cycles of a window, and the most by which the sticks of one cycle follow later than the median.
+/// Fewest cycles of a window, and how many times longer or shorter than the median one may be: a beat that is
+/// dropped is twice as long.
 const FEWEST: usize = 12;
-const REGULAR: f64 = 3.0;
+const REGULAR: f64 = 2.0;
+
+/// Share of its mean within which a component is the cycle.
+const NAMED: f64 = 0.1;
 
 /// What windows of a scene gave.
 #[derive(Default)]
@@ -113,26 +117,24 @@ impl Count {
     ) -> Result<(), Box<dyn std::error::Error>> {
         let record = Record { samples, frame_rate_hz: CAMERA.frame_rate_hz, exposure_s: None };
         let analysis = Analysis::of(&record, &Settings::default())?;
+        let length_s = samples.len() as f64 / CAMERA.frame_rate_hz;
         let from_s = from_s + analysis.left_out as f64 / CAMERA.frame_rate_hz;
         let to_s = from_s + analysis.left_m.len() as f64 / CAMERA.frame_rate_hz;
+        if to_s - from_s < length_s / 2.0 {
+            return Ok(()); // what is left behind a flip
+        }
         self.windows += 1;
-        let drifts = analysis.spectrum.components.iter().find(|c| c.range_hz.is_some());
-        let (component, [from_s, to_s]) = match (drifts, &analysis.ridge) {
-            (Some(component), Some(ridge)) => {
-                let point =
-                    |p: Option<f64>, end: Option<f64>, other: f64| end.or(p).map_or(other, |t| from_s + t);
-                let start =
-                    point(ridge.points.first().map(|p| p.time_s), ridge.start.map(|e| e.time_s), from_s);
-                let end = point(ridge.points.last().map(|p| p.time_s), ridge.end.map(|e| e.time_s), to_s);
-                (component, [start, end])
+        let mean_hz = cycles.mean_hz(from_s, to_s);
+        let off = |c: &&Component| (c.frequency_hz - mean_hz).abs();
+        let nearest = analysis.spectrum.components.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
+        let Some(component) = nearest.filter(|c| off(c) < NAMED * mean_hz) else { return Ok(()) };
+        let [from_s, to_s] = match &analysis.ridge {
+            Some(ridge) if component.range_hz.is_some() => {
+                let first = ridge.start.map(|end| end.time_s).or(ridge.points.first().map(|p| p.time_s));
+                let last = ridge.end.map(|end| end.time_s).or(ridge.points.last().map(|p| p.time_s));
+                [first.map_or(from_s, |t| from_s + t), last.map_or(to_s, |t| from_s + t)]
             }
-            _ => {
-                let mean_hz = cycles.mean_hz(from_s, to_s);
-                let off = |c: &&Component| (c.frequency_hz - mean_hz).abs();
-                let nearest = analysis.spectrum.components.iter().min_by(|a, b| off(a).total_cmp(&off(b)));
-                let Some(component) = nearest.filter(|c| off(c) < 0.1 * mean_hz) else { return Ok(()) };
-                (component, [from_s, to_s])
-            }
+            _ => [from_s, to_s],
         };
         self.named += 1;
         self.means.push((component.frequency_hz - cycles.mean_hz(from_s, to_s)) / component.frequency_sd_hz);

@@ -26,7 +26,7 @@ const SHORTER: [f64; 3] = [0.8, 0.65, 0.5];
 const GAINED: f64 = 0.1;
 /// Deviation of the instant of a cycle, cycles: its form changes with its frequency, and the fundamental
 /// moves against the instant at which the tip sticks.
-const FORM: f64 = 0.03;
+const FORM: f64 = 0.05;
 /// Distance of points that share too few frames to follow each other's noise, segments.
 const HALF: f64 = 0.5;
 /// Share of the segments in which a drift must be followed to be one.

@@ -53,6 +53,8 @@ pub(super) struct Evidence {
     pub unsteady: bool,
     /// Distance to the nearest other oscillation, resolutions.
     pub nearest: Option<f64>,
+    /// Distance to another oscillation of which it may be a piece, or that of it, resolutions.
+    pub piece: Option<f64>,
     /// Share of the segments in which one that drifts was followed.
     pub followed: Option<f64>,
     /// Whether it is as slow as what a trend that had to grow describes.
@@ -107,7 +109,7 @@ fn too_few_cycles(c: &Component, at: &Circumstances) -> Option<String> {
 }
 
 /// What makes a frequency ambiguous.
-fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 14] {
+fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 15] {
     let shift_hz = c.trend_shift_hz.unwrap_or_default();
     let near = evidence.nearest.filter(|nearest| *nearest < APART);
     let followed = evidence.followed.filter(|followed| *followed < COVERED);
@@ -127,6 +129,12 @@ fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 14] {
         (evidence.shift > SHIFTS)
             .then(|| format!("a trend of two columns more moves it by {shift_hz:.2e} Hz")),
         near.map(|n| format!("another lies {n:.2} resolutions from it, closer than the window tells apart")),
+        evidence.piece.map(|by| {
+            format!(
+                "another lies {by:.1} resolutions from it, and they are not both steady: pieces of one that \
+                 drifts look the same"
+            )
+        }),
         followed.map(|share| {
             format!("followed in {:.0} % of the window only: its range may be wider", 100.0 * share)
         }),

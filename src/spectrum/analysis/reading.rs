@@ -26,6 +26,9 @@ const SLOW: f64 = 6.5;
 const FEWEST_COLUMNS: usize = 4;
 /// Others near an oscillation that make a crowd.
 const CROWD: usize = 2;
+/// Resolutions within which two oscillations that are not both steady may be pieces of one: the window hardly
+/// tells them apart, and each makes up for what the other is not.
+const TOGETHER: f64 = 2.0;
 /// Resolutions by which a companion that cannot be resolved moves a frequency, for each part of the
 /// amplitude that is left: of pairs half a resolution to one apart with equal amplitudes, the worst of fifty
 /// was off by 4.6.
@@ -162,7 +165,10 @@ impl<'a> Reading<'a> {
             let left_m = self.search.left_next_to(&self.explained, term);
             (left_m / shown_m, shown_m / self.search.floor_near(&self.explained, term.cycles))
         };
-        let companion = COMPANION * left; // resolutions, so cycles
+        let piece = self.piece(k);
+        // resolutions, so cycles
+        let companion =
+            math::hypot(COMPANION * left, piece.as_ref().map_or(0.0, |piece| piece.apart * piece.share));
         let damping = matches!(free.free, Free::Both | Free::Nepers).then(|| {
             damping_ratio(
                 free,
@@ -179,6 +185,7 @@ impl<'a> Reading<'a> {
             slow: self.is_slow(k),
             crowded: self.is_crowded(k),
             nearest: self.nearest(k),
+            piece: piece.map(|piece| piece.apart),
             stays,
             ..Evidence::default()
         };
@@ -218,6 +225,26 @@ impl<'a> Reading<'a> {
         let terms = &self.explained.parts.solved.terms;
         let near = |t: &&Term| t.is_brief() && (t.cycles - terms[k].cycles).abs() < NEIGHBOURHOOD;
         terms[k].is_brief() && terms.iter().filter(near).count() > CROWD
+    }
+
+    /// The nearest other oscillation within two resolutions, where one of the two decays or begins inside the
+    /// record: two that are steady are a pair.
+    fn piece(&self, k: usize) -> Option<Piece> {
+        let (parts, terms) = (&self.explained.parts, &self.explained.parts.solved.terms);
+        let size_m = |k: usize| {
+            let [cosine, sine] = parts.problem.pair(&parts.solved, k);
+            math::hypot(cosine, sine)
+        };
+        let steady = |term: &Term| term.nepers == 0.0 && term.first == 0;
+        let piece = |j: usize| Piece {
+            apart: (terms[j].cycles - terms[k].cycles).abs(),
+            share: (size_m(j) / size_m(k)).min(1.0),
+        };
+        (0..terms.len())
+            .filter(|j| *j != k && terms[*j].cycles > 0.0 && !(steady(&terms[*j]) && steady(&terms[k])))
+            .map(piece)
+            .filter(|piece| piece.apart < TOGETHER)
+            .min_by(|a, b| a.apart.total_cmp(&b.apart))
     }
 
     /// Distance to the nearest other oscillation, resolutions.
@@ -331,6 +358,14 @@ impl<'a> Reading<'a> {
         let share = (1.0 - taken / values).max(0.25);
         self.search.periodogram.deviation((mean_square / share).sqrt())
     }
+}
+
+/// Another oscillation that may be a piece of the same.
+struct Piece {
+    /// Distance, resolutions.
+    apart: f64,
+    /// Its amplitude over that of this one, at most 1.
+    share: f64,
 }
 
 /// Damping ratio `d / sqrt(d^2 + (2 pi n)^2)` of `d` nepers in `n` cycles, and its deviation.
