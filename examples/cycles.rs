@@ -29,6 +29,10 @@ const REGULAR: f64 = 2.0;
 /// Share of its mean within which a component is the cycle.
 const NAMED: f64 = 0.1;
 
+/// Deviation of the count, cycles: a stick ends at another phase of the fundamental as the form of the cycle
+/// changes, by a twentieth at either end. The deviation of one that drifts has it already.
+const COUNTED: f64 = 0.07;
+
 /// What windows of a scene gave.
 #[derive(Default)]
 struct Count {
@@ -137,7 +141,9 @@ impl Count {
             _ => [from_s, to_s],
         };
         self.named += 1;
-        self.means.push((component.frequency_hz - cycles.mean_hz(from_s, to_s)) / component.frequency_sd_hz);
+        let counted_sd_hz = if component.range_hz.is_some() { 0.0 } else { COUNTED / (to_s - from_s) };
+        let off_hz = component.frequency_hz - cycles.mean_hz(from_s, to_s);
+        self.means.push(off_hz / component.frequency_sd_hz.hypot(counted_sd_hz));
         if let Some(range) = component.range_hz {
             let (low, high) = cycles.range_hz(from_s, to_s);
             for (found, sd_hz, truth) in
@@ -153,7 +159,10 @@ impl Count {
     fn print(&self, name: &str) {
         let within = |scaled: &[f64]| scaled.iter().filter(|x| x.abs() < 2.0).count();
         let largest = |values: &[f64]| values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let rms = (self.ends_hz.iter().map(|x| x * x).sum::<f64>() / self.ends_hz.len().max(1) as f64).sqrt();
+        let rms = match self.ends_hz.len() {
+            0 => 0.0,
+            count => (self.ends_hz.iter().map(|x| x * x).sum::<f64>() / count as f64).sqrt(),
+        };
         println!(
             "| {name} | {} | {} | {} of {} | {:.1} | {} | {} of {} | {rms:.1} | {:.1} |",
             self.windows,
