@@ -67,7 +67,7 @@ impl Search<'_> {
         (0..terms.len()).filter(leaves).collect()
     }
 
-    /// These, with what takes their place must explain more than.
+    /// These, with the criterion that what takes their place must fall below.
     pub(super) fn doubtful(&self, explained: &Explained) -> Vec<Doubtful> {
         let least = self.criterion(&explained.parts);
         let criterion = |k: usize| self.criterion_of_shapes(explained, k).min(least);
