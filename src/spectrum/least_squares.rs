@@ -11,7 +11,7 @@ mod columns;
 
 use super::trend::Trend;
 use crate::math;
-use columns::{Fixed, Of};
+use columns::{Fixed, Of, PAIR, WITH_SLOPES};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::{PI, TAU};
 use std::rc::Rc;
@@ -149,8 +149,6 @@ pub(super) struct Solved {
     pub amplitudes: DVector<f64>,
     /// Weighted sum of squares of what is left, m^2.
     pub misfit: f64,
-    /// Inner products of the columns and the data.
-    gram: DMatrix<f64>,
 }
 
 impl Problem {
@@ -222,13 +220,12 @@ impl Problem {
 
     /// The amplitudes that leave least at given terms.
     pub(super) fn at(&self, terms: Vec<Term>) -> Option<Solved> {
-        let gram = self.fixed.gram(&terms);
-        let linear = self.linear_columns(terms.len());
+        let gram = self.fixed.gram::<PAIR>(&terms);
         let last = gram.ncols() - 1;
-        let right = gram.column(last).select_rows(&linear);
-        let amplitudes = inverse(&gram.select_rows(&linear).select_columns(&linear))? * &right;
+        let right = gram.column(last).rows(0, last).into_owned();
+        let amplitudes = inverse(&gram.view((0, 0), (last, last)).into_owned())? * &right;
         let misfit = gram[(last, last)] - right.dot(&amplitudes);
-        Some(Solved { terms, amplitudes, misfit, gram })
+        Some(Solved { terms, amplitudes, misfit })
     }
 
     /// The step, halved until the misfit falls; `None` where it does not.
@@ -256,7 +253,8 @@ impl Problem {
     fn unknowns(&self, solved: &Solved) -> DMatrix<f64> {
         let (trend, linear) = (self.trend.columns(), self.linear_columns(solved.terms.len()));
         let moving: usize = solved.terms.iter().map(|t| t.free.count()).sum();
-        let mut map = DMatrix::zeros(solved.gram.nrows(), linear.len() + moving);
+        let columns = trend + WITH_SLOPES * solved.terms.len() + 1;
+        let mut map = DMatrix::zeros(columns, linear.len() + moving);
         for (unknown, column) in linear.iter().enumerate() {
             map[(*column, unknown)] = 1.0;
         }
@@ -285,12 +283,12 @@ impl Problem {
 
     /// The Gauss-Newton step of cycles and nepers of each term; zero for what is held.
     fn step(&self, solved: &Solved) -> Option<Vec<[f64; 2]>> {
-        let map = self.unknowns(solved);
+        let (map, gram) = (self.unknowns(solved), self.fixed.gram::<WITH_SLOPES>(&solved.terms));
         let linear = solved.amplitudes.len();
         let mut left = -(map.columns(0, linear) * &solved.amplitudes);
         left[map.nrows() - 1] = 1.0; // what is left, as a combination of the columns: the data less the model
-        let towards = map.tr_mul(&(&solved.gram * left));
-        let change = inverse(&map.tr_mul(&(&solved.gram * &map)))? * towards;
+        let towards = map.tr_mul(&(&gram * left));
+        let change = inverse(&map.tr_mul(&(&gram * &map)))? * towards;
         let mut moves = change.iter().skip(linear).copied();
         let mut take = |free: bool| if free { moves.next().unwrap_or(0.0) } else { 0.0 };
         Some(solved.terms.iter().map(|t| [take(t.free.cycles()), take(t.free.nepers())]).collect())
@@ -298,8 +296,8 @@ impl Problem {
 
     /// Covariance of the unknowns for a rest of white noise of variance one, and each term's place in it.
     pub(super) fn covariance(&self, solved: &Solved) -> Option<Covariance> {
-        let map = self.unknowns(solved);
-        let matrix = inverse(&map.tr_mul(&(&solved.gram * &map)))?;
+        let (map, gram) = (self.unknowns(solved), self.fixed.gram::<WITH_SLOPES>(&solved.terms));
+        let matrix = inverse(&map.tr_mul(&(gram * &map)))?;
         let mut next = solved.amplitudes.len();
         let mut take = |free: bool| {
             let place = free.then_some(next);
@@ -382,8 +380,10 @@ fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
         return Some(matrix.clone()); // neither a trend nor a term
     }
     let scale = matrix.diagonal().map(|x| if x > 0.0 { x.sqrt().recip() } else { 0.0 });
-    let scaled =
-        DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| matrix[(i, j)] * scale[i] * scale[j]);
+    let scaled = DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| {
+        // an empty column, the sine of a relaxation, has no part in the others
+        if i == j && scale[i] == 0.0 { 1.0 } else { matrix[(i, j)] * scale[i] * scale[j] }
+    });
     if scaled.iter().any(|x| !x.is_finite()) {
         return None;
     }

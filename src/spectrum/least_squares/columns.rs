@@ -3,7 +3,7 @@
 use super::Term;
 use crate::math;
 use crate::spectrum::trend::{MOST_COLUMNS, Trend, abscissa};
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DMatrixViewMut};
 use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::Range;
@@ -28,10 +28,15 @@ pub(super) enum Of {
     SineSlope,
 }
 
+/// Columns of each term that its amplitudes need: cosine and sine.
+pub(super) const PAIR: usize = 2;
+/// Columns of each term that a step needs: the slopes too.
+pub(super) const WITH_SLOPES: usize = 4;
+
 impl Of {
-    /// Where the column stands after those of the trend.
+    /// Where the column stands after those of the trend, among all four of each term.
     pub(super) fn column(self, trend: usize, term: usize) -> usize {
-        trend + 4 * term + self as usize
+        trend + WITH_SLOPES * term + self as usize
     }
 }
 
@@ -74,12 +79,13 @@ impl Fixed {
         Self { frames: data.len(), rows, blocks, columns, gram }
     }
 
-    /// Inner products of the trend's columns, those of the terms and the data, in this order.
-    pub(super) fn gram(&self, terms: &[Term]) -> DMatrix<f64> {
-        let (trend, width) = (self.columns.ncols() - 1, 4 * terms.len());
+    /// Inner products of the trend's columns, the first `EACH` of every term and the data, in this order.
+    pub(super) fn gram<const EACH: usize>(&self, terms: &[Term]) -> DMatrix<f64> {
+        let (trend, width) = (self.columns.ncols() - 1, EACH * terms.len());
         let tasks: Vec<&[Range<usize>]> = self.blocks.chunks(BLOCKS_A_TASK).collect();
-        let of =
-            |(task, blocks): (usize, &&[Range<usize>])| self.with_terms(terms, task * BLOCKS_A_TASK, blocks);
+        let of = |(task, blocks): (usize, &&[Range<usize>])| {
+            self.with_terms::<EACH>(terms, task * BLOCKS_A_TASK, blocks)
+        };
         let parts: Vec<_> = if tasks.len() > 1 {
             tasks.par_iter().enumerate().map(of).collect()
         } else {
@@ -103,20 +109,21 @@ impl Fixed {
 
     /// Inner products of the fixed columns with those of the terms, and of these with each other, over blocks
     /// from `first` on.
-    fn with_terms(
+    fn with_terms<const EACH: usize>(
         &self,
         terms: &[Term],
         first: usize,
         blocks: &[Range<usize>],
     ) -> (DMatrix<f64>, DMatrix<f64>) {
-        let width = 4 * terms.len();
+        let width = EACH * terms.len();
         let (mut mixed, mut own) =
             (DMatrix::zeros(self.columns.ncols(), width), DMatrix::zeros(width, width));
         let mut block = DMatrix::zeros(BLOCK, width);
         for (b, range) in blocks.iter().enumerate() {
             let rows = &self.rows[range.clone()];
             for (place, term) in terms.iter().enumerate() {
-                fill(&mut block, rows, place, &turning(term, (first + b) * BLOCK, self.frames));
+                let mut columns = block.columns_mut(EACH * place, EACH);
+                fill::<EACH>(&mut columns, rows, &turning(term, (first + b) * BLOCK, self.frames));
             }
             let of_terms = block.rows(0, rows.len());
             mixed.gemm_tr(1.0, &self.columns.rows(range.start, rows.len()), &of_terms, 1.0);
@@ -129,9 +136,9 @@ impl Fixed {
     }
 }
 
-fn fill(block: &mut DMatrix<f64>, rows: &[(usize, f64)], term: usize, turning: &Turning) {
+fn fill<const EACH: usize>(columns: &mut DMatrixViewMut<'_, f64>, rows: &[(usize, f64)], turning: &Turning) {
     let mut column = |of: Of, value: fn(f64, [f64; 3]) -> f64| {
-        let mut column = block.column_mut(of.column(0, term));
+        let mut column = columns.column_mut(of as usize);
         column
             .iter_mut()
             .zip(rows)
@@ -139,8 +146,10 @@ fn fill(block: &mut DMatrix<f64>, rows: &[(usize, f64)], term: usize, turning: &
     };
     column(Of::Cosine, |root, [cosine, _, _]| root * cosine);
     column(Of::Sine, |root, [_, sine, _]| root * sine);
-    column(Of::CosineSlope, |root, [_, sine, angle_per_cycle]| -root * angle_per_cycle * sine);
-    column(Of::SineSlope, |root, [cosine, _, angle_per_cycle]| root * angle_per_cycle * cosine);
+    if EACH == WITH_SLOPES {
+        column(Of::CosineSlope, |root, [_, sine, angle_per_cycle]| -root * angle_per_cycle * sine);
+        column(Of::SineSlope, |root, [cosine, _, angle_per_cycle]| root * angle_per_cycle * cosine);
+    }
 }
 
 /// A term with its cosine and sine amplitude in every frame.
@@ -195,7 +204,7 @@ mod tests {
         let weights: Vec<f64> =
             (0..frames).map(|i| if i % 3 == 1 { 0.0 } else { 1.0 + i as f64 / 700.0 }).collect();
         let data: Vec<f64> = (0..frames).map(|i| (i as f64 * 0.37).sin()).collect();
-        let gram = Fixed::of(Trend::Polynomial(2), &data, &weights).gram(&terms);
+        let gram = Fixed::of(Trend::Polynomial(2), &data, &weights).gram::<WITH_SLOPES>(&terms);
         assert_eq!(gram.shape(), (11, 11));
         let u = |i: usize| abscissa(i, frames);
         let envelope = |i: usize| (-2.5 * (u(i) + 1.0) / 2.0).exp();

@@ -49,10 +49,9 @@ fn of(ridge: &Ridge) -> Option<Range> {
     let known = |end: &&RidgeEnd| end.frequency_sd_hz < AGREES / ridge.segment_s;
     let start = ridge.start.as_ref().filter(known).zip(ridge.points.first());
     let end = ridge.end.as_ref().filter(known).zip(ridge.points.last());
-    let ends = start
-        .iter()
-        .chain(&end)
-        .map(|(end, point)| (end.frequency_hz, math::hypot(end.frequency_sd_hz, off_hz(end, point))));
+    let ends = start.iter().chain(&end).map(|(end, point)| {
+        (end.frequency_hz, norm([end.frequency_sd_hz, off_hz(end, point), within_a_cycle_hz(point)]))
+    });
     let confirmed = ridge.parts().flat_map(|part| {
         let outer = |i: usize| {
             let carried = |end: Option<(&RidgeEnd, &RidgePoint)>| end.is_some_and(|(_, p)| p == &part[i]);
@@ -63,13 +62,21 @@ fn of(ridge: &Ridge) -> Option<Range> {
     });
     let bent = bend_hz(ridge);
     let all: Vec<(f64, f64)> = confirmed
-        .map(|(p, beyond)| (p.frequency_hz, math::hypot(p.frequency_sd_hz, beyond)))
+        .map(|(p, beyond)| (p.frequency_hz, norm([p.frequency_sd_hz, beyond, within_a_cycle_hz(p)])))
         .chain(ends)
         .map(|(hz, sd_hz)| (hz, math::hypot(sd_hz, bent)))
         .collect();
     let (low_hz, low_sd_hz) = all.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let (high_hz, high_sd_hz) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    Some(Range { low_hz, low_sd_hz, high_hz, high_sd_hz })
+    // another that is less well known may lie beyond
+    let beyond =
+        |of: &dyn Fn(f64, f64) -> f64| all.iter().map(|(hz, sd_hz)| of(*hz, *sd_hz)).fold(0.0, f64::max);
+    Some(Range {
+        low_hz,
+        low_sd_hz: low_sd_hz.max(beyond(&|hz, sd_hz| (low_hz - hz) / 2.0 + sd_hz)),
+        high_hz,
+        high_sd_hz: high_sd_hz.max(beyond(&|hz, sd_hz| (hz - high_hz) / 2.0 + sd_hz)),
+    })
 }
 
 /// What the frequency changes by in the outer half of the segment of a point beyond which the course is not
@@ -83,6 +90,16 @@ fn beyond_hz(ridge: &Ridge, point: &RidgePoint) -> f64 {
 fn off_hz(end: &RidgeEnd, point: &RidgePoint) -> f64 {
     let led_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s);
     (end.frequency_hz - led_hz).abs() / 3.0
+}
+
+/// Half of what the frequency changes by within a cycle, Hz: an instant within it is not defined, since its
+/// form changes with its frequency.
+fn within_a_cycle_hz(point: &RidgePoint) -> f64 {
+    (point.rate_hz_per_s / point.frequency_hz / 2.0).abs()
+}
+
+fn norm(values: [f64; 3]) -> f64 {
+    values.into_iter().fold(0.0, math::hypot)
 }
 
 /// What a course that bends is read off by where it turns, Hz: a fit of a changing but steady rate to a

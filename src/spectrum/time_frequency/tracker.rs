@@ -21,9 +21,15 @@ const TRIALS: f64 = 10.0;
 const FARTHEST: f64 = 1.0;
 /// Deviation of a frequency that noise does not explain, resolutions: what other components leak into a fit.
 const LEAKS: f64 = 0.002;
-/// Length of the fit at an end of the record, segments: the change of the rate takes a longer stretch than
+/// The same at the end of a fit whose rate may change, resolutions of that fit.
+const END_LEAKS: f64 = 0.01;
+/// Lengths of the fits at an end of the record, segments: the change of the rate takes a longer stretch than
 /// the rate.
-const END_SEGMENTS: f64 = 1.75;
+const END_SEGMENTS: [f64; 6] = [1.75, 1.3, 1.0, 0.75, 0.55, 0.4];
+/// Fewest cycles in a fit there that is shorter than a segment: others leak into short ones.
+const END_CYCLES: f64 = 8.0;
+/// Deviations of their difference from which a shorter fit contradicts a longer one.
+const CONTRADICTS: f64 = 3.5;
 /// What a changing rate adds to the fitted frequency with the sine weights, over its change from one segment
 /// to the next: `<x^4>/<x^2>/24`.
 const BEND: f64 = 0.4154 / 24.0;
@@ -218,11 +224,23 @@ impl<'a> Tracker<'a> {
         })
     }
 
-    /// The frequency at the end of the record that a column is next to, by a fit of its own whose rate may
-    /// change, to a longer stretch if the component lasts so long: half a segment farther out, the deviation
-    /// of a straight course would be smaller, and wrong.
+    /// The frequency at the end of the record that a column is next to, by fits of their own whose rate may
+    /// change: half a segment farther out, the deviation of a straight course would be smaller, and wrong. A
+    /// long stretch knows it best, as far as the course is smooth there: the longest is taken with which all
+    /// shorter ones agree. The shortest, which others leak into most, only confirms.
     pub(super) fn end(&self, column: usize, fit: &Fit) -> Option<RidgeEnd> {
-        [END_SEGMENTS, 1.0].into_iter().find_map(|segments| self.carried(column, fit, segments))
+        let ends: Vec<RidgeEnd> =
+            END_SEGMENTS.into_iter().filter_map(|segments| self.carried(column, fit, segments)).collect();
+        // the noise of the longer one is a part of that of the shorter one
+        let agree = |longer: &RidgeEnd, shorter: &RidgeEnd| {
+            let variance = math::powi(shorter.frequency_sd_hz, 2) - math::powi(longer.frequency_sd_hz, 2);
+            (longer.frequency_hz - shorter.frequency_hz).abs() <= CONTRADICTS * variance.max(0.0).sqrt()
+        };
+        let confirmed = ends
+            .iter()
+            .enumerate()
+            .find(|(k, end)| k + 1 < ends.len() && ends[k + 1..].iter().all(|shorter| agree(end, shorter)));
+        confirmed.map(|(_, end)| end).or(ends.first()).copied()
     }
 
     fn carried(&self, column: usize, fit: &Fit, segments: f64) -> Option<RidgeEnd> {
@@ -233,19 +251,29 @@ impl<'a> Tracker<'a> {
         let away = (first as f64 + (frames as f64 - 1.0) / 2.0 - self.layout.centre(column))
             / self.layout.frames as f64; // segments
         let middle = fit.shape.cycles(0.0);
-        let start =
-            Shape::start((middle + away * fit.shape.change()) * longer, fit.shape.change() * longer * longer);
-        let found = Segment { samples: self.samples.get(first..first + frames)?, weights: &weights(frames) }
-            .fit::<CURVED>(start)?;
-        let agrees = (found.shape.cycles(-2.0 * away / longer) / longer - middle).abs() < AGREES;
+        let led = (middle + away * fit.shape.change()) * longer;
+        if segments < 1.0 && led < END_CYCLES {
+            return None;
+        }
+        let start = Shape::start(led, fit.shape.change() * longer * longer);
+        let samples = self.samples.get(first..first + frames)?;
+        let found = Segment { samples, weights: &weights(frames) }.fit::<CURVED>(start)?;
+        let agrees = if longer < 1.0 {
+            (found.shape.cycles(0.0) - led).abs() < FARTHEST
+        } else {
+            (found.shape.cycles(-2.0 * away / longer) / longer - middle).abs() < AGREES
+        };
         let x = (1.0 - 1.0 / frames as f64) * if at_start { -1.0 } else { 1.0 };
         let resolution_hz = self.frame_rate_hz / frames as f64;
+        let band = (self.band_hz.0 / resolution_hz, self.band_hz.1 / resolution_hz);
+        let under_m = Noise::of(frames, band).rest(samples, &found.shape).under_m;
+        let noise_m = fit.noise_m().max(under_m);
         (agrees && !found.shape.vanishes()).then(|| RidgeEnd {
             time_s: if at_start { 0.0 } else { (self.samples.len() - 1) as f64 / self.frame_rate_hz },
             frequency_hz: found.shape.cycles(x) * resolution_hz,
             frequency_sd_hz: math::hypot(
-                found.cycles_variance(x).sqrt() * fit.noise_m() * resolution_hz,
-                LEAKS * self.resolution_hz,
+                found.cycles_variance(x).sqrt() * noise_m * resolution_hz,
+                END_LEAKS * resolution_hz,
             ),
         })
     }
