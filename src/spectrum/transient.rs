@@ -151,14 +151,16 @@ impl Search<'_> {
                 .map(|bin| (bin, noise.at(cycles(bin))))
                 .collect();
             trials += bins.len() as f64 / PADDING as f64 * frames as f64 / step as f64;
+            let alone = Term { cycles: 1.0, nepers, first: 0, free: Free::Both };
+            let envelope: Vec<f64> = alone.envelope(frames).map(|(_, e)| e).collect();
             // a decay of which less than one neper is in the record is an impulse at its end
             for first in (0..frames.saturating_sub(length / 3)).step_by(step) {
-                let envelope = Term { cycles: 1.0, nepers, first, free: Free::Both }.envelope(frames);
-                let energy: f64 = envelope.clone().map(|(i, e)| self.weights[i] * e * e).sum();
+                let present = envelope.iter().zip(&self.weights[first..]);
+                let energy: f64 = present.map(|(e, weight)| weight * e * e).sum();
                 if energy <= 0.0 {
                     continue;
                 }
-                let squares = transform.squares(envelope.map(|(i, e)| e * left[i]));
+                let squares = transform.squares(envelope.iter().zip(&left[first..]).map(|(e, x)| e * x));
                 for (bin, noise) in &bins {
                     let half = squares[*bin] / (energy * noise * noise);
                     if best.as_ref().is_none_or(|best| half > best.half) {

@@ -13,8 +13,8 @@ use std::num::ParseFloatError;
 use std::ops::{Add, Div, Mul, Neg, Rem, Sub};
 
 thread_local! {
-    /// Parts of a turn in the plan that is being made.
-    static PARTS: Cell<usize> = const { Cell::new(1) };
+    /// Parts of a turn in the plan that is being made; zero where none is.
+    static PARTS: Cell<usize> = const { Cell::new(0) };
 }
 
 /// How far the system's cosine may be from ours: many last digits, and much less than two cosines of a plan
@@ -28,14 +28,17 @@ pub(super) struct Real(pub f64);
 /// Makes a plan whose turns have so many parts, a power of two.
 pub(super) fn in_turns_of<T>(parts: usize, plan: impl FnOnce() -> T) -> T {
     PARTS.set(parts);
-    plan()
+    let made = plan();
+    PARTS.set(0);
+    made
 }
 
 /// The cosine of a part of a turn that is given to all but its last digits; any other number as it is.
 fn settled(number: f64) -> f64 {
     let parts = PARTS.get() as f64;
     let (size, quarter) = (number.abs(), parts / 4.0);
-    if size > 1.0 {
+    // a transform itself asks for a half in each of its steps
+    if size > 1.0 || parts == 0.0 {
         return number;
     }
     let part = (math::acos(size) / TAU * parts).round();
