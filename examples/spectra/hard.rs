@@ -147,6 +147,10 @@ fn tanh_tail(t: f64) -> f64 {
     FLIP_M * (20.0 * (t / DURATION_S + 0.05)).tanh()
 }
 
+fn smooth_step(t: f64) -> f64 {
+    FLIP_M / (1.0 + (-12.0 * (t / DURATION_S - 0.4)).exp())
+}
+
 /// Two reversals without any oscillation.
 fn stroke(t: f64, duration_s: f64) -> f64 {
     let s = t / duration_s;
@@ -233,6 +237,35 @@ fn doubled(draw: &mut Draw) -> Made {
     plain([vec![base], parts.to_vec()].concat(), 30.0, draw)
 }
 
+/// Oscillations of any kind, on any flip or none, with a share of the frames lost.
+fn mixture(most: u32, missing: f64, draw: &mut Draw) -> Made {
+    /// Least distance of two, Hz: six resolutions.
+    const APART_HZ: f64 = 40.0;
+    const FLIPS: [fn(f64) -> f64; 4] = [|_| 0.0, exponential, tanh_tail, smooth_step];
+    let mut truths: Vec<Truth> = Vec::new();
+    let count = 1 + (draw.within(0.0, f64::from(most)) as usize);
+    while truths.len() < count {
+        let (hz, phase) = (draw.within(100.0, 2200.0), draw.phase());
+        let kind = match draw.within(0.0, 3.0) as u32 {
+            0 => Truth::steady(hz, phase),
+            1 => Truth::damped(hz, draw.within(0.005, 0.06), phase),
+            _ => Truth {
+                from_s: draw.within(0.1, 0.6) * DURATION_S,
+                ..Truth::damped(hz, draw.within(0.01, 0.06), phase)
+            },
+        };
+        if truths.iter().all(|truth| (truth.hz - hz).abs() > APART_HZ) {
+            truths.push(Truth { amplitude_m: AMPLITUDE_M * 10.0_f64.powf(draw.within(-0.5, 0.5)), ..kind });
+        }
+    }
+    let flip = FLIPS[draw.within(0.0, FLIPS.len() as f64) as usize];
+    let mut made = record(FRAMES, truths, noise_m(30.0), draw, flip);
+    for sample in &mut made.samples {
+        *sample = sample.filter(|_| draw.within(0.0, 1.0) >= missing);
+    }
+    made
+}
+
 macro_rules! kinds {
     ($($group:literal, $name:literal => $make:expr;)*) => {
         pub const KINDS: &[Kind] = &[$(Kind { group: $group, name: $name, make: $make },)*];
@@ -295,6 +328,9 @@ kinds! {
         made.truths.push(Truth { sought: false, ..Truth::steady(hz, phase) });
         made
     };
+    "mixtures", "one of any kind, on any flip, 30 dB" => |d| mixture(1, 0.0, d);
+    "mixtures", "up to three of any kind, on any flip, 30 dB" => |d| mixture(3, 0.0, d);
+    "mixtures", "the same, 10 % of the frames missing" => |d| mixture(3, 0.1, d);
     "noise", "white" => |d| plain(Vec::new(), 20.0, d);
     "noise", "AR(1), 0.9" => |d| of_noise(coloured(FRAMES, 0.9, 0.0, d));
     "noise", "AR(1), 0.5" => |d| of_noise(coloured(FRAMES, 0.5, 0.0, d));

@@ -2,13 +2,18 @@
 //! seen.
 
 use super::judge::DAMPED;
-use super::least_squares::{Term, nepers};
-use super::oscillations::{Explained, LOBE, Parts, Search, lobe};
+use super::least_squares::{Care, Term, nepers};
+use super::oscillations::{Explained, FLIP_CYCLES, LOBE, Parts, Search, lobe};
 use super::time_frequency::Range;
 
 /// Range over which two lines that beat may seem to drift, resolutions: they lie at most four apart, and
 /// where they nearly cancel the frequency swings beyond both.
 const WIDEST_BEAT: f64 = 10.0;
+
+/// Steps by which a trend may grow to explain what a slow ring-down does: together they have as many unknowns.
+const GROWN: usize = 3;
+/// What a criterion must differ by to decide: odds of a hundred to one.
+const DECIDES: f64 = 10.0;
 
 /// A term that leaves more than noise around it.
 pub(super) struct Doubtful {
@@ -44,7 +49,22 @@ impl Search<'_> {
             changed.iter().all(|d| criterion < d.criterion)
                 && (changed.is_empty() || self.settles(candidate, &changed, terms))
         };
-        candidates.filter(explains).min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))
+        let best =
+            candidates.filter(explains).min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))?;
+        let slow = |t: &Term| t.is_brief() && t.cycles < FLIP_CYCLES && !known(t);
+        let doubted = self.grows && best.solved.terms.iter().any(slow);
+        Some(doubted.then(|| self.with_grown_trend(parts, self.criterion(&best))).flatten().unwrap_or(best))
+    }
+
+    /// The parts with a trend of a few columns more, where that explains about as much as a criterion says: a
+    /// slow ring-down may be what a trend does not describe yet.
+    fn with_grown_trend(&self, parts: &Parts, criterion: f64) -> Option<Parts> {
+        let richer = std::iter::successors(parts.trend().richer(), |trend| trend.richer()).take(GROWN);
+        let grown =
+            richer.filter_map(|trend| self.fitted(self.problem(trend), &parts.solved.terms, Care::Passing));
+        grown
+            .min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))
+            .filter(|grown| self.criterion(grown) < criterion + DECIDES)
     }
 
     /// With two steady lines where one was seen that drifts over a range, if nothing but noise is left then.

@@ -21,7 +21,7 @@ const MOST_ROUNDS: usize = 12;
 const CLOSE_ROUNDS: usize = 5;
 /// Cycles in the record below which a flip makes peaks of its own: a step of a tenth of the record has its
 /// spectrum there.
-const FLIP_CYCLES: f64 = 8.0;
+pub(super) const FLIP_CYCLES: f64 = 8.0;
 /// Half width of the lobe of a Hann window, resolutions: what is left closer to a term is its own doing.
 pub(super) const LOBE: f64 = 2.0;
 /// Nepers over the record at which a relaxation is tried, at its start or, negative, at its end.
@@ -174,6 +174,9 @@ impl<'a> Search<'a> {
             };
             let Some(parts) = best else { break };
             explained = self.explain(parts);
+        }
+        if closely {
+            explained = self.explain(self.placed_again(explained.parts));
         }
         self.pruned(explained)
     }

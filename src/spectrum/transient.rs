@@ -31,6 +31,8 @@ const BRIEF: f64 = 8.0;
 const OCTAVE: f64 = 20.0;
 /// Moves of a term that is placed; each halving of the steps is one.
 const MOST_MOVES: usize = 30;
+/// Rounds in which terms are placed again; each changes one.
+const MOST_ROUNDS: usize = 6;
 /// Determinant of cosine and sine, over the product of their squares, below which they are one.
 const SINGULAR: f64 = 1e-3;
 /// Values of the transform in the length of a decay: bins a seventh of its width apart.
@@ -81,6 +83,50 @@ impl Search<'_> {
             (new.free == Free::Both && self.criterion(&fitted) < least).then_some(fitted)
         };
         places.iter().filter_map(placed).collect()
+    }
+
+    /// The parts with brief terms placed anew and without relaxations that explain nothing, as long as that
+    /// explains more with less: what was found first was placed while the others were missing, and no fit
+    /// moves a first frame.
+    pub(super) fn placed_again(&self, mut parts: Parts) -> Parts {
+        for _ in 0..MOST_ROUNDS {
+            let least = self.criterion(&parts);
+            let better = self.variants(&parts).into_iter().filter_map(|terms| {
+                let fitted = self.fitted(parts.problem.clone(), &terms, Care::Passing)?;
+                (self.criterion(&fitted) < least).then_some(fitted)
+            });
+            match better.min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b))) {
+                Some(better) => parts = better,
+                None => break,
+            }
+        }
+        parts
+    }
+
+    /// The terms with each brief one in another place, from the start on, or with a relaxation less.
+    fn variants(&self, parts: &Parts) -> Vec<Vec<Term>> {
+        let terms = &parts.solved.terms;
+        if !terms.iter().any(Term::is_brief) {
+            return Vec::new();
+        }
+        let left: Vec<f64> = self.explain(parts.clone()).left.iter().map(|x| x.unwrap_or(0.0)).collect();
+        let with = |k: usize, term: Option<Term>| {
+            let others = (0..terms.len()).filter(|j| *j != k).map(|j| terms[j]);
+            others.chain(term).collect::<Vec<Term>>()
+        };
+        let of = |k: usize| -> Vec<Vec<Term>> {
+            let term = terms[k];
+            if term.cycles == 0.0 {
+                return vec![with(k, None)];
+            }
+            if !term.is_brief() {
+                return Vec::new();
+            }
+            let again = self.placed(&self.with_terms(parts, &left, &[k]), term);
+            let from_start = (term.first > 0).then_some(Term { first: 0, ..term });
+            std::iter::once(again).chain(from_start).map(|term| with(k, Some(term))).collect()
+        };
+        (0..terms.len()).flat_map(of).collect()
     }
 
     /// What is left with some terms put back, m.
