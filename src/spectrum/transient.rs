@@ -31,6 +31,8 @@ const BRIEF: f64 = 8.0;
 const OCTAVE: f64 = 20.0;
 /// Moves of a term that is placed; each halving of the steps is one.
 const MOST_MOVES: usize = 30;
+/// Nepers of a decay that are lost where it is seen to begin late because others hide its start.
+const LOST: f64 = 2.0;
 /// Rounds in which terms are placed again; each changes one.
 const MOST_ROUNDS: usize = 6;
 /// Determinant of cosine and sine, over the product of their squares, below which they are one.
@@ -103,30 +105,40 @@ impl Search<'_> {
         parts
     }
 
-    /// The terms with each brief one in another place, from the start on, or with a relaxation less.
+    /// The terms with a brief one in another place, with two for those in its lobe, with all from the start on,
+    /// or with a relaxation less.
     fn variants(&self, parts: &Parts) -> Vec<Vec<Term>> {
         let terms = &parts.solved.terms;
-        if !terms.iter().any(Term::is_brief) {
+        let brief: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].is_brief()).collect();
+        if brief.is_empty() {
             return Vec::new();
         }
         let left: Vec<f64> = self.explain(parts.clone()).left.iter().map(|x| x.unwrap_or(0.0)).collect();
-        let with = |k: usize, term: Option<Term>| {
-            let others = (0..terms.len()).filter(|j| *j != k).map(|j| terms[j]);
-            others.chain(term).collect::<Vec<Term>>()
+        let with = |out: &[usize], new: &[Term]| {
+            let kept = (0..terms.len()).filter(|k| !out.contains(k)).map(|k| terms[k]);
+            kept.chain(new.iter().copied()).collect::<Vec<Term>>()
         };
-        let of = |k: usize| -> Vec<Vec<Term>> {
-            let term = terms[k];
-            if term.cycles == 0.0 {
-                return vec![with(k, None)];
-            }
-            if !term.is_brief() {
-                return Vec::new();
-            }
-            let again = self.placed(&self.with_terms(parts, &left, &[k]), term);
-            let from_start = (term.first > 0).then_some(Term { first: 0, ..term });
-            std::iter::once(again).chain(from_start).map(|term| with(k, Some(term))).collect()
-        };
-        (0..terms.len()).flat_map(of).collect()
+        let again = brief.iter().map(|k| {
+            let term = self.placed(&self.with_terms(parts, &left, &[*k]), terms[*k]);
+            with(&[*k], &[term])
+        });
+        let split = brief.iter().map(|k| {
+            let term = terms[*k];
+            let near = |j: &usize| (terms[*j].cycles - term.cycles).abs() < lobe(&term);
+            let together: Vec<usize> = brief.iter().copied().filter(near).collect();
+            let (by, nepers) = (term.nepers / TAU / 2.0, term.nepers / 2.0);
+            with(&together, &[-by, by].map(|by| Term { cycles: term.cycles + by, nepers, ..term }))
+        });
+        let from_start =
+            [with(&brief, &brief.iter().map(|k| self.from_start(&terms[*k])).collect::<Vec<_>>())];
+        let relaxed = (0..terms.len()).filter(|k| terms[*k].cycles == 0.0).map(|k| with(&[k], &[]));
+        again.chain(split).chain(from_start).chain(relaxed).collect()
+    }
+
+    /// The term from the start on, if it has lost little by then.
+    fn from_start(&self, term: &Term) -> Term {
+        let lost = term.nepers * term.first as f64 / self.samples.len() as f64;
+        if lost < LOST { Term { first: 0, ..*term } } else { *term }
     }
 
     /// What is left with some terms put back, m.
