@@ -55,11 +55,41 @@ impl Term {
     }
 }
 
-/// A decay that was found in what is left.
+/// A decay that is tried everywhere in what is left.
+struct Tried {
+    nepers: f64,
+    /// Values of its transform.
+    padded: usize,
+    /// Frames from one beginning to the next.
+    step: usize,
+    /// Bins of the transform where it may be, with the deviation of the noise there, m.
+    bins: Vec<(usize, f64)>,
+}
+
+/// The decays that were found in what is left: the one that stands out most of the noise around it, and the one
+/// that lowers the sum of squares most. A large one raises the noise around itself.
+#[derive(Default)]
 struct Met {
-    term: Term,
-    /// Half of what it lowers the sum of squares by, in variances of the noise there.
-    half: f64,
+    stands_out: Option<(f64, Term)>,
+    explains: Option<(f64, Term)>,
+}
+
+impl Met {
+    /// Takes a decay that lowers the sum of squares by twice `square`, which is `half` variances of the noise.
+    fn take(&mut self, term: Term, half: f64, square: f64) {
+        let larger = |value: f64, than: &Option<(f64, Term)>| than.is_none_or(|(least, _)| value > least);
+        if larger(half, &self.stands_out) {
+            self.stands_out = Some((half, term));
+        }
+        if larger(square, &self.explains) {
+            self.explains = Some((square, term));
+        }
+    }
+
+    fn terms(self) -> impl Iterator<Item = Term> {
+        let (first, second) = (self.stands_out.map(|met| met.1), self.explains.map(|met| met.1));
+        first.into_iter().chain(second.filter(|second| Some(*second) != first))
+    }
 }
 
 impl Search<'_> {
@@ -75,16 +105,25 @@ impl Search<'_> {
         places.extend(doubtful.iter().filter(|d| terms[d.k].first == 0).map(|d| vec![d.k]));
         places.extend(relaxations.iter().map(|k| vec![*k]));
         places.extend((relaxations.len() > 1).then_some(relaxations));
+        // what begins late and is large raises the noise around itself, so that no line in its place is doubtful
+        if doubtful.is_empty() && !self.leaves_noise(explained) {
+            let steady = |k: &usize| terms[*k].cycles > 0.0 && !terms[*k].is_brief();
+            places.extend((0..terms.len()).filter(steady).map(|k| vec![k]));
+        }
         let least = self.criterion(parts);
         let placed = |out: &Vec<usize>| {
-            let met = self.met(explained, &self.with_terms(parts, &left, out), &noise, reach(terms, out))?;
-            let kept = (0..terms.len()).filter(|k| !out.contains(k)).map(|k| terms[k]);
-            let terms: Vec<Term> = kept.chain([met]).collect();
-            let fitted = self.fitted(parts.problem.clone(), &terms, Care::Passing)?;
-            let new = fitted.solved.terms.last()?;
-            (new.free == Free::Both && self.criterion(&fitted) < least).then_some(fitted)
+            let left = self.with_terms(parts, &left, out);
+            let fitted = |met: Term| {
+                let kept = (0..terms.len()).filter(|k| !out.contains(k)).map(|k| terms[k]);
+                let terms: Vec<Term> = kept.chain([self.placed(&left, met)]).collect();
+                let fitted = self.fitted(parts.problem.clone(), &terms, Care::Passing)?;
+                let new = fitted.solved.terms.last()?;
+                (new.free == Free::Both && self.criterion(&fitted) < least).then_some(fitted)
+            };
+            let met = self.met(explained, &left, &noise, reach(terms, out));
+            met.terms().filter_map(fitted).collect::<Vec<Parts>>()
         };
-        places.iter().filter_map(placed).collect()
+        places.iter().flat_map(placed).collect()
     }
 
     /// The parts with brief terms placed anew and without relaxations that explain nothing, as long as that
@@ -184,35 +223,19 @@ impl Search<'_> {
         term.envelope(self.samples.len()).fold((0, 0.0), add)
     }
 
-    /// The decay that lowers the rest most, placed to the frame; `None` where noise alone may have made it.
-    fn met(&self, explained: &Explained, left: &[f64], noise: &Noise, within: Range<f64>) -> Option<Term> {
+    /// The decays that noise alone would make once in a hundred records and that stand out or explain most.
+    fn met(&self, explained: &Explained, left: &[f64], noise: &Noise, within: Range<f64>) -> Met {
         let frames = self.samples.len();
-        let lowest = MIN_CYCLES.max(explained.parts.trend().waves() + 1.0);
-        let mut best: Option<Met> = None;
-        let mut trials = 0.0;
-        for nepers in DECAYS.into_iter().filter(|nepers| FEWEST * nepers <= frames as f64) {
-            let length = (OVER * frames as f64 / nepers).ceil() as usize;
-            let padded = (PADDING * length).next_power_of_two();
+        let tried = self.tried(explained, noise, &within);
+        let trials = |t: &Tried| t.bins.len() as f64 / PADDING as f64 * frames as f64 / t.step as f64;
+        let least = math::ln(tried.iter().map(trials).sum::<f64>().max(1.0) / FALSE_ALARM);
+        let mut met = Met::default();
+        for Tried { nepers, padded, step, bins } in tried {
             let transform = Transform::of(padded);
-            let cycles = |bin: usize| bin as f64 * frames as f64 / padded as f64;
-            let step = ((frames as f64 / nepers / STEPS) as usize).max(1);
-            let bins: Vec<(usize, f64)> = (1..padded / 2)
-                .filter(|bin| {
-                    let term = Term::from_start(cycles(*bin), nepers, Free::Both);
-                    cycles(*bin) >= lowest
-                        && within.contains(&cycles(*bin))
-                        && cycles(*bin) + 1.0 < frames as f64 / 2.0
-                        && term.is_oscillation()
-                        && nepers < term.bounds().1
-                        && !self.drifts(cycles(*bin) * self.resolution_hz())
-                })
-                .map(|bin| (bin, noise.at(cycles(bin))))
-                .collect();
-            trials += bins.len() as f64 / PADDING as f64 * frames as f64 / step as f64;
             let alone = Term { cycles: 1.0, nepers, first: 0, free: Free::Both };
             let envelope: Vec<f64> = alone.envelope(frames).map(|(_, e)| e).collect();
             // a decay of which less than one neper is in the record is an impulse at its end
-            for first in (0..frames.saturating_sub(length / 3)).step_by(step) {
+            for first in (0..frames.saturating_sub(envelope.len() / 3)).step_by(step) {
                 let present = envelope.iter().zip(&self.weights[first..]);
                 let energy: f64 = present.map(|(e, weight)| weight * e * e).sum();
                 if energy <= 0.0 {
@@ -220,16 +243,38 @@ impl Search<'_> {
                 }
                 let squares = transform.squares(envelope.iter().zip(&left[first..]).map(|(e, x)| e * x));
                 for (bin, noise) in &bins {
-                    let half = squares[*bin] / (energy * noise * noise);
-                    if best.as_ref().is_none_or(|best| half > best.half) {
-                        let term = Term { cycles: cycles(*bin), nepers, first, free: Free::Both };
-                        best = Some(Met { term, half });
+                    let square = squares[*bin] / energy;
+                    let half = square / (noise * noise);
+                    if half > least {
+                        let cycles = *bin as f64 * frames as f64 / padded as f64;
+                        met.take(Term { cycles, nepers, first, free: Free::Both }, half, square);
                     }
                 }
             }
         }
-        let best = best?;
-        (best.half > math::ln(trials.max(1.0) / FALSE_ALARM)).then(|| self.placed(left, best.term))
+        met
+    }
+
+    /// The decays that are tried, and where.
+    fn tried(&self, explained: &Explained, noise: &Noise, within: &Range<f64>) -> Vec<Tried> {
+        let frames = self.samples.len() as f64;
+        let lowest = MIN_CYCLES.max(explained.parts.trend().waves() + 1.0);
+        let of = |nepers: f64| {
+            let padded = (PADDING * (OVER * frames / nepers).ceil() as usize).next_power_of_two();
+            let cycles = |bin: usize| bin as f64 * frames / padded as f64;
+            let usable = |bin: &usize| {
+                let term = Term::from_start(cycles(*bin), nepers, Free::Both);
+                term.cycles >= lowest
+                    && within.contains(&term.cycles)
+                    && term.cycles + 1.0 < frames / 2.0
+                    && term.is_oscillation()
+                    && nepers < term.bounds().1
+                    && !self.drifts(term.cycles * self.resolution_hz())
+            };
+            let bins = (1..padded / 2).filter(usable).map(|bin| (bin, noise.at(cycles(bin)))).collect();
+            Tried { nepers, padded, step: ((frames / nepers / STEPS) as usize).max(1), bins }
+        };
+        DECAYS.into_iter().filter(|nepers| FEWEST * nepers <= frames).map(of).collect()
     }
 
     /// Frequency, decay and first frame that explain most, by steps that are halved where none helps.

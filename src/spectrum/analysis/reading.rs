@@ -227,8 +227,8 @@ impl<'a> Reading<'a> {
         terms[k].is_brief() && terms.iter().filter(near).count() > CROWD
     }
 
-    /// The nearest other oscillation within two resolutions, where one of the two decays or begins inside the
-    /// record: two that are steady are a pair.
+    /// The nearest other oscillation within two resolutions or the width of the broader peak, where one of the
+    /// two decays or begins inside the record: two that are steady are a pair.
     fn piece(&self, k: usize) -> Option<Piece> {
         let (parts, terms) = (&self.explained.parts, &self.explained.parts.solved.terms);
         let size_m = |k: usize| {
@@ -236,14 +236,15 @@ impl<'a> Reading<'a> {
             math::hypot(cosine, sine)
         };
         let steady = |term: &Term| term.nepers == 0.0 && term.first == 0;
+        // a decaying peak is as wide as it decays
+        let width = |j: usize| (terms[j].nepers.max(terms[k].nepers) / TAU).max(TOGETHER);
         let piece = |j: usize| Piece {
             apart: (terms[j].cycles - terms[k].cycles).abs(),
             share: (size_m(j) / size_m(k)).min(1.0),
         };
         (0..terms.len())
             .filter(|j| *j != k && terms[*j].cycles > 0.0 && !(steady(&terms[*j]) && steady(&terms[k])))
-            .map(piece)
-            .filter(|piece| piece.apart < TOGETHER)
+            .filter_map(|j| Some(piece(j)).filter(|piece| piece.apart < width(j)))
             .min_by(|a, b| a.apart.total_cmp(&b.apart))
     }
 
