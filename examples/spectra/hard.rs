@@ -180,6 +180,33 @@ fn ring_down_and_tone(frames: usize, draw: &mut Draw) -> Made {
     record(frames, vec![ring_down, cycle], 1e-6, draw, |_| 0.0)
 }
 
+/// A ring-down anywhere in a record that is a hundred times as long, and a steady tone.
+fn ring_down_anywhere(draw: &mut Draw) -> Made {
+    const LONG: usize = 100_000;
+    let from_s = draw.within(0.0, 0.95) * LONG as f64 / RATE_HZ;
+    let damped = Truth::damped(draw.within(200.0, 800.0), 0.01, draw.phase());
+    let ring_down = Truth { amplitude_m: 2e-5, from_s, ..damped };
+    let cycle = Truth::steady(900.5, draw.phase());
+    record(LONG, vec![ring_down, cycle], 1e-6, draw, |_| 0.0)
+}
+
+/// Two flips of a few milliseconds, each with a ring-down of the same frequency.
+fn two_flips(frames: usize, draw: &mut Draw) -> Made {
+    const RISE_S: f64 = 0.005;
+    let flips_s = [0.2, 0.6].map(|share| share * frames as f64 / RATE_HZ);
+    let ring_down = |from_s: f64, draw: &mut Draw| Truth {
+        amplitude_m: 1e-4,
+        from_s,
+        ..Truth::damped(78.4, 0.03, draw.phase())
+    };
+    let first = ring_down(flips_s[0], draw);
+    // of two of one frequency one is listed
+    let second = Truth { sought: false, ..ring_down(flips_s[1], draw) };
+    record(frames, vec![first, second], 1e-6, draw, |t| {
+        FLIP_M * (((t - flips_s[0]) / RISE_S).tanh() - ((t - flips_s[1]) / RISE_S).tanh())
+    })
+}
+
 fn of_noise(values: Vec<f64>) -> Made {
     let samples = values.into_iter().map(Some).collect();
     Made { samples, rate_hz: RATE_HZ, truths: Vec::new(), noise_m: 1e-6 }
@@ -366,4 +393,10 @@ kinds! {
     "long", "AR(1), 0.9, 20,000 frames" => |d| of_noise(coloured(20_000, 0.9, 0.0, d));
     "long", "78.4 Hz, 3 %, and 900 Hz, 10,000 frames" => |d| ring_down_and_tone(10_000, d);
     "long", "78.4 Hz, 3 %, and 900 Hz, 20,000 frames" => |d| ring_down_and_tone(20_000, d);
+    "long", "900 Hz, 10 %, 20 um, at the start of 20,000 frames" => |d| {
+        let truth = Truth { amplitude_m: 2e-5, ..Truth::damped(900.0, 0.1, d.phase()) };
+        record(20_000, vec![truth], 1e-6, d, |_| 0.0)
+    };
+    "long", "78.4 Hz, 3 %, after each of two flips, 20,000 frames" => |d| two_flips(20_000, d);
+    "long", "200 to 800 Hz, 1 %, 20 um, anywhere, 100,000 frames" => ring_down_anywhere;
 }

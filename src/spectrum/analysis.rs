@@ -17,6 +17,7 @@ use super::{Detrend, MIN_SAMPLES, Settings, Spectrum, SpectrumError, regular};
 use crate::math;
 use reading::Reading;
 use std::f64::consts::TAU;
+use std::ops::Range;
 
 /// Longest record that is taken apart, frames: three seconds at 5,000 frames/s, which take about one. The
 /// time grows faster than the record; longer ones are read by their windowed periodogram.
@@ -166,6 +167,25 @@ impl Analysis {
         // what a plain trend leaves behind a step says more than waves through it
         let best = plain.filter(|_| whole.strained).unwrap_or(whole.analysis);
         Ok(best.with_densities(record.frame_rate_hz))
+    }
+
+    /// What lies between the flips of a piece of a longer record: of each stretch the first frames that leave
+    /// noise, or the first whose trend has no fast waves. A trend through a flip takes twenty times as long as
+    /// what the flip starts.
+    fn between_flips(record: &Record, settings: &Settings) -> Vec<Self> {
+        let part = |frames: &Range<usize>| {
+            let rest = Record { samples: &record.samples[frames.clone()], ..*record };
+            let (padded, trend) = check(rest.samples, rest.frame_rate_hz, settings).ok()?;
+            let part = Self::taken_apart(&rest, settings, padded, trend).ok()?;
+            (!part.strained).then(|| (part.explains, Self { left_out: frames.start, ..part.analysis }))
+        };
+        let of_stretch = |tries: &Vec<Range<usize>>| {
+            let mut parts = tries.iter().filter_map(part);
+            let first = parts.next()?;
+            let best = if first.0 { first } else { parts.find(|part| part.0).unwrap_or(first) };
+            Some(best.1.with_densities(record.frame_rate_hz))
+        };
+        flip::stretches(record.samples).iter().filter_map(of_stretch).collect()
     }
 
     fn taken_apart(

@@ -1,5 +1,7 @@
 //! A step inside the record: where a window that no sum of trend and oscillations describes may be cut.
 
+use std::ops::Range;
+
 /// Shares of the whole change between which a record is on neither side.
 const SIDES: (f64, f64) = (0.25, 0.75);
 /// Places behind the step that are tried, in times from a quarter to three quarters of the change: a step
@@ -22,9 +24,63 @@ pub(super) fn starts_behind(samples: &[Option<f64>]) -> Vec<usize> {
     starts.filter(|start| *start < samples.len()).collect()
 }
 
+/// Distances from a flip at which a stretch beside it may begin, in the same times; fewer, since a long record
+/// has many.
+const BESIDE: [f64; 2] = [1.0, 5.0];
+/// Most flips of a piece of a record: what changes sides more often is an oscillation.
+const MOST_FLIPS: usize = 4;
+/// Part of a record over which its slope is taken, its inverse: few such parts hold a flip.
+const APART: usize = 16;
+/// Share of a record's frames in a stretch that is worth a try, its inverse.
+const WORTH: usize = 8;
+
+/// What lies between the flips of a record, in order, each with the frames to try: near the flips, and farther
+/// away; all of a record without a flip.
+pub(super) fn stretches(samples: &[Option<f64>]) -> Vec<Vec<Range<usize>>> {
+    let frames = samples.len();
+    let sided = sided(&level(samples));
+    let changes = changes(&sided);
+    let widest = changes.iter().map(|(leaves, arrives)| arrives - leaves).max().unwrap_or(0);
+    let on_a_side = 2 * sided.len() >= samples.iter().flatten().count();
+    if changes.is_empty() || changes.len() > MOST_FLIPS || 3 * widest > frames || !on_a_side {
+        return vec![vec![0..frames]];
+    }
+    let starts = std::iter::once((0, 0)).chain(changes.iter().copied());
+    let ends = changes.iter().copied().chain([(frames, frames)]);
+    let shrunk = |(start, end): ((usize, usize), (usize, usize)), times: f64| {
+        let by = |(leaves, arrives): (usize, usize)| (times * (arrives - leaves) as f64).round() as usize;
+        start.1 + by(start)..end.0.saturating_sub(by(end))
+    };
+    let tried = |ends| {
+        let frames_of = |times: &f64| shrunk(ends, *times);
+        BESIDE.iter().map(frames_of).filter(|stretch| WORTH * stretch.len() >= frames).collect()
+    };
+    starts.zip(ends).map(tried).collect()
+}
+
+/// A record less the slope that most of it has: what moves evenly is on no side.
+fn level(samples: &[Option<f64>]) -> Vec<Option<f64>> {
+    let apart = (samples.len() / APART).max(1);
+    let rise = |(a, b): (&Option<f64>, &Option<f64>)| a.zip(*b).map(|(a, b)| (b - a) / apart as f64);
+    let mut slopes: Vec<f64> = samples.iter().zip(samples.iter().skip(apart)).filter_map(rise).collect();
+    let middle = slopes.len() / 2;
+    let slope =
+        if slopes.is_empty() { 0.0 } else { *slopes.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    samples.iter().enumerate().map(|(i, x)| x.map(|x| x - slope * i as f64)).collect()
+}
+
 /// The last frame on the old side and the first on the new one, if the record changes sides once, or comes
 /// back from a dip.
 fn step(samples: &[Option<f64>]) -> Option<(usize, usize)> {
+    match changes(&sided(samples))[..] {
+        [change] => Some(change),
+        [_, (leaves, arrives)] if DIP * (arrives - leaves) <= samples.len() => Some((leaves, arrives)),
+        _ => None,
+    }
+}
+
+/// The frames that are on a side, with whether it is the upper one.
+fn sided(samples: &[Option<f64>]) -> Vec<(usize, bool)> {
     let (low, high) =
         samples.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
     let side = |x: f64| match (x - low) / (high - low) {
@@ -32,15 +88,12 @@ fn step(samples: &[Option<f64>]) -> Option<(usize, usize)> {
         share if share > SIDES.1 => Some(true),
         _ => None,
     };
-    let sided: Vec<(usize, bool)> =
-        samples.iter().enumerate().filter_map(|(i, x)| Some((i, side((*x)?)?))).collect();
-    let changes: Vec<(usize, usize)> =
-        sided.windows(2).filter(|w| w[0].1 != w[1].1).map(|w| (w[0].0, w[1].0)).collect();
-    match changes[..] {
-        [change] => Some(change),
-        [_, (leaves, arrives)] if DIP * (arrives - leaves) <= samples.len() => Some((leaves, arrives)),
-        _ => None,
-    }
+    samples.iter().enumerate().filter_map(|(i, x)| Some((i, side((*x)?)?))).collect()
+}
+
+/// The last frame on the old side and the first on the new one, for each change.
+fn changes(sided: &[(usize, bool)]) -> Vec<(usize, usize)> {
+    sided.windows(2).filter(|w| w[0].1 != w[1].1).map(|w| (w[0].0, w[1].0)).collect()
 }
 
 #[cfg(test)]
@@ -70,6 +123,29 @@ mod tests {
             starts_behind(&record(|i| if (60.0..120.0).contains(&i) || i > 200.0 { 1.0 } else { 0.0 }))
                 .is_empty()
         );
+    }
+
+    #[test]
+    fn stretches_lie_between_flips_and_farther_from_them_at_the_second_try() {
+        let flips = |i: f64| {
+            ((i - 80.0) / 3.0).tanh() - ((i - 200.0) / 3.0).tanh() + 0.1 * (0.7 * i).sin() + 0.02 * i
+        };
+        let stretches = stretches(&record(flips));
+        let tries: Vec<usize> = stretches.iter().map(Vec::len).collect();
+        assert_eq!(tries, [2, 2, 2], "{stretches:?}");
+        for (stretch, (from, to)) in stretches.iter().zip([(0, 80), (80, 200), (200, 300)]) {
+            let (near, far) = (&stretch[0], &stretch[1]);
+            assert!(from <= near.start && near.end <= to && near.len() > 60, "{stretches:?}");
+            assert!(near.start <= far.start && far.end <= near.end && far.len() < near.len());
+        }
+    }
+
+    #[test]
+    fn a_record_without_flips_is_one_stretch() {
+        let rings = |i: f64| (-i / 6.0).exp() * (1.1 * i).cos();
+        for samples in [record(rings), record(|i| (0.1 * i).sin()), record(|i| i * i), record(|_| 1.0)] {
+            assert_eq!(stretches(&samples), [vec![0..300]]);
+        }
     }
 
     #[test]

@@ -2,7 +2,10 @@
 //!
 //! Decay and drift are not tried. Instead each component is read in pieces of the record: one that keeps its
 //! amplitude and phase is a steady line, any other is not known to be one, and its frequency only to the
-//! width of its peak.
+//! width of its peak. What is there for a short time only is read from the pieces that hold it.
+
+mod brief;
+mod pieces;
 
 use super::{Analysis, Record, Removed};
 use crate::math;
@@ -10,6 +13,7 @@ use crate::spectrum::judge::{Circumstances, Evidence, judge};
 use crate::spectrum::trend::Trend;
 use crate::spectrum::window;
 use crate::spectrum::{Component, Detrend, Settings, Spectrum, SpectrumError, analyse};
+use brief::Brief;
 use rayon::prelude::*;
 use std::f64::consts::{LN_2, TAU};
 
@@ -26,12 +30,16 @@ const NEIGHBOURHOOD: f64 = 40.0;
 /// Level over the noise there from which there is a component: once in a hundred spectra of a million frames.
 const DETECTION: f64 = 4.5;
 
+/// Components that are looked for, over those that are listed: a flip shows many.
+const MORE: usize = 2;
+
 pub(super) fn analysis(
     record: &Record,
     settings: &Settings,
     trend: Trend,
 ) -> Result<Analysis, SpectrumError> {
-    let mut spectrum = analyse(record.samples, record.frame_rate_hz, settings)?;
+    let more = Settings { max_components: MORE * settings.max_components, ..*settings };
+    let mut spectrum = analyse(record.samples, record.frame_rate_hz, &more)?;
     let circumstances = Circumstances {
         frame_rate_hz: record.frame_rate_hz,
         exposure_s: record.exposure_s,
@@ -41,19 +49,23 @@ pub(super) fn analysis(
     let removed_m = trend.of(record.samples);
     let left_m: Vec<Option<f64>> =
         record.samples.iter().zip(&removed_m).map(|(x, removed)| x.map(|x| x - removed)).collect();
-    let mut components = std::mem::take(&mut spectrum.components);
-    components.retain(|c| c.amplitude_m > DETECTION * floor_m(&spectrum, c.frequency_hz));
-    let steady =
-        |c: &Component| is_steady(&left_m, record.frame_rate_hz, c, floor_m(&spectrum, c.frequency_hz));
-    let evidence: Vec<Evidence> = components
-        .par_iter()
-        .map(|c| Evidence { stays: true, changes: !steady(c), ..Evidence::default() })
-        .collect();
-    for (component, _) in components.iter_mut().zip(&evidence).filter(|(_, evidence)| evidence.changes) {
-        let width_hz = width_hz(&spectrum, component);
-        component.frequency_sd_hz = math::hypot(component.frequency_sd_hz, width_hz / EVEN);
-    }
+    let mut brief = brief::components(record, settings);
+    let read = Reading { spectrum: &spectrum, left_m: &left_m, frame_rate_hz: record.frame_rate_hz };
+    let mut lines: Vec<(Component, Evidence)> =
+        spectrum.components.par_iter().filter_map(|c| read.line(c)).collect();
+    let known = |b: &Brief| lines.iter().any(|(c, line)| b.is(c) && !(line.changes && b.says_more()));
+    brief.retain(|b| !known(b));
+    lines.retain(|(c, _)| !brief.iter().any(|b| b.is(c)));
+    // what a flip shows fills a list: what is known better has its place first
+    let room = settings.max_components.saturating_sub(brief.len());
+    lines.sort_by_key(|(_, line)| line.changes);
+    lines.truncate(room);
+    lines.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
+    let (mut components, evidence): (Vec<Component>, Vec<Evidence>) = lines.into_iter().unzip();
     judge(&mut components, &evidence, &circumstances);
+    components.extend(brief.into_iter().map(|b| b.component));
+    components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
+    components.truncate(settings.max_components);
     spectrum.components = components;
     Ok(Analysis {
         spectrum,
@@ -69,6 +81,28 @@ pub(super) fn analysis(
         multitaper: None,
         noise_floor_m: Vec::new(),
     })
+}
+
+/// A long record and its spectrum.
+struct Reading<'a> {
+    spectrum: &'a Spectrum,
+    left_m: &'a [Option<f64>],
+    frame_rate_hz: f64,
+}
+
+impl Reading<'_> {
+    /// A component that stands out of the noise around it, with what the whole record says of it.
+    fn line(&self, c: &Component) -> Option<(Component, Evidence)> {
+        let floor_m = floor_m(self.spectrum, c.frequency_hz);
+        if c.amplitude_m <= DETECTION * floor_m {
+            return None;
+        }
+        let changes = !is_steady(self.left_m, self.frame_rate_hz, c, floor_m);
+        let width_hz = if changes { width_hz(self.spectrum, c) } else { 0.0 };
+        let frequency_sd_hz = math::hypot(c.frequency_sd_hz, width_hz / EVEN);
+        let evidence = Evidence { stays: true, changes, ..Evidence::default() };
+        Some((Component { frequency_sd_hz, ..c.clone() }, evidence))
+    }
 }
 
 /// Distance between the places where a peak has fallen to half of its top, Hz: the frequency of what changes
