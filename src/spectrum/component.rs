@@ -17,7 +17,7 @@ pub struct Component {
     /// over the time in which it was followed.
     pub range_hz: Option<Range>,
     /// Where it begins, s from the first frame that was analysed; `None` for one that is there from the
-    /// start.
+    /// start. Of a piece of a long record: where the piece starts, if it is there by then.
     pub begins_s: Option<f64>,
     /// Amplitude of a steady oscillation; of a decaying one, where it begins or the record starts, m.
     pub amplitude_m: f64,

@@ -29,7 +29,8 @@ pub(super) fn starts_behind(samples: &[Option<f64>]) -> Vec<usize> {
 const BESIDE: [f64; 2] = [1.0, 5.0];
 /// Most flips of a piece of a record: what changes sides more often is an oscillation.
 const MOST_FLIPS: usize = 4;
-/// Part of a record over which its slope is taken, its inverse: few such parts hold a flip.
+/// Part of a record over which its slope is taken, and which a flip takes at most, its inverse: a slower change
+/// is one that a trend describes.
 const APART: usize = 16;
 /// Share of a record's frames in a stretch that is worth a try, its inverse.
 const WORTH: usize = 8;
@@ -42,7 +43,7 @@ pub(super) fn stretches(samples: &[Option<f64>]) -> Vec<Vec<Range<usize>>> {
     let changes = changes(&sided);
     let widest = changes.iter().map(|(leaves, arrives)| arrives - leaves).max().unwrap_or(0);
     let on_a_side = 2 * sided.len() >= samples.iter().flatten().count();
-    if changes.is_empty() || changes.len() > MOST_FLIPS || 3 * widest > frames || !on_a_side {
+    if changes.is_empty() || changes.len() > MOST_FLIPS || APART * widest > frames || !on_a_side {
         return vec![vec![0..frames]];
     }
     let starts = std::iter::once((0, 0)).chain(changes.iter().copied());

@@ -36,9 +36,7 @@ fn nothing_sought_is_missed_and_nothing_is_wrongly_clear() {
     let undecidable = "a camera that shakes";
     for kind in KINDS {
         let counts = Counts::of(kind, if kind.group == "long" { LONG_SEEDS } else { SEEDS });
-        // the ring-down over a window that is too long for decays
-        let missed = if kind.name.ends_with("20,000 frames") { LONG_SEEDS as usize } else { 0 };
-        assert!(counts.missed <= missed, "{}: {} of {} missed", kind.name, counts.missed, counts.sought);
+        assert_eq!(counts.missed, 0, "{}: of {}", kind.name, counts.sought);
         let wrong = if kind.name == undecidable { 3 } else { 0 };
         assert!(counts.wrong <= wrong, "{}: {} records with what is none", kind.name, counts.wrong);
         if kind.group == "ring-downs" {

@@ -30,16 +30,12 @@ const NEIGHBOURHOOD: f64 = 40.0;
 /// Level over the noise there from which there is a component: once in a hundred spectra of a million frames.
 const DETECTION: f64 = 4.5;
 
-/// Components that are looked for, over those that are listed: a flip shows many.
-const MORE: usize = 2;
-
 pub(super) fn analysis(
     record: &Record,
     settings: &Settings,
     trend: Trend,
 ) -> Result<Analysis, SpectrumError> {
-    let more = Settings { max_components: MORE * settings.max_components, ..*settings };
-    let mut spectrum = analyse(record.samples, record.frame_rate_hz, &more)?;
+    let mut spectrum = analyse(record.samples, record.frame_rate_hz, settings)?;
     let circumstances = Circumstances {
         frame_rate_hz: record.frame_rate_hz,
         exposure_s: record.exposure_s,
@@ -55,7 +51,7 @@ pub(super) fn analysis(
         spectrum.components.par_iter().filter_map(|c| read.line(c)).collect();
     let known = |b: &Brief| lines.iter().any(|(c, line)| b.is(c) && !(line.changes && b.says_more()));
     brief.retain(|b| !known(b));
-    lines.retain(|(c, _)| !brief.iter().any(|b| b.is(c)));
+    lines.retain(|(c, line)| !(line.changes && brief.iter().any(|b| b.shows(c))));
     // what a flip shows fills a list: what is known better has its place first
     let room = settings.max_components.saturating_sub(brief.len());
     lines.sort_by_key(|(_, line)| line.changes);
@@ -155,4 +151,106 @@ fn is_steady(left_m: &[Option<f64>], frame_rate_hz: f64, c: &Component, floor_m:
     let scatter_m = (pieces.iter().map(off).sum::<f64>() / count).sqrt();
     let noise_m = floor_m * INDEPENDENT.sqrt();
     scatter_m < (STEADY * c.amplitude_m).max(STEADY_IN_NOISE * noise_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::spectrum::{Estimator, Verdict};
+
+    const RATE_HZ: f64 = 5000.0;
+    const FRAMES: usize = 40_000;
+
+    /// A ring-down: frequency, Hz, damping ratio, amplitude, m, first frame.
+    struct Rings(f64, f64, f64, usize);
+
+    impl Rings {
+        fn at_m(&self, frame: usize) -> f64 {
+            let Self(hz, ratio, amplitude_m, first) = *self;
+            let Some(since) = frame.checked_sub(first) else { return 0.0 };
+            let turn = TAU * hz * since as f64 / RATE_HZ;
+            amplitude_m * (-ratio * turn).exp() * (turn + 0.4).cos()
+        }
+    }
+
+    /// The components of a record in 1 um of noise.
+    fn components(value: impl Fn(usize) -> f64) -> Vec<Component> {
+        let mut seed = 5_u64;
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let noise_m = 1e-6 * 12.0_f64.sqrt();
+        let samples: Vec<Option<f64>> = (0..FRAMES).map(|i| Some(value(i) + noise_m * draw())).collect();
+        let record = Record { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None };
+        Analysis::of(&record, &Settings::default()).unwrap().spectrum.components
+    }
+
+    /// Those of ring-downs and a steady 900.5 Hz of 10 um.
+    fn listed(rings: &[Rings]) -> Vec<Component> {
+        let steady = |i: usize| 1e-5 * (TAU * 900.5 * i as f64 / RATE_HZ).cos();
+        components(|i| steady(i) + rings.iter().map(|r| r.at_m(i)).sum::<f64>())
+    }
+
+    fn near(list: &[Component], hz: f64) -> &Component {
+        let mut near = list.iter().filter(|c| (c.frequency_hz - hz).abs() < 0.05 * hz);
+        let found = near.next().unwrap_or_else(|| panic!("{hz} Hz: {list:?}"));
+        assert!(near.next().is_none(), "{hz} Hz twice: {list:?}");
+        found
+    }
+
+    fn assert_read(c: &Component, Rings(hz, ratio, _, first): &Rings) {
+        assert_eq!((c.estimator, c.verdict), (Estimator::LeastSquares, Verdict::Clear), "{c:?}");
+        assert!((c.frequency_hz - hz).abs() < 4.0 * c.frequency_sd_hz, "{hz} Hz: {c:?}");
+        let off = (c.damping_ratio.unwrap() - ratio).abs() / c.damping_ratio_sd.unwrap();
+        assert!(off < 4.0, "{ratio}: {c:?}");
+        let begins = c.begins_s.map_or(0.0, |begins_s| begins_s * RATE_HZ);
+        assert!((begins - *first as f64).abs() < 5.0, "frame {first}: {c:?}");
+    }
+
+    #[test]
+    fn a_ring_down_inside_is_read_with_its_beginning_and_the_steady_line_once() {
+        let rings = Rings(413.0, 0.02, 3e-5, 23_456);
+        let list = listed(&[Rings(413.0, 0.02, 3e-5, 23_456)]);
+        assert_eq!(list.len(), 2, "{list:?}");
+        assert_read(near(&list, 413.0), &rings);
+        let steady = near(&list, 900.5);
+        assert_eq!((steady.estimator, steady.verdict), (Estimator::Periodogram, Verdict::Clear));
+        assert_eq!(steady.begins_s, None);
+    }
+
+    #[test]
+    fn a_ring_down_that_is_over_soon_after_the_first_frame_is_read() {
+        let list = listed(&[Rings(600.0, 0.05, 3e-5, 0)]);
+        assert_eq!(list.len(), 2, "{list:?}");
+        assert_read(near(&list, 600.0), &Rings(600.0, 0.05, 3e-5, 0));
+        assert_eq!(near(&list, 600.0).begins_s, None);
+    }
+
+    #[test]
+    fn of_two_ring_downs_of_one_frequency_one_is_listed_and_a_weaker_one_of_another_too() {
+        let list = listed(&[
+            Rings(150.0, 0.03, 1e-4, 9_000),
+            Rings(150.0, 0.03, 1e-4, 30_000),
+            Rings(520.0, 0.02, 2e-5, 20_000),
+        ]);
+        assert_eq!(list.len(), 3, "{list:?}");
+        let first = if near(&list, 150.0).begins_s < Some(3.0) { 9_000 } else { 30_000 };
+        assert_read(near(&list, 150.0), &Rings(150.0, 0.03, 1e-4, first));
+        assert_read(near(&list, 520.0), &Rings(520.0, 0.02, 2e-5, 20_000));
+    }
+
+    #[test]
+    fn steady_lines_and_noise_are_listed_as_they_were() {
+        let list = listed(&[]);
+        assert_eq!(list.len(), 1, "{list:?}");
+        assert_eq!(near(&list, 900.5).estimator, Estimator::Periodogram);
+    }
+
+    #[test]
+    fn what_goes_on_outside_the_piece_that_shows_it_is_not_clear() {
+        let drifts = |i: usize| 2e-5 * (TAU * (400.0 + 4.0 * i as f64 / RATE_HZ) * i as f64 / RATE_HZ).cos();
+        let list = components(drifts);
+        assert!(!list.is_empty() && list.iter().all(|c| c.verdict == Verdict::Ambiguous), "{list:?}");
+    }
 }

@@ -3,19 +3,34 @@
 use super::pieces::{self, Piece};
 use crate::math;
 use crate::spectrum::analysis::{Analysis, Record};
-use crate::spectrum::{Component, Settings};
+use crate::spectrum::{Component, Reason, Settings, Verdict};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
-/// Lengths of the pieces, frames, and how many of each are taken apart besides the first: what is over in a
-/// hundred frames drowns in the noise of the longer ones, which take a tenth of a second each.
-const SCALES: [(usize, usize); 2] = [(4096, 3), (512, 6)];
+/// Pieces of a length, frames.
+struct Scale {
+    length: usize,
+    /// How many are taken apart.
+    most: usize,
+    /// Whether the first one always is: what is over soon after a record starts is hidden by a window that
+    /// starts at zero.
+    first: bool,
+}
+
+/// An oscillation shows best in pieces as long as it lasts. The longest take a tenth of a second each.
+const SCALES: [Scale; 3] = [
+    Scale { length: 4096, most: 2, first: false },
+    Scale { length: 1024, most: 4, first: true },
+    Scale { length: 256, most: 4, first: true },
+];
 /// Resolutions of a piece within which two components are one.
 const TOGETHER: f64 = 2.0;
 /// Deviations within which they are.
 const DEVIATIONS: f64 = 3.0;
 /// Nepers after which an oscillation is over: a twentieth is left.
 const OVER: f64 = 3.0;
+/// Nepers by which one falls that is no steady line whose amplitude wavers, and that soon ends.
+const FALLS: f64 = 1.0;
 
 /// A component that was read from a piece.
 #[derive(Debug)]
@@ -24,8 +39,8 @@ pub(super) struct Brief {
     /// First frame of the stretch that was taken apart.
     first: usize,
     resolution_hz: f64,
-    /// Whether it has decayed by the end of the stretch.
-    is_over: bool,
+    /// Nepers by which it has decayed at the end of the stretch.
+    nepers: f64,
 }
 
 impl Brief {
@@ -40,9 +55,31 @@ impl Brief {
         (c.frequency_hz - other.frequency_hz).abs() < within_hz || holds(c, other) || holds(other, c)
     }
 
+    /// Whether a component that changes over the window is what this one shows there: a line as wide as it
+    /// decays.
+    pub(super) fn shows(&self, other: &Component) -> bool {
+        let c = &self.component;
+        let width_hz = c.damping_ratio.map_or(0.0, |ratio| 2.0 * ratio * c.frequency_hz);
+        self.is(other) || (c.frequency_hz - other.frequency_hz).abs() < width_hz
+    }
+
+    /// With a doubt where it does not fall: what goes on outside the stretch may be another frequency.
+    fn doubted(mut self) -> Self {
+        if self.nepers < FALLS {
+            let words = "it goes on outside the part of the window in which it was read, and may drift or \
+                         change there"
+                .to_owned();
+            let reasons = &mut self.component.reasons;
+            reasons.push(Reason { verdict: Verdict::Ambiguous, words });
+            reasons.sort_by_key(|reason| reason.verdict);
+            self.component.verdict = reasons[0].verdict;
+        }
+        self
+    }
+
     /// Whether the piece says more of it than a window over which it changes.
     pub(super) fn says_more(&self) -> bool {
-        self.is_over || self.component.range_hz.is_some()
+        self.nepers > FALLS || self.component.range_hz.is_some()
     }
 }
 
@@ -50,10 +87,14 @@ impl Brief {
 pub(super) fn components(record: &Record, settings: &Settings) -> Vec<Brief> {
     let band_hz = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
     let band = (band_hz.0 / record.frame_rate_hz, (band_hz.1 / record.frame_rate_hz).min(0.5));
-    let pieces: Vec<Piece> = SCALES
-        .iter()
-        .flat_map(|(length, most)| pieces::most_unlike(record.samples, *length, *most, band))
-        .collect();
+    let of_scale = |scale: &Scale| {
+        let pieces = pieces::of(record.samples, scale.length, band);
+        let chosen = pieces::most_unlike(&pieces, scale.most);
+        let is_read = |k: usize| chosen.contains(&k) || (scale.first && k == 0);
+        let numbered = pieces.into_iter().enumerate();
+        numbered.filter(|(k, _)| is_read(*k)).map(|(_, piece)| piece).collect::<Vec<_>>()
+    };
+    let pieces: Vec<Piece> = SCALES.iter().flat_map(of_scale).collect();
     let mut found: Vec<Brief> = pieces
         .par_iter()
         .flat_map_iter(|piece| {
@@ -84,11 +125,11 @@ fn read(of_piece: &Record, settings: &Settings, piece: &Piece) -> Vec<Brief> {
         let c = &brief.component;
         let (low_hz, high_hz) =
             c.range_hz.map_or((c.frequency_hz, c.frequency_hz), |range| (range.low_hz, range.high_hz));
-        brief.is_over || piece.exceeds(low_hz / rate_hz, high_hz / rate_hz)
+        brief.nepers > OVER || piece.exceeds(low_hz / rate_hz, high_hz / rate_hz)
     };
     let analyses = Analysis::between_flips(of_piece, settings);
     let of_stretch = |analysis: Analysis| of_stretch(analysis, piece.frames.start, rate_hz);
-    analyses.into_iter().flat_map(of_stretch).filter(passes).collect()
+    analyses.into_iter().flat_map(of_stretch).filter(passes).map(Brief::doubted).collect()
 }
 
 /// The components of a stretch of a piece that begins at a frame.
@@ -97,16 +138,17 @@ fn of_stretch(analysis: Analysis, start: usize, rate_hz: f64) -> impl Iterator<I
     let lasts_s = analysis.left_m.len() as f64 / rate_hz;
     let resolution_hz = analysis.spectrum.resolution_hz;
     analysis.spectrum.components.into_iter().map(move |c| {
-        let is_over = is_over(&c, lasts_s);
+        let nepers = nepers(&c, lasts_s);
         let begins_s = first as f64 / rate_hz + c.begins_s.unwrap_or(0.0);
         let component = Component { begins_s: (begins_s > 0.0).then_some(begins_s), ..c };
-        Brief { component, first, resolution_hz, is_over }
+        Brief { component, first, resolution_hz, nepers }
     })
 }
 
-/// Whether a component has decayed by so many nepers within so long, s.
-fn is_over(c: &Component, lasts_s: f64) -> bool {
-    let Some((ratio, sd)) = c.damping_ratio.zip(c.damping_ratio_sd) else { return false };
-    let decay_per_s = TAU * c.frequency_hz * ratio / (1.0 - ratio * ratio).sqrt();
-    ratio > DEVIATIONS * sd && decay_per_s * (lasts_s - c.begins_s.unwrap_or(0.0)) > OVER
+/// Nepers by which a component decays before the end of a record; 0 where they may be none.
+fn nepers(c: &Component, lasts_s: f64) -> f64 {
+    let decays = c.damping_ratio.zip(c.damping_ratio_sd).filter(|(ratio, sd)| *ratio > DEVIATIONS * sd);
+    decays.map_or(0.0, |(ratio, _)| {
+        TAU * c.frequency_hz * ratio / (1.0 - ratio * ratio).sqrt() * (lasts_s - c.begins_s.unwrap_or(0.0))
+    })
 }

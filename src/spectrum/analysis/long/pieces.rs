@@ -2,8 +2,8 @@
 //! normal for the record.
 //!
 //! The pieces overlap by half. In each bin a quarter of them is below `-ln(3/4)` times the mean power of
-//! noise, whatever the rest holds, so steady lines and noise of any colour are normal, and up to half of the
-//! pieces may hold a flip.
+//! noise, whatever the rest holds, so steady lines and noise of any colour are normal, and most of
+//! the pieces may hold a flip.
 
 use crate::math;
 use crate::spectrum::limits::ROUNDING;
@@ -23,7 +23,7 @@ const NEIGHBOURHOOD: usize = 8;
 /// Cycles in a piece below which a flip, not an oscillation, exceeds what is normal.
 const SLOW: usize = 8;
 /// Half width of the main lobe of a Hann window, bins.
-pub(super) const LOBE: usize = 2;
+const LOBE: usize = 2;
 /// Removed from each piece.
 const CUBIC: Trend = Trend::Polynomial(4);
 
@@ -44,49 +44,10 @@ impl Piece {
     }
 }
 
-/// The first piece, whose start a window that starts at zero hides, and those that exceed the normal most: at
-/// most so many, each in bins in which none before it does. `band` is in cycles a frame.
-pub(super) fn most_unlike(
-    samples: &[Option<f64>],
-    length: usize,
-    most: usize,
-    band: (f64, f64),
-) -> Vec<Piece> {
-    let mut pieces = of(samples, length);
-    let bin = |cycles: f64| (cycles * length as f64) as usize;
-    let mut open: Vec<bool> =
-        (0..=length / 2).map(|k| (SLOW.max(bin(band.0))..=bin(band.1)).contains(&k)).collect();
-    let trials = pieces.len() as f64 * open.iter().filter(|open| **open).count() as f64;
-    let level = math::ln(trials.max(1.0) / FALSE_ALARM);
-    pieces.iter_mut().for_each(|piece| piece.level = level);
-    let mut chosen = Vec::new();
-    while chosen.len() < most {
-        let largest = |piece: &Piece| {
-            piece
-                .excess
-                .iter()
-                .zip(&open)
-                .filter(|(_, open)| **open)
-                .fold(0.0, |most: f64, (e, _)| most.max(*e))
-        };
-        let sizes: Vec<f64> = pieces.par_iter().map(largest).collect();
-        let best = (0..pieces.len()).max_by(|a, b| sizes[*a].total_cmp(&sizes[*b]).then(b.cmp(a)));
-        let Some(best) = best.filter(|best| sizes[*best] > level) else { break };
-        chosen.push(best);
-        for k in (0..open.len()).filter(|k| pieces[best].excess[*k] > level) {
-            open[k.saturating_sub(LOBE)..(k + LOBE + 1).min(length / 2 + 1)].fill(false);
-        }
-    }
-    let is_chosen = |k: usize| k == 0 || chosen.contains(&k);
-    pieces.into_iter().enumerate().filter(|(k, _)| is_chosen(*k)).map(|(_, piece)| piece).collect()
-}
-
-/// Every piece of which half the frames are there.
-fn of(samples: &[Option<f64>], length: usize) -> Vec<Piece> {
+/// The pieces of a length of which half the frames are there; `band` is in cycles a frame.
+pub(super) fn of(samples: &[Option<f64>], length: usize, band: (f64, f64)) -> Vec<Piece> {
     let last = samples.len() - length;
     let starts: Vec<usize> = (0..last).step_by(length / 2).chain([last]).collect();
-    let largest = samples.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
-    let least = math::powi(ROUNDING * largest, 2).max(f64::MIN_POSITIVE);
     let piece = |start: &usize| {
         let frames = *start..start + length;
         let piece = &samples[frames.clone()];
@@ -94,11 +55,41 @@ fn of(samples: &[Option<f64>], length: usize) -> Vec<Piece> {
         (2 * present >= length).then(|| Piece { frames, excess: powers(piece), level: 0.0 })
     };
     let mut pieces: Vec<Piece> = starts.par_iter().filter_map(piece).collect();
+    let largest = samples.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
+    let least = math::powi(ROUNDING * largest, 2).max(f64::MIN_POSITIVE);
     let normal = normal(&pieces, length / 2 + 1);
+    let bin = |cycles: f64| (cycles * length as f64) as usize;
+    let inside = SLOW.max(bin(band.0))..bin(band.1) + 1;
+    let trials = (pieces.len() * inside.len()).max(1) as f64;
     for piece in &mut pieces {
-        piece.excess.iter_mut().zip(&normal).for_each(|(power, normal)| *power /= normal.max(least));
+        piece.level = math::ln(trials / FALSE_ALARM);
+        for (k, (power, normal)) in piece.excess.iter_mut().zip(&normal).enumerate() {
+            *power = if inside.contains(&k) { *power / normal.max(least) } else { 0.0 };
+        }
     }
     pieces
+}
+
+/// Those that exceed the normal most, at most so many, each in bins in which none before it does.
+pub(super) fn most_unlike(pieces: &[Piece], most: usize) -> Vec<usize> {
+    let mut chosen = Vec::new();
+    let mut open = vec![true; pieces.first().map_or(0, |piece| piece.excess.len())];
+    while chosen.len() < most {
+        let largest = |piece: &Piece| {
+            let bins = piece.excess.iter().zip(&open).filter(|(_, open)| **open);
+            bins.fold(0.0, |most: f64, (excess, _)| most.max(*excess))
+        };
+        let sizes: Vec<f64> = pieces.par_iter().map(largest).collect();
+        let best = (0..pieces.len()).max_by(|a, b| sizes[*a].total_cmp(&sizes[*b]).then(b.cmp(a)));
+        let Some(best) = best.filter(|best| sizes[*best] > pieces[*best].level) else { break };
+        chosen.push(best);
+        let Piece { excess, level, .. } = &pieces[best];
+        for k in (0..open.len()).filter(|k| excess[*k] > *level) {
+            let end = (k + LOBE + 1).min(open.len());
+            open[k.saturating_sub(LOBE)..end].fill(false);
+        }
+    }
+    chosen
 }
 
 /// Power in each bin, as the variance of white noise with as much.
@@ -123,4 +114,58 @@ fn normal(pieces: &[Piece], bins: usize) -> Vec<f64> {
         at(&mut near, middle)
     };
     (0..bins).map(|bin| own[bin].max(around(bin))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::f64::consts::TAU;
+
+    const LENGTH: usize = 512;
+    const FRAMES: usize = 20_000;
+
+    /// A steady line in noise, and a tone for 200 frames.
+    fn record(seed: u64, burst: f64) -> Vec<Option<f64>> {
+        let mut seed = seed;
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let value = |i: usize| {
+            let on = if (7000..7200).contains(&i) { burst } else { 0.0 };
+            10.0 * (TAU * 0.1 * i as f64).sin() + on * (TAU * 0.23 * i as f64).sin()
+        };
+        (0..FRAMES).map(|i| Some(value(i) + draw())).collect()
+    }
+
+    #[test]
+    fn steady_lines_and_noise_exceed_nothing() {
+        let alarms = |seed| {
+            let pieces = of(&record(seed, 0.0), LENGTH, (0.0, 0.5));
+            most_unlike(&pieces, 4).len()
+        };
+        assert!((0..40).map(alarms).sum::<usize>() <= 1);
+    }
+
+    #[test]
+    fn what_is_there_for_a_short_time_is_found_where_it_is() {
+        let pieces = of(&record(1, 1.0), LENGTH, (0.0, 0.5));
+        assert_eq!(pieces.len(), FRAMES.div_ceil(LENGTH / 2) - 1);
+        assert_eq!(pieces.last().unwrap().frames, FRAMES - LENGTH..FRAMES);
+        let [k] = most_unlike(&pieces, 4)[..] else { panic!("{:?}", most_unlike(&pieces, 4)) };
+        let piece = &pieces[k];
+        assert!(piece.frames.start < 7100 && piece.frames.end > 7100, "{:?}", piece.frames);
+        assert!(piece.exceeds(0.23, 0.23) && piece.exceeds(0.2, 0.25));
+        assert!(!piece.exceeds(0.1, 0.1) && !piece.exceeds(0.3, 0.4));
+        assert!(most_unlike(&of(&record(1, 1.0), LENGTH, (0.3, 0.5)), 4).is_empty(), "outside the band");
+    }
+
+    #[test]
+    fn missing_frames_are_no_piece() {
+        let mut samples = record(2, 1.0);
+        samples[6000..9000].fill(None);
+        let pieces = of(&samples, LENGTH, (0.0, 0.5));
+        assert!(pieces.iter().all(|p| p.frames.start > 8700 || p.frames.end < 6300));
+        assert!(of(&vec![None; FRAMES], LENGTH, (0.0, 0.5)).is_empty());
+    }
 }
