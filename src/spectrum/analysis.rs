@@ -50,11 +50,12 @@ pub struct Analysis {
     pub removed_m: Vec<f64>,
     /// Amplitude that the removed parts would have shown in each bin of the spectrum, m.
     pub leakage_m: Vec<f64>,
-    /// The sum of the components in every frame, m.
+    /// The sum of the components in every frame, m; zero for a long record.
     pub model_m: Vec<f64>,
     /// What is left in each frame, m.
     pub left_m: Vec<Option<f64>>,
-    /// The components that are oscillations, as they are listed: all but one that drifts.
+    /// The components that are oscillations, as they are listed: all but one that drifts; none for a
+    /// long record.
     pub oscillations: Vec<Oscillation>,
     /// Course of the strongest component above the slow ones, where there is one.
     pub ridge: Option<Ridge>,

@@ -45,24 +45,11 @@ pub(super) fn analysis(
     let removed_m = trend.of(record.samples);
     let left_m: Vec<Option<f64>> =
         record.samples.iter().zip(&removed_m).map(|(x, removed)| x.map(|x| x - removed)).collect();
-    let mut brief = brief::components(record, settings);
     let read = Reading { spectrum: &spectrum, left_m: &left_m, frame_rate_hz: record.frame_rate_hz };
-    let mut lines: Vec<(Component, Evidence)> =
+    let lines: Vec<(Component, Evidence)> =
         spectrum.components.par_iter().filter_map(|c| read.line(c)).collect();
-    let known = |b: &Brief| lines.iter().any(|(c, line)| b.is(c) && !(line.changes && b.says_more()));
-    brief.retain(|b| !known(b));
-    lines.retain(|(c, line)| !(line.changes && brief.iter().any(|b| b.shows(c))));
-    // what a flip shows fills a list: what is known better has its place first
-    let room = settings.max_components.saturating_sub(brief.len());
-    lines.sort_by_key(|(_, line)| line.changes);
-    lines.truncate(room);
-    lines.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
-    let (mut components, evidence): (Vec<Component>, Vec<Evidence>) = lines.into_iter().unzip();
-    judge(&mut components, &evidence, &circumstances);
-    components.extend(brief.into_iter().map(|b| b.component));
-    components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
-    components.truncate(settings.max_components);
-    spectrum.components = components;
+    let brief = brief::components(record, settings);
+    spectrum.components = listed(lines, brief, &circumstances, settings.max_components);
     Ok(Analysis {
         spectrum,
         left_out: 0,
@@ -77,6 +64,28 @@ pub(super) fn analysis(
         multitaper: None,
         noise_floor_m: Vec::new(),
     })
+}
+
+/// The lines, largest first, and what is there for a short time only, each once and largest first.
+fn listed(
+    mut lines: Vec<(Component, Evidence)>,
+    mut brief: Vec<Brief>,
+    circumstances: &Circumstances,
+    most: usize,
+) -> Vec<Component> {
+    let known = |b: &Brief| lines.iter().any(|(c, line)| b.is(c) && !(line.changes && b.says_more()));
+    brief.retain(|b| !known(b));
+    lines.retain(|(c, line)| !(line.changes && brief.iter().any(|b| b.shows(c))));
+    // what a flip shows would fill the list: what is known better has its place first
+    let better = brief.len() + lines.iter().filter(|(_, line)| !line.changes).count();
+    let mut room = 0..most.saturating_sub(better);
+    lines.retain(|(_, line)| !line.changes || room.next().is_some());
+    let (mut components, evidence): (Vec<Component>, Vec<Evidence>) = lines.into_iter().unzip();
+    judge(&mut components, &evidence, circumstances);
+    components.extend(brief.into_iter().map(|b| b.component));
+    components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
+    components.truncate(most);
+    components
 }
 
 /// A long record and its spectrum.

@@ -2,8 +2,8 @@
 //! normal for the record.
 //!
 //! The pieces overlap by half. In each bin a quarter of them is below `-ln(3/4)` times the mean power of
-//! noise, whatever the rest holds, so steady lines and noise of any colour are normal, and most of
-//! the pieces may hold a flip.
+//! noise, whatever the rest holds, so steady lines and noise of any colour are normal, and most of the pieces
+//! may hold a flip.
 
 use crate::math;
 use crate::spectrum::limits::ROUNDING;
