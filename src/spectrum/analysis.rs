@@ -178,7 +178,7 @@ impl Analysis {
             let rest = Record { samples: &record.samples[frames.clone()], ..*record };
             let (padded, trend) = check(rest.samples, rest.frame_rate_hz, settings).ok()?;
             let part = Self::taken_apart(&rest, settings, padded, trend).ok()?;
-            (!part.strained).then(|| (part.explains, Self { left_out: frames.start, ..part.analysis }))
+            (!part.strained).then_some((part.explains, Self { left_out: frames.start, ..part.analysis }))
         };
         let of_stretch = |tries: &Vec<Range<usize>>| {
             let mut parts = tries.iter().filter_map(part);
