@@ -234,6 +234,9 @@ mod tests {
         assert_eq!(list.len(), 2, "{list:?}");
         assert_read(near(&list, 600.0), &Rings(600.0, 0.05, 3e-5, 0));
         assert_eq!(near(&list, 600.0).begins_s, None);
+        // over in twenty frames, which every window that starts at zero hides
+        let list = listed(&[Rings(1200.0, 0.08, 3e-5, 0)]);
+        assert!((near(&list, 1200.0).frequency_hz - 1200.0).abs() < 30.0, "{list:?}");
     }
 
     #[test]
