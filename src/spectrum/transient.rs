@@ -8,7 +8,7 @@
 use super::closely::Doubtful;
 use super::least_squares::{Care, Free, Term};
 use super::limits::MIN_CYCLES;
-use super::oscillations::{Explained, Parts, Search, lobe};
+use super::oscillations::{Explained, FLIP_CYCLES, Parts, Search, lobe};
 use super::transform::Transform;
 use crate::math;
 use std::f64::consts::TAU;
@@ -31,6 +31,8 @@ const BRIEF: f64 = 8.0;
 const OCTAVE: f64 = 20.0;
 /// Moves of a term that is placed; each halving of the steps is one.
 const MOST_MOVES: usize = 30;
+/// Cycles in the record up to which what explains most may be what a flip leaves, twice those of its own peaks.
+const SLOW: f64 = 2.0 * FLIP_CYCLES;
 /// Nepers of a decay that are lost where it is seen to begin late because others hide its start.
 const LOST: f64 = 2.0;
 /// Rounds in which terms are placed again; each changes one.
@@ -81,7 +83,7 @@ impl Met {
         if larger(half, &self.stands_out) {
             self.stands_out = Some((half, term));
         }
-        if larger(square, &self.explains) {
+        if term.cycles > SLOW && larger(square, &self.explains) {
             self.explains = Some((square, term));
         }
     }
