@@ -6,6 +6,8 @@ mod belt;
 mod blade;
 #[path = "../../examples/spectra/counts.rs"]
 mod counts;
+#[path = "../../examples/cycles/count.rs"]
+mod cycle_count;
 #[path = "../../examples/spectra/hard.rs"]
 mod hard;
 #[path = "../common/lagrangian.rs"]
@@ -25,6 +27,7 @@ mod belts;
 mod bits;
 mod compliance;
 mod conditioning;
+mod cycles;
 mod drive;
 mod equations;
 mod features;

@@ -1,10 +1,4 @@
-//! The stick-slip cycle as the spectrum reads it, against the sticks of the simulation that it is of:
-//! `cargo run --release --example cycles`.
-//!
-//! Each scene is recorded by two cameras, at 10,000 frames/s with 0.5 um of noise and at 5,000 frames/s with
-//! 2 um, and read in windows of several lengths between a release and the next hold. The truth is counted: the
-//! ends of the sticks are whole cycles apart. Windows in which a beat is dropped are left out: the oscillation
-//! goes on where a stick is missing.
+//! What the spectrum reads of a cycle whose sticks are counted.
 
 use wiperlab::recording::channel::Channel;
 use wiperlab::simulate::Effort;
@@ -12,14 +6,6 @@ use wiperlab::simulate::scene::Scene;
 use wiperlab::spectrum::{Analysis, Component, Record, Settings};
 use wiperlab::twin::{Camera, Tracking, track, view};
 
-const SCENES: [(&str, &str); 4] = [
-    ("light blade", include_str!("../data/scenes/light-blade.toml")),
-    ("actual blade", include_str!("../data/scenes/actual-blade.toml")),
-    ("another blade", include_str!("../data/scenes/another-blade.toml")),
-    ("published experiment", include_str!("../data/scenes/published-experiment.toml")),
-];
-/// Frames per second, 1/s, and noise, m.
-const CAMERAS: [(f64, f64); 2] = [(10_000.0, 5e-7), (5_000.0, 2e-6)];
 /// Lengths of windows, s, and how far apart they begin, in their lengths.
 const LENGTHS_S: [f64; 4] = [0.05, 0.1, 0.15, 0.25];
 const APART: f64 = 0.25;
@@ -37,32 +23,14 @@ const COUNTED: f64 = 0.07;
 
 /// What windows of a scene gave.
 #[derive(Default)]
-struct Count {
-    windows: usize,
-    named: usize,
+pub struct Count {
+    pub windows: usize,
+    pub named: usize,
     /// Error of the mean over its deviation.
-    means: Vec<f64>,
+    pub means: Vec<f64>,
     /// The same of both ends of the range of those that drift, and the errors, Hz.
-    ends: Vec<f64>,
-    ends_hz: Vec<f64>,
-}
-
-fn main() -> Result<(), Box<dyn std::error::Error>> {
-    println!(
-        "| scene | frames/s | windows with a cycle | named | mean within two deviations | largest | drifting | ends within two deviations | rms Hz | largest Hz |"
-    );
-    println!("|---|---:|---:|---:|---:|---:|---:|---:|---:|---:|");
-    let mut all = Count::default();
-    for (name, text) in SCENES {
-        let scene = Scene::parse(name, text)?;
-        for (frame_rate_hz, noise_m) in CAMERAS {
-            let count = Count::of(&scene, frame_rate_hz, noise_m)?;
-            count.print(name, &frame_rate_hz.to_string());
-            all.add(count);
-        }
-    }
-    all.print("all", "");
-    Ok(())
+    pub ends: Vec<f64>,
+    pub ends_hz: Vec<f64>,
 }
 
 /// Ends of sticks that follow one another regularly.
@@ -106,7 +74,7 @@ impl Cycles {
 
 impl Count {
     /// Of the windows of a scene that a camera sees.
-    fn of(scene: &Scene, frame_rate_hz: f64, noise_m: f64) -> Result<Self, Box<dyn std::error::Error>> {
+    pub fn of(scene: &Scene, frame_rate_hz: f64, noise_m: f64) -> Result<Self, Box<dyn std::error::Error>> {
         let camera = Camera { frame_rate_hz, exposure_s: 0.0 };
         let seen = view(scene, &camera, scene.start_s, scene.run.stop_s, Effort::of(scene))?;
         let tracking = Tracking { metres_per_pixel: noise_m, noise_px: 1.0, dropout_fraction: 0.0, seed: 1 };
@@ -129,7 +97,8 @@ impl Count {
         Ok(count)
     }
 
-    fn add(&mut self, other: Self) {
+    /// With the windows of another.
+    pub fn add(&mut self, other: Self) {
         self.windows += other.windows;
         self.named += other.named;
         self.means.extend(other.means);
@@ -179,24 +148,8 @@ impl Count {
         Ok(())
     }
 
-    fn print(&self, name: &str, frames_per_s: &str) {
-        let within = |scaled: &[f64]| scaled.iter().filter(|x| x.abs() < 2.0).count();
-        let largest = |values: &[f64]| values.iter().fold(0.0, |most: f64, x| most.max(x.abs()));
-        let rms = match self.ends_hz.len() {
-            0 => 0.0,
-            count => (self.ends_hz.iter().map(|x| x * x).sum::<f64>() / count as f64).sqrt(),
-        };
-        println!(
-            "| {name} | {frames_per_s} | {} | {} | {} of {} | {:.1} | {} | {} of {} | {rms:.1} | {:.1} |",
-            self.windows,
-            self.named,
-            within(&self.means),
-            self.means.len(),
-            largest(&self.means),
-            self.ends.len() / 2,
-            within(&self.ends),
-            self.ends.len(),
-            largest(&self.ends_hz)
-        );
+    /// How many means and how many ends are within two deviations.
+    pub fn within(&self) -> [usize; 2] {
+        [&self.means, &self.ends].map(|scaled| scaled.iter().filter(|x| x.abs() < 2.0).count())
     }
 }
