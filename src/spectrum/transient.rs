@@ -170,14 +170,13 @@ impl Search<'_> {
             let (by, nepers) = (term.nepers / TAU / 2.0, term.nepers / 2.0);
             with(&together, &[-by, by].map(|by| Term { cycles: term.cycles + by, nepers, ..term }))
         });
-        let from_start =
-            [with(&brief, &brief.iter().map(|k| self.from_start(&terms[*k])).collect::<Vec<_>>())];
+        let from_start = [with(&brief, &brief.iter().map(|k| self.begun(&terms[*k])).collect::<Vec<_>>())];
         let relaxed = (0..terms.len()).filter(|k| terms[*k].cycles == 0.0).map(|k| with(&[k], &[]));
         again.chain(split).chain(from_start).chain(relaxed).collect()
     }
 
     /// The term from the start on, if it has lost little by then.
-    fn from_start(&self, term: &Term) -> Term {
+    fn begun(&self, term: &Term) -> Term {
         let lost = term.nepers * term.first as f64 / self.samples.len() as f64;
         if lost < LOST { Term { first: 0, ..*term } } else { *term }
     }
