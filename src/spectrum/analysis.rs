@@ -142,6 +142,26 @@ impl Analysis {
         Ok(analysis.spread(record, kept))
     }
 
+    /// The analysis of the kept frames as one of the whole record. Between kept frames what was removed and
+    /// the components are drawn straight.
+    fn spread(self, record: &Record, (first, stride): (usize, usize)) -> Self {
+        let left_out = first + stride * self.left_out;
+        let frames = record.samples.len() - left_out;
+        let between = |values: &[f64]| {
+            let at = |frame: usize| {
+                let (kept, part) = (frame / stride, (frame % stride) as f64 / stride as f64);
+                let value = |kept: usize| values.get(kept).or(values.last()).copied().unwrap_or_default();
+                value(kept) + part * (value(kept + 1) - value(kept))
+            };
+            (0..frames).map(at).collect()
+        };
+        let left_m = (0..frames)
+            .map(|frame| self.left_m.get(frame / stride).copied().flatten().filter(|_| frame % stride == 0))
+            .collect();
+        let (removed_m, model_m) = (between(&self.removed_m), between(&self.model_m));
+        Self { left_out, stride, removed_m, model_m, left_m, ..self }
+    }
+
     fn of_frames(record: &Record, settings: &Settings) -> Result<Self, SpectrumError> {
         let (padded, trend) = check(record.samples, record.frame_rate_hz, settings)?;
         if record.samples.len() > LONGEST_FITTED {
@@ -171,8 +191,8 @@ impl Analysis {
     }
 
     /// What lies between the flips of a piece of a longer record: of each stretch the first frames that leave
-    /// noise, or the first whose trend has no fast waves. A trend through a flip takes twenty times as long as
-    /// what the flip starts.
+    /// noise, or the first whose trend has no fast waves. A trend through a flip takes twenty times as long
+    /// as what the flip starts.
     fn between_flips(record: &Record, settings: &Settings) -> Vec<Self> {
         let part = |frames: &Range<usize>| {
             let rest = Record { samples: &record.samples[frames.clone()], ..*record };

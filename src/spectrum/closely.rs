@@ -10,7 +10,8 @@ use super::time_frequency::Range;
 /// where they nearly cancel the frequency swings beyond both.
 const WIDEST_BEAT: f64 = 10.0;
 
-/// Steps by which a trend may grow to explain what a slow ring-down does: together they have as many unknowns.
+/// Steps by which a trend may grow to explain what a slow ring-down does: together they have as many
+/// unknowns.
 const GROWN: usize = 3;
 /// What a criterion must differ by to decide: odds of a hundred to one.
 const DECIDES: f64 = 10.0;

@@ -24,19 +24,19 @@ pub(super) fn starts_behind(samples: &[Option<f64>]) -> Vec<usize> {
     starts.filter(|start| *start < samples.len()).collect()
 }
 
-/// Distances from a flip at which a stretch beside it may begin, in the same times; fewer, since a long record
-/// has many.
+/// Distances from a flip at which a stretch beside it may begin, in the same times; fewer, since a long
+/// record has many.
 const BESIDE: [f64; 2] = [1.0, 5.0];
 /// Most flips of a piece of a record: what changes sides more often is an oscillation.
 const MOST_FLIPS: usize = 4;
-/// Part of a record over which its slope is taken, and which a flip takes at most, its inverse: a slower change
-/// is one that a trend describes.
+/// Part of a record over which its slope is taken, and which a flip takes at most, its inverse: a slower
+/// change is one that a trend describes.
 const APART: usize = 16;
 /// Share of a record's frames in a stretch that is worth a try, its inverse.
 const WORTH: usize = 8;
 
-/// What lies between the flips of a record, in order, each with the frames to try: near the flips, and farther
-/// away; all of a record without a flip.
+/// What lies between the flips of a record, in order, each with the frames to try: near the flips, and
+/// farther away; all of a record without a flip.
 pub(super) fn stretches(samples: &[Option<f64>]) -> Vec<Vec<Range<usize>>> {
     let frames = samples.len();
     let sided = sided(&level(samples));

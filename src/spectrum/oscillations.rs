@@ -58,7 +58,7 @@ pub(super) struct Search<'a> {
     /// Between these frequencies, Hz, and their multiples, peaks are a drifting cycle's.
     pub drifting: Option<Drifting>,
     offset: Vec<f64>,
-    data: Vec<f64>,
+    pub(super) data: Vec<f64>,
     pub(super) weights: Vec<f64>,
 }
 

@@ -31,10 +31,12 @@ const BRIEF: f64 = 8.0;
 const OCTAVE: f64 = 20.0;
 /// Moves of a term that is placed; each halving of the steps is one.
 const MOST_MOVES: usize = 30;
-/// Cycles in the record up to which what explains most may be what a flip leaves, twice those of its own peaks.
+/// Cycles in the record up to which what explains most may be what a flip leaves: twice those of its peaks.
 const SLOW: f64 = 2.0 * FLIP_CYCLES;
 /// Nepers of a decay that are lost where it is seen to begin late because others hide its start.
 const LOST: f64 = 2.0;
+/// Share of a record's sum of squares that is rounding: a misfit is a difference of such sums.
+const ROUNDED: f64 = 1e-12;
 /// Rounds in which terms are placed again; each changes one.
 const MOST_ROUNDS: usize = 6;
 /// Determinant of cosine and sine, over the product of their squares, below which they are one.
@@ -68,8 +70,8 @@ struct Tried {
     bins: Vec<(usize, f64)>,
 }
 
-/// The decays that were found in what is left: the one that stands out most of the noise around it, and the one
-/// that lowers the sum of squares most. A large one raises the noise around itself.
+/// The decays that were found in what is left: the one that stands out most of the noise around it, and the
+/// one that lowers the sum of squares most, if it is no slow one. A large one raises the noise around itself.
 #[derive(Default)]
 struct Met {
     stands_out: Option<(f64, Term)>,
@@ -77,7 +79,7 @@ struct Met {
 }
 
 impl Met {
-    /// Takes a decay that lowers the sum of squares by twice `square`, which is `half` variances of the noise.
+    /// Takes a decay that lowers the sum of squares by twice `square`, which is `half` variances of noise.
     fn take(&mut self, term: Term, half: f64, square: f64) {
         let larger = |value: f64, than: &Option<(f64, Term)>| than.is_none_or(|(least, _)| value > least);
         if larger(half, &self.stands_out) {
@@ -107,7 +109,7 @@ impl Search<'_> {
         places.extend(doubtful.iter().filter(|d| terms[d.k].first == 0).map(|d| vec![d.k]));
         places.extend(relaxations.iter().map(|k| vec![*k]));
         places.extend((relaxations.len() > 1).then_some(relaxations));
-        // what begins late and is large raises the noise around itself, so that no line in its place is doubtful
+        // what begins late and is large raises the noise around itself: no line in its place is doubtful
         if doubtful.is_empty() && !self.leaves_noise(explained) {
             let steady = |k: &usize| terms[*k].cycles > 0.0 && !terms[*k].is_brief();
             places.extend((0..terms.len()).filter(steady).map(|k| vec![k]));
@@ -130,9 +132,13 @@ impl Search<'_> {
 
     /// The parts with brief terms placed anew and without relaxations that explain nothing, as long as that
     /// explains more with less: what was found first was placed while the others were missing, and no fit
-    /// moves a first frame.
+    /// moves a first frame. Where only rounding is left, no criterion tells anything.
     pub(super) fn placed_again(&self, mut parts: Parts) -> Parts {
+        let power: f64 = self.data.iter().zip(&self.weights).map(|(x, weight)| weight * x * x).sum();
         for _ in 0..MOST_ROUNDS {
+            if parts.solved.misfit < ROUNDED * power {
+                break;
+            }
             let least = self.criterion(&parts);
             let better = self.variants(&parts).into_iter().filter_map(|terms| {
                 let fitted = self.fitted(parts.problem.clone(), &terms, Care::Passing)?;
@@ -146,8 +152,8 @@ impl Search<'_> {
         parts
     }
 
-    /// The terms with a brief one in another place, with two for those in its lobe, with all from the start on,
-    /// or with a relaxation less.
+    /// The terms with a brief one in another place, with two for those in its lobe, with all from the start
+    /// on, or with a relaxation less.
     fn variants(&self, parts: &Parts) -> Vec<Vec<Term>> {
         let terms = &parts.solved.terms;
         let brief: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].is_brief()).collect();
@@ -286,7 +292,8 @@ impl Search<'_> {
         for _ in 0..MOST_MOVES {
             let term = best.1;
             let by = share * term.nepers / TAU;
-            let frame = ((share * frames / term.nepers / STEPS) as usize).max(1);
+            // one that keeps its amplitude lasts as long as the record
+            let frame = ((share * frames / term.nepers.max(1.0) / STEPS) as usize).max(1);
             let with =
                 |cycles: f64, nepers: f64, first: usize| Term { cycles, nepers, first, free: Free::Both };
             let stretched = 1.0 + share;

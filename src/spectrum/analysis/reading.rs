@@ -227,8 +227,8 @@ impl<'a> Reading<'a> {
         terms[k].is_brief() && terms.iter().filter(near).count() > CROWD
     }
 
-    /// The nearest other oscillation within two resolutions or the width of the broader peak, where one of the
-    /// two decays or begins inside the record: two that are steady are a pair.
+    /// The nearest other oscillation within two resolutions or the width of the broader peak, where one of
+    /// the two decays or begins inside the record: two that are steady are a pair.
     fn piece(&self, k: usize) -> Option<Piece> {
         let (parts, terms) = (&self.explained.parts, &self.explained.parts.solved.terms);
         let size_m = |k: usize| {
