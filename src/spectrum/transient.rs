@@ -90,9 +90,10 @@ impl Met {
         }
     }
 
-    fn terms(self) -> impl Iterator<Item = Term> {
+    /// The first, and with `both` the second, if that is another.
+    fn terms(self, both: bool) -> impl Iterator<Item = Term> {
         let (first, second) = (self.stands_out.map(|met| met.1), self.explains.map(|met| met.1));
-        first.into_iter().chain(second.filter(|second| Some(*second) != first))
+        first.into_iter().chain(second.filter(|second| both && Some(*second) != first))
     }
 }
 
@@ -125,7 +126,8 @@ impl Search<'_> {
                 (new.free == Free::Both && self.criterion(&fitted) < least).then_some(fitted)
             };
             let met = self.met(explained, &left, &noise, reach(terms, out));
-            met.terms().filter_map(fitted).collect::<Vec<Parts>>()
+            // of a doubtful term, what explains most may be a piece
+            met.terms(doubtful.is_empty()).filter_map(fitted).collect::<Vec<Parts>>()
         };
         places.iter().flat_map(placed).collect()
     }
