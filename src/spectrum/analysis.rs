@@ -191,8 +191,8 @@ impl Analysis {
     }
 
     /// What lies between the flips of a piece of a longer record: of each stretch the first frames that leave
-    /// noise, or the first whose trend has no fast waves. A trend through a flip takes twenty times as long
-    /// as what the flip starts.
+    /// noise, or the first whose trend has no fast waves. A trend through a flip takes many times as long as
+    /// what the flip starts.
     fn between_flips(record: &Record, settings: &Settings) -> Vec<Self> {
         let part = |frames: &Range<usize>| {
             let rest = Record { samples: &record.samples[frames.clone()], ..*record };

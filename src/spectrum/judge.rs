@@ -131,8 +131,8 @@ fn doubts(c: &Component, evidence: &Evidence) -> [Option<String>; 15] {
         near.map(|n| format!("another lies {n:.2} resolutions from it, closer than the window tells apart")),
         evidence.piece.map(|by| {
             format!(
-                "another lies {by:.1} resolutions from it, and they are not both steady: pieces of one that \
-                 drifts look the same"
+                "another lies {by:.1} resolutions from it, and they are not both steady: pieces of one look \
+                 the same"
             )
         }),
         followed.map(|share| {

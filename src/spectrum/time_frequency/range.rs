@@ -68,7 +68,7 @@ fn of(ridge: &Ridge) -> Option<Range> {
         .collect();
     let (low_hz, low_sd_hz) = all.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let (high_hz, high_sd_hz) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    // another that is less well known may lie beyond
+    // two deviations of another that is less well known may reach farther
     let beyond =
         |of: &dyn Fn(f64, f64) -> f64| all.iter().map(|(hz, sd_hz)| of(*hz, *sd_hz)).fold(0.0, f64::max);
     Some(Range {

@@ -17,7 +17,7 @@ struct Scale {
     first: bool,
 }
 
-/// An oscillation shows best in pieces as long as it lasts. The longest take a tenth of a second each.
+/// An oscillation shows best in pieces as long as it lasts. The longest take most of the time.
 const SCALES: [Scale; 3] = [
     Scale { length: 4096, most: 2, first: false },
     Scale { length: 1024, most: 4, first: true },
