@@ -240,6 +240,14 @@ mod tests {
     }
 
     #[test]
+    fn a_jump_at_the_start_of_a_ring_down_is_no_other_one() {
+        let jumps =
+            |t: f64| if t < 5.0 { 0.0 } else { 1e-4 * (-28.3 * (t - 5.0)).exp() * (942.5 * (t - 5.0)).cos() };
+        let list = components(|i| jumps(i as f64 / RATE_HZ));
+        assert!(list.iter().all(|c| (c.frequency_hz - 150.0).abs() < 1.0), "{list:?}");
+    }
+
+    #[test]
     fn of_two_ring_downs_of_one_frequency_one_is_listed_and_a_weaker_one_of_another_too() {
         let list = listed(&[
             Rings(150.0, 0.03, 1e-4, 9_000),

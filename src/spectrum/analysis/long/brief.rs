@@ -3,6 +3,7 @@
 use super::pieces::{self, Piece};
 use crate::math;
 use crate::spectrum::analysis::{Analysis, Record};
+use crate::spectrum::judge::DAMPED;
 use crate::spectrum::{Component, Reason, Settings, Verdict};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
@@ -118,14 +119,15 @@ pub(super) fn components(record: &Record, settings: &Settings) -> Vec<Brief> {
 }
 
 /// The components of a piece that are not there all the time: those at whose frequency it exceeds the normal,
-/// and those that are over within it.
+/// and those that are over within it; but none that is over within a cycle, as every step would give one.
 fn read(of_piece: &Record, settings: &Settings, piece: &Piece) -> Vec<Brief> {
     let rate_hz = of_piece.frame_rate_hz;
     let passes = |brief: &Brief| {
         let c = &brief.component;
         let (low_hz, high_hz) =
             c.range_hz.map_or((c.frequency_hz, c.frequency_hz), |range| (range.low_hz, range.high_hz));
-        brief.nepers > OVER || piece.exceeds(low_hz / rate_hz, high_hz / rate_hz)
+        let step = c.damping_ratio.is_some_and(|ratio| ratio > DAMPED);
+        !step && (brief.nepers > OVER || piece.exceeds(low_hz / rate_hz, high_hz / rate_hz))
     };
     let analyses = Analysis::between_flips(of_piece, settings);
     let of_stretch = |analysis: Analysis| of_stretch(analysis, piece.frames.start, rate_hz);
