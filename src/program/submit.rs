@@ -1,12 +1,7 @@
 //! `wiperlab submit`.
 
-mod htcondor;
 mod local;
-mod lsf;
-mod pbs;
 mod plan;
-mod scheduler;
-mod script;
 mod shell;
 mod slurm;
 mod tasks;
@@ -17,14 +12,19 @@ use crate::program::files::{self, Maker, Overwrite, Size, Writer};
 use crate::program::global::Global;
 use crate::program::place;
 use crate::program::time_limit::TimeLimit;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use plan::Plan;
-use scheduler::Scheduler;
-use script::{SUBMIT_SH, Scripts};
 use std::path::PathBuf;
 use std::process::Command;
 pub use tasks::Tasks;
 use work::{Work, absolute};
+
+/// Who runs the tasks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Scheduler {
+    Slurm,
+    Local,
+}
 
 #[derive(Debug, Args)]
 pub struct SubmitArgs {
@@ -50,7 +50,7 @@ pub struct SubmitArgs {
     /// Only these tasks, as `wiperlab collect` names them, such as 3,7-12 (default: all)
     #[arg(long, value_name = "LIST")]
     pub tasks: Option<Tasks>,
-    /// A further line for the scheduler, such as --directive=--partition=short; may be given again
+    /// A further line for Slurm, such as --directive=--partition=short; may be given again
     #[arg(long = "directive", value_name = "TEXT", allow_hyphen_values = true)]
     pub directives: Vec<String>,
     /// Show scripts and commands on standard output; write and run nothing
@@ -63,14 +63,10 @@ pub struct SubmitArgs {
 impl SubmitArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let plan = self.plan(global)?;
-        let Some(scripts) = self.scheduler.scripts(&plan) else {
-            return self.run_here(&plan, global);
-        };
-        if self.print {
-            scripts.show();
-            return Ok(Outcome::Done);
+        match self.scheduler {
+            Scheduler::Slurm => self.submit(&plan, global),
+            Scheduler::Local => self.run_here(&plan, global),
         }
-        self.submit(&plan, &scripts, global)
     }
 
     fn plan(&self, global: &Global) -> Result<Plan, Failure> {
@@ -116,16 +112,22 @@ impl SubmitArgs {
     }
 
     /// Writes the scripts and hands them over.
-    fn submit(&self, plan: &Plan, scripts: &Scripts, global: &Global) -> Result<Outcome, Failure> {
-        let program = scripts.program;
-        if !shell::is_on_path(program) {
+    fn submit(&self, plan: &Plan, global: &Global) -> Result<Outcome, Failure> {
+        let scripts = slurm::scripts(plan);
+        if self.print {
+            show(&scripts);
+            return Ok(Outcome::Done);
+        }
+        if !shell::is_on_path(slurm::PROGRAM) {
             return Err(Failure::Input(format!(
-                "--scheduler: found no program `{program}` on PATH, expected that of the scheduler; submit from a \
-                 machine that has it, or see the scripts with --print"
+                "--scheduler: found no program `{}` on PATH, expected that of the scheduler; submit from a \
+                 machine that has it, or see the scripts with --print",
+                slurm::PROGRAM
             )));
         }
-        files::write_outputs(&plan.scripts(), &Writer::new(Maker::Submit, self.overwrite), &scripts.files())?;
-        let script = plan.scripts().join(SUBMIT_SH);
+        let scripts = scripts.map(|(name, text)| (name, text.into_bytes()));
+        files::write_outputs(&plan.scripts(), &Writer::new(Maker::Submit, self.overwrite), &scripts)?;
+        let script = plan.scripts().join(slurm::SUBMIT_SH);
         let ran = Command::new("/bin/sh").arg(&script).output();
         let ran = ran.map_err(|error| Failure::Internal(format!("/bin/sh: cannot be run: {error}")))?;
         let submitted = String::from_utf8_lossy(&ran.stdout);
@@ -134,7 +136,7 @@ impl SubmitArgs {
         if ran.status.success() {
             crate::program::output::message(&crate::program::output::lines(&complaint));
         } else {
-            return Err(refused(program, &script.display().to_string(), &submitted, &complaint));
+            return Err(refused(&script.display().to_string(), &submitted, &complaint));
         }
         if !global.quiet {
             print_line!(
@@ -156,8 +158,19 @@ fn options(global: &Global) -> Vec<String> {
     if size == Size::DEFAULT { Vec::new() } else { words.to_vec() }
 }
 
+/// Scripts on standard output.
+fn show(scripts: &[(&str, String)]) {
+    for (place, (name, text)) in scripts.iter().enumerate() {
+        if place > 0 {
+            print_line!("");
+        }
+        print_line!("# ---- {name} ----");
+        crate::program::output::result(&crate::program::output::lines(text));
+    }
+}
+
 /// Why nothing, or not everything, was submitted.
-fn refused(program: &str, script: &str, submitted: &str, complaint: &str) -> Failure {
+fn refused(script: &str, submitted: &str, complaint: &str) -> Failure {
     let state = if submitted.trim().is_empty() {
         "nothing was submitted: correct the cause and submit again"
     } else {
@@ -165,5 +178,5 @@ fn refused(program: &str, script: &str, submitted: &str, complaint: &str) -> Fai
          have ended"
     };
     let complaint = complaint.split_whitespace().collect::<Vec<_>>().join(" ");
-    Failure::Internal(format!("{script}: `{program}` failed: {complaint}; {state}"))
+    Failure::Internal(format!("{script}: `{}` failed: {complaint}; {state}", slurm::PROGRAM))
 }

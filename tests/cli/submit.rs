@@ -1,4 +1,4 @@
-//! `wiperlab submit`: scripts of every scheduler, how they are handed over, and tasks on this machine.
+//! `wiperlab submit`: scripts for Slurm, how they are handed over, and tasks on this machine.
 //!
 //! One test needs Slurm (Debian: slurm-wlm, munge): `cargo test --test cli submit -- --ignored`.
 #![cfg(unix)]
@@ -42,7 +42,7 @@ kind = "stick-fraction"
 /// Every name that the shell could misread.
 const FOLDER: &str = "it's a $tudy; 50% `x` \"Wischblätter\" & co";
 
-/// A study in a folder with a hostile name, and a folder of programs that stand for a scheduler's.
+/// A study in a folder with a hostile name, and a folder of programs that stand for Slurm's.
 struct Site {
     folder: TempDir,
 }
@@ -110,13 +110,13 @@ impl Site {
         self.command(&all).output().unwrap()
     }
 
-    /// Scripts and commands of a scheduler, by name.
-    fn printed(&self, scheduler: &str, arguments: &[&str]) -> BTreeMap<String, String> {
-        let mut all = vec!["--scheduler", scheduler, "--shards", "64", "--print"];
+    /// Scripts for Slurm, by name.
+    fn printed(&self, arguments: &[&str]) -> BTreeMap<String, String> {
+        let mut all = vec!["--scheduler", "slurm", "--shards", "64", "--print"];
         all.extend(arguments);
         let ran = self.submit(&all);
-        assert_eq!((ran.status.code(), text(&ran.stderr).as_str()), (Some(0), ""), "{scheduler}");
-        assert!(!self.path("out").exists(), "{scheduler}: something was written");
+        assert_eq!((ran.status.code(), text(&ran.stderr).as_str()), (Some(0), ""));
+        assert!(!self.path("out").exists(), "something was written");
         let mut scripts: BTreeMap<String, String> = BTreeMap::new();
         let mut name = String::new();
         for line in text(&ran.stdout).lines() {
@@ -156,7 +156,7 @@ fn check_script(name: &str, script: &str) {
 }
 
 /// Runs the script of a task with a program in place of wiperlab, and gives its folder and its arguments.
-fn arguments_of(site: &Site, script: &str, arguments: &[&str], variables: &[(&str, &str)]) -> Vec<String> {
+fn arguments_of(site: &Site, script: &str, variables: &[(&str, &str)]) -> Vec<String> {
     let program = cargo_bin!("wiperlab").display().to_string();
     let instead = site.folder.path().join("instead");
     fs::write(&instead, "#!/bin/sh\npwd\nprintf '%s\\n' \"$@\"\n").unwrap();
@@ -165,7 +165,7 @@ fn arguments_of(site: &Site, script: &str, arguments: &[&str], variables: &[(&st
     let path = site.folder.path().join("task.sh");
     fs::write(&path, script.replace(&program, &instead.display().to_string())).unwrap();
     let mut command = Command::new("/bin/sh");
-    let ran = command.arg(&path).args(arguments).envs(variables.iter().copied()).output().unwrap();
+    let ran = command.arg(&path).envs(variables.iter().copied()).output().unwrap();
     assert!(ran.status.success(), "{}", text(&ran.stderr));
     text(&ran.stdout).lines().map(str::to_owned).collect()
 }
@@ -190,7 +190,7 @@ fn expected(site: &Site, shard: &str, threads: &str, limit: &[&str]) -> Vec<Stri
 #[test]
 fn slurm_gets_an_array_and_a_job_after_it() {
     let site = Site::new();
-    let scripts = site.printed("slurm", &["--threads", "4", "--time", "1h30min", "--tasks", "3,7-12"]);
+    let scripts = site.printed(&["--threads", "4", "--time", "1h30min", "--tasks", "3,7-12"]);
     assert_eq!(scripts.keys().collect::<Vec<_>>(), ["array.sh", "collect.sh", "submit.sh"]);
     scripts.iter().for_each(|(name, script)| check_script(name, script));
     assert_lines(
@@ -207,162 +207,55 @@ fn slurm_gets_an_array_and_a_job_after_it() {
         ],
     );
     let variables = [("SLURM_ARRAY_TASK_ID", "7"), ("SLURM_CPUS_PER_TASK", "8")];
-    let found = arguments_of(&site, &scripts["array.sh"], &[], &variables);
+    let found = arguments_of(&site, &scripts["array.sh"], &variables);
     assert_eq!(found, expected(&site, "7/64", "8", &["--time-limit", "5130s"]));
     assert_lines(&scripts["collect.sh"], &["#SBATCH --cpus-per-task=1", "#SBATCH --output=%x-%j.log"]);
     assert!(scripts["submit.sh"].contains("--dependency=\"afterany:$array\""));
 
-    let large = site.printed("slurm", &["--max-file-size", "4GB"]);
-    let found = arguments_of(&site, &large["array.sh"], &[], &[("SLURM_ARRAY_TASK_ID", "7")]);
+    let large = site.printed(&["--max-file-size", "4GB"]);
+    let found = arguments_of(&site, &large["array.sh"], &[("SLURM_ARRAY_TASK_ID", "7")]);
     assert!(found.join(" ").contains(" --max-file-size 4GB --shard 7/64 "), "{found:?}");
     assert!(large["collect.sh"].contains(" --shards 64 --max-file-size 4GB\n"), "{}", large["collect.sh"]);
 
-    let all = site.printed("slurm", &[]);
+    let all = site.printed(&[]);
     assert_lines(&all["array.sh"], &["#SBATCH --array=0-63", "#SBATCH --cpus-per-task=1"]);
     assert!(!all["array.sh"].contains("--time"), "{}", all["array.sh"]);
-}
-
-#[test]
-fn lsf_gets_indices_from_one() {
-    let site = Site::new();
-    let scripts = site.printed("lsf", &["--threads", "2", "--time", "00:10:01"]);
-    scripts.iter().for_each(|(name, script)| check_script(name, script));
-    let lines = [
-        "#BSUB -J \"wl-small[1-64]\"",
-        "#BSUB -n 2",
-        "#BSUB -R \"span[hosts=1]\"",
-        "#BSUB -W 11",
-        "#BSUB -r",
-        "#BSUB -o %J-%I.log",
-    ];
-    assert_lines(&scripts["array.sh"], &lines);
-    let variables = [("LSB_JOBINDEX", "64"), ("LSB_DJOB_NUMPROC", "2")];
-    let found = arguments_of(&site, &scripts["array.sh"], &[], &variables);
-    assert_eq!(found, expected(&site, "63/64", "2", &["--time-limit", "571s"]));
-    assert!(scripts["submit.sh"].contains("-w \"ended($array)\""));
-
-    let some = site.printed("lsf", &["--tasks", "3,7-12"]);
-    assert_lines(&some["array.sh"], &["#BSUB -J \"wl-small[1-7]\""]);
-    let found = arguments_of(&site, &some["array.sh"], &[], &[("LSB_JOBINDEX", "7")]);
-    assert_eq!(found, expected(&site, "12/64", "1", &[]));
-}
-
-#[test]
-fn pbs_gets_a_range_or_a_single_job() {
-    let site = Site::new();
-    let scripts = site.printed("pbs", &["--threads", "16", "--time", "1-12:00:00"]);
-    scripts.iter().for_each(|(name, script)| check_script(name, script));
-    let lines = [
-        "#PBS -N wl-small",
-        "#PBS -S /bin/sh",
-        "#PBS -J 0-63",
-        "#PBS -l select=1:ncpus=16",
-        "#PBS -l walltime=36:00:00",
-        "#PBS -j oe",
-    ];
-    assert_lines(&scripts["array.sh"], &lines);
-    for (variable, threads) in [("NCPUS", "4"), ("OMP_NUM_THREADS", "5"), ("PBS_NUM_PPN", "6"), ("X", "16")] {
-        let variables = [("PBS_ARRAY_INDEX", "63"), (variable, threads)];
-        let found = arguments_of(&site, &scripts["array.sh"], &[], &variables);
-        assert_eq!(found, expected(&site, "63/64", threads, &["--time-limit", "129300s"]));
-    }
-    let some = site.printed("pbs", &["--tasks", "3,7-12"]);
-    assert_lines(&some["array.sh"], &["#PBS -J 0-6"]);
-    let found = arguments_of(&site, &some["array.sh"], &[], &[("PBS_ARRAY_INDEX", "0")]);
-    assert_eq!(found, expected(&site, "3/64", "1", &[]));
-
-    let one = site.printed("pbs", &["--tasks", "7"]);
-    assert!(!one["array.sh"].contains("#PBS -J"), "{}", one["array.sh"]);
-    assert_eq!(arguments_of(&site, &one["array.sh"], &[], &[]), expected(&site, "7/64", "1", &[]));
-}
-
-#[test]
-fn htcondor_gets_a_node_a_task_and_a_final_one() {
-    let site = Site::new();
-    let scripts = site.printed("htcondor", &["--threads", "2", "--tasks", "3,7", "--time", "1h"]);
-    let names: Vec<&str> = scripts.keys().map(String::as_str).collect();
-    assert_eq!(names, ["array.sh", "array.sub", "collect.sh", "collect.sub", "study.dag", "submit.sh"]);
-    for name in ["array.sh", "collect.sh", "submit.sh"] {
-        check_script(name, &scripts[name]);
-    }
-    let lines = ["arguments = \"array.sh $(shard) $(request_cpus)\"", "request_cpus = 2", "queue"];
-    assert_lines(&scripts["array.sub"], &lines);
-    let lines = [
-        "JOB shard3 array.sub",
-        "VARS shard3 shard=\"3\"",
-        "JOB shard7 array.sub",
-        "FINAL collect collect.sub",
-    ];
-    assert_lines(&scripts["study.dag"], &lines);
-    let found = arguments_of(&site, &scripts["array.sh"], &["7", "2"], &[]);
-    assert_eq!(found, expected(&site, "7/64", "2", &["--time-limit", "3420s"]));
 }
 
 #[test]
 fn further_lines_go_to_both_jobs() {
     let site = Site::new();
     let arguments = ["--directive=--partition=short", "--directive", "--account=blades"];
-    let scripts = site.printed("slurm", &arguments);
+    let scripts = site.printed(&arguments);
     for name in ["array.sh", "collect.sh"] {
         assert_lines(&scripts[name], &["#SBATCH --partition=short", "#SBATCH --account=blades"]);
     }
-    let condor = site.printed("htcondor", &["--directive=request_memory = 1GB"]);
-    assert_lines(&condor["array.sub"], &["request_memory = 1GB"]);
 }
 
 #[test]
 fn scripts_are_written_and_handed_over() {
-    type Parts = &'static [&'static str];
-    let cases: [(&str, &str, &str, Parts, Parts); 4] = [
-        (
-            "slurm",
-            "sbatch",
-            "echo '4711;cluster'",
-            &["array: 4711", "collect: 4711"],
-            &["--parsable ../submit/array.sh", "--parsable --dependency=afterany:4711 ../submit/collect.sh"],
-        ),
-        (
-            "lsf",
-            "bsub",
-            "echo 'Job <4712> is submitted to default queue <normal>.'",
-            &["array: 4712", "collect: 4712"],
-            &["#BSUB -J \"wl-small[1-3]\"", "-w ended(4712)"],
-        ),
-        (
-            "pbs",
-            "qsub",
-            "echo '4713[].server'",
-            &["array: 4713[].server", "collect: 4713[].server"],
-            &["../submit/array.sh", "-W depend=afterany:4713[].server ../submit/collect.sh"],
-        ),
-        (
-            "htcondor",
-            "condor_submit_dag",
-            "echo; echo '1 job(s) submitted to cluster 4714.'",
-            &["dag: 4714"],
-            &["-force study.dag"],
-        ),
-    ];
-    for (scheduler, program, prints, says, notes) in cases {
-        let site = Site::new();
-        site.fake(program, prints);
-        let ran = site.submit(&["--scheduler", scheduler, "--shards", "3"]);
-        let (said, complaint) = (text(&ran.stdout), text(&ran.stderr));
-        assert_eq!((ran.status.code(), complaint.as_str()), (Some(0), ""), "{scheduler}: {said}");
-        assert_lines(&said, says);
-        assert!(said.contains("3 tasks with 1 core each"), "{said}");
-        let noted = site.notes();
-        notes.iter().for_each(|part| assert!(noted.contains(part), "{scheduler}: no {part} in {noted}"));
-        let place = if scheduler == "htcondor" { "out/shards/submit" } else { "out/shards/logs" };
-        assert!(noted.contains(&site.path(place).display().to_string()), "{noted}");
-        for name in ["array.sh", "collect.sh", "submit.sh", ".wiperlab.json"] {
-            assert!(site.path("out/shards/submit").join(name).is_file(), "{scheduler}: {name}");
-        }
-        // again, with other tasks: the scripts are replaced
-        let again = site.submit(&["--scheduler", scheduler, "--shards", "7", "--tasks", "2", "--quiet"]);
-        assert_eq!(again.status.code(), Some(0), "{}", text(&again.stderr));
-        assert!(fs::read_to_string(site.path("out/shards/submit/array.sh")).unwrap().contains("/7\""));
+    let site = Site::new();
+    site.fake("sbatch", "echo '4711;cluster'");
+    let ran = site.submit(&["--scheduler", "slurm", "--shards", "3"]);
+    let (said, complaint) = (text(&ran.stdout), text(&ran.stderr));
+    assert_eq!((ran.status.code(), complaint.as_str()), (Some(0), ""), "{said}");
+    assert_lines(&said, &["array: 4711", "collect: 4711"]);
+    assert!(said.contains("3 tasks with 1 core each"), "{said}");
+    let noted = site.notes();
+    for part in [
+        "--parsable ../submit/array.sh",
+        "--parsable --dependency=afterany:4711 ../submit/collect.sh",
+        &site.path("out/shards/logs").display().to_string(),
+    ] {
+        assert!(noted.contains(part), "no {part} in {noted}");
     }
+    for name in ["array.sh", "collect.sh", "submit.sh", ".wiperlab.json"] {
+        assert!(site.path("out/shards/submit").join(name).is_file(), "{name}");
+    }
+    // again, with other tasks: the scripts are replaced
+    let again = site.submit(&["--scheduler", "slurm", "--shards", "7", "--tasks", "2", "--quiet"]);
+    assert_eq!(again.status.code(), Some(0), "{}", text(&again.stderr));
+    assert!(fs::read_to_string(site.path("out/shards/submit/array.sh")).unwrap().contains("/7\""));
 }
 
 #[test]
@@ -399,12 +292,11 @@ fn a_scheduler_that_refuses_is_quoted() {
 #[test]
 fn what_every_task_would_refuse_is_refused_before() {
     let site = Site::new();
-    let of = |scheduler: &'static str| ["--scheduler", scheduler, "--shards", "3"];
-    site.refused(&of("slurm"), &["found no program `sbatch` on PATH", "--print"]);
-    site.refused(&of("htcondor"), &["`condor_submit_dag`"]);
+    let three = ["--scheduler", "slurm", "--shards", "3"];
+    site.refused(&three, &["found no program `sbatch` on PATH", "--print"]);
     site.refused(
         &["--scheduler", "slurm", "--shards", "1001"],
-        &["1001", "take no longer array", "--threads"],
+        &["1001", "takes no longer array", "--threads"],
     );
     site.refused(&["--scheduler", "slurm", "--shards", "0"], &["from 1 to 1000"]);
     site.refused(
@@ -424,11 +316,11 @@ fn what_every_task_would_refuse_is_refused_before() {
 
     site.fake("sbatch", "echo 1");
     site.write("sweeps/small.toml", &STUDY.replace("preload_force_n", "preload_forse_n"));
-    site.refused(&of("slurm"), &["sweeps/small.toml", "blade.preload_forse_n"]);
+    site.refused(&three, &["sweeps/small.toml", "blade.preload_forse_n"]);
     site.write("sweeps/small.toml", &STUDY.replace("light-blade.toml", "no-blade.toml"));
-    site.refused(&of("slurm"), &["no-blade.toml: no such file"]);
+    site.refused(&three, &["no-blade.toml: no such file"]);
     site.write("sweeps/small.toml", &STUDY.replace("from = 0.05", "from = -0.05"));
-    site.refused(&of("slurm"), &["axis `blade.preload_force_n`", "found -0.05"]);
+    site.refused(&three, &["axis `blade.preload_force_n`", "found -0.05"]);
     assert_eq!(site.notes(), "", "something was submitted");
 
     site.write("sweeps/line\nbreak.toml", STUDY);

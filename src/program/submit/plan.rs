@@ -8,7 +8,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Shortest walltime, s: schedulers count in minutes.
+/// Shortest walltime, s: Slurm counts in minutes.
 const SHORTEST_S: u64 = 60;
 
 /// Part of the walltime by which a task ends earlier: enough to finish points and to be started late.
@@ -78,11 +78,11 @@ fn margin(walltime: Duration) -> Duration {
     Duration::from_secs(margin_s.clamp(least, most))
 }
 
-/// Time that a scheduler gives a task, for [`clap`].
+/// Time that Slurm gives a task, for [`clap`].
 pub fn walltime(text: &str) -> Result<TimeLimit, String> {
     let limit: TimeLimit = text.parse()?;
     if limit.0.as_secs() < SHORTEST_S {
-        return Err("expected at least a minute, as schedulers count in minutes".to_owned());
+        return Err("expected at least a minute, as Slurm counts in minutes".to_owned());
     }
     Ok(limit)
 }

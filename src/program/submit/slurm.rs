@@ -1,12 +1,18 @@
-//! Slurm: `sbatch` (<https://slurm.schedmd.com/sbatch.html>).
+//! Slurm: `sbatch` (<https://slurm.schedmd.com/sbatch.html>) takes a script of a task and one of the job that
+//! puts the shards together; a third script submits both.
 //!
-//! `--signal=B:` names the process of the script itself, which is the program; without `B:` only steps of
-//! `srun` would get the signal. After the loss of a node a task is queued again and goes on.
+//! No directive has a path, which would need quotes of its own: jobs are submitted from the folder of their
+//! logs. `--signal=B:` names the process of the script itself, which is the program; without `B:` only steps
+//! of `srun` would get the signal. After the loss of a node a task is queued again and goes on.
 
 use super::plan::Plan;
-use super::script::{
-    ARRAY_SH, COLLECT_SH, Own, SUBMIT_SH, Scripts, array, clock, collect, directives, submit,
-};
+use super::shell;
+use std::time::Duration;
+
+/// The program that submits.
+pub const PROGRAM: &str = "sbatch";
+/// Submits the other scripts.
+pub const SUBMIT_SH: &str = "submit.sh";
 
 const COMMANDS: &str = r#"array=$(sbatch --parsable ../submit/array.sh)
 array=${array%%;*}
@@ -15,35 +21,63 @@ collect=$(sbatch --parsable --dependency="afterany:$array" ../submit/collect.sh)
 echo "collect: ${collect%%;*}"
 "#;
 
-pub fn scripts(plan: &Plan) -> Scripts {
-    let own = Own {
-        before: "",
-        shard: "${SLURM_ARRAY_TASK_ID}",
-        cores: &format!("${{SLURM_CPUS_PER_TASK:-{}}}", plan.threads),
-    };
-    let tasks = options(
-        plan,
-        [format!("--job-name={}", plan.work.name()), format!("--array={}", plan.tasks)],
-        plan.threads,
-        "%x-%A_%a.log",
-    );
-    let last = options(plan, ["--job-name=wl-collect".to_owned()], 1, "%x-%j.log");
-    let texts = vec![
-        (ARRAY_SH, array(plan, &tasks, &own)),
-        (COLLECT_SH, collect(plan, &last)),
-        (SUBMIT_SH, submit(plan, COMMANDS)),
-    ];
-    Scripts { program: "sbatch", texts }
+/// All scripts by name.
+pub fn scripts(plan: &Plan) -> [(&'static str, String); 3] {
+    [("array.sh", array(plan)), ("collect.sh", collect(plan)), (SUBMIT_SH, submit(plan))]
 }
 
-fn options(plan: &Plan, first: impl IntoIterator<Item = String>, cores: usize, log: &str) -> String {
-    let mut lines: Vec<String> = first.into_iter().collect();
+/// A script of a task. The program takes the place of the shell, so that it gets every signal itself.
+fn array(plan: &Plan) -> String {
+    let own = [format!("--job-name={}", plan.work.name()), format!("--array={}", plan.tasks)];
+    let limit =
+        plan.time_limit().map_or_else(String::new, |limit| format!(" --time-limit {}s", limit.as_secs()));
+    format!(
+        "#!/bin/sh\n# One task of {tasks}, of {shards} shards. Made by `wiperlab submit`.\n{directives}\n{start} \
+         \\\n    --shard \"${{SLURM_ARRAY_TASK_ID}}/{shards}\" --threads \"${{SLURM_CPUS_PER_TASK:-{threads}}}\"\
+         {limit}\n",
+        tasks = plan.tasks.len(),
+        shards = plan.shards,
+        directives = directives(plan, &own, plan.threads, "%x-%A_%a.log"),
+        start = start(plan, &plan.task()),
+        threads = plan.threads,
+    )
+}
+
+/// A script of the job that puts the shards together.
+fn collect(plan: &Plan) -> String {
+    format!(
+        "#!/bin/sh\n# Puts the shards together. Made by `wiperlab submit`.\n{}\n{}\n",
+        directives(plan, &["--job-name=wl-collect".to_owned()], 1, "%x-%j.log"),
+        start(plan, &plan.collect())
+    )
+}
+
+/// A script that submits, from the folder of the logs.
+fn submit(plan: &Plan) -> String {
+    let logs = shell::quoted(&plan.logs().to_string_lossy());
+    format!(
+        "#!/bin/sh\n# Submits the tasks and the job after them. Made by `wiperlab submit`.\nset -e\nmkdir -p \
+         {logs}\ncd {logs}\n{COMMANDS}"
+    )
+}
+
+fn start(plan: &Plan, command: &[String]) -> String {
+    let (folder, program) = (shell::quoted(&plan.folder), shell::quoted(&plan.program));
+    format!("cd {folder} || exit 2\nexec {program} {}", shell::line(command))
+}
+
+fn directives(plan: &Plan, own: &[String], cores: usize, log: &str) -> String {
+    let mut lines = own.to_vec();
     lines.extend(["--nodes=1", "--ntasks=1"].map(str::to_owned));
     lines.push(format!("--cpus-per-task={cores}"));
-    if let Some(walltime) = plan.walltime {
-        lines.push(format!("--time={}", clock(walltime)));
-    }
+    lines.extend(plan.walltime.map(|walltime| format!("--time={}", clock(walltime))));
     lines.extend(["--signal=B:TERM@30", "--requeue", "--open-mode=append"].map(str::to_owned));
     lines.push(format!("--output={log}"));
-    directives("#SBATCH", &lines, plan)
+    lines.iter().chain(&plan.directives).map(|line| format!("#SBATCH {line}\n")).collect()
+}
+
+/// `HH:MM:SS` with as many hours as it takes.
+fn clock(time: Duration) -> String {
+    let s = time.as_secs();
+    format!("{:02}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
 }

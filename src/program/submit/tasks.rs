@@ -4,8 +4,8 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::str::FromStr;
 
-/// Most tasks of an array: LSF takes 1,000 (MAX_JOB_ARRAY_SIZE) and Slurm indices up to 1,000 (MaxArraySize
-/// 1001) where nobody has raised the limit.
+/// Most tasks of an array: Slurm takes indices up to 1,000 (MaxArraySize 1001) where nobody has raised the
+/// limit.
 pub const MOST: usize = 1000;
 
 /// Numbers of tasks, rising.
@@ -23,16 +23,6 @@ impl Tasks {
 
     pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         self.0.iter().copied()
-    }
-
-    /// The only task, where there is one.
-    pub fn only(&self) -> Option<usize> {
-        if let [task] = self.0[..] { Some(task) } else { None }
-    }
-
-    /// Whether they are 0, 1, 2 and so on.
-    pub fn count_from_zero(&self) -> bool {
-        self.iter().enumerate().all(|(place, task)| place == task)
     }
 
     pub fn last(&self) -> Option<usize> {
@@ -89,7 +79,7 @@ fn number(text: &str) -> Option<usize> {
 pub fn shards(text: &str) -> Result<usize, String> {
     crate::program::count::count(text).ok().filter(|shards| *shards <= MOST).ok_or_else(|| {
         format!(
-            "expected a whole number from 1 to {MOST}, as schedulers take no longer array; a task does any \
+            "expected a whole number from 1 to {MOST}, as Slurm takes no longer array; a task does any \
              number of points, and --threads gives it more cores"
         )
     })
@@ -119,7 +109,7 @@ mod tests {
     fn an_array_has_at_most_a_thousand_tasks() {
         assert_eq!(shards("1000"), Ok(1000));
         for text in ["0", "1001", "-3", "x"] {
-            assert!(shards(text).unwrap_err().contains("from 1 to 1000, as schedulers"), "{text}");
+            assert!(shards(text).unwrap_err().contains("from 1 to 1000, as Slurm"), "{text}");
         }
     }
 }

@@ -87,7 +87,8 @@ impl Work {
         Path::new(out).join(crate::program::shards::SHARDS)
     }
 
-    /// Name for jobs: at most 15 letters and digits that every scheduler takes, as older PBS takes no more.
+    /// Name of the tasks for the scheduler, with which the names of their logs start: at most 15 plain letters
+    /// and digits.
     pub fn name(&self) -> String {
         const LONGEST: usize = 15;
         let stem = match self {
