@@ -9,8 +9,6 @@ pub mod collect;
 pub mod grid;
 pub mod journal;
 pub mod outputs;
-#[cfg(feature = "parquet")]
-pub mod parquet;
 pub mod point;
 mod recheck;
 pub mod sample;

@@ -9,7 +9,7 @@ use crate::program::load::is_study;
 use crate::program::problem::Problem as Fit;
 use crate::program::shards::{SHARDS, shard_files, usual};
 use crate::program::submit::Tasks;
-use crate::program::sweep::{Problem, Tables, study_of};
+use crate::program::sweep::{Problem, study_of};
 use crate::sweep::Collection;
 use clap::Args;
 use std::fs::File;
@@ -27,8 +27,6 @@ pub struct CollectArgs {
     /// Number of shards for which missing tasks are named (default: the number that most shards there have)
     #[arg(long, value_name = "N", value_parser = crate::program::count::count)]
     pub shards: Option<usize>,
-    #[command(flatten)]
-    pub tables: Tables,
     #[command(flatten)]
     pub overwrite: Overwrite,
 }
@@ -103,14 +101,14 @@ impl CollectArgs {
         let study = self.study.clone().map_or_else(|| study_of(dir), Ok)?;
         let problem = Problem::load(&study)?;
         let writer = Writer::new(Maker::Sweep, self.overwrite).csv(global.csv_dialect);
-        problem.check_place(dir, &writer, &self.tables)?;
+        problem.check_place(dir, &writer)?;
         let mut points = problem.collection(dir)?;
         for (_, path) in &shards {
             problem.add(&mut points, path)?;
         }
         let all = problem.study.points();
         if points.known() == all {
-            return problem.write(&mut points, dir, &writer, &self.tables, global);
+            return problem.write(&mut points, dir, &writer, global);
         }
         let of = self.shards.unwrap_or_else(|| usual(&shards));
         if !global.quiet {

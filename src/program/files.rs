@@ -226,16 +226,6 @@ impl Growing {
     }
 }
 
-impl Write for Growing {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        self.to.write(bytes)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.to.flush()
-    }
-}
-
 fn unwritable(path: &Path, error: &io::Error) -> Failure {
     Failure::Internal(format!("{}: cannot be written: {error}", path.display()))
 }

@@ -4,11 +4,9 @@ mod problem;
 mod results;
 mod shards;
 mod solve;
-mod tables;
 
 pub use problem::Problem;
 pub use shards::study_of;
-pub use tables::Tables;
 
 use crate::journal::Shard;
 use crate::program::failure::{Failure, Outcome};
@@ -35,10 +33,8 @@ pub struct SweepArgs {
     pub resume: bool,
     /// Do only every N-th point from point K on (K from 0), into DIR/shards/K-of-N.jsonl; goes on from what
     /// is there, and `wiperlab collect DIR` puts the shards together
-    #[arg(long, value_name = "K/N", conflicts_with_all = ["force", "Tables"])]
+    #[arg(long, value_name = "K/N", conflicts_with = "force")]
     pub shard: Option<Shard>,
-    #[command(flatten)]
-    pub tables: Tables,
     /// Stop after this time with what is done (exit code 3); such as 45min, 1h30min or 02:00:00
     #[arg(long, value_name = "TIME")]
     pub time_limit: Option<TimeLimit>,
@@ -56,12 +52,12 @@ impl SweepArgs {
         let journal = self.out.join(JOURNAL);
         files::check_free(&journal)?;
         let writer = Writer::new(Maker::Sweep, self.overwrite).csv(global.csv_dialect);
-        problem.check_place(&self.out, &writer, &self.tables)?;
+        problem.check_place(&self.out, &writer)?;
         if !problem.solve(&journal, self.resume, global)? {
             return Ok(Outcome::StoppedEarly);
         }
         let mut points = problem.collection(&self.out)?;
         problem.add(&mut points, &journal)?;
-        problem.write(&mut points, &self.out, &writer, &self.tables, global)
+        problem.write(&mut points, &self.out, &writer, global)
     }
 }

@@ -11,7 +11,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 
 /// What every row of the table and the summary say of where the numbers come from.
-pub(crate) const SOURCE: &str = "simulation";
+const SOURCE: &str = "simulation";
 
 /// First row of `sweep.csv`.
 #[must_use]
@@ -36,7 +36,7 @@ pub fn csv_row(study: &Study, index: usize, outcome: &Outcome) -> String {
 }
 
 /// Which maps have no value for a reason of their own, and which: `column: reason; column: reason`.
-pub(super) fn missing(study: &Study, outcome: &Outcome) -> String {
+fn missing(study: &Study, outcome: &Outcome) -> String {
     let ended = outcome.ended.as_ref().map(|ended| ended.reason);
     let of = |(map, value): (&Map, &Result<f64, Reason>)| {
         let reason = value.err()?;

@@ -35,8 +35,6 @@ mod output;
 mod outputs;
 #[cfg_attr(not(unix), allow(dead_code, reason = "commands of pages run where there is a shell"))]
 mod page;
-#[cfg(feature = "parquet")]
-mod parquet;
 mod readme;
 mod report;
 mod results;

@@ -47,7 +47,7 @@ impl Work {
     fn study(study: &Path, out: &Path, overwrite: Overwrite) -> Result<Self, Failure> {
         let problem = sweep::Problem::load(study)?;
         let writer = Writer::new(Maker::Sweep, overwrite);
-        problem.check_place(out, &writer, &sweep::Tables::default())?;
+        problem.check_place(out, &writer)?;
         Ok(Self::Study { study: absolute(study)?, out: absolute(out)? })
     }
 

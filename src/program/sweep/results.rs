@@ -1,7 +1,6 @@
 //! The files of a study, from its points.
 
 use super::problem::{Problem, failure};
-use super::tables::Tables;
 use crate::program::failure::{Failure, Outcome};
 use crate::program::files::{self, Place, Writer};
 use crate::program::global::Global;
@@ -18,12 +17,11 @@ const SUMMARY: &str = "summary.json";
 
 impl Problem {
     /// Checks that a study can write its files into a folder.
-    pub fn check_place(&self, out: &Path, writer: &Writer, tables: &Tables) -> Result<Place, Failure> {
+    pub fn check_place(&self, out: &Path, writer: &Writer) -> Result<Place, Failure> {
         let sheet = self.study.has_sheet().then_some(SHEET);
         let figures = self.study.maps.iter().map(|map| map.slug.as_str()).chain(sheet);
         let maps = figures.map(|name| format!("{name}.svg"));
-        let names = [TABLE, SUMMARY].into_iter().chain(tables.names());
-        let names: Vec<String> = names.map(str::to_owned).chain(maps).collect();
+        let names: Vec<String> = [TABLE, SUMMARY].map(str::to_owned).into_iter().chain(maps).collect();
         Place::check(out, writer, &names.iter().map(String::as_str).collect::<Vec<_>>())
     }
 
@@ -33,11 +31,9 @@ impl Problem {
         points: &mut Collection<File>,
         out: &Path,
         writer: &Writer,
-        tables: &Tables,
         global: &Global,
     ) -> Result<Outcome, Failure> {
-        let place = self.check_place(out, writer, tables)?;
-        let mut typed = tables.begin(self, &place)?;
+        let place = self.check_place(out, writer)?;
         let mut table = place.file(TABLE)?;
         table.write(&csv_header(&self.study));
         let mut summary = Summary::new(&self.study, self.scene.title(), &self.fingerprint);
@@ -45,7 +41,6 @@ impl Problem {
         let is_mapped = self.study.is_mapped();
         let each = |index: usize, outcome: Point| {
             table.write(&csv_row(&self.study, index, &outcome));
-            typed.push(&self.study, index, &outcome);
             warn_of_panic(index, &outcome);
             summary.count(&outcome);
             if is_mapped {
@@ -71,8 +66,7 @@ impl Problem {
             others.extend(files::drawn(SHEET, &self.sheet(&mapped, &spread)));
         }
         others.push((SUMMARY.to_owned(), summary.to_json().map_err(Failure::internal)?.into_bytes()));
-        let files = std::iter::once(table).chain(typed.finish()?).collect();
-        place.finish(files, &others)?;
+        place.finish(vec![table], &others)?;
         if !global.quiet {
             print_summary(&self.study, &summary);
             print_line!("written to {}", out.display());
