@@ -1,15 +1,12 @@
 //! The formats that are read, and which of them a file is in. A new format is one file in this folder and its
 //! line in [`FORMATS`].
 
-mod animalta;
 mod deeplabcut;
 mod dice;
 mod dippmotion;
 mod dltdv;
-mod fasttrack;
 mod framedias;
 mod generic;
-mod idtracker;
 mod imagej;
 mod kinovea;
 mod motion_analysis;
@@ -19,7 +16,6 @@ mod tracker;
 mod trackmate;
 mod trackpy;
 mod trc;
-mod trex;
 mod wiperlab;
 
 use crate::import::error::ImportError;
@@ -43,11 +39,7 @@ static FORMATS: &[&dyn Format] = &[
     &tracker::Tracker,
     &trc::Trc,
     &imagej::ImageJ,
-    &fasttrack::FastTrack,
     &trackpy::Trackpy,
-    &idtracker::IdTracker,
-    &animalta::AnimalTa,
-    &trex::Trex,
     &motion_analysis::MotionAnalysis,
     &framedias::FrameDias,
     &plain::Plain,

@@ -13,7 +13,6 @@ pub(crate) mod findings;
 pub(crate) mod grid;
 pub(crate) mod instances;
 pub(crate) mod layout;
-pub(crate) mod named_columns;
 pub(crate) mod number;
 pub(crate) mod photron;
 pub(crate) mod picked;

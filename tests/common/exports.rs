@@ -330,43 +330,6 @@ fn trackpy(motion: &Motion) -> String {
     })
 }
 
-fn fasttrack(motion: &Motion) -> String {
-    let mut text =
-        "xHead\tyHead\ttHead\txTail\tyTail\ttTail\txBody\tyBody\ttBody\tcurvature\timageNumber\tid\n"
-            .to_owned();
-    for (frame, v) in motion.frames.iter().enumerate() {
-        let c: Vec<String> = v.iter().map(|v| cell(*v, "nan")).collect();
-        let _ =
-            writeln!(text, "{}\t{}\t0.1\t{}\t{}\t0.2\t1\t2\t0.3\t0.01\t{frame}\t0", c[2], c[3], c[0], c[1]);
-    }
-    text
-}
-
-fn idtracker(motion: &Motion) -> String {
-    wide(motion, "seconds,x1,y1,x2,y2\n", ",", "nan", |frame| format!("{:.3}", frame as f64 / motion.rate_hz))
-}
-
-fn animalta(motion: &Motion) -> String {
-    let header = "Frame;Time;X_Arena0_Ind0;Y_Arena0_Ind0;X_Arena1_Ind0;Y_Arena1_Ind0\n";
-    wide(motion, header, ";", "NA", |frame| {
-        format!("{};{:.2}", frame + 19_098, 639.0 + frame as f64 / motion.rate_hz)
-    })
-}
-
-fn trex(motion: &Motion) -> String {
-    let mut text = "frame,X#wcentroid (cm),Y#wcentroid (cm),AX,AY,frame,time\n".to_owned();
-    for (frame, v) in motion.frames.iter().enumerate() {
-        let _ = writeln!(
-            text,
-            "{frame}.000,{},{},0.0,0.0,{frame}.000,{}",
-            cell(v[0], "inf").replace("inf", "nan"),
-            cell(v[1], "nan"),
-            time(motion, frame)
-        );
-    }
-    text
-}
-
 fn trc(motion: &Motion) -> String {
     let rate = motion.rate_hz;
     let frames = motion.frames.len();
@@ -455,23 +418,6 @@ pub fn exporters() -> Vec<Exporter> {
         },
         two("motion-analysis-2d", "4 decimals", "run.csv", motion_analysis),
         Exporter { options: by_id, ..two("trackpy", "csv", "run.csv", trackpy) },
-        Exporter {
-            options: |o| (o.tip, o.head) = (Some("tail".to_owned()), Some("head".to_owned())),
-            ..two("fasttrack", "tracking", "run.txt", fasttrack)
-        },
-        Exporter {
-            options: |o| (o.tip, o.head) = (Some("1".to_owned()), Some("2".to_owned())),
-            ..two("idtracker", "csv", "run.csv", idtracker)
-        },
-        Exporter {
-            options: |o| (o.tip, o.head) = (Some("Arena0_Ind0".to_owned()), Some("Arena1_Ind0".to_owned())),
-            ..two("animalta", "wide", "run.csv", animalta)
-        },
-        Exporter {
-            points: 1,
-            options: |o| o.tip = Some("run".to_owned()),
-            ..two("trex", "wcentroid", "run.csv", trex)
-        },
         two("trc", "tab", "run.trc", trc),
         two("plain", "comma", "run.csv", plain),
         two("plain", "semicolon, decimal comma", "run.csv", plain_semicolon),

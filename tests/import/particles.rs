@@ -1,8 +1,7 @@
-//! Tables of programs that track particles, cells and animals: exact values, gaps, names, and refusals with
-//! place and remedy.
+//! Tables of programs that track particles and cells: exact values, gaps, names, and refusals with place and
+//! remedy.
 
 use wiperlab::import::{Import, ImportError, Options, Scale, Source, import};
-use wiperlab::recording::files::YAxis;
 use wiperlab::recording::quality::Severity;
 
 macro_rules! fixture {
@@ -23,16 +22,6 @@ const PROJECT: Fixture = fixture!("trackmate/trackmate7_project.xml");
 const TRACKPY: Fixture = fixture!("trackpy/trackpy_index_y_before_x.csv");
 const TRACKPY_FLOAT: Fixture = fixture!("trackpy/trackpy_frame_index_and_column_float.csv");
 const UNLINKED: Fixture = fixture!("trackpy/trackpy_features_not_linked.csv");
-const ONE_OBJECT: Fixture = fixture!("fasttrack/fasttrack_one_object.txt");
-const TWO_OBJECTS: Fixture = fixture!("fasttrack/fasttrack_two_objects.txt");
-const SECONDS: Fixture = fixture!("idtracker/idtracker5_trajectories_seconds.csv");
-const TIME: Fixture = fixture!("idtracker/idtracker6_trajectories_time.csv");
-const TIDY: Fixture = fixture!("idtracker/idtracker6_trajectories_tidy.csv");
-const PROBABILITIES: Fixture = fixture!("idtracker/idtracker6_id_probabilities.csv");
-const WIDE: Fixture = fixture!("animalta/animalta_wide_arenas.csv");
-const LONG: Fixture = fixture!("animalta/animalta_long_broken_times.csv");
-const TREX: Fixture = fixture!("trex/trex_cm_frame_twice_inf.csv");
-const TREX_BARE: Fixture = fixture!("trex/trex_without_units.csv");
 
 /// Nothing but the rate and the tracks: scale and direction have to come from the file.
 fn options(rate_hz: f64, tip: &str, head: &str) -> Options {
@@ -99,31 +88,15 @@ fn each_fixture_is_claimed_by_its_own_format() {
         (PROJECT, "trackmate", "holder"),
         (TRACKPY, "trackpy", "0"),
         (TRACKPY_FLOAT, "trackpy", "0"),
-        (ONE_OBJECT, "fasttrack", "head"),
-        (TWO_OBJECTS, "fasttrack", "1:body"),
-        (SECONDS, "idtracker", "1"),
-        (TIME, "idtracker", "1"),
-        (TIDY, "idtracker", "0"),
-        (WIDE, "animalta", "Arena0_Ind0"),
-        (LONG, "animalta", "Arena0_Ind1"),
-        (TREX, "trex", "trex_cm_frame_twice_inf"),
-        (TREX_BARE, "trex", "trex_without_units"),
     ];
     for (fixture, format, tip) in all {
-        let playback = Options {
-            y_axis: Some(YAxis::Down),
-            time: Some(wiperlab::import::TimeColumn::Playback),
-            ..scaled(1000.0, tip, "")
-        };
+        let playback =
+            Options { time: Some(wiperlab::import::TimeColumn::Playback), ..scaled(1000.0, tip, "") };
         let found = read(fixture, &playback).unwrap_or_else(|error| panic!("{}: {error}", fixture.0));
         assert_eq!(found.report.format, format, "{}", fixture.0);
     }
-    for (fixture, what) in [
-        (EDGES, "edges"),
-        (TRACKS, "tracks"),
-        (UNLINKED, "features that are not linked"),
-        (PROBABILITIES, "identity probabilities"),
-    ] {
+    for (fixture, what) in [(EDGES, "edges"), (TRACKS, "tracks"), (UNLINKED, "features that are not linked")]
+    {
         let error = read(fixture, &options(1000.0, "", "")).unwrap_err();
         assert!(matches!(&error, ImportError::WrongTable { found, .. } if found.contains(what)), "{error}");
     }
@@ -397,152 +370,4 @@ fn trackpy_refusals_name_the_place() {
         .unwrap_err()
         .to_string();
     assert_says(&own, &["--y-axis up|down"]);
-}
-
-#[test]
-fn fasttrack_has_head_tail_and_body_of_each_object() {
-    let found = read(ONE_OBJECT, &scaled(1000.0, "tail", "head")).unwrap();
-    assert_eq!(tip_x(&found), [Some(108.5), Some(109.5), None, Some(111.5)]);
-    assert_eq!(found.recording.traces().head_y_m, [Some(-20.5), Some(-20.5), None, Some(-20.5)]);
-    let found = read(TWO_OBJECTS, &scaled(1000.0, "1:body", "0:head")).unwrap();
-    assert_eq!(tip_x(&found), [Some(204.5), Some(205.5)]);
-    let message = refusal(TWO_OBJECTS, "imageNumber", "image");
-    assert_says(&message, &["a.csv:1:1: found the columns xHead", "expected xHead", "tracking.txt"]);
-    let ragged = refusal(ONE_OBJECT, "\t40\t1\t0\n", "\t40\t1\n");
-    assert_says(&ragged, &["a.csv:3:1: found 13 cells, expected 14"]);
-    let twice = refusal(TWO_OBJECTS, "\t0\t1\n", "\t0\t0\n");
-    assert_says(&twice, &["a.csv:3:1: found frame 0 of track `0` a second time"]);
-    assert_says(&refusal(ONE_OBJECT, "tHead", "tHead"), &["found `tip`", "head, tail, body"]);
-}
-
-#[test]
-fn idtracker_rows_are_frames_where_the_rounded_times_allow() {
-    let found = read(SECONDS, &scaled(28.0, "1", "2")).unwrap();
-    assert_eq!(tip_x(&found), [100.5, 101.5, 102.5, 103.5, 104.5, 105.5].map(Some));
-    assert_eq!(found.recording.traces().head_x_m[1..4], [Some(301.5), None, Some(303.5)]);
-    assert_eq!(found.recording.traces().tip_y_m[0], Some(-200.25));
-    // three frames a millisecond: the times repeat, and neither merge nor lose a row
-    let found = read(TIME, &Options { y_axis: Some(YAxis::Up), ..scaled(3000.0, "1", "") }).unwrap();
-    assert_eq!(found.recording.grid().frames, 12);
-    assert_eq!((tip_x(&found)[11], found.recording.traces().tip_y_m[0]), (Some(111.5), Some(200.25)));
-    assert_eq!(finding(&found, "rounded-times").map(|finding| finding.value), Some(1e-3));
-    // a removed row shows in the times
-    let removed = String::from_utf8_lossy(SECONDS.1).replace("0.107,103.5,200.25,303.5,50.25\n", "");
-    assert_eq!(
-        tip_x(&read_as("a.csv", &removed, &scaled(28.0, "1", "2")).unwrap())[2..5],
-        [Some(102.5), None, Some(104.5)]
-    );
-    let found = read(TIDY, &scaled(1000.0, "0", "1")).unwrap();
-    assert_eq!(found.recording.traces().head_x_m, [Some(200.5), Some(201.5), Some(202.5)]);
-    assert_eq!(found.recording.traces().tip_confidence, Some(vec![Some(0.3); 3]));
-}
-
-#[test]
-fn idtracker_asks_and_refuses() {
-    // the header of version 6 may be anybody's: y is asked for, unless the format is named
-    let open = read(TIME, &scaled(3000.0, "1", "")).unwrap_err().to_string();
-    assert_says(&open, &["--y-axis up|down"]);
-    let named = Options { format: Some("idtracker".to_owned()), ..scaled(3000.0, "1", "") };
-    assert_eq!(read(TIME, &named).unwrap().recording.traces().tip_y_m[0], Some(-200.25));
-    let table = read(PROBABILITIES, &named).unwrap_err().to_string();
-    assert_says(
-        &table,
-        &[
-            "idtracker6_id_probabilities.csv:1:6: found idtracker.ai's table of identity probabilities",
-            "trajectories.csv",
-        ],
-    );
-    assert_says(
-        &read(TIME, &Options { frame_rate_hz: Some(25.0), ..named.clone() }).unwrap_err().to_string(),
-        &["but --frame-rate-hz says 25"],
-    );
-    assert_says(&refusal(SECONDS, "102.5", "lost"), &["a.csv:4:7: column x of 1: found `lost`"]);
-    assert_says(&refusal(SECONDS, "0.071,", ""), &["a.csv:4:1: found 4 cells, expected 5"]);
-    // without times only the name of the format tells corners of boxes from animals
-    let untimed = "x1,y1,x2,y2\n1.5,2.5,3.5,4.5\n2.5,3.5,4.5,5.5\n";
-    assert_says(
-        &read_as("a.csv", untimed, &scaled(1000.0, "1", "2")).unwrap_err().to_string(),
-        &["found a plain table"],
-    );
-    assert_eq!(tip_x(&read_as("a.csv", untimed, &named).unwrap()), [Some(1.5), Some(2.5)]);
-}
-
-#[test]
-fn animalta_counts_frames_whatever_its_times_say() {
-    let found = read(WIDE, &scaled(30.0, "Arena0_Ind0", "Arena0_Ind1")).unwrap();
-    assert_eq!(tip_x(&found), [Some(100.5), Some(101.5), Some(102.5), None, Some(104.5)]);
-    assert_eq!(found.recording.traces().head_x_m, [Some(300.5), None, Some(302.5), None, Some(304.5)]);
-    assert_eq!(tip_x(&read(WIDE, &scaled(30.0, "Arena1_Ind0_Head", "")).unwrap())[0], Some(7.5));
-    assert!(finding(&found, "broken-times").is_none());
-    let found = read(LONG, &scaled(1000.0, "Arena0_Ind0", "Arena0_Ind1")).unwrap();
-    assert_eq!(tip_x(&found), [Some(100.5), Some(101.5), Some(102.5)]);
-    assert_eq!(found.recording.traces().head_y_m, [Some(-50.25), Some(-50.5), Some(-50.75)]);
-    assert_eq!(
-        finding(&found, "broken-times").map(|finding| (finding.severity, finding.value)),
-        Some((Severity::Caution, 2.0))
-    );
-}
-
-#[test]
-fn animalta_refusals_name_the_place() {
-    assert_says(
-        &read(WIDE, &scaled(1000.0, "Arena0_Ind0", "")).unwrap_err().to_string(),
-        &["imply 30.", "--time playback"],
-    );
-    assert_says(&read(WIDE, &options(30.0, "Arena0_Ind0", "")).unwrap_err().to_string(), &["--scale"]);
-    assert_says(
-        &refusal(WIDE, "Frame;", "Image;"),
-        &["a.csv:1:1: found the columns Image", "folder coordinates"],
-    );
-    assert_says(
-        &refusal(LONG, "\n1;00.07;0;0", "\n0;00.07;0;0"),
-        &["a.csv:3:1: found frame 0 of track `0:0` a second time (first in line 2)"],
-    );
-    assert_says(&refusal(WIDE, "102.5", "?"), &["a.csv:4:14: column x of Arena0_Ind0: found `?`"]);
-    let comma = String::from_utf8_lossy(WIDE.1).replace('.', ",");
-    assert_eq!(
-        read_as("a.csv", &comma, &scaled(30.0, "Arena0_Ind0", "")).unwrap().recording,
-        read(WIDE, &scaled(30.0, "Arena0_Ind0", "")).unwrap().recording
-    );
-}
-
-#[test]
-fn trex_has_its_unit_in_the_header_and_several_positions() {
-    let file = "trex_cm_frame_twice_inf";
-    let found = read(TREX, &options(30.0, file, "posture-head")).unwrap();
-    let traces = found.recording.traces();
-    assert_eq!(traces.tip_x_m, [Some(0.0925), None, Some(0.095), None]);
-    assert_eq!(traces.tip_y_m, [Some(-0.0375), None, Some(-0.035), None]);
-    assert_eq!(traces.head_x_m, [Some(0.095), None, Some(0.0975), None]);
-    assert!(
-        has_note(&found, "is X#wcentroid (cm)")
-            && has_note(&found, "`posture-head` (X (cm))")
-            && has_note(&found, "cm_per_pixel"),
-        "{:?}",
-        found.report
-    );
-    assert!(finding(&found, "lost-points").is_some());
-    let message = read(TREX, &options(30.0, "smooth", "")).unwrap_err().to_string();
-    assert!(message.contains(&format!("tracks found: {file}, posture-head")), "{message}");
-    // a file an animal: two files called after the points need no --point
-    let files = ["runs/tip.csv", "runs/head.csv"].map(|name| Source::alone(name, TREX.1.to_vec()));
-    let both = import(&files, &options(30.0, "", "")).unwrap();
-    assert_eq!(both.recording.traces().head_x_m, traces.tip_x_m);
-    let bare = read(TREX_BARE, &scaled(1000.0, "trex_without_units", "posture-head")).unwrap();
-    assert_eq!(tip_x(&bare), [Some(9.25), Some(9.5), None, Some(9.75)]);
-    assert_eq!(bare.recording.traces().head_x_m, [Some(9.5), Some(9.75), None, Some(9.75)]);
-}
-
-#[test]
-fn trex_refusals_name_the_place() {
-    assert_says(
-        &read(TREX_BARE, &options(1000.0, "trex_without_units", "")).unwrap_err().to_string(),
-        &["--scale"],
-    );
-    let differ = refusal(TREX, "4.250,3.500,3.5,2.000", "4.250,3.500,3.5,5.000");
-    assert_says(&differ, &["a.csv:4:1: found two columns `frame` (numbers 1 and 11) that differ"]);
-    assert_says(&refusal(TREX, "9.500,9.250", "9.500,9.25x"), &["a.csv:2:25: column x of a: found `9.25x`"]);
-    assert_says(&refusal(TREX, ",3294.000", ""), &["a.csv:2:1: found 14 cells, expected 15"]);
-    let rate = read(TREX_BARE, &scaled(25.0, "trex_without_units", "")).unwrap_err().to_string();
-    assert_says(&rate, &["the times imply 1000.000000 frames/s, but --frame-rate-hz says 25"]);
 }

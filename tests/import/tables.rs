@@ -1,7 +1,7 @@
 //! ImageJ's tables, DICe, TRC, plain tables with a telling header, and the camera's record of an export.
 
 use proptest::prelude::*;
-use wiperlab::import::{Companion, Import, ImportError, Options, Scale, Source, import};
+use wiperlab::import::{Columns, Companion, Import, ImportError, Options, Scale, Source, import};
 use wiperlab::recording::files::YAxis;
 
 macro_rules! fixture {
@@ -70,6 +70,27 @@ fn says(name: &'static str, text: &str) -> String {
     import(&[Source::alone(name, text.as_bytes().to_vec())], &down(pixels(500.0, points("tip", "head"))))
         .unwrap_err()
         .to_string()
+}
+
+#[test]
+fn tables_of_animal_trackers_are_read_by_their_columns() {
+    let fasttrack = "xHead\tyHead\ttHead\txBody\tyBody\timageNumber\tid\n1\t2\t0\t5\t6\t0\t1\n\
+        3\t4\t0\t7\t8\t0\t0\n11\t2\t0\t5\t6\t1\t1\n13\t4\t0\t7\t8\t1\t0\n";
+    let idtracker = "time,x1,y1,x2,y2\n0.0,1,2,3,4\n0.002,11,2,nan,nan\n";
+    let animalta = "Frame;Time;X_Arena0_Ind0;Y_Arena0_Ind0\n7;0.23;1;2\n8;0.27;11;2\n";
+    let trex = "frame,X (cm),Y (cm),X#wcentroid (cm),Y#wcentroid (cm),frame,time\n0,5,6,1,2,0,0.000\n\
+        1,7,8,11,2,1,0.002\n";
+    for (text, columns, tip) in [
+        (fasttrack, "frame=imageNumber,track=id,x=xHead,y=yHead", "1"),
+        (idtracker, "time=time,tip-x=x1,tip-y=y1", ""),
+        (animalta, "frame=Frame,tip-x=3,tip-y=4", ""),
+        (trex, "frame=1,tip-x=4,tip-y=5", ""),
+    ] {
+        let columns = Some(Columns::parse(columns).unwrap());
+        let options = Options { columns, ..down(pixels(500.0, points(tip, ""))) };
+        let found = read(("a.csv", text.as_bytes()), &options);
+        assert_eq!(found.recording.traces().tip_x_m, [Some(0.5), Some(5.5)], "{text}");
+    }
 }
 
 /// A record with bytes of other kinds as text.

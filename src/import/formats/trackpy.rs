@@ -4,7 +4,7 @@
 use crate::import::error::ImportError;
 use crate::import::format::Format;
 use crate::import::options::Options;
-use crate::import::reader::{Document, Facts, Layout, Order, PointCells, Table, TrackFile, named_columns};
+use crate::import::reader::{Document, Facts, Layout, Order, PointCells, Row, Table, TrackFile};
 
 const PARTICLE: &str = "particle";
 const FRAME: &str = "frame";
@@ -13,8 +13,16 @@ const FEATURE: [&str; 6] = ["mass", "ecc", "signal", "raw_mass", "ep", "size"];
 /// Features that a table of one's own may not have by chance.
 const FEATURES_ENOUGH: usize = 3;
 
+/// Rows at the top that may hold the names: the first, unless a line of somebody's own was put above it.
+const HEADER_ROWS: usize = 3;
+
 /// trackpy's tables.
 pub(crate) struct Trackpy;
+
+/// The first row whose cells `names` accepts, with its index.
+fn header<'t>(table: &'t Table, names: impl Fn(&[&str]) -> bool) -> Option<(usize, &'t Row)> {
+    table.head.iter().enumerate().take(HEADER_ROWS).find(|(_, row)| names(&row.texts()))
+}
 
 /// Whether a row names a table of features, linked or not.
 fn is_features(names: &[&str]) -> bool {
@@ -30,27 +38,20 @@ impl Format for Trackpy {
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
-        let (_, row) = named_columns::header(document.table.as_ref().ok()?, is_features)?;
+        let (_, row) = header(document.table.as_ref().ok()?, is_features)?;
         Some(format!("line {} names frame, x, y and the properties of features as trackpy does", row.line))
     }
 
     fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
-        let wanted = "frame, particle, y and x";
         let plain = |names: &[&str]| names.contains(&"x") && names.contains(&"y");
-        let (header, row) = named_columns::header(table, plain).ok_or_else(|| {
-            named_columns::no_column(table, None, wanted, "save the table with its column names")
-        })?;
+        let (header, row) = header(table, plain)
+            .ok_or_else(|| no_column(table, table.head.first(), "save the table with its column names"))?;
         let at = |name: &str| row.cells.iter().position(|cell| cell == name);
         let particle = at(PARTICLE).ok_or_else(|| unlinked(table, row.line))?;
-        let frame = named_columns::column(table, header, FRAME)?;
+        let frame = frame(table, header, row)?;
         let (Some(frame), Some(x), Some(y)) = (frame, at("x"), at("y")) else {
-            return Err(named_columns::no_column(
-                table,
-                Some(row.line),
-                wanted,
-                "save the table of the linked features",
-            ));
+            return Err(no_column(table, Some(row), "save the table of the linked features"));
         };
         let layout = Layout {
             start: header + 1,
@@ -71,6 +72,51 @@ impl Format for Trackpy {
         whole_numbers(&mut export);
         Ok(export)
     }
+}
+
+/// The refusal of a table without a column that trackpy always writes.
+fn no_column(table: &Table, row: Option<&Row>, advice: &str) -> ImportError {
+    let names = row.map(Row::texts).unwrap_or_default();
+    let found = names.into_iter().take(12).collect::<Vec<_>>().join(", ");
+    let problem = format!("found the columns {found}, expected frame, particle, y and x");
+    ImportError::columns(table.file, row.map_or(1, |row| row.line), problem, advice)
+}
+
+/// The column of the frames. Where it is the index too it stands twice, and both have to say the same in every
+/// row.
+///
+/// # Errors
+/// [`ImportError::Columns`] for two such columns that differ, with the first such line.
+fn frame(table: &Table, header: usize, names: &Row) -> Result<Option<usize>, ImportError> {
+    let mut at = names.cells.iter().enumerate().filter(|(_, cell)| *cell == FRAME).map(|(index, _)| index);
+    let Some(first) = at.next() else { return Ok(None) };
+    for other in at {
+        if let Some(line) = first_difference(table, header + 1, [first, other])? {
+            return Err(ImportError::columns(
+                table.file,
+                line,
+                format!(
+                    "found two columns `{FRAME}` (numbers {} and {}) that differ, expected the same in both",
+                    first + 1,
+                    other + 1
+                ),
+                "export again with one of them, or give the number of the right one with --columns",
+            ));
+        }
+    }
+    Ok(Some(first))
+}
+
+/// Line of the first row in which two cells do not say the same.
+fn first_difference(table: &Table, start: usize, cells: [usize; 2]) -> Result<Option<usize>, ImportError> {
+    let mut rows = table.rows(start);
+    while let Some(record) = rows.next()? {
+        let [first, other] = cells.map(|cell| table.number(record.cell(cell)));
+        if first != other {
+            return Ok(Some(record.line));
+        }
+    }
+    Ok(None)
 }
 
 /// The refusal of features that belong to no particle.

@@ -13,10 +13,6 @@ impl Column {
         self.0.get(row).copied().filter(|value| !value.is_nan())
     }
 
-    pub(crate) fn len(&self) -> usize {
-        self.0.len()
-    }
-
     pub(crate) fn iter(&self) -> impl Iterator<Item = Option<f64>> {
         self.0.iter().map(|value| Some(*value).filter(|value| !value.is_nan()))
     }

@@ -1,4 +1,4 @@
-//! Rows of one or of many instances (tracks, animals, blocks), gathered into clocks and tracks.
+//! Rows of one or of many instances (tracks, blocks), gathered into clocks and tracks.
 
 use crate::import::error::{ImportError, Place};
 use crate::import::reader::column::Column;

@@ -61,8 +61,6 @@ pub(crate) struct Layout {
     pub of_others: bool,
     pub points: Vec<PointCells>,
     pub lost: Vec<LostRule>,
-    /// Words that this format writes for a lost coordinate, in addition to the usual ones; lower case.
-    pub void: &'static [&'static str],
 }
 
 /// What is not read as a position.
@@ -88,7 +86,6 @@ impl Default for Layout {
             order: Order::AsWritten,
             points: vec![],
             lost: vec![],
-            void: &[],
         }
     }
 }
@@ -213,11 +210,6 @@ impl Layout {
                 match table.number(record.cell(part)) {
                     Number::Value(value) => total += value,
                     Number::Missing => return Ok(None),
-                    Number::Text
-                        if self.void.iter().any(|word| record.cell(part).eq_ignore_ascii_case(word)) =>
-                    {
-                        return Ok(None);
-                    }
                     Number::Text => {
                         return Err(table.not_a_number(
                             record.line,

@@ -95,8 +95,6 @@ checks! {
     ImpliedRate = "implied-rate",
     /// Times rounded to a noticeable part of a frame.
     RoundedTimes = "rounded-times",
-    /// Times that go back while frames go on.
-    BrokenTimes = "broken-times",
     /// Times that count frames because the interval was never set.
     FrameInterval = "frame-interval",
     /// Positions resampled to another rate.
