@@ -56,4 +56,3 @@ pub use error::FitError;
 pub use problem::{Measured, Problem, ProblemError};
 pub use run::{fit, warnings};
 pub use targets::targets;
-pub use trace_run::{Left, Ran};

@@ -1,5 +1,5 @@
-//! Append-only journals of long computations: one line of JSON a record, enough to resume, extend, merge and
-//! audit what was computed.
+//! Append-only journals of long computations: one line of JSON a record, enough to resume and extend what was
+//! computed.
 //!
 //! The first line is a [`Header`] with the fingerprint of the problem. Numbers are [`Exact`]: the shortest
 //! decimals that give the same bits back, as strings, because JSON readers round numbers in the last place
@@ -9,33 +9,26 @@
 //! What a line holds is a [`Record`]: an evaluation of a fit, a point of a study.
 
 mod checksum;
-mod drop;
 mod error;
 mod exact;
 mod fingerprint;
 mod header;
 mod lines;
-mod merge;
 mod read;
 mod record;
 mod sample;
 mod shard;
 mod sink;
 mod stream;
-mod table;
 
 pub use checksum::sealed;
-pub use drop::{Without, without};
 pub use error::JournalError;
 pub use exact::Exact;
 pub use fingerprint::fingerprint;
-
 pub use header::{Header, Kind, has_whole_line, kind_of};
-pub use merge::{Merged, merge};
 pub use read::{Journal, again, check_again, read};
-pub use record::{Record, header_line, line, text};
+pub use record::{Record, header_line, line};
 pub use sample::{RECHECKED, sample};
 pub use shard::Shard;
 pub use sink::{Discard, Sink};
 pub use stream::{End, Found, Stream};
-pub use table::Tabled;

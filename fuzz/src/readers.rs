@@ -4,7 +4,7 @@
 use wiperlab::fit::job::Job;
 use wiperlab::fit::journal::Entry;
 use wiperlab::fit::result::FitResult;
-use wiperlab::journal::{Journal, Record, read, sealed, text as journal_text};
+use wiperlab::journal::{Journal, Record, header_line, line, read, sealed};
 use wiperlab::recording::files::{RecordingFile, read_recording, trace_csv};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::Study;
@@ -47,12 +47,7 @@ pub const READERS: [Reader; 8] = [
     Reader { name: "trace", seeds: &["fuzz/seeds/trace.csv"], check: trace },
     Reader {
         name: "journal",
-        seeds: &[
-            "fuzz/seeds/journal-of-a-fit.jsonl",
-            "fuzz/seeds/journal-of-a-study.jsonl",
-            "fuzz/seeds/journal-of-a-fit-without-checksums.jsonl",
-            "fuzz/seeds/journal-of-a-study-without-checksums.jsonl",
-        ],
+        seeds: &["fuzz/seeds/journal-of-a-fit.jsonl", "fuzz/seeds/journal-of-a-study.jsonl"],
         check: journals,
     },
     Reader {
@@ -121,16 +116,16 @@ where
     R::Body: PartialEq + std::fmt::Debug,
 {
     let Ok(Some(found)) = read::<R>("journal.jsonl", text) else { return };
-    if found.is_unchecked() {
-        return; // an older layout is not written
-    }
-    let written = journal_text(&found.header, &found.records);
+    let lines = found.records.iter().enumerate().map(|(at, record)| line(record, at));
+    let written = header_line(&found.header) + &lines.collect::<String>();
     let back: Journal<R> = read("journal.jsonl", &written).expect("reads back").expect("has a header");
     assert_eq!((back.header, back.records), (found.header, found.records));
 }
 
 fn result(text: &str) {
-    if let Ok(result) = FitResult::parse("result.json", text) {
+    let _ = FitResult::parse("result.json", text);
+    // and with a new hash: else every change would end there
+    if let Ok(result) = serde_json::from_str::<FitResult>(text) {
         let written = result.to_json();
         assert_eq!(FitResult::parse("result.json", &written).expect("reads back").to_json(), written);
     }

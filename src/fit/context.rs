@@ -2,7 +2,7 @@
 
 use super::error::FitError;
 use super::journal::{Entry, Header, Journal};
-use crate::journal::{header_line, text};
+use crate::journal::header_line;
 
 /// Which run of which problem it is.
 #[derive(Debug, Clone, Default)]
@@ -23,20 +23,15 @@ impl<'a> Context<'a> {
         self.resume.map_or(&[][..], |(_, journal)| &journal.records)
     }
 
-    /// What is written before the first new line: the header of a new journal, and all of one whose lines
-    /// have no checksums, which begins a new file.
+    /// What is written before the first new line: the header of a new journal.
     pub(super) fn opening(&self, header: &Header) -> String {
-        match self.resume {
-            None => header_line(header),
-            Some((_, journal)) if journal.is_unchecked() => text(header, &journal.records),
-            Some(_) => String::new(),
-        }
+        self.resume.map_or_else(|| header_line(header), |_| String::new())
     }
 
     /// Refuses a journal from which a fit with this header cannot go on.
     pub(super) fn check_resumable(&self, expected: &Header) -> Result<(), FitError> {
         let Some((file, journal)) = self.resume else { return Ok(()) };
-        journal.check_problem(file, expected)?;
+        journal.header.check::<Entry>(file, expected)?;
         let (found, expected) = (journal.header.body.seed, expected.body.seed);
         if found == expected {
             return Ok(());

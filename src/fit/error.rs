@@ -30,7 +30,7 @@ pub enum FitError {
     Journal(#[from] JournalError),
     /// The journal belongs to a search with another seed.
     #[error(
-        "{file}: written by a search with seed {found}, the job has `seed = {expected}`; write `seed = {found}` into the job to go on from it, or move it away to start over (`wiperlab journal merge` puts journals of several seeds together)"
+        "{file}: written by a search with seed {found}, the job has `seed = {expected}`; write `seed = {found}` into the job to go on from it, or move it away to start over"
     )]
     OtherSeed {
         /// File as named by the user.

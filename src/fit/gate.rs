@@ -52,7 +52,6 @@ pub struct Gate {
     /// What a reader has to know, in sentences.
     pub notes: Vec<String>,
     /// What to measure in addition, in sentences.
-    #[serde(default)]
     pub advice: Vec<String>,
 }
 

@@ -1,7 +1,6 @@
 //! Iterates of a trace fit in a journal: everything from which the next one follows, to the last bit.
 
 mod body;
-mod table;
 
 pub use body::{Body, Coordinate, camera_name};
 

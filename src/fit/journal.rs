@@ -2,7 +2,6 @@
 
 mod body;
 mod difference;
-mod table;
 
 pub use body::{Aimed, Body, Parameter};
 
@@ -22,9 +21,6 @@ pub type Header = journal::Header<Body>;
 pub struct Entry {
     /// What it was made for.
     pub stage: Stage,
-    /// Seed of the search that made it, where that is another one than the header's: such an evaluation came
-    /// from another journal.
-    pub from: Option<u64>,
     /// What the model showed. Costs are not kept: they depend on the scatter that a search has met.
     pub outcome: Outcome,
 }
@@ -51,10 +47,7 @@ impl Record for Entry {
         Row {
             index: at,
             stage: self.stage,
-            from: self.from,
             unit: unit.iter().copied().map(Exact).collect(),
-            values: None,
-            cost: None,
             features: features.iter().map(Feature::of).collect(),
             failure: failure.as_ref().map(Failed::of),
         }
@@ -66,20 +59,7 @@ impl Record for Entry {
 
     fn from_row(row: Row, body: &Body) -> Result<Self, String> {
         row.check(body)?;
-        let (stage, from) = (row.stage, row.from.filter(|seed| *seed != body.seed));
-        Ok(Self { stage, from, outcome: row.into_outcome(body)? })
-    }
-
-    fn check_stored(&self, expected: &Body) -> Result<(), String> {
-        let Outcome { unit, values, .. } = &self.outcome;
-        let Some(axes) = expected.axes() else { return Ok(()) };
-        let differs = axes.iter().zip(unit).map(|(axis, u)| axis.bounds.from_unit(*u)).zip(values);
-        let differs = differs.zip(&expected.parameters).find(|((derived, stored), _)| derived != *stored);
-        let Some(((derived, stored), parameter)) = differs else { return Ok(()) };
-        Err(format!(
-            "`values`: found {stored:?} for `{}`, expected {derived:?}, which follows from `unit`",
-            parameter.name
-        ))
+        Ok(Self { stage: row.stage, outcome: row.into_outcome(body) })
     }
 
     /// Everything that the model shows. Stages may differ: another search may have come to a point for
@@ -89,14 +69,9 @@ impl Record for Entry {
     }
 
     fn other_problem(found: &Body, expected: &Body) -> Option<String> {
-        let differ = found.is_other_than(expected);
-        differ.then(|| "the header has other parameters, bounds, features or targets than the fit".to_owned())
-    }
-
-    /// A fit that is resumed replays the evaluations of its own seed, and knows those of others.
-    fn moved(&self, from: &Body, into: &Body) -> Self {
-        let seed = self.from.unwrap_or(from.seed);
-        Self { from: Some(seed).filter(|seed| *seed != into.seed), ..self.clone() }
+        let same = found.parameters == expected.parameters && found.features == expected.features;
+        (!same)
+            .then(|| "the header has other parameters, bounds, features or targets than the fit".to_owned())
     }
 }
 
@@ -106,15 +81,7 @@ impl Record for Entry {
 pub struct Row {
     index: usize,
     stage: Stage,
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    from: Option<u64>,
     unit: Vec<Exact>,
-    /// Layout 2 alone stores what follows from `unit` and the header.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    values: Option<Vec<Exact>>,
-    /// Layout 2 alone stores it, and nothing reads it.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    cost: Option<Exact>,
     features: Vec<Feature>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
     failure: Option<Failed>,
@@ -122,11 +89,9 @@ pub struct Row {
 
 impl Row {
     fn check(&self, body: &Body) -> Result<(), String> {
-        let expected = body.parameters.len();
-        for (name, numbers) in [("unit", Some(&self.unit)), ("values", self.values.as_ref())] {
-            if let Some(found) = numbers.map(Vec::len).filter(|found| *found != expected) {
-                return Err(format!("`{name}`: found {found} numbers, expected {expected}"));
-            }
+        let (found, expected) = (self.unit.len(), body.parameters.len());
+        if found != expected {
+            return Err(format!("`unit`: found {found} numbers, expected {expected}"));
         }
         let (found, expected) = (self.features.len(), body.features.len());
         if self.failure.is_none() && found != expected {
@@ -141,17 +106,13 @@ impl Row {
         }
     }
 
-    fn into_outcome(self, body: &Body) -> Result<Outcome, String> {
-        let plain = |numbers: Vec<Exact>| numbers.into_iter().map(|n| n.0).collect::<Vec<f64>>();
-        let unit = plain(self.unit);
-        let values = match (self.values.map(plain), body.axes()) {
-            (None, Some(axes)) => axes.iter().zip(&unit).map(|(axis, u)| axis.bounds.from_unit(*u)).collect(),
-            (Some(stored), None) => stored,
-            (None, None) => return Err("`values`: found none, and the header has no bounds".to_owned()),
-            (Some(_), Some(_)) => return Err("`values`: found some, but they follow from `unit`".to_owned()),
-        };
+    /// The values follow from the place in the unit box.
+    fn into_outcome(self, body: &Body) -> Outcome {
+        let unit: Vec<f64> = self.unit.into_iter().map(|n| n.0).collect();
+        let values = body.parameters.iter().zip(&unit);
+        let values = values.map(|(parameter, u)| parameter.axis.bounds.from_unit(*u)).collect();
         let features = self.features.into_iter().map(Feature::into_observed).collect();
-        Ok(Outcome { unit, values, features, failure: self.failure.map(Failed::into_failure) })
+        Outcome { unit, values, features, failure: self.failure.map(Failed::into_failure) }
     }
 }
 

@@ -44,9 +44,6 @@ pub struct Ledger<'a> {
     journal: &'a mut dyn Sink,
     on_progress: &'a mut OnProgress<'a>,
     replay: HashMap<Vec<u64>, Evaluation>,
-    /// Evaluations of other seeds in the journal, in the order of their coordinates so that it does not
-    /// matter in which they were merged.
-    foreign: BTreeMap<Vec<u64>, Evaluation>,
     lines: usize,
     run: Vec<Evaluation>,
     replayed: usize,
@@ -71,21 +68,17 @@ impl<'a> Ledger<'a> {
     ) -> Self {
         let priced = |entry: &Entry| (key(&entry.outcome.unit), objective.price(entry.outcome.clone()));
         let replay = journaled.iter().map(priced).collect();
-        let foreign: BTreeMap<_, _> =
-            journaled.iter().filter(|entry| entry.from.is_some()).map(priced).collect();
-        let best = foreign.values().min_by(|a, b| a.cost.total_cmp(&b.cost)).cloned();
         let (run, places, lines) = (Vec::new(), HashMap::new(), journaled.len());
         Self {
             objective,
             journal,
             on_progress,
             replay,
-            foreign,
             lines,
             run,
             replayed: 0,
             places,
-            best,
+            best: None,
             limit,
             stop: None,
             held: None,
@@ -143,7 +136,7 @@ impl<'a> Ledger<'a> {
     fn lines_of(&mut self, entries: impl Iterator<Item = (Stage, Evaluation)>) -> String {
         let mut text = String::new();
         for (stage, evaluation) in entries {
-            text += &line(&Entry { stage, from: None, outcome: evaluation.into() }, self.lines);
+            text += &line(&Entry { stage, outcome: evaluation.into() }, self.lines);
             self.lines += 1;
         }
         text
@@ -168,10 +161,10 @@ impl<'a> Ledger<'a> {
     /// Counts what is known and what will be by another objective of the same model and features.
     pub(crate) fn reprice(&mut self, objective: &'a Objective<'a>) {
         self.objective = objective;
-        let known = self.run.iter_mut().chain(self.replay.values_mut()).chain(self.foreign.values_mut());
+        let known = self.run.iter_mut().chain(self.replay.values_mut());
         known.for_each(|evaluation| *evaluation = objective.price(evaluation.clone().into()));
         let mut best: Option<&Evaluation> = None;
-        for evaluation in self.foreign.values().chain(&self.run) {
+        for evaluation in &self.run {
             best = best.filter(|best| best.cost <= evaluation.cost).or(Some(evaluation));
         }
         self.best = best.cloned();
@@ -187,18 +180,6 @@ impl<'a> Ledger<'a> {
     #[must_use]
     pub fn run(&self) -> &[Evaluation] {
         &self.run
-    }
-
-    /// Evaluations of this run in order, then those that searches with other seeds have made elsewhere.
-    pub fn known(&self) -> impl Iterator<Item = &Evaluation> {
-        let elsewhere = self.foreign.iter().filter(|(key, _)| !self.places.contains_key(*key));
-        self.run.iter().chain(elsewhere.map(|(_, evaluation)| evaluation))
-    }
-
-    /// How many evaluations of searches with other seeds the journal holds.
-    #[must_use]
-    pub fn foreign(&self) -> usize {
-        self.foreign.len()
     }
 
     /// The known evaluation of lowest cost, the earliest among equals.

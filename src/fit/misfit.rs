@@ -47,7 +47,6 @@ pub struct ChannelMisfit {
     /// Frames that were compared.
     pub frames: usize,
     /// Frames with data that lie in no segment: before the first in which the tip slides.
-    #[serde(default)]
     pub frames_left_out: usize,
     /// Root mean square of measured minus model, m.
     pub residual_rms_m: f64,

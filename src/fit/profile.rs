@@ -247,7 +247,7 @@ impl Walker {
     /// The best point that the fit knows near the coordinate, moved onto it.
     fn nearest(&self, ledger: &Ledger) -> Option<Vec<f64>> {
         let near = |e: &&Evaluation| e.unit.get(self.axis).is_some_and(|u| (u - self.at).abs() <= NEAR);
-        let known = ledger.known().filter(|_| self.end.is_none()).filter(|e| e.failure.is_none());
+        let known = ledger.run().iter().filter(|_| self.end.is_none()).filter(|e| e.failure.is_none());
         let best = known.filter(near).min_by(|a, b| a.cost.total_cmp(&b.cost))?;
         Some(self.onto(&best.unit))
     }
@@ -261,7 +261,7 @@ impl Walker {
         let crossing = self.end.flatten()?;
         let limit = self.start.1 + math::powi(self.most_root, 2);
         let along = |e: &Evaluation| e.unit.get(self.axis).map_or(0.0, |u| self.sign * (u - crossing));
-        let within = ledger.known().filter(|e| e.failure.is_none() && e.cost <= limit);
+        let within = ledger.run().iter().filter(|e| e.failure.is_none() && e.cost <= limit);
         let farthest = within.max_by(|a, b| along(a).total_cmp(&along(b)))?;
         (along(farthest) > FIRST_STEPS.0 / 2.0).then(|| farthest.clone())
     }

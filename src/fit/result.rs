@@ -231,14 +231,6 @@ pub struct Evaluations {
     pub total: usize,
     /// Those that failed, counted by reason.
     pub failed: BTreeMap<FailureReason, usize>,
-    /// Those of searches with other seeds that a merged journal brought: known from the start, and not among
-    /// the total unless met again.
-    #[serde(default, skip_serializing_if = "is_zero")]
-    pub foreign: usize,
-}
-
-fn is_zero(count: &usize) -> bool {
-    *count == 0
 }
 
 /// Everything a fit found.
@@ -264,7 +256,6 @@ pub struct FitResult {
     /// In job order.
     pub features: Vec<FeatureResult>,
     /// Components and features that were held out of the fit and predicted by it.
-    #[serde(default)]
     pub held_out: Vec<FeatureResult>,
     /// Number of informative directions in the space of the parameters.
     pub rank: usize,
@@ -319,21 +310,15 @@ impl FitResult {
         seal::sealed(&serde_json::to_string_pretty(self).unwrap_or_default())
     }
 
-    /// Reads a `result.json`; `file` is its name in refusals. A text of an earlier version carries no hash.
+    /// Reads a `result.json`; `file` is its name in refusals.
     ///
     /// # Errors
     /// [`ResultError`] with the place of the problem, or that the text is not what its hash says.
     pub fn parse(file: &str, text: &str) -> Result<Self, ResultError> {
         let refused = |problem| ResultError { file: file.to_owned(), problem };
         let result = serde_json::from_str(text).map_err(|e| refused(e.to_string()))?;
-        seal::is_sealed(text).map_err(refused)?;
+        seal::check(text).map_err(refused)?;
         Ok(result)
-    }
-
-    /// Whether the text of a result carries the hash of itself; one of an earlier version does not.
-    #[must_use]
-    pub fn is_sealed(text: &str) -> bool {
-        seal::is_sealed(text) == Ok(true)
     }
 
     /// Estimates of the job's parameters, in their order.
@@ -417,7 +402,6 @@ mod tests {
             evaluations: Evaluations {
                 total: 7,
                 failed: BTreeMap::from([(FailureReason::Ended(crate::simulate::Status::Jammed), 2)]),
-                foreign: 0,
             },
             synthetic: true,
             notes: vec!["n".to_owned()],

@@ -212,12 +212,12 @@ fn header(job: &Job, aims: &[Aim], targets: &[Target], context: &Context) -> Hea
     let parameter = |p: &FreeParameter| Parameter {
         name: p.name.clone(),
         unit: parameters::find(&p.name).map_or(Unit::PLAIN.name, |known| known.unit).to_owned(),
-        axis: Some(axis(p)),
+        axis: axis(p),
     };
     let aimed = |(aim, target): (&Aim, &Target)| Aimed {
         name: target.name.clone(),
         unit: aim.feature.reading.unit().name.to_owned(),
-        target: Some(target.clone()),
+        target: target.clone(),
     };
     let parameters = job.parameters.iter().map(parameter).collect();
     let features = aims.iter().zip(targets).map(aimed).collect();

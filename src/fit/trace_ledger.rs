@@ -8,8 +8,8 @@ use super::iterates::{Header, Journal, Step};
 use super::ledger::Progress;
 use super::stage::Stage;
 use super::trace::{Branch, Iterate, Keep};
-use crate::journal::{Shard, Sink, header_line, line, sample};
-use std::collections::{BTreeMap, BTreeSet, HashMap};
+use crate::journal::{Sink, header_line, line, sample};
+use std::collections::{BTreeMap, HashMap};
 use std::ops::ControlFlow;
 
 /// How far a trace fit has come.
@@ -55,33 +55,14 @@ pub enum Stopped {
     Budget,
     /// The journal cannot be written.
     Journal(String),
-    /// A start that other machines make is not there yet.
-    Missing,
 }
-
-/// Who makes the iterates of a fit.
-pub enum Division<'a> {
-    /// This run makes all of them.
-    Whole,
-    /// This run makes those of a shard. All shards need the starts: each takes what others have written by
-    /// then, and makes the rest too.
-    Shard(Shard, &'a mut Look<'a>),
-    /// This run makes none, and writes those of all shards into its own journal.
-    Collected(&'a [(&'a str, &'a Journal)]),
-}
-
-/// Gives the iterates that other shards have written since it was called last.
-pub type Look<'a> = dyn FnMut() -> Vec<Step> + 'a;
 
 /// The iterates of all searches of a trace fit, and where they are written.
-pub struct TraceLedger<'a, 'd> {
+pub struct TraceLedger<'a> {
     journal: &'a mut dyn Sink,
     on_iterate: &'a mut OnIterate<'a>,
-    division: Division<'d>,
-    /// Iterates of this journal, those of starts also when they were made by this run.
+    /// Iterates of the journal that is resumed.
     known: HashMap<(usize, usize), Iterate>,
-    /// Iterates of other journals.
-    elsewhere: HashMap<(usize, usize), Iterate>,
     /// Lines of the journal.
     lines: usize,
     /// The header of a new journal, until it is written.
@@ -93,57 +74,35 @@ pub struct TraceLedger<'a, 'd> {
     stopped: Option<Stopped>,
 }
 
-impl<'a, 'd> TraceLedger<'a, 'd> {
+impl<'a> TraceLedger<'a> {
     /// Searches that go on from a journal, or begin one with this header; `most` is the number of iterates
-    /// allowed, those of the journal included. Journals of other shards have been checked.
+    /// allowed, those of the journal included.
     ///
     /// # Errors
     /// [`FitError`] when the journal is that of another fit.
     pub fn new(
         header: &Header,
         resume: Option<(&str, &Journal)>,
-        (division, most): (Division<'d>, usize),
+        most: usize,
         journal: &'a mut dyn Sink,
         on_iterate: &'a mut OnIterate<'a>,
     ) -> Result<Self, FitError> {
         if let Some((file, found)) = resume {
             check_seed(file, found.header.body.seed, header.body.seed)?;
-            found.check_problem(file, header)?;
+            found.header.check::<Step>(file, header)?;
         }
         let records = resume.map_or(&[][..], |(_, journal)| &journal.records);
-        let known = records.iter().map(placed).collect();
-        let mut division = division;
-        let elsewhere = match &mut division {
-            Division::Whole => HashMap::new(),
-            Division::Shard(_, look) => look().iter().map(placed).collect(),
-            Division::Collected(journals) => {
-                journals.iter().flat_map(|(_, j)| &j.records).map(placed).collect()
-            }
-        };
+        let known = records.iter();
+        let known = known.map(|step| ((step.start, step.step), step.iterate.clone())).collect();
         let opening = resume.is_none().then(|| header_line(header));
         let (lines, counts, replayed, stopped) = (records.len(), BTreeMap::new(), 0, None);
-        Ok(Self {
-            journal,
-            on_iterate,
-            division,
-            known,
-            elsewhere,
-            lines,
-            opening,
-            counts,
-            replayed,
-            most,
-            stopped,
-        })
+        Ok(Self { journal, on_iterate, known, lines, opening, counts, replayed, most, stopped })
     }
 
-    /// Iterates so far, those of the journal included; of a shard those of its own journal.
+    /// Iterates so far, those of the journal included.
     #[must_use]
     pub fn iterates(&self) -> usize {
-        match self.division {
-            Division::Shard(..) => self.lines,
-            Division::Whole | Division::Collected(_) => self.counts.values().sum(),
-        }
+        self.counts.values().sum()
     }
 
     /// The same of one start, from 0.
@@ -180,31 +139,10 @@ impl<'a, 'd> TraceLedger<'a, 'd> {
         Ok(())
     }
 
-    /// An iterate of another journal, which is copied where journals are collected.
-    fn known_elsewhere(&mut self, place: (usize, usize)) -> Option<Iterate> {
-        if let Division::Shard(_, look) = &mut self.division
-            && !self.elsewhere.contains_key(&place)
-            && Branch::of(place.0).is_none()
-        {
-            self.elsewhere.extend(look().iter().map(placed));
-        }
-        let found = self.elsewhere.get(&place)?.clone();
-        if let Division::Collected(_) = self.division
-            && let Err(problem) = self.write(place, &found)
-        {
-            self.stopped.get_or_insert(Stopped::Journal(problem));
-        }
-        Some(found)
-    }
-
     fn stop(&mut self, why: Stopped) -> ControlFlow<()> {
         self.stopped.get_or_insert(why);
         ControlFlow::Break(())
     }
-}
-
-fn placed(step: &Step) -> ((usize, usize), Iterate) {
-    ((step.start, step.step), step.iterate.clone())
 }
 
 fn check_seed(file: &str, found: u64, expected: u64) -> Result<(), FitError> {
@@ -214,13 +152,9 @@ fn check_seed(file: &str, found: u64, expected: u64) -> Result<(), FitError> {
     Err(FitError::OtherSeed { file: file.to_owned(), found, expected })
 }
 
-impl Keep for TraceLedger<'_, '_> {
+impl Keep for TraceLedger<'_> {
     fn known(&mut self, start: usize, step: usize) -> Option<Iterate> {
-        let place = (start, step);
-        let known = match self.known.get(&place) {
-            Some(own) => own.clone(),
-            None => self.known_elsewhere(place)?,
-        };
+        let known = self.known.get(&(start, step))?.clone();
         self.replayed += 1;
         if self.count(start, &known).is_break() {
             self.stopped.get_or_insert(Stopped::Interrupted); // (the next new iterate is not made any more)
@@ -228,35 +162,15 @@ impl Keep for TraceLedger<'_, '_> {
         Some(known)
     }
 
-    fn begins(&self, start: usize) -> bool {
-        matches!(&self.division, Division::Shard(shard, _) if shard.holds(start))
-    }
-
-    fn makes(&self, chain: usize) -> bool {
-        match &self.division {
-            Division::Whole => true,
-            Division::Shard(shard, _) => shard.holds(chain),
-            Division::Collected(_) => false,
-        }
-    }
-
     fn add(&mut self, start: usize, step: usize, iterate: &Iterate) -> ControlFlow<()> {
         if let Some(why) = self.stopped.clone() {
             return self.stop(why);
-        }
-        if let Division::Collected(_) = self.division {
-            return self.stop(Stopped::Missing);
         }
         if self.iterates() >= self.most {
             return self.stop(Stopped::Budget);
         }
         if let Err(problem) = self.write((start, step), iterate) {
             return self.stop(Stopped::Journal(problem));
-        }
-        if let Division::Shard(..) = self.division
-            && Branch::of(start).is_none()
-        {
-            self.known.insert((start, step), iterate.clone());
         }
         match self.count(start, iterate) {
             ControlFlow::Break(()) => self.stop(Stopped::Interrupted),
@@ -265,31 +179,29 @@ impl Keep for TraceLedger<'_, '_> {
     }
 }
 
-/// Makes some iterates of journals again, each from the one before, and compares them to the last bit: a
+/// Makes some iterates of a journal again, each from the one before, and compares them to the last bit: a
 /// search that is resumed believes none that the model does not give. `next` gives the iterate after one of a
 /// chain, and the first one.
 ///
 /// # Errors
 /// [`FitError::Journal`] with the line that differs.
 pub fn recheck(
-    journals: &[(&str, &Journal)],
+    file: &str,
+    journal: &Journal,
     next: impl Fn(usize, Option<&Iterate>) -> Option<Iterate>,
 ) -> Result<(), FitError> {
-    let all = || journals.iter().flat_map(|of| of.1.records.iter().enumerate().map(move |at| (of, at)));
+    let records = &journal.records;
     let places: HashMap<(usize, usize), &Iterate> =
-        all().map(|(_, (_, step))| ((step.start, step.step), &step.iterate)).collect();
-    let count = all().count();
-    let seed = journals.first().map_or(0, |(_, journal)| journal.header.body.seed);
+        records.iter().map(|step| ((step.start, step.step), &step.iterate)).collect();
     // others each time, as it grows
-    let sampled: BTreeSet<usize> = sample(count, seed.wrapping_add(count as u64)).into_iter().collect();
-    for ((file, journal), (place, stored)) in
-        all().enumerate().filter(|(number, _)| sampled.contains(number)).map(|(_, one)| one)
-    {
+    let seed = journal.header.body.seed.wrapping_add(records.len() as u64);
+    for place in sample(records.len(), seed) {
+        let stored = &records[place];
         let before = stored.step.checked_sub(1).map(|before| places.get(&(stored.start, before)));
         let again = match before {
             None => next(stored.start, None),
             Some(Some(before)) => next(stored.start, Some(before)),
-            Some(None) => continue, // (its line was dropped)
+            Some(None) => continue, // (nothing that it follows from is in the journal)
         };
         if let Some(iterate) = again {
             journal.check_again(file, place, &Step { iterate, ..stored.clone() })?;

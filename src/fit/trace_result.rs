@@ -24,14 +24,14 @@ const ONE_LENGTH: &str = "segments of one length alone were fitted, and whether 
                           `segment_s` two lengths at least";
 
 /// Everything that a trace fit found.
-pub(super) struct Found<'a, 'l, 'd> {
+pub(super) struct Found<'a, 'l> {
     pub problem: &'a Problem,
     pub model: &'a TraceModel,
     pub searched: &'a Searched,
-    pub ledger: &'a TraceLedger<'l, 'd>,
+    pub ledger: &'a TraceLedger<'l>,
 }
 
-impl Found<'_, '_, '_> {
+impl Found<'_, '_> {
     /// The result, but for what the whole run shows; `None` where no search came anywhere.
     pub fn into_result(self) -> Option<FitResult> {
         let job = self.problem.job();

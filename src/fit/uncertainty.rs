@@ -376,7 +376,8 @@ impl Local {
     fn met<'a>(&self, ledger: &'a Ledger, axis: usize) -> impl Iterator<Item = f64> + 'a {
         let limit = self.best.cost + CHI_SQUARED_95;
         ledger
-            .known()
+            .run()
+            .iter()
             .filter(move |e| e.failure.is_none() && e.cost <= limit)
             .filter_map(move |e| e.unit.get(axis).copied())
     }

@@ -1,29 +1,21 @@
 //! Why a journal is refused.
 
-use super::header::{Kind, LAYOUT, UNCHECKED};
+use super::header::{Kind, LAYOUT};
 
 /// Why a journal was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum JournalError {
     /// Another layout.
     #[error(
-        "{file}: a journal of layout {found}, this program reads layouts {UNCHECKED} and {LAYOUT}; resume with the version of the program that wrote it, or move it away to start over"
+        "{file}: a journal of layout {found}, expected layout {LAYOUT}; move it away and run the {kind} again"
     )]
     Layout {
         /// File as named by the user.
         file: String,
-        /// Layout of the file.
-        found: u32,
-    },
-    /// Its lines have no checksums, and what is made of it would have.
-    #[error(
-        "{file}: a journal of layout {UNCHECKED}, whose lines have no checksums; resume its {kind} once, which checks it, writes it with checksums and keeps this file under another name"
-    )]
-    Unchecked {
-        /// File as named by the user.
-        file: String,
         /// What it is of.
         kind: Kind,
+        /// Layout of the file.
+        found: u32,
     },
     /// A journal of something else.
     #[error(
@@ -84,7 +76,7 @@ pub enum JournalError {
     },
     /// A line is not what the program writes.
     #[error(
-        "{file}:{line}: {problem}; the line was damaged or edited: restore the file, or remove the line with `wiperlab journal drop {file} {line}` (the {} is then made again, and the file as it is now is kept under another name)",
+        "{file}:{line}: {problem}; the line was damaged or edited: restore the file, or remove this line and all behind it (each {} in them is then made again)",
         kind.record()
     )]
     Line {
@@ -97,21 +89,9 @@ pub enum JournalError {
         /// What was found and what was expected.
         problem: String,
     },
-    /// There is no such line.
-    #[error(
-        "{file}: found {lines} lines, expected one of the lines 2 to {lines} and not {line}; line 1 is the header"
-    )]
-    NoSuchLine {
-        /// File as named by the user.
-        file: String,
-        /// 1-based line that was asked for.
-        line: usize,
-        /// Lines of the file.
-        lines: usize,
-    },
     /// A record is not what its computation gives.
     #[error(
-        "{file}:{line}: found {found}, but computed again the {} gives {computed}; the line was edited, or made on a machine that does not calculate alike to the last digit (another processor, system or build): resume where it was written, remove an edited line with `wiperlab journal drop {file} {line}`, or move the journal away to start over",
+        "{file}:{line}: found {found}, but computed again the {} gives {computed}; the line was edited, or made on a machine that does not calculate alike to the last digit (another processor, system or build): resume where it was written, or move the journal away to start over",
         kind.record()
     )]
     Recomputed {
@@ -128,7 +108,7 @@ pub enum JournalError {
     },
     /// Two journals disagree about one record.
     #[error(
-        "{file}:{line}: {found}, but {other_file}:{other_line} has {expected} at the same point; either was edited, or the machines that wrote them do not calculate alike to the last digit (another processor, system or build), and then their journals cannot be merged: resume each where it was written"
+        "{file}:{line}: {found}, but {other_file}:{other_line} has {expected} at the same point; either was edited, or the machines that wrote them do not calculate alike to the last digit (another processor, system or build): move one of them away"
     )]
     Conflict {
         /// File as named by the user.

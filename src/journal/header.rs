@@ -4,14 +4,10 @@ use super::error::JournalError;
 use super::lines::{lines, without_mark};
 use super::record::Record;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::fmt;
 
 /// Version of the layout of journals.
-pub(crate) const LAYOUT: u32 = 3;
-/// The layout before: its lines have no checksums and store what follows from the point too. In layout 1 fits
-/// and studies had headers of their own.
-pub(crate) const UNCHECKED: u32 = 2;
+pub(super) const LAYOUT: u32 = 3;
 
 /// What a journal is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -73,12 +69,6 @@ pub struct Header<B> {
 }
 
 impl<B> Header<B> {
-    /// Whether the lines of the journal have no checksums, so that a changed digit cannot be found.
-    #[must_use]
-    pub fn is_unchecked(&self) -> bool {
-        self.layout == UNCHECKED
-    }
-
     /// Refuses the header of another problem, data or program than `expected` is of.
     ///
     /// # Errors
@@ -104,23 +94,8 @@ impl<B> Header<B> {
 /// What every layout of a header has.
 #[derive(Debug, Deserialize)]
 pub(super) struct Start {
-    journal: Option<Value>,
-    layout: Option<u32>,
-    sweep_journal: Option<u32>,
-}
-
-impl Start {
-    /// Kind and layout; `None` where it is no header.
-    pub(super) fn kind_and_layout(&self) -> Option<(Kind, u32)> {
-        match (&self.journal, self.layout, self.sweep_journal) {
-            (Some(Value::Number(layout)), None, None) => {
-                Some((Kind::Fit, u32::try_from(layout.as_u64()?).ok()?))
-            }
-            (None, None, Some(layout)) => Some((Kind::Sweep, layout)),
-            (Some(kind), Some(layout), None) => Some((serde_json::from_value(kind.clone()).ok()?, layout)),
-            _ => None,
-        }
-    }
+    pub journal: Kind,
+    pub layout: u32,
 }
 
 /// What a file is a journal of, by its first line; `None` where it has no whole line or is no journal.
@@ -128,7 +103,7 @@ impl Start {
 pub fn kind_of(bytes: &[u8]) -> Option<Kind> {
     let first = lines(bytes).next().filter(|line| line.ended)?;
     let start: Start = serde_json::from_slice(without_mark(first.bytes)).ok()?;
-    start.kind_and_layout().map(|(kind, _)| kind)
+    Some(start.journal)
 }
 
 /// Whether a file holds a whole line.

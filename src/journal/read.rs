@@ -2,7 +2,7 @@
 
 use super::checksum::Seal;
 use super::error::JournalError;
-use super::header::{Header, LAYOUT, Start, UNCHECKED};
+use super::header::{Header, LAYOUT, Start};
 use super::lines::{Line, without_mark};
 use super::record::Record;
 use super::stream::{End, Found, Stream};
@@ -73,25 +73,6 @@ pub(super) fn is_complete(line: &Line) -> bool {
 }
 
 impl<R: Record> Journal<R> {
-    /// Whether its lines have no checksums, so that a changed digit cannot be found.
-    #[must_use]
-    pub fn is_unchecked(&self) -> bool {
-        self.header.is_unchecked()
-    }
-
-    /// Refuses a journal of another problem, data or program than the header `expected` has, and one of
-    /// which a line stores something else than follows from its point.
-    ///
-    /// # Errors
-    /// [`JournalError::OtherVersion`], [`JournalError::OtherProblem`], or [`JournalError::Header`] and
-    /// [`JournalError::Line`] when header or line were edited.
-    pub fn check_problem(&self, file: &str, expected: &Header<R::Body>) -> Result<(), JournalError> {
-        self.header.check::<R>(file, expected)?;
-        self.records.iter().zip(FIRST_LINE..).try_for_each(|(record, line)| {
-            record.check_stored(&expected.body).map_err(|problem| at::<R>(file, line, problem))
-        })
-    }
-
     /// Refuses a record of which a new computation gave something else.
     ///
     /// # Errors
@@ -113,31 +94,28 @@ pub fn check_again<R: Record>(file: &str, stored: &Found<R>, again: &R) -> Resul
 
 pub(super) fn header<R: Record>(file: &str, line: &[u8]) -> Result<Header<R::Body>, JournalError> {
     let at_header = |problem| JournalError::Header { file: file.to_owned(), problem };
-    let (object, sealed) = match Seal::of(without_mark(line)) {
-        Seal::Holds(object) => (object, true),
-        Seal::Absent => (without_mark(line).to_owned(), false),
-        broken @ Seal::Broken { .. } => return Err(at_header(broken_words(&broken))),
+    let line = without_mark(line);
+    let seal = Seal::of(line);
+    let object = match &seal {
+        Seal::Holds(object) => object.as_slice(),
+        Seal::Absent => line,
+        Seal::Broken { .. } => return Err(at_header(broken_words(&seal))),
     };
-    let start: Start = parse(&object, "journal header").map_err(at_header)?;
-    let Some((found, layout)) = start.kind_and_layout() else {
-        return Err(at_header("no journal header: found neither `journal` nor `layout`".to_owned()));
-    };
-    let (file, expected) = (file.to_owned(), R::KIND);
-    if found != expected {
-        return Err(JournalError::OtherKind { file, found, expected });
+    let Start { journal, layout } = parse(object, "journal header").map_err(at_header)?;
+    if journal != R::KIND {
+        return Err(JournalError::OtherKind { file: file.to_owned(), found: journal, expected: R::KIND });
     }
-    match (layout, sealed) {
-        (LAYOUT, true) | (UNCHECKED, false) => parse(&object, "journal header").map_err(at_header),
-        (LAYOUT, false) | (UNCHECKED, true) => Err(at_header(ABSENT.to_owned())),
-        _ => Err(JournalError::Layout { file, found: layout }),
+    if layout != LAYOUT {
+        return Err(JournalError::Layout { file: file.to_owned(), kind: R::KIND, found: layout });
     }
+    if seal == Seal::Absent {
+        return Err(at_header(ABSENT.to_owned()));
+    }
+    parse(object, "journal header").map_err(at_header)
 }
 
-/// A line of a layout as its row.
-pub(super) fn row<R: Record>(line: &[u8], layout: u32) -> Result<R::Row, String> {
-    if layout == UNCHECKED {
-        return parse(line, R::KIND.record());
-    }
+/// A line as its row.
+pub(super) fn row<R: Record>(line: &[u8]) -> Result<R::Row, String> {
     match Seal::of(line) {
         Seal::Holds(object) => parse(&object, R::KIND.record()),
         seal => Err(broken_words(&seal)),

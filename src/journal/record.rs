@@ -33,27 +33,11 @@ pub trait Record: Clone + Debug + PartialEq {
     /// What was found and what was expected.
     fn from_row(row: Self::Row, body: &Self::Body) -> Result<Self, String>;
 
-    /// Compares what a line of an older layout stores with what follows from its point.
-    ///
-    /// # Errors
-    /// What was found and what was expected.
-    fn check_stored(&self, expected: &Self::Body) -> Result<(), String> {
-        let _ = expected;
-        Ok(())
-    }
-
     /// What differs between two outcomes of the same computation: this one's and the other's, in words.
     fn difference(&self, other: &Self) -> Option<[String; 2]>;
 
     /// What differs between the problems of two journals with the same fingerprint, in words.
     fn other_problem(found: &Self::Body, expected: &Self::Body) -> Option<String>;
-
-    /// The record as it stands in a journal with the header `into`, after it stood in one with `from`.
-    #[must_use]
-    fn moved(&self, from: &Self::Body, into: &Self::Body) -> Self {
-        let _ = (from, into);
-        self.clone()
-    }
 }
 
 impl<B: Serialize> Header<B> {
@@ -74,13 +58,6 @@ pub fn header_line<B: Serialize>(header: &Header<B>) -> String {
 #[must_use]
 pub fn line<R: Record>(record: &R, at: usize) -> String {
     json_line(&record.to_row(at))
-}
-
-/// A whole journal.
-#[must_use]
-pub fn text<R: Record>(header: &Header<R::Body>, records: &[R]) -> String {
-    let lines = records.iter().enumerate().map(|(at, record)| line(record, at));
-    std::iter::once(header_line(header)).chain(lines).collect()
 }
 
 fn json_line<T: Serialize>(value: &T) -> String {

@@ -1,4 +1,4 @@
-//! A part of a study or fit that one machine does: every so many of its parts one.
+//! A part of a study, or of a list of fits, that one machine does: every so many of its parts one.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +6,7 @@ use std::str::FromStr;
 /// Most shards: more than a cluster has cores.
 const MOST: usize = 1_000_000;
 
-/// The points of a study, or chains of a fit, whose number is `at` modulo `of`, so that slow corners are
+/// The points of a study, or jobs of a list, whose number is `at` modulo `of`, so that slow corners are
 /// spread over all shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {

@@ -80,7 +80,7 @@ impl<R: Record, S: BufRead> Stream<R, S> {
             return Ok(None);
         }
         let refused = |problem| at::<R>(file, *line, problem);
-        let row = row::<R>(found.bytes, header.layout).map_err(refused)?;
+        let row = row::<R>(found.bytes).map_err(refused)?;
         let expected = *line - FIRST_LINE;
         if let Some(index) = R::line_index(&row).filter(|index| *index != expected) {
             let problem = format!("`index`: found {index}, expected {expected}; lines are missing before it");

@@ -3,8 +3,8 @@
 use crate::program::failure::{Failure, Outcome};
 use crate::program::global::Global;
 use crate::program::{
-    accuracy, blade, collect, completions, demo, fit, help, import, init, inspect, journal, man, modes,
-    report, simulate, spectrum, submit, sweep, twin,
+    accuracy, blade, collect, completions, demo, fit, help, import, init, inspect, man, modes, report,
+    simulate, spectrum, submit, sweep, twin,
 };
 use clap::{CommandFactory, Parser, Subcommand};
 
@@ -89,8 +89,6 @@ pub enum Command {
     /// is refused before the search. Exit code 3: the evaluations allowed were used up before the search had
     /// converged.
     Fit(fit::FitArgs),
-    /// Check, show, mend, merge and export journals of fits and studies
-    Journal(journal::JournalArgs),
     /// Figures and page of a fit
     Report(report::ReportArgs),
     /// What a shell completes, to standard output
@@ -118,7 +116,6 @@ impl Command {
             Self::Submit(args) => args.run(global),
             Self::Collect(args) => args.run(global),
             Self::Fit(args) => args.run(global),
-            Self::Journal(args) => args.run(global),
             Self::Report(args) => args.run(global),
             Self::Completions(args) => args.run(&mut Program::command()),
             Self::Man(args) => args.run(&mut Program::command(), global),

@@ -3,7 +3,7 @@
 use crate::journal::Shard;
 use crate::program::failure::{Failure, Outcome};
 use crate::program::files::{Maker, Overwrite, Writer};
-use crate::program::fit::{Collected, Standing, check_folders};
+use crate::program::fit::{Standing, check_folders};
 use crate::program::global::Global;
 use crate::program::load::is_study;
 use crate::program::problem::Problem as Fit;
@@ -35,34 +35,8 @@ impl CollectArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         match self.paths.as_slice() {
             [dir] if !dir.is_file() => self.study(dir, global),
-            [job] => self.job(job, global),
+            [file] => Err(of_one_file(file)?),
             jobs => self.jobs(jobs, global),
-        }
-    }
-
-    /// The result of a fit from its shards, where it was divided.
-    fn job(&self, job: &Path, global: &Global) -> Result<Outcome, Failure> {
-        if is_study(job)? {
-            return Err(Failure::Input(format!(
-                "{}: found a study, expected the folder of its shards: `wiperlab collect DIR` with the --out of \
-                 `wiperlab sweep`",
-                job.display()
-            )));
-        }
-        let problem = Fit::load(job)?;
-        if !problem.is_divided()? {
-            return self.jobs(&self.paths, global);
-        }
-        let of = self.shards.map_or_else(|| shard_files(&problem.folder).map(|found| usual(&found)), Ok)?;
-        Shard::new(0, of).ok_or_else(|| too_many(of))?;
-        match problem.collect(of, self.overwrite, global)? {
-            Collected::Solved(solved) => Ok(solved.said(&problem, global)),
-            Collected::Missing(tasks, what) => {
-                if !global.quiet {
-                    say_missing(&what, &tasks, of, &format!("fit {} --shard K/{of}", job.display()));
-                }
-                Ok(Outcome::StoppedEarly)
-            }
         }
     }
 
@@ -126,6 +100,19 @@ fn tasks(points: &Collection<File>, of: usize) -> Result<Tasks, Failure> {
     let mut due = vec![false; of];
     points.missing().for_each(|index| due[index % of] = true);
     Ok((0..of).filter(|at| due[*at]).collect())
+}
+
+/// Why a file alone is not collected.
+fn of_one_file(file: &Path) -> Result<Failure, Failure> {
+    let (found, expected) = if is_study(file)? {
+        ("a study", "the folder of its shards: `wiperlab collect DIR` with the --out of `wiperlab sweep`")
+    } else {
+        (
+            "one file",
+            "the folder of a study or a list of jobs, as a fit is not divided; run `wiperlab fit` with it",
+        )
+    };
+    Ok(Failure::Input(format!("{}: found {found}, expected {expected}", file.display())))
 }
 
 fn too_many(of: usize) -> Failure {

@@ -13,7 +13,7 @@ use crate::program::failure::Failure;
 use crate::report::chart::{Figure, Medium};
 pub use dialect::CsvDialect;
 use guard::Guard;
-pub use input::{Size, check_size, is_standard_input, read, read_json, read_open, read_text, read_toml};
+pub use input::{Size, check_size, is_standard_input, read, read_json, read_text, read_toml};
 pub use kept::{SIMULATION_SUMMARY, is_simulation_summary};
 pub use maker::{Maker, Overwrite, Writer};
 pub use marker::Marker;

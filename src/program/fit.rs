@@ -1,14 +1,12 @@
 //! `wiperlab fit`.
 
 mod batch;
-mod divided;
 mod misfit;
 mod outputs;
 mod summary;
 mod traces;
 
 pub use batch::{Standing, check_folders};
-pub use divided::Collected;
 pub use summary::print_summary;
 
 use crate::fit::ledger::Progress;
@@ -48,8 +46,7 @@ pub struct FitArgs {
     #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
     /// Of several jobs fit only every N-th from job K on (K from 0); each goes on from its journal, and one
-    /// whose result is there is left as it is. Of one job that fits traces make only every N-th chain of
-    /// iterates, into shards/K-of-N.jsonl next to it; `wiperlab collect JOB` puts the shards together
+    /// whose result is there is left as it is
     #[arg(long, value_name = "K/N")]
     pub shard: Option<Shard>,
     /// Stop after this time with what is done (exit code 3); such as 45min, 1h30min or 02:00:00
@@ -74,7 +71,12 @@ impl FitArgs {
         }
         match (self.jobs.as_slice(), self.shard) {
             ([job], None) => self.fit(&Problem::load(job)?, self.resume, global),
-            ([job], Some(shard)) => self.shard_of(job, shard, global),
+            ([job], Some(_)) => Err(Failure::Input(format!(
+                "--shard: found with the one job {}, expected a list of jobs, as a fit takes seconds and is not \
+                 divided; leave --shard out, or divide a list of jobs or a study (`wiperlab sweep STUDY --out DIR \
+                 --shard K/N`)",
+                job.display()
+            ))),
             _ => self.run_batch(global),
         }
     }

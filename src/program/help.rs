@@ -21,7 +21,7 @@ const WIDTH: usize = 96;
 
 #[derive(Debug, Args)]
 pub struct HelpArgs {
-    /// A command, such as `fit` or `journal merge`, or a page; all are listed without it
+    /// A command, such as `fit`, or a page; all are listed without it
     #[arg(value_name = "COMMAND|PAGE")]
     pub words: Vec<String>,
 }

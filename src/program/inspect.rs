@@ -88,9 +88,7 @@ fn print_origin(loaded: &Loaded) {
         return;
     };
     if file.trace_sha256.is_none() {
-        print_line!(
-            "trace             not verified: recording.toml is of an earlier version and has no SHA-256 of it"
-        );
+        print_line!("trace             not verified: recording.toml has no SHA-256 of it");
     }
     if let Some(source) = &file.source {
         print_line!(

@@ -1,58 +1,267 @@
-//! `wiperlab journal`, and journals on disk.
+//! A journal on disk: locked, shortened by nothing but a torn line, and kept when a new one is begun.
+//!
+//! Every append waits until the disk has the lines (`fdatasync`), and a new file also until the disk has its
+//! name. What was counted or reported survives a power failure.
 
-mod backup;
-mod drop;
-mod export;
-mod file;
-mod merge;
-mod show;
-mod verify;
-mod work;
+use crate::journal::{
+    End, Found, Header, Journal, JournalError, Kind, Record, Sink, Stream, has_whole_line, kind_of,
+};
+use crate::program::failure::Failure;
+use crate::program::files;
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
 
-pub use file::{JOURNAL, JournalFile};
+/// Name of a journal in the folder of its fit or study.
+pub const JOURNAL: &str = "journal.jsonl";
 
-use crate::program::failure::{Failure, Outcome};
-use crate::program::global::Global;
-use clap::{Args, Subcommand};
+/// Longest first line that is looked at, bytes.
+const LONGEST_HEADER: u64 = 1 << 24;
 
-#[derive(Debug, Args)]
-pub struct JournalArgs {
-    #[command(subcommand)]
-    pub command: JournalCommand,
+/// A journal on disk.
+pub struct JournalFile {
+    path: PathBuf,
+    /// `None` before the first line of a new journal.
+    file: Option<File>,
+    /// What has to be done with what is there, before the first line is appended.
+    due: Option<Due>,
+    kind: Kind,
 }
 
-#[derive(Debug, Subcommand)]
-pub enum JournalCommand {
-    /// Put journals of one fit or study together, such as those of several machines or seeds
-    ///
-    /// Of a fit, the first journal says which seed the merged one belongs to: put the result next to a job
-    /// with that seed as journal.jsonl and go on with `wiperlab fit JOB --resume`. Evaluations of other seeds
-    /// then count as known: they are not made again, local searches start from the best of them, and the best
-    /// point may be one of them.
-    Merge(merge::MergeArgs),
-    /// Check every line of journals against its checksum
-    ///
-    /// Ends at the first line that was damaged or edited, names it, and says what to do (exit code 2).
-    Verify(verify::VerifyArgs),
-    /// Say what a journal holds: header, counts, and single records with names and units
-    Show(show::ShowArgs),
-    /// Remove damaged lines from a journal
-    ///
-    /// What is left is numbered anew, and the file as it was is kept as NAME.previous-1.jsonl (the next free
-    /// number). `fit --resume` and `sweep --resume` then compute again what was removed.
-    Drop(drop::DropArgs),
-    /// Write a journal as a table, one row a record
-    ExportCsv(export::ExportArgs),
+/// A journal that is written, and what it holds if it is to be resumed.
+type Opened<T> = Result<(JournalFile, Option<T>), Failure>;
+
+/// What looks at the records of a journal, one by one.
+type Each<'a, R> = dyn FnMut(Found<R>) -> Result<(), JournalError> + 'a;
+
+/// What is done with a journal that is there.
+#[derive(Clone, Copy)]
+enum Due {
+    /// It is kept under another name: hours of work should not be lost because `--resume` was forgotten.
+    SetAside,
+    /// It is continued after this number of bytes, and a line end where the last line has none.
+    Continue { intact_bytes: u64, unended: bool },
 }
 
-impl JournalArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        match &self.command {
-            JournalCommand::Merge(args) => args.run(global),
-            JournalCommand::Verify(args) => args.run(global),
-            JournalCommand::Show(args) => args.run(),
-            JournalCommand::Drop(args) => args.run(global),
-            JournalCommand::ExportCsv(args) => args.run(global),
+impl JournalFile {
+    /// The journal at `path`, or where it will be, and what it holds if it is to be resumed; nothing is
+    /// changed before the first line.
+    pub fn open<R: Record>(path: &Path, resume: bool) -> Opened<Journal<R>> {
+        Self::opened(path, resume, |file, stream| {
+            files::check_size(path, file)?;
+            let journal = stream.whole().map_err(Failure::input)?;
+            let Journal { intact_bytes, torn, unended, .. } = journal;
+            Ok((journal, End { intact_bytes: intact_bytes as u64, torn, unended }))
+        })
+    }
+
+    /// The same where what it holds may be larger than memory: `each` sees its records one by one, and the
+    /// header is given back.
+    pub fn open_each<R: Record>(path: &Path, resume: bool, each: &mut Each<R>) -> Opened<Header<R::Body>> {
+        Self::opened(path, resume, |_, mut stream: Stream<R, _>| {
+            let header = stream.header().clone();
+            while let Some(found) = stream.record().map_err(Failure::input)? {
+                each(found).map_err(Failure::input)?;
+            }
+            Ok((header, stream.end()))
+        })
+    }
+
+    /// Locks the file, and lets `take` read it where it is to be resumed and has a header.
+    fn opened<R: Record, T>(
+        path: &Path,
+        resume: bool,
+        take: impl FnOnce(&File, Stream<R, BufReader<&File>>) -> Result<(T, End), Failure>,
+    ) -> Opened<T> {
+        let name = path.display().to_string();
+        let mut opened = Self::locked(path, R::KIND)?;
+        let refused = |error: io::Error| Failure::Input(format!("{name}: cannot be read: {error}"));
+        let Some(file) = &opened.file else {
+            if resume {
+                opened.resume(&name, R::KIND, true, None);
+            }
+            return Ok((opened, None));
+        };
+        if !resume {
+            let mut start = Vec::new();
+            BufReader::new(file.take(LONGEST_HEADER)).read_until(b'\n', &mut start).map_err(refused)?;
+            check_own(&name, &start, R::KIND)?;
+            return Ok((opened, None));
         }
+        let is_empty = file.metadata().map_err(refused)?.len() == 0;
+        let stream = Stream::<R, _>::open(&name, BufReader::new(file)).map_err(Failure::input)?;
+        let Some(stream) = stream else {
+            opened.resume(&name, R::KIND, is_empty, None);
+            return Ok((opened, None));
+        };
+        let (taken, end) = take(file, stream)?;
+        opened.resume(&name, R::KIND, is_empty, Some(end));
+        Ok((opened, Some(taken)))
+    }
+
+    fn locked(path: &Path, kind: Kind) -> Result<Self, Failure> {
+        let file = locked(path, kind)?;
+        Ok(Self { path: path.to_owned(), file, due: Some(Due::SetAside), kind })
+    }
+
+    /// Notes how a journal goes on that ends like this; `None` where it has no complete header.
+    fn resume(&mut self, name: &str, kind: Kind, is_empty: bool, end: Option<End>) {
+        self.due = Some(match end {
+            None => {
+                let lack = if is_empty { "" } else { "no complete header, so " };
+                warn_line!("warning: {name}: {lack}nothing to resume; starting over");
+                let empty = Due::Continue { intact_bytes: 0, unended: false };
+                if is_empty { empty } else { Due::SetAside }
+            }
+            Some(End { intact_bytes, torn, unended }) => {
+                if torn {
+                    let record = kind.record();
+                    warn_line!(
+                        "warning: {name}: the last line is incomplete and was dropped; its {record} is computed again"
+                    );
+                }
+                Due::Continue { intact_bytes, unended }
+            }
+        });
+    }
+
+    /// Drops what is torn, also where nothing had to be appended.
+    pub fn finish(mut self) -> Result<(), Failure> {
+        self.prepare().map_err(|problem| Failure::Internal(format!("{}: {problem}", self.path.display())))
+    }
+
+    /// Does what is due.
+    fn prepare(&mut self) -> Result<(), String> {
+        let refused = |error: io::Error| error.to_string();
+        match (self.due.take(), &mut self.file) {
+            (Some(Due::Continue { intact_bytes, unended }), Some(file)) => {
+                file.set_len(intact_bytes).map_err(refused)?;
+                if unended { file.write_all(b"\n").map_err(refused) } else { Ok(()) }
+            }
+            (Some(Due::SetAside), Some(_)) => {
+                self.file = None;
+                let kept = set_aside(&self.path).map_err(refused)?;
+                warn_line!("{}: the old journal is kept as {}", self.path.display(), kept.display());
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn write(&mut self, lines: &str) -> Result<(), String> {
+        let refused = |error: io::Error| error.to_string();
+        self.prepare()?;
+        let file = match &mut self.file {
+            Some(file) => file,
+            none => none.insert(begin(&self.path, self.kind)?),
+        };
+        file.write_all(lines.as_bytes()).and_then(|()| file.sync_data()).map_err(refused)
+    }
+}
+
+impl Sink for JournalFile {
+    fn append(&mut self, lines: &str) -> Result<(), String> {
+        self.write(lines).map_err(|problem| format!("{}: {problem}", self.path.display()))
+    }
+}
+
+/// A new journal, whose name the disk has.
+fn begin(path: &Path, kind: Kind) -> Result<File, String> {
+    let refused = |error: io::Error| error.to_string();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    fs::create_dir_all(folder).map_err(refused)?;
+    let file = OpenOptions::new().create(true).append(true).open(path).map_err(refused)?;
+    lock(&file, kind)?;
+    sync_folder(folder);
+    Ok(file)
+}
+
+/// Waits until the disk has the names in a folder, where the system can.
+fn sync_folder(folder: &Path) {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let _ = File::open(folder).and_then(|folder| folder.sync_all()); // (Windows opens no folder)
+}
+
+/// The file, if there is one.
+fn locked(path: &Path, kind: Kind) -> Result<Option<File>, Failure> {
+    let refused = |problem: String| Failure::Input(format!("{}: {problem}", path.display()));
+    let file = match OpenOptions::new().read(true).append(true).open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => {
+            return Err(refused(format!(
+                "cannot be read and written: {error}; correct that, or move it away"
+            )));
+        }
+    };
+    if !file.metadata().is_ok_and(|found| found.is_file()) {
+        return Err(refused("found no regular file, expected a journal; move it away".to_owned()));
+    }
+    lock(&file, kind).map_err(refused)?;
+    Ok(Some(file))
+}
+
+/// Two programs that append to one file would tear each other's lines. File systems without locks are taken
+/// as they are.
+fn lock(file: &File, kind: Kind) -> Result<(), String> {
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(format!(
+            "another {kind} is writing this journal; wait until it has ended, or use a folder of its own"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Only a journal of the same kind of input, or what is left of one, gives way to a new one: a job may turn
+/// from features to traces.
+fn check_own(name: &str, bytes: &[u8], kind: Kind) -> Result<(), Failure> {
+    if !has_whole_line(bytes) || kind_of(bytes).is_some_and(|found| found.input() == kind.input()) {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{name}: found a file that is no journal of a {kind}; choose another folder, or move it away"
+    )))
+}
+
+/// Gives a journal the next free name of its kind, `journal.previous-1.jsonl`: none is ever written over.
+fn set_aside(path: &Path) -> io::Result<PathBuf> {
+    let mut number = 1;
+    loop {
+        let to = numbered(path, number);
+        // (a new file: whoever comes at the same time finds the name taken)
+        match File::create_new(&to) {
+            Ok(_) => {
+                fs::rename(path, &to)?;
+                return Ok(to);
+            }
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+fn numbered(path: &Path, number: usize) -> PathBuf {
+    let extension = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
+    path.with_extension(format!("previous-{number}{extension}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_old_journal_has_a_number_of_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(JOURNAL);
+        let set_aside = |content| {
+            fs::write(&path, content).unwrap();
+            set_aside(&path).unwrap()
+        };
+        ["a", "b", "c"].into_iter().for_each(|content| drop(set_aside(content)));
+        fs::remove_file(numbered(&path, 2)).unwrap();
+        assert_eq!(set_aside("d"), folder.path().join("journal.previous-2.jsonl"));
+        let read = |number| fs::read_to_string(numbered(&path, number)).unwrap();
+        assert_eq!([read(1), read(2), read(3)], ["a", "d", "c"]);
+        assert!(!path.exists());
     }
 }

@@ -98,12 +98,6 @@ impl Fit {
         let file = path.display().to_string();
         let text = files::read_json(&path)?;
         let result = FitResult::parse(&file, &text).map_err(Failure::input)?;
-        if !FitResult::is_sealed(&text) {
-            warn_line!(
-                "warning: {file}: carries no SHA-256 of itself, as those of earlier versions: only what can be \
-                 computed again is checked"
-            );
-        }
         if result.fingerprint != problem.problem.fingerprint() {
             return Err(Failure::Input(format!(
                 "{file}: fingerprint {}, expected {}: job, scene, data or program have changed since the fit; run `wiperlab fit` again",

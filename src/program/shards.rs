@@ -1,5 +1,4 @@
-//! Shards on disk: `FOLDER/shards/K-of-N.jsonl` next to the results of a study or a fit, each written by one
-//! program.
+//! Shards on disk: `FOLDER/shards/K-of-N.jsonl` next to the results of a study, each written by one program.
 
 use crate::journal::{Found, Header, JournalError, Record, Shard, Stream};
 use crate::program::failure::Failure;

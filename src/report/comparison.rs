@@ -170,7 +170,6 @@ fn search(result: &FitResult) -> SearchLine {
         status: Some(result.status),
         converged: result.status == Status::Converged,
         evaluations: result.evaluations.total,
-        foreign: result.evaluations.foreign,
         failed: failed.collect(),
         local_searches: result.waterfall.len(),
         cost: result.cost,

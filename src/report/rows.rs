@@ -169,8 +169,6 @@ pub struct SearchLine {
     pub converged: bool,
     /// Evaluations of the model.
     pub evaluations: usize,
-    /// Those that were known from other seeds.
-    pub foreign: usize,
     /// Those that failed, by reason.
     pub failed: Vec<Failed>,
     /// Local searches.

@@ -43,6 +43,17 @@ fn a_divided_list_of_fits_gives_what_each_gives_alone() {
 }
 
 #[test]
+fn one_job_is_not_divided_and_says_what_is() {
+    let project = three();
+    let (code, _, err) = project.run(&["fit", NAMES[0], "--shard", "0/2"]);
+    assert!(code == 2 && err.contains("expected a list of jobs, as a fit takes seconds"), "{err}");
+    assert!(err.contains("`wiperlab sweep STUDY --out DIR --shard K/N`"), "{err}");
+    let (code, _, err) = project.run(&["collect", NAMES[0]]);
+    assert!(code == 2 && err.contains("expected the folder of a study or a list of jobs"), "{err}");
+    assert!(!project.path("fits/a/journal.jsonl").exists());
+}
+
+#[test]
 fn one_job_that_is_refused_does_not_stop_the_others() {
     let project = three();
     project.write(NAMES[0], &JOB.replace("friction.c", "friction.x"));

@@ -249,7 +249,7 @@ fn a_journal_of_another_job_is_not_resumed_nor_touched() {
     project.write("fits/x/journal.jsonl", &damaged);
     project.refused(
         &["fit", "fits/x/job.toml", "--resume"],
-        &["journal.jsonl:2: the line has the checksum", "`wiperlab journal drop fits/x/journal.jsonl 2`"],
+        &["journal.jsonl:2: the line has the checksum", "remove this line and all behind it"],
     );
 }
 
@@ -393,82 +393,6 @@ fn two_fits_do_not_write_one_journal() {
     project.refused(&["fit", "fits/x/job.toml"], &["another fit is writing this journal"]);
     held.unlock().unwrap();
     assert_ne!(project.fit(&["--max-evaluations", "30", "--resume"]).0, 2);
-}
-
-#[test]
-fn journals_of_two_seeds_are_merged_and_resumed() {
-    let project = Project::with(JOB);
-    project.fit(&[]);
-    project.write("a.jsonl", &project.journal());
-    project.write("fits/x/job.toml", &seeded(4));
-    project.fit(&[]);
-    project.write("b.jsonl", &project.journal());
-    let (code, stdout, stderr) =
-        project.run(&["journal", "merge", "a.jsonl", "b.jsonl", "--out", "new/c.jsonl"]);
-    assert_eq!((code, stderr.as_str()), (0, ""));
-    assert!(
-        stdout.contains("b.jsonl: seed 4,") && stdout.contains("new/c.jsonl:") && stdout.contains("seed = 3"),
-        "{stdout}"
-    );
-    let merged = project.read("new/c.jsonl");
-    assert!(merged.starts_with(&project.read("a.jsonl")) && merged.contains("\"from\":4"));
-    // with itself, and again, nothing changes
-    for (name, inputs) in
-        [("d", ["a.jsonl", "a.jsonl"]), ("e", ["new/c.jsonl", "b.jsonl"]), ("f", ["new/c.jsonl", "a.jsonl"])]
-    {
-        project.run(&["journal", "merge", inputs[0], inputs[1], "--out", name, "--quiet"]);
-        assert_eq!(project.read(name), project.read(inputs[0]), "{name}");
-    }
-    project.write("fits/x/job.toml", JOB);
-    project.write("fits/x/journal.jsonl", &merged);
-    let (_, stdout, _) = project.fit(&["--resume"]);
-    let foreign = merged.matches("\"from\":4").count();
-    assert_eq!(project.result()["evaluations"]["foreign"], foreign);
-    assert!(
-        stdout.contains(&format!("{foreign} known from other seeds"))
-            && stdout.contains("from the journal and"),
-        "{stdout}"
-    );
-}
-
-#[test]
-fn journals_that_do_not_belong_together_are_not_merged_and_none_is_written_over() {
-    let project = Project::with(JOB);
-    project.fit(&["--max-evaluations", "30"]);
-    let journal = project.journal();
-    project.write("a.jsonl", &journal);
-    let merge = |other: &str, out: &str, parts: &[&str]| {
-        project.refused(&["journal", "merge", "a.jsonl", other, "--out", out], parts);
-        assert!(!project.path("c.jsonl").exists() && project.read("a.jsonl") == journal);
-    };
-    merge("none.jsonl", "c.jsonl", &["none.jsonl: no such file"]);
-    merge("a.jsonl", "a.jsonl", &["a.jsonl: exists, and no journal is written over another one"]);
-    let (header, lines) = journal.split_once('\n').unwrap();
-    let (unit, features) = lines.split_once("\"features\":[\"").unwrap();
-    let edited = format!("{header}\n{unit}\"features\":[\"1{features}");
-    project.write("b.jsonl", &edited);
-    merge(
-        "b.jsonl",
-        "c.jsonl",
-        &["b.jsonl:2: the line has the checksum", "`wiperlab journal drop b.jsonl 2`"],
-    );
-    project.write("b.jsonl", &resealed(&edited));
-    merge(
-        "b.jsonl",
-        "c.jsonl",
-        &[
-            "b.jsonl:2: feature 1 1",
-            "but a.jsonl:2 has feature 1 ",
-            "do not calculate alike to the last digit",
-        ],
-    );
-    project.write("b.jsonl", &resealed(&journal.replacen("\"fingerprint\":\"", "\"fingerprint\":\"0", 1)));
-    merge("b.jsonl", "c.jsonl", &["b.jsonl: fingerprint 0", "has changed since"]);
-    project.write("b.jsonl", "");
-    merge("b.jsonl", "c.jsonl", &["b.jsonl: found no complete line"]);
-    project.write("b.jsonl", "time_s,tip_x_m\n0,1\n");
-    merge("b.jsonl", "c.jsonl", &["b.jsonl:1: no journal header"]);
-    project.refused(&["journal", "merge", "a.jsonl", "--out", "c.jsonl"], &["2"]);
 }
 
 #[test]

@@ -47,7 +47,7 @@ fn only_regular_files_are_read() {
             &["twin", file, "--out", "new"],
             &["sweep", file, "--out", "new"],
             &["fit", file],
-            &["journal", "merge", file, file, "--out", "new"],
+            &["submit", file, "--scheduler", "local", "--shards", "2"],
         ];
         for arguments in commands {
             refused(&project, arguments, &expected);

@@ -15,7 +15,6 @@ mod batch;
 mod blade;
 mod bounds;
 mod demo;
-mod divided;
 mod docs;
 mod estimates;
 mod figures;

@@ -5,7 +5,7 @@ use std::process::Command;
 const EXPORT: &str = "data/actual-blade-twin/synthetic-tracker-export.txt";
 
 /// Every option that takes a number, with a command that needs nothing else to come to it.
-const OPTIONS: [(&[&str], &[&str]); 6] = [
+const OPTIONS: [(&[&str], &[&str]); 5] = [
     (
         &["import", EXPORT, "--out", "none"],
         &["--frame-rate-hz", "--scale", "--frame-step", "--exposure-s", "--min-likelihood", "--threads"],
@@ -16,7 +16,6 @@ const OPTIONS: [(&[&str], &[&str]); 6] = [
         &["spectrum", "data/actual-blade-twin", "--out", "none"],
         &["--max-components", "--exposure-s", "--fastest-hz", "--band", "--window"],
     ),
-    (&["journal", "show", "none.jsonl"], &["--line", "--last"]),
     (
         &["simulate", "data/scenes/light-blade.toml", "--out", "none"],
         &["--relative-tolerance", "--step", "--gain"],

@@ -105,7 +105,7 @@ fn names_steer_no_terminal() {
         &["import", "export.csv", "--out", "new", "--point", HOSTILE],
         &["import", "export.csv", "--out", HOSTILE, "--columns", HOSTILE],
         &["report", HOSTILE],
-        &["journal", "merge", HOSTILE, LINE, "--out", "new"],
+        &["collect", HOSTILE, LINE],
         &[HOSTILE],
         &["modes", "scene.toml", "--threads", HOSTILE],
     ];

@@ -218,14 +218,14 @@ fn a_trace_that_is_not_the_one_described_is_refused_by_every_reader() {
     // a checkout that changed line ends changed nothing
     project.write("data/twin/trace.csv", &format!("\u{feff}{}", intact.replace('\n', "\r\n")));
     assert!(!project.succeeds(&["inspect", "data/twin"]).contains("not verified"));
-    // a description of an earlier version has nothing to hold the trace against
+    // without the key there is nothing to hold the trace against
     let description = project.read("data/twin/recording.toml");
-    let older: String = description
+    let without: String = description
         .lines()
         .filter(|line| !line.starts_with("trace_sha256"))
         .map(|l| format!("{l}\n"))
         .collect();
-    project.write("data/twin/recording.toml", &older);
+    project.write("data/twin/recording.toml", &without);
     assert!(project.succeeds(&["inspect", "data/twin"]).contains("not verified"));
     // the trace alone, in a folder of its own, is what the refusal offers
     project.write("alone/trace.csv", &changed);

@@ -6,6 +6,7 @@ use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use crate::sealed::resealed_result;
 use crate::small_fit::{JOB, Project};
 
 impl Project {
@@ -46,12 +47,6 @@ impl Project {
         }
         assert_eq!(tree(self.folder.path()), before);
     }
-}
-
-/// A result without the hash that it carries of itself, as earlier versions wrote it.
-fn unsealed(result: &str) -> String {
-    let at = result.find(",\n  \"sha256\"").unwrap();
-    format!("{}\n}}\n", &result[..at])
 }
 
 /// Every file below a folder.
@@ -300,7 +295,7 @@ fn a_result_that_was_edited_and_a_folder_that_is_taken_are_refused_and_nothing_i
         &["fits/x"],
         &["fits/x/result.json: ", "the file was changed after the fit wrote it"],
     );
-    project.write("fits/x/result.json", &unsealed(&edited));
+    project.write("fits/x/result.json", &resealed_result(&edited));
     project.report_refused(
         &["fits/x"],
         &["fits/x/result.json: ", "found no `friction.c`, which the job has", "run `wiperlab fit` again"],

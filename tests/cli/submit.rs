@@ -438,11 +438,12 @@ fn a_list_that_no_task_could_do_is_refused_before() {
         assert_eq!((code, said.as_str()), (2, ""), "{files:?}: {complaint}");
         assert!(complaint.contains(part), "{files:?}: {complaint}");
     };
+    refused(&["fits/one/job.toml"], "fits/one/job.toml: found one job, expected a study or a list of jobs");
     refused(&["fits/one/job.toml", "fits/one/other.toml"], "lies in the folder of");
     refused(&["fits/one/job.toml", "fits/bad/job.toml"], "friction.d");
     refused(&["fits/one/job.toml", "study.toml"], "study.toml: found a study among 2 files");
     refused(&["study.toml"], "study.toml: found a study without --out");
-    refused(&["fits/none/job.toml"], "fits/none/job.toml: no such file");
+    refused(&["fits/one/job.toml", "fits/none/job.toml"], "fits/none/job.toml: no such file");
     refused(&["-"], "found standard input");
     assert!(!project.path("fits/shards").exists());
 }

@@ -371,14 +371,11 @@ fn a_journal_of_another_study_is_neither_resumed_nor_touched() {
     project.write("scenes/light-blade.toml", &short_scene());
     let edited = journal.replacen("\"index\"", "\"indx\"", 1);
     project.write("out/journal.jsonl", &edited);
-    refused(&[
-        "out/journal.jsonl:2: the line has the checksum",
-        "`wiperlab journal drop out/journal.jsonl 2`",
-    ]);
+    refused(&["out/journal.jsonl:2: the line has the checksum", "remove this line and all behind it"]);
     project.write("out/journal.jsonl", &resealed(&edited));
     refused(&["out/journal.jsonl:2: no point: unknown field `indx`"]);
     // a journal of another kind is not overwritten, nor read
-    let of_a_fit = "{\"journal\":1,\"fingerprint\":\"f\"}\n";
+    let of_a_fit = "{\"journal\":\"fit\",\"layout\":3}\n";
     project.write("out/journal.jsonl", of_a_fit);
     refused(&["out/journal.jsonl: the journal of a fit, expected that of a sweep"]);
     project.refused(

@@ -1,6 +1,7 @@
-//! Lines of journals that were edited by somebody who makes the checksum anew.
+//! Journals and results that were edited by somebody who makes the checksums anew.
 
 use sha2::{Digest, Sha256};
+use wiperlab::fit::result::FitResult;
 
 /// The text with a new checksum in every line.
 pub fn resealed(text: &str) -> String {
@@ -11,4 +12,9 @@ pub fn resealed(text: &str) -> String {
         format!("{content},\"sha256\":\"{digits}\"}}\n")
     };
     text.lines().map(sealed).collect()
+}
+
+/// The text of a result with the hash of itself.
+pub fn resealed_result(text: &str) -> String {
+    serde_json::from_str::<FitResult>(text).unwrap().to_json()
 }

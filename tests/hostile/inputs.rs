@@ -193,17 +193,19 @@ fn results_and_journals(folder: &Path) -> Vec<Input> {
     }
     edited(folder, "fits/more/result.json", RESULT, "{", "{\"more\": 1,");
     fs::write(folder.join("fits/more/job.toml"), JOB).unwrap();
-    repeated(folder, "journal.jsonl", "", |_| "{".to_owned(), 20_000_000);
-    repeated(folder, "lines.jsonl", "", |_| "\n".to_owned(), 20_000_000);
+    repeated(folder, "braces/shards/0-of-1.jsonl", "", |_| "{".to_owned(), 20_000_000);
+    repeated(folder, "lines/shards/0-of-1.jsonl", "", |_| "\n".to_owned(), 20_000_000);
+    fs::write(folder.join("data/sweeps/flip.toml"), STUDY).unwrap();
     let report = |name: &str| Input {
         file: Some(format!("fits/{name}/result.json")),
         ..input(&format!("result: {name}"), "report FILE --out new", &format!("fits/{name}"), REFUSED)
     };
-    let merge = |file: &str| {
-        input(&format!("journal: {file}"), "journal merge FILE FILE --out merged", file, REFUSED)
+    let collect = |name: &str, codes: &'static [i32]| Input {
+        file: Some(format!("{name}/shards/0-of-1.jsonl")),
+        ..input(&format!("journal: {name}"), "collect FILE --study data/sweeps/flip.toml", name, codes)
     };
     let more = Input { codes: ANY, ..report("more") };
-    vec![report("nested"), report("values"), more, merge("journal.jsonl"), merge("lines.jsonl")]
+    vec![report("nested"), report("values"), more, collect("braces", &[3]), collect("lines", REFUSED)]
 }
 
 fn options() -> Vec<Input> {

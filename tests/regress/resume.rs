@@ -1,4 +1,4 @@
-//! Nothing of a fit is lost: killed, cut, extended or merged, it goes on to the result that it would have had
+//! Nothing of a fit is lost: killed, cut or extended, it goes on to the result that it would have had
 //! in one run.
 
 mod disk;
@@ -212,98 +212,6 @@ fn a_larger_allowance_goes_on_from_the_journal() {
         text = part.journal;
     }
     assert_eq!(resumed(JOB, &text).result, uncut.result);
-}
-
-fn merged(texts: &[&str]) -> String {
-    let journals: Vec<Journal> = texts.iter().map(|text| read(text)).collect();
-    journal::merge(&journals.iter().map(|journal| ("j", journal)).collect::<Vec<_>>()).unwrap().text
-}
-
-#[test]
-fn a_merged_journal_is_resumed_with_what_other_seeds_have_found() {
-    let (mine, theirs) = (whole(JOB), whole(&seeded(4)));
-    let both = merged(&[&mine.journal, &theirs.journal]);
-    let found = resumed(JOB, &both);
-    let (result, foreign) =
-        (found.parsed(), read(&both).records.iter().filter(|entry| entry.from == Some(4)).count());
-    assert!(foreign > 50 && result.evaluations.foreign == foreign, "{foreign}");
-    assert_eq!(mine.parsed().evaluations.foreign, 0);
-    assert!(!mine.result.contains("foreign"), "a fit that nothing was merged into says nothing of it");
-    // killed anywhere on its way, and on any number of threads, it ends the same
-    for cut in line_ends(&found.journal).into_iter().filter(|end| *end >= both.len()).step_by(3) {
-        let again = resumed(JOB, &found.journal[..cut]);
-        assert_eq!((&again.result, &again.journal), (&found.result, &found.journal), "cut at byte {cut}");
-    }
-    let one = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
-    assert_eq!(one.install(|| resumed(JOB, &both)), found);
-    assert_eq!(
-        resumed(JOB, &merged(&[&found.journal, &theirs.journal])).result,
-        found.result,
-        "merged once more"
-    );
-}
-
-#[test]
-fn it_does_not_matter_how_far_a_fit_had_come_nor_in_which_order_others_were_merged() {
-    let (mine, second, third) = (whole(JOB), whole(&seeded(4)), whole(&seeded(5)));
-    let found = resumed(JOB, &merged(&[&mine.journal, &second.journal, &third.journal])).result;
-    assert_ne!(found, mine.result, "the others brought nothing, so this shows nothing");
-    for end in line_ends(&mine.journal).into_iter().step_by(40) {
-        let both = merged(&[&mine.journal[..end], &third.journal, &second.journal]);
-        let from_there = resumed(JOB, &both).parsed();
-        let whole = FitResult::parse("r", &found).unwrap();
-        // what was shared when the fit was cut counts as brought along, the result is the same
-        assert_eq!(
-            FitResult { evaluations: whole.evaluations.clone(), ..from_there },
-            whole,
-            "cut at byte {end}"
-        );
-    }
-}
-
-#[test]
-fn the_best_point_may_be_one_that_another_seed_has_found() {
-    let hasty = |seed| {
-        seeded(seed)
-            .replace("= 60", "= 10")
-            .replace("= 90", "= 0")
-            .replace("bootstrap = 4", "bootstrap = 0\nprofile = false")
-    };
-    let (mine, theirs) = (whole(&hasty(3)), whole(&seeded(4)));
-    let (worse, better) = (mine.parsed().cost, theirs.parsed().cost);
-    assert!(better < worse, "{better} {worse}");
-    let found = resumed(&hasty(3), &merged(&[&mine.journal, &theirs.journal])).parsed();
-    assert_eq!(found.cost, better);
-    let estimates = |result: &FitResult| result.parameters.values().map(|p| p.estimate).collect::<Vec<_>>();
-    assert_eq!(estimates(&found), estimates(&theirs.parsed()));
-}
-
-#[test]
-fn local_searches_start_from_the_best_points_of_all_seeds() {
-    let (hasty, wide) =
-        (JOB.replace("= 60", "= 10"), seeded(4).replace("= 60", "= 300").replace("= 90", "= 0"));
-    let (mine, theirs) = (whole(&hasty), whole(&wide));
-    let found = resumed(&hasty, &merged(&[&mine.journal, &theirs.journal])).parsed();
-    // the gate met the same scatter, so that the same point has the same cost
-    let starts =
-        |result: &FitResult| result.waterfall.iter().map(|optimum| optimum.start_cost).collect::<Vec<_>>();
-    let own = starts(&mine.parsed());
-    let of_own = |result: &FitResult| starts(result).into_iter().filter(|cost| own.contains(cost)).count();
-    assert!(
-        of_own(&mine.parsed()) >= 3 && of_own(&found) < 3,
-        "{} {:?}",
-        of_own(&mine.parsed()),
-        found.waterfall
-    );
-}
-
-#[test]
-fn journals_of_the_same_seed_are_one_path() {
-    let uncut = whole(JOB);
-    let end = line_ends(&uncut.journal)[60];
-    assert_eq!(merged(&[&uncut.journal, &uncut.journal]), uncut.journal);
-    assert_eq!(merged(&[&uncut.journal[..end], &uncut.journal]), uncut.journal);
-    assert_eq!(merged(&[&uncut.journal, &uncut.journal[..end]]), uncut.journal);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 use super::*;
 use crate::fit::trace::{CameraUnknown, Unknown};
-use crate::journal::{Tabled, merge, read, text, without};
+use crate::journal::{header_line, line, read};
 
 pub(in crate::fit) fn iterate(step: usize) -> Iterate {
     let x = 0.1 * step as f64;
@@ -52,8 +52,13 @@ fn steps(start: usize, count: usize) -> Vec<Step> {
     (0..count).map(|step| Step { start, step, iterate: iterate(step) }).collect()
 }
 
+fn text(steps: &[Step]) -> String {
+    let lines = steps.iter().enumerate().map(|(at, step)| line(step, at));
+    header_line(&header()) + &lines.collect::<String>()
+}
+
 fn journal(steps: &[Step]) -> Journal {
-    read("j", text(&header(), steps)).unwrap().unwrap()
+    read("j", text(steps)).unwrap().unwrap()
 }
 
 #[test]
@@ -66,7 +71,7 @@ fn every_bit_comes_back() {
 
 #[test]
 fn what_cannot_be_of_this_fit_is_refused() {
-    let whole = text(&header(), &steps(0, 2));
+    let whole = text(&steps(0, 2));
     let sealed = |from: &str, to: &str| {
         let unsealed = |line: &str| line.split(",\"sha256\"").next().unwrap_or_default().to_owned() + "}";
         let lines =
@@ -85,34 +90,11 @@ fn what_cannot_be_of_this_fit_is_refused() {
 }
 
 #[test]
-fn equal_chains_are_merged_and_others_refused() {
-    let (short, long, second) = (journal(&steps(0, 2)), journal(&steps(0, 5)), journal(&steps(1, 3)));
-    let merged = merge(&[("a", &short), ("b", &long), ("c", &second)]).unwrap();
-    assert_eq!(merged.new, [2, 3, 3]);
-    let all = read::<Step>("m", &merged.text).unwrap().unwrap().records;
-    assert_eq!((&all[..5], &all[5..]), (&long.records[..], &second.records[..]));
-    let mut other = steps(0, 4);
-    other[3].iterate.point[1] += 1e-16 + f64::EPSILON;
-    let refused = merge(&[("a", &long), ("b", &journal(&other))]).unwrap_err().to_string();
-    assert!(refused.contains("coordinate 1 of ") && refused.contains("b:5"), "{refused}");
-}
-
-#[test]
-fn a_line_can_be_dropped_and_all_are_a_table() {
-    let bytes = text(&header(), &steps(0, 4));
-    let left = without::<Step>("j", bytes.as_bytes(), &[3..=3]).unwrap().unwrap();
-    let left = read::<Step>("j", left.text).unwrap().unwrap();
-    assert_eq!(left.records.iter().map(|step| step.step).collect::<Vec<_>>(), [0, 2, 3]);
-    let body = &left.header.body;
-    let columns = Step::columns(body);
-    let row: std::collections::HashMap<_, _> =
-        columns.iter().cloned().zip(left.records[0].cells(0, body)).collect();
-    assert_eq!(columns.len(), left.records[0].cells(0, body).len());
-    assert_eq!(row["friction.a [1]"].parse::<f64>().unwrap(), (-1.0_f64).exp());
-    assert_eq!((row["film: tilt_rad [rad]"].as_str(), row["failed_segments"].as_str()), ("0", "1"));
-    assert_eq!(
-        (left.records[0].cost(body), left.records.iter().filter_map(|s| s.cost(body)).count()),
-        (None, 0)
-    );
-    assert!(Step::about(body).iter().any(|[what, value]| what == "unknown" && value.ends_with(" rad")));
+fn an_iterate_that_is_computed_otherwise_is_refused_with_its_first_difference() {
+    let stored = journal(&steps(0, 4));
+    let mut again = stored.records[3].clone();
+    assert_eq!(stored.check_again("j", 3, &again), Ok(()));
+    again.iterate.point[1] += 1e-16 + f64::EPSILON;
+    let refused = stored.check_again("j", 3, &again).unwrap_err().to_string();
+    assert!(refused.contains("coordinate 1 of ") && refused.contains("j:5"), "{refused}");
 }

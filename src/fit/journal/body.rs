@@ -28,9 +28,8 @@ pub struct Parameter {
     pub name: String,
     /// Unit as shown; `1` for a plain number.
     pub unit: String,
-    /// Its range, from which its values follow, and what is known of it beforehand; `None` in a header that
-    /// has names alone.
-    pub axis: Option<Axis>,
+    /// Its range, from which its values follow, and what is known of it beforehand.
+    pub axis: Axis,
 }
 
 /// A feature in a header.
@@ -41,50 +40,20 @@ pub struct Aimed {
     pub name: String,
     /// Unit in files; `1` for a plain number.
     pub unit: String,
-    /// What it should be; `None` in a header that has names alone.
-    pub target: Option<Target>,
-}
-
-impl Body {
-    /// The parameters' ranges, where the header has them.
-    pub(super) fn axes(&self) -> Option<Vec<Axis>> {
-        self.parameters.iter().map(|parameter| parameter.axis).collect()
-    }
-
-    /// The targets, where the header has them.
-    pub(super) fn targets(&self) -> Option<Vec<Target>> {
-        self.features.iter().map(|feature| feature.target.clone()).collect()
-    }
-
-    /// Names of parameters and features.
-    fn names(&self) -> [Vec<&str>; 2] {
-        [
-            self.parameters.iter().map(|parameter| parameter.name.as_str()).collect(),
-            self.features.iter().map(|feature| feature.name.as_str()).collect(),
-        ]
-    }
-
-    /// Whether it is the header of another problem than `expected`; seeds may differ.
-    pub(super) fn is_other_than(&self, expected: &Self) -> bool {
-        let whole = self.axes().is_some() && self.targets().is_some();
-        let same = (&self.parameters, &self.features) == (&expected.parameters, &expected.features);
-        self.names() != expected.names() || whole && !same
-    }
+    /// What it should be.
+    pub target: Target,
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(untagged, deny_unknown_fields)]
-enum ParameterRow {
-    Name(String),
-    Whole {
-        name: String,
-        unit: String,
-        lower: Exact,
-        upper: Exact,
-        scale: Spacing,
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        prior: Option<PriorRow>,
-    },
+#[serde(deny_unknown_fields)]
+struct ParameterRow {
+    name: String,
+    unit: String,
+    lower: Exact,
+    upper: Exact,
+    scale: Spacing,
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    prior: Option<PriorRow>,
 }
 
 /// Of the parameter, or of its logarithm where its scale is one.
@@ -96,14 +65,13 @@ struct PriorRow {
 }
 
 impl From<Parameter> for ParameterRow {
-    fn from(Parameter { name, unit, axis }: Parameter) -> Self {
-        let Some(Axis { bounds, prior }) = axis else { return Self::Name(name) };
+    fn from(Parameter { name, unit, axis: Axis { bounds, prior } }: Parameter) -> Self {
         let prior = prior.map(|prior| match prior {
             Prior::Linear { mean, sd } => PriorRow { mean: Exact(mean), sd: Exact(sd) },
             Prior::Log { mean_ln, sd_ln } => PriorRow { mean: Exact(mean_ln), sd: Exact(sd_ln) },
         });
         let [lower, upper] = [bounds.lower(), bounds.upper()].map(Exact);
-        Self::Whole { name, unit, lower, upper, scale: bounds.spacing(), prior }
+        Self { name, unit, lower, upper, scale: bounds.spacing(), prior }
     }
 }
 
@@ -111,39 +79,31 @@ impl TryFrom<ParameterRow> for Parameter {
     type Error = String;
 
     fn try_from(row: ParameterRow) -> Result<Self, String> {
-        let (name, unit, lower, upper, scale, prior) = match row {
-            ParameterRow::Name(name) => return Ok(Self { name, unit: String::new(), axis: None }),
-            ParameterRow::Whole { name, unit, lower, upper, scale, prior } => {
-                (name, unit, lower, upper, scale, prior)
-            }
-        };
+        let ParameterRow { name, unit, lower, upper, scale, prior } = row;
         let bounds = Bounds::new(lower.0, upper.0, scale).map_err(|error| format!("`{name}`: {error}"))?;
         let prior = prior.map(|PriorRow { mean, sd }| match scale {
             Spacing::Linear => Prior::Linear { mean: mean.0, sd: sd.0 },
             Spacing::Log => Prior::Log { mean_ln: mean.0, sd_ln: sd.0 },
         });
-        Ok(Self { name, unit, axis: Some(Axis { bounds, prior }) })
+        Ok(Self { name, unit, axis: Axis { bounds, prior } })
     }
 }
 
 #[derive(Serialize, Deserialize)]
-#[serde(untagged, deny_unknown_fields)]
-enum FeatureRow {
-    Name(String),
-    Whole {
-        name: String,
-        unit: String,
-        target: Exact,
-        sd: Exact,
-        /// Size of a large difference, where it is differences that are compared and not ratios.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        large_difference: Option<Exact>,
-        /// Whether it counts in the last stage alone.
-        last_stage: bool,
-        /// What is not known of its camera, where it depends on it.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        camera: Option<CameraRow>,
-    },
+#[serde(deny_unknown_fields)]
+struct FeatureRow {
+    name: String,
+    unit: String,
+    target: Exact,
+    sd: Exact,
+    /// Size of a large difference, where it is differences that are compared and not ratios.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    large_difference: Option<Exact>,
+    /// Whether it counts in the last stage alone.
+    last_stage: bool,
+    /// What is not known of its camera, where it depends on it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    camera: Option<CameraRow>,
 }
 
 /// Features of one condition have a camera in common.
@@ -180,27 +140,20 @@ impl From<CameraRow> for Calibration {
 
 impl From<Aimed> for FeatureRow {
     fn from(Aimed { name, unit, target }: Aimed) -> Self {
-        let Some(Target { value, sd, measure, last, calibration, .. }) = target else {
-            return Self::Name(name);
-        };
+        let Target { value, sd, measure, last, calibration, .. } = target;
         let large_difference = match measure {
             Measure::Log => None,
             Measure::Linear { scale } => Some(Exact(scale)),
         };
         let camera = calibration.map(CameraRow::from);
         let (target, sd) = (Exact(value), Exact(sd));
-        Self::Whole { name, unit, target, sd, large_difference, last_stage: last, camera }
+        Self { name, unit, target, sd, large_difference, last_stage: last, camera }
     }
 }
 
 impl From<FeatureRow> for Aimed {
     fn from(row: FeatureRow) -> Self {
-        let (name, unit, target, sd, large_difference, last, camera) = match row {
-            FeatureRow::Name(name) => return Self { name, unit: String::new(), target: None },
-            FeatureRow::Whole { name, unit, target, sd, large_difference, last_stage, camera } => {
-                (name, unit, target, sd, large_difference, last_stage, camera)
-            }
-        };
+        let FeatureRow { name, unit, target, sd, large_difference, last_stage: last, camera } = row;
         let measure = large_difference.map_or(Measure::Log, |scale| Measure::Linear { scale: scale.0 });
         let target = Target {
             name: name.clone(),
@@ -211,6 +164,6 @@ impl From<FeatureRow> for Aimed {
             last,
             calibration: camera.map(Calibration::from),
         };
-        Self { name, unit, target: Some(target) }
+        Self { name, unit, target }
     }
 }

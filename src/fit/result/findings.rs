@@ -71,11 +71,7 @@ impl Findings<'_> {
             twins: self.found.twins,
             waterfall: waterfall(&names, &self.searched.descents),
             sensitivities: sensitivities.collect(),
-            evaluations: Evaluations {
-                total: ledger.run().len(),
-                failed: ledger.failures(),
-                foreign: ledger.foreign(),
-            },
+            evaluations: Evaluations { total: ledger.run().len(), failed: ledger.failures() },
             synthetic: self.synthetic,
             notes: self.notes(),
             seed: self.job.search.seed,

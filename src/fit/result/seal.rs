@@ -16,18 +16,20 @@ pub(super) fn sealed(object: &str) -> String {
     with(&text_sha256(with(&zeros())))
 }
 
-/// Whether a text carries the hash of itself.
+/// Holds a text against the hash of itself that it carries.
 ///
 /// # Errors
-/// What is wrong where it carries another one.
-pub(super) fn is_sealed(text: &str) -> Result<bool, String> {
+/// What is wrong.
+pub(super) fn check(text: &str) -> Result<(), String> {
     let line_feeds = text.replace("\r\n", "\n");
-    let Some(at) = line_feeds.rfind(KEY) else { return Ok(false) };
+    let Some(at) = line_feeds.rfind(KEY) else {
+        return Err("found no `sha256` as its last key, expected the SHA-256 of the file itself".to_owned());
+    };
     let (before, rest) = line_feeds.split_at(at + KEY.len());
     let (carried, after) = rest.split_once('"').unwrap_or((rest, ""));
     let found = text_sha256(format!("{before}{}\"{after}", zeros()));
     if found == carried {
-        return Ok(true);
+        return Ok(());
     }
     let short = |hash: &str| hash.chars().take(SHORT).collect::<String>();
     Err(format!(
@@ -50,15 +52,15 @@ mod tests {
         let text = sealed("{\n  \"a\": 1.5,\n  \"b\": []\n}");
         let value: serde_json::Value = serde_json::from_str(&text).unwrap();
         assert!(value["a"] == 1.5 && value["sha256"].as_str().unwrap().len() == DIGITS);
-        assert_eq!(is_sealed(&text), Ok(true));
-        assert_eq!(is_sealed(&text.replace('\n', "\r\n")), Ok(true), "a checkout changes line ends");
-        assert_eq!(is_sealed("{\n  \"a\": 1.5\n}\n"), Ok(false));
+        assert_eq!(check(&text), Ok(()));
+        assert_eq!(check(&text.replace('\n', "\r\n")), Ok(()), "a checkout changes line ends");
+        assert!(check("{\n  \"a\": 1.5\n}\n").unwrap_err().contains("found no `sha256`"));
         let key = text.find(KEY).map_or(0..0, |at| at..at + KEY.len());
         let digits = text.bytes().enumerate().filter(|(at, byte)| byte.is_ascii_digit() && !key.contains(at));
         for (at, byte) in digits {
             let mut other = text.clone();
             other.replace_range(at..=at, if byte == b'9' { "8" } else { "9" });
-            assert!(is_sealed(&other).unwrap_err().contains("changed after the fit wrote it"), "{other}");
+            assert!(check(&other).unwrap_err().contains("changed after the fit wrote it"), "{other}");
         }
     }
 }

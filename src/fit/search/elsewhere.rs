@@ -32,7 +32,7 @@ pub fn elsewhere(ledger: &mut Ledger, slab: Slab, settings: &Settings, share: us
     until(ledger, CLOUD_SHARE);
     let mut stop = cloud(ledger, slab, settings);
     until(ledger, 1.0);
-    let there = ledger.known().filter(|e| e.failure.is_none() && slab.holds(&e.unit));
+    let there = ledger.run().iter().filter(|e| e.failure.is_none() && slab.holds(&e.unit));
     for start in distinct_best(there, DESCENTS) {
         if !matches!(stop, None | Some(Stop::Budget)) {
             break;
@@ -64,6 +64,6 @@ fn cloud(ledger: &mut Ledger, slab: Slab, settings: &Settings) -> Option<Stop> {
 /// The best known point of a slab.
 #[must_use]
 pub fn best_in<'l>(ledger: &'l Ledger, slab: Slab) -> Option<&'l Evaluation> {
-    let there = ledger.known().filter(|e| e.failure.is_none() && slab.holds(&e.unit));
+    let there = ledger.run().iter().filter(|e| e.failure.is_none() && slab.holds(&e.unit));
     there.min_by(|a, b| a.cost.total_cmp(&b.cost))
 }

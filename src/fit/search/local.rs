@@ -23,7 +23,7 @@ pub(super) fn local(
     descents: &mut Vec<Descent>,
 ) -> Ended {
     ledger.set_limit(limit);
-    let starts = distinct_best(ledger.known(), settings.starts);
+    let starts = distinct_best(ledger.run().iter(), settings.starts);
     if starts.len() > 1 {
         let share = settings.local_evaluations / (3 * starts.len());
         for start in starts {
@@ -135,7 +135,7 @@ fn is_exact(ledger: &Ledger) -> bool {
     ledger.best().is_some_and(|best| best.cost <= EXACT)
 }
 
-/// The best points of the global stage, and of searches with other seeds, that lie apart, best first.
+/// The best points of the global stage that lie apart, best first.
 pub(super) fn distinct_best<'e>(
     known: impl IntoIterator<Item = &'e Evaluation>,
     most: usize,

@@ -52,29 +52,17 @@ struct Root<'a> {
     first: Iterate,
 }
 
-/// What became of branches.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) enum Followed {
-    /// The last iterate of each branch, in order; `None` where the scene refuses every place of it.
-    Ends(Vec<Option<Iterate>>),
-    /// Numbers of the chains that were left to others.
-    Left(Vec<usize>),
-    /// It was asked to stop.
-    Stopped,
-}
-
 /// A branch on its way.
 struct Way<'a> {
     branch: Branch,
     root: Option<Root<'a>>,
     place: usize,
     last: Option<Iterate>,
-    is_left: bool,
 }
 
 impl Way<'_> {
     fn is_open(&self) -> bool {
-        !self.is_left && !self.last.as_ref().is_some_and(|last| self.branch.ends_with(last))
+        !self.last.as_ref().is_some_and(|last| self.branch.ends_with(last))
     }
 
     fn take(&mut self, next: Iterate) {
@@ -89,35 +77,36 @@ impl<'a> Way<'a> {
     }
 }
 
-/// Follows branches to their ends, several at once.
-pub(super) fn followed(end: &End<'_>, branches: &[Branch], keep: &mut dyn Keep) -> Followed {
-    let (mut ends, mut left) = (Vec::new(), Vec::new());
+/// Follows branches to their ends, several at once: the last iterate of each, in order, where the scene does
+/// not refuse every place of it. `None` where it was asked to stop.
+pub(super) fn followed(
+    end: &End<'_>,
+    branches: &[Branch],
+    keep: &mut dyn Keep,
+) -> Option<Vec<Option<Iterate>>> {
+    let mut ends = Vec::new();
     // (twins are behind the others also where they are wanted later)
     let kinds = branches.chunk_by(|a, b| a.is_twin() == b.is_twin());
     for branches in kinds.flat_map(|kind| kind.chunks(TOGETHER)) {
-        let begun =
-            |branch: &Branch| Way { branch: *branch, root: None, place: 0, last: None, is_left: false };
+        let begun = |branch: &Branch| Way { branch: *branch, root: None, place: 0, last: None };
         let mut ways: Vec<Way<'_>> = branches.iter().map(begun).collect();
         while ways.iter().any(Way::is_open) {
             let mut due: Vec<&mut Way<'_>> = Vec::new();
             for way in ways.iter_mut().filter(|way| way.is_open()) {
-                let chain = way.branch.number();
-                match keep.known(chain, way.place) {
+                match keep.known(way.branch.number(), way.place) {
                     Some(known) => way.take(known),
-                    None if keep.makes(chain) => due.push(way),
-                    None => way.is_left = true,
+                    None => due.push(way),
                 }
             }
             let made: Vec<Iterate> = due.par_iter_mut().map(|way| way.next(end)).collect();
             for (way, made) in due.into_iter().zip(made) {
                 if keep.add(way.branch.number(), way.place, &made).is_break() {
-                    return Followed::Stopped;
+                    return None;
                 }
                 way.take(made);
             }
         }
-        left.extend(ways.iter().filter(|way| way.is_left).map(|way| way.branch.number()));
         ends.extend(ways.into_iter().map(|way| way.last.filter(|last| last.cost < f64::MAX)));
     }
-    if left.is_empty() { Followed::Ends(ends) } else { Followed::Left(left) }
+    Some(ends)
 }

@@ -7,14 +7,6 @@ use std::ops::ControlFlow;
 pub trait Keep {
     /// The iterate that a chain had at a place, where it is known already.
     fn known(&mut self, chain: usize, place: usize) -> Option<Iterate>;
-    /// Whether a start is taken before others, whatever they find.
-    fn begins(&self, _start: usize) -> bool {
-        false
-    }
-    /// Whether iterates of a chain that are not known are made here, or are left to another machine.
-    fn makes(&self, _chain: usize) -> bool {
-        true
-    }
     /// A new iterate of a chain; `Break` ends the search.
     fn add(&mut self, chain: usize, place: usize, iterate: &Iterate) -> ControlFlow<()>;
 }

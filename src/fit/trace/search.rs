@@ -3,7 +3,7 @@
 
 use super::assess::{Assessment, assess};
 use super::branch::{End, MOST_STARTS};
-use super::branches::{Followed, followed};
+use super::branches::followed;
 use super::descent::{AGREES_SD, Descent, descend};
 use super::iterate::{Iterate, Settings, chi2_per_dof};
 use super::keep::Keep;
@@ -31,31 +31,13 @@ pub struct Searched {
     pub best: usize,
     /// Whether it was asked to stop.
     pub stopped: bool,
-    /// Numbers of the chains behind the best end that were left to other machines.
-    pub left: Vec<usize>,
-    /// What is known at the best end; `None` where no start finished, or chains were left.
+    /// What is known at the best end; `None` where no start finished.
     pub assessment: Option<Assessment>,
 }
 
 /// Searches from the middle of the ranges, then from seeded places until two starts agree; then assesses the
 /// best end.
-///
-/// Of several machines that share a search each first takes starts that no other does, of those that are
-/// certainly needed.
 pub fn search(model: &TraceModel, settings: &Settings, seed: u64, keep: &mut dyn Keep) -> Searched {
-    for start in (0..FEWEST_STARTS).filter(|start| keep.begins(*start)).collect::<Vec<_>>() {
-        let point = start_point(model, seed, start);
-        let (descent, stopped) = descend(model, settings, point, start, f64::INFINITY, keep);
-        if stopped {
-            return Searched {
-                descents: vec![descent],
-                best: 0,
-                stopped,
-                left: Vec::new(),
-                assessment: None,
-            };
-        }
-    }
     let mut descents: Vec<Descent> = Vec::new();
     let mut stopped = false;
     for start in 0..MOST_STARTS {
@@ -69,17 +51,16 @@ pub fn search(model: &TraceModel, settings: &Settings, seed: u64, keep: &mut dyn
         }
     }
     let best = best_of(&descents);
-    let mut found = Searched { descents, best, stopped, left: Vec::new(), assessment: None };
+    let mut found = Searched { descents, best, stopped, assessment: None };
     let at = found.descents.get(best).and_then(Descent::end).filter(|_| !stopped);
     let Some(end) = at.and_then(|at| End::new(model, settings, seed, at)) else { return found };
     let branches = end.branches();
     match followed(&end, &branches, keep) {
-        Followed::Ends(ends) => {
+        Some(ends) => {
             let branches: Vec<_> = branches.into_iter().zip(ends).collect();
             found.assessment = Some(assess(&end, (&found.descents, best), &branches));
         }
-        Followed::Left(left) => found.left = left,
-        Followed::Stopped => found.stopped = true,
+        None => found.stopped = true,
     }
     found
 }

@@ -28,8 +28,7 @@ fn searched(journal: &mut String, most: usize, asked_to_stop_at: usize) -> Searc
     let mut on_iterate = |now: &TraceProgress| {
         if now.iterates == asked_to_stop_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let mut ledger =
-        TraceLedger::new(&header(), resume, (Division::Whole, most), journal, &mut on_iterate).unwrap();
+    let mut ledger = TraceLedger::new(&header(), resume, most, journal, &mut on_iterate).unwrap();
     let mut made = 0;
     'all: for start in 0..STARTS {
         let mut last: Option<Iterate> = None;
@@ -79,14 +78,6 @@ fn a_search_stops_when_it_is_asked_to_and_extends() {
 }
 
 #[test]
-fn a_dropped_line_is_made_again() {
-    let mut whole = String::new();
-    searched(&mut whole, usize::MAX, usize::MAX);
-    let mut left = crate::journal::without::<Step>("j", whole.as_bytes(), &[4..=5]).unwrap().unwrap().text;
-    assert_eq!(searched(&mut left, usize::MAX, usize::MAX), Searched { made: 2, ..WHOLE });
-}
-
-#[test]
 fn a_journal_that_cannot_be_written_ends_the_search() {
     struct Full;
     impl Sink for Full {
@@ -95,8 +86,7 @@ fn a_journal_that_cannot_be_written_ends_the_search() {
         }
     }
     let (mut full, mut on_iterate) = (Full, |_: &TraceProgress| ControlFlow::Continue(()));
-    let mut ledger =
-        TraceLedger::new(&header(), None, (Division::Whole, usize::MAX), &mut full, &mut on_iterate).unwrap();
+    let mut ledger = TraceLedger::new(&header(), None, usize::MAX, &mut full, &mut on_iterate).unwrap();
     assert!(ledger.add(0, 0, &iterate(0)).is_break());
     assert_eq!((ledger.stopped(), ledger.iterates()), (Some(&Stopped::Journal("no space".to_owned())), 0));
 }
@@ -106,10 +96,10 @@ fn an_iterate_that_the_model_does_not_give_is_refused() {
     let mut whole = String::new();
     searched(&mut whole, usize::MAX, usize::MAX);
     let journal = read::<Step>("j", &whole).unwrap().unwrap();
-    assert_eq!(recheck(&[("j", &journal)], |_, before| next(before)), Ok(()));
+    assert_eq!(recheck("j", &journal, |_, before| next(before)), Ok(()));
     let other =
         |before: Option<&Iterate>| next(before).map(|found| Iterate { cost: found.cost + 1e-9, ..found });
-    let refused = recheck(&[("j", &journal)], |_, before| other(before)).unwrap_err().to_string();
+    let refused = recheck("j", &journal, |_, before| other(before)).unwrap_err().to_string();
     assert!(refused.contains("cost"), "{refused}");
 }
 
@@ -121,7 +111,6 @@ fn a_journal_of_another_seed_is_refused() {
     let mut other = header();
     other.body.seed += 1;
     let (mut sink, mut on_iterate) = (String::new(), |_: &TraceProgress| ControlFlow::Continue(()));
-    let refused =
-        TraceLedger::new(&other, Some(("j", &journal)), (Division::Whole, 9), &mut sink, &mut on_iterate);
+    let refused = TraceLedger::new(&other, Some(("j", &journal)), 9, &mut sink, &mut on_iterate);
     assert!(matches!(refused.err(), Some(FitError::OtherSeed { found: 3, expected: 4, .. })));
 }

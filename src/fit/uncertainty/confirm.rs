@@ -131,7 +131,7 @@ fn island(found: &mut Uncertainty, ledger: &Ledger, names: &[String], axis: usiz
         return;
     };
     let limit = found.best.cost + CHI_SQUARED_95;
-    let good = ledger.known().filter(|e| e.failure.is_none() && e.cost <= limit);
+    let good = ledger.run().iter().filter(|e| e.failure.is_none() && e.cost <= limit);
     let mut places: Vec<f64> = good.filter_map(|e| e.unit.get(axis).copied()).collect();
     places.sort_by(f64::total_cmp);
     let wide = GAP * (bounds.to_unit(upper) - bounds.to_unit(lower));

@@ -100,11 +100,6 @@ pub fn read(path: &Path) -> Result<Vec<u8>, Failure> {
     read_within(path, Limit::of_data())
 }
 
-/// Bytes of a file with data that is open.
-pub fn read_open(path: &Path, file: &File) -> Result<Vec<u8>, Failure> {
-    read_opened(path, file, Limit::of_data())
-}
-
 /// Refuses a file with data that is open, and larger than what is read into memory.
 pub fn check_size(path: &Path, file: &File) -> Result<(), Failure> {
     Limit::of_data().check(path, file)
@@ -145,12 +140,9 @@ fn read_within(path: &Path, limit: Limit) -> Result<Vec<u8>, Failure> {
     }
     // asked before it is opened: to open a pipe waits for whoever writes into it
     check_kind(path, &fs::metadata(path).map_err(|error| unread(path, &error))?)?;
-    read_opened(path, &File::open(path).map_err(|error| unread(path, &error))?, limit)
-}
-
-fn read_opened(path: &Path, file: &File, limit: Limit) -> Result<Vec<u8>, Failure> {
-    limit.check(path, file)?;
-    all(path, file, limit)
+    let file = File::open(path).map_err(|error| unread(path, &error))?;
+    limit.check(path, &file)?;
+    all(path, &file, limit)
 }
 
 fn all(path: &Path, from: impl Read, limit: Limit) -> Result<Vec<u8>, Failure> {

@@ -51,12 +51,7 @@ fn pace(solved: &Solved) -> String {
     let failed: Vec<String> =
         evaluations.failed.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
     let failed = if failed.is_empty() { String::new() } else { format!(", failed: {}", failed.join(", ")) };
-    let foreign = if evaluations.foreign == 0 {
-        String::new()
-    } else {
-        format!(", {} known from other seeds", evaluations.foreign)
-    };
-    made + &failed + &foreign
+    made + &failed
 }
 
 fn print_features(result: &FitResult) {

@@ -1,12 +1,10 @@
 //! A fit to traces, with its journal of iterates.
 
 use super::Solved;
-use crate::fit::Ran;
-use crate::fit::iterates::{Journal, Step};
+use crate::fit::iterates::Step;
 use crate::fit::result::Status;
 use crate::fit::trace::Branch;
-use crate::fit::trace_ledger::{Division, TraceProgress};
-use crate::journal::Sink;
+use crate::fit::trace_ledger::TraceProgress;
 use crate::program::failure::Failure;
 use crate::program::files::{Maker, Overwrite, Writer};
 use crate::program::global::Global;
@@ -27,18 +25,6 @@ const STARTS: usize = 2;
 const ITERATES_A_TWIN: usize = 5;
 const ITERATES_A_SIDE: usize = 2;
 
-/// A run of a fit to traces, or of its part in one that is divided.
-pub struct Run<'a> {
-    pub division: Division<'a>,
-    /// Name of the journal, and what it holds where it goes on.
-    pub journal: (&'a str, Option<&'a Journal>),
-    pub most: Option<usize>,
-    /// What to do with what is done when it stops early.
-    pub advice: String,
-    /// Whether progress is said where there is no terminal.
-    pub reports: bool,
-}
-
 impl Problem {
     /// Fits the traces, and writes the journal as it goes and the result at the end.
     pub fn solve_traces(
@@ -52,37 +38,11 @@ impl Problem {
         self.check_place(&writer)?;
         let path = self.folder.join(JOURNAL);
         let (mut sink, resumed) = JournalFile::open::<Step>(&path, resume)?;
-        let journal = (&*path.to_string_lossy(), resumed.as_ref());
-        let (division, advice) = (Division::Whole, self.resume_advice());
-        let run = Run { division, journal, most, advice, reports: false };
-        let clock = Instant::now();
-        let (ran, replayed) = self.run_traces(run, &mut sink, global)?;
-        let wall = clock.elapsed();
-        sink.finish()?;
-        let Ran::Whole(result) = ran else {
-            return Err(Failure::Internal(format!("{}: the fit is not whole; please report it", self.file)));
-        };
-        // an earlier result of an interrupted fit stays: what is new is in the journal, and a resumed fit
-        // gives its result
-        if result.status != Status::Interrupted {
-            self.write(&result, &writer)?;
-        }
-        Ok(Solved { result: *result, replayed, wall })
-    }
-
-    /// Makes iterates into a journal; with the number of those that were there already.
-    pub fn run_traces(
-        &self,
-        run: Run<'_>,
-        sink: &mut dyn Sink,
-        global: &Global,
-    ) -> Result<(Ran, usize), Failure> {
-        let Run { division, journal: (name, resumed), most, advice, reports } = run;
-        let expected = self.expected_iterates(&division).min(most.unwrap_or(usize::MAX));
+        let name = path.display().to_string();
+        let expected = self.expected_iterates().min(most.unwrap_or(usize::MAX));
         let bar = progress::bar(expected as u64, "fit", "iterates", global.quiet);
-        let reporter = progress::Reporter::new(&bar, reports && !global.quiet);
-        let journaled = Arc::new(AtomicUsize::new(resumed.map_or(0, |found| found.records.len())));
-        let kept = self.kept(name, "iterates", advice, &journaled);
+        let journaled = Arc::new(AtomicUsize::new(resumed.as_ref().map_or(0, |found| found.records.len())));
+        let kept = self.kept(&name, "iterates", self.resume_advice(), &journaled);
         let stops = interrupt::stops(kept.clone());
         let mut replayed = 0;
         let stages = self.problem.segment_s().to_vec();
@@ -90,27 +50,28 @@ impl Problem {
             show(&bar, now, replayed, &stages);
             replayed = now.replayed;
             journaled.fetch_max(now.iterates, Ordering::Relaxed);
-            reporter.report();
             interrupt::flow()
         };
-        let resume = resumed.map(|journal| (name, journal));
-        let fitted = self.problem.fit_divided(division, resume, most, sink, &mut on_iterate);
-        let ran = fitted.map_err(|error| self.failure(&error))?;
+        let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
+        let clock = Instant::now();
+        let fitted = self.problem.fit_traces(resume, most, &mut sink, &mut on_iterate);
+        let result = fitted.map_err(|error| self.failure(&error))?;
+        let wall = clock.elapsed();
         bar.finish_and_clear();
-        if matches!(&ran, Ran::Whole(result) if result.status == Status::Interrupted) {
+        sink.finish()?;
+        if result.status == Status::Interrupted {
+            // an earlier result stays: what is new is in the journal, and a resumed fit gives its result
             stops.finishing(&kept());
+        } else {
+            self.write(&result, &writer)?;
         }
-        Ok((ran, replayed))
+        Ok(Solved { result, replayed, wall })
     }
 
-    fn expected_iterates(&self, division: &Division) -> usize {
+    fn expected_iterates(&self) -> usize {
         let search = STARTS * self.problem.segment_s().len() * ITERATES_A_STAGE;
         let (twins, parameters) = (self.job().intervals.bootstrap, self.job().parameters.len());
-        let branches = ITERATES_A_TWIN * twins + 2 * ITERATES_A_SIDE * parameters;
-        match division {
-            Division::Shard(shard, _) => search + branches / shard.of(),
-            Division::Whole | Division::Collected(_) => search + branches,
-        }
+        search + ITERATES_A_TWIN * twins + 2 * ITERATES_A_SIDE * parameters
     }
 }
 

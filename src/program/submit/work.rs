@@ -35,6 +35,11 @@ impl Work {
                 "{}: found a study without --out, expected the folder for its results; add --out DIR",
                 study.display()
             ))),
+            ([job], [], _) => Err(Failure::Input(format!(
+                "{}: found one job, expected a study or a list of jobs, as a fit takes seconds and is not divided; \
+                 run `wiperlab fit` with it",
+                job.display()
+            ))),
             (_, [], out) => Self::jobs(files, out),
             (_, [study, ..], _) => Err(Failure::Input(format!(
                 "{}: found a study among {} files, expected one study alone or jobs of fits; submit it by itself",
@@ -139,7 +144,6 @@ mod tests {
     fn scripts_of_jobs_lie_where_all_jobs_do() {
         let of = |files: &[&str]| common(&words(files));
         assert_eq!(of(&["/a/fits/one/job.toml", "/a/fits/two/job.toml"]), "/a/fits");
-        assert_eq!(of(&["/a/fits/one/job.toml"]), "/a/fits/one");
         assert_eq!(of(&["/a/x/job.toml", "/b/x/job.toml"]), "/");
     }
 }

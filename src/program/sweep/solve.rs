@@ -1,7 +1,7 @@
 //! The runs of a study, or of a part of it, into a journal.
 
 use super::problem::Problem;
-use crate::journal::{Found, Shard, Sink, header_line, line};
+use crate::journal::{Found, Shard, Sink, header_line};
 use crate::program::failure::Failure;
 use crate::program::global::Global;
 use crate::program::interrupt;
@@ -43,20 +43,15 @@ impl Problem {
         let points = self.study.points();
         let mut known = part.elsewhere.clone();
         known.resize(points, false);
-        let (mut own, mut seen) = (vec![false; points], 0);
+        let mut own = vec![false; points];
         let mut recheck = Recheck::new(points as u64);
-        let mut unchecked = String::new();
-        let mut each = |of: &sweep::journal::Header, found: Found<Point>| {
+        let mut each = |found: Found<Point>| {
             let index = found.record.index;
             match own.get_mut(index) {
                 Some(before) if *before => return Err(crate::journal::again(&name, &found, "")),
                 Some(before) => *before = true,
                 None => {}
             }
-            if of.is_unchecked() {
-                unchecked += &line(&found.record, seen);
-            }
-            seen += 1;
             recheck.offer(found);
             Ok(())
         };
@@ -64,13 +59,8 @@ impl Problem {
         if let Some(found) = &found {
             found.check::<Point>(&name, &header).map_err(Failure::input)?;
             recheck.check(&self.study, &self.scene, &name).map_err(Failure::input)?;
-        }
-        let opening = match &found {
-            Some(found) if !found.is_unchecked() => String::new(),
-            _ => header_line(&header) + &unchecked,
-        };
-        if !opening.is_empty() {
-            sink.append(&opening).map_err(Failure::Internal)?;
+        } else {
+            sink.append(&header_line(&header)).map_err(Failure::Internal)?;
         }
         known.iter_mut().zip(&own).for_each(|(known, own)| *known |= own);
         let all = part.shard.count(points);

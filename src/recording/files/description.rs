@@ -19,8 +19,8 @@ pub struct RecordingFile {
     /// Whether no camera took it: a simulation or a twin.
     #[serde(default)]
     pub synthetic: bool,
-    /// SHA-256 of `trace.csv`, without byte-order mark and with line feeds; absent in descriptions of
-    /// earlier versions.
+    /// SHA-256 of `trace.csv`, without byte-order mark and with line feeds; a trace without one is not
+    /// verified.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub trace_sha256: Option<String>,
     /// The export that was imported; absent for a twin that was never exported.

@@ -151,7 +151,6 @@ pub(super) fn search(report: &Report) -> String {
     let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
     let mut found =
         vec![("status", status.word().to_owned()), ("evaluations of the model", s.evaluations.to_string())];
-    found.extend((s.foreign > 0).then(|| ("known from other seeds", s.foreign.to_string())));
     found.extend([
         ("failed", failed),
         ("local searches", s.local_searches.to_string()),
