@@ -85,10 +85,21 @@ impl<'a> Objective<'a> {
         self.price(Outcome { unit, values, features, failure })
     }
 
-    /// What a point shows with its costs.
+    /// What a point shows with its costs, which follow from its features or its failure and its values.
     #[must_use]
     pub(crate) fn price(&self, outcome: Outcome) -> Evaluation {
-        price(&self.axes, &self.targets, outcome)
+        let Outcome { unit, values, features, failure } = outcome;
+        let priors: f64 =
+            prior_residuals(&self.axes, &values).map(|r| rho(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
+        let failed = |failure: &RunFailure, farthest: f64| (2.0 - failure.progress) * farthest.max(1.0);
+        let of = |(targets, features): (&[Target], &[Observed])| {
+            let (shown, farthest) = costs(targets, features);
+            priors + failure.as_ref().map_or(shown, |failure| failed(failure, farthest))
+        };
+        let cost = of((&self.targets, &features));
+        let (first, seen): (Vec<Target>, Vec<Observed>) = first_stage(&self.targets, &features);
+        let global_cost = of((&first, &seen));
+        Evaluation { unit, values, cost, global_cost, features, failure }
     }
 
     /// The same with the scatter of each feature, in its unit.
@@ -139,22 +150,6 @@ impl<'a> Objective<'a> {
             None => Ok(features),
         }
     }
-}
-
-/// What a point shows with its costs, which follow from its features or its failure and its values.
-#[must_use]
-pub(crate) fn price(axes: &[Axis], targets: &[Target], outcome: Outcome) -> Evaluation {
-    let Outcome { unit, values, features, failure } = outcome;
-    let priors: f64 = prior_residuals(axes, &values).map(|r| rho(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
-    let failed = |failure: &RunFailure, farthest: f64| (2.0 - failure.progress) * farthest.max(1.0);
-    let of = |(targets, features): (&[Target], &[Observed])| {
-        let (shown, farthest) = costs(targets, features);
-        priors + failure.as_ref().map_or(shown, |failure| failed(failure, farthest))
-    };
-    let cost = of((targets, &features));
-    let (first, seen): (Vec<Target>, Vec<Observed>) = first_stage(targets, &features);
-    let global_cost = of((&first, &seen));
-    Evaluation { unit, values, cost, global_cost, features, failure }
 }
 
 /// Distances from the priors, in standard deviations, of the parameters that have one.

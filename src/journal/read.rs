@@ -20,13 +20,8 @@ pub struct Journal<R: Record> {
     pub header: Header<R::Body>,
     /// Its records, in file order: the first stands in line 2.
     pub records: Vec<R>,
-    /// Length of the part that holds complete lines, bytes: the file is cut to it before anything is
-    /// appended.
-    pub intact_bytes: usize,
-    /// Whether an incomplete last line was dropped.
-    pub torn: bool,
-    /// Whether the last line is complete but for its end, which is added before anything is appended.
-    pub unended: bool,
+    /// How it ends.
+    pub end: End,
 }
 
 /// Reads a journal; `file` is its name in refusals. A file without a complete header is `None`.
@@ -55,9 +50,7 @@ impl<R: Record, S: BufRead> Stream<R, S> {
             }
             records.push(record);
         }
-        let End { intact_bytes, torn, unended } = self.end();
-        let (header, intact_bytes) = (self.header().clone(), intact_bytes as usize);
-        Ok(Journal { header, records, intact_bytes, torn, unended })
+        Ok(Journal { header: self.header().clone(), records, end: self.end() })
     }
 }
 

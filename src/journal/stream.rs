@@ -26,11 +26,11 @@ pub struct Stream<R: Record, S> {
 /// How a journal ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct End {
-    /// Bytes up to the end of the last complete line.
-    pub intact_bytes: u64,
-    /// Whether something follows that is dropped.
+    /// Bytes up to the end of the last complete line: the file is cut to them before anything is appended.
+    pub intact_bytes: usize,
+    /// Whether an incomplete line follows, which is dropped.
     pub torn: bool,
-    /// Whether the last complete line has no end of line.
+    /// Whether the last complete line has no end, which is added before anything is appended.
     pub unended: bool,
 }
 
@@ -53,7 +53,7 @@ impl<R: Record, S: BufRead> Stream<R, S> {
         let unreadable = |problem| JournalError::Unreadable { file: file.to_owned(), problem };
         let Some(first) = text.line().map_err(unreadable)?.filter(is_complete) else { return Ok(None) };
         let header = header::<R>(file, first.bytes)?;
-        let end = End { intact_bytes: first.upto as u64, torn: false, unended: !first.ended };
+        let end = End { intact_bytes: first.upto, torn: false, unended: !first.ended };
         Ok(Some(Self { file: file.to_owned(), header, text, line: FIRST_LINE, end }))
     }
 
@@ -87,7 +87,7 @@ impl<R: Record, S: BufRead> Stream<R, S> {
             return Err(refused(problem));
         }
         let record = R::from_row(row, &header.body).map_err(refused)?;
-        *end = End { intact_bytes: found.upto as u64, torn: false, unended: !found.ended };
+        *end = End { intact_bytes: found.upto, torn: false, unended: !found.ended };
         *line += 1;
         Ok(Some(Found { record, line: *line - 1 }))
     }

@@ -125,7 +125,7 @@ impl Problem {
         let bar = progress::bar(self.expected(max_evaluations) as u64, "fit", "evaluations", global.quiet);
         let mut replayed = 0;
         let journaled = Arc::new(AtomicUsize::new(resumed.as_ref().map_or(0, |found| found.records.len())));
-        let kept = self.kept(&name, "evaluations", self.resume_advice(), &journaled);
+        let kept = self.kept(&name, "evaluations", &journaled);
         let stops = interrupt::stops(kept.clone());
         let mut on_progress = |now: &Progress| {
             show(&bar, now, replayed);
@@ -166,18 +166,13 @@ impl Problem {
         &self,
         journal: &str,
         records: &'static str,
-        advice: String,
         journaled: &Arc<AtomicUsize>,
     ) -> impl Fn() -> String + Clone + use<> {
-        let (journal, journaled) = (journal.to_owned(), Arc::clone(journaled));
+        let (journal, job, journaled) = (journal.to_owned(), self.file.clone(), Arc::clone(journaled));
         move || match journaled.load(Ordering::Relaxed) {
             0 => "the search had not begun, and there is no journal of it".to_owned(),
-            count => format!("{journal} holds {count} {records}; {advice}"),
+            count => format!("{journal} holds {count} {records}; go on with `wiperlab fit {job} --resume`"),
         }
-    }
-
-    fn resume_advice(&self) -> String {
-        format!("go on with `wiperlab fit {} --resume`", self.file)
     }
 
     /// Evaluations to be expected, for the progress: the budget, and about what gate, profiles and twins

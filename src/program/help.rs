@@ -23,7 +23,7 @@ const WIDTH: usize = 96;
 pub struct HelpArgs {
     /// A command, such as `fit`, or a page; all are listed without it
     #[arg(value_name = "COMMAND|PAGE")]
-    pub words: Vec<String>,
+    pub word: Option<String>,
 }
 
 /// What a page shows.
@@ -69,11 +69,7 @@ pub fn pages() -> String {
 
 impl HelpArgs {
     pub fn run(&self, program: &mut Command) -> Result<Outcome, Failure> {
-        let page = match self.words.as_slice() {
-            [word] => find(word),
-            _ => None,
-        };
-        let text = match page {
+        let text = match self.word.as_deref().and_then(find) {
             Some(content) => content.text(),
             None => self.of_command(program)?,
         };
@@ -81,28 +77,22 @@ impl HelpArgs {
         Ok(Outcome::Done)
     }
 
-    /// The help of the command that the words name.
+    /// The help of the command that is named, or of the program.
     fn of_command(&self, program: &mut Command) -> Result<String, Failure> {
         program.build();
-        let mut command = program;
-        for (at, word) in self.words.iter().enumerate() {
-            let known: Vec<String> = command.get_subcommands().map(|c| c.get_name().to_owned()).collect();
-            let Some(next) = known.iter().position(|name| name == word) else {
-                return Err(self.unknown(at, &known));
-            };
-            command = command.get_subcommands_mut().nth(next).ok_or_else(|| self.unknown(at, &known))?;
-        }
+        let Some(word) = &self.word else { return Ok(program.render_long_help().to_string()) };
+        let refused = unknown(word, program);
+        let command = program.find_subcommand_mut(word).ok_or(refused)?;
         Ok(command.render_long_help().to_string())
     }
+}
 
-    fn unknown(&self, at: usize, commands: &[String]) -> Failure {
-        let pages = PAGES.iter().map(|(name, ..)| *name).filter(|_| at == 0);
-        let known: Vec<&str> = commands.iter().map(String::as_str).chain(pages).collect();
-        let word = &self.words[at];
-        let advice = Some(nearest(word, &known)).filter(|advice| advice.starts_with("did you mean"));
-        let advice = advice.unwrap_or_else(|| "`wiperlab help` lists them".to_owned());
-        Failure::Input(format!("help: found `{word}`, expected a command or a page; {advice}"))
-    }
+fn unknown(word: &str, program: &Command) -> Failure {
+    let pages = PAGES.iter().map(|(name, ..)| *name);
+    let known: Vec<&str> = program.get_subcommands().map(Command::get_name).chain(pages).collect();
+    let advice = Some(nearest(word, &known)).filter(|advice| advice.starts_with("did you mean"));
+    let advice = advice.unwrap_or_else(|| "`wiperlab help` lists them".to_owned());
+    Failure::Input(format!("help: found `{word}`, expected a command or a page; {advice}"))
 }
 
 /// The page of a name; a kind of file has it with and without its ending, unless a command has that name.

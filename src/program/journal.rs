@@ -40,7 +40,7 @@ enum Due {
     /// It is kept under another name: hours of work should not be lost because `--resume` was forgotten.
     SetAside,
     /// It is continued after this number of bytes, and a line end where the last line has none.
-    Continue { intact_bytes: u64, unended: bool },
+    Continue { intact_bytes: usize, unended: bool },
 }
 
 impl JournalFile {
@@ -50,8 +50,8 @@ impl JournalFile {
         Self::opened(path, resume, |file, stream| {
             files::check_size(path, file)?;
             let journal = stream.whole().map_err(Failure::input)?;
-            let Journal { intact_bytes, torn, unended, .. } = journal;
-            Ok((journal, End { intact_bytes: intact_bytes as u64, torn, unended }))
+            let end = journal.end;
+            Ok((journal, end))
         })
     }
 
@@ -135,7 +135,7 @@ impl JournalFile {
         let refused = |error: io::Error| error.to_string();
         match (self.due.take(), &mut self.file) {
             (Some(Due::Continue { intact_bytes, unended }), Some(file)) => {
-                file.set_len(intact_bytes).map_err(refused)?;
+                file.set_len(intact_bytes as u64).map_err(refused)?;
                 if unended { file.write_all(b"\n").map_err(refused) } else { Ok(()) }
             }
             (Some(Due::SetAside), Some(_)) => {

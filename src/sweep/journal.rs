@@ -216,7 +216,10 @@ mod tests {
         let (whole, one) = (text([7, 3].into_iter()), text([7].into_iter()));
         for cut in one.len() + 1..whole.len() - 1 {
             let journal = read_back(&whole[..cut]).unwrap().unwrap();
-            assert_eq!((journal.records.len(), journal.torn, journal.intact_bytes), (1, true, one.len()));
+            assert_eq!(
+                (journal.records.len(), journal.end.torn, journal.end.intact_bytes),
+                (1, true, one.len())
+            );
         }
         assert_eq!([read_back(""), read_back("{\"journal\":\"sweep\"")], [Ok(None), Ok(None)]);
     }

@@ -109,8 +109,8 @@ fn attempt(job: &str, text: &str, most: Option<usize>, version: &str) -> Result<
         (String::new(), |_: &Progress| ControlFlow::Continue(()), Ringing::default());
     let job = Job::parse_with_names("job.toml", job, &["stiffness", "friction"]).unwrap();
     let result = fit(&job, &[None], &model, &context, &mut lines, &mut watch)?.to_json();
-    let kept = journal.as_ref().map_or(0, |journal| journal.intact_bytes);
-    let end = if journal.is_some_and(|journal| journal.unended) { "\n" } else { "" };
+    let kept = journal.as_ref().map_or(0, |journal| journal.end.intact_bytes);
+    let end = if journal.is_some_and(|journal| journal.end.unended) { "\n" } else { "" };
     Ok(Ended { result, journal: text[..kept].to_owned() + end + &lines, calls: model.calls.into_inner() })
 }
 
@@ -146,7 +146,7 @@ fn a_fit_cut_anywhere_in_any_stage_is_the_uninterrupted_one_to_the_last_byte() {
             // twins are made again, everything else is replayed
             let left: Option<Journal> = journal::read("journal.jsonl", &uncut.journal[..cut]).unwrap();
             assert!(
-                left.as_ref().is_none_or(|journal| journal.torn == (cut != end && cut != end - 1)),
+                left.as_ref().is_none_or(|journal| journal.end.torn == (cut != end && cut != end - 1)),
                 "cut at byte {cut}"
             );
             // and some that were replayed are made once more to check them, the best point perhaps too

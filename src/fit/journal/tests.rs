@@ -59,7 +59,7 @@ fn text(units: &[f64]) -> String {
 fn every_bit_survives() {
     let units: Vec<f64> = (0..200).map(|i| (f64::from(i) * 0.618_033_988_749_894_9).fract()).collect();
     let journal = read("j", text(&units)).unwrap().unwrap();
-    assert_eq!((journal.records.len(), journal.torn), (200, false));
+    assert_eq!((journal.records.len(), journal.end.torn), (200, false));
     for (entry, u) in journal.records.iter().zip(&units) {
         assert_eq!(entry.outcome, outcome(*u));
     }
@@ -81,7 +81,7 @@ fn a_torn_last_line_is_dropped_and_said() {
     let one = text(&[0.25]);
     for cut in one.len() + 1..whole.len() - 1 {
         let journal = read("j", &whole[..cut]).unwrap().unwrap();
-        assert_eq!((journal.records.len(), journal.torn, journal.intact_bytes), (1, true, one.len()));
+        assert_eq!((journal.records.len(), journal.end.torn, journal.end.intact_bytes), (1, true, one.len()));
     }
     assert_eq!(read("j", "").unwrap(), None);
     assert_eq!(read("j", "{\"journal\":\"fit\"").unwrap(), None);
@@ -138,11 +138,11 @@ fn a_changed_digit_is_refused_with_its_line_and_what_to_do() {
 fn a_line_without_end_counts_when_its_checksum_holds() {
     let whole = text(&[0.25, 0.75]);
     let journal = read("j", whole.trim_end()).unwrap().unwrap();
-    assert_eq!((journal.records.len(), journal.torn, journal.unended), (2, false, true));
-    assert_eq!(journal.intact_bytes, whole.len() - 1);
+    assert_eq!((journal.records.len(), journal.end.torn, journal.end.unended), (2, false, true));
+    assert_eq!(journal.end.intact_bytes, whole.len() - 1);
     let header = header_line(&header("f"));
     let journal = read("j", header.trim_end()).unwrap().unwrap();
-    assert_eq!((journal.records.len(), journal.unended), (0, true));
+    assert_eq!((journal.records.len(), journal.end.unended), (0, true));
 }
 
 #[test]
@@ -151,14 +151,14 @@ fn what_a_power_cut_leaves_behind_the_last_line_is_dropped() {
     for tail in ["\0", "\0\0\0\0\0\0\0", "{\"index\":2\0\0\0\0"] {
         let journal = read("j", whole.clone() + tail).unwrap().unwrap();
         assert_eq!(
-            (journal.records.len(), journal.torn, journal.intact_bytes),
+            (journal.records.len(), journal.end.torn, journal.end.intact_bytes),
             (2, true, whole.len()),
             "{tail:?}"
         );
     }
     assert_eq!(read("j", "\0\0\0\0").unwrap(), None);
     let half_a_letter = [whole.as_bytes(), &[b'{', 0xc3]].concat();
-    assert_eq!(read("j", half_a_letter).unwrap().unwrap().intact_bytes, whole.len());
+    assert_eq!(read("j", half_a_letter).unwrap().unwrap().end.intact_bytes, whole.len());
     // zeros that are followed by complete lines are damage
     let refused = read("j", text(&[0.25]) + "\0\0\n" + "{}\n").unwrap_err().to_string();
     assert!(refused.starts_with("j:3: found no checksum"), "{refused}");
@@ -169,7 +169,7 @@ fn line_ends_of_other_systems_and_a_byte_order_mark_are_read() {
     let lines = text(&[0.25, 0.75]).replace('\n', "\r\n");
     let journal = read("j", format!("\u{feff}{lines}")).unwrap().unwrap();
     assert_eq!(journal.records, read("j", text(&[0.25, 0.75])).unwrap().unwrap().records);
-    assert_eq!(journal.intact_bytes, lines.len() + 3);
+    assert_eq!(journal.end.intact_bytes, lines.len() + 3);
     let lines = text(&[0.25, 0.75]).replace('\n', "\r");
     assert_eq!(read("j", lines).unwrap().unwrap().records, journal.records);
 }

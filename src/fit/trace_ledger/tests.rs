@@ -23,7 +23,7 @@ struct Searched {
 fn searched(journal: &mut String, most: usize, asked_to_stop_at: usize) -> Searched {
     let before = journal.clone();
     let found = read::<Step>("j", &before).unwrap();
-    journal.truncate(found.as_ref().map_or(0, |found| found.intact_bytes));
+    journal.truncate(found.as_ref().map_or(0, |found| found.end.intact_bytes));
     let resume = found.as_ref().map(|found| ("j", found));
     let mut on_iterate = |now: &TraceProgress| {
         if now.iterates == asked_to_stop_at { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }

@@ -42,7 +42,7 @@ impl Problem {
         let expected = self.expected_iterates().min(most.unwrap_or(usize::MAX));
         let bar = progress::bar(expected as u64, "fit", "iterates", global.quiet);
         let journaled = Arc::new(AtomicUsize::new(resumed.as_ref().map_or(0, |found| found.records.len())));
-        let kept = self.kept(&name, "iterates", self.resume_advice(), &journaled);
+        let kept = self.kept(&name, "iterates", &journaled);
         let stops = interrupt::stops(kept.clone());
         let mut replayed = 0;
         let stages = self.problem.segment_s().to_vec();
