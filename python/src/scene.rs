@@ -30,8 +30,8 @@ pub struct Scene {
 impl Scene {
     fn made(py: Python<'_>, (file, text, driver, set): Parts) -> PyResult<Self> {
         let recording = |named: &str| {
-            let path = driver.as_deref().unwrap_or(Path::new(named));
-            read::recording(path).map(|(recording, _)| recording).map_err(|error| error.to_string())
+            let path = driver.clone().map_or_else(|| read::existing_in(Path::new(&file), named), Ok)?;
+            read::recording(&path).map(|(recording, _)| recording).map_err(|error| error.to_string())
         };
         let scene = simulate::scene::Scene::parse_with(&file, &text, recording);
         let scene = scene.map_err(|error| errors::input(py, error))?;

@@ -11,6 +11,7 @@ mod staged;
 
 use crate::program::failure::Failure;
 use crate::report::chart::{Figure, Medium};
+use crate::toml_file;
 pub use dialect::CsvDialect;
 use guard::Guard;
 pub use input::{Size, check_size, is_standard_input, read, read_json, read_text, read_toml};
@@ -32,6 +33,30 @@ pub fn display_name(path: &Path) -> String {
     }
     let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
     full.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// The folder in which a file lies.
+pub fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Where a path leads that stands in `file`: it is relative to the folder of that file, whatever the working
+/// folder is.
+pub fn path_in(file: &Path, named: &str) -> PathBuf {
+    folder_of(file).join(named)
+}
+
+/// The same where something has to be there; otherwise why it is refused.
+pub fn existing_in(file: &Path, named: &str) -> Result<PathBuf, String> {
+    let path = path_in(file, named);
+    if path.exists() {
+        return Ok(path);
+    }
+    Err(format!(
+        "found \"{named}\", but there is no `{}`; a path in a file is relative to that file{}",
+        path.display(),
+        toml_file::path_hint(named)
+    ))
 }
 
 /// A path as a file in `folder` names it: from there, or in full where no way leads from one to the other.

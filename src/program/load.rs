@@ -10,7 +10,6 @@ use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_
 use crate::recording::quality::{Check, Finding, Severity};
 use crate::simulate::scene::Scene;
 use crate::text::text_sha256;
-use crate::toml_file;
 use std::path::{Path, PathBuf};
 
 /// Reads a scene that the user named, with the recording that drives it, if one does.
@@ -22,7 +21,7 @@ pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
 pub fn read_driven_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
     let mut driver = None;
     let recording = |named: &str| {
-        let place = recording_of(path, named)?;
+        let place = files::existing_in(path, named)?;
         let loaded = load_recording(&place).map_err(|failure| failure.to_string())?;
         driver = Some(place);
         Ok(loaded.recording)
@@ -38,14 +37,10 @@ pub fn warn_of(file: &Path, findings: &[plausibility::Finding], global: &Global)
     }
 }
 
-/// Where a scene's recording lies: from the working directory, or else from the scene's folder.
-pub fn recording_of(scene: &Path, named: &str) -> Result<PathBuf, String> {
-    let in_folder = scene.parent().unwrap_or(Path::new("")).join(named);
-    let places = [PathBuf::from(named), in_folder];
-    places.iter().find(|place| place.exists()).cloned().ok_or_else(|| {
-        let searched = places.each_ref().map(|place| format!("`{}`", place.display())).join(" and ");
-        format!("found no recording \"{named}\", searched {searched}; expected its folder (data/NAME) or its trace.csv, from the working directory or the scene's folder{}", toml_file::path_hint(named))
-    })
+/// Reads the scene that another file names with its key `scene`.
+pub fn read_scene_of(file: &Path, named: &str) -> Result<Scene, Failure> {
+    let refused = |problem| Failure::Input(format!("{}: key `scene`: {problem}", file.display()));
+    read_scene(&files::existing_in(file, named).map_err(refused)?)
 }
 
 /// A recording with its description, where it has one.
@@ -59,9 +54,9 @@ impl Loaded {
     /// Sources that lie in the folder of the recording at `path` but are no longer what was imported.
     pub fn changed_sources(&self, path: &Path) -> Option<Finding> {
         let source = self.file.as_ref()?.source.as_ref()?;
-        let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
+        let description = description_of(path);
         let changed = source.file.all().iter().zip(source.sha256.all()).filter(|(name, hash)| {
-            let copy = folder.join(name);
+            let copy = files::path_in(&description, name);
             copy.is_file() && files::read(&copy).is_ok_and(|bytes| sha256(&bytes) != **hash)
         });
         let names: Vec<&str> = changed.map(|(name, _)| name.as_str()).collect();
@@ -80,9 +75,9 @@ impl Loaded {
 /// Reads the recording at `path`: a folder, or a trace alone; a description next to the trace counts in
 /// either case.
 pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
-    let (folder, trace) = places(path)?;
+    let trace = trace_of(path)?;
     let text = files::read_text(&trace)?;
-    let description = folder.join(DESCRIPTION_FILE);
+    let description = description_of(path);
     let file = if description.is_file() && !files::is_standard_input(path) {
         let shown = description.display().to_string();
         Some(RecordingFile::parse(&shown, &files::read_toml(&description)?).map_err(Failure::input)?)
@@ -92,17 +87,15 @@ pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
     let name = files::display_name(if path.is_dir() { path } else { &trace });
     let recording =
         read_recording(&name, &trace.display().to_string(), &text, file.as_ref()).map_err(Failure::input)?;
-    let recording = if file.is_none() && is_simulated(&folder, &trace, &text)? {
-        marked_synthetic(recording)?
-    } else {
-        recording
-    };
+    let recording =
+        if file.is_none() && is_simulated(&trace, &text)? { marked_synthetic(recording)? } else { recording };
     Ok(Loaded { recording, file })
 }
 
 /// Whether a command made the trace without a description, as `simulate` does: the marker of its folder says
 /// so, or where there is none the summary of the simulation.
-fn is_simulated(folder: &Path, trace: &Path, text: &str) -> Result<bool, Failure> {
+fn is_simulated(trace: &Path, text: &str) -> Result<bool, Failure> {
+    let folder = files::folder_of(trace);
     let (marker, _) = Marker::of(folder)?;
     let name = trace.file_name().unwrap_or_default().to_string_lossy();
     let Some(made) = marker.files.get(name.as_ref()) else {
@@ -118,18 +111,23 @@ fn is_simulated(folder: &Path, trace: &Path, text: &str) -> Result<bool, Failure
     )))
 }
 
-/// Folder and trace of a recording.
-fn places(path: &Path) -> Result<(PathBuf, PathBuf), Failure> {
+/// Where the description of the recording at `path` lies, if it has one.
+pub fn description_of(path: &Path) -> PathBuf {
+    let folder = if path.is_dir() { path } else { files::folder_of(path) };
+    folder.join(DESCRIPTION_FILE)
+}
+
+/// The trace of the recording at `path`.
+fn trace_of(path: &Path) -> Result<PathBuf, Failure> {
     if !path.is_dir() {
-        let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
-        return Ok((folder, path.to_owned()));
+        return Ok(path.to_owned());
     }
     let trace = path.join(TRACE_FILE);
     if !trace.is_file() {
         let advice = "expected the folder of a recording, with `trace.csv` in it; make one with `wiperlab import`, or name a trace.csv";
         return Err(Failure::Input(format!("{}: found no {TRACE_FILE}, {advice}", path.display())));
     }
-    Ok((path.to_owned(), trace))
+    Ok(trace)
 }
 
 fn marked_synthetic(recording: Recording) -> Result<Recording, Failure> {

@@ -6,7 +6,6 @@ use crate::plausibility::Finding;
 use crate::program::failure::Failure;
 use crate::program::files;
 use crate::program::load::{Loaded, load_recording, read_driven_scene};
-use crate::toml_file;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -15,9 +14,13 @@ pub struct Problem {
     pub folder: PathBuf,
     pub file: String,
     pub problem: fit::Problem,
-    /// The scenes and what is hard to believe in them, each file once.
+    /// The file of the scene of each condition.
+    pub scene_files: Vec<PathBuf>,
+    /// What is hard to believe in the scenes, each file once.
     pub doubts: BTreeMap<PathBuf, Vec<Finding>>,
-    /// The recordings with their descriptions, one for each condition of the job that has one.
+    /// Where the recordings lie, one for each condition of the job that has one.
+    pub measured_at: Vec<PathBuf>,
+    /// The recordings with their descriptions.
     pub measured: Vec<Loaded>,
     /// The recording that drives the scene of a condition, where the scene names one.
     pub drivers: Vec<Option<PathBuf>>,
@@ -34,28 +37,24 @@ impl Problem {
         }
         let file = path.display().to_string();
         let job = Job::parse(&file, &files::read_toml(path)?).map_err(Failure::input)?;
-        let folder = path.parent().map_or_else(PathBuf::new, Path::to_owned);
         let found = |key: &str, named: &str| {
-            let path = folder.join(named);
-            if path.exists() || files::is_standard_input(&path) {
-                return Ok(path);
-            }
-            Err(Failure::Input(format!(
-                "{file}: key `{key}`: found \"{named}\", expected a path from the folder of the job; there is no {}{}",
-                path.display(),
-                toml_file::path_hint(named)
-            )))
+            files::existing_in(path, named)
+                .map_err(|problem| Failure::Input(format!("{file}: key `{key}`: {problem}")))
         };
-        let scenes =
-            job.conditions.iter().map(|condition| read_driven_scene(&found("scene", &condition.scene)?));
+        let scene_files = job.conditions.iter().map(|condition| found("scene", &condition.scene));
+        let scene_files = scene_files.collect::<Result<Vec<_>, _>>()?;
+        let scenes = scene_files.iter().map(|file| read_driven_scene(file));
         let (scenes, drivers): (Vec<_>, Vec<_>) = scenes.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
-        let files = job.conditions.iter().map(|condition| folder.join(&condition.scene));
-        let doubts = files.zip(&scenes).map(|(file, scene)| (file, scene.findings())).collect();
-        let measured = job.recordings().map(|path| load_recording(&found("recording.path", path)?));
+        let doubts = scene_files.iter().zip(&scenes);
+        let doubts = doubts.map(|(file, scene)| (file.clone(), scene.findings())).collect();
+        let measured_at = job.recordings().map(|named| found("recording.path", named));
+        let measured_at = measured_at.collect::<Result<Vec<_>, _>>()?;
+        let measured = measured_at.iter().map(|path| load_recording(path));
         let measured = measured.collect::<Result<Vec<_>, _>>()?;
         let problem = fit::Problem::new(job, scenes, measured.iter().map(with_exposure).collect());
         let problem = problem.map_err(|error| Failure::Input(format!("{file}: {error}")))?;
-        Ok(Self { folder, file, problem, doubts, measured, drivers })
+        let folder = files::folder_of(path).to_owned();
+        Ok(Self { folder, file, problem, scene_files, doubts, measured_at, measured, drivers })
     }
 
     pub fn job(&self) -> &Job {
@@ -63,8 +62,8 @@ impl Problem {
     }
 
     /// Every recording with where it lies.
-    pub fn recordings(&self) -> impl Iterator<Item = (PathBuf, &Loaded)> {
-        self.job().recordings().map(|path| self.folder.join(path)).zip(&self.measured)
+    pub fn recordings(&self) -> impl Iterator<Item = (&Path, &Loaded)> {
+        self.measured_at.iter().map(PathBuf::as_path).zip(&self.measured)
     }
 }
 

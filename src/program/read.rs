@@ -36,6 +36,14 @@ pub fn problem(path: &Path) -> Result<Problem, Failure> {
     Ok(super::problem::Problem::load(path)?.problem)
 }
 
+/// Where a path leads that stands in a file: from the folder of that file.
+///
+/// # Errors
+/// Says where nothing is.
+pub fn existing_in(file: &Path, named: &str) -> Result<PathBuf, String> {
+    super::files::existing_in(file, named)
+}
+
 /// Text of a TOML file, which people write.
 ///
 /// # Errors

@@ -107,7 +107,7 @@ impl Fit {
         }
         result.check_of(problem.job(), &file).map_err(Failure::input)?;
         problem.problem.check_result(&result, &file).map_err(Failure::input)?;
-        let videos = problem.recordings().map(|(path, loaded)| Video::of(&path, loaded));
+        let videos = problem.recordings().map(|(path, loaded)| Video::of(path, loaded));
         let videos = videos.collect::<Result<_, _>>()?;
         Ok(Self { folder: folder.to_owned(), name: files::display_name(folder), problem, result, videos })
     }
@@ -139,7 +139,7 @@ impl Fit {
         let mut report = made(self.problem.job(), &self.measured(), best, &self.result);
         self.videos.iter().flatten().try_for_each(Video::check)?;
         for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.problem.recordings()) {
-            line.also(loaded.changed_sources(&path));
+            line.also(loaded.changed_sources(path));
         }
         report.provenance = origin::provenance(self)?;
         Ok(report)

@@ -5,7 +5,7 @@ use crate::program::failure::{Failure, Outcome};
 use crate::program::figures::Figures;
 use crate::program::files::{self, Maker, Overwrite, Place, Writer};
 use crate::program::global::Global;
-use crate::program::load::read_scene;
+use crate::program::load::read_scene_of;
 use crate::program::watch::Watch;
 use crate::recording::Recording;
 use crate::recording::files::{CameraEntry, DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_csv};
@@ -17,7 +17,7 @@ use crate::text::text_sha256;
 use crate::twin::spec::TwinSpec;
 use crate::twin::{Camera, View, export, observed_view, track, truth, view};
 use clap::Args;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub struct TwinArgs {
@@ -37,7 +37,7 @@ impl TwinArgs {
         let file = self.spec.display().to_string();
         let text = files::read_toml(&self.spec)?;
         let spec = TwinSpec::parse(&file, &text).map_err(Failure::input)?;
-        let scene = read_scene(&self.spec.parent().unwrap_or(Path::new("")).join(&spec.scene))?;
+        let scene = read_scene_of(&self.spec, &spec.scene)?;
         let writer = Writer::new(Maker::Twin, self.overwrite);
         Place::check(&self.out, &writer, &names(&spec))?;
         self.figures.check(&[FIGURE], self.overwrite)?;

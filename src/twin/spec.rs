@@ -51,7 +51,7 @@ struct SpecFile {
     format: u32,
     /// Title for pages and figures.
     title: String,
-    /// Scene that is filmed; from the folder of this file.
+    /// Scene that is filmed; relative to this file.
     scene: String,
     /// Seed of the noise and of the lost frames, a whole number.
     seed: u64,

@@ -176,26 +176,26 @@ const MISTAKES: [(&str, &str, &str, &[&str]); 48] = [
         SCENE,
         "recording = \"../../data/twin\"",
         "recording = \"C:\\temp\\film\"",
-        &["`drive.recording`", "found no recording", "a backslash between double quotes"],
+        &["`drive.recording`", "there is no", "a backslash between double quotes"],
     ),
     (
         SCENE,
         "recording = \"../../data/twin\"",
         "recording = \"../../data/twni\"",
-        &["`drive.recording`", "../../data/twni", "expected its folder"],
+        &["`drive.recording`", "../../data/twni", "relative to that file"],
     ),
     // jobs
     (
         JOB,
         "path = \"../../data/twin\"",
         "path = \"nowhere\"",
-        &["job.toml", "`recording.path`", "found \"nowhere\"", "from the folder of the job"],
+        &["job.toml", "`recording.path`", "found \"nowhere\"", "relative to that file"],
     ),
     (
         JOB,
         "scene = \"scene.toml\"",
         "scene = \"scene\"",
-        &["job.toml", "`scene`", "found \"scene\"", "from the folder of the job"],
+        &["job.toml", "`scene`", "found \"scene\"", "relative to that file"],
     ),
     (JOB, "seed = 1", "seed = -1", &["`seed`", "found -1", "a whole number of 0 or more"]),
     (

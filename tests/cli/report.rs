@@ -153,7 +153,7 @@ fn a_recording_that_drives_the_scene_is_among_the_files() {
     let project = Project::with_fits(&[]);
     let scene = project.read("data/scenes/actual-blade.toml");
     let (from, to) = (scene.find("[drive]").unwrap(), scene.find("[start]").unwrap());
-    let driven = format!("{}[drive]\nrecording = \"data/twin\"\n\n{}", &scene[..from], &scene[to..]);
+    let driven = format!("{}[drive]\nrecording = \"../twin\"\n\n{}", &scene[..from], &scene[to..]);
     project.write(
         "data/scenes/actual-blade.toml",
         &driven.replacen("time_s = ", "time_s = 0.0 # ", 1).replacen("stop_s = ", "stop_s = 0.58 # ", 1),

@@ -297,8 +297,7 @@ fn a_run_that_is_killed_leaves_nothing() {
     assert_eq!(names(folder.path()), ["scene.toml"]);
 }
 
-/// The head as another run has shown it; the recording is found from the working directory, or else beside
-/// the scene.
+/// The head as another run has shown it; the recording is sought beside the scene.
 #[test]
 fn a_recording_drives_the_head_in_every_command_that_reads_scenes() {
     // (at rest the least error of the head's velocity would decide between stick and slip, so both runs start
@@ -337,12 +336,10 @@ fn a_recording_drives_the_head_in_every_command_that_reads_scenes() {
         );
         assert!(!none.exists());
     };
+    let nowhere = format!("there is no `{}`", folder.path().join("data/nowhere").display());
     refused(
         "data/nowhere",
-        &[
-            "found no recording \"data/nowhere\", searched `data/nowhere` and `",
-            "from the working directory or the scene's folder",
-        ],
+        &["found \"data/nowhere\", ", &nowhere, "a path in a file is relative to that file"],
     );
     refused("scene.toml", &["scene.toml:1:1: found the header"]);
     let text = fs::read_to_string(out.join("trace.csv")).unwrap();
@@ -358,6 +355,39 @@ fn a_recording_drives_the_head_in_every_command_that_reads_scenes() {
             "found a run from 0.05 s to 0.25 s, expected one within the 0 s to 0.098 s in which `short` tracks the head",
         ],
     );
+}
+
+/// A folder of the same name where the program runs is another recording, which nobody meant.
+#[test]
+fn a_path_in_a_file_is_relative_to_that_file_wherever_the_program_runs() {
+    let (folder, file, _) = folder_with("scene.toml", &scene());
+    let here = folder.path().join("here");
+    fs::create_dir(&here).unwrap();
+    let at = |name: &str, arguments: &[&str]| {
+        let mut command = Command::cargo_bin("wiperlab").unwrap();
+        let output = command.current_dir(folder.path().join(name)).args(arguments).output().unwrap();
+        (output.status.code().unwrap(), String::from_utf8(output.stderr).unwrap())
+    };
+    assert_eq!(at("", &["simulate", "scene.toml", "--out", "head"]), (0, String::new()));
+    let drive = "amplitude_m = 0.0138\nfrequency_hz = 0.915";
+    let driven = scene().replace("time_s = 0.0", "time_s = 0.05").replace(drive, "recording = \"head\"");
+    fs::write(&file, driven).unwrap();
+    fs::create_dir(here.join("head")).unwrap();
+    fs::write(here.join("head/trace.csv"), "another recording\n").unwrap();
+    fs::write(here.join("scene.toml"), "another scene\n").unwrap();
+    let spec = folder.path().join("twin.toml");
+    fs::write(&spec, TWIN).unwrap();
+    assert_eq!(at("here", &["simulate", "../scene.toml", "--out", "run"]), (0, String::new()));
+    assert_eq!(at("here", &["twin", "../twin.toml", "--out", "film"]).0, 0);
+
+    fs::rename(folder.path().join("head"), folder.path().join("gone")).unwrap();
+    let (code, said) = at("here", &["simulate", "../scene.toml", "--out", "other"]);
+    assert!(code == 2 && said.contains("found \"head\", but there is no `../head`"), "{said}");
+    assert!(said.contains("a path in a file is relative to that file"), "{said}");
+    fs::rename(&file, folder.path().join("gone.toml")).unwrap();
+    let (code, said) = at("here", &["twin", "../twin.toml", "--out", "other"]);
+    let missing = "../twin.toml: key `scene`: found \"scene.toml\", but there is no `../scene.toml`";
+    assert!(code == 2 && said.contains(missing), "{said}");
 }
 
 #[test]
@@ -533,7 +563,7 @@ fn bad_twins_are_refused_and_short_ones_say_so() {
         "nois_px",
         &["twin.toml:9:1: unknown key `camera.nois_px`; did you mean `noise_px`?"],
     );
-    refused("scene.toml", "other.toml", &["other.toml: no such file"]);
+    refused("scene.toml", "other.toml", &["key `scene`: found \"other.toml\", but there is no `"]);
     refused(
         "[export]",
         "[window]\nstart_s = 0.0\nstop_s = 5.0\n[export]",

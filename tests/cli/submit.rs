@@ -318,7 +318,7 @@ fn what_every_task_would_refuse_is_refused_before() {
     site.write("sweeps/small.toml", &STUDY.replace("preload_force_n", "preload_forse_n"));
     site.refused(&three, &["sweeps/small.toml", "blade.preload_forse_n"]);
     site.write("sweeps/small.toml", &STUDY.replace("light-blade.toml", "no-blade.toml"));
-    site.refused(&three, &["no-blade.toml: no such file"]);
+    site.refused(&three, &["key `scene`: found \"", "no-blade.toml`"]);
     site.write("sweeps/small.toml", &STUDY.replace("from = 0.05", "from = -0.05"));
     site.refused(&three, &["axis `blade.preload_force_n`", "found -0.05"]);
     assert_eq!(site.notes(), "", "something was submitted");

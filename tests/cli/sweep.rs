@@ -304,7 +304,7 @@ fn a_killed_study_goes_on_to_the_same_bytes() {
 fn what_cannot_be_run_is_refused_and_nothing_is_written() {
     let project = Project::with(SWEEP);
     let cases: [(&str, &str, &[&str]); 6] = [
-        ("light-blade.toml", "no-blade.toml", &["no-blade.toml: no such file; check the path"]),
+        ("light-blade.toml", "no-blade.toml", &["key `scene`: found \"", "there is no `", "no-blade.toml`"]),
         ("[[map]]", "[[maps]]", &["sweeps/small.toml:19:3: unknown key `maps`; did you mean `map`?"]),
         (
             "from = 0.05",

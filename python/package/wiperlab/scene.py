@@ -46,7 +46,7 @@ class Scene:
 
     @classmethod
     def parse(cls, text: str, file: str = "scene.toml") -> Scene:
-        """Reads the text of a scene.toml; ``file`` is its name in refusals."""
+        """Reads the text of a scene.toml; ``file`` is its name in refusals, and paths are relative to it."""
         return cls(NativeScene.parse(text, file))
 
     def replace(self, values: Mapping[str, float]) -> Scene:

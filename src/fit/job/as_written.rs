@@ -19,7 +19,7 @@ pub struct Job {
     pub format: u32,
     /// Title for pages and figures.
     pub title: String,
-    /// Scene that gives all values that the job does not; from the folder of the job.
+    /// Scene that gives all values that the job does not; relative to this file.
     pub scene: String,
     /// Seed of the search, a whole number.
     pub seed: u64,
@@ -71,7 +71,7 @@ pub struct Ensemble {
 pub struct Recording {
     /// Different from every other; "recording N" if left out.
     pub name: Option<String>,
-    /// Folder of the recording, from the folder of the job.
+    /// Folder of the recording, or its trace.csv; relative to this file.
     pub path: String,
     /// Its own scene; that of the job if left out.
     pub scene: Option<String>,

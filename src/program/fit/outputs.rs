@@ -104,7 +104,7 @@ impl Problem {
     fn scene(&self, at: usize, run: &ModelRun, result: &FitResult) -> Result<Option<String>, Failure> {
         let condition = &self.job().conditions[at];
         let recording = self.measured.get(at).map(|loaded| &loaded.recording);
-        let own = condition.recording.as_ref().map(|path| self.folder.join(path));
+        let own = self.measured_at.get(at).cloned();
         let by_trace =
             self.problem.traces().iter().find(|trace| trace.condition == at).map(|trace| trace.head);
         let driven = [Some(condition.head), by_trace].contains(&Some(Head::Recording));

@@ -5,10 +5,10 @@ use crate::import::sha256;
 use crate::program::failure::Failure;
 use crate::program::files;
 use crate::program::files::RESULT;
-use crate::program::load::{Loaded, load_recording, recording_of};
+use crate::program::load::{Loaded, description_of, load_recording};
 use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE};
 use crate::report::{Provenance, SourceFile};
-use std::path::{Component, Path, PathBuf};
+use std::path::{Component, Path};
 
 pub fn provenance(fit: &Fit) -> Result<Provenance, Failure> {
     let within = format!("fits/{}", fit.name);
@@ -17,11 +17,11 @@ pub fn provenance(fit: &Fit) -> Result<Provenance, Failure> {
         hashed("job", named(JOB), &fit.folder.join(JOB), false)?,
         hashed("result", named(RESULT), &fit.folder.join(RESULT), fit.result.synthetic)?,
     ];
-    for condition in &fit.problem.job().conditions {
-        files.extend(scene(named(&condition.scene), &fit.problem.folder.join(&condition.scene))?);
+    for (condition, file) in fit.problem.job().conditions.iter().zip(&fit.problem.scene_files) {
+        files.extend(scene(named(&condition.scene), file)?);
     }
     for (named, (path, loaded)) in fit.problem.job().recordings().map(named).zip(fit.problem.recordings()) {
-        files.extend(recording("", &named, &path, loaded)?);
+        files.extend(recording("", &named, path, loaded)?);
     }
     let mut once: Vec<SourceFile> = Vec::new();
     for file in files {
@@ -47,14 +47,7 @@ fn scene(name: String, path: &Path) -> Result<Vec<SourceFile>, Failure> {
         text.parse().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
     let drive = written.get("drive").and_then(|drive| drive.get("recording")).and_then(toml::Value::as_str);
     if let Some(named) = drive {
-        let at = recording_of(path, named)
-            .map_err(|problem| Failure::Input(format!("{}: {problem}", path.display())))?;
-        // named from the working directory, or else from the scene's folder
-        let shown = if at == Path::new(named) {
-            named.to_owned()
-        } else {
-            tidy(name.rsplit_once('/').map_or("", |(folder, _)| folder), named)
-        };
+        let (at, shown) = (files::path_in(path, named), tidy(&parent(&name), named));
         found.extend(recording("drive ", &shown, &at, &load_recording(&at)?)?);
     }
     Ok(found)
@@ -63,21 +56,17 @@ fn scene(name: String, path: &Path) -> Result<Vec<SourceFile>, Failure> {
 /// Trace, description and exports of a recording; the hashes of exports are those of its import.
 fn recording(role: &str, name: &str, path: &Path, loaded: &Loaded) -> Result<Vec<SourceFile>, Failure> {
     let synthetic = loaded.recording.is_synthetic();
-    let (folder, within, trace) = match path.is_dir() {
-        true => (path.to_owned(), name.to_owned(), TRACE_FILE.to_owned()),
-        false => {
-            (path.parent().map_or_else(PathBuf::new, Path::to_owned), parent(name), files::display_name(path))
-        }
+    let (within, trace) = match path.is_dir() {
+        true => (name.to_owned(), TRACE_FILE.to_owned()),
+        false => (parent(name), files::display_name(path)),
     };
     let placed = |file: &str| tidy(&within, file);
-    let mut found = vec![hashed(&format!("{role}trace"), placed(&trace), &folder.join(&trace), synthetic)?];
+    let description = description_of(path);
+    let trace_path = files::path_in(&description, &trace);
+    let mut found = vec![hashed(&format!("{role}trace"), placed(&trace), &trace_path, synthetic)?];
     if loaded.file.is_some() {
-        found.push(hashed(
-            &format!("{role}description"),
-            placed(DESCRIPTION_FILE),
-            &folder.join(DESCRIPTION_FILE),
-            synthetic,
-        )?);
+        let kind = format!("{role}description");
+        found.push(hashed(&kind, placed(DESCRIPTION_FILE), &description, synthetic)?);
     }
     let exports = loaded.file.iter().filter_map(|file| file.source.as_ref());
     let export = |(name, sha256): (&String, &String)| SourceFile {

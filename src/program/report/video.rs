@@ -2,8 +2,8 @@
 
 use crate::program::failure::Failure;
 use crate::program::files;
-use crate::program::load::Loaded;
-use crate::recording::files::{DESCRIPTION_FILE, FilesError, Place};
+use crate::program::load::{Loaded, description_of};
+use crate::recording::files::{FilesError, Place};
 use crate::recording::film::{Film, Picture, Pictures};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -25,13 +25,13 @@ impl Video {
         else {
             return Ok(None);
         };
-        let folder = if path.is_dir() { path } else { path.parent().unwrap_or(Path::new("")) };
-        let description = folder.join(DESCRIPTION_FILE).display().to_string();
+        let described = description_of(path);
+        let description = described.display().to_string();
         let place = video.place(&description, &file.camera, file.level.as_ref()).map_err(Failure::input)?;
-        let frames = folder.join(&video.frames);
+        let frames = files::path_in(&described, &video.frames);
         let refuse = |found: &str| {
             let problem = format!(
-                "found \"{}\", expected a folder of PNG pictures, a frame each, or one PNG, from the folder of the recording; {} {found}",
+                "found \"{}\", expected a folder of PNG pictures, a frame each, or one PNG, relative to this file; {} {found}",
                 video.frames,
                 frames.display()
             );

@@ -2,7 +2,7 @@
 
 use crate::program::failure::Failure;
 use crate::program::files;
-use crate::program::load::read_scene;
+use crate::program::load::read_scene_of;
 use crate::simulate::scene::Scene;
 use crate::sweep::journal::{Header, header};
 use crate::sweep::{CollectError, Collection, Study};
@@ -22,7 +22,7 @@ impl Problem {
         let file = path.display().to_string();
         let text = files::read_toml(path)?;
         let study = Study::parse(&file, &text).map_err(Failure::input)?;
-        let scene = read_scene(&path.parent().unwrap_or(Path::new("")).join(&study.scene))?;
+        let scene = read_scene_of(path, &study.scene)?;
         study.check_scene(&file, &scene).map_err(Failure::input)?;
         let fingerprint = study.fingerprint(&scene);
         Ok(Self { study, scene, fingerprint })

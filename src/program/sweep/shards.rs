@@ -10,7 +10,7 @@ use crate::program::shards::{SHARDS, journal_of, look_into, shard_files};
 use crate::sweep::journal::Point;
 use serde::{Deserialize, Serialize};
 use std::fs;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 /// Which study they are of.
 const NOTE: &str = "study.json";
@@ -18,7 +18,7 @@ const NOTE: &str = "study.json";
 /// What the note says.
 #[derive(Serialize, Deserialize)]
 struct Note {
-    /// Path of the study from the folder of the results, with `/`; absolute where there is no such way.
+    /// Path of the study from the folder of the note.
     study: String,
 }
 
@@ -74,11 +74,8 @@ fn note(study: &Path, out: &Path) -> Result<(), Failure> {
     let folder = out.join(SHARDS);
     let made = |error| Failure::Internal(format!("{}: cannot be made: {error}", folder.display()));
     fs::create_dir_all(&folder).map_err(made)?;
-    let absolute = |path: &Path| {
-        path.canonicalize()
-            .map_err(|error| Failure::Input(format!("{}: cannot be found: {error}", path.display())))
-    };
-    let study = way(&absolute(out)?, &absolute(study)?);
+    // (a folder that several machines share may have another place on each)
+    let study = files::path_from(&folder, study)?;
     let note = serde_json::to_string(&Note { study }).map_err(Failure::internal)? + "\n";
     if fs::read_to_string(folder.join(NOTE)).is_ok_and(|found| found == note) {
         return Ok(());
@@ -100,32 +97,6 @@ pub fn study_of(out: &Path) -> Result<PathBuf, Failure> {
     }
     let note: Note = serde_json::from_str(&files::read_json(&path)?)
         .map_err(|error| refused(format!("cannot be read: {error}")))?;
-    let study = out.join(note.study);
+    let study = files::path_in(&path, &note.study);
     Ok(study.canonicalize().unwrap_or(study))
-}
-
-/// The way from a folder to a file, both absolute: a folder that several machines share may have another
-/// place on each.
-fn way(from: &Path, to: &Path) -> String {
-    let common = from.components().zip(to.components()).take_while(|(a, b)| a == b).count();
-    if !from.components().take(common).any(|part| matches!(part, Component::Normal(_))) {
-        return to.to_string_lossy().into_owned();
-    }
-    let up = from.components().skip(common).map(|_| "..".to_owned());
-    let down = to.components().skip(common).map(|part| part.as_os_str().to_string_lossy().into_owned());
-    up.chain(down).collect::<Vec<_>>().join("/")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_way_to_a_study_holds_where_both_are_moved_together() {
-        let of = |from: &str, to: &str| way(Path::new(from), Path::new(to));
-        assert_eq!(of("/share/a/out", "/share/a/study.toml"), "../study.toml");
-        assert_eq!(of("/share/a/out/x", "/share/b/study.toml"), "../../../b/study.toml");
-        assert_eq!(of("/share/a", "/share/a/study.toml"), "study.toml");
-        assert_eq!(of("/share/a", "/home/study.toml"), "/home/study.toml");
-    }
 }

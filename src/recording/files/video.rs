@@ -15,8 +15,8 @@ const LENGTHS_M: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct VideoEntry {
-    /// Folder of PNG pictures, a frame each, in the order of their names, or a single PNG; from the folder of
-    /// the recording.
+    /// Folder of PNG pictures, a frame each, in the order of their names, or a single PNG; relative to
+    /// this file.
     pub frames: String,
     /// Number of the frame that the first picture shows, counted from 0; 0 if left out.
     #[serde(default)]

@@ -56,7 +56,7 @@ pub(crate) struct DriveFile {
     /// Time at which the head starts from one end of its stroke, s; 0 if left out.
     #[schemars(with = "Option<f64>")]
     pub(super) delay_s: Option<Spanned<f64>>,
-    /// Folder of a recording whose head drives the scene, from the working directory or the scene's folder.
+    /// Folder of a recording whose head drives the scene, or its trace.csv; relative to this file.
     #[schemars(with = "Option<String>")]
     pub(super) recording: Option<Spanned<String>>,
 }

@@ -17,7 +17,7 @@ pub struct Study {
     pub format: u32,
     /// Title for pages and figures.
     pub title: String,
-    /// Scene whose parameters vary; from the folder of the study.
+    /// Scene whose parameters vary; relative to this file.
     pub scene: String,
     /// Camera through which every run is seen.
     pub camera: Camera,
