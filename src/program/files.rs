@@ -17,6 +17,7 @@ use guard::Guard;
 pub use input::{Size, check_size, is_standard_input, read, read_json, read_text, read_toml};
 pub use kept::{SIMULATION_SUMMARY, is_simulation_summary};
 pub use maker::{Maker, Overwrite, Writer};
+use marker::MARKER;
 pub use marker::Marker;
 pub use staged::{Staging, check_free};
 use std::fs::File;
@@ -161,7 +162,7 @@ impl Place {
     /// `names` must not replace: asked before the work, as it is again when they are placed.
     pub fn check(folder: &Path, writer: &Writer, names: &[&str]) -> Result<Self, Failure> {
         let near = Self::writable(folder)?;
-        names.iter().try_for_each(|name| check_free(&folder.join(name)))?;
+        names.iter().chain([&MARKER]).try_for_each(|name| check_free(&folder.join(name)))?;
         let guard = Guard::of(folder, writer, names)?;
         names.iter().try_for_each(|name| guard.admit(name, None).map(|_| ()))?;
         Ok(Self { folder: folder.to_owned(), writer: writer.clone(), near })

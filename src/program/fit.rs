@@ -33,8 +33,8 @@ use std::time::{Duration, Instant};
 
 #[derive(Debug, Args)]
 pub struct FitArgs {
-    /// Job of the fit (fits/NAME/job.toml); several are fitted one after the other, each in a folder of its
-    /// own
+    /// Job of the fit (fits/NAME/job.toml), or its folder; several are fitted one after the other, each in a
+    /// folder of its own
     #[arg(required = true, value_name = "JOB")]
     pub jobs: Vec<PathBuf>,
     /// Go on from the journal next to the job; without this a new one is begun and the old one kept as

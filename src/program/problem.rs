@@ -9,9 +9,19 @@ use crate::program::load::{Loaded, load_recording, read_driven_scene};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+/// The job of a fit in its folder.
+pub const JOB: &str = "job.toml";
+
+/// The file of a job that is named by that file or by its folder.
+pub fn job_file(named: &Path) -> PathBuf {
+    if named.is_dir() { named.join(JOB) } else { named.to_owned() }
+}
+
 /// A problem with where it lies on disk.
 pub struct Problem {
     pub folder: PathBuf,
+    /// The file of the job, and its name in messages.
+    pub path: PathBuf,
     pub file: String,
     pub problem: fit::Problem,
     /// The file of the scene of each condition.
@@ -27,18 +37,19 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Reads and checks a job, its scenes and its recordings.
-    pub fn load(path: &Path) -> Result<Self, Failure> {
-        if files::is_standard_input(path) {
+    /// Reads and checks a job, named by its file or its folder, its scenes and its recordings.
+    pub fn load(named: &Path) -> Result<Self, Failure> {
+        let path = job_file(named);
+        if files::is_standard_input(&path) {
             let expected = "a file: journal and result of a fit lie next to its job";
             return Err(Failure::Input(format!(
                 "-: found standard input, expected {expected}; save it as job.toml"
             )));
         }
         let file = path.display().to_string();
-        let job = Job::parse(&file, &files::read_toml(path)?).map_err(Failure::input)?;
+        let job = Job::parse(&file, &files::read_toml(&path)?).map_err(Failure::input)?;
         let found = |key: &str, named: &str| {
-            files::existing_in(path, named)
+            files::existing_in(&path, named)
                 .map_err(|problem| Failure::Input(format!("{file}: key `{key}`: {problem}")))
         };
         let scene_files = job.conditions.iter().map(|condition| found("scene", &condition.scene));
@@ -53,8 +64,8 @@ impl Problem {
         let measured = measured.collect::<Result<Vec<_>, _>>()?;
         let problem = fit::Problem::new(job, scenes, measured.iter().map(with_exposure).collect());
         let problem = problem.map_err(|error| Failure::Input(format!("{file}: {error}")))?;
-        let folder = files::folder_of(path).to_owned();
-        Ok(Self { folder, file, problem, scene_files, doubts, measured_at, measured, drivers })
+        let folder = files::folder_of(&path).to_owned();
+        Ok(Self { folder, path, file, problem, scene_files, doubts, measured_at, measured, drivers })
     }
 
     pub fn job(&self) -> &Job {

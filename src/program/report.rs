@@ -13,7 +13,7 @@ use crate::program::failure::{Failure, Outcome};
 use crate::program::files;
 use crate::program::files::{Maker, Overwrite, RESULT, Writer};
 use crate::program::global::Global;
-use crate::program::problem::Problem;
+use crate::program::problem::{Problem, job_file};
 use crate::program::progress;
 use crate::report::Report;
 use crate::report::comparison;
@@ -25,12 +25,9 @@ use folder::Output;
 use std::path::{Path, PathBuf};
 use video::Video;
 
-/// File of a fit that is written by hand.
-const JOB: &str = "job.toml";
-
 #[derive(Debug, Args)]
 pub struct ReportArgs {
-    /// Folder of a fit (fits/NAME), with its job.toml and result.json; several are compared
+    /// Folder of a fit (fits/NAME), with its job.toml and result.json, or its job; several are compared
     #[arg(required = true, value_name = "FIT")]
     pub fits: Vec<PathBuf>,
     /// Folder of the report (default: reports/NAME next to the fits, of several reports/A-and-B)
@@ -46,14 +43,14 @@ pub struct ReportArgs {
 impl ReportArgs {
     pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
         let writer = Writer::new(Maker::Report, self.overwrite).csv(global.csv_dialect);
-        let missed = match self.fits.as_slice() {
-            [fit] => write(
-                fit,
-                &self.out.clone().unwrap_or_else(|| reports_folder(fit).join(files::display_name(fit))),
-                &writer,
-                global,
-            )?,
-            fits => several::write(fits, self.out.as_deref(), &writer, global)?,
+        let jobs: Vec<PathBuf> = self.fits.iter().map(|fit| job_file(fit)).collect();
+        let missed = match jobs.as_slice() {
+            [job] => {
+                let fit = files::folder_of(job);
+                let out = || reports_folder(fit).join(files::display_name(fit));
+                write(job, &self.out.clone().unwrap_or_else(out), &writer, global)?
+            }
+            jobs => several::write(jobs, self.out.as_deref(), &writer, global)?,
         };
         Ok(if self.check && missed { Outcome::StoppedEarly } else { Outcome::Done })
     }
@@ -67,7 +64,6 @@ fn reports_folder(fit: &Path) -> PathBuf {
 
 /// A fit with its result, which belongs to the job as it is now.
 struct Fit {
-    folder: PathBuf,
     name: String,
     problem: Problem,
     result: FitResult,
@@ -79,20 +75,14 @@ struct Fit {
 type MadeBy = fn(&Job, &[Measured], &[ModelRun], &FitResult) -> Report;
 
 impl Fit {
-    fn load(folder: &Path) -> Result<Self, Failure> {
-        if folder.is_file() {
-            return Err(Failure::Input(format!(
-                "{}: a file, expected the folder of a fit, with its {JOB} and {RESULT}",
-                folder.display()
-            )));
-        }
-        let problem = Problem::load(&folder.join(JOB))?;
-        let path = folder.join(RESULT);
+    fn load(job: &Path) -> Result<Self, Failure> {
+        let problem = Problem::load(job)?;
+        let path = problem.folder.join(RESULT);
         if !path.exists() {
             return Err(Failure::Input(format!(
                 "{}: no such file; run `wiperlab fit {}` first",
                 path.display(),
-                folder.join(JOB).display()
+                problem.file
             )));
         }
         let file = path.display().to_string();
@@ -109,7 +99,7 @@ impl Fit {
         problem.problem.check_result(&result, &file).map_err(Failure::input)?;
         let videos = problem.recordings().map(|(path, loaded)| Video::of(path, loaded));
         let videos = videos.collect::<Result<_, _>>()?;
-        Ok(Self { folder: folder.to_owned(), name: files::display_name(folder), problem, result, videos })
+        Ok(Self { name: files::display_name(&problem.folder), problem, result, videos })
     }
 
     fn measured(&self) -> Vec<Measured<'_>> {

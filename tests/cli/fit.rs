@@ -103,6 +103,46 @@ fn a_fit_writes_its_result_with_every_key_and_a_journal_line_an_evaluation() {
 }
 
 #[test]
+fn a_job_is_named_by_its_file_or_its_folder_from_any_folder() {
+    let project = Project::with(JOB);
+    project.drive_by_the_twin();
+    let fitted = |folder: &str, job: &str| {
+        let (code, _, said) = project.run_in(folder, &["fit", job, "--max-evaluations", "12", "--quiet"]);
+        assert_eq!(code, 3, "{folder} {job}: {said}");
+        let result = files(&project.path("fits/x"));
+        fs::remove_dir_all(project.path("fits/x")).unwrap();
+        project.write("fits/x/job.toml", JOB);
+        result
+    };
+    let usual = fitted("", "fits/x/job.toml");
+    let scene = String::from_utf8(usual["fitted-scene.toml"].clone()).unwrap();
+    assert!(scene.contains("recording = \"../../data/twin\""), "{scene}");
+    for (folder, job) in [("", "fits/x"), ("fits/x", "job.toml"), ("fits/x", "."), ("data", "../fits/x")] {
+        assert!(fitted(folder, job) == usual, "{folder} {job}");
+    }
+    assert_eq!(project.run(&["fit", "fits/x", "--max-evaluations", "12"]).0, 3);
+    for (at, (folder, fit)) in [("", "fits/x"), ("fits/x", "."), ("fits/x", "job.toml")].iter().enumerate() {
+        let (code, _, said) = project.run_in(folder, &["report", fit, "--quiet"]);
+        assert_eq!(code, 0, "{folder} {fit}: {said}");
+        fs::rename(project.path("reports/x"), project.path(&format!("page{at}"))).unwrap();
+    }
+    let page = |at: usize| {
+        project.read(&format!("page{at}/index.html")) + &project.read(&format!("page{at}/report.json"))
+    };
+    assert!(page(0) == page(1) && page(0) == page(2));
+}
+
+#[test]
+fn what_cannot_be_written_is_refused_before_the_search() {
+    let project = Project::with(JOB);
+    for name in ["result.json", "comparison.csv", "fitted-scene.toml", "parameters.csv", ".wiperlab.json"] {
+        fs::create_dir(project.path(&format!("fits/x/{name}"))).unwrap();
+        project.refused(&["fit", "fits/x"], &[&format!("fits/x/{name}: is a folder, expected a file")]);
+        fs::remove_dir(project.path(&format!("fits/x/{name}"))).unwrap();
+    }
+}
+
+#[test]
 fn a_resumed_fit_ends_like_one_that_was_never_stopped_on_any_number_of_threads() {
     let project = Project::with(JOB);
     project.fit(&["--threads", "1"]);

@@ -26,6 +26,15 @@ impl Project {
         assert_eq!((code, stderr.as_str()), (3, ""), "{folder}");
     }
 
+    /// The head of the recording `data/twin` drives the scene.
+    pub fn drive_by_the_twin(&self) {
+        let scene = self.read("data/scenes/actual-blade.toml");
+        let (from, to) = (scene.find("[drive]").unwrap(), scene.find("[start]").unwrap());
+        let driven = format!("{}[drive]\nrecording = \"../twin\"\n\n{}", &scene[..from], &scene[to..]);
+        let driven = driven.replacen("time_s = ", "time_s = 0.0 # ", 1);
+        self.write("data/scenes/actual-blade.toml", &driven.replacen("stop_s = ", "stop_s = 0.58 # ", 1));
+    }
+
     fn json(&self, folder: &str) -> Value {
         serde_json::from_str(&self.read(&format!("{folder}/report.json"))).unwrap()
     }
@@ -151,13 +160,7 @@ fn a_report_is_made_again_byte_for_byte_and_every_file_says_that_the_recording_i
 #[test]
 fn a_recording_that_drives_the_scene_is_among_the_files() {
     let project = Project::with_fits(&[]);
-    let scene = project.read("data/scenes/actual-blade.toml");
-    let (from, to) = (scene.find("[drive]").unwrap(), scene.find("[start]").unwrap());
-    let driven = format!("{}[drive]\nrecording = \"../twin\"\n\n{}", &scene[..from], &scene[to..]);
-    project.write(
-        "data/scenes/actual-blade.toml",
-        &driven.replacen("time_s = ", "time_s = 0.0 # ", 1).replacen("stop_s = ", "stop_s = 0.58 # ", 1),
-    );
+    project.drive_by_the_twin();
     project.quick_fit("fits/x", JOB);
     project.reported(&["fits/x"]);
     let files = project.json("reports/x")["provenance"]["files"].clone();
@@ -274,8 +277,9 @@ fn fits_that_cannot_be_compared_are_refused_and_nothing_is_written() {
         &["fits/a", "fits/stale"],
         &["fits/stale/result.json: fingerprint", "run `wiperlab fit` again"],
     );
-    project.report_refused(&["fits/a", "fits/none"], &["fits/none/job.toml: no such file"]);
-    project.report_refused(&["fits/a/job.toml"], &["fits/a/job.toml: a file, expected the folder of a fit"]);
+    project.report_refused(&["fits/a", "fits/none"], &["fits/none: no such file"]);
+    project.report_refused(&["fits/a", "fits"], &["fits/job.toml: no such file"]);
+    project.report_refused(&["fits/a", "fits/a/job.toml"], &["fits/a: given twice"]);
     let long = "n".repeat(98);
     fs::rename(project.path("other/a"), project.path(&format!("fits/{long}"))).unwrap();
     project.report_refused(
@@ -306,7 +310,6 @@ fn a_result_that_was_edited_and_a_folder_that_is_taken_are_refused_and_nothing_i
         &["fits/x/result.json: not the result of a fit: EOF", " at line ", "run `wiperlab fit` again"],
     );
     project.write("fits/x/result.json", &result);
-    project.report_refused(&["fits/x/job.toml"], &["fits/x/job.toml: a file, expected the folder of a fit"]);
     fs::create_dir_all(project.path("taken/report.json")).unwrap();
     project.report_refused(
         &["fits/x", "--out", "taken"],

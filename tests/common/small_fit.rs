@@ -84,8 +84,13 @@ impl Project {
 
     /// Exit code, standard output and standard error.
     pub fn run(&self, arguments: &[&str]) -> (i32, String, String) {
+        self.run_in("", arguments)
+    }
+
+    /// The same of a program that runs in a folder of the project.
+    pub fn run_in(&self, folder: &str, arguments: &[&str]) -> (i32, String, String) {
         let output = Command::new(env!("CARGO_BIN_EXE_wiperlab"))
-            .current_dir(self.folder.path())
+            .current_dir(self.path(folder))
             .args(arguments)
             .output()
             .unwrap();

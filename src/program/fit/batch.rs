@@ -7,7 +7,7 @@ use crate::program::files::{self, RESULT};
 use crate::program::global::Global;
 use crate::program::interrupt;
 use crate::program::journal::JOURNAL;
-use crate::program::problem::Problem;
+use crate::program::problem::{Problem, job_file};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -50,8 +50,8 @@ impl Standing {
 pub fn check_folders(jobs: &[PathBuf]) -> Result<(), Failure> {
     let mut folders: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     for job in jobs {
-        let folder = job.parent().unwrap_or(Path::new(""));
-        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let file = job_file(job);
+        let folder = files::folder_of(&file);
         let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         if let Some(other) = folders.insert(folder, job) {
             return Err(Failure::Input(format!(

@@ -17,7 +17,8 @@ impl Problem {
     pub fn check_place(&self, writer: &Writer) -> Result<(), Failure> {
         let names = self.names();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        Place::check(&self.folder, writer, &names).map(|_| ())
+        Place::check(&self.folder, writer, &names)?;
+        (0..self.job().conditions.len()).try_for_each(|at| self.driver(at).map(|_| ()))
     }
 
     fn names(&self) -> Vec<String> {
@@ -101,15 +102,20 @@ impl Problem {
         Ok(files)
     }
 
-    fn scene(&self, at: usize, run: &ModelRun, result: &FitResult) -> Result<Option<String>, Failure> {
+    /// The recording that drives the fitted scene of a condition, as that scene names it.
+    fn driver(&self, at: usize) -> Result<Option<String>, Failure> {
         let condition = &self.job().conditions[at];
-        let recording = self.measured.get(at).map(|loaded| &loaded.recording);
-        let own = self.measured_at.get(at).cloned();
         let by_trace =
             self.problem.traces().iter().find(|trace| trace.condition == at).map(|trace| trace.head);
         let driven = [Some(condition.head), by_trace].contains(&Some(Head::Recording));
-        let driver = if driven { own } else { self.drivers[at].clone() };
-        let driver = driver.map(|path| files::path_from(&self.folder, &path)).transpose()?;
+        let driver = if driven { self.measured_at.get(at) } else { self.drivers[at].as_ref() };
+        driver.map(|path| files::path_from(&self.folder, path)).transpose()
+    }
+
+    fn scene(&self, at: usize, run: &ModelRun, result: &FitResult) -> Result<Option<String>, Failure> {
+        let condition = &self.job().conditions[at];
+        let recording = self.measured.get(at).map(|loaded| &loaded.recording);
+        let driver = self.driver(at)?;
         Ok(fitted_scene(&Fitted {
             scene: &run.scene,
             condition: &condition.name,

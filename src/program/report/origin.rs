@@ -1,11 +1,12 @@
 //! Where the numbers of a fit come from: its files with their hashes, and the commands that make it again.
 
-use super::{Fit, JOB};
+use super::Fit;
 use crate::import::sha256;
 use crate::program::failure::Failure;
 use crate::program::files;
 use crate::program::files::RESULT;
 use crate::program::load::{Loaded, description_of, load_recording};
+use crate::program::problem::JOB;
 use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE};
 use crate::report::{Provenance, SourceFile};
 use std::path::{Component, Path};
@@ -13,9 +14,10 @@ use std::path::{Component, Path};
 pub fn provenance(fit: &Fit) -> Result<Provenance, Failure> {
     let within = format!("fits/{}", fit.name);
     let named = |path: &str| tidy(&within, path);
+    let job = fit.problem.path.file_name().unwrap_or_default().to_string_lossy();
     let mut files = vec![
-        hashed("job", named(JOB), &fit.folder.join(JOB), false)?,
-        hashed("result", named(RESULT), &fit.folder.join(RESULT), fit.result.synthetic)?,
+        hashed("job", named(&job), &fit.problem.path, false)?,
+        hashed("result", named(RESULT), &fit.problem.folder.join(RESULT), fit.result.synthetic)?,
     ];
     for (condition, file) in fit.problem.job().conditions.iter().zip(&fit.problem.scene_files) {
         files.extend(scene(named(&condition.scene), file)?);
@@ -29,7 +31,9 @@ pub fn provenance(fit: &Fit) -> Result<Provenance, Failure> {
             once.push(file);
         }
     }
-    let commands = vec![format!("wiperlab fit {within}/{JOB}"), format!("wiperlab report {within}")];
+    let file = format!("{within}/{job}");
+    let reported = if job == JOB { &within } else { &file };
+    let commands = vec![format!("wiperlab fit {file}"), format!("wiperlab report {reported}")];
     let (version, seed, fingerprint) =
         (fit.result.version.clone(), Some(fit.result.seed), fit.result.fingerprint.clone());
     Ok(Provenance { version, seed, fingerprint, files: once, commands })

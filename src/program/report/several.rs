@@ -17,17 +17,18 @@ const LONGEST_NAME: usize = 100;
 /// Writes the comparison of fits; says whether any of them does not explain its recording or misses a
 /// component.
 pub fn write(
-    fits: &[PathBuf],
+    jobs: &[PathBuf],
     out: Option<&Path>,
     writer: &Writer,
     global: &Global,
 ) -> Result<bool, Failure> {
-    distinct(fits)?;
-    let out = out.map_or_else(|| default_folder(fits), |out| Ok(out.to_owned()))?;
+    let folders: Vec<&Path> = jobs.iter().map(|job| files::folder_of(job)).collect();
+    distinct(&folders)?;
+    let out = out.map_or_else(|| default_folder(&folders), |out| Ok(out.to_owned()))?;
     folder::check(&out, writer)?;
     let steps = progress::steps("report", global.quiet);
     steps.on("reading the fits, running and comparing their models");
-    let fits = fits.iter().map(|fit| Fit::load(fit)).collect::<Result<Vec<_>, _>>()?;
+    let fits = jobs.iter().map(|job| Fit::load(job)).collect::<Result<Vec<_>, _>>()?;
     let best = fits.iter().map(Fit::best).collect::<Result<Vec<_>, _>>()?;
     let reports = fits
         .iter()
@@ -60,8 +61,8 @@ pub fn write(
 }
 
 /// Refuses a fit that is given twice, and two fits that would go by the same name.
-fn distinct(fits: &[PathBuf]) -> Result<(), Failure> {
-    let place = |fit: &PathBuf| fit.canonicalize().unwrap_or_else(|_| fit.clone());
+fn distinct(fits: &[&Path]) -> Result<(), Failure> {
+    let place = |fit: &Path| fit.canonicalize().unwrap_or_else(|_| fit.to_owned());
     for (i, fit) in fits.iter().enumerate() {
         for other in &fits[..i] {
             if place(fit) == place(other) {
@@ -84,7 +85,7 @@ fn distinct(fits: &[PathBuf]) -> Result<(), Failure> {
 }
 
 /// `reports/A-and-B` next to the first fit's folder `fits`.
-fn default_folder(fits: &[PathBuf]) -> Result<PathBuf, Failure> {
+fn default_folder(fits: &[&Path]) -> Result<PathBuf, Failure> {
     let name = fits.iter().map(|fit| files::display_name(fit)).collect::<Vec<_>>().join("-and-");
     if name.len() > LONGEST_NAME {
         let found = name.len();
