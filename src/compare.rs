@@ -14,7 +14,6 @@ pub mod summary;
 pub mod tables;
 pub mod traces;
 pub mod windows;
-mod worst;
 
 pub use alignment::{Alignment, Point};
 pub use case::{Case, Measured, Side};

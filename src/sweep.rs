@@ -10,18 +10,18 @@ pub mod grid;
 pub mod journal;
 pub mod outputs;
 pub mod point;
+pub mod rank_correlation;
 mod recheck;
 pub mod sample;
-pub mod spread;
 pub mod study;
 
 pub use crate::feature::Reason;
 pub use collect::{CollectError, Collection};
 pub use grid::{Axis, Spacing};
 pub use point::{Ended, Outcome};
+pub use rank_correlation::RankCorrelations;
 pub use recheck::Recheck;
 pub use sample::Sample;
-pub use spread::Spread;
 pub use study::{Map, SHEET, Study, StudyError};
 
 use crate::journal::{Shard, Sink, line};

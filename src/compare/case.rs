@@ -17,6 +17,10 @@ use crate::recording::quality::noise_floor;
 use rayon::prelude::*;
 use std::ops::Range;
 
+/// The channels by which a model is judged, the first that was tracked: stick and slip are seen best in the
+/// deflection, which needs the head.
+const JUDGED: [Channel; 3] = [Channel::Deflection, Channel::TipX, Channel::HeadX];
+
 /// A recording that was fitted, with its description where it has one.
 #[derive(Debug, Clone, Copy)]
 pub struct Measured<'a> {
@@ -161,7 +165,8 @@ impl<'a> Case<'a> {
     #[must_use]
     pub fn judged(&self) -> Option<(Channel, f64)> {
         let residual = self.residual.as_ref().filter(|_| !self.alignment.opposite_turn)?;
-        let channel = residual.judged()?;
+        let is_known = |channel: &Channel| residual.column(*channel).iter().any(Option::is_some);
+        let channel = JUDGED.into_iter().find(is_known)?;
         Some((channel, self.noise_m(channel)?))
     }
 

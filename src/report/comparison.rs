@@ -7,11 +7,9 @@ use super::figure::corner::Corner;
 use super::figure::naming::distinct;
 use super::figure::profiles::Profiles;
 use super::figure::pulls::Pulls;
-use super::figure::searches::Searches;
-use super::figure::sensitivities::Sensitivities;
 use super::figure::{
-    animation, cycle, evidence, friction, history, linkage, phase_portrait, poses, residuals, spectrogram,
-    spectrum, stick_slip,
+    animation, cycle, evidence, friction, history, phase_portrait, poses, residuals, spectrogram, spectrum,
+    video_frames,
 };
 use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, SearchLine, Subject};
 use crate::compare::{Case, Measured, ModelRun, Summary, model_runs, tables::tables};
@@ -54,7 +52,7 @@ pub fn report(job: &Job, measured: &[Measured], models: &[ModelRun], result: &Fi
         (Subject::Evidence, answering),
         (Subject::Measured, measured_figures(&cases, telling)),
         (Subject::Blade, blade_figures(&cases)),
-        (Subject::Parameters, of_parameters(job, result, &report)),
+        (Subject::Parameters, Profiles::of(job, result, &report.parameters).block().into_iter().collect()),
     ];
     Report {
         tables: tables(&cases),
@@ -128,12 +126,15 @@ fn measured_figures(cases: &[Case], telling: usize) -> Vec<FigureBlock> {
     distinct(cases.par_iter().enumerate().flat_map_iter(all).collect())
 }
 
-/// Run by run: the blade itself, its cycles, and then every run in motion.
+/// Run by run: the blade itself, then over the frames of each video, and then every run in motion.
 fn blade_figures(cases: &[Case]) -> Vec<FigureBlock> {
     let runs = || cases.iter().filter(|case| case.same_run.is_some());
-    let still = runs().flat_map(|case| [poses::block(case), stick_slip::block(case)]).flatten();
-    let over_recordings = cases.iter().filter_map(linkage::block);
-    still.chain(over_recordings).chain(runs().filter_map(animation::caption::block)).collect()
+    let filmed = cases.iter().filter_map(video_frames::block);
+    runs()
+        .filter_map(poses::block)
+        .chain(filmed)
+        .chain(runs().filter_map(animation::caption::block))
+        .collect()
 }
 
 /// How the parameters hang together, and how far every target is from the model.
@@ -142,16 +143,6 @@ fn of_answer(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock>
     let blocks = [
         Corner::of(job, result, &report.parameters).block(),
         Pulls::of(&job.title, &features, &report.held_out).block(),
-    ];
-    blocks.into_iter().flatten().collect()
-}
-
-/// What the fit knows of its parameters besides.
-fn of_parameters(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock> {
-    let blocks = [
-        Profiles::of(job, result, &report.parameters).block(),
-        Searches::of(job, result).block(),
-        Sensitivities::of(job, result).block(),
     ];
     blocks.into_iter().flatten().collect()
 }

@@ -2,8 +2,8 @@
 
 use super::grid::{Axis, Spacing};
 use super::point::Outcome;
+use super::rank_correlation::{RankCorrelation, RankCorrelations};
 use super::sample::Sample;
-use super::spread::{RankCorrelation, Spread};
 use super::study::{Map, SHEET, Study};
 use crate::feature::Reason;
 use crate::twin::Camera;
@@ -63,7 +63,7 @@ pub struct Summary {
     pub sample: Option<Sample>,
     pub status: BTreeMap<&'static str, usize>,
     pub axes: Vec<AxisSummary>,
-    /// The figure with every map, where there are several.
+    /// The figure with every map, where there are several, or with the rank correlations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sheet: Option<String>,
     pub maps: Vec<MapSummary>,
@@ -89,7 +89,9 @@ pub struct MapSummary {
     pub kind: &'static str,
     pub unit: &'static str,
     pub column: String,
-    pub figure: String,
+    /// Of a study that is drawn as maps.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub figure: Option<String>,
     pub values: usize,
     pub least: Option<f64>,
     pub greatest: Option<f64>,
@@ -117,7 +119,7 @@ impl Summary {
             status: BTreeMap::new(),
             axes: study.axes.iter().map(|axis| AxisSummary::of(axis, study.sample.is_some())).collect(),
             sheet: study.has_sheet().then(|| format!("{SHEET}.svg")),
-            maps: study.maps.iter().map(MapSummary::of).collect(),
+            maps: study.maps.iter().map(|map| MapSummary::of(study, map)).collect(),
         }
     }
 
@@ -131,9 +133,9 @@ impl Summary {
     }
 
     /// Adds the rank correlations of every map.
-    pub fn correlate(&mut self, study: &Study, spread: &Spread) {
+    pub fn correlate(&mut self, study: &Study, found: &RankCorrelations) {
         for (at, map) in self.maps.iter_mut().enumerate() {
-            map.rank_correlations = spread.correlations(study, at);
+            map.rank_correlations = found.of_map(study, at);
         }
     }
 
@@ -167,13 +169,13 @@ impl AxisSummary {
 }
 
 impl MapSummary {
-    fn of(map: &Map) -> Self {
+    fn of(study: &Study, map: &Map) -> Self {
         Self {
             name: map.name.clone(),
             kind: map.reading.kind(),
             unit: map.reading.unit().name,
             column: map.column(),
-            figure: format!("{}.svg", map.slug),
+            figure: study.is_mapped().then(|| format!("{}.svg", map.slug)),
             values: 0,
             least: None,
             greatest: None,

@@ -107,10 +107,10 @@ impl Study {
         self.sample.is_none() && self.axes.len() <= 2 && self.points() <= MOST_MAPPED
     }
 
-    /// Whether there is a sheet with every map: one alone has its own figure.
+    /// Whether there is a sheet with every map: one alone that is drawn has its own figure.
     #[must_use]
     pub fn has_sheet(&self) -> bool {
-        self.maps.len() > 1
+        self.maps.len() > 1 || !self.is_mapped()
     }
 
     /// Value of every axis at point `index`.

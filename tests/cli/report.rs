@@ -345,12 +345,12 @@ fn figures_of_an_earlier_report_go_and_nothing_else_does() {
 #[test]
 fn where_one_file_has_no_place_none_is_written() {
     let project = Project::with_fits(&[("x", JOB)]);
-    fs::create_dir_all(project.path("reports/x/stick-slip.svg")).unwrap();
+    fs::create_dir_all(project.path("reports/x/friction.svg")).unwrap();
     project.report_refused(
         &["fits/x"],
-        &["stick-slip.svg", "is a folder, expected a file or nothing", "choose another folder"],
+        &["friction.svg", "is a folder, expected a file or nothing", "choose another folder"],
     );
-    fs::remove_dir(project.path("reports/x/stick-slip.svg")).unwrap();
+    fs::remove_dir(project.path("reports/x/friction.svg")).unwrap();
     project.reported(&["fits/x"]);
 }
 

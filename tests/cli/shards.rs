@@ -204,7 +204,7 @@ fn what_cannot_be_divided_or_collected_is_refused() {
     assert!(code == 2 && said.contains("found a study, expected the folder of its shards"), "{said}");
 }
 
-/// Three parameters in a Sobol sample: no maps, but quantiles and rank correlations.
+/// Three parameters in a Sobol sample: no maps, but rank correlations.
 #[test]
 fn a_sample_is_divided_like_a_grid_and_its_summary_counts_what_failed() {
     let project = project();
@@ -235,6 +235,6 @@ fn a_sample_is_divided_like_a_grid_and_its_summary_counts_what_failed() {
     let loss = &summary["maps"][1]["rank_correlations"][2];
     assert_eq!(loss["parameter"], "blade.preload_force_n");
     assert!(summary["maps"][0]["rank_correlations"][1]["rank_correlation"].as_f64().unwrap() < -0.3);
-    let figure = fs::read_to_string(project.path().join("many/stick-fraction.svg")).unwrap();
+    let figure = fs::read_to_string(project.path().join("many/all-maps.svg")).unwrap();
     assert!(figure.contains("rank correlation") && figure.contains("synthetic: 200 simulations"));
 }

@@ -50,7 +50,7 @@ fn a_report_shows_the_frames_behind_the_links_and_stays_one_page() {
     let project = project(GOOD);
     frames(&project, &png());
     project.run_to(&["report", "fits/actual-blade-twin", "--out", "out"], &[0]);
-    let figure = fs::read_to_string(project.path("out/linkage.svg")).unwrap();
+    let figure = fs::read_to_string(project.path("out/video-frames.svg")).unwrap();
     assert!(figure.matches("data:image/png;base64,").count() >= 3);
     // one picture alone
     let one = project.path(&format!("{RECORDING}/recording.toml"));

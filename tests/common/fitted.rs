@@ -2,7 +2,6 @@
 //! user's name may stand.
 
 use super::scene;
-use std::f64::consts::PI;
 use wiperlab::fit::uncertainty::Verdict;
 use wiperlab::report::chart::Figure;
 use wiperlab::report::figure::corner::{self, Corner, Known};
@@ -14,15 +13,6 @@ use wiperlab::report::figure::poses::{self, Poses};
 use wiperlab::report::figure::profiles::{self, Profile, Profiles};
 use wiperlab::report::figure::pulls::{self, Pull, Pulls};
 use wiperlab::report::figure::residuals::{self, Diagnostics};
-use wiperlab::report::figure::searches::{self, Descent, Searches};
-use wiperlab::report::figure::sensitivities::{self, Sensitivities};
-use wiperlab::report::figure::stick_slip::{self, StickRaster};
-
-const SYMBOLS: [&str; 4] = ["A", "B", "C", "k\u{2081}"];
-
-fn symbols() -> Vec<String> {
-    SYMBOLS.map(str::to_owned).to_vec()
-}
 
 /// A parameter that is known, one that is open at an end, and one without intervals.
 pub fn profiles(name: &str) -> Figure {
@@ -58,54 +48,8 @@ pub fn profiles(name: &str) -> Figure {
     })
 }
 
-pub fn sensitivity(name: &str) -> Figure {
-    let cell = |i: usize, j: usize| (i + 2 * j != 5).then(|| (i as f64 + 1.3 * j as f64).sin());
-    let table = |rows: usize| (0..rows).map(|i| (0..SYMBOLS.len()).map(|j| cell(i, j)).collect()).collect();
-    let features = ["low", name, "release", "deflection after the flip"].map(str::to_owned).to_vec();
-    sensitivities::figure(&Sensitivities {
-        title: name.to_owned(),
-        synthetic: true,
-        symbols: symbols(),
-        sensitivities: table(features.len()),
-        features,
-        correlations: table(SYMBOLS.len()),
-    })
-}
-
-pub fn waterfall(name: &str) -> Figure {
-    let descent = |i: i32| Descent {
-        start_cost: 1e3 * (1.0 + f64::from(i)),
-        cost: 0.03 * 10.0_f64.powi(i / 3),
-        end: (0..SYMBOLS.len()).map(|j| 0.5 + 0.4 * (f64::from(i) * (j as f64 + 1.0)).sin()).collect(),
-        failed: i == 11,
-    };
-    let descents = (0..12).map(descent).collect();
-    searches::figure(&Searches {
-        title: name.to_owned(),
-        synthetic: true,
-        threshold: 3.84,
-        symbols: symbols(),
-        descents,
-    })
-}
-
 pub fn poses(name: &str) -> Figure {
     poses::figure(&Poses::of(&wiperlab::compare::Motion::of(&scene()), name, name.to_owned()).unwrap())
-}
-
-/// Cycles that grow shorter, with sticks that take less and less of them.
-pub fn stick_raster(name: &str) -> Figure {
-    let starts = (0..80).scan(0.7, |start, i| {
-        let length = 1.2e-3 + 4e-4 * (PI * f64::from(i) / 80.0).cos();
-        *start += length;
-        Some([*start, *start + length * (0.5 - 0.005 * f64::from(i))])
-    });
-    stick_slip::figure(&StickRaster {
-        title: name.to_owned(),
-        subtitle: name.to_owned(),
-        stick_s: starts.collect(),
-    })
-    .unwrap()
 }
 
 /// Two parts, one of them with measured states.

@@ -11,8 +11,6 @@ use wiperlab::report::figure::animation::{self, Animation, Tracked};
 use wiperlab::report::figure::history::{self, History};
 use wiperlab::report::figure::profiles::{self, Profiles};
 use wiperlab::report::figure::ring_down::{self, Decay, RingDown, Trace};
-use wiperlab::report::figure::searches::{self, Searches};
-use wiperlab::report::figure::sensitivities::{self, Sensitivities};
 use wiperlab::report::figure::spectrogram::{self, Aimed, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
 use wiperlab::report::figure::spectrum::{self, Curve, Named, Spectra, Target};
 use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
@@ -25,7 +23,7 @@ use wiperlab::sweep::{Outcome, Study};
 pub type Example = (&'static str, fn(&str) -> Figure);
 
 /// Every figure with something to show.
-pub const FULL: [Example; 23] = [
+pub const FULL: [Example; 20] = [
     ("cycle over speed", fitted::cycle),
     ("pulls", fitted::pulls),
     ("corner", fitted::corner),
@@ -43,16 +41,13 @@ pub const FULL: [Example; 23] = [
     ("sheet of one parameter", |name| sheet(name, 1)),
     ("sheet of two parameters", |name| sheet(name, 2)),
     ("profiles", fitted::profiles),
-    ("sensitivity", fitted::sensitivity),
-    ("waterfall", fitted::waterfall),
     ("poses", fitted::poses),
-    ("stick-slip raster", fitted::stick_raster),
     ("phase portrait", fitted::portrait),
     ("friction law", fitted::law),
 ];
 
 /// Every figure with nothing to show.
-pub const EMPTY: [Example; 9] = [
+pub const EMPTY: [Example; 7] = [
     ("history", |_| history::figure(&History::default())),
     ("spectra", |_| spectrum::figure(&Spectra::default())),
     ("spectrogram", |_| spectrogram::figure(&Spectrogram::default())),
@@ -60,8 +55,6 @@ pub const EMPTY: [Example; 9] = [
     ("windows", |_| windows::figure(&Windows::default())),
     ("work-precision", |_| work_precision::figure(&WorkPrecision::default())),
     ("profiles", |_| profiles::figure(&Profiles::default())),
-    ("sensitivity", |_| sensitivities::figure(&Sensitivities::default())),
-    ("waterfall", |_| searches::figure(&Searches::default())),
 ];
 
 pub const MEDIA: [(&str, Medium); 3] =
@@ -103,7 +96,6 @@ fn full_history(name: &str) -> History {
         stick_s: vec![(0.53, 0.58), (0.6, 0.601)],
         instants: vec![("hold".to_owned(), 0.53), (name.to_owned(), 0.55), ("release".to_owned(), 0.58)],
         zoom_s: Some((0.575, 0.61)),
-        worst: true,
     }
 }
 

@@ -10,7 +10,7 @@ use wiperlab::recording::Recording;
 use wiperlab::recording::files::{LevelEntry, Place, RecordingFile, parse_trace_csv};
 use wiperlab::recording::film::{Film, Picture, Pictures};
 use wiperlab::report::chart::{Medium, Raster};
-use wiperlab::report::figure::linkage::{Instant, Linkage, details, figure};
+use wiperlab::report::figure::video_frames::{VideoFrames, details, figure};
 use wiperlab::simulate::scene::Scene;
 
 /// Pictures of two dark spots of Gaussian shape, at the pixels of the tracked head and tip.
@@ -90,21 +90,14 @@ fn fit() -> Fit {
     Fit { job, result, recording, file, problem }
 }
 
-/// The linkage over spots.
-fn linkage(fit: &Fit, spots: &Spots<'_>) -> Linkage {
+/// The links over spots.
+fn over_spots(fit: &Fit, spots: &Spots<'_>) -> VideoFrames {
     let model = fit.problem.model_of(&fit.result).unwrap();
     let models = model_runs(&fit.job, &model, &fit.result).unwrap();
     let film = Film { place: spots.place, pictures: spots };
     let measured = [Measured { recording: &fit.recording, file: Some(&fit.file), film: Some(film) }];
     let cases = Case::all(&fit.job, &measured, &models, &fit.result);
-    Linkage::of(&cases[0]).unwrap()
-}
-
-/// Where the figure draws the tracked head and tip, mm.
-fn tracked_mm(instant: &Instant) -> [(f64, f64); 2] {
-    let [head, _, tip] = instant.joints_m;
-    [(head, instant.head), (tip, instant.tip)]
-        .map(|((x, y), apart)| (1e3 * (x + apart.along_m), 1e3 * (y + apart.up_m.unwrap())))
+    VideoFrames::of(&cases[0]).unwrap()
 }
 
 fn level(angle_rad: f64) -> LevelEntry {
@@ -139,13 +132,13 @@ fn spots_in_the_pictures_lie_where_the_tracked_points_are_drawn() {
             frames: 0..frames,
             asked: Mutex::default(),
         };
-        let shown = linkage(&fit, &spots);
+        let shown = over_spots(&fit, &spots);
         assert_eq!(spots.asked.lock().unwrap().len(), shown.instants.len(), "no other frame is read");
         assert!(shown.instants.len() >= 3);
         for instant in &shown.instants {
             let raster = instant.frame.shown().unwrap();
             let step = (raster.x[1] - raster.x[0]) / 256.0;
-            for (x, y) in tracked_mm(instant) {
+            for (x, y) in instant.tracked_m.map(|(x, y)| (1e3 * x, 1e3 * y)) {
                 let found = middle(raster, (x, y), 0.7);
                 let off = (found.0 - x).hypot(found.1 - y);
                 assert!(off < step, "{}: {off} mm off, a point is {step} mm", instant.name);
@@ -164,16 +157,16 @@ fn an_instant_without_a_frame_is_drawn_without_one_and_said() {
     let fit = fit();
     let place = Place::new([0.0, 12.0], 2e-4, None);
     let spots = |frames| Spots::of(&fit.recording, place, frames);
-    let none = linkage(&fit, &spots(0..0));
+    let none = over_spots(&fit, &spots(0..0));
     assert!(none.instants.iter().all(|instant| instant.frame.shown().is_none()));
     assert!(
         details(&none).contains("no picture before the reversal")
             && details(&none).contains("first_frame")
             && !figure(&none).svg(Medium::Screen).contains("<image")
     );
-    let last = linkage(&fit, &spots(0..fit.recording.grid().frames)).instants.pop().unwrap();
+    let last = over_spots(&fit, &spots(0..fit.recording.grid().frames)).instants.pop().unwrap();
     let from = ((last.time_s - fit.recording.grid().start_s) * 5000.0).round() as usize;
-    let one = linkage(&fit, &spots(from..from + 1));
+    let one = over_spots(&fit, &spots(from..from + 1));
     assert_eq!(one.instants.iter().filter(|instant| instant.frame.shown().is_some()).count(), 1);
     assert!(details(&one).contains("of which there is none before the reversal"), "{}", details(&one));
 }
@@ -184,7 +177,7 @@ fn a_picture_of_another_place_is_not_drawn_and_the_keys_are_named() {
     let frames = 0..fit.recording.grid().frames;
     let place = Place::new([1e6, -1e6], 2e-4, None);
     let spots = Spots::of(&fit.recording, place, frames);
-    let away = linkage(&fit, &spots);
+    let away = over_spots(&fit, &spots);
     assert!(!figure(&away).svg(Medium::Screen).contains("<image"));
     assert!(details(&away).contains("shows neither tracked point: check `origin_px`"), "{}", details(&away));
 }

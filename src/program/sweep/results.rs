@@ -5,9 +5,9 @@ use crate::program::failure::{Failure, Outcome};
 use crate::program::files::{self, Place, Writer};
 use crate::program::global::Global;
 use crate::report::chart::Figure;
-use crate::report::figure::{sweep_map, sweep_sheet, sweep_spread};
+use crate::report::figure::{sweep_map, sweep_sheet};
 use crate::sweep::outputs::{Summary, csv_header, csv_row};
-use crate::sweep::{Collection, Map, Outcome as Point, Reason, SHEET, Spread, Study};
+use crate::sweep::{Collection, Outcome as Point, RankCorrelations, Reason, SHEET, Study};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::path::Path;
@@ -19,8 +19,8 @@ impl Problem {
     /// Checks that a study can write its files into a folder.
     pub fn check_place(&self, out: &Path, writer: &Writer) -> Result<Place, Failure> {
         let sheet = self.study.has_sheet().then_some(SHEET);
-        let figures = self.study.maps.iter().map(|map| map.slug.as_str()).chain(sheet);
-        let maps = figures.map(|name| format!("{name}.svg"));
+        let mapped = self.study.maps.iter().filter(|_| self.study.is_mapped());
+        let maps = mapped.map(|map| map.slug.as_str()).chain(sheet).map(|name| format!("{name}.svg"));
         let names: Vec<String> = [TABLE, SUMMARY].map(str::to_owned).into_iter().chain(maps).collect();
         Place::check(out, writer, &names.iter().map(String::as_str).collect::<Vec<_>>())
     }
@@ -37,7 +37,7 @@ impl Problem {
         let mut table = place.file(TABLE)?;
         table.write(&csv_header(&self.study));
         let mut summary = Summary::new(&self.study, self.scene.title(), &self.fingerprint);
-        let (mut mapped, mut spread) = (Vec::new(), Spread::new(&self.study));
+        let (mut mapped, mut correlations) = (Vec::new(), RankCorrelations::new(&self.study));
         let is_mapped = self.study.is_mapped();
         let each = |index: usize, outcome: Point| {
             table.write(&csv_row(&self.study, index, &outcome));
@@ -46,24 +46,20 @@ impl Problem {
             if is_mapped {
                 mapped.push(outcome);
             } else {
-                spread.look(&self.study, index, &outcome);
+                correlations.look(&self.study, index, &outcome);
             }
         };
         points.each(each).map_err(failure)?;
         if !is_mapped {
-            summary.correlate(&self.study, &spread);
+            summary.correlate(&self.study, &correlations);
         }
-        let drawn = |(at, map): (usize, &Map)| {
-            let missing = summary.maps.get(at).map_or(0, |map| summary.points - map.values);
-            let figure = match is_mapped {
-                true => sweep_map::figure(&self.study, &self.scene, &mapped, at),
-                false => sweep_spread::figure(&self.study, &spread, missing, at),
-            };
-            files::drawn(&map.slug, &figure)
-        };
-        let mut others: Vec<(String, Vec<u8>)> = self.study.maps.iter().enumerate().flat_map(drawn).collect();
+        let maps = self.study.maps.iter().enumerate().filter(|_| is_mapped);
+        let drawn = maps.flat_map(|(at, map)| {
+            files::drawn(&map.slug, &sweep_map::figure(&self.study, &self.scene, &mapped, at))
+        });
+        let mut others: Vec<(String, Vec<u8>)> = drawn.collect();
         if self.study.has_sheet() {
-            others.extend(files::drawn(SHEET, &self.sheet(&mapped, &spread)));
+            others.extend(files::drawn(SHEET, &self.sheet(&mapped, &correlations)));
         }
         others.push((SUMMARY.to_owned(), summary.to_json().map_err(Failure::internal)?.into_bytes()));
         place.finish(vec![table], &others)?;
@@ -75,10 +71,10 @@ impl Problem {
     }
 
     /// Every map in one figure.
-    fn sheet(&self, mapped: &[Point], spread: &Spread) -> Figure {
+    fn sheet(&self, mapped: &[Point], correlations: &RankCorrelations) -> Figure {
         match self.study.is_mapped() {
             true => sweep_sheet::figure(&self.study, &self.scene, mapped),
-            false => sweep_sheet::correlations(&self.study, spread),
+            false => sweep_sheet::correlations(&self.study, correlations),
         }
     }
 }

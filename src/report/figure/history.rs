@@ -36,8 +36,6 @@ pub struct History {
     pub windows: Vec<(String, f64, f64)>,
     /// Interval that the enlarged figure shows, s.
     pub zoom_s: Option<(f64, f64)>,
-    /// Whether that is where the model fits worst, and not the release of the tip.
-    pub worst: bool,
 }
 
 /// Heights of the panels, mm: four quantities with what is left of them and a few windows fit on a page.
@@ -70,8 +68,8 @@ pub fn figure(history: &History) -> Figure {
 #[must_use]
 pub(crate) fn enlarged(history: &History) -> Option<Figure> {
     let zoom_s = history.zoom_s.filter(|(from, to)| from < to)?;
-    let part = if history.worst { "where the model fits worst" } else { "around the release of the tip" };
-    let figure = drawn(history, stacked(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM), part);
+    let panels = stacked(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM);
+    let figure = drawn(history, panels, "around the release of the tip");
     Some(Figure { title: history.enlarged_title.clone(), ..figure })
 }
 

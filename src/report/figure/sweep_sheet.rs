@@ -7,7 +7,7 @@ use crate::report::chart::{
     Axis, COLUMN_WIDTH_MM, Colour, Colours, FULL_WIDTH_MM, Figure, Heat, Panel, Text,
 };
 use crate::simulate::scene::Scene;
-use crate::sweep::{Map, Outcome, Spread, Study};
+use crate::sweep::{Map, Outcome, RankCorrelations, Study};
 use crate::text::{capitalised, decimals, listed, printable};
 
 /// Heights of a panel and of a row of the table of correlations, mm.
@@ -68,9 +68,9 @@ fn counted(maps: usize) -> String {
 
 /// The sheet of a study that is not drawn as maps: rank correlations as numbers over colours.
 #[must_use]
-pub fn correlations(study: &Study, spread: &Spread) -> Figure {
+pub fn correlations(study: &Study, found: &RankCorrelations) -> Figure {
     let of = |at: usize| -> Vec<Option<f64>> {
-        spread.correlations(study, at).into_iter().rev().map(|found| found.rank_correlation).collect()
+        found.of_map(study, at).into_iter().rev().map(|one| one.rank_correlation).collect()
     };
     // the first parameter on top
     let axes: Vec<_> = study.axes.iter().rev().collect();

@@ -15,6 +15,9 @@ use crate::text::{capitalised, decimals, digits, length, trimmed};
 const AROUND_RELEASE_S: (f64, f64) = (0.005, 0.03);
 /// Length of the part in which the later motion fits worst, s: a dozen cycles of the high component.
 const LATE_S: f64 = 0.015;
+/// Least share of the frames of a part that hold a value: fewer frames scatter more, and would be the worst
+/// by chance.
+const LEAST_PRESENT: f64 = 0.5;
 
 /// The figure of a condition; none without a recording, or where the two cannot agree.
 pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
@@ -45,7 +48,7 @@ pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
         .map(|t| ((t - AROUND_RELEASE_S.0).max(whole_s.0), (t + AROUND_RELEASE_S.1).min(whole_s.1)))
         .filter(|(from, to)| from < to);
     let later_s = (around_s.map_or(whole_s.0, |(_, to)| to), whole_s.1);
-    let worst_s = residual.worst_s(channel, LATE_S, later_s).filter(|(from, to)| from < to);
+    let worst_s = worst_s(residual, channel, later_s).filter(|(from, to)| from < to);
     let later = if around_s.is_some() { "worst later" } else { "worst part" };
     let parts: Vec<Part> = [
         part("recording".to_owned(), whole_s),
@@ -64,6 +67,35 @@ pub(in crate::report) fn block(case: &Case) -> Option<FigureBlock> {
         parts,
     };
     Some(case.block("evidence", words(case, &shown, channel, noise_m), figure(&shown)))
+}
+
+/// The part of [`LATE_S`] with the greatest mean square of a channel between two instants, s: from when to
+/// when. All between the two where that is shorter; `None` without a value.
+fn worst_s(residual: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)) -> Option<(f64, f64)> {
+    let first = residual.time_s.partition_point(|t| *t < from_s);
+    let end = residual.time_s.partition_point(|t| *t <= to_s);
+    let times = residual.time_s.get(first..end)?;
+    let column = residual.column(channel).get(first..end)?;
+    let (start_s, last_s) = (*times.first()?, *times.last()?);
+    column.iter().flatten().next()?;
+    let frames = (LATE_S / (last_s - start_s) * (times.len() - 1) as f64).round() as usize + 1;
+    if frames >= times.len() || frames < 2 {
+        return Some((start_s, last_s));
+    }
+    // squares and numbers of values before each frame
+    let mut sums = vec![(0.0, 0usize)];
+    for value in column {
+        let (square, count) = sums.last().copied().unwrap_or_default();
+        sums.push(value.map_or((square, count), |x| (square + x * x, count + 1)));
+    }
+    let mean = |at: usize| {
+        let ((before, counted), (after, all)) = (sums[at], sums[at + frames]);
+        let count = all - counted;
+        let enough = count as f64 >= LEAST_PRESENT * frames as f64;
+        enough.then(|| (at, (after - before) / count as f64))
+    };
+    let worst = (0..=times.len() - frames).filter_map(mean).reduce(|a, b| if b.1 > a.1 { b } else { a });
+    worst.map_or(Some((start_s, last_s)), |(at, _)| Some((times[at], times[at + frames - 1])))
 }
 
 /// A channel between two instants.
@@ -155,4 +187,39 @@ fn segments(case: &Case) -> Option<String> {
         length(tip.residual_rms_m),
         digits(tip.residual_rms_m / tip.noise_m, 2),
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn residual(of: impl Fn(usize) -> Option<f64>) -> MotionTraces {
+        MotionTraces {
+            time_s: (0..1000).map(|i| i as f64 * 1e-3).collect(),
+            tip_x_m: (0..1000).map(of).collect(),
+            head_x_m: vec![None; 1000],
+            deflection_m: vec![None; 1000],
+            head_drop_m: vec![None; 1000],
+        }
+    }
+
+    #[test]
+    fn the_worst_part_is_where_the_residual_is_largest() {
+        let found = residual(|i| Some(if (400..416).contains(&i) { 5.0 } else { 1.0 }));
+        assert_eq!(worst_s(&found, Channel::TipX, (0.0, 1.0)), Some((0.4, 0.415)));
+        assert_eq!(worst_s(&found, Channel::TipX, (0.5, 0.6)), Some((0.5, 0.515)));
+        assert_eq!(worst_s(&found, Channel::TipX, (0.5, 0.51)), Some((0.5, 0.51)));
+        assert_eq!(worst_s(&found, Channel::HeadX, (0.0, 1.0)), None);
+    }
+
+    #[test]
+    fn a_single_frame_among_lost_ones_is_not_the_worst_part() {
+        let gap = |i: usize| (100..200).contains(&i);
+        let found = residual(|i| match i {
+            150 => Some(9.0),
+            600..616 => Some(2.0),
+            _ => Some(1.0).filter(|_| !gap(i)),
+        });
+        assert_eq!(worst_s(&found, Channel::TipX, (0.0, 1.0)), Some((0.6, 0.615)));
+    }
 }

@@ -27,8 +27,7 @@ const MOST_WINDOWS: usize = 10;
 pub(in crate::report) fn blocks(case: &Case) -> Vec<FigureBlock> {
     let history = history(case);
     let whole = case.block("history", whole_words(case, &history), figure(&history));
-    let name = if history.worst { "worst" } else { "release" };
-    let part = enlarged(&history).map(|figure| case.block(name, enlarged_words(case, &history), figure));
+    let part = enlarged(&history).map(|figure| case.block("release", enlarged_words(case, &history), figure));
     std::iter::once(whole).chain(part).collect()
 }
 
@@ -36,8 +35,7 @@ fn history(case: &Case) -> History {
     let (shift_s, shown) = (case.alignment.shift_s, case.shown());
     let grid = shown.recording.grid();
     let whole_s = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
-    let worst_s = worst_s(case, whole_s);
-    let zoom_s = worst_s.or_else(|| release_s(&shown));
+    let zoom_s = release_s(&shown);
     let light = |traces: MotionTraces| lightened(traces, whole_s, zoom_s);
     // one after the other: each is lighter before the next is made
     let measured = case.recording().map(MotionTraces::of).map(light);
@@ -46,7 +44,7 @@ fn history(case: &Case) -> History {
         windows(case).into_iter().enumerate().map(|(i, (_, from, to))| ((i + 1).to_string(), from, to));
     History {
         title: motion_title(case),
-        enlarged_title: enlarged_title(case, zoom_s, worst_s.is_some()),
+        enlarged_title: enlarged_title(&shown),
         synthetic: case.synthetic(),
         measured,
         model: Some(model),
@@ -55,14 +53,7 @@ fn history(case: &Case) -> History {
         instants: instants(&shown),
         windows: windows.collect(),
         zoom_s,
-        worst: worst_s.is_some(),
     }
-}
-
-/// The part in which the model is farthest from the recording; `None` where they cannot agree.
-fn worst_s(case: &Case, whole_s: (f64, f64)) -> Option<(f64, f64)> {
-    let residual = case.residual.as_ref().filter(|_| !case.alignment.opposite_turn)?;
-    residual.worst_s(residual.judged()?, ZOOM_S.0 + ZOOM_S.1, whole_s)
 }
 
 /// The release of the tip, as far as there are frames.
@@ -123,20 +114,11 @@ fn whole_words(case: &Case, history: &History) -> Words {
 }
 
 fn enlarged_words(case: &Case, history: &History) -> Words {
-    let what = if history.worst { "The part that fits worst" } else { "The release of the tip" };
     let release_s = case.shown().instant_s(Anchor::Release);
-    let around = |(from_s, to_s): (f64, f64)| match release_s.filter(|_| !history.worst) {
-        Some(at_s) => {
-            format!(
-                ", from {} before it to {} after it",
-                milliseconds(at_s - from_s),
-                milliseconds(to_s - at_s)
-            )
-        }
-        None => format!(", from {} to {} s", decimals(from_s, 4), decimals(to_s, 4)),
-    };
-    let span = history.zoom_s.map_or_else(String::new, around);
-    let mut details = vec![format!("{what}{span}: {}", drawn(case))];
+    let span = release_s.zip(history.zoom_s).map_or_else(String::new, |(at_s, (from_s, to_s))| {
+        format!(", from {} before it to {} after it", milliseconds(at_s - from_s), milliseconds(to_s - at_s))
+    });
+    let mut details = vec![format!("The release of the tip{span}: {}", drawn(case))];
     details.extend(history.zoom_s.map(|(from_s, to_s)| {
         let sticks = history.stick_s.iter().filter(|(from, to)| *to > from_s && *from < to_s).count();
         match sticks {
@@ -146,7 +128,7 @@ fn enlarged_words(case: &Case, history: &History) -> Words {
     }));
     details.extend(left(case, history.zoom_s));
     let agreement = agreement(case, history.zoom_s);
-    let caption = format!("{what} enlarged, {}{agreement}.", both(case));
+    let caption = format!("The release of the tip enlarged, {}{agreement}.", both(case));
     Words { caption, details: details.join(" ") }
 }
 
@@ -192,11 +174,7 @@ fn motion_title(case: &Case) -> String {
 }
 
 /// The claim of the enlarged part.
-fn enlarged_title(case: &Case, zoom_s: Option<(f64, f64)>, worst: bool) -> String {
-    if let Some(found) = apart(case, zoom_s).filter(|_| worst) {
-        return format!("At worst {}", missed(found));
-    }
-    let shown = case.shown();
+fn enlarged_title(shown: &Side) -> String {
     let after_s = shown.instant_s(Anchor::Release).zip(shown.instant_s(Anchor::Reversal));
     after_s.map_or_else(
         || "The tip is released".to_owned(),

@@ -27,7 +27,11 @@ pub(in crate::report) fn lowest(case: &Case, all: &[FitWindow]) -> Option<(usize
         .min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The figure of the window's analysis; none for a record too long to be taken apart.
+/// Noise that the component nearest to the target exceeds where it is drawn, standard deviations.
+const LEAST_OVER_NOISE: f64 = 2.0;
+
+/// The figure of the window's analysis; none for a record too long to be taken apart, or where the component
+/// nearest to the target does not exceed twice the noise.
 pub(in crate::report) fn block(
     case: &Case,
     window: &FitWindow,
@@ -35,6 +39,8 @@ pub(in crate::report) fn block(
     target_hz: f64,
 ) -> Option<FigureBlock> {
     let side = case.shown();
+    let least_m = case.noise_m(window.channel).map_or(0.0, |noise_m| LEAST_OVER_NOISE * noise_m);
+    let component = nearest(analysis, target_hz).filter(|found| found.amplitude_m > least_m)?;
     let frames = side.frames(&window.window).filter(|frames| frames.len() <= LONGEST_FITTED)?;
     let frames = frames.start + analysis.left_out..frames.end;
     let shown = AnalysedWindow {
@@ -45,10 +51,7 @@ pub(in crate::report) fn block(
         note: format!("window {}", window.window),
     };
     let mut figure = super::figure(&shown.ring_down());
-    figure.title = nearest(analysis, target_hz).map_or_else(
-        || format!("No oscillation is found in the {}", window.channel.label()),
-        |component| super::title(&window.channel.label(), component),
-    );
+    figure.title = super::title(&window.channel.label(), component);
     let note = format!("{} taken apart; {}", window.channel.label(), shown.note);
     figure.subtitle = subtitle(figure.synthetic, &note);
     if case.recording().is_none() {
@@ -62,10 +65,10 @@ pub(in crate::report) fn block(
             .filter(|s| s.label == "data")
             .for_each(|s| s.label = "model".to_owned());
     }
-    Some(case.block("ring-down", words(case, window, analysis, target_hz), figure))
+    Some(case.block("ring-down", words(case, window, analysis, component), figure))
 }
 
-fn words(case: &Case, window: &FitWindow, analysis: &Analysis, target_hz: f64) -> Words {
+fn words(case: &Case, window: &FitWindow, analysis: &Analysis, component: &Component) -> Words {
     let mut said = vec![format!(
         "The {} in the window {} of {}: trend ({}) and {} fitted by least squares, and what they leave.",
         window.channel.label(),
@@ -74,9 +77,7 @@ fn words(case: &Case, window: &FitWindow, analysis: &Analysis, target_hz: f64) -
         analysis.removed,
         counted(analysis.oscillations.len()),
     )];
-    if let Some(component) = nearest(analysis, target_hz) {
-        said.push(of_component(component));
-    }
+    said.push(of_component(component));
     let fitted = counted(analysis.oscillations.len());
     let mut caption = format!("The {} taken apart into a trend and {fitted}", window.channel.label());
     let left: Vec<f64> = analysis.left_m.iter().flatten().map(|x| x * x).collect();

@@ -3,7 +3,7 @@
 use super::labels::words;
 use crate::feature::Unit;
 use crate::math;
-use crate::sweep::spread::spearman;
+use crate::sweep::rank_correlation::spearman;
 use crate::sweep::{Axis, Map, Outcome, Study};
 use crate::text::{capitalised, decimals, trimmed};
 
