@@ -21,7 +21,7 @@ pub use level::NotLevelled;
 pub use options::{ColumnName, Columns, Options, Scale, TimeColumn};
 pub use outcome::{Import, ImportReport};
 pub use reader::companion::companion_names;
-pub use source::{Companion, Source, kept_files, sha256};
+pub use source::{Companion, Source, kept_files};
 
 use crate::recording::files::{OneOrMany, SourceEntry};
 use assemble::assemble;

@@ -14,7 +14,8 @@
 //! | fit | [`fit`] | a job, recordings | estimates, intervals, verdicts |
 //! | compare | [`compare`] | recordings, the fitted model | clock shift, residuals, ridges, transitions |
 //! | vary | [`sweep`] | a study, its scene | quantities over a grid of parameters |
-//! | show | [`report`] | results | SVG figures, one HTML page |
+//! | draw | [`chart`], [`figures`] | results | SVG figures |
+//! | show | [`report`] | results | one HTML page |
 //!
 //! These modules read no files and print nothing: text and numbers in, typed values and text out. Only
 //! [`program`], the command-line program, opens files.
@@ -91,9 +92,11 @@
 pub mod accuracy;
 pub mod blade;
 pub mod camera;
+pub mod chart;
 pub mod compare;
 pub mod draft;
 pub mod feature;
+pub mod figures;
 pub mod fit;
 pub mod import;
 pub mod journal;

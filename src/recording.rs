@@ -5,12 +5,14 @@
 
 use serde::Serialize;
 
+pub mod alignment;
 pub mod channel;
 pub mod clock;
 pub mod files;
 pub mod film;
 pub(crate) mod interpolate;
 pub mod level;
+pub mod motion_traces;
 pub mod noise_model;
 pub mod quality;
 

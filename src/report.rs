@@ -1,10 +1,7 @@
 //! Results as figures and pages: plain data in, SVG, HTML and JSON as text out.
 
-pub mod analysis;
 pub mod answer;
-pub mod chart;
 pub mod comparison;
-pub mod figure;
 pub mod json;
 pub mod page;
 mod rows;
@@ -12,14 +9,12 @@ pub mod several;
 pub mod statement;
 pub mod verdict;
 
-pub use crate::compare::RunLine;
-pub use answer::{Answer, FrictionLine, Quantity};
-pub use rows::{
-    CombinationLine, Comparison, Failed, NextPeak, ParameterLine, ProbeLine, Provenance, RecordingLine,
-    SearchLine, SourceFile, Truth,
-};
+pub use answer::{Answer, Quantity};
+pub use rows::{CombinationLine, Failed, ProbeLine, Provenance, RecordingLine, SearchLine, SourceFile};
 
-use crate::compare::{Summary, Table};
+use crate::compare::{Comparison, ParameterLine, RunLine, Summary, Table};
+use crate::figures::FigureBlock;
+use crate::figures::friction::FrictionLine;
 use crate::fit::misfit::Misfit;
 use crate::fit::result::NuisanceResult;
 use serde::Serialize;
@@ -95,49 +90,6 @@ pub enum Subject {
     Parameters,
 }
 
-/// A figure of the page.
-#[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct FigureBlock {
-    /// Name of its file, in the folder of the page.
-    pub file: String,
-    /// What it shows and what follows from it: one sentence.
-    pub caption: String,
-    /// How it was made and what else it holds, sentence by sentence; empty for none.
-    pub details: String,
-    /// The condition whose clock its times are on, by its place in the job; `None` where it has none.
-    #[serde(skip)]
-    pub condition: Option<usize>,
-    /// The figure itself.
-    #[serde(skip)]
-    pub drawing: Drawing,
-}
-
-/// What is drawn.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Drawing {
-    /// A figure for every [`chart::Medium`].
-    Chart(chart::Figure),
-    /// An SVG for the screen alone: what moves has no place in print.
-    Moving(String),
-}
-
-impl Default for Drawing {
-    fn default() -> Self {
-        Self::Chart(chart::Figure::default())
-    }
-}
-
-impl Drawing {
-    /// As SVG for a screen.
-    #[must_use]
-    pub fn on_screen(&self) -> String {
-        match self {
-            Self::Chart(figure) => figure.svg(chart::Medium::Screen),
-            Self::Moving(svg) => svg.clone(),
-        }
-    }
-}
-
 impl Report {
     /// Whether any recording is one that no camera took.
     #[must_use]
@@ -148,26 +100,5 @@ impl Report {
     /// Every figure, in the order of the page.
     pub fn all_figures(&self) -> impl Iterator<Item = &FigureBlock> {
         self.figures.iter().flat_map(|group| &group.figures)
-    }
-}
-
-/// The line under a heading that says what kind of figure it is: what it is about, then what is said of it.
-fn about(name: &str, said: &str) -> String {
-    [name, said].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
-}
-
-/// What is said of a recording whose head turns the other way than the model's.
-const OPPOSED: &str = "The recorded head turns the other way than the model's, so that nothing with a sign can \
-                       agree: start the scene half a period of its drive later";
-
-/// What is said of the model where only numbers are published.
-const NO_TRACES: &str = "model alone: no traces are published";
-
-/// The line under a heading; a figure of synthetic data always says so there.
-fn subtitle(synthetic: bool, text: &str) -> String {
-    match (synthetic, text.is_empty()) {
-        (true, true) => "synthetic recording: no camera took it".to_owned(),
-        (true, false) => format!("synthetic recording: no camera took it; {text}"),
-        (false, _) => text.to_owned(),
     }
 }

@@ -39,6 +39,7 @@ mod relations;
 mod settings;
 mod shapes;
 mod sharp;
+mod target;
 pub mod time_frequency;
 mod transform;
 mod transformed;
@@ -58,6 +59,7 @@ pub use limits::{FASTEST_HZ, MAX_COMPONENTS, MIN_SAMPLES};
 pub use multitaper::{Multitaper, MultitaperError, TAPERS};
 
 pub use settings::Settings;
+pub use target::Target;
 pub use transformed::Transformed;
 
 pub use trend::{Detrend, UnknownDetrend};

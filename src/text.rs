@@ -12,7 +12,7 @@ mod printable;
 mod unit;
 
 pub use deviation::with_sd;
-pub use hash::{TextHash, text_sha256};
+pub use hash::{TextHash, sha256, text_sha256};
 pub use number::{ascii, digits, number, rounded, short, typed};
 pub use phrase::{interval, listed, plural, wrapped};
 pub use printable::{escaped, printable};

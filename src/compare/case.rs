@@ -1,17 +1,17 @@
 //! A condition of a job: its recording, and the model at the estimates through the same camera.
 
-use super::alignment::Alignment;
 use super::model_run::ModelRun;
 use super::ridge::Ridges;
 use super::runs::{self, RunLine};
-use super::traces::MotionTraces;
 use super::windows::{Sought, sought};
 use crate::fit::job::{Aim, Job};
 use crate::fit::result::FitResult;
 use crate::recording::Recording;
+use crate::recording::alignment::Alignment;
 use crate::recording::channel::{Anchor, Channel, Instants, Window};
 use crate::recording::files::RecordingFile;
 use crate::recording::film::Film;
+use crate::recording::motion_traces::MotionTraces;
 use crate::recording::noise_model::{RecordingNoise, noise_of};
 use crate::recording::quality::noise_floor;
 use rayon::prelude::*;

@@ -1,10 +1,10 @@
 //! The model at the estimates: each condition's scene, run once.
 
-use super::motion::{Motion, MotionRecorder};
 use crate::fit::failure::RunFailure;
 use crate::fit::job::Job;
 use crate::fit::result::FitResult;
 use crate::fit::scene_model::SceneModel;
+use crate::simulate::motion::{Motion, MotionRecorder};
 use crate::simulate::scene::Scene;
 use crate::twin::View;
 use rayon::prelude::*;

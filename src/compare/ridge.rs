@@ -1,11 +1,12 @@
 //! The deflection in segments of both sides, with the ridges that follow the stick-slip cycle.
 
 use super::case::{Case, Side};
-use super::course;
 use super::windows::band;
 use crate::feature::{Band, Reading};
 use crate::recording::channel::{Anchor, Channel, Window, WindowEnd, mean_speed_m_per_s};
-use crate::spectrum::time_frequency::{Ridge, RidgePoint, Spectrogram, SpectrogramSettings, default_band_hz};
+use crate::spectrum::time_frequency::{
+    Ridge, RidgePoint, Spectrogram, SpectrogramSettings, SpeedPoint, course, default_band_hz,
+};
 use crate::spectrum::{Analysis, Oscillation, Record, Settings};
 use std::ops::Range;
 
@@ -42,17 +43,6 @@ pub struct FollowedRidge {
     pub band_hz: (f64, f64),
     /// The courses over the speed of the tip, thinned.
     pub over_speed: Vec<SpeedPoint>,
-}
-
-/// A frequency at a speed of the tip.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SpeedPoint {
-    /// Mean speed of the tip over the segment, m/s.
-    pub tip_speed_m_per_s: f64,
-    /// Frequency, Hz.
-    pub frequency_hz: f64,
-    /// Its standard deviation, Hz, where known.
-    pub frequency_sd_hz: Option<f64>,
 }
 
 impl Ridges {

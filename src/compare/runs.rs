@@ -1,8 +1,7 @@
 //! The best model's run in a condition: how it ended and which hard events it had.
 
-use super::motion::Motion;
 use crate::simulate::mode::Mode;
-use crate::simulate::{Cause, Status, Transition};
+use crate::simulate::{Cause, Motion, Status, Transition};
 use serde::{Serialize, Serializer};
 
 /// The best model's run in a condition, with its hard events.

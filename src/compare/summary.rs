@@ -1,11 +1,11 @@
 //! What a comparison says in numbers, as `report.json` holds it.
 
-use super::alignment::Point;
 use super::case::{Case, Side};
 use super::ridge::FollowedRidge;
-use super::traces::CHANNELS;
 use super::windows::{FitWindow, fit_windows};
+use crate::recording::alignment::Point;
 use crate::recording::channel::Channel;
+use crate::recording::motion_traces::CHANNELS;
 use serde::Serialize;
 
 /// A recording against the model at the estimates; of a condition without a recording, the model alone.

@@ -1,12 +1,12 @@
 //! The columns of a comparison as CSV, on the clocks of the recordings.
 
-use super::alignment::Alignment;
 use super::case::{Case, Measured};
 use super::model_run::ModelRun;
 use super::ridge::FollowedRidge;
-use super::traces::{CHANNELS, MotionTraces};
 use crate::fit::job::Job;
 use crate::recording::Recording;
+use crate::recording::alignment::Alignment;
+use crate::recording::motion_traces::{CHANNELS, MotionTraces};
 use crate::simulate::Transition;
 use crate::spectrum::time_frequency::RidgePoint;
 

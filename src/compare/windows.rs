@@ -4,7 +4,7 @@ use crate::feature::{Band, Unit};
 use crate::fit::job::{Aim, Job};
 use crate::fit::result::FitResult;
 use crate::recording::channel::{Channel, Window};
-use serde::Serialize;
+use crate::spectrum::Target;
 
 /// A window of a channel that aims share.
 #[derive(Debug, Clone)]
@@ -17,17 +17,6 @@ pub struct FitWindow<'a> {
     pub band: Option<&'a Band>,
     /// What is read in it, in the order of the job.
     pub aims: Vec<&'a Aim>,
-}
-
-/// A frequency that a spectrum is compared with.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Target {
-    /// What it is.
-    pub name: String,
-    /// Frequency, Hz.
-    pub frequency_hz: f64,
-    /// Its standard deviation, Hz, where known.
-    pub frequency_sd_hz: Option<f64>,
 }
 
 /// A frequency that the fit seeks, and the model's.

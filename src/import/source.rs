@@ -3,7 +3,7 @@
 
 use crate::import::error::ImportError;
 use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE};
-use sha2::{Digest, Sha256};
+use crate::text::sha256;
 
 /// A file to import.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -72,10 +72,4 @@ pub fn kept_files(sources: &[Source]) -> Vec<(&str, &[u8])> {
 /// SHA-256 of every kept file, in their order.
 pub(crate) fn hashes(sources: &[Source]) -> Vec<String> {
     kept_files(sources).into_iter().map(|(_, bytes)| sha256(bytes)).collect()
-}
-
-/// SHA-256 of `bytes`, hexadecimal, as `recording.toml` keeps it.
-#[must_use]
-pub fn sha256(bytes: &[u8]) -> String {
-    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }

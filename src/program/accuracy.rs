@@ -3,13 +3,13 @@
 use crate::accuracy::{
     HIGH, LOW, REFERENCE_TOLERANCE, Reference, Row, TOLERANCES, accuracy_csv, settings, work_precision_csv,
 };
+use crate::figures::work_precision::{Point, WorkPrecision, figure};
 use crate::program::early_end::early_end;
 use crate::program::failure::{Failure, Outcome};
 use crate::program::files::{self, Maker, Overwrite, Place, Writer};
 use crate::program::global::Global;
 use crate::program::load::read_scene;
 use crate::program::progress;
-use crate::report::figure::work_precision::{Point, WorkPrecision, figure};
 use crate::simulate::scene::Scene;
 use crate::simulate::{Method, Status};
 use crate::text::digits;

@@ -1,9 +1,9 @@
 //! Figures of commands that print or write tables.
 
+use crate::chart::Figure;
 use crate::program::failure::Failure;
 use crate::program::files::{self, Maker, Overwrite, Place, Writer};
 use crate::program::global::Global;
-use crate::report::chart::Figure;
 use clap::Args;
 use std::path::PathBuf;
 

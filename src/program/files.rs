@@ -9,8 +9,8 @@ mod maker;
 mod marker;
 mod staged;
 
+use crate::chart::{Figure, Medium};
 use crate::program::failure::Failure;
-use crate::report::chart::{Figure, Medium};
 use crate::toml_file;
 pub use dialect::CsvDialect;
 use guard::Guard;

@@ -200,7 +200,7 @@ impl Typed {
     /// A folder keeps one recording, and a measured one for ever.
     fn writer(&self, sources: &[Source]) -> Writer {
         let exports =
-            import::kept_files(sources).into_iter().map(|(_, bytes)| import::sha256(bytes)).collect();
+            import::kept_files(sources).into_iter().map(|(_, bytes)| crate::text::sha256(bytes)).collect();
         Writer { exports, ..Writer::new(Maker::Import, self.overwrite) }
     }
 

@@ -1,5 +1,6 @@
 //! `wiperlab inspect`.
 
+use crate::figures::recorded;
 use crate::program::failure::{Failure, Outcome};
 use crate::program::figures::Figures;
 use crate::program::files::Overwrite;
@@ -8,7 +9,6 @@ use crate::program::inspection::{Components, Inspection, Slope, Turn};
 use crate::program::load::{Loaded, load_recording, read_scene};
 use crate::program::output;
 use crate::recording::quality;
-use crate::report::figure::recorded;
 use crate::text::degrees;
 use clap::Args;
 use std::path::PathBuf;

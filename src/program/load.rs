@@ -1,6 +1,5 @@
 //! Scenes from disk, and recordings: a folder with `trace.csv` and `recording.toml`, or a `trace.csv` alone.
 
-use crate::import::sha256;
 use crate::plausibility;
 use crate::program::failure::Failure;
 use crate::program::files::{self, Maker, Marker, SIMULATION_SUMMARY, is_simulation_summary};
@@ -9,7 +8,7 @@ use crate::recording::Recording;
 use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_recording};
 use crate::recording::quality::{Check, Finding, Severity};
 use crate::simulate::scene::Scene;
-use crate::text::text_sha256;
+use crate::text::{sha256, text_sha256};
 use std::path::{Path, PathBuf};
 
 /// Reads a scene that the user named, with the recording that drives it, if one does.

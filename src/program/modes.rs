@@ -1,12 +1,12 @@
 //! `wiperlab modes`.
 
 use crate::blade::modes::{NaturalMode, Tip, modes, named};
+use crate::figures::modes::figures;
 use crate::program::failure::{Failure, Outcome};
 use crate::program::figures::Figures;
 use crate::program::files::Overwrite;
 use crate::program::global::Global;
 use crate::program::load::{read_scene, warn_of};
-use crate::report::figure;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -50,7 +50,7 @@ impl ModesArgs {
                 modes(blade, tip, on_shoulder).iter().for_each(|mode| print_mode(word, mode));
             }
         }
-        let drawn = || FIGURES.into_iter().zip(figure::modes::figures(scene.title(), blade)).collect();
+        let drawn = || FIGURES.into_iter().zip(figures(scene.title(), blade)).collect();
         self.figures.write(self.overwrite, global, drawn)?;
         Ok(Outcome::Done)
     }

@@ -1,6 +1,6 @@
 //! `wiperlab simulate`.
 
-use crate::compare::Motion;
+use crate::figures::motion;
 use crate::program::failure::{Failure, Outcome};
 use crate::program::figures::Figures;
 use crate::program::files::{Maker, Overwrite, Place, SIMULATION_SUMMARY, Writer};
@@ -12,7 +12,7 @@ use crate::program::sensitivities::{self, Sensitivities};
 use crate::program::table::Table;
 use crate::program::watch::Watch;
 use crate::recording::files::{HEADER, push_trace_row};
-use crate::report::figure::motion;
+use crate::simulate::Motion;
 use crate::simulate::outputs::{
     Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, points_m, push_event, push_state, sample_times,
 };

@@ -2,6 +2,9 @@
 
 mod tables;
 
+use crate::chart::Figure;
+use crate::figures::analysis::{AnalysedWindow, compared};
+use crate::figures::spectrum::{self, Spectra};
 use crate::program::count::count;
 use crate::program::failure::{Failure, Outcome};
 use crate::program::files::{Maker, Overwrite, Place, Writer, drawn, write_outputs};
@@ -10,9 +13,6 @@ use crate::program::load::{Loaded, load_recording};
 use crate::program::progress;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Instants, Window};
-use crate::report::analysis::{AnalysedWindow, compared};
-use crate::report::chart::Figure;
-use crate::report::figure::spectrum::{self, Spectra};
 use crate::spectrum::{Analysis, Detrend, FASTEST_HZ, MAX_COMPONENTS, Record, Settings};
 use crate::twin::film::{Dropouts, film_like};
 use clap::Args;

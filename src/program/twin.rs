@@ -1,5 +1,6 @@
 //! `wiperlab twin`.
 
+use crate::figures::twin as figure;
 use crate::program::early_end::early_end;
 use crate::program::failure::{Failure, Outcome};
 use crate::program::figures::Figures;
@@ -10,7 +11,6 @@ use crate::program::watch::Watch;
 use crate::recording::Recording;
 use crate::recording::files::{CameraEntry, DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_csv};
 use crate::recording::quality::quality;
-use crate::report::figure::twin as figure;
 use crate::simulate::Effort;
 use crate::simulate::scene::Scene;
 use crate::text::text_sha256;

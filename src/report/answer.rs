@@ -1,18 +1,18 @@
 //! What a reader wants to know first, in plain words: whether the model explains the recording, the blade's
 //! numbers, how sure they are, and what to do next.
 
+use super::Report;
 use super::statement::{Sentence, Statement};
 use super::verdict::compared;
-use super::{Comparison, ParameterLine, Report};
 use crate::blade::parameters;
-use crate::compare::Summary;
 use crate::compare::summary::ResidualLine;
+use crate::compare::{Comparison, ParameterLine, Summary};
+use crate::figures::evidence::NOTHING_LEFT;
+use crate::figures::friction::FrictionLine;
 use crate::fit::misfit::{ChannelMisfit, Misfit, WorstSegment, far_from_priors};
 use crate::text::{capitalised, digits, length, listed, plural, speed};
 use serde::Serialize;
 
-/// Residual over noise up to which nothing but noise is left: of its size a few per cent are not known.
-pub(in crate::report) const NOTHING_LEFT: f64 = 1.1;
 /// Residual over noise above which a run is seen to be off.
 const SEEN: f64 = 3.0;
 /// Standard deviations between model and target that are worth a word.
@@ -50,17 +50,6 @@ pub struct Quantity {
     pub identified: bool,
     /// Whether anything of it was fitted.
     pub fitted: bool,
-}
-
-/// Friction of the law of the best model.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct FrictionLine {
-    /// Speed of the tip, m/s; zero is rest.
-    pub speed_m_per_s: f64,
-    /// Coefficient of friction.
-    pub coefficient: f64,
-    /// Half of its 95 % interval; `None` where the fit does not know it.
-    pub half_95: Option<f64>,
 }
 
 impl Answer {

@@ -3,16 +3,17 @@
 mod tables;
 
 use super::answer;
-use super::figure::corner::Corner;
-use super::figure::naming::distinct;
-use super::figure::profiles::Profiles;
-use super::figure::pulls::Pulls;
-use super::figure::{
+use super::{CombinationLine, Failed, FigureGroup, ProbeLine, Report, SearchLine, Subject};
+use crate::compare::{Case, Measured, ModelRun, Summary, model_runs, tables::tables};
+use crate::figures::FigureBlock;
+use crate::figures::corner::Corner;
+use crate::figures::naming::distinct;
+use crate::figures::profiles::Profiles;
+use crate::figures::pulls::Pulls;
+use crate::figures::{
     animation, cycle, evidence, friction, history, phase_portrait, poses, residuals, spectrogram, spectrum,
     video_frames,
 };
-use super::{CombinationLine, Failed, FigureBlock, FigureGroup, ProbeLine, Report, SearchLine, Subject};
-use crate::compare::{Case, Measured, ModelRun, Summary, model_runs, tables::tables};
 use crate::fit::Problem;
 use crate::fit::failure::{FailureReason, RunFailure};
 use crate::fit::job::Job;

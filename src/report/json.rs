@@ -70,8 +70,10 @@ pub fn report_json(report: &Report) -> Result<String, serde_json::Error> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Comparison, Drawing, FigureBlock, FigureGroup};
+    use super::super::FigureGroup;
     use super::*;
+    use crate::compare::Comparison;
+    use crate::figures::{Drawing, FigureBlock};
 
     #[test]
     fn the_json_has_the_verdict_and_no_drawings() {

@@ -1,8 +1,10 @@
 //! What a report says of a fit, built once for the page, the JSON and the terminal.
 
+use super::Report;
 use super::answer;
 use super::statement::{Sentence, Statement};
-use super::{Comparison, OPPOSED, ParameterLine, Report, RunLine};
+use crate::compare::{Comparison, ParameterLine, RunLine, Truth};
+use crate::figures::OPPOSED;
 use crate::fit::misfit::{ChannelMisfit, Misfit, far_from_priors, unexplained};
 use crate::fit::uncertainty::Verdict as Knowledge;
 use crate::simulate::Status;
@@ -254,7 +256,7 @@ fn truth(parameters: &[ParameterLine]) -> Option<Statement> {
         plural("parameter", known.len())
     ));
     let outside = known.iter().filter(|(_, truth)| !truth.inside_95);
-    let detail = |(p, truth): &(&ParameterLine, super::Truth)| {
+    let detail = |(p, truth): &(&ParameterLine, Truth)| {
         Sentence::default().name(&p.name).words(format!(
             " is {} in truth, outside {}",
             number(truth.value),
@@ -322,7 +324,7 @@ fn hard_events(run: &RunLine) -> Option<Statement> {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{SearchLine, Truth};
+    use super::super::SearchLine;
     use super::*;
     use crate::fit::misfit::{StageMisfit, WorstSegment};
     use crate::fit::result;

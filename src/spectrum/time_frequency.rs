@@ -18,6 +18,7 @@
 mod chirp;
 mod choice;
 mod columns;
+pub mod course;
 mod follow;
 mod noise;
 mod path;
@@ -27,6 +28,7 @@ mod segment;
 mod spectrogram;
 mod tracker;
 
+pub use course::SpeedPoint;
 pub use range::Range;
 pub use ridge::{Ridge, RidgeEnd, RidgePoint};
 pub use segment::MOST_COLUMNS;

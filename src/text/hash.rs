@@ -1,4 +1,4 @@
-//! SHA-256 of a text, the same however its lines end.
+//! SHA-256 of bytes, and of a text, the same however its lines end.
 
 use sha2::{Digest, Sha256};
 
@@ -73,6 +73,12 @@ impl TextHash {
         }
         self.digest.update(rest);
     }
+}
+
+/// SHA-256 of bytes in 64 hexadecimal digits.
+#[must_use]
+pub fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// [`TextHash`] of a whole text.

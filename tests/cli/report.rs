@@ -124,7 +124,7 @@ fn page_and_json_give_the_same_verdict_and_the_origin_of_every_number() {
     assert_eq!(files, expected);
     for (kind, name) in expected.iter().filter(|(kind, _)| *kind != "export") {
         let bytes = fs::read(project.path(name)).unwrap();
-        let hash = wiperlab::import::sha256(&bytes);
+        let hash = wiperlab::text::sha256(&bytes);
         assert!(page.contains(&hash) && project.read("reports/x/report.json").contains(&hash), "{kind}");
     }
 }
@@ -175,7 +175,7 @@ fn a_recording_that_drives_the_scene_is_among_the_files() {
         (
             &"data/twin/trace.csv".into(),
             &true.into(),
-            &wiperlab::import::sha256(project.read("data/twin/trace.csv").as_bytes()).into()
+            &wiperlab::text::sha256(project.read("data/twin/trace.csv").as_bytes()).into()
         )
     );
 }

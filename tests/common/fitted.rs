@@ -2,17 +2,17 @@
 //! user's name may stand.
 
 use super::scene;
+use wiperlab::chart::Figure;
+use wiperlab::figures::corner::{self, Corner, Known};
+use wiperlab::figures::cycle::{self, CycleOverSpeed, SpeedPoint, Target};
+use wiperlab::figures::evidence;
+use wiperlab::figures::friction::{self, Law};
+use wiperlab::figures::phase_portrait::{self, Part, Portrait};
+use wiperlab::figures::poses::{self, Poses};
+use wiperlab::figures::profiles::{self, Profile, Profiles};
+use wiperlab::figures::pulls::{self, Pull, Pulls};
+use wiperlab::figures::residuals::{self, Diagnostics};
 use wiperlab::fit::uncertainty::Verdict;
-use wiperlab::report::chart::Figure;
-use wiperlab::report::figure::corner::{self, Corner, Known};
-use wiperlab::report::figure::cycle::{self, CycleOverSpeed, SpeedPoint, Target};
-use wiperlab::report::figure::evidence;
-use wiperlab::report::figure::friction::{self, Law};
-use wiperlab::report::figure::phase_portrait::{self, Part, Portrait};
-use wiperlab::report::figure::poses::{self, Poses};
-use wiperlab::report::figure::profiles::{self, Profile, Profiles};
-use wiperlab::report::figure::pulls::{self, Pull, Pulls};
-use wiperlab::report::figure::residuals::{self, Diagnostics};
 
 /// A parameter that is known, one that is open at an end, and one without intervals.
 pub fn profiles(name: &str) -> Figure {
@@ -49,7 +49,7 @@ pub fn profiles(name: &str) -> Figure {
 }
 
 pub fn poses(name: &str) -> Figure {
-    poses::figure(&Poses::of(&wiperlab::compare::Motion::of(&scene()), name, name.to_owned()).unwrap())
+    poses::figure(&Poses::of(&wiperlab::simulate::Motion::of(&scene()), name, name.to_owned()).unwrap())
 }
 
 /// Two parts, one of them with measured states.

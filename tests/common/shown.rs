@@ -4,18 +4,18 @@
 #[path = "fitted.rs"]
 mod fitted;
 
-use wiperlab::compare::Motion;
-use wiperlab::report::chart::{Figure, Medium};
-use wiperlab::report::figure::animation::pace::{Pace, Part};
-use wiperlab::report::figure::animation::{self, Animation, Tracked};
-use wiperlab::report::figure::history::{self, History};
-use wiperlab::report::figure::profiles::{self, Profiles};
-use wiperlab::report::figure::ring_down::{self, Decay, RingDown, Trace};
-use wiperlab::report::figure::spectrogram::{self, Aimed, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
-use wiperlab::report::figure::spectrum::{self, Curve, Named, Spectra, Target};
-use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
-use wiperlab::report::figure::work_precision::{self, Point, WorkPrecision};
-use wiperlab::report::figure::{sweep_map, sweep_sheet};
+use wiperlab::chart::{Figure, Medium};
+use wiperlab::figures::animation::pace::{Pace, Part};
+use wiperlab::figures::animation::{self, Animation, Tracked};
+use wiperlab::figures::history::{self, History};
+use wiperlab::figures::profiles::{self, Profiles};
+use wiperlab::figures::ring_down::{self, Decay, RingDown, Trace};
+use wiperlab::figures::spectrogram::{self, Aimed, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
+use wiperlab::figures::spectrum::{self, Curve, Named, Spectra, Target};
+use wiperlab::figures::windows::{self, NamedWindow, Windows};
+use wiperlab::figures::work_precision::{self, Point, WorkPrecision};
+use wiperlab::figures::{sweep_map, sweep_sheet};
+use wiperlab::simulate::Motion;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::{Outcome, Study};
 
@@ -74,7 +74,7 @@ fn wave(amplitude_m: f64) -> Vec<Option<f64>> {
 }
 
 fn full_history(name: &str) -> History {
-    let motion = |scale: f64| wiperlab::compare::MotionTraces {
+    let motion = |scale: f64| wiperlab::recording::motion_traces::MotionTraces {
         time_s: times(),
         tip_x_m: wave(1e-2 * scale),
         head_x_m: wave(2e-2 * scale),

@@ -3,16 +3,17 @@
 
 use crate::raster::{colliding, inked, rasterised, sound};
 use std::path::{Path, PathBuf};
+use wiperlab::chart::{Figure, MOST_HEIGHT_MM, Medium};
 use wiperlab::compare::{Measured, ModelRun, model_runs};
+use wiperlab::figures::{Drawing, FigureBlock};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
 use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{RecordingFile, parse_trace_csv};
-use wiperlab::report::chart::{Figure, MOST_HEIGHT_MM, Medium};
+use wiperlab::report::Report;
 use wiperlab::report::comparison;
 use wiperlab::report::several::{Fitted, compare};
-use wiperlab::report::{Drawing, FigureBlock, Report};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::twin::Camera;
 

@@ -3,16 +3,17 @@
 
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+use wiperlab::chart::{Figure, Medium};
 use wiperlab::compare::{Measured, ModelRun, model_runs};
+use wiperlab::figures::{Drawing, FigureBlock};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
 use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
 use wiperlab::recording::files::parse_trace_csv;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::report::chart::{Figure, Medium};
 use wiperlab::report::comparison;
 use wiperlab::report::several::{Fitted, compare};
-use wiperlab::report::{Drawing, FigureBlock, Report, Subject};
+use wiperlab::report::{Report, Subject};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::twin::Camera;
 

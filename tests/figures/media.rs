@@ -5,9 +5,9 @@ use crate::shown;
 
 use crate::raster::{colliding, inked, near, rasterised, sound};
 use crate::shown::{EMPTY, FULL, MEDIA};
-use wiperlab::compare::MotionTraces;
-use wiperlab::report::chart::{Figure, MOST_HEIGHT_MM, Medium};
-use wiperlab::report::figure::history::{self, History};
+use wiperlab::chart::{Figure, MOST_HEIGHT_MM, Medium};
+use wiperlab::figures::history::{self, History};
+use wiperlab::recording::motion_traces::MotionTraces;
 
 const PLAIN: &str = "Actual blade fitted to its recording";
 /// A script, quotes, an entity, Hebrew, Arabic, an emoji, a mark that turns the direction of writing, and a

@@ -5,12 +5,12 @@ use crate::raster;
 
 use crate::noise::noise;
 use crate::raster::{drawn, inked, near, rasterised};
-use wiperlab::report::analysis::compared;
-use wiperlab::report::chart::Medium;
-use wiperlab::report::figure::ring_down::{self, Decay, RingDown, Trace};
-use wiperlab::report::figure::spectrogram::{self, RidgePoint, Spectrogram, SpeedPoint};
-use wiperlab::report::figure::spectrum::{self, Curve, Interval, Level, Named, Spectra};
-use wiperlab::report::figure::windows::{self, NamedWindow, Windows};
+use wiperlab::chart::Medium;
+use wiperlab::figures::analysis::compared;
+use wiperlab::figures::ring_down::{self, Decay, RingDown, Trace};
+use wiperlab::figures::spectrogram::{self, RidgePoint, Spectrogram, SpeedPoint};
+use wiperlab::figures::spectrum::{self, Curve, Interval, Level, Named, Spectra};
+use wiperlab::figures::windows::{self, NamedWindow, Windows};
 use wiperlab::spectrum::{Analysis, Record, Settings};
 
 const VERMILION: (u8, u8, u8) = (0xD5, 0x5E, 0x00);

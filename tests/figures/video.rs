@@ -2,15 +2,15 @@
 //! those that were tracked.
 
 use std::sync::Mutex;
+use wiperlab::chart::{Medium, Raster};
 use wiperlab::compare::{Case, Measured, model_runs};
+use wiperlab::figures::video_frames::{VideoFrames, details, figure};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
 use wiperlab::fit::{Measured as Fitted, Problem};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{LevelEntry, Place, RecordingFile, parse_trace_csv};
 use wiperlab::recording::film::{Film, Picture, Pictures};
-use wiperlab::report::chart::{Medium, Raster};
-use wiperlab::report::figure::video_frames::{VideoFrames, details, figure};
 use wiperlab::simulate::scene::Scene;
 
 /// Pictures of two dark spots of Gaussian shape, at the pixels of the tracked head and tip.

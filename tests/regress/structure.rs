@@ -9,41 +9,26 @@ use files::{SourceFile, all_files, edges};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Which rooms each room may use. A room that is not listed is new: it gets a line here.
-const ROOMS: [(&str, &[&str]); 22] = [
+const ROOMS: [(&str, &[&str]); 24] = [
     ("math", &[]),
     ("text", &["math"]),
     ("toml_file", &["text"]),
-    ("camera", &["math"]),
-    ("blade", &["math"]),
     ("ode", &["math"]),
+    ("camera", &["math"]),
+    ("spectrum", &["camera", "math"]), // a component may be one above half the frame rate, folded
+    ("chart", &["math", "text"]),
+    ("blade", &["math"]),
     ("plausibility", &["blade", "text"]), // the ranges are of parameters of the blade
-    ("spectrum", &["camera", "math"]),    // a component may be one above half the frame rate, folded
     ("recording", &["camera", "math", "text", "toml_file"]),
+    ("import", &["camera", "math", "recording", "text", "toml_file"]),
     ("simulate", &["blade", "math", "ode", "plausibility", "recording", "toml_file"]), // a recorded head may drive a scene
     ("section", &["blade", "math", "plausibility", "simulate", "text", "toml_file"]), // and back from a scene
-    ("accuracy", &["blade", "ode", "recording", "simulate", "spectrum"]),
     ("twin", &["blade", "camera", "math", "recording", "simulate", "toml_file"]),
+    ("accuracy", &["blade", "ode", "recording", "simulate", "spectrum"]),
     ("feature", &["math", "recording", "simulate", "spectrum", "toml_file"]),
     ("journal", &["text"]),
     (
         "fit",
-        &[
-            "blade",
-            "camera",
-            "feature",
-            "journal",
-            "math",
-            "recording",
-            "simulate",
-            "spectrum",
-            "text",
-            "toml_file",
-            "twin",
-        ],
-    ),
-    ("draft", &["blade", "fit", "math", "recording", "simulate", "spectrum", "text"]),
-    (
-        "sweep",
         &[
             "blade",
             "camera",
@@ -63,10 +48,26 @@ const ROOMS: [(&str, &[&str]); 22] = [
         &["blade", "camera", "feature", "fit", "math", "recording", "simulate", "spectrum", "text", "twin"],
     ),
     (
-        "report",
+        "sweep",
         &[
             "blade",
             "camera",
+            "feature",
+            "journal",
+            "math",
+            "recording",
+            "simulate",
+            "spectrum",
+            "text",
+            "toml_file",
+            "twin",
+        ],
+    ),
+    (
+        "figures",
+        &[
+            "blade",
+            "chart",
             "compare",
             "feature",
             "fit",
@@ -76,19 +77,36 @@ const ROOMS: [(&str, &[&str]); 22] = [
             "spectrum",
             "sweep",
             "text",
-            "twin",
         ],
     ),
-    ("import", &["camera", "math", "recording", "text", "toml_file"]),
+    (
+        "report",
+        &[
+            "blade",
+            "chart",
+            "compare",
+            "feature",
+            "figures",
+            "fit",
+            "math",
+            "recording",
+            "simulate",
+            "spectrum",
+            "text",
+        ],
+    ),
+    ("draft", &["blade", "fit", "math", "recording", "simulate", "spectrum", "text"]),
     (
         "program",
         &[
             "accuracy",
             "blade",
             "camera",
+            "chart",
             "compare",
             "draft",
             "feature",
+            "figures",
             "fit",
             "import",
             "journal",

@@ -1,10 +1,10 @@
 //! The folder of a report: what is written into it.
 
 use crate::compare::Table;
+use crate::figures::{Drawing, FigureBlock};
 use crate::program::failure::Failure;
 use crate::program::files::{self, Place, Writer, drawn};
 use crate::program::global::Global;
-use crate::report::{Drawing, FigureBlock};
 use std::path::Path;
 
 const JSON: &str = "report.json";

@@ -1,7 +1,6 @@
 //! Where the numbers of a fit come from: its files with their hashes, and the commands that make it again.
 
 use super::Fit;
-use crate::import::sha256;
 use crate::program::failure::Failure;
 use crate::program::files;
 use crate::program::files::RESULT;
@@ -9,6 +8,7 @@ use crate::program::load::{Loaded, description_of, load_recording};
 use crate::program::problem::JOB;
 use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE};
 use crate::report::{Provenance, SourceFile};
+use crate::text::sha256;
 use std::path::{Component, Path};
 
 pub fn provenance(fit: &Fit) -> Result<Provenance, Failure> {

@@ -1,9 +1,9 @@
 //! What `spectrum` writes and prints in addition to its figures.
 
 use super::{Request, Studied};
+use crate::figures::analysis::CoursePoint;
 use crate::program::failure::Failure;
 use crate::recording::channel::{Channel, Instants, named_windows};
-use crate::report::analysis::CoursePoint;
 use crate::spectrum::time_frequency::Range;
 use crate::spectrum::{Analysis, Component, Verdict};
 use crate::text::{ascii, with_sd};

@@ -1,11 +1,11 @@
 //! The files of a study, from its points.
 
 use super::problem::{Problem, failure};
+use crate::chart::Figure;
+use crate::figures::{sweep_map, sweep_sheet};
 use crate::program::failure::{Failure, Outcome};
 use crate::program::files::{self, Place, Writer};
 use crate::program::global::Global;
-use crate::report::chart::Figure;
-use crate::report::figure::{sweep_map, sweep_sheet};
 use crate::sweep::outputs::{Summary, csv_header, csv_row};
 use crate::sweep::{Collection, Outcome as Point, RankCorrelations, Reason, SHEET, Study};
 use std::collections::BTreeMap;

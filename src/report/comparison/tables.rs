@@ -2,13 +2,14 @@
 
 use crate::blade::parameters;
 use crate::compare::Measured;
+use crate::compare::{Comparison, NextPeak, ParameterLine, Truth};
 use crate::fit::job::{Aim, FreeParameter, Job, Source};
 use crate::fit::result::{ComponentResult, FeatureResult, FitResult, ParameterResult, Status};
 use crate::fit::uncertainty::Verdict;
 use crate::recording::channel::Instants;
 use crate::recording::files::RecordingFile;
 use crate::recording::quality::{self, Finding, Optics};
-use crate::report::{Comparison, NextPeak, ParameterLine, RecordingLine, Truth};
+use crate::report::RecordingLine;
 use crate::text::number;
 
 /// A recording with everything that `wiperlab inspect` says of it.

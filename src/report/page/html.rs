@@ -1,9 +1,9 @@
 //! Parts of a page: text that stays text, tables, figures, sections, the document.
 
 use crate::blade::parameters;
-use crate::report::chart::Medium;
+use crate::chart::Medium;
+use crate::figures::{Drawing, FigureBlock};
 use crate::report::statement::{Piece, Sentence, Statement};
-use crate::report::{Drawing, FigureBlock};
 use crate::text::{capitalised, printable};
 use html_escape::encode_safe;
 

@@ -1,8 +1,9 @@
 //! Sections on what is known of the parameters, and on how the search and the gate before it went.
 
 use super::html::{Cell, Set, Table, about, facts, key, list, parameter, prose, text, verdict};
+use crate::compare::ParameterLine;
 use crate::fit::result::Status;
-use crate::report::{CombinationLine, ParameterLine, ProbeLine, Report};
+use crate::report::{CombinationLine, ProbeLine, Report};
 use crate::text::{self, DASH, interval, number, or_dash, percent};
 
 pub(super) fn parameters(report: &Report) -> String {

@@ -1,11 +1,13 @@
 use super::*;
+use crate::compare::{Comparison, ParameterLine, Truth};
+use crate::figures::{Drawing, FigureBlock};
 use crate::fit::misfit::{ChannelMisfit, Misfit, WorstSegment};
 use crate::fit::result::{NuisanceResult, Status};
 use crate::recording::quality::{Check, Finding, Grade, Severity};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::report::{
-    CombinationLine, Comparison, Drawing, Failed, FigureBlock, FigureGroup, ParameterLine, ProbeLine,
-    Provenance, RecordingLine, RunLine, SearchLine, SourceFile, Truth,
+    CombinationLine, Failed, FigureGroup, ProbeLine, Provenance, RecordingLine, RunLine, SearchLine,
+    SourceFile,
 };
 
 pub(in crate::report) fn recording(name: &str, synthetic: bool) -> RecordingLine {

@@ -1,7 +1,7 @@
 //! Tables of what was measured and what the model shows.
 
 use super::html::{Cell, Set, Table, about, name, prose, text, verdict};
-use crate::report::Comparison;
+use crate::compare::Comparison;
 use crate::text::{self, digits, number, or_dash, percent, signed_percent, with_sd};
 
 pub(super) fn components(list: &[Comparison]) -> String {

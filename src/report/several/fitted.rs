@@ -2,10 +2,11 @@
 
 use super::shared::SharedParameter;
 use crate::compare::{Measured, ModelRun};
+use crate::figures::FigureBlock;
 use crate::fit::job::Job;
+use crate::report::Report;
 use crate::report::statement::Statement;
 use crate::report::verdict::Verdict;
-use crate::report::{FigureBlock, Report};
 use crate::text;
 
 /// A fit with everything that it is compared by.

@@ -3,11 +3,12 @@
 
 use super::fitted::{Entry, short};
 use super::shared::{Relation, SharedParameter};
-use crate::math;
-use crate::report::chart::{
+use crate::chart::{
     Axis, Bar, Colour, FULL_WIDTH_MM, Figure, MOST_HEIGHT_MM, Mark, Medium, Panel, Series, Shape,
 };
-use crate::report::{Drawing, FigureBlock, ParameterLine};
+use crate::compare::ParameterLine;
+use crate::figures::{Drawing, FigureBlock};
+use crate::math;
 use crate::text::{interval, number};
 
 const ROW_MM: f64 = 5.5;

@@ -3,11 +3,11 @@
 use super::fitted::{Entry, Several};
 use super::intervals::estimate;
 use super::shared::SharedParameter;
+use crate::compare::{Comparison, ParameterLine};
 use crate::report::page::html::{
     Cell, Section, Set, Table, about, document, figures, key, list, name, statements, text,
 };
 use crate::report::page::{banner, provenance, values};
-use crate::report::{Comparison, ParameterLine};
 use crate::text::{DASH, number, or_dash};
 
 /// The page; the same comparison always gives the same bytes.

@@ -1,8 +1,8 @@
 //! Parameters of several fits side by side, and whether their intervals overlap.
 
 use super::fitted::Entry;
+use crate::compare::ParameterLine;
 use crate::fit::uncertainty::Verdict;
-use crate::report::ParameterLine;
 use serde::Serialize;
 
 /// A parameter and what each fit knows of it.

@@ -4,12 +4,12 @@
 mod panels;
 
 use super::fitted::Fitted;
+use crate::chart::{FULL_WIDTH_MM, Figure};
 use crate::feature::{Band, Reading};
+use crate::figures::{Drawing, FigureBlock, NO_TRACES, subtitle};
 use crate::fit::job::Aim;
 use crate::recording::Recording;
 use crate::recording::channel::{Anchor, Channel, Instants, WindowEnd};
-use crate::report::chart::{FULL_WIDTH_MM, Figure};
-use crate::report::{Drawing, FigureBlock, NO_TRACES, subtitle};
 use crate::spectrum::{self, Settings, Spectrum};
 use crate::text::{digits, listed, trimmed};
 

@@ -1,8 +1,8 @@
 use super::shared::relation;
 use super::*;
+use crate::chart::{MOST_HEIGHT_MM, Medium};
+use crate::compare::{Comparison, ParameterLine};
 use crate::fit::uncertainty::Verdict as Knowledge;
-use crate::report::chart::{MOST_HEIGHT_MM, Medium};
-use crate::report::{Comparison, ParameterLine};
 
 fn line(verdict: Knowledge, lower_95: Option<f64>, upper_95: Option<f64>) -> ParameterLine {
     ParameterLine {
@@ -105,14 +105,14 @@ fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
         entry("second", report(vec![line(Knowledge::Identified, Some(0.3), Some(0.6))], true)),
     ];
     let block = intervals::figures(&entries, &shared::parameters(&entries)).remove(0);
-    let crate::report::Drawing::Chart(figure) = &block.drawing else { panic!("a chart") };
+    let crate::figures::Drawing::Chart(figure) = &block.drawing else { panic!("a chart") };
     let panel = &figure.panels[0];
     assert_eq!(panel.y.names, [(0.0, "second".to_owned()), (1.0, "first".to_owned())]);
     let (low, high) = panel.x.range.unwrap();
     assert!(low < 0.3 && high > 0.6, "{low} {high}");
     let open = panel.series.iter().find(|s| s.points == [Some((0.5, 1.0))]).unwrap();
     assert!(
-        matches!(open.bars[0], crate::report::chart::Bar::Horizontal { y: 1.0, from: 0.4, to } if to > high),
+        matches!(open.bars[0], crate::chart::Bar::Horizontal { y: 1.0, from: 0.4, to } if to > high),
         "{open:?}"
     );
     assert!(block.caption.contains("0 of 1 pairs"), "{}", block.caption);
@@ -132,8 +132,8 @@ fn parameters_of_eight_fits_are_parted_into_figures_that_fit_a_column() {
     let charts: Vec<_> = blocks
         .iter()
         .map(|block| match &block.drawing {
-            crate::report::Drawing::Chart(figure) => figure,
-            crate::report::Drawing::Moving(_) => panic!("a chart"),
+            crate::figures::Drawing::Chart(figure) => figure,
+            crate::figures::Drawing::Moving(_) => panic!("a chart"),
         })
         .collect();
     assert!(charts.iter().all(|figure| figure.height_mm(Medium::Column) <= MOST_HEIGHT_MM));

@@ -1,8 +1,8 @@
 //! The panels: the spectra of a few fits over each other, those of more in a panel each.
 
 use super::{Member, Points};
+use crate::chart::{Axis, Colour, Mark, Panel, Rule, Series};
 use crate::recording::Recording;
-use crate::report::chart::{Axis, Colour, Mark, Panel, Rule, Series};
 use crate::report::several::fitted::short;
 use crate::text::trimmed;
 

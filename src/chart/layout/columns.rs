@@ -1,0 +1,93 @@
+//! Panels side by side, and the room that each leaves next to its axes.
+
+use super::line_breaks::y_label_lines;
+use super::ranges::visible;
+use super::ticks::{HALF_LABEL_MM, MOST_NAMES, widest_mm, y_ticks};
+use crate::chart::axis::{self, Mapped, Scale};
+use crate::chart::elements::Panel;
+use crate::chart::figure::Figure;
+use crate::chart::heat_bar;
+use crate::chart::sizes::{EDGE_MM, LINE_MM, TICK_MM, UNITS};
+
+/// Least width of the axes of a panel with neighbours at its side, and of one without axes, mm.
+const LEAST_PANEL_MM: f64 = 30.0;
+const LEAST_BARE_MM: f64 = 18.0;
+
+/// How many panels stand side by side, and the room that each leaves next to its axes.
+pub(in crate::chart) struct Columns {
+    pub count: usize,
+    /// Room on the left and on the right of the axes of a column, mm.
+    margins: Vec<(f64, f64)>,
+}
+
+impl Columns {
+    /// As many as the figure asks for and its width has room for.
+    pub fn of(figure: &Figure) -> Self {
+        let most = figure.columns.clamp(1, figure.panels.len().max(1));
+        let least = if figure.panels.iter().all(|panel| panel.bare) { LEAST_BARE_MM } else { LEAST_PANEL_MM };
+        let fits =
+            |columns: &Self| (0..columns.count).all(|column| columns.width_mm(figure, column) >= least);
+        (1..=most)
+            .rev()
+            .map(|count| Self::with(figure, count))
+            .find(fits)
+            .unwrap_or_else(|| Self::with(figure, 1))
+    }
+
+    fn with(figure: &Figure, count: usize) -> Self {
+        let each_mm = figure.width_mm / count as f64;
+        let margins = |column: usize| {
+            let panels = || figure.panels.iter().skip(column).step_by(count);
+            (
+                panels().map(|p| left_margin(p, each_mm)).fold(0.0, f64::max),
+                panels().map(right_margin).fold(0.0, f64::max),
+            )
+        };
+        Self { count, margins: (0..count).map(margins).collect() }
+    }
+
+    fn width_mm(&self, figure: &Figure, column: usize) -> f64 {
+        let (left, right) = self.margins[column];
+        figure.width_mm / self.count as f64 - left - right
+    }
+
+    /// The x axis of a panel in a column.
+    pub fn x(&self, figure: &Figure, column: usize, scale: Scale, (low, high): (f64, f64)) -> Mapped {
+        let left = figure.width_mm * column as f64 / self.count as f64 + self.margins[column].0;
+        Mapped {
+            scale,
+            low,
+            high,
+            from: (left * UNITS).round(),
+            to: ((left + self.width_mm(figure, column)) * UNITS).round(),
+        }
+    }
+}
+
+/// Room for the widest label of a y axis and its title, mm.
+fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
+    if panel.bare {
+        return EDGE_MM / 2.0;
+    }
+    let (low, high) = axis::ends(&panel.y, visible(panel, f64::NEG_INFINITY, f64::INFINITY));
+    let y = Mapped { scale: panel.y.scale, low, high, from: 0.0, to: panel.height_mm * UNITS };
+    widest_mm(&y_ticks(panel, &y, MOST_NAMES * column_mm))
+        + TICK_MM
+        + y_label_lines(panel).len() as f64 * LINE_MM
+        + EDGE_MM
+        + 1.0
+}
+
+/// Room on the right of a panel, mm: for the half of the last label of its x axis, or for the colour bar of a
+/// heat map.
+fn right_margin(panel: &Panel) -> f64 {
+    if panel.bare {
+        return EDGE_MM / 2.0;
+    }
+    EDGE_MM
+        + panel
+            .heat
+            .as_ref()
+            .map_or(0.0, |heat| heat_bar::bar_width_mm(heat, panel.height_mm))
+            .max(HALF_LABEL_MM)
+}

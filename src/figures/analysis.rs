@@ -1,0 +1,31 @@
+//! The complete analysis of a window of a recording: its parts as data, a file each, and their figures.
+
+mod compared;
+mod components;
+mod course;
+mod history;
+mod parts;
+mod window;
+
+pub use compared::compared;
+pub use course::CoursePoint;
+pub use window::AnalysedWindow;
+
+use super::{about, ring_down, spectrogram, spectrum, windows};
+use crate::chart::Figure;
+
+impl AnalysedWindow<'_> {
+    /// Every figure, with its name.
+    #[must_use]
+    pub fn figures(&self) -> [(&'static str, Figure); 4] {
+        let figures = [
+            ("spectrum", spectrum::figure(&self.spectra())),
+            ("spectrogram", spectrogram::figure(&self.spectrogram())),
+            ("ring-down", ring_down::figure(&self.ring_down())),
+            ("history", windows::figure(&self.windows())),
+        ];
+        figures.map(|(name, figure)| {
+            (name, Figure { subtitle: about(self.recording.name(), &figure.subtitle), ..figure })
+        })
+    }
+}

@@ -1,0 +1,322 @@
+//! What moves, drawn over the still figure in its canvas: one SVG element a part, with its key frames inside.
+
+use super::Animation;
+use super::drawing::{self, HEAD_HALF_WIDTH, HEAD_HEIGHT};
+use super::pace::Part;
+use super::strips;
+use super::track::{Changed, Keys, animated, key_frames, short};
+use crate::chart::{Colour, Plot};
+use crate::simulate::Sample;
+use crate::simulate::mode::Mode;
+
+/// How far a drawn point may be from where it belongs, canvas units: a fiftieth of a millimetre, less than a
+/// line is wide.
+const TOLERANCE: f64 = 0.3;
+/// Half width of the tip's symbol, and of the cross of a measured point, canvas units.
+const TIP: f64 = 20.0;
+const CROSS: f64 = 15.0;
+/// How far the symbol is under the tip, canvas units.
+const UNDER: f64 = 40.0;
+/// How far the name of a link is from its middle, canvas units.
+const ASIDE: f64 = 52.0;
+/// The colour of the figure's ground.
+const GROUND: &str = "#FFFFFF";
+/// Size of words, canvas units.
+const LETTERS: f64 = 44.0;
+/// Shortest time for which a measured point stands, as a share of the animation: a screen shows no shorter
+/// one.
+const LEAST_SHARE: f64 = 1.0 / 2000.0;
+
+/// A mode of contact: what it is called and how the tip is drawn in it.
+struct Sign {
+    mode: Mode,
+    word: &'static str,
+    colour: Colour,
+    /// Outline of the tip's symbol in units of its half width.
+    outline: &'static str,
+}
+
+const SIGNS: [Sign; 4] = [
+    Sign { mode: Mode::Stick, word: "stick", colour: Colour::Blue, outline: "M-1 -1H1V1H-1Z" },
+    Sign {
+        mode: Mode::SlipForward,
+        word: "slip+ (to the right)",
+        colour: Colour::Green,
+        outline: "M1.4 0L-0.9 1.2V-1.2Z",
+    },
+    Sign {
+        mode: Mode::SlipBackward,
+        word: "slip\u{2212} (to the left)",
+        colour: Colour::Green,
+        outline: "M-1.4 0L0.9 1.2V-1.2Z",
+    },
+    Sign {
+        mode: Mode::Flight,
+        word: "flight",
+        colour: Colour::Purple,
+        outline: "M0 -1.3L1.3 0L0 1.3L-1.3 0Z",
+    },
+];
+
+/// The elements; none without the panels of the figure.
+pub(super) fn elements(animation: &Animation, plots: &[Plot]) -> String {
+    let [plot, close, strips @ ..] = plots else { return String::new() };
+    let drawing = [linkage(animation, plot), tip(animation, plot), crosses(animation, plot)].concat();
+    [drawing, enlarged(animation, close), words(animation, plot, close), cursors(animation, strips)].concat()
+}
+
+/// The states with their shares of the animation and their points on the canvas: head, hinge, tip as x, y, x,
+/// y, x, y.
+fn poses(animation: &Animation, plot: &Plot) -> Keys<6> {
+    let point = |sample: &Sample| {
+        let [a, b, c] = drawing::points(&animation.linkage, sample);
+        let (a, b, c) = (plot.place(a.0, a.1)?, plot.place(b.0, b.1)?, plot.place(c.0, c.1)?);
+        Some((animation.pace.share(sample.time_s), [a.0, a.1, b.0, b.1, c.0, c.1]))
+    };
+    animation.samples.iter().filter_map(point).collect()
+}
+
+/// Key frames of some of the numbers.
+fn taken<const N: usize>(poses: &Keys<6>, from: usize) -> Keys<N> {
+    let some: Keys<N> =
+        poses.iter().map(|(share, all)| (*share, std::array::from_fn(|k| all[from + k]))).collect();
+    key_frames(&some, TOLERANCE)
+}
+
+fn numbers<const N: usize>(values: &[f64; N]) -> [String; N] {
+    values.map(|v| short(v, 1))
+}
+
+fn place(values: &[f64; 2]) -> String {
+    numbers(values).join(" ")
+}
+
+fn segment(values: &[f64; 4]) -> String {
+    let [x1, y1, x2, y2] = numbers(values);
+    format!("M{x1} {y1}L{x2} {y2}")
+}
+
+/// A group that moves; it stands at its first place where nothing can move.
+fn group(animation: &Animation, changed: Changed, keys: &Keys<2>, contents: &str) -> String {
+    let Some((_, first)) = keys.first() else { return String::new() };
+    let motion = animated(changed, &animation.pace, keys, place);
+    format!("<g transform=\"translate({})\">{motion}{contents}</g>\n", place(first))
+}
+
+/// A link between two of the points.
+fn link(animation: &Animation, poses: &Keys<6>, from: usize, width: u32) -> String {
+    let keys: Keys<4> = taken(poses, from);
+    let Some((_, first)) = keys.first() else { return String::new() };
+    let motion = animated(Changed::Path, &animation.pace, &keys, segment);
+    let colour = Colour::Vermilion.hex();
+    format!(
+        "<path d=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" \
+         stroke-linecap=\"round\">{motion}</path>\n",
+        segment(first)
+    )
+}
+
+/// Neck, lip, head and the hinges.
+fn linkage(animation: &Animation, plot: &Plot) -> String {
+    let poses = poses(animation, plot);
+    let hinge = format!(
+        "<circle r=\"10\" fill=\"{GROUND}\" stroke=\"{}\" stroke-width=\"4\"/>",
+        Colour::Vermilion.hex()
+    );
+    let head = head(animation, plot) + &hinge;
+    let joint =
+        |from: usize, contents: &str| group(animation, Changed::Place, &taken(&poses, from), contents);
+    let links = [link(animation, &poses, 0, 34), link(animation, &poses, 2, 22)].concat();
+    [
+        links,
+        joint(0, &head),
+        joint(2, &hinge),
+        name(animation, &poses, 0, "neck"),
+        name(animation, &poses, 2, "lip"),
+    ]
+    .concat()
+}
+
+/// The name of a link, to the right of its middle.
+fn name(animation: &Animation, poses: &Keys<6>, from: usize, word: &str) -> String {
+    let middle = |[x1, y1, x2, y2]: [f64; 4]| [(x1 + x2) / 2.0, (y1 + y2) / 2.0];
+    let keys: Keys<2> =
+        poses.iter().map(|(share, all)| (*share, middle(std::array::from_fn(|k| all[from + k])))).collect();
+    group(animation, Changed::Place, &key_frames(&keys, TOLERANCE), &text(ASIDE, 0.0, "start", word))
+}
+
+/// The lip near its tip, cut at the frame of its panel.
+fn enlarged(animation: &Animation, plot: &Plot) -> String {
+    let [(left, top), (right, bottom)] = plot.corners();
+    let [x, y, width, height] = numbers(&[left, top, right - left, bottom - top]);
+    let contents =
+        [link(animation, &poses(animation, plot), 2, 40), tip(animation, plot), crosses(animation, plot)]
+            .concat();
+    // named for its place: where two animations of a page have the same name, they have the same frame
+    let name = format!("frame-{x}-{y}-{width}-{height}").replace('.', "_");
+    let frame = format!(
+        "<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>"
+    );
+    format!("{frame}\n<g clip-path=\"url(#{name})\">\n{contents}</g>\n")
+}
+
+/// The head around its hinge.
+fn head(animation: &Animation, plot: &Plot) -> String {
+    let length = drawing::blade_mm(&animation.linkage);
+    let corner = |x: f64, y: f64| plot.place(x * length, y * length);
+    let (Some((x0, y0)), Some((x1, y1))) = (corner(0.0, 0.0), corner(HEAD_HALF_WIDTH, HEAD_HEIGHT)) else {
+        return String::new();
+    };
+    let (half, height, grey) = (x1 - x0, y0 - y1, Colour::Grey.hex());
+    let word = text(0.0, -height / 2.0, "middle", "head");
+    let [x, y, width, height] = numbers(&[-half, -height, 2.0 * half, height]);
+    format!(
+        "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"12\" fill=\"{grey}\" \
+         opacity=\"0.6\"/>{word}"
+    )
+}
+
+/// Whether the tip is in a mode, from when on: shares of the animation.
+fn spells(animation: &Animation, mode: Mode) -> Vec<(f64, bool)> {
+    let mut spells: Vec<(f64, bool)> = animation
+        .modes
+        .iter()
+        .map(|(since_s, entered)| (animation.pace.share(*since_s), *entered == mode))
+        .collect();
+    spells.dedup_by_key(|(_, on)| *on);
+    spells
+}
+
+/// Something that is visible at times.
+fn at_times(animation: &Animation, spells: &[(f64, bool)], contents: &str) -> String {
+    let opacity = |on: &bool| u8::from(*on).to_string();
+    let Some((_, first)) = spells.first() else { return String::new() };
+    let change = animated(Changed::Visible, &animation.pace, spells, opacity);
+    format!("<g opacity=\"{}\">{change}{contents}</g>\n", opacity(first))
+}
+
+/// Something that is visible in one mode alone; nothing for a mode that never comes.
+fn in_mode(animation: &Animation, mode: Mode, contents: &str) -> String {
+    let spells = spells(animation, mode);
+    if spells.iter().any(|(_, on)| *on) { at_times(animation, &spells, contents) } else { String::new() }
+}
+
+fn symbol(sign: &Sign, at: (f64, f64)) -> String {
+    let [x, y, size] = numbers(&[at.0, at.1, TIP]);
+    format!(
+        "<path d=\"{}\" transform=\"translate({x} {y}) scale({size})\" fill=\"{}\"/>",
+        sign.outline,
+        sign.colour.hex()
+    )
+}
+
+/// The tip's symbol under the glass, which shows the mode of contact and leaves the tip itself free.
+fn tip(animation: &Animation, plot: &Plot) -> String {
+    let symbols: String =
+        SIGNS.iter().map(|sign| in_mode(animation, sign.mode, &symbol(sign, (0.0, UNDER)))).collect();
+    group(animation, Changed::Place, &taken(&poses(animation, plot), 4), &symbols)
+}
+
+fn text(x: f64, y: f64, anchor: &str, words: &str) -> String {
+    let (size, [x, y]) = (short(LETTERS, 1), numbers(&[x, y]));
+    format!(
+        "<text x=\"{x}\" y=\"{y}\" dy=\"0.35em\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" \
+         font-size=\"{size}\" fill=\"#000000\">{words}</text>"
+    )
+}
+
+/// Mode in words, at the upper corner of the drawing, and pace, over the enlarged tip.
+fn words(animation: &Animation, plot: &Plot, close: &Plot) -> String {
+    let [[(left, top), _], [(_, frame), (right, _)]] = [plot.corners(), close.corners()];
+    let y = top + LETTERS / 2.0;
+    let modes = SIGNS.iter().map(|sign| {
+        let word = text(left + 4.0 * TIP, y, "start", &format!("tip: {}", sign.word));
+        in_mode(animation, sign.mode, &(symbol(sign, (left + 1.5 * TIP, y)) + &word))
+    });
+    let over = frame - 0.8 * LETTERS;
+    let pace = |part: &Part| {
+        at_times(
+            animation,
+            &shown(animation, part),
+            &text(right, over, "end", &format!("{} times slower", part.slower)),
+        )
+    };
+    let paces = animation.pace.parts.iter().map(pace);
+    modes.chain(paces).collect()
+}
+
+/// When a part is shown; the last one stays for the rest.
+fn shown(animation: &Animation, part: &Part) -> Vec<(f64, bool)> {
+    let [from_s, to_s] = animation.pace.span_s();
+    let mut spells = vec![(0.0, part.from_s <= from_s)];
+    if part.from_s > from_s {
+        spells.push((animation.pace.share(part.from_s), true));
+    }
+    if part.to_s < to_s {
+        spells.push((animation.pace.share(part.to_s), false));
+    }
+    spells
+}
+
+/// The measured tip on the glass and the measured head at its drop, in the frame nearest to the instant
+/// shown; a missing one is hidden.
+fn crosses(animation: &Animation, plot: &Plot) -> String {
+    let Some(measured) = &animation.measured else { return String::new() };
+    let length = drawing::blade_mm(&animation.linkage);
+    let tips = measured.tip_x_m.iter().map(|x| x.map(|x| (1e3 * x, 0.0)));
+    let heads = measured
+        .head_x_m
+        .iter()
+        .zip(&measured.head_drop_m)
+        .map(|(x, u)| x.zip(*u).map(|(x, u)| (1e3 * x, length - 1e3 * u)));
+    let cross = |frames: Vec<Option<(f64, f64)>>| {
+        let frames = frames.into_iter().map(|p| p.and_then(|(x, y)| plot.inside(x, y)));
+        frame_by_frame(animation, &measured.time_s, &frames.collect::<Vec<_>>())
+    };
+    cross(tips.collect()) + &cross(heads.collect())
+}
+
+/// A cross that jumps from frame to frame.
+fn frame_by_frame(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, f64)>]) -> String {
+    let [from_s, to_s] = animation.pace.span_s();
+    let (mut places, mut visible): (Keys<2>, Vec<(f64, bool)>) = (Vec::new(), Vec::new());
+    let mut shown = 0.0;
+    for (i, (t, frame)) in time_s.iter().zip(frames).enumerate() {
+        let until_s = time_s.get(i + 1).map_or(*t, |next| (t + next) / 2.0);
+        let since_s = i.checked_sub(1).and_then(|i| time_s.get(i)).map_or(*t, |before| (t + before) / 2.0);
+        if until_s < from_s || since_s > to_s {
+            continue;
+        }
+        let share = if visible.is_empty() { 0.0 } else { animation.pace.share(since_s) };
+        if !visible.is_empty() && share - shown < LEAST_SHARE {
+            continue;
+        }
+        shown = share;
+        if visible.last().is_none_or(|(_, on)| *on != frame.is_some()) {
+            visible.push((share, frame.is_some()));
+        }
+        if let Some((x, y)) = frame {
+            places.push((if places.is_empty() { 0.0 } else { share }, [*x, *y]));
+        }
+    }
+    let arms = format!(
+        "<path d=\"M-{0} -{0}L{0} {0}M-{0} {0}L{0} -{0}\" stroke=\"#000000\" stroke-width=\"5\"/>",
+        short(CROSS, 1)
+    );
+    at_times(animation, &visible, &group(animation, Changed::Jumping, &places, &arms))
+}
+
+/// The line that runs through the strips with the time; it waits at the ends of one that covers a part.
+fn cursors(animation: &Animation, strips: &[Plot]) -> String {
+    let turns: Vec<f64> = animation.pace.parts.iter().flat_map(|p| [p.from_s, p.to_s]).collect();
+    let cursor = |(plot, [from_s, to_s]): (&Plot, [f64; 2])| {
+        let [(left, top), (right, bottom)] = plot.corners();
+        let x = |t: f64| left + (right - left) * (t.max(from_s).min(to_s) - from_s) / (to_s - from_s);
+        let keys: Keys<2> = turns.iter().map(|t| (animation.pace.share(*t), [x(*t), 0.0])).collect();
+        let [top, bottom] = numbers(&[top, bottom]);
+        let line =
+            format!("<path d=\"M0 {top}V{bottom}\" stroke=\"{}\" stroke-width=\"6\"/>", Colour::Blue.hex());
+        group(animation, Changed::Place, &key_frames(&keys, TOLERANCE), &line)
+    };
+    strips.iter().zip(strips::spans_s(animation)).map(cursor).collect()
+}

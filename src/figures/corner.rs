@@ -1,0 +1,437 @@
+//! What the data know of the parameters together: every pair with its regions, every parameter with its
+//! profile, its bounds, its prior, the truth of a twin and the interval that the page states.
+
+use super::symbol::symbol;
+use crate::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
+use crate::compare::ParameterLine;
+use crate::figures::{Drawing, FigureBlock, about, subtitle};
+use crate::fit::axis::Prior;
+use crate::fit::job::{FreeParameter, Job};
+use crate::fit::result::FitResult;
+use crate::fit::scale::Bounds;
+use crate::math;
+use crate::text::{digits, interval, listed, unit};
+
+/// What is known of one parameter; places are those of the search, 0 and 1 at its bounds.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Known {
+    /// Symbol in the equations.
+    pub symbol: String,
+    /// The stated interval in words.
+    pub words: String,
+    /// Estimate.
+    pub estimate: f64,
+    /// The 95 % interval that the page states; `None` for an open end.
+    pub stated: [Option<f64>; 2],
+    /// Standard deviation by the linear model.
+    pub sd: Option<f64>,
+    /// Mean and standard deviation of what was known beforehand.
+    pub prior: Option<(f64, f64)>,
+    /// True value, where the data are synthetic.
+    pub truth: Option<f64>,
+    /// Places along the parameter and the likelihood there over the greatest.
+    pub profile: Vec<(f64, f64)>,
+    /// Where local searches ended that fit as well within the threshold.
+    pub optima: Vec<f64>,
+}
+
+/// What the figure shows.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Corner {
+    /// What was fitted.
+    pub title: String,
+    /// Whether the data are synthetic.
+    pub synthetic: bool,
+    /// The parameters.
+    pub parameters: Vec<Known>,
+    /// Correlations of their estimates, a row and a column a parameter.
+    pub correlations: Vec<Vec<Option<f64>>>,
+}
+
+/// Height of a row, mm.
+const ROW_MM: f64 = 24.0;
+/// Most parameters that have room: of more the first are drawn.
+const MOST: usize = 8;
+/// Half widths of the regions of a pair, deviations: the chi-square of two freedoms at 68.3 and 95.4 %.
+const REGIONS: [(&str, Colour, Mark, f64); 2] = [
+    ("95 % of a pair", Colour::Blue, Mark::Thin, 2.486),
+    ("68 % of a pair", Colour::Blue, Mark::Line, 1.515),
+];
+/// Points of a region and of a curve.
+const POINTS: u32 = 48;
+/// Half width of a cell, of what is drawn in it, and how high its curve is.
+const HALF: f64 = 0.5;
+const INSIDE: f64 = 0.44;
+const CURVE: f64 = 0.72;
+/// Deviations to either side that a cell shows at least, and room beyond what it holds, as a share.
+const SHOWN_SD: f64 = 2.8;
+const ROOM: f64 = 0.06;
+/// Narrowest cell in units of the search: what is known better is rounding.
+const LEAST: f64 = 1e-9;
+/// Deviations of a two-sided 95 % interval.
+const Z_95: f64 = 1.96;
+
+impl Corner {
+    /// The parameters of a fit; `lines` bring units and true values.
+    #[must_use]
+    pub fn of(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
+        let free: Vec<&FreeParameter> =
+            job.parameters.iter().filter(|p| result.parameters.contains_key(&p.name)).take(MOST).collect();
+        let correlation = |a: &FreeParameter, b: &FreeParameter| {
+            result.correlations.get(&a.name).and_then(|row| row.get(&b.name)).copied()
+        };
+        Self {
+            title: job.title.clone(),
+            synthetic: result.synthetic,
+            parameters: free.iter().filter_map(|free| known(free, result, lines)).collect(),
+            correlations: free.iter().map(|a| free.iter().map(|b| correlation(a, b)).collect()).collect(),
+        }
+    }
+
+    /// The figure with its caption; nothing without a parameter.
+    #[must_use]
+    pub fn block(&self) -> Option<FigureBlock> {
+        (!self.parameters.is_empty()).then(|| FigureBlock {
+            condition: None,
+            file: "corner.svg".to_owned(),
+            caption: caption(self),
+            details: DETAILS.to_owned(),
+            drawing: Drawing::Chart(figure(self)),
+        })
+    }
+
+    /// The pair whose estimates move most as one.
+    fn strongest(&self) -> Option<(usize, usize, f64)> {
+        let rows = self.correlations.iter().enumerate();
+        let pairs = rows.flat_map(|(i, row)| row.iter().take(i).enumerate().map(move |(j, r)| (i, j, *r)));
+        pairs.filter_map(|(i, j, r)| Some((i, j, r?))).max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
+    }
+}
+
+fn known(free: &FreeParameter, result: &FitResult, lines: &[ParameterLine]) -> Option<Known> {
+    let (found, bounds) = (result.parameters.get(&free.name)?, &free.bounds);
+    let line = lines.iter().find(|line| line.name == free.name);
+    let estimate = bounds.to_unit(found.estimate);
+    // an end may have been cut at a bound: the longer half counts
+    let half = found
+        .linear_95
+        .map(|ends| ends.iter().map(|end| (bounds.to_unit(*end) - estimate).abs()).fold(0.0, f64::max));
+    let (name, factor) = unit(line.map_or("", |line| line.unit.as_str()), [found.estimate]);
+    let words = interval(found.lower_95, found.upper_95, |v| digits(v * factor, 4));
+    let open = found.lower_95.or(found.upper_95).is_none();
+    let likelihood = |cost: f64| math::exp(-0.5 * (cost - result.cost).max(0.0));
+    let optima = result.waterfall.iter().filter(|o| o.cost - result.cost <= result.threshold);
+    Some(Known {
+        symbol: symbol(&free.name),
+        words: if open { words } else { format!("{words} {name}").trim_end().to_owned() },
+        estimate,
+        stated: [found.lower_95, found.upper_95].map(|end| end.map(|v| bounds.to_unit(v))),
+        sd: half.map(|half| half / Z_95).filter(|sd| *sd > 0.0),
+        prior: free.prior.as_ref().and_then(|prior| of_prior(prior, bounds)),
+        truth: line.and_then(|line| line.truth).map(|truth| bounds.to_unit(truth.value)),
+        profile: found.profile.iter().map(|(v, cost)| (bounds.to_unit(*v), likelihood(*cost))).collect(),
+        optima: optima.filter_map(|o| o.values.get(&free.name)).map(|v| bounds.to_unit(*v)).collect(),
+    })
+}
+
+/// A prior in the places of the search, by its slope at its mean.
+fn of_prior(prior: &Prior, bounds: &Bounds) -> Option<(f64, f64)> {
+    let (mean, sd) = match *prior {
+        Prior::Linear { mean, sd } => (mean, sd),
+        Prior::Log { mean_ln, sd_ln } => (math::exp(mean_ln), sd_ln * math::exp(mean_ln)),
+    };
+    let at = bounds.to_unit(mean);
+    Some((at, sd / bounds.slope(at))).filter(|(at, sd)| at.is_finite() && sd.is_finite() && *sd > 0.0)
+}
+
+/// From where to where a cell shows a parameter.
+fn span(known: &Known) -> (f64, f64) {
+    let by_sd = known.sd.map(|sd| [known.estimate - SHOWN_SD * sd, known.estimate + SHOWN_SD * sd]);
+    let open =
+        |end: Option<f64>, bound: f64| end.unwrap_or(if known.sd.is_some() { known.estimate } else { bound });
+    let ends = [open(known.stated[0], 0.0), open(known.stated[1], 1.0), known.estimate];
+    let all = ends.into_iter().chain(by_sd.into_iter().flatten()).chain(known.truth);
+    let (low, high) = all
+        .filter(|v| v.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let room = (ROOM * (high - low)).max(LEAST);
+    (low - room, high + room)
+}
+
+/// Place in a cell about its middle.
+fn place(value: f64, (low, high): (f64, f64)) -> f64 {
+    INSIDE * (2.0 * (value - low) / (high - low) - 1.0)
+}
+
+/// The figure.
+#[must_use]
+pub fn figure(shown: &Corner) -> Figure {
+    let count = shown.parameters.len();
+    let title = match shown.strongest() {
+        Some((i, j, r)) => format!(
+            "{} and {} move together most: correlation {}",
+            shown.parameters.get(j).map_or("", |p| p.symbol.as_str()),
+            shown.parameters.get(i).map_or("", |p| p.symbol.as_str()),
+            crate::text::decimals(r, 2)
+        ),
+        None => {
+            let bounded = shown.parameters.iter().filter(|p| p.stated.iter().all(Option::is_some)).count();
+            format!("{bounded} of {count} parameters have an interval with two ends")
+        }
+    };
+    let names = shown.parameters.iter().map(|p| format!("{}: {}", p.symbol, p.words));
+    let panel = Panel {
+        x: Axis::named("", shown.parameters.iter().map(|p| p.symbol.clone())),
+        y: Axis::named("", names.rev().collect::<Vec<_>>()),
+        height_mm: ROW_MM * count as f64,
+        series: drawn(shown),
+        ribbons: under_bounds(shown),
+        ..Panel::default()
+    };
+    Figure {
+        title,
+        subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
+        synthetic: shown.synthetic,
+        description:
+            "Regions of every pair of parameters, and the likelihood along each with its 95 % interval."
+                .to_owned(),
+        width_mm: FULL_WIDTH_MM,
+        panels: vec![panel],
+        ..Figure::default()
+    }
+}
+
+/// Cells from the upper left: the middle of one by row and column.
+fn middle(shown: &Corner, row: usize, column: usize) -> (f64, f64) {
+    (column as f64, (shown.parameters.len() - 1 - row) as f64)
+}
+
+fn drawn(shown: &Corner) -> Vec<Series> {
+    let spans: Vec<(f64, f64)> = shown.parameters.iter().map(span).collect();
+    let cells = || {
+        let rows = shown.parameters.iter().zip(&spans).enumerate();
+        rows.flat_map(|(i, row)| {
+            let columns = shown.parameters.iter().zip(&spans).enumerate().take(i);
+            columns.map(move |(j, column)| ((i, row), (j, column)))
+        })
+    };
+    let diagonal = || shown.parameters.iter().zip(&spans).enumerate();
+    let line = |label: &str, colour, mark, points| Series {
+        label: label.to_owned(),
+        colour,
+        mark,
+        points,
+        ..Series::default()
+    };
+    // frames of the cells
+    let frame = |(x, y): (f64, f64)| {
+        let corners = [(-HALF, -HALF), (HALF, -HALF), (HALF, HALF), (-HALF, HALF), (-HALF, -HALF)];
+        corners.map(|(a, b)| Some((x + a, y + b))).into_iter().chain([None]).collect::<Vec<_>>()
+    };
+    let lower = (0..shown.parameters.len()).flat_map(|i| (0..=i).map(move |j| (i, j)));
+    let mut all = vec![line(
+        "",
+        Colour::Grey,
+        Mark::Thin,
+        lower.flat_map(|(i, j)| frame(middle(shown, i, j))).collect(),
+    )];
+    for (label, colour, mark, radius) in REGIONS {
+        let region = |((i, (a, of_a)), (j, (b, of_b))): Cell<'_>| {
+            let r = shown.correlations.get(i).and_then(|row| row.get(j).copied().flatten())?;
+            let (sd_a, sd_b) = (a.sd?, b.sd?);
+            let at = middle(shown, i, j);
+            let rest = (1.0 - r * r).max(0.0).sqrt();
+            let point = |k: u32| {
+                let (sin, cos) = math::sin_cos(std::f64::consts::TAU * f64::from(k) / f64::from(POINTS));
+                let along = b.estimate + radius * sd_b * cos;
+                let up = a.estimate + radius * sd_a * (r * cos + rest * sin);
+                inside((place(along, *of_b), place(up, *of_a)), at)
+            };
+            Some((0..=POINTS).map(point).chain([None]).collect::<Vec<_>>())
+        };
+        all.push(line(label, colour, mark, cells().filter_map(region).flatten().collect()));
+    }
+    let optima = cells().flat_map(|((i, (a, of_a)), (j, (b, of_b)))| {
+        let at = middle(shown, i, j);
+        b.optima
+            .iter()
+            .zip(&a.optima)
+            .filter_map(move |(x, y)| inside((place(*x, *of_b), place(*y, *of_a)), at))
+    });
+    all.push(line("searches within the threshold", Colour::Grey, Mark::Dots, optima.map(Some).collect()));
+    let estimates = cells().map(|((i, (a, of_a)), (j, (b, of_b)))| {
+        inside((place(b.estimate, *of_b), place(a.estimate, *of_a)), middle(shown, i, j))
+    });
+    all.push(line("estimate", Colour::Black, Mark::Circles, estimates.collect()));
+    let truths = cells().map(|((i, (a, of_a)), (j, (b, of_b)))| {
+        inside((place(b.truth?, *of_b), place(a.truth?, *of_a)), middle(shown, i, j))
+    });
+    all.push(line(TRUTH, Colour::Vermilion, Mark::Crosses, truths.collect()));
+    let curve = |of: fn(&Known) -> Option<(f64, f64)>| {
+        diagonal()
+            .filter_map(|(i, (known, span))| {
+                let ((mean, sd), at) = (of(known)?, middle(shown, i, i));
+                let point = |k: u32| {
+                    let value = span.0 + (span.1 - span.0) * f64::from(k) / f64::from(POINTS);
+                    let off = (value - mean) / sd;
+                    inside((place(value, *span), height(math::exp(-0.5 * off * off))), at)
+                };
+                Some((0..=POINTS).map(point).chain([None]).collect::<Vec<_>>())
+            })
+            .flatten()
+            .collect::<Vec<_>>()
+    };
+    all.push(line("prior", Colour::Green, Mark::ThinDashed, curve(|known| known.prior)));
+    all.push(line(
+        "likelihood, linear",
+        Colour::Orange,
+        Mark::ThinDashed,
+        curve(|known| Some((known.estimate, known.sd?))),
+    ));
+    let profiles = diagonal().flat_map(|(i, (known, span))| {
+        let at = middle(shown, i, i);
+        let points = known.profile.iter().map(move |(v, rise)| inside((place(*v, *span), height(*rise)), at));
+        points.chain([None]).collect::<Vec<_>>()
+    });
+    all.push(line("likelihood, profile", Colour::Blue, Mark::Thin, profiles.collect()));
+    let upright = diagonal().flat_map(|(i, (known, span))| {
+        let at = middle(shown, i, i);
+        let end = |y: f64| inside((place(known.truth?, *span), y), at);
+        [end(-INSIDE), end(height(1.0)), None]
+    });
+    all.push(line("", Colour::Vermilion, Mark::Line, upright.collect()));
+    let stated = diagonal().flat_map(|(i, (known, span))| {
+        let at = middle(shown, i, i);
+        let [low, high] = known.stated;
+        let closed = low.is_some() || high.is_some();
+        let end = |value: Option<f64>, open: f64| {
+            let x = value.map_or(open, |v| place(v, *span)).clamp(-HALF, HALF);
+            closed.then_some((at.0 + x, at.1 - INSIDE))
+        };
+        [end(low, -HALF), end(high, HALF), None]
+    });
+    all.push(line("95 % interval, as stated", Colour::Black, Mark::Thick, stated.collect()));
+    all.retain(|series| series.points.iter().any(Option::is_some));
+    all
+}
+
+const TRUTH: &str = "synthetic truth";
+
+/// Row and column of a cell, each with its parameter and the span that it shows.
+type Cell<'a> = ((usize, (&'a Known, &'a (f64, f64))), (usize, (&'a Known, &'a (f64, f64))));
+
+/// Height of a share of the greatest likelihood in a cell.
+fn height(share: f64) -> f64 {
+    -INSIDE + CURVE * share
+}
+
+/// A point of a cell on the axes; `None` outside the cell.
+fn inside((x, y): (f64, f64), at: (f64, f64)) -> Option<(f64, f64)> {
+    (x.abs() <= HALF && y.abs() <= HALF).then_some((at.0 + x, at.1 + y))
+}
+
+/// Where the search could not go, as far as a cell of the diagonal shows that.
+fn under_bounds(shown: &Corner) -> Vec<Ribbon> {
+    let strip = |(i, known): (usize, &Known)| {
+        let (span, at) = (span(known), middle(shown, i, i));
+        let [low, high] = [0.0, 1.0].map(|bound| place(bound, span));
+        let ends = [(-HALF, low.min(HALF)), (high.max(-HALF), HALF)];
+        ends.into_iter().filter(|(from, to)| from < to).map(move |(from, to)| Ribbon {
+            label: "out of bounds".to_owned(),
+            colour: Colour::Grey,
+            points: [from, to].map(|x| Some((at.0 + x, at.1 - HALF, at.1 + HALF))).to_vec(),
+        })
+    };
+    shown.parameters.iter().enumerate().flat_map(strip).collect()
+}
+
+const DETAILS: &str = "Below the diagonal: every pair of estimates with the regions that hold 68 and 95 % by \
+    the linear model at the estimates, none where it does not determine one of the two. On the diagonal: the \
+    likelihood over its greatest value, by the linear model and, where it was made, by the profile, with the \
+    interval that the table states. Every cell is as wide as what is known; scales are those of the search.";
+
+/// What the figure shows, with its number.
+#[must_use]
+pub fn caption(shown: &Corner) -> String {
+    let all = shown.parameters.len();
+    let bounded = shown.parameters.iter().filter(|p| p.stated.iter().all(Option::is_some)).count();
+    let truths: Vec<bool> = shown.parameters.iter().filter_map(holds).collect();
+    let held = if truths.is_empty() {
+        String::new()
+    } else {
+        let count = truths.iter().filter(|is| **is).count();
+        format!("; the true value lies within {count} of {}", truths.len())
+    };
+    let open: Vec<String> = shown
+        .parameters
+        .iter()
+        .filter(|p| p.stated.iter().any(Option::is_none))
+        .map(|p| p.symbol.clone())
+        .collect();
+    let open = if open.is_empty() { String::new() } else { format!(" ({} open)", listed(&open)) };
+    format!("Pairs of parameters and their likelihoods: {bounded} of {all} intervals are closed{open}{held}.")
+}
+
+fn holds(known: &Known) -> Option<bool> {
+    let (truth, [low, high]) = (known.truth?, known.stated);
+    Some(low.is_none_or(|low| low <= truth) && high.is_none_or(|high| truth <= high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn of(fit: &str) -> (Job, FitResult, Corner) {
+        let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fits").join(fit);
+        let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
+        let job = Job::parse("job.toml", &read("job.toml")).unwrap();
+        let result = FitResult::parse("result.json", &read("result.json")).unwrap();
+        let corner = Corner::of(&job, &result, &[]);
+        (job, result, corner)
+    }
+
+    #[test]
+    fn intervals_and_deviations_are_those_of_the_result() {
+        let (job, result, corner) = of("actual-blade-twin");
+        assert_eq!(corner.parameters.len(), 5);
+        for (free, known) in job.parameters.iter().zip(&corner.parameters) {
+            let found = &result.parameters[&free.name];
+            let back = known.stated.map(|end| end.map(|u| free.bounds.from_unit(u)));
+            for (drawn, stated) in back.iter().zip([found.lower_95, found.upper_95]) {
+                assert!((drawn.unwrap() / stated.unwrap() - 1.0).abs() < 1e-12, "{}", free.name);
+            }
+            let upper = free.bounds.from_unit(known.estimate + Z_95 * known.sd.unwrap());
+            assert!((upper / found.linear_95.unwrap()[1] - 1.0).abs() < 1e-3, "{}", free.name);
+        }
+    }
+
+    #[test]
+    fn a_region_reaches_as_far_as_its_deviations() {
+        let known = |estimate| Known {
+            symbol: "A".to_owned(),
+            estimate,
+            sd: Some(0.01),
+            stated: [Some(estimate - 0.02), Some(estimate + 0.02)],
+            ..Known::default()
+        };
+        let shown = Corner {
+            parameters: vec![known(0.4), known(0.6)],
+            correlations: vec![vec![Some(1.0), Some(0.8)], vec![Some(0.8), Some(1.0)]],
+            ..Corner::default()
+        };
+        let series = drawn(&shown);
+        let region = series.iter().find(|s| s.label == REGIONS[0].0).unwrap();
+        let widest = region.points.iter().flatten().map(|p| p.0).fold(0.0, f64::max);
+        let of = span(&shown.parameters[0]);
+        assert!((widest - place(0.4 + 2.486 * 0.01, of)).abs() < 1e-9, "{widest}");
+        assert!(figure(&shown).title.contains("correlation 0.80"), "{}", figure(&shown).title);
+    }
+
+    #[test]
+    fn what_is_open_leaves_its_cell_and_says_so() {
+        let (_, _, corner) = of("published-simulation");
+        assert!(caption(&corner).contains("open)"), "{}", caption(&corner));
+        let stated = drawn(&corner).into_iter().find(|s| s.label == "95 % interval, as stated").unwrap();
+        assert!(stated.points.iter().flatten().any(|p| (p.0 - p.0.round()).abs() == HALF));
+    }
+}

@@ -1,0 +1,259 @@
+//! Ring-down: what was fitted over the data, the residual, and the decaying component alone.
+
+use super::history::{thin, unit};
+pub(crate) mod caption;
+
+use crate::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
+use crate::figures::subtitle;
+use crate::spectrum::Component;
+use crate::text::with_sd;
+
+/// A curve over time; both columns have the same length.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Trace {
+    /// Instants, s, in the time of the recording.
+    pub time_s: Vec<f64>,
+    /// Displacement, m; `None` interrupts it.
+    pub displacement_m: Vec<Option<f64>>,
+}
+
+/// One decaying component alone.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Decay {
+    /// Name, such as `78.4(2) Hz, damping 5.0(3) %`.
+    pub name: String,
+    /// The fitted component.
+    pub fitted: Trace,
+    /// Its envelope, the upper half.
+    pub envelope: Trace,
+    /// The data without trend and other components.
+    pub data: Trace,
+}
+
+/// What a figure of a ring-down shows.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct RingDown {
+    /// Heading.
+    pub title: String,
+    /// Quantity, such as "deflection".
+    pub quantity: String,
+    /// Window and what was fitted; empty for none.
+    pub note: String,
+    /// Whether the motion is one that no camera took.
+    pub synthetic: bool,
+    /// The data.
+    pub data: Trace,
+    /// Sum of trend and decaying sinusoids, as finely as the line is to be drawn.
+    pub fitted: Trace,
+    /// The trend alone; empty for none.
+    pub trend: Trace,
+    /// Data minus fit.
+    pub residual: Trace,
+    /// Standard deviation of the noise, m.
+    pub noise_sd_m: Option<f64>,
+    /// The component of interest.
+    pub decay: Option<Decay>,
+}
+
+/// Heights of the panels, mm.
+const HEIGHT_MM: f64 = 48.0;
+const RESIDUAL_HEIGHT_MM: f64 = 24.0;
+const DECAY_HEIGHT_MM: f64 = 42.0;
+/// Name of what the oscillations and the trend add up to: no model of the blade, which would be called a fit.
+const SUM: &str = "trend + oscillations";
+
+/// The figure.
+#[must_use]
+pub fn figure(shown: &RingDown) -> Figure {
+    let mut panels = vec![whole(shown), residual(shown)];
+    panels.extend(shown.decay.as_ref().map(decay));
+    let ends = span(shown);
+    for panel in &mut panels {
+        panel.x = ends.map_or(Axis::time(), |(first, last)| Axis::time().between(first, last));
+    }
+    Figure {
+        title: shown.title.clone(),
+        subtitle: subtitle(shown.synthetic, &shown.note),
+        synthetic: shown.synthetic,
+        description: format!(
+            "Ring-down of {}: data, the sum of trend and decaying sinusoids, and the rest.",
+            shown.quantity
+        ),
+        width_mm: FULL_WIDTH_MM,
+        panels,
+        ..Figure::default()
+    }
+}
+
+/// The claim with its numbers: frequency and damping of a component.
+pub(crate) fn title(quantity: &str, component: &Component) -> String {
+    let frequency = with_sd(component.frequency_hz, component.frequency_sd_hz);
+    let damping = component
+        .damping_ratio
+        .zip(component.damping_ratio_sd)
+        .map_or_else(String::new, |(ratio, sd)| format!(" with a damping ratio of {}", with_sd(ratio, sd)));
+    format!("The {quantity} rings at {frequency} Hz{damping}")
+}
+
+/// First and last instant of data and fit.
+fn span(shown: &RingDown) -> Option<(f64, f64)> {
+    let times = || shown.data.time_s.iter().chain(&shown.fitted.time_s).copied().filter(|t| t.is_finite());
+    let (first, last) = (times().reduce(f64::min)?, times().reduce(f64::max)?);
+    (first < last).then_some((first, last))
+}
+
+/// A panel of traces in the unit in which they read best; its series come with the factor to that unit.
+fn panel(name: &str, height_mm: f64, traces: &[(&str, Colour, Mark, &Trace)]) -> (Panel, f64) {
+    let (unit, factor) = unit(
+        traces
+            .iter()
+            .flat_map(|(.., t)| t.displacement_m.iter().flatten().copied())
+            .filter(|x| x.is_finite()),
+    );
+    let series = |(label, colour, mark, trace): &(&str, Colour, Mark, &Trace)| Series {
+        label: (*label).to_owned(),
+        colour: *colour,
+        mark: *mark,
+        points: few(trace, factor),
+        bars: Vec::new(),
+    };
+    let drawn = traces.iter().filter(|(.., t)| !t.time_s.is_empty()).map(series).collect();
+    (
+        Panel { y: Axis::linear(format!("{name}, {unit}")), height_mm, series: drawn, ..Panel::default() },
+        factor,
+    )
+}
+
+/// The points in the unit of the axis, no more than a figure can show.
+fn few(trace: &Trace, factor: f64) -> Vec<Option<(f64, f64)>> {
+    let points: Vec<_> =
+        trace.time_s.iter().zip(&trace.displacement_m).map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
+    match (trace.time_s.first(), trace.time_s.last()) {
+        (Some(first), Some(last)) => thin(&points, (*first, *last)),
+        _ => points,
+    }
+}
+
+/// Dots, as long as they stand apart in a column of a journal; a line beyond, which also takes fewer bytes.
+fn frames(trace: &Trace) -> Mark {
+    const MOST_DOTS: usize = 400;
+    if trace.time_s.len() > MOST_DOTS { Mark::Thin } else { Mark::Dots }
+}
+
+fn whole(shown: &RingDown) -> Panel {
+    let data = ("data", Colour::Grey, frames(&shown.data), &shown.data);
+    let trend = ("trend", Colour::Blue, Mark::ThinDashed, &shown.trend);
+    panel(&shown.quantity, HEIGHT_MM, &[data, (SUM, Colour::Vermilion, Mark::Line, &shown.fitted), trend]).0
+}
+
+/// Data minus fit over the noise that is expected there.
+fn residual(shown: &RingDown) -> Panel {
+    let (mut panel, factor) =
+        panel("rest", RESIDUAL_HEIGHT_MM, &[("", Colour::Grey, frames(&shown.residual), &shown.residual)]);
+    let width = shown.noise_sd_m.filter(|sd| sd.is_finite() && *sd > 0.0).map(|sd| 2.0 * sd * factor);
+    if let Some((width, (first, last))) = width.zip(span(shown)) {
+        let points = [first, last].map(|t| Some((t, -width, width))).to_vec();
+        panel.ribbons.push(Ribbon { label: "noise \u{b1} 2 sd".to_owned(), colour: Colour::SkyBlue, points });
+    }
+    panel
+}
+
+/// The component alone, between its envelopes.
+fn decay(shown: &Decay) -> Panel {
+    let below = Trace {
+        displacement_m: shown.envelope.displacement_m.iter().map(|x| x.map(|x| -x)).collect(),
+        ..shown.envelope.clone()
+    };
+    let traces = [
+        ("data without the rest", Colour::Grey, frames(&shown.data), &shown.data),
+        ("envelope", Colour::Blue, Mark::Dashed, &shown.envelope),
+        ("", Colour::Blue, Mark::Dashed, &below),
+        (shown.name.as_str(), Colour::Vermilion, Mark::Line, &shown.fitted),
+    ];
+    panel("component", DECAY_HEIGHT_MM, &traces).0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chart::Medium;
+
+    fn as_svg(shown: &RingDown) -> String {
+        figure(shown).svg(Medium::Screen)
+    }
+
+    fn trace(amplitude_m: f64) -> Trace {
+        let time_s: Vec<f64> = (0..100).map(|i| 0.5 + f64::from(i) * 1e-3).collect();
+        Trace {
+            displacement_m: time_s.iter().map(|t| Some(amplitude_m * (490.0 * t).sin())).collect(),
+            time_s,
+        }
+    }
+
+    fn shown() -> RingDown {
+        RingDown {
+            quantity: "deflection".to_owned(),
+            data: trace(1e-3),
+            fitted: trace(1e-3),
+            residual: trace(1e-6),
+            noise_sd_m: Some(1e-6),
+            ..RingDown::default()
+        }
+    }
+
+    #[test]
+    fn every_panel_has_its_own_unit() {
+        let drawn = as_svg(&shown());
+        assert!(
+            drawn.contains("deflection, mm")
+                && drawn.contains("rest, \u{b5}m")
+                && drawn.contains("noise \u{b1} 2 sd")
+        );
+        assert!(!as_svg(&RingDown { noise_sd_m: Some(f64::NAN), ..shown() }).contains("noise"));
+    }
+
+    #[test]
+    fn many_frames_are_a_line_and_few_bytes() {
+        let long = |value: fn(i32) -> f64| Trace {
+            time_s: (0..8000).map(|i| f64::from(i) * 1e-4).collect(),
+            displacement_m: (0..8000).map(|i| Some(1e-5 * value(i))).collect(),
+        };
+        let (noisy, smooth, slow) = (
+            long(|i| f64::from(i * 7919 % 100)),
+            long(|i| (f64::from(i) * 0.1).sin()),
+            long(|i| 1.0 - f64::from(i) * 1e-4),
+        );
+        let decay =
+            Decay { fitted: smooth.clone(), envelope: slow.clone(), data: noisy.clone(), ..Decay::default() };
+        let drawn = RingDown {
+            data: noisy.clone(),
+            fitted: smooth,
+            trend: slow,
+            residual: noisy,
+            decay: Some(decay),
+            ..RingDown::default()
+        };
+        assert_eq!(
+            [&drawn, &shown()].map(|shown| figure(shown).panels[0].series[0].mark),
+            [Mark::Thin, Mark::Dots]
+        );
+        assert!(as_svg(&drawn).len() < 200_000, "{}", as_svg(&drawn).len());
+    }
+
+    #[test]
+    fn the_component_alone_is_a_third_panel_under_one_axis() {
+        let decay = Decay {
+            name: "78.4(2) Hz".to_owned(),
+            fitted: trace(1e-5),
+            envelope: trace(1e-5),
+            data: trace(1e-5),
+        };
+        let drawn = as_svg(&RingDown { decay: Some(decay), ..shown() });
+        assert!(
+            drawn.contains("component, \u{b5}m")
+                && drawn.contains("78.4(2) Hz")
+                && drawn.contains("envelope")
+        );
+        assert_eq!(drawn.matches("\ntime, s\n").count(), 1);
+    }
+}

@@ -1,0 +1,110 @@
+//! Components with their uncertainty as symbols with error bars, and their names.
+
+use super::MICROMETRES;
+use crate::chart::{Bar, Colour, Mark, Rule, Series, Shape};
+use crate::text::{trimmed, with_sd};
+
+/// A component as it is shown: frequency and amplitude with two standard deviations either side, or the range
+/// of one that drifts.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Named {
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Its standard deviation, Hz.
+    pub frequency_sd_hz: f64,
+    /// Least and greatest frequency of one that drifts, Hz.
+    pub range_hz: Option<(f64, f64)>,
+    /// Amplitude, m.
+    pub amplitude_m: f64,
+    /// Its standard deviation, m.
+    pub amplitude_sd_m: f64,
+    /// What stands after the frequency, such as `alias?`; empty for a component that is clear.
+    pub remark: String,
+}
+
+impl Named {
+    /// Its frequency with the deviation in units of the last digit, and what is wrong with it.
+    pub(crate) fn name(&self) -> String {
+        let frequency = match self.range_hz {
+            Some((low, high)) => format!("{} to {} Hz", trimmed(low, 4), trimmed(high, 4)),
+            None => format!("{} Hz", with_sd(self.frequency_hz, self.frequency_sd_hz)),
+        };
+        if self.remark.is_empty() { frequency } else { format!("{frequency}, {}", self.remark) }
+    }
+
+    fn is_clear(&self) -> bool {
+        self.remark.is_empty()
+    }
+
+    /// Frequency, Hz, and amplitude, micrometres.
+    fn point(&self) -> (f64, f64) {
+        (self.frequency_hz, self.amplitude_m * MICROMETRES)
+    }
+
+    fn bars(&self) -> [Bar; 2] {
+        let (x, y) = self.point();
+        let (dx, dy) = (2.0 * self.frequency_sd_hz, 2.0 * self.amplitude_sd_m * MICROMETRES);
+        let (from, to) = self.range_hz.unwrap_or((x - dx, x + dx));
+        [Bar::Horizontal { y, from, to }, Bar::Vertical { x, from: y - dy, to: y + dy }]
+    }
+
+    /// Upper end of the amplitude's error bar, m.
+    pub(super) fn top_m(&self) -> f64 {
+        let sd_m = if self.amplitude_sd_m.is_finite() { self.amplitude_sd_m } else { 0.0 };
+        self.amplitude_m + 2.0 * sd_m
+    }
+}
+
+/// Look of the components of one source: entry in the legend, colour, shape.
+type Look = (&'static str, Colour, Shape);
+/// One without a remark, and one with, where there is but one source.
+const ALONE: [Look; 2] = [
+    ("component \u{b1} 2 sd", Colour::Blue, Shape::Disc),
+    ("component that is not clear", Colour::Vermilion, Shape::Diamond),
+];
+/// The same of a recording next to a model, whose line is vermilion.
+const MEASURED: [Look; 2] = [
+    ("measured \u{b1} 2 sd", Colour::Black, Shape::Disc),
+    ("measured, not clear", Colour::Black, Shape::Diamond),
+];
+const MODEL: [Look; 2] = [
+    ("model \u{b1} 2 sd", Colour::Vermilion, Shape::Square),
+    ("model, not clear", Colour::Vermilion, Shape::InvertedTriangle),
+];
+
+/// The components of a recording and of a model as symbols with error bars.
+pub(super) fn series(measured: &[Named], model: &[Named]) -> Vec<Series> {
+    let styles = if model.is_empty() { ALONE } else { MEASURED };
+    [(model, MODEL), (measured, styles)]
+        .into_iter()
+        .flat_map(|(components, styles)| of_source(components, styles))
+        .collect()
+}
+
+fn of_source(components: &[Named], [clear, not_clear]: [Look; 2]) -> impl Iterator<Item = Series> {
+    let of = |((label, colour, shape), is_clear): (Look, bool)| {
+        let shown = || components.iter().filter(move |c| c.is_clear() == is_clear);
+        Series {
+            label: label.to_owned(),
+            colour,
+            mark: Mark::Hollow(shape),
+            points: shown().map(|c| Some(c.point())).collect(),
+            bars: shown().flat_map(Named::bars).collect(),
+        }
+    };
+    [(clear, true), (not_clear, false)].map(of).into_iter().filter(|s| !s.points.is_empty())
+}
+
+/// Names over the panel, each with a line up from its symbol: of a limited number, those without a remark
+/// first.
+pub(super) fn rules(components: &[Named], most: usize) -> impl Iterator<Item = Rule> {
+    let mut order: Vec<&Named> = components.iter().collect();
+    order.sort_by_key(|c| !c.is_clear()); // (stable: the order of the list otherwise)
+    order.into_iter().take(most).map(|c| Rule {
+        label: c.name(),
+        colour: Colour::Grey,
+        mark: Mark::Dotted,
+        at: c.frequency_hz,
+        above: Some(c.point().1),
+    })
+}

@@ -1,0 +1,275 @@
+//! What a synthetic camera sees of a motion: the motion itself, the frames with their exposure and noise, and
+//! the frames that are lost.
+
+use super::Words;
+use crate::chart::{Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
+use crate::recording::Recording;
+use crate::text::{length, milliseconds, percent, short};
+
+/// Samples of the motion in the time of a frame.
+pub const MOTION_SAMPLES: f64 = 8.0;
+/// Frames of an enlarged part, and how many of them lie before its instant.
+const ENLARGED: f64 = 40.0;
+const BEFORE: f64 = 10.0;
+/// Share of the run after which a stick is a late one.
+const LATE: f64 = 0.75;
+/// Height of a panel, mm.
+const PANEL_MM: f64 = 40.0;
+
+/// A twin with the motion behind it; all on one clock.
+#[derive(Debug, Clone, Copy)]
+pub struct Twin<'a> {
+    /// Heading.
+    pub title: &'a str,
+    /// The motion without exposure and noise, about [`MOTION_SAMPLES`] times as many samples as frames.
+    pub motion: &'a Recording,
+    /// What the camera sees of it, without noise.
+    pub seen: &'a Recording,
+    /// What was tracked.
+    pub tracked: &'a Recording,
+    /// Exposure of a frame, s.
+    pub exposure_s: f64,
+    /// Standard deviation of a tracked coordinate, m.
+    pub noise_m: f64,
+    /// When the tip stuck, s.
+    pub stick_s: &'a [[f64; 2]],
+}
+
+/// The deflection of the whole run, of the frames about the release of the longest stick and about that of a
+/// late one, and what the camera adds to it.
+#[must_use]
+pub fn figure(twin: &Twin) -> Figure {
+    let words = words(twin);
+    let mut panels = vec![run(twin)];
+    panels.extend(instants(twin).into_iter().map(|(name, at)| enlarged(twin, name, at)));
+    panels.push(added(twin));
+    Figure {
+        title: words.caption,
+        subtitle: format!("{}; synthetic: no camera took it", twin.title),
+        synthetic: true,
+        description: words.details,
+        width_mm: FULL_WIDTH_MM,
+        panels,
+        ..Figure::default()
+    }
+}
+
+/// The claim with its numbers, and what the figure shows.
+fn words(twin: &Twin) -> Words {
+    let grid = twin.tracked.grid();
+    let lost = lost(twin).len();
+    let blur_m = blurs(twin).into_iter().flatten().map(|(_, blur_m)| blur_m.abs()).fold(0.0, f64::max);
+    Words {
+        caption: format!(
+            "{} frames at {} frames/s: noise of {} on the deflection, {} of the frames lost",
+            grid.frames,
+            short(grid.frame_rate_hz),
+            length(deflection_noise_m(twin)),
+            percent(lost as f64 / grid.frames.max(1) as f64)
+        ),
+        details: format!(
+            "Deflection of the simulated motion and of the frames of a camera with an exposure of {}. Level bars: the \
+             exposure; upright bars: two standard deviations of the noise. The exposure blurs the deflection by up to \
+             {}.",
+            milliseconds(twin.exposure_s),
+            length(blur_m)
+        ),
+    }
+}
+
+/// Tip and head have noise of their own.
+fn deflection_noise_m(twin: &Twin) -> f64 {
+    std::f64::consts::SQRT_2 * twin.noise_m
+}
+
+fn deflection_m(recording: &Recording, at: usize) -> Option<f64> {
+    let traces = recording.traces();
+    Some((*traces.tip_x_m.get(at)?)? - (*traces.head_x_m.get(at)?)?)
+}
+
+/// Times, s, and deflections, mm; `None` where head or tip is lost.
+fn points(recording: &Recording) -> Vec<Option<(f64, f64)>> {
+    let grid = recording.grid();
+    (0..grid.frames).map(|at| Some((grid.time_s(at), 1e3 * deflection_m(recording, at)?))).collect()
+}
+
+/// Frames without head or without tip, where the camera would have seen them.
+fn lost(twin: &Twin) -> Vec<Option<(f64, f64)>> {
+    let tracked = points(twin.tracked);
+    points(twin.seen)
+        .into_iter()
+        .zip(tracked)
+        .filter(|(_, found)| found.is_none())
+        .map(|(seen, _)| seen)
+        .collect()
+}
+
+/// The deflection that the camera sees minus that of the motion at the instant of the frame, m.
+fn blurs(twin: &Twin) -> Vec<Option<(f64, f64)>> {
+    differences(twin, twin.seen)
+}
+
+fn differences(twin: &Twin, of: &Recording) -> Vec<Option<(f64, f64)>> {
+    let (grid, traces) = (of.grid(), twin.motion.traces());
+    let difference = |at: usize| {
+        let time_s = grid.time_s(at);
+        let true_m = twin.motion.at(&traces.tip_x_m, time_s)? - twin.motion.at(&traces.head_x_m, time_s)?;
+        Some((time_s, deflection_m(of, at)? - true_m))
+    };
+    (0..grid.frames).map(difference).collect()
+}
+
+fn run(twin: &Twin) -> Panel {
+    let rule = |(name, at): (&str, f64)| Rule {
+        label: name.to_owned(),
+        colour: Colour::Grey,
+        mark: Mark::Dashed,
+        at,
+        above: None,
+    };
+    Panel {
+        title: "whole run".to_owned(),
+        x: Axis::time(),
+        y: Axis::linear("deflection, mm"),
+        height_mm: PANEL_MM,
+        series: series(twin, None),
+        rules: instants(twin).into_iter().map(rule).collect(),
+        ..Panel::default()
+    }
+}
+
+/// A part of the run, frame by frame.
+fn enlarged(twin: &Twin, name: &str, at_s: f64) -> Panel {
+    let frame_s = 1.0 / twin.tracked.grid().frame_rate_hz;
+    let (from, to) = (at_s - BEFORE * frame_s, at_s + (ENLARGED - BEFORE) * frame_s);
+    Panel {
+        title: format!("{name}, {} frames", ENLARGED as usize),
+        x: Axis::time().between(from, to),
+        y: Axis::linear("deflection, mm"),
+        height_mm: PANEL_MM,
+        series: series(twin, Some((from, to))),
+        ..Panel::default()
+    }
+}
+
+/// The motion, the frames, and the lost ones; with bars in a part.
+fn series(twin: &Twin, part: Option<(f64, f64)>) -> Vec<Series> {
+    let tracked = points(twin.tracked);
+    let sd_mm = 1e3 * deflection_noise_m(twin);
+    let inside = |(time_s, _): &&(f64, f64)| part.is_some_and(|(from, to)| (from..=to).contains(time_s));
+    let half_s = 0.5 * twin.exposure_s;
+    let bars = tracked.iter().flatten().filter(inside).flat_map(|(time_s, y)| {
+        [
+            Bar::Horizontal { y: *y, from: time_s - half_s, to: time_s + half_s },
+            Bar::Vertical { x: *time_s, from: y - 2.0 * sd_mm, to: y + 2.0 * sd_mm },
+        ]
+    });
+    let is_seen = |bar: &Bar| match bar {
+        Bar::Horizontal { from, to, .. } | Bar::Vertical { from, to, .. } => to > from,
+    };
+    let bars = bars.filter(is_seen).collect();
+    let of = |label: &str, colour, mark, points| Series {
+        label: label.to_owned(),
+        colour,
+        mark,
+        points,
+        ..Series::default()
+    };
+    vec![
+        of("simulated motion", Colour::Blue, Mark::Thin, points(twin.motion)),
+        Series { bars, ..of("frame as tracked", Colour::Black, Mark::Dots, tracked) },
+        of("lost frame", Colour::Vermilion, Mark::Crosses, lost(twin)),
+    ]
+}
+
+/// What the camera adds: blur alone, and blur with noise.
+fn added(twin: &Twin) -> Panel {
+    let micrometres = |points: Vec<Option<(f64, f64)>>| {
+        points.into_iter().map(|point| point.map(|(time_s, y)| (time_s, 1e6 * y))).collect()
+    };
+    let of = |label: &str, colour, mark, points| Series {
+        label: label.to_owned(),
+        colour,
+        mark,
+        points: micrometres(points),
+        ..Series::default()
+    };
+    Panel {
+        title: format!("frame minus motion, noise {}", length(deflection_noise_m(twin))),
+        x: Axis::time(),
+        y: Axis::linear("difference, \u{b5}m"),
+        height_mm: 0.8 * PANEL_MM,
+        series: vec![
+            of("with noise", Colour::Grey, Mark::Dots, differences(twin, twin.tracked)),
+            of("exposure alone", Colour::Orange, Mark::Thin, blurs(twin)),
+        ],
+        ..Panel::default()
+    }
+}
+
+/// The end of the longest stick, and of the last one of the late part of the run that is followed by enough
+/// frames.
+fn instants(twin: &Twin) -> Vec<(&'static str, f64)> {
+    let grid = twin.tracked.grid();
+    let (start_s, end_s) = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
+    let frame_s = 1.0 / grid.frame_rate_hz;
+    let fits = |at: &f64| *at - BEFORE * frame_s >= start_s && *at + (ENLARGED - BEFORE) * frame_s <= end_s;
+    let ends = || twin.stick_s.iter().filter(|[_, end]| fits(end));
+    let longest = ends().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0]))).map(|[_, end]| *end);
+    let late_s = start_s + LATE * (end_s - start_s);
+    let late = ends().map(|[_, end]| *end).rfind(|end| *end >= late_s && Some(*end) != longest);
+    let named = [("longest stick ends", longest), ("stick-slip", late)];
+    named.into_iter().filter_map(|(name, at)| Some((name, at?))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chart::Medium;
+    use crate::recording::{FrameGrid, Traces};
+    use crate::twin::{Tracking, track};
+
+    fn recording(frame_rate_hz: f64, frames: usize, of: impl Fn(f64) -> f64) -> Recording {
+        let grid = FrameGrid { start_s: 1.0, frame_rate_hz, frames };
+        let column = |of: &dyn Fn(f64) -> f64| (0..frames).map(|i| Some(of(grid.time_s(i)))).collect();
+        let traces = Traces {
+            tip_x_m: column(&of),
+            tip_y_m: column(&|_| 0.0),
+            head_x_m: column(&|_| 0.0),
+            head_y_m: column(&|_| 0.0),
+            ..Traces::default()
+        };
+        Recording::new("motion", grid, traces, true).unwrap()
+    }
+
+    #[test]
+    fn the_parts_are_about_releases_and_every_lost_frame_is_marked() {
+        let path = |t: f64| 1e-3 * (300.0 * t).sin();
+        let (motion, seen) = (recording(8000.0, 4001, path), recording(1000.0, 501, path));
+        let tracking = Tracking { metres_per_pixel: 1e-5, noise_px: 0.2, dropout_fraction: 0.1, seed: 1 };
+        let tracked = track(&seen, "a <twin>", &tracking).unwrap();
+        let stick_s = [[1.1, 1.2], [1.3, 1.31], [1.44, 1.45], [1.499, 1.4995]];
+        let twin = Twin {
+            title: "a <twin>",
+            motion: &motion,
+            seen: &seen,
+            tracked: &tracked,
+            exposure_s: 4e-4,
+            noise_m: 2e-6,
+            stick_s: &stick_s,
+        };
+        assert_eq!(instants(&twin), [("longest stick ends", 1.2), ("stick-slip", 1.45)]);
+        let missing = points(&tracked).iter().filter(|point| point.is_none()).count();
+        assert!(missing > 50 && lost(&twin).iter().flatten().count() == missing);
+        // nothing is blurred in this view, and what is left has the stated noise
+        assert!(blurs(&twin).into_iter().flatten().all(|(_, m)| m.abs() < 2e-7));
+        let noise: Vec<f64> = differences(&twin, &tracked).into_iter().flatten().map(|(_, m)| m).collect();
+        let sd = (noise.iter().map(|m| m * m).sum::<f64>() / noise.len() as f64).sqrt();
+        assert!((sd / deflection_noise_m(&twin) - 1.0).abs() < 0.15, "{sd}");
+        let drawn = figure(&twin);
+        let svg = drawn.svg(Medium::Screen);
+        assert_eq!(drawn.panels.len(), 4);
+        assert!(svg.contains("synthetic") && svg.contains("a &lt;twin&gt;") && !svg.contains("NaN"));
+        assert!(drawn.title.contains("2.8 \u{b5}m"), "{}", drawn.title);
+    }
+}

@@ -1,0 +1,318 @@
+//! The links of the fitted model over frames of the video, at instants through the reversal.
+
+use super::Words;
+use super::poses::{joints, through_reversal};
+use crate::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Raster, Series};
+use crate::compare::Case;
+use crate::figures::{FigureBlock, subtitle};
+use crate::math;
+use crate::recording::film::Film;
+use crate::text::{length, listed};
+
+/// The instants that are shown: the pose of the model, and what it is called over a recording.
+const SHOWN: [(&str, &str); 4] = [
+    ("before", "before the reversal"),
+    ("upright", "in the flip"),
+    ("still stuck", "at the release"),
+    ("after", "after the flip"),
+];
+/// Most frames between an instant of the model and a frame that has head and tip.
+const NEAR: usize = 5;
+/// Height of a panel, mm.
+const DRAWING_MM: f64 = 42.0;
+/// Points of a frame of the video across a panel, and the part of it that is shown, in lengths of the blade:
+/// to either side of the head, and over the glass. A panel of any width lies within it.
+const FRAME_POINTS: usize = 256;
+const FRAME_HALF: f64 = 1.5;
+const FRAME_HEIGHTS: [f64; 2] = [-0.3, 1.3];
+/// Room round the links, in lengths of the blade.
+const ROOM: f64 = 0.12;
+
+/// What there is of the video at an instant.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Frame {
+    /// No picture of the instant.
+    Missing,
+    /// A picture that shows neither the tracked head nor the tip.
+    Elsewhere,
+    /// The part round the links, in mm of the figure.
+    Shown(Raster),
+}
+
+impl Frame {
+    /// The picture, where it shows the links.
+    #[must_use]
+    pub fn shown(&self) -> Option<&Raster> {
+        match self {
+            Self::Shown(raster) => Some(raster),
+            Self::Missing | Self::Elsewhere => None,
+        }
+    }
+}
+
+/// A frame of the recording with the model in it. Places are along the sweep from the model's head and over
+/// the glass, m.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Instant {
+    /// What happens then.
+    pub name: &'static str,
+    /// Time of the frame, s of the recording.
+    pub time_s: f64,
+    /// Head, hinge and tip of the model.
+    pub joints_m: [(f64, f64); 3],
+    /// The tracked head and tip; at the model's height where only the sweep was tracked.
+    pub tracked_m: [(f64, f64); 2],
+    /// The frame of the video.
+    pub frame: Frame,
+}
+
+impl Instant {
+    /// Distances of the tracked head and tip from the model's, m, with the name of the point.
+    fn distances_m(&self) -> [(&'static str, f64); 2] {
+        let [head, _, tip] = self.joints_m;
+        let apart = |(x, y): (f64, f64), (to_x, to_y): (f64, f64)| math::hypot(to_x - x, to_y - y);
+        [("head", apart(head, self.tracked_m[0])), ("tip", apart(tip, self.tracked_m[1]))]
+    }
+}
+
+/// What the figure shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct VideoFrames {
+    /// Line under the heading.
+    pub subtitle: String,
+    /// The instants, in their order.
+    pub instants: Vec<Instant>,
+}
+
+impl VideoFrames {
+    /// The instants of a condition that its recording shows; `None` without any, or without a video.
+    #[must_use]
+    pub fn of(case: &Case) -> Option<Self> {
+        let film = case.measured?.film.filter(|_| !case.alignment.opposite_turn)?;
+        let poses = through_reversal(&case.model.motion);
+        let shown = |(pose, name): (&str, &'static str)| {
+            let time_s = poses.iter().find(|p| p.name == pose)?.sample.time_s;
+            instant(case, &film, name, time_s + case.alignment.shift_s)
+        };
+        let instants: Vec<Instant> = SHOWN.into_iter().filter_map(shown).collect();
+        (!instants.is_empty()).then(|| Self { subtitle: subtitle(case.synthetic(), ""), instants })
+    }
+}
+
+/// The frame with head and tip that is nearest to a time of the recording, s; `None` where no height was
+/// tracked, so that the place of the picture is not known.
+fn instant(case: &Case, film: &Film<'_>, name: &'static str, time_s: f64) -> Option<Instant> {
+    let recording = case.recording()?;
+    let (grid, traces, view) = (recording.grid(), recording.traces(), &case.model.view.recording);
+    let nearest = ((time_s - grid.start_s) * grid.frame_rate_hz).round();
+    let has = |at: &usize| {
+        let value = |column: &[Option<f64>]| column.get(*at).copied().flatten().is_some();
+        value(&traces.tip_x_m) && value(&traces.head_x_m)
+    };
+    let frames = (0..=NEAR).flat_map(|away| [nearest - away as f64, nearest + away as f64]);
+    let at = frames.filter(|at| (0.0..grid.frames as f64).contains(at)).map(|at| at as usize).find(has)?;
+    let time_s = grid.time_s(at);
+    let model_s = time_s - case.alignment.shift_s;
+    // (measured, model, what is added to the model)
+    let apart_m = |measured: &[Option<f64>], model: &[Option<f64>], added_m: f64| {
+        Some((*measured.get(at)?)? - view.at(model, model_s)? - added_m)
+    };
+    let (seen, along_m, drop_m) = (view.traces(), case.alignment.along_m, case.alignment.drop_m);
+    let fine = &case.model.motion.fine;
+    let after = fine.partition_point(|sample| sample.time_s < model_s);
+    let joints_m = joints(&case.model.motion.linkage, fine.get(after).or(fine.last())?);
+    let joints_m = joints_m.map(|(x, y)| (x - joints_m[0].0, y));
+    let head_up_m = apart_m(&traces.head_y_m, &seen.head_y_m, -drop_m);
+    let tip_up_m = apart_m(&traces.tip_y_m, &seen.tip_y_m, -drop_m);
+    let [head, _, tip] = joints_m;
+    let tracked_m = [
+        (
+            head.0 + apart_m(&traces.head_x_m, &seen.head_x_m, along_m)?,
+            head.1 + head_up_m.unwrap_or_default(),
+        ),
+        (tip.0 + apart_m(&traces.tip_x_m, &seen.tip_x_m, along_m)?, tip.1 + tip_up_m.unwrap_or_default()),
+    ];
+    // from the place of the tracked points in the figure to that in the recording
+    let from = |column: &[Option<f64>], at_m: f64| Some((*column.get(at)?)? - at_m);
+    let by_head = head_up_m.and_then(|_| from(&traces.head_y_m, tracked_m[0].1));
+    let by_tip = tip_up_m.and_then(|_| from(&traces.tip_y_m, tracked_m[1].1));
+    let shift_m = (from(&traces.head_x_m, tracked_m[0].0)?, by_head.or(by_tip)?);
+    let frame = photograph(film, at, &joints_m, shift_m);
+    Some(Instant { name, time_s, joints_m, tracked_m, frame })
+}
+
+/// The frame `at` round the links, turned and scaled as the figure.
+fn photograph(film: &Film<'_>, at: usize, joints_m: &[(f64, f64); 3], shift_m: (f64, f64)) -> Frame {
+    let Some(picture) = film.pictures.picture(at) else { return Frame::Missing };
+    let ends = [joints_m[0], joints_m[2]];
+    let seen = |(x_m, y_m)| picture.holds(film.place.pixel([x_m + shift_m.0, y_m + shift_m.1]));
+    if !ends.into_iter().any(seen) {
+        return Frame::Elsewhere;
+    }
+    let size_m = joints_m[0].1;
+    let (half_m, [low_m, high_m]) = (FRAME_HALF * size_m, FRAME_HEIGHTS.map(|height| height * size_m));
+    let point_m = 2.0 * half_m / FRAME_POINTS as f64;
+    let rows = ((high_m - low_m) / point_m).round() as usize;
+    let pixel = |[across, down]: [f64; 2]| {
+        let (x_m, y_m) = (across * point_m - half_m, high_m - down * point_m);
+        film.place.pixel([x_m + shift_m.0, y_m + shift_m.1])
+    };
+    let Ok(png) = picture.cut(FRAME_POINTS, rows, pixel).to_png() else { return Frame::Missing };
+    let y = [high_m - rows as f64 * point_m, high_m].map(|y_m| 1e3 * y_m);
+    Frame::Shown(Raster { png, x: [-1e3 * half_m, 1e3 * half_m], y })
+}
+
+/// The figure of a condition; `None` without a video, or where nothing was tracked at the instants.
+pub(crate) fn block(case: &Case) -> Option<FigureBlock> {
+    let shown = VideoFrames::of(case)?;
+    let words = Words { caption: caption(&shown), details: details(&shown) };
+    Some(case.block("video-frames", words, figure(&shown)))
+}
+
+/// The point that lies farthest from the model, with its distance, m.
+fn farthest(shown: &VideoFrames) -> Option<(&Instant, &'static str, f64)> {
+    let points = shown.instants.iter().flat_map(|i| i.distances_m().map(|(point, m)| (i, point, m)));
+    points.max_by(|a, b| a.2.total_cmp(&b.2))
+}
+
+/// One sentence on the figure.
+#[must_use]
+pub fn caption(shown: &VideoFrames) -> String {
+    let Some((instant, point, distance_m)) = farthest(shown) else { return String::new() };
+    format!(
+        "At {} instants through the reversal head and tip of the model lie at most {} from the tracked points: the \
+         {point} {}.",
+        shown.instants.len(),
+        length(distance_m),
+        instant.name,
+    )
+}
+
+/// The rest of what is said of the figure.
+#[must_use]
+pub fn details(shown: &VideoFrames) -> String {
+    format!(
+        "The two links of the model to scale, with its head at 0, and the tracked points.{}",
+        frames_in_words(shown)
+    )
+}
+
+/// Which instants have a frame of the video.
+fn frames_in_words(shown: &VideoFrames) -> String {
+    let of = |is: fn(&Frame) -> bool| {
+        let names = shown.instants.iter().filter(|i| is(&i.frame)).map(|i| i.name.to_owned());
+        names.collect::<Vec<String>>()
+    };
+    let with = of(|frame| frame.shown().is_some());
+    let (without, elsewhere) = (of(|frame| *frame == Frame::Missing), of(|frame| *frame == Frame::Elsewhere));
+    let mut words = match (with.is_empty(), without.is_empty()) {
+        (true, true) => String::new(),
+        (true, false) => format!(
+            " The video has no picture {}: check `first_frame` of [video] in recording.toml.",
+            listed(&without)
+        ),
+        (false, true) => " Behind them the frames of the video.".to_owned(),
+        (false, false) => {
+            format!(" Behind them the frames of the video, of which there is none {}.", listed(&without))
+        }
+    };
+    if !elsewhere.is_empty() {
+        words += &format!(
+            " The frame {} shows neither tracked point: check `origin_px` and `metres_per_pixel` of [video] in \
+             recording.toml.",
+            listed(&elsewhere)
+        );
+    }
+    words
+}
+
+/// The figure: the links at every instant.
+#[must_use]
+pub fn figure(shown: &VideoFrames) -> Figure {
+    Figure {
+        title: farthest(shown).map_or_else(String::new, |(.., distance_m)| {
+            format!("The model's links end within {} of the tracked points", length(distance_m))
+        }),
+        subtitle: shown.subtitle.clone(),
+        synthetic: false, // (the figure of a condition is marked by that)
+        description: caption(shown),
+        width_mm: FULL_WIDTH_MM,
+        columns: 2,
+        panels: shown.instants.iter().map(|i| drawing(shown, i)).collect(),
+    }
+}
+
+/// The two links with the tracked points, mm.
+fn drawing(shown: &VideoFrames, instant: &Instant) -> Panel {
+    let place = |(x, y): (f64, f64)| Some((1e3 * x, 1e3 * y));
+    let of = |label: &str, colour, mark, points| Series {
+        label: label.to_owned(),
+        colour,
+        mark,
+        points,
+        ..Series::default()
+    };
+    let [head, hinge, tip] = instant.joints_m;
+    let [(_, head_m), (_, tip_m)] = instant.distances_m();
+    // the same length for all instants
+    let all = || shown.instants.iter().flat_map(|i| i.joints_m);
+    let size = all().map(|(_, y)| y).fold(0.0, f64::max);
+    let half = all().map(|(x, _)| x.abs()).fold(0.0, f64::max) + ROOM * size;
+    // (edged with white, lines and points are seen on any picture)
+    let filmed = instant.frame.shown().is_some();
+    let look = |plain: Mark| if filmed { Mark::Edged } else { plain };
+    let [tracked_head, tracked_tip] = instant.tracked_m.map(place);
+    let tracked = [tracked_head, None, tracked_tip].into_iter().filter(|point| filmed || point.is_some());
+    Panel {
+        title: format!("{}\ntip {}, head {}", instant.name, length(tip_m), length(head_m)),
+        x: Axis::linear("from the head, mm").between(-1e3 * half, 1e3 * half),
+        y: Axis::linear("over the glass, mm").between(-1e3 * ROOM * size, 1e3 * (1.0 + ROOM) * size),
+        height_mm: DRAWING_MM,
+        series: vec![
+            of("glass", Colour::Grey, Mark::Thin, vec![Some((-1e6, 0.0)), Some((1e6, 0.0))]),
+            of("neck", Colour::Blue, look(Mark::Thick), vec![place(head), place(hinge)]),
+            of("lip", Colour::Orange, look(Mark::Thick), vec![place(hinge), place(tip)]),
+            of("tracked head and tip", Colour::Black, look(Mark::Circles), tracked.collect()),
+        ],
+        equal: true,
+        picture: instant.frame.shown().cloned(),
+        ..Panel::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chart::{MOST_HEIGHT_MM, Medium};
+
+    #[test]
+    fn every_instant_has_its_links_and_the_farthest_point_is_named() {
+        let instant = |name, tip_m| Instant {
+            name,
+            time_s: 0.1,
+            joints_m: [(0.0, 5e-3), (1e-3, 3e-3), (2.5e-3, 0.0)],
+            tracked_m: [(1e-6, 5e-3), tip_m],
+            frame: Frame::Missing,
+        };
+        let shown = VideoFrames {
+            subtitle: "synthetic".to_owned(),
+            instants: vec![
+                instant("in the flip", (2.503e-3, 4e-6)),
+                instant("after the flip", (2.502e-3, 0.0)),
+            ],
+        };
+        let drawn = figure(&shown);
+        assert_eq!((drawn.panels.len(), drawn.columns), (2, 2));
+        assert!(drawn.panels.iter().all(|panel| panel.equal));
+        assert!(drawn.height_mm(Medium::Column) <= MOST_HEIGHT_MM);
+        let svg = drawn.svg(Medium::Page);
+        assert!(
+            svg.contains("tip 5.0 \u{b5}m, head 1.0 \u{b5}m")
+                && svg.contains("synthetic")
+                && !svg.contains("NaN")
+        );
+        assert!(
+            caption(&shown).ends_with("at most 5.0 \u{b5}m from the tracked points: the tip in the flip.")
+        );
+    }
+}

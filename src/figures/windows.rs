@@ -1,0 +1,169 @@
+//! The whole recording with its named windows, and the one that was analysed.
+
+use super::history::unit;
+use crate::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
+use crate::figures::subtitle;
+
+/// A named part of a recording.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct NamedWindow {
+    /// Name, such as `stick`.
+    pub name: String,
+    /// Start, s.
+    pub from_s: f64,
+    /// End, s.
+    pub to_s: f64,
+}
+
+/// What the figure shows; all columns have the length of `time_s`.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Windows {
+    /// Heading.
+    pub title: String,
+    /// Quantity that was analysed, such as "deflection".
+    pub quantity: String,
+    /// More to say; empty for none.
+    pub note: String,
+    /// Whether the motion is one that no camera took.
+    pub synthetic: bool,
+    /// Instants, s.
+    pub time_s: Vec<f64>,
+    /// The quantity, m.
+    pub channel_m: Vec<Option<f64>>,
+    /// Head along the sweep, m; empty for no such panel.
+    pub head_x_m: Vec<Option<f64>>,
+    /// The named windows.
+    pub windows: Vec<NamedWindow>,
+    /// Start and end of what was analysed, s.
+    pub analysed_s: Option<(f64, f64)>,
+    /// Named instants, s.
+    pub instants: Vec<(String, f64)>,
+}
+
+/// Heights of the panels, mm.
+const HEIGHT_MM: f64 = 46.0;
+const HEAD_HEIGHT_MM: f64 = 26.0;
+/// Colours of the windows in their order.
+const COLOURS: [Colour; 6] =
+    [Colour::SkyBlue, Colour::Orange, Colour::Vermilion, Colour::Green, Colour::Purple, Colour::Grey];
+
+/// The figure.
+#[must_use]
+pub fn figure(shown: &Windows) -> Figure {
+    let mut panels = vec![panel(shown, &shown.quantity, &shown.channel_m, HEIGHT_MM)];
+    // names stand over the topmost panel, their shades run through both
+    panels[0].captions = shown
+        .windows
+        .iter()
+        .map(|w| Caption { label: w.name.clone(), at: (w.from_s + w.to_s) / 2.0 })
+        .collect();
+    if !shown.head_x_m.is_empty() {
+        let mut head = panel(shown, "head x", &shown.head_x_m, HEAD_HEIGHT_MM);
+        head.rules.iter_mut().for_each(|r| r.label.clear());
+        panels.push(head);
+    }
+    Figure {
+        title: shown.title.clone(),
+        subtitle: subtitle(shown.synthetic, &shown.note),
+        synthetic: shown.synthetic,
+        description: format!(
+            "Time history of {} over the whole recording with its named windows shaded.",
+            shown.quantity
+        ),
+        width_mm: FULL_WIDTH_MM,
+        panels,
+        ..Figure::default()
+    }
+}
+
+fn panel(shown: &Windows, name: &str, values_m: &[Option<f64>], height_mm: f64) -> Panel {
+    let (unit, factor) = unit(values_m.iter().flatten().copied().filter(|x| x.is_finite()));
+    let points = shown.time_s.iter().zip(values_m).map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
+    let rule = |(label, at): &(String, f64)| Rule {
+        label: label.clone(),
+        colour: Colour::Blue,
+        mark: Mark::Dashed,
+        at: *at,
+        above: None,
+    };
+    let time = Axis::time();
+    Panel {
+        x: match (shown.time_s.first(), shown.time_s.last()) {
+            (Some(first), Some(last)) => time.between(*first, *last),
+            _ => time,
+        },
+        y: Axis::linear(format!("{name}, {unit}")),
+        height_mm,
+        series: vec![Series {
+            label: String::new(),
+            colour: Colour::Black,
+            mark: Mark::Thin,
+            points,
+            bars: Vec::new(),
+        }],
+        bands: bands(shown),
+        rules: shown.instants.iter().map(rule).collect(),
+        ..Panel::default()
+    }
+}
+
+/// The windows shaded, the analysed one framed.
+fn bands(shown: &Windows) -> Vec<Band> {
+    let shaded = |(w, colour): (&NamedWindow, &Colour)| Band {
+        label: w.name.clone(),
+        colour: *colour,
+        from: w.from_s,
+        to: w.to_s,
+        outlined: false,
+    };
+    let framed = shown.analysed_s.map(|(from, to)| Band {
+        label: "analysed".to_owned(),
+        colour: Colour::Black,
+        from,
+        to,
+        outlined: true,
+    });
+    shown.windows.iter().zip(COLOURS.iter().cycle()).map(shaded).chain(framed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chart::Medium;
+
+    fn as_svg(shown: &Windows) -> String {
+        figure(shown).svg(Medium::Screen)
+    }
+
+    fn shown() -> Windows {
+        let time_s: Vec<f64> = (0..1000).map(|i| f64::from(i) * 1e-3).collect();
+        let window = |name: &str, from_s, to_s| NamedWindow { name: name.to_owned(), from_s, to_s };
+        Windows {
+            quantity: "deflection".to_owned(),
+            channel_m: time_s.iter().map(|t| Some(1e-3 * (9.0 * t).sin())).collect(),
+            head_x_m: time_s.iter().map(|t| Some(0.1 * t)).collect(),
+            time_s,
+            windows: vec![
+                window("before", 0.0, 0.4),
+                window("stick", 0.4, 0.45),
+                window("flip", 0.45, 0.47),
+                window("after", 0.47, 0.99),
+            ],
+            analysed_s: Some((0.5, 0.7)),
+            ..Windows::default()
+        }
+    }
+
+    #[test]
+    fn every_window_is_named_over_the_panel_and_in_the_legend() {
+        let drawn = as_svg(&shown());
+        let named = |name: &str| drawn.matches(&format!("\n{name}\n")).count();
+        assert_eq!(["before", "stick", "flip", "after", "analysed"].map(named), [2, 2, 2, 2, 1]);
+        assert!(drawn.contains("deflection, mm") && drawn.contains("head x, mm"));
+    }
+
+    #[test]
+    fn without_a_head_there_is_one_panel() {
+        assert!(!as_svg(&Windows { head_x_m: Vec::new(), ..shown() }).contains("head x"));
+    }
+}

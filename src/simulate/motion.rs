@@ -1,0 +1,155 @@
+//! The motion of a blade, state by state, with everything that one run shows of it.
+
+use crate::blade::Linkage;
+use crate::simulate::outputs::{Audit, Impacts, StickIntervals, Transitions};
+use crate::simulate::scene::Scene;
+use crate::simulate::{Impact, Observer, Piece, Run, Sample, Transition, run};
+
+/// Samples of a run: enough for twenty points in a cycle of 1 kHz over the quarter of a second that a
+/// reversal takes.
+pub const SAMPLES: usize = 6000;
+/// Time between fine samples, s: fifty in a cycle of 1 kHz. Of a long run there are [`MOST_FINE`] (14 MB).
+const FINE_STEP_S: f64 = 2e-5;
+const MOST_FINE: usize = 100_000;
+
+/// Return of the head after a turn, as a share of its travel: less is a vibration of the drive.
+const RETURN: f64 = 0.005;
+
+/// A run of a scene.
+#[derive(Debug, Clone)]
+pub struct Motion {
+    /// Links and springs.
+    pub linkage: Linkage,
+    /// States at equal steps of time, until the run ended.
+    pub samples: Vec<Sample>,
+    /// The same in the finest steps that a figure of a part needs.
+    pub fine: Vec<Sample>,
+    /// Every change of mode.
+    pub transitions: Vec<Transition>,
+    /// When the tip stuck, s.
+    pub stick_s: Vec<[f64; 2]>,
+    /// Every impact of the tip on the glass.
+    pub impacts: Vec<Impact>,
+    /// Least normal force and Painlevé indicator over the whole run, not over the samples alone.
+    pub extremes: Audit,
+    /// How it ended.
+    pub run: Run,
+}
+
+impl Motion {
+    /// The scene, run from its start to its stop.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Self {
+        let mut recorder = MotionRecorder::new(scene);
+        let run = run(scene, &mut recorder);
+        recorder.motion(scene, run)
+    }
+
+    /// The fine samples between two instants, s.
+    #[must_use]
+    pub fn between(&self, [from_s, to_s]: [f64; 2]) -> &[Sample] {
+        let first = self.fine.partition_point(|s| s.time_s < from_s);
+        let end = self.fine.partition_point(|s| s.time_s <= to_s);
+        self.fine.get(first..end).unwrap_or_default()
+    }
+
+    /// The sample at the first extremum of the head's path from which it comes back, and to which it had come.
+    #[must_use]
+    pub(crate) fn turn(&self) -> Option<usize> {
+        let x = |at: usize| self.samples[at].head_x_m;
+        let (least, most) = self
+            .samples
+            .iter()
+            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), s| (l.min(s.head_x_m), h.max(s.head_x_m)));
+        let enough = RETURN * (most - least);
+        let (mut low, mut high) = (0, 0);
+        for at in 0..self.samples.len() {
+            (low, high) = (if x(at) < x(low) { at } else { low }, if x(at) > x(high) { at } else { high });
+            let came_back = [(high, x(high) - x(at), x(high) - x(0)), (low, x(at) - x(low), x(0) - x(low))];
+            let turned = |(_, back, there): &(usize, f64, f64)| *back > enough && *there > enough;
+            if let Some((turn, ..)) = came_back.into_iter().find(turned) {
+                return Some(turn);
+            }
+        }
+        None
+    }
+
+    /// When the head turns, s; `None` where it does not.
+    #[must_use]
+    pub fn turn_s(&self) -> Option<f64> {
+        self.samples.get(self.turn()?).map(|sample| sample.time_s)
+    }
+
+    /// The longest stick, s; the last of several as long.
+    #[must_use]
+    pub fn longest_stick_s(&self) -> Option<[f64; 2]> {
+        self.stick_s.iter().copied().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
+    }
+}
+
+/// What takes a [`Motion`] down while a scene runs.
+pub(crate) struct MotionRecorder {
+    states: (EvenSamples, EvenSamples),
+    events: (StickIntervals, (Transitions, (Impacts, Audit))),
+}
+
+impl MotionRecorder {
+    pub(crate) fn new(scene: &Scene) -> Self {
+        let fine = ((scene.run.stop_s - scene.start_s) / FINE_STEP_S).ceil() as usize + 1;
+        let states = (EvenSamples::new(scene, SAMPLES), EvenSamples::new(scene, fine.clamp(2, MOST_FINE)));
+        Self { states, events: Default::default() }
+    }
+
+    pub(crate) fn motion(self, scene: &Scene, run: Run) -> Motion {
+        let (stick, (transitions, (impacts, extremes))) = self.events;
+        Motion {
+            linkage: scene.linkage,
+            samples: self.states.0.taken,
+            fine: self.states.1.taken,
+            transitions: transitions.0,
+            stick_s: stick.0,
+            impacts: impacts.0,
+            extremes,
+            run,
+        }
+    }
+}
+
+impl Observer for MotionRecorder {
+    fn piece(&mut self, piece: &Piece<'_>) {
+        self.states.piece(piece);
+        self.events.piece(piece);
+    }
+    fn transition(&mut self, transition: &Transition) {
+        self.events.transition(transition);
+    }
+    fn impact(&mut self, impact: &Impact) {
+        self.events.impact(impact);
+    }
+}
+
+/// States at equal steps of time from the start of a scene to its stop.
+struct EvenSamples {
+    span_s: [f64; 2],
+    count: usize,
+    taken: Vec<Sample>,
+}
+
+impl EvenSamples {
+    fn new(scene: &Scene, count: usize) -> Self {
+        Self { span_s: [scene.start_s, scene.run.stop_s], count, taken: Vec::with_capacity(count) }
+    }
+
+    fn next_s(&self) -> Option<f64> {
+        let ([start_s, stop_s], i) = (self.span_s, self.taken.len());
+        (i < self.count).then(|| start_s + (stop_s - start_s) * i as f64 / (self.count - 1) as f64)
+    }
+}
+
+impl Observer for EvenSamples {
+    fn piece(&mut self, piece: &Piece<'_>) {
+        while let Some(t) = self.next_s().filter(|t| *t <= piece.end_s) {
+            self.taken.push(piece.sample(t.max(piece.start_s)));
+        }
+    }
+}
