@@ -1,5 +1,5 @@
 //! SIGINT, SIGTERM and the time limit. A command that can stop is asked to and finishes with what it has; any
-//! other ends at once. Either way the program says what was computed and ends with the code of an early stop,
+//! other, and one that does not stop in time, ends at once. Either way the program says what was computed and ends with the code of an early stop,
 //! and leaves neither half of its files nor a temporary one.
 
 use crate::program::failure::{Failure, STOPPED_EARLY};
@@ -8,8 +8,8 @@ use std::io;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
-use std::time::{Duration, Instant};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 use tempfile::NamedTempFile;
 
 /// How long a command that can stop may take to do so: with the rest, an answer comes within a second.
@@ -18,8 +18,8 @@ const GRACE: Duration = Duration::from_millis(800);
 /// Whether the program was asked to stop.
 static ASKED: AtomicBool = AtomicBool::new(false);
 
-/// When a command that can stop does so by itself.
-static DEADLINE: OnceLock<Instant> = OnceLock::new();
+/// Whether the time that it may take is over.
+static LATE: AtomicBool = AtomicBool::new(false);
 
 static STATE: Mutex<State> = Mutex::new(State { kept: None, finishing: false, passing: Vec::new() });
 
@@ -39,10 +39,10 @@ pub fn listen() -> Result<(), Failure> {
     let answer = move || {
         signals += 1;
         ASKED.store(true, Ordering::Relaxed);
-        if signals > 1 || state().kept.is_none() {
+        if signals > 1 {
             end();
         }
-        std::thread::spawn(end_if_it_does_not_stop);
+        std::thread::spawn(end_unless_it_stops);
     };
     ctrlc::set_handler(answer)
         .map_err(|error| Failure::Internal(format!("signals cannot be answered: {error}")))
@@ -50,22 +50,20 @@ pub fn listen() -> Result<(), Failure> {
 
 /// Whether a computation goes on.
 pub fn flow() -> ControlFlow<()> {
-    if ASKED.load(Ordering::Relaxed) || is_late() {
+    if ASKED.load(Ordering::Relaxed) || LATE.load(Ordering::Relaxed) {
         ControlFlow::Break(())
     } else {
         ControlFlow::Continue(())
     }
 }
 
-/// From now on a computation may take this long.
+/// From now on the command may take this long; then it is asked to stop as by a signal.
 pub fn limit(time: Duration) {
-    if let Some(deadline) = Instant::now().checked_add(time) {
-        let _ = DEADLINE.set(deadline); // (asked for once)
-    }
-}
-
-fn is_late() -> bool {
-    DEADLINE.get().is_some_and(|deadline| Instant::now() >= *deadline)
+    std::thread::spawn(move || {
+        std::thread::sleep(time);
+        LATE.store(true, Ordering::Relaxed);
+        end_unless_it_stops();
+    });
 }
 
 /// A command that asks [`flow`] and stops; `kept` says what is on the disk if it does not in time.
@@ -83,8 +81,7 @@ impl Stops {
     pub fn finishing(&self, what: &str) {
         state().finishing = true;
         progress::reached(); // the sentence says it better
-        let why = if ASKED.load(Ordering::Relaxed) { "interrupted" } else { "stopped at the time limit" };
-        warn_line!("{why}: {what}");
+        warn_line!("{}: {what}", why());
     }
 }
 
@@ -131,11 +128,18 @@ fn state() -> MutexGuard<'static, State> {
     STATE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-fn end_if_it_does_not_stop() {
-    std::thread::sleep(GRACE);
+fn end_unless_it_stops() {
+    if state().kept.is_some() {
+        std::thread::sleep(GRACE);
+    }
     if !state().finishing {
         end();
     }
+}
+
+/// Why the program ends before its command is done.
+fn why() -> &'static str {
+    if ASKED.load(Ordering::Relaxed) { "interrupted" } else { "stopped at the time limit" }
 }
 
 /// Ends the program; the state is held, so that nothing gets a name meanwhile.
@@ -147,7 +151,7 @@ fn end() -> ! {
     }
     let kept = state.kept.as_ref().map_or_else(nothing_kept, |kept| kept());
     let reached = progress::reached().map_or_else(String::new, |reached| format!("{reached}; "));
-    warn_line!("interrupted: {reached}{kept}");
+    warn_line!("{}: {reached}{kept}", why());
     std::process::exit(i32::from(STOPPED_EARLY))
 }
 

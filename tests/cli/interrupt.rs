@@ -106,6 +106,29 @@ fn a_fit_that_is_interrupted_keeps_its_journal_and_the_earlier_result() {
     project.run_to(&["fit", job, "--resume", "--max-evaluations", &held.to_string(), "--quiet"], &[3]);
 }
 
+/// A single evaluation that takes far longer than the limit does not carry the fit over it.
+#[test]
+fn a_fit_of_slow_evaluations_ends_at_its_time_limit() {
+    let project = project();
+    let job = fs::read_to_string(project.path("fits/published-simulation/job.toml")).unwrap();
+    let slow = job
+        .replace("../../data/scenes/published-simulation.toml", "../../long.toml")
+        .replace("frame_rate_hz = 10000.0", "frame_rate_hz = 100.0")
+        .replace("band_hz = [200.0, 1500.0]", "band_hz = [10.0, 45.0]")
+        .replace("segment_s = 0.015", "segment_s = 0.5");
+    fs::create_dir(project.path("fits/slow")).unwrap();
+    fs::write(project.path("fits/slow/job.toml"), slow).unwrap();
+    let clock = Instant::now();
+    let child = start(&project, &["fit", "fits/slow", "--time-limit", "1s", "--quiet"]);
+    let ended = child.wait_with_output().unwrap();
+    let (took, said) = (clock.elapsed(), String::from_utf8(ended.stderr).unwrap());
+    assert_eq!(ended.status.code(), Some(3), "{said}");
+    assert!(said.contains("stopped at the time limit: the search had not begun"), "{said}");
+    let limit = Duration::from_secs(1);
+    assert!(limit <= took && took < limit + ANSWER, "it took {took:?}");
+    assert_eq!(fs::read_dir(project.path("fits/slow")).unwrap().count(), 1);
+}
+
 #[test]
 fn a_study_that_is_interrupted_keeps_its_points() {
     let project = project();
