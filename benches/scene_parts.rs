@@ -8,9 +8,9 @@
 //! that change the motion are compared by the right-hand side.
 
 use std::time::Instant;
-use wiperlab::simulate::outputs::{Audit, Sampler, Transitions};
+use wiperlab::simulate::outputs::{EnergyAudit, SampleObserver, Transitions};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::{Effort, Observer, Run, run_with};
+use wiperlab::simulate::{Observer, RunResult, SolverOptions, run_scene_with};
 
 const SCENE: &str = include_str!("../data/scenes/light-blade.toml");
 /// Rounds in which every case runs once; the least time of each counts.
@@ -21,30 +21,30 @@ const TOLERANCE: f64 = 1e-8;
 struct Case {
     name: &'static str,
     scene: Scene,
-    observe: fn(&Scene) -> Run,
+    observe: fn(&Scene) -> RunResult,
     same_motion: bool,
 }
 
-fn nothing(scene: &Scene) -> Run {
-    run_with(scene, Effort::new(TOLERANCE), &mut ())
+fn nothing(scene: &Scene) -> RunResult {
+    run_scene_with(scene, SolverOptions::new(TOLERANCE), &mut ())
 }
 
-fn watched(scene: &Scene, mut observer: impl Observer) -> Run {
-    run_with(scene, Effort::new(TOLERANCE), &mut observer)
+fn watched(scene: &Scene, mut observer: impl Observer) -> RunResult {
+    run_scene_with(scene, SolverOptions::new(TOLERANCE), &mut observer)
 }
 
-fn sampled(scene: &Scene) -> Run {
+fn sampled(scene: &Scene) -> RunResult {
     let frames = ((scene.run.stop_s - scene.start_s) * scene.run.sample_rate_hz) as usize;
     let times = (0..frames).map(|i| scene.start_s + i as f64 / scene.run.sample_rate_hz);
     watched(
         scene,
-        Sampler::new(times, |sample| {
+        SampleObserver::new(times, |sample| {
             std::hint::black_box(sample.normal_n);
         }),
     )
 }
 
-fn case(name: &'static str, add: &str, observe: fn(&Scene) -> Run, same_motion: bool) -> Case {
+fn case(name: &'static str, add: &str, observe: fn(&Scene) -> RunResult, same_motion: bool) -> Case {
     let text = SCENE.replace("[friction]", &format!("{add}\n[friction]"));
     Case { name, scene: Scene::parse("light-blade.toml", &text).expect("a scene"), observe, same_motion }
 }
@@ -71,10 +71,10 @@ fn main() {
         without("no falling friction", "a", "0.0"),
         case("transitions listed", "", |scene| watched(scene, Transitions::default()), true),
         case("sampled at 10 kHz", "", sampled, true),
-        case("energy audited", "", |scene| watched(scene, Audit::default()), true),
+        case("energy audited", "", |scene| watched(scene, EnergyAudit::default()), true),
     ];
     let mut least = [f64::INFINITY; 8];
-    let runs: Vec<Run> = cases.iter().map(|case| (case.observe)(&case.scene)).collect();
+    let runs: Vec<RunResult> = cases.iter().map(|case| (case.observe)(&case.scene)).collect();
     for _ in 0..ROUNDS {
         for (case, least) in cases.iter().zip(&mut least) {
             let clock = Instant::now();

@@ -3,14 +3,14 @@
 
 use std::hint::black_box;
 use std::time::Instant;
-use wiperlab::feature::read_all;
+use wiperlab::feature::read_features;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::model::{Draw, Model};
-use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
-use wiperlab::recording::channel::Instants;
-use wiperlab::simulate::Effort;
+use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
+use wiperlab::recording::channel::ReversalInstants;
+use wiperlab::simulate::SolverOptions;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::twin::{Camera, view};
+use wiperlab::twin::{Camera, film_scene};
 
 const JOB: &str = include_str!("../fits/actual-blade-twin/job.toml");
 const SCENE: &str = include_str!("../data/scenes/actual-blade.toml");
@@ -28,18 +28,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = Scene::parse("actual-blade.toml", SCENE)?;
     let values: Vec<f64> = job.parameter_names().iter().filter_map(|name| scene.value(name)).collect();
     let model = SceneModel::new(
-        vec![Condition { scene: scene.clone(), instrument: INSTRUMENT }],
+        vec![ModelCondition { scene: scene.clone(), instrument: INSTRUMENT }],
         job.parameter_names(),
-        Plausible::default(),
+        PlausibilityLimits::default(),
     );
-    let (features, seen) = (job.features(), [model.observe(&values, 0, Draw::default())?]);
-    let effort = Effort::new(1e-6); // that of an evaluation
+    let (features, seen) = (job.features(), [model.record_condition(&values, 0, Draw::default())?]);
+    let effort = SolverOptions::new(1e-6); // that of an evaluation
     let simulated_s = least_s(|| {
-        drop(black_box(view(&scene, &INSTRUMENT.camera, scene.start_s, scene.run.stop_s, effort)))
+        drop(black_box(film_scene(&scene, &INSTRUMENT.camera, scene.start_s, scene.run.stop_s, effort)))
     });
-    let observed_s = least_s(|| drop(black_box(model.observe(&values, 0, Draw::default()))));
-    let instants_s = least_s(|| drop(black_box(Instants::find(&seen[0]))));
-    let read_s = least_s(|| drop(black_box(read_all(&features, &seen))));
+    let observed_s = least_s(|| drop(black_box(model.record_condition(&values, 0, Draw::default()))));
+    let instants_s = least_s(|| drop(black_box(ReversalInstants::find_instants(&seen[0]))));
+    let read_s = least_s(|| drop(black_box(read_features(&features, &seen))));
     println!("simulation, exposures included  {:8.3} ms", 1e3 * simulated_s);
     println!("noise of the tracking           {:8.3} ms", 1e3 * (observed_s - simulated_s));
     println!("instants                        {:8.3} ms", 1e3 * instants_s);
@@ -48,7 +48,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         1e3 * read_s,
         100.0 * read_s / (read_s + observed_s)
     );
-    for read in read_all(&features, &seen) {
+    for read in read_features(&features, &seen) {
         println!("{:?}", read?);
     }
     Ok(())

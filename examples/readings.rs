@@ -5,10 +5,10 @@
 use std::time::Instant;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::model::{Draw, Model};
-use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
-use wiperlab::recording::channel::{Channel, Instants, Window};
+use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
+use wiperlab::recording::channel::{Channel, ReversalInstants, Window};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::spectrum::{Analysis, Detrend, Record, Settings, Transformed};
+use wiperlab::spectrum::{Detrend, SampledRecord, SpectralAnalysis, SpectrumSettings, WindowedTransform};
 use wiperlab::twin::Camera;
 
 const JOB: &str = include_str!("../fits/actual-blade-twin/job.toml");
@@ -35,18 +35,18 @@ const COMPONENTS: [(&str, Channel, &str, (f64, f64)); 3] = [
 type Read = fn(&[Option<f64>], (f64, f64)) -> Option<f64>;
 const READINGS: [(&str, Read); 2] = [("windowed spectrum", windowed), ("complete analysis", complete)];
 
-fn settings() -> Settings {
-    Settings { detrend: Some(Detrend::Cubic), ..Settings::default() }
+fn settings() -> SpectrumSettings {
+    SpectrumSettings { detrend: Some(Detrend::Cubic), ..SpectrumSettings::default() }
 }
 
 fn windowed(samples: &[Option<f64>], band_hz: (f64, f64)) -> Option<f64> {
-    let found = Transformed::of(samples, INSTRUMENT.camera.frame_rate_hz, &settings()).ok()?;
+    let found = WindowedTransform::new(samples, INSTRUMENT.camera.frame_rate_hz, &settings()).ok()?;
     found.components(band_hz).ok()?.first().map(|c| c.frequency_hz)
 }
 
 fn complete(samples: &[Option<f64>], (low, high): (f64, f64)) -> Option<f64> {
-    let record = Record { samples, frame_rate_hz: INSTRUMENT.camera.frame_rate_hz, exposure_s: None };
-    let found = Analysis::of(&record, &settings()).ok()?.spectrum.components;
+    let record = SampledRecord { samples, frame_rate_hz: INSTRUMENT.camera.frame_rate_hz, exposure_s: None };
+    let found = SpectralAnalysis::from_record(&record, &settings()).ok()?.spectrum.components;
     found.iter().find(|c| (low..=high).contains(&c.frequency_hz)).map(|c| c.frequency_hz)
 }
 
@@ -55,9 +55,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let scene = Scene::parse("actual-blade.toml", SCENE)?;
     let values: Vec<f64> = job.parameter_names().iter().filter_map(|name| scene.value(name)).collect();
     let model = SceneModel::new(
-        vec![Condition { scene, instrument: INSTRUMENT }],
+        vec![ModelCondition { scene, instrument: INSTRUMENT }],
         job.parameter_names(),
-        Plausible::default(),
+        PlausibilityLimits::default(),
     );
     println!(
         "| component | read by | mean Hz | noise scatters it by, Hz | rough along A, Hz | along the neck stiffness, Hz | ms |"
@@ -68,8 +68,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         for (reading, read) in READINGS {
             let mut times_ms = Vec::new();
             let mut at = |values: &[f64], noise: u64| {
-                let seen = model.observe(values, 0, Draw { noise, ..Draw::default() }).ok()?;
-                let frames = window.resolve(&seen, &Instants::find(&seen)).ok()?;
+                let seen = model.record_condition(values, 0, Draw { noise, ..Draw::default() }).ok()?;
+                let frames = window.resolve_frames(&seen, &ReversalInstants::find_instants(&seen)).ok()?;
                 let samples = channel.samples(&seen);
                 let started = Instant::now();
                 let found = read(samples.get(frames)?, band_hz);

@@ -6,10 +6,10 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use wiperlab::fit::job::Job;
 use wiperlab::recording::files::RecordingFile;
-use wiperlab::section::Section;
+use wiperlab::section::BladeSection;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::Study;
-use wiperlab::toml_file::{FORMAT, Key, KeyTable, reference};
+use wiperlab::toml_file::{FORMAT, KeyEntry, KeyTable, list_key_tables};
 use wiperlab::twin::spec::TwinSpec;
 
 /// A kind of file.
@@ -57,7 +57,7 @@ const KINDS: [Kind; 6] = [
         name: "section",
         heading: "Sections of a blade",
         example: "[a section](../data/sections/example.toml)",
-        schema: Section::schema,
+        schema: BladeSection::schema,
     },
 ];
 
@@ -76,7 +76,7 @@ pub fn pages(root: &Path) -> Vec<(PathBuf, String)> {
     let mut all = Vec::new();
     for Kind { name, heading, example, schema } in KINDS {
         let schema = schema();
-        let tables = reference(&schema);
+        let tables = list_key_tables(&schema);
         let about = tables.first().map_or("", |table| table.about.as_str());
         let _ = write!(page, "\n## {heading}\n\n{about} See {example}.\n");
         tables.iter().for_each(|table| section(&mut page, table));
@@ -93,7 +93,7 @@ fn section(page: &mut String, table: &KeyTable) {
         let _ = write!(page, "\n### `{}`\n\n{}\n", table.name, table.about);
     }
     page.push_str("\n| key | value | needed | meaning |\n|---|---|---|---|\n");
-    for Key { name, value, required, meaning } in &table.keys {
+    for KeyEntry { name, value, required, meaning } in &table.keys {
         let (value, meaning) = (value.replace('|', "\\|"), meaning.replace('|', "\\|"));
         let needed = if *required { "yes" } else { "" };
         let _ = writeln!(page, "| `{name}` | {value} | {needed} | {meaning} |");

@@ -5,7 +5,7 @@
 use std::time::Instant;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::{Effort, Method, run_with};
+use wiperlab::simulate::{IntegrationMethod, SolverOptions, run_scene_with};
 
 /// Runs timed at each tolerance; the shortest and the median are shown.
 const RUNS: usize = 51;
@@ -19,18 +19,18 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "tolerance", "transitions", "steps", "rhs/transition", "least, ms", "median, ms", "shift of times, s"
     );
     let method = match std::env::args().nth(2).as_deref() {
-        Some("runge-kutta") => Method::RungeKutta,
-        _ => Method::Taylor,
+        Some("runge-kutta") => IntegrationMethod::RungeKutta,
+        _ => IntegrationMethod::Taylor,
     };
     let mut finer: Option<Transitions> = None;
     for exponent in (4..=13).rev() {
-        let effort = Effort { method, ..Effort::new(10f64.powi(-exponent)) };
+        let effort = SolverOptions { method, ..SolverOptions::new(10f64.powi(-exponent)) };
         let mut list = Transitions::default();
-        let run = run_with(&scene, effort, &mut list);
+        let run = run_scene_with(&scene, effort, &mut list);
         let mut times: Vec<f64> = (0..RUNS)
             .map(|_| {
                 let clock = Instant::now();
-                run_with(&scene, effort, &mut ());
+                run_scene_with(&scene, effort, &mut ());
                 1e3 * clock.elapsed().as_secs_f64()
             })
             .collect();

@@ -10,8 +10,10 @@ use std::hint::black_box;
 use std::path::Path;
 use std::time::Instant;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::sensitivity::{Channel, Direction, Runner, Seeds, TangentObserver, TangentPiece};
-use wiperlab::simulate::{Effort, Observer, Piece, run_with};
+use wiperlab::simulate::sensitivity::{
+    Channel, TangentDirection, TangentObserver, TangentRunner, TangentSeeds, TangentSegment,
+};
+use wiperlab::simulate::{Observer, SolutionSegment, SolverOptions, run_scene_with};
 
 /// Half the time that a shutter is open, s.
 const HALF_S: f64 = 2e-5;
@@ -42,23 +44,24 @@ impl Camera {
 }
 
 impl Observer for Camera {
-    fn piece(&mut self, piece: &Piece<'_>) {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
         let path = piece.path();
         while let Some(time) = self.times(piece.end_s) {
             let [from, to] = [(time - HALF_S).max(piece.start_s), (time + HALF_S).min(piece.end_s)];
-            let place = path.integral(from, to);
+            let place = path.integrate_points(from, to);
             self.sum += place.tip_x_m + place.head_drop_m;
         }
     }
 }
 
 impl TangentObserver for Camera {
-    fn piece(&mut self, piece: &TangentPiece<'_>) {
+    fn observe_segment(&mut self, piece: &TangentSegment<'_>) {
         while let Some(time) = self.times(piece.end_s) {
-            let weights = piece.over((time - HALF_S).max(piece.start_s), (time + HALF_S).min(piece.end_s));
+            let weights =
+                piece.weights_over((time - HALF_S).max(piece.start_s), (time + HALF_S).min(piece.end_s));
             for channel in [Channel::TipX, Channel::HeadDrop] {
-                self.sum += piece.value(channel, &weights);
-                piece.derivatives(channel, &weights, &mut self.row);
+                self.sum += piece.channel_value(channel, &weights);
+                piece.channel_derivatives(channel, &weights, &mut self.row);
                 self.sum += self.row.iter().sum::<f64>();
             }
         }
@@ -73,20 +76,25 @@ fn seconds(what: impl FnOnce() -> f64) -> f64 {
 }
 
 /// Smallest times of a run alone and of one with derivatives, s.
-fn times(runner: &mut Runner, scene: &Scene, directions: &[Direction], rate_hz: Option<f64>) -> [f64; 2] {
+fn times(
+    runner: &mut TangentRunner,
+    scene: &Scene,
+    directions: &[TangentDirection],
+    rate_hz: Option<f64>,
+) -> [f64; 2] {
     const ROUNDS: usize = 40;
-    let seeds = Seeds::new(scene, directions).expect("known directions");
-    let effort = Effort::of(scene);
+    let seeds = TangentSeeds::new(scene, directions).expect("known directions");
+    let effort = SolverOptions::from_scene(scene);
     let mut least = [f64::INFINITY; 2];
     for _ in 0..ROUNDS {
         let alone = seconds(|| {
             let mut camera = Camera::new(scene, rate_hz, 0);
-            run_with(scene, effort, &mut camera);
+            run_scene_with(scene, effort, &mut camera);
             camera.sum
         });
         let derived = seconds(|| {
             let mut camera = Camera::new(scene, rate_hz, directions.len());
-            runner.run(scene, effort, &seeds, &mut camera);
+            runner.run_scene(scene, effort, &seeds, &mut camera);
             camera.sum
         });
         least = [least[0].min(alone), least[1].min(derived)];
@@ -105,10 +113,15 @@ fn main() {
         "blade.neck_natural_frequency_hz",
         "shoulder.stiffness_ratio",
     ]
-    .map(|name| Direction::Parameter(name.to_owned()));
-    let states = [Direction::NeckAngle, Direction::LipAngle, Direction::NeckRate, Direction::LipRate];
-    let ten: Vec<Direction> =
-        parameters.iter().chain(&states).cloned().chain([Direction::DriveDelay]).collect();
+    .map(|name| TangentDirection::Parameter(name.to_owned()));
+    let states = [
+        TangentDirection::NeckAngle,
+        TangentDirection::LipAngle,
+        TangentDirection::NeckRate,
+        TangentDirection::LipRate,
+    ];
+    let ten: Vec<TangentDirection> =
+        parameters.iter().chain(&states).cloned().chain([TangentDirection::DriveDelay]).collect();
     println!(
         "directions                                   samples  derivatives    alone     with them  ratio"
     );
@@ -120,7 +133,8 @@ fn main() {
     ] {
         for (samples, rate_hz) in [("none", None), ("4 kHz", Some(4e3))] {
             // as good as the run itself, and as a fit to traces takes them
-            let runners = [("to 1e-8", Runner::default()), ("to 1e-5", Runner::with_accuracy(1e-5))];
+            let runners =
+                [("to 1e-8", TangentRunner::default()), ("to 1e-5", TangentRunner::with_accuracy(1e-5))];
             for (accuracy, mut runner) in runners {
                 let [alone, derived] = times(&mut runner, &scene, directions, rate_hz);
                 let ratio = derived / alone;

@@ -6,10 +6,10 @@
 use std::time::Instant;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::{Effort, Method, Transition, run_with};
+use wiperlab::simulate::{IntegrationMethod, SolverOptions, Transition, run_scene_with};
 
-const METHODS: [(&str, Method); 2] =
-    [("wiperlab-taylor", Method::Taylor), ("wiperlab-runge-kutta", Method::RungeKutta)];
+const METHODS: [(&str, IntegrationMethod); 2] =
+    [("wiperlab-taylor", IntegrationMethod::Taylor), ("wiperlab-runge-kutta", IntegrationMethod::RungeKutta)];
 
 /// A transition of the reference: time, s, and both modes.
 struct Exact {
@@ -30,9 +30,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     );
     for (name, method) in METHODS {
         for exponent in 4..=12 {
-            let effort = Effort { method, ..Effort::new(10f64.powi(-exponent)) };
+            let effort = SolverOptions { method, ..SolverOptions::new(10f64.powi(-exponent)) };
             let mut list = Transitions::default();
-            let run = run_with(&scene, effort, &mut list);
+            let run = run_scene_with(&scene, effort, &mut list);
             let wall_s = (0..repetitions).map(|_| seconds(&scene, effort)).fold(f64::INFINITY, f64::min);
             let (missed, invented, errors) = compare(&list.0, &reference);
             let (worst, median) = (
@@ -49,9 +49,9 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     Ok(())
 }
 
-fn seconds(scene: &Scene, effort: Effort) -> f64 {
+fn seconds(scene: &Scene, effort: SolverOptions) -> f64 {
     let clock = Instant::now();
-    run_with(scene, effort, &mut ());
+    run_scene_with(scene, effort, &mut ());
     clock.elapsed().as_secs_f64()
 }
 

@@ -11,9 +11,9 @@ mod reference;
 mod setting;
 mod tables;
 
-pub use components::{Components, HIGH, LOW};
-pub use lists::Lists;
-pub use reference::{Reference, Row};
+pub use components::{ComponentPair, HIGH_COMPONENT, LOW_COMPONENT};
+pub use lists::TransitionDifference;
+pub use reference::{AccuracyRow, ReferenceRun};
 
-pub use setting::{REFERENCE_TOLERANCE, Setting, TOLERANCES, settings};
-pub use tables::{accuracy_csv, work_precision_csv};
+pub use setting::{REFERENCE_TOLERANCE, SolverSetting, TOLERANCES, list_settings};
+pub use tables::{write_accuracy_csv, write_work_precision_csv};

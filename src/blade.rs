@@ -13,7 +13,7 @@
 //! n   = ((m_a - M l1) sin theta, (m_b - M l2) sin phi)
 //! ```
 //!
-//! Everything that contact needs follows from two solutions of that 2x2 system ([`Contact`]): the motion
+//! Everything that contact needs follows from two solutions of that 2x2 system ([`FrictionResponse`]): the motion
 //! without friction and the motion per unit of friction force.
 
 pub mod flight;
@@ -26,9 +26,9 @@ pub mod shoulder;
 pub mod tangent;
 
 use crate::math;
-use friction::Friction;
+use friction::FrictionLaw;
 use serde::Serialize;
-use shoulder::{Lean, Shoulder};
+use shoulder::{Shoulder, ShoulderContact};
 
 /// Inertial and elastic constants of a blade; the paper's letters, SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -58,7 +58,7 @@ pub struct Linkage {
     /// Displacement `h_d` by which the support is pressed down, m.
     pub preload_displacement_m: f64,
     /// Friction between lip tip and glass.
-    pub friction: Friction,
+    pub friction: FrictionLaw,
     /// The shoulder that the neck may lean on.
     pub shoulder: Option<Shoulder>,
 }
@@ -98,7 +98,7 @@ pub struct HeadMotion {
 
 /// Sines and cosines of both angles.
 #[derive(Debug, Clone, Copy)]
-pub struct Directions {
+pub struct LinkDirections {
     /// `sin theta`.
     pub sin_theta: f64,
     /// `cos theta`.
@@ -109,11 +109,11 @@ pub struct Directions {
     pub cos_phi: f64,
 }
 
-impl Directions {
+impl LinkDirections {
     /// Directions of both links.
     #[inline]
     #[must_use]
-    pub fn of(pose: &Pose) -> Self {
+    pub fn from_pose(pose: &Pose) -> Self {
         let (sin_theta, cos_theta) = math::sin_cos(pose.theta);
         let (sin_phi, cos_phi) = math::sin_cos(pose.phi);
         Self { sin_theta, cos_theta, sin_phi, cos_phi }
@@ -123,7 +123,7 @@ impl Directions {
 /// The blade's answer to a friction force `f` at one instant: `qdd = free + f per_force`, `v3dd = a_free +
 /// kappa f`, `N = n_free + nu f`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Contact {
+pub struct FrictionResponse {
     /// Angular accelerations without friction, rad/s2.
     pub free: [f64; 2],
     /// Angular accelerations per newton of friction, `A^-1 w`.
@@ -142,8 +142,14 @@ impl Linkage {
     /// Solves equations (1) to (3) for a friction force that is left open.
     #[inline]
     #[must_use]
-    pub fn contact(&self, pose: &Pose, d: &Directions, head: &HeadMotion, lean: Lean) -> Contact {
-        let Directions { sin_theta: st, cos_theta: ct, sin_phi: sp, cos_phi: cp } = *d;
+    pub fn friction_response(
+        &self,
+        pose: &Pose,
+        d: &LinkDirections,
+        head: &HeadMotion,
+        lean: ShoulderContact,
+    ) -> FrictionResponse {
+        let LinkDirections { sin_theta: st, cos_theta: ct, sin_phi: sp, cos_phi: cp } = *d;
         let (mass, l1, l2) = (self.mass_kg, self.l1_m, self.l2_m);
         let (dt, dp) = (pose.theta_rate, pose.phi_rate);
         let (dt2, dp2) = (dt * dt, dp * dp);
@@ -183,7 +189,7 @@ impl Linkage {
         let per_force =
             [inverse_determinant * (a22 * w1 - a12 * w2), inverse_determinant * (a11 * w2 - a12 * w1)];
         let (n1, n2) = (arm1 * st, arm2 * sp);
-        Contact {
+        FrictionResponse {
             free,
             per_force,
             a_free: acceleration - l1 * st * dt2 - l2 * sp * dp2 + w1 * free[0] + w2 * free[1],
@@ -194,23 +200,23 @@ impl Linkage {
     }
 
     #[inline]
-    fn shoulder_moment(&self, pose: &Pose, lean: Lean) -> f64 {
+    fn shoulder_moment(&self, pose: &Pose, lean: ShoulderContact) -> f64 {
         match (lean, &self.shoulder) {
-            (Lean::Off, _) | (_, None) => 0.0,
-            (side, Some(shoulder)) => shoulder.moment(pose.theta, pose.theta_rate, side.sign()),
+            (ShoulderContact::Off, _) | (_, None) => 0.0,
+            (side, Some(shoulder)) => shoulder.moment(pose.theta, pose.theta_rate, side.angle_sign()),
         }
     }
 
     /// Stiffness and damping that act on the neck while it leans on this side, and the moment they leave at
     /// zero angle and rate.
-    fn neck_and_shoulder(&self, lean: Lean) -> [f64; 3] {
+    fn neck_spring(&self, lean: ShoulderContact) -> [f64; 3] {
         let Spring { stiffness, damping } = self.neck;
         match (lean, &self.shoulder) {
-            (Lean::Off, _) | (_, None) => [stiffness, damping, 0.0],
+            (ShoulderContact::Off, _) | (_, None) => [stiffness, damping, 0.0],
             (side, Some(s)) => [
                 stiffness + s.stiffness_n_m_per_rad,
                 damping + s.damping_n_m_s_per_rad,
-                -s.stiffness_n_m_per_rad * side.sign() * s.contact_angle_rad,
+                -s.stiffness_n_m_per_rad * side.angle_sign() * s.contact_angle_rad,
             ],
         }
     }
@@ -218,14 +224,14 @@ impl Linkage {
     /// Position of the tip along the sweep, `v3`, m.
     #[inline]
     #[must_use]
-    pub fn tip_position_m(&self, d: &Directions, head: &HeadMotion) -> f64 {
+    pub fn tip_position_m(&self, d: &LinkDirections, head: &HeadMotion) -> f64 {
         head.position_m + self.l1_m * d.sin_theta + self.l2_m * d.sin_phi
     }
 
     /// Velocity of the tip along the sweep, `dv3/dt`, m/s.
     #[inline]
     #[must_use]
-    pub fn tip_velocity_m_per_s(&self, pose: &Pose, d: &Directions, head: &HeadMotion) -> f64 {
+    pub fn tip_velocity_m_per_s(&self, pose: &Pose, d: &LinkDirections, head: &HeadMotion) -> f64 {
         head.velocity_m_per_s
             + self.l1_m * d.cos_theta * pose.theta_rate
             + self.l2_m * d.cos_phi * pose.phi_rate
@@ -234,21 +240,21 @@ impl Linkage {
     /// Drop of the head towards the glass while the tip touches it, `u`, m.
     #[inline]
     #[must_use]
-    pub fn head_drop_m(&self, d: &Directions) -> f64 {
+    pub fn head_drop_m(&self, d: &LinkDirections) -> f64 {
         self.l1_m * (1.0 - d.cos_theta) + self.l2_m * (1.0 - d.cos_phi)
     }
 
     /// Rate of the head's drop, m/s.
     #[inline]
     #[must_use]
-    pub(crate) fn head_drop_rate_m_per_s(&self, pose: &Pose, d: &Directions) -> f64 {
+    pub(crate) fn head_drop_rate_m_per_s(&self, pose: &Pose, d: &LinkDirections) -> f64 {
         self.l1_m * d.sin_theta * pose.theta_rate + self.l2_m * d.sin_phi * pose.phi_rate
     }
 
     /// Kinetic energy plus the energy of every spring (the preload included) with the tip on the glass, J.
     /// Gravity is not in the model.
     #[must_use]
-    pub fn energy_j(&self, pose: &Pose, d: &Directions, head: &HeadMotion) -> f64 {
+    pub fn energy_j(&self, pose: &Pose, d: &LinkDirections, head: &HeadMotion) -> f64 {
         self.energy_with_drop_j(pose, d, head, (self.head_drop_m(d), self.head_drop_rate_m_per_s(pose, d)))
     }
 
@@ -257,7 +263,7 @@ impl Linkage {
     pub fn energy_with_drop_j(
         &self,
         pose: &Pose,
-        d: &Directions,
+        d: &LinkDirections,
         head: &HeadMotion,
         (drop, drop_rate): (f64, f64),
     ) -> f64 {
@@ -283,9 +289,9 @@ impl Linkage {
     pub fn power_w(
         &self,
         pose: &Pose,
-        d: &Directions,
+        d: &LinkDirections,
         head: &HeadMotion,
-        lean: Lean,
+        lean: ShoulderContact,
         force: f64,
         accelerations: [f64; 2],
     ) -> f64 {
@@ -299,9 +305,9 @@ impl Linkage {
     pub fn power_with_drop_w(
         &self,
         pose: &Pose,
-        d: &Directions,
+        d: &LinkDirections,
         head: &HeadMotion,
-        lean: Lean,
+        lean: ShoulderContact,
         force: f64,
         accelerations: [f64; 2],
         drop_rate: f64,
@@ -314,7 +320,7 @@ impl Linkage {
         let dampers = self.head.damping * math::powi(drop_rate, 2)
             + self.neck.damping * dt * dt
             + self.lip.damping * math::powi(dp - dt, 2);
-        let shoulder = if lean == Lean::Off {
+        let shoulder = if lean == ShoulderContact::Off {
             0.0
         } else {
             self.shoulder.map_or(0.0, |s| s.damping_n_m_s_per_rad * dt * dt)

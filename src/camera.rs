@@ -19,13 +19,13 @@ pub struct Camera {
 /// Frequency, in units of 1/exposure, at which the mean over the exposure passes half the power: the root of
 /// `sinc^2 = 1/2`.
 const HALF_POWER_CYCLES: f64 = 0.442_946_47;
-/// Most frequencies listed by [`folds_onto`]: a mistyped rate fills no memory.
-pub(crate) const MOST_FOLDS: usize = 1000;
+/// Most frequencies listed by [`aliased_frequencies_hz`]: a mistyped rate fills no memory.
+pub(crate) const MOST_ALIASES: usize = 1000;
 
 /// Part of an amplitude at `frequency_hz` that an exposure of `exposure_s` passes: `|sin(pi f T)/(pi f T)|`,
 /// the mean of the motion over the open shutter.
 #[must_use]
-pub fn exposure_passes(frequency_hz: f64, exposure_s: f64) -> f64 {
+pub fn exposure_gain(frequency_hz: f64, exposure_s: f64) -> f64 {
     let half_turns = PI * frequency_hz * exposure_s;
     if half_turns == 0.0 { 1.0 } else { (math::sin(half_turns) / half_turns).abs() }
 }
@@ -51,17 +51,17 @@ pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
 /// `k rate - f` and `k rate + f`, ascending, each once, at most 1000. None for a frequency that
 /// does not lie between 0 and half the rate, where nothing appears.
 #[must_use]
-pub fn folds_onto(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
+pub fn aliased_frequencies_hz(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
     let half_hz = frame_rate_hz / 2.0;
     if !(half_hz.is_finite() && half_hz > 0.0 && (0.0..=half_hz).contains(&frequency_hz)) {
         return vec![];
     }
-    let pairs = (1..=MOST_FOLDS)
+    let pairs = (1..=MOST_ALIASES)
         .flat_map(|k| [k as f64 * frame_rate_hz - frequency_hz, k as f64 * frame_rate_hz + frequency_hz]);
     let mut folds: Vec<f64> =
         pairs.take_while(|fold| *fold <= up_to_hz).filter(|fold| *fold > half_hz).collect();
     folds.dedup(); // at 0 and at half the rate two of them coincide
-    folds.truncate(MOST_FOLDS);
+    folds.truncate(MOST_ALIASES);
     folds
 }
 
@@ -71,17 +71,17 @@ mod tests {
 
     #[test]
     fn the_half_power_frequency_passes_half_the_power() {
-        assert!((exposure_passes(half_power_hz(1e-3), 1e-3).powi(2) - 0.5).abs() < 1e-7);
+        assert!((exposure_gain(half_power_hz(1e-3), 1e-3).powi(2) - 0.5).abs() < 1e-7);
         assert!((half_power_hz(half_power_hz(1e-3)) - 1e-3).abs() < 1e-18);
     }
 
     #[test]
     fn an_exposure_passes_the_sinc() {
-        assert_eq!(exposure_passes(900.0, 0.0), 1.0);
-        assert_eq!(exposure_passes(0.0, 1e-3), 1.0);
-        assert!((exposure_passes(500.0, 1e-3) - 2.0 / PI).abs() < 1e-15);
-        assert!((exposure_passes(900.0, 1e-3) - 0.109_292_4).abs() < 1e-7);
-        assert!(exposure_passes(1000.0, 1e-3) < 1e-15, "a whole cycle averages out");
+        assert_eq!(exposure_gain(900.0, 0.0), 1.0);
+        assert_eq!(exposure_gain(0.0, 1e-3), 1.0);
+        assert!((exposure_gain(500.0, 1e-3) - 2.0 / PI).abs() < 1e-15);
+        assert!((exposure_gain(900.0, 1e-3) - 0.109_292_4).abs() < 1e-7);
+        assert!(exposure_gain(1000.0, 1e-3) < 1e-15, "a whole cycle averages out");
     }
 
     #[test]
@@ -96,11 +96,11 @@ mod tests {
 
     #[test]
     fn everything_that_folds_onto_a_frequency_is_listed() {
-        assert_eq!(folds_onto(100.0, 1000.0, 2100.0), [900.0, 1100.0, 1900.0, 2100.0]);
-        assert_eq!(folds_onto(100.0, 1000.0, 2099.0), [900.0, 1100.0, 1900.0]);
-        assert!(folds_onto(100.0, 1000.0, 899.0).is_empty());
+        assert_eq!(aliased_frequencies_hz(100.0, 1000.0, 2100.0), [900.0, 1100.0, 1900.0, 2100.0]);
+        assert_eq!(aliased_frequencies_hz(100.0, 1000.0, 2099.0), [900.0, 1100.0, 1900.0]);
+        assert!(aliased_frequencies_hz(100.0, 1000.0, 899.0).is_empty());
         assert!(
-            folds_onto(78.4, 5000.0, 20_000.0)
+            aliased_frequencies_hz(78.4, 5000.0, 20_000.0)
                 .iter()
                 .all(|fold| (alias_hz(*fold, 5000.0) - 78.4).abs() < 1e-9)
         );
@@ -108,8 +108,8 @@ mod tests {
 
     #[test]
     fn folds_that_coincide_are_listed_once() {
-        assert_eq!(folds_onto(0.0, 1000.0, 3000.0), [1000.0, 2000.0, 3000.0]);
-        assert_eq!(folds_onto(500.0, 1000.0, 3000.0), [1500.0, 2500.0]);
+        assert_eq!(aliased_frequencies_hz(0.0, 1000.0, 3000.0), [1000.0, 2000.0, 3000.0]);
+        assert_eq!(aliased_frequencies_hz(500.0, 1000.0, 3000.0), [1500.0, 2500.0]);
     }
 
     #[test]
@@ -122,8 +122,11 @@ mod tests {
             (1.0, f64::INFINITY),
             (1.0, f64::NAN),
         ] {
-            assert!(folds_onto(frequency_hz, rate_hz, 1e4).is_empty(), "{frequency_hz} at {rate_hz}");
+            assert!(
+                aliased_frequencies_hz(frequency_hz, rate_hz, 1e4).is_empty(),
+                "{frequency_hz} at {rate_hz}"
+            );
         }
-        assert_eq!(folds_onto(1e-3, 1e-2, f64::INFINITY).len(), MOST_FOLDS);
+        assert_eq!(aliased_frequencies_hz(1e-3, 1e-2, f64::INFINITY).len(), MOST_ALIASES);
     }
 }

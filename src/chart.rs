@@ -35,15 +35,18 @@ mod svg;
 mod text;
 mod theme;
 
-pub use axis::{Axis, Scale};
-pub use colours::Colours;
-pub use elements::{Band, Bar, Caption, Detail, Hatch, Panel, Pattern, Raster, Ribbon, Rule, Series, Text};
+pub use axis::{AxisScale, ChartAxis};
+pub use colours::ColourMap;
+pub use elements::{
+    ErrorBar, Hatch, HatchPattern, Panel, Raster, Ribbon, SampledSeries, Series, ShadedSpan, TextAnnotation,
+    TopLabel, VerticalLine,
+};
 pub use figure::{Figure, Medium};
-pub use heat::{Heat, edges as cell_edges};
-pub use overlay::Plot;
-pub use sizes::MOST_HEIGHT_MM;
+pub use heat::{HeatMap, cell_edges};
+pub use overlay::PanelPlacement;
+pub use sizes::MAX_HEIGHT_MM;
 pub(crate) use sizes::{COLUMN_WIDTH_MM, FULL_WIDTH_MM};
-pub use style::{Colour, Mark, Shape};
+pub use style::{Colour, Mark, MarkerShape};
 
 #[cfg(test)]
 mod tests;

@@ -13,9 +13,9 @@ mod plan;
 mod scene;
 mod stroke;
 
-pub use fitted::{Fitted, fitted_scene};
-pub use found::{Found, FoundComponent, NotUsable};
-pub use job::job;
-pub use plan::{PLAN, Role};
-pub use scene::{YOURS, scene, scene_alone};
+pub use fitted::{FittedScene, write_fitted_scene};
+pub use found::{DraftComponent, DraftError, DraftFindings};
+pub use job::write_job;
+pub use plan::{PARAMETER_PLAN, ParameterRole};
+pub use scene::{YOURS_MARK, write_scene, write_scene_alone};
 pub use stroke::{KnownStroke, Stroke};

@@ -3,7 +3,7 @@
 //! them.
 //!
 //! A window's instants are found in each recording by itself, so model and measurement need not share a
-//! clock. What only a simulated run knows ([`Contact`]) is read with its [`RunRecord`].
+//! clock. What only a simulated run knows ([`ContactReading`]) is read with its [`RunRecord`].
 
 mod band;
 mod conditions;
@@ -24,25 +24,25 @@ mod spectral;
 mod unit;
 mod value;
 
-pub use band::Band;
-pub use conditions::{Feature, read_all, read_all_assigned};
-pub use contact::Contact;
+pub use band::FeatureBand;
+pub use conditions::{Feature, read_assigned_features, read_features};
+pub use contact::ContactReading;
 
-pub use interval::Interval;
+pub use interval::ReversalInterval;
 pub use keys::WIDTH_RELATIVE;
-pub(crate) use keys::{Entry, Keys, define_entry, with_reading_keys};
-pub use length::Length;
-pub use missing::Missing;
+pub(crate) use keys::{Keys, ReadingEntry, define_entry, with_reading_keys};
+pub use length::LengthCalibration;
+pub use missing::MissingValue;
 
-pub use reader::Reader;
-pub(crate) use reading::Kind;
+pub use reader::FeatureReader;
 pub use reading::Reading;
+pub(crate) use reading::ReadingKind;
 
-pub use reason::Reason;
+pub use reason::MissingReason;
 pub use run_record::RunRecord;
-pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH, End};
-pub use unit::{Measure, Unit};
-pub use value::{RunnerUp, Value};
+pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH, CycleRangeEnd};
+pub use unit::{FeatureUnit, ValueComparison};
+pub use value::{FeatureValue, RunnerUpComponent};
 
 /// Least relative standard deviation of a measured frequency. Reading a peak of 0.15 s leaves 0.03 Hz at 78
 /// Hz (4e-4) without any noise, and the model is read through another window of the same length.

@@ -75,7 +75,7 @@ impl Drawing {
     #[must_use]
     pub fn on_screen(&self) -> String {
         match self {
-            Self::Chart(figure) => figure.svg(chart::Medium::Screen),
+            Self::Chart(figure) => figure.to_svg(chart::Medium::Screen),
             Self::Moving(svg) => svg.clone(),
         }
     }

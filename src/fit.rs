@@ -51,8 +51,8 @@ pub mod traced;
 pub mod uncertainty;
 mod whole_run;
 
-pub use context::Context;
+pub use context::FitContext;
 pub use error::FitError;
-pub use problem::{Measured, Problem, ProblemError};
-pub use run::{fit, warnings};
-pub use targets::targets;
+pub use problem::{MeasuredRecording, Problem, ProblemError};
+pub use run::{fit_features, job_warnings};
+pub use targets::measure_targets;

@@ -14,49 +14,51 @@ mod outcome;
 mod reader;
 mod source;
 
-pub use error::{CellProblem, ImportError, Place};
+pub use error::{CellProblem, ImportError, TextLocation};
 pub use formats::format_names;
 
-pub use level::NotLevelled;
-pub use options::{ColumnName, Columns, Options, Scale, TimeColumn};
+pub use level::LevelError;
+pub use options::{ColumnMap, ColumnName, CoordinateScale, ImportOptions, TimeColumn};
 pub use outcome::{Import, ImportReport};
 pub use reader::companion::companion_names;
-pub use source::{Companion, Source, kept_files};
+pub use source::{CompanionFile, ImportSource, preserved_files};
 
 use crate::recording::files::{OneOrMany, SourceEntry};
-use assemble::assemble;
-use formats::{choose_format, doubted_columns};
+use assemble::assemble_recording;
+use formats::{choose_format, find_doubtful_columns};
 use reader::Document;
-use reader::encoding::{self, Decoded};
-use source::{check_names, hashes};
+use reader::encoding::{self, DecodedText};
+use source::{check_file_names, hash_sources};
 
 /// Imports one recording from one or more files that share its frame grid.
 ///
 /// # Errors
 /// [`ImportError`] with the place, what was found, what was expected and what to do.
-pub fn import(sources: &[Source], options: &Options) -> Result<Import, ImportError> {
-    options::check(options)?;
-    check_names(sources)?;
+pub fn import(sources: &[ImportSource], options: &ImportOptions) -> Result<Import, ImportError> {
+    options::check_options(options)?;
+    check_file_names(sources)?;
     // (hashing takes as long as a third of the reading)
-    let (hashes, imported) = rayon::join(|| hashes(sources), || read(sources, options));
+    let (hashes, imported) = rayon::join(|| hash_sources(sources), || read_exports(sources, options));
     let mut imported = imported?;
     imported.file.source =
         imported.file.source.map(|source| SourceEntry { sha256: OneOrMany::from(hashes), ..source });
     Ok(imported)
 }
 
-fn read(sources: &[Source], options: &Options) -> Result<Import, ImportError> {
+fn read_exports(sources: &[ImportSource], options: &ImportOptions) -> Result<Import, ImportError> {
     let decoded = sources
         .iter()
-        .map(|s| encoding::decode(&s.name, &s.bytes, options.encoding.as_deref()))
-        .collect::<Result<Vec<Decoded>, _>>()?;
+        .map(|s| encoding::decode_text(&s.name, &s.bytes, options.encoding.as_deref()))
+        .collect::<Result<Vec<DecodedText>, _>>()?;
     let documents: Vec<Document> =
         sources.iter().zip(&decoded).map(|(source, decoded)| Document::new(source, decoded)).collect();
     let (format, reason) = choose_format(&documents, options)?;
     let exports =
         documents.iter().map(|document| format.read(document, options)).collect::<Result<Vec<_>, _>>()?;
     let mut report = ImportReport { format: format.name().to_owned(), reason, ..ImportReport::default() };
-    report.notes.extend(documents.iter().zip(&decoded).map(|(document, decoded)| document.note(decoded)));
-    report.findings.extend(doubted_columns(format, &documents, options));
-    assemble(sources, &decoded, exports, options, report)
+    report
+        .notes
+        .extend(documents.iter().zip(&decoded).map(|(document, decoded)| document.encoding_note(decoded)));
+    report.findings.extend(find_doubtful_columns(format, &documents, options));
+    assemble_recording(sources, &decoded, exports, options, report)
 }

@@ -17,12 +17,12 @@ mod slack;
 mod tableau;
 pub mod taylor;
 
-pub use runge_kutta::{Locator, integrate, integrate_by};
+pub use runge_kutta::{EventLocator, integrate, integrate_with_locator};
 
 use std::ops::ControlFlow;
 
 /// A smooth phase of a hybrid system with `N` states and `G` guards.
-pub trait Phase<const N: usize, const G: usize> {
+pub trait HybridPhase<const N: usize, const G: usize> {
     /// Right-hand side `dy/dt`.
     fn derivative(&self, t: f64, y: &[f64; N]) -> [f64; N];
     /// The guards, positive while the phase lasts; infinity for one that does not apply.
@@ -33,7 +33,7 @@ pub trait Phase<const N: usize, const G: usize> {
 
 /// Where and how a phase starts.
 #[derive(Debug, Clone, Copy)]
-pub struct Start<const N: usize, const G: usize> {
+pub struct PhaseStart<const N: usize, const G: usize> {
     /// Time, s.
     pub t: f64,
     /// State.
@@ -47,13 +47,13 @@ pub struct Start<const N: usize, const G: usize> {
 
 /// Why a phase ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Cause {
+pub enum PhaseEndCause {
     /// This guard fell to zero.
     Guard(usize),
     /// The stop time was reached.
     Stop,
     /// Whoever observes the steps has asked for the end.
-    Asked,
+    Interrupted,
     /// No step is short enough for the tolerance, the state left the finite numbers, or the work that was
     /// allowed is spent.
     StepTooSmall,
@@ -61,13 +61,13 @@ pub enum Cause {
 
 /// Where a phase ended.
 #[derive(Debug, Clone, Copy)]
-pub struct End<const N: usize> {
+pub struct PhaseEnd<const N: usize> {
     /// Time, s.
     pub t: f64,
     /// State.
     pub y: [f64; N],
     /// Why it ended.
-    pub cause: Cause,
+    pub cause: PhaseEndCause,
     /// The longest first step that error control would have accepted: a good one for the next phase of this
     /// kind, s.
     pub first_step: f64,
@@ -75,7 +75,7 @@ pub struct End<const N: usize> {
 
 /// Work counters, cumulative over phases.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub struct Work {
+pub struct WorkCounters {
     /// Evaluations of a right-hand side, guards on the dense output not included.
     pub rhs_evaluations: u64,
     /// Evaluations of the guards.
@@ -88,7 +88,7 @@ pub struct Work {
     pub most_rhs_evaluations: Option<u64>,
 }
 
-impl Work {
+impl WorkCounters {
     /// Whether the bound is passed.
     #[inline]
     #[must_use]
@@ -98,7 +98,7 @@ impl Work {
 }
 
 /// An accepted step: the solution on `[start, end]`.
-pub struct Step<'a, const N: usize> {
+pub struct AcceptedStep<'a, const N: usize> {
     /// Start of the step, s.
     pub start: f64,
     /// End of the step or the event that cut it, s.
@@ -106,29 +106,29 @@ pub struct Step<'a, const N: usize> {
     /// State at `end`.
     pub y_end: &'a [f64; N],
     /// The solution inside.
-    pub solution: &'a dyn Solution<N>,
+    pub solution: &'a dyn DenseOutput<N>,
 }
 
 /// What an observer of steps answers: nothing, or whether the integration goes on.
-pub trait Answer {
-    /// `Break` ends the phase with [`Cause::Asked`].
-    fn flow(self) -> ControlFlow<()>;
+pub trait ObserverReply {
+    /// `Break` ends the phase with [`PhaseEndCause::Interrupted`].
+    fn control_flow(self) -> ControlFlow<()>;
 }
 
-impl Answer for () {
-    fn flow(self) -> ControlFlow<()> {
+impl ObserverReply for () {
+    fn control_flow(self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 }
 
-impl Answer for ControlFlow<()> {
-    fn flow(self) -> Self {
+impl ObserverReply for ControlFlow<()> {
+    fn control_flow(self) -> Self {
         self
     }
 }
 
 /// The solution between the ends of a step.
-pub trait Solution<const N: usize> {
+pub trait DenseOutput<const N: usize> {
     /// State at time `t`, s, within the step.
-    fn at(&self, t: f64) -> [f64; N];
+    fn state_at(&self, t: f64) -> [f64; N];
 }

@@ -5,10 +5,10 @@
 
 mod ranges;
 
-pub use ranges::{SCENE, SECTION};
+pub use ranges::{SCENE_RANGES, SECTION_RANGES};
 
 use crate::blade::parameters;
-use crate::text::{rounded, typed};
+use crate::text::{format_plain, round_to_digits};
 use serde::Serialize;
 
 /// Digits of a number in a finding.
@@ -16,7 +16,7 @@ const DIGITS: usize = 6;
 
 /// A value that is hard to believe.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Finding {
+pub struct PlausibilityFinding {
     /// Table and key.
     pub key: String,
     /// The value and its unit.
@@ -27,7 +27,7 @@ pub struct Finding {
     pub advice: String,
 }
 
-impl std::fmt::Display for Finding {
+impl std::fmt::Display for PlausibilityFinding {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let Self { key, found, expected, advice } = self;
         write!(f, "key `{key}`: found {found}, expected {expected}; {advice}")
@@ -36,7 +36,7 @@ impl std::fmt::Display for Finding {
 
 /// A usual slip: the factor by which it is undone, and its name.
 #[derive(Debug, Clone, Copy)]
-pub struct Slip {
+pub struct UnitSlip {
     /// What the value has to be multiplied by.
     pub factor: f64,
     /// What was written as what.
@@ -44,11 +44,11 @@ pub struct Slip {
 }
 
 /// Values by key; `None` for what is not there.
-pub type Lookup<'a> = dyn Fn(&str) -> Option<f64> + 'a;
+pub type ValueLookup<'a> = dyn Fn(&str) -> Option<f64> + 'a;
 
 /// What is held against a range.
 #[derive(Debug, Clone, Copy)]
-pub enum Judged {
+pub enum PlausibilitySubject {
     /// The value of the key.
     Value,
     /// A number that is computed from it and from others; not judged where one of those has a finding.
@@ -58,17 +58,17 @@ pub enum Judged {
         /// The keys that it depends on, its own first.
         keys: &'static [&'static str],
         /// How it is computed.
-        of: fn(&Lookup<'_>) -> Option<f64>,
+        of: fn(&ValueLookup<'_>) -> Option<f64>,
     },
 }
 
 /// A row of the table.
 #[derive(Debug, Clone, Copy)]
-pub struct Plausible {
+pub struct PlausibleRange {
     /// Table and key.
     pub key: &'static str,
     /// What is judged.
-    pub judged: Judged,
+    pub judged: PlausibilitySubject,
     /// Unit of what is judged.
     pub unit: &'static str,
     /// Least and greatest value without a finding.
@@ -76,7 +76,7 @@ pub struct Plausible {
     /// Why these limits.
     pub reason: &'static str,
     /// Slips to look for, the likeliest first.
-    pub slips: &'static [Slip],
+    pub slips: &'static [UnitSlip],
 }
 
 /// What is hard to believe among the values of a file, in the order of the table.
@@ -84,63 +84,68 @@ pub struct Plausible {
 /// `written` gives the key under which a file has the quantity of another key; a quantity that is written
 /// another way is judged like a derived one.
 #[must_use]
-pub fn findings(
-    table: &[Plausible],
-    value: &Lookup<'_>,
+pub fn find_implausible(
+    table: &[PlausibleRange],
+    value: &ValueLookup<'_>,
     written: &dyn Fn(&'static str) -> &'static str,
-) -> Vec<Finding> {
-    let mut found: Vec<Finding> = Vec::new();
+) -> Vec<PlausibilityFinding> {
+    let mut found: Vec<PlausibilityFinding> = Vec::new();
     for row in table {
         let doubted = |key: &&str| found.iter().any(|finding| finding.key == *key);
         let (judged, rests_on_doubt) = match row.judged {
-            Judged::Derived { keys, of, .. } => (of(value), keys.iter().any(doubted)),
+            PlausibilitySubject::Derived { keys, of, .. } => (of(value), keys.iter().any(doubted)),
             // a frequency from a stiffness rests on masses and lengths, and the other way round
-            Judged::Value => (value(row.key), written(row.key) != row.key && !found.is_empty()),
+            PlausibilitySubject::Value => (value(row.key), written(row.key) != row.key && !found.is_empty()),
         };
         let judged = judged.filter(|judged| !rests_on_doubt && !row.admits(*judged));
-        found.extend(judged.map(|judged| row.finding(judged, value, written(row.key))));
+        found.extend(judged.map(|judged| row.describe_finding(judged, value, written(row.key))));
     }
     found
 }
 
-impl Plausible {
+impl PlausibleRange {
     fn admits(&self, judged: f64) -> bool {
         let [least, greatest] = self.range;
         (least..=greatest).contains(&judged)
     }
 
-    fn finding(&self, judged: f64, value: &Lookup<'_>, key: &'static str) -> Finding {
-        let [least, greatest] = self.range.map(shown);
+    fn describe_finding(
+        &self,
+        judged: f64,
+        value: &ValueLookup<'_>,
+        key: &'static str,
+    ) -> PlausibilityFinding {
+        let [least, greatest] = self.range.map(format_value);
         let unit = if self.unit == "1" { String::new() } else { format!(" {}", self.unit) };
         let name = match self.judged {
-            Judged::Derived { name, .. } => format!(" for {name}"),
-            Judged::Value if key != self.key => {
-                format!(" for {}", parameters::find(self.key).map_or(self.key, |p| p.meaning))
+            PlausibilitySubject::Derived { name, .. } => format!(" for {name}"),
+            PlausibilitySubject::Value if key != self.key => {
+                format!(" for {}", parameters::find_parameter(self.key).map_or(self.key, |p| p.meaning))
             }
-            Judged::Value => String::new(),
+            PlausibilitySubject::Value => String::new(),
         };
-        Finding {
+        PlausibilityFinding {
             key: key.to_owned(),
-            found: format!("{}{unit}{name}", shown(judged)),
+            found: format!("{}{unit}{name}", format_value(judged)),
             expected: format!("{least} to {greatest}{unit} ({})", self.reason),
             // a slip is one of the row's own unit
-            advice: self.advice(judged, value(key).filter(|_| key == self.key)),
+            advice: self.advise_correction(judged, value(key).filter(|_| key == self.key)),
         }
     }
 
     /// The likeliest slip that leads back into the range, or else what to check. All that is judged by slips
     /// is proportional to the value of its own key.
-    fn advice(&self, judged: f64, written: Option<f64>) -> String {
+    fn advise_correction(&self, judged: f64, written: Option<f64>) -> String {
         let slip = self.slips.iter().find(|slip| self.admits(judged * slip.factor));
         match slip.zip(written) {
             Some((slip, written)) => {
-                format!("probably {}: then write {}", slip.words, shown(written * slip.factor))
+                format!("probably {}: then write {}", slip.words, format_value(written * slip.factor))
             }
             None => "check the value and its unit".to_owned(),
         }
     }
 }
 
-fn shown(value: f64) -> String {
-    typed(rounded(value, DIGITS))
+fn format_value(value: f64) -> String {
+    format_plain(round_to_digits(value, DIGITS))
 }

@@ -3,13 +3,13 @@
 
 pub use crate::fit::job::Job;
 pub use crate::fit::result::FitResult;
-pub use crate::fit::{Context, FitError, Measured, Problem, ProblemError};
-pub use crate::import::{ImportError, Options, Scale, Source, import};
+pub use crate::fit::{FitContext, FitError, MeasuredRecording, Problem, ProblemError};
+pub use crate::import::{CoordinateScale, ImportError, ImportOptions, ImportSource, import};
 pub use crate::recording::Recording;
-pub use crate::recording::channel::{Channel, Instants, Window};
+pub use crate::recording::channel::{Channel, ReversalInstants, Window};
 pub use crate::recording::files::YAxis;
 pub use crate::report::Report;
 pub use crate::simulate::outputs::Transitions;
 pub use crate::simulate::scene::Scene;
-pub use crate::simulate::{Cause, Run, Status, Transition, run};
-pub use crate::spectrum::{Analysis, Component, Record, Settings};
+pub use crate::simulate::{RunResult, RunStatus, Transition, TransitionCause, run_scene};
+pub use crate::spectrum::{Component, SampledRecord, SpectralAnalysis, SpectrumSettings};

@@ -50,8 +50,8 @@ use std::path::PathBuf;
 
 /// The same as [`run`] in a process that runs something else, such as Python: `path` starts the program.
 #[must_use]
-pub fn run_as(path: PathBuf, arguments: Vec<OsString>) -> u8 {
-    place::set(path);
+pub fn run_embedded(path: PathBuf, arguments: Vec<OsString>) -> u8 {
+    place::set_executable_path(path);
     run(arguments)
 }
 
@@ -59,20 +59,20 @@ pub fn run_as(path: PathBuf, arguments: Vec<OsString>) -> u8 {
 /// end the process to do so; a process runs it once.
 #[must_use]
 pub fn run(arguments: Vec<OsString>) -> u8 {
-    let program = match args::Program::try_parse_from(&arguments) {
+    let program = match args::CommandLine::try_parse_from(&arguments) {
         Ok(program) => program,
         Err(error) => {
             let code = if error.use_stderr() { failure::BAD_INPUT } else { 0 };
             return output::print_usage(&error, &arguments)
-                .map_or_else(|failure| failure.report(), |()| code);
+                .map_or_else(|failure| failure.print_message(), |()| code);
         }
     };
-    if let Err(failure) = interrupt::listen().and_then(|()| program.global.apply()) {
-        return failure.report();
+    if let Err(failure) = interrupt::install_handler().and_then(|()| program.global.apply_settings()) {
+        return failure.print_message();
     }
     let ran = program.command.run(&program.global);
-    match ran.and_then(|outcome| output::check().map(|()| outcome)) {
+    match ran.and_then(|outcome| output::check_stdout().map(|()| outcome)) {
         Ok(outcome) => outcome.exit_code(),
-        Err(failure) => failure.report(),
+        Err(failure) => failure.print_message(),
     }
 }

@@ -9,13 +9,13 @@ pub mod several;
 pub mod statement;
 pub mod verdict;
 
-pub use answer::{Answer, Quantity};
-pub use rows::{CombinationLine, Failed, ProbeLine, Provenance, RecordingLine, SearchLine, SourceFile};
+pub use answer::{ReportSummary, SummaryQuantity};
+pub use rows::{CombinationLine, FailureCount, ProbeLine, Provenance, RecordingLine, SearchLine, SourceFile};
 
-use crate::compare::{Comparison, ParameterLine, RunLine, Summary, Table};
+use crate::compare::{Comparison, ComparisonSummary, ComparisonTable, ParameterLine, RunSummary};
 use crate::figures::FigureBlock;
 use crate::figures::friction::FrictionLine;
-use crate::fit::misfit::Misfit;
+use crate::fit::misfit::TraceMisfit;
 use crate::fit::result::NuisanceResult;
 use serde::Serialize;
 
@@ -27,7 +27,7 @@ pub struct Report {
     /// How the search ended.
     pub search: SearchLine,
     /// How well the model explains the traces; `None` in a fit of features alone.
-    pub misfit: Option<Misfit>,
+    pub misfit: Option<TraceMisfit>,
     /// What was estimated of the cameras, and the constants that were freed.
     pub nuisances: Vec<NuisanceResult>,
     /// The recordings; none when only published numbers are known.
@@ -47,9 +47,9 @@ pub struct Report {
     /// What to measure in addition, one sentence each.
     pub advice: Vec<String>,
     /// The best model's run in each condition.
-    pub runs: Vec<RunLine>,
+    pub runs: Vec<RunSummary>,
     /// Each recording against the model.
-    pub comparison: Vec<Summary>,
+    pub comparison: Vec<ComparisonSummary>,
     /// What the gate saw before the search, place by place.
     pub gate: Vec<ProbeLine>,
     /// What the gate had to say, one sentence each.
@@ -59,7 +59,7 @@ pub struct Report {
     pub figures: Vec<FigureGroup>,
     /// Columns of the comparison, as files.
     #[serde(skip)]
-    pub tables: Vec<Table>,
+    pub tables: Vec<ComparisonTable>,
     /// Reservations that a reader must know, one sentence each.
     pub notes: Vec<String>,
     /// Where the numbers come from.
@@ -70,7 +70,7 @@ pub struct Report {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FigureGroup {
     /// What they show.
-    pub subject: Subject,
+    pub subject: FigureSubject,
     /// The figures in order.
     pub figures: Vec<FigureBlock>,
 }
@@ -78,7 +78,7 @@ pub struct FigureGroup {
 /// What a group of figures shows: where on the page it belongs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Subject {
+pub enum FigureSubject {
     /// What the answer rests on: the recording against the model, friction, residuals, parameters.
     Evidence,
     /// What was measured, against the model, in full.

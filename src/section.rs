@@ -29,6 +29,6 @@ mod input;
 mod keys;
 mod shape;
 
-pub use estimate::{Estimate, Quantity};
-pub use input::{Section, SectionError};
-pub use shape::{Hinge, LinkSection, plate_modulus_pa};
+pub use estimate::{BladeEstimate, BladeTableEntry};
+pub use input::{BladeSection, SectionError};
+pub use shape::{LinkSection, RubberHinge, plate_modulus_pa};

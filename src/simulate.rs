@@ -21,17 +21,17 @@ pub mod sensitivity;
 pub mod shutter;
 
 use crate::blade::Pose;
-use crate::blade::flight::Airborne;
+use crate::blade::flight::FlightState;
 use crate::blade::modes::time_scales_rad_per_s;
-use crate::ode::Work;
-pub use cause::Cause;
+use crate::ode::WorkCounters;
+pub use cause::TransitionCause;
 use impact::TipVelocity;
-use machine::{Machine, Plain, Rules};
-use mode::Mode;
-pub use motion::Motion;
-use paper::FixedStep;
-use phases::System;
-pub use piece::{Path, Piece, Place, Sample};
+use machine::{ContactRules, EventLoop, ObserverWatcher};
+use mode::TipMode;
+pub use motion::RunMotion;
+use paper::FixedStepScheme;
+use phases::DrivenBlade;
+pub use piece::{BladePoints, ModelSample, SegmentPath, SolutionSegment};
 use scene::{MOST_EVALUATIONS, Scene, StartKind};
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -39,7 +39,7 @@ use std::ops::ControlFlow;
 /// How a run ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Status {
+pub enum RunStatus {
     /// The stop time was reached.
     #[default]
     Completed,
@@ -59,7 +59,7 @@ pub enum Status {
     Interrupted,
 }
 
-impl Status {
+impl RunStatus {
     /// The name used in files.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -99,11 +99,11 @@ pub struct Transition {
     /// When, s.
     pub time_s: f64,
     /// Mode before.
-    pub from: Mode,
+    pub from: TipMode,
     /// Mode after.
-    pub to: Mode,
+    pub to: TipMode,
     /// Why.
-    pub cause: Cause,
+    pub cause: TransitionCause,
 }
 
 /// An impact of the tip on the glass: velocities jump in no time.
@@ -127,37 +127,37 @@ pub struct Impact {
 /// Sees the solution as it is accepted.
 pub trait Observer {
     /// A piece of the solution, in order of time.
-    fn piece(&mut self, piece: &Piece<'_>);
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>);
     /// A change of mode, between the pieces it separates.
-    fn transition(&mut self, _transition: &Transition) {}
+    fn observe_transition(&mut self, _transition: &Transition) {}
     /// An impact, before the transition that it causes.
-    fn impact(&mut self, _impact: &Impact) {}
-    /// Asked after every piece: `Break` ends the run as [`Status::Interrupted`].
-    fn flow(&self) -> ControlFlow<()> {
+    fn observe_impact(&mut self, _impact: &Impact) {}
+    /// Asked after every piece: `Break` ends the run as [`RunStatus::Interrupted`].
+    fn control_flow(&self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 }
 
 /// Observes nothing.
 impl Observer for () {
-    fn piece(&mut self, _: &Piece<'_>) {}
+    fn observe_segment(&mut self, _: &SolutionSegment<'_>) {}
 }
 
 /// How exact a run is and how much work it may cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Effort {
+pub struct SolverOptions {
     /// Tolerance, relative. Runge-Kutta may err by it in a step; Taylor series by a share of it, such that
     /// the times of transitions err by about as many seconds. Nothing to steps of fixed length.
     pub relative_tolerance: f64,
-    /// Right-hand sides after which the run gives up ([`Status::WorkLimit`]).
+    /// Right-hand sides after which the run gives up ([`RunStatus::WorkLimit`]).
     pub most_evaluations: u64,
     /// How it is integrated.
-    pub method: Method,
+    pub method: IntegrationMethod,
 }
 
 /// How a run is integrated and its transitions are located.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub enum Method {
+pub enum IntegrationMethod {
     /// Taylor series of the order that the tolerance asks for; transitions are roots of the guards' own
     /// series.
     #[default]
@@ -167,10 +167,10 @@ pub enum Method {
     /// The same with transitions located by the slack variable method.
     Slack,
     /// The paper's scheme; the tolerance does not apply.
-    FixedStep(FixedStep),
+    FixedStep(FixedStepScheme),
 }
 
-impl Method {
+impl IntegrationMethod {
     /// The name on the command line and in files.
     #[must_use]
     pub fn name(&self) -> &'static str {
@@ -192,16 +192,16 @@ impl Method {
     }
 }
 
-impl Effort {
+impl SolverOptions {
     /// A tolerance with a bound on work that no ordinary scene reaches ([`MOST_EVALUATIONS`]).
     #[must_use]
     pub fn new(relative_tolerance: f64) -> Self {
-        Self { relative_tolerance, most_evaluations: MOST_EVALUATIONS, method: Method::default() }
+        Self { relative_tolerance, most_evaluations: MOST_EVALUATIONS, method: IntegrationMethod::default() }
     }
 
     /// What a scene says of both, by the default method.
     #[must_use]
-    pub fn of(scene: &Scene) -> Self {
+    pub fn from_scene(scene: &Scene) -> Self {
         let most_evaluations = scene.run.most_evaluations.unwrap_or(MOST_EVALUATIONS);
         Self { most_evaluations, ..Self::new(scene.run.relative_tolerance) }
     }
@@ -209,20 +209,20 @@ impl Effort {
 
 /// How a run went.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Run {
+pub struct RunResult {
     /// How it ended.
-    pub status: Status,
+    pub status: RunStatus,
     /// When, s.
     pub stopped_at_s: f64,
     /// Number of changes of mode.
     pub transitions: u64,
     /// What it cost.
-    pub work: Work,
+    pub work: WorkCounters,
 }
 
 /// Runs a scene from its start to its stop time at the scene's own tolerance.
-pub fn run(scene: &Scene, observer: &mut impl Observer) -> Run {
-    run_with(scene, Effort::of(scene), observer)
+pub fn run_scene(scene: &Scene, observer: &mut impl Observer) -> RunResult {
+    run_scene_with(scene, SolverOptions::from_scene(scene), observer)
 }
 
 #[cfg(test)]
@@ -232,26 +232,27 @@ thread_local! {
 }
 
 /// Runs a scene with another effort than its own.
-pub fn run_with(scene: &Scene, effort: Effort, observer: &mut impl Observer) -> Run {
+pub fn run_scene_with(scene: &Scene, effort: SolverOptions, observer: &mut impl Observer) -> RunResult {
     #[cfg(test)]
     RUNS.set(RUNS.get() + 1);
-    let system = system(scene);
-    let mut watch = Plain(observer);
-    let mut machine = Machine::new(&system, Rules::of(scene), scene.start_s, effort, &mut watch);
+    let system = build_system(scene);
+    let mut watch = ObserverWatcher(observer);
+    let mut machine =
+        EventLoop::new(&system, ContactRules::from_scene(scene), scene.start_s, effort, &mut watch);
     match (scene.start, initial_pose(scene)) {
-        (StartKind::Airborne(state), _) => machine.run_airborne(&state, scene.run.stop_s),
-        (_, Some(pose)) => machine.run(&pose, scene.run.stop_s),
-        (_, None) => machine.ended(Status::Diverged),
+        (StartKind::Airborne(state), _) => machine.run_from_flight(&state, scene.run.stop_s),
+        (_, Some(pose)) => machine.run_from_pose(&pose, scene.run.stop_s),
+        (_, None) => machine.finish_run(RunStatus::Diverged),
     }
 }
 
 /// The system of a scene, with the magnitudes below which errors count as absolute.
 #[must_use]
-pub fn system(scene: &Scene) -> System {
+pub fn build_system(scene: &Scene) -> DrivenBlade {
     /// A tenth of a radian: angles of a wiper blade in use are 0.1 to 1 rad.
     const ANGLE_SCALE: f64 = 0.1;
     let (slowest, _) = time_scales_rad_per_s(&scene.linkage);
-    System {
+    DrivenBlade {
         linkage: scene.linkage,
         drive: scene.drive.clone(),
         angle_scale: ANGLE_SCALE,
@@ -262,9 +263,10 @@ pub fn system(scene: &Scene) -> System {
 fn initial_pose(scene: &Scene) -> Option<Pose> {
     match scene.start {
         StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
-        StartKind::State(pose) | StartKind::Airborne(Airborne { pose, .. }) => Some(pose),
-        StartKind::SteadySlide => {
-            equilibrium::steady_slide(&scene.linkage, scene.drive.at(scene.start_s).velocity_m_per_s)
-        }
+        StartKind::State(pose) | StartKind::Airborne(FlightState { pose, .. }) => Some(pose),
+        StartKind::SteadySlide => equilibrium::steady_slip_pose(
+            &scene.linkage,
+            scene.drive.motion_at(scene.start_s).velocity_m_per_s,
+        ),
     }
 }

@@ -1,10 +1,10 @@
 //! Components of short records with missing frames.
 //!
-//! [`Analysis::of`] takes a record apart: trend, steady and decaying oscillations by least squares on the
+//! [`SpectralAnalysis::of`] takes a record apart: trend, steady and decaying oscillations by least squares on the
 //! frames present, one that drifts by its ridge, each with deviations and a verdict (`docs/spectra.md` has
 //! the criteria). It is what `wiperlab spectrum` shows.
 //!
-//! [`analyse`] reads the tops of one Hann-windowed spectrum, fast and without choices that depend on the
+//! [`analyse_spectrum`] reads the tops of one Hann-windowed spectrum, fast and without choices that depend on the
 //! data, so that a fit can compare thousands of records by it. Gaps of up to four frames are bridged for the
 //! transform alone (`spectrum/gaps.rs`); where more than a tenth of the frames is missing, the components
 //! found are then refined on the frames present (`spectrum/refine.rs`). The record is detrended, weighted (a
@@ -50,7 +50,7 @@ mod window;
 mod windowed;
 
 pub use amplitudes::Spectrum;
-pub use analysis::{Analysis, LONGEST_FITTED, Oscillation, Record, Removed};
+pub use analysis::{LONGEST_DECOMPOSED, Oscillation, RemovedTrend, SampledRecord, SpectralAnalysis};
 pub use component::{Component, Estimator};
 pub use error::SpectrumError;
 
@@ -58,21 +58,23 @@ pub use limits::{FASTEST_HZ, MAX_COMPONENTS, MIN_SAMPLES};
 
 pub use multitaper::{Multitaper, MultitaperError, TAPERS};
 
-pub use settings::Settings;
+pub use settings::SpectrumSettings;
 pub use target::Target;
-pub use transformed::Transformed;
+pub use transformed::WindowedTransform;
 
 pub use trend::{Detrend, UnknownDetrend};
-pub use verdict::{Fold, Harmonic, Mains, Reason, Sideband, Subharmonic, Verdict};
+pub use verdict::{
+    AliasSource, ComponentReason, ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic,
+};
 
 /// Spectrum of a record of displacement, m, one sample a frame (`None` where there is none).
 ///
 /// # Errors
 /// [`SpectrumError`] when the record, the rate or the band cannot give one.
-pub fn analyse(
+pub fn analyse_spectrum(
     samples: &[Option<f64>],
     frame_rate_hz: f64,
-    settings: &Settings,
+    settings: &SpectrumSettings,
 ) -> Result<Spectrum, SpectrumError> {
-    Ok(Transformed::of(samples, frame_rate_hz, settings)?.spectrum(settings))
+    Ok(WindowedTransform::new(samples, frame_rate_hz, settings)?.into_spectrum(settings))
 }

@@ -2,7 +2,7 @@
 //! what is read from each run.
 //!
 //! A point whose run ends early, or does not show what is read, has a reason instead of a value
-//! ([`Reason`]); nothing is filled in. Points do not know each other, so a study gives the same numbers for
+//! ([`MissingReason`]); nothing is filled in. Points do not know each other, so a study gives the same numbers for
 //! any number of threads, and goes on from a [`journal`] of the points that are done.
 
 pub mod collect;
@@ -15,18 +15,18 @@ mod recheck;
 pub mod sample;
 pub mod study;
 
-pub use crate::feature::Reason;
-pub use collect::{CollectError, Collection};
-pub use grid::{Axis, Spacing};
-pub use point::{Ended, Outcome};
+pub use crate::feature::MissingReason;
+pub use collect::{CollectError, PointCollection};
+pub use grid::{AxisSpacing, SweepAxis};
+pub use point::{EarlyEnd, PointOutcome};
 pub use rank_correlation::RankCorrelations;
-pub use recheck::Recheck;
-pub use sample::Sample;
-pub use study::{Map, SHEET, Study, StudyError};
+pub use recheck::PointRecheck;
+pub use sample::SamplePlan;
+pub use study::{SHEET_NAME, Study, StudyError, SweepMap};
 
-use crate::journal::{Shard, Sink, line};
+use crate::journal::{CheckpointSink, Shard, format_record_line};
 use crate::simulate::scene::Scene;
-use journal::Point;
+use journal::SweepPoint;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -50,33 +50,37 @@ pub enum SweepError {
 
 /// Runs every point of a shard of a checked study that is `due`, in parallel; each goes to `sink`, in any
 /// order, and `done` is called once for each that is written. `flow` is asked before each of them. Nothing is
-/// kept in memory: what the points gave is read from their [`journal`], such as by a [`Collection`].
+/// kept in memory: what the points gave is read from their [`journal`], such as by a [`PointCollection`].
 ///
 /// # Errors
 /// [`SweepError`] when the journal cannot be written, or when `flow` breaks before the last point.
-pub fn run(
+pub fn run_sweep(
     study: &Study,
     scene: &Scene,
     shard: Shard,
     due: &(dyn Fn(usize) -> bool + Sync),
-    sink: &mut dyn Sink,
+    sink: &mut dyn CheckpointSink,
     done: &(dyn Fn() + Sync),
     flow: &(dyn Fn() -> ControlFlow<()> + Sync),
 ) -> Result<(), SweepError> {
     std::thread::scope(|scope| {
         // the disk is waited for on a thread of its own, while others compute
         let (to_disk, lines) = sync_channel::<String>(WAITING);
-        let writer = scope.spawn(move || write(&lines, sink, done));
+        let writer = scope.spawn(move || write_lines(&lines, sink, done));
         let point = |index: usize| {
             if flow().is_break() {
                 return Err(SweepError::Interrupted);
             }
-            let line = line(&Point { index, outcome: Outcome::of(study, scene, index) }, index);
+            let line = format_record_line(
+                &SweepPoint { index, outcome: PointOutcome::run_point(study, scene, index) },
+                index,
+            );
             // nobody receives it after a failure, which the writer reports
             to_disk.send(line).map_err(|_| SweepError::Interrupted)
         };
-        let places = (0..shard.count(study.points())).into_par_iter();
-        let ran = places.map(|place| shard.index(place)).filter(|index| due(*index)).try_for_each(point);
+        let places = (0..shard.count_points(study.point_count())).into_par_iter();
+        let ran =
+            places.map(|place| shard.point_index(place)).filter(|index| due(*index)).try_for_each(point);
         drop(to_disk);
         let panicked = |_| Err("the thread that writes it failed".to_owned());
         let written = writer.join().unwrap_or_else(panicked);
@@ -86,12 +90,19 @@ pub fn run(
 
 /// What every point of a small study gives, in the order of the study, without a journal.
 #[must_use]
-pub fn outcomes(study: &Study, scene: &Scene) -> Vec<Outcome> {
-    (0..study.points()).into_par_iter().map(|index| Outcome::of(study, scene, index)).collect()
+pub fn run_all_points(study: &Study, scene: &Scene) -> Vec<PointOutcome> {
+    (0..study.point_count())
+        .into_par_iter()
+        .map(|index| PointOutcome::run_point(study, scene, index))
+        .collect()
 }
 
 /// Writes lines as they come; those that came while the disk was busy go together.
-fn write(lines: &Receiver<String>, sink: &mut dyn Sink, done: &(dyn Fn() + Sync)) -> Result<(), String> {
+fn write_lines(
+    lines: &Receiver<String>,
+    sink: &mut dyn CheckpointSink,
+    done: &(dyn Fn() + Sync),
+) -> Result<(), String> {
     while let Ok(first) = lines.recv() {
         let waiting: Vec<String> = std::iter::once(first).chain(lines.try_iter()).collect();
         sink.append(&waiting.concat())?;

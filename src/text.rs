@@ -11,16 +11,19 @@ mod phrase;
 mod printable;
 mod unit;
 
-pub use deviation::with_sd;
+pub use deviation::format_with_sd;
 pub use hash::{TextHash, sha256, text_sha256};
-pub use number::{ascii, digits, number, rounded, short, typed};
-pub use phrase::{interval, listed, plural, wrapped};
-pub use printable::{escaped, printable};
-pub use unit::degrees;
+pub use number::{format_digits, format_number, format_plain, format_short, round_to_digits, to_ascii};
+pub use phrase::{format_interval, join_with_and, pluralise, wrap_words};
+pub use printable::{escape_controls, make_printable};
+pub use unit::format_degrees;
 
-pub(crate) use number::{decimals, or_dash, scientific, superscript, trimmed};
-pub(crate) use phrase::{capitalised, panic_message, shortened, times};
-pub(crate) use unit::{length, milliseconds, percent, signed_percent, speed, unit, with_unit};
+pub(crate) use number::{format_decimals, format_or_dash, format_scientific, format_trimmed, to_superscript};
+pub(crate) use phrase::{capitalise, format_times, panic_message, truncate_text};
+pub(crate) use unit::{
+    choose_prefix, format_length, format_milliseconds, format_percent, format_signed_percent, format_speed,
+    label_with_unit,
+};
 
 /// What stands for a missing value.
 pub(crate) const DASH: &str = "\u{2013}";

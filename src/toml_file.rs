@@ -5,9 +5,9 @@ mod check;
 mod hint;
 mod reference;
 
-pub use reference::{Key, KeyTable, reference};
+pub use reference::{KeyEntry, KeyTable, list_key_tables};
 
-use crate::text::escaped;
+use crate::text::escape_controls;
 use schemars::{JsonSchema, Schema, json_schema, schema_for};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -65,17 +65,17 @@ pub const FORMAT: u32 = 1;
 ///
 /// # Errors
 /// [`TomlError`] with the places of all problems that the schema of `T` shows, or else of the first one.
-pub fn parse<T: DeserializeOwned + JsonSchema>(file: &str, text: &str) -> Result<T, TomlError> {
-    let mut problems = check::problems(file, text, schema_for!(T).as_value());
+pub fn parse_toml<T: DeserializeOwned + JsonSchema>(file: &str, text: &str) -> Result<T, TomlError> {
+    let mut problems = check::find_problems(file, text, schema_for!(T).as_value());
     match problems.len() {
-        0 => toml::from_str(text).map_err(|error| refusal(file, text, &error)),
+        0 => toml::from_str(text).map_err(|error| error_from_toml(file, text, &error)),
         1 => Err(problems.remove(0)),
         _ => Err(TomlError::Several(problems)),
     }
 }
 
 /// The JSON Schema of a file that is read as `T`.
-pub(crate) fn schema<T: JsonSchema>() -> serde_json::Value {
+pub(crate) fn schema_of<T: JsonSchema>() -> serde_json::Value {
     schema_for!(T).to_value()
 }
 
@@ -96,13 +96,13 @@ pub(crate) fn table_schema(
 ///
 /// # Errors
 /// [`TomlError`] with the places of what is no TOML.
-pub fn table(file: &str, text: &str) -> Result<toml::Table, TomlError> {
-    toml::from_str(text).map_err(|error| refusal(file, text, &error))
+pub fn parse_table(file: &str, text: &str) -> Result<toml::Table, TomlError> {
+    toml::from_str(text).map_err(|error| error_from_toml(file, text, &error))
 }
 
 /// One problem a line; what is quoted of the file breaks none.
 fn lines(problems: &[TomlError]) -> String {
-    let lines: Vec<String> = problems.iter().map(|problem| escaped(&problem.to_string())).collect();
+    let lines: Vec<String> = problems.iter().map(|problem| escape_controls(&problem.to_string())).collect();
     lines.join("\n")
 }
 
@@ -120,9 +120,9 @@ pub fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
 /// Two numbers, such as the ends of a band. (An array of Rust would take the first two of three.)
 #[derive(Debug, Clone, Copy, PartialEq, Deserialize, Serialize, JsonSchema)]
 #[serde(try_from = "Vec<f64>")]
-pub struct Pair(pub [f64; 2]);
+pub struct NumberPair(pub [f64; 2]);
 
-impl TryFrom<Vec<f64>> for Pair {
+impl TryFrom<Vec<f64>> for NumberPair {
     type Error = String;
 
     fn try_from(found: Vec<f64>) -> Result<Self, String> {
@@ -135,22 +135,22 @@ impl TryFrom<Vec<f64>> for Pair {
 }
 
 /// A refusal that does not know its file yet: the key, and what was found, what was expected and what to do.
-pub(crate) type Refusal = (String, String);
+pub(crate) type KeyRefusal = (String, String);
 
-pub(crate) fn refuse<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, Refusal> {
+pub(crate) fn refuse_key<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, KeyRefusal> {
     Err((key.into(), problem.into()))
 }
 
-pub(crate) fn above_zero(key: impl Into<String>, found: f64) -> Result<f64, Refusal> {
+pub(crate) fn check_above_zero(key: impl Into<String>, found: f64) -> Result<f64, KeyRefusal> {
     if found.is_finite() && found > 0.0 {
         return Ok(found);
     }
-    refuse(key, format!("found {found}, expected a finite number above 0"))
+    refuse_key(key, format!("found {found}, expected a finite number above 0"))
 }
 
 /// The nearest of `known` to a mistyped `key`, capitals or not, as advice in words.
 #[must_use]
-pub fn nearest(key: &str, known: &[&str]) -> String {
+pub fn suggest_key(key: &str, known: &[&str]) -> String {
     /// Jaro-Winkler similarity above which a known key is worth suggesting; below it the list is shown
     /// instead.
     const SIMILAR: f64 = 0.75;
@@ -191,21 +191,25 @@ pub fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
     (line, String::from_utf8_lossy(&before[start..]).chars().count() + 1)
 }
 
-fn refusal(file: &str, text: &str, error: &toml::de::Error) -> TomlError {
+fn error_from_toml(file: &str, text: &str, error: &toml::de::Error) -> TomlError {
     let (line, column) = line_and_column(text, error.span().map_or(0, |s| s.start));
     let file = file.to_owned();
     let message = error.message();
-    match unknown_field(message) {
-        Some((key, known)) => {
-            TomlError::UnknownKey { file, line, column, key: key.to_owned(), advice: nearest(key, &known) }
-        }
+    match split_unknown_field(message) {
+        Some((key, known)) => TomlError::UnknownKey {
+            file,
+            line,
+            column,
+            key: key.to_owned(),
+            advice: suggest_key(key, &known),
+        },
         None => TomlError::Syntax { file, line, column, problem: message.trim().replace('\n', "; ") },
     }
 }
 
 /// Splits serde's fixed wording "unknown field `a`, expected one of `b`, `c`" into the key and the known
 /// ones.
-fn unknown_field(message: &str) -> Option<(&str, Vec<&str>)> {
+fn split_unknown_field(message: &str) -> Option<(&str, Vec<&str>)> {
     let quoted = message.strip_prefix("unknown field ")?;
     let mut names = quoted.split('`').skip(1).step_by(2);
     Some((names.next()?, names.collect()))
@@ -227,7 +231,7 @@ mod tests {
 
     #[test]
     fn an_unknown_key_names_its_place_and_the_nearest_known_key() {
-        let error = parse::<Sample>("a.toml", "stop_s = 1.0\nsample_rate = 2\n").unwrap_err();
+        let error = parse_toml::<Sample>("a.toml", "stop_s = 1.0\nsample_rate = 2\n").unwrap_err();
         assert_eq!(
             error.to_string(),
             "a.toml:2:1: unknown key `sample_rate`; did you mean `sample_rate_hz`?"
@@ -236,13 +240,13 @@ mod tests {
 
     #[test]
     fn two_exchanged_letters_of_a_short_key_are_one_slip() {
-        assert_eq!(nearest("tpi", &["head", "tip"]), "did you mean `tip`?");
-        assert_eq!(nearest("x", &["a", "b"]), "known keys here: a, b");
+        assert_eq!(suggest_key("tpi", &["head", "tip"]), "did you mean `tip`?");
+        assert_eq!(suggest_key("x", &["a", "b"]), "known keys here: a, b");
     }
 
     #[test]
     fn a_wrong_type_names_its_place() {
-        let error = parse::<Sample>("a.toml", "stop_s = \"soon\"\n").unwrap_err();
+        let error = parse_toml::<Sample>("a.toml", "stop_s = \"soon\"\n").unwrap_err();
         assert!(
             error.to_string() == "a.toml:1:10: key `stop_s`: found the text \"soon\", expected a number",
             "{error}"
@@ -251,7 +255,7 @@ mod tests {
 
     #[test]
     fn a_missing_key_is_named() {
-        let error = parse::<Sample>("a.toml", "sample_rate_hz = 1\n").unwrap_err();
+        let error = parse_toml::<Sample>("a.toml", "sample_rate_hz = 1\n").unwrap_err();
         assert!(
             error
                 .to_string()

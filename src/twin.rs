@@ -11,14 +11,14 @@ use crate::math::StandardNormal;
 use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
 use crate::simulate::outputs::StickIntervals;
 use crate::simulate::scene::Scene;
-use crate::simulate::shutter::Shutters;
-use crate::simulate::{Effort, Observer, Run, run_with};
+use crate::simulate::shutter::ShutterObserver;
+use crate::simulate::{Observer, RunResult, SolverOptions, run_scene_with};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
 /// What tracking adds.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Tracking {
+pub struct TrackingModel {
     /// Length that a pixel shows, m.
     pub metres_per_pixel: f64,
     /// Standard deviation of a tracked coordinate, pixels.
@@ -31,23 +31,23 @@ pub struct Tracking {
 
 /// What the camera saw of a scene, before tracking.
 #[derive(Debug, Clone)]
-pub struct View {
+pub struct TwinView {
     /// The traces, without noise.
     pub recording: Recording,
     /// How the simulation went.
-    pub run: Run,
+    pub run: RunResult,
     /// When the tip stuck, s of the scene's time.
     pub stick_s: Vec<[f64; 2]>,
 }
 
 /// Why a view cannot be made.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum ViewError {
+pub enum TwinViewError {
     /// The simulation stopped before two frames were taken.
     #[error("the simulation ended as {} at {stopped_at_s} s, before two frames were taken: {}", .status.name(), .status.meaning())]
     Early {
         /// How it ended.
-        status: crate::simulate::Status,
+        status: crate::simulate::RunStatus,
         /// When, s.
         stopped_at_s: f64,
     },
@@ -62,28 +62,28 @@ pub enum ViewError {
 /// its exposure, which is cut to the time from `start_s` to `stop_s`.
 ///
 /// # Errors
-/// [`ViewError`]; a run that stops after some frames is a view of those frames.
-pub fn view(
+/// [`TwinViewError`]; a run that stops after some frames is a view of those frames.
+pub fn film_scene(
     scene: &Scene,
     camera: &Camera,
     start_s: f64,
     stop_s: f64,
-    effort: Effort,
-) -> Result<View, ViewError> {
-    observed_view(scene, camera, [start_s, stop_s], effort, &mut ())
+    effort: SolverOptions,
+) -> Result<TwinView, TwinViewError> {
+    film_scene_with_observer(scene, camera, [start_s, stop_s], effort, &mut ())
 }
 
-/// As [`view`], from the first to the second of two instants; `observer` sees the run too.
+/// As [`film_scene`], from the first to the second of two instants; `observer` sees the run too.
 ///
 /// # Errors
-/// As [`view`].
-pub fn observed_view(
+/// As [`film_scene`].
+pub fn film_scene_with_observer(
     scene: &Scene,
     camera: &Camera,
     [start_s, stop_s]: [f64; 2],
-    effort: Effort,
+    effort: SolverOptions,
     observer: &mut impl Observer,
-) -> Result<View, ViewError> {
+) -> Result<TwinView, TwinViewError> {
     let frames = ((stop_s - start_s) * camera.frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1;
     let grid = FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames };
     let half_s = 0.5 * camera.exposure_s;
@@ -91,28 +91,32 @@ pub fn observed_view(
         .map(|i| [grid.time_s(i) - half_s, grid.time_s(i) + half_s].map(|t| t.clamp(start_s, stop_s)));
     let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
     let mut traces = Traces::default();
-    let shutters = Shutters::new(open, |place| {
+    let shutters = ShutterObserver::new(open, |place| {
         traces.tip_x_m.push(Some(place.tip_x_m));
         traces.tip_y_m.push(Some(glass_y_m + place.tip_height_m));
         traces.head_x_m.push(Some(place.head_x_m));
         traces.head_y_m.push(Some(-place.head_drop_m));
     });
     let mut observers = ((shutters, StickIntervals::default()), observer);
-    let run = run_with(scene, effort, &mut observers);
+    let run = run_scene_with(scene, effort, &mut observers);
     let stick_s = observers.0.1.0;
     let frames = traces.tip_x_m.len();
     if frames < 2 {
-        return Err(ViewError::Early { status: run.status, stopped_at_s: run.stopped_at_s });
+        return Err(TwinViewError::Early { status: run.status, stopped_at_s: run.stopped_at_s });
     }
     let recording = Recording::new(scene.title(), FrameGrid { frames, ..grid }, traces, true)?;
-    Ok(View { recording, run, stick_s })
+    Ok(TwinView { recording, run, stick_s })
 }
 
 /// What a tracking program makes of a view: white noise on every coordinate and lost points.
 ///
 /// # Errors
 /// [`RecordingError`] when noise leaves the finite numbers.
-pub fn track(view: &Recording, name: &str, tracking: &Tracking) -> Result<Recording, RecordingError> {
+pub fn add_tracking_noise(
+    view: &Recording,
+    name: &str,
+    tracking: &TrackingModel,
+) -> Result<Recording, RecordingError> {
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(tracking.seed);
     let noise_m = tracking.noise_px * tracking.metres_per_pixel;
     let mut traces = Traces::default();
@@ -137,7 +141,7 @@ pub fn track(view: &Recording, name: &str, tracking: &Tracking) -> Result<Record
 
 /// Every parameter of the scene behind a twin, by name, in SI: the truth that a fit is held against.
 #[must_use]
-pub fn truth(scene: &Scene) -> toml::Table {
+pub fn true_parameters(scene: &Scene) -> toml::Table {
     PARAMETERS
         .iter()
         .filter_map(|p| scene.value(p.name).map(|value| (p.name.to_owned(), toml::Value::Float(value))))
@@ -162,15 +166,21 @@ mod tests {
         let view =
             Recording::new("still", FrameGrid { start_s: 0.0, frame_rate_hz: 1e4, frames }, traces, true)
                 .unwrap();
-        let tracking = Tracking { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.05, seed: 3 };
-        let seen = track(&view, "noisy", &tracking).unwrap();
+        let tracking =
+            TrackingModel { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.05, seed: 3 };
+        let seen = add_tracking_noise(&view, "noisy", &tracking).unwrap();
         let present: Vec<f64> = seen.traces().tip_x_m.iter().flatten().copied().collect();
         let sd = (present.iter().map(|x| (x - 1.0).powi(2)).sum::<f64>() / present.len() as f64).sqrt();
         assert!((sd / 2e-6 - 1.0).abs() < 0.03, "{sd}"); // 6 standard errors of a standard deviation
         let lost = 1.0 - present.len() as f64 / frames as f64;
         assert!((lost - 0.05).abs() < 6.0 * (0.05 * 0.95 / frames as f64).sqrt(), "{lost}");
-        assert_eq!(seen, track(&view, "noisy", &tracking).unwrap(), "a seed gives one recording");
-        let again = track(&view, "noisy", &Tracking { dropout_fraction: 0.0, ..tracking }).unwrap();
+        assert_eq!(
+            seen,
+            add_tracking_noise(&view, "noisy", &tracking).unwrap(),
+            "a seed gives one recording"
+        );
+        let again =
+            add_tracking_noise(&view, "noisy", &TrackingModel { dropout_fraction: 0.0, ..tracking }).unwrap();
         let kept = seen
             .traces()
             .tip_x_m

@@ -1,10 +1,10 @@
 //! What the spectrum reads of a cycle whose sticks are counted.
 
 use wiperlab::recording::channel::Channel;
-use wiperlab::simulate::Effort;
+use wiperlab::simulate::SolverOptions;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::spectrum::{Analysis, Component, Record, Settings};
-use wiperlab::twin::{Camera, Tracking, track, view};
+use wiperlab::spectrum::{Component, SampledRecord, SpectralAnalysis, SpectrumSettings};
+use wiperlab::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
 
 /// Lengths of windows, s, and how far apart they begin, in their lengths.
 const LENGTHS_S: [f64; 4] = [0.05, 0.1, 0.15, 0.25];
@@ -76,9 +76,11 @@ impl Count {
     /// Of the windows of a scene that a camera sees.
     pub fn of(scene: &Scene, frame_rate_hz: f64, noise_m: f64) -> Result<Self, Box<dyn std::error::Error>> {
         let camera = Camera { frame_rate_hz, exposure_s: 0.0 };
-        let seen = view(scene, &camera, scene.start_s, scene.run.stop_s, Effort::of(scene))?;
-        let tracking = Tracking { metres_per_pixel: noise_m, noise_px: 1.0, dropout_fraction: 0.0, seed: 1 };
-        let recording = track(&seen.recording, "scene", &tracking)?;
+        let seen =
+            film_scene(scene, &camera, scene.start_s, scene.run.stop_s, SolverOptions::from_scene(scene))?;
+        let tracking =
+            TrackingModel { metres_per_pixel: noise_m, noise_px: 1.0, dropout_fraction: 0.0, seed: 1 };
+        let recording = add_tracking_noise(&seen.recording, "scene", &tracking)?;
         let samples = Channel::Deflection.samples(&recording);
         let ends_s: Vec<f64> = seen.stick_s.iter().map(|stick| stick[1]).collect();
         let mut count = Self::default();
@@ -88,8 +90,11 @@ impl Count {
             for first in (0..samples.len().saturating_sub(frames)).step_by(step) {
                 let from_s = recording.grid().time_s(first);
                 if let Some(cycles) = Cycles::between(&ends_s, from_s, from_s + length_s) {
-                    let record =
-                        Record { samples: &samples[first..first + frames], frame_rate_hz, exposure_s: None };
+                    let record = SampledRecord {
+                        samples: &samples[first..first + frames],
+                        frame_rate_hz,
+                        exposure_s: None,
+                    };
                     count.read(&record, from_s, &cycles)?;
                 }
             }
@@ -108,14 +113,14 @@ impl Count {
 
     fn read(
         &mut self,
-        record: &Record,
+        record: &SampledRecord,
         from_s: f64,
         cycles: &Cycles,
     ) -> Result<(), Box<dyn std::error::Error>> {
-        let analysis = Analysis::of(record, &Settings::default())?;
+        let analysis = SpectralAnalysis::from_record(record, &SpectrumSettings::default())?;
         let length_s = record.samples.len() as f64 / record.frame_rate_hz;
-        let from_s = from_s + analysis.left_out as f64 / record.frame_rate_hz;
-        let to_s = from_s + analysis.left_m.len() as f64 / record.frame_rate_hz;
+        let from_s = from_s + analysis.skipped_frames as f64 / record.frame_rate_hz;
+        let to_s = from_s + analysis.residual_m.len() as f64 / record.frame_rate_hz;
         if to_s - from_s < length_s / 2.0 {
             return Ok(()); // what is left behind a flip
         }

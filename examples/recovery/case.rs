@@ -4,7 +4,7 @@ use crate::truth::Filming;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::simulate::drive::{Drive, head_motion};
+use wiperlab::simulate::drive::{Drive, smooth_head_motion};
 use wiperlab::simulate::scene::Scene;
 
 /// A case.
@@ -124,7 +124,7 @@ impl Case {
     pub fn filmed(&self, believed: &Scene) -> Scene {
         let mut scene = self.wrong.iter().fold(believed.clone(), |scene, (name, factor)| {
             let value = scene.value(name).expect("a constant of the scene");
-            scene.with(name, factor * value).expect("a blade that can be")
+            scene.with_parameter(name, factor * value).expect("a blade that can be")
         });
         match self.motion {
             Motion::Crank => {}
@@ -154,5 +154,5 @@ fn by_hand() -> Drive {
         ..Traces::default()
     };
     let hand = Recording::new("synthetic", grid, traces, true).expect("a recording of a head");
-    Drive::Recorded(Arc::new(head_motion(&hand).expect("a head in every frame")))
+    Drive::Recorded(Arc::new(smooth_head_motion(&hand).expect("a head in every frame")))
 }

@@ -18,8 +18,8 @@ use table::{Line, table};
 use truth::{Blade, EXPOSURE_S, Filming, blade};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::trace::{Settings, search};
-use wiperlab::fit::{Measured, Problem};
+use wiperlab::fit::trace::{TraceSearchSettings, search_trace};
+use wiperlab::fit::{MeasuredRecording, Problem};
 use wiperlab::recording::Recording;
 use wiperlab::simulate::scene::Scene;
 
@@ -109,7 +109,7 @@ fn problem(case: &Case, scene: &Scene, seed: u64, recording: Recording) -> Probl
     let parameters = &JOB[..JOB.find("[[component]]").expect("a job with components")];
     let head = parameters.replace("seed = 1", &format!("seed = {seed}\n{}", case.job));
     let job = Job::parse("job.toml", &format!("{head}\n[[trace]]\n{}\n", case.trace)).expect("a job");
-    let measured = Measured { recording, exposure_s: Some(EXPOSURE_S) };
+    let measured = MeasuredRecording { recording, exposure_s: Some(EXPOSURE_S) };
     Problem::new(job, vec![scene.clone()], vec![measured]).expect("a job that goes with the scene")
 }
 
@@ -129,7 +129,7 @@ fn of(result: &FitResult) -> Vec<Found> {
         Found {
             estimate: parameter.estimate,
             ends: [parameter.lower_95, parameter.upper_95],
-            verdict: parameter.verdict.word().to_owned(),
+            verdict: parameter.verdict.name().to_owned(),
             explained,
         }
     };
@@ -148,11 +148,11 @@ fn from_corner(problem: &Problem, corner: u64) -> Vec<Found> {
         let is_upper = CORNERS[corner as usize % CORNERS.len()] >> bit & 1 == 1;
         unknown.start = low + (high - low) * if is_upper { 1.0 - INSIDE } else { INSIDE };
     }
-    let settings = Settings { segment_s: problem.segment_s().to_vec(), twins: 0 };
-    let found = search(&model, &settings, 1 + corner, &mut ());
+    let settings = TraceSearchSettings { segment_s: problem.segment_s().to_vec(), twins: 0 };
+    let found = search_trace(&model, &settings, 1 + corner, &mut ());
     let known = found.assessment.expect("a search that ends");
     let identified = known.doubts.is_empty();
-    let found = |estimate: &wiperlab::fit::trace::Estimate| Found {
+    let found = |estimate: &wiperlab::fit::trace::UnknownEstimate| Found {
         estimate: estimate.value,
         ends: estimate.widest_95().map(Some),
         verdict: if identified { "identified" } else { "not-identified" }.to_owned(),

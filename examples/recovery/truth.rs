@@ -3,9 +3,9 @@
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::fit::job::Job;
+use wiperlab::fit::measure_targets;
 use wiperlab::fit::model::{Draw, Model};
-use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
-use wiperlab::fit::targets;
+use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
 use wiperlab::recording::Recording;
 use wiperlab::simulate::scene::Scene;
 use wiperlab::twin::Camera;
@@ -49,7 +49,7 @@ pub fn blade(scene: &Scene, job: &Job, number: u64) -> Blade {
         let mut drawn = |(low, high): (f64, f64)| low * (high / low).powf(generator.random::<f64>());
         let blade = Blade { truth: RANGES.map(&mut drawn).to_vec(), start, usual };
         let shown = blade.film(scene, job, number, Filming::default());
-        if shown.is_some_and(|recording| targets(job, &[Some(recording)]).is_ok()) {
+        if shown.is_some_and(|recording| measure_targets(job, &[Some(recording)]).is_ok()) {
             return blade;
         }
     }
@@ -66,10 +66,10 @@ impl Blade {
             noise_m: NOISE_PX * PIXEL_M,
             dropout_fraction: dropout_fraction.unwrap_or(self.usual.1),
         };
-        let plausible = Plausible { spread: SPREAD, largest_tilt_rad: job.largest_tilt_rad };
-        let condition = Condition { scene: scene.clone(), instrument };
+        let plausible = PlausibilityLimits { spread: SPREAD, largest_tilt_rad: job.largest_tilt_rad };
+        let condition = ModelCondition { scene: scene.clone(), instrument };
         let model = SceneModel::new(vec![condition], job.parameter_names(), plausible);
         let draw = Draw { member: 1_000 + self.start, noise: 2 + number + 1_000 * draw, dropouts: true };
-        model.observe(&self.truth, 0, draw).ok()
+        model.record_condition(&self.truth, 0, draw).ok()
     }
 }

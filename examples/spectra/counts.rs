@@ -2,7 +2,7 @@
 
 use crate::hard::{Kind, Made, Truth};
 use rayon::prelude::*;
-use wiperlab::spectrum::{Analysis, Component, Record, Settings, Verdict};
+use wiperlab::spectrum::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 /// A component that is listed.
 pub struct Listed {
@@ -33,11 +33,12 @@ impl Counts {
     /// Of what the complete analysis reads.
     pub fn of(kind: &Kind, seeds: u64) -> Self {
         let read = |made: &Made| {
-            let record = Record { samples: &made.samples, frame_rate_hz: made.rate_hz, exposure_s: None };
-            let analysis = Analysis::of(&record, &Settings::default());
+            let record =
+                SampledRecord { samples: &made.samples, frame_rate_hz: made.rate_hz, exposure_s: None };
+            let analysis = SpectralAnalysis::from_record(&record, &SpectrumSettings::default());
             analysis.map_or_else(
                 |_| (Vec::new(), false),
-                |a| (a.spectrum.components.iter().map(listed).collect(), a.left_out > 0),
+                |a| (a.spectrum.components.iter().map(listed).collect(), a.skipped_frames > 0),
             )
         };
         Self::over(kind, seeds, read)
@@ -91,7 +92,7 @@ fn listed(c: &Component) -> Listed {
     Listed {
         hz: c.frequency_hz,
         sd_hz: c.frequency_sd_hz,
-        clear: c.verdict == Verdict::Clear,
+        clear: c.verdict == ComponentVerdict::Clear,
         drifts: c.range_hz.is_some(),
     }
 }

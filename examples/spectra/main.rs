@@ -16,7 +16,7 @@ use score::{Errors, deviation, largest, mean, near, read, read_all, rms};
 use signal::{AMPLITUDE_M, FLIPS, Signal, Tone};
 use std::hint::black_box;
 use std::time::Instant;
-use wiperlab::spectrum::{Analysis, Component, Record, Settings, Verdict};
+use wiperlab::spectrum::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 /// Seeds of a line unless asked for otherwise.
 const SEEDS: u64 = 200;
@@ -124,7 +124,8 @@ fn cameras(seeds: u64) {
         let found: Vec<&Component> = lists.iter().filter_map(|list| near(list, seen_hz)).collect();
         let count = |holds: &dyn Fn(&Component) -> bool| found.iter().filter(|c| holds(c)).count();
         let folded = count(&|c| c.folded_from.iter().any(|fold| (fold.frequency_hz - HIGH_HZ).abs() < 1.0));
-        let attenuated = count(&|c| c.reasons.iter().any(|reason| reason.verdict == Verdict::Attenuated));
+        let attenuated =
+            count(&|c| c.reasons.iter().any(|reason| reason.verdict == ComponentVerdict::Attenuated));
         let of_900 =
             |c: &&Component| c.folded_from.first().map_or(c.exposure_passes, |fold| fold.exposure_passes);
         let passes =
@@ -142,7 +143,7 @@ fn cameras(seeds: u64) {
 fn verdicts(found: &[&Component]) -> String {
     let mut counts = std::collections::BTreeMap::new();
     found.iter().for_each(|c| *counts.entry(c.verdict).or_insert(0) += 1);
-    counts.iter().map(|(verdict, count)| format!("{} {count}", verdict.word())).collect::<Vec<_>>().join(", ")
+    counts.iter().map(|(verdict, count)| format!("{} {count}", verdict.name())).collect::<Vec<_>>().join(", ")
 }
 
 /// A frequency that rises evenly, alone and on a ring-down twenty times as large.
@@ -219,8 +220,10 @@ fn timings() {
     let long = Signal { frames: 1_000_000, ..Signal::of(&[Tone::steady(LOW_HZ), Tone::steady(HIGH_HZ)]) };
     let samples = long.record(0);
     let analysis = |_| {
-        let record = Record { samples: black_box(&samples), frame_rate_hz: long.rate_hz, exposure_s: None };
-        Analysis::of(&record, &Settings::default()).map_or(0, |analysis| analysis.spectrum.components.len())
+        let record =
+            SampledRecord { samples: black_box(&samples), frame_rate_hz: long.rate_hz, exposure_s: None };
+        SpectralAnalysis::from_record(&record, &SpectrumSettings::default())
+            .map_or(0, |analysis| analysis.spectrum.components.len())
     };
     println!("\nA million samples: complete analysis in {:.0} ms (median of 5).", median_ms(5, analysis));
 }

@@ -2,7 +2,7 @@
 
 use crate::signal::{Signal, Tone};
 use rayon::prelude::*;
-use wiperlab::spectrum::{Analysis, Component, Record, Settings};
+use wiperlab::spectrum::{Component, SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 /// A component is a tone's if its frequency is within this share of it.
 const NEAR: f64 = 0.15;
@@ -26,16 +26,16 @@ impl std::ops::Deref for Reading {
 
 /// The components of a record.
 pub fn read(signal: &Signal, seed: u64) -> Reading {
-    let record = Record {
+    let record = SampledRecord {
         samples: &signal.record(seed),
         frame_rate_hz: signal.rate_hz,
         exposure_s: signal.exposure_s,
     };
-    let reading = |a: Analysis| Reading {
-        from_s: a.left_out as f64 / signal.rate_hz,
+    let reading = |a: SpectralAnalysis| Reading {
+        from_s: a.skipped_frames as f64 / signal.rate_hz,
         components: a.spectrum.components,
     };
-    Analysis::of(&record, &Settings::default())
+    SpectralAnalysis::from_record(&record, &SpectrumSettings::default())
         .map_or_else(|_| Reading { components: Vec::new(), from_s: 0.0 }, reading)
 }
 

@@ -3,7 +3,7 @@
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
-use wiperlab::camera::exposure_passes;
+use wiperlab::camera::exposure_gain;
 use wiperlab::math::StandardNormal;
 
 /// Amplitude of a component, m; noise is given in relation to it.
@@ -106,7 +106,7 @@ impl Signal {
     pub fn record(&self, seed: u64) -> Vec<Option<f64>> {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let phases: Vec<f64> = self.tones.iter().map(|_| random.random::<f64>() * TAU).collect();
-        let passes = |hz: f64| self.exposure_s.map_or(1.0, |exposure_s| exposure_passes(hz, exposure_s));
+        let passes = |hz: f64| self.exposure_s.map_or(1.0, |exposure_s| exposure_gain(hz, exposure_s));
         let sample = |i: usize| {
             let (t, s) = (i as f64 / self.rate_hz, i as f64 / self.frames as f64);
             let tones: f64 = self

@@ -2,13 +2,16 @@
 //! message, or what was read can be used, and written and read back it is the same.
 
 use wiperlab::fit::job::Job;
-use wiperlab::fit::journal::Entry;
+use wiperlab::fit::journal::EvaluationRecord;
 use wiperlab::fit::result::FitResult;
-use wiperlab::journal::{Journal, Record, header_line, line, read, sealed};
+use wiperlab::journal::{
+    CheckpointFile, CheckpointRecord, append_checksum, format_header_line, format_record_line,
+    read_checkpoint,
+};
 use wiperlab::recording::files::{RecordingFile, read_recording, trace_csv};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::Study;
-use wiperlab::sweep::journal::Point;
+use wiperlab::sweep::journal::SweepPoint;
 use wiperlab::twin::spec::TwinSpec;
 
 /// A reader, and the committed files, from the root of the project, from which its inputs grow.
@@ -66,13 +69,13 @@ fn scene(text: &str) {
 
 fn job(text: &str) {
     if let Ok(job) = Job::parse("job.toml", text) {
-        assert!(!job.parameters.is_empty() && !job.aims.is_empty());
+        assert!(!job.parameters.is_empty() && !job.targets.is_empty());
     }
 }
 
 fn study(text: &str) {
     if let Ok(study) = Study::parse("sweep.toml", text) {
-        assert!(study.points() > 0 && !study.maps.is_empty());
+        assert!(study.point_count() > 0 && !study.maps.is_empty());
     }
 }
 
@@ -101,24 +104,27 @@ fn trace(text: &str) {
 fn journals(text: &str) {
     // as it is, and with new checksums: else nearly every change would end at the first of them
     for text in [text.to_owned(), resealed(text)] {
-        journal::<Entry>(&text);
-        journal::<Point>(&text);
+        journal::<EvaluationRecord>(&text);
+        journal::<SweepPoint>(&text);
     }
 }
 
 fn resealed(text: &str) -> String {
     let content = |line: &str| line.rsplit_once(",\"sha256\":").map(|(content, _)| format!("{content}}}"));
-    text.lines().map(|line| content(line).map_or(line.to_owned(), |line| sealed(&line)) + "\n").collect()
+    text.lines()
+        .map(|line| content(line).map_or(line.to_owned(), |line| append_checksum(&line)) + "\n")
+        .collect()
 }
 
-fn journal<R: Record + PartialEq + std::fmt::Debug>(text: &str)
+fn journal<R: CheckpointRecord + PartialEq + std::fmt::Debug>(text: &str)
 where
     R::Body: PartialEq + std::fmt::Debug,
 {
-    let Ok(Some(found)) = read::<R>("journal.jsonl", text) else { return };
-    let lines = found.records.iter().enumerate().map(|(at, record)| line(record, at));
-    let written = header_line(&found.header) + &lines.collect::<String>();
-    let back: Journal<R> = read("journal.jsonl", &written).expect("reads back").expect("has a header");
+    let Ok(Some(found)) = read_checkpoint::<R>("journal.jsonl", text) else { return };
+    let lines = found.records.iter().enumerate().map(|(at, record)| format_record_line(record, at));
+    let written = format_header_line(&found.header) + &lines.collect::<String>();
+    let back: CheckpointFile<R> =
+        read_checkpoint("journal.jsonl", &written).expect("reads back").expect("has a header");
     assert_eq!((back.header, back.records), (found.header, found.records));
 }
 

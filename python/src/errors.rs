@@ -6,36 +6,37 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use wiperlab::program::read::Failure;
 
 /// An exception of `wiperlab.errors`.
-fn exception(py: Python<'_>, class: &str, message: String) -> PyErr {
+fn new_exception(py: Python<'_>, class: &str, message: String) -> PyErr {
     let made = py.import("wiperlab.errors").and_then(|errors| errors.getattr(class)?.call1((message,)));
     made.map_or_else(|error| error, PyErr::from_value)
 }
 
 /// Bad input.
-pub fn input(py: Python<'_>, message: impl ToString) -> PyErr {
-    exception(py, "InputError", message.to_string())
+pub fn input_error(py: Python<'_>, message: impl ToString) -> PyErr {
+    new_exception(py, "InputError", message.to_string())
 }
 
 /// A defect.
-pub fn internal(py: Python<'_>, message: impl ToString) -> PyErr {
-    exception(py, "InternalError", message.to_string())
+pub fn internal_error(py: Python<'_>, message: impl ToString) -> PyErr {
+    new_exception(py, "InternalError", message.to_string())
 }
 
 /// What the program refuses.
-pub fn failure(py: Python<'_>, failure: Failure) -> PyErr {
+pub fn failure_error(py: Python<'_>, failure: Failure) -> PyErr {
     match failure {
-        Failure::Input(message) => input(py, message),
-        Failure::Internal(message) => internal(py, message),
+        Failure::Input(message) => input_error(py, message),
+        Failure::Internal(message) => internal_error(py, message),
     }
 }
 
 /// Runs Rust code of which no panic may reach Python.
-pub fn guarded<T>(py: Python<'_>, work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
-    catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|panic| Err(internal(py, panic_text(&*panic))))
+pub fn catch_panic<T>(py: Python<'_>, work: impl FnOnce() -> PyResult<T>) -> PyResult<T> {
+    catch_unwind(AssertUnwindSafe(work))
+        .unwrap_or_else(|panic| Err(internal_error(py, panic_message(&*panic))))
 }
 
 /// What a panic says.
-pub fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
+pub fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let said = panic.downcast_ref::<String>().cloned();
     let said = said.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));
     format!("internal failure: {}; please report it", said.unwrap_or_else(|| "no message".to_owned()))

@@ -16,26 +16,29 @@ pub struct Job {
     path: PathBuf,
 }
 
-type Point<'py> = PyReadonlyArray1<'py, f64>;
+type PointArray<'py> = PyReadonlyArray1<'py, f64>;
 
 impl Job {
-    fn point(&self, py: Python<'_>, of: &Point<'_>) -> PyResult<Vec<f64>> {
+    fn read_point(&self, py: Python<'_>, of: &PointArray<'_>) -> PyResult<Vec<f64>> {
         let (found, expected) = (of.as_array().len(), self.posterior.unknowns().len());
         if found != expected {
             let names = self.names().join(", ");
-            return Err(errors::input(py, format!("found {found} numbers, expected {expected}: {names}")));
+            return Err(errors::input_error(
+                py,
+                format!("found {found} numbers, expected {expected}: {names}"),
+            ));
         }
         Ok(of.as_array().iter().copied().collect())
     }
 
-    fn number(
+    fn evaluate_at(
         &self,
         py: Python<'_>,
-        of: &Point<'_>,
+        of: &PointArray<'_>,
         what: impl Fn(&Posterior, &[f64]) -> f64 + Send,
     ) -> PyResult<f64> {
-        let (point, posterior) = (self.point(py, of)?, Arc::clone(&self.posterior));
-        workers::run(py, None, move |_| what(&posterior, &point))
+        let (point, posterior) = (self.read_point(py, of)?, Arc::clone(&self.posterior));
+        workers::run_interruptible(py, None, move |_| what(&posterior, &point))
     }
 }
 
@@ -43,12 +46,12 @@ impl Job {
 impl Job {
     #[new]
     fn new(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let read = workers::run(py, None, {
+        let read = workers::run_interruptible(py, None, {
             let path = path.clone();
-            move |_| read::problem(&path).map(Posterior::new)
+            move |_| read::read_problem(&path).map(Posterior::new)
         })?;
-        let posterior = read.map_err(|failure| errors::failure(py, failure))?;
-        let refused = |error| errors::input(py, format!("{}: {error}", path.display()));
+        let posterior = read.map_err(|failure| errors::failure_error(py, failure))?;
+        let refused = |error| errors::input_error(py, format!("{}: {error}", path.display()));
         let posterior = Arc::new(posterior.map_err(refused)?);
         // (as a process in another folder may read it again)
         let path = std::path::absolute(&path).unwrap_or(path);
@@ -81,29 +84,33 @@ impl Job {
         self.posterior.unknowns().iter().map(|unknown| (unknown.bounds[0], unknown.bounds[1])).collect()
     }
 
-    fn prior_transform<'py>(&self, py: Python<'py>, unit: Point<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let unit = self.point(py, &unit)?;
+    fn prior_transform<'py>(
+        &self,
+        py: Python<'py>,
+        unit: PointArray<'py>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let unit = self.read_point(py, &unit)?;
         if let Some(found) = unit.iter().find(|u| !(0.0..=1.0).contains(*u)) {
-            return Err(errors::input(py, format!("found {found}, expected numbers from 0 to 1")));
+            return Err(errors::input_error(py, format!("found {found}, expected numbers from 0 to 1")));
         }
         Ok(PyArray1::from_vec(py, self.posterior.prior_transform(&unit)))
     }
 
-    fn log_prior(&self, py: Python<'_>, x: Point<'_>) -> PyResult<f64> {
-        self.number(py, &x, Posterior::log_prior)
+    fn log_prior(&self, py: Python<'_>, x: PointArray<'_>) -> PyResult<f64> {
+        self.evaluate_at(py, &x, Posterior::log_prior)
     }
 
-    fn log_likelihood(&self, py: Python<'_>, x: Point<'_>) -> PyResult<f64> {
-        self.number(py, &x, Posterior::log_likelihood)
+    fn log_likelihood(&self, py: Python<'_>, x: PointArray<'_>) -> PyResult<f64> {
+        self.evaluate_at(py, &x, Posterior::log_likelihood)
     }
 
-    fn log_posterior(&self, py: Python<'_>, x: Point<'_>) -> PyResult<f64> {
-        self.number(py, &x, Posterior::log_density)
+    fn log_posterior(&self, py: Python<'_>, x: PointArray<'_>) -> PyResult<f64> {
+        self.evaluate_at(py, &x, Posterior::log_density)
     }
 
-    fn residuals<'py>(&self, py: Python<'py>, x: Point<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let (point, posterior) = (self.point(py, &x)?, Arc::clone(&self.posterior));
-        let found = workers::run(py, None, move |_| posterior.residuals(&point))?;
+    fn residuals<'py>(&self, py: Python<'py>, x: PointArray<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let (point, posterior) = (self.read_point(py, &x)?, Arc::clone(&self.posterior));
+        let found = workers::run_interruptible(py, None, move |_| posterior.residuals(&point))?;
         Ok(PyArray1::from_vec(py, found.into_iter().map(|r| r.unwrap_or(f64::NAN)).collect()))
     }
 }

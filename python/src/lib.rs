@@ -17,7 +17,7 @@ use std::path::PathBuf;
 #[pyo3(signature = (arguments, path = None))]
 fn run_program(py: Python<'_>, arguments: Vec<OsString>, path: Option<PathBuf>) -> u8 {
     py.detach(|| match path {
-        Some(path) => wiperlab::program::run_as(path, arguments),
+        Some(path) => wiperlab::program::run_embedded(path, arguments),
         None => wiperlab::program::run(arguments),
     })
 }

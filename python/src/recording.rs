@@ -1,13 +1,13 @@
 //! Recordings and their spectra.
 
-use crate::errors::{self, guarded};
+use crate::errors::{self, catch_panic};
 use crate::workers;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 use std::sync::Arc;
-use wiperlab::program::read::{self, Analysed};
+use wiperlab::program::read::{self, SpectrumOptions};
 use wiperlab::recording::{self, FrameGrid, Traces};
 
 /// Tracked positions of tip and head on the frame grid.
@@ -28,8 +28,8 @@ impl Recording {
     /// Reads the folder of a recording, or a trace.csv alone.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        let loaded = workers::run(py, None, move |_| read::recording(&path))?;
-        let (recording, exposure_s) = loaded.map_err(|failure| errors::failure(py, failure))?;
+        let loaded = workers::run_interruptible(py, None, move |_| read::read_recording(&path))?;
+        let (recording, exposure_s) = loaded.map_err(|failure| errors::failure_error(py, failure))?;
         Ok(Self { inner: Arc::new(recording), exposure_s })
     }
 
@@ -45,7 +45,7 @@ impl Recording {
         exposure_s: Option<f64>,
         synthetic: bool,
     ) -> PyResult<Self> {
-        guarded(py, || {
+        catch_panic(py, || {
             let column = |name: &str| -> PyResult<Option<Vec<Option<f64>>>> {
                 let Some(found) = columns.get_item(name)? else { return Ok(None) };
                 let found: PyReadonlyArray1<'_, f64> = found.extract()?;
@@ -63,7 +63,8 @@ impl Recording {
             };
             let grid = FrameGrid { start_s, frame_rate_hz, frames };
             let recording = recording::Recording::new(name, grid, traces, synthetic);
-            let inner = Arc::new(recording.map_err(|error| errors::input(py, format!("{name}: {error}")))?);
+            let inner =
+                Arc::new(recording.map_err(|error| errors::input_error(py, format!("{name}: {error}")))?);
             Ok(Self { inner, exposure_s })
         })
     }
@@ -128,11 +129,11 @@ pub fn analyse<'py>(
     exposure_s: Option<f64>,
 ) -> PyResult<Bound<'py, PyDict>> {
     let exposure_s = exposure_s.or(recording.exposure_s);
-    let of = Analysed { channel, window, detrend, band_hz, max_components, exposure_s };
+    let of = SpectrumOptions { channel, window, detrend, band_hz, max_components, exposure_s };
     let inner = Arc::clone(&recording.inner);
-    let files = workers::run_apart(py, move || read::spectrum((*inner).clone(), &of))?;
+    let files = workers::run_detached(py, move || read::spectrum_files((*inner).clone(), &of))?;
     let all = PyDict::new(py);
-    for (name, bytes) in files.map_err(|failure| errors::failure(py, failure))? {
+    for (name, bytes) in files.map_err(|failure| errors::failure_error(py, failure))? {
         all.set_item(name, PyBytes::new(py, &bytes))?;
     }
     Ok(all)

@@ -1,6 +1,6 @@
 //! Scenes, and runs of them.
 
-use crate::errors::{self, guarded};
+use crate::errors::{self, catch_panic};
 use crate::workers;
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
@@ -10,11 +10,13 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use wiperlab::program::read;
-use wiperlab::simulate::outputs::{Audit, Sampler, Summary, Transitions, points_m, sample_times};
-use wiperlab::simulate::{self, Effort, Observer, Piece, Sample, run_with};
+use wiperlab::simulate::outputs::{
+    EnergyAudit, SampleObserver, SimulationSummary, Transitions, recorded_points_m, sample_times,
+};
+use wiperlab::simulate::{self, ModelSample, Observer, SolutionSegment, SolverOptions, run_scene_with};
 
 /// What makes a scene again.
-type Parts = (String, String, Option<PathBuf>, Vec<(String, f64)>);
+type SceneParts = (String, String, Option<PathBuf>, Vec<(String, f64)>);
 
 /// A blade, its friction, its drive and what is to be computed.
 #[pyclass(module = "wiperlab", frozen, from_py_object)]
@@ -28,15 +30,17 @@ pub struct Scene {
 }
 
 impl Scene {
-    fn made(py: Python<'_>, (file, text, driver, set): Parts) -> PyResult<Self> {
+    fn from_source(py: Python<'_>, (file, text, driver, set): SceneParts) -> PyResult<Self> {
         let recording = |named: &str| {
-            let path = driver.clone().map_or_else(|| read::existing_in(Path::new(&file), named), Ok)?;
-            read::recording(&path).map(|(recording, _)| recording).map_err(|error| error.to_string())
+            let path =
+                driver.clone().map_or_else(|| read::resolve_existing_path(Path::new(&file), named), Ok)?;
+            read::read_recording(&path).map(|(recording, _)| recording).map_err(|error| error.to_string())
         };
-        let scene = simulate::scene::Scene::parse_with(&file, &text, recording);
-        let scene = scene.map_err(|error| errors::input(py, error))?;
-        let with = |scene: simulate::scene::Scene, (name, value): &(String, f64)| scene.with(name, *value);
-        let inner = set.iter().try_fold(scene, with).map_err(|error| errors::input(py, error))?;
+        let scene = simulate::scene::Scene::parse_with_recording(&file, &text, recording);
+        let scene = scene.map_err(|error| errors::input_error(py, error))?;
+        let with =
+            |scene: simulate::scene::Scene, (name, value): &(String, f64)| scene.with_parameter(name, *value);
+        let inner = set.iter().try_fold(scene, with).map_err(|error| errors::input_error(py, error))?;
         Ok(Self { inner: Arc::new(inner), file, text, driver, set })
     }
 }
@@ -46,12 +50,12 @@ impl Scene {
     /// Reads a scene file.
     #[staticmethod]
     fn load(py: Python<'_>, path: PathBuf) -> PyResult<Self> {
-        guarded(py, || {
-            let refused = |failure| errors::failure(py, failure);
-            let (_, driver) = read::scene(&path).map_err(refused)?;
+        catch_panic(py, || {
+            let refused = |failure| errors::failure_error(py, failure);
+            let (_, driver) = read::read_scene(&path).map_err(refused)?;
             let driver = driver.and_then(|path| std::path::absolute(path).ok());
-            let text = read::toml(&path).map_err(refused)?;
-            Self::made(py, (path.display().to_string(), text, driver, Vec::new()))
+            let text = read::read_toml_text(&path).map_err(refused)?;
+            Self::from_source(py, (path.display().to_string(), text, driver, Vec::new()))
         })
     }
 
@@ -59,22 +63,23 @@ impl Scene {
     #[staticmethod]
     #[pyo3(signature = (text, file = "scene.toml"))]
     fn parse(py: Python<'_>, text: &str, file: &str) -> PyResult<Self> {
-        guarded(py, || Self::made(py, (file.to_owned(), text.to_owned(), None, Vec::new())))
+        catch_panic(py, || Self::from_source(py, (file.to_owned(), text.to_owned(), None, Vec::new())))
     }
 
     /// A scene of its parts.
     #[staticmethod]
-    fn of_parts(py: Python<'_>, parts: Parts) -> PyResult<Self> {
-        guarded(py, || Self::made(py, parts))
+    fn of_parts(py: Python<'_>, parts: SceneParts) -> PyResult<Self> {
+        catch_panic(py, || Self::from_source(py, parts))
     }
 
     /// The same scene with other values of its parameters.
     fn replace(&self, py: Python<'_>, values: Vec<(String, f64)>) -> PyResult<Self> {
-        guarded(py, || {
-            let with =
-                |scene: simulate::scene::Scene, (name, value): &(String, f64)| scene.with(name, *value);
+        catch_panic(py, || {
+            let with = |scene: simulate::scene::Scene, (name, value): &(String, f64)| {
+                scene.with_parameter(name, *value)
+            };
             let inner = values.iter().try_fold((*self.inner).clone(), with);
-            let inner = Arc::new(inner.map_err(|error| errors::input(py, error))?);
+            let inner = Arc::new(inner.map_err(|error| errors::input_error(py, error))?);
             Ok(Self { inner, set: [&self.set[..], &values].concat(), ..self.clone() })
         })
     }
@@ -86,7 +91,7 @@ impl Scene {
 
     /// The parameters as they are written.
     fn written(&self) -> Vec<(&'static str, f64)> {
-        self.inner.written().collect()
+        self.inner.written_values().collect()
     }
 
     #[getter]
@@ -112,7 +117,7 @@ impl Scene {
     /// Numbers that are hard to believe, a sentence each.
     #[getter]
     fn findings(&self) -> Vec<String> {
-        self.inner.findings().iter().map(ToString::to_string).collect()
+        self.inner.find_implausible().iter().map(ToString::to_string).collect()
     }
 
     fn __eq__(&self, other: &Self) -> bool {
@@ -120,24 +125,24 @@ impl Scene {
     }
 
     /// What makes it again: name and text of its file, the recording that drives it, and what was replaced.
-    fn parts(&self) -> Parts {
+    fn parts(&self) -> SceneParts {
         (self.file.clone(), self.text.clone(), self.driver.clone(), self.set.clone())
     }
 }
 
 /// Ends a run that was asked to stop.
-pub struct Asked<'a>(pub &'a AtomicBool);
+pub struct StopFlag<'a>(pub &'a AtomicBool);
 
-impl Asked<'_> {
+impl StopFlag<'_> {
     pub fn flow(&self) -> ControlFlow<()> {
         if self.0.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     }
 }
 
-impl Observer for Asked<'_> {
-    fn piece(&mut self, _: &Piece<'_>) {}
-    fn flow(&self) -> ControlFlow<()> {
-        Asked::flow(self)
+impl Observer for StopFlag<'_> {
+    fn observe_segment(&mut self, _: &SolutionSegment<'_>) {}
+    fn control_flow(&self) -> ControlFlow<()> {
+        StopFlag::flow(self)
     }
 }
 
@@ -159,7 +164,7 @@ const COLUMNS: [&str; 13] = [
 ];
 
 /// Columns of samples, the modes among them, the columns of transitions, and the summary as JSON.
-type Ran<'py> = (Bound<'py, PyDict>, Vec<&'static str>, Bound<'py, PyDict>, String);
+type RunArrays<'py> = (Bound<'py, PyDict>, Vec<&'static str>, Bound<'py, PyDict>, String);
 
 /// Runs a scene; samples at its own rate, or at rising instants.
 #[pyfunction]
@@ -168,34 +173,34 @@ pub fn simulate_scene<'py>(
     py: Python<'py>,
     scene: &Scene,
     times_s: Option<PyReadonlyArray1<'py, f64>>,
-) -> PyResult<Ran<'py>> {
+) -> PyResult<RunArrays<'py>> {
     let times: Vec<f64> = match times_s {
         Some(times) => times.as_array().iter().copied().collect(),
         None => sample_times(&scene.inner).collect(),
     };
     let scene = Arc::clone(&scene.inner);
-    let (columns, modes, transitions, summary) = workers::run(py, None, move |stop| {
+    let (columns, modes, transitions, summary) = workers::run_interruptible(py, None, move |stop| {
         let mut columns: Vec<Vec<f64>> = COLUMNS.iter().map(|_| Vec::with_capacity(times.len())).collect();
         let mut modes = Vec::with_capacity(times.len());
-        let sampler = Sampler::new(times.into_iter(), |sample: &Sample| {
-            let Sample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, .. } =
+        let sampler = SampleObserver::new(times.into_iter(), |sample: &ModelSample| {
+            let ModelSample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, .. } =
                 *sample;
-            let [tip_x, tip_y, head_x, head_y] = points_m(&scene.linkage, sample);
+            let [tip_x, tip_y, head_x, head_y] = recorded_points_m(&scene.linkage, sample);
             let angles = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
             let rest = [head_drop_m, tip_velocity_m_per_s, normal_n, friction_n];
             let row = [time_s, tip_x, tip_y, head_x, head_y].into_iter().chain(angles).chain(rest);
             columns.iter_mut().zip(row).for_each(|(column, value)| column.push(value));
             modes.push(sample.mode.name());
         });
-        let (mut audit, mut transitions) = (Audit::default(), Transitions::default());
-        let (effort, clock) = (Effort::of(&scene), std::time::Instant::now());
-        let mut observers = ((sampler, Asked(stop)), (&mut audit, &mut transitions));
-        let run = run_with(&scene, effort, &mut observers);
+        let (mut audit, mut transitions) = (EnergyAudit::default(), Transitions::default());
+        let (effort, clock) = (SolverOptions::from_scene(&scene), std::time::Instant::now());
+        let mut observers = ((sampler, StopFlag(stop)), (&mut audit, &mut transitions));
+        let run = run_scene_with(&scene, effort, &mut observers);
         let wall_s = clock.elapsed().as_secs_f64();
-        let summary = serde_json::to_string(&Summary::new(&scene, &run, &audit, wall_s, &effort));
+        let summary = serde_json::to_string(&SimulationSummary::new(&scene, &run, &audit, wall_s, &effort));
         (columns, modes, transitions.0, summary)
     })?;
-    let summary = summary.map_err(|error| errors::internal(py, error))?;
+    let summary = summary.map_err(|error| errors::internal_error(py, error))?;
     let samples = PyDict::new(py);
     for (name, column) in COLUMNS.iter().zip(columns) {
         samples.set_item(name, PyArray1::from_vec(py, column))?;

@@ -15,7 +15,7 @@ const POLL: Duration = Duration::from_millis(50);
 /// The threads of this process; those of a process that it was forked from do not run here.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
-fn pool() -> Result<Arc<ThreadPool>, String> {
+fn process_pool() -> Result<Arc<ThreadPool>, String> {
     let mut held = POOL.lock().unwrap_or_else(PoisonError::into_inner);
     let process = std::process::id();
     if let Some((owner, pool)) = held.as_ref()
@@ -23,23 +23,23 @@ fn pool() -> Result<Arc<ThreadPool>, String> {
     {
         return Ok(Arc::clone(pool));
     }
-    let made = Arc::new(of_size(0)?);
+    let made = Arc::new(build_pool(0)?);
     // the threads of another process cannot be ended from here
     std::mem::forget(held.replace((process, Arc::clone(&made))));
     Ok(made)
 }
 
-fn of_size(threads: usize) -> Result<ThreadPool, String> {
+fn build_pool(threads: usize) -> Result<ThreadPool, String> {
     ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| error.to_string())
 }
 
 /// Runs work that cannot be asked to stop, on every core, while Python goes on. Ctrl-C leaves it to itself: it
 /// ends some time later, and what it gives is dropped.
-pub fn run_apart<T: Send + 'static>(
+pub fn run_detached<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,
 ) -> PyResult<T> {
-    let pool = pool().map_err(|error| no_threads(py, &error))?;
+    let pool = process_pool().map_err(|error| no_threads_error(py, &error))?;
     let (send, mut receive) = mpsc::channel();
     pool.spawn(move || {
         // (nobody waits any longer where this fails)
@@ -49,28 +49,28 @@ pub fn run_apart<T: Send + 'static>(
         let receive = &mut receive;
         match py.detach(move || receive.recv_timeout(POLL)) {
             Ok(Ok(result)) => return Ok(result),
-            Ok(Err(panic)) => return Err(errors::internal(py, errors::panic_text(&*panic))),
+            Ok(Err(panic)) => return Err(errors::internal_error(py, errors::panic_message(&*panic))),
             Err(RecvTimeoutError::Timeout) => py.check_signals()?,
-            Err(RecvTimeoutError::Disconnected) => return Err(errors::internal(py, NO_RESULT)),
+            Err(RecvTimeoutError::Disconnected) => return Err(errors::internal_error(py, NO_RESULT)),
         }
     }
 }
 
 const NO_RESULT: &str = "a thread ended without a result; please report it";
 
-fn no_threads(py: Python<'_>, error: &str) -> PyErr {
-    errors::internal(py, format!("no threads can be started: {error}"))
+fn no_threads_error(py: Python<'_>, error: &str) -> PyErr {
+    errors::internal_error(py, format!("no threads can be started: {error}"))
 }
 
 /// Runs work on as many threads (on every core if `None`) while Python goes on; what it is given turns true
 /// once it is asked to stop.
-pub fn run<T: Send>(
+pub fn run_interruptible<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,
     work: impl FnOnce(&AtomicBool) -> T + Send,
 ) -> PyResult<T> {
-    let pool = threads.map_or_else(pool, |threads| of_size(threads).map(Arc::new));
-    let pool = pool.map_err(|error| no_threads(py, &error))?;
+    let pool = threads.map_or_else(process_pool, |threads| build_pool(threads).map(Arc::new));
+    let pool = pool.map_err(|error| no_threads_error(py, &error))?;
     let stop = AtomicBool::new(false);
     let (done, changed) = (Mutex::new(None), Condvar::new());
     let mut asked = None;
@@ -101,7 +101,7 @@ pub fn run<T: Send>(
     match (asked, done) {
         (Some(signal), _) => Err(signal),
         (None, Some(Ok(result))) => Ok(result),
-        (None, Some(Err(panic))) => Err(errors::internal(py, errors::panic_text(&*panic))),
-        (None, None) => Err(errors::internal(py, NO_RESULT)),
+        (None, Some(Err(panic))) => Err(errors::internal_error(py, errors::panic_message(&*panic))),
+        (None, None) => Err(errors::internal_error(py, NO_RESULT)),
     }
 }

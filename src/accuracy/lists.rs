@@ -4,7 +4,7 @@ use crate::simulate::Transition;
 
 /// How a list differs from the reference's.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Lists {
+pub struct TransitionDifference {
     /// Transitions of the reference that the list lacks.
     pub missed: usize,
     /// Transitions that the reference lacks.
@@ -13,12 +13,12 @@ pub struct Lists {
     pub worst_s: Option<f64>,
 }
 
-impl Lists {
+impl TransitionDifference {
     /// Two lists agree when they have the same changes of mode in the same order. When they do not,
     /// transitions are paired that are of one kind and less than half of the reference's median gap apart;
     /// the others are missed or invented.
     #[must_use]
-    pub fn compare(reference: &[Transition], found: &[Transition]) -> Self {
+    pub fn from_lists(reference: &[Transition], found: &[Transition]) -> Self {
         let same =
             reference.len() == found.len() && reference.iter().zip(found).all(|(a, b)| is_of_one_kind(a, b));
         if same {
@@ -26,7 +26,7 @@ impl Lists {
                 reference.iter().zip(found).map(|(a, b)| (a.time_s - b.time_s).abs()).max_by(f64::total_cmp);
             return Self { missed: 0, invented: 0, worst_s };
         }
-        let pairs = pairs(reference, found, 0.5 * median_gap(reference));
+        let pairs = count_pairs(reference, found, 0.5 * median_gap(reference));
         // lists of one length whose every transition has a partner differ in order alone, which counts as one
         // of each
         let (missed, invented) = (reference.len() - pairs, found.len() - pairs);
@@ -39,7 +39,7 @@ impl Lists {
 
     /// Whether the list has the reference's transitions and no others.
     #[must_use]
-    pub fn agree(&self) -> bool {
+    pub fn is_empty(&self) -> bool {
         self.missed + self.invented == 0
     }
 }
@@ -49,7 +49,7 @@ fn is_of_one_kind(a: &Transition, b: &Transition) -> bool {
 }
 
 /// Number of transitions that have a partner, both lists read in order of time.
-fn pairs(reference: &[Transition], found: &[Transition], apart_s: f64) -> usize {
+fn count_pairs(reference: &[Transition], found: &[Transition], apart_s: f64) -> usize {
     let (mut i, mut j, mut count) = (0, 0, 0);
     while let (Some(a), Some(b)) = (reference.get(i), found.get(j)) {
         if is_of_one_kind(a, b) && (a.time_s - b.time_s).abs() < apart_s {
@@ -72,25 +72,25 @@ fn median_gap(list: &[Transition]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::Cause;
-    use crate::simulate::mode::Mode;
+    use crate::simulate::TransitionCause;
+    use crate::simulate::mode::TipMode;
 
     fn list(times: &[f64]) -> Vec<Transition> {
-        let modes = [Mode::Stick, Mode::SlipForward];
+        let modes = [TipMode::Stick, TipMode::SlipForward];
         let transition = |(i, time_s): (usize, &f64)| Transition {
             time_s: *time_s,
             from: modes[i % 2],
             to: modes[(i + 1) % 2],
-            cause: Cause::TipStops,
+            cause: TransitionCause::TipStops,
         };
         times.iter().enumerate().map(transition).collect()
     }
 
     #[test]
     fn equal_lists_are_as_far_apart_as_their_worst_pair() {
-        let lists = Lists::compare(&list(&[1.0, 2.0, 3.0]), &list(&[1.0, 2.25, 3.125]));
-        assert_eq!(lists, Lists { missed: 0, invented: 0, worst_s: Some(0.25) });
-        assert_eq!(Lists::compare(&[], &[]), Lists::default());
+        let lists = TransitionDifference::from_lists(&list(&[1.0, 2.0, 3.0]), &list(&[1.0, 2.25, 3.125]));
+        assert_eq!(lists, TransitionDifference { missed: 0, invented: 0, worst_s: Some(0.25) });
+        assert_eq!(TransitionDifference::from_lists(&[], &[]), TransitionDifference::default());
     }
 
     #[test]
@@ -98,11 +98,20 @@ mod tests {
         let reference = list(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0]);
         let mut short = reference.clone();
         short.drain(2..4);
-        assert_eq!(Lists::compare(&reference, &short), Lists { missed: 2, invented: 0, worst_s: None });
-        assert_eq!(Lists::compare(&short, &reference), Lists { missed: 0, invented: 2, worst_s: None });
+        assert_eq!(
+            TransitionDifference::from_lists(&reference, &short),
+            TransitionDifference { missed: 2, invented: 0, worst_s: None }
+        );
+        assert_eq!(
+            TransitionDifference::from_lists(&short, &reference),
+            TransitionDifference { missed: 0, invented: 2, worst_s: None }
+        );
         let mut late = reference.clone();
         late[5].time_s = 7.0;
-        late[5].to = Mode::SlipBackward;
-        assert_eq!(Lists::compare(&reference, &late), Lists { missed: 1, invented: 1, worst_s: None });
+        late[5].to = TipMode::SlipBackward;
+        assert_eq!(
+            TransitionDifference::from_lists(&reference, &late),
+            TransitionDifference { missed: 1, invented: 1, worst_s: None }
+        );
     }
 }

@@ -1,23 +1,23 @@
 //! What is kept of a run, at the instants at which runs are compared.
 
 use crate::recording::{FrameGrid, Recording, Traces};
-use crate::simulate::outputs::{Sampler, Transitions};
+use crate::simulate::outputs::{SampleObserver, Transitions};
 use crate::simulate::scene::Scene;
-use crate::simulate::{Effort, Run, Transition, run_with};
+use crate::simulate::{RunResult, SolverOptions, Transition, run_scene_with};
 
 /// Most samples that the deflection is compared at: longer runs are sampled at a lower rate.
 const MOST_SAMPLES: f64 = 1e5;
 
 /// What is kept of a run.
-pub(super) struct Motion {
-    pub run: Run,
+pub(super) struct SampledRun {
+    pub run: RunResult,
     pub transitions: Vec<Transition>,
     pub deflection_m: Vec<f64>,
     pub head_drop_m: Vec<f64>,
 }
 
 /// Instants at which runs are compared.
-pub(super) fn grid(scene: &Scene) -> FrameGrid {
+pub(super) fn comparison_grid(scene: &Scene) -> FrameGrid {
     let length = scene.run.stop_s - scene.start_s;
     let frame_rate_hz = scene.run.sample_rate_hz.min(MOST_SAMPLES / length);
     FrameGrid {
@@ -27,24 +27,24 @@ pub(super) fn grid(scene: &Scene) -> FrameGrid {
     }
 }
 
-impl Motion {
+impl SampledRun {
     /// Runs a scene.
-    pub fn of(scene: &Scene, effort: Effort) -> Self {
-        let grid = grid(scene);
+    pub fn run_scene(scene: &Scene, effort: SolverOptions) -> Self {
+        let grid = comparison_grid(scene);
         let (mut deflection_m, mut head_drop_m, mut transitions) =
             (Vec::new(), Vec::new(), Transitions::default());
         let times = (0..grid.frames).map(|i| grid.time_s(i).min(scene.run.stop_s));
-        let sampler = Sampler::new(times, |sample| {
+        let sampler = SampleObserver::new(times, |sample| {
             deflection_m.push(sample.tip_x_m - sample.head_x_m);
             head_drop_m.push(sample.head_drop_m);
         });
-        let run = run_with(scene, effort, &mut (sampler, &mut transitions));
+        let run = run_scene_with(scene, effort, &mut (sampler, &mut transitions));
         Self { run, transitions: transitions.0, deflection_m, head_drop_m }
     }
 
     /// Root mean square and worst difference of the deflection over the samples that both runs reached,
     /// relative to its range.
-    pub fn differences(reference: &Self, other: &Self) -> (f64, f64) {
+    pub fn deflection_differences(reference: &Self, other: &Self) -> (f64, f64) {
         let (low, high) = reference
             .deflection_m
             .iter()
@@ -61,10 +61,10 @@ impl Motion {
 
     /// The run as a camera without fault would record it; `None` for a run that ended before its second
     /// sample.
-    pub fn recording(&self, scene: &Scene) -> Option<Recording> {
-        let grid = grid(scene);
+    pub fn to_recording(&self, scene: &Scene) -> Option<Recording> {
+        let grid = comparison_grid(scene);
         let frames = self.deflection_m.len();
-        let head: Vec<f64> = (0..frames).map(|i| scene.drive.at(grid.time_s(i)).position_m).collect();
+        let head: Vec<f64> = (0..frames).map(|i| scene.drive.motion_at(grid.time_s(i)).position_m).collect();
         let traces = Traces {
             tip_x_m: head.iter().zip(&self.deflection_m).map(|(h, d)| Some(h + d)).collect(),
             tip_y_m: vec![Some(0.0); frames],

@@ -1,21 +1,21 @@
 //! The run that the others are held against, and what each of them errs by.
 
-use super::components::{Components, HIGH, LOW, Reader};
-use super::lists::Lists;
-use super::motion::Motion;
-use super::setting::{REFERENCE_TOLERANCE, Setting};
+use super::components::{ComponentPair, ComponentReader, HIGH_COMPONENT, LOW_COMPONENT};
+use super::lists::TransitionDifference;
+use super::motion::SampledRun;
+use super::setting::{REFERENCE_TOLERANCE, SolverSetting};
 use crate::simulate::scene::Scene;
-use crate::simulate::{Effort, Method, Run, run_with};
+use crate::simulate::{IntegrationMethod, RunResult, SolverOptions, run_scene_with};
 
 /// The run that the others are held against.
-pub struct Reference<'a> {
+pub struct ReferenceRun<'a> {
     scene: &'a Scene,
-    motion: Motion,
-    spectral: Reader,
+    motion: SampledRun,
+    spectral: ComponentReader,
     /// Its components, Hz.
-    pub components: Components,
+    pub components: ComponentPair,
     /// The method that it is checked against, at the same tolerance.
-    pub checked_by: Method,
+    pub checked_by: IntegrationMethod,
     /// Worst difference of the two methods' transition times, s; `None` when their lists differ or are empty.
     pub apart_s: Option<f64>,
     /// Whether the two lists of transitions agree.
@@ -26,15 +26,15 @@ pub struct Reference<'a> {
 
 /// What a setting errs by and costs.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Row {
+pub struct AccuracyRow {
     /// The setting.
-    pub setting: Setting,
+    pub setting: SolverSetting,
     /// How the run went.
-    pub run: Run,
+    pub run: RunResult,
     /// Time that it took, s; infinite until the caller has taken it.
     pub wall_s: f64,
     /// Its list of transitions against the reference's.
-    pub lists: Lists,
+    pub lists: TransitionDifference,
     /// Time of its end against the reference's, s.
     pub stop_error_s: f64,
     /// Root mean square error of the deflection, relative to its range.
@@ -45,24 +45,26 @@ pub struct Row {
     pub components_hz: [Option<f64>; 2],
 }
 
-impl<'a> Reference<'a> {
+impl<'a> ReferenceRun<'a> {
     /// Runs a scene by the default method and checks it against Runge-Kutta.
     #[must_use]
-    pub fn of(scene: &'a Scene) -> Self {
-        let reference = |method| Motion::of(scene, Effort { method, ..Effort::new(REFERENCE_TOLERANCE) });
-        let checked_by = Method::RungeKutta;
-        let [motion, check] = [Method::default(), checked_by].map(reference);
-        let lists = Lists::compare(&motion.transitions, &check.transitions);
-        let (_, state_apart) = Motion::differences(&motion, &check);
-        let spectral = Reader::of(scene, motion.recording(scene).as_ref());
-        let components = spectral.read(&motion.deflection_m, &motion.head_drop_m);
+    pub fn from_scene(scene: &'a Scene) -> Self {
+        let reference = |method| {
+            SampledRun::run_scene(scene, SolverOptions { method, ..SolverOptions::new(REFERENCE_TOLERANCE) })
+        };
+        let checked_by = IntegrationMethod::RungeKutta;
+        let [motion, check] = [IntegrationMethod::default(), checked_by].map(reference);
+        let lists = TransitionDifference::from_lists(&motion.transitions, &check.transitions);
+        let (_, state_apart) = SampledRun::deflection_differences(&motion, &check);
+        let spectral = ComponentReader::from_reference(scene, motion.to_recording(scene).as_ref());
+        let components = spectral.read_components(&motion.deflection_m, &motion.head_drop_m);
         Self {
             scene,
             spectral,
             components,
             checked_by,
             apart_s: lists.worst_s,
-            lists_agree: lists.agree(),
+            lists_agree: lists.is_empty(),
             state_apart,
             motion,
         }
@@ -70,37 +72,37 @@ impl<'a> Reference<'a> {
 
     /// How the reference itself went.
     #[must_use]
-    pub fn run(&self) -> &Run {
+    pub fn run_result(&self) -> &RunResult {
         &self.motion.run
     }
 
     /// Whether an error of transition times is larger than what the reference is sure of.
     #[must_use]
-    pub fn is_sure_of(&self, error_s: f64) -> bool {
+    pub fn resolves_error(&self, error_s: f64) -> bool {
         self.lists_agree && self.apart_s.is_none_or(|apart| error_s > apart)
     }
 
     /// Runs a setting and nothing else, to be timed.
     #[must_use]
-    pub fn run_bare(&self, setting: &Setting) -> Run {
-        run_with(self.scene, setting.effort(), &mut ())
+    pub fn run_untracked(&self, setting: &SolverSetting) -> RunResult {
+        run_scene_with(self.scene, setting.solver_options(), &mut ())
     }
 
     /// Runs a setting and holds it against the reference.
     #[must_use]
-    pub fn measure(&self, setting: Setting) -> Row {
-        let motion = Motion::of(self.scene, setting.effort());
-        let (state_rms, state_worst) = Motion::differences(&self.motion, &motion);
-        let components = self.spectral.read(&motion.deflection_m, &motion.head_drop_m);
+    pub fn measure_setting(&self, setting: SolverSetting) -> AccuracyRow {
+        let motion = SampledRun::run_scene(self.scene, setting.solver_options());
+        let (state_rms, state_worst) = SampledRun::deflection_differences(&self.motion, &motion);
+        let components = self.spectral.read_components(&motion.deflection_m, &motion.head_drop_m);
         let error = |i: usize| Some((components.hz[i]? - self.components.hz[i]?).abs());
-        Row {
+        AccuracyRow {
             setting,
             wall_s: f64::INFINITY,
-            lists: Lists::compare(&self.motion.transitions, &motion.transitions),
+            lists: TransitionDifference::from_lists(&self.motion.transitions, &motion.transitions),
             stop_error_s: (motion.run.stopped_at_s - self.motion.run.stopped_at_s).abs(),
             state_rms,
             state_worst,
-            components_hz: [error(LOW), error(HIGH)],
+            components_hz: [error(LOW_COMPONENT), error(HIGH_COMPONENT)],
             run: motion.run,
         }
     }

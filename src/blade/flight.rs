@@ -17,13 +17,13 @@
 //! The state carries the gap between tip and glass, `l1 (1 - cos theta) + l2 (1 - cos phi) - u`, in place of
 //! `u`: it starts at zero exactly and keeps its relative accuracy however low the tip flies.
 
-use super::shoulder::Lean;
-use super::{Directions, HeadMotion, Linkage, Pose};
+use super::shoulder::ShoulderContact;
+use super::{HeadMotion, LinkDirections, Linkage, Pose};
 use serde::Serialize;
 
 /// A state with the tip off the glass.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Airborne {
+pub struct FlightState {
     /// Angles and rates of both links.
     pub pose: Pose,
     /// Height of the tip above the glass, m.
@@ -54,7 +54,7 @@ pub struct ImpulseResponse {
 }
 
 /// The mass matrix with the head's drop eliminated, inverted, and the coupling to the drop.
-struct Inertia {
+struct ReducedInertia {
     inverse: [[f64; 2]; 2],
     /// Rate of the drop per rate of each link at no momentum of the drop: `m_a sin theta / M`, `m_b sin phi /
     /// M`.
@@ -62,27 +62,27 @@ struct Inertia {
 }
 
 impl Linkage {
-    fn inertia(&self, d: &Directions) -> Inertia {
+    fn reduced_inertia(&self, d: &LinkDirections) -> ReducedInertia {
         let carried = [self.m_a * d.sin_theta / self.mass_kg, self.m_b * d.sin_phi / self.mass_kg];
         let a11 = self.m_theta - self.m_a * d.sin_theta * carried[0];
         let a22 = self.m_phi - self.m_b * d.sin_phi * carried[1];
         let a12 = self.m_c * (d.cos_theta * d.cos_phi + d.sin_theta * d.sin_phi)
             - self.m_a * d.sin_theta * carried[1];
         let scale = 1.0 / (a11 * a22 - a12 * a12);
-        Inertia { inverse: [[scale * a22, -scale * a12], [-scale * a12, scale * a11]], carried }
+        ReducedInertia { inverse: [[scale * a22, -scale * a12], [-scale * a12, scale * a11]], carried }
     }
 
     /// Accelerations without contact forces.
     #[inline]
     #[must_use]
-    pub fn flight(
+    pub fn flight_accelerations(
         &self,
-        state: &Airborne,
-        d: &Directions,
+        state: &FlightState,
+        d: &LinkDirections,
         head: &HeadMotion,
-        lean: Lean,
+        lean: ShoulderContact,
     ) -> FlightAccelerations {
-        let Directions { sin_theta: st, cos_theta: ct, sin_phi: sp, cos_phi: cp } = *d;
+        let LinkDirections { sin_theta: st, cos_theta: ct, sin_phi: sp, cos_phi: cp } = *d;
         let Pose { theta, phi, theta_rate: dt, phi_rate: dp } = state.pose;
         let sin_difference = st * cp - ct * sp;
         let (drop, drop_rate) = self.drop_in_flight(state, d);
@@ -94,7 +94,7 @@ impl Linkage {
         let neck =
             self.neck.stiffness * theta + self.neck.damping * dt + self.shoulder_moment(&state.pose, lean);
         let along = head.acceleration_m_per_s2;
-        let Inertia { inverse, carried } = self.inertia(d);
+        let ReducedInertia { inverse, carried } = self.reduced_inertia(d);
         let right = [
             -self.m_c * sin_difference * dp * dp - self.m_a * along * ct + lip - neck + carried[0] * vertical,
             self.m_c * sin_difference * dt * dt - self.m_b * along * cp - lip + carried[1] * vertical,
@@ -110,7 +110,7 @@ impl Linkage {
     /// Drop of the head, m, and its rate, m/s, in flight.
     #[inline]
     #[must_use]
-    pub fn drop_in_flight(&self, state: &Airborne, d: &Directions) -> (f64, f64) {
+    pub fn drop_in_flight(&self, state: &FlightState, d: &LinkDirections) -> (f64, f64) {
         (
             self.head_drop_m(d) - state.gap_m,
             self.head_drop_rate_m_per_s(&state.pose, d) - state.gap_rate_m_per_s,
@@ -119,8 +119,8 @@ impl Linkage {
 
     /// What a unit impulse away from the glass and one along the sweep, +v, change.
     #[must_use]
-    pub fn impulse_responses(&self, d: &Directions) -> [ImpulseResponse; 2] {
-        let Inertia { inverse, carried } = self.inertia(d);
+    pub fn impulse_responses(&self, d: &LinkDirections) -> [ImpulseResponse; 2] {
+        let ReducedInertia { inverse, carried } = self.reduced_inertia(d);
         let normal = [self.l1_m * d.sin_theta, self.l2_m * d.sin_phi];
         let along = [self.l1_m * d.cos_theta, self.l2_m * d.cos_phi];
         let response = |on_links: [f64; 2], on_drop: f64| {
@@ -136,7 +136,7 @@ impl Linkage {
     /// Impulse along the sweep by which the drive keeps the head's velocity while the links' rates change by
     /// `rates`, rad/s, under a tangential impulse on the tip, N s.
     #[must_use]
-    pub fn drive_impulse_n_s(&self, d: &Directions, rates: [f64; 2], tangential_n_s: f64) -> f64 {
+    pub fn drive_impulse_n_s(&self, d: &LinkDirections, rates: [f64; 2], tangential_n_s: f64) -> f64 {
         self.m_a * d.cos_theta * rates[0] + self.m_b * d.cos_phi * rates[1] - tangential_n_s
     }
 }

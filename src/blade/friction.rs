@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// Coefficients of the friction law.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Friction {
+pub struct FrictionLaw {
     /// Part that falls with speed, `A`.
     pub a: f64,
     /// Its decay, `B`, s/m.
@@ -15,18 +15,18 @@ pub struct Friction {
     pub c: f64,
 }
 
-impl Friction {
+impl FrictionLaw {
     /// Coefficient of dynamic friction at the tip speed `|v3dot|`, m/s (equation (4) without the sign).
     #[inline]
     #[must_use]
-    pub fn dynamic(&self, speed_m_per_s: f64) -> f64 {
+    pub fn dynamic_coefficient(&self, speed_m_per_s: f64) -> f64 {
         self.a * math::exp(-self.b_s_per_m * speed_m_per_s) + self.c
     }
 
     /// Coefficient of static friction, `A + C`: the limit of the dynamic one at rest (equation (5)).
     #[inline]
     #[must_use]
-    pub fn at_rest(&self) -> f64 {
+    pub fn static_coefficient(&self) -> f64 {
         self.a + self.c
     }
 }

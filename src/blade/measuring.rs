@@ -1,18 +1,18 @@
 //! How each number of a scene is measured on a blade.
 
-use super::parameters::Quantity;
+use super::parameters::ParameterQuantity;
 
 /// What the masses, inertias, stiffnesses, dampings and the preload of a scene are for.
 ///
 /// The equations of motion keep their solution if all of these are multiplied by one factor, so that any
 /// length of blade will do.
-pub const SAME_LENGTH: &str = "Masses, inertias, stiffnesses, dampings and the preload are all for one and \
+pub const SAME_LENGTH_ADVICE: &str = "Masses, inertias, stiffnesses, dampings and the preload are all for one and \
                                the same length of blade: the whole blade, the piece on the rig, or one metre.";
 
-impl Quantity {
+impl ParameterQuantity {
     /// How the quantity is measured, in one sentence.
     #[must_use]
-    pub fn how_measured(self) -> &'static str {
+    pub fn measurement_method(self) -> &'static str {
         match self {
             Self::HeadMass => "weigh everything that moves with the head: upper profile, spring strip, claws",
             Self::NeckMass => "density times cross section times length of blade, or weigh a neck cut free",

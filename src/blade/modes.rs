@@ -33,7 +33,7 @@ pub struct NaturalMode {
 
 /// The three single-body natural frequencies that the paper names, Hz.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct NamedFrequencies {
+pub struct BodyFrequencies {
     /// `sqrt(k0/M)/2 pi`.
     pub head_hz: f64,
     /// `sqrt(k1/m_theta)/2 pi`.
@@ -44,7 +44,7 @@ pub struct NamedFrequencies {
 
 /// Which end of the lip may move along the glass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Tip {
+pub enum TipConstraint {
     /// The tip slides without friction: two modes.
     Free,
     /// The tip is held: one mode.
@@ -53,8 +53,8 @@ pub enum Tip {
 
 /// The named frequencies of a blade.
 #[must_use]
-pub fn named(blade: &Linkage) -> NamedFrequencies {
-    NamedFrequencies {
+pub fn body_frequencies(blade: &Linkage) -> BodyFrequencies {
+    BodyFrequencies {
         head_hz: natural_frequency_hz(blade.head.stiffness, blade.mass_kg),
         neck_hz: natural_frequency_hz(blade.neck.stiffness, blade.m_theta),
         lip_hz: natural_frequency_hz(blade.lip.stiffness, blade.m_phi),
@@ -64,15 +64,15 @@ pub fn named(blade: &Linkage) -> NamedFrequencies {
 /// Modes in rising frequency; `on_shoulder` adds the shoulder's stiffness and damping to the neck's (about
 /// the upright position).
 #[must_use]
-pub fn modes(blade: &Linkage, tip: Tip, on_shoulder: bool) -> Vec<NaturalMode> {
-    let (m, c, k) = matrices(blade, on_shoulder);
+pub fn natural_modes(blade: &Linkage, tip: TipConstraint, on_shoulder: bool) -> Vec<NaturalMode> {
+    let (m, c, k) = linearised_matrices(blade, on_shoulder);
     match tip {
-        Tip::Free => free_modes(&m, &c, &k),
-        Tip::Held => {
+        TipConstraint::Free => free_modes(&m, &c, &k),
+        TipConstraint::Held => {
             // q = (1, -l1/l2) times one amplitude
             let shape = nalgebra::Vector2::new(1.0, -blade.l1_m / blade.l2_m);
             let along = |a: &Matrix2<f64>| shape.dot(&(a * shape));
-            vec![single(along(&m), along(&c), along(&k), shape[1])]
+            vec![single_mode(along(&m), along(&c), along(&k), shape[1])]
         }
     }
 }
@@ -83,7 +83,7 @@ pub fn modes(blade: &Linkage, tip: Tip, on_shoulder: bool) -> Vec<NaturalMode> {
 /// `H = b^T (k + i w c - w^2 m)^-1 b` with `b = (l1, l2)`, the head at rest.
 #[must_use]
 pub fn tip_compliance(blade: &Linkage, on_shoulder: bool, frequency_hz: f64) -> Complex<f64> {
-    let (m, c, k) = matrices(blade, on_shoulder);
+    let (m, c, k) = linearised_matrices(blade, on_shoulder);
     let w = TAU * frequency_hz;
     let of = |i, j| Complex::new(k[(i, j)] - w * w * m[(i, j)], w * c[(i, j)]);
     let (a, b, d) = (of(0, 0), of(0, 1), of(1, 1));
@@ -95,12 +95,12 @@ pub fn tip_compliance(blade: &Linkage, on_shoulder: bool, frequency_hz: f64) -> 
 #[must_use]
 pub fn time_scales_rad_per_s(blade: &Linkage) -> (f64, f64) {
     let unloaded = Linkage { preload_displacement_m: 0.0, ..*blade };
-    let (m, _, k) = matrices(&unloaded, false);
+    let (m, _, k) = linearised_matrices(&unloaded, false);
     let (low, high) = squared_frequencies(&m, &k);
     (low.max(0.0).sqrt(), high.max(0.0).sqrt())
 }
 
-fn matrices(blade: &Linkage, on_shoulder: bool) -> (Matrix2<f64>, Matrix2<f64>, Matrix2<f64>) {
+fn linearised_matrices(blade: &Linkage, on_shoulder: bool) -> (Matrix2<f64>, Matrix2<f64>, Matrix2<f64>) {
     let (mut k1, mut c1) = (blade.neck.stiffness, blade.neck.damping);
     if let (true, Some(shoulder)) = (on_shoulder, blade.shoulder) {
         k1 += shoulder.stiffness_n_m_per_rad;
@@ -161,7 +161,7 @@ fn damped_pairs(m: &Matrix2<f64>, c: &Matrix2<f64>, k: &Matrix2<f64>) -> Vec<(f6
     if pairs.len() == 2 { pairs } else { Vec::new() }
 }
 
-fn single(m: f64, c: f64, k: f64, lip_over_neck: f64) -> NaturalMode {
+fn single_mode(m: f64, c: f64, k: f64, lip_over_neck: f64) -> NaturalMode {
     let stable = k > 0.0;
     let ratio = c / (2.0 * (k.max(0.0) * m).sqrt());
     let oscillates = stable && ratio < 1.0;

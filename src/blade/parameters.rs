@@ -1,7 +1,7 @@
 //! The one table of a scene's numbers: name, symbol, unit, admissible range, scale and meaning.
 //!
 //! Files, refusals, fits and reports all read this table. Where a quantity can be written in two ways (a
-//! stiffness or a natural frequency), both rows carry the same [`Quantity`] and a scene gives exactly one of
+//! stiffness or a natural frequency), both rows carry the same [`ParameterQuantity`] and a scene gives exactly one of
 //! them.
 
 use super::{Linkage, Spring};
@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 /// Which values of a parameter make sense.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Range {
+pub enum ParameterRange {
     /// Above zero.
     Positive,
     /// Zero or above.
@@ -19,7 +19,7 @@ pub enum Range {
     Within(f64, f64),
 }
 
-impl Range {
+impl ParameterRange {
     /// Whether a value is admissible; infinities and NaN never are.
     #[must_use]
     pub fn admits(self, value: f64) -> bool {
@@ -33,7 +33,7 @@ impl Range {
 
     /// The range in words.
     #[must_use]
-    pub fn in_words(self) -> String {
+    pub fn describe(self) -> String {
         match self {
             Self::Positive => "a number above 0".to_owned(),
             Self::NotNegative => "a number of 0 or more".to_owned(),
@@ -44,7 +44,7 @@ impl Range {
 
 /// How a search should move along a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Scale {
+pub enum ParameterScale {
     /// By factors.
     Log,
     /// By differences.
@@ -54,7 +54,7 @@ pub enum Scale {
 /// What a parameter says, whichever way it is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)] // the rows of the table say what each is
-pub enum Quantity {
+pub enum ParameterQuantity {
     HeadMass,
     NeckMass,
     LipMass,
@@ -84,7 +84,7 @@ pub enum Quantity {
 
 /// One row of the table.
 #[derive(Debug, Clone, Copy)]
-pub struct Parameter {
+pub struct ModelParameter {
     /// Name: the scene's table and key.
     pub name: &'static str,
     /// The paper's letter.
@@ -92,13 +92,13 @@ pub struct Parameter {
     /// Unit as shown.
     pub unit: &'static str,
     /// What it says.
-    pub quantity: Quantity,
+    pub quantity: ParameterQuantity,
     /// Value of the quantity when a scene leaves it out; `None` if it must be given.
     pub default: Option<f64>,
     /// Admissible values.
-    pub range: Range,
+    pub range: ParameterRange,
     /// How a search should move along it.
-    pub scale: Scale,
+    pub scale: ParameterScale,
     /// What it is, in words.
     pub meaning: &'static str,
 }
@@ -109,14 +109,14 @@ macro_rules! table {
         $default:expr, $range:expr, $scale:ident, $meaning:literal;
     )*) => {
         /// Every number of a scene that a file may set and a fit may free.
-        pub const PARAMETERS: &[Parameter] = &[$(Parameter {
-            name: $name, symbol: $symbol, unit: $unit, quantity: Quantity::$quantity,
-            default: $default, range: $range, scale: Scale::$scale, meaning: $meaning,
+        pub const PARAMETERS: &[ModelParameter] = &[$(ModelParameter {
+            name: $name, symbol: $symbol, unit: $unit, quantity: ParameterQuantity::$quantity,
+            default: $default, range: $range, scale: ParameterScale::$scale, meaning: $meaning,
         }),*];
     };
 }
 
-use Range::{NotNegative, Positive, Within};
+use ParameterRange::{NotNegative, Positive, Within};
 
 /// The angle of a shoulder lies between upright and level.
 const RIGHT_ANGLE: f64 = std::f64::consts::FRAC_PI_2;
@@ -160,13 +160,13 @@ table! {
 
 /// The row of a name.
 #[must_use]
-pub fn find(name: &str) -> Option<&'static Parameter> {
+pub fn find_parameter(name: &str) -> Option<&'static ModelParameter> {
     PARAMETERS.iter().find(|p| p.name == name)
 }
 
 /// Every name, in the order of the table.
 #[must_use]
-pub fn names() -> Vec<&'static str> {
+pub fn parameter_names() -> Vec<&'static str> {
     PARAMETERS.iter().map(|p| p.name).collect()
 }
 
@@ -178,21 +178,22 @@ pub(crate) fn natural_frequency_hz(stiffness: f64, inertia: f64) -> f64 {
 
 /// Stiffness that gives an inertia this natural frequency.
 #[must_use]
-pub fn stiffness_of(frequency_hz: f64, inertia: f64) -> f64 {
+pub fn stiffness_from_frequency(frequency_hz: f64, inertia: f64) -> f64 {
     inertia * math::powi(TAU * frequency_hz, 2)
 }
 
 /// Damping of `ratio` times the critical one, `2 sqrt(stiffness inertia)`.
 #[must_use]
-pub fn damping_of(ratio: f64, stiffness: f64, inertia: f64) -> f64 {
+pub fn damping_from_ratio(ratio: f64, stiffness: f64, inertia: f64) -> f64 {
     2.0 * ratio * (stiffness * inertia).sqrt()
 }
 
 /// The value of a parameter that a blade was given in the other way; `None` where a name has no second way or
 /// the blade no such part.
 #[must_use]
-pub fn converted(name: &str, blade: &Linkage) -> Option<f64> {
-    let ratio = |spring: &Spring, inertia: f64| spring.damping / damping_of(1.0, spring.stiffness, inertia);
+pub fn convert_value(name: &str, blade: &Linkage) -> Option<f64> {
+    let ratio =
+        |spring: &Spring, inertia: f64| spring.damping / damping_from_ratio(1.0, spring.stiffness, inertia);
     let (mass, theta, phi) = (blade.mass_kg, blade.m_theta, blade.m_phi);
     let (_, key) = name.split_once('.')?;
     if name.starts_with("shoulder.") {
@@ -201,9 +202,10 @@ pub fn converted(name: &str, blade: &Linkage) -> Option<f64> {
             "stiffness_n_m_per_rad" => Some(shoulder.stiffness_n_m_per_rad),
             "stiffness_ratio" => Some(shoulder.stiffness_n_m_per_rad / blade.neck.stiffness),
             "damping_n_m_s_per_rad" => Some(shoulder.damping_n_m_s_per_rad),
-            "damping_ratio" => {
-                Some(shoulder.damping_n_m_s_per_rad / damping_of(1.0, shoulder.stiffness_n_m_per_rad, theta))
-            }
+            "damping_ratio" => Some(
+                shoulder.damping_n_m_s_per_rad
+                    / damping_from_ratio(1.0, shoulder.stiffness_n_m_per_rad, theta),
+            ),
             _ => None,
         };
     }

@@ -16,14 +16,14 @@
 //! so that eight products of series, and two more for friction, are all that a coefficient costs. The highest
 //! coefficients enter linearly with the matrix of the instant itself, which is inverted once.
 
-use super::{Directions, Lean, Linkage, Pose};
+use super::{LinkDirections, Linkage, Pose, ShoulderContact};
 
 /// A quantity of neck and lip.
-pub(super) type Pair = [f64; 2];
+pub(super) type LinkPair = [f64; 2];
 
 /// How the tip touches the glass while the motion is expanded.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Touch {
+pub enum ContactMode {
     /// It slides in this direction, +1 or -1.
     Slip(f64),
     /// It is held at its place.
@@ -32,10 +32,10 @@ pub enum Touch {
     Flight(f64, f64),
 }
 
-impl Touch {
+impl ContactMode {
     /// Direction of slip, 0 in stick and flight.
     #[inline]
-    pub(super) fn direction(self) -> f64 {
+    pub(super) fn slip_direction(self) -> f64 {
         match self {
             Self::Slip(direction) => direction,
             Self::Stick | Self::Flight(..) => 0.0,
@@ -45,23 +45,23 @@ impl Touch {
 
 /// Factors of the products that a coefficient of index `j` enters from the left.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Left {
-    pub cos: Pair,
-    pub sin: Pair,
+pub(super) struct LeftFactors {
+    pub cos: LinkPair,
+    pub sin: LinkPair,
     /// `mu_j` and `j v3'_j`.
-    pub slip: Pair,
+    pub slip: LinkPair,
 }
 
 /// Factors that an index `m` enters from the right; those that are known later by one order carry the next
 /// index.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Right {
+pub(super) struct RightFactors {
     /// Angular rates of index `m + 1`.
-    next_rate: Pair,
-    pub x: Pair,
-    pub y: Pair,
+    next_rate: LinkPair,
+    pub x: LinkPair,
+    pub y: LinkPair,
     /// `N_m`, and the falling part of `mu` of index `m + 1`.
-    slip: Pair,
+    slip: LinkPair,
 }
 
 /// Taylor coefficients of the motion; `K` is their number, that of `x^0` included.
@@ -72,9 +72,9 @@ pub struct MotionSeries<const K: usize> {
     /// Velocity of the head along the sweep, m/s: given.
     pub head_velocity: [f64; K],
     /// Angles of neck and lip, rad.
-    pub angle: [Pair; K],
+    pub angle: [LinkPair; K],
     /// Angular rates, rad/s.
-    pub rate: [Pair; K],
+    pub rate: [LinkPair; K],
     /// Velocity of the tip along the sweep, m/s.
     pub tip_velocity: [f64; K],
     /// Drop of the head, m.
@@ -89,11 +89,11 @@ pub struct MotionSeries<const K: usize> {
     /// Order to which the motion was expanded last.
     pub order: usize,
     pub(super) drop_rate: [f64; K],
-    pub(super) left: [Left; K],
-    pub(super) right: [Right; K],
+    pub(super) left: [LeftFactors; K],
+    pub(super) right: [RightFactors; K],
     /// `p` and `q` of the highest order.
-    pub(super) p: Pair,
-    pub(super) q: Pair,
+    pub(super) p: LinkPair,
+    pub(super) q: LinkPair,
 }
 
 impl<const K: usize> Default for MotionSeries<K> {
@@ -109,8 +109,8 @@ impl<const K: usize> Default for MotionSeries<K> {
             indicator: 1.0,
             order: 0,
             drop_rate: [0.0; K],
-            left: [Left::default(); K],
-            right: [Right::default(); K],
+            left: [LeftFactors::default(); K],
+            right: [RightFactors::default(); K],
             p: [0.0; 2],
             q: [0.0; 2],
         }
@@ -119,43 +119,43 @@ impl<const K: usize> Default for MotionSeries<K> {
 
 /// Sums over the products of lower orders.
 #[derive(Clone, Copy, Default)]
-struct Sums {
-    p: Pair,
-    q: Pair,
-    x: Pair,
-    y: Pair,
-    slip: Pair,
+struct ProductSums {
+    p: LinkPair,
+    q: LinkPair,
+    x: LinkPair,
+    y: LinkPair,
+    slip: LinkPair,
 }
 
 /// The part of the recurrence that does not change with the order: everything that contains the angles of the
 /// instant alone.
 #[derive(Debug, Clone)]
-pub(super) struct Instant {
-    pub l: Pair,
+pub(super) struct RecurrenceConstants {
+    pub l: LinkPair,
     /// `m_a`, `m_b`.
-    pub m: Pair,
+    pub m: LinkPair,
     /// `m_a - M l1`, `m_b - M l2`: what the normal force takes of `q'`.
-    pub arm: Pair,
+    pub arm: LinkPair,
     /// Inverse of the matrix of the accelerations, friction included.
-    pub inverse: [Pair; 2],
+    pub inverse: [LinkPair; 2],
     /// `A^-1 w` and `1 / (w.A^-1 w)` with `w = (l1 cos theta, l2 cos phi)`, for stick.
-    pub w: Pair,
-    pub per_force: Pair,
+    pub w: LinkPair,
+    pub per_force: LinkPair,
     pub mobility: f64,
     /// How `u''` depends on the accelerations and on the rest of `q'`, and how `N` depends on the
     /// accelerations.
-    pub drop: Pair,
-    pub drop_rest: Pair,
-    pub normal: Pair,
+    pub drop: LinkPair,
+    pub drop_rest: LinkPair,
+    pub normal: LinkPair,
     /// What a newton of normal force and one of the friction's lower orders do to the moments of neck and
     /// lip.
-    pub per_normal: Pair,
-    pub per_slip: Pair,
+    pub per_normal: LinkPair,
+    pub per_slip: LinkPair,
     /// `cos` and `sin` of the instant times `m_c` and times `m`.
-    pub cos_m_c: Pair,
-    pub sin_m_c: Pair,
-    pub cos_m: Pair,
-    pub sin_m: Pair,
+    pub cos_m_c: LinkPair,
+    pub sin_m_c: LinkPair,
+    pub cos_m: LinkPair,
+    pub sin_m: LinkPair,
     /// Friction coefficient with the sign of its force.
     pub mu: f64,
     /// Stiffness of the neck, the shoulder's included where it leans, its damping, and the moment at zero
@@ -167,20 +167,27 @@ pub(super) struct Instant {
 
 impl<const K: usize> MotionSeries<K> {
     /// Coefficients up to `x^order` of the motion from `pose`; `self.head_velocity` holds those of the head.
-    pub fn expand(&mut self, linkage: &Linkage, touch: Touch, lean: Lean, pose: &Pose, order: usize) {
+    pub fn expand(
+        &mut self,
+        linkage: &Linkage,
+        touch: ContactMode,
+        lean: ShoulderContact,
+        pose: &Pose,
+        order: usize,
+    ) {
         let order = order.min(K - 1);
         self.order = order;
-        self.begin(linkage, touch, pose);
-        let instant = self.instant(linkage, touch, lean);
+        self.set_start(linkage, touch, pose);
+        let instant = self.recurrence_constants(linkage, touch, lean);
         self.indicator = instant.indicator;
-        (self.right[order], self.friction_n[order]) = (Right::default(), 0.0);
+        (self.right[order], self.friction_n[order]) = (RightFactors::default(), 0.0);
         match touch {
-            Touch::Slip(direction) if linkage.friction.a != 0.0 => {
-                (0..order).for_each(|k| self.advance::<true>(linkage, touch, &instant, k, direction))
+            ContactMode::Slip(direction) if linkage.friction.a != 0.0 => {
+                (0..order).for_each(|k| self.advance_order::<true>(linkage, touch, &instant, k, direction))
             }
-            _ => {
-                (0..order).for_each(|k| self.advance::<false>(linkage, touch, &instant, k, touch.direction()))
-            }
+            _ => (0..order).for_each(|k| {
+                self.advance_order::<false>(linkage, touch, &instant, k, touch.slip_direction())
+            }),
         }
     }
 
@@ -205,48 +212,55 @@ impl<const K: usize> MotionSeries<K> {
         self.right[k].slip[0]
     }
 
-    fn begin(&mut self, linkage: &Linkage, touch: Touch, pose: &Pose) {
-        let d = Directions::of(pose);
+    fn set_start(&mut self, linkage: &Linkage, touch: ContactMode, pose: &Pose) {
+        let d = LinkDirections::from_pose(pose);
         let (sin, cos, rate) =
             ([d.sin_theta, d.sin_phi], [d.cos_theta, d.cos_phi], [pose.theta_rate, pose.phi_rate]);
         self.angle[0] = [pose.theta, pose.phi];
         self.rate[0] = rate;
-        self.p = each(|i| cos[i] * rate[i]);
-        self.q = each(|i| sin[i] * rate[i]);
-        self.tip_velocity[0] = self.tip_rate(linkage, 0);
+        self.p = per_link(|i| cos[i] * rate[i]);
+        self.q = per_link(|i| sin[i] * rate[i]);
+        self.tip_velocity[0] = self.tip_velocity_at(linkage, 0);
         (self.drop_m[0], self.drop_rate[0]) = match touch {
-            Touch::Flight(drop, rate) => (drop, rate),
+            ContactMode::Flight(drop, rate) => (drop, rate),
             _ => (linkage.head_drop_m(&d), linkage.l1_m * self.q[0] + linkage.l2_m * self.q[1]),
         };
         let mu = match touch {
-            Touch::Slip(direction) => linkage.friction.dynamic(direction * self.tip_velocity[0]),
+            ContactMode::Slip(direction) => {
+                linkage.friction.dynamic_coefficient(direction * self.tip_velocity[0])
+            }
             _ => 0.0,
         };
-        self.left[0] = Left { cos, sin, slip: [mu, 0.0] };
+        self.left[0] = LeftFactors { cos, sin, slip: [mu, 0.0] };
     }
 
     #[inline(always)]
-    fn tip_rate(&self, linkage: &Linkage, k: usize) -> f64 {
+    fn tip_velocity_at(&self, linkage: &Linkage, k: usize) -> f64 {
         self.head_velocity[k] + linkage.l1_m * self.p[0] + linkage.l2_m * self.p[1]
     }
 
     /// What the first coefficients alone determine.
-    pub(super) fn instant(&self, linkage: &Linkage, touch: Touch, lean: Lean) -> Instant {
+    pub(super) fn recurrence_constants(
+        &self,
+        linkage: &Linkage,
+        touch: ContactMode,
+        lean: ShoulderContact,
+    ) -> RecurrenceConstants {
         let Linkage { mass_kg: mass, l1_m: l1, l2_m: l2, m_a, m_b, m_c, m_theta, m_phi, .. } = *linkage;
-        let Left { cos: c, sin: s, slip: [mu, _] } = self.left[0];
+        let LeftFactors { cos: c, sin: s, slip: [mu, _] } = self.left[0];
         let (l, m) = ([l1, l2], [m_a, m_b]);
         let arm = [m_a - mass * l1, m_b - mass * l2];
         // in flight `u''` follows from its own equation and nothing presses
-        let flies = matches!(touch, Touch::Flight(..));
+        let flies = matches!(touch, ContactMode::Flight(..));
         let drop_rest = if flies { m.map(|m| m / mass) } else { l };
-        let drop = each(|i| drop_rest[i] * s[i]);
-        let normal = if flies { [0.0; 2] } else { each(|i| arm[i] * s[i]) };
+        let drop = per_link(|i| drop_rest[i] * s[i]);
+        let normal = if flies { [0.0; 2] } else { per_link(|i| arm[i] * s[i]) };
         let a11 = m_theta - s[0] * (m_a * drop[0] + l1 * normal[0]);
         let a22 = m_phi - s[1] * (m_b * drop[1] + l2 * normal[1]);
         let a12 = m_c * (c[0] * c[1] + s[0] * s[1]) - s[0] * (m_a * drop[1] + l1 * normal[1]);
         let determinant = a11 * a22 - a12 * a12;
-        let w = each(|i| l[i] * c[i]);
-        let direction = touch.direction();
+        let w = per_link(|i| l[i] * c[i]);
+        let direction = touch.slip_direction();
         let friction = normal.map(|n| -direction * mu * n);
         let matrix = [
             [a11 - w[0] * friction[0], a12 - w[0] * friction[1]],
@@ -256,8 +270,8 @@ impl<const K: usize> MotionSeries<K> {
         let share = 1.0 / with_friction;
         let inverse =
             [[share * matrix[1][1], -share * matrix[0][1]], [-share * matrix[1][0], share * matrix[0][0]]];
-        let per_force = each(|i| inverse[i][0] * w[0] + inverse[i][1] * w[1]);
-        Instant {
+        let per_force = per_link(|i| inverse[i][0] * w[0] + inverse[i][1] * w[1]);
+        RecurrenceConstants {
             l,
             m,
             arm,
@@ -268,14 +282,14 @@ impl<const K: usize> MotionSeries<K> {
             drop,
             drop_rest,
             normal,
-            per_normal: each(|i| if flies { 0.0 } else { direction * mu * w[i] - l[i] * s[i] }),
-            per_slip: each(|i| direction * w[i]),
+            per_normal: per_link(|i| if flies { 0.0 } else { direction * mu * w[i] - l[i] * s[i] }),
+            per_slip: per_link(|i| direction * w[i]),
             cos_m_c: c.map(|c| c * m_c),
             sin_m_c: s.map(|s| s * m_c),
-            cos_m: each(|i| c[i] * m[i]),
-            sin_m: each(|i| s[i] * m[i]),
+            cos_m: per_link(|i| c[i] * m[i]),
+            sin_m: per_link(|i| s[i] * m[i]),
             mu: -direction * mu,
-            neck: linkage.neck_and_shoulder(lean),
+            neck: linkage.neck_spring(lean),
             indicator: with_friction / determinant,
         }
     }
@@ -283,67 +297,71 @@ impl<const K: usize> MotionSeries<K> {
     /// From the coefficients of angles and rates up to `x^k` to those of `x^(k + 1)`; `FALLING` is slip under
     /// friction that falls with speed.
     #[inline(always)]
-    fn advance<const FALLING: bool>(
+    fn advance_order<const FALLING: bool>(
         &mut self,
         linkage: &Linkage,
-        touch: Touch,
-        at: &Instant,
+        touch: ContactMode,
+        at: &RecurrenceConstants,
         k: usize,
         direction: f64,
     ) {
         let next = (k + 1) as f64;
         let share = 1.0 / next;
-        let Left { cos: c, sin: s, slip: [mu, _] } = self.left[0];
-        self.angle[k + 1] = each(|i| self.rate[k][i] * share);
-        let (cos, sin) = (each(|i| -self.q[i] * share), each(|i| self.p[i] * share));
-        let sums = self.sums::<FALLING>(k);
+        let LeftFactors { cos: c, sin: s, slip: [mu, _] } = self.left[0];
+        self.angle[k + 1] = per_link(|i| self.rate[k][i] * share);
+        let (cos, sin) = (per_link(|i| -self.q[i] * share), per_link(|i| self.p[i] * share));
+        let sums = self.sum_products::<FALLING>(k);
         // p and q of the next order but for the part of the rate that is solved for
-        let rest_p = each(|i| sums.p[i] + cos[i] * self.rate[0][i]);
-        let rest_q = each(|i| sums.q[i] + sin[i] * self.rate[0][i]);
-        let (tp, tq) = (each(|i| next * rest_p[i]), each(|i| next * rest_q[i]));
+        let rest_p = per_link(|i| sums.p[i] + cos[i] * self.rate[0][i]);
+        let rest_q = per_link(|i| sums.q[i] + sin[i] * self.rate[0][i]);
+        let (tp, tq) = (per_link(|i| next * rest_p[i]), per_link(|i| next * rest_q[i]));
         let head_acceleration = next * self.head_velocity[k + 1];
 
-        let support = self.support(linkage, k);
+        let support = self.support_force(linkage, k);
         let rest_drop = at.drop_rest[0] * tq[0]
             + at.drop_rest[1] * tq[1]
-            + if let Touch::Flight(..) = touch { support / linkage.mass_kg } else { 0.0 };
-        let rest_normal =
-            if let Touch::Flight(..) = touch { 0.0 } else { support + at.arm[0] * tq[0] + at.arm[1] * tq[1] };
+            + if let ContactMode::Flight(..) = touch { support / linkage.mass_kg } else { 0.0 };
+        let rest_normal = if let ContactMode::Flight(..) = touch {
+            0.0
+        } else {
+            support + at.arm[0] * tq[0] + at.arm[1] * tq[1]
+        };
         let springs = self.spring_moments(linkage, at, k);
-        let known = each(|i| {
+        let known = per_link(|i| {
             sums.x[i] + sums.y[i] + springs[i] + if FALLING { at.per_slip[i] * sums.slip[0] } else { 0.0 }
         });
-        let b = each(|i| {
+        let b = per_link(|i| {
             let other = 1 - i;
             let inertial =
                 at.cos_m_c[i] * tp[other] + at.sin_m_c[i] * tq[other] + at.cos_m[i] * head_acceleration
                     - at.sin_m[i] * rest_drop;
             inertial + at.per_normal[i] * rest_normal + known[i]
         });
-        let mut a = each(|i| -(at.inverse[i][0] * b[0] + at.inverse[i][1] * b[1]));
+        let mut a = per_link(|i| -(at.inverse[i][0] * b[0] + at.inverse[i][1] * b[1]));
         let mut held = 0.0;
-        if touch == Touch::Stick {
+        if touch == ContactMode::Stick {
             let tip = head_acceleration + at.l[0] * tp[0] + at.l[1] * tp[1] + at.w[0] * a[0] + at.w[1] * a[1];
             held = -tip * at.mobility;
-            a = each(|i| a[i] + held * at.per_force[i]);
+            a = per_link(|i| a[i] + held * at.per_force[i]);
         }
         let drop = rest_drop + at.drop[0] * a[0] + at.drop[1] * a[1];
         let normal = rest_normal + at.normal[0] * a[0] + at.normal[1] * a[1];
         let force = at.mu * normal + held - if FALLING { direction * sums.slip[0] } else { 0.0 };
 
-        let rate = each(|i| a[i] * share);
-        (self.p, self.q) = (each(|i| rest_p[i] + c[i] * rate[i]), each(|i| rest_q[i] + s[i] * rate[i]));
+        let rate = per_link(|i| a[i] * share);
+        (self.p, self.q) =
+            (per_link(|i| rest_p[i] + c[i] * rate[i]), per_link(|i| rest_q[i] + s[i] * rate[i]));
         let coupling = linkage.m_c * next;
-        let x = each(|i| coupling * self.p[1 - i] + at.m[i] * head_acceleration - at.l[i] * force);
-        let y = each(|i| coupling * self.q[1 - i] - at.m[i] * drop - at.l[i] * normal);
+        let x = per_link(|i| coupling * self.p[1 - i] + at.m[i] * head_acceleration - at.l[i] * force);
+        let y = per_link(|i| coupling * self.q[1 - i] - at.m[i] * drop - at.l[i] * normal);
         self.rate[k + 1] = rate;
         self.friction_n[k] = force;
         self.drop_rate[k + 1] = drop * share;
-        if let Touch::Flight(..) = touch {
+        if let ContactMode::Flight(..) = touch {
             self.gap_rate[k + 1] = at.l[0] * self.q[0] + at.l[1] * self.q[1] - drop * share;
         }
         self.drop_m[k + 1] = self.drop_rate[k] * share;
-        let tip = self.tip_rate(linkage, k + 1);
+        let tip = self.tip_velocity_at(linkage, k + 1);
         self.tip_velocity[k + 1] = tip;
         let mut falling = 0.0;
         if FALLING {
@@ -351,15 +369,15 @@ impl<const K: usize> MotionSeries<K> {
             let sum = sums.slip[1] + next * tip * (mu - linkage.friction.c);
             falling = -linkage.friction.b_s_per_m * direction * sum * share;
         }
-        self.left[k + 1] = Left { cos, sin, slip: [falling, next * tip] };
-        self.right[k] = Right { next_rate: rate, x, y, slip: [normal, falling] };
+        self.left[k + 1] = LeftFactors { cos, sin, slip: [falling, next * tip] };
+        self.right[k] = RightFactors { next_rate: rate, x, y, slip: [normal, falling] };
     }
 
     /// Products of known coefficients, the newest factors last: their computation may still be under way when
     /// the sum starts.
     #[inline(always)]
-    fn sums<const FALLING: bool>(&self, k: usize) -> Sums {
-        let mut sums = Sums::default();
+    fn sum_products<const FALLING: bool>(&self, k: usize) -> ProductSums {
+        let mut sums = ProductSums::default();
         for (left, right) in self.left[1..=k].iter().rev().zip(&self.right[..k]) {
             for i in 0..2 {
                 sums.p[i] += left.cos[i] * right.next_rate[i];
@@ -376,7 +394,7 @@ impl<const K: usize> MotionSeries<K> {
 
     /// Moments of the springs and dampers of both links, N m, coefficient `k`.
     #[inline(always)]
-    fn spring_moments(&self, linkage: &Linkage, at: &Instant, k: usize) -> Pair {
+    fn spring_moments(&self, linkage: &Linkage, at: &RecurrenceConstants, k: usize) -> LinkPair {
         let ([theta, phi], [theta_rate, phi_rate]) = (self.angle[k], self.rate[k]);
         let lip = linkage.lip.stiffness * (phi - theta) + linkage.lip.damping * (phi_rate - theta_rate);
         let neck = at.neck[0] * theta + at.neck[1] * theta_rate + if k == 0 { at.neck[2] } else { 0.0 };
@@ -385,7 +403,7 @@ impl<const K: usize> MotionSeries<K> {
 
     /// Force of the head's support on the head, N, coefficient `k`.
     #[inline(always)]
-    fn support(&self, linkage: &Linkage, k: usize) -> f64 {
+    fn support_force(&self, linkage: &Linkage, k: usize) -> f64 {
         let preload = if k == 0 { linkage.preload_displacement_m } else { 0.0 };
         linkage.head.stiffness * (preload - self.drop_m[k]) - linkage.head.damping * self.drop_rate[k]
     }
@@ -393,6 +411,6 @@ impl<const K: usize> MotionSeries<K> {
 
 /// One value a link.
 #[inline(always)]
-pub(super) fn each(f: impl Fn(usize) -> f64) -> Pair {
+pub(super) fn per_link(f: impl Fn(usize) -> f64) -> LinkPair {
     [f(0), f(1)]
 }

@@ -28,11 +28,11 @@ impl Shoulder {
 
     /// Which side a neck at this angle leans on.
     #[must_use]
-    pub fn lean(&self, theta: f64) -> Lean {
+    pub fn contact_at(&self, theta: f64) -> ShoulderContact {
         match theta {
-            t if t > self.contact_angle_rad => Lean::Forward,
-            t if t < -self.contact_angle_rad => Lean::Backward,
-            _ => Lean::Off,
+            t if t > self.contact_angle_rad => ShoulderContact::Forward,
+            t if t < -self.contact_angle_rad => ShoulderContact::Backward,
+            _ => ShoulderContact::Off,
         }
     }
 
@@ -45,7 +45,7 @@ impl Shoulder {
 
 /// Whether the neck leans on the shoulder, and on which side of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Lean {
+pub enum ShoulderContact {
     /// Free of the shoulder.
     Off,
     /// On the side of positive angles.
@@ -54,11 +54,11 @@ pub enum Lean {
     Backward,
 }
 
-impl Lean {
+impl ShoulderContact {
     /// Sign of the angles on this side, 0 when free.
     #[inline]
     #[must_use]
-    pub fn sign(self) -> f64 {
+    pub fn angle_sign(self) -> f64 {
         match self {
             Self::Off => 0.0,
             Self::Forward => 1.0,

@@ -26,23 +26,23 @@ mod linkage;
 mod row;
 mod source;
 
-pub use channel::{Form, Quantity};
-pub use course::Course;
-pub use equations::{Matrices, Single};
-pub use instants::{Attitude, Instants, row_of};
-pub use linkage::{Constant, LinkageTangent, SpringTangent};
-pub use row::{LANES, Row};
-pub use source::{Effect, HeadShift};
+pub use channel::{LinearForm, ModelChannel};
+pub use course::ReferenceMotion;
+pub use equations::{StickEquation, TangentMatrices};
+pub use instants::{LinkAttitudes, MotionSamples, fill_lanes};
+pub use linkage::{LinkageConstant, LinkageTangent, SpringTangent};
+pub use row::{LANES, LaneVector};
+pub use source::{ForcingTerms, HeadMotionChange};
 
 /// Derivatives of the state at the start of a step.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct StateTangent {
     /// Of the angles of neck and lip, rad over the unit of the direction, and so on.
-    pub angle: [Row; 2],
+    pub angle: [LaneVector; 2],
     /// Of the angular rates, rad/s.
-    pub rate: [Row; 2],
+    pub rate: [LaneVector; 2],
     /// Of the gap between tip and glass, m: nothing in contact.
-    pub gap_m: Row,
+    pub gap_m: LaneVector,
     /// Of its rate, m/s.
-    pub gap_rate: Row,
+    pub gap_rate: LaneVector,
 }

@@ -1,12 +1,12 @@
 //! Axes: ranges, the map from values to the canvas, ticks and their labels.
 
-use super::sizes::{TICK_MM, UNITS};
+use super::sizes::{TICK_MM, UNITS_PER_MM};
 use crate::math;
-use crate::text::{self, scientific, superscript};
+use crate::text::{self, format_scientific, to_superscript};
 
 /// How values are spread along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Scale {
+pub enum AxisScale {
     /// In proportion.
     #[default]
     Linear,
@@ -16,57 +16,57 @@ pub enum Scale {
 
 /// An axis of a panel.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Axis {
+pub struct ChartAxis {
     /// Quantity and unit.
     pub label: String,
     /// Linear or logarithmic.
-    pub scale: Scale,
+    pub scale: AxisScale,
     /// Ends; `None` to take them from the data.
     pub range: Option<(f64, f64)>,
     /// Names at places of the axis, which stand there instead of numbers; empty for numbers.
-    pub names: Vec<(f64, String)>,
+    pub categories: Vec<(f64, String)>,
 }
 
 /// Label of the axes that share a clock.
-const CLOCK: &str = "time, s";
+const TIME_LABEL: &str = "time, s";
 
-impl Axis {
+impl ChartAxis {
     /// A linear axis that fits the data.
     #[must_use]
     pub fn linear(label: impl Into<String>) -> Self {
-        Self { label: label.into(), scale: Scale::Linear, ..Self::default() }
+        Self { label: label.into(), scale: AxisScale::Linear, ..Self::default() }
     }
 
     /// A linear axis of time, s: the panels of a page that have one share a cursor.
     #[must_use]
     pub fn time() -> Self {
-        Self::linear(CLOCK)
+        Self::linear(TIME_LABEL)
     }
 
     /// Whether it is one.
     pub(super) fn is_time(&self) -> bool {
-        self.label == CLOCK && self.scale == Scale::Linear
+        self.label == TIME_LABEL && self.scale == AxisScale::Linear
     }
 
     /// A logarithmic axis that fits the data.
     #[must_use]
     pub fn log(label: impl Into<String>) -> Self {
-        Self { label: label.into(), scale: Scale::Log, ..Self::default() }
+        Self { label: label.into(), scale: AxisScale::Log, ..Self::default() }
     }
 
     /// An axis of things, one at every whole number from 0, with half a place before the first and after the
     /// last.
     #[must_use]
-    pub fn named(label: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
-        let names: Vec<(f64, String)> =
+    pub fn categorical(label: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
+        let categories: Vec<(f64, String)> =
             names.into_iter().enumerate().map(|(i, name)| (i as f64, name)).collect();
-        let end = names.len().max(1) as f64 - 0.5;
-        Self { names, ..Self::linear(label).between(-0.5, end) }
+        let end = categories.len().max(1) as f64 - 0.5;
+        Self { categories, ..Self::linear(label).with_range(-0.5, end) }
     }
 
     /// The same axis with fixed ends.
     #[must_use]
-    pub fn between(self, low: f64, high: f64) -> Self {
+    pub fn with_range(self, low: f64, high: f64) -> Self {
         Self { range: Some((low, high)), ..self }
     }
 }
@@ -81,14 +81,14 @@ pub(super) struct Tick {
 impl Tick {
     /// Length, canvas units: minor ones are half as long.
     pub fn length(&self) -> f64 {
-        if self.label.is_some() { TICK_MM * UNITS } else { TICK_MM / 2.0 * UNITS }
+        if self.label.is_some() { TICK_MM * UNITS_PER_MM } else { TICK_MM / 2.0 * UNITS_PER_MM }
     }
 }
 
 /// An axis with known ends, mapped to the canvas.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Mapped {
-    pub scale: Scale,
+pub(super) struct CanvasAxis {
+    pub scale: AxisScale,
     pub low: f64,
     pub high: f64,
     /// Canvas coordinates of the ends.
@@ -100,9 +100,9 @@ pub(super) struct Mapped {
 const LINEAR_ROOM: f64 = 0.05;
 /// Least room, as a share of the values: what varies by less is rounding, and a label would have no digits
 /// for it.
-const LEAST_SPAN: f64 = 1e-4;
+const MIN_RELATIVE_SPAN: f64 = 1e-4;
 /// Room about zero alone.
-const ALONE: f64 = 1.0;
+const SINGLE_VALUE_ROOM: f64 = 1.0;
 /// The same on a logarithmic axis, as a factor.
 const LOG_ROOM: f64 = 1.4;
 /// Most decades that a logarithmic axis takes from the data: more would show only rounding.
@@ -110,12 +110,12 @@ const MOST_DECADES: i32 = 6;
 
 /// Farthest place from the low end, in lengths of the axis: what lies beyond is drawn as from there, so that
 /// cutting a line at the axes cannot overflow.
-const FAR: f64 = 1e6;
+const FARTHEST_POSITION: f64 = 1e6;
 
 /// Ends of an axis: those given, or those of the data with some room; always finite, ordered and apart, above
 /// zero on a logarithmic axis.
-pub(super) fn ends(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64) {
-    let log = axis.scale == Scale::Log;
+pub(super) fn axis_limits(axis: &ChartAxis, values: impl Iterator<Item = f64>) -> (f64, f64) {
+    let log = axis.scale == AxisScale::Log;
     let usable = |x: &f64| x.is_finite() && (!log || *x > 0.0);
     if let Some((low, high)) = axis.range.filter(|(low, high)| usable(low) && usable(high) && low < high) {
         return (low, high);
@@ -131,33 +131,39 @@ pub(super) fn ends(axis: &Axis, values: impl Iterator<Item = f64>) -> (f64, f64)
             high * LOG_ROOM,
         );
     }
-    let room = ((high - low) * LINEAR_ROOM).max(low.abs().max(high.abs()) * LEAST_SPAN);
-    let room = if room > 0.0 { room } else { ALONE };
+    let room = ((high - low) * LINEAR_ROOM).max(low.abs().max(high.abs()) * MIN_RELATIVE_SPAN);
+    let room = if room > 0.0 { room } else { SINGLE_VALUE_ROOM };
     (low - room, high + room)
 }
 
-impl Mapped {
+impl CanvasAxis {
     /// Canvas coordinate of a value; `None` where it has none.
-    pub fn place(&self, value: f64) -> Option<f64> {
+    pub fn canvas_position(&self, value: f64) -> Option<f64> {
         let share = match self.scale {
-            Scale::Linear => (value - self.low) / (self.high - self.low),
-            Scale::Log if value > 0.0 => math::ln(value / self.low) / math::ln(self.high / self.low),
-            Scale::Log => return None,
+            AxisScale::Linear => (value - self.low) / (self.high - self.low),
+            AxisScale::Log if value > 0.0 => math::ln(value / self.low) / math::ln(self.high / self.low),
+            AxisScale::Log => return None,
         };
-        share.is_finite().then_some(self.from + share.clamp(-FAR, FAR) * (self.to - self.from))
+        share
+            .is_finite()
+            .then_some(self.from + share.clamp(-FARTHEST_POSITION, FARTHEST_POSITION) * (self.to - self.from))
     }
 
     /// The same; on a logarithmic axis the low end for what has no place there.
-    pub(crate) fn place_or_low(&self, value: f64) -> Option<f64> {
-        if self.scale == Scale::Log && value <= 0.0 { Some(self.from) } else { self.place(value) }
+    pub(crate) fn canvas_position_or_low(&self, value: f64) -> Option<f64> {
+        if self.scale == AxisScale::Log && value <= 0.0 {
+            Some(self.from)
+        } else {
+            self.canvas_position(value)
+        }
     }
 
     /// The value at a canvas coordinate.
-    pub fn value(&self, place: f64) -> f64 {
+    pub fn value_at(&self, place: f64) -> f64 {
         let share = (place - self.from) / (self.to - self.from);
         match self.scale {
-            Scale::Linear => self.low + share * (self.high - self.low),
-            Scale::Log => self.low * math::exp(share * math::ln(self.high / self.low)),
+            AxisScale::Linear => self.low + share * (self.high - self.low),
+            AxisScale::Log => self.low * math::exp(share * math::ln(self.high / self.low)),
         }
     }
 
@@ -166,8 +172,8 @@ impl Mapped {
         let most = ((self.to - self.from).abs() / apart).clamp(2.0, 12.0) as usize;
         let length = (self.to - self.from).abs();
         match self.scale {
-            Scale::Linear => with_minor(linear_ticks(self.low, self.high, most), self, length),
-            Scale::Log => {
+            AxisScale::Linear => add_minor_ticks(linear_ticks(self.low, self.high, most), self, length),
+            AxisScale::Log => {
                 let decade = length / math::log10(self.high / self.low);
                 log_ticks(self.low, self.high, most, decade / apart)
             }
@@ -176,18 +182,18 @@ impl Mapped {
 }
 
 /// Shortest distance of ticks without a label, canvas units: they stay apart in print.
-const MINOR: f64 = 1.0 * UNITS;
+const MIN_MINOR_TICK_SPACING: f64 = 1.0 * UNITS_PER_MM;
 
 /// The ticks of a linear axis with four more between neighbours, three where those are 2 apart, as far as
 /// there is room; these follow the others.
-fn with_minor(mut ticks: Vec<Tick>, axis: &Mapped, length: f64) -> Vec<Tick> {
+fn add_minor_ticks(mut ticks: Vec<Tick>, axis: &CanvasAxis, length: f64) -> Vec<Tick> {
     let [first, second, ..] = ticks.as_slice() else { return ticks };
     let (start, step) = (first.value, second.value - first.value);
     let leading = (step / math::powf(10.0, math::log10(step).floor())).round();
     let parts = if leading == 2.0 { 4 } else { 5 };
     let share = step / f64::from(parts) / (axis.high - axis.low);
     let apart = share * length;
-    if apart.is_nan() || apart < MINOR {
+    if apart.is_nan() || apart < MIN_MINOR_TICK_SPACING {
         return ticks;
     }
     let fine = step / f64::from(parts);
@@ -198,19 +204,20 @@ fn with_minor(mut ticks: Vec<Tick>, axis: &Mapped, length: f64) -> Vec<Tick> {
 }
 
 /// The names of an axis as ticks.
-pub(super) fn named_ticks(axis: &Axis, shown: impl Fn(&str) -> String) -> Vec<Tick> {
-    axis.names.iter().map(|(value, name)| Tick { value: *value, label: Some(shown(name)) }).collect()
+pub(super) fn category_ticks(axis: &ChartAxis, shown: impl Fn(&str) -> String) -> Vec<Tick> {
+    axis.categories.iter().map(|(value, name)| Tick { value: *value, label: Some(shown(name)) }).collect()
 }
 
 /// Ticks may stand this much closer than asked for, rather than at the next coarser step.
-const CROWDED: f64 = 0.8;
+const TICK_SPACING_SLACK: f64 = 0.8;
 
 /// Multiples of 1, 2 or 5 times a power of ten.
 fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let rough = (high - low) / most as f64;
     let mut exponent = math::log10(rough).floor() as i32;
-    let leading =
-        [1_i32, 2, 5].into_iter().find(|m| f64::from(*m) * math::powi(10.0, exponent) >= rough * CROWDED);
+    let leading = [1_i32, 2, 5]
+        .into_iter()
+        .find(|m| f64::from(*m) * math::powi(10.0, exponent) >= rough * TICK_SPACING_SLACK);
     let leading = leading.unwrap_or_else(|| {
         exponent += 1;
         1
@@ -225,7 +232,7 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let step = value(1);
     let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
     if !(step.is_normal() && first.abs() < 1e15 && last.abs() < 1e15) {
-        return [low, high].map(|value| Tick { value, label: Some(scientific(value, 2)) }).to_vec();
+        return [low, high].map(|value| Tick { value, label: Some(format_scientific(value, 2)) }).to_vec();
     }
     let plain = (-5..6).contains(&exponent);
     let decimals = usize::try_from(-exponent).unwrap_or(0);
@@ -235,13 +242,14 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
             .unwrap_or(0)
             .clamp(2, 15)
     };
-    let label = |v: f64| if plain { text::decimals(v, decimals) } else { scientific(v, digits(v)) };
+    let label =
+        |v: f64| if plain { text::format_decimals(v, decimals) } else { format_scientific(v, digits(v)) };
     (first as i64..=last as i64).map(|k| Tick { value: value(k), label: Some(label(value(k))) }).collect()
 }
 
 /// Multiples of a decade that are labelled, and the least distance of two of them in decades: the first for
 /// which there is room.
-const LABELLED: [(&[i32], f64); 2] = [(&[1, 2, 3, 5, 7], 0.154), (&[1, 2, 5], 0.301)];
+const LOG_LABEL_MULTIPLES: [(&[i32], f64); 2] = [(&[1, 2, 3, 5, 7], 0.154), (&[1, 2, 5], 0.301)];
 
 /// Decades with their multiples as minor ticks, some of which are labelled where there is room; a decade
 /// takes `room` times the least distance of labels. Under two decades the 2 and 5 always are, and under that
@@ -259,7 +267,7 @@ fn log_ticks(low: f64, high: f64, most: usize, room: f64) -> Vec<Tick> {
     };
     let (labelled, every): (&[i32], i32) = match (count(&[1]), count(&[1, 2, 5])) {
         (0 | 1, 0 | 1) => return linear_ticks(low, high, most.min(5)),
-        (decades, _) => match LABELLED.iter().find(|(_, apart)| apart * room >= 1.0) {
+        (decades, _) => match LOG_LABEL_MULTIPLES.iter().find(|(_, apart)| apart * room >= 1.0) {
             Some((multiples, _)) => (multiples, 1),
             None if decades < 2 => (&[1, 2, 5], 1),
             None => (&[1], (decades as i32 + most as i32 - 1) / most as i32),
@@ -278,8 +286,8 @@ fn log_label(m: i32, e: i32) -> String {
     match e {
         0..=4 => format!("{m}{}", "0".repeat(e as usize)),
         -3..=-1 => format!("{:.*}", (-e) as usize, f64::from(m) / math::powi(10.0, -e)),
-        _ if m == 1 => format!("10{}", superscript(e)),
-        _ => format!("{m}\u{b7}10{}", superscript(e)),
+        _ if m == 1 => format!("10{}", to_superscript(e)),
+        _ => format!("{m}\u{b7}10{}", to_superscript(e)),
     }
 }
 
@@ -335,8 +343,14 @@ mod tests {
     #[test]
     fn a_linear_axis_has_ticks_between_its_labels_where_there_is_room() {
         let minor = |high: f64, length_mm: f64| {
-            let axis = Mapped { scale: Scale::Linear, low: 0.0, high, from: 0.0, to: length_mm * UNITS };
-            let ticks = axis.ticks(18.0 * UNITS);
+            let axis = CanvasAxis {
+                scale: AxisScale::Linear,
+                low: 0.0,
+                high,
+                from: 0.0,
+                to: length_mm * UNITS_PER_MM,
+            };
+            let ticks = axis.ticks(18.0 * UNITS_PER_MM);
             ticks.iter().filter(|t| t.label.is_none()).map(|t| t.value).collect::<Vec<_>>()
         };
         assert_eq!(
@@ -352,19 +366,22 @@ mod tests {
 
     #[test]
     fn ends_are_apart_and_finite_whatever_the_data() {
-        let linear = Axis::linear("x");
-        assert_eq!(ends(&linear, [].into_iter()), (0.0, 1.0));
-        assert_eq!(ends(&linear, [f64::NAN, f64::INFINITY].into_iter()), (0.0, 1.0));
-        let (low, high) = ends(&linear, [3.0, 3.0].into_iter());
+        let linear = ChartAxis::linear("x");
+        assert_eq!(axis_limits(&linear, [].into_iter()), (0.0, 1.0));
+        assert_eq!(axis_limits(&linear, [f64::NAN, f64::INFINITY].into_iter()), (0.0, 1.0));
+        let (low, high) = axis_limits(&linear, [3.0, 3.0].into_iter());
         assert!(low < 3.0 && high > 3.0);
-        assert_eq!(ends(&linear, [0.0, 0.0].into_iter()), (-1.0, 1.0));
-        assert_eq!(ends(&Axis::log("x"), [-1.0, 0.0].into_iter()), (0.1, 10.0));
-        assert_eq!(ends(&Axis::linear("x").between(2.0, 1.0), [0.0, 1.0].into_iter()), (-0.05, 1.05));
+        assert_eq!(axis_limits(&linear, [0.0, 0.0].into_iter()), (-1.0, 1.0));
+        assert_eq!(axis_limits(&ChartAxis::log("x"), [-1.0, 0.0].into_iter()), (0.1, 10.0));
+        assert_eq!(
+            axis_limits(&ChartAxis::linear("x").with_range(2.0, 1.0), [0.0, 1.0].into_iter()),
+            (-0.05, 1.05)
+        );
     }
 
     #[test]
     fn values_that_differ_by_rounding_have_labels_that_differ() {
-        let (low, high) = ends(&Axis::linear("x"), [0.9, 0.9 + 1e-16, 0.9 - 2e-16].into_iter());
+        let (low, high) = axis_limits(&ChartAxis::linear("x"), [0.9, 0.9 + 1e-16, 0.9 - 2e-16].into_iter());
         let ticks = linear_ticks(low, high, 5);
         let labels = labels(&ticks);
         let small = linear_ticks(1.23e-4, 1.2301e-4, 5);
@@ -374,16 +391,20 @@ mod tests {
 
     #[test]
     fn a_log_axis_has_no_place_for_zero() {
-        let axis = Mapped { scale: Scale::Log, low: 1.0, high: 100.0, from: 0.0, to: 10.0 };
-        assert_eq!(axis.place(0.0), None);
-        assert_eq!(axis.place(10.0), Some(5.0));
+        let axis = CanvasAxis { scale: AxisScale::Log, low: 1.0, high: 100.0, from: 0.0, to: 10.0 };
+        assert_eq!(axis.canvas_position(0.0), None);
+        assert_eq!(axis.canvas_position(10.0), Some(5.0));
         assert_eq!(
-            [axis.place_or_low(-1.0), axis.place_or_low(10.0), axis.place_or_low(f64::NAN)],
+            [
+                axis.canvas_position_or_low(-1.0),
+                axis.canvas_position_or_low(10.0),
+                axis.canvas_position_or_low(f64::NAN)
+            ],
             [Some(0.0), Some(5.0), None]
         );
         assert!(
-            (axis.value(5.0) - 10.0).abs() < 1e-12
-                && (Mapped { scale: Scale::Linear, ..axis }.value(5.0) - 50.5).abs() < 1e-12
+            (axis.value_at(5.0) - 10.0).abs() < 1e-12
+                && (CanvasAxis { scale: AxisScale::Linear, ..axis }.value_at(5.0) - 50.5).abs() < 1e-12
         );
     }
 }

@@ -1,36 +1,47 @@
 //! The cells of a heat map as vectors: runs of one colour along a row, as thick lines over a ground of the
 //! commonest colour.
 
-use super::axis::Mapped;
-use super::colours::{NO_VALUE, colour, hex};
-use super::heat::{Heat, edges, share};
-use super::path::Area;
+use super::axis::CanvasAxis;
+use super::colours::{NO_VALUE, format_hex, sample_colour_map};
+use super::heat::{HeatMap, cell_edges, colour_fraction};
+use super::path::CanvasArea;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::ops::Range;
 
 /// Most columns and rows drawn, and how many colours: finer cells are shown by the largest that a block
-/// covers, so that a thin line stays. Where a map takes more bytes than [`MOST_BYTES`], the next step is
+/// covers, so that a thin line stays. Where a map takes more bytes than [`MAX_CELL_BYTES`], the next step is
 /// taken.
-const STEPS: [(usize, usize, u32); 6] =
+const CELL_RESOLUTIONS: [(usize, usize, u32); 6] =
     [(480, 240, 96), (320, 180, 64), (240, 135, 48), (200, 110, 32), (160, 90, 24), (120, 68, 16)];
-const MOST_BYTES: usize = 150_000;
+const MAX_CELL_BYTES: usize = 150_000;
 /// Lines are drawn so much longer and thicker than their cells, canvas units: no seam of the ground shows
 /// between them.
-const OVERLAP: i64 = 2;
+const CELL_OVERLAP: i64 = 2;
 
 /// A row or column of blocks: its ends on the canvas, ascending, and the cells that it covers.
-type Block = (i64, i64, Option<Range<usize>>);
+type CellBlock = (i64, i64, Option<Range<usize>>);
 
 /// The cells of a heat map over the axes, as SVG; `None` without values.
-pub(super) fn elements(heat: &Heat, x: &Mapped, y: &Mapped, area: &Area) -> Option<String> {
-    let ends = heat.ends()?;
-    let drawn = STEPS.iter().map(|(columns, rows, colours)| {
-        drawn((heat, ends), &blocks(&heat.x, x, *columns), &blocks(&heat.y, y, *rows), *colours, area)
+pub(super) fn heat_cells_svg(
+    heat: &HeatMap,
+    x: &CanvasAxis,
+    y: &CanvasAxis,
+    area: &CanvasArea,
+) -> Option<String> {
+    let ends = heat.value_range()?;
+    let drawn = CELL_RESOLUTIONS.iter().map(|(columns, rows, colours)| {
+        cell_rows_svg(
+            (heat, ends),
+            &cell_blocks(&heat.x, x, *columns),
+            &cell_blocks(&heat.y, y, *rows),
+            *colours,
+            area,
+        )
     });
     let mut last = None;
     for text in drawn {
-        let done = text.len() <= MOST_BYTES;
+        let done = text.len() <= MAX_CELL_BYTES;
         last = Some(text);
         if done {
             break;
@@ -40,37 +51,37 @@ pub(super) fn elements(heat: &Heat, x: &Mapped, y: &Mapped, area: &Area) -> Opti
 }
 
 /// The cells along an axis where there are no more than `most`, otherwise `most` equal steps.
-fn blocks(middles: &[f64], axis: &Mapped, most: usize) -> Vec<Block> {
-    let edges = edges(middles, axis.scale);
+fn cell_blocks(middles: &[f64], axis: &CanvasAxis, most: usize) -> Vec<CellBlock> {
+    let edges = cell_edges(middles, axis.scale);
     let (from, to) = (axis.from.min(axis.to), axis.from.max(axis.to));
     let place = |value: f64| {
         // a single cell reaches without end
         let beyond = if value > axis.low { axis.to } else { axis.from };
-        axis.place(value).unwrap_or(beyond).clamp(from, to).round() as i64
+        axis.canvas_position(value).unwrap_or(beyond).clamp(from, to).round() as i64
     };
     let ordered = |a: i64, b: i64| (a.min(b), a.max(b));
     let cells = edges.windows(2).enumerate().map(|(at, ends)| (ordered(place(ends[0]), place(ends[1])), at));
-    let shown: Vec<Block> = cells
+    let shown: Vec<CellBlock> = cells
         .filter(|((low, high), _)| low < high)
         .map(|((low, high), at)| (low, high, Some(at..at + 1)))
         .collect();
-    if (1..=most).contains(&shown.len()) && shown.len() == visible(&edges, axis) {
+    if (1..=most).contains(&shown.len()) && shown.len() == count_visible_cells(&edges, axis) {
         return shown;
     }
-    covered(middles, &edges, axis, most)
+    resample_cells(middles, &edges, axis, most)
 }
 
 /// Number of cells that lie between the ends of an axis, in part or whole.
-fn visible(edges: &[f64], axis: &Mapped) -> usize {
+fn count_visible_cells(edges: &[f64], axis: &CanvasAxis) -> usize {
     edges.windows(2).filter(|ends| ends[1] > axis.low && ends[0] < axis.high).count()
 }
 
 /// The cells under every one of `count` equal steps along an axis: those whose middle is in the step, else
 /// the one that holds the step's middle.
-fn covered(middles: &[f64], edges: &[f64], axis: &Mapped, count: usize) -> Vec<Block> {
+fn resample_cells(middles: &[f64], edges: &[f64], axis: &CanvasAxis, count: usize) -> Vec<CellBlock> {
     let step = (axis.to - axis.from) / count as f64;
     let place = |k: usize| axis.from + k as f64 * step;
-    let value = |k: f64| axis.value(axis.from + k * step);
+    let value = |k: f64| axis.value_at(axis.from + k * step);
     let of = |k: usize| {
         if edges.is_empty() {
             return None;
@@ -92,33 +103,35 @@ fn covered(middles: &[f64], edges: &[f64], axis: &Mapped, count: usize) -> Vec<B
 }
 
 /// Every row in runs of one colour; lines of one thickness and colour are one path.
-fn drawn(
-    (heat, ends): (&Heat, (f64, f64)),
-    columns: &[Block],
-    rows: &[Block],
+fn cell_rows_svg(
+    (heat, ends): (&HeatMap, (f64, f64)),
+    columns: &[CellBlock],
+    rows: &[CellBlock],
     colours: u32,
-    area: &Area,
+    area: &CanvasArea,
 ) -> String {
     let last = f64::from(colours - 1);
-    let level = |column: &Block, row: &Block| {
-        let value = heat.largest(column.2.as_ref()?, row.2.as_ref()?)?;
-        Some((share(ends, value) * last).round() as u32)
+    let level = |column: &CellBlock, row: &CellBlock| {
+        let value = heat.max_in_block(column.2.as_ref()?, row.2.as_ref()?)?;
+        Some((colour_fraction(ends, value) * last).round() as u32)
     };
     let grid: Vec<Vec<Option<u32>>> =
         rows.iter().map(|row| columns.iter().map(|column| level(column, row)).collect()).collect();
-    let ground = commonest(grid.iter().flatten().copied());
-    let rgb = |level: Option<u32>| level.map_or(NO_VALUE, |level| colour(heat.map, f64::from(level) / last));
+    let ground = most_common_level(grid.iter().flatten().copied());
+    let rgb = |level: Option<u32>| {
+        level.map_or(NO_VALUE, |level| sample_colour_map(heat.colour_map, f64::from(level) / last))
+    };
     let right = area.right as i64;
     let mut lines: BTreeMap<(Option<u32>, i64), String> = BTreeMap::new();
     for (row, levels) in rows.iter().zip(&grid) {
-        let (top, bottom) = (row.0, (row.1 + OVERLAP).min(area.bottom as i64));
+        let (top, bottom) = (row.0, (row.1 + CELL_OVERLAP).min(area.bottom as i64));
         let mut start = 0;
         for run in levels.chunk_by(|a, b| a == b) {
             let end = start + run.len();
             if run[0] != ground {
-                let (from, to) = (columns[start].0, (columns[end - 1].1 + OVERLAP).min(right));
+                let (from, to) = (columns[start].0, (columns[end - 1].1 + CELL_OVERLAP).min(right));
                 // twice the height of the middle is whole
-                let middle = half(top + bottom);
+                let middle = format_half(top + bottom);
                 let _ = write!(
                     lines.entry((run[0], bottom - top)).or_default(),
                     "M{from} {middle}h{}",
@@ -129,49 +142,49 @@ fn drawn(
         }
     }
     let of = |((level, height), data): ((Option<u32>, i64), String)| {
-        format!("<path stroke=\"{}\" stroke-width=\"{height}\" d=\"{data}\"/>\n", hex(rgb(level)))
+        format!("<path stroke=\"{}\" stroke-width=\"{height}\" d=\"{data}\"/>\n", format_hex(rgb(level)))
     };
     let whole = (area.left as i64, area.top as i64, area.right as i64, area.bottom as i64);
     let filled = |(left, top, right, bottom), level| {
-        format!("<path fill=\"{}\" d=\"M{left} {top}H{right}V{bottom}H{left}z\"/>\n", hex(rgb(level)))
+        format!("<path fill=\"{}\" d=\"M{left} {top}H{right}V{bottom}H{left}z\"/>\n", format_hex(rgb(level)))
     };
     filled(whole, None)
-        + &filled(extent(columns, rows), ground)
+        + &filled(blocks_extent(columns, rows), ground)
         + &lines.into_iter().map(of).collect::<String>()
 }
 
 /// Half of a whole number, exactly.
-fn half(twice: i64) -> String {
+fn format_half(twice: i64) -> String {
     if twice % 2 == 0 { (twice / 2).to_string() } else { format!("{}.5", twice / 2) }
 }
 
 /// The level that most blocks have, the lowest of several.
-fn commonest(levels: impl Iterator<Item = Option<u32>>) -> Option<u32> {
+fn most_common_level(levels: impl Iterator<Item = Option<u32>>) -> Option<u32> {
     let mut counts: BTreeMap<Option<u32>, usize> = BTreeMap::new();
     levels.for_each(|level| *counts.entry(level).or_default() += 1);
     counts.into_iter().max_by(|a, b| a.1.cmp(&b.1).then(b.0.cmp(&a.0))).and_then(|(level, _)| level)
 }
 
 /// Left, top, right and bottom of the blocks.
-fn extent(columns: &[Block], rows: &[Block]) -> (i64, i64, i64, i64) {
-    let least = |blocks: &[Block]| blocks.iter().map(|b| b.0).min().unwrap_or(0);
-    let most = |blocks: &[Block]| blocks.iter().map(|b| b.1).max().unwrap_or(0);
+fn blocks_extent(columns: &[CellBlock], rows: &[CellBlock]) -> (i64, i64, i64, i64) {
+    let least = |blocks: &[CellBlock]| blocks.iter().map(|b| b.0).min().unwrap_or(0);
+    let most = |blocks: &[CellBlock]| blocks.iter().map(|b| b.1).max().unwrap_or(0);
     (least(columns), least(rows), most(columns), most(rows))
 }
 
 #[cfg(test)]
 mod tests {
-    use super::super::axis::Scale;
+    use super::super::axis::AxisScale;
     use super::*;
 
-    fn axis(low: f64, high: f64) -> Mapped {
-        Mapped { scale: Scale::Linear, low, high, from: 0.0, to: 40.0 }
+    fn axis(low: f64, high: f64) -> CanvasAxis {
+        CanvasAxis { scale: AxisScale::Linear, low, high, from: 0.0, to: 40.0 }
     }
 
     #[test]
     fn every_step_of_an_axis_has_its_cells() {
         let covered = |middles: &[f64], count| {
-            covered(middles, &edges(middles, Scale::Linear), &axis(0.0, 4.0), count)
+            resample_cells(middles, &cell_edges(middles, AxisScale::Linear), &axis(0.0, 4.0), count)
                 .into_iter()
                 .map(|b| b.2)
                 .collect::<Vec<_>>()
@@ -190,48 +203,53 @@ mod tests {
     #[test]
     fn few_cells_keep_their_own_edges_and_many_become_steps() {
         assert_eq!(
-            blocks(&[1.0, 2.0, 3.0], &axis(0.0, 4.0), 10),
+            cell_blocks(&[1.0, 2.0, 3.0], &axis(0.0, 4.0), 10),
             [(5, 15, Some(0..1)), (15, 25, Some(1..2)), (25, 35, Some(2..3))]
         );
-        assert_eq!(blocks(&[1.0, 2.0, 3.0], &axis(0.0, 4.0), 2).len(), 2);
-        assert_eq!(blocks(&[2.0, 1.0], &axis(0.0, 4.0), 2), [(0, 20, None), (20, 40, None)]);
-        let upwards = Mapped { from: 40.0, to: 0.0, ..axis(0.0, 4.0) };
-        assert_eq!(blocks(&[1.0, 2.0], &upwards, 10), [(25, 35, Some(0..1)), (15, 25, Some(1..2))]);
+        assert_eq!(cell_blocks(&[1.0, 2.0, 3.0], &axis(0.0, 4.0), 2).len(), 2);
+        assert_eq!(cell_blocks(&[2.0, 1.0], &axis(0.0, 4.0), 2), [(0, 20, None), (20, 40, None)]);
+        let upwards = CanvasAxis { from: 40.0, to: 0.0, ..axis(0.0, 4.0) };
+        assert_eq!(cell_blocks(&[1.0, 2.0], &upwards, 10), [(25, 35, Some(0..1)), (15, 25, Some(1..2))]);
     }
 
     #[test]
     fn runs_of_one_colour_are_one_line_on_a_ground_of_the_commonest() {
-        let heat = Heat {
+        let heat = HeatMap {
             x: vec![0.5, 1.5, 2.5, 3.5],
             y: vec![2.0],
             values: vec![vec![Some(0.0)], vec![Some(1.0)], vec![Some(1.0)], vec![Some(0.0)]],
-            ..Heat::default()
+            ..HeatMap::default()
         };
-        let area = Area { left: 0.0, top: 0.0, right: 40.0, bottom: 40.0 };
-        let svg = elements(&heat, &axis(0.0, 4.0), &Mapped { from: 40.0, to: 0.0, ..axis(0.0, 4.0) }, &area)
-            .unwrap();
+        let area = CanvasArea { left: 0.0, top: 0.0, right: 40.0, bottom: 40.0 };
+        let svg = heat_cells_svg(
+            &heat,
+            &axis(0.0, 4.0),
+            &CanvasAxis { from: 40.0, to: 0.0, ..axis(0.0, 4.0) },
+            &area,
+        )
+        .unwrap();
         assert_eq!(
             svg,
             "<path fill=\"#E4E4E4\" d=\"M0 0H40V40H0z\"/>\n<path fill=\"#440154\" d=\"M0 \
              0H40V40H0z\"/>\n<path stroke=\"#FDE725\" stroke-width=\"40\" d=\"M10 20h22\"/>\n"
         );
-        assert!(elements(&Heat::default(), &axis(0.0, 4.0), &axis(0.0, 4.0), &area).is_none());
+        assert!(heat_cells_svg(&HeatMap::default(), &axis(0.0, 4.0), &axis(0.0, 4.0), &area).is_none());
     }
 
     #[test]
     fn noise_of_any_size_stays_small() {
         let column = |i: usize| (0..400).map(|j| Some(((i * 7919 + j * 104_729) % 997) as f64)).collect();
-        let heat = Heat {
+        let heat = HeatMap {
             x: (0..2000).map(f64::from).collect(),
             y: (0..400).map(f64::from).collect(),
             values: (0..2000).map(column).collect(),
-            ..Heat::default()
+            ..HeatMap::default()
         };
-        let area = Area { left: 0.0, top: 0.0, right: 2000.0, bottom: 1000.0 };
+        let area = CanvasArea { left: 0.0, top: 0.0, right: 2000.0, bottom: 1000.0 };
         let (x, y) = (
-            Mapped { to: 2000.0, ..axis(0.0, 2000.0) },
-            Mapped { from: 1000.0, to: 0.0, ..axis(0.0, 400.0) },
+            CanvasAxis { to: 2000.0, ..axis(0.0, 2000.0) },
+            CanvasAxis { from: 1000.0, to: 0.0, ..axis(0.0, 400.0) },
         );
-        assert!(elements(&heat, &x, &y, &area).unwrap().len() < 170_000);
+        assert!(heat_cells_svg(&heat, &x, &y, &area).unwrap().len() < 170_000);
     }
 }

@@ -9,20 +9,20 @@ pub(super) const BLACK: Rgb = (0, 0, 0);
 pub(super) const GRID: Rgb = (0xDD, 0xDD, 0xDD);
 pub(super) const FRAME: Rgb = (0x33, 0x33, 0x33);
 /// Near white and near black, which are the same in the light and the dark.
-pub(super) const LIGHT: Rgb = (0xFE, 0xFE, 0xFE);
-const DEEP: Rgb = (0x01, 0x01, 0x01);
+pub(super) const NEAR_WHITE: Rgb = (0xFE, 0xFE, 0xFE);
+const NEAR_BLACK: Rgb = (0x01, 0x01, 0x01);
 
 /// As SVG writes it.
-pub(super) fn hex((red, green, blue): Rgb) -> String {
+pub(super) fn format_hex((red, green, blue): Rgb) -> String {
     format!("#{red:02X}{green:02X}{blue:02X}")
 }
 
 /// Colours of a heat map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Colours {
+pub enum ColourMap {
     /// Viridis: from little to much.
     #[default]
-    Rising,
+    Viridis,
     /// From blue over white to vermilion: below and above a middle.
     Diverging,
 }
@@ -50,10 +50,10 @@ const DIVERGING: [Rgb; 5] =
 pub(super) const NO_VALUE: Rgb = (0xE4, 0xE4, 0xE4);
 
 /// Colour of a share from 0 to 1; beyond, that of the nearer end.
-pub(super) fn colour(map: Colours, share: f64) -> Rgb {
+pub(super) fn sample_colour_map(map: ColourMap, share: f64) -> Rgb {
     let stops: &[Rgb] = match map {
-        Colours::Rising => &VIRIDIS,
-        Colours::Diverging => &DIVERGING,
+        ColourMap::Viridis => &VIRIDIS,
+        ColourMap::Diverging => &DIVERGING,
     };
     let place = share.clamp(0.0, 1.0) * (stops.len() - 1) as f64;
     let below = (place as usize).min(stops.len() - 2);
@@ -77,7 +77,7 @@ pub(super) fn contrast(a: Rgb, b: Rgb) -> f64 {
 
 /// Near white or near black: the one with the higher contrast on a colour; the two meet at 0.18.
 pub(super) fn readable_on(colour: Rgb) -> Rgb {
-    if luminance(colour) > 0.18 { DEEP } else { LIGHT }
+    if luminance(colour) > 0.18 { NEAR_BLACK } else { NEAR_WHITE }
 }
 
 #[cfg(test)]
@@ -86,7 +86,7 @@ mod tests {
 
     #[test]
     fn the_colours_run_from_purple_to_yellow_and_stay_within() {
-        let viridis = |share| colour(Colours::Rising, share);
+        let viridis = |share| sample_colour_map(ColourMap::Viridis, share);
         assert_eq!(
             [0.0, 0.1, 1.0, -3.0, 7.0].map(viridis),
             [VIRIDIS[0], VIRIDIS[1], VIRIDIS[10], VIRIDIS[0], VIRIDIS[10]]
@@ -97,7 +97,7 @@ mod tests {
     #[test]
     fn the_middle_of_the_diverging_map_is_its_lightest() {
         let sum = |share| -> u32 {
-            let (r, g, b) = colour(Colours::Diverging, share);
+            let (r, g, b) = sample_colour_map(ColourMap::Diverging, share);
             u32::from(r) + u32::from(g) + u32::from(b)
         };
         assert!(sum(0.5) > sum(0.4) && sum(0.5) > sum(0.6) && sum(0.0) < sum(0.25));

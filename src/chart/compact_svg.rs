@@ -1,8 +1,8 @@
 //! A back end of plotters that writes SVG in few bytes: neighbouring lines, rectangles or dots of one look
 //! become one path. plotters' own writes an element for each.
 
-use super::colours::hex;
-use super::path::Area;
+use super::colours::format_hex;
+use super::path::CanvasArea;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use plotters::prelude::DrawingBackend;
@@ -14,7 +14,7 @@ use std::convert::Infallible;
 use std::fmt::Write;
 
 /// Writing into a string cannot fail.
-type Drawn = Result<(), DrawingErrorKind<Infallible>>;
+type DrawResult = Result<(), DrawingErrorKind<Infallible>>;
 
 /// The elements drawn so far.
 pub(super) struct CompactSvg {
@@ -25,25 +25,25 @@ pub(super) struct CompactSvg {
 }
 
 impl CompactSvg {
-    pub fn of(size: (u32, u32)) -> Self {
+    pub fn new(size: (u32, u32)) -> Self {
         Self { size, elements: String::new(), open: None }
     }
 
     /// The elements, one a line.
-    pub fn elements(mut self) -> String {
-        self.close();
+    pub fn into_elements(mut self) -> String {
+        self.close_path();
         self.elements
     }
 
-    fn close(&mut self) {
+    fn close_path(&mut self) {
         if self.open.take().is_some() {
             self.elements.push_str("\"/>\n");
         }
     }
 
-    fn path(&mut self, look: String, data: &str) -> Drawn {
+    fn append_path(&mut self, look: String, data: &str) -> DrawResult {
         if self.open.as_ref() != Some(&look) {
-            self.close();
+            self.close_path();
             self.elements.push_str(&format!("<path {look} d=\""));
             self.open = Some(look);
         }
@@ -53,20 +53,20 @@ impl CompactSvg {
 
     /// Begins a group with attributes; what is drawn until its end belongs to it.
     pub fn open_group(&mut self, attributes: &str) {
-        self.close();
+        self.close_path();
         self.elements.push_str(&format!("<g {attributes}>\n"));
     }
 
     /// Ends the last group that was begun.
     pub fn close_group(&mut self) {
-        self.close();
+        self.close_path();
         self.elements.push_str("</g>\n");
     }
 
     /// A PNG, cut at the edges of `within`, the text of the file in the element.
-    pub fn picture(&mut self, area: &Area, within: &Area, png: &[u8]) {
+    pub fn append_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
         let (x, y) = (area.left - within.left, area.top - within.top);
-        let _ = self.element(&format!(
+        let _ = self.append_element(&format!(
             "<svg x=\"{:.0}\" y=\"{:.0}\" width=\"{:.0}\" height=\"{:.0}\"><image x=\"{x:.1}\" y=\"{y:.1}\" \
              width=\"{:.1}\" height=\"{:.1}\" preserveAspectRatio=\"none\" \
              href=\"data:image/png;base64,{}\"/></svg>\n",
@@ -80,21 +80,21 @@ impl CompactSvg {
         )); // (a string takes everything)
     }
 
-    fn element(&mut self, element: &str) -> Drawn {
-        self.close();
+    fn append_element(&mut self, element: &str) -> DrawResult {
+        self.close_path();
         self.elements.push_str(element);
         Ok(())
     }
 }
 
 /// Colour and, where it is not full, opacity of a surface.
-fn fill(colour: BackendColor) -> String {
+fn fill_attributes(colour: BackendColor) -> String {
     let opacity = if colour.alpha < 1.0 { format!("opacity=\"{}\" ", colour.alpha) } else { String::new() };
-    format!("{opacity}fill=\"{}\"", hex(colour.rgb))
+    format!("{opacity}fill=\"{}\"", format_hex(colour.rgb))
 }
 
 /// Start in the units of the canvas, then steps.
-fn steps(points: impl IntoIterator<Item = BackendCoord>) -> String {
+fn relative_path_data(points: impl IntoIterator<Item = BackendCoord>) -> String {
     let mut points = points.into_iter();
     let Some(mut last) = points.next() else { return String::new() };
     let mut data = format!("M{} {}", last.0, last.1);
@@ -119,15 +119,15 @@ impl DrawingBackend for CompactSvg {
         self.size
     }
 
-    fn ensure_prepared(&mut self) -> Drawn {
+    fn ensure_prepared(&mut self) -> DrawResult {
         Ok(())
     }
 
-    fn present(&mut self) -> Drawn {
+    fn present(&mut self) -> DrawResult {
         Ok(())
     }
 
-    fn draw_pixel(&mut self, at: BackendCoord, colour: BackendColor) -> Drawn {
+    fn draw_pixel(&mut self, at: BackendCoord, colour: BackendColor) -> DrawResult {
         self.draw_rect(at, (at.0 + 1, at.1 + 1), &colour, true)
     }
 
@@ -135,10 +135,10 @@ impl DrawingBackend for CompactSvg {
         &mut self,
         points: I,
         style: &S,
-    ) -> Drawn {
-        let (colour, width) = (hex(style.color().rgb), style.stroke_width());
+    ) -> DrawResult {
+        let (colour, width) = (format_hex(style.color().rgb), style.stroke_width());
         let look = format!("fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\"");
-        self.path(look, &steps(points))
+        self.append_path(look, &relative_path_data(points))
     }
 
     fn draw_rect<S: BackendStyle>(
@@ -147,18 +147,18 @@ impl DrawingBackend for CompactSvg {
         (right, bottom): BackendCoord,
         style: &S,
         _fill: bool,
-    ) -> Drawn {
+    ) -> DrawResult {
         let (width, height) = (right - left, bottom - top);
-        self.path(fill(style.color()), &format!("M{left} {top}h{width}v{height}h-{width}z"))
+        self.append_path(fill_attributes(style.color()), &format!("M{left} {top}h{width}v{height}h-{width}z"))
     }
 
     fn fill_polygon<S: BackendStyle, I: IntoIterator<Item = BackendCoord>>(
         &mut self,
         corners: I,
         style: &S,
-    ) -> Drawn {
+    ) -> DrawResult {
         let corners: String = corners.into_iter().map(|(x, y)| format!("{x},{y} ")).collect();
-        self.element(&format!("<polygon {} points=\"{corners}\"/>\n", fill(style.color())))
+        self.append_element(&format!("<polygon {} points=\"{corners}\"/>\n", fill_attributes(style.color())))
     }
 
     /// A full circle is a line without length and with round ends.
@@ -168,20 +168,20 @@ impl DrawingBackend for CompactSvg {
         radius: u32,
         style: &S,
         filled: bool,
-    ) -> Drawn {
-        let (colour, width) = (hex(style.color().rgb), style.stroke_width());
+    ) -> DrawResult {
+        let (colour, width) = (format_hex(style.color().rgb), style.stroke_width());
         if filled {
             let look =
                 format!("stroke=\"{colour}\" stroke-width=\"{}\" stroke-linecap=\"round\"", 2 * radius);
-            return self.path(look, &format!("M{x} {y}h0"));
+            return self.append_path(look, &format!("M{x} {y}h0"));
         }
-        self.element(&format!(
+        self.append_element(&format!(
             "<circle cx=\"{x}\" cy=\"{y}\" r=\"{radius}\" fill=\"none\" stroke=\"{colour}\" \
              stroke-width=\"{width}\"/>\n"
         ))
     }
 
-    fn draw_text<S: BackendTextStyle>(&mut self, text: &str, style: &S, (x, y): BackendCoord) -> Drawn {
+    fn draw_text<S: BackendTextStyle>(&mut self, text: &str, style: &S, (x, y): BackendCoord) -> DrawResult {
         let anchor = match style.anchor().h_pos {
             HPos::Left => "start",
             HPos::Right => "end",
@@ -197,8 +197,8 @@ impl DrawingBackend for CompactSvg {
             FontTransform::Rotate270 => format!(" transform=\"rotate(270, {x}, {y})\""),
             _ => String::new(),
         };
-        let (family, size, colour) = (style.family(), style.size(), fill(style.color()));
-        self.element(&format!(
+        let (family, size, colour) = (style.family(), style.size(), fill_attributes(style.color()));
+        self.append_element(&format!(
             "<text x=\"{x}\" y=\"{y}\" dy=\"{lowered}\" text-anchor=\"{anchor}\" font-family=\"{}\" \
              font-size=\"{size}\" {colour}{bold}{turned}>\n{}\n</text>\n",
             family.as_str(),
@@ -219,10 +219,10 @@ mod tests {
         Color::stroke_width(&colour, width)
     }
 
-    fn drawn(draw: impl FnOnce(&mut CompactSvg) -> Drawn) -> String {
-        let mut back = CompactSvg::of((10, 10));
+    fn drawn(draw: impl FnOnce(&mut CompactSvg) -> DrawResult) -> String {
+        let mut back = CompactSvg::new((10, 10));
         draw(&mut back).unwrap();
-        back.elements()
+        back.into_elements()
     }
 
     #[test]

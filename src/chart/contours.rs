@@ -1,89 +1,95 @@
 //! Lines of equal value over a heat map, at round values, each with its value.
 
-use super::axis::{Mapped, Scale};
-use super::canvas::{Anchor, Canvas, Lettering};
-use super::colours::{colour, readable_on};
-use super::heat::{Heat, share};
-use super::layout::Placed;
-use super::path::{self, Area, Point};
-use super::sizes::{SMALL_MM, UNITS};
+use super::axis::{AxisScale, CanvasAxis};
+use super::canvas::{Canvas, Lettering, TextAnchor};
+use super::colours::{readable_on, sample_colour_map};
+use super::heat::{HeatMap, colour_fraction};
+use super::layout::PanelLayout;
+use super::path::{self, CanvasArea, CanvasPoint};
+use super::sizes::{SMALL_MM, UNITS_PER_MM};
 use super::text::text_width;
 use crate::math;
 use std::collections::BTreeMap;
 
 /// Fewest columns and rows of a map that has contours.
-const FEWEST: usize = 4;
+const MIN_GRID_SIZE: usize = 4;
 /// Most contours of a map.
 const MOST_LEVELS: f64 = 6.0;
 /// Share of the colours over which the corners of a cell may spread; more is a jump, which no line follows. A
 /// plane over the coarsest map, four by four, has a third.
-const JUMP: f64 = 0.35;
+const MAX_CELL_SPREAD: f64 = 0.35;
 /// Share of the cells that may be jumps; a map with more is not smooth.
 const MOST_JUMPS: f64 = 0.15;
 /// Width of a line, canvas units.
-const WIDTH: u32 = 3;
+const CONTOUR_WIDTH: u32 = 3;
 /// Shortest line that is drawn, and that has a label, mm.
-const LEAST_MM: f64 = 2.5;
-const LEAST_LABELLED_MM: f64 = 10.0;
+const MIN_CONTOUR_MM: f64 = 2.5;
+const MIN_LABELLED_MM: f64 = 10.0;
 /// Least distance of a label from another and from a symbol, mm.
 const LABELS_APART_MM: f64 = 8.0;
 const SYMBOL_APART_MM: f64 = 4.0;
 
 /// A side of a cell: the column and row where it starts, and whether it goes upwards.
-type Side = (usize, usize, bool);
+type GridEdge = (usize, usize, bool);
 
 /// The contours of a heat map that asks for them.
-pub(super) fn contours(canvas: &mut Canvas, placed: &Placed) {
+pub(super) fn draw_contours(canvas: &mut Canvas, placed: &PanelLayout) {
     let Some((heat, ends)) =
-        placed.panel.heat.as_ref().filter(|h| h.contours).and_then(|h| Some((h, h.ends()?)))
+        placed.panel.heat_map.as_ref().filter(|h| h.contours).and_then(|h| Some((h, h.value_range()?)))
     else {
         return;
     };
-    let Some(grid) = Grid::of(heat, placed, ends) else { return };
+    let Some(grid) = ContourGrid::new(heat, placed, ends) else { return };
     let symbols = placed.panel.series.iter().flat_map(|series| series.points.iter().flatten());
-    let symbols: Vec<Point> =
-        symbols.filter_map(|(x, y)| Some((placed.x.place(*x)?, placed.y.place(*y)?))).collect();
-    let scale = Mapped { scale: Scale::Linear, low: ends.0, high: ends.1, from: 0.0, to: MOST_LEVELS };
-    let mut labels: Vec<Point> = Vec::new();
+    let symbols: Vec<CanvasPoint> = symbols
+        .filter_map(|(x, y)| Some((placed.x.canvas_position(*x)?, placed.y.canvas_position(*y)?)))
+        .collect();
+    let scale =
+        CanvasAxis { scale: AxisScale::Linear, low: ends.0, high: ends.1, from: 0.0, to: MOST_LEVELS };
+    let mut labels: Vec<CanvasPoint> = Vec::new();
     for tick in scale.ticks(1.0) {
         let Some(label) = tick.label.filter(|_| tick.value > ends.0 && tick.value < ends.1) else { continue };
-        let ground = colour(heat.map, share(ends, tick.value));
+        let ground = sample_colour_map(heat.colour_map, colour_fraction(ends, tick.value));
         let ink = readable_on(ground);
-        let long = |line: &Vec<Point>| length(line) >= LEAST_MM * UNITS;
-        let lines: Vec<Vec<Point>> = grid.lines(tick.value).into_iter().filter(long).collect();
-        for piece in lines.iter().flat_map(|line| path::clipped(line, &placed.area)) {
-            canvas.line(&piece, ink, WIDTH);
+        let long = |line: &Vec<CanvasPoint>| polyline_length(line) >= MIN_CONTOUR_MM * UNITS_PER_MM;
+        let lines: Vec<Vec<CanvasPoint>> = grid.contour_lines(tick.value).into_iter().filter(long).collect();
+        for piece in lines.iter().flat_map(|line| path::clip_line(line, &placed.area)) {
+            canvas.draw_line(&piece, ink, CONTOUR_WIDTH);
         }
-        let half = (text_width(&label, SMALL_MM) / 2.0 * UNITS, SMALL_MM / 2.0 * UNITS);
-        if let Some(at) = label_place(&lines, &placed.area, half, &labels, &symbols) {
-            let (width, height) = (half.0 + 0.3 * UNITS, half.1);
-            let behind =
-                Area { left: at.0 - width, right: at.0 + width, top: at.1 - height, bottom: at.1 + height };
-            canvas.rectangle(&behind, ground, 1.0);
-            canvas.coloured(&label, at, Lettering::plain(SMALL_MM, Anchor::Centre), ink);
+        let half = (text_width(&label, SMALL_MM) / 2.0 * UNITS_PER_MM, SMALL_MM / 2.0 * UNITS_PER_MM);
+        if let Some(at) = find_label_position(&lines, &placed.area, half, &labels, &symbols) {
+            let (width, height) = (half.0 + 0.3 * UNITS_PER_MM, half.1);
+            let behind = CanvasArea {
+                left: at.0 - width,
+                right: at.0 + width,
+                top: at.1 - height,
+                bottom: at.1 + height,
+            };
+            canvas.fill_rectangle(&behind, ground, 1.0);
+            canvas.draw_coloured_text(&label, at, Lettering::plain(SMALL_MM, TextAnchor::Centre), ink);
             labels.push(at);
         }
     }
 }
 
 /// The point of the longest lines that lies farthest from labels and symbols, with room for a label.
-fn label_place(
-    lines: &[Vec<Point>],
-    area: &Area,
-    half: Point,
-    labels: &[Point],
-    symbols: &[Point],
-) -> Option<Point> {
-    let fits = |p: &Point| {
+fn find_label_position(
+    lines: &[Vec<CanvasPoint>],
+    area: &CanvasArea,
+    half: CanvasPoint,
+    labels: &[CanvasPoint],
+    symbols: &[CanvasPoint],
+) -> Option<CanvasPoint> {
+    let fits = |p: &CanvasPoint| {
         p.0 - half.0 >= area.left
             && p.0 + half.0 <= area.right
             && p.1 - half.1 >= area.top
             && p.1 + half.1 <= area.bottom
     };
-    let nearest = |p: Point, of: &[Point]| {
+    let nearest = |p: CanvasPoint, of: &[CanvasPoint]| {
         of.iter().map(|q| math::hypot(p.0 - q.0, p.1 - q.1)).fold(f64::INFINITY, f64::min)
     };
-    let long = lines.iter().filter(|line| length(line) >= LEAST_LABELLED_MM * UNITS);
+    let long = lines.iter().filter(|line| polyline_length(line) >= MIN_LABELLED_MM * UNITS_PER_MM);
     // from the middle of each line outwards, so that the first of equals is a middle
     let points = long.flat_map(|line| {
         let (before, after) = line.split_at(line.len() / 2);
@@ -91,43 +97,43 @@ fn label_place(
     });
     points
         .filter(fits)
-        .filter(|p| nearest(*p, symbols) >= SYMBOL_APART_MM * UNITS)
+        .filter(|p| nearest(*p, symbols) >= SYMBOL_APART_MM * UNITS_PER_MM)
         .map(|p| (nearest(p, labels).min(f64::MAX), p))
-        .filter(|(apart, _)| *apart >= LABELS_APART_MM * UNITS)
+        .filter(|(apart, _)| *apart >= LABELS_APART_MM * UNITS_PER_MM)
         .reduce(|best, next| if next.0 > best.0 { next } else { best })
         .map(|(_, p)| p)
 }
 
-fn length(line: &[Point]) -> f64 {
+fn polyline_length(line: &[CanvasPoint]) -> f64 {
     line.windows(2).map(|pair| math::hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1)).sum()
 }
 
 /// The middles of the cells on the canvas with their values, and the cells between them through which lines
 /// go.
-struct Grid<'a> {
-    heat: &'a Heat,
+struct ContourGrid<'a> {
+    heat: &'a HeatMap,
     x: Vec<f64>,
     y: Vec<f64>,
     smooth: Vec<(usize, usize)>,
 }
 
-impl<'a> Grid<'a> {
+impl<'a> ContourGrid<'a> {
     /// `None` where the map is too coarse or not smooth.
-    fn of(heat: &'a Heat, placed: &Placed, ends: (f64, f64)) -> Option<Self> {
-        let places = |values: &[f64], axis: &Mapped| {
-            values.iter().map(|value| axis.place(*value)).collect::<Option<Vec<f64>>>()
+    fn new(heat: &'a HeatMap, placed: &PanelLayout, ends: (f64, f64)) -> Option<Self> {
+        let places = |values: &[f64], axis: &CanvasAxis| {
+            values.iter().map(|value| axis.canvas_position(*value)).collect::<Option<Vec<f64>>>()
         };
         let (x, y) = (places(&heat.x, &placed.x)?, places(&heat.y, &placed.y)?);
-        if x.len() < FEWEST || y.len() < FEWEST {
+        if x.len() < MIN_GRID_SIZE || y.len() < MIN_GRID_SIZE {
             return None;
         }
         let mut grid = Self { heat, x, y, smooth: Vec::new() };
         let (mut jumps, within) = (0, |v: f64| v.clamp(ends.0, ends.1));
         for (i, j) in (1..grid.x.len()).flat_map(|i| (1..grid.y.len()).map(move |j| (i - 1, j - 1))) {
-            let Some(corners) = grid.corners(i, j) else { continue };
+            let Some(corners) = grid.corner_values(i, j) else { continue };
             let low = corners.into_iter().map(within).fold(f64::INFINITY, f64::min);
             let high = corners.into_iter().map(within).fold(f64::NEG_INFINITY, f64::max);
-            if high - low > JUMP * (ends.1 - ends.0) {
+            if high - low > MAX_CELL_SPREAD * (ends.1 - ends.0) {
                 jumps += 1;
             } else {
                 grid.smooth.push((i, j));
@@ -141,16 +147,16 @@ impl<'a> Grid<'a> {
     }
 
     /// Values at the corners of a cell between four middles: left and right below, left and right above.
-    fn corners(&self, i: usize, j: usize) -> Option<[f64; 4]> {
+    fn corner_values(&self, i: usize, j: usize) -> Option<[f64; 4]> {
         Some([self.value(i, j)?, self.value(i + 1, j)?, self.value(i, j + 1)?, self.value(i + 1, j + 1)?])
     }
 
     /// The lines on which the values are `level`, linear between the middles of cells (marching squares: W.
     /// Lorensen and H. Cline, 1987, in two dimensions; a saddle is cut as the mean of its corners says).
-    fn lines(&self, level: f64) -> Vec<Vec<Point>> {
-        let mut next: BTreeMap<Side, Vec<Side>> = BTreeMap::new();
+    fn contour_lines(&self, level: f64) -> Vec<Vec<CanvasPoint>> {
+        let mut next: BTreeMap<GridEdge, Vec<GridEdge>> = BTreeMap::new();
         for (i, j) in self.smooth.iter().copied() {
-            let Some([a, b, c, d]) = self.corners(i, j) else { continue };
+            let Some([a, b, c, d]) = self.corner_values(i, j) else { continue };
             let above = [a, b, c, d].map(|value| value >= level);
             let [bottom, top, left, right] =
                 [(i, j, false), (i, j + 1, false), (i, j, true), (i + 1, j, true)];
@@ -160,7 +166,7 @@ impl<'a> Grid<'a> {
                 (left, above[0] != above[2]),
                 (right, above[1] != above[3]),
             ];
-            let crossed: Vec<Side> =
+            let crossed: Vec<GridEdge> =
                 crossed.into_iter().filter(|(_, is)| *is).map(|(side, _)| side).collect();
             let pairs = match crossed.as_slice() {
                 [from, to] => vec![(*from, *to)],
@@ -175,14 +181,14 @@ impl<'a> Grid<'a> {
                 next.entry(to).or_default().push(from);
             }
         }
-        chained(next)
+        join_edges(next)
             .into_iter()
-            .map(|line| line.into_iter().filter_map(|s| self.cut(s, level)).collect())
+            .map(|line| line.into_iter().filter_map(|s| self.edge_crossing(s, level)).collect())
             .collect()
     }
 
     /// Where a side has the value.
-    fn cut(&self, (i, j, upwards): Side, level: f64) -> Option<Point> {
+    fn edge_crossing(&self, (i, j, upwards): GridEdge, level: f64) -> Option<CanvasPoint> {
         let (k, l) = if upwards { (i, j + 1) } else { (i + 1, j) };
         let (from, to) = (self.value(i, j)?, self.value(k, l)?);
         let share = ((level - from) / (to - from)).clamp(0.0, 1.0);
@@ -192,10 +198,11 @@ impl<'a> Grid<'a> {
 }
 
 /// Lines through sides that are next to each other: the open ones from an end, then the closed ones.
-fn chained(mut next: BTreeMap<Side, Vec<Side>>) -> Vec<Vec<Side>> {
+fn join_edges(mut next: BTreeMap<GridEdge, Vec<GridEdge>>) -> Vec<Vec<GridEdge>> {
     let mut lines = Vec::new();
-    let ends: Vec<Side> = next.iter().filter(|(_, near)| near.len() == 1).map(|(side, _)| *side).collect();
-    let all: Vec<Side> = next.keys().copied().collect();
+    let ends: Vec<GridEdge> =
+        next.iter().filter(|(_, near)| near.len() == 1).map(|(side, _)| *side).collect();
+    let all: Vec<GridEdge> = next.keys().copied().collect();
     for start in ends.into_iter().chain(all) {
         let mut line = vec![start];
         let mut at = start;
@@ -220,27 +227,31 @@ mod tests {
     use super::super::elements::Panel;
     use super::*;
 
-    fn placed(values: impl Fn(f64, f64) -> Option<f64>, size: usize) -> (Panel, Mapped) {
+    fn placed(values: impl Fn(f64, f64) -> Option<f64>, size: usize) -> (Panel, CanvasAxis) {
         let middles: Vec<f64> = (0..size).map(|i| i as f64).collect();
         let column = |x: &f64| middles.iter().map(|y| values(*x, *y)).collect();
-        let heat = Heat {
+        let heat = HeatMap {
             x: middles.clone(),
             y: middles.clone(),
             values: middles.iter().map(column).collect(),
             contours: true,
-            ..Heat::default()
+            ..HeatMap::default()
         };
         let last = size as f64 - 1.0;
-        let axis = Mapped { scale: Scale::Linear, low: 0.0, high: last, from: 0.0, to: 100.0 * last };
-        (Panel { heat: Some(heat), ..Panel::default() }, axis)
+        let axis = CanvasAxis { scale: AxisScale::Linear, low: 0.0, high: last, from: 0.0, to: 100.0 * last };
+        (Panel { heat_map: Some(heat), ..Panel::default() }, axis)
     }
 
-    fn lines(values: impl Fn(f64, f64) -> Option<f64>, size: usize, level: f64) -> Option<Vec<Vec<Point>>> {
+    fn lines(
+        values: impl Fn(f64, f64) -> Option<f64>,
+        size: usize,
+        level: f64,
+    ) -> Option<Vec<Vec<CanvasPoint>>> {
         let (panel, x) = placed(values, size);
-        let mut placed = Placed::of(&panel, (x, (x.low, x.high)), 0.0, true, Vec::new());
+        let mut placed = PanelLayout::new(&panel, (x, (x.low, x.high)), 0.0, true, Vec::new());
         placed.y = x;
-        let heat = panel.heat.as_ref().unwrap();
-        Some(Grid::of(heat, &placed, heat.ends().unwrap())?.lines(level))
+        let heat = panel.heat_map.as_ref().unwrap();
+        Some(ContourGrid::new(heat, &placed, heat.value_range().unwrap())?.contour_lines(level))
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What a figure is made of: a panel with its axes, and what is drawn in it.
 
-use super::axis::Axis;
-use super::heat::Heat;
+use super::axis::ChartAxis;
+use super::heat::HeatMap;
 use super::style::{Colour, Mark};
 
 /// Points with one style and one entry in the legend.
@@ -16,12 +16,12 @@ pub struct Series {
     /// Points in the units of the axes; `None` interrupts a line.
     pub points: Vec<Option<(f64, f64)>>,
     /// Error bars.
-    pub bars: Vec<Bar>,
+    pub error_bars: Vec<ErrorBar>,
 }
 
 /// A series at equal steps of a linear axis; values in the units of the other, `None` where one is missing.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Detail {
+pub struct SampledSeries {
     /// Place of the first value.
     pub start: f64,
     /// Distance of two.
@@ -33,7 +33,7 @@ pub struct Detail {
 /// An error bar, in the units of the axes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[allow(missing_docs)]
-pub enum Bar {
+pub enum ErrorBar {
     /// Along the x axis, at a height `y`.
     Horizontal { y: f64, from: f64, to: f64 },
     /// Along the y axis, at a place `x`.
@@ -64,7 +64,7 @@ pub struct Ribbon {
 
 /// A shaded interval of the x axis.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Band {
+pub struct ShadedSpan {
     /// Entry in the legend; empty for none.
     pub label: String,
     /// Colour, drawn pale.
@@ -79,7 +79,7 @@ pub struct Band {
 
 /// A vertical line with a label over the panel.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Rule {
+pub struct VerticalLine {
     /// Label; empty for none.
     pub label: String,
     /// Colour.
@@ -94,7 +94,7 @@ pub struct Rule {
 
 /// A label over the panel, without a line.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Caption {
+pub struct TopLabel {
     /// Label.
     pub label: String,
     /// Its middle, in units of the x axis.
@@ -103,7 +103,7 @@ pub struct Caption {
 
 /// Text inside the axes.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Text {
+pub struct TextAnnotation {
     /// What it says.
     pub text: String,
     /// Colour.
@@ -118,7 +118,7 @@ pub struct Hatch {
     /// Entry in the legend; empty for none.
     pub label: String,
     /// How they are drawn.
-    pub pattern: Pattern,
+    pub pattern: HatchPattern,
     /// Each from and to a place on the x axis, then on the y axis, in the units of the axes; cut at the axes.
     /// Infinite places on the y axis are its ends.
     pub cells: Vec<[f64; 4]>,
@@ -127,7 +127,7 @@ pub struct Hatch {
 /// A pattern of thin lines, over the grey of cells without a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(missing_docs)]
-pub enum Pattern {
+pub enum HatchPattern {
     /// The grey alone.
     #[default]
     Plain,
@@ -153,35 +153,35 @@ pub struct Panel {
     /// Title over its left corner, in one line or more; empty for none.
     pub title: String,
     /// Horizontal axis.
-    pub x: Axis,
+    pub x: ChartAxis,
     /// Vertical axis.
-    pub y: Axis,
+    pub y: ChartAxis,
     /// Height of the axes, mm.
     pub height_mm: f64,
     /// Lines and symbols, later ones on top.
     pub series: Vec<Series>,
     /// All of the first series, where their points are fewer: what a reader sees who enlarges a part on a
     /// screen.
-    pub details: Vec<Option<Detail>>,
+    pub sampled_series: Vec<Option<SampledSeries>>,
     /// Shaded intervals, under the lines.
-    pub bands: Vec<Band>,
+    pub shaded_spans: Vec<ShadedSpan>,
     /// Vertical lines.
-    pub rules: Vec<Rule>,
+    pub vertical_lines: Vec<VerticalLine>,
     /// Surfaces between curves, under the lines.
     pub ribbons: Vec<Ribbon>,
     /// Labels over the panel.
-    pub captions: Vec<Caption>,
+    pub top_labels: Vec<TopLabel>,
     /// A picture under everything else.
-    pub picture: Option<Raster>,
+    pub raster: Option<Raster>,
     /// Heat map, under everything else.
-    pub heat: Option<Heat>,
+    pub heat_map: Option<HeatMap>,
     /// Hatched cells over it.
     pub hatches: Vec<Hatch>,
     /// Text inside, over everything else.
-    pub texts: Vec<Text>,
+    pub annotations: Vec<TextAnnotation>,
     /// One length for a unit of either axis, as a drawing to scale has; the y axis reaches as far as that
     /// takes.
-    pub equal: bool,
+    pub equal_aspect: bool,
     /// Neither frame nor grid nor ticks: a drawing, not a diagram.
     pub bare: bool,
 }

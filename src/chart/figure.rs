@@ -11,7 +11,7 @@ pub struct Figure {
     /// Line under the heading: what is drawn, and whether it is synthetic; empty for none.
     pub subtitle: String,
     /// Whether it shows data that no camera took: print says so inside the axes, a screen in the subtitle.
-    pub synthetic: bool,
+    pub watermarked: bool,
     /// What the figure shows, for screen readers.
     pub description: String,
     /// Width on a screen, mm.

@@ -2,23 +2,23 @@
 
 use super::canvas::Canvas;
 use super::colours::{FRAME, NO_VALUE, Rgb};
-use super::elements::{Hatch, Pattern};
-use super::layout::Placed;
-use super::path::{self, Area, Point};
-use super::sizes::UNITS;
+use super::elements::{Hatch, HatchPattern};
+use super::layout::PanelLayout;
+use super::path::{self, CanvasArea, CanvasPoint};
+use super::sizes::UNITS_PER_MM;
 
-const INK: Rgb = (0x66, 0x66, 0x66);
+const HATCH_GREY: Rgb = (0x66, 0x66, 0x66);
 /// Distance of the lines, canvas units; doubled until there are no more than [`MOST_STROKES`], so that a
 /// figure stays small.
-const SPACING: f64 = 1.3 * UNITS;
+const HATCH_SPACING: f64 = 1.3 * UNITS_PER_MM;
 const MOST_STROKES: usize = 1200;
 /// Strokes closer than this along a line are one, canvas units: cells that touch.
-const TOUCHING: f64 = 1.5;
-const WIDTH: u32 = 3;
+const TOUCHING_DISTANCE: f64 = 1.5;
+const STROKE_WIDTH: u32 = 3;
 
-impl Pattern {
+impl HatchPattern {
     /// Directions of its lines, canvas units (y downwards).
-    fn directions(self) -> &'static [Point] {
+    fn directions(self) -> &'static [CanvasPoint] {
         const D: f64 = std::f64::consts::FRAC_1_SQRT_2;
         match self {
             Self::Plain => &[],
@@ -34,21 +34,24 @@ impl Pattern {
     /// Lengths of its lines that are drawn and left out in turn, canvas units; none for whole lines.
     fn dashes(self) -> &'static [f64] {
         match self {
-            Self::Dotted => &[0.25 * UNITS, 1.55 * UNITS],
-            Self::Dashed | Self::DashedUpright => &[1.2 * UNITS, 0.8 * UNITS],
+            Self::Dotted => &[0.25 * UNITS_PER_MM, 1.55 * UNITS_PER_MM],
+            Self::Dashed | Self::DashedUpright => &[1.2 * UNITS_PER_MM, 0.8 * UNITS_PER_MM],
             _ => &[],
         }
     }
 }
 
 /// The cells of a hatch on the axes.
-pub(super) fn cells(canvas: &mut Canvas, placed: &Placed, hatch: &Hatch) {
+pub(super) fn draw_hatch(canvas: &mut Canvas, placed: &PanelLayout, hatch: &Hatch) {
     let inside = |[x_from, x_to, y_from, y_to]: &[f64; 4]| {
-        let (left, right) = (placed.x.place_or_low(*x_from)?, placed.x.place_or_low(*x_to)?);
+        let (left, right) =
+            (placed.x.canvas_position_or_low(*x_from)?, placed.x.canvas_position_or_low(*x_to)?);
         let frame = &placed.area;
-        let end = |y: f64, beyond: f64| if y.is_finite() { placed.y.place_or_low(y) } else { Some(beyond) };
+        let end = |y: f64, beyond: f64| {
+            if y.is_finite() { placed.y.canvas_position_or_low(y) } else { Some(beyond) }
+        };
         let (bottom, top) = (end(*y_from, frame.bottom)?, end(*y_to, frame.top)?);
-        let area = Area {
+        let area = CanvasArea {
             left: left.max(frame.left),
             right: right.min(frame.right),
             top: top.max(frame.top),
@@ -56,52 +59,53 @@ pub(super) fn cells(canvas: &mut Canvas, placed: &Placed, hatch: &Hatch) {
         };
         (area.left < area.right && area.top < area.bottom).then_some(area)
     };
-    let areas: Vec<Area> = hatch.cells.iter().filter_map(inside).collect();
-    if placed.panel.heat.as_ref().is_none_or(|heat| !heat.has_values()) {
+    let areas: Vec<CanvasArea> = hatch.cells.iter().filter_map(inside).collect();
+    if placed.panel.heat_map.as_ref().is_none_or(|heat| !heat.has_values()) {
         // a heat map with values has the grey already
-        merged(&areas).iter().for_each(|area| canvas.rectangle(area, NO_VALUE, 1.0));
+        merge_areas(&areas).iter().for_each(|area| canvas.fill_rectangle(area, NO_VALUE, 1.0));
     }
-    strokes(canvas, &areas, hatch.pattern);
+    draw_strokes(canvas, &areas, hatch.pattern);
 }
 
 /// Areas of one height that touch, as one.
-fn merged(areas: &[Area]) -> Vec<Area> {
-    let mut sorted: Vec<Area> = areas.iter().map(|area| Area { ..*area }).collect();
+fn merge_areas(areas: &[CanvasArea]) -> Vec<CanvasArea> {
+    let mut sorted: Vec<CanvasArea> = areas.iter().map(|area| CanvasArea { ..*area }).collect();
     sorted.sort_by(|a, b| {
         a.top.total_cmp(&b.top).then(a.bottom.total_cmp(&b.bottom)).then(a.left.total_cmp(&b.left))
     });
-    let rows = sorted.chunk_by(|a, b| a.top == b.top && a.bottom == b.bottom && b.left <= a.right + TOUCHING);
-    rows.filter_map(|row| Some(Area { right: row.last()?.right, ..*row.first()? })).collect()
+    let rows = sorted
+        .chunk_by(|a, b| a.top == b.top && a.bottom == b.bottom && b.left <= a.right + TOUCHING_DISTANCE);
+    rows.filter_map(|row| Some(CanvasArea { right: row.last()?.right, ..*row.first()? })).collect()
 }
 
 /// What stands in the legend.
-pub(super) fn patch(canvas: &mut Canvas, area: &Area, pattern: Pattern) {
-    canvas.rectangle(area, NO_VALUE, 1.0);
-    strokes(canvas, &[Area { ..*area }], pattern);
-    canvas.line(&area.outline(), FRAME, 2);
+pub(super) fn draw_hatch_sample(canvas: &mut Canvas, area: &CanvasArea, pattern: HatchPattern) {
+    canvas.fill_rectangle(area, NO_VALUE, 1.0);
+    draw_strokes(canvas, &[CanvasArea { ..*area }], pattern);
+    canvas.draw_line(&area.outline(), FRAME, 2);
 }
 
 /// The lines of a pattern where they lie in any of the areas; they continue from one area into the next.
-fn strokes(canvas: &mut Canvas, areas: &[Area], pattern: Pattern) {
+fn draw_strokes(canvas: &mut Canvas, areas: &[CanvasArea], pattern: HatchPattern) {
     for direction in pattern.directions() {
-        let mut spacing = SPACING;
-        let mut found = lines(areas, *direction, spacing);
+        let mut spacing = HATCH_SPACING;
+        let mut found = hatch_lines(areas, *direction, spacing);
         while found.len() > MOST_STROKES {
             spacing *= 2.0;
-            found = lines(areas, *direction, spacing);
+            found = hatch_lines(areas, *direction, spacing);
         }
         for (a, b) in found {
-            for dash in path::dashed(&[a, b], pattern.dashes()) {
-                canvas.line(&dash, INK, WIDTH);
+            for dash in path::split_into_dashes(&[a, b], pattern.dashes()) {
+                canvas.draw_line(&dash, HATCH_GREY, STROKE_WIDTH);
             }
         }
     }
 }
 
 /// Pieces of equidistant lines of one direction inside the areas, touching ones joined.
-fn lines(areas: &[Area], (dx, dy): Point, spacing: f64) -> Vec<(Point, Point)> {
-    let across = |(x, y): Point| x * -dy + y * dx;
-    let along = |(x, y): Point| x * dx + y * dy;
+fn hatch_lines(areas: &[CanvasArea], (dx, dy): CanvasPoint, spacing: f64) -> Vec<(CanvasPoint, CanvasPoint)> {
+    let across = |(x, y): CanvasPoint| x * -dy + y * dx;
+    let along = |(x, y): CanvasPoint| x * dx + y * dy;
     let mut pieces: Vec<(i64, f64, f64)> = Vec::new();
     for area in areas {
         let corners = [
@@ -110,7 +114,7 @@ fn lines(areas: &[Area], (dx, dy): Point, spacing: f64) -> Vec<(Point, Point)> {
             (area.left, area.bottom),
             (area.right, area.bottom),
         ];
-        let ends = |of: &dyn Fn(Point) -> f64| {
+        let ends = |of: &dyn Fn(CanvasPoint) -> f64| {
             corners
                 .map(of)
                 .into_iter()
@@ -126,7 +130,7 @@ fn lines(areas: &[Area], (dx, dy): Point, spacing: f64) -> Vec<(Point, Point)> {
         }
     }
     pieces.sort_by(|a, b| a.0.cmp(&b.0).then(a.1.total_cmp(&b.1)));
-    let joined = pieces.chunk_by(|a, b| a.0 == b.0 && b.1 <= a.2 + TOUCHING);
+    let joined = pieces.chunk_by(|a, b| a.0 == b.0 && b.1 <= a.2 + TOUCHING_DISTANCE);
     let piece = |run: &[(i64, f64, f64)]| {
         let (number, start, _) = *run.first()?;
         let (end, offset) = (run.iter().map(|piece| piece.2).fold(start, f64::max), number as f64 * spacing);
@@ -142,17 +146,17 @@ fn lines(areas: &[Area], (dx, dy): Point, spacing: f64) -> Vec<(Point, Point)> {
 mod tests {
     use super::*;
 
-    const fn area(left: f64, right: f64) -> Area {
-        Area { left, right, top: 0.0, bottom: 10.0 }
+    const fn area(left: f64, right: f64) -> CanvasArea {
+        CanvasArea { left, right, top: 0.0, bottom: 10.0 }
     }
 
     #[test]
     fn cells_that_touch_have_one_ground() {
-        let joined = merged(&[
+        let joined = merge_areas(&[
             area(10.0, 20.0),
             area(30.0, 40.0),
             area(0.0, 10.0),
-            Area { top: 2.0, ..area(20.0, 30.0) },
+            CanvasArea { top: 2.0, ..area(20.0, 30.0) },
         ]);
         assert_eq!(
             joined.iter().map(|a| (a.left, a.right, a.top)).collect::<Vec<_>>(),
@@ -162,16 +166,17 @@ mod tests {
 
     #[test]
     fn lines_stay_inside_and_join_where_cells_touch() {
-        let level = |areas: &[Area]| lines(areas, (1.0, 0.0), 4.0);
+        let level = |areas: &[CanvasArea]| hatch_lines(areas, (1.0, 0.0), 4.0);
         assert_eq!(
             level(&[area(0.0, 10.0)]),
             [((0.0, 0.0), (10.0, 0.0)), ((0.0, 4.0), (10.0, 4.0)), ((0.0, 8.0), (10.0, 8.0))]
         );
         assert_eq!(level(&[area(10.0, 20.0), area(0.0, 10.0)])[1], ((0.0, 4.0), (20.0, 4.0)));
         assert_eq!(level(&[area(0.0, 10.0), area(20.0, 30.0)]).len(), 6);
-        for (a, b) in lines(&[area(0.0, 10.0)], Pattern::Rising.directions()[0], 3.0) {
-            let inside =
-                |(x, y): Point| (-1e-9..=10.0 + 1e-9).contains(&x) && (-1e-9..=10.0 + 1e-9).contains(&y);
+        for (a, b) in hatch_lines(&[area(0.0, 10.0)], HatchPattern::Rising.directions()[0], 3.0) {
+            let inside = |(x, y): CanvasPoint| {
+                (-1e-9..=10.0 + 1e-9).contains(&x) && (-1e-9..=10.0 + 1e-9).contains(&y)
+            };
             assert!(
                 inside(a) && inside(b) && (a.0 + a.1 - b.0 - b.1).abs() < 1e-9 && b.1 < a.1 + 1e-9,
                 "{a:?} {b:?}"

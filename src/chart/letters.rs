@@ -1,88 +1,90 @@
 //! Letters of panels, and what print says inside the axes.
 
-use super::canvas::{Anchor, Canvas, Lettering};
+use super::canvas::{Canvas, Lettering, TextAnchor};
 use super::colours::{Rgb, WHITE, readable_on};
-use super::elements::Text;
+use super::elements::TextAnnotation;
 use super::heat;
-use super::layout::Placed;
-use super::path::{Area, Point};
-use super::sizes::{EDGE_MM, SMALL_MM, UNITS};
+use super::layout::PanelLayout;
+use super::path::{CanvasArea, CanvasPoint};
+use super::sizes::{EDGE_MM, SMALL_MM, UNITS_PER_MM};
 use super::text::{WIDE_LETTER, text_width};
 
 /// What print says of data that no camera took; the rest belongs in the caption.
-const SYNTHETIC: &str = "synthetic";
+const WATERMARK: &str = "synthetic";
 /// Its grey, with a contrast of 5.7 to 1 on white.
-const INK: Rgb = (0x66, 0x66, 0x66);
+const WATERMARK_GREY: Rgb = (0x66, 0x66, 0x66);
 /// Distance of a letter from the axes under it, and of the word from the frame, mm.
-const OVER_MM: f64 = 0.6;
-const INSIDE_MM: f64 = 0.8;
+const LETTER_GAP_MM: f64 = 0.6;
+const WATERMARK_INSET_MM: f64 = 0.8;
 
 /// Width that the letter of a drawing without axes takes before its title, canvas units.
-pub(super) const BEFORE_TITLE: f64 = 4.4 * UNITS;
+pub(super) const LETTER_WIDTH: f64 = 4.4 * UNITS_PER_MM;
 
 /// The letters of all panels, each over the upper left corner of its panel with its labels.
-pub(super) fn letters(canvas: &mut Canvas, panels: &[Placed]) {
-    let look = Lettering { bold: true, ..Lettering::plain(SMALL_MM, Anchor::Left) };
+pub(super) fn draw_panel_letters(canvas: &mut Canvas, panels: &[PanelLayout]) {
+    let look = Lettering { bold: true, ..Lettering::plain(SMALL_MM, TextAnchor::Left) };
     for placed in panels {
         let Some(letter) = placed.letter else { continue };
         let edge_mm = if placed.panel.bare { EDGE_MM / 2.0 } else { EDGE_MM };
         let at = (
-            ((placed.column_mm + edge_mm) * UNITS).round(),
-            placed.area.top - (OVER_MM + SMALL_MM / 2.0) * UNITS,
+            ((placed.column_mm + edge_mm) * UNITS_PER_MM).round(),
+            placed.area.top - (LETTER_GAP_MM + SMALL_MM / 2.0) * UNITS_PER_MM,
         );
-        canvas.text(&format!("({letter})"), at, look);
+        canvas.draw_text(&format!("({letter})"), at, look);
     }
 }
 
 /// The word in the corner of a panel over which the fewest lines run.
-pub(super) fn synthetic(canvas: &mut Canvas, placed: &Placed) {
-    let width = text_width(SYNTHETIC, SMALL_MM) * WIDE_LETTER / super::text::LETTER * UNITS;
-    let (height, inside) = (SMALL_MM * 1.2 * UNITS, INSIDE_MM * UNITS);
+pub(super) fn draw_watermark(canvas: &mut Canvas, placed: &PanelLayout) {
+    let width = text_width(WATERMARK, SMALL_MM) * WIDE_LETTER / super::text::LETTER * UNITS_PER_MM;
+    let (height, inside) = (SMALL_MM * 1.2 * UNITS_PER_MM, WATERMARK_INSET_MM * UNITS_PER_MM);
     let area = &placed.area;
     let corner = |right: bool, bottom: bool| {
         let left = if right { area.right - inside - width } else { area.left + inside };
         let top = if bottom { area.bottom - inside - height } else { area.top + inside };
-        Area { left, top, right: left + width, bottom: top + height }
+        CanvasArea { left, top, right: left + width, bottom: top + height }
     };
     let corners = [(true, false), (false, false), (true, true), (false, true)].map(|(r, b)| corner(r, b));
     // over the axes where every corner is a cell with its number
-    let over = Area { top: area.top - inside - height, bottom: area.top - inside, ..corners[0] };
-    let full = |corner: &Area| texts_in(placed, corner) > 0;
-    let free = corners.iter().filter(|corner| !full(corner)).min_by_key(|corner| crossings(placed, corner));
+    let over = CanvasArea { top: area.top - inside - height, bottom: area.top - inside, ..corners[0] };
+    let full = |corner: &CanvasArea| count_texts_in(placed, corner) > 0;
+    let free =
+        corners.iter().filter(|corner| !full(corner)).min_by_key(|corner| count_lines_in(placed, corner));
     let free = free.unwrap_or(&over);
     let at = ((free.left + free.right) / 2.0, (free.top + free.bottom) / 2.0);
-    let value = (placed.x.value(at.0), placed.y.value(at.1));
+    let value = (placed.x.value_at(at.0), placed.y.value_at(at.1));
     let scales = (placed.x.scale, placed.y.scale);
-    let heat = placed.panel.heat.as_ref().filter(|_| area.holds(at));
+    let heat = placed.panel.heat_map.as_ref().filter(|_| area.contains(at));
     let map = heat.and_then(|heat| heat::colour_at(heat, scales, value));
     if map.is_none() {
-        canvas.rectangle(free, WHITE, 0.8);
+        canvas.fill_rectangle(free, WHITE, 0.8);
     }
-    let ink = map.map_or(INK, readable_on);
-    canvas.coloured(SYNTHETIC, at, Lettering::plain(SMALL_MM, Anchor::Centre), ink);
+    let ink = map.map_or(WATERMARK_GREY, readable_on);
+    canvas.draw_coloured_text(WATERMARK, at, Lettering::plain(SMALL_MM, TextAnchor::Centre), ink);
 }
 
 /// Canvas coordinates of a point of a panel.
-fn place(placed: &Placed, (x, y): (f64, f64)) -> Option<Point> {
-    Some((placed.x.place(x)?, placed.y.place(y)?))
+fn canvas_point(placed: &PanelLayout, (x, y): (f64, f64)) -> Option<CanvasPoint> {
+    Some((placed.x.canvas_position(x)?, placed.y.canvas_position(y)?))
 }
 
 /// How many texts of a panel reach into an area.
-fn texts_in(placed: &Placed, area: &Area) -> usize {
-    let reaches = |text: &Text| {
-        let Some((x, y)) = place(placed, text.at) else { return false };
-        let (wide, high) = (text_width(&text.text, SMALL_MM) / 2.0 * UNITS, SMALL_MM / 2.0 * UNITS);
+fn count_texts_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
+    let reaches = |text: &TextAnnotation| {
+        let Some((x, y)) = canvas_point(placed, text.at) else { return false };
+        let (wide, high) =
+            (text_width(&text.text, SMALL_MM) / 2.0 * UNITS_PER_MM, SMALL_MM / 2.0 * UNITS_PER_MM);
         x + wide > area.left && x - wide < area.right && y + high > area.top && y - high < area.bottom
     };
-    placed.panel.texts.iter().filter(|text| reaches(text)).count()
+    placed.panel.annotations.iter().filter(|text| reaches(text)).count()
 }
 
 /// How many pieces of lines and symbols of a panel lie in an area.
-fn crossings(placed: &Placed, area: &Area) -> usize {
+fn count_lines_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
     let of_series = placed.panel.series.iter().map(|series| {
-        let points: Vec<Option<Point>> =
-            series.points.iter().map(|p| p.and_then(|p| place(placed, p))).collect();
-        let inside = points.iter().flatten().filter(|p| area.holds(**p)).count();
+        let points: Vec<Option<CanvasPoint>> =
+            series.points.iter().map(|p| p.and_then(|p| canvas_point(placed, p))).collect();
+        let inside = points.iter().flatten().filter(|p| area.contains(**p)).count();
         let between = points.windows(2).filter(|pair| {
             let [Some(a), Some(b)] = pair else { return false };
             !series.mark.is_symbol() && area.clip(*a, *b).is_some()
@@ -94,7 +96,7 @@ fn crossings(placed: &Placed, area: &Area) -> usize {
 
 #[cfg(test)]
 mod tests {
-    use crate::chart::{Axis, Figure, Medium, Panel, Series, Text};
+    use crate::chart::{ChartAxis, Figure, Medium, Panel, Series, TextAnnotation};
 
     /// Place of a text in a figure, canvas units.
     fn found(svg: &str, text: &str) -> Option<(f64, f64)> {
@@ -106,22 +108,28 @@ mod tests {
     }
 
     fn panel() -> Panel {
-        let axis = || Axis::linear("q").between(0.0, 1.0);
+        let axis = || ChartAxis::linear("q").with_range(0.0, 1.0);
         Panel { x: axis(), y: axis(), height_mm: 30.0, ..Panel::default() }
     }
 
     fn figure(panels: Vec<Panel>, synthetic: bool) -> Figure {
-        Figure { width_mm: 170.0, panels, synthetic, title: "claim".to_owned(), ..Figure::default() }
+        Figure {
+            width_mm: 170.0,
+            panels,
+            watermarked: synthetic,
+            title: "claim".to_owned(),
+            ..Figure::default()
+        }
     }
 
     #[test]
     fn one_panel_has_no_letter_and_several_have_theirs_from_above() {
-        let alone = figure(vec![panel()], false).svg(Medium::Screen);
+        let alone = figure(vec![panel()], false).to_svg(Medium::Screen);
         assert_eq!(found(&alone, "(a)"), None);
-        let both = figure(vec![panel(), panel()], false).svg(Medium::Column);
+        let both = figure(vec![panel(), panel()], false).to_svg(Medium::Column);
         let [a, b] = ["(a)", "(b)"].map(|letter| found(&both, letter).unwrap());
         assert!(a.0 == b.0 && a.1 < b.1, "{a:?} {b:?}");
-        let many = figure(vec![panel(); 27], false).svg(Medium::Screen);
+        let many = figure(vec![panel(); 27], false).to_svg(Medium::Screen);
         assert_eq!(found(&many, "(a)"), None);
     }
 
@@ -131,19 +139,21 @@ mod tests {
         falling.series =
             vec![Series { points: vec![Some((0.5, 1.0)), Some((1.0, 0.9))], ..Series::default() }];
         let drawn = figure(vec![falling], true);
-        assert_eq!(found(&drawn.svg(Medium::Screen), "synthetic"), None);
-        let (x, _) = found(&drawn.svg(Medium::Column), "synthetic").unwrap();
+        assert_eq!(found(&drawn.to_svg(Medium::Screen), "synthetic"), None);
+        let (x, _) = found(&drawn.to_svg(Medium::Column), "synthetic").unwrap();
         assert!(x < 85.0 * 15.0 / 2.0, "on the left: {x}");
-        assert_eq!(found(&figure(vec![panel()], false).svg(Medium::Column), "synthetic"), None);
+        assert_eq!(found(&figure(vec![panel()], false).to_svg(Medium::Column), "synthetic"), None);
     }
 
     #[test]
     fn the_mark_leaves_the_axes_where_all_corners_have_numbers() {
         let mut table = panel();
         let corners = [(0.05, 0.05), (0.95, 0.05), (0.05, 0.95), (0.95, 0.95)];
-        table.texts = corners.map(|at| Text { text: "-0.27".to_owned(), at, ..Text::default() }).to_vec();
+        table.annotations = corners
+            .map(|at| TextAnnotation { text: "-0.27".to_owned(), at, ..TextAnnotation::default() })
+            .to_vec();
         table.title = "t".to_owned();
-        let svg = figure(vec![table], true).svg(Medium::Column);
+        let svg = figure(vec![table], true).to_svg(Medium::Column);
         let [mark, number] = ["synthetic", "-0.27"].map(|text| found(&svg, text).unwrap());
         assert!(mark.1 < number.1 - 30.0, "{mark:?} {number:?}");
     }

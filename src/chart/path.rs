@@ -3,25 +3,25 @@
 use crate::math;
 
 /// A point of the canvas.
-pub(super) type Point = (f64, f64);
+pub(super) type CanvasPoint = (f64, f64);
 
 /// A rectangle of the canvas.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Area {
+pub(super) struct CanvasArea {
     pub left: f64,
     pub top: f64,
     pub right: f64,
     pub bottom: f64,
 }
 
-impl Area {
+impl CanvasArea {
     /// Whether a point lies in it.
-    pub fn holds(&self, (x, y): Point) -> bool {
+    pub fn contains(&self, (x, y): CanvasPoint) -> bool {
         x >= self.left && x <= self.right && y >= self.top && y <= self.bottom
     }
 
     /// Its corners, the first one again at the end.
-    pub fn outline(&self) -> [Point; 5] {
+    pub fn outline(&self) -> [CanvasPoint; 5] {
         [
             (self.left, self.top),
             (self.right, self.top),
@@ -32,7 +32,7 @@ impl Area {
     }
 
     /// The part of a segment inside (Liang and Barsky); slopes are kept.
-    pub fn clip(&self, a: Point, b: Point) -> Option<(Point, Point)> {
+    pub fn clip(&self, a: CanvasPoint, b: CanvasPoint) -> Option<(CanvasPoint, CanvasPoint)> {
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
         for (p, q) in
@@ -55,7 +55,7 @@ impl Area {
 }
 
 /// The runs of points between gaps.
-pub(super) fn runs(points: impl Iterator<Item = Option<Point>>) -> Vec<Vec<Point>> {
+pub(super) fn split_at_gaps(points: impl Iterator<Item = Option<CanvasPoint>>) -> Vec<Vec<CanvasPoint>> {
     let mut runs = vec![Vec::new()];
     for point in points {
         match (point, runs.last_mut()) {
@@ -69,8 +69,8 @@ pub(super) fn runs(points: impl Iterator<Item = Option<Point>>) -> Vec<Vec<Point
 
 /// First, lowest, highest and last point of every column of `width` that holds more than four: looks the same
 /// and is no longer than the canvas is wide.
-pub(super) fn thinned(run: &[Point], width: f64) -> Vec<Point> {
-    let column = |p: &Point| (p.0 / width).floor();
+pub(super) fn thin_points(run: &[CanvasPoint], width: f64) -> Vec<CanvasPoint> {
+    let column = |p: &CanvasPoint| (p.0 / width).floor();
     let mut kept = Vec::new();
     for group in run.chunk_by(|a, b| column(a) == column(b)) {
         if group.len() <= 4 {
@@ -90,8 +90,8 @@ pub(super) fn thinned(run: &[Point], width: f64) -> Vec<Point> {
 }
 
 /// The pieces of a run inside an area.
-pub(super) fn clipped(run: &[Point], area: &Area) -> Vec<Vec<Point>> {
-    let mut pieces: Vec<Vec<Point>> = Vec::new();
+pub(super) fn clip_line(run: &[CanvasPoint], area: &CanvasArea) -> Vec<Vec<CanvasPoint>> {
+    let mut pieces: Vec<Vec<CanvasPoint>> = Vec::new();
     for pair in run.windows(2) {
         let Some((a, b)) = area.clip(pair[0], pair[1]) else { continue };
         match pieces.last_mut().filter(|piece| piece.last() == Some(&a)) {
@@ -103,15 +103,15 @@ pub(super) fn clipped(run: &[Point], area: &Area) -> Vec<Vec<Point>> {
 }
 
 /// The part of a polygon inside an area (Sutherland and Hodgman).
-pub(super) fn polygon_inside(corners: &[Point], area: &Area) -> Vec<Point> {
-    let depths: [&dyn Fn(Point) -> f64; 4] =
+pub(super) fn clip_polygon(corners: &[CanvasPoint], area: &CanvasArea) -> Vec<CanvasPoint> {
+    let depths: [&dyn Fn(CanvasPoint) -> f64; 4] =
         [&|p| p.0 - area.left, &|p| area.right - p.0, &|p| p.1 - area.top, &|p| area.bottom - p.1];
     depths.iter().fold(corners.to_vec(), |corners, depth| {
         let next = corners.iter().cycle().skip(1);
         corners
             .iter()
             .zip(next)
-            .flat_map(|(a, b)| kept_of_side(*a, *b, depth(*a), depth(*b)))
+            .flat_map(|(a, b)| clip_polygon_side(*a, *b, depth(*a), depth(*b)))
             .flatten()
             .collect()
     })
@@ -119,7 +119,7 @@ pub(super) fn polygon_inside(corners: &[Point], area: &Area) -> Vec<Point> {
 
 /// What the side from `a` to `b` leaves of a polygon where depths of zero or more are kept: its start, and
 /// the point where it crosses.
-fn kept_of_side(a: Point, b: Point, depth_a: f64, depth_b: f64) -> [Option<Point>; 2] {
+fn clip_polygon_side(a: CanvasPoint, b: CanvasPoint, depth_a: f64, depth_b: f64) -> [Option<CanvasPoint>; 2] {
     let crosses = (depth_a < 0.0) != (depth_b < 0.0);
     let share = depth_a / (depth_a - depth_b);
     let crossing = crosses.then_some((a.0 + share * (b.0 - a.0), a.1 + share * (b.1 - a.1)));
@@ -127,7 +127,7 @@ fn kept_of_side(a: Point, b: Point, depth_a: f64, depth_b: f64) -> [Option<Point
 }
 
 /// Dashes of a line: lengths drawn and left out in turn; an empty pattern is a full line.
-pub(super) fn dashed(line: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
+pub(super) fn split_into_dashes(line: &[CanvasPoint], pattern: &[f64]) -> Vec<Vec<CanvasPoint>> {
     let Some(first) = line.first().filter(|_| pattern.iter().sum::<f64>() > 0.0) else {
         return vec![line.to_vec()];
     };
@@ -164,7 +164,7 @@ pub(super) fn dashed(line: &[Point], pattern: &[f64]) -> Vec<Vec<Point>> {
 mod tests {
     use super::*;
 
-    const AREA: Area = Area { left: 0.0, top: 0.0, right: 10.0, bottom: 10.0 };
+    const AREA: CanvasArea = CanvasArea { left: 0.0, top: 0.0, right: 10.0, bottom: 10.0 };
 
     #[test]
     fn a_segment_is_cut_at_the_axes_and_keeps_its_slope() {
@@ -179,32 +179,32 @@ mod tests {
 
     #[test]
     fn a_line_that_leaves_and_returns_is_two_pieces() {
-        let pieces = clipped(&[(1.0, 5.0), (2.0, 15.0), (3.0, 5.0), (4.0, 5.0)], &AREA);
+        let pieces = clip_line(&[(1.0, 5.0), (2.0, 15.0), (3.0, 5.0), (4.0, 5.0)], &AREA);
         assert_eq!(pieces, [vec![(1.0, 5.0), (1.5, 10.0)], vec![(2.5, 10.0), (3.0, 5.0), (4.0, 5.0)]]);
     }
 
     #[test]
     fn a_polygon_is_cut_at_the_axes() {
         assert_eq!(
-            polygon_inside(&[(2.0, 2.0), (12.0, 2.0), (2.0, 7.0)], &AREA),
+            clip_polygon(&[(2.0, 2.0), (12.0, 2.0), (2.0, 7.0)], &AREA),
             [(2.0, 2.0), (10.0, 2.0), (10.0, 3.0), (2.0, 7.0)]
         );
-        assert_eq!(polygon_inside(&[(-5.0, -5.0), (15.0, -5.0), (15.0, 15.0), (-5.0, 15.0)], &AREA).len(), 4);
+        assert_eq!(clip_polygon(&[(-5.0, -5.0), (15.0, -5.0), (15.0, 15.0), (-5.0, 15.0)], &AREA).len(), 4);
         assert_eq!(
-            polygon_inside(&[(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)], &AREA),
+            clip_polygon(&[(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)], &AREA),
             [(1.0, 1.0), (2.0, 1.0), (2.0, 2.0)]
         );
-        assert_eq!(polygon_inside(&[(11.0, 1.0), (12.0, 1.0), (12.0, 2.0)], &AREA), []);
-        assert_eq!(polygon_inside(&[], &AREA), []);
+        assert_eq!(clip_polygon(&[(11.0, 1.0), (12.0, 1.0), (12.0, 2.0)], &AREA), []);
+        assert_eq!(clip_polygon(&[], &AREA), []);
     }
 
     #[test]
     fn gaps_split_and_long_runs_keep_their_extremes() {
         assert_eq!(
-            runs([None, Some((0.0, 1.0)), None, None, Some((2.0, 1.0))].into_iter()),
+            split_at_gaps([None, Some((0.0, 1.0)), None, None, Some((2.0, 1.0))].into_iter()),
             [vec![(0.0, 1.0)], vec![(2.0, 1.0)]]
         );
-        let run: Vec<Point> = (0..1000)
+        let run: Vec<CanvasPoint> = (0..1000)
             .map(|i| {
                 (
                     f64::from(i) / 500.0,
@@ -218,14 +218,14 @@ mod tests {
                 )
             })
             .collect();
-        let kept = thinned(&run, 1.0);
+        let kept = thin_points(&run, 1.0);
         assert!(kept.len() <= 8 && kept.contains(&(1.4, 9.0)) && kept.contains(&(0.6, -9.0)));
     }
 
     #[test]
     fn dashes_have_the_lengths_of_the_pattern() {
-        let dashes = dashed(&[(0.0, 0.0), (7.0, 0.0), (10.0, 0.0)], &[3.0, 2.0]);
+        let dashes = split_into_dashes(&[(0.0, 0.0), (7.0, 0.0), (10.0, 0.0)], &[3.0, 2.0]);
         assert_eq!(dashes, [vec![(0.0, 0.0), (3.0, 0.0)], vec![(5.0, 0.0), (7.0, 0.0), (8.0, 0.0)]]);
-        assert_eq!(dashed(&[(0.0, 0.0), (7.0, 0.0)], &[]), [vec![(0.0, 0.0), (7.0, 0.0)]]);
+        assert_eq!(split_into_dashes(&[(0.0, 0.0), (7.0, 0.0)], &[]), [vec![(0.0, 0.0), (7.0, 0.0)]]);
     }
 }

@@ -2,49 +2,55 @@
 
 use super::canvas::Canvas;
 use super::colours::{Rgb, WHITE};
-use super::elements::{Bar, Ribbon, Series};
-use super::layout::Placed;
-use super::path::{self, Area, Point};
-use super::sizes::{BAND_OPACITY, UNITS};
-use super::style::{Colour, Mark, Shape};
+use super::elements::{ErrorBar, Ribbon, Series};
+use super::layout::PanelLayout;
+use super::path::{self, CanvasArea, CanvasPoint};
+use super::sizes::{SHADING_OPACITY, UNITS_PER_MM};
+use super::style::{Colour, Mark, MarkerShape};
 use crate::math;
 
 /// Width of a column in which a line keeps four points, canvas units: one pixel.
-const COLUMN: f64 = 4.0;
+const THINNING_COLUMN: f64 = 4.0;
 /// Half width of a symbol, canvas units.
-const ARM: f64 = 0.8 * UNITS;
+const SYMBOL_HALF_WIDTH: f64 = 0.8 * UNITS_PER_MM;
 /// Least half width of a point that stands alone in a line, canvas units.
-const LEAST_DOT: u32 = 4;
+const MIN_DOT_HALF_WIDTH: u32 = 4;
 /// Half width of the cap at the end of an error bar, canvas units.
-const CAP: f64 = 0.7 * UNITS;
+const CAP_HALF_WIDTH: f64 = 0.7 * UNITS_PER_MM;
 /// Width of the line of an error bar, canvas units.
-const BAR_WIDTH: u32 = 3;
+const ERROR_BAR_WIDTH: u32 = 3;
 
 /// A series with its error bars, which lie under its symbols.
-pub(super) fn series(canvas: &mut Canvas, placed: &Placed, series: &Series) {
-    for bar in &series.bars {
-        error_bar(canvas, placed, *bar, series.colour.rgb());
+pub(super) fn draw_series(canvas: &mut Canvas, placed: &PanelLayout, series: &Series) {
+    for bar in &series.error_bars {
+        draw_error_bar(canvas, placed, *bar, series.colour.rgb());
     }
-    let points: Vec<Option<Point>> = series
+    let points: Vec<Option<CanvasPoint>> = series
         .points
         .iter()
-        .map(|p| p.and_then(|(x, y)| Some((placed.x.place(x)?, placed.y.place(y)?))))
+        .map(|p| p.and_then(|(x, y)| Some((placed.x.canvas_position(x)?, placed.y.canvas_position(y)?))))
         .collect();
-    marked(canvas, &points, series.colour, series.mark, &placed.area);
+    draw_marks(canvas, &points, series.colour, series.mark, &placed.area);
 }
 
 /// Points of the canvas as line or symbols, inside an area.
-pub(super) fn marked(canvas: &mut Canvas, points: &[Option<Point>], colour: Colour, mark: Mark, area: &Area) {
+pub(super) fn draw_marks(
+    canvas: &mut Canvas,
+    points: &[Option<CanvasPoint>],
+    colour: Colour,
+    mark: Mark,
+    area: &CanvasArea,
+) {
     let rgb = colour.rgb();
-    for whole in path::runs(points.iter().copied()) {
-        let run = path::thinned(&whole, COLUMN);
+    for whole in path::split_at_gaps(points.iter().copied()) {
+        let run = path::thin_points(&whole, THINNING_COLUMN);
         match mark {
             Mark::Dots | Mark::Circles | Mark::Crosses | Mark::Hollow(_) => {
-                for point in run.into_iter().filter(|p| area.holds(*p)) {
-                    symbol(canvas, point, mark, rgb);
+                for point in run.into_iter().filter(|p| area.contains(*p)) {
+                    draw_symbol(canvas, point, mark, rgb);
                 }
             }
-            Mark::Edged => edged(canvas, &run, rgb, area),
+            Mark::Edged => draw_edged_line(canvas, &run, rgb, area),
             Mark::Line
             | Mark::Thin
             | Mark::Thick
@@ -54,118 +60,151 @@ pub(super) fn marked(canvas: &mut Canvas, points: &[Option<Point>], colour: Colo
             | Mark::Joined(_) => {
                 // (a point between two gaps is no line, and must be seen)
                 if let [alone] = run.as_slice()
-                    && area.holds(*alone)
+                    && area.contains(*alone)
                 {
-                    canvas.circle(*alone, mark.width().max(LEAST_DOT), rgb, true);
+                    canvas.draw_circle(*alone, mark.line_width().max(MIN_DOT_HALF_WIDTH), rgb, true);
                 }
-                for piece in path::clipped(&run, area) {
-                    for dash in path::dashed(&piece, mark.pattern()) {
-                        canvas.line(&dash, rgb, mark.width());
+                for piece in path::clip_line(&run, area) {
+                    for dash in path::split_into_dashes(&piece, mark.dash_pattern()) {
+                        canvas.draw_line(&dash, rgb, mark.line_width());
                     }
                 }
             }
         }
         if let Mark::Joined(_) = mark {
-            for point in whole.iter().filter(|p| area.holds(**p)) {
-                symbol(canvas, *point, mark, rgb);
+            for point in whole.iter().filter(|p| area.contains(**p)) {
+                draw_symbol(canvas, *point, mark, rgb);
             }
         }
     }
 }
 
 /// A line over a wider white one, with its points where they stand apart or alone.
-fn edged(canvas: &mut Canvas, run: &[Point], colour: Rgb, area: &Area) {
+fn draw_edged_line(canvas: &mut Canvas, run: &[CanvasPoint], colour: Rgb, area: &CanvasArea) {
     const DOT: u32 = 5;
     const EDGE: u32 = 3;
     const APART: f64 = 4.0 * DOT as f64;
-    let pieces = path::clipped(run, area);
+    let pieces = path::clip_line(run, area);
     let apart = run.len() < 2
         || run.windows(2).any(|pair| math::hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1) > APART);
-    let inside = || run.iter().filter(|p| apart && area.holds(**p));
+    let inside = || run.iter().filter(|p| apart && area.contains(**p));
     for (rgb, extra) in [(WHITE, EDGE), (colour, 0)] {
         for piece in &pieces {
-            canvas.line(piece, rgb, 4 + 2 * extra);
+            canvas.draw_line(piece, rgb, 4 + 2 * extra);
         }
         for point in inside() {
-            canvas.circle(*point, DOT + extra, rgb, true);
+            canvas.draw_circle(*point, DOT + extra, rgb, true);
         }
     }
 }
 
-fn symbol(canvas: &mut Canvas, (x, y): Point, mark: Mark, colour: Rgb) {
+fn draw_symbol(canvas: &mut Canvas, (x, y): CanvasPoint, mark: Mark, colour: Rgb) {
     match mark {
-        Mark::Circles => canvas.circle((x, y), ARM as u32, colour, false),
+        Mark::Circles => canvas.draw_circle((x, y), SYMBOL_HALF_WIDTH as u32, colour, false),
         Mark::Crosses => {
-            canvas.line(&[(x - ARM, y - ARM), (x + ARM, y + ARM)], colour, 4);
-            canvas.line(&[(x - ARM, y + ARM), (x + ARM, y - ARM)], colour, 4);
+            canvas.draw_line(
+                &[
+                    (x - SYMBOL_HALF_WIDTH, y - SYMBOL_HALF_WIDTH),
+                    (x + SYMBOL_HALF_WIDTH, y + SYMBOL_HALF_WIDTH),
+                ],
+                colour,
+                4,
+            );
+            canvas.draw_line(
+                &[
+                    (x - SYMBOL_HALF_WIDTH, y + SYMBOL_HALF_WIDTH),
+                    (x + SYMBOL_HALF_WIDTH, y - SYMBOL_HALF_WIDTH),
+                ],
+                colour,
+                4,
+            );
         }
-        Mark::Joined(shape) => shaped(canvas, (x, y), ARM, shape, colour, true),
-        Mark::Hollow(shape) => shaped(canvas, (x, y), ARM, shape, colour, false),
-        _ => canvas.circle((x, y), 4, colour, true),
+        Mark::Joined(shape) => draw_shape(canvas, (x, y), SYMBOL_HALF_WIDTH, shape, colour, true),
+        Mark::Hollow(shape) => draw_shape(canvas, (x, y), SYMBOL_HALF_WIDTH, shape, colour, false),
+        _ => canvas.draw_circle((x, y), 4, colour, true),
     }
 }
 
 /// A symbol, hollow ones white inside.
-fn shaped(canvas: &mut Canvas, (x, y): Point, half_width: f64, shape: Shape, colour: Rgb, full: bool) {
-    let mut outline: Vec<Point> =
+fn draw_shape(
+    canvas: &mut Canvas,
+    (x, y): CanvasPoint,
+    half_width: f64,
+    shape: MarkerShape,
+    colour: Rgb,
+    full: bool,
+) {
+    let mut outline: Vec<CanvasPoint> =
         shape.corners().iter().map(|(a, b)| (x + a * half_width, y + b * half_width)).collect();
     let Some(first) = outline.first().copied() else {
-        canvas.circle((x, y), half_width as u32, if full { colour } else { WHITE }, true);
-        canvas.circle((x, y), half_width as u32, colour, false);
+        canvas.draw_circle((x, y), half_width as u32, if full { colour } else { WHITE }, true);
+        canvas.draw_circle((x, y), half_width as u32, colour, false);
         return;
     };
-    canvas.polygon(&outline, if full { colour } else { WHITE }, 1.0);
+    canvas.fill_polygon(&outline, if full { colour } else { WHITE }, 1.0);
     outline.push(first);
-    canvas.line(&outline, colour, 4);
+    canvas.draw_line(&outline, colour, 4);
 }
 
 /// An error bar; an end beyond the axes, or at or below zero on a logarithmic one, is cut there and has no
 /// cap.
-fn error_bar(canvas: &mut Canvas, placed: &Placed, bar: Bar, colour: Rgb) {
+fn draw_error_bar(canvas: &mut Canvas, placed: &PanelLayout, bar: ErrorBar, colour: Rgb) {
     let (x, y) = (&placed.x, &placed.y);
     let (ends, across) = match bar {
-        Bar::Horizontal { y: at, from, to } => {
-            let Some(at) = y.place(at) else { return };
-            ([x.place_or_low(from), x.place_or_low(to)].map(|end| end.map(|end| (end, at))), (0.0, CAP))
+        ErrorBar::Horizontal { y: at, from, to } => {
+            let Some(at) = y.canvas_position(at) else { return };
+            (
+                [x.canvas_position_or_low(from), x.canvas_position_or_low(to)]
+                    .map(|end| end.map(|end| (end, at))),
+                (0.0, CAP_HALF_WIDTH),
+            )
         }
-        Bar::Vertical { x: at, from, to } => {
-            let Some(at) = x.place(at) else { return };
-            ([y.place_or_low(from), y.place_or_low(to)].map(|end| end.map(|end| (at, end))), (CAP, 0.0))
+        ErrorBar::Vertical { x: at, from, to } => {
+            let Some(at) = x.canvas_position(at) else { return };
+            (
+                [y.canvas_position_or_low(from), y.canvas_position_or_low(to)]
+                    .map(|end| end.map(|end| (at, end))),
+                (CAP_HALF_WIDTH, 0.0),
+            )
         }
     };
     let [Some(from), Some(to)] = ends else { return };
     let Some((a, b)) = placed.area.clip(from, to) else { return };
-    canvas.line(&[a, b], colour, BAR_WIDTH);
+    canvas.draw_line(&[a, b], colour, ERROR_BAR_WIDTH);
     for (cut, end) in [(a, from), (b, to)] {
-        if cut == end && strictly_inside(&placed.area, end) {
-            canvas.line(
+        if cut == end && is_strictly_inside(&placed.area, end) {
+            canvas.draw_line(
                 &[(end.0 - across.0, end.1 - across.1), (end.0 + across.0, end.1 + across.1)],
                 colour,
-                BAR_WIDTH,
+                ERROR_BAR_WIDTH,
             );
         }
     }
 }
 
-fn strictly_inside(area: &Area, (x, y): Point) -> bool {
+fn is_strictly_inside(area: &CanvasArea, (x, y): CanvasPoint) -> bool {
     x > area.left && x < area.right && y > area.top && y < area.bottom
 }
 
 /// The surface between two curves.
-pub(super) fn ribbon(canvas: &mut Canvas, placed: &Placed, ribbon: &Ribbon) {
+pub(super) fn draw_ribbon(canvas: &mut Canvas, placed: &PanelLayout, ribbon: &Ribbon) {
     let corners = |(x, low, high): (f64, f64, f64)| {
-        Some((placed.x.place(x)?, placed.y.place_or_low(low)?, placed.y.place_or_low(high)?))
+        Some((
+            placed.x.canvas_position(x)?,
+            placed.y.canvas_position_or_low(low)?,
+            placed.y.canvas_position_or_low(high)?,
+        ))
     };
     let placed_points: Vec<_> = ribbon.points.iter().map(|p| p.and_then(corners)).collect();
     let edge = |take: fn((f64, f64, f64)) -> f64| {
-        path::runs(placed_points.iter().map(|p| p.map(|p| (p.0, take(p)))))
+        path::split_at_gaps(placed_points.iter().map(|p| p.map(|p| (p.0, take(p)))))
     };
     for (low, high) in edge(|p| p.1).iter().zip(edge(|p| p.2)) {
-        let mut outline = path::thinned(low, COLUMN);
-        outline.extend(path::thinned(&high, COLUMN).into_iter().rev());
-        let outline = path::polygon_inside(&outline, &placed.area);
+        let mut outline = path::thin_points(low, THINNING_COLUMN);
+        outline.extend(path::thin_points(&high, THINNING_COLUMN).into_iter().rev());
+        let outline = path::clip_polygon(&outline, &placed.area);
         if outline.len() > 2 {
-            canvas.polygon(&outline, ribbon.colour.rgb(), BAND_OPACITY);
+            canvas.fill_polygon(&outline, ribbon.colour.rgb(), SHADING_OPACITY);
         }
     }
 }

@@ -1,8 +1,8 @@
 //! Looks of lines and symbols.
 
-use super::colours::{LIGHT, Rgb, hex};
-use super::path::Point;
-use super::sizes::UNITS;
+use super::colours::{NEAR_WHITE, Rgb, format_hex};
+use super::path::CanvasPoint;
+use super::sizes::UNITS_PER_MM;
 
 /// Colours that colour-blind readers can tell apart: those of Okabe and Ito without the yellow that vanishes
 /// on white, orange and sky blue darker, so that thin lines have a contrast of 3 to 1.
@@ -39,7 +39,7 @@ impl Colour {
     /// As SVG writes it.
     #[must_use]
     pub(crate) fn hex(self) -> String {
-        hex(self.rgb())
+        format_hex(self.rgb())
     }
 
     pub(super) fn rgb(self) -> Rgb {
@@ -52,7 +52,7 @@ impl Colour {
             Self::Vermilion => (0xD5, 0x5E, 0x00),
             Self::Purple => (0xCC, 0x79, 0xA7),
             Self::Grey => (0x80, 0x80, 0x80),
-            Self::White => LIGHT,
+            Self::White => NEAR_WHITE,
         }
     }
 }
@@ -82,15 +82,15 @@ pub enum Mark {
     /// Crosses, not joined.
     Crosses,
     /// Full symbols of this shape, joined by a line.
-    Joined(Shape),
+    Joined(MarkerShape),
     /// Hollow symbols of this shape, not joined.
-    Hollow(Shape),
+    Hollow(MarkerShape),
 }
 
 /// Shape of a symbol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)]
-pub enum Shape {
+pub enum MarkerShape {
     Disc,
     Square,
     Diamond,
@@ -98,9 +98,9 @@ pub enum Shape {
     InvertedTriangle,
 }
 
-impl Shape {
+impl MarkerShape {
     /// Corners in units of the symbol's half width, y downwards; none for a disc.
-    pub(super) fn corners(self) -> &'static [Point] {
+    pub(super) fn corners(self) -> &'static [CanvasPoint] {
         match self {
             Self::Disc => &[],
             Self::Square => &[(-0.9, -0.9), (0.9, -0.9), (0.9, 0.9), (-0.9, 0.9)],
@@ -112,10 +112,10 @@ impl Shape {
 }
 
 impl Mark {
-    pub(super) fn pattern(self) -> &'static [f64] {
+    pub(super) fn dash_pattern(self) -> &'static [f64] {
         match self {
-            Self::Dashed | Self::ThinDashed => &[1.6 * UNITS, 1.0 * UNITS],
-            Self::Dotted => &[0.4 * UNITS, 0.8 * UNITS],
+            Self::Dashed | Self::ThinDashed => &[1.6 * UNITS_PER_MM, 1.0 * UNITS_PER_MM],
+            Self::Dotted => &[0.4 * UNITS_PER_MM, 0.8 * UNITS_PER_MM],
             _ => &[],
         }
     }
@@ -124,7 +124,7 @@ impl Mark {
         matches!(self, Self::Dots | Self::Circles | Self::Crosses | Self::Hollow(_))
     }
 
-    pub(super) fn width(self) -> u32 {
+    pub(super) fn line_width(self) -> u32 {
         match self {
             Self::Thin | Self::ThinDashed => 3,
             Self::Thick => 9,

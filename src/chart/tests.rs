@@ -8,11 +8,17 @@ fn figure(points: Vec<Option<(f64, f64)>>, title: &str) -> Figure {
         points,
         ..Series::default()
     };
-    let rule =
-        Rule { label: title.to_owned(), colour: Colour::Grey, mark: Mark::Dashed, at: 0.5, above: None };
-    let x = Axis::linear("x").between(0.0, 1.0);
-    let y = Axis::linear(title).between(0.0, 1.0);
-    let panel = Panel { x, y, height_mm: 30.0, series: vec![series], rules: vec![rule], ..Panel::default() };
+    let rule = VerticalLine {
+        label: title.to_owned(),
+        colour: Colour::Grey,
+        mark: Mark::Dashed,
+        at: 0.5,
+        above: None,
+    };
+    let x = ChartAxis::linear("x").with_range(0.0, 1.0);
+    let y = ChartAxis::linear(title).with_range(0.0, 1.0);
+    let panel =
+        Panel { x, y, height_mm: 30.0, series: vec![series], vertical_lines: vec![rule], ..Panel::default() };
     Figure {
         title: title.to_owned(),
         subtitle: title.to_owned(),
@@ -24,7 +30,7 @@ fn figure(points: Vec<Option<(f64, f64)>>, title: &str) -> Figure {
 }
 
 fn as_svg(figure: &Figure) -> String {
-    figure.svg(Medium::Screen)
+    figure.to_svg(Medium::Screen)
 }
 
 /// The lines of a colour and width, as lists of points.
@@ -106,18 +112,21 @@ fn a_line_is_cut_at_the_frame_and_not_bent() {
 
 #[test]
 fn error_bars_have_caps_but_where_they_are_cut() {
-    let count = |y: Axis, bar| {
+    let count = |y: ChartAxis, bar| {
         let mut figure = figure(vec![Some((0.5, 0.5))], "");
         let panel = &mut figure.panels[0];
-        (panel.y, panel.series[0].bars, panel.series[0].mark) = (y, vec![bar], Mark::Circles);
+        (panel.y, panel.series[0].error_bars, panel.series[0].mark) = (y, vec![bar], Mark::Circles);
         lines(&as_svg(&figure), "#0072B2", 3).len()
     };
-    let linear = || Axis::linear("y").between(0.0, 1.0);
-    assert_eq!(count(linear(), Bar::Vertical { x: 0.5, from: 0.2, to: 0.7 }), 3);
-    assert_eq!(count(linear(), Bar::Horizontal { y: 0.5, from: 0.2, to: 1.7 }), 2);
-    assert_eq!(count(linear(), Bar::Horizontal { y: 1.5, from: 0.2, to: 0.7 }), 0);
-    assert_eq!(count(linear(), Bar::Vertical { x: 0.5, from: f64::NAN, to: 0.7 }), 0);
-    assert_eq!(count(Axis::log("y").between(0.1, 1.0), Bar::Vertical { x: 0.5, from: -0.2, to: 0.7 }), 2);
+    let linear = || ChartAxis::linear("y").with_range(0.0, 1.0);
+    assert_eq!(count(linear(), ErrorBar::Vertical { x: 0.5, from: 0.2, to: 0.7 }), 3);
+    assert_eq!(count(linear(), ErrorBar::Horizontal { y: 0.5, from: 0.2, to: 1.7 }), 2);
+    assert_eq!(count(linear(), ErrorBar::Horizontal { y: 1.5, from: 0.2, to: 0.7 }), 0);
+    assert_eq!(count(linear(), ErrorBar::Vertical { x: 0.5, from: f64::NAN, to: 0.7 }), 0);
+    assert_eq!(
+        count(ChartAxis::log("y").with_range(0.1, 1.0), ErrorBar::Vertical { x: 0.5, from: -0.2, to: 0.7 }),
+        2
+    );
 }
 
 #[test]

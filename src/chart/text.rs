@@ -2,7 +2,7 @@
 //! reader's fonts are not known here.
 
 use super::sizes::{SMALL_MM, TEXT_MM};
-use crate::text::printable;
+use crate::text::make_printable;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
 /// Mean width of a letter of a sans-serif face over its size.
@@ -21,13 +21,13 @@ pub(super) fn text_width(text: &str, size_mm: f64) -> f64 {
     text.width() as f64 * LETTER * size_mm
 }
 
-fn letters(letter: char) -> usize {
+fn letter_count(letter: char) -> usize {
     letter.width().unwrap_or(0)
 }
 
 /// Text broken at spaces into lines of at most that width, mm; a word that is wider than a line is broken in
 /// itself.
-pub(super) fn lines(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
+pub(super) fn wrap_lines(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
     let most = (width_mm / letter_mm).max(2.0) as usize;
     let mut lines = vec![String::new()];
     let mut used = 0;
@@ -37,21 +37,21 @@ pub(super) fn lines(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
             used = 0;
         }
         for letter in word.chars() {
-            if used + letters(letter) > most && letter != ' ' {
+            if used + letter_count(letter) > most && letter != ' ' {
                 lines.push(String::new());
                 used = 0;
             }
             if let Some(line) = lines.last_mut() {
                 line.push(letter);
             }
-            used += letters(letter);
+            used += letter_count(letter);
         }
     }
     lines
 }
 
 /// Text of at most that width, mm, in the widest face, its end cut off with an ellipsis where it is longer.
-pub(super) fn shortened(text: &str, size_mm: f64, width_mm: f64) -> String {
+pub(super) fn truncate_text(text: &str, size_mm: f64, width_mm: f64) -> String {
     let letter_mm = WIDE_LETTER * size_mm;
     if text.width() as f64 * letter_mm <= width_mm {
         return text.to_owned();
@@ -61,7 +61,7 @@ pub(super) fn shortened(text: &str, size_mm: f64, width_mm: f64) -> String {
     let kept: String = text
         .chars()
         .take_while(|letter| {
-            used += letters(*letter);
+            used += letter_count(*letter);
             used <= most
         })
         .collect();
@@ -70,23 +70,23 @@ pub(super) fn shortened(text: &str, size_mm: f64, width_mm: f64) -> String {
 
 /// Text of at most that width, mm: in one line, otherwise in two of small letters, the second cut off where
 /// that is not enough either.
-pub(super) fn two_lines(text: &str, width_mm: f64) -> String {
-    let text = printable(text);
+pub(super) fn wrap_in_two_lines(text: &str, width_mm: f64) -> String {
+    let text = make_printable(text);
     if text.width() as f64 * WIDE_LETTER * TEXT_MM <= width_mm {
         return text;
     }
     // what small letters would bring into one line is broken near its middle
     let own_mm = text.width() as f64 * WIDE_LETTER * SMALL_MM;
-    let broken = lines(
+    let broken = wrap_lines(
         &text,
         WIDE_LETTER * SMALL_MM,
         if own_mm <= width_mm { NEAR_MIDDLE * own_mm } else { width_mm },
     );
     match broken.split_first() {
         Some((first, rest)) if !rest.is_empty() => {
-            format!("{}\n{}", first.trim_end(), shortened(rest.concat().trim_end(), SMALL_MM, width_mm))
+            format!("{}\n{}", first.trim_end(), truncate_text(rest.concat().trim_end(), SMALL_MM, width_mm))
         }
-        _ => shortened(&text, TEXT_MM, width_mm),
+        _ => truncate_text(&text, TEXT_MM, width_mm),
     }
 }
 
@@ -96,7 +96,7 @@ mod tests {
 
     #[test]
     fn long_text_is_broken_at_words_and_long_words_in_themselves() {
-        let broken = |text: &str| lines(text, 1.0, 10.5);
+        let broken = |text: &str| wrap_lines(text, 1.0, 10.5);
         assert_eq!(broken("one two three four"), ["one two ", "three four"]);
         assert_eq!(broken("abcdefghijklmno pq"), ["abcdefghij", "klmno pq"]);
         assert_eq!([broken("exactlyten"), broken("")], [[String::from("exactlyten")], [String::new()]]);
@@ -107,26 +107,29 @@ mod tests {
         assert_eq!(text_width("\u{b5}m\u{b2}", 1.0), text_width("um2", 1.0));
         assert_eq!(text_width("\u{6f22}\u{1f600}", 1.0), text_width("abcd", 1.0));
         assert_eq!(text_width("e\u{301}", 1.0), text_width("e", 1.0));
-        assert_eq!(lines("\u{6f22}\u{6f22}\u{6f22}", 1.0, 4.0).len(), 2);
+        assert_eq!(wrap_lines("\u{6f22}\u{6f22}\u{6f22}", 1.0, 4.0).len(), 2);
     }
 
     #[test]
     fn what_is_too_long_ends_in_an_ellipsis() {
-        assert_eq!(shortened("abcdef", 1.0, 6.01 * WIDE_LETTER), "abcdef");
-        assert_eq!(shortened("abcdefg", 1.0, 6.01 * WIDE_LETTER), "abcde\u{2026}");
-        assert_eq!(shortened("ab cdefg", 1.0, 4.01 * WIDE_LETTER), "ab\u{2026}");
+        assert_eq!(truncate_text("abcdef", 1.0, 6.01 * WIDE_LETTER), "abcdef");
+        assert_eq!(truncate_text("abcdefg", 1.0, 6.01 * WIDE_LETTER), "abcde\u{2026}");
+        assert_eq!(truncate_text("ab cdefg", 1.0, 4.01 * WIDE_LETTER), "ab\u{2026}");
     }
 
     #[test]
     fn names_break_into_two_lines_of_small_letters() {
         let width_mm = 20.5 * WIDE_LETTER * SMALL_MM;
-        assert_eq!(two_lines("high band", width_mm), "high band");
-        assert_eq!(two_lines("low band after flip", width_mm), "low band\nafter flip");
-        assert_eq!(two_lines("deflection at 0.08 m/s, before", width_mm), "deflection at 0.08\nm/s, before");
+        assert_eq!(wrap_in_two_lines("high band", width_mm), "high band");
+        assert_eq!(wrap_in_two_lines("low band after flip", width_mm), "low band\nafter flip");
         assert_eq!(
-            two_lines("deflection at 0.08 m/s, before the reversal", width_mm),
+            wrap_in_two_lines("deflection at 0.08 m/s, before", width_mm),
+            "deflection at 0.08\nm/s, before"
+        );
+        assert_eq!(
+            wrap_in_two_lines("deflection at 0.08 m/s, before the reversal", width_mm),
             "deflection at 0.08\nm/s, before the rev\u{2026}"
         );
-        assert_eq!(two_lines("a\nb", width_mm), "a b");
+        assert_eq!(wrap_in_two_lines("a\nb", width_mm), "a b");
     }
 }

@@ -1,13 +1,13 @@
 //! Light and dark: the style that a figure carries for screens. Without it, as in print, a figure has its
 //! light colours.
 
-use super::colours::{Rgb, hex};
+use super::colours::{Rgb, format_hex};
 use std::fmt::Write;
 
 /// Colours on a light ground, and what stands for them on a dark one; every other colour (heat maps, what
 /// lies over them) is the same on both. The palette is Okabe and Ito's, lighter on the dark ground in the
 /// same order of hues.
-const DARK: [(Rgb, Rgb); 13] = [
+const DARK_COLOURS: [(Rgb, Rgb); 13] = [
     ((0xFF, 0xFF, 0xFF), (0x16, 0x16, 0x16)), // ground
     ((0x00, 0x00, 0x00), (0xF0, 0xF0, 0xEE)), // text and black lines
     ((0x33, 0x33, 0x33), (0xB8, 0xB8, 0xB4)), // frame
@@ -25,10 +25,10 @@ const DARK: [(Rgb, Rgb); 13] = [
 
 /// A style element that gives every figure on its page the colours of a dark ground where the reader has
 /// asked for them.
-pub(crate) fn style() -> String {
+pub(crate) fn dark_theme_style() -> String {
     let mut rules = String::new();
-    for (light, dark) in DARK {
-        let (light, dark) = (hex(light), hex(dark));
+    for (light, dark) in DARK_COLOURS {
+        let (light, dark) = (format_hex(light), format_hex(dark));
         let _ = write!(
             rules,
             "svg [fill=\"{light}\"]{{fill:{dark}}}svg \
@@ -46,13 +46,13 @@ mod tests {
 
     #[test]
     fn lines_have_a_contrast_of_three_to_one_on_both_grounds() {
-        let [(white, dark_ground), ..] = DARK;
+        let [(white, dark_ground), ..] = DARK_COLOURS;
         for colour in Colour::LINES {
             let light = colour.rgb();
-            let (_, dark) = DARK.iter().find(|(of, _)| *of == light).unwrap();
+            let (_, dark) = DARK_COLOURS.iter().find(|(of, _)| *of == light).unwrap();
             for (line, ground) in [(light, white), (*dark, dark_ground)] {
                 let found = contrast(line, ground);
-                assert!(found >= 3.0, "{colour:?} on {}: {found:.2}", hex(ground));
+                assert!(found >= 3.0, "{colour:?} on {}: {found:.2}", format_hex(ground));
             }
         }
     }

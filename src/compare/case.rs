@@ -1,18 +1,18 @@
 //! A condition of a job: its recording, and the model at the estimates through the same camera.
 
 use super::model_run::ModelRun;
-use super::ridge::Ridges;
-use super::runs::{self, RunLine};
-use super::windows::{Sought, sought};
-use crate::fit::job::{Aim, Job};
+use super::ridge::RidgePair;
+use super::runs::{self, RunSummary};
+use super::windows::{FrequencyComparison, compare_frequency};
+use crate::fit::job::{FitTarget, Job};
 use crate::fit::result::FitResult;
 use crate::recording::Recording;
 use crate::recording::alignment::Alignment;
-use crate::recording::channel::{Anchor, Channel, Instants, Window};
+use crate::recording::channel::{Channel, InstantKind, ReversalInstants, Window};
 use crate::recording::files::RecordingFile;
-use crate::recording::film::Film;
+use crate::recording::film::RecordingVideo;
 use crate::recording::motion_traces::MotionTraces;
-use crate::recording::noise_model::{RecordingNoise, noise_of};
+use crate::recording::noise_model::{RecordingNoise, measure_noise};
 use crate::recording::quality::noise_floor;
 use rayon::prelude::*;
 use std::ops::Range;
@@ -23,17 +23,17 @@ const JUDGED: [Channel; 3] = [Channel::Deflection, Channel::TipX, Channel::HeadX
 
 /// A recording that was fitted, with its description where it has one.
 #[derive(Debug, Clone, Copy)]
-pub struct Measured<'a> {
+pub struct FittedRecording<'a> {
     /// The traces.
     pub recording: &'a Recording,
     /// `recording.toml`.
     pub file: Option<&'a RecordingFile>,
     /// Pictures of its frames.
-    pub film: Option<Film<'a>>,
+    pub film: Option<RecordingVideo<'a>>,
 }
 
 /// One condition.
-pub struct Case<'a> {
+pub struct ConditionComparison<'a> {
     /// The job.
     pub job: &'a Job,
     /// Its result.
@@ -41,7 +41,7 @@ pub struct Case<'a> {
     /// Number of the condition, from 0.
     pub condition: usize,
     /// The recording; `None` where only numbers are published.
-    pub measured: Option<Measured<'a>>,
+    pub measured: Option<FittedRecording<'a>>,
     /// The model.
     pub model: &'a ModelRun,
     /// The model's clock and origin on those of the recording; zero where there is none.
@@ -51,49 +51,49 @@ pub struct Case<'a> {
     /// Measured minus model, on the times of the recording.
     pub residual: Option<MotionTraces>,
     /// Frequency over time of both sides.
-    pub ridges: Ridges,
+    pub ridges: RidgePair,
     /// Noise of the recording's channels.
     noise: Option<RecordingNoise>,
     /// Instants of the recording.
-    measured_instants: Option<Instants>,
+    measured_instants: Option<ReversalInstants>,
     /// Instants of the model, on its own clock.
-    model_instants: Instants,
+    model_instants: ReversalInstants,
 }
 
 /// One side of a pair, with its own clock and its own instants.
 #[derive(Debug, Clone, Copy)]
-pub struct Side<'a> {
+pub struct TimedRecording<'a> {
     /// The traces.
     pub recording: &'a Recording,
     /// Their instants.
-    pub instants: &'a Instants,
+    pub instants: &'a ReversalInstants,
 }
 
-impl<'a> Case<'a> {
+impl<'a> ConditionComparison<'a> {
     /// The conditions of a job in its order; `measured` are the recordings of the first ones.
     #[must_use]
-    pub fn all(
+    pub fn compare_conditions(
         job: &'a Job,
-        measured: &[Measured<'a>],
+        measured: &[FittedRecording<'a>],
         models: &'a [ModelRun],
         result: &'a FitResult,
     ) -> Vec<Self> {
         let of = |(condition, model): (usize, &'a ModelRun)| {
-            let case = Self::aligned(job, result, condition, measured.get(condition).copied(), model);
+            let case = Self::align_condition(job, result, condition, measured.get(condition).copied(), model);
             let residual = case
                 .recording()
                 .map(|measured| MotionTraces::residual(measured, &model.view.recording, &case.alignment));
-            let ridges = Ridges::of(&case);
-            Self { same_run: same_run(models, condition), residual, ridges, ..case }
+            let ridges = RidgePair::track(&case);
+            Self { same_run: later_same_runs(models, condition), residual, ridges, ..case }
         };
         models.par_iter().enumerate().map(of).collect()
     }
 
-    fn aligned(
+    fn align_condition(
         job: &'a Job,
         result: &'a FitResult,
         condition: usize,
-        measured: Option<Measured<'a>>,
+        measured: Option<FittedRecording<'a>>,
         model: &'a ModelRun,
     ) -> Self {
         let view = &model.view.recording;
@@ -103,13 +103,13 @@ impl<'a> Case<'a> {
             condition,
             measured,
             model,
-            alignment: measured.map_or_else(Alignment::default, |m| Alignment::of(m.recording, view)),
+            alignment: measured.map_or_else(Alignment::default, |m| Alignment::estimate(m.recording, view)),
             same_run: None,
             residual: None,
-            ridges: Ridges::default(),
-            noise: measured.map(|m| noise_of(m.recording)),
-            measured_instants: measured.map(|m| Instants::find(m.recording)),
-            model_instants: Instants::find(view),
+            ridges: RidgePair::default(),
+            noise: measured.map(|m| measure_noise(m.recording)),
+            measured_instants: measured.map(|m| ReversalInstants::find_instants(m.recording)),
+            model_instants: ReversalInstants::find_instants(view),
         }
     }
 
@@ -121,27 +121,27 @@ impl<'a> Case<'a> {
 
     /// Whether there is a recording that no camera took.
     #[must_use]
-    pub fn synthetic(&self) -> bool {
+    pub fn is_synthetic(&self) -> bool {
         self.recording().is_some_and(Recording::is_synthetic)
     }
 
     /// The recording with its instants, where there is one.
     #[must_use]
-    pub fn measured_side(&self) -> Option<Side<'_>> {
+    pub fn measured_side(&self) -> Option<TimedRecording<'_>> {
         self.recording()
             .zip(self.measured_instants.as_ref())
-            .map(|(recording, instants)| Side { recording, instants })
+            .map(|(recording, instants)| TimedRecording { recording, instants })
     }
 
     /// The model with its instants, on its own clock.
     #[must_use]
-    pub fn model_side(&self) -> Side<'_> {
-        Side { recording: &self.model.view.recording, instants: &self.model_instants }
+    pub fn model_side(&self) -> TimedRecording<'_> {
+        TimedRecording { recording: &self.model.view.recording, instants: &self.model_instants }
     }
 
     /// The recording, otherwise the model.
     #[must_use]
-    pub fn shown(&self) -> Side<'_> {
+    pub fn measured_or_model(&self) -> TimedRecording<'_> {
         self.measured_side().unwrap_or_else(|| self.model_side())
     }
 
@@ -151,7 +151,7 @@ impl<'a> Case<'a> {
     #[must_use]
     pub fn noise_m(&self, channel: Channel) -> Option<f64> {
         let noise = self.noise.as_ref()?;
-        let along_m = noise.along.as_ref().map(|found| found.noise.sd());
+        let along_m = noise.along_sweep.as_ref().map(|found| found.noise.sd());
         let known_m = match channel {
             Channel::TipX | Channel::HeadX => along_m,
             Channel::Deflection => along_m.map(|m| m * std::f64::consts::SQRT_2),
@@ -163,7 +163,7 @@ impl<'a> Case<'a> {
     /// The channel by which what is left is judged, and its noise, m; `None` without a recording, where the
     /// two cannot agree, or where nothing is known of the noise.
     #[must_use]
-    pub fn judged(&self) -> Option<(Channel, f64)> {
+    pub fn judged_channel(&self) -> Option<(Channel, f64)> {
         let residual = self.residual.as_ref().filter(|_| !self.alignment.opposite_turn)?;
         let is_known = |channel: &Channel| residual.column(*channel).iter().any(Option::is_some);
         let channel = JUDGED.into_iter().find(is_known)?;
@@ -178,13 +178,13 @@ impl<'a> Case<'a> {
     }
 
     /// The frequencies that the fit seeks in the condition.
-    pub fn frequencies(&self) -> impl Iterator<Item = Sought> + '_ {
-        self.aims().filter_map(|aim| sought(aim, self.result))
+    pub fn frequency_comparisons(&self) -> impl Iterator<Item = FrequencyComparison> + '_ {
+        self.targets().filter_map(|aim| compare_frequency(aim, self.result))
     }
 
     /// What the job reads in the condition.
-    pub fn aims(&self) -> impl Iterator<Item = &'a Aim> + '_ {
-        self.job.aims.iter().filter(|aim| aim.feature.condition == self.condition)
+    pub fn targets(&self) -> impl Iterator<Item = &'a FitTarget> + '_ {
+        self.job.targets.iter().filter(|aim| aim.feature.condition == self.condition)
     }
 
     /// Name of the condition.
@@ -195,23 +195,23 @@ impl<'a> Case<'a> {
 
     /// The model's run and its hard events.
     #[must_use]
-    pub fn run_line(&self) -> RunLine {
-        let line = runs::line(self.name(), self.model.scene.start_s, &self.model.motion);
-        RunLine { opposite_turn: self.alignment.opposite_turn, ..line }
+    pub fn run_summary(&self) -> RunSummary {
+        let line = runs::summarize_run(self.name(), self.model.scene.start_s, &self.model.motion);
+        RunSummary { opposite_turn: self.alignment.opposite_turn, ..line }
     }
 }
 
 /// The later conditions with the run of this one; `None` where an earlier condition has it.
-fn same_run(runs: &[ModelRun], condition: usize) -> Option<Vec<usize>> {
+fn later_same_runs(runs: &[ModelRun], condition: usize) -> Option<Vec<usize>> {
     let scene = &runs.get(condition)?.scene;
     let mut same = (0..runs.len()).filter(|i| runs.get(*i).is_some_and(|other| other.scene == *scene));
     (same.next() == Some(condition)).then(|| same.collect())
 }
 
-impl Side<'_> {
+impl TimedRecording<'_> {
     /// Time of an instant of the first turn, s.
     #[must_use]
-    pub fn instant_s(&self, anchor: Anchor) -> Option<f64> {
+    pub fn instant_s(&self, anchor: InstantKind) -> Option<f64> {
         self.instants.time_s(anchor, 1).ok()
     }
 
@@ -223,13 +223,13 @@ impl Side<'_> {
 
     /// Frames of a window; `None` where it does not show it.
     #[must_use]
-    pub fn frames(&self, window: &Window) -> Option<Range<usize>> {
-        window.resolve(self.recording, self.instants).ok()
+    pub fn window_frames(&self, window: &Window) -> Option<Range<usize>> {
+        window.resolve_frames(self.recording, self.instants).ok()
     }
 
     /// Frames between two of its own times.
     #[must_use]
-    pub fn between(&self, (from_s, to_s): (f64, f64)) -> Range<usize> {
+    pub fn frames_between(&self, (from_s, to_s): (f64, f64)) -> Range<usize> {
         let grid = self.recording.grid();
         let frame =
             |t: f64| ((t - grid.start_s) * grid.frame_rate_hz).ceil().clamp(0.0, grid.frames as f64) as usize;

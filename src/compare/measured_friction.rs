@@ -5,7 +5,7 @@
 //! and slips, inertia cancels over whole cycles, so that the mean deflection gives a mean of the coefficient;
 //! that is none of the law's, and the model is read in the same way next to it.
 
-use super::case::{Case, Side};
+use super::case::{ConditionComparison, TimedRecording};
 use crate::recording::channel::Channel;
 use crate::simulate::equilibrium::static_deflections;
 
@@ -22,70 +22,71 @@ pub struct FrictionPoint {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct MeasuredFriction {
     /// Where the tip moved evenly.
-    pub even: Vec<FrictionPoint>,
+    pub steady_sliding: Vec<FrictionPoint>,
     /// Means over cycles of stick and slip.
     pub over_cycles: Vec<FrictionPoint>,
     /// The same means of the model.
-    pub of_model: Vec<FrictionPoint>,
+    pub model_over_cycles: Vec<FrictionPoint>,
 }
 
 /// Length of a block in which the tip may move evenly, s, and fewest frames of it.
-const EVEN_S: f64 = 5e-3;
-const FEWEST: usize = 8;
+const STEADY_BLOCK_S: f64 = 5e-3;
+const MIN_BLOCK_FRAMES: usize = 8;
 /// Length of a block of cycles, s, where no slow frequency is known: a dozen cycles of the fast one;
 /// otherwise this many cycles of the slow one.
-const CYCLES_S: f64 = 0.02;
+const CYCLE_BLOCK_S: f64 = 0.02;
 const SLOW_CYCLES: f64 = 2.0;
 /// Scatter about a parabola, over the noise, up to which a tip moves evenly.
-const EVEN: f64 = 1.2;
+const MAX_SCATTER_OVER_NOISE: f64 = 1.2;
 /// Share of its mean by which the speed may change within a block.
-const STEADY: f64 = 0.4;
+const MAX_SPEED_CHANGE: f64 = 0.4;
 /// Deviations from rest from which a speed is one.
-const MOVES: f64 = 5.0;
+const MIN_SPEED_SD: f64 = 5.0;
 /// Most points of a kind.
-const MOST: usize = 60;
+const MAX_POINTS: usize = 60;
 
 impl MeasuredFriction {
     /// What the recording of a condition shows; empty without tip and head.
     #[must_use]
-    pub fn of(case: &Case) -> Self {
+    pub fn measure(case: &ConditionComparison) -> Self {
         let Some(side) = case.measured_side() else { return Self::default() };
         let deflections = static_deflections(&case.model.scene.linkage);
-        let slowest_hz = case.frequencies().map(|sought| sought.target.frequency_hz).reduce(f64::min);
-        let cycles_s = slowest_hz.map_or(CYCLES_S, |hz| (SLOW_CYCLES / hz).max(CYCLES_S));
+        let slowest_hz =
+            case.frequency_comparisons().map(|sought| sought.target.frequency_hz).reduce(f64::min);
+        let cycles_s = slowest_hz.map_or(CYCLE_BLOCK_S, |hz| (SLOW_CYCLES / hz).max(CYCLE_BLOCK_S));
         let noise_m = case.noise_m(Channel::TipX).unwrap_or(0.0);
-        let evenly = blocks(&side, EVEN_S, noise_m);
-        let cycles = blocks(&side, cycles_s, noise_m);
+        let evenly = one_way_blocks(&side, STEADY_BLOCK_S, noise_m);
+        let cycles = one_way_blocks(&side, cycles_s, noise_m);
         let model_side = case.model_side();
         let shift_s = case.alignment.shift_s;
-        let model: Vec<Block> = blocks(&model_side, cycles_s, noise_m)
+        let model: Vec<FrictionBlock> = one_way_blocks(&model_side, cycles_s, noise_m)
             .into_iter()
-            .map(|b| Block { start_s: b.start_s + shift_s, ..b })
+            .map(|b| FrictionBlock { start_s: b.start_s + shift_s, ..b })
             .collect();
         let shown = |from_s: f64| {
             let grid = side.recording.grid();
             from_s >= grid.start_s && from_s <= grid.time_s(grid.frames)
         };
-        let points = |blocks: &[Block], even: bool| {
+        let points = |blocks: &[FrictionBlock], even: bool| {
             let found: Vec<FrictionPoint> = blocks
                 .iter()
                 .filter(|block| block.is_even == even && shown(block.start_s))
-                .filter_map(|block| block.friction(&deflections))
+                .filter_map(|block| block.friction_point(&deflections))
                 .collect();
-            let every = found.len().div_ceil(MOST).max(1);
+            let every = found.len().div_ceil(MAX_POINTS).max(1);
             found.into_iter().step_by(every).collect()
         };
         Self {
-            even: points(&evenly, true),
+            steady_sliding: points(&evenly, true),
             over_cycles: points(&cycles, false),
-            of_model: points(&model, false),
+            model_over_cycles: points(&model, false),
         }
     }
 }
 
 /// A few frames in which the tip moves one way.
 #[derive(Debug, Clone, Copy)]
-struct Block {
+struct FrictionBlock {
     start_s: f64,
     /// Mean velocity of the tip, m/s.
     velocity_m_per_s: f64,
@@ -94,9 +95,9 @@ struct Block {
     is_even: bool,
 }
 
-impl Block {
+impl FrictionBlock {
     /// The coefficient at which the blade rests at that deflection.
-    fn friction(&self, deflections: &[(f64, f64)]) -> Option<FrictionPoint> {
+    fn friction_point(&self, deflections: &[(f64, f64)]) -> Option<FrictionPoint> {
         let after = deflections.partition_point(|(_, deflection_m)| *deflection_m < self.deflection_m);
         let (a, b) = (deflections.get(after.checked_sub(1)?)?, deflections.get(after)?);
         let share = (self.deflection_m - a.1) / (b.1 - a.1);
@@ -106,24 +107,25 @@ impl Block {
 }
 
 /// The blocks of one side in which the tip keeps moving one way at nearly one speed.
-fn blocks(side: &Side, length_s: f64, noise_m: f64) -> Vec<Block> {
+fn one_way_blocks(side: &TimedRecording, length_s: f64, noise_m: f64) -> Vec<FrictionBlock> {
     let grid = side.recording.grid();
-    let frames = ((length_s * grid.frame_rate_hz).round() as usize).max(FEWEST);
+    let frames = ((length_s * grid.frame_rate_hz).round() as usize).max(MIN_BLOCK_FRAMES);
     let (tip, deflection) = (side.samples(Channel::TipX), side.samples(Channel::Deflection));
     let block = |i: usize, tip: &[Option<f64>], deflection: &[Option<f64>]| {
-        let path = Parabola::of(tip, 1.0 / grid.frame_rate_hz)?;
+        let path = TipParabola::fit(tip, 1.0 / grid.frame_rate_hz)?;
         let present: Vec<f64> = deflection.iter().flatten().copied().collect();
-        if present.len() < FEWEST {
+        if present.len() < MIN_BLOCK_FRAMES {
             return None;
         }
-        let least = MOVES * noise_m / length_s;
+        let least = MIN_SPEED_SD * noise_m / length_s;
         let changes = path.curvature_m_per_s2.abs() * length_s;
-        let moves = path.velocity_m_per_s.abs() > least && changes < STEADY * path.velocity_m_per_s.abs();
-        moves.then(|| Block {
+        let moves =
+            path.velocity_m_per_s.abs() > least && changes < MAX_SPEED_CHANGE * path.velocity_m_per_s.abs();
+        moves.then(|| FrictionBlock {
             start_s: grid.time_s(i * frames),
             velocity_m_per_s: path.velocity_m_per_s,
             deflection_m: present.iter().sum::<f64>() / present.len() as f64,
-            is_even: path.scatter_m <= EVEN * noise_m,
+            is_even: path.scatter_m <= MAX_SCATTER_OVER_NOISE * noise_m,
         })
     };
     let pairs = tip.chunks(frames).zip(deflection.chunks(frames)).enumerate();
@@ -131,22 +133,22 @@ fn blocks(side: &Side, length_s: f64, noise_m: f64) -> Vec<Block> {
 }
 
 /// A parabola through the frames of a block.
-struct Parabola {
+struct TipParabola {
     velocity_m_per_s: f64,
     curvature_m_per_s2: f64,
     scatter_m: f64,
 }
 
-impl Parabola {
+impl TipParabola {
     /// Least squares; `None` with too few frames.
-    fn of(samples: &[Option<f64>], frame_s: f64) -> Option<Self> {
+    fn fit(samples: &[Option<f64>], frame_s: f64) -> Option<Self> {
         let middle = 0.5 * (samples.len() as f64 - 1.0);
         let points: Vec<(f64, f64)> = samples
             .iter()
             .enumerate()
             .filter_map(|(i, x)| Some(((i as f64 - middle) / middle, (*x)?)))
             .collect();
-        if points.len() < FEWEST {
+        if points.len() < MIN_BLOCK_FRAMES {
             return None;
         }
         let mut normal = nalgebra::Matrix3::<f64>::zeros();
@@ -173,7 +175,7 @@ impl Parabola {
 mod tests {
     use super::*;
     use crate::blade::Linkage;
-    use crate::simulate::equilibrium::steady_slide;
+    use crate::simulate::equilibrium::steady_slip_pose;
     use crate::simulate::scene::Scene;
 
     fn linkage() -> Linkage {
@@ -186,16 +188,16 @@ mod tests {
         let linkage = linkage();
         let deflections = static_deflections(&linkage);
         for velocity_m_per_s in [-0.3, -0.05, 0.02, 0.2] {
-            let pose = steady_slide(&linkage, velocity_m_per_s).unwrap();
-            let d = crate::blade::Directions::of(&pose);
-            let block = Block {
+            let pose = steady_slip_pose(&linkage, velocity_m_per_s).unwrap();
+            let d = crate::blade::LinkDirections::from_pose(&pose);
+            let block = FrictionBlock {
                 start_s: 0.0,
                 velocity_m_per_s,
                 deflection_m: linkage.l1_m * d.sin_theta + linkage.l2_m * d.sin_phi,
                 is_even: true,
             };
-            let found = block.friction(&deflections).unwrap();
-            let law = linkage.friction.dynamic(velocity_m_per_s.abs());
+            let found = block.friction_point(&deflections).unwrap();
+            let law = linkage.friction.dynamic_coefficient(velocity_m_per_s.abs());
             assert!((found.coefficient - law).abs() < 1e-4, "{velocity_m_per_s}: {found:?} {law}");
         }
     }
@@ -205,9 +207,9 @@ mod tests {
         let place = |i: u32| 0.03 + 0.2 * f64::from(i) * 1e-3 + 0.5 * 4.0 * (f64::from(i) * 1e-3).powi(2);
         let noise = |i: u32| if i.is_multiple_of(2) { 1e-6 } else { -1e-6 };
         let samples: Vec<Option<f64>> = (0..40).map(|i| (i != 11).then(|| place(i) + noise(i))).collect();
-        let found = Parabola::of(&samples, 1e-3).unwrap();
+        let found = TipParabola::fit(&samples, 1e-3).unwrap();
         assert!((found.velocity_m_per_s - (0.2 + 4.0 * 19.5e-3)).abs() < 1e-4, "{}", found.velocity_m_per_s);
         assert!((found.curvature_m_per_s2 - 4.0).abs() < 0.05 && (found.scatter_m - 1e-6).abs() < 2e-7);
-        assert!(Parabola::of(&samples[..5], 1e-3).is_none());
+        assert!(TipParabola::fit(&samples[..5], 1e-3).is_none());
     }
 }

@@ -1,6 +1,6 @@
 //! Numbers of the experiment against those of the model, and what is known of the parameters.
 
-use crate::fit::uncertainty::Verdict;
+use crate::fit::uncertainty::ParameterVerdict;
 use serde::Serialize;
 
 /// A number of the experiment and that of the model.
@@ -69,7 +69,7 @@ pub struct ParameterLine {
     /// Upper end of the 95 % interval, the widest of those below; `None` where it is open.
     pub upper_95: Option<f64>,
     /// What is known of it.
-    pub verdict: Verdict,
+    pub verdict: ParameterVerdict,
     /// Why it is not identified, in words; `None` where it is.
     pub why: Option<String>,
     /// Bounds of the search.
@@ -112,6 +112,6 @@ impl ParameterLine {
     /// Whether the data determine it.
     #[must_use]
     pub(crate) fn is_identified(&self) -> bool {
-        self.verdict == Verdict::Identified
+        self.verdict == ParameterVerdict::Identified
     }
 }

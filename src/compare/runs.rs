@@ -1,17 +1,17 @@
 //! The best model's run in a condition: how it ended and which hard events it had.
 
-use crate::simulate::mode::Mode;
-use crate::simulate::{Cause, Motion, Status, Transition};
+use crate::simulate::mode::TipMode;
+use crate::simulate::{RunMotion, RunStatus, Transition, TransitionCause};
 use serde::{Serialize, Serializer};
 
 /// The best model's run in a condition, with its hard events.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct RunLine {
+pub struct RunSummary {
     /// Name of the condition.
     pub name: String,
     /// How it ended; written as `status` and, in a sentence, `meaning`.
     #[serde(flatten, serialize_with = "with_meaning")]
-    pub status: Status,
+    pub status: RunStatus,
     /// Start of the run, s.
     pub started_at_s: f64,
     /// End of the run, s.
@@ -43,25 +43,25 @@ pub struct RunLine {
     pub least_painleve_indicator: Option<f64>,
 }
 
-fn with_meaning<S: Serializer>(status: &Status, to: S) -> Result<S::Ok, S::Error> {
+fn with_meaning<S: Serializer>(status: &RunStatus, to: S) -> Result<S::Ok, S::Error> {
     #[derive(Serialize)]
-    struct Ended {
-        status: Status,
+    struct StatusWithMeaning {
+        status: RunStatus,
         meaning: &'static str,
     }
-    Ended { status: *status, meaning: status.meaning() }.serialize(to)
+    StatusWithMeaning { status: *status, meaning: status.meaning() }.serialize(to)
 }
 
 /// The run of a condition of this name.
-pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
+pub(super) fn summarize_run(name: &str, started_at_s: f64, motion: &RunMotion) -> RunSummary {
     let run = &motion.run;
     let lasted_s = run.stopped_at_s - started_at_s;
     let sticks = motion.stick_s.iter().map(|[from, to]| to - from);
     let stuck_s: f64 = sticks.clone().fold(0.0, |all, one| all + one); // (the sum of none is -0)
     let changes = |is: fn(&Transition) -> bool| motion.transitions.iter().filter(|t| is(t)).count();
     // a run that stops at an event has no transition behind it
-    let stopped = |status: Status| usize::from(run.status == status);
-    RunLine {
+    let stopped = |status: RunStatus| usize::from(run.status == status);
+    RunSummary {
         name: name.to_owned(),
         status: run.status,
         started_at_s,
@@ -70,12 +70,12 @@ pub(super) fn line(name: &str, started_at_s: f64, motion: &Motion) -> RunLine {
         sticks: motion.stick_s.len(),
         longest_stick_s: sticks.reduce(f64::max),
         stick_share: (lasted_s > 0.0).then(|| stuck_s / lasted_s),
-        contact_losses: changes(|t| t.from != Mode::Flight && t.to == Mode::Flight)
-            + stopped(Status::ContactLost),
+        contact_losses: changes(|t| t.from != TipMode::Flight && t.to == TipMode::Flight)
+            + stopped(RunStatus::ContactLost),
         impacts: motion.impacts.len(),
-        jams: changes(|t| t.cause == Cause::JamImpact) + stopped(Status::Jammed),
-        indeterminate: run.status == Status::Indeterminate,
-        chattering: run.status == Status::Chattering,
+        jams: changes(|t| t.cause == TransitionCause::JamImpact) + stopped(RunStatus::Jammed),
+        indeterminate: run.status == RunStatus::Indeterminate,
+        chattering: run.status == RunStatus::Chattering,
         opposite_turn: false,
         least_normal_force_n: motion.extremes.min_normal_force_n,
         least_painleve_indicator: motion.extremes.min_painleve_indicator,
@@ -91,11 +91,11 @@ mod tests {
     const FLY: &str = "\n[contact]\nloss = \"fly\"\njam = \"impact\"\n";
 
     /// The actual blade pressed with another force and wiped faster than any wiper.
-    fn ran(preload_n: f64, frequency_hz: f64, contact: &str) -> RunLine {
+    fn ran(preload_n: f64, frequency_hz: f64, contact: &str) -> RunSummary {
         let text = SCENE.replace("preload_force_n = 0.126", &format!("preload_force_n = {preload_n}"));
         let text = text.replace("frequency_hz = 0.749", &format!("frequency_hz = {frequency_hz:?}"));
         let scene = Scene::parse("s", &format!("{text}{contact}")).unwrap();
-        line("c", scene.start_s, &Motion::of(&scene))
+        summarize_run("c", scene.start_s, &RunMotion::simulate(&scene))
     }
 
     #[test]
@@ -103,7 +103,7 @@ mod tests {
         let line = ran(0.126, 0.749, "");
         assert_eq!(
             (line.status, line.contact_losses, line.impacts, line.jams, line.indeterminate, line.chattering),
-            (Status::Completed, 0, 0, 0, false, false)
+            (RunStatus::Completed, 0, 0, 0, false, false)
         );
         assert!(line.least_normal_force_n.unwrap() > 0.0 && line.least_painleve_indicator.unwrap() > 0.0);
         let (share, longest_s) = (line.stick_share.unwrap(), line.longest_stick_s.unwrap());
@@ -118,22 +118,22 @@ mod tests {
     fn a_tip_that_never_sticks_does_so_for_no_share_of_the_run() {
         let scene = Scene::parse("s", &SCENE.replace("a = 0.108", "a = 0.0").replace("c = 0.296", "c = 0.0"))
             .unwrap();
-        let line = line("c", scene.start_s, &Motion::of(&scene));
+        let line = summarize_run("c", scene.start_s, &RunMotion::simulate(&scene));
         assert_eq!((line.sticks, line.stick_share.map(f64::to_bits)), (0, Some(0.0_f64.to_bits())));
     }
 
     #[test]
     fn lost_contact_counts_where_it_ends_the_run_and_where_the_tip_flies() {
         let stopped = ran(0.126, 12.0, "");
-        assert_eq!((stopped.status, stopped.contact_losses, stopped.impacts), (Status::ContactLost, 1, 0));
+        assert_eq!((stopped.status, stopped.contact_losses, stopped.impacts), (RunStatus::ContactLost, 1, 0));
         let flown = ran(0.126, 12.0, FLY);
-        assert_eq!(flown.status, Status::Completed);
+        assert_eq!(flown.status, RunStatus::Completed);
         assert!(flown.contact_losses > 10 && flown.impacts >= flown.contact_losses - 1, "{flown:?}");
     }
 
     #[test]
     fn a_jam_that_ends_the_run_counts() {
         let line = ran(0.4, 20.0, "");
-        assert_eq!((line.status, line.jams, line.contact_losses), (Status::Jammed, 1, 0));
+        assert_eq!((line.status, line.jams, line.contact_losses), (RunStatus::Jammed, 1, 0));
     }
 }

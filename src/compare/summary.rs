@@ -1,16 +1,16 @@
 //! What a comparison says in numbers, as `report.json` holds it.
 
-use super::case::{Case, Side};
-use super::ridge::FollowedRidge;
-use super::windows::{FitWindow, fit_windows};
-use crate::recording::alignment::Point;
+use super::case::{ConditionComparison, TimedRecording};
+use super::ridge::TrackedRidge;
+use super::windows::{FitWindow, group_fit_windows};
+use crate::recording::alignment::AlignmentPoint;
 use crate::recording::channel::Channel;
-use crate::recording::motion_traces::CHANNELS;
+use crate::recording::motion_traces::MOTION_CHANNELS;
 use serde::Serialize;
 
 /// A recording against the model at the estimates; of a condition without a recording, the model alone.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct Summary {
+pub struct ComparisonSummary {
     /// Name of the condition.
     pub condition: String,
     /// Name of its recording.
@@ -24,25 +24,25 @@ pub struct Summary {
     /// What is added to the model's head drop, m.
     pub drop_m: Option<f64>,
     /// The point whose path was followed.
-    pub followed: Option<Point>,
+    pub followed: Option<AlignmentPoint>,
     /// Whether the recorded head turns the other way than the model's.
     pub opposite_turn: bool,
     /// What is left, channel by channel.
-    pub residuals: Vec<ResidualLine>,
+    pub residuals: Vec<ResidualSummary>,
     /// The channel by which the model is judged; `None` where the two cannot agree, or where the noise is
     /// unknown.
     pub judged: Option<&'static str>,
     /// The windows that the fit reads.
-    pub windows: Vec<WindowLine>,
+    pub windows: Vec<WindowSummary>,
     /// The ridges of the deflection after the release of the tip.
-    pub ridge: RidgeLines,
+    pub ridge: RidgeSummaries,
     /// Changes of mode in the model's run.
     pub transitions: usize,
 }
 
 /// What is left of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ResidualLine {
+pub struct ResidualSummary {
     /// Name of the channel.
     pub channel: &'static str,
     /// Root mean square of measured minus model, m.
@@ -55,7 +55,7 @@ pub struct ResidualLine {
 
 /// A window of the fit in both clocks, from first frame to behind the last, s of the recording's time.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct WindowLine {
+pub struct WindowSummary {
     /// Names of what is read in it.
     pub features: Vec<String>,
     /// Name of the channel.
@@ -68,16 +68,16 @@ pub struct WindowLine {
 
 /// The ridges of both sides.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct RidgeLines {
+pub struct RidgeSummaries {
     /// Of the recording.
-    pub measured: Option<RidgeLine>,
+    pub measured: Option<RidgeSummary>,
     /// Of the model.
-    pub model: Option<RidgeLine>,
+    pub model: Option<RidgeSummary>,
 }
 
 /// A ridge in short.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RidgeLine {
+pub struct RidgeSummary {
     /// Length of a segment, s.
     pub segment_s: f64,
     /// Where it was sought, Hz.
@@ -92,18 +92,18 @@ pub struct RidgeLine {
     pub range_hz: Option<[f64; 2]>,
 }
 
-impl Summary {
+impl ComparisonSummary {
     /// What is left of the channel by which the model is judged.
     #[must_use]
-    pub fn left(&self) -> Option<&ResidualLine> {
+    pub fn judged_residual(&self) -> Option<&ResidualSummary> {
         self.residuals.iter().find(|line| Some(line.channel) == self.judged)
     }
 
     /// The numbers of a condition.
     #[must_use]
-    pub fn of(case: &Case) -> Self {
+    pub fn summarize(case: &ConditionComparison) -> Self {
         let alignment = case.recording().map(|_| case.alignment);
-        let windows = fit_windows(case.job, case.condition);
+        let windows = group_fit_windows(case.job, case.condition);
         Self {
             condition: case.name().to_owned(),
             recording: case.recording().map(|r| r.name().to_owned()),
@@ -113,19 +113,19 @@ impl Summary {
             drop_m: alignment.map(|a| a.drop_m),
             followed: alignment.map(|a| a.followed),
             opposite_turn: case.alignment.opposite_turn,
-            residuals: residuals(case),
-            judged: case.judged().map(|(channel, _)| channel.name()),
-            windows: windows.iter().map(|window| window_line(case, window)).collect(),
-            ridge: RidgeLines {
-                measured: case.ridges.measured.as_ref().map(RidgeLine::of),
-                model: case.ridges.model.as_ref().map(RidgeLine::of),
+            residuals: summarize_residuals(case),
+            judged: case.judged_channel().map(|(channel, _)| channel.name()),
+            windows: windows.iter().map(|window| summarize_window(case, window)).collect(),
+            ridge: RidgeSummaries {
+                measured: case.ridges.measured.as_ref().map(RidgeSummary::summarize),
+                model: case.ridges.model.as_ref().map(RidgeSummary::summarize),
             },
             transitions: case.model.motion.transitions.len(),
         }
     }
 }
 
-fn residuals(case: &Case) -> Vec<ResidualLine> {
+fn summarize_residuals(case: &ConditionComparison) -> Vec<ResidualSummary> {
     let Some(residual) = case.residual.as_ref() else {
         return Vec::new();
     };
@@ -133,33 +133,33 @@ fn residuals(case: &Case) -> Vec<ResidualLine> {
         let rms_m = residual.rms_m(channel, None)?;
         let noise_m = case.noise_m(channel);
         let rms_over_noise = noise_m.map(|noise_m| rms_m / noise_m);
-        Some(ResidualLine { channel: channel.name(), rms_m, noise_m, rms_over_noise })
+        Some(ResidualSummary { channel: channel.name(), rms_m, noise_m, rms_over_noise })
     };
-    CHANNELS.into_iter().filter_map(line).collect()
+    MOTION_CHANNELS.into_iter().filter_map(line).collect()
 }
 
-fn window_line(case: &Case, window: &FitWindow) -> WindowLine {
-    let span = |side: &Side, shift_s: f64| {
-        let (frames, grid) = (side.frames(&window.window)?, side.recording.grid());
+fn summarize_window(case: &ConditionComparison, window: &FitWindow) -> WindowSummary {
+    let span = |side: &TimedRecording, shift_s: f64| {
+        let (frames, grid) = (side.window_frames(&window.window)?, side.recording.grid());
         Some([grid.time_s(frames.start) + shift_s, grid.time_s(frames.end) + shift_s])
     };
-    WindowLine {
-        features: window.names(),
+    WindowSummary {
+        features: window.feature_names(),
         channel: window.channel.name(),
         measured_s: case.measured_side().and_then(|side| span(&side, 0.0)),
         model_s: span(&case.model_side(), case.alignment.shift_s),
     }
 }
 
-impl RidgeLine {
-    fn of(followed: &FollowedRidge) -> Self {
+impl RidgeSummary {
+    fn summarize(followed: &TrackedRidge) -> Self {
         Self {
             segment_s: followed.ridge.segment_s,
             band_hz: followed.band_hz.into(),
             segments: followed.spectrogram.time_s.len(),
             points: followed.ridge.points.len(),
             course_points: followed.courses.iter().map(Vec::len).sum(),
-            range_hz: followed.range_hz().map(Into::into),
+            range_hz: followed.frequency_range_hz().map(Into::into),
         }
     }
 }

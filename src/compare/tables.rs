@@ -1,31 +1,31 @@
 //! The columns of a comparison as CSV, on the clocks of the recordings.
 
-use super::case::{Case, Measured};
+use super::case::{ConditionComparison, FittedRecording};
 use super::model_run::ModelRun;
-use super::ridge::FollowedRidge;
+use super::ridge::TrackedRidge;
 use crate::fit::job::Job;
 use crate::recording::Recording;
 use crate::recording::alignment::Alignment;
-use crate::recording::motion_traces::{CHANNELS, MotionTraces};
+use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
 use crate::simulate::Transition;
 use crate::spectrum::time_frequency::RidgePoint;
 
 /// The recordings beside the model.
-pub const COMPARISON: &str = "comparison.csv";
+pub const COMPARISON_FILE: &str = "comparison.csv";
 
 /// A file of a comparison.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Table {
+pub struct ComparisonTable {
     /// Its name.
     pub file: &'static str,
     /// What it holds.
     pub text: String,
 }
 
-/// Residuals, ridges and transitions of every condition, in the order of the job. `recording` says in every
+/// Residuals, ridges and transitions of every condition, in the order of the job. `reference_kind` says in every
 /// row what the model is compared with.
 #[must_use]
-pub fn tables(cases: &[Case]) -> Vec<Table> {
+pub fn comparison_tables(cases: &[ConditionComparison]) -> Vec<ComparisonTable> {
     const RESIDUALS: &[&str] =
         &["condition", "recording", "time_s", "tip_x_m", "head_x_m", "deflection_m", "head_drop_m"];
     const RIDGE: &[&str] = &[
@@ -39,46 +39,52 @@ pub fn tables(cases: &[Case]) -> Vec<Table> {
         "course",
     ];
     const TRANSITIONS: &[&str] = &["condition", "recording", "time_s", "from", "to", "cause"];
-    let table = |file, header: &[&str], rows: fn(&Case) -> Vec<Vec<String>>| {
+    let table = |file, header: &[&str], rows: fn(&ConditionComparison) -> Vec<Vec<String>>| {
         let rows = cases.iter().flat_map(|case| {
-            let start = [case.name().to_owned(), recording(case).to_owned()];
+            let start = [case.name().to_owned(), reference_kind(case).to_owned()];
             rows(case).into_iter().map(move |row| start.iter().cloned().chain(row).collect::<Vec<_>>())
         });
         let header = header.iter().map(|&name| name.to_owned()).collect();
-        Table { file, text: written(std::iter::once(header).chain(rows)) }
+        ComparisonTable { file, text: format_csv(std::iter::once(header).chain(rows)) }
     };
     vec![
-        table("residuals.csv", RESIDUALS, residuals),
-        table("ridge.csv", RIDGE, ridges),
-        table("transitions.csv", TRANSITIONS, transitions),
+        table("residuals.csv", RESIDUALS, residual_rows),
+        table("ridge.csv", RIDGE, ridge_rows),
+        table("transitions.csv", TRANSITIONS, transition_rows),
     ]
 }
 
 /// Every recording and the model at its frames, on its clock and from its origin, in the order of the job;
 /// `None` without a recording.
 #[must_use]
-pub fn comparison(job: &Job, measured: &[Measured<'_>], models: &[ModelRun]) -> Option<Table> {
-    let names = CHANNELS.iter().map(|channel| channel.name().replace('-', "_"));
+pub fn comparison_table(
+    job: &Job,
+    measured: &[FittedRecording<'_>],
+    models: &[ModelRun],
+) -> Option<ComparisonTable> {
+    let names = MOTION_CHANNELS.iter().map(|channel| channel.name().replace('-', "_"));
     let columns = names.flat_map(|name| [format!("{name}_m"), format!("{name}_model_m")]);
     let header = ["condition", "recording", "time_s"].map(str::to_owned).into_iter().chain(columns);
     let mut rows = vec![header.collect::<Vec<_>>()];
     for ((condition, measured), model) in job.conditions.iter().zip(measured).zip(models) {
         let (recording, view) = (measured.recording, &model.view.recording);
-        let alignment = Alignment::of(recording, view);
-        let seen = MotionTraces::of(recording);
-        let model = MotionTraces::of_model_at_frames(recording, view, &alignment);
+        let alignment = Alignment::estimate(recording, view);
+        let seen = MotionTraces::from_recording(recording);
+        let model = MotionTraces::from_model_at_frames(recording, view, &alignment);
         for (i, time_s) in seen.time_s.iter().enumerate() {
             let cell = |traces: &MotionTraces, channel| traces.column(channel).get(i).copied().flatten();
-            let cells = CHANNELS.iter().flat_map(|&channel| [cell(&seen, channel), cell(&model, channel)]);
+            let cells =
+                MOTION_CHANNELS.iter().flat_map(|&channel| [cell(&seen, channel), cell(&model, channel)]);
             let cells = cells.map(|m| m.map_or_else(String::new, |m| format!("{m:e}")));
-            let start = [condition.name.clone(), kind(Some(recording)).to_owned(), time_s.to_string()];
+            let start =
+                [condition.name.clone(), recording_kind(Some(recording)).to_owned(), time_s.to_string()];
             rows.push(start.into_iter().chain(cells).collect());
         }
     }
-    (!measured.is_empty()).then(|| Table { file: COMPARISON, text: written(rows) })
+    (!measured.is_empty()).then(|| ComparisonTable { file: COMPARISON_FILE, text: format_csv(rows) })
 }
 
-fn written(rows: impl IntoIterator<Item = Vec<String>>) -> String {
+fn format_csv(rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
     // (rows of one length written to memory cannot fail)
     rows.into_iter().for_each(|row| writer.write_record(row).unwrap_or_default());
@@ -86,11 +92,11 @@ fn written(rows: impl IntoIterator<Item = Vec<String>>) -> String {
 }
 
 /// What the model is compared with.
-fn recording(case: &Case) -> &'static str {
-    kind(case.recording())
+fn reference_kind(case: &ConditionComparison) -> &'static str {
+    recording_kind(case.recording())
 }
 
-fn kind(recording: Option<&Recording>) -> &'static str {
+fn recording_kind(recording: Option<&Recording>) -> &'static str {
     match recording {
         None => "published",
         Some(recording) if recording.is_synthetic() => "synthetic",
@@ -99,27 +105,27 @@ fn kind(recording: Option<&Recording>) -> &'static str {
 }
 
 /// Measured minus model; an empty field where either is missing.
-fn residuals(case: &Case) -> Vec<Vec<String>> {
+fn residual_rows(case: &ConditionComparison) -> Vec<Vec<String>> {
     let Some(residual) = &case.residual else { return Vec::new() };
     let left_m = |channel, i: usize| residual.column(channel).get(i).copied().flatten();
     let row = |(i, time_s): (usize, &f64)| {
-        let cells = CHANNELS.iter().map(|&channel| left_m(channel, i).map(|m| format!("{m:e}")));
+        let cells = MOTION_CHANNELS.iter().map(|&channel| left_m(channel, i).map(|m| format!("{m:e}")));
         std::iter::once(time_s.to_string()).chain(cells.map(Option::unwrap_or_default)).collect()
     };
     residual.time_s.iter().enumerate().map(row).collect()
 }
 
-fn ridges(case: &Case) -> Vec<Vec<String>> {
+fn ridge_rows(case: &ConditionComparison) -> Vec<Vec<String>> {
     let sides =
         [("measured", &case.ridges.measured, 0.0), ("model", &case.ridges.model, case.alignment.shift_s)];
-    let rows = |(source, followed, shift_s): (&str, &Option<FollowedRidge>, f64)| {
-        followed.iter().flat_map(|followed| ridge(source, followed, shift_s)).collect::<Vec<_>>()
+    let rows = |(source, followed, shift_s): (&str, &Option<TrackedRidge>, f64)| {
+        followed.iter().flat_map(|followed| tracked_ridge_rows(source, followed, shift_s)).collect::<Vec<_>>()
     };
     sides.into_iter().flat_map(rows).collect()
 }
 
 /// Every point of a ridge, with the number of the course that it is on, where it is on one.
-fn ridge(source: &str, followed: &FollowedRidge, shift_s: f64) -> Vec<Vec<String>> {
+fn tracked_ridge_rows(source: &str, followed: &TrackedRidge, shift_s: f64) -> Vec<Vec<String>> {
     let row = |point: &RidgePoint| {
         let course = followed.courses.iter().position(|course| course.contains(point));
         vec![
@@ -134,7 +140,7 @@ fn ridge(source: &str, followed: &FollowedRidge, shift_s: f64) -> Vec<Vec<String
     followed.ridge.points.iter().map(row).collect()
 }
 
-fn transitions(case: &Case) -> Vec<Vec<String>> {
+fn transition_rows(case: &ConditionComparison) -> Vec<Vec<String>> {
     let row = |transition: &Transition| {
         let time_s = transition.time_s + case.alignment.shift_s;
         let modes = [transition.from.name(), transition.to.name(), transition.cause.name()];

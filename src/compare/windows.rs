@@ -1,7 +1,7 @@
 //! The windows that a job reads, and the frequencies that it seeks in them.
 
-use crate::feature::{Band, Unit};
-use crate::fit::job::{Aim, Job};
+use crate::feature::{FeatureBand, FeatureUnit};
+use crate::fit::job::{FitTarget, Job};
 use crate::fit::result::FitResult;
 use crate::recording::channel::{Channel, Window};
 use crate::spectrum::Target;
@@ -14,14 +14,14 @@ pub struct FitWindow<'a> {
     /// The window.
     pub window: Window,
     /// The first band in it, where there is one: it says what is removed.
-    pub band: Option<&'a Band>,
+    pub band: Option<&'a FeatureBand>,
     /// What is read in it, in the order of the job.
-    pub aims: Vec<&'a Aim>,
+    pub targets: Vec<&'a FitTarget>,
 }
 
 /// A frequency that the fit seeks, and the model's.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Sought {
+pub struct FrequencyComparison {
     /// The frequency of the recording, or the published one.
     pub target: Target,
     /// That of the model at the estimates, Hz; `None` where it has none.
@@ -31,22 +31,22 @@ pub struct Sought {
 }
 
 /// The band of a reading that is one of a spectrum.
-pub(crate) fn band(aim: &Aim) -> Option<&Band> {
+pub(crate) fn spectral_band(aim: &FitTarget) -> Option<&FeatureBand> {
     aim.feature.reading.band()
 }
 
-fn window(aim: &Aim) -> Option<(Channel, Window)> {
-    let channel = band(aim).map_or(Channel::Deflection, |band| band.channel);
+fn channel_window(aim: &FitTarget) -> Option<(Channel, Window)> {
+    let channel = spectral_band(aim).map_or(Channel::Deflection, |band| band.channel);
     aim.feature.reading.window().map(|window| (channel, *window))
 }
 
 /// The windows of a condition, in the order of the job, each with the aims that it serves.
 #[must_use]
-pub fn fit_windows(job: &Job, condition: usize) -> Vec<FitWindow<'_>> {
+pub fn group_fit_windows(job: &Job, condition: usize) -> Vec<FitWindow<'_>> {
     let mut found: Vec<FitWindow> = Vec::new();
-    for aim in job.aims.iter().filter(|aim| aim.feature.condition == condition) {
-        let Some((channel, window)) = window(aim) else { continue };
-        let own = band(aim);
+    for aim in job.targets.iter().filter(|aim| aim.feature.condition == condition) {
+        let Some((channel, window)) = channel_window(aim) else { continue };
+        let own = spectral_band(aim);
         // what is removed tells two spectra of one window apart
         let same = |l: &&mut FitWindow| {
             (l.channel, l.window) == (channel, window)
@@ -55,9 +55,9 @@ pub fn fit_windows(job: &Job, condition: usize) -> Vec<FitWindow<'_>> {
         match found.iter_mut().find(same) {
             Some(shared) => {
                 shared.band = shared.band.or(own);
-                shared.aims.push(aim);
+                shared.targets.push(aim);
             }
-            None => found.push(FitWindow { channel, window, band: own, aims: vec![aim] }),
+            None => found.push(FitWindow { channel, window, band: own, targets: vec![aim] }),
         }
     }
     found
@@ -66,21 +66,21 @@ pub fn fit_windows(job: &Job, condition: usize) -> Vec<FitWindow<'_>> {
 impl FitWindow<'_> {
     /// Names of what is read in it.
     #[must_use]
-    pub fn names(&self) -> Vec<String> {
-        self.aims.iter().map(|aim| aim.feature.name.clone()).collect()
+    pub fn feature_names(&self) -> Vec<String> {
+        self.targets.iter().map(|aim| aim.feature.name.clone()).collect()
     }
 
     /// The frequencies that the fit seeks in it.
     #[must_use]
-    pub fn frequencies(&self, result: &FitResult) -> Vec<Sought> {
-        self.aims.iter().filter_map(|aim| sought(aim, result)).collect()
+    pub fn frequency_comparisons(&self, result: &FitResult) -> Vec<FrequencyComparison> {
+        self.targets.iter().filter_map(|aim| compare_frequency(aim, result)).collect()
     }
 }
 
 /// Target and model of an aim that is a frequency.
-pub(crate) fn sought(aim: &Aim, result: &FitResult) -> Option<Sought> {
+pub(crate) fn compare_frequency(aim: &FitTarget, result: &FitResult) -> Option<FrequencyComparison> {
     let name = &aim.feature.name;
-    let of = |frequency_hz: f64, sd_hz: f64, model_hz, met| Sought {
+    let of = |frequency_hz: f64, sd_hz: f64, model_hz, met| FrequencyComparison {
         target: Target {
             name: name.clone(),
             frequency_hz,
@@ -89,7 +89,7 @@ pub(crate) fn sought(aim: &Aim, result: &FitResult) -> Option<Sought> {
         model_hz,
         met,
     };
-    if aim.feature.reading.unit() != Unit::HERTZ {
+    if aim.feature.reading.unit() != FeatureUnit::HERTZ {
         return None;
     }
     let component = result

@@ -1,10 +1,10 @@
 //! The scene of a fit at its estimates.
 
-use super::commented::Commented;
+use super::commented::CommentedToml;
 use crate::fit::result::{FitResult, NuisanceResult};
 use crate::simulate::drive::Drive;
 use crate::simulate::scene::{Scene, StartKind};
-use crate::text::{digits, interval, printable};
+use crate::text::{format_digits, format_interval, make_printable};
 
 /// Tables of numbers in the order of a scene.
 const TABLES: [&str; 3] = ["blade", "shoulder", "friction"];
@@ -13,7 +13,7 @@ const DIGITS: usize = 4;
 
 /// A scene with the estimates in it, and what it is the scene of.
 #[derive(Debug, Clone, Copy)]
-pub struct Fitted<'a> {
+pub struct FittedScene<'a> {
     /// The scene that the fit ran.
     pub scene: &'a Scene,
     /// Name of its condition.
@@ -29,35 +29,36 @@ pub struct Fitted<'a> {
 /// The scene of a fit at its estimates, with their intervals as comments; `None` for one that starts in the
 /// air, which no scene file says.
 #[must_use]
-pub fn fitted_scene(fitted: &Fitted<'_>) -> Option<String> {
-    let Fitted { scene, condition, synthetic, recording, result } = *fitted;
+pub fn write_fitted_scene(fitted: &FittedScene<'_>) -> Option<String> {
+    let FittedScene { scene, condition, synthetic, recording, result } = *fitted;
     let of = match synthetic {
         Some(true) => "fitted to a synthetic recording, which no camera took",
         Some(false) => "fitted to a recording",
         None => "fitted to published numbers",
     };
-    let mut head = Commented::default().comment(&format!(
+    let mut head = CommentedToml::default().add_comment(&format!(
         "The scene of a fit at its estimates, {of}, for `wiperlab simulate` and for studies. The fit: {}; its \
          condition: {condition}. Written by `wiperlab fit`, and written anew by the next.",
         result.title
     ));
-    if !result.explains() {
-        head = head.comment("The model does not explain the recording: the numbers are those of no blade.");
+    if !result.explains_recordings() {
+        head =
+            head.add_comment("The model does not explain the recording: the numbers are those of no blade.");
     }
-    let title = format!("{} ({condition})", printable(&result.title));
-    as_toml(head, &title, scene, recording, |name| note(result, name))
+    let title = format!("{} ({condition})", make_printable(&result.title));
+    write_scene_toml(head, &title, scene, recording, |name| describe_estimate(result, name))
 }
 
 /// What a fit says of a number.
-fn note(result: &FitResult, name: &str) -> Option<String> {
-    let ends = |lower, upper| interval(lower, upper, |end| digits(end, DIGITS));
+fn describe_estimate(result: &FitResult, name: &str) -> Option<String> {
+    let ends = |lower, upper| format_interval(lower, upper, |end| format_digits(end, DIGITS));
     if let Some(found) = result.parameters.get(name) {
-        let verdict = found.verdict.word();
+        let verdict = found.verdict.name();
         return Some(format!("fitted, {verdict}; 95 %: {}", ends(found.lower_95, found.upper_95)));
     }
     let of_scene = |nuisance: &&NuisanceResult| nuisance.recording.is_none() && nuisance.name == name;
     let constant = result.nuisances.iter().find(of_scene)?;
-    let (prior, sd) = (digits(constant.prior, DIGITS), digits(constant.prior_sd, 2));
+    let (prior, sd) = (format_digits(constant.prior, DIGITS), format_digits(constant.prior_sd, 2));
     Some(format!(
         "freed around {prior} with standard deviation {sd}; 95 %: {}",
         ends(constant.lower_95, constant.upper_95)
@@ -65,73 +66,78 @@ fn note(result: &FitResult, name: &str) -> Option<String> {
 }
 
 /// A scene as a file that reads back as the same; `None` for a start in the air.
-fn as_toml(
-    head: Commented,
+fn write_scene_toml(
+    head: CommentedToml,
     title: &str,
     scene: &Scene,
     recording: Option<&str>,
     note: impl Fn(&str) -> Option<String>,
 ) -> Option<String> {
-    let mut text = head.line("format = 1").text("title", title);
+    let mut text = head.add_line("format = 1").add_text("title", title);
     for table in TABLES {
-        let of_table = scene.written().filter_map(|(name, value)| Some((name.split_once('.')?, name, value)));
+        let of_table =
+            scene.written_values().filter_map(|(name, value)| Some((name.split_once('.')?, name, value)));
         let rows: Vec<_> = of_table.filter(|((of, _), ..)| *of == table).collect();
         if !rows.is_empty() {
-            text = text.gap().line(&format!("[{table}]"));
+            text = text.add_empty_line().add_line(&format!("[{table}]"));
         }
         for ((_, key), name, value) in rows {
-            text = text.comments(note(name)).number(key, value);
+            text = text.add_comments(note(name)).add_number(key, value);
         }
     }
-    text = drive(text.gap().line("[drive]"), scene, recording, &note)?;
-    text = text.gap().line("[contact]").word("loss", scene.loss).word("jam", scene.jam);
-    if let Some((_, restitution)) = scene.written().find(|(name, _)| *name == "contact.restitution") {
-        text = text.number("restitution", restitution);
+    text = add_drive(text.add_empty_line().add_line("[drive]"), scene, recording, &note)?;
+    text =
+        text.add_empty_line().add_line("[contact]").add_word("loss", scene.loss).add_word("jam", scene.jam);
+    if let Some((_, restitution)) = scene.written_values().find(|(name, _)| *name == "contact.restitution") {
+        text = text.add_number("restitution", restitution);
     }
-    text = start(text.gap().line("[start]").number("time_s", scene.start_s), scene.start)?;
+    text = add_start(
+        text.add_empty_line().add_line("[start]").add_number("time_s", scene.start_s),
+        scene.start,
+    )?;
     let run = &scene.run;
     text = text
-        .gap()
-        .line("[run]")
-        .number("stop_s", run.stop_s)
-        .number("sample_rate_hz", run.sample_rate_hz)
-        .number("relative_tolerance", run.relative_tolerance);
+        .add_empty_line()
+        .add_line("[run]")
+        .add_number("stop_s", run.stop_s)
+        .add_number("sample_rate_hz", run.sample_rate_hz)
+        .add_number("relative_tolerance", run.relative_tolerance);
     if let Some(most) = run.most_evaluations {
-        text = text.line(&format!("most_evaluations = {most}"));
+        text = text.add_line(&format!("most_evaluations = {most}"));
     }
-    Some(text.word("outputs", &run.outputs).end())
+    Some(text.add_word("outputs", &run.outputs).into_text())
 }
 
-fn drive(
-    text: Commented,
+fn add_drive(
+    text: CommentedToml,
     scene: &Scene,
     recording: Option<&str>,
     note: impl Fn(&str) -> Option<String>,
-) -> Option<Commented> {
+) -> Option<CommentedToml> {
     match &scene.drive {
-        Drive::Recorded(_) => Some(text.text("recording", recording?)),
+        Drive::Recorded(_) => Some(text.add_text("recording", recording?)),
         Drive::Uniform { .. } => None,
         Drive::Cosine { amplitude_m, frequency_hz, delay_s } => {
             let text = text
-                .comments(note("drive.amplitude_m"))
-                .number("amplitude_m", *amplitude_m)
-                .comments(note("drive.frequency_hz"))
-                .number("frequency_hz", *frequency_hz);
-            Some(if *delay_s == 0.0 { text } else { text.number("delay_s", *delay_s) })
+                .add_comments(note("drive.amplitude_m"))
+                .add_number("amplitude_m", *amplitude_m)
+                .add_comments(note("drive.frequency_hz"))
+                .add_number("frequency_hz", *frequency_hz);
+            Some(if *delay_s == 0.0 { text } else { text.add_number("delay_s", *delay_s) })
         }
     }
 }
 
-fn start(text: Commented, start: StartKind) -> Option<Commented> {
+fn add_start(text: CommentedToml, start: StartKind) -> Option<CommentedToml> {
     match start {
-        StartKind::Upright => Some(text.text("kind", "upright")),
-        StartKind::SteadySlide => Some(text.text("kind", "steady-slide")),
+        StartKind::Upright => Some(text.add_text("kind", "upright")),
+        StartKind::SteadySlide => Some(text.add_text("kind", "steady-slide")),
         StartKind::State(pose) => Some(
-            text.text("kind", "state")
-                .number("neck_angle_rad", pose.theta)
-                .number("lip_angle_rad", pose.phi)
-                .number("neck_rate_rad_per_s", pose.theta_rate)
-                .number("lip_rate_rad_per_s", pose.phi_rate),
+            text.add_text("kind", "state")
+                .add_number("neck_angle_rad", pose.theta)
+                .add_number("lip_angle_rad", pose.phi)
+                .add_number("neck_rate_rad_per_s", pose.theta_rate)
+                .add_number("lip_rate_rad_per_s", pose.phi_rate),
         ),
         StartKind::Airborne(_) => None,
     }
@@ -149,7 +155,7 @@ mod tests {
     ];
 
     fn reads_back(scene: &Scene) {
-        let text = as_toml(Commented::default(), scene.title(), scene, None, |_| None).unwrap();
+        let text = write_scene_toml(CommentedToml::default(), scene.title(), scene, None, |_| None).unwrap();
         let again = Scene::parse("scene", &text).unwrap();
         assert_eq!(&again, scene, "{text}");
     }
@@ -160,8 +166,8 @@ mod tests {
             let scene = Scene::parse("scene", text).unwrap();
             reads_back(&scene);
             // numbers with all their digits, and a quantity that is written another way
-            let moved = scene.with("friction.a", 0.1 + 0.2).unwrap();
-            reads_back(&moved.with("blade.neck_natural_frequency_hz", 1000.0 / 3.0).unwrap());
+            let moved = scene.with_parameter("friction.a", 0.1 + 0.2).unwrap();
+            reads_back(&moved.with_parameter("blade.neck_natural_frequency_hz", 1000.0 / 3.0).unwrap());
         }
     }
 

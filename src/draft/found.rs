@@ -1,15 +1,17 @@
 //! What a recording shows that a first scene and a first job need.
 
-use super::stroke::{Estimated, KnownStroke, Stroke, stroke};
-use crate::recording::channel::{Channel, Instants, Reversal, Window, mean_speed_m_per_s};
+use super::stroke::{EstimatedStroke, KnownStroke, Stroke, estimate_stroke};
+use crate::recording::channel::{Channel, Reversal, ReversalInstants, Window, mean_speed_m_per_s};
 use crate::recording::{FrameGrid, Recording};
-use crate::simulate::drive::{EVEN, UNCERTAIN_S, head_motion};
-use crate::spectrum::{Analysis, Component, Record, Settings, Verdict};
-use crate::text::{digits, listed, milliseconds, plural, speed, with_sd};
+use crate::simulate::drive::{EVEN_SPEED_SHARE, UNCERTAIN_END_S, smooth_head_motion};
+use crate::spectrum::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
+use crate::text::{
+    format_digits, format_milliseconds, format_speed, format_with_sd, join_with_and, pluralise,
+};
 
 /// What moves the head of the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Head {
+pub(super) enum DraftHead {
     /// The head of the recording.
     Recorded,
     /// A cosine in the recording's clock, with the place of the recording's origin in its own, m.
@@ -18,7 +20,7 @@ pub(super) enum Head {
 
 /// A component that a job can ask for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FoundComponent {
+pub struct DraftComponent {
     /// Name in the job.
     pub name: &'static str,
     /// Where it was found.
@@ -37,7 +39,7 @@ pub struct FoundComponent {
 
 /// Why nothing can be drafted for a recording.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NotUsable {
+pub enum DraftError {
     /// The tip was not tracked.
     #[error(
         "found the tip's x in {found} of {frames} frames, expected it in most of them; track the tip of the lip, as a fit follows it"
@@ -75,7 +77,7 @@ pub enum NotUsable {
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+pub struct DraftFindings {
     /// Name of the recording.
     pub name: String,
     /// Whether no camera took it.
@@ -97,12 +99,12 @@ pub struct Found {
     /// Number of the reversal, counted from 1, whose tip is seen to stop and to slip again.
     pub shown: Option<usize>,
     /// Components behind that reversal.
-    pub components: Vec<FoundComponent>,
-    pub(super) head: Head,
+    pub components: Vec<DraftComponent>,
+    pub(super) head: DraftHead,
 }
 
 /// Share of the frames in which a point has to be tracked to be used.
-const MOST_FRAMES: f64 = 0.5;
+const LEAST_TRACKED_SHARE: f64 = 0.5;
 /// Least way of the head, m: a pixel or two of the usual 20 um.
 const LEAST_TRAVEL_M: f64 = 5e-5;
 /// Time over which a speed is taken, s: a few cycles of chatter.
@@ -110,15 +112,15 @@ const SPEED_S: f64 = 5e-3;
 /// Most frames that a first fit takes: it then ends within minutes.
 const MOST_FITTED: usize = 12_000;
 /// Share of these before the reversal that they are laid around.
-const BEFORE: f64 = 0.3;
+const SHARE_BEFORE_REVERSAL: f64 = 0.3;
 /// A component is looked for in this many times its frequency.
-const BAND: [f64; 2] = [0.6, 1.5];
+const BAND_FACTORS: [f64; 2] = [0.6, 1.5];
 /// Share of half the frame rate above which the exposure and the tracker leave little.
-const HIGHEST: f64 = 0.8;
+const HIGHEST_SHARE: f64 = 0.8;
 /// Between the ring-down of the head and the stick-slip cycle, Hz: 78 and about 900 Hz in the paper.
 const BETWEEN_HZ: f64 = 250.0;
 /// Least certain frequency that is asked for, relative standard deviation.
-const MOST_SD: f64 = 0.05;
+const MOST_RELATIVE_SD: f64 = 0.05;
 /// Slower than this is the stroke itself, Hz.
 const LOWEST_HZ: f64 = 10.0;
 
@@ -127,36 +129,41 @@ const MOST_TURNS: usize = 6;
 
 /// What is looked for behind a reversal: name, channel, time from the release to both ends of the window, s,
 /// whether it is below [`BETWEEN_HZ`].
-const WANTED: [(&str, Channel, [&str; 2], bool); 3] = [
+const WANTED_COMPONENTS: [(&str, Channel, [&str; 2], bool); 3] = [
     ("low", Channel::HeadDrop, ["+0.01", "+0.2"], true),
     ("high", Channel::Deflection, ["+0.01", "+0.1"], false),
     ("high at speed", Channel::Deflection, ["+0.2", "+0.3"], false),
 ];
 
-impl Found {
+impl DraftFindings {
     /// Looks at a recording; `known` is the stroke of a head that was not tracked.
     ///
     /// # Errors
-    /// [`NotUsable`] if no job could follow it.
-    pub fn of(recording: &Recording, exposure_s: Option<f64>, known: KnownStroke) -> Result<Self, NotUsable> {
+    /// [`DraftError`] if no job could follow it.
+    pub fn from_recording(
+        recording: &Recording,
+        exposure_s: Option<f64>,
+        known: KnownStroke,
+    ) -> Result<Self, DraftError> {
         let (grid, traces) = (recording.grid(), recording.traces());
         let tracked = |column: &[Option<f64>]| column.iter().flatten().count();
-        let enough = |column: &[Option<f64>]| tracked(column) as f64 >= MOST_FRAMES * grid.frames as f64;
+        let enough =
+            |column: &[Option<f64>]| tracked(column) as f64 >= LEAST_TRACKED_SHARE * grid.frames as f64;
         let frames = grid.frames;
         if !enough(&traces.tip_x_m) {
-            return Err(NotUsable::NoTip { found: tracked(&traces.tip_x_m), frames });
+            return Err(DraftError::NoTip { found: tracked(&traces.tip_x_m), frames });
         }
-        let no_head = NotUsable::NoHead { found: tracked(&traces.head_x_m), frames };
+        let no_head = DraftError::NoHead { found: tracked(&traces.head_x_m), frames };
         if !enough(&traces.head_x_m) {
-            let Estimated { stroke, origin_m } = stroke(recording, known).ok_or(no_head)?;
+            let EstimatedStroke { stroke, origin_m } = estimate_stroke(recording, known).ok_or(no_head)?;
             let span_s = [grid.start_s, grid.time_s(grid.frames.saturating_sub(1))];
             return Ok(Self {
-                head: Head::Cosine { stroke, origin_m },
-                ..Self::driven(recording, exposure_s, &traces.tip_x_m, span_s)
+                head: DraftHead::Cosine { stroke, origin_m },
+                ..Self::from_driving_trace(recording, exposure_s, &traces.tip_x_m, span_s)
             });
         }
         if known != KnownStroke::default() {
-            return Err(NotUsable::TwoHeads);
+            return Err(DraftError::TwoHeads);
         }
         let ends = traces
             .head_x_m
@@ -164,37 +171,37 @@ impl Found {
             .flatten()
             .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)]);
         if ends[1] - ends[0] < LEAST_TRAVEL_M {
-            return Err(NotUsable::AtRest { travel_m: ends[1] - ends[0] });
+            return Err(DraftError::AtRest { travel_m: ends[1] - ends[0] });
         }
-        let span_s = head_motion(recording).map_err(|_| no_head)?.span_s();
+        let span_s = smooth_head_motion(recording).map_err(|_| no_head)?.span_s();
         Ok(Self {
             drop: enough(&traces.head_y_m),
-            ..Self::driven(recording, exposure_s, &traces.head_x_m, span_s)
+            ..Self::from_driving_trace(recording, exposure_s, &traces.head_x_m, span_s)
         })
     }
 
     /// What a recording shows whose model is driven between two times, s; `moving` is the head, or the tip
     /// that follows it.
-    fn driven(
+    fn from_driving_trace(
         recording: &Recording,
         exposure_s: Option<f64>,
         moving: &[Option<f64>],
         [first_s, last_s]: [f64; 2],
     ) -> Self {
         let grid = recording.grid();
-        let instants = Instants::find(recording);
+        let instants = ReversalInstants::find_instants(recording);
         let reversals = &instants.reversals;
-        let speeds = speeds(grid, moving);
+        let speeds = sample_speeds(grid, moving);
         let greatest = speeds.iter().map(|(_, speed)| *speed).fold(0.0, f64::max);
         let resting = |time_s: f64| {
             reversals.iter().any(|r| {
                 let from = r.hold_s.unwrap_or(f64::NEG_INFINITY).min(r.reversal_s) - SPEED_S;
-                let to = r.settled_s().or(r.release_s).unwrap_or(r.reversal_s) + SPEED_S;
+                let to = r.settling_time_s().or(r.release_s).unwrap_or(r.reversal_s) + SPEED_S;
                 (from..=to).contains(&time_s)
             })
         };
         let even = |(time_s, speed): &(f64, f64)| {
-            *speed >= EVEN * greatest && *time_s >= first_s + UNCERTAIN_S && !resting(*time_s)
+            *speed >= EVEN_SPEED_SHARE * greatest && *time_s >= first_s + UNCERTAIN_END_S && !resting(*time_s)
         };
         let start_s = speeds.into_iter().find(even).map_or(first_s, |(time_s, _)| time_s);
         let shown = reversals.iter().position(|r| r.hold_s.is_some() && r.release_s.is_some());
@@ -206,18 +213,18 @@ impl Found {
             frame_rate_hz: grid.frame_rate_hz,
             drop: false,
             greatest_speed_m_per_s: greatest,
-            run_s: [start_s, last_s - UNCERTAIN_S].map(digits_of),
-            fitted_s: fitted(grid.frames, [grid.start_s, grid.time_s(grid.frames)], reversals),
+            run_s: [start_s, last_s - UNCERTAIN_END_S].map(round_time_s),
+            fitted_s: choose_fit_window(grid.frames, [grid.start_s, grid.time_s(grid.frames)], reversals),
             components: shown
-                .map_or_else(Vec::new, |at| components(recording, exposure_s, &instants, at + 1)),
+                .map_or_else(Vec::new, |at| find_components(recording, exposure_s, &instants, at + 1)),
             shown: shown.map(|at| at + 1),
             reversals: instants.reversals,
-            head: Head::Recorded,
+            head: DraftHead::Recorded,
         }
     }
 
     /// What has to be said of a recording that no camera took.
-    pub(super) fn origin(&self) -> Option<&'static str> {
+    pub(super) fn synthetic_note(&self) -> Option<&'static str> {
         self.synthetic.then_some("The recording is synthetic: no camera took it.")
     }
 
@@ -229,66 +236,66 @@ impl Found {
 
     /// What was found, in sentences.
     #[must_use]
-    pub fn words(&self) -> Vec<String> {
-        let rate = digits(self.frame_rate_hz, 4);
+    pub fn describe(&self) -> Vec<String> {
+        let rate = format_digits(self.frame_rate_hz, 4);
         let mut words = vec![format!(
             "{} frames at {rate} frames/s; {} moves at up to {}",
             self.frames,
-            if self.head == Head::Recorded { "the head" } else { "the tip" },
-            speed(self.greatest_speed_m_per_s)
+            if self.head == DraftHead::Recorded { "the head" } else { "the tip" },
+            format_speed(self.greatest_speed_m_per_s)
         )];
-        if let Head::Cosine { stroke, .. } = self.head {
+        if let DraftHead::Cosine { stroke, .. } = self.head {
             words.push(format!(
                 "no head; a stroke with an amplitude of {} mm at {} Hz, from the tip",
-                digits(1e3 * stroke.amplitude_m, 4),
-                digits(stroke.frequency_hz, 4)
+                format_digits(1e3 * stroke.amplitude_m, 4),
+                format_digits(stroke.frequency_hz, 4)
             ));
             return words;
         }
         words.push(match self.reversals.len() {
             0 => "no reversal".to_owned(),
             count => {
-                let mut turns = self.turns();
+                let mut turns = self.describe_reversals();
                 turns.extend((count > MOST_TURNS).then(|| format!("{} more", count - MOST_TURNS)));
-                format!("{count} {}: {}", plural("reversal", count), listed(&turns))
+                format!("{count} {}: {}", pluralise("reversal", count), join_with_and(&turns))
             }
         });
-        words.extend(self.components.iter().map(FoundComponent::words));
+        words.extend(self.components.iter().map(DraftComponent::describe));
         words
     }
 
-    fn turns(&self) -> Vec<String> {
+    fn describe_reversals(&self) -> Vec<String> {
         let turn = |r: &Reversal| {
-            let rest = r
-                .release_s
-                .map(|release_s| format!(", the tip slips {} later", milliseconds(release_s - r.reversal_s)));
+            let rest = r.release_s.map(|release_s| {
+                format!(", the tip slips {} later", format_milliseconds(release_s - r.reversal_s))
+            });
             format!("at {:.4} s{}", r.reversal_s, rest.unwrap_or_default())
         };
         self.reversals.iter().take(MOST_TURNS).map(turn).collect()
     }
 }
 
-impl FoundComponent {
+impl DraftComponent {
     /// What was found, in words.
     #[must_use]
-    pub fn words(&self) -> String {
+    pub fn describe(&self) -> String {
         format!(
             "{} Hz in the {} ({}), amplitude {}",
-            with_sd(self.frequency_hz, self.sd_hz),
+            format_with_sd(self.frequency_hz, self.sd_hz),
             self.channel.label(),
             self.window,
-            crate::text::length(self.amplitude_m)
+            crate::text::format_length(self.amplitude_m)
         )
     }
 }
 
 /// A time with the digits that matter, s.
-fn digits_of(time_s: f64) -> f64 {
+fn round_time_s(time_s: f64) -> f64 {
     (1e4 * time_s).round() / 1e4
 }
 
 /// Times and speeds of a point along the recording, m/s.
-fn speeds(grid: FrameGrid, moving: &[Option<f64>]) -> Vec<(f64, f64)> {
+fn sample_speeds(grid: FrameGrid, moving: &[Option<f64>]) -> Vec<(f64, f64)> {
     let step = ((SPEED_S * grid.frame_rate_hz) as usize).max(2);
     let at = |first: usize| {
         let frames = first..(first + 2 * step).min(grid.frames);
@@ -299,46 +306,47 @@ fn speeds(grid: FrameGrid, moving: &[Option<f64>]) -> Vec<(f64, f64)> {
 }
 
 /// The part of a long recording that a first fit takes.
-fn fitted(frames: usize, [start_s, end_s]: [f64; 2], reversals: &[Reversal]) -> Option<[f64; 2]> {
+fn choose_fit_window(frames: usize, [start_s, end_s]: [f64; 2], reversals: &[Reversal]) -> Option<[f64; 2]> {
     if frames <= MOST_FITTED {
         return None;
     }
     let length_s = (end_s - start_s) * MOST_FITTED as f64 / frames as f64;
     let turn_s = reversals.first().map_or(start_s, |r| r.reversal_s);
-    let from_s = (turn_s - BEFORE * length_s).clamp(start_s, end_s - length_s);
-    Some([digits_of(from_s), digits_of(from_s + length_s)])
+    let from_s = (turn_s - SHARE_BEFORE_REVERSAL * length_s).clamp(start_s, end_s - length_s);
+    Some([round_time_s(from_s), round_time_s(from_s + length_s)])
 }
 
-fn components(
+fn find_components(
     recording: &Recording,
     exposure_s: Option<f64>,
-    instants: &Instants,
+    instants: &ReversalInstants,
     reversal: usize,
-) -> Vec<FoundComponent> {
+) -> Vec<DraftComponent> {
     let release = if reversal == 1 { "release".to_owned() } else { format!("release[{reversal}]") };
-    let highest_hz = HIGHEST * recording.grid().frame_rate_hz / 2.0;
+    let highest_hz = HIGHEST_SHARE * recording.grid().frame_rate_hz / 2.0;
     let found = |(name, channel, [from, to], is_low): (&'static str, Channel, [&str; 2], bool)| {
         let window = format!("{release}{from}..{release}{to}");
-        let frames = Window::parse(&window).ok()?.resolve(recording, instants).ok()?;
+        let frames = Window::parse(&window).ok()?.resolve_frames(recording, instants).ok()?;
         let samples = channel.samples(recording);
-        let record = Record {
+        let record = SampledRecord {
             samples: samples.get(frames)?,
             frame_rate_hz: recording.grid().frame_rate_hz,
             exposure_s,
         };
         let band = if is_low { [LOWEST_HZ, BETWEEN_HZ.min(highest_hz)] } else { [BETWEEN_HZ, highest_hz] };
-        let settings = Settings { band_hz: Some((band[0], band[1])), ..Settings::default() };
-        let analysis = Analysis::of(&record, &settings).ok()?;
+        let settings = SpectrumSettings { band_hz: Some((band[0], band[1])), ..SpectrumSettings::default() };
+        let analysis = SpectralAnalysis::from_record(&record, &settings).ok()?;
         let usable = |c: &Component| {
-            let trusted = matches!(c.verdict, Verdict::Clear | Verdict::Attenuated) || c.range_hz.is_some();
-            trusted && c.frequency_sd_hz < MOST_SD * c.frequency_hz
+            let trusted = matches!(c.verdict, ComponentVerdict::Clear | ComponentVerdict::Attenuated)
+                || c.range_hz.is_some();
+            trusted && c.frequency_sd_hz < MOST_RELATIVE_SD * c.frequency_hz
         };
         let all = analysis.spectrum.components.into_iter().filter(usable);
         let best = all.max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m))?;
         let range = best.range_hz.map_or([best.frequency_hz; 2], |range| [range.low_hz, range.high_hz]);
-        let ends = [BAND[0] * range[0], BAND[1] * range[1]];
+        let ends = [BAND_FACTORS[0] * range[0], BAND_FACTORS[1] * range[1]];
         let whole = |hz: f64| if hz < 100.0 { hz.round() } else { (hz / 10.0).round() * 10.0 };
-        Some(FoundComponent {
+        Some(DraftComponent {
             name,
             channel,
             window,
@@ -348,5 +356,5 @@ fn components(
             band_hz: [whole(ends[0]).max(band[0]), whole(ends[1].min(highest_hz))],
         })
     };
-    WANTED.into_iter().filter_map(found).collect()
+    WANTED_COMPONENTS.into_iter().filter_map(found).collect()
 }

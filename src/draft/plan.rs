@@ -2,7 +2,7 @@
 
 /// What becomes of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Role {
+pub enum ParameterRole {
     /// The user measures it on the blade, to this relative standard deviation: it is held there, or freed
     /// within it where it is a constant that a fit may free.
     Yours(Option<f64>),
@@ -28,18 +28,18 @@ const NECK_HZ: [f64; 2] = [60.0, 600.0];
 /// From a shoulder that is hardly felt to one that is as good as rigid.
 const SHOULDER: [f64; 2] = [4.0, 60.0];
 /// A part that was weighed or computed from its cross section.
-const WEIGHED: Role = Role::Yours(Some(0.05));
+const WEIGHED: ParameterRole = ParameterRole::Yours(Some(0.05));
 /// Read from a scale below the blade.
-const PRELOAD: Role = Role::Yours(Some(0.05));
+const PRELOAD: ParameterRole = ParameterRole::Yours(Some(0.05));
 /// Measured on a picture of the cross section; a fit holds lengths.
-const MEASURED: Role = Role::Yours(None);
+const MEASURED: ParameterRole = ParameterRole::Yours(None);
 /// A natural frequency or an angle of a blade of the same kind.
-const SIMILAR: Role = Role::Guessed(0.2);
+const SIMILAR: ParameterRole = ParameterRole::Guessed(0.2);
 /// The widest that a constant may be freed: dampings of rubber differ by a factor.
-const UNKNOWN: Role = Role::Guessed(0.5);
+const UNKNOWN: ParameterRole = ParameterRole::Guessed(0.5);
 
 /// Every number of the example's blade, shoulder and friction in the form in which a draft writes it.
-pub const PLAN: [(&str, Role); 21] = [
+pub const PARAMETER_PLAN: [(&str, ParameterRole); 21] = [
     ("blade.head_mass_kg", WEIGHED),
     ("blade.neck_mass_kg", WEIGHED),
     ("blade.lip_mass_kg", WEIGHED),
@@ -51,19 +51,19 @@ pub const PLAN: [(&str, Role); 21] = [
     ("blade.lip_inertia_kg_m2", WEIGHED),
     ("blade.preload_force_n", PRELOAD),
     ("blade.head_natural_frequency_hz", SIMILAR),
-    ("blade.neck_natural_frequency_hz", Role::Fitted(NECK_HZ)),
+    ("blade.neck_natural_frequency_hz", ParameterRole::Fitted(NECK_HZ)),
     ("blade.lip_natural_frequency_hz", SIMILAR),
     ("blade.head_damping_ratio", UNKNOWN),
     ("blade.neck_damping_ratio", UNKNOWN),
     ("blade.lip_damping_ratio", UNKNOWN),
     ("shoulder.contact_angle_rad", SIMILAR),
-    ("shoulder.stiffness_ratio", Role::Fitted(SHOULDER)),
-    ("friction.a", Role::Fitted(FALLING)),
-    ("friction.b_s_per_m", Role::FittedOverSpeed(DECAY)),
-    ("friction.c", Role::Fitted(STAYING)),
+    ("shoulder.stiffness_ratio", ParameterRole::Fitted(SHOULDER)),
+    ("friction.a", ParameterRole::Fitted(FALLING)),
+    ("friction.b_s_per_m", ParameterRole::FittedOverSpeed(DECAY)),
+    ("friction.c", ParameterRole::Fitted(STAYING)),
 ];
 
 /// The numbers of a blade with or without a shoulder.
-pub(super) fn plan(shoulder: bool) -> impl Iterator<Item = (&'static str, Role)> {
-    PLAN.into_iter().filter(move |(name, _)| shoulder || !name.starts_with("shoulder."))
+pub(super) fn plan_parameters(shoulder: bool) -> impl Iterator<Item = (&'static str, ParameterRole)> {
+    PARAMETER_PLAN.into_iter().filter(move |(name, _)| shoulder || !name.starts_with("shoulder."))
 }

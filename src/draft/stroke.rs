@@ -31,7 +31,7 @@ pub struct KnownStroke {
 
 /// A stroke with the place of the recording's origin in its own, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Estimated {
+pub(super) struct EstimatedStroke {
     pub stroke: Stroke,
     pub origin_m: f64,
 }
@@ -45,10 +45,10 @@ const SPEED_S: f64 = 0.01;
 const SLIDING: f64 = 0.3;
 
 /// The stroke that the tip follows; `None` where it slides too little to show one.
-pub(super) fn stroke(recording: &Recording, known: KnownStroke) -> Option<Estimated> {
-    let sliding = sliding(recording);
+pub(super) fn estimate_stroke(recording: &Recording, known: KnownStroke) -> Option<EstimatedStroke> {
+    let sliding = select_sliding(recording);
     let fit =
-        |frequency_hz: f64| linear(&sliding, frequency_hz).map(|found| (found.0, frequency_hz, found.1));
+        |frequency_hz: f64| fit_terms(&sliding, frequency_hz).map(|found| (found.0, frequency_hz, found.1));
     let frequency_hz = known.frequency_hz.or_else(|| {
         let [low, high] = FREQUENCIES_HZ;
         let place = |i: usize| low * math::powf(high / low, i as f64 / COARSE as f64);
@@ -66,11 +66,11 @@ pub(super) fn stroke(recording: &Recording, known: KnownStroke) -> Option<Estima
     let amplitude_m = known.amplitude_m.unwrap_or_else(|| math::hypot(cosine, sine));
     let delay_s = math::atan2(-sine, -cosine) / (TAU * frequency_hz);
     let stroke = Stroke { amplitude_m, frequency_hz, delay_s };
-    Some(Estimated { stroke, origin_m: middle_m - amplitude_m })
+    Some(EstimatedStroke { stroke, origin_m: middle_m - amplitude_m })
 }
 
 /// Time, s, place, m, and side of the speed of the tip while it slides, about every [`SPEED_S`].
-fn sliding(recording: &Recording) -> Vec<[f64; 3]> {
+fn select_sliding(recording: &Recording) -> Vec<[f64; 3]> {
     let (grid, tip) = (recording.grid(), &recording.traces().tip_x_m);
     let step = ((SPEED_S * grid.frame_rate_hz) as usize).max(2);
     let at = |first: usize| {
@@ -89,21 +89,21 @@ fn sliding(recording: &Recording) -> Vec<[f64; 3]> {
 
 /// Mean squared residual, m2, and `c`, `d`, `P`, `Q`, m, at a frequency. Where the blade flips the tip does
 /// not trail: what is far off a first solution is left out of the second.
-fn linear(sliding: &[[f64; 3]], frequency_hz: f64) -> Option<(f64, [f64; 4])> {
+fn fit_terms(sliding: &[[f64; 3]], frequency_hz: f64) -> Option<(f64, [f64; 4])> {
     /// Residuals beyond this many times their median are left out.
     const FAR: f64 = 4.0;
     let all: Vec<usize> = (0..sliding.len()).collect();
-    let (left, _) = solved(sliding, &all, frequency_hz)?;
+    let (left, _) = solve_terms(sliding, &all, frequency_hz)?;
     let mut sorted = left.clone();
     sorted.sort_by(f64::total_cmp);
     let most = FAR * sorted.get(sorted.len() / 2)?;
     let near: Vec<usize> = all.into_iter().filter(|i| left[*i] <= most).collect();
-    let (left, found) = solved(sliding, &near, frequency_hz)?;
+    let (left, found) = solve_terms(sliding, &near, frequency_hz)?;
     Some((left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64, found))
 }
 
 /// Absolute residuals, m, and the solution from some of the places.
-fn solved(sliding: &[[f64; 3]], used: &[usize], frequency_hz: f64) -> Option<(Vec<f64>, [f64; 4])> {
+fn solve_terms(sliding: &[[f64; 3]], used: &[usize], frequency_hz: f64) -> Option<(Vec<f64>, [f64; 4])> {
     /// Twice as many places as there are terms.
     const FEWEST: usize = 8;
     let both_sides = [1.0, -1.0].iter().all(|side| used.iter().any(|i| sliding[*i][2] == *side));
@@ -148,7 +148,8 @@ mod tests {
     fn the_stroke_of_a_tip_that_trails_evenly_is_found() {
         let stroke = Stroke { amplitude_m: 0.045, frequency_hz: 0.75, delay_s: 0.21 };
         for (start_s, length_s) in [(0.0, 3.0), (17.3, 1.5)] {
-            let found = super::stroke(&recording(stroke, start_s, length_s), KnownStroke::default()).unwrap();
+            let found = super::estimate_stroke(&recording(stroke, start_s, length_s), KnownStroke::default())
+                .unwrap();
             let turns = (found.stroke.delay_s - stroke.delay_s) * stroke.frequency_hz;
             assert!((found.stroke.frequency_hz / 0.75 - 1.0).abs() < 1e-3, "{found:?}");
             assert!((found.stroke.amplitude_m / 0.045 - 1.0).abs() < 1e-2, "{found:?}");
@@ -158,7 +159,7 @@ mod tests {
             );
         }
         let known = KnownStroke { amplitude_m: Some(0.0453), frequency_hz: Some(0.75) };
-        let found = super::stroke(&recording(stroke, 0.0, 3.0), known).unwrap();
+        let found = super::estimate_stroke(&recording(stroke, 0.0, 3.0), known).unwrap();
         assert_eq!((found.stroke.amplitude_m, found.stroke.frequency_hz), (0.0453, 0.75));
         assert!((found.stroke.delay_s - 0.21).abs() < 1e-3, "{found:?}");
     }
@@ -166,6 +167,6 @@ mod tests {
     #[test]
     fn a_tip_that_goes_one_way_shows_no_stroke() {
         let stroke = Stroke { amplitude_m: 0.045, frequency_hz: 0.75, delay_s: 0.0 };
-        assert_eq!(super::stroke(&recording(stroke, 0.1, 0.4), KnownStroke::default()), None);
+        assert_eq!(super::estimate_stroke(&recording(stroke, 0.1, 0.4), KnownStroke::default()), None);
     }
 }

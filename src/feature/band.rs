@@ -6,7 +6,7 @@ use serde::Serialize;
 
 /// A band of the spectrum of a window of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Band {
+pub struct FeatureBand {
     /// Which channel.
     pub channel: Channel,
     /// Which frames.

@@ -1,17 +1,17 @@
 //! What only a simulated run knows of the contact: stick, changes of mode, forces.
 
-use super::missing::Missing;
-use super::reader::Reader;
+use super::missing::MissingValue;
+use super::reader::FeatureReader;
 use super::run_record::RunRecord;
 use crate::recording::channel::{Window, WindowEnd};
-use crate::simulate::mode::Mode;
-use crate::simulate::outputs::Audit;
-use crate::simulate::{Cause, Status, Transition};
+use crate::simulate::mode::TipMode;
+use crate::simulate::outputs::EnergyAudit;
+use crate::simulate::{RunStatus, Transition, TransitionCause};
 use serde::Serialize;
 
 /// A reading of the contact.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub enum Contact {
+pub enum ContactReading {
     /// Share of a window in which the tip sticks.
     StickFraction(Window),
     /// Longest uninterrupted stick in a window, s.
@@ -28,7 +28,7 @@ pub enum Contact {
     LeastPainleveIndicator,
 }
 
-impl Contact {
+impl ContactReading {
     /// Its kind in a study.
     #[must_use]
     pub fn kind(self) -> &'static str {
@@ -56,10 +56,10 @@ impl Contact {
 
     /// Whether it is known from a run that ended like this. A count or a share is not: what comes after the
     /// end would belong to it.
-    pub(super) fn is_known_after(self, end: Status) -> bool {
+    pub(super) fn is_known_after(self, end: RunStatus) -> bool {
         match self {
-            Self::ContactLoss | Self::LeastNormalForce => end == Status::ContactLost,
-            Self::Jam | Self::LeastPainleveIndicator => end == Status::Jammed,
+            Self::ContactLoss | Self::LeastNormalForce => end == RunStatus::ContactLost,
+            Self::Jam | Self::LeastPainleveIndicator => end == RunStatus::Jammed,
             Self::StickFraction(_) | Self::LongestStick(_) | Self::Transitions(_) => false,
         }
     }
@@ -70,43 +70,45 @@ impl Contact {
     }
 
     /// Its value, in its unit.
-    pub(super) fn value(self, reader: &Reader) -> Result<f64, Missing> {
-        let run = reader.run().ok_or(Missing::NoRun)?;
+    pub(super) fn value(self, reader: &FeatureReader) -> Result<f64, MissingValue> {
+        let run = reader.run().ok_or(MissingValue::NoRun)?;
         match self {
             Self::StickFraction(window) => {
-                let [from, to] = ends_s(&window, reader, run)?;
+                let [from, to] = window_ends_s(&window, reader, run)?;
                 let sticking_s = stick_lengths_s(run, [from, to]).fold(0.0, |sum, length| sum + length);
                 Ok(sticking_s / (to - from)) // (an empty sum() is -0)
             }
             Self::LongestStick(window) => {
-                Ok(stick_lengths_s(run, ends_s(&window, reader, run)?).fold(0.0, f64::max))
+                Ok(stick_lengths_s(run, window_ends_s(&window, reader, run)?).fold(0.0, f64::max))
             }
             Self::Transitions(window) => {
-                let [from, to] = ends_s(&window, reader, run)?;
+                let [from, to] = window_ends_s(&window, reader, run)?;
                 let inside = run.transitions.iter().filter(|t| (from..=to).contains(&t.time_s));
                 Ok(inside.count() as f64)
             }
-            Self::ContactLoss => first_s(run, |t| t.to == Mode::Flight, Status::ContactLost),
-            Self::Jam => first_s(run, |t| t.cause == Cause::JamImpact, Status::Jammed),
+            Self::ContactLoss => first_occurrence_s(run, |t| t.to == TipMode::Flight, RunStatus::ContactLost),
+            Self::Jam => {
+                first_occurrence_s(run, |t| t.cause == TransitionCause::JamImpact, RunStatus::Jammed)
+            }
             // in contact the force is zero or above; where contact is lost, rounding may say otherwise
             Self::LeastNormalForce => {
-                extreme(run, |audit| audit.min_normal_force_n).map(|force_n| force_n.max(0.0))
+                audit_extreme(run, |audit| audit.min_normal_force_n).map(|force_n| force_n.max(0.0))
             }
-            Self::LeastPainleveIndicator => extreme(run, |audit| audit.min_painleve_indicator),
+            Self::LeastPainleveIndicator => audit_extreme(run, |audit| audit.min_painleve_indicator),
         }
     }
 }
 
 /// Start and end of a window, s: exact where it is given in seconds or by an instant, to a frame where it is
 /// a phase.
-fn ends_s(window: &Window, reader: &Reader, run: &RunRecord) -> Result<[f64; 2], Missing> {
-    let frames = reader.frames(window)?;
+fn window_ends_s(window: &Window, reader: &FeatureReader, run: &RunRecord) -> Result<[f64; 2], MissingValue> {
+    let frames = reader.window_frames(window)?;
     let end = |end: WindowEnd, open_s: f64, frame: usize| {
-        Ok::<f64, Missing>(match end {
+        Ok::<f64, MissingValue>(match end {
             WindowEnd::Open => open_s,
             WindowEnd::Time(time_s) => time_s,
             WindowEnd::Found { anchor, reversal, offset_s } => {
-                reader.instants().time_s(anchor, reversal).map_err(Missing::Instant)? + offset_s
+                reader.instants().time_s(anchor, reversal).map_err(MissingValue::Instant)? + offset_s
             }
             WindowEnd::Phase { .. } => reader.time_s(frame),
         })
@@ -121,12 +123,16 @@ fn stick_lengths_s(run: &RunRecord, [from, to]: [f64; 2]) -> impl Iterator<Item 
 }
 
 /// When a transition like this first happens, or the run ends like this, s.
-fn first_s(run: &RunRecord, is: impl Fn(&Transition) -> bool, end: Status) -> Result<f64, Missing> {
+fn first_occurrence_s(
+    run: &RunRecord,
+    is: impl Fn(&Transition) -> bool,
+    end: RunStatus,
+) -> Result<f64, MissingValue> {
     let during = run.transitions.iter().find(|transition| is(transition)).map(|t| t.time_s);
     let at_the_end = (run.run.status == end).then_some(run.run.stopped_at_s);
-    during.or(at_the_end).ok_or(Missing::Never)
+    during.or(at_the_end).ok_or(MissingValue::Never)
 }
 
-fn extreme(run: &RunRecord, of: fn(&Audit) -> Option<f64>) -> Result<f64, Missing> {
-    run.audit.as_ref().and_then(of).ok_or(Missing::Never)
+fn audit_extreme(run: &RunRecord, of: fn(&EnergyAudit) -> Option<f64>) -> Result<f64, MissingValue> {
+    run.audit.as_ref().and_then(of).ok_or(MissingValue::Never)
 }

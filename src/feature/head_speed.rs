@@ -10,14 +10,14 @@ pub(crate) const SPEED_BLOCK_S: f64 = 0.02;
 const FEWEST_IN_BLOCK: usize = 5;
 
 /// The head's speed in every frame, m/s; `None` where it is tracked too little.
-pub(super) fn speeds_m_per_s(head: &[Option<f64>], frame_rate_hz: f64) -> Option<Vec<f64>> {
-    Some(Speeds::of(head, frame_rate_hz)?.take(head.len()).collect())
+pub(super) fn head_speeds_m_per_s(head: &[Option<f64>], frame_rate_hz: f64) -> Option<Vec<f64>> {
+    Some(HeadSpeeds::from_head(head, frame_rate_hz)?.take(head.len()).collect())
 }
 
 /// The head's speed, frame after frame: straight between the slopes of blocks that overlap by half, each
 /// where its frames have their middle, and straight on beyond the first and the last. Exact where the head's
 /// path is a parabola.
-struct Speeds {
+struct HeadSpeeds {
     /// Frame (a real number) and velocity, m/s, of each block.
     blocks: Vec<(f64, f64)>,
     /// The pair of blocks between which the last frame lay.
@@ -25,11 +25,11 @@ struct Speeds {
     frame: usize,
 }
 
-impl Speeds {
+impl HeadSpeeds {
     /// `None` where there are fewer than two blocks.
-    fn of(head: &[Option<f64>], frame_rate_hz: f64) -> Option<Self> {
+    fn from_head(head: &[Option<f64>], frame_rate_hz: f64) -> Option<Self> {
         let half = ((SPEED_BLOCK_S * frame_rate_hz / 2.0).round() as usize).max(FEWEST_IN_BLOCK.div_ceil(2));
-        let block = |k: usize| slope(head, k * half..((k + 2) * half).min(head.len()), frame_rate_hz);
+        let block = |k: usize| block_slope(head, k * half..((k + 2) * half).min(head.len()), frame_rate_hz);
         let mut blocks: Vec<(f64, f64)> =
             (0..(head.len() / half).saturating_sub(1)).filter_map(block).collect();
         // two blocks with one middle hold the same frames, those between two gaps
@@ -38,7 +38,7 @@ impl Speeds {
     }
 }
 
-impl Iterator for Speeds {
+impl Iterator for HeadSpeeds {
     type Item = f64;
 
     /// Never ends.
@@ -54,7 +54,11 @@ impl Iterator for Speeds {
 }
 
 /// Middle of the tracked frames and least-squares slope through them, m/s.
-fn slope(head: &[Option<f64>], frames: std::ops::Range<usize>, frame_rate_hz: f64) -> Option<(f64, f64)> {
+fn block_slope(
+    head: &[Option<f64>],
+    frames: std::ops::Range<usize>,
+    frame_rate_hz: f64,
+) -> Option<(f64, f64)> {
     let points = || {
         head[frames.clone()].iter().enumerate().filter_map(|(i, x)| Some(((frames.start + i) as f64, (*x)?)))
     };

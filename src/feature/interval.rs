@@ -1,14 +1,14 @@
 //! Times between two instants of a reversal.
 
-use super::missing::Missing;
-use super::reader::Reader;
-use super::value::Value;
-use crate::recording::channel::Anchor;
+use super::missing::MissingValue;
+use super::reader::FeatureReader;
+use super::value::FeatureValue;
+use crate::recording::channel::InstantKind;
 use serde::Serialize;
 
 /// Two instants of a reversal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Interval {
+pub enum ReversalInterval {
     /// From the head's turn to the tip's release.
     ReleaseAfterReversal,
     /// From the tip's stop to its release.
@@ -19,7 +19,7 @@ pub enum Interval {
     FlipDuration,
 }
 
-impl Interval {
+impl ReversalInterval {
     /// Its kind in a job or a study.
     #[must_use]
     pub const fn kind(self) -> &'static str {
@@ -32,19 +32,23 @@ impl Interval {
     }
 
     /// Its length at the `reversal`-th turn of the head, counted from 1, s.
-    pub(super) fn length_s(self, reversal: usize, reader: &Reader) -> Result<Value, Missing> {
-        let at = |anchor| reader.instants().time_s(anchor, reversal).map_err(Missing::Instant);
+    pub(super) fn length_s(
+        self,
+        reversal: usize,
+        reader: &FeatureReader,
+    ) -> Result<FeatureValue, MissingValue> {
+        let at = |anchor| reader.instants().time_s(anchor, reversal).map_err(MissingValue::Instant);
         let length_s = match self {
-            Self::ReleaseAfterReversal => at(Anchor::Release)? - at(Anchor::Reversal)?,
-            Self::StickDuration => at(Anchor::Release)? - at(Anchor::Hold)?,
-            Self::FlipAfterReversal => at(Anchor::Flip)? - at(Anchor::Reversal)?,
+            Self::ReleaseAfterReversal => at(InstantKind::Release)? - at(InstantKind::Reversal)?,
+            Self::StickDuration => at(InstantKind::Release)? - at(InstantKind::Hold)?,
+            Self::FlipAfterReversal => at(InstantKind::Flip)? - at(InstantKind::Reversal)?,
             Self::FlipDuration => {
-                let start_s = at(Anchor::Flip)?;
+                let start_s = at(InstantKind::Flip)?;
                 let reversals = &reader.instants().reversals;
                 let found = reversal.checked_sub(1).and_then(|index| reversals.get(index));
                 found.and_then(|r| r.flip).map_or(start_s, |flip| flip.end_s) - start_s
             }
         };
-        Ok(Value::of(length_s, None))
+        Ok(FeatureValue::new(length_s, None))
     }
 }

@@ -1,9 +1,9 @@
 //! The keys of a job's `[[feature]]` and a study's `[[map]]` that say what is read, and their checks.
 
-use super::band::Band;
+use super::band::FeatureBand;
 use crate::recording::channel::{Channel, Window};
 use crate::spectrum::Detrend;
-use crate::toml_file::{Pair, Refusal, above_zero, refuse};
+use crate::toml_file::{KeyRefusal, NumberPair, check_above_zero, refuse_key};
 
 /// Relative half width of the speeds that count as one, unless the file says otherwise: several cycles of
 /// chatter pass within it, and the friction hardly changes.
@@ -18,7 +18,7 @@ macro_rules! with_reading_keys {
             { $($own)* }
             #[doc = "Channel: \"deflection\", \"head-drop\", \"tip-x\" or \"head-x\"."] channel: String,
             #[doc = "Frames from which it is read."] window: String,
-            #[doc = "Lowest and highest frequency, Hz."] band_hz: Pair,
+            #[doc = "Lowest and highest frequency, Hz."] band_hz: NumberPair,
             #[doc = "What is removed first."] detrend: String,
             #[doc = "Amplitude below which nothing counts, m."] least_amplitude_m: f64,
             #[doc = "Number of the reversal, counted from 1; 1 if left out."] reversal: usize,
@@ -41,7 +41,7 @@ macro_rules! define_keys {
 
         impl Keys {
             /// Those that are given.
-            fn given(&self) -> impl Iterator<Item = &'static str> {
+            fn given_keys(&self) -> impl Iterator<Item = &'static str> {
                 [$((stringify!($key), self.$key.is_some())),*]
                     .into_iter()
                     .filter_map(|(key, given)| given.then_some(key))
@@ -75,7 +75,7 @@ macro_rules! define_entry {
 pub(crate) use {define_entry, with_reading_keys};
 
 /// An entry of a file that says what is read.
-pub(crate) struct Entry<'a> {
+pub(crate) struct ReadingEntry<'a> {
     /// Its name in messages: "feature `x` (rms)".
     pub name: &'a str,
     /// What an entry of the file is called: `feature` or `map`.
@@ -88,78 +88,78 @@ pub(crate) struct Entry<'a> {
     pub noisy: bool,
 }
 
-impl Entry<'_> {
+impl ReadingEntry<'_> {
     /// A key as messages name it.
-    pub fn key(&self, key: &str) -> String {
+    pub fn describe_key(&self, key: &str) -> String {
         format!("{}, `{key}`", self.name)
     }
 
     /// Checks that each key that is given has a meaning.
-    pub(crate) fn check_keys(&self, known: &[&str]) -> Result<(), Refusal> {
-        let Some(key) = self.keys.given().find(|key| !known.contains(key)) else { return Ok(()) };
+    pub(crate) fn check_keys(&self, known: &[&str]) -> Result<(), KeyRefusal> {
+        let Some(key) = self.keys.given_keys().find(|key| !known.contains(key)) else { return Ok(()) };
         let takes = if known.is_empty() { "none of its own".to_owned() } else { known.join(", ") };
-        refuse(
-            self.key(key),
+        refuse_key(
+            self.describe_key(key),
             format!("has no meaning for this kind of {}, which takes {takes}; remove it", self.noun),
         )
     }
 
     /// A number above 0 that has to be there.
-    pub fn needed(&self, key: &str, found: Option<f64>, expected: &str) -> Result<f64, Refusal> {
+    pub fn require_positive(&self, key: &str, found: Option<f64>, expected: &str) -> Result<f64, KeyRefusal> {
         match found {
-            Some(found) => above_zero(self.key(key), found),
-            None => refuse(self.key(key), format!("missing; expected {expected}")),
+            Some(found) => check_above_zero(self.describe_key(key), found),
+            None => refuse_key(self.describe_key(key), format!("missing; expected {expected}")),
         }
     }
 
-    pub fn window(&self) -> Result<Window, Refusal> {
+    pub fn parse_window(&self) -> Result<Window, KeyRefusal> {
         match self.window_if_given()? {
             Some(window) => Ok(window),
-            None => refuse(
-                self.key("window"),
+            None => refuse_key(
+                self.describe_key("window"),
                 "missing; expected a window such as \"release+0.02..release+0.20\"",
             ),
         }
     }
 
     /// A window; the whole run where none is given.
-    pub(crate) fn window_or_whole(&self) -> Result<Window, Refusal> {
+    pub(crate) fn window_or_whole(&self) -> Result<Window, KeyRefusal> {
         Ok(self.window_if_given()?.unwrap_or(Window::WHOLE))
     }
 
-    fn window_if_given(&self) -> Result<Option<Window>, Refusal> {
+    fn window_if_given(&self) -> Result<Option<Window>, KeyRefusal> {
         let parse = |text: &String| {
-            Window::parse(text).or_else(|error| refuse(self.key("window"), error.to_string()))
+            Window::parse(text).or_else(|error| refuse_key(self.describe_key("window"), error.to_string()))
         };
         self.keys.window.as_ref().map(parse).transpose()
     }
 
-    pub fn band(&self) -> Result<Band, Refusal> {
+    pub fn parse_band(&self) -> Result<FeatureBand, KeyRefusal> {
         let names = || Channel::ALL.map(Channel::name).join(", ");
         match &self.keys.channel {
-            Some(channel) => self.band_of(channel),
-            None => refuse(self.key("channel"), format!("missing; expected one of {}", names())),
+            Some(channel) => self.parse_band_of_channel(channel),
+            None => refuse_key(self.describe_key("channel"), format!("missing; expected one of {}", names())),
         }
     }
 
     /// A band of the deflection, unless another channel is given.
-    pub(crate) fn band_of_deflection(&self) -> Result<Band, Refusal> {
-        self.band_of(self.keys.channel.as_deref().unwrap_or(Channel::Deflection.name()))
+    pub(crate) fn band_of_deflection(&self) -> Result<FeatureBand, KeyRefusal> {
+        self.parse_band_of_channel(self.keys.channel.as_deref().unwrap_or(Channel::Deflection.name()))
     }
 
-    fn band_of(&self, channel: &str) -> Result<Band, Refusal> {
-        let channel =
-            Channel::parse(channel).or_else(|error| refuse(self.key("channel"), error.to_string()))?;
+    fn parse_band_of_channel(&self, channel: &str) -> Result<FeatureBand, KeyRefusal> {
+        let channel = Channel::parse(channel)
+            .or_else(|error| refuse_key(self.describe_key("channel"), error.to_string()))?;
         let band_hz = self.band_hz()?;
         let detrend = self.keys.detrend.as_deref().map_or(Ok(Detrend::default()), Detrend::parse);
-        let detrend = detrend.or_else(|error| refuse(self.key("detrend"), error.to_string()))?;
+        let detrend = detrend.or_else(|error| refuse_key(self.describe_key("detrend"), error.to_string()))?;
         let least_amplitude_m = self.least_amplitude_m()?;
-        Ok(Band { channel, window: self.window()?, band_hz, detrend, least_amplitude_m })
+        Ok(FeatureBand { channel, window: self.parse_window()?, band_hz, detrend, least_amplitude_m })
     }
 
-    fn band_hz(&self) -> Result<(f64, f64), Refusal> {
-        let Some(Pair([low, high])) = self.keys.band_hz else {
-            return refuse(self.key("band_hz"), "missing; expected [lowest, highest] frequency");
+    fn band_hz(&self) -> Result<(f64, f64), KeyRefusal> {
+        let Some(NumberPair([low, high])) = self.keys.band_hz else {
+            return refuse_key(self.describe_key("band_hz"), "missing; expected [lowest, highest] frequency");
         };
         let expected = match self.nyquist_hz {
             _ if !(low.is_finite() && high.is_finite() && 0.0 <= low && low < high) => {
@@ -171,58 +171,61 @@ impl Entry<'_> {
             ),
             _ => return Ok((low, high)),
         };
-        refuse(self.key("band_hz"), format!("found [{low}, {high}], expected {expected}"))
+        refuse_key(self.describe_key("band_hz"), format!("found [{low}, {high}], expected {expected}"))
     }
 
-    fn least_amplitude_m(&self) -> Result<f64, Refusal> {
+    fn least_amplitude_m(&self) -> Result<f64, KeyRefusal> {
         let least_m = self.keys.least_amplitude_m.unwrap_or(0.0);
         if least_m.is_finite() && least_m >= 0.0 {
             return Ok(least_m);
         }
-        refuse(
-            self.key("least_amplitude_m"),
+        refuse_key(
+            self.describe_key("least_amplitude_m"),
             format!("found {least_m}, expected a finite number of 0 or more, in m"),
         )
     }
 
     /// Number of a reversal, counted from 1.
-    pub fn reversal(&self) -> Result<usize, Refusal> {
+    pub fn reversal_number(&self) -> Result<usize, KeyRefusal> {
         match self.keys.reversal {
-            Some(0) => refuse(self.key("reversal"), "found 0, expected 1 or more: the first reversal is 1"),
+            Some(0) => refuse_key(
+                self.describe_key("reversal"),
+                "found 0, expected 1 or more: the first reversal is 1",
+            ),
             reversal => Ok(reversal.unwrap_or(1)),
         }
     }
 
     /// The part of a stroke in which a speed is sought: `part` of the reversal, or a window.
-    pub fn stroke(&self) -> Result<Window, Refusal> {
+    pub fn stroke_window(&self) -> Result<Window, KeyRefusal> {
         match (self.keys.part.as_deref(), &self.keys.window) {
             (Some(part @ ("before" | "after")), None) => {
-                Window::parse(&format!("{part}[{}]", self.reversal()?))
-                    .or_else(|error| refuse(self.key("part"), error.to_string()))
+                Window::parse(&format!("{part}[{}]", self.reversal_number()?))
+                    .or_else(|error| refuse_key(self.describe_key("part"), error.to_string()))
             }
-            (Some(part), None) => refuse(
-                self.key("part"),
+            (Some(part), None) => refuse_key(
+                self.describe_key("part"),
                 format!("found \"{part}\", expected \"before\" or \"after\" (the flip)"),
             ),
-            (None, Some(_)) if self.keys.reversal.is_none() => self.window(),
-            (None, Some(_)) => refuse(
-                self.key("reversal"),
+            (None, Some(_)) if self.keys.reversal.is_none() => self.parse_window(),
+            (None, Some(_)) => refuse_key(
+                self.describe_key("reversal"),
                 "has no meaning together with `window`; write it into the window, such as \"after[2]\"",
             ),
-            _ => refuse(
-                self.key("part"),
+            _ => refuse_key(
+                self.describe_key("part"),
                 "expected either `part` = \"before\" or \"after\" (the flip), or `window`; give one of them",
             ),
         }
     }
 
-    pub fn width_relative(&self) -> Result<f64, Refusal> {
+    pub fn width_relative(&self) -> Result<f64, KeyRefusal> {
         let width = self.keys.width_relative.unwrap_or(WIDTH_RELATIVE);
         if width > 0.0 && width <= WIDEST_RELATIVE {
             return Ok(width);
         }
-        refuse(
-            self.key("width_relative"),
+        refuse_key(
+            self.describe_key("width_relative"),
             format!(
                 "found {width}, expected above 0 and at most {WIDEST_RELATIVE}: 0.15 takes speeds within 15 %"
             ),

@@ -2,9 +2,9 @@
 
 /// A value that is read from lengths in a picture, by what its camera does to it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Length {
+pub enum LengthCalibration {
     /// A mean place of the tip against the head: it has the offset of the markers and the scale.
-    Place,
+    Position,
     /// The size of a motion: it has the scale, but for what was added in quadrature.
     Size {
         /// That root mean square, m.

@@ -1,8 +1,8 @@
 //! Why a recording or a run does not give a value.
 
-use super::reason::Reason;
-use crate::recording::channel::{NoInstant, WindowError};
-use crate::simulate::Status;
+use super::reason::MissingReason;
+use crate::recording::channel::{InstantNotFound, WindowError};
+use crate::simulate::RunStatus;
 use crate::spectrum::SpectrumError;
 
 /// Fewest cycles in each half: below, the lobe of the Hann window reaches its own mirror image.
@@ -12,7 +12,7 @@ pub(crate) const FEWEST_AT_SPEED: usize = 8;
 
 /// Why a recording or a run does not give a value.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum Missing {
+pub enum MissingValue {
     /// The window is not in the recording.
     #[error("{0}")]
     Window(#[from] WindowError),
@@ -115,7 +115,7 @@ pub enum Missing {
     NoSpeed,
     /// An instant is not in the recording.
     #[error(transparent)]
-    Instant(NoInstant),
+    Instant(InstantNotFound),
     /// There is no such recording.
     #[error("there is no recording number {number}")]
     NoRecording {
@@ -129,7 +129,7 @@ pub enum Missing {
     #[error("the run ended as {} at {stopped_at_s} s", .status.name())]
     Ended {
         /// How it ended.
-        status: Status,
+        status: RunStatus,
         /// When, s.
         stopped_at_s: f64,
     },
@@ -138,24 +138,24 @@ pub enum Missing {
     Never,
 }
 
-impl Missing {
+impl MissingValue {
     /// The same in one word.
     #[must_use]
-    pub fn reason(&self) -> Reason {
+    pub fn reason(&self) -> MissingReason {
         match self {
-            Self::Window(_) | Self::Instant(_) => Reason::NoWindow,
-            Self::Spectrum(_) => Reason::NoSpectrum,
-            Self::NoPeak { .. } | Self::TooSmall { .. } => Reason::NoComponent,
-            Self::NoDecay { .. } => Reason::NoDecay,
-            Self::Faded { .. } => Reason::Faded,
-            Self::FewCycles { .. } => Reason::FewCycles,
-            Self::Segment { .. } => Reason::SegmentLength,
-            Self::NoFrames => Reason::NoFrames,
-            Self::Speed { .. } | Self::NoSpeed => Reason::NoSpeed,
-            Self::NoRecording { .. } => Reason::NoRecording,
-            Self::NoRun => Reason::NoRun,
-            Self::Ended { status, .. } => Reason::of(*status).unwrap_or(Reason::Never),
-            Self::Never => Reason::Never,
+            Self::Window(_) | Self::Instant(_) => MissingReason::NoWindow,
+            Self::Spectrum(_) => MissingReason::NoSpectrum,
+            Self::NoPeak { .. } | Self::TooSmall { .. } => MissingReason::NoComponent,
+            Self::NoDecay { .. } => MissingReason::NoDecay,
+            Self::Faded { .. } => MissingReason::Faded,
+            Self::FewCycles { .. } => MissingReason::FewCycles,
+            Self::Segment { .. } => MissingReason::SegmentLength,
+            Self::NoFrames => MissingReason::NoFrames,
+            Self::Speed { .. } | Self::NoSpeed => MissingReason::NoSpeed,
+            Self::NoRecording { .. } => MissingReason::NoRecording,
+            Self::NoRun => MissingReason::NoRun,
+            Self::Ended { status, .. } => MissingReason::from_status(*status).unwrap_or(MissingReason::Never),
+            Self::Never => MissingReason::Never,
         }
     }
 }

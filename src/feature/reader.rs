@@ -1,45 +1,45 @@
 //! A recording from which many features are read: each channel is computed once, and each window
 //! transformed once.
 
-use super::band::Band;
-use super::cycle::Segments;
-use super::head_speed::speeds_m_per_s;
-use super::missing::Missing;
+use super::band::FeatureBand;
+use super::cycle::CycleSegments;
+use super::head_speed::head_speeds_m_per_s;
+use super::missing::MissingValue;
 use super::run_record::RunRecord;
 use crate::recording::Recording;
-use crate::recording::channel::{Channel, Instants, Window};
-use crate::spectrum::{Detrend, Settings, Transformed};
+use crate::recording::channel::{Channel, ReversalInstants, Window};
+use crate::spectrum::{Detrend, SpectrumSettings, WindowedTransform};
 use std::cell::{OnceCell, RefCell};
 use std::ops::Range;
 use std::rc::Rc;
 
 /// What decides a transform.
-type Cut = (Channel, Range<usize>, Detrend);
+type TransformKey = (Channel, Range<usize>, Detrend);
 /// Speeds of the head in some frames, m/s, where they can be found.
-type Speeds = (Range<usize>, Option<Rc<Vec<f64>>>);
+type CachedSpeeds = (Range<usize>, Option<Rc<Vec<f64>>>);
 
 /// A recording, the instants found in it, and what has been computed of it.
-pub struct Reader<'a> {
+pub struct FeatureReader<'a> {
     recording: &'a Recording,
-    instants: &'a Instants,
+    instants: &'a ReversalInstants,
     run: Option<&'a RunRecord>,
     channels: [OnceCell<Vec<Option<f64>>>; Channel::ALL.len()],
-    spectra: RefCell<Vec<(Cut, Rc<Transformed>)>>,
-    segments: RefCell<Vec<(Band, f64, Rc<Segments>)>>,
-    speeds: RefCell<Vec<Speeds>>,
+    transforms: RefCell<Vec<(TransformKey, Rc<WindowedTransform>)>>,
+    segments: RefCell<Vec<(FeatureBand, f64, Rc<CycleSegments>)>>,
+    speeds: RefCell<Vec<CachedSpeeds>>,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> FeatureReader<'a> {
     /// Of `recording`, in which `instants` were found.
     #[must_use]
-    pub fn new(recording: &'a Recording, instants: &'a Instants) -> Self {
-        let (spectra, segments, speeds) = (RefCell::default(), RefCell::default(), RefCell::default());
-        Self { recording, instants, run: None, channels: Default::default(), spectra, segments, speeds }
+    pub fn new(recording: &'a Recording, instants: &'a ReversalInstants) -> Self {
+        let (transforms, segments, speeds) = (RefCell::default(), RefCell::default(), RefCell::default());
+        Self { recording, instants, run: None, channels: Default::default(), transforms, segments, speeds }
     }
 
     /// Of a simulated run and the recording that a camera took of it.
     #[must_use]
-    pub fn of_run(recording: &'a Recording, instants: &'a Instants, run: &'a RunRecord) -> Self {
+    pub fn with_run(recording: &'a Recording, instants: &'a ReversalInstants, run: &'a RunRecord) -> Self {
         Self { run: Some(run), ..Self::new(recording, instants) }
     }
 
@@ -47,7 +47,7 @@ impl<'a> Reader<'a> {
         self.run
     }
 
-    pub(super) fn instants(&self) -> &Instants {
+    pub(super) fn instants(&self) -> &ReversalInstants {
         self.instants
     }
 
@@ -64,34 +64,49 @@ impl<'a> Reader<'a> {
         self.channels[place].get_or_init(|| channel.samples(self.recording))
     }
 
-    pub(super) fn frames(&self, window: &Window) -> Result<Range<usize>, Missing> {
-        Ok(window.resolve(self.recording, self.instants)?)
+    pub(super) fn window_frames(&self, window: &Window) -> Result<Range<usize>, MissingValue> {
+        Ok(window.resolve_frames(self.recording, self.instants)?)
     }
 
-    pub(super) fn cut(&self, channel: Channel, frames: Range<usize>) -> &[Option<f64>] {
+    pub(super) fn channel_frames(&self, channel: Channel, frames: Range<usize>) -> &[Option<f64>] {
         self.channel(channel).get(frames).unwrap_or_default()
     }
 
     /// The transform of a band's window.
-    pub(super) fn transformed(&self, band: &Band) -> Result<Rc<Transformed>, Missing> {
-        let cut = (band.channel, self.frames(&band.window)?, band.detrend);
-        let known =
-            self.spectra.borrow().iter().find(|(known, _)| *known == cut).map(|(_, found)| Rc::clone(found));
+    pub(super) fn band_transform(&self, band: &FeatureBand) -> Result<Rc<WindowedTransform>, MissingValue> {
+        let cut = (band.channel, self.window_frames(&band.window)?, band.detrend);
+        let known = self
+            .transforms
+            .borrow()
+            .iter()
+            .find(|(known, _)| *known == cut)
+            .map(|(_, found)| Rc::clone(found));
         if let Some(found) = known {
             return Ok(found);
         }
-        let found = Rc::new(self.transform(&cut)?);
-        self.spectra.borrow_mut().push((cut, Rc::clone(&found)));
+        let found = Rc::new(self.compute_transform(&cut)?);
+        self.transforms.borrow_mut().push((cut, Rc::clone(&found)));
         Ok(found)
     }
 
-    fn transform(&self, (channel, frames, detrend): &Cut) -> Result<Transformed, Missing> {
-        let settings = Settings { detrend: Some(*detrend), ..Settings::default() };
-        Ok(Transformed::of(self.cut(*channel, frames.clone()), self.frame_rate_hz(), &settings)?)
+    fn compute_transform(
+        &self,
+        (channel, frames, detrend): &TransformKey,
+    ) -> Result<WindowedTransform, MissingValue> {
+        let settings = SpectrumSettings { detrend: Some(*detrend), ..SpectrumSettings::default() };
+        Ok(WindowedTransform::new(
+            self.channel_frames(*channel, frames.clone()),
+            self.frame_rate_hz(),
+            &settings,
+        )?)
     }
 
     /// The component of a band, segment for segment; both ends of its range are read from it.
-    pub(super) fn segments(&self, band: &Band, segment_s: f64) -> Result<Rc<Segments>, Missing> {
+    pub(super) fn cycle_segments(
+        &self,
+        band: &FeatureBand,
+        segment_s: f64,
+    ) -> Result<Rc<CycleSegments>, MissingValue> {
         let known = self
             .segments
             .borrow()
@@ -101,19 +116,22 @@ impl<'a> Reader<'a> {
         if let Some(found) = known {
             return Ok(found);
         }
-        let samples = self.cut(band.channel, self.frames(&band.window)?);
-        let found = Rc::new(Segments::of(band, segment_s, samples, self.frame_rate_hz())?);
+        let samples = self.channel_frames(band.channel, self.window_frames(&band.window)?);
+        let found = Rc::new(CycleSegments::from_samples(band, segment_s, samples, self.frame_rate_hz())?);
         self.segments.borrow_mut().push((band.clone(), segment_s, Rc::clone(&found)));
         Ok(found)
     }
 
     /// The head's speed in every frame of a window, m/s; all points of a friction curve are read from it.
-    pub(super) fn speeds(&self, frames: &Range<usize>) -> Option<Rc<Vec<f64>>> {
+    pub(super) fn head_speeds_m_per_s(&self, frames: &Range<usize>) -> Option<Rc<Vec<f64>>> {
         let known =
             self.speeds.borrow().iter().find(|(known, _)| known == frames).map(|(_, found)| found.clone());
         known.unwrap_or_else(|| {
-            let found =
-                speeds_m_per_s(self.cut(Channel::HeadX, frames.clone()), self.frame_rate_hz()).map(Rc::new);
+            let found = head_speeds_m_per_s(
+                self.channel_frames(Channel::HeadX, frames.clone()),
+                self.frame_rate_hz(),
+            )
+            .map(Rc::new);
             self.speeds.borrow_mut().push((frames.clone(), found.clone()));
             found
         })

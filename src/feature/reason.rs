@@ -1,13 +1,13 @@
 //! Why there is no value, in one word: the reasons that tables, journals and legends name.
 
-use crate::simulate::Status;
+use crate::simulate::RunStatus;
 use serde::{Deserialize, Serialize};
 
 /// Why there is no value: the run failed, or it does not show the feature.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 #[allow(missing_docs)] // `meaning` says what each is
-pub enum Reason {
+pub enum MissingReason {
     ContactLost,
     Jammed,
     Indeterminate,
@@ -33,44 +33,44 @@ pub enum Reason {
 }
 
 /// Every reason with its name in files and its meaning in a legend.
-const REASONS: [(Reason, &str, &str); 22] = [
-    (Reason::ContactLost, "contact-lost", "contact lost"),
-    (Reason::Jammed, "jammed", "jammed (Painlev\u{e9})"),
-    (Reason::Indeterminate, "indeterminate", "indeterminate"),
-    (Reason::Chattering, "chattering", "chattering"),
-    (Reason::Diverged, "diverged", "diverged"),
-    (Reason::WorkLimit, "work-limit", "work limit reached"),
-    (Reason::Interrupted, "interrupted", "interrupted"),
-    (Reason::NoStart, "no-start", "no steady slide to start from"),
-    (Reason::Panicked, "panicked", "program failed"),
-    (Reason::NoComponent, "no-component", "no component in the band"),
-    (Reason::NoSpectrum, "no-spectrum", "no spectrum of the window"),
-    (Reason::NoDecay, "no-decay", "the component does not decay"),
-    (Reason::Faded, "faded", "decayed into the noise"),
-    (Reason::FewCycles, "few-cycles", "too few cycles in the window"),
-    (Reason::SegmentLength, "segment-length", "the segment does not fit the window"),
-    (Reason::NoWindow, "no-window", "no such window in the run"),
-    (Reason::NoFrames, "no-frames", "not tracked in the window"),
-    (Reason::NoSpeed, "no-speed", "the head does not have the speed"),
-    (Reason::NoRecording, "no-recording", "no such recording"),
-    (Reason::NoRun, "no-run", "no simulated run"),
-    (Reason::Never, "never", "does not happen"),
-    (Reason::NotFinite, "not-finite", "not a finite number"),
+const REASONS: [(MissingReason, &str, &str); 22] = [
+    (MissingReason::ContactLost, "contact-lost", "contact lost"),
+    (MissingReason::Jammed, "jammed", "jammed (Painlev\u{e9})"),
+    (MissingReason::Indeterminate, "indeterminate", "indeterminate"),
+    (MissingReason::Chattering, "chattering", "chattering"),
+    (MissingReason::Diverged, "diverged", "diverged"),
+    (MissingReason::WorkLimit, "work-limit", "work limit reached"),
+    (MissingReason::Interrupted, "interrupted", "interrupted"),
+    (MissingReason::NoStart, "no-start", "no steady slide to start from"),
+    (MissingReason::Panicked, "panicked", "program failed"),
+    (MissingReason::NoComponent, "no-component", "no component in the band"),
+    (MissingReason::NoSpectrum, "no-spectrum", "no spectrum of the window"),
+    (MissingReason::NoDecay, "no-decay", "the component does not decay"),
+    (MissingReason::Faded, "faded", "decayed into the noise"),
+    (MissingReason::FewCycles, "few-cycles", "too few cycles in the window"),
+    (MissingReason::SegmentLength, "segment-length", "the segment does not fit the window"),
+    (MissingReason::NoWindow, "no-window", "no such window in the run"),
+    (MissingReason::NoFrames, "no-frames", "not tracked in the window"),
+    (MissingReason::NoSpeed, "no-speed", "the head does not have the speed"),
+    (MissingReason::NoRecording, "no-recording", "no such recording"),
+    (MissingReason::NoRun, "no-run", "no simulated run"),
+    (MissingReason::Never, "never", "does not happen"),
+    (MissingReason::NotFinite, "not-finite", "not a finite number"),
 ];
 
-impl Reason {
+impl MissingReason {
     /// Why a run has ended before its stop time; `None` if it has not.
     #[must_use]
-    pub fn of(status: Status) -> Option<Self> {
+    pub fn from_status(status: RunStatus) -> Option<Self> {
         match status {
-            Status::Completed => None,
-            Status::ContactLost => Some(Self::ContactLost),
-            Status::Jammed => Some(Self::Jammed),
-            Status::Indeterminate => Some(Self::Indeterminate),
-            Status::Chattering => Some(Self::Chattering),
-            Status::Diverged => Some(Self::Diverged),
-            Status::WorkLimit => Some(Self::WorkLimit),
-            Status::Interrupted => Some(Self::Interrupted),
+            RunStatus::Completed => None,
+            RunStatus::ContactLost => Some(Self::ContactLost),
+            RunStatus::Jammed => Some(Self::Jammed),
+            RunStatus::Indeterminate => Some(Self::Indeterminate),
+            RunStatus::Chattering => Some(Self::Chattering),
+            RunStatus::Diverged => Some(Self::Diverged),
+            RunStatus::WorkLimit => Some(Self::WorkLimit),
+            RunStatus::Interrupted => Some(Self::Interrupted),
         }
     }
 
@@ -103,14 +103,18 @@ mod tests {
             assert_eq!(serde_json::to_string(&reason).unwrap(), format!("\"{name}\""));
         }
         let ends = [
-            Status::ContactLost,
-            Status::Jammed,
-            Status::Indeterminate,
-            Status::Chattering,
-            Status::Diverged,
-            Status::WorkLimit,
-            Status::Interrupted,
+            RunStatus::ContactLost,
+            RunStatus::Jammed,
+            RunStatus::Indeterminate,
+            RunStatus::Chattering,
+            RunStatus::Diverged,
+            RunStatus::WorkLimit,
+            RunStatus::Interrupted,
         ];
-        assert!(ends.into_iter().all(|status| Reason::of(status).map(Reason::name) == Some(status.name())));
+        assert!(
+            ends.into_iter()
+                .all(|status| MissingReason::from_status(status).map(MissingReason::name)
+                    == Some(status.name()))
+        );
     }
 }

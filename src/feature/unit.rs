@@ -2,7 +2,7 @@
 
 /// A unit in files and in figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Unit {
+pub struct FeatureUnit {
     /// In files; `1` for a plain number.
     pub name: &'static str,
     /// What it adds to the name of a column.
@@ -13,7 +13,7 @@ pub struct Unit {
     pub factor: f64,
 }
 
-impl Unit {
+impl FeatureUnit {
     /// Frequencies.
     pub const HERTZ: Self = Self { name: "Hz", suffix: "_hz", shown: "Hz", factor: 1.0 };
     /// Amplitudes, m.
@@ -27,12 +27,12 @@ impl Unit {
     /// Forces.
     pub(crate) const NEWTONS: Self = Self { name: "N", suffix: "_n", shown: "N", factor: 1.0 };
     /// Ratios and counts.
-    pub const PLAIN: Self = Self { name: "1", suffix: "", shown: "", factor: 1.0 };
+    pub const DIMENSIONLESS: Self = Self { name: "1", suffix: "", shown: "", factor: 1.0 };
 }
 
 /// How two values are compared.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Measure {
+pub enum ValueComparison {
     /// By the logarithm of their ratio.
     Log,
     /// By their difference, because zero and a change of sign are nothing special.

@@ -2,7 +2,7 @@
 
 /// A value read from a recording or a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Value {
+pub struct FeatureValue {
     /// The value, in the reading's unit.
     pub value: f64,
     /// Its standard deviation where the reading itself gives one.
@@ -11,21 +11,21 @@ pub struct Value {
     /// nothing to choose from.
     pub below_db: f64,
     /// The component that would have been next, where there is a choice.
-    pub runner_up: Option<RunnerUp>,
+    pub runner_up: Option<RunnerUpComponent>,
 }
 
 /// A component that was not chosen.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RunnerUp {
+pub struct RunnerUpComponent {
     /// Its frequency, Hz.
     pub frequency_hz: f64,
     /// How far it is below the strongest of the band, dB.
     pub below_db: f64,
 }
 
-impl Value {
+impl FeatureValue {
     /// A value among which there is no choice.
-    pub(super) fn of(value: f64, sd: Option<f64>) -> Self {
+    pub(super) fn new(value: f64, sd: Option<f64>) -> Self {
         Self { value, sd, below_db: 0.0, runner_up: None }
     }
 }

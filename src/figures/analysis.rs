@@ -7,7 +7,7 @@ mod history;
 mod parts;
 mod window;
 
-pub use compared::compared;
+pub use compared::compare_spectra;
 pub use course::CoursePoint;
 pub use window::AnalysedWindow;
 
@@ -19,10 +19,10 @@ impl AnalysedWindow<'_> {
     #[must_use]
     pub fn figures(&self) -> [(&'static str, Figure); 4] {
         let figures = [
-            ("spectrum", spectrum::figure(&self.spectra())),
-            ("spectrogram", spectrogram::figure(&self.spectrogram())),
-            ("ring-down", ring_down::figure(&self.ring_down())),
-            ("history", windows::figure(&self.windows())),
+            ("spectrum", spectrum::draw_figure(&self.spectra())),
+            ("spectrogram", spectrogram::draw_figure(&self.spectrogram())),
+            ("ring-down", ring_down::draw_figure(&self.ring_down())),
+            ("history", windows::draw_figure(&self.window_overview())),
         ];
         figures.map(|(name, figure)| {
             (name, Figure { subtitle: about(self.recording.name(), &figure.subtitle), ..figure })

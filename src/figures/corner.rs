@@ -1,8 +1,8 @@
 //! What the data know of the parameters together: every pair with its regions, every parameter with its
 //! profile, its bounds, its prior, the truth of a twin and the interval that the page states.
 
-use super::symbol::symbol;
-use crate::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
+use super::symbol::parameter_symbol;
+use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
 use crate::compare::ParameterLine;
 use crate::figures::{Drawing, FigureBlock, about, subtitle};
 use crate::fit::axis::Prior;
@@ -10,11 +10,11 @@ use crate::fit::job::{FreeParameter, Job};
 use crate::fit::result::FitResult;
 use crate::fit::scale::Bounds;
 use crate::math;
-use crate::text::{digits, interval, listed, unit};
+use crate::text::{choose_prefix, format_digits, format_interval, join_with_and};
 
 /// What is known of one parameter; places are those of the search, 0 and 1 at its bounds.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Known {
+pub struct CornerParameter {
     /// Symbol in the equations.
     pub symbol: String,
     /// The stated interval in words.
@@ -37,13 +37,13 @@ pub struct Known {
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Corner {
+pub struct CornerPlot {
     /// What was fitted.
     pub title: String,
     /// Whether the data are synthetic.
     pub synthetic: bool,
     /// The parameters.
-    pub parameters: Vec<Known>,
+    pub parameters: Vec<CornerParameter>,
     /// Correlations of their estimates, a row and a column a parameter.
     pub correlations: Vec<Vec<Option<f64>>>,
 }
@@ -71,10 +71,10 @@ const LEAST: f64 = 1e-9;
 /// Deviations of a two-sided 95 % interval.
 const Z_95: f64 = 1.96;
 
-impl Corner {
+impl CornerPlot {
     /// The parameters of a fit; `lines` bring units and true values.
     #[must_use]
-    pub fn of(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
+    pub fn from_fit(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
         let free: Vec<&FreeParameter> =
             job.parameters.iter().filter(|p| result.parameters.contains_key(&p.name)).take(MOST).collect();
         let correlation = |a: &FreeParameter, b: &FreeParameter| {
@@ -83,32 +83,36 @@ impl Corner {
         Self {
             title: job.title.clone(),
             synthetic: result.synthetic,
-            parameters: free.iter().filter_map(|free| known(free, result, lines)).collect(),
+            parameters: free.iter().filter_map(|free| corner_parameter(free, result, lines)).collect(),
             correlations: free.iter().map(|a| free.iter().map(|b| correlation(a, b)).collect()).collect(),
         }
     }
 
     /// The figure with its caption; nothing without a parameter.
     #[must_use]
-    pub fn block(&self) -> Option<FigureBlock> {
+    pub fn figure_block(&self) -> Option<FigureBlock> {
         (!self.parameters.is_empty()).then(|| FigureBlock {
             condition: None,
             file: "corner.svg".to_owned(),
-            caption: caption(self),
+            caption: figure_caption(self),
             details: DETAILS.to_owned(),
-            drawing: Drawing::Chart(figure(self)),
+            drawing: Drawing::Chart(draw_figure(self)),
         })
     }
 
     /// The pair whose estimates move most as one.
-    fn strongest(&self) -> Option<(usize, usize, f64)> {
+    fn strongest_correlation(&self) -> Option<(usize, usize, f64)> {
         let rows = self.correlations.iter().enumerate();
         let pairs = rows.flat_map(|(i, row)| row.iter().take(i).enumerate().map(move |(j, r)| (i, j, *r)));
         pairs.filter_map(|(i, j, r)| Some((i, j, r?))).max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
     }
 }
 
-fn known(free: &FreeParameter, result: &FitResult, lines: &[ParameterLine]) -> Option<Known> {
+fn corner_parameter(
+    free: &FreeParameter,
+    result: &FitResult,
+    lines: &[ParameterLine],
+) -> Option<CornerParameter> {
     let (found, bounds) = (result.parameters.get(&free.name)?, &free.bounds);
     let line = lines.iter().find(|line| line.name == free.name);
     let estimate = bounds.to_unit(found.estimate);
@@ -116,18 +120,18 @@ fn known(free: &FreeParameter, result: &FitResult, lines: &[ParameterLine]) -> O
     let half = found
         .linear_95
         .map(|ends| ends.iter().map(|end| (bounds.to_unit(*end) - estimate).abs()).fold(0.0, f64::max));
-    let (name, factor) = unit(line.map_or("", |line| line.unit.as_str()), [found.estimate]);
-    let words = interval(found.lower_95, found.upper_95, |v| digits(v * factor, 4));
+    let (name, factor) = choose_prefix(line.map_or("", |line| line.unit.as_str()), [found.estimate]);
+    let words = format_interval(found.lower_95, found.upper_95, |v| format_digits(v * factor, 4));
     let open = found.lower_95.or(found.upper_95).is_none();
     let likelihood = |cost: f64| math::exp(-0.5 * (cost - result.cost).max(0.0));
     let optima = result.waterfall.iter().filter(|o| o.cost - result.cost <= result.threshold);
-    Some(Known {
-        symbol: symbol(&free.name),
+    Some(CornerParameter {
+        symbol: parameter_symbol(&free.name),
         words: if open { words } else { format!("{words} {name}").trim_end().to_owned() },
         estimate,
         stated: [found.lower_95, found.upper_95].map(|end| end.map(|v| bounds.to_unit(v))),
         sd: half.map(|half| half / Z_95).filter(|sd| *sd > 0.0),
-        prior: free.prior.as_ref().and_then(|prior| of_prior(prior, bounds)),
+        prior: free.prior.as_ref().and_then(|prior| prior_in_search_scale(prior, bounds)),
         truth: line.and_then(|line| line.truth).map(|truth| bounds.to_unit(truth.value)),
         profile: found.profile.iter().map(|(v, cost)| (bounds.to_unit(*v), likelihood(*cost))).collect(),
         optima: optima.filter_map(|o| o.values.get(&free.name)).map(|v| bounds.to_unit(*v)).collect(),
@@ -135,7 +139,7 @@ fn known(free: &FreeParameter, result: &FitResult, lines: &[ParameterLine]) -> O
 }
 
 /// A prior in the places of the search, by its slope at its mean.
-fn of_prior(prior: &Prior, bounds: &Bounds) -> Option<(f64, f64)> {
+fn prior_in_search_scale(prior: &Prior, bounds: &Bounds) -> Option<(f64, f64)> {
     let (mean, sd) = match *prior {
         Prior::Linear { mean, sd } => (mean, sd),
         Prior::Log { mean_ln, sd_ln } => (math::exp(mean_ln), sd_ln * math::exp(mean_ln)),
@@ -145,7 +149,7 @@ fn of_prior(prior: &Prior, bounds: &Bounds) -> Option<(f64, f64)> {
 }
 
 /// From where to where a cell shows a parameter.
-fn span(known: &Known) -> (f64, f64) {
+fn shown_range(known: &CornerParameter) -> (f64, f64) {
     let by_sd = known.sd.map(|sd| [known.estimate - SHOWN_SD * sd, known.estimate + SHOWN_SD * sd]);
     let open =
         |end: Option<f64>, bound: f64| end.unwrap_or(if known.sd.is_some() { known.estimate } else { bound });
@@ -159,20 +163,20 @@ fn span(known: &Known) -> (f64, f64) {
 }
 
 /// Place in a cell about its middle.
-fn place(value: f64, (low, high): (f64, f64)) -> f64 {
+fn cell_position(value: f64, (low, high): (f64, f64)) -> f64 {
     INSIDE * (2.0 * (value - low) / (high - low) - 1.0)
 }
 
 /// The figure.
 #[must_use]
-pub fn figure(shown: &Corner) -> Figure {
+pub fn draw_figure(shown: &CornerPlot) -> Figure {
     let count = shown.parameters.len();
-    let title = match shown.strongest() {
+    let title = match shown.strongest_correlation() {
         Some((i, j, r)) => format!(
             "{} and {} move together most: correlation {}",
             shown.parameters.get(j).map_or("", |p| p.symbol.as_str()),
             shown.parameters.get(i).map_or("", |p| p.symbol.as_str()),
-            crate::text::decimals(r, 2)
+            crate::text::format_decimals(r, 2)
         ),
         None => {
             let bounded = shown.parameters.iter().filter(|p| p.stated.iter().all(Option::is_some)).count();
@@ -181,17 +185,17 @@ pub fn figure(shown: &Corner) -> Figure {
     };
     let names = shown.parameters.iter().map(|p| format!("{}: {}", p.symbol, p.words));
     let panel = Panel {
-        x: Axis::named("", shown.parameters.iter().map(|p| p.symbol.clone())),
-        y: Axis::named("", names.rev().collect::<Vec<_>>()),
+        x: ChartAxis::categorical("", shown.parameters.iter().map(|p| p.symbol.clone())),
+        y: ChartAxis::categorical("", names.rev().collect::<Vec<_>>()),
         height_mm: ROW_MM * count as f64,
-        series: drawn(shown),
-        ribbons: under_bounds(shown),
+        series: draw_cells(shown),
+        ribbons: out_of_bounds_ribbons(shown),
         ..Panel::default()
     };
     Figure {
         title,
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
-        synthetic: shown.synthetic,
+        watermarked: shown.synthetic,
         description:
             "Regions of every pair of parameters, and the likelihood along each with its 95 % interval."
                 .to_owned(),
@@ -202,12 +206,12 @@ pub fn figure(shown: &Corner) -> Figure {
 }
 
 /// Cells from the upper left: the middle of one by row and column.
-fn middle(shown: &Corner, row: usize, column: usize) -> (f64, f64) {
+fn cell_centre(shown: &CornerPlot, row: usize, column: usize) -> (f64, f64) {
     (column as f64, (shown.parameters.len() - 1 - row) as f64)
 }
 
-fn drawn(shown: &Corner) -> Vec<Series> {
-    let spans: Vec<(f64, f64)> = shown.parameters.iter().map(span).collect();
+fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
+    let spans: Vec<(f64, f64)> = shown.parameters.iter().map(shown_range).collect();
     let cells = || {
         let rows = shown.parameters.iter().zip(&spans).enumerate();
         rows.flat_map(|(i, row)| {
@@ -233,48 +237,57 @@ fn drawn(shown: &Corner) -> Vec<Series> {
         "",
         Colour::Grey,
         Mark::Thin,
-        lower.flat_map(|(i, j)| frame(middle(shown, i, j))).collect(),
+        lower.flat_map(|(i, j)| frame(cell_centre(shown, i, j))).collect(),
     )];
     for (label, colour, mark, radius) in REGIONS {
-        let region = |((i, (a, of_a)), (j, (b, of_b))): Cell<'_>| {
+        let region = |((i, (a, of_a)), (j, (b, of_b))): CornerCell<'_>| {
             let r = shown.correlations.get(i).and_then(|row| row.get(j).copied().flatten())?;
             let (sd_a, sd_b) = (a.sd?, b.sd?);
-            let at = middle(shown, i, j);
+            let at = cell_centre(shown, i, j);
             let rest = (1.0 - r * r).max(0.0).sqrt();
             let point = |k: u32| {
                 let (sin, cos) = math::sin_cos(std::f64::consts::TAU * f64::from(k) / f64::from(POINTS));
                 let along = b.estimate + radius * sd_b * cos;
                 let up = a.estimate + radius * sd_a * (r * cos + rest * sin);
-                inside((place(along, *of_b), place(up, *of_a)), at)
+                clip_to_cell((cell_position(along, *of_b), cell_position(up, *of_a)), at)
             };
             Some((0..=POINTS).map(point).chain([None]).collect::<Vec<_>>())
         };
         all.push(line(label, colour, mark, cells().filter_map(region).flatten().collect()));
     }
     let optima = cells().flat_map(|((i, (a, of_a)), (j, (b, of_b)))| {
-        let at = middle(shown, i, j);
+        let at = cell_centre(shown, i, j);
         b.optima
             .iter()
             .zip(&a.optima)
-            .filter_map(move |(x, y)| inside((place(*x, *of_b), place(*y, *of_a)), at))
+            .filter_map(move |(x, y)| clip_to_cell((cell_position(*x, *of_b), cell_position(*y, *of_a)), at))
     });
     all.push(line("searches within the threshold", Colour::Grey, Mark::Dots, optima.map(Some).collect()));
     let estimates = cells().map(|((i, (a, of_a)), (j, (b, of_b)))| {
-        inside((place(b.estimate, *of_b), place(a.estimate, *of_a)), middle(shown, i, j))
+        clip_to_cell(
+            (cell_position(b.estimate, *of_b), cell_position(a.estimate, *of_a)),
+            cell_centre(shown, i, j),
+        )
     });
     all.push(line("estimate", Colour::Black, Mark::Circles, estimates.collect()));
     let truths = cells().map(|((i, (a, of_a)), (j, (b, of_b)))| {
-        inside((place(b.truth?, *of_b), place(a.truth?, *of_a)), middle(shown, i, j))
+        clip_to_cell(
+            (cell_position(b.truth?, *of_b), cell_position(a.truth?, *of_a)),
+            cell_centre(shown, i, j),
+        )
     });
     all.push(line(TRUTH, Colour::Vermilion, Mark::Crosses, truths.collect()));
-    let curve = |of: fn(&Known) -> Option<(f64, f64)>| {
+    let curve = |of: fn(&CornerParameter) -> Option<(f64, f64)>| {
         diagonal()
             .filter_map(|(i, (known, span))| {
-                let ((mean, sd), at) = (of(known)?, middle(shown, i, i));
+                let ((mean, sd), at) = (of(known)?, cell_centre(shown, i, i));
                 let point = |k: u32| {
                     let value = span.0 + (span.1 - span.0) * f64::from(k) / f64::from(POINTS);
                     let off = (value - mean) / sd;
-                    inside((place(value, *span), height(math::exp(-0.5 * off * off))), at)
+                    clip_to_cell(
+                        (cell_position(value, *span), likelihood_height(math::exp(-0.5 * off * off))),
+                        at,
+                    )
                 };
                 Some((0..=POINTS).map(point).chain([None]).collect::<Vec<_>>())
             })
@@ -289,23 +302,26 @@ fn drawn(shown: &Corner) -> Vec<Series> {
         curve(|known| Some((known.estimate, known.sd?))),
     ));
     let profiles = diagonal().flat_map(|(i, (known, span))| {
-        let at = middle(shown, i, i);
-        let points = known.profile.iter().map(move |(v, rise)| inside((place(*v, *span), height(*rise)), at));
+        let at = cell_centre(shown, i, i);
+        let points = known
+            .profile
+            .iter()
+            .map(move |(v, rise)| clip_to_cell((cell_position(*v, *span), likelihood_height(*rise)), at));
         points.chain([None]).collect::<Vec<_>>()
     });
     all.push(line("likelihood, profile", Colour::Blue, Mark::Thin, profiles.collect()));
     let upright = diagonal().flat_map(|(i, (known, span))| {
-        let at = middle(shown, i, i);
-        let end = |y: f64| inside((place(known.truth?, *span), y), at);
-        [end(-INSIDE), end(height(1.0)), None]
+        let at = cell_centre(shown, i, i);
+        let end = |y: f64| clip_to_cell((cell_position(known.truth?, *span), y), at);
+        [end(-INSIDE), end(likelihood_height(1.0)), None]
     });
     all.push(line("", Colour::Vermilion, Mark::Line, upright.collect()));
     let stated = diagonal().flat_map(|(i, (known, span))| {
-        let at = middle(shown, i, i);
+        let at = cell_centre(shown, i, i);
         let [low, high] = known.stated;
         let closed = low.is_some() || high.is_some();
         let end = |value: Option<f64>, open: f64| {
-            let x = value.map_or(open, |v| place(v, *span)).clamp(-HALF, HALF);
+            let x = value.map_or(open, |v| cell_position(v, *span)).clamp(-HALF, HALF);
             closed.then_some((at.0 + x, at.1 - INSIDE))
         };
         [end(low, -HALF), end(high, HALF), None]
@@ -318,23 +334,24 @@ fn drawn(shown: &Corner) -> Vec<Series> {
 const TRUTH: &str = "synthetic truth";
 
 /// Row and column of a cell, each with its parameter and the span that it shows.
-type Cell<'a> = ((usize, (&'a Known, &'a (f64, f64))), (usize, (&'a Known, &'a (f64, f64))));
+type CornerCell<'a> =
+    ((usize, (&'a CornerParameter, &'a (f64, f64))), (usize, (&'a CornerParameter, &'a (f64, f64))));
 
 /// Height of a share of the greatest likelihood in a cell.
-fn height(share: f64) -> f64 {
+fn likelihood_height(share: f64) -> f64 {
     -INSIDE + CURVE * share
 }
 
 /// A point of a cell on the axes; `None` outside the cell.
-fn inside((x, y): (f64, f64), at: (f64, f64)) -> Option<(f64, f64)> {
+fn clip_to_cell((x, y): (f64, f64), at: (f64, f64)) -> Option<(f64, f64)> {
     (x.abs() <= HALF && y.abs() <= HALF).then_some((at.0 + x, at.1 + y))
 }
 
 /// Where the search could not go, as far as a cell of the diagonal shows that.
-fn under_bounds(shown: &Corner) -> Vec<Ribbon> {
-    let strip = |(i, known): (usize, &Known)| {
-        let (span, at) = (span(known), middle(shown, i, i));
-        let [low, high] = [0.0, 1.0].map(|bound| place(bound, span));
+fn out_of_bounds_ribbons(shown: &CornerPlot) -> Vec<Ribbon> {
+    let strip = |(i, known): (usize, &CornerParameter)| {
+        let (span, at) = (shown_range(known), cell_centre(shown, i, i));
+        let [low, high] = [0.0, 1.0].map(|bound| cell_position(bound, span));
         let ends = [(-HALF, low.min(HALF)), (high.max(-HALF), HALF)];
         ends.into_iter().filter(|(from, to)| from < to).map(move |(from, to)| Ribbon {
             label: "out of bounds".to_owned(),
@@ -352,10 +369,10 @@ const DETAILS: &str = "Below the diagonal: every pair of estimates with the regi
 
 /// What the figure shows, with its number.
 #[must_use]
-pub fn caption(shown: &Corner) -> String {
+pub fn figure_caption(shown: &CornerPlot) -> String {
     let all = shown.parameters.len();
     let bounded = shown.parameters.iter().filter(|p| p.stated.iter().all(Option::is_some)).count();
-    let truths: Vec<bool> = shown.parameters.iter().filter_map(holds).collect();
+    let truths: Vec<bool> = shown.parameters.iter().filter_map(interval_holds_truth).collect();
     let held = if truths.is_empty() {
         String::new()
     } else {
@@ -368,11 +385,11 @@ pub fn caption(shown: &Corner) -> String {
         .filter(|p| p.stated.iter().any(Option::is_none))
         .map(|p| p.symbol.clone())
         .collect();
-    let open = if open.is_empty() { String::new() } else { format!(" ({} open)", listed(&open)) };
+    let open = if open.is_empty() { String::new() } else { format!(" ({} open)", join_with_and(&open)) };
     format!("Pairs of parameters and their likelihoods: {bounded} of {all} intervals are closed{open}{held}.")
 }
 
-fn holds(known: &Known) -> Option<bool> {
+fn interval_holds_truth(known: &CornerParameter) -> Option<bool> {
     let (truth, [low, high]) = (known.truth?, known.stated);
     Some(low.is_none_or(|low| low <= truth) && high.is_none_or(|high| truth <= high))
 }
@@ -381,12 +398,12 @@ fn holds(known: &Known) -> Option<bool> {
 mod tests {
     use super::*;
 
-    fn of(fit: &str) -> (Job, FitResult, Corner) {
+    fn of(fit: &str) -> (Job, FitResult, CornerPlot) {
         let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("fits").join(fit);
         let read = |name: &str| std::fs::read_to_string(folder.join(name)).unwrap();
         let job = Job::parse("job.toml", &read("job.toml")).unwrap();
         let result = FitResult::parse("result.json", &read("result.json")).unwrap();
-        let corner = Corner::of(&job, &result, &[]);
+        let corner = CornerPlot::from_fit(&job, &result, &[]);
         (job, result, corner)
     }
 
@@ -407,31 +424,31 @@ mod tests {
 
     #[test]
     fn a_region_reaches_as_far_as_its_deviations() {
-        let known = |estimate| Known {
+        let known = |estimate| CornerParameter {
             symbol: "A".to_owned(),
             estimate,
             sd: Some(0.01),
             stated: [Some(estimate - 0.02), Some(estimate + 0.02)],
-            ..Known::default()
+            ..CornerParameter::default()
         };
-        let shown = Corner {
+        let shown = CornerPlot {
             parameters: vec![known(0.4), known(0.6)],
             correlations: vec![vec![Some(1.0), Some(0.8)], vec![Some(0.8), Some(1.0)]],
-            ..Corner::default()
+            ..CornerPlot::default()
         };
-        let series = drawn(&shown);
+        let series = draw_cells(&shown);
         let region = series.iter().find(|s| s.label == REGIONS[0].0).unwrap();
         let widest = region.points.iter().flatten().map(|p| p.0).fold(0.0, f64::max);
-        let of = span(&shown.parameters[0]);
-        assert!((widest - place(0.4 + 2.486 * 0.01, of)).abs() < 1e-9, "{widest}");
-        assert!(figure(&shown).title.contains("correlation 0.80"), "{}", figure(&shown).title);
+        let of = shown_range(&shown.parameters[0]);
+        assert!((widest - cell_position(0.4 + 2.486 * 0.01, of)).abs() < 1e-9, "{widest}");
+        assert!(draw_figure(&shown).title.contains("correlation 0.80"), "{}", draw_figure(&shown).title);
     }
 
     #[test]
     fn what_is_open_leaves_its_cell_and_says_so() {
         let (_, _, corner) = of("published-simulation");
-        assert!(caption(&corner).contains("open)"), "{}", caption(&corner));
-        let stated = drawn(&corner).into_iter().find(|s| s.label == "95 % interval, as stated").unwrap();
+        assert!(figure_caption(&corner).contains("open)"), "{}", figure_caption(&corner));
+        let stated = draw_cells(&corner).into_iter().find(|s| s.label == "95 % interval, as stated").unwrap();
         assert!(stated.points.iter().flatten().any(|p| (p.0 - p.0.round()).abs() == HALF));
     }
 }

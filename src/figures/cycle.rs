@@ -6,9 +6,12 @@ pub(crate) mod caption;
 pub use crate::spectrum::Target;
 pub use crate::spectrum::time_frequency::SpeedPoint;
 
-use crate::chart::{Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series, Shape, Text};
+use crate::chart::{
+    ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Ribbon, Series,
+    TextAnnotation,
+};
 use crate::figures::subtitle;
-use crate::text::{digits, shortened};
+use crate::text::{format_digits, truncate_text};
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -33,34 +36,41 @@ pub struct CycleOverSpeed {
 const HEIGHT_MM: f64 = 72.0;
 const MILLIMETRES: f64 = 1e3;
 /// The axes end this far beyond what is shown.
-const BEYOND: f64 = 1.12;
+const AXIS_MARGIN: f64 = 1.12;
 /// Places of the names along the lines, shares of the width: one after the other where lines are close.
-const PLACES: [f64; 3] = [0.24, 0.52, 0.79];
+const LABEL_POSITIONS: [f64; 3] = [0.24, 0.52, 0.79];
 /// Letters of a name that have room there.
-const LETTERS: usize = 12;
+const MAX_LABEL_LETTERS: usize = 12;
 /// Lines this close have their names at different places, share of the height.
-const CLOSE: f64 = 0.09;
+const CLOSE_LEVELS: f64 = 0.09;
 /// Distance of a name from its line, share of the height.
-const OVER: f64 = 0.022;
+const LABEL_OFFSET: f64 = 0.022;
 
 /// The figure.
 #[must_use]
-pub fn figure(shown: &CycleOverSpeed) -> Figure {
+pub fn draw_figure(shown: &CycleOverSpeed) -> Figure {
     let points = || shown.measured.iter().chain(&shown.model);
     let fastest = points().map(|p| p.tip_speed_m_per_s * MILLIMETRES).fold(0.0, f64::max);
     let highest = points()
         .map(|p| p.frequency_hz)
         .chain(shown.targets.iter().map(|t| t.frequency_hz))
         .fold(0.0, f64::max);
-    let (right, top) =
-        if fastest > 0.0 && highest > 0.0 { (BEYOND * fastest, BEYOND * highest) } else { (1.0, 1.0) };
+    let (right, top) = if fastest > 0.0 && highest > 0.0 {
+        (AXIS_MARGIN * fastest, AXIS_MARGIN * highest)
+    } else {
+        (1.0, 1.0)
+    };
     let mut lines: Vec<(String, f64, Colour)> = shown
         .natural_hz
         .iter()
-        .map(|(name, hz)| (format!("{name} {} Hz", digits(*hz, 3)), *hz, Colour::Green))
+        .map(|(name, hz)| (format!("{name} {} Hz", format_digits(*hz, 3)), *hz, Colour::Green))
         .chain(shown.targets.iter().map(|t| {
             (
-                format!("{} {} Hz", shortened(&t.name, LETTERS), digits(t.frequency_hz, 3)),
+                format!(
+                    "{} {} Hz",
+                    truncate_text(&t.name, MAX_LABEL_LETTERS),
+                    format_digits(t.frequency_hz, 3)
+                ),
                 t.frequency_hz,
                 Colour::Blue,
             )
@@ -69,18 +79,18 @@ pub fn figure(shown: &CycleOverSpeed) -> Figure {
         .collect();
     lines.sort_by(|a, b| a.1.total_cmp(&b.1));
     let panel = Panel {
-        x: Axis::linear("tip speed, mm/s").between(0.0, right),
-        y: Axis::linear("frequency, Hz").between(0.0, top),
+        x: ChartAxis::linear("tip speed, mm/s").with_range(0.0, right),
+        y: ChartAxis::linear("frequency, Hz").with_range(0.0, top),
         height_mm: HEIGHT_MM,
-        series: levels(&lines, right).into_iter().chain(cycles(shown)).collect(),
-        ribbons: shown.targets.iter().filter_map(|t| deviation(t, right)).collect(),
-        texts: names(&lines, (right, top)),
+        series: level_lines(&lines, right).into_iter().chain(cycle_series(shown)).collect(),
+        ribbons: shown.targets.iter().filter_map(|t| deviation_ribbon(t, right)).collect(),
+        annotations: level_names(&lines, (right, top)),
         ..Panel::default()
     };
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
-        synthetic: shown.synthetic,
+        watermarked: shown.synthetic,
         description: "Frequency of the stick-slip cycle over the speed of the tip, with natural frequencies \
                       and targets as lines."
             .to_owned(),
@@ -91,7 +101,7 @@ pub fn figure(shown: &CycleOverSpeed) -> Figure {
 }
 
 /// Lines across the axes.
-fn levels(lines: &[(String, f64, Colour)], right: f64) -> Vec<Series> {
+fn level_lines(lines: &[(String, f64, Colour)], right: f64) -> Vec<Series> {
     let line = |(_, hz, colour): &(String, f64, Colour)| Series {
         label: if *colour == Colour::Blue { "target" } else { "natural frequency" }.to_owned(),
         colour: *colour,
@@ -103,7 +113,7 @@ fn levels(lines: &[(String, f64, Colour)], right: f64) -> Vec<Series> {
 }
 
 /// Two deviations either side of a target.
-fn deviation(target: &Target, right: f64) -> Option<Ribbon> {
+fn deviation_ribbon(target: &Target, right: f64) -> Option<Ribbon> {
     let sd_hz = target.frequency_sd_hz?;
     let (low, high) = (target.frequency_hz - 2.0 * sd_hz, target.frequency_hz + 2.0 * sd_hz);
     Some(Ribbon {
@@ -114,35 +124,35 @@ fn deviation(target: &Target, right: f64) -> Option<Ribbon> {
 }
 
 /// The names over their lines, those of close lines next to each other.
-fn names(lines: &[(String, f64, Colour)], (right, top): (f64, f64)) -> Vec<Text> {
+fn level_names(lines: &[(String, f64, Colour)], (right, top): (f64, f64)) -> Vec<TextAnnotation> {
     let (mut place, mut before) = (0, f64::NEG_INFINITY);
     let mut named = Vec::new();
     for (name, hz, colour) in lines {
-        place = if hz - before < CLOSE * top { (place + 1) % PLACES.len() } else { 0 };
+        place = if hz - before < CLOSE_LEVELS * top { (place + 1) % LABEL_POSITIONS.len() } else { 0 };
         before = *hz;
-        let at = (PLACES[place] * right, hz + OVER * top);
-        named.push(Text { text: name.clone(), colour: *colour, at });
+        let at = (LABEL_POSITIONS[place] * right, hz + LABEL_OFFSET * top);
+        named.push(TextAnnotation { text: name.clone(), colour: *colour, at });
     }
     named
 }
 
 /// Both cycles, the recording's on top.
-fn cycles(shown: &CycleOverSpeed) -> Vec<Series> {
+fn cycle_series(shown: &CycleOverSpeed) -> Vec<Series> {
     let place = |p: &SpeedPoint| (p.tip_speed_m_per_s * MILLIMETRES, p.frequency_hz);
     let bar = |p: &SpeedPoint| {
         let ((x, f), sd) = (place(p), p.frequency_sd_hz?);
-        Some(Bar::Vertical { x, from: f - 2.0 * sd, to: f + 2.0 * sd })
+        Some(ErrorBar::Vertical { x, from: f - 2.0 * sd, to: f + 2.0 * sd })
     };
-    let series = |(label, colour, shape, points): (&str, Colour, Shape, &Vec<SpeedPoint>)| Series {
+    let series = |(label, colour, shape, points): (&str, Colour, MarkerShape, &Vec<SpeedPoint>)| Series {
         label: format!("{label} \u{b1} 2 sd"),
         colour,
         mark: Mark::Hollow(shape),
         points: points.iter().map(|p| Some(place(p))).collect(),
-        bars: points.iter().filter_map(bar).collect(),
+        error_bars: points.iter().filter_map(bar).collect(),
     };
     [
-        ("model", Colour::Vermilion, Shape::Square, &shown.model),
-        ("measured", Colour::Black, Shape::Disc, &shown.measured),
+        ("model", Colour::Vermilion, MarkerShape::Square, &shown.model),
+        ("measured", Colour::Black, MarkerShape::Disc, &shown.measured),
     ]
     .into_iter()
     .map(series)
@@ -172,17 +182,17 @@ mod tests {
 
     #[test]
     fn lines_within_the_axes_are_named_and_close_ones_next_to_each_other() {
-        let panel = &figure(&shown()).panels[0];
-        let names: Vec<&str> = panel.texts.iter().map(|t| t.text.as_str()).collect();
+        let panel = &draw_figure(&shown()).panels[0];
+        let names: Vec<&str> = panel.annotations.iter().map(|t| t.text.as_str()).collect();
         assert_eq!(names, ["neck 195 Hz", "lip 608 Hz", "high 640 Hz"]);
-        assert!(panel.texts[1].at.0 < panel.texts[2].at.0);
+        assert!(panel.annotations[1].at.0 < panel.annotations[2].at.0);
         assert_eq!(panel.ribbons[0].points[0], Some((0.0, 632.0, 648.0)));
         assert_eq!(panel.series.last().unwrap().points[0], Some((50.0, 910.0)));
     }
 
     #[test]
     fn nothing_has_axes_of_its_own() {
-        let panel = &figure(&CycleOverSpeed::default()).panels[0];
+        let panel = &draw_figure(&CycleOverSpeed::default()).panels[0];
         assert_eq!((panel.x.range, panel.series.len()), (Some((0.0, 1.0)), 0));
     }
 }

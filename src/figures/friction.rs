@@ -3,7 +3,9 @@
 
 pub(crate) mod caption;
 
-use crate::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Rule, Series, Shape};
+use crate::chart::{
+    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Ribbon, Series, VerticalLine,
+};
 use crate::figures::subtitle;
 use serde::Serialize;
 
@@ -20,7 +22,7 @@ pub struct FrictionLine {
 
 /// What the figure shows; speeds in m/s.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Law {
+pub struct FrictionPlot {
     /// Heading.
     pub title: String,
     /// More to say; empty for none.
@@ -55,13 +57,13 @@ const PERCENT: f64 = 100.0;
 
 /// The figure.
 #[must_use]
-pub fn figure(law: &Law) -> Figure {
+pub fn draw_figure(law: &FrictionPlot) -> Figure {
     let end = |take: fn(f64, f64) -> f64| law.curve.iter().map(|p| p.0 * MILLIMETRES).reduce(take);
-    let speed = Axis::linear("tip speed, mm/s");
+    let speed = ChartAxis::linear("tip speed, mm/s");
     let speed =
-        end(f64::min).zip(end(f64::max)).map_or(speed.clone(), |(low, high)| speed.between(low, high));
+        end(f64::min).zip(end(f64::max)).map_or(speed.clone(), |(low, high)| speed.with_range(low, high));
     let rule = |label: &str| {
-        let of = |at: f64| Rule {
+        let of = |at: f64| VerticalLine {
             label: label.to_owned(),
             colour: Colour::Blue,
             mark: Mark::Dashed,
@@ -72,26 +74,26 @@ pub fn figure(law: &Law) -> Figure {
     };
     let coefficient = Panel {
         x: speed.clone(),
-        y: coefficients(law),
+        y: coefficient_axis(law),
         height_mm: HEIGHT_MM,
-        series: curves(law),
-        ribbons: interval(law).into_iter().collect(),
-        rules: rule("mean speed of the head"),
+        series: law_series(law),
+        ribbons: interval_ribbon(law).into_iter().collect(),
+        vertical_lines: rule("mean speed of the head"),
         ..Panel::default()
     };
     let shares = Panel {
         x: speed,
-        y: Axis::linear("slip time, %"),
+        y: ChartAxis::linear("slip time, %"),
         height_mm: SHARES_HEIGHT_MM,
-        series: vec![outline(law)],
-        ribbons: vec![bars(law)],
-        rules: rule(""),
+        series: vec![histogram_outline(law)],
+        ribbons: vec![histogram_ribbon(law)],
+        vertical_lines: rule(""),
         ..Panel::default()
     };
     Figure {
         title: law.title.clone(),
         subtitle: subtitle(law.synthetic, &law.note),
-        synthetic: law.synthetic,
+        watermarked: law.synthetic,
         description:
             "Friction coefficient over the speed of the tip, and the share of the time of slip at each speed."
                 .to_owned(),
@@ -102,7 +104,7 @@ pub fn figure(law: &Law) -> Figure {
 }
 
 /// The law where the tip did not move at all, where it did, the truth, and what was measured.
-fn curves(law: &Law) -> Vec<Series> {
+fn law_series(law: &FrictionPlot) -> Vec<Series> {
     let place = |(v, coefficient): &(f64, f64)| Some((v * MILLIMETRES, *coefficient));
     let line = |label: &str, colour, mark, points: Vec<Option<(f64, f64)>>| Series {
         label: label.to_owned(),
@@ -136,7 +138,7 @@ fn curves(law: &Law) -> Vec<Series> {
         line(
             "measured, tip slides evenly",
             Colour::Black,
-            Mark::Joined(Shape::Disc),
+            Mark::Joined(MarkerShape::Disc),
             law.even.iter().flat_map(|p| [place(p), None]).collect(),
         ),
     ];
@@ -144,10 +146,10 @@ fn curves(law: &Law) -> Vec<Series> {
 }
 
 /// The axis of the coefficients: what is drawn, without points that lie far off the law.
-fn coefficients(law: &Law) -> Axis {
+fn coefficient_axis(law: &FrictionPlot) -> ChartAxis {
     const FAR: f64 = 0.5;
     const ROOM: f64 = 0.06;
-    let axis = Axis::linear("friction coefficient \u{b5}");
+    let axis = ChartAxis::linear("friction coefficient \u{b5}");
     let own = || law.curve.iter().chain(&law.truth).map(|p| p.1);
     let Some(mean) = own().reduce(f64::max).zip(own().reduce(f64::min)).map(|(a, b)| 0.5 * (a + b)) else {
         return axis;
@@ -158,10 +160,10 @@ fn coefficients(law: &Law) -> Axis {
     let all = || own().chain(band.clone().chain(points.clone()).filter(near));
     let (Some(low), Some(high)) = (all().reduce(f64::min), all().reduce(f64::max)) else { return axis };
     let room = (ROOM * (high - low)).max(1e-3 * mean.abs()).max(f64::MIN_POSITIVE);
-    axis.between(low - room, high + room)
+    axis.with_range(low - room, high + room)
 }
 
-fn interval(law: &Law) -> Option<Ribbon> {
+fn interval_ribbon(law: &FrictionPlot) -> Option<Ribbon> {
     let points = law.interval_95.iter().map(|(v, low, high)| Some((v * MILLIMETRES, *low, *high))).collect();
     (!law.interval_95.is_empty()).then(|| Ribbon {
         label: "95 %, linear".to_owned(),
@@ -171,26 +173,26 @@ fn interval(law: &Law) -> Option<Ribbon> {
 }
 
 /// Corners of the histogram from the left.
-fn steps(law: &Law) -> impl Iterator<Item = (f64, f64)> {
+fn histogram_corners(law: &FrictionPlot) -> impl Iterator<Item = (f64, f64)> {
     law.shares.iter().flat_map(|(from, to, share)| {
         [(from * MILLIMETRES, share * PERCENT), (to * MILLIMETRES, share * PERCENT)]
     })
 }
 
-fn bars(law: &Law) -> Ribbon {
+fn histogram_ribbon(law: &FrictionPlot) -> Ribbon {
     Ribbon {
         label: String::new(),
         colour: Colour::Blue,
-        points: steps(law).map(|(v, share)| Some((v, 0.0, share))).collect(),
+        points: histogram_corners(law).map(|(v, share)| Some((v, 0.0, share))).collect(),
     }
 }
 
-fn outline(law: &Law) -> Series {
+fn histogram_outline(law: &FrictionPlot) -> Series {
     Series {
         label: String::new(),
         colour: Colour::Blue,
         mark: Mark::Thin,
-        points: steps(law).map(Some).collect(),
+        points: histogram_corners(law).map(Some).collect(),
         ..Series::default()
     }
 }
@@ -199,24 +201,24 @@ fn outline(law: &Law) -> Series {
 mod tests {
     use super::*;
 
-    fn law() -> Law {
-        Law {
+    fn law() -> FrictionPlot {
+        FrictionPlot {
             curve: (0..=10).map(|i| (f64::from(i) * 0.1, 0.5 - 0.01 * f64::from(i))).collect(),
             visited: Some((0.15, 0.65)),
             even: vec![(0.2, 0.48)],
             shares: vec![(0.0, 0.5, 0.25), (0.5, 1.0, 0.75)],
             head: Some(0.3),
-            ..Law::default()
+            ..FrictionPlot::default()
         }
     }
 
     #[test]
     fn the_law_is_strong_only_where_the_tip_moved() {
-        let drawn = figure(&law());
+        let drawn = draw_figure(&law());
         let strong = &drawn.panels[0].series[1];
         assert_eq!((strong.points.len(), strong.points[0]), (5, Some((200.0, 0.48))));
-        assert_eq!(drawn.panels[0].rules[0].at, 300.0);
-        let never = figure(&Law { visited: None, ..law() });
+        assert_eq!(drawn.panels[0].vertical_lines[0].at, 300.0);
+        let never = draw_figure(&FrictionPlot { visited: None, ..law() });
         assert_eq!(
             never.panels[0].series.iter().map(|s| s.label.as_str()).collect::<Vec<_>>(),
             ["law", "measured, tip slides evenly"]
@@ -225,14 +227,14 @@ mod tests {
 
     #[test]
     fn an_interval_is_drawn_only_where_one_is_known() {
-        assert!(figure(&law()).panels[0].ribbons.is_empty());
-        let known = Law { interval_95: vec![(0.0, 0.4, 0.6), (1.0, 0.3, 0.5)], ..law() };
-        assert_eq!(figure(&known).panels[0].ribbons[0].points[1], Some((1000.0, 0.3, 0.5)));
+        assert!(draw_figure(&law()).panels[0].ribbons.is_empty());
+        let known = FrictionPlot { interval_95: vec![(0.0, 0.4, 0.6), (1.0, 0.3, 0.5)], ..law() };
+        assert_eq!(draw_figure(&known).panels[0].ribbons[0].points[1], Some((1000.0, 0.3, 0.5)));
     }
 
     #[test]
     fn the_histogram_is_in_per_cent_of_the_time_of_slip() {
-        let bars = &figure(&law()).panels[1].ribbons[0];
+        let bars = &draw_figure(&law()).panels[1].ribbons[0];
         assert_eq!(
             bars.points,
             [

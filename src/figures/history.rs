@@ -5,17 +5,17 @@ pub(crate) mod bands;
 pub(crate) mod caption;
 mod thin;
 
-use crate::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
+use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, ShadedSpan, VerticalLine};
 use crate::figures::{NO_TRACES, subtitle};
 use crate::math;
 use crate::recording::channel::Channel;
-use crate::recording::motion_traces::CHANNELS;
+use crate::recording::motion_traces::MOTION_CHANNELS;
 use crate::recording::motion_traces::MotionTraces;
-pub(crate) use thin::thin;
+pub(crate) use thin::thin_points;
 
 /// What a time history shows.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct History {
+pub struct TimeHistory {
     /// Heading: the claim with its number.
     pub title: String,
     /// Heading of the enlarged figure.
@@ -53,27 +53,28 @@ const ENLARGED: [Channel; 3] = [Channel::TipX, Channel::Deflection, Channel::Hea
 
 /// The whole motion.
 #[must_use]
-pub fn figure(history: &History) -> Figure {
-    let mut panels = stacked(history, &CHANNELS, whole_s(history), HEIGHT_MM);
+pub fn draw_figure(history: &TimeHistory) -> Figure {
+    let mut panels = stack_panels(history, &MOTION_CHANNELS, motion_span_s(history), HEIGHT_MM);
     if let Some((from, to)) = history.zoom_s.filter(|(from, to)| from < to) {
         // (outlined: a third shade would be one of the other two without colours)
-        let marked = Band { label: "enlarged".to_owned(), colour: Colour::Black, from, to, outlined: true };
-        panels.iter_mut().for_each(|panel| panel.bands.push(marked.clone()));
+        let marked =
+            ShadedSpan { label: "enlarged".to_owned(), colour: Colour::Black, from, to, outlined: true };
+        panels.iter_mut().for_each(|panel| panel.shaded_spans.push(marked.clone()));
     }
-    panels.extend(windows(history));
-    drawn(history, panels, "around the reversal of the head")
+    panels.extend(draw_window_panel(history));
+    compose_figure(history, panels, "around the reversal of the head")
 }
 
 /// A part of the motion enlarged; `None` where there is no such part.
 #[must_use]
-pub(crate) fn enlarged(history: &History) -> Option<Figure> {
+pub(crate) fn draw_enlarged(history: &TimeHistory) -> Option<Figure> {
     let zoom_s = history.zoom_s.filter(|(from, to)| from < to)?;
-    let panels = stacked(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM);
-    let figure = drawn(history, panels, "around the release of the tip");
+    let panels = stack_panels(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM);
+    let figure = compose_figure(history, panels, "around the release of the tip");
     Some(Figure { title: history.enlarged_title.clone(), ..figure })
 }
 
-fn drawn(history: &History, panels: Vec<Panel>, part: &str) -> Figure {
+fn compose_figure(history: &TimeHistory, panels: Vec<Panel>, part: &str) -> Figure {
     let source = match (&history.measured, &history.model) {
         (Some(_), Some(_)) => "",
         (None, Some(_)) => NO_TRACES,
@@ -83,7 +84,7 @@ fn drawn(history: &History, panels: Vec<Panel>, part: &str) -> Figure {
     Figure {
         title: history.title.clone(),
         subtitle: subtitle(history.synthetic, source),
-        synthetic: history.synthetic,
+        watermarked: history.synthetic,
         description: format!("Time histories of tip, head, deflection and head drop {part}."),
         width_mm: FULL_WIDTH_MM,
         panels,
@@ -92,7 +93,7 @@ fn drawn(history: &History, panels: Vec<Panel>, part: &str) -> Figure {
 }
 
 /// First and last instant of the measured motion, else of the model's.
-fn whole_s(history: &History) -> (f64, f64) {
+fn motion_span_s(history: &TimeHistory) -> (f64, f64) {
     let times = history.measured.as_ref().or(history.model.as_ref()).map_or(&[][..], |m| &m.time_s);
     match (times.first(), times.last()) {
         (Some(first), Some(last)) if first < last => (*first, *last),
@@ -101,17 +102,22 @@ fn whole_s(history: &History) -> (f64, f64) {
 }
 
 /// Every quantity over what is left of it.
-fn stacked(history: &History, channels: &[Channel], shown_s: (f64, f64), height_mm: f64) -> Vec<Panel> {
+fn stack_panels(
+    history: &TimeHistory,
+    channels: &[Channel],
+    shown_s: (f64, f64),
+    height_mm: f64,
+) -> Vec<Panel> {
     let first = channels.first();
     let pair = |channel: &Channel| {
-        let upper = panel(history, *channel, shown_s, height_mm, first == Some(channel));
-        std::iter::once(upper).chain(residual(history, *channel, shown_s))
+        let upper = draw_channel_panel(history, *channel, shown_s, height_mm, first == Some(channel));
+        std::iter::once(upper).chain(draw_residual_panel(history, *channel, shown_s))
     };
     channels.iter().flat_map(pair).collect()
 }
 
 /// Points within a span, no more than it can show; the lowest and highest decide the unit.
-fn points(motion: &MotionTraces, channel: Channel, (from, to): (f64, f64)) -> Vec<Option<(f64, f64)>> {
+fn points_within(motion: &MotionTraces, channel: Channel, (from, to): (f64, f64)) -> Vec<Option<(f64, f64)>> {
     let inside = |t: &f64| *t >= from && *t <= to;
     let all: Vec<_> = motion
         .time_s
@@ -120,28 +126,35 @@ fn points(motion: &MotionTraces, channel: Channel, (from, to): (f64, f64)) -> Ve
         .filter(|(t, _)| inside(t))
         .map(|(t, x)| x.map(|x| (*t, x)))
         .collect();
-    thin(&all, (from, to))
+    thin_points(&all, (from, to))
 }
 
-fn scaled(points: Vec<Option<(f64, f64)>>, factor: f64) -> Vec<Option<(f64, f64)>> {
+fn scale_points(points: Vec<Option<(f64, f64)>>, factor: f64) -> Vec<Option<(f64, f64)>> {
     points.into_iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect()
 }
 
-fn panel(history: &History, channel: Channel, shown_s: (f64, f64), height_mm: f64, labelled: bool) -> Panel {
-    let lines = [&history.model, &history.measured].map(|m| m.as_ref().map(|m| points(m, channel, shown_s)));
-    let (unit, factor) = unit(lines.iter().flatten().flatten().flatten().map(|(_, x)| *x));
+fn draw_channel_panel(
+    history: &TimeHistory,
+    channel: Channel,
+    shown_s: (f64, f64),
+    height_mm: f64,
+    labelled: bool,
+) -> Panel {
+    let lines =
+        [&history.model, &history.measured].map(|m| m.as_ref().map(|m| points_within(m, channel, shown_s)));
+    let (unit, factor) = length_unit(lines.iter().flatten().flatten().flatten().map(|(_, x)| *x));
     let styles = [("model", Colour::Vermilion, Mark::Thick), ("measured", Colour::Black, Mark::Thin)];
     let series = lines.into_iter().zip(styles).filter_map(|(points, (label, colour, mark))| {
         points.map(|points| Series {
             label: label.to_owned(),
             colour,
             mark,
-            points: scaled(points, factor),
+            points: scale_points(points, factor),
             ..Series::default()
         })
     });
     // the labels stand over the topmost panel, their lines run through all
-    let rule = |(label, at): &(String, f64)| Rule {
+    let rule = |(label, at): &(String, f64)| VerticalLine {
         label: if labelled { label.clone() } else { String::new() },
         colour: Colour::Blue,
         mark: Mark::Dashed,
@@ -149,25 +162,25 @@ fn panel(history: &History, channel: Channel, shown_s: (f64, f64), height_mm: f6
         above: None,
     };
     Panel {
-        x: Axis::time().between(shown_s.0, shown_s.1),
-        y: Axis::linear(format!("{}, {unit}", channel.label())),
+        x: ChartAxis::time().with_range(shown_s.0, shown_s.1),
+        y: ChartAxis::linear(format!("{}, {unit}", channel.label())),
         height_mm,
         series: series.collect(),
-        bands: bands::of(&history.stick_s, shown_s),
-        rules: history.instants.iter().map(rule).collect(),
+        shaded_spans: bands::stick_spans(&history.stick_s, shown_s),
+        vertical_lines: history.instants.iter().map(rule).collect(),
         ..Panel::default()
     }
 }
 
 /// What lies between the measured quantity and that of the model.
-fn residual(history: &History, channel: Channel, shown_s: (f64, f64)) -> Option<Panel> {
-    let points = points(history.residual.as_ref()?, channel, shown_s);
+fn draw_residual_panel(history: &TimeHistory, channel: Channel, shown_s: (f64, f64)) -> Option<Panel> {
+    let points = points_within(history.residual.as_ref()?, channel, shown_s);
     points.iter().flatten().next()?; // (empty axes say nothing)
-    let (unit, factor) = unit(points.iter().flatten().map(|(_, x)| *x));
-    let points = scaled(points, factor);
+    let (unit, factor) = length_unit(points.iter().flatten().map(|(_, x)| *x));
+    let points = scale_points(points, factor);
     Some(Panel {
-        x: Axis::time().between(shown_s.0, shown_s.1),
-        y: even(Axis::linear(format!("\u{394}, {unit}")), &points),
+        x: ChartAxis::time().with_range(shown_s.0, shown_s.1),
+        y: symmetric_axis(ChartAxis::linear(format!("\u{394}, {unit}")), &points),
         height_mm: RESIDUAL_HEIGHT_MM,
         series: vec![Series {
             label: "measured \u{2212} model".to_owned(),
@@ -182,21 +195,21 @@ fn residual(history: &History, channel: Channel, shown_s: (f64, f64)) -> Option<
 
 /// As far to either side of zero, to just beyond one of 1, 2, 5, 10, ..., so that the low panel has a tick on
 /// each side.
-pub(super) fn even(axis: Axis, points: &[Option<(f64, f64)>]) -> Axis {
+pub(super) fn symmetric_axis(axis: ChartAxis, points: &[Option<(f64, f64)>]) -> ChartAxis {
     const BEYOND: f64 = 1.2;
     const MOST: f64 = 1.15;
     let most = points.iter().flatten().map(|(_, x)| x.abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
     let decade = math::powf(10.0, math::log10(most).floor());
     let end = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * decade).find(|end| MOST * end >= most);
     match end.filter(|end| end.is_normal()) {
-        Some(end) => axis.between(-BEYOND * end, BEYOND * end),
+        Some(end) => axis.with_range(-BEYOND * end, BEYOND * end),
         None => axis,
     }
 }
 
 /// The windows as bars, the first on top.
-fn windows(history: &History) -> Option<Panel> {
-    let (from, to) = whole_s(history);
+fn draw_window_panel(history: &TimeHistory) -> Option<Panel> {
+    let (from, to) = motion_span_s(history);
     let bar = |(row, (_, start, end)): (usize, &(String, f64, f64))| {
         [Some((*start, row as f64)), Some((*end, row as f64)), None]
     };
@@ -209,8 +222,8 @@ fn windows(history: &History) -> Option<Panel> {
         ..Series::default()
     };
     (!history.windows.is_empty()).then(|| Panel {
-        x: Axis::time().between(from, to),
-        y: Axis::named("windows", history.windows.iter().rev().map(|(name, ..)| name.clone())),
+        x: ChartAxis::time().with_range(from, to),
+        y: ChartAxis::categorical("windows", history.windows.iter().rev().map(|(name, ..)| name.clone())),
         height_mm: (history.windows.len() as f64 * ROW_MM).max(LEAST_ROWS_MM),
         series: vec![series],
         ..Panel::default()
@@ -218,7 +231,7 @@ fn windows(history: &History) -> Option<Panel> {
 }
 
 /// Unit in which values of that span read best, and how many of it a metre has.
-pub(super) fn unit(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
+pub(super) fn length_unit(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
     if high - low < MICROMETRES_BELOW_M && high.abs().max(low.abs()) < 10.0 * MICROMETRES_BELOW_M {
         ("\u{b5}m", 1e6)
@@ -232,8 +245,8 @@ mod tests {
     use super::*;
     use crate::chart::Medium;
 
-    fn as_svg(shown: &History) -> String {
-        figure(shown).svg(Medium::Screen)
+    fn as_svg(shown: &TimeHistory) -> String {
+        draw_figure(shown).to_svg(Medium::Screen)
     }
 
     fn motion(amplitude_m: f64, frames: usize) -> MotionTraces {
@@ -257,14 +270,15 @@ mod tests {
         }
     }
 
-    fn history() -> History {
-        History { measured: Some(motion(0.01, 500)), zoom_s: Some((0.1, 0.2)), ..History::default() }
+    fn history() -> TimeHistory {
+        TimeHistory { measured: Some(motion(0.01, 500)), zoom_s: Some((0.1, 0.2)), ..TimeHistory::default() }
     }
 
     #[test]
     fn a_synthetic_recording_says_so_and_one_without_traces_too() {
-        assert!(as_svg(&History { synthetic: true, ..history() }).contains("synthetic recording"));
-        let published = History { measured: None, model: Some(motion(0.01, 500)), ..History::default() };
+        assert!(as_svg(&TimeHistory { synthetic: true, ..history() }).contains("synthetic recording"));
+        let published =
+            TimeHistory { measured: None, model: Some(motion(0.01, 500)), ..TimeHistory::default() };
         assert!(as_svg(&published).contains("model alone") && !as_svg(&published).contains(">measured"));
     }
 
@@ -276,42 +290,42 @@ mod tests {
 
     #[test]
     fn the_enlarged_part_has_its_own_figure_with_three_quantities() {
-        let part = enlarged(&history()).unwrap();
+        let part = draw_enlarged(&history()).unwrap();
         assert_eq!(
             part.panels.iter().map(|p| p.y.label.as_str()).collect::<Vec<_>>(),
             ["tip x, mm", "deflection, mm", "head drop, \u{b5}m"]
         );
         assert_eq!(part.panels[0].x.range, Some((0.1, 0.2)));
-        assert_eq!(enlarged(&History { zoom_s: None, ..history() }), None);
+        assert_eq!(draw_enlarged(&TimeHistory { zoom_s: None, ..history() }), None);
     }
 
     #[test]
     fn every_quantity_stands_over_its_residual() {
-        let shown = History { residual: Some(motion(1e-5, 500)), ..history() };
-        let labels: Vec<String> = figure(&shown).panels.into_iter().map(|p| p.y.label).collect();
+        let shown = TimeHistory { residual: Some(motion(1e-5, 500)), ..history() };
+        let labels: Vec<String> = draw_figure(&shown).panels.into_iter().map(|p| p.y.label).collect();
         assert_eq!(labels[..4], ["tip x, mm", "\u{394}, \u{b5}m", "head x, mm", "\u{394}, \u{b5}m"]);
-        assert_eq!(figure(&shown).panels[1].y.range, Some((-24.0, 24.0)));
-        assert_eq!((labels.len(), enlarged(&shown).unwrap().panels.len()), (8, 6));
+        assert_eq!(draw_figure(&shown).panels[1].y.range, Some((-24.0, 24.0)));
+        assert_eq!((labels.len(), draw_enlarged(&shown).unwrap().panels.len()), (8, 6));
     }
 
     #[test]
     fn what_was_not_tracked_leaves_no_empty_axes() {
         let headless = MotionTraces { head_x_m: vec![None; 500], ..motion(1e-5, 500) };
-        let shown = History { residual: Some(headless), ..history() };
-        let labels: Vec<String> = figure(&shown).panels.into_iter().map(|p| p.y.label).collect();
+        let shown = TimeHistory { residual: Some(headless), ..history() };
+        let labels: Vec<String> = draw_figure(&shown).panels.into_iter().map(|p| p.y.label).collect();
         assert_eq!(labels[..4], ["tip x, mm", "\u{394}, \u{b5}m", "head x, mm", "deflection, mm"]);
     }
 
     #[test]
     fn the_first_window_is_the_uppermost_bar() {
         let windows = vec![("1".to_owned(), 0.1, 0.2), ("2".to_owned(), 0.15, 0.3)];
-        let drawn = figure(&History { windows, ..history() });
+        let drawn = draw_figure(&TimeHistory { windows, ..history() });
         let bars = drawn.panels.last().unwrap();
         assert_eq!(
             bars.series[0].points,
             [Some((0.15, 0.0)), Some((0.3, 0.0)), None, Some((0.1, 1.0)), Some((0.2, 1.0)), None]
         );
-        assert_eq!(bars.y.names, [(0.0, "2".to_owned()), (1.0, "1".to_owned())]);
+        assert_eq!(bars.y.categories, [(0.0, "2".to_owned()), (1.0, "1".to_owned())]);
     }
 
     #[test]
@@ -321,7 +335,7 @@ mod tests {
         let stick_s: Vec<(f64, f64)> =
             (0..1000).map(|i| (f64::from(i) * 5e-4, f64::from(i) * 5e-4 + 2e-4)).collect();
         let windows = (0..10).map(|i| (i.to_string(), 0.1, 0.2)).collect();
-        let shown = History {
+        let shown = TimeHistory {
             measured: long(),
             model: long(),
             residual: long(),
@@ -329,15 +343,15 @@ mod tests {
             instants,
             windows,
             zoom_s: Some((0.1, 0.12)),
-            ..History::default()
+            ..TimeHistory::default()
         };
         for medium in [Medium::Screen, Medium::Column, Medium::Page] {
-            for drawn in [figure(&shown), enlarged(&shown).unwrap()] {
-                let bytes = drawn.svg(medium).len();
+            for drawn in [draw_figure(&shown), draw_enlarged(&shown).unwrap()] {
+                let bytes = drawn.to_svg(medium).len();
                 assert!(bytes < 200_000, "{medium:?}: {bytes} bytes");
             }
         }
-        let height_mm: f64 = figure(&shown).panels.iter().map(|p| p.height_mm).sum();
+        let height_mm: f64 = draw_figure(&shown).panels.iter().map(|p| p.height_mm).sum();
         assert!(height_mm < 200.0, "{height_mm} mm and the gaps between them do not fit a page");
     }
 }

@@ -1,10 +1,12 @@
 //! Natural modes of a blade: how its tip answers a force, and how the links swing.
 
 use crate::blade::Linkage;
-use crate::blade::modes::{NaturalMode, Tip, modes, tip_compliance};
-use crate::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape};
+use crate::blade::modes::{NaturalMode, TipConstraint, natural_modes, tip_compliance};
+use crate::chart::{
+    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, VerticalLine,
+};
 use crate::math;
-use crate::text::{digits, listed};
+use crate::text::{format_digits, join_with_and};
 
 /// Frequencies of the answer.
 const POINTS: usize = 600;
@@ -20,58 +22,61 @@ const HALF_WIDTH: f64 = 0.5;
 
 /// What the tip answers, and the shapes of the modes.
 #[must_use]
-pub fn figures(title: &str, blade: &Linkage) -> [Figure; 2] {
+pub fn draw_figures(title: &str, blade: &Linkage) -> [Figure; 2] {
     let sides: &[bool] = if blade.shoulder.is_some() { &[false, true] } else { &[false] };
-    let of = |on: bool| modes(blade, Tip::Free, on);
+    let of = |on: bool| natural_modes(blade, TipConstraint::Free, on);
     let found: Vec<f64> = sides.iter().flat_map(|on| of(*on)).filter_map(|mode| mode.frequency_hz).collect();
     let low = found.iter().copied().fold(f64::INFINITY, f64::min);
     let high = found.iter().copied().fold(0.0, f64::max);
     let range = if low <= high { (low / BEYOND, high * BEYOND) } else { (1.0, 1e4) };
     let shapes = sides.iter().flat_map(|&on| {
-        of(on).into_iter().enumerate().map(move |(number, mode)| shape(blade, on, number, &mode))
+        of(on).into_iter().enumerate().map(move |(number, mode)| draw_mode_shape(blade, on, number, &mode))
     });
     let words = found.iter().map(|hz| format!("{hz:.1} Hz")).collect::<Vec<_>>().join(", ");
     let figure = |claim: String, description: &str, panels| Figure {
         title: claim,
         subtitle: format!("{title}; linearised about the upright blade, tip sliding without friction"),
-        synthetic: false,
+        watermarked: false,
         description: format!("{description}; modes at {words}."),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
         panels,
     };
-    let answer = vec![answer(blade, sides, range)];
+    let answer = vec![draw_receptance_panel(blade, sides, range)];
     [
-        Figure { columns: 1, ..figure(resonances(&found), "How far a force on the tip moves it", answer) },
-        figure(swings(&of(false)), "The links at both ends of a swing", shapes.collect()),
+        Figure {
+            columns: 1,
+            ..figure(resonance_claim(&found), "How far a force on the tip moves it", answer)
+        },
+        figure(swing_claim(&of(false)), "The links at both ends of a swing", shapes.collect()),
     ]
 }
 
 /// The claim with its numbers: where a force moves the tip farthest.
-fn resonances(found_hz: &[f64]) -> String {
-    let found: Vec<String> = found_hz.iter().map(|hz| digits(*hz, 3)).collect();
+fn resonance_claim(found_hz: &[f64]) -> String {
+    let found: Vec<String> = found_hz.iter().map(|hz| format_digits(*hz, 3)).collect();
     if found.is_empty() {
         return "The blade has no stable mode".to_owned();
     }
-    format!("The tip answers most at {} Hz", listed(&found))
+    format!("The tip answers most at {} Hz", join_with_and(&found))
 }
 
 /// The claim with its numbers: how far the lip swings with the neck free.
-fn swings(found: &[NaturalMode]) -> String {
+fn swing_claim(found: &[NaturalMode]) -> String {
     let stable = found.iter().filter(|mode| mode.frequency_hz.is_some());
-    let ratios: Vec<String> = stable.map(|mode| digits(mode.lip_over_neck.abs(), 2)).collect();
+    let ratios: Vec<String> = stable.map(|mode| format_digits(mode.lip_over_neck.abs(), 2)).collect();
     if ratios.is_empty() {
         return "The blade has no stable mode".to_owned();
     }
-    format!("The lip swings {} times as far as the neck", listed(&ratios))
+    format!("The lip swings {} times as far as the neck", join_with_and(&ratios))
 }
 
-fn words(on_shoulder: bool) -> &'static str {
+fn side_name(on_shoulder: bool) -> &'static str {
     if on_shoulder { "neck on the shoulder" } else { "neck free" }
 }
 
 /// Displacement of the tip over the force on it.
-fn answer(blade: &Linkage, sides: &[bool], (low, high): (f64, f64)) -> Panel {
+fn draw_receptance_panel(blade: &Linkage, sides: &[bool], (low, high): (f64, f64)) -> Panel {
     let at = |i: usize| low * math::powf(high / low, i as f64 / (POINTS - 1) as f64);
     let mm_per_n = |on: bool, hz: f64| {
         let found = tip_compliance(blade, on, hz);
@@ -79,30 +84,30 @@ fn answer(blade: &Linkage, sides: &[bool], (low, high): (f64, f64)) -> Panel {
     };
     let styles = [(Colour::Blue, Mark::Line), (Colour::Vermilion, Mark::Dashed)];
     let series = sides.iter().zip(styles).map(|(&on, (colour, mark))| Series {
-        label: words(on).to_owned(),
+        label: side_name(on).to_owned(),
         colour,
         mark,
         points: (0..POINTS).map(at).map(|hz| Some((hz, mm_per_n(on, hz)))).collect(),
         ..Series::default()
     });
     let rules = sides.iter().zip(styles).flat_map(|(&on, (colour, _))| {
-        modes(blade, Tip::Free, on).into_iter().filter_map(move |mode| {
+        natural_modes(blade, TipConstraint::Free, on).into_iter().filter_map(move |mode| {
             let at = mode.frequency_hz?;
-            Some(Rule { label: format!("{at:.0} Hz"), colour, mark: Mark::Dotted, at, above: None })
+            Some(VerticalLine { label: format!("{at:.0} Hz"), colour, mark: Mark::Dotted, at, above: None })
         })
     });
     Panel {
-        x: Axis::log("frequency, Hz").between(low, high),
-        y: Axis::log("tip over force, mm/N"),
+        x: ChartAxis::log("frequency, Hz").with_range(low, high),
+        y: ChartAxis::log("tip over force, mm/N"),
         height_mm: ANSWER_MM,
         series: series.collect(),
-        rules: rules.collect(),
+        vertical_lines: rules.collect(),
         ..Panel::default()
     }
 }
 
 /// The links at both ends of a swing, over the upright blade, to scale.
-fn shape(blade: &Linkage, on_shoulder: bool, number: usize, mode: &NaturalMode) -> Panel {
+fn draw_mode_shape(blade: &Linkage, on_shoulder: bool, number: usize, mode: &NaturalMode) -> Panel {
     let largest = mode.lip_over_neck.abs().max(1.0);
     let (neck, lip) = (SWING / largest, SWING * mode.lip_over_neck / largest);
     let half_mm = HALF_WIDTH * 1e3 * (blade.l1_m + blade.l2_m);
@@ -122,16 +127,16 @@ fn shape(blade: &Linkage, on_shoulder: bool, number: usize, mode: &NaturalMode) 
     };
     let frequency = mode.frequency_hz.map_or_else(|| "unstable".to_owned(), |hz| format!("{hz:.1} Hz"));
     Panel {
-        title: format!("{}, mode {}: {frequency}", words(on_shoulder), number + 1),
-        x: Axis::linear("along the glass, mm").between(-half_mm, half_mm),
-        y: Axis::linear("over the glass, mm"),
+        title: format!("{}, mode {}: {frequency}", side_name(on_shoulder), number + 1),
+        x: ChartAxis::linear("along the glass, mm").with_range(-half_mm, half_mm),
+        y: ChartAxis::linear("over the glass, mm"),
         height_mm: SHAPE_MM,
         series: vec![
             drawn("upright", Colour::Grey, Mark::Dashed, line(0.0)),
-            drawn("one end of the swing", Colour::Blue, Mark::Joined(Shape::Disc), line(1.0)),
-            drawn("the other", Colour::Orange, Mark::Joined(Shape::Disc), line(-1.0)),
+            drawn("one end of the swing", Colour::Blue, Mark::Joined(MarkerShape::Disc), line(1.0)),
+            drawn("the other", Colour::Orange, Mark::Joined(MarkerShape::Disc), line(-1.0)),
         ],
-        equal: true,
+        equal_aspect: true,
         ..Panel::default()
     }
 }
@@ -145,15 +150,15 @@ mod tests {
     #[test]
     fn a_blade_with_a_shoulder_has_two_answers_and_four_shapes() {
         let scene = Scene::parse("s", include_str!("../../data/scenes/actual-blade.toml")).unwrap();
-        let [answer, shapes] = figures(scene.title(), &scene.linkage);
-        assert_eq!((answer.panels[0].series.len(), answer.panels[0].rules.len()), (2, 4));
+        let [answer, shapes] = draw_figures(scene.title(), &scene.linkage);
+        assert_eq!((answer.panels[0].series.len(), answer.panels[0].vertical_lines.len()), (2, 4));
         assert_eq!(shapes.panels.len(), 4);
         assert_eq!(shapes.panels[0].title, "neck free, mode 1: 115.2 Hz");
-        assert!(answer.svg(Medium::Screen).contains("115 Hz"));
+        assert!(answer.to_svg(Medium::Screen).contains("115 Hz"));
         assert_eq!(answer.title, "The tip answers most at 115, 745, 385 and 1250 Hz");
         assert_eq!(shapes.title, "The lip swings 2.3 and 7.8 times as far as the neck");
         let plain = Scene::parse("s", include_str!("../../data/scenes/light-blade.toml")).unwrap();
-        let [answer, shapes] = figures(plain.title(), &plain.linkage);
+        let [answer, shapes] = draw_figures(plain.title(), &plain.linkage);
         assert_eq!((answer.panels[0].series.len(), shapes.panels.len()), (1, 2));
     }
 }

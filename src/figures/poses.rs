@@ -3,27 +3,27 @@
 mod drawing;
 
 use crate::math;
-pub use drawing::figure;
+pub use drawing::draw_figure;
 
 use crate::blade::Linkage;
-use crate::compare::Case;
+use crate::compare::ConditionComparison;
 use crate::figures::{Drawing, FigureBlock, Words, subtitle};
-use crate::recording::channel::Anchor;
-use crate::simulate::Motion;
-use crate::simulate::Sample;
-use crate::simulate::mode::Mode;
-use crate::text::{self, listed, milliseconds, short};
-use drawing::Longest;
+use crate::recording::channel::InstantKind;
+use crate::simulate::ModelSample;
+use crate::simulate::RunMotion;
+use crate::simulate::mode::TipMode;
+use crate::text::{self, format_milliseconds, format_short, join_with_and};
+use drawing::ArrowScale;
 
 /// The blade at an instant.
 #[derive(Debug, Clone, Copy)]
-pub struct Pose {
+pub struct ReversalPose {
     /// What happens then.
     pub name: &'static str,
     /// Time after the head turned, s.
     pub after_turn_s: f64,
     /// The state.
-    pub sample: Sample,
+    pub sample: ModelSample,
     /// Velocity of the head, m/s.
     pub head_m_per_s: f64,
 }
@@ -35,20 +35,20 @@ const HALF_WAY: f64 = 0.5;
 
 /// The blade before, during and after the first turn of the head; empty where the head does not turn.
 #[must_use]
-pub(crate) fn through_reversal(motion: &Motion) -> Vec<Pose> {
+pub(crate) fn reversal_poses(motion: &RunMotion) -> Vec<ReversalPose> {
     let samples = &motion.samples;
     let Some(turn) = motion.turn() else { return Vec::new() };
     let turn_s = samples[turn].time_s;
     let mut chosen = vec![("head turns", turn)];
-    if let Some([hold_s, release_s]) = rest(motion, turn_s) {
+    if let Some([hold_s, release_s]) = rest_span_s(motion, turn_s) {
         let length = release_s - hold_s;
         let from = |t: f64| samples.partition_point(|s| s.time_s < t);
         let (held, released, last) = (from(hold_s), from(release_s), samples.len() - 1);
         chosen.extend([("before", from(hold_s - length).min(last)), ("tip stops", held.min(last))]);
-        chosen.extend(leans(samples, held, HALF_WAY).map(|at| ("half way", at)));
-        chosen.extend(leans(samples, held, 0.0).map(|at| ("upright", at)));
+        chosen.extend(head_over_tip_index(samples, held, HALF_WAY).map(|at| ("half way", at)));
+        chosen.extend(head_over_tip_index(samples, held, 0.0).map(|at| ("upright", at)));
         // a tip that rests until the run ends is not released
-        if samples.get(released).is_some_and(|s| released < last || s.mode != Mode::Stick) {
+        if samples.get(released).is_some_and(|s| released < last || s.mode != TipMode::Stick) {
             let (slip, after) = (first_slip(motion, released), from(release_s + length).min(last));
             chosen.push(("stick ends", released.saturating_sub(1)));
             chosen.extend(slip.map(|at| ("first slip", at)));
@@ -56,14 +56,14 @@ pub(crate) fn through_reversal(motion: &Motion) -> Vec<Pose> {
         }
     }
     chosen.sort_by_key(|(_, at)| *at);
-    chosen.into_iter().map(|(name, at)| pose(samples, name, at, turn_s)).collect()
+    chosen.into_iter().map(|(name, at)| build_pose(samples, name, at, turn_s)).collect()
 }
 
-fn pose(samples: &[Sample], name: &'static str, at: usize, turn_s: f64) -> Pose {
+fn build_pose(samples: &[ModelSample], name: &'static str, at: usize, turn_s: f64) -> ReversalPose {
     let (before, after) = (at.saturating_sub(1), (at + 1).min(samples.len() - 1));
     let (x, t) =
         (samples[after].head_x_m - samples[before].head_x_m, samples[after].time_s - samples[before].time_s);
-    Pose {
+    ReversalPose {
         name,
         after_turn_s: samples[at].time_s - turn_s,
         sample: samples[at],
@@ -72,7 +72,7 @@ fn pose(samples: &[Sample], name: &'static str, at: usize, turn_s: f64) -> Pose 
 }
 
 /// The longest stick at the turn or close to it: the tip rests while the head turns.
-fn rest(motion: &Motion, turn_s: f64) -> Option<[f64; 2]> {
+fn rest_span_s(motion: &RunMotion, turn_s: f64) -> Option<[f64; 2]> {
     let span = motion.samples.last()?.time_s - motion.samples.first()?.time_s;
     let near =
         |[start, end]: &&[f64; 2]| *start < turn_s + NEAR_TURN * span && *end > turn_s - NEAR_TURN * span;
@@ -80,17 +80,17 @@ fn rest(motion: &Motion, turn_s: f64) -> Option<[f64; 2]> {
 }
 
 /// Where the head has come so near to standing over the tip, as a share of its distance at `from`.
-fn leans(samples: &[Sample], from: usize, share: f64) -> Option<usize> {
-    let deflection = |s: &Sample| s.tip_x_m - s.head_x_m;
+fn head_over_tip_index(samples: &[ModelSample], from: usize, share: f64) -> Option<usize> {
+    let deflection = |s: &ModelSample| s.tip_x_m - s.head_x_m;
     let after = samples.get(from..)?;
     let first = deflection(after.first()?);
     after.iter().position(|s| deflection(s) * first <= share * first * first).map(|at| from + at)
 }
 
 /// The sample in which the tip is fastest between its release and where it sticks again or leaves the glass.
-fn first_slip(motion: &Motion, released: usize) -> Option<usize> {
+fn first_slip(motion: &RunMotion, released: usize) -> Option<usize> {
     let samples = &motion.samples;
-    let slips = |at: &usize| matches!(samples[*at].mode, Mode::SlipForward | Mode::SlipBackward);
+    let slips = |at: &usize| matches!(samples[*at].mode, TipMode::SlipForward | TipMode::SlipBackward);
     let again = motion
         .stick_s
         .iter()
@@ -102,7 +102,7 @@ fn first_slip(motion: &Motion, released: usize) -> Option<usize> {
 
 /// Head, hinge and tip as places along the sweep and over the glass, m.
 #[must_use]
-pub(crate) fn joints(linkage: &Linkage, sample: &Sample) -> [(f64, f64); 3] {
+pub(crate) fn joint_positions(linkage: &Linkage, sample: &ModelSample) -> [(f64, f64); 3] {
     let head = (sample.head_x_m, linkage.l1_m + linkage.l2_m - sample.head_drop_m);
     let below = |(x, y): (f64, f64), angle: f64, length: f64| {
         (x + length * math::sin(angle), y - length * math::cos(angle))
@@ -113,7 +113,7 @@ pub(crate) fn joints(linkage: &Linkage, sample: &Sample) -> [(f64, f64); 3] {
 
 /// What the figure shows.
 #[derive(Debug, Clone)]
-pub struct Poses {
+pub struct PoseSequence {
     /// Heading.
     pub title: String,
     /// Line under it.
@@ -121,7 +121,7 @@ pub struct Poses {
     /// Links of the blade.
     pub linkage: Linkage,
     /// The instants, in their order.
-    pub poses: Vec<Pose>,
+    pub poses: Vec<ReversalPose>,
     /// From when to when the tip rests while the head turns, s.
     pub rest_s: Option<[f64; 2]>,
     /// Time after the head turned at which the tip counts as released, s, as a fit reads it: it has left its
@@ -129,37 +129,42 @@ pub struct Poses {
     pub released_after_s: Option<f64>,
 }
 
-impl Poses {
+impl PoseSequence {
     /// The poses of a motion; `None` where its head does not turn.
     #[must_use]
-    pub fn of(motion: &Motion, title: &str, subtitle: String) -> Option<Self> {
+    pub fn from_motion(motion: &RunMotion, title: &str, subtitle: String) -> Option<Self> {
         let turn_s = motion.turn_s()?;
-        let poses = through_reversal(motion);
+        let poses = reversal_poses(motion);
         Some(Self {
             title: title.to_owned(),
             subtitle,
             linkage: motion.linkage,
             poses,
-            rest_s: rest(motion, turn_s),
+            rest_s: rest_span_s(motion, turn_s),
             released_after_s: None,
         })
     }
 }
 
 /// The figure of a condition; `None` where the head of its model does not turn.
-pub(crate) fn block(case: &Case) -> Option<FigureBlock> {
-    let subtitle = subtitle(case.synthetic(), "drawn from the fitted model");
+pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
+    let subtitle = subtitle(case.is_synthetic(), "drawn from the fitted model");
     let model = case.model_side();
-    let released_after_s =
-        model.instant_s(Anchor::Release).zip(model.instant_s(Anchor::Reversal)).map(|(to, from)| to - from);
-    let shown = Poses { released_after_s, ..Poses::of(&case.model.motion, &case.title(), subtitle)? };
-    let words = Words { caption: caption(&shown), details: details(&shown) };
-    Some(case.model_block("poses", words, Drawing::Chart(figure(&shown))))
+    let released_after_s = model
+        .instant_s(InstantKind::Release)
+        .zip(model.instant_s(InstantKind::Reversal))
+        .map(|(to, from)| to - from);
+    let shown = PoseSequence {
+        released_after_s,
+        ..PoseSequence::from_motion(&case.model.motion, &case.figure_title(), subtitle)?
+    };
+    let words = Words { caption: figure_caption(&shown), details: figure_details(&shown) };
+    Some(case.model_figure_block("poses", words, Drawing::Chart(draw_figure(&shown))))
 }
 
 /// The claim with its numbers.
-fn claim(shown: &Poses) -> String {
-    match rests(shown) {
+fn claim_sentence(shown: &PoseSequence) -> String {
+    match describe_rest(shown) {
         Some((time, way)) => format!("The tip rests for {time} while the head moves by {way}"),
         None if shown.rest_s.is_some() => "The tip rests until the run ends".to_owned(),
         None => "The tip does not rest while the head turns".to_owned(),
@@ -168,12 +173,12 @@ fn claim(shown: &Poses) -> String {
 
 /// One sentence on the figure.
 #[must_use]
-pub fn caption(shown: &Poses) -> String {
+pub fn figure_caption(shown: &PoseSequence) -> String {
     let at = |name: &str| shown.poses.iter().find(|p| p.name == name);
-    let rests =
-        rests(shown).map(|(time, way)| format!(": its tip rests for {time} while the head moves by {way}"));
+    let rests = describe_rest(shown)
+        .map(|(time, way)| format!(": its tip rests for {time} while the head moves by {way}"));
     let leans = at("before").zip(at("after")).map(|(before, after)| {
-        let lean = |p: &Pose| short(p.sample.pose.theta.to_degrees());
+        let lean = |p: &ReversalPose| format_short(p.sample.pose.theta.to_degrees());
         let joint = if rests.is_some() { ", and the" } else { ": its" };
         format!("{joint} neck leans over from {}\u{b0} to {}\u{b0}", lean(before), lean(after))
     });
@@ -185,31 +190,34 @@ pub fn caption(shown: &Poses) -> String {
 }
 
 /// For how long the tip rests, and how far the head moves meanwhile.
-fn rests(shown: &Poses) -> Option<(String, String)> {
+fn describe_rest(shown: &PoseSequence) -> Option<(String, String)> {
     let at = |name: &str| shown.poses.iter().find(|p| p.name == name);
     let ([from, to], (stops, leaves)) = shown.rest_s.zip(at("tip stops").zip(at("stick ends")))?;
     let way_m = (leaves.sample.head_x_m - stops.sample.head_x_m).abs();
-    let (unit, factor) = text::unit("m", [way_m]);
-    Some((format!("{} ms", short(1e3 * (to - from))), format!("{} {unit}", short(way_m * factor))))
+    let (unit, factor) = text::choose_prefix("m", [way_m]);
+    Some((
+        format!("{} ms", format_short(1e3 * (to - from))),
+        format!("{} {unit}", format_short(way_m * factor)),
+    ))
 }
 
 /// The rest of what is said of the figure.
 #[must_use]
-pub fn details(shown: &Poses) -> String {
-    let longest = Longest::of(&shown.poses);
+pub fn figure_details(shown: &PoseSequence) -> String {
+    let longest = ArrowScale::from_poses(&shown.poses);
     let mut sentences = vec![format!(
         "The fitted model on the glass, to scale, with the head in the middle of every drawing; times are \
          counted from the turn of the head. Arrows: velocity \
          of the head, the longest {} m/s, and friction on the tip, ending where it acts, the longest {} N; \
          short ones are left out.",
-        short(longest.speed_m_per_s),
-        short(longest.force_n)
+        format_short(longest.speed_m_per_s),
+        format_short(longest.force_n)
     )];
     sentences.extend(shown.released_after_s.map(|release_s| {
         format!(
             "The release of the fit, {} after the turn, is when the tip has left its place by more than the \
              noise: a little after its stick ends.",
-            milliseconds(release_s)
+            format_milliseconds(release_s)
         )
     }));
     let flights: Vec<String> = shown
@@ -218,8 +226,9 @@ pub fn details(shown: &Poses) -> String {
         .filter(|p| p.sample.tip_height_m > 0.0)
         .map(|p| format!("\u{201c}{}\u{201d}", p.name))
         .collect();
-    sentences
-        .extend((!flights.is_empty()).then(|| format!("The tip is off the glass in {}.", listed(&flights))));
+    sentences.extend(
+        (!flights.is_empty()).then(|| format!("The tip is off the glass in {}.", join_with_and(&flights))),
+    );
     sentences.join(" ")
 }
 
@@ -228,9 +237,11 @@ mod tests {
     use super::*;
     use crate::simulate::scene::Scene;
 
-    pub(super) fn motion() -> Motion {
+    pub(super) fn motion() -> RunMotion {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/data/scenes/actual-blade.toml");
-        Motion::of(&Scene::parse("actual-blade.toml", &std::fs::read_to_string(path).unwrap()).unwrap())
+        RunMotion::simulate(
+            &Scene::parse("actual-blade.toml", &std::fs::read_to_string(path).unwrap()).unwrap(),
+        )
     }
 
     #[test]
@@ -238,7 +249,7 @@ mod tests {
         let motion = motion();
         assert!(!motion.samples.is_empty());
         for sample in &motion.samples {
-            let [head, _, (x, y)] = joints(&motion.linkage, sample);
+            let [head, _, (x, y)] = joint_positions(&motion.linkage, sample);
             assert!(
                 (x - sample.tip_x_m).abs() < 1e-9 && (y - sample.tip_height_m).abs() < 1e-9,
                 "{sample:?}"
@@ -250,18 +261,25 @@ mod tests {
     #[test]
     fn the_poses_follow_the_reversal() {
         let motion = motion();
-        let poses = through_reversal(&motion);
+        let poses = reversal_poses(&motion);
         let names: Vec<&str> = poses.iter().map(|p| p.name).collect();
         assert_eq!(
             names,
             ["before", "tip stops", "head turns", "half way", "upright", "stick ends", "first slip", "after"]
         );
-        let modes: Vec<Mode> = poses[1..7].iter().map(|p| p.sample.mode).collect();
+        let modes: Vec<TipMode> = poses[1..7].iter().map(|p| p.sample.mode).collect();
         assert_eq!(
             modes,
-            [Mode::Stick, Mode::Stick, Mode::Stick, Mode::Stick, Mode::Stick, Mode::SlipBackward]
+            [
+                TipMode::Stick,
+                TipMode::Stick,
+                TipMode::Stick,
+                TipMode::Stick,
+                TipMode::Stick,
+                TipMode::SlipBackward
+            ]
         );
-        let deflection = |p: &Pose| p.sample.tip_x_m - p.sample.head_x_m;
+        let deflection = |p: &ReversalPose| p.sample.tip_x_m - p.sample.head_x_m;
         assert!((deflection(&poses[3]) / deflection(&poses[1]) - 0.5).abs() < 2e-3);
         assert!(deflection(&poses[0]) * deflection(&poses[7]) < 0.0 && deflection(&poses[4]).abs() < 1e-5);
         assert!(
@@ -273,8 +291,8 @@ mod tests {
     fn a_run_that_ends_in_the_rest_shows_no_release_and_a_tip_that_flies_does_not_slip() {
         let whole = motion();
         let turn_s = whole.turn_s().unwrap();
-        let [from_s, to_s] = rest(&whole, turn_s).unwrap();
-        let names = |motion: &Motion| through_reversal(motion).iter().map(|p| p.name).collect::<Vec<_>>();
+        let [from_s, to_s] = rest_span_s(&whole, turn_s).unwrap();
+        let names = |motion: &RunMotion| reversal_poses(motion).iter().map(|p| p.name).collect::<Vec<_>>();
         let mut held = whole.clone();
         let end_s = from_s + 0.9 * (to_s - from_s);
         held.samples.retain(|s| s.time_s <= end_s);
@@ -282,7 +300,7 @@ mod tests {
         held.stick_s.last_mut().unwrap()[1] = held.samples.last().unwrap().time_s;
         assert_eq!(names(&held), ["before", "tip stops", "head turns", "half way", "upright"]);
         let mut flies = whole;
-        flies.samples.iter_mut().filter(|s| s.time_s >= to_s).for_each(|s| s.mode = Mode::Flight);
+        flies.samples.iter_mut().filter(|s| s.time_s >= to_s).for_each(|s| s.mode = TipMode::Flight);
         assert_eq!(names(&flies).last_chunk(), Some(&["stick ends", "after"]));
     }
 
@@ -291,8 +309,8 @@ mod tests {
         let mut motion = motion();
         let turn = motion.turn().unwrap();
         motion.samples.truncate(turn);
-        assert!(through_reversal(&motion).is_empty());
+        assert!(reversal_poses(&motion).is_empty());
         motion.samples.clear();
-        assert!(through_reversal(&motion).is_empty());
+        assert!(reversal_poses(&motion).is_empty());
     }
 }

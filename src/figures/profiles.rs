@@ -1,25 +1,28 @@
 //! Profile likelihoods: how far the cost rises along each parameter while the others follow, with the
 //! intervals that are read from it.
 
-use super::symbol::symbol;
-use crate::chart::{Axis, Band, Bar, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape};
+use super::symbol::parameter_symbol;
+use crate::chart::{
+    ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan,
+    VerticalLine,
+};
 use crate::compare::ParameterLine;
 use crate::figures::{Drawing, FigureBlock, about, subtitle};
 use crate::fit::job::{FreeParameter, Job};
 use crate::fit::profile::AT_BOUND;
 use crate::fit::result::{FitResult, ParameterResult};
-use crate::fit::uncertainty::Verdict;
-use crate::text::{listed, short, unit, with_unit};
+use crate::fit::uncertainty::ParameterVerdict;
+use crate::text::{choose_prefix, format_short, join_with_and, label_with_unit};
 
 /// What is known of one parameter, in its own SI unit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Profile {
+pub struct ParameterProfile {
     /// Symbol in the equations, or its name where it has none.
     pub symbol: String,
     /// Unit; empty or `1` for a plain number.
     pub unit: String,
     /// What is known.
-    pub verdict: Verdict,
+    pub verdict: ParameterVerdict,
     /// Bounds of the search.
     pub bounds: (f64, f64),
     /// Estimate.
@@ -39,7 +42,7 @@ pub struct Profile {
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Profiles {
+pub struct ProfilePlot {
     /// Heading.
     pub title: String,
     /// Whether the data are synthetic.
@@ -49,7 +52,7 @@ pub struct Profiles {
     /// Rise in cost that bounds a 95 % interval.
     pub threshold: f64,
     /// One a parameter.
-    pub parameters: Vec<Profile>,
+    pub parameters: Vec<ParameterProfile>,
 }
 
 /// Height of a panel, mm.
@@ -59,56 +62,64 @@ const SHOWN: f64 = 3.0;
 /// Names and looks of the intervals, and their heights in thresholds: in the cup of the profile, where no
 /// line is.
 const STATED: (&str, f64) = ("95 % interval, as stated", 1.2);
-const INTERVALS: [(&str, Colour, Shape, f64); 3] = [
-    ("profile", Colour::Blue, Shape::Disc, 1.6),
-    ("linear model", Colour::Orange, Shape::Square, 2.05),
-    ("bootstrap", Colour::Green, Shape::Diamond, 2.5),
+const INTERVALS: [(&str, Colour, MarkerShape, f64); 3] = [
+    ("profile", Colour::Blue, MarkerShape::Disc, 1.6),
+    ("linear model", Colour::Orange, MarkerShape::Square, 2.05),
+    ("bootstrap", Colour::Green, MarkerShape::Diamond, 2.5),
 ];
 /// Room on either side of what is shown, as a share of its width.
 const ROOM: f64 = 0.06;
 
-impl Profiles {
+impl ProfilePlot {
     /// The profiles of a fit; `lines` bring units and true values.
     #[must_use]
-    pub fn of(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
+    pub fn from_fit(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
         Self {
             title: job.title.clone(),
             synthetic: result.synthetic,
             least_cost: result.cost,
             threshold: result.threshold,
-            parameters: job.parameters.iter().filter_map(|free| profile(free, result, lines)).collect(),
+            parameters: job
+                .parameters
+                .iter()
+                .filter_map(|free| parameter_profile(free, result, lines))
+                .collect(),
         }
     }
 
     /// The figure with its caption; nothing where no parameter has a profile.
     #[must_use]
-    pub fn block(&self) -> Option<FigureBlock> {
-        let figure = figure(self);
+    pub fn figure_block(&self) -> Option<FigureBlock> {
+        let figure = draw_figure(self);
         (!figure.panels.is_empty()).then(|| FigureBlock {
             condition: None,
             file: "profiles.svg".to_owned(),
-            caption: caption(self),
-            details: details(self),
+            caption: figure_caption(self),
+            details: figure_details(self),
             drawing: Drawing::Chart(figure),
         })
     }
 }
 
-fn profile(parameter: &FreeParameter, result: &FitResult, lines: &[ParameterLine]) -> Option<Profile> {
+fn parameter_profile(
+    parameter: &FreeParameter,
+    result: &FitResult,
+    lines: &[ParameterLine],
+) -> Option<ParameterProfile> {
     let found = result.parameters.get(&parameter.name)?;
     let line = lines.iter().find(|line| line.name == parameter.name);
-    Some(Profile {
-        symbol: symbol(&parameter.name),
+    Some(ParameterProfile {
+        symbol: parameter_symbol(&parameter.name),
         unit: line.map(|line| line.unit.clone()).unwrap_or_default(),
         verdict: found.verdict,
         bounds: (parameter.bounds.lower(), parameter.bounds.upper()),
         estimate: found.estimate,
         truth: line.and_then(|line| line.truth).map(|truth| truth.value),
         points: found.profile.iter().map(|(value, cost)| (*value, cost - result.cost)).collect(),
-        linear: parabola(parameter, found, result.threshold),
+        linear: linear_model_parabola(parameter, found, result.threshold),
         stated: [found.lower_95, found.upper_95],
         intervals: [
-            Some(closed(parameter, found)),
+            Some(closed_interval(parameter, found)),
             found.linear_95.map(|ends| ends.map(Some)),
             found.bootstrap_95.map(|ends| ends.map(Some)),
         ],
@@ -119,7 +130,7 @@ fn profile(parameter: &FreeParameter, result: &FitResult, lines: &[ParameterLine
 const PARABOLA: u32 = 60;
 
 /// Ends of the profile's interval; one at a bound is open, as what lies beyond was not tried.
-fn closed(parameter: &FreeParameter, found: &ParameterResult) -> [Option<f64>; 2] {
+fn closed_interval(parameter: &FreeParameter, found: &ParameterResult) -> [Option<f64>; 2] {
     let inside = |end: &f64| (AT_BOUND..=1.0 - AT_BOUND).contains(&parameter.bounds.to_unit(*end));
     found.profile_95.map(|end| end.filter(inside))
 }
@@ -130,7 +141,11 @@ const REACH: f64 = 2.0;
 /// The cost by the linear model: a parabola in the scale of the search, through the threshold at the ends of
 /// the linear interval. An end at a bound may have been cut there, so the longer half counts; none where both
 /// are.
-fn parabola(parameter: &FreeParameter, found: &ParameterResult, threshold: f64) -> Vec<(f64, f64)> {
+fn linear_model_parabola(
+    parameter: &FreeParameter,
+    found: &ParameterResult,
+    threshold: f64,
+) -> Vec<(f64, f64)> {
     let bounds = &parameter.bounds;
     let Some(ends) =
         found.linear_95.filter(|[lower, upper]| *lower > bounds.lower() || *upper < bounds.upper())
@@ -149,24 +164,29 @@ fn parabola(parameter: &FreeParameter, found: &ParameterResult, threshold: f64) 
 
 /// The figure; one without panels where no parameter has a profile.
 #[must_use]
-pub fn figure(shown: &Profiles) -> Figure {
+pub fn draw_figure(shown: &ProfilePlot) -> Figure {
     Figure {
-        title: claim(shown),
+        title: claim_sentence(shown),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
-        synthetic: shown.synthetic,
+        watermarked: shown.synthetic,
         description:
             "Rise of the cost along each parameter with the others refitted, against the 95 % threshold."
                 .to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
-        panels: shown.parameters.iter().filter(|p| !p.points.is_empty()).map(|p| panel(shown, p)).collect(),
+        panels: shown
+            .parameters
+            .iter()
+            .filter(|p| !p.points.is_empty())
+            .map(|p| draw_panel(shown, p))
+            .collect(),
     }
 }
 
-fn panel(shown: &Profiles, profile: &Profile) -> Panel {
+fn draw_panel(shown: &ProfilePlot, profile: &ParameterProfile) -> Panel {
     let top = SHOWN * shown.threshold;
-    let (low, high) = ends(profile, top);
-    let (unit, factor) = unit(&profile.unit, [low, high]);
+    let (low, high) = x_limits(profile, top);
+    let (unit, factor) = choose_prefix(&profile.unit, [low, high]);
     let (low, high) = (low * factor, high * factor);
     let line = |label: &str, colour, mark, points: &[(f64, f64)]| Series {
         label: label.to_owned(),
@@ -179,15 +199,17 @@ fn panel(shown: &Profiles, profile: &Profile) -> Panel {
     let mut series = vec![
         line("95 % threshold", Colour::Grey, Mark::Dashed, &level),
         line("cost by the linear model", Colour::Orange, Mark::ThinDashed, &profile.linear),
-        line("cost, others refitted", Colour::Blue, Mark::Joined(Shape::Disc), &profile.points),
+        line("cost, others refitted", Colour::Blue, Mark::Joined(MarkerShape::Disc), &profile.points),
     ];
     series.retain(|s| !s.points.is_empty());
     let bars = INTERVALS.iter().zip(profile.intervals);
     series.extend(
-        bars.filter_map(|(look, ends)| interval(shown, look, ends?, profile.estimate, factor, (low, high))),
+        bars.filter_map(|(look, ends)| {
+            interval_bar(shown, look, ends?, profile.estimate, factor, (low, high))
+        }),
     );
-    series.extend(stated(shown, profile, factor, (low, high)));
-    let truth = profile.truth.map(|at| Rule {
+    series.extend(stated_interval_line(shown, profile, factor, (low, high)));
+    let truth = profile.truth.map(|at| VerticalLine {
         label: "synthetic truth".to_owned(),
         colour: Colour::Vermilion,
         mark: Mark::Line,
@@ -195,20 +217,25 @@ fn panel(shown: &Profiles, profile: &Profile) -> Panel {
         above: None,
     });
     Panel {
-        title: in_a_title(profile.verdict),
-        x: Axis::linear(with_unit(&profile.symbol, &unit)).between(low, high),
-        y: Axis::linear("rise of the cost").between(-0.04 * top, top),
+        title: title_word(profile.verdict),
+        x: ChartAxis::linear(label_with_unit(&profile.symbol, &unit)).with_range(low, high),
+        y: ChartAxis::linear("rise of the cost").with_range(-0.04 * top, top),
         height_mm: HEIGHT_MM,
         series,
-        bands: outside(profile, factor, (low, high)),
-        rules: truth.into_iter().collect(),
+        shaded_spans: out_of_bounds_spans(profile, factor, (low, high)),
+        vertical_lines: truth.into_iter().collect(),
         ..Panel::default()
     }
 }
 
 /// The interval that the page states as a thick line; an open end runs out of the axes. None where both are
 /// open, as nothing is stated then.
-fn stated(shown: &Profiles, profile: &Profile, factor: f64, (low, high): (f64, f64)) -> Option<Series> {
+fn stated_interval_line(
+    shown: &ProfilePlot,
+    profile: &ParameterProfile,
+    factor: f64,
+    (low, high): (f64, f64),
+) -> Option<Series> {
     let (label, height) = STATED;
     let ([lower, upper], beyond) = (profile.stated, high - low);
     (lower.is_some() || upper.is_some()).then(|| {
@@ -227,9 +254,9 @@ fn stated(shown: &Profiles, profile: &Profile, factor: f64, (low, high): (f64, f
 }
 
 /// An interval as a bar with a symbol at the estimate; an open end runs out of the axes.
-fn interval(
-    shown: &Profiles,
-    (name, colour, shape, height): &(&str, Colour, Shape, f64),
+fn interval_bar(
+    shown: &ProfilePlot,
+    (name, colour, shape, height): &(&str, Colour, MarkerShape, f64),
     [lower, upper]: [Option<f64>; 2],
     estimate: f64,
     factor: f64,
@@ -245,14 +272,18 @@ fn interval(
         colour: *colour,
         mark: Mark::Hollow(*shape),
         points: vec![Some((estimate * factor, y))],
-        bars: vec![Bar::Horizontal { y, from: end(lower, low - beyond), to: end(upper, high + beyond) }],
+        error_bars: vec![ErrorBar::Horizontal {
+            y,
+            from: end(lower, low - beyond),
+            to: end(upper, high + beyond),
+        }],
     })
 }
 
 /// Where the search could not go, as far as that is shown.
-fn outside(profile: &Profile, factor: f64, (low, high): (f64, f64)) -> Vec<Band> {
+fn out_of_bounds_spans(profile: &ParameterProfile, factor: f64, (low, high): (f64, f64)) -> Vec<ShadedSpan> {
     let (lower, upper) = (profile.bounds.0 * factor, profile.bounds.1 * factor);
-    let band = |from, to| Band {
+    let band = |from, to| ShadedSpan {
         label: "out of bounds".to_owned(),
         colour: Colour::Grey,
         from,
@@ -267,14 +298,14 @@ fn outside(profile: &Profile, factor: f64, (low, high): (f64, f64)) -> Vec<Band>
 }
 
 /// Ends of the x axis: of the profile as far as it is shown, of the intervals and the truth, with some room.
-fn ends(profile: &Profile, top: f64) -> (f64, f64) {
+fn x_limits(profile: &ParameterProfile, top: f64) -> (f64, f64) {
     let rises = |at: usize| profile.points.get(at).is_some_and(|(_, rise)| *rise <= top);
     // a place beyond the top belongs to the figure where the line to it starts inside
     let reached = |at: usize| rises(at) || at.checked_sub(1).is_some_and(rises) || rises(at + 1);
     let inside = profile.points.iter().enumerate().filter(|(at, _)| reached(*at)).map(
         |(at, (value, rise))| match rises(at) {
             true => *value,
-            false => cut(profile, at, (*value, *rise), top),
+            false => crossing_at_top(profile, at, (*value, *rise), top),
         },
     );
     let intervals = profile.intervals.iter().flatten().flatten().chain(&profile.stated).flatten().copied();
@@ -286,7 +317,7 @@ fn ends(profile: &Profile, top: f64) -> (f64, f64) {
 }
 
 /// Where the line from the neighbour inside to a point beyond the top leaves it.
-fn cut(profile: &Profile, at: usize, (value, rise): (f64, f64), top: f64) -> f64 {
+fn crossing_at_top(profile: &ParameterProfile, at: usize, (value, rise): (f64, f64), top: f64) -> f64 {
     let neighbours =
         [at.checked_sub(1), at.checked_add(1)].into_iter().flatten().filter_map(|i| profile.points.get(i));
     let crossing = |(x, y): &(f64, f64)| x + (top - y) / (rise - y) * (value - x);
@@ -298,49 +329,50 @@ fn cut(profile: &Profile, at: usize, (value, rise): (f64, f64), top: f64) -> f64
 
 /// What the figure shows, with its number.
 #[must_use]
-pub fn caption(shown: &Profiles) -> String {
-    format!("Rise of the cost along each parameter while the others are refitted: {}.", claim(shown))
+pub fn figure_caption(shown: &ProfilePlot) -> String {
+    format!("Rise of the cost along each parameter while the others are refitted: {}.", claim_sentence(shown))
 }
 
 /// The claim with its numbers.
-fn claim(shown: &Profiles) -> String {
-    let drawn = drawn(shown);
-    let crosses = |p: &&&Profile| p.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some));
+fn claim_sentence(shown: &ProfilePlot) -> String {
+    let drawn = drawn_profiles(shown);
+    let crosses =
+        |p: &&&ParameterProfile| p.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some));
     let (count, all) = (drawn.iter().filter(crosses).count(), drawn.len());
     format!("{count} of {all} profiles cross the 95 % threshold on both sides")
 }
 
 /// How to read the figure, and its numbers.
 #[must_use]
-pub fn details(shown: &Profiles) -> String {
-    let drawn = drawn(shown);
+pub fn figure_details(shown: &ProfilePlot) -> String {
+    let drawn = drawn_profiles(shown);
     let mut sentences = vec![
         format!(
             "The cost is drawn over its least value, {}; the axes end at {SHOWN} times the threshold of {}.",
-            short(shown.least_cost),
-            short(shown.threshold)
+            format_short(shown.least_cost),
+            format_short(shown.threshold)
         ),
         "Thick line: the 95 % interval that the table states. Bars: 95 % intervals with their symbol at the estimate; a bar that leaves the axes is open on that \
          side."
             .to_owned(),
-        format!("By the profiles: {}.", drawn.iter().map(|p| in_words(p)).collect::<Vec<_>>().join("; ")),
+        format!("By the profiles: {}.", drawn.iter().map(|p| describe_interval(p)).collect::<Vec<_>>().join("; ")),
     ];
-    let open = drawn.iter().any(|p| open_but_rising(p, shown.threshold));
+    let open = drawn.iter().any(|p| is_open_but_rising(p, shown.threshold));
     sentences.extend(open.then(|| {
         "Where a line rises over the threshold on a side that counts as open, that parameter or another has \
          reached a bound of the search."
             .to_owned()
     }));
-    sentences.extend(drawn.iter().any(|p| closed_but_not_identified(p)).then(|| {
+    sentences.extend(drawn.iter().any(|p| is_closed_but_unidentified(p)).then(|| {
         format!(
             "A parameter whose line crosses the threshold on both sides is \u{201c}{}\u{201d} if the \
              features \
              determine no value near the estimate or the search is in doubt.",
-            in_a_title(Verdict::NotIdentified)
+            title_word(ParameterVerdict::NotIdentified)
         )
     }));
-    sentences.extend(undetermined(&drawn));
-    sentences.extend(truths(&drawn));
+    sentences.extend(describe_undetermined(&drawn));
+    sentences.extend(describe_truths(&drawn));
     sentences.push(
         "Where the best point is reliable, the intervals of the table reach as far as profile, bootstrap and \
          every point of the fit within the threshold."
@@ -349,24 +381,24 @@ pub fn details(shown: &Profiles) -> String {
     sentences.join(" ")
 }
 
-fn drawn(shown: &Profiles) -> Vec<&Profile> {
+fn drawn_profiles(shown: &ProfilePlot) -> Vec<&ParameterProfile> {
     shown.parameters.iter().filter(|p| !p.points.is_empty()).collect()
 }
 
-fn in_a_title(verdict: Verdict) -> String {
-    verdict.word().replace('-', " ")
+fn title_word(verdict: ParameterVerdict) -> String {
+    verdict.name().replace('-', " ")
 }
 
-fn closed_but_not_identified(profile: &Profile) -> bool {
-    profile.verdict == Verdict::NotIdentified
+fn is_closed_but_unidentified(profile: &ParameterProfile) -> bool {
+    profile.verdict == ParameterVerdict::NotIdentified
         && profile.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some))
 }
 
 /// "A from 0.1 to 0.2", or which end is open.
-fn in_words(profile: &Profile) -> String {
+fn describe_interval(profile: &ParameterProfile) -> String {
     let [lower, upper] = profile.intervals[0].unwrap_or_default();
-    let (unit, factor) = unit(&profile.unit, [profile.estimate]);
-    let value = |v: f64| short(v * factor);
+    let (unit, factor) = choose_prefix(&profile.unit, [profile.estimate]);
+    let value = |v: f64| format_short(v * factor);
     let ends = match (lower, upper) {
         (Some(lower), Some(upper)) => format!("from {} to {}", value(lower), value(upper)),
         (Some(lower), None) => format!("above {}, open upwards", value(lower)),
@@ -377,7 +409,7 @@ fn in_words(profile: &Profile) -> String {
 }
 
 /// Whether the cost crosses the threshold on a side on which the interval is open.
-fn open_but_rising(profile: &Profile, threshold: f64) -> bool {
+fn is_open_but_rising(profile: &ParameterProfile, threshold: f64) -> bool {
     let [lower, upper] = profile.intervals[0].unwrap_or_default();
     let rises = |below: bool| {
         profile.points.iter().any(|(value, rise)| (*value < profile.estimate) == below && *rise > threshold)
@@ -385,17 +417,18 @@ fn open_but_rising(profile: &Profile, threshold: f64) -> bool {
     (lower.is_none() && rises(true)) || (upper.is_none() && rises(false))
 }
 
-fn undetermined(drawn: &[&Profile]) -> Option<String> {
+fn describe_undetermined(drawn: &[&ParameterProfile]) -> Option<String> {
     let without: Vec<String> =
         drawn.iter().filter(|p| p.intervals[1].is_none()).map(|p| p.symbol.clone()).collect();
-    (!without.is_empty())
-        .then(|| format!("The linear model at the estimates gives no interval for {}.", listed(&without)))
+    (!without.is_empty()).then(|| {
+        format!("The linear model at the estimates gives no interval for {}.", join_with_and(&without))
+    })
 }
 
 /// How many truths the profile's intervals hold.
-fn truths(drawn: &[&Profile]) -> Option<String> {
-    let known: Vec<(&&Profile, f64)> = drawn.iter().filter_map(|p| Some((p, p.truth?))).collect();
-    let holds = |(p, truth): &&(&&Profile, f64)| {
+fn describe_truths(drawn: &[&ParameterProfile]) -> Option<String> {
+    let known: Vec<(&&ParameterProfile, f64)> = drawn.iter().filter_map(|p| Some((p, p.truth?))).collect();
+    let holds = |(p, truth): &&(&&ParameterProfile, f64)| {
         let [lower, upper] = p.intervals[0].unwrap_or_default();
         lower.is_none_or(|l| l <= *truth) && upper.is_none_or(|u| *truth <= u)
     };
@@ -412,10 +445,10 @@ fn truths(drawn: &[&Profile]) -> Option<String> {
 mod tests {
     use super::*;
     use crate::chart::Medium;
-    use crate::fit::scale::{Bounds, Spacing};
+    use crate::fit::scale::{Bounds, BoundsSpacing};
 
-    fn profile() -> Profile {
-        Profile {
+    fn profile() -> ParameterProfile {
+        ParameterProfile {
             symbol: "k1".to_owned(),
             unit: "N m/rad".to_owned(),
             bounds: (1e-3, 2.2e-3),
@@ -424,25 +457,25 @@ mod tests {
             points: vec![(1.0e-3, 20.0), (1.8e-3, 4.0), (2e-3, 0.0), (2.2e-3, 1.0)],
             stated: [Some(1.81e-3), None],
             intervals: [Some([Some(1.81e-3), None]), None, None],
-            verdict: Verdict::OpenAbove,
+            verdict: ParameterVerdict::OpenAbove,
             linear: Vec::new(),
         }
     }
 
-    fn shown() -> Profiles {
-        Profiles {
+    fn shown() -> ProfilePlot {
+        ProfilePlot {
             title: "t".to_owned(),
             least_cost: 0.5,
             threshold: 4.0,
             parameters: vec![profile()],
-            ..Profiles::default()
+            ..ProfilePlot::default()
         }
     }
 
     #[test]
     fn the_axis_ends_where_the_line_leaves_the_panel() {
         // the line from (1.8e-3, 4) to (1e-3, 20) reaches 12 half way, at 1.4e-3
-        let (low, high) = ends(&profile(), 12.0);
+        let (low, high) = x_limits(&profile(), 12.0);
         let room = ROOM * (2.2e-3 - 1.4e-3);
         assert!(
             (low - (1.4e-3 - room)).abs() < 1e-12 && (high - (2.2e-3 + room)).abs() < 1e-12,
@@ -452,19 +485,21 @@ mod tests {
 
     #[test]
     fn an_open_interval_runs_out_and_the_bound_is_shaded() {
-        let panel = panel(&shown(), &profile());
+        let panel = draw_panel(&shown(), &profile());
         assert_eq!(panel.x.label, "k1, mN m/rad");
         let (_, high) = panel.x.range.unwrap();
-        let bar = panel.series.iter().flat_map(|s| &s.bars).next().unwrap();
-        assert!(matches!(bar, Bar::Horizontal { from, to, .. } if (from - 1.81).abs() < 1e-12 && *to > high));
-        assert_eq!(panel.bands.iter().map(|b| b.from).collect::<Vec<_>>(), [2.2]);
-        assert!((panel.rules[0].at - 1.9).abs() < 1e-12);
+        let bar = panel.series.iter().flat_map(|s| &s.error_bars).next().unwrap();
+        assert!(
+            matches!(bar, ErrorBar::Horizontal { from, to, .. } if (from - 1.81).abs() < 1e-12 && *to > high)
+        );
+        assert_eq!(panel.shaded_spans.iter().map(|b| b.from).collect::<Vec<_>>(), [2.2]);
+        assert!((panel.vertical_lines[0].at - 1.9).abs() < 1e-12);
     }
 
     #[test]
     fn caption_and_details_say_what_is_open_and_how_many_truths_are_held() {
-        assert!(caption(&shown()).contains("0 of 1 profiles cross"), "{}", caption(&shown()));
-        let text = details(&shown());
+        assert!(figure_caption(&shown()).contains("0 of 1 profiles cross"), "{}", figure_caption(&shown()));
+        let text = figure_details(&shown());
         assert!(
             text.contains("k1 above 1.81, open upwards mN m/rad") && text.contains("no interval for k1"),
             "{text}"
@@ -475,10 +510,10 @@ mod tests {
     #[test]
     fn the_details_explain_a_rise_on_an_open_side() {
         let open = "on a side that counts as open";
-        assert!(!details(&shown()).contains(open));
+        assert!(!figure_details(&shown()).contains(open));
         let mut rising = shown();
         rising.parameters[0].points.push((2.21e-3, 9.0));
-        assert!(details(&rising).contains(open));
+        assert!(figure_details(&rising).contains(open));
     }
 
     #[test]
@@ -487,13 +522,13 @@ mod tests {
         let result = include_str!("../../fits/published-simulation/result.json");
         let (job, result) =
             (Job::parse("job.toml", job).unwrap(), FitResult::parse("result.json", result).unwrap());
-        let shown = Profiles::of(&job, &result, &[]);
+        let shown = ProfilePlot::from_fit(&job, &result, &[]);
         let (mut closed, mut open) = (0, 0);
         for (free, profile) in job.parameters.iter().zip(&shown.parameters) {
             let found = &result.parameters[&free.name];
             assert_eq!(profile.stated, [found.lower_95, found.upper_95], "{}", free.name);
-            let line = panel(&shown, profile).series.into_iter().find(|s| s.label == STATED.0);
-            let (low, high) = panel(&shown, profile).x.range.unwrap();
+            let line = draw_panel(&shown, profile).series.into_iter().find(|s| s.label == STATED.0);
+            let (low, high) = draw_panel(&shown, profile).x.range.unwrap();
             for (point, end) in line.unwrap().points.iter().zip([found.lower_95, found.upper_95]) {
                 let at = point.unwrap().0;
                 if let Some(end) = end {
@@ -510,12 +545,13 @@ mod tests {
 
     #[test]
     fn parameters_without_a_profile_have_no_panel() {
-        let none = Profiles { parameters: vec![Profile { points: Vec::new(), ..profile() }], ..shown() };
-        assert!(figure(&none).panels.is_empty());
-        assert!(figure(&shown()).svg(Medium::Column).contains("95 % threshold"));
+        let none =
+            ProfilePlot { parameters: vec![ParameterProfile { points: Vec::new(), ..profile() }], ..shown() };
+        assert!(draw_figure(&none).panels.is_empty());
+        assert!(draw_figure(&shown()).to_svg(Medium::Column).contains("95 % threshold"));
     }
 
-    fn free(spacing: Spacing) -> FreeParameter {
+    fn free(spacing: BoundsSpacing) -> FreeParameter {
         FreeParameter {
             name: "friction.a".to_owned(),
             bounds: Bounds::new(0.1, 1.0, spacing).unwrap(),
@@ -528,7 +564,7 @@ mod tests {
             estimate,
             lower_95: None,
             upper_95: Some(0.9),
-            verdict: Verdict::OpenBelow,
+            verdict: ParameterVerdict::OpenBelow,
             linear_95,
             profile_95: [Some(0.1), Some(0.8)],
             bootstrap_95: None,
@@ -544,8 +580,8 @@ mod tests {
 
     #[test]
     fn the_parabola_meets_the_threshold_at_the_ends_of_the_linear_interval() {
-        let linear = parabola(&free(Spacing::Linear), &found(0.5, Some([0.4, 0.6])), 4.0);
-        let log = parabola(&free(Spacing::Log), &found(0.4, Some([0.32, 0.5])), 4.0);
+        let linear = linear_model_parabola(&free(BoundsSpacing::Linear), &found(0.5, Some([0.4, 0.6])), 4.0);
+        let log = linear_model_parabola(&free(BoundsSpacing::Log), &found(0.4, Some([0.32, 0.5])), 4.0);
         for (parabola, ends) in [(linear, [0.4, 0.5, 0.6]), (log, [0.32, 0.4, 0.5])] {
             let rises = ends.map(|end| at(&parabola, end));
             assert!(
@@ -557,14 +593,17 @@ mod tests {
 
     #[test]
     fn an_end_that_a_bound_cut_does_not_narrow_the_parabola() {
-        let cut = parabola(&free(Spacing::Linear), &found(0.2, Some([0.1, 0.4])), 4.0);
+        let cut = linear_model_parabola(&free(BoundsSpacing::Linear), &found(0.2, Some([0.1, 0.4])), 4.0);
         assert!((at(&cut, 0.4) - 4.0).abs() < 1e-9 && at(&cut, 0.1) < 1.1, "{cut:?}");
-        assert!(parabola(&free(Spacing::Linear), &found(0.2, Some([0.1, 1.0])), 4.0).is_empty());
-        assert!(parabola(&free(Spacing::Linear), &found(0.2, None), 4.0).is_empty());
+        assert!(
+            linear_model_parabola(&free(BoundsSpacing::Linear), &found(0.2, Some([0.1, 1.0])), 4.0)
+                .is_empty()
+        );
+        assert!(linear_model_parabola(&free(BoundsSpacing::Linear), &found(0.2, None), 4.0).is_empty());
     }
 
     #[test]
     fn an_end_at_a_bound_is_open_in_the_figure() {
-        assert_eq!(closed(&free(Spacing::Linear), &found(0.5, None)), [None, Some(0.8)]);
+        assert_eq!(closed_interval(&free(BoundsSpacing::Linear), &found(0.5, None)), [None, Some(0.8)]);
     }
 }

@@ -1,9 +1,11 @@
 //! Every feature of a fit on one axis: how many deviations of its target the model is off.
 
-use crate::chart::{Axis, Band, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series, Shape};
+use crate::chart::{
+    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan, VerticalLine,
+};
 use crate::compare::Comparison;
 use crate::figures::{Drawing, FigureBlock, about, subtitle};
-use crate::text::{digits, plural, shortened};
+use crate::text::{format_digits, pluralise, truncate_text};
 
 /// A feature and how far off it is.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -18,7 +20,7 @@ pub struct Pull {
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Pulls {
+pub struct PullPlot {
     /// What was fitted.
     pub title: String,
     /// Whether a target was measured on a recording that no camera took.
@@ -39,10 +41,10 @@ const LETTERS: usize = 16;
 /// Least end of the axis, deviations.
 const LEAST_END: f64 = 3.0;
 
-impl Pulls {
+impl PullPlot {
     /// Those of a report's rows.
     #[must_use]
-    pub fn of(title: &str, fitted: &[&[Comparison]], held_out: &[Comparison]) -> Self {
+    pub fn from_comparisons(title: &str, fitted: &[&[Comparison]], held_out: &[Comparison]) -> Self {
         let deviations = |row: &Comparison| {
             let sd = row.target_sd.filter(|sd| *sd > 0.0)?;
             Some((row.model? - row.target) / sd).filter(|deviations| deviations.is_finite())
@@ -66,42 +68,42 @@ impl Pulls {
 
     /// The figure with its caption; nothing without a feature.
     #[must_use]
-    pub fn block(&self) -> Option<FigureBlock> {
+    pub fn figure_block(&self) -> Option<FigureBlock> {
         (!self.pulls.is_empty()).then(|| FigureBlock {
             condition: None,
             file: "pulls.svg".to_owned(),
-            caption: caption(self),
+            caption: figure_caption(self),
             details: "A feature of a right model lies within 1.96 deviations in 95 % of all cases. The \
                       deviation is that of the target alone; the scatter of the model, which counts in the \
                       fit too, is in the table."
                 .to_owned(),
-            drawing: Drawing::Chart(figure(self)),
+            drawing: Drawing::Chart(draw_figure(self)),
         })
     }
 
-    fn worst(&self) -> Option<&Pull> {
+    fn largest_pull(&self) -> Option<&Pull> {
         self.pulls.iter().max_by(|a, b| a.deviations.abs().total_cmp(&b.deviations.abs()))
     }
 }
 
 /// The figure.
 #[must_use]
-pub fn figure(shown: &Pulls) -> Figure {
+pub fn draw_figure(shown: &PullPlot) -> Figure {
     let count = shown.pulls.len();
-    let most = shown.worst().map_or(0.0, |pull| pull.deviations.abs());
+    let most = shown.largest_pull().map_or(0.0, |pull| pull.deviations.abs());
     let end = LEAST_END.max(1.1 * most);
     let of = |held_out: bool| {
         let places = shown.pulls.iter().enumerate().filter(move |(_, pull)| pull.held_out == held_out);
         places.map(|(i, pull)| Some((pull.deviations, (count - 1 - i) as f64))).collect::<Vec<_>>()
     };
     let series = [
-        ("fitted", Colour::Blue, Mark::Hollow(Shape::Disc), of(false)),
-        ("predicted, not fitted", Colour::Vermilion, Mark::Hollow(Shape::Diamond), of(true)),
+        ("fitted", Colour::Blue, Mark::Hollow(MarkerShape::Disc), of(false)),
+        ("predicted, not fitted", Colour::Vermilion, Mark::Hollow(MarkerShape::Diamond), of(true)),
     ];
     let drawn = series.into_iter().filter(|(.., points)| !points.is_empty());
     let panel = Panel {
-        x: Axis::linear("deviations from the target").between(-end, end),
-        y: Axis::named("", shown.pulls.iter().rev().map(|pull| pull.name.clone())),
+        x: ChartAxis::linear("deviations from the target").with_range(-end, end),
+        y: ChartAxis::categorical("", shown.pulls.iter().rev().map(|pull| pull.name.clone())),
         height_mm: LEAST_MM.max(ROW_MM * count as f64),
         series: drawn
             .map(|(label, colour, mark, points)| Series {
@@ -112,20 +114,25 @@ pub fn figure(shown: &Pulls) -> Figure {
                 ..Series::default()
             })
             .collect(),
-        bands: vec![Band {
+        shaded_spans: vec![ShadedSpan {
             label: "95 % of a right model".to_owned(),
             colour: Colour::SkyBlue,
             from: -WITHIN_95,
             to: WITHIN_95,
             outlined: false,
         }],
-        rules: vec![Rule { colour: Colour::Grey, mark: Mark::Thin, at: 0.0, ..Rule::default() }],
+        vertical_lines: vec![VerticalLine {
+            colour: Colour::Grey,
+            mark: Mark::Thin,
+            at: 0.0,
+            ..VerticalLine::default()
+        }],
         ..Panel::default()
     };
     Figure {
-        title: claim(shown),
+        title: claim_sentence(shown),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
-        synthetic: shown.synthetic,
+        watermarked: shown.synthetic,
         description: "Model minus target of every feature, in deviations of the target.".to_owned(),
         width_mm: FULL_WIDTH_MM,
         panels: vec![panel],
@@ -134,31 +141,31 @@ pub fn figure(shown: &Pulls) -> Figure {
 }
 
 /// The claim with its number.
-fn claim(shown: &Pulls) -> String {
-    let Some(worst) = shown.worst() else { return "No feature has a deviation".to_owned() };
-    let most = digits(worst.deviations.abs(), 2);
+fn claim_sentence(shown: &PullPlot) -> String {
+    let Some(worst) = shown.largest_pull() else { return "No feature has a deviation".to_owned() };
+    let most = format_digits(worst.deviations.abs(), 2);
     let missed = shown.pulls.iter().filter(|pull| pull.deviations.abs() > WITHIN_95).count();
     let all = shown.pulls.len();
     match missed {
-        0 => format!("The model meets {all} {} within {most} deviations", plural("feature", all)),
+        0 => format!("The model meets {all} {} within {most} deviations", pluralise("feature", all)),
         _ => format!(
             "{missed} of {all} {} {} more than 1.96 deviations off, {} by {most}",
-            plural("feature", all),
+            pluralise("feature", all),
             if missed == 1 { "is" } else { "are" },
-            shortened(&worst.name, LETTERS)
+            truncate_text(&worst.name, LETTERS)
         ),
     }
 }
 
 /// What the figure shows, with its number.
 #[must_use]
-pub fn caption(shown: &Pulls) -> String {
+pub fn figure_caption(shown: &PullPlot) -> String {
     let without = if shown.without.is_empty() {
         String::new()
     } else {
         format!("; {} not drawn, as model or deviation is missing", shown.without.len())
     };
-    format!("{}{without}.", claim(shown))
+    format!("{}{without}.", claim_sentence(shown))
 }
 
 #[cfg(test)]
@@ -173,18 +180,20 @@ mod tests {
     fn a_pull_is_model_minus_target_over_its_deviation() {
         let fitted = [row("low", 78.4, Some(0.4), Some(79.4)), row("high", 900.0, None, Some(900.0))];
         let held_out = [row("release", 0.066, Some(0.001), Some(0.0655))];
-        let shown = Pulls::of("t", &[&fitted], &held_out);
+        let shown = PullPlot::from_comparisons("t", &[&fitted], &held_out);
         let found: Vec<f64> = shown.pulls.iter().map(|pull| pull.deviations).collect();
         assert!((found[0] - 2.5).abs() < 1e-9 && (found[1] + 0.5).abs() < 1e-9, "{found:?}");
         assert_eq!(shown.without, ["high"]);
-        assert_eq!(claim(&shown), "1 of 2 features is more than 1.96 deviations off, low by 2.5");
-        assert!(caption(&shown).ends_with("low by 2.5; 1 not drawn, as model or deviation is missing."));
-        let drawn = figure(&shown);
+        assert_eq!(claim_sentence(&shown), "1 of 2 features is more than 1.96 deviations off, low by 2.5");
+        assert!(
+            figure_caption(&shown).ends_with("low by 2.5; 1 not drawn, as model or deviation is missing.")
+        );
+        let drawn = draw_figure(&shown);
         assert_eq!(drawn.panels[0].series[1].points, [Some((shown.pulls[1].deviations, 0.0))]);
     }
 
     #[test]
     fn without_a_feature_there_is_no_figure() {
-        assert!(Pulls::default().block().is_none());
+        assert!(PullPlot::default().figure_block().is_none());
     }
 }

@@ -1,11 +1,11 @@
 //! A recording as it was tracked: its motion, its gaps and its reversals.
 
-use super::history::{self, History};
+use super::history::{self, TimeHistory};
 use super::subtitle;
-use crate::chart::{Band, Colour, Figure};
+use crate::chart::{Colour, Figure, ShadedSpan};
 use crate::recording::Recording;
 use crate::recording::motion_traces::MotionTraces;
-use crate::text::{percent, plural, short};
+use crate::text::{format_percent, format_short, pluralise};
 
 /// Reversals that are named; a longer recording has more than a figure has room for.
 const MOST_NAMED: usize = 6;
@@ -16,53 +16,53 @@ const LEAST_GAP: usize = 3;
 
 /// The figure; `reversals` are instants, s, and `said` is what a reader has to know.
 #[must_use]
-pub fn figure(recording: &Recording, reversals: &[f64], said: &str) -> Figure {
+pub fn draw_figure(recording: &Recording, reversals: &[f64], said: &str) -> Figure {
     let name = |(number, at): (usize, &f64)| (format!("reversal {}", number + 1), *at);
     let named = reversals.iter().enumerate().take(MOST_NAMED).map(name);
-    let history = History {
-        title: claim(recording, reversals.len()),
+    let history = TimeHistory {
+        title: claim_sentence(recording, reversals.len()),
         synthetic: recording.is_synthetic(),
-        measured: Some(MotionTraces::of(recording)),
+        measured: Some(MotionTraces::from_recording(recording)),
         instants: named.collect(),
-        ..History::default()
+        ..TimeHistory::default()
     };
-    let mut figure = history::figure(&history);
+    let mut figure = history::draw_figure(&history);
     let origin = subtitle(recording.is_synthetic(), "");
     let parts = [recording.name(), origin.as_str(), said].into_iter().filter(|part| !part.is_empty());
     figure.subtitle = parts.collect::<Vec<_>>().join("; ");
-    figure.synthetic = recording.is_synthetic();
+    figure.watermarked = recording.is_synthetic();
     figure.description = format!("The recording as it was tracked: {}.", figure.subtitle);
-    let gaps = gaps(recording);
-    figure.panels.iter_mut().for_each(|panel| panel.bands.extend(gaps.iter().cloned()));
+    let gaps = gap_spans(recording);
+    figure.panels.iter_mut().for_each(|panel| panel.shaded_spans.extend(gaps.iter().cloned()));
     figure
 }
 
 /// The claim with its numbers.
-fn claim(recording: &Recording, reversals: usize) -> String {
-    let (lost, grid) = (lost(recording), recording.grid());
+fn claim_sentence(recording: &Recording, reversals: usize) -> String {
+    let (lost, grid) = (lost_frames(recording), recording.grid());
     let share = lost.iter().filter(|lost| **lost).count() as f64 / lost.len().max(1) as f64;
     let tracked = if share > 0.0 {
-        format!("{} of the frames", percent(1.0 - share))
+        format!("{} of the frames", format_percent(1.0 - share))
     } else {
         "every frame".to_owned()
     };
     let turns = match reversals {
         0 => "no reversal".to_owned(),
-        n => format!("{n} {}", plural("reversal", n)),
+        n => format!("{n} {}", pluralise("reversal", n)),
     };
     let span_s = grid.time_s(grid.frames.saturating_sub(1)) - grid.start_s;
-    format!("{} s with {turns}, head and tip tracked in {tracked}", short(span_s))
+    format!("{} s with {turns}, head and tip tracked in {tracked}", format_short(span_s))
 }
 
 /// Whether head or tip is missing in each frame.
-fn lost(recording: &Recording) -> Vec<bool> {
+fn lost_frames(recording: &Recording) -> Vec<bool> {
     let traces = recording.traces();
     traces.tip_x_m.iter().zip(&traces.head_x_m).map(|(tip, head)| tip.is_none() || head.is_none()).collect()
 }
 
 /// Runs of frames without head or without tip, s.
-fn gaps(recording: &Recording) -> Vec<Band> {
-    let (grid, lost) = (recording.grid(), lost(recording));
+fn gap_spans(recording: &Recording) -> Vec<ShadedSpan> {
+    let (grid, lost) = (recording.grid(), lost_frames(recording));
     let mut runs: Vec<(usize, usize)> = Vec::new();
     let mut at = 0;
     for run in lost.chunk_by(|a, b| a == b) {
@@ -73,7 +73,7 @@ fn gaps(recording: &Recording) -> Vec<Band> {
     }
     runs.sort_by_key(|(first, last)| std::cmp::Reverse(last - first));
     runs.truncate(MOST_GAPS);
-    let band = |(first, last): &(usize, usize)| Band {
+    let band = |(first, last): &(usize, usize)| ShadedSpan {
         label: "head or tip not tracked".to_owned(),
         colour: Colour::Grey,
         from: grid.time_s(*first),

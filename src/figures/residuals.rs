@@ -3,13 +3,13 @@
 
 pub(crate) mod caption;
 
-use crate::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series, Shape};
+use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Ribbon, Series};
 use crate::figures::subtitle;
 use crate::math;
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Diagnostics {
+pub struct ResidualDiagnostics {
     /// Heading: the claim with its number.
     pub title: String,
     /// More to say; empty for none.
@@ -36,12 +36,12 @@ const POINTS: u32 = 60;
 
 /// The figure.
 #[must_use]
-pub fn figure(shown: &Diagnostics) -> Figure {
-    let panels = [histogram(shown), correlation(shown), spectrum(shown), growth(shown)];
+pub fn draw_figure(shown: &ResidualDiagnostics) -> Figure {
+    let panels = [draw_histogram(shown), draw_correlation(shown), draw_spectrum(shown), draw_growth(shown)];
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
-        synthetic: shown.synthetic,
+        watermarked: shown.synthetic,
         description: "Residual in units of the noise: histogram, autocorrelation and spectrum against white \
                       noise, and chi2 over the length of the segments."
             .to_owned(),
@@ -51,14 +51,14 @@ pub fn figure(shown: &Diagnostics) -> Figure {
     }
 }
 
-fn line(label: &str, colour: Colour, mark: Mark, points: Vec<Option<(f64, f64)>>) -> Series {
+fn residual_line(label: &str, colour: Colour, mark: Mark, points: Vec<Option<(f64, f64)>>) -> Series {
     Series { label: label.to_owned(), colour, mark, points, ..Series::default() }
 }
 
 const RESIDUAL: &str = "residual";
 const WHITE: &str = "white noise";
 
-fn histogram(shown: &Diagnostics) -> Option<Panel> {
+fn draw_histogram(shown: &ResidualDiagnostics) -> Option<Panel> {
     let (first, last) = (shown.histogram.first()?, shown.histogram.last()?);
     let steps =
         shown.histogram.iter().flat_map(|(from, to, share)| [Some((*from, *share)), Some((*to, *share))]);
@@ -70,12 +70,12 @@ fn histogram(shown: &Diagnostics) -> Option<Panel> {
     let normal = |x: f64| math::exp(-0.5 * x * x) / std::f64::consts::TAU.sqrt();
     Some(Panel {
         title: "size".to_owned(),
-        x: Axis::linear("residual / noise").between(first.0, last.1),
-        y: Axis::linear("density"),
+        x: ChartAxis::linear("residual / noise").with_range(first.0, last.1),
+        y: ChartAxis::linear("density"),
         height_mm: HEIGHT_MM,
         series: vec![
-            line(RESIDUAL, Colour::Green, Mark::Line, steps.collect()),
-            line(
+            residual_line(RESIDUAL, Colour::Green, Mark::Line, steps.collect()),
+            residual_line(
                 WHITE,
                 Colour::Black,
                 Mark::Dashed,
@@ -87,16 +87,16 @@ fn histogram(shown: &Diagnostics) -> Option<Panel> {
     })
 }
 
-fn correlation(shown: &Diagnostics) -> Option<Panel> {
+fn draw_correlation(shown: &ResidualDiagnostics) -> Option<Panel> {
     let (first, last) =
         (shown.correlation.first()?.0 * MILLISECONDS, shown.correlation.last()?.0 * MILLISECONDS);
     let points = shown.correlation.iter().map(|(lag, r)| Some((lag * MILLISECONDS, *r)));
     Some(Panel {
         title: "memory".to_owned(),
-        x: Axis::linear("lag, ms").between(0.0, last.max(first + f64::MIN_POSITIVE)),
-        y: Axis::linear("autocorrelation").between(-1.0, 1.0),
+        x: ChartAxis::linear("lag, ms").with_range(0.0, last.max(first + f64::MIN_POSITIVE)),
+        y: ChartAxis::linear("autocorrelation").with_range(-1.0, 1.0),
         height_mm: HEIGHT_MM,
-        series: vec![line("", Colour::Green, Mark::Joined(Shape::Disc), points.collect())],
+        series: vec![residual_line("", Colour::Green, Mark::Joined(MarkerShape::Disc), points.collect())],
         ribbons: vec![Ribbon {
             label: "95 % of white noise".to_owned(),
             colour: Colour::SkyBlue,
@@ -106,33 +106,33 @@ fn correlation(shown: &Diagnostics) -> Option<Panel> {
     })
 }
 
-fn spectrum(shown: &Diagnostics) -> Option<Panel> {
+fn draw_spectrum(shown: &ResidualDiagnostics) -> Option<Panel> {
     let (first, last) = (shown.spectrum.first()?.0, shown.spectrum.last()?.0);
     Some(Panel {
         title: "frequencies".to_owned(),
-        x: Axis::linear("frequency, Hz").between(0.0, last),
-        y: Axis::log("power / that of the noise"),
+        x: ChartAxis::linear("frequency, Hz").with_range(0.0, last),
+        y: ChartAxis::log("power / that of the noise"),
         height_mm: HEIGHT_MM,
         series: vec![
-            line("", Colour::Green, Mark::Thin, shown.spectrum.iter().copied().map(Some).collect()),
-            line(WHITE, Colour::Black, Mark::Dashed, vec![Some((first, 1.0)), Some((last, 1.0))]),
+            residual_line("", Colour::Green, Mark::Thin, shown.spectrum.iter().copied().map(Some).collect()),
+            residual_line(WHITE, Colour::Black, Mark::Dashed, vec![Some((first, 1.0)), Some((last, 1.0))]),
         ],
         ..Panel::default()
     })
 }
 
-fn growth(shown: &Diagnostics) -> Option<Panel> {
+fn draw_growth(shown: &ResidualDiagnostics) -> Option<Panel> {
     let points: Vec<_> = shown.growth.iter().map(|(s, chi2)| Some((s * MILLISECONDS, *chi2))).collect();
     let ends = shown.growth.first().zip(shown.growth.last())?;
     let ends = [ends.0.0 * MILLISECONDS / 1.2, ends.1.0 * MILLISECONDS * 1.2];
     Some(Panel {
         title: "growth".to_owned(),
-        x: Axis::log("length of a segment, ms").between(ends[0], ends[1]),
-        y: Axis::log("chi2 per degree of freedom"),
+        x: ChartAxis::log("length of a segment, ms").with_range(ends[0], ends[1]),
+        y: ChartAxis::log("chi2 per degree of freedom"),
         height_mm: HEIGHT_MM,
         series: vec![
-            line("segments of the fit", Colour::Blue, Mark::Joined(Shape::Square), points),
-            line(WHITE, Colour::Black, Mark::Dashed, ends.map(|x| Some((x, 1.0))).to_vec()),
+            residual_line("segments of the fit", Colour::Blue, Mark::Joined(MarkerShape::Square), points),
+            residual_line(WHITE, Colour::Black, Mark::Dashed, ends.map(|x| Some((x, 1.0))).to_vec()),
         ],
         ..Panel::default()
     })
@@ -144,15 +144,15 @@ mod tests {
 
     #[test]
     fn a_panel_without_data_is_left_out() {
-        let shown = Diagnostics {
+        let shown = ResidualDiagnostics {
             histogram: vec![(-1.0, 0.0, 0.5), (0.0, 1.0, 0.5)],
             correlation: vec![(2e-4, 0.3), (4e-4, 0.1)],
             white_95: 0.05,
-            ..Diagnostics::default()
+            ..ResidualDiagnostics::default()
         };
-        let titles: Vec<String> = figure(&shown).panels.iter().map(|p| p.title.clone()).collect();
+        let titles: Vec<String> = draw_figure(&shown).panels.iter().map(|p| p.title.clone()).collect();
         assert_eq!(titles, ["size", "memory"]);
-        assert_eq!(figure(&shown).panels[1].series[0].points[0], Some((0.2, 0.3)));
-        assert!(figure(&Diagnostics::default()).panels.is_empty());
+        assert_eq!(draw_figure(&shown).panels[1].series[0].points[0], Some((0.2, 0.3)));
+        assert!(draw_figure(&ResidualDiagnostics::default()).panels.is_empty());
     }
 }

@@ -1,16 +1,16 @@
 //! Ring-down: what was fitted over the data, the residual, and the decaying component alone.
 
-use super::history::{thin, unit};
+use super::history::{length_unit, thin_points};
 pub(crate) mod caption;
 
-use crate::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
+use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
 use crate::figures::subtitle;
 use crate::spectrum::Component;
-use crate::text::with_sd;
+use crate::text::format_with_sd;
 
 /// A curve over time; both columns have the same length.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Trace {
+pub struct RingDownTrace {
     /// Instants, s, in the time of the recording.
     pub time_s: Vec<f64>,
     /// Displacement, m; `None` interrupts it.
@@ -19,15 +19,15 @@ pub struct Trace {
 
 /// One decaying component alone.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Decay {
+pub struct ComponentDecay {
     /// Name, such as `78.4(2) Hz, damping 5.0(3) %`.
     pub name: String,
     /// The fitted component.
-    pub fitted: Trace,
+    pub fitted: RingDownTrace,
     /// Its envelope, the upper half.
-    pub envelope: Trace,
+    pub envelope: RingDownTrace,
     /// The data without trend and other components.
-    pub data: Trace,
+    pub data: RingDownTrace,
 }
 
 /// What a figure of a ring-down shows.
@@ -42,17 +42,17 @@ pub struct RingDown {
     /// Whether the motion is one that no camera took.
     pub synthetic: bool,
     /// The data.
-    pub data: Trace,
+    pub data: RingDownTrace,
     /// Sum of trend and decaying sinusoids, as finely as the line is to be drawn.
-    pub fitted: Trace,
+    pub fitted: RingDownTrace,
     /// The trend alone; empty for none.
-    pub trend: Trace,
+    pub trend: RingDownTrace,
     /// Data minus fit.
-    pub residual: Trace,
+    pub residual: RingDownTrace,
     /// Standard deviation of the noise, m.
     pub noise_sd_m: Option<f64>,
     /// The component of interest.
-    pub decay: Option<Decay>,
+    pub decay: Option<ComponentDecay>,
 }
 
 /// Heights of the panels, mm.
@@ -64,17 +64,17 @@ const SUM: &str = "trend + oscillations";
 
 /// The figure.
 #[must_use]
-pub fn figure(shown: &RingDown) -> Figure {
-    let mut panels = vec![whole(shown), residual(shown)];
-    panels.extend(shown.decay.as_ref().map(decay));
-    let ends = span(shown);
+pub fn draw_figure(shown: &RingDown) -> Figure {
+    let mut panels = vec![draw_whole_panel(shown), draw_residual_panel(shown)];
+    panels.extend(shown.decay.as_ref().map(draw_decay_panel));
+    let ends = time_span(shown);
     for panel in &mut panels {
-        panel.x = ends.map_or(Axis::time(), |(first, last)| Axis::time().between(first, last));
+        panel.x = ends.map_or(ChartAxis::time(), |(first, last)| ChartAxis::time().with_range(first, last));
     }
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
-        synthetic: shown.synthetic,
+        watermarked: shown.synthetic,
         description: format!(
             "Ring-down of {}: data, the sum of trend and decaying sinusoids, and the rest.",
             shown.quantity
@@ -86,72 +86,85 @@ pub fn figure(shown: &RingDown) -> Figure {
 }
 
 /// The claim with its numbers: frequency and damping of a component.
-pub(crate) fn title(quantity: &str, component: &Component) -> String {
-    let frequency = with_sd(component.frequency_hz, component.frequency_sd_hz);
-    let damping = component
-        .damping_ratio
-        .zip(component.damping_ratio_sd)
-        .map_or_else(String::new, |(ratio, sd)| format!(" with a damping ratio of {}", with_sd(ratio, sd)));
+pub(crate) fn figure_title(quantity: &str, component: &Component) -> String {
+    let frequency = format_with_sd(component.frequency_hz, component.frequency_sd_hz);
+    let damping =
+        component.damping_ratio.zip(component.damping_ratio_sd).map_or_else(String::new, |(ratio, sd)| {
+            format!(" with a damping ratio of {}", format_with_sd(ratio, sd))
+        });
     format!("The {quantity} rings at {frequency} Hz{damping}")
 }
 
 /// First and last instant of data and fit.
-fn span(shown: &RingDown) -> Option<(f64, f64)> {
+fn time_span(shown: &RingDown) -> Option<(f64, f64)> {
     let times = || shown.data.time_s.iter().chain(&shown.fitted.time_s).copied().filter(|t| t.is_finite());
     let (first, last) = (times().reduce(f64::min)?, times().reduce(f64::max)?);
     (first < last).then_some((first, last))
 }
 
 /// A panel of traces in the unit in which they read best; its series come with the factor to that unit.
-fn panel(name: &str, height_mm: f64, traces: &[(&str, Colour, Mark, &Trace)]) -> (Panel, f64) {
-    let (unit, factor) = unit(
+fn draw_traces(name: &str, height_mm: f64, traces: &[(&str, Colour, Mark, &RingDownTrace)]) -> (Panel, f64) {
+    let (unit, factor) = length_unit(
         traces
             .iter()
             .flat_map(|(.., t)| t.displacement_m.iter().flatten().copied())
             .filter(|x| x.is_finite()),
     );
-    let series = |(label, colour, mark, trace): &(&str, Colour, Mark, &Trace)| Series {
+    let series = |(label, colour, mark, trace): &(&str, Colour, Mark, &RingDownTrace)| Series {
         label: (*label).to_owned(),
         colour: *colour,
         mark: *mark,
-        points: few(trace, factor),
-        bars: Vec::new(),
+        points: thin_trace(trace, factor),
+        error_bars: Vec::new(),
     };
     let drawn = traces.iter().filter(|(.., t)| !t.time_s.is_empty()).map(series).collect();
     (
-        Panel { y: Axis::linear(format!("{name}, {unit}")), height_mm, series: drawn, ..Panel::default() },
+        Panel {
+            y: ChartAxis::linear(format!("{name}, {unit}")),
+            height_mm,
+            series: drawn,
+            ..Panel::default()
+        },
         factor,
     )
 }
 
 /// The points in the unit of the axis, no more than a figure can show.
-fn few(trace: &Trace, factor: f64) -> Vec<Option<(f64, f64)>> {
+fn thin_trace(trace: &RingDownTrace, factor: f64) -> Vec<Option<(f64, f64)>> {
     let points: Vec<_> =
         trace.time_s.iter().zip(&trace.displacement_m).map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
     match (trace.time_s.first(), trace.time_s.last()) {
-        (Some(first), Some(last)) => thin(&points, (*first, *last)),
+        (Some(first), Some(last)) => thin_points(&points, (*first, *last)),
         _ => points,
     }
 }
 
 /// Dots, as long as they stand apart in a column of a journal; a line beyond, which also takes fewer bytes.
-fn frames(trace: &Trace) -> Mark {
+fn frame_mark(trace: &RingDownTrace) -> Mark {
     const MOST_DOTS: usize = 400;
     if trace.time_s.len() > MOST_DOTS { Mark::Thin } else { Mark::Dots }
 }
 
-fn whole(shown: &RingDown) -> Panel {
-    let data = ("data", Colour::Grey, frames(&shown.data), &shown.data);
+fn draw_whole_panel(shown: &RingDown) -> Panel {
+    let data = ("data", Colour::Grey, frame_mark(&shown.data), &shown.data);
     let trend = ("trend", Colour::Blue, Mark::ThinDashed, &shown.trend);
-    panel(&shown.quantity, HEIGHT_MM, &[data, (SUM, Colour::Vermilion, Mark::Line, &shown.fitted), trend]).0
+    draw_traces(
+        &shown.quantity,
+        HEIGHT_MM,
+        &[data, (SUM, Colour::Vermilion, Mark::Line, &shown.fitted), trend],
+    )
+    .0
 }
 
 /// Data minus fit over the noise that is expected there.
-fn residual(shown: &RingDown) -> Panel {
-    let (mut panel, factor) =
-        panel("rest", RESIDUAL_HEIGHT_MM, &[("", Colour::Grey, frames(&shown.residual), &shown.residual)]);
+fn draw_residual_panel(shown: &RingDown) -> Panel {
+    let (mut panel, factor) = draw_traces(
+        "rest",
+        RESIDUAL_HEIGHT_MM,
+        &[("", Colour::Grey, frame_mark(&shown.residual), &shown.residual)],
+    );
     let width = shown.noise_sd_m.filter(|sd| sd.is_finite() && *sd > 0.0).map(|sd| 2.0 * sd * factor);
-    if let Some((width, (first, last))) = width.zip(span(shown)) {
+    if let Some((width, (first, last))) = width.zip(time_span(shown)) {
         let points = [first, last].map(|t| Some((t, -width, width))).to_vec();
         panel.ribbons.push(Ribbon { label: "noise \u{b1} 2 sd".to_owned(), colour: Colour::SkyBlue, points });
     }
@@ -159,18 +172,18 @@ fn residual(shown: &RingDown) -> Panel {
 }
 
 /// The component alone, between its envelopes.
-fn decay(shown: &Decay) -> Panel {
-    let below = Trace {
+fn draw_decay_panel(shown: &ComponentDecay) -> Panel {
+    let below = RingDownTrace {
         displacement_m: shown.envelope.displacement_m.iter().map(|x| x.map(|x| -x)).collect(),
         ..shown.envelope.clone()
     };
     let traces = [
-        ("data without the rest", Colour::Grey, frames(&shown.data), &shown.data),
+        ("data without the rest", Colour::Grey, frame_mark(&shown.data), &shown.data),
         ("envelope", Colour::Blue, Mark::Dashed, &shown.envelope),
         ("", Colour::Blue, Mark::Dashed, &below),
         (shown.name.as_str(), Colour::Vermilion, Mark::Line, &shown.fitted),
     ];
-    panel("component", DECAY_HEIGHT_MM, &traces).0
+    draw_traces("component", DECAY_HEIGHT_MM, &traces).0
 }
 
 #[cfg(test)]
@@ -179,12 +192,12 @@ mod tests {
     use crate::chart::Medium;
 
     fn as_svg(shown: &RingDown) -> String {
-        figure(shown).svg(Medium::Screen)
+        draw_figure(shown).to_svg(Medium::Screen)
     }
 
-    fn trace(amplitude_m: f64) -> Trace {
+    fn trace(amplitude_m: f64) -> RingDownTrace {
         let time_s: Vec<f64> = (0..100).map(|i| 0.5 + f64::from(i) * 1e-3).collect();
-        Trace {
+        RingDownTrace {
             displacement_m: time_s.iter().map(|t| Some(amplitude_m * (490.0 * t).sin())).collect(),
             time_s,
         }
@@ -214,7 +227,7 @@ mod tests {
 
     #[test]
     fn many_frames_are_a_line_and_few_bytes() {
-        let long = |value: fn(i32) -> f64| Trace {
+        let long = |value: fn(i32) -> f64| RingDownTrace {
             time_s: (0..8000).map(|i| f64::from(i) * 1e-4).collect(),
             displacement_m: (0..8000).map(|i| Some(1e-5 * value(i))).collect(),
         };
@@ -223,8 +236,12 @@ mod tests {
             long(|i| (f64::from(i) * 0.1).sin()),
             long(|i| 1.0 - f64::from(i) * 1e-4),
         );
-        let decay =
-            Decay { fitted: smooth.clone(), envelope: slow.clone(), data: noisy.clone(), ..Decay::default() };
+        let decay = ComponentDecay {
+            fitted: smooth.clone(),
+            envelope: slow.clone(),
+            data: noisy.clone(),
+            ..ComponentDecay::default()
+        };
         let drawn = RingDown {
             data: noisy.clone(),
             fitted: smooth,
@@ -234,7 +251,7 @@ mod tests {
             ..RingDown::default()
         };
         assert_eq!(
-            [&drawn, &shown()].map(|shown| figure(shown).panels[0].series[0].mark),
+            [&drawn, &shown()].map(|shown| draw_figure(shown).panels[0].series[0].mark),
             [Mark::Thin, Mark::Dots]
         );
         assert!(as_svg(&drawn).len() < 200_000, "{}", as_svg(&drawn).len());
@@ -242,7 +259,7 @@ mod tests {
 
     #[test]
     fn the_component_alone_is_a_third_panel_under_one_axis() {
-        let decay = Decay {
+        let decay = ComponentDecay {
             name: "78.4(2) Hz".to_owned(),
             fitted: trace(1e-5),
             envelope: trace(1e-5),

@@ -7,16 +7,19 @@ mod targets;
 
 use crate::math;
 pub use crate::spectrum::time_frequency::SpeedPoint;
-pub use compared::{Compared, Of, compared};
+pub use compared::{SpectrogramComparison, SpectrogramSide, draw_comparison};
 
-use crate::chart::{Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Heat, Mark, Panel, Rule, Series, Shape};
+use crate::chart::{
+    ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, HeatMap, Mark, MarkerShape, Panel, Series,
+    VerticalLine,
+};
 use crate::figures::subtitle;
 use crate::spectrum::time_frequency;
-use crate::spectrum::time_frequency::course::MOST_RANGE_DB;
+use crate::spectrum::time_frequency::course::DYNAMIC_RANGE_DB;
 
 /// A frequency followed over time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct RidgePoint {
+pub struct SpectrogramRidgePoint {
     /// Instant, s.
     pub time_s: f64,
     /// Frequency, Hz; `None` where no ridge stands out.
@@ -25,7 +28,7 @@ pub struct RidgePoint {
 
 /// A frequency that is sought in a window.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Aimed {
+pub struct TargetFrequency {
     /// What it is.
     pub name: String,
     /// Frequency, Hz.
@@ -40,7 +43,7 @@ pub struct Aimed {
 
 /// What a spectrogram shows.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Spectrogram {
+pub struct SpectrogramPlot {
     /// Heading.
     pub title: String,
     /// Quantity, such as "deflection".
@@ -61,11 +64,11 @@ pub struct Spectrogram {
     /// Frequencies shown, Hz; `None` for all (above zero on a logarithmic axis).
     pub shown_hz: Option<(f64, f64)>,
     /// The ridge in order of time.
-    pub ridge: Vec<RidgePoint>,
+    pub ridge: Vec<SpectrogramRidgePoint>,
     /// Named instants, s.
     pub instants: Vec<(String, f64)>,
     /// The frequencies that are sought, each in its window.
-    pub targets: Vec<Aimed>,
+    pub targets: Vec<TargetFrequency>,
     /// The ridge over the speed of the tip; empty for no such panel.
     pub over_speed: Vec<SpeedPoint>,
 }
@@ -83,15 +86,15 @@ const MILLIMETRES: f64 = 1e3;
 
 /// The figure.
 #[must_use]
-pub fn figure(shown: &Spectrogram) -> Figure {
-    let mut panels = vec![map(shown)];
+pub fn draw_figure(shown: &SpectrogramPlot) -> Figure {
+    let mut panels = vec![draw_map(shown)];
     if !shown.over_speed.is_empty() {
-        panels.push(over_speed(&shown.over_speed));
+        panels.push(draw_over_speed(&shown.over_speed));
     }
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
-        synthetic: shown.synthetic,
+        watermarked: shown.synthetic,
         description: format!(
             "Spectrogram of {}: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m; light grey \
              where there is no value. \
@@ -106,23 +109,27 @@ pub fn figure(shown: &Spectrogram) -> Figure {
 }
 
 /// Every amplitude in dB.
-fn in_decibels(amplitude_m: &[Vec<Option<f64>>]) -> Vec<Vec<Option<f64>>> {
-    amplitude_m.iter().map(|column| column.iter().map(|a| a.and_then(decibels)).collect()).collect()
+fn decibel_map(amplitude_m: &[Vec<Option<f64>>]) -> Vec<Vec<Option<f64>>> {
+    amplitude_m.iter().map(|column| column.iter().map(|a| a.and_then(amplitude_decibels)).collect()).collect()
 }
 
 /// The colours, with ridge and instants over them.
-fn map(shown: &Spectrogram) -> Panel {
-    let values = in_decibels(&shown.amplitude_m);
-    let heat = Heat {
+fn draw_map(shown: &SpectrogramPlot) -> Panel {
+    let values = decibel_map(&shown.amplitude_m);
+    let heat = HeatMap {
         label: format!("amplitude of {}, dB re 1 \u{b5}m", shown.quantity),
         x: shown.time_s.clone(),
         y: shown.frequency_hz.clone(),
-        range: colours_db(&values),
+        range: colour_range_db(&values),
         values,
-        ..Heat::default()
+        ..HeatMap::default()
     };
-    let y = if shown.log_frequency { Axis::log("frequency, Hz") } else { Axis::linear("frequency, Hz") };
-    let rule = |(label, at): &(String, f64)| Rule {
+    let y = if shown.log_frequency {
+        ChartAxis::log("frequency, Hz")
+    } else {
+        ChartAxis::linear("frequency, Hz")
+    };
+    let rule = |(label, at): &(String, f64)| VerticalLine {
         label: label.clone(),
         colour: Colour::White,
         mark: Mark::Dashed,
@@ -130,55 +137,58 @@ fn map(shown: &Spectrogram) -> Panel {
         above: None,
     };
     Panel {
-        x: within(Axis::time(), span(&shown.time_s)),
-        y: within(y, shown.shown_hz.or_else(|| frequencies(shown))),
+        x: limit_axis(ChartAxis::time(), time_span(&shown.time_s)),
+        y: limit_axis(y, shown.shown_hz.or_else(|| frequency_range(shown))),
         height_mm: HEIGHT_MM,
-        series: targets::over_map(&shown.targets).into_iter().chain(ridge(&shown.ridge)).collect(),
-        rules: shown.instants.iter().map(rule).collect(),
-        texts: targets::names(shown),
-        heat: Some(heat),
+        series: targets::target_lines_over_map(&shown.targets)
+            .into_iter()
+            .chain(ridge_series(&shown.ridge))
+            .collect(),
+        vertical_lines: shown.instants.iter().map(rule).collect(),
+        annotations: targets::target_names(shown),
+        heat_map: Some(heat),
         ..Panel::default()
     }
 }
 
 /// Amplitude, m, in dB; an amplitude of zero lies under every colour.
-fn decibels(amplitude_m: f64) -> Option<f64> {
+fn amplitude_decibels(amplitude_m: f64) -> Option<f64> {
     (amplitude_m.is_finite() && amplitude_m >= 0.0)
         .then(|| 20.0 * math::log10((amplitude_m / REFERENCE_M).max(f64::MIN_POSITIVE)))
 }
 
 /// Values of the first and the last colour, dB.
-fn colours_db(values: &[Vec<Option<f64>>]) -> Option<(f64, f64)> {
+fn colour_range_db(values: &[Vec<Option<f64>>]) -> Option<(f64, f64)> {
     let mut all: Vec<f64> = values.iter().flatten().flatten().copied().collect();
     let peak = all.iter().copied().reduce(f64::max)?;
     let under = (all.len() as f64 * UNDER_COLOURS) as usize;
     let low = *all.select_nth_unstable_by(under, f64::total_cmp).1;
     let high = (peak / STEP_DB).ceil() * STEP_DB;
-    let low = (low.max(high - MOST_RANGE_DB) / STEP_DB).floor() * STEP_DB;
+    let low = (low.max(high - DYNAMIC_RANGE_DB) / STEP_DB).floor() * STEP_DB;
     Some((low, high.max(low + STEP_DB)))
 }
 
-fn within(axis: Axis, ends: Option<(f64, f64)>) -> Axis {
+fn limit_axis(axis: ChartAxis, ends: Option<(f64, f64)>) -> ChartAxis {
     match ends {
-        Some((low, high)) => axis.between(low, high),
+        Some((low, high)) => axis.with_range(low, high),
         None => axis,
     }
 }
 
 /// From the start of the first column to the end of the last; of a single one, around it.
-fn span(middles: &[f64]) -> Option<(f64, f64)> {
+fn time_span(middles: &[f64]) -> Option<(f64, f64)> {
     let ([first, second, ..], [.., before, last]) = (middles, middles) else { return None };
     Some((first - (second - first) / 2.0, last + (last - before) / 2.0))
 }
 
 /// All frequencies; on a logarithmic axis those above zero.
-fn frequencies(shown: &Spectrogram) -> Option<(f64, f64)> {
+fn frequency_range(shown: &SpectrogramPlot) -> Option<(f64, f64)> {
     let lowest = shown.frequency_hz.iter().find(|f| **f > 0.0 || !shown.log_frequency)?;
     Some((*lowest, *shown.frequency_hz.last()?))
 }
 
 /// The line of the ridge; nothing where it has no point at all.
-fn ridge(points: &[RidgePoint]) -> Option<Series> {
+fn ridge_series(points: &[SpectrogramRidgePoint]) -> Option<Series> {
     let drawn: Vec<Option<(f64, f64)>> =
         points.iter().map(|p| p.frequency_hz.map(|f| (p.time_s, f))).collect();
     drawn.iter().any(Option::is_some).then(|| Series {
@@ -186,27 +196,27 @@ fn ridge(points: &[RidgePoint]) -> Option<Series> {
         colour: Colour::Vermilion,
         mark: Mark::Edged,
         points: drawn,
-        bars: Vec::new(),
+        error_bars: Vec::new(),
     })
 }
 
 /// Frequency of the ridge over the speed of the tip.
-fn over_speed(points: &[SpeedPoint]) -> Panel {
+fn draw_over_speed(points: &[SpeedPoint]) -> Panel {
     let place = |p: &SpeedPoint| (p.tip_speed_m_per_s * MILLIMETRES, p.frequency_hz);
     let bar = |p: &SpeedPoint| {
         let (x, f) = place(p);
-        p.frequency_sd_hz.map(|sd| Bar::Vertical { x, from: f - 2.0 * sd, to: f + 2.0 * sd })
+        p.frequency_sd_hz.map(|sd| ErrorBar::Vertical { x, from: f - 2.0 * sd, to: f + 2.0 * sd })
     };
     let series = Series {
         label: "ridge over speed \u{b1} 2 sd".to_owned(),
         colour: Colour::Blue,
-        mark: Mark::Hollow(Shape::Disc),
+        mark: Mark::Hollow(MarkerShape::Disc),
         points: points.iter().map(|p| Some(place(p))).collect(),
-        bars: points.iter().filter_map(bar).collect(),
+        error_bars: points.iter().filter_map(bar).collect(),
     };
     Panel {
-        x: Axis::linear("speed of the tip, mm/s"),
-        y: Axis::linear("ridge, Hz"),
+        x: ChartAxis::linear("speed of the tip, mm/s"),
+        y: ChartAxis::linear("ridge, Hz"),
         height_mm: SPEED_HEIGHT_MM,
         series: vec![series],
         ..Panel::default()
@@ -214,7 +224,7 @@ fn over_speed(points: &[SpeedPoint]) -> Panel {
 }
 
 /// In how many of how many segments a ridge is drawn, and why not in others where it stands out of the noise.
-pub(crate) fn counted(
+pub(crate) fn describe_ridge_segments(
     drawn: &[Vec<time_frequency::RidgePoint>],
     ridge: &time_frequency::Ridge,
     of: &time_frequency::Spectrogram,
@@ -234,19 +244,19 @@ mod tests {
     use super::*;
     use crate::chart::Medium;
 
-    fn as_svg(shown: &Spectrogram) -> String {
-        figure(shown).svg(Medium::Screen)
+    fn as_svg(shown: &SpectrogramPlot) -> String {
+        draw_figure(shown).to_svg(Medium::Screen)
     }
 
-    fn shown() -> Spectrogram {
+    fn shown() -> SpectrogramPlot {
         let column =
             |i: usize| (0..40).map(|j| (i != 3).then(|| if j == 10 + i { 1e-5 } else { 1e-8 })).collect();
-        Spectrogram {
+        SpectrogramPlot {
             time_s: (0..10).map(|i| f64::from(i) * 0.01).collect(),
             frequency_hz: (0..40).map(|j| f64::from(j) * 25.0).collect(),
             amplitude_m: (0..10).map(column).collect(),
             ridge: (0..10)
-                .map(|i| RidgePoint {
+                .map(|i| SpectrogramRidgePoint {
                     time_s: f64::from(i) * 0.01,
                     frequency_hz: (i != 3).then(|| f64::from(250 + 25 * i)),
                 })
@@ -257,18 +267,18 @@ mod tests {
                 frequency_hz: 400.0,
                 frequency_sd_hz: Some(5.0),
             }],
-            ..Spectrogram::default()
+            ..SpectrogramPlot::default()
         }
     }
 
     #[test]
     fn the_colours_have_a_stated_scale_of_round_ends() {
         // 10 um are 20 dB re 1 um; a hundredth of a micrometre is -40 dB
-        let values = |a: &[f64]| vec![a.iter().map(|a| decibels(*a)).collect::<Vec<_>>()];
-        assert_eq!(colours_db(&values(&[1e-5, 1e-8])), Some((-40.0, 20.0)));
-        assert_eq!(colours_db(&values(&[0.9e-5, 1e-12])), Some((-40.0, 20.0)));
-        assert_eq!(colours_db(&values(&[1e-6])), Some((0.0, 5.0)));
-        assert_eq!(colours_db(&values(&[f64::NAN, f64::INFINITY, -1.0])), None);
+        let values = |a: &[f64]| vec![a.iter().map(|a| amplitude_decibels(*a)).collect::<Vec<_>>()];
+        assert_eq!(colour_range_db(&values(&[1e-5, 1e-8])), Some((-40.0, 20.0)));
+        assert_eq!(colour_range_db(&values(&[0.9e-5, 1e-12])), Some((-40.0, 20.0)));
+        assert_eq!(colour_range_db(&values(&[1e-6])), Some((0.0, 5.0)));
+        assert_eq!(colour_range_db(&values(&[f64::NAN, f64::INFINITY, -1.0])), None);
         assert!(as_svg(&shown()).contains("dB re 1 \u{b5}m"));
     }
 
@@ -282,19 +292,22 @@ mod tests {
                 .sum::<usize>()
         };
         assert_eq!(lines(&drawn), 3); // two pieces and the sample in the legend
-        assert_eq!(lines(&as_svg(&Spectrogram { ridge: Vec::new(), ..shown() })), 0);
+        assert_eq!(lines(&as_svg(&SpectrogramPlot { ridge: Vec::new(), ..shown() })), 0);
     }
 
     #[test]
     fn the_ridge_over_speed_is_a_second_panel() {
         assert!(as_svg(&shown()).contains("speed of the tip, mm/s"));
-        assert!(!as_svg(&Spectrogram { over_speed: Vec::new(), ..shown() }).contains("speed of the tip"));
+        assert!(!as_svg(&SpectrogramPlot { over_speed: Vec::new(), ..shown() }).contains("speed of the tip"));
     }
 
     #[test]
     fn the_time_axis_holds_whole_columns() {
-        assert_eq!(span(&[0.0, 1.0, 2.0, 4.0]), Some((-0.5, 5.0)));
-        assert_eq!([span(&[0.0, 1.0]), span(&[0.0, 1.0, 3.0])], [Some((-0.5, 1.5)), Some((-0.5, 4.0))]);
-        assert_eq!([span(&[1.0]), span(&[])], [None, None]);
+        assert_eq!(time_span(&[0.0, 1.0, 2.0, 4.0]), Some((-0.5, 5.0)));
+        assert_eq!(
+            [time_span(&[0.0, 1.0]), time_span(&[0.0, 1.0, 3.0])],
+            [Some((-0.5, 1.5)), Some((-0.5, 4.0))]
+        );
+        assert_eq!([time_span(&[1.0]), time_span(&[])], [None, None]);
     }
 }

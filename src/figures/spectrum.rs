@@ -6,17 +6,19 @@ mod levels;
 mod named;
 
 pub use crate::spectrum::Target;
-pub use levels::{Interval, Level};
-pub use named::Named;
+pub use levels::{AmplitudeInterval, SpectrumLevel};
+pub use named::LabelledComponent;
 
-use crate::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
+use crate::chart::{
+    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, ShadedSpan, TopLabel, VerticalLine,
+};
 use crate::figures::{NO_TRACES, subtitle};
-use crate::text::trimmed;
-use levels::{levels, points};
+use crate::text::format_trimmed;
+use levels::{axis_points, level_series};
 
 /// An amplitude spectrum.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Curve {
+pub struct SpectrumCurve {
     /// Frequencies, Hz.
     pub frequency_hz: Vec<f64>,
     /// Amplitudes, m.
@@ -25,7 +27,7 @@ pub struct Curve {
 
 /// What a figure of spectra shows.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Spectra {
+pub struct SpectraPlot {
     /// Heading.
     pub title: String,
     /// Quantity whose spectrum it is, such as "deflection".
@@ -35,23 +37,23 @@ pub struct Spectra {
     /// Whether the measured motion is one that no camera took.
     pub synthetic: bool,
     /// Measured spectrum; `None` where only published numbers are known.
-    pub measured: Option<Curve>,
+    pub measured: Option<SpectrumCurve>,
     /// Spectrum of the model, of the same length, window and detrending.
-    pub model: Option<Curve>,
+    pub model: Option<SpectrumCurve>,
     /// Published or measured frequencies.
     pub targets: Vec<Target>,
     /// Noise floor of the measured spectrum, m.
     pub noise_floor_m: Option<f64>,
     /// Noise floor over frequency; drawn instead of the constant one.
-    pub noise_floor: Option<Level>,
+    pub noise_floor: Option<SpectrumLevel>,
     /// What the noise leaves open of the measured spectrum, 95 %.
-    pub interval_95: Option<Interval>,
+    pub interval_95: Option<AmplitudeInterval>,
     /// What the removed flip leaves in the spectrum.
-    pub leakage: Option<Level>,
+    pub leakage: Option<SpectrumLevel>,
     /// Components of the measured spectrum with their uncertainty.
-    pub components: Vec<Named>,
+    pub components: Vec<LabelledComponent>,
     /// Those of the model, likewise.
-    pub model_components: Vec<Named>,
+    pub model_components: Vec<LabelledComponent>,
     /// Lowest frequency that the record resolves, Hz; the axis starts there.
     pub lowest_hz: f64,
 }
@@ -62,30 +64,30 @@ const MICROMETRES: f64 = 1e6;
 
 /// The figure.
 #[must_use]
-pub fn figure(spectra: &Spectra) -> Figure {
+pub fn draw_figure(spectra: &SpectraPlot) -> Figure {
     let highest = [&spectra.measured, &spectra.model]
         .into_iter()
         .flatten()
         .filter_map(|c| c.frequency_hz.last())
         .fold(0.0, |m: f64, f| m.max(*f));
-    let x = Axis::log("frequency, Hz");
+    let x = ChartAxis::log("frequency, Hz");
     let x = if spectra.lowest_hz > 0.0 && highest > spectra.lowest_hz {
-        x.between(spectra.lowest_hz, highest)
+        x.with_range(spectra.lowest_hz, highest)
     } else {
         x
     };
-    let y = Axis::log(format!("amplitude of {}, \u{b5}m", spectra.quantity));
-    let y =
-        amplitudes(spectra).map_or(y.clone(), |(low, high)| y.between(low * MICROMETRES, high * MICROMETRES));
+    let y = ChartAxis::log(format!("amplitude of {}, \u{b5}m", spectra.quantity));
+    let y = amplitude_limits(spectra)
+        .map_or(y.clone(), |(low, high)| y.with_range(low * MICROMETRES, high * MICROMETRES));
     let panel = Panel {
         x,
         y,
         height_mm: HEIGHT_MM,
-        series: series(spectra, highest),
-        bands: targets(&spectra.targets),
-        rules: rules(spectra),
-        captions: captions(spectra),
-        ribbons: spectra.interval_95.iter().map(Interval::ribbon).collect(),
+        series: spectrum_series(spectra, highest),
+        shaded_spans: target_spans(&spectra.targets),
+        vertical_lines: target_lines(spectra),
+        top_labels: target_labels(spectra),
+        ribbons: spectra.interval_95.iter().map(AmplitudeInterval::ribbon).collect(),
         ..Panel::default()
     };
     let mut source = if spectra.measured.is_none() && spectra.model.is_some() {
@@ -99,7 +101,7 @@ pub fn figure(spectra: &Spectra) -> Figure {
     Figure {
         title: spectra.title.clone(),
         subtitle: subtitle(spectra.synthetic, &source),
-        synthetic: spectra.synthetic,
+        watermarked: spectra.synthetic,
         description: format!(
             "Amplitude spectrum of {}; a sine of amplitude A reads A at its peak.",
             spectra.quantity
@@ -112,17 +114,21 @@ pub fn figure(spectra: &Spectra) -> Figure {
 
 /// The claim of a spectrum that nothing is sought in: its largest component.
 #[must_use]
-pub fn strongest(spectra: &Spectra) -> String {
-    let largest = |all: &[Named]| all.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m)).cloned();
+pub fn strongest_claim(spectra: &SpectraPlot) -> String {
+    let largest = |all: &[LabelledComponent]| {
+        all.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m)).cloned()
+    };
     match largest(&spectra.components).or_else(|| largest(&spectra.model_components)) {
-        Some(found) => format!("The largest component of the {} has {}", spectra.quantity, found.name()),
+        Some(found) => {
+            format!("The largest component of the {} has {}", spectra.quantity, found.label_text())
+        }
         None => format!("No component stands out in the {}", spectra.quantity),
     }
 }
 
 /// Ends of the amplitude axis, m: from well under the noise floor, or the foot of the model's range, to over
 /// the highest peak.
-fn amplitudes(spectra: &Spectra) -> Option<(f64, f64)> {
+fn amplitude_limits(spectra: &SpectraPlot) -> Option<(f64, f64)> {
     const UNDER_FLOOR: f64 = 0.1;
     const MODEL_RANGE: f64 = 1e-4;
     const OVER_PEAK: f64 = 2.0;
@@ -130,7 +136,7 @@ fn amplitudes(spectra: &Spectra) -> Option<(f64, f64)> {
     let shown = curves
         .flat_map(|c| c.frequency_hz.iter().zip(&c.amplitude_m))
         .filter(|(f, _)| **f >= spectra.lowest_hz);
-    let peaks = spectra.components.iter().chain(&spectra.model_components).map(Named::top_m);
+    let peaks = spectra.components.iter().chain(&spectra.model_components).map(LabelledComponent::top_m);
     let highest = shown.map(|(_, a)| *a).chain(peaks).filter(|a| a.is_finite()).fold(0.0, f64::max);
     let range_foot = highest * MODEL_RANGE;
     let lowest_floor = spectra.noise_floor.as_ref().and_then(|l| l.lowest_m(spectra.lowest_hz));
@@ -141,33 +147,33 @@ fn amplitudes(spectra: &Spectra) -> Option<(f64, f64)> {
     (foot > 0.0 && highest.is_finite() && foot < highest).then_some((foot, highest * OVER_PEAK))
 }
 
-fn series(spectra: &Spectra, highest: f64) -> Vec<Series> {
-    let curve = |label: &str, colour, mark, curve: &Curve| Series {
+fn spectrum_series(spectra: &SpectraPlot, highest: f64) -> Vec<Series> {
+    let curve = |label: &str, colour, mark, curve: &SpectrumCurve| Series {
         label: label.to_owned(),
         colour,
         mark,
-        points: points(&curve.frequency_hz, &curve.amplitude_m),
-        bars: Vec::new(),
+        points: axis_points(&curve.frequency_hz, &curve.amplitude_m),
+        error_bars: Vec::new(),
     };
-    let mut drawn = levels(spectra, highest);
+    let mut drawn = level_series(spectra, highest);
     drawn.extend(spectra.measured.as_ref().map(|c| curve("measured", Colour::Black, Mark::Thin, c)));
     drawn.extend(spectra.model.as_ref().map(|c| curve("model", Colour::Vermilion, Mark::Line, c)));
-    drawn.extend(named::series(&spectra.components, &spectra.model_components));
+    drawn.extend(named::component_series(&spectra.components, &spectra.model_components));
     drawn
 }
 
 /// Two standard deviations either side of a target.
-fn targets(targets: &[Target]) -> Vec<Band> {
+fn target_spans(targets: &[Target]) -> Vec<ShadedSpan> {
     let band = |t: &Target| {
         let sd_hz = t.frequency_sd_hz.filter(|sd| *sd > 0.0)?;
         let (from, to) =
             ((t.frequency_hz - 2.0 * sd_hz).max(f64::MIN_POSITIVE), t.frequency_hz + 2.0 * sd_hz);
-        Some(Band {
+        Some(ShadedSpan {
             label: "target \u{b1} 2 sd".to_owned(),
             colour: Colour::Blue,
             from,
             to,
-            ..Band::default()
+            ..ShadedSpan::default()
         })
     };
     targets.iter().filter_map(band).collect()
@@ -178,22 +184,22 @@ fn targets(targets: &[Target]) -> Vec<Band> {
 const MOST_NAMES: usize = 4;
 
 /// The components that are named: the measured ones, without a recording the model's.
-fn named(spectra: &Spectra) -> &[Named] {
+fn labelled_components(spectra: &SpectraPlot) -> &[LabelledComponent] {
     if spectra.components.is_empty() { &spectra.model_components } else { &spectra.components }
 }
 
 /// Lines at the targets, and labels over the components.
-fn rules(spectra: &Spectra) -> Vec<Rule> {
-    let named = named(spectra);
+fn target_lines(spectra: &SpectraPlot) -> Vec<VerticalLine> {
+    let named = labelled_components(spectra);
     // where components are named, the names of the targets are captions
     let label = |t: &Target| {
         if named.is_empty() {
-            format!("{}: {} Hz", t.name, trimmed(t.frequency_hz, 4))
+            format!("{}: {} Hz", t.name, format_trimmed(t.frequency_hz, 4))
         } else {
             String::new()
         }
     };
-    let target = |t: &Target| Rule {
+    let target = |t: &Target| VerticalLine {
         label: label(t),
         colour: Colour::Blue,
         mark: Mark::Dashed,
@@ -201,13 +207,17 @@ fn rules(spectra: &Spectra) -> Vec<Rule> {
         above: None,
     };
     let most = if spectra.targets.is_empty() { usize::MAX } else { MOST_NAMES };
-    spectra.targets.iter().map(target).chain(named::rules(named, most)).collect()
+    spectra.targets.iter().map(target).chain(named::component_labels(named, most)).collect()
 }
 
 /// Names of the targets, where components are named over them.
-fn captions(spectra: &Spectra) -> Vec<Caption> {
-    let caption = |t: &Target| Caption { label: t.name.clone(), at: t.frequency_hz };
-    if named(spectra).is_empty() { Vec::new() } else { spectra.targets.iter().map(caption).collect() }
+fn target_labels(spectra: &SpectraPlot) -> Vec<TopLabel> {
+    let caption = |t: &Target| TopLabel { label: t.name.clone(), at: t.frequency_hz };
+    if labelled_components(spectra).is_empty() {
+        Vec::new()
+    } else {
+        spectra.targets.iter().map(caption).collect()
+    }
 }
 
 #[cfg(test)]
@@ -215,49 +225,49 @@ mod tests {
     use super::*;
     use crate::chart::Medium;
 
-    fn as_svg(shown: &Spectra) -> String {
-        figure(shown).svg(Medium::Screen)
+    fn as_svg(shown: &SpectraPlot) -> String {
+        draw_figure(shown).to_svg(Medium::Screen)
     }
 
-    fn flat() -> Curve {
-        Curve { frequency_hz: (0..1000).map(f64::from).collect(), amplitude_m: vec![1e-6; 1000] }
+    fn flat() -> SpectrumCurve {
+        SpectrumCurve { frequency_hz: (0..1000).map(f64::from).collect(), amplitude_m: vec![1e-6; 1000] }
     }
 
     #[test]
     fn targets_are_named_with_their_frequencies() {
         let target =
             Target { name: "low component".to_owned(), frequency_hz: 78.4, frequency_sd_hz: Some(0.5) };
-        let held = as_svg(&Spectra {
+        let held = as_svg(&SpectraPlot {
             measured: Some(flat()),
             targets: vec![target],
             lowest_hz: 6.7,
-            ..Spectra::default()
+            ..SpectraPlot::default()
         });
         assert!(held.contains("low component: 78.4 Hz") && held.contains("target \u{b1} 2 sd"));
     }
 
     #[test]
     fn components_are_named_with_their_uncertainty_and_what_is_wrong_with_them() {
-        let clear = Named {
+        let clear = LabelledComponent {
             frequency_hz: 78.4,
             frequency_sd_hz: 0.03,
             amplitude_m: 20e-6,
             amplitude_sd_m: 1e-6,
-            ..Named::default()
+            ..LabelledComponent::default()
         };
-        let alias = Named {
+        let alias = LabelledComponent {
             frequency_hz: 100.0,
             frequency_sd_hz: 0.1,
             amplitude_m: 2e-6,
             amplitude_sd_m: 3e-6,
             remark: "alias?".to_owned(),
-            ..Named::default()
+            ..LabelledComponent::default()
         };
-        let spectra = Spectra {
+        let spectra = SpectraPlot {
             measured: Some(flat()),
             lowest_hz: 6.7,
             components: vec![clear, alias],
-            ..Spectra::default()
+            ..SpectraPlot::default()
         };
         let drawn = as_svg(&spectra);
         assert!(drawn.contains("78.40(3) Hz\n") && drawn.contains("100.0(1) Hz, alias?\n"));
@@ -267,15 +277,15 @@ mod tests {
     #[test]
     fn a_floor_over_frequency_replaces_the_constant_one() {
         let level = |amplitude_m: f64| {
-            Some(Level { frequency_hz: vec![10.0, 900.0], amplitude_m: vec![amplitude_m; 2] })
+            Some(SpectrumLevel { frequency_hz: vec![10.0, 900.0], amplitude_m: vec![amplitude_m; 2] })
         };
-        let constant = Spectra {
+        let constant = SpectraPlot {
             measured: Some(flat()),
             lowest_hz: 6.7,
             noise_floor_m: Some(1e-7),
-            ..Spectra::default()
+            ..SpectraPlot::default()
         };
-        let over = Spectra { noise_floor: level(1e-8), leakage: level(2e-8), ..constant.clone() };
+        let over = SpectraPlot { noise_floor: level(1e-8), leakage: level(2e-8), ..constant.clone() };
         let (constant, over) = (as_svg(&constant), as_svg(&over));
         assert_eq!([&constant, &over].map(|f| f.matches("noise floor of the recording").count()), [1, 1]);
         assert!(over.contains("leakage of the removed flip") && !constant.contains("leakage"));

@@ -6,16 +6,17 @@ mod hatches;
 pub(super) mod labels;
 mod limits;
 
-pub(super) use claim::{Claim, shown_values};
-pub(super) use hatches::Patterns;
+pub(super) use claim::{MapClaim, map_values};
+pub(super) use hatches::ReasonPatterns;
 
 use crate::chart::{
-    Axis as ChartAxis, COLUMN_WIDTH_MM, Colour, Figure, Heat, Mark, Panel, Rule, Series, Shape, cell_edges,
+    COLUMN_WIDTH_MM, ChartAxis, Colour, Figure, HeatMap, Mark, MarkerShape, Panel, Series, VerticalLine,
+    cell_edges,
 };
 use crate::simulate::scene::Scene;
-use crate::sweep::{Axis, Map, Outcome, Reason, Study};
-use labels::{axis_label, label, scale, shown_range, shown_unit};
-use limits::limits;
+use crate::sweep::{MissingReason, PointOutcome, Study, SweepAxis, SweepMap};
+use labels::{axis_label, axis_scale, display_unit, map_label, map_range};
+use limits::colour_limits;
 
 /// Heights of a map and of a curve, mm.
 const MAP_MM: f64 = 56.0;
@@ -23,23 +24,23 @@ const CURVE_MM: f64 = 46.0;
 
 /// The figure of map number `at` (counted from 0); one without panels where there is no such map.
 #[must_use]
-pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome], at: usize) -> Figure {
+pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome], at: usize) -> Figure {
     let Some(map) = study.maps.get(at) else { return Figure::default() };
-    let drawn = Drawn::of(study, map, outcomes, at);
-    let Some(mut panel) = drawn.panel(study, scene, &Patterns::of(outcomes)) else {
+    let drawn = SweepMapValues::new(study, map, outcomes, at);
+    let Some(mut panel) = drawn.draw_panel(study, scene, &ReasonPatterns::from_outcomes(outcomes)) else {
         return Figure::default();
     };
     for hatch in &mut panel.hatches {
         hatch.label = format!("{}: {}", hatch.label, hatch.cells.len());
     }
     Figure {
-        title: Claim::of(study, map, &drawn.values).title(),
+        title: MapClaim::new(study, map, &drawn.values).title(),
         subtitle: format!("{}; synthetic: a simulation, no camera took it", study.title),
-        synthetic: true,
+        watermarked: true,
         description: format!(
             "{} over {}, from the scene \"{}\"; grey or hatched where a run has no value.",
-            label(map),
-            over(study),
+            map_label(map),
+            describe_axes(study),
             scene.title()
         ),
         width_mm: COLUMN_WIDTH_MM,
@@ -49,45 +50,45 @@ pub fn figure(study: &Study, scene: &Scene, outcomes: &[Outcome], at: usize) -> 
 }
 
 /// The axes of a study.
-pub(super) fn over(study: &Study) -> String {
+pub(super) fn describe_axes(study: &Study) -> String {
     study.axes.iter().map(axis_label).collect::<Vec<_>>().join(" and ")
 }
 
 /// What is shown of a map at every point of the grid, in the unit of the figure.
-pub(super) struct Drawn<'a> {
-    map: &'a Map,
+pub(super) struct SweepMapValues<'a> {
+    map: &'a SweepMap,
     pub values: Vec<Option<f64>>,
-    reasons: Vec<Option<Reason>>,
+    reasons: Vec<Option<MissingReason>>,
 }
 
-impl<'a> Drawn<'a> {
+impl<'a> SweepMapValues<'a> {
     /// Map number `at` of a study.
-    pub fn of(study: &Study, map: &'a Map, outcomes: &[Outcome], at: usize) -> Self {
-        let reason = |outcome: &Outcome| outcome.values.get(at)?.err();
+    pub fn new(study: &Study, map: &'a SweepMap, outcomes: &[PointOutcome], at: usize) -> Self {
+        let reason = |outcome: &PointOutcome| outcome.values.get(at)?.err();
         let reasons = outcomes.iter().map(reason).collect();
-        Self { map, values: shown_values(study, outcomes, at), reasons }
+        Self { map, values: map_values(study, outcomes, at), reasons }
     }
 
     /// The panel of the map; `None` of a study without axes.
-    pub fn panel(&self, study: &Study, scene: &Scene, patterns: &Patterns) -> Option<Panel> {
+    pub fn draw_panel(&self, study: &Study, scene: &Scene, patterns: &ReasonPatterns) -> Option<Panel> {
         match study.axes.as_slice() {
-            [x] => Some(self.curve(x, scene, patterns)),
-            [x, y, ..] => Some(self.heat_map([x, y], scene, patterns)),
+            [x] => Some(self.draw_curve(x, scene, patterns)),
+            [x, y, ..] => Some(self.draw_heat_map([x, y], scene, patterns)),
             [] => None,
         }
     }
 
-    fn heat_map(&self, [x, y]: [&Axis; 2], scene: &Scene, patterns: &Patterns) -> Panel {
-        let (across, up) = (Shown::of(x), Shown::of(y));
+    fn draw_heat_map(&self, [x, y]: [&SweepAxis; 2], scene: &Scene, patterns: &ReasonPatterns) -> Panel {
+        let (across, up) = (DisplayAxis::new(x), DisplayAxis::new(y));
         let rows = up.middles.len().max(1);
-        let heat = Heat {
-            label: label(self.map),
+        let heat = HeatMap {
+            label: map_label(self.map),
             x: across.middles.clone(),
             y: up.middles.clone(),
             values: self.values.chunks(rows).map(<[_]>::to_vec).collect(),
-            range: shown_range(self.map).or_else(|| limits(&self.values)),
+            range: map_range(self.map).or_else(|| colour_limits(&self.values)),
             contours: true,
-            ..Heat::default()
+            ..HeatMap::default()
         };
         let cell = |index: usize| {
             let (column, row) = (index / rows, index % rows);
@@ -99,82 +100,87 @@ impl<'a> Drawn<'a> {
             ])
         };
         Panel {
-            x: across.axis(),
-            y: up.axis(),
+            x: across.chart_axis(),
+            y: up.chart_axis(),
             height_mm: MAP_MM,
-            series: as_written(across.of_scene(scene).zip(up.of_scene(scene))).into_iter().collect(),
-            heat: Some(heat),
-            hatches: patterns.hatches(&self.reasons, cell),
+            series: scene_marker(across.scene_value(scene).zip(up.scene_value(scene))).into_iter().collect(),
+            heat_map: Some(heat),
+            hatches: patterns.reason_hatches(&self.reasons, cell),
             ..Panel::default()
         }
     }
 
-    fn curve(&self, x: &Axis, scene: &Scene, patterns: &Patterns) -> Panel {
-        let across = Shown::of(x);
+    fn draw_curve(&self, x: &SweepAxis, scene: &Scene, patterns: &ReasonPatterns) -> Panel {
+        let across = DisplayAxis::new(x);
         let points: Vec<Option<(f64, f64)>> =
             across.middles.iter().zip(&self.values).map(|(x, value)| value.map(|y| (*x, y))).collect();
-        let mark = Mark::Joined(Shape::Disc);
+        let mark = Mark::Joined(MarkerShape::Disc);
         let line = Series { colour: Colour::Blue, mark, points, ..Series::default() };
         let cell = |index: usize| {
             let (from, to) = (*across.edges.get(index)?, *across.edges.get(index + 1)?);
             Some([from, to, f64::NEG_INFINITY, f64::INFINITY])
         };
-        let rule =
-            |at| Rule { label: SCENE.to_owned(), colour: Colour::Grey, mark: Mark::Dashed, at, above: None };
-        let y = ChartAxis::linear(label(self.map));
+        let rule = |at| VerticalLine {
+            label: SCENE_LABEL.to_owned(),
+            colour: Colour::Grey,
+            mark: Mark::Dashed,
+            at,
+            above: None,
+        };
+        let y = ChartAxis::linear(map_label(self.map));
         Panel {
-            x: across.axis(),
-            y: shown_range(self.map).map_or(y.clone(), |(low, high)| y.between(low, high)),
+            x: across.chart_axis(),
+            y: map_range(self.map).map_or(y.clone(), |(low, high)| y.with_range(low, high)),
             height_mm: CURVE_MM,
             series: vec![line],
-            rules: across.of_scene(scene).map(rule).into_iter().collect(),
-            hatches: patterns.hatches(&self.reasons, cell),
+            vertical_lines: across.scene_value(scene).map(rule).into_iter().collect(),
+            hatches: patterns.reason_hatches(&self.reasons, cell),
             ..Panel::default()
         }
     }
 }
 
 /// What marks the scene from which the study starts.
-const SCENE: &str = "the scene as written";
+const SCENE_LABEL: &str = "the scene as written";
 
-fn as_written(at: Option<(f64, f64)>) -> Option<Series> {
+fn scene_marker(at: Option<(f64, f64)>) -> Option<Series> {
     at.map(|at| Series {
-        label: SCENE.to_owned(),
+        label: SCENE_LABEL.to_owned(),
         colour: Colour::Vermilion,
-        mark: Mark::Hollow(Shape::Diamond),
+        mark: Mark::Hollow(MarkerShape::Diamond),
         points: vec![Some(at)],
         ..Series::default()
     })
 }
 
 /// An axis in the unit of figures.
-struct Shown<'a> {
-    axis: &'a Axis,
+struct DisplayAxis<'a> {
+    axis: &'a SweepAxis,
     middles: Vec<f64>,
     edges: Vec<f64>,
 }
 
-impl<'a> Shown<'a> {
-    fn of(axis: &'a Axis) -> Self {
-        let factor = shown_unit(axis.parameter).1;
+impl<'a> DisplayAxis<'a> {
+    fn new(axis: &'a SweepAxis) -> Self {
+        let factor = display_unit(axis.parameter).1;
         let middles: Vec<f64> = axis.values.iter().map(|value| value * factor).collect();
-        let edges = cell_edges(&middles, scale(axis));
+        let edges = cell_edges(&middles, axis_scale(axis));
         Self { axis, middles, edges }
     }
 
     /// From the start of the first cell to the end of the last.
-    fn axis(&self) -> ChartAxis {
+    fn chart_axis(&self) -> ChartAxis {
         let axis =
-            ChartAxis { label: axis_label(self.axis), scale: scale(self.axis), ..ChartAxis::default() };
+            ChartAxis { label: axis_label(self.axis), scale: axis_scale(self.axis), ..ChartAxis::default() };
         match (self.edges.first(), self.edges.last()) {
-            (Some(low), Some(high)) => axis.between(*low, *high),
+            (Some(low), Some(high)) => axis.with_range(*low, *high),
             _ => axis,
         }
     }
 
     /// Where the scene itself lies, if it does.
-    fn of_scene(&self, scene: &Scene) -> Option<f64> {
-        let value = scene.value(self.axis.parameter.name)? * shown_unit(self.axis.parameter).1;
+    fn scene_value(&self, scene: &Scene) -> Option<f64> {
+        let value = scene.value(self.axis.parameter.name)? * display_unit(self.axis.parameter).1;
         let within = value >= *self.edges.first()? && value <= *self.edges.last()?;
         within.then_some(value)
     }

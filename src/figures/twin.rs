@@ -2,9 +2,9 @@
 //! the frames that are lost.
 
 use super::Words;
-use crate::chart::{Axis, Bar, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
+use crate::chart::{ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, Panel, Series, VerticalLine};
 use crate::recording::Recording;
-use crate::text::{length, milliseconds, percent, short};
+use crate::text::{format_length, format_milliseconds, format_percent, format_short};
 
 /// Samples of the motion in the time of a frame.
 pub const MOTION_SAMPLES: f64 = 8.0;
@@ -18,7 +18,7 @@ const PANEL_MM: f64 = 40.0;
 
 /// A twin with the motion behind it; all on one clock.
 #[derive(Debug, Clone, Copy)]
-pub struct Twin<'a> {
+pub struct TwinPlot<'a> {
     /// Heading.
     pub title: &'a str,
     /// The motion without exposure and noise, about [`MOTION_SAMPLES`] times as many samples as frames.
@@ -38,15 +38,15 @@ pub struct Twin<'a> {
 /// The deflection of the whole run, of the frames about the release of the longest stick and about that of a
 /// late one, and what the camera adds to it.
 #[must_use]
-pub fn figure(twin: &Twin) -> Figure {
-    let words = words(twin);
-    let mut panels = vec![run(twin)];
-    panels.extend(instants(twin).into_iter().map(|(name, at)| enlarged(twin, name, at)));
-    panels.push(added(twin));
+pub fn draw_figure(twin: &TwinPlot) -> Figure {
+    let words = figure_text(twin);
+    let mut panels = vec![draw_run_panel(twin)];
+    panels.extend(release_instants(twin).into_iter().map(|(name, at)| draw_enlarged_panel(twin, name, at)));
+    panels.push(draw_camera_panel(twin));
     Figure {
         title: words.caption,
         subtitle: format!("{}; synthetic: no camera took it", twin.title),
-        synthetic: true,
+        watermarked: true,
         description: words.details,
         width_mm: FULL_WIDTH_MM,
         panels,
@@ -55,30 +55,30 @@ pub fn figure(twin: &Twin) -> Figure {
 }
 
 /// The claim with its numbers, and what the figure shows.
-fn words(twin: &Twin) -> Words {
+fn figure_text(twin: &TwinPlot) -> Words {
     let grid = twin.tracked.grid();
-    let lost = lost(twin).len();
-    let blur_m = blurs(twin).into_iter().flatten().map(|(_, blur_m)| blur_m.abs()).fold(0.0, f64::max);
+    let lost = lost_points(twin).len();
+    let blur_m = blur_points(twin).into_iter().flatten().map(|(_, blur_m)| blur_m.abs()).fold(0.0, f64::max);
     Words {
         caption: format!(
             "{} frames at {} frames/s: noise of {} on the deflection, {} of the frames lost",
             grid.frames,
-            short(grid.frame_rate_hz),
-            length(deflection_noise_m(twin)),
-            percent(lost as f64 / grid.frames.max(1) as f64)
+            format_short(grid.frame_rate_hz),
+            format_length(deflection_noise_m(twin)),
+            format_percent(lost as f64 / grid.frames.max(1) as f64)
         ),
         details: format!(
             "Deflection of the simulated motion and of the frames of a camera with an exposure of {}. Level bars: the \
              exposure; upright bars: two standard deviations of the noise. The exposure blurs the deflection by up to \
              {}.",
-            milliseconds(twin.exposure_s),
-            length(blur_m)
+            format_milliseconds(twin.exposure_s),
+            format_length(blur_m)
         ),
     }
 }
 
 /// Tip and head have noise of their own.
-fn deflection_noise_m(twin: &Twin) -> f64 {
+fn deflection_noise_m(twin: &TwinPlot) -> f64 {
     std::f64::consts::SQRT_2 * twin.noise_m
 }
 
@@ -88,15 +88,15 @@ fn deflection_m(recording: &Recording, at: usize) -> Option<f64> {
 }
 
 /// Times, s, and deflections, mm; `None` where head or tip is lost.
-fn points(recording: &Recording) -> Vec<Option<(f64, f64)>> {
+fn deflection_points(recording: &Recording) -> Vec<Option<(f64, f64)>> {
     let grid = recording.grid();
     (0..grid.frames).map(|at| Some((grid.time_s(at), 1e3 * deflection_m(recording, at)?))).collect()
 }
 
 /// Frames without head or without tip, where the camera would have seen them.
-fn lost(twin: &Twin) -> Vec<Option<(f64, f64)>> {
-    let tracked = points(twin.tracked);
-    points(twin.seen)
+fn lost_points(twin: &TwinPlot) -> Vec<Option<(f64, f64)>> {
+    let tracked = deflection_points(twin.tracked);
+    deflection_points(twin.seen)
         .into_iter()
         .zip(tracked)
         .filter(|(_, found)| found.is_none())
@@ -105,22 +105,23 @@ fn lost(twin: &Twin) -> Vec<Option<(f64, f64)>> {
 }
 
 /// The deflection that the camera sees minus that of the motion at the instant of the frame, m.
-fn blurs(twin: &Twin) -> Vec<Option<(f64, f64)>> {
-    differences(twin, twin.seen)
+fn blur_points(twin: &TwinPlot) -> Vec<Option<(f64, f64)>> {
+    difference_points(twin, twin.seen)
 }
 
-fn differences(twin: &Twin, of: &Recording) -> Vec<Option<(f64, f64)>> {
+fn difference_points(twin: &TwinPlot, of: &Recording) -> Vec<Option<(f64, f64)>> {
     let (grid, traces) = (of.grid(), twin.motion.traces());
     let difference = |at: usize| {
         let time_s = grid.time_s(at);
-        let true_m = twin.motion.at(&traces.tip_x_m, time_s)? - twin.motion.at(&traces.head_x_m, time_s)?;
+        let true_m = twin.motion.interpolate_column(&traces.tip_x_m, time_s)?
+            - twin.motion.interpolate_column(&traces.head_x_m, time_s)?;
         Some((time_s, deflection_m(of, at)? - true_m))
     };
     (0..grid.frames).map(difference).collect()
 }
 
-fn run(twin: &Twin) -> Panel {
-    let rule = |(name, at): (&str, f64)| Rule {
+fn draw_run_panel(twin: &TwinPlot) -> Panel {
+    let rule = |(name, at): (&str, f64)| VerticalLine {
         label: name.to_owned(),
         colour: Colour::Grey,
         mark: Mark::Dashed,
@@ -129,43 +130,43 @@ fn run(twin: &Twin) -> Panel {
     };
     Panel {
         title: "whole run".to_owned(),
-        x: Axis::time(),
-        y: Axis::linear("deflection, mm"),
+        x: ChartAxis::time(),
+        y: ChartAxis::linear("deflection, mm"),
         height_mm: PANEL_MM,
-        series: series(twin, None),
-        rules: instants(twin).into_iter().map(rule).collect(),
+        series: part_series(twin, None),
+        vertical_lines: release_instants(twin).into_iter().map(rule).collect(),
         ..Panel::default()
     }
 }
 
 /// A part of the run, frame by frame.
-fn enlarged(twin: &Twin, name: &str, at_s: f64) -> Panel {
+fn draw_enlarged_panel(twin: &TwinPlot, name: &str, at_s: f64) -> Panel {
     let frame_s = 1.0 / twin.tracked.grid().frame_rate_hz;
     let (from, to) = (at_s - BEFORE * frame_s, at_s + (ENLARGED - BEFORE) * frame_s);
     Panel {
         title: format!("{name}, {} frames", ENLARGED as usize),
-        x: Axis::time().between(from, to),
-        y: Axis::linear("deflection, mm"),
+        x: ChartAxis::time().with_range(from, to),
+        y: ChartAxis::linear("deflection, mm"),
         height_mm: PANEL_MM,
-        series: series(twin, Some((from, to))),
+        series: part_series(twin, Some((from, to))),
         ..Panel::default()
     }
 }
 
 /// The motion, the frames, and the lost ones; with bars in a part.
-fn series(twin: &Twin, part: Option<(f64, f64)>) -> Vec<Series> {
-    let tracked = points(twin.tracked);
+fn part_series(twin: &TwinPlot, part: Option<(f64, f64)>) -> Vec<Series> {
+    let tracked = deflection_points(twin.tracked);
     let sd_mm = 1e3 * deflection_noise_m(twin);
     let inside = |(time_s, _): &&(f64, f64)| part.is_some_and(|(from, to)| (from..=to).contains(time_s));
     let half_s = 0.5 * twin.exposure_s;
     let bars = tracked.iter().flatten().filter(inside).flat_map(|(time_s, y)| {
         [
-            Bar::Horizontal { y: *y, from: time_s - half_s, to: time_s + half_s },
-            Bar::Vertical { x: *time_s, from: y - 2.0 * sd_mm, to: y + 2.0 * sd_mm },
+            ErrorBar::Horizontal { y: *y, from: time_s - half_s, to: time_s + half_s },
+            ErrorBar::Vertical { x: *time_s, from: y - 2.0 * sd_mm, to: y + 2.0 * sd_mm },
         ]
     });
-    let is_seen = |bar: &Bar| match bar {
-        Bar::Horizontal { from, to, .. } | Bar::Vertical { from, to, .. } => to > from,
+    let is_seen = |bar: &ErrorBar| match bar {
+        ErrorBar::Horizontal { from, to, .. } | ErrorBar::Vertical { from, to, .. } => to > from,
     };
     let bars = bars.filter(is_seen).collect();
     let of = |label: &str, colour, mark, points| Series {
@@ -176,14 +177,14 @@ fn series(twin: &Twin, part: Option<(f64, f64)>) -> Vec<Series> {
         ..Series::default()
     };
     vec![
-        of("simulated motion", Colour::Blue, Mark::Thin, points(twin.motion)),
-        Series { bars, ..of("frame as tracked", Colour::Black, Mark::Dots, tracked) },
-        of("lost frame", Colour::Vermilion, Mark::Crosses, lost(twin)),
+        of("simulated motion", Colour::Blue, Mark::Thin, deflection_points(twin.motion)),
+        Series { error_bars: bars, ..of("frame as tracked", Colour::Black, Mark::Dots, tracked) },
+        of("lost frame", Colour::Vermilion, Mark::Crosses, lost_points(twin)),
     ]
 }
 
 /// What the camera adds: blur alone, and blur with noise.
-fn added(twin: &Twin) -> Panel {
+fn draw_camera_panel(twin: &TwinPlot) -> Panel {
     let micrometres = |points: Vec<Option<(f64, f64)>>| {
         points.into_iter().map(|point| point.map(|(time_s, y)| (time_s, 1e6 * y))).collect()
     };
@@ -195,13 +196,13 @@ fn added(twin: &Twin) -> Panel {
         ..Series::default()
     };
     Panel {
-        title: format!("frame minus motion, noise {}", length(deflection_noise_m(twin))),
-        x: Axis::time(),
-        y: Axis::linear("difference, \u{b5}m"),
+        title: format!("frame minus motion, noise {}", format_length(deflection_noise_m(twin))),
+        x: ChartAxis::time(),
+        y: ChartAxis::linear("difference, \u{b5}m"),
         height_mm: 0.8 * PANEL_MM,
         series: vec![
-            of("with noise", Colour::Grey, Mark::Dots, differences(twin, twin.tracked)),
-            of("exposure alone", Colour::Orange, Mark::Thin, blurs(twin)),
+            of("with noise", Colour::Grey, Mark::Dots, difference_points(twin, twin.tracked)),
+            of("exposure alone", Colour::Orange, Mark::Thin, blur_points(twin)),
         ],
         ..Panel::default()
     }
@@ -209,7 +210,7 @@ fn added(twin: &Twin) -> Panel {
 
 /// The end of the longest stick, and of the last one of the late part of the run that is followed by enough
 /// frames.
-fn instants(twin: &Twin) -> Vec<(&'static str, f64)> {
+fn release_instants(twin: &TwinPlot) -> Vec<(&'static str, f64)> {
     let grid = twin.tracked.grid();
     let (start_s, end_s) = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
     let frame_s = 1.0 / grid.frame_rate_hz;
@@ -227,7 +228,7 @@ mod tests {
     use super::*;
     use crate::chart::Medium;
     use crate::recording::{FrameGrid, Traces};
-    use crate::twin::{Tracking, track};
+    use crate::twin::{TrackingModel, add_tracking_noise};
 
     fn recording(frame_rate_hz: f64, frames: usize, of: impl Fn(f64) -> f64) -> Recording {
         let grid = FrameGrid { start_s: 1.0, frame_rate_hz, frames };
@@ -246,10 +247,11 @@ mod tests {
     fn the_parts_are_about_releases_and_every_lost_frame_is_marked() {
         let path = |t: f64| 1e-3 * (300.0 * t).sin();
         let (motion, seen) = (recording(8000.0, 4001, path), recording(1000.0, 501, path));
-        let tracking = Tracking { metres_per_pixel: 1e-5, noise_px: 0.2, dropout_fraction: 0.1, seed: 1 };
-        let tracked = track(&seen, "a <twin>", &tracking).unwrap();
+        let tracking =
+            TrackingModel { metres_per_pixel: 1e-5, noise_px: 0.2, dropout_fraction: 0.1, seed: 1 };
+        let tracked = add_tracking_noise(&seen, "a <twin>", &tracking).unwrap();
         let stick_s = [[1.1, 1.2], [1.3, 1.31], [1.44, 1.45], [1.499, 1.4995]];
-        let twin = Twin {
+        let twin = TwinPlot {
             title: "a <twin>",
             motion: &motion,
             seen: &seen,
@@ -258,16 +260,17 @@ mod tests {
             noise_m: 2e-6,
             stick_s: &stick_s,
         };
-        assert_eq!(instants(&twin), [("longest stick ends", 1.2), ("stick-slip", 1.45)]);
-        let missing = points(&tracked).iter().filter(|point| point.is_none()).count();
-        assert!(missing > 50 && lost(&twin).iter().flatten().count() == missing);
+        assert_eq!(release_instants(&twin), [("longest stick ends", 1.2), ("stick-slip", 1.45)]);
+        let missing = deflection_points(&tracked).iter().filter(|point| point.is_none()).count();
+        assert!(missing > 50 && lost_points(&twin).iter().flatten().count() == missing);
         // nothing is blurred in this view, and what is left has the stated noise
-        assert!(blurs(&twin).into_iter().flatten().all(|(_, m)| m.abs() < 2e-7));
-        let noise: Vec<f64> = differences(&twin, &tracked).into_iter().flatten().map(|(_, m)| m).collect();
+        assert!(blur_points(&twin).into_iter().flatten().all(|(_, m)| m.abs() < 2e-7));
+        let noise: Vec<f64> =
+            difference_points(&twin, &tracked).into_iter().flatten().map(|(_, m)| m).collect();
         let sd = (noise.iter().map(|m| m * m).sum::<f64>() / noise.len() as f64).sqrt();
         assert!((sd / deflection_noise_m(&twin) - 1.0).abs() < 0.15, "{sd}");
-        let drawn = figure(&twin);
-        let svg = drawn.svg(Medium::Screen);
+        let drawn = draw_figure(&twin);
+        let svg = drawn.to_svg(Medium::Screen);
         assert_eq!(drawn.panels.len(), 4);
         assert!(svg.contains("synthetic") && svg.contains("a &lt;twin&gt;") && !svg.contains("NaN"));
         assert!(drawn.title.contains("2.8 \u{b5}m"), "{}", drawn.title);

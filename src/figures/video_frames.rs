@@ -1,13 +1,13 @@
 //! The links of the fitted model over frames of the video, at instants through the reversal.
 
 use super::Words;
-use super::poses::{joints, through_reversal};
-use crate::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Raster, Series};
-use crate::compare::Case;
+use super::poses::{joint_positions, reversal_poses};
+use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Raster, Series};
+use crate::compare::ConditionComparison;
 use crate::figures::{FigureBlock, subtitle};
 use crate::math;
-use crate::recording::film::Film;
-use crate::text::{length, listed};
+use crate::recording::film::RecordingVideo;
+use crate::text::{format_length, join_with_and};
 
 /// The instants that are shown: the pose of the model, and what it is called over a recording.
 const SHOWN: [(&str, &str); 4] = [
@@ -87,21 +87,26 @@ pub struct VideoFrames {
 impl VideoFrames {
     /// The instants of a condition that its recording shows; `None` without any, or without a video.
     #[must_use]
-    pub fn of(case: &Case) -> Option<Self> {
+    pub fn of(case: &ConditionComparison) -> Option<Self> {
         let film = case.measured?.film.filter(|_| !case.alignment.opposite_turn)?;
-        let poses = through_reversal(&case.model.motion);
+        let poses = reversal_poses(&case.model.motion);
         let shown = |(pose, name): (&str, &'static str)| {
             let time_s = poses.iter().find(|p| p.name == pose)?.sample.time_s;
             instant(case, &film, name, time_s + case.alignment.shift_s)
         };
         let instants: Vec<Instant> = SHOWN.into_iter().filter_map(shown).collect();
-        (!instants.is_empty()).then(|| Self { subtitle: subtitle(case.synthetic(), ""), instants })
+        (!instants.is_empty()).then(|| Self { subtitle: subtitle(case.is_synthetic(), ""), instants })
     }
 }
 
 /// The frame with head and tip that is nearest to a time of the recording, s; `None` where no height was
 /// tracked, so that the place of the picture is not known.
-fn instant(case: &Case, film: &Film<'_>, name: &'static str, time_s: f64) -> Option<Instant> {
+fn instant(
+    case: &ConditionComparison,
+    film: &RecordingVideo<'_>,
+    name: &'static str,
+    time_s: f64,
+) -> Option<Instant> {
     let recording = case.recording()?;
     let (grid, traces, view) = (recording.grid(), recording.traces(), &case.model.view.recording);
     let nearest = ((time_s - grid.start_s) * grid.frame_rate_hz).round();
@@ -115,12 +120,12 @@ fn instant(case: &Case, film: &Film<'_>, name: &'static str, time_s: f64) -> Opt
     let model_s = time_s - case.alignment.shift_s;
     // (measured, model, what is added to the model)
     let apart_m = |measured: &[Option<f64>], model: &[Option<f64>], added_m: f64| {
-        Some((*measured.get(at)?)? - view.at(model, model_s)? - added_m)
+        Some((*measured.get(at)?)? - view.interpolate_column(model, model_s)? - added_m)
     };
     let (seen, along_m, drop_m) = (view.traces(), case.alignment.along_m, case.alignment.drop_m);
     let fine = &case.model.motion.fine;
     let after = fine.partition_point(|sample| sample.time_s < model_s);
-    let joints_m = joints(&case.model.motion.linkage, fine.get(after).or(fine.last())?);
+    let joints_m = joint_positions(&case.model.motion.linkage, fine.get(after).or(fine.last())?);
     let joints_m = joints_m.map(|(x, y)| (x - joints_m[0].0, y));
     let head_up_m = apart_m(&traces.head_y_m, &seen.head_y_m, -drop_m);
     let tip_up_m = apart_m(&traces.tip_y_m, &seen.tip_y_m, -drop_m);
@@ -142,10 +147,15 @@ fn instant(case: &Case, film: &Film<'_>, name: &'static str, time_s: f64) -> Opt
 }
 
 /// The frame `at` round the links, turned and scaled as the figure.
-fn photograph(film: &Film<'_>, at: usize, joints_m: &[(f64, f64); 3], shift_m: (f64, f64)) -> Frame {
-    let Some(picture) = film.pictures.picture(at) else { return Frame::Missing };
+fn photograph(
+    film: &RecordingVideo<'_>,
+    at: usize,
+    joints_m: &[(f64, f64); 3],
+    shift_m: (f64, f64),
+) -> Frame {
+    let Some(picture) = film.pictures.frame_picture(at) else { return Frame::Missing };
     let ends = [joints_m[0], joints_m[2]];
-    let seen = |(x_m, y_m)| picture.holds(film.place.pixel([x_m + shift_m.0, y_m + shift_m.1]));
+    let seen = |(x_m, y_m)| picture.contains_point(film.mapping.to_pixel([x_m + shift_m.0, y_m + shift_m.1]));
     if !ends.into_iter().any(seen) {
         return Frame::Elsewhere;
     }
@@ -155,18 +165,18 @@ fn photograph(film: &Film<'_>, at: usize, joints_m: &[(f64, f64); 3], shift_m: (
     let rows = ((high_m - low_m) / point_m).round() as usize;
     let pixel = |[across, down]: [f64; 2]| {
         let (x_m, y_m) = (across * point_m - half_m, high_m - down * point_m);
-        film.place.pixel([x_m + shift_m.0, y_m + shift_m.1])
+        film.mapping.to_pixel([x_m + shift_m.0, y_m + shift_m.1])
     };
-    let Ok(png) = picture.cut(FRAME_POINTS, rows, pixel).to_png() else { return Frame::Missing };
+    let Ok(png) = picture.resample(FRAME_POINTS, rows, pixel).to_png() else { return Frame::Missing };
     let y = [high_m - rows as f64 * point_m, high_m].map(|y_m| 1e3 * y_m);
     Frame::Shown(Raster { png, x: [-1e3 * half_m, 1e3 * half_m], y })
 }
 
 /// The figure of a condition; `None` without a video, or where nothing was tracked at the instants.
-pub(crate) fn block(case: &Case) -> Option<FigureBlock> {
+pub(crate) fn block(case: &ConditionComparison) -> Option<FigureBlock> {
     let shown = VideoFrames::of(case)?;
     let words = Words { caption: caption(&shown), details: details(&shown) };
-    Some(case.block("video-frames", words, figure(&shown)))
+    Some(case.figure_block("video-frames", words, figure(&shown)))
 }
 
 /// The point that lies farthest from the model, with its distance, m.
@@ -183,7 +193,7 @@ pub fn caption(shown: &VideoFrames) -> String {
         "At {} instants through the reversal head and tip of the model lie at most {} from the tracked points: the \
          {point} {}.",
         shown.instants.len(),
-        length(distance_m),
+        format_length(distance_m),
         instant.name,
     )
 }
@@ -209,18 +219,21 @@ fn frames_in_words(shown: &VideoFrames) -> String {
         (true, true) => String::new(),
         (true, false) => format!(
             " The video has no picture {}: check `first_frame` of [video] in recording.toml.",
-            listed(&without)
+            join_with_and(&without)
         ),
         (false, true) => " Behind them the frames of the video.".to_owned(),
         (false, false) => {
-            format!(" Behind them the frames of the video, of which there is none {}.", listed(&without))
+            format!(
+                " Behind them the frames of the video, of which there is none {}.",
+                join_with_and(&without)
+            )
         }
     };
     if !elsewhere.is_empty() {
         words += &format!(
             " The frame {} shows neither tracked point: check `origin_px` and `metres_per_pixel` of [video] in \
              recording.toml.",
-            listed(&elsewhere)
+            join_with_and(&elsewhere)
         );
     }
     words
@@ -231,10 +244,10 @@ fn frames_in_words(shown: &VideoFrames) -> String {
 pub fn figure(shown: &VideoFrames) -> Figure {
     Figure {
         title: farthest(shown).map_or_else(String::new, |(.., distance_m)| {
-            format!("The model's links end within {} of the tracked points", length(distance_m))
+            format!("The model's links end within {} of the tracked points", format_length(distance_m))
         }),
         subtitle: shown.subtitle.clone(),
-        synthetic: false, // (the figure of a condition is marked by that)
+        watermarked: false, // (the figure of a condition is marked by that)
         description: caption(shown),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
@@ -264,9 +277,9 @@ fn drawing(shown: &VideoFrames, instant: &Instant) -> Panel {
     let [tracked_head, tracked_tip] = instant.tracked_m.map(place);
     let tracked = [tracked_head, None, tracked_tip].into_iter().filter(|point| filmed || point.is_some());
     Panel {
-        title: format!("{}\ntip {}, head {}", instant.name, length(tip_m), length(head_m)),
-        x: Axis::linear("from the head, mm").between(-1e3 * half, 1e3 * half),
-        y: Axis::linear("over the glass, mm").between(-1e3 * ROOM * size, 1e3 * (1.0 + ROOM) * size),
+        title: format!("{}\ntip {}, head {}", instant.name, format_length(tip_m), format_length(head_m)),
+        x: ChartAxis::linear("from the head, mm").with_range(-1e3 * half, 1e3 * half),
+        y: ChartAxis::linear("over the glass, mm").with_range(-1e3 * ROOM * size, 1e3 * (1.0 + ROOM) * size),
         height_mm: DRAWING_MM,
         series: vec![
             of("glass", Colour::Grey, Mark::Thin, vec![Some((-1e6, 0.0)), Some((1e6, 0.0))]),
@@ -274,8 +287,8 @@ fn drawing(shown: &VideoFrames, instant: &Instant) -> Panel {
             of("lip", Colour::Orange, look(Mark::Thick), vec![place(hinge), place(tip)]),
             of("tracked head and tip", Colour::Black, look(Mark::Circles), tracked.collect()),
         ],
-        equal: true,
-        picture: instant.frame.shown().cloned(),
+        equal_aspect: true,
+        raster: instant.frame.shown().cloned(),
         ..Panel::default()
     }
 }
@@ -283,7 +296,7 @@ fn drawing(shown: &VideoFrames, instant: &Instant) -> Panel {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::{MOST_HEIGHT_MM, Medium};
+    use crate::chart::{MAX_HEIGHT_MM, Medium};
 
     #[test]
     fn every_instant_has_its_links_and_the_farthest_point_is_named() {
@@ -303,9 +316,9 @@ mod tests {
         };
         let drawn = figure(&shown);
         assert_eq!((drawn.panels.len(), drawn.columns), (2, 2));
-        assert!(drawn.panels.iter().all(|panel| panel.equal));
-        assert!(drawn.height_mm(Medium::Column) <= MOST_HEIGHT_MM);
-        let svg = drawn.svg(Medium::Page);
+        assert!(drawn.panels.iter().all(|panel| panel.equal_aspect));
+        assert!(drawn.height_mm(Medium::Column) <= MAX_HEIGHT_MM);
+        let svg = drawn.to_svg(Medium::Page);
         assert!(
             svg.contains("tip 5.0 \u{b5}m, head 1.0 \u{b5}m")
                 && svg.contains("synthetic")

@@ -1,12 +1,14 @@
 //! The whole recording with its named windows, and the one that was analysed.
 
-use super::history::unit;
-use crate::chart::{Axis, Band, Caption, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Rule, Series};
+use super::history::length_unit;
+use crate::chart::{
+    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, ShadedSpan, TopLabel, VerticalLine,
+};
 use crate::figures::subtitle;
 
 /// A named part of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct NamedWindow {
+pub struct WindowSpan {
     /// Name, such as `stick`.
     pub name: String,
     /// Start, s.
@@ -17,7 +19,7 @@ pub struct NamedWindow {
 
 /// What the figure shows; all columns have the length of `time_s`.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Windows {
+pub struct WindowOverview {
     /// Heading.
     pub title: String,
     /// Quantity that was analysed, such as "deflection".
@@ -33,7 +35,7 @@ pub struct Windows {
     /// Head along the sweep, m; empty for no such panel.
     pub head_x_m: Vec<Option<f64>>,
     /// The named windows.
-    pub windows: Vec<NamedWindow>,
+    pub windows: Vec<WindowSpan>,
     /// Start and end of what was analysed, s.
     pub analysed_s: Option<(f64, f64)>,
     /// Named instants, s.
@@ -49,23 +51,23 @@ const COLOURS: [Colour; 6] =
 
 /// The figure.
 #[must_use]
-pub fn figure(shown: &Windows) -> Figure {
-    let mut panels = vec![panel(shown, &shown.quantity, &shown.channel_m, HEIGHT_MM)];
+pub fn draw_figure(shown: &WindowOverview) -> Figure {
+    let mut panels = vec![draw_panel(shown, &shown.quantity, &shown.channel_m, HEIGHT_MM)];
     // names stand over the topmost panel, their shades run through both
-    panels[0].captions = shown
+    panels[0].top_labels = shown
         .windows
         .iter()
-        .map(|w| Caption { label: w.name.clone(), at: (w.from_s + w.to_s) / 2.0 })
+        .map(|w| TopLabel { label: w.name.clone(), at: (w.from_s + w.to_s) / 2.0 })
         .collect();
     if !shown.head_x_m.is_empty() {
-        let mut head = panel(shown, "head x", &shown.head_x_m, HEAD_HEIGHT_MM);
-        head.rules.iter_mut().for_each(|r| r.label.clear());
+        let mut head = draw_panel(shown, "head x", &shown.head_x_m, HEAD_HEIGHT_MM);
+        head.vertical_lines.iter_mut().for_each(|r| r.label.clear());
         panels.push(head);
     }
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
-        synthetic: shown.synthetic,
+        watermarked: shown.synthetic,
         description: format!(
             "Time history of {} over the whole recording with its named windows shaded.",
             shown.quantity
@@ -76,47 +78,47 @@ pub fn figure(shown: &Windows) -> Figure {
     }
 }
 
-fn panel(shown: &Windows, name: &str, values_m: &[Option<f64>], height_mm: f64) -> Panel {
-    let (unit, factor) = unit(values_m.iter().flatten().copied().filter(|x| x.is_finite()));
+fn draw_panel(shown: &WindowOverview, name: &str, values_m: &[Option<f64>], height_mm: f64) -> Panel {
+    let (unit, factor) = length_unit(values_m.iter().flatten().copied().filter(|x| x.is_finite()));
     let points = shown.time_s.iter().zip(values_m).map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
-    let rule = |(label, at): &(String, f64)| Rule {
+    let rule = |(label, at): &(String, f64)| VerticalLine {
         label: label.clone(),
         colour: Colour::Blue,
         mark: Mark::Dashed,
         at: *at,
         above: None,
     };
-    let time = Axis::time();
+    let time = ChartAxis::time();
     Panel {
         x: match (shown.time_s.first(), shown.time_s.last()) {
-            (Some(first), Some(last)) => time.between(*first, *last),
+            (Some(first), Some(last)) => time.with_range(*first, *last),
             _ => time,
         },
-        y: Axis::linear(format!("{name}, {unit}")),
+        y: ChartAxis::linear(format!("{name}, {unit}")),
         height_mm,
         series: vec![Series {
             label: String::new(),
             colour: Colour::Black,
             mark: Mark::Thin,
             points,
-            bars: Vec::new(),
+            error_bars: Vec::new(),
         }],
-        bands: bands(shown),
-        rules: shown.instants.iter().map(rule).collect(),
+        shaded_spans: window_spans(shown),
+        vertical_lines: shown.instants.iter().map(rule).collect(),
         ..Panel::default()
     }
 }
 
 /// The windows shaded, the analysed one framed.
-fn bands(shown: &Windows) -> Vec<Band> {
-    let shaded = |(w, colour): (&NamedWindow, &Colour)| Band {
+fn window_spans(shown: &WindowOverview) -> Vec<ShadedSpan> {
+    let shaded = |(w, colour): (&WindowSpan, &Colour)| ShadedSpan {
         label: w.name.clone(),
         colour: *colour,
         from: w.from_s,
         to: w.to_s,
         outlined: false,
     };
-    let framed = shown.analysed_s.map(|(from, to)| Band {
+    let framed = shown.analysed_s.map(|(from, to)| ShadedSpan {
         label: "analysed".to_owned(),
         colour: Colour::Black,
         from,
@@ -131,14 +133,14 @@ mod tests {
     use super::*;
     use crate::chart::Medium;
 
-    fn as_svg(shown: &Windows) -> String {
-        figure(shown).svg(Medium::Screen)
+    fn as_svg(shown: &WindowOverview) -> String {
+        draw_figure(shown).to_svg(Medium::Screen)
     }
 
-    fn shown() -> Windows {
+    fn shown() -> WindowOverview {
         let time_s: Vec<f64> = (0..1000).map(|i| f64::from(i) * 1e-3).collect();
-        let window = |name: &str, from_s, to_s| NamedWindow { name: name.to_owned(), from_s, to_s };
-        Windows {
+        let window = |name: &str, from_s, to_s| WindowSpan { name: name.to_owned(), from_s, to_s };
+        WindowOverview {
             quantity: "deflection".to_owned(),
             channel_m: time_s.iter().map(|t| Some(1e-3 * (9.0 * t).sin())).collect(),
             head_x_m: time_s.iter().map(|t| Some(0.1 * t)).collect(),
@@ -150,7 +152,7 @@ mod tests {
                 window("after", 0.47, 0.99),
             ],
             analysed_s: Some((0.5, 0.7)),
-            ..Windows::default()
+            ..WindowOverview::default()
         }
     }
 
@@ -164,6 +166,6 @@ mod tests {
 
     #[test]
     fn without_a_head_there_is_one_panel() {
-        assert!(!as_svg(&Windows { head_x_m: Vec::new(), ..shown() }).contains("head x"));
+        assert!(!as_svg(&WindowOverview { head_x_m: Vec::new(), ..shown() }).contains("head x"));
     }
 }

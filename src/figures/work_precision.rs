@@ -1,11 +1,11 @@
 //! Work-precision diagram: error against time, one line a method; runs whose list of transitions is not the
 //! reference's stand apart.
 
-use crate::chart::{Axis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, Shape};
+use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series};
 
 /// A run in the diagram.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct WorkPrecisionRun {
     /// Name of the method; runs of one name make one line, in their order.
     pub method: String,
     /// Time that it took, s.
@@ -26,7 +26,7 @@ pub struct WorkPrecision {
     /// Quantity and unit of the error.
     pub error_label: String,
     /// The runs.
-    pub points: Vec<Point>,
+    pub points: Vec<WorkPrecisionRun>,
     /// Error below which the reference is not sure: smaller ones are drawn at it.
     pub floor: Option<f64>,
 }
@@ -34,19 +34,19 @@ pub struct WorkPrecision {
 /// Height of the panel of errors and of that of wrong lists, mm.
 const HEIGHTS_MM: (f64, f64) = (88.0, 24.0);
 /// Looks of the methods, in order of appearance.
-const LOOKS: [(Colour, Shape); 7] = [
-    (Colour::Vermilion, Shape::Disc),
-    (Colour::Blue, Shape::Square),
-    (Colour::Green, Shape::Diamond),
-    (Colour::Orange, Shape::Triangle),
-    (Colour::Purple, Shape::InvertedTriangle),
-    (Colour::SkyBlue, Shape::Square),
-    (Colour::Black, Shape::Diamond),
+const LOOKS: [(Colour, MarkerShape); 7] = [
+    (Colour::Vermilion, MarkerShape::Disc),
+    (Colour::Blue, MarkerShape::Square),
+    (Colour::Green, MarkerShape::Diamond),
+    (Colour::Orange, MarkerShape::Triangle),
+    (Colour::Purple, MarkerShape::InvertedTriangle),
+    (Colour::SkyBlue, MarkerShape::Square),
+    (Colour::Black, MarkerShape::Diamond),
 ];
 
 /// The figure.
 #[must_use]
-pub fn figure(shown: &WorkPrecision) -> Figure {
+pub fn draw_figure(shown: &WorkPrecision) -> Figure {
     let mut methods: Vec<&str> = Vec::new();
     for point in &shown.points {
         if !methods.contains(&point.method.as_str()) {
@@ -57,13 +57,13 @@ pub fn figure(shown: &WorkPrecision) -> Figure {
     let looks = methods.iter().zip(LOOKS.iter().cycle());
     let lines = looks
         .clone()
-        .map(|(method, (colour, shape))| line(method, &of(method), shown.floor, *colour, *shape));
+        .map(|(method, (colour, shape))| method_line(method, &of(method), shown.floor, *colour, *shape));
     let strays: Vec<Series> = looks
-        .map(|(method, (colour, shape))| stray(&of(method), *colour, *shape))
+        .map(|(method, (colour, shape))| stray_runs(&of(method), *colour, *shape))
         .filter(|s| !s.points.is_empty())
         .collect();
-    let x = Axis::log("wall time of a run, s").between(ends(shown).0, ends(shown).1);
-    let panel = |y: Axis, height_mm: f64, series: Vec<Series>| Panel {
+    let x = ChartAxis::log("wall time of a run, s").with_range(x_limits(shown).0, x_limits(shown).1);
+    let panel = |y: ChartAxis, height_mm: f64, series: Vec<Series>| Panel {
         x: x.clone(),
         y,
         height_mm,
@@ -91,8 +91,16 @@ pub fn figure(shown: &WorkPrecision) -> Figure {
     }
 }
 
-fn line(method: &str, points: &[&Point], floor: Option<f64>, colour: Colour, shape: Shape) -> Series {
-    let at = |p: &&Point| p.error.map(|error| (p.wall_s, floor.map_or(error, |floor| error.max(floor))));
+fn method_line(
+    method: &str,
+    points: &[&WorkPrecisionRun],
+    floor: Option<f64>,
+    colour: Colour,
+    shape: MarkerShape,
+) -> Series {
+    let at = |p: &&WorkPrecisionRun| {
+        p.error.map(|error| (p.wall_s, floor.map_or(error, |floor| error.max(floor))))
+    };
     Series {
         label: method.to_owned(),
         colour,
@@ -103,14 +111,14 @@ fn line(method: &str, points: &[&Point], floor: Option<f64>, colour: Colour, sha
 }
 
 /// Runs with a wrong list, over the number of wrong transitions.
-fn stray(points: &[&Point], colour: Colour, shape: Shape) -> Series {
+fn stray_runs(points: &[&WorkPrecisionRun], colour: Colour, shape: MarkerShape) -> Series {
     let wrong = points.iter().filter(|p| p.wrong_transitions > 0);
     let points = wrong.map(|p| Some((p.wall_s, p.wrong_transitions as f64))).collect();
     Series { label: String::new(), colour, mark: Mark::Hollow(shape), points, ..Series::default() }
 }
 
 fn floor_line(shown: &WorkPrecision) -> Option<Series> {
-    let (low, high) = ends(shown);
+    let (low, high) = x_limits(shown);
     let points = vec![Some((low, shown.floor?)), Some((high, shown.floor?))];
     Some(Series {
         label: "limit of the reference".to_owned(),
@@ -124,24 +132,25 @@ fn floor_line(shown: &WorkPrecision) -> Option<Series> {
 /// Room beyond the data on a logarithmic axis, as a factor.
 const ROOM: f64 = 1.5;
 
-fn ends(shown: &WorkPrecision) -> (f64, f64) {
-    span(shown.points.iter().map(|p| p.wall_s)).unwrap_or((1e-3, 1.0))
+fn x_limits(shown: &WorkPrecision) -> (f64, f64) {
+    value_range(shown.points.iter().map(|p| p.wall_s)).unwrap_or((1e-3, 1.0))
 }
 
 /// The axis reaches over all errors, however many decades these are.
-fn error_axis(shown: &WorkPrecision) -> Axis {
+fn error_axis(shown: &WorkPrecision) -> ChartAxis {
     let errors =
         shown.points.iter().filter_map(|p| p.error.map(|error| error.max(shown.floor.unwrap_or(0.0))));
-    let (low, high) = span(errors.chain(shown.floor)).unwrap_or((1e-12, 1.0));
-    Axis::log(shown.error_label.clone()).between(low, high)
+    let (low, high) = value_range(errors.chain(shown.floor)).unwrap_or((1e-12, 1.0));
+    ChartAxis::log(shown.error_label.clone()).with_range(low, high)
 }
 
-fn stray_axis(shown: &WorkPrecision) -> Axis {
-    let (low, high) = span(shown.points.iter().map(|p| p.wrong_transitions as f64)).unwrap_or((1.0, 10.0));
-    Axis::log("missed + invented").between(low, high.max(10.0 * low))
+fn stray_axis(shown: &WorkPrecision) -> ChartAxis {
+    let (low, high) =
+        value_range(shown.points.iter().map(|p| p.wrong_transitions as f64)).unwrap_or((1.0, 10.0));
+    ChartAxis::log("missed + invented").with_range(low, high.max(10.0 * low))
 }
 
-fn span(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
+fn value_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let usable = values.filter(|v| v.is_finite() && *v > 0.0);
     let (low, high) = usable.fold((f64::INFINITY, 0.0f64), |(l, h), v| (l.min(v), h.max(v)));
     (low <= high).then_some((low / ROOM, high * ROOM))
@@ -153,11 +162,11 @@ mod tests {
     use crate::chart::Medium;
 
     fn as_svg(shown: &WorkPrecision) -> String {
-        figure(shown).svg(Medium::Screen)
+        draw_figure(shown).to_svg(Medium::Screen)
     }
 
-    fn point(method: &str, wall_s: f64, error: Option<f64>, wrong_transitions: usize) -> Point {
-        Point { method: method.to_owned(), wall_s, error, wrong_transitions }
+    fn point(method: &str, wall_s: f64, error: Option<f64>, wrong_transitions: usize) -> WorkPrecisionRun {
+        WorkPrecisionRun { method: method.to_owned(), wall_s, error, wrong_transitions }
     }
 
     #[test]

@@ -4,21 +4,21 @@
 //! box, and held against the open directions there: a feature is worth measuring where it moves by more than
 //! its own 95 % interval across the box.
 
-use super::gate::Probed;
-use super::information::{Combination, INFORMATIVE};
-use super::job::{Aim, Job};
-use super::linear::points;
+use super::gate::ProbeEvaluation;
+use super::information::{MIN_INFORMATIVE, ParameterCombination};
+use super::job::{FitTarget, Job};
+use super::linear::difference_points;
 use super::model::{Draw, Model};
 use super::model_features::ModelFeatures;
-use crate::feature::{Band, End, Feature, Interval, Reading, WIDTH_RELATIVE};
+use crate::feature::{CycleRangeEnd, Feature, FeatureBand, Reading, ReversalInterval, WIDTH_RELATIVE};
 use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Window};
 
 /// Standard deviations that a careful measurement reaches, relative: of a mean or an instant, and of an
 /// amplitude or a damping.
-const CAREFUL: f64 = 0.01;
-const ROUGH: f64 = 0.05;
+const CAREFUL_SD_RELATIVE: f64 = 0.01;
+const ROUGH_SD_RELATIVE: f64 = 0.05;
 /// Speeds at which the friction curve is tried, as shares of the largest.
 const SPEED_SHARES: [f64; 3] = [0.25, 0.5, 0.8];
 /// Frames over which the head's speed is taken.
@@ -27,22 +27,27 @@ const SPEED_FRAMES: usize = 20;
 const SEGMENT_S: f64 = 0.02;
 
 /// A feature that a job might ask for.
-struct Candidate {
-    words: String,
+struct CandidateFeature {
+    description: String,
     sd_relative: f64,
     feature: Feature,
 }
 
 /// Sentences for the directions that are open at a place that was probed; none where nothing is open.
 #[must_use]
-pub fn advice(job: &Job, model: &dyn Model, probed: &Probed, combinations: &[Combination]) -> Vec<String> {
-    let open = probed.directions.open();
+pub fn advise_measurements(
+    job: &Job,
+    model: &dyn Model,
+    probed: &ProbeEvaluation,
+    combinations: &[ParameterCombination],
+) -> Vec<String> {
+    let open = probed.directions.open_directions();
     if open.is_empty() {
         return Vec::new();
     }
-    let candidates = candidates(job, model, &probed.centre.values);
-    let rows = rows(&candidates, job, model, probed);
-    let names = combinations.iter().filter(|c| !c.determined).map(Combination::in_words);
+    let candidates = candidate_features(job, model, &probed.centre.values);
+    let rows = candidate_sensitivities(&candidates, job, model, probed);
+    let names = combinations.iter().filter(|c| !c.determined).map(ParameterCombination::describe);
     let mut sentences: Vec<String> = Vec::new();
     for (direction, name) in open.into_iter().zip(names) {
         let moved = |row: &Vec<f64>| row.iter().zip(direction).map(|(r, d)| r * d).sum::<f64>().abs();
@@ -52,9 +57,9 @@ pub fn advice(job: &Job, model: &dyn Model, probed: &Probed, combinations: &[Com
             .map(|(candidate, row)| (candidate, moved(row)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         let sentence = match best {
-            Some((candidate, moved)) if moved > INFORMATIVE => format!(
+            Some((candidate, moved)) if moved > MIN_INFORMATIVE => format!(
                 "to determine {name}: measure {} to {:.0} %, which moves by {moved:.0} of its standard deviations across the box",
-                candidate.words,
+                candidate.description,
                 100.0 * candidate.sd_relative
             ),
             _ => format!(
@@ -69,16 +74,21 @@ pub fn advice(job: &Job, model: &dyn Model, probed: &Probed, combinations: &[Com
 
 /// Change of each candidate across the box along each parameter, in standard deviations; zero where it is not
 /// seen.
-fn rows(candidates: &[Candidate], job: &Job, model: &dyn Model, probed: &Probed) -> Vec<Vec<f64>> {
+fn candidate_sensitivities(
+    candidates: &[CandidateFeature],
+    job: &Job,
+    model: &dyn Model,
+    probed: &ProbeEvaluation,
+) -> Vec<Vec<f64>> {
     let features: Vec<Feature> = candidates.iter().map(|candidate| candidate.feature.clone()).collect();
     let seen = ModelFeatures::new(model, &features, Vec::new(), 1);
     let read = |unit: &Vec<f64>| -> Vec<Option<f64>> {
         let values: Vec<f64> =
             job.parameters.iter().zip(unit).map(|(parameter, u)| parameter.bounds.from_unit(*u)).collect();
-        let read = seen.read(&values, Draw::default()).unwrap_or_default();
+        let read = seen.read_features(&values, Draw::default()).unwrap_or_default();
         (0..features.len()).map(|at| read.get(at)?.as_ref().ok().map(|read| read.value)).collect()
     };
-    let around = points(&probed.centre.unit);
+    let around = difference_points(&probed.centre.unit);
     let reads: Vec<Vec<Option<f64>>> = around.iter().map(read).collect();
     let slope = |at: usize, axis: usize| {
         let (below, above) =
@@ -87,7 +97,7 @@ fn rows(candidates: &[Candidate], job: &Job, model: &dyn Model, probed: &Probed)
         let ratio = above / below;
         (ratio > 0.0 && ratio.is_finite() && width > 0.0).then(|| math::ln(ratio) / width)
     };
-    let row = |(at, candidate): (usize, &Candidate)| {
+    let row = |(at, candidate): (usize, &CandidateFeature)| {
         let slopes =
             (0..job.parameters.len()).map(|axis| slope(at, axis).unwrap_or(0.0) / candidate.sd_relative);
         slopes.collect::<Vec<f64>>()
@@ -95,28 +105,42 @@ fn rows(candidates: &[Candidate], job: &Job, model: &dyn Model, probed: &Probed)
     candidates.iter().enumerate().map(row).collect()
 }
 
-fn candidates(job: &Job, model: &dyn Model, values: &[f64]) -> Vec<Candidate> {
+fn candidate_features(job: &Job, model: &dyn Model, values: &[f64]) -> Vec<CandidateFeature> {
     let mut all = Vec::new();
     for (at, condition) in job.conditions.iter().enumerate().filter(|(_, condition)| !condition.held_out) {
-        let fastest =
-            model.observe(values, at, Draw::default()).ok().and_then(|recording| fastest_m_per_s(&recording));
+        let fastest = model
+            .record_condition(values, at, Draw::default())
+            .ok()
+            .and_then(|recording| max_head_speed_m_per_s(&recording));
         let of = |reading: Reading, words: String, sd_relative: f64| {
             let words =
                 if job.conditions.len() > 1 { format!("{words} in `{}`", condition.name) } else { words };
-            Candidate { words, sd_relative, feature: Feature { name: String::new(), reading, condition: at } }
+            CandidateFeature {
+                description: words,
+                sd_relative,
+                feature: Feature { name: String::new(), reading, condition: at },
+            }
         };
-        all.extend(quasi_static(fastest).into_iter().map(|(reading, words)| of(reading, words, CAREFUL)));
+        all.extend(
+            quasi_static_readings(fastest)
+                .into_iter()
+                .map(|(reading, words)| of(reading, words, CAREFUL_SD_RELATIVE)),
+        );
         all.extend(INTERVALS.map(|interval| {
             of(
                 Reading::Interval { interval, reversal: 1 },
                 format!("the {}", interval.kind().replace('-', " ")),
-                CAREFUL,
+                CAREFUL_SD_RELATIVE,
             )
         }));
-        all.extend(spectral(&job.aims, at).into_iter().map(|(reading, words)| of(reading, words, ROUGH)));
+        all.extend(
+            spectral_readings(&job.targets, at)
+                .into_iter()
+                .map(|(reading, words)| of(reading, words, ROUGH_SD_RELATIVE)),
+        );
     }
     all.retain(|candidate| {
-        job.aims.iter().all(|aim| {
+        job.targets.iter().all(|aim| {
             aim.feature.reading != candidate.feature.reading
                 || aim.feature.condition != candidate.feature.condition
         })
@@ -124,11 +148,11 @@ fn candidates(job: &Job, model: &dyn Model, values: &[f64]) -> Vec<Candidate> {
     all
 }
 
-const INTERVALS: [Interval; 3] =
-    [Interval::ReleaseAfterReversal, Interval::StickDuration, Interval::FlipDuration];
+const INTERVALS: [ReversalInterval; 3] =
+    [ReversalInterval::ReleaseAfterReversal, ReversalInterval::StickDuration, ReversalInterval::FlipDuration];
 
 /// Mean deflections, which say the friction at a speed.
-fn quasi_static(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)> {
+fn quasi_static_readings(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)> {
     let mut found = Vec::new();
     for part in ["before", "after"] {
         let Ok(window) = Window::parse(part) else { continue };
@@ -143,8 +167,8 @@ fn quasi_static(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)> {
 }
 
 /// Amplitude, damping and range in the bands of the components.
-fn spectral(aims: &[Aim], condition: usize) -> Vec<(Reading, String)> {
-    let bands: Vec<(&Band, &str)> = aims
+fn spectral_readings(aims: &[FitTarget], condition: usize) -> Vec<(Reading, String)> {
+    let bands: Vec<(&FeatureBand, &str)> = aims
         .iter()
         .filter(|aim| aim.feature.condition == condition)
         .filter_map(|aim| match &aim.feature.reading {
@@ -152,19 +176,19 @@ fn spectral(aims: &[Aim], condition: usize) -> Vec<(Reading, String)> {
             _ => None,
         })
         .collect();
-    let of = |(band, name): (&Band, &str)| {
+    let of = |(band, name): (&FeatureBand, &str)| {
         let mut found = vec![
             (Reading::Rms(band.clone()), format!("the rms in the band of `{name}`")),
             (Reading::DampingRatio(band.clone()), format!("the damping of `{name}` (damping-ratio)")),
         ];
         if band.channel == Channel::Deflection {
-            let end = |end: End, word: &str| {
+            let end = |end: CycleRangeEnd, word: &str| {
                 (
                     Reading::CycleFrequency { band: band.clone(), segment_s: SEGMENT_S, end },
                     format!("the {word} frequency over which `{name}` runs (cycle-frequency-{word})"),
                 )
             };
-            found.extend([end(End::Low, "low"), end(End::High, "high")]);
+            found.extend([end(CycleRangeEnd::Low, "low"), end(CycleRangeEnd::High, "high")]);
         }
         found
     };
@@ -172,7 +196,7 @@ fn spectral(aims: &[Aim], condition: usize) -> Vec<(Reading, String)> {
 }
 
 /// Largest speed of the head, m/s.
-fn fastest_m_per_s(recording: &Recording) -> Option<f64> {
+fn max_head_speed_m_per_s(recording: &Recording) -> Option<f64> {
     let (head, rate_hz) = (&recording.traces().head_x_m, recording.grid().frame_rate_hz);
     let speed = |ends: &[Option<f64>]| {
         Some((ends.last().copied()?? - ends.first().copied()??).abs() * rate_hz / SPEED_FRAMES as f64)

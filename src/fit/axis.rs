@@ -6,14 +6,14 @@ use serde::Serialize;
 
 /// A free parameter as the search sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Axis {
+pub struct SearchAxis {
     /// Its range.
     pub bounds: Bounds,
     /// What is known of it beforehand.
     pub prior: Option<Prior>,
 }
 
-impl From<Bounds> for Axis {
+impl From<Bounds> for SearchAxis {
     fn from(bounds: Bounds) -> Self {
         Self { bounds, prior: None }
     }

@@ -6,23 +6,23 @@
 //! damped Gauss-Newton steps from the best point with the Jacobian there, corrected by Broyden's rule; the
 //! spread is taken about the best point, so that it includes the bias.
 
-use super::cameras::drawn;
+use super::cameras::draw_camera_errors;
 use super::evaluation::{Evaluation, Observed};
-use super::ledger::{Ledger, Stop};
-use super::linear::{correct, moved, residuals_against, step};
+use super::ledger::{Ledger, StopReason};
+use super::linear::{broyden_update, damped_step, residuals_against, step_in_box};
 use super::objective::Objective;
-use super::stage::Stage;
-use super::target::Target;
+use super::stage::EvaluationStage;
+use super::target::TargetValue;
 use crate::math;
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 /// Gauss-Newton steps of a refit: twins differ by a few deviations, where the linear model nearly holds.
-const STEPS: usize = 3;
+const REFIT_STEPS: usize = 3;
 /// Damping of a refit: a prior of one length of the box, negligible for any informative direction.
-const DAMPING: f64 = 1.0;
+const REFIT_DAMPING: f64 = 1.0;
 /// Fewest twins from which a spread is taken.
-pub const FEWEST: usize = 8;
+pub const MIN_TWINS: usize = 8;
 
 /// What the twins say.
 #[derive(Debug, Clone, PartialEq)]
@@ -40,32 +40,32 @@ impl Bootstrap {
     /// Root mean square distance of the refits from the best point along a coordinate; `None` with too few
     /// twins.
     #[must_use]
-    pub fn spread(&self, axis: usize, best: f64) -> Option<f64> {
+    pub fn refit_spread(&self, axis: usize, best: f64) -> Option<f64> {
         let places: Vec<f64> = self.refits.iter().filter_map(|unit| unit.get(axis).copied()).collect();
         let mean_square = places.iter().map(|u| math::powi(u - best, 2)).sum::<f64>() / places.len() as f64;
-        (places.len() >= FEWEST).then(|| mean_square.sqrt())
+        (places.len() >= MIN_TWINS).then(|| mean_square.sqrt())
     }
 }
 
 /// Makes and fits `twins` twins of `best`; the Jacobian is that at `best`.
 ///
 /// # Errors
-/// [`Stop`] when the evaluations are used up or may not go on.
-pub fn bootstrap(
+/// [`StopReason`] when the evaluations are used up or may not go on.
+pub fn bootstrap_refits(
     ledger: &mut Ledger,
     best: &Evaluation,
     jacobian: &DMatrix<f64>,
     twins: usize,
-) -> Result<Bootstrap, Stop> {
+) -> Result<Bootstrap, StopReason> {
     let objective = ledger.objective();
     let draws: Vec<u64> = (1..=twins as u64).collect();
     let made: Vec<Option<Vec<Observed>>> =
-        draws.par_iter().map(|draw| objective.twin(&best.values, *draw).ok()).collect();
+        draws.par_iter().map(|draw| objective.simulate_twin(&best.values, *draw).ok()).collect();
     let failed = made.iter().filter(|twin| twin.is_none()).count();
     let seen: Vec<&Vec<Observed>> = made.iter().flatten().collect();
-    let feature_sd = (0..objective.targets().len()).map(|at| deviation(&seen, at)).collect();
+    let feature_sd = (0..objective.targets().len()).map(|at| standard_deviation(&seen, at)).collect();
     let filmed = |(twin, draw): (Option<Vec<Observed>>, &u64)| {
-        twin.map(|twin| drawn(objective.targets(), &twin, *draw))
+        twin.map(|twin| draw_camera_errors(objective.targets(), &twin, *draw))
     };
     let mut refits: Vec<Refit> = made
         .into_iter()
@@ -73,20 +73,20 @@ pub fn bootstrap(
         .filter_map(filmed)
         .map(|twin| Refit::new(objective, &twin, best, jacobian))
         .collect();
-    for _ in 0..STEPS {
-        let points: Vec<Vec<f64>> = refits.iter().filter_map(Refit::proposal).collect();
-        ledger.evaluate(Stage::Bootstrap, &points)?;
+    for _ in 0..REFIT_STEPS {
+        let points: Vec<Vec<f64>> = refits.iter().filter_map(Refit::next_point).collect();
+        ledger.evaluate_points(EvaluationStage::Bootstrap, &points)?;
         for refit in &mut refits {
-            let found = refit.proposal().and_then(|point| ledger.find(&point).cloned());
+            let found = refit.next_point().and_then(|point| ledger.find_evaluation(&point).cloned());
             if let Some(found) = found {
-                refit.take(found, objective);
+                refit.accept_step(found, objective);
             }
         }
     }
     Ok(Bootstrap { refits: refits.into_iter().map(|refit| refit.unit).collect(), failed, feature_sd })
 }
 
-fn deviation(seen: &[&Vec<Observed>], feature: usize) -> Option<f64> {
+fn standard_deviation(seen: &[&Vec<Observed>], feature: usize) -> Option<f64> {
     let values: Vec<f64> = seen.iter().filter_map(|twin| twin.get(feature)?.value()).collect();
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let sum: f64 = values.iter().map(|v| math::powi(v - mean, 2)).sum();
@@ -95,7 +95,7 @@ fn deviation(seen: &[&Vec<Observed>], feature: usize) -> Option<f64> {
 
 /// A twin that is being fitted again.
 struct Refit {
-    targets: Vec<Target>,
+    targets: Vec<TargetValue>,
     unit: Vec<f64>,
     residuals: Vec<Option<f64>>,
     model: DMatrix<f64>,
@@ -104,31 +104,32 @@ struct Refit {
 
 impl Refit {
     fn new(objective: &Objective, twin: &[Observed], best: &Evaluation, jacobian: &DMatrix<f64>) -> Self {
-        let target = |(target, seen): (&Target, &Observed)| Target {
+        let target = |(target, seen): (&TargetValue, &Observed)| TargetValue {
             value: seen.value().unwrap_or(f64::NAN),
             ..target.clone()
         };
-        let targets: Vec<Target> = objective.targets().iter().zip(twin).map(target).collect();
+        let targets: Vec<TargetValue> = objective.targets().iter().zip(twin).map(target).collect();
         let residuals = residuals_against(objective.axes(), &targets, best);
         Self { targets, unit: best.unit.clone(), residuals, model: jacobian.clone(), done: false }
     }
 
-    fn proposal(&self) -> Option<Vec<f64>> {
-        let step = (!self.done).then(|| step(&self.model, &self.residuals, DAMPING, None)).flatten()?;
-        Some(moved(&self.unit, &step))
+    fn next_point(&self) -> Option<Vec<f64>> {
+        let step =
+            (!self.done).then(|| damped_step(&self.model, &self.residuals, REFIT_DAMPING, None)).flatten()?;
+        Some(step_in_box(&self.unit, &step))
     }
 
-    fn take(&mut self, found: Evaluation, objective: &Objective) {
+    fn accept_step(&mut self, found: Evaluation, objective: &Objective) {
         let after = residuals_against(objective.axes(), &self.targets, &found);
         let size = |residuals: &[Option<f64>]| {
-            residuals.iter().flatten().map(|r| super::objective::rho(*r)).sum::<f64>()
+            residuals.iter().flatten().map(|r| super::objective::robust_loss(*r)).sum::<f64>()
         };
         if found.failure.is_some() || size(&after) >= size(&self.residuals) {
             self.done = true;
             return;
         }
         let taken: Vec<f64> = found.unit.iter().zip(&self.unit).map(|(to, from)| to - from).collect();
-        correct(&mut self.model, &self.residuals, &after, &taken);
+        broyden_update(&mut self.model, &self.residuals, &after, &taken);
         (self.unit, self.residuals) = (found.unit, after);
     }
 }

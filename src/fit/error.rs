@@ -1,6 +1,6 @@
 //! Why a fit did not run.
 
-use crate::journal::JournalError;
+use crate::journal::CheckpointError;
 
 /// Why a fit did not run, or could not go on.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -27,7 +27,7 @@ pub enum FitError {
     },
     /// The journal does not belong to this fit.
     #[error(transparent)]
-    Journal(#[from] JournalError),
+    Journal(#[from] CheckpointError),
     /// The journal belongs to a search with another seed.
     #[error(
         "{file}: written by a search with seed {found}, the job has `seed = {expected}`; write `seed = {found}` into the job to go on from it, or move it away to start over"

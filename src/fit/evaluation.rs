@@ -26,7 +26,7 @@ pub enum Observed {
 impl Observed {
     /// A value of one run, the strongest of its kind.
     #[must_use]
-    pub fn of(value: f64) -> Self {
+    pub fn from_value(value: f64) -> Self {
         Self::Value(Observation { value, spread: 0.0, below_db: 0.0 })
     }
 
@@ -65,7 +65,7 @@ pub struct Evaluation {
 
 /// What the model shows at a point: an evaluation but for its costs, which depend on what else a search met.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
+pub struct EvaluationOutcome {
     /// Place in the unit box, one coordinate a parameter.
     pub unit: Vec<f64>,
     /// Parameter values in job order, in their SI units.
@@ -76,7 +76,7 @@ pub struct Outcome {
     pub failure: Option<RunFailure>,
 }
 
-impl From<Evaluation> for Outcome {
+impl From<Evaluation> for EvaluationOutcome {
     fn from(evaluation: Evaluation) -> Self {
         let Evaluation { unit, values, features, failure, .. } = evaluation;
         Self { unit, values, features, failure }

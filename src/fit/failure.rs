@@ -1,6 +1,6 @@
 //! Why a model run gave no features.
 
-use crate::simulate::Status;
+use crate::simulate::RunStatus;
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error};
 use std::cmp::Ordering;
 use std::fmt;
@@ -9,7 +9,7 @@ use std::fmt;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailureReason {
     /// The run ended before its stop time.
-    Ended(Status),
+    Ended(RunStatus),
     /// The scene refuses the parameters.
     Refused,
     /// A link leans too far.
@@ -26,13 +26,13 @@ pub enum FailureReason {
 
 impl FailureReason {
     const ALL: [Self; 13] = [
-        Self::Ended(Status::ContactLost),
-        Self::Ended(Status::Jammed),
-        Self::Ended(Status::Indeterminate),
-        Self::Ended(Status::Chattering),
-        Self::Ended(Status::Diverged),
-        Self::Ended(Status::WorkLimit),
-        Self::Ended(Status::Interrupted),
+        Self::Ended(RunStatus::ContactLost),
+        Self::Ended(RunStatus::Jammed),
+        Self::Ended(RunStatus::Indeterminate),
+        Self::Ended(RunStatus::Chattering),
+        Self::Ended(RunStatus::Diverged),
+        Self::Ended(RunStatus::WorkLimit),
+        Self::Ended(RunStatus::Interrupted),
         Self::Refused,
         Self::Tilt,
         Self::NotFinite,

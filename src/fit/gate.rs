@@ -6,17 +6,17 @@
 //! pass with a sentence.
 
 use super::evaluation::{Evaluation, Observed};
-use super::information::{Combination, Directions};
-use super::ledger::{Ledger, Stop};
-use super::linear::{Slopes, jacobian, points, scatter};
-use super::stage::Stage;
-use super::target::Target;
-use crate::text::short;
+use super::information::{ParameterCombination, SingularDirections};
+use super::ledger::{Ledger, StopReason};
+use super::linear::{FeatureSlopes, difference_points, feature_scatter, jacobian};
+use super::stage::EvaluationStage;
+use super::target::TargetValue;
+use crate::text::format_short;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Places that are probed: the middle of the box and points of a Halton sequence around it.
-pub const PROBES: usize = 5;
+pub const PROBE_COUNT: usize = 5;
 /// The share of the box, about its middle, in which the probes lie: corners are rarely blades.
 const INNER_BOX: f64 = 0.7;
 
@@ -40,11 +40,11 @@ pub struct Probe {
 
 /// What the gate found.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Gate {
+pub struct Identifiability {
     /// The probes.
     pub probes: Vec<Probe>,
     /// What the features determine and leave open at the probe that is nearest to the targets.
-    pub combinations: Vec<Combination>,
+    pub combinations: Vec<ParameterCombination>,
     /// Scatter of the model's value of each feature between neighbouring parameters, in its unit: the median
     /// over the probes. It counts with the deviation of the target, because no search can use what it
     /// drowns.
@@ -57,20 +57,20 @@ pub struct Gate {
 
 /// Why there is no gate to pass.
 #[derive(Debug, Clone, PartialEq)]
-pub enum GateError {
+pub enum IdentifiabilityError {
     /// Nothing can be learned, and why.
     CannotBeFitted(String),
     /// The evaluations are used up or may not go on.
-    Stopped(Stop),
+    Stopped(StopReason),
 }
 
 /// A place that was probed and where the model ran.
 #[derive(Debug, Clone)]
-pub struct Probed {
+pub struct ProbeEvaluation {
     /// The evaluation there.
     pub centre: Evaluation,
     /// Its directions.
-    pub directions: Directions,
+    pub directions: SingularDirections,
     /// Scatter of each feature there.
     scatter: Vec<Option<f64>>,
 }
@@ -78,23 +78,29 @@ pub struct Probed {
 /// Probes the box.
 ///
 /// # Errors
-/// [`GateError`] when the job cannot be fitted, or the ledger has stopped.
-pub fn gate(ledger: &mut Ledger, names: &[String]) -> Result<(Gate, Probed), GateError> {
-    let centres: Vec<Vec<f64>> = (0..PROBES).map(|at| probe_place(at, names.len())).collect();
-    let all: Vec<Vec<f64>> =
-        centres.iter().flat_map(|centre| std::iter::once(centre.clone()).chain(points(centre))).collect();
-    ledger.evaluate(Stage::Gate, &all).map_err(GateError::Stopped)?;
-    let probed: Vec<Probed> = centres.iter().filter_map(|centre| probed(ledger, centre)).collect();
-    let probes: Vec<Probe> = probed.iter().map(|p| probe(p, names)).collect();
+/// [`IdentifiabilityError`] when the job cannot be fitted, or the ledger has stopped.
+pub fn assess_identifiability(
+    ledger: &mut Ledger,
+    names: &[String],
+) -> Result<(Identifiability, ProbeEvaluation), IdentifiabilityError> {
+    let centres: Vec<Vec<f64>> = (0..PROBE_COUNT).map(|at| probe_point(at, names.len())).collect();
+    let all: Vec<Vec<f64>> = centres
+        .iter()
+        .flat_map(|centre| std::iter::once(centre.clone()).chain(difference_points(centre)))
+        .collect();
+    ledger.evaluate_points(EvaluationStage::Gate, &all).map_err(IdentifiabilityError::Stopped)?;
+    let probed: Vec<ProbeEvaluation> =
+        centres.iter().filter_map(|centre| evaluate_probe(ledger, centre)).collect();
+    let probes: Vec<Probe> = probed.iter().map(|p| summarize_probe(p, names)).collect();
     let usable = || probed.iter().filter(|p| p.centre.failure.is_none());
     let Some(nearest) = usable().min_by(|a, b| a.centre.global_cost.total_cmp(&b.centre.global_cost)) else {
-        return Err(GateError::CannotBeFitted(nothing_runs(&probes)));
+        return Err(IdentifiabilityError::CannotBeFitted(all_probes_failed(&probes)));
     };
     if probes.iter().all(|p| p.features_seen == 0) {
-        return Err(GateError::CannotBeFitted(nothing_seen(ledger, nearest)));
+        return Err(IdentifiabilityError::CannotBeFitted(no_features_seen(ledger, nearest)));
     }
     if usable().all(|p| p.directions.rank == 0) {
-        return Err(GateError::CannotBeFitted(NOTHING_MOVES.to_owned()));
+        return Err(IdentifiabilityError::CannotBeFitted(NOTHING_MOVES.to_owned()));
     }
     let combinations =
         nearest.directions.combinations(names, ledger.objective().axes(), &nearest.centre.unit);
@@ -102,25 +108,25 @@ pub fn gate(ledger: &mut Ledger, names: &[String]) -> Result<(Gate, Probed), Gat
     let scatter = (0..targets.len())
         .map(|at| median(probed.iter().filter_map(|p| p.scatter.get(at).copied().flatten()).collect()))
         .collect();
-    let notes = [notes(&probes, names), rough_notes(targets, &scatter)].concat();
-    Ok((Gate { probes, combinations, scatter, notes, advice: Vec::new() }, nearest.clone()))
+    let notes = [probe_notes(&probes, names), rough_notes(targets, &scatter)].concat();
+    Ok((Identifiability { probes, combinations, scatter, notes, advice: Vec::new() }, nearest.clone()))
 }
 
-fn probed(ledger: &Ledger, centre: &[f64]) -> Option<Probed> {
+fn evaluate_probe(ledger: &Ledger, centre: &[f64]) -> Option<ProbeEvaluation> {
     let objective = ledger.objective();
     let around: Vec<&Evaluation> =
-        points(centre).iter().map(|point| ledger.find(point)).collect::<Option<_>>()?;
-    let centre = ledger.find(centre)?.clone();
-    let slopes = Slopes::of(objective.targets(), &centre, &around);
-    let directions = Directions::of(&jacobian(objective, &centre, &slopes));
-    let scatter = scatter(objective.targets(), &centre, &around);
-    Some(Probed { centre, directions, scatter })
+        difference_points(centre).iter().map(|point| ledger.find_evaluation(point)).collect::<Option<_>>()?;
+    let centre = ledger.find_evaluation(centre)?.clone();
+    let slopes = FeatureSlopes::from_differences(objective.targets(), &centre, &around);
+    let directions = SingularDirections::from_jacobian(&jacobian(objective, &centre, &slopes));
+    let scatter = feature_scatter(objective.targets(), &centre, &around);
+    Some(ProbeEvaluation { centre, directions, scatter })
 }
 
-fn probe(probed: &Probed, names: &[String]) -> Probe {
-    let Probed { centre, directions, .. } = probed;
+fn summarize_probe(probed: &ProbeEvaluation, names: &[String]) -> Probe {
+    let ProbeEvaluation { centre, directions, .. } = probed;
     let failed = centre.failure.is_some();
-    let condition = Some(directions.condition()).filter(|condition| condition.is_finite() && !failed);
+    let condition = Some(directions.condition_number()).filter(|condition| condition.is_finite() && !failed);
     let determines = names
         .iter()
         .enumerate()
@@ -137,7 +143,7 @@ fn probe(probed: &Probed, names: &[String]) -> Probe {
 }
 
 /// The middle of the box, then a Halton sequence (Halton, Numer. Math. 2 (1960) 84).
-fn probe_place(at: usize, dimensions: usize) -> Vec<f64> {
+fn probe_point(at: usize, dimensions: usize) -> Vec<f64> {
     let coordinate = |axis: usize| {
         let share = if at == 0 { 0.5 } else { radical_inverse(at, nth_prime(axis)) };
         0.5 + INNER_BOX * (share - 0.5)
@@ -166,7 +172,7 @@ fn nth_prime(n: usize) -> usize {
 const NOTHING_MOVES: &str = "no parameter moves any feature by more than its own 95 % interval over the whole box, at any of the places that were probed: the features \
     say nothing about these parameters; choose other features or parameters, widen the bounds, or state smaller standard deviations if they are known";
 
-fn nothing_runs(probes: &[Probe]) -> String {
+fn all_probes_failed(probes: &[Probe]) -> String {
     let reasons: Vec<&str> = probes.iter().filter_map(|p| p.failure.as_deref()).collect();
     let first = reasons.first().copied().unwrap_or("no probe was evaluated");
     format!(
@@ -175,7 +181,7 @@ fn nothing_runs(probes: &[Probe]) -> String {
     )
 }
 
-fn nothing_seen(ledger: &Ledger, probed: &Probed) -> String {
+fn no_features_seen(ledger: &Ledger, probed: &ProbeEvaluation) -> String {
     let seen = probed.centre.features.iter().zip(ledger.objective().targets());
     let missing = seen.filter_map(|(feature, target)| match feature {
         Observed::Missing(why) => Some(format!("`{}`: {why}", target.name)),
@@ -194,20 +200,20 @@ fn median(mut values: Vec<f64>) -> f64 {
 }
 
 /// Features whose own scatter exceeds the deviation of their target.
-fn rough_notes(targets: &[Target], scatter: &Vec<f64>) -> Vec<String> {
+fn rough_notes(targets: &[TargetValue], scatter: &Vec<f64>) -> Vec<String> {
     let rough = targets.iter().zip(scatter).filter(|(target, scatter)| **scatter > target.sd);
-    let note = |(target, scatter): (&Target, &f64)| {
+    let note = |(target, scatter): (&TargetValue, &f64)| {
         format!(
             "the model's `{}` is not smooth: it scatters by {} between neighbouring parameters, more than the target's deviation of {}, and counts for that much less",
             target.name,
-            short(*scatter),
-            short(target.sd)
+            format_short(*scatter),
+            format_short(target.sd)
         )
     };
     rough.map(note).collect()
 }
 
-fn notes(probes: &[Probe], names: &[String]) -> Vec<String> {
+fn probe_notes(probes: &[Probe], names: &[String]) -> Vec<String> {
     let usable: Vec<&Probe> = probes.iter().filter(|p| p.failure.is_none()).collect();
     let mut notes = Vec::new();
     if usable.len() < probes.len() {
@@ -239,7 +245,7 @@ mod tests {
 
     #[test]
     fn the_probes_are_those_of_the_sequence() {
-        let place: Vec<Vec<f64>> = (0..3).map(|at| probe_place(at, 2)).collect();
+        let place: Vec<Vec<f64>> = (0..3).map(|at| probe_point(at, 2)).collect();
         let expected = [
             [0.5, 0.5],
             [0.5, 0.5 + 0.7 * (1.0 / 3.0 - 0.5)],

@@ -5,7 +5,7 @@
 //! is informative if its 95 % interval fits into the box; the information matrix `J^T J` is inverted on those
 //! directions alone.
 
-use super::axis::Axis;
+use super::axis::SearchAxis;
 use crate::math;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -17,18 +17,18 @@ pub const Z_95: f64 = 1.96;
 pub(crate) const CHI_SQUARED_95: f64 = 3.84;
 /// Smallest singular value, per length of the box, of an informative direction: its 95 % interval is as wide
 /// as the box.
-pub(crate) const INFORMATIVE: f64 = 2.0 * Z_95;
+pub(crate) const MIN_INFORMATIVE: f64 = 2.0 * Z_95;
 /// Singular values below this share of the largest are rounding.
-pub const ROUNDING: f64 = 1e-9;
+pub const ROUNDING_SHARE: f64 = 1e-9;
 /// Share (squared cosine) of uninformative directions in a parameter from which on the parameter is not
 /// determined.
 pub(crate) const OPEN_SHARE: f64 = 0.01;
 /// Exponents below this share of the largest one of a combination are not named.
-const NAMED: f64 = 0.05;
+const MIN_NAMED_EXPONENT: f64 = 0.05;
 
 /// Singular directions of a Jacobian in the space of the parameters.
 #[derive(Debug, Clone)]
-pub struct Directions {
+pub struct SingularDirections {
     /// Singular value and direction, the most informative first; all of unit length and at right angles.
     all: Vec<(f64, Vec<f64>)>,
     /// Number of informative directions.
@@ -37,7 +37,7 @@ pub struct Directions {
 
 /// A product of powers of the parameters that the features determine, or leave open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Combination {
+pub struct ParameterCombination {
     /// Exponents by parameter; the largest is 1, those below 0.05 are left out.
     pub exponents: BTreeMap<String, f64>,
     /// Standard deviation of its logarithm; for one that is left open, that of which the box allows.
@@ -46,10 +46,10 @@ pub struct Combination {
     pub determined: bool,
 }
 
-impl Combination {
+impl ParameterCombination {
     /// Such as `friction.c friction.a^0.31`.
     #[must_use]
-    pub fn in_words(&self) -> String {
+    pub fn describe(&self) -> String {
         let mut factors: Vec<(&String, f64)> = self.exponents.iter().map(|(name, e)| (name, *e)).collect();
         factors.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         let factor = |(name, e): (&String, f64)| {
@@ -59,10 +59,10 @@ impl Combination {
     }
 }
 
-impl Directions {
+impl SingularDirections {
     /// Of a Jacobian, a column a parameter.
     #[must_use]
-    pub fn of(jacobian: &DMatrix<f64>) -> Self {
+    pub fn from_jacobian(jacobian: &DMatrix<f64>) -> Self {
         let columns = jacobian.ncols();
         // rows of zeros say nothing and make the decomposition complete
         let padded = jacobian.clone().resize_vertically(jacobian.nrows().max(columns), 0.0);
@@ -72,23 +72,26 @@ impl Directions {
         });
         let mut all: Vec<(f64, Vec<f64>)> = svd.singular_values.iter().copied().zip(rows).collect();
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let threshold = all.first().map_or(INFORMATIVE, |(largest, _)| INFORMATIVE.max(ROUNDING * largest));
+        let threshold =
+            all.first().map_or(MIN_INFORMATIVE, |(largest, _)| MIN_INFORMATIVE.max(ROUNDING_SHARE * largest));
         let rank = all.iter().filter(|(value, _)| *value > threshold).count();
         Self { all, rank }
     }
 
     /// Largest singular value over the smallest; infinite where one is zero.
     #[must_use]
-    pub fn condition(&self) -> f64 {
+    pub fn condition_number(&self) -> f64 {
         match (self.all.first(), self.all.last()) {
-            (Some((largest, _)), Some((smallest, _))) if *smallest > ROUNDING * largest => largest / smallest,
+            (Some((largest, _)), Some((smallest, _))) if *smallest > ROUNDING_SHARE * largest => {
+                largest / smallest
+            }
             _ => f64::INFINITY,
         }
     }
 
     /// Standard deviation of a coordinate from the informative directions, and its share in the others.
     #[must_use]
-    pub fn coordinate(&self, axis: usize) -> (f64, f64) {
+    pub fn coordinate_sd(&self, axis: usize) -> (f64, f64) {
         let component = |direction: &Vec<f64>| math::powi(direction.get(axis).copied().unwrap_or(0.0), 2);
         let (known, open) = self.all.split_at(self.rank);
         let variance: f64 =
@@ -99,12 +102,12 @@ impl Directions {
     /// Whether the informative directions determine a coordinate.
     #[must_use]
     pub fn determines(&self, axis: usize) -> bool {
-        self.coordinate(axis).1 < OPEN_SHARE
+        self.coordinate_sd(axis).1 < OPEN_SHARE
     }
 
     /// Directions that the features leave open.
     #[must_use]
-    pub fn open(&self) -> Vec<&[f64]> {
+    pub fn open_directions(&self) -> Vec<&[f64]> {
         self.all.iter().skip(self.rank).map(|(_, direction)| direction.as_slice()).collect()
     }
 
@@ -121,13 +124,18 @@ impl Directions {
             .take(self.rank)
             .filter_map(|(value, direction)| Some(product(direction)? / (value * value)))
             .sum();
-        Some((covariance / (self.coordinate(a).0 * self.coordinate(b).0)).clamp(-1.0, 1.0))
+        Some((covariance / (self.coordinate_sd(a).0 * self.coordinate_sd(b).0)).clamp(-1.0, 1.0))
     }
 
     /// What is determined (most precise first) and what is left open, as products of powers at the point
     /// `unit`.
     #[must_use]
-    pub fn combinations(&self, names: &[String], axes: &[Axis], unit: &[f64]) -> Vec<Combination> {
+    pub fn combinations(
+        &self,
+        names: &[String],
+        axes: &[SearchAxis],
+        unit: &[f64],
+    ) -> Vec<ParameterCombination> {
         let slopes: Vec<f64> =
             axes.iter().zip(unit).map(|(axis, u)| axis.bounds.log_slope(*u).unwrap_or(0.0)).collect();
         let one = |(rank, (value, direction)): (usize, &(f64, Vec<f64>))| {
@@ -146,14 +154,14 @@ impl Directions {
             let named = names
                 .iter()
                 .zip(&exponents)
-                .filter(|(_, e)| e.abs() >= NAMED * largest.abs() && largest != 0.0);
+                .filter(|(_, e)| e.abs() >= MIN_NAMED_EXPONENT * largest.abs() && largest != 0.0);
             let sd = if determined {
                 1.0 / (value * largest.abs())
             } else {
-                largest.abs() / value.max(INFORMATIVE / 2.0 / Z_95)
+                largest.abs() / value.max(MIN_INFORMATIVE / 2.0 / Z_95)
             };
             let exponents = named.map(|(name, e)| (name.clone(), e / largest)).collect();
-            Combination { exponents, sd_relative: if sd.is_finite() { sd } else { 0.0 }, determined }
+            ParameterCombination { exponents, sd_relative: if sd.is_finite() { sd } else { 0.0 }, determined }
         };
         self.all.iter().enumerate().map(one).collect()
     }
@@ -161,17 +169,17 @@ impl Directions {
 
 #[cfg(test)]
 mod tests {
-    use super::super::scale::{Bounds, Spacing};
+    use super::super::scale::{Bounds, BoundsSpacing};
     use super::*;
 
     fn names() -> [String; 2] {
         ["p".to_owned(), "q".to_owned()]
     }
 
-    fn axes() -> Vec<Axis> {
+    fn axes() -> Vec<SearchAxis> {
         vec![
-            Bounds::new(0.1, 10.0, Spacing::Log).unwrap().into(),
-            Bounds::new(1.0, 10.0, Spacing::Log).unwrap().into(),
+            Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap().into(),
+            Bounds::new(1.0, 10.0, BoundsSpacing::Log).unwrap().into(),
         ]
     }
 
@@ -185,11 +193,11 @@ mod tests {
 
     #[test]
     fn a_product_is_named_with_its_exponents_and_deviation() {
-        let found = Directions::of(&rows(&[(1.0, 0.5, 0.01)]));
+        let found = SingularDirections::from_jacobian(&rows(&[(1.0, 0.5, 0.01)]));
         assert_eq!(found.rank, 1);
-        assert!(!found.determines(0) && !found.determines(1) && found.condition().is_infinite());
+        assert!(!found.determines(0) && !found.determines(1) && found.condition_number().is_infinite());
         let combinations = found.combinations(&names(), &axes(), &[0.5, 0.5]);
-        assert_eq!(combinations[0].in_words(), "p q^0.50");
+        assert_eq!(combinations[0].describe(), "p q^0.50");
         assert!(combinations[0].determined && (combinations[0].sd_relative - 0.01).abs() < 1e-12);
         // p q^0.5 stays the same where ln q = -2 ln p
         let open = &combinations[1];
@@ -202,18 +210,18 @@ mod tests {
     #[test]
     fn two_features_determine_both_and_their_correlation_is_that_of_least_squares() {
         // r1 = ln p / 0.01, r2 = ln(p q) / 0.02: cov = [[1, -1], [-1, 5]] 1e-4
-        let found = Directions::of(&rows(&[(1.0, 0.0, 0.01), (1.0, 1.0, 0.02)]));
+        let found = SingularDirections::from_jacobian(&rows(&[(1.0, 0.0, 0.01), (1.0, 1.0, 0.02)]));
         assert_eq!(found.rank, 2);
-        assert!((found.coordinate(0).0 * 100.0_f64.ln() - 0.01).abs() < 1e-12);
-        assert!((found.coordinate(1).0 * 10.0_f64.ln() - 0.01 * 5.0_f64.sqrt()).abs() < 1e-12);
+        assert!((found.coordinate_sd(0).0 * 100.0_f64.ln() - 0.01).abs() < 1e-12);
+        assert!((found.coordinate_sd(1).0 * 10.0_f64.ln() - 0.01 * 5.0_f64.sqrt()).abs() < 1e-12);
         assert!((found.correlation(0, 1).unwrap() + 1.0 / 5.0_f64.sqrt()).abs() < 1e-12);
-        assert!(found.condition() > 1.0 && found.open().is_empty());
+        assert!(found.condition_number() > 1.0 && found.open_directions().is_empty());
     }
 
     #[test]
     fn nothing_is_known_from_nothing() {
-        let found = Directions::of(&DMatrix::zeros(0, 2));
-        assert_eq!((found.rank, found.open().len()), (0, 2));
+        let found = SingularDirections::from_jacobian(&DMatrix::zeros(0, 2));
+        assert_eq!((found.rank, found.open_directions().len()), (0, 2));
         assert_eq!(found.correlation(0, 1), None);
     }
 }

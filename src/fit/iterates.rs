@@ -2,20 +2,20 @@
 
 mod body;
 
-pub use body::{Body, Coordinate, camera_name};
+pub use body::{HeaderCoordinate, TraceHeaderBody, camera_unknown_name};
 
 use super::trace::{Iterate, SegmentState};
-use crate::journal::{self, Exact, Kind, Record};
+use crate::journal::{self, CheckpointKind, CheckpointRecord, ExactNumber};
 use serde::{Deserialize, Serialize};
 
 /// The journal of a trace fit.
-pub type Journal = journal::Journal<Step>;
+pub type TraceCheckpoint = journal::CheckpointFile<IterateRecord>;
 /// Its header.
-pub type Header = journal::Header<Body>;
+pub type TraceHeader = journal::CheckpointHeader<TraceHeaderBody>;
 
 /// One iterate of one search in a journal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Step {
+pub struct IterateRecord {
     /// Number of its chain: that of its start, from 0, or of a [`Branch`](super::trace::Branch).
     pub start: usize,
     /// Which iterate of that search, from 0: each follows from the one before.
@@ -24,10 +24,10 @@ pub struct Step {
     pub iterate: Iterate,
 }
 
-impl Record for Step {
-    const KIND: Kind = Kind::Trace;
-    type Body = Body;
-    type Row = Row;
+impl CheckpointRecord for IterateRecord {
+    const KIND: CheckpointKind = CheckpointKind::Trace;
+    type Body = TraceHeaderBody;
+    type IterateRow = Row;
     type Identity = (usize, usize);
 
     fn identity(&self) -> (usize, usize) {
@@ -35,7 +35,7 @@ impl Record for Step {
     }
 
     fn to_row(&self, at: usize) -> Row {
-        let Iterate { stage, number, cuts, mended, plain, settled, damping, point, segments, cost } =
+        let Iterate { stage, number, cuts, rescues: mended, plain, settled, damping, point, segments, cost } =
             &self.iterate;
         Row {
             index: at,
@@ -47,10 +47,10 @@ impl Record for Step {
             mended: *mended,
             plain: *plain,
             settled: *settled,
-            damping: Exact(*damping),
-            cost: Exact(*cost),
-            point: point.iter().copied().map(Exact).collect(),
-            segments: segments.iter().map(Segment::of).collect(),
+            damping: ExactNumber(*damping),
+            cost: ExactNumber(*cost),
+            point: point.iter().copied().map(ExactNumber).collect(),
+            segments: segments.iter().map(SegmentRow::from_state).collect(),
         }
     }
 
@@ -58,19 +58,19 @@ impl Record for Step {
         Some(row.index)
     }
 
-    fn from_row(row: Row, body: &Body) -> Result<Self, String> {
-        row.check(body)?;
+    fn from_row(row: Row, body: &TraceHeaderBody) -> Result<Self, String> {
+        row.check_against(body)?;
         let iterate = Iterate {
             stage: row.stage,
             number: row.number,
             cuts: row.cuts,
-            mended: row.mended,
+            rescues: row.mended,
             plain: row.plain,
             settled: row.settled,
             damping: row.damping.0,
             cost: row.cost.0,
             point: row.point.into_iter().map(|z| z.0).collect(),
-            segments: row.segments.into_iter().map(Segment::into_state).collect(),
+            segments: row.segments.into_iter().map(SegmentRow::into_state).collect(),
         };
         Ok(Self { start: row.start, step: row.step, iterate })
     }
@@ -98,7 +98,7 @@ impl Record for Step {
         Some([words(one), words(two)])
     }
 
-    fn other_problem(found: &Body, expected: &Body) -> Option<String> {
+    fn problem_difference(found: &TraceHeaderBody, expected: &TraceHeaderBody) -> Option<String> {
         if found.seed != expected.seed {
             let (found, expected) = (found.seed, expected.seed);
             return Some(format!(
@@ -123,14 +123,14 @@ pub struct Row {
     mended: usize,
     plain: bool,
     settled: bool,
-    damping: Exact,
-    cost: Exact,
-    point: Vec<Exact>,
-    segments: Vec<Segment>,
+    damping: ExactNumber,
+    cost: ExactNumber,
+    point: Vec<ExactNumber>,
+    segments: Vec<SegmentRow>,
 }
 
 impl Row {
-    fn check(&self, body: &Body) -> Result<(), String> {
+    fn check_against(&self, body: &TraceHeaderBody) -> Result<(), String> {
         let counts = [("point", self.point.len(), body.unknowns.len())];
         if let Some((key, found, expected)) =
             counts.into_iter().find(|(_, found, expected)| found != expected)
@@ -156,35 +156,35 @@ impl Row {
 /// A segment as it stands in a line.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Segment {
+struct SegmentRow {
     recording: usize,
     first: usize,
     last: usize,
-    start: [Exact; 4],
-    shown: [Exact; 4],
+    start: [ExactNumber; 4],
+    shown: [ExactNumber; 4],
     data: usize,
     /// Absent where the model's run fails.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    chi2: Option<Exact>,
+    chi2: Option<ExactNumber>,
 }
 
-impl Segment {
-    fn of(state: &SegmentState) -> Self {
-        let SegmentState { film, first, last, start, shown, chi2, data } = state;
+impl SegmentRow {
+    fn from_state(state: &SegmentState) -> Self {
+        let SegmentState { recording: film, first, last, start, shown, chi2, data } = state;
         Self {
             recording: *film,
             first: *first,
             last: *last,
-            start: start.map(Exact),
-            shown: shown.map(Exact),
+            start: start.map(ExactNumber),
+            shown: shown.map(ExactNumber),
             data: *data,
-            chi2: chi2.is_finite().then_some(Exact(*chi2)),
+            chi2: chi2.is_finite().then_some(ExactNumber(*chi2)),
         }
     }
 
     fn into_state(self) -> SegmentState {
         SegmentState {
-            film: self.recording,
+            recording: self.recording,
             first: self.first,
             last: self.last,
             start: self.start.map(|x| x.0),

@@ -12,43 +12,43 @@ mod refusal;
 mod settings;
 mod traces;
 
-pub use aim::{Aim, Source, When};
+pub use aim::{FitTarget, TargetSource, TargetStage};
 pub use cameras::FeatureCamera;
-pub(crate) use conditions::same_quantity;
-pub use conditions::{Condition, Head};
+pub(crate) use conditions::is_same_quantity;
+pub use conditions::{HeadSource, JobCondition};
 
-pub use nuisances::{Constants, Nuisance};
+pub use nuisances::{Constants, NuisanceParameter};
 pub use parameters::FreeParameter;
 pub use refusal::JobError;
 pub use settings::{Ensemble, IntervalSettings};
-pub use traces::{CameraDoubt, TraceAim, TraceChannel};
+pub use traces::{CameraPriorSds, TraceChannel, TraceTarget};
 
-use super::calibration::Calibration;
-use super::settings::Settings;
+use super::calibration::TargetCalibration;
+use super::settings::SearchSettings;
 use crate::feature::Feature;
-use crate::toml_file::{check_format, parse};
+use crate::toml_file::{check_format, parse_toml};
 use crate::twin::Camera;
-use refusal::Refusal;
+use refusal::JobRefusal;
 use serde::Serialize;
 
 /// Name, what it sets, and whether it is held out.
-type ConditionContent<'a> = (&'a str, &'a [(String, f64)], bool);
+type ConditionIdentity<'a> = (&'a str, &'a [(String, f64)], bool);
 
 /// What of a job decides the cost of a point.
 #[derive(Serialize)]
-pub(super) struct Content<'a> {
-    conditions: Vec<ConditionContent<'a>>,
+pub(super) struct JobIdentity<'a> {
+    conditions: Vec<ConditionIdentity<'a>>,
     camera: Option<Camera>,
     parameters: &'a [FreeParameter],
     /// Left out where there is none, so that the fingerprints of other jobs stay.
     #[serde(skip_serializing_if = "Constants::is_none")]
     constants: &'a Constants,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
-    traces: &'a [TraceAim],
+    traces: &'a [TraceTarget],
     /// Those on which a feature depends, with the numbers of their conditions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     cameras: Vec<(usize, FeatureCamera)>,
-    aims: &'a [Aim],
+    aims: &'a [FitTarget],
     ensemble: Ensemble,
     largest_tilt_rad: Option<f64>,
 }
@@ -60,7 +60,7 @@ pub struct Job {
     pub title: String,
     /// What is simulated: recordings first, then conditions without one, in the order of the file; at least
     /// one.
-    pub conditions: Vec<Condition>,
+    pub conditions: Vec<JobCondition>,
     /// The camera through which the model of a condition without a recording is seen.
     pub camera: Option<Camera>,
     /// Free parameters.
@@ -68,11 +68,11 @@ pub struct Job {
     /// Constants that are freed too, each within its prior.
     pub constants: Constants,
     /// Recordings whose traces are fitted, in the order of the file; none in a job on features alone.
-    pub traces: Vec<TraceAim>,
+    pub traces: Vec<TraceTarget>,
     /// Components first, then features, in the order of the file.
-    pub aims: Vec<Aim>,
+    pub targets: Vec<FitTarget>,
     /// Budgets and seed of the search.
-    pub search: Settings,
+    pub search: SearchSettings,
     /// Starting states that are averaged over.
     pub ensemble: Ensemble,
     /// Largest lean of the blade from the vertical that a run may show, rad; `None` for any.
@@ -87,24 +87,24 @@ impl Job {
     /// # Errors
     /// [`JobError`] at the first problem.
     pub fn parse(file: &str, text: &str) -> Result<Self, JobError> {
-        Self::parse_with_names(file, text, &crate::blade::parameters::names())
+        Self::parse_with_names(file, text, &crate::blade::parameters::parameter_names())
     }
 
     /// The same for another model, whose parameters have the names `known`.
     ///
     /// # Errors
-    /// As [`Self::parse`].
+    /// As [`Self::parse_toml`].
     pub fn parse_with_names(file: &str, text: &str, known: &[&str]) -> Result<Self, JobError> {
-        let written: as_written::Job = parse(file, text)?;
+        let written: as_written::JobFile = parse_toml(file, text)?;
         check_format(file, written.format)?;
-        let checked = Self::check(&written, known);
+        let checked = Self::validate(&written, known);
         checked.map_err(|refusal| refusal.in_file(file))
     }
 
     /// The JSON Schema of job.toml: for editors, and for messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
-        crate::toml_file::schema::<as_written::Job>()
+        crate::toml_file::schema_of::<as_written::JobFile>()
     }
 
     /// Names of the free parameters in order.
@@ -116,7 +116,7 @@ impl Job {
     /// What is read from each recording, in order.
     #[must_use]
     pub fn features(&self) -> Vec<Feature> {
-        self.aims.iter().map(|aim| aim.feature.clone()).collect()
+        self.targets.iter().map(|aim| aim.feature.clone()).collect()
     }
 
     /// Paths of the recordings, relative to the job file: those of the first conditions.
@@ -126,8 +126,8 @@ impl Job {
 
     /// What decides the cost of a point: neither title, seed and budgets of the search nor how intervals are
     /// found, so that a fit can be given a larger budget; nor the places of its files.
-    pub(super) fn content(&self) -> Content<'_> {
-        Content {
+    pub(super) fn identity(&self) -> JobIdentity<'_> {
+        JobIdentity {
             conditions: self
                 .conditions
                 .iter()
@@ -137,18 +137,18 @@ impl Job {
             parameters: &self.parameters,
             constants: &self.constants,
             traces: &self.traces,
-            cameras: self.cameras(),
-            aims: &self.aims,
+            cameras: self.used_cameras(),
+            aims: &self.targets,
             ensemble: self.ensemble,
             largest_tilt_rad: self.largest_tilt_rad,
         }
     }
 
     /// Cameras on which a feature depends that is fitted, with the numbers of their conditions.
-    fn cameras(&self) -> Vec<(usize, FeatureCamera)> {
+    fn used_cameras(&self) -> Vec<(usize, FeatureCamera)> {
         let used = |at: usize| {
-            let aims = self.aims.iter().filter(|aim| aim.feature.condition == at && !aim.held_out);
-            aims.filter_map(|aim| self.calibration(aim)).next().is_some()
+            let aims = self.targets.iter().filter(|aim| aim.feature.condition == at && !aim.held_out);
+            aims.filter_map(|aim| self.target_calibration(aim)).next().is_some()
         };
         let cameras = self.conditions.iter().enumerate().filter_map(|(at, c)| Some((at, c.camera?)));
         cameras.filter(|(at, _)| used(*at)).collect()
@@ -157,31 +157,38 @@ impl Job {
     /// How the target of an aim depends on what is not known of its camera. `None` for what is no length, for
     /// a number that the job gives, whose deviation is the job's, and in a job with traces.
     #[must_use]
-    pub fn calibration(&self, aim: &Aim) -> Option<Calibration> {
-        let measured = matches!(aim.source, Source::Measured { .. }) && self.traces.is_empty();
+    pub fn target_calibration(&self, aim: &FitTarget) -> Option<TargetCalibration> {
+        let measured = matches!(aim.source, TargetSource::Measured { .. }) && self.traces.is_empty();
         let condition = aim.feature.condition;
         let camera = self.conditions.get(condition)?.camera.filter(|_| measured)?;
         let FeatureCamera { scale_sd, offset_sd_m } = camera;
-        let found = Calibration { condition, scale_sd, offset_sd_m, length: aim.feature.reading.length()? };
-        (found.sds() != [0.0; 2]).then_some(found)
+        let found = TargetCalibration {
+            condition,
+            scale_sd,
+            offset_sd_m,
+            length: aim.feature.reading.length_calibration()?,
+        };
+        (found.standard_deviations() != [0.0; 2]).then_some(found)
     }
 
-    fn check(written: &as_written::Job, known: &[&str]) -> Result<Self, Refusal> {
+    fn validate(written: &as_written::JobFile, known: &[&str]) -> Result<Self, JobRefusal> {
         settings::check_counts(written)?;
-        let conditions = conditions::conditions(written, known)?;
-        let camera = settings::camera(written)?;
-        let parameters = parameters::parameters(&written.parameter, known)?;
-        parameters.iter().try_for_each(|p| conditions::check_free(&conditions, &p.name))?;
-        let context =
-            aims::Context { conditions: &conditions, nyquist_hz: camera.map(|c| c.frame_rate_hz / 2.0) };
-        cameras::check_beside_traces(written)?;
-        let traces = traces::traces(&written.trace, &conditions)?;
-        let constants = nuisances::constants(written, &parameters, known)?;
-        constants.names().try_for_each(|name| conditions::check_free(&conditions, name))?;
-        let aims = aims::aims(written, &context)?;
-        let (search, ensemble) = (settings::search(written)?, settings::ensemble(written)?);
+        let conditions = conditions::check_conditions(written, known)?;
+        let camera = settings::check_camera_table(written)?;
+        let parameters = parameters::check_parameters(&written.parameter, known)?;
+        parameters.iter().try_for_each(|p| conditions::check_not_set(&conditions, &p.name))?;
+        let context = aims::TargetContext {
+            conditions: &conditions,
+            nyquist_hz: camera.map(|c| c.frame_rate_hz / 2.0),
+        };
+        cameras::check_no_camera_with_traces(written)?;
+        let traces = traces::check_traces(&written.trace, &conditions)?;
+        let constants = nuisances::check_constants(written, &parameters, known)?;
+        constants.listed_names().try_for_each(|name| conditions::check_not_set(&conditions, name))?;
+        let aims = aims::check_targets(written, &context)?;
+        let (search, ensemble) = (settings::check_search(written)?, settings::check_ensemble(written)?);
         let (largest_tilt_rad, intervals) =
-            (settings::largest_tilt_rad(written)?, settings::intervals(written)?);
+            (settings::check_largest_tilt_rad(written)?, settings::check_intervals(written)?);
         Ok(Self {
             title: written.title.clone(),
             conditions,
@@ -189,7 +196,7 @@ impl Job {
             parameters,
             constants,
             traces,
-            aims,
+            targets: aims,
             search,
             ensemble,
             largest_tilt_rad,

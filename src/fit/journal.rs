@@ -3,53 +3,53 @@
 mod body;
 mod difference;
 
-pub use body::{Aimed, Body, Parameter};
+pub use body::{FeatureHeaderBody, HeaderFeature, HeaderParameter};
 
-use super::evaluation::{Observation, Observed, Outcome};
+use super::evaluation::{EvaluationOutcome, Observation, Observed};
 use super::failure::{FailureReason, RunFailure};
-use super::stage::Stage;
-use crate::journal::{self, Exact, Kind, Record};
+use super::stage::EvaluationStage;
+use crate::journal::{self, CheckpointKind, CheckpointRecord, ExactNumber};
 use serde::{Deserialize, Serialize};
 
 /// The journal of a fit.
-pub type Journal = journal::Journal<Entry>;
+pub type FeatureCheckpoint = journal::CheckpointFile<EvaluationRecord>;
 /// Its header.
-pub type Header = journal::Header<Body>;
+pub type FeatureHeader = journal::CheckpointHeader<FeatureHeaderBody>;
 
 /// One evaluation in a journal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub struct EvaluationRecord {
     /// What it was made for.
-    pub stage: Stage,
+    pub stage: EvaluationStage,
     /// What the model showed. Costs are not kept: they depend on the scatter that a search has met.
-    pub outcome: Outcome,
+    pub outcome: EvaluationOutcome,
 }
 
 /// Exact coordinates of a point of the unit box, for look-up.
 #[must_use]
-pub fn key(unit: &[f64]) -> Vec<u64> {
+pub fn point_key(unit: &[f64]) -> Vec<u64> {
     unit.iter().map(|u| u.to_bits()).collect()
 }
 
-impl Record for Entry {
-    const KIND: Kind = Kind::Fit;
-    type Body = Body;
-    type Row = Row;
+impl CheckpointRecord for EvaluationRecord {
+    const KIND: CheckpointKind = CheckpointKind::Fit;
+    type Body = FeatureHeaderBody;
+    type IterateRow = Row;
     type Identity = Vec<u64>;
 
     fn identity(&self) -> Vec<u64> {
-        key(&self.outcome.unit)
+        point_key(&self.outcome.unit)
     }
 
     /// The values follow from the place in the unit box, and are not stored.
     fn to_row(&self, at: usize) -> Row {
-        let Outcome { unit, features, failure, .. } = &self.outcome;
+        let EvaluationOutcome { unit, features, failure, .. } = &self.outcome;
         Row {
             index: at,
             stage: self.stage,
-            unit: unit.iter().copied().map(Exact).collect(),
-            features: features.iter().map(Feature::of).collect(),
-            failure: failure.as_ref().map(Failed::of),
+            unit: unit.iter().copied().map(ExactNumber).collect(),
+            features: features.iter().map(FeatureValueRow::from_observed).collect(),
+            failure: failure.as_ref().map(FailureRow::from_failure),
         }
     }
 
@@ -57,18 +57,18 @@ impl Record for Entry {
         Some(row.index)
     }
 
-    fn from_row(row: Row, body: &Body) -> Result<Self, String> {
-        row.check(body)?;
+    fn from_row(row: Row, body: &FeatureHeaderBody) -> Result<Self, String> {
+        row.check_against(body)?;
         Ok(Self { stage: row.stage, outcome: row.into_outcome(body) })
     }
 
     /// Everything that the model shows. Stages may differ: another search may have come to a point for
     /// another reason.
     fn difference(&self, other: &Self) -> Option<[String; 2]> {
-        difference::between(&self.outcome, &other.outcome)
+        difference::first_difference(&self.outcome, &other.outcome)
     }
 
-    fn other_problem(found: &Body, expected: &Body) -> Option<String> {
+    fn problem_difference(found: &FeatureHeaderBody, expected: &FeatureHeaderBody) -> Option<String> {
         let same = found.parameters == expected.parameters && found.features == expected.features;
         (!same)
             .then(|| "the header has other parameters, bounds, features or targets than the fit".to_owned())
@@ -80,15 +80,15 @@ impl Record for Entry {
 #[serde(deny_unknown_fields)]
 pub struct Row {
     index: usize,
-    stage: Stage,
-    unit: Vec<Exact>,
-    features: Vec<Feature>,
+    stage: EvaluationStage,
+    unit: Vec<ExactNumber>,
+    features: Vec<FeatureValueRow>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    failure: Option<Failed>,
+    failure: Option<FailureRow>,
 }
 
 impl Row {
-    fn check(&self, body: &Body) -> Result<(), String> {
+    fn check_against(&self, body: &FeatureHeaderBody) -> Result<(), String> {
         let (found, expected) = (self.unit.len(), body.parameters.len());
         if found != expected {
             return Err(format!("`unit`: found {found} numbers, expected {expected}"));
@@ -107,37 +107,41 @@ impl Row {
     }
 
     /// The values follow from the place in the unit box.
-    fn into_outcome(self, body: &Body) -> Outcome {
+    fn into_outcome(self, body: &FeatureHeaderBody) -> EvaluationOutcome {
         let unit: Vec<f64> = self.unit.into_iter().map(|n| n.0).collect();
         let values = body.parameters.iter().zip(&unit);
         let values = values.map(|(parameter, u)| parameter.axis.bounds.from_unit(*u)).collect();
-        let features = self.features.into_iter().map(Feature::into_observed).collect();
-        Outcome { unit, values, features, failure: self.failure.map(Failed::into_failure) }
+        let features = self.features.into_iter().map(FeatureValueRow::into_observed).collect();
+        EvaluationOutcome { unit, values, features, failure: self.failure.map(FailureRow::into_failure) }
     }
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
-enum Feature {
-    Value(Exact),
-    Averaged { value: Exact, spread: Exact, below_db: Exact },
+enum FeatureValueRow {
+    Value(ExactNumber),
+    Averaged { value: ExactNumber, spread: ExactNumber, below_db: ExactNumber },
     Missing { missing: String },
 }
 
-impl Feature {
-    fn of(observed: &Observed) -> Self {
+impl FeatureValueRow {
+    fn from_observed(observed: &Observed) -> Self {
         match observed {
-            Observed::Value(Observation { value, spread: 0.0, below_db: 0.0 }) => Self::Value(Exact(*value)),
-            Observed::Value(Observation { value, spread, below_db }) => {
-                Self::Averaged { value: Exact(*value), spread: Exact(*spread), below_db: Exact(*below_db) }
+            Observed::Value(Observation { value, spread: 0.0, below_db: 0.0 }) => {
+                Self::Value(ExactNumber(*value))
             }
+            Observed::Value(Observation { value, spread, below_db }) => Self::Averaged {
+                value: ExactNumber(*value),
+                spread: ExactNumber(*spread),
+                below_db: ExactNumber(*below_db),
+            },
             Observed::Missing(missing) => Self::Missing { missing: missing.clone() },
         }
     }
 
     fn into_observed(self) -> Observed {
         match self {
-            Self::Value(value) => Observed::of(value.0),
+            Self::Value(value) => Observed::from_value(value.0),
             Self::Averaged { value, spread, below_db } => {
                 Observed::Value(Observation { value: value.0, spread: spread.0, below_db: below_db.0 })
             }
@@ -148,16 +152,16 @@ impl Feature {
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Failed {
+struct FailureRow {
     reason: FailureReason,
     message: String,
-    progress: Exact,
+    progress: ExactNumber,
 }
 
-impl Failed {
-    fn of(failure: &RunFailure) -> Self {
+impl FailureRow {
+    fn from_failure(failure: &RunFailure) -> Self {
         let RunFailure { reason, message, progress } = failure.clone();
-        Self { reason, message, progress: Exact(progress) }
+        Self { reason, message, progress: ExactNumber(progress) }
     }
 
     fn into_failure(self) -> RunFailure {

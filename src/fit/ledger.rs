@@ -3,19 +3,19 @@
 
 use super::evaluation::Evaluation;
 use super::failure::FailureReason;
-use super::journal::{Entry, key};
+use super::journal::{EvaluationRecord, point_key};
 use super::objective::Objective;
-use super::stage::Stage;
-use crate::journal::{Sink, line};
+use super::stage::EvaluationStage;
+use crate::journal::{CheckpointSink, format_record_line};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use std::ops::ControlFlow;
 
 /// How far a fit has come.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress {
+pub struct FitProgress {
     /// What the last evaluations were made for.
-    pub stage: Stage,
+    pub stage: EvaluationStage,
     /// Evaluations so far, replayed ones included.
     pub evaluations: usize,
     /// Those of them that were taken from the journal.
@@ -25,11 +25,11 @@ pub struct Progress {
 }
 
 /// Called with every entry; `Break` ends the search, and what was found so far is the result.
-pub type OnProgress<'a> = dyn FnMut(&Progress) -> ControlFlow<()> + Send + 'a;
+pub type OnProgress<'a> = dyn FnMut(&FitProgress) -> ControlFlow<()> + Send + 'a;
 
 /// Why no more evaluations are made.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Stop {
+pub enum StopReason {
     /// The evaluations allowed are used up.
     Budget,
     /// It was asked to stop.
@@ -41,18 +41,18 @@ pub enum Stop {
 /// The evaluations of one run and where they are written.
 pub struct Ledger<'a> {
     objective: &'a Objective<'a>,
-    journal: &'a mut dyn Sink,
+    journal: &'a mut dyn CheckpointSink,
     on_progress: &'a mut OnProgress<'a>,
     replay: HashMap<Vec<u64>, Evaluation>,
     lines: usize,
-    run: Vec<Evaluation>,
+    evaluations: Vec<Evaluation>,
     replayed: usize,
     places: HashMap<Vec<u64>, usize>,
     best: Option<Evaluation>,
     limit: usize,
-    stop: Option<Stop>,
+    stop: Option<StopReason>,
     /// Evaluations that are not yet written; `None` when they are written as they come.
-    held: Option<Vec<(Stage, usize)>>,
+    held_lines: Option<Vec<(EvaluationStage, usize)>>,
 }
 
 impl<'a> Ledger<'a> {
@@ -61,27 +61,29 @@ impl<'a> Ledger<'a> {
     #[must_use]
     pub fn new(
         objective: &'a Objective<'a>,
-        journaled: &[Entry],
-        journal: &'a mut dyn Sink,
+        journaled: &[EvaluationRecord],
+        journal: &'a mut dyn CheckpointSink,
         on_progress: &'a mut OnProgress<'a>,
         limit: usize,
     ) -> Self {
-        let priced = |entry: &Entry| (key(&entry.outcome.unit), objective.price(entry.outcome.clone()));
+        let priced = |entry: &EvaluationRecord| {
+            (point_key(&entry.outcome.unit), objective.add_costs(entry.outcome.clone()))
+        };
         let replay = journaled.iter().map(priced).collect();
-        let (run, places, lines) = (Vec::new(), HashMap::new(), journaled.len());
+        let (evaluations, places, lines) = (Vec::new(), HashMap::new(), journaled.len());
         Self {
             objective,
             journal,
             on_progress,
             replay,
             lines,
-            run,
+            evaluations,
             replayed: 0,
             places,
             best: None,
             limit,
             stop: None,
-            held: None,
+            held_lines: None,
         }
     }
 
@@ -89,8 +91,12 @@ impl<'a> Ledger<'a> {
     /// evaluated again.
     ///
     /// # Errors
-    /// [`Stop`] when not all of them could be made; what was made is kept.
-    pub fn evaluate(&mut self, stage: Stage, points: &[Vec<f64>]) -> Result<Vec<&Evaluation>, Stop> {
+    /// [`StopReason`] when not all of them could be made; what was made is kept.
+    pub fn evaluate_points(
+        &mut self,
+        stage: EvaluationStage,
+        points: &[Vec<f64>],
+    ) -> Result<Vec<&Evaluation>, StopReason> {
         if let Some(stop) = &self.stop {
             return Err(stop.clone());
         }
@@ -100,43 +106,45 @@ impl<'a> Ledger<'a> {
         for chunk in new.chunks(2 * rayon::current_num_threads()) {
             let (objective, replay) = (self.objective, &self.replay);
             let made: Vec<(Evaluation, bool)> =
-                chunk.par_iter().map(|point| make(objective, replay, point)).collect();
-            self.write(stage, &made)?;
+                chunk.par_iter().map(|point| make_evaluation(objective, replay, point)).collect();
+            self.write_lines(stage, &made)?;
             for (evaluation, replayed) in made {
-                self.enter(stage, evaluation, replayed);
+                self.count_evaluation(stage, evaluation, replayed);
             }
             if let Some(stop) = &self.stop {
                 return Err(stop.clone());
             }
         }
         if !complete {
-            return Err(Stop::Budget);
+            return Err(StopReason::Budget);
         }
-        Ok(points.iter().filter_map(|point| self.find(point)).collect())
+        Ok(points.iter().filter_map(|point| self.find_evaluation(point)).collect())
     }
 
-    /// Holds new lines back until [`Self::release`]: what is refused at the gate leaves no journal.
-    pub fn hold(&mut self) {
-        self.held = Some(Vec::new());
+    /// Holds new lines back until [`Self::release_lines`]: what is refused at the gate leaves no journal.
+    pub fn hold_lines(&mut self) {
+        self.held_lines = Some(Vec::new());
     }
 
     /// Writes `opening`, then every line that was held back.
     ///
     /// # Errors
     /// Why the journal cannot be written.
-    pub fn release(&mut self, opening: &str) -> Result<(), String> {
-        let held = self.held.take().unwrap_or_default();
-        let entries: Vec<_> =
-            held.into_iter().filter_map(|(stage, at)| Some((stage, self.run.get(at)?.clone()))).collect();
-        let lines = opening.to_owned() + &self.lines_of(entries.into_iter());
+    pub fn release_lines(&mut self, opening: &str) -> Result<(), String> {
+        let held = self.held_lines.take().unwrap_or_default();
+        let entries: Vec<_> = held
+            .into_iter()
+            .filter_map(|(stage, at)| Some((stage, self.evaluations.get(at)?.clone())))
+            .collect();
+        let lines = opening.to_owned() + &self.format_lines(entries.into_iter());
         if lines.is_empty() { Ok(()) } else { self.journal.append(&lines) }
     }
 
     /// The next lines of the journal.
-    fn lines_of(&mut self, entries: impl Iterator<Item = (Stage, Evaluation)>) -> String {
+    fn format_lines(&mut self, entries: impl Iterator<Item = (EvaluationStage, Evaluation)>) -> String {
         let mut text = String::new();
         for (stage, evaluation) in entries {
-            text += &line(&Entry { stage, outcome: evaluation.into() }, self.lines);
+            text += &format_record_line(&EvaluationRecord { stage, outcome: evaluation.into() }, self.lines);
             self.lines += 1;
         }
         text
@@ -144,27 +152,27 @@ impl<'a> Ledger<'a> {
 
     /// Writes what was newly made, as one: the disk is waited for once, and nothing is counted or reported
     /// before it has the lines.
-    fn write(&mut self, stage: Stage, made: &[(Evaluation, bool)]) -> Result<(), Stop> {
-        if let Some(held) = &mut self.held {
-            let places = made.iter().zip(self.run.len()..).filter(|((_, replayed), _)| !replayed);
+    fn write_lines(&mut self, stage: EvaluationStage, made: &[(Evaluation, bool)]) -> Result<(), StopReason> {
+        if let Some(held) = &mut self.held_lines {
+            let places = made.iter().zip(self.evaluations.len()..).filter(|((_, replayed), _)| !replayed);
             held.extend(places.map(|(_, at)| (stage, at)));
             return Ok(());
         }
         let new = made.iter().filter(|(_, replayed)| !replayed);
-        let lines = self.lines_of(new.map(|(evaluation, _)| (stage, evaluation.clone())));
+        let lines = self.format_lines(new.map(|(evaluation, _)| (stage, evaluation.clone())));
         if lines.is_empty() {
             return Ok(());
         }
-        self.journal.append(&lines).map_err(|problem| self.stop_for(Stop::Journal(problem)))
+        self.journal.append(&lines).map_err(|problem| self.stop_for(StopReason::Journal(problem)))
     }
 
     /// Counts what is known and what will be by another objective of the same model and features.
-    pub(crate) fn reprice(&mut self, objective: &'a Objective<'a>) {
+    pub(crate) fn change_objective(&mut self, objective: &'a Objective<'a>) {
         self.objective = objective;
-        let known = self.run.iter_mut().chain(self.replay.values_mut());
-        known.for_each(|evaluation| *evaluation = objective.price(evaluation.clone().into()));
+        let known = self.evaluations.iter_mut().chain(self.replay.values_mut());
+        known.for_each(|evaluation| *evaluation = objective.add_costs(evaluation.clone().into()));
         let mut best: Option<&Evaluation> = None;
-        for evaluation in &self.run {
+        for evaluation in &self.evaluations {
             best = best.filter(|best| best.cost <= evaluation.cost).or(Some(evaluation));
         }
         self.best = best.cloned();
@@ -178,25 +186,25 @@ impl<'a> Ledger<'a> {
 
     /// Evaluations of this run in order.
     #[must_use]
-    pub fn run(&self) -> &[Evaluation] {
-        &self.run
+    pub fn run_evaluations(&self) -> &[Evaluation] {
+        &self.evaluations
     }
 
     /// The known evaluation of lowest cost, the earliest among equals.
     #[must_use]
-    pub fn best(&self) -> Option<&Evaluation> {
+    pub fn best_evaluation(&self) -> Option<&Evaluation> {
         self.best.as_ref()
     }
 
     /// Evaluations that this run may still make.
     #[must_use]
-    pub fn remaining(&self) -> usize {
-        self.limit.saturating_sub(self.run.len())
+    pub fn remaining_evaluations(&self) -> usize {
+        self.limit.saturating_sub(self.evaluations.len())
     }
 
     /// The number of evaluations of this run, at most.
     #[must_use]
-    pub fn limit(&self) -> usize {
+    pub fn evaluation_limit(&self) -> usize {
         self.limit
     }
 
@@ -207,15 +215,15 @@ impl<'a> Ledger<'a> {
 
     /// Why nothing more can be evaluated at all, other than the budget.
     #[must_use]
-    pub fn stopped(&self) -> Option<&Stop> {
+    pub fn stop_reason(&self) -> Option<&StopReason> {
         self.stop.as_ref()
     }
 
     /// Failed evaluations of this run, counted by reason.
     #[must_use]
-    pub fn failures(&self) -> BTreeMap<FailureReason, usize> {
+    pub fn count_failures(&self) -> BTreeMap<FailureReason, usize> {
         let mut counts = BTreeMap::new();
-        for failure in self.run.iter().filter_map(|e| e.failure.as_ref()) {
+        for failure in self.evaluations.iter().filter_map(|e| e.failure.as_ref()) {
             *counts.entry(failure.reason).or_insert(0) += 1;
         }
         counts
@@ -225,46 +233,51 @@ impl<'a> Ledger<'a> {
     /// are all.
     fn new_points(&self, points: &[Vec<f64>]) -> (Vec<Vec<f64>>, bool) {
         let mut new: Vec<Vec<f64>> = Vec::new();
-        for point in points.iter().filter(|point| self.find(point).is_none()) {
+        for point in points.iter().filter(|point| self.find_evaluation(point).is_none()) {
             if !new.contains(point) {
                 new.push(point.clone());
             }
         }
-        let complete = new.len() <= self.remaining();
-        new.truncate(self.remaining());
+        let complete = new.len() <= self.remaining_evaluations();
+        new.truncate(self.remaining_evaluations());
         (new, complete)
     }
 
     /// Counts and reports what was written; asked to stop, it counts the rest of what was written with it.
-    fn enter(&mut self, stage: Stage, evaluation: Evaluation, replayed: bool) {
+    fn count_evaluation(&mut self, stage: EvaluationStage, evaluation: Evaluation, replayed: bool) {
         self.replayed += usize::from(replayed);
-        self.places.insert(key(&evaluation.unit), self.run.len());
+        self.places.insert(point_key(&evaluation.unit), self.evaluations.len());
         if self.best.as_ref().is_none_or(|best| evaluation.cost < best.cost) {
             self.best = Some(evaluation.clone());
         }
-        self.run.push(evaluation);
+        self.evaluations.push(evaluation);
         let best_cost = self.best.as_ref().map_or(f64::MAX, |best| best.cost);
-        let progress = Progress { stage, evaluations: self.run.len(), replayed: self.replayed, best_cost };
+        let progress =
+            FitProgress { stage, evaluations: self.evaluations.len(), replayed: self.replayed, best_cost };
         if (self.on_progress)(&progress).is_break() {
-            self.stop = Some(Stop::Interrupted);
+            self.stop = Some(StopReason::Interrupted);
         }
     }
 
-    fn stop_for(&mut self, stop: Stop) -> Stop {
+    fn stop_for(&mut self, stop: StopReason) -> StopReason {
         self.stop = Some(stop.clone());
         stop
     }
 
     /// What this run knows of a point.
     #[must_use]
-    pub fn find(&self, point: &[f64]) -> Option<&Evaluation> {
-        self.places.get(&key(point)).and_then(|at| self.run.get(*at))
+    pub fn find_evaluation(&self, point: &[f64]) -> Option<&Evaluation> {
+        self.places.get(&point_key(point)).and_then(|at| self.evaluations.get(*at))
     }
 }
 
 /// The evaluation at `point`, and whether it came from a journal.
-fn make(objective: &Objective, replay: &HashMap<Vec<u64>, Evaluation>, point: &[f64]) -> (Evaluation, bool) {
-    match replay.get(&key(point)) {
+fn make_evaluation(
+    objective: &Objective,
+    replay: &HashMap<Vec<u64>, Evaluation>,
+    point: &[f64],
+) -> (Evaluation, bool) {
+    match replay.get(&point_key(point)) {
         Some(known) => (known.clone(), true),
         None => (objective.evaluate(point), false),
     }

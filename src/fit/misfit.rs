@@ -6,7 +6,7 @@
 
 use super::result::NuisanceResult;
 use crate::math;
-use crate::text::trimmed;
+use crate::text::format_trimmed;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
@@ -15,18 +15,18 @@ use std::collections::BTreeMap;
 const NOISE_SD_RELATIVE: f64 = 0.04;
 /// Relative growth of chi2 per degree of freedom from the shortest segments to the longest that a right model
 /// may show beyond its own scatter: a wrong damping gave 0.05 to 0.13, right models less than 0.02.
-const MOST_GROWTH: f64 = 0.03;
+const MAX_GROWTH: f64 = 0.03;
 /// Standard deviations of a two-sided 95 % interval.
 const Z_95: f64 = 1.96;
 /// Standard deviations of its prior by which a nuisance may lie from it: with twenty of them, one in a
 /// hundred fits of a right model has one beyond.
-const MOST_APART_SD: f64 = 3.5;
+const MAX_PRIOR_DISTANCE_SD: f64 = 3.5;
 /// Digits of a ratio in a sentence.
 const DIGITS: usize = 3;
 
 /// How well the model explains the traces.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
-pub struct Misfit {
+pub struct TraceMisfit {
     /// Whether nothing speaks against the model.
     pub explained: bool,
     /// What speaks against it, a sentence each.
@@ -98,17 +98,26 @@ fn or_infinite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Err
 
 impl StageMisfit {
     /// Standard deviation of chi2 per degree of freedom of white noise of known size.
-    fn sd(&self) -> f64 {
+    fn chi2_sd(&self) -> f64 {
         (2.0 / self.dof.max(1) as f64).sqrt()
     }
 }
 
-impl Misfit {
+impl TraceMisfit {
     /// The judgement on what was found.
     #[must_use]
-    pub fn of(channels: Vec<ChannelMisfit>, stages: Vec<StageMisfit>, nuisances: &[NuisanceResult]) -> Self {
-        let tests =
-            [none(&stages), unseen(&channels), bad_segments(&stages), above_noise(&stages), growth(&stages)];
+    pub fn judge(
+        channels: Vec<ChannelMisfit>,
+        stages: Vec<StageMisfit>,
+        nuisances: &[NuisanceResult],
+    ) -> Self {
+        let tests = [
+            no_segment_compared(&stages),
+            unseen_channel(&channels),
+            bad_segments(&stages),
+            misfit_above_noise(&stages),
+            misfit_growth(&stages),
+        ];
         let mut reasons: Vec<String> = tests.into_iter().flatten().collect();
         reasons.extend(far_from_priors(nuisances));
         Self { explained: reasons.is_empty(), reasons, channels, stages }
@@ -116,21 +125,21 @@ impl Misfit {
 
     /// The first sentence of everything that is said of the fit.
     #[must_use]
-    pub fn sentence(&self) -> String {
+    pub fn headline(&self) -> String {
         let chi2 = self.stages.last().map_or(f64::NAN, |stage| stage.chi2_per_dof);
         if self.explained {
-            let chi2 = trimmed(chi2, DIGITS);
+            let chi2 = format_trimmed(chi2, DIGITS);
             return format!(
                 "The model explains the recording to within its noise (chi2 per degree of freedom {chi2})"
             );
         }
-        unexplained(&self.reasons)
+        unexplained_headline(&self.reasons)
     }
 }
 
 /// The first sentence of a fit of which something speaks against the model.
 #[must_use]
-pub fn unexplained(reasons: &[String]) -> String {
+pub fn unexplained_headline(reasons: &[String]) -> String {
     format!("The model does not explain the recording: {}", reasons.join("; "))
 }
 
@@ -141,13 +150,13 @@ pub fn far_from_priors(nuisances: &[NuisanceResult]) -> Vec<String> {
 }
 
 /// Nothing was compared at all.
-fn none(stages: &[StageMisfit]) -> Option<String> {
+fn no_segment_compared(stages: &[StageMisfit]) -> Option<String> {
     let compared = stages.last().is_some_and(|stage| stage.segments > 0);
     (!compared).then(|| "no segment of it could be started".to_owned())
 }
 
 /// A recording of which nothing was compared.
-fn unseen(channels: &[ChannelMisfit]) -> Option<String> {
+fn unseen_channel(channels: &[ChannelMisfit]) -> Option<String> {
     let unseen = channels.iter().find(|channel| channel.frames == 0)?;
     let (recording, channel) = (&unseen.recording, &unseen.channel);
     Some(format!("no segment of {channel} in `{recording}` could be started"))
@@ -161,10 +170,10 @@ fn bad_segments(stages: &[StageMisfit]) -> Option<String> {
 }
 
 /// Residuals above what noise of uncertain size explains.
-fn above_noise(stages: &[StageMisfit]) -> Option<String> {
+fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last()?;
-    let most = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.sd());
-    let (found, most_words) = (trimmed(last.chi2_per_dof, DIGITS), trimmed(most, DIGITS));
+    let most = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.chi2_sd());
+    let (found, most_words) = (format_trimmed(last.chi2_per_dof, DIGITS), format_trimmed(most, DIGITS));
     let is_above = last.chi2_per_dof > most || last.chi2_per_dof.is_nan();
     is_above.then(|| {
         format!("chi2 per degree of freedom is {found}, and the noise's own uncertainty allows {most_words}")
@@ -172,16 +181,16 @@ fn above_noise(stages: &[StageMisfit]) -> Option<String> {
 }
 
 /// A misfit that grows with the segments: the longer a run, the farther a wrong model leads away.
-fn growth(stages: &[StageMisfit]) -> Option<String> {
+fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     let [first, .., last] = stages else { return None };
-    let most = first.chi2_per_dof * (1.0 + MOST_GROWTH + Z_95 * math::hypot(first.sd(), last.sd()));
+    let most = first.chi2_per_dof * (1.0 + MAX_GROWTH + Z_95 * math::hypot(first.chi2_sd(), last.chi2_sd()));
     (last.chi2_per_dof > most).then(|| {
         format!(
             "chi2 per degree of freedom grows with the segments, from {} at {} ms to {} at {} ms",
-            trimmed(first.chi2_per_dof, DIGITS),
-            trimmed(1e3 * first.segment_s, DIGITS),
-            trimmed(last.chi2_per_dof, DIGITS),
-            trimmed(1e3 * last.segment_s, DIGITS),
+            format_trimmed(first.chi2_per_dof, DIGITS),
+            format_trimmed(1e3 * first.segment_s, DIGITS),
+            format_trimmed(last.chi2_per_dof, DIGITS),
+            format_trimmed(1e3 * last.segment_s, DIGITS),
         )
     })
 }
@@ -190,12 +199,12 @@ fn growth(stages: &[StageMisfit]) -> Option<String> {
 /// whatever is free.
 fn far_from_prior(found: &NuisanceResult) -> Option<String> {
     let apart = (found.estimate - found.prior) / found.prior_sd;
-    (apart.abs() > MOST_APART_SD).then(|| {
+    (apart.abs() > MAX_PRIOR_DISTANCE_SD).then(|| {
         let of = found.recording.as_ref().map_or(String::new(), |recording| format!(" of `{recording}`"));
         format!(
             "`{}`{of} lies {} prior deviations from where the job has it",
             found.name,
-            trimmed(apart.abs(), 2)
+            format_trimmed(apart.abs(), 2)
         )
     })
 }
@@ -217,7 +226,7 @@ mod tests {
     }
 
     fn reasons(chi2: [f64; 3], bad_segments: usize, dof: usize) -> usize {
-        Misfit::of(Vec::new(), stages(chi2, bad_segments, dof), &[]).reasons.len()
+        TraceMisfit::judge(Vec::new(), stages(chi2, bad_segments, dof), &[]).reasons.len()
     }
 
     #[test]
@@ -231,16 +240,19 @@ mod tests {
         assert_eq!(reasons([1.0, 1.0, 1.0], 2, 5000), 1, "bad segments");
         assert_eq!(reasons([1.0, 1.3, 3.8], 29, 5000), 3);
         assert_eq!(reasons([1.0, 1.0, f64::NAN], 0, 5000), 1);
-        assert_eq!(Misfit::of(Vec::new(), Vec::new(), &[]).reasons, ["no segment of it could be started"]);
+        assert_eq!(
+            TraceMisfit::judge(Vec::new(), Vec::new(), &[]).reasons,
+            ["no segment of it could be started"]
+        );
     }
 
     #[test]
     fn a_recording_that_was_not_compared_and_a_run_that_fails_are_said() {
         let channels = vec![ChannelMisfit { recording: "b".to_owned(), ..ChannelMisfit::default() }];
-        let found = Misfit::of(channels, stages([1.0, 1.0, f64::INFINITY], 1, 5000), &[]);
+        let found = TraceMisfit::judge(channels, stages([1.0, 1.0, f64::INFINITY], 1, 5000), &[]);
         assert_eq!(found.reasons.len(), 4, "{:?}", found.reasons);
         let text = serde_json::to_string(&found).unwrap();
-        assert_eq!(serde_json::from_str::<Misfit>(&text).unwrap(), found);
+        assert_eq!(serde_json::from_str::<TraceMisfit>(&text).unwrap(), found);
     }
 
     #[test]
@@ -255,7 +267,8 @@ mod tests {
             upper_95: None,
         };
         let found = |estimate| {
-            Misfit::of(Vec::new(), stages([1.0; 3], 0, 5000), &[nuisance(0.001), nuisance(estimate)]).reasons
+            TraceMisfit::judge(Vec::new(), stages([1.0; 3], 0, 5000), &[nuisance(0.001), nuisance(estimate)])
+                .reasons
         };
         assert!(found(-0.012).is_empty());
         assert_eq!(
@@ -266,7 +279,7 @@ mod tests {
 
     #[test]
     fn the_first_sentence_says_it() {
-        let said = |chi2, bad| Misfit::of(Vec::new(), stages(chi2, bad, 5000), &[]).sentence();
+        let said = |chi2, bad| TraceMisfit::judge(Vec::new(), stages(chi2, bad, 5000), &[]).headline();
         assert_eq!(
             said([1.0, 1.0, 0.98], 0),
             "The model explains the recording to within its noise (chi2 per degree of freedom 0.98)"

@@ -5,19 +5,19 @@ use super::failure::{FailureReason, RunFailure};
 use crate::recording::Recording;
 
 /// Features of a model at parameter values: what the objective needs, and all that it knows.
-pub trait Predict: Sync {
+pub trait FeaturePredictor: Sync {
     /// One entry a target, in their order; `values` are the free parameters in job order, in their SI units.
     ///
     /// # Errors
     /// [`RunFailure`] when the run ended before anything could be observed.
-    fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure>;
+    fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure>;
 
     /// What one measurement of that model would show: noise, lost points and starting state of draw number
     /// `draw`.
     ///
     /// # Errors
-    /// As [`Self::predict`].
-    fn twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure>;
+    /// As [`Self::predict_features`].
+    fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure>;
 }
 
 /// Which of the many equally likely runs and recordings of a model.
@@ -38,13 +38,14 @@ pub trait Model: Sync {
     ///
     /// # Errors
     /// [`RunFailure`] when the run ended before anything could be observed.
-    fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure>;
+    fn record_condition(&self, values: &[f64], condition: usize, draw: Draw)
+    -> Result<Recording, RunFailure>;
 
     /// The same of a run that starts otherwise.
     ///
     /// # Errors
-    /// As [`Self::observe`]; also where the model knows no other start.
-    fn restarted(
+    /// As [`Self::record_condition`]; also where the model knows no other start.
+    fn record_restarted(
         &self,
         values: &[f64],
         condition: usize,
@@ -62,7 +63,7 @@ pub trait Model: Sync {
     }
 
     /// By how much earlier a run may start, s.
-    fn most_lead_s(&self, condition: usize) -> f64 {
+    fn max_lead_s(&self, condition: usize) -> f64 {
         let _ = condition;
         f64::INFINITY
     }

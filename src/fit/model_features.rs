@@ -2,8 +2,8 @@
 
 use super::evaluation::{Observation, Observed};
 use super::failure::RunFailure;
-use super::model::{Draw, Model, Predict};
-use crate::feature::{Feature, Measure, Missing, Value, read_all_assigned};
+use super::model::{Draw, FeaturePredictor, Model};
+use crate::feature::{Feature, FeatureValue, MissingValue, ValueComparison, read_assigned_features};
 use crate::math;
 use crate::recording::Recording;
 use rayon::prelude::*;
@@ -43,22 +43,26 @@ impl<'a> ModelFeatures<'a> {
     ///
     /// # Errors
     /// [`RunFailure`] of the first condition that fails.
-    pub fn read(&self, values: &[f64], draw: Draw) -> Result<Vec<Result<Value, Missing>>, RunFailure> {
+    pub fn read_features(
+        &self,
+        values: &[f64],
+        draw: Draw,
+    ) -> Result<Vec<Result<FeatureValue, MissingValue>>, RunFailure> {
         let recordings = self
             .conditions
             .iter()
-            .map(|condition| self.model.observe(values, *condition, draw))
+            .map(|condition| self.model.record_condition(values, *condition, draw))
             .collect::<Result<Vec<Recording>, _>>()?;
-        Ok(read_all_assigned(&self.features, &self.targets, &recordings.iter().collect::<Vec<_>>()))
+        Ok(read_assigned_features(&self.features, &self.targets, &recordings.iter().collect::<Vec<_>>()))
     }
 }
 
-impl Predict for ModelFeatures<'_> {
-    fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
+impl FeaturePredictor for ModelFeatures<'_> {
+    fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
         let members = 0..self.members as u64;
         let runs: Vec<_> = members
             .into_par_iter()
-            .map(|member| self.read(values, Draw { member, ..Draw::default() }))
+            .map(|member| self.read_features(values, Draw { member, ..Draw::default() }))
             .collect();
         let failed = runs.iter().filter(|run| run.is_err()).count();
         if 2 * failed >= runs.len()
@@ -67,43 +71,43 @@ impl Predict for ModelFeatures<'_> {
             return Err(failure.clone());
         }
         let read: Vec<_> = runs.into_iter().flatten().collect();
-        Ok(self.features.iter().enumerate().map(|(at, feature)| averaged(&read, at, feature)).collect())
+        Ok(self.features.iter().enumerate().map(|(at, feature)| average_runs(&read, at, feature)).collect())
     }
 
-    fn twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
+    fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
         // starting states of twins are none of those that are averaged over
         let member = if self.members > 1 { self.members as u64 + draw } else { 0 };
-        let read = self.read(values, Draw { member, noise: draw, dropouts: true })?;
-        Ok(read.into_iter().map(observed).collect())
+        let read = self.read_features(values, Draw { member, noise: draw, dropouts: true })?;
+        Ok(read.into_iter().map(observe_reading).collect())
     }
 }
 
-fn observed(read: Result<Value, Missing>) -> Observed {
+fn observe_reading(read: Result<FeatureValue, MissingValue>) -> Observed {
     read.map_or_else(
         |missing| Observed::Missing(missing.to_string()),
-        |read| Observed::Value(observation(read.value, 0.0, read.below_db)),
+        |read| Observed::Value(make_observation(read.value, 0.0, read.below_db)),
     )
 }
 
-fn observation(value: f64, spread: f64, below_db: f64) -> Observation {
+fn make_observation(value: f64, spread: f64, below_db: f64) -> Observation {
     Observation { value, spread, below_db }
 }
 
 /// Mean and spread of a feature over the starting states; missing where at most half of them show it.
-fn averaged(runs: &[Vec<Result<Value, Missing>>], at: usize, feature: &Feature) -> Observed {
-    let shown: Vec<&Value> = runs.iter().filter_map(|run| run.get(at)?.as_ref().ok()).collect();
+fn average_runs(runs: &[Vec<Result<FeatureValue, MissingValue>>], at: usize, feature: &Feature) -> Observed {
+    let shown: Vec<&FeatureValue> = runs.iter().filter_map(|run| run.get(at)?.as_ref().ok()).collect();
     if 2 * shown.len() <= runs.len() {
         let why = runs.iter().find_map(|run| run.get(at)?.as_ref().err());
         return Observed::Missing(why.map_or_else(|| "no run shows it".to_owned(), ToString::to_string));
     }
     if let [only] = shown.as_slice() {
-        return Observed::Value(observation(only.value, 0.0, only.below_db));
+        return Observed::Value(make_observation(only.value, 0.0, only.below_db));
     }
     let count = shown.len() as f64;
     let below_db = shown.iter().map(|read| read.below_db).sum::<f64>() / count;
     let values = shown.iter().map(|read| read.value);
     // a mean of logarithms where residuals are logarithms and nothing changes its sign
-    let log = feature.reading.measure() == Measure::Log
+    let log = feature.reading.comparison() == ValueComparison::Log
         && (shown.iter().all(|read| read.value > 0.0) || shown.iter().all(|read| read.value < 0.0));
     let taken: Vec<f64> = if log { values.map(|v| math::ln(v.abs())).collect() } else { values.collect() };
     let mean = taken.iter().sum::<f64>() / count;
@@ -111,7 +115,7 @@ fn averaged(runs: &[Vec<Result<Value, Missing>>], at: usize, feature: &Feature) 
     let sign = shown.first().map_or(1.0, |read| read.value.signum());
     let (value, spread) =
         if log { (sign * math::exp(mean), spread * math::exp(mean)) } else { (mean, spread) };
-    Observed::Value(observation(value, spread, below_db))
+    Observed::Value(make_observation(value, spread, below_db))
 }
 
 #[cfg(test)]
@@ -129,10 +133,15 @@ mod tests {
     const FACTORS: [f64; 4] = [1.0, 1.2, 0.8, 1.0];
 
     impl Model for Still {
-        fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure> {
+        fn record_condition(
+            &self,
+            values: &[f64],
+            condition: usize,
+            draw: Draw,
+        ) -> Result<Recording, RunFailure> {
             if draw.member == 3 {
                 return Err(RunFailure::new(
-                    FailureReason::Ended(crate::simulate::Status::ContactLost),
+                    FailureReason::Ended(crate::simulate::RunStatus::ContactLost),
                     "",
                     0.5,
                 ));
@@ -161,7 +170,11 @@ mod tests {
     fn shown(members: usize, conditions: &[usize]) -> Vec<Observation> {
         let features: Vec<Feature> = conditions.iter().map(|condition| mean(*condition)).collect();
         let seen = ModelFeatures::new(&Still, &features, vec![0.01; conditions.len()], members);
-        seen.predict(&[0.01]).unwrap().iter().map(|feature| *feature.observation().unwrap()).collect()
+        seen.predict_features(&[0.01])
+            .unwrap()
+            .iter()
+            .map(|feature| *feature.observation().unwrap())
+            .collect()
     }
 
     #[test]
@@ -193,7 +206,7 @@ mod tests {
     fn a_twin_has_its_own_noise_and_a_starting_state_that_is_not_averaged_over() {
         let twin = |members| {
             let features = [mean(0)];
-            ModelFeatures::new(&Still, &features, vec![0.01], members).twin(&[0.01], 7).unwrap()[0]
+            ModelFeatures::new(&Still, &features, vec![0.01], members).simulate_twin(&[0.01], 7).unwrap()[0]
                 .value()
                 .unwrap()
         };

@@ -6,19 +6,19 @@
 //! feature: `r = ln(model / target) / s` (or `(model - target) / s` where the sign may change). `s^2 = sd^2 +
 //! scatter^2 + spread^2`: the target's deviation; the scatter of the model's own value between neighbouring
 //! parameters, where it is not smooth; and the spread over its starting states, to which the term `2 ln(s /
-//! sd)` belongs: without it a fit would look for points at which nothing is certain. `rho` is `r^2` up to
-//! `KNEE` and grows as a logarithm after that, as errors with heavy tails have it: a peak that is missing
-//! must not outvote all that is shown; it costs as much as a value that is [`FAR`] times off. `d` is by how
+//! sd)` belongs: without it a fit would look for points at which nothing is certain. `robust_loss` is `r^2` up to
+//! `LOSS_KNEE` and grows as a logarithm after that, as errors with heavy tails have it: a peak that is missing
+//! must not outvote all that is shown; it costs as much as a value that is [`MAX_RATIO`] times off. `d` is by how
 //! much the assigned peak is weaker than the strongest one, so that the cost does not jump when another peak
 //! is assigned. A run that fails costs at least as much as one from which every feature is missing, and less
 //! the further it came.
 
-use super::axis::Axis;
-use super::cameras::Cameras;
-use super::evaluation::{Evaluation, Observation, Observed, Outcome};
+use super::axis::SearchAxis;
+use super::cameras::CameraFit;
+use super::evaluation::{Evaluation, EvaluationOutcome, Observation, Observed};
 use super::failure::{FailureReason, RunFailure};
-use super::model::Predict;
-use super::target::{FAR, Target};
+use super::model::FeaturePredictor;
+use super::target::{MAX_RATIO, TargetValue};
 use crate::feature::ASSIGN_DB;
 use crate::math;
 use crate::text::panic_message;
@@ -27,32 +27,32 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Residual, in standard deviations, above which the cost grows as a logarithm: errors of measurement stay
 /// below 3, so only a model that is far off feels it.
-pub(crate) const KNEE: f64 = 3.0;
+pub(crate) const LOSS_KNEE: f64 = 3.0;
 
 /// Bounds, targets and the model between them.
 pub struct Objective<'a> {
-    axes: Vec<Axis>,
-    targets: Vec<Target>,
-    model: &'a dyn Predict,
+    axes: Vec<SearchAxis>,
+    targets: Vec<TargetValue>,
+    model: &'a dyn FeaturePredictor,
 }
 
 impl<'a> Objective<'a> {
     /// One axis a free parameter, one target a feature; targets are finite, not zero where logarithms are
     /// taken, with a standard deviation above zero (as [`crate::feature`] and [`super::job`] make them).
     #[must_use]
-    pub fn new(axes: Vec<Axis>, targets: Vec<Target>, model: &'a dyn Predict) -> Self {
+    pub fn new(axes: Vec<SearchAxis>, targets: Vec<TargetValue>, model: &'a dyn FeaturePredictor) -> Self {
         Self { axes, targets, model }
     }
 
     /// The free parameters in job order.
     #[must_use]
-    pub fn axes(&self) -> &[Axis] {
+    pub fn axes(&self) -> &[SearchAxis] {
         &self.axes
     }
 
     /// Targets in job order.
     #[must_use]
-    pub fn targets(&self) -> &[Target] {
+    pub fn targets(&self) -> &[TargetValue] {
         &self.targets
     }
 
@@ -65,51 +65,53 @@ impl<'a> Objective<'a> {
     /// Runs the model at a place in the unit box; never fails and never panics.
     #[must_use]
     pub fn evaluate(&self, unit: &[f64]) -> Evaluation {
-        self.evaluated(unit.to_vec(), self.values(unit))
+        self.evaluate_at(unit.to_vec(), self.values(unit))
     }
 
     /// Runs the model at parameter values, whose place in the unit box is not needed.
     #[must_use]
     pub(crate) fn evaluate_values(&self, values: Vec<f64>) -> Evaluation {
-        self.evaluated(Vec::new(), values)
+        self.evaluate_at(Vec::new(), values)
     }
 
-    fn evaluated(&self, unit: Vec<f64>, values: Vec<f64>) -> Evaluation {
-        let outcome = guarded(|| self.model.predict(&values)).and_then(|features| self.admit(features));
+    fn evaluate_at(&self, unit: Vec<f64>, values: Vec<f64>) -> Evaluation {
+        let outcome = catch_panic(|| self.model.predict_features(&values))
+            .and_then(|features| self.check_features(features));
         let (features, failure) = match outcome {
             Ok(features) => (features, None),
             Err(failure) => {
                 (Vec::new(), Some(RunFailure::new(failure.reason, failure.message, failure.progress)))
             }
         };
-        self.price(Outcome { unit, values, features, failure })
+        self.add_costs(EvaluationOutcome { unit, values, features, failure })
     }
 
     /// What a point shows with its costs, which follow from its features or its failure and its values.
     #[must_use]
-    pub(crate) fn price(&self, outcome: Outcome) -> Evaluation {
-        let Outcome { unit, values, features, failure } = outcome;
-        let priors: f64 =
-            prior_residuals(&self.axes, &values).map(|r| rho(r.clamp(-MOST_PRIOR, MOST_PRIOR))).sum();
+    pub(crate) fn add_costs(&self, outcome: EvaluationOutcome) -> Evaluation {
+        let EvaluationOutcome { unit, values, features, failure } = outcome;
+        let priors: f64 = prior_residuals(&self.axes, &values)
+            .map(|r| robust_loss(r.clamp(-MAX_PRIOR_RESIDUAL, MAX_PRIOR_RESIDUAL)))
+            .sum();
         let failed = |failure: &RunFailure, farthest: f64| (2.0 - failure.progress) * farthest.max(1.0);
-        let of = |(targets, features): (&[Target], &[Observed])| {
-            let (shown, farthest) = costs(targets, features);
+        let of = |(targets, features): (&[TargetValue], &[Observed])| {
+            let (shown, farthest) = feature_costs(targets, features);
             priors + failure.as_ref().map_or(shown, |failure| failed(failure, farthest))
         };
         let cost = of((&self.targets, &features));
-        let (first, seen): (Vec<Target>, Vec<Observed>) = first_stage(&self.targets, &features);
+        let (first, seen): (Vec<TargetValue>, Vec<Observed>) = first_stage_targets(&self.targets, &features);
         let global_cost = of((&first, &seen));
         Evaluation { unit, values, cost, global_cost, features, failure }
     }
 
     /// The same with the scatter of each feature, in its unit.
     #[must_use]
-    pub(crate) fn with_scatter(&self, scatter: &[f64]) -> Self {
+    pub(crate) fn with_feature_scatter(&self, scatter: &[f64]) -> Self {
         let targets = self
             .targets
             .iter()
             .zip(scatter)
-            .map(|(target, scatter)| Target { scatter: *scatter, ..target.clone() });
+            .map(|(target, scatter)| TargetValue { scatter: *scatter, ..target.clone() });
         Self { axes: self.axes.clone(), targets: targets.collect(), model: self.model }
     }
 
@@ -117,18 +119,19 @@ impl<'a> Objective<'a> {
     ///
     /// # Errors
     /// [`RunFailure`], also for a panic and for numbers that are not finite.
-    pub fn twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
-        guarded(|| self.model.twin(values, draw)).and_then(|features| self.admit(features))
+    pub fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
+        catch_panic(|| self.model.simulate_twin(values, draw))
+            .and_then(|features| self.check_features(features))
     }
 
     /// Numbers of cameras that are estimated at every point.
     #[must_use]
-    pub(crate) fn camera_unknowns(&self) -> usize {
-        Cameras::of(&self.targets, &[]).unknowns()
+    pub(crate) fn count_camera_unknowns(&self) -> usize {
+        CameraFit::estimate(&self.targets, &[]).count_unknowns()
     }
 
     /// Stops numbers that are not finite at the border.
-    fn admit(&self, features: Vec<Observed>) -> Result<Vec<Observed>, RunFailure> {
+    fn check_features(&self, features: Vec<Observed>) -> Result<Vec<Observed>, RunFailure> {
         if features.len() != self.targets.len() {
             let message =
                 format!("the model gave {} features, expected {}", features.len(), self.targets.len());
@@ -153,92 +156,96 @@ impl<'a> Objective<'a> {
 }
 
 /// Distances from the priors, in standard deviations, of the parameters that have one.
-pub(crate) fn prior_residuals(axes: &[Axis], values: &[f64]) -> impl Iterator<Item = f64> {
+pub(crate) fn prior_residuals(axes: &[SearchAxis], values: &[f64]) -> impl Iterator<Item = f64> {
     axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
 }
 
 /// What features cost with the priors of their cameras, and the most that the features can.
-fn costs(targets: &[Target], features: &[Observed]) -> (f64, f64) {
-    let cameras = Cameras::of(targets, features);
-    let one = |(at, target): (usize, &Target)| {
-        let (found, farthest) = (features.get(at).and_then(Observed::observation), farthest(target));
-        let shown = found.map(|found| cost_of(&cameras.shown(target, found), target));
+fn feature_costs(targets: &[TargetValue], features: &[Observed]) -> (f64, f64) {
+    let cameras = CameraFit::estimate(targets, features);
+    let one = |(at, target): (usize, &TargetValue)| {
+        let (found, farthest) = (features.get(at).and_then(Observed::observation), missing_cost(target));
+        let shown = found.map(|found| feature_cost(&cameras.apply(target, found), target));
         (shown.unwrap_or(farthest), farthest)
     };
     let all = targets.iter().enumerate().map(one);
     let (shown, farthest) = all.fold((0.0, 0.0), |sum, cost| (sum.0 + cost.0, sum.1 + cost.1));
-    (shown + cameras.prior_residuals().map(rho).sum::<f64>(), farthest)
+    (shown + cameras.prior_residuals().map(robust_loss).sum::<f64>(), farthest)
 }
 
 /// Targets of the first stage, with the features that belong to them.
-fn first_stage(targets: &[Target], features: &[Observed]) -> (Vec<Target>, Vec<Observed>) {
-    let kept = targets.iter().enumerate().filter_map(|(at, target)| Some((at, target.for_first_stage()?)));
-    let with = |(at, target): (usize, Target)| (target, features.get(at).cloned());
+fn first_stage_targets(targets: &[TargetValue], features: &[Observed]) -> (Vec<TargetValue>, Vec<Observed>) {
+    let kept = targets.iter().enumerate().filter_map(|(at, target)| Some((at, target.first_stage_target()?)));
+    let with = |(at, target): (usize, TargetValue)| (target, features.get(at).cloned());
     let (targets, features): (Vec<_>, Vec<_>) = kept.map(with).unzip();
     (targets, features.into_iter().flatten().collect())
 }
 
 /// Most standard deviations from a prior that are counted, so that costs stay finite.
-const MOST_PRIOR: f64 = 1e6;
+const MAX_PRIOR_RESIDUAL: f64 = 1e6;
 
 /// Distance over its standard deviation, the spread over starting states included.
 #[must_use]
-pub fn residual(observation: &Observation, target: &Target) -> f64 {
+pub fn residual(observation: &Observation, target: &TargetValue) -> f64 {
     target.distance(observation.value) / total_sd(observation, target)
 }
 
 /// Standard deviation of the distance: of the target and over starting states.
 #[must_use]
-pub(crate) fn total_sd(observation: &Observation, target: &Target) -> f64 {
-    math::hypot(target.relative_sd(), observation.spread / target.scale())
+pub(crate) fn total_sd(observation: &Observation, target: &TargetValue) -> f64 {
+    math::hypot(target.relative_sd(), observation.spread / target.reference_size())
 }
 
 /// What a feature that was shown costs; never more than one that was not.
-fn cost_of(observation: &Observation, target: &Target) -> f64 {
+fn feature_cost(observation: &Observation, target: &TargetValue) -> f64 {
     let assigned = math::powi(observation.below_db / ASSIGN_DB, 2);
     let spread = 2.0 * math::ln(total_sd(observation, target) / target.relative_sd());
-    (rho(residual(observation, target)) + spread + assigned).min(farthest(target))
+    (robust_loss(residual(observation, target)) + spread + assigned).min(missing_cost(target))
 }
 
-fn farthest(target: &Target) -> f64 {
-    rho(math::ln(FAR) / target.relative_sd())
+fn missing_cost(target: &TargetValue) -> f64 {
+    robust_loss(math::ln(MAX_RATIO) / target.relative_sd())
 }
 
-/// A residual's share of the cost: its square, and beyond `KNEE` a logarithm with the same slope there.
+/// A residual's share of the cost: its square, and beyond `LOSS_KNEE` a logarithm with the same slope there.
 #[must_use]
-pub(crate) fn rho(residual: f64) -> f64 {
+pub(crate) fn robust_loss(residual: f64) -> f64 {
     let size = residual.abs();
-    if size <= KNEE { size * size } else { KNEE * KNEE * (1.0 + 2.0 * math::ln(size / KNEE)) }
+    if size <= LOSS_KNEE {
+        size * size
+    } else {
+        LOSS_KNEE * LOSS_KNEE * (1.0 + 2.0 * math::ln(size / LOSS_KNEE))
+    }
 }
 
 /// The outcome, or a panic as a failure.
-fn guarded<T>(run: impl FnOnce() -> Result<T, RunFailure>) -> Result<T, RunFailure> {
+fn catch_panic<T>(run: impl FnOnce() -> Result<T, RunFailure>) -> Result<T, RunFailure> {
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|payload| {
-        Err(RunFailure::new(FailureReason::Panic, message_of(payload.as_ref()), 0.0))
+        Err(RunFailure::new(FailureReason::Panic, panic_text(payload.as_ref()), 0.0))
     })
 }
 
 /// The message of a panic, if it has one.
-fn message_of(payload: &(dyn Any + Send)) -> String {
+fn panic_text(payload: &(dyn Any + Send)) -> String {
     panic_message(payload).unwrap_or_else(|| "the model panicked without a message".to_owned())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::feature::Measure;
+    use crate::feature::ValueComparison;
     use crate::fit::axis::Prior;
-    use crate::fit::scale::{Bounds, Spacing};
+    use crate::fit::scale::{Bounds, BoundsSpacing};
 
     struct Fake(fn(f64) -> Result<Vec<Observed>, RunFailure>);
 
-    impl Predict for Fake {
-        fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
+    impl FeaturePredictor for Fake {
+        fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
             (self.0)(values[0])
         }
 
-        fn twin(&self, values: &[f64], _: u64) -> Result<Vec<Observed>, RunFailure> {
-            self.predict(values)
+        fn simulate_twin(&self, values: &[f64], _: u64) -> Result<Vec<Observed>, RunFailure> {
+            self.predict_features(values)
         }
     }
 
@@ -247,17 +254,17 @@ mod tests {
     }
 
     fn objective(fake: &Fake, prior: Option<Prior>) -> Objective<'_> {
-        let bounds = Bounds::new(0.0, 100.0, Spacing::Linear).unwrap();
-        Objective::new(vec![Axis { bounds, prior }], vec![low()], fake)
+        let bounds = Bounds::new(0.0, 100.0, BoundsSpacing::Linear).unwrap();
+        Objective::new(vec![SearchAxis { bounds, prior }], vec![low()], fake)
     }
 
-    fn low() -> Target {
-        Target {
+    fn low() -> TargetValue {
+        TargetValue {
             name: "low".to_owned(),
             value: 80.0,
             sd: 0.8,
             scatter: 0.0,
-            measure: Measure::Log,
+            measure: ValueComparison::Log,
             last: false,
             calibration: None,
         }
@@ -265,7 +272,7 @@ mod tests {
 
     #[test]
     fn the_cost_is_the_square_of_the_log_residual_and_then_a_logarithm() {
-        let identity = Fake(|p| Ok(vec![Observed::of(p)]));
+        let identity = Fake(|p| Ok(vec![Observed::from_value(p)]));
         assert_eq!(at(&identity, 0.8).cost, 0.0);
         let near = (0.81_f64 / 0.8).ln() / 0.01;
         assert!((at(&identity, 0.81).cost - near * near).abs() < 1e-9);
@@ -276,19 +283,23 @@ mod tests {
     #[test]
     fn a_missing_value_costs_as_much_as_the_farthest_one_and_a_failure_more() {
         let missing = at(&Fake(|_| Ok(vec![Observed::Missing("no peak".to_owned())])), 0.5);
-        let wrong_sign = at(&Fake(|_| Ok(vec![Observed::of(-80.0)])), 0.5);
+        let wrong_sign = at(&Fake(|_| Ok(vec![Observed::from_value(-80.0)])), 0.5);
         assert!((missing.cost - 9.0 * (1.0 + 2.0 * (100.0_f64.ln() / 0.03).ln())).abs() < 1e-9);
         assert_eq!(wrong_sign.cost, missing.cost);
         let late = at(
-            &Fake(|_| Err(RunFailure::new(FailureReason::Ended(crate::simulate::Status::Jammed), "", 0.9))),
+            &Fake(|_| {
+                Err(RunFailure::new(FailureReason::Ended(crate::simulate::RunStatus::Jammed), "", 0.9))
+            }),
             0.5,
         );
         let early = at(
-            &Fake(|_| Err(RunFailure::new(FailureReason::Ended(crate::simulate::Status::Jammed), "", 0.1))),
+            &Fake(|_| {
+                Err(RunFailure::new(FailureReason::Ended(crate::simulate::RunStatus::Jammed), "", 0.1))
+            }),
             0.5,
         );
         assert!(early.cost > late.cost && late.cost > missing.cost && early.cost <= 2.0 * missing.cost);
-        assert_eq!(late.failure.unwrap().reason, FailureReason::Ended(crate::simulate::Status::Jammed));
+        assert_eq!(late.failure.unwrap().reason, FailureReason::Ended(crate::simulate::RunStatus::Jammed));
     }
 
     #[test]
@@ -296,7 +307,7 @@ mod tests {
         let reason = |fake: &Fake| at(fake, 0.5).failure.map(|f| (f.reason, f.message)).unwrap();
         assert_eq!(reason(&Fake(|_| panic!("lost it"))), (FailureReason::Panic, "lost it".to_owned()));
         assert_eq!(
-            reason(&Fake(|_| Ok(vec![Observed::of(f64::NAN)]))),
+            reason(&Fake(|_| Ok(vec![Observed::from_value(f64::NAN)]))),
             (FailureReason::NotANumber, "feature `low` is NaN".to_owned())
         );
         assert_eq!(reason(&Fake(|_| Ok(vec![]))).0, FailureReason::FeatureCount);
@@ -313,29 +324,29 @@ mod tests {
     fn a_spread_over_starting_states_counts_as_a_likelihood_says() {
         // s^2 = 0.01^2 + 0.03^2: the residual shrinks, and 2 ln(s / sd) = ln 10 is paid
         let wide = Observation { value: 80.0 * 0.05_f64.exp(), spread: 2.4, below_db: 0.0 };
-        assert!((cost_of(&wide, &low()) - (0.05_f64.powi(2) / 1e-3 + 10.0_f64.ln())).abs() < 1e-9);
+        assert!((feature_cost(&wide, &low()) - (0.05_f64.powi(2) / 1e-3 + 10.0_f64.ln())).abs() < 1e-9);
         let useless = Observation { value: 1e-9, spread: 1e9, below_db: 0.0 };
-        assert!(cost_of(&useless, &low()) <= farthest(&low()));
+        assert!(feature_cost(&useless, &low()) <= missing_cost(&low()));
     }
 
     #[test]
     fn a_weaker_peak_costs_and_a_prior_counts() {
         let weaker = Observation { value: 80.0, spread: 0.0, below_db: 12.0 };
-        assert_eq!(cost_of(&weaker, &low()), 4.0);
+        assert_eq!(feature_cost(&weaker, &low()), 4.0);
         let prior = Prior::Log { mean_ln: 40.0_f64.ln(), sd_ln: 0.2 };
-        let exact = Fake(|_| Ok(vec![Observed::of(80.0)]));
+        let exact = Fake(|_| Ok(vec![Observed::from_value(80.0)]));
         let found = objective(&exact, Some(prior)).evaluate(&[0.44]);
         assert!((found.cost - (1.1_f64.ln() / 0.2).powi(2)).abs() < 1e-12);
     }
 
     #[test]
     fn a_difference_may_pass_through_zero() {
-        let target = Target {
+        let target = TargetValue {
             name: "flip".to_owned(),
             value: 0.0,
             sd: 1e-3,
             scatter: 0.0,
-            measure: Measure::Linear { scale: 0.05 },
+            measure: ValueComparison::Linear { scale: 0.05 },
             last: false,
             calibration: None,
         };
@@ -346,11 +357,14 @@ mod tests {
 
     #[test]
     fn the_features_of_the_last_stage_are_left_out_of_the_first() {
-        let fake = Fake(|p| Ok(vec![Observed::of(80.0), Observed::of(p)]));
-        let targets = vec![low(), Target { name: "line".to_owned(), last: true, ..low() }];
-        let found =
-            Objective::new(vec![Bounds::new(0.0, 100.0, Spacing::Linear).unwrap().into()], targets, &fake)
-                .evaluate(&[0.81]);
+        let fake = Fake(|p| Ok(vec![Observed::from_value(80.0), Observed::from_value(p)]));
+        let targets = vec![low(), TargetValue { name: "line".to_owned(), last: true, ..low() }];
+        let found = Objective::new(
+            vec![Bounds::new(0.0, 100.0, BoundsSpacing::Linear).unwrap().into()],
+            targets,
+            &fake,
+        )
+        .evaluate(&[0.81]);
         assert!(found.cost > 1.0 && found.global_cost == 0.0);
     }
 }

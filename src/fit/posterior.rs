@@ -4,19 +4,19 @@
 //! prior is flat along its coordinate (its logarithm, or itself), or normal and cut off at the ends. Of a job
 //! on features the likelihood is `-cost / 2` without the share of the priors ([`super::objective`]). Of a job
 //! on traces it is `-chi^2 / 2` with the starting states of the segments where they fit best
-//! ([`super::trace::at_point`]).
+//! ([`super::trace::fit_states_at`]).
 
-use super::axis::{Axis, Prior};
+use super::axis::{Prior, SearchAxis};
 use super::error::FitError;
-use super::iterates::Coordinate;
+use super::iterates::HeaderCoordinate;
 use super::model_features::ModelFeatures;
 use super::objective::{Objective, residual};
 use super::problem::Problem;
-use super::run::axis;
-use super::scale::Spacing;
-use super::target::Target;
-use super::targets::targets;
-use super::trace::{TraceModel, at_point, frame_residuals};
+use super::run::search_axis;
+use super::scale::BoundsSpacing;
+use super::target::TargetValue;
+use super::targets::measure_targets;
+use super::trace::{TraceModel, fit_states_at, frame_residuals};
 
 use crate::feature::Feature;
 use crate::math;
@@ -24,7 +24,7 @@ use std::f64::consts::{LN_2, SQRT_2, TAU};
 
 /// An unknown: its range and its prior along a coordinate, which is its logarithm or itself.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Unknown {
+pub struct PosteriorParameter {
     /// Key of the scene with its table; of a camera its recording and the quantity.
     pub name: String,
     /// Least and greatest value, in its SI unit.
@@ -38,12 +38,12 @@ pub struct Unknown {
 /// The posterior density of a problem's unknowns.
 pub struct Posterior {
     problem: Problem,
-    unknowns: Vec<Unknown>,
-    data: Data,
+    unknowns: Vec<PosteriorParameter>,
+    data: PosteriorData,
 }
 
-enum Data {
-    Features { features: Vec<Feature>, targets: Vec<Target> },
+enum PosteriorData {
+    Features { features: Vec<Feature>, targets: Vec<TargetValue> },
     Traces(Box<TraceModel>),
 }
 
@@ -55,17 +55,23 @@ impl Posterior {
     pub fn new(problem: Problem) -> Result<Self, FitError> {
         if let Some(model) = problem.trace_model() {
             let model = model.map_err(|error| FitError::CannotBeFitted { why: error.to_string() })?;
-            let recordings = problem.trace_names();
-            let unknowns = model.unknowns.0.iter().map(|of| Unknown::along(&Coordinate::of(of, &recordings)));
-            let (unknowns, data) = (unknowns.collect(), Data::Traces(Box::new(model)));
+            let recordings = problem.trace_recording_names();
+            let unknowns = model.unknowns.0.iter().map(|of| {
+                PosteriorParameter::from_coordinate(&HeaderCoordinate::from_unknown(of, &recordings))
+            });
+            let (unknowns, data) = (unknowns.collect(), PosteriorData::Traces(Box::new(model)));
             return Ok(Self { problem, unknowns, data });
         }
         let job = problem.job();
-        let all = targets(job, problem.recordings())?;
-        let fitted = job.aims.iter().zip(all).filter(|(aim, _)| !aim.held_out);
+        let all = measure_targets(job, problem.recordings())?;
+        let fitted = job.targets.iter().zip(all).filter(|(aim, _)| !aim.held_out);
         let (features, targets) = fitted.map(|(aim, target)| (aim.feature.clone(), target)).unzip();
-        let unknowns = job.parameters.iter().map(|free| Unknown::of(&free.name, &axis(free))).collect();
-        Ok(Self { problem, unknowns, data: Data::Features { features, targets } })
+        let unknowns = job
+            .parameters
+            .iter()
+            .map(|free| PosteriorParameter::from_axis(&free.name, &search_axis(free)))
+            .collect();
+        Ok(Self { problem, unknowns, data: PosteriorData::Features { features, targets } })
     }
 
     /// The problem.
@@ -76,7 +82,7 @@ impl Posterior {
 
     /// The unknowns, in the order of every point.
     #[must_use]
-    pub fn unknowns(&self) -> &[Unknown] {
+    pub fn unknowns(&self) -> &[PosteriorParameter] {
         &self.unknowns
     }
 
@@ -96,15 +102,17 @@ impl Posterior {
     #[must_use]
     pub fn log_likelihood(&self, values: &[f64]) -> f64 {
         match &self.data {
-            Data::Features { features, targets } => {
-                let seen = self.model(features, targets);
-                let flat = self.problem.job().parameters.iter().map(|free| Axis::from(free.bounds)).collect();
+            PosteriorData::Features { features, targets } => {
+                let seen = self.feature_model(features, targets);
+                let flat =
+                    self.problem.job().parameters.iter().map(|free| SearchAxis::from(free.bounds)).collect();
                 let found = Objective::new(flat, targets.clone(), &seen).evaluate_values(values.to_vec());
                 if found.failure.is_some() { f64::NEG_INFINITY } else { -found.cost / 2.0 }
             }
-            Data::Traces(model) => {
-                let chi2 = at_point(model, self.problem.segment_s(), &coordinates(model, values))
-                    .map(|at| at.segments.iter().map(|segment| segment.chi2).sum::<f64>());
+            PosteriorData::Traces(model) => {
+                let chi2 =
+                    fit_states_at(model, self.problem.segment_s(), &unknown_coordinates(model, values))
+                        .map(|at| at.segments.iter().map(|segment| segment.chi2).sum::<f64>());
                 chi2.map_or(f64::NEG_INFINITY, |chi2| -chi2 / 2.0)
             }
         }
@@ -123,36 +131,36 @@ impl Posterior {
     #[must_use]
     pub fn residuals(&self, values: &[f64]) -> Vec<Option<f64>> {
         match &self.data {
-            Data::Features { features, targets } => {
-                let seen = self.model(features, targets);
+            PosteriorData::Features { features, targets } => {
+                let seen = self.feature_model(features, targets);
                 let found =
                     Objective::new(Vec::new(), targets.clone(), &seen).evaluate_values(values.to_vec());
-                let one = |(at, target): (usize, &Target)| {
+                let one = |(at, target): (usize, &TargetValue)| {
                     found.features.get(at)?.observation().map(|shown| residual(shown, target))
                 };
                 targets.iter().enumerate().map(one).collect()
             }
-            Data::Traces(model) => {
-                let at = at_point(model, self.problem.segment_s(), &coordinates(model, values));
+            PosteriorData::Traces(model) => {
+                let at = fit_states_at(model, self.problem.segment_s(), &unknown_coordinates(model, values));
                 frame_residuals(model, at.as_ref())
             }
         }
     }
 
-    fn model(&self, features: &[Feature], targets: &[Target]) -> ModelFeatures<'_> {
+    fn feature_model(&self, features: &[Feature], targets: &[TargetValue]) -> ModelFeatures<'_> {
         let values = targets.iter().map(|target| target.value).collect();
         ModelFeatures::new(self.problem.model(), features, values, self.problem.job().ensemble.members)
     }
 }
 
-fn coordinates(model: &TraceModel, values: &[f64]) -> Vec<f64> {
+fn unknown_coordinates(model: &TraceModel, values: &[f64]) -> Vec<f64> {
     model.unknowns.0.iter().zip(values).map(|(unknown, value)| unknown.coordinate(*value)).collect()
 }
 
-impl Unknown {
-    fn of(name: &str, axis: &Axis) -> Self {
+impl PosteriorParameter {
+    fn from_axis(name: &str, axis: &SearchAxis) -> Self {
         let bounds = [axis.bounds.lower(), axis.bounds.upper()];
-        let is_log = axis.bounds.spacing() == Spacing::Log;
+        let is_log = axis.bounds.spacing() == BoundsSpacing::Log;
         let prior = axis.prior.map(|prior| match prior {
             Prior::Linear { mean, sd } => [mean, sd],
             Prior::Log { mean_ln, sd_ln } => [mean_ln, sd_ln],
@@ -160,7 +168,7 @@ impl Unknown {
         Self { name: name.to_owned(), bounds, is_log, prior }
     }
 
-    fn along(coordinate: &Coordinate) -> Self {
+    fn from_coordinate(coordinate: &HeaderCoordinate) -> Self {
         let bounds = coordinate.range.map(|end| coordinate.value(end.0));
         let unit = coordinate.per_unit.map_or(1.0, |unit| unit.0);
         let prior = coordinate.prior.map(|[mean, sd]| [mean.0 * unit, sd.0 * unit]);
@@ -172,7 +180,7 @@ impl Unknown {
     }
 
     /// Ends of the range in standard deviations from the prior's mean.
-    fn ends(&self, [mean, sd]: [f64; 2]) -> [f64; 2] {
+    fn standardized_bounds(&self, [mean, sd]: [f64; 2]) -> [f64; 2] {
         self.bounds.map(|end| (self.coordinate(end) - mean) / sd)
     }
 
@@ -181,14 +189,14 @@ impl Unknown {
         let at = match self.prior {
             None => low + unit * (high - low),
             Some(prior) => {
-                let ends = self.ends(prior);
-                let all = share_between(ends[0], ends[1]);
+                let ends = self.standardized_bounds(prior);
+                let all = normal_probability(ends[0], ends[1]);
                 // from the nearer end, so that neither tail is lost to rounding
                 let below = |x: f64| match unit < 0.5 {
-                    true => share_between(ends[0], x) - unit * all,
-                    false => (1.0 - unit) * all - share_between(x, ends[1]),
+                    true => normal_probability(ends[0], x) - unit * all,
+                    false => (1.0 - unit) * all - normal_probability(x, ends[1]),
                 };
-                (prior[0] + prior[1] * root(below, ends)).clamp(low, high)
+                (prior[0] + prior[1] * bisect_root(below, ends)).clamp(low, high)
             }
         };
         let value = if self.is_log { math::exp(at) } else { at };
@@ -206,9 +214,12 @@ impl Unknown {
         let along = match self.prior {
             None => -math::ln(self.coordinate(high) - self.coordinate(low)),
             Some(prior @ [mean, sd]) => {
-                let [low, high] = self.ends(prior);
+                let [low, high] = self.standardized_bounds(prior);
                 let off = (self.coordinate(value) - mean) / sd;
-                -off * off / 2.0 - math::ln(sd) - math::ln(TAU) / 2.0 - math::ln(share_between(low, high))
+                -off * off / 2.0
+                    - math::ln(sd)
+                    - math::ln(TAU) / 2.0
+                    - math::ln(normal_probability(low, high))
             }
         };
         along + slope
@@ -216,13 +227,13 @@ impl Unknown {
 }
 
 /// Share of a standard normal distribution between two places; exact in either tail.
-fn share_between(from: f64, to: f64) -> f64 {
+fn normal_probability(from: f64, to: f64) -> f64 {
     let above = |x: f64| math::erfc(x / SQRT_2) / 2.0;
     if from > 0.0 { above(from) - above(to) } else { above(-to) - above(-from) }
 }
 
 /// Where a rising function is zero, to the last bit that halving reaches.
-fn root(of: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
+fn bisect_root(of: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
     // 38 deviations are as far as a normal density is above zero
     (low, high) = (low.max(-38.0), high.min(38.0));
     let halvings = (f64::MANTISSA_DIGITS as f64 + math::ln((high - low).max(2.0)) / LN_2) as usize;
@@ -237,8 +248,8 @@ fn root(of: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
 
-    fn unknown(bounds: [f64; 2], is_log: bool, prior: Option<[f64; 2]>) -> Unknown {
-        Unknown { name: String::new(), bounds, is_log, prior }
+    fn unknown(bounds: [f64; 2], is_log: bool, prior: Option<[f64; 2]>) -> PosteriorParameter {
+        PosteriorParameter { name: String::new(), bounds, is_log, prior }
     }
 
     /// The transform is the inverse of the integral of the density: differences of the one are the other.
@@ -268,9 +279,9 @@ mod tests {
     #[test]
     fn shares_of_the_normal_distribution_are_those_of_tables() {
         for (z, within) in [(1.0, 0.682_689_492_137_085_9), (2.0, 0.954_499_736_103_641_6)] {
-            assert!((share_between(-z, z) - within).abs() < 1e-15);
+            assert!((normal_probability(-z, z) - within).abs() < 1e-15);
         }
         // Abramowitz and Stegun, table 26.1: 1 - P(5) = 2.86651572e-7
-        assert!((share_between(5.0, 38.0) / 2.866_515_718_791_94e-7 - 1.0).abs() < 1e-12);
+        assert!((normal_probability(5.0, 38.0) / 2.866_515_718_791_94e-7 - 1.0).abs() < 1e-12);
     }
 }

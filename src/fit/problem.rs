@@ -1,20 +1,20 @@
 //! A job with its scenes and recordings: everything that decides a fit.
 
-use super::constants::{ConstantsError, Freed, check_scaling, freed};
-use super::context::Context;
+use super::constants::{FreedConstant, NuisanceError, check_scaling, free_constants};
+use super::context::FitContext;
 use super::error::FitError;
-use super::job::{self, FreeParameter, Head, Job};
-use super::ledger::{OnProgress, Progress};
+use super::job::{self, FreeParameter, HeadSource, Job};
+use super::ledger::{FitProgress, OnProgress};
 use super::result::FitResult;
-use super::run::fit;
-use super::scene_model::{Condition, Instrument, Plausible, SceneModel};
-use super::trace::{Source, TraceModel};
+use super::run::fit_features;
+use super::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
+use super::trace::{TraceModel, TraceSource};
 use super::trace_ledger::TraceProgress;
-use super::traced::{TraceError, Traced, traced};
-use crate::journal::{Discard, Sink, fingerprint};
-use crate::recording::quality::quality;
+use super::traced::{TraceData, TraceError, prepare_traces};
+use crate::journal::{CheckpointSink, NullSink, fingerprint};
+use crate::recording::quality::measure_quality;
 use crate::recording::{FrameGrid, Recording, Traces};
-use crate::simulate::drive::HeadError;
+use crate::simulate::drive::HeadMotionError;
 use crate::simulate::scene::{Scene, SceneError};
 use crate::twin::Camera;
 use serde::Serialize;
@@ -26,14 +26,14 @@ const MOST_FRAMES: f64 = 1e6;
 
 /// A recording with what its frames do not say.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Measured {
+pub struct MeasuredRecording {
     /// The recording.
     pub recording: Recording,
     /// Time for which the shutter was open, s; `None` where it is unknown, which counts as an instant.
     pub exposure_s: Option<f64>,
 }
 
-impl From<Recording> for Measured {
+impl From<Recording> for MeasuredRecording {
     fn from(recording: Recording) -> Self {
         Self { recording, exposure_s: None }
     }
@@ -95,7 +95,7 @@ pub enum ProblemError {
     Trace(#[from] TraceError),
     /// Constants or parameters cannot be freed as the job wants it.
     #[error(transparent)]
-    Constants(#[from] ConstantsError),
+    Constants(#[from] NuisanceError),
     /// A scene refuses a bound of a free parameter.
     #[error("bounds of `{name}`: {problem}")]
     Bounds {
@@ -111,9 +111,9 @@ pub struct Problem {
     job: Job,
     model: SceneModel,
     recordings: Vec<Option<Recording>>,
-    traces: Vec<Traced>,
+    traces: Vec<TraceData>,
     segment_s: Vec<f64>,
-    constants: Vec<Freed>,
+    constants: Vec<FreedConstant>,
     fingerprint: String,
 }
 
@@ -125,7 +125,7 @@ impl Problem {
     ///
     /// # Errors
     /// [`ProblemError`] at the first that does not fit.
-    pub fn new(job: Job, scenes: Vec<Scene>, measured: Vec<Measured>) -> Result<Self, ProblemError> {
+    pub fn new(job: Job, scenes: Vec<Scene>, measured: Vec<MeasuredRecording>) -> Result<Self, ProblemError> {
         let (found, expected) = (scenes.len(), job.conditions.len());
         if found != expected {
             return Err(ProblemError::Scenes { found, expected });
@@ -135,34 +135,35 @@ impl Problem {
             return Err(ProblemError::Recordings { found, expected });
         }
         let mut measured = measured.into_iter();
-        let measured: Vec<Option<Measured>> = job
+        let measured: Vec<Option<MeasuredRecording>> = job
             .conditions
             .iter()
             .map(|condition| condition.recording.as_ref().and_then(|_| measured.next()))
             .collect();
         let scenes: Vec<Scene> = (0..scenes.len())
-            .map(|at| checked(&job, at, &scenes[at], measured[at].as_ref()))
+            .map(|at| check_scene(&job, at, &scenes[at], measured[at].as_ref()))
             .collect::<Result<_, _>>()?;
         let mut filmed = scenes.iter().zip(&measured).zip(&job.conditions);
         filmed.try_for_each(|((scene, measured), condition)| {
             check_frames(&job, &condition.name, scene, measured.as_ref())
         })?;
-        let constants = freed(&job, &scenes)?;
+        let constants = free_constants(&job, &scenes)?;
         check_scaling(&job, &scenes)?;
-        let fingerprint = fingerprint(&Content {
+        let fingerprint = fingerprint(&ProblemIdentity {
             version: env!("CARGO_PKG_VERSION"),
-            job: job.content(),
+            job: job.identity(),
             scenes: &scenes,
             recordings: measured.iter().map(|measured| measured.as_ref().map(Into::into)).collect(),
         });
         let recordings: Vec<Option<Recording>> =
             measured.iter().map(|measured| Some(measured.as_ref()?.recording.clone())).collect();
-        let (traces, segment_s) = traced(&job, &scenes, &recordings)?;
-        let conditions = scenes
-            .into_iter()
-            .zip(&measured)
-            .map(|(scene, measured)| Condition { scene, instrument: instrument(&job, measured.as_ref()) });
-        let plausible = Plausible { spread: job.ensemble.spread, largest_tilt_rad: job.largest_tilt_rad };
+        let (traces, segment_s) = prepare_traces(&job, &scenes, &recordings)?;
+        let conditions = scenes.into_iter().zip(&measured).map(|(scene, measured)| ModelCondition {
+            scene,
+            instrument: recording_instrument(&job, measured.as_ref()),
+        });
+        let plausible =
+            PlausibilityLimits { spread: job.ensemble.spread, largest_tilt_rad: job.largest_tilt_rad };
         let model = SceneModel::new(conditions.collect(), job.parameter_names(), plausible);
         Ok(Self { job, model, recordings, traces, segment_s, constants, fingerprint })
     }
@@ -187,7 +188,7 @@ impl Problem {
 
     /// The traces that are fitted; none in a job on features alone.
     #[must_use]
-    pub fn traces(&self) -> &[Traced] {
+    pub fn traces(&self) -> &[TraceData] {
         &self.traces
     }
 
@@ -199,26 +200,26 @@ impl Problem {
 
     /// Constants of the scenes that are freed within priors.
     #[must_use]
-    pub fn constants(&self) -> &[Freed] {
+    pub fn constants(&self) -> &[FreedConstant] {
         &self.constants
     }
 
     /// The model of the traces that are fitted; `None` in a job on features alone.
     ///
     /// # Errors
-    /// [`HeadError`] where the head that drives a model is not tracked.
-    pub fn trace_model(&self) -> Option<Result<TraceModel, HeadError>> {
+    /// [`HeadMotionError`] where the head that drives a model is not tracked.
+    pub fn trace_model(&self) -> Option<Result<TraceModel, HeadMotionError>> {
         if self.traces.is_empty() {
             return None;
         }
-        let sources: Vec<Source<'_>> = self
+        let sources: Vec<TraceSource<'_>> = self
             .traces
             .iter()
             .filter_map(|traced| {
                 let condition = &self.model.conditions()[traced.condition];
                 let recording = self.recordings[traced.condition].as_ref()?;
                 let exposure_s = condition.instrument.camera.exposure_s;
-                Some(Source { scene: &condition.scene, recording, exposure_s, traced })
+                Some(TraceSource { scene: &condition.scene, recording, exposure_s, traced })
             })
             .collect();
         Some(TraceModel::new(&sources, &self.job.parameters, &self.constants))
@@ -234,36 +235,40 @@ impl Problem {
 
     /// A run of the whole job from the start.
     #[must_use]
-    pub fn context(&self) -> Context<'_> {
-        Context { fingerprint: &self.fingerprint, version: env!("CARGO_PKG_VERSION"), ..Context::default() }
+    pub fn new_context(&self) -> FitContext<'_> {
+        FitContext {
+            fingerprint: &self.fingerprint,
+            version: env!("CARGO_PKG_VERSION"),
+            ..FitContext::default()
+        }
     }
 
     /// Fits the job within its budgets; keeps no journal.
     ///
     /// # Errors
-    /// As [`fit`].
+    /// As [`fit_features`].
     pub fn fit(&self) -> Result<FitResult, FitError> {
-        self.fit_with(&self.context(), &mut Discard, &mut |_: &Progress| ControlFlow::Continue(()))
+        self.fit_with(&self.new_context(), &mut NullSink, &mut |_: &FitProgress| ControlFlow::Continue(()))
     }
 
     /// Fits with at most `evaluations` of the model; keeps no journal.
     ///
     /// # Errors
-    /// As [`fit`].
+    /// As [`fit_features`].
     pub fn fit_within(&self, evaluations: usize) -> Result<FitResult, FitError> {
-        let context = Context { max_evaluations: Some(evaluations), ..self.context() };
-        self.fit_with(&context, &mut Discard, &mut |_: &Progress| ControlFlow::Continue(()))
+        let context = FitContext { max_evaluations: Some(evaluations), ..self.new_context() };
+        self.fit_with(&context, &mut NullSink, &mut |_: &FitProgress| ControlFlow::Continue(()))
     }
 
-    /// Fits the job as the context says (start from [`Self::context`]), with a journal, and tells of every
+    /// Fits the job as the context says (start from [`Self::new_context`]), with a journal, and tells of every
     /// evaluation.
     ///
     /// # Errors
-    /// As [`fit`].
+    /// As [`fit_features`].
     pub fn fit_with(
         &self,
-        context: &Context,
-        journal: &mut dyn Sink,
+        context: &FitContext,
+        journal: &mut dyn CheckpointSink,
         on_progress: &mut OnProgress,
     ) -> Result<FitResult, FitError> {
         if !self.traces.is_empty() {
@@ -274,26 +279,31 @@ impl Problem {
             let mut flow = |now: &TraceProgress| on_progress(&(*now).into());
             return self.fit_traces(None, context.max_evaluations, journal, &mut flow);
         }
-        fit(&self.job, &self.recordings, &self.model, context, journal, on_progress)
+        fit_features(&self.job, &self.recordings, &self.model, context, journal, on_progress)
     }
 }
 
 /// The scene of condition `at` with its drive and what it sets; both bounds of every free parameter are tried
 /// on it.
-fn checked(job: &Job, at: usize, scene: &Scene, measured: Option<&Measured>) -> Result<Scene, ProblemError> {
+fn check_scene(
+    job: &Job,
+    at: usize,
+    scene: &Scene,
+    measured: Option<&MeasuredRecording>,
+) -> Result<Scene, ProblemError> {
     let condition = &job.conditions[at];
     let scene = match (condition.head, measured) {
-        (Head::Recording, Some(measured)) => {
+        (HeadSource::Recording, Some(measured)) => {
             let refused = |problem| ProblemError::Drive {
                 condition: condition.name.clone(),
                 problem: Box::new(problem),
             };
-            scene.driven_by(&measured.recording).map_err(refused)?
+            scene.drive_by_recording(&measured.recording).map_err(refused)?
         }
         _ => scene.clone(),
     };
     let set = |scene: Scene, (name, value): &(String, f64)| {
-        scene.with(name, *value).map_err(|problem| ProblemError::Set {
+        scene.with_parameter(name, *value).map_err(|problem| ProblemError::Set {
             condition: condition.name.clone(),
             name: name.clone(),
             problem: Box::new(problem),
@@ -303,7 +313,7 @@ fn checked(job: &Job, at: usize, scene: &Scene, measured: Option<&Measured>) -> 
     for FreeParameter { name, bounds, .. } in &job.parameters {
         for end in [bounds.lower(), bounds.upper()] {
             scene
-                .with(name, end)
+                .with_parameter(name, end)
                 .map_err(|problem| ProblemError::Bounds { name: name.clone(), problem: Box::new(problem) })?;
         }
     }
@@ -314,7 +324,7 @@ fn check_frames(
     job: &Job,
     condition: &str,
     scene: &Scene,
-    measured: Option<&Measured>,
+    measured: Option<&MeasuredRecording>,
 ) -> Result<(), ProblemError> {
     let of_recording = measured.map(|measured| measured.recording.grid().frame_rate_hz);
     let own = || job.camera.map_or(0.0, |camera| camera.frame_rate_hz);
@@ -327,14 +337,14 @@ fn check_frames(
 }
 
 /// Camera and tracking noise of a recording, or the job's own camera without noise.
-fn instrument(job: &Job, measured: Option<&Measured>) -> Instrument {
-    let Some(Measured { recording, exposure_s }) = measured else {
+fn recording_instrument(job: &Job, measured: Option<&MeasuredRecording>) -> Instrument {
+    let Some(MeasuredRecording { recording, exposure_s }) = measured else {
         let camera = job.camera.unwrap_or(Camera { frame_rate_hz: 0.0, exposure_s: 0.0 });
         return Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 };
     };
     let frame_rate_hz = recording.grid().frame_rate_hz;
     let camera = Camera { frame_rate_hz, exposure_s: exposure_s.unwrap_or(0.0) };
-    let quality = quality(recording, *exposure_s);
+    let quality = measure_quality(recording, *exposure_s);
     // a point is lost independently of the other: the deflection misses either
     let dropout_fraction = 0.5 * quality.missing_deflection_frames as f64 / quality.frames.max(1) as f64;
     // the head moves most smoothly, so its noise is estimated best
@@ -343,23 +353,23 @@ fn instrument(job: &Job, measured: Option<&Measured>) -> Instrument {
 
 /// What decides the cost of a point.
 #[derive(Serialize)]
-struct Content<'a> {
+struct ProblemIdentity<'a> {
     version: &'static str,
-    job: job::Content<'a>,
+    job: job::JobIdentity<'a>,
     scenes: &'a [Scene],
-    recordings: Vec<Option<RecordingContent<'a>>>,
+    recordings: Vec<Option<RecordingIdentity<'a>>>,
 }
 
 #[derive(Serialize)]
-struct RecordingContent<'a> {
+struct RecordingIdentity<'a> {
     grid: FrameGrid,
     traces: &'a Traces,
     exposure_s: Option<f64>,
     synthetic: bool,
 }
 
-impl<'a> From<&'a Measured> for RecordingContent<'a> {
-    fn from(Measured { recording, exposure_s }: &'a Measured) -> Self {
+impl<'a> From<&'a MeasuredRecording> for RecordingIdentity<'a> {
+    fn from(MeasuredRecording { recording, exposure_s }: &'a MeasuredRecording) -> Self {
         let (grid, traces) = (recording.grid(), recording.traces());
         Self { grid, traces, exposure_s: *exposure_s, synthetic: recording.is_synthetic() }
     }
@@ -378,7 +388,7 @@ mod tests {
         let job = Job::parse("job.toml", job).unwrap();
         let recording = read_recording("twin", "trace.csv", TRACE, None).unwrap();
         let scene = Scene::parse("scene.toml", scene).unwrap();
-        Problem::new(job, vec![scene], vec![Measured { recording, exposure_s }])
+        Problem::new(job, vec![scene], vec![MeasuredRecording { recording, exposure_s }])
     }
 
     #[test]
@@ -418,8 +428,11 @@ mod tests {
         let whole = made("", "").unwrap();
         let [trace] = whole.traces() else { panic!() };
         assert_eq!(trace.channels, [job::TraceChannel::TipX, job::TraceChannel::HeadDrop]);
-        assert_eq!((trace.head, trace.frames.start), (job::Head::Recording, 0));
-        assert_eq!((whole.segment_s(), whole.constants()), (&crate::fit::traced::SEGMENT_S[..], &[][..]));
+        assert_eq!((trace.head, trace.frames.start), (job::HeadSource::Recording, 0));
+        assert_eq!(
+            (whole.segment_s(), whole.constants()),
+            (&crate::fit::traced::DEFAULT_SEGMENT_S[..], &[][..])
+        );
         let refused = |trace: &str| made("", trace).err().unwrap().to_string();
         let short = refused("segment_s = [1e-4]");
         assert!(short.starts_with("trace 1, `segment_s`: found 0.0001 s, which is "), "{short}");
@@ -448,7 +461,7 @@ mod tests {
     fn all_masses_and_forces_at_once_are_refused() {
         let scene = Scene::parse("scene.toml", SCENE).unwrap();
         let heavy = |name: &str| {
-            crate::blade::parameters::find(name)
+            crate::blade::parameters::find_parameter(name)
                 .is_some_and(|p| p.unit.starts_with("kg") || p.unit.starts_with('N'))
         };
         let block = |(name, value): (&str, f64)| {
@@ -459,7 +472,7 @@ mod tests {
             )
         };
         let free: Vec<String> =
-            scene.written().filter(|(name, value)| *value != 0.0 && heavy(name)).map(block).collect();
+            scene.written_values().filter(|(name, value)| *value != 0.0 && heavy(name)).map(block).collect();
         let job = |free: &[String]| {
             let head = "format = 1\ntitle = \"t\"\nscene = \"s\"\nseed = 1\n[[recording]]\npath = \"r\"\n";
             format!("{head}{}[[trace]]\n", free.concat())
@@ -467,7 +480,7 @@ mod tests {
         let refused = problem(&job(&free), SCENE, None).err().unwrap().to_string();
         assert!(refused.contains("multiplied by one factor"), "{refused}");
         assert!(problem(&job(&free[1..]), SCENE, None).is_ok(), "one that is held gives the size");
-        let value = scene.written().find(|(name, value)| *value != 0.0 && heavy(name)).unwrap().1;
+        let value = scene.written_values().find(|(name, value)| *value != 0.0 && heavy(name)).unwrap().1;
         let mut held = free.clone();
         held[0] += &format!("prior = {{ mean = {value}, sd_relative = 0.05 }}\n");
         assert!(problem(&job(&held), SCENE, None).is_ok(), "so does a prior");

@@ -4,21 +4,21 @@ mod belongs;
 mod findings;
 mod seal;
 
-pub(super) use findings::{Findings, Shown, camera_nuisances, predicted};
+pub(super) use findings::{FitFindings, ModelledTargets, camera_nuisance_results, predicted_feature_result};
 
 use super::failure::FailureReason;
-use super::gate::Gate;
-use super::information::Combination;
+use super::gate::Identifiability;
+use super::information::ParameterCombination;
 use super::job::{FreeParameter, Job};
-use super::misfit::{Misfit, far_from_priors};
-use super::uncertainty::Verdict;
+use super::misfit::{TraceMisfit, far_from_priors};
+use super::uncertainty::ParameterVerdict;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// How a fit ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Status {
+pub enum FitStatus {
     /// A restarted search gained nothing.
     Converged,
     /// The evaluations allowed were used up first.
@@ -29,10 +29,10 @@ pub enum Status {
     Failed,
 }
 
-impl Status {
+impl FitStatus {
     /// The word in files and summaries.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Converged => "converged",
             Self::BudgetExhausted => "budget-exhausted",
@@ -52,7 +52,7 @@ pub struct ParameterResult {
     /// Upper end of the 95 % interval, the widest of those below; `None` where the features give none.
     pub upper_95: Option<f64>,
     /// What is known of it.
-    pub verdict: Verdict,
+    pub verdict: ParameterVerdict,
     /// Ends by the linear model at the estimates, where it determines the parameter.
     pub linear_95: Option<[f64; 2]>,
     /// Where the profile of the cost crosses the threshold, below and above; `None` where it does not within
@@ -116,7 +116,7 @@ pub struct StartState {
 
 /// A peak that a component was not assigned to.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct RunnerUp {
+pub struct RunnerUpPeak {
     /// Its frequency, Hz.
     pub frequency_hz: f64,
     /// By how much it is weaker than the strongest peak of the band, dB.
@@ -125,7 +125,7 @@ pub struct RunnerUp {
 
 /// A local search, as one step of the waterfall of optima.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Optimum {
+pub struct LocalOptimum {
     /// Cost where it started.
     pub start_cost: f64,
     /// Cost where it ended.
@@ -169,7 +169,7 @@ pub struct ComponentResult {
     pub below_db: Option<f64>,
     /// The model's peak that would be assigned next.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub runner_up: Option<RunnerUp>,
+    pub runner_up: Option<RunnerUpPeak>,
     /// Standard deviation over twins of the best model, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub twin_sd_hz: Option<f64>,
@@ -219,14 +219,14 @@ pub struct FeatureResult {
 impl FeatureResult {
     /// The model's value, as its camera shows it where that is estimated.
     #[must_use]
-    pub fn shown(&self) -> Option<f64> {
+    pub fn value_seen(&self) -> Option<f64> {
         self.model_seen.or(self.model)
     }
 }
 
 /// Evaluations of the model.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub struct Evaluations {
+pub struct EvaluationCounts {
     /// All of them, replayed ones included.
     pub total: usize,
     /// Those that failed, counted by reason.
@@ -239,10 +239,10 @@ pub struct FitResult {
     /// Title of the job.
     pub title: String,
     /// How it ended.
-    pub status: Status,
+    pub status: FitStatus,
     /// How well the model explains the traces; `None` in a fit of features alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub misfit: Option<Misfit>,
+    pub misfit: Option<TraceMisfit>,
     /// By name, as in the scene with its table.
     pub parameters: BTreeMap<String, ParameterResult>,
     /// What was estimated of the cameras, and the constants that were freed.
@@ -262,7 +262,7 @@ pub struct FitResult {
     /// Largest singular value of the sensitivities over the smallest; `None` where one is zero.
     pub condition: Option<f64>,
     /// Products of powers of the parameters that the features determine or leave open.
-    pub combinations: Vec<Combination>,
+    pub combinations: Vec<ParameterCombination>,
     /// Correlations of the estimates by the linear model; none for a parameter that it does not determine.
     pub correlations: BTreeMap<String, BTreeMap<String, f64>>,
     /// Sum of squared residuals at the estimates, linear beyond `KNEE` (3 standard deviations).
@@ -272,14 +272,14 @@ pub struct FitResult {
     /// Twins of the best model that were fitted again.
     pub twins: usize,
     /// What was known before the search.
-    pub gate: Gate,
+    pub gate: Identifiability,
     /// Where the local searches ended, the lowest cost first.
-    pub waterfall: Vec<Optimum>,
+    pub waterfall: Vec<LocalOptimum>,
     /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` where there is
     /// none.
     pub sensitivities: BTreeMap<String, BTreeMap<String, Option<f64>>>,
     /// Evaluations of the model.
-    pub evaluations: Evaluations,
+    pub evaluations: EvaluationCounts,
     /// Whether a recording that was fitted is synthetic.
     pub synthetic: bool,
     /// What a reader has to know, in sentences.
@@ -307,7 +307,7 @@ impl FitResult {
     #[must_use]
     pub fn to_json(&self) -> String {
         // string keys only and `null` for numbers that are not finite: the writer has nothing to refuse
-        seal::sealed(&serde_json::to_string_pretty(self).unwrap_or_default())
+        seal::append_hash(&serde_json::to_string_pretty(self).unwrap_or_default())
     }
 
     /// Reads a `result.json`; `file` is its name in refusals.
@@ -317,27 +317,27 @@ impl FitResult {
     pub fn parse(file: &str, text: &str) -> Result<Self, ResultError> {
         let refused = |problem| ResultError { file: file.to_owned(), problem };
         let result = serde_json::from_str(text).map_err(|e| refused(e.to_string()))?;
-        seal::check(text).map_err(refused)?;
+        seal::check_hash(text).map_err(refused)?;
         Ok(result)
     }
 
     /// Estimates of the job's parameters, in their order.
     #[must_use]
-    pub fn values(&self, job: &Job) -> Vec<f64> {
+    pub fn parameter_estimates(&self, job: &Job) -> Vec<f64> {
         let estimate = |p: &FreeParameter| self.parameters.get(&p.name).map_or(f64::NAN, |p| p.estimate);
         job.parameters.iter().map(estimate).collect()
     }
 
     /// Whether every component is within its tolerance.
     #[must_use]
-    pub fn passes(&self) -> bool {
+    pub fn components_pass(&self) -> bool {
         self.components.iter().all(|component| component.pass)
     }
 
     /// Whether the model explains the recordings. Features alone speak against it where they need a camera
     /// that is far from its prior.
     #[must_use]
-    pub fn explains(&self) -> bool {
+    pub fn explains_recordings(&self) -> bool {
         match &self.misfit {
             Some(misfit) => misfit.explained,
             None => far_from_priors(&self.nuisances).is_empty(),
@@ -362,12 +362,12 @@ mod tests {
             reasons: Vec::new(),
         };
         let parameters = [
-            ("friction.c", parameter(0.5, Verdict::OpenAbove)),
-            ("friction.a", parameter(0.75, Verdict::AtBound)),
+            ("friction.c", parameter(0.5, ParameterVerdict::OpenAbove)),
+            ("friction.a", parameter(0.75, ParameterVerdict::AtBound)),
         ];
         FitResult {
             title: "t".to_owned(),
-            status: Status::BudgetExhausted,
+            status: FitStatus::BudgetExhausted,
             misfit: None,
             nuisances: vec![],
             starts: vec![],
@@ -396,12 +396,12 @@ mod tests {
             cost: 2.5,
             threshold: 3.84,
             twins: 0,
-            gate: Gate::default(),
+            gate: Identifiability::default(),
             waterfall: vec![],
             sensitivities: BTreeMap::new(),
-            evaluations: Evaluations {
+            evaluations: EvaluationCounts {
                 total: 7,
-                failed: BTreeMap::from([(FailureReason::Ended(crate::simulate::Status::Jammed), 2)]),
+                failed: BTreeMap::from([(FailureReason::Ended(crate::simulate::RunStatus::Jammed), 2)]),
             },
             synthetic: true,
             notes: vec!["n".to_owned()],
@@ -424,7 +424,7 @@ mod tests {
         );
         assert_eq!(value["evaluations"], serde_json::json!({"total": 7, "failed": {"jammed": 2}}));
         assert!(text.find("friction.a").unwrap() < text.find("friction.c").unwrap());
-        assert!(!sample().passes());
+        assert!(!sample().components_pass());
     }
 
     #[test]

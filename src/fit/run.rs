@@ -1,38 +1,38 @@
 //! One run of a fit, from the targets to the result.
 
-use super::advice::advice;
-use super::axis::Axis;
-use super::context::Context;
+use super::advice::advise_measurements;
+use super::axis::SearchAxis;
+use super::context::FitContext;
 use super::error::FitError;
 use super::evaluation::Evaluation;
-use super::gate::{Gate, GateError, gate};
-use super::job::{Aim, FreeParameter, Job};
-use super::journal::{Aimed, Body, Entry, Header, Parameter};
-use super::ledger::{Ledger, OnProgress, Stop};
-use super::misfit::{far_from_priors, unexplained};
+use super::gate::{Identifiability, IdentifiabilityError, assess_identifiability};
+use super::job::{FitTarget, FreeParameter, Job};
+use super::journal::{EvaluationRecord, FeatureHeader, FeatureHeaderBody, HeaderFeature, HeaderParameter};
+use super::ledger::{Ledger, OnProgress, StopReason};
+use super::misfit::{far_from_priors, unexplained_headline};
 use super::model::{Draw, Model};
 use super::model_features::ModelFeatures;
 use super::objective::Objective;
 use super::recheck;
-use super::result::{Findings, FitResult, Status, camera_nuisances};
-use super::search::{self, Ended, Searched};
+use super::result::{FitFindings, FitResult, FitStatus, camera_nuisance_results};
+use super::search::{self, SearchOutcome, SearchTermination};
 use super::settled::start_notes;
-use super::target::Target;
-use super::targets::targets;
-use super::uncertainty::{self, Uncertainty, Weighed};
+use super::target::TargetValue;
+use super::targets::measure_targets;
+use super::uncertainty::{self, FeatureWeights, FitUncertainty};
 use crate::blade::parameters;
-use crate::feature::{Feature, Unit, Value};
-use crate::journal::Sink;
+use crate::feature::{Feature, FeatureUnit, FeatureValue};
+use crate::journal::CheckpointSink;
 use crate::recording::Recording;
 use std::cell::OnceCell;
 
 /// What is wrong with a job before anything runs, in sentences.
 #[must_use]
-pub fn warnings(job: &Job) -> Vec<String> {
+pub fn job_warnings(job: &Job) -> Vec<String> {
     if !job.traces.is_empty() {
         return Vec::new(); // every frame counts
     }
-    uncertainty::count_warning(job.aims.len(), None, job.parameters.len()).into_iter().collect()
+    uncertainty::count_warning(job.targets.len(), None, job.parameters.len()).into_iter().collect()
 }
 
 /// Fits the job's parameters: `measured` has a recording for each condition that has one, `model` shows what
@@ -45,20 +45,20 @@ pub fn warnings(job: &Job) -> Vec<String> {
 ///
 /// # Errors
 /// [`FitError`]; a search that stops early or does not converge is a result and says so.
-pub fn fit(
+pub fn fit_features(
     job: &Job,
     measured: &[Option<Recording>],
     model: &dyn Model,
-    context: &Context,
-    journal: &mut dyn Sink,
+    context: &FitContext,
+    journal: &mut dyn CheckpointSink,
     on_progress: &mut OnProgress,
 ) -> Result<FitResult, FitError> {
-    let all = targets(job, measured)?;
+    let all = measure_targets(job, measured)?;
     let (fitted, held): (Vec<_>, Vec<_>) =
-        job.aims.iter().cloned().zip(all).partition(|(aim, _)| !aim.held_out);
-    let (aims, targets): (Vec<Aim>, Vec<Target>) = fitted.into_iter().unzip();
+        job.targets.iter().cloned().zip(all).partition(|(aim, _)| !aim.held_out);
+    let (aims, targets): (Vec<FitTarget>, Vec<TargetValue>) = fitted.into_iter().unzip();
     let names = job.parameter_names();
-    let header = header(job, &aims, &targets, context);
+    let header = checkpoint_header(job, &aims, &targets, context);
     context.check_resumable(&header)?;
     let wanted: Vec<Feature> = aims.iter().map(|aim| aim.feature.clone()).collect();
     let seen = ModelFeatures::new(
@@ -67,44 +67,46 @@ pub fn fit(
         targets.iter().map(|target| target.value).collect(),
         job.ensemble.members,
     );
-    let objective = Objective::new(job.parameters.iter().map(axis).collect(), targets, &seen);
-    recheck::some(&objective, context, job.search.seed)?;
+    let objective = Objective::new(job.parameters.iter().map(search_axis).collect(), targets, &seen);
+    recheck::recheck_sample(&objective, context, job.search.seed)?;
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
     let (rough, local) = (OnceCell::new(), OnceCell::new());
-    let mut ledger = Ledger::new(&objective, context.journaled(), journal, on_progress, allowed);
-    ledger.hold();
-    let gate = passed(&mut ledger, job, model)?;
-    ledger.reprice(rough.get_or_init(|| objective.with_scatter(&gate.scatter)));
-    ledger.release(&context.opening(&header)).map_err(|problem| FitError::JournalWrite { problem })?;
-    let searched = if ledger.stopped().is_some() || ledger.remaining() == 0 {
-        Searched { ended: Ended::Stopped(Stop::Budget), descents: Vec::new() }
+    let mut ledger = Ledger::new(&objective, context.stored_records(), journal, on_progress, allowed);
+    ledger.hold_lines();
+    let gate = check_identifiability(&mut ledger, job, model)?;
+    ledger.change_objective(rough.get_or_init(|| objective.with_feature_scatter(&gate.scatter)));
+    ledger
+        .release_lines(&context.opening_lines(&header))
+        .map_err(|problem| FitError::JournalWrite { problem })?;
+    let searched = if ledger.stop_reason().is_some() || ledger.remaining_evaluations() == 0 {
+        SearchOutcome { termination: SearchTermination::Stopped(StopReason::Budget), descents: Vec::new() }
     } else {
-        search::search(&mut ledger, names.len(), &job.search, search_allowance(allowed, names.len()))
+        search::search_minimum(&mut ledger, names.len(), &job.search, search_allowance(allowed, names.len()))
     };
     ledger.set_limit(allowed);
-    let weighed = uncertainty::weighed(&mut ledger);
+    let weighed = uncertainty::weigh_features(&mut ledger);
     if let Some(weighed) = &weighed {
-        ledger.reprice(local.get_or_init(|| objective.with_scatter(&weighed.scatter)));
+        ledger.change_objective(local.get_or_init(|| objective.with_feature_scatter(&weighed.scatter)));
     }
-    let found = uncertainty::at_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations);
-    let settled = searched.ended == Ended::Converged;
+    let found = uncertainty::assess_best(&mut ledger, &names, &job.intervals, job.search.local_evaluations);
+    let settled = searched.termination == SearchTermination::Converged;
     let found = found.map(|found| match settled && found.best.failure.is_none() {
-        true => uncertainty::confirmed(&mut ledger, &names, (&job.search, &job.intervals), found),
+        true => uncertainty::confirm_identified(&mut ledger, &names, (&job.search, &job.intervals), found),
         false => found,
     });
-    let found = found.map(|found| qualified(found, weighed.as_ref(), &ledger, &searched));
-    if let Some(Stop::Journal(problem)) = ledger.stopped() {
+    let found = found.map(|found| add_reservations(found, weighed.as_ref(), &ledger, &searched));
+    if let Some(StopReason::Journal(problem)) = ledger.stop_reason() {
         return Err(FitError::JournalWrite { problem: problem.clone() });
     }
     let Some(found) = found else { return Err(FitError::NoEvaluation { allowed }) };
-    let found = started(found, model, job, (&aims, ledger.objective().targets()));
-    let far = far_from_priors(&camera_nuisances(job, &found.cameras));
-    let found = found.barred((!far.is_empty()).then(|| unexplained(&far)));
-    recheck::at(&objective, context, &found.best.unit)?;
-    let held_out = cross_check(held, model, &found.best.values);
-    let status = status(&ledger, &found.best, &searched.ended);
+    let found = add_start_notes(found, model, job, (&aims, ledger.objective().targets()));
+    let far = far_from_priors(&camera_nuisance_results(job, &found.cameras));
+    let found = found.with_model_objection((!far.is_empty()).then(|| unexplained_headline(&far)));
+    recheck::recheck_at(&objective, context, &found.best.unit)?;
+    let held_out = predict_held_out(held, model, &found.best.values);
+    let status = fit_status(&ledger, &found.best, &searched.termination);
     let synthetic = measured.iter().flatten().any(Recording::is_synthetic);
-    let findings = Findings {
+    let findings = FitFindings {
         job,
         aims: &aims,
         targets: ledger.objective().targets(),
@@ -116,28 +118,36 @@ pub fn fit(
         synthetic,
         context,
     };
-    let best_reads = best_reads(&seen, &found.best.values);
+    let best_reads = read_best_model(&seen, &found.best.values);
     Ok(findings.into_result(&ledger, &best_reads))
 }
 
 /// What the gate says; nothing was found where the evaluations did not reach.
-fn passed(ledger: &mut Ledger, job: &Job, model: &dyn Model) -> Result<Gate, FitError> {
-    match gate(ledger, &job.parameter_names()) {
-        Ok((gate, nearest)) => Ok(Gate { advice: advice(job, model, &nearest, &gate.combinations), ..gate }),
-        Err(GateError::CannotBeFitted(why)) => Err(FitError::CannotBeFitted { why }),
-        Err(GateError::Stopped(_)) => {
-            Ok(Gate { scatter: vec![0.0; ledger.objective().targets().len()], ..Gate::default() })
-        }
+fn check_identifiability(
+    ledger: &mut Ledger,
+    job: &Job,
+    model: &dyn Model,
+) -> Result<Identifiability, FitError> {
+    match assess_identifiability(ledger, &job.parameter_names()) {
+        Ok((gate, nearest)) => Ok(Identifiability {
+            advice: advise_measurements(job, model, &nearest, &gate.combinations),
+            ..gate
+        }),
+        Err(IdentifiabilityError::CannotBeFitted(why)) => Err(FitError::CannotBeFitted { why }),
+        Err(IdentifiabilityError::Stopped(_)) => Ok(Identifiability {
+            scatter: vec![0.0; ledger.objective().targets().len()],
+            ..Identifiability::default()
+        }),
     }
 }
 
 /// What was found, with the reservations that the weighing and the other local searches bring.
-fn qualified(
-    mut found: Uncertainty,
-    weighed: Option<&Weighed>,
+fn add_reservations(
+    mut found: FitUncertainty,
+    weighed: Option<&FeatureWeights>,
     ledger: &Ledger,
-    searched: &Searched,
-) -> Uncertainty {
+    searched: &SearchOutcome,
+) -> FitUncertainty {
     let Some(weighed) = weighed.filter(|_| found.best.failure.is_none()) else { return found };
     if weighed.inflation > 1.0 {
         let note = format!(
@@ -149,16 +159,21 @@ fn qualified(
     // the last one polished the best point: it is no other search
     let others = searched.descents.split_last().map_or(&[][..], |(_, others)| others);
     // places are distinguished by the features alone, without deviations that a misfit has widened
-    let plain = ledger.objective().with_scatter(&weighed.roughness);
-    found.doubted(
-        searched.ended == Ended::Converged,
+    let plain = ledger.objective().with_feature_scatter(&weighed.roughness);
+    found.with_search_doubts(
+        searched.termination == SearchTermination::Converged,
         &plain,
         &others.iter().map(|descent| descent.end.clone()).collect::<Vec<_>>(),
     )
 }
 
 /// What was found, with what the start of the scenes does to it.
-fn started(mut found: Uncertainty, model: &dyn Model, job: &Job, fitted: (&[Aim], &[Target])) -> Uncertainty {
+fn add_start_notes(
+    mut found: FitUncertainty,
+    model: &dyn Model,
+    job: &Job,
+    fitted: (&[FitTarget], &[TargetValue]),
+) -> FitUncertainty {
     if found.best.failure.is_none() {
         let names: Vec<String> = job.conditions.iter().map(|condition| condition.name.clone()).collect();
         let said = start_notes(model, &names, fitted, &found.best.values, job.ensemble.members);
@@ -167,24 +182,24 @@ fn started(mut found: Uncertainty, model: &dyn Model, job: &Job, fitted: (&[Aim]
     found
 }
 
-fn status(ledger: &Ledger, best: &Evaluation, ended: &Ended) -> Status {
+fn fit_status(ledger: &Ledger, best: &Evaluation, ended: &SearchTermination) -> FitStatus {
     match ended {
-        _ if best.failure.is_some() => Status::Failed,
-        _ if ledger.stopped().is_some() => Status::Interrupted,
-        Ended::Converged => Status::Converged,
-        Ended::Stopped(_) => Status::BudgetExhausted,
+        _ if best.failure.is_some() => FitStatus::Failed,
+        _ if ledger.stop_reason().is_some() => FitStatus::Interrupted,
+        SearchTermination::Converged => FitStatus::Converged,
+        SearchTermination::Stopped(_) => FitStatus::BudgetExhausted,
     }
 }
 
 /// What the best model shows of the features that were held out.
-pub(super) fn cross_check(
-    held: Vec<(Aim, Target)>,
+pub(super) fn predict_held_out(
+    held: Vec<(FitTarget, TargetValue)>,
     model: &dyn Model,
     values: &[f64],
-) -> Vec<(Aim, Target, Result<f64, String>)> {
-    let predicted = |(aim, target): (Aim, Target)| {
+) -> Vec<(FitTarget, TargetValue, Result<f64, String>)> {
+    let predicted = |(aim, target): (FitTarget, TargetValue)| {
         let seen = ModelFeatures::new(model, std::slice::from_ref(&aim.feature), vec![target.value], 1);
-        let read = seen.read(values, Draw::default()).map_err(|failure| failure.to_string());
+        let read = seen.read_features(values, Draw::default()).map_err(|failure| failure.to_string());
         let read = read.and_then(|mut read| match read.pop() {
             Some(Ok(read)) => Ok(read.value),
             Some(Err(missing)) => Err(missing.to_string()),
@@ -196,8 +211,8 @@ pub(super) fn cross_check(
 }
 
 /// The features of the best model once more, with the peaks that were not assigned.
-pub(super) fn best_reads(seen: &ModelFeatures, values: &[f64]) -> Vec<Option<Value>> {
-    seen.read(values, Draw::default())
+pub(super) fn read_best_model(seen: &ModelFeatures, values: &[f64]) -> Vec<Option<FeatureValue>> {
+    seen.read_features(values, Draw::default())
         .map_or_else(|_| Vec::new(), |read| read.into_iter().map(Result::ok).collect())
 }
 
@@ -208,23 +223,30 @@ fn search_allowance(allowed: usize, parameters: usize) -> usize {
     if allowed >= 2 * sensitivities { allowed - sensitivities } else { allowed }
 }
 
-fn header(job: &Job, aims: &[Aim], targets: &[Target], context: &Context) -> Header {
-    let parameter = |p: &FreeParameter| Parameter {
+fn checkpoint_header(
+    job: &Job,
+    aims: &[FitTarget],
+    targets: &[TargetValue],
+    context: &FitContext,
+) -> FeatureHeader {
+    let parameter = |p: &FreeParameter| HeaderParameter {
         name: p.name.clone(),
-        unit: parameters::find(&p.name).map_or(Unit::PLAIN.name, |known| known.unit).to_owned(),
-        axis: axis(p),
+        unit: parameters::find_parameter(&p.name)
+            .map_or(FeatureUnit::DIMENSIONLESS.name, |known| known.unit)
+            .to_owned(),
+        axis: search_axis(p),
     };
-    let aimed = |(aim, target): (&Aim, &Target)| Aimed {
+    let aimed = |(aim, target): (&FitTarget, &TargetValue)| HeaderFeature {
         name: target.name.clone(),
         unit: aim.feature.reading.unit().name.to_owned(),
         target: target.clone(),
     };
     let parameters = job.parameters.iter().map(parameter).collect();
     let features = aims.iter().zip(targets).map(aimed).collect();
-    let body = Body { seed: job.search.seed, parameters, features };
-    Header::of::<Entry>(context.fingerprint, context.version, body)
+    let body = FeatureHeaderBody { seed: job.search.seed, parameters, features };
+    FeatureHeader::new::<EvaluationRecord>(context.fingerprint, context.version, body)
 }
 
-pub(super) fn axis(parameter: &FreeParameter) -> Axis {
-    Axis { bounds: parameter.bounds, prior: parameter.prior }
+pub(super) fn search_axis(parameter: &FreeParameter) -> SearchAxis {
+    SearchAxis { bounds: parameter.bounds, prior: parameter.prior }
 }

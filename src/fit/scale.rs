@@ -12,7 +12,7 @@ use std::f64::consts::FRAC_PI_2;
 /// How a parameter's range is divided.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
-pub enum Spacing {
+pub enum BoundsSpacing {
     /// Equal ratios take equal lengths; both bounds above 0.
     Log,
     /// Equal differences take equal lengths.
@@ -21,7 +21,7 @@ pub enum Spacing {
 
 /// Why two numbers are not bounds.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
-pub enum ScaleError {
+pub enum BoundsError {
     /// A bound is infinite or not a number.
     #[error("`{key}`: found {found}, expected a finite number")]
     NotFinite {
@@ -55,27 +55,27 @@ pub enum ScaleError {
 pub struct Bounds {
     lower: f64,
     upper: f64,
-    spacing: Spacing,
+    spacing: BoundsSpacing,
 }
 
 impl Bounds {
     /// Checks the bounds.
     ///
     /// # Errors
-    /// [`ScaleError`] when they are not finite, cross or touch, or are logarithmic and not above zero.
-    pub fn new(lower: f64, upper: f64, spacing: Spacing) -> Result<Self, ScaleError> {
+    /// [`BoundsError`] when they are not finite, cross or touch, or are logarithmic and not above zero.
+    pub fn new(lower: f64, upper: f64, spacing: BoundsSpacing) -> Result<Self, BoundsError> {
         for (key, found) in [("lower", lower), ("upper", upper)] {
             if !found.is_finite() {
-                return Err(ScaleError::NotFinite { key, found });
+                return Err(BoundsError::NotFinite { key, found });
             }
         }
-        if spacing == Spacing::Log && lower <= 0.0 {
-            return Err(ScaleError::LogOfNonPositive { lower });
+        if spacing == BoundsSpacing::Log && lower <= 0.0 {
+            return Err(BoundsError::LogOfNonPositive { lower });
         }
         let bounds = Self { lower, upper, spacing };
-        let length = bounds.length();
+        let length = bounds.scaled_length();
         if lower >= upper || !length.is_finite() || length <= 0.0 {
-            return Err(ScaleError::Crossed { lower, upper });
+            return Err(BoundsError::Crossed { lower, upper });
         }
         Ok(bounds)
     }
@@ -94,7 +94,7 @@ impl Bounds {
 
     /// How the range is divided.
     #[must_use]
-    pub fn spacing(&self) -> Spacing {
+    pub fn spacing(&self) -> BoundsSpacing {
         self.spacing
     }
 
@@ -103,10 +103,10 @@ impl Bounds {
     pub fn to_unit(&self, value: f64) -> f64 {
         let value = value.clamp(self.lower, self.upper);
         let along = match self.spacing {
-            Spacing::Log => math::ln(value / self.lower),
-            Spacing::Linear => value - self.lower,
+            BoundsSpacing::Log => math::ln(value / self.lower),
+            BoundsSpacing::Linear => value - self.lower,
         };
-        clamp_unit(along / self.length())
+        clamp_unit(along / self.scaled_length())
     }
 
     /// Value at `unit` (taken into 0 to 1 first); the ends give the bounds exactly.
@@ -120,8 +120,8 @@ impl Bounds {
             return self.upper;
         }
         let value = match self.spacing {
-            Spacing::Log => self.lower * math::exp(unit * self.length()),
-            Spacing::Linear => self.lower + unit * self.length(),
+            BoundsSpacing::Log => self.lower * math::exp(unit * self.scaled_length()),
+            BoundsSpacing::Linear => self.lower + unit * self.scaled_length(),
         };
         value.clamp(self.lower, self.upper)
     }
@@ -130,8 +130,8 @@ impl Bounds {
     #[must_use]
     pub fn slope(&self, unit: f64) -> f64 {
         match self.spacing {
-            Spacing::Log => self.length() * self.from_unit(unit),
-            Spacing::Linear => self.length(),
+            BoundsSpacing::Log => self.scaled_length() * self.from_unit(unit),
+            BoundsSpacing::Linear => self.scaled_length(),
         }
     }
 
@@ -139,18 +139,18 @@ impl Bounds {
     #[must_use]
     pub(crate) fn log_slope(&self, unit: f64) -> Option<f64> {
         match self.spacing {
-            Spacing::Log => Some(self.length()),
-            Spacing::Linear => {
+            BoundsSpacing::Log => Some(self.scaled_length()),
+            BoundsSpacing::Linear => {
                 let value = self.from_unit(unit);
-                (value != 0.0).then(|| self.length() / value)
+                (value != 0.0).then(|| self.scaled_length() / value)
             }
         }
     }
 
-    fn length(&self) -> f64 {
+    fn scaled_length(&self) -> f64 {
         match self.spacing {
-            Spacing::Log => math::ln(self.upper / self.lower),
-            Spacing::Linear => self.upper - self.lower,
+            BoundsSpacing::Log => math::ln(self.upper / self.lower),
+            BoundsSpacing::Linear => self.upper - self.lower,
         }
     }
 }
@@ -185,8 +185,8 @@ mod tests {
 
     #[test]
     fn values_survive_the_round_trip() {
-        let log = Bounds::new(1e-3, 10.0, Spacing::Log).unwrap();
-        let linear = Bounds::new(-2.0, 5.0, Spacing::Linear).unwrap();
+        let log = Bounds::new(1e-3, 10.0, BoundsSpacing::Log).unwrap();
+        let linear = Bounds::new(-2.0, 5.0, BoundsSpacing::Linear).unwrap();
         for step in 0..=1000 {
             let unit = f64::from(step) / 1000.0;
             for bounds in [log, linear] {
@@ -199,12 +199,12 @@ mod tests {
 
     #[test]
     fn the_ends_and_the_middle_are_exact() {
-        let log = Bounds::new(0.01, 100.0, Spacing::Log).unwrap();
+        let log = Bounds::new(0.01, 100.0, BoundsSpacing::Log).unwrap();
         assert_eq!((log.from_unit(0.0), log.from_unit(1.0)), (0.01, 100.0));
         assert!((log.from_unit(0.5) - 1.0).abs() < 1e-15);
         assert_eq!((log.to_unit(0.001), log.to_unit(1e9)), (0.0, 1.0));
         assert_eq!((line_to_unit(unit_to_line(0.0)), line_to_unit(unit_to_line(1.0))), (0.0, 1.0));
-        let linear = Bounds::new(-1.0, 3.0, Spacing::Linear).unwrap();
+        let linear = Bounds::new(-1.0, 3.0, BoundsSpacing::Linear).unwrap();
         assert_eq!(linear.from_unit(0.5), 1.0);
     }
 
@@ -218,8 +218,8 @@ mod tests {
 
     #[test]
     fn slopes_are_those_of_the_transform() {
-        let log = Bounds::new(1.0, 4.0, Spacing::Log).unwrap();
-        let linear = Bounds::new(-1.0, 1.0, Spacing::Linear).unwrap();
+        let log = Bounds::new(1.0, 4.0, BoundsSpacing::Log).unwrap();
+        let linear = Bounds::new(-1.0, 1.0, BoundsSpacing::Linear).unwrap();
         assert_eq!(log.log_slope(0.3), Some(4.0_f64.ln()));
         assert_eq!((linear.log_slope(1.0), linear.log_slope(0.5)), (Some(2.0), None));
         assert_eq!((log.slope(0.5), linear.slope(0.5)), (2.0 * 4.0_f64.ln(), 2.0));
@@ -228,13 +228,13 @@ mod tests {
     #[test]
     fn bad_bounds_are_refused() {
         let refused = |lower, upper, spacing| Bounds::new(lower, upper, spacing).unwrap_err();
-        assert!(matches!(refused(1.0, 1.0, Spacing::Linear), ScaleError::Crossed { .. }));
-        assert!(matches!(refused(2.0, 1.0, Spacing::Log), ScaleError::Crossed { .. }));
-        assert!(matches!(refused(0.0, 1.0, Spacing::Log), ScaleError::LogOfNonPositive { .. }));
-        assert!(matches!(refused(-f64::MAX, f64::MAX, Spacing::Linear), ScaleError::Crossed { .. }));
+        assert!(matches!(refused(1.0, 1.0, BoundsSpacing::Linear), BoundsError::Crossed { .. }));
+        assert!(matches!(refused(2.0, 1.0, BoundsSpacing::Log), BoundsError::Crossed { .. }));
+        assert!(matches!(refused(0.0, 1.0, BoundsSpacing::Log), BoundsError::LogOfNonPositive { .. }));
+        assert!(matches!(refused(-f64::MAX, f64::MAX, BoundsSpacing::Linear), BoundsError::Crossed { .. }));
         assert!(matches!(
-            refused(0.0, f64::INFINITY, Spacing::Linear),
-            ScaleError::NotFinite { key: "upper", .. }
+            refused(0.0, f64::INFINITY, BoundsSpacing::Linear),
+            BoundsError::NotFinite { key: "upper", .. }
         ));
     }
 }

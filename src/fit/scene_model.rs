@@ -3,29 +3,31 @@
 use super::failure::{FailureReason, RunFailure};
 use super::model::{Draw, Model, Restart};
 use crate::blade::Pose;
-use crate::blade::modes::{Tip, modes, time_scales_rad_per_s};
+use crate::blade::modes::{TipConstraint, natural_modes, time_scales_rad_per_s};
 use crate::math::StandardNormal;
 use crate::recording::Recording;
 use crate::simulate::drive::Drive;
-use crate::simulate::equilibrium::steady_slide;
-use crate::simulate::outputs::Tilt;
+use crate::simulate::equilibrium::steady_slip_pose;
+use crate::simulate::outputs::LargestTilt;
 use crate::simulate::scene::{Scene, StartKind};
-use crate::simulate::{Effort, Observer, Run, Status};
-use crate::twin::{Camera, Tracking, View, ViewError, observed_view, track, view};
+use crate::simulate::{Observer, RunResult, RunStatus, SolverOptions};
+use crate::twin::{
+    Camera, TrackingModel, TwinView, TwinViewError, add_tracking_noise, film_scene, film_scene_with_observer,
+};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
 /// Right-hand sides after which an evaluation is given up: some hundred times what a reversal costs, a few
 /// seconds.
-const MOST_EVALUATIONS: u64 = 20_000_000;
+const MAX_EVALUATIONS: u64 = 20_000_000;
 
 /// Tolerance of the model's runs: features are read to about 1e-3, and at 1e-6 the transitions are those of
 /// 1e-8 and finer.
 const TOLERANCE: f64 = 1e-6;
 /// An angle that a spread of starting states refers to where the blade starts upright, rad: blades in use
 /// lean by 0.1 to 1.
-const LEAN: f64 = 0.1;
+const REFERENCE_LEAN_RAD: f64 = 0.1;
 /// Far apart, so that the noise of one condition is not that of another with the next seed.
 const CONDITION_SEEDS: u64 = 1 << 32;
 
@@ -43,7 +45,7 @@ pub struct Instrument {
 
 /// A scene and how it was seen.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Condition {
+pub struct ModelCondition {
     /// The scene, with what this condition sets.
     pub scene: Scene,
     /// How it was seen.
@@ -52,7 +54,7 @@ pub struct Condition {
 
 /// Which blades count.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Plausible {
+pub struct PlausibilityLimits {
     /// Relative spread of the starting states.
     pub spread: f64,
     /// Largest angle of a link from the vertical, rad; `None` for any.
@@ -61,27 +63,27 @@ pub struct Plausible {
 
 /// Scenes whose named parameters a fit may change.
 pub struct SceneModel {
-    conditions: Vec<Condition>,
+    conditions: Vec<ModelCondition>,
     names: Vec<String>,
-    plausible: Plausible,
+    plausible: PlausibilityLimits,
 }
 
 impl SceneModel {
     /// A model of these conditions; `names` are the free parameters in job order.
     #[must_use]
-    pub fn new(conditions: Vec<Condition>, names: Vec<String>, plausible: Plausible) -> Self {
+    pub fn new(conditions: Vec<ModelCondition>, names: Vec<String>, plausible: PlausibilityLimits) -> Self {
         Self { conditions, names, plausible }
     }
 
     /// The same for other conditions.
     #[must_use]
-    pub(super) fn with_conditions(&self, conditions: Vec<Condition>) -> Self {
+    pub(super) fn with_conditions(&self, conditions: Vec<ModelCondition>) -> Self {
         Self { conditions, names: self.names.clone(), plausible: self.plausible }
     }
 
     /// The conditions.
     #[must_use]
-    pub fn conditions(&self) -> &[Condition] {
+    pub fn conditions(&self) -> &[ModelCondition] {
         &self.conditions
     }
 
@@ -91,7 +93,7 @@ impl SceneModel {
     /// The scene's refusal, as a failure of the run.
     pub fn scene_at(&self, values: &[f64], condition: usize) -> Result<Scene, RunFailure> {
         let scene = self.condition(condition)?.scene.clone();
-        let set = |scene: Scene, (name, value): (&String, &f64)| scene.with(name, *value);
+        let set = |scene: Scene, (name, value): (&String, &f64)| scene.with_parameter(name, *value);
         self.names
             .iter()
             .zip(values)
@@ -104,19 +106,25 @@ impl SceneModel {
     ///
     /// # Errors
     /// [`RunFailure`] when fewer than two frames were taken.
-    pub(crate) fn recorded(
+    pub(crate) fn record_scene(
         &self,
         scene: &Scene,
         condition: usize,
         observer: &mut impl Observer,
-    ) -> Result<View, RunFailure> {
+    ) -> Result<TwinView, RunFailure> {
         let (camera, span) =
             (&self.condition(condition)?.instrument.camera, [scene.start_s, scene.run.stop_s]);
-        observed_view(scene, camera, span, Effort::new(scene.run.relative_tolerance), observer)
-            .map_err(|error| blind(scene, &error))
+        film_scene_with_observer(
+            scene,
+            camera,
+            span,
+            SolverOptions::new(scene.run.relative_tolerance),
+            observer,
+        )
+        .map_err(|error| view_failure(scene, &error))
     }
 
-    fn condition(&self, condition: usize) -> Result<&Condition, RunFailure> {
+    fn condition(&self, condition: usize) -> Result<&ModelCondition, RunFailure> {
         self.conditions.get(condition).ok_or_else(|| {
             RunFailure::new(
                 FailureReason::Refused,
@@ -127,26 +135,30 @@ impl SceneModel {
     }
 
     /// A run that ended as it should, recorded from `from_s` on without tracking noise.
-    fn ran(&self, scene: &Scene, camera: &Camera, from_s: f64) -> Result<Recording, RunFailure> {
+    fn record_completed_run(
+        &self,
+        scene: &Scene,
+        camera: &Camera,
+        from_s: f64,
+    ) -> Result<Recording, RunFailure> {
         let span = [from_s, scene.run.stop_s];
         let seen = match self.plausible.largest_tilt_rad {
-            None => {
-                view(scene, camera, span[0], span[1], effort(scene)).map_err(|error| blind(scene, &error))?
-            }
+            None => film_scene(scene, camera, span[0], span[1], solver_effort(scene))
+                .map_err(|error| view_failure(scene, &error))?,
             Some(largest_rad) => {
-                let mut tilt = Tilt::default();
-                let seen = observed_view(scene, camera, span, effort(scene), &mut tilt)
-                    .map_err(|error| blind(scene, &error))?;
-                upright(scene, &tilt, largest_rad)?;
+                let mut tilt = LargestTilt::default();
+                let seen = film_scene_with_observer(scene, camera, span, solver_effort(scene), &mut tilt)
+                    .map_err(|error| view_failure(scene, &error))?;
+                check_tilt(scene, &tilt, largest_rad)?;
                 seen
             }
         };
-        whole(scene, &seen.run)?;
+        check_completed(scene, &seen.run)?;
         Ok(seen.recording)
     }
 
     /// What a camera and its tracking make of a run.
-    fn tracked(
+    fn record_with_noise(
         &self,
         scene: &Scene,
         condition: usize,
@@ -154,25 +166,25 @@ impl SceneModel {
         from_s: f64,
     ) -> Result<Recording, RunFailure> {
         let instrument = &self.condition(condition)?.instrument;
-        let seen = self.ran(scene, &instrument.camera, from_s)?;
+        let seen = self.record_completed_run(scene, &instrument.camera, from_s)?;
         let dropout_fraction = if draw.dropouts { instrument.dropout_fraction } else { 0.0 };
         let seed = draw.noise + condition as u64 * CONDITION_SEEDS;
         let tracking =
-            Tracking { metres_per_pixel: instrument.noise_m, noise_px: 1.0, dropout_fraction, seed };
-        track(&seen, seen.name(), &tracking)
+            TrackingModel { metres_per_pixel: instrument.noise_m, noise_px: 1.0, dropout_fraction, seed };
+        add_tracking_noise(&seen, seen.name(), &tracking)
             .map_err(|error| RunFailure::new(FailureReason::NotFinite, error.to_string(), 1.0))
     }
 
     /// The scene as it starts in a draw.
-    fn started(&self, mut scene: Scene, member: u64) -> Scene {
+    fn draw_start(&self, mut scene: Scene, member: u64) -> Scene {
         if member == 0 || self.plausible.spread == 0.0 {
             return scene;
         }
-        let Some(pose) = own_start(&scene) else { return scene };
+        let Some(pose) = start_pose(&scene) else { return scene };
         let (rate, _) = time_scales_rad_per_s(&scene.linkage);
         let mut generator = Xoshiro256PlusPlus::seed_from_u64(member);
         let mut moved = |lean: f64| {
-            let size = self.plausible.spread * if lean == 0.0 { LEAN } else { lean.abs() };
+            let size = self.plausible.spread * if lean == 0.0 { REFERENCE_LEAN_RAD } else { lean.abs() };
             let (angle, velocity): (f64, f64) =
                 (generator.sample(StandardNormal), generator.sample(StandardNormal));
             (size * angle, size * rate * velocity)
@@ -189,12 +201,17 @@ impl SceneModel {
 }
 
 impl Model for SceneModel {
-    fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure> {
-        let scene = self.started(self.scene_at(values, condition)?, draw.member);
-        self.tracked(&scene, condition, draw, scene.start_s)
+    fn record_condition(
+        &self,
+        values: &[f64],
+        condition: usize,
+        draw: Draw,
+    ) -> Result<Recording, RunFailure> {
+        let scene = self.draw_start(self.scene_at(values, condition)?, draw.member);
+        self.record_with_noise(&scene, condition, draw, scene.start_s)
     }
 
-    fn restarted(
+    fn record_restarted(
         &self,
         values: &[f64],
         condition: usize,
@@ -206,20 +223,20 @@ impl Model for SceneModel {
         match restart {
             Restart::Earlier(lead_s) => scene.start_s -= lead_s,
             Restart::Moved(share) => {
-                if let Some(pose) = own_start(&scene) {
+                if let Some(pose) = start_pose(&scene) {
                     let (theta, phi) = ((1.0 + share) * pose.theta, (1.0 + share) * pose.phi);
                     scene.start = StartKind::State(Pose { theta, phi, ..pose });
                 }
             }
         }
-        let scene = self.started(scene, draw.member);
-        self.tracked(&scene, condition, draw, from_s)
+        let scene = self.draw_start(scene, draw.member);
+        self.record_with_noise(&scene, condition, draw, from_s)
     }
 
     fn decay_s(&self, values: &[f64], condition: usize) -> Option<f64> {
         let scene = self.scene_at(values, condition).ok()?;
         let (blade, length_s) = (&scene.linkage, scene.run.stop_s - scene.start_s);
-        let of_links = modes(blade, Tip::Free, false)
+        let of_links = natural_modes(blade, TipConstraint::Free, false)
             .into_iter()
             .filter_map(|mode| Some(1.0 / (mode.damping_ratio? * TAU * mode.frequency_hz?)));
         let of_head = 2.0 * blade.mass_kg / blade.head.damping;
@@ -227,7 +244,7 @@ impl Model for SceneModel {
         Some(slowest.min(length_s))
     }
 
-    fn most_lead_s(&self, condition: usize) -> f64 {
+    fn max_lead_s(&self, condition: usize) -> f64 {
         match self.conditions.get(condition).map(|condition| &condition.scene) {
             Some(Scene { drive: Drive::Recorded(head), start_s, .. }) => start_s - head.span_s()[0],
             // a blade that starts in the air or in a stated pose is there at that time
@@ -238,10 +255,10 @@ impl Model for SceneModel {
 }
 
 /// The pose in which a scene starts; `None` in the air.
-fn own_start(scene: &Scene) -> Option<Pose> {
+fn start_pose(scene: &Scene) -> Option<Pose> {
     match scene.start {
         StartKind::SteadySlide => {
-            steady_slide(&scene.linkage, scene.drive.at(scene.start_s).velocity_m_per_s)
+            steady_slip_pose(&scene.linkage, scene.drive.motion_at(scene.start_s).velocity_m_per_s)
         }
         StartKind::State(pose) => Some(pose),
         StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
@@ -249,33 +266,38 @@ fn own_start(scene: &Scene) -> Option<Pose> {
     }
 }
 
-fn effort(scene: &Scene) -> Effort {
-    Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(scene.run.relative_tolerance.max(TOLERANCE)) }
+fn solver_effort(scene: &Scene) -> SolverOptions {
+    SolverOptions {
+        most_evaluations: MAX_EVALUATIONS,
+        ..SolverOptions::new(scene.run.relative_tolerance.max(TOLERANCE))
+    }
 }
 
-fn blind(scene: &Scene, error: &ViewError) -> RunFailure {
+fn view_failure(scene: &Scene, error: &TwinViewError) -> RunFailure {
     match error {
-        ViewError::Early { status, stopped_at_s } => {
-            RunFailure::new(FailureReason::Ended(*status), error.to_string(), progress(scene, *stopped_at_s))
-        }
-        ViewError::Recording(_) => RunFailure::new(FailureReason::NotFinite, error.to_string(), 0.0),
+        TwinViewError::Early { status, stopped_at_s } => RunFailure::new(
+            FailureReason::Ended(*status),
+            error.to_string(),
+            run_progress(scene, *stopped_at_s),
+        ),
+        TwinViewError::Recording(_) => RunFailure::new(FailureReason::NotFinite, error.to_string(), 0.0),
     }
 }
 
 /// Share of the run that was reached.
-fn progress(scene: &Scene, time_s: f64) -> f64 {
+fn run_progress(scene: &Scene, time_s: f64) -> f64 {
     (time_s - scene.start_s) / (scene.run.stop_s - scene.start_s)
 }
 
-fn whole(scene: &Scene, run: &Run) -> Result<(), RunFailure> {
-    if run.status == Status::Completed {
+fn check_completed(scene: &Scene, run: &RunResult) -> Result<(), RunFailure> {
+    if run.status == RunStatus::Completed {
         return Ok(());
     }
     let message = format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning());
-    Err(RunFailure::new(FailureReason::Ended(run.status), message, progress(scene, run.stopped_at_s)))
+    Err(RunFailure::new(FailureReason::Ended(run.status), message, run_progress(scene, run.stopped_at_s)))
 }
 
-fn upright(scene: &Scene, tilt: &Tilt, largest_rad: f64) -> Result<(), RunFailure> {
+fn check_tilt(scene: &Scene, tilt: &LargestTilt, largest_rad: f64) -> Result<(), RunFailure> {
     if tilt.largest_rad <= largest_rad {
         return Ok(());
     }
@@ -288,6 +310,6 @@ fn upright(scene: &Scene, tilt: &Tilt, largest_rad: f64) -> Result<(), RunFailur
     Err(RunFailure::new(
         FailureReason::Tilt,
         message,
-        progress(scene, scene.run.stop_s) * largest_rad / tilt.largest_rad,
+        run_progress(scene, scene.run.stop_s) * largest_rad / tilt.largest_rad,
     ))
 }

@@ -18,32 +18,40 @@ mod rules;
 mod simplex;
 mod slab;
 
-pub(super) use elsewhere::{best_in, elsewhere};
-pub use ended::{Descent, Ended, Searched};
-pub use local::polish;
-pub use rules::SPREAD;
-pub(crate) use rules::{EXACT, WORTH};
+pub(super) use elsewhere::{best_in_slab, search_excluded_region};
+pub use ended::{LocalDescent, SearchOutcome, SearchTermination};
+pub use local::polish_best;
+pub use rules::SIMPLEX_COST_SPREAD;
+pub(crate) use rules::{EXACT_COST, MIN_WORTHWHILE_GAIN};
 pub(super) use slab::Slab;
 
-use super::ledger::{Ledger, Stop};
-use super::settings::Settings;
-use clouds::clouds;
-use local::local;
+use super::ledger::{Ledger, StopReason};
+use super::settings::SearchSettings;
+use clouds::search_with_populations;
+use local::search_locally;
 
 /// Searches within the budgets of `settings` and `limit` evaluations in all.
-pub fn search(ledger: &mut Ledger, dimensions: usize, settings: &Settings, limit: usize) -> Searched {
-    let mut searched = Searched { ended: Ended::Stopped(Stop::Budget), descents: Vec::new() };
+pub fn search_minimum(
+    ledger: &mut Ledger,
+    dimensions: usize,
+    settings: &SearchSettings,
+    limit: usize,
+) -> SearchOutcome {
+    let mut searched =
+        SearchOutcome { termination: SearchTermination::Stopped(StopReason::Budget), descents: Vec::new() };
     if dimensions == 0 {
         return searched;
     }
-    let made = ledger.run().len();
+    let made = ledger.run_evaluations().len();
     ledger.set_limit(limit.min(made.saturating_add(settings.global_evaluations)));
-    if let Some(stop @ (Stop::Interrupted | Stop::Journal(_))) = clouds(ledger, dimensions, settings) {
-        searched.ended = Ended::Stopped(stop);
+    if let Some(stop @ (StopReason::Interrupted | StopReason::Journal(_))) =
+        search_with_populations(ledger, dimensions, settings)
+    {
+        searched.termination = SearchTermination::Stopped(stop);
         return searched;
     }
-    let made = ledger.run().len();
-    searched.ended = local(
+    let made = ledger.run_evaluations().len();
+    searched.termination = search_locally(
         ledger,
         settings,
         limit.min(made.saturating_add(settings.local_evaluations)),

@@ -5,7 +5,7 @@ pub const STAGNANT_GENERATIONS: usize = 20;
 
 /// Budgets and rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Settings {
+pub struct SearchSettings {
     /// Seed of the clouds.
     pub seed: u64,
     /// Evaluations of the global stage.

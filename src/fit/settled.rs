@@ -6,58 +6,64 @@
 
 use super::evaluation::Observed;
 use super::failure::RunFailure;
-use super::job::Aim;
-use super::model::{Draw, Model, Predict, Restart};
+use super::job::FitTarget;
+use super::model::{Draw, FeaturePredictor, Model, Restart};
 use super::model_features::ModelFeatures;
-use super::target::Target;
+use super::target::TargetValue;
 use crate::feature::Feature;
 use crate::recording::Recording;
 
 /// Standard deviations by which another start may move a feature before it is said: half of what a 95 %
 /// interval allows.
-const SHOWS: f64 = 1.0;
+const MIN_VISIBLE_SHIFT_SD: f64 = 1.0;
 /// Standard deviations by which it moves no more where the start is forgotten.
-const FORGOTTEN: f64 = 0.3;
+const MAX_FORGOTTEN_SHIFT_SD: f64 = 0.3;
 /// Decay times by which a start is set earlier, at most: a hundredth is left after five.
-const MOST_DECAYS: usize = 5;
+const MAX_LEAD_DECAYS: usize = 5;
 /// Share of the angles by which a start is moved where it cannot be earlier.
-const MOVED: f64 = 0.05;
+const ANGLE_CHANGE: f64 = 0.05;
 
 /// A model whose runs start otherwise.
-struct Restarted<'a> {
+struct RestartedModel<'a> {
     model: &'a dyn Model,
     restart: Restart,
 }
 
-impl Model for Restarted<'_> {
-    fn observe(&self, values: &[f64], condition: usize, draw: Draw) -> Result<Recording, RunFailure> {
-        self.model.restarted(values, condition, draw, self.restart)
+impl Model for RestartedModel<'_> {
+    fn record_condition(
+        &self,
+        values: &[f64],
+        condition: usize,
+        draw: Draw,
+    ) -> Result<Recording, RunFailure> {
+        self.model.record_restarted(values, condition, draw, self.restart)
     }
 }
 
 /// The features of one condition of the best model.
-struct Shown<'a> {
+struct ConditionFeatures<'a> {
     model: &'a dyn Model,
     values: &'a [f64],
     features: Vec<Feature>,
-    targets: Vec<&'a Target>,
+    targets: Vec<&'a TargetValue>,
     members: usize,
 }
 
-impl Shown<'_> {
-    fn read(&self, restart: Option<Restart>) -> Option<Vec<Observed>> {
+impl ConditionFeatures<'_> {
+    fn read_features(&self, restart: Option<Restart>) -> Option<Vec<Observed>> {
         let targets = self.targets.iter().map(|target| target.value).collect();
-        let read =
-            |model| ModelFeatures::new(model, &self.features, targets, self.members).predict(self.values);
+        let read = |model| {
+            ModelFeatures::new(model, &self.features, targets, self.members).predict_features(self.values)
+        };
         match restart {
             None => read(self.model).ok(),
-            Some(restart) => read(&Restarted { model: self.model, restart }).ok(),
+            Some(restart) => read(&RestartedModel { model: self.model, restart }).ok(),
         }
     }
 
     /// The feature that differs most between two readings, with the difference in its standard deviations;
     /// one that is missing from one of them is left out.
-    fn difference(&self, one: &[Observed], other: &[Observed]) -> Option<(&str, f64)> {
+    fn largest_difference(&self, one: &[Observed], other: &[Observed]) -> Option<(&str, f64)> {
         let pairs = self.targets.iter().zip(one).zip(other);
         let differences = pairs.filter_map(|((target, one), other)| {
             let moved = target.distance_between(other.value()?, one.value()?);
@@ -73,43 +79,46 @@ impl Shown<'_> {
 pub(super) fn start_notes(
     model: &dyn Model,
     names: &[String],
-    (aims, targets): (&[Aim], &[Target]),
+    (aims, targets): (&[FitTarget], &[TargetValue]),
     values: &[f64],
     members: usize,
 ) -> Vec<String> {
     let note = |(condition, name): (usize, &String)| {
         let here = || aims.iter().zip(targets).filter(|(aim, _)| aim.feature.condition == condition);
         let features: Vec<Feature> = here().map(|(aim, _)| aim.feature.clone()).collect();
-        let shown = Shown { model, values, features, targets: here().map(|(_, t)| t).collect(), members };
-        let said = sentence(&shown, condition)?;
+        let shown =
+            ConditionFeatures { model, values, features, targets: here().map(|(_, t)| t).collect(), members };
+        let said = start_sentence(&shown, condition)?;
         Some(if names.len() > 1 { format!("`{name}`: {said}") } else { said })
     };
     names.iter().enumerate().filter_map(note).collect()
 }
 
-fn sentence(shown: &Shown, condition: usize) -> Option<String> {
+fn start_sentence(shown: &ConditionFeatures, condition: usize) -> Option<String> {
     let decay_s = shown.model.decay_s(shown.values, condition).filter(|_| !shown.features.is_empty())?;
-    let as_fitted = shown.read(None)?;
-    if shown.model.most_lead_s(condition) < decay_s {
-        let moved = shown.read(Some(Restart::Moved(MOVED)))?;
-        let (name, by) = shown.difference(&as_fitted, &moved).filter(|(_, by)| *by > SHOWS)?;
+    let as_fitted = shown.read_features(None)?;
+    if shown.model.max_lead_s(condition) < decay_s {
+        let moved = shown.read_features(Some(Restart::Moved(ANGLE_CHANGE)))?;
+        let (name, by) =
+            shown.largest_difference(&as_fitted, &moved).filter(|(_, by)| *by > MIN_VISIBLE_SHIFT_SD)?;
         return Some(format!(
             "the start of the scene shows in the features: from a start with angles {:.0} % larger, the best \
              model's `{name}` is {by:.1} standard deviations away; begin the windows about {:.3} s later (three \
              decay times of the slowest mode), or average over starts with [ensemble]",
-            100.0 * MOVED,
+            100.0 * ANGLE_CHANGE,
             3.0 * decay_s
         ));
     }
-    let led = |decays: usize| shown.read(Some(Restart::Earlier(decays as f64 * decay_s)));
+    let led = |decays: usize| shown.read_features(Some(Restart::Earlier(decays as f64 * decay_s)));
     let mut earlier = led(1)?;
-    let (name, by) = shown.difference(&as_fitted, &earlier).filter(|(_, by)| *by > SHOWS)?;
-    let most = (shown.model.most_lead_s(condition) / decay_s).min(MOST_DECAYS as f64) as usize;
+    let (name, by) =
+        shown.largest_difference(&as_fitted, &earlier).filter(|(_, by)| *by > MIN_VISIBLE_SHIFT_SD)?;
+    let most = (shown.model.max_lead_s(condition) / decay_s).min(MAX_LEAD_DECAYS as f64) as usize;
     let mut enough = most;
     for decays in 1..most {
         let Some(next) = led(decays + 1) else { break };
-        let still = shown.difference(&earlier, &next).map_or(0.0, |(_, by)| by);
-        if still <= FORGOTTEN {
+        let still = shown.largest_difference(&earlier, &next).map_or(0.0, |(_, by)| by);
+        if still <= MAX_FORGOTTEN_SHIFT_SD {
             enough = decays;
             break;
         }
@@ -126,9 +135,9 @@ fn sentence(shown: &Shown, condition: usize) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::feature::{Measure, Reading};
-    use crate::fit::job::{Source, When};
-    use crate::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
+    use crate::feature::{Reading, ValueComparison};
+    use crate::fit::job::{TargetSource, TargetStage};
+    use crate::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
     use crate::recording::channel::Window;
     use crate::simulate::scene::Scene;
     use crate::twin::Camera;
@@ -142,16 +151,26 @@ mod tests {
         let scene = Scene::parse("scene.toml", &text).unwrap();
         let camera = Camera { frame_rate_hz: 5000.0, exposure_s: 0.0 };
         let instrument = Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 };
-        let model = SceneModel::new(vec![Condition { scene, instrument }], Vec::new(), Plausible::default());
+        let model = SceneModel::new(
+            vec![ModelCondition { scene, instrument }],
+            Vec::new(),
+            PlausibilityLimits::default(),
+        );
         let reading = Reading::MeanDeflection(Window::parse(window).unwrap());
         let feature = Feature { name: "mean".to_owned(), reading, condition: 0 };
         let shown = ModelFeatures::new(&model, std::slice::from_ref(&feature), vec![1e-3], 1);
-        let value = shown.predict(&[]).unwrap()[0].value().unwrap();
+        let value = shown.predict_features(&[]).unwrap()[0].value().unwrap();
         let sd = 0.005 * value.abs();
-        let (name, measure) = ("mean".to_owned(), Measure::Log);
-        let target = Target { name, value, sd, scatter: 0.0, measure, last: false, calibration: None };
-        let source = Source::Given { target: value, sd };
-        let aim = Aim { feature, source, tolerance_relative: None, held_out: false, stage: When::Always };
+        let (name, measure) = ("mean".to_owned(), ValueComparison::Log);
+        let target = TargetValue { name, value, sd, scatter: 0.0, measure, last: false, calibration: None };
+        let source = TargetSource::Given { target: value, sd };
+        let aim = FitTarget {
+            feature,
+            source,
+            tolerance_relative: None,
+            held_out: false,
+            stage: TargetStage::Always,
+        };
         start_notes(&model, &["film".to_owned()], (&[aim], &[target]), &[], 1)
     }
 

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// What an evaluation was made for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Stage {
+pub enum EvaluationStage {
     /// Probes of what the features can determine, before the search.
     Gate,
     /// Clouds of points over the whole box.
@@ -22,10 +22,10 @@ pub enum Stage {
     Elsewhere,
 }
 
-impl Stage {
+impl EvaluationStage {
     /// The word in files and on a terminal.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Gate => "gate",
             Self::Global => "global",

@@ -2,20 +2,20 @@
 //! leaves.
 
 use super::error::FitError;
-use super::job::{Aim, Job, Source, When};
-use super::target::Target;
-use crate::feature::{Feature, Measure, Missing, Value, read_all_assigned};
+use super::job::{FitTarget, Job, TargetSource, TargetStage};
+use super::target::TargetValue;
+use crate::feature::{Feature, FeatureValue, MissingValue, ValueComparison, read_assigned_features};
 use crate::math;
 use crate::recording::Recording;
-use crate::recording::quality::quality;
-use crate::twin::{Tracking, track};
+use crate::recording::quality::measure_quality;
+use crate::twin::{TrackingModel, add_tracking_noise};
 
 /// Copies of a recording with its own noise added once more, from which the deviation of a feature is taken:
 /// the estimate of a standard deviation from 12 values is itself good to a fifth.
-const COPIES: u64 = 12;
+const NOISE_COPIES: u64 = 12;
 /// Least deviation relative to a value that was measured: features of sampled traces are not read better, and
 /// the model is no better.
-const LEAST_RELATIVE: f64 = 1e-3;
+const MIN_SD_RELATIVE: f64 = 1e-3;
 
 /// Targets of a job in the order of its aims; `measured` has one recording for each of the job's conditions
 /// that has one.
@@ -25,7 +25,7 @@ const LEAST_RELATIVE: f64 = 1e-3;
 ///
 /// # Errors
 /// [`FitError::Recordings`], or [`FitError::NotMeasurable`] naming the recording and the feature.
-pub fn targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<Target>, FitError> {
+pub fn measure_targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<TargetValue>, FitError> {
     let expected = job.conditions.len();
     if measured.len() != expected
         || job.conditions.iter().zip(measured).any(|(c, m)| c.recording.is_some() != m.is_some())
@@ -36,33 +36,34 @@ pub fn targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<Target>,
         });
     }
     let features = job.features();
-    let read = read(&features, measured);
-    let unstated = job.aims.iter().any(|aim| matches!(aim.source, Source::Measured { least_sd: 0.0, .. }));
-    let scatter = if unstated { scatter(&features, measured) } else { vec![None; features.len()] };
-    job.aims
+    let read = read_recorded_features(&features, measured);
+    let unstated =
+        job.targets.iter().any(|aim| matches!(aim.source, TargetSource::Measured { least_sd: 0.0, .. }));
+    let scatter = if unstated { copy_scatter(&features, measured) } else { vec![None; features.len()] };
+    job.targets
         .iter()
         .zip(read)
         .zip(scatter)
         .map(|((aim, read), scatter)| {
-            let calibration = job.calibration(aim);
-            Ok(Target { calibration, ..target(aim, read, scatter, measured)? })
+            let calibration = job.target_calibration(aim);
+            Ok(TargetValue { calibration, ..measure_target(aim, read, scatter, measured)? })
         })
         .collect()
 }
 
-fn target(
-    aim: &Aim,
-    read: Result<Value, Missing>,
+fn measure_target(
+    aim: &FitTarget,
+    read: Result<FeatureValue, MissingValue>,
     scatter: Option<f64>,
     measured: &[Option<Recording>],
-) -> Result<Target, FitError> {
+) -> Result<TargetValue, FitError> {
     let (name, measure, last) =
-        (aim.feature.name.clone(), aim.feature.reading.measure(), aim.stage == When::Last);
+        (aim.feature.name.clone(), aim.feature.reading.comparison(), aim.stage == TargetStage::Last);
     let (value, sd) = match aim.source {
-        Source::Given { target, sd } => (target, sd),
-        Source::Measured { least_sd, least_sd_relative } => {
-            let usable = |read: Value| match read.value {
-                value if !value.is_finite() || (value == 0.0 && measure == Measure::Log) => {
+        TargetSource::Given { target, sd } => (target, sd),
+        TargetSource::Measured { least_sd, least_sd_relative } => {
+            let usable = |read: FeatureValue| match read.value {
+                value if !value.is_finite() || (value == 0.0 && measure == ValueComparison::Log) => {
                     Err(format!("its value is {value}"))
                 }
                 _ => Ok(read),
@@ -70,69 +71,79 @@ fn target(
             let read = read
                 .map_err(|missing| missing.to_string())
                 .and_then(usable)
-                .map_err(|problem| not_measurable(aim, measured, problem))?;
-            let scale = if measure == Measure::Log { read.value.abs() } else { least_scale(measure) };
+                .map_err(|problem| not_measurable_error(aim, measured, problem))?;
+            let scale =
+                if measure == ValueComparison::Log { read.value.abs() } else { target_scale(measure) };
             let stated = least_sd > 0.0 || least_sd_relative > 0.0;
             let noise = if stated { read.sd } else { scatter.or(read.sd) };
-            let least = if stated { least_sd.max(least_sd_relative * scale) } else { LEAST_RELATIVE * scale };
+            let least =
+                if stated { least_sd.max(least_sd_relative * scale) } else { MIN_SD_RELATIVE * scale };
             (read.value, noise.filter(|sd| sd.is_finite()).unwrap_or(0.0).max(least))
         }
     };
-    Ok(Target { name, value, sd, scatter: 0.0, measure, last, calibration: None })
+    Ok(TargetValue { name, value, sd, scatter: 0.0, measure, last, calibration: None })
 }
 
-fn least_scale(measure: Measure) -> f64 {
+fn target_scale(measure: ValueComparison) -> f64 {
     match measure {
-        Measure::Log => 1.0,
-        Measure::Linear { scale } => scale,
+        ValueComparison::Log => 1.0,
+        ValueComparison::Linear { scale } => scale,
     }
 }
 
 /// Standard deviation of each feature over noisier copies of the recordings; `None` where fewer than half of
 /// them show it.
-fn scatter(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Option<f64>> {
+fn copy_scatter(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Option<f64>> {
     let noise_m: Vec<f64> = measured
         .iter()
-        .map(|m| m.as_ref().and_then(|m| quality(m, None).head_x.noise_m).unwrap_or(0.0))
+        .map(|m| m.as_ref().and_then(|m| measure_quality(m, None).head_x.noise_m).unwrap_or(0.0))
         .collect();
     let copy = |seed: u64| -> Vec<Option<Recording>> {
         let noisier = |(recording, noise_m): (&Option<Recording>, &f64)| {
             let recording = recording.as_ref()?;
             let tracking =
-                Tracking { metres_per_pixel: *noise_m, noise_px: 1.0, dropout_fraction: 0.0, seed };
-            track(recording, recording.name(), &tracking).ok()
+                TrackingModel { metres_per_pixel: *noise_m, noise_px: 1.0, dropout_fraction: 0.0, seed };
+            add_tracking_noise(recording, recording.name(), &tracking).ok()
         };
         measured.iter().zip(&noise_m).map(noisier).collect()
     };
     let values = |seed: u64| {
-        read(features, &copy(seed)).into_iter().map(|read| read.ok().map(|read| read.value)).collect()
+        read_recorded_features(features, &copy(seed))
+            .into_iter()
+            .map(|read| read.ok().map(|read| read.value))
+            .collect()
     };
-    let reads: Vec<Vec<Option<f64>>> = (1..=COPIES).map(values).collect();
+    let reads: Vec<Vec<Option<f64>>> = (1..=NOISE_COPIES).map(values).collect();
     (0..features.len())
         .map(|at| {
-            deviation(&reads.iter().filter_map(|read| read.get(at).copied().flatten()).collect::<Vec<f64>>())
+            standard_deviation(
+                &reads.iter().filter_map(|read| read.get(at).copied().flatten()).collect::<Vec<f64>>(),
+            )
         })
         .collect()
 }
 
 /// Every feature of the conditions that were measured; those of the others are missing.
-fn read(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Result<Value, Missing>> {
+fn read_recorded_features(
+    features: &[Feature],
+    measured: &[Option<Recording>],
+) -> Vec<Result<FeatureValue, MissingValue>> {
     let present: Vec<usize> = (0..measured.len()).filter(|at| measured[*at].is_some()).collect();
     let place = |condition: usize| present.iter().position(|at| *at == condition).unwrap_or(usize::MAX - 1);
     let placed: Vec<Feature> = features
         .iter()
         .map(|feature| Feature { condition: place(feature.condition), ..feature.clone() })
         .collect();
-    read_all_assigned(&placed, &[], &measured.iter().flatten().collect::<Vec<_>>())
+    read_assigned_features(&placed, &[], &measured.iter().flatten().collect::<Vec<_>>())
 }
 
-fn deviation(values: &[f64]) -> Option<f64> {
+fn standard_deviation(values: &[f64]) -> Option<f64> {
     let mean = values.iter().sum::<f64>() / values.len() as f64;
     let sum: f64 = values.iter().map(|v| math::powi(v - mean, 2)).sum();
-    (2 * values.len() as u64 > COPIES).then(|| (sum / (values.len() - 1) as f64).sqrt())
+    (2 * values.len() as u64 > NOISE_COPIES).then(|| (sum / (values.len() - 1) as f64).sqrt())
 }
 
-fn not_measurable(aim: &Aim, measured: &[Option<Recording>], problem: String) -> FitError {
+fn not_measurable_error(aim: &FitTarget, measured: &[Option<Recording>], problem: String) -> FitError {
     let recording = measured
         .get(aim.feature.condition)
         .and_then(Option::as_ref)

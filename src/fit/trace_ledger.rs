@@ -4,18 +4,18 @@
 //! with the same bits. At most the iterates that were being made are lost.
 
 use super::error::FitError;
-use super::iterates::{Header, Journal, Step};
-use super::ledger::Progress;
-use super::stage::Stage;
-use super::trace::{Branch, Iterate, Keep};
-use crate::journal::{Sink, header_line, line, sample};
+use super::iterates::{IterateRecord, TraceCheckpoint, TraceHeader};
+use super::ledger::FitProgress;
+use super::stage::EvaluationStage;
+use super::trace::{Checkpoint, Iterate, UncertaintyRun};
+use crate::journal::{CheckpointSink, format_header_line, format_record_line, sample_records};
 use std::collections::{BTreeMap, HashMap};
 use std::ops::ControlFlow;
 
 /// How far a trace fit has come.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TraceProgress {
-    /// Number of the chain: that of the start, or of a [`Branch`].
+    /// Number of the chain: that of the start, or of a [`UncertaintyRun`].
     pub start: usize,
     /// Iterates of all searches so far, those of the journal included.
     pub iterates: usize,
@@ -32,12 +32,12 @@ pub struct TraceProgress {
 }
 
 /// The same as of any fit: an iterate counts as an evaluation.
-impl From<TraceProgress> for Progress {
+impl From<TraceProgress> for FitProgress {
     fn from(now: TraceProgress) -> Self {
-        let stage = match Branch::of(now.start) {
-            None => Stage::Local,
-            Some(Branch::Twin(_)) => Stage::Bootstrap,
-            Some(Branch::Shorter | Branch::Side { .. }) => Stage::Profile,
+        let stage = match UncertaintyRun::from_chain_number(now.start) {
+            None => EvaluationStage::Local,
+            Some(UncertaintyRun::Twin(_)) => EvaluationStage::Bootstrap,
+            Some(UncertaintyRun::Shorter | UncertaintyRun::Side { .. }) => EvaluationStage::Profile,
         };
         Self { stage, evaluations: now.iterates, replayed: now.replayed, best_cost: now.cost }
     }
@@ -48,7 +48,7 @@ pub type OnIterate<'a> = dyn FnMut(&TraceProgress) -> ControlFlow<()> + Send + '
 
 /// Why no more iterates are made.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Stopped {
+pub enum TraceStopReason {
     /// It was asked to stop.
     Interrupted,
     /// As many iterates as were allowed have been made.
@@ -59,7 +59,7 @@ pub enum Stopped {
 
 /// The iterates of all searches of a trace fit, and where they are written.
 pub struct TraceLedger<'a> {
-    journal: &'a mut dyn Sink,
+    journal: &'a mut dyn CheckpointSink,
     on_iterate: &'a mut OnIterate<'a>,
     /// Iterates of the journal that is resumed.
     known: HashMap<(usize, usize), Iterate>,
@@ -71,7 +71,7 @@ pub struct TraceLedger<'a> {
     counts: BTreeMap<usize, usize>,
     replayed: usize,
     most: usize,
-    stopped: Option<Stopped>,
+    stopped: Option<TraceStopReason>,
 }
 
 impl<'a> TraceLedger<'a> {
@@ -81,47 +81,47 @@ impl<'a> TraceLedger<'a> {
     /// # Errors
     /// [`FitError`] when the journal is that of another fit.
     pub fn new(
-        header: &Header,
-        resume: Option<(&str, &Journal)>,
+        header: &TraceHeader,
+        resume: Option<(&str, &TraceCheckpoint)>,
         most: usize,
-        journal: &'a mut dyn Sink,
+        journal: &'a mut dyn CheckpointSink,
         on_iterate: &'a mut OnIterate<'a>,
     ) -> Result<Self, FitError> {
         if let Some((file, found)) = resume {
             check_seed(file, found.header.body.seed, header.body.seed)?;
-            found.header.check::<Step>(file, header)?;
+            found.header.check_matches::<IterateRecord>(file, header)?;
         }
         let records = resume.map_or(&[][..], |(_, journal)| &journal.records);
         let known = records.iter();
         let known = known.map(|step| ((step.start, step.step), step.iterate.clone())).collect();
-        let opening = resume.is_none().then(|| header_line(header));
+        let opening = resume.is_none().then(|| format_header_line(header));
         let (lines, counts, replayed, stopped) = (records.len(), BTreeMap::new(), 0, None);
         Ok(Self { journal, on_iterate, known, lines, opening, counts, replayed, most, stopped })
     }
 
     /// Iterates so far, those of the journal included.
     #[must_use]
-    pub fn iterates(&self) -> usize {
+    pub fn count_iterates(&self) -> usize {
         self.counts.values().sum()
     }
 
     /// The same of one start, from 0.
     #[must_use]
-    pub fn of_start(&self, start: usize) -> usize {
+    pub fn count_start_iterates(&self, start: usize) -> usize {
         self.counts.get(&start).copied().unwrap_or(0)
     }
 
     /// Why nothing more was made.
     #[must_use]
-    pub fn stopped(&self) -> Option<&Stopped> {
+    pub fn stop_reason(&self) -> Option<&TraceStopReason> {
         self.stopped.as_ref()
     }
 
-    fn count(&mut self, start: usize, iterate: &Iterate) -> ControlFlow<()> {
+    fn count_iterate(&mut self, start: usize, iterate: &Iterate) -> ControlFlow<()> {
         *self.counts.entry(start).or_default() += 1;
         let now = TraceProgress {
             start,
-            iterates: self.iterates(),
+            iterates: self.count_iterates(),
             replayed: self.replayed,
             stage: iterate.stage,
             cost: iterate.cost,
@@ -131,15 +131,15 @@ impl<'a> TraceLedger<'a> {
         (self.on_iterate)(&now)
     }
 
-    fn write(&mut self, (start, step): (usize, usize), iterate: &Iterate) -> Result<(), String> {
-        let made = Step { start, step, iterate: iterate.clone() };
-        let lines = self.opening.take().unwrap_or_default() + &line(&made, self.lines);
+    fn write_iterate(&mut self, (start, step): (usize, usize), iterate: &Iterate) -> Result<(), String> {
+        let made = IterateRecord { start, step, iterate: iterate.clone() };
+        let lines = self.opening.take().unwrap_or_default() + &format_record_line(&made, self.lines);
         self.journal.append(&lines)?;
         self.lines += 1;
         Ok(())
     }
 
-    fn stop(&mut self, why: Stopped) -> ControlFlow<()> {
+    fn stop_for(&mut self, why: TraceStopReason) -> ControlFlow<()> {
         self.stopped.get_or_insert(why);
         ControlFlow::Break(())
     }
@@ -152,28 +152,28 @@ fn check_seed(file: &str, found: u64, expected: u64) -> Result<(), FitError> {
     Err(FitError::OtherSeed { file: file.to_owned(), found, expected })
 }
 
-impl Keep for TraceLedger<'_> {
-    fn known(&mut self, start: usize, step: usize) -> Option<Iterate> {
+impl Checkpoint for TraceLedger<'_> {
+    fn find_iterate(&mut self, start: usize, step: usize) -> Option<Iterate> {
         let known = self.known.get(&(start, step))?.clone();
         self.replayed += 1;
-        if self.count(start, &known).is_break() {
-            self.stopped.get_or_insert(Stopped::Interrupted); // (the next new iterate is not made any more)
+        if self.count_iterate(start, &known).is_break() {
+            self.stopped.get_or_insert(TraceStopReason::Interrupted); // (the next new iterate is not made any more)
         }
         Some(known)
     }
 
-    fn add(&mut self, start: usize, step: usize, iterate: &Iterate) -> ControlFlow<()> {
+    fn store_iterate(&mut self, start: usize, step: usize, iterate: &Iterate) -> ControlFlow<()> {
         if let Some(why) = self.stopped.clone() {
-            return self.stop(why);
+            return self.stop_for(why);
         }
-        if self.iterates() >= self.most {
-            return self.stop(Stopped::Budget);
+        if self.count_iterates() >= self.most {
+            return self.stop_for(TraceStopReason::Budget);
         }
-        if let Err(problem) = self.write((start, step), iterate) {
-            return self.stop(Stopped::Journal(problem));
+        if let Err(problem) = self.write_iterate((start, step), iterate) {
+            return self.stop_for(TraceStopReason::Journal(problem));
         }
-        match self.count(start, iterate) {
-            ControlFlow::Break(()) => self.stop(Stopped::Interrupted),
+        match self.count_iterate(start, iterate) {
+            ControlFlow::Break(()) => self.stop_for(TraceStopReason::Interrupted),
             ControlFlow::Continue(()) => ControlFlow::Continue(()),
         }
     }
@@ -185,9 +185,9 @@ impl Keep for TraceLedger<'_> {
 ///
 /// # Errors
 /// [`FitError::Journal`] with the line that differs.
-pub fn recheck(
+pub fn recheck_iterates(
     file: &str,
-    journal: &Journal,
+    journal: &TraceCheckpoint,
     next: impl Fn(usize, Option<&Iterate>) -> Option<Iterate>,
 ) -> Result<(), FitError> {
     let records = &journal.records;
@@ -195,7 +195,7 @@ pub fn recheck(
         records.iter().map(|step| ((step.start, step.step), &step.iterate)).collect();
     // others each time, as it grows
     let seed = journal.header.body.seed.wrapping_add(records.len() as u64);
-    for place in sample(records.len(), seed) {
+    for place in sample_records(records.len(), seed) {
         let stored = &records[place];
         let before = stored.step.checked_sub(1).map(|before| places.get(&(stored.start, before)));
         let again = match before {
@@ -204,7 +204,7 @@ pub fn recheck(
             Some(None) => continue, // (nothing that it follows from is in the journal)
         };
         if let Some(iterate) = again {
-            journal.check_again(file, place, &Step { iterate, ..stored.clone() })?;
+            journal.check_recomputed(file, place, &IterateRecord { iterate, ..stored.clone() })?;
         }
     }
     Ok(())

@@ -1,7 +1,7 @@
 //! What is known of the parameters at the best point: intervals, verdicts, correlations, combinations.
 //!
 //! An interval reaches as far as any of three says: the profile likelihood ([`super::profile`]), twins of the
-//! best model fitted again ([`super::bootstrap`]), and every point of the whole fit that is as good as the
+//! best model fitted again ([`super::bootstrap_refits`]), and every point of the whole fit that is as good as the
 //! threshold allows. Without a profile the linear model at the best point takes its place.
 
 mod bound;
@@ -10,34 +10,36 @@ mod doubt;
 mod stored;
 
 pub(crate) use super::information::CHI_SQUARED_95;
-pub(crate) use confirm::confirmed;
-pub use doubt::Weighed;
-pub(crate) use doubt::weighed;
+pub(crate) use confirm::confirm_identified;
+pub use doubt::FeatureWeights;
+pub(crate) use doubt::weigh_features;
 pub(super) use stored::stored_verdicts;
 
-use super::bootstrap::{Bootstrap, bootstrap};
+use super::bootstrap::{Bootstrap, bootstrap_refits};
 use super::cameras::CameraEstimate;
 use super::evaluation::Evaluation;
-use super::information::{Combination, Directions, INFORMATIVE, Z_95};
+use super::information::{MIN_INFORMATIVE, ParameterCombination, SingularDirections, Z_95};
 use super::job::IntervalSettings;
-use super::ledger::{Ledger, Stop};
-use super::linear::{STEP, Slopes, camera_estimates, jacobian, points, residuals};
+use super::ledger::{Ledger, StopReason};
+use super::linear::{
+    DIFFERENCE_STEP, FeatureSlopes, camera_estimates, difference_points, jacobian, residuals,
+};
 use super::objective::Objective;
-use super::profile::{AT_BOUND, Profile, profiles};
-use super::search::{WORTH, polish};
-use super::stage::Stage;
-use bound::{bar_all, bar_followers, excluding, is_at_bound};
-use doubt::believed;
+use super::profile::{AT_BOUND, ProfileLikelihood, profile_parameters};
+use super::search::{MIN_WORTHWHILE_GAIN, polish_best};
+use super::stage::EvaluationStage;
+use bound::{best_excluded_gain, is_at_bound, withdraw_all, withdraw_correlated};
+use doubt::check_best_point;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
 /// How often a better point, met on the way along a profile, is followed and everything begun again.
-const RESTARTS: usize = 2;
+const MAX_RESTARTS: usize = 2;
 
 /// What is known of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum ParameterVerdict {
     /// Its interval lies within the bounds.
     Identified,
     /// Its interval reaches below the lower bound: only an upper limit is known.
@@ -51,10 +53,10 @@ pub enum Verdict {
     AtBound,
 }
 
-impl Verdict {
+impl ParameterVerdict {
     /// The word in files and summaries.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Identified => "identified",
             Self::OpenBelow => "open-below",
@@ -67,7 +69,7 @@ impl Verdict {
 
 /// Estimate and interval of one parameter, in its own SI unit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Interval {
+pub struct ParameterInterval {
     /// Best value.
     pub estimate: f64,
     /// Lower end of the 95 % interval; `None` where the features give none.
@@ -75,7 +77,7 @@ pub struct Interval {
     /// Upper end of the 95 % interval; `None` where the features give none.
     pub upper_95: Option<f64>,
     /// What is known.
-    pub verdict: Verdict,
+    pub verdict: ParameterVerdict,
     /// Lower and upper end by the linear model at the best point, where it determines the parameter.
     pub linear_95: Option<[f64; 2]>,
     /// Value and lowest cost along the parameter.
@@ -89,26 +91,26 @@ pub struct Interval {
     pub reasons: Vec<String>,
 }
 
-impl Interval {
+impl ParameterInterval {
     /// Calls it not identified, for a reason.
-    fn bar(&mut self, reason: String) {
-        self.verdict = Verdict::NotIdentified;
+    fn withdraw_verdict(&mut self, reason: String) {
+        self.verdict = ParameterVerdict::NotIdentified;
         self.reasons.push(reason);
     }
 }
 
 /// Everything found at the best point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Uncertainty {
+pub struct FitUncertainty {
     /// The best point.
     pub best: Evaluation,
     /// One a parameter, in job order.
-    pub intervals: Vec<Interval>,
+    pub intervals: Vec<ParameterInterval>,
     /// Number of informative directions.
     pub rank: usize,
     /// Largest singular value over the smallest; infinite where one is zero.
     pub condition: f64,
-    /// Features that move by more than their own 95 % interval (`INFORMATIVE` standard deviations) over the
+    /// Features that move by more than their own 95 % interval (`MIN_INFORMATIVE` standard deviations) over the
     /// box.
     pub informative_features: usize,
     /// `d ln feature / d ln parameter`, a row a feature, a column a parameter; `None` where either is missing
@@ -117,7 +119,7 @@ pub struct Uncertainty {
     /// Correlation of the estimates by the linear model, a row and a column a parameter.
     pub correlations: Vec<Vec<Option<f64>>>,
     /// What is determined and what is left open.
-    pub combinations: Vec<Combination>,
+    pub combinations: Vec<ParameterCombination>,
     /// What is estimated of the cameras there.
     pub cameras: Vec<CameraEstimate>,
     /// Standard deviation of each feature over twins of the best model, in its own unit.
@@ -136,10 +138,10 @@ pub(crate) fn count_warning(features: usize, rank: Option<usize>, parameters: us
         return None;
     }
     let (features_word, parameters_word) =
-        (plural(features, "informative feature"), plural(parameters, "parameter"));
+        (count_noun(features, "informative feature"), count_noun(parameters, "parameter"));
     let directions = match rank {
-        Some(rank) => format!("they fix {}", plural(rank, "combination")),
-        None => format!("they can fix at most {}", plural(features, "combination")),
+        Some(rank) => format!("they fix {}", count_noun(rank, "combination")),
+        None => format!("they can fix at most {}", count_noun(features, "combination")),
     };
     Some(format!(
         "{features_word} for {parameters_word}: {directions} of the parameters and leave {} open; add features such as release-after-reversal, mean-deflection or rms, or take parameters out of the job",
@@ -150,53 +152,56 @@ pub(crate) fn count_warning(features: usize, rank: Option<usize>, parameters: us
 /// Assesses the ledger's best point; `None` when the ledger is empty. A better point that is met on the way
 /// is polished with at most `polishing` evaluations and assessed instead.
 #[must_use]
-pub(crate) fn at_best(
+pub(crate) fn assess_best(
     ledger: &mut Ledger,
     names: &[String],
     settings: &IntervalSettings,
     polishing: usize,
-) -> Option<Uncertainty> {
-    let limit = ledger.limit();
-    for _ in 0..RESTARTS {
-        let found = once(ledger, names, settings)?;
-        let better = ledger.best().is_some_and(|now| found.best.cost - now.cost > WORTH);
+) -> Option<FitUncertainty> {
+    let limit = ledger.evaluation_limit();
+    for _ in 0..MAX_RESTARTS {
+        let found = assess_once(ledger, names, settings)?;
+        let better =
+            ledger.best_evaluation().is_some_and(|now| found.best.cost - now.cost > MIN_WORTHWHILE_GAIN);
         if !better {
             return Some(found);
         }
-        ledger.set_limit(limit.min(ledger.run().len().saturating_add(polishing)));
-        polish(ledger);
+        ledger.set_limit(limit.min(ledger.run_evaluations().len().saturating_add(polishing)));
+        polish_best(ledger);
         ledger.set_limit(limit);
     }
-    once(ledger, names, settings)
+    assess_once(ledger, names, settings)
 }
 
-fn once(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings) -> Option<Uncertainty> {
-    let best = ledger.best()?.clone();
+fn assess_once(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings) -> Option<FitUncertainty> {
+    let best = ledger.best_evaluation()?.clone();
     if let Some(failure) = &best.failure {
-        return Some(unassessed(
+        return Some(unassessed_point(
             ledger.objective(),
             &best,
             &format!("every evaluation failed, the best one with {failure}"),
         ));
     }
-    let Ok(around) = ledger.evaluate(Stage::Sensitivity, &points(&best.unit)) else {
-        return Some(unassessed(ledger.objective(), &best, USED_UP));
+    let Ok(around) = ledger.evaluate_points(EvaluationStage::Sensitivity, &difference_points(&best.unit))
+    else {
+        return Some(unassessed_point(ledger.objective(), &best, BUDGET_USED_UP));
     };
     let around: Vec<Evaluation> = around.into_iter().cloned().collect();
-    let local = Local::new(ledger.objective(), best, &around);
-    let profiles = settings.profile.then(|| profiles(ledger, &local.best, &local.jacobian, CHI_SQUARED_95));
-    let twins =
-        (settings.bootstrap > 0).then(|| bootstrap(ledger, &local.best, &local.jacobian, settings.bootstrap));
+    let local = LocalAssessment::new(ledger.objective(), best, &around);
+    let profiles =
+        settings.profile.then(|| profile_parameters(ledger, &local.best, &local.jacobian, CHI_SQUARED_95));
+    let twins = (settings.bootstrap > 0)
+        .then(|| bootstrap_refits(ledger, &local.best, &local.jacobian, settings.bootstrap));
     let mut notes = Vec::new();
-    let profiles = kept(profiles, "profiles", &mut notes);
-    let twins = kept(twins, "twins", &mut notes);
-    Some(local.assessed(ledger, names, &Evidence { profiles, twins }, &around, notes))
+    let profiles = keep_or_note(profiles, "profiles", &mut notes);
+    let twins = keep_or_note(twins, "twins", &mut notes);
+    Some(local.assess(ledger, names, &IntervalEvidence { profiles, twins }, &around, notes))
 }
 
-const USED_UP: &str =
+const BUDGET_USED_UP: &str =
     "the evaluations allowed were used up, or the fit was interrupted, before the sensitivities";
 
-fn kept<T>(found: Option<Result<T, Stop>>, what: &str, notes: &mut Vec<String>) -> Option<T> {
+fn keep_or_note<T>(found: Option<Result<T, StopReason>>, what: &str, notes: &mut Vec<String>) -> Option<T> {
     let found = found?;
     if found.is_err() {
         notes.push(format!(
@@ -208,19 +213,19 @@ fn kept<T>(found: Option<Result<T, Stop>>, what: &str, notes: &mut Vec<String>) 
 
 /// An assessment of a point around which nothing could be evaluated.
 #[must_use]
-pub(crate) fn unassessed(objective: &Objective, best: &Evaluation, why: &str) -> Uncertainty {
-    let open = |estimate: &f64| Interval {
+pub(crate) fn unassessed_point(objective: &Objective, best: &Evaluation, why: &str) -> FitUncertainty {
+    let open = |estimate: &f64| ParameterInterval {
         estimate: *estimate,
         lower_95: None,
         upper_95: None,
-        verdict: Verdict::NotIdentified,
+        verdict: ParameterVerdict::NotIdentified,
         linear_95: None,
         profile: Vec::new(),
         profile_95: [None, None],
         bootstrap_95: None,
         reasons: Vec::new(),
     };
-    Uncertainty {
+    FitUncertainty {
         best: best.clone(),
         intervals: best.values.iter().map(open).collect(),
         rank: 0,
@@ -236,92 +241,95 @@ pub(crate) fn unassessed(objective: &Objective, best: &Evaluation, why: &str) ->
     }
 }
 
-impl Uncertainty {
+impl FitUncertainty {
     /// The same, where nothing is called identified if the search had not come to its end, or no other local
     /// search came to the best point; `ends` are where they ended.
     #[must_use]
-    pub fn doubted(self, converged: bool, objective: &Objective, ends: &[Evaluation]) -> Self {
+    pub fn with_search_doubts(self, converged: bool, objective: &Objective, ends: &[Evaluation]) -> Self {
         if !converged {
-            return self.withheld(UNFINISHED.to_owned());
+            return self.withhold_intervals(SEARCH_UNFINISHED.to_owned());
         }
-        let costs: Vec<f64> = ends.iter().map(|end| objective.price(end.clone().into()).cost).collect();
-        match believed(objective, &objective.price(self.best.clone().into()), &costs) {
+        let costs: Vec<f64> = ends.iter().map(|end| objective.add_costs(end.clone().into()).cost).collect();
+        match check_best_point(objective, &objective.add_costs(self.best.clone().into()), &costs) {
             Ok(()) => self,
-            Err(why) => self.withheld(why),
+            Err(why) => self.withhold_intervals(why),
         }
     }
 
     /// The same, where nothing is called identified for a reason that speaks against the model.
     #[must_use]
-    pub fn barred(mut self, why: Option<String>) -> Self {
+    pub fn with_model_objection(mut self, why: Option<String>) -> Self {
         if let Some(why) = why {
-            let known = self.intervals.iter_mut().filter(|i| i.verdict == Verdict::Identified);
-            known.for_each(|interval| interval.bar(why.clone()));
+            let known = self.intervals.iter_mut().filter(|i| i.verdict == ParameterVerdict::Identified);
+            known.for_each(|interval| interval.withdraw_verdict(why.clone()));
             self.notes.insert(0, why);
         }
         self
     }
 
-    fn withheld(mut self, why: String) -> Self {
+    fn withhold_intervals(mut self, why: String) -> Self {
         self.notes.insert(0, why);
         for interval in &mut self.intervals {
-            (interval.lower_95, interval.upper_95, interval.verdict) = (None, None, Verdict::NotIdentified);
+            (interval.lower_95, interval.upper_95, interval.verdict) =
+                (None, None, ParameterVerdict::NotIdentified);
         }
         self
     }
 }
 
-const UNFINISHED: &str = "the search was still gaining when its evaluations were used up, or was interrupted: there is a better point, so nothing is called identified; \
+const SEARCH_UNFINISHED: &str = "the search was still gaining when its evaluations were used up, or was interrupted: there is a better point, so nothing is called identified; \
     raise local_evaluations in [search], or --max-evaluations, and go on with --resume";
 
 /// What is known apart from the linear model.
-struct Evidence {
-    profiles: Option<Vec<Profile>>,
+struct IntervalEvidence {
+    profiles: Option<Vec<ProfileLikelihood>>,
     twins: Option<Bootstrap>,
 }
 
 /// The best point with its linear model.
-struct Local {
+struct LocalAssessment {
     best: Evaluation,
-    slopes: Slopes,
+    slopes: FeatureSlopes,
     jacobian: DMatrix<f64>,
-    directions: Directions,
+    directions: SingularDirections,
 }
 
-impl Local {
+impl LocalAssessment {
     fn new(objective: &Objective, best: Evaluation, around: &[Evaluation]) -> Self {
         let around: Vec<&Evaluation> = around.iter().collect();
-        let slopes = Slopes::of(objective.targets(), &best, &around);
+        let slopes = FeatureSlopes::from_differences(objective.targets(), &best, &around);
         let model = jacobian(objective, &best, &slopes);
-        let directions = Directions::of(&model);
+        let directions = SingularDirections::from_jacobian(&model);
         Self { slopes, directions, jacobian: model, best }
     }
 
-    fn assessed(
+    fn assess(
         self,
         ledger: &Ledger,
         names: &[String],
-        evidence: &Evidence,
+        evidence: &IntervalEvidence,
         around: &[Evaluation],
         late: Vec<String>,
-    ) -> Uncertainty {
+    ) -> FitUncertainty {
         let objective = ledger.objective();
         let mut intervals: Vec<_> =
-            (0..names.len()).map(|axis| self.interval(ledger, axis, evidence)).collect();
-        let known = self.jacobian.row_iter().take(self.jacobian.nrows() - objective.camera_unknowns());
-        let informative_features = known.filter(|row| row.norm() > INFORMATIVE).count();
-        let mut notes = bar_followers(&mut intervals, names, &self.best.unit, &self.directions);
-        if let Some(held) = excluding(&self.best.unit, &self.jacobian, &residuals(objective, &self.best)) {
-            notes.extend(bar_all(&mut intervals, names, held));
+            (0..names.len()).map(|axis| self.parameter_interval(ledger, axis, evidence)).collect();
+        let known = self.jacobian.row_iter().take(self.jacobian.nrows() - objective.count_camera_unknowns());
+        let informative_features = known.filter(|row| row.norm() > MIN_INFORMATIVE).count();
+        let mut notes = withdraw_correlated(&mut intervals, names, &self.best.unit, &self.directions);
+        if let Some(held) =
+            best_excluded_gain(&self.best.unit, &self.jacobian, &residuals(objective, &self.best))
+        {
+            notes.extend(withdraw_all(&mut intervals, names, held));
         }
         notes.extend(count_warning(informative_features, Some(self.directions.rank), names.len()));
-        notes.extend(blind_notes(names, around));
+        notes.extend(failed_step_notes(names, around));
         notes.extend(late);
         let correlation = |a: usize| (0..names.len()).map(|b| self.directions.correlation(a, b)).collect();
-        Uncertainty {
+        FitUncertainty {
             intervals,
             rank: self.directions.rank,
-            condition: self.directions.condition(),
+            condition: self.directions.condition_number(),
             informative_features,
             sensitivities: log_sensitivities(objective, &self.best, &self.slopes),
             correlations: (0..names.len()).map(correlation).collect(),
@@ -334,30 +342,35 @@ impl Local {
         }
     }
 
-    fn interval(&self, ledger: &Ledger, axis: usize, evidence: &Evidence) -> Interval {
+    fn parameter_interval(
+        &self,
+        ledger: &Ledger,
+        axis: usize,
+        evidence: &IntervalEvidence,
+    ) -> ParameterInterval {
         let unit = self.best.unit.get(axis).copied().unwrap_or(0.5);
         let profile = evidence.profiles.as_ref().and_then(|profiles| profiles.get(axis));
-        let linear = self.linear(axis, unit);
-        let twins = evidence
-            .twins
-            .as_ref()
-            .and_then(|twins| Some(Z_95 * small_sample(twins.refits.len()) * twins.spread(axis, unit)?));
+        let linear = self.linear_interval(axis, unit);
+        let twins = evidence.twins.as_ref().and_then(|twins| {
+            Some(Z_95 * student_factor(twins.refits.len()) * twins.refit_spread(axis, unit)?)
+        });
         let twins = twins.map(|half| [unit - half, unit + half]);
         let lower = profile.map_or(linear.map(|l| l[0]), |p| p.lower);
         let upper = profile.map_or(linear.map(|l| l[1]), |p| p.upper);
-        let (least, most) =
-            self.met(ledger, axis).fold((unit, unit), |(least, most), u| (least.min(u), most.max(u)));
+        let (least, most) = self
+            .coordinates_within_threshold(ledger, axis)
+            .fold((unit, unit), |(least, most), u| (least.min(u), most.max(u)));
         let [below, above] = twins.unwrap_or([unit, unit]);
         let value = |u: f64| ledger.objective().axes().get(axis).map_or(f64::NAN, |a| a.bounds.from_unit(u));
         // what reaches a bound is open: what lies beyond was not tried
         let inside = |u: f64| (AT_BOUND..=1.0 - AT_BOUND).contains(&u).then(|| value(u));
         let lower_95 = lower.and_then(|u| inside(u.min(least).min(below)));
         let upper_95 = upper.and_then(|u| inside(u.max(most).max(above)));
-        Interval {
+        ParameterInterval {
             estimate: self.best.values.get(axis).copied().unwrap_or(f64::NAN),
             lower_95,
             upper_95,
-            verdict: verdict(unit, lower_95, upper_95, self.directions.determines(axis)),
+            verdict: interval_verdict(unit, lower_95, upper_95, self.directions.determines(axis)),
             linear_95: linear.map(|ends| ends.map(value)),
             profile: profile
                 .map_or_else(Vec::new, |p| p.points.iter().map(|(u, cost)| (value(*u), *cost)).collect()),
@@ -367,16 +380,20 @@ impl Local {
         }
     }
 
-    fn linear(&self, axis: usize, unit: f64) -> Option<[f64; 2]> {
-        let half = CHI_SQUARED_95.sqrt() * self.directions.coordinate(axis).0;
+    fn linear_interval(&self, axis: usize, unit: f64) -> Option<[f64; 2]> {
+        let half = CHI_SQUARED_95.sqrt() * self.directions.coordinate_sd(axis).0;
         self.directions.determines(axis).then_some([unit - half, unit + half])
     }
 
     /// Coordinates of every point of the fit that is as good as the threshold allows.
-    fn met<'a>(&self, ledger: &'a Ledger, axis: usize) -> impl Iterator<Item = f64> + 'a {
+    fn coordinates_within_threshold<'a>(
+        &self,
+        ledger: &'a Ledger,
+        axis: usize,
+    ) -> impl Iterator<Item = f64> + 'a {
         let limit = self.best.cost + CHI_SQUARED_95;
         ledger
-            .run()
+            .run_evaluations()
             .iter()
             .filter(move |e| e.failure.is_none() && e.cost <= limit)
             .filter_map(move |e| e.unit.get(axis).copied())
@@ -385,24 +402,28 @@ impl Local {
 
 /// What an interval is worth. A parameter that the features do not determine near the best point is not
 /// identified, even where the edge of what the model can do closes its interval.
-fn verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determined: bool) -> Verdict {
+fn interval_verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determined: bool) -> ParameterVerdict {
     match (lower, upper) {
-        (None, None) => Verdict::NotIdentified,
-        _ if is_at_bound(unit) => Verdict::AtBound,
-        (Some(_), Some(_)) if determined => Verdict::Identified,
-        (Some(_), Some(_)) => Verdict::NotIdentified,
-        (None, Some(_)) => Verdict::OpenBelow,
-        (Some(_), None) => Verdict::OpenAbove,
+        (None, None) => ParameterVerdict::NotIdentified,
+        _ if is_at_bound(unit) => ParameterVerdict::AtBound,
+        (Some(_), Some(_)) if determined => ParameterVerdict::Identified,
+        (Some(_), Some(_)) => ParameterVerdict::NotIdentified,
+        (None, Some(_)) => ParameterVerdict::OpenBelow,
+        (Some(_), None) => ParameterVerdict::OpenAbove,
     }
 }
 
 /// Student's 97.5 % point over the normal one, to first order in one over the number of twins (Abramowitz and
 /// Stegun, 26.7.5).
-fn small_sample(twins: usize) -> f64 {
+fn student_factor(twins: usize) -> f64 {
     1.0 + (Z_95 * Z_95 + 1.0) / (4.0 * twins.max(1) as f64)
 }
 
-fn log_sensitivities(objective: &Objective, best: &Evaluation, slopes: &Slopes) -> Vec<Vec<Option<f64>>> {
+fn log_sensitivities(
+    objective: &Objective,
+    best: &Evaluation,
+    slopes: &FeatureSlopes,
+) -> Vec<Vec<Option<f64>>> {
     let per_log = |axis: usize, slope: Option<f64>| {
         let unit = best.unit.get(axis)?;
         Some(slope? / objective.axes().get(axis)?.bounds.log_slope(*unit)?)
@@ -415,17 +436,17 @@ fn log_sensitivities(objective: &Objective, best: &Evaluation, slopes: &Slopes) 
 }
 
 /// Steps at which the model failed.
-fn blind_notes(names: &[String], around: &[Evaluation]) -> Vec<String> {
+fn failed_step_notes(names: &[String], around: &[Evaluation]) -> Vec<String> {
     let failed = |axis: usize| around.iter().skip(2 * axis).take(2).find_map(|e| e.failure.as_ref());
     let note = |(axis, name): (usize, &String)| {
         failed(axis).map(|f| {
-            format!("the model fails ({}) one step of {STEP} of its range from the best {name}; its sensitivities are one-sided or unknown", f.reason)
+            format!("the model fails ({}) one step of {DIFFERENCE_STEP} of its range from the best {name}; its sensitivities are one-sided or unknown", f.reason)
         })
     };
     names.iter().enumerate().filter_map(note).collect()
 }
 
-fn plural(count: usize, noun: &str) -> String {
+fn count_noun(count: usize, noun: &str) -> String {
     format!("{count} {noun}{}", if count == 1 { "" } else { "s" })
 }
 

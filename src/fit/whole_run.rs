@@ -2,16 +2,18 @@
 //! by its own head from the state in which the first segment starts.
 
 use super::error::FitError;
-use super::job::{Aim, Head};
+use super::job::{FitTarget, HeadSource};
 use super::model_features::ModelFeatures;
 use super::objective::Objective;
 use super::problem::Problem;
-use super::result::{FeatureResult, FitResult, NuisanceResult, Shown, StartState, predicted};
-use super::run::{axis, best_reads, cross_check};
-use super::scene_model::{Condition, SceneModel};
-use super::target::Target;
+use super::result::{
+    FeatureResult, FitResult, ModelledTargets, NuisanceResult, StartState, predicted_feature_result,
+};
+use super::run::{predict_held_out, read_best_model, search_axis};
+use super::scene_model::{ModelCondition, SceneModel};
+use super::target::TargetValue;
 use crate::blade::Pose;
-use crate::simulate::drive::{Drive, head_motion};
+use crate::simulate::drive::{Drive, smooth_head_motion};
 use crate::simulate::scene::{Scene, StartKind};
 use std::sync::Arc;
 
@@ -20,11 +22,11 @@ impl Problem {
     ///
     /// # Errors
     /// [`FitError::CannotBeFitted`] when a scene refuses what was fitted.
-    pub fn model_of(&self, result: &FitResult) -> Result<SceneModel, FitError> {
+    pub fn fitted_model(&self, result: &FitResult) -> Result<SceneModel, FitError> {
         let conditions = self.model().conditions().iter().enumerate();
         let whole = conditions.map(|(at, condition)| {
             let scene = self.whole_scene(at, &condition.scene, result)?;
-            Ok(Condition { scene, instrument: condition.instrument })
+            Ok(ModelCondition { scene, instrument: condition.instrument })
         });
         Ok(self.model().with_conditions(whole.collect::<Result<_, FitError>>()?))
     }
@@ -34,51 +36,59 @@ impl Problem {
         let refused = |why: String| FitError::CannotBeFitted { why };
         let mut constants = result.nuisances.iter().filter(|nuisance| nuisance.recording.is_none());
         let set = |scene: Scene, constant: &NuisanceResult| {
-            scene.with(&constant.name, constant.estimate).map_err(|error| refused(error.to_string()))
+            scene
+                .with_parameter(&constant.name, constant.estimate)
+                .map_err(|error| refused(error.to_string()))
         };
         let mut scene = constants.try_fold(scene.clone(), set)?;
         let trace = self.traces().iter().find(|trace| trace.condition == at);
         let name = self.job().conditions.get(at).map(|condition| &condition.name);
         let start = result.starts.iter().find(|start| Some(&start.recording) == name);
         let recording = self.recordings().get(at).and_then(Option::as_ref);
-        if let (Some(Head::Recording), Some(start), Some(recording)) =
+        if let (Some(HeadSource::Recording), Some(start), Some(recording)) =
             (trace.map(|trace| trace.head), start, recording)
         {
-            let motion = head_motion(recording).map_err(|error| refused(error.to_string()))?;
+            let motion = smooth_head_motion(recording).map_err(|error| refused(error.to_string()))?;
             scene.run.stop_s = motion.span_s()[1];
             scene.drive = Drive::Recorded(Arc::new(motion));
             scene.start_s = start.time_s;
-            scene.start = StartKind::State(pose(start));
+            scene.start = StartKind::State(start_pose(start));
         }
         Ok(scene)
     }
 
     /// What the whole runs of a result's model show of the job's components and features.
-    pub(super) fn checked(
+    pub(super) fn compare_with_targets(
         &self,
         result: &FitResult,
-        targets: Vec<Target>,
-    ) -> Result<(Shown, Vec<FeatureResult>), FitError> {
-        let (job, model) = (self.job(), self.model_of(result)?);
+        targets: Vec<TargetValue>,
+    ) -> Result<(ModelledTargets, Vec<FeatureResult>), FitError> {
+        let (job, model) = (self.job(), self.fitted_model(result)?);
         let (fitted, held): (Vec<_>, Vec<_>) =
-            job.aims.iter().cloned().zip(targets).partition(|(aim, _)| !aim.held_out);
-        let (aims, targets): (Vec<Aim>, Vec<Target>) = fitted.into_iter().unzip();
+            job.targets.iter().cloned().zip(targets).partition(|(aim, _)| !aim.held_out);
+        let (aims, targets): (Vec<FitTarget>, Vec<TargetValue>) = fitted.into_iter().unzip();
         let wanted: Vec<_> = aims.iter().map(|aim| aim.feature.clone()).collect();
         let goals = targets.iter().map(|target| target.value).collect();
-        let values = result.values(job);
-        let held_out = cross_check(held, &model, &values).iter().map(predicted).collect();
+        let values = result.parameter_estimates(job);
+        let held_out = predict_held_out(held, &model, &values).iter().map(predicted_feature_result).collect();
         if aims.is_empty() {
-            return Ok((Shown { components: Vec::new(), features: Vec::new() }, held_out));
+            return Ok((ModelledTargets { components: Vec::new(), features: Vec::new() }, held_out));
         }
         let seen = ModelFeatures::new(&model, &wanted, goals, job.ensemble.members);
-        let objective = Objective::new(job.parameters.iter().map(axis).collect(), targets, &seen);
+        let objective = Objective::new(job.parameters.iter().map(search_axis).collect(), targets, &seen);
         let best = objective.evaluate_values(values.clone());
-        let shown = Shown::of(&aims, objective.targets(), &[], &best, &best_reads(&seen, &values));
+        let shown = ModelledTargets::compare(
+            &aims,
+            objective.targets(),
+            &[],
+            &best,
+            &read_best_model(&seen, &values),
+        );
         Ok((shown, held_out))
     }
 }
 
-fn pose(start: &StartState) -> Pose {
+fn start_pose(start: &StartState) -> Pose {
     Pose {
         theta: start.neck_angle_rad,
         phi: start.lip_angle_rad,

@@ -1,52 +1,52 @@
 //! Tracks to a recording: points, frames, scale, direction, and what deserves a warning.
 
 use crate::import::error::ImportError;
-use crate::import::level::level;
-use crate::import::options::{Options, Scale};
+use crate::import::level::level_recording;
+use crate::import::options::{CoordinateScale, ImportOptions};
 use crate::import::outcome::{Import, ImportReport};
-use crate::import::reader::calibration::{Calibration, calibrate};
-use crate::import::reader::encoding::Decoded;
-use crate::import::reader::findings::finding;
-use crate::import::reader::grid::{Clocks, Point};
+use crate::import::reader::calibration::{ImportCalibration, calibrate};
+use crate::import::reader::encoding::DecodedText;
+use crate::import::reader::findings::new_finding;
+use crate::import::reader::grid::{ClockGrid, GridPositions};
 use crate::import::reader::track_choice::TrackIndex;
 use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{companion, findings, track_choice};
-use crate::import::source::{Source, base_name, kept_files};
+use crate::import::source::{ImportSource, base_name, preserved_files};
 use crate::recording::files::{CameraEntry, OneOrMany, RecordingFile, SourceEntry};
-use crate::recording::quality::{Check, Optics, Severity, quality};
+use crate::recording::quality::{Check, Optics, Severity, measure_quality};
 use crate::recording::{Recording, Traces};
 use crate::toml_file;
 
 /// Word in a track's name or a header that marks data no camera took.
 const SYNTHETIC: &str = "synthetic";
 
-pub(crate) fn assemble(
-    sources: &[Source],
-    decoded: &[Decoded],
+pub(crate) fn assemble_recording(
+    sources: &[ImportSource],
+    decoded: &[DecodedText],
     mut exports: Vec<TrackFile>,
-    options: &Options,
+    options: &ImportOptions,
     mut report: ImportReport,
 ) -> Result<Import, ImportError> {
-    companion::read_records(sources, &mut exports, options)?;
+    companion::read_camera_records(sources, &mut exports, options)?;
     track_choice::number_repeated_names(&mut exports);
     let calibration = calibrate(&mut exports, options, &mut report)?;
-    let chosen = track_choice::choose(&exports, options)?;
+    let chosen = track_choice::choose_tracks(&exports, options)?;
     for export in &mut exports {
         report.notes.extend(export.notes.iter().map(|note| format!("{}: {note}", export.file)));
         report.findings.append(&mut export.findings);
     }
-    let clocks = Clocks::place(&exports, &chosen, &calibration, options)?;
-    clocks.findings(&exports, &calibration, options, &mut report);
+    let clocks = ClockGrid::align(&exports, &chosen, &calibration, options)?;
+    clocks.report_findings(&exports, &calibration, options, &mut report);
     let synthetic = options.twin.is_some() || exports.iter().any(is_synthetic);
-    let mut points = [0, 1].map(|index| Point::spread(&mut exports, &clocks, chosen[index]));
+    let mut points = [0, 1].map(|index| GridPositions::from_track(&mut exports, &clocks, chosen[index]));
     refuse_no_position(&exports, &chosen, &points)?;
     note_points(&exports, &chosen, &points, &mut report);
     for (point, choice) in points.iter_mut().zip(chosen) {
         let Some((file, track)) = choice else { continue };
         let name = &exports[file].tracks[track].name;
-        report.findings.extend(findings::positions(name, &point.x, &point.y, calibration.scale));
-        point.reject(name, options.min_likelihood, &mut report)?;
-        point.convert(&calibration);
+        report.findings.extend(findings::position_findings(name, &point.x, &point.y, calibration.scale));
+        point.reject_unlikely(name, options.min_likelihood, &mut report)?;
+        point.convert_to_metres(&calibration);
     }
     drop(exports);
     for source in sources {
@@ -57,12 +57,15 @@ pub(crate) fn assemble(
             .for_each(|finding| finding.found = finding.found.replace(&source.name, base_name(&source.name)));
     }
     let file_name = || sources.first().map_or_else(String::new, |source| source.name.clone());
-    let recording = Recording::new(options.name.clone(), clocks.grid, traces(points), synthetic)
+    let recording = Recording::new(options.name.clone(), clocks.grid, to_traces(points), synthetic)
         .map_err(|problem| ImportError::Recording { file: file_name(), problem })?;
-    let camera = camera(&calibration);
+    let camera = camera_entry(&calibration);
     let optics = Optics::from(&camera);
-    let (recording, level) = level(recording, &file_name(), (options, &optics), &mut report)?;
-    let file = RecordingFile { level, ..describe(sources, decoded, options, camera, &recording, &report)? };
+    let (recording, level) = level_recording(recording, &file_name(), (options, &optics), &mut report)?;
+    let file = RecordingFile {
+        level,
+        ..describe_recording(sources, decoded, options, camera, &recording, &report)?
+    };
     Ok(Import { recording, file, report })
 }
 
@@ -70,9 +73,9 @@ pub(crate) fn assemble(
 fn refuse_no_position(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
-    points: &[Point; 2],
+    points: &[GridPositions; 2],
 ) -> Result<(), ImportError> {
-    if points.iter().any(|point| point.tracked().is_some()) {
+    if points.iter().any(|point| point.tracked_frames().is_some()) {
         return Ok(());
     }
     let used: Vec<TrackIndex> = chosen.iter().flatten().copied().collect();
@@ -85,11 +88,11 @@ fn refuse_no_position(
 fn note_points(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
-    points: &[Point; 2],
+    points: &[GridPositions; 2],
     report: &mut ImportReport,
 ) {
     let lacks =
-        |found: String, advice: &str| finding(Check::Points, Severity::Caution, (0.0, ""), found, advice);
+        |found: String, advice: &str| new_finding(Check::Points, Severity::Caution, (0.0, ""), found, advice);
     for ((point, choice), on_grid) in ["tip", "head"].into_iter().zip(chosen).zip(points) {
         match choice {
             Some((file, track)) => {
@@ -97,7 +100,7 @@ fn note_points(
                     "{point}: track `{}` of {}",
                     exports[*file].tracks[*track].name, exports[*file].file
                 ));
-                if on_grid.tracked().is_none() {
+                if on_grid.tracked_frames().is_none() {
                     report.findings.push(lacks(
                         format!(
                             "{point}: its track has no position in any row; its columns stay \
@@ -110,7 +113,7 @@ fn note_points(
                 }
             }
             None => {
-                let advice = track_choice::unchosen(exports, chosen, point).unwrap_or_default();
+                let advice = track_choice::unchosen_advice(exports, chosen, point).unwrap_or_default();
                 report.findings.push(lacks(
                     format!("no track for the {point}: its columns stay empty and there is no deflection"),
                     &advice,
@@ -118,7 +121,7 @@ fn note_points(
             }
         }
     }
-    if let [Some(tip), Some(head)] = [points[0].tracked(), points[1].tracked()]
+    if let [Some(tip), Some(head)] = [points[0].tracked_frames(), points[1].tracked_frames()]
         && tip != head
     {
         report.notes.push(format!(
@@ -134,7 +137,7 @@ fn is_synthetic(export: &TrackFile) -> bool {
     names.into_iter().any(|name| name.to_lowercase().contains(SYNTHETIC))
 }
 
-fn traces([tip, head]: [Point; 2]) -> Traces {
+fn to_traces([tip, head]: [GridPositions; 2]) -> Traces {
     Traces {
         tip_x_m: tip.x,
         tip_y_m: tip.y,
@@ -145,9 +148,9 @@ fn traces([tip, head]: [Point; 2]) -> Traces {
     }
 }
 
-fn camera(calibration: &Calibration) -> CameraEntry {
+fn camera_entry(calibration: &ImportCalibration) -> CameraEntry {
     let metres_per_pixel =
-        if let Scale::MetresPerPixel(metres) = calibration.scale { Some(metres) } else { None };
+        if let CoordinateScale::MetresPerPixel(metres) = calibration.scale { Some(metres) } else { None };
     CameraEntry {
         frame_rate_hz: calibration.rate_hz,
         exposure_s: calibration.exposure_s,
@@ -156,17 +159,17 @@ fn camera(calibration: &Calibration) -> CameraEntry {
     }
 }
 
-fn describe(
-    sources: &[Source],
-    decoded: &[Decoded],
-    options: &Options,
+fn describe_recording(
+    sources: &[ImportSource],
+    decoded: &[DecodedText],
+    options: &ImportOptions,
     camera: CameraEntry,
     recording: &Recording,
     report: &ImportReport,
 ) -> Result<RecordingFile, ImportError> {
     let mut encodings: Vec<&str> = decoded.iter().map(|d| d.encoding).collect();
     encodings.dedup();
-    let names: Vec<String> = kept_files(sources).into_iter().map(|(name, _)| name.to_owned()).collect();
+    let names: Vec<String> = preserved_files(sources).into_iter().map(|(name, _)| name.to_owned()).collect();
     let exposure_s = camera.exposure_s;
     let mut file = RecordingFile::new(camera, recording.is_synthetic());
     file.source = Some(SourceEntry {
@@ -176,8 +179,8 @@ fn describe(
         encoding: encodings.join(", "),
         findings: report.findings.clone(),
     });
-    file.quality = Some(quality(recording, exposure_s));
+    file.quality = Some(measure_quality(recording, exposure_s));
     file.conditions = options.conditions.clone();
-    file.twin = options.twin.as_ref().map(|(name, text)| toml_file::table(name, text)).transpose()?;
+    file.twin = options.twin.as_ref().map(|(name, text)| toml_file::parse_table(name, text)).transpose()?;
     Ok(file)
 }

@@ -1,6 +1,6 @@
 //! Why an export was refused: the place, what was found, what was expected, what to do.
 
-use crate::import::level::NotLevelled;
+use crate::import::level::LevelError;
 use crate::recording::RecordingError;
 use crate::recording::files::FilesError;
 use crate::toml_file::TomlError;
@@ -8,7 +8,7 @@ use std::fmt;
 
 /// A place in a text file.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Place {
+pub struct TextLocation {
     /// File as named by the user.
     pub file: String,
     /// 1-based line.
@@ -17,7 +17,7 @@ pub struct Place {
     pub column: usize,
 }
 
-impl fmt::Display for Place {
+impl fmt::Display for TextLocation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}:{}", self.file, self.line, self.column)
     }
@@ -153,7 +153,7 @@ pub enum ImportError {
     )]
     QuotedComma {
         /// The first row of them.
-        place: Place,
+        place: TextLocation,
         /// The number.
         found: String,
     },
@@ -164,7 +164,7 @@ pub enum ImportError {
     )]
     Delimiter {
         /// The first row that looks like data.
-        place: Place,
+        place: TextLocation,
         /// The row.
         found: String,
     },
@@ -175,7 +175,7 @@ pub enum ImportError {
     )]
     DecimalComma {
         /// The first such row.
-        place: Place,
+        place: TextLocation,
         /// Its cells.
         found: usize,
         /// What they should be, in words.
@@ -186,9 +186,9 @@ pub enum ImportError {
         "{place}: found a quoted cell that runs over {lines} lines, expected it to end in its own; close \
          the quotation mark, or export again"
     )]
-    Quote {
+    OpenQuote {
         /// The row.
-        place: Place,
+        place: TextLocation,
         /// Lines until the next quotation mark or the end of the file.
         lines: usize,
     },
@@ -199,7 +199,7 @@ pub enum ImportError {
     )]
     BlankLine {
         /// The line.
-        place: Place,
+        place: TextLocation,
     },
     /// Two rows of one track in one frame.
     #[error(
@@ -207,9 +207,9 @@ pub enum ImportError {
          every {what} once in a track; see in the tracking program which of the two is right and export again, or split the track where it merges with \
          another"
     )]
-    Twice {
+    DuplicateRow {
         /// The second row.
-        place: Place,
+        place: TextLocation,
         /// `frame` or `time`.
         what: &'static str,
         /// Its value.
@@ -238,7 +238,7 @@ pub enum ImportError {
     )]
     Ragged {
         /// The row.
-        place: Place,
+        place: TextLocation,
         /// Its cells.
         found: usize,
         /// Cells of the table.
@@ -248,7 +248,7 @@ pub enum ImportError {
     #[error("{place}: column {name}: found `{found}`, expected {expected}; {advice}")]
     Cell {
         /// The cell.
-        place: Place,
+        place: TextLocation,
         /// What is wrong with it.
         problem: CellProblem,
         /// Name of the column.
@@ -299,7 +299,7 @@ pub enum ImportError {
     /// Options without which no number has a meaning.
     #[error("{files}: read as {format}, which does not say all of how it was recorded, and no default is \
         safe; give\n  {}", .missing.join("\n  "))]
-    Unset {
+    MissingOptions {
         /// Files as named by the user.
         files: String,
         /// Format that they are in.
@@ -316,7 +316,7 @@ pub enum ImportError {
         /// File as named by the user.
         file: String,
         /// Why not.
-        problem: NotLevelled,
+        problem: LevelError,
     },
     /// An option with an unusable value.
     #[error("{option}: found `{found}`, expected {expected}")]
@@ -340,7 +340,7 @@ pub enum ImportError {
         milliseconds = if (.declared_hz / .implied_hz / 1000.0 - 1.0).abs() < 0.01 { "; if the times are \
             milliseconds, add --time ms" } else { "" }
     )]
-    Rate {
+    RateMismatch {
         /// File as named by the user.
         file: String,
         /// Rate of its times, 1/s.
@@ -356,7 +356,7 @@ pub enum ImportError {
          that is the rate at which this video was recorded, or move the record away if it belongs to another \
          one"
     )]
-    RateRecord {
+    RecordedRateMismatch {
         /// Rate as declared, 1/s.
         declared_hz: f64,
         /// The record that says otherwise.
@@ -369,7 +369,7 @@ pub enum ImportError {
         "{file}: found {found}, expected {expected} as in {other}; export both tracks from one clip with the \
          same time settings"
     )]
-    Grids {
+    GridMismatch {
         /// File as named by the user.
         file: String,
         /// What was found.

@@ -19,15 +19,15 @@ mod trc;
 mod wiperlab;
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::options::Options;
+use crate::import::format::FileFormat;
+use crate::import::options::ImportOptions;
 use crate::import::reader::Document;
-use crate::import::reader::finding;
-use crate::recording::quality::{Check, Finding, Severity};
+use crate::import::reader::new_finding;
+use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::toml_file;
 
 /// Formats that are read, in the order in which the content is asked.
-static FORMATS: &[&dyn Format] = &[
+static FORMATS: &[&dyn FileFormat] = &[
     &wiperlab::Wiperlab,
     &dippmotion::DippMotion,
     &dice::Dice,
@@ -36,14 +36,14 @@ static FORMATS: &[&dyn Format] = &[
     &dltdv::Dltdv,
     &trackmate::TrackMate,
     &sleap::Sleap,
-    &tracker::Tracker,
+    &tracker::TrackerFormat,
     &trc::Trc,
     &imagej::ImageJ,
     &trackpy::Trackpy,
     &motion_analysis::MotionAnalysis,
     &framedias::FrameDias,
-    &plain::Plain,
-    &generic::Generic,
+    &plain::PlainFormat,
+    &generic::GenericFormat,
 ];
 
 /// Programs whose layout is not published: their tables are read as plain ones.
@@ -51,34 +51,42 @@ const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "
 
 pub(crate) fn choose_format(
     documents: &[Document],
-    options: &Options,
-) -> Result<(&'static dyn Format, String), ImportError> {
+    options: &ImportOptions,
+) -> Result<(&'static dyn FileFormat, String), ImportError> {
     match options.format.as_deref() {
-        None | Some("auto") => detect(documents, options),
+        None | Some("auto") => detect_format(documents, options),
         Some(name) => match FORMATS.iter().copied().find(|format| format.name() == name) {
             Some(format) => {
                 refuse_other_programs(format, documents, options)?;
                 Ok((format, "as given with --format".to_owned()))
             }
-            None => Err(unknown_format(name)),
+            None => Err(unknown_format_error(name)),
         },
     }
 }
 
-fn detect(documents: &[Document], options: &Options) -> Result<(&'static dyn Format, String), ImportError> {
+fn detect_format(
+    documents: &[Document],
+    options: &ImportOptions,
+) -> Result<(&'static dyn FileFormat, String), ImportError> {
     if options.columns.is_some() {
         // (these lose samples and are filtered, whoever names their columns)
-        let format: &'static dyn Format =
-            if documents.iter().all(kinovea::is_window) { &kinovea::Kinovea } else { &generic::Generic };
+        let format: &'static dyn FileFormat = if documents.iter().all(kinovea::is_window) {
+            &kinovea::Kinovea
+        } else {
+            &generic::GenericFormat
+        };
         return Ok((format, "--columns names the columns".to_owned()));
     }
-    let mut found: Option<(&'static dyn Format, String)> = None;
+    let mut found: Option<(&'static dyn FileFormat, String)> = None;
     for document in documents {
-        let Some((format, reason)) = recognise(document, options)? else {
-            return Err(unrecognised(document));
+        let Some((format, reason)) = recognise_document(document, options)? else {
+            return Err(unrecognised_error(document));
         };
         match &found {
-            Some((first, _)) if first.name() != format.name() => return Err(mixed(document, format, *first)),
+            Some((first, _)) if first.name() != format.name() => {
+                return Err(mixed_formats_error(document, format, *first));
+            }
             Some(_) => {}
             None => found = Some((format, reason)),
         }
@@ -88,69 +96,77 @@ fn detect(documents: &[Document], options: &Options) -> Result<(&'static dyn For
 
 /// The format of a document and what shows it: the first that recognises it. Where several do, one that says
 /// that its program wrote no positions here is believed.
-fn recognise(
+fn recognise_document(
     document: &Document,
-    options: &Options,
-) -> Result<Option<(&'static dyn Format, String)>, ImportError> {
-    let mut found = programs(document);
+    options: &ImportOptions,
+) -> Result<Option<(&'static dyn FileFormat, String)>, ImportError> {
+    let mut found = recognising_formats(document);
     let Some(first) = found.next() else {
-        return Ok(plain::Plain.recognises(document).map(|reason| (&plain::Plain as &dyn Format, reason)));
+        return Ok(plain::PlainFormat
+            .recognises(document)
+            .map(|reason| (&plain::PlainFormat as &dyn FileFormat, reason)));
     };
-    match found.find_map(|(other, _)| refused(other, document, options)) {
+    match found.find_map(|(other, _)| refusal_by(other, document, options)) {
         Some(refusal) => Err(refusal),
         None => Ok(Some(first)),
     }
 }
 
 /// The formats of programs that recognise a document, with what shows it; a plain table is nobody's.
-fn programs<'d>(document: &'d Document) -> impl Iterator<Item = (&'static dyn Format, String)> + 'd {
+fn recognising_formats<'d>(
+    document: &'d Document,
+) -> impl Iterator<Item = (&'static dyn FileFormat, String)> + 'd {
     FORMATS
         .iter()
         .copied()
-        .filter(|format| format.name() != plain::NAME)
+        .filter(|format| format.name() != plain::PLAIN_NAME)
         .filter_map(|format| format.recognises(document).map(|reason| (format, reason)))
 }
 
 /// Why `format`, which recognises a document, says that it holds no positions over time, if it does.
-fn refused(format: &dyn Format, document: &Document, options: &Options) -> Option<ImportError> {
+fn refusal_by(format: &dyn FileFormat, document: &Document, options: &ImportOptions) -> Option<ImportError> {
     format.read(document, options).err().filter(|error| matches!(error, ImportError::WrongTable { .. }))
 }
 
 /// A document that the program which wrote it calls no positions over time is not read as another format's,
 /// whatever --format says.
 fn refuse_other_programs(
-    chosen: &'static dyn Format,
+    chosen: &'static dyn FileFormat,
     documents: &[Document],
-    options: &Options,
+    options: &ImportOptions,
 ) -> Result<(), ImportError> {
     if options.columns.is_some() {
         return Ok(()); // (who names the columns answers for them, and reads what the program says)
     }
-    documents.iter().find_map(|document| refused_by_others(chosen, document, options)).map_or(Ok(()), Err)
+    documents.iter().find_map(|document| refusal_by_others(chosen, document, options)).map_or(Ok(()), Err)
 }
 
-fn refused_by_others(chosen: &dyn Format, document: &Document, options: &Options) -> Option<ImportError> {
-    programs(document)
+fn refusal_by_others(
+    chosen: &dyn FileFormat,
+    document: &Document,
+    options: &ImportOptions,
+) -> Option<ImportError> {
+    recognising_formats(document)
         .filter(|(format, _)| format.name() != chosen.name())
-        .find_map(|(format, _)| refused(format, document, options))
+        .find_map(|(format, _)| refusal_by(format, document, options))
 }
 
 /// Named columns of tables that their own program calls no positions over time.
-pub(crate) fn doubted_columns(
-    chosen: &dyn Format,
+pub(crate) fn find_doubtful_columns(
+    chosen: &dyn FileFormat,
     documents: &[Document],
-    options: &Options,
-) -> Vec<Finding> {
+    options: &ImportOptions,
+) -> Vec<QualityFinding> {
     let doubt = |document: &Document| {
-        let refusal = refused_by_others(chosen, document, options)?;
+        let refusal = refusal_by_others(chosen, document, options)?;
         let found = format!("--columns names columns of a table that would be refused without it: {refusal}");
         let advice = "make sure that these columns are positions over time";
-        Some(finding(Check::OtherTable, Severity::Caution, (0.0, ""), found, advice))
+        Some(new_finding(Check::OtherTable, Severity::Caution, (0.0, ""), found, advice))
     };
     options.columns.iter().flat_map(|_| documents.iter().filter_map(doubt)).collect()
 }
 
-fn mixed(document: &Document, found: &dyn Format, first: &dyn Format) -> ImportError {
+fn mixed_formats_error(document: &Document, found: &dyn FileFormat, first: &dyn FileFormat) -> ImportError {
     ImportError::format(
         document.file,
         format!("the format {}", found.name()),
@@ -164,7 +180,7 @@ pub fn format_names() -> Vec<&'static str> {
     FORMATS.iter().map(|format| format.name()).collect()
 }
 
-fn unknown_format(name: &str) -> ImportError {
+fn unknown_format_error(name: &str) -> ImportError {
     let mut names = format_names();
     names.push("auto");
     let undocumented = UNDOCUMENTED.contains(&name.to_lowercase().replace([' ', '_'], "-").as_str());
@@ -177,12 +193,12 @@ fn unknown_format(name: &str) -> ImportError {
              --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5"
                 .to_owned()
         } else {
-            format!("{}; any other table is read with --columns", toml_file::nearest(name, &names))
+            format!("{}; any other table is read with --columns", toml_file::suggest_key(name, &names))
         },
     )
 }
 
 /// A file that no format recognises: its own problem, or a plain table whose columns have no names yet.
-fn unrecognised(document: &Document) -> ImportError {
-    document.table().map_or_else(|error| error, generic::unnamed)
+fn unrecognised_error(document: &Document) -> ImportError {
+    document.table().map_or_else(|error| error, generic::unnamed_columns_error)
 }

@@ -5,7 +5,7 @@ use crate::recording::files::YAxis;
 
 /// What the user says about an export. `None` is refused where no default is safe.
 #[derive(Debug, Clone, Default)]
-pub struct Options {
+pub struct ImportOptions {
     /// Name of the recording, for messages and figures.
     pub name: String,
     /// Name of the format; `None` or `auto` finds it from the content.
@@ -15,7 +15,7 @@ pub struct Options {
     /// Rate at which the camera recorded, 1/s.
     pub frame_rate_hz: Option<f64>,
     /// Length that a unit of the file's coordinates stands for.
-    pub scale: Option<Scale>,
+    pub scale: Option<CoordinateScale>,
     /// Direction of y in the file.
     pub y_axis: Option<YAxis>,
     /// Exposure of a frame, s.
@@ -30,7 +30,7 @@ pub struct Options {
     /// Track that is the head.
     pub head: Option<String>,
     /// Columns of a plain table.
-    pub columns: Option<Columns>,
+    pub columns: Option<ColumnMap>,
     /// Confidence below which a position counts as missing.
     pub min_likelihood: Option<f64>,
     /// Whether the tilt of the camera is taken out of both tracks.
@@ -59,7 +59,7 @@ pub enum TimeColumn {
 
 /// Length of one unit of the file's coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Scale {
+pub enum CoordinateScale {
     /// Coordinates are pixels, each showing this length, m.
     MetresPerPixel(f64),
     /// Coordinates are lengths in a unit of this many metres.
@@ -67,10 +67,10 @@ pub enum Scale {
 }
 
 /// Length units by their sign; `u`, the micro sign and the Greek mu all mean micro.
-const UNITS: [(&str, f64); 6] =
+const LENGTH_UNITS: [(&str, f64); 6] =
     [("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6), ("\u{b5}m", 1e-6), ("\u{3bc}m", 1e-6)];
 
-impl Scale {
+impl CoordinateScale {
     /// Reads `21.5um/px` or a length unit such as `mm`.
     ///
     /// # Errors
@@ -83,7 +83,7 @@ impl Scale {
                 "a length a pixel such as 21.5um/px, or the unit of the file's coordinates: m, cm, mm or um",
             )
         };
-        let unit = |name: &str| UNITS.iter().find(|unit| unit.0 == name).map(|unit| unit.1);
+        let unit = |name: &str| LENGTH_UNITS.iter().find(|unit| unit.0 == name).map(|unit| unit.1);
         let Some(length) = text.trim().strip_suffix("/px") else {
             return unit(text.trim()).map(Self::Unit).ok_or_else(refuse);
         };
@@ -129,7 +129,7 @@ impl std::fmt::Display for ColumnName {
 
 /// Columns of a plain table: key and column, in the order given.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Columns(pub Vec<(&'static str, ColumnName)>);
+pub struct ColumnMap(pub Vec<(&'static str, ColumnName)>);
 
 /// Keys of `--columns`.
 pub(crate) const COLUMN_KEYS: [&str; 13] = [
@@ -148,9 +148,9 @@ pub(crate) const COLUMN_KEYS: [&str; 13] = [
     "confidence",
 ];
 /// `frame=row`: the table has no column of frames or times, every row is a frame.
-pub(crate) const ROW: &str = "row";
+pub(crate) const ROW_COLUMN: &str = "row";
 
-impl Columns {
+impl ColumnMap {
     /// Reads `time=1,tip-x=2,tip-y=3,head-x=4,head-y=5`; a column is a 1-based number or a name of the
     /// header.
     ///
@@ -165,7 +165,10 @@ impl Columns {
                 .ok_or_else(|| refuse(part, "KEY=COLUMN pairs such as time=1,tip-x=2,head-x=4".to_owned()))?;
             let known = COLUMN_KEYS.into_iter().find(|known| *known == key.trim());
             let key = known.ok_or_else(|| {
-                refuse(key, format!("a known key; {}", crate::toml_file::nearest(key.trim(), &COLUMN_KEYS)))
+                refuse(
+                    key,
+                    format!("a known key; {}", crate::toml_file::suggest_key(key.trim(), &COLUMN_KEYS)),
+                )
             })?;
             if columns.iter().any(|(seen, _)| *seen == key) {
                 return Err(refuse(part, format!("the key `{key}` only once")));
@@ -210,7 +213,7 @@ impl Columns {
     }
 }
 
-impl Options {
+impl ImportOptions {
     /// Reads `KEY=VALUE` into `[conditions]`; numbers and true/false keep their type.
     ///
     /// # Errors
@@ -269,7 +272,7 @@ const RATES_HZ: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
 ///
 /// # Errors
 /// [`ImportError::Option`] naming the option.
-pub fn check(options: &Options) -> Result<(), ImportError> {
+pub fn check_options(options: &ImportOptions) -> Result<(), ImportError> {
     let positive = [("--frame-rate-hz", options.frame_rate_hz), ("--exposure-s", options.exposure_s)];
     for (option, value) in positive {
         if let Some(found) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
@@ -305,18 +308,18 @@ mod tests {
 
     #[test]
     fn scales_are_lengths_a_pixel_or_units() {
-        assert_eq!(Scale::parse("21.5um/px"), Ok(Scale::MetresPerPixel(2.15e-5)));
-        assert_eq!(Scale::parse("0.02 mm/px"), Ok(Scale::MetresPerPixel(2e-5)));
-        assert_eq!(Scale::parse("mm"), Ok(Scale::Unit(1e-3)));
-        assert_eq!(Scale::parse("\u{b5}m"), Ok(Scale::Unit(1e-6)));
+        assert_eq!(CoordinateScale::parse("21.5um/px"), Ok(CoordinateScale::MetresPerPixel(2.15e-5)));
+        assert_eq!(CoordinateScale::parse("0.02 mm/px"), Ok(CoordinateScale::MetresPerPixel(2e-5)));
+        assert_eq!(CoordinateScale::parse("mm"), Ok(CoordinateScale::Unit(1e-3)));
+        assert_eq!(CoordinateScale::parse("\u{b5}m"), Ok(CoordinateScale::Unit(1e-6)));
         for text in ["21.5", "inch", "-1um/px", "0mm/px", "1e999m/px", "/px", "5/px", ""] {
-            assert!(Scale::parse(text).is_err(), "{text}");
+            assert!(CoordinateScale::parse(text).is_err(), "{text}");
         }
     }
 
     #[test]
     fn columns_name_the_part_at_fault() {
-        let says = |text: &str| Columns::parse(text).unwrap_err().to_string();
+        let says = |text: &str| ColumnMap::parse(text).unwrap_err().to_string();
         assert_eq!(
             says("time=1,tipx=2"),
             "--columns: found `tipx`, expected a known key; did you mean `tip-x`?"
@@ -325,13 +328,13 @@ mod tests {
         assert!(says("time=1,tip-x=0").contains("from 1"));
         assert!(says("time=1,head-y=2").contains("tip-x= or head-x="));
         assert!(says("time=1,time=2,tip-x=3").contains("only once"));
-        let columns = Columns::parse("time=1, tip-x=X (cm)").unwrap();
+        let columns = ColumnMap::parse("time=1, tip-x=X (cm)").unwrap();
         assert_eq!(columns.get("tip-x"), Some(&ColumnName::Name("X (cm)".to_owned())));
     }
 
     #[test]
     fn conditions_keep_their_types() {
-        let mut options = Options::default();
+        let mut options = ImportOptions::default();
         for text in ["glass=wet", "speed_m_per_s=0.5", "run=3"] {
             options.add_condition(text).unwrap();
         }

@@ -2,7 +2,7 @@
 
 use crate::recording::Recording;
 use crate::recording::files::RecordingFile;
-use crate::recording::quality::{Finding, Severity};
+use crate::recording::quality::{QualityFinding, Severity};
 
 /// An import that succeeded.
 #[derive(Debug, Clone, PartialEq)]
@@ -25,7 +25,7 @@ pub struct ImportReport {
     /// Facts worth knowing.
     pub notes: Vec<String>,
     /// What only the export could show: it is kept in `recording.toml`.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<QualityFinding>,
 }
 
 impl ImportReport {
@@ -34,7 +34,7 @@ impl ImportReport {
     pub fn lines(&self) -> Vec<String> {
         let first = format!("format: {} ({})", self.format, self.reason);
         let notes = self.notes.iter().map(|note| format!("note: {note}"));
-        std::iter::once(first).chain(notes).chain(self.findings.iter().map(Finding::line)).collect()
+        std::iter::once(first).chain(notes).chain(self.findings.iter().map(QualityFinding::to_line)).collect()
     }
 
     /// What may be wrong, in words.

@@ -28,11 +28,11 @@ pub(crate) mod units;
 
 pub(crate) use column::Column;
 pub(crate) use document::Document;
-pub(crate) use findings::finding;
-pub(crate) use instances::{Collector, Order, PointShape, Position, Shape, Stamp};
-pub(crate) use layout::{Layout, LostRule, PointCells};
-pub(crate) use number::{Number, number};
-pub(crate) use rows::{Record, Row};
-pub(crate) use table::Table;
+pub(crate) use findings::new_finding;
+pub(crate) use instances::{InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector};
+pub(crate) use layout::{LostRule, PointCells, TableLayout};
+pub(crate) use number::{CellNumber, parse_number};
+pub(crate) use rows::{RowView, TextRow};
+pub(crate) use table::DelimitedTable;
 pub(crate) use track_file::{Clock, Fact, Facts, Track, TrackFile};
-pub(crate) use units::{TimeUnit, Unit};
+pub(crate) use units::{CoordinateUnit, TimeUnit};

@@ -7,34 +7,34 @@ use crate::text::sha256;
 
 /// A file to import.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Source {
+pub struct ImportSource {
     /// Path or name as given by the user; its last part names the copy in the recording.
     pub name: String,
     /// Its bytes.
     pub bytes: Vec<u8>,
     /// Its companion files: see [`companion_names`](crate::import::companion_names).
-    pub companions: Vec<Companion>,
+    pub companions: Vec<CompanionFile>,
 }
 
 /// A file in the folder of an export that belongs to it, such as a camera's record.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Companion {
+pub struct CompanionFile {
     /// Its path or name.
     pub name: String,
     /// Its bytes.
     pub bytes: Vec<u8>,
 }
 
-impl Source {
+impl ImportSource {
     /// A file without companions.
     #[must_use]
-    pub fn alone(name: impl Into<String>, bytes: Vec<u8>) -> Self {
+    pub fn without_companions(name: impl Into<String>, bytes: Vec<u8>) -> Self {
         Self { name: name.into(), bytes, companions: vec![] }
     }
 }
 
 /// Every copy in the recording's folder needs a name of its own.
-pub(crate) fn check_names(sources: &[Source]) -> Result<(), ImportError> {
+pub(crate) fn check_file_names(sources: &[ImportSource]) -> Result<(), ImportError> {
     if sources.is_empty() {
         return Err(ImportError::NoSource);
     }
@@ -57,7 +57,7 @@ pub(crate) fn base_name(path: &str) -> &str {
 /// Names and bytes of the files that are kept with the recording, in the order of `[source]`; a companion of
 /// several is kept once.
 #[must_use]
-pub fn kept_files(sources: &[Source]) -> Vec<(&str, &[u8])> {
+pub fn preserved_files(sources: &[ImportSource]) -> Vec<(&str, &[u8])> {
     let mut kept: Vec<(&str, &[u8])> =
         sources.iter().map(|source| (base_name(&source.name), source.bytes.as_slice())).collect();
     for file in sources.iter().flat_map(|source| &source.companions) {
@@ -70,6 +70,6 @@ pub fn kept_files(sources: &[Source]) -> Vec<(&str, &[u8])> {
 }
 
 /// SHA-256 of every kept file, in their order.
-pub(crate) fn hashes(sources: &[Source]) -> Vec<String> {
-    kept_files(sources).into_iter().map(|(_, bytes)| sha256(bytes)).collect()
+pub(crate) fn hash_sources(sources: &[ImportSource]) -> Vec<String> {
+    preserved_files(sources).into_iter().map(|(_, bytes)| sha256(bytes)).collect()
 }

@@ -6,23 +6,23 @@
 
 use sha2::{Digest, Sha256};
 
-const KEY: &str = ",\"sha256\":\"";
-const END: &str = "\"}";
+const CHECKSUM_KEY: &str = ",\"sha256\":\"";
+const LINE_END: &str = "\"}";
 /// Hexadecimal digits of the checksum: 64 bits, so that an accident is missed once in 2e19.
-const DIGITS: usize = 16;
+const CHECKSUM_DIGITS: usize = 16;
 
 /// A JSON object with its checksum, as it stands in a line; for whoever writes journals by another program.
 #[must_use]
-pub fn sealed(object: &str) -> String {
+pub fn append_checksum(object: &str) -> String {
     let content = object.strip_suffix('}').unwrap_or(object);
-    format!("{content}{KEY}{}{END}", checksum(content.as_bytes()))
+    format!("{content}{CHECKSUM_KEY}{}{LINE_END}", hex_checksum(content.as_bytes()))
 }
 
 /// What the end of a line says of the rest.
 #[derive(Debug, PartialEq, Eq)]
-pub(super) enum Seal {
+pub(super) enum LineChecksum {
     /// The checksum holds; the object without it.
-    Holds(Vec<u8>),
+    Valid(Vec<u8>),
     /// The checksum does not hold: what stands there, and what the line has.
     Broken {
         found: String,
@@ -31,26 +31,26 @@ pub(super) enum Seal {
     Absent,
 }
 
-impl Seal {
-    pub(super) fn of(line: &[u8]) -> Self {
-        let Some((content, found)) = parts(line) else { return Self::Absent };
-        let computed = checksum(content);
+impl LineChecksum {
+    pub(super) fn check(line: &[u8]) -> Self {
+        let Some((content, found)) = split_checksum(line) else { return Self::Absent };
+        let computed = hex_checksum(content);
         match String::from_utf8_lossy(found).into_owned() {
-            found if found == computed => Self::Holds([content, b"}"].concat()),
+            found if found == computed => Self::Valid([content, b"}"].concat()),
             found => Self::Broken { found, computed },
         }
     }
 }
 
 /// The bytes before the checksum, and the checksum.
-fn parts(line: &[u8]) -> Option<(&[u8], &[u8])> {
-    let line = line.strip_suffix(END.as_bytes())?;
-    let (rest, digits) = line.split_at_checked(line.len().checked_sub(DIGITS)?)?;
-    Some((rest.strip_suffix(KEY.as_bytes())?, digits))
+fn split_checksum(line: &[u8]) -> Option<(&[u8], &[u8])> {
+    let line = line.strip_suffix(LINE_END.as_bytes())?;
+    let (rest, digits) = line.split_at_checked(line.len().checked_sub(CHECKSUM_DIGITS)?)?;
+    Some((rest.strip_suffix(CHECKSUM_KEY.as_bytes())?, digits))
 }
 
-fn checksum(content: &[u8]) -> String {
-    Sha256::digest(content).iter().take(DIGITS / 2).map(|byte| format!("{byte:02x}")).collect()
+fn hex_checksum(content: &[u8]) -> String {
+    Sha256::digest(content).iter().take(CHECKSUM_DIGITS / 2).map(|byte| format!("{byte:02x}")).collect()
 }
 
 #[cfg(test)]
@@ -59,19 +59,25 @@ mod tests {
 
     #[test]
     fn every_changed_byte_of_a_line_is_found() {
-        let line = sealed("{\"index\":3,\"values\":[\"0.25\"]}");
+        let line = append_checksum("{\"index\":3,\"values\":[\"0.25\"]}");
         // printf '%s' '{"index":3,"values":["0.25"]' | sha256sum
         assert_eq!(line, "{\"index\":3,\"values\":[\"0.25\"],\"sha256\":\"3e7e4b4d0d5fce91\"}");
-        assert_eq!(Seal::of(line.as_bytes()), Seal::Holds(b"{\"index\":3,\"values\":[\"0.25\"]}".to_vec()));
+        assert_eq!(
+            LineChecksum::check(line.as_bytes()),
+            LineChecksum::Valid(b"{\"index\":3,\"values\":[\"0.25\"]}".to_vec())
+        );
         for at in 0..line.len() {
             for bit in 0..8 {
                 let mut changed = line.clone().into_bytes();
                 changed[at] ^= 1 << bit;
-                assert!(!matches!(Seal::of(&changed), Seal::Holds(_)), "byte {at}, bit {bit}");
+                assert!(
+                    !matches!(LineChecksum::check(&changed), LineChecksum::Valid(_)),
+                    "byte {at}, bit {bit}"
+                );
             }
         }
         for cut in 0..line.len() {
-            assert_eq!(Seal::of(&line.as_bytes()[..cut]), Seal::Absent, "cut at {cut}");
+            assert_eq!(LineChecksum::check(&line.as_bytes()[..cut]), LineChecksum::Absent, "cut at {cut}");
         }
     }
 }

@@ -1,10 +1,10 @@
 //! Why a journal is refused.
 
-use super::header::{Kind, LAYOUT};
+use super::header::{CheckpointKind, LAYOUT};
 
 /// Why a journal was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-pub enum JournalError {
+pub enum CheckpointError {
     /// Another layout.
     #[error(
         "{file}: a journal of layout {found}, expected layout {LAYOUT}; move it away and run the {kind} again"
@@ -13,7 +13,7 @@ pub enum JournalError {
         /// File as named by the user.
         file: String,
         /// What it is of.
-        kind: Kind,
+        kind: CheckpointKind,
         /// Layout of the file.
         found: u32,
     },
@@ -25,9 +25,9 @@ pub enum JournalError {
         /// File as named by the user.
         file: String,
         /// What it is of.
-        found: Kind,
+        found: CheckpointKind,
         /// What was expected.
-        expected: Kind,
+        expected: CheckpointKind,
     },
     /// Another version of the program wrote it.
     #[error(
@@ -50,7 +50,7 @@ pub enum JournalError {
         /// File as named by the user.
         file: String,
         /// What it is of.
-        kind: Kind,
+        kind: CheckpointKind,
         /// Fingerprint in its header.
         found: String,
         /// Fingerprint of this problem.
@@ -85,7 +85,7 @@ pub enum JournalError {
         /// 1-based line.
         line: usize,
         /// What it is of.
-        kind: Kind,
+        kind: CheckpointKind,
         /// What was found and what was expected.
         problem: String,
     },
@@ -100,7 +100,7 @@ pub enum JournalError {
         /// 1-based line.
         line: usize,
         /// What it is of.
-        kind: Kind,
+        kind: CheckpointKind,
         /// What the line says.
         found: String,
         /// What is computed.

@@ -1,8 +1,8 @@
 //! The first line of a journal.
 
-use super::error::JournalError;
-use super::lines::{lines, without_mark};
-use super::record::Record;
+use super::error::CheckpointError;
+use super::lines::{split_lines, strip_byte_order_mark};
+use super::record::CheckpointRecord;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -12,7 +12,7 @@ pub(super) const LAYOUT: u32 = 3;
 /// What a journal is of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Kind {
+pub enum CheckpointKind {
     /// Evaluations of a fit.
     Fit,
     /// Iterates of a fit to traces.
@@ -21,7 +21,7 @@ pub enum Kind {
     Sweep,
 }
 
-impl Kind {
+impl CheckpointKind {
     /// What one of its records is called.
     #[must_use]
     pub fn record(self) -> &'static str {
@@ -42,7 +42,7 @@ impl Kind {
     }
 }
 
-impl fmt::Display for Kind {
+impl fmt::Display for CheckpointKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::Fit => "fit",
@@ -55,9 +55,9 @@ impl fmt::Display for Kind {
 /// First line of a journal; `B` is what a journal of its kind says besides.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Header<B> {
+pub struct CheckpointHeader<B> {
     /// What it is of.
-    pub journal: Kind,
+    pub journal: CheckpointKind,
     /// Layout.
     pub layout: u32,
     /// Fingerprint of problem, data and program, from [`super::fingerprint`].
@@ -68,24 +68,28 @@ pub struct Header<B> {
     pub body: B,
 }
 
-impl<B> Header<B> {
+impl<B> CheckpointHeader<B> {
     /// Refuses the header of another problem, data or program than `expected` is of.
     ///
     /// # Errors
-    /// [`JournalError::OtherVersion`], [`JournalError::OtherProblem`], or [`JournalError::Header`] when it
+    /// [`CheckpointError::OtherVersion`], [`CheckpointError::OtherProblem`], or [`CheckpointError::Header`] when it
     /// was edited.
-    pub fn check<R: Record<Body = B>>(&self, file: &str, expected: &Self) -> Result<(), JournalError> {
+    pub fn check_matches<R: CheckpointRecord<Body = B>>(
+        &self,
+        file: &str,
+        expected: &Self,
+    ) -> Result<(), CheckpointError> {
         let name = file.to_owned();
         if self.version != expected.version {
             let (found, expected) = (self.version.clone(), expected.version.clone());
-            return Err(JournalError::OtherVersion { file: name, found, expected });
+            return Err(CheckpointError::OtherVersion { file: name, found, expected });
         }
         if self.fingerprint != expected.fingerprint {
             let (found, expected) = (self.fingerprint.clone(), expected.fingerprint.clone());
-            return Err(JournalError::OtherProblem { file: name, kind: R::KIND, found, expected });
+            return Err(CheckpointError::OtherProblem { file: name, kind: R::KIND, found, expected });
         }
-        match R::other_problem(&self.body, &expected.body) {
-            Some(problem) => Err(JournalError::Header { file: name, problem }),
+        match R::problem_difference(&self.body, &expected.body) {
+            Some(problem) => Err(CheckpointError::Header { file: name, problem }),
             None => Ok(()),
         }
     }
@@ -93,21 +97,21 @@ impl<B> Header<B> {
 
 /// What every layout of a header has.
 #[derive(Debug, Deserialize)]
-pub(super) struct Start {
-    pub journal: Kind,
+pub(super) struct HeaderPrefix {
+    pub journal: CheckpointKind,
     pub layout: u32,
 }
 
 /// What a file is a journal of, by its first line; `None` where it has no whole line or is no journal.
 #[must_use]
-pub fn kind_of(bytes: &[u8]) -> Option<Kind> {
-    let first = lines(bytes).next().filter(|line| line.ended)?;
-    let start: Start = serde_json::from_slice(without_mark(first.bytes)).ok()?;
+pub fn detect_kind(bytes: &[u8]) -> Option<CheckpointKind> {
+    let first = split_lines(bytes).next().filter(|line| line.ended)?;
+    let start: HeaderPrefix = serde_json::from_slice(strip_byte_order_mark(first.bytes)).ok()?;
     Some(start.journal)
 }
 
 /// Whether a file holds a whole line.
 #[must_use]
 pub fn has_whole_line(bytes: &[u8]) -> bool {
-    lines(bytes).next().is_some_and(|line| line.ended)
+    split_lines(bytes).next().is_some_and(|line| line.ended)
 }

@@ -1,11 +1,11 @@
 //! A journal as it is read.
 
-use super::checksum::Seal;
-use super::error::JournalError;
-use super::header::{Header, LAYOUT, Start};
-use super::lines::{Line, without_mark};
-use super::record::Record;
-use super::stream::{End, Found, Stream};
+use super::checksum::LineChecksum;
+use super::error::CheckpointError;
+use super::header::{CheckpointHeader, HeaderPrefix, LAYOUT};
+use super::lines::{RawLine, strip_byte_order_mark};
+use super::record::CheckpointRecord;
+use super::stream::{CheckpointEnd, CheckpointReader, StoredRecord};
 use serde::de::DeserializeOwned;
 use std::collections::HashMap;
 use std::io::BufRead;
@@ -15,13 +15,13 @@ pub(super) const FIRST_LINE: usize = 2;
 
 /// A journal as read.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Journal<R: Record> {
+pub struct CheckpointFile<R: CheckpointRecord> {
     /// Its header.
-    pub header: Header<R::Body>,
+    pub header: CheckpointHeader<R::Body>,
     /// Its records, in file order: the first stands in line 2.
     pub records: Vec<R>,
     /// How it ends.
-    pub end: End,
+    pub end: CheckpointEnd,
 }
 
 /// Reads a journal; `file` is its name in refusals. A file without a complete header is `None`.
@@ -30,107 +30,127 @@ pub struct Journal<R: Record> {
 /// killed, and the zero bytes that a file system may leave in its place when the power fails.
 ///
 /// # Errors
-/// [`JournalError`] at the first complete line that the program did not write.
-pub fn read<R: Record>(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<Journal<R>>, JournalError> {
-    Stream::<R, _>::open(file, bytes.as_ref())?.map(Stream::whole).transpose()
+/// [`CheckpointError`] at the first complete line that the program did not write.
+pub fn read_checkpoint<R: CheckpointRecord>(
+    file: &str,
+    bytes: impl AsRef<[u8]>,
+) -> Result<Option<CheckpointFile<R>>, CheckpointError> {
+    CheckpointReader::<R, _>::open(file, bytes.as_ref())?.map(CheckpointReader::read_all).transpose()
 }
 
-impl<R: Record, S: BufRead> Stream<R, S> {
+impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
     /// All that follows, in memory.
     ///
     /// # Errors
-    /// [`JournalError`] at the first complete line that the program did not write, and at a record that
+    /// [`CheckpointError`] at the first complete line that the program did not write, and at a record that
     /// stands in a line before too.
-    pub fn whole(mut self) -> Result<Journal<R>, JournalError> {
+    pub fn read_all(mut self) -> Result<CheckpointFile<R>, CheckpointError> {
         let (mut records, mut lines) = (Vec::new(), HashMap::new());
-        while let Some(Found { record, line }) = self.record()? {
+        while let Some(StoredRecord { record, line }) = self.next_record()? {
             if let Some(before) = lines.insert(record.identity(), line) {
-                let found = Found { record, line };
-                return Err(again(self.file(), &found, &format!("of line {before} ")));
+                let found = StoredRecord { record, line };
+                return Err(duplicate_record_error(self.file_name(), &found, &format!("of line {before} ")));
             }
             records.push(record);
         }
-        Ok(Journal { header: self.header().clone(), records, end: self.end() })
+        Ok(CheckpointFile { header: self.header().clone(), records, end: self.end() })
     }
 }
 
 /// The refusal of a record that stands in a line before too; `before` says in which, if that is known.
 #[must_use]
-pub fn again<R: Record>(file: &str, found: &Found<R>, before: &str) -> JournalError {
-    at::<R>(file, found.line, format!("the {} {before}a second time", R::KIND.record()))
+pub fn duplicate_record_error<R: CheckpointRecord>(
+    file: &str,
+    found: &StoredRecord<R>,
+    before: &str,
+) -> CheckpointError {
+    line_error::<R>(file, found.line, format!("the {} {before}a second time", R::KIND.record()))
 }
 
 /// A line has its end, or a checksum, which is what is written last.
-pub(super) fn is_complete(line: &Line) -> bool {
-    line.ended || Seal::of(without_mark(line.bytes)) != Seal::Absent
+pub(super) fn is_complete(line: &RawLine) -> bool {
+    line.ended || LineChecksum::check(strip_byte_order_mark(line.bytes)) != LineChecksum::Absent
 }
 
-impl<R: Record> Journal<R> {
+impl<R: CheckpointRecord> CheckpointFile<R> {
     /// Refuses a record of which a new computation gave something else.
     ///
     /// # Errors
-    /// [`JournalError::Recomputed`].
-    pub fn check_again(&self, file: &str, place: usize, again: &R) -> Result<(), JournalError> {
+    /// [`CheckpointError::Recomputed`].
+    pub fn check_recomputed(&self, file: &str, place: usize, again: &R) -> Result<(), CheckpointError> {
         let Some(stored) = self.records.get(place) else { return Ok(()) };
-        check_again(file, &Found { record: stored.clone(), line: place + FIRST_LINE }, again)
+        check_recomputed(file, &StoredRecord { record: stored.clone(), line: place + FIRST_LINE }, again)
     }
 }
 
 /// Refuses a record of which a new computation gave something else.
 ///
 /// # Errors
-/// [`JournalError::Recomputed`].
-pub fn check_again<R: Record>(file: &str, stored: &Found<R>, again: &R) -> Result<(), JournalError> {
+/// [`CheckpointError::Recomputed`].
+pub fn check_recomputed<R: CheckpointRecord>(
+    file: &str,
+    stored: &StoredRecord<R>,
+    again: &R,
+) -> Result<(), CheckpointError> {
     let Some([found, computed]) = stored.record.difference(again) else { return Ok(()) };
-    Err(JournalError::Recomputed { file: file.to_owned(), line: stored.line, kind: R::KIND, found, computed })
+    Err(CheckpointError::Recomputed {
+        file: file.to_owned(),
+        line: stored.line,
+        kind: R::KIND,
+        found,
+        computed,
+    })
 }
 
-pub(super) fn header<R: Record>(file: &str, line: &[u8]) -> Result<Header<R::Body>, JournalError> {
-    let at_header = |problem| JournalError::Header { file: file.to_owned(), problem };
-    let line = without_mark(line);
-    let seal = Seal::of(line);
+pub(super) fn parse_header<R: CheckpointRecord>(
+    file: &str,
+    line: &[u8],
+) -> Result<CheckpointHeader<R::Body>, CheckpointError> {
+    let at_header = |problem| CheckpointError::Header { file: file.to_owned(), problem };
+    let line = strip_byte_order_mark(line);
+    let seal = LineChecksum::check(line);
     let object = match &seal {
-        Seal::Holds(object) => object.as_slice(),
-        Seal::Absent => line,
-        Seal::Broken { .. } => return Err(at_header(broken_words(&seal))),
+        LineChecksum::Valid(object) => object.as_slice(),
+        LineChecksum::Absent => line,
+        LineChecksum::Broken { .. } => return Err(at_header(checksum_problem(&seal))),
     };
-    let Start { journal, layout } = parse(object, "journal header").map_err(at_header)?;
+    let HeaderPrefix { journal, layout } = parse_json(object, "journal header").map_err(at_header)?;
     if journal != R::KIND {
-        return Err(JournalError::OtherKind { file: file.to_owned(), found: journal, expected: R::KIND });
+        return Err(CheckpointError::OtherKind { file: file.to_owned(), found: journal, expected: R::KIND });
     }
     if layout != LAYOUT {
-        return Err(JournalError::Layout { file: file.to_owned(), kind: R::KIND, found: layout });
+        return Err(CheckpointError::Layout { file: file.to_owned(), kind: R::KIND, found: layout });
     }
-    if seal == Seal::Absent {
-        return Err(at_header(ABSENT.to_owned()));
+    if seal == LineChecksum::Absent {
+        return Err(at_header(MISSING_CHECKSUM.to_owned()));
     }
-    parse(object, "journal header").map_err(at_header)
+    parse_json(object, "journal header").map_err(at_header)
 }
 
 /// A line as its row.
-pub(super) fn row<R: Record>(line: &[u8]) -> Result<R::Row, String> {
-    match Seal::of(line) {
-        Seal::Holds(object) => parse(&object, R::KIND.record()),
-        seal => Err(broken_words(&seal)),
+pub(super) fn parse_row<R: CheckpointRecord>(line: &[u8]) -> Result<R::IterateRow, String> {
+    match LineChecksum::check(line) {
+        LineChecksum::Valid(object) => parse_json(&object, R::KIND.record()),
+        seal => Err(checksum_problem(&seal)),
     }
 }
 
-const ABSENT: &str = "found no checksum at the end of the line, expected `\"sha256\":\"...\"}`";
+const MISSING_CHECKSUM: &str = "found no checksum at the end of the line, expected `\"sha256\":\"...\"}`";
 
-fn broken_words(seal: &Seal) -> String {
+fn checksum_problem(seal: &LineChecksum) -> String {
     match seal {
-        Seal::Broken { found, computed } => {
+        LineChecksum::Broken { found, computed } => {
             format!("the line has the checksum {computed}, but says {found}: it was changed")
         }
-        _ => ABSENT.to_owned(),
+        _ => MISSING_CHECKSUM.to_owned(),
     }
 }
 
 /// The one place in which a line becomes a value.
-fn parse<T: DeserializeOwned>(line: &[u8], what: &str) -> Result<T, String> {
+fn parse_json<T: DeserializeOwned>(line: &[u8], what: &str) -> Result<T, String> {
     serde_json::from_slice(line).map_err(|error| format!("no {what}: {error}"))
 }
 
-pub(super) fn at<R: Record>(file: &str, line: usize, problem: String) -> JournalError {
-    JournalError::Line { file: file.to_owned(), line, problem, kind: R::KIND }
+pub(super) fn line_error<R: CheckpointRecord>(file: &str, line: usize, problem: String) -> CheckpointError {
+    CheckpointError::Line { file: file.to_owned(), line, problem, kind: R::KIND }
 }

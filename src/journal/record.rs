@@ -1,20 +1,20 @@
 //! What a line of a journal holds.
 
-use super::checksum::sealed;
-use super::header::{Header, Kind, LAYOUT};
+use super::checksum::append_checksum;
+use super::header::{CheckpointHeader, CheckpointKind, LAYOUT};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use std::fmt::Debug;
 use std::hash::Hash;
 
 /// A computation with its outcome, as one line of a journal.
-pub trait Record: Clone + Debug + PartialEq {
+pub trait CheckpointRecord: Clone + Debug + PartialEq {
     /// What its journals are of.
-    const KIND: Kind;
+    const KIND: CheckpointKind;
     /// What the header of such a journal says for all of its lines.
     type Body: Serialize + DeserializeOwned + Clone + Debug + PartialEq;
     /// The record as it stands in a line.
-    type Row: Serialize + DeserializeOwned;
+    type IterateRow: Serialize + DeserializeOwned;
     /// Records with the same identity are the same computation, and have the same outcome.
     type Identity: Eq + Hash;
 
@@ -22,27 +22,27 @@ pub trait Record: Clone + Debug + PartialEq {
     fn identity(&self) -> Self::Identity;
 
     /// The record as it stands in line `at`, counted from 0 behind the header.
-    fn to_row(&self, at: usize) -> Self::Row;
+    fn to_row(&self, at: usize) -> Self::IterateRow;
 
     /// The number of its line, counted from 0 behind the header, where a row says it.
-    fn line_index(row: &Self::Row) -> Option<usize>;
+    fn line_index(row: &Self::IterateRow) -> Option<usize>;
 
     /// The record of a row.
     ///
     /// # Errors
     /// What was found and what was expected.
-    fn from_row(row: Self::Row, body: &Self::Body) -> Result<Self, String>;
+    fn from_row(row: Self::IterateRow, body: &Self::Body) -> Result<Self, String>;
 
     /// What differs between two outcomes of the same computation: this one's and the other's, in words.
     fn difference(&self, other: &Self) -> Option<[String; 2]>;
 
     /// What differs between the problems of two journals with the same fingerprint, in words.
-    fn other_problem(found: &Self::Body, expected: &Self::Body) -> Option<String>;
+    fn problem_difference(found: &Self::Body, expected: &Self::Body) -> Option<String>;
 }
 
-impl<B: Serialize> Header<B> {
+impl<B: Serialize> CheckpointHeader<B> {
     /// The header of a journal of such records.
-    pub fn of<R: Record<Body = B>>(fingerprint: &str, version: &str, body: B) -> Self {
+    pub fn new<R: CheckpointRecord<Body = B>>(fingerprint: &str, version: &str, body: B) -> Self {
         let (fingerprint, version) = (fingerprint.to_owned(), version.to_owned());
         Self { journal: R::KIND, layout: LAYOUT, fingerprint, version, body }
     }
@@ -50,18 +50,18 @@ impl<B: Serialize> Header<B> {
 
 /// A header as a line.
 #[must_use]
-pub fn header_line<B: Serialize>(header: &Header<B>) -> String {
-    json_line(header)
+pub fn format_header_line<B: Serialize>(header: &CheckpointHeader<B>) -> String {
+    format_json_line(header)
 }
 
 /// A record as line `at`, counted from 0 behind the header.
 #[must_use]
-pub fn line<R: Record>(record: &R, at: usize) -> String {
-    json_line(&record.to_row(at))
+pub fn format_record_line<R: CheckpointRecord>(record: &R, at: usize) -> String {
+    format_json_line(&record.to_row(at))
 }
 
-fn json_line<T: Serialize>(value: &T) -> String {
+fn format_json_line<T: Serialize>(value: &T) -> String {
     // string keys and finite numbers only: the writer has nothing to refuse, and a line that it did refuse
     // would be refused when it is read
-    sealed(&serde_json::to_string(value).unwrap_or_default()) + "\n"
+    append_checksum(&serde_json::to_string(value).unwrap_or_default()) + "\n"
 }

@@ -4,83 +4,83 @@ use std::fmt;
 use std::str::FromStr;
 
 /// Most shards: more than a cluster has cores.
-const MOST: usize = 1_000_000;
+const MAX_SHARDS: usize = 1_000_000;
 
 /// The points of a study, or jobs of a list, whose number is `at` modulo `of`, so that slow corners are
 /// spread over all shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
-    at: usize,
-    of: usize,
+    number: usize,
+    total: usize,
 }
 
 impl Shard {
     /// All points.
-    pub const WHOLE: Self = Self { at: 0, of: 1 };
+    pub const WHOLE: Self = Self { number: 0, total: 1 };
 
     /// Shard `at` (counted from 0) of `of`; `None` where there is none.
     #[must_use]
     pub fn new(at: usize, of: usize) -> Option<Self> {
-        (at < of && of <= MOST).then_some(Self { at, of })
+        (at < of && of <= MAX_SHARDS).then_some(Self { number: at, total: of })
     }
 
     /// Its number, from 0.
     #[must_use]
-    pub fn at(self) -> usize {
-        self.at
+    pub fn number(self) -> usize {
+        self.number
     }
 
     /// Number of shards.
     #[must_use]
-    pub fn of(self) -> usize {
-        self.of
+    pub fn total(self) -> usize {
+        self.total
     }
 
     /// How many of `points` it holds.
     #[must_use]
-    pub fn count(self, points: usize) -> usize {
-        points.saturating_sub(self.at).div_ceil(self.of)
+    pub fn count_points(self, points: usize) -> usize {
+        points.saturating_sub(self.number).div_ceil(self.total)
     }
 
     /// Whether it holds point `index`.
     #[must_use]
-    pub fn holds(self, index: usize) -> bool {
-        index % self.of == self.at
+    pub fn contains(self, index: usize) -> bool {
+        index % self.total == self.number
     }
 
     /// Whether both may hold the same point: not where their numbers differ by what divides both counts.
     #[must_use]
-    pub fn meets(self, other: Self) -> bool {
-        let (mut common, mut rest) = (self.of, other.of);
+    pub fn overlaps(self, other: Self) -> bool {
+        let (mut common, mut rest) = (self.total, other.total);
         while rest > 0 {
             (common, rest) = (rest, common % rest);
         }
-        self.at % common == other.at % common
+        self.number % common == other.number % common
     }
 
     /// Index of its point `place`, counted from 0.
     #[must_use]
-    pub fn index(self, place: usize) -> usize {
-        self.at + place * self.of
+    pub fn point_index(self, place: usize) -> usize {
+        self.number + place * self.total
     }
 
     /// Name of its journal, without an ending: `3-of-64`.
     #[must_use]
-    pub fn name(self) -> String {
-        format!("{}-of-{}", self.at, self.of)
+    pub fn file_stem(self) -> String {
+        format!("{}-of-{}", self.number, self.total)
     }
 
     /// The shard whose journal has this name.
     #[must_use]
-    pub fn named(name: &str) -> Option<Self> {
+    pub fn from_file_stem(name: &str) -> Option<Self> {
         let (at, of) = name.split_once("-of-")?;
-        Self::new(at.parse().ok()?, of.parse().ok()?).filter(|shard| shard.name() == name)
+        Self::new(at.parse().ok()?, of.parse().ok()?).filter(|shard| shard.file_stem() == name)
     }
 }
 
 impl fmt::Display for Shard {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{}/{}", self.at, self.of)
+        write!(f, "{}/{}", self.number, self.total)
     }
 }
 
@@ -89,9 +89,9 @@ impl FromStr for Shard {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers = text.split_once('/').and_then(|(at, of)| Some((at.parse().ok()?, of.parse().ok()?)));
-        numbers
-            .and_then(|(at, of)| Self::new(at, of))
-            .ok_or_else(|| format!("expected K/N, such as 3/64, with K from 0 to N - 1 and N up to {MOST}"))
+        numbers.and_then(|(at, of)| Self::new(at, of)).ok_or_else(|| {
+            format!("expected K/N, such as 3/64, with K from 0 to N - 1 and N up to {MAX_SHARDS}")
+        })
     }
 }
 
@@ -105,7 +105,7 @@ mod tests {
             let mut held = vec![0; points];
             for at in 0..of {
                 let shard = Shard::new(at, of).unwrap();
-                (0..shard.count(points)).for_each(|place| held[shard.index(place)] += 1);
+                (0..shard.count_points(points)).for_each(|place| held[shard.point_index(place)] += 1);
             }
             assert_eq!(held, vec![1; points], "{points} points in {of} shards");
         }
@@ -116,8 +116,8 @@ mod tests {
         for (a, b) in [(4, 4), (4, 6), (3, 7), (16, 8), (1, 5)] {
             for (i, j) in (0..a).flat_map(|i| (0..b).map(move |j| (i, j))) {
                 let (one, two) = (Shard::new(i, a).unwrap(), Shard::new(j, b).unwrap());
-                let shared = (0..a * b).any(|index| one.holds(index) && two.holds(index));
-                assert_eq!(one.meets(two), shared, "{one} and {two}");
+                let shared = (0..a * b).any(|index| one.contains(index) && two.contains(index));
+                assert_eq!(one.overlaps(two), shared, "{one} and {two}");
             }
         }
     }
@@ -127,10 +127,10 @@ mod tests {
         let shard = Shard::new(3, 64).unwrap();
         assert_eq!("3/64".parse(), Ok(shard));
         assert_eq!(shard.to_string(), "3/64");
-        assert_eq!(Shard::named("3-of-64"), Some(shard));
+        assert_eq!(Shard::from_file_stem("3-of-64"), Some(shard));
         for text in ["", "3", "64/64", "-1/4", "0/0", "1/2/3", "a/b", "0/1000001", "1 / 2"] {
             assert!(text.parse::<Shard>().unwrap_err().contains("such as 3/64"), "{text}");
         }
-        assert_eq!(["03-of-64", "3-of-2", "x-of-y", "journal"].map(Shard::named), [None; 4]);
+        assert_eq!(["03-of-64", "3-of-2", "x-of-y", "journal"].map(Shard::from_file_stem), [None; 4]);
     }
 }

@@ -2,7 +2,7 @@
 
 /// Takes lines as they are made. When it returns they are where they stay: the program has written them to a
 /// file, and the disk has them. Only then is a record counted or reported.
-pub trait Sink: Send {
+pub trait CheckpointSink: Send {
     /// Appends one line or several, each with its newline.
     ///
     /// # Errors
@@ -12,16 +12,16 @@ pub trait Sink: Send {
 
 /// Keeps nothing: for a computation that will not be resumed.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Discard;
+pub struct NullSink;
 
-impl Sink for Discard {
+impl CheckpointSink for NullSink {
     fn append(&mut self, _: &str) -> Result<(), String> {
         Ok(())
     }
 }
 
 /// Keeps the lines in memory.
-impl Sink for String {
+impl CheckpointSink for String {
     fn append(&mut self, lines: &str) -> Result<(), String> {
         self.push_str(lines);
         Ok(())

@@ -1,10 +1,10 @@
 //! A journal line by line: of one that is larger than memory no more than a line is held.
 
-use super::error::JournalError;
-use super::header::Header;
-use super::lines::{Line, lines};
-use super::read::{FIRST_LINE, at, header, is_complete, row};
-use super::record::Record;
+use super::error::CheckpointError;
+use super::header::CheckpointHeader;
+use super::lines::{RawLine, split_lines};
+use super::read::{FIRST_LINE, is_complete, line_error, parse_header, parse_row};
+use super::record::CheckpointRecord;
 use std::io::{BufRead, Read};
 
 /// Longest line, bytes: many times what the program writes, so that no file fills the memory as one line.
@@ -15,17 +15,17 @@ const LONGEST_LINE: u64 = 1 << 28;
 /// What follows the last complete line is dropped: part of a line that was being written when the program
 /// was killed, and the zero bytes that a file system may leave in its place when the power fails.
 #[derive(Debug)]
-pub struct Stream<R: Record, S> {
+pub struct CheckpointReader<R: CheckpointRecord, S> {
     file: String,
-    header: Header<R::Body>,
-    text: Text<S>,
+    header: CheckpointHeader<R::Body>,
+    line_reader: LineReader<S>,
     line: usize,
-    end: End,
+    end: CheckpointEnd,
 }
 
 /// How a journal ends.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct End {
+pub struct CheckpointEnd {
     /// Bytes up to the end of the last complete line: the file is cut to them before anything is appended.
     pub intact_bytes: usize,
     /// Whether an incomplete line follows, which is dropped.
@@ -36,71 +36,71 @@ pub struct End {
 
 /// A record as it stands in a journal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found<R> {
+pub struct StoredRecord<R> {
     /// The record.
     pub record: R,
     /// Its line, counted from 1.
     pub line: usize,
 }
 
-impl<R: Record, S: BufRead> Stream<R, S> {
+impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
     /// Reads the header; `file` is the name in refusals. A file without a complete header is `None`.
     ///
     /// # Errors
-    /// [`JournalError`] where it cannot be read, or the program did not write its first line.
-    pub fn open(file: &str, from: S) -> Result<Option<Self>, JournalError> {
-        let mut text = Text { from, chunk: Vec::new(), start: 0, used: 0 };
-        let unreadable = |problem| JournalError::Unreadable { file: file.to_owned(), problem };
-        let Some(first) = text.line().map_err(unreadable)?.filter(is_complete) else { return Ok(None) };
-        let header = header::<R>(file, first.bytes)?;
-        let end = End { intact_bytes: first.upto, torn: false, unended: !first.ended };
-        Ok(Some(Self { file: file.to_owned(), header, text, line: FIRST_LINE, end }))
+    /// [`CheckpointError`] where it cannot be read, or the program did not write its first line.
+    pub fn open(file: &str, from: S) -> Result<Option<Self>, CheckpointError> {
+        let mut text = LineReader { from, chunk: Vec::new(), start: 0, used: 0 };
+        let unreadable = |problem| CheckpointError::Unreadable { file: file.to_owned(), problem };
+        let Some(first) = text.next_line().map_err(unreadable)?.filter(is_complete) else { return Ok(None) };
+        let header = parse_header::<R>(file, first.bytes)?;
+        let end = CheckpointEnd { intact_bytes: first.end_offset, torn: false, unended: !first.ended };
+        Ok(Some(Self { file: file.to_owned(), header, line_reader: text, line: FIRST_LINE, end }))
     }
 
     /// Its name in refusals.
-    pub(super) fn file(&self) -> &str {
+    pub(super) fn file_name(&self) -> &str {
         &self.file
     }
 
     /// Its header.
-    pub fn header(&self) -> &Header<R::Body> {
+    pub fn header(&self) -> &CheckpointHeader<R::Body> {
         &self.header
     }
 
     /// The next record; `None` behind the last complete line.
     ///
     /// # Errors
-    /// [`JournalError`] where it cannot be read, or at a complete line that the program did not write.
-    pub fn record(&mut self) -> Result<Option<Found<R>>, JournalError> {
-        let Self { file, header, text, line, end } = self;
-        let unreadable = |problem| JournalError::Unreadable { file: file.clone(), problem };
-        let Some(found) = text.line().map_err(unreadable)? else { return Ok(None) };
+    /// [`CheckpointError`] where it cannot be read, or at a complete line that the program did not write.
+    pub fn next_record(&mut self) -> Result<Option<StoredRecord<R>>, CheckpointError> {
+        let Self { file, header, line_reader: text, line, end } = self;
+        let unreadable = |problem| CheckpointError::Unreadable { file: file.clone(), problem };
+        let Some(found) = text.next_line().map_err(unreadable)? else { return Ok(None) };
         if end.torn || !is_complete(&found) {
             end.torn = true;
             return Ok(None);
         }
-        let refused = |problem| at::<R>(file, *line, problem);
-        let row = row::<R>(found.bytes).map_err(refused)?;
+        let refused = |problem| line_error::<R>(file, *line, problem);
+        let row = parse_row::<R>(found.bytes).map_err(refused)?;
         let expected = *line - FIRST_LINE;
         if let Some(index) = R::line_index(&row).filter(|index| *index != expected) {
             let problem = format!("`index`: found {index}, expected {expected}; lines are missing before it");
             return Err(refused(problem));
         }
         let record = R::from_row(row, &header.body).map_err(refused)?;
-        *end = End { intact_bytes: found.upto, torn: false, unended: !found.ended };
+        *end = CheckpointEnd { intact_bytes: found.end_offset, torn: false, unended: !found.ended };
         *line += 1;
-        Ok(Some(Found { record, line: *line - 1 }))
+        Ok(Some(StoredRecord { record, line: *line - 1 }))
     }
 
     /// How it ends, once there is no further record.
-    pub fn end(&self) -> End {
+    pub fn end(&self) -> CheckpointEnd {
         self.end
     }
 }
 
 /// The lines of a file that is read piece by piece.
 #[derive(Debug)]
-struct Text<S> {
+struct LineReader<S> {
     from: S,
     /// What was read last: up to a line feed, which is a line but where an editor ended lines otherwise.
     chunk: Vec<u8>,
@@ -110,8 +110,8 @@ struct Text<S> {
     used: usize,
 }
 
-impl<S: BufRead> Text<S> {
-    fn line(&mut self) -> Result<Option<Line<'_>>, String> {
+impl<S: BufRead> LineReader<S> {
+    fn next_line(&mut self) -> Result<Option<RawLine<'_>>, String> {
         if self.used == self.chunk.len() {
             self.start += self.chunk.len();
             self.used = 0;
@@ -122,9 +122,9 @@ impl<S: BufRead> Text<S> {
                 return Err(format!("found a line of more than {LONGEST_LINE} bytes, expected a journal"));
             }
         }
-        let Some(line) = lines(&self.chunk[self.used..]).next() else { return Ok(None) };
+        let Some(line) = split_lines(&self.chunk[self.used..]).next() else { return Ok(None) };
         let from = self.used;
-        self.used += line.upto;
-        Ok(Some(Line { upto: self.start + from + line.upto, ..line }))
+        self.used += line.end_offset;
+        Ok(Some(RawLine { end_offset: self.start + from + line.end_offset, ..line }))
     }
 }

@@ -17,15 +17,16 @@ impl Distribution<f64> for StandardNormal {
             let bits = generator.next_u64();
             let layer = (bits & 0xff) as usize;
             let place = f64::from_bits(FROM_TWO | (bits >> 12)) - 3.0;
-            let x = place * EDGES[layer];
-            if x.abs() < EDGES[layer + 1] {
+            let x = place * LAYER_EDGES[layer];
+            if x.abs() < LAYER_EDGES[layer + 1] {
                 return x;
             }
             if layer == 0 {
-                return beyond(generator).copysign(place);
+                return draw_tail(generator).copysign(place);
             }
-            let (outer, inner) = (density(EDGES[layer]), density(EDGES[layer + 1]));
-            if inner + (outer - inner) * generator.random::<f64>() < density(x) {
+            let (outer, inner) =
+                (relative_density(LAYER_EDGES[layer]), relative_density(LAYER_EDGES[layer + 1]));
+            if inner + (outer - inner) * generator.random::<f64>() < relative_density(x) {
                 return x;
             }
         }
@@ -33,18 +34,18 @@ impl Distribution<f64> for StandardNormal {
 }
 
 /// A draw beyond the edge of the lowest layer, by Marsaglia's rejection.
-fn beyond<R: Rng + ?Sized>(generator: &mut R) -> f64 {
+fn draw_tail<R: Rng + ?Sized>(generator: &mut R) -> f64 {
     loop {
-        let x = -ln(generator.sample(Open01)) / EDGES[1];
+        let x = -ln(generator.sample(Open01)) / LAYER_EDGES[1];
         let y = -ln(generator.sample(Open01));
         if 2.0 * y >= x * x {
-            return EDGES[1] + x;
+            return LAYER_EDGES[1] + x;
         }
     }
 }
 
 /// The density, 1 at its top.
-fn density(x: f64) -> f64 {
+fn relative_density(x: f64) -> f64 {
     exp(-x * x / 2.0)
 }
 
@@ -54,7 +55,7 @@ const FROM_TWO: u64 = 0x4000_0000_0000_0000;
 /// Edges of 256 layers of one area. The lowest has the tail from its edge on, `EDGES[1]`; `EDGES[0]` is that
 /// of a box of the same area.
 #[rustfmt::skip] // fewer lines
-const EDGES: [f64; 257] = [
+const LAYER_EDGES: [f64; 257] = [
     3.91075795953709, 3.654152885361009, 3.4492782985609645, 3.320244733839166, 3.224575052047029,
     3.14788928951715, 3.083526132001233, 3.0278377917686354, 2.978603279880845, 2.9343668672078542,
     2.894121053612348, 2.8571387308721325, 2.822877396825325, 2.7909211740007858, 2.7609440052788226,
@@ -123,10 +124,10 @@ mod tests {
         for _ in 0..2_000_000 {
             let found: f64 = ours.sample(StandardNormal);
             let expected: f64 = theirs.sample(rand_distr::StandardNormal);
-            beyond += usize::from(expected.abs() > EDGES[1]);
+            beyond += usize::from(expected.abs() > LAYER_EDGES[1]);
             differing += usize::from(found != expected);
             assert!((found - expected).abs() <= 4.0 * f64::EPSILON, "{found:e} {expected:e}");
-            assert!(found == expected || expected.abs() > EDGES[1], "{found:e} {expected:e}");
+            assert!(found == expected || expected.abs() > LAYER_EDGES[1], "{found:e} {expected:e}");
         }
         // 2.58e-4 of all
         assert!((450..600).contains(&beyond), "{beyond} of 2,000,000 in the tail");

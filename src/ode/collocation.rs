@@ -25,73 +25,74 @@ pub const MOST_NODES: usize = 12;
 pub const LEAST_NODES: usize = 3;
 
 /// One number a node.
-pub type AtNodes<T> = [T; MOST_NODES];
+pub type NodeArray<T> = [T; MOST_NODES];
 
 /// The nodes of a step and what they integrate.
 #[derive(Debug, Clone)]
-pub struct Rule {
+pub struct CollocationRule {
     /// Their number.
     pub nodes: usize,
     /// Where they lie on [0, 1].
-    pub places: AtNodes<f64>,
+    pub positions: NodeArray<f64>,
     /// Weights of the integral over [0, 1].
-    pub weights: AtNodes<f64>,
+    pub weights: NodeArray<f64>,
     /// `(2 m + 1) b_j P_m(2 c_j - 1)` by node and degree: coefficients of `l_j` by Legendre's polynomials.
-    legendre: AtNodes<AtNodes<f64>>,
+    legendre: NodeArray<NodeArray<f64>>,
     /// Integrals of `l_j` up to each node, once and twice.
-    once: AtNodes<AtNodes<f64>>,
-    twice: AtNodes<AtNodes<f64>>,
+    once: NodeArray<NodeArray<f64>>,
+    twice: NodeArray<NodeArray<f64>>,
 }
 
 /// Rules of every number of nodes.
-static RULES: LazyLock<Vec<Rule>> = LazyLock::new(|| (0..=MOST_NODES).map(Rule::new).collect());
+static RULES: LazyLock<Vec<CollocationRule>> =
+    LazyLock::new(|| (0..=MOST_NODES).map(CollocationRule::new).collect());
 
 /// The rule of this many nodes, at most [`MOST_NODES`].
 #[must_use]
-pub fn rule(nodes: usize) -> &'static Rule {
+pub fn collocation_rule(nodes: usize) -> &'static CollocationRule {
     &RULES[nodes]
 }
 
 /// Numbers that are computed side by side: one, or one a lane.
-pub trait Lanes: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+pub trait LaneNumber: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
     /// The same number in every lane.
-    fn all(x: f64) -> Self;
+    fn splat(x: f64) -> Self;
 
     /// All of them times the same.
     #[must_use]
-    fn scaled(self, factor: f64) -> Self;
+    fn scale_by(self, factor: f64) -> Self;
 }
 
-impl Lanes for f64 {
+impl LaneNumber for f64 {
     #[inline(always)]
-    fn all(x: f64) -> Self {
+    fn splat(x: f64) -> Self {
         x
     }
 
     #[inline(always)]
-    fn scaled(self, factor: f64) -> Self {
+    fn scale_by(self, factor: f64) -> Self {
         factor * self
     }
 }
 
-impl Rule {
+impl CollocationRule {
     fn new(nodes: usize) -> Self {
         let mut rule = Self {
             nodes,
-            places: [0.0; MOST_NODES],
+            positions: [0.0; MOST_NODES],
             weights: [0.0; MOST_NODES],
             legendre: [[0.0; MOST_NODES]; MOST_NODES],
             once: [[0.0; MOST_NODES]; MOST_NODES],
             twice: [[0.0; MOST_NODES]; MOST_NODES],
         };
         for j in 0..nodes {
-            let (place, weight) = node(nodes, j);
-            (rule.places[j], rule.weights[j]) = (place, weight);
-            let polynomials = legendre(place, nodes);
+            let (place, weight) = gauss_node(nodes, j);
+            (rule.positions[j], rule.weights[j]) = (place, weight);
+            let polynomials = legendre_polynomials(place, nodes);
             rule.legendre[j] = from_fn(|m| (2 * m + 1) as f64 * weight * polynomials[m]);
         }
         for i in 0..nodes {
-            let [once, twice] = rule.integrals(rule.places[i]);
+            let [once, twice] = rule.integrals(rule.positions[i]);
             (rule.once[i], rule.twice[i]) = (once, twice);
         }
         rule
@@ -99,35 +100,40 @@ impl Rule {
 
     /// Integrals from 0 to `x` on [0, 1] of each `l_j`, once and twice.
     #[must_use]
-    pub fn integrals(&self, x: f64) -> [AtNodes<f64>; 2] {
+    pub fn integrals(&self, x: f64) -> [NodeArray<f64>; 2] {
         let [mut once, mut twice] = [[0.0; MOST_NODES]; 2];
         self.integrals_by_degree(x, &mut once, &mut twice);
-        [self.nodal(&once), self.nodal(&twice)]
+        [self.to_nodal(&once), self.to_nodal(&twice)]
     }
 
     /// Integrals from 0 to `x` of Legendre's polynomials of `2 x - 1`, once and twice, by degree: as many as
     /// there are nodes. `int P_m = (P_(m+1) - P_(m-1)) / (2 (2 m + 1))`, and likewise again.
     #[inline(always)]
-    pub fn integrals_by_degree<R: Lanes>(&self, x: R, once: &mut AtNodes<R>, twice: &mut AtNodes<R>) {
-        let p = legendre(x, self.nodes);
-        (once[0], twice[0]) = (x, (x * x).scaled(0.5));
+    pub fn integrals_by_degree<R: LaneNumber>(
+        &self,
+        x: R,
+        once: &mut NodeArray<R>,
+        twice: &mut NodeArray<R>,
+    ) {
+        let p = legendre_polynomials(x, self.nodes);
+        (once[0], twice[0]) = (x, (x * x).scale_by(0.5));
         for m in 1..self.nodes {
-            once[m] = (p[m + 1] - p[m - 1]).scaled(0.5 * SHARES[2 * m + 1]);
+            once[m] = (p[m + 1] - p[m - 1]).scale_by(0.5 * RECIPROCALS[2 * m + 1]);
         }
         for m in 1..self.nodes {
             // (the last one is needed beyond the nodes)
             let next = if m + 1 < self.nodes {
                 once[m + 1]
             } else {
-                (p[m + 2] - p[m]).scaled(0.5 * SHARES[2 * m + 3])
+                (p[m + 2] - p[m]).scale_by(0.5 * RECIPROCALS[2 * m + 3])
             };
-            twice[m] = (next - once[m - 1]).scaled(0.5 * SHARES[2 * m + 1]);
+            twice[m] = (next - once[m - 1]).scale_by(0.5 * RECIPROCALS[2 * m + 1]);
         }
     }
 
     /// By nodes what is known by degrees.
     #[must_use]
-    pub fn nodal(&self, by_degree: &AtNodes<f64>) -> AtNodes<f64> {
+    pub fn to_nodal(&self, by_degree: &NodeArray<f64>) -> NodeArray<f64> {
         let mut sums = [0.0; MOST_NODES];
         for (sum, legendre) in sums.iter_mut().zip(&self.legendre[..self.nodes]) {
             for (a, b) in legendre[..self.nodes].iter().zip(by_degree) {
@@ -139,7 +145,7 @@ impl Rule {
 }
 
 /// Node `j` of `nodes` on [0, 1] and its weight, by Newton's steps.
-fn node(nodes: usize, j: usize) -> (f64, f64) {
+fn gauss_node(nodes: usize, j: usize) -> (f64, f64) {
     /// More than Newton's steps need from Tricomi's start.
     const ROUNDS: usize = 12;
     let mut z = -math::cos(std::f64::consts::PI * (j as f64 + 0.75) / (nodes as f64 + 0.5));
@@ -158,19 +164,19 @@ fn node(nodes: usize, j: usize) -> (f64, f64) {
 
 /// Legendre's polynomials of `2 x - 1`, up to two degrees beyond those of the nodes.
 #[inline(always)]
-fn legendre<R: Lanes>(x: R, nodes: usize) -> [R; MOST_NODES + 2] {
-    let z = x.scaled(2.0) - R::all(1.0);
-    let mut p = [R::all(1.0); MOST_NODES + 2];
+fn legendre_polynomials<R: LaneNumber>(x: R, nodes: usize) -> [R; MOST_NODES + 2] {
+    let z = x.scale_by(2.0) - R::splat(1.0);
+    let mut p = [R::splat(1.0); MOST_NODES + 2];
     p[1] = z;
     for m in 1..=nodes.min(MOST_NODES) {
-        let share = SHARES[m + 1];
-        p[m + 1] = (z * p[m]).scaled((2 * m + 1) as f64 * share) - p[m - 1].scaled(m as f64 * share);
+        let share = RECIPROCALS[m + 1];
+        p[m + 1] = (z * p[m]).scale_by((2 * m + 1) as f64 * share) - p[m - 1].scale_by(m as f64 * share);
     }
     p
 }
 
 /// `1 / m`.
-const SHARES: [f64; 2 * MOST_NODES + 4] = {
+const RECIPROCALS: [f64; 2 * MOST_NODES + 4] = {
     let mut shares = [0.0; 2 * MOST_NODES + 4];
     let mut m = 1;
     while m < shares.len() {
@@ -181,20 +187,20 @@ const SHARES: [f64; 2 * MOST_NODES + 4] = {
 };
 
 /// A square of the equations of one instant.
-pub type Square<const D: usize> = [[f64; D]; D];
+pub type SquareMatrix<const D: usize> = [[f64; D]; D];
 
 /// Matrices of `D` equations at the nodes of a step.
 #[derive(Debug, Clone, Copy)]
-pub struct Equations<const D: usize> {
+pub struct CollocationEquations<const D: usize> {
     /// `M`.
-    pub mass: AtNodes<Square<D>>,
+    pub mass: NodeArray<SquareMatrix<D>>,
     /// `D`.
-    pub damping: AtNodes<Square<D>>,
+    pub damping: NodeArray<SquareMatrix<D>>,
     /// `K`.
-    pub stiffness: AtNodes<Square<D>>,
+    pub stiffness: NodeArray<SquareMatrix<D>>,
 }
 
-impl<const D: usize> Default for Equations<D> {
+impl<const D: usize> Default for CollocationEquations<D> {
     fn default() -> Self {
         let none = [[[0.0; D]; D]; MOST_NODES];
         Self { mass: none, damping: none, stiffness: none }
@@ -203,22 +209,27 @@ impl<const D: usize> Default for Equations<D> {
 
 /// The equations of a step, factored.
 #[derive(Debug, Clone)]
-pub struct Step<const D: usize> {
-    rule: &'static Rule,
+pub struct CollocationStep<const D: usize> {
+    rule: &'static CollocationRule,
     length: f64,
     /// Factors: multipliers left of the diagonal, inverses on it, what remains right of it.
-    blocks: AtNodes<AtNodes<Square<D>>>,
+    blocks: NodeArray<NodeArray<SquareMatrix<D>>>,
 }
 
-impl<const D: usize> Default for Step<D> {
+impl<const D: usize> Default for CollocationStep<D> {
     fn default() -> Self {
-        Self { rule: rule(0), length: 0.0, blocks: [[[[0.0; D]; D]; MOST_NODES]; MOST_NODES] }
+        Self { rule: collocation_rule(0), length: 0.0, blocks: [[[[0.0; D]; D]; MOST_NODES]; MOST_NODES] }
     }
 }
 
-impl<const D: usize> Step<D> {
+impl<const D: usize> CollocationStep<D> {
     /// Factors the equations of a step of this length.
-    pub fn factor(&mut self, rule: &'static Rule, length: f64, equations: &Equations<D>) {
+    pub fn factor(
+        &mut self,
+        rule: &'static CollocationRule,
+        length: f64,
+        equations: &CollocationEquations<D>,
+    ) {
         (self.rule, self.length) = (rule, length);
         for i in 0..rule.nodes {
             let (damping, stiffness) = (&equations.damping[i], &equations.stiffness[i]);
@@ -232,9 +243,9 @@ impl<const D: usize> Step<D> {
         for p in 0..rule.nodes {
             let (upper, lower) = self.blocks.split_at_mut(p + 1);
             let pivot = &mut upper[p];
-            pivot[p] = inverse(&pivot[p]);
+            pivot[p] = invert_square(&pivot[p]);
             for row in &mut lower[..rule.nodes - p - 1] {
-                let factor = product(&row[p], &pivot[p]);
+                let factor = multiply_squares(&row[p], &pivot[p]);
                 row[p] = factor;
                 for (block, right) in row[p + 1..rule.nodes].iter_mut().zip(&pivot[p + 1..rule.nodes]) {
                     for r in 0..D {
@@ -251,14 +262,14 @@ impl<const D: usize> Step<D> {
 
     /// Turns right-hand sides at the nodes into accelerations there; what starting values do is part of them.
     #[inline(always)]
-    pub fn solve<R: Lanes>(&self, rows: &mut [[R; D]]) {
+    pub fn solve<R: LaneNumber>(&self, rows: &mut [[R; D]]) {
         let nodes = self.rule.nodes;
         let rows = &mut rows[..nodes];
         for i in 1..nodes {
             let (done, rest) = rows.split_at_mut(i);
             let mut sum = rest[0];
             for (block, row) in self.blocks[i][..i].iter().zip(done) {
-                take(&mut sum, block, row);
+                subtract_product(&mut sum, block, row);
             }
             rest[0] = sum;
         }
@@ -266,42 +277,42 @@ impl<const D: usize> Step<D> {
             let (rest, done) = rows.split_at_mut(i + 1);
             let mut sum = rest[i];
             for (block, row) in self.blocks[i][i + 1..nodes].iter().zip(done) {
-                take(&mut sum, block, row);
+                subtract_product(&mut sum, block, row);
             }
-            rest[i] = times(&self.blocks[i][i], &sum);
+            rest[i] = multiply_row(&self.blocks[i][i], &sum);
         }
     }
 }
 
 /// `sum - block row`.
 #[inline(always)]
-fn take<const D: usize, R: Lanes>(sum: &mut [R; D], block: &Square<D>, row: &[R; D]) {
+fn subtract_product<const D: usize, R: LaneNumber>(sum: &mut [R; D], block: &SquareMatrix<D>, row: &[R; D]) {
     for r in 0..D {
         for c in 0..D {
-            sum[r] = sum[r] - row[c].scaled(block[r][c]);
+            sum[r] = sum[r] - row[c].scale_by(block[r][c]);
         }
     }
 }
 
 /// `block row`.
 #[inline(always)]
-pub fn times<const D: usize, R: Lanes>(block: &Square<D>, row: &[R; D]) -> [R; D] {
+pub fn multiply_row<const D: usize, R: LaneNumber>(block: &SquareMatrix<D>, row: &[R; D]) -> [R; D] {
     from_fn(|r| {
-        let mut sum = row[0].scaled(block[r][0]);
+        let mut sum = row[0].scale_by(block[r][0]);
         for c in 1..D {
-            sum = sum + row[c].scaled(block[r][c]);
+            sum = sum + row[c].scale_by(block[r][c]);
         }
         sum
     })
 }
 
-fn product<const D: usize>(a: &Square<D>, b: &Square<D>) -> Square<D> {
+fn multiply_squares<const D: usize>(a: &SquareMatrix<D>, b: &SquareMatrix<D>) -> SquareMatrix<D> {
     from_fn(|r| from_fn(|c| (0..D).map(|k| a[r][k] * b[k][c]).sum()))
 }
 
 /// Inverse of a matrix of at most three rows, by Cramer's rule.
 #[must_use]
-pub fn inverse<const D: usize>(m: &Square<D>) -> Square<D> {
+pub fn invert_square<const D: usize>(m: &SquareMatrix<D>) -> SquareMatrix<D> {
     let mut out = [[0.0; D]; D];
     match D {
         1 => out[0][0] = 1.0 / m[0][0],
@@ -333,7 +344,7 @@ mod tests {
     /// The rules of Abramowitz and Stegun, table 25.4.
     #[test]
     fn nodes_and_weights_are_those_of_the_table() {
-        let five = rule(5);
+        let five = collocation_rule(5);
         for (j, (z, weight)) in [
             (-0.906_179_845_938_664, 0.236_926_885_056_189_1),
             (-0.538_469_310_105_683_1, 0.478_628_670_499_366_5),
@@ -342,7 +353,7 @@ mod tests {
         .into_iter()
         .enumerate()
         {
-            assert!((2.0 * five.places[j] - 1.0 - z).abs() < 1e-15);
+            assert!((2.0 * five.positions[j] - 1.0 - z).abs() < 1e-15);
             assert!((2.0 * five.weights[j] - weight).abs() < 1e-15);
         }
     }
@@ -351,9 +362,9 @@ mod tests {
     #[test]
     fn powers_are_integrated_exactly() {
         for nodes in LEAST_NODES..=MOST_NODES {
-            let rule = rule(nodes);
+            let rule = collocation_rule(nodes);
             for power in 0..nodes as i32 {
-                let values = rule.places.map(|c| c.powi(power));
+                let values = rule.positions.map(|c| c.powi(power));
                 for x in [0.0, 0.3, 1.0f64] {
                     let sums = rule.integrals(x).map(|w| (0..nodes).map(|j| w[j] * values[j]).sum::<f64>());
                     let once = x.powi(power + 1) / f64::from(power + 1);
@@ -368,12 +379,12 @@ mod tests {
     /// End of one step of `y'' + 0.2 y' + y = 0` from (1, 0) and its error.
     fn error(nodes: usize, length: f64) -> f64 {
         let [mass, damping, stiffness] = [1.0, 0.2, 1.0].map(|x| [[[x]]; MOST_NODES]);
-        let equations = Equations::<1> { mass, damping, stiffness };
-        let (rule, mut step) = (rule(nodes), Step::default());
+        let equations = CollocationEquations::<1> { mass, damping, stiffness };
+        let (rule, mut step) = (collocation_rule(nodes), CollocationStep::default());
         step.factor(rule, length, &equations);
         let mut rows = [[-1.0]; MOST_NODES];
         step.solve(&mut rows);
-        let sum = |weights: &AtNodes<f64>| (0..nodes).map(|j| weights[j] * rows[j][0]).sum::<f64>();
+        let sum = |weights: &NodeArray<f64>| (0..nodes).map(|j| weights[j] * rows[j][0]).sum::<f64>();
         let [once, twice] = rule.integrals(1.0);
         let (value, rate) = (1.0 + length * length * sum(&twice), length * sum(&once));
         let (decay, omega) = (0.1, 0.99f64.sqrt());

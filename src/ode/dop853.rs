@@ -2,9 +2,9 @@
 
 #![allow(clippy::needless_range_loop)] // several arrays share each index, as in the formulas
 
-use super::Solution;
+use super::DenseOutput;
 use super::tableau::{
-    A1, A2, A3, A4, A5, A6, A7, A8, A9, A10, A11, A12, A13, A14, A15, C, D3, D4, D5, D6, E3, E5, Row,
+    A1, A2, A3, A4, A5, A6, A7, A8, A9, A10, A11, A12, A13, A14, A15, C, D3, D4, D5, D6, E3, E5, TableauRow,
 };
 use crate::math;
 
@@ -20,7 +20,7 @@ const ORDER_3_WEIGHT: f64 = 0.01;
 
 /// The stages of one step of length `h` from `(t, y)`.
 #[derive(Debug, Clone)]
-pub struct Stages<const N: usize> {
+pub struct Dop853Stages<const N: usize> {
     /// Start of the step, s.
     pub t: f64,
     /// Length of the step, s.
@@ -34,11 +34,11 @@ pub struct Stages<const N: usize> {
 
 /// `y + h * sum(a_j k_j)` over the nonzero entries of a row.
 #[inline(always)]
-fn combine<const N: usize, const M: usize>(
+fn combine_stages<const N: usize, const M: usize>(
     y: &[f64; N],
     h: f64,
     k: &[[f64; N]; 16],
-    row: &Row<M>,
+    row: &TableauRow<M>,
 ) -> [f64; N] {
     let mut sum = [0.0; N];
     for &(stage, a) in row {
@@ -53,11 +53,11 @@ fn combine<const N: usize, const M: usize>(
     out
 }
 
-impl<const N: usize> Stages<N> {
+impl<const N: usize> Dop853Stages<N> {
     /// Takes the step; `first` is the derivative at its start, `f(t, y)` the right-hand side (12
     /// evaluations).
     #[inline]
-    pub fn take(
+    pub fn take_step(
         f: impl Fn(f64, &[f64; N]) -> [f64; N],
         t: f64,
         y: &[f64; N],
@@ -68,7 +68,7 @@ impl<const N: usize> Stages<N> {
         k[0] = *first;
         macro_rules! stage {
             ($i:literal, $row:ident) => {
-                k[$i] = f(t + C[$i] * h, &combine(y, h, &k, &$row))
+                k[$i] = f(t + C[$i] * h, &combine_stages(y, h, &k, &$row))
             };
         }
         stage!(1, A1);
@@ -82,7 +82,7 @@ impl<const N: usize> Stages<N> {
         stage!(9, A9);
         stage!(10, A10);
         stage!(11, A11);
-        let y_end = combine(y, h, &k, &A12);
+        let y_end = combine_stages(y, h, &k, &A12);
         k[12] = f(t + h, &y_end);
         Self { t, h, y: *y, y_end, k }
     }
@@ -96,10 +96,10 @@ impl<const N: usize> Stages<N> {
     /// Combined error estimate in units of the tolerance: at most 1 is accepted. `scale` is the tolerated
     /// error of each component.
     #[inline]
-    pub fn error(&self, scale: &[f64; N]) -> f64 {
+    pub fn error_norm(&self, scale: &[f64; N]) -> f64 {
         let zero = [0.0; N];
-        let e5 = combine(&zero, 1.0, &self.k, &E5);
-        let e3 = combine(&zero, 1.0, &self.k, &E3);
+        let e5 = combine_stages(&zero, 1.0, &self.k, &E5);
+        let e3 = combine_stages(&zero, 1.0, &self.k, &E3);
         let (mut norm5, mut norm3) = (0.0, 0.0);
         for i in 0..N {
             norm5 += math::powi(e5[i] / scale[i], 2);
@@ -113,11 +113,11 @@ impl<const N: usize> Stages<N> {
 
     /// Adds the three stages of the dense output and returns it.
     #[inline]
-    pub fn dense(&mut self, f: impl Fn(f64, &[f64; N]) -> [f64; N]) -> Dense<N> {
+    pub fn dense_output(&mut self, f: impl Fn(f64, &[f64; N]) -> [f64; N]) -> Dop853DenseOutput<N> {
         let (t, h) = (self.t, self.h);
-        self.k[13] = f(t + C[13] * h, &combine(&self.y, h, &self.k, &A13));
-        self.k[14] = f(t + C[14] * h, &combine(&self.y, h, &self.k, &A14));
-        self.k[15] = f(t + C[15] * h, &combine(&self.y, h, &self.k, &A15));
+        self.k[13] = f(t + C[13] * h, &combine_stages(&self.y, h, &self.k, &A13));
+        self.k[14] = f(t + C[14] * h, &combine_stages(&self.y, h, &self.k, &A14));
+        self.k[15] = f(t + C[15] * h, &combine_stages(&self.y, h, &self.k, &A15));
         let zero = [0.0; N];
         let mut c = [[0.0; N]; 7];
         for i in 0..N {
@@ -126,28 +126,28 @@ impl<const N: usize> Stages<N> {
             c[1][i] = h * self.k[0][i] - rise;
             c[2][i] = 2.0 * rise - h * (self.k[12][i] + self.k[0][i]);
         }
-        c[3] = combine(&zero, h, &self.k, &D3);
-        c[4] = combine(&zero, h, &self.k, &D4);
-        c[5] = combine(&zero, h, &self.k, &D5);
-        c[6] = combine(&zero, h, &self.k, &D6);
-        Dense { t, h, y: self.y, c }
+        c[3] = combine_stages(&zero, h, &self.k, &D3);
+        c[4] = combine_stages(&zero, h, &self.k, &D4);
+        c[5] = combine_stages(&zero, h, &self.k, &D5);
+        c[6] = combine_stages(&zero, h, &self.k, &D6);
+        Dop853DenseOutput { t, h, y: self.y, c }
     }
 }
 
 /// The solution between the ends of a step, of order 7.
 #[derive(Debug, Clone)]
-pub struct Dense<const N: usize> {
+pub struct Dop853DenseOutput<const N: usize> {
     t: f64,
     h: f64,
     y: [f64; N],
     c: [[f64; N]; 7],
 }
 
-impl<const N: usize> Dense<N> {
+impl<const N: usize> Dop853DenseOutput<N> {
     /// State at the fraction `x` of the step, 0 at its start and 1 at its end.
     #[inline]
     #[must_use]
-    pub(crate) fn at_fraction(&self, x: f64) -> [f64; N] {
+    pub(crate) fn state_at_fraction(&self, x: f64) -> [f64; N] {
         let rest = 1.0 - x;
         let mut y = self.y;
         for i in 0..N {
@@ -159,9 +159,9 @@ impl<const N: usize> Dense<N> {
     }
 }
 
-impl<const N: usize> Solution<N> for Dense<N> {
-    fn at(&self, t: f64) -> [f64; N] {
-        self.at_fraction((t - self.t) / self.h)
+impl<const N: usize> DenseOutput<N> for Dop853DenseOutput<N> {
+    fn state_at(&self, t: f64) -> [f64; N] {
+        self.state_at_fraction((t - self.t) / self.h)
     }
 }
 
@@ -218,7 +218,7 @@ mod tests {
         assert!(sum(&E3).abs() < 1e-14 && sum(&E5).abs() < 1e-14);
     }
 
-    fn sum<const M: usize>(row: &Row<M>) -> f64 {
+    fn sum<const M: usize>(row: &TableauRow<M>) -> f64 {
         row.iter().map(|&(_, a)| a).sum()
     }
 
@@ -238,7 +238,7 @@ mod tests {
         let h = 8.0 / f64::from(steps);
         let mut y = exact(0.0);
         for i in 0..steps {
-            y = Stages::take(rotation, f64::from(i) * h, &y, &rotation(0.0, &y), h).y_end;
+            y = Dop853Stages::take_step(rotation, f64::from(i) * h, &y, &rotation(0.0, &y), h).y_end;
         }
         (y[0] - exact(8.0)[0]).hypot(y[1] - exact(8.0)[1])
     }
@@ -246,11 +246,11 @@ mod tests {
     /// Largest error of the dense output within one step.
     fn dense_error(h: f64) -> f64 {
         let start = exact(0.0);
-        let mut stages = Stages::take(rotation, 0.0, &start, &rotation(0.0, &start), h);
-        let dense = stages.dense(rotation);
+        let mut stages = Dop853Stages::take_step(rotation, 0.0, &start, &rotation(0.0, &start), h);
+        let dense = stages.dense_output(rotation);
         (1..20)
             .map(|i| f64::from(i) / 20.0)
-            .map(|x| (dense.at_fraction(x)[0] - exact(x * h)[0]).abs())
+            .map(|x| (dense.state_at_fraction(x)[0] - exact(x * h)[0]).abs())
             .fold(0.0, f64::max)
     }
 

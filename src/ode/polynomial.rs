@@ -12,7 +12,7 @@ pub const TERMS: usize = MOST_ORDER + 1;
 
 /// Taylor coefficients about the start of a step: `g(t + x) = sum g_k x^k`, those beyond the order in use
 /// unspecified.
-pub type Series = [f64; TERMS];
+pub type TaylorSeries = [f64; TERMS];
 
 /// Halvings after which a root that cannot be distinguished from a touch is taken for a touch: 2^-30 of a
 /// step is below every tolerance.
@@ -26,7 +26,7 @@ const FLAT: f64 = 4.0 * f64::EPSILON;
 
 /// What a guard does on a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Fall {
+pub enum GuardFall {
     /// It stays positive.
     Nowhere,
     /// It falls to zero this far after the start, in the units of `h`.
@@ -41,9 +41,9 @@ pub enum Fall {
 /// A zero at the start is armed by the first coefficient that rounding does not explain: if it is positive
 /// that zero is divided out, if it is negative the guard falls at once.
 #[must_use]
-pub(crate) fn first_fall(guard: &Series, order: usize, zero_order: usize, h: f64) -> Fall {
+pub(crate) fn first_fall(guard: &TaylorSeries, order: usize, zero_order: usize, h: f64) -> GuardFall {
     if guard[0] == f64::INFINITY {
-        return Fall::Nowhere;
+        return GuardFall::Nowhere;
     }
     let mut scaled = [0.0; TERMS];
     let (mut power, mut rest) = (1.0, 0.0);
@@ -53,24 +53,26 @@ pub(crate) fn first_fall(guard: &Series, order: usize, zero_order: usize, h: f64
         rest += scaled[k].abs();
     }
     if !rest.is_finite() {
-        return Fall::Undefined;
+        return GuardFall::Undefined;
     }
     if zero_order == 0 && 2.0 * scaled[0] > rest {
-        return Fall::Nowhere; // the first term outweighs all others together
+        return GuardFall::Nowhere; // the first term outweighs all others together
     }
     let noise = NOISE * rest;
-    let Some(first) = (zero_order..=order).find(|&k| scaled[k].abs() > noise) else { return Fall::Nowhere };
+    let Some(first) = (zero_order..=order).find(|&k| scaled[k].abs() > noise) else {
+        return GuardFall::Nowhere;
+    };
     let quotient = &scaled[first..=order];
     match () {
-        () if quotient[0] < 0.0 => Fall::At(0.0),
-        () if is_clear(quotient) => Fall::Nowhere,
-        () => first_root(quotient).map_or(Fall::Nowhere, |s| Fall::At(s * h)),
+        () if quotient[0] < 0.0 => GuardFall::At(0.0),
+        () if is_root_free(quotient) => GuardFall::Nowhere,
+        () => first_root(quotient).map_or(GuardFall::Nowhere, |s| GuardFall::At(s * h)),
     }
 }
 
 /// A quick look: whether the first few terms, in the Bernstein basis, stay above all that the others can take
 /// away.
-fn is_clear(c: &[f64]) -> bool {
+fn is_root_free(c: &[f64]) -> bool {
     /// Degree of the part that is evaluated closely; the rest falls with the power of the step.
     const HEAD: usize = 4;
     /// Reciprocals of the binomial coefficients of that degree.
@@ -101,17 +103,23 @@ fn first_root(c: &[f64]) -> Option<f64> {
         }
     }
     let flat = FLAT * c.iter().map(|c| c.abs()).sum::<f64>();
-    crossing(&Search { c, flat }, &mut b, 0.0, 1.0, 0)
+    first_crossing(&RootSearch { c, flat }, &mut b, 0.0, 1.0, 0)
 }
 
 /// The polynomial that is searched and the size below which its values are rounding.
-struct Search<'a> {
+struct RootSearch<'a> {
     c: &'a [f64],
     flat: f64,
 }
 
 /// First crossing in `[low, high]`; `b` are the Bernstein coefficients there and are used up.
-fn crossing(search: &Search<'_>, b: &mut [f64; TERMS], low: f64, high: f64, depth: u32) -> Option<f64> {
+fn first_crossing(
+    search: &RootSearch<'_>,
+    b: &mut [f64; TERMS],
+    low: f64,
+    high: f64,
+    depth: u32,
+) -> Option<f64> {
     let degree = search.c.len() - 1;
     if b[0] <= 0.0 {
         return Some(low);
@@ -136,8 +144,8 @@ fn crossing(search: &Search<'_>, b: &mut [f64; TERMS], low: f64, high: f64, dept
     }
     // what is left in `b` is the right half, from its start
     let middle = 0.5 * (low + high);
-    crossing(search, &mut left, low, middle, depth + 1)
-        .or_else(|| crossing(search, b, middle, high, depth + 1))
+    first_crossing(search, &mut left, low, middle, depth + 1)
+        .or_else(|| first_crossing(search, b, middle, high, depth + 1))
 }
 
 /// The one root between `low`, where the polynomial is positive, and `high`, where it is not: Newton's steps,
@@ -180,7 +188,7 @@ mod tests {
     use super::*;
 
     /// Coefficients of `factor * product (x - root)`.
-    fn with_roots(factor: f64, roots: &[f64]) -> (Series, usize) {
+    fn with_roots(factor: f64, roots: &[f64]) -> (TaylorSeries, usize) {
         let mut c = [0.0; TERMS];
         c[0] = factor;
         for (degree, root) in roots.iter().enumerate() {
@@ -191,13 +199,13 @@ mod tests {
         (c, roots.len())
     }
 
-    fn fall(factor: f64, roots: &[f64], zero_order: usize, h: f64) -> Fall {
+    fn fall(factor: f64, roots: &[f64], zero_order: usize, h: f64) -> GuardFall {
         let (c, order) = with_roots(factor, roots);
         first_fall(&c, order, zero_order, h)
     }
 
-    fn assert_falls(found: Fall, expected: f64, error: f64) {
-        let Fall::At(x) = found else { panic!("{found:?}") };
+    fn assert_falls(found: GuardFall, expected: f64, error: f64) {
+        let GuardFall::At(x) = found else { panic!("{found:?}") };
         assert!((x - expected).abs() <= error, "{x} instead of {expected}");
     }
 
@@ -205,7 +213,7 @@ mod tests {
     fn a_single_root_is_found_to_rounding() {
         assert_falls(fall(-1.0, &[0.3], 0, 1.0), 0.3, 1e-16);
         assert_falls(fall(-1.0, &[0.3, 1.7, 2.5, -1.0, -2.0], 0, 1.5), 0.3, 1e-15);
-        assert_eq!(fall(-1.0, &[1.3], 0, 1.0), Fall::Nowhere);
+        assert_eq!(fall(-1.0, &[1.3], 0, 1.0), GuardFall::Nowhere);
     }
 
     #[test]
@@ -215,14 +223,14 @@ mod tests {
         // (x - 0.515)^2 lifted by a little more than rounding
         let (mut c, order) = with_roots(1.0, &[0.515, 0.515]);
         c[0] += 1e-14;
-        assert_eq!(first_fall(&c, order, 0, 1.0), Fall::Nowhere);
+        assert_eq!(first_fall(&c, order, 0, 1.0), GuardFall::Nowhere);
     }
 
     #[test]
     fn a_zero_at_the_start_is_divided_out_and_the_next_one_found() {
         for order in 1..=3 {
             let mut roots = vec![0.0; order];
-            assert_eq!(fall(1.0, &roots, order, 1.0), Fall::Nowhere);
+            assert_eq!(fall(1.0, &roots, order, 1.0), GuardFall::Nowhere);
             roots.push(0.01);
             assert_falls(fall(-1.0, &roots, order, 1.0), 0.01, 1e-16);
             // the same zero, not announced: the first coefficient that rounding does not explain arms it
@@ -232,32 +240,32 @@ mod tests {
 
     #[test]
     fn a_guard_that_falls_from_its_zero_falls_at_once() {
-        assert_eq!(fall(-1.0, &[0.0], 1, 1.0), Fall::At(0.0));
-        assert_eq!(fall(-1.0, &[0.0, 0.0], 0, 1.0), Fall::At(0.0));
-        assert_eq!(fall(-1.0, &[-0.1], 0, 1.0), Fall::At(0.0));
+        assert_eq!(fall(-1.0, &[0.0], 1, 1.0), GuardFall::At(0.0));
+        assert_eq!(fall(-1.0, &[0.0, 0.0], 0, 1.0), GuardFall::At(0.0));
+        assert_eq!(fall(-1.0, &[-0.1], 0, 1.0), GuardFall::At(0.0));
     }
 
     #[test]
     fn a_zero_of_higher_order_than_announced_is_armed_by_the_next_coefficient() {
-        assert_eq!(fall(1.0, &[0.0, 0.0, 0.0], 2, 1.0), Fall::Nowhere);
-        assert_eq!(fall(-1.0, &[0.0, 0.0, 0.0], 2, 1.0), Fall::At(0.0));
+        assert_eq!(fall(1.0, &[0.0, 0.0, 0.0], 2, 1.0), GuardFall::Nowhere);
+        assert_eq!(fall(-1.0, &[0.0, 0.0, 0.0], 2, 1.0), GuardFall::At(0.0));
     }
 
     /// A root of multiplicity 20 is flat to rounding over a sixth of the step: halving that on would not end.
     #[test]
     fn a_flat_touch_ends_the_search() {
         let found = fall(1.0, &[1.0; 20], 0, 1.0);
-        assert!(found == Fall::Nowhere || matches!(found, Fall::At(x) if x > 0.7), "{found:?}");
+        assert!(found == GuardFall::Nowhere || matches!(found, GuardFall::At(x) if x > 0.7), "{found:?}");
     }
 
     #[test]
     fn what_is_no_number_is_said_and_what_does_not_apply_is_nowhere() {
         let mut c = [0.0; TERMS];
         c[0] = f64::NAN;
-        assert_eq!(first_fall(&c, 4, 0, 1.0), Fall::Undefined);
+        assert_eq!(first_fall(&c, 4, 0, 1.0), GuardFall::Undefined);
         c[0] = f64::INFINITY;
-        assert_eq!(first_fall(&c, 4, 0, 1.0), Fall::Nowhere);
+        assert_eq!(first_fall(&c, 4, 0, 1.0), GuardFall::Nowhere);
         // a corner of the shoulder that was passed at the same instant as the other one
-        assert_eq!(first_fall(&c, 4, 1, 1.0), Fall::Nowhere);
+        assert_eq!(first_fall(&c, 4, 1, 1.0), GuardFall::Nowhere);
     }
 }

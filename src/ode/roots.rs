@@ -8,9 +8,9 @@
 use crate::math;
 
 /// Samples a quick look takes: fractions 0, 1/4, 1/2, 3/4, 1.
-pub const COARSE: usize = 5;
+pub const COARSE_SAMPLES: usize = 5;
 /// Samples a full look takes: fractions 0, 1/8, ..., 1.
-pub const FINE: usize = 9;
+pub const FINE_SAMPLES: usize = 9;
 
 /// Halvings after which a root that cannot be distinguished from a touch is taken for a touch: 2^-30 of a
 /// step is below every tolerance.
@@ -19,45 +19,47 @@ const MOST_HALVINGS: u32 = 30;
 /// zero: its signs are those of rounding, and to halve it on would take a billion looks.
 const FLAT: f64 = 8.0 * f64::EPSILON;
 
-const COARSE_TO_BERNSTEIN: [[f64; COARSE]; COARSE] = bernstein_from_samples::<COARSE>();
-const FINE_TO_BERNSTEIN: [[f64; FINE]; FINE] = bernstein_from_samples::<FINE>();
-const INNER_TO_BERNSTEIN: [[f64; FINE - 1]; FINE - 1] = bernstein_from_inner_samples();
+const COARSE_TO_BERNSTEIN: [[f64; COARSE_SAMPLES]; COARSE_SAMPLES] =
+    bernstein_from_samples::<COARSE_SAMPLES>();
+const FINE_TO_BERNSTEIN: [[f64; FINE_SAMPLES]; FINE_SAMPLES] = bernstein_from_samples::<FINE_SAMPLES>();
+const INNER_TO_BERNSTEIN: [[f64; FINE_SAMPLES - 1]; FINE_SAMPLES - 1] = bernstein_from_inner_samples();
 
 /// Whether a guard with these coarse samples and one check sample (at fraction 7/8) stays clear of zero: the
 /// least Bernstein coefficient must exceed the error of interpolation that the check sample shows, with a
 /// margin.
 #[inline]
 #[must_use]
-pub fn is_clear(samples: &[f64; COARSE], check: f64) -> bool {
+pub fn is_root_free(samples: &[f64; COARSE_SAMPLES], check: f64) -> bool {
     /// The check sample sees the error of interpolation at one place; elsewhere it may be larger.
     const MARGIN: f64 = 8.0;
     /// Lagrange weights of the five coarse nodes at fraction 7/8.
-    const AT_CHECK: [f64; COARSE] = [-5.0 / 128.0, 7.0 / 32.0, -35.0 / 64.0, 35.0 / 32.0, 35.0 / 128.0];
+    const AT_CHECK: [f64; COARSE_SAMPLES] =
+        [-5.0 / 128.0, 7.0 / 32.0, -35.0 / 64.0, 35.0 / 32.0, 35.0 / 128.0];
     let predicted: f64 = samples.iter().zip(AT_CHECK).map(|(s, w)| s * w).sum();
     let margin = MARGIN * (predicted - check).abs();
-    multiply(&COARSE_TO_BERNSTEIN, samples).iter().all(|&b| b > margin)
+    multiply_matrix(&COARSE_TO_BERNSTEIN, samples).iter().all(|&b| b > margin)
 }
 
 /// First fraction of the step at which the polynomial through the fine samples falls to zero, if it does.
 #[must_use]
-pub(crate) fn first_root(samples: &[f64; FINE]) -> Option<f64> {
-    search(multiply(&FINE_TO_BERNSTEIN, samples))
+pub(crate) fn first_root(samples: &[f64; FINE_SAMPLES]) -> Option<f64> {
+    find_first_root(multiply_matrix(&FINE_TO_BERNSTEIN, samples))
 }
 
 /// The same for a guard that starts at a zero of multiplicity `order` and grows: the samples (the first is
 /// not used) are divided by `fraction^order`, which removes that zero, and the quotient is searched.
 #[must_use]
-pub(crate) fn first_root_after_zero(samples: &[f64; FINE], order: i32) -> Option<f64> {
-    let mut quotient = [0.0; FINE - 1];
+pub(crate) fn first_root_after_zero(samples: &[f64; FINE_SAMPLES], order: i32) -> Option<f64> {
+    let mut quotient = [0.0; FINE_SAMPLES - 1];
     for (i, q) in quotient.iter_mut().enumerate() {
-        let fraction = (i + 1) as f64 / (FINE - 1) as f64;
+        let fraction = (i + 1) as f64 / (FINE_SAMPLES - 1) as f64;
         *q = samples[i + 1] / math::powi(fraction, order);
     }
-    search(multiply(&INNER_TO_BERNSTEIN, &quotient))
+    find_first_root(multiply_matrix(&INNER_TO_BERNSTEIN, &quotient))
 }
 
 #[inline]
-fn multiply<const M: usize>(matrix: &[[f64; M]; M], x: &[f64; M]) -> [f64; M] {
+fn multiply_matrix<const M: usize>(matrix: &[[f64; M]; M], x: &[f64; M]) -> [f64; M] {
     let mut out = [0.0; M];
     for (o, row) in out.iter_mut().zip(matrix) {
         *o = row.iter().zip(x).map(|(a, b)| a * b).sum();
@@ -67,7 +69,7 @@ fn multiply<const M: usize>(matrix: &[[f64; M]; M], x: &[f64; M]) -> [f64; M] {
 
 /// A guard that does not apply, infinity or what subtracting it leaves, has no root; nor has one that is zero
 /// throughout.
-fn search<const M: usize>(b: [f64; M]) -> Option<f64> {
+fn find_first_root<const M: usize>(b: [f64; M]) -> Option<f64> {
     let largest = b.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
     if largest == 0.0 || !b.iter().all(|c| c.is_finite()) {
         return None;
@@ -91,7 +93,7 @@ fn first_crossing<const M: usize>(b: [f64; M], flat: f64, low: f64, high: f64, d
     if depth == MOST_HALVINGS || b.iter().all(|c| c.abs() <= flat) {
         return None;
     }
-    let (left, right) = halve(b);
+    let (left, right) = subdivide(b);
     let middle = 0.5 * (low + high);
     first_crossing(left, flat, low, middle, depth + 1)
         .or_else(|| first_crossing(right, flat, middle, high, depth + 1))
@@ -108,7 +110,7 @@ fn single_root<const M: usize>(b: &[f64; M]) -> f64 {
         }
         let secant = low + (high - low) * at_low / (at_low - at_high);
         let x = if round % 3 == 2 || !(secant > low && secant < high) { 0.5 * (low + high) } else { secant };
-        let value = evaluate(b, x);
+        let value = evaluate_bernstein(b, x);
         if value > 0.0 {
             (low, at_low, at_high) = (x, value, 0.5 * at_high);
         } else {
@@ -121,7 +123,7 @@ fn single_root<const M: usize>(b: &[f64; M]) -> f64 {
     high
 }
 
-fn evaluate<const M: usize>(b: &[f64; M], x: f64) -> f64 {
+fn evaluate_bernstein<const M: usize>(b: &[f64; M], x: f64) -> f64 {
     let mut c = *b;
     for level in (1..M).rev() {
         for i in 0..level {
@@ -131,7 +133,7 @@ fn evaluate<const M: usize>(b: &[f64; M], x: f64) -> f64 {
     c[0]
 }
 
-fn halve<const M: usize>(b: [f64; M]) -> ([f64; M], [f64; M]) {
+fn subdivide<const M: usize>(b: [f64; M]) -> ([f64; M], [f64; M]) {
     let (mut c, mut left, mut right) = (b, [0.0; M], [0.0; M]);
     for level in (0..M).rev() {
         left[M - 1 - level] = c[0];
@@ -151,21 +153,21 @@ const fn bernstein_from_samples<const M: usize>() -> [[f64; M]; M] {
         nodes[i] = i as f64 / (M - 1) as f64;
         i += 1;
     }
-    inverse(collocation(&nodes))
+    invert_matrix(collocation_matrix(&nodes))
 }
 
 /// The same at the nodes 1/8, ..., 1, for a quotient that is not sampled at 0.
-const fn bernstein_from_inner_samples() -> [[f64; FINE - 1]; FINE - 1] {
-    let mut nodes = [0.0; FINE - 1];
+const fn bernstein_from_inner_samples() -> [[f64; FINE_SAMPLES - 1]; FINE_SAMPLES - 1] {
+    let mut nodes = [0.0; FINE_SAMPLES - 1];
     let mut i = 0;
-    while i < FINE - 1 {
-        nodes[i] = (i + 1) as f64 / (FINE - 1) as f64;
+    while i < FINE_SAMPLES - 1 {
+        nodes[i] = (i + 1) as f64 / (FINE_SAMPLES - 1) as f64;
         i += 1;
     }
-    inverse(collocation(&nodes))
+    invert_matrix(collocation_matrix(&nodes))
 }
 
-const fn collocation<const M: usize>(nodes: &[f64; M]) -> [[f64; M]; M] {
+const fn collocation_matrix<const M: usize>(nodes: &[f64; M]) -> [[f64; M]; M] {
     let mut matrix = [[0.0; M]; M];
     let mut row = 0;
     while row < M {
@@ -173,7 +175,7 @@ const fn collocation<const M: usize>(nodes: &[f64; M]) -> [[f64; M]; M] {
         let mut binomial = 1.0;
         while column < M {
             matrix[row][column] =
-                binomial * power(nodes[row], column) * power(1.0 - nodes[row], M - 1 - column);
+                binomial * power_of(nodes[row], column) * power_of(1.0 - nodes[row], M - 1 - column);
             binomial = binomial * (M - 1 - column) as f64 / (column + 1) as f64;
             column += 1;
         }
@@ -182,7 +184,7 @@ const fn collocation<const M: usize>(nodes: &[f64; M]) -> [[f64; M]; M] {
     matrix
 }
 
-const fn power(x: f64, n: usize) -> f64 {
+const fn power_of(x: f64, n: usize) -> f64 {
     let mut product = 1.0;
     let mut i = 0;
     while i < n {
@@ -194,7 +196,7 @@ const fn power(x: f64, n: usize) -> f64 {
 
 /// Gauss-Jordan elimination without pivoting: collocation matrices of the Bernstein basis at ordered nodes
 /// are totally positive.
-const fn inverse<const M: usize>(mut a: [[f64; M]; M]) -> [[f64; M]; M] {
+const fn invert_matrix<const M: usize>(mut a: [[f64; M]; M]) -> [[f64; M]; M] {
     let mut out = [[0.0; M]; M];
     let mut p = 0;
     while p < M {
@@ -232,8 +234,8 @@ const fn inverse<const M: usize>(mut a: [[f64; M]; M]) -> [[f64; M]; M] {
 mod tests {
     use super::*;
 
-    fn sample(f: impl Fn(f64) -> f64) -> [f64; FINE] {
-        std::array::from_fn(|i| f(i as f64 / (FINE - 1) as f64))
+    fn sample(f: impl Fn(f64) -> f64) -> [f64; FINE_SAMPLES] {
+        std::array::from_fn(|i| f(i as f64 / (FINE_SAMPLES - 1) as f64))
     }
 
     #[test]
@@ -271,15 +273,15 @@ mod tests {
     /// Both would be halved a billion times: the test would not end.
     #[test]
     fn a_guard_that_does_not_apply_or_is_flat_ends_the_search() {
-        assert_eq!(first_root_after_zero(&[f64::INFINITY; FINE], 1), None);
-        assert_eq!(first_root_after_zero(&[0.0; FINE], 3), None);
+        assert_eq!(first_root_after_zero(&[f64::INFINITY; FINE_SAMPLES], 1), None);
+        assert_eq!(first_root_after_zero(&[0.0; FINE_SAMPLES], 3), None);
         let flat = first_root(&sample(|x| (1.0 - x).powi(8)));
         assert!(flat.is_none_or(|x| x > 0.9), "{flat:?}");
     }
 
     #[test]
     fn the_quick_look_agrees_with_the_full_one() {
-        let quick = |f: fn(f64) -> f64| is_clear(&std::array::from_fn(|i| f(i as f64 / 4.0)), f(0.875));
+        let quick = |f: fn(f64) -> f64| is_root_free(&std::array::from_fn(|i| f(i as f64 / 4.0)), f(0.875));
         assert!(quick(|x| 1.0 + 0.5 * (3.0 * x).sin()));
         assert!(!quick(|x| 0.3 - x));
         assert!(!quick(|x| (x - 0.51) * (x - 0.52)));

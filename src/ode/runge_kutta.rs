@@ -1,17 +1,19 @@
 //! The Dormand-Prince 8(5,3) method with error control, up to the first guard that falls: roots are isolated
 //! on nine samples of the dense output, and the state there is that of a step of the method's own order.
 
-use super::dop853::{Dense, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, Stages};
-use super::fixed::{SHORT_STEP_EVALUATIONS, short_step};
-use super::roots::{self, COARSE, FINE};
-use super::slack::{MOST_HALVINGS, Point, Slack};
-use super::{Answer, Cause, End, Phase, Start, Step, Work};
+use super::dop853::{
+    Dop853DenseOutput, Dop853Stages, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP,
+};
+use super::fixed::{RUNGE_KUTTA_4_EVALUATIONS, runge_kutta_4_step};
+use super::roots::{self, COARSE_SAMPLES, FINE_SAMPLES};
+use super::slack::{MOST_HALVINGS, SlackVariable, StatePoint};
+use super::{AcceptedStep, HybridPhase, ObserverReply, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters};
 use crate::math;
 
 /// How the instant at which a guard falls to zero is located; which guard falls first, double roots included,
 /// is always read off the dense output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Locator {
+pub enum EventLocator {
     /// The root is bracketed on the dense output, the step taken again up to it and the rest closed by
     /// Newton's iteration.
     #[default]
@@ -23,54 +25,57 @@ pub enum Locator {
 
 /// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every accepted step.
 ///
-/// `relative` is the tolerated error of a step relative to each state, or to its [`Phase::scale`] where that
+/// `relative` is the tolerated error of a step relative to each state, or to its [`HybridPhase::scale`] where that
 /// is larger.
-pub fn integrate<const N: usize, const G: usize, P: Phase<N, G>, A: Answer>(
+pub fn integrate<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
     phase: &P,
-    start: Start<N, G>,
+    start: PhaseStart<N, G>,
     stop: f64,
     relative: f64,
-    work: &mut Work,
-    observe: impl FnMut(&Step<'_, N>) -> A,
-) -> End<N> {
-    integrate_by(Locator::Bracket, phase, start, stop, relative, work, observe)
+    work: &mut WorkCounters,
+    observe: impl FnMut(&AcceptedStep<'_, N>) -> A,
+) -> PhaseEnd<N> {
+    integrate_with_locator(EventLocator::Bracket, phase, start, stop, relative, work, observe)
 }
 
 /// [`integrate`] with a choice of how events are located.
-pub fn integrate_by<const N: usize, const G: usize, P: Phase<N, G>, A: Answer>(
-    locator: Locator,
+pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
+    locator: EventLocator,
     phase: &P,
-    start: Start<N, G>,
+    start: PhaseStart<N, G>,
     stop: f64,
     relative: f64,
-    work: &mut Work,
-    mut observe: impl FnMut(&Step<'_, N>) -> A,
-) -> End<N> {
-    let mut run = Integration { locator, ..Integration::begin(phase, start, relative, work) };
+    work: &mut WorkCounters,
+    mut observe: impl FnMut(&AcceptedStep<'_, N>) -> A,
+) -> PhaseEnd<N> {
+    let mut run =
+        Dop853Integration { locator, ..Dop853Integration::from_start(phase, start, relative, work) };
     loop {
         if run.t >= stop {
-            return run.end(Cause::Stop);
+            return run.phase_end(PhaseEndCause::Stop);
         }
         if run.work.is_spent() {
-            return run.end(Cause::StepTooSmall);
+            return run.phase_end(PhaseEndCause::StepTooSmall);
         }
-        let Some(mut stages) = run.accepted_step(stop) else { return run.end(Cause::StepTooSmall) };
+        let Some(mut stages) = run.find_accepted_step(stop) else {
+            return run.phase_end(PhaseEndCause::StepTooSmall);
+        };
         run.work.rhs_evaluations += EVALUATIONS_FOR_DENSE;
-        let dense = stages.dense(|t, y| phase.derivative(t, y));
-        match run.locate(&stages, &dense) {
-            Located::Outside => run.shorten(&stages),
-            Located::Nowhere => {
-                let end = run.accept(&stages, stop);
-                let step = Step { start: stages.t, end, y_end: &stages.y_end, solution: &dense };
-                if observe(&step).flow().is_break() {
-                    return run.end(Cause::Asked);
+        let dense = stages.dense_output(|t, y| phase.derivative(t, y));
+        match run.locate_event(&stages, &dense) {
+            EventLocation::Outside => run.reject_step(&stages),
+            EventLocation::Nowhere => {
+                let end = run.accept_step(&stages, stop);
+                let step = AcceptedStep { start: stages.t, end, y_end: &stages.y_end, solution: &dense };
+                if observe(&step).control_flow().is_break() {
+                    return run.phase_end(PhaseEndCause::Interrupted);
                 }
             }
-            Located::At { guard, t, y } => {
-                let step = Step { start: run.t, end: t, y_end: &y, solution: &dense };
-                let asked = observe(&step).flow().is_break();
-                let cause = if asked { Cause::Asked } else { Cause::Guard(guard) };
-                return End { t, y, ..run.end(cause) };
+            EventLocation::At { guard, t, y } => {
+                let step = AcceptedStep { start: run.t, end: t, y_end: &y, solution: &dense };
+                let asked = observe(&step).control_flow().is_break();
+                let cause = if asked { PhaseEndCause::Interrupted } else { PhaseEndCause::Guard(guard) };
+                return PhaseEnd { t, y, ..run.phase_end(cause) };
             }
         }
     }
@@ -91,16 +96,16 @@ const OUT_OF_DOMAIN: f64 = 0.1;
 const STRETCH: f64 = 1.01;
 /// Length of step, in units of the rounding of time, up to which a guard that starts at zero is not looked
 /// at.
-const SLIVER: f64 = 64.0;
+const SLIVER_STEP: f64 = 64.0;
 /// What a guard may leave at its located zero, as a share of its largest sample: with more, the polynomial
 /// through the samples has a root that the guard has not, and the step is taken again, shorter.
-const UNEXPLAINED: f64 = 1e-3;
+const MOST_GUARD_REMAINDER: f64 = 1e-3;
 /// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over
 /// it, a double zero at the start opens by less than the rounding of the state.
-const UNTOLD: f64 = 1e8;
+const SHORTEST_TELLING_STEP: f64 = 1e8;
 
 /// What the guards say of a step.
-enum Located<const N: usize> {
+enum EventLocation<const N: usize> {
     /// None falls to zero.
     Nowhere,
     /// The first to fall to zero, with time and state there.
@@ -109,10 +114,10 @@ enum Located<const N: usize> {
     Outside,
 }
 
-struct Integration<'a, const N: usize, const G: usize, P> {
+struct Dop853Integration<'a, const N: usize, const G: usize, P> {
     phase: &'a P,
-    locator: Locator,
-    work: &'a mut Work,
+    locator: EventLocator,
+    work: &'a mut WorkCounters,
     relative: f64,
     t: f64,
     y: [f64; N],
@@ -124,15 +129,15 @@ struct Integration<'a, const N: usize, const G: usize, P> {
     last_error: f64,
 }
 
-impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P> {
-    fn begin(phase: &'a P, start: Start<N, G>, relative: f64, work: &'a mut Work) -> Self {
+impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration<'a, N, G, P> {
+    fn from_start(phase: &'a P, start: PhaseStart<N, G>, relative: f64, work: &'a mut WorkCounters) -> Self {
         let derivative = phase.derivative(start.t, &start.y);
         work.rhs_evaluations += 1;
         work.guard_evaluations += 1;
         let guards = phase.guards(start.t, &start.y);
         let mut run = Self {
             phase,
-            locator: Locator::default(),
+            locator: EventLocator::default(),
             work,
             relative,
             t: start.t,
@@ -144,22 +149,22 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
             first_step: None,
             last_error: NEGLIGIBLE,
         };
-        run.h = start.step.unwrap_or_else(|| run.estimated_step());
+        run.h = start.step.unwrap_or_else(|| run.estimate_first_step());
         run
     }
 
-    fn end(&self, cause: Cause) -> End<N> {
-        End { t: self.t, y: self.y, cause, first_step: self.first_step.unwrap_or(self.h) }
+    fn phase_end(&self, cause: PhaseEndCause) -> PhaseEnd<N> {
+        PhaseEnd { t: self.t, y: self.y, cause, first_step: self.first_step.unwrap_or(self.h) }
     }
 
-    fn tolerated(&self, y: &[f64; N]) -> [f64; N] {
+    fn tolerated_error(&self, y: &[f64; N]) -> [f64; N] {
         let scale = self.phase.scale();
         std::array::from_fn(|i| self.relative * scale[i].max(self.y[i].abs()).max(y[i].abs()))
     }
 
     /// Hairer's starting step (section II.4): from the sizes of the state and of its first two derivatives.
-    fn estimated_step(&mut self) -> f64 {
-        let tolerated = self.tolerated(&self.y);
+    fn estimate_first_step(&mut self) -> f64 {
+        let tolerated = self.tolerated_error(&self.y);
         let norm = |v: &[f64; N]| {
             (v.iter().zip(&tolerated).map(|(v, s)| math::powi(v / s, 2)).sum::<f64>() / N as f64).sqrt()
         };
@@ -182,7 +187,7 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
     }
 
     /// Tries steps until one meets the tolerance; `None` when even the shortest representable one does not.
-    fn accepted_step(&mut self, stop: f64) -> Option<Stages<N>> {
+    fn find_accepted_step(&mut self, stop: f64) -> Option<Dop853Stages<N>> {
         let (most, least, safety) = GROWTH;
         let mut rejected = false;
         loop {
@@ -193,10 +198,15 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
             if !resolved || self.t + h <= self.t {
                 return None;
             }
-            let stages =
-                Stages::take(|t, y| self.phase.derivative(t, y), self.t, &self.y, &self.derivative, h);
+            let stages = Dop853Stages::take_step(
+                |t, y| self.phase.derivative(t, y),
+                self.t,
+                &self.y,
+                &self.derivative,
+                h,
+            );
             self.work.rhs_evaluations += EVALUATIONS_PER_STEP;
-            let error = stages.error(&self.tolerated(&stages.y_end));
+            let error = stages.error_norm(&self.tolerated_error(&stages.y_end));
             if error <= 1.0 {
                 // (a step that was cut at the stop time says little about the next one)
                 let wanted = safety
@@ -221,13 +231,13 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
     }
 
     /// Takes back a step that left the domain of the phase.
-    fn shorten(&mut self, stages: &Stages<N>) {
+    fn reject_step(&mut self, stages: &Dop853Stages<N>) {
         self.work.steps -= 1;
         self.work.rejected_steps += 1;
         self.h = OUT_OF_DOMAIN * stages.h;
     }
 
-    fn accept(&mut self, stages: &Stages<N>, stop: f64) -> f64 {
+    fn accept_step(&mut self, stages: &Dop853Stages<N>, stop: f64) -> f64 {
         let end = stages.t + stages.h;
         self.t = if (stop - end).abs() <= 4.0 * f64::EPSILON * stop.abs() { stop } else { end };
         self.y = stages.y_end;
@@ -239,80 +249,85 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
     }
 
     /// Whether a step is so short that a guard which starts at its zero does not leave the rounding of it.
-    fn is_sliver(&self, stages: &Stages<N>) -> bool {
-        stages.h <= SLIVER * f64::EPSILON * stages.t.abs()
+    fn is_sliver(&self, stages: &Dop853Stages<N>) -> bool {
+        stages.h <= SLIVER_STEP * f64::EPSILON * stages.t.abs()
     }
 
     /// The first guard that falls to zero inside the step.
-    fn locate(&mut self, stages: &Stages<N>, dense: &Dense<N>) -> Located<N> {
-        let mut sampled = Sampled {
+    fn locate_event(&mut self, stages: &Dop853Stages<N>, dense: &Dop853DenseOutput<N>) -> EventLocation<N> {
+        let mut sampled = GuardSamples {
             phase: self.phase,
             t: stages.t,
             h: stages.h,
             dense,
-            samples: [[0.0; G]; FINE],
+            samples: [[0.0; G]; FINE_SAMPLES],
             count: 0,
         };
         sampled.samples[0] = self.guards;
-        sampled.samples[FINE - 1] = self.phase.guards(stages.t + stages.h, &stages.y_end);
-        let mut suspects = sampled.suspects(&self.zero_order);
+        sampled.samples[FINE_SAMPLES - 1] = self.phase.guards(stages.t + stages.h, &stages.y_end);
+        let mut suspects = sampled.find_suspects(&self.zero_order);
         if self.is_sliver(stages) {
             (0..G).filter(|&g| self.zero_order[g] > 0).for_each(|g| suspects[g] = false);
         }
         if suspects.iter().any(|&s| s) {
-            sampled.complete();
+            sampled.sample_remaining();
         }
         self.work.guard_evaluations += 1 + sampled.count;
-        if sampled.has_no_number() {
-            return Located::Outside;
+        if sampled.has_nan() {
+            return EventLocation::Outside;
         }
         let first = (0..G)
             .filter(|&g| suspects[g])
             .filter_map(|g| sampled.first_root(g, self.zero_order[g]).map(|x| (g, x)))
             .min_by(|a, b| a.1.total_cmp(&b.1));
-        let before = std::mem::replace(&mut self.guards, sampled.samples[FINE - 1]);
-        let Some((guard, fraction)) = first else { return Located::Nowhere };
-        let landed =
-            if self.locator == Locator::Slack { self.land(stages, dense, guard, fraction) } else { None };
-        let (t, y) = landed.unwrap_or_else(|| self.polish(stages, guard, fraction));
+        let before = std::mem::replace(&mut self.guards, sampled.samples[FINE_SAMPLES - 1]);
+        let Some((guard, fraction)) = first else { return EventLocation::Nowhere };
+        let landed = if self.locator == EventLocator::Slack {
+            self.land_by_slack(stages, dense, guard, fraction)
+        } else {
+            None
+        };
+        let (t, y) = landed.unwrap_or_else(|| self.refine_event(stages, guard, fraction));
         let left = self.phase.guards(t, &y)[guard].abs();
         self.work.guard_evaluations += 1;
         // (a guard that has fallen before its start is taken at its word)
-        if t > stages.t && left > UNEXPLAINED * sampled.largest(guard) {
-            if stages.h <= UNTOLD * f64::EPSILON * t.abs() {
-                return Located::Nowhere; // a shorter step would tell no more: what is left is rounding
+        if t > stages.t && left > MOST_GUARD_REMAINDER * sampled.largest_sample(guard) {
+            if stages.h <= SHORTEST_TELLING_STEP * f64::EPSILON * t.abs() {
+                return EventLocation::Nowhere; // a shorter step would tell no more: what is left is rounding
             }
             self.guards = before;
-            return Located::Outside;
+            return EventLocation::Outside;
         }
-        Located::At { guard, t, y }
+        EventLocation::At { guard, t, y }
     }
 
     /// State at the event by the slack variable, from the start of the step or from nearer the zero where the
     /// guard turns before it falls; `None` for a guard that turns too close to its zero.
-    fn land(
+    fn land_by_slack(
         &mut self,
-        stages: &Stages<N>,
-        dense: &Dense<N>,
+        stages: &Dop853Stages<N>,
+        dense: &Dop853DenseOutput<N>,
         guard: usize,
         fraction: f64,
     ) -> Option<(f64, [f64; N])> {
         self.work.rejected_steps += u64::from(self.guards[guard] < 0.0);
         let f = |t: f64, y: &[f64; N]| self.phase.derivative(t, y);
-        let mut slack = Slack::new(self.phase, guard, stages.h, self.work);
+        let mut slack = SlackVariable::new(self.phase, guard, stages.h, self.work);
         let (mut after, root) = (0.0, fraction * stages.h);
         for _ in 0..MOST_HALVINGS {
-            if slack
-                .falls(&Point { t: stages.t + after, y: dense.at_fraction(after / stages.h) }, root - after)
-            {
-                let (mut from, mut flow) = (Point { t: stages.t, y: stages.y }, self.derivative);
+            if slack.can_descend(
+                &StatePoint { t: stages.t + after, y: dense.state_at_fraction(after / stages.h) },
+                root - after,
+            ) {
+                let (mut from, mut flow) = (StatePoint { t: stages.t, y: stages.y }, self.derivative);
                 if after > 0.0 {
-                    let lead = Stages::take(f, stages.t, &stages.y, &flow, after);
-                    (from, flow) = (Point { t: stages.t + after, y: lead.y_end }, *lead.derivative_at_end());
-                    slack.count(EVALUATIONS_PER_STEP);
+                    let lead = Dop853Stages::take_step(f, stages.t, &stages.y, &flow, after);
+                    (from, flow) =
+                        (StatePoint { t: stages.t + after, y: lead.y_end }, *lead.derivative_at_end());
+                    slack.count_evaluations(EVALUATIONS_PER_STEP);
                 }
-                let advance = |t: f64| Stages::take(f, from.t, &from.y, &flow, t - from.t).y_end;
-                if let Some(landed) = slack.land(&from, EVALUATIONS_PER_STEP, advance) {
+                let advance = |t: f64| Dop853Stages::take_step(f, from.t, &from.y, &flow, t - from.t).y_end;
+                if let Some(landed) = slack.land_on_zero(&from, EVALUATIONS_PER_STEP, advance) {
                     return Some((landed.t, landed.y));
                 }
             }
@@ -323,7 +338,7 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
 
     /// State at the event to the order of the method: the step is taken again up to the root of the dense
     /// output, then Newton's iteration on the guard closes what is left with short steps.
-    fn polish(&mut self, stages: &Stages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
+    fn refine_event(&mut self, stages: &Dop853Stages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
         /// Corrections at most; one is the rule, because the dense output's root is good to its order.
         const ROUNDS: usize = 4;
         /// A correction beyond this share of the step means that the guard only grazes zero: the dense
@@ -337,7 +352,7 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
         }
         let f = |t: f64, y: &[f64; N]| self.phase.derivative(t, y);
         let mut t = stages.t + fraction * stages.h;
-        let retaken = Stages::take(f, stages.t, &stages.y, &self.derivative, t - stages.t);
+        let retaken = Dop853Stages::take_step(f, stages.t, &stages.y, &self.derivative, t - stages.t);
         let (mut y, mut slope_here) = (retaken.y_end, *retaken.derivative_at_end());
         self.work.rhs_evaluations += EVALUATIONS_PER_STEP;
         for _ in 0..ROUNDS {
@@ -351,8 +366,8 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
             if !small || t + correction == t || t + correction <= stages.t {
                 break;
             }
-            (t, y) = short_step(f, t, &y, &slope_here, correction);
-            self.work.rhs_evaluations += SHORT_STEP_EVALUATIONS;
+            (t, y) = runge_kutta_4_step(f, t, &y, &slope_here, correction);
+            self.work.rhs_evaluations += RUNGE_KUTTA_4_EVALUATIONS;
             if PROBE * correction.abs() <= f64::EPSILON * t.abs() {
                 break;
             }
@@ -364,53 +379,53 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Integration<'a, N, G, P
 }
 
 /// Guards sampled along a step, coarsely first.
-struct Sampled<'a, const N: usize, const G: usize, P> {
+struct GuardSamples<'a, const N: usize, const G: usize, P> {
     phase: &'a P,
     t: f64,
     h: f64,
-    dense: &'a Dense<N>,
-    samples: [[f64; G]; FINE],
+    dense: &'a Dop853DenseOutput<N>,
+    samples: [[f64; G]; FINE_SAMPLES],
     count: u64,
 }
 
-impl<const N: usize, const G: usize, P: Phase<N, G>> Sampled<'_, N, G, P> {
-    fn take(&mut self, index: usize) {
-        let fraction = index as f64 / (FINE - 1) as f64;
+impl<const N: usize, const G: usize, P: HybridPhase<N, G>> GuardSamples<'_, N, G, P> {
+    fn sample_at(&mut self, index: usize) {
+        let fraction = index as f64 / (FINE_SAMPLES - 1) as f64;
         self.samples[index] =
-            self.phase.guards(self.t + fraction * self.h, &self.dense.at_fraction(fraction));
+            self.phase.guards(self.t + fraction * self.h, &self.dense.state_at_fraction(fraction));
         self.count += 1;
     }
 
     /// Which guards may reach zero: those that start there, those that end there and those that the quick
     /// look cannot clear.
-    fn suspects(&mut self, zero_order: &[u8; G]) -> [bool; G] {
+    fn find_suspects(&mut self, zero_order: &[u8; G]) -> [bool; G] {
         for index in [2, 4, 6, 7] {
-            self.take(index);
+            self.sample_at(index);
         }
         std::array::from_fn(|g| {
             let at = |i: usize| self.samples[i][g];
-            let coarse: [f64; COARSE] = [at(0), at(2), at(4), at(6), at(8)];
-            zero_order[g] > 0 || (at(8) < f64::INFINITY && !roots::is_clear(&coarse, at(7)))
+            let coarse: [f64; COARSE_SAMPLES] = [at(0), at(2), at(4), at(6), at(8)];
+            zero_order[g] > 0 || (at(8) < f64::INFINITY && !roots::is_root_free(&coarse, at(7)))
         })
     }
 
-    fn complete(&mut self) {
+    fn sample_remaining(&mut self) {
         for index in [1, 3, 5] {
-            self.take(index);
+            self.sample_at(index);
         }
     }
 
-    fn largest(&self, guard: usize) -> f64 {
+    fn largest_sample(&self, guard: usize) -> f64 {
         self.samples.iter().fold(0.0, |most, s| most.max(s[guard].abs()))
     }
 
     /// Whether a sample is NaN, which no search for roots could end on.
-    fn has_no_number(&self) -> bool {
+    fn has_nan(&self) -> bool {
         self.samples.iter().flatten().any(|s| s.is_nan())
     }
 
     fn first_root(&self, guard: usize, zero_order: u8) -> Option<f64> {
-        let samples: [f64; FINE] = std::array::from_fn(|i| self.samples[i][guard]);
+        let samples: [f64; FINE_SAMPLES] = std::array::from_fn(|i| self.samples[i][guard]);
         match zero_order {
             0 => roots::first_root(&samples),
             order => roots::first_root_after_zero(&samples, i32::from(order)),
@@ -423,9 +438,9 @@ mod tests {
     use super::*;
     use crate::ode::taylor::tests::Oscillator;
 
-    fn fall(level: f64, relative: f64) -> (End<2>, Work) {
-        let mut work = Work::default();
-        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
+    fn fall(level: f64, relative: f64) -> (PhaseEnd<2>, WorkCounters) {
+        let mut work = WorkCounters::default();
+        let start = PhaseStart { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
         (integrate(&Oscillator { level }, start, 10.0, relative, &mut work, |_| ()), work)
     }
 
@@ -434,7 +449,7 @@ mod tests {
         for exponent in 4..=12 {
             let relative = 10f64.powi(-exponent);
             let (end, _) = fall(0.25, relative);
-            assert_eq!(end.cause, Cause::Guard(0));
+            assert_eq!(end.cause, PhaseEndCause::Guard(0));
             let error = (end.t - 0.25f64.acos()).abs();
             assert!(error < 20.0 * relative, "tolerance {relative:e}: error {error:e}");
         }
@@ -445,19 +460,19 @@ mod tests {
     #[test]
     fn a_dip_inside_one_step_is_found_and_a_near_miss_is_not() {
         let (end, _) = fall(-1.0 + 1e-6, 1e-8);
-        assert_eq!(end.cause, Cause::Guard(0));
+        assert_eq!(end.cause, PhaseEndCause::Guard(0));
         assert!((end.t - (-1.0f64 + 1e-6).acos()).abs() < 1e-5, "{}", end.t);
         let (end, _) = fall(-1.0 - 1e-6, 1e-8);
-        assert_eq!((end.cause, end.t), (Cause::Stop, 10.0));
+        assert_eq!((end.cause, end.t), (PhaseEndCause::Stop, 10.0));
     }
 
     #[test]
     fn a_guard_armed_at_a_double_zero_falls_a_period_later() {
-        let mut work = Work::default();
+        let mut work = WorkCounters::default();
         // 1 - x starts at a double zero and returns to it after one period, where it only touches; x + 0.5
         // ends the phase before
         struct Released;
-        impl Phase<2, 2> for Released {
+        impl HybridPhase<2, 2> for Released {
             fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
                 [y[1], -y[0]]
             }
@@ -468,16 +483,16 @@ mod tests {
                 [1.0, 1.0]
             }
         }
-        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [2, 0], step: None };
+        let start = PhaseStart { t: 0.0, y: [1.0, 0.0], zero_order: [2, 0], step: None };
         let end = integrate(&Released, start, 10.0, 1e-10, &mut work, |_| ());
-        assert_eq!(end.cause, Cause::Guard(1));
+        assert_eq!(end.cause, PhaseEndCause::Guard(1));
         assert!((end.t - 5.0).abs() < 1e-9);
     }
 
     #[test]
     fn a_state_that_blows_up_ends_with_a_reason() {
         struct Blowup;
-        impl Phase<1, 1> for Blowup {
+        impl HybridPhase<1, 1> for Blowup {
             fn derivative(&self, _: f64, y: &[f64; 1]) -> [f64; 1] {
                 [y[0] * y[0]]
             }
@@ -488,9 +503,9 @@ mod tests {
                 [1.0]
             }
         }
-        let start = Start { t: 0.0, y: [1.0], zero_order: [0], step: None };
-        let end = integrate(&Blowup, start, 2.0, 1e-8, &mut Work::default(), |_| ());
-        assert_eq!(end.cause, Cause::StepTooSmall);
+        let start = PhaseStart { t: 0.0, y: [1.0], zero_order: [0], step: None };
+        let end = integrate(&Blowup, start, 2.0, 1e-8, &mut WorkCounters::default(), |_| ());
+        assert_eq!(end.cause, PhaseEndCause::StepTooSmall);
         assert!((end.t - 1.0).abs() < 1e-6, "the solution 1/(1-t) ends at 1, found {}", end.t);
     }
 
@@ -498,7 +513,7 @@ mod tests {
     #[test]
     fn a_guard_that_leaves_its_domain_ends_with_a_reason() {
         struct Level;
-        impl Phase<1, 1> for Level {
+        impl HybridPhase<1, 1> for Level {
             fn derivative(&self, _: f64, _: &[f64; 1]) -> [f64; 1] {
                 [1.0]
             }
@@ -509,17 +524,17 @@ mod tests {
                 [1.0]
             }
         }
-        let start = Start { t: 0.0, y: [0.0], zero_order: [0], step: None };
-        let end = integrate(&Level, start, 2.0, 1e-8, &mut Work::default(), |_| ());
-        assert_eq!(end.cause, Cause::StepTooSmall);
+        let start = PhaseStart { t: 0.0, y: [0.0], zero_order: [0], step: None };
+        let end = integrate(&Level, start, 2.0, 1e-8, &mut WorkCounters::default(), |_| ());
+        assert_eq!(end.cause, PhaseEndCause::StepTooSmall);
         assert!((end.t - 1.0).abs() < 1e-12, "{}", end.t);
     }
 
     #[test]
     fn steps_are_contiguous_and_the_last_one_ends_at_the_stop() {
         let (mut last, mut count) = (0.0, 0);
-        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
-        let mut work = Work::default();
+        let start = PhaseStart { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
+        let mut work = WorkCounters::default();
         let end = integrate(&Oscillator { level: -2.0 }, start, 3.0, 1e-6, &mut work, |step| {
             assert_eq!(step.start, last);
             last = step.end;

@@ -9,11 +9,11 @@
 //! applied to `sqrt(2 G)`). Both slopes stay finite where the guard falls to a double zero. A state past the
 //! zero has no real `s`; there `G = -s^2/2` leads back.
 
-use super::{Phase, Work};
+use super::{HybridPhase, WorkCounters};
 
 /// A time, s, with the state there.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Point<const N: usize> {
+pub(super) struct StatePoint<const N: usize> {
     pub t: f64,
     pub y: [f64; N],
 }
@@ -28,7 +28,7 @@ const MOST_DESCENTS: usize = 40;
 const SHORT: f64 = 1e-3;
 /// Share of its way that a short descent leaves at most: when that is below the rounding of time, the zero is
 /// reached.
-const LEFT_OVER: f64 = 1e-4;
+const MOST_REMAINDER: f64 = 1e-4;
 /// Span of the central difference for the guard's rate, as a share of the step: its error, about 1e-10 of the
 /// rate, shifts where one descent ends and is removed by the next.
 const PROBE: f64 = 1e-5;
@@ -39,68 +39,71 @@ const LEAST_FALL: f64 = 0.5;
 pub(super) const MOST_HALVINGS: usize = 30;
 
 /// One guard of a phase, near its zero inside a step.
-pub(super) struct Slack<'a, const N: usize, const G: usize, P: Phase<N, G>> {
+pub(super) struct SlackVariable<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> {
     phase: &'a P,
     guard: usize,
     probe_s: f64,
-    work: &'a mut Work,
+    work: &'a mut WorkCounters,
 }
 
-impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Slack<'a, N, G, P> {
+impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a, N, G, P> {
     /// The guard with this index; `step_s` is the length of the step that it falls in, s.
-    pub(super) fn new(phase: &'a P, guard: usize, step_s: f64, work: &'a mut Work) -> Self {
+    pub(super) fn new(phase: &'a P, guard: usize, step_s: f64, work: &'a mut WorkCounters) -> Self {
         Self { phase, guard, probe_s: PROBE * step_s, work }
     }
 
     /// Notes right-hand sides that the method's own steps took.
-    pub(super) fn count(&mut self, evaluations: u64) {
+    pub(super) fn count_evaluations(&mut self, evaluations: u64) {
         self.work.rhs_evaluations += evaluations;
     }
 
     /// The guard at a point.
-    pub(super) fn value(&mut self, at: &Point<N>) -> f64 {
+    pub(super) fn guard_value(&mut self, at: &StatePoint<N>) -> f64 {
         self.work.guard_evaluations += 1;
         self.phase.guards(at.t, &at.y)[self.guard]
     }
 
     /// Rate of the guard along the flow, 1/s times its unit: a central difference along the direction of the
     /// flow.
-    fn rate(&mut self, at: &Point<N>, flow: &[f64; N]) -> f64 {
+    fn guard_rate(&mut self, at: &StatePoint<N>, flow: &[f64; N]) -> f64 {
         let probe = (at.t + self.probe_s) - at.t; // as the time really moves
         let mut along = |share: f64| {
-            self.value(&Point { t: at.t + share, y: std::array::from_fn(|i| at.y[i] + share * flow[i]) })
+            self.guard_value(&StatePoint {
+                t: at.t + share,
+                y: std::array::from_fn(|i| at.y[i] + share * flow[i]),
+            })
         };
         (along(probe) - along(-probe)) / (2.0 * probe)
     }
 
     /// Whether a descent may start here, a time `ahead_s` before the zero: the guard falls, and not much
     /// slower than on the average.
-    pub(super) fn falls(&mut self, at: &Point<N>, ahead_s: f64) -> bool {
-        let value = self.value(at);
+    pub(super) fn can_descend(&mut self, at: &StatePoint<N>, ahead_s: f64) -> bool {
+        let value = self.guard_value(at);
         let flow = self.derivative(at);
-        value > 0.0 && -self.rate(at, &flow) * ahead_s >= LEAST_FALL * value
+        value > 0.0 && -self.guard_rate(at, &flow) * ahead_s >= LEAST_FALL * value
     }
 
     /// From a point where the guard falls to the point where it is zero; `advance` takes the state from there
     /// to a given time by the method's own step, at the cost of the right-hand sides given with it. `None`
     /// when the guard turns before it is zero.
-    pub(super) fn land(
+    pub(super) fn land_on_zero(
         &mut self,
-        from: &Point<N>,
+        from: &StatePoint<N>,
         cost: u64,
         advance: impl Fn(f64) -> [f64; N],
-    ) -> Option<Point<N>> {
-        let mut at = self.descend(from, FIRST_STEPS)?;
+    ) -> Option<StatePoint<N>> {
+        let mut at = self.descend_to_zero(from, FIRST_STEPS)?;
         let mut moved = f64::INFINITY;
         for _ in 0..MOST_DESCENTS {
             if moved > SHORT * (at.t - from.t) {
-                self.count(cost);
+                self.count_evaluations(cost);
                 at.y = advance(at.t);
             }
-            let next = self.descend(&at, 1)?;
+            let next = self.descend_to_zero(&at, 1)?;
             moved = (next.t - at.t).abs();
             at = next;
-            if LEFT_OVER * moved <= f64::EPSILON * at.t.abs() {
+            if MOST_REMAINDER * moved <= f64::EPSILON * at.t.abs() {
                 return (at.t > from.t).then_some(at);
             }
         }
@@ -108,8 +111,8 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Slack<'a, N, G, P> {
     }
 
     /// Brings `s` to zero in equal steps of the classical Runge-Kutta method.
-    fn descend(&mut self, from: &Point<N>, steps: u32) -> Option<Point<N>> {
-        let value = self.value(from);
+    fn descend_to_zero(&mut self, from: &StatePoint<N>, steps: u32) -> Option<StatePoint<N>> {
+        let value = self.guard_value(from);
         let (side, start) = (value.signum(), (2.0 * value.abs()).sqrt());
         let mut at = *from;
         if start == 0.0 {
@@ -118,32 +121,33 @@ impl<'a, const N: usize, const G: usize, P: Phase<N, G>> Slack<'a, N, G, P> {
         for step in 0..steps {
             let s = |done: f64| side * start * (1.0 - (f64::from(step) + done) / f64::from(steps));
             let h = -start / f64::from(steps);
-            let k1 = self.slope(&at, s(0.0))?;
-            let k2 = self.slope(&moved(&at, 0.5 * h, &k1), s(0.5))?;
-            let k3 = self.slope(&moved(&at, 0.5 * h, &k2), s(0.5))?;
-            let k4 = self.slope(&moved(&at, h, &k3), s(1.0))?;
-            let mean = |i: fn(&Point<N>, usize) -> f64, j: usize| {
+            let k1 = self.slope_by_slack(&at, s(0.0))?;
+            let k2 = self.slope_by_slack(&shift_point(&at, 0.5 * h, &k1), s(0.5))?;
+            let k3 = self.slope_by_slack(&shift_point(&at, 0.5 * h, &k2), s(0.5))?;
+            let k4 = self.slope_by_slack(&shift_point(&at, h, &k3), s(1.0))?;
+            let mean = |i: fn(&StatePoint<N>, usize) -> f64, j: usize| {
                 (i(&k1, j) + 2.0 * (i(&k2, j) + i(&k3, j)) + i(&k4, j)) / 6.0
             };
-            let slope = Point { t: mean(|k, _| k.t, 0), y: std::array::from_fn(|i| mean(|k, i| k.y[i], i)) };
-            at = moved(&at, h, &slope);
+            let slope =
+                StatePoint { t: mean(|k, _| k.t, 0), y: std::array::from_fn(|i| mean(|k, i| k.y[i], i)) };
+            at = shift_point(&at, h, &slope);
         }
         Some(at)
     }
 
     /// `(dt/ds, dy/ds)`; `side_s` is `s` with the sign of the guard. `None` where the guard does not fall.
-    fn slope(&mut self, at: &Point<N>, side_s: f64) -> Option<Point<N>> {
+    fn slope_by_slack(&mut self, at: &StatePoint<N>, side_s: f64) -> Option<StatePoint<N>> {
         let flow = self.derivative(at);
-        let rate = self.rate(at, &flow);
-        (rate < 0.0).then(|| Point { t: side_s / rate, y: flow.map(|f| f * (side_s / rate)) })
+        let rate = self.guard_rate(at, &flow);
+        (rate < 0.0).then(|| StatePoint { t: side_s / rate, y: flow.map(|f| f * (side_s / rate)) })
     }
 
-    fn derivative(&mut self, at: &Point<N>) -> [f64; N] {
+    fn derivative(&mut self, at: &StatePoint<N>) -> [f64; N] {
         self.work.rhs_evaluations += 1;
         self.phase.derivative(at.t, &at.y)
     }
 }
 
-fn moved<const N: usize>(at: &Point<N>, h: f64, slope: &Point<N>) -> Point<N> {
-    Point { t: at.t + h * slope.t, y: std::array::from_fn(|i| at.y[i] + h * slope.y[i]) }
+fn shift_point<const N: usize>(at: &StatePoint<N>, h: f64, slope: &StatePoint<N>) -> StatePoint<N> {
+    StatePoint { t: at.t + h * slope.t, y: std::array::from_fn(|i| at.y[i] + h * slope.y[i]) }
 }

@@ -7,7 +7,7 @@
 #![allow(clippy::excessive_precision, clippy::unreadable_literal)] // the published digits
 
 /// One row of coefficients: (stage, coefficient) for the nonzero entries.
-pub type Row<const M: usize> = [(usize, f64); M];
+pub type TableauRow<const M: usize> = [(usize, f64); M];
 
 /// Nodes `c` of the 16 stages; stage 12 is the derivative at the end of the step, 13 to 15 serve the dense
 /// output.
@@ -30,20 +30,21 @@ pub const C: [f64; 16] = [
     0.7777777777777778,
 ];
 /// Row of stage 1.
-pub(crate) const A1: Row<1> = [(0, 0.05260015195876773)];
+pub(crate) const A1: TableauRow<1> = [(0, 0.05260015195876773)];
 /// Row of stage 2.
-pub(crate) const A2: Row<2> = [(0, 0.0197250569845379), (1, 0.0591751709536137)];
+pub(crate) const A2: TableauRow<2> = [(0, 0.0197250569845379), (1, 0.0591751709536137)];
 /// Row of stage 3.
-pub(crate) const A3: Row<2> = [(0, 0.02958758547680685), (2, 0.08876275643042054)];
+pub(crate) const A3: TableauRow<2> = [(0, 0.02958758547680685), (2, 0.08876275643042054)];
 /// Row of stage 4.
-pub const A4: Row<3> = [(0, 0.2413651341592667), (2, -0.8845494793282861), (3, 0.924834003261792)];
+pub const A4: TableauRow<3> = [(0, 0.2413651341592667), (2, -0.8845494793282861), (3, 0.924834003261792)];
 /// Row of stage 5.
-pub(crate) const A5: Row<3> = [(0, 0.037037037037037035), (3, 0.17082860872947386), (4, 0.12546768756682242)];
+pub(crate) const A5: TableauRow<3> =
+    [(0, 0.037037037037037035), (3, 0.17082860872947386), (4, 0.12546768756682242)];
 /// Row of stage 6.
-pub(crate) const A6: Row<4> =
+pub(crate) const A6: TableauRow<4> =
     [(0, 0.037109375), (3, 0.17025221101954405), (4, 0.06021653898045596), (5, -0.017578125)];
 /// Row of stage 7.
-pub(crate) const A7: Row<5> = [
+pub(crate) const A7: TableauRow<5> = [
     (0, 0.03709200011850479),
     (3, 0.17038392571223998),
     (4, 0.10726203044637328),
@@ -51,7 +52,7 @@ pub(crate) const A7: Row<5> = [
     (6, 0.008273789163814023),
 ];
 /// Row of stage 8.
-pub(crate) const A8: Row<6> = [
+pub(crate) const A8: TableauRow<6> = [
     (0, 0.6241109587160757),
     (3, -3.3608926294469414),
     (4, -0.868219346841726),
@@ -60,7 +61,7 @@ pub(crate) const A8: Row<6> = [
     (7, -43.48988418106996),
 ];
 /// Row of stage 9.
-pub(crate) const A9: Row<7> = [
+pub(crate) const A9: TableauRow<7> = [
     (0, 0.47766253643826434),
     (3, -2.4881146199716677),
     (4, -0.590290826836843),
@@ -70,7 +71,7 @@ pub(crate) const A9: Row<7> = [
     (8, -0.020331201708508627),
 ];
 /// Row of stage 10.
-pub(crate) const A10: Row<8> = [
+pub(crate) const A10: TableauRow<8> = [
     (0, -0.9371424300859873),
     (3, 5.186372428844064),
     (4, 1.0914373489967295),
@@ -81,7 +82,7 @@ pub(crate) const A10: Row<8> = [
     (9, -3.0467644718982196),
 ];
 /// Row of stage 11.
-pub const A11: Row<9> = [
+pub const A11: TableauRow<9> = [
     (0, 2.273310147516538),
     (3, -10.53449546673725),
     (4, -2.0008720582248625),
@@ -93,7 +94,7 @@ pub const A11: Row<9> = [
     (10, 0.6433927460157636),
 ];
 /// Row of stage 12: the weights `b` of the order 8 solution.
-pub const A12: Row<8> = [
+pub const A12: TableauRow<8> = [
     (0, 0.054293734116568765),
     (5, 4.450312892752409),
     (6, 1.8915178993145003),
@@ -104,7 +105,7 @@ pub const A12: Row<8> = [
     (11, 0.04471061572777259),
 ];
 /// Row of stage 13.
-pub(crate) const A13: Row<8> = [
+pub(crate) const A13: TableauRow<8> = [
     (0, 0.056167502283047954),
     (6, 0.25350021021662483),
     (7, -0.2462390374708025),
@@ -115,7 +116,7 @@ pub(crate) const A13: Row<8> = [
     (12, -0.008298),
 ];
 /// Row of stage 14.
-pub(crate) const A14: Row<8> = [
+pub(crate) const A14: TableauRow<8> = [
     (0, 0.03183464816350214),
     (5, 0.028300909672366776),
     (6, 0.053541988307438566),
@@ -126,7 +127,7 @@ pub(crate) const A14: Row<8> = [
     (13, 0.1413124436746325),
 ];
 /// Row of stage 15.
-pub(crate) const A15: Row<8> = [
+pub(crate) const A15: TableauRow<8> = [
     (0, -0.42889630158379194),
     (5, -4.697621415361164),
     (6, 7.683421196062599),
@@ -137,7 +138,7 @@ pub(crate) const A15: Row<8> = [
     (14, -9.15095847217987),
 ];
 /// Weights of the order 3 error estimate.
-pub(crate) const E3: Row<8> = [
+pub(crate) const E3: TableauRow<8> = [
     (0, -0.18980075407240762),
     (5, 4.450312892752409),
     (6, 1.8915178993145003),
@@ -148,7 +149,7 @@ pub(crate) const E3: Row<8> = [
     (11, 0.02265179219836082),
 ];
 /// Weights of the order 5 error estimate.
-pub(crate) const E5: Row<8> = [
+pub(crate) const E5: TableauRow<8> = [
     (0, 0.01312004499419488),
     (5, -1.2251564463762044),
     (6, -0.4957589496572502),
@@ -159,7 +160,7 @@ pub(crate) const E5: Row<8> = [
     (11, -0.022355307863886294),
 ];
 /// Weights of coefficient 3 of the dense output.
-pub(crate) const D3: Row<12> = [
+pub(crate) const D3: TableauRow<12> = [
     (0, -8.428938276109013),
     (5, 0.5667149535193777),
     (6, -3.0689499459498917),
@@ -174,7 +175,7 @@ pub(crate) const D3: Row<12> = [
     (15, -4.436036387594894),
 ];
 /// Weights of coefficient 4 of the dense output.
-pub(crate) const D4: Row<12> = [
+pub(crate) const D4: TableauRow<12> = [
     (0, 10.427508642579134),
     (5, 242.28349177525817),
     (6, 165.20045171727028),
@@ -189,7 +190,7 @@ pub(crate) const D4: Row<12> = [
     (15, 35.81684148639408),
 ];
 /// Weights of coefficient 5 of the dense output.
-pub(crate) const D5: Row<12> = [
+pub(crate) const D5: TableauRow<12> = [
     (0, 19.985053242002433),
     (5, -387.0373087493518),
     (6, -189.17813819516758),
@@ -204,7 +205,7 @@ pub(crate) const D5: Row<12> = [
     (15, 11.99229113618279),
 ];
 /// Weights of coefficient 6 of the dense output.
-pub(crate) const D6: Row<12> = [
+pub(crate) const D6: TableauRow<12> = [
     (0, -25.69393346270375),
     (5, -154.18974869023643),
     (6, -231.5293791760455),

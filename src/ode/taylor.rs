@@ -6,23 +6,25 @@
 //! polynomials of the guards are as exact as those of the states, so an event is found on them with certainty
 //! and its state needs no further step.
 
-use super::polynomial::{Fall, MOST_ORDER, Series, TERMS, first_fall};
-use super::{Answer, Cause, End, Phase, Solution, Start, Step, Work};
+use super::polynomial::{GuardFall, MOST_ORDER, TERMS, TaylorSeries, first_fall};
+use super::{
+    AcceptedStep, DenseOutput, HybridPhase, ObserverReply, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters,
+};
 use crate::math;
 
 /// A phase whose Taylor coefficients follow by recurrence.
-pub trait Expand<const N: usize, const G: usize>: Phase<N, G> {
+pub trait TaylorPhase<const N: usize, const G: usize>: HybridPhase<N, G> {
     /// What the recurrences keep; one is used for all steps of a phase.
     type Tape: Default;
 
     /// Writes the coefficients of states and guards about `(t, y)` up to `out.order`; equal to the
-    /// derivatives of [`Phase::derivative`] and [`Phase::guards`] along the solution, divided by `k!`.
-    fn expand(&self, t: f64, y: &[f64; N], tape: &mut Self::Tape, out: &mut Expansion<N, G>);
+    /// derivatives of [`HybridPhase::derivative`] and [`HybridPhase::guards`] along the solution, divided by `k!`.
+    fn expand_series(&self, t: f64, y: &[f64; N], tape: &mut Self::Tape, out: &mut TaylorExpansion<N, G>);
 }
 
 /// Taylor polynomials of states and guards about the start of a step.
 #[derive(Debug, Clone)]
-pub struct Expansion<const N: usize, const G: usize> {
+pub struct TaylorExpansion<const N: usize, const G: usize> {
     /// Start of the step, s.
     pub t: f64,
     /// Highest power in use.
@@ -36,10 +38,10 @@ pub struct Expansion<const N: usize, const G: usize> {
     /// multiple of its scale.
     pub followers: [f64; 2],
     /// `x` of a term in `exp(-x)`, `x >= 0`, that the equations contain and that may vary much over a step.
-    pub exponent: Option<Series>,
+    pub exponent: Option<TaylorSeries>,
 }
 
-impl<const N: usize, const G: usize> Default for Expansion<N, G> {
+impl<const N: usize, const G: usize> Default for TaylorExpansion<N, G> {
     fn default() -> Self {
         Self {
             t: 0.0,
@@ -52,10 +54,10 @@ impl<const N: usize, const G: usize> Default for Expansion<N, G> {
     }
 }
 
-impl<const N: usize, const G: usize> Expansion<N, G> {
+impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
     /// States at `x` after the start, by Horner's rule.
     #[inline]
-    fn after(&self, x: f64) -> [f64; N] {
+    fn states_after(&self, x: f64) -> [f64; N] {
         let mut sum = [0.0; N];
         for row in self.states[..=self.order].iter().rev() {
             for i in 0..N {
@@ -68,7 +70,7 @@ impl<const N: usize, const G: usize> Expansion<N, G> {
     /// Length of step at which the last two coefficients of every state reach the tolerance: the error, of
     /// the next order, is below it.
     #[inline]
-    fn step(&self, scale: &[f64; N], relative: f64) -> f64 {
+    fn step_length(&self, scale: &[f64; N], relative: f64) -> f64 {
         let largest = |k: usize, follower: f64| {
             let ratio = |i: usize| self.states[k][i].abs() / scale[i].max(self.states[0][i].abs());
             (0..N).map(ratio).fold(follower, |a: f64, b| if b > a || b.is_nan() { b } else { a })
@@ -83,7 +85,7 @@ impl<const N: usize, const G: usize> Expansion<N, G> {
     /// the last coefficients, but grows by many powers of ten within the step, would otherwise be missed: the
     /// coefficients of `exp(x)` rise up to the order `x`.
     #[inline]
-    fn within_exponential(&self, h: f64) -> f64 {
+    fn limit_by_exponential(&self, h: f64) -> f64 {
         /// Share of the order that the exponent may vary by: each term is then at most this share of the one
         /// before where the series ends.
         const SHARE: f64 = 0.25;
@@ -99,7 +101,7 @@ impl<const N: usize, const G: usize> Expansion<N, G> {
     /// The first guard that falls within `h`, with its distance from the start; of two that fall at once the
     /// first in the list.
     #[inline]
-    fn event(&self, zero_order: &[u8; G], h: f64) -> Result<Option<(usize, f64)>, Undefined> {
+    fn find_event(&self, zero_order: &[u8; G], h: f64) -> Result<Option<(usize, f64)>, UndefinedGuard> {
         let mut rest = [0.0; G];
         let mut power = 1.0;
         for row in &self.guards[1..=self.order] {
@@ -114,10 +116,10 @@ impl<const N: usize, const G: usize> Expansion<N, G> {
             if self.guards[0][g] > rest[g] && zero_order[g] == 0 {
                 continue;
             }
-            let series: Series = std::array::from_fn(|k| self.guards[k][g]);
+            let series: TaylorSeries = std::array::from_fn(|k| self.guards[k][g]);
             match first_fall(&series, self.order, usize::from(zero_order[g]), h) {
-                Fall::Undefined => return Err(Undefined),
-                Fall::At(x) if first.is_none_or(|(_, before)| x < before) => first = Some((g, x)),
+                GuardFall::Undefined => return Err(UndefinedGuard),
+                GuardFall::At(x) if first.is_none_or(|(_, before)| x < before) => first = Some((g, x)),
                 _ => {}
             }
         }
@@ -127,18 +129,18 @@ impl<const N: usize, const G: usize> Expansion<N, G> {
 
 /// The room in which steps are expanded, made once for all phases of a kind.
 #[derive(Debug, Clone, Default)]
-pub struct Room<T, const N: usize, const G: usize> {
+pub struct TaylorWorkspace<T, const N: usize, const G: usize> {
     /// What the recurrences keep of the last step.
     pub tape: T,
-    expansion: Expansion<N, G>,
+    expansion: TaylorExpansion<N, G>,
 }
 
 /// A guard is no number somewhere in the step.
-struct Undefined;
+struct UndefinedGuard;
 
-impl<const N: usize, const G: usize> Solution<N> for Expansion<N, G> {
-    fn at(&self, t: f64) -> [f64; N] {
-        self.after(t - self.t)
+impl<const N: usize, const G: usize> DenseOutput<N> for TaylorExpansion<N, G> {
+    fn state_at(&self, t: f64) -> [f64; N] {
+        self.states_after(t - self.t)
     }
 }
 
@@ -146,7 +148,7 @@ impl<const N: usize, const G: usize> Solution<N> for Expansion<N, G> {
 /// ln(relative)/2` (Jorba and Zou 2005, section 3.1), and a little more, because the coefficients of
 /// oscillations fall faster. The optimum is flat: on the light test blade 2 to 6 more cost the same time.
 #[must_use]
-pub(crate) fn order_for(relative: f64) -> usize {
+pub(crate) fn order_for_tolerance(relative: f64) -> usize {
     const MORE: f64 = 3.0;
     /// Below it the step length, taken from two coefficients, would rest on too few.
     const LEAST_ORDER: usize = 6;
@@ -162,51 +164,53 @@ const STEP_SHARE: f64 = 0.02;
 const STRETCH: f64 = 1.01;
 
 /// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every step and of what its
-/// recurrences keep; the contract is that of [`integrate`](super::integrate). A coefficient of all states
+/// recurrences keep; the contract is that of [`integrate_taylor`](super::integrate). A coefficient of all states
 /// counts as one right-hand side.
-pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>, A: Answer>(
+pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A: ObserverReply>(
     phase: &P,
-    start: Start<N, G>,
+    start: PhaseStart<N, G>,
     stop: f64,
     relative: f64,
-    room: &mut Room<P::Tape, N, G>,
-    work: &mut Work,
-    mut observe: impl FnMut(&Step<'_, N>, &P::Tape) -> A,
-) -> End<N> {
-    let Room { tape, expansion } = room;
+    room: &mut TaylorWorkspace<P::Tape, N, G>,
+    work: &mut WorkCounters,
+    mut observe: impl FnMut(&AcceptedStep<'_, N>, &P::Tape) -> A,
+) -> PhaseEnd<N> {
+    let TaylorWorkspace { tape, expansion } = room;
     let relative = STEP_SHARE * relative;
-    expansion.order = order_for(relative);
+    expansion.order = order_for_tolerance(relative);
     let scale = phase.scale();
-    let Start { mut t, mut y, mut zero_order, .. } = start;
+    let PhaseStart { mut t, mut y, mut zero_order, .. } = start;
     let mut last = 0.0;
     loop {
-        let end = |t: f64, y: [f64; N], cause: Cause| End { t, y, cause, first_step: last };
+        let end = |t: f64, y: [f64; N], cause: PhaseEndCause| PhaseEnd { t, y, cause, first_step: last };
         if t >= stop {
-            return end(t, y, Cause::Stop);
+            return end(t, y, PhaseEndCause::Stop);
         }
         if work.is_spent() {
-            return end(t, y, Cause::StepTooSmall);
+            return end(t, y, PhaseEndCause::StepTooSmall);
         }
         expansion.t = t;
-        phase.expand(t, &y, tape, expansion);
+        phase.expand_series(t, &y, tape, expansion);
         work.rhs_evaluations += expansion.order as u64;
-        let (remaining, wanted) = (stop - t, expansion.step(&scale, relative));
-        let h = expansion.within_exponential(if wanted * STRETCH >= remaining { remaining } else { wanted });
+        let (remaining, wanted) = (stop - t, expansion.step_length(&scale, relative));
+        let h =
+            expansion.limit_by_exponential(if wanted * STRETCH >= remaining { remaining } else { wanted });
         // (a step that is no number is not resolved either)
         let resolved = wanted > 4.0 * f64::EPSILON * t.abs();
-        let event = if resolved && t + h > t { expansion.event(&zero_order, h) } else { Err(Undefined) };
-        let Ok(event) = event else { return end(t, y, Cause::StepTooSmall) };
-        let event = event.map(|(guard, x)| (guard, corrected(phase, expansion, guard, x, h, work)));
+        let event =
+            if resolved && t + h > t { expansion.find_event(&zero_order, h) } else { Err(UndefinedGuard) };
+        let Ok(event) = event else { return end(t, y, PhaseEndCause::StepTooSmall) };
+        let event = event.map(|(guard, x)| (guard, correct_root(phase, expansion, guard, x, h, work)));
         work.steps += 1;
         last = h;
         let t_end = event.map_or(if h == remaining { stop } else { t + h }, |(_, x)| t + x);
-        let y_end = expansion.after(event.map_or(h, |(_, x)| x));
-        let step = Step { start: t, end: t_end, y_end: &y_end, solution: expansion };
-        if observe(&step, tape).flow().is_break() {
-            return End { t: t_end, y: y_end, cause: Cause::Asked, first_step: last };
+        let y_end = expansion.states_after(event.map_or(h, |(_, x)| x));
+        let step = AcceptedStep { start: t, end: t_end, y_end: &y_end, solution: expansion };
+        if observe(&step, tape).control_flow().is_break() {
+            return PhaseEnd { t: t_end, y: y_end, cause: PhaseEndCause::Interrupted, first_step: last };
         }
         if let Some((guard, _)) = event {
-            return End { t: t_end, y: y_end, cause: Cause::Guard(guard), first_step: last };
+            return PhaseEnd { t: t_end, y: y_end, cause: PhaseEndCause::Guard(guard), first_step: last };
         }
         (t, y, zero_order) = (t_end, y_end, [0; G]);
     }
@@ -214,13 +218,13 @@ pub fn integrate<const N: usize, const G: usize, P: Expand<N, G>, A: Answer>(
 
 /// The root of a guard's series moved to that of the guard itself on the states' polynomials: forces follow
 /// from second derivatives, so their series end one order before those of the states.
-fn corrected<const N: usize, const G: usize, P: Expand<N, G>>(
+fn correct_root<const N: usize, const G: usize, P: TaylorPhase<N, G>>(
     phase: &P,
-    expansion: &Expansion<N, G>,
+    expansion: &TaylorExpansion<N, G>,
     guard: usize,
     x: f64,
     h: f64,
-    work: &mut Work,
+    work: &mut WorkCounters,
 ) -> f64 {
     /// A correction beyond this share of the step means that the guard only grazes zero: the root of the
     /// series stands.
@@ -233,7 +237,7 @@ fn corrected<const N: usize, const G: usize, P: Expand<N, G>>(
         .enumerate()
         .rev()
         .fold(0.0, |sum, (k, row)| sum * x + (k + 1) as f64 * row[guard]);
-    let value = phase.guards(expansion.t + x, &expansion.after(x))[guard];
+    let value = phase.guards(expansion.t + x, &expansion.states_after(x))[guard];
     work.guard_evaluations += 1;
     let moved = x - value / slope;
     if (moved - x).abs() <= GRAZING * h && moved > 0.0 && moved <= h { moved } else { x }
@@ -248,7 +252,7 @@ pub(super) mod tests {
         pub level: f64,
     }
 
-    impl Phase<2, 1> for Oscillator {
+    impl HybridPhase<2, 1> for Oscillator {
         fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
             [y[1], -y[0]]
         }
@@ -260,9 +264,9 @@ pub(super) mod tests {
         }
     }
 
-    impl Expand<2, 1> for Oscillator {
+    impl TaylorPhase<2, 1> for Oscillator {
         type Tape = ();
-        fn expand(&self, _: f64, y: &[f64; 2], (): &mut (), out: &mut Expansion<2, 1>) {
+        fn expand_series(&self, _: f64, y: &[f64; 2], (): &mut (), out: &mut TaylorExpansion<2, 1>) {
             let (mut x, mut v) = (*y).into();
             for k in 0..=out.order {
                 out.states[k] = [x, v];
@@ -272,16 +276,16 @@ pub(super) mod tests {
         }
     }
 
-    fn run(level: f64, relative: f64, stop: f64) -> (End<2>, Work) {
-        let mut work = Work::default();
-        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
+    fn run(level: f64, relative: f64, stop: f64) -> (PhaseEnd<2>, WorkCounters) {
+        let mut work = WorkCounters::default();
+        let start = PhaseStart { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
         (
-            integrate(
+            integrate_taylor(
                 &Oscillator { level },
                 start,
                 stop,
                 relative,
-                &mut Room::default(),
+                &mut TaylorWorkspace::default(),
                 &mut work,
                 |_, ()| (),
             ),
@@ -294,7 +298,7 @@ pub(super) mod tests {
         for exponent in 4..=13 {
             let relative = 10f64.powi(-exponent);
             let (end, _) = run(0.25, relative, 10.0);
-            assert_eq!(end.cause, Cause::Guard(0));
+            assert_eq!(end.cause, PhaseEndCause::Guard(0));
             let error = (end.t - 0.25f64.acos()).abs();
             assert!(error < 10.0 * relative, "tolerance {relative:e}: error {error:e}");
         }
@@ -303,10 +307,10 @@ pub(super) mod tests {
     #[test]
     fn a_dip_inside_one_step_is_found_and_a_near_miss_is_not() {
         let (end, _) = run(-1.0 + 1e-6, 1e-10, 10.0);
-        assert_eq!(end.cause, Cause::Guard(0));
+        assert_eq!(end.cause, PhaseEndCause::Guard(0));
         assert!((end.t - (-1.0f64 + 1e-6).acos()).abs() < 1e-7, "{}", end.t);
         let (end, _) = run(-1.0 - 1e-6, 1e-10, 10.0);
-        assert_eq!((end.cause, end.t), (Cause::Stop, 10.0));
+        assert_eq!((end.cause, end.t), (PhaseEndCause::Stop, 10.0));
     }
 
     /// The error over a fixed time falls as `h^p`, the step being `(tolerance)^(1/p)` times what the solution
@@ -317,9 +321,9 @@ pub(super) mod tests {
             let error = |steps: u32| {
                 let (mut y, h) = ([0.7f64.sin(), 0.7f64.cos()], 8.0 / f64::from(steps));
                 for _ in 0..steps {
-                    let mut expansion = Expansion { order, ..Expansion::default() };
-                    Oscillator { level: -2.0 }.expand(0.0, &y, &mut (), &mut expansion);
-                    y = expansion.after(h);
+                    let mut expansion = TaylorExpansion { order, ..TaylorExpansion::default() };
+                    Oscillator { level: -2.0 }.expand_series(0.0, &y, &mut (), &mut expansion);
+                    y = expansion.states_after(h);
                 }
                 (y[0] - 8.7f64.sin()).hypot(y[1] - 8.7f64.cos())
             };
@@ -331,14 +335,14 @@ pub(super) mod tests {
     #[test]
     fn steps_are_contiguous_and_the_last_one_ends_at_the_stop() {
         let (mut last, mut count) = (0.0, 0);
-        let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
-        let mut work = Work::default();
-        let end = integrate(
+        let start = PhaseStart { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
+        let mut work = WorkCounters::default();
+        let end = integrate_taylor(
             &Oscillator { level: -2.0 },
             start,
             3.0,
             1e-6,
-            &mut Room::default(),
+            &mut TaylorWorkspace::default(),
             &mut work,
             |step, ()| {
                 assert_eq!(step.start, last);
@@ -352,8 +356,8 @@ pub(super) mod tests {
     /// y' = y^2 from 1: `1/(1 - t)` ends at 1, its coefficients are all one.
     #[test]
     fn a_state_that_blows_up_ends_with_a_reason() {
-        struct Blowup;
-        impl Phase<1, 1> for Blowup {
+        struct TaylorBlowup;
+        impl HybridPhase<1, 1> for TaylorBlowup {
             fn derivative(&self, _: f64, y: &[f64; 1]) -> [f64; 1] {
                 [y[0] * y[0]]
             }
@@ -364,19 +368,26 @@ pub(super) mod tests {
                 [1.0]
             }
         }
-        impl Expand<1, 1> for Blowup {
+        impl TaylorPhase<1, 1> for TaylorBlowup {
             type Tape = ();
-            fn expand(&self, _: f64, y: &[f64; 1], (): &mut (), out: &mut Expansion<1, 1>) {
+            fn expand_series(&self, _: f64, y: &[f64; 1], (): &mut (), out: &mut TaylorExpansion<1, 1>) {
                 for k in 0..=out.order {
                     out.states[k][0] = y[0].powi(k as i32 + 1);
                 }
                 out.guards[0][0] = f64::INFINITY;
             }
         }
-        let start = Start { t: 0.0, y: [1.0], zero_order: [0], step: None };
-        let end =
-            integrate(&Blowup, start, 2.0, 1e-8, &mut Room::default(), &mut Work::default(), |_, ()| ());
-        assert_eq!(end.cause, Cause::StepTooSmall);
+        let start = PhaseStart { t: 0.0, y: [1.0], zero_order: [0], step: None };
+        let end = integrate_taylor(
+            &TaylorBlowup,
+            start,
+            2.0,
+            1e-8,
+            &mut TaylorWorkspace::default(),
+            &mut WorkCounters::default(),
+            |_, ()| (),
+        );
+        assert_eq!(end.cause, PhaseEndCause::StepTooSmall);
         assert!((end.t - 1.0).abs() < 1e-6, "found {}", end.t);
     }
 }

@@ -1,6 +1,6 @@
 //! The ranges, each with its reason. They are wide: no blade that is in use lies outside.
 
-use super::{Judged, Lookup, Plausible, Slip};
+use super::{PlausibilitySubject, PlausibleRange, UnitSlip, ValueLookup};
 use std::f64::consts::{PI, TAU};
 
 /// Height of a link, m: the whole rubber of a wiper is 5 to 20 mm high, and no part that bends on its own is
@@ -71,48 +71,48 @@ const STROKES_HZ: [f64; 2] = [0.01, 5.0];
 /// Top speed of the head, m/s: a wiper's tip reaches 2 to 3.
 const TOP_SPEED_M_PER_S: [f64; 2] = [1e-4, 5.0];
 
-const MILLIMETRES: Slip = Slip { factor: 1e-3, words: "millimetres written as metres" };
-const CENTIMETRES: Slip = Slip { factor: 1e-2, words: "centimetres written as metres" };
-const METRES_TWICE: Slip = Slip { factor: 1e3, words: "millimetres turned into metres twice" };
-const GRAMS: Slip = Slip { factor: 1e-3, words: "grams written as kilograms" };
-const MILLIGRAMS: Slip = Slip { factor: 1e-6, words: "milligrams written as kilograms" };
-const THOUSAND_TOO_LARGE: Slip = Slip { factor: 1e-3, words: "three powers of ten too many" };
-const THOUSAND_TOO_SMALL: Slip = Slip { factor: 1e3, words: "three powers of ten too few" };
-const KG_MM2: Slip = Slip { factor: 1e-6, words: "kg mm2 written as kg m2" };
-const G_CM2: Slip = Slip { factor: 1e-7, words: "g cm2 written as kg m2" };
-const G_MM2: Slip = Slip { factor: 1e-9, words: "g mm2 written as kg m2" };
-const PERCENT: Slip = Slip { factor: 1e-2, words: "percent written as a ratio" };
-const POINT: Slip = Slip { factor: 0.1, words: "a decimal point one place too far to the right" };
-const DEGREES: Slip = Slip { factor: PI / 180.0, words: "degrees written as radians" };
-const KILOHERTZ: Slip = Slip { factor: 1e3, words: "kHz written as Hz" };
-const GRAM_FORCE: Slip = Slip { factor: 9.806_65e-3, words: "grams of a scale written as newtons" };
-const MEGAPASCALS: Slip = Slip { factor: 1e6, words: "MPa written as Pa" };
-const KILOPASCALS: Slip = Slip { factor: 1e3, words: "kPa written as Pa" };
-const G_PER_CM3: Slip = Slip { factor: 1e3, words: "g/cm3 written as kg/m3" };
-const G_PER_M: Slip = Slip { factor: 1e-3, words: "g/m written as kg/m" };
-const PER_MILLIMETRE: Slip = Slip { factor: 1e3, words: "N/mm written as N/m" };
+const MILLIMETRES: UnitSlip = UnitSlip { factor: 1e-3, words: "millimetres written as metres" };
+const CENTIMETRES: UnitSlip = UnitSlip { factor: 1e-2, words: "centimetres written as metres" };
+const METRES_TWICE: UnitSlip = UnitSlip { factor: 1e3, words: "millimetres turned into metres twice" };
+const GRAMS: UnitSlip = UnitSlip { factor: 1e-3, words: "grams written as kilograms" };
+const MILLIGRAMS: UnitSlip = UnitSlip { factor: 1e-6, words: "milligrams written as kilograms" };
+const THOUSAND_TOO_LARGE: UnitSlip = UnitSlip { factor: 1e-3, words: "three powers of ten too many" };
+const THOUSAND_TOO_SMALL: UnitSlip = UnitSlip { factor: 1e3, words: "three powers of ten too few" };
+const KG_MM2: UnitSlip = UnitSlip { factor: 1e-6, words: "kg mm2 written as kg m2" };
+const G_CM2: UnitSlip = UnitSlip { factor: 1e-7, words: "g cm2 written as kg m2" };
+const G_MM2: UnitSlip = UnitSlip { factor: 1e-9, words: "g mm2 written as kg m2" };
+const PERCENT: UnitSlip = UnitSlip { factor: 1e-2, words: "percent written as a ratio" };
+const POINT: UnitSlip = UnitSlip { factor: 0.1, words: "a decimal point one place too far to the right" };
+const DEGREES: UnitSlip = UnitSlip { factor: PI / 180.0, words: "degrees written as radians" };
+const KILOHERTZ: UnitSlip = UnitSlip { factor: 1e3, words: "kHz written as Hz" };
+const GRAM_FORCE: UnitSlip = UnitSlip { factor: 9.806_65e-3, words: "grams of a scale written as newtons" };
+const MEGAPASCALS: UnitSlip = UnitSlip { factor: 1e6, words: "MPa written as Pa" };
+const KILOPASCALS: UnitSlip = UnitSlip { factor: 1e3, words: "kPa written as Pa" };
+const G_PER_CM3: UnitSlip = UnitSlip { factor: 1e3, words: "g/cm3 written as kg/m3" };
+const G_PER_M: UnitSlip = UnitSlip { factor: 1e-3, words: "g/m written as kg/m" };
+const PER_MILLIMETRE: UnitSlip = UnitSlip { factor: 1e3, words: "N/mm written as N/m" };
 
-const LENGTHS: &[Slip] = &[MILLIMETRES, CENTIMETRES, METRES_TWICE];
-const MASSES: &[Slip] = &[GRAMS, MILLIGRAMS];
-const INERTIAS: &[Slip] = &[THOUSAND_TOO_LARGE, KG_MM2, G_CM2, G_MM2, THOUSAND_TOO_SMALL];
+const LENGTHS: &[UnitSlip] = &[MILLIMETRES, CENTIMETRES, METRES_TWICE];
+const MASSES: &[UnitSlip] = &[GRAMS, MILLIGRAMS];
+const INERTIAS: &[UnitSlip] = &[THOUSAND_TOO_LARGE, KG_MM2, G_CM2, G_MM2, THOUSAND_TOO_SMALL];
 
-const fn row(
+const fn value_range(
     key: &'static str,
     unit: &'static str,
     range: [f64; 2],
     reason: &'static str,
-    slips: &'static [Slip],
-) -> Plausible {
-    Plausible { key, judged: Judged::Value, unit, range, reason, slips }
+    slips: &'static [UnitSlip],
+) -> PlausibleRange {
+    PlausibleRange { key, judged: PlausibilitySubject::Value, unit, range, reason, slips }
 }
 
-const fn derived(
-    row: Plausible,
+const fn derived_range(
+    row: PlausibleRange,
     name: &'static str,
     keys: &'static [&'static str],
-    of: fn(&Lookup<'_>) -> Option<f64>,
-) -> Plausible {
-    Plausible { judged: Judged::Derived { name, keys, of }, ..row }
+    of: fn(&ValueLookup<'_>) -> Option<f64>,
+) -> PlausibleRange {
+    PlausibleRange { judged: PlausibilitySubject::Derived { name, keys, of }, ..row }
 }
 
 const LINK_WHY: &str = "the rubber of a wiper is 5 to 20 mm high, a part of it at least 0.5 mm";
@@ -126,38 +126,38 @@ const RUBBER_WHY: &str = "half the loss factor of rubber, which is at most about
 const FRICTION_WHY: &str = "rubber on glass has 0.1 to 0.6 wet and up to 2 dry";
 
 /// The numbers of a scene.
-pub const SCENE: &[Plausible] = &[
-    row("blade.neck_length_m", "m", LINK_M, LINK_WHY, LENGTHS),
-    row("blade.lip_length_m", "m", LINK_M, LINK_WHY, LENGTHS),
-    row("blade.head_mass_kg", "kg", HEAD_MASS_KG, HEAD_WHY, MASSES),
-    row("blade.neck_mass_kg", "kg", LINK_MASS_KG, MASS_WHY, MASSES),
-    row("blade.lip_mass_kg", "kg", LINK_MASS_KG, MASS_WHY, MASSES),
-    derived(
-        row("blade.neck_mass_kg", "kg/m", MASS_OVER_HEIGHT_KG_PER_M, MASS_WHY, MASSES),
+pub const SCENE_RANGES: &[PlausibleRange] = &[
+    value_range("blade.neck_length_m", "m", LINK_M, LINK_WHY, LENGTHS),
+    value_range("blade.lip_length_m", "m", LINK_M, LINK_WHY, LENGTHS),
+    value_range("blade.head_mass_kg", "kg", HEAD_MASS_KG, HEAD_WHY, MASSES),
+    value_range("blade.neck_mass_kg", "kg", LINK_MASS_KG, MASS_WHY, MASSES),
+    value_range("blade.lip_mass_kg", "kg", LINK_MASS_KG, MASS_WHY, MASSES),
+    derived_range(
+        value_range("blade.neck_mass_kg", "kg/m", MASS_OVER_HEIGHT_KG_PER_M, MASS_WHY, MASSES),
         "the mass over the height of the neck",
         &["blade.neck_mass_kg", "blade.neck_length_m"],
         |value| Some(value("blade.neck_mass_kg")? / value("blade.neck_length_m")?),
     ),
-    derived(
-        row("blade.lip_mass_kg", "kg/m", MASS_OVER_HEIGHT_KG_PER_M, MASS_WHY, MASSES),
+    derived_range(
+        value_range("blade.lip_mass_kg", "kg/m", MASS_OVER_HEIGHT_KG_PER_M, MASS_WHY, MASSES),
         "the mass over the height of the lip",
         &["blade.lip_mass_kg", "blade.lip_length_m"],
         |value| Some(value("blade.lip_mass_kg")? / value("blade.lip_length_m")?),
     ),
-    derived(
-        row("blade.neck_centre_m", "1", CENTRE_OVER_LENGTH, CENTRE_WHY, LENGTHS),
+    derived_range(
+        value_range("blade.neck_centre_m", "1", CENTRE_OVER_LENGTH, CENTRE_WHY, LENGTHS),
         "the centre of the neck over its length",
         &["blade.neck_centre_m", "blade.neck_length_m"],
         |value| Some(value("blade.neck_centre_m")? / value("blade.neck_length_m")?),
     ),
-    derived(
-        row("blade.lip_centre_m", "1", CENTRE_OVER_LENGTH, CENTRE_WHY, LENGTHS),
+    derived_range(
+        value_range("blade.lip_centre_m", "1", CENTRE_OVER_LENGTH, CENTRE_WHY, LENGTHS),
         "the centre of the lip over its length",
         &["blade.lip_centre_m", "blade.lip_length_m"],
         |value| Some(value("blade.lip_centre_m")? / value("blade.lip_length_m")?),
     ),
-    derived(
-        row("blade.neck_inertia_kg_m2", "1", INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS),
+    derived_range(
+        value_range("blade.neck_inertia_kg_m2", "1", INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS),
         "the inertia of the neck over mass times length squared",
         &["blade.neck_inertia_kg_m2", "blade.neck_mass_kg", "blade.neck_length_m"],
         |value| {
@@ -165,8 +165,8 @@ pub const SCENE: &[Plausible] = &[
             Some(value("blade.neck_inertia_kg_m2")? / (value("blade.neck_mass_kg")? * length * length))
         },
     ),
-    derived(
-        row("blade.lip_inertia_kg_m2", "1", INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS),
+    derived_range(
+        value_range("blade.lip_inertia_kg_m2", "1", INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS),
         "the inertia of the lip over mass times length squared",
         &["blade.lip_inertia_kg_m2", "blade.lip_mass_kg", "blade.lip_length_m"],
         |value| {
@@ -174,71 +174,83 @@ pub const SCENE: &[Plausible] = &[
             Some(value("blade.lip_inertia_kg_m2")? / (value("blade.lip_mass_kg")? * length * length))
         },
     ),
-    row(
+    value_range(
         "blade.head_natural_frequency_hz",
         "Hz",
         HEAD_HZ,
         "arms and rigs spring slowly; 8.88 and 20 Hz are published",
         &[],
     ),
-    row(
+    value_range(
         "blade.neck_natural_frequency_hz",
         "Hz",
         NECK_HZ,
         "195 and 519 Hz are published; a tenth to ten times of these",
         &[KILOHERTZ],
     ),
-    row(
+    value_range(
         "blade.lip_natural_frequency_hz",
         "Hz",
         LIP_HZ,
         "a tongue of rubber of 1 to 10 mm rings at 100 Hz to 10 kHz",
         &[KILOHERTZ],
     ),
-    row("blade.head_damping_ratio", "1", HEAD_RATIO, "beyond 1 a head does not ring", &[PERCENT]),
-    row("blade.neck_damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
-    row("blade.lip_damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
-    row(
+    value_range("blade.head_damping_ratio", "1", HEAD_RATIO, "beyond 1 a head does not ring", &[PERCENT]),
+    value_range("blade.neck_damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
+    value_range("blade.lip_damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
+    value_range(
         "blade.preload_force_n",
         "N",
         PRESS_N,
         "arms press with 10 to 20 N per metre, here 1 to 60, on 5 mm to 1.5 m of blade",
         &[GRAM_FORCE],
     ),
-    row(
+    value_range(
         "shoulder.contact_angle_rad",
         "rad",
         SHOULDER_RAD,
         "a neck that leans on its shoulder has turned by 0.3 to 57 degrees",
         &[DEGREES],
     ),
-    row(
+    value_range(
         "shoulder.stiffness_ratio",
         "1",
         SHOULDER_OVER_NECK,
         "less is no shoulder, more is a wall",
         &[PERCENT],
     ),
-    row("shoulder.damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
-    row("friction.a", "1", FRICTION, FRICTION_WHY, &[POINT, PERCENT]),
-    row("friction.c", "1", FRICTION, FRICTION_WHY, &[POINT, PERCENT]),
-    derived(
-        row("friction.a", "1", FRICTION, FRICTION_WHY, &[]),
+    value_range("shoulder.damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
+    value_range("friction.a", "1", FRICTION, FRICTION_WHY, &[POINT, PERCENT]),
+    value_range("friction.c", "1", FRICTION, FRICTION_WHY, &[POINT, PERCENT]),
+    derived_range(
+        value_range("friction.a", "1", FRICTION, FRICTION_WHY, &[]),
         "the static friction A + C",
         &["friction.a", "friction.c"],
         |value| Some(value("friction.a")? + value("friction.c")?),
     ),
-    row(
+    value_range(
         "friction.b_s_per_m",
         "s/m",
         DECAY_S_PER_M,
         "above 1000 friction falls within 1 mm/s, and a wiper moves at 0.1 to 2 m/s",
         &[THOUSAND_TOO_LARGE],
     ),
-    row("drive.amplitude_m", "m", AMPLITUDE_M, "half a stroke, on a rig or a bus", LENGTHS),
-    row("drive.frequency_hz", "Hz", STROKES_HZ, "a wiper makes at most about 1.2 strokes a second", &[]),
-    derived(
-        row("drive.amplitude_m", "m/s", TOP_SPEED_M_PER_S, "a wiper's tip reaches 2 to 3 m/s", LENGTHS),
+    value_range("drive.amplitude_m", "m", AMPLITUDE_M, "half a stroke, on a rig or a bus", LENGTHS),
+    value_range(
+        "drive.frequency_hz",
+        "Hz",
+        STROKES_HZ,
+        "a wiper makes at most about 1.2 strokes a second",
+        &[],
+    ),
+    derived_range(
+        value_range(
+            "drive.amplitude_m",
+            "m/s",
+            TOP_SPEED_M_PER_S,
+            "a wiper's tip reaches 2 to 3 m/s",
+            LENGTHS,
+        ),
         "the top speed of the head",
         &["drive.amplitude_m", "drive.frequency_hz"],
         |value| Some(TAU * value("drive.amplitude_m")? * value("drive.frequency_hz")?),
@@ -246,32 +258,38 @@ pub const SCENE: &[Plausible] = &[
 ];
 
 /// The numbers of a blade's section.
-pub const SECTION: &[Plausible] = &[
-    row("length_m", "m", PIECE_M, "a slice on a rig to the longest blade of a bus", LENGTHS),
-    row(
+pub const SECTION_RANGES: &[PlausibleRange] = &[
+    value_range("length_m", "m", PIECE_M, "a slice on a rig to the longest blade of a bus", LENGTHS),
+    value_range(
         "rubber.density_kg_per_m3",
         "kg/m3",
         DENSITY_KG_PER_M3,
         "pure rubber has 860 to 930, highly filled rubber 1600",
         &[G_PER_CM3],
     ),
-    row(
+    value_range(
         "rubber.youngs_modulus_pa",
         "Pa",
         MODULUS_PA,
         "30 to 90 Shore A are about 1 to 20 MPa, and twice that at the frequencies of chatter",
         &[MEGAPASCALS, KILOPASCALS],
     ),
-    row(
+    value_range(
         "rubber.loss_factor",
         "1",
         LOSS_FACTOR,
         "0.05 to 0.5 is usual for rubber, 1 the peak of a damping one",
         &[PERCENT],
     ),
-    row("head.mass_kg_per_m", "kg/m", HEAD_KG_PER_M, "a strip and its profile, to a carriage", &[G_PER_M]),
-    derived(
-        row(
+    value_range(
+        "head.mass_kg_per_m",
+        "kg/m",
+        HEAD_KG_PER_M,
+        "a strip and its profile, to a carriage",
+        &[G_PER_M],
+    ),
+    derived_range(
+        value_range(
             "head.stiffness_n_per_m2",
             "Hz",
             HEAD_HZ,
@@ -282,21 +300,21 @@ pub const SECTION: &[Plausible] = &[
         &["head.stiffness_n_per_m2", "head.mass_kg_per_m"],
         |value| Some((value("head.stiffness_n_per_m2")? / value("head.mass_kg_per_m")?).sqrt() / TAU),
     ),
-    row(
+    value_range(
         "head.press_force_n_per_m",
         "N/m",
         PRESS_N_PER_M,
         "arms press with 10 to 20 N per metre of blade",
         &[GRAM_FORCE, PER_MILLIMETRE],
     ),
-    row("neck.height_m", "m", LINK_M, LINK_WHY, LENGTHS),
-    row("neck.top_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
-    row("neck.bottom_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
-    row("neck.hinge_thickness_m", "m", HINGE_THICKNESS_M, HINGE_WHY, LENGTHS),
-    row("neck.hinge_height_m", "m", HINGE_M, HINGE_WHY, LENGTHS),
-    row("lip.height_m", "m", LINK_M, LINK_WHY, LENGTHS),
-    row("lip.top_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
-    row("lip.bottom_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
-    row("lip.hinge_thickness_m", "m", HINGE_THICKNESS_M, HINGE_WHY, LENGTHS),
-    row("lip.hinge_height_m", "m", HINGE_M, HINGE_WHY, LENGTHS),
+    value_range("neck.height_m", "m", LINK_M, LINK_WHY, LENGTHS),
+    value_range("neck.top_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
+    value_range("neck.bottom_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
+    value_range("neck.hinge_thickness_m", "m", HINGE_THICKNESS_M, HINGE_WHY, LENGTHS),
+    value_range("neck.hinge_height_m", "m", HINGE_M, HINGE_WHY, LENGTHS),
+    value_range("lip.height_m", "m", LINK_M, LINK_WHY, LENGTHS),
+    value_range("lip.top_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
+    value_range("lip.bottom_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
+    value_range("lip.hinge_thickness_m", "m", HINGE_THICKNESS_M, HINGE_WHY, LENGTHS),
+    value_range("lip.hinge_height_m", "m", HINGE_M, HINGE_WHY, LENGTHS),
 ];

@@ -1,18 +1,19 @@
 //! `wiperlab accuracy`.
 
 use crate::accuracy::{
-    HIGH, LOW, REFERENCE_TOLERANCE, Reference, Row, TOLERANCES, accuracy_csv, settings, work_precision_csv,
+    AccuracyRow, HIGH_COMPONENT, LOW_COMPONENT, REFERENCE_TOLERANCE, ReferenceRun, TOLERANCES, list_settings,
+    write_accuracy_csv, write_work_precision_csv,
 };
-use crate::figures::work_precision::{Point, WorkPrecision, figure};
-use crate::program::early_end::early_end;
-use crate::program::failure::{Failure, Outcome};
-use crate::program::files::{self, Maker, Overwrite, Place, Writer};
-use crate::program::global::Global;
+use crate::figures::work_precision::{WorkPrecision, WorkPrecisionRun, draw_figure};
+use crate::program::early_end::describe_early_end;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::files::{self, OutputCommand, OutputFolder, Overwrite, WritePolicy};
+use crate::program::global::GlobalArgs;
 use crate::program::load::read_scene;
 use crate::program::progress;
 use crate::simulate::scene::Scene;
-use crate::simulate::{Method, Status};
-use crate::text::digits;
+use crate::simulate::{IntegrationMethod, RunStatus};
+use crate::text::format_digits;
 use clap::Args;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
@@ -43,45 +44,54 @@ const OUTPUTS: [&str; 5] = [
 const ROUNDS: u32 = 15;
 /// Rounds in which a setting takes part however long it takes, and what it may have taken in all to take part
 /// in more.
-const EVERY_SETTING: (u32, Duration) = (3, Duration::from_millis(250));
+const MIN_TIMING: (u32, Duration) = (3, Duration::from_millis(250));
 
 impl AccuracyArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let scene = read_scene(&self.scene)?;
-        let writer = Writer::new(Maker::Accuracy, self.overwrite).csv(global.csv_dialect);
-        Place::check(&self.out, &writer, &OUTPUTS)?;
-        let settings = settings(&scene);
+        let writer =
+            WritePolicy::new(OutputCommand::Accuracy, self.overwrite).with_csv_dialect(global.csv_dialect);
+        OutputFolder::check(&self.out, &writer, &OUTPUTS)?;
+        let settings = list_settings(&scene);
         let steps = settings.len() as u64 + u64::from(ROUNDS);
-        let bar = progress::bar(steps, "accuracy", "settings and rounds", global.quiet);
-        let reference = Reference::of(&scene);
-        let measured = settings.into_iter().map(|setting| reference.measure(setting)).inspect(|_| bar.inc(1));
-        let mut rows: Vec<Row> = measured.collect();
-        take_times(&reference, &mut rows, || bar.inc(1));
+        let bar = progress::start_bar(steps, "accuracy", "settings and rounds", global.quiet);
+        let reference = ReferenceRun::from_scene(&scene);
+        let measured =
+            settings.into_iter().map(|setting| reference.measure_setting(setting)).inspect(|_| bar.inc(1));
+        let mut rows: Vec<AccuracyRow> = measured.collect();
+        time_settings(&reference, &mut rows, || bar.inc(1));
         bar.finish_and_clear();
         let mut outputs = vec![
-            (WORK_PRECISION.to_owned(), work_precision_csv(&rows).into_bytes()),
-            (ACCURACY.to_owned(), accuracy_csv(&reference, &rows).into_bytes()),
+            (WORK_PRECISION.to_owned(), write_work_precision_csv(&rows).into_bytes()),
+            (ACCURACY.to_owned(), write_accuracy_csv(&reference, &rows).into_bytes()),
         ];
-        outputs.extend(files::drawn("work-precision", &figure(&diagram(&scene, &reference, &rows))));
+        outputs.extend(files::figure_files(
+            "work-precision",
+            &draw_figure(&work_precision_diagram(&scene, &reference, &rows)),
+        ));
         files::write_outputs(&self.out, &writer, &outputs)?;
         if !global.quiet {
             print_study(&scene, &reference, &rows);
             print_line!("written to {}", self.out.display());
         }
-        Ok(if reference.run().status == Status::Completed { Outcome::Done } else { Outcome::StoppedEarly })
+        Ok(if reference.run_result().status == RunStatus::Completed {
+            CommandOutcome::Done
+        } else {
+            CommandOutcome::StoppedEarly
+        })
     }
 }
 
 /// The least time of every setting over the rounds.
-fn take_times(reference: &Reference<'_>, rows: &mut [Row], after_round: impl Fn()) {
-    let (least_rounds, long_enough) = EVERY_SETTING;
+fn time_settings(reference: &ReferenceRun<'_>, rows: &mut [AccuracyRow], after_round: impl Fn()) {
+    let (least_rounds, long_enough) = MIN_TIMING;
     let mut taken = vec![Duration::ZERO; rows.len()];
     for round in 0..ROUNDS {
         for (row, taken) in
             rows.iter_mut().zip(&mut taken).filter(|(_, taken)| round < least_rounds || **taken < long_enough)
         {
             let clock = Instant::now();
-            std::hint::black_box(reference.run_bare(&row.setting));
+            std::hint::black_box(reference.run_untracked(&row.setting));
             let elapsed = clock.elapsed();
             *taken += elapsed;
             row.wall_s = row.wall_s.min(elapsed.as_secs_f64());
@@ -90,15 +100,19 @@ fn take_times(reference: &Reference<'_>, rows: &mut [Row], after_round: impl Fn(
     }
 }
 
-fn diagram(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) -> WorkPrecision {
-    let transitions = reference.run().transitions;
-    let length_s = (1e4 * (reference.run().stopped_at_s - scene.start_s)).round() / 1e4;
+fn work_precision_diagram(
+    scene: &Scene,
+    reference: &ReferenceRun<'_>,
+    rows: &[AccuracyRow],
+) -> WorkPrecision {
+    let transitions = reference.run_result().transitions;
+    let length_s = (1e4 * (reference.run_result().stopped_at_s - scene.start_s)).round() / 1e4;
     // without transitions, or with references that disagree on them, the error is that of the deflection
     let timed = transitions > 0 && reference.lists_agree;
-    let error = |row: &Row| if timed { row.lists.worst_s } else { Some(row.state_worst) };
-    let point = |row: &Row| {
+    let error = |row: &AccuracyRow| if timed { row.lists.worst_s } else { Some(row.state_worst) };
+    let point = |row: &AccuracyRow| {
         let wrong_transitions = if timed { row.lists.missed + row.lists.invented } else { 0 };
-        Point {
+        WorkPrecisionRun {
             method: row.setting.name().to_owned(),
             wall_s: row.wall_s,
             error: error(row),
@@ -106,7 +120,7 @@ fn diagram(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) -> WorkPrecis
         }
     };
     WorkPrecision {
-        title: fastest(rows, error, if timed { " s" } else { "" }),
+        title: diagram_title(rows, error, if timed { " s" } else { "" }),
         subtitle: format!(
             "work-precision of {}: {transitions} transitions in {length_s} s of motion",
             scene.title()
@@ -124,22 +138,22 @@ fn diagram(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) -> WorkPrecis
 }
 
 /// The claim of the diagram: the setting with the least error, and its time.
-fn fastest(rows: &[Row], error: impl Fn(&Row) -> Option<f64>, unit: &str) -> String {
+fn diagram_title(rows: &[AccuracyRow], error: impl Fn(&AccuracyRow) -> Option<f64>, unit: &str) -> String {
     let least = rows.iter().filter_map(|row| Some((error(row)?, row))).min_by(|a, b| a.0.total_cmp(&b.0));
     match least {
         Some((error, row)) => format!(
             "Least error {}{unit}: {} in {} ms",
-            digits(error, 2),
+            format_digits(error, 2),
             row.setting.name(),
-            digits(1e3 * row.wall_s, 2)
+            format_digits(1e3 * row.wall_s, 2)
         ),
         None => "No setting has an error to show".to_owned(),
     }
 }
 
-fn print_study(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) {
-    let run = reference.run();
-    let method = Method::default().name();
+fn print_study(scene: &Scene, reference: &ReferenceRun<'_>, rows: &[AccuracyRow]) {
+    let run = reference.run_result();
+    let method = IntegrationMethod::default().name();
     print_line!(
         "{}: {} transitions from {} s to {} s",
         scene.title(),
@@ -147,12 +161,12 @@ fn print_study(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) {
         scene.start_s,
         run.stopped_at_s
     );
-    if let Some(how) = early_end(run) {
+    if let Some(how) = describe_early_end(run) {
         print_line!("the reference ends early: {how}");
     }
-    print_doubt(reference, method);
-    let [low, high] =
-        [LOW, HIGH].map(|i| reference.components.hz[i].map_or("none".to_owned(), |hz| format!("{hz:.3} Hz")));
+    print_reference_error(reference, method);
+    let [low, high] = [LOW_COMPONENT, HIGH_COMPONENT]
+        .map(|i| reference.components.hz[i].map_or("none".to_owned(), |hz| format!("{hz:.3} Hz")));
     print_line!("components of the reference: low {low}, high {high}");
     print_line!(
         "{:<17} {:>9} {:>11} {:>13} {:>6} {:>8} {:>12} {:>11} {:>9} {:>9} {:>10} {:>11}",
@@ -176,7 +190,7 @@ fn print_study(scene: &Scene, reference: &Reference<'_>, rows: &[Row]) {
 }
 
 /// What the reference is worth.
-fn print_doubt(reference: &Reference<'_>, method: &str) {
+fn print_reference_error(reference: &ReferenceRun<'_>, method: &str) {
     let finest = TOLERANCES.iter().fold(f64::INFINITY, |a: f64, b| a.min(*b));
     let other = reference.checked_by.name();
     if !reference.lists_agree {
@@ -199,12 +213,12 @@ fn print_doubt(reference: &Reference<'_>, method: &str) {
     }
 }
 
-fn print_row(reference: &Reference<'_>, row: &Row) {
+fn print_row(reference: &ReferenceRun<'_>, row: &AccuracyRow) {
     let small = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.1e}"));
     let error = row
         .lists
         .worst_s
-        .map_or("-".to_owned(), |s| format!("{}{s:.1e}", if reference.is_sure_of(s) { "" } else { "<" }));
+        .map_or("-".to_owned(), |s| format!("{}{s:.1e}", if reference.resolves_error(s) { "" } else { "<" }));
     let sets = row.setting.relative_tolerance.map_or_else(
         || row.setting.method.step_s().map_or(String::new(), |h| format!("{h:e} s")),
         |r| format!("{r:e}"),
@@ -217,8 +231,8 @@ fn print_row(reference: &Reference<'_>, row: &Row) {
         row.lists.invented,
         small(Some(row.state_worst)),
         small(Some(row.state_rms)),
-        small(row.components_hz[LOW]),
-        small(row.components_hz[HIGH]),
+        small(row.components_hz[LOW_COMPONENT]),
+        small(row.components_hz[HIGH_COMPONENT]),
         1e3 * row.wall_s,
         row.run.work.rhs_evaluations
     );

@@ -1,7 +1,7 @@
 //! The command line as typed; each command validates its own part in its own file.
 
-use crate::program::failure::{Failure, Outcome};
-use crate::program::global::Global;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::global::GlobalArgs;
 use crate::program::{
     accuracy, blade, collect, completions, demo, fit, help, import, init, inspect, man, modes, report,
     simulate, spectrum, submit, sweep, twin,
@@ -30,11 +30,11 @@ const LONG_VERSION: &str = concat!(
     long_about = None,
     propagate_version = true,
     disable_help_subcommand = true,
-    after_help = help::pages()
+    after_help = help::list_help_pages()
 )]
-pub struct Program {
+pub struct CommandLine {
     #[command(flatten)]
-    pub global: Global,
+    pub global: GlobalArgs,
     #[command(subcommand)]
     pub command: Command,
 }
@@ -100,7 +100,7 @@ pub enum Command {
 }
 
 impl Command {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         match self {
             Self::Demo(args) => args.run(global),
             Self::Import(args) => args.run(global),
@@ -117,9 +117,9 @@ impl Command {
             Self::Collect(args) => args.run(global),
             Self::Fit(args) => args.run(global),
             Self::Report(args) => args.run(global),
-            Self::Completions(args) => args.run(&mut Program::command()),
-            Self::Man(args) => args.run(&mut Program::command(), global),
-            Self::Help(args) => args.run(&mut Program::command()),
+            Self::Completions(args) => args.run(&mut CommandLine::command()),
+            Self::Man(args) => args.run(&mut CommandLine::command(), global),
+            Self::Help(args) => args.run(&mut CommandLine::command()),
         }
     }
 }

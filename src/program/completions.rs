@@ -1,11 +1,11 @@
 //! `wiperlab completions`: what a shell completes.
 
-use crate::program::failure::{Failure, Outcome};
-use crate::program::output::{lines, result};
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::output::{escape_lines, write_stdout};
 use clap::{Args, Command};
 use clap_complete::{Shell, generate};
 
-const AFTER_HELP: &str = "\
+const COMPLETIONS_HELP: &str = "\
 For example:
 
     wiperlab completions bash > ~/.local/share/bash-completion/completions/wiperlab
@@ -14,17 +14,17 @@ For example:
     wiperlab completions powershell >> $PROFILE";
 
 #[derive(Debug, Args)]
-#[command(after_help = AFTER_HELP)]
+#[command(after_help = COMPLETIONS_HELP)]
 pub struct CompletionsArgs {
     /// The shell
     pub shell: Shell,
 }
 
 impl CompletionsArgs {
-    pub fn run(&self, program: &mut Command) -> Result<Outcome, Failure> {
+    pub fn run(&self, program: &mut Command) -> Result<CommandOutcome, Failure> {
         let mut script = Vec::new();
         generate(self.shell, program, "wiperlab", &mut script);
-        result(&lines(&String::from_utf8_lossy(&script)));
-        Ok(Outcome::Done)
+        write_stdout(&escape_lines(&String::from_utf8_lossy(&script)));
+        Ok(CommandOutcome::Done)
     }
 }

@@ -1,19 +1,19 @@
 //! `wiperlab demo`: the whole pipeline on the bundled synthetic recording.
 
-use crate::fit::result::{FitResult, Status};
-use crate::import::{Options, Scale, Source};
-use crate::program::count::count;
-use crate::program::failure::{Failure, Outcome};
-use crate::program::files::{self, Maker, Overwrite, Place, Writer};
+use crate::fit::result::{FitResult, FitStatus};
+use crate::import::{CoordinateScale, ImportOptions, ImportSource};
+use crate::program::count::parse_count;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::files::{self, OutputCommand, OutputFolder, Overwrite, WritePolicy};
 use crate::program::fit::print_summary;
-use crate::program::global::Global;
+use crate::program::global::GlobalArgs;
 use crate::program::import::import_into;
-use crate::program::problem::Problem;
-use crate::program::progress::say;
+use crate::program::problem::LoadedJob;
+use crate::program::progress::print_progress;
 use crate::program::report;
 use crate::program::spectrum::SpectrumArgs;
 use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis};
-use crate::twin::export::TRACK_NAMES;
+use crate::twin::export::SYNTHETIC_TRACK_NAMES;
 use clap::Args;
 use std::path::{Path, PathBuf};
 
@@ -34,41 +34,44 @@ pub struct DemoArgs {
     #[arg(long, default_value = "demo", value_name = "DIR")]
     pub out: PathBuf,
     /// Most iterates of the fit: fewer are quicker and settle less (default: as many as it takes)
-    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
     #[command(flatten)]
     pub overwrite: Overwrite,
 }
 
 impl DemoArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        self.check()?;
-        let quiet = Global { quiet: true, ..global.clone() };
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        self.check_outputs()?;
+        let quiet = GlobalArgs { quiet: true, ..global.clone() };
         let data = self.out.join("data").join(NAME);
-        say(global.quiet, &format!("1/4 import    {EXPORT} -> {}", data.display()));
-        self.unpack()?;
+        print_progress(global.quiet, &format!("1/4 import    {EXPORT} -> {}", data.display()));
+        self.write_bundled_files()?;
         import_export(&data, self.overwrite)?;
 
-        say(global.quiet, "2/4 spectrum  of the head's drop (low) and of the deflection (high)");
+        print_progress(global.quiet, "2/4 spectrum  of the head's drop (low) and of the deflection (high)");
         for (name, channel, window) in SPECTRA {
             SpectrumArgs::new(&data, channel, window, &self.out.join("spectra").join(name), self.overwrite)
                 .run(&quiet)?;
         }
 
         let fit = self.out.join("fits").join(NAME);
-        say(global.quiet, &format!("3/4 fit       {} (some ten seconds)", fit.join("job.toml").display()));
-        let problem = Problem::load(&fit.join("job.toml"))?;
+        print_progress(
+            global.quiet,
+            &format!("3/4 fit       {} (some ten seconds)", fit.join("job.toml").display()),
+        );
+        let problem = LoadedJob::load(&fit.join("job.toml"))?;
         let solved = problem.solve(global, false, self.max_evaluations, self.overwrite)?;
-        if solved.result.status == Status::Interrupted {
-            return Ok(Outcome::StoppedEarly);
+        if solved.result.status == FitStatus::Interrupted {
+            return Ok(CommandOutcome::StoppedEarly);
         }
 
         let page = self.out.join("reports").join(NAME);
-        say(global.quiet, &format!("4/4 report    {}", page.join("index.html").display()));
-        let missed = report::write(
+        print_progress(global.quiet, &format!("4/4 report    {}", page.join("index.html").display()));
+        let missed = report::write_report(
             &fit,
             &page,
-            &Writer::new(Maker::Report, self.overwrite).csv(global.csv_dialect),
+            &WritePolicy::new(OutputCommand::Report, self.overwrite).with_csv_dialect(global.csv_dialect),
             &quiet,
         )?;
         if !global.quiet {
@@ -76,33 +79,33 @@ impl DemoArgs {
             print_truth(&solved.result)?;
             print_line!("open {}", page.join("index.html").display());
         }
-        Ok(if missed || solved.result.status != Status::Converged {
-            Outcome::StoppedEarly
+        Ok(if missed || solved.result.status != FitStatus::Converged {
+            CommandOutcome::StoppedEarly
         } else {
-            Outcome::Done
+            CommandOutcome::Done
         })
     }
 
     /// Refuses before anything is written what one of the steps would refuse.
-    fn check(&self) -> Result<(), Failure> {
-        let steps: [(Maker, &str, &[&str]); 4] = [
-            (Maker::Import, "data", &[TRACE_FILE, DESCRIPTION_FILE, EXPORT]),
-            (Maker::Fit, "fits", &[files::RESULT]),
-            (Maker::Report, "reports", &["index.html", "report.json"]),
-            (Maker::Demo, "fits", &["job.toml"]),
+    fn check_outputs(&self) -> Result<(), Failure> {
+        let steps: [(OutputCommand, &str, &[&str]); 4] = [
+            (OutputCommand::Import, "data", &[TRACE_FILE, DESCRIPTION_FILE, EXPORT]),
+            (OutputCommand::Fit, "fits", &[files::RESULT_FILE]),
+            (OutputCommand::Report, "reports", &["index.html", "report.json"]),
+            (OutputCommand::Demo, "fits", &["job.toml"]),
         ];
         steps.iter().try_for_each(|(maker, folder, names)| {
-            let writer = Writer::new(*maker, self.overwrite);
-            Place::check(&self.out.join(folder).join(NAME), &writer, names).map(|_| ())
+            let writer = WritePolicy::new(*maker, self.overwrite);
+            OutputFolder::check(&self.out.join(folder).join(NAME), &writer, names).map(|_| ())
         })
     }
 
     /// The bundled export, scene and job, laid out as a project has them.
-    fn unpack(&self) -> Result<(), Failure> {
+    fn write_bundled_files(&self) -> Result<(), Failure> {
         let write = |folder: PathBuf, name: &str, text: &str| {
             files::write_outputs(
                 &folder,
-                &Writer::new(Maker::Demo, self.overwrite),
+                &WritePolicy::new(OutputCommand::Demo, self.overwrite),
                 &[(name, text.as_bytes().to_vec())],
             )
         };
@@ -113,19 +116,24 @@ impl DemoArgs {
 
 /// What `wiperlab import` does with the export, its scale and rate.
 fn import_export(folder: &Path, overwrite: Overwrite) -> Result<(), Failure> {
-    let [tip, head] = TRACK_NAMES;
-    let options = Options {
+    let [tip, head] = SYNTHETIC_TRACK_NAMES;
+    let options = ImportOptions {
         name: NAME.to_owned(),
         frame_rate_hz: Some(5000.0),
-        scale: Some(Scale::parse("20um/px").map_err(Failure::internal)?),
+        scale: Some(CoordinateScale::parse("20um/px").map_err(Failure::internal)?),
         y_axis: Some(YAxis::Up),
         exposure_s: Some(5e-5),
         tip: Some(tip.to_owned()),
         head: Some(head.to_owned()),
         twin: Some(("twin.toml".to_owned(), TWIN.to_owned())),
-        ..Options::default()
+        ..ImportOptions::default()
     };
-    import_into(folder, &[Source::alone(EXPORT, EXPORT_TEXT.as_bytes().to_vec())], &options, overwrite)
+    import_into(
+        folder,
+        &[ImportSource::without_companions(EXPORT, EXPORT_TEXT.as_bytes().to_vec())],
+        &options,
+        overwrite,
+    )
 }
 
 /// The truth behind the synthetic recording, next to the estimates.

@@ -9,14 +9,14 @@ pub const STOPPED_EARLY: u8 = 3;
 
 /// How a command that ran has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Outcome {
+pub enum CommandOutcome {
     /// Everything was done.
     Done,
     /// It stopped early or did not converge; what was computed is written and says so.
     StoppedEarly,
 }
 
-impl Outcome {
+impl CommandOutcome {
     pub fn exit_code(self) -> u8 {
         match self {
             Self::Done => 0,
@@ -48,7 +48,7 @@ impl Failure {
     }
 
     /// Prints the message and gives the exit code.
-    pub fn report(&self) -> u8 {
+    pub fn print_message(&self) -> u8 {
         // (each problem of a file has a line of its own; no line but the first begins at the margin)
         for (i, line) in self.to_string().split('\n').enumerate() {
             warn_line!("{}{line}", if i == 0 { "error: " } else { "       " });

@@ -2,40 +2,41 @@
 
 use crate::chart::Figure;
 use crate::program::failure::Failure;
-use crate::program::files::{self, Maker, Overwrite, Place, Writer};
-use crate::program::global::Global;
+use crate::program::files::{self, OutputCommand, OutputFolder, Overwrite, WritePolicy};
+use crate::program::global::GlobalArgs;
 use clap::Args;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
-pub struct Figures {
+pub struct FigureArgs {
     /// Draw figures into a folder, each in three files: one for a screen, and below paper/ one for a column
     /// and one for a page
     #[arg(long = "figures", value_name = "DIR")]
     pub folder: Option<PathBuf>,
 }
 
-impl Figures {
+impl FigureArgs {
     /// Refuses a folder that figures of these names cannot go to; asked before the work.
-    pub fn check(&self, names: &[&str], overwrite: Overwrite) -> Result<(), Failure> {
+    pub fn check_folder(&self, names: &[&str], overwrite: Overwrite) -> Result<(), Failure> {
         let Some(folder) = &self.folder else { return Ok(()) };
-        let files = names.iter().flat_map(|name| files::drawn(name, &Figure::default()));
+        let files = names.iter().flat_map(|name| files::figure_files(name, &Figure::default()));
         let names: Vec<String> = files.map(|(name, _)| name).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        Place::check(folder, &writer(overwrite), &names).map(|_| ())
+        OutputFolder::check(folder, &figure_policy(overwrite), &names).map(|_| ())
     }
 
     /// Writes named figures, where they are wanted.
-    pub fn write(
+    pub fn write_figures(
         &self,
         overwrite: Overwrite,
-        global: &Global,
+        global: &GlobalArgs,
         figures: impl FnOnce() -> Vec<(&'static str, Figure)>,
     ) -> Result<(), Failure> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let figures = figures();
-        let files: Vec<_> = figures.iter().flat_map(|(name, figure)| files::drawn(name, figure)).collect();
-        files::write_outputs(folder, &writer(overwrite), &files)?;
+        let files: Vec<_> =
+            figures.iter().flat_map(|(name, figure)| files::figure_files(name, figure)).collect();
+        files::write_outputs(folder, &figure_policy(overwrite), &files)?;
         for (name, _) in figures.iter().filter(|_| !global.quiet) {
             print_line!("figure: {}", folder.join(format!("{name}.svg")).display());
         }
@@ -43,6 +44,6 @@ impl Figures {
     }
 }
 
-fn writer(overwrite: Overwrite) -> Writer {
-    Writer::new(Maker::Figures, overwrite)
+fn figure_policy(overwrite: Overwrite) -> WritePolicy {
+    WritePolicy::new(OutputCommand::Figures, overwrite)
 }

@@ -13,19 +13,19 @@ use crate::chart::{Figure, Medium};
 use crate::program::failure::Failure;
 use crate::toml_file;
 pub use dialect::CsvDialect;
-use guard::Guard;
-pub use input::{Size, check_size, is_standard_input, read, read_json, read_text, read_toml};
+use guard::OutputGuard;
+pub use input::{FileSize, check_data_size, is_standard_input, read_data, read_json, read_text, read_toml};
 pub use kept::{SIMULATION_SUMMARY, is_simulation_summary};
-pub use maker::{Maker, Overwrite, Writer};
-use marker::MARKER;
-pub use marker::Marker;
-pub use staged::{Staging, check_free};
+pub use maker::{OutputCommand, Overwrite, WritePolicy};
+pub use marker::FolderMarker;
+use marker::MARKER_FILE;
+pub use staged::{OutputStaging, check_path_free};
 use std::fs::File;
 use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 /// What a fit found, in its folder.
-pub const RESULT: &str = "result.json";
+pub const RESULT_FILE: &str = "result.json";
 
 /// Name of a file or folder for messages and headings.
 pub fn display_name(path: &Path) -> String {
@@ -37,19 +37,19 @@ pub fn display_name(path: &Path) -> String {
 }
 
 /// The folder in which a file lies.
-pub fn folder_of(file: &Path) -> &Path {
+pub fn containing_folder(file: &Path) -> &Path {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Where a path leads that stands in `file`: it is relative to the folder of that file, whatever the working
 /// folder is.
-pub fn path_in(file: &Path, named: &str) -> PathBuf {
-    folder_of(file).join(named)
+pub fn resolve_path(file: &Path, named: &str) -> PathBuf {
+    containing_folder(file).join(named)
 }
 
 /// The same where something has to be there; otherwise why it is refused.
-pub fn existing_in(file: &Path, named: &str) -> Result<PathBuf, String> {
-    let path = path_in(file, named);
+pub fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf, String> {
+    let path = resolve_path(file, named);
     if path.exists() {
         return Ok(path);
     }
@@ -61,7 +61,7 @@ pub fn existing_in(file: &Path, named: &str) -> Result<PathBuf, String> {
 }
 
 /// A path as a file in `folder` names it: from there, or in full where no way leads from one to the other.
-pub fn path_from(folder: &Path, path: &Path) -> Result<String, Failure> {
+pub fn relative_path(folder: &Path, path: &Path) -> Result<String, Failure> {
     let in_full = |path: &Path| {
         std::path::absolute(path).map_err(|error| {
             Failure::Input(format!("{}: cannot be found from here: {error}", path.display()))
@@ -88,31 +88,31 @@ pub fn path_from(folder: &Path, path: &Path) -> Result<String, Failure> {
 /// then renamed.
 pub fn write_outputs(
     folder: &Path,
-    writer: &Writer,
+    writer: &WritePolicy,
     files: &[(impl AsRef<str>, Vec<u8>)],
 ) -> Result<(), Failure> {
     let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
-    Place::writable(folder)?;
-    stage_all(Staging::of(folder, writer, &names)?, files)
+    OutputFolder::find_writable_ancestor(folder)?;
+    commit_files(OutputStaging::new(folder, writer, &names)?, files)
 }
 
 /// The same for files that no marker lists, of which the caller knows that they replace nothing of value.
-pub fn write_all(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
+pub fn write_unmarked(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
     let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
-    Place::writable(folder)?;
-    stage_all(Staging::unmarked(folder, &names)?, files)
+    OutputFolder::find_writable_ancestor(folder)?;
+    commit_files(OutputStaging::new_unmarked(folder, &names)?, files)
 }
 
-fn stage_all(mut staging: Staging, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
+fn commit_files(mut staging: OutputStaging, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
     for (name, bytes) in files {
-        staging.add(name.as_ref(), bytes.as_slice())?;
+        staging.stage_file(name.as_ref(), bytes.as_slice())?;
     }
-    staging.place()
+    staging.commit()
 }
 
 /// A figure as files: for the screen, and under `paper/` for a journal's column and page.
-pub fn drawn(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
-    let file = |name: String, medium| (name, figure.svg(medium).into_bytes());
+pub fn figure_files(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
+    let file = |name: String, medium| (name, figure.to_svg(medium).into_bytes());
     [
         file(format!("{name}.svg"), Medium::Screen),
         file(format!("paper/{name}-85mm.svg"), Medium::Column),
@@ -121,18 +121,18 @@ pub fn drawn(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
 }
 
 /// Text that is made piece by piece, as a reader.
-pub struct Pieces<I> {
+pub struct ChunkReader<I> {
     pieces: I,
     present: io::Cursor<Vec<u8>>,
 }
 
-impl<I: Iterator<Item = String>> Pieces<I> {
+impl<I: Iterator<Item = String>> ChunkReader<I> {
     pub fn new(pieces: I) -> Self {
         Self { pieces, present: io::Cursor::default() }
     }
 }
 
-impl<I: Iterator<Item = String>> Read for Pieces<I> {
+impl<I: Iterator<Item = String>> Read for ChunkReader<I> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         loop {
             let read = self.present.read(buffer)?;
@@ -150,26 +150,26 @@ impl<I: Iterator<Item = String>> Read for Pieces<I> {
 /// A folder for results that are written while they are computed: nothing is seen of them before all are
 /// complete, and nothing is left of them when the program is killed.
 #[derive(Debug)]
-pub struct Place {
+pub struct OutputFolder {
     folder: PathBuf,
-    writer: Writer,
+    writer: WritePolicy,
     /// Where the nameless files are kept meanwhile: the folder, or what there is of the way to it.
-    near: PathBuf,
+    temporary_folder: PathBuf,
 }
 
-impl Place {
+impl OutputFolder {
     /// Checks that `folder` is one or can be made, can be written to, and holds nothing that the files
     /// `names` must not replace: asked before the work, as it is again when they are placed.
-    pub fn check(folder: &Path, writer: &Writer, names: &[&str]) -> Result<Self, Failure> {
-        let near = Self::writable(folder)?;
-        names.iter().chain([&MARKER]).try_for_each(|name| check_free(&folder.join(name)))?;
-        let guard = Guard::of(folder, writer, names)?;
-        names.iter().try_for_each(|name| guard.admit(name, None).map(|_| ()))?;
-        Ok(Self { folder: folder.to_owned(), writer: writer.clone(), near })
+    pub fn check(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
+        let near = Self::find_writable_ancestor(folder)?;
+        names.iter().chain([&MARKER_FILE]).try_for_each(|name| check_path_free(&folder.join(name)))?;
+        let guard = OutputGuard::new(folder, writer, names)?;
+        names.iter().try_for_each(|name| guard.check_overwrite(name, None).map(|_| ()))?;
+        Ok(Self { folder: folder.to_owned(), writer: writer.clone(), temporary_folder: near })
     }
 
     /// What there is of the way to a folder, which can be written to.
-    fn writable(folder: &Path) -> Result<PathBuf, Failure> {
+    fn find_writable_ancestor(folder: &Path) -> Result<PathBuf, Failure> {
         let near = folder
             .ancestors()
             .find(|path| path.exists() || path.is_symlink())
@@ -192,66 +192,71 @@ impl Place {
         Ok(near)
     }
 
-    /// A file that is written to as it grows and gets its name when all are [finished](Self::finish).
-    pub fn file(&self, name: &'static str) -> Result<Growing, Failure> {
+    /// A file that is written to as it grows and gets its name when all are [finished](Self::commit).
+    pub fn create_file(&self, name: &'static str) -> Result<PendingFile, Failure> {
         let path = self.folder.join(name);
-        let file = tempfile::tempfile_in(&self.near).map_err(|error| unwritable(&path, &error))?;
-        Ok(Growing { name, path, to: BufWriter::new(file), failed: None })
+        let file =
+            tempfile::tempfile_in(&self.temporary_folder).map_err(|error| write_failure(&path, &error))?;
+        Ok(PendingFile { name, path, to: BufWriter::new(file), failed: None })
     }
 
     /// Puts the files that grew and the others into the folder under their names, or none of them.
-    pub fn finish(&self, files: Vec<Growing>, others: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
-        let files = files.into_iter().map(Growing::complete).collect::<Result<Vec<_>, _>>()?;
+    pub fn commit(
+        &self,
+        files: Vec<PendingFile>,
+        others: &[(impl AsRef<str>, Vec<u8>)],
+    ) -> Result<(), Failure> {
+        let files = files.into_iter().map(PendingFile::into_rewound_file).collect::<Result<Vec<_>, _>>()?;
         let others = others.iter().map(|(name, bytes)| (name.as_ref(), bytes.as_slice()));
         let names: Vec<&str> =
             files.iter().map(|(name, _)| *name).chain(others.clone().map(|(name, _)| name)).collect();
-        let mut staging = Staging::of(&self.folder, &self.writer, &names)?;
+        let mut staging = OutputStaging::new(&self.folder, &self.writer, &names)?;
         for (name, file) in files {
-            staging.add(name, file)?;
+            staging.stage_file(name, file)?;
         }
         for (name, bytes) in others {
-            staging.add(name, bytes)?;
+            staging.stage_file(name, bytes)?;
         }
-        staging.place()
+        staging.commit()
     }
 }
 
 /// A file without a name for what does not fit into memory, in a folder or in what there is of the way to it.
-pub fn scratch(folder: &Path) -> Result<File, Failure> {
-    let near = Place::writable(folder)?;
-    tempfile::tempfile_in(&near).map_err(|error| unwritable(&near, &error))
+pub fn create_scratch_file(folder: &Path) -> Result<File, Failure> {
+    let near = OutputFolder::find_writable_ancestor(folder)?;
+    tempfile::tempfile_in(&near).map_err(|error| write_failure(&near, &error))
 }
 
 /// A file on its way; after its first failure nothing more is written, and the failure is reported at the
 /// end.
 #[derive(Debug)]
-pub struct Growing {
+pub struct PendingFile {
     name: &'static str,
     path: PathBuf,
     to: BufWriter<File>,
     failed: Option<io::Error>,
 }
 
-impl Growing {
-    pub fn write(&mut self, text: &str) {
+impl PendingFile {
+    pub fn write_text(&mut self, text: &str) {
         if self.failed.is_none() {
             self.failed = self.to.write_all(text.as_bytes()).err();
         }
     }
 
     /// The whole file, to be read from its start.
-    fn complete(self) -> Result<(&'static str, File), Failure> {
+    fn into_rewound_file(self) -> Result<(&'static str, File), Failure> {
         let Self { name, path, to, failed } = self;
         let rewound = || {
             let mut file = to.into_inner().map_err(io::IntoInnerError::into_error)?;
             file.rewind()?;
             Ok(file)
         };
-        let file = failed.map_or_else(rewound, Err).map_err(|error| unwritable(&path, &error))?;
+        let file = failed.map_or_else(rewound, Err).map_err(|error| write_failure(&path, &error))?;
         Ok((name, file))
     }
 }
 
-fn unwritable(path: &Path, error: &io::Error) -> Failure {
+fn write_failure(path: &Path, error: &io::Error) -> Failure {
     Failure::Internal(format!("{}: cannot be written: {error}", path.display()))
 }

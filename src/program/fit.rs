@@ -6,22 +6,22 @@ mod outputs;
 mod summary;
 mod traces;
 
-pub use batch::{Standing, check_folders};
+pub use batch::{BatchJobState, check_distinct_folders};
 pub use summary::print_summary;
 
-use crate::fit::ledger::Progress;
-use crate::fit::result::{FitResult, Status};
-use crate::fit::stage::Stage;
-use crate::fit::{Context, FitError};
+use crate::fit::ledger::FitProgress;
+use crate::fit::result::{FitResult, FitStatus};
+use crate::fit::stage::EvaluationStage;
+use crate::fit::{FitContext, FitError};
 use crate::journal::Shard;
-use crate::program::count::count;
-use crate::program::failure::{Failure, Outcome};
-use crate::program::files::{Maker, Overwrite, Writer};
-use crate::program::global::Global;
+use crate::program::count::parse_count;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::files::{OutputCommand, Overwrite, WritePolicy};
+use crate::program::global::GlobalArgs;
 use crate::program::interrupt;
-use crate::program::journal::{JOURNAL, JournalFile};
-use crate::program::load::warn_of;
-use crate::program::problem::Problem;
+use crate::program::journal::{CHECKPOINT_FILE, CheckpointWriter};
+use crate::program::load::print_warnings;
+use crate::program::problem::LoadedJob;
 use crate::program::time_limit::TimeLimit;
 use crate::program::{files, progress};
 use clap::Args;
@@ -43,7 +43,7 @@ pub struct FitArgs {
     pub resume: bool,
     /// Most evaluations of the model, those of the journal included (default: what the job allows); of a fit
     /// to traces most iterates of the search (default: as many as it takes)
-    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub max_evaluations: Option<usize>,
     /// Of several jobs fit only every N-th from job K on (K from 0); each goes on from its journal, and one
     /// whose result is there is left as it is
@@ -57,7 +57,7 @@ pub struct FitArgs {
 }
 
 /// A result, and what it took.
-pub struct Solved {
+pub struct CompletedFit {
     pub result: FitResult,
     /// How much of it was taken from journals.
     pub replayed: usize,
@@ -65,12 +65,12 @@ pub struct Solved {
 }
 
 impl FitArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         if let Some(TimeLimit(time)) = self.time_limit {
-            interrupt::limit(time);
+            interrupt::set_time_limit(time);
         }
         match (self.jobs.as_slice(), self.shard) {
-            ([job], None) => self.fit(&Problem::load(job)?, self.resume, global),
+            ([job], None) => self.fit_job(&LoadedJob::load(job)?, self.resume, global),
             ([job], Some(_)) => Err(Failure::Input(format!(
                 "--shard: found with the one job {}, expected a list of jobs, as a fit takes seconds and is not \
                  divided; leave --shard out, or divide a list of jobs or a study (`wiperlab sweep STUDY --out DIR \
@@ -81,79 +81,89 @@ impl FitArgs {
         }
     }
 
-    fn fit(&self, problem: &Problem, resume: bool, global: &Global) -> Result<Outcome, Failure> {
-        for warning in crate::fit::warnings(problem.job()).iter().filter(|_| !global.quiet) {
+    fn fit_job(
+        &self,
+        problem: &LoadedJob,
+        resume: bool,
+        global: &GlobalArgs,
+    ) -> Result<CommandOutcome, Failure> {
+        for warning in crate::fit::job_warnings(problem.job()).iter().filter(|_| !global.quiet) {
             warn_line!("warning: {warning}");
         }
-        problem.doubts.iter().for_each(|(scene, findings)| warn_of(scene, findings, global));
+        problem.doubts.iter().for_each(|(scene, findings)| print_warnings(scene, findings, global));
         let solved = problem.solve(global, resume, self.max_evaluations, self.overwrite)?;
-        Ok(solved.said(problem, global))
+        Ok(solved.print_outcome(problem, global))
     }
 }
 
-impl Solved {
+impl CompletedFit {
     /// Says what was found and where it is.
-    pub fn said(&self, problem: &Problem, global: &Global) -> Outcome {
+    pub fn print_outcome(&self, problem: &LoadedJob, global: &GlobalArgs) -> CommandOutcome {
         if !global.quiet {
             print_summary(self);
         }
-        if !global.quiet && self.result.status != Status::Interrupted {
-            print_line!("written to {}", problem.folder.join(files::RESULT).display());
+        if !global.quiet && self.result.status != FitStatus::Interrupted {
+            print_line!("written to {}", problem.folder.join(files::RESULT_FILE).display());
         }
-        let done = self.result.status == Status::Converged && self.result.explains();
-        if done { Outcome::Done } else { Outcome::StoppedEarly }
+        let done = self.result.status == FitStatus::Converged && self.result.explains_recordings();
+        if done { CommandOutcome::Done } else { CommandOutcome::StoppedEarly }
     }
 }
 
-impl Problem {
+impl LoadedJob {
     /// Fits, and writes the journal as it goes and the result at the end.
     pub fn solve(
         &self,
-        global: &Global,
+        global: &GlobalArgs,
         resume: bool,
         max_evaluations: Option<usize>,
         overwrite: Overwrite,
-    ) -> Result<Solved, Failure> {
+    ) -> Result<CompletedFit, Failure> {
         if !self.problem.traces().is_empty() {
             return self.solve_traces(global, resume, max_evaluations, overwrite);
         }
-        let writer = Writer::new(Maker::Fit, overwrite).csv(global.csv_dialect);
-        self.check_place(&writer)?;
-        let path = self.folder.join(JOURNAL);
+        let writer = WritePolicy::new(OutputCommand::Fit, overwrite).with_csv_dialect(global.csv_dialect);
+        self.check_outputs(&writer)?;
+        let path = self.folder.join(CHECKPOINT_FILE);
         let name = path.display().to_string();
-        let (mut sink, resumed) = JournalFile::open(&path, resume)?;
-        let bar = progress::bar(self.expected(max_evaluations) as u64, "fit", "evaluations", global.quiet);
+        let (mut sink, resumed) = CheckpointWriter::open(&path, resume)?;
+        let bar = progress::start_bar(
+            self.expected_evaluations(max_evaluations) as u64,
+            "fit",
+            "evaluations",
+            global.quiet,
+        );
         let mut replayed = 0;
         let journaled = Arc::new(AtomicUsize::new(resumed.as_ref().map_or(0, |found| found.records.len())));
-        let kept = self.kept(&name, "evaluations", &journaled);
-        let stops = interrupt::stops(kept.clone());
-        let mut on_progress = |now: &Progress| {
-            show(&bar, now, replayed);
+        let kept = self.saved_progress(&name, "evaluations", &journaled);
+        let stops = interrupt::register_stoppable(kept.clone());
+        let mut on_progress = |now: &FitProgress| {
+            update_progress_bar(&bar, now, replayed);
             replayed = now.replayed;
-            if now.stage != Stage::Gate {
+            if now.stage != EvaluationStage::Gate {
                 journaled.fetch_max(now.evaluations, Ordering::Relaxed);
             }
-            interrupt::flow()
+            interrupt::control_flow()
         };
         let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
-        let context = Context { max_evaluations, resume, ..self.problem.context() };
+        let context = FitContext { max_evaluations, resume, ..self.problem.new_context() };
         let clock = Instant::now();
         let fitted = self.problem.fit_with(&context, &mut sink, &mut on_progress);
-        let result = fitted.map_err(|error| self.failure(&error))?;
+        let result = fitted.map_err(|error| self.fit_failure(&error))?;
         let wall = clock.elapsed();
         bar.finish_and_clear();
         sink.finish()?;
-        if result.status == Status::Interrupted {
+        if result.status == FitStatus::Interrupted {
             // an earlier result stays: what is new is in the journal, and a resumed fit gives its result
-            stops.finishing(&kept());
+            stops.announce_stop(&kept());
         } else {
-            self.write(&result, &writer)?;
+            self.write_outputs(&result, &writer)?;
         }
-        Ok(Solved { result, replayed, wall })
+        Ok(CompletedFit { result, replayed, wall })
     }
 
     /// Why the fit did not run.
-    fn failure(&self, error: &FitError) -> Failure {
+    fn fit_failure(&self, error: &FitError) -> Failure {
         match error {
             FitError::JournalWrite { .. } => Failure::Internal(error.to_string()),
             FitError::Journal(_) | FitError::OtherSeed { .. } => Failure::input(error),
@@ -162,7 +172,7 @@ impl Problem {
     }
 
     /// What is on the disk when the fit is interrupted.
-    fn kept(
+    fn saved_progress(
         &self,
         journal: &str,
         records: &'static str,
@@ -177,9 +187,9 @@ impl Problem {
 
     /// Evaluations to be expected, for the progress: the budget, and about what gate, profiles and twins
     /// take.
-    fn expected(&self, max_evaluations: Option<usize>) -> usize {
+    fn expected_evaluations(&self, max_evaluations: Option<usize>) -> usize {
         let (job, parameters) = (self.job(), self.job().parameters.len());
-        let gate = crate::fit::gate::PROBES * (2 * parameters + 1);
+        let gate = crate::fit::gate::PROBE_COUNT * (2 * parameters + 1);
         let profiles = if job.intervals.profile { 60 * parameters } else { 0 };
         let all = gate
             + job.search.global_evaluations
@@ -192,11 +202,11 @@ impl Problem {
 
 /// Moves the bar; the time left follows from the evaluations that are made, not from those that were just
 /// replayed.
-fn show(bar: &ProgressBar, now: &Progress, replayed_before: usize) {
+fn update_progress_bar(bar: &ProgressBar, now: &FitProgress, replayed_before: usize) {
     bar.set_length(bar.length().unwrap_or(0).max(now.evaluations as u64));
     bar.set_position(now.evaluations as u64);
     if now.replayed > replayed_before {
         bar.reset_eta();
     }
-    bar.set_message(format!("{}, cost {:.4}", now.stage.word(), now.best_cost));
+    bar.set_message(format!("{}, cost {:.4}", now.stage.name(), now.best_cost));
 }

@@ -3,17 +3,17 @@
 mod markdown;
 
 use crate::fit::job::Job;
-use crate::program::failure::{Failure, Outcome};
-use crate::program::output::{lines, result};
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::output::{escape_lines, write_stdout};
 use crate::recording::files::RecordingFile;
-use crate::section::Section;
+use crate::section::BladeSection;
 use crate::simulate::scene::Scene;
 use crate::sweep::Study;
-use crate::text::wrapped;
-use crate::toml_file::{KeyTable, nearest, reference};
+use crate::text::wrap_words;
+use crate::toml_file::{KeyTable, list_key_tables, suggest_key};
 use crate::twin::spec::TwinSpec;
 use clap::{Args, Command};
-use markdown::{section, terminal};
+use markdown::{find_section, render_for_terminal};
 use serde_json::Value;
 
 /// Widest line of a page, characters.
@@ -27,7 +27,7 @@ pub struct HelpArgs {
 }
 
 /// What a page shows.
-enum Content {
+enum HelpContent {
     /// Every key of a kind of file.
     Keys(fn() -> Value),
     /// A section of the documentation, by the text of its heading.
@@ -37,30 +37,30 @@ enum Content {
 }
 
 /// A page, what it is about, and what it shows.
-type Page = (&'static str, &'static str, Content);
+type HelpPage = (&'static str, &'static str, HelpContent);
 
 const FITS: &str = include_str!("../../docs/fits.md");
 const SPECTRA: &str = include_str!("../../docs/spectra.md");
 const RELIABILITY: &str = include_str!("../../docs/reliability.md");
 const FIRST_HOUR: &str = include_str!("../../docs/first-hour.md");
 
-const PAGES: [Page; 12] = [
-    ("first-hour", "from a tracking export to a report, step by step", Content::Whole(FIRST_HOUR)),
-    ("scene", "every key of scene.toml", Content::Keys(Scene::schema)),
-    ("job", "every key of job.toml", Content::Keys(Job::schema)),
-    ("study", "every key of study.toml", Content::Keys(Study::schema)),
-    ("twin.toml", "every key of twin.toml", Content::Keys(TwinSpec::schema)),
-    ("recording", "every key of recording.toml", Content::Keys(RecordingFile::schema)),
-    ("section", "every key of section.toml", Content::Keys(Section::schema)),
-    ("windows", "what --window and `window` take", Content::Section(SPECTRA, "The window")),
-    ("components", "what the verdicts on components mean", Content::Section(SPECTRA, "Verdicts")),
-    ("features", "what a fit reads from recording and model", Content::Section(FITS, "Features")),
-    ("traces", "how a fit compares frame by frame", Content::Section(FITS, "Traces")),
-    ("exit-codes", "what the program returns to a shell", Content::Section(RELIABILITY, "Exit codes")),
+const PAGES: [HelpPage; 12] = [
+    ("first-hour", "from a tracking export to a report, step by step", HelpContent::Whole(FIRST_HOUR)),
+    ("scene", "every key of scene.toml", HelpContent::Keys(Scene::schema)),
+    ("job", "every key of job.toml", HelpContent::Keys(Job::schema)),
+    ("study", "every key of study.toml", HelpContent::Keys(Study::schema)),
+    ("twin.toml", "every key of twin.toml", HelpContent::Keys(TwinSpec::schema)),
+    ("recording", "every key of recording.toml", HelpContent::Keys(RecordingFile::schema)),
+    ("section", "every key of section.toml", HelpContent::Keys(BladeSection::schema)),
+    ("windows", "what --window and `window` take", HelpContent::Section(SPECTRA, "The window")),
+    ("components", "what the verdicts on components mean", HelpContent::Section(SPECTRA, "Verdicts")),
+    ("features", "what a fit reads from recording and model", HelpContent::Section(FITS, "Features")),
+    ("traces", "how a fit compares frame by frame", HelpContent::Section(FITS, "Traces")),
+    ("exit-codes", "what the program returns to a shell", HelpContent::Section(RELIABILITY, "Exit codes")),
 ];
 
 /// The list of the pages, below the help of the program.
-pub fn pages() -> String {
+pub fn list_help_pages() -> String {
     let width = PAGES.iter().map(|(name, ..)| name.len()).max().unwrap_or_default();
     let rows = PAGES.iter().map(|(name, about, _)| format!("  {name:<width$}  {about}"));
     let rows: Vec<String> = rows.collect();
@@ -68,52 +68,52 @@ pub fn pages() -> String {
 }
 
 impl HelpArgs {
-    pub fn run(&self, program: &mut Command) -> Result<Outcome, Failure> {
-        let text = match self.word.as_deref().and_then(find) {
-            Some(content) => content.text(),
-            None => self.of_command(program)?,
+    pub fn run(&self, program: &mut Command) -> Result<CommandOutcome, Failure> {
+        let text = match self.word.as_deref().and_then(find_help_page) {
+            Some(content) => content.render(),
+            None => self.command_help(program)?,
         };
-        result(&lines(text.trim_end()));
-        Ok(Outcome::Done)
+        write_stdout(&escape_lines(text.trim_end()));
+        Ok(CommandOutcome::Done)
     }
 
     /// The help of the command that is named, or of the program.
-    fn of_command(&self, program: &mut Command) -> Result<String, Failure> {
+    fn command_help(&self, program: &mut Command) -> Result<String, Failure> {
         program.build();
         let Some(word) = &self.word else { return Ok(program.render_long_help().to_string()) };
-        let refused = unknown(word, program);
+        let refused = unknown_command_failure(word, program);
         let command = program.find_subcommand_mut(word).ok_or(refused)?;
         Ok(command.render_long_help().to_string())
     }
 }
 
-fn unknown(word: &str, program: &Command) -> Failure {
+fn unknown_command_failure(word: &str, program: &Command) -> Failure {
     let pages = PAGES.iter().map(|(name, ..)| *name);
     let known: Vec<&str> = program.get_subcommands().map(Command::get_name).chain(pages).collect();
-    let advice = Some(nearest(word, &known)).filter(|advice| advice.starts_with("did you mean"));
+    let advice = Some(suggest_key(word, &known)).filter(|advice| advice.starts_with("did you mean"));
     let advice = advice.unwrap_or_else(|| "`wiperlab help` lists them".to_owned());
     Failure::Input(format!("help: found `{word}`, expected a command or a page; {advice}"))
 }
 
 /// The page of a name; a kind of file has it with and without its ending, unless a command has that name.
-fn find(word: &str) -> Option<&'static Content> {
+fn find_help_page(word: &str) -> Option<&'static HelpContent> {
     let stem = word.strip_suffix(".toml").unwrap_or(word);
     let page = PAGES.iter().find(|(name, ..)| *name == word || *name == stem);
     page.map(|(.., content)| content)
 }
 
-impl Content {
-    fn text(&self) -> String {
+impl HelpContent {
+    fn render(&self) -> String {
         match self {
-            Self::Keys(schema) => keys(&reference(&schema())),
-            Self::Section(page, heading) => terminal(section(page, heading), WIDTH),
-            Self::Whole(page) => terminal(page, WIDTH),
+            Self::Keys(schema) => render_keys(&list_key_tables(&schema())),
+            Self::Section(page, heading) => render_for_terminal(find_section(page, heading), WIDTH),
+            Self::Whole(page) => render_for_terminal(page, WIDTH),
         }
     }
 }
 
 /// The keys of a file as a page for the terminal.
-fn keys(tables: &[KeyTable]) -> String {
+fn render_keys(tables: &[KeyTable]) -> String {
     let mut text = String::new();
     let mut add = |line: &str| {
         text.push_str(line);
@@ -124,7 +124,7 @@ fn keys(tables: &[KeyTable]) -> String {
             add("");
             add(&table.name);
         }
-        wrapped(&table.about, WIDTH).iter().for_each(|line| add(line));
+        wrap_words(&table.about, WIDTH).iter().for_each(|line| add(line));
         add("");
         for key in &table.keys {
             let needed = if key.required { ", required" } else { "" };
@@ -134,9 +134,9 @@ fn keys(tables: &[KeyTable]) -> String {
                 add(&beside);
             } else {
                 add(&format!("  {}", key.name));
-                wrapped(&value, WIDTH - 6).iter().for_each(|line| add(&format!("      {line}")));
+                wrap_words(&value, WIDTH - 6).iter().for_each(|line| add(&format!("      {line}")));
             }
-            wrapped(&key.meaning, WIDTH - 6).iter().for_each(|line| add(&format!("      {line}")));
+            wrap_words(&key.meaning, WIDTH - 6).iter().for_each(|line| add(&format!("      {line}")));
         }
     }
     text

@@ -1,10 +1,12 @@
 //! `wiperlab import`.
 
-use crate::import::{self, Columns, Companion, Import, Options, Scale, Source, TimeColumn};
-use crate::program::count::count;
-use crate::program::failure::{Failure, Outcome};
-use crate::program::files::{self, Maker, Overwrite, Place, Staging, Writer};
-use crate::program::global::Global;
+use crate::import::{
+    self, ColumnMap, CompanionFile, CoordinateScale, Import, ImportOptions, ImportSource, TimeColumn,
+};
+use crate::program::count::parse_count;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::files::{self, OutputCommand, OutputFolder, OutputStaging, Overwrite, WritePolicy};
+use crate::program::global::GlobalArgs;
 use crate::program::inspection::Inspection;
 use crate::program::output;
 use crate::program::progress;
@@ -47,17 +49,17 @@ Examples:
 #[command(after_help = after_help())]
 pub struct ImportArgs {
     #[command(flatten)]
-    typed: Box<Typed>, // far larger than the arguments of any other command
+    typed: Box<ImportOptionArgs>, // far larger than the arguments of any other command
 }
 
 impl ImportArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         self.typed.run(global)
     }
 }
 
 #[derive(Debug, Args)]
-pub struct Typed {
+pub struct ImportOptionArgs {
     /// Exported tables; several are merged on one frame grid
     #[arg(value_name = "FILE", required = true)]
     pub sources: Vec<PathBuf>,
@@ -76,7 +78,7 @@ pub struct Typed {
     pub scale: Option<String>,
     /// Direction of y in the file (required unless the format fixes it)
     #[arg(long, value_enum)]
-    pub y_axis: Option<Direction>,
+    pub y_axis: Option<YDirection>,
     /// Track of a point: tip=NAME or head=NAME
     #[arg(long, value_name = "POINT=TRACK")]
     pub point: Vec<String>,
@@ -88,7 +90,7 @@ pub struct Typed {
     #[arg(long, value_enum)]
     pub time: Option<TimeMeaning>,
     /// Frames from row to row where only every n-th frame was tracked and the table has no frame column
-    #[arg(long, value_name = "N", value_parser = count, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
     pub frame_step: Option<usize>,
     /// Exposure of a frame, s
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
@@ -119,7 +121,7 @@ pub struct Typed {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Direction {
+pub enum YDirection {
     Up,
     Down,
 }
@@ -132,35 +134,35 @@ pub enum TimeMeaning {
     Playback,
 }
 
-impl Typed {
-    fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        let options = self.options()?;
-        let steps = progress::steps("import", global.quiet);
-        steps.on("reading the export");
+impl ImportOptionArgs {
+    fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let options = self.import_options()?;
+        let steps = progress::start_steps("import", global.quiet);
+        steps.show_step("reading the export");
         let sources =
             self.sources.iter().map(|path| read_source(path)).collect::<Result<Vec<_>, Failure>>()?;
         let imported = import::import(&sources, &options).map_err(Failure::input)?;
-        let writer = self.writer(&sources);
-        Place::check(&self.out, &writer, &[TRACE_FILE, DESCRIPTION_FILE])?;
+        let writer = self.write_policy(&sources);
+        OutputFolder::check(&self.out, &writer, &[TRACE_FILE, DESCRIPTION_FILE])?;
         if !self.dry_run {
-            steps.on("writing the recording");
-            write(&self.out, &writer, &sources, &imported)?;
+            steps.show_step("writing the recording");
+            write_recording(&self.out, &writer, &sources, &imported)?;
         }
         drop(steps);
         if self.json {
-            let text = serde_json::to_string_pretty(&self.summary(&imported, &sources));
-            output::result(&output::lines(&text.map_err(Failure::internal)?));
+            let text = serde_json::to_string_pretty(&self.json_summary(&imported, &sources));
+            output::write_stdout(&output::escape_lines(&text.map_err(Failure::internal)?));
         } else if global.quiet {
             imported.report.warnings().for_each(|warning| warn_line!("warning: {warning}"));
         } else {
-            self.print(&imported, &sources);
+            self.print_report(&imported, &sources);
         }
-        Ok(Outcome::Done)
+        Ok(CommandOutcome::Done)
     }
 
     /// The options as typed become the library's.
-    fn options(&self) -> Result<Options, Failure> {
-        let mut options = Options {
+    fn import_options(&self) -> Result<ImportOptions, Failure> {
+        let mut options = ImportOptions {
             name: self
                 .out
                 .file_name()
@@ -168,10 +170,10 @@ impl Typed {
             format: Some(self.format.clone()),
             encoding: self.encoding.clone(),
             frame_rate_hz: self.frame_rate_hz,
-            scale: self.scale.as_deref().map(Scale::parse).transpose().map_err(Failure::input)?,
+            scale: self.scale.as_deref().map(CoordinateScale::parse).transpose().map_err(Failure::input)?,
             y_axis: self
                 .y_axis
-                .map(|direction| if direction == Direction::Up { YAxis::Up } else { YAxis::Down }),
+                .map(|direction| if direction == YDirection::Up { YAxis::Up } else { YAxis::Down }),
             exposure_s: self.exposure_s,
             time: self.time.map(|meaning| match meaning {
                 TimeMeaning::Real => TimeColumn::Real,
@@ -180,10 +182,10 @@ impl Typed {
                 TimeMeaning::Playback => TimeColumn::Playback,
             }),
             frame_step: self.frame_step,
-            columns: self.columns.as_deref().map(Columns::parse).transpose().map_err(Failure::input)?,
+            columns: self.columns.as_deref().map(ColumnMap::parse).transpose().map_err(Failure::input)?,
             min_likelihood: self.min_likelihood,
             level: self.level,
-            ..Options::default()
+            ..ImportOptions::default()
         };
         for point in &self.point {
             options.add_point(point).map_err(Failure::input)?;
@@ -198,25 +200,27 @@ impl Typed {
     }
 
     /// A folder keeps one recording, and a measured one for ever.
-    fn writer(&self, sources: &[Source]) -> Writer {
-        let exports =
-            import::kept_files(sources).into_iter().map(|(_, bytes)| crate::text::sha256(bytes)).collect();
-        Writer { exports, ..Writer::new(Maker::Import, self.overwrite) }
+    fn write_policy(&self, sources: &[ImportSource]) -> WritePolicy {
+        let exports = import::preserved_files(sources)
+            .into_iter()
+            .map(|(_, bytes)| crate::text::sha256(bytes))
+            .collect();
+        WritePolicy { exports, ..WritePolicy::new(OutputCommand::Import, self.overwrite) }
     }
 
-    fn summary(&self, imported: &Import, sources: &[Source]) -> Summary {
-        Summary {
+    fn json_summary(&self, imported: &Import, sources: &[ImportSource]) -> ImportSummary {
+        ImportSummary {
             out: self.out.display().to_string(),
             written: !self.dry_run,
-            files: outputs(sources).map(str::to_owned).collect(),
+            files: output_names(sources).map(str::to_owned).collect(),
             format: imported.report.format.clone(),
             reason: imported.report.reason.clone(),
             notes: imported.report.notes.clone(),
-            inspection: Inspection::of_import(&imported.recording, &imported.file),
+            inspection: Inspection::from_import(&imported.recording, &imported.file),
         }
     }
 
-    fn print(&self, imported: &Import, sources: &[Source]) {
+    fn print_report(&self, imported: &Import, sources: &[ImportSource]) {
         let grid = imported.recording.grid();
         let verb = if self.dry_run { "would write" } else { "wrote" };
         let kind = if imported.recording.is_synthetic() { "synthetic recording" } else { "recording" };
@@ -232,10 +236,10 @@ impl Typed {
             print_line!("note: {note}");
         }
         if self.dry_run {
-            preview(imported, sources);
+            print_preview(imported, sources);
         }
-        let inspection = Inspection::of_import(&imported.recording, &imported.file);
-        for line in inspection.verdict() {
+        let inspection = Inspection::from_import(&imported.recording, &imported.file);
+        for line in inspection.verdict_lines() {
             print_line!("verdict: {line}");
         }
     }
@@ -243,7 +247,7 @@ impl Typed {
 
 /// What `--json` prints of an import.
 #[derive(Debug, Serialize)]
-struct Summary {
+struct ImportSummary {
     out: String,
     /// False for a dry run.
     written: bool,
@@ -257,16 +261,16 @@ struct Summary {
 }
 
 /// Names of the files that an import writes.
-fn outputs(sources: &[Source]) -> impl Iterator<Item = &str> {
-    import::kept_files(sources).into_iter().map(|(name, _)| name).chain([TRACE_FILE, DESCRIPTION_FILE])
+fn output_names(sources: &[ImportSource]) -> impl Iterator<Item = &str> {
+    import::preserved_files(sources).into_iter().map(|(name, _)| name).chain([TRACE_FILE, DESCRIPTION_FILE])
 }
 
 /// Rows of the trace that a dry run shows.
 const PREVIEWED_ROWS: usize = 3;
 
 /// The names of the files and the first rows of the traces.
-fn preview(imported: &Import, sources: &[Source]) {
-    print_line!("files: {}", outputs(sources).collect::<Vec<_>>().join(", "));
+fn print_preview(imported: &Import, sources: &[ImportSource]) {
+    print_line!("files: {}", output_names(sources).collect::<Vec<_>>().join(", "));
     let start: String = trace_blocks(&imported.recording).take(2).collect();
     for line in start.lines().take(PREVIEWED_ROWS + 1) {
         print_line!("{TRACE_FILE}: {line}");
@@ -280,7 +284,7 @@ const LINE_SHOWN: usize = 40;
 
 /// Bytes of a table; what has no lines is none, and its cells would fill memory. (Markup may be one line.)
 fn read_table(path: &Path) -> Result<Vec<u8>, Failure> {
-    let bytes = files::read(path)?;
+    let bytes = files::read_data(path)?;
     let is_markup = bytes.iter().take(16).any(|byte| *byte == b'<');
     let mut lines = bytes.split(|byte| matches!(byte, b'\n' | b'\r'));
     match lines.find(|line| line.len() > LONGEST_LINE).filter(|_| !is_markup) {
@@ -295,9 +299,9 @@ fn read_table(path: &Path) -> Result<Vec<u8>, Failure> {
 }
 
 /// A file with its companions.
-fn read_source(path: &Path) -> Result<Source, Failure> {
+fn read_source(path: &Path) -> Result<ImportSource, Failure> {
     if files::is_standard_input(path) {
-        return Ok(Source::alone(files::display_name(path), read_table(path)?));
+        return Ok(ImportSource::without_companions(files::display_name(path), read_table(path)?));
     }
     let name = path.display().to_string();
     let mut names = import::companion_names(&name);
@@ -306,25 +310,25 @@ fn read_source(path: &Path) -> Result<Source, Failure> {
     names.dedup_by(|a, b| a.eq_ignore_ascii_case(b));
     let companions = names
         .into_iter()
-        .map(|name| Ok(Companion { bytes: files::read(Path::new(&name))?, name }))
+        .map(|name| Ok(CompanionFile { bytes: files::read_data(Path::new(&name))?, name }))
         .collect::<Result<Vec<_>, Failure>>()?;
-    Ok(Source { bytes: read_table(path)?, name, companions })
+    Ok(ImportSource { bytes: read_table(path)?, name, companions })
 }
 
 /// Imports sources into a folder.
 pub fn import_into(
     folder: &Path,
-    sources: &[Source],
-    options: &Options,
+    sources: &[ImportSource],
+    options: &ImportOptions,
     overwrite: Overwrite,
 ) -> Result<(), Failure> {
     let imported = import::import(sources, options).map_err(Failure::input)?;
-    write(folder, &Writer::new(Maker::Import, overwrite), sources, &imported)
+    write_recording(folder, &WritePolicy::new(OutputCommand::Import, overwrite), sources, &imported)
 }
 
 /// What the user noted in a description which is replaced, and the command line does not give, stays: facts
 /// of the test, and where the pictures of its frames are.
-fn keep_notes(folder: &Path, description: &mut RecordingFile) {
+fn keep_user_notes(folder: &Path, description: &mut RecordingFile) {
     let replaced = files::read_text(&folder.join(DESCRIPTION_FILE)).ok();
     let replaced = replaced.and_then(|text| RecordingFile::parse(DESCRIPTION_FILE, &text).ok());
     let Some(replaced) = replaced else { return };
@@ -335,15 +339,20 @@ fn keep_notes(folder: &Path, description: &mut RecordingFile) {
 }
 
 /// The exports as they came, the traces and the description.
-fn write(folder: &Path, writer: &Writer, sources: &[Source], imported: &Import) -> Result<(), Failure> {
-    let names: Vec<&str> = outputs(sources).collect();
-    let mut staging = Staging::of(folder, writer, &names)?;
-    for (name, bytes) in import::kept_files(sources) {
-        staging.add(name, bytes)?;
+fn write_recording(
+    folder: &Path,
+    writer: &WritePolicy,
+    sources: &[ImportSource],
+    imported: &Import,
+) -> Result<(), Failure> {
+    let names: Vec<&str> = output_names(sources).collect();
+    let mut staging = OutputStaging::new(folder, writer, &names)?;
+    for (name, bytes) in import::preserved_files(sources) {
+        staging.stage_file(name, bytes)?;
     }
-    let trace = staging.add(TRACE_FILE, files::Pieces::new(trace_blocks(&imported.recording)))?;
+    let trace = staging.stage_file(TRACE_FILE, files::ChunkReader::new(trace_blocks(&imported.recording)))?;
     let mut description = RecordingFile { trace_sha256: Some(trace), ..imported.file.clone() };
-    keep_notes(folder, &mut description);
-    staging.add(DESCRIPTION_FILE, description.to_toml().map_err(Failure::internal)?.as_bytes())?;
-    staging.place()
+    keep_user_notes(folder, &mut description);
+    staging.stage_file(DESCRIPTION_FILE, description.to_toml().map_err(Failure::internal)?.as_bytes())?;
+    staging.commit()
 }

@@ -1,9 +1,9 @@
 //! `wiperlab init`.
 
 use crate::draft::{self, KnownStroke};
-use crate::program::failure::{Failure, Outcome};
-use crate::program::files::{self, Maker, Overwrite, Place, Writer};
-use crate::program::global::Global;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::files::{self, OutputCommand, OutputFolder, Overwrite, WritePolicy};
+use crate::program::global::GlobalArgs;
 use crate::program::load::load_recording;
 use crate::simulate::scene::Scene;
 use clap::Args;
@@ -45,32 +45,32 @@ pub struct InitArgs {
 }
 
 /// Files with their names, and what they rest on.
-struct Drafted {
+struct DraftFiles {
     texts: Vec<(&'static str, String)>,
     words: Vec<String>,
 }
 
 impl InitArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        let writer = Writer::new(Maker::Init, self.overwrite);
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let writer = WritePolicy::new(OutputCommand::Init, self.overwrite);
         let names: &[&str] = if self.scene { &[SCENE] } else { &[SCENE, JOB] };
-        Place::check(&self.out, &writer, names)?;
-        let Drafted { texts, words } = match &self.recording {
-            Some(recording) => self.drafted(recording)?,
+        OutputFolder::check(&self.out, &writer, names)?;
+        let DraftFiles { texts, words } = match &self.recording {
+            Some(recording) => self.draft_for_recording(recording)?,
             None => {
-                let scene = draft::scene_alone(!self.no_shoulder).map_err(Failure::internal)?;
-                Drafted { texts: vec![(SCENE, scene)], words: Vec::new() }
+                let scene = draft::write_scene_alone(!self.no_shoulder).map_err(Failure::internal)?;
+                DraftFiles { texts: vec![(SCENE, scene)], words: Vec::new() }
             }
         };
         let outputs: Vec<_> = texts.into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
         files::write_outputs(&self.out, &writer, &outputs)?;
         if !global.quiet {
-            self.say(&words);
+            self.print_next_steps(&words);
         }
-        Ok(Outcome::Done)
+        Ok(CommandOutcome::Done)
     }
 
-    fn drafted(&self, path: &Path) -> Result<Drafted, Failure> {
+    fn draft_for_recording(&self, path: &Path) -> Result<DraftFiles, Failure> {
         if files::is_standard_input(path) {
             let expected = "a folder or a file, which scene and job can name";
             return Err(Failure::Input(format!(
@@ -79,12 +79,12 @@ impl InitArgs {
         }
         let loaded = load_recording(path)?;
         let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
-        let found = draft::Found::of(&loaded.recording, exposure_s, self.known()?)
+        let found = draft::DraftFindings::from_recording(&loaded.recording, exposure_s, self.known_stroke()?)
             .map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
-        let seen = files::path_from(&self.out, path)?;
-        let scene = draft::scene(&found, &seen, !self.no_shoulder).map_err(Failure::internal)?;
+        let seen = files::relative_path(&self.out, path)?;
+        let scene = draft::write_scene(&found, &seen, !self.no_shoulder).map_err(Failure::internal)?;
         let file = self.out.join(SCENE).display().to_string();
-        Scene::parse_with(&file, &scene, |_| Ok(loaded.recording.clone()))
+        Scene::parse_with_recording(&file, &scene, |_| Ok(loaded.recording.clone()))
             .map_err(|error| {
                 Failure::Input(format!(
                     "{}: found {:.4} s, too short or too slow a motion for a run to start in; expected a head that moves by several millimetres; film more of the stroke ({error})",
@@ -92,12 +92,12 @@ impl InitArgs {
                     found.length_s()
                 ))
             })?;
-        let job = draft::job(&found, &loaded.recording, [&seen, SCENE], !self.no_shoulder);
-        Ok(Drafted { texts: vec![(SCENE, scene), (JOB, job)], words: found.words() })
+        let job = draft::write_job(&found, &loaded.recording, [&seen, SCENE], !self.no_shoulder);
+        Ok(DraftFiles { texts: vec![(SCENE, scene), (JOB, job)], words: found.describe() })
     }
 
     /// The stroke as typed.
-    fn known(&self) -> Result<KnownStroke, Failure> {
+    fn known_stroke(&self) -> Result<KnownStroke, Failure> {
         let typed = [("--amplitude-m", self.amplitude_m), ("--frequency-hz", self.frequency_hz)];
         for (option, value) in typed {
             if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
@@ -107,13 +107,13 @@ impl InitArgs {
         Ok(KnownStroke { amplitude_m: self.amplitude_m, frequency_hz: self.frequency_hz })
     }
 
-    fn say(&self, words: &[String]) {
+    fn print_next_steps(&self, words: &[String]) {
         words.iter().for_each(|line| print_line!("found: {line}"));
         let (scene, job) = (self.out.join(SCENE), self.out.join(JOB));
         print_line!("written to {}", self.out.display());
         print_line!(
             "next: replace the numbers marked {} in {}; they are those of an example",
-            draft::YOURS,
+            draft::YOURS_MARK,
             scene.display()
         );
         if self.scene {

@@ -1,15 +1,15 @@
 //! `wiperlab inspect`.
 
 use crate::figures::recorded;
-use crate::program::failure::{Failure, Outcome};
-use crate::program::figures::Figures;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::figures::FigureArgs;
 use crate::program::files::Overwrite;
-use crate::program::global::Global;
-use crate::program::inspection::{Components, Inspection, Slope, Turn};
-use crate::program::load::{Loaded, load_recording, read_scene};
+use crate::program::global::GlobalArgs;
+use crate::program::inspection::{GlassSlope, InspectedComponents, InspectedReversal, Inspection};
+use crate::program::load::{LoadedRecording, load_recording, read_scene};
 use crate::program::output;
 use crate::recording::quality;
-use crate::text::degrees;
+use crate::text::format_degrees;
 use clap::Args;
 use std::path::PathBuf;
 
@@ -34,28 +34,28 @@ pub struct InspectArgs {
     #[arg(long)]
     pub json: bool,
     #[command(flatten)]
-    pub figures: Figures,
+    pub figures: FigureArgs,
     #[command(flatten)]
     pub overwrite: Overwrite,
 }
 
 impl InspectArgs {
     /// What is asked for is the text itself, so `--quiet` leaves the verdict.
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let scene = self.scene.as_deref().map(read_scene).transpose()?;
-        self.figures.check(&[FIGURE], self.overwrite)?;
+        self.figures.check_folder(&[FIGURE], self.overwrite)?;
         let loaded = load_recording(&self.recording)?;
         let changed = loaded.changed_sources(&self.recording).into_iter().collect();
-        let found = Inspection::of_folder(&loaded.recording, loaded.file.as_ref(), changed, scene.as_ref());
-        let turns_s = found.turns_s();
+        let found = Inspection::from_folder(&loaded.recording, loaded.file.as_ref(), changed, scene.as_ref());
+        let turns_s = found.reversal_times_s();
         let drawn =
-            || vec![(FIGURE, recorded::figure(&loaded.recording, &turns_s, &found.verdict_in_short()))];
+            || vec![(FIGURE, recorded::draw_figure(&loaded.recording, &turns_s, &found.verdict_headline()))];
         if self.json {
             let text = serde_json::to_string_pretty(&found).map_err(Failure::internal)?;
-            output::result(&output::lines(&text));
-            let silent = Global { quiet: true, ..global.clone() };
-            self.figures.write(self.overwrite, &silent, drawn)?;
-            return Ok(Outcome::Done);
+            output::write_stdout(&output::escape_lines(&text));
+            let silent = GlobalArgs { quiet: true, ..global.clone() };
+            self.figures.write_figures(self.overwrite, &silent, drawn)?;
+            return Ok(CommandOutcome::Done);
         }
         if !global.quiet {
             print_line!(
@@ -64,7 +64,7 @@ impl InspectArgs {
                 if found.synthetic { " (synthetic: no camera took it)" } else { "" }
             );
             print_origin(&loaded);
-            output::result(&output::lines(&quality::table(
+            output::write_stdout(&output::escape_lines(&quality::measurement_table(
                 &found.measurements,
                 loaded.recording.grid().start_s,
             )));
@@ -72,17 +72,17 @@ impl InspectArgs {
             print_reversals(&found.reversals);
             print_components(&found.components);
         }
-        for line in found.verdict() {
+        for line in found.verdict_lines() {
             print_line!("verdict: {line}");
         }
-        self.figures.write(self.overwrite, global, drawn)?;
-        Ok(Outcome::Done)
+        self.figures.write_figures(self.overwrite, global, drawn)?;
+        Ok(CommandOutcome::Done)
     }
 }
 
 const FIGURE: &str = "recorded";
 
-fn print_origin(loaded: &Loaded) {
+fn print_origin(loaded: &LoadedRecording) {
     let Some(file) = &loaded.file else {
         print_line!("no recording.toml: the rate is estimated from the times");
         return;
@@ -93,7 +93,7 @@ fn print_origin(loaded: &Loaded) {
     if let Some(source) = &file.source {
         print_line!(
             "source            {} ({}, {})",
-            source.file.all().join(", "),
+            source.file.as_slice().join(", "),
             source.detected_format,
             source.encoding
         );
@@ -105,25 +105,25 @@ fn print_origin(loaded: &Loaded) {
 
 fn print_slope(found: &Inspection) {
     match &found.tilt {
-        Slope::Tilt(tilt) => {
+        GlassSlope::Tilt(tilt) => {
             print_line!(
                 "tilt              {}, the slope of the glass in {} frames (off the glass: {})",
-                degrees(tilt.angle_rad, tilt.sd_rad),
+                format_degrees(tilt.angle_rad, tilt.sd_rad),
                 tilt.frames,
                 tilt.frames_off_glass
             );
         }
-        Slope::NoTilt(reason) => print_line!("tilt              not known: {reason}"),
+        GlassSlope::NoTilt(reason) => print_line!("tilt              not known: {reason}"),
     }
     if let Some(level) = &found.level {
-        print_line!("level             {}", level.words());
+        print_line!("level             {}", level.describe());
     }
 }
 
 /// Turns listed in the table; a longer recording has them all in the JSON.
 const MOST_TURNS: usize = 10;
 
-fn print_reversals(turns: &[Turn]) {
+fn print_reversals(turns: &[InspectedReversal]) {
     let time = |instant: Option<f64>| instant.map_or_else(|| "-".to_owned(), |t| format!("{t:.6}"));
     for (i, turn) in turns.iter().take(MOST_TURNS).enumerate() {
         let (hold, release) = (time(turn.hold_s), time(turn.release_s));
@@ -134,14 +134,14 @@ fn print_reversals(turns: &[Turn]) {
     }
 }
 
-fn print_components(components: &Components) {
+fn print_components(components: &InspectedComponents) {
     print_line!("components        of the {}", components.source);
     for component in &components.shown {
         print_line!(
             "  {:<36}{:>9.1} Hz  {}",
             component.name,
             component.showing.frequency_hz,
-            component.showing.words()
+            component.showing.describe()
         );
     }
 }

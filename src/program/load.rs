@@ -2,11 +2,11 @@
 
 use crate::plausibility;
 use crate::program::failure::Failure;
-use crate::program::files::{self, Maker, Marker, SIMULATION_SUMMARY, is_simulation_summary};
-use crate::program::global::Global;
+use crate::program::files::{self, FolderMarker, OutputCommand, SIMULATION_SUMMARY, is_simulation_summary};
+use crate::program::global::GlobalArgs;
 use crate::recording::Recording;
 use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_recording};
-use crate::recording::quality::{Check, Finding, Severity};
+use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::simulate::scene::Scene;
 use crate::text::{sha256, text_sha256};
 use std::path::{Path, PathBuf};
@@ -20,43 +20,43 @@ pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
 pub fn read_driven_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
     let mut driver = None;
     let recording = |named: &str| {
-        let place = files::existing_in(path, named)?;
+        let place = files::resolve_existing_path(path, named)?;
         let loaded = load_recording(&place).map_err(|failure| failure.to_string())?;
         driver = Some(place);
         Ok(loaded.recording)
     };
-    let scene = Scene::parse_with(&path.display().to_string(), &files::read_toml(path)?, recording);
+    let scene = Scene::parse_with_recording(&path.display().to_string(), &files::read_toml(path)?, recording);
     scene.map(|scene| (scene, driver)).map_err(Failure::input)
 }
 
 /// Says what is hard to believe in a file.
-pub fn warn_of(file: &Path, findings: &[plausibility::Finding], global: &Global) {
+pub fn print_warnings(file: &Path, findings: &[plausibility::PlausibilityFinding], global: &GlobalArgs) {
     for finding in findings.iter().filter(|_| !global.quiet) {
         warn_line!("warning: {}: {finding}", file.display());
     }
 }
 
 /// Reads the scene that another file names with its key `scene`.
-pub fn read_scene_of(file: &Path, named: &str) -> Result<Scene, Failure> {
+pub fn read_named_scene(file: &Path, named: &str) -> Result<Scene, Failure> {
     let refused = |problem| Failure::Input(format!("{}: key `scene`: {problem}", file.display()));
-    read_scene(&files::existing_in(file, named).map_err(refused)?)
+    read_scene(&files::resolve_existing_path(file, named).map_err(refused)?)
 }
 
 /// A recording with its description, where it has one.
 #[derive(Debug)]
-pub struct Loaded {
+pub struct LoadedRecording {
     pub recording: Recording,
     pub file: Option<RecordingFile>,
 }
 
-impl Loaded {
+impl LoadedRecording {
     /// Sources that lie in the folder of the recording at `path` but are no longer what was imported.
-    pub fn changed_sources(&self, path: &Path) -> Option<Finding> {
+    pub fn changed_sources(&self, path: &Path) -> Option<QualityFinding> {
         let source = self.file.as_ref()?.source.as_ref()?;
-        let description = description_of(path);
-        let changed = source.file.all().iter().zip(source.sha256.all()).filter(|(name, hash)| {
-            let copy = files::path_in(&description, name);
-            copy.is_file() && files::read(&copy).is_ok_and(|bytes| sha256(&bytes) != **hash)
+        let description = description_path(path);
+        let changed = source.file.as_slice().iter().zip(source.sha256.as_slice()).filter(|(name, hash)| {
+            let copy = files::resolve_path(&description, name);
+            copy.is_file() && files::read_data(&copy).is_ok_and(|bytes| sha256(&bytes) != **hash)
         });
         let names: Vec<&str> = changed.map(|(name, _)| name.as_str()).collect();
         let words = match names.len() {
@@ -65,18 +65,18 @@ impl Loaded {
             _ => format!("{} are not the files that were imported (their SHA-256 differ)", names.join(", ")),
         };
         Some(
-            Finding::new(Check::SourceChanged, Severity::Caution, names.len() as f64, "files", words)
-                .advise("import it into a new folder"),
+            QualityFinding::new(Check::SourceChanged, Severity::Caution, names.len() as f64, "files", words)
+                .with_advice("import it into a new folder"),
         )
     }
 }
 
 /// Reads the recording at `path`: a folder, or a trace alone; a description next to the trace counts in
 /// either case.
-pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
-    let trace = trace_of(path)?;
+pub fn load_recording(path: &Path) -> Result<LoadedRecording, Failure> {
+    let trace = trace_path(path)?;
     let text = files::read_text(&trace)?;
-    let description = description_of(path);
+    let description = description_path(path);
     let file = if description.is_file() && !files::is_standard_input(path) {
         let shown = description.display().to_string();
         Some(RecordingFile::parse(&shown, &files::read_toml(&description)?).map_err(Failure::input)?)
@@ -87,37 +87,37 @@ pub fn load_recording(path: &Path) -> Result<Loaded, Failure> {
     let recording =
         read_recording(&name, &trace.display().to_string(), &text, file.as_ref()).map_err(Failure::input)?;
     let recording =
-        if file.is_none() && is_simulated(&trace, &text)? { marked_synthetic(recording)? } else { recording };
-    Ok(Loaded { recording, file })
+        if file.is_none() && is_simulated(&trace, &text)? { mark_synthetic(recording)? } else { recording };
+    Ok(LoadedRecording { recording, file })
 }
 
 /// Whether a command made the trace without a description, as `simulate` does: the marker of its folder says
 /// so, or where there is none the summary of the simulation.
 fn is_simulated(trace: &Path, text: &str) -> Result<bool, Failure> {
-    let folder = files::folder_of(trace);
-    let (marker, _) = Marker::of(folder)?;
+    let folder = files::containing_folder(trace);
+    let (marker, _) = FolderMarker::load(folder)?;
     let name = trace.file_name().unwrap_or_default().to_string_lossy();
     let Some(made) = marker.files.get(name.as_ref()) else {
         return Ok(name == TRACE_FILE && is_simulation_summary(&folder.join(SIMULATION_SUMMARY)));
     };
-    if made.by == Maker::Import || made.is(&text_sha256(text)) {
-        return Ok(made.by != Maker::Import);
+    if made.by == OutputCommand::Import || made.matches_hash(&text_sha256(text)) {
+        return Ok(made.by != OutputCommand::Import);
     }
     Err(Failure::Input(format!(
         "{}: found a trace that was changed or replaced since `wiperlab {by}` wrote it, so that nothing says whether a camera took it; expected what {by} wrote: run it again into another folder or, where the change is intended, copy the trace alone into a folder of its own",
         trace.display(),
-        by = made.by.word()
+        by = made.by.command_name()
     )))
 }
 
 /// Where the description of the recording at `path` lies, if it has one.
-pub fn description_of(path: &Path) -> PathBuf {
-    let folder = if path.is_dir() { path } else { files::folder_of(path) };
+pub fn description_path(path: &Path) -> PathBuf {
+    let folder = if path.is_dir() { path } else { files::containing_folder(path) };
     folder.join(DESCRIPTION_FILE)
 }
 
 /// The trace of the recording at `path`.
-fn trace_of(path: &Path) -> Result<PathBuf, Failure> {
+fn trace_path(path: &Path) -> Result<PathBuf, Failure> {
     if !path.is_dir() {
         return Ok(path.to_owned());
     }
@@ -129,7 +129,7 @@ fn trace_of(path: &Path) -> Result<PathBuf, Failure> {
     Ok(trace)
 }
 
-fn marked_synthetic(recording: Recording) -> Result<Recording, Failure> {
+fn mark_synthetic(recording: Recording) -> Result<Recording, Failure> {
     Recording::new(recording.name(), recording.grid(), recording.traces().clone(), true)
         .map_err(Failure::internal)
 }

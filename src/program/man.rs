@@ -1,8 +1,8 @@
 //! `wiperlab man`: the help of every command as manual pages.
 
-use crate::program::failure::{Failure, Outcome};
-use crate::program::files::{self, Maker, Overwrite, Writer};
-use crate::program::global::Global;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::files::{self, OutputCommand, Overwrite, WritePolicy};
+use crate::program::global::GlobalArgs;
 use clap::{Args, Command};
 use clap_mangen::Man;
 use std::path::PathBuf;
@@ -17,22 +17,24 @@ pub struct ManArgs {
 }
 
 impl ManArgs {
-    pub fn run(&self, program: &mut Command, global: &Global) -> Result<Outcome, Failure> {
+    pub fn run(&self, program: &mut Command, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         program.build();
         let mut pages = Vec::new();
-        add(&mut pages, program, "wiperlab")?;
-        files::write_outputs(&self.out, &Writer::new(Maker::Man, self.overwrite), &pages)?;
+        add_manual_page(&mut pages, program, "wiperlab")?;
+        files::write_outputs(&self.out, &WritePolicy::new(OutputCommand::Man, self.overwrite), &pages)?;
         if !global.quiet {
             print_line!("{} pages written to {}", pages.len(), self.out.display());
         }
-        Ok(Outcome::Done)
+        Ok(CommandOutcome::Done)
     }
 }
 
 /// The page of a command and those of the commands in it.
-fn add(pages: &mut Vec<(String, Vec<u8>)>, command: &Command, name: &str) -> Result<(), Failure> {
+fn add_manual_page(pages: &mut Vec<(String, Vec<u8>)>, command: &Command, name: &str) -> Result<(), Failure> {
     let mut page = Vec::new();
     Man::new(command.clone()).render(&mut page).map_err(Failure::internal)?;
     pages.push((format!("{name}.1"), page));
-    command.get_subcommands().try_for_each(|inner| add(pages, inner, &format!("{name}-{}", inner.get_name())))
+    command
+        .get_subcommands()
+        .try_for_each(|inner| add_manual_page(pages, inner, &format!("{name}-{}", inner.get_name())))
 }

@@ -1,9 +1,11 @@
 //! The options that choose how a scene is integrated.
 
 use crate::program::failure::Failure;
-use crate::simulate::paper::{DEFAULT_GAIN_PER_S, FixedStep, LARGEST_GAIN_TIMES_STEP, Locate};
-use crate::simulate::scene::{Jam, Loss, Scene, check_tolerance};
-use crate::simulate::{Effort, Method};
+use crate::simulate::paper::{
+    DEFAULT_GAIN_PER_S, FixedStepLocator, FixedStepScheme, LARGEST_GAIN_TIMES_STEP,
+};
+use crate::simulate::scene::{ContactLossRule, JamRule, Scene, check_tolerance};
+use crate::simulate::{IntegrationMethod, SolverOptions};
 use clap::{Args, ValueEnum};
 
 #[derive(Debug, Args)]
@@ -51,26 +53,26 @@ const MOST_STEPS: f64 = 1e10;
 
 impl MethodArgs {
     /// How the scene is integrated.
-    pub fn effort(&self, scene: &Scene) -> Result<Effort, Failure> {
+    pub fn integration_effort(&self, scene: &Scene) -> Result<SolverOptions, Failure> {
         let tolerance = self.relative_tolerance.unwrap_or(scene.run.relative_tolerance);
         check_tolerance(tolerance).map_err(|expected| {
             Failure::Input(format!("--relative-tolerance: found {tolerance}, expected {expected}"))
         })?;
         let method = match self.method {
-            MethodName::FixedStep => Method::FixedStep(self.fixed_step(scene)?),
-            MethodName::Adaptive => Method::default(),
-            MethodName::RungeKutta => Method::RungeKutta,
-            MethodName::Slack => Method::Slack,
+            MethodName::FixedStep => IntegrationMethod::FixedStep(self.fixed_step_method(scene)?),
+            MethodName::Adaptive => IntegrationMethod::default(),
+            MethodName::RungeKutta => IntegrationMethod::RungeKutta,
+            MethodName::Slack => IntegrationMethod::Slack,
         };
         if self.method != MethodName::FixedStep {
             let [transitions, step, gain] = [
-                self.transitions.map(|w| name(&w)),
+                self.transitions.map(|w| value_name(&w)),
                 self.step.map(|x| x.to_string()),
                 self.gain.map(|x| x.to_string()),
             ];
             for (option, found) in [("--step", step), ("--transitions", transitions), ("--gain", gain)] {
                 if let Some(found) = found {
-                    let with = name(&self.method);
+                    let with = value_name(&self.method);
                     let message = format!(
                         "{option}: found {found} with --method {with}, expected it with --method fixed-step alone; remove it or choose that method"
                     );
@@ -78,10 +80,10 @@ impl MethodArgs {
                 }
             }
         }
-        Ok(Effort { method, relative_tolerance: tolerance, ..Effort::of(scene) })
+        Ok(SolverOptions { method, relative_tolerance: tolerance, ..SolverOptions::from_scene(scene) })
     }
 
-    fn fixed_step(&self, scene: &Scene) -> Result<FixedStep, Failure> {
+    fn fixed_step_method(&self, scene: &Scene) -> Result<FixedStepScheme, Failure> {
         let refuse = |option: &str, found: &str, expected: &str| {
             Err(Failure::Input(format!("{option}: found {found}, expected {expected}")))
         };
@@ -92,7 +94,7 @@ impl MethodArgs {
                 "none, as the step sets the error; remove it",
             );
         }
-        check_contact(scene)?;
+        refuse_flight(scene)?;
         let Some(step_s) = self.step else {
             return refuse(
                 "--step",
@@ -119,18 +121,18 @@ impl MethodArgs {
             return refuse("--gain", &gain_per_s.to_string(), &expected);
         }
         let locate = match self.transitions {
-            Some(TransitionsAt::StepEnd) => Locate::StepEnd,
-            Some(TransitionsAt::Slack) | None => Locate::Slack,
+            Some(TransitionsAt::StepEnd) => FixedStepLocator::StepEnd,
+            Some(TransitionsAt::Slack) | None => FixedStepLocator::Slack,
         };
-        Ok(FixedStep { step_s, locate, gain_per_s })
+        Ok(FixedStepScheme { step_s, locate, gain_per_s })
     }
 }
 
 /// The fixed-step scheme has neither flight nor impacts.
-fn check_contact(scene: &Scene) -> Result<(), Failure> {
+fn refuse_flight(scene: &Scene) -> Result<(), Failure> {
     let [loss, jam] = [
-        ("contact.loss", "fly", scene.loss == Loss::Fly),
-        ("contact.jam", "impact", scene.jam == Jam::Impact),
+        ("contact.loss", "fly", scene.loss == ContactLossRule::Fly),
+        ("contact.jam", "impact", scene.jam == JamRule::Impact),
     ];
     for (key, found, is_set) in [loss, jam] {
         if is_set {
@@ -143,6 +145,6 @@ fn check_contact(scene: &Scene) -> Result<(), Failure> {
     Ok(())
 }
 
-fn name(value: &impl ValueEnum) -> String {
+fn value_name(value: &impl ValueEnum) -> String {
     value.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned())
 }

@@ -1,12 +1,12 @@
 //! `wiperlab modes`.
 
-use crate::blade::modes::{NaturalMode, Tip, modes, named};
-use crate::figures::modes::figures;
-use crate::program::failure::{Failure, Outcome};
-use crate::program::figures::Figures;
+use crate::blade::modes::{NaturalMode, TipConstraint, body_frequencies, natural_modes};
+use crate::figures::modes::draw_figures;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::figures::FigureArgs;
 use crate::program::files::Overwrite;
-use crate::program::global::Global;
-use crate::program::load::{read_scene, warn_of};
+use crate::program::global::GlobalArgs;
+use crate::program::load::{print_warnings, read_scene};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -15,18 +15,18 @@ pub struct ModesArgs {
     /// Scene of the blade (scene.toml)
     pub scene: PathBuf,
     #[command(flatten)]
-    pub figures: Figures,
+    pub figures: FigureArgs,
     #[command(flatten)]
     pub overwrite: Overwrite,
 }
 
 impl ModesArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let scene = read_scene(&self.scene)?;
         let blade = &scene.linkage;
-        self.figures.check(&FIGURES, self.overwrite)?;
-        warn_of(&self.scene, &scene.findings(), global);
-        let names = named(blade);
+        self.figures.check_folder(&FIGURES, self.overwrite)?;
+        print_warnings(&self.scene, &scene.find_implausible(), global);
+        let names = body_frequencies(blade);
         print_line!("{}", scene.title());
         print_line!("");
         print_line!("natural frequencies of the single parts");
@@ -46,13 +46,13 @@ impl ModesArgs {
                 "ratio",
                 "lip/neck"
             );
-            for (tip, word) in [(Tip::Free, "slides"), (Tip::Held, "held")] {
-                modes(blade, tip, on_shoulder).iter().for_each(|mode| print_mode(word, mode));
+            for (tip, word) in [(TipConstraint::Free, "slides"), (TipConstraint::Held, "held")] {
+                natural_modes(blade, tip, on_shoulder).iter().for_each(|mode| print_mode(word, mode));
             }
         }
-        let drawn = || FIGURES.into_iter().zip(figures(scene.title(), blade)).collect();
-        self.figures.write(self.overwrite, global, drawn)?;
-        Ok(Outcome::Done)
+        let drawn = || FIGURES.into_iter().zip(draw_figures(scene.title(), blade)).collect();
+        self.figures.write_figures(self.overwrite, global, drawn)?;
+        Ok(CommandOutcome::Done)
     }
 }
 

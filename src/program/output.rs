@@ -3,7 +3,7 @@
 //! (`| head`) is no failure.
 
 use crate::program::failure::Failure;
-use crate::text::escaped;
+use crate::text::escape_controls;
 use std::ffi::OsString;
 use std::fmt::Arguments;
 use std::io::{self, ErrorKind, Write};
@@ -12,33 +12,33 @@ use std::sync::{Mutex, PoisonError};
 /// One line of results to standard output.
 macro_rules! print_line {
     ($($words:tt)*) => {
-        $crate::program::output::result(&$crate::program::output::one_line(format_args!($($words)*)))
+        $crate::program::output::write_stdout(&$crate::program::output::escape_line(format_args!($($words)*)))
     };
 }
 
 /// One line of a message to standard error.
 macro_rules! warn_line {
     ($($words:tt)*) => {
-        $crate::program::output::message(&$crate::program::output::one_line(format_args!($($words)*)))
+        $crate::program::output::write_stderr(&$crate::program::output::escape_line(format_args!($($words)*)))
     };
 }
 
 /// The first failure of standard output, after which nothing more is written to it.
-static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
+static STDOUT_FAILURE: Mutex<Option<io::Error>> = Mutex::new(None);
 
 /// A line of text with its end; ends within it are escaped like everything else that steers.
-pub fn one_line(words: Arguments<'_>) -> String {
-    escaped(&words.to_string()) + "\n"
+pub fn escape_line(words: Arguments<'_>) -> String {
+    escape_controls(&words.to_string()) + "\n"
 }
 
 /// Lines that the program itself has broken, such as those of a table or of JSON.
-pub fn lines(text: &str) -> String {
-    text.lines().map(|line| escaped(line) + "\n").collect()
+pub fn escape_lines(text: &str) -> String {
+    text.lines().map(|line| escape_controls(line) + "\n").collect()
 }
 
 /// Text that has passed the filter to standard output.
-pub fn result(text: &str) {
-    let mut failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner);
+pub fn write_stdout(text: &str) {
+    let mut failed = STDOUT_FAILURE.lock().unwrap_or_else(PoisonError::into_inner);
     if failed.is_none() {
         let mut output = io::stdout().lock();
         *failed = output.write_all(text.as_bytes()).and_then(|()| output.flush()).err();
@@ -46,15 +46,15 @@ pub fn result(text: &str) {
 }
 
 /// Text that has passed the filter to standard error.
-pub fn message(text: &str) {
+pub fn write_stderr(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes()); // (there is no place left to say so)
 }
 
 /// Whether everything that was said was written.
-pub fn check() -> Result<(), Failure> {
-    let failed = FAILED.lock().unwrap_or_else(PoisonError::into_inner);
+pub fn check_stdout() -> Result<(), Failure> {
+    let failed = STDOUT_FAILURE.lock().unwrap_or_else(PoisonError::into_inner);
     match failed.as_ref() {
-        Some(error) if error.kind() != ErrorKind::BrokenPipe => Err(unwritten(error)),
+        Some(error) if error.kind() != ErrorKind::BrokenPipe => Err(stdout_failure(error)),
         _ => Ok(()),
     }
 }
@@ -63,26 +63,26 @@ pub fn check() -> Result<(), Failure> {
 pub fn print_usage(error: &clap::Error, arguments: &[OsString]) -> Result<(), Failure> {
     let typed = arguments.iter().any(|word| {
         let word = word.to_string_lossy();
-        escaped(&word) != word
+        escape_controls(&word) != word
     });
     if typed {
-        let text = lines(&error.render().to_string());
+        let text = escape_lines(&error.render().to_string());
         if error.use_stderr() {
-            message(&text)
+            write_stderr(&text)
         } else {
-            result(&text)
+            write_stdout(&text)
         }
-        return check();
+        return check_stdout();
     }
     match error.print().and_then(|()| io::stdout().flush()) {
         Err(failed) if !error.use_stderr() && failed.kind() != ErrorKind::BrokenPipe => {
-            Err(unwritten(&failed))
+            Err(stdout_failure(&failed))
         }
         _ => Ok(()),
     }
 }
 
-fn unwritten(error: &io::Error) -> Failure {
+fn stdout_failure(error: &io::Error) -> Failure {
     Failure::Internal(format!(
         "standard output: cannot be written: {error}; what was printed is not complete"
     ))

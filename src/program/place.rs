@@ -5,15 +5,15 @@ use std::path::PathBuf;
 use std::sync::OnceLock;
 
 /// Its path where the process runs something else.
-static PATH: OnceLock<PathBuf> = OnceLock::new();
+static EXECUTABLE_PATH: OnceLock<PathBuf> = OnceLock::new();
 
 /// Says where it lies; the first word counts.
-pub fn set(path: PathBuf) {
-    let _ = PATH.set(path);
+pub fn set_executable_path(path: PathBuf) {
+    let _ = EXECUTABLE_PATH.set(path);
 }
 
 /// Its path.
-pub fn path() -> Result<PathBuf, Failure> {
+pub fn executable_path() -> Result<PathBuf, Failure> {
     let unknown = |error| Failure::Internal(format!("the path of this program is not known: {error}"));
-    PATH.get().map_or_else(|| std::env::current_exe().map_err(unknown), |path| Ok(path.clone()))
+    EXECUTABLE_PATH.get().map_or_else(|| std::env::current_exe().map_err(unknown), |path| Ok(path.clone()))
 }

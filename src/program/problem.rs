@@ -1,24 +1,24 @@
 //! A job with the scenes and recordings that it names, read from disk.
 
 use crate::fit::job::Job;
-use crate::fit::{self, Measured};
-use crate::plausibility::Finding;
+use crate::fit::{self, MeasuredRecording};
+use crate::plausibility::PlausibilityFinding;
 use crate::program::failure::Failure;
 use crate::program::files;
-use crate::program::load::{Loaded, load_recording, read_driven_scene};
+use crate::program::load::{LoadedRecording, load_recording, read_driven_scene};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// The job of a fit in its folder.
-pub const JOB: &str = "job.toml";
+pub const JOB_FILE: &str = "job.toml";
 
 /// The file of a job that is named by that file or by its folder.
-pub fn job_file(named: &Path) -> PathBuf {
-    if named.is_dir() { named.join(JOB) } else { named.to_owned() }
+pub fn job_path(named: &Path) -> PathBuf {
+    if named.is_dir() { named.join(JOB_FILE) } else { named.to_owned() }
 }
 
 /// A problem with where it lies on disk.
-pub struct Problem {
+pub struct LoadedJob {
     pub folder: PathBuf,
     /// The file of the job, and its name in messages.
     pub path: PathBuf,
@@ -27,19 +27,19 @@ pub struct Problem {
     /// The file of the scene of each condition.
     pub scene_files: Vec<PathBuf>,
     /// What is hard to believe in the scenes, each file once.
-    pub doubts: BTreeMap<PathBuf, Vec<Finding>>,
+    pub doubts: BTreeMap<PathBuf, Vec<PlausibilityFinding>>,
     /// Where the recordings lie, one for each condition of the job that has one.
-    pub measured_at: Vec<PathBuf>,
+    pub recording_paths: Vec<PathBuf>,
     /// The recordings with their descriptions.
-    pub measured: Vec<Loaded>,
+    pub measured: Vec<LoadedRecording>,
     /// The recording that drives the scene of a condition, where the scene names one.
     pub drivers: Vec<Option<PathBuf>>,
 }
 
-impl Problem {
+impl LoadedJob {
     /// Reads and checks a job, named by its file or its folder, its scenes and its recordings.
     pub fn load(named: &Path) -> Result<Self, Failure> {
-        let path = job_file(named);
+        let path = job_path(named);
         if files::is_standard_input(&path) {
             let expected = "a file: journal and result of a fit lie next to its job";
             return Err(Failure::Input(format!(
@@ -49,7 +49,7 @@ impl Problem {
         let file = path.display().to_string();
         let job = Job::parse(&file, &files::read_toml(&path)?).map_err(Failure::input)?;
         let found = |key: &str, named: &str| {
-            files::existing_in(&path, named)
+            files::resolve_existing_path(&path, named)
                 .map_err(|problem| Failure::Input(format!("{file}: key `{key}`: {problem}")))
         };
         let scene_files = job.conditions.iter().map(|condition| found("scene", &condition.scene));
@@ -57,15 +57,25 @@ impl Problem {
         let scenes = scene_files.iter().map(|file| read_driven_scene(file));
         let (scenes, drivers): (Vec<_>, Vec<_>) = scenes.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
         let doubts = scene_files.iter().zip(&scenes);
-        let doubts = doubts.map(|(file, scene)| (file.clone(), scene.findings())).collect();
+        let doubts = doubts.map(|(file, scene)| (file.clone(), scene.find_implausible())).collect();
         let measured_at = job.recordings().map(|named| found("recording.path", named));
         let measured_at = measured_at.collect::<Result<Vec<_>, _>>()?;
         let measured = measured_at.iter().map(|path| load_recording(path));
         let measured = measured.collect::<Result<Vec<_>, _>>()?;
-        let problem = fit::Problem::new(job, scenes, measured.iter().map(with_exposure).collect());
+        let problem = fit::Problem::new(job, scenes, measured.iter().map(to_measured).collect());
         let problem = problem.map_err(|error| Failure::Input(format!("{file}: {error}")))?;
-        let folder = files::folder_of(&path).to_owned();
-        Ok(Self { folder, path, file, problem, scene_files, doubts, measured_at, measured, drivers })
+        let folder = files::containing_folder(&path).to_owned();
+        Ok(Self {
+            folder,
+            path,
+            file,
+            problem,
+            scene_files,
+            doubts,
+            recording_paths: measured_at,
+            measured,
+            drivers,
+        })
     }
 
     pub fn job(&self) -> &Job {
@@ -73,12 +83,12 @@ impl Problem {
     }
 
     /// Every recording with where it lies.
-    pub fn recordings(&self) -> impl Iterator<Item = (&Path, &Loaded)> {
-        self.measured_at.iter().map(PathBuf::as_path).zip(&self.measured)
+    pub fn recordings(&self) -> impl Iterator<Item = (&Path, &LoadedRecording)> {
+        self.recording_paths.iter().map(PathBuf::as_path).zip(&self.measured)
     }
 }
 
-fn with_exposure(loaded: &Loaded) -> Measured {
+fn to_measured(loaded: &LoadedRecording) -> MeasuredRecording {
     let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
-    Measured { recording: loaded.recording.clone(), exposure_s }
+    MeasuredRecording { recording: loaded.recording.clone(), exposure_s }
 }

@@ -6,59 +6,59 @@ use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 /// What is going on, and the unit that it is counted in.
-static PRESENT: Mutex<Option<(ProgressBar, &'static str, &'static str)>> = Mutex::new(None);
+static CURRENT_WORK: Mutex<Option<(ProgressBar, &'static str, &'static str)>> = Mutex::new(None);
 
 /// A bar over `total` steps of a unit such as `evaluations`; drawn unless `quiet`, where standard error is a
 /// terminal.
-pub fn bar(total: u64, what: &'static str, unit: &'static str, quiet: bool) -> ProgressBar {
-    let bar = ProgressBar::with_draw_target(Some(total), target(quiet));
+pub fn start_bar(total: u64, what: &'static str, unit: &'static str, quiet: bool) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(total), draw_target(quiet));
     let template =
         format!("{{prefix}} {{bar:20}} {{pos}}/{{len}} {unit} ({{per_sec}}, {{eta}} left) {{wide_msg}}");
     bar.set_style(ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()));
     bar.set_prefix(what);
-    *PRESENT.lock().unwrap_or_else(PoisonError::into_inner) = Some((bar.clone(), what, unit));
+    *CURRENT_WORK.lock().unwrap_or_else(PoisonError::into_inner) = Some((bar.clone(), what, unit));
     bar
 }
 
 /// Work in steps of unknown length.
-pub struct Steps(ProgressBar);
+pub struct StepSpinner(ProgressBar);
 
-/// Steps of a command; drawn as a [`bar`] is.
-pub fn steps(what: &'static str, quiet: bool) -> Steps {
+/// Steps of a command; drawn as a [`start_bar`] is.
+pub fn start_steps(what: &'static str, quiet: bool) -> StepSpinner {
     /// From one sign of life to the next.
     const TICK: Duration = Duration::from_millis(200);
-    let bar = ProgressBar::with_draw_target(None, target(quiet));
+    let bar = ProgressBar::with_draw_target(None, draw_target(quiet));
     let style = ProgressStyle::with_template("{spinner} {prefix}: {wide_msg} {elapsed}");
     bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
     bar.set_prefix(what);
     if !bar.is_hidden() {
         bar.enable_steady_tick(TICK);
     }
-    *PRESENT.lock().unwrap_or_else(PoisonError::into_inner) = Some((bar.clone(), what, ""));
-    Steps(bar)
+    *CURRENT_WORK.lock().unwrap_or_else(PoisonError::into_inner) = Some((bar.clone(), what, ""));
+    StepSpinner(bar)
 }
 
-impl Steps {
+impl StepSpinner {
     /// The next step, such as `reading the recording`.
-    pub fn on(&self, step: &'static str) {
+    pub fn show_step(&self, step: &'static str) {
         self.0.set_message(step);
     }
 }
 
-impl Drop for Steps {
+impl Drop for StepSpinner {
     fn drop(&mut self) {
         self.0.finish_and_clear();
     }
 }
 
-fn target(quiet: bool) -> ProgressDrawTarget {
+fn draw_target(quiet: bool) -> ProgressDrawTarget {
     let is_drawn = !quiet && std::io::stderr().is_terminal();
     if is_drawn { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() }
 }
 
 /// How far the present work has come, in words; nothing more is drawn of it.
-pub fn reached() -> Option<String> {
-    let present = PRESENT.lock().unwrap_or_else(PoisonError::into_inner);
+pub fn finish_in_words() -> Option<String> {
+    let present = CURRENT_WORK.lock().unwrap_or_else(PoisonError::into_inner);
     let (bar, what, unit) = present.as_ref().filter(|(bar, ..)| !bar.is_finished())?;
     let reached = match bar.length() {
         Some(total) => format!("{what} had done {} of {total} {unit}", bar.position()),
@@ -69,19 +69,19 @@ pub fn reached() -> Option<String> {
 }
 
 /// A line of progress to standard error, unless `quiet`.
-pub fn say(quiet: bool, line: &str) {
+pub fn print_progress(quiet: bool, line: &str) {
     if !quiet {
         warn_line!("{line}");
     }
 }
 
 /// Says how far a bar has come where it is not drawn, such as in the log of a batch system.
-pub struct Reporter {
+pub struct ProgressReporter {
     bar: ProgressBar,
     due: Mutex<Option<Instant>>,
 }
 
-impl Reporter {
+impl ProgressReporter {
     /// From one line to the next.
     const PAUSE: Duration = Duration::from_secs(60);
     /// Up to the first line: a typing error shows early.
@@ -94,7 +94,7 @@ impl Reporter {
     }
 
     /// A line where one is due.
-    pub fn report(&self) {
+    pub fn report_if_due(&self) {
         let now = Instant::now();
         let mut due = self.due.lock().unwrap_or_else(PoisonError::into_inner);
         if due.is_none_or(|due| now < due) {
@@ -103,12 +103,12 @@ impl Reporter {
         *due = Some(now + Self::PAUSE);
         let (done, all) = (self.bar.position(), self.bar.length().unwrap_or_default());
         let left_s = self.bar.elapsed().as_secs_f64() / done.max(1) as f64 * all.saturating_sub(done) as f64;
-        warn_line!("{done} of {all} done, about {} left", in_words(left_s));
+        warn_line!("{done} of {all} done, about {} left", format_duration(left_s));
     }
 }
 
 /// A time of which the order of magnitude matters.
-fn in_words(time_s: f64) -> String {
+fn format_duration(time_s: f64) -> String {
     match time_s {
         time_s if time_s < 90.0 => format!("{time_s:.0} s"),
         time_s if time_s < 5400.0 => format!("{:.0} min", time_s / 60.0),

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 ///
 /// # Errors
 /// [`Failure::Input`] with file, key, what was found, what was expected and what to do.
-pub fn scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
+pub fn read_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
     read_driven_scene(path)
 }
 
@@ -21,8 +21,8 @@ pub fn scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
 /// known.
 ///
 /// # Errors
-/// As [`scene`].
-pub fn recording(path: &Path) -> Result<(Recording, Option<f64>), Failure> {
+/// As [`read_scene`].
+pub fn read_recording(path: &Path) -> Result<(Recording, Option<f64>), Failure> {
     let loaded = load_recording(path)?;
     let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
     Ok((loaded.recording, exposure_s))
@@ -31,30 +31,30 @@ pub fn recording(path: &Path) -> Result<(Recording, Option<f64>), Failure> {
 /// A job with its scenes and recordings.
 ///
 /// # Errors
-/// As [`scene`].
-pub fn problem(path: &Path) -> Result<Problem, Failure> {
-    Ok(super::problem::Problem::load(path)?.problem)
+/// As [`read_scene`].
+pub fn read_problem(path: &Path) -> Result<Problem, Failure> {
+    Ok(super::problem::LoadedJob::load(path)?.problem)
 }
 
 /// Where a path leads that stands in a file: from the folder of that file.
 ///
 /// # Errors
 /// Says where nothing is.
-pub fn existing_in(file: &Path, named: &str) -> Result<PathBuf, String> {
-    super::files::existing_in(file, named)
+pub fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf, String> {
+    super::files::resolve_existing_path(file, named)
 }
 
 /// Text of a TOML file, which people write.
 ///
 /// # Errors
-/// As [`scene`].
-pub fn toml(path: &Path) -> Result<String, Failure> {
+/// As [`read_scene`].
+pub fn read_toml_text(path: &Path) -> Result<String, Failure> {
     super::files::read_toml(path)
 }
 
 /// What of a recording is analysed, as on the command line.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Analysed {
+pub struct SpectrumOptions {
     /// Its channel, such as `head-drop`.
     pub channel: String,
     /// Its window, such as `after`.
@@ -72,13 +72,13 @@ pub struct Analysed {
 /// The files that `wiperlab spectrum` writes, by name.
 ///
 /// # Errors
-/// As [`scene`], with the options in place of keys.
-pub fn spectrum(recording: Recording, of: &Analysed) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+/// As [`read_scene`], with the options in place of keys.
+pub fn spectrum_files(recording: Recording, of: &SpectrumOptions) -> Result<Vec<(String, Vec<u8>)>, Failure> {
     let mut args =
         SpectrumArgs::new(Path::new(""), &of.channel, &of.window, Path::new(""), Default::default());
     args.detrend.clone_from(&of.detrend);
     args.band = of.band_hz.map(|(low, high)| format!("{low}..{high}"));
     args.max_components = of.max_components.unwrap_or(args.max_components);
     args.exposure_s = of.exposure_s;
-    args.files(recording)
+    args.output_files(recording)
 }

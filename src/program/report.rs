@@ -5,25 +5,25 @@ mod origin;
 mod several;
 mod video;
 
-use crate::compare::{Measured, ModelRun, model_runs};
+use crate::compare::{FittedRecording, ModelRun, run_conditions};
 use crate::fit::job::Job;
 use crate::fit::result::FitResult;
-use crate::program::early_end::early_end;
-use crate::program::failure::{Failure, Outcome};
+use crate::program::early_end::describe_early_end;
+use crate::program::failure::{CommandOutcome, Failure};
 use crate::program::files;
-use crate::program::files::{Maker, Overwrite, RESULT, Writer};
-use crate::program::global::Global;
-use crate::program::problem::{Problem, job_file};
+use crate::program::files::{OutputCommand, Overwrite, RESULT_FILE, WritePolicy};
+use crate::program::global::GlobalArgs;
+use crate::program::problem::{LoadedJob, job_path};
 use crate::program::progress;
 use crate::report::Report;
 use crate::report::comparison;
 use crate::report::json::report_json;
-use crate::report::page::page;
-use crate::report::verdict::Verdict;
+use crate::report::page::render_page;
+use crate::report::verdict::ReportVerdict;
 use clap::Args;
-use folder::Output;
+use folder::ReportFiles;
 use std::path::{Path, PathBuf};
-use video::Video;
+use video::VideoFrames;
 
 #[derive(Debug, Args)]
 pub struct ReportArgs {
@@ -41,43 +41,44 @@ pub struct ReportArgs {
 }
 
 impl ReportArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        let writer = Writer::new(Maker::Report, self.overwrite).csv(global.csv_dialect);
-        let jobs: Vec<PathBuf> = self.fits.iter().map(|fit| job_file(fit)).collect();
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let writer =
+            WritePolicy::new(OutputCommand::Report, self.overwrite).with_csv_dialect(global.csv_dialect);
+        let jobs: Vec<PathBuf> = self.fits.iter().map(|fit| job_path(fit)).collect();
         let missed = match jobs.as_slice() {
             [job] => {
-                let fit = files::folder_of(job);
-                let out = || reports_folder(fit).join(files::display_name(fit));
-                write(job, &self.out.clone().unwrap_or_else(out), &writer, global)?
+                let fit = files::containing_folder(job);
+                let out = || default_reports_folder(fit).join(files::display_name(fit));
+                write_report(job, &self.out.clone().unwrap_or_else(out), &writer, global)?
             }
-            jobs => several::write(jobs, self.out.as_deref(), &writer, global)?,
+            jobs => several::write_comparison(jobs, self.out.as_deref(), &writer, global)?,
         };
-        Ok(if self.check && missed { Outcome::StoppedEarly } else { Outcome::Done })
+        Ok(if self.check && missed { CommandOutcome::StoppedEarly } else { CommandOutcome::Done })
     }
 }
 
 /// The folder `reports` next to the folder `fits` that holds `fits/NAME`.
-fn reports_folder(fit: &Path) -> PathBuf {
+fn default_reports_folder(fit: &Path) -> PathBuf {
     let full = fit.canonicalize().unwrap_or_else(|_| fit.to_owned());
     full.parent().and_then(Path::parent).unwrap_or(Path::new("")).join("reports")
 }
 
 /// A fit with its result, which belongs to the job as it is now.
-struct Fit {
+struct ReportedFit {
     name: String,
-    problem: Problem,
+    problem: LoadedJob,
     result: FitResult,
     /// Pictures of the frames of every recording that has some.
-    videos: Vec<Option<Video>>,
+    videos: Vec<Option<VideoFrames>>,
 }
 
 /// What makes a report of the model at the estimates.
-type MadeBy = fn(&Job, &[Measured], &[ModelRun], &FitResult) -> Report;
+type ReportBuilder = fn(&Job, &[FittedRecording], &[ModelRun], &FitResult) -> Report;
 
-impl Fit {
+impl ReportedFit {
     fn load(job: &Path) -> Result<Self, Failure> {
-        let problem = Problem::load(job)?;
-        let path = problem.folder.join(RESULT);
+        let problem = LoadedJob::load(job)?;
+        let path = problem.folder.join(RESULT_FILE);
         if !path.exists() {
             return Err(Failure::Input(format!(
                 "{}: no such file; run `wiperlab fit {}` first",
@@ -95,69 +96,74 @@ impl Fit {
                 problem.problem.fingerprint()
             )));
         }
-        result.check_of(problem.job(), &file).map_err(Failure::input)?;
+        result.check_against_job(problem.job(), &file).map_err(Failure::input)?;
         problem.problem.check_result(&result, &file).map_err(Failure::input)?;
-        let videos = problem.recordings().map(|(path, loaded)| Video::of(path, loaded));
+        let videos = problem.recordings().map(|(path, loaded)| VideoFrames::load(path, loaded));
         let videos = videos.collect::<Result<_, _>>()?;
         Ok(Self { name: files::display_name(&problem.folder), problem, result, videos })
     }
 
-    fn measured(&self) -> Vec<Measured<'_>> {
+    fn measured_recordings(&self) -> Vec<FittedRecording<'_>> {
         let measured = self.problem.measured.iter().zip(&self.videos);
-        let measured = measured.map(|(loaded, video)| Measured {
+        let measured = measured.map(|(loaded, video)| FittedRecording {
             recording: &loaded.recording,
             file: loaded.file.as_ref(),
-            film: video.as_ref().map(Video::film),
+            film: video.as_ref().map(VideoFrames::as_film),
         });
         measured.collect()
     }
 
-    fn best(&self) -> Result<Vec<ModelRun>, Failure> {
-        let model = self.problem.problem.model_of(&self.result).map_err(Failure::input)?;
-        let best = model_runs(self.problem.job(), &model, &self.result);
+    fn run_best_models(&self) -> Result<Vec<ModelRun>, Failure> {
+        let model = self.problem.problem.fitted_model(&self.result).map_err(Failure::input)?;
+        let best = run_conditions(self.problem.job(), &model, &self.result);
         let best = best
             .map_err(|why| Failure::Internal(format!("{}: the best model does not run: {why}", self.name)))?;
-        for how in best.iter().filter_map(|best| early_end(&best.view.run)) {
+        for how in best.iter().filter_map(|best| describe_early_end(&best.view.run)) {
             warn_line!("warning: {}: the best model's run ended early: {how}", self.name);
         }
         Ok(best)
     }
 
-    /// The report, made by [`comparison::report`] or, where its figures are not asked for, by
+    /// The report, made by [`comparison::build_report`] or, where its figures are not asked for, by
     /// [`comparison::in_words`].
-    fn report(&self, made: MadeBy, best: &[ModelRun]) -> Result<Report, Failure> {
-        let mut report = made(self.problem.job(), &self.measured(), best, &self.result);
-        self.videos.iter().flatten().try_for_each(Video::check)?;
+    fn build_report(&self, made: ReportBuilder, best: &[ModelRun]) -> Result<Report, Failure> {
+        let mut report = made(self.problem.job(), &self.measured_recordings(), best, &self.result);
+        self.videos.iter().flatten().try_for_each(VideoFrames::check_pictures)?;
         for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.problem.recordings()) {
-            line.also(loaded.changed_sources(path));
+            line.add_findings(loaded.changed_sources(path));
         }
-        report.provenance = origin::provenance(self)?;
+        report.provenance = origin::collect_provenance(self)?;
         Ok(report)
     }
 }
 
 /// Writes the report of a fit; says whether the model does not explain the recording, or misses a component.
-pub fn write(fit: &Path, out: &Path, writer: &Writer, global: &Global) -> Result<bool, Failure> {
-    folder::check(out, writer)?;
-    let steps = progress::steps("report", global.quiet);
+pub fn write_report(
+    fit: &Path,
+    out: &Path,
+    writer: &WritePolicy,
+    global: &GlobalArgs,
+) -> Result<bool, Failure> {
+    folder::check_report_folder(out, writer)?;
+    let steps = progress::start_steps("report", global.quiet);
     let report = {
-        steps.on("reading the fit");
-        let fit = Fit::load(fit)?;
-        steps.on("running the model");
-        let best = fit.best()?;
-        steps.on("comparing and drawing");
-        fit.report(comparison::report, &best)?
+        steps.show_step("reading the fit");
+        let fit = ReportedFit::load(fit)?;
+        steps.show_step("running the model");
+        let best = fit.run_best_models()?;
+        steps.show_step("comparing and drawing");
+        fit.build_report(comparison::build_report, &best)?
     };
-    let verdict = Verdict::of(&report);
+    let verdict = ReportVerdict::from_report(&report);
     let json = report_json(&report).map_err(Failure::internal)?;
-    let output = Output {
+    let output = ReportFiles {
         figures: report.all_figures().collect(),
         json,
         tables: &report.tables,
-        page: page(&report),
+        page: render_page(&report),
         summary: verdict.summary(),
     };
     drop(steps);
-    output.write(out, writer, global)?;
+    output.write_to_folder(out, writer, global)?;
     Ok(!verdict.passes())
 }

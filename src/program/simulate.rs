@@ -1,23 +1,26 @@
 //! `wiperlab simulate`.
 
 use crate::figures::motion;
-use crate::program::failure::{Failure, Outcome};
-use crate::program::figures::Figures;
-use crate::program::files::{Maker, Overwrite, Place, SIMULATION_SUMMARY, Writer};
-use crate::program::global::Global;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::figures::FigureArgs;
+use crate::program::files::{OutputCommand, OutputFolder, Overwrite, SIMULATION_SUMMARY, WritePolicy};
+use crate::program::global::GlobalArgs;
 use crate::program::interrupt;
-use crate::program::load::{read_scene, warn_of};
+use crate::program::load::{print_warnings, read_scene};
 use crate::program::method::MethodArgs;
-use crate::program::sensitivities::{self, Sensitivities};
-use crate::program::table::Table;
-use crate::program::watch::Watch;
+use crate::program::sensitivities::{self, SensitivityRequest};
+use crate::program::table::StreamedTable;
+use crate::program::watch::ProgressObserver;
 use crate::recording::files::{HEADER, push_trace_row};
-use crate::simulate::Motion;
+use crate::simulate::RunMotion;
 use crate::simulate::outputs::{
-    Audit, EVENTS_HEADER, STATE_HEADER, Sampler, Summary, points_m, push_event, push_state, sample_times,
+    EVENTS_HEADER, EnergyAudit, STATE_HEADER, SampleObserver, SimulationSummary, push_event_row,
+    push_state_row, recorded_points_m, sample_times,
 };
-use crate::simulate::scene::{Output, Scene};
-use crate::simulate::{Effort, Observer, Piece, Sample, Status, Transition, run_with};
+use crate::simulate::scene::{OutputTable, Scene};
+use crate::simulate::{
+    ModelSample, Observer, RunStatus, SolutionSegment, SolverOptions, Transition, run_scene_with,
+};
 use clap::Args;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -38,103 +41,113 @@ pub struct SimulateArgs {
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     pub sensitivities: Vec<String>,
     #[command(flatten)]
-    pub figures: Figures,
+    pub figures: FigureArgs,
 }
 
 impl SimulateArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let scene = read_scene(&self.scene)?;
-        let effort = self.method.effort(&scene)?;
-        let sensitivities = Sensitivities::of(&scene, &self.sensitivities, &effort)?;
-        let writer = Writer::new(Maker::Simulate, self.overwrite).csv(global.csv_dialect);
-        let watch = Watch::of([scene.start_s, scene.run.stop_s], "simulate", global);
-        let names = names(&scene, sensitivities.is_some());
-        let place = Place::check(&self.out, &writer, &names)?;
-        self.figures.check(&[FIGURE], self.overwrite)?;
-        warn_of(&self.scene, &scene.findings(), global);
-        let summary = simulate(&scene, effort, sensitivities.as_ref(), &place, watch)?;
+        let effort = self.method.integration_effort(&scene)?;
+        let sensitivities = SensitivityRequest::parse(&scene, &self.sensitivities, &effort)?;
+        let writer =
+            WritePolicy::new(OutputCommand::Simulate, self.overwrite).with_csv_dialect(global.csv_dialect);
+        let watch = ProgressObserver::new([scene.start_s, scene.run.stop_s], "simulate", global);
+        let names = output_names(&scene, sensitivities.is_some());
+        let place = OutputFolder::check(&self.out, &writer, &names)?;
+        self.figures.check_folder(&[FIGURE], self.overwrite)?;
+        print_warnings(&self.scene, &scene.find_implausible(), global);
+        let summary = run_to_files(&scene, effort, sensitivities.as_ref(), &place, watch)?;
         if !global.quiet {
             print_summary(&summary, &self.out);
         }
         // (a run more than the tables need: they hold no more than a row of it)
-        let drawn = || vec![(FIGURE, motion::figure(scene.title(), &Motion::of(&scene)))];
-        self.figures.write(self.overwrite, global, drawn)?;
-        Ok(if summary.status == Status::Completed { Outcome::Done } else { Outcome::StoppedEarly })
+        let drawn = || vec![(FIGURE, motion::draw_figure(scene.title(), &RunMotion::simulate(&scene)))];
+        self.figures.write_figures(self.overwrite, global, drawn)?;
+        Ok(if summary.status == RunStatus::Completed {
+            CommandOutcome::Done
+        } else {
+            CommandOutcome::StoppedEarly
+        })
     }
 }
 
 const FIGURE: &str = "motion";
 
 /// The tables of a run, and what each is called.
-const TABLES: [(Output, &str); 3] =
-    [(Output::Trace, "trace.csv"), (Output::State, "state.csv"), (Output::Events, "events.csv")];
+const TABLES: [(OutputTable, &str); 3] = [
+    (OutputTable::Trace, "trace.csv"),
+    (OutputTable::State, "state.csv"),
+    (OutputTable::Events, "events.csv"),
+];
 
 /// Files that the scene asks for.
-fn names(scene: &Scene, sensitivities: bool) -> Vec<&'static str> {
+fn output_names(scene: &Scene, sensitivities: bool) -> Vec<&'static str> {
     let asked = TABLES.into_iter().filter(|(output, _)| scene.run.outputs.contains(output));
-    let derivatives = sensitivities::NAMES.into_iter().filter(|_| sensitivities);
+    let derivatives = sensitivities::SENSITIVITY_FILES.into_iter().filter(|_| sensitivities);
     asked.map(|(_, name)| name).chain(derivatives).chain([SIMULATION_SUMMARY]).collect()
 }
 
 /// Runs the scene; every row goes to its file as soon as it is known.
-fn simulate(
+fn run_to_files(
     scene: &Scene,
-    effort: Effort,
-    sensitivities: Option<&Sensitivities>,
-    place: &Place,
-    mut watch: Watch,
-) -> Result<Summary, Failure> {
-    let table = |output: Output, name, header: &str, least_rows| {
+    effort: SolverOptions,
+    sensitivities: Option<&SensitivityRequest>,
+    place: &OutputFolder,
+    mut watch: ProgressObserver,
+) -> Result<SimulationSummary, Failure> {
+    let table = |output: OutputTable, name, header: &str, least_rows| {
         scene
             .run
             .outputs
             .contains(&output)
-            .then(|| Ok(Table::new(place.file(name)?, header, least_rows)))
+            .then(|| Ok(StreamedTable::new(place.create_file(name)?, header, least_rows)))
             .transpose()
     };
     // a trace of one row would have no frame rate
-    let mut trace = table(Output::Trace, "trace.csv", HEADER, 2)?;
-    let mut state = table(Output::State, "state.csv", STATE_HEADER, 1)?;
-    let mut events = table(Output::Events, "events.csv", EVENTS_HEADER, 1)?;
+    let mut trace = table(OutputTable::Trace, "trace.csv", HEADER, 2)?;
+    let mut state = table(OutputTable::State, "state.csv", STATE_HEADER, 1)?;
+    let mut events = table(OutputTable::Events, "events.csv", EVENTS_HEADER, 1)?;
     let wanted = trace.is_some() || state.is_some();
-    let sampler = Sampler::new(sample_times(scene).take_while(|_| wanted), |sample: &Sample| {
-        let points_m = points_m(&scene.linkage, sample).map(Some);
-        trace.iter_mut().for_each(|table| table.add(|row| push_trace_row(row, sample.time_s, points_m)));
-        state.iter_mut().for_each(|table| table.add(|row| push_state(row, sample)));
+    let sampler = SampleObserver::new(sample_times(scene).take_while(|_| wanted), |sample: &ModelSample| {
+        let points_m = recorded_points_m(&scene.linkage, sample).map(Some);
+        trace.iter_mut().for_each(|table| table.add_row(|row| push_trace_row(row, sample.time_s, points_m)));
+        state.iter_mut().for_each(|table| table.add_row(|row| push_state_row(row, sample)));
     });
-    let mut audit = Audit::default();
-    let stops = interrupt::stops(|| "the run did not stop in time, and nothing of it is written".to_owned());
+    let mut audit = EnergyAudit::default();
+    let stops = interrupt::register_stoppable(|| {
+        "the run did not stop in time, and nothing of it is written".to_owned()
+    });
     let clock = Instant::now();
-    let mut observers = ((sampler, Events(events.as_mut())), (&mut audit, &mut watch));
-    let run = run_with(scene, effort, &mut observers);
+    let mut observers = ((sampler, EventTableWriter(events.as_mut())), (&mut audit, &mut watch));
+    let run = run_scene_with(scene, effort, &mut observers);
     let elapsed = clock.elapsed();
-    if run.status == Status::Interrupted {
+    if run.status == RunStatus::Interrupted {
         let (at_s, stop_s) = (run.stopped_at_s, scene.run.stop_s);
-        stops.finishing(&format!("the run has reached {at_s} s of {stop_s} s; what it has is written"));
+        stops.announce_stop(&format!("the run has reached {at_s} s of {stop_s} s; what it has is written"));
     }
 
-    let mut tables: Vec<Table> = [trace, state, events].into_iter().flatten().collect();
+    let mut tables: Vec<StreamedTable> = [trace, state, events].into_iter().flatten().collect();
     let wall_s = tables.iter().fold(elapsed, |left, table| left.saturating_sub(table.spent)).as_secs_f64();
-    let summary = Summary::new(scene, &run, &audit, wall_s, &effort);
+    let summary = SimulationSummary::new(scene, &run, &audit, wall_s, &effort);
     let bytes = serde_json::to_vec_pretty(&summary).map_err(Failure::internal)?;
-    if let Some(sensitivities) = sensitivities.filter(|_| run.status != Status::Interrupted) {
-        tables.extend(sensitivities.tables(scene, effort, place, sample_times(scene))?);
+    if let Some(sensitivities) = sensitivities.filter(|_| run.status != RunStatus::Interrupted) {
+        tables.extend(sensitivities.run_to_tables(scene, effort, place, sample_times(scene))?);
     }
-    place.finish(tables.into_iter().map(|table| table.file).collect(), &[(SIMULATION_SUMMARY, bytes)])?;
+    place.commit(tables.into_iter().map(|table| table.file).collect(), &[(SIMULATION_SUMMARY, bytes)])?;
     Ok(summary)
 }
 
 /// Transitions to their table.
-struct Events<'a>(Option<&'a mut Table>);
+struct EventTableWriter<'a>(Option<&'a mut StreamedTable>);
 
-impl Observer for Events<'_> {
-    fn piece(&mut self, _: &Piece<'_>) {}
-    fn transition(&mut self, transition: &Transition) {
-        self.0.iter_mut().for_each(|table| table.add(|row| push_event(row, transition)));
+impl Observer for EventTableWriter<'_> {
+    fn observe_segment(&mut self, _: &SolutionSegment<'_>) {}
+    fn observe_transition(&mut self, transition: &Transition) {
+        self.0.iter_mut().for_each(|table| table.add_row(|row| push_event_row(row, transition)));
     }
 }
 
-fn print_summary(summary: &Summary, out: &Path) {
+fn print_summary(summary: &SimulationSummary, out: &Path) {
     print_line!("{}: {}", summary.status.name(), summary.status_meaning);
     print_line!(
         "stopped at {} s after {} transitions, {} right-hand sides, {} steps ({} rejected), {:.1} ms",

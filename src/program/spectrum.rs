@@ -3,18 +3,22 @@
 mod tables;
 
 use crate::chart::Figure;
-use crate::figures::analysis::{AnalysedWindow, compared};
-use crate::figures::spectrum::{self, Spectra};
-use crate::program::count::count;
-use crate::program::failure::{Failure, Outcome};
-use crate::program::files::{Maker, Overwrite, Place, Writer, drawn, write_outputs};
-use crate::program::global::Global;
-use crate::program::load::{Loaded, load_recording};
+use crate::figures::analysis::{AnalysedWindow, compare_spectra};
+use crate::figures::spectrum::{self, SpectraPlot};
+use crate::program::count::parse_count;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::files::{
+    OutputCommand, OutputFolder, Overwrite, WritePolicy, figure_files, write_outputs,
+};
+use crate::program::global::GlobalArgs;
+use crate::program::load::{LoadedRecording, load_recording};
 use crate::program::progress;
 use crate::recording::Recording;
-use crate::recording::channel::{Channel, Instants, Window};
-use crate::spectrum::{Analysis, Detrend, FASTEST_HZ, MAX_COMPONENTS, Record, Settings};
-use crate::twin::film::{Dropouts, film_like};
+use crate::recording::channel::{Channel, ReversalInstants, Window};
+use crate::spectrum::{
+    Detrend, FASTEST_HZ, MAX_COMPONENTS, SampledRecord, SpectralAnalysis, SpectrumSettings,
+};
+use crate::twin::film::{DropoutPattern, film_like_recording};
 use clap::Args;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -45,7 +49,7 @@ pub struct SpectrumArgs {
     #[arg(long, value_name = "LO..HI", allow_hyphen_values = true)]
     pub band: Option<String>,
     /// Most components listed
-    #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N", value_parser = count,
+    #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N", value_parser = parse_count,
         allow_negative_numbers = true)]
     pub max_components: usize,
     /// Exposure of a frame, s (default: as recording.toml says)
@@ -67,18 +71,18 @@ pub struct SpectrumArgs {
 }
 
 /// The command line once checked.
-struct Request {
+struct SpectrumRequest {
     channel: Channel,
     window: Window,
-    settings: Settings,
+    settings: SpectrumSettings,
 }
 
 /// A recording, its window and what is in it.
-struct Studied {
+struct StudiedWindow {
     recording: Recording,
     exposure_s: Option<f64>,
     frames: Range<usize>,
-    analysis: Analysis,
+    analysis: SpectralAnalysis,
     /// What was done, in words.
     note: String,
     /// What to try instead, where the window asks for it.
@@ -104,33 +108,34 @@ impl SpectrumArgs {
     }
 
     /// The files of a recording at hand.
-    pub fn files(&self, recording: Recording) -> Result<Vec<(String, Vec<u8>)>, Failure> {
-        let request = self.request()?;
+    pub fn output_files(&self, recording: Recording) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+        let request = self.parse_request()?;
         let exposure_s = self.given_exposure_s()?;
-        request.outputs(&request.study(exposure_s, recording)?)
+        request.output_files(&request.study_recording(exposure_s, recording)?)
     }
 
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        let request = self.request()?;
-        Place::check(&self.out, &self.writer(global), &TABLES)?;
-        let steps = progress::steps("spectrum", global.quiet);
-        steps.on("reading the recording");
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let request = self.parse_request()?;
+        OutputFolder::check(&self.out, &self.write_policy(global), &TABLES)?;
+        let steps = progress::start_steps("spectrum", global.quiet);
+        steps.show_step("reading the recording");
         let loaded = load_recording(&self.recording)?;
-        steps.on("analysing the window");
+        steps.show_step("analysing the window");
         let Some(like) = &self.like else {
-            let studied = request.study(self.exposure_of(&loaded)?, loaded.recording)?;
-            let outputs = request.outputs(&studied)?;
+            let studied = request.study_recording(self.exposure_for(&loaded)?, loaded.recording)?;
+            let outputs = request.output_files(&studied)?;
             drop(steps);
-            return self.finish(global, &request, &outputs, &[&studied]);
+            return self.write_and_print(global, &request, &outputs, &[&studied]);
         };
         let model = load_recording(like)?;
-        let exposure_s = self.exposure_of(&model)?;
-        let filmed = film_like(&loaded.recording, &model.recording, exposure_s.unwrap_or(0.0), FILM_SEED)
-            .map_err(|e| {
-                Failure::Input(format!("{} like {}: {e}", self.recording.display(), like.display()))
-            })?;
-        let mut simulated = request.study(exposure_s, filmed.recording)?;
-        let frames = if filmed.dropouts == Dropouts::SameFrames {
+        let exposure_s = self.exposure_for(&model)?;
+        let filmed =
+            film_like_recording(&loaded.recording, &model.recording, exposure_s.unwrap_or(0.0), FILM_SEED)
+                .map_err(|e| {
+                    Failure::Input(format!("{} like {}: {e}", self.recording.display(), like.display()))
+                })?;
+        let mut simulated = request.study_recording(exposure_s, filmed.recording)?;
+        let frames = if filmed.dropouts == DropoutPattern::SameFrames {
             "the same frames lost"
         } else {
             "as many frames lost"
@@ -140,34 +145,34 @@ impl SpectrumArgs {
             simulated.note,
             model.recording.name()
         );
-        let measured = request.study(exposure_s, model.recording)?;
-        let mut outputs = request.outputs(&simulated)?;
-        outputs.push(("components-like.json".to_owned(), tables::components(&measured)?));
-        outputs.extend(drawn("comparison", &request.comparison(&simulated, &measured)));
+        let measured = request.study_recording(exposure_s, model.recording)?;
+        let mut outputs = request.output_files(&simulated)?;
+        outputs.push(("components-like.json".to_owned(), tables::components_json(&measured)?));
+        outputs.extend(figure_files("comparison", &request.comparison_figure(&simulated, &measured)));
         drop(steps);
-        self.finish(global, &request, &outputs, &[&simulated, &measured])
+        self.write_and_print(global, &request, &outputs, &[&simulated, &measured])
     }
 
-    fn finish(
+    fn write_and_print(
         &self,
-        global: &Global,
-        request: &Request,
+        global: &GlobalArgs,
+        request: &SpectrumRequest,
         outputs: &[(String, Vec<u8>)],
-        studied: &[&Studied],
-    ) -> Result<Outcome, Failure> {
-        write_outputs(&self.out, &self.writer(global), outputs)?;
+        studied: &[&StudiedWindow],
+    ) -> Result<CommandOutcome, Failure> {
+        write_outputs(&self.out, &self.write_policy(global), outputs)?;
         if !global.quiet {
-            studied.iter().for_each(|studied| tables::summary(request.channel, studied));
+            studied.iter().for_each(|studied| tables::print_summary(request.channel, studied));
         }
-        Ok(Outcome::Done)
+        Ok(CommandOutcome::Done)
     }
 
-    fn writer(&self, global: &Global) -> Writer {
-        Writer::new(Maker::Spectrum, self.overwrite).csv(global.csv_dialect)
+    fn write_policy(&self, global: &GlobalArgs) -> WritePolicy {
+        WritePolicy::new(OutputCommand::Spectrum, self.overwrite).with_csv_dialect(global.csv_dialect)
     }
 
     /// Exposure as given, or as the recording says.
-    fn exposure_of(&self, loaded: &Loaded) -> Result<Option<f64>, Failure> {
+    fn exposure_for(&self, loaded: &LoadedRecording) -> Result<Option<f64>, Failure> {
         let recorded = || loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
         Ok(self.given_exposure_s()?.or_else(recorded))
     }
@@ -181,47 +186,51 @@ impl SpectrumArgs {
         }
     }
 
-    fn request(&self) -> Result<Request, Failure> {
+    fn parse_request(&self) -> Result<SpectrumRequest, Failure> {
         let named =
             |option: &str, error: &dyn std::fmt::Display| Failure::Input(format!("{option}: {error}"));
         let channel = Channel::parse(&self.channel).map_err(|e| named("--channel", &e))?;
         let window = Window::parse(&self.window).map_err(|e| named("--window", &e))?;
         let detrend = (self.detrend != AUTO).then(|| Detrend::parse(&self.detrend)).transpose();
         let detrend = detrend.map_err(|e| named("--detrend", &format!("{e}, or `{AUTO}`")))?;
-        let band_hz = self.band.as_deref().map(band).transpose()?;
+        let band_hz = self.band.as_deref().map(parse_band).transpose()?;
         if !(self.fastest_hz.is_finite() && self.fastest_hz > 0.0) {
             return Err(Failure::Input(format!(
                 "--fastest-hz: found {}, expected a frequency in Hz above 0",
                 self.fastest_hz
             )));
         }
-        let settings = Settings {
+        let settings = SpectrumSettings {
             detrend,
             band_hz,
             max_components: self.max_components,
             fastest_hz: self.fastest_hz,
-            ..Settings::default()
+            ..SpectrumSettings::default()
         };
-        Ok(Request { channel, window, settings })
+        Ok(SpectrumRequest { channel, window, settings })
     }
 }
 
-impl Request {
-    fn study(&self, exposure_s: Option<f64>, recording: Recording) -> Result<Studied, Failure> {
-        let instants = Instants::find(&recording);
-        let frames = self.window.resolve(&recording, &instants).map_err(Failure::input)?;
+impl SpectrumRequest {
+    fn study_recording(
+        &self,
+        exposure_s: Option<f64>,
+        recording: Recording,
+    ) -> Result<StudiedWindow, Failure> {
+        let instants = ReversalInstants::find_instants(&recording);
+        let frames = self.window.resolve_frames(&recording, &instants).map_err(Failure::input)?;
         let grid = recording.grid();
         let samples = self.channel.samples(&recording);
         let inside = samples.get(frames.clone()).unwrap_or_default(); // a resolved window lies inside
-        let record = Record { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
+        let record = SampledRecord { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
         let refuse = |error| {
             Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window))
         };
-        let analysis = Analysis::of(&record, &self.settings).map_err(refuse)?;
-        let hint = flip_inside(&instants, (grid.time_s(frames.start), grid.time_s(frames.end)));
-        let frames = frames.start + analysis.left_out..frames.end;
+        let analysis = SpectralAnalysis::from_record(&record, &self.settings).map_err(refuse)?;
+        let hint = flip_hint(&instants, (grid.time_s(frames.start), grid.time_s(frames.end)));
+        let frames = frames.start + analysis.skipped_frames..frames.end;
         let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
-        let cut = if analysis.left_out >= analysis.stride {
+        let cut = if analysis.skipped_frames >= analysis.stride {
             ", cut behind a flip that no trend describes"
         } else {
             ""
@@ -237,10 +246,10 @@ impl Request {
             frames.len(),
             analysis.removed
         );
-        Ok(Studied { recording, exposure_s, frames, analysis, note, hint })
+        Ok(StudiedWindow { recording, exposure_s, frames, analysis, note, hint })
     }
 
-    fn outputs(&self, studied: &Studied) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+    fn output_files(&self, studied: &StudiedWindow) -> Result<Vec<(String, Vec<u8>)>, Failure> {
         let shown = AnalysedWindow {
             recording: &studied.recording,
             channel: self.channel,
@@ -249,18 +258,18 @@ impl Request {
             note: studied.note.clone(),
         };
         let mut outputs = vec![
-            (TABLES[0].to_owned(), tables::components(studied)?),
-            (TABLES[1].to_owned(), tables::description(self, studied)?),
-            (TABLES[2].to_owned(), tables::spectrum(&studied.analysis)),
-            (TABLES[3].to_owned(), tables::ridge(&shown.course())),
+            (TABLES[0].to_owned(), tables::components_json(studied)?),
+            (TABLES[1].to_owned(), tables::description_json(self, studied)?),
+            (TABLES[2].to_owned(), tables::spectrum_csv(&studied.analysis)),
+            (TABLES[3].to_owned(), tables::ridge_csv(&shown.frequency_course())),
         ];
-        outputs.extend(shown.figures().iter().flat_map(|(name, figure)| drawn(name, figure)));
+        outputs.extend(shown.figures().iter().flat_map(|(name, figure)| figure_files(name, figure)));
         Ok(outputs)
     }
 
     /// Both spectra in one figure.
-    fn comparison(&self, simulated: &Studied, measured: &Studied) -> Figure {
-        let shown = Spectra {
+    fn comparison_figure(&self, simulated: &StudiedWindow, measured: &StudiedWindow) -> Figure {
+        let shown = SpectraPlot {
             quantity: self.channel.to_string(),
             note: format!(
                 "spectra of {} and {}; model: {}; recording: {}",
@@ -270,15 +279,15 @@ impl Request {
                 measured.note
             ),
             synthetic: measured.recording.is_synthetic(),
-            ..compared(Some(&measured.analysis), Some(&simulated.analysis))
+            ..compare_spectra(Some(&measured.analysis), Some(&simulated.analysis))
         };
-        spectrum::figure(&Spectra { title: spectrum::strongest(&shown), ..shown })
+        spectrum::draw_figure(&SpectraPlot { title: spectrum::strongest_claim(&shown), ..shown })
     }
 }
 
 /// What to do where the window holds a whole flip and more: nothing slow and steady describes both of its
 /// sides.
-fn flip_inside(instants: &Instants, (from_s, to_s): (f64, f64)) -> Option<String> {
+fn flip_hint(instants: &ReversalInstants, (from_s, to_s): (f64, f64)) -> Option<String> {
     let flips =
         instants.reversals.iter().enumerate().filter_map(|(i, reversal)| Some((i + 1, reversal.flip?)));
     let (k, flip) = flips.into_iter().find(|(_, flip)| from_s < flip.start_s && flip.end_s < to_s)?;
@@ -289,7 +298,7 @@ fn flip_inside(instants: &Instants, (from_s, to_s): (f64, f64)) -> Option<String
     ))
 }
 
-fn band(text: &str) -> Result<(f64, f64), Failure> {
+fn parse_band(text: &str) -> Result<(f64, f64), Failure> {
     let ends = text
         .split_once("..")
         .and_then(|(low, high)| Some((low.trim().parse().ok()?, high.trim().parse().ok()?)));

@@ -7,17 +7,17 @@ mod slurm;
 mod tasks;
 mod work;
 
-use crate::program::failure::{Failure, Outcome};
-use crate::program::files::{self, Maker, Overwrite, Size, Writer};
-use crate::program::global::Global;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::files::{self, FileSize, OutputCommand, Overwrite, WritePolicy};
+use crate::program::global::GlobalArgs;
 use crate::program::place;
 use crate::program::time_limit::TimeLimit;
 use clap::{Args, ValueEnum};
-use plan::Plan;
+use plan::SubmissionPlan;
 use std::path::PathBuf;
 use std::process::Command;
-pub use tasks::Tasks;
-use work::{Work, absolute};
+pub use tasks::TaskList;
+use work::{SubmittedWork, absolute_path};
 
 /// Who runs the tasks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -41,15 +41,15 @@ pub struct SubmitArgs {
     pub scheduler: Scheduler,
     /// Number of tasks that the work is divided into, at most 1000; --threads is the number of cores of each
     /// (default: 1)
-    #[arg(long, value_name = "N", value_parser = tasks::shards, allow_negative_numbers = true)]
+    #[arg(long, value_name = "N", value_parser = tasks::parse_shard_count, allow_negative_numbers = true)]
     pub shards: usize,
     /// Walltime of a task, such as 01:30:00 or 45min, at least a minute; the task ends by itself shortly
     /// before
-    #[arg(long, value_name = "TIME", value_parser = plan::walltime)]
+    #[arg(long, value_name = "TIME", value_parser = plan::parse_walltime)]
     pub time: Option<TimeLimit>,
     /// Only these tasks, as `wiperlab collect` names them, such as 3,7-12 (default: all)
     #[arg(long, value_name = "LIST")]
-    pub tasks: Option<Tasks>,
+    pub tasks: Option<TaskList>,
     /// A further line for Slurm, such as --directive=--partition=short; may be given again
     #[arg(long = "directive", value_name = "TEXT", allow_hyphen_values = true)]
     pub directives: Vec<String>,
@@ -61,16 +61,16 @@ pub struct SubmitArgs {
 }
 
 impl SubmitArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        let plan = self.plan(global)?;
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let plan = self.make_plan(global)?;
         match self.scheduler {
-            Scheduler::Slurm => self.submit(&plan, global),
-            Scheduler::Local => self.run_here(&plan, global),
+            Scheduler::Slurm => self.submit_scripts(&plan, global),
+            Scheduler::Local => self.run_locally(&plan, global),
         }
     }
 
-    fn plan(&self, global: &Global) -> Result<Plan, Failure> {
-        let tasks = self.tasks.clone().unwrap_or_else(|| Tasks::all(self.shards));
+    fn make_plan(&self, global: &GlobalArgs) -> Result<SubmissionPlan, Failure> {
+        let tasks = self.tasks.clone().unwrap_or_else(|| TaskList::all(self.shards));
         if let Some(last) = tasks.last().filter(|last| *last >= self.shards) {
             return Err(Failure::Input(format!(
                 "--tasks: found {last}, expected numbers below the {} of --shards; correct one of them",
@@ -83,20 +83,20 @@ impl SubmitArgs {
             )));
         }
         let here = |error| Failure::Input(format!("the working directory cannot be found: {error}"));
-        Ok(Plan {
-            work: Work::load(&self.files, self.out.as_deref(), self.overwrite)?,
-            program: absolute(&place::path()?)?,
-            folder: absolute(&std::env::current_dir().map_err(here)?)?,
+        Ok(SubmissionPlan {
+            work: SubmittedWork::load(&self.files, self.out.as_deref(), self.overwrite)?,
+            program: absolute_path(&place::executable_path()?)?,
+            folder: absolute_path(&std::env::current_dir().map_err(here)?)?,
             shards: self.shards,
             tasks,
             threads: global.threads.unwrap_or(1),
             walltime: self.time.map(|TimeLimit(time)| time),
             directives: self.directives.clone(),
-            options: options(global),
+            options: task_options(global),
         })
     }
 
-    fn run_here(&self, plan: &Plan, global: &Global) -> Result<Outcome, Failure> {
+    fn run_locally(&self, plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         if !self.directives.is_empty() {
             return Err(Failure::Input(format!(
                 "--directive: found \"{}\" with --scheduler local, expected none, as there is no scheduler; \
@@ -105,72 +105,76 @@ impl SubmitArgs {
             )));
         }
         if self.print {
-            local::show(plan);
-            return Ok(Outcome::Done);
+            local::print_commands(plan);
+            return Ok(CommandOutcome::Done);
         }
-        local::run(plan, global)
+        local::run_tasks(plan, global)
     }
 
     /// Writes the scripts and hands them over.
-    fn submit(&self, plan: &Plan, global: &Global) -> Result<Outcome, Failure> {
-        let scripts = slurm::scripts(plan);
+    fn submit_scripts(&self, plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let scripts = slurm::slurm_scripts(plan);
         if self.print {
-            show(&scripts);
-            return Ok(Outcome::Done);
+            print_scripts(&scripts);
+            return Ok(CommandOutcome::Done);
         }
-        if !shell::is_on_path(slurm::PROGRAM) {
+        if !shell::is_program_on_path(slurm::SBATCH) {
             return Err(Failure::Input(format!(
                 "--scheduler: found no program `{}` on PATH, expected that of the scheduler; submit from a \
                  machine that has it, or see the scripts with --print",
-                slurm::PROGRAM
+                slurm::SBATCH
             )));
         }
         let scripts = scripts.map(|(name, text)| (name, text.into_bytes()));
-        files::write_outputs(&plan.scripts(), &Writer::new(Maker::Submit, self.overwrite), &scripts)?;
-        let script = plan.scripts().join(slurm::SUBMIT_SH);
+        files::write_outputs(
+            &plan.scripts_folder(),
+            &WritePolicy::new(OutputCommand::Submit, self.overwrite),
+            &scripts,
+        )?;
+        let script = plan.scripts_folder().join(slurm::SUBMIT_SH);
         let ran = Command::new("/bin/sh").arg(&script).output();
         let ran = ran.map_err(|error| Failure::Internal(format!("/bin/sh: cannot be run: {error}")))?;
         let submitted = String::from_utf8_lossy(&ran.stdout);
-        crate::program::output::result(&crate::program::output::lines(&submitted));
+        crate::program::output::write_stdout(&crate::program::output::escape_lines(&submitted));
         let complaint = String::from_utf8_lossy(&ran.stderr);
         if ran.status.success() {
-            crate::program::output::message(&crate::program::output::lines(&complaint));
+            crate::program::output::write_stderr(&crate::program::output::escape_lines(&complaint));
         } else {
-            return Err(refused(&script.display().to_string(), &submitted, &complaint));
+            return Err(submission_failure(&script.display().to_string(), &submitted, &complaint));
         }
         if !global.quiet {
             print_line!(
                 "{} tasks with {} each; logs: {}",
                 plan.tasks.len(),
-                plan.cores(),
-                plan.logs().display()
+                plan.describe_cores(),
+                plan.logs_folder().display()
             );
-            print_line!("scripts: {}", plan.scripts().display());
+            print_line!("scripts: {}", plan.scripts_folder().display());
         }
-        Ok(Outcome::Done)
+        Ok(CommandOutcome::Done)
     }
 }
 
 /// What the tasks have to be told to read the files that were read here.
-fn options(global: &Global) -> Vec<String> {
+fn task_options(global: &GlobalArgs) -> Vec<String> {
     let size = global.max_file_size;
     let words = ["--max-file-size".to_owned(), size.to_string().replace(' ', "")];
-    if size == Size::DEFAULT { Vec::new() } else { words.to_vec() }
+    if size == FileSize::DEFAULT { Vec::new() } else { words.to_vec() }
 }
 
 /// Scripts on standard output.
-fn show(scripts: &[(&str, String)]) {
+fn print_scripts(scripts: &[(&str, String)]) {
     for (place, (name, text)) in scripts.iter().enumerate() {
         if place > 0 {
             print_line!("");
         }
         print_line!("# ---- {name} ----");
-        crate::program::output::result(&crate::program::output::lines(text));
+        crate::program::output::write_stdout(&crate::program::output::escape_lines(text));
     }
 }
 
 /// Why nothing, or not everything, was submitted.
-fn refused(script: &str, submitted: &str, complaint: &str) -> Failure {
+fn submission_failure(script: &str, submitted: &str, complaint: &str) -> Failure {
     let state = if submitted.trim().is_empty() {
         "nothing was submitted: correct the cause and submit again"
     } else {
@@ -178,5 +182,5 @@ fn refused(script: &str, submitted: &str, complaint: &str) -> Failure {
          have ended"
     };
     let complaint = complaint.split_whitespace().collect::<Vec<_>>().join(" ");
-    Failure::Internal(format!("{script}: `{}` failed: {complaint}; {state}", slurm::PROGRAM))
+    Failure::Internal(format!("{script}: `{}` failed: {complaint}; {state}", slurm::SBATCH))
 }

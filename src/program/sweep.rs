@@ -5,15 +5,15 @@ mod results;
 mod shards;
 mod solve;
 
-pub use problem::Problem;
-pub use shards::study_of;
+pub use problem::LoadedStudy;
+pub use shards::find_study;
 
 use crate::journal::Shard;
-use crate::program::failure::{Failure, Outcome};
-use crate::program::files::{self, Maker, Overwrite, Writer};
-use crate::program::global::Global;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::files::{self, OutputCommand, Overwrite, WritePolicy};
+use crate::program::global::GlobalArgs;
 use crate::program::interrupt;
-use crate::program::journal::JOURNAL;
+use crate::program::journal::CHECKPOINT_FILE;
 use crate::program::time_limit::TimeLimit;
 use clap::Args;
 use std::path::PathBuf;
@@ -41,23 +41,24 @@ pub struct SweepArgs {
 }
 
 impl SweepArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
-        let problem = Problem::load(&self.sweep)?;
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let problem = LoadedStudy::load(&self.sweep)?;
         if let Some(TimeLimit(time)) = self.time_limit {
-            interrupt::limit(time);
+            interrupt::set_time_limit(time);
         }
         if let Some(shard) = self.shard {
             return problem.solve_shard(&self.sweep, &self.out, shard, global);
         }
-        let journal = self.out.join(JOURNAL);
-        files::check_free(&journal)?;
-        let writer = Writer::new(Maker::Sweep, self.overwrite).csv(global.csv_dialect);
-        problem.check_place(&self.out, &writer)?;
+        let journal = self.out.join(CHECKPOINT_FILE);
+        files::check_path_free(&journal)?;
+        let writer =
+            WritePolicy::new(OutputCommand::Sweep, self.overwrite).with_csv_dialect(global.csv_dialect);
+        problem.check_outputs(&self.out, &writer)?;
         if !problem.solve(&journal, self.resume, global)? {
-            return Ok(Outcome::StoppedEarly);
+            return Ok(CommandOutcome::StoppedEarly);
         }
-        let mut points = problem.collection(&self.out)?;
-        problem.add(&mut points, &journal)?;
-        problem.write(&mut points, &self.out, &writer, global)
+        let mut points = problem.new_collection(&self.out)?;
+        problem.add_checkpoint(&mut points, &journal)?;
+        problem.write_outputs(&mut points, &self.out, &writer, global)
     }
 }

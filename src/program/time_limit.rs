@@ -8,16 +8,16 @@ use std::time::Duration;
 pub struct TimeLimit(pub Duration);
 
 /// Longest time that is taken, s: a year.
-const LONGEST_S: u64 = 366 * DAY_S;
+const MAX_TIME_LIMIT_S: u64 = 366 * DAY_S;
 const DAY_S: u64 = 86_400;
-const UNITS: [(&str, u64); 5] = [("min", 60), ("d", DAY_S), ("h", 3600), ("m", 60), ("s", 1)];
+const TIME_LIMIT_UNITS: [(&str, u64); 5] = [("min", 60), ("d", DAY_S), ("h", 3600), ("m", 60), ("s", 1)];
 
 impl FromStr for TimeLimit {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let seconds = if text.contains(':') { clock(text) } else { units(text) };
-        let allowed = seconds.filter(|seconds| (1..=LONGEST_S).contains(seconds));
+        let seconds = if text.contains(':') { parse_clock_time(text) } else { parse_unit_time(text) };
+        let allowed = seconds.filter(|seconds| (1..=MAX_TIME_LIMIT_S).contains(seconds));
         allowed.map(|seconds| Self(Duration::from_secs(seconds))).ok_or_else(|| {
             "expected a time such as 90s, 45min, 1h30min, 02:00:00 (hours, minutes, seconds) or 1-12:00:00 \
              (and days)"
@@ -27,30 +27,30 @@ impl FromStr for TimeLimit {
 }
 
 /// `HH:MM:SS`, or `D-HH:MM:SS`.
-fn clock(text: &str) -> Option<u64> {
+fn parse_clock_time(text: &str) -> Option<u64> {
     let (days, time) = text.split_once('-').unwrap_or(("0", text));
-    let mut parts = time.split(':').map(number);
+    let mut parts = time.split(':').map(parse_digits);
     let (hours, minutes, seconds) = (parts.next()??, parts.next()??, parts.next()??);
     let in_range = minutes < 60 && seconds < 60 && parts.next().is_none();
-    let total = number(days)?.checked_mul(DAY_S)?.checked_add(hours.checked_mul(3600)?)?;
+    let total = parse_digits(days)?.checked_mul(DAY_S)?.checked_add(hours.checked_mul(3600)?)?;
     in_range.then_some(total.checked_add(minutes * 60 + seconds)?)
 }
 
 /// Numbers, each with its unit.
-fn units(text: &str) -> Option<u64> {
+fn parse_unit_time(text: &str) -> Option<u64> {
     let mut rest = text;
     let mut total: u64 = 0;
     while !rest.is_empty() {
         let digits = rest.find(|c: char| !c.is_ascii_digit())?;
         let (count, behind) = rest.split_at(digits);
-        let (unit, seconds) = UNITS.iter().find(|(unit, _)| behind.starts_with(unit))?;
-        total = total.checked_add(number(count)?.checked_mul(*seconds)?)?;
+        let (unit, seconds) = TIME_LIMIT_UNITS.iter().find(|(unit, _)| behind.starts_with(unit))?;
+        total = total.checked_add(parse_digits(count)?.checked_mul(*seconds)?)?;
         rest = behind.get(unit.len()..)?;
     }
     Some(total)
 }
 
-fn number(text: &str) -> Option<u64> {
+fn parse_digits(text: &str) -> Option<u64> {
     text.bytes().all(|byte| byte.is_ascii_digit()).then(|| text.parse().ok())?
 }
 

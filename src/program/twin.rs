@@ -1,21 +1,23 @@
 //! `wiperlab twin`.
 
 use crate::figures::twin as figure;
-use crate::program::early_end::early_end;
-use crate::program::failure::{Failure, Outcome};
-use crate::program::figures::Figures;
-use crate::program::files::{self, Maker, Overwrite, Place, Writer};
-use crate::program::global::Global;
-use crate::program::load::read_scene_of;
-use crate::program::watch::Watch;
+use crate::program::early_end::describe_early_end;
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::figures::FigureArgs;
+use crate::program::files::{self, OutputCommand, OutputFolder, Overwrite, WritePolicy};
+use crate::program::global::GlobalArgs;
+use crate::program::load::read_named_scene;
+use crate::program::watch::ProgressObserver;
 use crate::recording::Recording;
 use crate::recording::files::{CameraEntry, DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_csv};
-use crate::recording::quality::quality;
-use crate::simulate::Effort;
+use crate::recording::quality::measure_quality;
+use crate::simulate::SolverOptions;
 use crate::simulate::scene::Scene;
 use crate::text::text_sha256;
 use crate::twin::spec::TwinSpec;
-use crate::twin::{Camera, View, export, observed_view, track, truth, view};
+use crate::twin::{
+    Camera, TwinView, add_tracking_noise, export, film_scene, film_scene_with_observer, true_parameters,
+};
 use clap::Args;
 use std::path::PathBuf;
 
@@ -27,30 +29,30 @@ pub struct TwinArgs {
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
     #[command(flatten)]
-    pub figures: Figures,
+    pub figures: FigureArgs,
     #[command(flatten)]
     pub overwrite: Overwrite,
 }
 
 impl TwinArgs {
-    pub fn run(&self, global: &Global) -> Result<Outcome, Failure> {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let file = self.spec.display().to_string();
         let text = files::read_toml(&self.spec)?;
         let spec = TwinSpec::parse(&file, &text).map_err(Failure::input)?;
-        let scene = read_scene_of(&self.spec, &spec.scene)?;
-        let writer = Writer::new(Maker::Twin, self.overwrite);
-        Place::check(&self.out, &writer, &names(&spec))?;
-        self.figures.check(&[FIGURE], self.overwrite)?;
-        let [start_s, stop_s] = spec.window_in(&file, &scene).map_err(Failure::input)?;
+        let scene = read_named_scene(&self.spec, &spec.scene)?;
+        let writer = WritePolicy::new(OutputCommand::Twin, self.overwrite);
+        OutputFolder::check(&self.out, &writer, &output_names(&spec))?;
+        self.figures.check_folder(&[FIGURE], self.overwrite)?;
+        let [start_s, stop_s] = spec.window_within(&file, &scene).map_err(Failure::input)?;
 
-        let mut watch = Watch::of([scene.start_s, scene.run.stop_s], "twin", global);
-        let effort = Effort::of(&scene);
-        let seen = observed_view(&scene, &spec.camera, [start_s, stop_s], effort, &mut watch)
+        let mut watch = ProgressObserver::new([scene.start_s, scene.run.stop_s], "twin", global);
+        let effort = SolverOptions::from_scene(&scene);
+        let seen = film_scene_with_observer(&scene, &spec.camera, [start_s, stop_s], effort, &mut watch)
             .map_err(Failure::input)?;
         drop(watch);
-        let recording = track(&seen.recording, &files::display_name(&self.out), &spec.tracking)
+        let recording = add_tracking_noise(&seen.recording, &files::display_name(&self.out), &spec.tracking)
             .map_err(Failure::internal)?;
-        let mut description = description(&spec, &scene, &text, &recording)?;
+        let mut description = describe_recording(&spec, &scene, &text, &recording)?;
         let trace = trace_csv(&recording);
         description.trace_sha256 = Some(text_sha256(&trace));
         let mut outputs = vec![
@@ -61,12 +63,12 @@ impl TwinArgs {
             let table = toml::to_string(&description.twin).map_err(Failure::internal)?;
             outputs.push((
                 EXPORT_FILE,
-                export::tracker_table(&recording, spec.tracking.metres_per_pixel).into_bytes(),
+                export::write_tracker_table(&recording, spec.tracking.metres_per_pixel).into_bytes(),
             ));
             outputs.push((SPEC_FILE, table.into_bytes()));
         }
         files::write_outputs(&self.out, &writer, &outputs)?;
-        let early = early_end(&seen.run);
+        let early = describe_early_end(&seen.run);
         if !global.quiet {
             print_line!(
                 "synthetic recording of \"{}\": {} frames at {} 1/s",
@@ -76,23 +78,23 @@ impl TwinArgs {
             );
             print_line!("written to {}", self.out.display());
         }
-        self.draw(&spec, &scene, &seen, &recording, global)?;
-        Ok(early.map_or(Outcome::Done, |how| {
+        self.draw_figure(&spec, &scene, &seen, &recording, global)?;
+        Ok(early.map_or(CommandOutcome::Done, |how| {
             warn_line!("warning: the simulation ended early and so does the recording: {how}");
-            Outcome::StoppedEarly
+            CommandOutcome::StoppedEarly
         }))
     }
 }
 
 impl TwinArgs {
     /// The figure, where it is wanted: the motion between the frames takes a run of its own.
-    fn draw(
+    fn draw_figure(
         &self,
         spec: &TwinSpec,
         scene: &Scene,
-        seen: &View,
+        seen: &TwinView,
         tracked: &Recording,
-        global: &Global,
+        global: &GlobalArgs,
     ) -> Result<(), Failure> {
         if self.figures.folder.is_none() {
             return Ok(());
@@ -100,8 +102,9 @@ impl TwinArgs {
         let grid = tracked.grid();
         let ends_s = [grid.start_s, grid.time_s(grid.frames.saturating_sub(1))];
         let camera = Camera { frame_rate_hz: figure::MOTION_SAMPLES * grid.frame_rate_hz, exposure_s: 0.0 };
-        let motion = view(scene, &camera, ends_s[0], ends_s[1], Effort::of(scene)).map_err(Failure::input)?;
-        let shown = figure::Twin {
+        let motion = film_scene(scene, &camera, ends_s[0], ends_s[1], SolverOptions::from_scene(scene))
+            .map_err(Failure::input)?;
+        let shown = figure::TwinPlot {
             title: &spec.title,
             motion: &motion.recording,
             seen: &seen.recording,
@@ -110,7 +113,7 @@ impl TwinArgs {
             noise_m: spec.tracking.noise_px * spec.tracking.metres_per_pixel,
             stick_s: &seen.stick_s,
         };
-        self.figures.write(self.overwrite, global, || vec![(FIGURE, figure::figure(&shown))])
+        self.figures.write_figures(self.overwrite, global, || vec![(FIGURE, figure::draw_figure(&shown))])
     }
 }
 
@@ -121,13 +124,13 @@ const EXPORT_FILE: &str = "synthetic-tracker-export.txt";
 const SPEC_FILE: &str = "twin.toml";
 
 /// Files that the specification asks for.
-fn names(spec: &TwinSpec) -> Vec<&'static str> {
+fn output_names(spec: &TwinSpec) -> Vec<&'static str> {
     let export = if spec.tracker_export { &[EXPORT_FILE, SPEC_FILE][..] } else { &[] };
     [&[TRACE_FILE, DESCRIPTION_FILE], export].concat()
 }
 
 /// `recording.toml` with the whole specification and the truth behind it.
-fn description(
+fn describe_recording(
     spec: &TwinSpec,
     scene: &Scene,
     text: &str,
@@ -141,9 +144,9 @@ fn description(
         y_axis: Some(YAxis::Up),
     };
     let mut twin: toml::Table = text.parse().map_err(Failure::internal)?;
-    twin.insert("truth".to_owned(), toml::Value::Table(truth(scene)));
+    twin.insert("truth".to_owned(), toml::Value::Table(true_parameters(scene)));
     let mut file = RecordingFile::new(camera, true);
-    file.quality = Some(quality(recording, exposure_s));
+    file.quality = Some(measure_quality(recording, exposure_s));
     file.twin = Some(twin);
     Ok(file)
 }

@@ -1,8 +1,8 @@
 //! Who watches a run of the model for the user: how far it has come, and whether it is to stop.
 
-use crate::program::global::Global;
+use crate::program::global::GlobalArgs;
 use crate::program::{interrupt, progress};
-use crate::simulate::{Observer, Piece};
+use crate::simulate::{Observer, SolutionSegment};
 use indicatif::ProgressBar;
 use std::ops::ControlFlow;
 
@@ -10,39 +10,40 @@ use std::ops::ControlFlow;
 const PIECES_A_LOOK: u32 = 64;
 
 /// The observer of a run that a user waits for.
-pub struct Watch {
+pub struct ProgressObserver {
     bar: ProgressBar,
     start_s: f64,
     pieces: u32,
 }
 
-impl Watch {
+impl ProgressObserver {
     /// Of a run from one instant to another, s.
-    pub fn of([start_s, stop_s]: [f64; 2], command: &'static str, global: &Global) -> Self {
-        let bar = progress::bar(milliseconds(stop_s - start_s), command, "ms of the model", global.quiet);
+    pub fn new([start_s, stop_s]: [f64; 2], command: &'static str, global: &GlobalArgs) -> Self {
+        let bar =
+            progress::start_bar(to_milliseconds(stop_s - start_s), command, "ms of the model", global.quiet);
         Self { bar, start_s, pieces: 0 }
     }
 }
 
-impl Observer for Watch {
-    fn piece(&mut self, piece: &Piece<'_>) {
+impl Observer for ProgressObserver {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
         self.pieces = (self.pieces + 1) % PIECES_A_LOOK;
         if self.pieces == 0 {
-            self.bar.set_position(milliseconds(piece.end_s - self.start_s));
+            self.bar.set_position(to_milliseconds(piece.end_s - self.start_s));
         }
     }
 
-    fn flow(&self) -> ControlFlow<()> {
-        interrupt::flow()
+    fn control_flow(&self) -> ControlFlow<()> {
+        interrupt::control_flow()
     }
 }
 
-impl Drop for Watch {
+impl Drop for ProgressObserver {
     fn drop(&mut self) {
         self.bar.finish_and_clear();
     }
 }
 
-fn milliseconds(time_s: f64) -> u64 {
+fn to_milliseconds(time_s: f64) -> u64 {
     (1e3 * time_s) as u64
 }

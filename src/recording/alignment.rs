@@ -2,7 +2,7 @@
 
 use crate::math;
 use crate::recording::Recording;
-use crate::recording::channel::{Channel, Instants};
+use crate::recording::channel::{Channel, ReversalInstants};
 use serde::Serialize;
 
 /// What is added to the model's times and positions so that its head runs with the recorded one.
@@ -15,7 +15,7 @@ pub struct Alignment {
     /// Of the head drop, m.
     pub drop_m: f64,
     /// The point whose path was followed.
-    pub followed: Point,
+    pub followed: AlignmentPoint,
     /// Standard deviation of the time, s: infinite where the path does not fix it; `None` where there is no
     /// path to follow.
     pub shift_sd_s: Option<f64>,
@@ -27,7 +27,7 @@ pub struct Alignment {
 /// The point whose path brings a model to a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Point {
+pub enum AlignmentPoint {
     /// The head.
     #[default]
     Head,
@@ -35,8 +35,8 @@ pub enum Point {
     Tip,
 }
 
-impl Point {
-    fn of(measured: &Recording) -> Self {
+impl AlignmentPoint {
+    fn choose_for(measured: &Recording) -> Self {
         if is_tracked(&measured.traces().head_x_m) { Self::Head } else { Self::Tip }
     }
 
@@ -63,50 +63,50 @@ pub(crate) fn is_tracked(column: &[Option<f64>]) -> bool {
 }
 
 /// Steps of the least squares: the head's path is smooth, and three bring it to a nanosecond.
-const STEPS: usize = 8;
+const MAX_STEPS: usize = 8;
 /// A shorter step ends them, s.
-const LEAST_STEP_S: f64 = 1e-9;
+const MIN_STEP_S: f64 = 1e-9;
 /// Most frames that are used: more would not move the clock by a microsecond.
-const MOST_FRAMES: usize = 20_000;
+const MAX_FRAMES: usize = 20_000;
 
 impl Alignment {
     /// Starts from the first turn of the head in both, then least squares over the frames that both show, of
     /// the head or, where none was tracked, of the tip: neither a camera's origin nor its clock is the
     /// model's.
     #[must_use]
-    pub fn of(measured: &Recording, model: &Recording) -> Self {
-        let turns = Instants::first_turn_s(measured).zip(Instants::first_turn_s(model));
-        let by = Point::of(measured);
+    pub fn estimate(measured: &Recording, model: &Recording) -> Self {
+        let turns = ReversalInstants::first_turn_s(measured).zip(ReversalInstants::first_turn_s(model));
+        let by = AlignmentPoint::choose_for(measured);
         let opposite = |(of_measured, of_model): &(f64, f64)| {
-            bend_m(measured, *of_measured) * bend_m(model, *of_model) < 0.0
+            head_turn_m(measured, *of_measured) * head_turn_m(model, *of_model) < 0.0
         };
         if let Some((of_measured, of_model)) = turns.filter(opposite) {
             let at = |recording: &Recording, t: f64| {
-                recording.at(&recording.traces().head_x_m, t).unwrap_or_default()
+                recording.interpolate_column(&recording.traces().head_x_m, t).unwrap_or_default()
             };
             let (shift_s, along_m) =
                 (of_measured - of_model, at(measured, of_measured) - at(model, of_model));
             return Self {
                 shift_s,
                 along_m,
-                drop_m: drop_m(measured, model, shift_s),
+                drop_m: mean_drop_offset_m(measured, model, shift_s),
                 followed: by,
                 shift_sd_s: None,
                 opposite_turn: true,
             };
         }
-        let mut shift_s =
-            turns.map_or_else(|| nearest_s(measured, model, by), |(measured, model)| measured - model);
+        let mut shift_s = turns
+            .map_or_else(|| best_overlap_shift_s(measured, model, by), |(measured, model)| measured - model);
         let (mut along_m, mut shift_sd_s) = (0.0, None);
-        for _ in 0..STEPS {
-            let Some(step) = Step::of(measured, model, by, shift_s) else { break };
+        for _ in 0..MAX_STEPS {
+            let Some(step) = AlignmentStep::least_squares(measured, model, by, shift_s) else { break };
             shift_s += step.time_s;
             (along_m, shift_sd_s) = (step.mean_m, Some(step.time_sd_s));
-            if step.time_s.abs() < LEAST_STEP_S {
+            if step.time_s.abs() < MIN_STEP_S {
                 break;
             }
         }
-        let drop_m = drop_m(measured, model, shift_s);
+        let drop_m = mean_drop_offset_m(measured, model, shift_s);
         Self { shift_s, along_m, drop_m, followed: by, shift_sd_s, opposite_turn: false }
     }
 }
@@ -125,24 +125,25 @@ impl Alignment {
 
 /// How far the head has moved a while after a time, m: its sign says which way it turns. The longest of a few
 /// whiles that was tracked.
-fn bend_m(recording: &Recording, at_s: f64) -> f64 {
+fn head_turn_m(recording: &Recording, at_s: f64) -> f64 {
     const WHILES_S: [f64; 4] = [0.04, 0.02, 0.01, 0.005];
-    let head = |t: f64| recording.at(&recording.traces().head_x_m, t);
+    let head = |t: f64| recording.interpolate_column(&recording.traces().head_x_m, t);
     WHILES_S.iter().find_map(|while_s| Some(head(at_s + while_s)? - head(at_s)?)).unwrap_or_default()
 }
 
 /// Of the places of the recording along the model's run, the one where the path is most like the model's: for
 /// a recording without a turn.
-fn nearest_s(measured: &Recording, model: &Recording, by: Point) -> f64 {
+fn best_overlap_shift_s(measured: &Recording, model: &Recording, by: AlignmentPoint) -> f64 {
     const PLACES: u32 = 200;
     const FRAMES: usize = 100;
     let end_s = |recording: &Recording| recording.grid().time_s(recording.grid().frames.saturating_sub(1));
     let ends = [measured.grid().start_s - model.grid().start_s, end_s(measured) - end_s(model)];
-    let frames: Vec<usize> = used(measured).step_by(used(measured).count().div_ceil(FRAMES).max(1)).collect();
+    let frames: Vec<usize> =
+        used_frames(measured).step_by(used_frames(measured).count().div_ceil(FRAMES).max(1)).collect();
     let spread = |shift_s: f64| {
         let apart = |i: &usize| {
             let t = measured.grid().time_s(*i) - shift_s;
-            Some((*by.path(measured).get(*i)?)? - model.at(by.path(model), t)?)
+            Some((*by.path(measured).get(*i)?)? - model.interpolate_column(by.path(model), t)?)
         };
         let all: Vec<f64> = frames.iter().filter_map(apart).collect();
         let mean = all.iter().sum::<f64>() / all.len() as f64;
@@ -156,29 +157,34 @@ fn nearest_s(measured: &Recording, model: &Recording, by: Point) -> f64 {
 }
 
 /// The frames that are used.
-fn used(recording: &Recording) -> impl Iterator<Item = usize> {
+fn used_frames(recording: &Recording) -> impl Iterator<Item = usize> {
     let frames = recording.grid().frames;
-    (0..frames).step_by(frames.div_ceil(MOST_FRAMES).max(1))
+    (0..frames).step_by(frames.div_ceil(MAX_FRAMES).max(1))
 }
 
 /// One step of Gauss and Newton for a time and a mean distance of the paths.
-struct Step {
+struct AlignmentStep {
     time_s: f64,
     /// Standard deviation of the time by what is left, s.
     time_sd_s: f64,
     mean_m: f64,
 }
 
-impl Step {
-    fn of(measured: &Recording, model: &Recording, by: Point, shift_s: f64) -> Option<Self> {
+impl AlignmentStep {
+    fn least_squares(
+        measured: &Recording,
+        model: &Recording,
+        by: AlignmentPoint,
+        shift_s: f64,
+    ) -> Option<Self> {
         let (grid, frame_s) = (measured.grid(), 1.0 / model.grid().frame_rate_hz);
-        let place = |t: f64| model.at(by.path(model), t);
+        let place = |t: f64| model.interpolate_column(by.path(model), t);
         let point = |i: usize| {
             let t = grid.time_s(i) - shift_s;
             let speed = (place(t + frame_s)? - place(t - frame_s)?) / (2.0 * frame_s);
             Some((speed, (*by.path(measured).get(i)?)? - place(t)?))
         };
-        let points: Vec<(f64, f64)> = used(measured).filter_map(point).collect();
+        let points: Vec<(f64, f64)> = used_frames(measured).filter_map(point).collect();
         let count = points.len() as f64;
         let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
         let (spread, both) = points.iter().fold((0.0, 0.0), |sum, p| {
@@ -193,15 +199,15 @@ impl Step {
     }
 }
 
-fn drop_m(measured: &Recording, model: &Recording, shift_s: f64) -> f64 {
+fn mean_drop_offset_m(measured: &Recording, model: &Recording, shift_s: f64) -> f64 {
     let grid = measured.grid();
     let difference = |i: usize| {
         Some(
-            model.at(&model.traces().head_y_m, grid.time_s(i) - shift_s)?
+            model.interpolate_column(&model.traces().head_y_m, grid.time_s(i) - shift_s)?
                 - (*measured.traces().head_y_m.get(i)?)?,
         )
     };
-    let all: Vec<f64> = used(measured).filter_map(difference).collect();
+    let all: Vec<f64> = used_frames(measured).filter_map(difference).collect();
     if all.is_empty() { 0.0 } else { all.iter().sum::<f64>() / all.len() as f64 }
 }
 
@@ -229,10 +235,13 @@ mod tests {
         let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
         let (model, measured) =
             (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 1e-3, |t| head(t + 0.40007)));
-        let found = Alignment::of(&measured, &model);
+        let found = Alignment::estimate(&measured, &model);
         assert!((found.shift_s + 0.40007).abs() < 1e-7, "{found:?}");
         assert!((found.along_m - 1e-3).abs() < 1e-7 && (found.drop_m + 1e-3).abs() < 1e-7, "{found:?}");
-        assert!(found.followed == Point::Head && found.shift_sd_s.is_some_and(|sd| sd < 1e-6), "{found:?}");
+        assert!(
+            found.followed == AlignmentPoint::Head && found.shift_sd_s.is_some_and(|sd| sd < 1e-6),
+            "{found:?}"
+        );
     }
 
     #[test]
@@ -240,12 +249,12 @@ mod tests {
         let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
         let (model, measured) =
             (recording(0.3, 3000, 0.0, head), recording(0.0, 2000, 0.0, |t| 1e-3 - head(t + 0.4)));
-        let found = Alignment::of(&measured, &model);
+        let found = Alignment::estimate(&measured, &model);
         assert!(
             found.opposite_turn && (found.shift_s + 0.4).abs() < 2e-3 && (found.along_m + 0.199).abs() < 1e-5,
             "{found:?}"
         );
-        assert!(!Alignment::of(&model, &model).opposite_turn);
+        assert!(!Alignment::estimate(&model, &model).opposite_turn);
     }
 
     #[test]
@@ -255,9 +264,9 @@ mod tests {
         let whole = recording(0.0, 600, 1e-3, |t| path(t + 0.20007));
         let traces =
             Traces { head_x_m: vec![None; 600], head_y_m: vec![None; 600], ..whole.traces().clone() };
-        let found = Alignment::of(&Recording::new("r", whole.grid(), traces, true).unwrap(), &model);
+        let found = Alignment::estimate(&Recording::new("r", whole.grid(), traces, true).unwrap(), &model);
         assert!(
-            found.followed == Point::Tip
+            found.followed == AlignmentPoint::Tip
                 && (found.shift_s + 0.20007).abs() < 1e-6
                 && (found.along_m - 1e-3).abs() < 1e-6,
             "{found:?}"
@@ -277,7 +286,7 @@ mod tests {
             head_x_m: short.traces().head_x_m.iter().map(|x| x.map(&mut noisy)).collect(),
             ..short.traces().clone()
         };
-        let found = Alignment::of(
+        let found = Alignment::estimate(
             &Recording::new("r", short.grid(), traces, true).unwrap(),
             &recording(0.1, 4000, 0.0, head),
         );
@@ -290,7 +299,7 @@ mod tests {
         let head = |t: f64| 0.05 * (1.0 - (6.0 * t).cos());
         let (model, measured) =
             (recording(0.1, 4000, 0.0, head), recording(0.0, 600, 1e-3, |t| head(t + 0.20007)));
-        let found = Alignment::of(&measured, &model);
+        let found = Alignment::estimate(&measured, &model);
         assert!((found.shift_s + 0.20007).abs() < 1e-6 && (found.along_m - 1e-3).abs() < 1e-6, "{found:?}");
     }
 }

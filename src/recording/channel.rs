@@ -14,9 +14,9 @@ mod window_text;
 
 pub use channels::{Channel, UnknownChannel};
 pub use flip::Flip;
-pub use instants::{Anchor, Instants, NoInstant, Reversal};
-pub use named_windows::{NamedWindow, named_windows};
-pub use phase::Phase;
+pub use instants::{InstantKind, InstantNotFound, Reversal, ReversalInstants};
+pub use named_windows::{PhaseWindow, phase_windows};
+pub use phase::ReversalPhase;
 pub use speed::mean_speed_m_per_s;
 
 pub use window::{Window, WindowEnd, WindowError};

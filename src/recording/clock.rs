@@ -32,7 +32,7 @@ pub struct FrameFit {
 impl FrameFit {
     /// Whether every row lies on the grid within [`OFF_GRID_LIMIT_FRAMES`].
     #[must_use]
-    pub fn holds(&self) -> bool {
+    pub fn is_on_grid(&self) -> bool {
         self.worst_frames <= OFF_GRID_LIMIT_FRAMES
     }
 
@@ -58,10 +58,10 @@ pub fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     {
         return None;
     }
-    let mut frames = follow(times_s, first, seed_s);
+    let mut frames = follow_grid(times_s, first, seed_s);
     let mut line = fit_line(&frames, times_s);
     for _ in 0..ROUNDS {
-        match renumber(times_s, line) {
+        match renumber_frames(times_s, line) {
             Some(again) if again != frames => {
                 frames = again;
                 line = fit_line(&frames, times_s);
@@ -69,11 +69,11 @@ pub fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
             _ => break,
         }
     }
-    Some(assess(frames, times_s, line))
+    Some(assess_fit(frames, times_s, line))
 }
 
 /// Nearest frame of every row on a grid whose phase follows the rows with [`PHASE_GAIN`].
-fn follow(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
+fn follow_grid(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
     let mut phase_s = first;
     let mut number = |time: &f64| {
         let frame = ((time - phase_s) / seed_s).round().max(0.0);
@@ -115,7 +115,7 @@ fn fit_line(frames: &[usize], times_s: &[f64]) -> (f64, f64) {
 }
 
 /// Nearest frame of every row on the fitted line; `None` when the line is useless.
-fn renumber(times_s: &[f64], (intercept, slope): (f64, f64)) -> Option<Vec<usize>> {
+fn renumber_frames(times_s: &[f64], (intercept, slope): (f64, f64)) -> Option<Vec<usize>> {
     let nearest: Vec<f64> = times_s.iter().map(|t| ((t - intercept) / slope).round()).collect();
     let first = *nearest.first()?;
     let usable = slope > 0.0 && nearest.last()? - first < MAX_FRAMES;
@@ -123,7 +123,7 @@ fn renumber(times_s: &[f64], (intercept, slope): (f64, f64)) -> Option<Vec<usize
 }
 
 /// A row that shares its frame with the row above counts as a whole frame off.
-fn assess(frames: Vec<usize>, times_s: &[f64], (intercept, slope): (f64, f64)) -> FrameFit {
+fn assess_fit(frames: Vec<usize>, times_s: &[f64], (intercept, slope): (f64, f64)) -> FrameFit {
     let shared = |row: usize| row > 0 && frames[row] <= frames[row - 1];
     let off = |row: usize| {
         let distance = (times_s[row] - intercept - slope * frames[row] as f64).abs() / slope;
@@ -143,7 +143,7 @@ mod tests {
         let fit = number_frames(&times, median_step_s(&times).unwrap()).unwrap();
         assert_eq!(fit.frames, (0..600).collect::<Vec<_>>());
         assert!((1.0 / fit.frame_s - 120.0).abs() < 0.01, "{}", 1.0 / fit.frame_s);
-        assert!(fit.holds());
+        assert!(fit.is_on_grid());
     }
 
     #[test]
@@ -157,7 +157,7 @@ mod tests {
         let times: Vec<f64> = (0..20).map(|i| if i == 10 { 10.45 } else { f64::from(i) }).collect();
         let fit = number_frames(&times, 1.0).unwrap();
         assert_eq!(fit.worst_row, 10);
-        assert!(!fit.holds());
+        assert!(!fit.is_on_grid());
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The frames of the video from which a recording was tracked: which picture shows which frame, and where a
 //! tracked point lies in it.
 
-use super::files::Place;
+use super::files::PixelMapping;
 use crate::math;
 use png::{BitDepth, ColorType, Compression, Decoder, Encoder, Limits, Transformations};
 use std::io::Cursor;
@@ -47,7 +47,7 @@ impl Picture {
     ///
     /// # Errors
     /// [`PictureError`] where it is none, is not whole or is too large.
-    pub fn read(png: &[u8]) -> Result<Self, PictureError> {
+    pub fn from_png(png: &[u8]) -> Result<Self, PictureError> {
         let mut decoder = Decoder::new_with_limits(Cursor::new(png), Limits { bytes: MOST_BYTES });
         decoder.set_transformations(Transformations::normalize_to_color8());
         let mut reader = decoder.read_info()?;
@@ -59,7 +59,7 @@ impl Picture {
         let mut values = vec![0; bytes];
         let frame = reader.next_frame(&mut values)?;
         values.truncate(frame.buffer_size());
-        let grey = values.chunks_exact(frame.color_type.samples()).map(grey).collect();
+        let grey = values.chunks_exact(frame.color_type.samples()).map(grey_on_white).collect();
         Ok(Self { width: frame.width as usize, height: frame.height as usize, grey })
     }
 
@@ -90,7 +90,7 @@ impl Picture {
     /// in this picture of a place in that one, both in pixels from the upper left corner. White where there
     /// is nothing.
     #[must_use]
-    pub fn cut(&self, width: usize, height: usize, pixel: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
+    pub fn resample(&self, width: usize, height: usize, pixel: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
         let ([x0, y0], [x1, y1]) = (pixel([0.0, 0.0]), pixel([1.0, 0.0]));
         let samples = math::hypot(x1 - x0, y1 - y0).ceil().clamp(1.0, MOST_SAMPLES) as usize;
         let samples = samples.max(1); // (of places that are no numbers)
@@ -98,7 +98,7 @@ impl Picture {
         let point = |at: usize| {
             let (row, column) = (at / width, at % width);
             let of = |k: usize| pixel([part(column, k % samples), part(row, k / samples)]);
-            let sum: u32 = (0..samples * samples).map(|k| u32::from(self.at(of(k)))).sum();
+            let sum: u32 = (0..samples * samples).map(|k| u32::from(self.grey_at(of(k)))).sum();
             (sum / (samples * samples) as u32) as u8
         };
         Self { width, height, grey: (0..width * height).map(point).collect() }
@@ -106,12 +106,12 @@ impl Picture {
 
     /// Whether a place lies in the picture.
     #[must_use]
-    pub fn holds(&self, [x, y]: [f64; 2]) -> bool {
+    pub fn contains_point(&self, [x, y]: [f64; 2]) -> bool {
         (0.0..self.width as f64).contains(&x) && (0.0..self.height as f64).contains(&y)
     }
 
-    fn at(&self, [x, y]: [f64; 2]) -> u8 {
-        if !self.holds([x, y]) {
+    fn grey_at(&self, [x, y]: [f64; 2]) -> u8 {
+        if !self.contains_point([x, y]) {
             return u8::MAX;
         }
         self.grey.get(y as usize * self.width + x as usize).copied().unwrap_or(u8::MAX)
@@ -119,7 +119,7 @@ impl Picture {
 }
 
 /// Grey of the samples of a pixel, on white (ITU-R BT.601 weights).
-fn grey(samples: &[u8]) -> u8 {
+fn grey_on_white(samples: &[u8]) -> u8 {
     let (colour, alpha) = match samples {
         [grey] => (u32::from(*grey), 255),
         [grey, alpha] => (u32::from(*grey), u32::from(*alpha)),
@@ -133,23 +133,23 @@ fn grey(samples: &[u8]) -> u8 {
 }
 
 /// Gives pictures of frames.
-pub trait Pictures: Sync {
+pub trait PictureSource: Sync {
     /// The picture of a frame, counted from 0, where there is one.
-    fn picture(&self, frame: usize) -> Option<Picture>;
+    fn frame_picture(&self, frame: usize) -> Option<Picture>;
 }
 
 /// The frames of a recording's video.
 #[derive(Clone, Copy)]
-pub struct Film<'a> {
+pub struct RecordingVideo<'a> {
     /// Where points lie in them.
-    pub place: Place,
+    pub mapping: PixelMapping,
     /// The pictures.
-    pub pictures: &'a dyn Pictures,
+    pub pictures: &'a dyn PictureSource,
 }
 
-impl std::fmt::Debug for Film<'_> {
+impl std::fmt::Debug for RecordingVideo<'_> {
     fn fmt(&self, formatter: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        formatter.debug_struct("Film").field("place", &self.place).finish_non_exhaustive()
+        formatter.debug_struct("Film").field("place", &self.mapping).finish_non_exhaustive()
     }
 }
 
@@ -170,7 +170,7 @@ mod tests {
     }
 
     fn read(colour: ColorType, depth: BitDepth, size: (u32, u32), values: &[u8]) -> Vec<u8> {
-        Picture::read(&encoded(colour, depth, size, values)).unwrap().grey
+        Picture::from_png(&encoded(colour, depth, size, values)).unwrap().grey
     }
 
     #[test]
@@ -189,14 +189,14 @@ mod tests {
     #[test]
     fn what_is_no_whole_picture_is_refused_and_nothing_panics() {
         let whole = encoded(ColorType::Rgb, BitDepth::Eight, (5, 4), &[7; 60]);
-        assert!(Picture::read(&whole).is_ok());
+        assert!(Picture::from_png(&whole).is_ok());
         for length in 0..whole.len() - 16 {
-            assert!(Picture::read(&whole[..length]).is_err(), "{length}");
+            assert!(Picture::from_png(&whole[..length]).is_err(), "{length}");
         }
         for at in 0..whole.len() {
             let mut changed = whole.clone();
             changed[at] ^= 0x55;
-            let _ = Picture::read(&changed);
+            let _ = Picture::from_png(&changed);
         }
     }
 
@@ -215,7 +215,7 @@ mod tests {
             bomb[20..24].copy_from_slice(&side.to_be_bytes());
             let sum = checksum(&bomb[12..29]);
             bomb[29..33].copy_from_slice(&sum.to_be_bytes());
-            let refused = Picture::read(&bomb).unwrap_err();
+            let refused = Picture::from_png(&bomb).unwrap_err();
             assert!(matches!(refused, PictureError::Large { .. }), "{refused}");
         }
     }
@@ -224,20 +224,20 @@ mod tests {
     fn sixteen_greys_come_back_within_half_a_step() {
         let grey: Vec<u8> = (0..=254).step_by(2).map(|grey| grey as u8).collect();
         let picture = Picture { width: 16, height: 8, grey };
-        let again = Picture::read(&picture.to_png().unwrap()).unwrap();
+        let again = Picture::from_png(&picture.to_png().unwrap()).unwrap();
         assert_eq!((again.width, again.height), (16, 8));
         let apart = picture.grey.iter().zip(&again.grey).map(|(a, b)| a.abs_diff(*b)).max();
         assert!(apart.unwrap() <= 9, "{apart:?}");
         let odd = Picture { width: 3, height: 2, grey: vec![0, 255, 0, 255, 0, 255] };
-        assert_eq!(Picture::read(&odd.to_png().unwrap()).unwrap(), odd);
+        assert_eq!(Picture::from_png(&odd.to_png().unwrap()).unwrap(), odd);
     }
 
     #[test]
     fn a_cut_is_the_mean_of_what_it_shows_and_white_beyond() {
         let picture = Picture { width: 4, height: 2, grey: vec![0, 100, 200, 200, 100, 200, 200, 200] };
-        let half = picture.cut(2, 1, |[x, y]| [2.0 * x, 2.0 * y]);
+        let half = picture.resample(2, 1, |[x, y]| [2.0 * x, 2.0 * y]);
         assert_eq!(half.grey, [100, 200]);
-        let beyond = picture.cut(2, 1, |[x, y]| [x - 1.0, y]);
+        let beyond = picture.resample(2, 1, |[x, y]| [x - 1.0, y]);
         assert_eq!(beyond.grey, [255, 0]);
     }
 }

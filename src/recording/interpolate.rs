@@ -7,35 +7,36 @@ use super::Recording;
 pub(crate) const STENCIL: usize = 6;
 /// A place this close to a frame, in frames, is the frame: well above the rounding of times near 1 s at 1e5
 /// frames/s.
-pub(crate) const ON_FRAME: f64 = 1e-6;
+pub(crate) const ON_FRAME_TOLERANCE: f64 = 1e-6;
 
 impl Recording {
     /// A column of this recording at a time, s: on the polynomial through three frames before and three
     /// after, and on a straight line where one of the outer four is missing. `None` beyond the frames and
     /// next to a missing one.
     #[must_use]
-    pub fn at(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
+    pub fn interpolate_column(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
         let place = (time_s - self.grid.start_s) * self.grid.frame_rate_hz;
-        if let Some(frame) = on_frame(place) {
+        if let Some(frame) = frame_at(place) {
             return *column.get(frame)?;
         }
         let before = (place >= 0.0).then_some(place.floor() as usize)?;
         let (low, high) = ((*column.get(before)?)?, (*column.get(before + 1)?)?);
         let straight = || low + (place - before as f64) * (high - low);
-        let curved = before.checked_sub(STENCIL / 2 - 1).and_then(|first| through_six(column, first, place));
+        let curved =
+            before.checked_sub(STENCIL / 2 - 1).and_then(|first| lagrange_through_six(column, first, place));
         Some(curved.unwrap_or_else(straight))
     }
 }
 
 /// The frame on which a place, in frames, falls, if it does; the column may be shorter.
-pub(crate) fn on_frame(place: f64) -> Option<usize> {
+pub(crate) fn frame_at(place: f64) -> Option<usize> {
     let nearest = place.round();
-    (nearest >= 0.0 && (place - nearest).abs() < ON_FRAME).then_some(nearest as usize)
+    (nearest >= 0.0 && (place - nearest).abs() < ON_FRAME_TOLERANCE).then_some(nearest as usize)
 }
 
 /// Lagrange's polynomial through the six frames from `first` on, at a place in frames; `None` where one of
 /// them is missing.
-pub(crate) fn through_six(column: &[Option<f64>], first: usize, place: f64) -> Option<f64> {
+pub(crate) fn lagrange_through_six(column: &[Option<f64>], first: usize, place: f64) -> Option<f64> {
     /// Products of the distances of each frame from the others.
     const APART: [f64; STENCIL] = [-120.0, 24.0, -12.0, 12.0, -24.0, 120.0];
     let place = place - first as f64;
@@ -70,7 +71,7 @@ mod tests {
     fn a_fast_sine_keeps_its_height_and_a_polynomial_is_exact() {
         let quintic = |t: f64| 1.0 + 3e2 * t - 2e6 * t * t + 4e14 * t.powi(5);
         let at = |recording: &Recording, frames: f64| {
-            recording.at(&recording.traces().head_x_m, frames / 5000.0).unwrap()
+            recording.interpolate_column(&recording.traces().head_x_m, frames / 5000.0).unwrap()
         };
         let curve = recording(0.0, quintic);
         for place in [2.25, 4.5, 6.999] {
@@ -83,7 +84,7 @@ mod tests {
         assert!((at(&sine, 4.5) - 0.991_64).abs() < 1e-5, "{}", at(&sine, 4.5));
         let mut cut = sine.traces().head_x_m.clone();
         cut[2] = None;
-        let straight = sine.at(&cut, 4.5 / 5000.0).unwrap();
+        let straight = sine.interpolate_column(&cut, 4.5 / 5000.0).unwrap();
         assert!((straight - 0.844_33).abs() < 1e-5, "{straight}");
     }
 
@@ -92,7 +93,7 @@ mod tests {
         let line = recording(1.0, |t| t);
         let mut column = line.traces().head_x_m.clone();
         column[5] = None;
-        let at = |frames: f64| line.at(&column, 1.0 + frames / 5000.0);
+        let at = |frames: f64| line.interpolate_column(&column, 1.0 + frames / 5000.0);
         assert!(
             (at(2.25).unwrap() - (1.0 + 2.25 / 5000.0)).abs() < 1e-12
                 && at(9.0).is_some()

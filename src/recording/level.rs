@@ -9,7 +9,7 @@ use crate::math;
     "the {point} has only one of x and y in {frames} frames, the first is frame {first}; expected both or \
      neither, because a rotation mixes them"
 )]
-pub struct NotTurnable {
+pub struct RotationError {
     /// `tip` or `head`.
     pub point: &'static str,
     /// Frames with one coordinate alone.
@@ -22,27 +22,31 @@ pub struct NotTurnable {
 /// this angle along x becomes level.
 ///
 /// # Errors
-/// [`NotTurnable`] where a point has one coordinate alone.
-pub fn turned(traces: &Traces, angle_rad: f64, centre_m: [f64; 2]) -> Result<Traces, NotTurnable> {
+/// [`RotationError`] where a point has one coordinate alone.
+pub fn rotate_traces(traces: &Traces, angle_rad: f64, centre_m: [f64; 2]) -> Result<Traces, RotationError> {
     let turn = |point, x: &[Option<f64>], y: &[Option<f64>]| {
-        both_or_neither(point, x, y)?;
-        let places = x.iter().zip(y).map(|(x, y)| Some(turned_point([(*x)?, (*y)?], angle_rad, centre_m)));
-        Ok::<(Vec<_>, Vec<_>), NotTurnable>(places.map(|p| (p.map(|p| p[0]), p.map(|p| p[1]))).unzip())
+        check_coordinate_pairs(point, x, y)?;
+        let places = x.iter().zip(y).map(|(x, y)| Some(rotate_point([(*x)?, (*y)?], angle_rad, centre_m)));
+        Ok::<(Vec<_>, Vec<_>), RotationError>(places.map(|p| (p.map(|p| p[0]), p.map(|p| p[1]))).unzip())
     };
     let (tip_x_m, tip_y_m) = turn("tip", &traces.tip_x_m, &traces.tip_y_m)?;
     let (head_x_m, head_y_m) = turn("head", &traces.head_x_m, &traces.head_y_m)?;
     Ok(Traces { tip_x_m, tip_y_m, head_x_m, head_y_m, ..traces.clone() })
 }
 
-fn turned_point([x, y]: [f64; 2], angle_rad: f64, centre_m: [f64; 2]) -> [f64; 2] {
+fn rotate_point([x, y]: [f64; 2], angle_rad: f64, centre_m: [f64; 2]) -> [f64; 2] {
     let ((sin, cos), [from_x, from_y]) = (math::sin_cos(angle_rad), [x - centre_m[0], y - centre_m[1]]);
     [centre_m[0] + cos * from_x + sin * from_y, centre_m[1] - sin * from_x + cos * from_y]
 }
 
-fn both_or_neither(point: &'static str, x: &[Option<f64>], y: &[Option<f64>]) -> Result<(), NotTurnable> {
+fn check_coordinate_pairs(
+    point: &'static str,
+    x: &[Option<f64>],
+    y: &[Option<f64>],
+) -> Result<(), RotationError> {
     let mut alone = x.iter().zip(y).enumerate().filter(|(_, (x, y))| x.is_some() != y.is_some());
     match alone.next() {
-        Some((first, _)) => Err(NotTurnable { point, frames: 1 + alone.count(), first }),
+        Some((first, _)) => Err(RotationError { point, frames: 1 + alone.count(), first }),
         None => Ok(()),
     }
 }
@@ -66,12 +70,12 @@ mod tests {
             head_y_m: y(5e-3),
             ..Traces::default()
         };
-        let level = turned(&traces, angle_rad, centre_m).unwrap();
+        let level = rotate_traces(&traces, angle_rad, centre_m).unwrap();
         assert!(level.tip_y_m.iter().flatten().all(|y| (y - centre_m[1]).abs() < 1e-16));
         assert_eq!((level.tip_x_m[7], level.tip_y_m[7]), (None, None));
         let apart = level.head_x_m[0].unwrap() - level.tip_x_m[0].unwrap();
         assert!((apart - 5e-3 * angle_rad.sin()).abs() < 1e-16, "{apart}");
-        let back = turned(&level, -angle_rad, centre_m).unwrap();
+        let back = rotate_traces(&level, -angle_rad, centre_m).unwrap();
         let same = |a: &[Option<f64>], b: &[Option<f64>]| {
             a.iter().flatten().zip(b.iter().flatten()).all(|(a, b)| (a - b).abs() < 1e-16)
         };
@@ -87,7 +91,7 @@ mod tests {
             head_y_m: vec![Some(1.0), None, None],
             ..Traces::default()
         };
-        let refused = turned(&traces, 0.1, [0.0; 2]).unwrap_err();
-        assert_eq!(refused, NotTurnable { point: "head", frames: 2, first: 1 });
+        let refused = rotate_traces(&traces, 0.1, [0.0; 2]).unwrap_err();
+        assert_eq!(refused, RotationError { point: "head", frames: 2, first: 1 });
     }
 }

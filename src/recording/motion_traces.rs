@@ -21,21 +21,22 @@ pub struct MotionTraces {
 }
 
 /// The channels in the order of a figure.
-pub const CHANNELS: [Channel; 4] = [Channel::TipX, Channel::HeadX, Channel::Deflection, Channel::HeadDrop];
+pub const MOTION_CHANNELS: [Channel; 4] =
+    [Channel::TipX, Channel::HeadX, Channel::Deflection, Channel::HeadDrop];
 
 impl MotionTraces {
     /// What a recording shows, on its own clock.
     #[must_use]
-    pub fn of(recording: &Recording) -> Self {
-        Self::with(recording, |channel| channel.samples(recording))
+    pub fn from_recording(recording: &Recording) -> Self {
+        Self::from_columns(recording, |channel| channel.samples(recording))
     }
 
     /// What a model shows, on the clock and from the origin of a recording.
     #[must_use]
-    pub fn of_model(model: &Recording, alignment: &Alignment) -> Self {
-        let mut moved = Self::of(model);
+    pub fn from_model(model: &Recording, alignment: &Alignment) -> Self {
+        let mut moved = Self::from_recording(model);
         moved.time_s.iter_mut().for_each(|t| *t += alignment.shift_s);
-        for channel in CHANNELS {
+        for channel in MOTION_CHANNELS {
             let by_m = alignment.offset_m(channel);
             moved.column_mut(channel).iter_mut().flatten().for_each(|x| *x += by_m);
         }
@@ -44,11 +45,12 @@ impl MotionTraces {
 
     /// What a model shows at the frames of a recording, on its clock and from its origin.
     #[must_use]
-    pub fn of_model_at_frames(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {
+    pub fn from_model_at_frames(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {
         let grid = recording.grid();
-        Self::with(recording, |channel| {
+        Self::from_columns(recording, |channel| {
             let (of_model, by_m) = (channel.samples(model), alignment.offset_m(channel));
-            let at = |i| Some(model.at(&of_model, grid.time_s(i) - alignment.shift_s)? + by_m);
+            let at =
+                |i| Some(model.interpolate_column(&of_model, grid.time_s(i) - alignment.shift_s)? + by_m);
             (0..grid.frames).map(at).collect()
         })
     }
@@ -57,16 +59,20 @@ impl MotionTraces {
     #[must_use]
     pub fn residual(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {
         let grid = recording.grid();
-        Self::with(recording, |channel| {
+        Self::from_columns(recording, |channel| {
             let (of_model, by_m) = (channel.samples(model), alignment.offset_m(channel));
             let left = |(i, measured): (usize, Option<f64>)| {
-                Some(measured? - model.at(&of_model, grid.time_s(i) - alignment.shift_s)? - by_m)
+                Some(
+                    measured?
+                        - model.interpolate_column(&of_model, grid.time_s(i) - alignment.shift_s)?
+                        - by_m,
+                )
             };
             channel.samples(recording).into_iter().enumerate().map(left).collect()
         })
     }
 
-    fn with(recording: &Recording, column: impl Fn(Channel) -> Vec<Option<f64>>) -> Self {
+    fn from_columns(recording: &Recording, column: impl Fn(Channel) -> Vec<Option<f64>>) -> Self {
         let grid = recording.grid();
         Self {
             time_s: (0..grid.frames).map(|i| grid.time_s(i)).collect(),

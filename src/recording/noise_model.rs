@@ -8,9 +8,9 @@ mod common;
 mod likelihood;
 mod whitener;
 
-pub use autoregressive::{Ar, MOST_COEFFICIENTS, NotStationary};
-pub use channels::{ChannelNoise, RecordingNoise, Source, noise_of};
-pub use common::{Common, Shared, common};
+pub use autoregressive::{AutoregressiveNoise, MOST_COEFFICIENTS, NotStationary};
+pub use channels::{ChannelNoise, NoiseSource, RecordingNoise, measure_noise};
+pub use common::{CommonNoise, SharedNoise, measure_common_noise};
 pub use whitener::Whitener;
 
 #[cfg(test)]

@@ -1,7 +1,7 @@
 //! What a recording can show: its rates, gaps and noise, measured on the traces themselves, and what looks
 //! wrong with it.
 //!
-//! [`quality`] measures, [`findings`] judges (each finding with a severity, a number and advice), [`verdict`]
+//! [`measure_quality`] measures, [`collect_findings`] judges (each finding with a severity, a number and advice), [`verdict_lines`]
 //! puts both into lines for reading, and [`Quality::shows`] answers for a single frequency.
 
 mod checks;
@@ -15,44 +15,44 @@ mod summary;
 mod tilt;
 mod visibility;
 
-pub use checks::position_steps;
-pub use finding::{Check, Finding, Severity};
-pub use measured::{ChannelQuality, Optics, Quality, quality};
+pub use checks::check_position_steps;
+pub use finding::{Check, QualityFinding, Severity};
+pub use measured::{ChannelQuality, Optics, Quality, measure_quality};
 pub use noise::{noise_floor, quantisation_step};
 pub use outliers::outlier_frames;
 
-pub use summary::{Grade, grade, table, verdict};
-pub use tilt::{Curvature, NoTilt, Tilt, tilt};
+pub use summary::{Grade, grade_findings, measurement_table, verdict_lines};
+pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
 pub use visibility::{ComponentVisibility, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Visibility};
 
 use crate::recording::Recording;
-use crate::recording::channel::Instants;
+use crate::recording::channel::ReversalInstants;
 
 /// Every finding on a recording, the gravest first: what its traces show, and what only its
 /// export could show (`import`).
 ///
-/// `measured` is the [`quality`] of the same recording, `instants` what [`Instants::find`] finds in it.
+/// `measured` is the [`measure_quality`] of the same recording, `instants` what [`ReversalInstants::find`] finds in it.
 #[must_use]
-pub fn findings(
+pub fn collect_findings(
     recording: &Recording,
     measured: &Quality,
     optics: &Optics,
-    instants: &Instants,
-    import: &[Finding],
-) -> Vec<Finding> {
-    let columns = measured::columns(recording.traces(), measured);
+    instants: &ReversalInstants,
+    import: &[QualityFinding],
+) -> Vec<QualityFinding> {
+    let columns = measured::measured_columns(recording.traces(), measured);
     let mut found = import.to_vec();
-    found.extend(checks::of_the_grid(measured));
-    found.extend(checks::of_the_exposure(measured));
-    found.extend(motion::of_both_points(recording, measured));
-    found.extend(tilt::findings(recording, measured, instants));
-    found.extend(motion::of_the_turns(instants));
+    found.extend(checks::check_grid(measured));
+    found.extend(checks::check_exposure(measured));
+    found.extend(motion::check_motion(recording, measured));
+    found.extend(tilt::check_tilt(recording, measured, instants));
+    found.extend(motion::check_turns(instants));
     for column in &columns {
-        found.extend(checks::of_a_column(column, recording.grid(), optics));
-        found.extend(outliers::finding(column, recording.grid(), optics));
-        found.extend(prefilter::finding(column, measured.frame_rate_hz));
+        found.extend(checks::check_track_column(column, recording.grid(), optics));
+        found.extend(outliers::check_outliers(column, recording.grid(), optics));
+        found.extend(prefilter::check_prefilter(column, measured.frame_rate_hz));
     }
-    found.extend(checks::of_the_confidence(recording.traces()));
+    found.extend(checks::check_confidence(recording.traces()));
     // (stable: the order above within a severity)
     found.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     found

@@ -3,13 +3,16 @@
 mod tables;
 
 use super::answer;
-use super::{CombinationLine, Failed, FigureGroup, ProbeLine, Report, SearchLine, Subject};
-use crate::compare::{Case, Measured, ModelRun, Summary, model_runs, tables::tables};
+use super::{CombinationLine, FailureCount, FigureGroup, FigureSubject, ProbeLine, Report, SearchLine};
+use crate::compare::{
+    ComparisonSummary, ConditionComparison, FittedRecording, ModelRun, run_conditions,
+    tables::comparison_tables,
+};
 use crate::figures::FigureBlock;
-use crate::figures::corner::Corner;
-use crate::figures::naming::distinct;
-use crate::figures::profiles::Profiles;
-use crate::figures::pulls::Pulls;
+use crate::figures::corner::CornerPlot;
+use crate::figures::naming::make_file_names_unique;
+use crate::figures::profiles::ProfilePlot;
+use crate::figures::pulls::PullPlot;
 use crate::figures::{
     animation, cycle, evidence, friction, history, phase_portrait, poses, residuals, spectrogram, spectrum,
     video_frames,
@@ -17,7 +20,7 @@ use crate::figures::{
 use crate::fit::Problem;
 use crate::fit::failure::{FailureReason, RunFailure};
 use crate::fit::job::Job;
-use crate::fit::result::{FitResult, Status};
+use crate::fit::result::{FitResult, FitStatus};
 use rayon::prelude::*;
 
 impl Report {
@@ -26,141 +29,169 @@ impl Report {
     ///
     /// # Errors
     /// [`RunFailure`] when the model at the estimates does not run.
-    pub fn of(problem: &Problem, result: &FitResult) -> Result<Self, RunFailure> {
+    pub fn from_fit(problem: &Problem, result: &FitResult) -> Result<Self, RunFailure> {
         let recordings = problem.recordings().iter().flatten();
-        let measured: Vec<Measured> =
-            recordings.map(|recording| Measured { recording, file: None, film: None }).collect();
+        let measured: Vec<FittedRecording> =
+            recordings.map(|recording| FittedRecording { recording, file: None, film: None }).collect();
         let model = problem
-            .model_of(result)
+            .fitted_model(result)
             .map_err(|error| RunFailure::new(FailureReason::Refused, error.to_string(), 0.0))?;
-        let models = model_runs(problem.job(), &model, result)?;
-        Ok(report(problem.job(), &measured, &models, result))
+        let models = run_conditions(problem.job(), &model, result)?;
+        Ok(build_report(problem.job(), &measured, &models, result))
     }
 }
 
 /// The report of a fit, but for its provenance.
 #[must_use]
-pub fn report(job: &Job, measured: &[Measured], models: &[ModelRun], result: &FitResult) -> Report {
-    let cases = Case::all(job, measured, models, result);
-    let report = lines(job, measured, &cases, result);
-    let telling = answer::farthest(&report.comparison).map_or(0, |(condition, _)| condition);
+pub fn build_report(
+    job: &Job,
+    measured: &[FittedRecording],
+    models: &[ModelRun],
+    result: &FitResult,
+) -> Report {
+    let cases = ConditionComparison::compare_conditions(job, measured, models, result);
+    let report = fill_report_sections(job, measured, &cases, result);
+    let telling = answer::farthest_condition(&report.comparison).map_or(0, |(condition, _)| condition);
     let answering = [
-        cases.get(telling).map_or_else(Vec::new, |case| distinct(of_condition(case, law(&cases, telling)))),
-        of_answer(job, result, &report),
+        cases.get(telling).map_or_else(Vec::new, |case| {
+            make_file_names_unique(condition_figures(case, shared_law_case(&cases, telling)))
+        }),
+        summary_figures(job, result, &report),
     ]
     .concat();
     let groups = [
-        (Subject::Evidence, answering),
-        (Subject::Measured, measured_figures(&cases, telling)),
-        (Subject::Blade, blade_figures(&cases)),
-        (Subject::Parameters, Profiles::of(job, result, &report.parameters).block().into_iter().collect()),
+        (FigureSubject::Evidence, answering),
+        (FigureSubject::Measured, measured_figures(&cases, telling)),
+        (FigureSubject::Blade, blade_figures(&cases)),
+        (
+            FigureSubject::Parameters,
+            ProfilePlot::from_fit(job, result, &report.parameters).figure_block().into_iter().collect(),
+        ),
     ];
     Report {
-        tables: tables(&cases),
-        figures: groups.into_iter().map(group).filter(|group| !group.figures.is_empty()).collect(),
+        tables: comparison_tables(&cases),
+        figures: groups.into_iter().map(figure_group).filter(|group| !group.figures.is_empty()).collect(),
         ..report
     }
 }
 
 /// The same without its figures, which take most of the time.
 #[must_use]
-pub fn in_words(job: &Job, measured: &[Measured], models: &[ModelRun], result: &FitResult) -> Report {
-    lines(job, measured, &Case::all(job, measured, models, result), result)
+pub fn build_report_without_figures(
+    job: &Job,
+    measured: &[FittedRecording],
+    models: &[ModelRun],
+    result: &FitResult,
+) -> Report {
+    fill_report_sections(
+        job,
+        measured,
+        &ConditionComparison::compare_conditions(job, measured, models, result),
+        result,
+    )
 }
 
-fn lines(job: &Job, measured: &[Measured], cases: &[Case], result: &FitResult) -> Report {
+fn fill_report_sections(
+    job: &Job,
+    measured: &[FittedRecording],
+    cases: &[ConditionComparison],
+    result: &FitResult,
+) -> Report {
     Report {
         title: job.title.clone(),
-        search: search(result),
+        search: search_line(result),
         misfit: result.misfit.clone(),
         nuisances: result.nuisances.clone(),
-        recordings: measured.iter().map(tables::recording).collect(),
-        components: tables::components(job, measured, result),
-        features: tables::features(job, measured, &result.features),
-        held_out: tables::features(job, measured, &result.held_out),
-        parameters: tables::parameters(job, measured, result),
-        friction: cases.first().map_or_else(Vec::new, friction::caption::lines),
-        combinations: result.combinations.iter().map(combination).collect(),
+        recordings: measured.iter().map(tables::recording_line).collect(),
+        components: tables::component_lines(job, measured, result),
+        features: tables::feature_lines(job, measured, &result.features),
+        held_out: tables::feature_lines(job, measured, &result.held_out),
+        parameters: tables::parameter_lines(job, measured, result),
+        friction: cases.first().map_or_else(Vec::new, friction::caption::friction_lines),
+        combinations: result.combinations.iter().map(combination_line).collect(),
         advice: result.gate.advice.clone(),
-        runs: cases.iter().map(Case::run_line).collect(),
-        gate: result.gate.probes.iter().map(probe).collect(),
+        runs: cases.iter().map(ConditionComparison::run_summary).collect(),
+        gate: result.gate.probes.iter().map(probe_line).collect(),
         gate_notes: result.gate.notes.clone(),
-        comparison: cases.iter().map(Summary::of).collect(),
-        notes: notes(measured, result),
+        comparison: cases.iter().map(ComparisonSummary::summarize).collect(),
+        notes: fit_notes(measured, result),
         ..Report::default()
     }
 }
 
 /// The condition whose figure of friction shows that of another, as it is the first with the same run.
-fn law<'a, 'b>(cases: &'b [Case<'a>], of: usize) -> Option<&'b Case<'a>> {
-    let shares = |same: &Vec<usize>, case: &Case| case.condition == of || same.contains(&of);
+fn shared_law_case<'a, 'b>(
+    cases: &'b [ConditionComparison<'a>],
+    of: usize,
+) -> Option<&'b ConditionComparison<'a>> {
+    let shares = |same: &Vec<usize>, case: &ConditionComparison| case.condition == of || same.contains(&of);
     cases.iter().find(|case| case.same_run.as_ref().is_some_and(|same| shares(same, case)))
 }
 
 /// What shows at a glance whether the model explains a condition: both on one axis, the cycles over speed,
 /// friction, and what is left.
-fn of_condition(case: &Case, law: Option<&Case>) -> Vec<FigureBlock> {
+fn condition_figures(case: &ConditionComparison, law: Option<&ConditionComparison>) -> Vec<FigureBlock> {
     let parts = [
-        evidence::caption::block(case),
-        cycle::caption::block(case),
-        law.and_then(friction::caption::block),
-        residuals::caption::block(case),
+        evidence::caption::figure_block(case),
+        cycle::caption::figure_block(case),
+        law.and_then(friction::caption::figure_block),
+        residuals::caption::figure_block(case),
     ];
     parts.into_iter().flatten().collect()
 }
 
 /// Condition by condition: the motion itself, then what it is made of; of the conditions but the `telling`
 /// one also what the answer shows of that one.
-fn measured_figures(cases: &[Case], telling: usize) -> Vec<FigureBlock> {
-    let all = |(i, case): (usize, &Case)| {
-        let shown = law(cases, telling).map(|law| law.condition);
+fn measured_figures(cases: &[ConditionComparison], telling: usize) -> Vec<FigureBlock> {
+    let all = |(i, case): (usize, &ConditionComparison)| {
+        let shown = shared_law_case(cases, telling).map(|law| law.condition);
         let own = case.same_run.as_ref().map(|_| case).filter(|case| shown != Some(case.condition));
-        let first = if i == telling { Vec::new() } else { of_condition(case, own) };
+        let first = if i == telling { Vec::new() } else { condition_figures(case, own) };
         let parts = [
-            history::caption::blocks(case),
-            spectrum::caption::blocks(case),
-            spectrogram::caption::blocks(case),
-            phase_portrait::caption::blocks(case),
+            history::caption::figure_blocks(case),
+            spectrum::caption::figure_blocks(case),
+            spectrogram::caption::figure_blocks(case),
+            phase_portrait::caption::figure_blocks(case),
         ];
         first.into_iter().chain(parts.into_iter().flatten()).collect::<Vec<_>>()
     };
-    distinct(cases.par_iter().enumerate().flat_map_iter(all).collect())
+    make_file_names_unique(cases.par_iter().enumerate().flat_map_iter(all).collect())
 }
 
 /// Run by run: the blade itself, then over the frames of each video, and then every run in motion.
-fn blade_figures(cases: &[Case]) -> Vec<FigureBlock> {
+fn blade_figures(cases: &[ConditionComparison]) -> Vec<FigureBlock> {
     let runs = || cases.iter().filter(|case| case.same_run.is_some());
     let filmed = cases.iter().filter_map(video_frames::block);
     runs()
-        .filter_map(poses::block)
+        .filter_map(poses::figure_block)
         .chain(filmed)
-        .chain(runs().filter_map(animation::caption::block))
+        .chain(runs().filter_map(animation::caption::figure_block))
         .collect()
 }
 
 /// How the parameters hang together, and how far every target is from the model.
-fn of_answer(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock> {
+fn summary_figures(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock> {
     let features = [report.components.as_slice(), report.features.as_slice()];
     let blocks = [
-        Corner::of(job, result, &report.parameters).block(),
-        Pulls::of(&job.title, &features, &report.held_out).block(),
+        CornerPlot::from_fit(job, result, &report.parameters).figure_block(),
+        PullPlot::from_comparisons(&job.title, &features, &report.held_out).figure_block(),
     ];
     blocks.into_iter().flatten().collect()
 }
 
-fn group((subject, figures): (Subject, Vec<FigureBlock>)) -> FigureGroup {
+fn figure_group((subject, figures): (FigureSubject, Vec<FigureBlock>)) -> FigureGroup {
     FigureGroup { subject, figures }
 }
 
-fn search(result: &FitResult) -> SearchLine {
+fn search_line(result: &FitResult) -> SearchLine {
     let failed = result
         .evaluations
         .failed
         .iter()
-        .map(|(reason, count)| Failed { reason: reason.to_string(), count: *count });
+        .map(|(reason, count)| FailureCount { reason: reason.to_string(), count: *count });
     SearchLine {
         status: Some(result.status),
-        converged: result.status == Status::Converged,
+        converged: result.status == FitStatus::Converged,
         evaluations: result.evaluations.total,
         failed: failed.collect(),
         local_searches: result.waterfall.len(),
@@ -172,11 +203,11 @@ fn search(result: &FitResult) -> SearchLine {
     }
 }
 
-fn combination(found: &crate::fit::information::Combination) -> CombinationLine {
-    CombinationLine { words: found.in_words(), determined: found.determined, sd_relative: found.sd_relative }
+fn combination_line(found: &crate::fit::information::ParameterCombination) -> CombinationLine {
+    CombinationLine { words: found.describe(), determined: found.determined, sd_relative: found.sd_relative }
 }
 
-fn probe(found: &crate::fit::gate::Probe) -> ProbeLine {
+fn probe_line(found: &crate::fit::gate::Probe) -> ProbeLine {
     ProbeLine {
         features_seen: found.features_seen,
         rank: found.rank,
@@ -187,7 +218,7 @@ fn probe(found: &crate::fit::gate::Probe) -> ProbeLine {
 }
 
 /// Notes of the fit, but for those of the gate, which have a place of their own.
-fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
+fn fit_notes(measured: &[FittedRecording], result: &FitResult) -> Vec<String> {
     let mut notes: Vec<String> =
         result.notes.iter().filter(|note| !result.gate.notes.contains(note)).cloned().collect();
     let freed = result.nuisances.iter().any(|nuisance| nuisance.recording.is_none());
@@ -213,8 +244,8 @@ fn notes(measured: &[Measured], result: &FitResult) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::compare::model_runs;
-    use crate::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
+    use crate::compare::run_conditions;
+    use crate::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
     use crate::simulate::RUNS;
     use crate::simulate::scene::Scene;
     use crate::twin::Camera;
@@ -228,17 +259,17 @@ mod tests {
         let job = Job::parse("job.toml", JOB).unwrap();
         let result = FitResult::parse("result.json", RESULT).unwrap();
         let camera = Camera { frame_rate_hz: 5e3, exposure_s: 0.0 };
-        let condition = || Condition {
+        let condition = || ModelCondition {
             scene: Scene::parse("scene.toml", SCENE).unwrap(),
             instrument: Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 },
         };
-        let conditions: Vec<Condition> = job.conditions.iter().map(|_| condition()).collect();
-        let model = SceneModel::new(conditions, job.parameter_names(), Plausible::default());
+        let conditions: Vec<ModelCondition> = job.conditions.iter().map(|_| condition()).collect();
+        let model = SceneModel::new(conditions, job.parameter_names(), PlausibilityLimits::default());
         // everything in one thread, whose runs are counted
         let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
         let (runs, figures) = pool.install(|| {
-            let models = model_runs(&job, &model, &result).unwrap();
-            let figures = report(&job, &[], &models, &result).all_figures().count();
+            let models = run_conditions(&job, &model, &result).unwrap();
+            let figures = build_report(&job, &[], &models, &result).all_figures().count();
             (RUNS.get(), figures)
         });
         assert_eq!(runs, job.conditions.len());

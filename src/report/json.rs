@@ -1,8 +1,8 @@
 //! Reports as JSON for scripts: `docs/reports.md` lists the keys.
 
 use super::statement::Statement;
-use super::verdict::Verdict;
-use super::{Answer, Report, Subject};
+use super::verdict::ReportVerdict;
+use super::{FigureSubject, Report, ReportSummary};
 use serde::Serialize;
 
 /// Version of the keys.
@@ -10,31 +10,31 @@ pub(super) const FORMAT: u32 = 1;
 
 /// A figure as it is listed.
 #[derive(Debug, Serialize)]
-pub(super) struct Listed<'a> {
+pub(super) struct FigureEntry<'a> {
     pub file: &'a str,
     pub caption: &'a str,
     pub details: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub subject: Option<Subject>,
+    pub subject: Option<FigureSubject>,
 }
 
 /// What the JSON says of one fit.
 #[derive(Debug, Serialize)]
-pub(super) struct Written<'a> {
+pub(super) struct ReportDocument<'a> {
     #[serde(flatten)]
-    verdict: &'a Verdict,
-    answer: Answer,
+    verdict: &'a ReportVerdict,
+    answer: ReportSummary,
     summary: Vec<String>,
     statements: &'a [Statement],
     #[serde(flatten)]
     report: &'a Report,
-    figures: Vec<Listed<'a>>,
+    figures: Vec<FigureEntry<'a>>,
 }
 
-impl<'a> Written<'a> {
-    pub fn of(report: &'a Report, verdict: &'a Verdict) -> Self {
+impl<'a> ReportDocument<'a> {
+    pub fn new(report: &'a Report, verdict: &'a ReportVerdict) -> Self {
         let listed = report.figures.iter().flat_map(|group| {
-            group.figures.iter().map(|f| Listed {
+            group.figures.iter().map(|f| FigureEntry {
                 file: &f.file,
                 caption: &f.caption,
                 details: &f.details,
@@ -43,7 +43,7 @@ impl<'a> Written<'a> {
         });
         Self {
             verdict,
-            answer: Answer::of(report),
+            answer: ReportSummary::from_report(report),
             summary: verdict.summary(),
             statements: &verdict.statements,
             report,
@@ -58,14 +58,17 @@ impl<'a> Written<'a> {
 /// None in practice: every field can be written (a value that is no number becomes `null`).
 pub fn report_json(report: &Report) -> Result<String, serde_json::Error> {
     #[derive(Serialize)]
-    struct File<'a> {
+    struct ReportFile<'a> {
         format: u32,
         #[serde(flatten)]
-        written: Written<'a>,
+        written: ReportDocument<'a>,
     }
-    let verdict = Verdict::of(report);
-    serde_json::to_string_pretty(&File { format: FORMAT, written: Written::of(report, &verdict) })
-        .map(|text| text + "\n")
+    let verdict = ReportVerdict::from_report(report);
+    serde_json::to_string_pretty(&ReportFile {
+        format: FORMAT,
+        written: ReportDocument::new(report, &verdict),
+    })
+    .map(|text| text + "\n")
 }
 
 #[cfg(test)]
@@ -84,7 +87,7 @@ mod tests {
             details: String::new(),
             drawing: Drawing::Moving("<svg/>".to_owned()),
         };
-        let figures = vec![FigureGroup { subject: Subject::Blade, figures: vec![block] }];
+        let figures = vec![FigureGroup { subject: FigureSubject::Blade, figures: vec![block] }];
         let components = vec![Comparison { model: Some(f64::NAN), ..Comparison::default() }];
         let text = report_json(&Report { figures, components, ..Report::default() }).unwrap();
         let json: serde_json::Value = serde_json::from_str(&text).unwrap();

@@ -10,17 +10,17 @@ mod quality;
 mod runs;
 pub(super) mod values;
 
-pub(super) use origin::provenance;
+pub(super) use origin::provenance_html;
 
-use super::verdict::Verdict;
-use super::{FigureBlock, Report, Subject};
-use html::{Section, document, figures, list, name, statements};
+use super::verdict::ReportVerdict;
+use super::{FigureBlock, FigureSubject, Report};
+use html::{PageSection, figures_html, isolate_name, render_document, sentence_list, statements_html};
 
 impl Report {
     /// The page of the report: one HTML file; the same report always gives the same bytes.
     #[must_use]
-    pub fn page(&self) -> String {
-        page(self)
+    pub fn render_page(&self) -> String {
+        render_page(self)
     }
 }
 
@@ -30,54 +30,54 @@ const MOST_BYTES: usize = 1_000_000;
 /// The page; the same report always gives the same bytes. One that would be too large for it does without the
 /// figures for telephones, which show the others smaller.
 #[must_use]
-pub fn page(report: &Report) -> String {
-    let whole = set(report, true);
-    if whole.len() <= MOST_BYTES { whole } else { set(report, false) }
+pub fn render_page(report: &Report) -> String {
+    let whole = assemble_page(report, true);
+    if whole.len() <= MOST_BYTES { whole } else { assemble_page(report, false) }
 }
 
 /// The page, with figures for `narrow` screens besides.
-fn set(report: &Report, narrow: bool) -> String {
-    let verdict = Verdict::of(report);
-    let (first, evidence) = evidence(report, narrow);
-    let open = |id, heading, html: String| Section { id, heading, html, folded: false };
-    let folded = |id, heading, html: String| Section { id, heading, html, folded: true };
+fn assemble_page(report: &Report, narrow: bool) -> String {
+    let verdict = ReportVerdict::from_report(report);
+    let (first, evidence) = evidence_html(report, narrow);
+    let open = |id, heading, html: String| PageSection { id, heading, html, folded: false };
+    let folded = |id, heading, html: String| PageSection { id, heading, html, folded: true };
     let sections = [
         open(
             "answer",
             "Answer",
-            [answer::answer(report), first, values::components(&report.components)].concat(),
+            [answer::summary_html(report), first, values::components_table(&report.components)].concat(),
         ),
         open("evidence", "Evidence", evidence),
         folded(
             "verdict",
             "Every finding",
-            format!("<div class=\"verdict\">\n{}</div>\n", statements(&verdict.statements)),
+            format!("<div class=\"verdict\">\n{}</div>\n", statements_html(&verdict.statements)),
         ),
-        folded("features", "Features", values::features(&report.features)),
-        folded("held-out", "Held-out predictions", values::held_out(&report.held_out)),
-        folded("misfit", "Residuals", misfit::misfit(report.misfit.as_ref())),
-        folded("measured", measured_heading(report), drawn(report, Subject::Measured)),
+        folded("features", "Features", values::features_table(&report.features)),
+        folded("held-out", "Held-out predictions", values::held_out_table(&report.held_out)),
+        folded("misfit", "Residuals", misfit::misfit_html(report.misfit.as_ref())),
+        folded("measured", measured_heading(report), subject_figures_html(report, FigureSubject::Measured)),
         folded(
             "blade",
             "The blade of the best model",
-            [runs::events(&report.runs), drawn(report, Subject::Blade)].concat(),
+            [runs::events_table(&report.runs), subject_figures_html(report, FigureSubject::Blade)].concat(),
         ),
         folded(
             "parameters",
             "Parameters",
             [
-                knowledge::parameters(report),
-                misfit::nuisances(&report.nuisances),
-                drawn(report, Subject::Parameters),
+                knowledge::parameters_html(report),
+                misfit::nuisances_table(&report.nuisances),
+                subject_figures_html(report, FigureSubject::Parameters),
             ]
             .concat(),
         ),
-        folded("data", "Data quality", quality::recordings(&report.recordings)),
-        folded("search", search_heading(report), knowledge::search(report)),
-        folded("reservations", "Reservations", list(&report.notes)),
-        folded("provenance", "Provenance", provenance(&report.provenance)),
+        folded("data", "Data quality", quality::recordings_html(&report.recordings)),
+        folded("search", search_heading(report), knowledge::search_html(report)),
+        folded("reservations", "Reservations", sentence_list(&report.notes)),
+        folded("provenance", "Provenance", provenance_html(&report.provenance)),
     ];
-    document(&report.title, &banner(report), &sections)
+    render_document(&report.title, &data_banner(report), &sections)
 }
 
 /// A gate looks at features, which a fit to traces does not rest on.
@@ -90,8 +90,9 @@ fn measured_heading(report: &Report) -> &'static str {
 }
 
 /// What the data are, before anything else is said.
-pub(super) fn banner(report: &Report) -> String {
-    let named: Vec<_> = report.recordings.iter().filter(|r| r.synthetic).map(|r| name(&r.name)).collect();
+pub(super) fn data_banner(report: &Report) -> String {
+    let named: Vec<_> =
+        report.recordings.iter().filter(|r| r.synthetic).map(|r| isolate_name(&r.name)).collect();
     match (named.is_empty(), report.recordings.is_empty()) {
         (false, _) => format!(
             "<p class=\"banner\" role=\"note\">Synthetic data: no camera took {}. The numbers below test \
@@ -107,26 +108,26 @@ pub(super) fn banner(report: &Report) -> String {
 }
 
 /// Figures of a subject, with the number of those before them: numbers run through the whole page.
-fn of(report: &Report, subject: Subject) -> (Vec<&FigureBlock>, usize) {
+fn figures_of_subject(report: &Report, subject: FigureSubject) -> (Vec<&FigureBlock>, usize) {
     let groups = || report.figures.iter();
     let before = groups().take_while(|group| group.subject != subject).map(|group| group.figures.len()).sum();
     (groups().filter(|group| group.subject == subject).flat_map(|group| &group.figures).collect(), before)
 }
 
 /// The first figure of the evidence, which stands in the answer, and the others.
-fn evidence(report: &Report, narrow: bool) -> (String, String) {
-    let (all, before) = of(report, Subject::Evidence);
+fn evidence_html(report: &Report, narrow: bool) -> (String, String) {
+    let (all, before) = figures_of_subject(report, FigureSubject::Evidence);
     let (first, rest) = all.split_at(all.len().min(1));
     (
-        figures(first.iter().copied(), before, narrow),
-        figures(rest.iter().copied(), before + first.len(), narrow),
+        figures_html(first.iter().copied(), before, narrow),
+        figures_html(rest.iter().copied(), before + first.len(), narrow),
     )
 }
 
 /// The figures of a subject.
-fn drawn(report: &Report, subject: Subject) -> String {
-    let (all, before) = of(report, subject);
-    figures(all, before, false)
+fn subject_figures_html(report: &Report, subject: FigureSubject) -> String {
+    let (all, before) = figures_of_subject(report, subject);
+    figures_html(all, before, false)
 }
 
 #[cfg(test)]

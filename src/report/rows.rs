@@ -1,7 +1,7 @@
 //! The rows of a report's tables.
 
 use crate::fit;
-use crate::recording::quality::{self, Finding, Grade, Quality};
+use crate::recording::quality::{self, Grade, Quality, QualityFinding};
 use serde::Serialize;
 
 /// A recording and what it can show.
@@ -18,20 +18,20 @@ pub struct RecordingLine {
     /// What was measured on its traces.
     pub measurements: Quality,
     /// What was found on it, the gravest first.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<QualityFinding>,
     /// The same as `wiperlab inspect` says it.
     pub verdict: Vec<String>,
 }
 
 impl RecordingLine {
     /// The same with findings that only its folder could show.
-    pub fn also(&mut self, more: impl IntoIterator<Item = Finding>) {
+    pub fn add_findings(&mut self, more: impl IntoIterator<Item = QualityFinding>) {
         let kept = std::mem::take(&mut self.findings);
         self.findings = more.into_iter().chain(kept).collect();
         // stable: the order above within a severity
         self.findings.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
-        self.grade = quality::grade(&self.findings);
-        self.verdict = quality::verdict(&self.measurements, &self.findings);
+        self.grade = quality::grade_findings(&self.findings);
+        self.verdict = quality::verdict_lines(&self.measurements, &self.findings);
     }
 }
 
@@ -50,13 +50,13 @@ pub struct CombinationLine {
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct SearchLine {
     /// How; `None` before a search.
-    pub status: Option<fit::result::Status>,
+    pub status: Option<fit::result::FitStatus>,
     /// Whether it had converged.
     pub converged: bool,
     /// Evaluations of the model.
     pub evaluations: usize,
     /// Those that failed, by reason.
-    pub failed: Vec<Failed>,
+    pub failed: Vec<FailureCount>,
     /// Local searches.
     pub local_searches: usize,
     /// Sum of squared residuals at the estimates.
@@ -73,7 +73,7 @@ pub struct SearchLine {
 
 /// Evaluations that failed for one reason.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
-pub struct Failed {
+pub struct FailureCount {
     /// The reason, such as `contact-lost`.
     pub reason: String,
     /// How many.

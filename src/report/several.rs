@@ -7,35 +7,35 @@ mod shared;
 mod spectra;
 mod verdict;
 
-pub use fitted::{Entry, Fitted, Several};
-pub use page::page;
-pub use shared::{Pair, Relation, SharedParameter};
+pub use fitted::{ComparedFit, ComparisonInput, FitComparison};
+pub use page::render_page;
+pub use shared::{IntervalPair, IntervalRelation, SharedParameter};
 
 use super::Report;
-use super::json::{FORMAT, Listed, Written};
+use super::json::{FORMAT, FigureEntry, ReportDocument};
 use super::statement::Statement;
-use super::verdict::Verdict;
+use super::verdict::ReportVerdict;
 use crate::text;
 use serde::Serialize;
 
 /// Compares fits, in the order given.
 #[must_use]
-pub fn compare(fits: &[Fitted]) -> Several {
-    let entry = |fit: &Fitted| Entry {
+pub fn compare_fits(fits: &[ComparisonInput]) -> FitComparison {
+    let entry = |fit: &ComparisonInput| ComparedFit {
         name: fit.name.to_owned(),
         report: Report { figures: Vec::new(), ..fit.report.clone() },
-        verdict: Verdict::of(fit.report),
+        verdict: ReportVerdict::from_report(fit.report),
     };
-    let entries: Vec<Entry> = fits.iter().map(entry).collect();
-    let parameters = shared::parameters(&entries);
+    let entries: Vec<ComparedFit> = fits.iter().map(entry).collect();
+    let parameters = shared::shared_parameters(&entries);
     let names: Vec<String> = fits.iter().map(|fit| fit.name.to_owned()).collect();
-    Several {
-        title: format!("Comparison of {}", text::listed(&names)),
-        figures: intervals::figures(&entries, &parameters)
+    FitComparison {
+        title: format!("Comparison of {}", text::join_with_and(&names)),
+        figures: intervals::interval_figures(&entries, &parameters)
             .into_iter()
-            .chain(spectra::figures(fits))
+            .chain(spectra::spectra_figures(fits))
             .collect(),
-        statements: verdict::statements(&entries, &parameters),
+        statements: verdict::comparison_statements(&entries, &parameters),
         fits: entries,
         parameters,
     }
@@ -45,15 +45,15 @@ pub fn compare(fits: &[Fitted]) -> Several {
 ///
 /// # Errors
 /// None in practice: every field can be written (a value that is no number becomes `null`).
-pub fn several_json(several: &Several) -> Result<String, serde_json::Error> {
+pub fn comparison_json(several: &FitComparison) -> Result<String, serde_json::Error> {
     #[derive(Serialize)]
-    struct Fit<'a> {
+    struct ComparedFitDocument<'a> {
         name: &'a str,
         #[serde(flatten)]
-        written: Written<'a>,
+        written: ReportDocument<'a>,
     }
     #[derive(Serialize)]
-    struct File<'a> {
+    struct FitComparisonFile<'a> {
         format: u32,
         title: &'a str,
         every_model_explains_recording: bool,
@@ -62,10 +62,10 @@ pub fn several_json(several: &Several) -> Result<String, serde_json::Error> {
         summary: Vec<String>,
         statements: &'a [Statement],
         parameters: &'a [SharedParameter],
-        fits: Vec<Fit<'a>>,
-        figures: Vec<Listed<'a>>,
+        fits: Vec<ComparedFitDocument<'a>>,
+        figures: Vec<FigureEntry<'a>>,
     }
-    let file = File {
+    let file = FitComparisonFile {
         format: FORMAT,
         title: &several.title,
         every_model_explains_recording: (several.fits.iter()).all(|fit| fit.verdict.model_explains_recording),
@@ -77,12 +77,15 @@ pub fn several_json(several: &Several) -> Result<String, serde_json::Error> {
         fits: several
             .fits
             .iter()
-            .map(|fit| Fit { name: &fit.name, written: Written::of(&fit.report, &fit.verdict) })
+            .map(|fit| ComparedFitDocument {
+                name: &fit.name,
+                written: ReportDocument::new(&fit.report, &fit.verdict),
+            })
             .collect(),
         figures: several
             .figures
             .iter()
-            .map(|f| Listed { file: &f.file, caption: &f.caption, details: &f.details, subject: None })
+            .map(|f| FigureEntry { file: &f.file, caption: &f.caption, details: &f.details, subject: None })
             .collect(),
     };
     serde_json::to_string_pretty(&file).map(|text| text + "\n")

@@ -3,16 +3,16 @@
 //! A name may be written from right to left, or hold characters that turn the direction of what follows. The
 //! page isolates each name; text without markup drops the characters that would turn it.
 
-use crate::text::printable;
+use crate::text::make_printable;
 use serde::{Serialize, Serializer};
 
 /// A sentence: own words and names in turn.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Sentence(Vec<Piece>);
+pub struct Sentence(Vec<SentencePart>);
 
 /// A part of a sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Piece {
+pub enum SentencePart {
     /// The program's own words.
     Words(String),
     /// A name that a user chose.
@@ -22,46 +22,46 @@ pub enum Piece {
 impl Sentence {
     /// A sentence of own words.
     #[must_use]
-    pub fn of(words: impl Into<String>) -> Self {
-        Self::default().words(words)
+    pub fn new(words: impl Into<String>) -> Self {
+        Self::default().with_words(words)
     }
 
     /// The same, continued with own words.
     #[must_use]
-    pub fn words(mut self, words: impl Into<String>) -> Self {
-        self.0.push(Piece::Words(words.into()));
+    pub fn with_words(mut self, words: impl Into<String>) -> Self {
+        self.0.push(SentencePart::Words(words.into()));
         self
     }
 
     /// The same, continued with a name.
     #[must_use]
-    pub fn name(mut self, name: &str) -> Self {
-        self.0.push(Piece::Name(printable(name)));
+    pub fn with_name(mut self, name: &str) -> Self {
+        self.0.push(SentencePart::Name(make_printable(name)));
         self
     }
 
     /// The same, continued with names and commas between them.
     #[must_use]
-    pub fn names<'a>(self, names: impl IntoIterator<Item = &'a str>) -> Self {
+    pub fn with_names<'a>(self, names: impl IntoIterator<Item = &'a str>) -> Self {
         let joined = |sentence: Self, (i, name): (usize, &str)| {
-            if i == 0 { sentence.name(name) } else { sentence.words(", ").name(name) }
+            if i == 0 { sentence.with_name(name) } else { sentence.with_words(", ").with_name(name) }
         };
         names.into_iter().enumerate().fold(self, joined)
     }
 
     /// Its parts in order.
     #[must_use]
-    pub fn pieces(&self) -> &[Piece] {
+    pub fn parts(&self) -> &[SentencePart] {
         &self.0
     }
 
     /// As text without markup.
     #[must_use]
-    pub fn plain(&self) -> String {
+    pub fn plain_text(&self) -> String {
         self.0
             .iter()
             .map(|piece| match piece {
-                Piece::Words(text) | Piece::Name(text) => text.as_str(),
+                SentencePart::Words(text) | SentencePart::Name(text) => text.as_str(),
             })
             .collect()
     }
@@ -69,7 +69,7 @@ impl Sentence {
 
 impl Serialize for Sentence {
     fn serialize<S: Serializer>(&self, to: S) -> Result<S::Ok, S::Error> {
-        to.serialize_str(&self.plain())
+        to.serialize_str(&self.plain_text())
     }
 }
 
@@ -87,21 +87,21 @@ pub struct Statement {
 impl Statement {
     /// A statement without details.
     #[must_use]
-    pub fn alone(statement: Sentence) -> Self {
+    pub fn new(statement: Sentence) -> Self {
         Self { statement, ..Self::default() }
     }
 
     /// The same, being as one would have it or not.
     #[must_use]
-    pub fn judged(self, good: bool) -> Self {
+    pub fn with_verdict(self, good: bool) -> Self {
         Self { good: Some(good), ..self }
     }
 
     /// The whole as one line of text.
     #[must_use]
-    pub fn plain(&self) -> String {
-        let details: Vec<String> = self.details.iter().map(Sentence::plain).collect();
-        let statement = self.statement.plain();
+    pub fn plain_text(&self) -> String {
+        let details: Vec<String> = self.details.iter().map(Sentence::plain_text).collect();
+        let statement = self.statement.plain_text();
         if details.is_empty() {
             statement
         } else {
@@ -116,14 +116,14 @@ mod tests {
 
     #[test]
     fn a_statement_is_one_line_with_its_details() {
-        let names = Sentence::of("open: ").names(["a\u{202e}", "b"]);
-        assert_eq!(names.pieces().len(), 4);
+        let names = Sentence::new("open: ").with_names(["a\u{202e}", "b"]);
+        assert_eq!(names.parts().len(), 4);
         let statement = Statement {
-            statement: Sentence::of("One is met."),
-            details: vec![names, Sentence::of("x")],
+            statement: Sentence::new("One is met."),
+            details: vec![names, Sentence::new("x")],
             ..Statement::default()
         };
-        assert_eq!(statement.plain(), "One is met: open: a, b; x.");
-        assert_eq!(Statement::alone(Sentence::of("Nothing.")).plain(), "Nothing.");
+        assert_eq!(statement.plain_text(), "One is met: open: a, b; x.");
+        assert_eq!(Statement::new(Sentence::new("Nothing.")).plain_text(), "Nothing.");
     }
 }

@@ -3,18 +3,21 @@
 use super::Report;
 use super::answer;
 use super::statement::{Sentence, Statement};
-use crate::compare::{Comparison, ParameterLine, RunLine, Truth};
+use crate::compare::{Comparison, ParameterLine, RunSummary, Truth};
 use crate::figures::OPPOSED;
-use crate::fit::misfit::{ChannelMisfit, Misfit, far_from_priors, unexplained};
-use crate::fit::uncertainty::Verdict as Knowledge;
-use crate::simulate::Status;
-use crate::text::{self, interval, number, percent, plural, printable, signed_percent, with_sd};
+use crate::fit::misfit::{ChannelMisfit, TraceMisfit, far_from_priors, unexplained_headline};
+use crate::fit::uncertainty::ParameterVerdict as Knowledge;
+use crate::simulate::RunStatus;
+use crate::text::{
+    self, format_interval, format_number, format_percent, format_signed_percent, format_with_sd,
+    make_printable, pluralise,
+};
 use serde::Serialize;
 
 /// The verdict on a fit.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 #[allow(clippy::struct_excessive_bools)] // they are the answers that a script asks for
-pub struct Verdict {
+pub struct ReportVerdict {
     /// Whether the model explains the traces that were fitted; also without traces.
     pub model_explains_recording: bool,
     /// Whether every component is within its tolerance; also without components.
@@ -38,10 +41,10 @@ pub struct Verdict {
     pub statements: Vec<Statement>,
 }
 
-impl Verdict {
+impl ReportVerdict {
     /// The verdict on what a report holds.
     #[must_use]
-    pub fn of(report: &Report) -> Self {
+    pub fn from_report(report: &Report) -> Self {
         let met = |list: &[Comparison]| list.iter().all(|c| c.pass);
         Self {
             model_explains_recording: is_explained(report),
@@ -50,10 +53,10 @@ impl Verdict {
             all_held_out_met: met(&report.held_out),
             all_parameters_identified: report.parameters.iter().all(ParameterLine::is_identified),
             search_converged: report.search.converged,
-            all_runs_completed: report.runs.iter().all(|run| run.status == Status::Completed),
+            all_runs_completed: report.runs.iter().all(|run| run.status == RunStatus::Completed),
             synthetic: report.is_synthetic(),
             published_only: report.recordings.is_empty(),
-            statements: statements(report),
+            statements: verdict_statements(report),
         }
     }
 
@@ -66,54 +69,61 @@ impl Verdict {
     /// The statements as lines of text.
     #[must_use]
     pub fn summary(&self) -> Vec<String> {
-        self.statements.iter().map(Statement::plain).collect()
+        self.statements.iter().map(Statement::plain_text).collect()
     }
 }
 
-fn statements(report: &Report) -> Vec<Statement> {
-    let mut found: Vec<Statement> = report.misfit.iter().map(misfit).collect();
-    found.extend(far_camera(report));
+fn verdict_statements(report: &Report) -> Vec<Statement> {
+    let mut found: Vec<Statement> = report.misfit.iter().map(misfit_statement).collect();
+    found.extend(far_camera_statement(report));
     if report.misfit.is_none() && !report.recordings.is_empty() {
-        found.push(Statement { details: Vec::new(), ..answer::headline(report) });
+        found.push(Statement { details: Vec::new(), ..answer::report_headline(report) });
     }
-    found.extend(met("component", "", &report.components, |_| true));
-    found.extend(met("feature", " within 1.96 standard deviations of the target", &report.features, |c| {
-        !c.pass
-    }));
-    found.extend(met("value that was held out of the fit", "", &report.held_out, |_| true));
+    found.extend(met_statement("component", "", &report.components, |_| true));
+    found.extend(met_statement(
+        "feature",
+        " within 1.96 standard deviations of the target",
+        &report.features,
+        |c| !c.pass,
+    ));
+    found.extend(met_statement("value that was held out of the fit", "", &report.held_out, |_| true));
     if found.is_empty() {
-        found.push(Statement::alone(Sentence::of("Nothing was compared.")));
+        found.push(Statement::new(Sentence::new("Nothing was compared.")));
     }
     let (known, open): (Vec<_>, Vec<_>) = report.parameters.iter().partition(|p| p.is_identified());
     let all = report.parameters.len();
     if !known.is_empty() {
-        found.push(parameters(
-            format!("The data determine {} of {all} {}", known.len(), plural("parameter", all)),
+        found.push(parameter_statement(
+            format!("The data determine {} of {all} {}", known.len(), pluralise("parameter", all)),
             &known,
             open.is_empty().then_some(true),
         ));
     }
     if !open.is_empty() {
-        found.push(parameters(
-            format!("{} of {all} {} not determined", open.len(), are("parameter", open.len(), all)),
+        found.push(parameter_statement(
+            format!(
+                "{} of {all} {} not determined",
+                open.len(),
+                noun_with_verb("parameter", open.len(), all)
+            ),
             &open,
             Some(false),
         ));
     }
-    found.extend(truth(&report.parameters));
-    let details = report.advice.iter().map(|advice| Sentence::of(printable(advice)));
+    found.extend(truth_statement(&report.parameters));
+    let details = report.advice.iter().map(|advice| Sentence::new(make_printable(advice)));
     found.extend((!report.advice.is_empty()).then(|| Statement {
-        statement: Sentence::of("What to measure in addition"),
+        statement: Sentence::new("What to measure in addition"),
         details: details.collect(),
         good: None,
     }));
     if report.recordings.is_empty() {
-        found.push(Statement::alone(Sentence::of(
+        found.push(Statement::new(Sentence::new(
             "Only published numbers were fitted, and those that the job assumes. There are no measured \
              traces, so the figures show the model alone.",
         )));
     }
-    found.extend(ended(report));
+    found.extend(ending_statements(report));
     // what does not fit is said before what does
     found.sort_by_key(|statement| statement.good != Some(false));
     found
@@ -127,26 +137,27 @@ fn is_explained(report: &Report) -> bool {
 }
 
 /// Features that need a camera which is far from its prior.
-fn far_camera(report: &Report) -> Option<Statement> {
+fn far_camera_statement(report: &Report) -> Option<Statement> {
     let reasons = far_from_priors(&report.nuisances);
-    let statement = || Statement::alone(Sentence::of(unexplained(&reasons))).judged(false);
+    let statement = || Statement::new(Sentence::new(unexplained_headline(&reasons))).with_verdict(false);
     (report.misfit.is_none() && !reasons.is_empty()).then(statement)
 }
 
 /// Whether the model explains the traces, with the residuals of every channel.
-fn misfit(misfit: &Misfit) -> Statement {
+fn misfit_statement(misfit: &TraceMisfit) -> Statement {
     Statement {
-        statement: Sentence::of(misfit.sentence()),
-        details: misfit.channels.iter().map(residuals).collect(),
+        statement: Sentence::new(misfit.headline()),
+        details: misfit.channels.iter().map(residual_sentence).collect(),
         good: Some(misfit.explained),
     }
 }
 
 /// Residuals of a channel against its noise, and where it fits worst.
-fn residuals(c: &ChannelMisfit) -> Sentence {
-    let um = |metres: f64| number(1e6 * metres);
+fn residual_sentence(c: &ChannelMisfit) -> Sentence {
+    let um = |metres: f64| format_number(1e6 * metres);
     let worst = c.worst.first().map_or_else(String::new, |w| {
-        let (from, to, chi2) = (number(w.start_s), number(w.end_s), number(w.chi2_per_dof));
+        let (from, to, chi2) =
+            (format_number(w.start_s), format_number(w.end_s), format_number(w.chi2_per_dof));
         format!("; worst from {from} s to {to} s, with {chi2} times the variance of the noise")
     });
     let words = format!(
@@ -155,12 +166,12 @@ fn residuals(c: &ChannelMisfit) -> Sentence {
         um(c.residual_rms_m),
         um(c.noise_m)
     );
-    Sentence::default().name(&c.recording).words(words)
+    Sentence::default().with_name(&c.recording).with_words(words)
 }
 
 /// "parameters are", "parameter is".
-fn are(noun: &str, count: usize, of: usize) -> String {
-    format!("{} {}", plural(noun, of), if count == 1 { "is" } else { "are" })
+fn noun_with_verb(noun: &str, count: usize, of: usize) -> String {
+    format!("{} {}", pluralise(noun, of), if count == 1 { "is" } else { "are" })
 }
 
 /// What is counted, and the same of several.
@@ -168,7 +179,7 @@ const NOUNS: [[&str; 2]; 3] =
     [["value that was", "values that were"], ["component", "components"], ["feature", "features"]];
 
 /// "2 of 2 components are met", with details of those that are `listed`.
-fn met(
+fn met_statement(
     noun: &str,
     how: &str,
     list: &[Comparison],
@@ -181,145 +192,161 @@ fn met(
         NOUNS.iter().fold(noun.to_owned(), |noun, [one, many]| noun.replacen(one, many, 1))
     };
     let verb = if count == 1 { "is" } else { "are" };
-    let statement = Sentence::of(format!("{count} of {total} {noun} {verb} met{how}"));
+    let statement = Sentence::new(format!("{count} of {total} {noun} {verb} met{how}"));
     (total > 0).then(|| Statement {
         statement,
-        details: list.iter().filter(listed).map(compared).collect(),
+        details: list.iter().filter(listed).map(comparison_sentence).collect(),
         good: Some(count == total),
     })
 }
 
 /// Name, model, target with its deviation, error and tolerance.
-pub(super) fn compared(c: &Comparison) -> Sentence {
-    let (unit, factor) = text::unit(&c.unit, [c.target]);
+pub(super) fn comparison_sentence(c: &Comparison) -> Sentence {
+    let (unit, factor) = text::choose_prefix(&c.unit, [c.target]);
     let unit = if unit.is_empty() { unit } else { format!(" {unit}") };
-    let target = format!("{}{unit}", with_sd(c.target * factor, c.target_sd.map(|sd| sd * factor)));
+    let target = format!("{}{unit}", format_with_sd(c.target * factor, c.target_sd.map(|sd| sd * factor)));
     let given = if c.given { " as given in the job" } else { "" };
     let named = match &c.condition {
-        Some(condition) => Sentence::default().name(&c.name).words(" (").name(condition).words(")"),
-        None => Sentence::default().name(&c.name),
+        Some(condition) => {
+            Sentence::default().with_name(&c.name).with_words(" (").with_name(condition).with_words(")")
+        }
+        None => Sentence::default().with_name(&c.name),
     };
     let Some(model) = c.model else {
         let why = c.missing.as_ref().map_or_else(String::new, |why| format!(" ({why})"));
-        return named.words(format!(" does not appear in the model{why}; target {target}{given}"));
+        return named.with_words(format!(" does not appear in the model{why}; target {target}{given}"));
     };
-    let error =
-        c.relative_error.map_or_else(String::new, |error| format!(", off by {}", signed_percent(error)));
+    let error = c
+        .relative_error
+        .map_or_else(String::new, |error| format!(", off by {}", format_signed_percent(error)));
     let within = if c.pass { "within" } else { "beyond" };
     let tolerance = match c.tolerance_relative {
-        Some(tolerance) => format!(", {within} the tolerance of {}", percent(tolerance)),
+        Some(tolerance) => format!(", {within} the tolerance of {}", format_percent(tolerance)),
         None => format!(", {within} the 95 % interval of the target"),
     };
-    named.words(format!(": model {}{unit}, target {target}{given}{error}{tolerance}", number(model * factor)))
+    named.with_words(format!(
+        ": model {}{unit}, target {target}{given}{error}{tolerance}",
+        format_number(model * factor)
+    ))
 }
 
-fn parameters(statement: String, list: &[&ParameterLine], good: Option<bool>) -> Statement {
+fn parameter_statement(statement: String, list: &[&ParameterLine], good: Option<bool>) -> Statement {
     Statement {
-        statement: Sentence::of(statement),
-        details: list.iter().map(|p| parameter(p)).collect(),
+        statement: Sentence::new(statement),
+        details: list.iter().map(|p| parameter_sentence(p)).collect(),
         good,
     }
 }
 
-fn parameter(p: &ParameterLine) -> Sentence {
-    let (unit, factor) = text::unit(&p.unit, [p.estimate]);
+fn parameter_sentence(p: &ParameterLine) -> Sentence {
+    let (unit, factor) = text::choose_prefix(&p.unit, [p.estimate]);
     let unit = if unit.is_empty() { unit } else { format!(" {unit}") };
-    let number = |value: f64| number(value * factor);
+    let number = |value: f64| format_number(value * factor);
     let why = p.why.as_ref().map_or_else(String::new, |why| format!("; {why}"));
-    let range = interval(p.lower_95, p.upper_95, number);
+    let range = format_interval(p.lower_95, p.upper_95, number);
     let at = if p.lower_95.is_some() && p.upper_95.is_some() { "from " } else { "" };
     let range = match p.verdict == Knowledge::NotIdentified {
         true if !p.is_bounded() => "no end of a 95 % interval is known".to_owned(),
         true => format!("equally good fits lie {at}{range}"),
         false => format!("95 % interval {range}"),
     };
-    Sentence::default().name(&p.name).words(format!(" = {}{unit}, {range}{why}", number(p.estimate)))
+    Sentence::default()
+        .with_name(&p.name)
+        .with_words(format!(" = {}{unit}, {range}{why}", number(p.estimate)))
 }
 
 /// How many intervals hold the truth behind synthetic data.
-fn truth(parameters: &[ParameterLine]) -> Option<Statement> {
+fn truth_statement(parameters: &[ParameterLine]) -> Option<Statement> {
     let (known, open): (Vec<_>, Vec<_>) =
         parameters.iter().filter_map(|p| p.truth.map(|truth| (p, truth))).partition(|(p, _)| p.is_bounded());
     if known.is_empty() {
         let all = "No 95 % interval has an end, so none can be compared with the values behind the synthetic \
                    data";
-        return (!open.is_empty()).then(|| Statement::alone(Sentence::of(all)));
+        return (!open.is_empty()).then(|| Statement::new(Sentence::new(all)));
     }
     let inside = known.iter().filter(|(_, truth)| truth.inside_95).count();
     let without_end = match open.len() {
         0 => String::new(),
         n => format!("; {n} {} no end", if n == 1 { "more has" } else { "more have" }),
     };
-    let statement = Sentence::of(format!(
+    let statement = Sentence::new(format!(
         "The value behind the synthetic data lies inside the 95 % interval of {inside} of {} {}{without_end}",
         known.len(),
-        plural("parameter", known.len())
+        pluralise("parameter", known.len())
     ));
     let outside = known.iter().filter(|(_, truth)| !truth.inside_95);
     let detail = |(p, truth): &(&ParameterLine, Truth)| {
-        Sentence::default().name(&p.name).words(format!(
+        Sentence::default().with_name(&p.name).with_words(format!(
             " is {} in truth, outside {}",
-            number(truth.value),
-            interval(p.lower_95, p.upper_95, number)
+            format_number(truth.value),
+            format_interval(p.lower_95, p.upper_95, format_number)
         ))
     };
     Some(Statement { statement, details: outside.map(detail).collect(), good: Some(inside == known.len()) })
 }
 
 /// How search and best run ended.
-fn ended(report: &Report) -> Vec<Statement> {
+fn ending_statements(report: &Report) -> Vec<Statement> {
     let search = &report.search;
     let mut found = Vec::new();
     if let Some(status) = search.status {
         let how = if search.converged {
             "The search converged".to_owned()
         } else {
-            format!("The search ended before it had converged ({})", status.word())
+            format!("The search ended before it had converged ({})", status.name())
         };
         let failed: usize = search.failed.iter().map(|f| f.count).sum();
         let failed = if failed == 0 { "none failed".to_owned() } else { format!("{failed} failed") };
         let made = search.evaluations;
         let words = match report.misfit {
             None => {
-                format!("{how}, after {made} {} of the model, of which {failed}.", plural("evaluation", made))
+                format!(
+                    "{how}, after {made} {} of the model, of which {failed}.",
+                    pluralise("evaluation", made)
+                )
             }
             Some(_) => {
                 let starts = search.local_searches;
-                format!("{how}, after {made} {} from {starts} starts.", plural("iterate", made))
+                format!("{how}, after {made} {} from {starts} starts.", pluralise("iterate", made))
             }
         };
-        found.push(Statement::alone(Sentence::of(words)).judged(search.converged));
+        found.push(Statement::new(Sentence::new(words)).with_verdict(search.converged));
     }
-    found.extend(report.runs.iter().filter(|run| run.status == Status::Completed).filter_map(hard_events));
+    found.extend(
+        report.runs.iter().filter(|run| run.status == RunStatus::Completed).filter_map(hard_event_statement),
+    );
     for run in report.runs.iter().filter(|run| run.opposite_turn) {
         let words = format!(": {}{}.", OPPOSED[..1].to_lowercase(), &OPPOSED[1..]);
-        found.push(Statement::alone(Sentence::of("In ").name(&run.name).words(words)).judged(false));
+        found.push(
+            Statement::new(Sentence::new("In ").with_name(&run.name).with_words(words)).with_verdict(false),
+        );
     }
-    for run in report.runs.iter().filter(|run| run.status != Status::Completed) {
+    for run in report.runs.iter().filter(|run| run.status != RunStatus::Completed) {
         let ended = format!(
             " ended early, at {} s as {}: {}.",
-            number(run.stopped_at_s),
+            format_number(run.stopped_at_s),
             run.status.name(),
             run.status.meaning()
         );
         found.push(
-            Statement::alone(Sentence::of("The best model's run in ").name(&run.name).words(ended))
-                .judged(false),
+            Statement::new(Sentence::new("The best model's run in ").with_name(&run.name).with_words(ended))
+                .with_verdict(false),
         );
     }
     found
 }
 
 /// What a run went through and went on; nothing where the tip stays on the glass.
-fn hard_events(run: &RunLine) -> Option<Statement> {
-    let times =
-        |count: usize, what: &str| (count > 0).then(|| format!("{what} {count} {}", plural("time", count)));
+fn hard_event_statement(run: &RunSummary) -> Option<Statement> {
+    let times = |count: usize, what: &str| {
+        (count > 0).then(|| format!("{what} {count} {}", pluralise("time", count)))
+    };
     let events: Vec<String> = [times(run.contact_losses, "leaves the glass"), times(run.jams, "jams")]
         .into_iter()
         .flatten()
         .collect();
     let words = format!(" the best model's tip {}.", events.join(" and "));
-    (!events.is_empty()).then(|| Statement::alone(Sentence::of("In ").name(&run.name).words(words)))
+    (!events.is_empty()).then(|| Statement::new(Sentence::new("In ").with_name(&run.name).with_words(words)))
 }
 
 #[cfg(test)]
@@ -367,7 +394,7 @@ mod tests {
             recordings: Vec::new(),
             ..Report::default()
         };
-        let verdict = Verdict::of(&report);
+        let verdict = ReportVerdict::from_report(&report);
         let expected = "1 of 3 components is met: low: model 101.0 Hz, target 100.0(5) Hz, off by +1.00 %, \
                         within the tolerance of 2 %; \
             high: model 80.00 Hz, target 100.0(5) Hz, off by \u{2212}20.00 %, beyond the tolerance of 2 %; \
@@ -389,7 +416,11 @@ mod tests {
         let mut known = parameter("friction.a", Knowledge::Identified, Some(0.6));
         known.truth = Some(Truth { value: 0.55, inside_95: known.holds(0.55) });
         let advice = vec!["measure the release".to_owned()];
-        let verdict = Verdict::of(&Report { parameters: vec![known, wide], advice, ..Report::default() });
+        let verdict = ReportVerdict::from_report(&Report {
+            parameters: vec![known, wide],
+            advice,
+            ..Report::default()
+        });
         let expected = [
             "1 of 2 parameters is not determined: friction.c = 0.5000, 95 % interval above 0.4000; only a \
              lower limit is known.",
@@ -422,11 +453,11 @@ mod tests {
             ..ChannelMisfit::default()
         };
         let report = |stage| Report {
-            misfit: Some(Misfit::of(vec![channel.clone()], vec![stage], &[])),
+            misfit: Some(TraceMisfit::judge(vec![channel.clone()], vec![stage], &[])),
             components: vec![comparison("low", Some(101.0), true)],
             ..Report::default()
         };
-        let wrong = Verdict::of(&report(stage.clone()));
+        let wrong = ReportVerdict::from_report(&report(stage.clone()));
         assert!(!wrong.model_explains_recording && wrong.all_components_met && !wrong.passes());
         assert_eq!(
             wrong.summary()[0],
@@ -434,7 +465,7 @@ mod tests {
              tip-x: residuals of 3.000 \u{b5}m rms, noise of 2.000 \u{b5}m; worst from 0.2500 s to 0.2660 s, \
              with 9.000 times the variance of the noise."
         );
-        assert!(Verdict::of(&report(StageMisfit { bad_segments: 0, ..stage })).passes());
+        assert!(ReportVerdict::from_report(&report(StageMisfit { bad_segments: 0, ..stage })).passes());
     }
 
     #[test]
@@ -449,30 +480,34 @@ mod tests {
             ..parameter("friction.c", Knowledge::Identified, Some(0.6))
         };
         let of = |parameters: Vec<ParameterLine>| {
-            Verdict::of(&Report { parameters, ..Report::default() }).statements
+            ReportVerdict::from_report(&Report { parameters, ..Report::default() }).statements
         };
         let alone = of(vec![open(9.0)]);
-        let said = alone.iter().find(|s| s.plain().contains("behind the synthetic data")).unwrap();
-        assert!(said.plain().starts_with("No 95 % interval has an end") && said.good.is_none(), "{said:?}");
+        let said = alone.iter().find(|s| s.plain_text().contains("behind the synthetic data")).unwrap();
+        assert!(
+            said.plain_text().starts_with("No 95 % interval has an end") && said.good.is_none(),
+            "{said:?}"
+        );
         assert!(
             alone
                 .iter()
-                .any(|s| s.plain().contains("friction.a = 0.5000, no end of a 95 % interval is known")),
+                .any(|s| s.plain_text().contains("friction.a = 0.5000, no end of a 95 % interval is known")),
             "{alone:?}"
         );
         let both = of(vec![known, open(9.0)]);
         assert!(
-            both.iter().any(|s| s.plain().ends_with("interval of 1 of 1 parameter; 1 more has no end")),
+            both.iter().any(|s| s.plain_text().ends_with("interval of 1 of 1 parameter; 1 more has no end")),
             "{both:?}"
         );
     }
 
     #[test]
     fn a_head_that_turns_the_other_way_is_said_and_is_not_good() {
-        let runs = vec![RunLine { name: "r".to_owned(), opposite_turn: true, ..Default::default() }];
-        let said = Verdict::of(&Report { runs, ..Report::default() }).statements.swap_remove(0);
+        let runs = vec![RunSummary { name: "r".to_owned(), opposite_turn: true, ..Default::default() }];
+        let said =
+            ReportVerdict::from_report(&Report { runs, ..Report::default() }).statements.swap_remove(0);
         assert!(
-            said.plain().starts_with("In r: the recorded head turns the other way than the model's")
+            said.plain_text().starts_with("In r: the recorded head turns the other way than the model's")
                 && said.good == Some(false),
             "{said:?}"
         );
@@ -480,13 +515,14 @@ mod tests {
 
     #[test]
     fn a_tip_that_leaves_the_glass_and_comes_back_is_said_to() {
-        let run = |contact_losses, jams| RunLine {
+        let run = |contact_losses, jams| RunSummary {
             name: "r".to_owned(),
             contact_losses,
             jams,
-            ..RunLine::default()
+            ..RunSummary::default()
         };
-        let said = |run| Verdict::of(&Report { runs: vec![run], ..Report::default() }).summary();
+        let said =
+            |run| ReportVerdict::from_report(&Report { runs: vec![run], ..Report::default() }).summary();
         assert!(
             said(run(10, 1))
                 .contains(&"In r the best model's tip leaves the glass 10 times and jams 1 time.".to_owned()),
@@ -498,7 +534,7 @@ mod tests {
 
     #[test]
     fn where_nothing_is_known_that_is_said_once() {
-        let summary = Verdict::of(&Report {
+        let summary = ReportVerdict::from_report(&Report {
             parameters: vec![parameter("friction.c", Knowledge::OpenAbove, None)],
             ..Report::default()
         })
@@ -514,7 +550,7 @@ mod tests {
     fn several_held_out_values_are_met_in_the_plural_and_a_name_breaks_no_line() {
         let held_out = vec![comparison("a", Some(100.0), true), comparison("b", Some(100.0), true)];
         let advice = vec!["measure the damping of `a\nb\u{202e}c`".to_owned()];
-        let summary = Verdict::of(&Report { held_out, advice, ..Report::default() }).summary();
+        let summary = ReportVerdict::from_report(&Report { held_out, advice, ..Report::default() }).summary();
         assert!(summary[0].starts_with("2 of 2 values that were held out of the fit are met"), "{summary:?}");
         assert!(summary.iter().all(|line| !line.contains(['\n', '\u{202e}'])), "{summary:?}");
     }
@@ -522,11 +558,11 @@ mod tests {
     #[test]
     fn a_search_that_did_not_converge_is_said() {
         let search = SearchLine {
-            status: Some(result::Status::BudgetExhausted),
+            status: Some(result::FitStatus::BudgetExhausted),
             evaluations: 1,
             ..SearchLine::default()
         };
-        let verdict = Verdict::of(&Report { search, ..Report::default() });
+        let verdict = ReportVerdict::from_report(&Report { search, ..Report::default() });
         // (what is not as one would have it comes first)
         assert_eq!(
             verdict.summary()[0],

@@ -1,8 +1,10 @@
 //! What ruler, scale and a spectrum show of a scene's blade: numbers to hold against the real one.
 
-use crate::blade::modes::{NamedFrequencies, NaturalMode, Tip, modes, named, tip_compliance};
-use crate::blade::{Directions, Linkage};
-use crate::simulate::equilibrium::steady_slide;
+use crate::blade::modes::{
+    BodyFrequencies, NaturalMode, TipConstraint, body_frequencies, natural_modes, tip_compliance,
+};
+use crate::blade::{LinkDirections, Linkage};
+use crate::simulate::equilibrium::steady_slip_pose;
 use crate::simulate::scene::{Drive, Scene};
 use serde::Serialize;
 use std::f64::consts::TAU;
@@ -12,7 +14,7 @@ pub const FREE_FALL_M_PER_S2: f64 = 9.806_65;
 
 /// Numbers to check with simple means; lengths in m, forces in N, masses in kg.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Checks {
+pub struct BenchChecks {
     /// Mass of neck and lip: the rubber that is cut off below the head.
     pub rubber_mass_kg: f64,
     /// Mass of head, neck and lip.
@@ -20,7 +22,7 @@ pub struct Checks {
     /// Their weight.
     pub weight_n: f64,
     /// Masses and preload over the length of blade, where that is known.
-    pub per_metre: Option<PerMetre>,
+    pub per_metre: Option<ChecksPerMetre>,
     /// Force on the tip for which the displacements are.
     pub tip_force_n: f64,
     /// How far such a force along the glass moves the tip of a blade in free air, its head held: `F ((l1 +
@@ -33,7 +35,7 @@ pub struct Checks {
     /// The preload.
     pub preload_force_n: f64,
     /// Natural frequencies of the single parts.
-    pub parts: Frequencies,
+    pub parts: PartFrequencies,
     /// Coupled modes in free air, the head held, Hz.
     pub free_air_hz: Vec<Option<f64>>,
     /// The same on the glass under the preload, the tip sliding without friction; `None` for a mode that the
@@ -43,13 +45,13 @@ pub struct Checks {
     pub held_tip_hz: Vec<Option<f64>>,
     /// The blade in steady slip at the head's top speed; `None` for a recorded drive or a blade without such
     /// an equilibrium.
-    pub slide: Option<Slide>,
+    pub slide: Option<SteadySlipCheck>,
 }
 
 /// What does not depend on the length of blade.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[allow(missing_docs)] // named with their units
-pub struct PerMetre {
+pub struct ChecksPerMetre {
     pub rubber_mass_kg_per_m: f64,
     pub mass_kg_per_m: f64,
     pub press_force_n_per_m: f64,
@@ -58,7 +60,7 @@ pub struct PerMetre {
 /// Natural frequencies of head, neck and lip, Hz.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[allow(missing_docs)] // named with their unit
-pub struct Frequencies {
+pub struct PartFrequencies {
     pub head_hz: f64,
     pub neck_hz: f64,
     pub lip_hz: f64,
@@ -66,7 +68,7 @@ pub struct Frequencies {
 
 /// A blade in steady slip.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Slide {
+pub struct SteadySlipCheck {
     /// Speed of the head, m/s.
     pub speed_m_per_s: f64,
     /// How far the tip trails, m.
@@ -79,20 +81,20 @@ pub struct Slide {
     pub lip_angle_rad: f64,
 }
 
-impl Checks {
+impl BenchChecks {
     /// Of a scene's blade, for a force on its tip, N, and the length of blade that its masses are for, m.
     #[must_use]
-    pub fn of(scene: &Scene, tip_force_n: f64, length_m: Option<f64>) -> Self {
+    pub fn from_scene(scene: &Scene, tip_force_n: f64, length_m: Option<f64>) -> Self {
         let blade = &scene.linkage;
         let in_air = Linkage { preload_displacement_m: 0.0, ..*blade };
         let rubber_mass_kg = blade.mass_kg - scene.value("blade.head_mass_kg").unwrap_or(0.0);
         let preload_force_n = blade.preload_displacement_m * blade.head.stiffness;
-        let per_metre = length_m.map(|length_m| PerMetre {
+        let per_metre = length_m.map(|length_m| ChecksPerMetre {
             rubber_mass_kg_per_m: rubber_mass_kg / length_m,
             mass_kg_per_m: blade.mass_kg / length_m,
             press_force_n_per_m: preload_force_n / length_m,
         });
-        let NamedFrequencies { head_hz, neck_hz, lip_hz } = named(blade);
+        let BodyFrequencies { head_hz, neck_hz, lip_hz } = body_frequencies(blade);
         Self {
             rubber_mass_kg,
             mass_kg: blade.mass_kg,
@@ -103,26 +105,26 @@ impl Checks {
             lip_displacement_m: tip_force_n * blade.l2_m * blade.l2_m / blade.lip.stiffness,
             preload_displacement_m: blade.preload_displacement_m,
             preload_force_n,
-            parts: Frequencies { head_hz, neck_hz, lip_hz },
-            free_air_hz: frequencies(&modes(&in_air, Tip::Free, false)),
-            sliding_tip_hz: frequencies(&modes(blade, Tip::Free, false)),
-            held_tip_hz: frequencies(&modes(blade, Tip::Held, false)),
-            slide: slide(scene),
+            parts: PartFrequencies { head_hz, neck_hz, lip_hz },
+            free_air_hz: mode_frequencies(&natural_modes(&in_air, TipConstraint::Free, false)),
+            sliding_tip_hz: mode_frequencies(&natural_modes(blade, TipConstraint::Free, false)),
+            held_tip_hz: mode_frequencies(&natural_modes(blade, TipConstraint::Held, false)),
+            slide: steady_slip_check(scene),
         }
     }
 }
 
-fn frequencies(modes: &[NaturalMode]) -> Vec<Option<f64>> {
+fn mode_frequencies(modes: &[NaturalMode]) -> Vec<Option<f64>> {
     modes.iter().map(|mode| mode.frequency_hz).collect()
 }
 
-fn slide(scene: &Scene) -> Option<Slide> {
+fn steady_slip_check(scene: &Scene) -> Option<SteadySlipCheck> {
     let Drive::Cosine { amplitude_m, frequency_hz, .. } = scene.drive else { return None };
     let speed_m_per_s = TAU * frequency_hz * amplitude_m;
     let blade = &scene.linkage;
-    let pose = steady_slide(blade, speed_m_per_s)?;
-    let Directions { sin_theta, cos_theta, sin_phi, cos_phi } = Directions::of(&pose);
-    Some(Slide {
+    let pose = steady_slip_pose(blade, speed_m_per_s)?;
+    let LinkDirections { sin_theta, cos_theta, sin_phi, cos_phi } = LinkDirections::from_pose(&pose);
+    Some(SteadySlipCheck {
         speed_m_per_s,
         deflection_m: -(blade.l1_m * sin_theta + blade.l2_m * sin_phi),
         head_drop_m: blade.l1_m * (1.0 - cos_theta) + blade.l2_m * (1.0 - cos_phi),

@@ -1,9 +1,9 @@
 //! The `[blade]` table that follows from a section, with the equation and the uncertainty of each number.
 
-use super::input::Section;
-use super::keys::{Deviation, Key};
+use super::input::BladeSection;
+use super::keys::{InputDeviation, SectionKey};
 use super::shape::{LinkSection, plate_modulus_pa};
-use crate::text::{escaped, rounded};
+use crate::text::{escape_controls, round_to_digits};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -17,7 +17,7 @@ const LEAST_SHARE: f64 = 0.1;
 
 /// A number of the `[blade]` table.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Quantity {
+pub struct BladeTableEntry {
     /// Key in the table.
     pub key: &'static str,
     /// Value, in the unit of the key.
@@ -30,13 +30,13 @@ pub struct Quantity {
 
 /// The `[blade]` table of a section.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Estimate {
+pub struct BladeEstimate {
     /// Title of the section.
     pub title: String,
     /// Length of blade that every number is for, m.
     pub length_m: f64,
     /// The numbers, in the order of the table.
-    pub blade: Vec<Quantity>,
+    pub blade: Vec<BladeTableEntry>,
 }
 
 const MASS: &str = "rho b h (t1 + t2)/2";
@@ -46,14 +46,15 @@ const HINGE: &str = "E/(1 - nu^2) b t^3/(12 L), nu = 1/2, of the hinge";
 const BENDING: &str = "E/(1 - nu^2) b h^2/(12 int s^2/t(s)^3 ds), nu = 1/2, of the link's own bending";
 const RATIO: &str = "eta/2";
 
-impl Estimate {
+impl BladeEstimate {
     /// Of a section.
     #[must_use]
-    pub fn of(section: &Section) -> Self {
-        let numbers = numbers(section);
+    pub fn from_section(section: &BladeSection) -> Self {
+        let numbers = compute_entries(section);
         let blade = numbers.iter().enumerate().map(|(at, &(key, value, equation))| {
-            let variance: f64 = section.keys().map(|input| change(section, input, at)).map(|d| d * d).sum();
-            Quantity { key, value, equation, relative_uncertainty: variance.sqrt() / value }
+            let variance: f64 =
+                section.present_keys().map(|input| entry_change(section, input, at)).map(|d| d * d).sum();
+            BladeTableEntry { key, value, equation, relative_uncertainty: variance.sqrt() / value }
         });
         Self { title: section.title().to_owned(), length_m: section.length_m(), blade: blade.collect() }
     }
@@ -75,11 +76,12 @@ impl Estimate {
              # frequency, and that a link is no rigid body, comes on top.\n\
              # The head's damping does not follow from a section: add head_damping_ratio from a ring-down.\n\
              [blade]\n",
-            escaped(&self.title),
-            rounded(1e3 * self.length_m, DIGITS)
+            escape_controls(&self.title),
+            round_to_digits(1e3 * self.length_m, DIGITS)
         );
-        for Quantity { key, value, relative_uncertainty, equation } in &self.blade {
-            let (value, percent) = (rounded(*value, DIGITS), rounded(100.0 * relative_uncertainty, 2));
+        for BladeTableEntry { key, value, relative_uncertainty, equation } in &self.blade {
+            let (value, percent) =
+                (round_to_digits(*value, DIGITS), round_to_digits(100.0 * relative_uncertainty, 2));
             let _ = writeln!(text, "{key} = {value:?} # +-{percent} %: {equation}"); // cannot fail
         }
         text
@@ -87,7 +89,7 @@ impl Estimate {
 }
 
 /// Key, value and equation of every number.
-fn numbers(section: &Section) -> [(&'static str, f64, &'static str); COUNT] {
+fn compute_entries(section: &BladeSection) -> [(&'static str, f64, &'static str); COUNT] {
     let b = section.length_m();
     let rho = section.number("rubber.density_kg_per_m3");
     let modulus = plate_modulus_pa(section.number("rubber.youngs_modulus_pa"));
@@ -116,13 +118,13 @@ fn numbers(section: &Section) -> [(&'static str, f64, &'static str); COUNT] {
 }
 
 /// How far a standard deviation of an input moves the number `at`, from a central difference over it.
-fn change(section: &Section, input: &Key, at: usize) -> f64 {
+fn entry_change(section: &BladeSection, input: &SectionKey, at: usize) -> f64 {
     let value = section.number(input.name);
     let deviation = match input.deviation {
-        Deviation::Absolute(deviation) => deviation,
-        Deviation::Relative(share) => share * value,
+        InputDeviation::Absolute(deviation) => deviation,
+        InputDeviation::Relative(share) => share * value,
     };
     let (low, high) = ((value - deviation).max(LEAST_SHARE * value), value + deviation);
-    let moved = |value: f64| numbers(&section.with(input.name, value))[at].1;
+    let moved = |value: f64| compute_entries(&section.with_value(input.name, value))[at].1;
     (moved(high) - moved(low)) / (high - low) * deviation
 }

@@ -1,8 +1,8 @@
 //! `section.toml` as people write it and as validated.
 
-use super::keys::{KEYS, Key};
-use super::shape::{Hinge, LinkSection};
-use crate::plausibility::{self, Finding};
+use super::keys::{KEYS, SectionKey};
+use super::shape::{LinkSection, RubberHinge};
+use crate::plausibility::{self, PlausibilityFinding};
 use crate::toml_file::{self, TomlError};
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
@@ -27,7 +27,7 @@ pub enum SectionError {
     },
 }
 
-type Numbers = BTreeMap<String, f64>;
+type SectionNumbers = BTreeMap<String, f64>;
 
 /// The section of a blade, from which `wiperlab blade` computes the table of a scene.
 #[derive(Deserialize, JsonSchema)]
@@ -42,40 +42,40 @@ struct SectionFile {
     length_m: f64,
     /// The rubber of neck and lip.
     #[schemars(schema_with = "rubber")]
-    rubber: Numbers,
+    rubber: SectionNumbers,
     /// What moves with the head, per metre of blade.
     #[schemars(schema_with = "head")]
-    head: Numbers,
+    head: SectionNumbers,
     /// The neck.
     #[schemars(schema_with = "neck")]
-    neck: Numbers,
+    neck: SectionNumbers,
     /// The lip.
     #[schemars(schema_with = "lip")]
-    lip: Numbers,
+    lip: SectionNumbers,
 }
 
 fn length(_: &mut SchemaGenerator) -> Schema {
-    KEYS.iter().find(|key| key.name == "length_m").map_or_else(Schema::default, Key::schema)
+    KEYS.iter().find(|key| key.name == "length_m").map_or_else(Schema::default, SectionKey::schema)
 }
 
 fn rubber(_: &mut SchemaGenerator) -> Schema {
-    numbers("rubber")
+    number_table_schema("rubber")
 }
 
 fn head(_: &mut SchemaGenerator) -> Schema {
-    numbers("head")
+    number_table_schema("head")
 }
 
 fn neck(_: &mut SchemaGenerator) -> Schema {
-    numbers("neck")
+    number_table_schema("neck")
 }
 
 fn lip(_: &mut SchemaGenerator) -> Schema {
-    numbers("lip")
+    number_table_schema("lip")
 }
 
 /// The keys of a table.
-fn numbers(table: &str) -> Schema {
+fn number_table_schema(table: &str) -> Schema {
     let keys = || KEYS.iter().filter_map(|key| Some((key.name.split_once('.')?, key)));
     let keys = || keys().filter(|((of, _), _)| *of == table);
     let required: Vec<&str> = keys().filter(|(_, key)| !key.optional).map(|((_, name), _)| name).collect();
@@ -87,18 +87,18 @@ fn numbers(table: &str) -> Schema {
 
 /// A validated section: every number that the file has, by key.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Section {
+pub struct BladeSection {
     title: String,
     values: BTreeMap<&'static str, f64>,
 }
 
-impl Section {
+impl BladeSection {
     /// Reads and validates a section; `file` is the name used in refusals.
     ///
     /// # Errors
     /// [`SectionError`] with file, line, key, what was found, what was expected and what to do.
     pub fn parse(file: &str, text: &str) -> Result<Self, SectionError> {
-        let written: SectionFile = toml_file::parse(file, text)?;
+        let written: SectionFile = toml_file::parse_toml(file, text)?;
         toml_file::check_format(file, written.format)?;
         let tables = [
             ("rubber", written.rubber),
@@ -121,7 +121,7 @@ impl Section {
     /// The JSON Schema of section.toml: for editors, and for messages.
     #[must_use]
     pub fn schema() -> Value {
-        toml_file::schema::<SectionFile>()
+        toml_file::schema_of::<SectionFile>()
     }
 
     /// Title of the section.
@@ -138,21 +138,21 @@ impl Section {
 
     /// What is hard to believe in it.
     #[must_use]
-    pub fn findings(&self) -> Vec<Finding> {
+    pub fn find_implausible(&self) -> Vec<PlausibilityFinding> {
         let value = |key: &str| self.values.get(key).copied();
-        plausibility::findings(plausibility::SECTION, &value, &|key| key)
+        plausibility::find_implausible(plausibility::SECTION_RANGES, &value, &|key| key)
     }
 
     /// The neck.
     #[must_use]
     pub fn neck(&self) -> LinkSection {
-        self.link("neck")
+        self.link_section("neck")
     }
 
     /// The lip.
     #[must_use]
     pub fn lip(&self) -> LinkSection {
-        self.link("lip")
+        self.link_section("lip")
     }
 
     pub(super) fn number(&self, key: &str) -> f64 {
@@ -160,18 +160,18 @@ impl Section {
     }
 
     /// The keys that the file has.
-    pub(super) fn keys(&self) -> impl Iterator<Item = &'static Key> {
+    pub(super) fn present_keys(&self) -> impl Iterator<Item = &'static SectionKey> {
         KEYS.iter().filter(|key| self.values.contains_key(key.name))
     }
 
     /// The same section with another value, admissible or not: for differences.
-    pub(super) fn with(&self, key: &'static str, value: f64) -> Self {
+    pub(super) fn with_value(&self, key: &'static str, value: f64) -> Self {
         let mut section = self.clone();
         section.values.insert(key, value);
         section
     }
 
-    fn link(&self, table: &str) -> LinkSection {
+    fn link_section(&self, table: &str) -> LinkSection {
         let of = |key: &str| self.values.get(format!("{table}.{key}").as_str()).copied();
         let number = |key: &str| of(key).unwrap_or(0.0); // completeness was checked
         let hinge = of("hinge_thickness_m").zip(of("hinge_height_m"));
@@ -179,7 +179,7 @@ impl Section {
             height_m: number("height_m"),
             top_thickness_m: number("top_thickness_m"),
             bottom_thickness_m: number("bottom_thickness_m"),
-            hinge: hinge.map(|(thickness_m, height_m)| Hinge { thickness_m, height_m }),
+            hinge: hinge.map(|(thickness_m, height_m)| RubberHinge { thickness_m, height_m }),
         }
     }
 }
@@ -191,6 +191,10 @@ fn check_hinges(file: &str, values: &BTreeMap<&'static str, f64>) -> Result<(), 
     let absent = KEYS.iter().filter(|key| !values.contains_key(key.name));
     let half = absent.into_iter().find(|key| hinge_of(key.name).is_some_and(|link| hinged(&link)));
     half.map_or(Ok(()), |key| {
-        Err(SectionError::HalfAHinge { file: file.to_owned(), key: key.name, expected: key.expected() })
+        Err(SectionError::HalfAHinge {
+            file: file.to_owned(),
+            key: key.name,
+            expected: key.describe_expected(),
+        })
     })
 }

@@ -24,19 +24,19 @@ pub struct LinkSection {
     /// Thickness at the bottom `t2`.
     pub bottom_thickness_m: f64,
     /// The hinge at its top, where it has one.
-    pub hinge: Option<Hinge>,
+    pub hinge: Option<RubberHinge>,
 }
 
 /// A thin neck of rubber that bends in place of the link below it, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Hinge {
+pub struct RubberHinge {
     /// Thickness `t`.
     pub thickness_m: f64,
     /// Height `L`.
     pub height_m: f64,
 }
 
-impl Hinge {
+impl RubberHinge {
     /// Stiffness per length of blade under a moment, N m/rad/m: `E' t^3/(12 L)`.
     #[must_use]
     pub fn stiffness_n_per_rad(&self, plate_modulus_pa: f64) -> f64 {
@@ -84,7 +84,7 @@ impl LinkSection {
             self.bottom_thickness_m + (self.top_thickness_m - self.bottom_thickness_m) * s / self.height_m
         };
         (0..PARTS)
-            .flat_map(|i| gauss::nodes(part * f64::from(i), part * f64::from(i + 1)))
+            .flat_map(|i| gauss::nodes_and_weights(part * f64::from(i), part * f64::from(i + 1)))
             .map(|(s, weight)| weight * s * s / powi(thickness(s), 3))
             .sum()
     }

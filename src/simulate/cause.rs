@@ -2,7 +2,7 @@
 
 /// Why contact changes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-pub enum Cause {
+pub enum TransitionCause {
     /// The tip comes to rest and sticks.
     TipStops,
     /// The holding force reaches the static limit.
@@ -19,7 +19,7 @@ pub enum Cause {
     JamImpact,
 }
 
-impl Cause {
+impl TransitionCause {
     /// The name used in files.
     #[must_use]
     pub fn name(self) -> &'static str {

@@ -6,9 +6,11 @@ mod spline;
 
 use crate::blade::HeadMotion;
 use crate::math;
-pub use recorded::{EVEN, HeadError, UNCERTAIN_S, even_from_s, head_motion};
+pub use recorded::{
+    EVEN_SPEED_SHARE, HeadMotionError, UNCERTAIN_END_S, even_motion_start_s, smooth_head_motion,
+};
 use serde::Serialize;
-pub use spline::Spline;
+pub use spline::HeadSpline;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
@@ -31,14 +33,14 @@ pub enum Drive {
         speed_m_per_s: f64,
     },
     /// As a recording's head moved; scenes that differ in other values share it.
-    Recorded(Arc<Spline>),
+    Recorded(Arc<HeadSpline>),
 }
 
 impl Drive {
     /// Motion of the head at time `t`, s.
     #[inline]
     #[must_use]
-    pub fn at(&self, t: f64) -> HeadMotion {
+    pub fn motion_at(&self, t: f64) -> HeadMotion {
         match *self {
             Self::Cosine { amplitude_m, frequency_hz, delay_s } => {
                 let omega = TAU * frequency_hz;
@@ -54,14 +56,14 @@ impl Drive {
                 velocity_m_per_s: speed_m_per_s,
                 acceleration_m_per_s2: 0.0,
             },
-            Self::Recorded(ref spline) => spline.at(t),
+            Self::Recorded(ref spline) => spline.motion_at(t),
         }
     }
 
     /// Taylor coefficients of the head's velocity about `t`, as many as `out` holds; they are those of the
     /// motion after `t` and hold up to the [next break](Self::next_break).
     #[inline]
-    pub fn series(&self, t: f64, out: &mut [f64]) {
+    pub fn velocity_series(&self, t: f64, out: &mut [f64]) {
         match *self {
             Self::Cosine { amplitude_m, frequency_hz, delay_s } => {
                 let omega = TAU * frequency_hz;
@@ -88,14 +90,14 @@ impl Drive {
 
     /// The same motion with every length multiplied by `factor`.
     #[must_use]
-    pub fn scaled(&self, factor: f64) -> Self {
+    pub fn scale_lengths(&self, factor: f64) -> Self {
         match self {
             _ if factor == 1.0 => self.clone(),
             &Self::Cosine { amplitude_m, frequency_hz, delay_s } => {
                 Self::Cosine { amplitude_m: factor * amplitude_m, frequency_hz, delay_s }
             }
             Self::Uniform { speed_m_per_s } => Self::Uniform { speed_m_per_s: factor * speed_m_per_s },
-            Self::Recorded(spline) => Self::Recorded(Arc::new(spline.scaled(factor))),
+            Self::Recorded(spline) => Self::Recorded(Arc::new(spline.scale_lengths(factor))),
         }
     }
 
@@ -141,7 +143,7 @@ mod tests {
         let wave = |i: usize| 0.01 * (0.4 * i as f64).sin();
         let recorded = {
             let points: Vec<(usize, f64)> = (0..40).map(|i| (i, wave(i))).collect();
-            Spline::smoothed(&grid, &points, 1, &(0..40).collect::<Vec<_>>())
+            HeadSpline::from_points(&grid, &points, 1, &(0..40).collect::<Vec<_>>())
         };
         let drives = [
             (Drive::Cosine { amplitude_m: 0.0138, frequency_hz: 0.915, delay_s: 0.0 }, 2e-11),
@@ -152,10 +154,10 @@ mod tests {
         for (drive, allowed) in drives {
             let t = 0.62;
             let mut series = [f64::NAN; 7];
-            drive.series(t, &mut series);
+            drive.velocity_series(t, &mut series);
             for x in [0.0, 0.01, 0.025] {
                 let sum = series.iter().rev().fold(0.0, |sum, c| sum * x + c);
-                let error = sum - drive.at(t + x).velocity_m_per_s;
+                let error = sum - drive.motion_at(t + x).velocity_m_per_s;
                 assert!(error.abs() <= allowed, "{drive:?} after {x} s: {error:e} m/s");
             }
         }

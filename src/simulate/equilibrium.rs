@@ -1,7 +1,7 @@
 //! Steady slip: the algebraic equilibrium of a blade that is dragged at constant speed.
 
-use crate::blade::shoulder::Lean;
-use crate::blade::{Directions, HeadMotion, Linkage, Pose};
+use crate::blade::shoulder::ShoulderContact;
+use crate::blade::{HeadMotion, LinkDirections, Linkage, Pose};
 use nalgebra::{Matrix2, Vector2};
 
 /// Steps in which friction is brought from nothing to its value: each Newton iteration starts near its
@@ -14,18 +14,21 @@ const RESIDUAL: f64 = 1e-14;
 /// Pose in which `A qdd = 0` under the friction of the head's speed; `None` when the head rests, when there
 /// is no such pose short of a level link, or when the tip would be pulled.
 #[must_use]
-pub fn steady_slide(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
+pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     if speed_m_per_s == 0.0 {
         return None;
     }
     let head = HeadMotion { position_m: 0.0, velocity_m_per_s: speed_m_per_s, acceleration_m_per_s2: 0.0 };
-    let mu = speed_m_per_s.signum() * linkage.friction.dynamic(speed_m_per_s.abs());
+    let mu = speed_m_per_s.signum() * linkage.friction.dynamic_coefficient(speed_m_per_s.abs());
     let mut angles = Vector2::zeros();
     for step in 1..=LOAD_STEPS {
-        angles = loaded(linkage, mu * f64::from(step) / f64::from(LOAD_STEPS), angles)?;
+        angles = solve_for_load(linkage, mu * f64::from(step) / f64::from(LOAD_STEPS), angles)?;
     }
-    let pose = pose(&angles);
-    let pressed = linkage.contact(&pose, &Directions::of(&pose), &head, lean(linkage, &pose)).n_free > 0.0;
+    let pose = pose_at_rest(&angles);
+    let pressed = linkage
+        .friction_response(&pose, &LinkDirections::from_pose(&pose), &head, shoulder_contact(linkage, &pose))
+        .n_free
+        > 0.0;
     let upright = angles.iter().all(|a| a.abs() < std::f64::consts::FRAC_PI_2);
     (pressed && upright).then_some(pose)
 }
@@ -45,9 +48,9 @@ pub fn static_deflections(linkage: &Linkage) -> Vec<(f64, f64)> {
         let mut found: Vec<(f64, f64)> = Vec::new();
         for step in 0..=FRICTIONS {
             let mu = sign * MOST_FRICTION * f64::from(step) / f64::from(FRICTIONS);
-            let Some(next) = loaded(linkage, mu, angles) else { break };
+            let Some(next) = solve_for_load(linkage, mu, angles) else { break };
             angles = next;
-            let d = Directions::of(&pose(&angles));
+            let d = LinkDirections::from_pose(&pose_at_rest(&angles));
             let deflection_m = linkage.l1_m * d.sin_theta + linkage.l2_m * d.sin_phi;
             if found.last().is_some_and(|(_, before_m)| deflection_m.abs() <= before_m.abs()) {
                 break;
@@ -62,35 +65,41 @@ pub fn static_deflections(linkage: &Linkage) -> Vec<(f64, f64)> {
     all
 }
 
-fn pose(angles: &Vector2<f64>) -> Pose {
+fn pose_at_rest(angles: &Vector2<f64>) -> Pose {
     Pose { theta: angles[0], phi: angles[1], theta_rate: 0.0, phi_rate: 0.0 }
 }
 
-fn lean(linkage: &Linkage, pose: &Pose) -> Lean {
-    linkage.shoulder.map_or(Lean::Off, |s| s.lean(pose.theta))
+fn shoulder_contact(linkage: &Linkage, pose: &Pose) -> ShoulderContact {
+    linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(pose.theta))
 }
 
 /// The equilibrium at one load, on the side of the shoulder where it lies: across the corner, a kink,
 /// Newton's steps could cycle.
-fn loaded(linkage: &Linkage, mu: f64, angles: Vector2<f64>) -> Option<Vector2<f64>> {
-    let here = lean(linkage, &pose(&angles));
-    let sides = [here, Lean::Off, Lean::Forward, Lean::Backward];
+fn solve_for_load(linkage: &Linkage, mu: f64, angles: Vector2<f64>) -> Option<Vector2<f64>> {
+    let here = shoulder_contact(linkage, &pose_at_rest(&angles));
+    let sides = [here, ShoulderContact::Off, ShoulderContact::Forward, ShoulderContact::Backward];
     sides.into_iter().find_map(|side| {
-        newton(linkage, mu, angles, side).filter(|found| lean(linkage, &pose(found)) == side)
+        solve_newton(linkage, mu, angles, side)
+            .filter(|found| shoulder_contact(linkage, &pose_at_rest(found)) == side)
     })
 }
 
-fn newton(linkage: &Linkage, mu: f64, mut angles: Vector2<f64>, side: Lean) -> Option<Vector2<f64>> {
+fn solve_newton(
+    linkage: &Linkage,
+    mu: f64,
+    mut angles: Vector2<f64>,
+    side: ShoulderContact,
+) -> Option<Vector2<f64>> {
     let scale = linkage.neck.stiffness + linkage.lip.stiffness;
     for _ in 0..MOST_ITERATIONS {
-        let residual = moments(linkage, mu, &angles, side);
+        let residual = residual_moments(linkage, mu, &angles, side);
         if !residual.iter().all(|r| r.is_finite()) {
             return None;
         }
         if residual.amax() <= RESIDUAL * scale {
             return Some(angles);
         }
-        let step = jacobian(linkage, mu, &angles, side).lu().solve(&residual)?;
+        let step = moment_jacobian(linkage, mu, &angles, side).lu().solve(&residual)?;
         if step.amax() <= 4.0 * f64::EPSILON {
             return Some(angles);
         }
@@ -101,16 +110,21 @@ fn newton(linkage: &Linkage, mu: f64, mut angles: Vector2<f64>, side: Lean) -> O
 
 /// Moments that springs, normal force and friction leave on neck and lip at rest, N m: equations (1) and (2)
 /// without rates.
-pub(super) fn moments(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: Lean) -> Vector2<f64> {
-    let pose = pose(angles);
-    let d = Directions::of(&pose);
+pub(super) fn residual_moments(
+    linkage: &Linkage,
+    mu: f64,
+    angles: &Vector2<f64>,
+    side: ShoulderContact,
+) -> Vector2<f64> {
+    let pose = pose_at_rest(angles);
+    let d = LinkDirections::from_pose(&pose);
     let normal = linkage.head.stiffness * (linkage.preload_displacement_m - linkage.head_drop_m(&d));
     let friction = -mu * normal;
     let lip = linkage.lip.stiffness * (pose.phi - pose.theta);
     let shoulder = linkage
         .shoulder
-        .filter(|_| side != Lean::Off)
-        .map_or(0.0, |s| s.moment(pose.theta, 0.0, side.sign()));
+        .filter(|_| side != ShoulderContact::Off)
+        .map_or(0.0, |s| s.moment(pose.theta, 0.0, side.angle_sign()));
     Vector2::new(
         linkage.neck.stiffness * pose.theta + shoulder
             - lip
@@ -119,7 +133,7 @@ pub(super) fn moments(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: L
     )
 }
 
-fn jacobian(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: Lean) -> Matrix2<f64> {
+fn moment_jacobian(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: ShoulderContact) -> Matrix2<f64> {
     /// Step of the central difference, rad: the cube root of the rounding error.
     const STEP: f64 = 6e-6;
     let column = |i: usize| {
@@ -127,7 +141,8 @@ fn jacobian(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: Lean) -> Ma
         let mut behind = *angles;
         ahead[i] += STEP;
         behind[i] -= STEP;
-        (moments(linkage, mu, &ahead, side) - moments(linkage, mu, &behind, side)) / (2.0 * STEP)
+        (residual_moments(linkage, mu, &ahead, side) - residual_moments(linkage, mu, &behind, side))
+            / (2.0 * STEP)
     };
     Matrix2::from_columns(&[column(0), column(1)])
 }
@@ -143,15 +158,19 @@ mod tests {
         let scene =
             Scene::parse("actual-blade.toml", include_str!("../../data/scenes/actual-blade.toml")).unwrap();
         let scene = scene
-            .with("friction.c", 0.30985)
-            .and_then(|s| s.with("blade.neck_stiffness_n_m_per_rad", 0.0019698))
+            .with_parameter("friction.c", 0.30985)
+            .and_then(|s| s.with_parameter("blade.neck_stiffness_n_m_per_rad", 0.0019698))
             .unwrap();
-        let speed = scene.drive.at(scene.start_s).velocity_m_per_s;
-        let pose = steady_slide(&scene.linkage, speed).expect("an equilibrium");
-        let mu = scene.linkage.friction.dynamic(speed);
-        let left =
-            moments(&scene.linkage, mu, &Vector2::new(pose.theta, pose.phi), lean(&scene.linkage, &pose))
-                .amax();
+        let speed = scene.drive.motion_at(scene.start_s).velocity_m_per_s;
+        let pose = steady_slip_pose(&scene.linkage, speed).expect("an equilibrium");
+        let mu = scene.linkage.friction.dynamic_coefficient(speed);
+        let left = residual_moments(
+            &scene.linkage,
+            mu,
+            &Vector2::new(pose.theta, pose.phi),
+            shoulder_contact(&scene.linkage, &pose),
+        )
+        .amax();
         assert!(left < 1e-12 * scene.linkage.neck.stiffness, "{left:e} N m left");
     }
 }

@@ -1,32 +1,32 @@
 //! Flight of the blade as a smooth phase with guards: no contact forces, ended by the tip's landing.
 
-use super::phases::{GUARDS, LEVEL_GUARDS, Motion, SHOULDER_GUARDS, System};
-use crate::blade::flight::Airborne;
-use crate::blade::series::Touch;
-use crate::blade::shoulder::Lean;
-use crate::blade::{Directions, Pose};
+use super::phases::{DrivenBlade, GUARDS, LEVEL_GUARDS, SHOULDER_GUARDS, TaylorMotion};
+use crate::blade::flight::FlightState;
+use crate::blade::series::ContactMode;
+use crate::blade::shoulder::ShoulderContact;
+use crate::blade::{LinkDirections, Pose};
 use crate::math;
-use crate::ode::Phase;
-use crate::ode::taylor::{Expand, Expansion};
+use crate::ode::HybridPhase;
+use crate::ode::taylor::{TaylorExpansion, TaylorPhase};
 
 /// The gap falls to zero. The guards of shoulder and level are those of the phases of contact; the rest do
 /// not apply.
-pub(crate) const LANDS: usize = 0;
+pub(crate) const LANDING: usize = 0;
 
 /// The tip is off the glass; states `(theta, phi, gap, theta_rate, phi_rate, gap_rate)`.
 #[derive(Debug, Clone, Copy)]
-pub struct Flight<'a> {
+pub struct FlightPhase<'a> {
     /// The blade on its drive.
-    pub system: &'a System,
+    pub system: &'a DrivenBlade,
     /// Side of the shoulder.
-    pub lean: Lean,
+    pub lean: ShoulderContact,
 }
 
 /// The state behind the six numbers.
 #[inline]
 #[must_use]
-pub(crate) fn airborne_of(y: &[f64; 6]) -> Airborne {
-    Airborne {
+pub(crate) fn flight_state_from(y: &[f64; 6]) -> FlightState {
+    FlightState {
         pose: Pose { theta: y[0], phi: y[1], theta_rate: y[3], phi_rate: y[4] },
         gap_m: y[2],
         gap_rate_m_per_s: y[5],
@@ -35,19 +35,19 @@ pub(crate) fn airborne_of(y: &[f64; 6]) -> Airborne {
 
 /// The six numbers of a state.
 #[must_use]
-pub fn states_of(state: &Airborne) -> [f64; 6] {
-    let Airborne { pose, gap_m, gap_rate_m_per_s } = *state;
+pub fn flight_state_vector(state: &FlightState) -> [f64; 6] {
+    let FlightState { pose, gap_m, gap_rate_m_per_s } = *state;
     [pose.theta, pose.phi, gap_m, pose.theta_rate, pose.phi_rate, gap_rate_m_per_s]
 }
 
-impl Phase<6, GUARDS> for Flight<'_> {
+impl HybridPhase<6, GUARDS> for FlightPhase<'_> {
     #[inline]
     fn derivative(&self, t: f64, y: &[f64; 6]) -> [f64; 6] {
-        let state = airborne_of(y);
-        let accelerations = self.system.linkage.flight(
+        let state = flight_state_from(y);
+        let accelerations = self.system.linkage.flight_accelerations(
             &state,
-            &Directions::of(&state.pose),
-            &self.system.drive.at(t),
+            &LinkDirections::from_pose(&state.pose),
+            &self.system.drive.motion_at(t),
             self.lean,
         );
         [y[3], y[4], y[5], accelerations.links[0], accelerations.links[1], accelerations.gap_m_per_s2]
@@ -55,24 +55,38 @@ impl Phase<6, GUARDS> for Flight<'_> {
 
     #[inline]
     fn guards(&self, _: f64, y: &[f64; 6]) -> [f64; GUARDS] {
-        let [forward, backward] = self.system.corners(y[0], self.lean);
+        let [forward, backward] = self.system.corner_distances(y[0], self.lean);
         [y[2], f64::INFINITY, f64::INFINITY, forward, backward, math::cos(y[0]), math::cos(y[1])]
     }
 
     fn scale(&self) -> [f64; 6] {
-        let System { angle_scale, rate_scale, linkage, .. } = self.system;
+        let DrivenBlade { angle_scale, rate_scale, linkage, .. } = self.system;
         let length = linkage.l1_m + linkage.l2_m;
         [*angle_scale, *angle_scale, length * angle_scale, *rate_scale, *rate_scale, length * rate_scale]
     }
 }
 
-impl Expand<6, GUARDS> for Flight<'_> {
-    type Tape = Motion;
+impl TaylorPhase<6, GUARDS> for FlightPhase<'_> {
+    type Tape = TaylorMotion;
 
-    fn expand(&self, t: f64, y: &[f64; 6], motion: &mut Motion, out: &mut Expansion<6, GUARDS>) {
-        let state = airborne_of(y);
-        let (drop, drop_rate) = self.system.linkage.drop_in_flight(&state, &Directions::of(&state.pose));
-        self.system.expand(t, &state.pose, Touch::Flight(drop, drop_rate), self.lean, out.order, motion);
+    fn expand_series(
+        &self,
+        t: f64,
+        y: &[f64; 6],
+        motion: &mut TaylorMotion,
+        out: &mut TaylorExpansion<6, GUARDS>,
+    ) {
+        let state = flight_state_from(y);
+        let (drop, drop_rate) =
+            self.system.linkage.drop_in_flight(&state, &LinkDirections::from_pose(&state.pose));
+        self.system.expand_motion(
+            t,
+            &state.pose,
+            ContactMode::Flight(drop, drop_rate),
+            self.lean,
+            out.order,
+            motion,
+        );
         motion.gap_rate[0] = state.gap_rate_m_per_s;
         let corners = self.system.corner_signs(self.lean);
         let ([forward, backward], [neck, lip]) = (SHOULDER_GUARDS, LEVEL_GUARDS);
@@ -84,7 +98,7 @@ impl Expand<6, GUARDS> for Flight<'_> {
             let guards = &mut out.guards[k];
             [guards[neck], guards[lip]] = motion.cosines(k);
             [guards[forward], guards[backward]] = corners.map(|sign| sign * theta);
-            guards[LANDS] = gap;
+            guards[LANDING] = gap;
             gap = gap_rate / (k + 1) as f64;
         }
         let start = self.guards(t, y);

@@ -20,9 +20,9 @@
 //! so by `W_nt^2 < W_nn W_tt` the tip is braked at `sigma dv_t/dp < 0` down to rest, where `|W_nt| < mu
 //! W_tt` lets it stick, and sticking restores at `W_nn - W_nt^2 / W_tt > 0`.
 
-use crate::blade::friction::Friction;
+use crate::blade::friction::FrictionLaw;
 use crate::math;
-use crate::ode::{self, Cause, Phase, Start, Work};
+use crate::ode::{self, HybridPhase, PhaseEndCause, PhaseStart, WorkCounters};
 
 /// Inverse mass that the tip shows to impulses, 1/kg.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,9 +37,9 @@ pub struct InverseMass {
 
 /// How hard and how rough a contact is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Surface {
+pub struct ContactSurface {
     /// Friction, as in slip.
-    pub friction: Friction,
+    pub friction: FrictionLaw,
     /// Stronge's energetic coefficient of restitution, 0 to 1.
     pub restitution: f64,
 }
@@ -55,7 +55,7 @@ pub struct TipVelocity {
 
 /// What an impact did.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Outcome {
+pub struct ImpactOutcome {
     /// Velocity after it; exactly zero where the tip came to rest.
     pub velocity: TipVelocity,
     /// Normal and tangential impulse on the tip, N s.
@@ -66,7 +66,7 @@ pub struct Outcome {
 
 /// What begins an impact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Origin {
+pub enum ImpactOrigin {
     /// The tip meets the glass at `v_n <= 0`.
     Collision,
     /// The tip slides on the glass, `v_n = 0`, and no finite force is admissible.
@@ -75,42 +75,42 @@ pub enum Origin {
 
 /// The impact that `before` begins; `None` where the integration meets numbers that are not finite.
 #[must_use]
-pub fn impact(
+pub fn solve_impact(
     mass: &InverseMass,
-    surface: &Surface,
+    surface: &ContactSurface,
     before: TipVelocity,
-    origin: Origin,
+    origin: ImpactOrigin,
     relative: f64,
-    work: &mut Work,
-) -> Option<Outcome> {
+    work: &mut WorkCounters,
+) -> Option<ImpactOutcome> {
     /// A tangential velocity this many times the normal one sets the unit of velocity by itself: the quotient
     /// stays a number.
     const FLATTEST: f64 = 1e12;
     let unit = before.normal.abs().max(before.tangential.abs() / FLATTEST);
-    let unit = if origin == Origin::Jam { before.tangential.abs() } else { unit };
-    if unit == 0.0 || (origin == Origin::Collision && before.normal >= 0.0) {
-        return Some(Outcome { velocity: before, impulse_n_s: [0.0; 2], lost_j: 0.0 });
+    let unit = if origin == ImpactOrigin::Jam { before.tangential.abs() } else { unit };
+    if unit == 0.0 || (origin == ImpactOrigin::Collision && before.normal >= 0.0) {
+        return Some(ImpactOutcome { velocity: before, impulse_n_s: [0.0; 2], lost_j: 0.0 });
     }
-    let Friction { a, b_s_per_m, c } = surface.friction;
-    let friction = Friction { a, b_s_per_m: b_s_per_m * unit, c };
-    let blow = Blow {
+    let FrictionLaw { a, b_s_per_m, c } = surface.friction;
+    let friction = FrictionLaw { a, b_s_per_m: b_s_per_m * unit, c };
+    let blow = ScaledImpact {
         cross: mass.nt / mass.nn,
         along: mass.tt / mass.nn,
         friction,
         restitution: surface.restitution,
     };
-    let mut state = Progress {
+    let mut state = ImpactState {
         impulse: 0.0,
         normal: before.normal / unit,
         tangential: before.tangential / unit,
         taken: 0.0,
         given: 0.0,
-        stage: Stage::Compression,
+        stage: ImpactStage::Compression,
     };
-    if origin == Origin::Jam {
-        state = blow.jam(state, relative, work)?;
+    if origin == ImpactOrigin::Jam {
+        state = blow.integrate_jam(state, relative, work)?;
     }
-    let end = blow.run(state, relative, work)?;
+    let end = blow.integrate_impact(state, relative, work)?;
     let velocity = TipVelocity { normal: unit * end.normal, tangential: unit * end.tangential };
     let normal = end.impulse * unit / mass.nn;
     let tangential = (velocity.tangential - before.tangential - mass.nt * normal) / mass.tt;
@@ -118,7 +118,7 @@ pub fn impact(
         * (normal * (before.normal + velocity.normal)
             + tangential * (before.tangential + velocity.tangential));
     let all = [velocity.normal, velocity.tangential, normal, tangential, lost];
-    all.iter().all(|x| x.is_finite()).then_some(Outcome {
+    all.iter().all(|x| x.is_finite()).then_some(ImpactOutcome {
         velocity,
         impulse_n_s: [normal, tangential],
         lost_j: lost,
@@ -126,7 +126,7 @@ pub fn impact(
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Stage {
+enum ImpactStage {
     Compression,
     Restitution,
     Ended,
@@ -134,104 +134,129 @@ enum Stage {
 
 /// State of an impact in units of one velocity, `unit`, and of `unit / W_nn`.
 #[derive(Debug, Clone, Copy)]
-struct Progress {
+struct ImpactState {
     impulse: f64,
     normal: f64,
     tangential: f64,
     /// Work that compression has taken and that restitution has given, both positive.
     taken: f64,
     given: f64,
-    stage: Stage,
+    stage: ImpactStage,
 }
 
 /// An impact without units.
-struct Blow {
+struct ScaledImpact {
     /// `W_nt / W_nn`.
     cross: f64,
     /// `W_tt / W_nn`.
     along: f64,
-    friction: Friction,
+    friction: FrictionLaw,
     restitution: f64,
 }
 
-impl Blow {
+impl ScaledImpact {
     /// Carries an impact to its end. A tip slides at most twice, before and after it has been at rest, and
     /// each slide opens and closes compression and restitution a few times at most.
-    fn run(&self, mut state: Progress, relative: f64, work: &mut Work) -> Option<Progress> {
+    fn integrate_impact(
+        &self,
+        mut state: ImpactState,
+        relative: f64,
+        work: &mut WorkCounters,
+    ) -> Option<ImpactState> {
         const MOST_PARTS: usize = 32;
         for _ in 0..MOST_PARTS {
-            if state.stage == Stage::Ended {
+            if state.stage == ImpactStage::Ended {
                 return Some(state);
             }
-            state = match self.direction(state.tangential) {
-                None => self.stick(state),
-                Some(direction) => self.slide(state, direction, relative, work)?,
+            state = match self.slip_direction(state.tangential) {
+                None => self.finish_in_stick(state),
+                Some(direction) => self.integrate_slip(state, direction, relative, work)?,
             };
         }
         None
     }
 
     /// Direction of slip; `None` where the tip at rest sticks.
-    fn direction(&self, tangential: f64) -> Option<f64> {
-        let holds = self.cross.abs() <= self.friction.at_rest() * self.along;
+    fn slip_direction(&self, tangential: f64) -> Option<f64> {
+        let holds = self.cross.abs() <= self.friction.static_coefficient() * self.along;
         let leading = if tangential == 0.0 { self.cross } else { tangential };
         (tangential != 0.0 || !holds).then(|| leading.signum())
     }
 
     /// What follows compression that has ended in slip.
-    fn compressed(&self, state: Progress) -> Progress {
-        let stage = if self.allowance(&state) > 0.0 { Stage::Restitution } else { Stage::Ended };
-        Progress { normal: 0.0, stage, ..state }
+    fn end_compression(&self, state: ImpactState) -> ImpactState {
+        let stage = if self.remaining_restitution(&state) > 0.0 {
+            ImpactStage::Restitution
+        } else {
+            ImpactStage::Ended
+        };
+        ImpactState { normal: 0.0, stage, ..state }
     }
 
     /// Work that restitution may still give.
-    fn allowance(&self, state: &Progress) -> f64 {
+    fn remaining_restitution(&self, state: &ImpactState) -> f64 {
         self.restitution * self.restitution * state.taken - state.given
     }
 
     /// The end in stick, in closed form: the normal velocity grows in proportion to the impulse.
-    fn stick(&self, state: Progress) -> Progress {
+    fn finish_in_stick(&self, state: ImpactState) -> ImpactState {
         let growth = 1.0 - self.cross * self.cross / self.along;
-        let at_zero = if state.stage == Stage::Compression {
-            Progress { taken: state.taken + 0.5 * math::powi(state.normal, 2) / growth, normal: 0.0, ..state }
+        let at_zero = if state.stage == ImpactStage::Compression {
+            ImpactState {
+                taken: state.taken + 0.5 * math::powi(state.normal, 2) / growth,
+                normal: 0.0,
+                ..state
+            }
         } else {
             state
         };
-        let normal =
-            (math::powi(at_zero.normal, 2) + 2.0 * growth * self.allowance(&at_zero).max(0.0)).sqrt();
-        Progress {
+        let normal = (math::powi(at_zero.normal, 2)
+            + 2.0 * growth * self.remaining_restitution(&at_zero).max(0.0))
+        .sqrt();
+        ImpactState {
             impulse: state.impulse + (normal - state.normal) / growth,
             normal,
-            stage: Stage::Ended,
+            stage: ImpactStage::Ended,
             ..at_zero
         }
     }
 
     /// Slides until the tip is at rest or the stage ends.
-    fn slide(&self, state: Progress, direction: f64, relative: f64, work: &mut Work) -> Option<Progress> {
-        let restores = state.stage == Stage::Restitution;
-        let slide = Slide { blow: self, direction, from: state, open: false };
+    fn integrate_slip(
+        &self,
+        state: ImpactState,
+        direction: f64,
+        relative: f64,
+        work: &mut WorkCounters,
+    ) -> Option<ImpactState> {
+        let restores = state.stage == ImpactStage::Restitution;
+        let slide = ImpactSlip { blow: self, direction, from: state, open: false };
         let mut zero_order = [0; 3];
         zero_order[RESTS] = u8::from(state.tangential == 0.0);
         zero_order[if restores { REOPENS } else { CLOSES }] = u8::from(state.normal == 0.0);
-        let (mut next, cause) = slide.integrate(zero_order, relative, work);
+        let (mut next, cause) = slide.integrate_to_guard(zero_order, relative, work);
         match cause {
-            Cause::Guard(RESTS) => next.tangential = 0.0,
-            Cause::Guard(CLOSES) if restores => next.stage = Stage::Ended,
-            Cause::Guard(CLOSES) => next = self.compressed(next),
-            Cause::Guard(_) => (next.normal, next.stage) = (0.0, Stage::Compression),
-            Cause::Stop | Cause::StepTooSmall | Cause::Asked => return None,
+            PhaseEndCause::Guard(RESTS) => next.tangential = 0.0,
+            PhaseEndCause::Guard(CLOSES) if restores => next.stage = ImpactStage::Ended,
+            PhaseEndCause::Guard(CLOSES) => next = self.end_compression(next),
+            PhaseEndCause::Guard(_) => (next.normal, next.stage) = (0.0, ImpactStage::Compression),
+            PhaseEndCause::Stop | PhaseEndCause::StepTooSmall | PhaseEndCause::Interrupted => return None,
         }
         Some(next)
     }
 
     /// The part of a jam that slides: down to rest, for any first instant, because the normal
     /// velocity there starts at a zero whose order depends on how the indicator came to vanish.
-    fn jam(&self, state: Progress, relative: f64, work: &mut Work) -> Option<Progress> {
-        let slide = Slide { blow: self, direction: state.tangential.signum(), from: state, open: true };
-        let (next, cause) = slide.integrate([0; 3], relative, work);
+    fn integrate_jam(
+        &self,
+        state: ImpactState,
+        relative: f64,
+        work: &mut WorkCounters,
+    ) -> Option<ImpactState> {
+        let slide = ImpactSlip { blow: self, direction: state.tangential.signum(), from: state, open: true };
+        let (next, cause) = slide.integrate_to_guard([0; 3], relative, work);
         let normal = next.normal.min(0.0);
-        (cause == Cause::Guard(RESTS)).then_some(Progress {
+        (cause == PhaseEndCause::Guard(RESTS)).then_some(ImpactState {
             tangential: 0.0,
             normal,
             taken: next.taken.max(0.0),
@@ -247,40 +272,46 @@ const REOPENS: usize = 2;
 
 /// Slip in one direction, over the normal impulse; states: growth of the tangential speed in that direction,
 /// which a glancing blow changes by far less than the speed, and work of the normal force.
-struct Slide<'a> {
-    blow: &'a Blow,
+struct ImpactSlip<'a> {
+    blow: &'a ScaledImpact,
     direction: f64,
-    from: Progress,
+    from: ImpactState,
     /// No stage ends it, only rest.
     open: bool,
 }
 
-impl Slide<'_> {
-    fn speed(&self, growth: f64) -> f64 {
+impl ImpactSlip<'_> {
+    fn tip_speed(&self, growth: f64) -> f64 {
         self.direction * self.from.tangential + growth
     }
 
     /// Normal velocity, which both impulses determine: integrated on its own it would drift from them.
-    fn normal(&self, impulse: f64, growth: f64) -> f64 {
-        let Blow { cross, along, .. } = *self.blow;
+    fn normal_velocity(&self, impulse: f64, growth: f64) -> f64 {
+        let ScaledImpact { cross, along, .. } = *self.blow;
         let grown = impulse - self.from.impulse;
         let tangential = (self.direction * growth - cross * grown) / along;
         self.from.normal + grown + cross * tangential
     }
 
-    fn integrate(&self, zero_order: [u8; 3], relative: f64, work: &mut Work) -> (Progress, Cause) {
+    fn integrate_to_guard(
+        &self,
+        zero_order: [u8; 3],
+        relative: f64,
+        work: &mut WorkCounters,
+    ) -> (ImpactState, PhaseEndCause) {
         /// Impulse, in units of what stops the tip alone, at which a slide counts as endless.
         const MOST: f64 = 1e15;
         /// First step to try, in the same unit: most slides end within it.
         const FIRST: f64 = 1.0;
-        let start = Start { t: self.from.impulse, y: [0.0; 2], zero_order, step: Some(FIRST) };
+        let start = PhaseStart { t: self.from.impulse, y: [0.0; 2], zero_order, step: Some(FIRST) };
         let end = ode::integrate(self, start, MOST, relative, work, |_| ());
         let done = end.y[1];
-        let (taken, given) = if self.from.stage == Stage::Compression { (-done, 0.0) } else { (0.0, done) };
-        let next = Progress {
+        let (taken, given) =
+            if self.from.stage == ImpactStage::Compression { (-done, 0.0) } else { (0.0, done) };
+        let next = ImpactState {
             impulse: end.t,
-            normal: self.normal(end.t, end.y[0]),
-            tangential: self.direction * self.speed(end.y[0]),
+            normal: self.normal_velocity(end.t, end.y[0]),
+            tangential: self.direction * self.tip_speed(end.y[0]),
             taken: self.from.taken + taken,
             given: self.from.given + given,
             stage: self.from.stage,
@@ -289,18 +320,23 @@ impl Slide<'_> {
     }
 }
 
-impl Phase<2, 3> for Slide<'_> {
+impl HybridPhase<2, 3> for ImpactSlip<'_> {
     fn derivative(&self, impulse: f64, y: &[f64; 2]) -> [f64; 2] {
-        let Blow { cross, along, friction, .. } = self.blow;
-        [self.direction * cross - friction.dynamic(self.speed(y[0])) * along, self.normal(impulse, y[0])]
+        let ScaledImpact { cross, along, friction, .. } = self.blow;
+        [
+            self.direction * cross - friction.dynamic_coefficient(self.tip_speed(y[0])) * along,
+            self.normal_velocity(impulse, y[0]),
+        ]
     }
 
     fn guards(&self, impulse: f64, y: &[f64; 2]) -> [f64; 3] {
-        let (normal, speed) = (self.normal(impulse, y[0]), self.speed(y[0]));
+        let (normal, speed) = (self.normal_velocity(impulse, y[0]), self.tip_speed(y[0]));
         match self.from.stage {
             _ if self.open => [speed, f64::INFINITY, f64::INFINITY],
-            Stage::Compression => [speed, -normal, f64::INFINITY],
-            Stage::Restitution | Stage::Ended => [speed, self.blow.allowance(&self.from) - y[1], normal],
+            ImpactStage::Compression => [speed, -normal, f64::INFINITY],
+            ImpactStage::Restitution | ImpactStage::Ended => {
+                [speed, self.blow.remaining_restitution(&self.from) - y[1], normal]
+            }
         }
     }
 

@@ -6,81 +6,92 @@ mod recent;
 mod strike;
 mod watch;
 
-use super::mode::{AtRest, Mode, at_rest, holding_force};
-use super::paper::{FixedStep, Held};
+use super::mode::{RestDecision, TipMode, decide_mode_at_rest, holding_force};
+use super::paper::{FixedStepScheme, StabilisedStickPhase};
 use super::phases::{
-    GUARDS, JAMS, LEVEL_GUARDS, Motion, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST, Slip, Stick,
-    System, TIP_STOPS, pose_of, released,
+    DrivenBlade, GUARDS, JAMS, LEVEL_GUARDS, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST,
+    SlipPhase, StickPhase, TIP_STOPS, TaylorMotion, mode_after_release, pose_from_states,
 };
-use super::piece::{Piece, Solution};
-use super::scene::{Jam, Loss, Scene};
-use super::{Cause, Effort, Method, Run, Status, Transition};
-use crate::blade::flight::Airborne;
+use super::piece::{SegmentSolution, SolutionSegment};
+use super::scene::{ContactLossRule, JamRule, Scene};
+use super::{IntegrationMethod, RunResult, RunStatus, SolverOptions, Transition, TransitionCause};
+use crate::blade::flight::FlightState;
 use crate::blade::modes::time_scales_rad_per_s;
-use crate::blade::shoulder::Lean;
-use crate::blade::{Contact, Pose};
-use crate::ode::taylor::Room;
-use crate::ode::{Cause as Ended, Start, Work, fixed};
-use integrate::integrate;
-use recent::Recent;
-pub(super) use strike::Strike;
-pub(super) use watch::{Plain, Watch};
+use crate::blade::shoulder::ShoulderContact;
+use crate::blade::{FrictionResponse, Pose};
+use crate::ode::taylor::TaylorWorkspace;
+use crate::ode::{PhaseEndCause as Ended, PhaseStart, WorkCounters, fixed};
+use integrate::integrate_phase;
+use recent::ChatterDetector;
+pub(super) use strike::TipStrike;
+pub(super) use watch::{ObserverWatcher, RunWatcher};
 
 /// What a scene says of contact that is lost, jammed or made.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Rules {
-    loss: Loss,
-    jam: Jam,
+pub(super) struct ContactRules {
+    loss: ContactLossRule,
+    jam: JamRule,
     restitution: f64,
 }
 
-impl Rules {
-    pub(super) fn of(scene: &Scene) -> Self {
+impl ContactRules {
+    pub(super) fn from_scene(scene: &Scene) -> Self {
         Self { loss: scene.loss, jam: scene.jam, restitution: scene.restitution() }
     }
 }
 
 /// The state between phases.
-pub(super) struct Machine<'a, W> {
-    system: &'a System,
-    rules: Rules,
-    effort: Effort,
+pub(super) struct EventLoop<'a, W> {
+    system: &'a DrivenBlade,
+    rules: ContactRules,
+    effort: SolverOptions,
     watch: &'a mut W,
     t: f64,
-    work: Work,
+    work: WorkCounters,
     transitions: u64,
-    lean: Lean,
+    lean: ShoulderContact,
     /// First steps that suited the last stick, slip and flight phase.
     steps: [Option<f64>; 3],
-    recent: Recent,
+    recent: ChatterDetector,
     /// Shortest period of the links, s.
     shortest_period_s: f64,
     /// Rebounds in a row that were short.
     short_rebounds: u32,
     /// Where steps of stick, of slip and of flight are expanded.
-    rooms: (Room<Motion, 2, GUARDS>, Room<Motion, 4, GUARDS>, Room<Motion, 6, GUARDS>),
+    rooms: (
+        TaylorWorkspace<TaylorMotion, 2, GUARDS>,
+        TaylorWorkspace<TaylorMotion, 4, GUARDS>,
+        TaylorWorkspace<TaylorMotion, 6, GUARDS>,
+    ),
 }
 
 /// What follows a phase.
-enum Next {
+enum NextPhase {
     /// Another phase in this mode, with the guards that start at zero.
-    Phase(Mode, Pose, [u8; GUARDS]),
+    Phase(TipMode, Pose, [u8; GUARDS]),
     /// Flight from this state, likewise.
-    Flight(Airborne, [u8; GUARDS]),
+    Flight(FlightState, [u8; GUARDS]),
     /// The end of the run.
-    End(Status),
+    End(RunStatus),
 }
 
 /// The transition that a decision may write: the mode before it and, where the forces do not tell, the cause.
-type Before = Option<(Mode, Option<Cause>)>;
+type PendingTransition = Option<(TipMode, Option<TransitionCause>)>;
 
-impl<'a, W: Watch> Machine<'a, W> {
-    pub(super) fn new(system: &'a System, rules: Rules, t: f64, effort: Effort, watch: &'a mut W) -> Self {
+impl<'a, W: RunWatcher> EventLoop<'a, W> {
+    pub(super) fn new(
+        system: &'a DrivenBlade,
+        rules: ContactRules,
+        t: f64,
+        effort: SolverOptions,
+        watch: &'a mut W,
+    ) -> Self {
         let (_, fastest) = time_scales_rad_per_s(&system.linkage);
         let shortest_period_s = std::f64::consts::TAU / fastest;
-        let recent = Recent::new(shortest_period_s);
-        let work = Work { most_rhs_evaluations: Some(effort.most_evaluations), ..Work::default() };
-        let (lean, steps) = (Lean::Off, [None; 3]);
+        let recent = ChatterDetector::new(shortest_period_s);
+        let work =
+            WorkCounters { most_rhs_evaluations: Some(effort.most_evaluations), ..WorkCounters::default() };
+        let (lean, steps) = (ShoulderContact::Off, [None; 3]);
         Self {
             system,
             rules,
@@ -98,39 +109,43 @@ impl<'a, W: Watch> Machine<'a, W> {
         }
     }
 
-    pub(super) fn run(&mut self, pose: &Pose, stop: f64) -> Run {
-        self.lean = self.system.linkage.shoulder.map_or(Lean::Off, |s| s.lean(pose.theta));
-        let first = self.begin(pose);
-        self.follow(first, stop)
+    pub(super) fn run_from_pose(&mut self, pose: &Pose, stop: f64) -> RunResult {
+        self.lean = self.system.linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(pose.theta));
+        let first = self.first_phase(pose);
+        self.run_phases(first, stop)
     }
 
-    fn follow(&mut self, mut next: Next, stop: f64) -> Run {
+    fn run_phases(&mut self, mut next: NextPhase, stop: f64) -> RunResult {
         loop {
             next = match next {
-                Next::End(status) => return self.ended(status),
-                _ if self.work.is_spent() => Next::End(Status::WorkLimit),
-                _ if self.recent.is_chattering(self.t) => Next::End(Status::Chattering),
-                Next::Flight(state, zero_order) => self.flight(&state, zero_order, stop),
-                Next::Phase(Mode::Stick, pose, zero_order) => self.stick(&pose, zero_order, stop),
-                Next::Phase(mode, pose, zero_order) => self.slip(mode, &pose, zero_order, stop),
+                NextPhase::End(status) => return self.finish_run(status),
+                _ if self.work.is_spent() => NextPhase::End(RunStatus::WorkLimit),
+                _ if self.recent.is_chattering(self.t) => NextPhase::End(RunStatus::Chattering),
+                NextPhase::Flight(state, zero_order) => self.integrate_flight(&state, zero_order, stop),
+                NextPhase::Phase(TipMode::Stick, pose, zero_order) => {
+                    self.integrate_stick(&pose, zero_order, stop)
+                }
+                NextPhase::Phase(mode, pose, zero_order) => {
+                    self.integrate_slip(mode, &pose, zero_order, stop)
+                }
             };
         }
     }
 
     /// Why a phase found no further step.
-    fn gave_up(&self) -> Status {
-        if self.work.is_spent() { Status::WorkLimit } else { Status::Diverged }
+    fn failure_status(&self) -> RunStatus {
+        if self.work.is_spent() { RunStatus::WorkLimit } else { RunStatus::Diverged }
     }
 
-    pub(super) fn ended(&self, status: Status) -> Run {
-        Run { status, stopped_at_s: self.t, transitions: self.transitions, work: self.work }
+    pub(super) fn finish_run(&self, status: RunStatus) -> RunResult {
+        RunResult { status, stopped_at_s: self.t, transitions: self.transitions, work: self.work }
     }
 
     /// The first mode: by the tip's velocity, or by the forces when it is at rest.
-    fn begin(&mut self, pose: &Pose) -> Next {
-        let at = self.system.instant(self.t, pose, self.lean);
+    fn first_phase(&mut self, pose: &Pose) -> NextPhase {
+        let at = self.system.contact_instant(self.t, pose, self.lean);
         if at.directions.cos_theta <= 0.0 || at.directions.cos_phi <= 0.0 {
-            return Next::End(Status::Diverged);
+            return NextPhase::End(RunStatus::Diverged);
         }
         let velocity = self.system.linkage.tip_velocity_m_per_s(pose, &at.directions, &at.head);
         if velocity == 0.0 {
@@ -140,38 +155,42 @@ impl<'a, W: Watch> Machine<'a, W> {
     }
 
     /// Decides what follows with the tip moving along the glass.
-    fn decide_in_motion(&mut self, pose: &Pose, velocity: f64, before: Before) -> Next {
-        let at = self.system.instant(self.t, pose, self.lean);
-        let mode = Mode::slip(velocity);
-        let (_, forces) =
-            Slip { system: self.system, direction: mode.direction(), lean: self.lean }.forces(pose, &at);
+    fn decide_in_motion(&mut self, pose: &Pose, velocity: f64, before: PendingTransition) -> NextPhase {
+        let at = self.system.contact_instant(self.t, pose, self.lean);
+        let mode = TipMode::slip_towards(velocity);
+        let (_, forces) = SlipPhase { system: self.system, direction: mode.direction(), lean: self.lean }
+            .slip_forces(pose, &at);
         if forces.indicator > 0.0 && forces.normal_n <= 0.0 {
             return self.lose_contact(pose, before);
         }
         if let Some((from, Some(cause))) = before {
-            self.change(from, mode, cause);
+            self.record_transition(from, mode, cause);
         }
-        if forces.indicator <= 0.0 { self.jam(pose, mode) } else { Next::Phase(mode, *pose, [0; GUARDS]) }
+        if forces.indicator <= 0.0 {
+            self.resolve_jam(pose, mode)
+        } else {
+            NextPhase::Phase(mode, *pose, [0; GUARDS])
+        }
     }
 
     /// Decides what follows with the tip at rest.
-    fn decide_at_rest(&mut self, pose: &Pose, before: Before) -> Next {
-        let at = self.system.instant(self.t, pose, self.lean);
-        match at_rest(&at.contact, self.system.linkage.friction.at_rest()) {
-            AtRest::Becomes(Mode::Flight) => self.lose_contact(pose, before),
-            AtRest::Indeterminate => Next::End(Status::Indeterminate),
-            AtRest::Jammed => Next::End(Status::Jammed),
-            AtRest::Becomes(mode) => {
+    fn decide_at_rest(&mut self, pose: &Pose, before: PendingTransition) -> NextPhase {
+        let at = self.system.contact_instant(self.t, pose, self.lean);
+        match decide_mode_at_rest(&at.contact, self.system.linkage.friction.static_coefficient()) {
+            RestDecision::Becomes(TipMode::Flight) => self.lose_contact(pose, before),
+            RestDecision::Indeterminate => NextPhase::End(RunStatus::Indeterminate),
+            RestDecision::Jammed => NextPhase::End(RunStatus::Jammed),
+            RestDecision::Becomes(mode) => {
                 if let Some((from, given)) = before.filter(|&(from, given)| from != mode || given.is_some()) {
-                    self.change(from, mode, given.unwrap_or_else(|| cause(from, mode)));
+                    self.record_transition(from, mode, given.unwrap_or_else(|| cause_of_change(from, mode)));
                 }
                 let mut zero_order = [0; GUARDS];
-                zero_order[TIP_STOPS] = if mode == Mode::Stick {
+                zero_order[TIP_STOPS] = if mode == TipMode::Stick {
                     0
                 } else {
-                    order_of_release(&at.contact, self.system.linkage.friction.at_rest())
+                    release_order(&at.contact, self.system.linkage.friction.static_coefficient())
                 };
-                Next::Phase(mode, *pose, zero_order)
+                NextPhase::Phase(mode, *pose, zero_order)
             }
         }
     }
@@ -179,11 +198,11 @@ impl<'a, W: Watch> Machine<'a, W> {
     /// Takes what event location leaves of the tip's velocity (rounding, or the tolerance where the tip only
     /// grazes rest) out of the rates, by the impulse on the tip that does so: the state that is decided on is
     /// exactly at rest.
-    fn at_standstill(&self, mut pose: Pose) -> Pose {
-        if matches!(self.effort.method, Method::FixedStep(scheme) if scheme.gain_per_s > 0.0) {
+    fn remove_tip_velocity(&self, mut pose: Pose) -> Pose {
+        if matches!(self.effort.method, IntegrationMethod::FixedStep(scheme) if scheme.gain_per_s > 0.0) {
             return pose; // the stabilisation does it
         }
-        let at = self.system.instant(self.t, &pose, self.lean);
+        let at = self.system.contact_instant(self.t, &pose, self.lean);
         let impulse =
             -self.system.linkage.tip_velocity_m_per_s(&pose, &at.directions, &at.head) / at.contact.kappa;
         pose.theta_rate += impulse * at.contact.per_force[0];
@@ -191,19 +210,19 @@ impl<'a, W: Watch> Machine<'a, W> {
         pose
     }
 
-    fn change(&mut self, from: Mode, to: Mode, cause: Cause) {
+    fn record_transition(&mut self, from: TipMode, to: TipMode, cause: TransitionCause) {
         self.transitions += 1;
-        self.watch.transition(&Transition { time_s: self.t, from, to, cause });
+        self.watch.watch_transition(&Transition { time_s: self.t, from, to, cause });
     }
 
-    fn stick(&mut self, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
-        if let Method::FixedStep(scheme) = self.effort.method {
-            return self.hold(&scheme, pose, zero_order, stop);
+    fn integrate_stick(&mut self, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> NextPhase {
+        if let IntegrationMethod::FixedStep(scheme) = self.effort.method {
+            return self.integrate_stabilised_stick(&scheme, pose, zero_order, stop);
         }
-        let phase = Stick::hold(self.system, self.t, pose, self.lean);
-        let start = Start { t: self.t, y: phase.states(pose), zero_order, step: self.steps[0] };
+        let phase = StickPhase::from_pose(self.system, self.t, pose, self.lean);
+        let start = PhaseStart { t: self.t, y: phase.free_states(pose), zero_order, step: self.steps[0] };
         let (watch, drive) = (&mut *self.watch, &self.system.drive);
-        let end = integrate(
+        let end = integrate_phase(
             &phase,
             start,
             |t| drive.horizon(t, stop),
@@ -211,94 +230,113 @@ impl<'a, W: Watch> Machine<'a, W> {
             &mut self.rooms.0,
             &mut self.work,
             |step, motion| {
-                watch.piece(&Piece {
+                watch.watch_segment(&SolutionSegment {
                     start_s: step.start,
                     end_s: step.end,
-                    mode: Mode::Stick,
+                    mode: TipMode::Stick,
                     motion,
-                    solution: Solution::Stick(&phase, step),
+                    solution: SegmentSolution::Stick(&phase, step),
                 });
-                watch.flow()
+                watch.control_flow()
             },
         );
         (self.t, self.steps[0]) = (end.t, Some(end.first_step));
-        let (pose, _) = phase.pose(&self.system.drive.at(end.t), &end.y);
+        let (pose, _) = phase.full_pose(&self.system.drive.motion_at(end.t), &end.y);
         if let Ended::Guard(guard) = end.cause {
-            self.watch.fell(guard, &self.rooms.0.tape);
+            self.watch.watch_guard(guard, &self.rooms.0.tape);
         }
-        self.after_stick(end.cause, pose)
+        self.decide_after_stick(end.cause, pose)
     }
 
     /// Stick as the fixed-step scheme has it.
-    fn hold(&mut self, scheme: &FixedStep, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
-        let phase = Held::hold(self.system, self.t, pose, self.lean, scheme.gain_per_s);
-        let start = Start {
+    fn integrate_stabilised_stick(
+        &mut self,
+        scheme: &FixedStepScheme,
+        pose: &Pose,
+        zero_order: [u8; GUARDS],
+        stop: f64,
+    ) -> NextPhase {
+        let phase = StabilisedStickPhase::from_pose(self.system, self.t, pose, self.lean, scheme.gain_per_s);
+        let start = PhaseStart {
             t: self.t,
             y: [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate],
             zero_order,
             step: None,
         };
         let watch = &mut *self.watch;
-        let end = fixed::integrate(&phase, start, stop, &scheme.steps(), &mut self.work, |step| {
-            watch.piece(&Piece {
-                start_s: step.start,
-                end_s: step.end,
-                mode: Mode::Stick,
-                motion: None,
-                solution: Solution::Held(&phase, step),
-            });
-            watch.flow()
-        });
+        let end = fixed::integrate_fixed(
+            &phase,
+            start,
+            stop,
+            &scheme.integrator_options(),
+            &mut self.work,
+            |step| {
+                watch.watch_segment(&SolutionSegment {
+                    start_s: step.start,
+                    end_s: step.end,
+                    mode: TipMode::Stick,
+                    motion: None,
+                    solution: SegmentSolution::Held(&phase, step),
+                });
+                watch.control_flow()
+            },
+        );
         self.t = end.t;
-        self.after_stick(end.cause, pose_of(&end.y))
+        self.decide_after_stick(end.cause, pose_from_states(&end.y))
     }
 
-    fn after_stick(&mut self, ended: Ended, pose: Pose) -> Next {
+    fn decide_after_stick(&mut self, ended: Ended, pose: Pose) -> NextPhase {
         match ended {
-            Ended::Stop => Next::End(Status::Completed),
-            Ended::Asked => Next::End(Status::Interrupted),
-            Ended::StepTooSmall => Next::End(self.gave_up()),
-            Ended::Guard(STICK_CONTACT_LOST) => self.lose_contact(&pose, Some((Mode::Stick, None))),
-            Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
-            Ended::Guard(guard) => match released(guard) {
-                Some(mode) => self.release(mode, pose),
-                None => self.corner_in_stick(guard, &pose),
+            Ended::Stop => NextPhase::End(RunStatus::Completed),
+            Ended::Interrupted => NextPhase::End(RunStatus::Interrupted),
+            Ended::StepTooSmall => NextPhase::End(self.failure_status()),
+            Ended::Guard(STICK_CONTACT_LOST) => self.lose_contact(&pose, Some((TipMode::Stick, None))),
+            Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => NextPhase::End(RunStatus::Diverged),
+            Ended::Guard(guard) => match mode_after_release(guard) {
+                Some(mode) => self.release_tip(mode, pose),
+                None => self.decide_at_corner(guard, &pose),
             },
         }
     }
 
     /// Leaves stick at the static limit: the tip's velocity starts at a double zero.
-    fn release(&mut self, mode: Mode, pose: Pose) -> Next {
-        let at = self.system.instant(self.t, &pose, self.lean);
-        let (_, forces) =
-            Slip { system: self.system, direction: mode.direction(), lean: self.lean }.forces(&pose, &at);
+    fn release_tip(&mut self, mode: TipMode, pose: Pose) -> NextPhase {
+        let at = self.system.contact_instant(self.t, &pose, self.lean);
+        let (_, forces) = SlipPhase { system: self.system, direction: mode.direction(), lean: self.lean }
+            .slip_forces(&pose, &at);
         if forces.indicator <= 0.0 {
-            return self.jam(&pose, Mode::Stick);
+            return self.resolve_jam(&pose, TipMode::Stick);
         }
-        self.recent.note(self.t);
-        self.change(Mode::Stick, mode, Cause::FrictionLimit);
+        self.recent.note_event(self.t);
+        self.record_transition(TipMode::Stick, mode, TransitionCause::FrictionLimit);
         let mut zero_order = [0; GUARDS];
         zero_order[TIP_STOPS] = 2;
-        Next::Phase(mode, pose, zero_order)
+        NextPhase::Phase(mode, pose, zero_order)
     }
 
     /// The shoulder's damping makes the holding force jump at its corner, so stick is decided again there.
-    fn corner_in_stick(&mut self, guard: usize, pose: &Pose) -> Next {
+    fn decide_at_corner(&mut self, guard: usize, pose: &Pose) -> NextPhase {
         let corner = self.cross_corner(guard);
-        let mut next = self.decide_at_rest(pose, Some((Mode::Stick, None)));
-        if let Next::Phase(_, _, zero_order) | Next::Flight(_, zero_order) = &mut next {
+        let mut next = self.decide_at_rest(pose, Some((TipMode::Stick, None)));
+        if let NextPhase::Phase(_, _, zero_order) | NextPhase::Flight(_, zero_order) = &mut next {
             zero_order[corner] = 1;
         }
         next
     }
 
-    fn slip(&mut self, mode: Mode, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> Next {
-        let phase = Slip { system: self.system, direction: mode.direction(), lean: self.lean };
+    fn integrate_slip(
+        &mut self,
+        mode: TipMode,
+        pose: &Pose,
+        zero_order: [u8; GUARDS],
+        stop: f64,
+    ) -> NextPhase {
+        let phase = SlipPhase { system: self.system, direction: mode.direction(), lean: self.lean };
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
         let started = self.t;
-        let start = Start { t: started, y, zero_order, step: self.steps[1] };
+        let start = PhaseStart { t: started, y, zero_order, step: self.steps[1] };
         let (watch, drive) = (&mut *self.watch, &self.system.drive);
-        let end = integrate(
+        let end = integrate_phase(
             &phase,
             start,
             |t| drive.horizon(t, stop),
@@ -306,45 +344,45 @@ impl<'a, W: Watch> Machine<'a, W> {
             &mut self.rooms.1,
             &mut self.work,
             |step, motion| {
-                watch.piece(&Piece {
+                watch.watch_segment(&SolutionSegment {
                     start_s: step.start,
                     end_s: step.end,
                     mode,
                     motion,
-                    solution: Solution::Slip(&phase, step),
+                    solution: SegmentSolution::Slip(&phase, step),
                 });
-                watch.flow()
+                watch.control_flow()
             },
         );
         (self.t, self.steps[1]) = (end.t, Some(end.first_step));
-        let pose = pose_of(&end.y);
+        let pose = pose_from_states(&end.y);
         if let Ended::Guard(guard) = end.cause {
-            self.watch.fell(guard, &self.rooms.1.tape);
+            self.watch.watch_guard(guard, &self.rooms.1.tape);
         }
         match end.cause {
-            Ended::Stop => Next::End(Status::Completed),
-            Ended::Asked => Next::End(Status::Interrupted),
-            Ended::StepTooSmall if self.work.is_spent() => Next::End(Status::WorkLimit),
+            Ended::Stop => NextPhase::End(RunStatus::Completed),
+            Ended::Interrupted => NextPhase::End(RunStatus::Interrupted),
+            Ended::StepTooSmall if self.work.is_spent() => NextPhase::End(RunStatus::WorkLimit),
             Ended::StepTooSmall | Ended::Guard(SLIP_CONTACT_LOST) if self.is_at_pole(&phase, &pose) => {
-                self.jam(&pose, mode)
+                self.resolve_jam(&pose, mode)
             }
-            Ended::StepTooSmall => Next::End(Status::Diverged),
-            Ended::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.jam(&pose, mode),
+            Ended::StepTooSmall => NextPhase::End(RunStatus::Diverged),
+            Ended::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.resolve_jam(&pose, mode),
             // beyond the tip's rest friction that falls steeply grows without bound, and an interpolant
             // through that may dip where the indicator does not: the state stands, and the phase goes on
             Ended::Guard(JAMS) => {
-                self.recent.note(self.t);
-                self.shorten_slip();
-                Next::Phase(mode, pose, [0; GUARDS])
+                self.recent.note_event(self.t);
+                self.shorten_slip_step();
+                NextPhase::Phase(mode, pose, [0; GUARDS])
             }
             Ended::Guard(SLIP_CONTACT_LOST) => self.lose_contact(&pose, Some((mode, None))),
-            Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
+            Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => NextPhase::End(RunStatus::Diverged),
             Ended::Guard(TIP_STOPS) => {
-                self.recent.note(self.t);
-                let next = self.decide_at_rest(&self.at_standstill(pose), Some((mode, None)));
-                if matches!(next, Next::Phase(same, ..) if same == mode) {
+                self.recent.note_event(self.t);
+                let next = self.decide_at_rest(&self.remove_tip_velocity(pose), Some((mode, None)));
+                if matches!(next, NextPhase::Phase(same, ..) if same == mode) {
                     // the tip has not stopped: its first step was too long to tell a release from its error
-                    self.shorten_slip();
+                    self.shorten_slip_step();
                 }
                 next
             }
@@ -353,12 +391,12 @@ impl<'a, W: Watch> Machine<'a, W> {
                 // (at the instant of a release the tip's velocity still starts at its zero)
                 let mut next_order = if end.t == started { zero_order } else { [0; GUARDS] };
                 next_order[corner] = 1;
-                Next::Phase(mode, pose, next_order)
+                NextPhase::Phase(mode, pose, next_order)
             }
         }
     }
 
-    fn shorten_slip(&mut self) {
+    fn shorten_slip_step(&mut self) {
         /// What the next first step of slip is multiplied by.
         const SHORTER: f64 = 0.1;
         self.steps[1] = self.steps[1].map(|step| SHORTER * step);
@@ -367,23 +405,23 @@ impl<'a, W: Watch> Machine<'a, W> {
     /// Whether the tip is about to jam. Towards the paradox the indicator vanishes as the square root of the
     /// time that is left and the normal force grows without bound: no step resolves the last instant, and one
     /// that rounding takes across it finds the force pulling.
-    fn is_at_pole(&self, phase: &Slip<'_>, pose: &Pose) -> bool {
+    fn is_at_pole(&self, phase: &SlipPhase<'_>, pose: &Pose) -> bool {
         /// Chosen by looking, not derived: over 300 random heavy-headed blades the runs that ended at the
         /// paradox were left with an indicator of at most 5e-6 in size, those that ended otherwise with 0.5
         /// or more. Anything between tells the two apart.
         const VANISHED: f64 = 1e-4;
-        let (_, forces) = phase.forces(pose, &self.system.instant(self.t, pose, self.lean));
+        let (_, forces) = phase.slip_forces(pose, &self.system.contact_instant(self.t, pose, self.lean));
         forces.indicator < VANISHED
     }
 
     /// Moves the neck onto or off the shoulder; returns the guard of the corner it has just passed.
     fn cross_corner(&mut self, guard: usize) -> usize {
-        self.recent.note(self.t);
+        self.recent.note_event(self.t);
         let [forward, backward] = SHOULDER_GUARDS;
         self.lean = match (self.lean, guard) {
-            (Lean::Off, g) if g == forward => Lean::Forward,
-            (Lean::Off, _) => Lean::Backward,
-            (Lean::Forward | Lean::Backward, _) => Lean::Off,
+            (ShoulderContact::Off, g) if g == forward => ShoulderContact::Forward,
+            (ShoulderContact::Off, _) => ShoulderContact::Backward,
+            (ShoulderContact::Forward | ShoulderContact::Backward, _) => ShoulderContact::Off,
         };
         if guard == backward { backward } else { forward }
     }
@@ -392,7 +430,7 @@ impl<'a, W: Watch> Machine<'a, W> {
 /// Order of the zero with which the tip's velocity opens from rest: 1 where friction falls short of what
 /// would hold the tip, 2 where the two are equal, as at the end of stick, and the acceleration is what
 /// rounding leaves.
-fn order_of_release(contact: &Contact, mu: f64) -> u8 {
+fn release_order(contact: &FrictionResponse, mu: f64) -> u8 {
     /// Excess, as a share of the limit, up to which the forces count as equal: far above rounding, far below
     /// what a step resolves.
     const EQUAL: f64 = 1e-11;
@@ -403,10 +441,10 @@ fn order_of_release(contact: &Contact, mu: f64) -> u8 {
 
 /// Why the tip at rest leaves one mode for another; stick that is decided again ends at the shoulder's
 /// corner.
-fn cause(from: Mode, to: Mode) -> Cause {
+fn cause_of_change(from: TipMode, to: TipMode) -> TransitionCause {
     match (from, to) {
-        (_, Mode::Stick) => Cause::TipStops,
-        (Mode::Stick, _) => Cause::ShoulderCorner,
-        _ => Cause::DirectReversal,
+        (_, TipMode::Stick) => TransitionCause::TipStops,
+        (TipMode::Stick, _) => TransitionCause::ShoulderCorner,
+        _ => TransitionCause::DirectReversal,
     }
 }

@@ -1,12 +1,12 @@
 //! The states of contact and which of them follows when the tip is at rest on the glass: a pure function of
 //! the forces.
 
-use crate::blade::Contact;
+use crate::blade::FrictionResponse;
 use serde::Serialize;
 
 /// How the tip touches the glass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Mode {
+pub enum TipMode {
     /// The tip is held at its place.
     #[serde(rename = "stick")]
     Stick,
@@ -21,7 +21,7 @@ pub enum Mode {
     Flight,
 }
 
-impl Mode {
+impl TipMode {
     /// The name used in files.
     #[must_use]
     pub fn name(self) -> &'static str {
@@ -45,16 +45,16 @@ impl Mode {
 
     /// The slip mode of a direction.
     #[must_use]
-    pub fn slip(direction: f64) -> Self {
+    pub fn slip_towards(direction: f64) -> Self {
         if direction < 0.0 { Self::SlipBackward } else { Self::SlipForward }
     }
 }
 
 /// What contact does next with the tip at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum AtRest {
+pub enum RestDecision {
     /// Contact goes on in this mode.
-    Becomes(Mode),
+    Becomes(TipMode),
     /// More than one mode is consistent with the forces.
     Indeterminate,
     /// No mode is: the tip jams.
@@ -63,7 +63,7 @@ pub enum AtRest {
 
 /// Friction force that holds a tip at rest, N.
 #[must_use]
-pub fn holding_force(contact: &Contact) -> f64 {
+pub fn holding_force(contact: &FrictionResponse) -> f64 {
     -contact.a_free / contact.kappa
 }
 
@@ -73,33 +73,33 @@ pub fn holding_force(contact: &Contact) -> f64 {
 /// holding force is within the static limit and the tip is pressed on, lift-off if the glass would have to
 /// pull, otherwise slip against the holding force. Where it is not (the Painlevé region) every mode is tried.
 #[must_use]
-pub fn at_rest(contact: &Contact, mu: f64) -> AtRest {
+pub fn decide_mode_at_rest(contact: &FrictionResponse, mu: f64) -> RestDecision {
     let force = holding_force(contact);
     let normal = contact.n_free + contact.nu * force;
     let sticks = normal > 0.0 && force.abs() <= mu * normal;
     if (mu * contact.nu).abs() < 1.0 {
-        return AtRest::Becomes(match () {
-            () if sticks => Mode::Stick,
-            () if contact.n_free <= 0.0 => Mode::Flight,
-            () => Mode::slip(-force),
+        return RestDecision::Becomes(match () {
+            () if sticks => TipMode::Stick,
+            () if contact.n_free <= 0.0 => TipMode::Flight,
+            () => TipMode::slip_towards(-force),
         });
     }
     let consistent = [
-        (sticks, Mode::Stick),
-        (slips(contact, mu, 1.0), Mode::SlipForward),
-        (slips(contact, mu, -1.0), Mode::SlipBackward),
-        (contact.n_free < 0.0, Mode::Flight),
+        (sticks, TipMode::Stick),
+        (is_slip_consistent(contact, mu, 1.0), TipMode::SlipForward),
+        (is_slip_consistent(contact, mu, -1.0), TipMode::SlipBackward),
+        (contact.n_free < 0.0, TipMode::Flight),
     ];
     let mut modes = consistent.into_iter().filter(|(holds, _)| *holds).map(|(_, mode)| mode);
     match (modes.next(), modes.next()) {
-        (Some(mode), None) => AtRest::Becomes(mode),
-        (Some(_), Some(_)) => AtRest::Indeterminate,
-        (None, _) => AtRest::Jammed,
+        (Some(mode), None) => RestDecision::Becomes(mode),
+        (Some(_), Some(_)) => RestDecision::Indeterminate,
+        (None, _) => RestDecision::Jammed,
     }
 }
 
 /// Whether slip in this direction has a normal force that presses and an acceleration that leads into it.
-fn slips(contact: &Contact, mu: f64, direction: f64) -> bool {
+fn is_slip_consistent(contact: &FrictionResponse, mu: f64, direction: f64) -> bool {
     let indicator = 1.0 + direction * mu * contact.nu;
     let normal = contact.n_free / indicator;
     normal > 0.0 && direction * (contact.a_free - contact.kappa * direction * mu * normal) > 0.0
@@ -110,23 +110,35 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn contact(a_free: f64, n_free: f64, nu: f64) -> Contact {
-        Contact { free: [0.0; 2], per_force: [0.0; 2], a_free, kappa: 2.0, n_free, nu }
+    fn contact(a_free: f64, n_free: f64, nu: f64) -> FrictionResponse {
+        FrictionResponse { free: [0.0; 2], per_force: [0.0; 2], a_free, kappa: 2.0, n_free, nu }
     }
 
     #[test]
     fn the_holding_force_within_the_limit_sticks_and_beyond_it_slips_against_it() {
         // needs 0.5 N of at most 0.6 N
-        assert_eq!(at_rest(&contact(1.0, 1.0, 0.0), 0.6), AtRest::Becomes(Mode::Stick));
-        assert_eq!(at_rest(&contact(1.0, 1.0, 0.0), 0.4), AtRest::Becomes(Mode::SlipForward));
-        assert_eq!(at_rest(&contact(-1.0, 1.0, 0.0), 0.4), AtRest::Becomes(Mode::SlipBackward));
-        assert_eq!(at_rest(&contact(1.0, -1.0, 0.0), 0.4), AtRest::Becomes(Mode::Flight));
+        assert_eq!(decide_mode_at_rest(&contact(1.0, 1.0, 0.0), 0.6), RestDecision::Becomes(TipMode::Stick));
+        assert_eq!(
+            decide_mode_at_rest(&contact(1.0, 1.0, 0.0), 0.4),
+            RestDecision::Becomes(TipMode::SlipForward)
+        );
+        assert_eq!(
+            decide_mode_at_rest(&contact(-1.0, 1.0, 0.0), 0.4),
+            RestDecision::Becomes(TipMode::SlipBackward)
+        );
+        assert_eq!(
+            decide_mode_at_rest(&contact(1.0, -1.0, 0.0), 0.4),
+            RestDecision::Becomes(TipMode::Flight)
+        );
     }
 
     #[test]
     fn without_a_consistent_mode_the_tip_jams_and_with_several_it_is_indeterminate() {
-        assert_eq!(at_rest(&contact(0.1, -1.0, 3.0), 1.0), AtRest::Becomes(Mode::Flight));
-        assert_eq!(at_rest(&contact(-1.0, -1.0, 3.0), 1.0), AtRest::Indeterminate);
+        assert_eq!(
+            decide_mode_at_rest(&contact(0.1, -1.0, 3.0), 1.0),
+            RestDecision::Becomes(TipMode::Flight)
+        );
+        assert_eq!(decide_mode_at_rest(&contact(-1.0, -1.0, 3.0), 1.0), RestDecision::Indeterminate);
     }
 
     proptest! {
@@ -144,14 +156,14 @@ mod tests {
             let normal = n + nu * force;
             prop_assume!((force.abs() - mu * normal).abs() > 1e-9);
             let holds = [
-                (normal > 0.0 && force.abs() <= mu * normal, Mode::Stick),
-                (slips(&contact, mu, 1.0), Mode::SlipForward),
-                (slips(&contact, mu, -1.0), Mode::SlipBackward),
-                (n < 0.0, Mode::Flight),
+                (normal > 0.0 && force.abs() <= mu * normal, TipMode::Stick),
+                (is_slip_consistent(&contact, mu, 1.0), TipMode::SlipForward),
+                (is_slip_consistent(&contact, mu, -1.0), TipMode::SlipBackward),
+                (n < 0.0, TipMode::Flight),
             ];
-            let modes: Vec<Mode> = holds.iter().filter(|h| h.0).map(|h| h.1).collect();
+            let modes: Vec<TipMode> = holds.iter().filter(|h| h.0).map(|h| h.1).collect();
             prop_assert_eq!(modes.len(), 1);
-            prop_assert_eq!(at_rest(&contact, mu), AtRest::Becomes(modes[0]));
+            prop_assert_eq!(decide_mode_at_rest(&contact, mu), RestDecision::Becomes(modes[0]));
         }
     }
 }

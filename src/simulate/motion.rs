@@ -1,29 +1,29 @@
 //! The motion of a blade, state by state, with everything that one run shows of it.
 
 use crate::blade::Linkage;
-use crate::simulate::outputs::{Audit, Impacts, StickIntervals, Transitions};
+use crate::simulate::outputs::{EnergyAudit, Impacts, StickIntervals, Transitions};
 use crate::simulate::scene::Scene;
-use crate::simulate::{Impact, Observer, Piece, Run, Sample, Transition, run};
+use crate::simulate::{Impact, ModelSample, Observer, RunResult, SolutionSegment, Transition, run_scene};
 
 /// Samples of a run: enough for twenty points in a cycle of 1 kHz over the quarter of a second that a
 /// reversal takes.
-pub const SAMPLES: usize = 6000;
-/// Time between fine samples, s: fifty in a cycle of 1 kHz. Of a long run there are [`MOST_FINE`] (14 MB).
+pub const MOTION_SAMPLES: usize = 6000;
+/// Time between fine samples, s: fifty in a cycle of 1 kHz. Of a long run there are [`MAX_FINE_SAMPLES`] (14 MB).
 const FINE_STEP_S: f64 = 2e-5;
-const MOST_FINE: usize = 100_000;
+const MAX_FINE_SAMPLES: usize = 100_000;
 
 /// Return of the head after a turn, as a share of its travel: less is a vibration of the drive.
 const RETURN: f64 = 0.005;
 
 /// A run of a scene.
 #[derive(Debug, Clone)]
-pub struct Motion {
+pub struct RunMotion {
     /// Links and springs.
     pub linkage: Linkage,
     /// States at equal steps of time, until the run ended.
-    pub samples: Vec<Sample>,
+    pub samples: Vec<ModelSample>,
     /// The same in the finest steps that a figure of a part needs.
-    pub fine: Vec<Sample>,
+    pub fine: Vec<ModelSample>,
     /// Every change of mode.
     pub transitions: Vec<Transition>,
     /// When the tip stuck, s.
@@ -31,23 +31,23 @@ pub struct Motion {
     /// Every impact of the tip on the glass.
     pub impacts: Vec<Impact>,
     /// Least normal force and Painlevé indicator over the whole run, not over the samples alone.
-    pub extremes: Audit,
+    pub extremes: EnergyAudit,
     /// How it ended.
-    pub run: Run,
+    pub run: RunResult,
 }
 
-impl Motion {
+impl RunMotion {
     /// The scene, run from its start to its stop.
     #[must_use]
-    pub fn of(scene: &Scene) -> Self {
+    pub fn simulate(scene: &Scene) -> Self {
         let mut recorder = MotionRecorder::new(scene);
-        let run = run(scene, &mut recorder);
-        recorder.motion(scene, run)
+        let run = run_scene(scene, &mut recorder);
+        recorder.into_motion(scene, run)
     }
 
     /// The fine samples between two instants, s.
     #[must_use]
-    pub fn between(&self, [from_s, to_s]: [f64; 2]) -> &[Sample] {
+    pub fn fine_samples_between(&self, [from_s, to_s]: [f64; 2]) -> &[ModelSample] {
         let first = self.fine.partition_point(|s| s.time_s < from_s);
         let end = self.fine.partition_point(|s| s.time_s <= to_s);
         self.fine.get(first..end).unwrap_or_default()
@@ -87,25 +87,28 @@ impl Motion {
     }
 }
 
-/// What takes a [`Motion`] down while a scene runs.
+/// What takes a [`RunMotion`] down while a scene runs.
 pub(crate) struct MotionRecorder {
     states: (EvenSamples, EvenSamples),
-    events: (StickIntervals, (Transitions, (Impacts, Audit))),
+    events: (StickIntervals, (Transitions, (Impacts, EnergyAudit))),
 }
 
 impl MotionRecorder {
     pub(crate) fn new(scene: &Scene) -> Self {
         let fine = ((scene.run.stop_s - scene.start_s) / FINE_STEP_S).ceil() as usize + 1;
-        let states = (EvenSamples::new(scene, SAMPLES), EvenSamples::new(scene, fine.clamp(2, MOST_FINE)));
+        let states = (
+            EvenSamples::new(scene, MOTION_SAMPLES),
+            EvenSamples::new(scene, fine.clamp(2, MAX_FINE_SAMPLES)),
+        );
         Self { states, events: Default::default() }
     }
 
-    pub(crate) fn motion(self, scene: &Scene, run: Run) -> Motion {
+    pub(crate) fn into_motion(self, scene: &Scene, run: RunResult) -> RunMotion {
         let (stick, (transitions, (impacts, extremes))) = self.events;
-        Motion {
+        RunMotion {
             linkage: scene.linkage,
-            samples: self.states.0.taken,
-            fine: self.states.1.taken,
+            samples: self.states.0.samples,
+            fine: self.states.1.samples,
             transitions: transitions.0,
             stick_s: stick.0,
             impacts: impacts.0,
@@ -116,15 +119,15 @@ impl MotionRecorder {
 }
 
 impl Observer for MotionRecorder {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        self.states.piece(piece);
-        self.events.piece(piece);
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        self.states.observe_segment(piece);
+        self.events.observe_segment(piece);
     }
-    fn transition(&mut self, transition: &Transition) {
-        self.events.transition(transition);
+    fn observe_transition(&mut self, transition: &Transition) {
+        self.events.observe_transition(transition);
     }
-    fn impact(&mut self, impact: &Impact) {
-        self.events.impact(impact);
+    fn observe_impact(&mut self, impact: &Impact) {
+        self.events.observe_impact(impact);
     }
 }
 
@@ -132,24 +135,24 @@ impl Observer for MotionRecorder {
 struct EvenSamples {
     span_s: [f64; 2],
     count: usize,
-    taken: Vec<Sample>,
+    samples: Vec<ModelSample>,
 }
 
 impl EvenSamples {
     fn new(scene: &Scene, count: usize) -> Self {
-        Self { span_s: [scene.start_s, scene.run.stop_s], count, taken: Vec::with_capacity(count) }
+        Self { span_s: [scene.start_s, scene.run.stop_s], count, samples: Vec::with_capacity(count) }
     }
 
-    fn next_s(&self) -> Option<f64> {
-        let ([start_s, stop_s], i) = (self.span_s, self.taken.len());
+    fn next_time_s(&self) -> Option<f64> {
+        let ([start_s, stop_s], i) = (self.span_s, self.samples.len());
         (i < self.count).then(|| start_s + (stop_s - start_s) * i as f64 / (self.count - 1) as f64)
     }
 }
 
 impl Observer for EvenSamples {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        while let Some(t) = self.next_s().filter(|t| *t <= piece.end_s) {
-            self.taken.push(piece.sample(t.max(piece.start_s)));
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        while let Some(t) = self.next_time_s().filter(|t| *t <= piece.end_s) {
+            self.samples.push(piece.sample_at(t.max(piece.start_s)));
         }
     }
 }

@@ -1,34 +1,34 @@
 //! What observers make of a run: samples at given times, the list of transitions, extremes and the energy
 //! balance.
 
-use super::mode::Mode;
-use super::scene::{Drive, Jam, Loss, Scene, StartKind};
-use super::{Effort, Impact, Observer, Piece, Run, Sample, Transition};
+use super::mode::TipMode;
+use super::scene::{ContactLossRule, Drive, JamRule, Scene, StartKind};
+use super::{Impact, ModelSample, Observer, RunResult, SolutionSegment, SolverOptions, Transition};
 use crate::blade::Linkage;
 use crate::math::gauss;
-use crate::plausibility::Finding;
+use crate::plausibility::PlausibilityFinding;
 use crate::recording::FrameGrid;
 use serde::Serialize;
 use std::fmt::Write;
 use std::ops::ControlFlow;
 
 /// Hands every sample at the given rising times to `sink`.
-pub struct Sampler<I: Iterator<Item = f64>, F: FnMut(&Sample)> {
+pub struct SampleObserver<I: Iterator<Item = f64>, F: FnMut(&ModelSample)> {
     times: std::iter::Peekable<I>,
     sink: F,
 }
 
-impl<I: Iterator<Item = f64>, F: FnMut(&Sample)> Sampler<I, F> {
+impl<I: Iterator<Item = f64>, F: FnMut(&ModelSample)> SampleObserver<I, F> {
     /// A sampler of these times, s; they must rise.
     pub fn new(times: I, sink: F) -> Self {
         Self { times: times.peekable(), sink }
     }
 }
 
-impl<I: Iterator<Item = f64>, F: FnMut(&Sample)> Observer for Sampler<I, F> {
-    fn piece(&mut self, piece: &Piece<'_>) {
+impl<I: Iterator<Item = f64>, F: FnMut(&ModelSample)> Observer for SampleObserver<I, F> {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
         while let Some(t) = self.times.next_if(|&t| t <= piece.end_s) {
-            (self.sink)(&piece.sample(t.max(piece.start_s)));
+            (self.sink)(&piece.sample_at(t.max(piece.start_s)));
         }
     }
 }
@@ -38,8 +38,8 @@ impl<I: Iterator<Item = f64>, F: FnMut(&Sample)> Observer for Sampler<I, F> {
 pub struct Transitions(pub Vec<Transition>);
 
 impl Observer for Transitions {
-    fn piece(&mut self, _: &Piece<'_>) {}
-    fn transition(&mut self, transition: &Transition) {
+    fn observe_segment(&mut self, _: &SolutionSegment<'_>) {}
+    fn observe_transition(&mut self, transition: &Transition) {
         self.0.push(*transition);
     }
 }
@@ -49,8 +49,8 @@ impl Observer for Transitions {
 pub struct Impacts(pub Vec<Impact>);
 
 impl Observer for Impacts {
-    fn piece(&mut self, _: &Piece<'_>) {}
-    fn impact(&mut self, impact: &Impact) {
+    fn observe_segment(&mut self, _: &SolutionSegment<'_>) {}
+    fn observe_impact(&mut self, impact: &Impact) {
         self.0.push(*impact);
     }
 }
@@ -60,8 +60,8 @@ impl Observer for Impacts {
 pub struct StickIntervals(pub Vec<[f64; 2]>);
 
 impl Observer for StickIntervals {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        if piece.mode != Mode::Stick {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        if piece.mode != TipMode::Stick {
             return;
         }
         match self.0.last_mut() {
@@ -73,16 +73,16 @@ impl Observer for StickIntervals {
 
 /// Largest angle of a link from the vertical, and when it was.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Tilt {
+pub struct LargestTilt {
     /// The angle, rad; seen at the ends of the pieces, of which a swing has many.
     pub largest_rad: f64,
     /// When, s.
     pub at_s: f64,
 }
 
-impl Observer for Tilt {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        let pose = piece.pose(piece.end_s);
+impl Observer for LargestTilt {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        let pose = piece.pose_at(piece.end_s);
         let tilt = pose.theta.abs().max(pose.phi.abs());
         if tilt > self.largest_rad {
             *self = Self { largest_rad: tilt, at_s: piece.end_s };
@@ -92,44 +92,44 @@ impl Observer for Tilt {
 
 /// Two observers at once.
 impl<A: Observer, B: Observer> Observer for (A, B) {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        self.0.piece(piece);
-        self.1.piece(piece);
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        self.0.observe_segment(piece);
+        self.1.observe_segment(piece);
     }
-    fn transition(&mut self, transition: &Transition) {
-        self.0.transition(transition);
-        self.1.transition(transition);
+    fn observe_transition(&mut self, transition: &Transition) {
+        self.0.observe_transition(transition);
+        self.1.observe_transition(transition);
     }
-    fn impact(&mut self, impact: &Impact) {
-        self.0.impact(impact);
-        self.1.impact(impact);
+    fn observe_impact(&mut self, impact: &Impact) {
+        self.0.observe_impact(impact);
+        self.1.observe_impact(impact);
     }
-    fn flow(&self) -> ControlFlow<()> {
-        self.0.flow()?;
-        self.1.flow()
+    fn control_flow(&self) -> ControlFlow<()> {
+        self.0.control_flow()?;
+        self.1.control_flow()
     }
 }
 
 /// An observer that is borrowed.
 impl<A: Observer> Observer for &mut A {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        (**self).piece(piece);
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        (**self).observe_segment(piece);
     }
-    fn transition(&mut self, transition: &Transition) {
-        (**self).transition(transition);
+    fn observe_transition(&mut self, transition: &Transition) {
+        (**self).observe_transition(transition);
     }
-    fn impact(&mut self, impact: &Impact) {
-        (**self).impact(impact);
+    fn observe_impact(&mut self, impact: &Impact) {
+        (**self).observe_impact(impact);
     }
-    fn flow(&self) -> ControlFlow<()> {
-        (**self).flow()
+    fn control_flow(&self) -> ControlFlow<()> {
+        (**self).control_flow()
     }
 }
 
 /// Extremes of a run and its energy balance: drive power = storage + damping + friction work + losses of
 /// impacts.
 #[derive(Debug, Clone, Default)]
-pub struct Audit {
+pub struct EnergyAudit {
     start_energy_j: Option<f64>,
     supplied_j: f64,
     exchanged_j: f64,
@@ -143,7 +143,7 @@ pub struct Audit {
     pub min_painleve_indicator: Option<f64>,
 }
 
-impl Audit {
+impl EnergyAudit {
     /// Largest error of the energy balance over the run, relative to the energy that was stored or exchanged;
     /// 0 for a run without energy.
     #[must_use]
@@ -152,40 +152,40 @@ impl Audit {
         if scale > 0.0 { self.largest_residual_j / scale } else { 0.0 }
     }
 
-    fn extremes(&mut self, sample: &Sample) {
+    fn update_extremes(&mut self, sample: &ModelSample) {
         let least = |old: Option<f64>, new: f64| Some(old.map_or(new, |o| o.min(new)));
         self.max_constraint_drift_m = self.max_constraint_drift_m.max(sample.constraint_drift_m.abs());
-        if sample.mode == Mode::Flight {
+        if sample.mode == TipMode::Flight {
             return;
         }
         self.min_normal_force_n = least(self.min_normal_force_n, sample.normal_n);
-        if sample.mode != Mode::Stick {
+        if sample.mode != TipMode::Stick {
             self.min_painleve_indicator = least(self.min_painleve_indicator, sample.indicator);
         }
     }
 }
 
-impl Observer for Audit {
-    fn piece(&mut self, piece: &Piece<'_>) {
+impl Observer for EnergyAudit {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
         if self.start_energy_j.is_none() {
-            let start = piece.sample(piece.start_s);
-            self.extremes(&start);
+            let start = piece.sample_at(piece.start_s);
+            self.update_extremes(&start);
             self.start_energy_j = Some(start.energy_j);
         }
-        for (t, weight_s) in gauss::nodes(piece.start_s, piece.end_s) {
-            let sample = piece.sample(t);
-            self.extremes(&sample);
+        for (t, weight_s) in gauss::nodes_and_weights(piece.start_s, piece.end_s) {
+            let sample = piece.sample_at(t);
+            self.update_extremes(&sample);
             self.supplied_j += weight_s * sample.power_w;
             self.exchanged_j += weight_s * sample.power_w.abs();
         }
-        let end = piece.sample(piece.end_s);
-        self.extremes(&end);
+        let end = piece.sample_at(piece.end_s);
+        self.update_extremes(&end);
         self.largest_energy_j = self.largest_energy_j.max(end.energy_j.abs());
         let residual = end.energy_j - self.start_energy_j.unwrap_or(end.energy_j) - self.supplied_j;
         self.largest_residual_j = self.largest_residual_j.max(residual.abs());
     }
 
-    fn impact(&mut self, impact: &Impact) {
+    fn observe_impact(&mut self, impact: &Impact) {
         if self.start_energy_j.is_none() {
             return; // an impact at the very start: the balance begins with the first piece, behind it
         }
@@ -197,8 +197,8 @@ impl Observer for Audit {
 /// `summary.json`.
 #[derive(Debug, Clone, Serialize)]
 #[allow(missing_docs)] // the fields are those of the file, named with their units
-pub struct Summary {
-    pub status: super::Status,
+pub struct SimulationSummary {
+    pub status: super::RunStatus,
     pub status_meaning: &'static str,
     pub stopped_at_s: f64,
     pub transitions: u64,
@@ -218,15 +218,21 @@ pub struct Summary {
     pub min_painleve_indicator: Option<f64>,
     pub model_parts: Vec<&'static str>,
     /// Numbers of the scene that are hard to believe.
-    pub findings: Vec<Finding>,
+    pub findings: Vec<PlausibilityFinding>,
     /// A simulation is no measurement, and its files say so.
     pub synthetic: bool,
 }
 
-impl Summary {
+impl SimulationSummary {
     /// Gathers a run, its audit and its duration (of the run alone).
     #[must_use]
-    pub fn new(scene: &Scene, run: &Run, audit: &Audit, wall_s: f64, effort: &Effort) -> Self {
+    pub fn new(
+        scene: &Scene,
+        run: &RunResult,
+        audit: &EnergyAudit,
+        wall_s: f64,
+        effort: &SolverOptions,
+    ) -> Self {
         Self {
             status: run.status,
             status_meaning: run.status.meaning(),
@@ -245,7 +251,7 @@ impl Summary {
             min_normal_force_n: audit.min_normal_force_n,
             min_painleve_indicator: audit.min_painleve_indicator,
             model_parts: model_parts(scene),
-            findings: scene.findings(),
+            findings: scene.find_implausible(),
             synthetic: true,
         }
     }
@@ -258,8 +264,8 @@ pub fn model_parts(scene: &Scene) -> Vec<&'static str> {
     let parts = [
         (true, "stick"),
         (true, "slip"),
-        (scene.loss == Loss::Fly, "flight"),
-        (scene.loss == Loss::Fly || scene.jam == Jam::Impact, "impacts"),
+        (scene.loss == ContactLossRule::Fly, "flight"),
+        (scene.loss == ContactLossRule::Fly || scene.jam == JamRule::Impact, "impacts"),
         (friction.a > 0.0 && friction.b_s_per_m > 0.0, "velocity-dependent friction"),
         (shoulder.is_some(), "shoulder"),
         (shoulder.is_some_and(|s| s.damping_n_m_s_per_rad > 0.0), "shoulder damping"),
@@ -290,14 +296,15 @@ pub fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> + use<> {
 ///
 /// The glass lies at `y = -(l1 + l2)`: the origin is the head of the upright blade.
 #[must_use]
-pub fn points_m(linkage: &Linkage, sample: &Sample) -> [f64; 4] {
+pub fn recorded_points_m(linkage: &Linkage, sample: &ModelSample) -> [f64; 4] {
     let glass_y_m = -(linkage.l1_m + linkage.l2_m);
     [sample.tip_x_m, glass_y_m + sample.tip_height_m, sample.head_x_m, -sample.head_drop_m]
 }
 
 /// Adds the row of a sample in `state.csv` to `text`.
-pub fn push_state(text: &mut String, sample: &Sample) {
-    let Sample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, mode, .. } = sample;
+pub fn push_state_row(text: &mut String, sample: &ModelSample) {
+    let ModelSample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, mode, .. } =
+        sample;
     let [theta, phi, dt, dp] = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
     let mode = mode.name();
     let _ = writeln!(
@@ -307,7 +314,7 @@ pub fn push_state(text: &mut String, sample: &Sample) {
 }
 
 /// Adds the row of a transition in `events.csv` to `text`: the time with 17 significant digits.
-pub fn push_event(text: &mut String, Transition { time_s, from, to, cause }: &Transition) {
+pub fn push_event_row(text: &mut String, Transition { time_s, from, to, cause }: &Transition) {
     let [from, to] = [from, to].map(|mode| mode.name());
     let _ = writeln!(text, "{time_s:.16e},{from},{to},{}", cause.name()); // writing to a String cannot fail
 }

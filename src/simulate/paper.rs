@@ -9,12 +9,12 @@
 //! and transitions taken at a step's end or located by the slack variable method. The paper prints neither
 //! step nor gain.
 
-use super::phases::{Forces, GUARDS, Instant, System, pose_of, with_force};
-use crate::blade::shoulder::Lean;
-use crate::blade::{Directions, Pose};
-use crate::ode::Phase;
-pub use crate::ode::fixed::Locate;
-use crate::ode::fixed::Steps;
+use super::phases::{ContactInstant, DrivenBlade, GUARDS, TipForces, apply_friction, pose_from_states};
+use crate::blade::shoulder::ShoulderContact;
+use crate::blade::{LinkDirections, Pose};
+use crate::ode::HybridPhase;
+pub use crate::ode::fixed::FixedStepLocator;
+use crate::ode::fixed::FixedStepOptions;
 
 /// Gain of the stabilisation unless asked for otherwise, 1/s: what the tip has drifted decays within 0.1 ms,
 /// a tenth of a stick-slip cycle.
@@ -25,74 +25,81 @@ pub const LARGEST_GAIN_TIMES_STEP: f64 = 2.785;
 
 /// The scheme's settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FixedStep {
+pub struct FixedStepScheme {
     /// Length of a step, s.
     pub step_s: f64,
     /// Where a transition takes place.
-    pub locate: Locate,
+    pub locate: FixedStepLocator,
     /// Gains `a = b` of the stabilisation, 1/s. Without gain the tip's velocity is taken out at the
     /// transition, or it would never decay.
     pub gain_per_s: f64,
 }
 
-impl FixedStep {
+impl FixedStepScheme {
     /// What the integrator takes of it.
     #[must_use]
-    pub fn steps(&self) -> Steps {
-        Steps { step_s: self.step_s, locate: self.locate }
+    pub fn integrator_options(&self) -> FixedStepOptions {
+        FixedStepOptions { step_s: self.step_s, locate: self.locate }
     }
 }
 
 /// The tip is drawn to `place_m`; states `(theta, phi, theta_rate, phi_rate)`. The guards are those of
 /// [`super::phases::Stick`].
 #[derive(Debug, Clone, Copy)]
-pub struct Held<'a> {
+pub struct StabilisedStickPhase<'a> {
     /// The blade on its drive.
-    pub system: &'a System,
+    pub system: &'a DrivenBlade,
     /// Where the tip is held, `alpha`, m.
     pub place_m: f64,
     /// Side of the shoulder.
-    pub lean: Lean,
+    pub lean: ShoulderContact,
     /// Gains of the stabilisation, 1/s.
     pub gain_per_s: f64,
 }
 
-impl<'a> Held<'a> {
+impl<'a> StabilisedStickPhase<'a> {
     /// Holds the tip where it is in this pose.
     #[must_use]
-    pub fn hold(system: &'a System, t: f64, pose: &Pose, lean: Lean, gain_per_s: f64) -> Self {
-        let place_m = system.linkage.tip_position_m(&Directions::of(pose), &system.drive.at(t));
+    pub fn from_pose(
+        system: &'a DrivenBlade,
+        t: f64,
+        pose: &Pose,
+        lean: ShoulderContact,
+        gain_per_s: f64,
+    ) -> Self {
+        let place_m =
+            system.linkage.tip_position_m(&LinkDirections::from_pose(pose), &system.drive.motion_at(t));
         Self { system, place_m, lean, gain_per_s }
     }
 
     /// The forces that draw the tip to its place: `v3dd = a_free + kappa f = -2 a Phi' - a^2 Phi`.
     #[inline]
-    pub(super) fn forces(&self, pose: &Pose, at: &Instant) -> Forces {
-        let Instant { head, directions, contact } = at;
+    pub(super) fn stabilised_forces(&self, pose: &Pose, at: &ContactInstant) -> TipForces {
+        let ContactInstant { head, directions, contact } = at;
         let (linkage, gain) = (&self.system.linkage, self.gain_per_s);
         let drift = linkage.tip_position_m(directions, head) - self.place_m;
         let wanted = -gain * (2.0 * linkage.tip_velocity_m_per_s(pose, directions, head) + gain * drift);
         let friction = (wanted - contact.a_free) / contact.kappa;
-        with_force(contact, friction, contact.n_free + contact.nu * friction, 1.0)
+        apply_friction(contact, friction, contact.n_free + contact.nu * friction, 1.0)
     }
 }
 
-impl Phase<4, GUARDS> for Held<'_> {
+impl HybridPhase<4, GUARDS> for StabilisedStickPhase<'_> {
     #[inline]
     fn derivative(&self, t: f64, y: &[f64; 4]) -> [f64; 4] {
-        let pose = pose_of(y);
-        let forces = self.forces(&pose, &self.system.instant(t, &pose, self.lean));
+        let pose = pose_from_states(y);
+        let forces = self.stabilised_forces(&pose, &self.system.contact_instant(t, &pose, self.lean));
         [y[2], y[3], forces.accelerations[0], forces.accelerations[1]]
     }
 
     #[inline]
     fn guards(&self, t: f64, y: &[f64; 4]) -> [f64; GUARDS] {
-        let pose = pose_of(y);
-        let at = self.system.instant(t, &pose, self.lean);
-        let forces = self.forces(&pose, &at);
-        let limit = self.system.linkage.friction.at_rest() * forces.normal_n;
-        let [forward, backward] = self.system.corners(y[0], self.lean);
-        let Directions { cos_theta, cos_phi, .. } = at.directions;
+        let pose = pose_from_states(y);
+        let at = self.system.contact_instant(t, &pose, self.lean);
+        let forces = self.stabilised_forces(&pose, &at);
+        let limit = self.system.linkage.friction.static_coefficient() * forces.normal_n;
+        let [forward, backward] = self.system.corner_distances(y[0], self.lean);
+        let LinkDirections { cos_theta, cos_phi, .. } = at.directions;
         [
             limit + forces.friction_n,
             limit - forces.friction_n,
@@ -105,7 +112,7 @@ impl Phase<4, GUARDS> for Held<'_> {
     }
 
     fn scale(&self) -> [f64; 4] {
-        let System { angle_scale, rate_scale, .. } = *self.system;
+        let DrivenBlade { angle_scale, rate_scale, .. } = *self.system;
         [angle_scale, angle_scale, rate_scale, rate_scale]
     }
 }

@@ -1,14 +1,14 @@
 //! Slip and stick of the blade as smooth phases with guards.
 
 use super::drive::Drive;
-use super::mode::Mode;
-use crate::blade::series::{MotionSeries, Touch};
-use crate::blade::shoulder::Lean;
-use crate::blade::{Contact, Directions, HeadMotion, Linkage, Pose};
+use super::mode::TipMode;
+use crate::blade::series::{ContactMode, MotionSeries};
+use crate::blade::shoulder::ShoulderContact;
+use crate::blade::{FrictionResponse, HeadMotion, LinkDirections, Linkage, Pose};
 use crate::math;
-use crate::ode::Phase;
+use crate::ode::HybridPhase;
 use crate::ode::polynomial::TERMS;
-use crate::ode::taylor::{Expand, Expansion};
+use crate::ode::taylor::{TaylorExpansion, TaylorPhase};
 
 /// Number of guards of either phase.
 pub const GUARDS: usize = 7;
@@ -34,7 +34,7 @@ pub(crate) const STICK_CONTACT_LOST: usize = 2;
 
 /// A blade on its drive, with the magnitudes below which errors are absolute.
 #[derive(Debug, Clone)]
-pub struct System {
+pub struct DrivenBlade {
     /// The blade.
     pub linkage: Linkage,
     /// The head's motion.
@@ -46,71 +46,77 @@ pub struct System {
 }
 
 /// Everything about one instant that forces need.
-pub(super) struct Instant {
+pub(super) struct ContactInstant {
     pub head: HeadMotion,
-    pub directions: Directions,
-    pub contact: Contact,
+    pub directions: LinkDirections,
+    pub contact: FrictionResponse,
 }
 
-impl System {
+impl DrivenBlade {
     #[inline]
-    pub(super) fn instant(&self, t: f64, pose: &Pose, lean: Lean) -> Instant {
-        self.instant_with(t, pose, Directions::of(pose), lean)
+    pub(super) fn contact_instant(&self, t: f64, pose: &Pose, lean: ShoulderContact) -> ContactInstant {
+        self.contact_instant_with(t, pose, LinkDirections::from_pose(pose), lean)
     }
 
     #[inline]
-    fn instant_with(&self, t: f64, pose: &Pose, directions: Directions, lean: Lean) -> Instant {
-        let head = self.drive.at(t);
-        let contact = self.linkage.contact(pose, &directions, &head, lean);
-        Instant { head, directions, contact }
+    fn contact_instant_with(
+        &self,
+        t: f64,
+        pose: &Pose,
+        directions: LinkDirections,
+        lean: ShoulderContact,
+    ) -> ContactInstant {
+        let head = self.drive.motion_at(t);
+        let contact = self.linkage.friction_response(pose, &directions, &head, lean);
+        ContactInstant { head, directions, contact }
     }
 
     /// Distances to the shoulder's corners that keep the neck on its side, rad.
     #[inline]
-    pub(super) fn corners(&self, theta: f64, lean: Lean) -> [f64; 2] {
+    pub(super) fn corner_distances(&self, theta: f64, lean: ShoulderContact) -> [f64; 2] {
         match (&self.linkage.shoulder, lean) {
             (None, _) => [f64::INFINITY; 2],
-            (Some(s), Lean::Off) => [s.contact_angle_rad - theta, s.contact_angle_rad + theta],
-            (Some(s), Lean::Forward) => [theta - s.contact_angle_rad, f64::INFINITY],
-            (Some(s), Lean::Backward) => [f64::INFINITY, -theta - s.contact_angle_rad],
+            (Some(s), ShoulderContact::Off) => [s.contact_angle_rad - theta, s.contact_angle_rad + theta],
+            (Some(s), ShoulderContact::Forward) => [theta - s.contact_angle_rad, f64::INFINITY],
+            (Some(s), ShoulderContact::Backward) => [f64::INFINITY, -theta - s.contact_angle_rad],
         }
     }
 }
 
-impl System {
+impl DrivenBlade {
     /// Taylor coefficients of the blade's motion about `t`.
     #[inline]
-    pub(super) fn expand(
+    pub(super) fn expand_motion(
         &self,
         t: f64,
         pose: &Pose,
-        touch: Touch,
-        lean: Lean,
+        touch: ContactMode,
+        lean: ShoulderContact,
         order: usize,
-        motion: &mut Motion,
+        motion: &mut TaylorMotion,
     ) {
-        self.drive.series(t, &mut motion.head_velocity[..=order]);
+        self.drive.velocity_series(t, &mut motion.head_velocity[..=order]);
         motion.expand(&self.linkage, touch, lean, pose, order);
     }
 
     /// Signs of the neck's angle in the guards of the two corners, 0 for one that does not apply.
-    pub(super) fn corner_signs(&self, lean: Lean) -> [f64; 2] {
+    pub(super) fn corner_signs(&self, lean: ShoulderContact) -> [f64; 2] {
         match (&self.linkage.shoulder, lean) {
             (None, _) => [0.0, 0.0],
-            (_, Lean::Off) => [-1.0, 1.0],
-            (_, Lean::Forward) => [1.0, 0.0],
-            (_, Lean::Backward) => [0.0, -1.0],
+            (_, ShoulderContact::Off) => [-1.0, 1.0],
+            (_, ShoulderContact::Forward) => [1.0, 0.0],
+            (_, ShoulderContact::Backward) => [0.0, -1.0],
         }
     }
 }
 
 /// Taylor coefficients of the blade's motion, one order more than is used of the states: forces are known to
 /// one less.
-pub type Motion = MotionSeries<{ TERMS + 2 }>;
+pub type TaylorMotion = MotionSeries<{ TERMS + 2 }>;
 
 /// Friction and normal force at one instant, N, with the angular accelerations they cause, rad/s2.
 #[derive(Debug, Clone, Copy)]
-pub struct Forces {
+pub struct TipForces {
     /// Friction force on the tip, N.
     pub friction_n: f64,
     /// Normal force on the tip, N.
@@ -123,55 +129,60 @@ pub struct Forces {
 
 /// The tip slides in one direction; states `(theta, phi, theta_rate, phi_rate)`.
 #[derive(Debug, Clone, Copy)]
-pub struct Slip<'a> {
+pub struct SlipPhase<'a> {
     /// The blade on its drive.
-    pub system: &'a System,
+    pub system: &'a DrivenBlade,
     /// Direction of slip, +1 or -1.
     pub direction: f64,
     /// Side of the shoulder.
-    pub lean: Lean,
+    pub lean: ShoulderContact,
 }
 
 /// The pose of the four slip states.
 #[inline]
 #[must_use]
-pub(crate) fn pose_of(y: &[f64; 4]) -> Pose {
+pub(crate) fn pose_from_states(y: &[f64; 4]) -> Pose {
     Pose { theta: y[0], phi: y[1], theta_rate: y[2], phi_rate: y[3] }
 }
 
-impl Slip<'_> {
+impl SlipPhase<'_> {
     /// Speed of the tip in the direction of slip, m/s, and the forces there: `f = -sigma mu N` with `N =
     /// n_free / (1 + sigma mu nu)`.
     #[inline]
-    pub(super) fn forces(&self, pose: &Pose, at: &Instant) -> (f64, Forces) {
+    pub(super) fn slip_forces(&self, pose: &Pose, at: &ContactInstant) -> (f64, TipForces) {
         let speed = self.direction * self.system.linkage.tip_velocity_m_per_s(pose, &at.directions, &at.head);
-        let mu = self.direction * self.system.linkage.friction.dynamic(speed);
+        let mu = self.direction * self.system.linkage.friction.dynamic_coefficient(speed);
         let indicator = 1.0 + mu * at.contact.nu;
         let normal_n = at.contact.n_free / indicator;
-        (speed, with_force(&at.contact, -mu * normal_n, normal_n, indicator))
+        (speed, apply_friction(&at.contact, -mu * normal_n, normal_n, indicator))
     }
 }
 
 #[inline]
-pub(super) fn with_force(contact: &Contact, friction_n: f64, normal_n: f64, indicator: f64) -> Forces {
+pub(super) fn apply_friction(
+    contact: &FrictionResponse,
+    friction_n: f64,
+    normal_n: f64,
+    indicator: f64,
+) -> TipForces {
     let acceleration = |i: usize| contact.free[i] + friction_n * contact.per_force[i];
-    Forces { friction_n, normal_n, indicator, accelerations: [acceleration(0), acceleration(1)] }
+    TipForces { friction_n, normal_n, indicator, accelerations: [acceleration(0), acceleration(1)] }
 }
 
-impl Phase<4, GUARDS> for Slip<'_> {
+impl HybridPhase<4, GUARDS> for SlipPhase<'_> {
     #[inline]
     fn derivative(&self, t: f64, y: &[f64; 4]) -> [f64; 4] {
-        let pose = pose_of(y);
-        let (_, forces) = self.forces(&pose, &self.system.instant(t, &pose, self.lean));
+        let pose = pose_from_states(y);
+        let (_, forces) = self.slip_forces(&pose, &self.system.contact_instant(t, &pose, self.lean));
         [y[2], y[3], forces.accelerations[0], forces.accelerations[1]]
     }
 
     #[inline]
     fn guards(&self, t: f64, y: &[f64; 4]) -> [f64; GUARDS] {
-        let pose = pose_of(y);
-        let at = self.system.instant(t, &pose, self.lean);
-        let (speed, forces) = self.forces(&pose, &at);
-        let [forward, backward] = self.system.corners(y[0], self.lean);
+        let pose = pose_from_states(y);
+        let at = self.system.contact_instant(t, &pose, self.lean);
+        let (speed, forces) = self.slip_forces(&pose, &at);
+        let [forward, backward] = self.system.corner_distances(y[0], self.lean);
         // the force without friction has the sign of the normal force and no pole where the indicator
         // vanishes
         [
@@ -186,16 +197,29 @@ impl Phase<4, GUARDS> for Slip<'_> {
     }
 
     fn scale(&self) -> [f64; 4] {
-        let System { angle_scale, rate_scale, .. } = *self.system;
+        let DrivenBlade { angle_scale, rate_scale, .. } = *self.system;
         [angle_scale, angle_scale, rate_scale, rate_scale]
     }
 }
 
-impl Expand<4, GUARDS> for Slip<'_> {
-    type Tape = Motion;
+impl TaylorPhase<4, GUARDS> for SlipPhase<'_> {
+    type Tape = TaylorMotion;
 
-    fn expand(&self, t: f64, y: &[f64; 4], motion: &mut Motion, out: &mut Expansion<4, GUARDS>) {
-        self.system.expand(t, &pose_of(y), Touch::Slip(self.direction), self.lean, out.order, motion);
+    fn expand_series(
+        &self,
+        t: f64,
+        y: &[f64; 4],
+        motion: &mut TaylorMotion,
+        out: &mut TaylorExpansion<4, GUARDS>,
+    ) {
+        self.system.expand_motion(
+            t,
+            &pose_from_states(y),
+            ContactMode::Slip(self.direction),
+            self.lean,
+            out.order,
+            motion,
+        );
         let corners = self.system.corner_signs(self.lean);
         for k in 0..=out.order {
             let ([theta, phi], [theta_rate, phi_rate]) = (motion.angle[k], motion.rate[k]);
@@ -213,20 +237,20 @@ impl Expand<4, GUARDS> for Slip<'_> {
         out.exponent = falls
             .then(|| std::array::from_fn(|k| friction.b_s_per_m * self.direction * motion.tip_velocity[k]));
         let [forward, backward] = SHOULDER_GUARDS;
-        [out.guards[0][forward], out.guards[0][backward]] = self.system.corners(y[0], self.lean);
+        [out.guards[0][forward], out.guards[0][backward]] = self.system.corner_distances(y[0], self.lean);
     }
 }
 
 /// The tip is held at `place_m`; the states are angle and rate of the free link, the other link follows from
 /// the place of the tip: `l1 sin theta + l2 sin phi = place - v(t)`, so the tip cannot drift.
 #[derive(Debug, Clone, Copy)]
-pub struct Stick<'a> {
+pub struct StickPhase<'a> {
     /// The blade on its drive.
-    pub system: &'a System,
+    pub system: &'a DrivenBlade,
     /// Where the tip is held, `alpha`, m.
     pub place_m: f64,
     /// Side of the shoulder.
-    pub lean: Lean,
+    pub lean: ShoulderContact,
     /// The link whose angle follows: the one that moves the tip more.
     follower: Link,
 }
@@ -237,7 +261,7 @@ enum Link {
     Lip,
 }
 
-impl<'a> Stick<'a> {
+impl<'a> StickPhase<'a> {
     /// Cosine of the follower at which stick counts as level, 1e-3 rad short of it. The place of the tip
     /// turns back at level, so the follower's rate is 0/0 there and its cosine keeps its sign; a thousandth
     /// of a radian costs about nine bits of the state, not all.
@@ -245,18 +269,18 @@ impl<'a> Stick<'a> {
 
     /// Holds the tip where it is in this pose, both links short of level.
     #[must_use]
-    pub fn hold(system: &'a System, t: f64, pose: &Pose, lean: Lean) -> Self {
-        let directions = Directions::of(pose);
+    pub fn from_pose(system: &'a DrivenBlade, t: f64, pose: &Pose, lean: ShoulderContact) -> Self {
+        let directions = LinkDirections::from_pose(pose);
         let (neck, lip) =
             (system.linkage.l1_m * directions.cos_theta, system.linkage.l2_m * directions.cos_phi);
         let follower = if lip >= neck { Link::Lip } else { Link::Neck };
-        let place_m = system.linkage.tip_position_m(&directions, &system.drive.at(t));
+        let place_m = system.linkage.tip_position_m(&directions, &system.drive.motion_at(t));
         Self { system, place_m, lean, follower }
     }
 
     /// The two states of a pose.
     #[must_use]
-    pub fn states(&self, pose: &Pose) -> [f64; 2] {
+    pub fn free_states(&self, pose: &Pose) -> [f64; 2] {
         match self.follower {
             Link::Lip => [pose.theta, pose.theta_rate],
             Link::Neck => [pose.phi, pose.phi_rate],
@@ -266,7 +290,7 @@ impl<'a> Stick<'a> {
     /// Pose and directions of the two states: the follower from the tip's place, its rate from the tip's
     /// rest.
     #[inline]
-    pub(super) fn pose(&self, head: &HeadMotion, y: &[f64; 2]) -> (Pose, Directions) {
+    pub(super) fn full_pose(&self, head: &HeadMotion, y: &[f64; 2]) -> (Pose, LinkDirections) {
         let (l1, l2) = (self.system.linkage.l1_m, self.system.linkage.l2_m);
         let (own, other) = match self.follower {
             Link::Lip => (l1, l2),
@@ -280,46 +304,56 @@ impl<'a> Stick<'a> {
         match self.follower {
             Link::Lip => (
                 Pose { theta: y[0], phi: angle, theta_rate: y[1], phi_rate: rate },
-                Directions { sin_theta: sin, cos_theta: cos, sin_phi: follower_sin, cos_phi: follower_cos },
+                LinkDirections {
+                    sin_theta: sin,
+                    cos_theta: cos,
+                    sin_phi: follower_sin,
+                    cos_phi: follower_cos,
+                },
             ),
             Link::Neck => (
                 Pose { theta: angle, phi: y[0], theta_rate: rate, phi_rate: y[1] },
-                Directions { sin_theta: follower_sin, cos_theta: follower_cos, sin_phi: sin, cos_phi: cos },
+                LinkDirections {
+                    sin_theta: follower_sin,
+                    cos_theta: follower_cos,
+                    sin_phi: sin,
+                    cos_phi: cos,
+                },
             ),
         }
     }
 
     /// The forces that hold the tip: `v3dd = a_free + kappa f = 0`.
     #[inline]
-    pub(super) fn forces(&self, at: &Instant) -> Forces {
+    pub(super) fn holding_forces(&self, at: &ContactInstant) -> TipForces {
         let friction = super::mode::holding_force(&at.contact);
-        with_force(&at.contact, friction, at.contact.n_free + at.contact.nu * friction, 1.0)
+        apply_friction(&at.contact, friction, at.contact.n_free + at.contact.nu * friction, 1.0)
     }
 
     #[inline]
-    pub(super) fn instant(&self, t: f64, y: &[f64; 2]) -> (Pose, Instant) {
-        let head = self.system.drive.at(t);
-        let (pose, directions) = self.pose(&head, y);
-        let contact = self.system.linkage.contact(&pose, &directions, &head, self.lean);
-        (pose, Instant { head, directions, contact })
+    pub(super) fn contact_instant(&self, t: f64, y: &[f64; 2]) -> (Pose, ContactInstant) {
+        let head = self.system.drive.motion_at(t);
+        let (pose, directions) = self.full_pose(&head, y);
+        let contact = self.system.linkage.friction_response(&pose, &directions, &head, self.lean);
+        (pose, ContactInstant { head, directions, contact })
     }
 }
 
-impl Phase<2, GUARDS> for Stick<'_> {
+impl HybridPhase<2, GUARDS> for StickPhase<'_> {
     #[inline]
     fn derivative(&self, t: f64, y: &[f64; 2]) -> [f64; 2] {
-        let (_, at) = self.instant(t, y);
-        let forces = self.forces(&at);
+        let (_, at) = self.contact_instant(t, y);
+        let forces = self.holding_forces(&at);
         [y[1], forces.accelerations[if self.follower == Link::Lip { 0 } else { 1 }]]
     }
 
     #[inline]
     fn guards(&self, t: f64, y: &[f64; 2]) -> [f64; GUARDS] {
-        let (pose, at) = self.instant(t, y);
-        let forces = self.forces(&at);
-        let limit = self.system.linkage.friction.at_rest() * forces.normal_n;
-        let [forward, backward] = self.system.corners(pose.theta, self.lean);
-        let Directions { cos_theta, cos_phi, .. } = at.directions;
+        let (pose, at) = self.contact_instant(t, y);
+        let forces = self.holding_forces(&at);
+        let limit = self.system.linkage.friction.static_coefficient() * forces.normal_n;
+        let [forward, backward] = self.system.corner_distances(pose.theta, self.lean);
+        let LinkDirections { cos_theta, cos_phi, .. } = at.directions;
         let [neck, lip] = match self.follower {
             Link::Lip => [cos_theta, cos_phi - Self::LEAST_COSINE],
             Link::Neck => [cos_theta - Self::LEAST_COSINE, cos_phi],
@@ -333,15 +367,21 @@ impl Phase<2, GUARDS> for Stick<'_> {
     }
 }
 
-impl Expand<2, GUARDS> for Stick<'_> {
-    type Tape = Motion;
+impl TaylorPhase<2, GUARDS> for StickPhase<'_> {
+    type Tape = TaylorMotion;
 
-    fn expand(&self, t: f64, y: &[f64; 2], motion: &mut Motion, out: &mut Expansion<2, GUARDS>) {
-        let (pose, _) = self.pose(&self.system.drive.at(t), y);
-        self.system.expand(t, &pose, Touch::Stick, self.lean, out.order + 1, motion);
+    fn expand_series(
+        &self,
+        t: f64,
+        y: &[f64; 2],
+        motion: &mut TaylorMotion,
+        out: &mut TaylorExpansion<2, GUARDS>,
+    ) {
+        let (pose, _) = self.full_pose(&self.system.drive.motion_at(t), y);
+        self.system.expand_motion(t, &pose, ContactMode::Stick, self.lean, out.order + 1, motion);
         let (leader, follower) = if self.follower == Link::Lip { (0, 1) } else { (1, 0) };
         let corners = self.system.corner_signs(self.lean);
-        let mu = self.system.linkage.friction.at_rest();
+        let mu = self.system.linkage.friction.static_coefficient();
         for k in 0..=out.order {
             let (theta, [cos_theta, cos_phi]) = (motion.angle[k][0], motion.cosines(k));
             let (normal, force) = (motion.normal_n(k), motion.friction_n[k]);
@@ -357,9 +397,10 @@ impl Expand<2, GUARDS> for Stick<'_> {
             ];
         }
         let [forward, backward] = SHOULDER_GUARDS;
-        [out.guards[0][forward], out.guards[0][backward]] = self.system.corners(pose.theta, self.lean);
+        [out.guards[0][forward], out.guards[0][backward]] =
+            self.system.corner_distances(pose.theta, self.lean);
         out.guards[0][LEVEL_GUARDS[follower]] -= Self::LEAST_COSINE;
-        let System { angle_scale, rate_scale, .. } = *self.system;
+        let DrivenBlade { angle_scale, rate_scale, .. } = *self.system;
         let (angle, rate) = (
             angle_scale.max(motion.angle[0][follower].abs()),
             rate_scale.max(motion.rate[0][follower].abs()),
@@ -371,10 +412,10 @@ impl Expand<2, GUARDS> for Stick<'_> {
 
 /// Mode that follows when a guard of stick falls to the friction limit.
 #[must_use]
-pub fn released(guard: usize) -> Option<Mode> {
+pub fn mode_after_release(guard: usize) -> Option<TipMode> {
     match guard {
-        FORWARD_LIMIT => Some(Mode::SlipForward),
-        BACKWARD_LIMIT => Some(Mode::SlipBackward),
+        FORWARD_LIMIT => Some(TipMode::SlipForward),
+        BACKWARD_LIMIT => Some(TipMode::SlipBackward),
         _ => None,
     }
 }

@@ -2,42 +2,42 @@
 
 mod path;
 
-use super::flight::{Flight, airborne_of};
-use super::mode::Mode;
-use super::paper::Held;
-use super::phases::{self, Motion, Slip, Stick, System, pose_of};
-use crate::blade::shoulder::Lean;
-use crate::blade::{Directions, HeadMotion, Pose};
+use super::flight::{FlightPhase, flight_state_from};
+use super::mode::TipMode;
+use super::paper::StabilisedStickPhase;
+use super::phases::{self, DrivenBlade, SlipPhase, StickPhase, TaylorMotion, pose_from_states};
+use crate::blade::shoulder::ShoulderContact;
+use crate::blade::{HeadMotion, LinkDirections, Pose};
 use crate::ode;
-pub use path::Path;
+pub use path::SegmentPath;
 
 /// A piece of the solution in one mode, as observers see it.
-pub struct Piece<'a> {
+pub struct SolutionSegment<'a> {
     /// Start of the piece, s.
     pub start_s: f64,
     /// End of the piece, s.
     pub end_s: f64,
     /// Mode of contact.
-    pub mode: Mode,
+    pub mode: TipMode,
     /// Taylor coefficients of the motion about the start, where it was computed by them.
-    pub(super) motion: Option<&'a Motion>,
-    pub(super) solution: Solution<'a>,
+    pub(super) motion: Option<&'a TaylorMotion>,
+    pub(super) solution: SegmentSolution<'a>,
 }
 
-pub(super) enum Solution<'a> {
-    Slip(&'a Slip<'a>, &'a ode::Step<'a, 4>),
-    Stick(&'a Stick<'a>, &'a ode::Step<'a, 2>),
-    Flight(&'a Flight<'a>, &'a ode::Step<'a, 6>),
-    Held(&'a Held<'a>, &'a ode::Step<'a, 4>),
+pub(super) enum SegmentSolution<'a> {
+    Slip(&'a SlipPhase<'a>, &'a ode::AcceptedStep<'a, 4>),
+    Stick(&'a StickPhase<'a>, &'a ode::AcceptedStep<'a, 2>),
+    Flight(&'a FlightPhase<'a>, &'a ode::AcceptedStep<'a, 6>),
+    Held(&'a StabilisedStickPhase<'a>, &'a ode::AcceptedStep<'a, 4>),
 }
 
 /// The model at one instant.
 #[derive(Debug, Clone, Copy)]
-pub struct Sample {
+pub struct ModelSample {
     /// Time, s.
     pub time_s: f64,
     /// Mode of contact.
-    pub mode: Mode,
+    pub mode: TipMode,
     /// Angles and rates.
     pub pose: Pose,
     /// Position of the head along the sweep, `v`, m.
@@ -66,7 +66,7 @@ pub struct Sample {
 
 /// Where a camera sees the blade.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct BladePoints {
     /// Position of the head along the sweep, `v`, m.
     pub head_x_m: f64,
     /// Drop of the head, `u`, m.
@@ -77,62 +77,68 @@ pub struct Place {
     pub tip_height_m: f64,
 }
 
-impl Place {
-    pub(super) const fn values(self) -> [f64; 4] {
+impl BladePoints {
+    pub(super) const fn to_array(self) -> [f64; 4] {
         [self.head_x_m, self.head_drop_m, self.tip_x_m, self.tip_height_m]
     }
 
-    pub(super) const fn of([head_x_m, head_drop_m, tip_x_m, tip_height_m]: [f64; 4]) -> Self {
+    pub(super) const fn from_array([head_x_m, head_drop_m, tip_x_m, tip_height_m]: [f64; 4]) -> Self {
         Self { head_x_m, head_drop_m, tip_x_m, tip_height_m }
     }
 }
 
-impl Piece<'_> {
+impl SolutionSegment<'_> {
     /// Where the blade is at any time within the piece, and the integral of it: by the polynomials of the
     /// step where the motion was computed by them.
     #[must_use]
-    pub fn path(&self) -> Path<'_> {
-        Path::of(self)
+    pub fn path(&self) -> SegmentPath<'_> {
+        SegmentPath::new(self)
     }
 
-    /// Angles and rates at a time within the piece: what [`Self::sample`] says, to the bit.
+    /// Angles and rates at a time within the piece: what [`Self::sample_at`] says, to the bit.
     #[must_use]
-    pub fn pose(&self, t: f64) -> Pose {
+    pub fn pose_at(&self, t: f64) -> Pose {
         match &self.solution {
-            Solution::Slip(_, step) => pose_of(&state(step, t)),
-            Solution::Held(_, step) => pose_of(&state(step, t)),
-            Solution::Stick(stick, step) => stick.pose(&stick.system.drive.at(t), &state(step, t)).0,
-            Solution::Flight(_, step) => airborne_of(&state(step, t)).pose,
+            SegmentSolution::Slip(_, step) => pose_from_states(&state_in_step(step, t)),
+            SegmentSolution::Held(_, step) => pose_from_states(&state_in_step(step, t)),
+            SegmentSolution::Stick(stick, step) => {
+                stick.full_pose(&stick.system.drive.motion_at(t), &state_in_step(step, t)).0
+            }
+            SegmentSolution::Flight(_, step) => flight_state_from(&state_in_step(step, t)).pose,
         }
     }
 
-    /// Where the blade is at a time within the piece: what [`Self::sample`] says, to the bit, without forces
+    /// Where the blade is at a time within the piece: what [`Self::sample_at`] says, to the bit, without forces
     /// and energies.
     #[must_use]
-    pub fn place(&self, t: f64) -> Place {
-        let on_glass = |system: &System, d: &Directions, head: &HeadMotion| Place {
+    pub fn points_at(&self, t: f64) -> BladePoints {
+        let on_glass = |system: &DrivenBlade, d: &LinkDirections, head: &HeadMotion| BladePoints {
             head_x_m: head.position_m,
             head_drop_m: system.linkage.head_drop_m(d),
             tip_x_m: system.linkage.tip_position_m(d, head),
             tip_height_m: 0.0,
         };
         match &self.solution {
-            Solution::Slip(slip, step) => {
-                on_glass(slip.system, &Directions::of(&pose_of(&state(step, t))), &slip.system.drive.at(t))
-            }
-            Solution::Held(held, step) => {
-                on_glass(held.system, &Directions::of(&pose_of(&state(step, t))), &held.system.drive.at(t))
-            }
-            Solution::Stick(stick, step) => {
-                let head = stick.system.drive.at(t);
-                let (_, directions) = stick.pose(&head, &state(step, t));
+            SegmentSolution::Slip(slip, step) => on_glass(
+                slip.system,
+                &LinkDirections::from_pose(&pose_from_states(&state_in_step(step, t))),
+                &slip.system.drive.motion_at(t),
+            ),
+            SegmentSolution::Held(held, step) => on_glass(
+                held.system,
+                &LinkDirections::from_pose(&pose_from_states(&state_in_step(step, t))),
+                &held.system.drive.motion_at(t),
+            ),
+            SegmentSolution::Stick(stick, step) => {
+                let head = stick.system.drive.motion_at(t);
+                let (_, directions) = stick.full_pose(&head, &state_in_step(step, t));
                 on_glass(stick.system, &directions, &head)
             }
-            Solution::Flight(flight, step) => {
-                let (linkage, state) = (&flight.system.linkage, airborne_of(&state(step, t)));
-                let (d, head) = (Directions::of(&state.pose), flight.system.drive.at(t));
+            SegmentSolution::Flight(flight, step) => {
+                let (linkage, state) = (&flight.system.linkage, flight_state_from(&state_in_step(step, t)));
+                let (d, head) = (LinkDirections::from_pose(&state.pose), flight.system.drive.motion_at(t));
                 let head_drop_m = linkage.drop_in_flight(&state, &d).0;
-                Place {
+                BladePoints {
                     head_x_m: head.position_m,
                     head_drop_m,
                     tip_x_m: linkage.tip_position_m(&d, &head),
@@ -144,51 +150,60 @@ impl Piece<'_> {
 
     /// The model at a time within the piece.
     #[must_use]
-    pub fn sample(&self, t: f64) -> Sample {
+    pub fn sample_at(&self, t: f64) -> ModelSample {
         match &self.solution {
-            Solution::Slip(slip, step) => {
-                let y = state(step, t);
-                let pose = pose_of(&y);
-                let at = slip.system.instant(t, &pose, slip.lean);
-                let (speed, forces) = slip.forces(&pose, &at);
-                self.assemble(t, slip.system, slip.lean, pose, &at, &forces, slip.direction * speed, 0.0)
+            SegmentSolution::Slip(slip, step) => {
+                let y = state_in_step(step, t);
+                let pose = pose_from_states(&y);
+                let at = slip.system.contact_instant(t, &pose, slip.lean);
+                let (speed, forces) = slip.slip_forces(&pose, &at);
+                self.assemble_sample(
+                    t,
+                    slip.system,
+                    slip.lean,
+                    pose,
+                    &at,
+                    &forces,
+                    slip.direction * speed,
+                    0.0,
+                )
             }
-            Solution::Stick(stick, step) => {
-                let y = state(step, t);
-                let (pose, at) = stick.instant(t, &y);
-                let forces = stick.forces(&at);
-                let drift =
-                    stick.system.linkage.tip_position_m(&Directions::of(&pose), &at.head) - stick.place_m;
-                self.assemble(t, stick.system, stick.lean, pose, &at, &forces, 0.0, drift)
+            SegmentSolution::Stick(stick, step) => {
+                let y = state_in_step(step, t);
+                let (pose, at) = stick.contact_instant(t, &y);
+                let forces = stick.holding_forces(&at);
+                let drift = stick.system.linkage.tip_position_m(&LinkDirections::from_pose(&pose), &at.head)
+                    - stick.place_m;
+                self.assemble_sample(t, stick.system, stick.lean, pose, &at, &forces, 0.0, drift)
             }
-            Solution::Flight(flight, step) => airborne(t, flight, &state(step, t)),
-            Solution::Held(held, step) => {
-                let y = state(step, t);
-                let pose = pose_of(&y);
-                let at = held.system.instant(t, &pose, held.lean);
-                let forces = held.forces(&pose, &at);
+            SegmentSolution::Flight(flight, step) => sample_in_flight(t, flight, &state_in_step(step, t)),
+            SegmentSolution::Held(held, step) => {
+                let y = state_in_step(step, t);
+                let pose = pose_from_states(&y);
+                let at = held.system.contact_instant(t, &pose, held.lean);
+                let forces = held.stabilised_forces(&pose, &at);
                 let linkage = &held.system.linkage;
                 let drift = linkage.tip_position_m(&at.directions, &at.head) - held.place_m;
                 let velocity = linkage.tip_velocity_m_per_s(&pose, &at.directions, &at.head);
-                self.assemble(t, held.system, held.lean, pose, &at, &forces, velocity, drift)
+                self.assemble_sample(t, held.system, held.lean, pose, &at, &forces, velocity, drift)
             }
         }
     }
 
     #[allow(clippy::too_many_arguments)] // one private place gathers what both modes computed
-    fn assemble(
+    fn assemble_sample(
         &self,
         t: f64,
-        system: &System,
-        lean: Lean,
+        system: &DrivenBlade,
+        lean: ShoulderContact,
         pose: Pose,
-        at: &phases::Instant,
-        forces: &phases::Forces,
+        at: &phases::ContactInstant,
+        forces: &phases::TipForces,
         tip_velocity_m_per_s: f64,
         drift: f64,
-    ) -> Sample {
+    ) -> ModelSample {
         let (linkage, d) = (&system.linkage, &at.directions);
-        Sample {
+        ModelSample {
             time_s: t,
             mode: self.mode,
             pose,
@@ -208,19 +223,19 @@ impl Piece<'_> {
 }
 
 /// The state at a time within a step.
-fn state<const N: usize>(step: &ode::Step<'_, N>, t: f64) -> [f64; N] {
-    if t == step.end { *step.y_end } else { step.solution.at(t) }
+fn state_in_step<const N: usize>(step: &ode::AcceptedStep<'_, N>, t: f64) -> [f64; N] {
+    if t == step.end { *step.y_end } else { step.solution.state_at(t) }
 }
 
 /// The model off the glass, where no force acts on the tip.
-fn airborne(t: f64, flight: &Flight<'_>, y: &[f64; 6]) -> Sample {
-    let (linkage, state) = (&flight.system.linkage, airborne_of(y));
-    let (d, head) = (Directions::of(&state.pose), flight.system.drive.at(t));
+fn sample_in_flight(t: f64, flight: &FlightPhase<'_>, y: &[f64; 6]) -> ModelSample {
+    let (linkage, state) = (&flight.system.linkage, flight_state_from(y));
+    let (d, head) = (LinkDirections::from_pose(&state.pose), flight.system.drive.motion_at(t));
     let drop = linkage.drop_in_flight(&state, &d);
-    let accelerations = linkage.flight(&state, &d, &head, flight.lean).links;
-    Sample {
+    let accelerations = linkage.flight_accelerations(&state, &d, &head, flight.lean).links;
+    ModelSample {
         time_s: t,
-        mode: Mode::Flight,
+        mode: TipMode::Flight,
         pose: state.pose,
         head_x_m: head.position_m,
         head_drop_m: drop.0,

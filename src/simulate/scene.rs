@@ -11,20 +11,20 @@ mod run;
 mod start;
 
 pub use super::drive::Drive;
-use super::drive::{Spline, UNCERTAIN_S, even_from_s, head_motion};
+use super::drive::{HeadSpline, UNCERTAIN_END_S, even_motion_start_s, smooth_head_motion};
 use crate::blade::Linkage;
 use crate::blade::modes::time_scales_rad_per_s;
-use crate::blade::parameters::{self, PARAMETERS, Parameter};
-use crate::plausibility::{self, Finding};
+use crate::blade::parameters::{self, ModelParameter, PARAMETERS};
+use crate::plausibility::{self, PlausibilityFinding};
 use crate::recording::Recording;
 use crate::toml_file;
 use as_written::SceneFile;
-pub use contact::{Jam, Loss};
+pub use contact::{ContactLossRule, JamRule};
 pub use error::SceneError;
 use error::key_error;
-use linkage::{constants, linkage};
-use numbers::{Reader, check_complete, check_range, parameter};
-pub use output::Output;
+use linkage::{build_linkage, linkage_constants};
+use numbers::{SceneReader, check_complete, check_parameter_range, find_known_parameter};
+pub use output::OutputTable;
 pub use run::{MOST_EVALUATIONS, RunSettings, check_tolerance};
 use serde::Serialize;
 pub use start::StartKind;
@@ -41,9 +41,9 @@ pub struct Scene {
     values: BTreeMap<&'static str, f64>,
     has_shoulder: bool,
     /// What a loss of contact does.
-    pub loss: Loss,
+    pub loss: ContactLossRule,
     /// What the Painlevé paradox does.
-    pub jam: Jam,
+    pub jam: JamRule,
     /// How the head moves.
     pub drive: Drive,
     /// Start of the run, s.
@@ -61,9 +61,9 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError`] with file, line, key, what was found and what to do; also for a scene with
-    /// `drive.recording`, which [`Self::parse_with`] reads.
+    /// `drive.recording`, which [`Self::parse_with_recording`] reads.
     pub fn parse(file: &str, text: &str) -> Result<Self, SceneError> {
-        Self::parse_with(file, text, |path| {
+        Self::parse_with_recording(file, text, |path| {
             Err(format!(
                 "found \"{path}\", expected amplitude_m and frequency_hz: recordings are not at hand here"
             ))
@@ -75,32 +75,32 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError`] with file, line, key, what was found and what to do.
-    pub fn parse_with(
+    pub fn parse_with_recording(
         file: &str,
         text: &str,
         recording: impl FnOnce(&str) -> Result<Recording, String>,
     ) -> Result<Self, SceneError> {
-        let written: SceneFile = toml_file::parse(file, text)?;
+        let written: SceneFile = toml_file::parse_toml(file, text)?;
         toml_file::check_format(file, written.format)?;
-        let mut reader = Reader { file, text, values: BTreeMap::new() };
-        reader.table("blade", written.blade)?;
+        let mut reader = SceneReader { file, text, values: BTreeMap::new() };
+        reader.read_table("blade", written.blade)?;
         let has_shoulder = written.shoulder.is_some();
-        reader.table("shoulder", written.shoulder.unwrap_or_default())?;
-        reader.table("friction", written.friction)?;
-        let recorded = reader.drive(&written.drive)?;
-        let delay_s = reader.delay_s(&written.drive)?;
-        reader.number("contact.restitution", written.contact.restitution)?;
+        reader.read_table("shoulder", written.shoulder.unwrap_or_default())?;
+        reader.read_table("friction", written.friction)?;
+        let recorded = reader.read_drive(&written.drive)?;
+        let delay_s = reader.read_delay_s(&written.drive)?;
+        reader.read_number("contact.restitution", written.contact.restitution)?;
         let values = reader.values;
         check_complete(file, &values, has_shoulder, recorded.is_some())?;
-        let (start_s, start) = start::start(file, &written.start)?;
-        let run = run::run_settings(file, &written.run, start_s)?;
-        let linkage = linkage(file, &values, has_shoulder)?;
-        run::check_work(file, &run, start_s, time_scales_rad_per_s(&linkage).1)?;
+        let (start_s, start) = start::check_start(file, &written.start)?;
+        let run = run::check_run_settings(file, &written.run, start_s)?;
+        let linkage = build_linkage(file, &values, has_shoulder)?;
+        run::check_work_limit(file, &run, start_s, time_scales_rad_per_s(&linkage).1)?;
         let drive = match recorded {
             Some((place, path)) => recorded_drive(&place, &recording(&path), [start_s, run.stop_s])?,
-            None => drive(&values, delay_s),
+            None => cosine_drive(&values, delay_s),
         };
-        start::check_slide(file, start_s, start, &linkage, &drive)?;
+        start::check_steady_start(file, start_s, start, &linkage, &drive)?;
         let (loss, jam) = (written.contact.loss, written.contact.jam);
         Ok(Self {
             file: file.to_owned(),
@@ -120,7 +120,7 @@ impl Scene {
     /// The JSON Schema of scene.toml: for editors, and for messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
-        toml_file::schema::<SceneFile>()
+        toml_file::schema_of::<SceneFile>()
     }
 
     /// Title of the scene.
@@ -140,14 +140,14 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::Key`] for an unknown name or a value out of range.
-    pub fn with(&self, name: &str, value: f64) -> Result<Self, SceneError> {
-        let parameter = self.parameter(name)?;
-        check_range(&self.file, parameter, value)?;
+    pub fn with_parameter(&self, name: &str, value: f64) -> Result<Self, SceneError> {
+        let parameter = self.find_own_parameter(name)?;
+        check_parameter_range(&self.file, parameter, value)?;
         let mut scene = self.clone();
         scene.values = self.values_with(parameter, value);
-        scene.linkage = linkage(&self.file, &scene.values, self.has_shoulder)?;
+        scene.linkage = build_linkage(&self.file, &scene.values, self.has_shoulder)?;
         if let Drive::Cosine { .. } = self.drive {
-            scene.drive = drive(&scene.values, self.drive.delay_s());
+            scene.drive = cosine_drive(&scene.values, self.drive.delay_s());
         }
         Ok(scene)
     }
@@ -157,19 +157,19 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError`] where the head is not tracked for long enough, or no steady slip is possible.
-    pub fn driven_by(&self, recording: &Recording) -> Result<Self, SceneError> {
-        let motion = tracked_head(&self.file, recording)?;
+    pub fn drive_by_recording(&self, recording: &Recording) -> Result<Self, SceneError> {
+        let motion = read_head_motion(&self.file, recording)?;
         let [first_s, last_s] = motion.span_s();
         let start_s = match self.start {
-            StartKind::SteadySlide => even_from_s(&motion),
-            _ => first_s + UNCERTAIN_S,
+            StartKind::SteadySlide => even_motion_start_s(&motion),
+            _ => first_s + UNCERTAIN_END_S,
         };
-        let stop_s = last_s - UNCERTAIN_S;
+        let stop_s = last_s - UNCERTAIN_END_S;
         if start_s >= stop_s {
             let problem = format!(
                 "found the head's motion of `{}` from {first_s} s to {last_s} s, expected one that goes on for more than {} s after the head moves; film more of the stroke",
                 recording.name(),
-                2.0 * UNCERTAIN_S
+                2.0 * UNCERTAIN_END_S
             );
             return Err(SceneError::Recording { place: self.file.clone(), problem });
         }
@@ -177,17 +177,17 @@ impl Scene {
         scene.values.retain(|name, _| !name.starts_with("drive."));
         (scene.start_s, scene.run.stop_s) = (start_s, stop_s);
         scene.drive = Drive::Recorded(Arc::new(motion));
-        start::check_slide(&self.file, scene.start_s, scene.start, &scene.linkage, &scene.drive)?;
+        start::check_steady_start(&self.file, scene.start_s, scene.start, &scene.linkage, &scene.drive)?;
         Ok(scene)
     }
 
     /// The linkage with one parameter set to any value, admissible or not: for differences.
     #[must_use]
-    pub(super) fn linkage_with(&self, parameter: &Parameter, value: f64) -> Linkage {
-        constants(&self.values_with(parameter, value), self.has_shoulder)
+    pub(super) fn linkage_with(&self, parameter: &ModelParameter, value: f64) -> Linkage {
+        linkage_constants(&self.values_with(parameter, value), self.has_shoulder)
     }
 
-    fn values_with(&self, parameter: &Parameter, value: f64) -> BTreeMap<&'static str, f64> {
+    fn values_with(&self, parameter: &ModelParameter, value: f64) -> BTreeMap<&'static str, f64> {
         let mut values = self.values.clone();
         for other in PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity) {
             values.remove(other.name);
@@ -200,8 +200,8 @@ impl Scene {
     ///
     /// # Errors
     /// [`SceneError::Key`] for an unknown name or one of a part that the scene does not have.
-    pub(super) fn parameter(&self, name: &str) -> Result<&'static Parameter, SceneError> {
-        let parameter = parameter(&self.file, name)?;
+    pub(super) fn find_own_parameter(&self, name: &str) -> Result<&'static ModelParameter, SceneError> {
+        let parameter = find_known_parameter(&self.file, name)?;
         if parameter.name.starts_with("shoulder.") && !self.has_shoulder {
             return Err(key_error(
                 &self.file,
@@ -224,33 +224,33 @@ impl Scene {
     }
 
     /// Every number of the scene as it is written, by name.
-    pub fn written(&self) -> impl Iterator<Item = (&'static str, f64)> {
+    pub fn written_values(&self) -> impl Iterator<Item = (&'static str, f64)> {
         self.values.iter().map(|(name, value)| (*name, *value))
     }
 
     /// What is hard to believe in its numbers.
     #[must_use]
-    pub fn findings(&self) -> Vec<Finding> {
-        let written = |name| written_as(&self.values, name);
-        plausibility::findings(plausibility::SCENE, &|name| self.value(name), &written)
+    pub fn find_implausible(&self) -> Vec<PlausibilityFinding> {
+        let written = |name| find_written_key(&self.values, name);
+        plausibility::find_implausible(plausibility::SCENE_RANGES, &|name| self.value(name), &written)
     }
 
     /// Value of a parameter in SI, converted where the scene writes the quantity another way; `None` where
     /// the scene has no such part.
     #[must_use]
     pub fn value(&self, name: &str) -> Option<f64> {
-        self.values.get(name).copied().or_else(|| parameters::converted(name, &self.linkage))
+        self.values.get(name).copied().or_else(|| parameters::convert_value(name, &self.linkage))
     }
 }
 
 /// The key under which a scene has the quantity of `name`.
-fn written_as(values: &BTreeMap<&'static str, f64>, name: &'static str) -> &'static str {
-    let quantity = parameters::find(name).map(|p| p.quantity);
+fn find_written_key(values: &BTreeMap<&'static str, f64>, name: &'static str) -> &'static str {
+    let quantity = parameters::find_parameter(name).map(|p| p.quantity);
     let mut ways = PARAMETERS.iter().filter(|p| Some(p.quantity) == quantity).map(|p| p.name);
     ways.find(|way| values.contains_key(way)).unwrap_or(name)
 }
 
-fn drive(values: &BTreeMap<&'static str, f64>, delay_s: f64) -> Drive {
+fn cosine_drive(values: &BTreeMap<&'static str, f64>, delay_s: f64) -> Drive {
     let number = |name: &str| values.get(name).copied().unwrap_or(0.0); // completeness was checked
     let (amplitude_m, frequency_hz) = (number("drive.amplitude_m"), number("drive.frequency_hz"));
     Drive::Cosine { amplitude_m, frequency_hz, delay_s }
@@ -265,7 +265,7 @@ fn recorded_drive(
     let unread =
         |problem: &String| SceneError::Recording { place: place.to_owned(), problem: problem.clone() };
     let recording = recording.as_ref().map_err(unread)?;
-    let motion = tracked_head(place, recording)?;
+    let motion = read_head_motion(place, recording)?;
     let ([start_s, stop_s], [first_s, last_s]) = (run_s, motion.span_s());
     if motion.covers(start_s, stop_s) {
         return Ok(Drive::Recorded(Arc::new(motion)));
@@ -277,7 +277,7 @@ fn recorded_drive(
     Err(key_error(place, "drive.recording", &found, &expected, advice))
 }
 
-fn tracked_head(place: &str, recording: &Recording) -> Result<Spline, SceneError> {
-    head_motion(recording)
+fn read_head_motion(place: &str, recording: &Recording) -> Result<HeadSpline, SceneError> {
+    smooth_head_motion(recording)
         .map_err(|problem| SceneError::Recording { place: place.to_owned(), problem: problem.to_string() })
 }

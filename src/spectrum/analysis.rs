@@ -4,27 +4,27 @@
 mod long;
 mod reading;
 
-use super::check::check;
-use super::drifting::{self, Course};
+use super::check::check_record;
+use super::drifting::{self, DriftCourse};
 use super::flip;
 use super::limits::ROUNDING;
 use super::multitaper::{Multitaper, TAPERS};
-use super::oscillations::{FRAMES_PER_COLUMN, Search};
+use super::oscillations::{FRAMES_PER_COLUMN, ModelSelector};
 use super::periodogram::Periodogram;
 use super::time_frequency::Ridge;
 use super::trend::Trend;
-use super::{Detrend, MIN_SAMPLES, Settings, Spectrum, SpectrumError, regular};
+use super::{Detrend, MIN_SAMPLES, Spectrum, SpectrumError, SpectrumSettings, regular};
 use crate::math;
-use reading::Reading;
+use reading::FittedDecomposition;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
 /// Longest record that is taken apart, frames: three seconds at 5,000 frames/s, which take about one. The
 /// time grows faster than the record; longer ones are read by their windowed periodogram.
-pub const LONGEST_FITTED: usize = 1 << 14;
+pub const LONGEST_DECOMPOSED: usize = 1 << 14;
 /// A record and the camera that took it.
 #[derive(Debug, Clone, Copy)]
-pub struct Record<'a> {
+pub struct SampledRecord<'a> {
     /// One sample a frame, m; `None` where there is none.
     pub samples: &'a [Option<f64>],
     /// Frames per second, 1/s.
@@ -35,17 +35,17 @@ pub struct Record<'a> {
 
 /// A record taken apart.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Analysis {
+pub struct SpectralAnalysis {
     /// Amplitude spectrum of the record less what was removed, with the components.
     pub spectrum: Spectrum,
     /// Frames at the start that were left out, because they hold a flip that nothing describes; everything
     /// below is of the frames behind.
-    pub left_out: usize,
+    pub skipped_frames: usize,
     /// Frames from one that may have a value to the next: 1, or more where only every second, third ... has
     /// one.
     pub stride: usize,
     /// What was removed.
-    pub removed: Removed,
+    pub removed: RemovedTrend,
     /// Trend and relaxations in every frame, m.
     pub removed_m: Vec<f64>,
     /// Amplitude that the removed parts would have shown in each bin of the spectrum, m.
@@ -53,7 +53,7 @@ pub struct Analysis {
     /// The sum of the components in every frame, m; zero for a long record.
     pub model_m: Vec<f64>,
     /// What is left in each frame, m.
-    pub left_m: Vec<Option<f64>>,
+    pub residual_m: Vec<Option<f64>>,
     /// The components that are oscillations, as they are listed: all but one that drifts; none for a
     /// long record.
     pub oscillations: Vec<Oscillation>,
@@ -85,7 +85,7 @@ pub struct Oscillation {
 impl Oscillation {
     /// Displacement at a time from the record's first frame, m.
     #[must_use]
-    pub fn at_m(&self, time_s: f64) -> f64 {
+    pub fn displacement_m(&self, time_s: f64) -> f64 {
         self.envelope_m(time_s) * math::cos(TAU * self.frequency_hz * time_s + self.phase_rad)
     }
 
@@ -101,14 +101,14 @@ impl Oscillation {
 
 /// What was taken away before components were read.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Removed {
+pub struct RemovedTrend {
     /// The trend.
     pub detrend: Detrend,
     /// Exponential relaxations removed with it.
     pub relaxations: usize,
 }
 
-impl std::fmt::Display for Removed {
+impl std::fmt::Display for RemovedTrend {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         match (self.detrend, self.relaxations) {
             (Detrend::None, 0) => f.write_str("nothing"),
@@ -120,13 +120,13 @@ impl std::fmt::Display for Removed {
 }
 
 /// Columns of a polynomial from which one is tried that needs fewer behind a step.
-const MOST_BENT: usize = 20;
+const MAX_SMOOTH_TREND_COLUMNS: usize = 20;
 
-impl Analysis {
+impl SpectralAnalysis {
     /// The record less what was removed, m.
     #[must_use]
     pub fn detrended_m(&self) -> Vec<Option<f64>> {
-        self.left_m.iter().zip(&self.model_m).map(|(left, m)| left.map(|left| left + m)).collect()
+        self.residual_m.iter().zip(&self.model_m).map(|(left, m)| left.map(|left| left + m)).collect()
     }
 
     /// Takes a record apart; with `settings.detrend` `None` the trend is chosen from the record. One of which
@@ -134,18 +134,21 @@ impl Analysis {
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate or the band cannot give one.
-    pub fn of(record: &Record, settings: &Settings) -> Result<Self, SpectrumError> {
-        let Some(kept) = regular::stride(record.samples) else { return Self::of_frames(record, settings) };
-        let samples = regular::kept(record.samples, kept);
+    pub fn from_record(record: &SampledRecord, settings: &SpectrumSettings) -> Result<Self, SpectrumError> {
+        let Some(kept) = regular::find_stride(record.samples) else {
+            return Self::analyse_frames(record, settings);
+        };
+        let samples = regular::decimate(record.samples, kept);
         let frame_rate_hz = record.frame_rate_hz / kept.1 as f64;
-        let analysis = Self::of_frames(&Record { samples: &samples, frame_rate_hz, ..*record }, settings)?;
-        Ok(analysis.spread(record, kept))
+        let analysis =
+            Self::analyse_frames(&SampledRecord { samples: &samples, frame_rate_hz, ..*record }, settings)?;
+        Ok(analysis.interpolate_to_record(record, kept))
     }
 
     /// The analysis of the kept frames as one of the whole record. Between kept frames what was removed and
     /// the components are drawn straight.
-    fn spread(self, record: &Record, (first, stride): (usize, usize)) -> Self {
-        let left_out = first + stride * self.left_out;
+    fn interpolate_to_record(self, record: &SampledRecord, (first, stride): (usize, usize)) -> Self {
+        let left_out = first + stride * self.skipped_frames;
         let frames = record.samples.len() - left_out;
         let between = |values: &[f64]| {
             let at = |frame: usize| {
@@ -156,49 +159,52 @@ impl Analysis {
             (0..frames).map(at).collect()
         };
         let left_m = (0..frames)
-            .map(|frame| self.left_m.get(frame / stride).copied().flatten().filter(|_| frame % stride == 0))
+            .map(|frame| {
+                self.residual_m.get(frame / stride).copied().flatten().filter(|_| frame % stride == 0)
+            })
             .collect();
         let (removed_m, model_m) = (between(&self.removed_m), between(&self.model_m));
-        Self { left_out, stride, removed_m, model_m, left_m, ..self }
+        Self { skipped_frames: left_out, stride, removed_m, model_m, residual_m: left_m, ..self }
     }
 
-    fn of_frames(record: &Record, settings: &Settings) -> Result<Self, SpectrumError> {
-        let (padded, trend) = check(record.samples, record.frame_rate_hz, settings)?;
-        if record.samples.len() > LONGEST_FITTED {
-            return long::analysis(record, settings, trend);
+    fn analyse_frames(record: &SampledRecord, settings: &SpectrumSettings) -> Result<Self, SpectrumError> {
+        let (padded, trend) = check_record(record.samples, record.frame_rate_hz, settings)?;
+        if record.samples.len() > LONGEST_DECOMPOSED {
+            return long::analyse_long_record(record, settings, trend);
         }
-        let whole = Self::taken_apart(record, settings, padded, trend)?;
-        if whole.explains && !whole.strained || settings.detrend.is_some() {
+        let whole = Self::decompose(record, settings, padded, trend)?;
+        if whole.leaves_only_noise && !whole.trend_competes || settings.detrend.is_some() {
             return Ok(whole.analysis.with_densities(record.frame_rate_hz));
         }
-        let behind = flip::starts_behind(record.samples).into_iter().filter_map(|start| {
-            let rest = Record { samples: &record.samples[start..], ..*record };
-            let (padded, trend) = check(rest.samples, rest.frame_rate_hz, settings).ok()?;
-            Some((start, Self::taken_apart(&rest, settings, padded, trend).ok()?))
+        let behind = flip::starts_after_step(record.samples).into_iter().filter_map(|start| {
+            let rest = SampledRecord { samples: &record.samples[start..], ..*record };
+            let (padded, trend) = check_record(rest.samples, rest.frame_rate_hz, settings).ok()?;
+            Some((start, Self::decompose(&rest, settings, padded, trend).ok()?))
         });
         let mut plain = None;
-        for (start, part) in behind.filter(|(_, part)| !part.strained) {
-            let explains = part.explains;
-            let part = Self { left_out: start, ..part.analysis };
+        for (start, part) in behind.filter(|(_, part)| !part.trend_competes) {
+            let explains = part.leaves_only_noise;
+            let part = Self { skipped_frames: start, ..part.analysis };
             if explains {
                 return Ok(part.with_densities(record.frame_rate_hz));
             }
             plain.get_or_insert(part);
         }
         // what a plain trend leaves behind a step says more than waves through it
-        let best = plain.filter(|_| whole.strained).unwrap_or(whole.analysis);
+        let best = plain.filter(|_| whole.trend_competes).unwrap_or(whole.analysis);
         Ok(best.with_densities(record.frame_rate_hz))
     }
 
     /// What lies between the flips of a piece of a longer record: of each stretch the first frames that leave
     /// noise, or the first whose trend has no fast waves. A trend through a flip takes many times as long as
     /// what the flip starts.
-    fn between_flips(record: &Record, settings: &Settings) -> Vec<Self> {
+    fn analyse_between_steps(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Self> {
         let part = |frames: &Range<usize>| {
-            let rest = Record { samples: &record.samples[frames.clone()], ..*record };
-            let (padded, trend) = check(rest.samples, rest.frame_rate_hz, settings).ok()?;
-            let part = Self::taken_apart(&rest, settings, padded, trend).ok()?;
-            (!part.strained).then_some((part.explains, Self { left_out: frames.start, ..part.analysis }))
+            let rest = SampledRecord { samples: &record.samples[frames.clone()], ..*record };
+            let (padded, trend) = check_record(rest.samples, rest.frame_rate_hz, settings).ok()?;
+            let part = Self::decompose(&rest, settings, padded, trend).ok()?;
+            (!part.trend_competes)
+                .then_some((part.leaves_only_noise, Self { skipped_frames: frames.start, ..part.analysis }))
         };
         let of_stretch = |tries: &Vec<Range<usize>>| {
             let mut parts = tries.iter().filter_map(part);
@@ -206,72 +212,78 @@ impl Analysis {
             let best = if first.0 { first } else { parts.find(|part| part.0).unwrap_or(first) };
             Some(best.1.with_densities(record.frame_rate_hz))
         };
-        flip::stretches(record.samples).iter().filter_map(of_stretch).collect()
+        flip::stretches_between_steps(record.samples).iter().filter_map(of_stretch).collect()
     }
 
-    fn taken_apart(
-        record: &Record,
-        settings: &Settings,
+    fn decompose(
+        record: &SampledRecord,
+        settings: &SpectrumSettings,
         padded: usize,
         trend: Trend,
-    ) -> Result<TakenApart, SpectrumError> {
-        let periodogram = Periodogram::of(record.samples, padded);
+    ) -> Result<DecompositionCandidate, SpectrumError> {
+        let periodogram = Periodogram::new(record.samples, padded);
         let largest = record.samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let least_m = (ROUNDING * largest).max(f64::MIN_POSITIVE);
-        let mut search = Search::new(record.samples, record.frame_rate_hz, &periodogram, trend, least_m);
-        search.grows = settings.detrend.is_none();
-        let least = MIN_SAMPLES.max(FRAMES_PER_COLUMN * trend.columns());
+        let mut search =
+            ModelSelector::new(record.samples, record.frame_rate_hz, &periodogram, trend, least_m);
+        search.trend_grows = settings.detrend.is_none();
+        let least = MIN_SAMPLES.max(FRAMES_PER_COLUMN * trend.column_count());
         let too_few = || SpectrumError::TooFew { found: record.samples.iter().flatten().count(), least };
-        let mut explained = search.run(trend).ok_or_else(too_few)?;
-        let mut course = drifting::course(&search, &explained, settings.band_hz);
-        search.coloured = true;
+        let mut explained = search.select_model(trend).ok_or_else(too_few)?;
+        let mut course = drifting::find_drift_course(&search, &explained, settings.band_hz);
+        search.noise_is_coloured = true;
         if let Some((drifting, range)) =
-            course.as_ref().and_then(|course| Some((course.drifting()?, course.range?)))
+            course.as_ref().and_then(|course| Some((course.drift_region()?, course.range?)))
         {
-            if let Some(pair) = search.paired(&explained, &range) {
+            if let Some(pair) = search.split_into_pair(&explained, &range) {
                 // two that beat look like one that drifts
-                course = course.map(|course| Course { range: None, ..course });
-                explained = search.more_closely(pair).ok_or_else(too_few)?;
+                course = course.map(|course| DriftCourse { range: None, ..course });
+                explained = search.run_second_pass(pair).ok_or_else(too_few)?;
             } else {
-                search.drifting = Some(drifting);
-                explained = search.run_without_drifting(&explained).ok_or_else(too_few)?;
+                search.drift_region = Some(drifting);
+                explained = search.select_without_drift(&explained).ok_or_else(too_few)?;
             }
         } else {
             // where no trend describes a flip, everything would be taken to pieces
-            let described = !search.grows || explained.parts.trend().columns() <= MOST_BENT;
+            let described =
+                !search.trend_grows || explained.model.trend().column_count() <= MAX_SMOOTH_TREND_COLUMNS;
             if described {
-                explained = search.more_closely(explained).ok_or_else(too_few)?;
+                explained = search.run_second_pass(explained).ok_or_else(too_few)?;
             }
         }
-        let exhausted = search.grows && explained.parts.trend().richer().is_none();
-        let bent = explained.parts.trend().columns() > MOST_BENT;
-        let strained = search.grows && (bent || search.wrestles(&explained));
+        let exhausted = search.trend_grows && explained.model.trend().next_richer().is_none();
+        let bent = explained.model.trend().column_count() > MAX_SMOOTH_TREND_COLUMNS;
+        let strained = search.trend_grows && (bent || search.trend_competes(&explained));
         let explains = !exhausted
-            && !search.steps(&explained)
-            && (search.drifting.is_some() || search.leaves_noise(&explained));
-        let reading = Reading::of(&search, explained).ok_or_else(too_few)?;
-        Ok(TakenApart { explains, strained, analysis: reading.analysis(record, settings, course) })
+            && !search.contains_step(&explained)
+            && (search.drift_region.is_some() || search.leaves_only_noise(&explained));
+        let reading = FittedDecomposition::new(&search, explained).ok_or_else(too_few)?;
+        Ok(DecompositionCandidate {
+            leaves_only_noise: explains,
+            trend_competes: strained,
+            analysis: reading.to_analysis(record, settings, course),
+        })
     }
 }
 
 /// An analysis, whether it leaves nothing but noise, and whether its trend has waves as fast as a
 /// component: then the two swing against each other, also where the record is flat.
-struct TakenApart {
-    explains: bool,
-    strained: bool,
-    analysis: Analysis,
+struct DecompositionCandidate {
+    leaves_only_noise: bool,
+    trend_competes: bool,
+    analysis: SpectralAnalysis,
 }
 
-impl Analysis {
+impl SpectralAnalysis {
     /// With the power density, the noise floor and each component's chance of being a steady line.
     fn with_densities(mut self, frame_rate_hz: f64) -> Self {
         let padded = 2 * (self.spectrum.amplitude_m.len() - 1);
         let density = |samples: &[Option<f64>]| {
-            Multitaper::of(samples, frame_rate_hz, padded, TAPERS)
+            Multitaper::new(samples, frame_rate_hz, padded, TAPERS)
                 .ok()
                 .filter(|m| m.frequency_hz.len() == padded / 2 + 1)
         };
-        let (multitaper, left) = rayon::join(|| density(&self.detrended_m()), || density(&self.left_m));
+        let (multitaper, left) = rayon::join(|| density(&self.detrended_m()), || density(&self.residual_m));
         self.multitaper = multitaper;
         let bandwidth_hz = self.spectrum.noise_bandwidth_hz;
         // a bin of a windowed spectrum holds the noise of its bandwidth; a sine of amplitude A has the mean
@@ -294,7 +306,7 @@ mod tests {
 
     const RATE_HZ: f64 = 5000.0;
 
-    fn analysed(frames: usize, value: impl Fn(f64) -> f64) -> Analysis {
+    fn analysed(frames: usize, value: impl Fn(f64) -> f64) -> SpectralAnalysis {
         let mut seed = 7_u64;
         let mut draw = || {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -303,9 +315,9 @@ mod tests {
         let noise_m = 2e-7 * 12.0_f64.sqrt();
         let samples: Vec<Option<f64>> =
             (0..frames).map(|i| Some(value(i as f64 / RATE_HZ) + noise_m * draw())).collect();
-        Analysis::of(
-            &Record { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None },
-            &Settings::default(),
+        SpectralAnalysis::from_record(
+            &SampledRecord { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None },
+            &SpectrumSettings::default(),
         )
         .unwrap()
     }
@@ -323,7 +335,7 @@ mod tests {
                 .spectrum
                 .components
                 .iter()
-                .filter(|c| c.verdict == super::super::Verdict::Clear && c.range_hz.is_none())
+                .filter(|c| c.verdict == super::super::ComponentVerdict::Clear && c.range_hz.is_none())
             {
                 let off_hz = (c.frequency_hz - low_hz).abs().min((c.frequency_hz - low_hz - apart_hz).abs());
                 assert!(off_hz < 4.0 * c.frequency_sd_hz, "{low_hz} Hz and {apart_hz} Hz more: {c:?}");

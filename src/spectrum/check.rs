@@ -2,7 +2,7 @@
 
 use super::error::SpectrumError;
 use super::limits::{LONG_PADDED, MIN_SAMPLES, MOST_PADDED};
-use super::settings::Settings;
+use super::settings::SpectrumSettings;
 use super::trend::Trend;
 
 /// Padding of longer records: bins half a resolution apart still show every peak of a Hann window, which is
@@ -19,10 +19,10 @@ pub(super) fn check_band(band_hz: Option<(f64, f64)>, frame_rate_hz: f64) -> Res
 }
 
 /// The padded length and the trend, after every check of record and band.
-pub(super) fn check(
+pub(super) fn check_record(
     samples: &[Option<f64>],
     frame_rate_hz: f64,
-    settings: &Settings,
+    settings: &SpectrumSettings,
 ) -> Result<(usize, Trend), SpectrumError> {
     /// Squares of larger values overflow.
     const LARGEST: f64 = 1e100;
@@ -48,7 +48,7 @@ pub(super) fn check(
     let padded = padded.ok_or(SpectrumError::TooLong { frames, padding })?;
     let detrend = settings.detrend.unwrap_or_default();
     let trend = detrend
-        .trend(frames, frame_rate_hz)
+        .to_trend(frames, frame_rate_hz)
         .ok_or(SpectrumError::Trend { detrend, duration_s: frames as f64 / frame_rate_hz })?;
     Ok((padded, trend))
 }

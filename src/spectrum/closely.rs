@@ -1,10 +1,10 @@
 //! What a first look at a record does not show: what begins late or is over soon, and two lines where one was
 //! seen.
 
-use super::judge::DAMPED;
-use super::least_squares::{Care, Term, nepers};
-use super::oscillations::{Explained, FLIP_CYCLES, LOBE, Parts, Search, lobe};
-use super::time_frequency::Range;
+use super::judge::SINGLE_CYCLE_DAMPING;
+use super::least_squares::{SinusoidTerm, Tolerance, nepers_from_damping_ratio};
+use super::oscillations::{Decomposition, LOBE, ModelSelector, STEP_CYCLES, SinusoidModel, lobe_half_width};
+use super::time_frequency::FrequencyRange;
 
 /// Range over which two lines that beat may seem to drift, resolutions: they lie at most four apart, and
 /// where they nearly cancel the frequency swings beyond both.
@@ -12,86 +12,114 @@ const WIDEST_BEAT: f64 = 10.0;
 
 /// Steps by which a trend may grow to explain what a slow ring-down does: together they have as many
 /// unknowns.
-const GROWN: usize = 3;
+const MOST_TREND_GROWTH: usize = 3;
 /// What a criterion must differ by to decide: odds of a hundred to one.
-const DECIDES: f64 = 10.0;
+const DECISIVE_DIFFERENCE: f64 = 10.0;
 
 /// A term that leaves more than noise around it.
-pub(super) struct Doubtful {
+pub(super) struct DoubtfulTerm {
     /// Its number.
-    pub k: usize,
+    pub index: usize,
     /// The criterion that what takes its place must fall below.
     pub criterion: f64,
 }
 
-impl Search<'_> {
+impl ModelSelector<'_> {
     /// What explains most with least: parts that are improved otherwise, with a ring-down more, or with two
     /// lines for one. Next to a doubtful term they must explain more than a drift or an even fall of that
     /// one.
-    pub(super) fn looked_at_closely(&self, explained: &Explained, improved: Option<Parts>) -> Option<Parts> {
-        let parts = &explained.parts;
-        let terms = &parts.solved.terms;
-        let doubtful = self.doubtful(explained);
+    pub(super) fn refine_candidates(
+        &self,
+        explained: &Decomposition,
+        improved: Option<SinusoidModel>,
+    ) -> Option<SinusoidModel> {
+        let parts = &explained.model;
+        let terms = &parts.solution.terms;
+        let doubtful = self.doubtful_terms(explained);
         let ring_downs = self.with_ring_downs(explained, &doubtful);
-        let leaving: Vec<usize> = doubtful.iter().map(|d| d.k).collect();
+        let leaving: Vec<usize> = doubtful.iter().map(|d| d.index).collect();
         let pairs = self.with_pairs(explained, &leaving);
         let candidates = improved.into_iter().chain(ring_downs).chain(pairs);
-        let known = |new: &Term| terms.iter().any(|t| t.cycles == new.cycles && t.nepers == new.nepers);
-        let explains = |candidate: &Parts| {
-            let criterion = self.criterion(candidate);
-            let doubted = |d: &Doubtful| {
-                let near =
-                    |t: &&Term| t.cycles > 0.0 && (t.cycles - terms[d.k].cycles).abs() < LOBE + lobe(t);
-                let pieces = candidate.solved.terms.iter().filter(near).filter(|t| !known(t)).count();
+        let known =
+            |new: &SinusoidTerm| terms.iter().any(|t| t.cycles == new.cycles && t.nepers == new.nepers);
+        let explains = |candidate: &SinusoidModel| {
+            let criterion = self.information_criterion(candidate);
+            let doubted = |d: &DoubtfulTerm| {
+                let near = |t: &&SinusoidTerm| {
+                    t.cycles > 0.0 && (t.cycles - terms[d.index].cycles).abs() < LOBE + lobe_half_width(t)
+                };
+                let pieces = candidate.solution.terms.iter().filter(near).filter(|t| !known(t)).count();
                 let were = terms.iter().filter(near).count();
-                pieces > were.min(1) || candidate.solved.terms.iter().filter(near).any(|t| t.first > 0)
+                pieces > were.min(1) || candidate.solution.terms.iter().filter(near).any(|t| t.first > 0)
             };
-            let changed: Vec<&Doubtful> = doubtful.iter().filter(|d| doubted(d)).collect();
+            let changed: Vec<&DoubtfulTerm> = doubtful.iter().filter(|d| doubted(d)).collect();
             changed.iter().all(|d| criterion < d.criterion)
-                && (changed.is_empty() || self.settles(candidate, &changed, terms))
+                && (changed.is_empty() || self.leaves_noise_near_terms(candidate, &changed, terms))
         };
-        let best =
-            candidates.filter(explains).min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))?;
-        let slow = |t: &Term| t.is_brief() && t.cycles < FLIP_CYCLES && !known(t);
-        let doubted = self.grows && best.solved.terms.iter().any(slow);
-        Some(doubted.then(|| self.with_grown_trend(parts, self.criterion(&best))).flatten().unwrap_or(best))
+        let best = candidates
+            .filter(explains)
+            .min_by(|a, b| self.information_criterion(a).total_cmp(&self.information_criterion(b)))?;
+        let slow = |t: &SinusoidTerm| t.is_transient() && t.cycles < STEP_CYCLES && !known(t);
+        let doubted = self.trend_grows && best.solution.terms.iter().any(slow);
+        Some(
+            doubted
+                .then(|| self.with_grown_trend(parts, self.information_criterion(&best)))
+                .flatten()
+                .unwrap_or(best),
+        )
     }
 
     /// The parts with a trend of a few columns more, where that explains about as much as a criterion says: a
     /// slow ring-down may be what a trend does not describe yet.
-    fn with_grown_trend(&self, parts: &Parts, criterion: f64) -> Option<Parts> {
-        let richer = std::iter::successors(parts.trend().richer(), |trend| trend.richer()).take(GROWN);
-        let grown =
-            richer.filter_map(|trend| self.fitted(self.problem(trend), &parts.solved.terms, Care::Passing));
+    fn with_grown_trend(&self, parts: &SinusoidModel, criterion: f64) -> Option<SinusoidModel> {
+        let richer = std::iter::successors(parts.trend().next_richer(), |trend| trend.next_richer())
+            .take(MOST_TREND_GROWTH);
+        let grown = richer.filter_map(|trend| {
+            self.fit_model(self.problem_with_trend(trend), &parts.solution.terms, Tolerance::Coarse)
+        });
         grown
-            .min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))
-            .filter(|grown| self.criterion(grown) < criterion + DECIDES)
+            .min_by(|a, b| self.information_criterion(a).total_cmp(&self.information_criterion(b)))
+            .filter(|grown| self.information_criterion(grown) < criterion + DECISIVE_DIFFERENCE)
     }
 
     /// With two steady lines where one was seen that drifts over a range, if nothing but noise is left then.
     /// What drifts farther than the two may lie apart is no pair.
-    pub(super) fn paired(&self, explained: &Explained, range: &Range) -> Option<Explained> {
+    pub(super) fn split_into_pair(
+        &self,
+        explained: &Decomposition,
+        range: &FrequencyRange,
+    ) -> Option<Decomposition> {
         if range.high_hz - range.low_hz > WIDEST_BEAT * self.resolution_hz() {
             return None;
         }
-        let pairs = self.with_pairs(explained, &self.leaving(explained));
-        let best = pairs.into_iter().min_by(|a, b| self.criterion(a).total_cmp(&self.criterion(b)))?;
-        Some(self.explain(best)).filter(|paired| self.leaves_noise(paired))
+        let pairs = self.with_pairs(explained, &self.terms_with_residual(explained));
+        let best = pairs
+            .into_iter()
+            .min_by(|a, b| self.information_criterion(a).total_cmp(&self.information_criterion(b)))?;
+        Some(self.decompose(best)).filter(|paired| self.leaves_only_noise(paired))
     }
 
     /// Whether nothing more than noise is left around doubtful terms once a candidate takes their place: what
     /// a sum of oscillations does not describe, more of them only take to pieces.
-    fn settles(&self, candidate: &Parts, doubtful: &[&Doubtful], terms: &[Term]) -> bool {
-        let explained = self.explain(candidate.clone());
-        let near = |t: &&Term| {
-            doubtful.iter().any(|d| (t.cycles - terms[d.k].cycles).abs() < LOBE + lobe(t)) && t.cycles > 0.0
+    fn leaves_noise_near_terms(
+        &self,
+        candidate: &SinusoidModel,
+        doubtful: &[&DoubtfulTerm],
+        terms: &[SinusoidTerm],
+    ) -> bool {
+        let explained = self.decompose(candidate.clone());
+        let near = |t: &&SinusoidTerm| {
+            doubtful.iter().any(|d| (t.cycles - terms[d.index].cycles).abs() < LOBE + lobe_half_width(t))
+                && t.cycles > 0.0
         };
-        !explained.parts.solved.terms.iter().filter(near).any(|t| self.leaves_peak(&explained, t))
+        !explained.model.solution.terms.iter().filter(near).any(|t| self.leaves_peak(&explained, t))
     }
 
     /// Whether something that begins inside the record is over within a cycle, as a step is.
-    pub(super) fn steps(&self, explained: &Explained) -> bool {
-        let damped = |t: &Term| t.first > 0 && t.nepers > nepers(t.cycles, DAMPED);
-        self.grows && explained.parts.solved.terms.iter().any(|t| t.cycles > 0.0 && damped(t))
+    pub(super) fn contains_step(&self, explained: &Decomposition) -> bool {
+        let damped = |t: &SinusoidTerm| {
+            t.first > 0 && t.nepers > nepers_from_damping_ratio(t.cycles, SINGLE_CYCLE_DAMPING)
+        };
+        self.trend_grows && explained.model.solution.terms.iter().any(|t| t.cycles > 0.0 && damped(t))
     }
 }

@@ -1,7 +1,9 @@
 //! An oscillation that was found in a record.
 
-use super::time_frequency::Range;
-use super::verdict::{Fold, Harmonic, Mains, Reason, Sideband, Subharmonic, Verdict};
+use super::time_frequency::FrequencyRange;
+use super::verdict::{
+    AliasSource, ComponentReason, ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic,
+};
 use serde::Serialize;
 
 /// One component of a spectrum.
@@ -15,7 +17,7 @@ pub struct Component {
     pub frequency_sd_hz: f64,
     /// Least and greatest frequency of a component that drifts; its frequency is the number of its cycles
     /// over the time in which it was followed.
-    pub range_hz: Option<Range>,
+    pub range_hz: Option<FrequencyRange>,
     /// Where it begins, s from the first frame that was analysed; `None` for one that is there from the
     /// start. Of a piece of a long record: where the piece starts, if it is there by then.
     pub begins_s: Option<f64>,
@@ -44,7 +46,7 @@ pub struct Component {
     /// Part of the amplitude that the exposure has passed; `None` where the exposure is not known.
     pub exposure_passes: Option<f64>,
     /// What else the frequency may be.
-    pub folded_from: Vec<Fold>,
+    pub folded_from: Vec<AliasSource>,
     /// The component of which this is a harmonic.
     pub harmonic_of: Option<Harmonic>,
     /// The component of which this is a fraction.
@@ -52,11 +54,11 @@ pub struct Component {
     /// The component of which this is a sideband.
     pub sideband_of: Option<Sideband>,
     /// The multiple of the mains frequency that it is within its deviation of.
-    pub mains: Option<Mains>,
+    pub mains: Option<MainsMultiple>,
     /// What the frequency is worth: the gravest of the reasons, or clear.
-    pub verdict: Verdict,
+    pub verdict: ComponentVerdict,
     /// All that was found against it, gravest first.
-    pub reasons: Vec<Reason>,
+    pub reasons: Vec<ComponentReason>,
 }
 
 /// How a component was read.
@@ -75,11 +77,11 @@ impl Component {
     /// Whether the record holds enough of its cycles for a frequency of its own.
     #[must_use]
     pub fn is_resolvable(&self) -> bool {
-        self.verdict != Verdict::NotResolvable
+        self.verdict != ComponentVerdict::NotResolvable
     }
 
     /// With nothing known but how it is read.
-    pub(super) fn of(estimator: Estimator) -> Self {
+    pub(super) fn from_estimator(estimator: Estimator) -> Self {
         Self {
             frequency_hz: 0.0,
             frequency_sd_hz: 0.0,
@@ -101,7 +103,7 @@ impl Component {
             subharmonic_of: None,
             sideband_of: None,
             mains: None,
-            verdict: Verdict::Clear,
+            verdict: ComponentVerdict::Clear,
             reasons: Vec::new(),
         }
     }

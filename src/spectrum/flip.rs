@@ -3,47 +3,47 @@
 use std::ops::Range;
 
 /// Shares of the whole change between which a record is on neither side.
-const SIDES: (f64, f64) = (0.25, 0.75);
+const TRANSITION_BOUNDS: (f64, f64) = (0.25, 0.75);
 /// Places behind the step that are tried, in times from a quarter to three quarters of the change: a step
 /// that dies away exponentially has tails there which a relaxation or two describe.
-const BEHIND: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
+const STEP_WIDTHS_AFTER: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
 
 /// Times by which a record is at least as long as its way back from a dip: the drop of a head is near its
 /// level before and after a flip, and comes back in a jump, which no slow wave does.
-const DIP: usize = 20;
+const DIP_FRACTION: usize = 20;
 
 /// First frames of the parts behind the step that are worth a try, earliest first; none where the record
 /// changes sides to and fro, as an oscillation does, or not within a third of its length, as a trend does.
-pub(super) fn starts_behind(samples: &[Option<f64>]) -> Vec<usize> {
-    let Some((leaves, arrives)) = step(samples) else { return Vec::new() };
+pub(super) fn starts_after_step(samples: &[Option<f64>]) -> Vec<usize> {
+    let Some((leaves, arrives)) = find_single_step(samples) else { return Vec::new() };
     let width = (arrives - leaves).max(1);
     if 3 * width > samples.len() {
         return Vec::new();
     }
-    let starts = BEHIND.iter().map(|times| arrives + (times * width as f64).round() as usize);
+    let starts = STEP_WIDTHS_AFTER.iter().map(|times| arrives + (times * width as f64).round() as usize);
     starts.filter(|start| *start < samples.len()).collect()
 }
 
 /// Distances from a flip at which a stretch beside it may begin, in the same times; fewer, since a long
 /// record has many.
-const BESIDE: [f64; 2] = [1.0, 5.0];
+const STEP_WIDTHS_BESIDE: [f64; 2] = [1.0, 5.0];
 /// Most flips of a piece of a record: what changes sides more often is an oscillation.
-const MOST_FLIPS: usize = 4;
+const MAX_STEPS: usize = 4;
 /// Part of a record over which its slope is taken, and which a flip takes at most, its inverse: a slower
 /// change is one that a trend describes.
-const APART: usize = 16;
+const SLOPE_FRACTION: usize = 16;
 /// Share of a record's frames in a stretch that is worth a try, its inverse.
-const WORTH: usize = 8;
+const LEAST_STRETCH_FRACTION: usize = 8;
 
 /// What lies between the flips of a record, in order, each with the frames to try: near the flips, and
 /// farther away; all of a record without a flip.
-pub(super) fn stretches(samples: &[Option<f64>]) -> Vec<Vec<Range<usize>>> {
+pub(super) fn stretches_between_steps(samples: &[Option<f64>]) -> Vec<Vec<Range<usize>>> {
     let frames = samples.len();
-    let sided = sided(&level(samples));
-    let changes = changes(&sided);
+    let sided = classify_sides(&remove_median_slope(samples));
+    let changes = find_side_changes(&sided);
     let widest = changes.iter().map(|(leaves, arrives)| arrives - leaves).max().unwrap_or(0);
     let on_a_side = 2 * sided.len() >= samples.iter().flatten().count();
-    if changes.is_empty() || changes.len() > MOST_FLIPS || APART * widest > frames || !on_a_side {
+    if changes.is_empty() || changes.len() > MAX_STEPS || SLOPE_FRACTION * widest > frames || !on_a_side {
         return vec![vec![0..frames]];
     }
     let starts = std::iter::once((0, 0)).chain(changes.iter().copied());
@@ -54,14 +54,18 @@ pub(super) fn stretches(samples: &[Option<f64>]) -> Vec<Vec<Range<usize>>> {
     };
     let tried = |ends| {
         let frames_of = |times: &f64| shrunk(ends, *times);
-        BESIDE.iter().map(frames_of).filter(|stretch| WORTH * stretch.len() >= frames).collect()
+        STEP_WIDTHS_BESIDE
+            .iter()
+            .map(frames_of)
+            .filter(|stretch| LEAST_STRETCH_FRACTION * stretch.len() >= frames)
+            .collect()
     };
     starts.zip(ends).map(tried).collect()
 }
 
 /// A record less the slope that most of it has: what moves evenly is on no side.
-fn level(samples: &[Option<f64>]) -> Vec<Option<f64>> {
-    let apart = (samples.len() / APART).max(1);
+fn remove_median_slope(samples: &[Option<f64>]) -> Vec<Option<f64>> {
+    let apart = (samples.len() / SLOPE_FRACTION).max(1);
     let rise = |(a, b): (&Option<f64>, &Option<f64>)| a.zip(*b).map(|(a, b)| (b - a) / apart as f64);
     let mut slopes: Vec<f64> = samples.iter().zip(samples.iter().skip(apart)).filter_map(rise).collect();
     let middle = slopes.len() / 2;
@@ -72,28 +76,30 @@ fn level(samples: &[Option<f64>]) -> Vec<Option<f64>> {
 
 /// The last frame on the old side and the first on the new one, if the record changes sides once, or comes
 /// back from a dip.
-fn step(samples: &[Option<f64>]) -> Option<(usize, usize)> {
-    match changes(&sided(samples))[..] {
+fn find_single_step(samples: &[Option<f64>]) -> Option<(usize, usize)> {
+    match find_side_changes(&classify_sides(samples))[..] {
         [change] => Some(change),
-        [_, (leaves, arrives)] if DIP * (arrives - leaves) <= samples.len() => Some((leaves, arrives)),
+        [_, (leaves, arrives)] if DIP_FRACTION * (arrives - leaves) <= samples.len() => {
+            Some((leaves, arrives))
+        }
         _ => None,
     }
 }
 
 /// The frames that are on a side, with whether it is the upper one.
-fn sided(samples: &[Option<f64>]) -> Vec<(usize, bool)> {
+fn classify_sides(samples: &[Option<f64>]) -> Vec<(usize, bool)> {
     let (low, high) =
         samples.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
     let side = |x: f64| match (x - low) / (high - low) {
-        share if share < SIDES.0 => Some(false),
-        share if share > SIDES.1 => Some(true),
+        share if share < TRANSITION_BOUNDS.0 => Some(false),
+        share if share > TRANSITION_BOUNDS.1 => Some(true),
         _ => None,
     };
     samples.iter().enumerate().filter_map(|(i, x)| Some((i, side((*x)?)?))).collect()
 }
 
 /// The last frame on the old side and the first on the new one, for each change.
-fn changes(sided: &[(usize, bool)]) -> Vec<(usize, usize)> {
+fn find_side_changes(sided: &[(usize, bool)]) -> Vec<(usize, usize)> {
     sided.windows(2).filter(|w| w[0].1 != w[1].1).map(|w| (w[0].0, w[1].0)).collect()
 }
 
@@ -108,8 +114,8 @@ mod tests {
 
     #[test]
     fn a_step_is_found_where_it_is() {
-        let starts = starts_behind(&record(|i| ((i - 100.0) / 10.0).tanh() + 0.1 * (0.7 * i).sin()));
-        assert_eq!(starts.len(), BEHIND.len());
+        let starts = starts_after_step(&record(|i| ((i - 100.0) / 10.0).tanh() + 0.1 * (0.7 * i).sin()));
+        assert_eq!(starts.len(), STEP_WIDTHS_AFTER.len());
         assert!((110..125).contains(&starts[0]), "{starts:?}");
         assert!(starts.is_sorted() && *starts.last().unwrap() < 300);
     }
@@ -117,11 +123,11 @@ mod tests {
     #[test]
     fn a_dip_ends_where_the_record_comes_back_in_a_jump() {
         let back = |i: f64| if i < 120.0 { 1.0 - (i / 115.0).min(1.0) } else { 1.0 };
-        let starts = starts_behind(&record(back));
+        let starts = starts_after_step(&record(back));
         assert!((120..130).contains(&starts[0]), "{starts:?}");
-        assert!(starts_behind(&record(|i| (TAU * i / 300.0).cos())).is_empty(), "a slow wave");
+        assert!(starts_after_step(&record(|i| (TAU * i / 300.0).cos())).is_empty(), "a slow wave");
         assert!(
-            starts_behind(&record(|i| if (60.0..120.0).contains(&i) || i > 200.0 { 1.0 } else { 0.0 }))
+            starts_after_step(&record(|i| if (60.0..120.0).contains(&i) || i > 200.0 { 1.0 } else { 0.0 }))
                 .is_empty()
         );
     }
@@ -131,7 +137,7 @@ mod tests {
         let flips = |i: f64| {
             ((i - 80.0) / 3.0).tanh() - ((i - 200.0) / 3.0).tanh() + 0.1 * (0.7 * i).sin() + 0.02 * i
         };
-        let stretches = stretches(&record(flips));
+        let stretches = stretches_between_steps(&record(flips));
         let tries: Vec<usize> = stretches.iter().map(Vec::len).collect();
         assert_eq!(tries, [2, 2, 2], "{stretches:?}");
         for (stretch, (from, to)) in stretches.iter().zip([(0, 80), (80, 200), (200, 300)]) {
@@ -146,15 +152,15 @@ mod tests {
         let rings = |i: f64| (-i / 6.0).exp() * (1.1 * i).cos();
         let whole = 0..300;
         for samples in [record(rings), record(|i| (0.1 * i).sin()), record(|i| i * i), record(|_| 1.0)] {
-            assert_eq!(stretches(&samples), [vec![whole.clone()]]);
+            assert_eq!(stretches_between_steps(&samples), [vec![whole.clone()]]);
         }
     }
 
     #[test]
     fn oscillations_and_slow_changes_are_no_step() {
-        assert!(starts_behind(&record(|i| (0.1 * i).sin())).is_empty());
-        assert!(starts_behind(&record(|i| i)).is_empty());
-        assert!(starts_behind(&record(|_| 1.0)).is_empty());
-        assert!(starts_behind(&[None; 20]).is_empty());
+        assert!(starts_after_step(&record(|i| (0.1 * i).sin())).is_empty());
+        assert!(starts_after_step(&record(|i| i)).is_empty());
+        assert!(starts_after_step(&record(|_| 1.0)).is_empty());
+        assert!(starts_after_step(&[None; 20]).is_empty());
     }
 }

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 /// Longest gap that is bridged, frames: beyond it the fill amplifies noise more than a gap of weight zero
 /// costs.
-pub(crate) const LONGEST_BRIDGED: usize = 4;
+pub(crate) const LONGEST_FILLED_GAP: usize = 4;
 /// Fourth difference.
 const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const ORDER: usize = DIFFERENCE.len() - 1;
@@ -31,11 +31,11 @@ const CLUSTERS_AT_ONCE: usize = 256;
 
 /// The record with its short gaps filled; what cannot be filled stays `None`.
 #[must_use]
-pub fn bridged(samples: &[Option<f64>]) -> Vec<Option<f64>> {
+pub fn fill_short_gaps(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut filled = samples.to_vec();
-    let short: Vec<usize> = runs(samples)
+    let short: Vec<usize> = missing_runs(samples)
         .into_iter()
-        .filter(|(from, to)| to - from <= LONGEST_BRIDGED)
+        .filter(|(from, to)| to - from <= LONGEST_FILLED_GAP)
         .flat_map(|(from, to)| from..to)
         .collect();
     let near = |a: &usize, b: &usize| b - a <= ORDER;
@@ -45,7 +45,9 @@ pub fn bridged(samples: &[Option<f64>]) -> Vec<Option<f64>> {
         let mut filled = Vec::new();
         for cluster in clusters {
             filled.extend(
-                solve(samples, cluster).into_iter().flat_map(|values| cluster.iter().copied().zip(values)),
+                solve_cluster(samples, cluster)
+                    .into_iter()
+                    .flat_map(|values| cluster.iter().copied().zip(values)),
             );
         }
         filled
@@ -60,7 +62,7 @@ pub fn bridged(samples: &[Option<f64>]) -> Vec<Option<f64>> {
 }
 
 /// Half-open runs of missing frames.
-fn runs(samples: &[Option<f64>]) -> Vec<(usize, usize)> {
+fn missing_runs(samples: &[Option<f64>]) -> Vec<(usize, usize)> {
     let mut runs: Vec<(usize, usize)> = Vec::new();
     for (frame, _) in samples.iter().enumerate().filter(|(_, sample)| sample.is_none()) {
         match runs.last_mut() {
@@ -72,30 +74,43 @@ fn runs(samples: &[Option<f64>]) -> Vec<(usize, usize)> {
 }
 
 /// Least squares over every fourth difference that touches the cluster and no other missing frame.
-fn solve(samples: &[Option<f64>], cluster: &[usize]) -> Option<[f64; MOST_UNKNOWNS]> {
+fn solve_cluster(samples: &[Option<f64>], cluster: &[usize]) -> Option<[f64; MOST_UNKNOWNS]> {
     let (first, last) = (*cluster.first()?, *cluster.last()?);
-    let mut normal = Normal { band: [[0.0; ORDER + 1]; MOST_UNKNOWNS], right: [0.0; MOST_UNKNOWNS] };
+    let mut normal = BandedNormalEquations {
+        band: [[0.0; ORDER + 1]; MOST_UNKNOWNS],
+        right_hand_side: [0.0; MOST_UNKNOWNS],
+    };
     let (mut differences, mut next) = (0, 0);
     for start in first.saturating_sub(ORDER)..=last.min(samples.len().checked_sub(ORDER + 1)?) {
         next += cluster[next..].iter().take_while(|frame| **frame < start).count();
-        differences +=
-            usize::from(normal.add(&samples[start..=start + ORDER], start, next, &cluster[next..]));
+        differences += usize::from(normal.add_difference(
+            &samples[start..=start + ORDER],
+            start,
+            next,
+            &cluster[next..],
+        ));
     }
     // as many differences again as unknowns: a fill that leans on one side alone would extrapolate
-    if differences < cluster.len() + ORDER { None } else { normal.solved(cluster.len()) }
+    if differences < cluster.len() + ORDER { None } else { normal.cholesky_solve(cluster.len()) }
 }
 
 /// Normal equations of a cluster: unknowns further apart than a difference reaches are not coupled.
-struct Normal {
+struct BandedNormalEquations {
     /// The diagonal and what is under it, column by column.
     band: [[f64; ORDER + 1]; MOST_UNKNOWNS],
-    right: [f64; MOST_UNKNOWNS],
+    right_hand_side: [f64; MOST_UNKNOWNS],
 }
 
-impl Normal {
+impl BandedNormalEquations {
     /// Adds the difference over the frames from `start` on, if none but those `missing` from there on, of
     /// which the first has the place `place`, is without a value; says whether.
-    fn add(&mut self, samples: &[Option<f64>], start: usize, place: usize, missing: &[usize]) -> bool {
+    fn add_difference(
+        &mut self,
+        samples: &[Option<f64>],
+        start: usize,
+        place: usize,
+        missing: &[usize],
+    ) -> bool {
         let (mut known, mut weights, mut unknowns) = (0.0, [0.0; ORDER + 1], 0);
         for ((frame, sample), weight) in samples.iter().enumerate().zip(DIFFERENCE) {
             match sample {
@@ -108,7 +123,7 @@ impl Normal {
             }
         }
         for (i, weight) in weights[..unknowns].iter().enumerate() {
-            self.right[place + i] -= weight * known;
+            self.right_hand_side[place + i] -= weight * known;
             self.band[place + i]
                 .iter_mut()
                 .zip(&weights[i..unknowns])
@@ -118,7 +133,7 @@ impl Normal {
     }
 
     /// The first `count` unknowns, by Cholesky's factors; `None` where the equations do not fix them.
-    fn solved(mut self, count: usize) -> Option<[f64; MOST_UNKNOWNS]> {
+    fn cholesky_solve(mut self, count: usize) -> Option<[f64; MOST_UNKNOWNS]> {
         for j in 0..count {
             for k in j.saturating_sub(ORDER)..j {
                 let (above, factor) = (self.band[k], self.band[k][j - k]);
@@ -134,21 +149,21 @@ impl Normal {
             *diagonal = diagonal.sqrt();
             under.iter_mut().for_each(|entry| *entry /= *diagonal);
         }
-        self.substitute(count);
-        Some(self.right)
+        self.substitute_triangular(count);
+        Some(self.right_hand_side)
     }
 
-    fn substitute(&mut self, count: usize) {
+    fn substitute_triangular(&mut self, count: usize) {
         for j in 0..count {
-            self.right[j] /= self.band[j][0];
+            self.right_hand_side[j] /= self.band[j][0];
             for i in 1..=ORDER.min(count - 1 - j) {
-                self.right[j + i] -= self.band[j][i] * self.right[j];
+                self.right_hand_side[j + i] -= self.band[j][i] * self.right_hand_side[j];
             }
         }
         for j in (0..count).rev() {
             let below: f64 =
-                (1..=ORDER.min(count - 1 - j)).map(|i| self.band[j][i] * self.right[j + i]).sum();
-            self.right[j] = (self.right[j] - below) / self.band[j][0];
+                (1..=ORDER.min(count - 1 - j)).map(|i| self.band[j][i] * self.right_hand_side[j + i]).sum();
+            self.right_hand_side[j] = (self.right_hand_side[j] - below) / self.band[j][0];
         }
     }
 }
@@ -165,7 +180,7 @@ mod tests {
     #[test]
     fn a_cubic_is_restored_exactly() {
         let cubic = |x: f64| 1.0 + x * (0.5 - x * (0.02 - 0.001 * x));
-        let filled = bridged(&without(cubic, &[10, 20, 21, 30, 32, 33, 40, 41, 42, 43]));
+        let filled = fill_short_gaps(&without(cubic, &[10, 20, 21, 30, 32, 33, 40, 41, 42, 43]));
         for (i, value) in filled.iter().enumerate() {
             assert!((value.unwrap() - cubic(i as f64)).abs() < 1e-9, "frame {i}");
         }
@@ -175,7 +190,7 @@ mod tests {
     fn a_single_frame_of_a_fast_component_is_restored_as_stated() {
         let share = 900.0 / 5000.0;
         let wave = |x: f64| (TAU * share * x).cos();
-        let filled = bridged(&without(wave, &[30]));
+        let filled = fill_short_gaps(&without(wave, &[30]));
         let stated = (2.0 * (TAU * share / 2.0).sin()).powi(8) / 70.0 * wave(30.0).abs();
         assert!(((filled[30].unwrap() - wave(30.0)).abs() - stated).abs() < 1e-12);
     }
@@ -188,7 +203,7 @@ mod tests {
                     .then(|| (i as f64 * 0.9).sin() + (i * i % 13) as f64)
             })
             .collect();
-        let filled = bridged(&samples);
+        let filled = fill_short_gaps(&samples);
         let missing: Vec<usize> = (0..90).filter(|i| samples[*i].is_none()).collect();
         assert_eq!((missing.len(), filled.iter().flatten().count()), (25, 90));
         let value = |i: usize| filled[i].unwrap();
@@ -204,9 +219,9 @@ mod tests {
 
     #[test]
     fn long_gaps_and_ends_stay_gaps() {
-        let filled = bridged(&without(|x| x, &[0, 10, 11, 12, 13, 14, 59]));
+        let filled = fill_short_gaps(&without(|x| x, &[0, 10, 11, 12, 13, 14, 59]));
         let missing: Vec<usize> = (0..60).filter(|i| filled[*i].is_none()).collect();
         assert_eq!(missing, [0, 10, 11, 12, 13, 14, 59]);
-        assert_eq!(bridged(&[None; 3]), vec![None; 3]);
+        assert_eq!(fill_short_gaps(&[None; 3]), vec![None; 3]);
     }
 }

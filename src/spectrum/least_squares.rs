@@ -11,24 +11,24 @@ mod columns;
 
 use super::trend::Trend;
 use crate::math;
-use columns::{Fixed, Of, PAIR, WITH_SLOPES};
+use columns::{COLUMNS_WITH_SLOPES, FixedColumns, QUADRATURE_COLUMNS, TermColumn};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use std::f64::consts::{PI, TAU};
 use std::rc::Rc;
 
 /// Farthest a steady frequency moves, resolutions: half way down the lobe of a Hann window (-6 dB at one
 /// resolution, its end at two).
-const REACH: f64 = 1.0;
+const MOST_FREQUENCY_SHIFT: f64 = 1.0;
 /// Halvings of a step that raises the misfit.
 const MOST_HALVINGS: i32 = 8;
 /// A step below this many cycles or nepers is the last.
-const SETTLED: f64 = 1e-6;
+const SMALLEST_STEP: f64 = 1e-6;
 /// Directions of the normal matrix, scaled to a diagonal of ones, below this share of the largest are not in
 /// the data.
-const SINGULAR: f64 = 1e-10;
+const SINGULAR_DIRECTION: f64 = 1e-10;
 /// Pivots of that matrix from which on all directions are in the data: what is left of a column without those
 /// before it is a thousandth of it at least.
-const WELL_POSED: f64 = 1e-6;
+const WELL_POSED_PIVOT: f64 = 1e-6;
 /// Most nepers gained over the record: a growth by a factor of 400 is a transient at its end.
 const MOST_GROWTH: f64 = 6.0;
 /// Largest damping ratio of an oscillation: beyond a half nothing is left of it after one cycle.
@@ -41,35 +41,35 @@ const MOST_RELAXED_AT_END: f64 = 330.0;
 
 /// What of a term moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Free {
+pub(super) enum FreeParameters {
     /// Its amplitude alone.
     Amplitude,
     /// Its frequency too.
     Cycles,
     /// Frequency and decay.
-    Both,
+    CyclesAndNepers,
     /// The decay alone: with no cycles, a relaxation.
     Nepers,
 }
 
-impl Free {
-    fn cycles(self) -> bool {
-        matches!(self, Self::Cycles | Self::Both)
+impl FreeParameters {
+    fn moves_cycles(self) -> bool {
+        matches!(self, Self::Cycles | Self::CyclesAndNepers)
     }
 
-    fn nepers(self) -> bool {
-        matches!(self, Self::Nepers | Self::Both)
+    fn moves_nepers(self) -> bool {
+        matches!(self, Self::Nepers | Self::CyclesAndNepers)
     }
 
     /// How many numbers move, amplitudes apart.
     pub(super) fn count(self) -> usize {
-        usize::from(self.cycles()) + usize::from(self.nepers())
+        usize::from(self.moves_cycles()) + usize::from(self.moves_nepers())
     }
 }
 
 /// A sinusoid, decaying or not, or with no cycles a relaxation.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Term {
+pub(super) struct SinusoidTerm {
     /// Cycles in the record.
     pub cycles: f64,
     /// Nepers by which it decays over the record.
@@ -77,54 +77,54 @@ pub(super) struct Term {
     /// The first frame that it is in.
     pub first: usize,
     /// What of it moves.
-    pub free: Free,
+    pub free: FreeParameters,
 }
 
-impl Term {
+impl SinusoidTerm {
     /// One that is there from the first frame on.
-    pub(super) fn from_start(cycles: f64, nepers: f64, free: Free) -> Self {
+    pub(super) fn from_start(cycles: f64, nepers: f64, free: FreeParameters) -> Self {
         Self { cycles, nepers, first: 0, free }
     }
 
     /// How far the nepers may go.
-    pub(super) fn bounds(&self) -> (f64, f64) {
+    pub(super) fn nepers_bounds(&self) -> (f64, f64) {
         if self.cycles == 0.0 {
             (-MOST_RELAXED_AT_END, MOST_RELAXED)
         } else {
-            (-MOST_GROWTH, nepers(self.cycles, MOST_DAMPING))
+            (-MOST_GROWTH, nepers_from_damping_ratio(self.cycles, MOST_DAMPING))
         }
     }
 }
 
 /// Nepers over a record of `cycles` cycles for a damping ratio: `2 pi n zeta / sqrt(1 - zeta^2)`.
-pub(super) fn nepers(cycles: f64, damping_ratio: f64) -> f64 {
+pub(super) fn nepers_from_damping_ratio(cycles: f64, damping_ratio: f64) -> f64 {
     TAU * cycles * damping_ratio / (1.0 - damping_ratio * damping_ratio).sqrt()
 }
 
 /// How closely a minimum is approached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Care {
+pub(super) enum Tolerance {
     /// To a few hundredths of a deviation: there is more to come.
-    Passing,
+    Coarse,
     /// To the last step that lowers the misfit.
-    Final,
+    Fine,
 }
 
-impl Care {
-    /// A step that lowers the misfit by a smaller share is the last: of 450 frames [`Self::Final`] is a
+impl Tolerance {
+    /// A step that lowers the misfit by a smaller share is the last: of 450 frames [`Self::Fine`] is a
     /// thousandth of a deviation, of a million a hundredth.
-    fn falls(self) -> f64 {
+    fn least_misfit_decrease(self) -> f64 {
         match self {
-            Self::Passing => 1e-6,
-            Self::Final => 1e-10,
+            Self::Coarse => 1e-6,
+            Self::Fine => 1e-10,
         }
     }
 
     /// Steps: a steady tone takes four, a drifting one a dozen, what no sinusoid describes never ends.
     fn most_steps(self) -> usize {
         match self {
-            Self::Passing => 8,
-            Self::Final => 30,
+            Self::Coarse => 8,
+            Self::Fine => 30,
         }
     }
 }
@@ -132,18 +132,18 @@ impl Care {
 /// A record, how its frames count, and the trend, which is fitted again: sinusoids and trend are not
 /// orthogonal.
 #[derive(Debug, Clone)]
-pub(super) struct Problem {
+pub(super) struct SinusoidProblem {
     pub trend: Trend,
     /// Sum of the weights.
     pub weight: f64,
     frames: usize,
-    fixed: Rc<Fixed>,
+    fixed_columns: Rc<FixedColumns>,
 }
 
 /// Terms solved for.
 #[derive(Debug, Clone)]
-pub(super) struct Solved {
-    pub terms: Vec<Term>,
+pub(super) struct SinusoidSolution {
+    pub terms: Vec<SinusoidTerm>,
     /// Trend, then cosine and sine amplitude of each term with its phase counted from the middle of the
     /// record and at the start of its envelope, m.
     pub amplitudes: DVector<f64>,
@@ -151,35 +151,35 @@ pub(super) struct Solved {
     pub misfit: f64,
 }
 
-impl Problem {
+impl SinusoidProblem {
     /// A record, m, with the weight of each frame, zero where there is none.
     pub(super) fn new(data: &[f64], weights: &[f64], trend: Trend) -> Self {
         Self {
             trend,
             weight: weights.iter().sum(),
             frames: data.len(),
-            fixed: Rc::new(Fixed::of(trend, data, weights)),
+            fixed_columns: Rc::new(FixedColumns::new(trend, data, weights)),
         }
     }
 
     /// Moves what is free to where the misfit is least; `None` where the normal matrix is no finite one. A
     /// term that wants to leave its peak goes back and keeps its frequency; one that wants to decay or grow
     /// beyond bounds becomes steady.
-    pub(super) fn solve(&self, terms: &[Term], care: Care) -> Option<Solved> {
-        let mut solved = self.at(terms.to_vec())?;
+    pub(super) fn gauss_newton(&self, terms: &[SinusoidTerm], care: Tolerance) -> Option<SinusoidSolution> {
+        let mut solved = self.solve_amplitudes(terms.to_vec())?;
         for _ in 0..care.most_steps() {
-            let step = self.step(&solved)?;
+            let step = self.gauss_newton_step(&solved)?;
             let left: Vec<_> =
-                (0..terms.len()).map(|k| leaves(&terms[k], &solved.terms[k], step[k])).collect();
+                (0..terms.len()).map(|k| constrain_step(&terms[k], &solved.terms[k], step[k])).collect();
             if let Some(k) = left.iter().position(Option::is_some) {
                 let mut held = solved.terms;
                 held[k] = left[k].unwrap_or(held[k]);
-                solved = self.at(held)?;
+                solved = self.solve_amplitudes(held)?;
                 continue;
             }
-            let Some(next) = self.descend(&solved, &step) else { break };
-            let settled = next.misfit > (1.0 - care.falls()) * solved.misfit
-                || step.iter().flatten().all(|s| s.abs() < SETTLED);
+            let Some(next) = self.halve_until_descent(&solved, &step) else { break };
+            let settled = next.misfit > (1.0 - care.least_misfit_decrease()) * solved.misfit
+                || step.iter().flatten().all(|s| s.abs() < SMALLEST_STEP);
             solved = next;
             if settled {
                 break;
@@ -189,92 +189,93 @@ impl Problem {
     }
 
     /// The trend in every frame, m.
-    pub(super) fn of_trend(&self, solved: &Solved) -> Vec<f64> {
-        self.trend.values(&solved.amplitudes.as_slice()[..self.trend.columns()], self.frames)
+    pub(super) fn trend_values(&self, solved: &SinusoidSolution) -> Vec<f64> {
+        self.trend.values(&solved.amplitudes.as_slice()[..self.trend.column_count()], self.frames)
     }
 
     /// A term in every frame, m.
-    pub(super) fn of_term(&self, solved: &Solved, k: usize) -> Vec<f64> {
-        columns::course(&solved.terms[k], self.pair(solved, k), self.frames)
+    pub(super) fn term_values(&self, solved: &SinusoidSolution, k: usize) -> Vec<f64> {
+        columns::term_values(&solved.terms[k], self.quadrature_amplitudes(solved, k), self.frames)
     }
 
     /// Trend and terms in every frame, m.
-    pub(super) fn model(&self, solved: &Solved) -> Vec<f64> {
-        let mut model = self.of_trend(solved);
+    pub(super) fn model_values(&self, solved: &SinusoidSolution) -> Vec<f64> {
+        let mut model = self.trend_values(solved);
         for k in 0..solved.terms.len() {
-            model.iter_mut().zip(self.of_term(solved, k)).for_each(|(sum, value)| *sum += value);
+            model.iter_mut().zip(self.term_values(solved, k)).for_each(|(sum, value)| *sum += value);
         }
         model
     }
 
     /// Cosine and sine amplitude of a term, m.
-    pub(super) fn pair(&self, solved: &Solved, k: usize) -> [f64; 2] {
-        [0, 1].map(|part| solved.amplitudes[self.trend.columns() + 2 * k + part])
+    pub(super) fn quadrature_amplitudes(&self, solved: &SinusoidSolution, k: usize) -> [f64; 2] {
+        [0, 1].map(|part| solved.amplitudes[self.trend.column_count() + 2 * k + part])
     }
 
     /// Numbers that were fitted.
-    pub(super) fn unknown_count(&self, terms: &[Term]) -> usize {
-        let amplitudes = |t: &Term| if t.cycles == 0.0 { 1 } else { 2 };
-        self.trend.columns() + terms.iter().map(|t| amplitudes(t) + t.free.count()).sum::<usize>()
+    pub(super) fn unknown_count(&self, terms: &[SinusoidTerm]) -> usize {
+        let amplitudes = |t: &SinusoidTerm| if t.cycles == 0.0 { 1 } else { 2 };
+        self.trend.column_count() + terms.iter().map(|t| amplitudes(t) + t.free.count()).sum::<usize>()
     }
 
     /// The amplitudes that leave least at given terms.
-    pub(super) fn at(&self, terms: Vec<Term>) -> Option<Solved> {
-        let gram = self.fixed.gram::<PAIR>(&terms);
+    pub(super) fn solve_amplitudes(&self, terms: Vec<SinusoidTerm>) -> Option<SinusoidSolution> {
+        let gram = self.fixed_columns.gram_matrix::<QUADRATURE_COLUMNS>(&terms);
         let last = gram.ncols() - 1;
         let right = gram.column(last).rows(0, last).into_owned();
-        let amplitudes = inverse(&gram.view((0, 0), (last, last)).into_owned())? * &right;
+        let amplitudes = pseudo_inverse(&gram.view((0, 0), (last, last)).into_owned())? * &right;
         let misfit = gram[(last, last)] - right.dot(&amplitudes);
-        Some(Solved { terms, amplitudes, misfit })
+        Some(SinusoidSolution { terms, amplitudes, misfit })
     }
 
     /// The step, halved until the misfit falls; `None` where it does not.
-    fn descend(&self, from: &Solved, step: &[[f64; 2]]) -> Option<Solved> {
+    fn halve_until_descent(&self, from: &SinusoidSolution, step: &[[f64; 2]]) -> Option<SinusoidSolution> {
         (0..MOST_HALVINGS).find_map(|halvings| {
             let share = math::powi(0.5, halvings);
-            let moved = |(t, s): (&Term, &[f64; 2])| Term {
+            let moved = |(t, s): (&SinusoidTerm, &[f64; 2])| SinusoidTerm {
                 cycles: t.cycles + share * s[0],
                 nepers: t.nepers + share * s[1],
                 ..*t
             };
-            let solved = self.at(from.terms.iter().zip(step).map(moved).collect())?;
+            let solved = self.solve_amplitudes(from.terms.iter().zip(step).map(moved).collect())?;
             (solved.misfit < from.misfit).then_some(solved)
         })
     }
 
-    fn linear_columns(&self, terms: usize) -> Vec<usize> {
-        let trend = self.trend.columns();
-        let of = |k| [Of::Cosine.column(trend, k), Of::Sine.column(trend, k)];
+    fn linear_column_indices(&self, terms: usize) -> Vec<usize> {
+        let trend = self.trend.column_count();
+        let of = |k| [TermColumn::Cosine.column_index(trend, k), TermColumn::Sine.column_index(trend, k)];
         (0..trend).chain((0..terms).flat_map(of)).collect()
     }
 
     /// The unknowns as combinations of the columns: the linear ones, then cycles and nepers of each term
     /// where they are free.
-    fn unknowns(&self, solved: &Solved) -> DMatrix<f64> {
-        let (trend, linear) = (self.trend.columns(), self.linear_columns(solved.terms.len()));
+    fn unknowns_matrix(&self, solved: &SinusoidSolution) -> DMatrix<f64> {
+        let (trend, linear) = (self.trend.column_count(), self.linear_column_indices(solved.terms.len()));
         let moving: usize = solved.terms.iter().map(|t| t.free.count()).sum();
-        let columns = trend + WITH_SLOPES * solved.terms.len() + 1;
+        let columns = trend + COLUMNS_WITH_SLOPES * solved.terms.len() + 1;
         let mut map = DMatrix::zeros(columns, linear.len() + moving);
         for (unknown, column) in linear.iter().enumerate() {
             map[(*column, unknown)] = 1.0;
         }
         let mut place = linear.len();
         for (k, term) in solved.terms.iter().enumerate() {
-            let [cosine, sine] = self.pair(solved, k);
-            let mut add = |of: Of, place: usize, value: f64| map[(of.column(trend, k), place)] = value;
-            if term.free.cycles() {
-                add(Of::CosineSlope, place, cosine);
-                add(Of::SineSlope, place, sine);
+            let [cosine, sine] = self.quadrature_amplitudes(solved, k);
+            let mut add =
+                |of: TermColumn, place: usize, value: f64| map[(of.column_index(trend, k), place)] = value;
+            if term.free.moves_cycles() {
+                add(TermColumn::CosineSlope, place, cosine);
+                add(TermColumn::SineSlope, place, sine);
                 place += 1;
             }
-            if term.free.nepers() {
+            if term.free.moves_nepers() {
                 // of exp(-d ((u + 1) / 2 - s)): s - (u + 1) / 2 times the term; the slopes are -pi u sin and
                 // pi u cos
                 let since = term.first as f64 / self.frames as f64 - 0.5;
-                add(Of::Cosine, place, since * cosine);
-                add(Of::Sine, place, since * sine);
-                add(Of::SineSlope, place, -cosine / (2.0 * PI));
-                add(Of::CosineSlope, place, sine / (2.0 * PI));
+                add(TermColumn::Cosine, place, since * cosine);
+                add(TermColumn::Sine, place, since * sine);
+                add(TermColumn::SineSlope, place, -cosine / (2.0 * PI));
+                add(TermColumn::CosineSlope, place, sine / (2.0 * PI));
                 place += 1;
             }
         }
@@ -282,45 +283,53 @@ impl Problem {
     }
 
     /// The Gauss-Newton step of cycles and nepers of each term; zero for what is held.
-    fn step(&self, solved: &Solved) -> Option<Vec<[f64; 2]>> {
-        let (map, gram) = (self.unknowns(solved), self.fixed.gram::<WITH_SLOPES>(&solved.terms));
+    fn gauss_newton_step(&self, solved: &SinusoidSolution) -> Option<Vec<[f64; 2]>> {
+        let (map, gram) = (
+            self.unknowns_matrix(solved),
+            self.fixed_columns.gram_matrix::<COLUMNS_WITH_SLOPES>(&solved.terms),
+        );
         let linear = solved.amplitudes.len();
         let mut left = -(map.columns(0, linear) * &solved.amplitudes);
         left[map.nrows() - 1] = 1.0; // what is left, as a combination of the columns: the data less the model
         let towards = map.tr_mul(&(&gram * left));
-        let change = inverse(&map.tr_mul(&(&gram * &map)))? * towards;
+        let change = pseudo_inverse(&map.tr_mul(&(&gram * &map)))? * towards;
         let mut moves = change.iter().skip(linear).copied();
         let mut take = |free: bool| if free { moves.next().unwrap_or(0.0) } else { 0.0 };
-        Some(solved.terms.iter().map(|t| [take(t.free.cycles()), take(t.free.nepers())]).collect())
+        Some(
+            solved.terms.iter().map(|t| [take(t.free.moves_cycles()), take(t.free.moves_nepers())]).collect(),
+        )
     }
 
     /// Covariance of the unknowns for a rest of white noise of variance one, and each term's place in it.
-    pub(super) fn covariance(&self, solved: &Solved) -> Option<Covariance> {
-        let (map, gram) = (self.unknowns(solved), self.fixed.gram::<WITH_SLOPES>(&solved.terms));
-        let matrix = inverse(&map.tr_mul(&(gram * &map)))?;
+    pub(super) fn covariance(&self, solved: &SinusoidSolution) -> Option<SinusoidCovariance> {
+        let (map, gram) = (
+            self.unknowns_matrix(solved),
+            self.fixed_columns.gram_matrix::<COLUMNS_WITH_SLOPES>(&solved.terms),
+        );
+        let matrix = pseudo_inverse(&map.tr_mul(&(gram * &map)))?;
         let mut next = solved.amplitudes.len();
         let mut take = |free: bool| {
             let place = free.then_some(next);
             next += usize::from(free);
             place
         };
-        let place = |(k, t): (usize, &Term)| Place {
-            amplitudes: self.trend.columns() + 2 * k,
-            cycles: take(t.free.cycles()),
-            nepers: take(t.free.nepers()),
+        let place = |(k, t): (usize, &SinusoidTerm)| UnknownIndices {
+            amplitudes: self.trend.column_count() + 2 * k,
+            cycles: take(t.free.moves_cycles()),
+            nepers: take(t.free.moves_nepers()),
         };
         let places = solved.terms.iter().enumerate().map(place).collect();
-        Some(Covariance { matrix, places })
+        Some(SinusoidCovariance { matrix, places })
     }
 }
 
 /// Covariance of everything fitted.
-pub(super) struct Covariance {
+pub(super) struct SinusoidCovariance {
     matrix: DMatrix<f64>,
-    places: Vec<Place>,
+    places: Vec<UnknownIndices>,
 }
 
-struct Place {
+struct UnknownIndices {
     amplitudes: usize,
     cycles: Option<usize>,
     nepers: Option<usize>,
@@ -328,7 +337,7 @@ struct Place {
 
 /// Standard deviations of one term for white noise of variance one.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Deviations {
+pub(super) struct TermDeviations {
     /// Of the cycles in the record; 0 where they are held.
     pub cycles: f64,
     /// Of the nepers over the record; 0 where they are held.
@@ -337,9 +346,9 @@ pub(super) struct Deviations {
     pub amplitude: f64,
 }
 
-impl Covariance {
+impl SinusoidCovariance {
     /// The deviations of term `k`, whose cosine and sine amplitudes are `pair`.
-    pub(super) fn deviations(&self, k: usize, pair: [f64; 2]) -> Deviations {
+    pub(super) fn deviations(&self, k: usize, pair: [f64; 2]) -> TermDeviations {
         let place = &self.places[k];
         let size = math::hypot(pair[0], pair[1]).max(f64::MIN_POSITIVE);
         let along = pair.map(|part| part / size);
@@ -348,7 +357,7 @@ impl Covariance {
             + 2.0 * along[0] * along[1] * variance(0, 1)
             + math::powi(along[1], 2) * variance(1, 1);
         let of = |place: Option<usize>| place.map_or(0.0, |i| self.matrix[(i, i)].max(0.0).sqrt());
-        Deviations {
+        TermDeviations {
             cycles: of(place.cycles),
             nepers: of(place.nepers),
             amplitude: amplitude.max(0.0).sqrt(),
@@ -357,17 +366,21 @@ impl Covariance {
 }
 
 /// What a term becomes whose step leaves its peak or its bounds; `None` for a step that may be taken.
-fn leaves(start: &Term, now: &Term, step: [f64; 2]) -> Option<Term> {
+fn constrain_step(start: &SinusoidTerm, now: &SinusoidTerm, step: [f64; 2]) -> Option<SinusoidTerm> {
     let width = now.nepers.abs() / TAU; // a decaying peak is as wide as it decays
-    if (now.cycles + step[0] - start.cycles).abs() > REACH + width {
-        let free = if now.free == Free::Both { Free::Nepers } else { Free::Amplitude };
-        return Some(Term { cycles: start.cycles, free, ..*now });
+    if (now.cycles + step[0] - start.cycles).abs() > MOST_FREQUENCY_SHIFT + width {
+        let free = if now.free == FreeParameters::CyclesAndNepers {
+            FreeParameters::Nepers
+        } else {
+            FreeParameters::Amplitude
+        };
+        return Some(SinusoidTerm { cycles: start.cycles, free, ..*now });
     }
-    let (low, high) = now.bounds();
+    let (low, high) = now.nepers_bounds();
     let beyond = !(low..=high).contains(&(now.nepers + step[1]));
     beyond.then_some(match now.free {
-        Free::Both => Term { nepers: 0.0, free: Free::Cycles, ..*now },
-        _ => Term { free: Free::Amplitude, ..*now },
+        FreeParameters::CyclesAndNepers => SinusoidTerm { nepers: 0.0, free: FreeParameters::Cycles, ..*now },
+        _ => SinusoidTerm { free: FreeParameters::Amplitude, ..*now },
     })
 }
 
@@ -375,7 +388,7 @@ fn leaves(start: &Term, now: &Term, step: [f64; 2]) -> Option<Term> {
 const MOST_ITERATIONS: usize = 10_000;
 
 /// Inverse of a symmetric matrix over the directions that are in the data.
-fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     if matrix.is_empty() {
         return Some(matrix.clone()); // neither a trend nor a term
     }
@@ -393,12 +406,12 @@ fn inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     // eigenvalues take ten times as long, and only directions that are not in the data need them
     if let Some(factor) = scaled.clone().cholesky() {
         let pivots = factor.l_dirty().diagonal();
-        if pivots.iter().all(|pivot| pivot * pivot > WELL_POSED) {
+        if pivots.iter().all(|pivot| pivot * pivot > WELL_POSED_PIVOT) {
             return Some(back(&factor.inverse()));
         }
     }
     let eigen = SymmetricEigen::try_new(scaled, f64::EPSILON, MOST_ITERATIONS)?;
-    let least = SINGULAR * eigen.eigenvalues.max();
+    let least = SINGULAR_DIRECTION * eigen.eigenvalues.max();
     let inverted =
         DMatrix::from_diagonal(&eigen.eigenvalues.map(|x| if x > least { x.recip() } else { 0.0 }));
     Some(back(&(&eigen.eigenvectors * inverted * eigen.eigenvectors.transpose())))

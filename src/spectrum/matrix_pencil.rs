@@ -16,7 +16,7 @@ const BLOCKS: usize = 60;
 /// Most exponentials: the peak, its mirror image, a remainder of the trend and their neighbours.
 const MOST_POLES: usize = 8;
 /// Farthest pole from the peak that is still the peak's, cycles in the record.
-const NEAR: f64 = 2.0;
+const FARTHEST_POLE: f64 = 2.0;
 
 /// Precision of a decomposition, that of rounding.
 const PRECISION: f64 = 5.0 * f64::EPSILON;
@@ -37,16 +37,17 @@ pub(super) struct Pole {
 }
 
 /// The strongest pole near `cycles` in a record without gaps.
-pub(super) fn pole(record: &[f64], cycles: f64) -> Option<Pole> {
+pub(super) fn find_pole(record: &[f64], cycles: f64) -> Option<Pole> {
     let size = record.len().div_ceil(BLOCKS).max(1);
     let sums = block_sums(record, cycles, size);
     let per_record = record.len() as f64 / size as f64; // blocks in the record, not a whole number
-    let shifts = shifts(&sums)?;
-    let strengths = strengths(&sums, &shifts)?;
+    let shifts = block_shifts(&sums)?;
+    let strengths = pole_energies(&sums, &shifts)?;
     let near = |shift: Complex<f64>| {
         let (turn, gain) = (math::atan2(shift.im, shift.re), math::ln(magnitude(&shift)));
         let pole = Pole { cycles: cycles + turn / TAU * per_record, nepers: -gain * per_record };
-        ((pole.cycles - cycles).abs() <= NEAR + pole.nepers.abs() / TAU && pole.cycles > 0.0).then_some(pole)
+        ((pole.cycles - cycles).abs() <= FARTHEST_POLE + pole.nepers.abs() / TAU && pole.cycles > 0.0)
+            .then_some(pole)
     };
     let found =
         shifts.iter().zip(strengths.iter()).filter_map(|(shift, strength)| Some((near(*shift)?, *strength)));
@@ -70,7 +71,7 @@ fn magnitude(z: &Complex<f64>) -> f64 {
 }
 
 /// The factor of each exponential from one block to the next.
-fn shifts(sums: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
+fn block_shifts(sums: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
     let rows = sums.len() / 2;
     let columns = sums.len() + 1 - rows;
     if rows < 2 * MOST_POLES {
@@ -78,7 +79,7 @@ fn shifts(sums: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
     }
     let hankel = DMatrix::from_fn(rows, columns, |i, j| sums[i + j]);
     let svd = hankel.try_svd(true, false, PRECISION, MOST_ITERATIONS)?;
-    let order = order(svd.singular_values.as_slice(), columns)?;
+    let order = model_order(svd.singular_values.as_slice(), columns)?;
     let left = svd.u?;
     let (upper, lower) = (left.view((0, 0), (rows - 1, order)), left.view((1, 0), (rows - 1, order)));
     let turn = (upper.adjoint() * upper).lu().solve(&(upper.adjoint() * lower))?;
@@ -98,7 +99,7 @@ fn shifts(sums: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
 
 /// Number of exponentials by the minimum description length of Wax and Kailath (1985); `None` where it is
 /// none.
-fn order(singular_values: &[f64], samples: usize) -> Option<usize> {
+fn model_order(singular_values: &[f64], samples: usize) -> Option<usize> {
     let (all, samples) = (singular_values.len(), samples as f64);
     let powers: Vec<f64> = singular_values.iter().map(|s| (s * s).max(f64::MIN_POSITIVE)).collect();
     let length = |order: usize| {
@@ -114,7 +115,7 @@ fn order(singular_values: &[f64], samples: usize) -> Option<usize> {
 }
 
 /// Energy of each exponential over the record.
-fn strengths(sums: &[Complex<f64>], shifts: &[Complex<f64>]) -> Option<Vec<f64>> {
+fn pole_energies(sums: &[Complex<f64>], shifts: &[Complex<f64>]) -> Option<Vec<f64>> {
     let powers = DMatrix::from_fn(sums.len(), shifts.len(), |i, j| shifts[j].powu(i as u32));
     let amplitudes = powers
         .clone()
@@ -143,7 +144,7 @@ mod tests {
         for (frames, cycles, nepers) in
             [(750, 11.76, 7.4), (751, 135.0, 1.0), (200, 20.3, 0.0), (3001, 11.76, 30.0)]
         {
-            let found = pole(&ring_down(frames, cycles, nepers), cycles + 0.4).unwrap();
+            let found = find_pole(&ring_down(frames, cycles, nepers), cycles + 0.4).unwrap();
             assert!(
                 (found.cycles - cycles).abs() < 1e-6 && (found.nepers - nepers).abs() < 1e-6,
                 "{cycles} {nepers}: {found:?}"
@@ -158,7 +159,7 @@ mod tests {
             .zip(ring_down(750, 30.7, 3.0))
             .map(|(a, b)| a + 2.0 * b)
             .collect();
-        let found = pole(&both, 30.5).unwrap();
+        let found = find_pole(&both, 30.5).unwrap();
         assert!((found.cycles - 30.7).abs() < 1e-5 && (found.nepers - 3.0).abs() < 1e-5, "{found:?}");
     }
 
@@ -175,15 +176,15 @@ mod tests {
             })
             .collect();
         for cycles in 1..440 {
-            let found = pole(&ends, f64::from(cycles));
+            let found = find_pole(&ends, f64::from(cycles));
             assert!(found.is_none_or(|pole| pole.cycles.is_finite() && pole.nepers.is_finite()), "{found:?}");
         }
     }
 
     #[test]
     fn nothing_near_is_none_and_too_little_too() {
-        assert_eq!(pole(&ring_down(750, 60.0, 1.0), 30.0), None);
-        assert_eq!(pole(&ring_down(20, 5.0, 1.0), 5.0), None);
-        assert_eq!(pole(&[0.0; 750], 30.0), None);
+        assert_eq!(find_pole(&ring_down(750, 60.0, 1.0), 30.0), None);
+        assert_eq!(find_pole(&ring_down(20, 5.0, 1.0), 5.0), None);
+        assert_eq!(find_pole(&[0.0; 750], 30.0), None);
     }
 }

@@ -14,11 +14,11 @@ mod floor;
 mod student;
 mod tapers;
 
-use super::transform::{Complex, Transform};
+use super::transform::{Complex, RealTransform};
 use crate::math;
 use rayon::prelude::*;
 use std::ops::RangeInclusive;
-use tapers::Tapers;
+use tapers::SineTapers;
 
 /// Tapers unless asked for otherwise: a density of 14 degrees of freedom scatters by 38 %, and a line takes 8
 /// resolutions, 53 Hz in 0.15 s, so that 78 Hz is still apart from zero and from 900 Hz.
@@ -126,24 +126,24 @@ impl Multitaper {
     ///
     /// # Errors
     /// [`MultitaperError`] when record, rate, padding or tapers cannot give one.
-    pub fn of(
+    pub fn new(
         residual_m: &[Option<f64>],
         frame_rate_hz: f64,
         padded: usize,
         tapers: usize,
     ) -> Result<Self, MultitaperError> {
-        check(residual_m, frame_rate_hz, tapers)?;
-        let samples = trimmed(residual_m);
+        check_input(residual_m, frame_rate_hz, tapers)?;
+        let samples = trim_missing_ends(residual_m);
         let padded = padded.max(samples.len()).checked_next_power_of_two().filter(|n| *n <= MOST_PADDED);
         let padded =
             padded.ok_or(MultitaperError::TooLong { frames: samples.len(), padded: samples.len() })?;
-        let made = Tapers::over(samples, tapers);
+        let made = SineTapers::new(samples, tapers);
         if made.len() < *TAPER_RANGE.start() {
             return Err(MultitaperError::Clumped { found: samples.iter().flatten().count() });
         }
-        let bins = bins(&made, samples, padded, frame_rate_hz);
+        let bins = estimate_bins(&made, samples, padded, frame_rate_hz);
         let resolution_hz = frame_rate_hz / samples.len() as f64;
-        let column = |of: fn(&Bin) -> f64| bins.iter().map(of).collect();
+        let column = |of: fn(&MultitaperBin) -> f64| bins.iter().map(of).collect();
         Ok(Self {
             frequency_hz: (0..bins.len()).map(|k| k as f64 * (frame_rate_hz / padded as f64)).collect(),
             density_m2_per_hz: column(|b| b.density_m2_per_hz),
@@ -153,13 +153,13 @@ impl Multitaper {
             tapers: made.len(),
             resolution_hz,
             half_bandwidth_hz: (tapers + 1) as f64 / 2.0 * resolution_hz,
-            student_t: student::two_sided(0.95, made.len() - 1),
+            student_t: student::student_t_quantile(0.95, made.len() - 1),
         })
     }
 
     /// Degrees of freedom of the density in a bin: two for each taper.
     #[must_use]
-    pub fn degrees(&self) -> usize {
+    pub fn degrees_of_freedom(&self) -> usize {
         2 * self.tapers
     }
 
@@ -189,11 +189,11 @@ impl Multitaper {
         let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
         let width_hz = width_hz.max(2.0 * FLOOR_LINES * self.half_bandwidth_hz);
         let window = ((width_hz / bin_hz).ceil() as usize).min(2 * self.density_m2_per_hz.len());
-        floor::curve(&self.density_m2_per_hz, window, self.degrees() as f64)
+        floor::noise_floor_curve(&self.density_m2_per_hz, window, self.degrees_of_freedom() as f64)
     }
 }
 
-fn check(samples: &[Option<f64>], frame_rate_hz: f64, tapers: usize) -> Result<(), MultitaperError> {
+fn check_input(samples: &[Option<f64>], frame_rate_hz: f64, tapers: usize) -> Result<(), MultitaperError> {
     if !TAPER_RANGE.contains(&tapers) {
         return Err(MultitaperError::Tapers { found: tapers });
     }
@@ -211,14 +211,14 @@ fn check(samples: &[Option<f64>], frame_rate_hz: f64, tapers: usize) -> Result<(
 }
 
 /// From the first to the last frame present: what is missing at the ends is no gap.
-fn trimmed(samples: &[Option<f64>]) -> &[Option<f64>] {
+fn trim_missing_ends(samples: &[Option<f64>]) -> &[Option<f64>] {
     let first = samples.iter().position(Option::is_some).unwrap_or(0);
     let end = samples.iter().rposition(Option::is_some).map_or(first, |last| last + 1);
     samples.get(first..end).unwrap_or_default()
 }
 
 /// The values of `of` in order, made in parallel where `work` is long.
-fn each<T: Send>(count: usize, work: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
+fn map_parallel_above<T: Send>(count: usize, work: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
     if work < PARALLEL_FROM {
         (0..count).map(&of).collect()
     } else {
@@ -227,7 +227,7 @@ fn each<T: Send>(count: usize, work: usize, of: impl Fn(usize) -> T + Sync) -> V
 }
 
 /// What the tapers say of one frequency.
-struct Bin {
+struct MultitaperBin {
     density_m2_per_hz: f64,
     log_density_sd: f64,
     line_f: f64,
@@ -235,15 +235,20 @@ struct Bin {
 }
 
 /// A taper's transform of the record, and the taper's own at zero.
-struct Tapered {
+struct TaperTransform {
     values: Vec<Complex>,
     sum: f64,
 }
 
-fn bins(tapers: &Tapers, samples: &[Option<f64>], padded: usize, frame_rate_hz: f64) -> Vec<Bin> {
-    let transform = Transform::of(padded);
+fn estimate_bins(
+    tapers: &SineTapers,
+    samples: &[Option<f64>],
+    padded: usize,
+    frame_rate_hz: f64,
+) -> Vec<MultitaperBin> {
+    let transform = RealTransform::new(padded);
     let tapered = |taper: usize| {
-        let (row, mut sum) = (tapers.row(taper), 0.0);
+        let (row, mut sum) = (tapers.coefficients(taper), 0.0);
         let values = samples.iter().enumerate().map(|(frame, sample)| {
             sample.map_or(0.0, |sample| {
                 let weight = tapers.value(&row, frame);
@@ -251,24 +256,24 @@ fn bins(tapers: &Tapers, samples: &[Option<f64>], padded: usize, frame_rate_hz: 
                 weight * sample
             })
         });
-        Tapered { values: transform.values(values), sum }
+        TaperTransform { values: transform.spectrum_values(values), sum }
     };
-    let tapered = each(tapers.len(), padded, tapered);
+    let tapered = map_parallel_above(tapers.len(), padded, tapered);
     let half = padded / 2;
     let sided = |bin: usize| if bin == 0 || bin == half { 1.0 } else { 2.0 };
-    each(half + 1, padded, |bin| of_bin(&tapered, bin, sided(bin) / frame_rate_hz))
+    map_parallel_above(half + 1, padded, |bin| estimate_bin(&tapered, bin, sided(bin) / frame_rate_hz))
 }
 
-fn of_bin(tapered: &[Tapered], bin: usize, scale: f64) -> Bin {
+fn estimate_bin(tapered: &[TaperTransform], bin: usize, scale: f64) -> MultitaperBin {
     let values = || tapered.iter().map(|t| (t.values[bin], t.sum));
     let power: f64 = values().map(|(y, _)| y.norm_sqr()).sum();
     let own: f64 = values().map(|(_, u)| u * u).sum();
     let line = values().map(|(y, u)| y * u).sum::<Complex>() / own;
     let rest: f64 = values().map(|(y, u)| (y - line * u).norm_sqr()).sum();
     let explained = (tapered.len() - 1) as f64 * line.norm_sqr() * own;
-    Bin {
+    MultitaperBin {
         density_m2_per_hz: scale * power / tapered.len() as f64,
-        log_density_sd: jackknife(power, || values().map(|(y, _)| y.norm_sqr())),
+        log_density_sd: jackknife_log_sd(power, || values().map(|(y, _)| y.norm_sqr())),
         line_f: if explained > 0.0 { explained / rest } else { 0.0 },
         line_amplitude_m: 2.0 * math::hypot(line.re, line.im),
     }
@@ -276,7 +281,7 @@ fn of_bin(tapered: &[Tapered], bin: usize, scale: f64) -> Bin {
 
 /// Standard deviation of the logarithm of the mean of `powers`, whose sum is `total`, from the means that
 /// lack one of them.
-fn jackknife<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I) -> f64 {
+fn jackknife_log_sd<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I) -> f64 {
     if total <= 0.0 {
         return 0.0;
     }

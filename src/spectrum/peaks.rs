@@ -2,11 +2,11 @@
 
 use super::component::{Component, Estimator};
 use super::limits::{CLEAR_DB, MIN_CYCLES};
-use super::parabola::vertex;
-use super::refine::{MOST_REFINED, Outcome, Start};
-use super::sharp::Weighted;
-use super::verdict::Verdict;
-use super::window::Sums;
+use super::parabola::log_parabola_vertex;
+use super::refine::{MOST_REFINED, RefinementOutcome, RefinementStart};
+use super::sharp::WeightedRecord;
+use super::verdict::ComponentVerdict;
+use super::window::WindowSums;
 use super::windowed::WindowedSpectrum;
 use crate::math;
 use rayon::prelude::*;
@@ -27,10 +27,10 @@ const SIDELOBE_MARGIN: f64 = 1.5;
 const TREND_MARGIN: f64 = 4.0;
 /// Amplitude below the largest resolvable component at which nothing is listed: 50 dB. A cubic takes a little
 /// of a tone with it, and of twelve cycles that comes back 56 dB below.
-const RANGE: f64 = 3.2e-3;
+const DYNAMIC_RANGE: f64 = 3.2e-3;
 /// A second maximum counts if the spectrum falls this far below it towards every larger one: 3 dB, half its
 /// power.
-const DIP: f64 = std::f64::consts::FRAC_1_SQRT_2;
+const VALLEY_RATIO: f64 = std::f64::consts::FRAC_1_SQRT_2;
 /// The noise floor is a median over at least this many resolutions, so that a component does not set its own
 /// floor.
 const FLOOR_RESOLUTIONS: f64 = 40.0;
@@ -46,7 +46,7 @@ impl WindowedSpectrum<'_> {
 }
 
 /// The peaks that are components of their own.
-pub(super) struct Peaks {
+pub(super) struct PeakList {
     /// Noise floor, m.
     pub floor_m: f64,
     /// Level over the noise from which there is a component.
@@ -57,38 +57,42 @@ pub(super) struct Peaks {
     listed: Vec<usize>,
 }
 
-impl Peaks {
+impl PeakList {
     /// Where a refinement starts.
-    pub(super) fn starts(&self, spectrum: &WindowedSpectrum) -> Vec<Start> {
+    pub(super) fn refinement_starts(&self, spectrum: &WindowedSpectrum) -> Vec<RefinementStart> {
         self.accepted
             .iter()
-            .map(|peak| Start {
+            .map(|peak| RefinementStart {
                 cycles: peak.frequency_hz / spectrum.resolution_hz,
-                free: spectrum.resolves(peak),
+                moves: spectrum.resolves(peak),
             })
             .collect()
     }
 
     /// Moves the peaks to where the transform of the samples has them, for bins too far apart for a parabola.
-    pub(super) fn sharpen(&mut self, spectrum: &WindowedSpectrum, record: &Weighted) {
+    pub(super) fn zoom_peaks(&mut self, spectrum: &WindowedSpectrum, record: &WeightedRecord) {
         self.accepted.par_iter_mut().for_each(|peak| {
-            let (cycles, amplitude_m) = record.peak(peak.frequency_hz / spectrum.resolution_hz);
+            let (cycles, amplitude_m) = record.zoom_peak(peak.frequency_hz / spectrum.resolution_hz);
             (peak.frequency_hz, peak.amplitude_m) = (cycles * spectrum.resolution_hz, amplitude_m);
         });
     }
 
     /// The components listed, largest first; `outcomes` are those of the starts.
-    pub(super) fn components(&self, spectrum: &WindowedSpectrum, outcomes: &[Outcome]) -> Vec<Component> {
+    pub(super) fn list_components(
+        &self,
+        spectrum: &WindowedSpectrum,
+        outcomes: &[RefinementOutcome],
+    ) -> Vec<Component> {
         let amplitudes = outcomes
             .iter()
-            .filter_map(|o| if let Outcome::Refined(r) = o { Some(r.amplitude_m) } else { None });
-        let least_m = RANGE * amplitudes.fold(0.0, f64::max);
+            .filter_map(|o| if let RefinementOutcome::Refined(r) = o { Some(r.amplitude_m) } else { None });
+        let least_m = DYNAMIC_RANGE * amplitudes.fold(0.0, f64::max);
         let absent = |index: usize| match outcomes[index] {
-            Outcome::Kept => false,
-            Outcome::Held(amplitude_m) => amplitude_m < least_m,
+            RefinementOutcome::Unchanged => false,
+            RefinementOutcome::FixedFrequency(amplitude_m) => amplitude_m < least_m,
             // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the
             // deviation
-            Outcome::Refined(r) => {
+            RefinementOutcome::Refined(r) => {
                 r.amplitude_m
                     < least_m.max(
                         r.deviations
@@ -98,7 +102,7 @@ impl Peaks {
         };
         let there = self.listed.iter().filter(|index| !absent(**index));
         let mut components: Vec<Component> = there
-            .map(|index| component(spectrum, self.floor_m, &self.accepted[*index], outcomes[*index]))
+            .map(|index| component_of_peak(spectrum, self.floor_m, &self.accepted[*index], outcomes[*index]))
             .collect();
         components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
         components
@@ -116,11 +120,11 @@ pub(super) struct Peak {
 }
 
 /// The noise floor and the peaks; at most `most` of those in the band are listed.
-pub(super) fn find(spectrum: &WindowedSpectrum, band_hz: (f64, f64), most: usize) -> Peaks {
-    let floor_m = floor(spectrum, band_hz).max(spectrum.least_m);
-    let detection = detection(spectrum, band_hz);
+pub(super) fn find_peaks(spectrum: &WindowedSpectrum, band_hz: (f64, f64), most: usize) -> PeakList {
+    let floor_m = noise_floor(spectrum, band_hz).max(spectrum.least_m);
+    let detection = detection_threshold(spectrum, band_hz);
     let detected_m = floor_m * detection;
-    let mut candidates = maxima(spectrum, detected_m);
+    let mut candidates = local_maxima(spectrum, detected_m);
     candidates.retain(|p| p.amplitude_m >= detected_m);
     candidates.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m).then(a.bin.cmp(&b.bin)));
     let mut accepted: Vec<Peak> = Vec::new();
@@ -131,9 +135,9 @@ pub(super) fn find(spectrum: &WindowedSpectrum, band_hz: (f64, f64), most: usize
         if enough || peak.amplitude_m < least_m {
             break;
         }
-        if accepted.iter().all(|larger| stands_apart(spectrum, larger, &peak)) {
+        if accepted.iter().all(|larger| is_separate_peak(spectrum, larger, &peak)) {
             if spectrum.resolves(&peak) {
-                least_m = least_m.max(RANGE * peak.amplitude_m);
+                least_m = least_m.max(DYNAMIC_RANGE * peak.amplitude_m);
             }
             if listed.len() < most && peak.frequency_hz >= band_hz.0 && peak.frequency_hz <= band_hz.1 {
                 listed.push(accepted.len());
@@ -141,12 +145,12 @@ pub(super) fn find(spectrum: &WindowedSpectrum, band_hz: (f64, f64), most: usize
             accepted.push(peak); // one outside the band still casts its sidelobes into it
         }
     }
-    Peaks { floor_m, detection, accepted, listed }
+    PeakList { floor_m, detection, accepted, listed }
 }
 
 /// Root mean square of the noise in a bin: amplitudes of noise are Rayleigh distributed, with median `rms
 /// sqrt(ln 2)`.
-fn floor(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
+fn noise_floor(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
     let widen = (FLOOR_RESOLUTIONS * spectrum.resolution_hz - (high - low)).max(0.0) / 2.0;
     let bins = spectrum.amplitude_m.len();
     let bin = |f: f64| ((f / spectrum.bin_hz).max(0.0) as usize).min(bins);
@@ -164,13 +168,13 @@ fn floor(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
 
 /// Level over the floor that noise reaches anywhere in the band with the chance [`FALSE_ALARM`]: a bin
 /// exceeds `r` times its rms with the chance `exp(-r^2)`.
-fn detection(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
+fn detection_threshold(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
     let trials = (TRIALS_PER_RESOLUTION * (high - low) / spectrum.resolution_hz).max(1.0);
     math::ln(trials / FALSE_ALARM).sqrt()
 }
 
 /// Local maxima, those left out that cannot reach `least_m`.
-fn maxima(spectrum: &WindowedSpectrum, least_m: f64) -> Vec<Peak> {
+fn local_maxima(spectrum: &WindowedSpectrum, least_m: f64) -> Vec<Peak> {
     /// A parabola through logarithms rises above its middle point by at most the eighth root of that point
     /// over its lower neighbour: by 9 % where the neighbour is half as high.
     const RISE: f64 = 1.1;
@@ -182,16 +186,16 @@ fn maxima(spectrum: &WindowedSpectrum, least_m: f64) -> Vec<Peak> {
     };
     (1..a.len().saturating_sub(1))
         .filter(is_top)
-        .map(|k| interpolated(k, [a[k - 1], a[k], a[k + 1]], spectrum.bin_hz))
+        .map(|k| interpolate_peak(k, [a[k - 1], a[k], a[k + 1]], spectrum.bin_hz))
         .collect()
 }
 
-fn interpolated(bin: usize, around: [f64; 3], bin_hz: f64) -> Peak {
-    let (shift, amplitude_m) = vertex(around);
+fn interpolate_peak(bin: usize, around: [f64; 3], bin_hz: f64) -> Peak {
+    let (shift, amplitude_m) = log_parabola_vertex(around);
     Peak { bin, frequency_hz: (bin as f64 + shift) * bin_hz, amplitude_m }
 }
 
-fn stands_apart(spectrum: &WindowedSpectrum, larger: &Peak, peak: &Peak) -> bool {
+fn is_separate_peak(spectrum: &WindowedSpectrum, larger: &Peak, peak: &Peak) -> bool {
     let (low, high) = (larger.bin.min(peak.bin), larger.bin.max(peak.bin));
     let distance = high - low;
     if (distance as f64) * spectrum.bin_hz < LOBE * spectrum.resolution_hz {
@@ -200,28 +204,40 @@ fn stands_apart(spectrum: &WindowedSpectrum, larger: &Peak, peak: &Peak) -> bool
     let margin = if spectrum.resolves(larger) { SIDELOBE_MARGIN } else { TREND_MARGIN };
     let sidelobe = spectrum.envelope.get(distance).copied().unwrap_or(0.0) * larger.amplitude_m * margin;
     let valley = spectrum.amplitude_m[low..=high].iter().fold(f64::INFINITY, |m, a| m.min(*a));
-    peak.amplitude_m > sidelobe && valley < DIP * peak.amplitude_m
+    peak.amplitude_m > sidelobe && valley < VALLEY_RATIO * peak.amplitude_m
 }
 
 /// The component of a peak, from its refinement where it has one.
-fn component(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak, outcome: Outcome) -> Component {
+fn component_of_peak(
+    spectrum: &WindowedSpectrum,
+    floor_m: f64,
+    peak: &Peak,
+    outcome: RefinementOutcome,
+) -> Component {
     let trend_hz = TREND_SHARE * spectrum.resolution_hz;
-    let by_floor =
-        (OVER_BOUND * bound_hz(spectrum, floor_m, peak), floor_m * std::f64::consts::FRAC_1_SQRT_2);
+    let by_floor = (
+        OVER_BOUND * cramer_rao_bound_hz(spectrum, floor_m, peak),
+        floor_m * std::f64::consts::FRAC_1_SQRT_2,
+    );
     let (frequency_hz, amplitude_m, deviations) = match outcome {
-        Outcome::Refined(r) => (r.cycles * spectrum.resolution_hz, r.amplitude_m, r.deviations),
-        Outcome::Kept | Outcome::Held(_) => (peak.frequency_hz, peak.amplitude_m, None),
+        RefinementOutcome::Refined(r) => (r.cycles * spectrum.resolution_hz, r.amplitude_m, r.deviations),
+        RefinementOutcome::Unchanged | RefinementOutcome::FixedFrequency(_) => {
+            (peak.frequency_hz, peak.amplitude_m, None)
+        }
     };
     let (sd_hz, amplitude_sd_m) =
         deviations.map_or(by_floor, |sd| (sd.cycles * spectrum.resolution_hz, sd.amplitude_m));
     let snr_db = 20.0 * math::log10(amplitude_m / floor_m);
     let reason = match () {
-        () if !spectrum.resolves(peak) => Some(Verdict::NotResolvable),
-        () if snr_db < CLEAR_DB => Some(Verdict::Weak),
+        () if !spectrum.resolves(peak) => Some(ComponentVerdict::NotResolvable),
+        () if snr_db < CLEAR_DB => Some(ComponentVerdict::Weak),
         () => None,
     };
-    let estimator =
-        if let Outcome::Refined(_) = outcome { Estimator::LeastSquares } else { Estimator::Periodogram };
+    let estimator = if let RefinementOutcome::Refined(_) = outcome {
+        Estimator::LeastSquares
+    } else {
+        Estimator::Periodogram
+    };
     Component {
         frequency_hz,
         frequency_sd_hz: math::hypot(sd_hz, trend_hz),
@@ -229,14 +245,14 @@ fn component(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak, outcome: Ou
         amplitude_sd_m,
         snr_db,
         cramer_rao_hz: by_floor.0 / OVER_BOUND,
-        verdict: reason.unwrap_or(Verdict::Clear),
-        ..Component::of(estimator)
+        verdict: reason.unwrap_or(ComponentVerdict::Clear),
+        ..Component::from_estimator(estimator)
     }
 }
 
 /// Cramér-Rao bound of one real tone in the noise of the floor, `eta = A^2 / (2 sigma^2)`, Hz.
-fn bound_hz(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak) -> f64 {
-    let Sums { first, second, .. } = spectrum.sums;
+fn cramer_rao_bound_hz(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak) -> f64 {
+    let WindowSums { first, second, .. } = spectrum.sums;
     let sigma_m = floor_m * first / (2.0 * second.sqrt());
     let eta = math::powi(peak.amplitude_m, 2) / (2.0 * sigma_m * sigma_m);
     let span = math::powi(spectrum.frames as f64, 2) - 1.0;

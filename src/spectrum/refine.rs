@@ -14,7 +14,7 @@
 //! 9 % | 0.04 % low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a damping ratio of 0.05: 0.11
 //! and 0.13 Hz | 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
 
-use super::least_squares::{Care, Free, Problem, Solved, Term};
+use super::least_squares::{FreeParameters, SinusoidProblem, SinusoidSolution, SinusoidTerm, Tolerance};
 use super::limits::MAX_COMPONENTS;
 use super::trend::Trend;
 use super::{gaps, window};
@@ -30,35 +30,35 @@ const FRAMES_PER_UNKNOWN: usize = 4;
 /// What is left is white while its mean square stays below this many times that of noise: of sixty fourth
 /// differences one in a thousand says otherwise, and a misfit as large as the noise leaks no more than the
 /// noise does.
-const WHITE: f64 = 2.0;
+const WHITE_RATIO: f64 = 2.0;
 /// Fewest fourth differences that tell noise from a cycle.
 const FEWEST_DIFFERENCES: usize = 20;
 /// Times what is left is bridged: the second moves what the first did by a tenth.
-const BRIDGINGS: usize = 2;
+const FILL_ROUNDS: usize = 2;
 
 /// Where the transform saw a component.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Start {
+pub(super) struct RefinementStart {
     /// Frequency, cycles in the record.
     pub cycles: f64,
     /// Whether the frequency may move; that of a remainder of the trend may not.
-    pub free: bool,
+    pub moves: bool,
 }
 
 /// What the frames present say of a component.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Refined {
+pub(super) struct RefinedComponent {
     /// Frequency, cycles in the record.
     pub cycles: f64,
     /// Amplitude, m.
     pub amplitude_m: f64,
     /// How well they are known; `None` where the rest is no noise, and tells nothing of it.
-    pub deviations: Option<Deviations>,
+    pub deviations: Option<RefinedDeviations>,
 }
 
 /// Standard deviations from the normal matrix and the size of a white rest.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Deviations {
+pub(super) struct RefinedDeviations {
     /// Of the frequency, cycles in the record.
     pub cycles: f64,
     /// Of the amplitude, m.
@@ -67,84 +67,104 @@ pub(super) struct Deviations {
 
 /// What became of a start.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Outcome {
+pub(super) enum RefinementOutcome {
     /// It stands as the transform saw it.
-    Kept,
+    Unchanged,
     /// It stands as the transform saw it, though at that frequency the frames present leave it this
     /// amplitude, m.
-    Held(f64),
+    FixedFrequency(f64),
     /// It was refined.
-    Refined(Refined),
+    Refined(RefinedComponent),
 }
 
 /// The components refined together, in the order of their starts.
-pub(super) fn refined(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -> Vec<Outcome> {
+pub(super) fn refine_components(
+    samples: &[Option<f64>],
+    trend: Trend,
+    starts: &[RefinementStart],
+) -> Vec<RefinementOutcome> {
     let fitted = &starts[..starts.len().min(MOST_REFINED)];
     let present = samples.iter().flatten().count();
-    let unknowns = trend.columns() + 3 * fitted.len();
+    let unknowns = trend.column_count() + 3 * fitted.len();
     let gappy = (samples.len() - present) as f64 > REFINED_MISSING * samples.len() as f64;
     let mut outcomes = Vec::new();
-    if gappy && present >= FRAMES_PER_UNKNOWN * unknowns && fitted.iter().any(|s| s.free) {
-        outcomes = fit(samples, trend, fitted).unwrap_or_default();
+    if gappy && present >= FRAMES_PER_UNKNOWN * unknowns && fitted.iter().any(|s| s.moves) {
+        outcomes = fit_components(samples, trend, fitted).unwrap_or_default();
     }
-    outcomes.resize(starts.len(), Outcome::Kept);
+    outcomes.resize(starts.len(), RefinementOutcome::Unchanged);
     outcomes
 }
 
-fn fit(samples: &[Option<f64>], trend: Trend, starts: &[Start]) -> Option<Vec<Outcome>> {
-    let free = |start: &Start| if start.free { Free::Cycles } else { Free::Amplitude };
-    let terms: Vec<Term> = starts.iter().map(|s| Term::from_start(s.cycles, 0.0, free(s))).collect();
+fn fit_components(
+    samples: &[Option<f64>],
+    trend: Trend,
+    starts: &[RefinementStart],
+) -> Option<Vec<RefinementOutcome>> {
+    let free = |start: &RefinementStart| {
+        if start.moves { FreeParameters::Cycles } else { FreeParameters::Amplitude }
+    };
+    let terms: Vec<SinusoidTerm> =
+        starts.iter().map(|s| SinusoidTerm::from_start(s.cycles, 0.0, free(s))).collect();
     let measured = trend.residual(samples);
-    let hann = window::hann(samples);
-    let problem = Problem::new(&measured, &hann, trend);
-    let mut solved = problem.solve(&terms, Care::Final)?;
+    let hann = window::hann_weights(samples);
+    let problem = SinusoidProblem::new(&measured, &hann, trend);
+    let mut solved = problem.gauss_newton(&terms, Tolerance::Fine)?;
     let rest = |model: &[f64]| -> Vec<Option<f64>> {
         samples.iter().zip(measured.iter().zip(model)).map(|(sample, (x, m))| sample.map(|_| x - m)).collect()
     };
-    let mut model = problem.model(&solved);
+    let mut model = problem.model_values(&solved);
     let mut left = rest(&model);
     if is_white(&left) {
         let weights: Vec<f64> = samples.iter().map(|x| f64::from(u8::from(x.is_some()))).collect();
-        let problem = Problem::new(&measured, &weights, trend);
-        let solved = problem.solve(&solved.terms, Care::Final)?;
-        return outcomes(&problem, &solved, starts, true);
+        let problem = SinusoidProblem::new(&measured, &weights, trend);
+        let solved = problem.gauss_newton(&solved.terms, Tolerance::Fine)?;
+        return refinement_outcomes(&problem, &solved, starts, true);
     }
     let mut outcome = None;
-    for _ in 0..BRIDGINGS {
-        let bridged = gaps::bridged(&left);
+    for _ in 0..FILL_ROUNDS {
+        let bridged = gaps::fill_short_gaps(&left);
         let data: Vec<f64> =
             bridged.iter().zip(&model).map(|(left, m)| left.map_or(0.0, |left| left + m)).collect();
-        let problem = Problem::new(&data, &window::hann(&bridged), trend);
-        solved = problem.solve(&solved.terms, Care::Final)?;
-        model = problem.model(&solved);
+        let problem = SinusoidProblem::new(&data, &window::hann_weights(&bridged), trend);
+        solved = problem.gauss_newton(&solved.terms, Tolerance::Fine)?;
+        model = problem.model_values(&solved);
         left = rest(&model);
-        outcome = outcomes(&problem, &solved, starts, false);
+        outcome = refinement_outcomes(&problem, &solved, starts, false);
     }
     outcome
 }
 
 /// What became of each start; `white` says that the weights are one and the rest is noise, so that deviations
 /// follow from it.
-fn outcomes(problem: &Problem, solved: &Solved, starts: &[Start], white: bool) -> Option<Vec<Outcome>> {
+fn refinement_outcomes(
+    problem: &SinusoidProblem,
+    solved: &SinusoidSolution,
+    starts: &[RefinementStart],
+    white: bool,
+) -> Option<Vec<RefinementOutcome>> {
     let freedom = problem.weight - problem.unknown_count(&solved.terms) as f64;
     if white && freedom <= 0.0 {
         return None;
     }
     let noise_m = (solved.misfit.max(0.0) / freedom).sqrt();
     let covariance = if white { Some(problem.covariance(solved)?) } else { None };
-    let outcome = |(k, start): (usize, &Start)| {
-        let pair = problem.pair(solved, k);
+    let outcome = |(k, start): (usize, &RefinementStart)| {
+        let pair = problem.quadrature_amplitudes(solved, k);
         let amplitude_m = math::hypot(pair[0], pair[1]);
-        match (start.free, solved.terms[k].free == Free::Cycles && amplitude_m > 0.0) {
-            (false, _) => Outcome::Kept,
-            (true, false) => Outcome::Held(amplitude_m),
+        match (start.moves, solved.terms[k].free == FreeParameters::Cycles && amplitude_m > 0.0) {
+            (false, _) => RefinementOutcome::Unchanged,
+            (true, false) => RefinementOutcome::FixedFrequency(amplitude_m),
             (true, true) => {
                 let deviations = covariance.as_ref().map(|c| c.deviations(k, pair));
-                let deviations = deviations.map(|sd| Deviations {
+                let deviations = deviations.map(|sd| RefinedDeviations {
                     cycles: sd.cycles * noise_m,
                     amplitude_m: sd.amplitude * noise_m,
                 });
-                Outcome::Refined(Refined { cycles: solved.terms[k].cycles, amplitude_m, deviations })
+                RefinementOutcome::Refined(RefinedComponent {
+                    cycles: solved.terms[k].cycles,
+                    amplitude_m,
+                    deviations,
+                })
             }
         }
     };
@@ -162,7 +182,7 @@ fn is_white(left: &[Option<f64>]) -> bool {
     };
     let (differences, noise) = mean_square(&mut left.windows(5).filter_map(difference));
     let (_, all) = mean_square(&mut left.iter().flatten().copied());
-    differences >= FEWEST_DIFFERENCES && all < WHITE * noise / GAIN
+    differences >= FEWEST_DIFFERENCES && all < WHITE_RATIO * noise / GAIN
 }
 
 #[cfg(test)]
@@ -179,40 +199,50 @@ mod tests {
     #[test]
     fn exact_sinusoids_are_found_exactly_and_a_third_is_absent() {
         let samples = gappy(300, |s| 1.0 + s + 2.0 * (TAU * 11.3 * s).cos() + (TAU * 57.8 * s + 1.0).sin());
-        let starts = [11.5, 57.5, 90.0].map(|cycles| Start { cycles, free: true });
-        let found = refined(&samples, Trend::Polynomial(4), &starts);
+        let starts = [11.5, 57.5, 90.0].map(|cycles| RefinementStart { cycles, moves: true });
+        let found = refine_components(&samples, Trend::Polynomial(4), &starts);
         for (outcome, (cycles, amplitude)) in found.iter().zip([(11.3, 2.0), (57.8, 1.0)]) {
-            let Outcome::Refined(r) = outcome else { panic!("{outcome:?}") };
+            let RefinementOutcome::Refined(r) = outcome else { panic!("{outcome:?}") };
             assert!((r.cycles - cycles).abs() < 1e-6 && (r.amplitude_m - amplitude).abs() < 1e-6, "{r:?}");
         }
         let left = match found[2] {
-            Outcome::Refined(r) => r.amplitude_m,
-            Outcome::Held(amplitude_m) => amplitude_m,
-            Outcome::Kept => f64::NAN,
+            RefinementOutcome::Refined(r) => r.amplitude_m,
+            RefinementOutcome::FixedFrequency(amplitude_m) => amplitude_m,
+            RefinementOutcome::Unchanged => f64::NAN,
         };
         assert!(left < 1e-6, "{found:?}");
     }
 
     #[test]
     fn few_gaps_or_few_frames_refine_nothing() {
-        let start = [Start { cycles: 11.5, free: true }];
+        let start = [RefinementStart { cycles: 11.5, moves: true }];
         let few_gaps: Vec<_> =
             (0..300).map(|i| (i % 10 != 3).then(|| (TAU * 11.3 * i as f64 / 300.0).cos())).collect();
         assert_eq!(
-            refined(&few_gaps, Trend::Polynomial(4), &start),
-            [Outcome::Kept],
+            refine_components(&few_gaps, Trend::Polynomial(4), &start),
+            [RefinementOutcome::Unchanged],
             "a tenth missing is not more than a tenth"
         );
         let few_frames: Vec<_> = (0..54).map(|i| (i % 2 == 0).then_some(f64::from(i))).collect();
         assert_eq!(few_frames.iter().flatten().count(), 27, "one short of four for each of 4 + 3 unknowns");
-        assert_eq!(refined(&few_frames, Trend::Polynomial(4), &start), [Outcome::Kept]);
+        assert_eq!(
+            refine_components(&few_frames, Trend::Polynomial(4), &start),
+            [RefinementOutcome::Unchanged]
+        );
     }
 
     #[test]
     fn a_frequency_that_wants_to_leave_its_peak_is_kept() {
         let samples = gappy(300, |s| (TAU * 11.3 * s).cos());
-        let found = refined(&samples, Trend::Polynomial(4), &[Start { cycles: 12.9, free: true }]);
-        assert!(!matches!(found[0], Outcome::Refined(r) if (r.cycles - 12.9).abs() > 1.0), "{found:?}");
+        let found = refine_components(
+            &samples,
+            Trend::Polynomial(4),
+            &[RefinementStart { cycles: 12.9, moves: true }],
+        );
+        assert!(
+            !matches!(found[0], RefinementOutcome::Refined(r) if (r.cycles - 12.9).abs() > 1.0),
+            "{found:?}"
+        );
     }
 
     #[test]

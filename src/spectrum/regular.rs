@@ -3,7 +3,7 @@
 
 /// First frame with a value, and the distance of which all later ones are multiples, where that is two
 /// frames or more.
-pub(super) fn stride(samples: &[Option<f64>]) -> Option<(usize, usize)> {
+pub(super) fn find_stride(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     let mut present = samples.iter().enumerate().filter(|(_, x)| x.is_some()).map(|(i, _)| i);
     let first = present.next()?;
     let divisor = |mut a: usize, mut b: usize| {
@@ -18,7 +18,7 @@ pub(super) fn stride(samples: &[Option<f64>]) -> Option<(usize, usize)> {
 }
 
 /// The frames of such a record alone, at their own rate.
-pub(super) fn kept(samples: &[Option<f64>], (first, stride): (usize, usize)) -> Vec<Option<f64>> {
+pub(super) fn decimate(samples: &[Option<f64>], (first, stride): (usize, usize)) -> Vec<Option<f64>> {
     samples.iter().skip(first).step_by(stride).copied().collect()
 }
 
@@ -32,12 +32,12 @@ mod tests {
 
     #[test]
     fn the_distance_of_kept_frames_is_their_greatest_common_divisor() {
-        assert_eq!(stride(&record(|_| true)), None);
-        assert_eq!(stride(&record(|i| i % 2 == 1)), Some((1, 2)));
-        assert_eq!(stride(&record(|i| i % 3 == 2 && i % 5 != 0)), Some((2, 3)));
-        assert_eq!(stride(&record(|i| i % 3 != 1)), None, "two of three");
-        assert_eq!(stride(&record(|i| i == 7)), None);
-        assert_eq!(stride(&record(|_| false)), None);
-        assert_eq!(kept(&record(|i| i % 40 == 5), (5, 40)), [Some(5.0), Some(45.0), Some(85.0)]);
+        assert_eq!(find_stride(&record(|_| true)), None);
+        assert_eq!(find_stride(&record(|i| i % 2 == 1)), Some((1, 2)));
+        assert_eq!(find_stride(&record(|i| i % 3 == 2 && i % 5 != 0)), Some((2, 3)));
+        assert_eq!(find_stride(&record(|i| i % 3 != 1)), None, "two of three");
+        assert_eq!(find_stride(&record(|i| i == 7)), None);
+        assert_eq!(find_stride(&record(|_| false)), None);
+        assert_eq!(decimate(&record(|i| i % 40 == 5), (5, 40)), [Some(5.0), Some(45.0), Some(85.0)]);
     }
 }

@@ -5,9 +5,9 @@
 //! twenty.
 
 use super::component::Component;
-use super::judge::Circumstances;
+use super::judge::RecordContext;
 use super::limits::MIN_CYCLES;
-use super::verdict::{Harmonic, Mains, Sideband, Subharmonic, Verdict};
+use super::verdict::{ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic};
 use crate::camera::alias_hz;
 use crate::math;
 
@@ -16,23 +16,23 @@ const MOST_MULTIPLE: usize = 20;
 /// Highest multiple tried that folds: the exposure passes little of what lies higher.
 const MOST_FOLDED: usize = 8;
 /// Multiples that are tried whatever the deviations are.
-const MULTIPLES: usize = 5;
+const ALWAYS_TRIED_MULTIPLES: usize = 5;
 /// Beats after which one is like the first: more have never been seen.
-const BEATS: [usize; 2] = [2, 3];
+const SUBHARMONIC_DENOMINATORS: [usize; 2] = [2, 3];
 /// Highest fraction tried.
 const MOST_FRACTION: usize = 5;
 /// Sidebands on each side of a component.
 const SIDEBANDS: usize = 2;
 /// Deviations within which a relation is met: of three in a record, one record in five thousand misses one.
-const MEETS: f64 = 4.0;
+const MATCH_DEVIATIONS: f64 = 4.0;
 /// Most that it may be off, resolutions: a wider net would catch what is there by chance.
-const MEETS_WITHIN: f64 = 0.5;
+const MATCH_RESOLUTIONS: f64 = 0.5;
 /// Chance of meeting a frequency up to which more multiples are tried.
-const CHANCE: f64 = 0.05;
+const CHANCE_MATCHES: f64 = 0.05;
 /// Least ratio of the amplitudes of two sidebands without a component at their distance.
-const ALIKE: f64 = 0.5;
+const SIDEBAND_RATIO: f64 = 0.5;
 /// Deviations within which a frequency is that of the mains.
-const DEVIATIONS: f64 = 3.0;
+const MAINS_DEVIATIONS: f64 = 3.0;
 /// Mains frequencies, Hz.
 const MAINS_HZ: [usize; 2] = [50, 60];
 /// Highest multiple of the mains that a lamp shows: it flickers at the second.
@@ -41,7 +41,7 @@ const MOST_MAINS: usize = 12;
 const MAINS_WITHIN_HZ: f64 = 0.5;
 
 /// Finds the relations of components, largest first.
-pub(super) fn relate(components: &mut [Component], at: &Circumstances) {
+pub(super) fn find_relations(components: &mut [Component], at: &RecordContext) {
     for k in 0..components.len() {
         let (larger, rest) = components.split_at_mut(k);
         let Some(c) = rest.first_mut() else { continue };
@@ -51,22 +51,22 @@ pub(super) fn relate(components: &mut [Component], at: &Circumstances) {
         };
         let bases =
             || larger.iter().filter(own).filter(|base| base.frequency_hz >= MIN_CYCLES * at.resolution_hz);
-        c.harmonic_of = bases().find_map(|base| multiple(base, c, at));
+        c.harmonic_of = bases().find_map(|base| find_harmonic(base, c, at));
         if c.harmonic_of.is_none() {
-            c.subharmonic_of = bases().find_map(|base| fraction(base, c, at));
+            c.subharmonic_of = bases().find_map(|base| find_subharmonic(base, c, at));
         }
     }
     for k in 0..components.len() {
         let c = &components[k];
         if c.harmonic_of.is_none() && c.subharmonic_of.is_none() {
-            components[k].sideband_of = sideband(components, k, at);
+            components[k].sideband_of = find_sideband(components, k, at);
         }
     }
-    components.iter_mut().for_each(|c| c.mains = mains(c));
+    components.iter_mut().for_each(|c| c.mains = find_mains_multiple(c));
 }
 
 /// The relations of a component, in words.
-pub(super) fn relations(c: &Component) -> [(Verdict, Option<String>); 4] {
+pub(super) fn describe_relations(c: &Component) -> [(ComponentVerdict, Option<String>); 4] {
     let multiple = |h: &Harmonic| format!("{} times {:.3} Hz", h.multiple, h.frequency_hz);
     let fraction = |s: &Subharmonic| {
         let beats = if s.denominator == 2 { "second" } else { "third" };
@@ -78,32 +78,33 @@ pub(super) fn relations(c: &Component) -> [(Verdict, Option<String>); 4] {
     let sideband = |s: &Sideband| {
         format!("a sideband: {:.3} Hz modulated with {:.3} Hz", s.frequency_hz, s.modulation_hz)
     };
-    let mains =
-        |m: &Mains| format!("{} times {} Hz: a lamp on the mains flickers so", m.multiple, m.frequency_hz);
+    let mains = |m: &MainsMultiple| {
+        format!("{} times {} Hz: a lamp on the mains flickers so", m.multiple, m.frequency_hz)
+    };
     [
-        (Verdict::Harmonic, c.harmonic_of.as_ref().map(multiple)),
-        (Verdict::Subharmonic, c.subharmonic_of.as_ref().map(fraction)),
-        (Verdict::Sideband, c.sideband_of.as_ref().map(sideband)),
-        (Verdict::Mains, c.mains.as_ref().map(mains)),
+        (ComponentVerdict::Harmonic, c.harmonic_of.as_ref().map(multiple)),
+        (ComponentVerdict::Subharmonic, c.subharmonic_of.as_ref().map(fraction)),
+        (ComponentVerdict::Sideband, c.sideband_of.as_ref().map(sideband)),
+        (ComponentVerdict::Mains, c.mains.as_ref().map(mains)),
     ]
 }
 
 /// Distance within which a relation is met, Hz, from the deviations of its sides.
-fn within_hz(sd_hz: f64, at: &Circumstances) -> f64 {
-    (MEETS * sd_hz).min(MEETS_WITHIN * at.resolution_hz)
+fn tolerance_hz(sd_hz: f64, at: &RecordContext) -> f64 {
+    (MATCH_DEVIATIONS * sd_hz).min(MATCH_RESOLUTIONS * at.resolution_hz)
 }
 
 /// `other` as a multiple of `base`, also a folded one.
-fn multiple(base: &Component, other: &Component, at: &Circumstances) -> Option<Harmonic> {
+fn find_harmonic(base: &Component, other: &Component, at: &RecordContext) -> Option<Harmonic> {
     if base.amplitude_m <= other.amplitude_m {
         return None;
     }
     let mut chance = 0.0;
     for multiple in 2..=MOST_MULTIPLE {
         let times = multiple as f64;
-        let within_hz = within_hz(math::hypot(other.frequency_sd_hz, times * base.frequency_sd_hz), at);
+        let within_hz = tolerance_hz(math::hypot(other.frequency_sd_hz, times * base.frequency_sd_hz), at);
         chance += 2.0 * within_hz / base.frequency_hz;
-        if multiple > MULTIPLES && chance > CHANCE {
+        if multiple > ALWAYS_TRIED_MULTIPLES && chance > CHANCE_MATCHES {
             return None;
         }
         let folds = times * base.frequency_hz > at.frame_rate_hz / 2.0;
@@ -119,17 +120,18 @@ fn multiple(base: &Component, other: &Component, at: &Circumstances) -> Option<H
 }
 
 /// `other` as a fraction of `base`.
-fn fraction(base: &Component, other: &Component, at: &Circumstances) -> Option<Subharmonic> {
+fn find_subharmonic(base: &Component, other: &Component, at: &RecordContext) -> Option<Subharmonic> {
     if base.amplitude_m <= other.amplitude_m {
         return None;
     }
     let mut chance = 0.0;
-    for denominator in BEATS {
+    for denominator in SUBHARMONIC_DENOMINATORS {
         for numerator in (1..=MOST_FRACTION * denominator).filter(|n| n % denominator != 0) {
             let times = numerator as f64 / denominator as f64;
-            let within_hz = within_hz(math::hypot(other.frequency_sd_hz, times * base.frequency_sd_hz), at);
+            let within_hz =
+                tolerance_hz(math::hypot(other.frequency_sd_hz, times * base.frequency_sd_hz), at);
             chance += 2.0 * within_hz / base.frequency_hz;
-            if chance > CHANCE {
+            if chance > CHANCE_MATCHES {
                 return None;
             }
             let seen_hz = alias_hz(times * base.frequency_hz, at.frame_rate_hz);
@@ -143,7 +145,7 @@ fn fraction(base: &Component, other: &Component, at: &Circumstances) -> Option<S
 
 /// Component `k` as a sideband of a larger one: at the distance of another component, or with a like one on
 /// the other side.
-fn sideband(components: &[Component], k: usize, at: &Circumstances) -> Option<Sideband> {
+fn find_sideband(components: &[Component], k: usize, at: &RecordContext) -> Option<Sideband> {
     let c = &components[k];
     let carriers = components.iter().filter(|carrier| carrier.amplitude_m > c.amplitude_m);
     carriers.into_iter().find_map(|carrier| {
@@ -156,7 +158,7 @@ fn sideband(components: &[Component], k: usize, at: &Circumstances) -> Option<Si
                 && (1..=SIDEBANDS).any(|order| {
                     let sd_hz = math::hypot(sd_hz, order as f64 * other.frequency_sd_hz);
                     let off_hz = (order as f64 * other.frequency_hz - apart_hz).abs();
-                    off_hz <= within_hz(sd_hz, at) && sd_hz < CHANCE * other.frequency_hz
+                    off_hz <= tolerance_hz(sd_hz, at) && sd_hz < CHANCE_MATCHES * other.frequency_hz
                 })
         };
         let mirrors = |other: &&Component| {
@@ -165,9 +167,10 @@ fn sideband(components: &[Component], k: usize, at: &Circumstances) -> Option<Si
                 2.0 * carrier.frequency_sd_hz,
             );
             let (less, more) = (c.amplitude_m.min(other.amplitude_m), c.amplitude_m.max(other.amplitude_m));
-            (c.frequency_hz + other.frequency_hz - 2.0 * carrier.frequency_hz).abs() <= within_hz(sd_hz, at)
+            (c.frequency_hz + other.frequency_hz - 2.0 * carrier.frequency_hz).abs()
+                <= tolerance_hz(sd_hz, at)
                 && more < carrier.amplitude_m
-                && less > ALIKE * more
+                && less > SIDEBAND_RATIO * more
                 && apart_hz < carrier.frequency_hz / 2.0
         };
         let by = |modulation_hz: f64| Sideband { frequency_hz: carrier.frequency_hz, modulation_hz };
@@ -179,18 +182,20 @@ fn sideband(components: &[Component], k: usize, at: &Circumstances) -> Option<Si
 }
 
 /// The multiple of the mains that a steady component cannot be told from.
-fn mains(c: &Component) -> Option<Mains> {
-    let within_hz = DEVIATIONS * c.frequency_sd_hz;
+fn find_mains_multiple(c: &Component) -> Option<MainsMultiple> {
+    let within_hz = MAINS_DEVIATIONS * c.frequency_sd_hz;
     if within_hz > MAINS_WITHIN_HZ || c.range_hz.is_some() {
         return None;
     }
-    let decays =
-        c.damping_ratio.zip(c.damping_ratio_sd).is_some_and(|(ratio, sd)| ratio.abs() > DEVIATIONS * sd);
+    let decays = c
+        .damping_ratio
+        .zip(c.damping_ratio_sd)
+        .is_some_and(|(ratio, sd)| ratio.abs() > MAINS_DEVIATIONS * sd);
     let meets = |frequency_hz: usize| {
         let multiple = (c.frequency_hz / frequency_hz as f64).round() as usize;
         let off_hz = (c.frequency_hz - (multiple * frequency_hz) as f64).abs();
         ((1..=MOST_MAINS).contains(&multiple) && off_hz <= within_hz)
-            .then_some(Mains { frequency_hz, multiple })
+            .then_some(MainsMultiple { frequency_hz, multiple })
     };
     if decays { None } else { MAINS_HZ.into_iter().find_map(meets) }
 }

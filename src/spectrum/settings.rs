@@ -5,7 +5,7 @@ use super::trend::Detrend;
 
 /// How a record is analysed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Settings {
+pub struct SpectrumSettings {
     /// What is removed; `None` to let the record choose ([`super::Analysis::of`]), which is a cubic to begin
     /// with ([`super::analyse`]).
     pub detrend: Option<Detrend>,
@@ -22,7 +22,7 @@ pub struct Settings {
     pub fastest_hz: f64,
 }
 
-impl Default for Settings {
+impl Default for SpectrumSettings {
     fn default() -> Self {
         Self {
             detrend: None,

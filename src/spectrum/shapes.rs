@@ -2,112 +2,124 @@
 //! line. Neither is a term of the fit; but where one explains as much as a second oscillation does, there is
 //! no second.
 
-use super::closely::Doubtful;
-use super::least_squares::Term;
-use super::oscillations::{Explained, Search};
+use super::closely::DoubtfulTerm;
+use super::least_squares::SinusoidTerm;
+use super::oscillations::{Decomposition, ModelSelector};
 use crate::math;
 use std::f64::consts::{PI, TAU};
 
 /// Steps of a search for the best shape; each halving is one.
 const MOST_STEPS: usize = 40;
 /// First steps of frequency and of its change over the record, cycles, and of nepers.
-const FIRST: [f64; 3] = [0.3, 1.0, 1.0];
+const FIRST_STEPS: [f64; 3] = [0.3, 1.0, 1.0];
 /// Numbers of a term, and of a shape more than those.
-const OF_A_TERM: f64 = 4.0;
-const MORE: f64 = 1.0;
+const TERM_PARAMETERS: f64 = 4.0;
+const EXTRA_PARAMETERS: f64 = 1.0;
 /// Distance of terms that may be pieces of one, resolutions.
-const NEAR: f64 = 5.0;
+const NEARBY_RESOLUTIONS: f64 = 5.0;
 /// Blocks that stand for the record: a few cycles more or less turn by little within one.
 const BLOCKS: usize = 128;
 /// Shares of the record in which an amplitude may fall to nothing.
-const ENDS: (f64, f64) = (0.1, 4.0);
+const LINEAR_DECAY_ENDS: (f64, f64) = (0.1, 4.0);
 
 /// An oscillation whose frequency or amplitude changes evenly.
 #[derive(Clone, Copy)]
-struct Shape {
+struct UnsteadyOscillation {
     /// Frequency in the middle, cycles in the record.
     cycles: f64,
     /// Its change over the record, cycles.
     change: f64,
     /// Nepers over the record, or the share of it in which the amplitude falls to zero.
-    fall: Fall,
+    decay: EnvelopeDecay,
 }
 
 #[derive(Clone, Copy)]
-enum Fall {
-    Decay(f64),
-    Line(f64),
+enum EnvelopeDecay {
+    Exponential(f64),
+    Linear(f64),
 }
 
-impl Shape {
-    fn of(start: &Term, [cycles, change, fall]: [f64; 3], line: bool) -> Self {
-        let fall = if line {
-            Fall::Line(math::exp(fall).clamp(ENDS.0, ENDS.1))
+impl UnsteadyOscillation {
+    fn from_term(start: &SinusoidTerm, [cycles, change, fall]: [f64; 3], line: bool) -> Self {
+        let decay = if line {
+            EnvelopeDecay::Linear(math::exp(fall).clamp(LINEAR_DECAY_ENDS.0, LINEAR_DECAY_ENDS.1))
         } else {
-            Fall::Decay(start.nepers + fall)
+            EnvelopeDecay::Exponential(start.nepers + fall)
         };
-        Self { cycles: start.cycles + cycles, change, fall }
+        Self { cycles: start.cycles + cycles, change, decay }
     }
 
     /// Envelope and phase at a share of the record, rad.
-    fn at(&self, s: f64) -> (f64, f64) {
-        let envelope = match self.fall {
-            Fall::Decay(nepers) => math::exp(-nepers * s),
-            Fall::Line(end) => (1.0 - s / end).max(0.0),
+    fn envelope_and_phase(&self, s: f64) -> (f64, f64) {
+        let envelope = match self.decay {
+            EnvelopeDecay::Exponential(nepers) => math::exp(-nepers * s),
+            EnvelopeDecay::Linear(end) => (1.0 - s / end).max(0.0),
         };
         (envelope, TAU * self.cycles * s + PI * self.change * s * (s - 1.0))
     }
 }
 
-impl Search<'_> {
+impl ModelSelector<'_> {
     /// Terms that leave more than noise around them.
-    pub(super) fn leaving(&self, explained: &Explained) -> Vec<usize> {
-        let terms = &explained.parts.solved.terms;
+    pub(super) fn terms_with_residual(&self, explained: &Decomposition) -> Vec<usize> {
+        let terms = &explained.model.solution.terms;
         let leaves = |k: &usize| terms[*k].cycles > 0.0 && self.leaves_peak(explained, &terms[*k]);
         (0..terms.len()).filter(leaves).collect()
     }
 
     /// These, with the criterion that what takes their place must fall below.
-    pub(super) fn doubtful(&self, explained: &Explained) -> Vec<Doubtful> {
-        let least = self.criterion(&explained.parts);
-        let criterion = |k: usize| self.criterion_of_shapes(explained, k).min(least);
-        self.leaving(explained).into_iter().map(|k| Doubtful { k, criterion: criterion(k) }).collect()
+    pub(super) fn doubtful_terms(&self, explained: &Decomposition) -> Vec<DoubtfulTerm> {
+        let least = self.information_criterion(&explained.model);
+        let criterion = |k: usize| self.alternatives_criterion(explained, k).min(least);
+        self.terms_with_residual(explained)
+            .into_iter()
+            .map(|k| DoubtfulTerm { index: k, criterion: criterion(k) })
+            .collect()
     }
 
     /// Terms that may be the pieces of one: an even drift or fall in their place explains more.
-    pub(super) fn unsteady(&self, explained: &Explained) -> Vec<usize> {
-        let parts = &explained.parts;
-        let terms = &parts.solved.terms;
-        let steady = self.criterion(parts);
+    pub(super) fn unsteady_terms(&self, explained: &Decomposition) -> Vec<usize> {
+        let parts = &explained.model;
+        let terms = &parts.solution.terms;
+        let steady = self.information_criterion(parts);
         // alone, it is one line whatever it does; with others it may be in pieces
-        let in_pieces =
-            |k: &usize| near(terms, *k).len() > 1 && self.criterion_of_shapes(explained, *k) < steady;
-        let whole: Vec<usize> = self.leaving(explained).into_iter().filter(in_pieces).collect();
-        let piece = |k: &usize| whole.iter().any(|one| (terms[*one].cycles - terms[*k].cycles).abs() < NEAR);
+        let in_pieces = |k: &usize| {
+            nearby_terms(terms, *k).len() > 1 && self.alternatives_criterion(explained, *k) < steady
+        };
+        let whole: Vec<usize> = self.terms_with_residual(explained).into_iter().filter(in_pieces).collect();
+        let piece = |k: &usize| {
+            whole.iter().any(|one| (terms[*one].cycles - terms[*k].cycles).abs() < NEARBY_RESOLUTIONS)
+        };
         (0..terms.len()).filter(|k| terms[*k].cycles > 0.0).filter(piece).collect()
     }
 
     /// The criterion that an oscillation which drifts or fades evenly reaches in the place of term `k`, or of
     /// that and what lies in its lobe.
-    pub(super) fn criterion_of_shapes(&self, explained: &Explained, k: usize) -> f64 {
-        let terms = &explained.parts.solved.terms;
-        let group = near(terms, k);
-        let alone = self.criterion_in_place(explained, k, &[k]);
-        if group.len() > 1 { alone.min(self.criterion_in_place(explained, k, &group)) } else { alone }
+    pub(super) fn alternatives_criterion(&self, explained: &Decomposition, k: usize) -> f64 {
+        let terms = &explained.model.solution.terms;
+        let group = nearby_terms(terms, k);
+        let alone = self.replacement_criterion(explained, k, &[k]);
+        if group.len() > 1 { alone.min(self.replacement_criterion(explained, k, &group)) } else { alone }
     }
 
-    fn criterion_in_place(&self, explained: &Explained, k: usize, of: &[usize]) -> f64 {
-        let parts = &explained.parts;
-        let start = parts.solved.terms[k];
-        let left: Vec<f64> = explained.left.iter().map(|x| x.unwrap_or(0.0)).collect();
-        let with = self.with_terms(parts, &left, of);
-        let blocks = self.blocks(&with, start.cycles);
+    fn replacement_criterion(&self, explained: &Decomposition, k: usize, of: &[usize]) -> f64 {
+        let parts = &explained.model;
+        let start = parts.solution.terms[k];
+        let left: Vec<f64> = explained.residual_m.iter().map(|x| x.unwrap_or(0.0)).collect();
+        let with = self.add_terms_back(parts, &left, of);
+        let blocks = self.demodulate_blocks(&with, start.cycles);
         let square: f64 = with.iter().map(|x| x * x).sum();
         let alone = |line: bool| {
-            let left =
-                |values: [f64; 3]| square - explained_by(&blocks, &start, &Shape::of(&start, values, line));
+            let left = |values: [f64; 3]| {
+                square
+                    - power_from_blocks(
+                        &blocks,
+                        &start,
+                        &UnsteadyOscillation::from_term(&start, values, line),
+                    )
+            };
             let mut best = ([0.0; 3], left([0.0; 3]));
-            let mut steps = FIRST;
+            let mut steps = FIRST_STEPS;
             for _ in 0..MOST_STEPS {
                 let moves = (0..3).filter(|j| !(line && *j == 1)).flat_map(|j| {
                     [steps[j], -steps[j]].map(|by| {
@@ -121,16 +133,16 @@ impl Search<'_> {
                     None => steps = steps.map(|step| step / 2.0),
                 }
             }
-            square - self.explained_exactly(&with, &Shape::of(&start, best.0, line))
+            square - self.power_of_alternative(&with, &UnsteadyOscillation::from_term(&start, best.0, line))
         };
-        let less = (of.len() - 1) as f64 * OF_A_TERM;
-        self.criterion_at(parts, alone(false).min(alone(true)), MORE - less)
+        let less = (of.len() - 1) as f64 * TERM_PARAMETERS;
+        self.information_criterion_of(parts, alone(false).min(alone(true)), EXTRA_PARAMETERS - less)
     }
 
     /// What a shape with the best amplitude and phase lowers the sum of squares by, m^2.
-    fn explained_exactly(&self, values: &[f64], shape: &Shape) -> f64 {
+    fn power_of_alternative(&self, values: &[f64], shape: &UnsteadyOscillation) -> f64 {
         let add = |[cc, cs, ss, xc, xs]: [f64; 5], (i, x): (usize, &f64)| {
-            let (envelope, phase) = shape.at((i as f64 + 0.5) / values.len() as f64);
+            let (envelope, phase) = shape.envelope_and_phase((i as f64 + 0.5) / values.len() as f64);
             let (sine, cosine) = math::sin_cos(phase);
             let (c, s, w) = (envelope * cosine, envelope * sine, self.weights[i]);
             [cc + w * c * c, cs + w * c * s, ss + w * s * s, xc + c * x, xs + s * x]
@@ -141,7 +153,7 @@ impl Search<'_> {
     }
 
     /// The record turned back by a frequency and summed over blocks.
-    fn blocks(&self, values: &[f64], cycles: f64) -> Vec<Block> {
+    fn demodulate_blocks(&self, values: &[f64], cycles: f64) -> Vec<DemodulatedBlock> {
         let frames = values.len();
         let size = frames.div_ceil(BLOCKS);
         let turn = -TAU * cycles / frames as f64;
@@ -153,34 +165,35 @@ impl Search<'_> {
             let inside = first..frames.min(first + size);
             let middle = (inside.start + inside.end) as f64 / 2.0 / frames as f64;
             let (re, im, weight) = inside.fold((0.0, 0.0, 0.0), add);
-            Block { middle, sum: [re, im], weight }
+            DemodulatedBlock { middle, phasor: [re, im], weight }
         };
         (0..frames).step_by(size).map(block).collect()
     }
 }
 
 /// The oscillations that may be pieces of one with term `k`.
-pub(super) fn near(terms: &[Term], k: usize) -> Vec<usize> {
-    let near = |j: &usize| terms[*j].cycles > 0.0 && (terms[*j].cycles - terms[k].cycles).abs() < NEAR;
+pub(super) fn nearby_terms(terms: &[SinusoidTerm], k: usize) -> Vec<usize> {
+    let near =
+        |j: &usize| terms[*j].cycles > 0.0 && (terms[*j].cycles - terms[k].cycles).abs() < NEARBY_RESOLUTIONS;
     (0..terms.len()).filter(near).collect()
 }
 
 /// A block of frames.
-struct Block {
+struct DemodulatedBlock {
     /// The share of the record in its middle.
     middle: f64,
     /// The sum of its frames, turned back, m.
-    sum: [f64; 2],
+    phasor: [f64; 2],
     /// The sum of their weights.
     weight: f64,
 }
 
 /// The same from blocks, but for a share of it that is about one over the cycles in the record.
-fn explained_by(blocks: &[Block], start: &Term, shape: &Shape) -> f64 {
-    let add = |[re, im, power]: [f64; 3], block: &Block| {
-        let (envelope, phase) = shape.at(block.middle);
+fn power_from_blocks(blocks: &[DemodulatedBlock], start: &SinusoidTerm, shape: &UnsteadyOscillation) -> f64 {
+    let add = |[re, im, power]: [f64; 3], block: &DemodulatedBlock| {
+        let (envelope, phase) = shape.envelope_and_phase(block.middle);
         let (sine, cosine) = math::sin_cos(phase - TAU * start.cycles * block.middle);
-        let [x, y] = block.sum;
+        let [x, y] = block.phasor;
         [
             re + envelope * (x * cosine + y * sine),
             im + envelope * (y * cosine - x * sine),

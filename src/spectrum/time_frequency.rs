@@ -29,7 +29,7 @@ mod spectrogram;
 mod tracker;
 
 pub use course::SpeedPoint;
-pub use range::Range;
+pub use range::FrequencyRange;
 pub use ridge::{Ridge, RidgeEnd, RidgePoint};
 pub use segment::MOST_COLUMNS;
 

@@ -1,18 +1,18 @@
 //! A record after its transform, from which many bands are read.
 
 use super::amplitudes::{Spectrum, rms_in_band_m};
-use super::check::{check, check_band};
+use super::check::{check_band, check_record};
 use super::component::Component;
 use super::error::SpectrumError;
 use super::limits::{MAX_COMPONENTS, PADDED_AT_ONCE, ROUNDING};
 use super::periodogram::Periodogram;
-use super::settings::Settings;
+use super::settings::SpectrumSettings;
 use super::trend::Trend;
 use super::windowed::WindowedSpectrum;
 use super::{gaps, peaks, refine, sharp, window};
 
 /// The windowed transform of a record of displacement.
-pub struct Transformed {
+pub struct WindowedTransform {
     samples: Vec<Option<f64>>,
     residual: Vec<f64>,
     periodogram: Periodogram,
@@ -20,31 +20,31 @@ pub struct Transformed {
     frame_rate_hz: f64,
     trend: Trend,
     /// Amplitude of rounding, m.
-    least_m: f64,
+    rounding_m: f64,
     /// Whether the bins are too far apart for a parabola.
-    coarse: bool,
+    has_coarse_bins: bool,
 }
 
-impl Transformed {
+impl WindowedTransform {
     /// Of samples, m, one a frame (`None` where there is none); the number of components in the settings does
     /// not count.
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate or the settings' band cannot give one.
-    pub fn of(
+    pub fn new(
         samples: &[Option<f64>],
         frame_rate_hz: f64,
-        settings: &Settings,
+        settings: &SpectrumSettings,
     ) -> Result<Self, SpectrumError> {
-        let (padded, trend) = check(samples, frame_rate_hz, settings)?;
-        let bridged = gaps::bridged(samples);
+        let (padded, trend) = check_record(samples, frame_rate_hz, settings)?;
+        let bridged = gaps::fill_short_gaps(samples);
         let residual = trend.residual(&bridged);
-        let periodogram = Periodogram::of(&bridged, padded);
+        let periodogram = Periodogram::new(&bridged, padded);
         let of_record = || periodogram.amplitudes(&residual);
         let amplitude_m = if padded < PADDED_AT_ONCE {
             of_record()
         } else {
-            rayon::join(of_record, || periodogram.envelope()).0
+            rayon::join(of_record, || periodogram.sidelobe_envelope()).0
         };
         let largest = bridged.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let least_m = (ROUNDING * largest).max(f64::MIN_POSITIVE);
@@ -56,8 +56,8 @@ impl Transformed {
             amplitude_m,
             frame_rate_hz,
             trend,
-            least_m,
-            coarse,
+            rounding_m: least_m,
+            has_coarse_bins: coarse,
         })
     }
 
@@ -73,7 +73,7 @@ impl Transformed {
     /// [`SpectrumError::Band`] where the band holds no frequency of the spectrum.
     pub fn components(&self, band_hz: (f64, f64)) -> Result<Vec<Component>, SpectrumError> {
         self.check_band(band_hz)?;
-        Ok(self.found(band_hz, MAX_COMPONENTS).1)
+        Ok(self.find_components(band_hz, MAX_COMPONENTS).1)
     }
 
     /// Whether a band, Hz, holds a frequency of the spectrum.
@@ -99,13 +99,13 @@ impl Transformed {
     /// Amplitude at a frequency in the first and the second half of the record, m, each by a Hann window of
     /// its own over the frames present.
     #[must_use]
-    pub fn halves_m(&self, frequency_hz: f64) -> [f64; 2] {
+    pub fn half_amplitudes_m(&self, frequency_hz: f64) -> [f64; 2] {
         let half = self.samples.len() / 2;
         let of = |from: usize| {
             let pattern = &self.samples[from..from + half];
             let values = &self.residual[from..from + half];
-            Periodogram::shown_by(
-                &window::hann(pattern),
+            Periodogram::amplitude_with_weights(
+                &window::hann_weights(pattern),
                 values,
                 frequency_hz * half as f64 / self.frame_rate_hz,
             )
@@ -114,44 +114,46 @@ impl Transformed {
     }
 
     /// The whole spectrum, with the components that the settings ask for.
-    pub(super) fn spectrum(self, settings: &Settings) -> Spectrum {
+    pub(super) fn into_spectrum(self, settings: &SpectrumSettings) -> Spectrum {
         let band_hz = settings.band_hz.unwrap_or((0.0, self.frame_rate_hz / 2.0));
-        let (noise_floor_m, components) = self.found(band_hz, settings.max_components);
+        let (noise_floor_m, components) = self.find_components(band_hz, settings.max_components);
         let bin_hz = self.periodogram.bin_hz(self.frame_rate_hz);
         Spectrum {
             frequency_hz: (0..self.amplitude_m.len()).map(|k| k as f64 * bin_hz).collect(),
             noise_floor_m,
             resolution_hz: self.frame_rate_hz / self.samples.len() as f64,
             noise_bandwidth_hz: self.periodogram.noise_bandwidth_hz(self.frame_rate_hz),
-            present: self.present() as f64 / self.samples.len() as f64,
+            present: self.count_present() as f64 / self.samples.len() as f64,
             components,
             amplitude_m: self.amplitude_m,
         }
     }
 
-    fn present(&self) -> usize {
+    fn count_present(&self) -> usize {
         self.samples.iter().flatten().count()
     }
 
     /// Noise floor, m, and components of a band.
-    fn found(&self, band_hz: (f64, f64), most: usize) -> (f64, Vec<Component>) {
+    fn find_components(&self, band_hz: (f64, f64), most: usize) -> (f64, Vec<Component>) {
         let spectrum = WindowedSpectrum {
-            present: self.present(),
-            ..self.periodogram.windowed(&self.amplitude_m, self.frame_rate_hz, self.least_m)
+            present: self.count_present(),
+            ..self.periodogram.windowed_spectrum(&self.amplitude_m, self.frame_rate_hz, self.rounding_m)
         };
-        let mut found = peaks::find(&spectrum, band_hz, most);
-        if self.coarse {
-            let record = sharp::Weighted {
+        let mut found = peaks::find_peaks(&spectrum, band_hz, most);
+        if self.has_coarse_bins {
+            let record = sharp::WeightedRecord {
                 residual: &self.residual,
                 weights: &self.periodogram.weights,
-                scaled: self.periodogram.scaled(),
+                amplitude_scale: self.periodogram.amplitude_scale(),
             };
-            found.sharpen(&spectrum, &record);
+            found.zoom_peaks(&spectrum, &record);
         }
         (
             found.floor_m,
-            found
-                .components(&spectrum, &refine::refined(&self.samples, self.trend, &found.starts(&spectrum))),
+            found.list_components(
+                &spectrum,
+                &refine::refine_components(&self.samples, self.trend, &found.refinement_starts(&spectrum)),
+            ),
         )
     }
 }

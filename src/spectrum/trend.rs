@@ -74,7 +74,7 @@ impl Detrend {
     }
 
     /// The trend of a record of this length; `None` where it would take more columns than a fit can hold.
-    pub(super) fn trend(self, frames: usize, frame_rate_hz: f64) -> Option<Trend> {
+    pub(super) fn to_trend(self, frames: usize, frame_rate_hz: f64) -> Option<Trend> {
         Some(match self {
             Self::None => Trend::Polynomial(0),
             Self::Mean => Trend::Polynomial(1),
@@ -83,7 +83,7 @@ impl Detrend {
             Self::Polynomial(degree) => Trend::Polynomial(degree.min(HIGHEST_DEGREE) + 1),
             Self::HighPass(hz) => {
                 let half_waves = 2.0 * hz * frames as f64 / frame_rate_hz;
-                let most = (MOST_COLUMNS - LINE) as f64;
+                let most = (MOST_COLUMNS - LINE_COLUMNS) as f64;
                 return (half_waves < most + 1.0).then_some(Trend::Cosines(half_waves as usize));
             }
         })
@@ -111,7 +111,7 @@ impl std::str::FromStr for Detrend {
 }
 
 /// Columns of a line.
-const LINE: usize = 2;
+const LINE_COLUMNS: usize = 2;
 
 /// The columns that are removed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -135,19 +135,19 @@ const LEGENDRE: [[f64; 2]; HIGHEST_DEGREE + 1] = {
 };
 
 /// The values of a trend's columns in one frame.
-pub(super) type Basis = [f64; MOST_COLUMNS];
+pub(super) type TrendBasis = [f64; MOST_COLUMNS];
 
 impl Trend {
     /// Number of columns.
-    pub(super) fn columns(self) -> usize {
+    pub(super) fn column_count(self) -> usize {
         match self {
             Self::Polynomial(columns) => columns,
-            Self::Cosines(cosines) => LINE + cosines,
+            Self::Cosines(cosines) => LINE_COLUMNS + cosines,
         }
     }
 
     /// Waves over the record that the trend itself can show: below, nothing is left to be found.
-    pub(super) fn waves(self) -> f64 {
+    pub(super) fn fastest_waves(self) -> f64 {
         match self {
             Self::Polynomial(columns) => columns as f64 / 2.0,
             Self::Cosines(cosines) => cosines as f64 / 2.0,
@@ -155,7 +155,7 @@ impl Trend {
     }
 
     /// The columns at `s`, which runs over the record from -1 to 1; the rest stays as it is.
-    pub(super) fn fill(self, s: f64, row: &mut Basis) {
+    pub(super) fn fill_row(self, s: f64, row: &mut TrendBasis) {
         match self {
             Self::Polynomial(columns) => {
                 row[..4].copy_from_slice(&[1.0, s, (3.0 * s * s - 1.0) / 2.0, (5.0 * s * s - 3.0) * s / 2.0]);
@@ -163,9 +163,9 @@ impl Trend {
                     .for_each(|k| row[k] = LEGENDRE[k][0] * s * row[k - 1] - LEGENDRE[k][1] * row[k - 2]);
             }
             Self::Cosines(cosines) => {
-                row[..LINE].copy_from_slice(&[1.0, s]);
+                row[..LINE_COLUMNS].copy_from_slice(&[1.0, s]);
                 let half_wave = std::f64::consts::FRAC_PI_2 * (s + 1.0);
-                (0..cosines).for_each(|j| row[LINE + j] = math::cos((j + 1) as f64 * half_wave));
+                (0..cosines).for_each(|j| row[LINE_COLUMNS + j] = math::cos((j + 1) as f64 * half_wave));
             }
         }
     }
@@ -174,26 +174,26 @@ impl Trend {
     pub(super) fn values(self, coefficients: &[f64], frames: usize) -> Vec<f64> {
         let mut row = [0.0; MOST_COLUMNS];
         let mut value = |i: usize| {
-            self.fill(abscissa(i, frames), &mut row);
+            self.fill_row(abscissa(i, frames), &mut row);
             row.iter().zip(coefficients).map(|(b, c)| b * c).sum()
         };
         (0..frames).map(&mut value).collect()
     }
 
     /// The trend of the samples in every frame.
-    pub(super) fn of(self, samples: &[Option<f64>]) -> Vec<f64> {
-        self.fit(samples)
+    pub(super) fn fit_values(self, samples: &[Option<f64>]) -> Vec<f64> {
+        self.fit_coefficients(samples)
             .map_or_else(|| vec![0.0; samples.len()], |c| self.values(c.as_slice(), samples.len()))
     }
 
     /// The samples less the trend; zero where there is none.
     pub(super) fn residual(self, samples: &[Option<f64>]) -> Vec<f64> {
-        samples.iter().zip(self.of(samples)).map(|(x, trend)| x.map_or(0.0, |x| x - trend)).collect()
+        samples.iter().zip(self.fit_values(samples)).map(|(x, trend)| x.map_or(0.0, |x| x - trend)).collect()
     }
 
     /// The next richer one of its kind; `None` where there is none.
-    pub(super) fn richer(self) -> Option<Self> {
-        let columns = self.columns() + 2;
+    pub(super) fn next_richer(self) -> Option<Self> {
+        let columns = self.column_count() + 2;
         match self {
             Self::Polynomial(_) => (columns <= HIGHEST_DEGREE + 1).then_some(Self::Polynomial(columns)),
             Self::Cosines(cosines) => (columns <= MOST_COLUMNS).then_some(Self::Cosines(cosines + 2)),
@@ -202,12 +202,12 @@ impl Trend {
 
     /// Coefficients by singular values of the normal equations, so that frames in one clump cannot make them
     /// singular.
-    fn fit(self, samples: &[Option<f64>]) -> Option<DVector<f64>> {
+    fn fit_coefficients(self, samples: &[Option<f64>]) -> Option<DVector<f64>> {
         /// Directions of the normal matrix below this share of the number of frames are not in the data.
         const SINGULAR: f64 = 1e-12;
         /// Iterations, of which each column takes a few.
         const MOST_ITERATIONS: usize = 10_000;
-        let columns = self.columns();
+        let columns = self.column_count();
         if columns == 0 {
             return None;
         }
@@ -217,7 +217,7 @@ impl Trend {
         for (s, x) in
             samples.iter().enumerate().filter_map(|(i, x)| x.map(|x| (abscissa(i, samples.len()), x)))
         {
-            self.fill(s, &mut row);
+            self.fill_row(s, &mut row);
             for i in 0..columns {
                 (i..columns).for_each(|j| normal[i][j] += row[i] * row[j]); // the lower half is the same
                 right[i] += row[i] * x;
@@ -246,7 +246,7 @@ mod tests {
     }
 
     fn residual(detrend: Detrend, samples: &[Option<f64>]) -> Vec<f64> {
-        detrend.trend(samples.len(), 1000.0).unwrap().residual(samples)
+        detrend.to_trend(samples.len(), 1000.0).unwrap().residual(samples)
     }
 
     #[test]
@@ -279,8 +279,11 @@ mod tests {
             "singular values are iterated to some 1e-9"
         );
         assert!((of_20_hz(&half_waves(40.0)) - 1.0).abs() < 0.02, "{}", of_20_hz(&half_waves(40.0)));
-        assert_eq!(Detrend::HighPass(47.0).trend(500, 1000.0), None, "one column too many");
-        assert_eq!(Detrend::HighPass(46.0).trend(500, 1000.0).map(Trend::columns), Some(MOST_COLUMNS));
+        assert_eq!(Detrend::HighPass(47.0).to_trend(500, 1000.0), None, "one column too many");
+        assert_eq!(
+            Detrend::HighPass(46.0).to_trend(500, 1000.0).map(Trend::column_count),
+            Some(MOST_COLUMNS)
+        );
     }
 
     #[test]

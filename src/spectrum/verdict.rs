@@ -5,7 +5,7 @@ use serde::Serialize;
 /// What a component's frequency is worth, gravest reason first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Verdict {
+pub enum ComponentVerdict {
     /// Fewer than `MIN_CYCLES` in the record: the frequency depends on the trend and the window.
     NotResolvable,
     /// A faster oscillation that the motion may hold would appear at the same frequency.
@@ -32,10 +32,10 @@ pub enum Verdict {
     Clear,
 }
 
-impl Verdict {
+impl ComponentVerdict {
     /// The word in files and tables.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::NotResolvable => "not-resolvable",
             Self::AliasSuspected => "alias-suspected",
@@ -53,16 +53,16 @@ impl Verdict {
 
 /// A verdict with what it rests on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Reason {
+pub struct ComponentReason {
     /// The verdict.
-    pub verdict: Verdict,
+    pub verdict: ComponentVerdict,
     /// The numbers behind it, in words.
     pub words: String,
 }
 
 /// A frequency that would appear at a component's.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Fold {
+pub struct AliasSource {
     /// The faster frequency, Hz.
     pub frequency_hz: f64,
     /// Part of its amplitude that the exposure would have passed, where that is known.
@@ -91,7 +91,7 @@ pub struct Sideband {
 
 /// A multiple of the mains frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub struct Mains {
+pub struct MainsMultiple {
     /// Frequency of the mains, Hz.
     pub frequency_hz: usize,
     /// The multiple.

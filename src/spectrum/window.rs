@@ -4,7 +4,7 @@ use crate::math;
 
 /// Sums over the weights of a record.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Sums {
+pub(super) struct WindowSums {
     /// Of the weights.
     pub first: f64,
     /// Of their squares.
@@ -13,8 +13,8 @@ pub(super) struct Sums {
     pub present: usize,
 }
 
-impl Sums {
-    pub(super) fn of(weights: &[f64]) -> Self {
+impl WindowSums {
+    pub(super) fn from_weights(weights: &[f64]) -> Self {
         let add = |s: Self, w: &f64| Self {
             first: s.first + w,
             second: s.second + w * w,
@@ -26,7 +26,7 @@ impl Sums {
 
 /// Weights `sin^2(pi (i + 1/2) / n)`: symmetric, nowhere zero on a frame that holds a value, zero on one that
 /// does not.
-pub(super) fn hann(samples: &[Option<f64>]) -> Vec<f64> {
+pub(super) fn hann_weights(samples: &[Option<f64>]) -> Vec<f64> {
     let n = samples.len() as f64;
     let weight = |i: usize| math::powi(math::sin(std::f64::consts::PI * (i as f64 + 0.5) / n), 2);
     samples.iter().enumerate().map(|(i, x)| if x.is_some() { weight(i) } else { 0.0 }).collect()
@@ -38,14 +38,14 @@ mod tests {
 
     #[test]
     fn the_sums_are_those_of_the_hann_window() {
-        let sums = Sums::of(&hann(&[Some(1.0); 64]));
+        let sums = WindowSums::from_weights(&hann_weights(&[Some(1.0); 64]));
         assert!((sums.first - 32.0).abs() < 1e-12 && (sums.second - 24.0).abs() < 1e-12);
         assert_eq!(sums.present, 64);
     }
 
     #[test]
     fn a_missing_frame_has_no_weight() {
-        let weights = hann(&[Some(1.0), None, Some(1.0), Some(1.0)]);
+        let weights = hann_weights(&[Some(1.0), None, Some(1.0), Some(1.0)]);
         assert_eq!(weights[1], 0.0);
         assert!((weights[2] - 0.853_553_390_593_273_8).abs() < 1e-15);
     }

@@ -2,9 +2,9 @@
 //!
 //! Points are kept in a temporary file; the memory holds eight bytes a point.
 
-use super::journal::{Header, Point};
-use super::point::Outcome;
-use crate::journal::{End, Found, JournalError, Record, Stream};
+use super::journal::{SweepHeader, SweepPoint};
+use super::point::PointOutcome;
+use crate::journal::{CheckpointEnd, CheckpointError, CheckpointReader, CheckpointRecord, StoredRecord};
 use std::io::{self, BufRead, BufWriter, Read, Seek, SeekFrom, Write};
 
 /// Why points cannot be collected.
@@ -12,7 +12,7 @@ use std::io::{self, BufRead, BufWriter, Read, Seek, SeekFrom, Write};
 pub enum CollectError {
     /// A journal is refused, or two disagree.
     #[error(transparent)]
-    Journal(#[from] JournalError),
+    Journal(#[from] CheckpointError),
     /// The temporary file cannot be written or read.
     #[error("the temporary file with the points cannot be used: {0}")]
     Spool(#[from] io::Error),
@@ -20,19 +20,19 @@ pub enum CollectError {
 
 /// What a journal added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Added {
+pub struct AddedPoints {
     /// Its points.
     pub points: usize,
     /// Those of them that no journal before it had.
     pub new: usize,
     /// How it ends.
-    pub end: End,
+    pub end: CheckpointEnd,
 }
 
 /// Points of a study, with a temporary file for them.
 #[derive(Debug)]
-pub struct Collection<F: Write> {
-    header: Header,
+pub struct PointCollection<F: Write> {
+    header: SweepHeader,
     /// Where each point starts in the temporary file, plus one; 0 for one that is missing.
     places: Vec<u64>,
     files: Vec<String>,
@@ -42,11 +42,11 @@ pub struct Collection<F: Write> {
 }
 
 /// A point in the temporary file: the numbers of its journal and line, and the length of its text.
-const HEAD: usize = 16;
+const HEAD_BYTES: usize = 16;
 
-impl<F: Read + Write + Seek> Collection<F> {
+impl<F: Read + Write + Seek> PointCollection<F> {
     /// No point yet; `header` is that of every journal of the study, and `spool` an empty file.
-    pub fn new(header: Header, spool: F) -> Self {
+    pub fn new(header: SweepHeader, spool: F) -> Self {
         let places = vec![0; header.body.points];
         Self { header, places, files: Vec::new(), spool: BufWriter::new(spool), end: 0, known: 0 }
     }
@@ -56,36 +56,40 @@ impl<F: Read + Write + Seek> Collection<F> {
     /// # Errors
     /// [`CollectError`] when it is of another study or version, is damaged, or a point in it is not what
     /// another journal has.
-    pub fn add(&mut self, file: &str, from: impl BufRead) -> Result<Option<Added>, CollectError> {
-        let Some(mut journal) = Stream::<Point, _>::open(file, from)? else { return Ok(None) };
-        journal.header().check::<Point>(file, &self.header)?;
+    pub fn add_journal(
+        &mut self,
+        file: &str,
+        from: impl BufRead,
+    ) -> Result<Option<AddedPoints>, CollectError> {
+        let Some(mut journal) = CheckpointReader::<SweepPoint, _>::open(file, from)? else { return Ok(None) };
+        journal.header().check_matches::<SweepPoint>(file, &self.header)?;
         let before = self.known;
         let mut points = 0;
         self.files.push(file.to_owned());
-        while let Some(found) = journal.record()? {
+        while let Some(found) = journal.next_record()? {
             points += 1;
-            match self.find(found.record.index)? {
-                None => self.keep(&found)?,
-                Some(there) => self.agrees(&there, &found)?,
+            match self.read_point(found.record.index)? {
+                None => self.spool_point(&found)?,
+                Some(there) => self.check_agreement(&there, &found)?,
             }
         }
-        Ok(Some(Added { points, new: self.known - before, end: journal.end() }))
+        Ok(Some(AddedPoints { points, new: self.known - before, end: journal.end() }))
     }
 
     /// Number of points that are known.
     #[must_use]
-    pub fn known(&self) -> usize {
+    pub fn known_count(&self) -> usize {
         self.known
     }
 
     /// Whether a point is known.
     #[must_use]
-    pub fn holds(&self, index: usize) -> bool {
+    pub fn has_point(&self, index: usize) -> bool {
         self.places.get(index).is_some_and(|place| *place > 0)
     }
 
     /// Indices of the points that are missing.
-    pub fn missing(&self) -> impl Iterator<Item = usize> + '_ {
+    pub fn missing_indices(&self) -> impl Iterator<Item = usize> + '_ {
         self.places.iter().enumerate().filter(|(_, place)| **place == 0).map(|(index, _)| index)
     }
 
@@ -93,23 +97,23 @@ impl<F: Read + Write + Seek> Collection<F> {
     ///
     /// # Errors
     /// [`CollectError::Spool`].
-    pub fn outcome(&mut self, index: usize) -> Result<Option<Outcome>, CollectError> {
-        Ok(self.find(index)?.map(|there| there.point.outcome))
+    pub fn read_outcome(&mut self, index: usize) -> Result<Option<PointOutcome>, CollectError> {
+        Ok(self.read_point(index)?.map(|there| there.point.outcome))
     }
 
     /// Calls `each` with every point in order.
     ///
     /// # Errors
     /// [`CollectError::Spool`], also where a point is missing.
-    pub fn each(&mut self, mut each: impl FnMut(usize, Outcome)) -> Result<(), CollectError> {
+    pub fn for_each_point(&mut self, mut each: impl FnMut(usize, PointOutcome)) -> Result<(), CollectError> {
         for index in 0..self.places.len() {
             let missing = || io::Error::other(format!("point {index} is missing"));
-            each(index, self.outcome(index)?.ok_or_else(missing)?);
+            each(index, self.read_outcome(index)?.ok_or_else(missing)?);
         }
         Ok(())
     }
 
-    fn keep(&mut self, found: &Found<Point>) -> Result<(), CollectError> {
+    fn spool_point(&mut self, found: &StoredRecord<SweepPoint>) -> Result<(), CollectError> {
         let text = serde_json::to_vec(&found.record.to_row(0)).map_err(io::Error::from)?;
         let file = (self.files.len() - 1) as u32;
         self.spool.write_all(&file.to_le_bytes())?;
@@ -119,17 +123,17 @@ impl<F: Read + Write + Seek> Collection<F> {
         if let Some(place) = self.places.get_mut(found.record.index) {
             *place = self.end + 1;
         }
-        self.end += (HEAD + text.len()) as u64;
+        self.end += (HEAD_BYTES + text.len()) as u64;
         self.known += 1;
         Ok(())
     }
 
     /// A point that is known.
-    fn find(&mut self, index: usize) -> Result<Option<There>, CollectError> {
+    fn read_point(&mut self, index: usize) -> Result<Option<SpooledPoint>, CollectError> {
         let Some(place) = self.places.get(index).filter(|place| **place > 0) else { return Ok(None) };
         self.spool.seek(SeekFrom::Start(place - 1))?;
         let file = self.spool.get_mut();
-        let mut head = [0; HEAD];
+        let mut head = [0; HEAD_BYTES];
         file.read_exact(&mut head)?;
         let [a, b, c, d, line @ .., e, f, g, h] = head;
         let length = u32::from_le_bytes([e, f, g, h]) as usize;
@@ -137,15 +141,19 @@ impl<F: Read + Write + Seek> Collection<F> {
         file.read_exact(&mut text)?;
         self.spool.seek(SeekFrom::Start(self.end))?;
         let row = serde_json::from_slice(&text).map_err(io::Error::from)?;
-        let point = Point::from_row(row, &self.header.body).map_err(io::Error::other)?;
+        let point = SweepPoint::from_row(row, &self.header.body).map_err(io::Error::other)?;
         let file = u32::from_le_bytes([a, b, c, d]) as usize;
-        Ok(Some(There { point, file, line: u64::from_le_bytes(line) as usize }))
+        Ok(Some(SpooledPoint { point, file, line: u64::from_le_bytes(line) as usize }))
     }
 
-    fn agrees(&self, there: &There, found: &Found<Point>) -> Result<(), JournalError> {
+    fn check_agreement(
+        &self,
+        there: &SpooledPoint,
+        found: &StoredRecord<SweepPoint>,
+    ) -> Result<(), CheckpointError> {
         let Some([expected, differs]) = there.point.difference(&found.record) else { return Ok(()) };
         let name = |at: usize| self.files.get(at).cloned().unwrap_or_default();
-        Err(JournalError::Conflict {
+        Err(CheckpointError::Conflict {
             file: name(self.files.len() - 1),
             line: found.line,
             found: differs,
@@ -157,8 +165,8 @@ impl<F: Read + Write + Seek> Collection<F> {
 }
 
 /// A point and where its line stands.
-struct There {
-    point: Point,
+struct SpooledPoint {
+    point: SweepPoint,
     file: usize,
     line: usize,
 }

@@ -1,27 +1,27 @@
 //! Points of a study in a journal, in the order in which they were done.
 
-use super::grid::Spacing;
-use super::point::Ended;
-use super::{Map, Outcome, Reason, Sample, Study};
-use crate::journal::{self, Exact, Kind, Record};
+use super::grid::AxisSpacing;
+use super::point::EarlyEnd;
+use super::{MissingReason, PointOutcome, SamplePlan, Study, SweepMap};
+use crate::journal::{self, CheckpointKind, CheckpointRecord, ExactNumber};
 use serde::{Deserialize, Serialize};
 
 /// The journal of a study.
-pub type Journal = journal::Journal<Point>;
+pub type SweepJournal = journal::CheckpointFile<SweepPoint>;
 /// Its header.
-pub type Header = journal::Header<Body>;
+pub type SweepHeader = journal::CheckpointHeader<SweepHeaderBody>;
 
 /// What the header of a study says besides.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Body {
+pub struct SweepHeaderBody {
     /// Number of points.
     pub points: usize,
     /// What is varied, the slowest first.
-    pub axes: Vec<Axis>,
+    pub axes: Vec<AxisRecord>,
     /// How points are drawn instead of lying on a grid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub sample: Option<Sample>,
+    pub sample: Option<SamplePlan>,
     /// Columns of the maps, in the order of the values.
     pub maps: Vec<String>,
 }
@@ -29,49 +29,50 @@ pub struct Body {
 /// A parameter and the values that it takes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Axis {
+pub struct AxisRecord {
     /// Name of the parameter.
     pub name: String,
     /// Its unit as shown; `1` for a plain number.
     pub unit: String,
     /// How they are spread.
     #[serde(default, skip_serializing_if = "is_linear")]
-    pub scale: Spacing,
+    pub scale: AxisSpacing,
     /// Its values, rising.
-    pub values: Vec<Exact>,
+    pub values: Vec<ExactNumber>,
 }
 
-fn is_linear(spacing: &Spacing) -> bool {
-    *spacing == Spacing::Linear
+fn is_linear(spacing: &AxisSpacing) -> bool {
+    *spacing == AxisSpacing::Linear
 }
 
 /// One point in a journal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Point {
+pub struct SweepPoint {
     /// Its place in the study, counted from 0.
     pub index: usize,
     /// What it gave.
-    pub outcome: Outcome,
+    pub outcome: PointOutcome,
 }
 
 /// The header of a study with this fingerprint.
 #[must_use]
-pub fn header(study: &Study, fingerprint: &str) -> Header {
-    let axes = study.axes.iter().map(|axis| Axis {
+pub fn study_header(study: &Study, fingerprint: &str) -> SweepHeader {
+    let axes = study.axes.iter().map(|axis| AxisRecord {
         name: axis.parameter.name.to_owned(),
         unit: axis.parameter.unit.to_owned(),
-        scale: if study.sample.is_some() { axis.spacing } else { Spacing::Linear },
-        values: axis.values.iter().copied().map(Exact).collect(),
+        scale: if study.sample.is_some() { axis.spacing } else { AxisSpacing::Linear },
+        values: axis.values.iter().copied().map(ExactNumber).collect(),
     });
-    let maps = study.maps.iter().map(Map::column).collect();
-    let body = Body { points: study.points(), axes: axes.collect(), sample: study.sample, maps };
-    Header::of::<Point>(fingerprint, env!("CARGO_PKG_VERSION"), body)
+    let maps = study.maps.iter().map(SweepMap::column).collect();
+    let body =
+        SweepHeaderBody { points: study.point_count(), axes: axes.collect(), sample: study.sample, maps };
+    SweepHeader::new::<SweepPoint>(fingerprint, env!("CARGO_PKG_VERSION"), body)
 }
 
-impl Record for Point {
-    const KIND: Kind = Kind::Sweep;
-    type Body = Body;
-    type Row = Row;
+impl CheckpointRecord for SweepPoint {
+    const KIND: CheckpointKind = CheckpointKind::Sweep;
+    type Body = SweepHeaderBody;
+    type IterateRow = Row;
     type Identity = usize;
 
     fn identity(&self) -> usize {
@@ -79,15 +80,15 @@ impl Record for Point {
     }
 
     fn to_row(&self, _: usize) -> Row {
-        let Outcome { ended, stopped_at_s, values } = &self.outcome;
-        let cell = |value: &Result<f64, Reason>| match value {
-            Ok(value) => Cell::Value(Exact(*value)),
-            Err(reason) => Cell::Missing(Gap { reason: *reason }),
+        let PointOutcome { ended, stopped_at_s, values } = &self.outcome;
+        let cell = |value: &Result<f64, MissingReason>| match value {
+            Ok(value) => ValueCell::Value(ExactNumber(*value)),
+            Err(reason) => ValueCell::Missing(MissingCell { reason: *reason }),
         };
         Row {
             index: self.index,
             ended: ended.clone(),
-            stopped_at_s: stopped_at_s.map(Exact),
+            stopped_at_s: stopped_at_s.map(ExactNumber),
             values: values.iter().map(cell).collect(),
         }
     }
@@ -97,7 +98,7 @@ impl Record for Point {
         None
     }
 
-    fn from_row(row: Row, body: &Body) -> Result<Self, String> {
+    fn from_row(row: Row, body: &SweepHeaderBody) -> Result<Self, String> {
         if row.values.len() != body.maps.len() {
             return Err(format!("`values`: found {}, expected {}", row.values.len(), body.maps.len()));
         }
@@ -108,12 +109,12 @@ impl Record for Point {
     }
 
     fn difference(&self, other: &Self) -> Option<[String; 2]> {
-        let Outcome { ended, stopped_at_s, values } = &self.outcome;
+        let PointOutcome { ended, stopped_at_s, values } = &self.outcome;
         let (one, two) = (self, other);
-        let shown = |of: fn(&Outcome) -> String| Some([one, two].map(|point| of(&point.outcome)));
+        let shown = |of: fn(&PointOutcome) -> String| Some([one, two].map(|point| of(&point.outcome)));
         if *ended != other.outcome.ended {
             return shown(|outcome| match &outcome.ended {
-                Some(Ended { reason, why }) => format!("the run ended as {} ({why})", reason.name()),
+                Some(EarlyEnd { reason, why }) => format!("the run ended as {} ({why})", reason.name()),
                 None => "the run completed".to_owned(),
             });
         }
@@ -128,7 +129,7 @@ impl Record for Point {
         }))
     }
 
-    fn other_problem(found: &Body, expected: &Body) -> Option<String> {
+    fn problem_difference(found: &SweepHeaderBody, expected: &SweepHeaderBody) -> Option<String> {
         (found != expected).then(|| "the header has other axes or maps than the study".to_owned())
     }
 }
@@ -139,19 +140,19 @@ impl Record for Point {
 pub struct Row {
     index: usize,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    ended: Option<Ended>,
+    ended: Option<EarlyEnd>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    stopped_at_s: Option<Exact>,
-    values: Vec<Cell>,
+    stopped_at_s: Option<ExactNumber>,
+    values: Vec<ValueCell>,
 }
 
 impl Row {
-    fn into_outcome(self) -> Outcome {
-        let value = |cell: Cell| match cell {
-            Cell::Value(value) => Ok(value.0),
-            Cell::Missing(gap) => Err(gap.reason),
+    fn into_outcome(self) -> PointOutcome {
+        let value = |cell: ValueCell| match cell {
+            ValueCell::Value(value) => Ok(value.0),
+            ValueCell::Missing(gap) => Err(gap.reason),
         };
-        Outcome {
+        PointOutcome {
             ended: self.ended,
             stopped_at_s: self.stopped_at_s.map(|at| at.0),
             values: self.values.into_iter().map(value).collect(),
@@ -161,21 +162,23 @@ impl Row {
 
 #[derive(Serialize, Deserialize)]
 #[serde(untagged)]
-enum Cell {
-    Value(Exact),
-    Missing(Gap),
+enum ValueCell {
+    Value(ExactNumber),
+    Missing(MissingCell),
 }
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Gap {
-    reason: Reason,
+struct MissingCell {
+    reason: MissingReason,
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::journal::{JournalError, header_line, kind_of, line, read};
+    use crate::journal::{
+        CheckpointError, detect_kind, format_header_line, format_record_line, read_checkpoint,
+    };
 
     fn study() -> Study {
         let text = "format = 1\ntitle = \"\"\nscene = \"x\"\n[camera]\nframe_rate_hz = 1e3\nexposure_s = 0.0\n\
@@ -184,24 +187,24 @@ mod tests {
         Study::parse("s", text).unwrap()
     }
 
-    fn outcome(index: usize) -> Outcome {
+    fn outcome(index: usize) -> PointOutcome {
         let share = (index as f64 * 0.618_033_988_749_894_9).fract();
         let why = if index.is_multiple_of(2) { String::new() } else { "a \"why\"".to_owned() };
-        let ended = index.is_multiple_of(3).then_some(Ended { reason: Reason::ContactLost, why });
-        Outcome {
+        let ended = index.is_multiple_of(3).then_some(EarlyEnd { reason: MissingReason::ContactLost, why });
+        PointOutcome {
             ended,
             stopped_at_s: (!index.is_multiple_of(5)).then_some(1e-300 * share),
-            values: vec![Ok(1e23 * share / 7.0), Err(Reason::Never)],
+            values: vec![Ok(1e23 * share / 7.0), Err(MissingReason::Never)],
         }
     }
 
     fn text(points: impl Iterator<Item = usize>) -> String {
-        let point = |index| line(&Point { index, outcome: outcome(index) }, 0);
-        header_line(&header(&study(), "f")) + &points.map(point).collect::<String>()
+        let point = |index| format_record_line(&SweepPoint { index, outcome: outcome(index) }, 0);
+        format_header_line(&study_header(&study(), "f")) + &points.map(point).collect::<String>()
     }
 
-    fn read_back(text: &str) -> Result<Option<Journal>, JournalError> {
-        read("j", text)
+    fn read_back(text: &str) -> Result<Option<SweepJournal>, CheckpointError> {
+        read_checkpoint("j", text)
     }
 
     #[test]
@@ -226,16 +229,20 @@ mod tests {
 
     #[test]
     fn a_journal_is_known_by_its_first_line() {
-        assert_eq!(kind_of(text([0].into_iter()).as_bytes()), Some(Kind::Sweep));
-        assert_eq!(kind_of(b"{\"journal\":\"fit\",\"layout\":2}\n"), Some(Kind::Fit));
-        assert_eq!([&b"time_s,tip_x_m\n"[..], b"{}\n", b"{\"journal\":"].map(kind_of), [None; 3]);
+        assert_eq!(detect_kind(text([0].into_iter()).as_bytes()), Some(CheckpointKind::Sweep));
+        assert_eq!(detect_kind(b"{\"journal\":\"fit\",\"layout\":2}\n"), Some(CheckpointKind::Fit));
+        assert_eq!([&b"time_s,tip_x_m\n"[..], b"{}\n", b"{\"journal\":"].map(detect_kind), [None; 3]);
     }
 
     #[test]
     fn another_study_and_damage_are_refused() {
         let good = text([0, 1].into_iter());
         let refused = |text: &str| read_back(text).unwrap_err().to_string();
-        let other = read_back(&good).unwrap().unwrap().header.check::<Point>("j", &header(&study(), "g"));
+        let other = read_back(&good)
+            .unwrap()
+            .unwrap()
+            .header
+            .check_matches::<SweepPoint>("j", &study_header(&study(), "g"));
         assert!(
             other
                 .unwrap_err()
@@ -247,11 +254,12 @@ mod tests {
             refused(&good.replacen("\"index\":1", "\"index\":2", 1))
                 .starts_with("j:3: the line has the checksum")
         );
-        let forged = |index: usize| good.clone() + &line(&Point { index, outcome: outcome(3) }, 0);
+        let forged =
+            |index: usize| good.clone() + &format_record_line(&SweepPoint { index, outcome: outcome(3) }, 0);
         assert!(refused(&forged(0)).starts_with("j:4: the point of line 2 a second time"));
         assert!(refused(&forged(200)).contains("found 200, expected less than 200"));
-        let header = |layout| Header { layout, ..header(&study(), "f") };
-        let later = header_line(&header(4)) + good.split_once('\n').unwrap().1;
+        let header = |layout| SweepHeader { layout, ..study_header(&study(), "f") };
+        let later = format_header_line(&header(4)) + good.split_once('\n').unwrap().1;
         let said = "j: a journal of layout 4, expected layout 3; move it away and run the sweep again";
         assert_eq!(refused(&later), said);
     }

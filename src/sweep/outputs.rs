@@ -1,11 +1,11 @@
 //! What a study writes: the table of all points and its summary.
 
-use super::grid::{Axis, Spacing};
-use super::point::Outcome;
+use super::grid::{AxisSpacing, SweepAxis};
+use super::point::PointOutcome;
 use super::rank_correlation::{RankCorrelation, RankCorrelations};
-use super::sample::Sample;
-use super::study::{Map, SHEET, Study};
-use crate::feature::Reason;
+use super::sample::SamplePlan;
+use super::study::{SHEET_NAME, Study, SweepMap};
+use crate::feature::MissingReason;
 use crate::twin::Camera;
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -18,27 +18,27 @@ const SOURCE: &str = "simulation";
 pub fn csv_header(study: &Study) -> String {
     let mut cells: Vec<String> = study.axes.iter().map(|axis| axis.parameter.name.to_owned()).collect();
     cells.extend(["status", "stopped_at_s"].map(str::to_owned));
-    cells.extend(study.maps.iter().map(Map::column));
+    cells.extend(study.maps.iter().map(SweepMap::column));
     cells.extend(["missing", "source"].map(str::to_owned));
     cells.join(",") + "\n"
 }
 
 /// Row of a point in `sweep.csv`, in which the first axis is the slowest; a cell without a value is empty,
-/// and `status` or `missing` says why.
+/// and `status` or `describe_missing` says why.
 #[must_use]
-pub fn csv_row(study: &Study, index: usize, outcome: &Outcome) -> String {
+pub fn csv_row(study: &Study, index: usize, outcome: &PointOutcome) -> String {
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
-    let mut cells: Vec<String> = study.place(index).iter().map(|value| value.to_string()).collect();
+    let mut cells: Vec<String> = study.point_values(index).iter().map(|value| value.to_string()).collect();
     cells.extend([outcome.status().to_owned(), number(outcome.stopped_at_s)]);
     cells.extend(outcome.values.iter().map(|value| number(value.ok())));
-    cells.extend([missing(study, outcome), SOURCE.to_owned()]);
+    cells.extend([describe_missing(study, outcome), SOURCE.to_owned()]);
     cells.join(",") + "\n"
 }
 
 /// Which maps have no value for a reason of their own, and which: `column: reason; column: reason`.
-fn missing(study: &Study, outcome: &Outcome) -> String {
+fn describe_missing(study: &Study, outcome: &PointOutcome) -> String {
     let ended = outcome.ended.as_ref().map(|ended| ended.reason);
-    let of = |(map, value): (&Map, &Result<f64, Reason>)| {
+    let of = |(map, value): (&SweepMap, &Result<f64, MissingReason>)| {
         let reason = value.err()?;
         (Some(reason) != ended).then(|| format!("{}: {}", map.column(), reason.name()))
     };
@@ -48,7 +48,7 @@ fn missing(study: &Study, outcome: &Outcome) -> String {
 /// `summary.json`.
 #[derive(Debug, Clone, Serialize)]
 #[allow(missing_docs)] // the fields are those of the file, named with their units
-pub struct Summary {
+pub struct SweepSummary {
     pub title: String,
     pub scene: String,
     pub scene_title: String,
@@ -60,7 +60,7 @@ pub struct Summary {
     pub camera: Camera,
     pub points: usize,
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub sample: Option<Sample>,
+    pub sample: Option<SamplePlan>,
     pub status: BTreeMap<&'static str, usize>,
     pub axes: Vec<AxisSummary>,
     /// The figure with every map, where there are several, or with the rank correlations.
@@ -74,7 +74,7 @@ pub struct Summary {
 pub struct AxisSummary {
     pub name: &'static str,
     pub unit: &'static str,
-    pub scale: Spacing,
+    pub scale: AxisSpacing,
     /// Values on the axis of a grid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub points: Option<usize>,
@@ -101,7 +101,7 @@ pub struct MapSummary {
     pub rank_correlations: Vec<RankCorrelation>,
 }
 
-impl Summary {
+impl SweepSummary {
     /// That of a study of which no point is counted yet.
     #[must_use]
     pub fn new(study: &Study, scene_title: &str, fingerprint: &str) -> Self {
@@ -117,23 +117,27 @@ impl Summary {
             points: 0,
             sample: study.sample,
             status: BTreeMap::new(),
-            axes: study.axes.iter().map(|axis| AxisSummary::of(axis, study.sample.is_some())).collect(),
-            sheet: study.has_sheet().then(|| format!("{SHEET}.svg")),
-            maps: study.maps.iter().map(|map| MapSummary::of(study, map)).collect(),
+            axes: study
+                .axes
+                .iter()
+                .map(|axis| AxisSummary::from_axis(axis, study.sample.is_some()))
+                .collect(),
+            sheet: study.has_sheet().then(|| format!("{SHEET_NAME}.svg")),
+            maps: study.maps.iter().map(|map| MapSummary::from_map(study, map)).collect(),
         }
     }
 
     /// Counts a point.
-    pub fn count(&mut self, outcome: &Outcome) {
+    pub fn count_point(&mut self, outcome: &PointOutcome) {
         self.points += 1;
         *self.status.entry(outcome.status()).or_default() += 1;
         for (map, value) in self.maps.iter_mut().zip(&outcome.values) {
-            map.count(*value);
+            map.count_value(*value);
         }
     }
 
     /// Adds the rank correlations of every map.
-    pub fn correlate(&mut self, study: &Study, found: &RankCorrelations) {
+    pub fn add_correlations(&mut self, study: &Study, found: &RankCorrelations) {
         for (at, map) in self.maps.iter_mut().enumerate() {
             map.rank_correlations = found.of_map(study, at);
         }
@@ -141,7 +145,7 @@ impl Summary {
 
     /// Whether any map has a value anywhere.
     #[must_use]
-    pub fn shows_something(&self) -> bool {
+    pub fn has_values(&self) -> bool {
         self.maps.iter().any(|map| map.values > 0)
     }
 
@@ -155,7 +159,7 @@ impl Summary {
 }
 
 impl AxisSummary {
-    fn of(axis: &Axis, sampled: bool) -> Self {
+    fn from_axis(axis: &SweepAxis, sampled: bool) -> Self {
         let (from, to) = (axis.values.first().copied(), axis.values.last().copied());
         Self {
             name: axis.parameter.name,
@@ -169,7 +173,7 @@ impl AxisSummary {
 }
 
 impl MapSummary {
-    fn of(study: &Study, map: &Map) -> Self {
+    fn from_map(study: &Study, map: &SweepMap) -> Self {
         Self {
             name: map.name.clone(),
             kind: map.reading.kind(),
@@ -184,7 +188,7 @@ impl MapSummary {
         }
     }
 
-    fn count(&mut self, value: Result<f64, Reason>) {
+    fn count_value(&mut self, value: Result<f64, MissingReason>) {
         match value {
             Ok(value) => {
                 self.values += 1;

@@ -1,13 +1,13 @@
 //! One point of a study: its run, as far as it went, and what every map reads from it.
 
 use super::study::Study;
-use crate::feature::{Reader, Reading, Reason, RunRecord};
-use crate::recording::channel::Instants;
-use crate::simulate::outputs::{Audit, Transitions};
+use crate::feature::{FeatureReader, MissingReason, Reading, RunRecord};
+use crate::recording::channel::ReversalInstants;
+use crate::simulate::outputs::{EnergyAudit, Transitions};
 use crate::simulate::scene::{Scene, SceneError, StartKind};
-use crate::simulate::{Effort, Impact, Observer, Piece, Transition, equilibrium};
+use crate::simulate::{Impact, Observer, SolutionSegment, SolverOptions, Transition, equilibrium};
 use crate::text::panic_message;
-use crate::twin::{View, ViewError, observed_view};
+use crate::twin::{TwinView, TwinViewError, film_scene_with_observer};
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -18,57 +18,57 @@ const MOST_EVALUATIONS: u64 = 20_000_000;
 
 /// What a point gave.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Outcome {
+pub struct PointOutcome {
     /// Why the run ended before its stop time, if it did.
-    pub ended: Option<Ended>,
+    pub ended: Option<EarlyEnd>,
     /// When it ended, s; `None` where it never ran.
     pub stopped_at_s: Option<f64>,
     /// One value a map, in its unit, or why there is none.
-    pub values: Vec<Result<f64, Reason>>,
+    pub values: Vec<Result<f64, MissingReason>>,
 }
 
 /// Why a run ended before its stop time.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Ended {
+pub struct EarlyEnd {
     /// In one word.
-    pub reason: Reason,
+    pub reason: MissingReason,
     /// What happened, where the reason does not say all.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub why: String,
 }
 
-impl Ended {
-    fn new(reason: Reason, why: impl ToString) -> Self {
+impl EarlyEnd {
+    fn new(reason: MissingReason, why: impl ToString) -> Self {
         Self { reason, why: why.to_string() }
     }
 }
 
-impl Outcome {
+impl PointOutcome {
     /// The name of a run that reached its stop time.
     pub(crate) const COMPLETED: &'static str = "completed";
 
     /// Runs point `index` of a checked study; a panic is a reason like any other.
     #[must_use]
-    pub fn of(study: &Study, scene: &Scene, index: usize) -> Self {
-        Self::of_scene(study, || study.scene_at(scene, index), || ControlFlow::Continue(()))
+    pub fn run_point(study: &Study, scene: &Scene, index: usize) -> Self {
+        Self::run_point_scene(study, || study.scene_of_point(scene, index), || ControlFlow::Continue(()))
     }
 
     /// Runs a scene that a study did not choose; `flow` is asked during the run and may end it.
     #[must_use]
-    pub fn of_scene(
+    pub fn run_point_scene(
         study: &Study,
         scene: impl FnOnce() -> Result<Scene, SceneError>,
         flow: impl Fn() -> ControlFlow<()>,
     ) -> Self {
         let attempt = || {
-            Self::attempt(study, scene, flow)
+            Self::try_run(study, scene, flow)
                 .unwrap_or_else(|(ended, stopped_at_s)| Self::without_values(study, ended, stopped_at_s))
         };
         catch_unwind(AssertUnwindSafe(attempt)).unwrap_or_else(|payload| {
             Self::without_values(
                 study,
-                Ended::new(Reason::Panicked, panic_message(payload.as_ref()).unwrap_or_default()),
+                EarlyEnd::new(MissingReason::Panicked, panic_message(payload.as_ref()).unwrap_or_default()),
                 None,
             )
         })
@@ -81,85 +81,86 @@ impl Outcome {
     }
 
     /// What the point gives; or why nothing can be read, and when the run ended, s.
-    fn attempt(
+    fn try_run(
         study: &Study,
         scene: impl FnOnce() -> Result<Scene, SceneError>,
         flow: impl Fn() -> ControlFlow<()>,
-    ) -> Result<Self, (Ended, Option<f64>)> {
-        let scene = scene().map_err(|error| (Ended::new(Reason::NoStart, error), None))?;
-        if !starts(&scene) {
-            return Err((Ended::new(Reason::NoStart, ""), None));
+    ) -> Result<Self, (EarlyEnd, Option<f64>)> {
+        let scene = scene().map_err(|error| (EarlyEnd::new(MissingReason::NoStart, error), None))?;
+        if !can_start(&scene) {
+            return Err((EarlyEnd::new(MissingReason::NoStart, ""), None));
         }
         let most_evaluations = scene.run.most_evaluations.unwrap_or(MOST_EVALUATIONS);
-        let effort = Effort { most_evaluations, ..Effort::of(&scene) };
-        let mut watch = Watch::of(study, flow);
+        let effort = SolverOptions { most_evaluations, ..SolverOptions::from_scene(&scene) };
+        let mut watch = PointObserver::from_study(study, flow);
         let span_s = [scene.start_s, scene.run.stop_s];
-        let view = observed_view(&scene, &study.camera, span_s, effort, &mut watch).map_err(unseen)?;
-        let View { recording, run, stick_s } = view;
-        let Watch { transitions: Transitions(transitions), audit, .. } = watch;
+        let view = film_scene_with_observer(&scene, &study.camera, span_s, effort, &mut watch)
+            .map_err(end_without_view)?;
+        let TwinView { recording, run, stick_s } = view;
+        let PointObserver { transitions: Transitions(transitions), audit, .. } = watch;
         let record = RunRecord { span_s, run, stick_s, transitions, audit };
-        let instants = Instants::find(&recording);
-        let reader = Reader::of_run(&recording, &instants, &record);
+        let instants = ReversalInstants::find_instants(&recording);
+        let reader = FeatureReader::with_run(&recording, &instants, &record);
         Ok(Self {
-            ended: Reason::of(run.status).map(|reason| Ended::new(reason, "")),
+            ended: MissingReason::from_status(run.status).map(|reason| EarlyEnd::new(reason, "")),
             stopped_at_s: Some(run.stopped_at_s),
-            values: study.maps.iter().map(|map| value(&map.reading, &reader)).collect(),
+            values: study.maps.iter().map(|map| read_value(&map.reading, &reader)).collect(),
         })
     }
 
-    fn without_values(study: &Study, ended: Ended, stopped_at_s: Option<f64>) -> Self {
+    fn without_values(study: &Study, ended: EarlyEnd, stopped_at_s: Option<f64>) -> Self {
         let values = study.maps.iter().map(|_| Err(ended.reason)).collect();
         Self { ended: Some(ended), stopped_at_s, values }
     }
 }
 
-fn value(reading: &Reading, reader: &Reader) -> Result<f64, Reason> {
+fn read_value(reading: &Reading, reader: &FeatureReader) -> Result<f64, MissingReason> {
     let found = reading.read(None, reader).map_err(|missing| missing.reason())?;
-    if found.value.is_finite() { Ok(found.value) } else { Err(Reason::NotFinite) }
+    if found.value.is_finite() { Ok(found.value) } else { Err(MissingReason::NotFinite) }
 }
 
-fn unseen(error: ViewError) -> (Ended, Option<f64>) {
+fn end_without_view(error: TwinViewError) -> (EarlyEnd, Option<f64>) {
     match error {
-        ViewError::Early { status, stopped_at_s } => {
-            let reason = Reason::of(status).unwrap_or(Reason::NoWindow);
-            (Ended::new(reason, "before two frames were taken"), Some(stopped_at_s))
+        TwinViewError::Early { status, stopped_at_s } => {
+            let reason = MissingReason::from_status(status).unwrap_or(MissingReason::NoWindow);
+            (EarlyEnd::new(reason, "before two frames were taken"), Some(stopped_at_s))
         }
-        ViewError::Recording(error) => (Ended::new(Reason::Diverged, error), None),
+        TwinViewError::Recording(error) => (EarlyEnd::new(MissingReason::Diverged, error), None),
     }
 }
 
 /// A scene that starts in steady slip needs such an equilibrium, which another preload or friction may not
 /// have.
-fn starts(scene: &Scene) -> bool {
-    let speed = scene.drive.at(scene.start_s).velocity_m_per_s;
-    scene.start != StartKind::SteadySlide || equilibrium::steady_slide(&scene.linkage, speed).is_some()
+fn can_start(scene: &Scene) -> bool {
+    let speed = scene.drive.motion_at(scene.start_s).velocity_m_per_s;
+    scene.start != StartKind::SteadySlide || equilibrium::steady_slip_pose(&scene.linkage, speed).is_some()
 }
 
 /// What is noted of a run besides its traces: the transitions, and its extremes where a map needs them.
-struct Watch<F> {
+struct PointObserver<F> {
     transitions: Transitions,
-    audit: Option<Audit>,
+    audit: Option<EnergyAudit>,
     flow: F,
 }
 
-impl<F> Watch<F> {
-    fn of(study: &Study, flow: F) -> Self {
+impl<F> PointObserver<F> {
+    fn from_study(study: &Study, flow: F) -> Self {
         let audited = study.maps.iter().any(|map| map.reading.needs_audit());
-        Self { transitions: Transitions::default(), audit: audited.then(Audit::default), flow }
+        Self { transitions: Transitions::default(), audit: audited.then(EnergyAudit::default), flow }
     }
 }
 
-impl<F: Fn() -> ControlFlow<()>> Observer for Watch<F> {
-    fn flow(&self) -> ControlFlow<()> {
+impl<F: Fn() -> ControlFlow<()>> Observer for PointObserver<F> {
+    fn control_flow(&self) -> ControlFlow<()> {
         (self.flow)()
     }
-    fn piece(&mut self, piece: &Piece<'_>) {
-        self.audit.iter_mut().for_each(|audit| audit.piece(piece));
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        self.audit.iter_mut().for_each(|audit| audit.observe_segment(piece));
     }
-    fn transition(&mut self, transition: &Transition) {
-        self.transitions.transition(transition);
+    fn observe_transition(&mut self, transition: &Transition) {
+        self.transitions.observe_transition(transition);
     }
-    fn impact(&mut self, impact: &Impact) {
-        self.audit.iter_mut().for_each(|audit| audit.impact(impact));
+    fn observe_impact(&mut self, impact: &Impact) {
+        self.audit.iter_mut().for_each(|audit| audit.observe_impact(impact));
     }
 }

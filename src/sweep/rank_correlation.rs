@@ -3,8 +3,8 @@
 //! Of a large study a subset of the points is looked at, spread evenly over all, so that the memory does not
 //! grow with their number.
 
-use super::grid::Axis;
-use super::point::Outcome;
+use super::grid::SweepAxis;
+use super::point::PointOutcome;
 use super::study::Study;
 use serde::Serialize;
 
@@ -41,17 +41,17 @@ impl RankCorrelations {
     pub fn new(study: &Study) -> Self {
         let (axes, maps) = (study.axes.len(), study.maps.len());
         let most = (MOST_NUMBERS / (axes + maps).max(1)).min(MOST_POINTS);
-        let share = (most as f64 / study.points().max(1) as f64).min(1.0);
+        let share = (most as f64 / study.point_count().max(1) as f64).min(1.0);
         Self { share, places: vec![Vec::new(); axes], values: vec![Vec::new(); maps] }
     }
 
     /// Looks at a point, or leaves it out.
-    pub fn look(&mut self, study: &Study, index: usize, outcome: &Outcome) {
+    pub fn look(&mut self, study: &Study, index: usize, outcome: &PointOutcome) {
         // multiples of the golden ratio are spread evenly over every regular part of a grid
         if (index as f64 * 0.618_033_988_749_894_9).fract() >= self.share {
             return;
         }
-        self.places.iter_mut().zip(study.place(index)).for_each(|(places, place)| places.push(place));
+        self.places.iter_mut().zip(study.point_values(index)).for_each(|(places, place)| places.push(place));
         let values = outcome.values.iter().map(|value| value.ok()).chain(std::iter::repeat(None));
         self.values.iter_mut().zip(values).for_each(|(values, value)| values.push(value));
     }
@@ -59,9 +59,9 @@ impl RankCorrelations {
     /// Rank correlation of map `map` with every parameter.
     #[must_use]
     pub fn of_map(&self, study: &Study, map: usize) -> Vec<RankCorrelation> {
-        let of = |(at, axis): (usize, &Axis)| {
+        let of = |(at, axis): (usize, &SweepAxis)| {
             let (x, y): (Vec<f64>, Vec<f64>) = self.pairs(map, at).unzip();
-            RankCorrelation { parameter: axis.parameter.name, rank_correlation: spearman(&x, &y) }
+            RankCorrelation { parameter: axis.parameter.name, rank_correlation: spearman_correlation(&x, &y) }
         };
         study.axes.iter().enumerate().map(of).collect()
     }
@@ -77,11 +77,11 @@ impl RankCorrelations {
 /// Rank correlation (Spearman's) of two lists, pair by pair; `None` where they are too short, or one is
 /// constant.
 #[must_use]
-pub fn spearman(x: &[f64], y: &[f64]) -> Option<f64> {
+pub fn spearman_correlation(x: &[f64], y: &[f64]) -> Option<f64> {
     if x.len() < FEWEST_PAIRS {
         return None;
     }
-    let (x, y) = (ranks(x), ranks(y));
+    let (x, y) = (rank_values(x), rank_values(y));
     let mean = 0.5 * (x.len() as f64 - 1.0);
     let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - mean) * (b - mean)).sum::<f64>();
     let scale = (product(&x, &x) * product(&y, &y)).sqrt();
@@ -89,7 +89,7 @@ pub fn spearman(x: &[f64], y: &[f64]) -> Option<f64> {
 }
 
 /// Ranks from 0; equal values share the mean of theirs.
-fn ranks(values: &[f64]) -> Vec<f64> {
+fn rank_values(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
     let mut ranks = vec![0.0; values.len()];
@@ -108,21 +108,22 @@ mod tests {
 
     #[test]
     fn ranks_of_equal_values_are_their_mean() {
-        assert_eq!(ranks(&[3.0, 1.0, 3.0, 2.0]), [2.5, 0.0, 2.5, 1.0]);
+        assert_eq!(rank_values(&[3.0, 1.0, 3.0, 2.0]), [2.5, 0.0, 2.5, 1.0]);
     }
 
     #[test]
     fn a_rank_correlation_knows_only_the_order() {
         let x: Vec<f64> = (0..100).map(f64::from).collect();
-        let of = |f: fn(f64) -> f64| spearman(&x, &x.iter().copied().map(f).collect::<Vec<_>>());
+        let of = |f: fn(f64) -> f64| spearman_correlation(&x, &x.iter().copied().map(f).collect::<Vec<_>>());
         assert!((of(|x| x.powi(3)).unwrap() - 1.0).abs() < 1e-12);
         assert!((of(|x| -(x + 1.0).ln()).unwrap() + 1.0).abs() < 1e-12);
         assert!(of(|x| (x - 49.5).abs()).unwrap().abs() < 1e-12);
         assert_eq!(of(|_| 1.0), None);
-        assert_eq!(spearman(&x[..5], &x[..5]), None);
+        assert_eq!(spearman_correlation(&x[..5], &x[..5]), None);
         // ranks 0..4 against 1, 0, 2, 4, 3, five times each: 1 - 6 * 4 / (5 * 24)
         let five = |of: [f64; 5]| of.repeat(5);
-        let found = spearman(&five([1.0, 2.0, 3.0, 4.0, 5.0]), &five([2.0, 1.0, 3.0, 5.0, 4.0])).unwrap();
+        let found =
+            spearman_correlation(&five([1.0, 2.0, 3.0, 4.0, 5.0]), &five([2.0, 1.0, 3.0, 5.0, 4.0])).unwrap();
         assert!((found - 0.8).abs() < 1e-12, "{found}");
     }
 }

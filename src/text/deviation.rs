@@ -1,33 +1,33 @@
 //! A value with its standard deviation, in one way everywhere.
 
-use super::number::{number, typeset};
-use super::{DASH, superscript};
+use super::number::{format_number, typeset};
+use super::{DASH, to_superscript};
 use crate::math;
 
 /// Most decimals shown: more are beyond any measurement here, and a deviation below them is rounded up to the
 /// last one.
 const MOST_DECIMALS: i32 = 6;
 /// Powers of ten of the larger of value and deviation that are written in plain digits.
-const PLAIN: std::ops::RangeInclusive<i32> = -4..=6;
+const PLAIN_POWERS_WITH_SD: std::ops::RangeInclusive<i32> = -4..=6;
 
 /// A value with its standard deviation in units of the last digit shown, `78.40(3)` for 78.40 with 0.03
 /// (JCGM 100:2008, 7.2.2), one digit of it. Four significant digits without a deviation (none, zero or no
 /// finite number); a dash for a value that is no finite number.
 #[must_use]
-pub fn with_sd(value: f64, sd: impl Into<Option<f64>>) -> String {
+pub fn format_with_sd(value: f64, sd: impl Into<Option<f64>>) -> String {
     if !value.is_finite() {
         return DASH.to_owned();
     }
-    let Some(sd) = sd.into().filter(|sd| sd.is_finite() && *sd > 0.0) else { return number(value) };
+    let Some(sd) = sd.into().filter(|sd| sd.is_finite() && *sd > 0.0) else { return format_number(value) };
     let larger = math::log10(value.abs().max(sd)).floor() as i32;
-    if PLAIN.contains(&larger) {
-        return in_digits(value, sd);
+    if PLAIN_POWERS_WITH_SD.contains(&larger) {
+        return format_digits_with_sd(value, sd);
     }
     let unit = math::powi(10.0, larger);
-    format!("{}\u{b7}10{}", in_digits(value / unit, sd / unit), superscript(larger))
+    format!("{}\u{b7}10{}", format_digits_with_sd(value / unit, sd / unit), to_superscript(larger))
 }
 
-fn in_digits(value: f64, sd: f64) -> String {
+fn format_digits_with_sd(value: f64, sd: f64) -> String {
     let power = power_of_first_digit(sd);
     if power > 0 {
         let unit = math::powi(10.0, power);
@@ -70,31 +70,36 @@ mod tests {
             (78.4, 3e8, "0(3)\u{b7}10\u{2078}"),
         ];
         for (value, sd, expected) in cases {
-            assert_eq!(with_sd(value, sd), expected);
+            assert_eq!(format_with_sd(value, sd), expected);
         }
     }
 
     #[test]
     fn a_deviation_that_rounds_up_to_ten_moves_the_digit() {
         assert_eq!(
-            [with_sd(78.4, 0.096), with_sd(78.4, 0.96), with_sd(78.4, 9.6), with_sd(1234.0, 96.0)],
+            [
+                format_with_sd(78.4, 0.096),
+                format_with_sd(78.4, 0.96),
+                format_with_sd(78.4, 9.6),
+                format_with_sd(1234.0, 96.0)
+            ],
             ["78.4(1)", "78(1)", "80(10)", "1200(100)"]
         );
-        assert_eq!(with_sd(78.4, 0.094), "78.40(9)");
+        assert_eq!(format_with_sd(78.4, 0.094), "78.40(9)");
     }
 
     #[test]
     fn no_deviation_gives_four_digits_and_no_number_a_dash() {
-        assert_eq!([0.0, -1.0, f64::NAN, f64::INFINITY].map(|sd| with_sd(78.4123, sd)), ["78.41"; 4]);
-        assert_eq!(with_sd(78.4, None), "78.40");
-        assert_eq!([f64::NAN, f64::INFINITY].map(|value| with_sd(value, 0.1)), ["\u{2013}"; 2]);
+        assert_eq!([0.0, -1.0, f64::NAN, f64::INFINITY].map(|sd| format_with_sd(78.4123, sd)), ["78.41"; 4]);
+        assert_eq!(format_with_sd(78.4, None), "78.40");
+        assert_eq!([f64::NAN, f64::INFINITY].map(|value| format_with_sd(value, 0.1)), ["\u{2013}"; 2]);
     }
 
     #[test]
     fn extremes_stay_short() {
-        assert_eq!(with_sd(78.4, 1e-9), "78.400000(1)");
-        assert_eq!(with_sd(78.4, 2.6e-6), "78.400000(3)");
-        assert_eq!(with_sd(78.4, f64::MIN_POSITIVE), "78.400000(1)");
-        assert!(with_sd(f64::MAX, f64::MAX).len() < 24 && with_sd(1e12, 1e6).len() < 24);
+        assert_eq!(format_with_sd(78.4, 1e-9), "78.400000(1)");
+        assert_eq!(format_with_sd(78.4, 2.6e-6), "78.400000(3)");
+        assert_eq!(format_with_sd(78.4, f64::MIN_POSITIVE), "78.400000(1)");
+        assert!(format_with_sd(f64::MAX, f64::MAX).len() < 24 && format_with_sd(1e12, 1e6).len() < 24);
     }
 }

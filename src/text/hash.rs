@@ -27,17 +27,17 @@ impl TextHash {
             if self.start.len() < BYTE_ORDER_MARK.len() {
                 return;
             }
-            self.begin();
+            self.check_byte_order_mark();
             bytes = rest;
         }
-        self.take(bytes);
+        self.hash_lines(bytes);
     }
 
     /// The hash in 64 hexadecimal digits.
     #[must_use]
     pub fn finish(mut self) -> String {
         if !self.started {
-            self.begin();
+            self.check_byte_order_mark();
         }
         if self.ends_in_cr {
             self.digest.update(b"\r");
@@ -45,15 +45,15 @@ impl TextHash {
         self.digest.finalize().iter().map(|byte| format!("{byte:02x}")).collect()
     }
 
-    fn begin(&mut self) {
+    fn check_byte_order_mark(&mut self) {
         self.started = true;
         let start = std::mem::take(&mut self.start);
         if start != BYTE_ORDER_MARK {
-            self.take(&start);
+            self.hash_lines(&start);
         }
     }
 
-    fn take(&mut self, bytes: &[u8]) {
+    fn hash_lines(&mut self, bytes: &[u8]) {
         let Some(first) = bytes.first() else { return };
         if std::mem::take(&mut self.ends_in_cr) && *first != b'\n' {
             self.digest.update(b"\r");

@@ -4,31 +4,31 @@
 use super::DASH;
 
 /// Powers of ten that are written in plain digits.
-const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
+const PLAIN_POWERS: std::ops::RangeInclusive<i32> = -3..=4;
 const MINUS: &str = "\u{2212}";
 const TIMES_TEN: &str = "\u{b7}10";
 
 /// Four significant digits.
 #[must_use]
-pub fn number(value: f64) -> String {
-    digits(value, 4)
+pub fn format_number(value: f64) -> String {
+    format_digits(value, 4)
 }
 
 /// Three significant digits without zeros at the end.
 #[must_use]
-pub fn short(value: f64) -> String {
-    trimmed(value, 3)
+pub fn format_short(value: f64) -> String {
+    format_trimmed(value, 3)
 }
 
 /// The value that has `count` significant digits of it.
 #[must_use]
-pub fn rounded(value: f64, count: usize) -> f64 {
+pub fn round_to_digits(value: f64, count: usize) -> f64 {
     format!("{value:.*e}", count.saturating_sub(1)).parse().unwrap_or(value)
 }
 
 /// A number as one types it: all of its digits, with a power of ten where zeros would be many.
 #[must_use]
-pub fn typed(value: f64) -> String {
+pub fn format_plain(value: f64) -> String {
     const WITHOUT_POWER: std::ops::Range<f64> = 1e-3..1e6;
     if value == 0.0 || WITHOUT_POWER.contains(&value.abs()) {
         value.to_string()
@@ -38,36 +38,36 @@ pub fn typed(value: f64) -> String {
 }
 
 /// A value as it is written, or a dash for a missing one.
-pub fn or_dash<T>(value: Option<T>, written: impl FnOnce(T) -> String) -> String {
+pub fn format_or_dash<T>(value: Option<T>, written: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| DASH.to_owned(), written)
 }
 
 /// `count` significant digits, zeros at the end included; all of those before the decimal point. A dash for
 /// what is no finite number.
 #[must_use]
-pub fn digits(value: f64, count: usize) -> String {
-    written(value, count, |plain| plain)
+pub fn format_digits(value: f64, count: usize) -> String {
+    format_significant(value, count, |plain| plain)
 }
 
 /// The same without zeros at the end of a fraction.
 #[must_use]
-pub fn trimmed(value: f64, count: usize) -> String {
-    written(value, count, without_zeros)
+pub fn format_trimmed(value: f64, count: usize) -> String {
+    format_significant(value, count, trim_zeros)
 }
 
-fn without_zeros(plain: &str) -> &str {
+fn trim_zeros(plain: &str) -> &str {
     if plain.contains('.') { plain.trim_end_matches('0').trim_end_matches('.') } else { plain }
 }
 
-fn written(value: f64, count: usize, shorten: impl Fn(&str) -> &str) -> String {
+fn format_significant(value: f64, count: usize, shorten: impl Fn(&str) -> &str) -> String {
     if !value.is_finite() {
         return DASH.to_owned();
     }
     let last = count.saturating_sub(1);
     // the power once rounded: 0.0999 with two digits is 0.10
     let scientific = format!("{value:.last$e}");
-    match split(&scientific) {
-        Some((_, power)) if PLAIN.contains(&power) => {
+    match split_exponent(&scientific) {
+        Some((_, power)) if PLAIN_POWERS.contains(&power) => {
             let decimals = usize::try_from(last as i32 - power).unwrap_or(0);
             typeset(shorten(&format!("{value:.decimals$}")))
         }
@@ -77,17 +77,17 @@ fn written(value: f64, count: usize, shorten: impl Fn(&str) -> &str) -> String {
 
 /// A fixed number of decimals.
 #[must_use]
-pub fn decimals(value: f64, count: usize) -> String {
+pub fn format_decimals(value: f64, count: usize) -> String {
     if value.is_finite() { typeset(&format!("{value:.count$}")) } else { DASH.to_owned() }
 }
 
 /// Digits, without zeros at the end, times a power of ten.
 #[must_use]
-pub fn scientific(value: f64, count: usize) -> String {
+pub fn format_scientific(value: f64, count: usize) -> String {
     let written = format!("{value:.count$e}");
-    match split(&written) {
+    match split_exponent(&written) {
         _ if value == 0.0 => "0".to_owned(),
-        Some((digits, power)) => typeset(&format!("{}e{power}", without_zeros(digits))),
+        Some((digits, power)) => typeset(&format!("{}e{power}", trim_zeros(digits))),
         None => DASH.to_owned(),
     }
 }
@@ -96,8 +96,8 @@ pub fn scientific(value: f64, count: usize) -> String {
 /// and a power of ten.
 #[must_use]
 pub(crate) fn typeset(written: &str) -> String {
-    let (digits, power) = match split(written) {
-        Some((digits, power)) => (digits, format!("{TIMES_TEN}{}", superscript(power))),
+    let (digits, power) = match split_exponent(written) {
+        Some((digits, power)) => (digits, format!("{TIMES_TEN}{}", to_superscript(power))),
         None => (written, String::new()),
     };
     match digits.strip_prefix('-') {
@@ -107,27 +107,28 @@ pub(crate) fn typeset(written: &str) -> String {
     }
 }
 
-fn split(scientific: &str) -> Option<(&str, i32)> {
+fn split_exponent(scientific: &str) -> Option<(&str, i32)> {
     let (digits, power) = scientific.split_once('e')?;
     Some((digits, power.parse().ok()?))
 }
 
-const RAISED: [char; 11] = [
+const SUPERSCRIPTS: [char; 11] = [
     '\u{2070}', '\u{b9}', '\u{b2}', '\u{b3}', '\u{2074}', '\u{2075}', '\u{2076}', '\u{2077}', '\u{2078}',
     '\u{2079}', '\u{207b}',
 ];
 
 /// An exponent as it stands behind a ten.
 #[must_use]
-pub fn superscript(exponent: i32) -> String {
-    let raised = |c: char| RAISED[c.to_digit(10).map_or(RAISED.len() - 1, |digit| digit as usize)];
+pub fn to_superscript(exponent: i32) -> String {
+    let raised =
+        |c: char| SUPERSCRIPTS[c.to_digit(10).map_or(SUPERSCRIPTS.len() - 1, |digit| digit as usize)];
     exponent.to_string().chars().map(raised).collect()
 }
 
 /// A printed number in letters that every terminal has: `-1.5e-7`, and `-` for a missing value.
 #[must_use]
-pub fn ascii(printed: &str) -> String {
-    let letter = |c: char| match RAISED.iter().position(|raised| *raised == c) {
+pub fn to_ascii(printed: &str) -> String {
+    let letter = |c: char| match SUPERSCRIPTS.iter().position(|raised| *raised == c) {
         Some(digit) => char::from_digit(digit as u32, 10).unwrap_or('-'),
         None if matches!(c, '\u{2212}' | '\u{2013}') => '-',
         None => c,
@@ -142,42 +143,51 @@ mod tests {
     #[test]
     fn numbers_have_four_digits_and_true_minus_signs() {
         assert_eq!(
-            [78.4, 900.0, 0.0, -0.0123456].map(number),
+            [78.4, 900.0, 0.0, -0.0123456].map(format_number),
             ["78.40", "900.0", "0.000", "\u{2212}0.01235"]
         );
-        assert_eq!(number(-1.23456e-7), "\u{2212}1.235\u{b7}10\u{207b}\u{2077}");
-        assert_eq!([number(f64::NAN), or_dash(None, number)], ["\u{2013}", "\u{2013}"]);
+        assert_eq!(format_number(-1.23456e-7), "\u{2212}1.235\u{b7}10\u{207b}\u{2077}");
+        assert_eq!([format_number(f64::NAN), format_or_dash(None, format_number)], ["\u{2013}", "\u{2013}"]);
     }
 
     #[test]
     fn numbers_have_the_digits_that_they_are_worth() {
         assert_eq!(
-            [digits(0.0, 2), digits(3.456, 2), digits(-0.09996, 3), digits(1234.0, 2), digits(f64::NAN, 2)],
+            [
+                format_digits(0.0, 2),
+                format_digits(3.456, 2),
+                format_digits(-0.09996, 3),
+                format_digits(1234.0, 2),
+                format_digits(f64::NAN, 2)
+            ],
             ["0.0", "3.5", "\u{2212}0.100", "1234", "\u{2013}"]
         );
-        assert_eq!([decimals(-0.04, 1), decimals(-0.05001, 1)], ["0.0", "\u{2212}0.1"]);
+        assert_eq!([format_decimals(-0.04, 1), format_decimals(-0.05001, 1)], ["0.0", "\u{2212}0.1"]);
     }
 
     #[test]
     fn three_digits_are_kept_at_any_size() {
         assert_eq!(
-            [0.0, 1.0, 0.0326, 848.83, 12345.0, -0.5].map(short),
+            [0.0, 1.0, 0.0326, 848.83, 12345.0, -0.5].map(format_short),
             ["0", "1", "0.0326", "849", "12345", "\u{2212}0.5"]
         );
-        assert_eq!([7.18e-6, 2.0e7].map(short), ["7.18\u{b7}10\u{207b}\u{2076}", "2.00\u{b7}10\u{2077}"]);
-        assert_eq!([f64::NAN, 0.9996, 99_999.0].map(short), ["\u{2013}", "1", "1.00\u{b7}10\u{2075}"]);
         assert_eq!(
-            [78.4, 900.0, 12.567, 1234.6, 0.51].map(|value| trimmed(value, 4)),
+            [7.18e-6, 2.0e7].map(format_short),
+            ["7.18\u{b7}10\u{207b}\u{2076}", "2.00\u{b7}10\u{2077}"]
+        );
+        assert_eq!([f64::NAN, 0.9996, 99_999.0].map(format_short), ["\u{2013}", "1", "1.00\u{b7}10\u{2075}"]);
+        assert_eq!(
+            [78.4, 900.0, 12.567, 1234.6, 0.51].map(|value| format_trimmed(value, 4)),
             ["78.4", "900", "12.57", "1235", "0.51"]
         );
     }
 
     #[test]
     fn a_terminal_reads_the_same_number() {
-        let read = |value: f64| ascii(&digits(value, 5)).parse::<f64>().unwrap();
+        let read = |value: f64| to_ascii(&format_digits(value, 5)).parse::<f64>().unwrap();
         for value in [-1.2345e-7, 1.2345e12, 0.5, -12.345, 0.0] {
             assert_eq!(read(value), value);
         }
-        assert_eq!(ascii(DASH), "-");
+        assert_eq!(to_ascii(DASH), "-");
     }
 }

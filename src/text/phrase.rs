@@ -2,7 +2,7 @@
 
 /// "a, b and c".
 #[must_use]
-pub fn listed(items: &[String]) -> String {
+pub fn join_with_and(items: &[String]) -> String {
     match items {
         [] => String::new(),
         [one] => one.clone(),
@@ -12,13 +12,13 @@ pub fn listed(items: &[String]) -> String {
 
 /// A noun as a count has it.
 #[must_use]
-pub fn plural(noun: &str, count: usize) -> String {
+pub fn pluralise(noun: &str, count: usize) -> String {
     if count == 1 { noun.to_owned() } else { format!("{noun}s") }
 }
 
 /// "once", "twice", "14 times".
 #[must_use]
-pub fn times(count: usize) -> String {
+pub fn format_times(count: usize) -> String {
     match count {
         1 => "once".to_owned(),
         2 => "twice".to_owned(),
@@ -28,7 +28,7 @@ pub fn times(count: usize) -> String {
 
 /// `0.09656 to 0.1355`, or what an open end leaves of it.
 #[must_use]
-pub fn interval(lower: Option<f64>, upper: Option<f64>, written: impl Fn(f64) -> String) -> String {
+pub fn format_interval(lower: Option<f64>, upper: Option<f64>, written: impl Fn(f64) -> String) -> String {
     match (lower, upper) {
         (Some(lower), Some(upper)) => format!("{} to {}", written(lower), written(upper)),
         (Some(lower), None) => format!("above {}", written(lower)),
@@ -39,7 +39,7 @@ pub fn interval(lower: Option<f64>, upper: Option<f64>, written: impl Fn(f64) ->
 
 /// The first letters of a text, with an ellipsis where some are left out.
 #[must_use]
-pub fn shortened(text: &str, most: usize) -> String {
+pub fn truncate_text(text: &str, most: usize) -> String {
     if text.chars().count() <= most {
         return text.to_owned();
     }
@@ -49,7 +49,7 @@ pub fn shortened(text: &str, most: usize) -> String {
 
 /// The first letter a capital.
 #[must_use]
-pub fn capitalised(text: &str) -> String {
+pub fn capitalise(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
@@ -62,7 +62,7 @@ pub(crate) fn panic_message(payload: &(dyn std::any::Any + Send)) -> Option<Stri
 
 /// Words broken into lines of at most so many characters; a longer word has a line of its own.
 #[must_use]
-pub fn wrapped(words: &str, width: usize) -> Vec<String> {
+pub fn wrap_words(words: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in words.split_whitespace() {
         match lines.last_mut() {
@@ -79,11 +79,11 @@ pub fn wrapped(words: &str, width: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::text::number;
+    use crate::text::format_number;
 
     #[test]
     fn an_open_end_is_said() {
-        let of = |lower, upper| interval(lower, upper, number);
+        let of = |lower, upper| format_interval(lower, upper, format_number);
         assert_eq!(of(Some(1.0), Some(2.0)), "1.000 to 2.000");
         assert_eq!(
             [of(Some(1.0), None), of(None, Some(2.0)), of(None, None)],
@@ -94,18 +94,22 @@ mod tests {
     #[test]
     fn long_names_end_in_an_ellipsis() {
         assert_eq!(
-            [shortened("deflection after", 12), shortened("release", 12), shortened("\u{e9}\u{e9}\u{e9}", 2)],
+            [
+                truncate_text("deflection after", 12),
+                truncate_text("release", 12),
+                truncate_text("\u{e9}\u{e9}\u{e9}", 2)
+            ],
             ["deflection\u{2026}", "release", "\u{e9}\u{2026}"]
         );
     }
 
     #[test]
     fn lists_and_counts_are_words() {
-        assert_eq!(listed(&["a".to_owned(), "b".to_owned(), "c".to_owned()]), "a, b and c");
+        assert_eq!(join_with_and(&["a".to_owned(), "b".to_owned(), "c".to_owned()]), "a, b and c");
         assert_eq!(
-            [times(1), times(14), plural("step", 1), plural("step", 0)],
+            [format_times(1), format_times(14), pluralise("step", 1), pluralise("step", 0)],
             ["once", "14 times", "step", "steps"]
         );
-        assert_eq!(capitalised("\u{e9}nergie"), "\u{c9}nergie");
+        assert_eq!(capitalise("\u{e9}nergie"), "\u{c9}nergie");
     }
 }

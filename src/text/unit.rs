@@ -1,71 +1,71 @@
 //! Units with the prefix that saves zeros, and shares as percentages.
 
-use super::deviation::with_sd;
-use super::number::{ascii, decimals, digits, short, typeset};
+use super::deviation::format_with_sd;
+use super::number::{format_decimals, format_digits, format_short, to_ascii, typeset};
 
 /// Prefixes with their factors, the smallest last.
 const PREFIXES: [(&str, f64); 3] = [("", 1.0), ("m", 1e3), ("\u{b5}", 1e6)];
 /// Units that take no prefix here, or are known better by another name.
-const OTHERWISE: [(&str, &str, f64); 5] =
+const UNPREFIXED_UNITS: [(&str, &str, f64); 5] =
     [("1", "", 1.0), ("", "", 1.0), ("kg", "g", 1e3), ("kg m2", "g mm\u{b2}", 1e9), ("s/m", "s/m", 1.0)];
 /// Least value, in the unit as shown, that is still without a prefix: 0.2 N is read as easily as 200 mN.
-const LEAST: f64 = 0.1;
+const LEAST_UNPREFIXED: f64 = 0.1;
 
 /// A unit with the prefix that makes the largest of some values readable, and the factor to it; nothing for a
 /// plain number.
 #[must_use]
-pub fn unit(unit: &str, values: impl IntoIterator<Item = f64>) -> (String, f64) {
-    if let Some((_, shown, factor)) = OTHERWISE.iter().find(|(name, ..)| *name == unit) {
+pub fn choose_prefix(unit: &str, values: impl IntoIterator<Item = f64>) -> (String, f64) {
+    if let Some((_, shown, factor)) = UNPREFIXED_UNITS.iter().find(|(name, ..)| *name == unit) {
         return ((*shown).to_owned(), *factor);
     }
     let largest = values.into_iter().filter(|v| v.is_finite()).map(f64::abs).fold(0.0, f64::max);
-    let fits = |(_, factor): &&(&str, f64)| largest == 0.0 || largest * factor >= LEAST;
+    let fits = |(_, factor): &&(&str, f64)| largest == 0.0 || largest * factor >= LEAST_UNPREFIXED;
     let (prefix, factor) = PREFIXES.iter().find(fits).unwrap_or(&PREFIXES[PREFIXES.len() - 1]);
     (format!("{prefix}{unit}"), *factor)
 }
 
 /// A name with its unit, as an axis has it.
 #[must_use]
-pub fn with_unit(name: &str, unit: &str) -> String {
+pub fn label_with_unit(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
 }
 
 /// A length in metres: micrometres with two digits, or millimetres with three.
 #[must_use]
-pub fn length(metres: f64) -> String {
+pub fn format_length(metres: f64) -> String {
     if metres.abs() < 1e-3 {
-        format!("{} \u{b5}m", digits(metres * 1e6, 2))
+        format!("{} \u{b5}m", format_digits(metres * 1e6, 2))
     } else {
-        format!("{} mm", digits(metres * 1e3, 3))
+        format!("{} mm", format_digits(metres * 1e3, 3))
     }
 }
 
 /// A speed in m/s, as mm/s with three digits.
 #[must_use]
-pub fn speed(metres_per_s: f64) -> String {
-    format!("{} mm/s", digits(metres_per_s * 1e3, 3))
+pub fn format_speed(metres_per_s: f64) -> String {
+    format!("{} mm/s", format_digits(metres_per_s * 1e3, 3))
 }
 
 /// A time in seconds, as ms to a tenth. One that is a clock's, and no length of a motion, stays in seconds.
 #[must_use]
-pub fn milliseconds(seconds: f64) -> String {
+pub fn format_milliseconds(seconds: f64) -> String {
     const CLOCK_S: f64 = 10.0;
     if seconds.abs() >= CLOCK_S {
-        format!("{} s", decimals(seconds, 4))
+        format!("{} s", format_decimals(seconds, 4))
     } else {
-        format!("{} ms", decimals(1e3 * seconds, 1))
+        format!("{} ms", format_decimals(1e3 * seconds, 1))
     }
 }
 
 /// A share as a percentage of three digits without zeros at the end: a tolerance of 0.02 is `2 %`.
 #[must_use]
-pub fn percent(share: f64) -> String {
-    format!("{} %", short(100.0 * share))
+pub fn format_percent(share: f64) -> String {
+    format!("{} %", format_short(100.0 * share))
 }
 
 /// A relative error as a signed percentage.
 #[must_use]
-pub fn signed_percent(share: f64) -> String {
+pub fn format_signed_percent(share: f64) -> String {
     let written = format!("{:+.2}", 100.0 * share);
     let written = if written[1..] == *"0.00" { "0.00" } else { &written };
     format!("{} %", typeset(written))
@@ -77,9 +77,9 @@ const LEAST_SHOWN_DEGREES: f64 = 1e-4;
 
 /// An angle with its standard deviation, rad, as degrees in plain letters: `0.300(1) degrees`.
 #[must_use]
-pub fn degrees(angle_rad: f64, sd_rad: f64) -> String {
+pub fn format_degrees(angle_rad: f64, sd_rad: f64) -> String {
     let sd = sd_rad.to_degrees().max(LEAST_SHOWN_DEGREES);
-    format!("{} degrees", ascii(&with_sd(angle_rad.to_degrees(), sd)))
+    format!("{} degrees", to_ascii(&format_with_sd(angle_rad.to_degrees(), sd)))
 }
 
 #[cfg(test)]
@@ -88,7 +88,7 @@ mod tests {
 
     #[test]
     fn prefixes_save_zeros_where_the_unit_takes_one() {
-        let of = |name: &str, value: f64| unit(name, [value, value / 1e9]);
+        let of = |name: &str, value: f64| choose_prefix(name, [value, value / 1e9]);
         assert_eq!(of("N m/rad", 0.0019), ("mN m/rad".to_owned(), 1e3));
         assert_eq!(of("N", -0.2), ("N".to_owned(), 1.0));
         assert_eq!(of("m", 2e-5), ("\u{b5}m".to_owned(), 1e6));
@@ -97,17 +97,22 @@ mod tests {
             [of("s/m", 1e-3), of("1", 1e-3), of("kg", 1e-4)],
             [("s/m".to_owned(), 1.0), (String::new(), 1.0), ("g".to_owned(), 1e3)]
         );
-        assert_eq!(unit("Hz", [0.0]), ("Hz".to_owned(), 1.0));
+        assert_eq!(choose_prefix("Hz", [0.0]), ("Hz".to_owned(), 1.0));
     }
 
     #[test]
     fn quantities_have_the_unit_in_which_they_read_best() {
         assert_eq!(
-            [length(3.2e-6), length(1.234e-3), speed(0.0071), milliseconds(-0.00014)],
+            [
+                format_length(3.2e-6),
+                format_length(1.234e-3),
+                format_speed(0.0071),
+                format_milliseconds(-0.00014)
+            ],
             ["3.2 \u{b5}m", "1.23 mm", "7.10 mm/s", "\u{2212}0.1 ms"]
         );
         assert_eq!(
-            [milliseconds(-0.00004), milliseconds(0.00004), milliseconds(-86400.0)],
+            [format_milliseconds(-0.00004), format_milliseconds(0.00004), format_milliseconds(-86400.0)],
             ["0.0 ms", "0.0 ms", "\u{2212}86400.0000 s"]
         );
     }
@@ -115,11 +120,11 @@ mod tests {
     #[test]
     fn shares_are_percentages() {
         assert_eq!(
-            [0.0123, -0.2, 0.0, -1e-6].map(signed_percent),
+            [0.0123, -0.2, 0.0, -1e-6].map(format_signed_percent),
             ["+1.23 %", "\u{2212}20.00 %", "0.00 %", "0.00 %"]
         );
         assert_eq!(
-            [0.02, 0.005, 0.0, 0.314, 1e-9].map(percent),
+            [0.02, 0.005, 0.0, 0.314, 1e-9].map(format_percent),
             ["2 %", "0.5 %", "0 %", "31.4 %", "1.00\u{b7}10\u{207b}\u{2077} %"]
         );
     }

@@ -1,38 +1,38 @@
 //! Every problem of a file at once: its tables and values against the schema of its format.
 
-use super::hint::{doubled, hint, unwritten};
-use super::{TomlError, line_and_column, nearest};
-use crate::text::typed;
+use super::hint::{describe_bad_line, describe_duplicate, suggest_value};
+use super::{TomlError, line_and_column, suggest_key};
+use crate::text::format_plain;
 use serde_json::Value as Schema;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
 /// Most problems that are listed: beyond it the file is most likely of another kind.
-const MOST: usize = 20;
+const MOST_PROBLEMS: usize = 20;
 
 /// What is wrong with a file, in the order of its lines; nothing for one that goes with the schema.
-pub(super) fn problems(file: &str, text: &str, schema: &Schema) -> Vec<TomlError> {
+pub(super) fn find_problems(file: &str, text: &str, schema: &Schema) -> Vec<TomlError> {
     let (table, errors) = DeTable::parse_recoverable(text);
-    let mut check = Check { file, text, root: schema, found: Vec::new() };
+    let mut check = SchemaCheck { file, text, root: schema, found: Vec::new() };
     if errors.is_empty() {
-        check.table(&[], table.get_ref(), schema, table.span());
+        check.check_table(&[], table.get_ref(), schema, table.span());
     }
-    for error in errors.iter().take(MOST) {
+    for error in errors.iter().take(MOST_PROBLEMS) {
         let at = error.span().map_or(0, |span| span.start);
         let (line, _) = line_and_column(text, at);
         let written = text.lines().nth(line - 1).unwrap_or_default();
         let problem = match error.message() {
-            "duplicate key" => doubled(written),
-            message => unwritten(written).unwrap_or_else(|| message.trim().replace('\n', "; ")),
+            "duplicate key" => describe_duplicate(written),
+            message => describe_bad_line(written).unwrap_or_else(|| message.trim().replace('\n', "; ")),
         };
-        check.add(at, problem);
+        check.add_problem(at, problem);
     }
     check.found.sort_by_key(|(at, _)| *at);
     check.found.dedup_by(|a, b| line_and_column(text, a.0).0 == line_and_column(text, b.0).0 && a.1 == b.1);
-    check.found.into_iter().map(|(_, problem)| problem).take(MOST).collect()
+    check.found.into_iter().map(|(_, problem)| problem).take(MOST_PROBLEMS).collect()
 }
 
-struct Check<'a> {
+struct SchemaCheck<'a> {
     file: &'a str,
     text: &'a str,
     root: &'a Schema,
@@ -40,26 +40,26 @@ struct Check<'a> {
     found: Vec<(usize, TomlError)>,
 }
 
-impl<'a> Check<'a> {
-    fn add(&mut self, at: usize, problem: String) {
+impl<'a> SchemaCheck<'a> {
+    fn add_problem(&mut self, at: usize, problem: String) {
         let (line, column) = line_and_column(self.text, at);
         self.found.push((at, TomlError::Syntax { file: self.file.to_owned(), line, column, problem }));
     }
 
-    fn table(&mut self, path: &[&str], table: &DeTable<'_>, schema: &'a Schema, span: Range<usize>) {
-        let schema = resolved(self.root, schema);
+    fn check_table(&mut self, path: &[&str], table: &DeTable<'_>, schema: &'a Schema, span: Range<usize>) {
+        let schema = resolve_reference(self.root, schema);
         let known = schema["properties"].as_object();
         let property = |name: &str| known.and_then(|known| known.get(name));
         let others = schema.get("additionalProperties");
         let mut meant: Vec<&str> = Vec::new();
         for (key, value) in table {
-            if self.found.len() >= MOST {
+            if self.found.len() >= MOST_PROBLEMS {
                 return;
             }
             let name: &str = key.get_ref();
             let path: Vec<&str> = path.iter().copied().chain([name]).collect();
             match (property(name), others) {
-                (Some(schema), _) => self.value(&path, value.get_ref(), schema, value.span()),
+                (Some(schema), _) => self.check_value(&path, value.get_ref(), schema, value.span()),
                 (None, Some(Schema::Bool(false))) => {
                     let names: Vec<&str> =
                         known.into_iter().flatten().map(|(name, _)| name.as_str()).collect();
@@ -69,12 +69,12 @@ impl<'a> Check<'a> {
                         line,
                         column,
                         key: path.join("."),
-                        advice: nearest(name, &names),
+                        advice: suggest_key(name, &names),
                     };
-                    meant.extend(names.iter().find(|known| unknown_means(&unknown, known)));
+                    meant.extend(names.iter().find(|known| suggests_key(&unknown, known)));
                     self.found.push((key.span().start, unknown));
                 }
-                (None, Some(schema)) => self.value(&path, value.get_ref(), schema, value.span()),
+                (None, Some(schema)) => self.check_value(&path, value.get_ref(), schema, value.span()),
                 (None, None) => (),
             }
         }
@@ -87,55 +87,59 @@ impl<'a> Check<'a> {
             let path: Vec<&str> = path.iter().copied().chain([name]).collect();
             let meaning = meaning.trim_end_matches('.');
             let add = if meaning.is_empty() { String::new() } else { format!("; add it: {meaning}") };
-            let problem =
-                format!("key `{}`: found nothing, expected {}{add}", path.join("."), expected(self.root, of));
-            self.add(span.start, problem);
+            let problem = format!(
+                "key `{}`: found nothing, expected {}{add}",
+                path.join("."),
+                describe_expected(self.root, of)
+            );
+            self.add_problem(span.start, problem);
         }
     }
 
-    fn value(&mut self, path: &[&str], value: &DeValue<'_>, schema: &'a Schema, span: Range<usize>) {
-        let ways = ways(self.root, schema);
-        let Some(way) = ways.iter().copied().find(|way| fits(way, value)) else {
+    fn check_value(&mut self, path: &[&str], value: &DeValue<'_>, schema: &'a Schema, span: Range<usize>) {
+        let ways = list_alternatives(self.root, schema);
+        let Some(way) = ways.iter().copied().find(|way| matches_schema(way, value)) else {
             let key = path.join(".");
             let name = path.last().copied().unwrap_or_default();
-            let kinds: Vec<&str> = ways.iter().flat_map(|way| types(way)).collect();
-            let hint = hint(name, value, &kinds).map_or_else(String::new, |hint| format!("; {hint}"));
+            let kinds: Vec<&str> = ways.iter().flat_map(|way| list_types(way)).collect();
+            let hint =
+                suggest_value(name, value, &kinds).map_or_else(String::new, |hint| format!("; {hint}"));
             let problem = format!(
                 "key `{key}`: found {}, expected {}{hint}",
-                found(value),
-                expected(self.root, schema)
+                describe_value(value),
+                describe_expected(self.root, schema)
             );
-            return self.add(span.start, problem);
+            return self.add_problem(span.start, problem);
         };
         match value {
-            DeValue::Table(table) => self.table(path, table, way, span),
+            DeValue::Table(table) => self.check_table(path, table, way, span),
             DeValue::Array(list) => {
                 let Some(items) = way.get("items") else { return };
                 for (i, item) in list.iter().enumerate() {
-                    if self.found.len() >= MOST {
+                    if self.found.len() >= MOST_PROBLEMS {
                         return;
                     }
                     let place = format!("{}[{}]", path.join("."), i + 1);
-                    self.value(&[&place], item.get_ref(), items, item.span());
+                    self.check_value(&[&place], item.get_ref(), items, item.span());
                 }
             }
-            DeValue::Integer(_) | DeValue::Float(_) => self.range(path, value, way, span.start),
+            DeValue::Integer(_) | DeValue::Float(_) => self.check_range(path, value, way, span.start),
             _ => (),
         }
     }
 
     /// A number against the range of its key.
-    fn range(&mut self, path: &[&str], value: &DeValue<'_>, schema: &Schema, at: usize) {
-        let written = found(value);
+    fn check_range(&mut self, path: &[&str], value: &DeValue<'_>, schema: &Schema, at: usize) {
+        let written = describe_value(value);
         let Ok(number) = written.replace('_', "").parse::<f64>() else { return };
         let [least, most, above] =
             ["minimum", "maximum", "exclusiveMinimum"].map(|end| schema.get(end).and_then(Schema::as_f64));
         let expected = match (least, most, above) {
             (Some(least), Some(most), _) if !(least..=most).contains(&number) => {
-                format!("a number from {} to {}", typed(least), typed(most))
+                format!("a number from {} to {}", format_plain(least), format_plain(most))
             }
             (Some(least), None, _)
-                if types(schema) == ["number"] && !(number >= least && number.is_finite()) =>
+                if list_types(schema) == ["number"] && !(number >= least && number.is_finite()) =>
             {
                 format!("a number of {least} or more")
             }
@@ -145,7 +149,7 @@ impl<'a> Check<'a> {
         let meaning = schema["description"].as_str().and_then(|words| words.split(". ").next());
         let meaning = meaning.map_or_else(String::new, |meaning| format!(" ({meaning})"));
         let key = path.join(".");
-        self.add(
+        self.add_problem(
             at,
             format!("key `{key}`: found {written}, expected {expected}{meaning}; correct the value"),
         );
@@ -153,22 +157,22 @@ impl<'a> Check<'a> {
 }
 
 /// A schema without its reference.
-fn resolved<'a>(root: &'a Schema, schema: &'a Schema) -> &'a Schema {
+fn resolve_reference<'a>(root: &'a Schema, schema: &'a Schema) -> &'a Schema {
     let pointer = schema["$ref"].as_str().and_then(|place| place.strip_prefix('#'));
     pointer.and_then(|pointer| root.pointer(pointer)).unwrap_or(schema)
 }
 
 /// The ways in which a value may be written.
-fn ways<'a>(root: &'a Schema, schema: &'a Schema) -> Vec<&'a Schema> {
-    let schema = resolved(root, schema);
+fn list_alternatives<'a>(root: &'a Schema, schema: &'a Schema) -> Vec<&'a Schema> {
+    let schema = resolve_reference(root, schema);
     match schema.get("anyOf").or(schema.get("oneOf")).and_then(Schema::as_array) {
-        Some(ways) => ways.iter().flat_map(|way| self::ways(root, way)).collect(),
+        Some(ways) => ways.iter().flat_map(|way| self::list_alternatives(root, way)).collect(),
         None => vec![schema],
     }
 }
 
 /// Whether an unknown key is taken for a known one.
-fn unknown_means(problem: &TomlError, known: &str) -> bool {
+fn suggests_key(problem: &TomlError, known: &str) -> bool {
     matches!(problem, TomlError::UnknownKey { advice, .. } if advice.contains(&format!("`{known}`?")))
 }
 
@@ -176,27 +180,28 @@ fn unknown_means(problem: &TomlError, known: &str) -> bool {
 const IN_WORDS: &str = "x-expected";
 
 /// What a schema takes, in words.
-pub(super) fn expected(root: &Schema, schema: &Schema) -> String {
-    let schema = resolved(root, schema);
+pub(super) fn describe_expected(root: &Schema, schema: &Schema) -> String {
+    let schema = resolve_reference(root, schema);
     if let Some(words) = schema.get(IN_WORDS).and_then(Schema::as_str) {
         return words.to_owned();
     }
     if let Some(all) = schema.get("anyOf").and_then(Schema::as_array) {
-        let all: Vec<String> = all.iter().map(|way| expected(root, way)).filter(|w| !w.is_empty()).collect();
+        let all: Vec<String> =
+            all.iter().map(|way| describe_expected(root, way)).filter(|w| !w.is_empty()).collect();
         return all.join(" or ");
     }
-    let ways = ways(root, schema);
-    let choices: Vec<&str> = ways.iter().filter_map(|way| words(way)).flatten().collect();
+    let ways = list_alternatives(root, schema);
+    let choices: Vec<&str> = ways.iter().filter_map(|way| list_words(way)).flatten().collect();
     let quoted: Vec<String> = choices.iter().map(|word| format!("\"{word}\"")).collect();
     match quoted.as_slice() {
-        [] => ways.iter().map(|way| one(way)).collect::<Vec<_>>().join(" or "),
+        [] => ways.iter().map(|way| describe_type(way)).collect::<Vec<_>>().join(" or "),
         [one] => one.clone(),
         many => format!("one of {}", many.join(", ")),
     }
 }
 
 /// Types of a schema without `null`: TOML has none.
-fn types(schema: &Schema) -> Vec<&str> {
+fn list_types(schema: &Schema) -> Vec<&str> {
     let all: Vec<&str> = match &schema["type"] {
         Schema::String(one) => vec![one.as_str()],
         Schema::Array(many) => many.iter().filter_map(Schema::as_str).collect(),
@@ -206,7 +211,7 @@ fn types(schema: &Schema) -> Vec<&str> {
 }
 
 /// The words that a schema takes, where it takes some words alone.
-fn words(schema: &Schema) -> Option<Vec<&str>> {
+fn list_words(schema: &Schema) -> Option<Vec<&str>> {
     if let Some(one) = schema.get("const") {
         return one.as_str().map(|word| vec![word]);
     }
@@ -214,11 +219,11 @@ fn words(schema: &Schema) -> Option<Vec<&str>> {
 }
 
 /// Whether a value has the type of a schema, or is one of its words.
-fn fits(schema: &Schema, value: &DeValue<'_>) -> bool {
-    if let Some(words) = words(schema) {
+fn matches_schema(schema: &Schema, value: &DeValue<'_>) -> bool {
+    if let Some(words) = list_words(schema) {
         return matches!(value, DeValue::String(text) if words.contains(&text.as_ref()));
     }
-    let types = types(schema);
+    let types = list_types(schema);
     if types.is_empty() {
         return schema.get("properties").is_none() && schema["type"].is_null();
     }
@@ -242,8 +247,8 @@ fn fits(schema: &Schema, value: &DeValue<'_>) -> bool {
 }
 
 /// What one way of a schema takes.
-fn one(schema: &Schema) -> String {
-    let kinds = types(schema);
+fn describe_type(schema: &Schema) -> String {
+    let kinds = list_types(schema);
     let word = |kind: &&str| match *kind {
         "number" => "a number",
         "integer" if schema["minimum"].as_f64() == Some(0.0) => "a whole number of 0 or more",
@@ -258,7 +263,7 @@ fn one(schema: &Schema) -> String {
 }
 
 /// A value in words.
-fn found(value: &DeValue<'_>) -> String {
+fn describe_value(value: &DeValue<'_>) -> String {
     match value {
         DeValue::String(text) => format!("the text \"{text}\""),
         DeValue::Integer(number) => number.as_str().to_owned(),

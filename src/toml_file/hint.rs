@@ -1,6 +1,6 @@
 //! What to write instead, where a slip is a common one.
 
-use crate::text::rounded;
+use crate::text::round_to_digits;
 use toml::de::DeValue;
 
 /// Digits of a converted number: a product of decimal numbers may have too many.
@@ -39,11 +39,11 @@ const UNITS: [(&str, &str, f64); 15] = [
 ];
 
 /// Advice on a value of the wrong type; `kinds` are the types that the key takes.
-pub(super) fn hint(key: &str, value: &DeValue<'_>, kinds: &[&str]) -> Option<String> {
+pub(super) fn suggest_value(key: &str, value: &DeValue<'_>, kinds: &[&str]) -> Option<String> {
     let takes = |kind: &str| kinds.contains(&kind);
     let is_numeric = takes("number") || takes("integer");
     match value {
-        DeValue::String(text) if is_numeric => number(key, text),
+        DeValue::String(text) if is_numeric => suggest_number(key, text),
         DeValue::String(text) if takes("array") => Some(format!("write [\"{text}\"]")),
         DeValue::Array(list) if is_numeric && list.len() == 2 => {
             Some("a decimal number has a point, no comma".to_owned())
@@ -60,7 +60,7 @@ pub(super) fn hint(key: &str, value: &DeValue<'_>, kinds: &[&str]) -> Option<Str
 }
 
 /// A number that was written as a text.
-fn number(key: &str, text: &str) -> Option<String> {
+fn suggest_number(key: &str, text: &str) -> Option<String> {
     let text = text.trim();
     if text.parse::<f64>().is_ok() {
         return Some(format!("write {text} without quotes"));
@@ -69,11 +69,11 @@ fn number(key: &str, text: &str) -> Option<String> {
     if pointed.parse::<f64>().is_ok() {
         return Some(format!("write {pointed}: a decimal number has a point, no comma, and no quotes"));
     }
-    with_unit(key, text)
+    suggest_without_unit(key, text)
 }
 
 /// A number with a unit behind it.
-fn with_unit(key: &str, text: &str) -> Option<String> {
+fn suggest_without_unit(key: &str, text: &str) -> Option<String> {
     // (the longest number at the start; `1e3Hz` has an exponent, `10e` none)
     let (value, unit) = (1..=text.len())
         .rev()
@@ -93,13 +93,15 @@ fn with_unit(key: &str, text: &str) -> Option<String> {
         UNITS.iter().find(of_key).map(|(_, _, size)| factor * size)
     });
     Some(match size {
-        Some(size) => format!("write {:?} without a unit: the key says it", rounded(value * size, DIGITS)),
+        Some(size) => {
+            format!("write {:?} without a unit: the key says it", round_to_digits(value * size, DIGITS))
+        }
         None => "write the number alone, in the unit that the key ends in".to_owned(),
     })
 }
 
 /// What is wrong with a key or table that was there before.
-pub(super) fn doubled(line: &str) -> String {
+pub(super) fn describe_duplicate(line: &str) -> String {
     let line = line.split('#').next().unwrap_or_default().trim();
     if let Some(table) = line.strip_prefix('[') {
         let name = table.trim_matches(['[', ']']).trim();
@@ -113,7 +115,7 @@ pub(super) fn doubled(line: &str) -> String {
 }
 
 /// What is wrong with a line that is no TOML, where the slip is a common one.
-pub(super) fn unwritten(line: &str) -> Option<String> {
+pub(super) fn describe_bad_line(line: &str) -> Option<String> {
     let line = line.split('#').next().unwrap_or_default().trim();
     let Some((key, value)) = line.split_once('=') else {
         let is_table = line.is_empty() || line.starts_with(['[', ']', '{', '}', '"', '\'']);
@@ -141,7 +143,7 @@ pub(super) fn unwritten(line: &str) -> Option<String> {
             Ok(number) => {
                 Some(format!("write {number:?}: a decimal number has a point with digits on both sides"))
             }
-            Err(_) => with_unit(last, value),
+            Err(_) => suggest_without_unit(last, value),
         };
         return hint.map(said);
     }
@@ -164,13 +166,19 @@ mod tests {
             ("lip_damping_ratio", "4.9 %", "0.049"),
             ("tilt_sd_deg", "0.3\u{b0}", "0.3"),
         ] {
-            assert!(with_unit(key, text).unwrap().starts_with(&format!("write {written} without")), "{text}");
+            assert!(
+                suggest_without_unit(key, text).unwrap().starts_with(&format!("write {written} without")),
+                "{text}"
+            );
         }
         // a quotient is not converted by its last unit, nor what is in no unit of the table
         for (key, text) in [("head_stiffness_n_per_m", "25 mm"), ("noise_px", "0.1 px"), ("stop_s", "1 min")]
         {
-            assert!(with_unit(key, text).unwrap().starts_with("write the number alone"), "{text}");
+            assert!(suggest_without_unit(key, text).unwrap().starts_with("write the number alone"), "{text}");
         }
-        assert_eq!((with_unit("stop_s", "soon"), with_unit("stop_s", "1.0")), (None, None));
+        assert_eq!(
+            (suggest_without_unit("stop_s", "soon"), suggest_without_unit("stop_s", "1.0")),
+            (None, None)
+        );
     }
 }

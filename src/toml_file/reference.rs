@@ -11,12 +11,12 @@ pub struct KeyTable {
     /// What it is.
     pub about: String,
     /// Its keys.
-    pub keys: Vec<Key>,
+    pub keys: Vec<KeyEntry>,
 }
 
 /// A key of a table.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Key {
+pub struct KeyEntry {
     /// Its name.
     pub name: String,
     /// What it takes, with range and default.
@@ -29,22 +29,22 @@ pub struct Key {
 
 /// The tables of a kind of file: the file itself, then those in it, each followed by those in it.
 #[must_use]
-pub fn reference(schema: &Value) -> Vec<KeyTable> {
+pub fn list_key_tables(schema: &Value) -> Vec<KeyTable> {
     let mut all = Vec::new();
-    tables(&mut all, schema, schema, "");
+    collect_tables(&mut all, schema, schema, "");
     all
 }
 
-fn tables(all: &mut Vec<KeyTable>, root: &Value, table: &Value, name: &str) {
-    let table = resolved(root, table);
+fn collect_tables(all: &mut Vec<KeyTable>, root: &Value, table: &Value, name: &str) {
+    let table = resolve_reference(root, table);
     let Some(keys) = table["properties"].as_object() else { return };
     let required: Vec<&str> =
         table["required"].as_array().into_iter().flatten().filter_map(Value::as_str).collect();
     let key = |(key, part): (&String, &Value)| {
-        let meaning = part["description"].as_str().or(resolved(root, part)["description"].as_str());
-        Key {
+        let meaning = part["description"].as_str().or(resolve_reference(root, part)["description"].as_str());
+        KeyEntry {
             name: key.clone(),
-            value: value(root, part),
+            value: describe_takes(root, part),
             required: required.contains(&key.as_str()),
             meaning: meaning.unwrap_or_default().replace('\n', " "),
         }
@@ -56,18 +56,18 @@ fn tables(all: &mut Vec<KeyTable>, root: &Value, table: &Value, name: &str) {
             "" => key.clone(),
             outer => format!("{outer}.{key}"),
         };
-        let part = inner(root, part);
+        let part = resolve_container(root, part);
         if part["type"] == "array" {
-            tables(all, root, inner(root, &part["items"]), &format!("[[{at}]]"));
+            collect_tables(all, root, resolve_container(root, &part["items"]), &format!("[[{at}]]"));
         } else {
-            tables(all, root, part, &format!("[{at}]"));
+            collect_tables(all, root, part, &format!("[{at}]"));
         }
     }
 }
 
 /// What a key takes, with its range and default.
-fn value(root: &Value, part: &Value) -> String {
-    let mut words = check::expected(root, part);
+fn describe_takes(root: &Value, part: &Value) -> String {
+    let mut words = check::describe_expected(root, part);
     let number = |key: &str| part[key].as_f64();
     match (number("minimum"), number("maximum"), number("exclusiveMinimum")) {
         (Some(least), Some(most), _) => words = format!("{words} from {least} to {most}"),
@@ -82,14 +82,14 @@ fn value(root: &Value, part: &Value) -> String {
 }
 
 /// A schema without its reference, and of several ways the one that is a table or a list.
-fn inner<'a>(root: &'a Value, part: &'a Value) -> &'a Value {
-    let part = resolved(root, part);
+fn resolve_container<'a>(root: &'a Value, part: &'a Value) -> &'a Value {
+    let part = resolve_reference(root, part);
     let ways = part.get("anyOf").and_then(Value::as_array);
-    let ways = ways.into_iter().flatten().map(|way| inner(root, way));
+    let ways = ways.into_iter().flatten().map(|way| resolve_container(root, way));
     ways.into_iter().find(|way| way["type"] == "object" || way["type"] == "array").unwrap_or(part)
 }
 
-fn resolved<'a>(root: &'a Value, part: &'a Value) -> &'a Value {
+fn resolve_reference<'a>(root: &'a Value, part: &'a Value) -> &'a Value {
     let pointer = part["$ref"].as_str().and_then(|place| place.strip_prefix('#'));
     pointer.and_then(|pointer| root.pointer(pointer)).unwrap_or(part)
 }

@@ -4,23 +4,23 @@ use crate::recording::Recording;
 use std::fmt::Write;
 
 /// Names of the tracks: the mark that the data are synthetic travels in the file itself.
-pub const TRACK_NAMES: [&str; 2] = ["synthetic tip", "synthetic head"];
+pub const SYNTHETIC_TRACK_NAMES: [&str; 2] = ["synthetic tip", "synthetic head"];
 
 /// The recording as a tab-separated table of two tracks in pixels, y upwards, time from the first frame; an
 /// empty cell where a point was lost. Numbers carry seven digits, as Tracker's do.
 #[must_use]
-pub fn tracker_table(recording: &Recording, metres_per_pixel: f64) -> String {
-    let [tip, head] = TRACK_NAMES;
+pub fn write_tracker_table(recording: &Recording, metres_per_pixel: f64) -> String {
+    let [tip, head] = SYNTHETIC_TRACK_NAMES;
     let mut text = format!("#multi:\n\t{tip}\t\t{head}\t\t\nt\tx\ty\tx\ty\t\n");
     let traces = recording.traces();
     let columns = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
     for i in 0..recording.grid().frames {
         // writing to a String cannot fail
-        let _ = write!(text, "{}", number(i as f64 / recording.grid().frame_rate_hz));
+        let _ = write!(text, "{}", format_java_number(i as f64 / recording.grid().frame_rate_hz));
         for column in columns {
             text.push('\t');
             if let Some(value) = column[i] {
-                text.push_str(&number(value / metres_per_pixel));
+                text.push_str(&format_java_number(value / metres_per_pixel));
             }
         }
         text.push('\n');
@@ -29,7 +29,7 @@ pub fn tracker_table(recording: &Recording, metres_per_pixel: f64) -> String {
 }
 
 /// `1.234567E-1`: Java's scientific notation without a sign in front of a positive exponent.
-fn number(value: f64) -> String {
+fn format_java_number(value: f64) -> String {
     format!("{value:.6E}")
 }
 
@@ -53,6 +53,6 @@ mod tests {
                 .unwrap();
         let lines = "#multi:\n\tsynthetic tip\t\tsynthetic head\t\t\nt\tx\ty\tx\ty\t\n0.000000E0\t1.000000E2\t-3.000000E2\t\t\n\
                      1.000000E-4\t2.000000E2\t-3.000000E2\t0.000000E0\t5.000000E-2\n";
-        assert_eq!(tracker_table(&recording, 2e-5), lines);
+        assert_eq!(write_tracker_table(&recording, 2e-5), lines);
     }
 }

@@ -10,10 +10,10 @@
 
 mod like;
 
-pub use like::{Dropouts, LikeError, LikeFilm, film_like};
+pub use like::{DropoutPattern, MatchedFilm, MatchedFilmError, film_like_recording};
 
 use super::Camera;
-use crate::recording::interpolate::{ON_FRAME, STENCIL, on_frame, through_six};
+use crate::recording::interpolate::{ON_FRAME_TOLERANCE, STENCIL, frame_at, lagrange_through_six};
 use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
 
 /// Samples of the fine trace in the time of a frame, at least, so that the error above holds.
@@ -93,13 +93,13 @@ pub enum FilmError {
 ///
 /// # Errors
 /// [`FilmError`].
-pub fn film(fine: &Recording, camera: &Camera, start_s: f64) -> Result<Recording, FilmError> {
-    check_camera(camera)?;
-    let grid = frames(fine, camera, start_s)?;
-    let shutter = Shutter::new(fine, camera, &grid);
-    shutter.check(fine, camera, &grid)?;
+pub fn film_trace(fine: &Recording, camera: &Camera, start_s: f64) -> Result<Recording, FilmError> {
+    check_film_camera(camera)?;
+    let grid = plan_frames(fine, camera, start_s)?;
+    let shutter = FrameShutter::new(fine, camera, &grid);
+    shutter.check_sampling(fine, camera, &grid)?;
     let seen = |column: &[Option<f64>]| -> Vec<Option<f64>> {
-        (0..grid.frames).map(|frame| shutter.mean(column, frame)).collect()
+        (0..grid.frames).map(|frame| shutter.frame_mean(column, frame)).collect()
     };
     let traces = fine.traces();
     let traces = Traces {
@@ -113,7 +113,7 @@ pub fn film(fine: &Recording, camera: &Camera, start_s: f64) -> Result<Recording
         .map_err(|error| FilmError::Recording { trace: fine.name().to_owned(), error })
 }
 
-fn check_camera(camera: &Camera) -> Result<(), FilmError> {
+fn check_film_camera(camera: &Camera) -> Result<(), FilmError> {
     let Camera { frame_rate_hz, exposure_s } = *camera;
     if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
         return Err(FilmError::Camera {
@@ -133,31 +133,32 @@ fn check_camera(camera: &Camera) -> Result<(), FilmError> {
 }
 
 /// The camera's frames from `start_s` to the last sample; never more than samples.
-fn frames(fine: &Recording, camera: &Camera, start_s: f64) -> Result<FrameGrid, FilmError> {
+fn plan_frames(fine: &Recording, camera: &Camera, start_s: f64) -> Result<FrameGrid, FilmError> {
     let (trace, grid) = (fine.name().to_owned(), fine.grid());
     let (fine_hz, end_s) = (grid.frame_rate_hz, grid.time_s(grid.frames - 1));
     let least_hz = LEAST_OVERSAMPLING * camera.frame_rate_hz;
-    if fine_hz < camera.frame_rate_hz * (1.0 - ON_FRAME) {
+    if fine_hz < camera.frame_rate_hz * (1.0 - ON_FRAME_TOLERANCE) {
         return Err(FilmError::TooCoarse { trace, fine_hz, least_hz, frame_rate_hz: camera.frame_rate_hz });
     }
-    let slack_s = ON_FRAME / fine_hz;
+    let slack_s = ON_FRAME_TOLERANCE / fine_hz;
     if !(grid.start_s - slack_s..=end_s + slack_s).contains(&start_s) {
         return Err(FilmError::Outside { trace, found_s: start_s, start_s: grid.start_s, end_s });
     }
     // bounded by the samples
-    let frames = ((end_s - start_s) * camera.frame_rate_hz + ON_FRAME).floor().max(0.0) as usize + 1;
+    let frames =
+        ((end_s - start_s) * camera.frame_rate_hz + ON_FRAME_TOLERANCE).floor().max(0.0) as usize + 1;
     Ok(FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames })
 }
 
 /// Where the open shutter lies on the samples, in samples (real numbers).
-struct Shutter {
+struct FrameShutter {
     first: f64,
     samples_per_frame: f64,
     open: f64,
     last: f64,
 }
 
-impl Shutter {
+impl FrameShutter {
     fn new(fine: &Recording, camera: &Camera, grid: &FrameGrid) -> Self {
         let (start_s, rate_hz, frames) = (fine.grid().start_s, fine.grid().frame_rate_hz, fine.grid().frames);
         Self {
@@ -169,30 +170,30 @@ impl Shutter {
     }
 
     /// Whether the path between samples is known well enough, or not needed.
-    fn check(&self, fine: &Recording, camera: &Camera, grid: &FrameGrid) -> Result<(), FilmError> {
+    fn check_sampling(&self, fine: &Recording, camera: &Camera, grid: &FrameGrid) -> Result<(), FilmError> {
         let trace = || fine.name().to_owned();
-        if self.open == 0.0 && (0..grid.frames).all(|frame| on_frame(self.centre(frame)).is_some()) {
+        if self.open == 0.0 && (0..grid.frames).all(|frame| frame_at(self.frame_centre(frame)).is_some()) {
             return Ok(());
         }
         let (fine_hz, frame_rate_hz) = (fine.grid().frame_rate_hz, camera.frame_rate_hz);
         let least_hz = LEAST_OVERSAMPLING * frame_rate_hz;
-        if fine_hz < least_hz * (1.0 - ON_FRAME) {
+        if fine_hz < least_hz * (1.0 - ON_FRAME_TOLERANCE) {
             return Err(FilmError::TooCoarse { trace: trace(), fine_hz, least_hz, frame_rate_hz });
         }
         let found = fine.grid().frames;
         if found < STENCIL { Err(FilmError::TooShort { trace: trace(), found }) } else { Ok(()) }
     }
 
-    fn centre(&self, frame: usize) -> f64 {
+    fn frame_centre(&self, frame: usize) -> f64 {
         (self.first + frame as f64 * self.samples_per_frame).clamp(0.0, self.last)
     }
 
     /// Mean of a column over the shutter of a frame: its pieces between samples, each by a rule that is exact
     /// for it.
-    fn mean(&self, column: &[Option<f64>], frame: usize) -> Option<f64> {
+    fn frame_mean(&self, column: &[Option<f64>], frame: usize) -> Option<f64> {
         let centre = self.first + frame as f64 * self.samples_per_frame;
         if self.open == 0.0 {
-            return value(column, centre.clamp(0.0, self.last));
+            return interpolate_column(column, centre.clamp(0.0, self.last));
         }
         let (from, to) = (centre - self.open / 2.0, centre + self.open / 2.0);
         let (inner_from, inner_to) = (from.clamp(0.0, self.last), to.clamp(0.0, self.last));
@@ -201,7 +202,7 @@ impl Shutter {
         while at < inner_to {
             let next = (at.floor() + 1.0).min(inner_to);
             for (node, weight) in GAUSS {
-                sum += weight * (next - at) * value(column, at + node * (next - at))?;
+                sum += weight * (next - at) * interpolate_column(column, at + node * (next - at))?;
             }
             at = next;
         }
@@ -217,10 +218,10 @@ impl Shutter {
 
 /// The path at `at`, counted in samples, inside the column: the sample itself, or the polynomial through the
 /// six samples around, which near the ends lie more to one side.
-fn value(column: &[Option<f64>], at: f64) -> Option<f64> {
-    if let Some(sample) = on_frame(at) {
+fn interpolate_column(column: &[Option<f64>], at: f64) -> Option<f64> {
+    if let Some(sample) = frame_at(at) {
         return *column.get(sample)?;
     }
     let first = (at.floor() as usize).saturating_sub(STENCIL / 2 - 1).min(column.len().checked_sub(STENCIL)?);
-    through_six(column, first, at)
+    lagrange_through_six(column, first, at)
 }

@@ -1,6 +1,6 @@
 //! The specification of a twin, as written and as validated.
 
-use super::{Camera, Tracking};
+use super::{Camera, TrackingModel};
 use crate::simulate::scene::Scene;
 use crate::toml_file::{self, TomlError};
 use schemars::JsonSchema;
@@ -8,7 +8,7 @@ use serde::Deserialize;
 
 /// Why a specification was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum SpecError {
+pub enum TwinSpecError {
     /// The file is not TOML of this format.
     #[error(transparent)]
     Toml(#[from] TomlError),
@@ -36,7 +36,7 @@ pub struct TwinSpec {
     /// The camera.
     pub camera: Camera,
     /// What tracking adds.
-    pub tracking: Tracking,
+    pub tracking: TrackingModel,
     /// Part of the scene's time that is recorded, s; the whole run where `None`.
     pub window_s: Option<[f64; 2]>,
     /// Whether a table in Tracker's export layout is written next to the traces.
@@ -46,7 +46,7 @@ pub struct TwinSpec {
 /// A synthetic recording: a scene seen by a camera.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct SpecFile {
+struct TwinFile {
     /// Version of the format: 1.
     format: u32,
     /// Title for pages and figures.
@@ -56,11 +56,11 @@ struct SpecFile {
     /// Seed of the noise and of the lost frames, a whole number.
     seed: u64,
     /// The camera and the tracking.
-    camera: CameraFile,
+    camera: TwinCameraFile,
     /// Part of the run that is recorded; all if left out.
-    window: Option<WindowFile>,
+    window: Option<TwinWindowFile>,
     /// Whether an export of a tracking program is written too.
-    export: Option<ExportFile>,
+    export: Option<TwinExportFile>,
     /// Written by the program into the specification that goes with a twin; not read back.
     #[allow(dead_code)]
     #[schemars(with = "Option<serde_json::Map<String, serde_json::Value>>")]
@@ -70,7 +70,7 @@ struct SpecFile {
 /// A camera and what tracking adds.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct CameraFile {
+struct TwinCameraFile {
     /// Frames per second, 1/s.
     frame_rate_hz: f64,
     /// Time for which the shutter is open, s; 0 if left out.
@@ -89,7 +89,7 @@ struct CameraFile {
 /// Part of a run.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct WindowFile {
+struct TwinWindowFile {
     /// Its start, s.
     start_s: f64,
     /// Its end, s.
@@ -99,15 +99,15 @@ struct WindowFile {
 /// An export of a tracking program.
 #[derive(Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-struct ExportFile {
+struct TwinExportFile {
     /// Whose layout it has.
     #[allow(dead_code)]
-    layout: Layout,
+    layout: ExportLayout,
 }
 
 #[derive(Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-enum Layout {
+enum ExportLayout {
     Tracker,
 }
 
@@ -119,15 +119,15 @@ impl TwinSpec {
     /// The JSON Schema of twin.toml: for editors, and for messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
-        toml_file::schema::<SpecFile>()
+        toml_file::schema_of::<TwinFile>()
     }
 
     /// Reads and validates a specification; `file` is the name used in refusals.
     ///
     /// # Errors
-    /// [`SpecError`] with file, key, what was found and what was expected.
-    pub fn parse(file: &str, text: &str) -> Result<Self, SpecError> {
-        let written: SpecFile = toml_file::parse(file, text)?;
+    /// [`TwinSpecError`] with file, key, what was found and what was expected.
+    pub fn parse(file: &str, text: &str) -> Result<Self, TwinSpecError> {
+        let written: TwinFile = toml_file::parse_toml(file, text)?;
         toml_file::check_format(file, written.format)?;
         let camera = &written.camera;
         let positive = |v: f64| v.is_finite() && v > 0.0;
@@ -181,7 +181,7 @@ impl TwinSpec {
             title: written.title,
             scene: written.scene,
             camera: Camera { frame_rate_hz: camera.frame_rate_hz, exposure_s: camera.exposure_s },
-            tracking: Tracking {
+            tracking: TrackingModel {
                 metres_per_pixel: camera.metres_per_pixel,
                 noise_px: camera.noise_px,
                 dropout_fraction: camera.dropout_fraction,
@@ -195,8 +195,8 @@ impl TwinSpec {
     /// The recorded part of a scene's time, s.
     ///
     /// # Errors
-    /// [`SpecError::Value`] when the window is outside the scene's run or holds too few or too many frames.
-    pub fn window_in(&self, file: &str, scene: &Scene) -> Result<[f64; 2], SpecError> {
+    /// [`TwinSpecError::Value`] when the window is outside the scene's run or holds too few or too many frames.
+    pub fn window_within(&self, file: &str, scene: &Scene) -> Result<[f64; 2], TwinSpecError> {
         let [start, stop] = self.window_s.unwrap_or([scene.start_s, scene.run.stop_s]);
         if start < scene.start_s || stop > scene.run.stop_s {
             let expected = format!("a window within the scene's {} to {} s", scene.start_s, scene.run.stop_s);
@@ -215,6 +215,11 @@ impl TwinSpec {
     }
 }
 
-fn value_error(file: &str, key: &'static str, found: &str, expected: &str) -> SpecError {
-    SpecError::Value { file: file.to_owned(), key, found: found.to_owned(), expected: expected.to_owned() }
+fn value_error(file: &str, key: &'static str, found: &str, expected: &str) -> TwinSpecError {
+    TwinSpecError::Value {
+        file: file.to_owned(),
+        key,
+        found: found.to_owned(),
+        expected: expected.to_owned(),
+    }
 }

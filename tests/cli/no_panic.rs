@@ -1,9 +1,9 @@
 //! No record, however broken, makes the search for instants or components panic.
 
 use proptest::prelude::*;
-use wiperlab::recording::channel::{Channel, Instants, Window};
+use wiperlab::recording::channel::{Channel, ReversalInstants, Window};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::spectrum::{Settings, analyse};
+use wiperlab::spectrum::{SpectrumSettings, analyse_spectrum};
 
 fn column(frames: usize) -> impl Strategy<Value = Vec<Option<f64>>> {
     let wild = prop_oneof![4 => (-1.0..1.0f64).prop_map(Some), 3 => (-3i32..3).prop_map(|i| Some(f64::from(i) * 1e-3)), 2 => Just(None), 1 => Just(Some(9e5)), 1 => Just(Some(-9e5))];
@@ -16,16 +16,16 @@ proptest! {
         let frames = tip.len();
         let traces = Traces { tip_x_m: tip, tip_y_m: vec![None; frames], head_x_m: head, head_y_m: vec![None; frames], ..Traces::default() };
         let recording = Recording::new("r", FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames }, traces, true).unwrap();
-        let found = Instants::find(&recording);
+        let found = ReversalInstants::find_instants(&recording);
         prop_assert!(found.reversals.windows(2).all(|w| w[0].reversal_s <= w[1].reversal_s));
         prop_assert!(found.reversals.iter().all(|r| r.reversal_s.is_finite()));
-        let _ = Window::parse("hold..release").unwrap().resolve(&recording, &found);
-        let _ = analyse(&Channel::TipX.samples(&recording), 1000.0, &Settings::default());
+        let _ = Window::parse("hold..release").unwrap().resolve_frames(&recording, &found);
+        let _ = analyse_spectrum(&Channel::TipX.samples(&recording), 1000.0, &SpectrumSettings::default());
     }
 
     #[test]
     fn any_usable_record_has_a_finite_spectrum(samples in (8..300usize).prop_flat_map(|n| prop::collection::vec(prop::option::weighted(0.8, -1.0..1.0f64), n))) {
-        if let Ok(found) = analyse(&samples, 1000.0, &Settings::default()) {
+        if let Ok(found) = analyse_spectrum(&samples, 1000.0, &SpectrumSettings::default()) {
             prop_assert!(found.amplitude_m.iter().all(|a| a.is_finite()) && found.noise_floor_m.is_finite());
             prop_assert!(found.components.iter().all(|c| c.frequency_sd_hz.is_finite() && c.amplitude_m.is_finite() && c.snr_db.is_finite()));
         }

@@ -7,7 +7,7 @@ use serde_json::Value;
 use std::path::Path;
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::{Measured, Problem};
+use wiperlab::fit::{MeasuredRecording, Problem};
 use wiperlab::recording::files::{RecordingFile, read_recording};
 use wiperlab::simulate::scene::Scene;
 
@@ -58,7 +58,7 @@ fn problem_in(root: &Path, fit: &str) -> (Problem, String) {
         let file = RecordingFile::parse("recording.toml", &read(&at.join("recording.toml"))).unwrap();
         let recording =
             read_recording("twin", "trace.csv", &read(&at.join("trace.csv")), Some(&file)).unwrap();
-        Measured { recording, exposure_s: file.camera.exposure_s }
+        MeasuredRecording { recording, exposure_s: file.camera.exposure_s }
     });
     let measured = measured.collect();
     (Problem::new(job, scenes, measured).unwrap(), read(&folder.join("result.json")))
@@ -134,7 +134,7 @@ fn every_changed_number_is_refused_by_the_hash_and_what_can_be_computed_by_the_m
     let (problem, text) = problem("published-simulation");
     let check = |text: &str| {
         let result: FitResult = serde_json::from_str(text).map_err(|error| error.to_string())?;
-        result.check_of(problem.job(), "r").map_err(|error| error.to_string())?;
+        result.check_against_job(problem.job(), "r").map_err(|error| error.to_string())?;
         problem.check_result(&result, "r").map_err(|error| error.to_string())
     };
     assert_eq!(check(&text), Ok(()), "the committed result is what the model shows");

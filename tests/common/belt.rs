@@ -2,7 +2,7 @@
 
 #![allow(dead_code)] // each test program uses a part
 
-use wiperlab::ode::{End, Phase, Start};
+use wiperlab::ode::{HybridPhase, PhaseEnd, PhaseStart};
 
 /// The static limit is `at_rest`, the kinetic force a function of the sliding speed.
 pub struct Belt {
@@ -19,7 +19,7 @@ pub struct Belt {
 /// The mass lags behind the belt; states are position and velocity. The sliding speed stays positive.
 pub struct Sliding<'a>(pub &'a Belt);
 
-impl Phase<2, 1> for Sliding<'_> {
+impl HybridPhase<2, 1> for Sliding<'_> {
     fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
         [y[1], (self.0.kinetic)(self.0.speed - y[1]) - y[0]]
     }
@@ -34,7 +34,7 @@ impl Phase<2, 1> for Sliding<'_> {
 /// The mass rides on the belt; the spring stays within the static limit.
 pub struct Riding<'a>(pub &'a Belt);
 
-impl Phase<1, 1> for Riding<'_> {
+impl HybridPhase<1, 1> for Riding<'_> {
     fn derivative(&self, _: f64, _: &[f64; 1]) -> [f64; 1] {
         [self.0.speed]
     }
@@ -48,13 +48,13 @@ impl Phase<1, 1> for Riding<'_> {
 
 impl Belt {
     /// Slip from a release at `t`.
-    pub fn release(&self, t: f64, x: f64) -> Start<2, 1> {
-        Start { t, y: [x, self.speed], zero_order: [self.release_order], step: None }
+    pub fn release(&self, t: f64, x: f64) -> PhaseStart<2, 1> {
+        PhaseStart { t, y: [x, self.speed], zero_order: [self.release_order], step: None }
     }
 
     /// Stick from where slip ended.
-    pub fn catch(&self, slip: &End<2>) -> Start<1, 1> {
-        Start { t: slip.t, y: [slip.y[0]], zero_order: [0], step: None }
+    pub fn catch(&self, slip: &PhaseEnd<2>) -> PhaseStart<1, 1> {
+        PhaseStart { t: slip.t, y: [slip.y[0]], zero_order: [0], step: None }
     }
 }
 

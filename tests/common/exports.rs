@@ -5,7 +5,7 @@
 #![allow(dead_code)] // each test program uses a part
 
 use std::fmt::Write;
-use wiperlab::import::{Columns, Companion, Options, Scale, Source, TimeColumn};
+use wiperlab::import::{ColumnMap, CompanionFile, CoordinateScale, ImportOptions, ImportSource, TimeColumn};
 use wiperlab::recording::files::YAxis;
 
 /// Frames of two points: tip x and y, head x and y, `None` where a point was lost.
@@ -25,7 +25,7 @@ pub struct Exporter {
     pub write: fn(&Motion) -> String,
     /// Its companion files.
     pub companions: fn(&Motion) -> Vec<(&'static str, String)>,
-    pub options: fn(&mut Options),
+    pub options: fn(&mut ImportOptions),
     /// Points that it holds: 2, or 1 for the tip alone.
     pub points: usize,
     /// Whether the rows carry no frame and no time, so that a lost row cannot be noticed.
@@ -33,11 +33,11 @@ pub struct Exporter {
 }
 
 impl Exporter {
-    pub fn source(&self, motion: &Motion) -> Source {
+    pub fn source(&self, motion: &Motion) -> ImportSource {
         let companions = (self.companions)(motion)
             .into_iter()
-            .map(|(name, text)| Companion { name: name.to_owned(), bytes: text.into_bytes() });
-        Source {
+            .map(|(name, text)| CompanionFile { name: name.to_owned(), bytes: text.into_bytes() });
+        ImportSource {
             name: self.file.to_owned(),
             bytes: (self.write)(motion).into_bytes(),
             companions: companions.collect(),
@@ -45,15 +45,15 @@ impl Exporter {
     }
 
     /// Everything that the user has to say; coordinates count as metres with y upwards.
-    pub fn options(&self, motion: &Motion) -> Options {
-        let mut options = Options {
+    pub fn options(&self, motion: &Motion) -> ImportOptions {
+        let mut options = ImportOptions {
             name: "made".to_owned(),
             frame_rate_hz: Some(motion.rate_hz),
-            scale: Some(Scale::Unit(1.0)),
+            scale: Some(CoordinateScale::Unit(1.0)),
             y_axis: Some(YAxis::Up),
             tip: Some("tip".to_owned()),
             head: (self.points == 2).then(|| "head".to_owned()),
-            ..Options::default()
+            ..ImportOptions::default()
         };
         (self.options)(&mut options);
         options
@@ -64,19 +64,19 @@ fn nothing(_: &Motion) -> Vec<(&'static str, String)> {
     vec![]
 }
 
-fn as_they_are(_: &mut Options) {}
+fn as_they_are(_: &mut ImportOptions) {}
 
-fn by_id(options: &mut Options) {
+fn by_id(options: &mut ImportOptions) {
     (options.tip, options.head) = (Some("0".to_owned()), Some("1".to_owned()));
 }
 
-fn frames_in_time(options: &mut Options) {
+fn frames_in_time(options: &mut ImportOptions) {
     options.time = Some(TimeColumn::Frames);
 }
 
-fn plain_columns(options: &mut Options) {
+fn plain_columns(options: &mut ImportOptions) {
     (options.tip, options.head) = (None, None);
-    options.columns = Some(Columns::parse("time=1,tip-x=2,tip-y=3,head-x=4,head-y=5").unwrap());
+    options.columns = Some(ColumnMap::parse("time=1,tip-x=2,tip-y=3,head-x=4,head-y=5").unwrap());
 }
 
 /// A number, or a word for none.

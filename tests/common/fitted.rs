@@ -3,16 +3,16 @@
 
 use super::scene;
 use wiperlab::chart::Figure;
-use wiperlab::figures::corner::{self, Corner, Known};
+use wiperlab::figures::corner::{self, CornerParameter, CornerPlot};
 use wiperlab::figures::cycle::{self, CycleOverSpeed, SpeedPoint, Target};
 use wiperlab::figures::evidence;
-use wiperlab::figures::friction::{self, Law};
-use wiperlab::figures::phase_portrait::{self, Part, Portrait};
-use wiperlab::figures::poses::{self, Poses};
-use wiperlab::figures::profiles::{self, Profile, Profiles};
-use wiperlab::figures::pulls::{self, Pull, Pulls};
-use wiperlab::figures::residuals::{self, Diagnostics};
-use wiperlab::fit::uncertainty::Verdict;
+use wiperlab::figures::friction::{self, FrictionPlot};
+use wiperlab::figures::phase_portrait::{self, PhasePortrait, PortraitPart};
+use wiperlab::figures::poses::{self, PoseSequence};
+use wiperlab::figures::profiles::{self, ParameterProfile, ProfilePlot};
+use wiperlab::figures::pulls::{self, Pull, PullPlot};
+use wiperlab::figures::residuals::{self, ResidualDiagnostics};
+use wiperlab::fit::uncertainty::ParameterVerdict;
 
 /// A parameter that is known, one that is open at an end, and one without intervals.
 pub fn profiles(name: &str) -> Figure {
@@ -22,10 +22,10 @@ pub fn profiles(name: &str) -> Figure {
             .map(|x| (x, ((x - 0.18) / width).powi(2)))
             .collect::<Vec<_>>()
     };
-    let profile = |symbol: &str, intervals| Profile {
+    let profile = |symbol: &str, intervals| ParameterProfile {
         symbol: symbol.to_owned(),
         unit: "s/m".to_owned(),
-        verdict: Verdict::Identified,
+        verdict: ParameterVerdict::Identified,
         bounds: (0.05, 0.4),
         estimate: 0.18,
         truth: Some(0.19),
@@ -35,7 +35,7 @@ pub fn profiles(name: &str) -> Figure {
         intervals,
     };
     let known = Some([Some(0.15), Some(0.21)]);
-    profiles::figure(&Profiles {
+    profiles::draw_figure(&ProfilePlot {
         title: name.to_owned(),
         synthetic: true,
         least_cost: 0.03,
@@ -49,7 +49,10 @@ pub fn profiles(name: &str) -> Figure {
 }
 
 pub fn poses(name: &str) -> Figure {
-    poses::figure(&Poses::of(&wiperlab::simulate::Motion::of(&scene()), name, name.to_owned()).unwrap())
+    poses::draw_figure(
+        &PoseSequence::from_motion(&wiperlab::simulate::RunMotion::simulate(&scene()), name, name.to_owned())
+            .unwrap(),
+    )
 }
 
 /// Two parts, one of them with measured states.
@@ -60,9 +63,9 @@ pub fn portrait(name: &str) -> Figure {
             .map(|a| Some((1e-3 * radius * a.cos(), 0.1 * radius * a.sin())))
             .collect::<Vec<_>>()
     };
-    let part = |name: &str, measured| Part { name: name.to_owned(), measured, model: circle(1.0) };
+    let part = |name: &str, measured| PortraitPart { name: name.to_owned(), measured, model: circle(1.0) };
     let parts = vec![part(name, circle(1.1)), part("after the flip", Vec::new())];
-    phase_portrait::figure(&Portrait {
+    phase_portrait::draw_figure(&PhasePortrait {
         title: name.to_owned(),
         note: name.to_owned(),
         synthetic: true,
@@ -73,7 +76,7 @@ pub fn portrait(name: &str) -> Figure {
 pub fn law(name: &str) -> Figure {
     let speeds = || (0..100).map(|i| 2e-3 * f64::from(i));
     let coefficient = |v: f64| 0.1 * (-5.0 * v).exp() + 0.3;
-    friction::figure(&Law {
+    friction::draw_figure(&FrictionPlot {
         title: name.to_owned(),
         note: name.to_owned(),
         synthetic: true,
@@ -99,7 +102,7 @@ pub fn evidence(name: &str) -> Figure {
         let inside = |course: Vec<Option<(f64, f64)>>| {
             course.into_iter().filter(|p| p.is_none_or(|p| p.0 >= span_s.0 && p.0 <= span_s.1)).collect()
         };
-        evidence::Part {
+        evidence::EvidencePart {
             name: name.to_owned(),
             span_s,
             measured: inside(course(1e-3)),
@@ -109,7 +112,7 @@ pub fn evidence(name: &str) -> Figure {
             sticks: Vec::new(),
         }
     };
-    evidence::figure(&evidence::Evidence {
+    evidence::draw_figure(&evidence::EvidencePlot {
         title: name.to_owned(),
         synthetic: true,
         quantity: "deflection".to_owned(),
@@ -118,7 +121,7 @@ pub fn evidence(name: &str) -> Figure {
             part(name, (0.3, 0.335)),
             part("late", (0.8, 0.815)),
         ],
-        ..evidence::Evidence::default()
+        ..evidence::EvidencePlot::default()
     })
 }
 
@@ -132,7 +135,7 @@ pub fn cycle(name: &str) -> Figure {
         };
         (1..40).map(point).collect()
     };
-    cycle::figure(&CycleOverSpeed {
+    cycle::draw_figure(&CycleOverSpeed {
         title: name.to_owned(),
         synthetic: true,
         measured: points(5.0),
@@ -146,7 +149,7 @@ pub fn cycle(name: &str) -> Figure {
 /// Features that are met, missed and predicted.
 pub fn pulls(name: &str) -> Figure {
     let pull = |name: &str, deviations, held_out| Pull { name: name.to_owned(), deviations, held_out };
-    pulls::figure(&Pulls {
+    pulls::draw_figure(&PullPlot {
         title: name.to_owned(),
         synthetic: true,
         pulls: vec![pull("low", -0.3, false), pull(name, 2.4, false), pull("release", 1.1, true)],
@@ -156,7 +159,7 @@ pub fn pulls(name: &str) -> Figure {
 
 /// Three parameters, one of them open and without a linear interval.
 pub fn corner(name: &str) -> Figure {
-    let known = |estimate: f64| Known {
+    let known = |estimate: f64| CornerParameter {
         symbol: "A".to_owned(),
         words: "0.107 to 0.109".to_owned(),
         estimate,
@@ -167,9 +170,9 @@ pub fn corner(name: &str) -> Figure {
         profile: vec![(estimate - 0.02, 0.14), (estimate, 1.0), (estimate + 0.02, 0.14)],
         optima: vec![estimate; 3],
     };
-    let open = Known { sd: None, stated: [None, Some(0.9)], symbol: name.to_owned(), ..known(0.7) };
+    let open = CornerParameter { sd: None, stated: [None, Some(0.9)], symbol: name.to_owned(), ..known(0.7) };
     let row = |a: f64, b: f64| vec![Some(a), Some(b), None];
-    corner::figure(&Corner {
+    corner::draw_figure(&CornerPlot {
         title: name.to_owned(),
         synthetic: true,
         parameters: vec![known(0.4), known(0.5), open],
@@ -179,7 +182,7 @@ pub fn corner(name: &str) -> Figure {
 
 /// A residual with a memory, and segments that fit worse the longer they are.
 pub fn residuals(name: &str) -> Figure {
-    residuals::figure(&Diagnostics {
+    residuals::draw_figure(&ResidualDiagnostics {
         title: name.to_owned(),
         note: name.to_owned(),
         synthetic: true,

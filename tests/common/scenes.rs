@@ -2,9 +2,11 @@
 
 #![allow(dead_code)] // each test program uses a part
 
-use wiperlab::simulate::outputs::{Audit, Transitions};
+use wiperlab::simulate::outputs::{EnergyAudit, Transitions};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::{Effort, Observer, Piece, Run, Sample, Transition, run_with};
+use wiperlab::simulate::{
+    ModelSample, Observer, RunResult, SolutionSegment, SolverOptions, Transition, run_scene_with,
+};
 
 /// A scene under `data/scenes`.
 pub fn committed(name: &str) -> Scene {
@@ -26,25 +28,29 @@ pub fn both() -> [Scene; 2] {
 
 /// A run with its transitions, its audit and the samples at both ends of every piece.
 pub struct Seen {
-    pub run: Run,
+    pub run: RunResult,
     pub transitions: Vec<Transition>,
-    pub audit: Audit,
-    pub samples: Vec<Sample>,
+    pub audit: EnergyAudit,
+    pub samples: Vec<ModelSample>,
 }
 
 #[derive(Default)]
-struct Ends(Vec<Sample>);
+struct Ends(Vec<ModelSample>);
 
 impl Observer for Ends {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        self.0.extend([piece.sample(piece.start_s), piece.sample(piece.end_s)]);
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        self.0.extend([piece.sample_at(piece.start_s), piece.sample_at(piece.end_s)]);
     }
 }
 
 /// Runs a scene at a tolerance.
 pub fn seen(scene: &Scene, relative_tolerance: f64) -> Seen {
-    let (mut transitions, mut audit, mut ends) = (Transitions::default(), Audit::default(), Ends::default());
-    let run =
-        run_with(scene, Effort::new(relative_tolerance), &mut ((&mut transitions, &mut audit), &mut ends));
+    let (mut transitions, mut audit, mut ends) =
+        (Transitions::default(), EnergyAudit::default(), Ends::default());
+    let run = run_scene_with(
+        scene,
+        SolverOptions::new(relative_tolerance),
+        &mut ((&mut transitions, &mut audit), &mut ends),
+    );
     Seen { run, transitions: transitions.0, audit, samples: ends.0 }
 }

@@ -5,19 +5,22 @@
 mod fitted;
 
 use wiperlab::chart::{Figure, Medium};
-use wiperlab::figures::animation::pace::{Pace, Part};
-use wiperlab::figures::animation::{self, Animation, Tracked};
-use wiperlab::figures::history::{self, History};
-use wiperlab::figures::profiles::{self, Profiles};
-use wiperlab::figures::ring_down::{self, Decay, RingDown, Trace};
-use wiperlab::figures::spectrogram::{self, Aimed, Compared, Of, RidgePoint, Spectrogram, SpeedPoint};
-use wiperlab::figures::spectrum::{self, Curve, Named, Spectra, Target};
-use wiperlab::figures::windows::{self, NamedWindow, Windows};
-use wiperlab::figures::work_precision::{self, Point, WorkPrecision};
+use wiperlab::figures::animation::pace::{PlaybackPace, PlaybackPart};
+use wiperlab::figures::animation::{self, Animation, TrackedMotion};
+use wiperlab::figures::history::{self, TimeHistory};
+use wiperlab::figures::profiles::{self, ProfilePlot};
+use wiperlab::figures::ring_down::{self, ComponentDecay, RingDown, RingDownTrace};
+use wiperlab::figures::spectrogram::{
+    self, SpectrogramComparison, SpectrogramPlot, SpectrogramRidgePoint, SpectrogramSide, SpeedPoint,
+    TargetFrequency,
+};
+use wiperlab::figures::spectrum::{self, LabelledComponent, SpectraPlot, SpectrumCurve, Target};
+use wiperlab::figures::windows::{self, WindowOverview, WindowSpan};
+use wiperlab::figures::work_precision::{self, WorkPrecision, WorkPrecisionRun};
 use wiperlab::figures::{sweep_map, sweep_sheet};
-use wiperlab::simulate::Motion;
+use wiperlab::simulate::RunMotion;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::sweep::{Outcome, Study};
+use wiperlab::sweep::{PointOutcome, Study};
 
 /// An example: its name and what draws it, with a user's name in it.
 pub type Example = (&'static str, fn(&str) -> Figure);
@@ -29,13 +32,13 @@ pub const FULL: [Example; 20] = [
     ("corner", fitted::corner),
     ("residuals", fitted::residuals),
     ("evidence", fitted::evidence),
-    ("history", |name| history::figure(&full_history(name))),
-    ("spectra", |name| spectrum::figure(&full_spectra(name))),
-    ("spectrogram", |name| spectrogram::figure(&full_spectrogram(name))),
-    ("spectrograms compared", |name| spectrogram::compared(&both_spectrograms(name))),
-    ("ring-down", |name| ring_down::figure(&full_ring_down(name))),
-    ("windows", |name| windows::figure(&full_windows(name))),
-    ("work-precision", |name| work_precision::figure(&full_work_precision(name))),
+    ("history", |name| history::draw_figure(&full_history(name))),
+    ("spectra", |name| spectrum::draw_figure(&full_spectra(name))),
+    ("spectrogram", |name| spectrogram::draw_figure(&full_spectrogram(name))),
+    ("spectrograms compared", |name| spectrogram::draw_comparison(&both_spectrograms(name))),
+    ("ring-down", |name| ring_down::draw_figure(&full_ring_down(name))),
+    ("windows", |name| windows::draw_figure(&full_windows(name))),
+    ("work-precision", |name| work_precision::draw_figure(&full_work_precision(name))),
     ("map over one parameter", |name| sweep(name, 1)),
     ("map over two parameters", |name| sweep(name, 2)),
     ("sheet of one parameter", |name| sheet(name, 1)),
@@ -48,13 +51,13 @@ pub const FULL: [Example; 20] = [
 
 /// Every figure with nothing to show.
 pub const EMPTY: [Example; 7] = [
-    ("history", |_| history::figure(&History::default())),
-    ("spectra", |_| spectrum::figure(&Spectra::default())),
-    ("spectrogram", |_| spectrogram::figure(&Spectrogram::default())),
-    ("ring-down", |_| ring_down::figure(&RingDown::default())),
-    ("windows", |_| windows::figure(&Windows::default())),
-    ("work-precision", |_| work_precision::figure(&WorkPrecision::default())),
-    ("profiles", |_| profiles::figure(&Profiles::default())),
+    ("history", |_| history::draw_figure(&TimeHistory::default())),
+    ("spectra", |_| spectrum::draw_figure(&SpectraPlot::default())),
+    ("spectrogram", |_| spectrogram::draw_figure(&SpectrogramPlot::default())),
+    ("ring-down", |_| ring_down::draw_figure(&RingDown::default())),
+    ("windows", |_| windows::draw_figure(&WindowOverview::default())),
+    ("work-precision", |_| work_precision::draw_figure(&WorkPrecision::default())),
+    ("profiles", |_| profiles::draw_figure(&ProfilePlot::default())),
 ];
 
 pub const MEDIA: [(&str, Medium); 3] =
@@ -73,7 +76,7 @@ fn wave(amplitude_m: f64) -> Vec<Option<f64>> {
     times().into_iter().enumerate().map(|(i, t)| Some(value(t)).filter(|_| !missing(&i))).collect()
 }
 
-fn full_history(name: &str) -> History {
+fn full_history(name: &str) -> TimeHistory {
     let motion = |scale: f64| wiperlab::recording::motion_traces::MotionTraces {
         time_s: times(),
         tip_x_m: wave(1e-2 * scale),
@@ -81,7 +84,7 @@ fn full_history(name: &str) -> History {
         deflection_m: wave(1e-3 * scale),
         head_drop_m: wave(1e-4 * scale),
     };
-    History {
+    TimeHistory {
         title: name.to_owned(),
         enlarged_title: name.to_owned(),
         synthetic: true,
@@ -99,14 +102,14 @@ fn full_history(name: &str) -> History {
     }
 }
 
-fn full_spectra(name: &str) -> Spectra {
+fn full_spectra(name: &str) -> SpectraPlot {
     let curve = |at: f64| {
         let frequency_hz: Vec<f64> = (0..2000).map(f64::from).collect();
         let amplitude_m =
             frequency_hz.iter().map(|f| 1e-8 + 1e-5 * (-((f - at) / 10.0).powi(2)).exp()).collect();
-        Curve { frequency_hz, amplitude_m }
+        SpectrumCurve { frequency_hz, amplitude_m }
     };
-    let named = |frequency_hz, remark: &str| Named {
+    let named = |frequency_hz, remark: &str| LabelledComponent {
         frequency_hz,
         frequency_sd_hz: 2.0,
         amplitude_m: 1e-5,
@@ -114,7 +117,7 @@ fn full_spectra(name: &str) -> Spectra {
         range_hz: Some((frequency_hz - 9.0, frequency_hz + 9.0)),
         remark: remark.to_owned(),
     };
-    Spectra {
+    SpectraPlot {
         title: name.to_owned(),
         quantity: "deflection".to_owned(),
         note: name.to_owned(),
@@ -126,25 +129,25 @@ fn full_spectra(name: &str) -> Spectra {
         components: vec![named(78.4, ""), named(900.0, name)],
         model_components: vec![named(80.1, ""), named(850.0, name)],
         lowest_hz: 7.0,
-        ..Spectra::default()
+        ..SpectraPlot::default()
     }
 }
 
-fn aimed(name: &str, frequency_hz: f64, span_s: (f64, f64), met: bool) -> Aimed {
-    Aimed { name: name.to_owned(), frequency_hz, frequency_sd_hz: Some(5.0), span_s, met }
+fn aimed(name: &str, frequency_hz: f64, span_s: (f64, f64), met: bool) -> TargetFrequency {
+    TargetFrequency { name: name.to_owned(), frequency_hz, frequency_sd_hz: Some(5.0), span_s, met }
 }
 
-fn full_spectrogram(name: &str) -> Spectrogram {
+fn full_spectrogram(name: &str) -> SpectrogramPlot {
     let column = |i: u32| {
         (0..100)
             .map(|j| (!(40..50).contains(&i)).then(|| if j == 30 + i / 4 { 1e-5 } else { 1e-8 }))
             .collect()
     };
-    let ridge = |i: u32| RidgePoint {
+    let ridge = |i: u32| SpectrogramRidgePoint {
         time_s: f64::from(i) * 1e-3,
         frequency_hz: (!(40..50).contains(&i)).then(|| f64::from(30 + i / 4) * 5.0),
     };
-    Spectrogram {
+    SpectrogramPlot {
         title: name.to_owned(),
         quantity: "deflection".to_owned(),
         note: name.to_owned(),
@@ -158,30 +161,34 @@ fn full_spectrogram(name: &str) -> Spectrogram {
             aimed("high at speed", 230.0, (0.05, 0.09), false),
         ],
         instants: vec![(name.to_owned(), 0.02), ("reversal".to_owned(), 0.099)],
-        ..Spectrogram::default()
+        ..SpectrogramPlot::default()
     }
 }
 
 /// A recording and a model that starts and ends a little later.
-fn both_spectrograms(name: &str) -> Compared {
+fn both_spectrograms(name: &str) -> SpectrogramComparison {
     let speed = |i: u32| SpeedPoint {
         tip_speed_m_per_s: 1e-3 * f64::from(i),
         frequency_hz: 150.0 + f64::from(i),
         frequency_sd_hz: Some(5.0),
     };
-    let measured = Spectrogram { over_speed: (0..40).map(speed).collect(), ..full_spectrogram(name) };
+    let measured = SpectrogramPlot { over_speed: (0..40).map(speed).collect(), ..full_spectrogram(name) };
     let later = |time_s: &mut f64| *time_s += 5e-3;
     let mut model = measured.clone();
     model.time_s.iter_mut().for_each(later);
     model.ridge.iter_mut().map(|p| &mut p.time_s).for_each(later);
-    let sides = vec![(Of::Measured, measured), (Of::Model, model)];
-    Compared { title: name.to_owned(), note: name.to_owned(), synthetic: true, sides }
+    let sides = vec![(SpectrogramSide::Measured, measured), (SpectrogramSide::Model, model)];
+    SpectrogramComparison { title: name.to_owned(), note: name.to_owned(), synthetic: true, sides }
 }
 
 fn full_ring_down(name: &str) -> RingDown {
-    let trace = |amplitude_m| Trace { time_s: times(), displacement_m: wave(amplitude_m) };
-    let decay =
-        Decay { name: name.to_owned(), fitted: trace(1e-5), envelope: trace(1e-5), data: trace(1e-5) };
+    let trace = |amplitude_m| RingDownTrace { time_s: times(), displacement_m: wave(amplitude_m) };
+    let decay = ComponentDecay {
+        name: name.to_owned(),
+        fitted: trace(1e-5),
+        envelope: trace(1e-5),
+        data: trace(1e-5),
+    };
     RingDown {
         title: name.to_owned(),
         quantity: "deflection".to_owned(),
@@ -194,9 +201,9 @@ fn full_ring_down(name: &str) -> RingDown {
     }
 }
 
-fn full_windows(name: &str) -> Windows {
-    let window = |name: &str, from_s, to_s| NamedWindow { name: name.to_owned(), from_s, to_s };
-    Windows {
+fn full_windows(name: &str) -> WindowOverview {
+    let window = |name: &str, from_s, to_s| WindowSpan { name: name.to_owned(), from_s, to_s };
+    WindowOverview {
         title: name.to_owned(),
         quantity: "deflection".to_owned(),
         head_x_m: wave(1e-2),
@@ -204,12 +211,12 @@ fn full_windows(name: &str) -> Windows {
         time_s: times(),
         windows: vec![window("before", 0.5, 0.54), window(name, 0.54, 0.58), window("after", 0.58, 0.7)],
         analysed_s: Some((0.6, 0.65)),
-        ..Windows::default()
+        ..WindowOverview::default()
     }
 }
 
 fn full_work_precision(name: &str) -> WorkPrecision {
-    let point = |method: &str, i: i32| Point {
+    let point = |method: &str, i: i32| WorkPrecisionRun {
         method: method.to_owned(),
         wall_s: 1e-3 * 2.0_f64.powi(i),
         error: (i > 0).then(|| 10.0_f64.powi(-2 * i)),
@@ -230,16 +237,16 @@ fn full_work_precision(name: &str) -> WorkPrecision {
 /// A map of a parameter study over so many parameters; a cell in seven has no value.
 fn sweep(name: &str, axes: usize) -> Figure {
     let (study, outcomes) = swept(name, axes);
-    sweep_map::figure(&study, &scene(), &outcomes, 0)
+    sweep_map::draw_figure(&study, &scene(), &outcomes, 0)
 }
 
 /// The same map on a sheet.
 fn sheet(name: &str, axes: usize) -> Figure {
     let (study, outcomes) = swept(name, axes);
-    sweep_sheet::figure(&study, &scene(), &outcomes)
+    sweep_sheet::draw_figure(&study, &scene(), &outcomes)
 }
 
-fn swept(name: &str, axes: usize) -> (Study, Vec<Outcome>) {
+fn swept(name: &str, axes: usize) -> (Study, Vec<PointOutcome>) {
     let axis = |name: &str| format!("[[axis]]\nname = \"{name}\"\nfrom = 0.1\nto = 0.4\npoints = 12\n");
     let axes: String = ["friction.a", "friction.c"][..axes].iter().map(|name| axis(name)).collect();
     let name = serde_json::to_string(name).unwrap(); // a JSON string is a TOML string
@@ -248,12 +255,12 @@ fn swept(name: &str, axes: usize) -> (Study, Vec<Outcome>) {
     );
     let text = format!("{head}{axes}[[map]]\nname = {name}\nkind = \"stick-fraction\"\n");
     let study = Study::parse("study", &text).unwrap();
-    let value = |i: usize| Outcome {
+    let value = |i: usize| PointOutcome {
         ended: None,
         stopped_at_s: Some(1.0),
         values: if i % 7 == 3 { Vec::new() } else { vec![Ok(0.01 * i as f64)] },
     };
-    let outcomes: Vec<Outcome> = (0..study.points()).map(value).collect();
+    let outcomes: Vec<PointOutcome> = (0..study.point_count()).map(value).collect();
     (study, outcomes)
 }
 
@@ -263,16 +270,16 @@ fn scene() -> Scene {
 
 /// The animation of the committed blade, with its own motion as what was measured.
 pub fn animation(name: &str) -> String {
-    let motion = Motion::of(&scene());
+    let motion = RunMotion::simulate(&scene());
     let hold = motion.stick_s.iter().copied().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0]))).unwrap();
-    let pace = Pace::around(hold, [0.56, 1.15]).unwrap();
+    let pace = PlaybackPace::around_hold(hold, [0.56, 1.15]).unwrap();
     let [from_s, to_s] = pace.span_s();
     let samples: Vec<_> =
         motion.samples.iter().filter(|s| s.time_s >= from_s && s.time_s <= to_s).copied().collect();
-    let seen = |of: fn(&wiperlab::simulate::Sample) -> f64| {
+    let seen = |of: fn(&wiperlab::simulate::ModelSample) -> f64| {
         samples.iter().enumerate().map(|(i, s)| (i % 50 != 7).then(|| of(s))).collect()
     };
-    let measured = Tracked {
+    let measured = TrackedMotion {
         time_s: samples.iter().map(|s| s.time_s).collect(),
         tip_x_m: seen(|s| s.tip_x_m),
         head_x_m: seen(|s| s.head_x_m),
@@ -281,7 +288,7 @@ pub fn animation(name: &str) -> String {
     let inside =
         motion.transitions.iter().filter(|t| t.time_s > from_s && t.time_s <= to_s).map(|t| (t.time_s, t.to));
     let modes = std::iter::once((from_s, samples[0].mode)).chain(inside).collect();
-    animation::svg(&Animation {
+    animation::render_svg(&Animation {
         title: name.to_owned(),
         synthetic: true,
         turns: true,
@@ -297,7 +304,7 @@ pub fn animation(name: &str) -> String {
 
 /// An animation of nothing.
 pub fn still() -> String {
-    animation::svg(&Animation {
+    animation::render_svg(&Animation {
         title: String::new(),
         synthetic: false,
         turns: true,
@@ -307,6 +314,6 @@ pub fn still() -> String {
         stick_s: Vec::new(),
         hold_s: [0.0, 0.1],
         measured: None,
-        pace: Pace { parts: vec![Part { from_s: 0.0, to_s: 0.1, slower: 100.0 }] },
+        pace: PlaybackPace { parts: vec![PlaybackPart { from_s: 0.0, to_s: 0.1, slower: 100.0 }] },
     })
 }

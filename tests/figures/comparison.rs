@@ -3,17 +3,17 @@
 
 use crate::raster::{colliding, inked, rasterised, sound};
 use std::path::{Path, PathBuf};
-use wiperlab::chart::{Figure, MOST_HEIGHT_MM, Medium};
-use wiperlab::compare::{Measured, ModelRun, model_runs};
+use wiperlab::chart::{Figure, MAX_HEIGHT_MM, Medium};
+use wiperlab::compare::{FittedRecording, ModelRun, run_conditions};
 use wiperlab::figures::{Drawing, FigureBlock};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
+use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{RecordingFile, parse_trace_csv};
 use wiperlab::report::Report;
 use wiperlab::report::comparison;
-use wiperlab::report::several::{Fitted, compare};
+use wiperlab::report::several::{ComparisonInput, compare_fits};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::twin::Camera;
 
@@ -59,23 +59,23 @@ impl Bundled {
         let scene = Scene::parse("scene.toml", &read(&folder.join(&job.conditions[0].scene))).unwrap();
         let instrument = Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 };
         let model = SceneModel::new(
-            vec![Condition { scene, instrument }],
+            vec![ModelCondition { scene, instrument }],
             job.parameter_names(),
-            Plausible::default(),
+            PlausibilityLimits::default(),
         );
-        let best = model_runs(&job, &model, &result).unwrap();
+        let best = run_conditions(&job, &model, &result).unwrap();
         Self { job, result, recorded, best }
     }
 
-    fn measured(&self) -> Vec<Measured<'_>> {
+    fn measured(&self) -> Vec<FittedRecording<'_>> {
         self.recorded
             .iter()
-            .map(|(recording, file)| Measured { recording, file: Some(file), film: None })
+            .map(|(recording, file)| FittedRecording { recording, file: Some(file), film: None })
             .collect()
     }
 
     fn report(&self) -> Report {
-        comparison::report(&self.job, &self.measured(), &self.best, &self.result)
+        comparison::build_report(&self.job, &self.measured(), &self.best, &self.result)
     }
 }
 
@@ -112,12 +112,12 @@ fn assert_sound<'a>(blocks: impl Iterator<Item = &'a FigureBlock>) {
     const LEAST_INK: usize = 4000;
     for block in blocks {
         let drawn: Vec<String> = match &block.drawing {
-            Drawing::Chart(figure) => MEDIA.map(|medium| figure.svg(medium)).to_vec(),
+            Drawing::Chart(figure) => MEDIA.map(|medium| figure.to_svg(medium)).to_vec(),
             Drawing::Moving(svg) => vec![svg.clone()],
         };
         if let Drawing::Chart(figure) = &block.drawing {
             let in_print = [Medium::Column, Medium::Page].map(|medium| figure.height_mm(medium));
-            assert!(in_print.iter().all(|mm| *mm <= MOST_HEIGHT_MM), "{}: {in_print:?} mm", block.file);
+            assert!(in_print.iter().all(|mm| *mm <= MAX_HEIGHT_MM), "{}: {in_print:?} mm", block.file);
         }
         for svg in drawn {
             sound(&block.file, &svg);
@@ -171,7 +171,7 @@ fn in_print_there_is_no_heading_and_synthetic_data_are_marked() {
         let report = report(fit);
         for block in report.all_figures() {
             let Drawing::Chart(figure) = &block.drawing else { continue };
-            let [screen, column, page] = MEDIA.map(|medium| texts(&figure.svg(medium)));
+            let [screen, column, page] = MEDIA.map(|medium| texts(&figure.to_svg(medium)));
             let heading = screen.first().unwrap();
             assert!(heading.starts_with(figure.title.split(' ').next().unwrap()), "{}", block.file);
             for print in [column, page] {
@@ -192,7 +192,7 @@ fn assert_said(report: &Report, said: &str) {
         let Drawing::Chart(figure) = &block.drawing else { continue };
         // (in print that belongs in the caption; the name for screen readers has it)
         for medium in MEDIA {
-            assert!(figure.svg(medium).contains(said), "{} does not say `{said}`", block.file);
+            assert!(figure.to_svg(medium).contains(said), "{} does not say `{said}`", block.file);
         }
         assert!(!block.caption.contains('?'), "{}: {}", block.file, block.caption);
         assert!(!block.details.contains('?'), "{}: {}", block.file, block.details);
@@ -310,14 +310,14 @@ fn the_figures_of_several_fits_are_sound_too() {
     let fits = names.map(Bundled::of);
     let reports = fits.each_ref().map(Bundled::report);
     let measured = fits.each_ref().map(Bundled::measured);
-    let fitted = |i: usize| Fitted {
+    let fitted = |i: usize| ComparisonInput {
         name: names[i],
         report: &reports[i],
         job: &fits[i].job,
         measured: &measured[i],
         best: &fits[i].best,
     };
-    let several = compare(&[fitted(0), fitted(1), fitted(2)]);
+    let several = compare_fits(&[fitted(0), fitted(1), fitted(2)]);
     assert_sound(several.figures.iter());
     let files: Vec<&str> = several.figures.iter().map(|f| f.file.as_str()).collect();
     assert!(files.contains(&"parameters.svg") && files.contains(&"spectra-1.svg"), "{files:?}");
@@ -325,19 +325,21 @@ fn the_figures_of_several_fits_are_sound_too() {
 
     // of more than three, every fit has its panel
     let many: Vec<String> = (0..8).map(|i| format!("{}, {i}", names[i % 3])).collect();
-    let eight: Vec<Fitted> =
-        many.iter().enumerate().map(|(i, name)| Fitted { name, ..fitted(i % 3) }).collect();
-    let several = compare(&eight);
+    let eight: Vec<ComparisonInput> =
+        many.iter().enumerate().map(|(i, name)| ComparisonInput { name, ..fitted(i % 3) }).collect();
+    let several = compare_fits(&eight);
     assert_sound(several.figures.iter());
     let low = several.figures.iter().find(|f| f.file == "spectra-1.svg").unwrap();
     let panels = &chart(low).panels;
     assert_eq!(panels.iter().map(|p| p.title.as_str()).collect::<Vec<_>>(), many);
-    assert!(panels.iter().all(|p| (&p.x, &p.y) == (&panels[0].x, &panels[0].y) && p.rules.len() == 1));
+    assert!(
+        panels.iter().all(|p| (&p.x, &p.y) == (&panels[0].x, &panels[0].y) && p.vertical_lines.len() == 1)
+    );
     assert_eq!(panels.iter().map(|p| p.series.len()).collect::<Vec<_>>(), [1, 1, 2, 1, 1, 2, 1, 1]);
     assert!(low.caption.contains("A panel a fit"), "{}", low.caption);
     for block in &several.figures {
         for medium in [Medium::Column, Medium::Page] {
-            assert_eq!(colliding(&chart(block).svg(medium)), Vec::<[String; 2]>::new(), "{}", block.file);
+            assert_eq!(colliding(&chart(block).to_svg(medium)), Vec::<[String; 2]>::new(), "{}", block.file);
         }
     }
 }

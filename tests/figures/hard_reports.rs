@@ -4,16 +4,16 @@
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::chart::{Figure, Medium};
-use wiperlab::compare::{Measured, ModelRun, model_runs};
+use wiperlab::compare::{FittedRecording, ModelRun, run_conditions};
 use wiperlab::figures::{Drawing, FigureBlock};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::scene_model::{Condition, Instrument, Plausible, SceneModel};
+use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
 use wiperlab::recording::files::parse_trace_csv;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::report::comparison;
-use wiperlab::report::several::{Fitted, compare};
-use wiperlab::report::{Report, Subject};
+use wiperlab::report::several::{ComparisonInput, compare_fits};
+use wiperlab::report::{FigureSubject, Report};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::twin::Camera;
 
@@ -61,22 +61,25 @@ impl Case {
             let frame_rate_hz = self.recordings.get(i).map_or(5000.0, |r| r.grid().frame_rate_hz);
             let camera = Camera { frame_rate_hz, exposure_s: 5e-6 };
             let scene = self.another.as_ref().filter(|_| i > 0).unwrap_or(&self.scene);
-            Condition {
+            ModelCondition {
                 scene: Scene::parse("s", scene).unwrap(),
                 instrument: Instrument { camera, noise_m: 0.0, dropout_fraction: 0.0 },
             }
         };
         let conditions = (0..self.job.conditions.len()).map(condition).collect();
-        let model = SceneModel::new(conditions, self.job.parameter_names(), Plausible::default());
-        model_runs(&self.job, &model, &self.result).unwrap()
+        let model = SceneModel::new(conditions, self.job.parameter_names(), PlausibilityLimits::default());
+        run_conditions(&self.job, &model, &self.result).unwrap()
     }
 
-    fn measured(&self) -> Vec<Measured<'_>> {
-        self.recordings.iter().map(|recording| Measured { recording, file: None, film: None }).collect()
+    fn measured(&self) -> Vec<FittedRecording<'_>> {
+        self.recordings
+            .iter()
+            .map(|recording| FittedRecording { recording, file: None, film: None })
+            .collect()
     }
 
     fn report(&self) -> Report {
-        let report = comparison::report(&self.job, &self.measured(), &self.best(), &self.result);
+        let report = comparison::build_report(&self.job, &self.measured(), &self.best(), &self.result);
         one_sentence_each(&report);
         report
     }
@@ -84,7 +87,8 @@ impl Case {
 
 /// Captions of what was measured and of the blade are one sentence of at most fifty words.
 fn one_sentence_each(report: &Report) {
-    for figure in report.figures.iter().filter(|g| g.subject != Subject::Parameters).flat_map(|g| &g.figures)
+    for figure in
+        report.figures.iter().filter(|g| g.subject != FigureSubject::Parameters).flat_map(|g| &g.figures)
     {
         let words = figure.caption.split_whitespace().count();
         assert!((5..=50).contains(&words), "{}: {words} words: {}", figure.file, figure.caption);
@@ -133,7 +137,7 @@ fn without_a_release_both_spectrograms_show_what_the_camera_saw() {
     };
     let report = case(vec![traced(true, before)]).report();
     let maps: Vec<_> =
-        chart(&report, "spectrogram.svg").panels.iter().filter_map(|p| p.heat.as_ref()).collect();
+        chart(&report, "spectrogram.svg").panels.iter().filter_map(|p| p.heat_map.as_ref()).collect();
     assert_eq!(maps.len(), 2);
     assert!(
         maps[0].x.iter().zip(&maps[1].x).all(|(measured, model)| (measured - model).abs() < 1e-3),
@@ -206,7 +210,7 @@ fn a_blade_that_never_sticks_is_said_to() {
     let report = smooth.report();
     let said = &block(&report, "history.svg").details;
     assert!(said.contains("The model's tip never sticks.") && !said.contains("\u{2212}0.0"), "{said}");
-    let law = chart(&report, "friction.svg").svg(Medium::Column);
+    let law = chart(&report, "friction.svg").to_svg(Medium::Column);
     assert!(!law.contains("10\u{207b}\u{b9}"), "a coefficient of zero needs no powers of ten");
 }
 
@@ -420,14 +424,14 @@ fn a_film_beside_a_twin_is_not_called_synthetic_with_it() {
     let [twin, film] = &cases;
     let (reports, best) = (cases.each_ref().map(Case::report), cases.each_ref().map(Case::best));
     let measured = [twin.measured(), film.measured()];
-    let fitted = |i: usize, name| Fitted {
+    let fitted = |i: usize, name| ComparisonInput {
         name,
         report: &reports[i],
         job: &cases[i].job,
         measured: &measured[i],
         best: &best[i],
     };
-    let several = compare(&[fitted(0, "twin"), fitted(1, "film")]);
+    let several = compare_fits(&[fitted(0, "twin"), fitted(1, "film")]);
     let spectra: Vec<_> = several.figures.iter().filter(|f| f.file.starts_with("spectra")).collect();
     assert!(!spectra.is_empty());
     for block in spectra {
@@ -437,7 +441,7 @@ fn a_film_beside_a_twin_is_not_called_synthetic_with_it() {
             "{}",
             block.file
         );
-        assert_eq!(figure.panels[0].rules.len(), 1, "one target of both fits is one line");
+        assert_eq!(figure.panels[0].vertical_lines.len(), 1, "one target of both fits is one line");
     }
 }
 
@@ -449,7 +453,7 @@ fn names_of_many_words_leave_captions_short() {
     let mut case = case(vec![recording]);
     case.job.title = name.clone();
     case.job.conditions[0].name = name.clone();
-    case.job.aims.iter_mut().for_each(|aim| aim.feature.name = name.clone());
+    case.job.targets.iter_mut().for_each(|aim| aim.feature.name = name.clone());
     case.report();
     case.recordings.clear();
     case.report();

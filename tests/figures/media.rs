@@ -5,8 +5,8 @@ use crate::shown;
 
 use crate::raster::{colliding, inked, near, rasterised, sound};
 use crate::shown::{EMPTY, FULL, MEDIA};
-use wiperlab::chart::{Figure, MOST_HEIGHT_MM, Medium};
-use wiperlab::figures::history::{self, History};
+use wiperlab::chart::{Figure, MAX_HEIGHT_MM, Medium};
+use wiperlab::figures::history::{self, TimeHistory};
 use wiperlab::recording::motion_traces::MotionTraces;
 
 const PLAIN: &str = "Actual blade fitted to its recording";
@@ -19,7 +19,7 @@ fn all(examples: &[shown::Example], name: &str) -> Vec<(String, String)> {
     let media = |(what, figure): &shown::Example| {
         let figure: Figure = figure(name);
         let what = *what;
-        MEDIA.map(|(medium, of)| (format!("{what} for a {medium}"), figure.svg(of)))
+        MEDIA.map(|(medium, of)| (format!("{what} for a {medium}"), figure.to_svg(of)))
     };
     examples.iter().flat_map(media).collect()
 }
@@ -41,7 +41,7 @@ fn every_figure_is_drawn_and_keeps_to_itself() {
 fn every_figure_in_print_fits_on_a_page() {
     for (what, figure) in FULL.iter().chain(&EMPTY) {
         for (medium, of) in MEDIA.into_iter().filter(|(_, of)| *of != Medium::Screen) {
-            let svg = figure(PLAIN).svg(of);
+            let svg = figure(PLAIN).to_svg(of);
             let height_mm: f64 = svg
                 .split("height=\"")
                 .nth(1)
@@ -49,7 +49,7 @@ fn every_figure_in_print_fits_on_a_page() {
                 .unwrap()
                 .parse()
                 .unwrap();
-            assert!(height_mm <= MOST_HEIGHT_MM, "{what} for a {medium}: {height_mm} mm");
+            assert!(height_mm <= MAX_HEIGHT_MM, "{what} for a {medium}: {height_mm} mm");
         }
     }
 }
@@ -58,7 +58,7 @@ fn every_figure_in_print_fits_on_a_page() {
 #[test]
 fn panels_on_one_axis_of_time_are_numbered_once() {
     let (_, compared) = FULL.into_iter().find(|(what, _)| *what == "spectrograms compared").unwrap();
-    let titles = |medium| compared(PLAIN).svg(medium).matches("\ntime, s\n").count();
+    let titles = |medium| compared(PLAIN).to_svg(medium).matches("\ntime, s\n").count();
     assert_eq!((titles(Medium::Column), titles(Medium::Page)), (1, 2));
 }
 
@@ -150,13 +150,15 @@ fn a_history_shows_the_model_only_when_there_is_one() {
             time_s,
         }
     };
-    let both = History {
+    let both = TimeHistory {
         measured: Some(motion(0.0)),
         model: Some(motion(1e-3)),
         zoom_s: Some((0.05, 0.1)),
-        ..History::default()
+        ..TimeHistory::default()
     };
-    let model = |shown: &History| near(&rasterised(&history::figure(shown).svg(Medium::Screen)), VERMILION);
+    let model = |shown: &TimeHistory| {
+        near(&rasterised(&history::draw_figure(shown).to_svg(Medium::Screen)), VERMILION)
+    };
     assert!(model(&both) > 4000, "{}", model(&both));
-    assert_eq!(model(&History { model: None, ..both }), 0);
+    assert_eq!(model(&TimeHistory { model: None, ..both }), 0);
 }

@@ -6,12 +6,14 @@ use crate::raster;
 use crate::noise::noise;
 use crate::raster::{drawn, inked, near, rasterised};
 use wiperlab::chart::Medium;
-use wiperlab::figures::analysis::compared;
-use wiperlab::figures::ring_down::{self, Decay, RingDown, Trace};
-use wiperlab::figures::spectrogram::{self, RidgePoint, Spectrogram, SpeedPoint};
-use wiperlab::figures::spectrum::{self, Curve, Interval, Level, Named, Spectra};
-use wiperlab::figures::windows::{self, NamedWindow, Windows};
-use wiperlab::spectrum::{Analysis, Record, Settings};
+use wiperlab::figures::analysis::compare_spectra;
+use wiperlab::figures::ring_down::{self, ComponentDecay, RingDown, RingDownTrace};
+use wiperlab::figures::spectrogram::{self, SpectrogramPlot, SpectrogramRidgePoint, SpeedPoint};
+use wiperlab::figures::spectrum::{
+    self, AmplitudeInterval, LabelledComponent, SpectraPlot, SpectrumCurve, SpectrumLevel,
+};
+use wiperlab::figures::windows::{self, WindowOverview, WindowSpan};
+use wiperlab::spectrum::{SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 const VERMILION: (u8, u8, u8) = (0xD5, 0x5E, 0x00);
 const BLUE: (u8, u8, u8) = (0x00, 0x72, 0xB2);
@@ -23,12 +25,12 @@ fn hz(count: u32) -> Vec<f64> {
     (0..count).map(|i| f64::from(i) * 5.0).collect()
 }
 
-fn spectra_shown() -> Spectra {
+fn spectra_shown() -> SpectraPlot {
     let frequency_hz = hz(400);
     let amplitude_m: Vec<f64> =
         frequency_hz.iter().map(|f| 1e-8 + 1e-5 * (-((f - 900.0) / 10.0).powi(2)).exp()).collect();
     let scaled = |factor: f64| amplitude_m.iter().map(|a| a * factor).collect::<Vec<_>>();
-    let named = |frequency_hz, remark: &str| Named {
+    let named = |frequency_hz, remark: &str| LabelledComponent {
         frequency_hz,
         frequency_sd_hz: 2.0,
         amplitude_m: 1e-5,
@@ -36,38 +38,38 @@ fn spectra_shown() -> Spectra {
         range_hz: None,
         remark: remark.to_owned(),
     };
-    Spectra {
+    SpectraPlot {
         title: "a <name> & more".to_owned(),
         quantity: "deflection".to_owned(),
         note: "0.1 s to 0.25 s; ".repeat(12),
         synthetic: true,
-        interval_95: Some(Interval {
+        interval_95: Some(AmplitudeInterval {
             frequency_hz: frequency_hz.clone(),
             lower_m: scaled(0.5),
             upper_m: scaled(2.0),
         }),
-        noise_floor: Some(Level { frequency_hz: frequency_hz.clone(), amplitude_m: vec![1e-8; 400] }),
-        leakage: Some(Level { frequency_hz: frequency_hz.clone(), amplitude_m: vec![2e-8; 400] }),
+        noise_floor: Some(SpectrumLevel { frequency_hz: frequency_hz.clone(), amplitude_m: vec![1e-8; 400] }),
+        leakage: Some(SpectrumLevel { frequency_hz: frequency_hz.clone(), amplitude_m: vec![2e-8; 400] }),
         components: vec![
             named(78.4, "weak"),
             named(100.0, "alias?"),
             named(900.0, ""),
             named(1990.0, "harmonic"),
         ],
-        measured: Some(Curve { frequency_hz, amplitude_m }),
+        measured: Some(SpectrumCurve { frequency_hz, amplitude_m }),
         lowest_hz: 7.0,
-        ..Spectra::default()
+        ..SpectraPlot::default()
     }
 }
 
 /// Cells of 10 um along a line of 10 nm noise, none in a tenth of the columns.
-fn gram() -> Spectrogram {
+fn gram() -> SpectrogramPlot {
     let column = |i: u32| {
         (0..100)
             .map(|j| (!(40..50).contains(&i)).then(|| if j == 30 + i / 4 { 1e-5 } else { 1e-8 }))
             .collect()
     };
-    let ridge = |i: u32| RidgePoint {
+    let ridge = |i: u32| SpectrogramRidgePoint {
         time_s: f64::from(i) * 1e-3,
         frequency_hz: (!(40..50).contains(&i)).then(|| f64::from(30 + i / 4) * 5.0),
     };
@@ -76,7 +78,7 @@ fn gram() -> Spectrogram {
         frequency_hz: f64::from(150 + i),
         frequency_sd_hz: Some(4.0),
     };
-    Spectrogram {
+    SpectrogramPlot {
         title: "synthetic".to_owned(),
         quantity: "deflection".to_owned(),
         note: "sliding Hann window of 40 ms".to_owned(),
@@ -87,17 +89,20 @@ fn gram() -> Spectrogram {
         ridge: (0..100).map(ridge).collect(),
         instants: vec![("release".to_owned(), 0.02), ("reversal".to_owned(), 0.099)],
         over_speed: (1..9).map(speed).collect(),
-        ..Spectrogram::default()
+        ..SpectrogramPlot::default()
     }
 }
 
-fn trace(amplitude_m: f64) -> Trace {
+fn trace(amplitude_m: f64) -> RingDownTrace {
     let time_s: Vec<f64> = (0..500).map(|i| 0.5 + f64::from(i) * 2e-4).collect();
-    Trace { displacement_m: time_s.iter().map(|t| Some(amplitude_m * (490.0 * t).sin())).collect(), time_s }
+    RingDownTrace {
+        displacement_m: time_s.iter().map(|t| Some(amplitude_m * (490.0 * t).sin())).collect(),
+        time_s,
+    }
 }
 
 fn ring() -> RingDown {
-    let decay = Decay {
+    let decay = ComponentDecay {
         name: "78.40(3) Hz, damping 5.0(1) %".to_owned(),
         fitted: trace(1e-5),
         envelope: trace(1e-5),
@@ -114,10 +119,10 @@ fn ring() -> RingDown {
     }
 }
 
-fn whole() -> Windows {
-    let window = |name: &str, from_s, to_s| NamedWindow { name: name.to_owned(), from_s, to_s };
-    let Trace { time_s, displacement_m } = trace(1e-3);
-    Windows {
+fn whole() -> WindowOverview {
+    let window = |name: &str, from_s, to_s| WindowSpan { name: name.to_owned(), from_s, to_s };
+    let RingDownTrace { time_s, displacement_m } = trace(1e-3);
+    WindowOverview {
         quantity: "deflection".to_owned(),
         head_x_m: displacement_m.clone(),
         channel_m: displacement_m,
@@ -129,13 +134,13 @@ fn whole() -> Windows {
             window("after", 0.552, 0.6),
         ],
         analysed_s: Some((0.56, 0.58)),
-        ..Windows::default()
+        ..WindowOverview::default()
     }
 }
 
 #[test]
 fn a_spectrum_shows_its_components_and_keeps_its_text_inside() {
-    let map = drawn(&spectrum::figure(&spectra_shown()).svg(Medium::Screen));
+    let map = drawn(&spectrum::draw_figure(&spectra_shown()).to_svg(Medium::Screen));
     assert!(
         inked(&map) > 5000 && near(&map, BLUE) > 20 && near(&map, VERMILION) > 60,
         "{} {}",
@@ -143,7 +148,8 @@ fn a_spectrum_shows_its_components_and_keeps_its_text_inside() {
         near(&map, VERMILION)
     );
     let bare = rasterised(
-        &spectrum::figure(&Spectra { components: Vec::new(), ..spectra_shown() }).svg(Medium::Screen),
+        &spectrum::draw_figure(&SpectraPlot { components: Vec::new(), ..spectra_shown() })
+            .to_svg(Medium::Screen),
     );
     assert_eq!([near(&bare, BLUE), near(&bare, VERMILION)], [0, 0]);
 }
@@ -157,25 +163,27 @@ fn of_a_model_no_component_is_named_that_the_recording_could_not_show() {
             1e-5 * tone(103.0, t) + 3e-8 * tone(311.0, t) + 1e-9 * tone(707.0, t) + noise_m * noise
         };
         let samples: Vec<Option<f64>> = (0..2000).map(|i| Some(at(f64::from(i) / 5000.0, noise()))).collect();
-        Analysis::of(
-            &Record { samples: &samples, frame_rate_hz: 5000.0, exposure_s: None },
-            &Settings::default(),
+        SpectralAnalysis::from_record(
+            &SampledRecord { samples: &samples, frame_rate_hz: 5000.0, exposure_s: None },
+            &SpectrumSettings::default(),
         )
         .unwrap()
     };
-    let named = |components: &[Named]| components.iter().map(|c| c.frequency_hz.round()).collect::<Vec<_>>();
+    let named = |components: &[LabelledComponent]| {
+        components.iter().map(|c| c.frequency_hz.round()).collect::<Vec<_>>()
+    };
     let (recording, model) = (analysed(2e-6), analysed(0.0));
     assert!(model.spectrum.components.len() >= 3, "{:?}", model.spectrum.components);
     // a thousandth of the largest is of no account even where nothing was recorded
-    assert_eq!(named(&compared(None, Some(&model)).model_components), [103.0, 311.0]);
-    let beside = compared(Some(&recording), Some(&model));
+    assert_eq!(named(&compare_spectra(None, Some(&model)).model_components), [103.0, 311.0]);
+    let beside = compare_spectra(Some(&recording), Some(&model));
     assert_eq!((named(&beside.components), named(&beside.model_components)), (vec![103.0], vec![103.0]));
 }
 
 #[test]
 fn a_spectrogram_is_coloured_from_end_to_end_and_grey_where_there_is_nothing() {
-    let shown = Spectrogram { ridge: Vec::new(), over_speed: Vec::new(), ..gram() };
-    let map = drawn(&spectrogram::figure(&shown).svg(Medium::Screen));
+    let shown = SpectrogramPlot { ridge: Vec::new(), over_speed: Vec::new(), ..gram() };
+    let map = drawn(&spectrogram::draw_figure(&shown).to_svg(Medium::Screen));
     let all = map.pixels().len() as f64;
     let share = |colour| near(&map, colour) as f64 / all;
     // the map takes about 0.56 of the figure: nine tenths of it low, a tenth without a value, a hundredth
@@ -187,7 +195,7 @@ fn a_spectrogram_is_coloured_from_end_to_end_and_grey_where_there_is_nothing() {
         share(NO_VALUE)
     );
     assert!((0.003..0.02).contains(&share(HIGHEST)), "{}", share(HIGHEST));
-    let ridge = drawn(&spectrogram::figure(&gram()).svg(Medium::Screen));
+    let ridge = drawn(&spectrogram::draw_figure(&gram()).to_svg(Medium::Screen));
     assert!(near(&ridge, VERMILION) > 300 && near(&map, VERMILION) == 0, "{}", near(&ridge, VERMILION));
 }
 
@@ -197,15 +205,19 @@ fn rows_stand_where_the_frequency_axis_says_linear_or_logarithmic() {
     let frequency_hz: Vec<f64> = (0..101).map(|j| f64::from(j) * 10.0).collect();
     let amplitude_m = vec![(0..101).map(|j| Some(if j == 10 { 1e-5 } else { 1e-8 })).collect(); 4];
     let height = |log_frequency| {
-        let shown = Spectrogram {
+        let shown = SpectrogramPlot {
             time_s: vec![0.0, 0.1, 0.2, 0.3],
             frequency_hz: frequency_hz.clone(),
             amplitude_m: amplitude_m.clone(),
-            ..Spectrogram::default()
+            ..SpectrogramPlot::default()
         };
         let map = rasterised(
-            &spectrogram::figure(&Spectrogram { log_frequency, shown_hz: Some((10.0, 1000.0)), ..shown })
-                .svg(Medium::Screen),
+            &spectrogram::draw_figure(&SpectrogramPlot {
+                log_frequency,
+                shown_hz: Some((10.0, 1000.0)),
+                ..shown
+            })
+            .to_svg(Medium::Screen),
         );
         let column = map.width() / 2;
         let of = |y: u32| map.pixel(column, y).map(|p| (p.red(), p.green(), p.blue())).unwrap();
@@ -222,9 +234,9 @@ fn rows_stand_where_the_frequency_axis_says_linear_or_logarithmic() {
 
 #[test]
 fn a_ring_down_and_the_windows_are_drawn_inside() {
-    let map = drawn(&ring_down::figure(&ring()).svg(Medium::Screen));
+    let map = drawn(&ring_down::draw_figure(&ring()).to_svg(Medium::Screen));
     assert!(inked(&map) > 10_000 && near(&map, VERMILION) > 500, "{} {}", inked(&map), near(&map, VERMILION));
-    let map = drawn(&windows::figure(&whole()).svg(Medium::Screen));
+    let map = drawn(&windows::draw_figure(&whole()).to_svg(Medium::Screen));
     // sky blue and green at 22 % on white
     assert!(
         near(&map, (0xDA, 0xEE, 0xFA)) > 20_000 && near(&map, (0xC7, 0xEA, 0xE0)) > 20_000,
@@ -237,49 +249,52 @@ fn a_ring_down_and_the_windows_are_drawn_inside() {
 fn the_same_figures_give_the_same_bytes_and_are_small() {
     let figures = || {
         [
-            spectrum::figure(&spectra_shown()).svg(Medium::Screen),
-            spectrogram::figure(&gram()).svg(Medium::Screen),
-            ring_down::figure(&ring()).svg(Medium::Screen),
-            windows::figure(&whole()).svg(Medium::Screen),
+            spectrum::draw_figure(&spectra_shown()).to_svg(Medium::Screen),
+            spectrogram::draw_figure(&gram()).to_svg(Medium::Screen),
+            ring_down::draw_figure(&ring()).to_svg(Medium::Screen),
+            windows::draw_figure(&whole()).to_svg(Medium::Screen),
         ]
     };
     assert_eq!(figures(), figures());
     assert!(figures().iter().all(|f| f.len() < 300_000), "{:?}", figures().map(|f| f.len()));
     let column: Vec<Option<f64>> = (0..700).map(|j| Some(1e-6 * f64::from(1 + j * 7919 % 1000))).collect();
-    let large = Spectrogram {
+    let large = SpectrogramPlot {
         time_s: (0..1300).map(f64::from).collect(),
         frequency_hz: hz(700),
         amplitude_m: vec![column; 1300],
-        ..Spectrogram::default()
+        ..SpectrogramPlot::default()
     };
     assert!(
-        spectrogram::figure(&large).svg(Medium::Screen).len() < 400_000,
+        spectrogram::draw_figure(&large).to_svg(Medium::Screen).len() < 400_000,
         "{}",
-        spectrogram::figure(&large).svg(Medium::Screen).len()
+        spectrogram::draw_figure(&large).to_svg(Medium::Screen).len()
     );
 }
 
 #[test]
 fn figures_of_nothing_are_frames() {
-    assert!(inked(&drawn(&spectrogram::figure(&Spectrogram::default()).svg(Medium::Screen))) > 500);
-    assert!(inked(&drawn(&ring_down::figure(&RingDown::default()).svg(Medium::Screen))) > 500);
-    assert!(inked(&drawn(&windows::figure(&Windows::default()).svg(Medium::Screen))) > 500);
+    assert!(
+        inked(&drawn(&spectrogram::draw_figure(&SpectrogramPlot::default()).to_svg(Medium::Screen))) > 500
+    );
+    assert!(inked(&drawn(&ring_down::draw_figure(&RingDown::default()).to_svg(Medium::Screen))) > 500);
+    assert!(inked(&drawn(&windows::draw_figure(&WindowOverview::default()).to_svg(Medium::Screen))) > 500);
     let unfilled = vec![vec![None; 100]; 100];
     assert!(
         inked(&drawn(
-            &spectrogram::figure(&Spectrogram { amplitude_m: unfilled, ..gram() }).svg(Medium::Screen)
+            &spectrogram::draw_figure(&SpectrogramPlot { amplitude_m: unfilled, ..gram() })
+                .to_svg(Medium::Screen)
         )) > 500
     );
-    let one = Spectrogram { time_s: vec![0.1], amplitude_m: vec![vec![Some(1e-6); 100]], ..gram() };
-    assert!(inked(&drawn(&spectrogram::figure(&one).svg(Medium::Screen))) > 500);
-    let ragged = Spectrogram { amplitude_m: vec![vec![Some(1e-6)], Vec::new()], ..gram() };
-    assert!(inked(&drawn(&spectrogram::figure(&ragged).svg(Medium::Screen))) > 500);
+    let one = SpectrogramPlot { time_s: vec![0.1], amplitude_m: vec![vec![Some(1e-6); 100]], ..gram() };
+    assert!(inked(&drawn(&spectrogram::draw_figure(&one).to_svg(Medium::Screen))) > 500);
+    let ragged = SpectrogramPlot { amplitude_m: vec![vec![Some(1e-6)], Vec::new()], ..gram() };
+    assert!(inked(&drawn(&spectrogram::draw_figure(&ragged).to_svg(Medium::Screen))) > 500);
 }
 
 #[test]
 fn what_is_no_finite_number_never_reaches_a_figure() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -1.0, f64::MAX, 1e-320] {
-        let named = Named {
+        let named = LabelledComponent {
             frequency_hz: bad,
             frequency_sd_hz: bad,
             amplitude_m: bad,
@@ -287,47 +302,47 @@ fn what_is_no_finite_number_never_reaches_a_figure() {
             range_hz: Some((bad, bad)),
             remark: String::new(),
         };
-        let level = Level { frequency_hz: vec![bad, 5.0, 100.0], amplitude_m: vec![bad, bad, 1e-6] };
-        let interval = Interval {
+        let level = SpectrumLevel { frequency_hz: vec![bad, 5.0, 100.0], amplitude_m: vec![bad, bad, 1e-6] };
+        let interval = AmplitudeInterval {
             frequency_hz: vec![10.0, bad, 900.0],
             lower_m: vec![bad, 1e-7, bad],
             upper_m: vec![1e-6, bad, bad],
         };
-        let bad_spectra = Spectra {
+        let bad_spectra = SpectraPlot {
             components: vec![named],
             noise_floor: Some(level.clone()),
             leakage: Some(level),
             interval_95: Some(interval),
             ..spectra_shown()
         };
-        raster::sound("figure", &spectrum::figure(&bad_spectra).svg(Medium::Screen));
+        raster::sound("figure", &spectrum::draw_figure(&bad_spectra).to_svg(Medium::Screen));
         let mut bad_gram = gram();
         bad_gram.amplitude_m[7] = vec![Some(bad); 100];
         bad_gram.ridge[3].frequency_hz = Some(bad);
         bad_gram.over_speed =
             vec![SpeedPoint { tip_speed_m_per_s: bad, frequency_hz: bad, frequency_sd_hz: Some(bad) }];
         bad_gram.instants.push(("bad".to_owned(), bad));
-        raster::sound("figure", &spectrogram::figure(&bad_gram).svg(Medium::Screen));
+        raster::sound("figure", &spectrogram::draw_figure(&bad_gram).to_svg(Medium::Screen));
         bad_gram.frequency_hz[5] = bad;
         bad_gram.time_s[99] = bad;
         bad_gram.log_frequency = true;
-        raster::sound("figure", &spectrogram::figure(&bad_gram).svg(Medium::Screen));
+        raster::sound("figure", &spectrogram::draw_figure(&bad_gram).to_svg(Medium::Screen));
         let bad_trace =
-            Trace { time_s: vec![bad, 0.1, 0.2], displacement_m: vec![Some(1e-3), Some(bad), None] };
+            RingDownTrace { time_s: vec![bad, 0.1, 0.2], displacement_m: vec![Some(1e-3), Some(bad), None] };
         raster::sound(
             "figure",
-            &ring_down::figure(&RingDown {
+            &ring_down::draw_figure(&RingDown {
                 data: bad_trace.clone(),
                 residual: bad_trace,
                 noise_sd_m: Some(bad),
                 ..ring()
             })
-            .svg(Medium::Screen),
+            .to_svg(Medium::Screen),
         );
-        let mut bad_windows = Windows { analysed_s: Some((bad, 0.58)), ..whole() };
+        let mut bad_windows = WindowOverview { analysed_s: Some((bad, 0.58)), ..whole() };
         bad_windows.windows[1].from_s = bad;
         bad_windows.channel_m[9] = Some(bad);
         bad_windows.time_s[20] = bad;
-        raster::sound("figure", &windows::figure(&bad_windows).svg(Medium::Screen));
+        raster::sound("figure", &windows::draw_figure(&bad_windows).to_svg(Medium::Screen));
     }
 }

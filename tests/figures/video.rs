@@ -3,20 +3,20 @@
 
 use std::sync::Mutex;
 use wiperlab::chart::{Medium, Raster};
-use wiperlab::compare::{Case, Measured, model_runs};
+use wiperlab::compare::{ConditionComparison, FittedRecording, run_conditions};
 use wiperlab::figures::video_frames::{VideoFrames, details, figure};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::{Measured as Fitted, Problem};
+use wiperlab::fit::{MeasuredRecording as Fitted, Problem};
 use wiperlab::recording::Recording;
-use wiperlab::recording::files::{LevelEntry, Place, RecordingFile, parse_trace_csv};
-use wiperlab::recording::film::{Film, Picture, Pictures};
+use wiperlab::recording::files::{LevelEntry, PixelMapping, RecordingFile, parse_trace_csv};
+use wiperlab::recording::film::{Picture, PictureSource, RecordingVideo};
 use wiperlab::simulate::scene::Scene;
 
 /// Pictures of two dark spots of Gaussian shape, at the pixels of the tracked head and tip.
 struct Spots<'a> {
     recording: &'a Recording,
-    place: Place,
+    place: PixelMapping,
     size: (usize, usize),
     /// Standard deviation of a spot, pixels.
     wide: f64,
@@ -24,11 +24,11 @@ struct Spots<'a> {
     asked: Mutex<Vec<usize>>,
 }
 
-impl Pictures for Spots<'_> {
-    fn picture(&self, frame: usize) -> Option<Picture> {
+impl PictureSource for Spots<'_> {
+    fn frame_picture(&self, frame: usize) -> Option<Picture> {
         self.asked.lock().unwrap().push(frame);
         let traces = self.recording.traces();
-        let at = |x: &[Option<f64>], y: &[Option<f64>]| Some(self.place.pixel([x[frame]?, y[frame]?]));
+        let at = |x: &[Option<f64>], y: &[Option<f64>]| Some(self.place.to_pixel([x[frame]?, y[frame]?]));
         let spots = [at(&traces.head_x_m, &traces.head_y_m)?, at(&traces.tip_x_m, &traces.tip_y_m)?];
         let (width, height) = self.size;
         let grey = (0..width * height).map(|at| {
@@ -45,7 +45,7 @@ impl Pictures for Spots<'_> {
 
 /// The middle of what is dark near a place of a raster, in the figure's mm.
 fn middle(raster: &Raster, near_mm: (f64, f64), within_mm: f64) -> (f64, f64) {
-    let picture = Picture::read(&raster.png).unwrap();
+    let picture = Picture::from_png(&raster.png).unwrap();
     let step = (raster.x[1] - raster.x[0]) / picture.width as f64;
     let (mut sum, mut x_sum, mut y_sum) = (0.0, 0.0, 0.0);
     for (at, grey) in picture.grey.iter().enumerate() {
@@ -62,7 +62,7 @@ fn middle(raster: &Raster, near_mm: (f64, f64), within_mm: f64) -> (f64, f64) {
 
 impl<'a> Spots<'a> {
     /// Pictures 560 pixels wide of the whole stroke, of some frames.
-    fn of(recording: &'a Recording, place: Place, frames: std::ops::Range<usize>) -> Self {
+    fn of(recording: &'a Recording, place: PixelMapping, frames: std::ops::Range<usize>) -> Self {
         Self { recording, place, size: (560, 60), wide: 1.0, frames, asked: Mutex::default() }
     }
 }
@@ -92,11 +92,11 @@ fn fit() -> Fit {
 
 /// The links over spots.
 fn over_spots(fit: &Fit, spots: &Spots<'_>) -> VideoFrames {
-    let model = fit.problem.model_of(&fit.result).unwrap();
-    let models = model_runs(&fit.job, &model, &fit.result).unwrap();
-    let film = Film { place: spots.place, pictures: spots };
-    let measured = [Measured { recording: &fit.recording, file: Some(&fit.file), film: Some(film) }];
-    let cases = Case::all(&fit.job, &measured, &models, &fit.result);
+    let model = fit.problem.fitted_model(&fit.result).unwrap();
+    let models = run_conditions(&fit.job, &model, &fit.result).unwrap();
+    let film = RecordingVideo { mapping: spots.place, pictures: spots };
+    let measured = [FittedRecording { recording: &fit.recording, file: Some(&fit.file), film: Some(film) }];
+    let cases = ConditionComparison::compare_conditions(&fit.job, &measured, &models, &fit.result);
     VideoFrames::of(&cases[0]).unwrap()
 }
 
@@ -122,7 +122,7 @@ fn spots_in_the_pictures_lie_where_the_tracked_points_are_drawn() {
         (2e-4, [7.25, 12.5], (560, 60), None),
         (1e-4, [40.0, 80.0], (1100, 200), Some(level(0.03))),
     ] {
-        let place = Place::new(origin_px, metres_per_pixel, turned.as_ref());
+        let place = PixelMapping::new(origin_px, metres_per_pixel, turned.as_ref());
         let wide = 2e-4 / metres_per_pixel;
         let spots = Spots {
             recording: &fit.recording,
@@ -145,7 +145,7 @@ fn spots_in_the_pictures_lie_where_the_tracked_points_are_drawn() {
             }
         }
         assert!(details(&shown).ends_with("the frames of the video."));
-        let svg = figure(&shown).svg(Medium::Screen);
+        let svg = figure(&shown).to_svg(Medium::Screen);
         assert_eq!(svg.matches("href=\"data:image/png;base64,").count(), shown.instants.len());
         // four of them leave room on a page of a megabyte
         assert!(svg.len() < 120_000, "{}", svg.len());
@@ -155,14 +155,14 @@ fn spots_in_the_pictures_lie_where_the_tracked_points_are_drawn() {
 #[test]
 fn an_instant_without_a_frame_is_drawn_without_one_and_said() {
     let fit = fit();
-    let place = Place::new([0.0, 12.0], 2e-4, None);
+    let place = PixelMapping::new([0.0, 12.0], 2e-4, None);
     let spots = |frames| Spots::of(&fit.recording, place, frames);
     let none = over_spots(&fit, &spots(0..0));
     assert!(none.instants.iter().all(|instant| instant.frame.shown().is_none()));
     assert!(
         details(&none).contains("no picture before the reversal")
             && details(&none).contains("first_frame")
-            && !figure(&none).svg(Medium::Screen).contains("<image")
+            && !figure(&none).to_svg(Medium::Screen).contains("<image")
     );
     let last = over_spots(&fit, &spots(0..fit.recording.grid().frames)).instants.pop().unwrap();
     let from = ((last.time_s - fit.recording.grid().start_s) * 5000.0).round() as usize;
@@ -175,9 +175,9 @@ fn an_instant_without_a_frame_is_drawn_without_one_and_said() {
 fn a_picture_of_another_place_is_not_drawn_and_the_keys_are_named() {
     let fit = fit();
     let frames = 0..fit.recording.grid().frames;
-    let place = Place::new([1e6, -1e6], 2e-4, None);
+    let place = PixelMapping::new([1e6, -1e6], 2e-4, None);
     let spots = Spots::of(&fit.recording, place, frames);
     let away = over_spots(&fit, &spots);
-    assert!(!figure(&away).svg(Medium::Screen).contains("<image"));
+    assert!(!figure(&away).to_svg(Medium::Screen).contains("<image"));
     assert!(details(&away).contains("shows neither tracked point: check `origin_px`"), "{}", details(&away));
 }

@@ -1,7 +1,10 @@
 //! Exports of Kinovea, DIPP-MOTION, Frame-DIAS and motion-analysis-2d: exact values, gaps and names, and the
 //! words of refusals.
 
-use wiperlab::import::{Columns, Companion, Import, ImportError, Options, Scale, Source, TimeColumn, import};
+use wiperlab::import::{
+    ColumnMap, CompanionFile, CoordinateScale, Import, ImportError, ImportOptions, ImportSource, TimeColumn,
+    import,
+};
 use wiperlab::recording::Traces;
 use wiperlab::recording::files::YAxis;
 use wiperlab::recording::quality::Severity;
@@ -30,33 +33,33 @@ const SETTINGS: File = fixture!("framedias/two_points_lost.set");
 const DECIMALS: File = fixture!("motion_analysis_2d/points_four_decimals.csv");
 const ANGLES: File = fixture!("motion_analysis_2d/angle_distance_lost.csv");
 
-fn all() -> Options {
-    Options {
+fn all() -> ImportOptions {
+    ImportOptions {
         name: "made".to_owned(),
-        scale: Some(Scale::Unit(1.0)),
+        scale: Some(CoordinateScale::Unit(1.0)),
         y_axis: Some(YAxis::Up),
-        ..Options::default()
+        ..ImportOptions::default()
     }
 }
 
-fn rate(rate_hz: f64) -> Options {
-    Options { frame_rate_hz: Some(rate_hz), ..all() }
+fn rate(rate_hz: f64) -> ImportOptions {
+    ImportOptions { frame_rate_hz: Some(rate_hz), ..all() }
 }
 
-fn points(tip: &str, head: &str, options: Options) -> Options {
-    Options { tip: Some(tip.to_owned()), head: Some(head.to_owned()), ..options }
+fn points(tip: &str, head: &str, options: ImportOptions) -> ImportOptions {
+    ImportOptions { tip: Some(tip.to_owned()), head: Some(head.to_owned()), ..options }
 }
 
-fn time(time: TimeColumn, options: Options) -> Options {
-    Options { time: Some(time), ..options }
+fn time(time: TimeColumn, options: ImportOptions) -> ImportOptions {
+    ImportOptions { time: Some(time), ..options }
 }
 
-fn read((name, bytes): File, options: &Options) -> Result<Import, ImportError> {
-    import(&[Source::alone(name, bytes.to_vec())], options)
+fn read((name, bytes): File, options: &ImportOptions) -> Result<Import, ImportError> {
+    import(&[ImportSource::without_companions(name, bytes.to_vec())], options)
 }
 
-fn text(content: &str, options: &Options) -> Result<Import, ImportError> {
-    import(&[Source::alone("a.txt", content.as_bytes().to_vec())], options)
+fn text(content: &str, options: &ImportOptions) -> Result<Import, ImportError> {
+    import(&[ImportSource::without_companions("a.txt", content.as_bytes().to_vec())], options)
 }
 
 fn refusal(result: Result<Import, ImportError>) -> String {
@@ -147,7 +150,7 @@ fn kinovea_never_names_the_unit_of_its_times() {
         &["--time UNIT", "unit of the program's preferences"],
     );
     contains(
-        &refusal(read(TRAJECTORIES, &Options::default())),
+        &refusal(read(TRAJECTORIES, &ImportOptions::default())),
         &["--time UNIT", "--frame-rate-hz N", "--scale S", "--y-axis up|down"],
     );
 }
@@ -185,7 +188,7 @@ fn kinovea_tables_with_other_columns_are_refused() {
         &refusal(text(&first, &time(TimeColumn::Frames, rate(1000.0)))),
         &["a.txt:2:1: column time: found `zero`, expected a number"],
     );
-    let forced = Options { format: Some("kinovea".to_owned()), ..rate(1000.0) };
+    let forced = ImportOptions { format: Some("kinovea".to_owned()), ..rate(1000.0) };
     contains(
         &refusal(text("t,x\n0,1\n1,2\n", &forced)),
         &["a.txt:1:1: found `t | x`, expected `Time` and pairs", "File > Export"],
@@ -279,8 +282,8 @@ fn kinovea_windows_do_not_say_what_their_series_are() {
             "--columns time-ms=1",
         ],
     );
-    let columns = Some(Columns::parse("time-ms=1,tip-x=2,head-x=3").unwrap());
-    let named = |options: Options| Options {
+    let columns = Some(ColumnMap::parse("time-ms=1,tip-x=2,head-x=3").unwrap());
+    let named = |options: ImportOptions| ImportOptions {
         format: Some("kinovea".to_owned()),
         columns: columns.clone(),
         ..options
@@ -316,7 +319,10 @@ fn dippmotion_has_its_unit_its_names_and_stars_for_lost_points() {
     let options = points(
         "\u{5148}\u{7aef}",
         "P 2",
-        Options { y_axis: Some(YAxis::Up), ..Options { frame_rate_hz: Some(1000.0), ..Options::default() } },
+        ImportOptions {
+            y_axis: Some(YAxis::Up),
+            ..ImportOptions { frame_rate_hz: Some(1000.0), ..ImportOptions::default() }
+        },
     );
     let found = read(STARS, &options).unwrap();
     assert_eq!(found.file.source.as_ref().unwrap().encoding, "Shift_JIS");
@@ -324,25 +330,27 @@ fn dippmotion_has_its_unit_its_names_and_stars_for_lost_points() {
     assert_eq!(found.recording.traces().tip_y_m, [Some(-0.00225), None, Some(-0.00275), Some(-0.003)]);
     assert_eq!(found.recording.traces().head_x_m, [Some(0.01), Some(0.010125), Some(0.01025), None]);
     assert!(!warns(&found, "relative-positions", Severity::Caution));
-    contains(&refusal(read(STARS, &Options { y_axis: None, ..options })), &["--y-axis up|down"]);
+    contains(&refusal(read(STARS, &ImportOptions { y_axis: None, ..options })), &["--y-axis up|down"]);
 }
 
 #[test]
 fn dippmotion_tells_positions_that_are_relative_to_a_point() {
-    let found = read(ORIGIN, &points("P 2", "P 1", Options { scale: None, ..rate(1000.0) })).unwrap();
+    let found = read(ORIGIN, &points("P 2", "P 1", ImportOptions { scale: None, ..rate(1000.0) })).unwrap();
     assert_eq!(found.recording.traces().tip_x_m, some(&[-0.265, -0.2625, -0.26]));
     assert!(warns(&found, "relative-positions", Severity::Caution));
-    let said =
-        read(ORIGIN, &points("P 2", "P 1", Options { scale: Some(Scale::Unit(1e-3)), ..rate(1000.0) }))
-            .unwrap();
+    let said = read(
+        ORIGIN,
+        &points("P 2", "P 1", ImportOptions { scale: Some(CoordinateScale::Unit(1e-3)), ..rate(1000.0) }),
+    )
+    .unwrap();
     assert!(warns(&said, "unit", Severity::Caution), "{:?}", said.report.findings);
 }
 
 #[test]
 fn dippmotion_tables_of_tabs_are_read() {
     let bytes: Vec<u8> = STARS.1.iter().map(|byte| if *byte == b',' { b'\t' } else { *byte }).collect();
-    let options = points("\u{5148}\u{7aef}", "P 2", Options { scale: None, ..rate(1000.0) });
-    let found = import(&[Source::alone("a.csv", bytes)], &options);
+    let options = points("\u{5148}\u{7aef}", "P 2", ImportOptions { scale: None, ..rate(1000.0) });
+    let found = import(&[ImportSource::without_companions("a.csv", bytes)], &options);
     assert_eq!(traces(found), traces(read(STARS, &options)));
 }
 
@@ -377,9 +385,15 @@ fn dippmotion_refusals_name_the_graph_the_unit_and_the_column() {
     );
 }
 
-fn with_settings(table: &[u8], settings: &[u8], options: &Options) -> Result<Import, ImportError> {
-    let companion = Companion { name: "run/two.set".to_owned(), bytes: settings.to_vec() };
-    import(&[Source { companions: vec![companion], ..Source::alone("run/two.rd", table.to_vec()) }], options)
+fn with_settings(table: &[u8], settings: &[u8], options: &ImportOptions) -> Result<Import, ImportError> {
+    let companion = CompanionFile { name: "run/two.set".to_owned(), bytes: settings.to_vec() };
+    import(
+        &[ImportSource {
+            companions: vec![companion],
+            ..ImportSource::without_companions("run/two.rd", table.to_vec())
+        }],
+        options,
+    )
 }
 
 #[test]
@@ -396,7 +410,7 @@ fn framedias_takes_rate_and_names_from_the_settings_beside_it() {
             .iter()
             .any(|finding| finding.check.name() == "lost-points" && finding.value == 2.0)
     );
-    assert_eq!(found.file.source.unwrap().file.all(), ["two.rd", "two.set"]);
+    assert_eq!(found.file.source.unwrap().file.as_slice(), ["two.rd", "two.set"]);
 }
 
 #[test]
@@ -415,7 +429,10 @@ fn framedias_alone_asks_for_the_rate_and_numbers_its_points() {
 fn framedias_refusals_name_what_contradicts_what() {
     let chosen = points("point1", "point2", rate(2000.0));
     let changed = |from: &str, to: &str| {
-        refusal(import(&[Source::alone("a.rd", decoded(DIAS).replacen(from, to, 1).into_bytes())], &chosen))
+        refusal(import(
+            &[ImportSource::without_companions("a.rd", decoded(DIAS).replacen(from, to, 1).into_bytes())],
+            &chosen,
+        ))
     };
     contains(
         &changed("4,2,", "5,2,"),
@@ -446,7 +463,7 @@ fn framedias_refusals_name_what_contradicts_what() {
         &settings("CameraSpeed=2000\nRecInterval=5\nPointName=\"tip\",\"head\"\n"),
         &["--frame-rate-hz N"],
     );
-    let forced = Options { format: Some("framedias".to_owned()), ..chosen.clone() };
+    let forced = ImportOptions { format: Some("framedias".to_owned()), ..chosen.clone() };
     contains(
         &refusal(text("1,2\n3,4\n", &forced)),
         &["a.txt:1:1: found `1,2`, expected the numbers of frames and points"],
@@ -462,7 +479,7 @@ fn motion_analysis_counts_frames_and_its_times_may_be_rounded() {
     assert_eq!(found.recording.traces().tip_y_m[..3], some(&[45.0, 44.75, 44.5]));
     assert!(warns(&found, "rounded-times", Severity::Caution), "{:?}", found.report.findings);
     contains(
-        &refusal(read(DECIMALS, &Options::default())),
+        &refusal(read(DECIMALS, &ImportOptions::default())),
         &["--frame-rate-hz N", "--scale S", "--y-axis up|down"],
     );
 }
@@ -529,7 +546,7 @@ fn line_ends_and_encodings_change_nothing() {
         blocks.replace("\n# lame", "\n\n\n# lame").into_bytes(),
     ];
     for bytes in variants {
-        assert_eq!(traces(import(&[Source::alone("a.txt", bytes)], &options)), expected);
+        assert_eq!(traces(import(&[ImportSource::without_companions("a.txt", bytes)], &options)), expected);
     }
     let options = time(TimeColumn::Frames, rate(2000.0));
     let expected = traces(read(TRAJECTORIES, &options));
@@ -566,7 +583,7 @@ fn files_that_are_cut_short_or_damaged_are_imported_or_refused() {
             changed[at] = [b',', b'"', b'9', b'\n', b'#', b':', 0xe3][at % 7];
             for damaged in [bytes[..at].to_vec(), changed] {
                 tried += 1;
-                match import(&[Source::alone(name, damaged)], &options) {
+                match import(&[ImportSource::without_companions(name, damaged)], &options) {
                     Ok(found) => imported += usize::from(found.recording.grid().frames < 100),
                     Err(error) => assert!(
                         error.to_string().contains(name) || error.to_string().starts_with("--point"),

@@ -2,7 +2,7 @@
 
 use crate::exports::{self, Motion};
 use std::path::{Path, PathBuf};
-use wiperlab::import::{Columns, Import, Options, Scale, Source, import};
+use wiperlab::import::{ColumnMap, CoordinateScale, Import, ImportOptions, ImportSource, import};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::YAxis;
 use wiperlab::recording::quality::Severity;
@@ -10,29 +10,30 @@ use wiperlab::recording::quality::Severity;
 const DICE: &str = "FRAME,COORDINATE_X,COORDINATE_Y,SIGMA,STATUS_FLAG\n0,266,376,0.0015,4\n1,266,376,0.0015,4\n\
     2,266,376,0.0015,4\n";
 
-fn options() -> Options {
-    Options {
+fn options() -> ImportOptions {
+    ImportOptions {
         name: "made".to_owned(),
         frame_rate_hz: Some(1000.0),
-        scale: Some(Scale::Unit(1.0)),
+        scale: Some(CoordinateScale::Unit(1.0)),
         y_axis: Some(YAxis::Up),
-        ..Options::default()
+        ..ImportOptions::default()
     }
 }
 
-fn columns(text: &str) -> Options {
-    Options { columns: Some(Columns::parse(text).unwrap()), ..options() }
+fn columns(text: &str) -> ImportOptions {
+    ImportOptions { columns: Some(ColumnMap::parse(text).unwrap()), ..options() }
 }
 
-fn tracks(tip: &str, head: &str) -> Options {
-    Options { tip: Some(tip.to_owned()), head: Some(head.to_owned()), ..options() }
+fn tracks(tip: &str, head: &str) -> ImportOptions {
+    ImportOptions { tip: Some(tip.to_owned()), head: Some(head.to_owned()), ..options() }
 }
 
-fn read(text: &str, options: &Options) -> Result<Import, String> {
-    import(&[Source::alone("a.csv", text.as_bytes().to_vec())], options).map_err(|error| error.to_string())
+fn read(text: &str, options: &ImportOptions) -> Result<Import, String> {
+    import(&[ImportSource::without_companions("a.csv", text.as_bytes().to_vec())], options)
+        .map_err(|error| error.to_string())
 }
 
-fn refused(text: &str, options: &Options) -> String {
+fn refused(text: &str, options: &ImportOptions) -> String {
     match read(text, options) {
         Ok(found) => panic!("read as {}:\n{text}", found.report.format),
         Err(error) => error,
@@ -41,15 +42,15 @@ fn refused(text: &str, options: &Options) -> String {
 
 fn cautions(found: &Import) -> Vec<String> {
     let graver = found.report.findings.iter().filter(|finding| finding.severity > Severity::Note);
-    graver.map(|finding| format!("{}: {}", finding.check.name(), finding.line())).collect()
+    graver.map(|finding| format!("{}: {}", finding.check.name(), finding.to_line())).collect()
 }
 
 #[test]
 fn a_solution_without_displacements_is_no_motion_for_any_format() {
-    let plain = Options { format: Some("plain".to_owned()), ..options() };
-    let dice = Options { format: Some("dice".to_owned()), ..options() };
+    let plain = ImportOptions { format: Some("plain".to_owned()), ..options() };
+    let dice = ImportOptions { format: Some("dice".to_owned()), ..options() };
     for options in [options(), plain, dice] {
-        let says = refused(DICE, &Options { tip: Some("COORDINATE".to_owned()), ..options });
+        let says = refused(DICE, &ImportOptions { tip: Some("COORDINATE".to_owned()), ..options });
         assert!(
             says.starts_with(
                 "a.csv:1:1: found COORDINATE_X and COORDINATE_Y without DISPLACEMENT_X and DISPLACEMENT_Y"
@@ -102,7 +103,7 @@ fn a_column_less_gives_no_other_positions_in_any_format() {
         let most = text.lines().map(|line| line.split(delimiter).count()).max().unwrap_or(0);
         for column in (0..most).filter(|_| !text.starts_with('<')) {
             let bytes = without_column(&text, delimiter, column).into_bytes();
-            let found = import(&[Source { bytes, ..source.clone() }], &options);
+            let found = import(&[ImportSource { bytes, ..source.clone() }], &options);
             let Ok(found) = found else { continue };
             let same = |(less, all): (&[Option<f64>], &[Option<f64>])| {
                 less == all || less.iter().all(Option::is_none)
@@ -218,7 +219,7 @@ fn a_clock_for_each_track_is_read() {
 
 #[test]
 fn columns_pass_over_no_clock_and_take_none_for_a_position() {
-    let columns = |text: &str| Options { columns: Some(Columns::parse(text).unwrap()), ..options() };
+    let columns = |text: &str| ImportOptions { columns: Some(ColumnMap::parse(text).unwrap()), ..options() };
     let named = columns("time=1,tip-x=2,tip-y=3,head-x=5,head-y=6");
     let text = "tip\t\t\thead\t\t\nt\tx\ty\tt\tx\ty\n0\t1\t2\t0.430\t11\t12\n0.001\t2\t3\t0.431\t12\t13\n\
         0.002\t3\t4\t0.432\t13\t14\n";

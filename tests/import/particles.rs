@@ -1,7 +1,7 @@
 //! Tables of programs that track particles and cells: exact values, gaps, names, and refusals with place and
 //! remedy.
 
-use wiperlab::import::{Import, ImportError, Options, Scale, Source, import};
+use wiperlab::import::{CoordinateScale, Import, ImportError, ImportOptions, ImportSource, import};
 use wiperlab::recording::quality::Severity;
 
 macro_rules! fixture {
@@ -24,28 +24,28 @@ const TRACKPY_FLOAT: Fixture = fixture!("trackpy/trackpy_frame_index_and_column_
 const UNLINKED: Fixture = fixture!("trackpy/trackpy_features_not_linked.csv");
 
 /// Nothing but the rate and the tracks: scale and direction have to come from the file.
-fn options(rate_hz: f64, tip: &str, head: &str) -> Options {
+fn options(rate_hz: f64, tip: &str, head: &str) -> ImportOptions {
     let name = |name: &str| Some(name.to_owned()).filter(|name| !name.is_empty());
-    Options {
+    ImportOptions {
         name: "made".to_owned(),
         frame_rate_hz: Some(rate_hz),
         tip: name(tip),
         head: name(head),
-        ..Options::default()
+        ..ImportOptions::default()
     }
 }
 
 /// The same with a scale, for files in pixels.
-fn scaled(rate_hz: f64, tip: &str, head: &str) -> Options {
-    Options { scale: Some(Scale::MetresPerPixel(1.0)), ..options(rate_hz, tip, head) }
+fn scaled(rate_hz: f64, tip: &str, head: &str) -> ImportOptions {
+    ImportOptions { scale: Some(CoordinateScale::MetresPerPixel(1.0)), ..options(rate_hz, tip, head) }
 }
 
-fn read(fixture: Fixture, options: &Options) -> Result<Import, ImportError> {
+fn read(fixture: Fixture, options: &ImportOptions) -> Result<Import, ImportError> {
     read_as(fixture.0, &String::from_utf8_lossy(fixture.1), options)
 }
 
-fn read_as(name: &str, text: &str, options: &Options) -> Result<Import, ImportError> {
-    import(&[Source::alone(name, text.as_bytes().to_vec())], options)
+fn read_as(name: &str, text: &str, options: &ImportOptions) -> Result<Import, ImportError> {
+    import(&[ImportSource::without_companions(name, text.as_bytes().to_vec())], options)
 }
 
 /// What is said of the fixture with `from` replaced by `to`.
@@ -70,7 +70,7 @@ fn tip_x(found: &Import) -> Vec<Option<f64>> {
     found.recording.traces().tip_x_m.clone()
 }
 
-fn finding<'f>(found: &'f Import, check: &str) -> Option<&'f wiperlab::recording::quality::Finding> {
+fn finding<'f>(found: &'f Import, check: &str) -> Option<&'f wiperlab::recording::quality::QualityFinding> {
     found.report.findings.iter().find(|finding| finding.check.name() == check)
 }
 
@@ -91,7 +91,7 @@ fn each_fixture_is_claimed_by_its_own_format() {
     ];
     for (fixture, format, tip) in all {
         let playback =
-            Options { time: Some(wiperlab::import::TimeColumn::Playback), ..scaled(1000.0, tip, "") };
+            ImportOptions { time: Some(wiperlab::import::TimeColumn::Playback), ..scaled(1000.0, tip, "") };
         let found = read(fixture, &playback).unwrap_or_else(|error| panic!("{}: {error}", fixture.0));
         assert_eq!(found.report.format, format, "{}", fixture.0);
     }
@@ -155,7 +155,9 @@ fn a_lost_sign_of_the_micrometre_and_an_unset_interval_are_understood() {
     ]
     .concat();
     assert_eq!(
-        import(&[Source::alone("a.csv", latin)], &options(2000.0, "0", "1")).unwrap().recording,
+        import(&[ImportSource::without_companions("a.csv", latin)], &options(2000.0, "0", "1"))
+            .unwrap()
+            .recording,
         expected
     );
     let unset = text

@@ -1,7 +1,9 @@
 //! DeepLabCut, Lightning Pose, SLEAP, DLTdv and Argus: exact values, gaps and names, and what is refused.
 
-use wiperlab::import::{Companion, Import, ImportError, Options, Scale, Source, import};
-use wiperlab::recording::channel::Instants;
+use wiperlab::import::{
+    CompanionFile, CoordinateScale, Import, ImportError, ImportOptions, ImportSource, import,
+};
+use wiperlab::recording::channel::ReversalInstants;
 use wiperlab::recording::files::YAxis;
 use wiperlab::recording::quality::Severity;
 use wiperlab::recording::quality::{self, Optics};
@@ -37,29 +39,29 @@ fixtures! {
 }
 
 /// What none of these formats says: rate and scale; 1 m/px keeps the numbers of the file.
-fn options() -> Options {
-    Options {
+fn options() -> ImportOptions {
+    ImportOptions {
         name: "made".to_owned(),
         frame_rate_hz: Some(1000.0),
-        scale: Some(Scale::MetresPerPixel(1.0)),
-        ..Options::default()
+        scale: Some(CoordinateScale::MetresPerPixel(1.0)),
+        ..ImportOptions::default()
     }
 }
 
-fn points(tip: &str, head: &str) -> Options {
+fn points(tip: &str, head: &str) -> ImportOptions {
     let name = |name: &str| (!name.is_empty()).then(|| name.to_owned());
-    Options { tip: name(tip), head: name(head), ..options() }
+    ImportOptions { tip: name(tip), head: name(head), ..options() }
 }
 
-fn text(name: &str, text: &str, options: &Options) -> Result<Import, ImportError> {
-    import(&[Source::alone(name, text.as_bytes().to_vec())], options)
+fn text(name: &str, text: &str, options: &ImportOptions) -> Result<Import, ImportError> {
+    import(&[ImportSource::without_companions(name, text.as_bytes().to_vec())], options)
 }
 
-fn read((name, content): (&str, &str), options: &Options) -> Import {
+fn read((name, content): (&str, &str), options: &ImportOptions) -> Import {
     text(name, content, options).unwrap()
 }
 
-fn says(content: &str, options: &Options) -> String {
+fn says(content: &str, options: &ImportOptions) -> String {
     text("a.csv", content, options).unwrap_err().to_string()
 }
 
@@ -82,14 +84,14 @@ fn every_fixture_is_recognised_as_its_own_format() {
     ];
     for (format, fixtures) in of_format {
         for (name, content) in fixtures {
-            let choice = Options { y_axis: (format == "dltdv").then_some(YAxis::Down), ..options() };
+            let choice = ImportOptions { y_axis: (format == "dltdv").then_some(YAxis::Down), ..options() };
             let found = text(name, content, &choice).or_else(|error| {
                 let shown = error.to_string();
                 let first = shown.split("tracks found: ").nth(1).and_then(|list| list.split(", ").next());
                 text(
                     name,
                     content,
-                    &Options {
+                    &ImportOptions {
                         tip: Some(first.unwrap_or_else(|| panic!("{name}: {shown}")).to_owned()),
                         ..choice
                     },
@@ -117,17 +119,17 @@ fn deeplabcut_has_its_frames_pixels_and_likelihoods() {
             found.report
         );
     }
-    let found = read(DLC, &Options { min_likelihood: Some(0.6), ..options() });
+    let found = read(DLC, &ImportOptions { min_likelihood: Some(0.6), ..options() });
     assert_eq!(found.recording.traces().tip_x_m, [Some(100.5), None, Some(102.5)]);
     assert_eq!(findings(&found, "confidence-rejected").len(), 2);
     // what nobody rejected is told once: by the verdict, for the point that has such positions
     let kept = read(DLC, &options());
     let measured = kept.file.quality.as_ref().unwrap();
-    let all = quality::findings(
+    let all = quality::collect_findings(
         &kept.recording,
         measured,
         &Optics::default(),
-        &Instants::find(&kept.recording),
+        &ReversalInstants::find_instants(&kept.recording),
         &kept.report.findings,
     );
     let doubtful: Vec<_> = all
@@ -213,7 +215,7 @@ fn spreadsheets_and_line_ends_change_nothing() {
     }
     let expected = read(SLEAP, &options()).recording;
     assert_eq!(text("a.csv", &SLEAP.1.replace('\n', "\r\n"), &options()).unwrap().recording, expected);
-    let upwards = Options { y_axis: Some(YAxis::Up), ..points("pt1", "pt2") };
+    let upwards = ImportOptions { y_axis: Some(YAxis::Up), ..points("pt1", "pt2") };
     let expected = read(DLTDV_7, &upwards).recording;
     assert_eq!(
         text("a.csv", &DLTDV_7.1.replace('\n', "\r\n").replace("NaN", ""), &upwards).unwrap().recording,
@@ -395,7 +397,7 @@ fn sleap_tables_that_lack_something_are_refused() {
         videos.starts_with("a.csv:4:3: found a row of the video `run8.mp4` after those of `run7.mp4`"),
         "{videos}"
     );
-    let other = says("a,b\n1,2\n3,4\n", &Options { format: Some("sleap".to_owned()), ..options() });
+    let other = says("a,b\n1,2\n3,4\n", &ImportOptions { format: Some("sleap".to_owned()), ..options() });
     assert!(other.starts_with("a.csv:1:1: found the columns a, b, expected frame_idx"), "{other}");
     let cell = says(&SLEAP.1.replace("100.5", "lost"), &options());
     assert!(cell.starts_with("a.csv:2:14: column tip.x: found `lost`, expected a number"), "{cell}");
@@ -421,7 +423,7 @@ fn dltdv_rows_are_frames_and_its_version_decides_about_y() {
         found.report
     );
     let open = text("a.csv", DLTDV_7.1, &points("pt1", "pt2")).unwrap_err();
-    assert!(matches!(&open, ImportError::Unset { missing, .. } if missing.len() == 1), "{open}");
+    assert!(matches!(&open, ImportError::MissingOptions { missing, .. } if missing.len() == 1), "{open}");
     assert!(
         open.to_string().contains(
             "DLTdv 8 counts pixels from the top of the picture (down), DLTdv 5 to \
@@ -429,7 +431,7 @@ fn dltdv_rows_are_frames_and_its_version_decides_about_y() {
         ),
         "{open}"
     );
-    let found = read(DLTDV_7, &Options { y_axis: Some(YAxis::Up), ..points("pt1", "pt2") });
+    let found = read(DLTDV_7, &ImportOptions { y_axis: Some(YAxis::Up), ..points("pt1", "pt2") });
     assert_eq!(found.recording.traces().tip_x_m, [Some(101.25), None, Some(103.75)]);
     assert_eq!(found.recording.traces().tip_y_m, [Some(200.5), None, Some(201.0)]);
     assert_eq!(found.recording.traces().head_x_m, [Some(90.0), Some(90.1), Some(90.2)]);
@@ -463,13 +465,16 @@ fn cameras_are_kept_apart() {
     assert!(refused.contains("tracks found: tip_cam1, tip_cam2"), "{refused}");
 }
 
-fn sparse(table: &str, names: Option<&str>, options: &Options) -> Result<Import, ImportError> {
+fn sparse(table: &str, names: Option<&str>, options: &ImportOptions) -> Result<Import, ImportError> {
     let companions = names
         .iter()
-        .map(|names| Companion { name: "run_pointNames.tsv".to_owned(), bytes: names.as_bytes().to_vec() })
+        .map(|names| CompanionFile {
+            name: "run_pointNames.tsv".to_owned(),
+            bytes: names.as_bytes().to_vec(),
+        })
         .collect();
     import(
-        &[Source { name: "run_xypts.tsv".to_owned(), bytes: table.as_bytes().to_vec(), companions }],
+        &[ImportSource { name: "run_xypts.tsv".to_owned(), bytes: table.as_bytes().to_vec(), companions }],
         options,
     )
 }
@@ -482,8 +487,8 @@ fn triplets_of_dltdv_are_placed_by_row_and_column() {
     assert_eq!(traces.tip_y_m, [Some(-200.5), None, Some(-201.0)]);
     assert_eq!(traces.head_x_m, [Some(90.0), Some(90.1), Some(90.2)]);
     assert_eq!(found.file.camera.y_axis, Some(YAxis::Down));
-    assert_eq!(found.file.source.unwrap().file.all(), ["run_xypts.tsv", "run_pointNames.tsv"]);
-    let up = Options { y_axis: Some(YAxis::Up), ..points("columns1-2", "columns3-4") };
+    assert_eq!(found.file.source.unwrap().file.as_slice(), ["run_xypts.tsv", "run_pointNames.tsv"]);
+    let up = ImportOptions { y_axis: Some(YAxis::Up), ..points("columns1-2", "columns3-4") };
     let alone = sparse(DLTDV_SPARSE.1, None, &up).unwrap();
     assert_eq!(alone.recording.traces().tip_y_m, [Some(200.5), None, Some(201.0)]);
     assert!(
@@ -563,7 +568,7 @@ fn flat_tables_of_dltdv_that_do_not_fit_are_refused() {
         ),
         "{lone}"
     );
-    let headless = says("1,2\n3,4\n", &Options { format: Some("dltdv".to_owned()), ..options() });
+    let headless = says("1,2\n3,4\n", &ImportOptions { format: Some("dltdv".to_owned()), ..options() });
     assert!(
         headless.starts_with("a.csv:1:1: found `1, 2`, expected pairs of columns such as tip_cam1_X"),
         "{headless}"
@@ -581,7 +586,7 @@ fn damaged_tables_are_read_or_refused_but_never_break_the_program() {
     for (name, content) in
         [DLC_MULTI, DLC_LABELS, DLC_PATHS, SLEAP, SLEAP_POINTS, SLEAP_FRAMES, DLTDV_8, DLTDV_SPARSE, ARGUS]
     {
-        let choice = Options { y_axis: Some(YAxis::Down), ..options() };
+        let choice = ImportOptions { y_axis: Some(YAxis::Down), ..options() };
         let lines: Vec<&str> = content.lines().collect();
         for cut in (0..content.len()).step_by(31).filter(|cut| content.is_char_boundary(*cut)) {
             let (before, after) = content.split_at(cut);

@@ -1,7 +1,8 @@
 //! Exports in, recordings out: exact values for what is read, place and remedy for what is refused.
 
 use wiperlab::import::{
-    CellProblem, Columns, Import, ImportError, Options, Scale, Source, TimeColumn, import,
+    CellProblem, ColumnMap, CoordinateScale, Import, ImportError, ImportOptions, ImportSource, TimeColumn,
+    import,
 };
 use wiperlab::recording::files::{RecordingFile, YAxis, read_recording, trace_csv};
 
@@ -9,26 +10,26 @@ const MULTI: &[u8] = include_bytes!("../fixtures/tracker/tracker6_export_multi_b
 const NORWEGIAN: &[u8] = include_bytes!("../fixtures/tracker/tracker6_locale_nb_u2212_comma.txt");
 const FRAMES: &[u8] = include_bytes!("../fixtures/generic/frame_and_rounded_time.csv");
 
-fn source(name: &str, bytes: &[u8]) -> Source {
-    Source::alone(name, bytes.to_vec())
+fn source(name: &str, bytes: &[u8]) -> ImportSource {
+    ImportSource::without_companions(name, bytes.to_vec())
 }
 
-fn options(rate_hz: f64) -> Options {
-    Options {
+fn options(rate_hz: f64) -> ImportOptions {
+    ImportOptions {
         name: "made".to_owned(),
         frame_rate_hz: Some(rate_hz),
-        scale: Some(Scale::Unit(1.0)),
+        scale: Some(CoordinateScale::Unit(1.0)),
         y_axis: Some(YAxis::Up),
-        ..Options::default()
+        ..ImportOptions::default()
     }
 }
 
-fn read(text: &str, options: &Options) -> Result<Import, ImportError> {
+fn read(text: &str, options: &ImportOptions) -> Result<Import, ImportError> {
     import(&[source("a.txt", text.as_bytes())], options)
 }
 
-fn columns(text: &str, rate_hz: f64) -> Options {
-    Options { columns: Some(Columns::parse(text).unwrap()), ..options(rate_hz) }
+fn columns(text: &str, rate_hz: f64) -> ImportOptions {
+    ImportOptions { columns: Some(ColumnMap::parse(text).unwrap()), ..options(rate_hz) }
 }
 
 /// A plain table of `rows` rows at 1000 rows/s: time, tip x and y, head x and y.
@@ -48,14 +49,14 @@ fn an_export_of_two_tracks_keeps_its_blank_row_as_a_gap() {
     assert_eq!(traces.tip_x_m, [Some(0.125), None, Some(0.13)]);
     assert_eq!(traces.tip_y_m, [Some(3.0), None, Some(2.95)]);
     assert_eq!(traces.head_x_m, [Some(12.0), Some(12.01), Some(12.02)]);
-    assert_eq!(found.file.source.unwrap().file.all(), ["multi.txt"]);
+    assert_eq!(found.file.source.unwrap().file.as_slice(), ["multi.txt"]);
     assert_eq!(found.report.format, "tracker");
     assert!(!found.recording.is_synthetic());
 }
 
 #[test]
 fn a_locale_with_decimal_commas_and_typographic_minus_is_read() {
-    let choice = Options { tip: Some("mass A".to_owned()), ..options(2000.0) };
+    let choice = ImportOptions { tip: Some("mass A".to_owned()), ..options(2000.0) };
     let found = import(&[source("nb.txt", NORWEGIAN)], &choice).unwrap();
     assert_eq!(found.recording.traces().tip_x_m, [Some(-0.125), Some(-0.13)]);
     assert_eq!(found.recording.traces().head_x_m, [None, None]);
@@ -92,10 +93,10 @@ fn every_delimiter_line_end_and_encoding_gives_the_same_recording() {
 #[test]
 fn momentum_is_not_a_position() {
     let with = "t\tpx\tpy\tx\ty\n0\t100\t200\t1\t2\n1\t101\t201\t3\t4\n";
-    let choice = Options { tip: Some("a".to_owned()), ..options(1.0) };
+    let choice = ImportOptions { tip: Some("a".to_owned()), ..options(1.0) };
     assert_eq!(read(with, &choice).unwrap().recording.traces().tip_x_m, [Some(1.0), Some(3.0)]);
     let without = "t\tpx\tpy\n0\t1\t2\n1\t1\t2\n";
-    let forced = Options { format: Some("tracker".to_owned()), ..choice };
+    let forced = ImportOptions { format: Some("tracker".to_owned()), ..choice };
     assert!(
         read(without, &forced)
             .unwrap_err()
@@ -117,7 +118,7 @@ fn single_track_files_merge_on_one_grid() {
     let two = "t\tx\ty\n0.2\t30\t30\n0.3\t40\t40\n0.4\t50\t50\n";
     let sources = [source("left/tip.txt", one.as_bytes()), source("left/holder.txt", two.as_bytes())];
     let choice =
-        Options { tip: Some("tip".to_owned()), head: Some("holder.txt".to_owned()), ..options(10.0) };
+        ImportOptions { tip: Some("tip".to_owned()), head: Some("holder.txt".to_owned()), ..options(10.0) };
     let found = import(&sources, &choice).unwrap().recording;
     assert_eq!(found.grid().frames, 5);
     assert_eq!(found.traces().tip_x_m, [Some(1.0), Some(2.0), None, Some(4.0), None]);
@@ -150,8 +151,8 @@ fn a_plain_table_is_read_by_number_and_by_name() {
 
 #[test]
 fn scale_and_direction_are_applied_to_the_files_own_origin() {
-    let pixels = Options {
-        scale: Some(Scale::parse("0.5m/px").unwrap()),
+    let pixels = ImportOptions {
+        scale: Some(CoordinateScale::parse("0.5m/px").unwrap()),
         y_axis: Some(YAxis::Down),
         ..columns(ALL, 1000.0)
     };
@@ -165,7 +166,7 @@ fn scale_and_direction_are_applied_to_the_files_own_origin() {
 fn what_no_file_says_must_be_said_all_at_once() {
     let says = read(
         &plain(20).join("\n"),
-        &Options { columns: Some(Columns::parse(ALL).unwrap()), ..Options::default() },
+        &ImportOptions { columns: Some(ColumnMap::parse(ALL).unwrap()), ..ImportOptions::default() },
     )
     .unwrap_err()
     .to_string();
@@ -236,12 +237,16 @@ fn missing_words_are_missing_and_lost_points_are_suspected() {
 #[test]
 fn rates_that_disagree_are_refused_unless_the_times_only_count() {
     let text = plain(20).join("\n");
-    assert!(matches!(read(&text, &columns(ALL, 25_000.0)), Err(ImportError::Rate { step: None, .. })));
+    assert!(matches!(
+        read(&text, &columns(ALL, 25_000.0)),
+        Err(ImportError::RateMismatch { step: None, .. })
+    ));
     assert!(read(&text, &columns(ALL, 1005.0)).is_ok());
-    let counted = Options { time: Some(TimeColumn::Playback), ..columns(ALL, 25_000.0) };
+    let counted = ImportOptions { time: Some(TimeColumn::Playback), ..columns(ALL, 25_000.0) };
     let found = read(&text, &counted).unwrap().recording;
     assert_eq!((found.grid().frame_rate_hz, found.grid().frames), (25_000.0, 20));
-    let playback = read(&text, &Options { time: Some(TimeColumn::Playback), ..columns(ALL, 30.0) }).unwrap();
+    let playback =
+        read(&text, &ImportOptions { time: Some(TimeColumn::Playback), ..columns(ALL, 30.0) }).unwrap();
     assert!(playback.report.findings.iter().any(|f| f.check.name() == "implied-rate"
         && (f.value - 1000.0).abs() < 1e-6
         && f.found.contains("playback")));
@@ -249,7 +254,7 @@ fn rates_that_disagree_are_refused_unless_the_times_only_count() {
 
 #[test]
 fn tracks_are_named_in_the_refusal() {
-    let choice = Options { tip: Some("tipp".to_owned()), ..options(2000.0) };
+    let choice = ImportOptions { tip: Some("tipp".to_owned()), ..options(2000.0) };
     let says = import(&[source("m.txt", MULTI)], &choice).unwrap_err().to_string();
     assert_eq!(
         says,
@@ -260,15 +265,15 @@ fn tracks_are_named_in_the_refusal() {
 #[test]
 fn a_point_that_is_not_named_is_the_track_of_its_name() {
     let lip = String::from_utf8(MULTI.to_vec()).unwrap().replace("tip", "lip");
-    let found = read(&lip, &Options { tip: Some("lip".to_owned()), ..options(2000.0) }).unwrap();
+    let found = read(&lip, &ImportOptions { tip: Some("lip".to_owned()), ..options(2000.0) }).unwrap();
     assert_eq!(found.recording.traces().head_x_m, [Some(12.0), Some(12.01), Some(12.02)]);
-    let taken = read(&lip, &Options { tip: Some("head".to_owned()), ..options(2000.0) }).unwrap();
+    let taken = read(&lip, &ImportOptions { tip: Some("head".to_owned()), ..options(2000.0) }).unwrap();
     assert_eq!(taken.recording.traces().head_x_m, [None; 3]);
 }
 
 #[test]
 fn formats_and_tables_that_are_not_read_say_what_to_do() {
-    let kinovea = Options { format: Some("kinovea".to_owned()), ..options(1.0) };
+    let kinovea = ImportOptions { format: Some("kinovea".to_owned()), ..options(1.0) };
     let says = read("t\tx\n1\t2\n", &kinovea).unwrap_err().to_string();
     assert!(
         says.contains("found `t | x`")
@@ -276,7 +281,7 @@ fn formats_and_tables_that_are_not_read_say_what_to_do() {
             && says.contains("leave --format out"),
         "{says}"
     );
-    let tema = read("t\tx\n1\t2\n", &Options { format: Some("TEMA".to_owned()), ..options(1.0) })
+    let tema = read("t\tx\n1\t2\n", &ImportOptions { format: Some("TEMA".to_owned()), ..options(1.0) })
         .unwrap_err()
         .to_string();
     assert!(tema.contains("its layout is not published") && tema.contains("--columns time=1"), "{tema}");
@@ -291,18 +296,24 @@ fn formats_and_tables_that_are_not_read_say_what_to_do() {
 #[test]
 fn pixels_declared_as_a_length_are_suspected() {
     let text = "t\tx\ty\n0\t100\t200\n1\t101\t201\n2\t103\t202\n3\t104\t203\n";
-    let found =
-        read(text, &Options { tip: Some("a".to_owned()), scale: Some(Scale::Unit(1e-3)), ..options(1.0) })
-            .unwrap();
+    let found = read(
+        text,
+        &ImportOptions {
+            tip: Some("a".to_owned()),
+            scale: Some(CoordinateScale::Unit(1e-3)),
+            ..options(1.0)
+        },
+    )
+    .unwrap();
     assert!(found.report.warnings().any(|w| w.contains("look like pixels")), "{:?}", found.report);
 }
 
 #[test]
 fn synthetic_data_says_so() {
     let text = "\ttip synthetic\t\nt\tx\ty\n0\t1\t1\n1\t2\t2\n";
-    let named = read(text, &Options { tip: Some("tip synthetic".to_owned()), ..options(1.0) }).unwrap();
+    let named = read(text, &ImportOptions { tip: Some("tip synthetic".to_owned()), ..options(1.0) }).unwrap();
     assert!(named.recording.is_synthetic() && named.file.synthetic);
-    let twin = Options {
+    let twin = ImportOptions {
         twin: Some(("spec.toml".to_owned(), "format = 1\n[camera]\nseed = 7\n".to_owned())),
         ..columns(ALL, 1000.0)
     };
@@ -314,7 +325,8 @@ fn synthetic_data_says_so() {
 #[test]
 fn confidence_below_the_limit_is_missing() {
     let text = "0,1,0.9\n1,2,0.1\n2,3,0.7\n";
-    let limited = Options { min_likelihood: Some(0.6), ..columns("frame=1,tip-x=2,tip-confidence=3", 100.0) };
+    let limited =
+        ImportOptions { min_likelihood: Some(0.6), ..columns("frame=1,tip-x=2,tip-confidence=3", 100.0) };
     let found = read(text, &limited).unwrap().recording;
     assert_eq!(found.traces().tip_x_m, [Some(1.0), None, Some(3.0)]);
     assert_eq!(found.traces().tip_confidence.as_deref(), Some(&[Some(0.9), Some(0.1), Some(0.7)][..]));
@@ -322,9 +334,9 @@ fn confidence_below_the_limit_is_missing() {
 
 #[test]
 fn import_write_read_is_the_identity() {
-    let mut set = Options {
+    let mut set = ImportOptions {
         exposure_s: Some(1e-4),
-        scale: Some(Scale::parse("21.5um/px").unwrap()),
+        scale: Some(CoordinateScale::parse("21.5um/px").unwrap()),
         y_axis: Some(YAxis::Down),
         ..columns(ALL, 1000.0)
     };

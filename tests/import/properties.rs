@@ -3,7 +3,7 @@
 
 use crate::exports::{Exporter, Motion, exporters};
 use proptest::prelude::*;
-use wiperlab::import::{Import, Source, import};
+use wiperlab::import::{Import, ImportSource, import};
 
 /// Positions with three decimals, of which some are lost; no point sits on the origin, which some programs
 /// write for a lost one.
@@ -24,7 +24,7 @@ fn motions() -> impl Strategy<Value = Motion> {
     )
 }
 
-fn read(exporter: &Exporter, motion: &Motion, source: Source) -> Result<Import, String> {
+fn read(exporter: &Exporter, motion: &Motion, source: ImportSource) -> Result<Import, String> {
     import(&[source], &exporter.options(motion)).map_err(|error| error.to_string())
 }
 
@@ -84,7 +84,7 @@ proptest! {
             let with_mark = format!("\u{feff}{text}").into_bytes();
             let variants = [text.replace('\n', "\r\n").into_bytes(), text.replace('\n', "\r").into_bytes(), with_mark, wide, text.trim_end().as_bytes().to_vec()];
             for (index, bytes) in variants.into_iter().enumerate() {
-                let found = read(&exporter, &motion, Source { bytes, ..plain.clone() });
+                let found = read(&exporter, &motion, ImportSource { bytes, ..plain.clone() });
                 let found = found.map_err(|message| TestCaseError::fail(format!("{} {} variant {index}: \
                     {message}", exporter.format, exporter.variant)))?;
                 prop_assert_eq!(positions(&found), carried(&exporter, &motion), "{} {} variant {}", exporter.format, exporter.variant, index);
@@ -180,7 +180,7 @@ proptest! {
         let source = exporter.source(&motion);
         let (bytes, first, last) = suffer(&source.bytes, &accident);
         let header = header_lines(&source.bytes);
-        let Ok(found) = read(exporter, &motion, Source { bytes: bytes.clone(), ..source.clone() }) else { return Ok(()) };
+        let Ok(found) = read(exporter, &motion, ImportSource { bytes: bytes.clone(), ..source.clone() }) else { return Ok(()) };
         // another header may give other columns; a row lost where rows are frames cannot be noticed
         if first <= header || exporter.rows_are_frames || exporter.variant.contains("xml") || exporter.variant == "sparse" {
             return Ok(());

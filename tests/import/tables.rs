@@ -1,7 +1,9 @@
 //! ImageJ's tables, DICe, TRC, plain tables with a telling header, and the camera's record of an export.
 
 use proptest::prelude::*;
-use wiperlab::import::{Columns, Companion, Import, ImportError, Options, Scale, Source, import};
+use wiperlab::import::{
+    ColumnMap, CompanionFile, CoordinateScale, Import, ImportError, ImportOptions, ImportSource, import,
+};
 use wiperlab::recording::files::YAxis;
 
 macro_rules! fixture {
@@ -35,30 +37,34 @@ const PHOTRON: Fixture = fixture!("photron/run7.csv");
 const CIH: Fixture = fixture!("photron/run7.cih");
 const CIHX: Fixture = fixture!("photron/run7.cihx");
 
-fn source((name, bytes): Fixture) -> Source {
-    Source::alone(name, bytes.to_vec())
+fn source((name, bytes): Fixture) -> ImportSource {
+    ImportSource::without_companions(name, bytes.to_vec())
 }
 
 /// Nothing said but which track is which.
-fn points(tip: &str, head: &str) -> Options {
+fn points(tip: &str, head: &str) -> ImportOptions {
     let named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
-    Options { name: "made".to_owned(), tip: named(tip), head: named(head), ..Options::default() }
+    ImportOptions { name: "made".to_owned(), tip: named(tip), head: named(head), ..ImportOptions::default() }
 }
 
 /// Pixels of half a metre, so that no product rounds.
-fn pixels(rate_hz: f64, options: Options) -> Options {
-    Options { frame_rate_hz: Some(rate_hz), scale: Some(Scale::MetresPerPixel(0.5)), ..options }
+fn pixels(rate_hz: f64, options: ImportOptions) -> ImportOptions {
+    ImportOptions {
+        frame_rate_hz: Some(rate_hz),
+        scale: Some(CoordinateScale::MetresPerPixel(0.5)),
+        ..options
+    }
 }
 
-fn down(options: Options) -> Options {
-    Options { y_axis: Some(YAxis::Down), ..options }
+fn down(options: ImportOptions) -> ImportOptions {
+    ImportOptions { y_axis: Some(YAxis::Down), ..options }
 }
 
-fn read(fixture: Fixture, options: &Options) -> Import {
+fn read(fixture: Fixture, options: &ImportOptions) -> Import {
     import(&[source(fixture)], options).unwrap_or_else(|error| panic!("{}: {error}", fixture.0))
 }
 
-fn refused(fixture: Fixture, options: &Options) -> String {
+fn refused(fixture: Fixture, options: &ImportOptions) -> String {
     match import(&[source(fixture)], options) {
         Ok(found) => panic!("{} was read as {}", fixture.0, found.report.format),
         Err(error) => error.to_string(),
@@ -67,9 +73,12 @@ fn refused(fixture: Fixture, options: &Options) -> String {
 
 /// The refusal of a text of the given name.
 fn says(name: &'static str, text: &str) -> String {
-    import(&[Source::alone(name, text.as_bytes().to_vec())], &down(pixels(500.0, points("tip", "head"))))
-        .unwrap_err()
-        .to_string()
+    import(
+        &[ImportSource::without_companions(name, text.as_bytes().to_vec())],
+        &down(pixels(500.0, points("tip", "head"))),
+    )
+    .unwrap_err()
+    .to_string()
 }
 
 #[test]
@@ -86,8 +95,8 @@ fn tables_of_animal_trackers_are_read_by_their_columns() {
         (animalta, "frame=Frame,tip-x=3,tip-y=4", ""),
         (trex, "frame=1,tip-x=4,tip-y=5", ""),
     ] {
-        let columns = Some(Columns::parse(columns).unwrap());
-        let options = Options { columns, ..down(pixels(500.0, points(tip, ""))) };
+        let columns = Some(ColumnMap::parse(columns).unwrap());
+        let options = ImportOptions { columns, ..down(pixels(500.0, points(tip, ""))) };
         let found = read(("a.csv", text.as_bytes()), &options);
         assert_eq!(found.recording.traces().tip_x_m, [Some(0.5), Some(5.5)], "{text}");
     }
@@ -188,9 +197,12 @@ fn results_that_do_not_say_which_point_is_which_are_refused() {
     assert!(both.contains("both Slice and Frame change") && both.contains("--columns frame=Frame"), "{both}");
     let header = says("a.txt", "X\tY\tSlice\n1\t101\t200\t1\n2\t103\t201\t2\n");
     assert!(header.starts_with("a.txt:2:1: found 4 cells, expected 3"), "{header}");
-    let half = import(&[Source::alone("a.txt", b"X,Y,Slice\n101,200,1\n103,201,2.5\n".to_vec())], &choice)
-        .unwrap_err()
-        .to_string();
+    let half = import(
+        &[ImportSource::without_companions("a.txt", b"X,Y,Slice\n101,200,1\n103,201,2.5\n".to_vec())],
+        &choice,
+    )
+    .unwrap_err()
+    .to_string();
     assert!(half.starts_with("a.txt:3:9: column frame: found `2.5`, expected a whole number"), "{half}");
 }
 
@@ -212,8 +224,11 @@ fn manual_tracking_is_read_whatever_became_of_its_degree_sign() {
         );
     }
     let lost = replaced(MANUAL[1], "\u{b0}", "?");
-    let found =
-        import(&[Source::alone("a.xls", lost.into_bytes())], &pixels(1000.0, points("1", "2"))).unwrap();
+    let found = import(
+        &[ImportSource::without_companions("a.xls", lost.into_bytes())],
+        &pixels(1000.0, points("1", "2")),
+    )
+    .unwrap();
     assert_eq!(found.recording.grid().frames, 4);
     let unit = refused(MANUAL[0], &points("1", "2"));
     assert!(unit.contains("Manual Tracking writes X and Y in whole pixels"), "{unit}");
@@ -237,7 +252,7 @@ fn mtrackj_times_its_points_and_names_its_units() {
     let found = read(MTRACKJ, &pixels(2000.0, points("1", "2")));
     assert_eq!(found.recording.traces().tip_x_m, [Some(50.75), Some(51.75), None, Some(53.75)]);
     assert_eq!(found.recording.traces().head_x_m, [Some(45.0), Some(45.5), Some(46.0), None]);
-    let found = read(MTRACKJ_MM, &Options { frame_rate_hz: Some(2000.0), ..points("1:1", "2:1") });
+    let found = read(MTRACKJ_MM, &ImportOptions { frame_rate_hz: Some(2000.0), ..points("1:1", "2:1") });
     assert_eq!(found.recording.traces().tip_x_m, [Some(0.0105), Some(0.01075)]);
     assert_eq!(found.recording.traces().head_y_m, [Some(-0.00525), Some(-0.00525)]);
     let unset = refused(MTRACKJ, &points("1", "2"));
@@ -324,7 +339,7 @@ fn fields_of_dice_are_refused() {
 #[test]
 fn trc_says_its_unit_and_rate() {
     for fixture in [TRC_TAB, TRC_COMMA] {
-        let found = read(fixture, &Options { y_axis: Some(YAxis::Up), ..points("", "") });
+        let found = read(fixture, &ImportOptions { y_axis: Some(YAxis::Up), ..points("", "") });
         let (grid, traces) = (found.recording.grid(), found.recording.traces());
         assert_eq!((grid.frame_rate_hz, grid.frames), (500.0, 3));
         assert_eq!(traces.tip_x_m, [Some(0.1015), None, Some(0.1035)]);
@@ -336,9 +351,11 @@ fn trc_says_its_unit_and_rate() {
         axis.contains("--y-axis up|down") && !axis.contains("--scale") && !axis.contains("--frame-rate-hz"),
         "{axis}"
     );
-    let slower =
-        Source::alone("a.trc", replaced(TRC_TAB, "500.00\t500.00\t3", "500.00\t1000.00\t3").into_bytes());
-    let found = import(&[slower], &Options { y_axis: Some(YAxis::Up), ..points("", "") }).unwrap();
+    let slower = ImportSource::without_companions(
+        "a.trc",
+        replaced(TRC_TAB, "500.00\t500.00\t3", "500.00\t1000.00\t3").into_bytes(),
+    );
+    let found = import(&[slower], &ImportOptions { y_axis: Some(YAxis::Up), ..points("", "") }).unwrap();
     assert!(found.report.warnings().any(|warning| warning.contains(
         "the camera ran at 1000 frames/s, but the \
         rows are 500 a second"
@@ -372,12 +389,16 @@ fn settings_of_trc_that_contradict_the_rows_are_refused() {
 
 #[test]
 fn a_telling_header_needs_no_columns_option() {
-    let found =
-        read(PLAIN_MM, &Options { frame_rate_hz: Some(2000.0), y_axis: Some(YAxis::Up), ..points("", "") });
+    let found = read(
+        PLAIN_MM,
+        &ImportOptions { frame_rate_hz: Some(2000.0), y_axis: Some(YAxis::Up), ..points("", "") },
+    );
     assert_eq!(found.recording.traces().tip_x_m, [Some(0.0105), Some(0.01075), None, Some(0.01125)]);
     assert_eq!(found.recording.traces().head_x_m, [Some(0.009), Some(0.00925), None, Some(0.00975)]);
-    let wrong =
-        refused(PLAIN_MM, &Options { frame_rate_hz: Some(25.0), y_axis: Some(YAxis::Up), ..points("", "") });
+    let wrong = refused(
+        PLAIN_MM,
+        &ImportOptions { frame_rate_hz: Some(25.0), y_axis: Some(YAxis::Up), ..points("", "") },
+    );
     assert!(wrong.contains("imply 2000.000000 frames/s, but --frame-rate-hz says 25"), "{wrong}");
     let unset = refused(PLAIN_MM, &points("", ""));
     assert!(
@@ -392,8 +413,10 @@ fn a_telling_header_needs_no_columns_option() {
         comment.starts_with("a.csv:3:1: found the name of an object that starts like a comment"),
         "{comment}"
     );
-    let found =
-        read(UNITS_ROW, &Options { min_likelihood: Some(0.6), ..down(pixels(1000.0, points("tip", ""))) });
+    let found = read(
+        UNITS_ROW,
+        &ImportOptions { min_likelihood: Some(0.6), ..down(pixels(1000.0, points("tip", ""))) },
+    );
     assert_eq!(found.recording.traces().tip_x_m, [Some(50.5), None, Some(52.5)]);
     assert!(
         found.report.notes.iter().any(|note| note.contains("line 2 names the units")),
@@ -454,7 +477,10 @@ fn doubtful_headers_are_refused_with_their_columns() {
         assert!(message.contains(part), "{part}: {message}");
     }
     let both = import(
-        &[Source::alone("a.csv", b"time_s,time_ms,tip_x,tip_y\n0,0,1,2\n0.5,500,3,4\n".to_vec())],
+        &[ImportSource::without_companions(
+            "a.csv",
+            b"time_s,time_ms,tip_x,tip_y\n0,0,1,2\n0.5,500,3,4\n".to_vec(),
+        )],
         &down(pixels(2.0, points("tip", ""))),
     );
     assert_eq!(both.unwrap().recording.traces().tip_x_m, [Some(0.5), Some(1.5)]);
@@ -464,15 +490,15 @@ fn doubtful_headers_are_refused_with_their_columns() {
 
 #[test]
 fn the_cameras_record_gives_the_rate() {
-    let beside = |files: &[(&str, Vec<u8>)]| Source {
+    let beside = |files: &[(&str, Vec<u8>)]| ImportSource {
         companions: files
             .iter()
-            .map(|(name, bytes)| Companion { name: (*name).to_owned(), bytes: bytes.clone() })
+            .map(|(name, bytes)| CompanionFile { name: (*name).to_owned(), bytes: bytes.clone() })
             .collect(),
         ..source(PHOTRON)
     };
-    let options = down(Options { scale: Some(Scale::MetresPerPixel(0.5)), ..points("", "") });
-    let rate = |source: Source| {
+    let options = down(ImportOptions { scale: Some(CoordinateScale::MetresPerPixel(0.5)), ..points("", "") });
+    let rate = |source: ImportSource| {
         import(&[source], &options)
             .map(|found| (found.recording.grid().frame_rate_hz, found.report.findings.len()))
     };
@@ -515,7 +541,10 @@ fn the_cameras_record_gives_the_rate() {
             .any(|f| f.check.name() == "camera-record" && f.found.contains("Save Step : 36"))
     );
     let differs = import(&[beside(&[("run7.cih", other)])], &pixels(5000.0, options.clone()));
-    assert!(matches!(differs, Err(ImportError::RateRecord { recorded_hz: 250.0, .. })), "{differs:?}");
+    assert!(
+        matches!(differs, Err(ImportError::RecordedRateMismatch { recorded_hz: 250.0, .. })),
+        "{differs:?}"
+    );
     let alone = import(&[source(CIH)], &options).unwrap_err().to_string();
     assert!(
         alone.contains("a Photron camera's record, not a table")
@@ -526,11 +555,11 @@ fn the_cameras_record_gives_the_rate() {
 
 #[test]
 fn a_record_of_saved_steps_gives_no_rate_by_itself() {
-    let beside = |name: &str, text: String| Source {
-        companions: vec![Companion { name: name.to_owned(), bytes: text.into_bytes() }],
+    let beside = |name: &str, text: String| ImportSource {
+        companions: vec![CompanionFile { name: name.to_owned(), bytes: text.into_bytes() }],
         ..source(PHOTRON)
     };
-    let options = down(Options { scale: Some(Scale::MetresPerPixel(0.5)), ..points("", "") });
+    let options = down(ImportOptions { scale: Some(CoordinateScale::MetresPerPixel(0.5)), ..points("", "") });
     let of_step = |n: u32| lossy(CIHX).replace("<skipFrame>1<", &format!("<skipFrame>{n}<"));
     let stepped = || beside("run7.cihx", of_step(2500));
     let says = import(&[stepped()], &options).unwrap_err().to_string();
@@ -541,7 +570,7 @@ fn a_record_of_saved_steps_gives_no_rate_by_itself() {
     );
     // the declared rate has to be one of the two, and the camera's own needs the step
     let at = |rate_hz: f64, step: Option<usize>| {
-        import(&[stepped()], &Options { frame_step: step, ..pixels(rate_hz, options.clone()) })
+        import(&[stepped()], &ImportOptions { frame_step: step, ..pixels(rate_hz, options.clone()) })
     };
     assert_eq!(at(2.0, None).unwrap().recording.grid().frame_rate_hz, 2.0);
     for (rate_hz, step) in [(5000.0, None), (250.0, None), (5000.0, Some(7))] {
@@ -553,24 +582,24 @@ fn a_record_of_saved_steps_gives_no_rate_by_itself() {
     }
     let by_40 = import(
         &[beside("run7.cihx", of_step(40))],
-        &Options { frame_step: Some(40), ..pixels(5000.0, options.clone()) },
+        &ImportOptions { frame_step: Some(40), ..pixels(5000.0, options.clone()) },
     );
     assert_eq!(by_40.unwrap().recording.grid().frames, 81);
 }
 
 #[test]
 fn the_cameras_record_gives_the_exposure() {
-    let beside = |name: &str, text: String| Source {
-        companions: vec![Companion { name: name.to_owned(), bytes: text.into_bytes() }],
+    let beside = |name: &str, text: String| ImportSource {
+        companions: vec![CompanionFile { name: name.to_owned(), bytes: text.into_bytes() }],
         ..source(PHOTRON)
     };
-    let options = down(Options { scale: Some(Scale::MetresPerPixel(0.5)), ..points("", "") });
-    let exposure = |source: Source| import(&[source], &options).unwrap().file.camera.exposure_s;
+    let options = down(ImportOptions { scale: Some(CoordinateScale::MetresPerPixel(0.5)), ..points("", "") });
+    let exposure = |source: ImportSource| import(&[source], &options).unwrap().file.camera.exposure_s;
     assert_eq!(exposure(beside("run7.cih", lossy(CIH))), Some(1e-4));
     assert_eq!(exposure(beside("run7.cih", replaced(CIH, "1/10000", "0.0002"))), Some(2e-4));
     assert_eq!(exposure(beside("run7.cihx", lossy(CIHX))), Some(1e-4));
     let says = |exposure_s: f64| {
-        let options = Options { exposure_s: Some(exposure_s), ..options.clone() };
+        let options = ImportOptions { exposure_s: Some(exposure_s), ..options.clone() };
         import(&[beside("run7.cih", lossy(CIH))], &options).map_err(|error| error.to_string())
     };
     assert!(says(1.0001e-4).is_ok());
@@ -596,7 +625,7 @@ proptest! {
                 _ => bytes.truncate(at.max(1)),
             }
         }
-        if let Ok(found) = import(&[Source::alone("a.txt", bytes)], &down(pixels(1000.0, points("1", "")))) {
+        if let Ok(found) = import(&[ImportSource::without_companions("a.txt", bytes)], &down(pixels(1000.0, points("1", "")))) {
             prop_assert!(found.recording.grid().frames >= 2);
         }
     }

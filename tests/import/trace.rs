@@ -1,13 +1,14 @@
 //! A recording's own `trace.csv` is read back to the bit.
 
 use proptest::prelude::*;
-use wiperlab::import::{Options, Source, import};
+use wiperlab::import::{ImportOptions, ImportSource, import};
 use wiperlab::recording::files::{HEADER, trace_csv};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 
 fn read(text: &str, rate_hz: Option<f64>) -> Result<wiperlab::import::Import, String> {
-    let options = Options { name: "made".to_owned(), frame_rate_hz: rate_hz, ..Options::default() };
-    import(&[Source::alone("run7.csv", text.as_bytes().to_vec())], &options)
+    let options =
+        ImportOptions { name: "made".to_owned(), frame_rate_hz: rate_hz, ..ImportOptions::default() };
+    import(&[ImportSource::without_companions("run7.csv", text.as_bytes().to_vec())], &options)
         .map_err(|error| error.to_string())
 }
 
@@ -71,10 +72,12 @@ fn a_trace_says_everything_itself() {
     assert_eq!(traces.head_y_m, [Some(0.0), Some(0.0), None, None]);
     assert_eq!(traces.tip_confidence.as_deref(), Some(&[Some(0.99), Some(0.12), None, Some(0.98)][..]));
     assert_eq!(found.report.format, "wiperlab");
-    let renamed =
-        import(&[Source::alone("data/run7/trace.csv", text.as_bytes().to_vec())], &Options::default())
-            .unwrap_err()
-            .to_string();
+    let renamed = import(
+        &[ImportSource::without_companions("data/run7/trace.csv", text.as_bytes().to_vec())],
+        &ImportOptions::default(),
+    )
+    .unwrap_err()
+    .to_string();
     assert!(
         renamed.contains("found the file name `trace.csv`") && renamed.contains("rename the export"),
         "{renamed}"

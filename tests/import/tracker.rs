@@ -1,7 +1,7 @@
 //! Tracker's tables: versions 4 to 6, exported and copied, in every spelling that its dialogue and the locale
 //! of its user give.
 
-use wiperlab::import::{Columns, Import, Options, Scale, Source, TimeColumn, import};
+use wiperlab::import::{ColumnMap, CoordinateScale, Import, ImportOptions, ImportSource, TimeColumn, import};
 use wiperlab::recording::files::YAxis;
 
 macro_rules! fixture {
@@ -26,29 +26,32 @@ const MONTHS: Fixture = fixture!("tracker_excel_month_names.csv");
 const COMMAS: Fixture = fixture!("tracker6_comma_decimal_comma.csv");
 
 /// World coordinates in metres, y upwards.
-fn world(rate_hz: f64, tip: &str) -> Options {
+fn world(rate_hz: f64, tip: &str) -> ImportOptions {
     let tip = (!tip.is_empty()).then(|| tip.to_owned());
-    Options {
+    ImportOptions {
         name: "made".to_owned(),
         frame_rate_hz: Some(rate_hz),
-        scale: Some(Scale::Unit(1.0)),
+        scale: Some(CoordinateScale::Unit(1.0)),
         y_axis: Some(YAxis::Up),
         tip,
-        ..Options::default()
+        ..ImportOptions::default()
     }
 }
 
-fn imported((name, bytes): Fixture, options: &Options) -> Result<Import, String> {
-    import(&[Source::alone(name, bytes.to_vec())], options).map_err(|error| error.to_string())
+fn imported((name, bytes): Fixture, options: &ImportOptions) -> Result<Import, String> {
+    import(&[ImportSource::without_companions(name, bytes.to_vec())], options)
+        .map_err(|error| error.to_string())
 }
 
-fn read(fixture: Fixture, options: &Options) -> Import {
+fn read(fixture: Fixture, options: &ImportOptions) -> Import {
     imported(fixture, options).unwrap_or_else(|error| panic!("{}: {error}", fixture.0))
 }
 
 /// The refusal of a text.
-fn says(text: &str, options: &Options) -> String {
-    import(&[Source::alone("a.txt", text.as_bytes().to_vec())], options).unwrap_err().to_string()
+fn says(text: &str, options: &ImportOptions) -> String {
+    import(&[ImportSource::without_companions("a.txt", text.as_bytes().to_vec())], options)
+        .unwrap_err()
+        .to_string()
 }
 
 fn tip_x(found: &Import) -> Vec<Option<f64>> {
@@ -71,7 +74,7 @@ fn every_fixture_is_recognised() {
         assert_eq!(found.report.format, "tracker", "{}", fixture.0);
     }
     for refused in [MOMENTUM, POLAR, DATES, MONTHS] {
-        let forced = Options { format: Some("tracker".to_owned()), ..world(2000.0, "") };
+        let forced = ImportOptions { format: Some("tracker".to_owned()), ..world(2000.0, "") };
         assert_eq!(imported(refused, &world(2000.0, "")), imported(refused, &forced), "{}", refused.0);
     }
 }
@@ -94,13 +97,17 @@ fn a_locale_with_decimal_commas_is_read_with_greek_columns_left_out() {
 
 #[test]
 fn image_pixels_point_down_and_frame_numbers_count() {
-    let options =
-        Options { scale: Some(Scale::MetresPerPixel(0.5)), y_axis: None, ..world(2000.0, "mass A") };
+    let options = ImportOptions {
+        scale: Some(CoordinateScale::MetresPerPixel(0.5)),
+        y_axis: None,
+        ..world(2000.0, "mass A")
+    };
     let found = read(PIXELS, &options);
     assert_eq!((found.recording.grid().start_s, found.recording.grid().frames), (0.05, 4));
     assert_eq!(tip_x(&found), [Some(256.25), Some(256.75), None, Some(257.75)]);
     assert_eq!(found.recording.traces().tip_y_m, [Some(-150.125), Some(-150.375), None, Some(-150.875)]);
-    let unset = imported(PIXELS, &Options { name: "made".to_owned(), ..Options::default() }).unwrap_err();
+    let unset =
+        imported(PIXELS, &ImportOptions { name: "made".to_owned(), ..ImportOptions::default() }).unwrap_err();
     assert!(
         unset.contains("--scale S           the length that a pixel shows") && !unset.contains("--y-axis"),
         "{unset}"
@@ -142,7 +149,10 @@ fn every_delimiter_and_line_end_gives_the_same_recording() {
         text.replace("#multi:\r\n", ""),
     ];
     for variant in variants {
-        let found = import(&[Source::alone("a.txt", variant.clone().into_bytes())], &world(2000.0, ""));
+        let found = import(
+            &[ImportSource::without_companions("a.txt", variant.clone().into_bytes())],
+            &world(2000.0, ""),
+        );
         assert_eq!(found.map(|found| found.recording).as_ref(), Ok(&expected), "{variant}");
     }
 }
@@ -152,8 +162,8 @@ fn without_titles_tracks_are_numbered_and_have_to_be_chosen() {
     let text = std::str::from_utf8(STEP_2.1).unwrap();
     let untitled = text.replace("\ttip\t\t\t\thead\t\t\t\t\r\n", "");
     assert!(says(&untitled, &world(2000.0, "")).ends_with("tracks found: track1, track2"));
-    let chosen = Options { head: Some("track2".to_owned()), ..world(2000.0, "track1") };
-    let found = import(&[Source::alone("a.txt", untitled.into_bytes())], &chosen).unwrap();
+    let chosen = ImportOptions { head: Some("track2".to_owned()), ..world(2000.0, "track1") };
+    let found = import(&[ImportSource::without_companions("a.txt", untitled.into_bytes())], &chosen).unwrap();
     assert_eq!(found.recording, read(STEP_2, &world(2000.0, "")).recording);
 }
 
@@ -223,8 +233,8 @@ fn times_of_playback_are_refused_until_they_are_said_to_count() {
         ),
         "{refused}"
     );
-    let counted = Options { time: Some(TimeColumn::Playback), ..world(2000.0, "") };
-    let found = import(&[Source::alone("a.txt", text.into_bytes())], &counted).unwrap();
+    let counted = ImportOptions { time: Some(TimeColumn::Playback), ..world(2000.0, "") };
+    let found = import(&[ImportSource::without_companions("a.txt", text.into_bytes())], &counted).unwrap();
     assert_eq!((found.recording.grid().frame_rate_hz, found.recording.grid().frames), (2000.0, 60));
 }
 
@@ -233,15 +243,17 @@ fn times_with_too_few_digits_say_how_to_count_the_rows() {
     let rows: String = (0..60).map(|i| format!("{:.3}\t{i}\t0\n", f64::from(i) / 2000.0)).collect();
     let text = format!("\ttip\t\t\nt\tx\ty\t\n{rows}");
     let refused = says(&text, &world(2000.0, ""));
-    let unset = says(&text, &Options { name: "made".to_owned(), ..Options::default() });
+    let unset = says(&text, &ImportOptions { name: "made".to_owned(), ..ImportOptions::default() });
     assert!(unset.contains("the file's times repeat, go back or follow no rate"), "{unset}");
     assert!(
         refused.contains("column time: found `") && refused.contains("frame=row if every row is a frame"),
         "{refused}"
     );
-    let counted =
-        Options { columns: Some(Columns::parse("frame=row,tip-x=2,tip-y=3").unwrap()), ..world(2000.0, "") };
-    let found = import(&[Source::alone("a.txt", text.into_bytes())], &counted).unwrap();
+    let counted = ImportOptions {
+        columns: Some(ColumnMap::parse("frame=row,tip-x=2,tip-y=3").unwrap()),
+        ..world(2000.0, "")
+    };
+    let found = import(&[ImportSource::without_companions("a.txt", text.into_bytes())], &counted).unwrap();
     assert_eq!((found.recording.grid().frames, tip_x(&found)[59]), (60, Some(59.0)));
 }
 
@@ -255,31 +267,36 @@ macro_rules! undocumented {
 }
 
 /// A file with its columns, points and unit; y points up.
-type Made = (Fixture, &'static str, [&'static str; 2], Option<Scale>);
+type Made = (Fixture, &'static str, [&'static str; 2], Option<CoordinateScale>);
 
 /// Made-up files of programs whose layout is published nowhere, with the options of the documentation:
 /// columns, points and unit.
 const UNDOCUMENTED: [Made; 6] = [
     (undocumented!("movias_neo.csv"), "", ["P1", "P2"], None),
     (undocumented!("tema_row_of_units.txt"), "", ["Point#1", "Point#2"], None),
-    (undocumented!("proanalyst.csv"), "", ["Feature 1", "Feature 2"], Some(Scale::MetresPerPixel(0.001))),
+    (
+        undocumented!("proanalyst.csv"),
+        "",
+        ["Feature 1", "Feature 2"],
+        Some(CoordinateScale::MetresPerPixel(0.001)),
+    ),
     (
         undocumented!("phantom_pcc.txt"),
         "frame=Image,tip-x=3,tip-y=4,head-x=5,head-y=6",
         ["", ""],
-        Some(Scale::MetresPerPixel(0.001)),
+        Some(CoordinateScale::MetresPerPixel(0.001)),
     ),
     (
         undocumented!("gom_repeated_names.csv"),
         "time=1,tip-x=2,tip-y=3,head-x=6,head-y=7",
         ["", ""],
-        Some(Scale::Unit(0.001)),
+        Some(CoordinateScale::Unit(0.001)),
     ),
     (
         undocumented!("optitrack_motive.csv"),
         "frame=1,time=2,tip-x=3,tip-y=4,head-x=6,head-y=7",
         ["", ""],
-        Some(Scale::Unit(1.0)),
+        Some(CoordinateScale::Unit(1.0)),
     ),
 ];
 
@@ -287,10 +304,10 @@ const UNDOCUMENTED: [Made; 6] = [
 fn tables_of_programs_without_a_published_layout_are_read_as_documented() {
     for (fixture, columns, [tip, head], scale) in UNDOCUMENTED {
         let named = |name: &str| (!name.is_empty()).then(|| name.to_owned());
-        let columns = (!columns.is_empty()).then(|| Columns::parse(columns).unwrap());
+        let columns = (!columns.is_empty()).then(|| ColumnMap::parse(columns).unwrap());
         let found = read(
             fixture,
-            &Options { columns, scale, tip: named(tip), head: named(head), ..world(2000.0, "") },
+            &ImportOptions { columns, scale, tip: named(tip), head: named(head), ..world(2000.0, "") },
         );
         let (grid, traces) = (found.recording.grid(), found.recording.traces());
         assert_eq!(grid.frames, 3, "{}", fixture.0);
@@ -306,11 +323,11 @@ fn tables_of_programs_without_a_published_layout_are_read_as_documented() {
         }
     }
     let columns =
-        Columns::parse("frame=Index,tip-x=u0 [pixel],tip-y=v0 [pixel],head-x=u1 [pixel],head-y=v1 [pixel]")
+        ColumnMap::parse("frame=Index,tip-x=u0 [pixel],tip-y=v0 [pixel],head-x=u1 [pixel],head-y=v1 [pixel]")
             .unwrap();
-    let options = Options {
+    let options = ImportOptions {
         columns: Some(columns),
-        scale: Some(Scale::MetresPerPixel(0.5)),
+        scale: Some(CoordinateScale::MetresPerPixel(0.5)),
         y_axis: Some(YAxis::Down),
         ..world(2000.0, "")
     };
@@ -322,22 +339,25 @@ fn tables_of_programs_without_a_published_layout_are_read_as_documented() {
 #[test]
 fn a_row_of_units_counts_as_much_as_units_in_the_names() {
     let text = "time,tip_x,tip_y\nms,px,px\n0.0,1,2\n0.5,3,4\n1.0,5,6\n";
-    let real = Options {
+    let real = ImportOptions {
         frame_rate_hz: None,
         time: Some(TimeColumn::Real),
-        scale: Some(Scale::MetresPerPixel(0.5)),
+        scale: Some(CoordinateScale::MetresPerPixel(0.5)),
         ..world(1.0, "")
     };
-    let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &real).unwrap();
+    let found =
+        import(&[ImportSource::without_companions("a.csv", text.as_bytes().to_vec())], &real).unwrap();
     assert_eq!((found.recording.grid().frame_rate_hz, found.recording.grid().frames), (2000.0, 3));
-    let odd =
-        says(&text.replace("ms,", "fortnights,"), &Options { name: "made".to_owned(), ..Options::default() });
+    let odd = says(
+        &text.replace("ms,", "fortnights,"),
+        &ImportOptions { name: "made".to_owned(), ..ImportOptions::default() },
+    );
     assert!(odd.contains("--time UNIT"), "{odd}");
 }
 
 #[test]
 fn names_behind_a_comment_mark_above_the_numbers_are_names() {
-    let options = Options { scale: Some(Scale::Unit(1.0)), ..world(10.0, "a") };
+    let options = ImportOptions { scale: Some(CoordinateScale::Unit(1.0)), ..world(10.0, "a") };
     for text in [
         "# t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n",
         "# saved by a script\n# frame,x,y\n0,1.5,2.5\n1,1.75,2.75\n",
@@ -345,7 +365,8 @@ fn names_behind_a_comment_mark_above_the_numbers_are_names() {
         "% t x y\n0.0 1.5 2.5\n0.1 1.75 2.75\n",
         "# time,x,y\n# ms,px,px\n0,1.5,2.5\n100,1.75,2.75\n",
     ] {
-        let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &options).unwrap();
+        let found =
+            import(&[ImportSource::without_companions("a.csv", text.as_bytes().to_vec())], &options).unwrap();
         assert_eq!(tip_x(&found), [Some(1.5), Some(1.75)], "{text}");
     }
     let remark = says("# just two words\n0,1.5,2.5\n1,1.75,2.75\n", &options);
@@ -356,14 +377,15 @@ fn names_behind_a_comment_mark_above_the_numbers_are_names() {
 fn frame_numbers_said_to_be_seconds_are_a_serious_finding() {
     let rows: String = (0..20).map(|i| format!("\"{i}\",\"{i}.5\",\"2\"\n")).collect();
     let text = format!("\"Time\",\"tip/0/X\",\"tip/0/Y\"\n{rows}");
-    let source = [Source::alone("a.csv", text.into_bytes())];
-    let unset =
-        import(&source, &Options { name: "made".to_owned(), ..Options::default() }).unwrap_err().to_string();
+    let source = [ImportSource::without_companions("a.csv", text.into_bytes())];
+    let unset = import(&source, &ImportOptions { name: "made".to_owned(), ..ImportOptions::default() })
+        .unwrap_err()
+        .to_string();
     assert!(
         unset.contains("the file's times count like frame numbers: if they are, add --time frames"),
         "{unset}"
     );
-    let real = Options { frame_rate_hz: None, time: Some(TimeColumn::Real), ..world(1.0, "") };
+    let real = ImportOptions { frame_rate_hz: None, time: Some(TimeColumn::Real), ..world(1.0, "") };
     let found = import(&source, &real).unwrap();
     assert!(
         found
@@ -373,7 +395,7 @@ fn frame_numbers_said_to_be_seconds_are_a_serious_finding() {
         "{:?}",
         found.report
     );
-    let frames = Options { time: Some(TimeColumn::Frames), ..world(2000.0, "") };
+    let frames = ImportOptions { time: Some(TimeColumn::Frames), ..world(2000.0, "") };
     assert_eq!(import(&source, &frames).unwrap().recording.grid().frame_rate_hz, 2000.0);
 }
 
@@ -414,18 +436,23 @@ fn plain_tables_say_what_is_wrong_with_their_clock() {
             && minus.contains("the minus sign was read in a wrong encoding before"),
         "{minus}"
     );
-    let minutes =
-        import(&[Source::alone("a.csv", rows("time [min]", 0.125).into_bytes())], &world(2.0 / 15.0, ""))
-            .unwrap();
+    let minutes = import(
+        &[ImportSource::without_companions("a.csv", rows("time [min]", 0.125).into_bytes())],
+        &world(2.0 / 15.0, ""),
+    )
+    .unwrap();
     assert_eq!(minutes.recording.grid().frames, 20);
 }
 
 #[test]
 fn settings_above_a_table_are_no_damaged_rows() {
-    let numbered =
-        Options { columns: Some(Columns::parse("frame=1,tip-x=2,tip-y=3").unwrap()), ..world(10.0, "") };
+    let numbered = ImportOptions {
+        columns: Some(ColumnMap::parse("frame=1,tip-x=2,tip-y=3").unwrap()),
+        ..world(10.0, "")
+    };
     let text = "Version,1.23,Take\n\nframe,a,b\n0,1.5,2\n1,1.75,2\n";
-    let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &numbered).unwrap();
+    let found =
+        import(&[ImportSource::without_companions("a.csv", text.as_bytes().to_vec())], &numbered).unwrap();
     assert_eq!(tip_x(&found), [Some(1.5), Some(1.75)]);
     let damaged = says("frame,a,b\nfirst,1.5,2\n1,1.75,2\n2,1.75,2\n", &numbered);
     assert!(damaged.starts_with("a.txt:2:1: column frame: found `first`"), "{damaged}");
@@ -434,21 +461,23 @@ fn settings_above_a_table_are_no_damaged_rows() {
 #[test]
 fn a_table_of_a_kinematics_window_stays_one_when_its_columns_are_named() {
     let rows: String = (0..20).map(|i| format!("{i};{i},5\n")).collect();
-    let source = [Source::alone("a.csv", format!("Zeit (ms);tip\n{rows}").into_bytes())];
-    let named = Options { columns: Some(Columns::parse("time-ms=1,tip-x=2").unwrap()), ..world(1000.0, "") };
+    let source = [ImportSource::without_companions("a.csv", format!("Zeit (ms);tip\n{rows}").into_bytes())];
+    let named =
+        ImportOptions { columns: Some(ColumnMap::parse("time-ms=1,tip-x=2").unwrap()), ..world(1000.0, "") };
     let found = import(&source, &named).unwrap();
     assert!(
         found.report.warnings().any(|warning| warning.contains("after a low-pass filter")),
         "{:?}",
         found.report
     );
-    let fast =
-        import(&source, &Options { frame_rate_hz: Some(2000.0), ..named.clone() }).unwrap_err().to_string();
+    let fast = import(&source, &ImportOptions { frame_rate_hz: Some(2000.0), ..named.clone() })
+        .unwrap_err()
+        .to_string();
     assert!(
         fast.contains("keep one sample a millisecond") && fast.ends_with("add --format generic"),
         "{fast}"
     );
-    let other = Options { format: Some("generic".to_owned()), ..named };
+    let other = ImportOptions { format: Some("generic".to_owned()), ..named };
     assert!(!import(&source, &other).unwrap().report.warnings().any(|warning| warning.contains("low-pass")));
 }
 
@@ -463,7 +492,7 @@ fn headers_in_other_languages_and_scripts_are_read() {
     ];
     for (text, tip) in texts.into_iter().zip(["Tip", "tip", "\u{5148}\u{7aef}", "Tip", "1"]) {
         let metres = world(2.0, tip);
-        let found = import(&[Source::alone("a.csv", text.as_bytes().to_vec())], &metres)
+        let found = import(&[ImportSource::without_companions("a.csv", text.as_bytes().to_vec())], &metres)
             .unwrap_or_else(|error| panic!("{text}: {error}"));
         assert_eq!(
             (found.report.format.as_str(), tip_x(&found)),
@@ -471,6 +500,8 @@ fn headers_in_other_languages_and_scripts_are_read() {
             "{text}"
         );
     }
-    let found = import(&[Source::alone("a.csv", texts[0].as_bytes().to_vec())], &world(2.0, "")).unwrap();
+    let found =
+        import(&[ImportSource::without_companions("a.csv", texts[0].as_bytes().to_vec())], &world(2.0, ""))
+            .unwrap();
     assert_eq!(tip_x(&found), [Some(1.5), Some(1.75)]);
 }

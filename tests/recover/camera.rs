@@ -4,12 +4,12 @@
 use std::ops::ControlFlow;
 use wiperlab::fit::failure::{FailureReason, RunFailure};
 use wiperlab::fit::job::Job;
-use wiperlab::fit::ledger::Progress;
+use wiperlab::fit::ledger::FitProgress;
 use wiperlab::fit::model::{Draw, Model};
 use wiperlab::fit::result::FitResult;
-use wiperlab::fit::uncertainty::Verdict;
-use wiperlab::fit::{Context, fit};
-use wiperlab::journal::Discard;
+use wiperlab::fit::uncertainty::ParameterVerdict;
+use wiperlab::fit::{FitContext, fit_features};
+use wiperlab::journal::NullSink;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 
 const JOB: &str = r#"format = 1
@@ -95,7 +95,7 @@ fn filmed(values: &[f64], offset_m: f64, scale: f64) -> Result<Recording, RunFai
 }
 
 impl Model for Strokes {
-    fn observe(&self, values: &[f64], _: usize, _: Draw) -> Result<Recording, RunFailure> {
+    fn record_condition(&self, values: &[f64], _: usize, _: Draw) -> Result<Recording, RunFailure> {
         filmed(values, 0.0, 0.0)
     }
 }
@@ -106,9 +106,10 @@ const TRUTH: [f64; 2] = [8100.0, 2e-3];
 fn found(text: &str, offset_m: f64, scale: f64) -> FitResult {
     let job = Job::parse_with_names("job.toml", text, &["blade.stiffness", "friction.a"]).unwrap();
     let measured = [offset_m, -offset_m].map(|offset_m| filmed(&TRUTH, offset_m, scale).ok());
-    let context = Context { fingerprint: "f", version: "0.1.0", max_evaluations: None, resume: None };
-    let mut go_on = |_: &Progress| ControlFlow::Continue(());
-    fit(&job, &measured[..job.recordings().count()], &Strokes, &context, &mut Discard, &mut go_on).unwrap()
+    let context = FitContext { fingerprint: "f", version: "0.1.0", max_evaluations: None, resume: None };
+    let mut go_on = |_: &FitProgress| ControlFlow::Continue(());
+    fit_features(&job, &measured[..job.recordings().count()], &Strokes, &context, &mut NullSink, &mut go_on)
+        .unwrap()
 }
 
 fn exact() -> String {
@@ -136,11 +137,11 @@ fn an_offset_and_a_scale_are_found_and_leave_the_parameters_where_they_are() {
         for result in [&plain, &moved] {
             let p = &result.parameters[name];
             assert!((p.estimate / truth - 1.0).abs() < 1e-3, "{name} {p:?}");
-            assert_eq!(p.verdict, Verdict::Identified, "{:?}", result.notes);
+            assert_eq!(p.verdict, ParameterVerdict::Identified, "{:?}", result.notes);
             assert!((p.lower_95.unwrap()..p.upper_95.unwrap()).contains(&truth), "{name} {p:?}");
         }
     }
-    assert!(moved.explains() && moved.cost < 4.0, "{}", moved.cost);
+    assert!(moved.explains_recordings() && moved.cost < 4.0, "{}", moved.cost);
     let there = &moved.features[0];
     assert!((there.model.unwrap() - 2e-3).abs() < 1e-5 && there.pass, "{there:?}");
     assert!((there.model_seen.unwrap() / there.target - 1.0).abs() < 1e-3, "{there:?}");
@@ -176,12 +177,12 @@ fn a_camera_that_is_held_bends_the_parameters() {
 #[test]
 fn an_offset_that_nobody_would_believe_speaks_against_the_model() {
     let result = found(JOB, 4.5e-3, 0.0);
-    assert!(!result.explains());
+    assert!(!result.explains_recordings());
     let said =
         "The model does not explain the recording: `offset_x_m` of `recording 1` lies 4.5 prior deviations";
     assert!(result.notes[0].starts_with(said), "{:?}", result.notes);
     for p in result.parameters.values() {
-        assert!(p.verdict == Verdict::NotIdentified && p.reasons[0].starts_with(said), "{p:?}");
+        assert!(p.verdict == ParameterVerdict::NotIdentified && p.reasons[0].starts_with(said), "{p:?}");
     }
 }
 

@@ -3,9 +3,9 @@
 use std::ops::ControlFlow;
 use wiperlab::fit::Problem;
 use wiperlab::fit::job::Job;
-use wiperlab::fit::ledger::Progress;
-use wiperlab::fit::result::Status;
-use wiperlab::fit::uncertainty::Verdict;
+use wiperlab::fit::ledger::FitProgress;
+use wiperlab::fit::result::FitStatus;
+use wiperlab::fit::uncertainty::ParameterVerdict;
 use wiperlab::simulate::scene::Scene;
 
 const SCENE: &str = include_str!("../../data/scenes/published-experiment.toml");
@@ -53,10 +53,14 @@ fn a_neck_that_fits_as_well_at_twice_its_value_is_not_identified() {
     let job = Job::parse("job.toml", JOB).unwrap();
     let scene = Scene::parse("scene.toml", SCENE).unwrap();
     let problem = Problem::new(job, vec![scene], Vec::new()).unwrap();
-    let mut carry_on = |_: &Progress| ControlFlow::Continue(());
-    let result = problem.fit_with(&problem.context(), &mut String::new(), &mut carry_on).unwrap();
+    let mut carry_on = |_: &FitProgress| ControlFlow::Continue(());
+    let result = problem.fit_with(&problem.new_context(), &mut String::new(), &mut carry_on).unwrap();
     let neck = &result.parameters["blade.neck_natural_frequency_hz"];
-    assert_eq!((result.status, neck.verdict), (Status::Converged, Verdict::NotIdentified), "{neck:?}");
+    assert_eq!(
+        (result.status, neck.verdict),
+        (FitStatus::Converged, ParameterVerdict::NotIdentified),
+        "{neck:?}"
+    );
     assert!(!neck.reasons.is_empty(), "{neck:?}");
     assert!(result.notes.iter().any(|note| note.contains("is not called identified")), "{:?}", result.notes);
     problem.check_result(&result, "result.json").unwrap();

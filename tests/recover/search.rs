@@ -4,22 +4,22 @@
 use crate::ringing::ringing;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::feature::Measure;
-use wiperlab::fit::axis::Axis;
+use wiperlab::feature::ValueComparison;
+use wiperlab::fit::axis::SearchAxis;
 use wiperlab::fit::evaluation::Observed;
 use wiperlab::fit::failure::{FailureReason, RunFailure};
-use wiperlab::fit::journal::Journal;
-use wiperlab::fit::ledger::{Ledger, Progress, Stop};
-use wiperlab::fit::model::{Draw, Model, Predict};
+use wiperlab::fit::journal::FeatureCheckpoint;
+use wiperlab::fit::ledger::{FitProgress, Ledger, StopReason};
+use wiperlab::fit::model::{Draw, FeaturePredictor, Model};
 use wiperlab::fit::objective::Objective;
-use wiperlab::fit::result::{FitResult, Status};
-use wiperlab::fit::scale::{Bounds, Spacing};
-use wiperlab::fit::search::{Ended, search};
-use wiperlab::fit::settings::{STAGNANT_GENERATIONS, Settings};
-use wiperlab::fit::target::Target;
-use wiperlab::fit::uncertainty::Verdict;
-use wiperlab::fit::{Context, FitError, fit, job::Job, warnings};
-use wiperlab::journal::{self, JournalError, Sink};
+use wiperlab::fit::result::{FitResult, FitStatus};
+use wiperlab::fit::scale::{Bounds, BoundsSpacing};
+use wiperlab::fit::search::{SearchTermination, search_minimum};
+use wiperlab::fit::settings::{STAGNANT_GENERATIONS, SearchSettings};
+use wiperlab::fit::target::TargetValue;
+use wiperlab::fit::uncertainty::ParameterVerdict;
+use wiperlab::fit::{FitContext, FitError, fit_features, job::Job, job_warnings};
+use wiperlab::journal::{self, CheckpointError, CheckpointSink};
 use wiperlab::recording::Recording;
 
 /// A journal in memory; refuses lines after `room`.
@@ -34,7 +34,7 @@ impl Memory {
     }
 }
 
-impl Sink for Memory {
+impl CheckpointSink for Memory {
     fn append(&mut self, lines: &str) -> Result<(), String> {
         for line in lines.split_inclusive('\n') {
             self.room = self.room.checked_sub(1).ok_or("no space left")?;
@@ -44,7 +44,7 @@ impl Sink for Memory {
     }
 }
 
-fn carry_on(_: &Progress) -> ControlFlow<()> {
+fn carry_on(_: &FitProgress) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
@@ -52,21 +52,21 @@ type Features = Result<Vec<Observed>, RunFailure>;
 
 struct Fake<F>(F);
 
-impl<F: Fn(&[f64]) -> Features + Sync> Predict for Fake<F> {
-    fn predict(&self, values: &[f64]) -> Features {
+impl<F: Fn(&[f64]) -> Features + Sync> FeaturePredictor for Fake<F> {
+    fn predict_features(&self, values: &[f64]) -> Features {
         (self.0)(values)
     }
 
-    fn twin(&self, values: &[f64], _: u64) -> Features {
+    fn simulate_twin(&self, values: &[f64], _: u64) -> Features {
         (self.0)(values)
     }
 }
 
 fn values(features: &[f64]) -> Features {
-    Ok(features.iter().map(|f| Observed::of(*f)).collect())
+    Ok(features.iter().map(|f| Observed::from_value(*f)).collect())
 }
 
-const SETTINGS: Settings = Settings {
+const SETTINGS: SearchSettings = SearchSettings {
     seed: 1,
     global_evaluations: 600,
     local_evaluations: 900,
@@ -78,7 +78,7 @@ const SETTINGS: Settings = Settings {
 /// What a search over parameters from 0.1 to 10 found: how it ended, the best values, cost and failure,
 /// evaluations, and failures by reason.
 struct Found {
-    ended: Ended,
+    ended: SearchTermination,
     values: Vec<f64>,
     cost: f64,
     failure: Option<RunFailure>,
@@ -92,13 +92,13 @@ fn find(
     limit: usize,
     model: impl Fn(&[f64]) -> Features + Sync,
 ) -> Found {
-    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); dimensions];
-    let target = |(i, (value, sd)): (usize, &(f64, f64))| Target {
+    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); dimensions];
+    let target = |(i, (value, sd)): (usize, &(f64, f64))| TargetValue {
         name: i.to_string(),
         value: *value,
         sd: *sd,
         scatter: 0.0,
-        measure: Measure::Log,
+        measure: ValueComparison::Log,
         last: false,
         calibration: None,
     };
@@ -106,15 +106,15 @@ fn find(
     let objective = Objective::new(axes, targets.iter().enumerate().map(target).collect(), &model);
     let (mut journal, mut watch) = (Memory::new(), carry_on);
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
-    let ended = search(&mut ledger, dimensions, &SETTINGS, limit).ended;
-    let best = ledger.best().unwrap().clone();
+    let ended = search_minimum(&mut ledger, dimensions, &SETTINGS, limit).termination;
+    let best = ledger.best_evaluation().unwrap().clone();
     Found {
         ended,
         values: best.values,
         cost: best.cost,
         failure: best.failure,
-        total: ledger.run().len(),
-        failures: ledger.failures().into_iter().map(|(reason, n)| (reason.to_string(), n)).collect(),
+        total: ledger.run_evaluations().len(),
+        failures: ledger.count_failures().into_iter().map(|(reason, n)| (reason.to_string(), n)).collect(),
     }
 }
 
@@ -124,7 +124,7 @@ fn a_known_optimum_is_recovered() {
         values(&[p[0] * p[1], p[1] * p[2].sqrt(), p[0] * p[2]])
     });
     // p0 p1 = 0.6, p1 sqrt(p2) = 3, p0 p2 = 0.2
-    assert_eq!(found.ended, Ended::Converged);
+    assert_eq!(found.ended, SearchTermination::Converged);
     assert!(
         (found.values[0] * found.values[1] - 0.6).abs() < 1e-4
             && (found.values[0] * found.values[2] - 0.2).abs() < 1e-4,
@@ -145,7 +145,7 @@ fn half_a_box_of_nan_is_counted_and_avoided() {
         }
         values(&[p[0], p[1]])
     });
-    assert_eq!(found.ended, Ended::Converged);
+    assert_eq!(found.ended, SearchTermination::Converged);
     assert!(
         (found.values[0] - 1.05).abs() < 1e-4 && (found.values[1] - 2.0).abs() < 1e-4,
         "{:?}",
@@ -161,7 +161,7 @@ fn a_model_that_panics_here_and_there_is_survived() {
         assert!(p[0] > 0.3, "too small: {}", p[0]);
         values(&[p[0], p[1]])
     });
-    assert_eq!(found.ended, Ended::Converged);
+    assert_eq!(found.ended, SearchTermination::Converged);
     assert!((found.values[0] - 3.0).abs() < 1e-4, "{:?}", found.values);
     assert_eq!(found.failures.len(), 1);
     assert!(found.failures[0].0 == "panic" && found.failures[0].1 > 0);
@@ -170,11 +170,14 @@ fn a_model_that_panics_here_and_there_is_survived() {
 #[test]
 fn a_model_that_always_fails_ends_within_its_budget() {
     let found = find(2, &[(1.0, 0.1)], usize::MAX, |_| {
-        Err(RunFailure::new(FailureReason::Ended(wiperlab::simulate::Status::ContactLost), "at once", 0.0))
+        Err(RunFailure::new(FailureReason::Ended(wiperlab::simulate::RunStatus::ContactLost), "at once", 0.0))
     });
     assert!(found.total >= 20 && found.total <= 1500);
     assert_eq!(found.failures, [("contact-lost".to_owned(), found.total)]);
-    assert_eq!(found.failure.unwrap().reason, FailureReason::Ended(wiperlab::simulate::Status::ContactLost));
+    assert_eq!(
+        found.failure.unwrap().reason,
+        FailureReason::Ended(wiperlab::simulate::RunStatus::ContactLost)
+    );
     assert!(found.cost.is_finite());
 }
 
@@ -184,7 +187,11 @@ fn failures_lead_towards_where_the_model_runs() {
     let found = find(2, &[(9.5, 0.1), (9.5, 0.1)], usize::MAX, |p| {
         let distance = (10.0 / p[0]).ln().max((10.0 / p[1]).ln()) / 100.0_f64.ln();
         if distance > 0.06 {
-            Err(RunFailure::new(FailureReason::Ended(wiperlab::simulate::Status::Jammed), "", 1.0 - distance))
+            Err(RunFailure::new(
+                FailureReason::Ended(wiperlab::simulate::RunStatus::Jammed),
+                "",
+                1.0 - distance,
+            ))
         } else {
             values(p)
         }
@@ -211,7 +218,7 @@ fn a_narrow_valley_is_followed_to_its_end() {
         found.ended,
         found.total
     );
-    assert!(found.cost < 2e-3 && found.ended == Ended::Converged);
+    assert!(found.cost < 2e-3 && found.ended == SearchTermination::Converged);
 }
 
 #[test]
@@ -219,7 +226,7 @@ fn the_limit_is_kept_to_the_evaluation() {
     for limit in [1, 19, 20, 333, 550] {
         let found =
             find(2, &[(1.0, 1e-6), (2.0, 1e-6)], limit, |p| values(&[p[0] * p[1], p[0] / p[1].sqrt()]));
-        assert_eq!((found.ended, found.total), (Ended::Stopped(Stop::Budget), limit));
+        assert_eq!((found.ended, found.total), (SearchTermination::Stopped(StopReason::Budget), limit));
     }
 }
 
@@ -271,11 +278,11 @@ impl Ringing {
 }
 
 impl Model for Ringing {
-    fn observe(&self, values: &[f64], _: usize, draw: Draw) -> Result<Recording, RunFailure> {
+    fn record_condition(&self, values: &[f64], _: usize, draw: Draw) -> Result<Recording, RunFailure> {
         self.calls.fetch_add(1, Ordering::Relaxed);
         if values[0] > self.contact_lost_above {
             return Err(RunFailure::new(
-                FailureReason::Ended(wiperlab::simulate::Status::ContactLost),
+                FailureReason::Ended(wiperlab::simulate::RunStatus::ContactLost),
                 "normal force below zero",
                 0.5,
             ));
@@ -290,13 +297,13 @@ fn job(text: &str) -> Job {
     Job::parse_with_names("job.toml", text, &["blade.stiffness", "friction.a"]).unwrap()
 }
 
-fn context<'a>(resume: Option<(&'a str, &'a Journal)>) -> Context<'a> {
-    Context { fingerprint: "f", version: "0.1.0", max_evaluations: None, resume }
+fn context<'a>(resume: Option<(&'a str, &'a FeatureCheckpoint)>) -> FitContext<'a> {
+    FitContext { fingerprint: "f", version: "0.1.0", max_evaluations: None, resume }
 }
 
-fn run(text: &str, model: &dyn Model, context: &Context) -> (Result<FitResult, FitError>, String) {
+fn run(text: &str, model: &dyn Model, context: &FitContext) -> (Result<FitResult, FitError>, String) {
     let mut journal = Memory::new();
-    let result = fit(&job(text), &[None], model, context, &mut journal, &mut carry_on);
+    let result = fit_features(&job(text), &[None], model, context, &mut journal, &mut carry_on);
     (result, journal.text)
 }
 
@@ -305,34 +312,41 @@ fn a_fit_to_published_numbers_finds_both_parameters() {
     let model = Ringing::new();
     let (result, journal) = run(JOB, &model, &context(None));
     let result = result.unwrap();
-    assert_eq!(result.status, Status::Converged);
+    assert_eq!(result.status, FitStatus::Converged);
     let (stiffness, a) = (&result.parameters["blade.stiffness"], &result.parameters["friction.a"]);
     assert!(
         (stiffness.estimate - 6400.0).abs() < 20.0 && (a.estimate - 4e-3).abs() < 1e-5,
         "{stiffness:?} {a:?}"
     );
-    assert_eq!((stiffness.verdict, a.verdict, result.rank), (Verdict::Identified, Verdict::Identified, 2));
+    assert_eq!(
+        (stiffness.verdict, a.verdict, result.rank),
+        (ParameterVerdict::Identified, ParameterVerdict::Identified, 2)
+    );
     // sd ln stiffness = 2 * 0.4/80
     assert!((stiffness.upper_95.unwrap() / stiffness.estimate).ln() / (1.96 * 0.01) - 1.0 < 0.1);
     assert!((result.sensitivities["low"]["blade.stiffness"].unwrap() - 0.5).abs() < 0.02);
-    assert!(result.components[0].pass && result.features[0].pass && result.passes());
+    assert!(result.components[0].pass && result.features[0].pass && result.components_pass());
     // twins are made beside the evaluations, and the best model is read once more
     assert_eq!(result.evaluations.total, model.calls.into_inner() - result.twins - 1);
     assert_eq!(journal.lines().count(), result.evaluations.total + 1);
-    assert!(result.evaluations.failed[&FailureReason::Ended(wiperlab::simulate::Status::ContactLost)] > 0);
+    assert!(result.evaluations.failed[&FailureReason::Ended(wiperlab::simulate::RunStatus::ContactLost)] > 0);
 }
 
 #[test]
 fn a_fit_can_be_stopped_from_outside() {
     let mut journal = Memory::new();
     let mut seen = 0;
-    let mut watch = |progress: &Progress| {
+    let mut watch = |progress: &FitProgress| {
         seen = progress.evaluations;
         if progress.evaluations == 30 { ControlFlow::Break(()) } else { ControlFlow::Continue(()) }
     };
-    let result = fit(&job(JOB), &[None], &Ringing::new(), &context(None), &mut journal, &mut watch).unwrap();
+    let result =
+        fit_features(&job(JOB), &[None], &Ringing::new(), &context(None), &mut journal, &mut watch).unwrap();
     let total = result.evaluations.total;
-    assert_eq!((result.status, seen, journal.text.lines().count()), (Status::Interrupted, total, total + 1));
+    assert_eq!(
+        (result.status, seen, journal.text.lines().count()),
+        (FitStatus::Interrupted, total, total + 1)
+    );
     // what was computed along with the last one counts
     assert!((30..30 + 2 * rayon::current_num_threads()).contains(&total), "{total}");
 }
@@ -341,18 +355,19 @@ fn a_fit_can_be_stopped_from_outside() {
 fn a_journal_that_cannot_be_written_ends_the_fit() {
     let mut journal = Memory { text: String::new(), room: 9 };
     let error =
-        fit(&job(JOB), &[None], &Ringing::new(), &context(None), &mut journal, &mut carry_on).unwrap_err();
+        fit_features(&job(JOB), &[None], &Ringing::new(), &context(None), &mut journal, &mut carry_on)
+            .unwrap_err();
     assert_eq!(error, FitError::JournalWrite { problem: "no space left".to_owned() });
     assert_eq!(journal.text.lines().count(), 9);
 }
 
 #[test]
 fn a_journal_of_another_fit_is_refused() {
-    let (_, text) = run(JOB, &Ringing::new(), &Context { max_evaluations: Some(3), ..context(None) });
-    let journal: Journal = journal::read("j", &text).unwrap().unwrap();
+    let (_, text) = run(JOB, &Ringing::new(), &FitContext { max_evaluations: Some(3), ..context(None) });
+    let journal: FeatureCheckpoint = journal::read_checkpoint("j", &text).unwrap().unwrap();
     let (refused, appended) =
-        run(JOB, &Ringing::new(), &Context { fingerprint: "g", ..context(Some(("j", &journal))) });
-    assert!(matches!(refused, Err(FitError::Journal(JournalError::OtherProblem { .. }))));
+        run(JOB, &Ringing::new(), &FitContext { fingerprint: "g", ..context(Some(("j", &journal))) });
+    assert!(matches!(refused, Err(FitError::Journal(CheckpointError::OtherProblem { .. }))));
     assert_eq!(appended, "");
 }
 
@@ -360,7 +375,7 @@ fn a_journal_of_another_fit_is_refused() {
 fn fewer_features_than_parameters_are_said_before_and_after() {
     let start = JOB.find("[[feature]]").unwrap();
     let text = JOB[..start].to_owned() + &JOB[JOB.find("[search]").unwrap()..];
-    let before = warnings(&job(&text));
+    let before = job_warnings(&job(&text));
     assert_eq!(before.len(), 1);
     assert!(before[0].starts_with("1 informative feature for 2 parameters: they can fix at most 1 combination of the parameters and leave 1 open"));
     let result = run(&text, &Ringing::new(), &context(None)).0.unwrap();
@@ -373,9 +388,12 @@ fn fewer_features_than_parameters_are_said_before_and_after() {
         result.notes
     );
     let a = &result.parameters["friction.a"];
-    assert_eq!((a.verdict, a.lower_95, a.upper_95, result.rank), (Verdict::NotIdentified, None, None, 1));
-    assert_eq!(result.parameters["blade.stiffness"].verdict, Verdict::Identified);
-    assert_eq!(warnings(&job(JOB)), Vec::<String>::new());
+    assert_eq!(
+        (a.verdict, a.lower_95, a.upper_95, result.rank),
+        (ParameterVerdict::NotIdentified, None, None, 1)
+    );
+    assert_eq!(result.parameters["blade.stiffness"].verdict, ParameterVerdict::Identified);
+    assert_eq!(job_warnings(&job(JOB)), Vec::<String>::new());
 }
 
 #[test]
@@ -441,9 +459,10 @@ fn a_recording_held_out_is_predicted_and_not_fitted() {
         .replace("target = 4e-3\ntarget_sd = 1e-4\n", "sd_relative = 0.02\n");
     let check = "[[component]]\nname = \"check\"\nchannel = \"deflection\"\nwindow = \"0.05..0.45\"\nband_hz = [20, 200]\nrecording = \"held\"\n[search]";
     let text = text.replace("[search]", check);
-    let seen = |stiffness| Some(Ringing::new().observe(&[stiffness, 2e-3], 0, Draw::default()).unwrap());
+    let seen =
+        |stiffness| Some(Ringing::new().record_condition(&[stiffness, 2e-3], 0, Draw::default()).unwrap());
     for (held, passes) in [(8100.0, true), (6400.0, false)] {
-        let result = fit(
+        let result = fit_features(
             &job(&text),
             &[seen(8100.0), seen(held)],
             &Ringing::new(),
@@ -469,10 +488,11 @@ fn targets_are_measured_on_the_recording_by_the_same_code() {
     let text = text
         .replace("target_hz = 80\ntarget_sd_hz = 0.4\n", "")
         .replace("target = 4e-3\ntarget_sd = 1e-4\n", "sd_relative = 0.02\n");
-    let measured = [Some(Ringing::new().observe(&[8100.0, 2e-3], 0, Draw::default()).unwrap())];
+    let measured = [Some(Ringing::new().record_condition(&[8100.0, 2e-3], 0, Draw::default()).unwrap())];
     let mut journal = Memory::new();
     let result =
-        fit(&job(&text), &measured, &Ringing::new(), &context(None), &mut journal, &mut carry_on).unwrap();
+        fit_features(&job(&text), &measured, &Ringing::new(), &context(None), &mut journal, &mut carry_on)
+            .unwrap();
     let low = &result.components[0];
     assert!((low.target_hz - 90.0).abs() < 0.05 && low.target_sd_hz >= 1e-3 * low.target_hz, "{low:?}");
     assert!(
@@ -482,12 +502,20 @@ fn targets_are_measured_on_the_recording_by_the_same_code() {
     );
     assert!((result.parameters["friction.a"].estimate / 2e-3 - 1.0).abs() < 1e-2);
     assert!(result.synthetic && result.notes.iter().any(|n| n.contains("synthetic")));
-    let none = fit(&job(&text), &[], &Ringing::new(), &context(None), &mut Memory::new(), &mut carry_on)
-        .unwrap_err();
+    let none =
+        fit_features(&job(&text), &[], &Ringing::new(), &context(None), &mut Memory::new(), &mut carry_on)
+            .unwrap_err();
     assert_eq!(none, FitError::Recordings { found: 0, expected: 1 });
-    let silent = [Some(Ringing::new().observe(&[100.0, 2e-3], 0, Draw::default()).unwrap())];
-    let error = fit(&job(&text), &silent, &Ringing::new(), &context(None), &mut Memory::new(), &mut carry_on)
-        .unwrap_err();
+    let silent = [Some(Ringing::new().record_condition(&[100.0, 2e-3], 0, Draw::default()).unwrap())];
+    let error = fit_features(
+        &job(&text),
+        &silent,
+        &Ringing::new(),
+        &context(None),
+        &mut Memory::new(),
+        &mut carry_on,
+    )
+    .unwrap_err();
     assert!(
         error.to_string().starts_with("model: `low` cannot be measured: no component between 20 and 200 Hz"),
         "{error}"

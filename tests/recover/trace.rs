@@ -2,21 +2,21 @@
 //! also where the tip alone is tracked or points are lost.
 
 use wiperlab::fit::job::Job;
-use wiperlab::fit::result::{FitResult, Status};
-use wiperlab::fit::uncertainty::Verdict;
-use wiperlab::fit::{Measured, Problem};
+use wiperlab::fit::result::{FitResult, FitStatus};
+use wiperlab::fit::uncertainty::ParameterVerdict;
+use wiperlab::fit::{MeasuredRecording, Problem};
 use wiperlab::recording::Recording;
-use wiperlab::simulate::Effort;
+use wiperlab::simulate::SolverOptions;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::twin::{Camera, Tracking, track, view};
+use wiperlab::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
 
 const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 /// A fifth of a second around the flip.
 const SPAN_S: [f64; 2] = [0.58, 0.8];
 const CAMERA: Camera = Camera { frame_rate_hz: 5_000.0, exposure_s: 5e-5 };
 /// A tenth of a pixel of 20 um.
-const TRACKING: Tracking =
-    Tracking { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.02, seed: 3 };
+const TRACKING: TrackingModel =
+    TrackingModel { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.02, seed: 3 };
 
 /// Two parameters far from the scene's values in the middle of their bounds.
 const JOB: &str = r#"format = 1
@@ -48,14 +48,14 @@ fn scene() -> Scene {
 
 fn recording() -> Recording {
     let scene = scene();
-    let effort = Effort::new(scene.run.relative_tolerance);
-    let seen = view(&scene, &CAMERA, SPAN_S[0], SPAN_S[1], effort).unwrap();
-    track(&seen.recording, "twin", &TRACKING).unwrap()
+    let effort = SolverOptions::new(scene.run.relative_tolerance);
+    let seen = film_scene(&scene, &CAMERA, SPAN_S[0], SPAN_S[1], effort).unwrap();
+    add_tracking_noise(&seen.recording, "twin", &TRACKING).unwrap()
 }
 
 fn fitted(keys: &str, recording: Recording) -> FitResult {
     let job = Job::parse("job.toml", &format!("{JOB}{keys}")).unwrap();
-    let measured = Measured { recording, exposure_s: Some(CAMERA.exposure_s) };
+    let measured = MeasuredRecording { recording, exposure_s: Some(CAMERA.exposure_s) };
     Problem::new(job, vec![scene()], vec![measured]).unwrap().fit().unwrap()
 }
 
@@ -63,10 +63,10 @@ fn fitted(keys: &str, recording: Recording) -> FitResult {
 fn assert_found(result: &FitResult) {
     let misfit = result.misfit.as_ref().unwrap();
     assert!(misfit.explained, "{:?}", misfit.reasons);
-    assert_eq!(result.status, Status::Converged);
+    assert_eq!(result.status, FitStatus::Converged);
     for (name, found) in &result.parameters {
         let truth = scene().value(name).unwrap();
-        assert_eq!(found.verdict, Verdict::Identified, "{name}: {:?}", found.reasons);
+        assert_eq!(found.verdict, ParameterVerdict::Identified, "{name}: {:?}", found.reasons);
         let (lower, upper) = (found.lower_95.unwrap(), found.upper_95.unwrap());
         let half = 1.5 * 0.5 * (upper - lower);
         assert!((found.estimate - truth).abs() < half, "{name}: {lower} to {upper} for {truth}");
@@ -122,7 +122,7 @@ fn a_scene_of_another_time_does_not_drive_a_trace() {
     let mut early = scene();
     (early.start_s, early.run.stop_s) = (-2.0, -1.0);
     let job = Job::parse("job.toml", &format!("{JOB}drive = \"scene\"\n")).unwrap();
-    let measured = Measured { recording: recording(), exposure_s: Some(CAMERA.exposure_s) };
+    let measured = MeasuredRecording { recording: recording(), exposure_s: Some(CAMERA.exposure_s) };
     let said = Problem::new(job, vec![early], vec![measured]).map(|_| ()).unwrap_err().to_string();
     assert!(said.contains("`drive`: found \"scene\", whose head runs from -2 to -1 s"), "{said}");
 }

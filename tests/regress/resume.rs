@@ -8,12 +8,12 @@ use crate::ringing::ringing;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use wiperlab::fit::failure::{FailureReason, RunFailure};
-use wiperlab::fit::journal::Journal;
-use wiperlab::fit::ledger::Progress;
+use wiperlab::fit::journal::FeatureCheckpoint;
+use wiperlab::fit::ledger::FitProgress;
 use wiperlab::fit::model::{Draw, Model};
-use wiperlab::fit::result::{FitResult, Status};
-use wiperlab::fit::{Context, FitError, fit, job::Job};
-use wiperlab::journal::{self, JournalError};
+use wiperlab::fit::result::{FitResult, FitStatus};
+use wiperlab::fit::{FitContext, FitError, fit_features, job::Job};
+use wiperlab::journal::{self, CheckpointError};
 use wiperlab::recording::Recording;
 
 const JOB: &str = r#"format = 1
@@ -62,12 +62,12 @@ struct Ringing {
 }
 
 impl Model for Ringing {
-    fn observe(&self, values: &[f64], _: usize, draw: Draw) -> Result<Recording, RunFailure> {
+    fn record_condition(&self, values: &[f64], _: usize, draw: Draw) -> Result<Recording, RunFailure> {
         self.calls.fetch_add(1, Ordering::Relaxed);
         let (stiffness, friction) = (values[0], values[1]);
         if stiffness > 25_000.0 {
             return Err(RunFailure::new(
-                FailureReason::Ended(wiperlab::simulate::Status::ContactLost),
+                FailureReason::Ended(wiperlab::simulate::RunStatus::ContactLost),
                 "normal force below zero",
                 0.5,
             ));
@@ -92,23 +92,23 @@ impl Ended {
         FitResult::parse("result.json", &self.result).unwrap()
     }
 
-    fn read(&self) -> Journal {
+    fn read(&self) -> FeatureCheckpoint {
         read(&self.journal)
     }
 }
 
-fn read(text: &str) -> Journal {
-    journal::read("journal.jsonl", text).unwrap().unwrap()
+fn read(text: &str) -> FeatureCheckpoint {
+    journal::read_checkpoint("journal.jsonl", text).unwrap().unwrap()
 }
 
 fn attempt(job: &str, text: &str, most: Option<usize>, version: &str) -> Result<Ended, FitError> {
-    let journal: Option<Journal> = journal::read("journal.jsonl", text).unwrap();
+    let journal: Option<FeatureCheckpoint> = journal::read_checkpoint("journal.jsonl", text).unwrap();
     let resume = journal.as_ref().map(|journal| ("journal.jsonl", journal));
-    let context = Context { fingerprint: "f", version, max_evaluations: most, resume };
+    let context = FitContext { fingerprint: "f", version, max_evaluations: most, resume };
     let (mut lines, mut watch, model) =
-        (String::new(), |_: &Progress| ControlFlow::Continue(()), Ringing::default());
+        (String::new(), |_: &FitProgress| ControlFlow::Continue(()), Ringing::default());
     let job = Job::parse_with_names("job.toml", job, &["stiffness", "friction"]).unwrap();
-    let result = fit(&job, &[None], &model, &context, &mut lines, &mut watch)?.to_json();
+    let result = fit_features(&job, &[None], &model, &context, &mut lines, &mut watch)?.to_json();
     let kept = journal.as_ref().map_or(0, |journal| journal.end.intact_bytes);
     let end = if journal.is_some_and(|journal| journal.end.unended) { "\n" } else { "" };
     Ok(Ended { result, journal: text[..kept].to_owned() + end + &lines, calls: model.calls.into_inner() })
@@ -144,14 +144,15 @@ fn a_fit_cut_anywhere_in_any_stage_is_the_uninterrupted_one_to_the_last_byte() {
             let again = resumed(JOB, &uncut.journal[..cut]);
             assert_eq!((&again.result, &again.journal), (&uncut.result, &uncut.journal), "cut at byte {cut}");
             // twins are made again, everything else is replayed
-            let left: Option<Journal> = journal::read("journal.jsonl", &uncut.journal[..cut]).unwrap();
+            let left: Option<FeatureCheckpoint> =
+                journal::read_checkpoint("journal.jsonl", &uncut.journal[..cut]).unwrap();
             assert!(
                 left.as_ref().is_none_or(|journal| journal.end.torn == (cut != end && cut != end - 1)),
                 "cut at byte {cut}"
             );
             // and some that were replayed are made once more to check them, the best point perhaps too
             let kept = left.map_or(0, |journal| journal.records.len());
-            let checked = journal::RECHECKED.min(kept);
+            let checked = journal::RECHECKED_RECORDS.min(kept);
             let fewest = uncut.calls - kept + checked;
             assert!((fewest..=fewest + 1).contains(&again.calls), "cut at byte {cut}");
         }
@@ -207,7 +208,7 @@ fn a_larger_allowance_goes_on_from_the_journal() {
             (attempt(JOB, &text, Some(most), "1").unwrap(), attempt(JOB, "", Some(most), "1").unwrap());
         assert_eq!(part.result, fresh.result, "{most} evaluations");
         // the last one is used up by the intervals, when the search has converged
-        let status = if most < 180 { Status::BudgetExhausted } else { Status::Converged };
+        let status = if most < 180 { FitStatus::BudgetExhausted } else { FitStatus::Converged };
         assert_eq!((part.parsed().status, part.parsed().evaluations.total), (status, most));
         text = part.journal;
     }
@@ -222,7 +223,7 @@ fn a_journal_of_another_seed_or_version_is_refused() {
         refused(&seeded(4), "1"),
         FitError::OtherSeed { file: "journal.jsonl".to_owned(), found: 3, expected: 4 }
     );
-    assert!(matches!(refused(JOB, "2"), FitError::Journal(JournalError::OtherVersion { .. })));
+    assert!(matches!(refused(JOB, "2"), FitError::Journal(CheckpointError::OtherVersion { .. })));
 }
 
 #[test]
@@ -235,6 +236,6 @@ fn two_thousand_lines_are_replayed_without_one_evaluation() {
     assert!(uncut.read().records.len() > 1500, "{}", uncut.read().records.len());
     let again = resumed(&job, &uncut.journal);
     assert_eq!((&again.result, &again.journal), (&uncut.result, &uncut.journal));
-    let checked = journal::RECHECKED + 1;
+    let checked = journal::RECHECKED_RECORDS + 1;
     assert!(again.calls <= checked + 1, "the best model alone is looked at once more: {}", again.calls);
 }

@@ -2,15 +2,15 @@
 //! at their estimates. Their blades are examples and not the paper's.
 
 use std::path::{Path, PathBuf};
-use wiperlab::feature::{Feature, Reading, read_all_assigned};
-use wiperlab::fit::job::{Job, Source};
-use wiperlab::fit::result::{FitResult, Status as Ended};
+use wiperlab::feature::{Feature, Reading, read_assigned_features};
+use wiperlab::fit::job::{Job, TargetSource};
+use wiperlab::fit::result::{FitResult, FitStatus as Ended};
 use wiperlab::recording::Recording;
-use wiperlab::recording::channel::{Channel, Instants, Window};
-use wiperlab::simulate::outputs::{StickIntervals, Tilt};
+use wiperlab::recording::channel::{Channel, ReversalInstants, Window};
+use wiperlab::simulate::outputs::{LargestTilt, StickIntervals};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::{Effort, Status};
-use wiperlab::twin::{Camera, observed_view, view};
+use wiperlab::simulate::{RunStatus, SolverOptions};
+use wiperlab::twin::{Camera, film_scene, film_scene_with_observer};
 
 const TOLERANCE: f64 = 1e-8;
 
@@ -50,8 +50,10 @@ impl Fitted {
         let job = Job::parse("job.toml", &text(folder.join("job.toml"))).unwrap();
         let result = FitResult::parse("result.json", &text(folder.join("result.json"))).unwrap();
         let written = Scene::parse("scene.toml", &text(folder.join(&job.conditions[0].scene))).unwrap();
-        let scene =
-            result.parameters.iter().fold(written, |scene, (name, p)| scene.with(name, p.estimate).unwrap());
+        let scene = result
+            .parameters
+            .iter()
+            .fold(written, |scene, (name, p)| scene.with_parameter(name, p.estimate).unwrap());
         let recording = seen(&scene, &camera(&job));
         Self { job, result, scene, recording }
     }
@@ -60,18 +62,25 @@ impl Fitted {
     fn features(&self, change: impl Fn(&mut Feature)) -> Vec<f64> {
         let mut features = self.job.features();
         features.iter_mut().for_each(change);
-        let target = |source: &Source| {
-            if let Source::Given { target, .. } = source { *target } else { panic!("nothing was measured") }
+        let target = |source: &TargetSource| {
+            if let TargetSource::Given { target, .. } = source {
+                *target
+            } else {
+                panic!("nothing was measured")
+            }
         };
-        let targets: Vec<f64> = self.job.aims.iter().map(|aim| target(&aim.source)).collect();
-        read_all_assigned(&features, &targets, &[&self.recording])
+        let targets: Vec<f64> = self.job.targets.iter().map(|aim| target(&aim.source)).collect();
+        read_assigned_features(&features, &targets, &[&self.recording])
             .into_iter()
             .map(|read| read.unwrap().value)
             .collect()
     }
 
     fn window(&self, text: &str) -> std::ops::Range<usize> {
-        Window::parse(text).unwrap().resolve(&self.recording, &Instants::find(&self.recording)).unwrap()
+        Window::parse(text)
+            .unwrap()
+            .resolve_frames(&self.recording, &ReversalInstants::find_instants(&self.recording))
+            .unwrap()
     }
 
     /// Largest minus least head drop in a window, m.
@@ -87,7 +96,14 @@ impl Fitted {
     fn sticks_hz(&self, window: &str) -> f64 {
         let mut sticks = StickIntervals::default();
         let span = [self.scene.start_s, self.scene.run.stop_s];
-        observed_view(&self.scene, &camera(&self.job), span, Effort::new(TOLERANCE), &mut sticks).unwrap();
+        film_scene_with_observer(
+            &self.scene,
+            &camera(&self.job),
+            span,
+            SolverOptions::new(TOLERANCE),
+            &mut sticks,
+        )
+        .unwrap();
         let (frames, grid) = (self.window(window), self.recording.grid());
         let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
         sticks.0.iter().filter(|[start_s, _]| (from_s..to_s).contains(start_s)).count() as f64
@@ -96,7 +112,7 @@ impl Fitted {
 
     /// The same blade with other friction.
     fn with(&self, parameter: &str, value: f64) -> Self {
-        let scene = self.scene.clone().with(parameter, value).unwrap();
+        let scene = self.scene.clone().with_parameter(parameter, value).unwrap();
         Self {
             job: self.job.clone(),
             result: self.result.clone(),
@@ -113,11 +129,17 @@ fn assert_is_such_a_blade(fitted: &Fitted, published: &Published) {
     for (name, natural) in head_and_neck.iter().zip(&published.natural_frequency) {
         assert!((fitted.scene.value(name).unwrap() / natural.frequency_hz - 1.0).abs() < 1e-9, "{name}");
     }
-    let mut tilt = Tilt::default();
+    let mut tilt = LargestTilt::default();
     let span = [fitted.scene.start_s, fitted.scene.run.stop_s];
-    let again =
-        observed_view(&fitted.scene, &camera(&fitted.job), span, Effort::new(TOLERANCE), &mut tilt).unwrap();
-    assert_eq!(again.run.status, Status::Completed, "lost contact and a paradox would have stopped it");
+    let again = film_scene_with_observer(
+        &fitted.scene,
+        &camera(&fitted.job),
+        span,
+        SolverOptions::new(TOLERANCE),
+        &mut tilt,
+    )
+    .unwrap();
+    assert_eq!(again.run.status, RunStatus::Completed, "lost contact and a paradox would have stopped it");
     assert!(
         tilt.largest_rad < fitted.job.largest_tilt_rad.unwrap() && tilt.largest_rad < 60_f64.to_radians(),
         "{}",
@@ -278,11 +300,13 @@ fn frequency_hz(blade: &Fitted, channel: Channel) -> f64 {
         |feature: &&Feature| matches!(&feature.reading, Reading::Frequency(band) if band.channel == channel);
     let features = blade.job.features();
     let feature = features.iter().find(of_channel).unwrap();
-    feature.read(&blade.recording, &Instants::find(&blade.recording)).unwrap().value
+    feature.read(&blade.recording, &ReversalInstants::find_instants(&blade.recording)).unwrap().value
 }
 
 fn seen(scene: &Scene, camera: &Camera) -> Recording {
-    view(scene, camera, scene.start_s, scene.run.stop_s, Effort::new(TOLERANCE)).unwrap().recording
+    film_scene(scene, camera, scene.start_s, scene.run.stop_s, SolverOptions::new(TOLERANCE))
+        .unwrap()
+        .recording
 }
 
 fn camera(job: &Job) -> Camera {

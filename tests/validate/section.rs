@@ -1,23 +1,23 @@
 //! How near the example of a section comes to the committed blades. No section of a real blade is published,
 //! so that this compares two examples, and nothing is tuned: the ratios are what they are.
 
-use wiperlab::section::{Estimate, Section};
+use wiperlab::section::{BladeEstimate, BladeSection};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::text::rounded;
+use wiperlab::text::round_to_digits;
 
 const EXAMPLE: &str = include_str!("../../data/sections/example.toml");
 const ACTUAL: &str = include_str!("../../data/scenes/actual-blade.toml");
 const LIGHT: &str = include_str!("../../data/scenes/light-blade.toml");
 
 /// The example with the lengths of a scene's links, for a piece whose neck has the mass of the scene's.
-fn of_the_size_of(scene: &Scene) -> Estimate {
+fn of_the_size_of(scene: &Scene) -> BladeEstimate {
     let number = |key: &str| scene.value(key).unwrap();
     let estimate = |piece_m: f64| {
         let text = EXAMPLE
             .replace("length_m = 0.04", &format!("length_m = {piece_m}"))
             .replace("height_m = 0.004\n", &format!("height_m = {}\n", number("blade.neck_length_m")))
             .replace("height_m = 0.0035\n", &format!("height_m = {}\n", number("blade.lip_length_m")));
-        Estimate::of(&Section::parse("example.toml", &text).unwrap())
+        BladeEstimate::from_section(&BladeSection::parse("example.toml", &text).unwrap())
     };
     let metre = estimate(1.0).value("neck_mass_kg").unwrap();
     estimate(number("blade.neck_mass_kg") / metre)
@@ -29,7 +29,7 @@ fn ratios(text: &str) -> [f64; 10] {
     let estimate = of_the_size_of(&scene);
     COMPARED.map(|key| {
         let ratio = estimate.value(key).unwrap() / scene.value(&format!("blade.{key}")).unwrap();
-        rounded(ratio, 2)
+        round_to_digits(ratio, 2)
     })
 }
 

@@ -5,12 +5,16 @@ use crate::scenes::upright_light_blade;
 use allocation_counter::{AllocationInfo, measure};
 use wiperlab::recording::files::push_trace_row;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::simulate::drive::head_motion;
-use wiperlab::simulate::outputs::{Audit, Sampler, points_m, push_event, push_state};
+use wiperlab::simulate::drive::smooth_head_motion;
+use wiperlab::simulate::outputs::{
+    EnergyAudit, SampleObserver, push_event_row, push_state_row, recorded_points_m,
+};
 use wiperlab::simulate::scene::{Drive, Scene};
-use wiperlab::simulate::{Effort, Method, Observer, Piece, Status, Transition, run_with};
+use wiperlab::simulate::{
+    IntegrationMethod, Observer, RunStatus, SolutionSegment, SolverOptions, Transition, run_scene_with,
+};
 
-const METHODS: [Method; 2] = [Method::Taylor, Method::RungeKutta];
+const METHODS: [IntegrationMethod; 2] = [IntegrationMethod::Taylor, IntegrationMethod::RungeKutta];
 
 fn lasting(stop_s: f64) -> Scene {
     let mut scene = upright_light_blade();
@@ -18,14 +22,14 @@ fn lasting(stop_s: f64) -> Scene {
     scene
 }
 
-fn effort(method: Method) -> Effort {
-    Effort { method, ..Effort::new(1e-8) }
+fn effort(method: IntegrationMethod) -> SolverOptions {
+    SolverOptions { method, ..SolverOptions::new(1e-8) }
 }
 
 /// The same scene, its head as a camera of 1000 frames/s would have seen it.
 pub fn recorded(mut scene: Scene) -> Scene {
     let grid = FrameGrid { start_s: scene.start_s, frame_rate_hz: 1000.0, frames: 1001 };
-    let head_x_m = (0..grid.frames).map(|i| Some(scene.drive.at(grid.time_s(i)).position_m)).collect();
+    let head_x_m = (0..grid.frames).map(|i| Some(scene.drive.motion_at(grid.time_s(i)).position_m)).collect();
     let nothing = vec![None; grid.frames];
     let traces = Traces {
         tip_x_m: nothing.clone(),
@@ -35,7 +39,7 @@ pub fn recorded(mut scene: Scene) -> Scene {
         ..Traces::default()
     };
     let recording = Recording::new("head", grid, traces, true).unwrap();
-    scene.drive = Drive::Recorded(head_motion(&recording).unwrap().into());
+    scene.drive = Drive::Recorded(smooth_head_motion(&recording).unwrap().into());
     scene
 }
 
@@ -44,7 +48,7 @@ fn the_loop_of_a_run_allocates_nothing() {
     for method in METHODS {
         for scene in [lasting(0.75), recorded(lasting(0.75))] {
             let mut transitions = 0;
-            let made = measure(|| transitions = run_with(&scene, effort(method), &mut ()).transitions);
+            let made = measure(|| transitions = run_scene_with(&scene, effort(method), &mut ()).transitions);
             assert!(transitions > 100, "{method:?}: {transitions} transitions");
             assert_eq!(made.count_total, 0, "{method:?}: {made:?}");
         }
@@ -69,25 +73,29 @@ impl Rows {
 struct Events<'a>(&'a mut Rows);
 
 impl Observer for Events<'_> {
-    fn piece(&mut self, _: &Piece<'_>) {}
-    fn transition(&mut self, transition: &Transition) {
-        self.0.add(|text| push_event(text, transition));
+    fn observe_segment(&mut self, _: &SolutionSegment<'_>) {}
+    fn observe_transition(&mut self, transition: &Transition) {
+        self.0.add(|text| push_event_row(text, transition));
     }
 }
 
 /// Rows of samples and transitions, and the memory that it took to make them.
-fn streamed(scene: &Scene, method: Method) -> (u64, u64, AllocationInfo) {
+fn streamed(scene: &Scene, method: IntegrationMethod) -> (u64, u64, AllocationInfo) {
     let (mut samples, mut events) = (Rows::default(), Rows::default());
     let made = measure(|| {
         let times = (0_u32..).map(|i| f64::from(i) * 1e-4);
-        let sampler = Sampler::new(times, |sample| {
+        let sampler = SampleObserver::new(times, |sample| {
             samples.add(|text| {
-                push_trace_row(text, sample.time_s, points_m(&scene.linkage, sample).map(Some));
-                push_state(text, sample);
+                push_trace_row(text, sample.time_s, recorded_points_m(&scene.linkage, sample).map(Some));
+                push_state_row(text, sample);
             });
         });
-        let run = run_with(scene, effort(method), &mut ((sampler, Events(&mut events)), Audit::default()));
-        assert_eq!(run.status, Status::Completed);
+        let run = run_scene_with(
+            scene,
+            effort(method),
+            &mut ((sampler, Events(&mut events)), EnergyAudit::default()),
+        );
+        assert_eq!(run.status, RunStatus::Completed);
     });
     (samples.count, events.count, made)
 }

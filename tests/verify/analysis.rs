@@ -6,14 +6,18 @@ use crate::score::{Errors, Reading, deviation, largest, mean, near, read, read_a
 use crate::signal::{AMPLITUDE_M, FLIPS, Signal, Tone};
 use std::ops::Range;
 use wiperlab::spectrum::{
-    Analysis, Component, Detrend, Estimator, LONGEST_FITTED, Record, Settings, SpectrumError, Verdict,
+    Component, ComponentVerdict, Detrend, Estimator, LONGEST_DECOMPOSED, SampledRecord, SpectralAnalysis,
+    SpectrumError, SpectrumSettings,
 };
 
 const LOW_HZ: f64 = 78.4;
 const HIGH_HZ: f64 = 900.0;
 
-fn analysed(samples: &[Option<f64>], settings: &Settings) -> Result<Analysis, SpectrumError> {
-    Analysis::of(&Record { samples, frame_rate_hz: 5000.0, exposure_s: None }, settings)
+fn analysed(samples: &[Option<f64>], settings: &SpectrumSettings) -> Result<SpectralAnalysis, SpectrumError> {
+    SpectralAnalysis::from_record(
+        &SampledRecord { samples, frame_rate_hz: 5000.0, exposure_s: None },
+        settings,
+    )
 }
 
 /// The listed frequencies, ascending, Hz.
@@ -106,7 +110,7 @@ fn a_peak_on_the_flank_of_a_fast_decay_is_no_oscillation_of_its_own() {
     let list =
         read(&Signal { flip: FLIPS[0], snr_db: 30.0, ..Signal::of(&[Tone::ring_down(LOW_HZ, 0.1)]) }, 396);
     assert_eq!(list.len(), 1, "{list:?}");
-    assert_eq!((list[0].estimator, list[0].verdict), (Estimator::LeastSquares, Verdict::Clear));
+    assert_eq!((list[0].estimator, list[0].verdict), (Estimator::LeastSquares, ComponentVerdict::Clear));
     assert!((list[0].amplitude_m / AMPLITUDE_M - 1.0).abs() < 0.02, "{list:?}");
 }
 
@@ -171,7 +175,7 @@ fn a_tone_above_half_the_frame_rate_is_called_an_alias_suspect() {
             each(&Signal { rate_hz: 1000.0, frames: 150, exposure_s, ..Signal::of(&[Tone::steady(HIGH_HZ)]) })
         {
             assert!((c.frequency_hz - 100.0).abs() < 0.5, "{c:?}");
-            assert_eq!(c.verdict, Verdict::AliasSuspected);
+            assert_eq!(c.verdict, ComponentVerdict::AliasSuspected);
             assert_eq!(c.folded_from.len(), 2, "900 and 1100 Hz, up to 1,300: {:?}", c.folded_from);
             assert!((c.folded_from[0].frequency_hz - HIGH_HZ).abs() < 0.5, "{:?}", c.folded_from);
             match (exposure_s, c.folded_from[0].exposure_passes) {
@@ -188,7 +192,7 @@ fn a_tone_above_half_the_frame_rate_is_called_an_alias_suspect() {
 #[test]
 fn a_tone_that_the_exposure_has_blurred_says_by_how_much() {
     for c in each(&Signal { exposure_s: Some(1e-3), ..Signal::of(&[Tone::steady(HIGH_HZ)]) }) {
-        assert_eq!(c.verdict, Verdict::Attenuated);
+        assert_eq!(c.verdict, ComponentVerdict::Attenuated);
         let passes = c.exposure_passes.unwrap();
         // it is that at the frequency as read, and falls by 0.0011 a hertz
         assert!((passes - 0.1093).abs() < 1e-3, "sin(0.9 pi) / (0.9 pi): {passes}");
@@ -209,11 +213,11 @@ fn a_multiple_of_a_stronger_tone_is_its_harmonic_and_what_only_lies_near_is_none
         let lists = read_all(&Signal::of(&[Tone::steady(203.7), weaker]), 20);
         for list in &lists {
             assert_eq!(list.len(), 2, "{list:?}");
-            assert_eq!((list[0].verdict, list[0].harmonic_of), (Verdict::Clear, None));
+            assert_eq!((list[0].verdict, list[0].harmonic_of), (ComponentVerdict::Clear, None));
             assert_eq!(list[1].harmonic_of.map(|of| of.multiple), multiple, "{list:?}");
         }
         // a multiple is met within four deviations, which one record in thousands misses
-        let expected = if multiple.is_some() { Verdict::Harmonic } else { Verdict::Clear };
+        let expected = if multiple.is_some() { ComponentVerdict::Harmonic } else { ComponentVerdict::Clear };
         assert!(lists.iter().all(|list| list[1].verdict == expected), "{lists:?}");
     }
 }
@@ -222,12 +226,12 @@ fn a_multiple_of_a_stronger_tone_is_its_harmonic_and_what_only_lies_near_is_none
 fn two_and_a_half_cycles_are_no_frequency() {
     let signal = Signal::of(&[Tone::steady(2.5 * 5000.0 / 750.0)]);
     for seed in 0..20 {
-        let settings = Settings { detrend: Some(Detrend::Mean), ..Settings::default() };
+        let settings = SpectrumSettings { detrend: Some(Detrend::Mean), ..SpectrumSettings::default() };
         let list = analysed(&signal.record(seed), &settings).unwrap().spectrum.components;
         assert_eq!(list.len(), 1, "{list:?}");
-        assert_eq!(list[0].verdict, Verdict::NotResolvable);
+        assert_eq!(list[0].verdict, ComponentVerdict::NotResolvable);
         assert!(
-            read(&signal, seed).iter().all(|c| c.verdict == Verdict::NotResolvable),
+            read(&signal, seed).iter().all(|c| c.verdict == ComponentVerdict::NotResolvable),
             "and with a trend of the record's own choice"
         );
     }
@@ -280,11 +284,11 @@ fn a_chirp_beside_a_ring_down_twenty_times_as_large_is_one_component() {
 fn a_trend_that_is_asked_for_is_removed_and_no_other() {
     let samples = Signal { flip: FLIPS[3], ..Signal::of(&[Tone::steady(HIGH_HZ)]) }.record(0);
     for detrend in [Detrend::Polynomial(5), Detrend::HighPass(40.0), Detrend::None] {
-        let settings = Settings { detrend: Some(detrend), ..Settings::default() };
+        let settings = SpectrumSettings { detrend: Some(detrend), ..SpectrumSettings::default() };
         let removed = analysed(&samples, &settings).unwrap().removed;
         assert_eq!((removed.detrend, removed.relaxations), (detrend, 0));
     }
-    let chosen = analysed(&samples, &Settings::default()).unwrap().removed;
+    let chosen = analysed(&samples, &SpectrumSettings::default()).unwrap().removed;
     assert!(
         matches!(chosen.detrend, Detrend::Polynomial(degree) if degree > 5) || chosen.relaxations > 0,
         "{chosen}"
@@ -300,16 +304,16 @@ fn what_was_removed_what_is_listed_and_what_is_left_add_up_to_the_record() {
         ..Signal::of(&[Tone::ring_down(LOW_HZ, 0.05), Tone::steady(HIGH_HZ)])
     };
     let samples = signal.record(3);
-    let analysis = analysed(&samples, &Settings::default()).unwrap();
+    let analysis = analysed(&samples, &SpectrumSettings::default()).unwrap();
     assert_eq!(analysis.oscillations.len(), 2);
     for (i, sample) in samples.iter().enumerate() {
-        let sum = analysis.left_m[i].map(|left| left + analysis.model_m[i] + analysis.removed_m[i]);
+        let sum = analysis.residual_m[i].map(|left| left + analysis.model_m[i] + analysis.removed_m[i]);
         assert_eq!(sum.is_some(), sample.is_some(), "frame {i}");
         assert!(sum.zip(*sample).is_none_or(|(sum, x)| (sum - x).abs() < 1e-15), "frame {i}");
-        let listed: f64 = analysis.oscillations.iter().map(|o| o.at_m(i as f64 / 5000.0)).sum();
+        let listed: f64 = analysis.oscillations.iter().map(|o| o.displacement_m(i as f64 / 5000.0)).sum();
         assert!((listed - analysis.model_m[i]).abs() < 1e-12, "frame {i}: {listed} {}", analysis.model_m[i]);
     }
-    let left: Vec<f64> = analysis.left_m.iter().flatten().copied().collect();
+    let left: Vec<f64> = analysis.residual_m.iter().flatten().copied().collect();
     assert!((rms(&left) / signal.noise_m() - 1.0).abs() < 0.1, "{} of {}", rms(&left), signal.noise_m());
 }
 
@@ -324,7 +328,7 @@ fn the_same_record_gives_the_same_bits_on_any_number_of_threads() {
         let samples = Signal { frames, ..signal.clone() }.record(1);
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-            pool.install(|| analysed(&samples, &Settings::default()).unwrap())
+            pool.install(|| analysed(&samples, &SpectrumSettings::default()).unwrap())
         };
         let (one, two, again) = (on(1), on(2), on(2));
         assert!(!one.spectrum.components.is_empty());
@@ -334,7 +338,7 @@ fn the_same_record_gives_the_same_bits_on_any_number_of_threads() {
 
 #[test]
 fn records_that_have_no_spectrum_are_refused() {
-    let (tone, settings) = (Signal::of(&[Tone::steady(HIGH_HZ)]).record(0), Settings::default());
+    let (tone, settings) = (Signal::of(&[Tone::steady(HIGH_HZ)]).record(0), SpectrumSettings::default());
     for value in [f64::NAN, f64::INFINITY, -1e300] {
         let mut samples = tone.clone();
         samples[17] = Some(value);
@@ -346,15 +350,19 @@ fn records_that_have_no_spectrum_are_refused() {
     assert_eq!(analysed(&[], &settings), Err(SpectrumError::TooFew { found: 0, least: 8 }));
     assert_eq!(analysed(&tone[..7], &settings), Err(SpectrumError::TooFew { found: 7, least: 8 }));
     assert_eq!(analysed(&[None; 750], &settings), Err(SpectrumError::TooFew { found: 0, least: 8 }));
-    let steep = Settings { detrend: Some(Detrend::Polynomial(23)), ..settings };
+    let steep = SpectrumSettings { detrend: Some(Detrend::Polynomial(23)), ..settings };
     assert_eq!(analysed(&tone[..40], &steep), Err(SpectrumError::TooFew { found: 40, least: 48 }));
-    let rate =
-        |frame_rate_hz| Analysis::of(&Record { samples: &tone, frame_rate_hz, exposure_s: None }, &settings);
+    let rate = |frame_rate_hz| {
+        SpectralAnalysis::from_record(
+            &SampledRecord { samples: &tone, frame_rate_hz, exposure_s: None },
+            &settings,
+        )
+    };
     assert!(matches!(rate(0.0), Err(SpectrumError::FrameRate { .. })));
     assert!(matches!(rate(f64::NAN), Err(SpectrumError::FrameRate { .. })));
-    let banded = Settings { band_hz: Some((3000.0, 4000.0)), ..settings };
+    let banded = SpectrumSettings { band_hz: Some((3000.0, 4000.0)), ..settings };
     assert!(matches!(analysed(&tone, &banded), Err(SpectrumError::Band { .. })));
-    let too_many = Settings { detrend: Some(Detrend::HighPass(160.0)), ..settings };
+    let too_many = SpectrumSettings { detrend: Some(Detrend::HighPass(160.0)), ..settings };
     assert!(matches!(analysed(&tone, &too_many), Err(SpectrumError::Trend { .. })));
 }
 
@@ -363,7 +371,7 @@ fn a_constant_record_and_a_straight_line_have_no_components() {
     for value in [|_: usize| 0.0, |_| 3e-3, |i| 1.0 + 1e-5 * i as f64] {
         for frames in [8, 60, 750] {
             let samples: Vec<Option<f64>> = (0..frames).map(|i| Some(value(i))).collect();
-            let list = analysed(&samples, &Settings::default()).unwrap().spectrum.components;
+            let list = analysed(&samples, &SpectrumSettings::default()).unwrap().spectrum.components;
             assert!(list.is_empty(), "{frames} frames: {list:?}");
         }
     }
@@ -373,11 +381,11 @@ fn a_constant_record_and_a_straight_line_have_no_components() {
 fn a_long_record_is_read_by_its_periodogram() {
     let tone = Tone::steady(HIGH_HZ + 0.1);
     let signal = Signal { frames: 20_000, ..Signal::of(&[tone]) };
-    assert!(signal.frames > LONGEST_FITTED);
+    assert!(signal.frames > LONGEST_DECOMPOSED);
     let lists = read_all(&signal, 40);
     assert_complete(&signal, &lists);
     for c in lists.iter().filter_map(|list| near(list, tone.hz)) {
-        assert_eq!((c.estimator, c.verdict), (Estimator::Periodogram, Verdict::Clear));
+        assert_eq!((c.estimator, c.verdict), (Estimator::Periodogram, ComponentVerdict::Clear));
         assert!((c.frequency_hz - tone.hz).abs() < c.frequency_sd_hz, "{c:?}");
         assert!(c.frequency_sd_hz < 0.01, "a 25th of a resolution: {c:?}");
     }
@@ -388,20 +396,22 @@ fn a_long_record_is_read_by_its_periodogram() {
 #[test]
 fn no_polynomial_swings_through_a_whole_reversal() {
     use wiperlab::recording::channel::Channel;
-    use wiperlab::simulate::Effort;
+    use wiperlab::simulate::SolverOptions;
     use wiperlab::simulate::scene::Scene;
-    use wiperlab::twin::{Camera, Tracking, track, view};
+    use wiperlab::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
     let scene = Scene::parse("scene", include_str!("../../data/scenes/actual-blade.toml")).unwrap();
     for frame_rate_hz in [1000.0, 2000.0, 3000.0, 4000.0, 5000.0] {
         let camera = Camera { frame_rate_hz, exposure_s: 5e-5 };
-        let seen = view(&scene, &camera, scene.start_s, scene.run.stop_s, Effort::new(1e-8)).unwrap();
+        let seen =
+            film_scene(&scene, &camera, scene.start_s, scene.run.stop_s, SolverOptions::new(1e-8)).unwrap();
         for seed in 0..3 {
-            let tracking = Tracking { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.01, seed };
-            let recording = track(&seen.recording, "twin", &tracking).unwrap();
+            let tracking =
+                TrackingModel { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.01, seed };
+            let recording = add_tracking_noise(&seen.recording, "twin", &tracking).unwrap();
             for channel in [Channel::HeadDrop, Channel::Deflection] {
                 let samples = channel.samples(&recording);
-                let record = Record { samples: &samples, frame_rate_hz, exposure_s: Some(5e-5) };
-                let found = Analysis::of(&record, &Settings::default()).unwrap();
+                let record = SampledRecord { samples: &samples, frame_rate_hz, exposure_s: Some(5e-5) };
+                let found = SpectralAnalysis::from_record(&record, &SpectrumSettings::default()).unwrap();
                 let slowest = &found.spectrum.components;
                 let slowest =
                     slowest.iter().min_by(|a, b| a.frequency_hz.total_cmp(&b.frequency_hz)).unwrap();
@@ -415,7 +425,7 @@ fn no_polynomial_swings_through_a_whole_reversal() {
                     Detrend::Polynomial(degree) => degree,
                     _ => 3,
                 };
-                assert!(found.left_out > 0 && degree <= 11, "{what}");
+                assert!(found.skipped_frames > 0 && degree <= 11, "{what}");
             }
         }
     }
@@ -433,9 +443,9 @@ fn a_tone_in_every_second_or_third_frame_is_read_at_the_rate_of_those() {
                 let first = seed as usize % stride;
                 let kept: Vec<Option<f64>> =
                     whole.iter().enumerate().map(|(i, x)| x.filter(|_| i % stride == first)).collect();
-                let found = analysed(&kept, &Settings::default()).unwrap();
-                assert_eq!((found.stride, found.left_out), (stride, first));
-                assert_eq!(found.left_m.len(), kept.len() - first);
+                let found = analysed(&kept, &SpectrumSettings::default()).unwrap();
+                assert_eq!((found.stride, found.skipped_frames), (stride, first));
+                assert_eq!(found.residual_m.len(), kept.len() - first);
                 let half_hz = 2500.0 / stride as f64;
                 let seen_hz = if hz > half_hz { 2.0 * half_hz - hz } else { hz };
                 let list = &found.spectrum.components;
@@ -443,13 +453,13 @@ fn a_tone_in_every_second_or_third_frame_is_read_at_the_rate_of_those() {
                 assert_eq!(list.len(), 1, "{hz} Hz: {:?}", listed_hz(list));
                 let folds = hz > half_hz || 2.0 * half_hz - hz < 1300.0;
                 assert_eq!(
-                    tone.verdict == Verdict::AliasSuspected,
+                    tone.verdict == ComponentVerdict::AliasSuspected,
                     folds,
                     "{stride}, {hz} Hz: {:?}",
                     tone.reasons
                 );
                 // what is left in a kept frame is what the sum of the parts leaves
-                for (i, left) in found.left_m.iter().enumerate() {
+                for (i, left) in found.residual_m.iter().enumerate() {
                     let at = kept[first + i];
                     assert_eq!(left.is_some(), at.is_some());
                     if let (Some(left), Some(at)) = (left, at) {

@@ -5,8 +5,8 @@
 //! All are dimensionless with unit mass, stiffness and static friction; times are compared absolutely, so an
 //! error is in units of the reciprocal angular frequency and the tolerance is that of one step.
 
-use wiperlab::ode::taylor::{self, Expand, Expansion, Room};
-use wiperlab::ode::{self, Cause, End, Phase, Start, Work};
+use wiperlab::ode::taylor::{self, TaylorExpansion, TaylorPhase, TaylorWorkspace};
+use wiperlab::ode::{self, HybridPhase, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters};
 
 /// Error that a located instant may have in units of the tolerance: a phase takes a few steps and each may
 /// err by the tolerance.
@@ -31,18 +31,24 @@ fn cases() -> impl Iterator<Item = (Method, f64)> {
     METHODS.into_iter().flat_map(|method| tolerances().map(move |relative| (method, relative)))
 }
 
-fn integrate<const N: usize, P: Expand<N, 1>>(
+fn integrate<const N: usize, P: TaylorPhase<N, 1>>(
     method: Method,
     phase: &P,
-    start: Start<N, 1>,
+    start: PhaseStart<N, 1>,
     stop: f64,
     relative: f64,
-) -> End<N> {
-    let mut work = Work::default();
+) -> PhaseEnd<N> {
+    let mut work = WorkCounters::default();
     match method {
-        Method::Taylor => {
-            taylor::integrate(phase, start, stop, relative, &mut Room::default(), &mut work, |_, _| ())
-        }
+        Method::Taylor => taylor::integrate_taylor(
+            phase,
+            start,
+            stop,
+            relative,
+            &mut TaylorWorkspace::default(),
+            &mut work,
+            |_, _| (),
+        ),
         Method::RungeKutta => ode::integrate(phase, start, stop, relative, &mut work, |_| ()),
     }
 }
@@ -94,7 +100,7 @@ struct Belt {
 /// The mass lags behind the belt; states are position and velocity. The sliding speed stays positive.
 struct Sliding<'a>(&'a Belt);
 
-impl Phase<2, 1> for Sliding<'_> {
+impl HybridPhase<2, 1> for Sliding<'_> {
     fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
         [y[1], self.0.kinetic.force(self.0.speed - y[1]) - y[0]]
     }
@@ -119,9 +125,9 @@ impl Sliding<'_> {
     }
 }
 
-impl Expand<2, 1> for Sliding<'_> {
+impl TaylorPhase<2, 1> for Sliding<'_> {
     type Tape = ();
-    fn expand(&self, _: f64, y: &[f64; 2], (): &mut (), out: &mut Expansion<2, 1>) {
+    fn expand_series(&self, _: f64, y: &[f64; 2], (): &mut (), out: &mut TaylorExpansion<2, 1>) {
         for (k, row) in self.series(y, out.order).into_iter().enumerate() {
             (out.states[k], out.guards[k]) = (row, [-row[1]]);
         }
@@ -132,7 +138,7 @@ impl Expand<2, 1> for Sliding<'_> {
 /// The mass rides on the belt; the spring stays within the static limit.
 struct Riding<'a>(&'a Belt);
 
-impl Phase<1, 1> for Riding<'_> {
+impl HybridPhase<1, 1> for Riding<'_> {
     fn derivative(&self, _: f64, _: &[f64; 1]) -> [f64; 1] {
         [self.0.speed]
     }
@@ -144,9 +150,9 @@ impl Phase<1, 1> for Riding<'_> {
     }
 }
 
-impl Expand<1, 1> for Riding<'_> {
+impl TaylorPhase<1, 1> for Riding<'_> {
     type Tape = ();
-    fn expand(&self, _: f64, y: &[f64; 1], (): &mut (), out: &mut Expansion<1, 1>) {
+    fn expand_series(&self, _: f64, y: &[f64; 1], (): &mut (), out: &mut TaylorExpansion<1, 1>) {
         let rows = [(*y, self.0.at_rest - y[0]), ([self.0.speed], -self.0.speed)];
         for k in 0..=out.order {
             let (state, guard) = rows.get(k).copied().unwrap_or_default();
@@ -156,16 +162,16 @@ impl Expand<1, 1> for Riding<'_> {
 }
 
 impl Belt {
-    fn slide(&self, t: f64, x: f64, method: Method, relative: f64) -> End<2> {
-        let start = Start { t, y: [x, self.speed], zero_order: [self.release_order], step: None };
+    fn slide(&self, t: f64, x: f64, method: Method, relative: f64) -> PhaseEnd<2> {
+        let start = PhaseStart { t, y: [x, self.speed], zero_order: [self.release_order], step: None };
         integrate(method, &Sliding(self), start, t + 100.0, relative)
     }
 
-    fn ride(&self, t: f64, x: f64, method: Method, relative: f64) -> End<1> {
+    fn ride(&self, t: f64, x: f64, method: Method, relative: f64) -> PhaseEnd<1> {
         integrate(
             method,
             &Riding(self),
-            Start { t, y: [x], zero_order: [0], step: None },
+            PhaseStart { t, y: [x], zero_order: [0], step: None },
             t + 100.0,
             relative,
         )
@@ -178,11 +184,15 @@ impl Belt {
         (0..PERIODS)
             .map(|cycle| {
                 let stop = self.slide(t, x, method, relative);
-                assert_eq!(stop.cause, Cause::Guard(0), "slip of cycle {cycle}, {method:?} at {relative:e}");
+                assert_eq!(
+                    stop.cause,
+                    PhaseEndCause::Guard(0),
+                    "slip of cycle {cycle}, {method:?} at {relative:e}"
+                );
                 let release = self.ride(stop.t, stop.y[0], method, relative);
                 assert_eq!(
                     release.cause,
-                    Cause::Guard(0),
+                    PhaseEndCause::Guard(0),
                     "stick of cycle {cycle}, {method:?} at {relative:e}"
                 );
                 assert!((release.y[0] - self.at_rest).abs() < 1e-13);
@@ -227,7 +237,7 @@ fn a_belt_with_static_above_kinetic_friction() {
 /// The mass turns back where its velocity, the guard here, reaches zero.
 struct UntilTurn<'a>(&'a Belt, f64);
 
-impl Phase<2, 1> for UntilTurn<'_> {
+impl HybridPhase<2, 1> for UntilTurn<'_> {
     fn derivative(&self, t: f64, y: &[f64; 2]) -> [f64; 2] {
         Sliding(self.0).derivative(t, y)
     }
@@ -239,9 +249,9 @@ impl Phase<2, 1> for UntilTurn<'_> {
     }
 }
 
-impl Expand<2, 1> for UntilTurn<'_> {
+impl TaylorPhase<2, 1> for UntilTurn<'_> {
     type Tape = ();
-    fn expand(&self, _: f64, y: &[f64; 2], (): &mut (), out: &mut Expansion<2, 1>) {
+    fn expand_series(&self, _: f64, y: &[f64; 2], (): &mut (), out: &mut TaylorExpansion<2, 1>) {
         for (k, row) in Sliding(self.0).series(y, out.order).into_iter().enumerate() {
             (out.states[k], out.guards[k]) = (row, [self.1 * row[1]]);
         }
@@ -251,13 +261,13 @@ impl Expand<2, 1> for UntilTurn<'_> {
 #[test]
 fn the_mass_on_the_belt_reaches_the_exact_extremes() {
     for (method, relative) in cases() {
-        let turn = |start: Start<2, 1>, side: f64| {
+        let turn = |start: PhaseStart<2, 1>, side: f64| {
             let end = integrate(method, &UntilTurn(&COULOMB, side), start, start.t + 10.0, relative);
-            assert_eq!(end.cause, Cause::Guard(0));
+            assert_eq!(end.cause, PhaseEndCause::Guard(0));
             end
         };
-        let most = turn(Start { t: 0.0, y: [1.0, COULOMB.speed], zero_order: [0], step: None }, 1.0);
-        let least = turn(Start { t: most.t, y: [most.y[0], 0.0], zero_order: [1], step: None }, -1.0);
+        let most = turn(PhaseStart { t: 0.0, y: [1.0, COULOMB.speed], zero_order: [0], step: None }, 1.0);
+        let least = turn(PhaseStart { t: most.t, y: [most.y[0], 0.0], zero_order: [1], step: None }, -1.0);
         for (found, exact) in [(most.y[0], 1.038_516_480_713_45), (least.y[0], -0.038_516_480_713_45)] {
             assert!(
                 (found - exact).abs() <= ERRORS * relative + 1e-14,
@@ -310,7 +320,7 @@ struct DenHartog {
     side: f64,
 }
 
-impl Phase<2, 1> for DenHartog {
+impl HybridPhase<2, 1> for DenHartog {
     fn derivative(&self, t: f64, y: &[f64; 2]) -> [f64; 2] {
         [y[1], (self.b * t).cos() - y[0] - self.r * self.side]
     }
@@ -322,9 +332,9 @@ impl Phase<2, 1> for DenHartog {
     }
 }
 
-impl Expand<2, 1> for DenHartog {
+impl TaylorPhase<2, 1> for DenHartog {
     type Tape = ();
-    fn expand(&self, t: f64, y: &[f64; 2], (): &mut (), out: &mut Expansion<2, 1>) {
+    fn expand_series(&self, t: f64, y: &[f64; 2], (): &mut (), out: &mut TaylorExpansion<2, 1>) {
         let (mut sin, mut cos) = (self.b * t).sin_cos();
         let [mut x, mut v] = *y;
         for k in 0..=out.order {
@@ -353,11 +363,11 @@ fn den_hartogs_oscillator_slides_without_stopping_at_the_exact_amplitude() {
                 let end = integrate(
                     method,
                     &phase,
-                    Start { t, y, zero_order: [1], step: None },
+                    PhaseStart { t, y, zero_order: [1], step: None },
                     t + 100.0,
                     relative,
                 );
-                assert_eq!(end.cause, Cause::Guard(0), "half cycle {half}");
+                assert_eq!(end.cause, PhaseEndCause::Guard(0), "half cycle {half}");
                 assert!(
                     ((b * end.t).cos() - end.y[0]).abs() > r,
                     "half cycle {half}: friction could hold the mass"
@@ -379,7 +389,7 @@ struct Spiral {
     side: f64,
 }
 
-impl Phase<2, 1> for Spiral {
+impl HybridPhase<2, 1> for Spiral {
     fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
         let w = self.side * std::f64::consts::TAU;
         [y[0] + w * y[1], y[1] - w * y[0]]
@@ -392,9 +402,9 @@ impl Phase<2, 1> for Spiral {
     }
 }
 
-impl Expand<2, 1> for Spiral {
+impl TaylorPhase<2, 1> for Spiral {
     type Tape = ();
-    fn expand(&self, _: f64, y: &[f64; 2], (): &mut (), out: &mut Expansion<2, 1>) {
+    fn expand_series(&self, _: f64, y: &[f64; 2], (): &mut (), out: &mut TaylorExpansion<2, 1>) {
         let w = self.side * std::f64::consts::TAU;
         let [mut x, mut v] = *y;
         for k in 0..=out.order {
@@ -413,13 +423,13 @@ impl Expand<2, 1> for Spiral {
 #[test]
 fn a_crossing_of_a_discontinuity_happens_at_its_exact_instant() {
     for (method, relative) in cases() {
-        let start = Start { t: 0.0, y: [(-1.0f64).exp(), 0.0], zero_order: [0], step: None };
+        let start = PhaseStart { t: 0.0, y: [(-1.0f64).exp(), 0.0], zero_order: [0], step: None };
         let crossing = integrate(method, &Spiral { side: -1.0 }, start, 10.0, relative);
-        assert_eq!(crossing.cause, Cause::Guard(0));
+        assert_eq!(crossing.cause, PhaseEndCause::Guard(0));
         assert!((crossing.t - 1.0).abs() <= ERRORS * relative, "{} at {relative:e}", crossing.t);
-        let start = Start { t: crossing.t, y: crossing.y, zero_order: [1], step: None };
+        let start = PhaseStart { t: crossing.t, y: crossing.y, zero_order: [1], step: None };
         let end = integrate(method, &Spiral { side: 1.0 }, start, std::f64::consts::FRAC_PI_2, relative);
-        assert_eq!((end.cause, end.t), (Cause::Stop, std::f64::consts::FRAC_PI_2));
+        assert_eq!((end.cause, end.t), (PhaseEndCause::Stop, std::f64::consts::FRAC_PI_2));
         for (found, exact) in end.y.into_iter().zip([-1.597_460_377_450_7, 0.761_493_620_606_011]) {
             // an error in phase is one in place times the angular velocity
             assert!(

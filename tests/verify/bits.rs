@@ -5,8 +5,8 @@
 use crate::scenes::committed;
 use wiperlab::math;
 use wiperlab::simulate::outputs::Transitions;
-use wiperlab::simulate::{Status, run};
-use wiperlab::spectrum::{Analysis, Record, Settings};
+use wiperlab::simulate::{RunStatus, run_scene};
+use wiperlab::spectrum::{SampledRecord, SpectralAnalysis, SpectrumSettings};
 use wiperlab::text::text_sha256;
 
 /// Hash of numbers, with all their digits.
@@ -32,7 +32,7 @@ fn functions_round_as_they_do_elsewhere() {
 #[test]
 fn transitions_of_a_run_are_at_the_same_times() {
     let mut transitions = Transitions::default();
-    assert_eq!(run(&committed("actual-blade"), &mut transitions).status, Status::Completed);
+    assert_eq!(run_scene(&committed("actual-blade"), &mut transitions).status, RunStatus::Completed);
     assert_eq!(transitions.0.len(), 380);
     assert_eq!(
         hash(transitions.0.iter().map(|t| t.time_s)),
@@ -48,8 +48,9 @@ fn components_of_a_record_have_the_same_digits() {
         Some(ring_down + 1e-4 * math::sin(1900.0 * t) + 2e-7 * math::sin(1e4 * t * t))
     };
     let samples: Vec<_> = (0..900).map(sample).collect();
-    let record = Record { samples: &samples, frame_rate_hz: 2000.0, exposure_s: None };
-    let components = Analysis::of(&record, &Settings::default()).unwrap().spectrum.components;
+    let record = SampledRecord { samples: &samples, frame_rate_hz: 2000.0, exposure_s: None };
+    let components =
+        SpectralAnalysis::from_record(&record, &SpectrumSettings::default()).unwrap().spectrum.components;
     assert_eq!(components.len(), 2, "{components:#?}");
     let numbers = components.iter().flat_map(|c| [c.frequency_hz, c.amplitude_m, c.snr_db]);
     assert_eq!(hash(numbers), "f7a797cf798926e7f586b1cf15fd0cb80dd6e4ed223ec98915cad175a3140bfe");

@@ -2,7 +2,7 @@
 
 use crate::scenes::both;
 use std::f64::consts::TAU;
-use wiperlab::blade::modes::{Tip, modes, tip_compliance};
+use wiperlab::blade::modes::{TipConstraint, natural_modes, tip_compliance};
 use wiperlab::blade::{Linkage, Spring};
 
 /// A blade without damping.
@@ -26,7 +26,8 @@ fn it_is_the_sum_over_the_modes() {
                     let natural = TAU * mode.frequency_hz.unwrap();
                     shown * shown / (mass * (natural * natural - w * w))
                 };
-                let expected: f64 = modes(&blade, Tip::Free, on_shoulder).iter().map(one).sum();
+                let expected: f64 =
+                    natural_modes(&blade, TipConstraint::Free, on_shoulder).iter().map(one).sum();
                 let found = tip_compliance(&blade, on_shoulder, frequency_hz);
                 assert!((found.re / expected - 1.0).abs() < 1e-9, "{frequency_hz}: {} {expected}", found.re);
                 assert_eq!(found.im, 0.0);
@@ -39,7 +40,7 @@ fn it_is_the_sum_over_the_modes() {
 fn it_vanishes_where_the_blade_swings_with_its_tip_held() {
     for scene in both() {
         let blade = undamped(&scene.linkage);
-        let held = modes(&blade, Tip::Held, false)[0].frequency_hz.unwrap();
+        let held = natural_modes(&blade, TipConstraint::Held, false)[0].frequency_hz.unwrap();
         let (at, below) = (tip_compliance(&blade, false, held), tip_compliance(&blade, false, 0.5 * held));
         assert!(at.re.abs() < 1e-9 * below.re.abs(), "{} {}", at.re, below.re);
     }

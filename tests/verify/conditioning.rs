@@ -2,9 +2,9 @@
 //! gaps.
 
 use std::f64::consts::TAU;
-use wiperlab::recording::channel::{Anchor, Channel, Instants, Window};
+use wiperlab::recording::channel::{Channel, InstantKind, ReversalInstants, Window};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::spectrum::{Settings, SpectrumError, analyse};
+use wiperlab::spectrum::{SpectrumError, SpectrumSettings, analyse_spectrum};
 
 const RATE_HZ: f64 = 5000.0;
 const START_S: f64 = 0.9;
@@ -43,7 +43,10 @@ fn gappy() -> Recording {
 }
 
 fn cut(recording: &Recording, window: &str) -> Vec<Option<f64>> {
-    let frames = Window::parse(window).unwrap().resolve(recording, &Instants::find(recording)).unwrap();
+    let frames = Window::parse(window)
+        .unwrap()
+        .resolve_frames(recording, &ReversalInstants::find_instants(recording))
+        .unwrap();
     Channel::Deflection.samples(recording)[frames].to_vec()
 }
 
@@ -68,9 +71,9 @@ fn gaps_do_not_move_the_reversal() {
     for recording in
         [recording(|_| false, |_| false), gappy(), recording(|_| false, |i| (470..530).contains(&i))]
     {
-        let found = Instants::find(&recording);
+        let found = ReversalInstants::find_instants(&recording);
         assert_eq!(found.reversals.len(), 1);
-        let reversal_s = found.time_s(Anchor::Reversal, 1).unwrap();
+        let reversal_s = found.time_s(InstantKind::Reversal, 1).unwrap();
         assert!((reversal_s - 1.0).abs() < 1e-6, "{reversal_s}");
     }
 }
@@ -79,8 +82,12 @@ fn gaps_do_not_move_the_reversal() {
 fn a_window_from_the_reversal_holds_exactly_its_frames_also_with_gaps() {
     let recording = gappy();
     // the reversal is frame 500; half a frame keeps the ends away from frames
-    let frames =
-        |text: &str| Window::parse(text).unwrap().resolve(&recording, &Instants::find(&recording)).unwrap();
+    let frames = |text: &str| {
+        Window::parse(text)
+            .unwrap()
+            .resolve_frames(&recording, &ReversalInstants::find_instants(&recording))
+            .unwrap()
+    };
     assert_eq!(frames("reversal+0.0499..reversal+0.1999"), 750..1500);
     assert_eq!(frames("reversal-0.0501..reversal-0.0001"), 250..500);
     let samples = cut(&recording, "reversal+0.0499..reversal+0.1999");
@@ -92,8 +99,12 @@ fn a_window_from_the_reversal_holds_exactly_its_frames_also_with_gaps() {
 #[test]
 fn a_cubic_leaves_a_cycle_on_a_flip_a_hundred_times_larger_intact() {
     for recording in [recording(|_| false, |_| false), gappy()] {
-        let found =
-            analyse(&cut(&recording, "reversal+0.05..reversal+0.20"), RATE_HZ, &Settings::default()).unwrap();
+        let found = analyse_spectrum(
+            &cut(&recording, "reversal+0.05..reversal+0.20"),
+            RATE_HZ,
+            &SpectrumSettings::default(),
+        )
+        .unwrap();
         let c = found.component_in_band(60.0, 100.0).unwrap();
         assert!((c.frequency_hz - TONE_HZ).abs() < 0.05, "{}", c.frequency_hz);
         assert!((c.amplitude_m / TONE_M - 1.0).abs() < 0.01, "{}", c.amplitude_m);
@@ -104,7 +115,7 @@ fn a_cubic_leaves_a_cycle_on_a_flip_a_hundred_times_larger_intact() {
 fn a_window_in_which_nothing_was_tracked_is_refused() {
     let samples = cut(&gappy(), "reversal+0.0801..reversal+0.0879");
     assert_eq!((samples.len(), samples.iter().flatten().count()), (39, 0));
-    let refused = analyse(&samples, RATE_HZ, &Settings::default()).unwrap_err();
+    let refused = analyse_spectrum(&samples, RATE_HZ, &SpectrumSettings::default()).unwrap_err();
     assert_eq!(refused, SpectrumError::TooFew { found: 0, least: 8 });
 }
 
@@ -115,7 +126,7 @@ fn a_recording_without_a_head_has_no_deflection_and_says_why_it_has_no_reversal(
     assert_eq!(Channel::TipX.samples(&recording).iter().flatten().count(), FRAMES);
     let refused = Window::parse("reversal+0.05..")
         .unwrap()
-        .resolve(&recording, &Instants::find(&recording))
+        .resolve_frames(&recording, &ReversalInstants::find_instants(&recording))
         .unwrap_err()
         .to_string();
     assert_eq!(

@@ -6,11 +6,13 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 use wiperlab::math::StandardNormal;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::simulate::drive::{Spline, head_motion};
-use wiperlab::simulate::mode::Mode;
+use wiperlab::simulate::drive::{HeadSpline, smooth_head_motion};
+use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::{Drive, Scene, StartKind};
-use wiperlab::simulate::{Effort, Method, Observer, Piece, Status, Transition, run_with};
+use wiperlab::simulate::{
+    IntegrationMethod, Observer, RunStatus, SolutionSegment, SolverOptions, Transition, run_scene_with,
+};
 
 const SCENE: &str = include_str!("../fixtures/light-blade.toml");
 const COSINE: &str = "amplitude_m = 0.0138\nfrequency_hz = 0.915";
@@ -38,19 +40,19 @@ fn of_cosine(start_s: f64, stop_s: f64, frame_rate_hz: f64) -> Recording {
         frame_rate_hz,
         frames: ((stop_s - start_s) * frame_rate_hz).round() as usize + 1,
     };
-    recording(grid, (0..grid.frames).map(|i| Some(cosine().at(grid.time_s(i)).position_m)).collect())
+    recording(grid, (0..grid.frames).map(|i| Some(cosine().motion_at(grid.time_s(i)).position_m)).collect())
 }
 
 /// Root mean square and largest errors of position, velocity and acceleration against the cosine, over part
 /// of the recorded time.
-fn errors(spline: &Spline, margin_s: f64) -> [[f64; 2]; 3] {
+fn errors(spline: &HeadSpline, margin_s: f64) -> [[f64; 2]; 3] {
     let [first, last] = spline.span_s();
     let (from, to) = (first + margin_s, last - margin_s);
     let count = 4001;
     let mut found = [[0.0f64; 2]; 3];
     for i in 0..count {
         let t = from + (to - from) * i as f64 / (count - 1) as f64;
-        let (is, should) = (spline.at(t), cosine().at(t));
+        let (is, should) = (spline.motion_at(t), cosine().motion_at(t));
         let off = [
             is.position_m - should.position_m,
             is.velocity_m_per_s - should.velocity_m_per_s,
@@ -67,7 +69,7 @@ fn errors(spline: &Spline, margin_s: f64) -> [[f64; 2]; 3] {
 #[test]
 fn without_noise_the_errors_fall_with_the_frame_rate_as_a_cubic_splines_do() {
     let worst = |rate: f64| {
-        errors(&head_motion(&of_cosine(0.1, 0.9, rate)).unwrap(), 0.1).map(|[_, largest]| largest)
+        errors(&smooth_head_motion(&of_cosine(0.1, 0.9, rate)).unwrap(), 0.1).map(|[_, largest]| largest)
     };
     let (coarse, fine) = (worst(125.0), worst(250.0));
     for (k, least) in [(0, 2.7), (1, 2.7), (2, 1.8)] {
@@ -89,7 +91,7 @@ fn of_a_noisy_stroke_the_position_is_within_the_noise_and_the_acceleration_withi
             x.filter(|_| lost > 0.02).map(|x| x + NOISE_M * noise)
         };
         let head_x_m = clean.traces().head_x_m.iter().map(seen).collect();
-        let spline = head_motion(&recording(clean.grid(), head_x_m)).unwrap();
+        let spline = smooth_head_motion(&recording(clean.grid(), head_x_m)).unwrap();
         let [position, velocity, acceleration] = errors(&spline, 0.0);
         assert!(
             position[0] < 0.5 * NOISE_M && position[1] < 2.0 * NOISE_M,
@@ -108,9 +110,9 @@ fn of_a_noisy_stroke_the_position_is_within_the_noise_and_the_acceleration_withi
     }
 }
 
-fn transitions(scene: &Scene, effort: Effort) -> Vec<Transition> {
+fn transitions(scene: &Scene, effort: SolverOptions) -> Vec<Transition> {
     let mut list = Transitions::default();
-    assert_eq!(run_with(scene, effort, &mut list).status, Status::Completed);
+    assert_eq!(run_scene_with(scene, effort, &mut list).status, RunStatus::Completed);
     list.0
 }
 
@@ -126,14 +128,14 @@ fn driven_by(recording: &Recording) -> Scene {
         assert_eq!(path, "data/head");
         Ok(recording.clone())
     };
-    Scene::parse_with("scene.toml", &text, read).unwrap()
+    Scene::parse_with_recording("scene.toml", &text, read).unwrap()
 }
 
 /// The blade follows a recording of its cosine through the same transitions, closer with every doubling of
 /// the rate.
 #[test]
 fn a_noiseless_recording_of_the_cosine_gives_the_transitions_of_the_cosine() {
-    let effort = Effort::new(1e-11);
+    let effort = SolverOptions::new(1e-11);
     let expected = transitions(&Scene::parse("scene.toml", &moving()).unwrap(), effort);
     assert!(expected.len() > 40, "{}", expected.len());
     let worst = |rate: f64| {
@@ -156,10 +158,10 @@ struct Pieces {
 }
 
 impl Observer for Pieces {
-    fn piece(&mut self, piece: &Piece<'_>) {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
         self.ends.push([piece.start_s, piece.end_s]);
-        if piece.mode == Mode::Stick {
-            self.drift_m = self.drift_m.max(piece.sample(piece.end_s).constraint_drift_m.abs());
+        if piece.mode == TipMode::Stick {
+            self.drift_m = self.drift_m.max(piece.sample_at(piece.end_s).constraint_drift_m.abs());
         }
     }
 }
@@ -168,9 +170,13 @@ impl Observer for Pieces {
 fn no_step_leads_across_a_knot_and_both_methods_agree() {
     let scene = driven_by(&of_cosine(0.0, 0.25, 2000.0));
     let mut lists = vec![];
-    for method in [Method::Taylor, Method::RungeKutta] {
+    for method in [IntegrationMethod::Taylor, IntegrationMethod::RungeKutta] {
         let (mut list, mut pieces) = (Transitions::default(), Pieces::default());
-        run_with(&scene, Effort { method, ..Effort::new(1e-10) }, &mut (&mut list, &mut pieces));
+        run_scene_with(
+            &scene,
+            SolverOptions { method, ..SolverOptions::new(1e-10) },
+            &mut (&mut list, &mut pieces),
+        );
         for [start, end] in pieces.ends {
             let next = scene.drive.next_break(start).unwrap_or(f64::INFINITY);
             assert!(end <= next, "{method:?}: a step from {start} to {end} across {next}");
@@ -185,7 +191,7 @@ fn no_step_leads_across_a_knot_and_both_methods_agree() {
 }
 
 fn refusal(text: &str, read: impl FnOnce(&str) -> Result<Recording, String>) -> String {
-    Scene::parse_with("scene.toml", text, read).unwrap_err().to_string()
+    Scene::parse_with_recording("scene.toml", text, read).unwrap_err().to_string()
 }
 
 #[test]
@@ -217,8 +223,10 @@ fn what_a_recording_cannot_drive_is_refused() {
         ),
         "{alone}"
     );
-    let fitted =
-        driven_by(&of_cosine(0.0, 0.25, 1000.0)).with("drive.amplitude_m", 0.02).unwrap_err().to_string();
+    let fitted = driven_by(&of_cosine(0.0, 0.25, 1000.0))
+        .with_parameter("drive.amplitude_m", 0.02)
+        .unwrap_err()
+        .to_string();
     assert!(fitted.contains("key `drive.amplitude_m`: found a recorded drive"), "{fitted}");
 }
 
@@ -229,21 +237,21 @@ fn a_scene_that_its_recording_drives_runs_while_the_head_is_tracked_and_starts_w
     slide.start = StartKind::SteadySlide;
     // a head at rest at first: the sine of its speed is 0.2 of the greatest at asin(0.2)/omega
     let recorded = of_cosine(0.0, 0.5, 5000.0);
-    let driven = slide.driven_by(&recorded).unwrap();
+    let driven = slide.drive_by_recording(&recorded).unwrap();
     let expected_s = 0.2_f64.asin() / (TAU * 0.915);
     assert!((0.0..1e-3).contains(&(driven.start_s - expected_s)), "{} {expected_s}", driven.start_s);
     assert!((driven.run.stop_s - 0.49).abs() < 1e-12 && driven.value("drive.amplitude_m").is_none());
-    let speed = driven.drive.at(0.2).velocity_m_per_s;
-    assert!((speed / cosine().at(0.2).velocity_m_per_s - 1.0).abs() < 1e-6, "{speed}");
+    let speed = driven.drive.motion_at(0.2).velocity_m_per_s;
+    assert!((speed / cosine().motion_at(0.2).velocity_m_per_s - 1.0).abs() < 1e-6, "{speed}");
     // any other start is that of the recording, less its uncertain end; the times of the scene do not count
     (upright.start, upright.start_s) = (StartKind::Upright, 7.0);
-    let later = upright.driven_by(&of_cosine(0.3, 0.8, 5000.0)).unwrap();
+    let later = upright.drive_by_recording(&of_cosine(0.3, 0.8, 5000.0)).unwrap();
     assert!((later.start_s - 0.31).abs() < 1e-12 && (later.run.stop_s - 0.79).abs() < 1e-12);
     // a head that begins in full motion starts at once
-    let moving = slide.driven_by(&of_cosine(0.2, 0.5, 5000.0)).unwrap();
+    let moving = slide.drive_by_recording(&of_cosine(0.2, 0.5, 5000.0)).unwrap();
     assert!((moving.start_s - 0.21).abs() < 1e-12);
 
-    let refused = |recording: &Recording| slide.driven_by(recording).unwrap_err().to_string();
+    let refused = |recording: &Recording| slide.drive_by_recording(recording).unwrap_err().to_string();
     let short = refused(&of_cosine(0.2, 0.219, 5000.0));
     assert!(short.contains("`drive.recording`") && short.contains("film more of the stroke"), "{short}");
     let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 5000.0, frames: 2000 };

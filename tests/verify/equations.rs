@@ -6,11 +6,11 @@ use crate::lagrangian;
 use crate::blade::{Parts, STROKE};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wiperlab::blade::shoulder::Lean;
-use wiperlab::blade::{Contact, Directions, HeadMotion, Linkage, Pose};
-use wiperlab::ode::Phase;
+use wiperlab::blade::shoulder::ShoulderContact;
+use wiperlab::blade::{FrictionResponse, HeadMotion, LinkDirections, Linkage, Pose};
+use wiperlab::ode::HybridPhase;
 use wiperlab::simulate::mode::holding_force;
-use wiperlab::simulate::phases::{Slip, Stick, System};
+use wiperlab::simulate::phases::{DrivenBlade, SlipPhase, StickPhase};
 use wiperlab::simulate::scene::Drive;
 
 const STATES: usize = 400;
@@ -24,7 +24,7 @@ struct Case {
     linkage: Linkage,
     pose: Pose,
     head: HeadMotion,
-    lean: Lean,
+    lean: ShoulderContact,
     friction_n: f64,
 }
 
@@ -41,12 +41,17 @@ impl Case {
             acceleration_m_per_s2: within(5.0),
         };
         let friction_n = within(parts.k[0] * parts.hd);
-        let lean = linkage.shoulder.map_or(Lean::Off, |s| s.lean(pose.theta));
+        let lean = linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(pose.theta));
         Self { parts, linkage, pose, head, lean, friction_n }
     }
 
-    fn contact(&self) -> Contact {
-        self.linkage.contact(&self.pose, &Directions::of(&self.pose), &self.head, self.lean)
+    fn contact(&self) -> FrictionResponse {
+        self.linkage.friction_response(
+            &self.pose,
+            &LinkDirections::from_pose(&self.pose),
+            &self.head,
+            self.lean,
+        )
     }
 
     /// The same state for the independent evaluation, the head's drop following from the tip's contact with
@@ -61,7 +66,7 @@ impl Case {
             &self.parts,
             [self.head.position_m, drop, theta, phi],
             rates,
-            self.lean.sign(),
+            self.lean.angle_sign(),
         )
     }
 }
@@ -109,7 +114,7 @@ fn accelerations_and_normal_force_follow_from_the_lagrangian() {
             &tip,
         );
         assert!(contact.kappa > 0.0);
-        leaning += usize::from(case.lean != Lean::Off);
+        leaning += usize::from(case.lean != ShoulderContact::Off);
     }
     assert!(leaning > STATES / 10, "only {leaning} states lean on the shoulder");
 }
@@ -117,7 +122,7 @@ fn accelerations_and_normal_force_follow_from_the_lagrangian() {
 #[test]
 fn energy_is_that_of_the_bodies_and_springs_and_its_rate_is_the_power() {
     for (i, case) in cases().enumerate() {
-        let d = Directions::of(&case.pose);
+        let d = LinkDirections::from_pose(&case.pose);
         let independent = case.lagrangian();
         let energy = independent.energy_j();
         assert_close("energy", i, case.linkage.energy_j(&case.pose, &d, &case.head), energy, &[]);
@@ -143,8 +148,8 @@ fn printed_residuals(case: &Case, [ddt, ddp]: [f64; 2], normal: f64, f: f64) -> 
     let shoulder = case
         .linkage
         .shoulder
-        .filter(|_| case.lean != Lean::Off)
-        .map_or(0.0, |s| s.moment(theta, dt, case.lean.sign()));
+        .filter(|_| case.lean != ShoulderContact::Off)
+        .map_or(0.0, |s| s.moment(theta, dt, case.lean.angle_sign()));
     let (st, ct, sp, cp) = (theta.sin(), theta.cos(), phi.sin(), phi.cos());
     let (s, c) = ((theta - phi).sin(), (theta - phi).cos());
     let first = [
@@ -189,19 +194,20 @@ fn printed_residuals(case: &Case, [ddt, ddp]: [f64; 2], normal: f64, f: f64) -> 
 
 /// The drive passes through the case's head motion at t = 0 only if it is uniform: the phases are tried with
 /// the head unaccelerated.
-fn uniform(case: &mut Case) -> System {
+fn uniform(case: &mut Case) -> DrivenBlade {
     case.head = HeadMotion { position_m: 0.0, acceleration_m_per_s2: 0.0, ..case.head };
     let drive = Drive::Uniform { speed_m_per_s: case.head.velocity_m_per_s };
-    System { linkage: case.linkage, drive, angle_scale: 0.1, rate_scale: 100.0 }
+    DrivenBlade { linkage: case.linkage, drive, angle_scale: 0.1, rate_scale: 100.0 }
 }
 
 #[test]
 fn slip_satisfies_the_equations_as_printed() {
     for (i, mut case) in cases().enumerate() {
         let system = uniform(&mut case);
-        let velocity = case.linkage.tip_velocity_m_per_s(&case.pose, &Directions::of(&case.pose), &case.head);
+        let velocity =
+            case.linkage.tip_velocity_m_per_s(&case.pose, &LinkDirections::from_pose(&case.pose), &case.head);
         let Pose { theta, phi, theta_rate, phi_rate } = case.pose;
-        let slip = Slip { system: &system, direction: velocity.signum(), lean: case.lean };
+        let slip = SlipPhase { system: &system, direction: velocity.signum(), lean: case.lean };
         let [_, _, ddt, ddp] = slip.derivative(0.0, &[theta, phi, theta_rate, phi_rate]);
         // equation (4), and the normal force from the accelerations by the Lagrangian's constraint
         let [a, b, c] = case.parts.friction;
@@ -227,8 +233,8 @@ fn stick_satisfies_the_equations_as_printed() {
         case.pose.phi_rate = -(case.head.velocity_m_per_s
             + l1 * case.pose.theta.cos() * case.pose.theta_rate)
             / (l2 * case.pose.phi.cos());
-        let stick = Stick::hold(&system, 0.0, &case.pose, case.lean);
-        let [rate, acceleration] = stick.derivative(0.0, &stick.states(&case.pose));
+        let stick = StickPhase::from_pose(&system, 0.0, &case.pose, case.lean);
+        let [rate, acceleration] = stick.derivative(0.0, &stick.free_states(&case.pose));
         let contact = case.contact();
         let f = holding_force(&contact);
         let accelerations = [0, 1].map(|link| contact.free[link] + f * contact.per_force[link]);

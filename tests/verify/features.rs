@@ -3,11 +3,12 @@
 use crate::noise::noise;
 use std::f64::consts::{PI, TAU};
 use wiperlab::feature::{
-    ASSIGN_DB, ASSIGN_WIDTH, Band, End, Feature, Interval, Missing, Reader, Reading, Value, read_all,
+    ASSIGN_DB, ASSIGN_WIDTH, CycleRangeEnd, Feature, FeatureBand, FeatureReader, FeatureValue, MissingValue,
+    Reading, ReversalInterval, read_features,
 };
-use wiperlab::recording::channel::{Channel, Instants, NoInstant, Window};
+use wiperlab::recording::channel::{Channel, InstantNotFound, ReversalInstants, Window};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::spectrum::{Detrend, Settings, analyse};
+use wiperlab::spectrum::{Detrend, SpectrumSettings, analyse_spectrum};
 
 const RATE_HZ: f64 = 5000.0;
 /// A tenth of a pixel of 20 um, in the deflection.
@@ -38,8 +39,8 @@ fn resting(duration_s: f64, noise_m: f64, deflection: impl Fn(f64) -> f64) -> Re
     recording(duration_s, noise_m, |_| 0.0, deflection)
 }
 
-fn band(window: &str, low: f64, high: f64) -> Band {
-    Band {
+fn band(window: &str, low: f64, high: f64) -> FeatureBand {
+    FeatureBand {
         channel: Channel::Deflection,
         window: Window::parse(window).unwrap(),
         band_hz: (low, high),
@@ -52,8 +53,8 @@ fn feature(reading: Reading) -> Feature {
     Feature { name: "f".to_owned(), reading, condition: 0 }
 }
 
-fn read(reading: Reading, recording: &Recording) -> Result<Value, Missing> {
-    feature(reading).read(recording, &Instants::find(recording))
+fn read(reading: Reading, recording: &Recording) -> Result<FeatureValue, MissingValue> {
+    feature(reading).read(recording, &ReversalInstants::find_instants(recording))
 }
 
 /// A blade's flip as a cubic, m, over a window of 0.15 s.
@@ -82,7 +83,10 @@ fn damping_of_an_exact_ring_down_is_read_to_two_thousandths_also_on_a_flip() {
         let of = |with_flip: f64, detrend| {
             let seen = resting(duration_s, 0.0, |t| with_flip * flip(t) + exact(t));
             read(
-                Reading::DampingRatio(Band { detrend, ..band("..", 0.5 * frequency_hz, 1.5 * frequency_hz) }),
+                Reading::DampingRatio(FeatureBand {
+                    detrend,
+                    ..band("..", 0.5 * frequency_hz, 1.5 * frequency_hz)
+                }),
                 &seen,
             )
             .unwrap()
@@ -117,18 +121,18 @@ fn a_ring_down_that_has_faded_that_grows_or_that_is_too_short_has_no_damping() {
         let seen = resting(duration_s, noise_m, ring_down(frequency_hz, damping, 100e-6));
         read(Reading::DampingRatio(band("..", 0.5 * frequency_hz, 1.5 * frequency_hz)), &seen)
     };
-    assert!(matches!(of(0.3, NOISE_M, (78.4, 0.05)), Err(Missing::Faded { .. })), "e^-3.7 of 100 um");
+    assert!(matches!(of(0.3, NOISE_M, (78.4, 0.05)), Err(MissingValue::Faded { .. })), "e^-3.7 of 100 um");
     assert!(matches!(
         of(0.15, NOISE_M, (78.4, -0.01)),
-        Err(Missing::NoDecay { first_m, second_m, .. }) if first_m < second_m
+        Err(MissingValue::NoDecay { first_m, second_m, .. }) if first_m < second_m
     ));
     assert!(matches!(
         of(0.06, 0.0, (78.4, 0.01)),
-        Err(Missing::FewCycles { cycles, .. }) if (cycles - 2.35).abs() < 0.1
+        Err(MissingValue::FewCycles { cycles, .. }) if (cycles - 2.35).abs() < 0.1
     ));
 }
 
-fn cycle(window: &str, (low, high): (f64, f64), segment_s: f64, end: End) -> Reading {
+fn cycle(window: &str, (low, high): (f64, f64), segment_s: f64, end: CycleRangeEnd) -> Reading {
     Reading::CycleFrequency { band: band(window, low, high), segment_s, end }
 }
 
@@ -152,7 +156,7 @@ fn the_range_of_a_chirp_is_that_of_the_middles_of_its_first_and_last_segment() {
         ("sine in noise", resting(0.2, NOISE_M, tone), 4.0),
         ("saw in noise", resting(0.2, NOISE_M, saw), 4.0),
     ] {
-        for (end, expected) in [(End::Low, low_hz), (End::High, high_hz)] {
+        for (end, expected) in [(CycleRangeEnd::Low, low_hz), (CycleRangeEnd::High, high_hz)] {
             let found = read(cycle("..", (300.0, 800.0), 0.02, end), &seen).unwrap().value;
             assert!((found - expected).abs() < tolerance_hz, "{name}, {end:?}: {found}, expected {expected}");
         }
@@ -162,8 +166,8 @@ fn the_range_of_a_chirp_is_that_of_the_middles_of_its_first_and_last_segment() {
 #[test]
 fn a_constant_cycle_has_no_range_and_what_is_too_weak_does_not_widen_it() {
     let seen = resting(0.2, NOISE_M, |t| 20e-6 * (TAU * 600.0 * t).sin());
-    let [low, high] =
-        [End::Low, End::High].map(|end| read(cycle("..", (300.0, 800.0), 0.02, end), &seen).unwrap());
+    let [low, high] = [CycleRangeEnd::Low, CycleRangeEnd::High]
+        .map(|end| read(cycle("..", (300.0, 800.0), 0.02, end), &seen).unwrap());
     assert!(
         high.value >= low.value && high.value - low.value < 12.0,
         "six deviations of {:?} Hz: {} to {}",
@@ -179,17 +183,17 @@ fn a_constant_cycle_has_no_range_and_what_is_too_weak_does_not_widen_it() {
             0.1e-6,
             |t| if (0.1..0.2).contains(&t) { 40e-6 * (TAU * 600.0 * t).sin() } else { weak(t) },
         );
-    let found = read(cycle("..", (300.0, 800.0), 0.02, End::Low), &late).unwrap().value;
+    let found = read(cycle("..", (300.0, 800.0), 0.02, CycleRangeEnd::Low), &late).unwrap().value;
     assert!((found - 600.0).abs() < 6.0, "a segment half in the cycle is still its: {found}");
     let silent = resting(0.2, 0.0, |t| 1e-3 * t);
     assert!(matches!(
-        read(cycle("..", (300.0, 800.0), 0.02, End::Low), &silent),
-        Err(Missing::NoPeak { .. })
+        read(cycle("..", (300.0, 800.0), 0.02, CycleRangeEnd::Low), &silent),
+        Err(MissingValue::NoPeak { .. })
     ));
     for segment_s in [0.0012, 0.3] {
         assert!(matches!(
-            read(cycle("..", (300.0, 800.0), segment_s, End::Low), &seen),
-            Err(Missing::Segment { window: 1000, .. })
+            read(cycle("..", (300.0, 800.0), segment_s, CycleRangeEnd::Low), &seen),
+            Err(MissingValue::Segment { window: 1000, .. })
         ));
     }
 }
@@ -240,7 +244,7 @@ fn gaps_move_the_deflection_at_a_speed_no_more_than_noise_and_a_speed_that_is_no
     assert!(
         matches!(
             missing,
-            Missing::Speed { found: 0, most_m_per_s, .. } if (most_m_per_s - 0.1 * PI).abs() < 1e-3
+            MissingValue::Speed { found: 0, most_m_per_s, .. } if (most_m_per_s - 0.1 * PI).abs() < 1e-3
         ),
         "{missing}"
     );
@@ -253,7 +257,7 @@ fn gaps_move_the_deflection_at_a_speed_no_more_than_noise_and_a_speed_that_is_no
         speed_m_per_s: 0.1,
         width_relative: 0.15,
     };
-    assert_eq!(read(few, &whole), Err(Missing::NoSpeed), "50 frames hold no two blocks of 20 ms");
+    assert_eq!(read(few, &whole), Err(MissingValue::NoSpeed), "50 frames hold no two blocks of 20 ms");
 }
 
 const TRAILS_M: f64 = 1.1e-3;
@@ -285,10 +289,10 @@ fn times_between_the_instants_of_a_reversal_are_exact_to_a_frame_or_two() {
     let excursion_m = turning_head(0.99) - turning_head(HOLD_S); // of the head at the median of the rest
     let flip_s = |share: f64| back_s(share * (2.0 * TRAILS_M + excursion_m) - excursion_m);
     let expected = [
-        (Interval::ReleaseAfterReversal, release_s - 1.0),
-        (Interval::StickDuration, release_s - HOLD_S),
-        (Interval::FlipAfterReversal, flip_s(0.05) - 1.0),
-        (Interval::FlipDuration, flip_s(0.95) - flip_s(0.05)),
+        (ReversalInterval::ReleaseAfterReversal, release_s - 1.0),
+        (ReversalInterval::StickDuration, release_s - HOLD_S),
+        (ReversalInterval::FlipAfterReversal, flip_s(0.05) - 1.0),
+        (ReversalInterval::FlipDuration, flip_s(0.95) - flip_s(0.05)),
     ];
     for (noise_m, frames) in [(0.0, 3.0), (NOISE_M, 12.0)] {
         let seen = reversal(noise_m);
@@ -306,18 +310,18 @@ fn times_between_the_instants_of_a_reversal_are_exact_to_a_frame_or_two() {
 fn a_reversal_that_is_not_there_gives_no_times() {
     let still = resting(0.2, NOISE_M, |t| 20e-6 * (TAU * 300.0 * t).sin());
     for interval in [
-        Interval::ReleaseAfterReversal,
-        Interval::StickDuration,
-        Interval::FlipAfterReversal,
-        Interval::FlipDuration,
+        ReversalInterval::ReleaseAfterReversal,
+        ReversalInterval::StickDuration,
+        ReversalInterval::FlipAfterReversal,
+        ReversalInterval::FlipDuration,
     ] {
         assert_eq!(
             read(Reading::Interval { interval, reversal: 1 }, &still),
-            Err(Missing::Instant(NoInstant::NoTurn))
+            Err(MissingValue::Instant(InstantNotFound::NoTurn))
         );
         assert_eq!(
             read(Reading::Interval { interval, reversal: 2 }, &reversal(0.0)),
-            Err(Missing::Instant(NoInstant::FewerTurns { turns: 1 }))
+            Err(MissingValue::Instant(InstantNotFound::FewerTurns { turns: 1 }))
         );
     }
     let after = Reading::DeflectionAtSpeed {
@@ -325,10 +329,13 @@ fn a_reversal_that_is_not_there_gives_no_times() {
         speed_m_per_s: 0.01,
         width_relative: 0.15,
     };
-    assert!(matches!(read(after, &still), Err(Missing::Window(_))));
-    assert!(matches!(read(Reading::Rms(band("0.1..0.3", 100.0, 200.0)), &still), Err(Missing::Window(_))));
+    assert!(matches!(read(after, &still), Err(MissingValue::Window(_))));
+    assert!(matches!(
+        read(Reading::Rms(band("0.1..0.3", 100.0, 200.0)), &still),
+        Err(MissingValue::Window(_))
+    ));
     let other = Feature { condition: 1, ..feature(Reading::MeanDeflection(Window::WHOLE)) };
-    assert_eq!(read_all(&[other], &[still]), [Err(Missing::NoRecording { number: 2 })]);
+    assert_eq!(read_features(&[other], &[still]), [Err(MissingValue::NoRecording { number: 2 })]);
 }
 
 #[test]
@@ -341,20 +348,20 @@ fn a_line_that_holds_a_tone_has_its_rms_and_the_others_the_floor() {
         assert!((other.value / 1e-7 - 1.0).abs() < 0.01 && other.sd.is_none(), "{other:?}");
     }
     assert!(
-        matches!(read(Reading::Rms(band("..", 2500.0, 2600.0)), &seen), Err(Missing::Spectrum(_))),
+        matches!(read(Reading::Rms(band("..", 2500.0, 2600.0)), &seen), Err(MissingValue::Spectrum(_))),
         "above half the frame rate"
     );
 }
 
 /// Two tones on either side of a target, the lower one stronger by this ratio, and what is assigned to the
 /// target.
-fn between_two(ratio: f64) -> Value {
+fn between_two(ratio: f64) -> FeatureValue {
     let seen = resting(0.4, 0.0, |t| {
         10e-6 * (ratio.sqrt() * (TAU * LOWER_HZ * t).sin() + (TAU * UPPER_HZ * t).sin() / ratio.sqrt())
     });
-    let instants = Instants::find(&seen);
+    let instants = ReversalInstants::find_instants(&seen);
     feature(Reading::Frequency(band("..", 40.0, 140.0)))
-        .read_assigned(Some(TARGET_HZ), &Reader::new(&seen, &instants))
+        .read_assigned(Some(TARGET_HZ), &FeatureReader::new(&seen, &instants))
         .unwrap()
 }
 
@@ -369,14 +376,15 @@ fn rank(found_hz: f64, below_db: f64) -> f64 {
 #[test]
 fn the_rank_of_the_assigned_peak_does_not_jump_when_peaks_cross_over() {
     // from -18 dB to 18 dB in steps of 0.25 dB
-    let steps: Vec<Value> = (-72..=72).map(|k| between_two(10.0_f64.powf(f64::from(k) / 80.0))).collect();
+    let steps: Vec<FeatureValue> =
+        (-72..=72).map(|k| between_two(10.0_f64.powf(f64::from(k) / 80.0))).collect();
     let ranks: Vec<f64> = steps.iter().map(|r| rank(r.value, r.below_db)).collect();
     let largest = ranks.windows(2).map(|w| (w[1] - w[0]).abs()).fold(0.0, f64::max);
     assert!(
         largest < 0.25,
         "a quarter of a decibel at 12 dB below changes the rank by 0.17, found {largest}"
     );
-    let taken = |r: &Value| if (r.value - UPPER_HZ).abs() < 1.0 { 'u' } else { 'l' };
+    let taken = |r: &FeatureValue| if (r.value - UPPER_HZ).abs() < 1.0 { 'u' } else { 'l' };
     let switches = steps.windows(2).filter(|w| taken(&w[0]) != taken(&w[1])).count();
     assert_eq!((taken(&steps[0]), taken(&steps[144]), switches), ('u', 'l', 1));
     let upper_at_6_db = between_two(2.0);
@@ -414,16 +422,16 @@ fn features_read_together_are_those_read_alone_and_those_of_a_spectrum_of_their_
         Reading::Amplitude(low.clone()),
         Reading::Rms(high.clone()),
         Reading::DampingRatio(low.clone()),
-        Reading::CycleFrequency { band: high.clone(), segment_s: 0.02, end: End::Low },
-        Reading::CycleFrequency { band: high, segment_s: 0.02, end: End::High },
+        Reading::CycleFrequency { band: high.clone(), segment_s: 0.02, end: CycleRangeEnd::Low },
+        Reading::CycleFrequency { band: high, segment_s: 0.02, end: CycleRangeEnd::High },
         Reading::MeanDeflection(Window::WHOLE),
     ];
     let features: Vec<Feature> = readings.into_iter().map(feature).collect();
-    let instants = Instants::find(&seen);
+    let instants = ReversalInstants::find_instants(&seen);
     let alone: Vec<_> = features.iter().map(|feature| feature.read(&seen, &instants)).collect();
-    assert_eq!(read_all(&features, std::slice::from_ref(&seen)), alone);
+    assert_eq!(read_features(&features, std::slice::from_ref(&seen)), alone);
     assert!(alone.iter().all(Result::is_ok), "{alone:?}");
-    let settings = Settings { band_hz: Some((40.0, 140.0)), ..Settings::default() };
-    let own = analyse(&Channel::Deflection.samples(&seen)[250..1750], RATE_HZ, &settings).unwrap();
+    let settings = SpectrumSettings { band_hz: Some((40.0, 140.0)), ..SpectrumSettings::default() };
+    let own = analyse_spectrum(&Channel::Deflection.samples(&seen)[250..1750], RATE_HZ, &settings).unwrap();
     assert_eq!(alone[0].as_ref().unwrap().value, own.component_in_band(40.0, 140.0).unwrap().frequency_hz);
 }

@@ -3,12 +3,12 @@
 
 use crate::scenes::committed;
 use std::f64::consts::{PI, TAU};
-use wiperlab::camera::exposure_passes;
+use wiperlab::camera::exposure_gain;
 use wiperlab::recording::quality::noise_floor;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::simulate::Effort;
-use wiperlab::twin::film::{Dropouts, FilmError, LEAST_OVERSAMPLING, film, film_like};
-use wiperlab::twin::{Camera, Tracking, track, view};
+use wiperlab::simulate::SolverOptions;
+use wiperlab::twin::film::{DropoutPattern, FilmError, LEAST_OVERSAMPLING, film_like_recording, film_trace};
+use wiperlab::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
 
 const AMPLITUDE_M: f64 = 1e-3;
 const START_S: f64 = 0.3;
@@ -42,13 +42,14 @@ fn worst(seen: &Recording, frequency_hz: f64, part: f64) -> f64 {
 fn a_sine_keeps_its_frequency_and_phase_and_loses_the_sinc_of_its_exposure() {
     let fine = trace(20_000.0, 4001, sine(900.0));
     for exposure_s in [0.0, 5e-5, 1.3e-4, 2e-4] {
-        let seen = film(&fine, &Camera { frame_rate_hz: 5000.0, exposure_s }, START_S + 1.7e-5).unwrap();
+        let seen =
+            film_trace(&fine, &Camera { frame_rate_hz: 5000.0, exposure_s }, START_S + 1.7e-5).unwrap();
         assert_eq!(seen.grid(), FrameGrid { start_s: START_S + 1.7e-5, frame_rate_hz: 5000.0, frames: 1000 });
-        let error = worst(&seen, 900.0, exposure_passes(900.0, exposure_s));
+        let error = worst(&seen, 900.0, exposure_gain(900.0, exposure_s));
         assert!(error < 3e-6, "{exposure_s}: {error:e}");
     }
     // more than a whole cycle under the open shutter turns the sine over
-    let slow = film(&fine, &Camera { frame_rate_hz: 500.0, exposure_s: 2e-3 }, START_S + 1e-3).unwrap();
+    let slow = film_trace(&fine, &Camera { frame_rate_hz: 500.0, exposure_s: 2e-3 }, START_S + 1e-3).unwrap();
     let sinc = (PI * 1.8).sin() / (PI * 1.8);
     assert!(sinc < 0.0 && worst(&slow, 900.0, sinc) < 3e-6, "{:e}", worst(&slow, 900.0, sinc));
 }
@@ -59,7 +60,7 @@ fn at_the_least_rate_the_error_is_the_stated_one() {
     for (frequency_hz, most) in [(2500.0, 1.2e-3), (1250.0, 2e-5), (900.0, 3e-6)] {
         let fine = trace(fine.grid().frame_rate_hz, 4001, sine(frequency_hz));
         let error = worst(
-            &film(&fine, &Camera { frame_rate_hz: 4999.0, exposure_s: 0.0 }, START_S + 2.5e-5).unwrap(),
+            &film_trace(&fine, &Camera { frame_rate_hz: 4999.0, exposure_s: 0.0 }, START_S + 2.5e-5).unwrap(),
             frequency_hz,
             1.0,
         );
@@ -70,9 +71,9 @@ fn at_the_least_rate_the_error_is_the_stated_one() {
 #[test]
 fn a_camera_of_the_same_rate_without_exposure_takes_the_samples() {
     let fine = trace(5000.0, 100, sine(900.0));
-    let seen = film(&fine, &Camera { frame_rate_hz: 5000.0, exposure_s: 0.0 }, START_S).unwrap();
+    let seen = film_trace(&fine, &Camera { frame_rate_hz: 5000.0, exposure_s: 0.0 }, START_S).unwrap();
     assert_eq!(seen, fine);
-    let half = film(&fine, &Camera { frame_rate_hz: 2500.0, exposure_s: 0.0 }, START_S + 2e-4).unwrap();
+    let half = film_trace(&fine, &Camera { frame_rate_hz: 2500.0, exposure_s: 0.0 }, START_S + 2e-4).unwrap();
     assert_eq!(half.grid().frames, 50);
     assert!((0..50).all(|i| half.traces().head_y_m[i] == fine.traces().head_y_m[2 * i + 1]));
 }
@@ -80,7 +81,7 @@ fn a_camera_of_the_same_rate_without_exposure_takes_the_samples() {
 #[test]
 fn the_shutter_at_the_ends_is_cut_to_the_trace() {
     let fine = trace(20_000.0, 401, |t| t);
-    let seen = film(&fine, &Camera { frame_rate_hz: 5000.0, exposure_s: 1e-4 }, START_S).unwrap();
+    let seen = film_trace(&fine, &Camera { frame_rate_hz: 5000.0, exposure_s: 1e-4 }, START_S).unwrap();
     let x = &seen.traces().tip_x_m;
     assert_eq!(x.len(), 101);
     // half of the first exposure shows the first sample: the mean lies an eighth of the exposure further on
@@ -95,7 +96,7 @@ fn a_frame_that_rests_on_a_missing_sample_is_missing() {
     let mut traces = fine.traces().clone();
     traces.tip_x_m[200] = None;
     let fine = Recording::new("fine", fine.grid(), traces, true).unwrap();
-    let seen = film(&fine, &Camera { frame_rate_hz: 5000.0, exposure_s: 5e-5 }, START_S).unwrap();
+    let seen = film_trace(&fine, &Camera { frame_rate_hz: 5000.0, exposure_s: 5e-5 }, START_S).unwrap();
     let missing: Vec<usize> = (0..101).filter(|i| seen.traces().tip_x_m[*i].is_none()).collect();
     assert_eq!(missing, [50]);
     assert_eq!(seen.traces().tip_y_m.iter().filter(|y| y.is_none()).count(), 0);
@@ -105,7 +106,7 @@ fn a_frame_that_rests_on_a_missing_sample_is_missing() {
 fn what_cannot_be_filmed_is_refused() {
     let fine = trace(10_000.0, 100, sine(900.0));
     let refused = |rate, exposure_s, start_s| {
-        film(&fine, &Camera { frame_rate_hz: rate, exposure_s }, start_s).unwrap_err()
+        film_trace(&fine, &Camera { frame_rate_hz: rate, exposure_s }, start_s).unwrap_err()
     };
     assert_eq!(
         refused(5000.0, 5e-5, START_S).to_string(),
@@ -130,7 +131,8 @@ fn what_cannot_be_filmed_is_refused() {
         );
     }
     let short = trace(1e5, 5, sine(900.0));
-    let refused = film(&short, &Camera { frame_rate_hz: 25_000.0, exposure_s: 1e-6 }, START_S).unwrap_err();
+    let refused =
+        film_trace(&short, &Camera { frame_rate_hz: 25_000.0, exposure_s: 1e-6 }, START_S).unwrap_err();
     assert!(matches!(refused, FilmError::TooShort { found: 5, .. }));
 }
 
@@ -140,16 +142,18 @@ fn what_cannot_be_filmed_is_refused() {
 fn a_fine_simulation_filmed_is_the_scene_seen_by_the_same_camera() {
     let mut scene = committed("actual-blade");
     scene.run.stop_s = 0.8;
-    let effort = Effort::new(1e-8);
-    let look =
-        |camera: &Camera| view(&scene, camera, scene.start_s, scene.run.stop_s, effort).unwrap().recording;
+    let effort = SolverOptions::new(1e-8);
+    let look = |camera: &Camera| {
+        film_scene(&scene, camera, scene.start_s, scene.run.stop_s, effort).unwrap().recording
+    };
     for (fine_hz, exposure_s, most_m) in
         [(20_000.0, 5e-5, 4e-9), (20_000.0, 2e-4, 4e-9), (80_000.0, 5e-5, 2e-10)]
     {
         let camera = Camera { frame_rate_hz: 5000.0, exposure_s };
         let seen = look(&camera);
         let filmed =
-            film(&look(&Camera { frame_rate_hz: fine_hz, exposure_s: 0.0 }), &camera, scene.start_s).unwrap();
+            film_trace(&look(&Camera { frame_rate_hz: fine_hz, exposure_s: 0.0 }), &camera, scene.start_s)
+                .unwrap();
         assert_eq!(filmed.grid(), seen.grid());
         // of the first and the last frame a view takes the half that there is, a film holds its first sample
         let inner = 1..seen.grid().frames - 1;
@@ -172,7 +176,8 @@ fn turning(rate_hz: f64, frames: usize, turn_s: f64) -> Recording {
     Recording::new("turning", still.grid(), Traces { head_x_m, ..still.traces().clone() }, true).unwrap()
 }
 
-const TRACKING: Tracking = Tracking { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.2, seed: 9 };
+const TRACKING: TrackingModel =
+    TrackingModel { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.2, seed: 9 };
 const NOISE_M: f64 = 2e-6;
 
 fn sd(values: &[Option<f64>]) -> f64 {
@@ -182,9 +187,9 @@ fn sd(values: &[Option<f64>]) -> f64 {
 
 #[test]
 fn a_film_like_a_recording_has_its_noise_and_misses_its_frames() {
-    let like = track(&turning(5000.0, 5000, 0.8), "like", &TRACKING).unwrap();
-    let filmed = film_like(&turning(20_000.0, 4001, 0.4), &like, 5e-5, 4).unwrap();
-    assert_eq!(filmed.dropouts, Dropouts::SameFrames);
+    let like = add_tracking_noise(&turning(5000.0, 5000, 0.8), "like", &TRACKING).unwrap();
+    let filmed = film_like_recording(&turning(20_000.0, 4001, 0.4), &like, 5e-5, 4).unwrap();
+    assert_eq!(filmed.dropouts, DropoutPattern::SameFrames);
     assert!(filmed.recording.is_synthetic());
     // the trace turns 0.1 s after its start, the recording 0.5 s after its own
     assert!(
@@ -206,18 +211,18 @@ fn a_film_like_a_recording_has_its_noise_and_misses_its_frames() {
     assert!((measured / NOISE_M - 1.0).abs() < 0.1, "{measured}");
     assert!((sd(&film.tip_x_m) / measured - 1.0).abs() < 0.15, "{}", sd(&film.tip_x_m)); // 6 standard errors with 800 frames
     assert_eq!(
-        film_like(&turning(20_000.0, 4001, 0.4), &like, 5e-5, 4).unwrap(),
+        film_like_recording(&turning(20_000.0, 4001, 0.4), &like, 5e-5, 4).unwrap(),
         filmed,
         "a seed gives one film"
     );
-    assert_ne!(film_like(&turning(20_000.0, 4001, 0.4), &like, 5e-5, 5).unwrap(), filmed);
+    assert_ne!(film_like_recording(&turning(20_000.0, 4001, 0.4), &like, 5e-5, 5).unwrap(), filmed);
 }
 
 #[test]
 fn without_a_turn_as_many_frames_are_dropped_at_random() {
-    let like = track(&trace(5000.0, 5000, |_| 0.0), "like", &TRACKING).unwrap();
-    let filmed = film_like(&turning(20_000.0, 16_001, 0.4), &like, 0.0, 4).unwrap();
-    assert_eq!(filmed.dropouts, Dropouts::AtRandom);
+    let like = add_tracking_noise(&trace(5000.0, 5000, |_| 0.0), "like", &TRACKING).unwrap();
+    let filmed = film_like_recording(&turning(20_000.0, 16_001, 0.4), &like, 0.0, 4).unwrap();
+    assert_eq!(filmed.dropouts, DropoutPattern::AtRandom);
     let tip = &filmed.recording.traces().tip_x_m;
     assert_eq!(tip.len(), 4001);
     let share = tip.iter().filter(|x| x.is_none()).count() as f64 / 4001.0;
@@ -238,13 +243,13 @@ fn a_column_that_was_not_tracked_is_not_filmed_and_one_without_noise_is_refused(
         true,
     )
     .unwrap();
-    let filmed = film_like(&turning(20_000.0, 4001, 0.4), &untracked, 0.0, 4).unwrap();
+    let filmed = film_like_recording(&turning(20_000.0, 4001, 0.4), &untracked, 0.0, 4).unwrap();
     assert!(filmed.recording.traces().head_y_m.iter().all(Option::is_none));
     assert_eq!(filmed.noise_m, [0.0; 4]);
     let gappy: Vec<Option<f64>> = (0..500).map(|i| (i % 3 == 0).then_some(0.0)).collect();
     let gappy =
         Recording::new("like", still.grid(), Traces { tip_y_m: gappy, ..still.traces().clone() }, true)
             .unwrap();
-    let refused = film_like(&turning(20_000.0, 4001, 0.4), &gappy, 0.0, 4).unwrap_err().to_string();
+    let refused = film_like_recording(&turning(20_000.0, 4001, 0.4), &gappy, 0.0, 4).unwrap_err().to_string();
     assert!(refused.starts_with("like, column tip_y_m: found too few frames in a row"), "{refused}");
 }

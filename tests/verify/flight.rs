@@ -7,13 +7,16 @@ use crate::blade::{Parts, STROKE};
 use crate::scenes::upright_light_blade;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wiperlab::blade::flight::Airborne;
-use wiperlab::blade::shoulder::Lean;
-use wiperlab::blade::{Directions, HeadMotion, Linkage, Pose};
-use wiperlab::simulate::mode::Mode;
-use wiperlab::simulate::outputs::{Audit, Transitions};
-use wiperlab::simulate::scene::{Drive, Jam, Loss, Scene, StartKind};
-use wiperlab::simulate::{Cause, Effort, Impact, Observer, Piece, Run, Sample, Status, Transition, run_with};
+use wiperlab::blade::flight::FlightState;
+use wiperlab::blade::shoulder::ShoulderContact;
+use wiperlab::blade::{HeadMotion, LinkDirections, Linkage, Pose};
+use wiperlab::simulate::mode::TipMode;
+use wiperlab::simulate::outputs::{EnergyAudit, Transitions};
+use wiperlab::simulate::scene::{ContactLossRule, Drive, JamRule, Scene, StartKind};
+use wiperlab::simulate::{
+    Impact, ModelSample, Observer, RunResult, RunStatus, SolutionSegment, SolverOptions, Transition,
+    TransitionCause, run_scene_with,
+};
 
 const STATES: usize = 400;
 /// Both sides solve a small linear system in double precision whose condition is set by mass ratios up to
@@ -24,9 +27,9 @@ const AGREEMENT: f64 = 1e-10;
 struct Case {
     parts: Parts,
     linkage: Linkage,
-    state: Airborne,
+    state: FlightState,
     head: HeadMotion,
-    lean: Lean,
+    lean: ShoulderContact,
 }
 
 impl Case {
@@ -42,13 +45,13 @@ impl Case {
             acceleration_m_per_s2: within(5.0),
         };
         let state =
-            Airborne { pose, gap_m: within(most_gap).abs(), gap_rate_m_per_s: within(1e3 * most_gap) };
-        let lean = linkage.shoulder.map_or(Lean::Off, |s| s.lean(pose.theta));
+            FlightState { pose, gap_m: within(most_gap).abs(), gap_rate_m_per_s: within(1e3 * most_gap) };
+        let lean = linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(pose.theta));
         Self { parts, linkage, state, head, lean }
     }
 
-    fn directions(&self) -> Directions {
-        Directions::of(&self.state.pose)
+    fn directions(&self) -> LinkDirections {
+        LinkDirections::from_pose(&self.state.pose)
     }
 
     fn lagrangian(&self) -> lagrangian::Linkage {
@@ -62,7 +65,7 @@ impl Case {
             &self.parts,
             [self.head.position_m, drop, theta, phi],
             rates,
-            self.lean.sign(),
+            self.lean.angle_sign(),
         )
     }
 }
@@ -83,7 +86,7 @@ fn assert_close(what: &str, index: usize, found: f64, expected: f64, terms: &[f6
 #[test]
 fn flight_follows_from_the_lagrangian_without_contact() {
     for (i, case) in cases(2e-3).enumerate() {
-        let found = case.linkage.flight(&case.state, &case.directions(), &case.head, case.lean);
+        let found = case.linkage.flight_accelerations(&case.state, &case.directions(), &case.head, case.lean);
         let independent = case.lagrangian();
         let expected = independent.flight(case.head.acceleration_m_per_s2);
         for link in 0..2 {
@@ -113,7 +116,7 @@ fn energy_in_flight_changes_at_the_power() {
             energy,
             &[],
         );
-        let links = case.linkage.flight(&case.state, &d, &case.head, case.lean).links;
+        let links = case.linkage.flight_accelerations(&case.state, &d, &case.head, case.lean).links;
         let power =
             case.linkage.power_with_drop_w(&case.state.pose, &d, &case.head, case.lean, 0.0, links, drop.1);
         let rate = independent.energy_rate_w(&independent.flight(case.head.acceleration_m_per_s2));
@@ -137,7 +140,8 @@ fn an_impulse_on_the_tip_changes_the_rates_as_the_mass_matrix_says() {
             assert_close("tangential velocity", i, response.tangential_per_kg, x, &[size]);
         }
         // the constrained equations use the same inverse mass: nu = -W_nt/W_nn, kappa = W_tt - W_nt^2/W_nn
-        let contact = case.linkage.contact(&case.state.pose, &case.directions(), &case.head, case.lean);
+        let contact =
+            case.linkage.friction_response(&case.state.pose, &case.directions(), &case.head, case.lean);
         let (nn, nt, tt) =
             (responses[0].normal_per_kg, responses[0].tangential_per_kg, responses[1].tangential_per_kg);
         assert_close("nu", i, contact.nu, -nt / nn, &[1.0]);
@@ -150,10 +154,10 @@ fn an_impulse_on_the_tip_changes_the_rates_as_the_mass_matrix_says() {
 fn flight_with_the_contact_forces_is_motion_on_the_glass() {
     for (i, case) in cases(0.0).enumerate() {
         let d = case.directions();
-        let contact = case.linkage.contact(&case.state.pose, &d, &case.head, case.lean);
+        let contact = case.linkage.friction_response(&case.state.pose, &d, &case.head, case.lean);
         let friction = 0.3 * case.parts.k[0] * case.parts.hd;
         let normal = contact.n_free + contact.nu * friction;
-        let flight = case.linkage.flight(&case.state, &d, &case.head, case.lean);
+        let flight = case.linkage.flight_accelerations(&case.state, &d, &case.head, case.lean);
         let [up, along] = case.linkage.impulse_responses(&d);
         for link in 0..2 {
             let constrained = contact.free[link] + friction * contact.per_force[link];
@@ -167,8 +171,8 @@ fn flight_with_the_contact_forces_is_motion_on_the_glass() {
 
 /// A run with what happened in it.
 struct Flown {
-    run: Run,
-    audit: Audit,
+    run: RunResult,
+    audit: EnergyAudit,
     transitions: Vec<Transition>,
     seen: Seen,
 }
@@ -176,34 +180,37 @@ struct Flown {
 /// Ends of all pieces, impacts, and the least height of the tip on looks inside.
 #[derive(Default)]
 struct Seen {
-    ends: Vec<Sample>,
+    ends: Vec<ModelSample>,
     impacts: Vec<Impact>,
     lowest_m: f64,
 }
 
 impl Observer for Seen {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        self.ends.extend([piece.sample(piece.start_s), piece.sample(piece.end_s)]);
-        if piece.mode == Mode::Flight {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        self.ends.extend([piece.sample_at(piece.start_s), piece.sample_at(piece.end_s)]);
+        if piece.mode == TipMode::Flight {
             let looks = (0..=20).map(|i| {
-                piece.sample(piece.start_s + (piece.end_s - piece.start_s) * f64::from(i) / 20.0).tip_height_m
+                piece
+                    .sample_at(piece.start_s + (piece.end_s - piece.start_s) * f64::from(i) / 20.0)
+                    .tip_height_m
             });
             self.lowest_m = looks.fold(self.lowest_m, f64::min);
         }
     }
-    fn impact(&mut self, impact: &Impact) {
+    fn observe_impact(&mut self, impact: &Impact) {
         self.impacts.push(*impact);
     }
 }
 
 fn fly(scene: &Scene, relative: f64) -> Flown {
-    let (mut transitions, mut audit, mut seen) = (Transitions::default(), Audit::default(), Seen::default());
-    let effort = Effort { most_evaluations: 50_000_000, ..Effort::new(relative) };
-    let run = run_with(scene, effort, &mut ((&mut transitions, &mut audit), &mut seen));
+    let (mut transitions, mut audit, mut seen) =
+        (Transitions::default(), EnergyAudit::default(), Seen::default());
+    let effort = SolverOptions { most_evaluations: 50_000_000, ..SolverOptions::new(relative) };
+    let run = run_scene_with(scene, effort, &mut ((&mut transitions, &mut audit), &mut seen));
     Flown { run, audit, transitions: transitions.0, seen }
 }
 
-fn number(flown: &Flown, cause: Cause) -> usize {
+fn number(flown: &Flown, cause: TransitionCause) -> usize {
     flown.transitions.iter().filter(|t| t.cause == cause).count()
 }
 
@@ -211,15 +218,15 @@ fn number(flown: &Flown, cause: Cause) -> usize {
 /// glass.
 fn bouncing(restitution: f64) -> Scene {
     let mut scene = upright_light_blade()
-        .with("contact.restitution", restitution)
+        .with_parameter("contact.restitution", restitution)
         .unwrap()
-        .with("blade.preload_force_n", 0.02)
+        .with_parameter("blade.preload_force_n", 0.02)
         .unwrap();
     scene.linkage.head.damping = 0.0;
     scene.drive = Drive::Uniform { speed_m_per_s: 0.0 };
-    scene.loss = Loss::Fly;
+    scene.loss = ContactLossRule::Fly;
     let pose = Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 };
-    scene.start = StartKind::Airborne(Airborne { pose, gap_m: 1e-3, gap_rate_m_per_s: 0.0 });
+    scene.start = StartKind::Airborne(FlightState { pose, gap_m: 1e-3, gap_rate_m_per_s: 0.0 });
     scene
 }
 
@@ -253,15 +260,15 @@ fn a_bouncing_head_lands_when_its_spring_says() {
             let expected =
                 landings(&scene, restitution, scene.run.stop_s, |rebound_s| rebound_s < resolution);
             let flown = fly(&scene, relative);
-            assert_eq!(flown.run.status, Status::Completed);
+            assert_eq!(flown.run.status, RunStatus::Completed);
             assert_eq!(flown.transitions.len(), expected.len(), "restitution {restitution} at {relative:e}");
             assert_eq!(flown.seen.impacts.len(), expected.len());
             for (i, (transition, time)) in flown.transitions.iter().zip(&expected).enumerate() {
                 let last = restitution < 1.0 && i + 1 == expected.len();
-                let to = if last { Mode::Stick } else { Mode::Flight };
+                let to = if last { TipMode::Stick } else { TipMode::Flight };
                 assert_eq!(
                     (transition.from, transition.to, transition.cause),
-                    (Mode::Flight, to, Cause::Landing)
+                    (TipMode::Flight, to, TransitionCause::Landing)
                 );
                 assert!(
                     (transition.time_s - time).abs() < 20.0 * relative * time,
@@ -287,12 +294,12 @@ fn the_lowest_rebounds_close_instead_of_looping() {
         for (gap_m, gap_rate_m_per_s) in [(1e-13, 0.0), (0.0, 1e-9), (0.0, 0.0), (1e-9, -1e-12)] {
             let mut scene = bouncing(restitution);
             let StartKind::Airborne(start) = scene.start else { panic!("off the glass") };
-            scene.start = StartKind::Airborne(Airborne { gap_m, gap_rate_m_per_s, ..start });
+            scene.start = StartKind::Airborne(FlightState { gap_m, gap_rate_m_per_s, ..start });
             scene.run.stop_s = 1e-3;
             let flown = fly(&scene, 1e-8);
             assert_eq!(
                 flown.run.status,
-                Status::Completed,
+                RunStatus::Completed,
                 "restitution {restitution}, gap {gap_m:e}: {:?}",
                 flown.run
             );
@@ -300,7 +307,7 @@ fn the_lowest_rebounds_close_instead_of_looping() {
             if gap_m < 1e-12 && (restitution < 1.0 || gap_m == 0.0) {
                 assert_eq!(
                     flown.transitions.last().map(|t| (t.to, t.cause)),
-                    Some((Mode::Stick, Cause::Landing)),
+                    Some((TipMode::Stick, TransitionCause::Landing)),
                     "restitution {restitution}"
                 );
             }
@@ -334,17 +341,17 @@ fn assert_sound(what: &str, scene: &Scene, flown: &Flown, relative: f64) {
             impact.before.normal <= 0.0 && impact.after.normal >= 0.0 && impact.impulse_n_s[0] >= 0.0,
             "{what}: {impact:?}"
         );
-        let mu = scene.linkage.friction.at_rest();
+        let mu = scene.linkage.friction.static_coefficient();
         assert!(
             impact.impulse_n_s[1].abs() <= mu * impact.impulse_n_s[0] * (1.0 + 1e-9) + 1e-9 * size,
             "{what}: beyond the cone: {impact:?}"
         );
     }
     for sample in &flown.seen.ends {
-        assert!(sample.mode == Mode::Flight || sample.tip_height_m == 0.0);
-        assert!(sample.mode != Mode::Flight || (sample.normal_n, sample.friction_n) == (0.0, 0.0));
+        assert!(sample.mode == TipMode::Flight || sample.tip_height_m == 0.0);
+        assert!(sample.mode != TipMode::Flight || (sample.normal_n, sample.friction_n) == (0.0, 0.0));
         assert!(
-            sample.mode == Mode::Flight || sample.indicator < 1e-3 || sample.normal_n > -1e-6,
+            sample.mode == TipMode::Flight || sample.indicator < 1e-3 || sample.normal_n > -1e-6,
             "{what}: {sample:?}"
         );
     }
@@ -358,11 +365,11 @@ fn assert_sound(what: &str, scene: &Scene, flown: &Flown, relative: f64) {
 
 fn lifting(preload: f64, restitution: f64) -> Scene {
     let mut scene = upright_light_blade()
-        .with("blade.preload_force_n", preload)
+        .with_parameter("blade.preload_force_n", preload)
         .unwrap()
-        .with("contact.restitution", restitution)
+        .with_parameter("contact.restitution", restitution)
         .unwrap();
-    scene.loss = Loss::Fly;
+    scene.loss = ContactLossRule::Fly;
     scene
 }
 
@@ -374,8 +381,8 @@ fn a_lightly_pressed_blade_flies_and_lands_and_its_transitions_do_not_depend_on_
         let mut scene = lifting(preload, restitution);
         scene.run.stop_s = stop_s;
         let fine = fly(&scene, 1e-11);
-        assert_eq!(fine.run.status, Status::Completed);
-        assert!(number(&fine, Cause::LiftOff) > 0 && number(&fine, Cause::Landing) > 0);
+        assert_eq!(fine.run.status, RunStatus::Completed);
+        assert!(number(&fine, TransitionCause::LiftOff) > 0 && number(&fine, TransitionCause::Landing) > 0);
         for relative in [1e-7, 1e-9] {
             let coarse = fly(&scene, relative);
             assert_sound("lifting", &scene, &coarse, relative);
@@ -394,8 +401,11 @@ fn a_lightly_pressed_blade_flies_and_lands_and_its_transitions_do_not_depend_on_
 
 /// A heavy head on a rough glass, the tip ahead of it and running on: where the paradox lies in wait.
 pub fn heavy_head_leading_tip(rng: &mut Xoshiro256PlusPlus) -> Scene {
-    let mut scene =
-        upright_light_blade().with("blade.head_mass_kg", 0.5).unwrap().with("friction.c", 0.6).unwrap();
+    let mut scene = upright_light_blade()
+        .with_parameter("blade.head_mass_kg", 0.5)
+        .unwrap()
+        .with_parameter("friction.c", 0.6)
+        .unwrap();
     let mut between = |low: f64, high: f64| rng.random_range(low..high);
     let pose = Pose {
         theta: between(0.1, 1.0),
@@ -405,7 +415,7 @@ pub fn heavy_head_leading_tip(rng: &mut Xoshiro256PlusPlus) -> Scene {
     };
     scene.start = StartKind::State(pose);
     scene.run.stop_s = 0.02;
-    scene.jam = Jam::Impact;
+    scene.jam = JamRule::Impact;
     scene
 }
 
@@ -416,14 +426,17 @@ fn a_jam_is_an_impact_that_brings_the_tip_to_rest() {
     let (mut jams, mut ends) = (0, std::collections::BTreeMap::<&str, usize>::new());
     for i in 0..100 {
         let mut scene = heavy_head_leading_tip(&mut rng);
-        for loss in [Loss::Stop, Loss::Fly] {
+        for loss in [ContactLossRule::Stop, ContactLossRule::Fly] {
             scene.loss = loss;
             let flown = fly(&scene, RELATIVE);
             assert_sound(&format!("state {i}"), &scene, &flown, RELATIVE);
-            jams += number(&flown, Cause::JamImpact);
+            jams += number(&flown, TransitionCause::JamImpact);
             *ends.entry(flown.run.status.name()).or_default() += 1;
             let jammed = |impact: &&Impact| {
-                flown.transitions.iter().any(|t| t.cause == Cause::JamImpact && t.time_s == impact.time_s)
+                flown
+                    .transitions
+                    .iter()
+                    .any(|t| t.cause == TransitionCause::JamImpact && t.time_s == impact.time_s)
             };
             for impact in flown.seen.impacts.iter().filter(jammed) {
                 assert_eq!(impact.after.tangential, 0.0, "state {i}");
@@ -446,12 +459,12 @@ fn random_blades_fly_and_jam_soundly() {
         let mut parts = Parts::random(&mut rng);
         parts.hd *= 0.2;
         for restitution in [0.0, 0.3, 0.8] {
-            let mut scene = parts.scene(STROKE).with("contact.restitution", restitution).unwrap();
-            (scene.loss, scene.jam) = (Loss::Fly, Jam::Impact);
+            let mut scene = parts.scene(STROKE).with_parameter("contact.restitution", restitution).unwrap();
+            (scene.loss, scene.jam) = (ContactLossRule::Fly, JamRule::Impact);
             let flown = fly(&scene, RELATIVE);
             assert_sound(&format!("blade {i}, restitution {restitution}"), &scene, &flown, RELATIVE);
-            flights += number(&flown, Cause::LiftOff);
-            jams += number(&flown, Cause::JamImpact);
+            flights += number(&flown, TransitionCause::LiftOff);
+            jams += number(&flown, TransitionCause::JamImpact);
             *ends.entry(flown.run.status.name()).or_default() += 1;
         }
     }

@@ -8,9 +8,12 @@ mod long;
 mod moments;
 use crate::scenes;
 
-use wiperlab::simulate::outputs::{Audit, Transitions};
+use wiperlab::simulate::outputs::{EnergyAudit, Transitions};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::{Effort, Method, Observer, Piece, Run, Sample, Transition, run_with};
+use wiperlab::simulate::{
+    IntegrationMethod, ModelSample, Observer, RunResult, SolutionSegment, SolverOptions, Transition,
+    run_scene_with,
+};
 
 /// Error that a located instant may have in units of the tolerance: a phase takes a few steps and each may
 /// err by the tolerance.
@@ -25,34 +28,35 @@ const DRIFT_M: f64 = 1e-15;
 /// Right-hand sides that no case here needs; one that hangs ends with `diverged` instead.
 const MOST_EVALUATIONS: u64 = 20_000_000;
 
-const METHODS: [Method; 2] = [Method::Taylor, Method::RungeKutta];
+const METHODS: [IntegrationMethod; 2] = [IntegrationMethod::Taylor, IntegrationMethod::RungeKutta];
 
 /// Both methods at tolerances from 1e-4 down to 1e-12.
-fn cases() -> impl Iterator<Item = (Method, f64)> {
+fn cases() -> impl Iterator<Item = (IntegrationMethod, f64)> {
     METHODS.into_iter().flat_map(|method| [4, 6, 8, 10, 12].map(|exponent| (method, 10f64.powi(-exponent))))
 }
 
 /// A run and what it showed.
 struct Ran {
-    run: Run,
+    run: RunResult,
     transitions: Vec<Transition>,
-    audit: Audit,
-    ends: Vec<Sample>,
+    audit: EnergyAudit,
+    ends: Vec<ModelSample>,
 }
 
 #[derive(Default)]
-struct Ends(Vec<Sample>);
+struct Ends(Vec<ModelSample>);
 
 impl Observer for Ends {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        self.0.extend([piece.sample(piece.start_s), piece.sample(piece.end_s)]);
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        self.0.extend([piece.sample_at(piece.start_s), piece.sample_at(piece.end_s)]);
     }
 }
 
-fn ran(scene: &Scene, method: Method, relative: f64) -> Ran {
-    let (mut transitions, mut audit, mut ends) = (Transitions::default(), Audit::default(), Ends::default());
-    let effort = Effort { method, most_evaluations: MOST_EVALUATIONS, ..Effort::new(relative) };
-    let run = run_with(scene, effort, &mut ((&mut transitions, &mut audit), &mut ends));
+fn ran(scene: &Scene, method: IntegrationMethod, relative: f64) -> Ran {
+    let (mut transitions, mut audit, mut ends) =
+        (Transitions::default(), EnergyAudit::default(), Ends::default());
+    let effort = SolverOptions { method, most_evaluations: MOST_EVALUATIONS, ..SolverOptions::new(relative) };
+    let run = run_scene_with(scene, effort, &mut ((&mut transitions, &mut audit), &mut ends));
     Ran { run, transitions: transitions.0, audit, ends: ends.0 }
 }
 
@@ -71,8 +75,9 @@ impl Ran {
             self.audit.max_constraint_drift_m
         );
         for sample in &self.ends {
-            let Sample { tip_x_m, tip_velocity_m_per_s, normal_n, friction_n, energy_j, power_w, .. } =
-                *sample;
+            let ModelSample {
+                tip_x_m, tip_velocity_m_per_s, normal_n, friction_n, energy_j, power_w, ..
+            } = *sample;
             let numbers = [tip_x_m, tip_velocity_m_per_s, normal_n, friction_n, energy_j, power_w];
             assert!(numbers.iter().all(|x| x.is_finite()), "{what}: {sample:?}");
         }

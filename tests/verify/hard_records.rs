@@ -4,17 +4,17 @@
 use crate::counts::Counts;
 use crate::hard::KINDS;
 use std::f64::consts::TAU;
-use wiperlab::spectrum::{Analysis, Component, Record, Settings, Verdict};
+use wiperlab::spectrum::{Component, ComponentVerdict, SampledRecord, SpectralAnalysis, SpectrumSettings};
 
 const RATE_HZ: f64 = 5000.0;
 /// Seeds of a kind; long records take a few.
 const SEEDS: u64 = 25;
 const LONG_SEEDS: u64 = 3;
 
-fn analysed(frames: usize, value: impl Fn(f64) -> f64) -> Analysis {
+fn analysed(frames: usize, value: impl Fn(f64) -> f64) -> SpectralAnalysis {
     let samples: Vec<Option<f64>> = (0..frames).map(|i| Some(value(i as f64 / RATE_HZ))).collect();
-    let record = Record { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None };
-    Analysis::of(&record, &Settings::default()).unwrap()
+    let record = SampledRecord { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None };
+    SpectralAnalysis::from_record(&record, &SpectrumSettings::default()).unwrap()
 }
 
 fn components(frames: usize, value: impl Fn(f64) -> f64) -> Vec<Component> {
@@ -58,10 +58,15 @@ fn ring_downs_in_a_mixture_are_told_apart_and_known_to_their_deviations() {
         let kind = KINDS.iter().find(|kind| kind.name == name).unwrap();
         for seed in seeds {
             let made = kind.made(*seed);
-            let record = Record { samples: &made.samples, frame_rate_hz: made.rate_hz, exposure_s: None };
-            let analysis = Analysis::of(&record, &Settings::default()).unwrap();
+            let record =
+                SampledRecord { samples: &made.samples, frame_rate_hz: made.rate_hz, exposure_s: None };
+            let analysis = SpectralAnalysis::from_record(&record, &SpectrumSettings::default()).unwrap();
             let list = &analysis.spectrum.components;
-            assert_eq!((analysis.left_out, list.len()), (0, made.truths.len()), "{name}, {seed}: {list:?}");
+            assert_eq!(
+                (analysis.skipped_frames, list.len()),
+                (0, made.truths.len()),
+                "{name}, {seed}: {list:?}"
+            );
             for truth in &made.truths {
                 let off = |c: &Component| (c.frequency_hz - truth.hz).abs() / c.frequency_sd_hz;
                 let nearest = list.iter().min_by(|a, b| off(a).total_cmp(&off(b))).unwrap();
@@ -112,7 +117,7 @@ fn its_oscillation_is_what_was_put_in_and_nothing_before_it_begins() {
     assert!((oscillation.begins_s - 0.06).abs() < 1e-12);
     for i in 0..750 {
         let t = f64::from(i) / RATE_HZ;
-        assert!((oscillation.at_m(t) - ringing(t)).abs() < 2e-9, "{t} s");
+        assert!((oscillation.displacement_m(t) - ringing(t)).abs() < 2e-9, "{t} s");
     }
 }
 
@@ -156,21 +161,24 @@ fn each_relation_is_named_with_its_numbers() {
     let multiples = [(262.6, 2), (787.8, 6), (1444.3, 11)];
     for (hz, multiple) in multiples {
         let of = near(&list, hz).harmonic_of.unwrap();
-        assert_eq!((of.multiple, near(&list, hz).verdict), (multiple, Verdict::Harmonic));
+        assert_eq!((of.multiple, near(&list, hz).verdict), (multiple, ComponentVerdict::Harmonic));
         assert!((of.frequency_hz - 131.3).abs() < 0.1, "of the lowest, not of another multiple: {of:?}");
     }
     let list = tones(&[(302.0, 10.0), (151.0, 2.0), (402.666_667, 1.5), (1057.0, 3.0)]);
     for (hz, numerator, denominator) in [(151.0, 1, 2), (402.67, 4, 3), (1057.0, 7, 2)] {
         let c = near(&list, hz);
         let of = c.subharmonic_of.unwrap();
-        assert_eq!((of.numerator, of.denominator, c.verdict), (numerator, denominator, Verdict::Subharmonic));
+        assert_eq!(
+            (of.numerator, of.denominator, c.verdict),
+            (numerator, denominator, ComponentVerdict::Subharmonic)
+        );
         assert!(c.reasons[0].words.contains("beat differs or is dropped"), "{:?}", c.reasons);
     }
     // with the modulation in the list, and without
     let list = tones(&[(902.0, 10.0), (78.0, 6.0), (824.0, 2.0), (980.0, 2.0), (1058.0, 1.0)]);
-    assert_eq!(near(&list, 78.0).verdict, Verdict::Clear);
+    assert_eq!(near(&list, 78.0).verdict, ComponentVerdict::Clear);
     assert!(
-        [824.0, 980.0, 1058.0].iter().all(|hz| near(&list, *hz).verdict == Verdict::Sideband),
+        [824.0, 980.0, 1058.0].iter().all(|hz| near(&list, *hz).verdict == ComponentVerdict::Sideband),
         "{list:?}"
     );
     let list = tones(&[(902.0, 10.0), (831.0, 2.0), (973.0, 2.0)]);
@@ -178,7 +186,7 @@ fn each_relation_is_named_with_its_numbers() {
     assert!((of.frequency_hz - 902.0).abs() < 0.1 && (of.modulation_hz - 71.0).abs() < 0.1, "{of:?}");
     // what is none
     let list = tones(&[(902.3, 10.0), (78.4, 6.0), (655.5, 3.0)]);
-    assert!(list.iter().all(|c| c.verdict == Verdict::Clear), "{list:?}");
+    assert!(list.iter().all(|c| c.verdict == ComponentVerdict::Clear), "{list:?}");
 }
 
 #[test]
@@ -186,7 +194,7 @@ fn a_lamp_on_the_mains_is_named_and_what_decays_there_is_none() {
     let list = tones(&[(100.0, 5.0), (360.0, 3.0), (437.0, 2.0)]);
     let mains = |hz| near(&list, hz).mains.map(|mains| (mains.frequency_hz, mains.multiple));
     assert_eq!((mains(100.0), mains(360.0), mains(437.0)), (Some((50, 2)), Some((60, 6)), None));
-    assert_eq!(near(&list, 100.0).verdict, Verdict::Mains);
+    assert_eq!(near(&list, 100.0).verdict, ComponentVerdict::Mains);
     let mut draw = noise(1e-8);
     let noise_m: Vec<f64> = (0..750).map(|_| draw()).collect();
     let ringing = |t: f64| 1e-5 * (-15.0 * t).exp() * (TAU * 100.0 * t).cos();
@@ -206,7 +214,7 @@ fn the_cycles_of_a_drift_are_counted() {
         let last_s = 999.0 / RATE_HZ;
         let mean_hz = cycles(last_s) / last_s;
         let off_hz = c.frequency_hz - mean_hz;
-        assert!(c.range_hz.is_some() && c.verdict == Verdict::Clear, "{c:?}");
+        assert!(c.range_hz.is_some() && c.verdict == ComponentVerdict::Clear, "{c:?}");
         assert!(off_hz.abs() < 2.0 * c.frequency_sd_hz && off_hz.abs() < 0.5, "{mean_hz}: {c:?}");
     }
 }

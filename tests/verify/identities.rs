@@ -4,22 +4,24 @@
 use crate::scenes::{both, committed, seen, upright_light_blade};
 use nalgebra::{Complex, Matrix4, Vector4};
 use std::f64::consts::TAU;
-use wiperlab::blade::friction::Friction;
-use wiperlab::blade::modes::{Tip, modes};
-use wiperlab::blade::shoulder::Lean;
-use wiperlab::blade::{Directions, Linkage, Pose, Spring};
-use wiperlab::ode::Phase;
-use wiperlab::simulate::equilibrium::steady_slide;
-use wiperlab::simulate::mode::Mode;
-use wiperlab::simulate::outputs::Sampler;
-use wiperlab::simulate::phases::{Slip, Stick, System};
+use wiperlab::blade::friction::FrictionLaw;
+use wiperlab::blade::modes::{TipConstraint, natural_modes};
+use wiperlab::blade::shoulder::ShoulderContact;
+use wiperlab::blade::{LinkDirections, Linkage, Pose, Spring};
+use wiperlab::ode::HybridPhase;
+use wiperlab::simulate::equilibrium::steady_slip_pose;
+use wiperlab::simulate::mode::TipMode;
+use wiperlab::simulate::outputs::SampleObserver;
+use wiperlab::simulate::phases::{DrivenBlade, SlipPhase, StickPhase};
 use wiperlab::simulate::scene::{Drive, Scene, StartKind};
-use wiperlab::simulate::{Cause, Effort, Status, Transition, run_with, system};
+use wiperlab::simulate::{
+    RunStatus, SolverOptions, Transition, TransitionCause, build_system, run_scene_with,
+};
 
-fn mirrored(mode: Mode) -> Mode {
+fn mirrored(mode: TipMode) -> TipMode {
     match mode {
-        Mode::SlipForward => Mode::SlipBackward,
-        Mode::SlipBackward => Mode::SlipForward,
+        TipMode::SlipForward => TipMode::SlipBackward,
+        TipMode::SlipBackward => TipMode::SlipForward,
         other => other,
     }
 }
@@ -129,10 +131,10 @@ const MOST_SHIFT_S: f64 = 100.0;
 fn transitions_do_not_depend_on_the_tolerance() {
     for scene in both() {
         let fine = seen(&scene, 1e-12);
-        assert_eq!(fine.run.status, Status::Completed);
+        assert_eq!(fine.run.status, RunStatus::Completed);
         for relative in [1e-6, 1e-7, 1e-8, 1e-9, 1e-10] {
             let coarse = seen(&scene, relative);
-            assert_eq!(coarse.run.status, Status::Completed);
+            assert_eq!(coarse.run.status, RunStatus::Completed);
             assert_eq!(coarse.run.transitions, coarse.transitions.len() as u64);
             assert_same(
                 &format!("{} at {relative:e}", scene.title()),
@@ -151,13 +153,13 @@ fn stick_holds_the_tip_and_its_friction_does_no_work() {
         assert!(seen.audit.max_constraint_drift_m < 1e-15, "{:e}", seen.audit.max_constraint_drift_m);
         let blade = &scene.linkage;
         let mut stuck = 0;
-        for sample in seen.samples.iter().filter(|s| s.mode == Mode::Stick) {
+        for sample in seen.samples.iter().filter(|s| s.mode == TipMode::Stick) {
             stuck += 1;
             assert_eq!(sample.tip_velocity_m_per_s, 0.0);
             let velocity = blade.tip_velocity_m_per_s(
                 &sample.pose,
-                &Directions::of(&sample.pose),
-                &scene.drive.at(sample.time_s),
+                &LinkDirections::from_pose(&sample.pose),
+                &scene.drive.motion_at(sample.time_s),
             );
             assert!(
                 (sample.friction_n * velocity).abs() < 1e-15,
@@ -166,21 +168,22 @@ fn stick_holds_the_tip_and_its_friction_does_no_work() {
                 sample.time_s
             );
             assert!(
-                sample.friction_n.abs() <= blade.friction.at_rest() * sample.normal_n * (1.0 + 1e-9),
+                sample.friction_n.abs()
+                    <= blade.friction.static_coefficient() * sample.normal_n * (1.0 + 1e-9),
                 "at {} s",
                 sample.time_s
             );
         }
         // a phase of stick has at least one piece, and every piece is sampled at both ends
-        let phases = seen.transitions.iter().filter(|t| t.to == Mode::Stick).count();
+        let phases = seen.transitions.iter().filter(|t| t.to == TipMode::Stick).count();
         assert!(phases > 0 && stuck >= 2 * phases, "{stuck} samples in {phases} phases of stick");
     }
 }
 
 /// The light blade without friction, pressed on lightly, its head at rest.
 fn frictionless() -> Scene {
-    let mut scene = upright_light_blade().with("blade.preload_force_n", 0.02).unwrap();
-    scene.linkage.friction = Friction { a: 0.0, b_s_per_m: 0.0, c: 0.0 };
+    let mut scene = upright_light_blade().with_parameter("blade.preload_force_n", 0.02).unwrap();
+    scene.linkage.friction = FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: 0.0 };
     scene.drive = Drive::Uniform { speed_m_per_s: 0.0 };
     scene.run.stop_s = 0.05;
     scene
@@ -193,7 +196,7 @@ fn without_friction_and_damping_the_tip_turns_at_the_natural_frequencies() {
     for spring in [&mut scene.linkage.head, &mut scene.linkage.neck, &mut scene.linkage.lip] {
         spring.damping = 0.0;
     }
-    for mode in modes(&scene.linkage, Tip::Free, false) {
+    for mode in natural_modes(&scene.linkage, TipConstraint::Free, false) {
         let frequency = mode.frequency_hz.unwrap();
         // an amplitude whose square, the size of what linearising leaves out, is below the tolerance
         scene.start = StartKind::State(Pose {
@@ -203,9 +206,9 @@ fn without_friction_and_damping_the_tip_turns_at_the_natural_frequencies() {
             phi_rate: 0.0,
         });
         let seen = seen(&scene, 1e-12);
-        assert_eq!(seen.run.status, Status::Completed);
+        assert_eq!(seen.run.status, RunStatus::Completed);
         let times: Vec<f64> = seen.transitions.iter().map(|t| t.time_s).collect();
-        assert!(seen.transitions.iter().all(|t| t.cause == Cause::DirectReversal));
+        assert!(seen.transitions.iter().all(|t| t.cause == TransitionCause::DirectReversal));
         let expected = (2.0 * frequency * 0.05).floor() as usize;
         assert_eq!(times.len(), expected, "{frequency} Hz");
         for (i, t) in times.iter().enumerate() {
@@ -251,16 +254,16 @@ fn matrix(rows: [[f64; 4]; 4]) -> Matrix4<f64> {
 
 #[test]
 fn damped_modes_are_those_of_the_linearised_phases() {
-    let mut actual = committed("actual-blade").with("blade.preload_force_n", 0.02).unwrap(); // with its own it would buckle upright
+    let mut actual = committed("actual-blade").with_parameter("blade.preload_force_n", 0.02).unwrap(); // with its own it would buckle upright
     actual.drive = Drive::Uniform { speed_m_per_s: 0.0 };
     for scene in [frictionless(), actual] {
         let mut blade = scene.linkage;
-        blade.friction = Friction { a: 0.0, b_s_per_m: 0.0, c: 0.0 };
-        let system = System { linkage: blade, ..system(&scene) };
-        let slip = Slip { system: &system, direction: 1.0, lean: Lean::Off };
+        blade.friction = FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: 0.0 };
+        let system = DrivenBlade { linkage: blade, ..build_system(&scene) };
+        let slip = SlipPhase { system: &system, direction: 1.0, lean: ShoulderContact::Off };
         let found =
             oscillating(&matrix(jacobian(|y| slip.derivative(0.0, y), &[0.0; 4], [1e-6, 1e-6, 1e-2, 1e-2])));
-        let expected = modes(&blade, Tip::Free, false);
+        let expected = natural_modes(&blade, TipConstraint::Free, false);
         assert_eq!((found.len(), expected.len()), (2, 2));
         for (e, mode) in found.iter().zip(expected) {
             assert!(
@@ -273,11 +276,11 @@ fn damped_modes_are_those_of_the_linearised_phases() {
             );
         }
         let upright = Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 };
-        let stick = Stick::hold(&system, 0.0, &upright, Lean::Off);
+        let stick = StickPhase::from_pose(&system, 0.0, &upright, ShoulderContact::Off);
         let [[zero, one], [stiffness, damping]] =
             jacobian(|y| stick.derivative(0.0, y), &[0.0; 2], [1e-6, 1e-2]);
         assert!(zero == 0.0 && (one - 1.0).abs() < 1e-12);
-        let held = modes(&blade, Tip::Held, false)[0];
+        let held = natural_modes(&blade, TipConstraint::Held, false)[0];
         assert!(((-stiffness).sqrt() / TAU / held.frequency_hz.unwrap() - 1.0).abs() < 1e-7);
         assert!((-damping / 2.0 / (-stiffness).sqrt() / held.damping_ratio.unwrap() - 1.0).abs() < 1e-6);
     }
@@ -302,12 +305,12 @@ fn a_deviation_from_steady_slip_grows_at_the_rate_of_its_eigenvalue() {
     const SAMPLES: usize = 400;
     let mut growing = 0;
     for (friction_b, speed) in [(7.95, 0.06), (2.0, 0.3)] {
-        let mut scene = upright_light_blade().with("friction.b_s_per_m", friction_b).unwrap();
+        let mut scene = upright_light_blade().with_parameter("friction.b_s_per_m", friction_b).unwrap();
         scene.drive = Drive::Uniform { speed_m_per_s: speed };
-        let pose = steady_slide(&scene.linkage, speed).unwrap();
+        let pose = steady_slip_pose(&scene.linkage, speed).unwrap();
         let rest = [pose.theta, pose.phi, 0.0, 0.0];
-        let whole = system(&scene);
-        let slip = Slip { system: &whole, direction: 1.0, lean: Lean::Off };
+        let whole = build_system(&scene);
+        let slip = SlipPhase { system: &whole, direction: 1.0, lean: ShoulderContact::Off };
         assert!(slip.derivative(0.0, &rest).iter().all(|d| d.abs() < 1e-6), "steady slip is an equilibrium");
         let a = matrix(jacobian(|y| slip.derivative(0.0, y), &rest, [1e-6, 1e-6, 1e-2, 1e-2]));
         let fastest = oscillating(&a).iter().map(|e| e.re).fold(1.0, f64::max);
@@ -322,12 +325,12 @@ fn a_deviation_from_steady_slip_grows_at_the_rate_of_its_eigenvalue() {
                 StartKind::State(Pose { theta: rest[0] + theta, phi: rest[1] + phi, theta_rate, phi_rate });
             let mut amplitudes = Vec::new();
             let times = (0..=SAMPLES).map(|i| scene.run.stop_s * i as f64 / SAMPLES as f64);
-            let mut sampler = Sampler::new(times, |s| {
+            let mut sampler = SampleObserver::new(times, |s| {
                 let y = [s.pose.theta, s.pose.phi, s.pose.theta_rate, s.pose.phi_rate];
                 amplitudes.push((0..4).map(|i| left[i] * (y[i] - rest[i])).sum::<Complex<f64>>());
             });
-            let run = run_with(&scene, Effort::new(1e-12), &mut sampler);
-            assert_eq!((run.status, run.transitions), (Status::Completed, 0));
+            let run = run_scene_with(&scene, SolverOptions::new(1e-12), &mut sampler);
+            assert_eq!((run.status, run.transitions), (RunStatus::Completed, 0));
             let (first, last) = (amplitudes[0], amplitudes[SAMPLES]);
             let turned: f64 = amplitudes.windows(2).map(|w| (w[1] / w[0]).arg()).sum();
             let rate = (last.norm() / first.norm()).ln() / scene.run.stop_s;

@@ -3,27 +3,36 @@
 
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wiperlab::blade::friction::Friction;
-use wiperlab::blade::shoulder::Lean;
-use wiperlab::blade::{Directions, HeadMotion, Linkage, Pose, Spring};
-use wiperlab::ode::Work;
-use wiperlab::simulate::impact::{InverseMass, Origin, Outcome, Surface, TipVelocity, impact};
+use wiperlab::blade::friction::FrictionLaw;
+use wiperlab::blade::shoulder::ShoulderContact;
+use wiperlab::blade::{HeadMotion, LinkDirections, Linkage, Pose, Spring};
+use wiperlab::ode::WorkCounters;
+use wiperlab::simulate::impact::{
+    ContactSurface, ImpactOrigin, ImpactOutcome, InverseMass, TipVelocity, solve_impact,
+};
 
 const RELATIVE: f64 = 1e-12;
 /// Errors of closed forms, in units of the tolerance and of the sizes that go in.
 const AGREEMENT: f64 = 20.0 * RELATIVE;
 
-fn coulomb(mu: f64, restitution: f64) -> Surface {
-    Surface { friction: Friction { a: 0.0, b_s_per_m: 0.0, c: mu }, restitution }
+fn coulomb(mu: f64, restitution: f64) -> ContactSurface {
+    ContactSurface { friction: FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: mu }, restitution }
 }
 
-fn hit(mass: InverseMass, surface: &Surface, normal: f64, tangential: f64) -> Outcome {
-    let origin = if normal < 0.0 { Origin::Collision } else { Origin::Jam };
-    impact(&mass, surface, TipVelocity { normal, tangential }, origin, RELATIVE, &mut Work::default())
-        .unwrap()
+fn hit(mass: InverseMass, surface: &ContactSurface, normal: f64, tangential: f64) -> ImpactOutcome {
+    let origin = if normal < 0.0 { ImpactOrigin::Collision } else { ImpactOrigin::Jam };
+    solve_impact(
+        &mass,
+        surface,
+        TipVelocity { normal, tangential },
+        origin,
+        RELATIVE,
+        &mut WorkCounters::default(),
+    )
+    .unwrap()
 }
 
-fn assert_outcome(found: &Outcome, normal: f64, tangential: f64, impulse: f64) {
+fn assert_outcome(found: &ImpactOutcome, normal: f64, tangential: f64, impulse: f64) {
     let expected = [normal, tangential, impulse];
     for (found, expected) in
         [found.velocity.normal, found.velocity.tangential, found.impulse_n_s[0]].into_iter().zip(expected)
@@ -131,7 +140,7 @@ fn a_jam_compresses_by_itself() {
 #[test]
 fn friction_that_falls_with_speed_follows_its_closed_form_and_the_tolerance() {
     let mass = InverseMass { nn: 3.0, nt: 0.8, tt: 4.0 };
-    let friction = Friction { a: 0.4, b_s_per_m: 2.0, c: 0.2 };
+    let friction = FrictionLaw { a: 0.4, b_s_per_m: 2.0, c: 0.2 };
     let (normal, tangential) = (-0.9, 2.0);
     let (linear, constant) = (mass.nt - mass.tt * friction.c, mass.tt * friction.a);
     let speed = |p: f64| {
@@ -152,9 +161,16 @@ fn friction_that_falls_with_speed_follows_its_closed_form_and_the_tolerance() {
     }
     for relative in [1e-4, 1e-6, 1e-8, 1e-10, 1e-12] {
         let before = TipVelocity { normal, tangential };
-        let surface = Surface { friction, restitution: 0.0 };
-        let found =
-            impact(&mass, &surface, before, Origin::Collision, relative, &mut Work::default()).unwrap();
+        let surface = ContactSurface { friction, restitution: 0.0 };
+        let found = solve_impact(
+            &mass,
+            &surface,
+            before,
+            ImpactOrigin::Collision,
+            relative,
+            &mut WorkCounters::default(),
+        )
+        .unwrap();
         assert_eq!(found.velocity.normal, 0.0);
         assert!(
             (found.impulse_n_s[0] - low).abs() < 20.0 * relative,
@@ -169,18 +185,18 @@ fn friction_that_falls_with_speed_follows_its_closed_form_and_the_tolerance() {
 }
 
 /// The impact in small steps of the impulse, nothing but the law: slip, rest, and work counted as it comes.
-fn step_by_step(mass: InverseMass, surface: &Surface, before: TipVelocity) -> [f64; 3] {
+fn step_by_step(mass: InverseMass, surface: &ContactSurface, before: TipVelocity) -> [f64; 3] {
     let TipVelocity { mut normal, mut tangential } = before;
     let h = 1e-5 * normal.abs().max(tangential.abs()) / mass.nn;
     let (mut impulse, mut taken, mut given) = (0.0, 0.0, 0.0);
     let mut compressing = true;
     loop {
-        let holds = mass.nt.abs() <= surface.friction.at_rest() * mass.tt;
+        let holds = mass.nt.abs() <= surface.friction.static_coefficient() * mass.tt;
         let towards = if tangential == 0.0 { mass.nt } else { tangential };
         let share = if tangential == 0.0 && holds {
             -mass.nt / mass.tt
         } else {
-            -towards.signum() * surface.friction.dynamic(tangential.abs())
+            -towards.signum() * surface.friction.dynamic_coefficient(tangential.abs())
         };
         let (dn, dt) = (mass.nn + mass.nt * share, mass.nt + mass.tt * share);
         let stops = tangential != 0.0 && (tangential + h * dt) * tangential <= 0.0;
@@ -209,11 +225,20 @@ fn impacts_agree_with_small_steps_and_never_gain_energy() {
         let mut between = |low: f64, high: f64| rng.random_range(low..high);
         let (nn, tt) = (between(0.5, 4.0), between(0.5, 4.0));
         let nt = between(-0.95, 0.95) * (nn * tt).sqrt();
-        let friction = Friction { a: between(0.0, 1.0), b_s_per_m: between(0.0, 8.0), c: between(0.0, 1.0) };
+        let friction =
+            FrictionLaw { a: between(0.0, 1.0), b_s_per_m: between(0.0, 8.0), c: between(0.0, 1.0) };
         let before = TipVelocity { normal: -between(0.05, 1.0), tangential: between(-2.0, 2.0) };
         let (mass, surface) =
-            (InverseMass { nn, nt, tt }, Surface { friction, restitution: [0.0, 0.4, 0.9][i % 3] });
-        let found = impact(&mass, &surface, before, Origin::Collision, 1e-9, &mut Work::default()).unwrap();
+            (InverseMass { nn, nt, tt }, ContactSurface { friction, restitution: [0.0, 0.4, 0.9][i % 3] });
+        let found = solve_impact(
+            &mass,
+            &surface,
+            before,
+            ImpactOrigin::Collision,
+            1e-9,
+            &mut WorkCounters::default(),
+        )
+        .unwrap();
         let reference = step_by_step(mass, &surface, before);
         for (found, expected) in [found.velocity.normal, found.velocity.tangential, found.impulse_n_s[0] * nn]
             .into_iter()
@@ -228,7 +253,8 @@ fn impacts_agree_with_small_steps_and_never_gain_energy() {
         stuck += usize::from(found.velocity.tangential == 0.0);
         turned += usize::from(found.velocity.tangential * before.tangential < 0.0);
         slid += usize::from(found.velocity.tangential * before.tangential > 0.0);
-        compressing_slip += usize::from(nn - before.tangential.signum() * friction.at_rest() * nt < 0.0);
+        compressing_slip +=
+            usize::from(nn - before.tangential.signum() * friction.static_coefficient() * nt < 0.0);
     }
     assert!(
         stuck > 10 && turned > 4 && slid > 10 && compressing_slip > 5,
@@ -254,7 +280,7 @@ fn free_rod(mass_kg: f64, length_m: f64, mu: f64) -> Linkage {
         neck: none,
         lip: none,
         preload_displacement_m: 0.0,
-        friction: Friction { a: 0.0, b_s_per_m: 0.0, c: mu },
+        friction: FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: mu },
         shoulder: None,
     }
 }
@@ -267,7 +293,7 @@ fn the_painleve_rod_jams_first_at_four_thirds() {
         let rod = free_rod(0.3, 0.8, mu);
         let pose =
             Pose { theta: 0.0, phi: std::f64::consts::FRAC_PI_2 - alpha, theta_rate: 0.0, phi_rate: 0.0 };
-        let d = Directions::of(&pose);
+        let d = LinkDirections::from_pose(&pose);
         let [up, along] = rod.impulse_responses(&d);
         let (sin, cos) = alpha.sin_cos();
         let expected = [(1.0 + 3.0 * cos * cos) / 0.3, 3.0 * sin * cos / 0.3, (1.0 + 3.0 * sin * sin) / 0.3];
@@ -278,7 +304,8 @@ fn the_painleve_rod_jams_first_at_four_thirds() {
         }
         assert!((up.tangential_per_kg - along.normal_per_kg).abs() < 1e-12);
         let head = HeadMotion { position_m: 0.0, velocity_m_per_s: 0.0, acceleration_m_per_s2: 0.0 };
-        let leading = -up.tangential_per_kg.signum() * rod.contact(&pose, &d, &head, Lean::Off).nu.signum();
+        let leading = -up.tangential_per_kg.signum()
+            * rod.friction_response(&pose, &d, &head, ShoulderContact::Off).nu.signum();
         assert_eq!(leading, 1.0, "nu = -W_nt/W_nn");
         1.0 - mu * up.tangential_per_kg.abs() / up.normal_per_kg
     };

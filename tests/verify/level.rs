@@ -3,11 +3,11 @@
 
 use crate::scenes::{both, seen, upright_light_blade};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_8};
-use wiperlab::blade::friction::Friction;
+use wiperlab::blade::friction::FrictionLaw;
 use wiperlab::blade::{Linkage, Pose, Spring};
-use wiperlab::simulate::mode::Mode;
+use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::scene::{Drive, Scene, StartKind};
-use wiperlab::simulate::{Status, run};
+use wiperlab::simulate::{RunStatus, run_scene};
 
 /// Force with which the head presses, N, whatever its height: its spring is very long and very soft.
 const PRESS_N: f64 = 0.3;
@@ -29,7 +29,7 @@ fn reduced(friction: f64) -> Scene {
         neck: spring(SLACK_N_M_PER_RAD),
         lip: spring(SLACK_N_M_PER_RAD),
         preload_displacement_m: PRESS_N / SOFT_N_PER_M,
-        friction: Friction { a: 0.0, b_s_per_m: 0.0, c: friction },
+        friction: FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: friction },
         ..scene.linkage
     };
     scene
@@ -60,7 +60,7 @@ fn slip_ends_where_a_link_is_level() {
         for relative in [1e-6, 1e-8, 1e-10] {
             let seen = seen(&scene, relative);
             let what = format!("neck {neck}, side {side} at {relative:e}: {:?}", seen.run);
-            assert_eq!((seen.run.status, seen.run.transitions), (Status::Diverged, 0), "{what}");
+            assert_eq!((seen.run.status, seen.run.transitions), (RunStatus::Diverged, 0), "{what}");
             assert!(
                 (seen.run.stopped_at_s - exact).abs() * w < 20.0 * relative + 1e-9,
                 "{what}, expected {exact}"
@@ -90,7 +90,7 @@ fn stick_ends_where_the_link_that_follows_is_all_but_level() {
         let way = scene.linkage.l2_m * (0.1f64.sin() + (1.0f64 - 1e-6).sqrt());
         let exact = (1.0 - way / amplitude_m).acos() / (std::f64::consts::TAU * frequency_hz);
         let seen = seen(&scene, 1e-8);
-        assert_eq!((seen.run.status, seen.run.transitions), (Status::Diverged, 0), "{:?}", seen.run);
+        assert_eq!((seen.run.status, seen.run.transitions), (RunStatus::Diverged, 0), "{:?}", seen.run);
         assert!(
             (seen.run.stopped_at_s - exact).abs() < 1e-12,
             "{} instead of {exact} s",
@@ -98,7 +98,7 @@ fn stick_ends_where_the_link_that_follows_is_all_but_level() {
         );
         let last = seen.samples.last().unwrap();
         assert!(
-            last.mode == Mode::Stick
+            last.mode == TipMode::Stick
                 && (last.pose.phi.cos() - 1e-3).abs() < 1e-9
                 && side * last.pose.phi < 0.0,
             "{:?}",
@@ -119,10 +119,10 @@ fn stick_ends_where_the_free_link_is_level() {
         scene.start = StartKind::State(Pose { theta: side * 0.3, ..AT_REST });
         let (l1, l2) = (scene.linkage.l1_m, scene.linkage.l2_m);
         let seen = seen(&scene, 1e-10);
-        assert_eq!((seen.run.status, seen.run.transitions), (Status::Diverged, 0), "{:?}", seen.run);
+        assert_eq!((seen.run.status, seen.run.transitions), (RunStatus::Diverged, 0), "{:?}", seen.run);
         let last = seen.samples.last().unwrap();
         assert!(
-            last.mode == Mode::Stick && (side * last.pose.theta - FRAC_PI_2).abs() < 1e-12,
+            last.mode == TipMode::Stick && (side * last.pose.theta - FRAC_PI_2).abs() < 1e-12,
             "{:?}",
             last.pose
         );
@@ -147,10 +147,10 @@ fn a_start_with_a_link_past_level_ends_at_once() {
             Pose { theta: 3.0, phi: 3.0, theta_rate: 1.0, phi_rate: 1.0 },
         ] {
             scene.start = StartKind::State(pose);
-            let run = run(&scene, &mut ());
+            let run = run_scene(&scene, &mut ());
             assert_eq!(
                 (run.status, run.stopped_at_s, run.transitions),
-                (Status::Diverged, scene.start_s, 0),
+                (RunStatus::Diverged, scene.start_s, 0),
                 "{pose:?}"
             );
         }

@@ -20,7 +20,7 @@ fn estimate(samples: &[f64]) -> Multitaper {
 
 fn padded(samples: &[f64], padded: usize) -> Multitaper {
     let samples: Vec<_> = samples.iter().copied().map(Some).collect();
-    Multitaper::of(&samples, RATE_HZ, padded, TAPERS).unwrap()
+    Multitaper::new(&samples, RATE_HZ, padded, TAPERS).unwrap()
 }
 
 fn bin(m: &Multitaper, frequency_hz: f64) -> usize {
@@ -38,7 +38,7 @@ fn the_sum_over_the_bins_is_the_mean_square_as_the_tapers_weigh_it() {
     let mut draw = noise(1);
     let samples: Vec<f64> = (0..FRAMES).map(|_| 2e-6 * draw()).collect();
     let m = estimate(&samples);
-    assert_eq!((m.frequency_hz.len(), m.tapers, m.degrees()), (PADDED / 2 + 1, 7, 14));
+    assert_eq!((m.frequency_hz.len(), m.tapers, m.degrees_of_freedom()), (PADDED / 2 + 1, 7, 14));
     assert_eq!(*m.frequency_hz.last().unwrap(), RATE_HZ / 2.0);
     let integral = m.density_m2_per_hz.iter().sum::<f64>() * m.frequency_hz[1];
     let weight = |i: usize| {
@@ -172,13 +172,13 @@ fn gaps_keep_the_scale_and_find_the_line() {
         let toned = quiet.iter().zip(record(|t| 4.0 * (TAU * 625.0 * t).sin())).map(|(x, s)| x + s).collect();
         let (quiet, toned) = (gappy(quiet), gappy(toned));
         assert_eq!(quiet.iter().filter(|x| x.is_none()).count(), 120);
-        let m = Multitaper::of(&quiet, RATE_HZ, SHORT, TAPERS).unwrap();
+        let m = Multitaper::new(&quiet, RATE_HZ, SHORT, TAPERS).unwrap();
         assert_eq!(m.tapers, 7);
         apart(&m).for_each(|bin| {
             mean += m.density_m2_per_hz[bin] * RATE_HZ / 2.0;
             count += 1;
         });
-        let m = Multitaper::of(&toned, RATE_HZ, SHORT, TAPERS).unwrap();
+        let m = Multitaper::new(&toned, RATE_HZ, SHORT, TAPERS).unwrap();
         assert!(m.line_probability(128).unwrap() < 1e-3, "{:e}", m.line_probability(128).unwrap());
         assert!((m.line_amplitude_m[128] / 4.0 - 1.0).abs() < 0.1, "{}", m.line_amplitude_m[128]);
     }
@@ -192,7 +192,7 @@ fn the_same_record_gives_the_same_estimate_in_one_thread_and_in_four() {
     let samples: Vec<_> = (0..20_000).map(|i| Some(draw()).filter(|_| i % 9 != 4)).collect();
     let with = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| Multitaper::of(&samples, RATE_HZ, 1 << 17, TAPERS).unwrap())
+        pool.install(|| Multitaper::new(&samples, RATE_HZ, 1 << 17, TAPERS).unwrap())
     };
     assert_eq!(with(1), with(4));
 }
@@ -200,7 +200,7 @@ fn the_same_record_gives_the_same_estimate_in_one_thread_and_in_four() {
 #[test]
 fn records_without_an_estimate_are_refused() {
     let refuse = |samples: &[Option<f64>], rate, padded, tapers| {
-        Multitaper::of(samples, rate, padded, tapers).unwrap_err()
+        Multitaper::new(samples, rate, padded, tapers).unwrap_err()
     };
     assert_eq!(refuse(&[Some(1.0); 100], RATE_HZ, 128, 1), MultitaperError::Tapers { found: 1 });
     assert_eq!(
@@ -217,7 +217,7 @@ fn records_without_an_estimate_are_refused() {
         MultitaperError::NotFinite { frame: 4, found: f64::INFINITY }
     );
     assert!(matches!(refuse(&[Some(1.0); 100], RATE_HZ, usize::MAX, 7), MultitaperError::TooLong { .. }));
-    let silent = Multitaper::of(&[Some(0.0); 100], RATE_HZ, 0, 7).unwrap();
+    let silent = Multitaper::new(&[Some(0.0); 100], RATE_HZ, 0, 7).unwrap();
     assert_eq!(silent.frequency_hz.len(), 65);
     assert!(silent.log_density_sd.iter().chain(&silent.line_f).all(|x| *x == 0.0));
     assert_eq!((silent.interval_95(64), silent.interval_95(65)), (Some((0.0, 0.0)), None));

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 use wiperlab::blade::parameters;
-use wiperlab::plausibility::{self, Judged};
-use wiperlab::section::Section;
+use wiperlab::plausibility::{self, PlausibilitySubject};
+use wiperlab::section::BladeSection;
 use wiperlab::simulate::scene::Scene;
 
 const BLADE: &str = include_str!("../../data/scenes/actual-blade.toml");
@@ -21,10 +21,10 @@ fn committed_files_raise_no_doubt() {
     let scenes = files("data/scenes");
     assert!(scenes.len() >= 6, "{}", scenes.len());
     for text in scenes {
-        assert_eq!(Scene::parse("scene.toml", &text).unwrap().findings(), []);
+        assert_eq!(Scene::parse("scene.toml", &text).unwrap().find_implausible(), []);
     }
     for text in files("data/sections") {
-        assert_eq!(Section::parse("section.toml", &text).unwrap().findings(), []);
+        assert_eq!(BladeSection::parse("section.toml", &text).unwrap().find_implausible(), []);
     }
 }
 
@@ -52,7 +52,7 @@ const SLIPS: [(&str, &str, &str); 16] = [
 fn a_usual_slip_is_named_with_what_to_write() {
     let right = Scene::parse("scene.toml", BLADE).unwrap();
     for (key, value, advice) in SLIPS {
-        let found = right.with(key, value.parse().unwrap()).unwrap().findings();
+        let found = right.with_parameter(key, value.parse().unwrap()).unwrap().find_implausible();
         let one =
             found.iter().find(|finding| finding.key == key).unwrap_or_else(|| panic!("{key}: {found:?}"));
         assert!(one.advice.contains(advice), "{key}: {one}");
@@ -64,11 +64,11 @@ fn a_usual_slip_is_named_with_what_to_write() {
 #[test]
 fn a_stiffness_is_judged_by_its_frequency() {
     let right = Scene::parse("scene.toml", BLADE).unwrap();
-    let found = right.with("blade.neck_stiffness_n_m_per_rad", 1.9).unwrap().findings();
+    let found = right.with_parameter("blade.neck_stiffness_n_m_per_rad", 1.9).unwrap().find_implausible();
     assert_eq!(found.len(), 1, "{found:?}");
     assert_eq!(found[0].key, "blade.neck_stiffness_n_m_per_rad");
     assert!(found[0].found.contains("Hz for natural frequency of the neck"), "{}", found[0]);
-    let found = right.with("blade.preload_displacement_m", 5.0).unwrap().findings();
+    let found = right.with_parameter("blade.preload_displacement_m", 5.0).unwrap().find_implausible();
     assert_eq!(found.len(), 1, "{found:?}");
     assert_eq!(found[0].key, "blade.preload_displacement_m");
     assert_eq!(found[0].advice, "check the value and its unit"); // the slips of the row are those of a force
@@ -85,8 +85,8 @@ fn slips_in_a_section_are_named() {
     ];
     for (right, wrong, key, advice) in slips {
         assert!(SECTION.contains(right), "{right}");
-        let section = Section::parse("section.toml", &SECTION.replacen(right, wrong, 1)).unwrap();
-        let found = section.findings();
+        let section = BladeSection::parse("section.toml", &SECTION.replacen(right, wrong, 1)).unwrap();
+        let found = section.find_implausible();
         assert_eq!(found.len(), 1, "{key}: {found:#?}");
         assert_eq!(found[0].key, key);
         assert!(found[0].advice.contains(advice), "{}", found[0]);
@@ -96,14 +96,14 @@ fn slips_in_a_section_are_named() {
 /// Rows are of keys that exist, their ranges have an order and lie within what is admitted.
 #[test]
 fn every_row_is_of_a_key_that_files_have() {
-    for row in plausibility::SCENE {
-        let parameter = parameters::find(row.key).unwrap_or_else(|| panic!("{}", row.key));
-        let judged_itself = matches!(row.judged, Judged::Value);
+    for row in plausibility::SCENE_RANGES {
+        let parameter = parameters::find_parameter(row.key).unwrap_or_else(|| panic!("{}", row.key));
+        let judged_itself = matches!(row.judged, PlausibilitySubject::Value);
         assert!(!judged_itself || row.unit == parameter.unit, "{}", row.key);
         assert!(!judged_itself || row.range.iter().all(|end| parameter.range.admits(*end)), "{}", row.key);
         assert!(row.range[0] < row.range[1], "{}", row.key);
     }
-    for row in plausibility::SECTION {
+    for row in plausibility::SECTION_RANGES {
         assert!(PAGE.contains(&format!("`{}`", row.key)), "{}: not in docs/blade.md", row.key);
         assert!(row.range[0] < row.range[1], "{}", row.key);
     }

@@ -5,7 +5,7 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::{PI, TAU};
 use wiperlab::math::StandardNormal;
-use wiperlab::recording::channel::Instants;
+use wiperlab::recording::channel::ReversalInstants;
 use wiperlab::recording::quality::*;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 
@@ -55,18 +55,19 @@ fn recording(traces: Traces) -> Recording {
     recording_at(traces, RATE_HZ)
 }
 
-fn judged(recording: &Recording, optics: &Optics) -> (Quality, Vec<Finding>) {
-    let measured = quality(recording, optics.exposure_s);
-    let found = findings(recording, &measured, optics, &Instants::find(recording), &[]);
+fn judged(recording: &Recording, optics: &Optics) -> (Quality, Vec<QualityFinding>) {
+    let measured = measure_quality(recording, optics.exposure_s);
+    let found =
+        collect_findings(recording, &measured, optics, &ReversalInstants::find_instants(recording), &[]);
     (measured, found)
 }
 
-fn of(traces: Traces) -> Vec<Finding> {
+fn of(traces: Traces) -> Vec<QualityFinding> {
     judged(&recording(traces), &OPTICS).1
 }
 
 /// Channel and severity of every finding of a check.
-fn told<'a>(found: &'a [Finding], check: &str) -> Vec<(&'a str, Severity)> {
+fn told<'a>(found: &'a [QualityFinding], check: &str) -> Vec<(&'a str, Severity)> {
     found
         .iter()
         .filter(|f| f.check.name() == check)
@@ -74,11 +75,11 @@ fn told<'a>(found: &'a [Finding], check: &str) -> Vec<(&'a str, Severity)> {
         .collect()
 }
 
-fn value(found: &[Finding], check: &str) -> f64 {
+fn value(found: &[QualityFinding], check: &str) -> f64 {
     found.iter().find(|f| f.check.name() == check).unwrap_or_else(|| panic!("no {check} in {found:?}")).value
 }
 
-fn doubts(found: &[Finding]) -> Vec<&Finding> {
+fn doubts(found: &[QualityFinding]) -> Vec<&QualityFinding> {
     found.iter().filter(|f| f.severity > Severity::Note).collect()
 }
 
@@ -92,25 +93,25 @@ fn with_tip(mut traces: Traces, change: impl Fn(usize, f64) -> f64) -> Traces {
 fn a_sound_stroke_is_good_and_its_noise_is_read() {
     for seed in 0..20 {
         let (measured, found) = judged(&recording(stroke(4_000, seed, NOISE_M)), &OPTICS);
-        assert_eq!(doubts(&found), Vec::<&Finding>::new());
+        assert_eq!(doubts(&found), Vec::<&QualityFinding>::new());
         assert_eq!(told(&found, "outliers"), []);
-        let noise: Vec<&Finding> = found.iter().filter(|f| f.check.name() == "noise").collect();
+        let noise: Vec<&QualityFinding> = found.iter().filter(|f| f.check.name() == "noise").collect();
         assert_eq!(noise.len(), 4);
         for finding in noise {
             // the median of 4,000 third differences, correlated over three, is known to 3 %
             assert!((finding.value / NOISE_M - 1.0).abs() < 0.12 && finding.unit == "m", "{finding:?}");
         }
         assert!(
-            verdict(&measured, &found)[0].starts_with("good: shows oscillations from about 3.751 Hz"),
+            verdict_lines(&measured, &found)[0].starts_with("good: shows oscillations from about 3.751 Hz"),
             "{:?}",
-            verdict(&measured, &found)
+            verdict_lines(&measured, &found)
         );
     }
 }
 
 #[test]
 fn motion_without_noise_gives_no_alarm() {
-    assert_eq!(doubts(&of(stroke(20_000, 1, 0.0))), Vec::<&Finding>::new());
+    assert_eq!(doubts(&of(stroke(20_000, 1, 0.0))), Vec::<&QualityFinding>::new());
 }
 
 #[test]
@@ -124,23 +125,29 @@ fn the_committed_twin_is_good() {
             .unwrap();
     let (measured, found) = judged(&recording, &Optics::from(&file.camera));
     assert_eq!(Some(&measured), file.quality.as_ref());
-    assert_eq!(doubts(&found), Vec::<&Finding>::new());
+    assert_eq!(doubts(&found), Vec::<&QualityFinding>::new());
     assert_eq!((told(&found, "outliers"), value(&found, "reversals")), (vec![], 1.0));
 }
 
 #[test]
 fn a_twin_without_noise_gives_no_alarm() {
-    use wiperlab::simulate::{Effort, scene::Scene};
+    use wiperlab::simulate::{SolverOptions, scene::Scene};
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/data/scenes/actual-blade.toml");
     let scene = Scene::parse("scene", &std::fs::read_to_string(path).unwrap()).unwrap();
     for (frame_rate_hz, exposure_s) in [(5_000.0, 5e-5), (20_000.0, 0.0)] {
         let camera = wiperlab::twin::Camera { frame_rate_hz, exposure_s };
-        let seen = wiperlab::twin::view(&scene, &camera, scene.start_s, scene.run.stop_s, Effort::new(1e-8))
-            .unwrap()
-            .recording;
+        let seen = wiperlab::twin::film_scene(
+            &scene,
+            &camera,
+            scene.start_s,
+            scene.run.stop_s,
+            SolverOptions::new(1e-8),
+        )
+        .unwrap()
+        .recording;
         let (_, found) =
             judged(&seen, &Optics { exposure_s: Some(exposure_s).filter(|&t| t > 0.0), ..OPTICS });
-        assert_eq!(doubts(&found), Vec::<&Finding>::new());
+        assert_eq!(doubts(&found), Vec::<&QualityFinding>::new());
         assert_eq!(told(&found, "outliers"), [], "{found:?}");
     }
 }
@@ -283,8 +290,11 @@ fn many_lost_frames_and_a_long_gap_are_cautions_and_no_deflection_is_serious() {
     assert_eq!(told(&without(&|i| (1_000..1_201).contains(&i)).1, "gaps")[0], ("", Severity::Caution));
     assert_eq!(told(&without(&|i| (1_000..1_200).contains(&i)).1, "gaps")[0], ("", Severity::Note));
     let (measured, found) = without(&|_| true);
-    assert_eq!((told(&found, "gaps"), grade(&found)), (vec![("", Severity::Serious)], Grade::NotUsable));
-    assert!(verdict(&measured, &found)[0].starts_with("not usable for deflection"));
+    assert_eq!(
+        (told(&found, "gaps"), grade_findings(&found)),
+        (vec![("", Severity::Serious)], Grade::NotUsable)
+    );
+    assert!(verdict_lines(&measured, &found)[0].starts_with("not usable for deflection"));
 }
 
 #[test]
@@ -352,7 +362,7 @@ fn moving_average(samples: &[f64], width: usize) -> Vec<f64> {
     (0..samples.len()).map(|i| mean(i).iter().sum::<f64>() / mean(i).len() as f64).collect()
 }
 
-fn tip_filtered(frames: usize, seed: u64, filter: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Finding> {
+fn tip_filtered(frames: usize, seed: u64, filter: impl Fn(&[f64]) -> Vec<f64>) -> Vec<QualityFinding> {
     let mut traces = stroke(frames, seed, NOISE_M);
     let tip: Vec<f64> = traces.tip_x_m.iter().flatten().copied().collect();
     traces.tip_x_m = filter(&tip).into_iter().map(Some).collect();
@@ -509,7 +519,7 @@ fn a_rate_of_playback_is_serious_and_comes_first() {
         (told(&found, "playback-rate"), value(&found, "playback-rate")),
         (vec![("", Severity::Serious)], 29.97)
     );
-    let lines = verdict(&measured, &found);
+    let lines = verdict_lines(&measured, &found);
     assert!(
         lines[0].starts_with("not usable until")
             && lines[1].starts_with("serious: 29.97 frames/s is a rate of playback"),
@@ -568,14 +578,18 @@ fn a_head_that_does_not_turn_is_told() {
 fn too_few_frames_are_serious() {
     let (measured, found) = judged(&recording(stroke(7, 1, NOISE_M)), &OPTICS);
     assert_eq!((told(&found, "too-short"), value(&found, "too-short")), (vec![("", Severity::Serious)], 7.0));
-    assert!(verdict(&measured, &found)[0].starts_with("too short for a spectrum: 7 frames at 5000 frames/s"));
+    assert!(
+        verdict_lines(&measured, &found)[0]
+            .starts_with("too short for a spectrum: 7 frames at 5000 frames/s")
+    );
 }
 
 #[test]
 fn a_component_is_shown_attenuated_aliased_or_too_slow() {
     let seen = |frame_rate_hz, exposure_s, frequency_hz| {
         let frames = frame_rate_hz as usize / 10 + 1; // 0.1 s
-        quality(&recording_at(stroke(frames, 1, NOISE_M), frame_rate_hz), exposure_s).shows(frequency_hz)
+        measure_quality(&recording_at(stroke(frames, 1, NOISE_M), frame_rate_hz), exposure_s)
+            .component_visibility(frequency_hz)
     };
     let shown = seen(10_000.0, Some(5e-5), 900.0);
     assert_eq!((shown.verdict, shown.appears_at_hz), (Visibility::Shown, 900.0));
@@ -600,30 +614,36 @@ fn a_component_is_shown_attenuated_aliased_or_too_slow() {
 
 #[test]
 fn findings_of_the_export_are_kept_and_sorted_in() {
-    let kept = Finding::new(
+    let kept = QualityFinding::new(
         Check::ImpliedRate,
         Severity::Serious,
         30.0,
         "Hz",
         "the times imply 30 frames/s".to_owned(),
     )
-    .advise("check the rate");
+    .with_advice("check the rate");
     let sound = recording(stroke(4_000, 1, NOISE_M));
-    let measured = quality(&sound, OPTICS.exposure_s);
-    let found = findings(&sound, &measured, &OPTICS, &Instants::find(&sound), std::slice::from_ref(&kept));
-    assert_eq!((&found[0], grade(&found)), (&kept, Grade::NotUsable));
-    assert_eq!(verdict(&measured, &found)[1], "serious: the times imply 30 frames/s; check the rate");
+    let measured = measure_quality(&sound, OPTICS.exposure_s);
+    let found = collect_findings(
+        &sound,
+        &measured,
+        &OPTICS,
+        &ReversalInstants::find_instants(&sound),
+        std::slice::from_ref(&kept),
+    );
+    assert_eq!((&found[0], grade_findings(&found)), (&kept, Grade::NotUsable));
+    assert_eq!(verdict_lines(&measured, &found)[1], "serious: the times imply 30 frames/s; check the rate");
 }
 
 #[test]
 fn one_check_on_several_channels_is_one_line() {
-    let measured = quality(&recording(stroke(4_000, 1, NOISE_M)), None);
+    let measured = measure_quality(&recording(stroke(4_000, 1, NOISE_M)), None);
     let step = |channel: &str, value: f64| {
-        Finding::new(Check::PositionStep, Severity::Caution, value, "m", format!("steps of {value}"))
-            .on(channel)
+        QualityFinding::new(Check::PositionStep, Severity::Caution, value, "m", format!("steps of {value}"))
+            .on_channel(channel)
     };
     let found = [step("tip-x", 1.0), step("head-x", 3.0), step("head-y", 2.0)];
-    let lines = verdict(&measured, &found);
+    let lines = verdict_lines(&measured, &found);
     assert_eq!(lines.len(), 3, "{lines:?}");
     assert_eq!(lines[1], "caution: tip-x, head-x, head-y (most in head-x): steps of 3");
 }

@@ -4,7 +4,7 @@ use crate::noise::noise;
 use std::f64::consts::TAU;
 use wiperlab::spectrum::SpectrumError;
 use wiperlab::spectrum::time_frequency::{
-    MOST_COLUMNS, Range, Ridge, Spectrogram, SpectrogramSettings, default_band_hz,
+    FrequencyRange, MOST_COLUMNS, Ridge, Spectrogram, SpectrogramSettings, default_band_hz,
 };
 
 const BAND_HZ: (f64, f64) = (250.0, 1500.0);
@@ -78,7 +78,7 @@ impl Made {
 
     fn ridge(&self, seed: u64) -> Ridge {
         let record = self.record(seed);
-        spectrogram(&record, self.rate_hz).ridge(&record, BAND_HZ).unwrap()
+        spectrogram(&record, self.rate_hz).find_ridge(&record, BAND_HZ).unwrap()
     }
 
     /// Least and greatest frequency of the law within the record.
@@ -89,7 +89,7 @@ impl Made {
     }
 
     /// Holds the range found against that of the law.
-    fn assert_range(&self, seed: u64, share: f64) -> Range {
+    fn assert_range(&self, seed: u64, share: f64) -> FrequencyRange {
         let ((low_hz, high_hz), found) = (self.range_hz(), self.ridge(seed).range_hz().unwrap());
         let said = format!(
             "{} s at {} Hz, seed {seed}: {low_hz}..{high_hz} and found {found:?}",
@@ -104,7 +104,7 @@ impl Made {
 }
 
 fn spectrogram(record: &[Option<f64>], rate_hz: f64) -> Spectrogram {
-    Spectrogram::of(record, rate_hz, &SpectrogramSettings { band_hz: Some(BAND_HZ), segment_s: None })
+    Spectrogram::new(record, rate_hz, &SpectrogramSettings { band_hz: Some(BAND_HZ), segment_s: None })
         .unwrap()
 }
 
@@ -130,7 +130,7 @@ fn courses_come_back_as_their_range_within_two_percent() {
             let made = Made::of(law, duration_s, rate_hz);
             made.assert_range(1, 0.02);
             (1..4).for_each(|seed| assert!(made.noisy().assert_range(seed, 0.02).low_sd_hz < 8.0));
-            assert!(made.noisy().ridge(1).drifts());
+            assert!(made.noisy().ridge(1).is_drifting());
         }
     }
 }
@@ -194,7 +194,7 @@ fn the_stated_deviations_of_points_and_ends_are_honest() {
 fn a_steady_tone_does_not_drift() {
     let mut drifting = 0;
     for (duration_s, rate_hz) in lengths_and_rates() {
-        assert!(!Made::of(STEADY, duration_s, rate_hz).ridge(1).drifts());
+        assert!(!Made::of(STEADY, duration_s, rate_hz).ridge(1).is_drifting());
         for seed in 0..5 {
             let ridge = Made::of(STEADY, duration_s, rate_hz).noisy().ridge(seed);
             let range = ridge.range_hz().unwrap();
@@ -204,7 +204,7 @@ fn a_steady_tone_does_not_drift() {
                     && (range.high_hz - 525.0).abs() < 4.0 * range.high_sd_hz,
                 "{range:?}"
             );
-            drifting += usize::from(ridge.drifts());
+            drifting += usize::from(ridge.is_drifting());
         }
     }
     assert_eq!(drifting, 0, "of 40");
@@ -217,14 +217,15 @@ fn noise_alone_has_no_ridge() {
             let mut draw = noise(104_729 * seed + 5);
             (0..(duration_s * rate_hz) as usize).map(|_| Some(1e-6 * draw())).collect::<Vec<_>>()
         };
-        let ridge = |record: Vec<Option<f64>>| spectrogram(&record, rate_hz).ridge(&record, BAND_HZ).unwrap();
+        let ridge =
+            |record: Vec<Option<f64>>| spectrogram(&record, rate_hz).find_ridge(&record, BAND_HZ).unwrap();
         let found: Vec<Ridge> =
             (0..100).map(|seed| ridge(silent(seed))).filter(|ridge| !ridge.points.is_empty()).collect();
         assert!(found.len() <= 5, "{} of 100", found.len());
     }
     let still = vec![Some(0.0); 750];
-    let ridge = spectrogram(&still, 5000.0).ridge(&still, BAND_HZ).unwrap();
-    assert!(ridge.points.is_empty() && ridge.range_hz().is_none() && !ridge.drifts());
+    let ridge = spectrogram(&still, 5000.0).find_ridge(&still, BAND_HZ).unwrap();
+    assert!(ridge.points.is_empty() && ridge.range_hz().is_none() && !ridge.is_drifting());
 }
 
 #[test]
@@ -237,7 +238,7 @@ fn a_component_that_ends_half_way_has_a_ridge_that_ends_there() {
             for (frame, sample) in record.iter_mut().enumerate() {
                 *sample = sample.filter(|_| frame < half).or(Some(0.0)).map(|x| x + NOISE_20_DB_M * draw());
             }
-            let ridge = spectrogram(&record, 5000.0).ridge(&record, BAND_HZ).unwrap();
+            let ridge = spectrogram(&record, 5000.0).find_ridge(&record, BAND_HZ).unwrap();
             let last = ridge.points.last().unwrap();
             let late = (last.time_s - duration_s / 2.0) / ridge.segment_s;
             assert!(ridge.start.is_some() && ridge.end.is_none(), "{duration_s} s, seed {seed}: {ridge:?}");
@@ -245,7 +246,7 @@ fn a_component_that_ends_half_way_has_a_ridge_that_ends_there() {
                 (-0.6..0.1).contains(&late),
                 "{duration_s} s, seed {seed}: {late} segments after the end"
             );
-            assert_eq!(ridge.parts().count(), 1);
+            assert_eq!(ridge.unbroken_parts().count(), 1);
             let range = ridge.range_hz().unwrap();
             assert!(
                 (range.low_hz - 500.0).abs() < 6.0 && range.high_hz < 555.0 && range.high_hz > 520.0,
@@ -269,8 +270,8 @@ fn a_gap_interrupts_the_ridge_and_columns_with_half_their_weight_missing_are_non
         .map(|(_, t)| *t)
         .collect();
     assert!(!empty.is_empty() && empty.iter().all(|t| (0.13..0.19).contains(t)), "{empty:?}");
-    let ridge = found.ridge(&record, BAND_HZ).unwrap();
-    assert_eq!(ridge.parts().count(), 2);
+    let ridge = found.find_ridge(&record, BAND_HZ).unwrap();
+    assert_eq!(ridge.unbroken_parts().count(), 2);
     let range = ridge.range_hz().unwrap();
     assert!(
         (range.low_hz / LOW_HZ - 1.0).abs() < 0.02 && (range.high_hz / HIGH_HZ - 1.0).abs() < 0.02,
@@ -284,7 +285,7 @@ fn a_steady_sine_reads_its_amplitude_in_every_column() {
         let made = Made { gaps, ..Made::of(STEADY, 0.3, 5000.0) };
         let record = made.record(1);
         let settings = SpectrogramSettings { segment_s: Some(0.04), band_hz: None };
-        let found = Spectrogram::of(&record, 5000.0, &settings).unwrap();
+        let found = Spectrogram::new(&record, 5000.0, &settings).unwrap();
         // 200 frames of 1500, 50 apart: 27 columns; 1024 bins of 4.88 Hz from zero to half the rate
         assert_eq!((found.time_s.len(), found.amplitude_m.len(), found.frequency_hz.len()), (27, 27, 513));
         assert_eq!((found.segment_s, found.hop_s, found.resolution_hz), (0.04, 0.01, 25.0));
@@ -301,7 +302,7 @@ fn a_steady_sine_reads_its_amplitude_in_every_column() {
                 "{top}"
             );
         }
-        let ridge = found.ridge(&record, BAND_HZ).unwrap();
+        let ridge = found.find_ridge(&record, BAND_HZ).unwrap();
         assert_eq!(ridge.points.len(), 27);
         for p in &ridge.points {
             assert!(
@@ -332,31 +333,34 @@ fn a_long_record_has_a_bounded_spectrogram() {
 fn what_cannot_be_cut_is_refused() {
     let record = Made::of(STEADY, 0.1, 5000.0).record(1);
     let of =
-        |segment_s, band_hz| Spectrogram::of(&record, 5000.0, &SpectrogramSettings { segment_s, band_hz });
+        |segment_s, band_hz| Spectrogram::new(&record, 5000.0, &SpectrogramSettings { segment_s, band_hz });
     for segment_s in [0.0, -1.0, 0.003, 0.2, f64::NAN, f64::INFINITY] {
         assert!(matches!(of(Some(segment_s), None), Err(SpectrumError::Segment { .. })), "{segment_s}");
     }
-    assert!(of(Some(0.1), None).unwrap().ridge(&record, BAND_HZ).is_ok());
+    assert!(of(Some(0.1), None).unwrap().find_ridge(&record, BAND_HZ).is_ok());
     for band_hz in [(700.0, 700.0), (2500.0, 2600.0), (-1.0, 5.0), (f64::NAN, 5.0), (5.0, f64::NAN)] {
         assert!(matches!(of(None, Some(band_hz)), Err(SpectrumError::Band { .. })), "{band_hz:?}");
         assert!(
-            matches!(of(None, None).unwrap().ridge(&record, band_hz), Err(SpectrumError::Band { .. })),
+            matches!(of(None, None).unwrap().find_ridge(&record, band_hz), Err(SpectrumError::Band { .. })),
             "{band_hz:?}"
         );
     }
     for (low, high) in [(0.0, 1e300), (0.0, 1e-300), (2499.0, f64::INFINITY)] {
-        assert!(of(None, Some((low, high))).unwrap().ridge(&record, (low, high)).is_ok(), "{low}..{high}");
+        assert!(
+            of(None, Some((low, high))).unwrap().find_ridge(&record, (low, high)).is_ok(),
+            "{low}..{high}"
+        );
     }
     assert!(matches!(
-        Spectrogram::of(&[Some(1.0); 7], 5000.0, &SpectrogramSettings::default()),
+        Spectrogram::new(&[Some(1.0); 7], 5000.0, &SpectrogramSettings::default()),
         Err(SpectrumError::TooFew { found: 7, least: 8 })
     ));
     for frames in [8, 9, 15, 16, 17, 33] {
         let short: Vec<_> = record.iter().copied().take(frames).collect();
-        let found = Spectrogram::of(&short, 5000.0, &SpectrogramSettings::default()).unwrap();
+        let found = Spectrogram::new(&short, 5000.0, &SpectrogramSettings::default()).unwrap();
         assert!(
-            found.ridge(&short, (1.0, 2500.0)).is_ok()
-                && found.ridge(&[], (1.0, 2500.0)).unwrap().points.is_empty()
+            found.find_ridge(&short, (1.0, 2500.0)).is_ok()
+                && found.find_ridge(&[], (1.0, 2500.0)).unwrap().points.is_empty()
         );
     }
 }

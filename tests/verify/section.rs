@@ -1,7 +1,7 @@
 //! From a section to a blade: closed forms of rods, plates and beams, limits, additivity and scaling.
 
-use wiperlab::section::checks::Checks;
-use wiperlab::section::{Estimate, Hinge, LinkSection, Section, plate_modulus_pa};
+use wiperlab::section::checks::BenchChecks;
+use wiperlab::section::{BladeEstimate, BladeSection, LinkSection, RubberHinge, plate_modulus_pa};
 use wiperlab::simulate::scene::Scene;
 
 const EXAMPLE: &str = include_str!("../../data/sections/example.toml");
@@ -12,12 +12,12 @@ fn link(height_m: f64, top_thickness_m: f64, bottom_thickness_m: f64) -> LinkSec
     LinkSection { height_m, top_thickness_m, bottom_thickness_m, hinge: None }
 }
 
-fn example() -> Estimate {
-    Estimate::of(&Section::parse("example.toml", EXAMPLE).unwrap())
+fn example() -> BladeEstimate {
+    BladeEstimate::from_section(&BladeSection::parse("example.toml", EXAMPLE).unwrap())
 }
 
 /// The example with other numbers.
-fn changed(changes: &[(&str, f64)]) -> Estimate {
+fn changed(changes: &[(&str, f64)]) -> BladeEstimate {
     let text = EXAMPLE.lines().map(|line| {
         let key = line.split_once(" = ").map_or("", |(key, _)| key);
         let (_, number) = line.split_once(" = ").unwrap_or_default();
@@ -27,7 +27,7 @@ fn changed(changes: &[(&str, f64)]) -> Estimate {
             _ => format!("{line}\n"),
         }
     });
-    Estimate::of(&Section::parse("example.toml", &text.collect::<String>()).unwrap())
+    BladeEstimate::from_section(&BladeSection::parse("example.toml", &text.collect::<String>()).unwrap())
 }
 
 #[track_caller]
@@ -75,7 +75,7 @@ fn a_trapezoid_is_the_sum_of_its_parts() {
 fn a_hinge_is_a_beam_under_a_moment() {
     let (modulus, t, l) = (plate_modulus_pa(6e6), 4e-4, 1e-3);
     near(modulus, 8e6, ROUNDING); // 4/3 of Young's modulus: rubber keeps its volume
-    let hinge = |thickness_m, height_m| Hinge { thickness_m, height_m }.stiffness_n_per_rad(modulus);
+    let hinge = |thickness_m, height_m| RubberHinge { thickness_m, height_m }.stiffness_n_per_rad(modulus);
     near(hinge(t, l), modulus * t.powi(3) / 12.0 / l, ROUNDING); // E' I/L
     near(hinge(t, l / 2.0) / 2.0, hinge(t, l), ROUNDING); // two halves in series
     near(hinge(2.0 * t, l), 8.0 * hinge(t, l), ROUNDING);
@@ -115,7 +115,8 @@ fn dimensions_scale_as_they_must() {
     for (key, power) in powers.into_iter().chain(stiffnesses) {
         near(large.value(key).unwrap() / one.value(key).unwrap(), factor.powi(power), ROUNDING);
     }
-    let frequency = |estimate: &Estimate| scene(estimate).value("blade.lip_natural_frequency_hz").unwrap();
+    let frequency =
+        |estimate: &BladeEstimate| scene(estimate).value("blade.lip_natural_frequency_hz").unwrap();
     near(frequency(&large) * factor, frequency(&one), 2e-3); // the table has four digits
 }
 
@@ -144,7 +145,7 @@ fn the_uncertainty_is_that_of_the_inputs() {
 }
 
 /// The table in a scene.
-fn scene(estimate: &Estimate) -> Scene {
+fn scene(estimate: &BladeEstimate) -> Scene {
     let rest = "[friction]\na = 0.1\nb_s_per_m = 5.0\nc = 0.3\n[drive]\namplitude_m = 0.045\nfrequency_hz = 0.75\n[run]\nstop_s = 1.0\nsample_rate_hz = 1000.0\n";
     let text = format!("format = 1\ntitle = \"from a section\"\n{}{rest}", estimate.to_toml());
     Scene::parse("scene.toml", &text).unwrap()
@@ -157,7 +158,7 @@ fn the_table_is_that_of_a_scene_and_believable() {
     for quantity in &estimate.blade {
         near(scene.value(&format!("blade.{}", quantity.key)).unwrap(), quantity.value, 5e-4);
     }
-    assert_eq!(scene.findings(), []);
+    assert_eq!(scene.find_implausible(), []);
     // a rigid plate on the spring of a cantilever swings at sqrt(3 k/m)/h, were it no thicker than a rod
     let lip = |key: &str| estimate.value(key).unwrap();
     let rod = (3.0 * lip("lip_stiffness_n_m_per_rad") / lip("lip_mass_kg")).sqrt() / lip("lip_length_m");
@@ -173,7 +174,7 @@ fn deflections_balance_the_moments() {
         let scene = crate::scenes::committed(name);
         let (blade, force) = (&scene.linkage, 0.013);
         let (l1, l2, k1, k2) = (blade.l1_m, blade.l2_m, blade.neck.stiffness, blade.lip.stiffness);
-        let checks = Checks::of(&scene, force, None);
+        let checks = BenchChecks::from_scene(&scene, force, None);
         near(checks.tip_displacement_m, force * ((l1 + l2).powi(2) / k1 + l2 * l2 / k2), 1e-12);
         near(checks.lip_displacement_m, force * l2 * l2 / k2, 1e-12);
         near(checks.weight_n, 9.80665 * checks.mass_kg, ROUNDING);
@@ -182,7 +183,7 @@ fn deflections_balance_the_moments() {
         near(slide.deflection_m, -(l1 * theta.sin() + l2 * phi.sin()), ROUNDING);
         // (1) to (3) at rest, with f = -mu N; the shoulder adds to the neck
         let normal = blade.head.stiffness * (blade.preload_displacement_m - slide.head_drop_m);
-        let friction = -blade.friction.dynamic(slide.speed_m_per_s) * normal;
+        let friction = -blade.friction.dynamic_coefficient(slide.speed_m_per_s) * normal;
         let neck = k1 * theta
             + blade.shoulder.map_or(0.0, |shoulder| {
                 shoulder.stiffness_n_m_per_rad

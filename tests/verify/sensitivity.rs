@@ -8,15 +8,17 @@ use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::collections::HashMap;
 use wiperlab::blade::Pose;
-use wiperlab::blade::modes::{Tip, modes};
+use wiperlab::blade::modes::{TipConstraint, natural_modes};
 use wiperlab::simulate::drive::Drive;
-use wiperlab::simulate::mode::Mode;
+use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::Transitions;
-use wiperlab::simulate::scene::{Jam, Loss, Scene, StartKind};
+use wiperlab::simulate::scene::{ContactLossRule, JamRule, Scene, StartKind};
 use wiperlab::simulate::sensitivity::{
-    Channel, Direction, Seeds, TangentObserver, TangentPiece, run_with_tangents,
+    Channel, TangentDirection, TangentObserver, TangentSeeds, TangentSegment, run_with_tangents,
 };
-use wiperlab::simulate::{Cause, Effort, Observer, Piece, Transition, run_with};
+use wiperlab::simulate::{
+    Observer, SolutionSegment, SolverOptions, Transition, TransitionCause, run_scene_with,
+};
 
 /// Tolerance of the runs that are compared.
 const TOLERANCE: f64 = 1e-13;
@@ -47,28 +49,28 @@ struct Derived {
 }
 
 impl TangentObserver for Derived {
-    fn piece(&mut self, piece: &TangentPiece<'_>) {
-        let at = piece.at(piece.end_s);
+    fn observe_segment(&mut self, piece: &TangentSegment<'_>) {
+        let at = piece.weights_at(piece.end_s);
         self.known = piece.is_known;
-        self.values = CHANNELS.iter().map(|&channel| piece.value(channel, &at)).collect();
+        self.values = CHANNELS.iter().map(|&channel| piece.channel_value(channel, &at)).collect();
         self.end = CHANNELS
             .iter()
             .map(|&channel| {
                 let mut row = vec![f64::NAN; self.directions];
-                piece.derivatives(channel, &at, &mut row);
+                piece.channel_derivatives(channel, &at, &mut row);
                 row
             })
             .collect();
     }
-    fn transition(&mut self, transition: &Transition, d_time_s: Option<&[f64]>) {
+    fn observe_transition(&mut self, transition: &Transition, d_time_s: Option<&[f64]>) {
         self.transitions.push((*transition, d_time_s.map(<[f64]>::to_vec)));
     }
 }
 
-fn derived(scene: &Scene, directions: &[Direction], tolerance: f64) -> Derived {
-    let seeds = Seeds::new(scene, directions).unwrap();
+fn derived(scene: &Scene, directions: &[TangentDirection], tolerance: f64) -> Derived {
+    let seeds = TangentSeeds::new(scene, directions).unwrap();
     let mut derived = Derived { directions: directions.len(), ..Derived::default() };
-    run_with_tangents(scene, Effort::new(tolerance), &seeds, &mut derived);
+    run_with_tangents(scene, SolverOptions::new(tolerance), &seeds, &mut derived);
     derived
 }
 
@@ -77,8 +79,8 @@ fn derived(scene: &Scene, directions: &[Direction], tolerance: f64) -> Derived {
 struct End(Vec<f64>);
 
 impl Observer for End {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        let s = piece.sample(piece.end_s);
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        let s = piece.sample_at(piece.end_s);
         let Pose { theta, phi, theta_rate, phi_rate } = s.pose;
         self.0 = vec![theta, phi, theta_rate, phi_rate, s.tip_x_m, s.head_drop_m, s.head_x_m];
     }
@@ -86,51 +88,51 @@ impl Observer for End {
 
 fn plain(scene: &Scene, tolerance: f64) -> (Vec<f64>, Vec<f64>) {
     let (mut end, mut transitions) = (End::default(), Transitions::default());
-    run_with(scene, Effort::new(tolerance), &mut (&mut end, &mut transitions));
+    run_scene_with(scene, SolverOptions::new(tolerance), &mut (&mut end, &mut transitions));
     (end.0, transitions.0.iter().map(|t| t.time_s).collect())
 }
 
 /// A scene moved along a direction, how much later its clock then is, and the scale of the direction.
-fn moved(scene: &Scene, direction: &Direction, step: f64) -> (Scene, f64) {
+fn moved(scene: &Scene, direction: &TangentDirection, step: f64) -> (Scene, f64) {
     let mut moved = scene.clone();
     let mut pose = |change: &dyn Fn(&mut Pose)| {
         let StartKind::State(pose) = &mut moved.start else { panic!("a scene that starts in a state") };
         change(pose);
     };
     match direction {
-        Direction::NeckAngle => pose(&|p| p.theta += step),
-        Direction::LipAngle => pose(&|p| p.phi += step),
-        Direction::NeckRate => pose(&|p| p.theta_rate += step),
-        Direction::LipRate => pose(&|p| p.phi_rate += step),
-        Direction::DriveScale => {
+        TangentDirection::NeckAngle => pose(&|p| p.theta += step),
+        TangentDirection::LipAngle => pose(&|p| p.phi += step),
+        TangentDirection::NeckRate => pose(&|p| p.theta_rate += step),
+        TangentDirection::LipRate => pose(&|p| p.phi_rate += step),
+        TangentDirection::DriveScale => {
             let amplitude = scene.value("drive.amplitude_m").unwrap();
-            return (scene.with("drive.amplitude_m", amplitude * (1.0 + step)).unwrap(), 0.0);
+            return (scene.with_parameter("drive.amplitude_m", amplitude * (1.0 + step)).unwrap(), 0.0);
         }
-        Direction::DriveDelay => {
+        TangentDirection::DriveDelay => {
             moved.start_s -= step;
             moved.run.stop_s -= step;
             return (moved, step);
         }
-        Direction::Parameter(name) => {
-            return (scene.with(name, scene.value(name).unwrap() + step).unwrap(), 0.0);
+        TangentDirection::Parameter(name) => {
+            return (scene.with_parameter(name, scene.value(name).unwrap() + step).unwrap(), 0.0);
         }
     }
     (moved, 0.0)
 }
 
-fn scale(scene: &Scene, direction: &Direction) -> f64 {
+fn scale(scene: &Scene, direction: &TangentDirection) -> f64 {
     match direction {
-        Direction::NeckAngle | Direction::LipAngle => 0.1,
-        Direction::NeckRate | Direction::LipRate => 100.0,
-        Direction::DriveScale => 1.0,
-        Direction::DriveDelay => 1e-3,
-        Direction::Parameter(name) => scene.value(name).unwrap(),
+        TangentDirection::NeckAngle | TangentDirection::LipAngle => 0.1,
+        TangentDirection::NeckRate | TangentDirection::LipRate => 100.0,
+        TangentDirection::DriveScale => 1.0,
+        TangentDirection::DriveDelay => 1e-3,
+        TangentDirection::Parameter(name) => scene.value(name).unwrap(),
     }
 }
 
 /// Six-point differences with this relative step: channels at the end and times of transitions, `values`
 /// together; `None` where a step changes their number.
-fn differences(scene: &Scene, direction: &Direction, share: f64, values: usize) -> Option<Vec<f64>> {
+fn differences(scene: &Scene, direction: &TangentDirection, share: f64, values: usize) -> Option<Vec<f64>> {
     const SIX: [(f64, f64); 6] = [
         (-3.0, -1.0 / 60.0),
         (-2.0, 9.0 / 60.0),
@@ -153,21 +155,21 @@ fn differences(scene: &Scene, direction: &Direction, share: f64, values: usize) 
     Some(sums)
 }
 
-fn every_direction(scene: &Scene) -> Vec<Direction> {
-    let mut directions: Vec<Direction> = wiperlab::blade::parameters::names()
+fn every_direction(scene: &Scene) -> Vec<TangentDirection> {
+    let mut directions: Vec<TangentDirection> = wiperlab::blade::parameters::parameter_names()
         .into_iter()
         .filter(|name| scene.value(name).is_some_and(|value| value != 0.0))
-        .map(|name| Direction::Parameter(name.to_owned()))
+        .map(|name| TangentDirection::Parameter(name.to_owned()))
         .collect();
     if matches!(scene.start, StartKind::State(_)) {
         directions.extend([
-            Direction::NeckAngle,
-            Direction::LipAngle,
-            Direction::NeckRate,
-            Direction::LipRate,
+            TangentDirection::NeckAngle,
+            TangentDirection::LipAngle,
+            TangentDirection::NeckRate,
+            TangentDirection::LipRate,
         ]);
     }
-    directions.extend([Direction::DriveScale, Direction::DriveDelay]);
+    directions.extend([TangentDirection::DriveScale, TangentDirection::DriveDelay]);
     directions
 }
 
@@ -211,17 +213,17 @@ struct Passed {
 }
 
 impl Observer for Passed {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        if piece.mode == Mode::SlipForward || piece.mode == Mode::SlipBackward {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        if piece.mode == TipMode::SlipForward || piece.mode == TipMode::SlipBackward {
             let t = 0.5 * (piece.start_s + piece.end_s);
-            self.states.push((t, piece.sample(t).pose));
+            self.states.push((t, piece.sample_at(t).pose));
         }
-        let [start, end] = [piece.start_s, piece.end_s].map(|t| piece.sample(t).pose.theta.abs());
+        let [start, end] = [piece.start_s, piece.end_s].map(|t| piece.sample_at(t).pose.theta.abs());
         if self.corner_rad.is_some_and(|corner| (start < corner) != (end < corner)) {
             self.events.push((piece.end_s, "corner"));
         }
     }
-    fn transition(&mut self, transition: &Transition) {
+    fn observe_transition(&mut self, transition: &Transition) {
         self.events.push((transition.time_s, transition.cause.name()));
     }
 }
@@ -233,8 +235,8 @@ fn windows(each: usize, length_s: f64) -> HashMap<&'static str, Vec<Scene>> {
     for _ in 0..60 {
         let mut parts = Parts::random(&mut rng);
         parts.hd *= 0.3;
-        let mut scene = parts.scene(STROKE).with("contact.restitution", 0.4).unwrap();
-        (scene.loss, scene.jam) = (Loss::Fly, Jam::Impact);
+        let mut scene = parts.scene(STROKE).with_parameter("contact.restitution", 0.4).unwrap();
+        (scene.loss, scene.jam) = (ContactLossRule::Fly, JamRule::Impact);
         add_windows(&mut windows, &scene, each, length_s);
     }
     windows
@@ -244,7 +246,7 @@ fn windows(each: usize, length_s: f64) -> HashMap<&'static str, Vec<Scene>> {
 fn add_windows(windows: &mut HashMap<&'static str, Vec<Scene>>, scene: &Scene, each: usize, length_s: f64) {
     let corner_rad = scene.linkage.shoulder.map(|s| s.contact_angle_rad);
     let mut passed = Passed { corner_rad, ..Passed::default() };
-    run_with(scene, Effort::new(1e-9), &mut passed);
+    run_scene_with(scene, SolverOptions::new(1e-9), &mut passed);
     let mut last = f64::NEG_INFINITY;
     for &(time, event) in &passed.events {
         let found = windows.entry(event).or_default();
@@ -297,15 +299,17 @@ fn a_head_that_starts_later_has_the_derivatives_of_its_own_start() {
 /// A blade let go with little friction swings across the head's speed without sticking.
 #[test]
 fn derivatives_are_those_of_differences_through_direct_reversals() {
-    let mut scene =
-        upright_light_blade().with("friction.a", 1e-4).and_then(|s| s.with("friction.c", 2e-4)).unwrap();
-    let swings = modes(&scene.linkage, Tip::Free, false).pop().unwrap();
+    let mut scene = upright_light_blade()
+        .with_parameter("friction.a", 1e-4)
+        .and_then(|s| s.with_parameter("friction.c", 2e-4))
+        .unwrap();
+    let swings = natural_modes(&scene.linkage, TipConstraint::Free, false).pop().unwrap();
     let (theta, phi) = (5e-4, 5e-4 * swings.lip_over_neck);
     let pose = Pose { theta, phi, theta_rate: 0.0, phi_rate: 0.0 };
     (scene.start_s, scene.start) = (5e-4, StartKind::State(pose));
     scene.run.stop_s = 5e-3;
     let transitions = derived(&scene, &[], 1e-9).transitions;
-    let reversals = transitions.iter().filter(|(t, _)| t.cause == Cause::DirectReversal).count();
+    let reversals = transitions.iter().filter(|(t, _)| t.cause == TransitionCause::DirectReversal).count();
     assert!(reversals == 2, "{reversals} {transitions:?}");
     let error = worst(&scene).unwrap();
     assert!(error < AGREEMENT, "{error:e}");
@@ -317,12 +321,12 @@ fn derivatives_do_not_change_the_run() {
     #[derive(Default, PartialEq, Debug)]
     struct Places(Vec<f64>, Vec<u64>);
     impl Observer for Places {
-        fn piece(&mut self, piece: &Piece<'_>) {
-            let pose = piece.sample(piece.end_s).pose;
+        fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+            let pose = piece.sample_at(piece.end_s).pose;
             self.0.push(piece.end_s);
             self.1.extend([pose.theta, pose.phi, pose.theta_rate, pose.phi_rate].map(f64::to_bits));
         }
-        fn transition(&mut self, transition: &Transition) {
+        fn observe_transition(&mut self, transition: &Transition) {
             self.1.push(transition.time_s.to_bits());
         }
     }
@@ -330,23 +334,23 @@ fn derivatives_do_not_change_the_run() {
     #[derive(Default)]
     struct Same(Places, Vec<f64>);
     impl TangentObserver for Same {
-        fn piece(&mut self, piece: &TangentPiece<'_>) {
-            let pose = piece.sample(piece.end_s).pose;
+        fn observe_segment(&mut self, piece: &TangentSegment<'_>) {
+            let pose = piece.sample_at(piece.end_s).pose;
             if self.1.get(self.0.0.len()) == Some(&piece.end_s) {
                 self.0.0.push(piece.end_s);
                 self.0.1.extend([pose.theta, pose.phi, pose.theta_rate, pose.phi_rate].map(f64::to_bits));
             }
         }
-        fn transition(&mut self, transition: &Transition, _: Option<&[f64]>) {
+        fn observe_transition(&mut self, transition: &Transition, _: Option<&[f64]>) {
             self.0.1.push(transition.time_s.to_bits());
         }
     }
     let scene = committed("actual-blade");
     let mut places = Places::default();
-    let plain = run_with(&scene, Effort::of(&scene), &mut places);
+    let plain = run_scene_with(&scene, SolverOptions::from_scene(&scene), &mut places);
     let mut same = Same(Places::default(), places.0.clone());
-    let seeds = Seeds::new(&scene, &every_direction(&scene)).unwrap();
-    let derived = run_with_tangents(&scene, Effort::of(&scene), &seeds, &mut same);
+    let seeds = TangentSeeds::new(&scene, &every_direction(&scene)).unwrap();
+    let derived = run_with_tangents(&scene, SolverOptions::from_scene(&scene), &seeds, &mut same);
     assert_eq!(plain, derived);
     assert_eq!(places, same.0);
 }
@@ -355,14 +359,18 @@ fn derivatives_do_not_change_the_run() {
 /// transition comes earlier by as much, whatever happens before it, and the end moves by its own rates.
 #[test]
 fn a_start_moved_along_the_motion_moves_transitions_back_in_time() {
-    const STATES: [Direction; 4] =
-        [Direction::NeckAngle, Direction::LipAngle, Direction::NeckRate, Direction::LipRate];
+    const STATES: [TangentDirection; 4] = [
+        TangentDirection::NeckAngle,
+        TangentDirection::LipAngle,
+        TangentDirection::NeckRate,
+        TangentDirection::LipRate,
+    ];
     /// Rates of the state at the start.
     struct Start(Option<[f64; 4]>);
     impl TangentObserver for Start {
-        fn piece(&mut self, piece: &TangentPiece<'_>) {
+        fn observe_segment(&mut self, piece: &TangentSegment<'_>) {
             const STEP_S: f64 = 1e-9;
-            let value = |channel, t| piece.value(channel, &piece.at(t));
+            let value = |channel, t| piece.channel_value(channel, &piece.weights_at(t));
             let rate = |channel| (value(channel, STEP_S) - value(channel, -STEP_S)) / (2.0 * STEP_S);
             let rates = [Channel::NeckRate, Channel::LipRate];
             let [theta, phi] = rates.map(|channel| value(channel, 0.0));
@@ -372,11 +380,11 @@ fn a_start_moved_along_the_motion_moves_transitions_back_in_time() {
     let mut transitions = 0;
     for scene in windows(3, 1e-3).into_values().flatten() {
         let mut scene = scene;
-        scene.drive = Drive::Uniform { speed_m_per_s: scene.drive.at(scene.start_s).velocity_m_per_s };
+        scene.drive = Drive::Uniform { speed_m_per_s: scene.drive.motion_at(scene.start_s).velocity_m_per_s };
         (scene.run.stop_s, scene.start_s) = (scene.run.stop_s - scene.start_s + 5e-4, 0.0);
         let mut start = Start(None);
-        let seeds = Seeds::new(&scene, &[]).unwrap();
-        run_with_tangents(&scene, Effort::new(1e-12), &seeds, &mut start);
+        let seeds = TangentSeeds::new(&scene, &[]).unwrap();
+        run_with_tangents(&scene, SolverOptions::new(1e-12), &seeds, &mut start);
         let rates = start.0.unwrap();
         let derived = derived(&scene, &STATES, 1e-12);
         let along = |row: &[f64]| row.iter().zip(rates).map(|(d, rate)| d * rate).sum::<f64>();
@@ -430,7 +438,7 @@ fn integrals_are_those_of_the_values() {
     /// Compares both over every piece, by the rule of three nodes in many parts.
     struct Both(Vec<[Vec<f64>; 2]>, usize);
     impl TangentObserver for Both {
-        fn piece(&mut self, piece: &TangentPiece<'_>) {
+        fn observe_segment(&mut self, piece: &TangentSegment<'_>) {
             const PARTS: usize = 16;
             const NODES: [(f64, f64); 3] = [
                 (-0.774_596_669_241_483_4, 5.0 / 18.0),
@@ -440,12 +448,16 @@ fn integrals_are_those_of_the_values() {
             let length = (piece.end_s - piece.start_s) / PARTS as f64;
             for channel in CHANNELS.into_iter().chain([Channel::NormalForce, Channel::FrictionForce]) {
                 let (mut integral, mut row) = (vec![0.0; self.1], vec![0.0; self.1]);
-                piece.derivatives(channel, &piece.over(piece.start_s, piece.end_s), &mut integral);
+                piece.channel_derivatives(
+                    channel,
+                    &piece.weights_over(piece.start_s, piece.end_s),
+                    &mut integral,
+                );
                 let mut sum = vec![0.0; self.1];
                 for part in 0..PARTS {
                     for (node, weight) in NODES {
                         let t = piece.start_s + (part as f64 + 0.5 * (1.0 + node)) * length;
-                        piece.derivatives(channel, &piece.at(t), &mut row);
+                        piece.channel_derivatives(channel, &piece.weights_at(t), &mut row);
                         sum.iter_mut().zip(&row).for_each(|(sum, d)| *sum += weight * length * d);
                     }
                 }
@@ -456,8 +468,8 @@ fn integrals_are_those_of_the_values() {
     for scene in windows(1, 1e-3).into_values().flatten() {
         let directions = every_direction(&scene);
         let mut both = Both(Vec::new(), directions.len());
-        let seeds = Seeds::new(&scene, &directions).unwrap();
-        run_with_tangents(&scene, Effort::new(1e-9), &seeds, &mut both);
+        let seeds = TangentSeeds::new(&scene, &directions).unwrap();
+        run_with_tangents(&scene, SolverOptions::new(1e-9), &seeds, &mut both);
         // one piece's derivative may pass zero: each is compared on the scale of the run
         let channels = CHANNELS.len() + 2;
         for channel in 0..channels {
@@ -479,12 +491,12 @@ fn a_recorded_head_may_be_delayed() {
     let mut early = scene.clone();
     early.start_s -= 0.01;
     scene.drive = recorded(early).drive;
-    let found = derived(&scene, &[Direction::DriveDelay], TOLERANCE);
+    let found = derived(&scene, &[TangentDirection::DriveDelay], TOLERANCE);
     let times = found.transitions.iter().map(|(_, row)| (row.as_ref().unwrap()[0], 1.0));
     let ends =
         found.end.iter().zip([100.0, 100.0, 1e5, 1e5, 1.0, 0.1, 1.0]).map(|(row, size)| (row[0], size));
     let found: Vec<(f64, f64)> = ends.chain(times).collect();
-    let expected = differences(&scene, &Direction::DriveDelay, 1e-5, found.len()).unwrap();
+    let expected = differences(&scene, &TangentDirection::DriveDelay, 1e-5, found.len()).unwrap();
     for (i, ((found, size), expected)) in found.into_iter().zip(expected).enumerate() {
         let error = (found - expected).abs() / expected.abs().max(size);
         assert!(error < 1e-6, "{i}: {found} instead of {expected}");
@@ -498,9 +510,9 @@ fn a_jam_has_no_derivatives() {
     let mut jams = 0;
     for _ in 0..20 {
         let mut scene = heavy_head_leading_tip(&mut rng);
-        scene.loss = Loss::Fly;
+        scene.loss = ContactLossRule::Fly;
         let derived = derived(&scene, &every_direction(&scene), 1e-9);
-        let jam = derived.transitions.iter().position(|(t, _)| t.cause == Cause::JamImpact);
+        let jam = derived.transitions.iter().position(|(t, _)| t.cause == TransitionCause::JamImpact);
         let Some(jam) = jam else { continue };
         assert!(derived.transitions[jam..].iter().all(|(_, row)| row.is_none()));
         assert!(!derived.known);

@@ -5,12 +5,12 @@ use crate::blade::{Parts, STROKE};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::blade::Pose;
-use wiperlab::blade::flight::Airborne;
-use wiperlab::blade::shoulder::Lean;
-use wiperlab::ode::taylor::{Expand, Expansion};
-use wiperlab::simulate::flight::{Flight, states_of};
-use wiperlab::simulate::phases::{GUARDS, JAMS, Slip, Stick, System};
-use wiperlab::simulate::system;
+use wiperlab::blade::flight::FlightState;
+use wiperlab::blade::shoulder::ShoulderContact;
+use wiperlab::ode::taylor::{TaylorExpansion, TaylorPhase};
+use wiperlab::simulate::build_system;
+use wiperlab::simulate::flight::{FlightPhase, flight_state_vector};
+use wiperlab::simulate::phases::{DrivenBlade, GUARDS, JAMS, SlipPhase, StickPhase};
 
 const STATES: usize = 200;
 const ORDER: usize = 18;
@@ -21,9 +21,9 @@ const AHEAD: [f64; 3] = [0.0, 0.03, 0.1];
 const AGREEMENT: f64 = 1e-10;
 
 struct Case {
-    system: System,
+    system: DrivenBlade,
     pose: Pose,
-    lean: Lean,
+    lean: ShoulderContact,
     t: f64,
 }
 
@@ -35,8 +35,8 @@ fn cases() -> impl Iterator<Item = Case> {
         let mut within = |most: f64| most * rng.random_range(-1.0..1.0);
         let pose =
             Pose { theta: within(0.8), phi: within(0.8), theta_rate: within(100.0), phi_rate: within(100.0) };
-        let lean = scene.linkage.shoulder.map_or(Lean::Off, |s| s.lean(pose.theta));
-        Case { system: system(&scene), pose, lean, t: rng.random_range(0.0..1.0) }
+        let lean = scene.linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(pose.theta));
+        Case { system: build_system(&scene), pose, lean, t: rng.random_range(0.0..1.0) }
     })
 }
 
@@ -46,15 +46,15 @@ fn at<const N: usize>(rows: &[[f64; N]], x: f64) -> [f64; N] {
 
 /// The polynomials satisfy the differential equation and give the guards, at the start and ahead of it;
 /// guards in `without` have no series.
-fn assert_expands<const N: usize, P: Expand<N, GUARDS>>(
+fn assert_expands<const N: usize, P: TaylorPhase<N, GUARDS>>(
     phase: &P,
     t: f64,
     y: &[f64; N],
     without: &[usize],
     what: &str,
 ) {
-    let mut out = Expansion { t, order: ORDER, ..Expansion::default() };
-    phase.expand(t, y, &mut P::Tape::default(), &mut out);
+    let mut out = TaylorExpansion { t, order: ORDER, ..TaylorExpansion::default() };
+    phase.expand_series(t, y, &mut P::Tape::default(), &mut out);
     let (states, guards) = (&out.states[..=ORDER], &out.guards[..=ORDER]);
     let slopes: Vec<[f64; N]> =
         states.iter().enumerate().skip(1).map(|(k, row)| row.map(|c| k as f64 * c)).collect();
@@ -94,17 +94,17 @@ fn assert_expands<const N: usize, P: Expand<N, GUARDS>>(
 fn slip_expands_to_its_own_motion() {
     let mut tested = 0;
     for (i, case) in cases().enumerate() {
-        let head = case.system.drive.at(case.t);
+        let head = case.system.drive.motion_at(case.t);
         let speed = case.system.linkage.tip_velocity_m_per_s(
             &case.pose,
-            &wiperlab::blade::Directions::of(&case.pose),
+            &wiperlab::blade::LinkDirections::from_pose(&case.pose),
             &head,
         );
-        let slip = Slip { system: &case.system, direction: speed.signum(), lean: case.lean };
+        let slip = SlipPhase { system: &case.system, direction: speed.signum(), lean: case.lean };
         let y = [case.pose.theta, case.pose.phi, case.pose.theta_rate, case.pose.phi_rate];
         // the indicator is constant in the expansion, and near its zero the radius of the series is short; N
         // is taken for its sign alone
-        let guards = wiperlab::ode::Phase::guards(&slip, case.t, &y);
+        let guards = wiperlab::ode::HybridPhase::guards(&slip, case.t, &y);
         if guards[JAMS] < 0.5 {
             continue;
         }
@@ -116,8 +116,13 @@ fn slip_expands_to_its_own_motion() {
             &[JAMS, wiperlab::simulate::phases::SLIP_CONTACT_LOST],
             &format!("state {i} of slip"),
         );
-        let mut out = Expansion { order: ORDER, ..Expansion::default() };
-        slip.expand(case.t, &y, &mut <Slip<'_> as Expand<4, GUARDS>>::Tape::default(), &mut out);
+        let mut out = TaylorExpansion { order: ORDER, ..TaylorExpansion::default() };
+        slip.expand_series(
+            case.t,
+            &y,
+            &mut <SlipPhase<'_> as TaylorPhase<4, GUARDS>>::Tape::default(),
+            &mut out,
+        );
         assert!((out.guards[0][JAMS] - guards[JAMS]).abs() < 1e-10, "indicator of state {i}");
         let normal = guards[wiperlab::simulate::phases::SLIP_CONTACT_LOST] / guards[JAMS];
         let found = out.guards[0][wiperlab::simulate::phases::SLIP_CONTACT_LOST];
@@ -132,8 +137,8 @@ fn slip_expands_to_its_own_motion() {
 #[test]
 fn stick_expands_to_its_own_motion() {
     for (i, case) in cases().enumerate() {
-        let stick = Stick::hold(&case.system, case.t, &case.pose, case.lean);
-        let y = stick.states(&case.pose);
+        let stick = StickPhase::from_pose(&case.system, case.t, &case.pose, case.lean);
+        let y = stick.free_states(&case.pose);
         assert_expands(&stick, case.t, &y, &[], &format!("state {i} of stick"));
     }
 }
@@ -141,12 +146,12 @@ fn stick_expands_to_its_own_motion() {
 #[test]
 fn flight_expands_to_its_own_motion() {
     for (i, case) in cases().enumerate() {
-        let flight = Flight { system: &case.system, lean: case.lean };
-        let state = Airborne {
+        let flight = FlightPhase { system: &case.system, lean: case.lean };
+        let state = FlightState {
             pose: case.pose,
             gap_m: 1e-5 * (i % 7) as f64,
             gap_rate_m_per_s: 0.01 * (i % 5) as f64,
         };
-        assert_expands(&flight, case.t, &states_of(&state), &[], &format!("state {i} of flight"));
+        assert_expands(&flight, case.t, &flight_state_vector(&state), &[], &format!("state {i} of flight"));
     }
 }

@@ -2,10 +2,12 @@
 //! angles, against fine quadrature, and through transitions.
 
 use crate::scenes::committed;
-use wiperlab::simulate::mode::Mode;
+use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::simulate::{Effort, Method, Observer, Piece, Place, run_with};
-use wiperlab::twin::{Camera, view};
+use wiperlab::simulate::{
+    BladePoints, IntegrationMethod, Observer, SolutionSegment, SolverOptions, run_scene_with,
+};
+use wiperlab::twin::{Camera, film_scene};
 
 /// A blade that slips, sticks and flies, the last with impacts.
 fn flying() -> Scene {
@@ -15,7 +17,7 @@ fn flying() -> Scene {
     Scene::parse("light.toml", &text).unwrap()
 }
 
-fn values(place: &Place) -> [f64; 4] {
+fn values(place: &BladePoints) -> [f64; 4] {
     [place.head_x_m, place.head_drop_m, place.tip_x_m, place.tip_height_m]
 }
 
@@ -24,10 +26,10 @@ fn apart(a: [f64; 4], b: [f64; 4]) -> f64 {
 }
 
 /// Looks at every piece of both scenes at a tolerance and a method; the modes that were seen.
-fn watch(effort: Effort, look: impl FnMut(&Piece<'_>)) -> Vec<Mode> {
-    struct Look<F>(F, Vec<Mode>);
-    impl<F: FnMut(&Piece<'_>)> Observer for Look<F> {
-        fn piece(&mut self, piece: &Piece<'_>) {
+fn watch(effort: SolverOptions, look: impl FnMut(&SolutionSegment<'_>)) -> Vec<TipMode> {
+    struct Look<F>(F, Vec<TipMode>);
+    impl<F: FnMut(&SolutionSegment<'_>)> Observer for Look<F> {
+        fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
             (self.0)(piece);
             if !self.1.contains(&piece.mode) {
                 self.1.push(piece.mode);
@@ -36,30 +38,33 @@ fn watch(effort: Effort, look: impl FnMut(&Piece<'_>)) -> Vec<Mode> {
     }
     let mut look = Look(look, Vec::new());
     for scene in [flying(), committed("actual-blade")] {
-        run_with(&scene, effort, &mut look);
+        run_scene_with(&scene, effort, &mut look);
     }
     look.1
 }
 
-fn with(relative: f64, method: Method) -> Effort {
-    Effort { method, ..Effort::new(relative) }
+fn with(relative: f64, method: IntegrationMethod) -> SolverOptions {
+    SolverOptions { method, ..SolverOptions::new(relative) }
 }
 
-fn assert_all(modes: &[Mode]) {
-    assert!(modes.contains(&Mode::Stick) && modes.contains(&Mode::Flight) && modes.len() == 4, "{modes:?}");
+fn assert_all(modes: &[TipMode]) {
+    assert!(
+        modes.contains(&TipMode::Stick) && modes.contains(&TipMode::Flight) && modes.len() == 4,
+        "{modes:?}"
+    );
 }
 
 /// Time at a share of a piece, its end to the bit.
-fn at(piece: &Piece<'_>, share: f64) -> f64 {
+fn at(piece: &SolutionSegment<'_>, share: f64) -> f64 {
     if share == 1.0 { piece.end_s } else { piece.start_s + share * (piece.end_s - piece.start_s) }
 }
 
 #[test]
 fn a_place_and_a_pose_are_the_samples_to_the_bit() {
-    let modes = watch(Effort::new(1e-8), |piece| {
+    let modes = watch(SolverOptions::new(1e-8), |piece| {
         for share in [0.0, 0.3, 1.0] {
             let t = at(piece, share);
-            let (sample, place, pose) = (piece.sample(t), piece.place(t), piece.pose(t));
+            let (sample, place, pose) = (piece.sample_at(t), piece.points_at(t), piece.pose_at(t));
             let expected = [sample.head_x_m, sample.head_drop_m, sample.tip_x_m, sample.tip_height_m];
             assert_eq!(values(&place).map(f64::to_bits), expected.map(f64::to_bits));
             assert_eq!(pose, sample.pose);
@@ -74,11 +79,11 @@ fn a_place_and_a_pose_are_the_samples_to_the_bit() {
 fn polynomials_give_the_places_of_the_poses() {
     for (relative, most_m) in [(1e-6, 1e-9), (1e-9, 1e-12), (1e-13, 1e-16)] {
         let mut worst: f64 = 0.0;
-        let modes = watch(Effort::new(relative), |piece| {
+        let modes = watch(SolverOptions::new(relative), |piece| {
             let path = piece.path();
             for share in [0.0, 0.21, 0.5, 0.83, 1.0] {
                 let t = at(piece, share);
-                worst = worst.max(apart(values(&path.at(t)), values(&piece.place(t))));
+                worst = worst.max(apart(values(&path.points_at(t)), values(&piece.points_at(t))));
             }
         });
         assert_all(&modes);
@@ -88,10 +93,10 @@ fn polynomials_give_the_places_of_the_poses() {
 
 #[test]
 fn a_tip_that_sticks_has_one_place() {
-    watch(Effort::new(1e-8), |piece| {
-        if piece.mode == Mode::Stick {
+    watch(SolverOptions::new(1e-8), |piece| {
+        if piece.mode == TipMode::Stick {
             let path = piece.path();
-            let [first, last] = [path.at(piece.start_s), path.at(piece.end_s)];
+            let [first, last] = [path.points_at(piece.start_s), path.points_at(piece.end_s)];
             assert_eq!(first.tip_x_m.to_bits(), last.tip_x_m.to_bits());
             assert_eq!(first.tip_height_m, 0.0);
         }
@@ -99,7 +104,7 @@ fn a_tip_that_sticks_has_one_place() {
 }
 
 /// Integral of the places by the two-point rule of Gauss on many parts.
-fn quadrature(piece: &Piece<'_>, from: f64, to: f64) -> [f64; 4] {
+fn quadrature(piece: &SolutionSegment<'_>, from: f64, to: f64) -> [f64; 4] {
     const PARTS: usize = 200;
     let half = 0.5 * (to - from) / PARTS as f64;
     let nodes = (0..PARTS).flat_map(|i| {
@@ -107,14 +112,14 @@ fn quadrature(piece: &Piece<'_>, from: f64, to: f64) -> [f64; 4] {
         [-1.0, 1.0].map(|side| middle + side * half / 3f64.sqrt())
     });
     nodes
-        .map(|t| values(&piece.place(t)))
+        .map(|t| values(&piece.points_at(t)))
         .fold([0.0; 4], |sum, place| std::array::from_fn(|i| sum[i] + half * place[i]))
 }
 
 /// The integral over a part of a piece, as a mean; for both kinds of solutions.
 #[test]
 fn integrals_are_those_of_fine_quadrature() {
-    for method in [Method::Taylor, Method::RungeKutta] {
+    for method in [IntegrationMethod::Taylor, IntegrationMethod::RungeKutta] {
         let (mut worst, mut number): (f64, usize) = (0.0, 0);
         let modes = watch(with(1e-12, method), |piece| {
             number += 1;
@@ -122,7 +127,8 @@ fn integrals_are_those_of_fine_quadrature() {
             if !number.is_multiple_of(17) || to - from < 1e-7 {
                 return;
             }
-            let (found, exact) = (values(&piece.path().integral(from, to)), quadrature(piece, from, to));
+            let (found, exact) =
+                (values(&piece.path().integrate_points(from, to)), quadrature(piece, from, to));
             worst = worst.max(apart(found, exact) / (to - from));
         });
         assert_all(&modes);
@@ -131,11 +137,11 @@ fn integrals_are_those_of_fine_quadrature() {
 }
 
 /// Frames of the bundled blade with long exposures, which hold several transitions and steps each.
-fn frames(effort: Effort, exposure_s: f64) -> Vec<[f64; 4]> {
+fn frames(effort: SolverOptions, exposure_s: f64) -> Vec<[f64; 4]> {
     let mut scene = committed("actual-blade");
     scene.run.stop_s = 0.8;
     let camera = Camera { frame_rate_hz: 1000.0, exposure_s };
-    let seen = view(&scene, &camera, scene.start_s, scene.run.stop_s, effort).unwrap();
+    let seen = film_scene(&scene, &camera, scene.start_s, scene.run.stop_s, effort).unwrap();
     let t = seen.recording.traces();
     (0..t.tip_x_m.len())
         .map(|i| [t.tip_x_m[i], t.tip_y_m[i], t.head_x_m[i], t.head_y_m[i]].map(Option::unwrap))
@@ -150,12 +156,12 @@ fn worst(a: &[[f64; 4]], b: &[[f64; 4]]) -> f64 {
 #[test]
 fn frames_converge_with_the_tolerance_and_methods_agree() {
     for exposure_s in [0.0, 2e-4, 1e-3] {
-        let exact = frames(with(1e-13, Method::Taylor), exposure_s);
+        let exact = frames(with(1e-13, IntegrationMethod::Taylor), exposure_s);
         for relative in [1e-6, 1e-8, 1e-10] {
-            let error = worst(&frames(with(relative, Method::Taylor), exposure_s), &exact);
+            let error = worst(&frames(with(relative, IntegrationMethod::Taylor), exposure_s), &exact);
             assert!(error < relative, "{exposure_s} s at {relative:e}: {error:e} m");
         }
-        let other = worst(&frames(with(1e-13, Method::RungeKutta), exposure_s), &exact);
+        let other = worst(&frames(with(1e-13, IntegrationMethod::RungeKutta), exposure_s), &exact);
         assert!(other < 1e-10, "{exposure_s} s: {other:e} m");
     }
 }
@@ -167,7 +173,7 @@ fn a_long_exposure_is_the_mean_of_short_ones() {
     scene.run.stop_s = 0.8;
     let tip = |frame_rate_hz: f64, exposure_s: f64, start_s: f64| {
         let camera = Camera { frame_rate_hz, exposure_s };
-        let seen = view(&scene, &camera, start_s, 0.8, Effort::new(1e-9)).unwrap();
+        let seen = film_scene(&scene, &camera, start_s, 0.8, SolverOptions::new(1e-9)).unwrap();
         seen.recording.traces().tip_x_m.iter().map(|x| x.unwrap()).collect::<Vec<f64>>()
     };
     let start_s = scene.start_s;
@@ -185,7 +191,7 @@ fn the_shutter_at_the_ends_is_cut_to_the_run() {
     let [start_s, stop_s] = [scene.start_s, scene.start_s + 0.1];
     let head = |frame_rate_hz: f64, exposure_s: f64| {
         let camera = Camera { frame_rate_hz, exposure_s };
-        let seen = view(&scene, &camera, start_s, stop_s, Effort::new(1e-10)).unwrap();
+        let seen = film_scene(&scene, &camera, start_s, stop_s, SolverOptions::new(1e-10)).unwrap();
         seen.recording.traces().head_x_m.iter().map(|x| x.unwrap()).collect::<Vec<f64>>()
     };
     // the first 5 ms are one frame's half, and a half and two frames of another camera

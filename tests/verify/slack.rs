@@ -3,9 +3,11 @@
 
 use crate::belt::{BELTS, Riding, Sliding};
 use crate::scenes::committed;
-use wiperlab::ode::{Cause, End, Locator, Phase, Start, Work, integrate_by};
+use wiperlab::ode::{
+    EventLocator, HybridPhase, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters, integrate_with_locator,
+};
 use wiperlab::simulate::outputs::Transitions;
-use wiperlab::simulate::{Effort, Method, Status, Transition, run_with};
+use wiperlab::simulate::{IntegrationMethod, RunStatus, SolverOptions, Transition, run_scene_with};
 
 /// How far the two locators may be apart in units of the tolerance.
 const APART: f64 = 10.0;
@@ -19,11 +21,22 @@ fn tolerances() -> impl Iterator<Item = f64> {
 }
 
 /// The phase by the slack variable, checked against bracketing from the same start.
-fn both<const N: usize>(phase: &impl Phase<N, 1>, start: Start<N, 1>, relative: f64) -> End<N> {
-    let [slack, bracket] = [Locator::Slack, Locator::Bracket].map(|locator| {
-        let end =
-            integrate_by(locator, phase, start, start.t + 100.0, relative, &mut Work::default(), |_| ());
-        assert_eq!(end.cause, Cause::Guard(0), "{locator:?} at {relative:e}");
+fn both<const N: usize>(
+    phase: &impl HybridPhase<N, 1>,
+    start: PhaseStart<N, 1>,
+    relative: f64,
+) -> PhaseEnd<N> {
+    let [slack, bracket] = [EventLocator::Slack, EventLocator::Bracket].map(|locator| {
+        let end = integrate_with_locator(
+            locator,
+            phase,
+            start,
+            start.t + 100.0,
+            relative,
+            &mut WorkCounters::default(),
+            |_| (),
+        );
+        assert_eq!(end.cause, PhaseEndCause::Guard(0), "{locator:?} at {relative:e}");
         end
     });
     let rounding = 1e-15 * slack.t.abs().max(1.0);
@@ -62,18 +75,22 @@ fn both_locators_meet_the_exact_cycles_of_the_belts() {
     }
 }
 
-fn transitions(method: Method, relative: f64) -> Vec<Transition> {
+fn transitions(method: IntegrationMethod, relative: f64) -> Vec<Transition> {
     let mut list = Transitions::default();
-    let run = run_with(&committed("light-blade"), Effort { method, ..Effort::new(relative) }, &mut list);
-    assert_eq!(run.status, Status::Completed);
+    let run = run_scene_with(
+        &committed("light-blade"),
+        SolverOptions { method, ..SolverOptions::new(relative) },
+        &mut list,
+    );
+    assert_eq!(run.status, RunStatus::Completed);
     list.0
 }
 
 #[test]
 fn both_locators_give_the_light_blade_the_same_transitions() {
     for relative in tolerances() {
-        let [bracket, slack] =
-            [Method::RungeKutta, Method::Slack].map(|method| transitions(method, relative));
+        let [bracket, slack] = [IntegrationMethod::RungeKutta, IntegrationMethod::Slack]
+            .map(|method| transitions(method, relative));
         assert_eq!(slack.len(), 450, "at {relative:e}");
         assert_eq!(bracket.len(), 450, "at {relative:e}");
         let mut worst = 0.0f64;
@@ -96,7 +113,7 @@ struct Dip {
     level: f64,
 }
 
-impl Phase<2, 1> for Dip {
+impl HybridPhase<2, 1> for Dip {
     fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
         [y[1], -y[0]]
     }
@@ -113,17 +130,17 @@ impl Phase<2, 1> for Dip {
 fn a_dip_within_a_step_is_located_ever_closer_to_a_double_root() {
     for depth in [1e-2, 1e-4, 1e-6] {
         for relative in [1e-8, 1e-10, 1e-12] {
-            let start = Start { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
-            let end = integrate_by(
-                Locator::Slack,
+            let start = PhaseStart { t: 0.0, y: [1.0, 0.0], zero_order: [0], step: None };
+            let end = integrate_with_locator(
+                EventLocator::Slack,
                 &Dip { level: depth - 1.0 },
                 start,
                 10.0,
                 relative,
-                &mut Work::default(),
+                &mut WorkCounters::default(),
                 |_| (),
             );
-            assert_eq!(end.cause, Cause::Guard(0));
+            assert_eq!(end.cause, PhaseEndCause::Guard(0));
             let error = (end.t - (depth - 1.0f64).acos()).abs();
             let slope = (2.0 * depth).sqrt();
             assert!(

@@ -2,7 +2,9 @@
 
 use crate::noise::noise;
 use std::f64::consts::TAU;
-use wiperlab::spectrum::{Component, Detrend, Settings, Spectrum, SpectrumError, Verdict, analyse};
+use wiperlab::spectrum::{
+    Component, ComponentVerdict, Detrend, Spectrum, SpectrumError, SpectrumSettings, analyse_spectrum,
+};
 
 const RATE_HZ: f64 = 5000.0;
 
@@ -11,7 +13,7 @@ fn record(frames: usize, f: impl Fn(f64) -> f64) -> Vec<Option<f64>> {
 }
 
 fn spectrum(samples: &[Option<f64>]) -> Spectrum {
-    analyse(samples, RATE_HZ, &Settings::default()).unwrap()
+    analyse_spectrum(samples, RATE_HZ, &SpectrumSettings::default()).unwrap()
 }
 
 /// Drops about one frame in five, by a fixed generator.
@@ -27,7 +29,7 @@ fn dropped(samples: &[Option<f64>], level: f64, seed: u64) -> Vec<Option<f64>> {
 
 /// What is not a remainder of the trend.
 fn resolvable(spectrum: &Spectrum) -> Vec<Component> {
-    spectrum.components.iter().filter(|c| c.verdict != Verdict::NotResolvable).cloned().collect()
+    spectrum.components.iter().filter(|c| c.verdict != ComponentVerdict::NotResolvable).cloned().collect()
 }
 
 fn only(spectrum: &Spectrum) -> Component {
@@ -43,7 +45,7 @@ fn a_tone_on_and_off_a_bin_reads_its_frequency_and_amplitude() {
         let found = only(&spectrum(&record(750, |t| 3e-6 * (TAU * tone_hz * t + 0.7).sin())));
         assert!((found.frequency_hz - tone_hz).abs() < 0.03, "{tone_hz}: {}", found.frequency_hz);
         assert!((found.amplitude_m / 3e-6 - 1.0).abs() < 0.01, "{tone_hz}: {}", found.amplitude_m);
-        assert_eq!(found.verdict, Verdict::Clear);
+        assert_eq!(found.verdict, ComponentVerdict::Clear);
         assert_eq!(found.damping_ratio, None);
     }
 }
@@ -64,10 +66,14 @@ fn two_tones_on_the_flip_of_a_blade_are_both_found() {
 fn a_line_leaves_far_more_error_than_a_cubic() {
     let samples = record(750, |t| 5e-4 * (t / 0.15 - 0.5).powi(3) * 8.0 + 20e-6 * (TAU * 78.4 * t).sin());
     let error = |detrend| {
-        let found = analyse(
+        let found = analyse_spectrum(
             &samples,
             RATE_HZ,
-            &Settings { detrend: Some(detrend), band_hz: Some((60.0, 100.0)), ..Settings::default() },
+            &SpectrumSettings {
+                detrend: Some(detrend),
+                band_hz: Some((60.0, 100.0)),
+                ..SpectrumSettings::default()
+            },
         )
         .unwrap();
         found.component_in_band(60.0, 100.0).map_or(f64::INFINITY, |c| (c.frequency_hz - 78.4).abs())
@@ -251,7 +257,7 @@ fn closing_up_the_gaps_moves_a_peak_by_tens_of_hertz() {
         let kept = spectrum(&gappy).component_in_band(870.0, 930.0).unwrap().frequency_hz;
         assert!((kept - 900.0).abs() < 1e-3, "{kept}");
         let closed: Vec<_> = gappy.into_iter().filter(Option::is_some).collect();
-        let found = analyse(&closed, RATE_HZ, &Settings::default()).unwrap();
+        let found = analyse_spectrum(&closed, RATE_HZ, &SpectrumSettings::default()).unwrap();
         moved_hz.push(found.components.first().map_or(f64::INFINITY, |c| (c.frequency_hz - 900.0).abs()));
     }
     assert!(moved_hz.iter().all(|moved| *moved > 20.0), "{moved_hz:?}");
@@ -306,9 +312,13 @@ fn noise_alone_has_no_component_in_nearly_every_spectrum() {
 #[test]
 fn fewer_than_three_cycles_are_not_resolvable() {
     let samples = record(750, |t| 1e-5 * (TAU * 17.0 * t).sin());
-    let found = analyse(&samples, RATE_HZ, &Settings { detrend: Some(Detrend::Mean), ..Settings::default() })
-        .unwrap();
-    assert_eq!(found.components[0].verdict, Verdict::NotResolvable);
+    let found = analyse_spectrum(
+        &samples,
+        RATE_HZ,
+        &SpectrumSettings { detrend: Some(Detrend::Mean), ..SpectrumSettings::default() },
+    )
+    .unwrap();
+    assert_eq!(found.components[0].verdict, ComponentVerdict::NotResolvable);
     assert_eq!(found.component_in_band(0.0, 100.0), None);
 }
 
@@ -336,8 +346,9 @@ fn a_long_record_reads_its_tone_no_worse_for_its_wider_bins() {
 
 #[test]
 fn records_without_a_spectrum_are_refused() {
-    let refuse = |samples: &[Option<f64>], rate, settings| analyse(samples, rate, &settings).unwrap_err();
-    let default = Settings::default();
+    let refuse =
+        |samples: &[Option<f64>], rate, settings| analyse_spectrum(samples, rate, &settings).unwrap_err();
+    let default = SpectrumSettings::default();
     assert_eq!(refuse(&[None; 100], RATE_HZ, default), SpectrumError::TooFew { found: 0, least: 8 });
     assert_eq!(refuse(&[Some(1.0); 7], RATE_HZ, default), SpectrumError::TooFew { found: 7, least: 8 });
     assert_eq!(refuse(&[Some(1.0); 8], 0.0, default), SpectrumError::FrameRate { found: 0.0 });
@@ -348,7 +359,7 @@ fn records_without_a_spectrum_are_refused() {
     );
     for band in [(100.0, 100.0), (2500.0, 2600.0), (-1.0, 5.0), (f64::NAN, 5.0)] {
         assert!(matches!(
-            refuse(&[Some(1.0); 100], RATE_HZ, Settings { band_hz: Some(band), ..default }),
+            refuse(&[Some(1.0); 100], RATE_HZ, SpectrumSettings { band_hz: Some(band), ..default }),
             SpectrumError::Band { .. }
         ));
     }

@@ -4,7 +4,7 @@
 
 use crate::scenes::committed;
 use wiperlab::simulate::outputs::Transitions;
-use wiperlab::simulate::{Effort, Method, Run, Status, run_with};
+use wiperlab::simulate::{IntegrationMethod, RunResult, RunStatus, SolverOptions, run_scene_with};
 
 const REFERENCE: &str = include_str!("../../benches/peers/reference/transitions.csv");
 /// Transitions of the reference, counted there.
@@ -22,12 +22,19 @@ fn exact() -> Vec<(f64, &'static str, &'static str)> {
 
 /// The run and its worst error of a transition time, s; the list must be the reference's, transition by
 /// transition.
-fn worst_error(method: Method, relative: f64) -> (Run, f64) {
+fn worst_error(method: IntegrationMethod, relative: f64) -> (RunResult, f64) {
     let (exact, mut found) = (exact(), Transitions::default());
     assert_eq!(exact.len(), TRANSITIONS);
-    let run =
-        run_with(&committed("light-blade-strokes"), Effort { method, ..Effort::new(relative) }, &mut found);
-    assert_eq!((run.status, found.0.len()), (Status::Completed, TRANSITIONS), "{method:?} at {relative:e}");
+    let run = run_scene_with(
+        &committed("light-blade-strokes"),
+        SolverOptions { method, ..SolverOptions::new(relative) },
+        &mut found,
+    );
+    assert_eq!(
+        (run.status, found.0.len()),
+        (RunStatus::Completed, TRANSITIONS),
+        "{method:?} at {relative:e}"
+    );
     let errors = found.0.iter().zip(&exact).enumerate().map(|(i, (found, &(time_s, from, to)))| {
         assert_eq!(
             (found.from.name(), found.to.name()),
@@ -44,7 +51,7 @@ fn worst_error(method: Method, relative: f64) -> (Run, f64) {
 fn the_worst_transition_tracks_the_tolerance() {
     for exponent in 4..=12 {
         let relative = 10f64.powi(-exponent);
-        let (_, error) = worst_error(Method::Taylor, relative);
+        let (_, error) = worst_error(IntegrationMethod::Taylor, relative);
         assert!(error <= 2.0 * relative, "off by {error:e} s at {relative:e}");
         // the tolerance is not met by luck or at the price of the next two
         assert!(error >= 1e-3 * relative, "off by {error:e} s only at {relative:e}");
@@ -55,14 +62,14 @@ fn the_worst_transition_tracks_the_tolerance() {
 #[test]
 fn an_independent_method_finds_the_same_transitions() {
     for (relative, most) in [(1e-4, 1e-2), (1e-8, 1e-6), (1e-11, 1e-9)] {
-        let (_, error) = worst_error(Method::RungeKutta, relative);
+        let (_, error) = worst_error(IntegrationMethod::RungeKutta, relative);
         assert!(error <= most, "off by {error:e} s at {relative:e}");
     }
 }
 
 #[test]
 fn a_transition_costs_few_right_hand_sides() {
-    let (run, _) = worst_error(Method::Taylor, 1e-8);
+    let (run, _) = worst_error(IntegrationMethod::Taylor, 1e-8);
     let cost = run.work.rhs_evaluations as f64 / TRANSITIONS as f64;
     assert!(cost <= 70.0, "{cost} a transition");
     assert_eq!(run.work.rejected_steps, 0);

@@ -4,18 +4,20 @@
 use resvg::{tiny_skia, usvg};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::blade::modes::{Tip, modes};
+use wiperlab::blade::modes::{TipConstraint, natural_modes};
 use wiperlab::chart::Medium;
-use wiperlab::feature::{self, Reader};
+use wiperlab::feature::{self, FeatureReader};
 use wiperlab::figures::sweep_map;
-use wiperlab::journal::{Shard, header_line};
-use wiperlab::recording::channel::Instants;
-use wiperlab::simulate::mode::Mode;
+use wiperlab::journal::{Shard, format_header_line};
+use wiperlab::recording::channel::ReversalInstants;
+use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::Transitions;
-use wiperlab::simulate::scene::{Loss, Scene};
-use wiperlab::simulate::{Effort, Status, run};
-use wiperlab::sweep::{self, Collection, Map, Outcome, Reason, Study, journal as points};
-use wiperlab::twin::view;
+use wiperlab::simulate::scene::{ContactLossRule, Scene};
+use wiperlab::simulate::{RunStatus, SolverOptions, run_scene};
+use wiperlab::sweep::{
+    self, MissingReason, PointCollection, PointOutcome, Study, SweepMap, journal as points,
+};
+use wiperlab::twin::film_scene;
 
 const LIGHT_BLADE: &str = include_str!("../../data/scenes/light-blade.toml");
 const ACTUAL_BLADE: &str = include_str!("../../data/scenes/actual-blade.toml");
@@ -33,7 +35,7 @@ fn go_on() -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
 
-fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
+fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<PointOutcome>) {
     let text = format!(
         "format = 1\ntitle = \"t\"\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n{body}"
     );
@@ -43,17 +45,18 @@ fn outcomes(scene: &Scene, body: &str) -> (Study, Vec<Outcome>) {
     let count = || {
         done.fetch_add(1, Ordering::Relaxed);
     };
-    let mut journal = header_line(&points::header(&study, "f"));
-    sweep::run(&study, scene, Shard::WHOLE, &|_| true, &mut journal, &count, &go_on).unwrap();
-    let mut collected = Collection::new(points::header(&study, "f"), tempfile::tempfile().unwrap());
-    let added = collected.add("journal", journal.as_bytes()).unwrap().unwrap();
-    assert_eq!([added.points, added.new, done.into_inner()], [study.points(); 3]);
+    let mut journal = format_header_line(&points::study_header(&study, "f"));
+    sweep::run_sweep(&study, scene, Shard::WHOLE, &|_| true, &mut journal, &count, &go_on).unwrap();
+    let mut collected =
+        PointCollection::new(points::study_header(&study, "f"), tempfile::tempfile().unwrap());
+    let added = collected.add_journal("journal", journal.as_bytes()).unwrap().unwrap();
+    assert_eq!([added.points, added.new, done.into_inner()], [study.point_count(); 3]);
     let mut outcomes = Vec::new();
-    collected.each(|_, outcome| outcomes.push(outcome)).unwrap();
+    collected.for_each_point(|_, outcome| outcomes.push(outcome)).unwrap();
     (study, outcomes)
 }
 
-fn values(outcome: &Outcome) -> Vec<f64> {
+fn values(outcome: &PointOutcome) -> Vec<f64> {
     outcome.values.iter().map(|value| *value.as_ref().unwrap()).collect()
 }
 
@@ -90,10 +93,12 @@ fn a_free_ring_down_has_the_eigenfrequencies_everywhere() {
                 least_amplitude_m = 1e-6\n"; // the angles are 1e-5 rad, the links 4 mm long
     let (study, outcomes) = outcomes(&scene, maps);
     for (index, outcome) in outcomes.iter().enumerate() {
-        let at = study.scene_at(&scene, index).unwrap();
-        let expected: Vec<f64> =
-            modes(&at.linkage, Tip::Free, false).iter().map(|mode| mode.frequency_hz.unwrap()).collect();
-        assert_eq!(outcome.values[2], Err(Reason::NoComponent));
+        let at = study.scene_of_point(&scene, index).unwrap();
+        let expected: Vec<f64> = natural_modes(&at.linkage, TipConstraint::Free, false)
+            .iter()
+            .map(|mode| mode.frequency_hz.unwrap())
+            .collect();
+        assert_eq!(outcome.values[2], Err(MissingReason::NoComponent));
         for (found, expected) in
             outcome.values.iter().take(2).map(|value| value.as_ref().unwrap()).zip(expected)
         {
@@ -101,7 +106,7 @@ fn a_free_ring_down_has_the_eigenfrequencies_everywhere() {
             assert!(
                 (found / expected - 1.0).abs() < 1e-4,
                 "{:?}: {found} Hz, expected {expected} Hz",
-                study.place(index)
+                study.point_values(index)
             );
         }
     }
@@ -170,12 +175,12 @@ fn a_mirror_image_shows_the_same() {
 
 /// The time in stick, counted from the list of transitions.
 fn stick_s(scene: &Scene, transitions: &Transitions) -> f64 {
-    let times: Vec<(f64, Mode)> = transitions.0.iter().map(|t| (t.time_s, t.to)).collect();
+    let times: Vec<(f64, TipMode)> = transitions.0.iter().map(|t| (t.time_s, t.to)).collect();
     let ends = times.iter().skip(1).map(|t| t.0).chain([scene.run.stop_s]);
     times
         .iter()
         .zip(ends)
-        .filter(|((_, mode), _)| *mode == Mode::Stick)
+        .filter(|((_, mode), _)| *mode == TipMode::Stick)
         .map(|((from, _), to)| to - from)
         .sum()
 }
@@ -190,23 +195,27 @@ fn every_point_is_the_run_of_its_scene_and_lost_contact_has_a_reason_and_no_numb
                 [[map]]\nname = \"force\"\nkind = \"least-normal-force\"\n\
                 [[map]]\nname = \"jam\"\nkind = \"jam\"\n";
     let mut flies = scene.clone();
-    flies.loss = Loss::Fly;
+    flies.loss = ContactLossRule::Fly;
     let flying = outcomes(&flies, maps).1;
     let (study, outcomes) = outcomes(&scene, maps);
     let (mut kept, mut lost) = (0, 0);
     for (index, (outcome, flying)) in outcomes.iter().zip(&flying).enumerate() {
         assert_eq!(flying.values[1], outcome.values[1], "the first flight starts where contact is lost");
-        let at = study.scene_at(&scene, index).unwrap();
+        let at = study.scene_of_point(&scene, index).unwrap();
         let mut transitions = Transitions::default();
-        let ended = run(&at, &mut transitions);
+        let ended = run_scene(&at, &mut transitions);
         assert_eq!((outcome.status(), outcome.stopped_at_s), (ended.status.name(), Some(ended.stopped_at_s)));
         let [fraction, loss, force, jam] = &outcome.values[..] else { panic!("four maps") };
-        let missing = Err::<f64, Reason>;
-        if ended.status == Status::ContactLost {
+        let missing = Err::<f64, MissingReason>;
+        if ended.status == RunStatus::ContactLost {
             lost += 1;
             assert_eq!(
                 (fraction, loss, jam),
-                (&missing(Reason::ContactLost), &Ok(ended.stopped_at_s), &missing(Reason::ContactLost))
+                (
+                    &missing(MissingReason::ContactLost),
+                    &Ok(ended.stopped_at_s),
+                    &missing(MissingReason::ContactLost)
+                )
             );
             assert!(*force.as_ref().unwrap() < 1e-9, "{force:?}");
         } else {
@@ -217,7 +226,7 @@ fn every_point_is_the_run_of_its_scene_and_lost_contact_has_a_reason_and_no_numb
                 (fraction.as_ref().unwrap() - expected).abs() < 1e-12 && expected > 0.05,
                 "{fraction:?}, expected {expected}"
             );
-            assert_eq!((loss, jam), (&missing(Reason::Never), &missing(Reason::Never)));
+            assert_eq!((loss, jam), (&missing(MissingReason::Never), &missing(MissingReason::Never)));
             assert!(*force.as_ref().unwrap() > 1e-6);
         }
     }
@@ -232,7 +241,7 @@ fn a_blade_without_a_steady_slide_and_a_window_that_is_not_there_are_said() {
     let (_, outcomes) = outcomes(&scene(&[]), maps);
     let reasons: Vec<_> =
         outcomes.iter().map(|outcome| (outcome.status(), outcome.values[0].unwrap_err())).collect();
-    assert_eq!(reasons, [("no-start", Reason::NoStart), ("completed", Reason::NoWindow)]);
+    assert_eq!(reasons, [("no-start", MissingReason::NoStart), ("completed", MissingReason::NoWindow)]);
 }
 
 /// Colour at a share of the width and of the height (from the bottom) of the map in a figure.
@@ -269,13 +278,16 @@ fn every_cell_of_a_map_stands_in_its_place() {
         "format = 1\ntitle = \"t\"\nscene = \"s\"\n[camera]\nframe_rate_hz = 1e4\nexposure_s = 0.0\n{maps}"
     );
     let study = Study::parse("study", &text).unwrap();
-    let found =
-        |value: Result<f64, Reason>| Outcome { ended: None, stopped_at_s: Some(1.0), values: vec![value] };
+    let found = |value: Result<f64, MissingReason>| PointOutcome {
+        ended: None,
+        stopped_at_s: Some(1.0),
+        values: vec![value],
+    };
     // the first axis goes to the right, the second one upwards
     let mut outcomes = vec![found(Ok(0.0)); 6];
     outcomes[4] = found(Ok(1.0)); // a = 0.3, c = 0.1
-    outcomes[1] = found(Err(Reason::NoComponent)); // a = 0.1, c = 1
-    let svg = sweep_map::figure(&study, &scene(&[]), &outcomes, 0).svg(Medium::Screen);
+    outcomes[1] = found(Err(MissingReason::NoComponent)); // a = 0.1, c = 1
+    let svg = sweep_map::draw_figure(&study, &scene(&[]), &outcomes, 0).to_svg(Medium::Screen);
     let (purple, yellow, grey) = ([0x44, 0x01, 0x54], [0xFD, 0xE7, 0x25], [0xE4, 0xE4, 0xE4]);
     for (across, up, expected) in [
         (0.1, 0.2, purple),
@@ -291,8 +303,8 @@ fn every_cell_of_a_map_stands_in_its_place() {
     assert_eq!([colour(&svg, 0.1, 0.47), colour(&svg, 0.1, 0.53)], [purple, grey]);
     assert!(svg.contains("no component in the band: 1") && svg.contains("the scene as written"));
     // a map without any value is a figure too, and says why
-    let nothing = vec![found(Err(Reason::Jammed)); 6];
-    let svg = sweep_map::figure(&study, &scene(&[]), &nothing, 0).svg(Medium::Screen);
+    let nothing = vec![found(Err(MissingReason::Jammed)); 6];
+    let svg = sweep_map::draw_figure(&study, &scene(&[]), &nothing, 0).to_svg(Medium::Screen);
     assert!(svg.contains("jammed (Painlev\u{e9}): 6") && !svg.contains("NaN") && !svg.contains("#440154"));
 }
 
@@ -314,12 +326,14 @@ fn of_a_jammed_run_only_the_instant_is_known() {
         "{:?}: it ends where the indicator is zero",
         jammed.values[1]
     );
-    assert!(jammed.values[2..].iter().all(|value| *value == Err(Reason::Jammed)), "{jammed:?}");
-    assert!(outcomes[1].values[0] == Err(Reason::Never) && *outcomes[1].values[1].as_ref().unwrap() > 0.5);
+    assert!(jammed.values[2..].iter().all(|value| *value == Err(MissingReason::Jammed)), "{jammed:?}");
+    assert!(
+        outcomes[1].values[0] == Err(MissingReason::Never) && *outcomes[1].values[1].as_ref().unwrap() > 0.5
+    );
 }
 
 /// A study of the actual blade with these maps, at two speeds of the head.
-fn of_the_actual_blade(maps: &str) -> (Scene, Study, Vec<Outcome>) {
+fn of_the_actual_blade(maps: &str) -> (Scene, Study, Vec<PointOutcome>) {
     let scene = Scene::parse("scene", ACTUAL_BLADE).unwrap();
     let axis = "[[axis]]\nname = \"drive.amplitude_m\"\nvalues = [0.04, 0.0453]\n";
     let (study, outcomes) = outcomes(&scene, &format!("{axis}{maps}"));
@@ -353,16 +367,16 @@ fn a_study_maps_what_a_fit_reads() {
     let entry =
         |(kind, keys): (&str, String)| format!("[[map]]\nname = \"{kind}\"\nkind = \"{kind}\"\n{keys}");
     let (scene, study, outcomes) = of_the_actual_blade(&kinds.map(entry).concat());
-    let columns: Vec<String> = study.maps.iter().map(Map::column).collect();
+    let columns: Vec<String> = study.maps.iter().map(SweepMap::column).collect();
     assert_eq!(columns.len(), 17, "{columns:?}");
     assert!(columns.contains(&"friction_curve_at_0_05_m_s_m".to_owned()), "{columns:?}");
     for (index, outcome) in outcomes.iter().enumerate() {
-        let at = study.scene_at(&scene, index).unwrap();
-        let effort = Effort::new(at.run.relative_tolerance);
-        let seen = view(&at, &study.camera, at.start_s, at.run.stop_s, effort).unwrap().recording;
-        let instants = Instants::find(&seen);
+        let at = study.scene_of_point(&scene, index).unwrap();
+        let effort = SolverOptions::new(at.run.relative_tolerance);
+        let seen = film_scene(&at, &study.camera, at.start_s, at.run.stop_s, effort).unwrap().recording;
+        let instants = ReversalInstants::find_instants(&seen);
         for (map, found) in study.maps.iter().zip(&outcome.values) {
-            let expected = map.reading.read(None, &Reader::new(&seen, &instants));
+            let expected = map.reading.read(None, &FeatureReader::new(&seen, &instants));
             match (found, &expected) {
                 (Ok(found), Ok(expected)) => assert_eq!(*found, expected.value, "{}", map.name),
                 (Err(reason), Err(missing)) => assert_eq!(*reason, missing.reason(), "{}", map.name),
@@ -379,14 +393,17 @@ fn a_recording_does_not_show_what_only_a_run_knows() {
     let maps =
         "[[map]]\nname = \"longest\"\nkind = \"longest-stick\"\n[[map]]\nname = \"jam\"\nkind = \"jam\"\n";
     let (scene, study, outcomes) = of_the_actual_blade(maps);
-    let effort = Effort::new(scene.run.relative_tolerance);
-    let seen = view(&scene, &study.camera, scene.start_s, scene.run.stop_s, effort).unwrap().recording;
-    let instants = Instants::find(&seen);
+    let effort = SolverOptions::new(scene.run.relative_tolerance);
+    let seen = film_scene(&scene, &study.camera, scene.start_s, scene.run.stop_s, effort).unwrap().recording;
+    let instants = ReversalInstants::find_instants(&seen);
     for map in &study.maps {
-        assert_eq!(map.reading.read(None, &Reader::new(&seen, &instants)), Err(feature::Missing::NoRun));
+        assert_eq!(
+            map.reading.read(None, &FeatureReader::new(&seen, &instants)),
+            Err(feature::MissingValue::NoRun)
+        );
     }
     assert!(outcomes[0].values[0].is_ok_and(|longest_s| longest_s > 0.05));
-    assert_eq!(outcomes[0].values[1], Err(Reason::Never));
+    assert_eq!(outcomes[0].values[1], Err(MissingReason::Never));
 }
 
 /// Four points of the committed study of the flip, against its table.
@@ -397,14 +414,14 @@ fn the_committed_study_of_the_flip_is_what_the_program_makes() {
         .replacen("from = 0.1\nto = 0.5\npoints = 17", "values = [0.15, 0.4]", 1);
     let study = Study::parse("flip", &text).unwrap();
     let scene = Scene::parse("scene", ACTUAL_BLADE).unwrap();
-    let outcomes = sweep::outcomes(&study, &scene);
+    let outcomes = sweep::run_all_points(&study, &scene);
     let table = include_str!("../../data/sweeps/flip/sweep.csv");
     assert!(
         table.starts_with("drive.amplitude_m,friction.c,status,stopped_at_s,flip_duration_s,damping_ratio,")
     );
     let mut decays = 0;
     for (index, outcome) in outcomes.iter().enumerate() {
-        let [amplitude_m, c] = study.place(index)[..] else { panic!("two axes") };
+        let [amplitude_m, c] = study.point_values(index)[..] else { panic!("two axes") };
         let row = table.lines().find(|row| row.starts_with(&format!("{amplitude_m},{c},"))).unwrap();
         let cells: Vec<&str> = row.split(',').skip(4).collect();
         for (cell, value) in cells.iter().zip(&outcome.values) {

@@ -5,9 +5,9 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 use wiperlab::math::StandardNormal;
-use wiperlab::recording::channel::Instants;
+use wiperlab::recording::channel::ReversalInstants;
 use wiperlab::recording::files::{RecordingFile, read_recording};
-use wiperlab::recording::level::turned;
+use wiperlab::recording::level::rotate_traces;
 use wiperlab::recording::quality::*;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 
@@ -40,16 +40,22 @@ fn recording(traces: Traces) -> Recording {
 
 /// The recording of a camera that is tilted by `degrees`: the glass rises by as much.
 fn tilted(traces: &Traces, degrees: f64) -> Recording {
-    recording(turned(traces, -degrees.to_radians(), ORIGIN).unwrap())
+    recording(rotate_traces(traces, -degrees.to_radians(), ORIGIN).unwrap())
 }
 
-fn measured(recording: &Recording) -> Result<Tilt, NoTilt> {
-    tilt(recording, &Instants::find(recording), &quality(recording, None))
+fn measured(recording: &Recording) -> Result<CameraTilt, TiltNotFound> {
+    measure_tilt(recording, &ReversalInstants::find_instants(recording), &measure_quality(recording, None))
 }
 
-fn found(recording: &Recording) -> Vec<Finding> {
+fn found(recording: &Recording) -> Vec<QualityFinding> {
     let optics = Optics { exposure_s: Some(5e-5), metres_per_pixel: Some(20e-6) };
-    let all = findings(recording, &quality(recording, None), &optics, &Instants::find(recording), &[]);
+    let all = collect_findings(
+        recording,
+        &measure_quality(recording, None),
+        &optics,
+        &ReversalInstants::find_instants(recording),
+        &[],
+    );
     all.into_iter().filter(|f| matches!(f.check.name(), "tilt" | "curved-glass")).collect()
 }
 
@@ -143,7 +149,7 @@ fn the_committed_twin_is_level_and_shows_a_tilt_of_its_camera() {
     assert!((finding.value - 0.3).abs() < 1e-3, "{finding:?}");
     // 5.3 mm from tip to head turned by 0.3 degrees
     assert!(finding.found.contains("every deflection is shifted by 2"), "{finding:?}");
-    println!("{}", finding.line());
+    println!("{}", finding.to_line());
 }
 
 #[test]
@@ -236,12 +242,15 @@ fn heights_in_whole_pixels_are_known_to_a_step_over_the_travel() {
 fn a_path_that_shows_no_slope_gives_the_reason() {
     let flat = stroke(3_000, &mut |_, _| 0.0);
     let no_height = Traces { tip_y_m: vec![None; 3_000], ..flat.clone() };
-    assert_eq!(measured(&recording(no_height)), Err(NoTilt::TooFewFrames { frames: 0 }));
-    assert_eq!(measured(&recording(stroke(40, &mut |_, _| 0.0))), Err(NoTilt::TooFewFrames { frames: 40 }));
+    assert_eq!(measured(&recording(no_height)), Err(TiltNotFound::TooFewFrames { frames: 0 }));
+    assert_eq!(
+        measured(&recording(stroke(40, &mut |_, _| 0.0))),
+        Err(TiltNotFound::TooFewFrames { frames: 40 })
+    );
     let still =
         Traces { tip_x_m: flat.tip_x_m.iter().map(|x| x.map(|x| 0.03 * x)).collect(), ..flat.clone() };
     assert!(
-        matches!(measured(&recording(still)), Err(NoTilt::TooLittleTravel { travel_m }) if travel_m < 3e-3)
+        matches!(measured(&recording(still)), Err(TiltNotFound::TooLittleTravel { travel_m }) if travel_m < 3e-3)
     );
     // three heights in turn, none of which holds half of the frames
     let mut scattered = |i: usize, _: f64| [0.0, 1e-2, 3e-2][i % 3];

@@ -8,19 +8,21 @@ use crate::scenes::{both, committed, seen, upright_light_blade};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use wiperlab::blade::Pose;
-use wiperlab::simulate::mode::Mode;
-use wiperlab::simulate::outputs::Sampler;
+use wiperlab::simulate::mode::TipMode;
+use wiperlab::simulate::outputs::SampleObserver;
 use wiperlab::simulate::scene::{Scene, StartKind};
-use wiperlab::simulate::{Cause, Effort, Observer, Piece, Status, run_with};
+use wiperlab::simulate::{
+    Observer, RunStatus, SolutionSegment, SolverOptions, TransitionCause, run_scene_with,
+};
 
 #[test]
 fn contact_is_lost_where_the_normal_force_vanishes() {
-    let scene = upright_light_blade().with("blade.preload_force_n", 0.03).unwrap();
+    let scene = upright_light_blade().with_parameter("blade.preload_force_n", 0.03).unwrap();
     let [coarse, fine] = [1e-8, 1e-10].map(|relative| seen(&scene, relative));
     assert!(!coarse.transitions.is_empty(), "the tip has moved before it lifts off");
     assert_eq!(coarse.transitions.len(), fine.transitions.len());
     for run in [&coarse, &fine] {
-        assert_eq!(run.run.status, Status::ContactLost);
+        assert_eq!(run.run.status, RunStatus::ContactLost);
         let (last, before) = run.samples.split_last().unwrap();
         assert_eq!(last.time_s, run.run.stopped_at_s);
         assert!(last.normal_n.abs() < 1e-9, "{} N", last.normal_n);
@@ -31,8 +33,11 @@ fn contact_is_lost_where_the_normal_force_vanishes() {
 
 /// A heavy head on a rough glass, the tip ahead of it and running on: where the paradox lies in wait.
 fn heavy_head_leading_tip(rng: &mut Xoshiro256PlusPlus) -> Scene {
-    let mut scene =
-        upright_light_blade().with("blade.head_mass_kg", 0.5).unwrap().with("friction.c", 0.6).unwrap();
+    let mut scene = upright_light_blade()
+        .with_parameter("blade.head_mass_kg", 0.5)
+        .unwrap()
+        .with_parameter("friction.c", 0.6)
+        .unwrap();
     let mut between = |low: f64, high: f64| rng.random_range(low..high);
     let pose = Pose {
         theta: between(0.1, 1.0),
@@ -84,7 +89,7 @@ impl Reference<'_> {
     /// Rates of the state, and what must stay positive: indicator, force without friction, speed, cosines of
     /// both angles.
     fn evaluate(&self, t: f64, y: &[f64; 4]) -> ([f64; 4], [f64; 5]) {
-        let head = self.scene.drive.at(t);
+        let head = self.scene.drive.motion_at(t);
         let ([l1, l2], [a, b, c]) = (self.parts.l, self.parts.friction);
         let [theta, phi, dt, dp] = *y;
         let drop = l1 * (1.0 - theta.cos()) + l2 * (1.0 - phi.cos());
@@ -152,14 +157,15 @@ fn the_tip_jams_where_the_painleve_indicator_vanishes() {
         let StartKind::State(pose) = scene.start else { panic!("a state") };
         let run = seen(&scene, 1e-8);
         let Some(last) = run.samples.last() else {
-            assert_ne!(run.run.status, Status::Completed, "state {i} is refused at the start");
+            assert_ne!(run.run.status, RunStatus::Completed, "state {i} is refused at the start");
             continue;
         };
-        assert_ne!(run.run.status, Status::Chattering, "state {i}");
-        assert!(run.run.status != Status::Diverged || is_level(&last.pose), "state {i}: {last:?}");
+        assert_ne!(run.run.status, RunStatus::Chattering, "state {i}");
+        assert!(run.run.status != RunStatus::Diverged || is_level(&last.pose), "state {i}: {last:?}");
         let direction = run.samples[0].mode.direction();
         let expected = Reference { scene: &scene, parts: parts(&scene), direction }.jams_at(&pose);
-        let jams_at_once = run.run.status == Status::Jammed && run.transitions.is_empty() && direction != 0.0;
+        let jams_at_once =
+            run.run.status == RunStatus::Jammed && run.transitions.is_empty() && direction != 0.0;
         assert_eq!(
             jams_at_once.then_some(()),
             expected.map(|_| ()),
@@ -173,7 +179,7 @@ fn the_tip_jams_where_the_painleve_indicator_vanishes() {
             "state {i}: {} instead of {expected} s",
             run.run.stopped_at_s
         );
-        assert_eq!(last.mode, Mode::SlipForward, "state {i}: the tip leads the head");
+        assert_eq!(last.mode, TipMode::SlipForward, "state {i}: the tip leads the head");
         assert!(
             last.pose.theta > 0.0 && last.pose.phi > 0.0 && last.tip_velocity_m_per_s > 0.0,
             "state {i}: {last:?}"
@@ -182,8 +188,12 @@ fn the_tip_jams_where_the_painleve_indicator_vanishes() {
         // whether the indicator is seen to vanish or no step resolves the last instant depends on the
         // tolerance; the verdict does not
         for relative in [1e-6, 1e-10, 1e-12] {
-            let other = run_with(&scene, Effort::new(relative), &mut ());
-            assert_eq!((other.status, other.transitions), (Status::Jammed, 0), "state {i} at {relative:e}");
+            let other = run_scene_with(&scene, SolverOptions::new(relative), &mut ());
+            assert_eq!(
+                (other.status, other.transitions),
+                (RunStatus::Jammed, 0),
+                "state {i} at {relative:e}"
+            );
             assert!(
                 (other.stopped_at_s - expected).abs() < 1e-7 + relative * expected,
                 "state {i} at {relative:e}: {} s",
@@ -201,27 +211,34 @@ fn is_level(pose: &Pose) -> bool {
 
 #[test]
 fn a_fast_tip_on_slippery_glass_turns_without_stopping() {
-    let mut scene = upright_light_blade().with("friction.a", 0.01).unwrap().with("friction.c", 0.02).unwrap();
+    let mut scene = upright_light_blade()
+        .with_parameter("friction.a", 0.01)
+        .unwrap()
+        .with_parameter("friction.c", 0.02)
+        .unwrap();
     scene.start = StartKind::State(Pose { theta: 0.1, phi: 0.3, theta_rate: 0.0, phi_rate: 0.0 });
     scene.run.stop_s = 0.01;
     let seen = seen(&scene, 1e-9);
-    assert_eq!(seen.run.status, Status::Completed);
-    let reversals: Vec<_> = seen.transitions.iter().filter(|t| t.cause == Cause::DirectReversal).collect();
+    assert_eq!(seen.run.status, RunStatus::Completed);
+    let reversals: Vec<_> =
+        seen.transitions.iter().filter(|t| t.cause == TransitionCause::DirectReversal).collect();
     // the tip's velocity looked at often, and its changes of sign without a rest between counted
     let mut velocities = Vec::new();
-    run_with(
+    run_scene_with(
         &scene,
-        Effort::new(1e-9),
-        &mut Sampler::new((0..=1000).map(|i| i as f64 * 1e-5), |s| velocities.push(s.tip_velocity_m_per_s)),
+        SolverOptions::new(1e-9),
+        &mut SampleObserver::new((0..=1000).map(|i| i as f64 * 1e-5), |s| {
+            velocities.push(s.tip_velocity_m_per_s)
+        }),
     );
     let changes = velocities.windows(2).filter(|v| v[0] * v[1] < 0.0).count();
     assert!(changes > 0);
     assert_eq!(reversals.len(), changes, "{:?}", seen.transitions);
     for reversal in reversals {
         assert_eq!(reversal.from.direction(), -reversal.to.direction());
-        let [before, after] = [Mode::SlipForward, Mode::SlipBackward]
+        let [before, after] = [TipMode::SlipForward, TipMode::SlipBackward]
             .map(|mode| seen.samples.iter().find(|s| s.time_s == reversal.time_s && s.mode == mode).unwrap());
-        let limit = scene.linkage.friction.at_rest();
+        let limit = scene.linkage.friction.static_coefficient();
         for sample in [before, after] {
             assert!(
                 (sample.friction_n + sample.mode.direction() * limit * sample.normal_n).abs()
@@ -248,16 +265,16 @@ struct Watch {
 }
 
 impl Observer for Watch {
-    fn piece(&mut self, piece: &Piece<'_>) {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
         /// Looks a piece: a dip that is shorter than this share of a step is found by luck only.
         const LOOKS: usize = 200;
         for i in 1..LOOKS {
             let sample =
-                piece.sample(piece.start_s + (piece.end_s - piece.start_s) * i as f64 / LOOKS as f64);
+                piece.sample_at(piece.start_s + (piece.end_s - piece.start_s) * i as f64 / LOOKS as f64);
             self.looks += 1;
             let backwards = sample.mode.direction() * sample.tip_velocity_m_per_s < -self.slack_m_per_s;
             let pulls = sample.normal_n < 0.0 && sample.indicator > 1e-3;
-            let held_too_hard = sample.mode == Mode::Stick
+            let held_too_hard = sample.mode == TipMode::Stick
                 && sample.friction_n.abs() > self.static_limit * sample.normal_n * (1.0 + 1e-4);
             if backwards || pulls || held_too_hard {
                 self.missed.push(format!("{sample:?}"));
@@ -272,10 +289,10 @@ fn no_transition_is_missed_inside_a_piece() {
     let random: Vec<Scene> = (0..BLADES).map(|_| Parts::random(&mut rng).scene(STROKE)).collect();
     for scene in both().iter().chain(&random) {
         for relative in [1e-4, 1e-6, 1e-8] {
-            let static_limit = scene.linkage.friction.at_rest();
+            let static_limit = scene.linkage.friction.static_coefficient();
             let mut watch =
                 Watch { slack_m_per_s: 10.0 * relative, static_limit, looks: 0, missed: Vec::new() };
-            run_with(scene, Effort::new(relative), &mut watch);
+            run_scene_with(scene, SolverOptions::new(relative), &mut watch);
             assert!(watch.looks > 0);
             assert!(
                 watch.missed.is_empty(),
@@ -291,36 +308,36 @@ fn no_transition_is_missed_inside_a_piece() {
 /// the static limit.
 #[test]
 fn stick_that_the_shoulder_breaks_says_so() {
-    let mut scene = committed("actual-blade").with("shoulder.damping_ratio", 1.0).unwrap();
+    let mut scene = committed("actual-blade").with_parameter("shoulder.damping_ratio", 1.0).unwrap();
     scene.run.stop_s = 0.9;
     let seen = seen(&scene, 1e-8);
     let shoulder = scene.linkage.shoulder.unwrap();
-    let limit = scene.linkage.friction.at_rest();
+    let limit = scene.linkage.friction.static_coefficient();
     let mut broken = 0;
     for transition in &seen.transitions {
-        let at = |mode: Mode| {
+        let at = |mode: TipMode| {
             seen.samples.iter().find(|s| s.time_s == transition.time_s && s.mode == mode).unwrap()
         };
         let (before, after) = (at(transition.from), at(transition.to));
         let at_corner = (before.pose.theta.abs() - shoulder.contact_angle_rad).abs() < 1e-12;
         let used = before.friction_n.abs() / (limit * before.normal_n); // share of the static limit
         match transition.cause {
-            Cause::ShoulderCorner => {
+            TransitionCause::ShoulderCorner => {
                 broken += 1;
                 assert!(
-                    before.mode == Mode::Stick && at_corner && used < 1.0 - 1e-6,
+                    before.mode == TipMode::Stick && at_corner && used < 1.0 - 1e-6,
                     "{transition:?}: {used}"
                 );
                 let full = after.friction_n + after.mode.direction() * limit * after.normal_n;
                 assert!(full.abs() < 1e-9 * after.normal_n, "{transition:?}: slip starts with full friction");
             }
-            Cause::FrictionLimit => {
-                assert!(before.mode == Mode::Stick && (used - 1.0).abs() < 1e-6, "{transition:?}: {used}")
+            TransitionCause::FrictionLimit => {
+                assert!(before.mode == TipMode::Stick && (used - 1.0).abs() < 1e-6, "{transition:?}: {used}")
             }
-            Cause::DirectReversal => {
-                assert!(before.mode != Mode::Stick && after.mode != Mode::Stick, "{transition:?}")
+            TransitionCause::DirectReversal => {
+                assert!(before.mode != TipMode::Stick && after.mode != TipMode::Stick, "{transition:?}")
             }
-            cause => assert_eq!((cause, after.mode), (Cause::TipStops, Mode::Stick)),
+            cause => assert_eq!((cause, after.mode), (TransitionCause::TipStops, TipMode::Stick)),
         }
     }
     assert!(broken > 0, "{:?}", seen.run);

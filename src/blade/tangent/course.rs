@@ -1,29 +1,29 @@
 //! A motion whose variation is asked for.
 
-use super::row::Row;
+use super::row::LaneVector;
 use crate::blade::Linkage;
-use crate::blade::series::{MotionSeries, Touch};
-use crate::blade::shoulder::Lean;
+use crate::blade::series::{ContactMode, MotionSeries};
+use crate::blade::shoulder::ShoulderContact;
 
 /// A quantity of neck and lip.
-pub(super) type Pairs = [Row; 2];
+pub(super) type LaneVectorPair = [LaneVector; 2];
 
 /// A motion whose variation is asked for; `K` is that of its series.
 #[derive(Debug, Clone, Copy)]
-pub struct Course<'a, const K: usize> {
+pub struct ReferenceMotion<'a, const K: usize> {
     /// The linkage that moves.
     pub linkage: &'a Linkage,
     /// How its tip touches the glass.
-    pub touch: Touch,
+    pub touch: ContactMode,
     /// On which side its neck leans.
-    pub lean: Lean,
+    pub lean: ShoulderContact,
     /// Its series.
     pub motion: &'a MotionSeries<K>,
 }
 
-impl<const K: usize> Course<'_, K> {
-    pub(super) fn flies(&self) -> bool {
-        matches!(self.touch, Touch::Flight(..))
+impl<const K: usize> ReferenceMotion<'_, K> {
+    pub(super) fn is_in_flight(&self) -> bool {
+        matches!(self.touch, ContactMode::Flight(..))
     }
 
     pub(super) fn lengths(&self) -> [f64; 2] {
@@ -43,12 +43,12 @@ impl<const K: usize> Course<'_, K> {
 
 /// One row a link.
 #[inline(always)]
-pub(super) fn rows(f: impl Fn(usize) -> Row) -> Pairs {
+pub(super) fn lanes_per_link(f: impl Fn(usize) -> LaneVector) -> LaneVectorPair {
     [f(0), f(1)]
 }
 
 /// The sum over both links.
 #[inline(always)]
-pub(super) fn weighted(weights: [f64; 2], rows: &Pairs) -> Row {
+pub(super) fn sum_over_links(weights: [f64; 2], rows: &LaneVectorPair) -> LaneVector {
     weights[0] * rows[0] + weights[1] * rows[1]
 }

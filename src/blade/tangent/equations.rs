@@ -2,56 +2,60 @@
 
 #![allow(clippy::needless_range_loop)] // indices are those of the equations
 
-use super::course::{Course, rows};
-use super::instants::Instants;
-use super::row::Row;
-use crate::blade::series::Touch;
+use super::course::{ReferenceMotion, lanes_per_link};
+use super::instants::MotionSamples;
+use super::row::LaneVector;
+use crate::blade::series::ContactMode;
 
 /// Matrices of the derivatives' second, first and own values at a few instants: equations by unknowns, the
 /// third of both in flight alone.
 #[derive(Debug, Clone)]
-pub struct Matrices {
+pub struct TangentMatrices {
     /// Of the second derivatives in time.
-    pub mass: [[Row; 3]; 3],
+    pub mass: [[LaneVector; 3]; 3],
     /// Of the first.
-    pub damping: [[Row; 3]; 3],
+    pub damping: [[LaneVector; 3]; 3],
     /// Of the values.
-    pub stiffness: [[Row; 3]; 3],
+    pub stiffness: [[LaneVector; 3]; 3],
 }
 
 /// The one equation of a tip that sticks, without the force that holds it: `y2` follows from `y1`.
 #[derive(Debug, Clone, Copy)]
-pub struct Single {
+pub struct StickEquation {
     /// Factors of `y1''`, `y1'` and `y1`.
-    pub first: [Row; 3],
+    pub first: [LaneVector; 3],
     /// What the same of `y2` would be multiplied by.
-    pub second: [Row; 3],
+    pub second: [LaneVector; 3],
 }
 
-impl<const K: usize> Course<'_, K> {
+impl<const K: usize> ReferenceMotion<'_, K> {
     /// What a newton of normal force does to each link's equation; nothing presses in flight.
     #[inline(always)]
-    pub(super) fn per_normal(&self, at: &Instants) -> [Row; 2] {
+    pub(super) fn normal_force_arms(&self, at: &MotionSamples) -> [LaneVector; 2] {
         let l = self.lengths();
-        if self.flies() { [Row::ZERO; 2] } else { rows(|i| l[i] * (at.mu - at.tangent[0][i])) }
+        if self.is_in_flight() {
+            [LaneVector::ZERO; 2]
+        } else {
+            lanes_per_link(|i| l[i] * (at.mu - at.tangent[0][i]))
+        }
     }
 
     /// What friction gains with the tip's speed, N s/m.
     #[inline(always)]
-    pub(super) fn per_speed(&self, at: &Instants) -> Row {
+    pub(super) fn friction_per_speed(&self, at: &MotionSamples) -> LaneVector {
         self.linkage.friction.b_s_per_m * at.falling
     }
 
     /// The matrices at these instants; in stick without the force that holds the tip.
     #[must_use]
-    pub fn matrices(&self, at: &Instants) -> Matrices {
+    pub fn tangent_matrices(&self, at: &MotionSamples) -> TangentMatrices {
         let linkage = self.linkage;
         let (l, m, arms, m_c) = (self.lengths(), self.moments(), self.arms(), linkage.m_c);
         let inertias = [linkage.m_theta, linkage.m_phi];
         let [secant, secant_1, secant_2] = &at.secant;
-        let n = self.per_normal(at);
-        let zero = [[Row::ZERO; 3]; 3];
-        let mut out = Matrices { mass: zero, damping: zero, stiffness: zero };
+        let n = self.normal_force_arms(at);
+        let zero = [[LaneVector::ZERO; 3]; 3];
+        let mut out = TangentMatrices { mass: zero, damping: zero, stiffness: zero };
         for i in 0..2 {
             let o = 1 - i;
             let x = m_c * at.along[o] + m[i] * at.head_acceleration - l[i] * at.friction;
@@ -59,28 +63,28 @@ impl<const K: usize> Course<'_, K> {
             let turned = at.cos[i] * y - at.sin[i] * x;
             let carried = inertias[i] * secant[i];
             out.mass[i][i] = carried * secant[i];
-            out.mass[i][o] = Row::all(m_c);
+            out.mass[i][o] = LaneVector::splat(m_c);
             out.damping[i][i] = 2.0 * carried * secant_1[i];
             out.stiffness[i][i] = carried * secant_2[i] + turned * secant[i] * secant[i];
             for j in 0..2 {
                 let coupled = if i == j { -m[i] * l[j] } else { m_c - m[i] * l[j] };
                 let pushed = coupled * at.tangent[0][i] + arms[j] * n[i];
                 let held = l[j] * n[i];
-                self.add_rise(&mut out, at, (i, j), pushed, held);
+                self.add_support(&mut out, at, (i, j), pushed, held);
             }
         }
         self.add_springs(&mut out, secant, secant_1);
         match self.touch {
-            Touch::Slip(_) => {
-                let per_speed = self.per_speed(at);
+            ContactMode::Slip(_) => {
+                let per_speed = self.friction_per_speed(at);
                 for i in 0..2 {
                     for j in 0..2 {
                         out.damping[i][j] -= (l[i] * l[j]) * per_speed;
                     }
                 }
             }
-            Touch::Stick => {}
-            Touch::Flight(..) => self.add_gap(&mut out, at),
+            ContactMode::Stick => {}
+            ContactMode::Flight(..) => self.add_gap(&mut out, at),
         }
         out
     }
@@ -88,7 +92,14 @@ impl<const K: usize> Course<'_, K> {
     /// What `S_j = t_j y_j` does in equation `i`: by its second derivative, and by the support, which its
     /// first and itself take from the normal force.
     #[inline(always)]
-    fn add_rise(&self, out: &mut Matrices, at: &Instants, (i, j): (usize, usize), pushed: Row, held: Row) {
+    fn add_support(
+        &self,
+        out: &mut TangentMatrices,
+        at: &MotionSamples,
+        (i, j): (usize, usize),
+        pushed: LaneVector,
+        held: LaneVector,
+    ) {
         let head = self.linkage.head;
         let [t, t_1, t_2] = [at.tangent[0][j], at.tangent[1][j], at.tangent[2][j]];
         let (by_rate, by_value) = (-head.damping * held, -head.stiffness * held);
@@ -99,9 +110,9 @@ impl<const K: usize> Course<'_, K> {
 
     /// The springs of both links, by their angles `y / cos`.
     #[inline(always)]
-    fn add_springs(&self, out: &mut Matrices, secant: &[Row; 2], secant_1: &[Row; 2]) {
+    fn add_springs(&self, out: &mut TangentMatrices, secant: &[LaneVector; 2], secant_1: &[LaneVector; 2]) {
         let lip = self.linkage.lip;
-        let [stiffness, damping, _] = self.linkage.neck_and_shoulder(self.lean);
+        let [stiffness, damping, _] = self.linkage.neck_spring(self.lean);
         let square = |neck: f64, lip: f64| [[neck + lip, -lip], [-lip, lip]];
         let (k, c) = (square(stiffness, lip.stiffness), square(damping, lip.damping));
         for i in 0..2 {
@@ -114,7 +125,7 @@ impl<const K: usize> Course<'_, K> {
 
     /// Flight: the gap lifts the head, whose own equation is the third.
     #[inline(always)]
-    fn add_gap(&self, out: &mut Matrices, at: &Instants) {
+    fn add_gap(&self, out: &mut TangentMatrices, at: &MotionSamples) {
         const GAP: usize = 2;
         let (m, l, arms, linkage) = (self.moments(), self.lengths(), self.arms(), self.linkage);
         for i in 0..2 {
@@ -125,20 +136,20 @@ impl<const K: usize> Course<'_, K> {
             out.damping[GAP][i] = -2.0 * arms[i] * t_1 + head.damping * l[i] * t;
             out.stiffness[GAP][i] = -arms[i] * t_2 + head.damping * l[i] * t_1 + head.stiffness * l[i] * t;
         }
-        out.mass[GAP][GAP] = Row::all(-linkage.mass_kg);
-        out.damping[GAP][GAP] = Row::all(-linkage.head.damping);
-        out.stiffness[GAP][GAP] = Row::all(-linkage.head.stiffness);
+        out.mass[GAP][GAP] = LaneVector::splat(-linkage.mass_kg);
+        out.damping[GAP][GAP] = LaneVector::splat(-linkage.head.damping);
+        out.stiffness[GAP][GAP] = LaneVector::splat(-linkage.head.stiffness);
     }
 
     /// The one equation of stick.
     #[must_use]
-    pub fn single(&self, matrices: &Matrices) -> Single {
+    pub fn stick_equation(&self, matrices: &TangentMatrices) -> StickEquation {
         let l = self.lengths();
         let ratio = l[0] / l[1];
-        let column = |m: &[[Row; 3]; 3], j: usize| l[1] * m[0][j] - l[0] * m[1][j];
+        let column = |m: &[[LaneVector; 3]; 3], j: usize| l[1] * m[0][j] - l[0] * m[1][j];
         let all = [&matrices.mass, &matrices.damping, &matrices.stiffness];
         let second = all.map(|m| column(m, 1));
         let first = [0, 1, 2].map(|k| column(all[k], 0) - ratio * second[k]);
-        Single { first, second }
+        StickEquation { first, second }
     }
 }

@@ -1,6 +1,6 @@
 //! Derivatives of a linkage's constants.
 
-use super::row::Row;
+use super::row::LaneVector;
 use crate::blade::Linkage;
 
 /// Derivatives of every constant of a [`Linkage`], one a direction: names and units are those of the
@@ -8,37 +8,37 @@ use crate::blade::Linkage;
 #[derive(Debug, Clone, Default)]
 #[allow(missing_docs)] // the fields are those of the linkage
 pub struct LinkageTangent {
-    pub mass_kg: Row,
+    pub mass_kg: LaneVector,
     /// `l1`, `l2`.
-    pub lengths_m: [Row; 2],
+    pub lengths_m: [LaneVector; 2],
     /// `m_a`, `m_b`.
-    pub moments: [Row; 2],
-    pub m_c: Row,
+    pub moments: [LaneVector; 2],
+    pub m_c: LaneVector,
     /// `m_theta`, `m_phi`.
-    pub inertias: [Row; 2],
+    pub inertias: [LaneVector; 2],
     pub head: SpringTangent,
     pub neck: SpringTangent,
     pub lip: SpringTangent,
-    pub preload_displacement_m: Row,
-    pub friction_a: Row,
-    pub friction_b_s_per_m: Row,
-    pub friction_c: Row,
+    pub preload_displacement_m: LaneVector,
+    pub friction_a: LaneVector,
+    pub friction_b_s_per_m: LaneVector,
+    pub friction_c: LaneVector,
     pub shoulder: SpringTangent,
-    pub contact_angle_rad: Row,
+    pub contact_angle_rad: LaneVector,
 }
 
 /// Derivatives of a spring's constants.
 #[derive(Debug, Clone, Copy, Default)]
 #[allow(missing_docs)] // the fields are those of the spring
 pub struct SpringTangent {
-    pub stiffness: Row,
-    pub damping: Row,
+    pub stiffness: LaneVector,
+    pub damping: LaneVector,
 }
 
 /// A constant of a linkage; of two the neck's or `theta`'s is the first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)] // the names are those of the linkage's fields
-pub enum Constant {
+pub enum LinkageConstant {
     Mass,
     Length(usize),
     Moment(usize),
@@ -59,41 +59,41 @@ pub enum Constant {
     ShoulderDamping,
 }
 
-/// All of them, in the order of [`constants`].
-const CONSTANTS: [Constant; 21] = [
-    Constant::Mass,
-    Constant::Length(0),
-    Constant::Length(1),
-    Constant::Moment(0),
-    Constant::Moment(1),
-    Constant::Coupling,
-    Constant::Inertia(0),
-    Constant::Inertia(1),
-    Constant::HeadStiffness,
-    Constant::HeadDamping,
-    Constant::NeckStiffness,
-    Constant::NeckDamping,
-    Constant::LipStiffness,
-    Constant::LipDamping,
-    Constant::Preload,
-    Constant::FrictionA,
-    Constant::FrictionB,
-    Constant::FrictionC,
-    Constant::ContactAngle,
-    Constant::ShoulderStiffness,
-    Constant::ShoulderDamping,
+/// All of them, in the order of [`constants_mut`].
+const CONSTANTS: [LinkageConstant; 21] = [
+    LinkageConstant::Mass,
+    LinkageConstant::Length(0),
+    LinkageConstant::Length(1),
+    LinkageConstant::Moment(0),
+    LinkageConstant::Moment(1),
+    LinkageConstant::Coupling,
+    LinkageConstant::Inertia(0),
+    LinkageConstant::Inertia(1),
+    LinkageConstant::HeadStiffness,
+    LinkageConstant::HeadDamping,
+    LinkageConstant::NeckStiffness,
+    LinkageConstant::NeckDamping,
+    LinkageConstant::LipStiffness,
+    LinkageConstant::LipDamping,
+    LinkageConstant::Preload,
+    LinkageConstant::FrictionA,
+    LinkageConstant::FrictionB,
+    LinkageConstant::FrictionC,
+    LinkageConstant::ContactAngle,
+    LinkageConstant::ShoulderStiffness,
+    LinkageConstant::ShoulderDamping,
 ];
 
 impl LinkageTangent {
     /// Sets a direction to `sum weight * linkage` over these linkages: a difference quotient, whose weights
     /// add up to zero.
-    pub fn set(&mut self, lane: usize, terms: &[(f64, Linkage)]) {
-        self.rows().into_iter().for_each(|row| row[lane] = 0.0);
+    pub fn set_direction(&mut self, lane: usize, terms: &[(f64, Linkage)]) {
+        self.rows_mut().into_iter().for_each(|row| row[lane] = 0.0);
         let Some((_, mut first)) = terms.first().copied() else { return };
         for (weight, linkage) in terms {
             let mut linkage = *linkage;
-            let pairs = constants(&mut linkage).into_iter().zip(constants(&mut first));
-            for (row, pair) in self.rows().into_iter().zip(pairs) {
+            let pairs = constants_mut(&mut linkage).into_iter().zip(constants_mut(&mut first));
+            for (row, pair) in self.rows_mut().into_iter().zip(pairs) {
                 // (what is the same in all of them is then exactly without a derivative, and costs nothing)
                 if let (Some(constant), Some(first)) = pair {
                     row[lane] += weight * (*constant - *first);
@@ -103,16 +103,16 @@ impl LinkageTangent {
     }
 
     /// The constants that change in a direction, each with its derivative.
-    pub fn changes(&self, lane: usize) -> impl Iterator<Item = (Constant, f64)> {
-        let changes = self.clone().rows().map(|row| row[lane]);
+    pub fn nonzero_changes(&self, lane: usize) -> impl Iterator<Item = (LinkageConstant, f64)> {
+        let changes = self.clone().rows_mut().map(|row| row[lane]);
         CONSTANTS.into_iter().zip(changes).filter(|(_, change)| *change != 0.0)
     }
 
     /// The linkage `step` along a direction.
     #[must_use]
-    pub fn along(&self, linkage: &Linkage, lane: usize, step: f64) -> Linkage {
+    pub fn displace_linkage(&self, linkage: &Linkage, lane: usize, step: f64) -> Linkage {
         let (mut tangent, mut moved) = (self.clone(), *linkage);
-        for (row, constant) in tangent.rows().into_iter().zip(constants(&mut moved)) {
+        for (row, constant) in tangent.rows_mut().into_iter().zip(constants_mut(&mut moved)) {
             if let Some(constant) = constant {
                 *constant += step * row[lane];
             }
@@ -120,8 +120,8 @@ impl LinkageTangent {
         moved
     }
 
-    /// The rows, in the order of [`constants`].
-    fn rows(&mut self) -> [&mut Row; CONSTANTS.len()] {
+    /// The rows, in the order of [`constants_mut`].
+    fn rows_mut(&mut self) -> [&mut LaneVector; CONSTANTS.len()] {
         let [l1, l2] = &mut self.lengths_m;
         let [m_a, m_b] = &mut self.moments;
         let [m_theta, m_phi] = &mut self.inertias;
@@ -152,7 +152,7 @@ impl LinkageTangent {
 }
 
 /// The constants of a linkage; those of a shoulder that it does not have are `None`.
-fn constants(linkage: &mut Linkage) -> [Option<&mut f64>; CONSTANTS.len()] {
+fn constants_mut(linkage: &mut Linkage) -> [Option<&mut f64>; CONSTANTS.len()] {
     let Linkage { head, neck, lip, friction, shoulder, .. } = linkage;
     let [angle, stiffness, damping] = match shoulder {
         None => [None, None, None],

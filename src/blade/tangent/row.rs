@@ -8,16 +8,16 @@ pub const LANES: usize = 4;
 
 /// One number a direction, or one an instant.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Row(pub [f64; LANES]);
+pub struct LaneVector(pub [f64; LANES]);
 
-impl Row {
+impl LaneVector {
     /// Nothing in every lane.
     pub const ZERO: Self = Self([0.0; LANES]);
 
     /// The same number in every lane.
     #[inline(always)]
     #[must_use]
-    pub const fn all(x: f64) -> Self {
+    pub const fn splat(x: f64) -> Self {
         Self([x; LANES])
     }
 
@@ -57,7 +57,7 @@ impl Row {
     }
 }
 
-impl Add for Row {
+impl Add for LaneVector {
     type Output = Self;
     #[inline(always)]
     fn add(self, other: Self) -> Self {
@@ -65,7 +65,7 @@ impl Add for Row {
     }
 }
 
-impl Sub for Row {
+impl Sub for LaneVector {
     type Output = Self;
     #[inline(always)]
     fn sub(self, other: Self) -> Self {
@@ -73,7 +73,7 @@ impl Sub for Row {
     }
 }
 
-impl Neg for Row {
+impl Neg for LaneVector {
     type Output = Self;
     #[inline(always)]
     fn neg(self) -> Self {
@@ -81,29 +81,29 @@ impl Neg for Row {
     }
 }
 
-impl AddAssign for Row {
+impl AddAssign for LaneVector {
     #[inline(always)]
     fn add_assign(&mut self, other: Self) {
         *self = *self + other;
     }
 }
 
-impl SubAssign for Row {
+impl SubAssign for LaneVector {
     #[inline(always)]
     fn sub_assign(&mut self, other: Self) {
         *self = *self - other;
     }
 }
 
-impl Mul<Row> for f64 {
-    type Output = Row;
+impl Mul<LaneVector> for f64 {
+    type Output = LaneVector;
     #[inline(always)]
-    fn mul(self, row: Row) -> Row {
-        Row(from_fn(|lane| self * row.0[lane]))
+    fn mul(self, row: LaneVector) -> LaneVector {
+        LaneVector(from_fn(|lane| self * row.0[lane]))
     }
 }
 
-impl Mul for Row {
+impl Mul for LaneVector {
     type Output = Self;
     #[inline(always)]
     fn mul(self, other: Self) -> Self {
@@ -111,7 +111,7 @@ impl Mul for Row {
     }
 }
 
-impl Index<usize> for Row {
+impl Index<usize> for LaneVector {
     type Output = f64;
     #[inline(always)]
     fn index(&self, lane: usize) -> &f64 {
@@ -119,7 +119,7 @@ impl Index<usize> for Row {
     }
 }
 
-impl IndexMut<usize> for Row {
+impl IndexMut<usize> for LaneVector {
     #[inline(always)]
     fn index_mut(&mut self, lane: usize) -> &mut f64 {
         &mut self.0[lane]

@@ -2,68 +2,68 @@
 
 #![allow(clippy::needless_range_loop)] // indices are those of the equations
 
-use super::course::{Course, rows};
-use super::instants::{Attitude, Instants};
-use super::linkage::Constant;
-use super::row::Row;
-use crate::blade::series::Touch;
-use crate::blade::shoulder::Lean;
+use super::course::{ReferenceMotion, lanes_per_link};
+use super::instants::{LinkAttitudes, MotionSamples};
+use super::linkage::LinkageConstant;
+use super::row::LaneVector;
+use crate::blade::series::ContactMode;
+use crate::blade::shoulder::ShoulderContact;
 
 /// What one change does at a few instants, over the unit of the change; or the factors of the same in a sum.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct Effect {
+pub struct ForcingTerms {
     /// Moves the head along the sweep, m.
-    pub head: Row,
+    pub head: LaneVector,
     /// Moves the tip where the angles stay, m, with the first two derivatives in time.
-    pub tip: [Row; 3],
+    pub tip: [LaneVector; 3],
     /// Lowers the head likewise, m.
-    pub drop: Row,
+    pub drop: LaneVector,
     /// Normal force, N.
-    pub normal: Row,
+    pub normal: LaneVector,
     /// Friction force in slip, N, at the same normal force and speed of the blade's own.
-    pub force: Row,
+    pub force: LaneVector,
     /// What is added to each equation.
-    pub equations: [Row; 3],
+    pub equations: [LaneVector; 3],
 }
 
 /// A change of the head's motion along the sweep at a few instants, m, with the first two derivatives.
-pub type HeadShift = [Row; 3];
+pub type HeadMotionChange = [LaneVector; 3];
 
 /// What a constant does directly.
 #[derive(Default)]
-struct Direct {
-    effect: Effect,
+struct DirectForcing {
+    effect: ForcingTerms,
     /// To the equation of each link over its cosine.
-    links: [Row; 2],
+    links: [LaneVector; 2],
     /// To `u''`.
-    drop_acceleration: Row,
+    drop_acceleration: LaneVector,
 }
 
-impl Effect {
+impl ForcingTerms {
     /// Sum of the products with the factors of another.
     #[must_use]
-    pub fn dot(&self, factors: &Self) -> Row {
+    pub fn dot(&self, factors: &Self) -> LaneVector {
         let numbers = |e: &Self| {
             let ([t_0, t_1, t_2], [e_0, e_1, e_2]) = (e.tip, e.equations);
             [e.head, t_0, t_1, t_2, e.drop, e.normal, e.force, e_0, e_1, e_2]
         };
-        let mut sum = Row::ZERO;
+        let mut sum = LaneVector::ZERO;
         numbers(self).into_iter().zip(numbers(factors)).for_each(|(a, b)| sum += a * b);
         sum
     }
 }
 
-impl<const K: usize> Course<'_, K> {
+impl<const K: usize> ReferenceMotion<'_, K> {
     /// Whether a constant matters in this course.
     #[must_use]
-    pub fn uses(&self, constant: Constant) -> bool {
+    pub fn depends_on(&self, constant: LinkageConstant) -> bool {
         match constant {
-            Constant::FrictionA | Constant::FrictionB | Constant::FrictionC => {
-                matches!(self.touch, Touch::Slip(_))
+            LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC => {
+                matches!(self.touch, ContactMode::Slip(_))
             }
-            Constant::ContactAngle | Constant::ShoulderStiffness | Constant::ShoulderDamping => {
-                self.lean != Lean::Off
-            }
+            LinkageConstant::ContactAngle
+            | LinkageConstant::ShoulderStiffness
+            | LinkageConstant::ShoulderDamping => self.lean != ShoulderContact::Off,
             _ => true,
         }
     }
@@ -71,33 +71,34 @@ impl<const K: usize> Course<'_, K> {
     /// What a unit of a constant does.
     #[inline(always)]
     #[must_use]
-    pub fn effect(&self, at: &Instants, constant: Constant) -> Effect {
-        let mut direct = Direct::default();
-        if let Constant::FrictionA | Constant::FrictionB | Constant::FrictionC = constant {
+    pub fn constant_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> ForcingTerms {
+        let mut direct = DirectForcing::default();
+        if let LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC = constant
+        {
             // (nothing but a force, and there are often three of them)
-            direct.effect.force = self.rub(at, constant);
+            direct.effect.force = self.friction_law_forcing(at, constant);
             let l = self.lengths();
             direct.effect.equations[0] = -l[0] * direct.effect.force;
             direct.effect.equations[1] = -l[1] * direct.effect.force;
             return direct.effect;
         }
-        self.act(&mut direct, at, constant);
-        self.complete(at, direct)
+        self.add_direct_forcing(&mut direct, at, constant);
+        self.complete_forcing(at, direct)
     }
 
-    /// Whether a constant moves tip or head where the angles stay; only then there is [`Self::moved`].
+    /// Whether a constant moves tip or head where the angles stay; only then there is [`Self::displacement_terms`].
     #[must_use]
-    pub fn moves(&self, constant: Constant) -> bool {
-        matches!(constant, Constant::Length(_))
+    pub fn displaces_points(&self, constant: LinkageConstant) -> bool {
+        matches!(constant, LinkageConstant::Length(_))
     }
 
     /// Where a unit of a constant moves tip and head; no forces.
     #[must_use]
-    pub fn moved(&self, at: &Attitude, constant: Constant) -> Effect {
-        let mut effect = Effect::default();
-        if let Constant::Length(j) = constant {
+    pub fn displacement_terms(&self, at: &LinkAttitudes, constant: LinkageConstant) -> ForcingTerms {
+        let mut effect = ForcingTerms::default();
+        if let LinkageConstant::Length(j) = constant {
             (effect.tip[0], effect.tip[1]) = (at.sin[j], at.cos[j] * at.rate[j]);
-            effect.drop = Row::all(1.0) - at.cos[j];
+            effect.drop = LaneVector::splat(1.0) - at.cos[j];
         }
         effect
     }
@@ -105,88 +106,96 @@ impl<const K: usize> Course<'_, K> {
     /// What a change of the head's motion does.
     #[inline(always)]
     #[must_use]
-    pub fn head_effect(&self, at: &Instants, shift: &HeadShift) -> Effect {
+    pub fn head_motion_forcing(&self, at: &MotionSamples, shift: &HeadMotionChange) -> ForcingTerms {
         let m = self.moments();
-        let effect = Effect { head: shift[0], tip: *shift, ..Effect::default() };
-        self.complete(at, Direct { effect, links: rows(|i| m[i] * shift[2]), ..Direct::default() })
+        let effect = ForcingTerms { head: shift[0], tip: *shift, ..ForcingTerms::default() };
+        self.complete_forcing(
+            at,
+            DirectForcing { effect, links: lanes_per_link(|i| m[i] * shift[2]), ..DirectForcing::default() },
+        )
     }
 
     #[inline(always)]
-    fn act(&self, direct: &mut Direct, at: &Instants, constant: Constant) {
-        let Direct { effect, links, drop_acceleration } = direct;
+    fn add_direct_forcing(&self, direct: &mut DirectForcing, at: &MotionSamples, constant: LinkageConstant) {
+        let DirectForcing { effect, links, drop_acceleration } = direct;
         let [secant, tangent] = [&at.secant[0], &at.tangent[0]];
         match constant {
-            Constant::Mass => effect.normal = -at.drop_acceleration,
-            Constant::Length(j) => {
+            LinkageConstant::Mass => effect.normal = -at.drop_acceleration,
+            LinkageConstant::Length(j) => {
                 let head = self.linkage.head;
                 *drop_acceleration = at.across[j];
                 effect.tip = [at.sin[j], at.cos[j] * at.rate[j], at.along[j]];
-                effect.drop = Row::all(1.0) - at.cos[j];
+                effect.drop = LaneVector::splat(1.0) - at.cos[j];
                 effect.normal = -head.stiffness * effect.drop
                     - head.damping * (at.sin[j] * at.rate[j])
                     - self.linkage.mass_kg * at.across[j];
                 links[j] = -(at.friction + tangent[j] * at.normal);
             }
-            Constant::Moment(j) => {
+            LinkageConstant::Moment(j) => {
                 effect.normal = at.across[j];
                 links[j] = at.head_acceleration - tangent[j] * at.drop_acceleration;
             }
-            Constant::Coupling => *links = rows(|i| at.along[1 - i] + tangent[i] * at.across[1 - i]),
-            Constant::Inertia(i) => links[i] = secant[i] * at.acceleration[i],
-            Constant::HeadStiffness => {
-                effect.normal = Row::all(self.linkage.preload_displacement_m) - self.drop(at)[0];
+            LinkageConstant::Coupling => {
+                *links = lanes_per_link(|i| at.along[1 - i] + tangent[i] * at.across[1 - i])
             }
-            Constant::HeadDamping => effect.normal = -self.drop(at)[1],
-            Constant::Preload => effect.normal = Row::all(self.linkage.head.stiffness),
-            _ => self.bend(links, at, constant),
+            LinkageConstant::Inertia(i) => links[i] = secant[i] * at.acceleration[i],
+            LinkageConstant::HeadStiffness => {
+                effect.normal =
+                    LaneVector::splat(self.linkage.preload_displacement_m) - self.sample_head_drop(at)[0];
+            }
+            LinkageConstant::HeadDamping => effect.normal = -self.sample_head_drop(at)[1],
+            LinkageConstant::Preload => effect.normal = LaneVector::splat(self.linkage.head.stiffness),
+            _ => self.add_spring_forcing(links, at, constant),
         }
     }
 
     /// What the springs and dampers of the links do.
     #[inline(always)]
-    fn bend(&self, links: &mut [Row; 2], at: &Instants, constant: Constant) {
+    fn add_spring_forcing(&self, links: &mut [LaneVector; 2], at: &MotionSamples, constant: LinkageConstant) {
         let secant = &at.secant[0];
-        let [theta, phi] = self.angles(at);
+        let [theta, phi] = self.sample_angles(at);
         let [theta_rate, phi_rate] = at.rate;
-        let lip = |moment: Row| [-secant[0] * moment, secant[1] * moment];
-        let side = self.lean.sign();
+        let lip = |moment: LaneVector| [-secant[0] * moment, secant[1] * moment];
+        let side = self.lean.angle_sign();
         match (constant, &self.linkage.shoulder) {
-            (Constant::NeckStiffness, _) => links[0] = secant[0] * theta,
-            (Constant::NeckDamping, _) | (Constant::ShoulderDamping, Some(_)) => {
+            (LinkageConstant::NeckStiffness, _) => links[0] = secant[0] * theta,
+            (LinkageConstant::NeckDamping, _) | (LinkageConstant::ShoulderDamping, Some(_)) => {
                 links[0] = secant[0] * theta_rate;
             }
-            (Constant::LipStiffness, _) => *links = lip(phi - theta),
-            (Constant::LipDamping, _) => *links = lip(phi_rate - theta_rate),
-            (Constant::ShoulderStiffness, Some(s)) => {
-                links[0] = secant[0] * (theta - Row::all(side * s.contact_angle_rad));
+            (LinkageConstant::LipStiffness, _) => *links = lip(phi - theta),
+            (LinkageConstant::LipDamping, _) => *links = lip(phi_rate - theta_rate),
+            (LinkageConstant::ShoulderStiffness, Some(s)) => {
+                links[0] = secant[0] * (theta - LaneVector::splat(side * s.contact_angle_rad));
             }
-            (Constant::ContactAngle, Some(s)) => links[0] = (-side * s.stiffness_n_m_per_rad) * secant[0],
+            (LinkageConstant::ContactAngle, Some(s)) => {
+                links[0] = (-side * s.stiffness_n_m_per_rad) * secant[0]
+            }
             _ => {}
         }
     }
 
     /// What the law of friction does to its force in slip.
     #[inline(always)]
-    fn rub(&self, at: &Instants, constant: Constant) -> Row {
-        let direction = self.touch.direction();
+    fn friction_law_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> LaneVector {
+        let direction = self.touch.slip_direction();
         match constant {
-            Constant::FrictionA => -direction * at.normal * self.decay(at, direction),
-            Constant::FrictionB => self.tip_velocity(at.x) * at.falling,
+            LinkageConstant::FrictionA => -direction * at.normal * self.friction_decay(at, direction),
+            LinkageConstant::FrictionB => self.sample_tip_velocity(at.x) * at.falling,
             _ => -direction * at.normal,
         }
     }
 
     #[inline(always)]
-    fn complete(&self, at: &Instants, direct: Direct) -> Effect {
-        let (l, m, n) = (self.lengths(), self.moments(), self.per_normal(at));
-        let Direct { mut effect, links, drop_acceleration } = direct;
-        effect.force += self.per_speed(at) * effect.tip[1];
+    fn complete_forcing(&self, at: &MotionSamples, direct: DirectForcing) -> ForcingTerms {
+        let (l, m, n) = (self.lengths(), self.moments(), self.normal_force_arms(at));
+        let DirectForcing { mut effect, links, drop_acceleration } = direct;
+        effect.force += self.friction_per_speed(at) * effect.tip[1];
         for i in 0..2 {
             effect.equations[i] = links[i] - (m[i] * at.tangent[0][i]) * drop_acceleration
                 + n[i] * effect.normal
                 - l[i] * effect.force;
         }
-        if self.flies() {
+        if self.is_in_flight() {
             effect.equations[2] = -effect.normal;
         }
         effect

@@ -1,40 +1,41 @@
 //! Panels side by side, and the room that each leaves next to its axes.
 
 use super::line_breaks::y_label_lines;
-use super::ranges::visible;
-use super::ticks::{HALF_LABEL_MM, MOST_NAMES, widest_mm, y_ticks};
-use crate::chart::axis::{self, Mapped, Scale};
+use super::ranges::visible_y_values;
+use super::ticks::{HALF_LABEL_MM, MOST_NAMES, widest_label_mm, y_axis_ticks};
+use crate::chart::axis::{self, AxisScale, CanvasAxis};
 use crate::chart::elements::Panel;
 use crate::chart::figure::Figure;
 use crate::chart::heat_bar;
-use crate::chart::sizes::{EDGE_MM, LINE_MM, TICK_MM, UNITS};
+use crate::chart::sizes::{EDGE_MM, LINE_MM, TICK_MM, UNITS_PER_MM};
 
 /// Least width of the axes of a panel with neighbours at its side, and of one without axes, mm.
-const LEAST_PANEL_MM: f64 = 30.0;
-const LEAST_BARE_MM: f64 = 18.0;
+const MIN_PANEL_WIDTH_MM: f64 = 30.0;
+const MIN_BARE_WIDTH_MM: f64 = 18.0;
 
 /// How many panels stand side by side, and the room that each leaves next to its axes.
-pub(in crate::chart) struct Columns {
+pub(in crate::chart) struct PanelColumns {
     pub count: usize,
     /// Room on the left and on the right of the axes of a column, mm.
     margins: Vec<(f64, f64)>,
 }
 
-impl Columns {
+impl PanelColumns {
     /// As many as the figure asks for and its width has room for.
-    pub fn of(figure: &Figure) -> Self {
+    pub fn new(figure: &Figure) -> Self {
         let most = figure.columns.clamp(1, figure.panels.len().max(1));
-        let least = if figure.panels.iter().all(|panel| panel.bare) { LEAST_BARE_MM } else { LEAST_PANEL_MM };
+        let least =
+            if figure.panels.iter().all(|panel| panel.bare) { MIN_BARE_WIDTH_MM } else { MIN_PANEL_WIDTH_MM };
         let fits =
             |columns: &Self| (0..columns.count).all(|column| columns.width_mm(figure, column) >= least);
         (1..=most)
             .rev()
-            .map(|count| Self::with(figure, count))
+            .map(|count| Self::with_count(figure, count))
             .find(fits)
-            .unwrap_or_else(|| Self::with(figure, 1))
+            .unwrap_or_else(|| Self::with_count(figure, 1))
     }
 
-    fn with(figure: &Figure, count: usize) -> Self {
+    fn with_count(figure: &Figure, count: usize) -> Self {
         let each_mm = figure.width_mm / count as f64;
         let margins = |column: usize| {
             let panels = || figure.panels.iter().skip(column).step_by(count);
@@ -52,14 +53,20 @@ impl Columns {
     }
 
     /// The x axis of a panel in a column.
-    pub fn x(&self, figure: &Figure, column: usize, scale: Scale, (low, high): (f64, f64)) -> Mapped {
+    pub fn x_axis(
+        &self,
+        figure: &Figure,
+        column: usize,
+        scale: AxisScale,
+        (low, high): (f64, f64),
+    ) -> CanvasAxis {
         let left = figure.width_mm * column as f64 / self.count as f64 + self.margins[column].0;
-        Mapped {
+        CanvasAxis {
             scale,
             low,
             high,
-            from: (left * UNITS).round(),
-            to: ((left + self.width_mm(figure, column)) * UNITS).round(),
+            from: (left * UNITS_PER_MM).round(),
+            to: ((left + self.width_mm(figure, column)) * UNITS_PER_MM).round(),
         }
     }
 }
@@ -69,9 +76,9 @@ fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
     if panel.bare {
         return EDGE_MM / 2.0;
     }
-    let (low, high) = axis::ends(&panel.y, visible(panel, f64::NEG_INFINITY, f64::INFINITY));
-    let y = Mapped { scale: panel.y.scale, low, high, from: 0.0, to: panel.height_mm * UNITS };
-    widest_mm(&y_ticks(panel, &y, MOST_NAMES * column_mm))
+    let (low, high) = axis::axis_limits(&panel.y, visible_y_values(panel, f64::NEG_INFINITY, f64::INFINITY));
+    let y = CanvasAxis { scale: panel.y.scale, low, high, from: 0.0, to: panel.height_mm * UNITS_PER_MM };
+    widest_label_mm(&y_axis_ticks(panel, &y, MOST_NAMES * column_mm))
         + TICK_MM
         + y_label_lines(panel).len() as f64 * LINE_MM
         + EDGE_MM
@@ -86,8 +93,8 @@ fn right_margin(panel: &Panel) -> f64 {
     }
     EDGE_MM
         + panel
-            .heat
+            .heat_map
             .as_ref()
-            .map_or(0.0, |heat| heat_bar::bar_width_mm(heat, panel.height_mm))
+            .map_or(0.0, |heat| heat_bar::colour_bar_width_mm(heat, panel.height_mm))
             .max(HALF_LABEL_MM)
 }

@@ -1,36 +1,43 @@
 //! Labels over a panel, in rows such that none overlaps another.
 
-use crate::chart::axis::Mapped;
+use crate::chart::axis::CanvasAxis;
 use crate::chart::elements::Panel;
-use crate::chart::sizes::{SMALL_MM, UNITS};
-use crate::chart::text::{WIDE_BOLD_LETTER, WIDE_LETTER, shortened, text_width};
+use crate::chart::sizes::{SMALL_MM, UNITS_PER_MM};
+use crate::chart::text::{WIDE_BOLD_LETTER, WIDE_LETTER, text_width, truncate_text};
 
 /// Rows of labels over a panel; further labels are left out, their lines stay.
-const MOST_ROWS: usize = 4;
+const MAX_LABEL_ROWS: usize = 4;
 /// Width of bold letters over that of others.
-const BOLD: f64 = WIDE_BOLD_LETTER / WIDE_LETTER;
+const BOLD_WIDTH_RATIO: f64 = WIDE_BOLD_LETTER / WIDE_LETTER;
 
 /// Row of every label over the panel such that none overlaps another: those of the rules, then the captions,
 /// which stand next to the panel.
-pub(super) fn label_rows(panel: &Panel, x: &Mapped) -> Vec<Option<usize>> {
-    let end = |line: &str| x.from + (text_width(line, SMALL_MM) * BOLD + 1.0) * UNITS;
+pub(super) fn assign_label_rows(panel: &Panel, x: &CanvasAxis) -> Vec<Option<usize>> {
+    let end = |line: &str| x.from + (text_width(line, SMALL_MM) * BOLD_WIDTH_RATIO + 1.0) * UNITS_PER_MM;
     let title_ends: Vec<f64> = panel.title.lines().rev().map(end).collect();
-    let captions =
-        rows(&panel.captions.iter().map(|c| (c.label.as_str(), c.at)).collect::<Vec<_>>(), x, &title_ends);
+    let captions = stack_labels(
+        &panel.top_labels.iter().map(|c| (c.label.as_str(), c.at)).collect::<Vec<_>>(),
+        x,
+        &title_ends,
+    );
     let taken = captions.iter().flatten().max().map_or(0, |row| row + 1);
     let free: &[f64] = if taken == 0 { &title_ends } else { &[] };
-    let rules = rows(&panel.rules.iter().map(|r| (r.label.as_str(), r.at)).collect::<Vec<_>>(), x, free);
+    let rules = stack_labels(
+        &panel.vertical_lines.iter().map(|r| (r.label.as_str(), r.at)).collect::<Vec<_>>(),
+        x,
+        free,
+    );
     rules.into_iter().map(|row| row.map(|row| row + taken)).chain(captions).collect()
 }
 
 /// The lowest row for every label with its place such that none overlaps another, nor the lines of a title,
 /// of which the lowest comes first and ends at the first of `title_ends`.
-fn rows(labels: &[(&str, f64)], x: &Mapped, title_ends: &[f64]) -> Vec<Option<usize>> {
-    let place = |at: f64| x.place(at).filter(|at| *at >= x.from && *at <= x.to);
+fn stack_labels(labels: &[(&str, f64)], x: &CanvasAxis, title_ends: &[f64]) -> Vec<Option<usize>> {
+    let place = |at: f64| x.canvas_position(at).filter(|at| *at >= x.from && *at <= x.to);
     let mut order: Vec<(usize, f64)> =
         labels.iter().enumerate().filter_map(|(i, (_, at))| place(*at).map(|at| (i, at))).collect();
     order.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let mut ends = [f64::NEG_INFINITY; MOST_ROWS];
+    let mut ends = [f64::NEG_INFINITY; MAX_LABEL_ROWS];
     ends.iter_mut().zip(title_ends).for_each(|(end, title)| *end = *title);
     let mut rows = vec![None; labels.len()];
     for (index, _) in order {
@@ -40,7 +47,7 @@ fn rows(labels: &[(&str, f64)], x: &Mapped, title_ends: &[f64]) -> Vec<Option<us
         }
         let (left, right) = label_span(label, at, x);
         if let Some(row) = ends.iter().position(|end| *end < left) {
-            ends[row] = right + UNITS;
+            ends[row] = right + UNITS_PER_MM;
             rows[index] = Some(row);
         }
     }
@@ -48,41 +55,44 @@ fn rows(labels: &[(&str, f64)], x: &Mapped, title_ends: &[f64]) -> Vec<Option<us
 }
 
 /// Left and right end of a label over the panel: centred on its place, moved inside the axes.
-pub(in crate::chart) fn label_span(label: &str, at: f64, x: &Mapped) -> (f64, f64) {
-    let width = text_width(&over_panel(label, x), SMALL_MM) * UNITS;
-    let left = (x.place(at).unwrap_or(x.from) - width / 2.0).min(x.to - width).max(x.from);
+pub(in crate::chart) fn label_span(label: &str, at: f64, x: &CanvasAxis) -> (f64, f64) {
+    let width = text_width(&shorten_to_panel(label, x), SMALL_MM) * UNITS_PER_MM;
+    let left = (x.canvas_position(at).unwrap_or(x.from) - width / 2.0).min(x.to - width).max(x.from);
     (left, left + width)
 }
 
 /// A label over the panel, as far as the panel is wide.
-pub(in crate::chart) fn over_panel(label: &str, x: &Mapped) -> String {
-    shortened(label, SMALL_MM, (x.to - x.from) / UNITS)
+pub(in crate::chart) fn shorten_to_panel(label: &str, x: &CanvasAxis) -> String {
+    truncate_text(label, SMALL_MM, (x.to - x.from) / UNITS_PER_MM)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::chart::{Caption, Rule};
+    use crate::chart::{TopLabel, VerticalLine};
 
     #[test]
     fn captions_stand_next_to_the_panel_and_labels_of_rules_over_them() {
-        let rule = |label: &str, at| Rule { label: label.to_owned(), at, ..Rule::default() };
-        let captions = vec![Caption { label: "flip".to_owned(), at: 5.0 }];
+        let rule = |label: &str, at| VerticalLine { label: label.to_owned(), at, ..VerticalLine::default() };
+        let captions = vec![TopLabel { label: "flip".to_owned(), at: 5.0 }];
         let panel = Panel {
-            rules: vec![rule("a", 1.0), rule("", 2.0), rule("b", 20.0)],
-            captions,
+            vertical_lines: vec![rule("a", 1.0), rule("", 2.0), rule("b", 20.0)],
+            top_labels: captions,
             ..Panel::default()
         };
-        let x = Mapped { scale: Default::default(), low: 0.0, high: 10.0, from: 0.0, to: 1000.0 };
-        assert_eq!(label_rows(&panel, &x), [Some(1), None, None, Some(0)]);
+        let x = CanvasAxis { scale: Default::default(), low: 0.0, high: 10.0, from: 0.0, to: 1000.0 };
+        assert_eq!(assign_label_rows(&panel, &x), [Some(1), None, None, Some(0)]);
     }
 
     #[test]
     fn labels_stand_beside_the_title_of_a_panel_or_over_it() {
-        let rule = |at| Rule { label: "truth".to_owned(), at, ..Rule::default() };
-        let panel =
-            Panel { title: "identified".to_owned(), rules: vec![rule(1.0), rule(8.0)], ..Panel::default() };
-        let x = Mapped { scale: Default::default(), low: 0.0, high: 10.0, from: 0.0, to: 1000.0 };
-        assert_eq!(label_rows(&panel, &x), [Some(1), Some(0)]);
+        let rule = |at| VerticalLine { label: "truth".to_owned(), at, ..VerticalLine::default() };
+        let panel = Panel {
+            title: "identified".to_owned(),
+            vertical_lines: vec![rule(1.0), rule(8.0)],
+            ..Panel::default()
+        };
+        let x = CanvasAxis { scale: Default::default(), low: 0.0, high: 10.0, from: 0.0, to: 1000.0 };
+        assert_eq!(assign_label_rows(&panel, &x), [Some(1), Some(0)]);
     }
 }

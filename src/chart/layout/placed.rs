@@ -1,26 +1,26 @@
 //! A panel in its place, and the ticks that fit there.
 
-use super::ranges::visible;
-use super::ticks::{HALF_LABEL_MM, MOST_NAMES, is_scale, y_ticks};
-use crate::chart::axis::{self, Mapped, Scale, Tick};
+use super::ranges::visible_y_values;
+use super::ticks::{HALF_LABEL_MM, MOST_NAMES, shows_scale, y_axis_ticks};
+use crate::chart::axis::{self, AxisScale, CanvasAxis, Tick};
 use crate::chart::elements::Panel;
-use crate::chart::path::Area;
-use crate::chart::sizes::{EDGE_MM, LINE_MM, TEXT_MM, UNITS, X_LOG_TICKS_MM, X_TICKS_MM};
-use crate::chart::text::{LETTER, WIDE_LETTER, shortened, text_width};
+use crate::chart::path::CanvasArea;
+use crate::chart::sizes::{EDGE_MM, LINE_MM, TEXT_MM, UNITS_PER_MM, X_LOG_TICKS_MM, X_TICKS_MM};
+use crate::chart::text::{LETTER, WIDE_LETTER, text_width, truncate_text};
 
 /// Ticks for which a narrow x axis has room, however close they come.
 const LEAST_X_TICKS: f64 = 4.0;
 
 /// A panel with its place; lengths in mm.
-pub(in crate::chart) struct Placed<'a> {
+pub(in crate::chart) struct PanelLayout<'a> {
     pub panel: &'a Panel,
-    pub x: Mapped,
-    pub y: Mapped,
-    pub area: Area,
+    pub x: CanvasAxis,
+    pub y: CanvasAxis,
+    pub area: CanvasArea,
     /// Whether the ticks of the x axis are labelled here.
-    pub last: bool,
+    pub has_x_labels: bool,
     /// Row over the panel of the label of every rule, then of every caption.
-    pub rows: Vec<Option<usize>>,
+    pub label_rows: Vec<Option<usize>>,
     /// Letter by which a text names it, where there are several.
     pub letter: Option<char>,
     /// Left end of its column, mm.
@@ -31,37 +31,37 @@ pub(in crate::chart) struct Placed<'a> {
     pub(super) names_mm: f64,
 }
 
-impl<'a> Placed<'a> {
-    pub(in crate::chart) fn of(
+impl<'a> PanelLayout<'a> {
+    pub(in crate::chart) fn new(
         panel: &'a Panel,
-        (x, (low, high)): (Mapped, (f64, f64)),
+        (x, (low, high)): (CanvasAxis, (f64, f64)),
         top_mm: f64,
         last: bool,
         rows: Vec<Option<usize>>,
     ) -> Self {
-        let area = Area {
+        let area = CanvasArea {
             left: x.from,
             right: x.to,
-            top: (top_mm * UNITS).round(),
-            bottom: ((top_mm + panel.height_mm) * UNITS).round(),
+            top: (top_mm * UNITS_PER_MM).round(),
+            bottom: ((top_mm + panel.height_mm) * UNITS_PER_MM).round(),
         };
-        let (y_low, y_high) = axis::ends(&panel.y, visible(panel, low, high));
+        let (y_low, y_high) = axis::axis_limits(&panel.y, visible_y_values(panel, low, high));
         let mut placed = Self {
             panel,
             x,
-            y: Mapped { scale: panel.y.scale, low: y_low, high: y_high, from: area.bottom, to: area.top },
+            y: CanvasAxis { scale: panel.y.scale, low: y_low, high: y_high, from: area.bottom, to: area.top },
             area,
-            last: last && !panel.bare,
-            rows,
+            has_x_labels: last && !panel.bare,
+            label_rows: rows,
             letter: None,
             column_mm: 0.0,
             under_mm: 0.0,
             names_mm: 0.0,
         };
-        if panel.equal {
-            placed.equalise();
+        if panel.equal_aspect {
+            placed.equalise_scales();
         }
-        if placed.last {
+        if placed.has_x_labels {
             let label = if panel.x.label.is_empty() { 0.0 } else { LINE_MM };
             placed.under_mm = label + placed.x_names_mm().map_or(LINE_MM, |names| names + 1.0);
         }
@@ -69,8 +69,8 @@ impl<'a> Placed<'a> {
     }
 
     /// Widens the shorter of the axes about its middle until both have one length for a unit.
-    fn equalise(&mut self) {
-        let unit = |axis: &Mapped| (axis.high - axis.low) / (axis.to - axis.from).abs();
+    fn equalise_scales(&mut self) {
+        let unit = |axis: &CanvasAxis| (axis.high - axis.low) / (axis.to - axis.from).abs();
         let most = unit(&self.x).max(unit(&self.y));
         for axis in [&mut self.x, &mut self.y] {
             let (middle, half) = ((axis.low + axis.high) / 2.0, most * (axis.to - axis.from).abs() / 2.0);
@@ -80,45 +80,48 @@ impl<'a> Placed<'a> {
 
     /// Ticks of the x axis: names, or numbers that do not run into each other.
     pub(crate) fn x_ticks(&self) -> Vec<Tick> {
-        if !self.panel.x.names.is_empty() {
+        if !self.panel.x.categories.is_empty() {
             let most_mm = self.x_names_mm().map_or(f64::INFINITY, |_| MOST_NAMES * self.panel.height_mm);
-            return axis::named_ticks(&self.panel.x, |name| shortened(name, TEXT_MM, most_mm));
+            return axis::category_ticks(&self.panel.x, |name| truncate_text(name, TEXT_MM, most_mm));
         }
         let width = self.area.right - self.area.left;
-        let usual_mm = if self.x.scale == Scale::Log { X_LOG_TICKS_MM } else { X_TICKS_MM };
-        let mut apart = (usual_mm * UNITS).min(width / LEAST_X_TICKS);
+        let usual_mm = if self.x.scale == AxisScale::Log { X_LOG_TICKS_MM } else { X_TICKS_MM };
+        let mut apart = (usual_mm * UNITS_PER_MM).min(width / LEAST_X_TICKS);
         let mut ticks = self.x.ticks(apart);
-        while !self.apart(&ticks) && apart < width {
+        while !self.are_labels_apart(&ticks) && apart < width {
             apart *= 1.3;
             let fewer = self.x.ticks(apart);
-            if !is_scale(&fewer) {
+            if !shows_scale(&fewer) {
                 break;
             }
             ticks = fewer;
         }
-        self.thin_out(&mut ticks);
+        self.drop_crowded_labels(&mut ticks);
         ticks
     }
 
     /// Ends of the label of a tick of the x axis.
-    fn span(&self, tick: &Tick) -> Option<(f64, f64)> {
-        let (at, half) = (self.x.place(tick.value)?, text_width(tick.label.as_ref()?, TEXT_MM) * UNITS / 2.0);
+    fn tick_label_span(&self, tick: &Tick) -> Option<(f64, f64)> {
+        let (at, half) = (
+            self.x.canvas_position(tick.value)?,
+            text_width(tick.label.as_ref()?, TEXT_MM) * UNITS_PER_MM / 2.0,
+        );
         Some((at - half, at + half))
     }
 
-    fn apart(&self, ticks: &[Tick]) -> bool {
-        let spans: Vec<_> = ticks.iter().filter_map(|tick| self.span(tick)).collect();
-        spans.windows(2).all(|pair| pair[0].1 + UNITS < pair[1].0)
+    fn are_labels_apart(&self, ticks: &[Tick]) -> bool {
+        let spans: Vec<_> = ticks.iter().filter_map(|tick| self.tick_label_span(tick)).collect();
+        spans.windows(2).all(|pair| pair[0].1 + UNITS_PER_MM < pair[1].0)
     }
 
     /// Takes the labels away that would run into the one before, or out of the figure.
-    fn thin_out(&self, ticks: &mut [Tick]) {
+    fn drop_crowded_labels(&self, ticks: &mut [Tick]) {
         let mut end = f64::NEG_INFINITY;
-        let edge = self.area.right + (EDGE_MM + HALF_LABEL_MM) * UNITS;
+        let edge = self.area.right + (EDGE_MM + HALF_LABEL_MM) * UNITS_PER_MM;
         for tick in ticks {
-            let Some((left, right)) = self.span(tick) else { continue };
+            let Some((left, right)) = self.tick_label_span(tick) else { continue };
             let wide = (right - left) * (WIDE_LETTER / LETTER - 1.0) / 2.0;
-            if left < end + UNITS || right + wide > edge {
+            if left < end + UNITS_PER_MM || right + wide > edge {
                 tick.label = None;
             } else {
                 end = right;
@@ -128,14 +131,14 @@ impl<'a> Placed<'a> {
 
     /// Ticks of the y axis.
     pub(crate) fn y_ticks(&self) -> Vec<Tick> {
-        y_ticks(self.panel, &self.y, self.names_mm)
+        y_axis_ticks(self.panel, &self.y, self.names_mm)
     }
 
     /// Height that the names under an x axis take where they have to stand upright, mm; `None` where they
     /// lie, or are none.
     pub(crate) fn x_names_mm(&self) -> Option<f64> {
-        let names = &self.panel.x.names;
-        let step_mm = (self.area.right - self.area.left) / UNITS / (self.x.high - self.x.low).max(1.0);
+        let names = &self.panel.x.categories;
+        let step_mm = (self.area.right - self.area.left) / UNITS_PER_MM / (self.x.high - self.x.low).max(1.0);
         let widest = names.iter().map(|(_, name)| text_width(name, TEXT_MM)).fold(0.0, f64::max);
         (widest > step_mm - 1.0 && !names.is_empty()).then(|| widest.min(MOST_NAMES * self.panel.height_mm))
     }
@@ -152,9 +155,14 @@ mod tests {
     #[test]
     fn a_low_axis_has_two_numbers_where_there_is_room_for_lines_of_text() {
         let of = |height_mm: f64| {
-            let y =
-                Mapped { scale: Default::default(), low: 13.0, high: 93.0, from: height_mm * UNITS, to: 0.0 };
-            y_ticks(&Panel::default(), &y, 0.0)
+            let y = CanvasAxis {
+                scale: Default::default(),
+                low: 13.0,
+                high: 93.0,
+                from: height_mm * UNITS_PER_MM,
+                to: 0.0,
+            };
+            y_axis_ticks(&Panel::default(), &y, 0.0)
         };
         assert_eq!(numbers(&of(24.0)), ["20", "40", "60", "80"]);
         assert_eq!(numbers(&of(20.0)), ["20", "40", "60", "80"]);
@@ -162,30 +170,39 @@ mod tests {
 
     #[test]
     fn numbers_that_have_room_beside_each_other_only_one_in_two_are_not_one_alone() {
-        let x = Mapped {
+        let x = CanvasAxis {
             scale: Default::default(),
             low: 0.001_851,
             high: 0.001_949,
             from: 0.0,
-            to: 44.0 * UNITS,
+            to: 44.0 * UNITS_PER_MM,
         };
-        let placed = Placed::of(&Panel::default(), (x, (x.low, x.high)), 0.0, true, Vec::new()).x_ticks();
+        let placed =
+            PanelLayout::new(&Panel::default(), (x, (x.low, x.high)), 0.0, true, Vec::new()).x_ticks();
         assert_eq!(numbers(&placed), ["0.00186", "0.00190", "0.00194"]);
         // the last of these would leave the figure
-        let x = Mapped { high: 0.001_941, ..x };
-        let placed = Placed::of(&Panel::default(), (x, (x.low, x.high)), 0.0, true, Vec::new()).x_ticks();
+        let x = CanvasAxis { high: 0.001_941, ..x };
+        let placed =
+            PanelLayout::new(&Panel::default(), (x, (x.low, x.high)), 0.0, true, Vec::new()).x_ticks();
         assert_eq!(numbers(&placed), ["0.00186", "0.00190"]);
     }
 
     #[test]
     fn long_names_along_a_y_axis_take_two_lines_where_there_is_room() {
         let name = "deflection at 0.08 m/s, before";
-        let panel =
-            Panel { y: axis::Axis::named("", [name.to_owned(), "low".to_owned()]), ..Panel::default() };
+        let panel = Panel {
+            y: axis::ChartAxis::categorical("", [name.to_owned(), "low".to_owned()]),
+            ..Panel::default()
+        };
         let labels = |height_mm: f64| {
-            let y =
-                Mapped { scale: Default::default(), low: -0.5, high: 1.5, from: height_mm * UNITS, to: 0.0 };
-            y_ticks(&panel, &y, 26.0).into_iter().filter_map(|tick| tick.label).collect::<Vec<_>>()
+            let y = CanvasAxis {
+                scale: Default::default(),
+                low: -0.5,
+                high: 1.5,
+                from: height_mm * UNITS_PER_MM,
+                to: 0.0,
+            };
+            y_axis_ticks(&panel, &y, 26.0).into_iter().filter_map(|tick| tick.label).collect::<Vec<_>>()
         };
         assert_eq!(labels(11.0), ["deflection at\n0.08 m/s, before", "low"]);
         assert_eq!(labels(10.5), ["deflection at\u{2026}", "low"]);

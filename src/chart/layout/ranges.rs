@@ -1,14 +1,14 @@
 //! What of the data decides the ends of axes.
 
 use crate::chart::axis;
-use crate::chart::elements::{Bar, Panel};
+use crate::chart::elements::{ErrorBar, Panel};
 
 /// Values of y within the ends of x.
-pub(super) fn visible(panel: &Panel, low: f64, high: f64) -> impl Iterator<Item = f64> {
+pub(super) fn visible_y_values(panel: &Panel, low: f64, high: f64) -> impl Iterator<Item = f64> {
     let points = panel.series.iter().flat_map(|s| s.points.iter().flatten());
-    let bars = panel.series.iter().flat_map(|s| &s.bars).flat_map(|bar| match bar {
-        Bar::Vertical { x, from, to } => [(*x, *from), (*x, *to)],
-        Bar::Horizontal { y, from, to } => [(*from, *y), (*to, *y)],
+    let bars = panel.series.iter().flat_map(|s| &s.error_bars).flat_map(|bar| match bar {
+        ErrorBar::Vertical { x, from, to } => [(*x, *from), (*x, *to)],
+        ErrorBar::Horizontal { y, from, to } => [(*from, *y), (*to, *y)],
     });
     let ribbons = panel
         .ribbons
@@ -18,7 +18,7 @@ pub(super) fn visible(panel: &Panel, low: f64, high: f64) -> impl Iterator<Item 
     let all = points.copied().chain(bars).chain(ribbons);
     all.filter(move |(x, _)| *x >= low && *x <= high)
         .map(|(_, y)| y)
-        .chain(panel.heat.iter().flat_map(|h| h.y.iter().copied()))
+        .chain(panel.heat_map.iter().flat_map(|h| h.y.iter().copied()))
 }
 
 /// Ends of the x axis of every panel, common to those one below the other that share it.
@@ -26,13 +26,14 @@ pub(super) fn x_ranges(panels: &[Panel], columns: usize) -> Vec<(f64, f64)> {
     let values = |p: &'_ Panel| {
         let points = p.series.iter().flat_map(|s| s.points.iter().flatten().map(|(x, _)| *x));
         let ribbons = p.ribbons.iter().flat_map(|r| r.points.iter().flatten().map(|(x, ..)| *x));
-        points.chain(ribbons).chain(p.heat.iter().flat_map(|h| h.x.iter().copied())).collect::<Vec<_>>()
+        points.chain(ribbons).chain(p.heat_map.iter().flat_map(|h| h.x.iter().copied())).collect::<Vec<_>>()
     };
     let mut ranges = vec![(0.0, 1.0); panels.len()];
     for column in 0..columns {
         let own: Vec<usize> = (column..panels.len()).step_by(columns).collect();
         for group in own.chunk_by(|a, b| panels[*a].x == panels[*b].x) {
-            let range = axis::ends(&panels[group[0]].x, group.iter().flat_map(|at| values(&panels[*at])));
+            let range =
+                axis::axis_limits(&panels[group[0]].x, group.iter().flat_map(|at| values(&panels[*at])));
             group.iter().for_each(|at| ranges[*at] = range);
         }
     }

@@ -1,8 +1,8 @@
 //! What a recording and a model show in the same window, side by side.
 
-use super::components::{curve, level, named};
-use crate::figures::spectrum::{Named, Spectra};
-use crate::spectrum::Analysis;
+use super::components::{label_component, spectrum_curve, spectrum_level};
+use crate::figures::spectrum::{LabelledComponent, SpectraPlot};
+use crate::spectrum::SpectralAnalysis;
 
 /// Components of a model under this share of its largest are of no account.
 const LEAST_OF_MODEL: f64 = 1e-3;
@@ -11,14 +11,14 @@ const LEAST_OF_MODEL: f64 = 1e-3;
 /// without those that no recording could show: under the noise floor of this one, or of no account. Heading,
 /// note and targets are left to the caller.
 #[must_use]
-pub fn compared(measured: Option<&Analysis>, model: Option<&Analysis>) -> Spectra {
-    let components = |analysis: &Analysis| -> Vec<Named> {
+pub fn compare_spectra(measured: Option<&SpectralAnalysis>, model: Option<&SpectralAnalysis>) -> SpectraPlot {
+    let components = |analysis: &SpectralAnalysis| -> Vec<LabelledComponent> {
         analysis
             .spectrum
             .components
             .iter()
             .filter(|c| c.is_resolvable())
-            .map(|c| named(c, &analysis.spectrum))
+            .map(|c| label_component(c, &analysis.spectrum))
             .collect()
     };
     let noise_floor_m = measured.map(|m| m.spectrum.noise_floor_m);
@@ -26,14 +26,14 @@ pub fn compared(measured: Option<&Analysis>, model: Option<&Analysis>) -> Spectr
     let largest_m = model_components.iter().map(|c| c.amplitude_m).fold(0.0, f64::max);
     let least_m = noise_floor_m.unwrap_or(0.0).max(LEAST_OF_MODEL * largest_m);
     model_components.retain(|c| c.amplitude_m >= least_m);
-    Spectra {
-        measured: measured.map(curve),
-        model: model.map(curve),
+    SpectraPlot {
+        measured: measured.map(spectrum_curve),
+        model: model.map(spectrum_curve),
         noise_floor_m,
-        noise_floor: measured.and_then(|m| level(m, &m.noise_floor_m)),
+        noise_floor: measured.and_then(|m| spectrum_level(m, &m.noise_floor_m)),
         components: measured.map_or_else(Vec::new, components),
         model_components,
         lowest_hz: measured.or(model).map_or(1.0, |a| a.spectrum.resolution_hz),
-        ..Spectra::default()
+        ..SpectraPlot::default()
     }
 }

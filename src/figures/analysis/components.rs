@@ -1,63 +1,69 @@
 //! The spectrum of a window as curves, levels and named components.
 
 use super::window::AnalysedWindow;
-use crate::figures::spectrum::{Curve, Interval, Level, Named, Spectra, strongest};
-use crate::spectrum::{Analysis, Component, Spectrum, Verdict};
+use crate::figures::spectrum::{
+    AmplitudeInterval, LabelledComponent, SpectraPlot, SpectrumCurve, SpectrumLevel, strongest_claim,
+};
+use crate::spectrum::{Component, ComponentVerdict, SpectralAnalysis, Spectrum};
 
 impl AnalysedWindow<'_> {
-    pub(super) fn spectra(&self) -> Spectra {
+    pub(super) fn spectra(&self) -> SpectraPlot {
         let (analysis, spectrum) = (self.analysis, &self.analysis.spectrum);
-        let shown = Spectra {
+        let shown = SpectraPlot {
             quantity: self.channel.to_string(),
-            note: self.said("spectrum"),
+            note: self.figure_note("spectrum"),
             synthetic: self.recording.is_synthetic(),
-            measured: Some(curve(analysis)),
+            measured: Some(spectrum_curve(analysis)),
             noise_floor_m: Some(spectrum.noise_floor_m),
-            noise_floor: level(analysis, &analysis.noise_floor_m),
-            interval_95: self.interval(),
-            leakage: level(analysis, &analysis.leakage_m),
-            components: spectrum.components.iter().map(|c| named(c, spectrum)).collect(),
+            noise_floor: spectrum_level(analysis, &analysis.noise_floor_m),
+            interval_95: self.noise_interval(),
+            leakage: spectrum_level(analysis, &analysis.leakage_m),
+            components: spectrum.components.iter().map(|c| label_component(c, spectrum)).collect(),
             lowest_hz: spectrum.resolution_hz,
-            ..Spectra::default()
+            ..SpectraPlot::default()
         };
-        Spectra { title: strongest(&shown), ..shown }
+        SpectraPlot { title: strongest_claim(&shown), ..shown }
     }
 
     /// What the noise leaves open of every amplitude of the curve that is drawn.
-    fn interval(&self) -> Option<Interval> {
-        let floor = level(self.analysis, &self.analysis.noise_floor_m)?;
-        Some(Interval::of(&curve(self.analysis), &floor))
+    fn noise_interval(&self) -> Option<AmplitudeInterval> {
+        let floor = spectrum_level(self.analysis, &self.analysis.noise_floor_m)?;
+        Some(AmplitudeInterval::from_noise_floor(&spectrum_curve(self.analysis), &floor))
     }
 }
 
-pub(super) fn curve(analysis: &Analysis) -> Curve {
-    Curve {
+pub(super) fn spectrum_curve(analysis: &SpectralAnalysis) -> SpectrumCurve {
+    SpectrumCurve {
         frequency_hz: analysis.spectrum.frequency_hz.clone(),
         amplitude_m: analysis.spectrum.amplitude_m.clone(),
     }
 }
 
 /// Amplitudes at the frequencies of the spectrum; none where there are not as many.
-pub(super) fn level(analysis: &Analysis, amplitude_m: &[f64]) -> Option<Level> {
+pub(super) fn spectrum_level(analysis: &SpectralAnalysis, amplitude_m: &[f64]) -> Option<SpectrumLevel> {
     let frequency_hz = &analysis.spectrum.frequency_hz;
     (amplitude_m.len() == frequency_hz.len())
-        .then(|| Level { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
+        .then(|| SpectrumLevel { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
 }
 
 /// A component at its height in the spectrum, as its amplitude may be that of a start, or the mean of one
 /// that drifts, which lies above its wide peak.
-pub(super) fn named(c: &Component, spectrum: &Spectrum) -> Named {
+pub(super) fn label_component(c: &Component, spectrum: &Spectrum) -> LabelledComponent {
     let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
     let height_m = spectrum.amplitude_m.get((c.frequency_hz / bin_hz).round() as usize).copied();
     let shown_m = height_m.unwrap_or(c.amplitude_m);
     let share = if c.amplitude_m > 0.0 { c.amplitude_sd_m / c.amplitude_m } else { 0.0 };
-    Named {
+    LabelledComponent {
         frequency_hz: c.frequency_hz,
         frequency_sd_hz: c.frequency_sd_hz,
         range_hz: c.range_hz.map(|range| (range.low_hz, range.high_hz)),
         amplitude_m: shown_m,
         amplitude_sd_m: shown_m * share,
-        remark: if c.verdict == Verdict::Clear { String::new() } else { c.verdict.word().to_owned() },
+        remark: if c.verdict == ComponentVerdict::Clear {
+            String::new()
+        } else {
+            c.verdict.name().to_owned()
+        },
     }
 }
 
@@ -66,13 +72,13 @@ mod tests {
     use super::*;
     use crate::recording::channel::Channel;
     use crate::recording::{FrameGrid, Recording, Traces};
-    use crate::spectrum::{Detrend, Record, Settings};
+    use crate::spectrum::{Detrend, SampledRecord, SpectrumSettings};
     use std::f64::consts::TAU;
 
     const RATE_HZ: f64 = 5000.0;
 
     /// A record with noise, one frame in so many lost, as it is drawn, and its curve without noise.
-    fn drawn(of_m: impl Fn(f64) -> f64, noise_m: f64, lost: usize) -> (Spectra, Curve) {
+    fn drawn(of_m: impl Fn(f64) -> f64, noise_m: f64, lost: usize) -> (SpectraPlot, SpectrumCurve) {
         let mut seed = 7_u64;
         let mut draw = || {
             seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
@@ -83,8 +89,12 @@ mod tests {
         let noisy: Vec<_> = exact.iter().enumerate().map(|(i, x)| seen(x + noise_m * draw(), i)).collect();
         let quiet: Vec<_> = exact.iter().enumerate().map(|(i, x)| seen(*x, i)).collect();
         let analysed = |samples: &[Option<f64>]| {
-            let record = Record { samples, frame_rate_hz: RATE_HZ, exposure_s: None };
-            Analysis::of(&record, &Settings { detrend: Some(Detrend::Mean), ..Settings::default() }).unwrap()
+            let record = SampledRecord { samples, frame_rate_hz: RATE_HZ, exposure_s: None };
+            SpectralAnalysis::from_record(
+                &record,
+                &SpectrumSettings { detrend: Some(Detrend::Mean), ..SpectrumSettings::default() },
+            )
+            .unwrap()
         };
         let grid = FrameGrid { start_s: 0.0, frame_rate_hz: RATE_HZ, frames: noisy.len() };
         let none = vec![None; noisy.len()];
@@ -104,11 +114,11 @@ mod tests {
             analysis: &analysis,
             note: String::new(),
         };
-        (window.spectra(), curve(&analysed(&quiet)))
+        (window.spectra(), spectrum_curve(&analysed(&quiet)))
     }
 
     /// Share of the bins above the lowest frequency whose interval holds an amplitude.
-    fn covered(shown: &Spectra, amplitude_m: &[f64]) -> f64 {
+    fn covered(shown: &SpectraPlot, amplitude_m: &[f64]) -> f64 {
         let interval = shown.interval_95.as_ref().unwrap();
         let bins = interval.lower_m.iter().zip(&interval.upper_m).zip(amplitude_m);
         let inside = |((low, high), a): ((&f64, &f64), &f64)| low <= a && a <= high;

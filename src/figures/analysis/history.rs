@@ -1,19 +1,19 @@
 //! The whole recording with its named windows.
 
-use super::window::{AnalysedWindow, instants};
-use crate::figures::windows::{NamedWindow, Windows};
-use crate::recording::channel::{self, Channel, Instants, named_windows};
-use crate::text::short;
+use super::window::{AnalysedWindow, named_instants};
+use crate::figures::windows::{WindowOverview, WindowSpan};
+use crate::recording::channel::{self, Channel, ReversalInstants, phase_windows};
+use crate::text::format_short;
 
 impl AnalysedWindow<'_> {
-    pub(super) fn windows(&self) -> Windows {
-        let (grid, found) = (self.recording.grid(), Instants::find(self.recording));
-        let window = |w: channel::NamedWindow| NamedWindow { name: w.name, from_s: w.from_s, to_s: w.to_s };
-        Windows {
+    pub(super) fn window_overview(&self) -> WindowOverview {
+        let (grid, found) = (self.recording.grid(), ReversalInstants::find_instants(self.recording));
+        let window = |w: channel::PhaseWindow| WindowSpan { name: w.name, from_s: w.from_s, to_s: w.to_s };
+        WindowOverview {
             title: format!(
                 "Analysed: {} s of {} s, {} frames",
-                short(self.frames.len() as f64 / grid.frame_rate_hz),
-                short(grid.frames as f64 / grid.frame_rate_hz),
+                format_short(self.frames.len() as f64 / grid.frame_rate_hz),
+                format_short(grid.frames as f64 / grid.frame_rate_hz),
                 self.frames.len()
             ),
             quantity: self.channel.to_string(),
@@ -26,9 +26,9 @@ impl AnalysedWindow<'_> {
             } else {
                 Channel::HeadX.samples(self.recording)
             },
-            windows: named_windows(self.recording, &found).into_iter().map(window).collect(),
+            windows: phase_windows(self.recording, &found).into_iter().map(window).collect(),
             analysed_s: Some((grid.time_s(self.frames.start), grid.time_s(self.frames.end))),
-            instants: instants(self.recording, (grid.start_s, grid.time_s(grid.frames))),
+            instants: named_instants(self.recording, (grid.start_s, grid.time_s(grid.frames))),
         }
     }
 }

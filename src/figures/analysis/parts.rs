@@ -1,9 +1,9 @@
 //! A window as the sum of its trend and its components, and what is left.
 
 use super::window::AnalysedWindow;
-use crate::figures::ring_down::{Decay, RingDown, Trace, title};
+use crate::figures::ring_down::{ComponentDecay, RingDown, RingDownTrace, figure_title};
 use crate::spectrum::{Component, Estimator, Oscillation};
-use crate::text::with_sd;
+use crate::text::format_with_sd;
 
 /// Points a cycle of the fastest oscillation for a smooth line.
 const POINTS_A_CYCLE: f64 = 12.0;
@@ -18,10 +18,11 @@ impl AnalysedWindow<'_> {
     pub(crate) fn ring_down(&self) -> RingDown {
         let grid = self.recording.grid();
         let time_s: Vec<f64> = self.frames.clone().map(|i| grid.time_s(i)).collect();
-        let trace = |values: Vec<Option<f64>>| Trace { time_s: time_s.clone(), displacement_m: values };
+        let trace =
+            |values: Vec<Option<f64>>| RingDownTrace { time_s: time_s.clone(), displacement_m: values };
         let analysis = self.analysis;
         let samples = analysis
-            .left_m
+            .residual_m
             .iter()
             .zip(&analysis.model_m)
             .zip(&analysis.removed_m)
@@ -32,23 +33,25 @@ impl AnalysedWindow<'_> {
         RingDown {
             title: analysis.spectrum.components.first().map_or_else(
                 || format!("No oscillation is found in the {}", self.channel.label()),
-                |component| title(&self.channel.label(), component),
+                |component| figure_title(&self.channel.label(), component),
             ),
             quantity: self.channel.label(),
-            note: self.said("components and rest"),
+            note: self.figure_note("components and rest"),
             synthetic: self.recording.is_synthetic(),
             data: trace(samples.collect()),
-            fitted: self
-                .fine(|t| self.slow_m(t) + analysis.oscillations.iter().map(|o| o.at_m(t)).sum::<f64>()),
+            fitted: self.fine_trace(|t| {
+                self.removed_trend_m(t)
+                    + analysis.oscillations.iter().map(|o| o.displacement_m(t)).sum::<f64>()
+            }),
             trend: trace(analysis.removed_m.iter().copied().map(Some).collect()),
-            residual: trace(analysis.left_m.clone()),
+            residual: trace(analysis.residual_m.clone()),
             noise_sd_m: (noise_m > 0.0).then_some(noise_m),
-            decay: self.decay(&time_s),
+            decay: self.largest_decay(&time_s),
         }
     }
 
     /// The largest component that decays, with what is left of the record added.
-    fn decay(&self, time_s: &[f64]) -> Option<Decay> {
+    fn largest_decay(&self, time_s: &[f64]) -> Option<ComponentDecay> {
         let analysis = self.analysis;
         let decays = |c: &&Component| {
             c.damping_ratio.zip(c.damping_ratio_sd).is_some_and(|(ratio, sd)| ratio > DECAYS * sd)
@@ -67,26 +70,28 @@ impl AnalysedWindow<'_> {
         let own = analysis.oscillations.iter().min_by(near)?;
         let start_s = time_s.first().copied()?;
         let data = analysis
-            .left_m
+            .residual_m
             .iter()
             .zip(time_s)
-            .map(|(left, t)| left.map(|left| left + own.at_m(t - start_s)))
+            .map(|(left, t)| left.map(|left| left + own.displacement_m(t - start_s)))
             .collect();
-        let ratio =
-            component.damping_ratio.zip(component.damping_ratio_sd).map(|(ratio, sd)| with_sd(ratio, sd))?;
-        Some(Decay {
+        let ratio = component
+            .damping_ratio
+            .zip(component.damping_ratio_sd)
+            .map(|(ratio, sd)| format_with_sd(ratio, sd))?;
+        Some(ComponentDecay {
             name: format!(
                 "{} Hz, damping ratio {ratio}",
-                with_sd(component.frequency_hz, component.frequency_sd_hz)
+                format_with_sd(component.frequency_hz, component.frequency_sd_hz)
             ),
-            fitted: self.fine(|t| own.at_m(t)),
-            envelope: self.fine(|t| own.envelope_m(t)),
-            data: Trace { time_s: time_s.to_vec(), displacement_m: data },
+            fitted: self.fine_trace(|t| own.displacement_m(t)),
+            envelope: self.fine_trace(|t| own.envelope_m(t)),
+            data: RingDownTrace { time_s: time_s.to_vec(), displacement_m: data },
         })
     }
 
     /// What was removed, between the frames on a straight line, m.
-    fn slow_m(&self, time_s: f64) -> f64 {
+    fn removed_trend_m(&self, time_s: f64) -> f64 {
         let place = time_s * self.recording.grid().frame_rate_hz;
         let before = (place.max(0.0) as usize).min(self.analysis.removed_m.len().saturating_sub(1));
         let value = |i: usize| {
@@ -96,7 +101,7 @@ impl AnalysedWindow<'_> {
     }
 
     /// A function of the time from the first frame, drawn finer than the frames.
-    fn fine(&self, value: impl Fn(f64) -> f64) -> Trace {
+    fn fine_trace(&self, value: impl Fn(f64) -> f64) -> RingDownTrace {
         let grid = self.recording.grid();
         let (start_s, length_s) =
             (grid.time_s(self.frames.start), self.frames.len().saturating_sub(1) as f64 / grid.frame_rate_hz);
@@ -104,7 +109,7 @@ impl AnalysedWindow<'_> {
         let points =
             (POINTS_A_CYCLE * fastest_hz * length_s).max(self.frames.len() as f64).min(MOST_POINTS) as usize;
         let times: Vec<f64> = (0..=points).map(|i| length_s * i as f64 / points.max(1) as f64).collect();
-        Trace {
+        RingDownTrace {
             displacement_m: times.iter().map(|t| Some(value(*t))).collect(),
             time_s: times.into_iter().map(|t| start_s + t).collect(),
         }

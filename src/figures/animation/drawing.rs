@@ -3,9 +3,9 @@
 
 use super::Animation;
 use crate::blade::Linkage;
-use crate::chart::{Axis, Colour, Mark, Panel, Series, Text};
-use crate::figures::poses::joints;
-use crate::simulate::Sample;
+use crate::chart::{ChartAxis, Colour, Mark, Panel, Series, TextAnnotation};
+use crate::figures::poses::joint_positions;
+use crate::simulate::ModelSample;
 
 const MM: f64 = 1e3;
 /// Estimated width of the axes of a panel in half a page, mm: the scale of the drawing follows from it.
@@ -24,45 +24,45 @@ const MARGIN_MM: f64 = 5.0;
 pub(super) const HEAD_HALF_WIDTH: f64 = 0.22;
 pub(super) const HEAD_HEIGHT: f64 = 0.14;
 
-/// A pose with its name, as [`points`].
-type Pose = (&'static str, [(f64, f64); 3]);
+/// A pose with its name, as [`linkage_points_mm`].
+type LabelledPose = (&'static str, [(f64, f64); 3]);
 
 /// Upper hinge of the neck, hinge between neck and lip, and lip tip, mm.
-pub(super) fn points(linkage: &Linkage, sample: &Sample) -> [(f64, f64); 3] {
-    joints(linkage, sample).map(|(x, y)| (MM * x, MM * y))
+pub(super) fn linkage_points_mm(linkage: &Linkage, sample: &ModelSample) -> [(f64, f64); 3] {
+    joint_positions(linkage, sample).map(|(x, y)| (MM * x, MM * y))
 }
 
 /// Length of the straight blade, mm.
-pub(super) fn blade_mm(linkage: &Linkage) -> f64 {
+pub(super) fn blade_length_mm(linkage: &Linkage) -> f64 {
     MM * (linkage.l1_m + linkage.l2_m)
 }
 
 /// The panel: glass, a length for scale, and the poses at the ends of the hold and half way of the flip.
-pub(super) fn panel(animation: &Animation) -> Panel {
-    let length = blade_mm(&animation.linkage);
+pub(super) fn draw_linkage_panel(animation: &Animation) -> Panel {
+    let length = blade_length_mm(&animation.linkage);
     let (low, high) = (-BELOW * length, (1.0 + ABOVE) * length);
     let ends = animation.samples.iter().flat_map(|s| [MM * s.head_x_m, MM * s.tip_x_m]);
     let room = 1.2 * HEAD_HALF_WIDTH * length;
     let (left, right) =
         ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, r), x| (l.min(x - room), r.max(x + room)));
     let height_mm = (AXES_MM * (high - low) / (right - left)).clamp(HEIGHT_MM.0, HEIGHT_MM.1);
-    let poses = poses(animation);
+    let poses = key_poses(animation);
     let unit_mm = (AXES_MM / (right - left)).min(height_mm / (high - low));
     let (bar, foot) = (left + (MARGIN_MM / unit_mm - 0.5).max(0.0), 0.8 * low);
     let mut panel = Panel {
-        x: Axis::linear("").between(left, right),
-        y: Axis::linear("").between(low, high),
+        x: ChartAxis::linear("").with_range(left, right),
+        y: ChartAxis::linear("").with_range(low, high),
         height_mm,
-        equal: true,
+        equal_aspect: true,
         bare: true,
-        series: vec![glass(left, right), scale((bar, low / 2.0))],
-        texts: vec![
-            text("glass", (right - MARGIN_MM / unit_mm, foot)),
-            text("1 mm", (bar + 0.5, foot - 0.5 / unit_mm)),
+        series: vec![glass_line(left, right), scale_bar((bar, low / 2.0))],
+        annotations: vec![
+            text_at("glass", (right - MARGIN_MM / unit_mm, foot)),
+            text_at("1 mm", (bar + 0.5, foot - 0.5 / unit_mm)),
         ],
         ..Panel::default()
     };
-    panel.texts.extend(labels(
+    panel.annotations.extend(pose_labels(
         &poses,
         (1.0 + 1.4 * HEAD_HEIGHT) * length,
         ROW_MM / unit_mm,
@@ -87,7 +87,7 @@ pub(super) fn panel(animation: &Animation) -> Panel {
 }
 
 /// The glass, as wide as the panel turns out to be.
-fn glass(left: f64, right: f64) -> Series {
+fn glass_line(left: f64, right: f64) -> Series {
     const FAR: f64 = 100.0;
     let ends = [left - FAR * (right - left), right + FAR * (right - left)];
     Series {
@@ -99,16 +99,16 @@ fn glass(left: f64, right: f64) -> Series {
 }
 
 /// A millimetre from there.
-fn scale((x, y): (f64, f64)) -> Series {
+fn scale_bar((x, y): (f64, f64)) -> Series {
     Series { points: vec![Some((x, y)), Some((x + 1.0, y))], ..Series::default() }
 }
 
-fn text(text: &str, at: (f64, f64)) -> Text {
-    Text { text: text.to_owned(), at, ..Text::default() }
+fn text_at(text: &str, at: (f64, f64)) -> TextAnnotation {
+    TextAnnotation { text: text.to_owned(), at, ..TextAnnotation::default() }
 }
 
 /// The tip enlarged over the last part of what is shown, where it slips.
-pub(super) fn enlarged(animation: &Animation, height_mm: f64) -> Panel {
+pub(super) fn draw_tip_panel(animation: &Animation, height_mm: f64) -> Panel {
     /// Room on either side of the tip's way, and the depth under the glass, in lengths of that way.
     const ROOM: f64 = 0.12;
     const UNDER: f64 = 0.3;
@@ -116,28 +116,28 @@ pub(super) fn enlarged(animation: &Animation, height_mm: f64) -> Panel {
     let tips =
         animation.samples.iter().filter(|s| s.time_s >= from_s && s.time_s <= to_s).map(|s| MM * s.tip_x_m);
     let (left, right) = tips.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, r), x| (l.min(x), r.max(x)));
-    let way = (right - left).max(0.01 * blade_mm(&animation.linkage));
+    let way = (right - left).max(0.01 * blade_length_mm(&animation.linkage));
     let (left, right) = (left - ROOM * way, right + ROOM * way);
     let low = -UNDER * way;
     Panel {
         title: "the tip, enlarged".to_owned(),
-        x: Axis::linear("along the sweep, mm").between(left, right),
-        y: Axis::linear("height, mm").between(low, low + (right - left) * height_mm / AXES_MM),
+        x: ChartAxis::linear("along the sweep, mm").with_range(left, right),
+        y: ChartAxis::linear("height, mm").with_range(low, low + (right - left) * height_mm / AXES_MM),
         height_mm,
-        equal: true,
-        series: vec![glass(left, right)],
+        equal_aspect: true,
+        series: vec![glass_line(left, right)],
         ..Panel::default()
     }
 }
 
 /// The names of poses over their heads, each in the lowest row where it does not run into one before.
-fn labels(poses: &[Pose], height: f64, row: f64, apart: f64) -> Vec<Text> {
-    let mut labels: Vec<Text> = Vec::new();
+fn pose_labels(poses: &[LabelledPose], height: f64, row: f64, apart: f64) -> Vec<TextAnnotation> {
+    let mut labels: Vec<TextAnnotation> = Vec::new();
     for (name, [(x, _), ..]) in poses {
         let meets = |at: f64| labels.iter().any(|l| l.at.1 == at && (l.at.0 - x).abs() < apart);
         let rows = (0..poses.len()).map(|k| height + k as f64 * row);
         if let Some(at) = rows.into_iter().find(|at| !meets(*at)) {
-            labels.push(text(name, (*x, at)));
+            labels.push(text_at(name, (*x, at)));
         }
     }
     labels
@@ -145,22 +145,25 @@ fn labels(poses: &[Pose], height: f64, row: f64, apart: f64) -> Vec<Text> {
 
 /// The poses worth keeping: at both ends of the hold and, where the tip passes the head, half way of the
 /// flip.
-fn poses(animation: &Animation) -> Vec<Pose> {
+fn key_poses(animation: &Animation) -> Vec<LabelledPose> {
     let [from_s, to_s] = animation.hold_s;
     let at = |time_s: f64| animation.samples.iter().find(|s| s.time_s >= time_s);
-    let held: Vec<&Sample> =
+    let held: Vec<&ModelSample> =
         animation.samples.iter().filter(|s| s.time_s >= from_s && s.time_s <= to_s).collect();
-    let deflection = |s: &Sample| s.tip_x_m - s.head_x_m;
+    let deflection = |s: &ModelSample| s.tip_x_m - s.head_x_m;
     let upright =
         held.windows(2).find(|pair| deflection(pair[0]) * deflection(pair[1]) <= 0.0).map(|pair| pair[0]);
     let named = [("hold", at(from_s)), ("stick ends", at(to_s)), ("upright", upright)];
-    named.into_iter().filter_map(|(name, sample)| Some((name, points(&animation.linkage, sample?)))).collect()
+    named
+        .into_iter()
+        .filter_map(|(name, sample)| Some((name, linkage_points_mm(&animation.linkage, sample?))))
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::simulate::Motion;
+    use crate::simulate::RunMotion;
     use crate::simulate::scene::Scene;
 
     #[test]
@@ -169,10 +172,10 @@ mod tests {
             Scene::parse("actual-blade.toml", include_str!("../../../data/scenes/actual-blade.toml"))
                 .unwrap();
         scene.run.stop_s = 0.8;
-        let motion = Motion::of(&scene);
+        let motion = RunMotion::simulate(&scene);
         assert!(motion.samples.len() > 1000);
         for sample in &motion.samples {
-            let [head, hinge, tip] = points(&motion.linkage, sample);
+            let [head, hinge, tip] = linkage_points_mm(&motion.linkage, sample);
             assert!(
                 (tip.0 - 1e3 * sample.tip_x_m).abs() < 1e-9
                     && (tip.1 - 1e3 * sample.tip_height_m).abs() < 1e-9,
@@ -186,15 +189,15 @@ mod tests {
             );
         }
         // a head that is drawn up lifts the tip by as much
-        let lifted = Sample { head_drop_m: motion.samples[0].head_drop_m - 1e-4, ..motion.samples[0] };
-        assert!((points(&motion.linkage, &lifted)[2].1 - 0.1).abs() < 1e-9);
+        let lifted = ModelSample { head_drop_m: motion.samples[0].head_drop_m - 1e-4, ..motion.samples[0] };
+        assert!((linkage_points_mm(&motion.linkage, &lifted)[2].1 - 0.1).abs() < 1e-9);
     }
 
     #[test]
     fn names_of_poses_that_would_meet_stand_in_rows() {
         let pose = |name, x| (name, [(x, 5.0); 3]);
         let labels =
-            labels(&[pose("hold", 1.0), pose("stick ends", 3.0), pose("upright", 2.5)], 6.0, 0.5, 1.0);
+            pose_labels(&[pose("hold", 1.0), pose("stick ends", 3.0), pose("upright", 2.5)], 6.0, 0.5, 1.0);
         assert_eq!(
             labels.iter().map(|l| (l.text.as_str(), l.at)).collect::<Vec<_>>(),
             [("hold", (1.0, 6.0)), ("stick ends", (3.0, 6.0)), ("upright", (2.5, 6.5))]

@@ -2,56 +2,61 @@
 
 use super::Animation;
 use super::drawing::{self, HEAD_HALF_WIDTH, HEAD_HEIGHT};
-use super::pace::Part;
+use super::pace::PlaybackPart;
 use super::strips;
-use super::track::{Changed, Keys, animated, key_frames, short};
-use crate::chart::{Colour, Plot};
-use crate::simulate::Sample;
-use crate::simulate::mode::Mode;
+use super::track::{AnimatedAttribute, KeyFrames, animate_element, format_short, simplify_key_frames};
+use crate::chart::{Colour, PanelPlacement};
+use crate::simulate::ModelSample;
+use crate::simulate::mode::TipMode;
 
 /// How far a drawn point may be from where it belongs, canvas units: a fiftieth of a millimetre, less than a
 /// line is wide.
 const TOLERANCE: f64 = 0.3;
 /// Half width of the tip's symbol, and of the cross of a measured point, canvas units.
-const TIP: f64 = 20.0;
-const CROSS: f64 = 15.0;
+const TIP_HALF_WIDTH: f64 = 20.0;
+const CROSS_HALF_WIDTH: f64 = 15.0;
 /// How far the symbol is under the tip, canvas units.
-const UNDER: f64 = 40.0;
+const SYMBOL_OFFSET: f64 = 40.0;
 /// How far the name of a link is from its middle, canvas units.
-const ASIDE: f64 = 52.0;
+const NAME_OFFSET: f64 = 52.0;
 /// The colour of the figure's ground.
-const GROUND: &str = "#FFFFFF";
+const BACKGROUND: &str = "#FFFFFF";
 /// Size of words, canvas units.
-const LETTERS: f64 = 44.0;
+const TEXT_SIZE: f64 = 44.0;
 /// Shortest time for which a measured point stands, as a share of the animation: a screen shows no shorter
 /// one.
-const LEAST_SHARE: f64 = 1.0 / 2000.0;
+const MIN_CROSS_FRACTION: f64 = 1.0 / 2000.0;
 
 /// A mode of contact: what it is called and how the tip is drawn in it.
-struct Sign {
-    mode: Mode,
+struct ContactModeSymbol {
+    mode: TipMode,
     word: &'static str,
     colour: Colour,
     /// Outline of the tip's symbol in units of its half width.
     outline: &'static str,
 }
 
-const SIGNS: [Sign; 4] = [
-    Sign { mode: Mode::Stick, word: "stick", colour: Colour::Blue, outline: "M-1 -1H1V1H-1Z" },
-    Sign {
-        mode: Mode::SlipForward,
+const CONTACT_MODE_SYMBOLS: [ContactModeSymbol; 4] = [
+    ContactModeSymbol {
+        mode: TipMode::Stick,
+        word: "stick",
+        colour: Colour::Blue,
+        outline: "M-1 -1H1V1H-1Z",
+    },
+    ContactModeSymbol {
+        mode: TipMode::SlipForward,
         word: "slip+ (to the right)",
         colour: Colour::Green,
         outline: "M1.4 0L-0.9 1.2V-1.2Z",
     },
-    Sign {
-        mode: Mode::SlipBackward,
+    ContactModeSymbol {
+        mode: TipMode::SlipBackward,
         word: "slip\u{2212} (to the left)",
         colour: Colour::Green,
         outline: "M-1.4 0L0.9 1.2V-1.2Z",
     },
-    Sign {
-        mode: Mode::Flight,
+    ContactModeSymbol {
+        mode: TipMode::Flight,
         word: "flight",
         colour: Colour::Purple,
         outline: "M0 -1.3L1.3 0L0 1.3L-1.3 0Z",
@@ -59,99 +64,122 @@ const SIGNS: [Sign; 4] = [
 ];
 
 /// The elements; none without the panels of the figure.
-pub(super) fn elements(animation: &Animation, plots: &[Plot]) -> String {
+pub(super) fn moving_elements(animation: &Animation, plots: &[PanelPlacement]) -> String {
     let [plot, close, strips @ ..] = plots else { return String::new() };
-    let drawing = [linkage(animation, plot), tip(animation, plot), crosses(animation, plot)].concat();
-    [drawing, enlarged(animation, close), words(animation, plot, close), cursors(animation, strips)].concat()
+    let drawing =
+        [moving_linkage(animation, plot), tip_symbol(animation, plot), measured_crosses(animation, plot)]
+            .concat();
+    [
+        drawing,
+        enlarged_tip(animation, close),
+        mode_and_pace_text(animation, plot, close),
+        time_cursors(animation, strips),
+    ]
+    .concat()
 }
 
 /// The states with their shares of the animation and their points on the canvas: head, hinge, tip as x, y, x,
 /// y, x, y.
-fn poses(animation: &Animation, plot: &Plot) -> Keys<6> {
-    let point = |sample: &Sample| {
-        let [a, b, c] = drawing::points(&animation.linkage, sample);
-        let (a, b, c) = (plot.place(a.0, a.1)?, plot.place(b.0, b.1)?, plot.place(c.0, c.1)?);
-        Some((animation.pace.share(sample.time_s), [a.0, a.1, b.0, b.1, c.0, c.1]))
+fn pose_key_frames(animation: &Animation, plot: &PanelPlacement) -> KeyFrames<6> {
+    let point = |sample: &ModelSample| {
+        let [a, b, c] = drawing::linkage_points_mm(&animation.linkage, sample);
+        let (a, b, c) =
+            (plot.canvas_point(a.0, a.1)?, plot.canvas_point(b.0, b.1)?, plot.canvas_point(c.0, c.1)?);
+        Some((animation.pace.playback_fraction(sample.time_s), [a.0, a.1, b.0, b.1, c.0, c.1]))
     };
     animation.samples.iter().filter_map(point).collect()
 }
 
 /// Key frames of some of the numbers.
-fn taken<const N: usize>(poses: &Keys<6>, from: usize) -> Keys<N> {
-    let some: Keys<N> =
+fn select_numbers<const N: usize>(poses: &KeyFrames<6>, from: usize) -> KeyFrames<N> {
+    let some: KeyFrames<N> =
         poses.iter().map(|(share, all)| (*share, std::array::from_fn(|k| all[from + k]))).collect();
-    key_frames(&some, TOLERANCE)
+    simplify_key_frames(&some, TOLERANCE)
 }
 
-fn numbers<const N: usize>(values: &[f64; N]) -> [String; N] {
-    values.map(|v| short(v, 1))
+fn format_numbers<const N: usize>(values: &[f64; N]) -> [String; N] {
+    values.map(|v| format_short(v, 1))
 }
 
-fn place(values: &[f64; 2]) -> String {
-    numbers(values).join(" ")
+fn format_translation(values: &[f64; 2]) -> String {
+    format_numbers(values).join(" ")
 }
 
-fn segment(values: &[f64; 4]) -> String {
-    let [x1, y1, x2, y2] = numbers(values);
+fn line_path(values: &[f64; 4]) -> String {
+    let [x1, y1, x2, y2] = format_numbers(values);
     format!("M{x1} {y1}L{x2} {y2}")
 }
 
 /// A group that moves; it stands at its first place where nothing can move.
-fn group(animation: &Animation, changed: Changed, keys: &Keys<2>, contents: &str) -> String {
+fn moving_group(
+    animation: &Animation,
+    changed: AnimatedAttribute,
+    keys: &KeyFrames<2>,
+    contents: &str,
+) -> String {
     let Some((_, first)) = keys.first() else { return String::new() };
-    let motion = animated(changed, &animation.pace, keys, place);
-    format!("<g transform=\"translate({})\">{motion}{contents}</g>\n", place(first))
+    let motion = animate_element(changed, &animation.pace, keys, format_translation);
+    format!("<g transform=\"translate({})\">{motion}{contents}</g>\n", format_translation(first))
 }
 
 /// A link between two of the points.
-fn link(animation: &Animation, poses: &Keys<6>, from: usize, width: u32) -> String {
-    let keys: Keys<4> = taken(poses, from);
+fn moving_link(animation: &Animation, poses: &KeyFrames<6>, from: usize, width: u32) -> String {
+    let keys: KeyFrames<4> = select_numbers(poses, from);
     let Some((_, first)) = keys.first() else { return String::new() };
-    let motion = animated(Changed::Path, &animation.pace, &keys, segment);
+    let motion = animate_element(AnimatedAttribute::Path, &animation.pace, &keys, line_path);
     let colour = Colour::Vermilion.hex();
     format!(
         "<path d=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"{width}\" \
          stroke-linecap=\"round\">{motion}</path>\n",
-        segment(first)
+        line_path(first)
     )
 }
 
 /// Neck, lip, head and the hinges.
-fn linkage(animation: &Animation, plot: &Plot) -> String {
-    let poses = poses(animation, plot);
+fn moving_linkage(animation: &Animation, plot: &PanelPlacement) -> String {
+    let poses = pose_key_frames(animation, plot);
     let hinge = format!(
-        "<circle r=\"10\" fill=\"{GROUND}\" stroke=\"{}\" stroke-width=\"4\"/>",
+        "<circle r=\"10\" fill=\"{BACKGROUND}\" stroke=\"{}\" stroke-width=\"4\"/>",
         Colour::Vermilion.hex()
     );
-    let head = head(animation, plot) + &hinge;
-    let joint =
-        |from: usize, contents: &str| group(animation, Changed::Place, &taken(&poses, from), contents);
-    let links = [link(animation, &poses, 0, 34), link(animation, &poses, 2, 22)].concat();
+    let head = moving_head(animation, plot) + &hinge;
+    let joint = |from: usize, contents: &str| {
+        moving_group(animation, AnimatedAttribute::Place, &select_numbers(&poses, from), contents)
+    };
+    let links = [moving_link(animation, &poses, 0, 34), moving_link(animation, &poses, 2, 22)].concat();
     [
         links,
         joint(0, &head),
         joint(2, &hinge),
-        name(animation, &poses, 0, "neck"),
-        name(animation, &poses, 2, "lip"),
+        link_name(animation, &poses, 0, "neck"),
+        link_name(animation, &poses, 2, "lip"),
     ]
     .concat()
 }
 
 /// The name of a link, to the right of its middle.
-fn name(animation: &Animation, poses: &Keys<6>, from: usize, word: &str) -> String {
+fn link_name(animation: &Animation, poses: &KeyFrames<6>, from: usize, word: &str) -> String {
     let middle = |[x1, y1, x2, y2]: [f64; 4]| [(x1 + x2) / 2.0, (y1 + y2) / 2.0];
-    let keys: Keys<2> =
+    let keys: KeyFrames<2> =
         poses.iter().map(|(share, all)| (*share, middle(std::array::from_fn(|k| all[from + k])))).collect();
-    group(animation, Changed::Place, &key_frames(&keys, TOLERANCE), &text(ASIDE, 0.0, "start", word))
+    moving_group(
+        animation,
+        AnimatedAttribute::Place,
+        &simplify_key_frames(&keys, TOLERANCE),
+        &text_element(NAME_OFFSET, 0.0, "start", word),
+    )
 }
 
 /// The lip near its tip, cut at the frame of its panel.
-fn enlarged(animation: &Animation, plot: &Plot) -> String {
+fn enlarged_tip(animation: &Animation, plot: &PanelPlacement) -> String {
     let [(left, top), (right, bottom)] = plot.corners();
-    let [x, y, width, height] = numbers(&[left, top, right - left, bottom - top]);
-    let contents =
-        [link(animation, &poses(animation, plot), 2, 40), tip(animation, plot), crosses(animation, plot)]
-            .concat();
+    let [x, y, width, height] = format_numbers(&[left, top, right - left, bottom - top]);
+    let contents = [
+        moving_link(animation, &pose_key_frames(animation, plot), 2, 40),
+        tip_symbol(animation, plot),
+        measured_crosses(animation, plot),
+    ]
+    .concat();
     // named for its place: where two animations of a page have the same name, they have the same frame
     let name = format!("frame-{x}-{y}-{width}-{height}").replace('.', "_");
     let frame = format!(
@@ -161,15 +189,15 @@ fn enlarged(animation: &Animation, plot: &Plot) -> String {
 }
 
 /// The head around its hinge.
-fn head(animation: &Animation, plot: &Plot) -> String {
-    let length = drawing::blade_mm(&animation.linkage);
-    let corner = |x: f64, y: f64| plot.place(x * length, y * length);
+fn moving_head(animation: &Animation, plot: &PanelPlacement) -> String {
+    let length = drawing::blade_length_mm(&animation.linkage);
+    let corner = |x: f64, y: f64| plot.canvas_point(x * length, y * length);
     let (Some((x0, y0)), Some((x1, y1))) = (corner(0.0, 0.0), corner(HEAD_HALF_WIDTH, HEAD_HEIGHT)) else {
         return String::new();
     };
     let (half, height, grey) = (x1 - x0, y0 - y1, Colour::Grey.hex());
-    let word = text(0.0, -height / 2.0, "middle", "head");
-    let [x, y, width, height] = numbers(&[-half, -height, 2.0 * half, height]);
+    let word = text_element(0.0, -height / 2.0, "middle", "head");
+    let [x, y, width, height] = format_numbers(&[-half, -height, 2.0 * half, height]);
     format!(
         "<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\" rx=\"12\" fill=\"{grey}\" \
          opacity=\"0.6\"/>{word}"
@@ -177,32 +205,36 @@ fn head(animation: &Animation, plot: &Plot) -> String {
 }
 
 /// Whether the tip is in a mode, from when on: shares of the animation.
-fn spells(animation: &Animation, mode: Mode) -> Vec<(f64, bool)> {
+fn mode_intervals(animation: &Animation, mode: TipMode) -> Vec<(f64, bool)> {
     let mut spells: Vec<(f64, bool)> = animation
         .modes
         .iter()
-        .map(|(since_s, entered)| (animation.pace.share(*since_s), *entered == mode))
+        .map(|(since_s, entered)| (animation.pace.playback_fraction(*since_s), *entered == mode))
         .collect();
     spells.dedup_by_key(|(_, on)| *on);
     spells
 }
 
 /// Something that is visible at times.
-fn at_times(animation: &Animation, spells: &[(f64, bool)], contents: &str) -> String {
+fn visible_at_times(animation: &Animation, spells: &[(f64, bool)], contents: &str) -> String {
     let opacity = |on: &bool| u8::from(*on).to_string();
     let Some((_, first)) = spells.first() else { return String::new() };
-    let change = animated(Changed::Visible, &animation.pace, spells, opacity);
+    let change = animate_element(AnimatedAttribute::Visible, &animation.pace, spells, opacity);
     format!("<g opacity=\"{}\">{change}{contents}</g>\n", opacity(first))
 }
 
 /// Something that is visible in one mode alone; nothing for a mode that never comes.
-fn in_mode(animation: &Animation, mode: Mode, contents: &str) -> String {
-    let spells = spells(animation, mode);
-    if spells.iter().any(|(_, on)| *on) { at_times(animation, &spells, contents) } else { String::new() }
+fn visible_in_mode(animation: &Animation, mode: TipMode, contents: &str) -> String {
+    let spells = mode_intervals(animation, mode);
+    if spells.iter().any(|(_, on)| *on) {
+        visible_at_times(animation, &spells, contents)
+    } else {
+        String::new()
+    }
 }
 
-fn symbol(sign: &Sign, at: (f64, f64)) -> String {
-    let [x, y, size] = numbers(&[at.0, at.1, TIP]);
+fn mode_symbol(sign: &ContactModeSymbol, at: (f64, f64)) -> String {
+    let [x, y, size] = format_numbers(&[at.0, at.1, TIP_HALF_WIDTH]);
     format!(
         "<path d=\"{}\" transform=\"translate({x} {y}) scale({size})\" fill=\"{}\"/>",
         sign.outline,
@@ -211,14 +243,21 @@ fn symbol(sign: &Sign, at: (f64, f64)) -> String {
 }
 
 /// The tip's symbol under the glass, which shows the mode of contact and leaves the tip itself free.
-fn tip(animation: &Animation, plot: &Plot) -> String {
-    let symbols: String =
-        SIGNS.iter().map(|sign| in_mode(animation, sign.mode, &symbol(sign, (0.0, UNDER)))).collect();
-    group(animation, Changed::Place, &taken(&poses(animation, plot), 4), &symbols)
+fn tip_symbol(animation: &Animation, plot: &PanelPlacement) -> String {
+    let symbols: String = CONTACT_MODE_SYMBOLS
+        .iter()
+        .map(|sign| visible_in_mode(animation, sign.mode, &mode_symbol(sign, (0.0, SYMBOL_OFFSET))))
+        .collect();
+    moving_group(
+        animation,
+        AnimatedAttribute::Place,
+        &select_numbers(&pose_key_frames(animation, plot), 4),
+        &symbols,
+    )
 }
 
-fn text(x: f64, y: f64, anchor: &str, words: &str) -> String {
-    let (size, [x, y]) = (short(LETTERS, 1), numbers(&[x, y]));
+fn text_element(x: f64, y: f64, anchor: &str, words: &str) -> String {
+    let (size, [x, y]) = (format_short(TEXT_SIZE, 1), format_numbers(&[x, y]));
     format!(
         "<text x=\"{x}\" y=\"{y}\" dy=\"0.35em\" text-anchor=\"{anchor}\" font-family=\"sans-serif\" \
          font-size=\"{size}\" fill=\"#000000\">{words}</text>"
@@ -226,19 +265,19 @@ fn text(x: f64, y: f64, anchor: &str, words: &str) -> String {
 }
 
 /// Mode in words, at the upper corner of the drawing, and pace, over the enlarged tip.
-fn words(animation: &Animation, plot: &Plot, close: &Plot) -> String {
+fn mode_and_pace_text(animation: &Animation, plot: &PanelPlacement, close: &PanelPlacement) -> String {
     let [[(left, top), _], [(_, frame), (right, _)]] = [plot.corners(), close.corners()];
-    let y = top + LETTERS / 2.0;
-    let modes = SIGNS.iter().map(|sign| {
-        let word = text(left + 4.0 * TIP, y, "start", &format!("tip: {}", sign.word));
-        in_mode(animation, sign.mode, &(symbol(sign, (left + 1.5 * TIP, y)) + &word))
+    let y = top + TEXT_SIZE / 2.0;
+    let modes = CONTACT_MODE_SYMBOLS.iter().map(|sign| {
+        let word = text_element(left + 4.0 * TIP_HALF_WIDTH, y, "start", &format!("tip: {}", sign.word));
+        visible_in_mode(animation, sign.mode, &(mode_symbol(sign, (left + 1.5 * TIP_HALF_WIDTH, y)) + &word))
     });
-    let over = frame - 0.8 * LETTERS;
-    let pace = |part: &Part| {
-        at_times(
+    let over = frame - 0.8 * TEXT_SIZE;
+    let pace = |part: &PlaybackPart| {
+        visible_at_times(
             animation,
-            &shown(animation, part),
-            &text(right, over, "end", &format!("{} times slower", part.slower)),
+            &part_visibility(animation, part),
+            &text_element(right, over, "end", &format!("{} times slower", part.slower)),
         )
     };
     let paces = animation.pace.parts.iter().map(pace);
@@ -246,23 +285,23 @@ fn words(animation: &Animation, plot: &Plot, close: &Plot) -> String {
 }
 
 /// When a part is shown; the last one stays for the rest.
-fn shown(animation: &Animation, part: &Part) -> Vec<(f64, bool)> {
+fn part_visibility(animation: &Animation, part: &PlaybackPart) -> Vec<(f64, bool)> {
     let [from_s, to_s] = animation.pace.span_s();
     let mut spells = vec![(0.0, part.from_s <= from_s)];
     if part.from_s > from_s {
-        spells.push((animation.pace.share(part.from_s), true));
+        spells.push((animation.pace.playback_fraction(part.from_s), true));
     }
     if part.to_s < to_s {
-        spells.push((animation.pace.share(part.to_s), false));
+        spells.push((animation.pace.playback_fraction(part.to_s), false));
     }
     spells
 }
 
 /// The measured tip on the glass and the measured head at its drop, in the frame nearest to the instant
 /// shown; a missing one is hidden.
-fn crosses(animation: &Animation, plot: &Plot) -> String {
+fn measured_crosses(animation: &Animation, plot: &PanelPlacement) -> String {
     let Some(measured) = &animation.measured else { return String::new() };
-    let length = drawing::blade_mm(&animation.linkage);
+    let length = drawing::blade_length_mm(&animation.linkage);
     let tips = measured.tip_x_m.iter().map(|x| x.map(|x| (1e3 * x, 0.0)));
     let heads = measured
         .head_x_m
@@ -270,16 +309,16 @@ fn crosses(animation: &Animation, plot: &Plot) -> String {
         .zip(&measured.head_drop_m)
         .map(|(x, u)| x.zip(*u).map(|(x, u)| (1e3 * x, length - 1e3 * u)));
     let cross = |frames: Vec<Option<(f64, f64)>>| {
-        let frames = frames.into_iter().map(|p| p.and_then(|(x, y)| plot.inside(x, y)));
-        frame_by_frame(animation, &measured.time_s, &frames.collect::<Vec<_>>())
+        let frames = frames.into_iter().map(|p| p.and_then(|(x, y)| plot.canvas_point_inside(x, y)));
+        jumping_cross(animation, &measured.time_s, &frames.collect::<Vec<_>>())
     };
     cross(tips.collect()) + &cross(heads.collect())
 }
 
 /// A cross that jumps from frame to frame.
-fn frame_by_frame(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, f64)>]) -> String {
+fn jumping_cross(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, f64)>]) -> String {
     let [from_s, to_s] = animation.pace.span_s();
-    let (mut places, mut visible): (Keys<2>, Vec<(f64, bool)>) = (Vec::new(), Vec::new());
+    let (mut places, mut visible): (KeyFrames<2>, Vec<(f64, bool)>) = (Vec::new(), Vec::new());
     let mut shown = 0.0;
     for (i, (t, frame)) in time_s.iter().zip(frames).enumerate() {
         let until_s = time_s.get(i + 1).map_or(*t, |next| (t + next) / 2.0);
@@ -287,8 +326,8 @@ fn frame_by_frame(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, 
         if until_s < from_s || since_s > to_s {
             continue;
         }
-        let share = if visible.is_empty() { 0.0 } else { animation.pace.share(since_s) };
-        if !visible.is_empty() && share - shown < LEAST_SHARE {
+        let share = if visible.is_empty() { 0.0 } else { animation.pace.playback_fraction(since_s) };
+        if !visible.is_empty() && share - shown < MIN_CROSS_FRACTION {
             continue;
         }
         shown = share;
@@ -301,22 +340,27 @@ fn frame_by_frame(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, 
     }
     let arms = format!(
         "<path d=\"M-{0} -{0}L{0} {0}M-{0} {0}L{0} -{0}\" stroke=\"#000000\" stroke-width=\"5\"/>",
-        short(CROSS, 1)
+        format_short(CROSS_HALF_WIDTH, 1)
     );
-    at_times(animation, &visible, &group(animation, Changed::Jumping, &places, &arms))
+    visible_at_times(
+        animation,
+        &visible,
+        &moving_group(animation, AnimatedAttribute::Jumping, &places, &arms),
+    )
 }
 
 /// The line that runs through the strips with the time; it waits at the ends of one that covers a part.
-fn cursors(animation: &Animation, strips: &[Plot]) -> String {
+fn time_cursors(animation: &Animation, strips: &[PanelPlacement]) -> String {
     let turns: Vec<f64> = animation.pace.parts.iter().flat_map(|p| [p.from_s, p.to_s]).collect();
-    let cursor = |(plot, [from_s, to_s]): (&Plot, [f64; 2])| {
+    let cursor = |(plot, [from_s, to_s]): (&PanelPlacement, [f64; 2])| {
         let [(left, top), (right, bottom)] = plot.corners();
         let x = |t: f64| left + (right - left) * (t.max(from_s).min(to_s) - from_s) / (to_s - from_s);
-        let keys: Keys<2> = turns.iter().map(|t| (animation.pace.share(*t), [x(*t), 0.0])).collect();
-        let [top, bottom] = numbers(&[top, bottom]);
+        let keys: KeyFrames<2> =
+            turns.iter().map(|t| (animation.pace.playback_fraction(*t), [x(*t), 0.0])).collect();
+        let [top, bottom] = format_numbers(&[top, bottom]);
         let line =
             format!("<path d=\"M0 {top}V{bottom}\" stroke=\"{}\" stroke-width=\"6\"/>", Colour::Blue.hex());
-        group(animation, Changed::Place, &key_frames(&keys, TOLERANCE), &line)
+        moving_group(animation, AnimatedAttribute::Place, &simplify_key_frames(&keys, TOLERANCE), &line)
     };
-    strips.iter().zip(strips::spans_s(animation)).map(cursor).collect()
+    strips.iter().zip(strips::strip_spans_s(animation)).map(cursor).collect()
 }

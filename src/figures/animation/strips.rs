@@ -1,41 +1,41 @@
 //! Deflection over all that is shown and velocity of the tip over the last part, under the drawings.
 
 use super::Animation;
-use super::pace::Pace;
-use crate::chart::{Axis, Band, Colour, Mark, Panel, Series};
-use crate::simulate::Sample;
+use super::pace::PlaybackPace;
+use crate::chart::{ChartAxis, Colour, Mark, Panel, Series, ShadedSpan};
+use crate::simulate::ModelSample;
 
 const HEIGHT_MM: f64 = 27.0;
 const MM: f64 = 1e3;
 
 /// A quantity of the model's states over time.
-struct Strip {
+struct StripChart {
     label: &'static str,
     /// What the model's line is called in the legend, and how it is drawn.
     line: (&'static str, Mark),
-    of: fn(&Sample) -> f64,
+    of: fn(&ModelSample) -> f64,
     /// The instants that it covers, s.
-    span_s: fn(&Pace) -> [f64; 2],
+    span_s: fn(&PlaybackPace) -> [f64; 2],
 }
 
-const STRIPS: [Strip; 2] = [
-    Strip {
+const STRIPS: [StripChart; 2] = [
+    StripChart {
         label: "deflection, mm",
         line: ("model", Mark::Thick),
         of: |s| MM * (s.tip_x_m - s.head_x_m),
-        span_s: Pace::span_s,
+        span_s: PlaybackPace::span_s,
     },
-    Strip {
+    StripChart {
         label: "tip velocity, m/s",
         line: ("", Mark::Line),
         of: |s| s.tip_velocity_m_per_s,
-        span_s: Pace::last_part_s,
+        span_s: PlaybackPace::last_part_s,
     },
 ];
 
 /// The panels; the first one holds the measured deflection too.
-pub(super) fn panels(animation: &Animation) -> Vec<Panel> {
-    let mut panels: Vec<Panel> = STRIPS.iter().map(|strip| panel(animation, strip)).collect();
+pub(super) fn draw_strips(animation: &Animation) -> Vec<Panel> {
+    let mut panels: Vec<Panel> = STRIPS.iter().map(|strip| draw_strip(animation, strip)).collect();
     if let (Some(first), Some(measured)) = (panels.first_mut(), &animation.measured) {
         let deflection =
             measured.tip_x_m.iter().zip(&measured.head_x_m).map(|(tip, head)| Some((*tip)? - (*head)?));
@@ -51,22 +51,22 @@ pub(super) fn panels(animation: &Animation) -> Vec<Panel> {
 }
 
 /// The instants that every strip covers, s.
-pub(super) fn spans_s(animation: &Animation) -> [[f64; 2]; 2] {
+pub(super) fn strip_spans_s(animation: &Animation) -> [[f64; 2]; 2] {
     STRIPS.map(|strip| (strip.span_s)(&animation.pace))
 }
 
-fn panel(animation: &Animation, strip: &Strip) -> Panel {
+fn draw_strip(animation: &Animation, strip: &StripChart) -> Panel {
     let [from_s, to_s] = (strip.span_s)(&animation.pace);
     let whole = [from_s, to_s] == animation.pace.span_s();
     let points = animation.samples.iter().map(|s| Some((s.time_s, (strip.of)(s)))).collect();
-    let stick = |[from, to]: &[f64; 2]| Band {
+    let stick = |[from, to]: &[f64; 2]| ShadedSpan {
         label: "tip sticks (model)".to_owned(),
         colour: Colour::SkyBlue,
         from: *from,
         to: *to,
-        ..Band::default()
+        ..ShadedSpan::default()
     };
-    let slower = animation.pace.parts.iter().skip(1).filter(|_| whole).map(|p| Band {
+    let slower = animation.pace.parts.iter().skip(1).filter(|_| whole).map(|p| ShadedSpan {
         label: format!("shown {} times slower", p.slower),
         colour: Colour::Grey,
         from: p.from_s,
@@ -74,8 +74,8 @@ fn panel(animation: &Animation, strip: &Strip) -> Panel {
         outlined: true,
     });
     Panel {
-        x: Axis::time().between(from_s, to_s),
-        y: Axis::linear(strip.label),
+        x: ChartAxis::time().with_range(from_s, to_s),
+        y: ChartAxis::linear(strip.label),
         height_mm: HEIGHT_MM,
         series: vec![Series {
             label: strip.line.0.to_owned(),
@@ -84,7 +84,7 @@ fn panel(animation: &Animation, strip: &Strip) -> Panel {
             points,
             ..Series::default()
         }],
-        bands: animation.stick_s.iter().map(stick).chain(slower).collect(),
+        shaded_spans: animation.stick_s.iter().map(stick).chain(slower).collect(),
         ..Panel::default()
     }
 }

@@ -1,14 +1,14 @@
 //! The evidence of a condition: whole, at the release, and where it fits worst after it.
 
-use super::{Course, Evidence, NOTHING_LEFT, Part, figure, ratio};
-use crate::compare::Case;
+use super::{EvidencePart, EvidencePlot, NOTHING_LEFT, TimeCurve, draw_figure, format_noise_ratio};
+use crate::compare::ConditionComparison;
 use crate::figures::history::bands;
 use crate::figures::{FigureBlock, Words};
 use crate::fit::misfit::ChannelMisfit;
-use crate::recording::channel::{Anchor, Channel};
+use crate::recording::channel::{Channel, InstantKind};
 use crate::recording::motion_traces::MotionTraces;
-use crate::simulate::Sample;
-use crate::text::{capitalised, decimals, digits, length, trimmed};
+use crate::simulate::ModelSample;
+use crate::text::{capitalise, format_decimals, format_digits, format_length, format_trimmed};
 
 /// How long before and after the tip's release the enlarged part lasts, s.
 const AROUND_RELEASE_S: (f64, f64) = (0.005, 0.03);
@@ -19,37 +19,41 @@ const LATE_S: f64 = 0.015;
 const LEAST_PRESENT: f64 = 0.5;
 
 /// The figure of a condition; none without a recording, or where the two cannot agree.
-pub(crate) fn block(case: &Case) -> Option<FigureBlock> {
+pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let residual = case.residual.as_ref()?;
-    let (channel, noise_m) = case.judged()?;
-    let measured = MotionTraces::of(case.recording()?);
-    let model = MotionTraces::of_model(&case.model.view.recording, &case.alignment);
+    let (channel, noise_m) = case.judged_channel()?;
+    let measured = MotionTraces::from_recording(case.recording()?);
+    let model = MotionTraces::from_model(&case.model.view.recording, &case.alignment);
     let whole_s = (*residual.time_s.first()?, *residual.time_s.last()?);
     let part = |name: String, span_s: (f64, f64)| {
         let rms = residual.rms_m(channel, Some(span_s))? / noise_m;
-        let own = within(&model, channel, span_s);
-        let left = within(residual, channel, span_s).into_iter();
+        let own = channel_between(&model, channel, span_s);
+        let left = channel_between(residual, channel, span_s).into_iter();
         let sticks = case.model.view.stick_s.iter();
         let shift_s = case.alignment.shift_s;
         let sticks: Vec<(f64, f64)> = sticks.map(|[from, to]| (from + shift_s, to + shift_s)).collect();
-        Some(Part {
+        Some(EvidencePart {
             name,
             span_s,
-            measured: within(&measured, channel, span_s),
-            model: if span_s == whole_s { own } else { finely(case, channel, span_s).unwrap_or(own) },
+            measured: channel_between(&measured, channel, span_s),
+            model: if span_s == whole_s {
+                own
+            } else {
+                model_states_curve(case, channel, span_s).unwrap_or(own)
+            },
             residual: left.map(|p| p.map(|(t, x)| (t, x / noise_m))).collect(),
             rms,
-            sticks: bands::of(&sticks, span_s),
+            sticks: bands::stick_spans(&sticks, span_s),
         })
     };
-    let release_s = case.shown().instant_s(Anchor::Release);
+    let release_s = case.measured_or_model().instant_s(InstantKind::Release);
     let around_s = release_s
         .map(|t| ((t - AROUND_RELEASE_S.0).max(whole_s.0), (t + AROUND_RELEASE_S.1).min(whole_s.1)))
         .filter(|(from, to)| from < to);
     let later_s = (around_s.map_or(whole_s.0, |(_, to)| to), whole_s.1);
     let worst_s = worst_s(residual, channel, later_s).filter(|(from, to)| from < to);
     let later = if around_s.is_some() { "worst later" } else { "worst part" };
-    let parts: Vec<Part> = [
+    let parts: Vec<EvidencePart> = [
         part("recording".to_owned(), whole_s),
         around_s.and_then(|span_s| part("release".to_owned(), span_s)),
         worst_s.and_then(|span_s| part(later.to_owned(), span_s)),
@@ -58,14 +62,14 @@ pub(crate) fn block(case: &Case) -> Option<FigureBlock> {
     .flatten()
     .collect();
     let whole = parts.first()?.rms;
-    let shown = Evidence {
-        title: title(channel, whole, noise_m),
-        note: segments(case).map_or_else(String::new, |said| said.trim_end_matches('.').to_owned()),
-        synthetic: case.synthetic(),
+    let shown = EvidencePlot {
+        title: figure_title(channel, whole, noise_m),
+        note: describe_segments(case).map_or_else(String::new, |said| said.trim_end_matches('.').to_owned()),
+        synthetic: case.is_synthetic(),
         quantity: channel.label(),
         parts,
     };
-    Some(case.block("evidence", words(case, &shown, channel, noise_m), figure(&shown)))
+    Some(case.figure_block("evidence", figure_text(case, &shown, channel, noise_m), draw_figure(&shown)))
 }
 
 /// The part of [`LATE_S`] with the greatest mean square of a channel between two instants, s: from when to
@@ -98,46 +102,50 @@ fn worst_s(residual: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)
 }
 
 /// A channel between two instants.
-fn within(motion: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)) -> Course {
+fn channel_between(motion: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)) -> TimeCurve {
     let all = motion.time_s.iter().zip(motion.column(channel));
     all.filter(|(t, _)| **t >= from_s && **t <= to_s).map(|(t, x)| x.map(|x| (*t, x))).collect()
 }
 
 /// The model's own states, for a line as smooth as its motion; `None` where its frames are closer.
-fn finely(case: &Case, channel: Channel, (from_s, to_s): (f64, f64)) -> Option<Course> {
+fn model_states_curve(
+    case: &ConditionComparison,
+    channel: Channel,
+    (from_s, to_s): (f64, f64),
+) -> Option<TimeCurve> {
     let (shift_s, by_m) = (case.alignment.shift_s, case.alignment.along_m);
-    let samples = case.model.motion.between([from_s - shift_s, to_s - shift_s]);
+    let samples = case.model.motion.fine_samples_between([from_s - shift_s, to_s - shift_s]);
     let frames = (to_s - from_s) * case.model.view.recording.grid().frame_rate_hz;
-    let place = |s: &Sample| match channel {
+    let place = |s: &ModelSample| match channel {
         Channel::Deflection => Some(s.tip_x_m - s.head_x_m),
         Channel::TipX => Some(s.tip_x_m + by_m),
         Channel::HeadX => Some(s.head_x_m + by_m),
         Channel::HeadDrop => None,
     };
-    let point = |s: &Sample| place(s).map(|x| Some((s.time_s + shift_s, x)));
-    samples.iter().map(point).collect::<Option<Course>>().filter(|_| samples.len() as f64 > frames)
+    let point = |s: &ModelSample| place(s).map(|x| Some((s.time_s + shift_s, x)));
+    samples.iter().map(point).collect::<Option<TimeCurve>>().filter(|_| samples.len() as f64 > frames)
 }
 
 /// The claim with its number.
-fn title(channel: Channel, rms: f64, noise_m: f64) -> String {
-    let (label, left) = (channel.label(), length(rms * noise_m));
+fn figure_title(channel: Channel, rms: f64, noise_m: f64) -> String {
+    let (label, left) = (channel.label(), format_length(rms * noise_m));
     if rms <= NOTHING_LEFT {
         return format!(
             "One run of the model explains the {label} to within its noise of {}",
-            length(noise_m)
+            format_length(noise_m)
         );
     }
-    format!("One run of the model misses the {label} by {left}, {} times the noise", ratio(rms))
+    format!("One run of the model misses the {label} by {left}, {} times the noise", format_noise_ratio(rms))
 }
 
-fn words(case: &Case, shown: &Evidence, channel: Channel, noise_m: f64) -> Words {
-    let rms = |part: &Part| {
+fn figure_text(case: &ConditionComparison, shown: &EvidencePlot, channel: Channel, noise_m: f64) -> Words {
+    let rms = |part: &EvidencePart| {
         let at = match part.name.as_str() {
             "worst later" => "where it fits worst later",
             "worst part" => "where it fits worst",
             _ => "at the release of the tip",
         };
-        format!("{} {at}", ratio(part.rms))
+        format!("{} {at}", format_noise_ratio(part.rms))
     };
     let [whole, parts @ ..] = shown.parts.as_slice() else {
         return Words { caption: String::new(), details: String::new() };
@@ -149,15 +157,15 @@ fn words(case: &Case, shown: &Evidence, channel: Channel, noise_m: f64) -> Words
          noise{enlarged}.",
         channel.label(),
         case.source_kind(),
-        length(whole.rms * noise_m),
-        ratio(whole.rms),
+        format_length(whole.rms * noise_m),
+        format_noise_ratio(whole.rms),
     );
     let spans: Vec<String> = shown
         .parts
         .iter()
         .map(|part| {
             let (from_s, to_s) = part.span_s;
-            format!("{} from {} to {} s", part.name, decimals(from_s, 4), decimals(to_s, 4))
+            format!("{} from {} to {} s", part.name, format_decimals(from_s, 4), format_decimals(to_s, 4))
         })
         .collect();
     let details = format!(
@@ -167,24 +175,25 @@ fn words(case: &Case, shown: &Evidence, channel: Channel, noise_m: f64) -> Words
          its own motion, and every dot is a frame.",
         spans.join("; "),
         channel.label(),
-        length(noise_m),
+        format_length(noise_m),
     );
-    let details = segments(case).map_or(details.clone(), |said| format!("{details} {}", capitalised(&said)));
+    let details =
+        describe_segments(case).map_or(details.clone(), |said| format!("{details} {}", capitalise(&said)));
     Words { caption, details }
 }
 
 /// What a fit to traces says: how far its restarted segments are from the recording.
-fn segments(case: &Case) -> Option<String> {
+fn describe_segments(case: &ConditionComparison) -> Option<String> {
     let misfit = case.result.misfit.as_ref()?;
     let own = |found: &&ChannelMisfit| found.recording == case.name();
     let tip = misfit.channels.iter().find(own)?;
     let longest = misfit.stages.last()?;
     Some(format!(
         "restarted every {} ms, as it is fitted, the model misses the {} by {}, {} times the noise.",
-        trimmed(1e3 * longest.segment_s, 3),
+        format_trimmed(1e3 * longest.segment_s, 3),
         tip.channel.replace("tip-x", "tip").replace("head-drop", "head drop"),
-        length(tip.residual_rms_m),
-        digits(tip.residual_rms_m / tip.noise_m, 2),
+        format_length(tip.residual_rms_m),
+        format_digits(tip.residual_rms_m / tip.noise_m, 2),
     ))
 }
 

@@ -1,166 +1,181 @@
 //! The friction law of the fitted model, with the speeds at which the tip moved and what is known of it.
 
-use super::{FrictionLine, Law, figure};
-use crate::blade::friction::Friction;
-use crate::compare::fitted_law::{COEFFICIENTS, Coefficient, half_95, is_free};
-use crate::compare::{Case, FrictionPoint, MeasuredFriction};
+use super::{FrictionLine, FrictionPlot, draw_figure};
+use crate::blade::friction::FrictionLaw;
+use crate::compare::fitted_law::{COEFFICIENTS, LawCoefficient, friction_half_95, is_fitted};
+use crate::compare::{ConditionComparison, FrictionPoint, MeasuredFriction};
 use crate::figures::{FigureBlock, Words};
-use crate::simulate::Sample;
-use crate::simulate::mode::Mode;
-use crate::text::{digits, listed, percent, speed};
+use crate::simulate::ModelSample;
+use crate::simulate::mode::TipMode;
+use crate::text::{format_digits, format_percent, format_speed, join_with_and};
 
 /// Points of the curve, bins of speed.
-const POINTS: usize = 200;
-const BINS: usize = 30;
+const CURVE_POINTS: usize = 200;
+const SPEED_BINS: usize = 30;
 /// The curve goes on this far beyond the greatest speed.
-const BEYOND: f64 = 1.15;
+const SPEED_MARGIN: f64 = 1.15;
 
 /// The figure; none for a model that never slips.
-pub(crate) fn block(case: &Case) -> Option<FigureBlock> {
+pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let law = case.model.scene.linkage.friction;
-    let slips = slips(case);
+    let slips = slip_speeds(case);
     let (Some(slowest), Some(fastest)) = (slips.first(), slips.last()) else { return None };
-    let (visited, top) = ((slowest.0, fastest.0), BEYOND * fastest.0);
-    let speeds: Vec<f64> = (0..=POINTS).map(|i| top * i as f64 / POINTS as f64).collect();
-    let half = half_95(case.job, case.result, &law);
-    let measured = MeasuredFriction::of(case);
+    let (visited, top) = ((slowest.0, fastest.0), SPEED_MARGIN * fastest.0);
+    let speeds: Vec<f64> = (0..=CURVE_POINTS).map(|i| top * i as f64 / CURVE_POINTS as f64).collect();
+    let half = friction_half_95(case.job, case.result, &law);
+    let measured = MeasuredFriction::measure(case);
     let points = |of: &[FrictionPoint]| of.iter().map(|p| (p.speed_m_per_s, p.coefficient)).collect();
-    let shown = Law {
-        title: claim(&law, fastest.0),
-        note: case.note("model at the estimates"),
-        synthetic: case.synthetic(),
-        curve: speeds.iter().map(|v| (*v, law.dynamic(*v))).collect(),
+    let shown = FrictionPlot {
+        title: claim_sentence(&law, fastest.0),
+        note: case.heading_note("model at the estimates"),
+        synthetic: case.is_synthetic(),
+        curve: speeds.iter().map(|v| (*v, law.dynamic_coefficient(*v))).collect(),
         visited: Some(visited),
         interval_95: half.as_ref().map_or_else(Vec::new, |half| {
-            speeds.iter().map(|v| (*v, law.dynamic(*v) - half(*v), law.dynamic(*v) + half(*v))).collect()
+            speeds
+                .iter()
+                .map(|v| (*v, law.dynamic_coefficient(*v) - half(*v), law.dynamic_coefficient(*v) + half(*v)))
+                .collect()
         }),
-        truth: truth(case)
-            .map_or_else(Vec::new, |law| speeds.iter().map(|v| (*v, law.dynamic(*v))).collect()),
-        even: points(&measured.even),
+        truth: true_law(case)
+            .map_or_else(Vec::new, |law| speeds.iter().map(|v| (*v, law.dynamic_coefficient(*v))).collect()),
+        even: points(&measured.steady_sliding),
         over_cycles: points(&measured.over_cycles),
-        of_model: points(&measured.of_model),
-        shares: shares(&slips, top),
-        head: Some(head_speed(case)),
+        of_model: points(&measured.model_over_cycles),
+        shares: slip_time_shares(&slips, top),
+        head: Some(mean_head_speed(case)),
     };
-    let words = words(case, &law, &slips, half.as_deref(), &measured);
-    Some(case.block("friction", words, figure(&shown)))
+    let words = figure_text(case, &law, &slips, half.as_deref(), &measured);
+    Some(case.figure_block("friction", words, draw_figure(&shown)))
 }
 
 /// The claim with its numbers.
-fn claim(law: &Friction, fastest: f64) -> String {
-    let (rest, moving) = (law.at_rest(), law.dynamic(fastest));
+fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
+    let (rest, moving) = (law.static_coefficient(), law.dynamic_coefficient(fastest));
     let how = if moving < rest { "falls" } else { "goes" };
-    format!("Friction {how} from {} at rest to {} at {}", digits(rest, 3), digits(moving, 3), speed(fastest))
+    format!(
+        "Friction {how} from {} at rest to {} at {}",
+        format_digits(rest, 3),
+        format_digits(moving, 3),
+        format_speed(fastest)
+    )
 }
 
 /// The law of a synthetic blade; `None` where the recording does not say it.
-fn truth(case: &Case) -> Option<Friction> {
+fn true_law(case: &ConditionComparison) -> Option<FrictionLaw> {
     let twin = case.measured.and_then(|m| m.file).and_then(|file| file.twin.as_ref())?;
     let known = twin.get("truth").and_then(toml::Value::as_table)?;
     let [a, b_s_per_m, c] = COEFFICIENTS.map(|c| known.get(c.name).and_then(toml::Value::as_float));
-    Some(Friction { a: a?, b_s_per_m: b_s_per_m?, c: c? })
+    Some(FrictionLaw { a: a?, b_s_per_m: b_s_per_m?, c: c? })
 }
 
 /// Speeds of the tip where it slips, with the coefficients there, the slowest first.
-fn slips(case: &Case) -> Vec<(f64, f64)> {
+fn slip_speeds(case: &ConditionComparison) -> Vec<(f64, f64)> {
     let samples = case.model.motion.samples.iter().filter(|s| is_slip(s));
     let mut slips: Vec<(f64, f64)> =
-        samples.map(|s| (s.tip_velocity_m_per_s.abs(), coefficient(s))).collect();
+        samples.map(|s| (s.tip_velocity_m_per_s.abs(), friction_coefficient(s))).collect();
     slips.sort_by(|a, b| a.0.total_cmp(&b.0));
     slips
 }
 
 /// Friction at rest and at the greatest speed of the tip.
-pub(crate) fn lines(case: &Case) -> Vec<FrictionLine> {
+pub(crate) fn friction_lines(case: &ConditionComparison) -> Vec<FrictionLine> {
     let law = case.model.scene.linkage.friction;
-    let half = half_95(case.job, case.result, &law);
-    let speeds = std::iter::once(0.0).chain(slips(case).last().map(|(fastest, _)| *fastest));
+    let half = friction_half_95(case.job, case.result, &law);
+    let speeds = std::iter::once(0.0).chain(slip_speeds(case).last().map(|(fastest, _)| *fastest));
     let line = |speed_m_per_s: f64| FrictionLine {
         speed_m_per_s,
-        coefficient: law.dynamic(speed_m_per_s),
+        coefficient: law.dynamic_coefficient(speed_m_per_s),
         half_95: half.as_ref().map(|half| half(speed_m_per_s)),
     };
     speeds.map(line).collect()
 }
 
-fn is_slip(sample: &Sample) -> bool {
-    matches!(sample.mode, Mode::SlipForward | Mode::SlipBackward) && sample.normal_n > 0.0
+fn is_slip(sample: &ModelSample) -> bool {
+    matches!(sample.mode, TipMode::SlipForward | TipMode::SlipBackward) && sample.normal_n > 0.0
 }
 
-fn coefficient(sample: &Sample) -> f64 {
+fn friction_coefficient(sample: &ModelSample) -> f64 {
     sample.friction_n.abs() / sample.normal_n
 }
 
 /// Share of the time of slip in each bin; the states are equally far apart in time.
-fn shares(slips: &[(f64, f64)], top: f64) -> Vec<(f64, f64, f64)> {
+fn slip_time_shares(slips: &[(f64, f64)], top: f64) -> Vec<(f64, f64, f64)> {
     let below = |v: f64| slips.partition_point(|s| s.0 < v) as f64;
-    let edge = |i: usize| top * i as f64 / BINS as f64;
-    (0..BINS)
+    let edge = |i: usize| top * i as f64 / SPEED_BINS as f64;
+    (0..SPEED_BINS)
         .map(|i| (edge(i), edge(i + 1), (below(edge(i + 1)) - below(edge(i))) / slips.len() as f64))
         .collect()
 }
 
 /// Mean of `|v|` of the head over the run, m/s.
-fn head_speed(case: &Case) -> f64 {
+fn mean_head_speed(case: &ConditionComparison) -> f64 {
     let samples = &case.model.motion.samples;
-    samples.iter().map(|s| case.model.scene.drive.at(s.time_s).velocity_m_per_s.abs()).sum::<f64>()
+    samples.iter().map(|s| case.model.scene.drive.motion_at(s.time_s).velocity_m_per_s.abs()).sum::<f64>()
         / samples.len().max(1) as f64
 }
 
-fn words(
-    case: &Case,
-    law: &Friction,
+fn figure_text(
+    case: &ConditionComparison,
+    law: &FrictionLaw,
     slips: &[(f64, f64)],
     half: Option<&(dyn Fn(f64) -> f64 + '_)>,
     measured: &MeasuredFriction,
 ) -> Words {
     let fastest = slips.last().map_or(0.0, |s| s.0);
-    let (median, head) = (slips.get(slips.len() / 2).map_or(0.0, |s| s.0), head_speed(case));
+    let (median, head) = (slips.get(slips.len() / 2).map_or(0.0, |s| s.0), mean_head_speed(case));
     let slower = slips.partition_point(|s| s.0 < head) as f64 / slips.len().max(1) as f64;
     let mut said = vec![format!(
         "Friction law of the model at the estimates, \u{b5} = A exp(\u{2212}B|v|) + C with A = {}, B = {} \
          s/m, C = {}: from {} at rest to {} at {}, the greatest \
          speed of the tip.",
-        digits(law.a, 3),
-        digits(law.b_s_per_m, 3),
-        digits(law.c, 3),
-        digits(law.at_rest(), 3),
-        digits(law.dynamic(fastest), 3),
-        speed(fastest),
+        format_digits(law.a, 3),
+        format_digits(law.b_s_per_m, 3),
+        format_digits(law.c, 3),
+        format_digits(law.static_coefficient(), 3),
+        format_digits(law.dynamic_coefficient(fastest), 3),
+        format_speed(fastest),
     )];
-    said.extend(points_in_words(case, law, measured));
+    said.extend(describe_points(case, law, measured));
     said.push(format!(
         "Below: the time of slip at each speed; half of it is slower than {}, {} of it slower than the head \
          on average ({}).",
-        speed(median),
-        percent(slower),
-        speed(head)
+        format_speed(median),
+        format_percent(slower),
+        format_speed(head)
     ));
-    said.push(known(case, median, half));
-    let even = apart(law, &measured.even).map_or_else(String::new, |(count, off)| {
-        format!("; {count} points measured where the tip slides evenly lie within {} of it", digits(off, 2))
+    said.push(describe_uncertainty(case, median, half));
+    let even = largest_deviation(law, &measured.steady_sliding).map_or_else(String::new, |(count, off)| {
+        format!(
+            "; {count} points measured where the tip slides evenly lie within {} of it",
+            format_digits(off, 2)
+        )
     });
-    let caption = format!("{} in the law of the fitted model{even}.", claim(law, fastest));
-    Words { caption, details: said.join(" ") + &case.sharing() }
+    let caption = format!("{} in the law of the fitted model{even}.", claim_sentence(law, fastest));
+    Words { caption, details: said.join(" ") + &case.sharing_note() }
 }
 
 /// How many points there are, and by how much the one farthest from the law is off.
-fn apart(law: &Friction, points: &[FrictionPoint]) -> Option<(usize, f64)> {
-    let off = |p: &FrictionPoint| (p.coefficient - law.dynamic(p.speed_m_per_s)).abs();
+fn largest_deviation(law: &FrictionLaw, points: &[FrictionPoint]) -> Option<(usize, f64)> {
+    let off = |p: &FrictionPoint| (p.coefficient - law.dynamic_coefficient(p.speed_m_per_s)).abs();
     points.iter().map(off).reduce(f64::max).map(|most| (points.len(), most))
 }
 
 /// What the points are, and why some of them are not on the law.
-fn points_in_words(case: &Case, law: &Friction, measured: &MeasuredFriction) -> Option<String> {
+fn describe_points(
+    case: &ConditionComparison,
+    law: &FrictionLaw,
+    measured: &MeasuredFriction,
+) -> Option<String> {
     case.recording()?;
-    let even = apart(law, &measured.even).map_or_else(
+    let even = largest_deviation(law, &measured.steady_sliding).map_or_else(
         || "The recorded tip nowhere slides evenly.".to_owned(),
         |(count, off)| {
             format!(
                 "Full circles ({count}): where the recorded tip slides evenly its deflection gives the friction, as \
                  the blade is in equilibrium there; stiffnesses and preload are the model's. The farthest is {} off \
                  the law.",
-                digits(off, 2)
+                format_digits(off, 2)
             )
         },
     );
@@ -174,9 +189,14 @@ fn points_in_words(case: &Case, law: &Friction, measured: &MeasuredFriction) -> 
 }
 
 /// What the fit knows of the law.
-fn known(case: &Case, at: f64, half: Option<&(dyn Fn(f64) -> f64 + '_)>) -> String {
-    let (free, held): (Vec<_>, Vec<_>) = COEFFICIENTS.iter().partition(|c| is_free(case.job, c));
-    let symbols = |of: &[&Coefficient]| listed(&of.iter().map(|c| c.symbol.to_owned()).collect::<Vec<_>>());
+fn describe_uncertainty(
+    case: &ConditionComparison,
+    at: f64,
+    half: Option<&(dyn Fn(f64) -> f64 + '_)>,
+) -> String {
+    let (free, held): (Vec<_>, Vec<_>) = COEFFICIENTS.iter().partition(|c| is_fitted(case.job, c));
+    let symbols =
+        |of: &[&LawCoefficient]| join_with_and(&of.iter().map(|c| c.symbol.to_owned()).collect::<Vec<_>>());
     let taken = if held.is_empty() {
         String::new()
     } else {
@@ -188,9 +208,9 @@ fn known(case: &Case, at: f64, half: Option<&(dyn Fn(f64) -> f64 + '_)>) -> Stri
             "Shaded: 95 %, propagated from the intervals of {}{}, \u{b1}{} at rest and \u{b1}{} at {}.{taken}",
             symbols(&free),
             if free.len() > 1 { " with their correlations" } else { "" },
-            digits(half(0.0), 2),
-            digits(half(at), 2),
-            speed(at)
+            format_digits(half(0.0), 2),
+            format_digits(half(at), 2),
+            format_speed(at)
         ),
         None => {
             let open: Vec<_> = free

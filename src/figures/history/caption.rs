@@ -1,19 +1,22 @@
 //! Time histories: the whole and the release of the tip, with what lies between measurement and model.
 
-use super::thin::lightened;
-use super::{History, enlarged, figure};
-use crate::compare::windows::{FitWindow, fit_windows};
-use crate::compare::{Case, Side};
-use crate::feature::{Interval, Reading};
+use super::thin::thin_frames;
+use super::{TimeHistory, draw_enlarged, draw_figure};
+use crate::compare::windows::{FitWindow, group_fit_windows};
+use crate::compare::{ConditionComparison, TimedRecording};
+use crate::feature::{Reading, ReversalInterval};
 use crate::figures::{FigureBlock, OPPOSED, Words};
-use crate::recording::alignment::Point;
+use crate::recording::alignment::AlignmentPoint;
 use crate::recording::alignment::is_tracked;
-use crate::recording::channel::{Anchor, Channel};
-use crate::recording::motion_traces::CHANNELS;
+use crate::recording::channel::{Channel, InstantKind};
+use crate::recording::motion_traces::MOTION_CHANNELS;
 use crate::recording::motion_traces::MotionTraces;
-use crate::simulate::Status;
-use crate::simulate::mode::Mode;
-use crate::text::{capitalised, decimals, digits, length, listed, milliseconds, percent, times};
+use crate::simulate::RunStatus;
+use crate::simulate::mode::TipMode;
+use crate::text::{
+    capitalise, format_decimals, format_digits, format_length, format_milliseconds, format_percent,
+    format_times, join_with_and,
+};
 
 /// How long before and after the tip's release the enlarged part lasts, s: a few cycles of the high
 /// component.
@@ -24,41 +27,44 @@ const MOST_TURNS: usize = 4;
 const MOST_WINDOWS: usize = 10;
 
 /// The figures of the motion over time.
-pub(crate) fn blocks(case: &Case) -> Vec<FigureBlock> {
-    let history = history(case);
-    let whole = case.block("history", whole_words(case, &history), figure(&history));
-    let part = enlarged(&history).map(|figure| case.block("release", enlarged_words(case, &history), figure));
+pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
+    let history = build_history(case);
+    let whole = case.figure_block("history", whole_text(case, &history), draw_figure(&history));
+    let part = draw_enlarged(&history)
+        .map(|figure| case.figure_block("release", enlarged_text(case, &history), figure));
     std::iter::once(whole).chain(part).collect()
 }
 
-fn history(case: &Case) -> History {
-    let (shift_s, shown) = (case.alignment.shift_s, case.shown());
+fn build_history(case: &ConditionComparison) -> TimeHistory {
+    let (shift_s, shown) = (case.alignment.shift_s, case.measured_or_model());
     let grid = shown.recording.grid();
     let whole_s = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
     let zoom_s = release_s(&shown);
-    let light = |traces: MotionTraces| lightened(traces, whole_s, zoom_s);
+    let light = |traces: MotionTraces| thin_frames(traces, whole_s, zoom_s);
     // one after the other: each is lighter before the next is made
-    let measured = case.recording().map(MotionTraces::of).map(light);
-    let model = light(MotionTraces::of_model(&case.model.view.recording, &case.alignment));
-    let windows =
-        windows(case).into_iter().enumerate().map(|(i, (_, from, to))| ((i + 1).to_string(), from, to));
-    History {
+    let measured = case.recording().map(MotionTraces::from_recording).map(light);
+    let model = light(MotionTraces::from_model(&case.model.view.recording, &case.alignment));
+    let windows = fit_window_spans(case)
+        .into_iter()
+        .enumerate()
+        .map(|(i, (_, from, to))| ((i + 1).to_string(), from, to));
+    TimeHistory {
         title: motion_title(case),
         enlarged_title: enlarged_title(&shown),
-        synthetic: case.synthetic(),
+        synthetic: case.is_synthetic(),
         measured,
         model: Some(model),
         residual: case.residual.clone().map(light),
         stick_s: case.model.view.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect(),
-        instants: instants(&shown),
+        instants: turn_instants(&shown),
         windows: windows.collect(),
         zoom_s,
     }
 }
 
 /// The release of the tip, as far as there are frames.
-fn release_s(shown: &Side) -> Option<(f64, f64)> {
-    let (grid, release_s) = (shown.recording.grid(), shown.instant_s(Anchor::Release)?);
+fn release_s(shown: &TimedRecording) -> Option<(f64, f64)> {
+    let (grid, release_s) = (shown.recording.grid(), shown.instant_s(InstantKind::Release)?);
     Some((
         (release_s - ZOOM_S.0).max(grid.start_s),
         (release_s + ZOOM_S.1).min(grid.time_s(grid.frames.saturating_sub(1))),
@@ -66,12 +72,13 @@ fn release_s(shown: &Side) -> Option<(f64, f64)> {
 }
 
 /// Instants of the first turns, or of the first alone where there are many.
-fn instants(shown: &Side) -> Vec<(String, f64)> {
+fn turn_instants(shown: &TimedRecording) -> Vec<(String, f64)> {
     let turns = shown.instants.reversals.len();
     let marked = if turns > MOST_TURNS { 1 } else { turns };
-    let all = (1..=marked)
-        .flat_map(|k| [Anchor::Hold, Anchor::Reversal, Anchor::Release].map(|anchor| (anchor, k)));
-    let named = |(anchor, k): (Anchor, usize)| {
+    let all = (1..=marked).flat_map(|k| {
+        [InstantKind::Hold, InstantKind::Reversal, InstantKind::Release].map(|anchor| (anchor, k))
+    });
+    let named = |(anchor, k): (InstantKind, usize)| {
         let name = if turns > 1 { format!("{}[{k}]", anchor.name()) } else { anchor.name().to_owned() };
         shown.instants.time_s(anchor, k).ok().map(|t| (name, t))
     };
@@ -80,13 +87,13 @@ fn instants(shown: &Side) -> Vec<(String, f64)> {
 
 /// The windows of the fit on what is shown, in order of time, with what they serve; those that it does not
 /// show are left out.
-fn windows(case: &Case) -> Vec<(String, f64, f64)> {
-    let (shown, grid) = (case.shown(), case.shown().recording.grid());
+fn fit_window_spans(case: &ConditionComparison) -> Vec<(String, f64, f64)> {
+    let (shown, grid) = (case.measured_or_model(), case.measured_or_model().recording.grid());
     let place = |l: &FitWindow| {
-        let frames = shown.frames(&l.window)?;
-        let served = match l.aims.as_slice() {
-            [first, _, _, ..] => format!("{} and {} more", first.feature.name, l.aims.len() - 1),
-            _ => listed(&l.names()),
+        let frames = shown.window_frames(&l.window)?;
+        let served = match l.targets.as_slice() {
+            [first, _, _, ..] => format!("{} and {} more", first.feature.name, l.targets.len() - 1),
+            _ => join_with_and(&l.feature_names()),
         };
         Some((
             format!("{served} ({})", l.channel.label()),
@@ -94,46 +101,64 @@ fn windows(case: &Case) -> Vec<(String, f64, f64)> {
             grid.time_s(frames.end),
         ))
     };
-    let mut found: Vec<_> = fit_windows(case.job, case.condition).iter().filter_map(place).collect();
+    let mut found: Vec<_> = group_fit_windows(case.job, case.condition).iter().filter_map(place).collect();
     found.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)));
     found.truncate(MOST_WINDOWS);
     found
 }
 
-fn whole_words(case: &Case, history: &History) -> Words {
-    let first = format!("Tip, head, deflection (tip minus head) and head drop over time: {}", drawn(case));
-    let said = [Some(first), Some(sticks(history)), flights(case), ended(case), released(case)];
-    let mut details: Vec<String> = said.into_iter().flatten().chain(left(case, None)).collect();
-    let windows: Vec<String> =
-        windows(case).iter().enumerate().map(|(i, (name, ..))| format!("{} {name}", i + 1)).collect();
+fn whole_text(case: &ConditionComparison, history: &TimeHistory) -> Words {
+    let first =
+        format!("Tip, head, deflection (tip minus head) and head drop over time: {}", describe_overlay(case));
+    let said = [
+        Some(first),
+        Some(describe_sticks(history)),
+        describe_flights(case),
+        describe_early_end(case),
+        describe_release(case),
+    ];
+    let mut details: Vec<String> = said.into_iter().flatten().chain(describe_residuals(case, None)).collect();
+    let windows: Vec<String> = fit_window_spans(case)
+        .iter()
+        .enumerate()
+        .map(|(i, (name, ..))| format!("{} {name}", i + 1))
+        .collect();
     if !windows.is_empty() {
         details.push(format!("Bars: windows that the fit read, {}.", windows.join("; ")));
     }
-    let caption = format!("Motion of tip and head over time, {}{}.", both(case), agreement(case, None));
+    let caption = format!(
+        "Motion of tip and head over time, {}{}.",
+        whose_motion(case),
+        describe_agreement(case, None)
+    );
     Words { caption, details: details.join(" ") }
 }
 
-fn enlarged_words(case: &Case, history: &History) -> Words {
-    let release_s = case.shown().instant_s(Anchor::Release);
+fn enlarged_text(case: &ConditionComparison, history: &TimeHistory) -> Words {
+    let release_s = case.measured_or_model().instant_s(InstantKind::Release);
     let span = release_s.zip(history.zoom_s).map_or_else(String::new, |(at_s, (from_s, to_s))| {
-        format!(", from {} before it to {} after it", milliseconds(at_s - from_s), milliseconds(to_s - at_s))
+        format!(
+            ", from {} before it to {} after it",
+            format_milliseconds(at_s - from_s),
+            format_milliseconds(to_s - at_s)
+        )
     });
-    let mut details = vec![format!("The release of the tip{span}: {}", drawn(case))];
+    let mut details = vec![format!("The release of the tip{span}: {}", describe_overlay(case))];
     details.extend(history.zoom_s.map(|(from_s, to_s)| {
         let sticks = history.stick_s.iter().filter(|(from, to)| *to > from_s && *from < to_s).count();
         match sticks {
             0 => "The model's tip does not stick in it.".to_owned(),
-            sticks => format!("The model's tip sticks {} in it.", times(sticks)),
+            sticks => format!("The model's tip sticks {} in it.", format_times(sticks)),
         }
     }));
-    details.extend(left(case, history.zoom_s));
-    let agreement = agreement(case, history.zoom_s);
-    let caption = format!("The release of the tip enlarged, {}{agreement}.", both(case));
+    details.extend(describe_residuals(case, history.zoom_s));
+    let agreement = describe_agreement(case, history.zoom_s);
+    let caption = format!("The release of the tip enlarged, {}{agreement}.", whose_motion(case));
     Words { caption, details: details.join(" ") }
 }
 
 /// Whose motion is drawn.
-fn both(case: &Case) -> String {
+fn whose_motion(case: &ConditionComparison) -> String {
     match case.recording() {
         Some(_) => format!("{} over the fitted model", case.source_kind()),
         None => case.source_kind().to_owned(),
@@ -142,7 +167,10 @@ fn both(case: &Case) -> String {
 
 /// The channel in which model and recording are compared, how far they lie apart there (root mean square), m,
 /// and that in units of the noise.
-fn apart(case: &Case, within_s: Option<(f64, f64)>) -> Option<(Channel, f64, Option<f64>)> {
+fn rms_difference(
+    case: &ConditionComparison,
+    within_s: Option<(f64, f64)>,
+) -> Option<(Channel, f64, Option<f64>)> {
     let residual = case.residual.as_ref().filter(|_| !case.alignment.opposite_turn)?;
     let channels = [Channel::Deflection, Channel::TipX, Channel::HeadX];
     let (of, rms_m) = channels.into_iter().find_map(|of| Some((of, residual.rms_m(of, within_s)?)))?;
@@ -150,16 +178,16 @@ fn apart(case: &Case, within_s: Option<(f64, f64)>) -> Option<(Channel, f64, Opt
 }
 
 /// "the model misses the deflection by 7.4 um, 2.6 times the noise"
-fn missed((of, rms_m, over_noise): (Channel, f64, Option<f64>)) -> String {
+fn describe_miss((of, rms_m, over_noise): (Channel, f64, Option<f64>)) -> String {
     let noise =
-        over_noise.map_or_else(String::new, |ratio| format!(", {} times the noise", digits(ratio, 2)));
-    format!("the model misses the {} by {}{noise}", of.label(), length(rms_m))
+        over_noise.map_or_else(String::new, |ratio| format!(", {} times the noise", format_digits(ratio, 2)));
+    format!("the model misses the {} by {}{noise}", of.label(), format_length(rms_m))
 }
 
 /// The claim of the whole motion.
-fn motion_title(case: &Case) -> String {
-    match apart(case, None) {
-        Some(found) => capitalised(&missed(found)),
+fn motion_title(case: &ConditionComparison) -> String {
+    match rms_difference(case, None) {
+        Some(found) => capitalise(&describe_miss(found)),
         None if case.alignment.opposite_turn => {
             "The recorded head turns the other way than the model's".to_owned()
         }
@@ -167,88 +195,91 @@ fn motion_title(case: &Case) -> String {
             let (stick_s, samples) = (&case.model.motion.stick_s, &case.model.motion.samples);
             let whole_s = samples.last().zip(samples.first()).map_or(0.0, |(b, a)| b.time_s - a.time_s);
             let stuck_s: f64 = stick_s.iter().map(|[from, to]| to - from).sum();
-            let share = percent(stuck_s / whole_s.max(f64::MIN_POSITIVE));
-            format!("The model's tip sticks {}, {share} of the time", times(stick_s.len()))
+            let share = format_percent(stuck_s / whole_s.max(f64::MIN_POSITIVE));
+            format!("The model's tip sticks {}, {share} of the time", format_times(stick_s.len()))
         }
     }
 }
 
 /// The claim of the enlarged part.
-fn enlarged_title(shown: &Side) -> String {
-    let after_s = shown.instant_s(Anchor::Release).zip(shown.instant_s(Anchor::Reversal));
+fn enlarged_title(shown: &TimedRecording) -> String {
+    let after_s = shown.instant_s(InstantKind::Release).zip(shown.instant_s(InstantKind::Reversal));
     after_s.map_or_else(
         || "The tip is released".to_owned(),
         |(release_s, turn_s)| {
-            format!("The tip is released {} the head turns", beside_turn(release_s - turn_s))
+            format!("The tip is released {} the head turns", format_turn_offset(release_s - turn_s))
         },
     )
 }
 
 /// How near the deflection of the model is to the measured one.
-fn agreement(case: &Case, within_s: Option<(f64, f64)>) -> String {
+fn describe_agreement(case: &ConditionComparison, within_s: Option<(f64, f64)>) -> String {
     if case.residual.is_none() {
-        return format!(": its tip sticks {}", times(case.model.motion.stick_s.len()));
+        return format!(": its tip sticks {}", format_times(case.model.motion.stick_s.len()));
     }
     if case.alignment.opposite_turn {
         return ": the recorded head turns the other way, so that nothing with a sign can agree".to_owned();
     }
-    let Some((of, rms_m, over_noise)) = apart(case, within_s) else { return String::new() };
+    let Some((of, rms_m, over_noise)) = rms_difference(case, within_s) else { return String::new() };
     let noise = over_noise
-        .map_or_else(String::new, |ratio| format!(", {} times the tracking noise", digits(ratio, 2)));
-    format!(": they differ by {} in the {} (root mean square){noise}", length(rms_m), of.label())
+        .map_or_else(String::new, |ratio| format!(", {} times the tracking noise", format_digits(ratio, 2)));
+    format!(": they differ by {} in the {} (root mean square){noise}", format_length(rms_m), of.label())
 }
 
 /// What is drawn over what, and how it was brought there.
-fn drawn(case: &Case) -> String {
+fn describe_overlay(case: &ConditionComparison) -> String {
     if case.recording().is_none() {
-        return format!("{}.", case.source());
+        return format!("{}.", case.source_name());
     }
     let alignment = case.alignment;
     if alignment.opposite_turn {
         return format!(
             "{} against the fitted model through the same camera, together at the turn of the head. \
              {OPPOSED}.",
-            case.source()
+            case.source_name()
         );
     }
     let Some(shift_sd_s) = alignment.shift_sd_s else {
         return format!(
             "{} against the fitted model through the same camera, each on its own clock: they show no path \
              in common.",
-            case.source()
+            case.source_name()
         );
     };
-    let headless = if alignment.followed == Point::Tip { ", as no head was tracked" } else { "" };
+    let headless = if alignment.followed == AlignmentPoint::Tip { ", as no head was tracked" } else { "" };
     let has_drop = case.recording().is_some_and(|r| is_tracked(&r.traces().head_y_m));
-    let drop =
-        if has_drop { format!(", the head drop by {}", length(alignment.drop_m)) } else { String::new() };
+    let drop = if has_drop {
+        format!(", the head drop by {}", format_length(alignment.drop_m))
+    } else {
+        String::new()
+    };
     format!(
         "{} against the fitted model through the same camera. The model's clock and origin are those that \
          bring its {} closest to the recorded one \
          (least squares{headless}): its clock is moved by {}{}, head and tip by {} along the sweep{drop}.",
-        case.source(),
+        case.source_name(),
         alignment.followed.name(),
-        milliseconds(alignment.shift_s),
-        uncertain(case, shift_sd_s),
-        length(alignment.along_m),
+        format_milliseconds(alignment.shift_s),
+        describe_clock_uncertainty(case, shift_sd_s),
+        format_length(alignment.along_m),
     )
 }
 
 /// What is said of a clock that the path does not fix to half a frame.
-fn uncertain(case: &Case, shift_sd_s: f64) -> String {
-    let frame_s = 1.0 / case.shown().recording.grid().frame_rate_hz;
+fn describe_clock_uncertainty(case: &ConditionComparison, shift_sd_s: f64) -> String {
+    let frame_s = 1.0 / case.measured_or_model().recording.grid().frame_rate_hz;
     match shift_sd_s {
         sd if sd < 0.5 * frame_s => String::new(),
         sd if sd.is_finite() => format!(
             " (give or take {}, one standard deviation: its speed changes too little to say more)",
-            milliseconds(sd)
+            format_milliseconds(sd)
         ),
         _ => " (which a path of constant speed does not fix)".to_owned(),
     }
 }
 
 /// How often and how long the model's tip sticks in what is shown.
-fn sticks(history: &History) -> String {
+fn describe_sticks(history: &TimeHistory) -> String {
     let shown = history
         .measured
         .as_ref()
@@ -273,69 +304,72 @@ fn sticks(history: &History) -> String {
     let share = stuck_s.iter().sum::<f64>() / (to_s - from_s).max(f64::MIN_POSITIVE);
     format!(
         "Shaded: the model's tip sticks {}, {} of the time; cycles too short to stand apart are one band.",
-        times(stuck_s.len()),
-        percent(share)
+        format_times(stuck_s.len()),
+        format_percent(share)
     )
 }
 
 /// How often the model's tip leaves the glass in its run, where it does.
-fn flights(case: &Case) -> Option<String> {
+fn describe_flights(case: &ConditionComparison) -> Option<String> {
     let count = case
         .model
         .motion
         .transitions
         .iter()
-        .filter(|t| t.from != Mode::Flight && t.to == Mode::Flight)
+        .filter(|t| t.from != TipMode::Flight && t.to == TipMode::Flight)
         .count();
-    (count > 0).then(|| format!("In its whole run it leaves the glass {}.", times(count)))
+    (count > 0).then(|| format!("In its whole run it leaves the glass {}.", format_times(count)))
 }
 
 /// How the model's run ended, where that was before its time.
-fn ended(case: &Case) -> Option<String> {
+fn describe_early_end(case: &ConditionComparison) -> Option<String> {
     let run = &case.model.motion.run;
-    let at = decimals(run.stopped_at_s + case.alignment.shift_s, 4);
-    (run.status != Status::Completed)
+    let at = format_decimals(run.stopped_at_s + case.alignment.shift_s, 4);
+    (run.status != RunStatus::Completed)
         .then(|| format!("The model's run ended early, at {at} s: {}.", run.status.meaning()))
 }
 
 /// When the tip is released, in both as the fit reads them, so that every place says the same of it; where it
 /// does not read them, of the recording or of the model alone.
-fn released(case: &Case) -> Option<String> {
-    const RELEASE: Reading = Reading::Interval { interval: Interval::ReleaseAfterReversal, reversal: 1 };
-    let read = case.aims().find(|aim| aim.feature.reading == RELEASE);
+fn describe_release(case: &ConditionComparison) -> Option<String> {
+    const RELEASE: Reading =
+        Reading::Interval { interval: ReversalInterval::ReleaseAfterReversal, reversal: 1 };
+    let read = case.targets().find(|aim| aim.feature.reading == RELEASE);
     let all = || case.result.features.iter().chain(&case.result.held_out);
     let found = read.and_then(|aim| all().find(|feature| feature.name == aim.feature.name));
-    let shown = case.shown();
-    let own_s = || Some(shown.instant_s(Anchor::Release)? - shown.instant_s(Anchor::Reversal)?);
+    let shown = case.measured_or_model();
+    let own_s = || Some(shown.instant_s(InstantKind::Release)? - shown.instant_s(InstantKind::Reversal)?);
     let Some(found) = found else {
-        return Some(format!("The tip is released {} the head turns.", beside_turn(own_s()?)));
+        return Some(format!("The tip is released {} the head turns.", format_turn_offset(own_s()?)));
     };
-    let same_side = |s: f64| if s < 0.0 || found.target < 0.0 { beside_turn(s) } else { milliseconds(s) };
+    let same_side =
+        |s: f64| if s < 0.0 || found.target < 0.0 { format_turn_offset(s) } else { format_milliseconds(s) };
     let model =
         found.model.map_or_else(|| "the model's is not".to_owned(), |s| format!("model: {}", same_side(s)));
     Some(format!(
         "The tip is released {} the head turns ({model}): it has left its place by more than the noise, a little \
          after its longest stick ends.",
-        beside_turn(found.target)
+        format_turn_offset(found.target)
     ))
 }
 
 /// "4.2 ms after" or "4.2 ms before" the turn of the head.
-fn beside_turn(after_s: f64) -> String {
-    format!("{} {}", milliseconds(after_s.abs()), if after_s < 0.0 { "before" } else { "after" })
+fn format_turn_offset(after_s: f64) -> String {
+    format!("{} {}", format_milliseconds(after_s.abs()), if after_s < 0.0 { "before" } else { "after" })
 }
 
 /// Root mean square of what is left of every channel, and the noise of the tracking.
-fn left(case: &Case, within_s: Option<(f64, f64)>) -> Option<String> {
+fn describe_residuals(case: &ConditionComparison, within_s: Option<(f64, f64)>) -> Option<String> {
     let residual = case.residual.as_ref()?;
     let one = |channel: Channel| {
-        Some(format!("{} ({})", length(residual.rms_m(channel, within_s)?), channel.label()))
+        Some(format!("{} ({})", format_length(residual.rms_m(channel, within_s)?), channel.label()))
     };
-    let rms: Vec<String> = CHANNELS.into_iter().filter_map(one).collect();
+    let rms: Vec<String> = MOTION_CHANNELS.into_iter().filter_map(one).collect();
     let noise = case
         .noise_m(Channel::HeadX)
-        .map_or_else(String::new, |m| format!("; the tracking noise of the head is {}", length(m)));
-    (!rms.is_empty()).then(|| format!("Root mean square of measured minus model: {}{noise}.", listed(&rms)))
+        .map_or_else(String::new, |m| format!("; the tracking noise of the head is {}", format_length(m)));
+    (!rms.is_empty())
+        .then(|| format!("Root mean square of measured minus model: {}{noise}.", join_with_and(&rms)))
 }
 
 #[cfg(test)]
@@ -344,14 +378,17 @@ mod tests {
 
     #[test]
     fn a_release_is_before_or_after_the_turn_and_no_time_is_negative() {
-        assert_eq!([beside_turn(0.0661), beside_turn(-0.0482)], ["66.1 ms after", "48.2 ms before"]);
+        assert_eq!(
+            [format_turn_offset(0.0661), format_turn_offset(-0.0482)],
+            ["66.1 ms after", "48.2 ms before"]
+        );
     }
 
     #[test]
     fn a_tip_that_sticks_outside_what_is_shown_is_not_said_never_to_stick() {
         let shown = |stick_s: Vec<(f64, f64)>| {
             let measured = Some(MotionTraces { time_s: vec![1.0, 1.1], ..MotionTraces::default() });
-            sticks(&History { measured, stick_s, ..History::default() })
+            describe_sticks(&TimeHistory { measured, stick_s, ..TimeHistory::default() })
         };
         assert_eq!(shown(vec![(0.2, 0.3)]), "The model's tip does not stick in what is shown.");
         assert_eq!(shown(Vec::new()), "The model's tip never sticks.");

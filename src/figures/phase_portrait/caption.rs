@@ -1,13 +1,16 @@
 //! Phase portraits: after the release of the tip, and where the head is fastest, or the tip, if it rests
 //! there.
 
-use super::{Difference, MOST_NOISE, Part, Portrait, State, figure, swing_m_per_s};
-use crate::compare::{Case, Side};
+use super::{
+    CentralDifference, MAX_VELOCITY_NOISE, PhasePoint, PhasePortrait, PortraitPart, draw_figure,
+    swing_m_per_s,
+};
+use crate::compare::{ConditionComparison, TimedRecording};
 use crate::figures::{FigureBlock, Words};
-use crate::recording::channel::{Anchor, Channel};
+use crate::recording::channel::{Channel, InstantKind};
 use crate::recording::quality::noise_floor;
-use crate::simulate::Sample;
-use crate::text::{digits, listed, milliseconds, percent, speed};
+use crate::simulate::ModelSample;
+use crate::text::{format_digits, format_milliseconds, format_percent, format_speed, join_with_and};
 
 /// Cycles that stay readable over each other: of the low component, which move on, and of the high one, which
 /// repeat.
@@ -26,7 +29,7 @@ const MOST_STUCK: f64 = 0.8;
 const ROUNDING_M: f64 = 1e-12;
 
 /// A part of the shown motion: its name for the panel and for the caption, from when to when, s.
-struct Span {
+struct PortraitSpan {
     name: String,
     said: String,
     from_s: f64,
@@ -36,29 +39,29 @@ struct Span {
 }
 
 /// The figure; none where the motion is too short.
-pub(crate) fn blocks(case: &Case) -> Vec<FigureBlock> {
-    let spans = spans(case);
-    let taken = taken(case, &spans);
-    let parts: Vec<Part> = spans
+pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
+    let spans = portrait_spans(case);
+    let taken = estimate_velocities(case, &spans);
+    let parts: Vec<PortraitPart> = spans
         .iter()
-        .map(|span| part(case, span, taken.difference))
+        .map(|span| build_part(case, span, taken.difference))
         .filter(|part| !part.model.is_empty())
         .collect();
     if parts.is_empty() {
         return Vec::new();
     }
     let measured = parts.iter().any(|part| !part.measured.is_empty());
-    let figure = figure(&Portrait {
-        title: title(&parts),
-        note: case.note("phase portrait"),
-        synthetic: case.synthetic(),
+    let figure = draw_figure(&PhasePortrait {
+        title: figure_title(&parts),
+        note: case.heading_note("phase portrait"),
+        synthetic: case.is_synthetic(),
         parts,
     });
-    vec![case.block("phase-portrait", words(case, &spans, &taken, measured), figure)]
+    vec![case.figure_block("phase-portrait", figure_text(case, &spans, &taken, measured), figure)]
 }
 
 /// The claim with its number: how far the velocity swings in the last part.
-fn title(parts: &[Part]) -> String {
+fn figure_title(parts: &[PortraitPart]) -> String {
     let last = parts.last().and_then(|part| Some((&part.name, swing_m_per_s(&part.model)?)));
     last.map_or_else(
         || "The model shows no velocity".to_owned(),
@@ -68,28 +71,28 @@ fn title(parts: &[Part]) -> String {
             } else {
                 name.clone()
             };
-            format!("The tip swings through {} {name}", speed(swing))
+            format!("The tip swings through {} {name}", format_speed(swing))
         },
     )
 }
 
-fn spans(case: &Case) -> Vec<Span> {
-    let shown = case.shown();
+fn portrait_spans(case: &ConditionComparison) -> Vec<PortraitSpan> {
+    let shown = case.measured_or_model();
     let grid = shown.recording.grid();
-    let start_s = shown.instant_s(Anchor::Release).unwrap_or(grid.start_s);
+    let start_s = shown.instant_s(InstantKind::Release).unwrap_or(grid.start_s);
     let last_s = grid.time_s(grid.frames.saturating_sub(1));
-    let end_s = shown.instants.time_s(Anchor::Hold, 2).unwrap_or(last_s);
-    let low_hz = case.frequencies().map(|m| m.target.frequency_hz).reduce(f64::min);
-    let high_hz = case.frequencies().map(|m| m.target.frequency_hz).reduce(f64::max);
+    let end_s = shown.instants.time_s(InstantKind::Hold, 2).unwrap_or(last_s);
+    let low_hz = case.frequency_comparisons().map(|m| m.target.frequency_hz).reduce(f64::min);
+    let high_hz = case.frequency_comparisons().map(|m| m.target.frequency_hz).reduce(f64::max);
     let first_s = low_hz.map_or(LONGEST_S, |hz| LOW_CYCLES / hz).min(LONGEST_S).min(end_s - start_s);
     let after =
-        if shown.instant_s(Anchor::Release).is_some() { "after the release" } else { "from the start" };
+        if shown.instant_s(InstantKind::Release).is_some() { "after the release" } else { "from the start" };
     let cycles = low_hz.map_or_else(String::new, |hz| {
-        format!(" ({} cycles at {} Hz)", digits(first_s * hz, 2), digits(hz, 3))
+        format!(" ({} cycles at {} Hz)", format_digits(first_s * hz, 2), format_digits(hz, 3))
     });
-    let first = Span {
-        name: format!("{} {after}", milliseconds(first_s)),
-        said: format!("the first {} {after}{cycles}", milliseconds(first_s)),
+    let first = PortraitSpan {
+        name: format!("{} {after}", format_milliseconds(first_s)),
+        said: format!("the first {} {after}{cycles}", format_milliseconds(first_s)),
         from_s: start_s,
         to_s: start_s + first_s,
         cycles_hz: low_hz,
@@ -100,24 +103,25 @@ fn spans(case: &Case) -> Vec<Span> {
     let late = late.and_then(|(hz, length_s)| {
         let rest_s = (start_s + first_s, end_s);
         let starts = |at_s: f64| (at_s - length_s / 2.0).clamp(rest_s.0, rest_s.1 - length_s);
-        let of_head = fastest(case, rest_s, |s| case.model.scene.drive.at(s.time_s).velocity_m_per_s)?;
+        let of_head =
+            peak_velocity(case, rest_s, |s| case.model.scene.drive.motion_at(s.time_s).velocity_m_per_s)?;
         // a tip that rests there shows no cycles
-        let rests = stuck_s(case, starts(of_head.0), length_s) > MOST_STUCK * length_s;
+        let rests = stick_duration_s(case, starts(of_head.0), length_s) > MOST_STUCK * length_s;
         let (whose, (at_s, top)) = if rests {
-            ("tip", fastest(case, rest_s, |s| s.tip_velocity_m_per_s)?)
+            ("tip", peak_velocity(case, rest_s, |s| s.tip_velocity_m_per_s)?)
         } else {
             ("head", of_head)
         };
         let from_s = starts(at_s);
-        let (length, cycles) = (milliseconds(length_s), digits(length_s * hz, 2));
-        Some(Span {
+        let (length, cycles) = (format_milliseconds(length_s), format_digits(length_s * hz, 2));
+        Some(PortraitSpan {
             name: format!("{length} at the {whose}'s top speed"),
             said: format!(
                 "{length} about the greatest speed of the model's {whose} ({} at {} s; {cycles} cycles at {} \
                  Hz)",
-                speed(top),
-                digits(at_s, 3),
-                digits(hz, 3)
+                format_speed(top),
+                format_digits(at_s, 3),
+                format_digits(hz, 3)
             ),
             from_s,
             to_s: from_s + length_s,
@@ -128,14 +132,18 @@ fn spans(case: &Case) -> Vec<Span> {
 }
 
 /// When a velocity of the model is greatest between two times of what is shown, s, and how great, m/s.
-fn fastest(case: &Case, (from_s, to_s): (f64, f64), velocity: impl Fn(&Sample) -> f64) -> Option<(f64, f64)> {
-    let of = |s: &Sample| (s.time_s + case.alignment.shift_s, velocity(s).abs());
+fn peak_velocity(
+    case: &ConditionComparison,
+    (from_s, to_s): (f64, f64),
+    velocity: impl Fn(&ModelSample) -> f64,
+) -> Option<(f64, f64)> {
+    let of = |s: &ModelSample| (s.time_s + case.alignment.shift_s, velocity(s).abs());
     let inside = case.model.motion.samples.iter().map(of).filter(|(t, _)| *t >= from_s && *t <= to_s);
     inside.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// For how long the model's tip sticks from a time of what is shown on, s.
-fn stuck_s(case: &Case, from_s: f64, length_s: f64) -> f64 {
+fn stick_duration_s(case: &ConditionComparison, from_s: f64, length_s: f64) -> f64 {
     let from_s = from_s - case.alignment.shift_s;
     case.model
         .motion
@@ -146,8 +154,8 @@ fn stuck_s(case: &Case, from_s: f64, length_s: f64) -> f64 {
 }
 
 /// How the velocities of both sides are taken, and what that rests on.
-struct Taken {
-    difference: Difference,
+struct VelocityEstimate {
+    difference: CentralDifference,
     /// Noise of the recorded tip, m.
     noise_m: Option<f64>,
     /// Least swing of the model's velocity in a part, m/s: that of a recording holds its noise.
@@ -155,45 +163,58 @@ struct Taken {
     fastest_hz: Option<f64>,
 }
 
-fn taken(case: &Case, spans: &[Span]) -> Taken {
-    let rate_hz = case.shown().recording.grid().frame_rate_hz;
+fn estimate_velocities(case: &ConditionComparison, spans: &[PortraitSpan]) -> VelocityEstimate {
+    let rate_hz = case.measured_or_model().recording.grid().frame_rate_hz;
     let noise_m = case
         .recording()
         .and_then(|recording| noise_floor(&recording.traces().tip_x_m))
         .filter(|noise_m| *noise_m > ROUNDING_M);
-    let swing = |span: &Span| {
-        swing_m_per_s(&recorded(&case.model_side(), on_model(case, span), Difference::shortest(rate_hz)))
+    let swing = |span: &PortraitSpan| {
+        swing_m_per_s(&recorded_states(
+            &case.model_side(),
+            model_clock_span(case, span),
+            CentralDifference::of_neighbouring_frames(rate_hz),
+        ))
     };
     let swing_m_per_s = spans.iter().filter_map(swing).reduce(f64::min);
     let fastest_hz = spans.iter().filter_map(|span| span.cycles_hz).reduce(f64::max);
     let known = noise_m.zip(swing_m_per_s);
-    let difference = known.map_or(Difference::shortest(rate_hz), |(noise_m, swing)| {
-        Difference::of(rate_hz, noise_m, swing, fastest_hz)
+    let difference = known.map_or(CentralDifference::of_neighbouring_frames(rate_hz), |(noise_m, swing)| {
+        CentralDifference::for_noise(rate_hz, noise_m, swing, fastest_hz)
     });
-    Taken { difference, noise_m, swing_m_per_s, fastest_hz }
+    VelocityEstimate { difference, noise_m, swing_m_per_s, fastest_hz }
 }
 
 /// When a part is on the model's clock, s.
-fn on_model(case: &Case, span: &Span) -> (f64, f64) {
+fn model_clock_span(case: &ConditionComparison, span: &PortraitSpan) -> (f64, f64) {
     (span.from_s - case.alignment.shift_s, span.to_s - case.alignment.shift_s)
 }
 
-fn part(case: &Case, span: &Span, difference: Difference) -> Part {
-    let measured = case.measured_side().map(|side| recorded(&side, (span.from_s, span.to_s), difference));
+fn build_part(
+    case: &ConditionComparison,
+    span: &PortraitSpan,
+    difference: CentralDifference,
+) -> PortraitPart {
+    let measured =
+        case.measured_side().map(|side| recorded_states(&side, (span.from_s, span.to_s), difference));
     let measured = measured.filter(|states| states.iter().any(Option::is_some));
     let model = match &measured {
-        Some(_) => differences(case, on_model(case, span), difference)
-            .unwrap_or_else(|| recorded(&case.model_side(), on_model(case, span), difference)),
-        None => exact(case, on_model(case, span)),
+        Some(_) => differenced_states(case, model_clock_span(case, span), difference)
+            .unwrap_or_else(|| recorded_states(&case.model_side(), model_clock_span(case, span), difference)),
+        None => model_states(case, model_clock_span(case, span)),
     };
-    Part { name: span.name.clone(), measured: measured.unwrap_or_default(), model }
+    PortraitPart { name: span.name.clone(), measured: measured.unwrap_or_default(), model }
 }
 
 /// States of the model with velocities that are the same difference of its path as those of the recording, at
 /// every sample instead of every frame; `None` where its samples are too far apart for that.
-fn differences(case: &Case, (from_s, to_s): (f64, f64), difference: Difference) -> Option<Vec<State>> {
+fn differenced_states(
+    case: &ConditionComparison,
+    (from_s, to_s): (f64, f64),
+    difference: CentralDifference,
+) -> Option<Vec<PhasePoint>> {
     let fine = &case.model.motion.fine;
-    let half_s = difference.half_s();
+    let half_s = difference.half_width_s();
     let [first, second, ..] = fine.as_slice() else { return None };
     if SAMPLES_APART * (second.time_s - first.time_s) > half_s {
         return None;
@@ -204,39 +225,48 @@ fn differences(case: &Case, (from_s, to_s): (f64, f64), difference: Difference) 
         let share = (time_s - a.time_s) / (b.time_s - a.time_s);
         Some(a.tip_x_m + share * (b.tip_x_m - a.tip_x_m))
     };
-    let state = |s: &Sample| {
+    let state = |s: &ModelSample| {
         let way_m = place_m(s.time_s + half_s)? - place_m(s.time_s - half_s)?;
         Some((s.tip_x_m - s.head_x_m, way_m / (2.0 * half_s)))
     };
-    Some(case.model.motion.between([from_s, to_s]).iter().map(state).collect())
+    Some(case.model.motion.fine_samples_between([from_s, to_s]).iter().map(state).collect())
 }
 
 /// States of the model itself.
-fn exact(case: &Case, (from_s, to_s): (f64, f64)) -> Vec<State> {
-    let state = |s: &Sample| Some((s.tip_x_m - s.head_x_m, s.tip_velocity_m_per_s));
-    case.model.motion.between([from_s, to_s]).iter().map(state).collect()
+fn model_states(case: &ConditionComparison, (from_s, to_s): (f64, f64)) -> Vec<PhasePoint> {
+    let state = |s: &ModelSample| Some((s.tip_x_m - s.head_x_m, s.tip_velocity_m_per_s));
+    case.model.motion.fine_samples_between([from_s, to_s]).iter().map(state).collect()
 }
 
 /// States as the frames of a camera give them.
-fn recorded(side: &Side, span_s: (f64, f64), difference: Difference) -> Vec<State> {
-    let frames = side.between(span_s);
+fn recorded_states(
+    side: &TimedRecording,
+    span_s: (f64, f64),
+    difference: CentralDifference,
+) -> Vec<PhasePoint> {
+    let frames = side.frames_between(span_s);
     let (deflection, tip) = (side.samples(Channel::Deflection), side.samples(Channel::TipX));
     let part = |samples: &[Option<f64>]| samples.get(frames.clone()).unwrap_or_default().to_vec();
-    difference.states(&part(&deflection), &part(&tip))
+    difference.phase_points(&part(&deflection), &part(&tip))
 }
 
-fn words(case: &Case, spans: &[Span], taken: &Taken, measured: bool) -> Words {
+fn figure_text(
+    case: &ConditionComparison,
+    spans: &[PortraitSpan],
+    taken: &VelocityEstimate,
+    measured: bool,
+) -> Words {
     let said: Vec<String> = spans.iter().map(|span| span.said.clone()).collect();
     let source = match case.recording() {
         Some(_) if !measured => format!(
             "the fitted model alone, as {} shows no velocity with its deflection there",
-            case.source()
+            case.source_name()
         ),
-        _ => case.source(),
+        _ => case.source_name(),
     };
-    let details = format!("Velocity of the tip over deflection in {}: {source}", listed(&said));
+    let details = format!("Velocity of the tip over deflection in {}: {source}", join_with_and(&said));
     let details = match case.recording().filter(|_| measured) {
-        Some(_) => format!("{details} and the fitted model through the same camera. {}", taken.said()),
+        Some(_) => format!("{details} and the fitted model through the same camera. {}", taken.describe()),
         None => format!("{details}; its own states, with no camera between."),
     };
     let whose = if measured {
@@ -251,10 +281,10 @@ fn words(case: &Case, spans: &[Span], taken: &Taken, measured: bool) -> Words {
     Words { caption, details }
 }
 
-impl Taken {
+impl VelocityEstimate {
     /// How the velocities were taken, and how far the noise moves them.
-    fn said(&self) -> String {
-        let Difference { half_frames, .. } = self.difference;
+    fn describe(&self) -> String {
+        let CentralDifference { half_frames, .. } = self.difference;
         let frames = if half_frames == 1 {
             "in the frames before and after".to_owned()
         } else {
@@ -263,30 +293,30 @@ impl Taken {
         let passes = self.fastest_hz.map_or_else(String::new, |hz| {
             format!(
                 ", which leaves {} of a velocity that swings at {} Hz",
-                percent(self.difference.passes(hz)),
-                digits(hz, 3)
+                format_percent(self.difference.velocity_gain(hz)),
+                format_digits(hz, 3)
             )
         });
-        let apart_ms = digits(1e3 * self.difference.apart_s(), 2);
+        let apart_ms = format_digits(1e3 * self.difference.frame_gap_s(), 2);
         format!(
             "Both velocities are the difference of the tip's places {frames}, {apart_ms} ms apart{passes}{}.",
-            self.noise()
+            self.describe_noise()
         )
     }
 
-    fn noise(&self) -> String {
+    fn describe_noise(&self) -> String {
         let Some(noise_m) = self.noise_m else { return String::new() };
         let noise = self.difference.noise_m_per_s(noise_m);
         let of_swing = self.swing_m_per_s.map_or_else(String::new, |swing| {
-            let share = format!(", {} of the least of the model's swings", percent(noise / swing));
+            let share = format!(", {} of the least of the model's swings", format_percent(noise / swing));
             let why = match self.fastest_hz {
                 Some(_) => "a longer difference would be quieter, but not follow the fastest component",
                 None => {
                     "a longer difference would be quieter, but no frequency is known that it has to follow"
                 }
             };
-            if noise > MOST_NOISE * swing {
-                format!("{share}, which is more than {}: {why}", percent(MOST_NOISE))
+            if noise > MAX_VELOCITY_NOISE * swing {
+                format!("{share}, which is more than {}: {why}", format_percent(MAX_VELOCITY_NOISE))
             } else {
                 share
             }
@@ -294,7 +324,7 @@ impl Taken {
         format!(
             "; the tracking noise of the recorded tip makes that uncertain by {} (one standard \
              deviation){of_swing}",
-            speed(noise)
+            format_speed(noise)
         )
     }
 }

@@ -1,65 +1,68 @@
 //! The residual of a condition against white noise.
 
-use super::{Diagnostics, figure};
-use crate::compare::Case;
+use super::{ResidualDiagnostics, draw_figure};
+use crate::compare::ConditionComparison;
 use crate::figures::{FigureBlock, Words};
 use crate::spectrum::Multitaper;
-use crate::text::{decimals, digits};
+use crate::text::{format_decimals, format_digits};
 
 /// Bins of the histogram, and deviations to either side that it holds at least.
-const BINS: usize = 40;
-const LEAST_END: f64 = 4.0;
+const HISTOGRAM_BINS: usize = 40;
+const MIN_HISTOGRAM_RANGE: f64 = 4.0;
 /// Longest lag, frames, and share of the recording that it may be.
-const LAGS: usize = 60;
-const LONGEST_LAG: f64 = 0.25;
+const MAX_LAGS: usize = 60;
+const MAX_LAG_FRACTION: f64 = 0.25;
 /// Fewest frames of which anything is said.
-const FEWEST: usize = 50;
+const MIN_FRAMES: usize = 50;
 /// Most points of the spectrum: neighbours are one, by their mean.
-const MOST_POINTS: usize = 300;
+const MAX_SPECTRUM_POINTS: usize = 300;
 /// Tapers of the spectrum: its values scatter by a quarter.
 const TAPERS: usize = 9;
 /// Deviations of a two-sided 95 % interval.
 const Z_95: f64 = 1.96;
 /// Correlation of neighbours and size, over those of white noise, up to which a residual looks like noise.
-const ALIKE: f64 = 0.1;
+const WHITE_NOISE_TOLERANCE: f64 = 0.1;
 
 /// The figure of a condition; none without a recording, or where the two cannot agree.
-pub(crate) fn block(case: &Case) -> Option<FigureBlock> {
+pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let residual = case.residual.as_ref()?;
-    let (channel, noise_m) = case.judged()?;
+    let (channel, noise_m) = case.judged_channel()?;
     let left: Vec<Option<f64>> = residual.column(channel).iter().map(|x| x.map(|x| x / noise_m)).collect();
     let values: Vec<f64> = left.iter().flatten().copied().collect();
-    if values.len() < FEWEST {
+    if values.len() < MIN_FRAMES {
         return None;
     }
     let rate_hz = case.recording()?.grid().frame_rate_hz;
     let rms = (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
-    let correlation = correlation(&left, rate_hz);
+    let correlation = autocorrelation(&left, rate_hz);
     let neighbours = correlation.first()?.1;
     let stages = case.result.misfit.iter().flat_map(|misfit| &misfit.stages);
-    let shown = Diagnostics {
-        title: claim(rms, neighbours),
+    let shown = ResidualDiagnostics {
+        title: claim_sentence(rms, neighbours),
         note: format!("residual of the {} in one run of the model", channel.label()),
-        synthetic: case.synthetic(),
-        histogram: histogram(&values),
+        synthetic: case.is_synthetic(),
+        histogram: histogram_bins(&values),
         correlation,
         white_95: Z_95 / (values.len() as f64).sqrt(),
-        spectrum: spectrum(&left, rate_hz),
+        spectrum: power_density(&left, rate_hz),
         growth: stages
             .map(|stage| (stage.segment_s, stage.chi2_per_dof))
             .filter(|(_, chi2)| chi2.is_finite())
             .collect(),
     };
-    let caption =
-        format!("{}; that of white noise lies within \u{b1}{}.", shown.title, decimals(shown.white_95, 2));
+    let caption = format!(
+        "{}; that of white noise lies within \u{b1}{}.",
+        shown.title,
+        format_decimals(shown.white_95, 2)
+    );
     let growth = match (shown.growth.first(), shown.growth.last()) {
         (Some(first), Some(last)) => format!(
             " Restarted in segments, as it is fitted, the model has a chi2 per degree of freedom of {} at {} ms \
              and {} at {} ms; one that does not grow speaks for the model.",
-            digits(first.1, 3),
-            digits(1e3 * first.0, 2),
-            digits(last.1, 3),
-            digits(1e3 * last.0, 2)
+            format_digits(first.1, 3),
+            format_digits(1e3 * first.0, 2),
+            format_digits(last.1, 3),
+            format_digits(1e3 * last.0, 2)
         ),
         _ => String::new(),
     };
@@ -69,23 +72,27 @@ pub(crate) fn block(case: &Case) -> Option<FigureBlock> {
          that of the noise ({TAPERS} tapers).{growth}",
         channel.label()
     );
-    Some(case.block("residuals", Words { caption, details }, figure(&shown)))
+    Some(case.figure_block("residuals", Words { caption, details }, draw_figure(&shown)))
 }
 
 /// The claim with its numbers.
-fn claim(rms: f64, neighbours: f64) -> String {
-    let is = if rms < 1.0 + ALIKE && neighbours.abs() < ALIKE { "like white" } else { "more than" };
-    let (size, r) = (digits(rms, 2), decimals(neighbours, 2));
+fn claim_sentence(rms: f64, neighbours: f64) -> String {
+    let is = if rms < 1.0 + WHITE_NOISE_TOLERANCE && neighbours.abs() < WHITE_NOISE_TOLERANCE {
+        "like white"
+    } else {
+        "more than"
+    };
+    let (size, r) = (format_digits(rms, 2), format_decimals(neighbours, 2));
     format!("The residual is {is} noise: {size} times its size, correlation {r}")
 }
 
 /// Density of the values in bins from the least to the greatest end, the same on both sides.
-fn histogram(values: &[f64]) -> Vec<(f64, f64, f64)> {
-    let end = values.iter().map(|x| x.abs()).filter(|x| x.is_finite()).fold(LEAST_END, f64::max);
-    let width = 2.0 * end / BINS as f64;
-    let mut counts = vec![0usize; BINS];
+fn histogram_bins(values: &[f64]) -> Vec<(f64, f64, f64)> {
+    let end = values.iter().map(|x| x.abs()).filter(|x| x.is_finite()).fold(MIN_HISTOGRAM_RANGE, f64::max);
+    let width = 2.0 * end / HISTOGRAM_BINS as f64;
+    let mut counts = vec![0usize; HISTOGRAM_BINS];
     for value in values.iter().filter(|x| x.is_finite()) {
-        let bin = (((value + end) / width) as usize).min(BINS - 1);
+        let bin = (((value + end) / width) as usize).min(HISTOGRAM_BINS - 1);
         if let Some(count) = counts.get_mut(bin) {
             *count += 1;
         }
@@ -98,12 +105,12 @@ fn histogram(values: &[f64]) -> Vec<(f64, f64, f64)> {
 }
 
 /// Correlation at every lag from one frame on, over the pairs of frames that were both compared.
-fn correlation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
+fn autocorrelation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     let values = || left.iter().flatten();
     let count = values().count().max(1) as f64;
     let mean = values().sum::<f64>() / count;
     let variance = values().map(|x| (x - mean) * (x - mean)).sum::<f64>() / count;
-    let longest = LAGS.min((LONGEST_LAG * left.len() as f64) as usize);
+    let longest = MAX_LAGS.min((MAX_LAG_FRACTION * left.len() as f64) as usize);
     let at = |lag: usize| {
         let both = left.iter().zip(left.get(lag..)?);
         let pairs: Vec<f64> = both.filter_map(|(a, b)| Some(((*a)? - mean) * ((*b)? - mean))).collect();
@@ -114,8 +121,8 @@ fn correlation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
 }
 
 /// Power density over that of white noise of unit size, in few points.
-fn spectrum(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
-    let Ok(found) = Multitaper::of(left, rate_hz, left.len(), TAPERS) else { return Vec::new() };
+fn power_density(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
+    let Ok(found) = Multitaper::new(left, rate_hz, left.len(), TAPERS) else { return Vec::new() };
     let white = 2.0 / rate_hz;
     let bins: Vec<(f64, f64)> = found
         .frequency_hz
@@ -128,7 +135,7 @@ fn spectrum(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
         let count = group.len() as f64;
         (group.iter().map(|p| p.0).sum::<f64>() / count, group.iter().map(|p| p.1).sum::<f64>() / count)
     };
-    bins.chunks(bins.len().div_ceil(MOST_POINTS).max(1)).map(mean).collect()
+    bins.chunks(bins.len().div_ceil(MAX_SPECTRUM_POINTS).max(1)).map(mean).collect()
 }
 
 #[cfg(test)]
@@ -148,12 +155,13 @@ mod tests {
     fn white_noise_looks_like_white_noise() {
         let left = noise(6000);
         let values: Vec<f64> = left.iter().flatten().copied().collect();
-        let total: f64 = histogram(&values).iter().map(|(from, to, density)| (to - from) * density).sum();
+        let total: f64 =
+            histogram_bins(&values).iter().map(|(from, to, density)| (to - from) * density).sum();
         assert!((total - 1.0).abs() < 1e-9, "{total}");
         let inside = |(_, r): &&(f64, f64)| r.abs() < Z_95 / (values.len() as f64).sqrt();
-        let found = correlation(&left, 5000.0);
-        assert!(found.len() == LAGS && found.iter().filter(inside).count() >= 53, "{found:?}");
-        let powers = spectrum(&left, 5000.0);
+        let found = autocorrelation(&left, 5000.0);
+        assert!(found.len() == MAX_LAGS && found.iter().filter(inside).count() >= 53, "{found:?}");
+        let powers = power_density(&left, 5000.0);
         let mean = powers.iter().map(|p| p.1).sum::<f64>() / powers.len() as f64;
         assert!((mean - 1.0).abs() < 0.06, "{mean}");
     }
@@ -161,9 +169,9 @@ mod tests {
     #[test]
     fn a_swing_is_found_with_its_memory_and_its_frequency() {
         let left: Vec<Option<f64>> = (0..4000).map(|i| Some(3.0 * (0.9 * f64::from(i)).sin())).collect();
-        assert!((correlation(&left, 5000.0)[0].1 - 0.9_f64.cos()).abs() < 0.01);
-        let top = spectrum(&left, 5000.0).into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        assert!((autocorrelation(&left, 5000.0)[0].1 - 0.9_f64.cos()).abs() < 0.01);
+        let top = power_density(&left, 5000.0).into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
         assert!((top.0 - 0.9 * 5000.0 / std::f64::consts::TAU).abs() < 20.0 && top.1 > 50.0, "{top:?}");
-        assert!(claim(2.1, 0.6).contains("more than noise: 2.1 times its size, correlation 0.60"));
+        assert!(claim_sentence(2.1, 0.6).contains("more than noise: 2.1 times its size, correlation 0.60"));
     }
 }

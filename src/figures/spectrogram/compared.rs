@@ -2,14 +2,14 @@
 //! over speed.
 
 use super::{
-    FULL_WIDTH_MM, Figure, RidgePoint, Spectrogram, SpeedPoint, colours_db, in_decibels, map, span, subtitle,
-    targets, within,
+    FULL_WIDTH_MM, Figure, SpectrogramPlot, SpectrogramRidgePoint, SpeedPoint, colour_range_db, decibel_map,
+    draw_map, limit_axis, subtitle, targets, time_span,
 };
-use crate::chart::{Axis, Bar, Colour, Mark, Panel, Series, Shape};
+use crate::chart::{ChartAxis, Colour, ErrorBar, Mark, MarkerShape, Panel, Series};
 
 /// Whose spectrogram it is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Of {
+pub enum SpectrogramSide {
     /// Of the recording.
     Measured,
     /// Of the model.
@@ -18,7 +18,7 @@ pub enum Of {
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Compared {
+pub struct SpectrogramComparison {
     /// Heading.
     pub title: String,
     /// How they were made; empty for none.
@@ -26,7 +26,7 @@ pub struct Compared {
     /// Whether the measured motion is one that no camera took.
     pub synthetic: bool,
     /// One or both, over the same frequencies; the first sets the colours.
-    pub sides: Vec<(Of, Spectrogram)>,
+    pub sides: Vec<(SpectrogramSide, SpectrogramPlot)>,
 }
 
 /// Heights of the maps and of the ridges under them, mm.
@@ -37,7 +37,7 @@ const MOST_COLUMNS: usize = 64;
 const MOST_ROWS: usize = 48;
 const MILLIMETRES: f64 = 1e3;
 
-impl Of {
+impl SpectrogramSide {
     fn name(self) -> &'static str {
         match self {
             Self::Measured => "measured",
@@ -52,30 +52,37 @@ impl Of {
         }
     }
 
-    fn shape(self) -> Shape {
+    fn shape(self) -> MarkerShape {
         match self {
-            Self::Measured => Shape::Disc,
-            Self::Model => Shape::Square,
+            Self::Measured => MarkerShape::Disc,
+            Self::Model => MarkerShape::Square,
         }
     }
 }
 
 /// The figure.
 #[must_use]
-pub fn compared(shown: &Compared) -> Figure {
-    let sides: Vec<(Of, Spectrogram)> = shown.sides.iter().map(|(of, s)| (*of, coarse(s))).collect();
-    let range = sides.first().and_then(|(_, s)| colours_db(&in_decibels(&s.amplitude_m)));
-    let time = within(Axis::time(), whole_s(&sides));
+pub fn draw_comparison(shown: &SpectrogramComparison) -> Figure {
+    let sides: Vec<(SpectrogramSide, SpectrogramPlot)> =
+        shown.sides.iter().map(|(of, s)| (*of, coarsen_spectrogram(s))).collect();
+    let range = sides.first().and_then(|(_, s)| colour_range_db(&decibel_map(&s.amplitude_m)));
+    let time = limit_axis(ChartAxis::time(), common_span_s(&sides));
     let mut panels: Vec<Panel> = sides
         .iter()
-        .map(|(of, s)| titled(map(s), *of, range, shown.sides.len() > 1 && *of == Of::Measured))
+        .map(|(of, s)| {
+            title_panel(draw_map(s), *of, range, shown.sides.len() > 1 && *of == SpectrogramSide::Measured)
+        })
         .collect();
     panels.iter_mut().for_each(|panel| panel.x = time.clone());
-    panels.extend([over_time(&shown.sides, time), over_speed(&shown.sides)].into_iter().flatten());
+    panels.extend(
+        [draw_ridges_over_time(&shown.sides, time), draw_ridges_over_speed(&shown.sides)]
+            .into_iter()
+            .flatten(),
+    );
     Figure {
         title: shown.title.clone(),
         subtitle: subtitle(shown.synthetic, &shown.note),
-        synthetic: shown.synthetic,
+        watermarked: shown.synthetic,
         description: "Spectrograms: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m, with \
         the ridges that were followed."
             .to_owned(),
@@ -87,23 +94,23 @@ pub fn compared(shown: &Compared) -> Figure {
 
 /// From the first column of either side to the last: with one axis of time, panels one below the other are
 /// numbered once.
-fn whole_s(sides: &[(Of, Spectrogram)]) -> Option<(f64, f64)> {
-    sides.iter().filter_map(|(_, s)| span(&s.time_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+fn common_span_s(sides: &[(SpectrogramSide, SpectrogramPlot)]) -> Option<(f64, f64)> {
+    sides.iter().filter_map(|(_, s)| time_span(&s.time_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
 }
 
-fn titled(panel: Panel, of: Of, range: Option<(f64, f64)>, without_bar: bool) -> Panel {
-    let heat = panel.heat.map(|heat| super::Heat {
+fn title_panel(panel: Panel, of: SpectrogramSide, range: Option<(f64, f64)>, without_bar: bool) -> Panel {
+    let heat = panel.heat_map.map(|heat| super::HeatMap {
         range,
         without_bar,
         label: "amplitude, dB re 1 \u{b5}m".to_owned(),
         ..heat
     });
-    Panel { title: of.name().to_owned(), heat, height_mm: HEIGHT_MM, ..panel }
+    Panel { title: of.name().to_owned(), heat_map: heat, height_mm: HEIGHT_MM, ..panel }
 }
 
 /// Neighbouring columns and rows as one, with the largest of their amplitudes, so that a thin line stays; the
 /// frequencies outside what is shown are left out.
-fn coarse(shown: &Spectrogram) -> Spectrogram {
+fn coarsen_spectrogram(shown: &SpectrogramPlot) -> SpectrogramPlot {
     let (low, high) = shown.shown_hz.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
     let from = shown.frequency_hz.partition_point(|f| *f < low);
     let to = shown.frequency_hz.partition_point(|f| *f <= high).max(from);
@@ -119,17 +126,17 @@ fn coarse(shown: &Spectrogram) -> Spectrogram {
         };
         (from..to).step_by(rows).map(row).collect()
     };
-    Spectrogram {
+    SpectrogramPlot {
         time_s: shown.time_s.chunks(columns).map(mean).collect(),
         frequency_hz: shown.frequency_hz.get(from..to).unwrap_or_default().chunks(rows).map(mean).collect(),
         amplitude_m: shown.amplitude_m.chunks(columns).map(block).collect(),
-        ridge: few(&shown.ridge),
+        ridge: thin_ridge(&shown.ridge),
         ..shown.clone()
     }
 }
 
 /// Points of a ridge that stand apart on a map, with its interruptions.
-fn few(ridge: &[RidgePoint]) -> Vec<RidgePoint> {
+fn thin_ridge(ridge: &[SpectrogramRidgePoint]) -> Vec<SpectrogramRidgePoint> {
     let every = ridge.len().div_ceil(MOST_COLUMNS).max(1);
     ridge
         .iter()
@@ -140,12 +147,12 @@ fn few(ridge: &[RidgePoint]) -> Vec<RidgePoint> {
 }
 
 /// Both ridges over time.
-fn over_time(sides: &[(Of, Spectrogram)], time: Axis) -> Option<Panel> {
-    let place = |p: &RidgePoint| p.frequency_hz.map(|f| (p.time_s, f));
-    let line = |(of, shown): &(Of, Spectrogram)| Series {
+fn draw_ridges_over_time(sides: &[(SpectrogramSide, SpectrogramPlot)], time: ChartAxis) -> Option<Panel> {
+    let place = |p: &SpectrogramRidgePoint| p.frequency_hz.map(|f| (p.time_s, f));
+    let line = |(of, shown): &(SpectrogramSide, SpectrogramPlot)| Series {
         label: format!("ridge, {}", of.name()),
         colour: of.colour(),
-        mark: if *of == Of::Measured { Mark::Thin } else { Mark::Thick },
+        mark: if *of == SpectrogramSide::Measured { Mark::Thin } else { Mark::Thick },
         points: shown.ridge.iter().map(place).collect(),
         ..Series::default()
     };
@@ -156,32 +163,32 @@ fn over_time(sides: &[(Of, Spectrogram)], time: Axis) -> Option<Panel> {
     (!ridges.is_empty()).then(|| Panel {
         title: "ridge over time".to_owned(),
         x: time,
-        y: Axis::linear("frequency, Hz"),
+        y: ChartAxis::linear("frequency, Hz"),
         height_mm: RIDGE_HEIGHT_MM,
-        series: targets::over_ridges(targets).chain(ridges).collect(),
+        series: targets::target_lines_over_ridges(targets).chain(ridges).collect(),
         ..Panel::default()
     })
 }
 
 /// Both ridges over the speed of the tip.
-fn over_speed(sides: &[(Of, Spectrogram)]) -> Option<Panel> {
+fn draw_ridges_over_speed(sides: &[(SpectrogramSide, SpectrogramPlot)]) -> Option<Panel> {
     let place = |p: &SpeedPoint| (p.tip_speed_m_per_s * MILLIMETRES, p.frequency_hz);
     let bar = |p: &SpeedPoint| {
         let ((x, f), sd) = (place(p), p.frequency_sd_hz?);
-        Some(Bar::Vertical { x, from: f - 2.0 * sd, to: f + 2.0 * sd })
+        Some(ErrorBar::Vertical { x, from: f - 2.0 * sd, to: f + 2.0 * sd })
     };
-    let symbols = |(of, shown): &(Of, Spectrogram)| Series {
+    let symbols = |(of, shown): &(SpectrogramSide, SpectrogramPlot)| Series {
         label: format!("{} \u{b1} 2 sd", of.name()),
         colour: of.colour(),
         mark: Mark::Hollow(of.shape()),
         points: shown.over_speed.iter().map(|p| Some(place(p))).collect(),
-        bars: shown.over_speed.iter().filter_map(bar).collect(),
+        error_bars: shown.over_speed.iter().filter_map(bar).collect(),
     };
     let series: Vec<Series> = sides.iter().rev().map(symbols).filter(|s| !s.points.is_empty()).collect();
     (!series.is_empty()).then(|| Panel {
         title: "ridge over tip speed".to_owned(),
-        x: Axis::linear("tip speed, mm/s"),
-        y: Axis::linear("frequency, Hz"),
+        x: ChartAxis::linear("tip speed, mm/s"),
+        y: ChartAxis::linear("frequency, Hz"),
         height_mm: RIDGE_HEIGHT_MM,
         series,
         ..Panel::default()
@@ -193,7 +200,7 @@ mod tests {
     use super::*;
     use crate::chart::Medium;
 
-    fn shown(columns: usize, scale: f64) -> Spectrogram {
+    fn shown(columns: usize, scale: f64) -> SpectrogramPlot {
         let column = |i: usize| {
             (0..1000)
                 .map(|j| {
@@ -208,13 +215,13 @@ mod tests {
                 })
                 .collect()
         };
-        Spectrogram {
+        SpectrogramPlot {
             time_s: (0..columns).map(|i| i as f64 * 0.01).collect(),
             frequency_hz: (0..1000).map(|j| f64::from(j) * 2.5).collect(),
             amplitude_m: (0..columns).map(column).collect(),
             shown_hz: Some((0.0, 2000.0)),
             ridge: (0..columns)
-                .map(|i| RidgePoint { time_s: i as f64 * 0.01, frequency_hz: Some(1000.0) })
+                .map(|i| SpectrogramRidgePoint { time_s: i as f64 * 0.01, frequency_hz: Some(1000.0) })
                 .collect(),
             over_speed: (0..columns)
                 .map(|i| SpeedPoint {
@@ -223,21 +230,24 @@ mod tests {
                     frequency_sd_hz: Some(5.0),
                 })
                 .collect(),
-            ..Spectrogram::default()
+            ..SpectrogramPlot::default()
         }
     }
 
-    fn both() -> Compared {
-        Compared {
-            sides: vec![(Of::Measured, shown(200, 1.0)), (Of::Model, shown(200, 0.1))],
-            ..Compared::default()
+    fn both() -> SpectrogramComparison {
+        SpectrogramComparison {
+            sides: vec![
+                (SpectrogramSide::Measured, shown(200, 1.0)),
+                (SpectrogramSide::Model, shown(200, 0.1)),
+            ],
+            ..SpectrogramComparison::default()
         }
     }
 
     #[test]
     fn both_maps_have_one_scale_and_one_bar() {
-        let drawn = compared(&both());
-        let heats: Vec<_> = drawn.panels.iter().filter_map(|p| p.heat.as_ref()).collect();
+        let drawn = draw_comparison(&both());
+        let heats: Vec<_> = drawn.panels.iter().filter_map(|p| p.heat_map.as_ref()).collect();
         assert_eq!(heats.iter().map(|h| h.without_bar).collect::<Vec<_>>(), [true, false]);
         assert!(heats[0].range.is_some() && heats[0].range == heats[1].range);
         assert_eq!(
@@ -248,9 +258,17 @@ mod tests {
 
     #[test]
     fn the_model_alone_has_its_own_bar() {
-        let drawn = compared(&Compared { sides: both().sides.split_off(1), ..Compared::default() });
+        let drawn = draw_comparison(&SpectrogramComparison {
+            sides: both().sides.split_off(1),
+            ..SpectrogramComparison::default()
+        });
         assert_eq!(
-            drawn.panels.iter().filter_map(|p| p.heat.as_ref()).map(|h| h.without_bar).collect::<Vec<_>>(),
+            drawn
+                .panels
+                .iter()
+                .filter_map(|p| p.heat_map.as_ref())
+                .map(|h| h.without_bar)
+                .collect::<Vec<_>>(),
             [false]
         );
         assert_eq!(drawn.panels.len(), 3);
@@ -258,7 +276,7 @@ mod tests {
 
     #[test]
     fn coarse_maps_keep_thin_lines_within_what_is_shown() {
-        let small = coarse(&shown(200, 1.0));
+        let small = coarsen_spectrogram(&shown(200, 1.0));
         assert!(small.time_s.len() <= MOST_COLUMNS && small.frequency_hz.len() <= MOST_ROWS);
         assert!(small.frequency_hz.iter().all(|f| *f <= 2000.0));
         assert!(
@@ -272,11 +290,14 @@ mod tests {
     #[test]
     fn the_figure_is_small_in_every_medium() {
         for medium in [Medium::Screen, Medium::Column, Medium::Page] {
-            let bytes = compared(&Compared {
-                sides: vec![(Of::Measured, shown(400, 1.0)), (Of::Model, shown(400, 0.1))],
+            let bytes = draw_comparison(&SpectrogramComparison {
+                sides: vec![
+                    (SpectrogramSide::Measured, shown(400, 1.0)),
+                    (SpectrogramSide::Model, shown(400, 0.1)),
+                ],
                 ..both()
             })
-            .svg(medium)
+            .to_svg(medium)
             .len();
             assert!(bytes < 210_000, "{medium:?}: {bytes} bytes");
         }

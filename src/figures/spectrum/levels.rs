@@ -1,11 +1,11 @@
 //! Noise floor, leakage and interval of a spectrum.
 
-use super::{Curve, MICROMETRES, Spectra};
+use super::{MICROMETRES, SpectraPlot, SpectrumCurve};
 use crate::chart::{Colour, Mark, Ribbon, Series};
 
 /// A level over frequency.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Level {
+pub struct SpectrumLevel {
     /// Frequencies, Hz.
     pub frequency_hz: Vec<f64>,
     /// Amplitudes, m.
@@ -14,7 +14,7 @@ pub struct Level {
 
 /// An interval of amplitudes over frequency.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Interval {
+pub struct AmplitudeInterval {
     /// Frequencies, Hz.
     pub frequency_hz: Vec<f64>,
     /// Lower ends, m.
@@ -23,7 +23,7 @@ pub struct Interval {
     pub upper_m: Vec<f64>,
 }
 
-impl Level {
+impl SpectrumLevel {
     /// The lowest positive level from a frequency on, m.
     pub(super) fn lowest_m(&self, lowest_hz: f64) -> Option<f64> {
         let shown = self
@@ -39,11 +39,11 @@ impl Level {
 /// mean square of the noise: `sqrt(-ln 0.05)`, as its magnitude follows Rayleigh's law.
 const CIRCLE_95: f64 = 1.730_818_382_602_285_7;
 
-impl Interval {
+impl AmplitudeInterval {
     /// What noise of a level leaves open of every amplitude of a curve: the true one lies in it in 95 % of
     /// the bins at least, and where it reaches down to zero the bin may hold noise alone.
     #[must_use]
-    pub fn of(curve: &Curve, floor: &Level) -> Self {
+    pub fn from_noise_floor(curve: &SpectrumCurve, floor: &SpectrumLevel) -> Self {
         let ends = |sign: f64| {
             let end = |(a, noise_m): (&f64, &f64)| (a + sign * CIRCLE_95 * noise_m).max(0.0);
             curve.amplitude_m.iter().zip(&floor.amplitude_m).map(end).collect()
@@ -67,19 +67,20 @@ impl Interval {
 }
 
 /// Points in the units of the axes.
-pub(super) fn points(frequency_hz: &[f64], amplitude_m: &[f64]) -> Vec<Option<(f64, f64)>> {
+pub(super) fn axis_points(frequency_hz: &[f64], amplitude_m: &[f64]) -> Vec<Option<(f64, f64)>> {
     frequency_hz.iter().zip(amplitude_m).map(|(f, a)| Some((*f, a * MICROMETRES))).collect()
 }
 
 /// Noise floor and leakage, which lie under the spectra.
-pub(super) fn levels(spectra: &Spectra, highest: f64) -> Vec<Series> {
+pub(super) fn level_series(spectra: &SpectraPlot, highest: f64) -> Vec<Series> {
     let constant = spectra
         .noise_floor_m
         .filter(|f| *f > 0.0)
         .map(|floor_m| [spectra.lowest_hz, highest].map(|f| Some((f, floor_m * MICROMETRES))).to_vec());
-    let floor = spectra.noise_floor.as_ref().map(|l| points(&l.frequency_hz, &l.amplitude_m)).or(constant);
+    let floor =
+        spectra.noise_floor.as_ref().map(|l| axis_points(&l.frequency_hz, &l.amplitude_m)).or(constant);
     let floor = floor.map(|points| ("noise floor of the recording", Colour::Grey, Mark::Dotted, points));
-    let leakage = spectra.leakage.as_ref().map(|l| points(&l.frequency_hz, &l.amplitude_m));
+    let leakage = spectra.leakage.as_ref().map(|l| axis_points(&l.frequency_hz, &l.amplitude_m));
     let leakage =
         leakage.map(|points| ("leakage of the removed flip", Colour::Orange, Mark::ThinDashed, points));
     let drawn = floor.into_iter().chain(leakage);
@@ -89,7 +90,7 @@ pub(super) fn levels(spectra: &Spectra, highest: f64) -> Vec<Series> {
             colour,
             mark,
             points,
-            bars: Vec::new(),
+            error_bars: Vec::new(),
         })
         .collect()
 }

@@ -1,13 +1,13 @@
 //! Components with their uncertainty as symbols with error bars, and their names.
 
 use super::MICROMETRES;
-use crate::chart::{Bar, Colour, Mark, Rule, Series, Shape};
-use crate::text::{trimmed, with_sd};
+use crate::chart::{Colour, ErrorBar, Mark, MarkerShape, Series, VerticalLine};
+use crate::text::{format_trimmed, format_with_sd};
 
 /// A component as it is shown: frequency and amplitude with two standard deviations either side, or the range
 /// of one that drifts.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Named {
+pub struct LabelledComponent {
     /// Frequency, Hz.
     pub frequency_hz: f64,
     /// Its standard deviation, Hz.
@@ -22,12 +22,12 @@ pub struct Named {
     pub remark: String,
 }
 
-impl Named {
+impl LabelledComponent {
     /// Its frequency with the deviation in units of the last digit, and what is wrong with it.
-    pub(crate) fn name(&self) -> String {
+    pub(crate) fn label_text(&self) -> String {
         let frequency = match self.range_hz {
-            Some((low, high)) => format!("{} to {} Hz", trimmed(low, 4), trimmed(high, 4)),
-            None => format!("{} Hz", with_sd(self.frequency_hz, self.frequency_sd_hz)),
+            Some((low, high)) => format!("{} to {} Hz", format_trimmed(low, 4), format_trimmed(high, 4)),
+            None => format!("{} Hz", format_with_sd(self.frequency_hz, self.frequency_sd_hz)),
         };
         if self.remark.is_empty() { frequency } else { format!("{frequency}, {}", self.remark) }
     }
@@ -37,15 +37,15 @@ impl Named {
     }
 
     /// Frequency, Hz, and amplitude, micrometres.
-    fn point(&self) -> (f64, f64) {
+    fn axis_point(&self) -> (f64, f64) {
         (self.frequency_hz, self.amplitude_m * MICROMETRES)
     }
 
-    fn bars(&self) -> [Bar; 2] {
-        let (x, y) = self.point();
+    fn error_bars(&self) -> [ErrorBar; 2] {
+        let (x, y) = self.axis_point();
         let (dx, dy) = (2.0 * self.frequency_sd_hz, 2.0 * self.amplitude_sd_m * MICROMETRES);
         let (from, to) = self.range_hz.unwrap_or((x - dx, x + dx));
-        [Bar::Horizontal { y, from, to }, Bar::Vertical { x, from: y - dy, to: y + dy }]
+        [ErrorBar::Horizontal { y, from, to }, ErrorBar::Vertical { x, from: y - dy, to: y + dy }]
     }
 
     /// Upper end of the amplitude's error bar, m.
@@ -56,40 +56,43 @@ impl Named {
 }
 
 /// Look of the components of one source: entry in the legend, colour, shape.
-type Look = (&'static str, Colour, Shape);
+type ComponentLook = (&'static str, Colour, MarkerShape);
 /// One without a remark, and one with, where there is but one source.
-const ALONE: [Look; 2] = [
-    ("component \u{b1} 2 sd", Colour::Blue, Shape::Disc),
-    ("component that is not clear", Colour::Vermilion, Shape::Diamond),
+const ALONE: [ComponentLook; 2] = [
+    ("component \u{b1} 2 sd", Colour::Blue, MarkerShape::Disc),
+    ("component that is not clear", Colour::Vermilion, MarkerShape::Diamond),
 ];
 /// The same of a recording next to a model, whose line is vermilion.
-const MEASURED: [Look; 2] = [
-    ("measured \u{b1} 2 sd", Colour::Black, Shape::Disc),
-    ("measured, not clear", Colour::Black, Shape::Diamond),
+const MEASURED: [ComponentLook; 2] = [
+    ("measured \u{b1} 2 sd", Colour::Black, MarkerShape::Disc),
+    ("measured, not clear", Colour::Black, MarkerShape::Diamond),
 ];
-const MODEL: [Look; 2] = [
-    ("model \u{b1} 2 sd", Colour::Vermilion, Shape::Square),
-    ("model, not clear", Colour::Vermilion, Shape::InvertedTriangle),
+const MODEL: [ComponentLook; 2] = [
+    ("model \u{b1} 2 sd", Colour::Vermilion, MarkerShape::Square),
+    ("model, not clear", Colour::Vermilion, MarkerShape::InvertedTriangle),
 ];
 
 /// The components of a recording and of a model as symbols with error bars.
-pub(super) fn series(measured: &[Named], model: &[Named]) -> Vec<Series> {
+pub(super) fn component_series(measured: &[LabelledComponent], model: &[LabelledComponent]) -> Vec<Series> {
     let styles = if model.is_empty() { ALONE } else { MEASURED };
     [(model, MODEL), (measured, styles)]
         .into_iter()
-        .flat_map(|(components, styles)| of_source(components, styles))
+        .flat_map(|(components, styles)| source_series(components, styles))
         .collect()
 }
 
-fn of_source(components: &[Named], [clear, not_clear]: [Look; 2]) -> impl Iterator<Item = Series> {
-    let of = |((label, colour, shape), is_clear): (Look, bool)| {
+fn source_series(
+    components: &[LabelledComponent],
+    [clear, not_clear]: [ComponentLook; 2],
+) -> impl Iterator<Item = Series> {
+    let of = |((label, colour, shape), is_clear): (ComponentLook, bool)| {
         let shown = || components.iter().filter(move |c| c.is_clear() == is_clear);
         Series {
             label: label.to_owned(),
             colour,
             mark: Mark::Hollow(shape),
-            points: shown().map(|c| Some(c.point())).collect(),
-            bars: shown().flat_map(Named::bars).collect(),
+            points: shown().map(|c| Some(c.axis_point())).collect(),
+            error_bars: shown().flat_map(LabelledComponent::error_bars).collect(),
         }
     };
     [(clear, true), (not_clear, false)].map(of).into_iter().filter(|s| !s.points.is_empty())
@@ -97,14 +100,17 @@ fn of_source(components: &[Named], [clear, not_clear]: [Look; 2]) -> impl Iterat
 
 /// Names over the panel, each with a line up from its symbol: of a limited number, those without a remark
 /// first.
-pub(super) fn rules(components: &[Named], most: usize) -> impl Iterator<Item = Rule> {
-    let mut order: Vec<&Named> = components.iter().collect();
+pub(super) fn component_labels(
+    components: &[LabelledComponent],
+    most: usize,
+) -> impl Iterator<Item = VerticalLine> {
+    let mut order: Vec<&LabelledComponent> = components.iter().collect();
     order.sort_by_key(|c| !c.is_clear()); // (stable: the order of the list otherwise)
-    order.into_iter().take(most).map(|c| Rule {
-        label: c.name(),
+    order.into_iter().take(most).map(|c| VerticalLine {
+        label: c.label_text(),
         colour: Colour::Grey,
         mark: Mark::Dotted,
         at: c.frequency_hz,
-        above: Some(c.point().1),
+        above: Some(c.axis_point().1),
     })
 }

@@ -1,11 +1,11 @@
 //! What a map says in words: from where to where its values go, and with which parameter they rise or fall.
 
-use super::labels::words;
-use crate::feature::Unit;
+use super::labels::parameter_words;
+use crate::feature::FeatureUnit;
 use crate::math;
-use crate::sweep::rank_correlation::spearman;
-use crate::sweep::{Axis, Map, Outcome, Study};
-use crate::text::{capitalised, decimals, trimmed};
+use crate::sweep::rank_correlation::spearman_correlation;
+use crate::sweep::{PointOutcome, Study, SweepAxis, SweepMap};
+use crate::text::{capitalise, format_decimals, format_trimmed};
 
 /// Rank correlation from which on a map is said to rise or fall with a parameter.
 const CLEAR: f64 = 0.5;
@@ -18,7 +18,7 @@ const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
 
 /// What the values of a map show.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::figures) struct Claim {
+pub(in crate::figures) struct MapClaim {
     /// The quantity, such as "High component".
     pub name: String,
     /// Its least and greatest value, such as "222 to 637 Hz".
@@ -30,20 +30,20 @@ pub(in crate::figures) struct Claim {
     strongest: String,
 }
 
-impl Claim {
-    pub fn of(study: &Study, map: &Map, values: &[Option<f64>]) -> Self {
-        let trends = trends(study, values);
-        let said = |trends: &[(f64, &Axis)], name: &dyn Fn(&Axis) -> String| {
-            let one = |(r, axis): &(f64, &Axis)| {
+impl MapClaim {
+    pub fn new(study: &Study, map: &SweepMap, values: &[Option<f64>]) -> Self {
+        let trends = clear_trends(study, values);
+        let said = |trends: &[(f64, &SweepAxis)], name: &dyn Fn(&SweepAxis) -> String| {
+            let one = |(r, axis): &(f64, &SweepAxis)| {
                 format!("{} with {}", if *r > 0.0 { "rises" } else { "falls" }, name(axis))
             };
             trends.iter().map(one).collect::<Vec<_>>().join(", ")
         };
-        let symbol = |axis: &Axis| axis.parameter.symbol.to_owned();
+        let symbol = |axis: &SweepAxis| axis.parameter.symbol.to_owned();
         Self {
-            name: capitalised(&map.name),
-            range: range(map, values),
-            trend: said(&trends, &words),
+            name: capitalise(&map.name),
+            range: value_range(map, values),
+            trend: said(&trends, &parameter_words),
             short_trend: said(&trends, &symbol),
             strongest: said(trends.get(..1).unwrap_or_default(), &symbol),
         }
@@ -51,29 +51,34 @@ impl Claim {
 
     /// All in one line.
     pub fn title(&self) -> String {
-        format!("{}: {}", self.name, joined(&self.range, &self.trend))
+        format!("{}: {}", self.name, join_trend(&self.range, &self.trend))
     }
 
     /// Range and trend in that many letters: in words, by symbols, or the strongest trend alone.
-    pub fn shown_in(&self, letters: usize) -> String {
-        let ways = [&self.trend, &self.short_trend, &self.strongest].map(|trend| joined(&self.range, trend));
+    pub fn fit_in_letters(&self, letters: usize) -> String {
+        let ways =
+            [&self.trend, &self.short_trend, &self.strongest].map(|trend| join_trend(&self.range, trend));
         let fits = ways.iter().find(|way| way.chars().count() <= letters);
         fits.unwrap_or(&self.range).clone()
     }
 }
 
-fn joined(range: &str, trend: &str) -> String {
+fn join_trend(range: &str, trend: &str) -> String {
     if trend.is_empty() { range.to_owned() } else { format!("{range}, {trend}") }
 }
 
 /// Values of map number `at` at every point, in the unit of the figure; `None` where there is none.
-pub(in crate::figures) fn shown_values(study: &Study, outcomes: &[Outcome], at: usize) -> Vec<Option<f64>> {
+pub(in crate::figures) fn map_values(
+    study: &Study,
+    outcomes: &[PointOutcome],
+    at: usize,
+) -> Vec<Option<f64>> {
     let factor = study.maps.get(at).map_or(1.0, |map| map.reading.unit().factor);
-    let value = |outcome: &Outcome| Some(outcome.values.get(at)?.ok()? * factor);
+    let value = |outcome: &PointOutcome| Some(outcome.values.get(at)?.ok()? * factor);
     outcomes.iter().map(value).collect()
 }
 
-fn range(map: &Map, values: &[Option<f64>]) -> String {
+fn value_range(map: &SweepMap, values: &[Option<f64>]) -> String {
     let finite = || values.iter().flatten().copied().filter(|value| value.is_finite());
     let Some((low, high)) = finite().reduce(f64::min).zip(finite().reduce(f64::max)) else {
         return "no value".to_owned();
@@ -82,28 +87,28 @@ fn range(map: &Map, values: &[Option<f64>]) -> String {
     let power = if largest > 0.0 { math::log10(largest).floor() as i32 } else { 0 };
     let written = |value| match usize::try_from(DIGITS - 1 - power) {
         _ if value == 0.0 => "0".to_owned(),
-        _ if !PLAIN.contains(&power) => trimmed(value, DIGITS as usize),
-        Ok(places) => decimals(value, places),
-        Err(_) => decimals(value, 0),
+        _ if !PLAIN.contains(&power) => format_trimmed(value, DIGITS as usize),
+        Ok(places) => format_decimals(value, places),
+        Err(_) => format_decimals(value, 0),
     };
-    let Unit { shown, .. } = map.reading.unit();
+    let FeatureUnit { shown, .. } = map.reading.unit();
     let unit = if shown.is_empty() { String::new() } else { format!(" {shown}") };
     let [low, high] = [low, high].map(written);
     if low == high { format!("{low}{unit}") } else { format!("{low} to {high}{unit}") }
 }
 
 /// The clear trends, strongest first.
-fn trends<'a>(study: &'a Study, values: &[Option<f64>]) -> Vec<(f64, &'a Axis)> {
+fn clear_trends<'a>(study: &'a Study, values: &[Option<f64>]) -> Vec<(f64, &'a SweepAxis)> {
     let known: Vec<(usize, f64)> =
         values.iter().enumerate().filter_map(|(index, value)| Some((index, (*value)?))).collect();
     if (known.len() as f64) < MOSTLY_KNOWN * values.len() as f64 {
         return Vec::new();
     }
     let y: Vec<f64> = known.iter().map(|(_, value)| *value).collect();
-    let places: Vec<Vec<f64>> = known.iter().map(|(index, _)| study.place(*index)).collect();
+    let places: Vec<Vec<f64>> = known.iter().map(|(index, _)| study.point_values(*index)).collect();
     let of = |(at, axis)| {
         let x: Option<Vec<f64>> = places.iter().map(|place| place.get(at).copied()).collect();
-        Some((spearman(&x?, &y)?, axis))
+        Some((spearman_correlation(&x?, &y)?, axis))
     };
     let mut clear: Vec<_> = study.axes.iter().enumerate().filter_map(of).collect();
     clear.retain(|(r, _)| r.abs() >= CLEAR);
@@ -125,22 +130,22 @@ mod tests {
         Study::parse("study", &text).unwrap()
     }
 
-    fn claim(value: impl Fn(f64, f64) -> Option<f64>) -> Claim {
+    fn claim(value: impl Fn(f64, f64) -> Option<f64>) -> MapClaim {
         let study = study();
         let values: Vec<Option<f64>> = (0..36)
             .map(|index| (f64::from(index / 6), f64::from(index % 6)))
             .map(|(x, y)| value(x, y))
             .collect();
-        Claim::of(&study, &study.maps[0], &values)
+        MapClaim::new(&study, &study.maps[0], &values)
     }
 
     #[test]
     fn a_title_says_from_where_to_where_and_with_what() {
         let falls = claim(|x, y| Some(80.0 - 5.0 * y - 0.1 * x));
         assert_eq!(falls.title(), "Flip: 54.5 to 80.0 ms, falls with preload force");
-        assert_eq!(falls.shown_in(34), "54.5 to 80.0 ms, falls with k0 hd");
+        assert_eq!(falls.fit_in_letters(34), "54.5 to 80.0 ms, falls with k0 hd");
         let both = claim(|x, y| Some(y - x));
-        assert_eq!(both.shown_in(60), "\u{2212}5.00 to 5.00 ms, falls with a, rises with k0 hd");
+        assert_eq!(both.fit_in_letters(60), "\u{2212}5.00 to 5.00 ms, falls with a, rises with k0 hd");
         assert_eq!(claim(|x, y| Some((x - 2.5).abs() + (y - 2.5).abs())).title(), "Flip: 1.00 to 5.00 ms");
     }
 

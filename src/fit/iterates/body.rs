@@ -1,63 +1,66 @@
 //! What the header of a trace fit's journal says.
 
 use crate::blade::parameters;
-use crate::fit::trace::{CameraUnknown, Kind, Unknown};
-use crate::journal::Exact;
+use crate::fit::trace::{CameraUnknown, TraceUnknown, UnknownKind};
+use crate::journal::ExactNumber;
 use crate::math;
 use serde::{Deserialize, Serialize};
 
 /// What the header of a trace fit says besides.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Body {
+pub struct TraceHeaderBody {
     /// Seed of the job.
     pub seed: u64,
     /// Names of the recordings, in the order of their numbers.
     pub recordings: Vec<String>,
     /// Length of the segments in each stage, s.
-    pub segment_s: Vec<Exact>,
+    pub segment_s: Vec<ExactNumber>,
     /// What is estimated, in the order of the coordinates.
-    pub unknowns: Vec<Coordinate>,
+    pub unknowns: Vec<HeaderCoordinate>,
 }
 
 /// Something that is estimated, and what its coordinate means.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Coordinate {
+pub struct HeaderCoordinate {
     /// Key of the scene, or the recording and what of its camera.
     pub name: String,
     /// Unit of its value.
     pub unit: String,
     /// Length of a unit of the coordinate; absent where the coordinate is the logarithm of the value.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub per_unit: Option<Exact>,
+    pub per_unit: Option<ExactNumber>,
     /// Range of the coordinate.
-    pub range: [Exact; 2],
+    pub range: [ExactNumber; 2],
     /// Mean and standard deviation of the prior of the coordinate.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub prior: Option<[Exact; 2]>,
+    pub prior: Option<[ExactNumber; 2]>,
 }
 
-impl Coordinate {
+impl HeaderCoordinate {
     /// An unknown of a fit to these recordings.
     #[must_use]
-    pub fn of(unknown: &Unknown, recordings: &[String]) -> Self {
+    pub fn from_unknown(unknown: &TraceUnknown, recordings: &[String]) -> Self {
         let (name, unit) = match &unknown.kind {
-            Kind::Parameter { name, .. } => {
-                (name.clone(), parameters::find(name).map_or("1", |row| row.unit).to_owned())
+            UnknownKind::Parameter { name, .. } => {
+                (name.clone(), parameters::find_parameter(name).map_or("1", |row| row.unit).to_owned())
             }
-            Kind::Camera { film, what } => {
+            UnknownKind::Camera { film, what } => {
                 let recording = recordings.get(*film).map_or("", String::as_str);
-                (format!("{recording}: {}", camera_name(*what)), camera_unit(*what).to_owned())
+                (
+                    format!("{recording}: {}", camera_unknown_name(*what)),
+                    camera_unknown_unit(*what).to_owned(),
+                )
             }
         };
-        let is_logarithm = matches!(unknown.kind, Kind::Parameter { unit: None, .. });
+        let is_logarithm = matches!(unknown.kind, UnknownKind::Parameter { unit: None, .. });
         Self {
             name,
             unit,
-            per_unit: (!is_logarithm).then(|| Exact(unknown.slope(0.0))),
-            range: unknown.range.map(Exact),
-            prior: unknown.prior.map(|prior| prior.map(Exact)),
+            per_unit: (!is_logarithm).then(|| ExactNumber(unknown.slope(0.0))),
+            range: unknown.range.map(ExactNumber),
+            prior: unknown.prior.map(|prior| prior.map(ExactNumber)),
         }
     }
 
@@ -70,7 +73,7 @@ impl Coordinate {
 
 /// Key of a number of a camera in files, its unit included.
 #[must_use]
-pub fn camera_name(what: CameraUnknown) -> &'static str {
+pub fn camera_unknown_name(what: CameraUnknown) -> &'static str {
     match what {
         CameraUnknown::OffsetX => "offset_x_m",
         CameraUnknown::OffsetDrop => "offset_drop_m",
@@ -82,7 +85,7 @@ pub fn camera_name(what: CameraUnknown) -> &'static str {
     }
 }
 
-fn camera_unit(what: CameraUnknown) -> &'static str {
+fn camera_unknown_unit(what: CameraUnknown) -> &'static str {
     match what {
         CameraUnknown::OffsetX | CameraUnknown::OffsetDrop => "m",
         CameraUnknown::DriftX | CameraUnknown::DriftDrop => "m/s",

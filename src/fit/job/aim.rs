@@ -5,22 +5,22 @@ use serde::Serialize;
 
 /// A feature and where its target comes from.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Aim {
+pub struct FitTarget {
     /// What is read from measurement and model alike.
     pub feature: Feature,
     /// Where target and standard deviation come from.
-    pub source: Source,
+    pub source: TargetSource,
     /// Relative error that passes, for a component; `None` for any other feature.
     pub tolerance_relative: Option<f64>,
     /// Whether it is only predicted, never fitted.
     pub held_out: bool,
     /// From when on it counts.
-    pub stage: When,
+    pub stage: TargetStage,
 }
 
 /// Stages of a search in which an aim counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum When {
+pub enum TargetStage {
     /// In all of them.
     Always,
     /// In the last stage alone: the lines of a log-spectrum have many minima, and help only near the right
@@ -30,7 +30,7 @@ pub enum When {
 
 /// Where a target comes from.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub enum Source {
+pub enum TargetSource {
     /// Given in the job, in the feature's unit.
     Given {
         /// The target.

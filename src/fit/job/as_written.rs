@@ -1,8 +1,8 @@
 //! job.toml as people write it: types and keys only, nothing checked against anything else.
 
-use super::super::scale::Spacing;
+use super::super::scale::BoundsSpacing;
 use crate::feature::{Keys, define_entry, with_reading_keys};
-use crate::toml_file::Pair;
+use crate::toml_file::NumberPair;
 use crate::twin::Camera;
 use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
@@ -14,7 +14,7 @@ use std::fmt;
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "job.toml")]
-pub struct Job {
+pub struct JobFile {
     /// Version of the format: 1.
     pub format: u32,
     /// Title for pages and figures.
@@ -24,41 +24,41 @@ pub struct Job {
     /// Seed of the search, a whole number.
     pub seed: u64,
     /// Starting states over which the model is averaged.
-    pub ensemble: Option<Ensemble>,
+    pub ensemble: Option<JobEnsembleTable>,
     /// Recordings that are fitted.
     #[serde(default)]
-    pub recording: Vec<Recording>,
+    pub recording: Vec<JobRecordingTable>,
     /// Operating conditions with published numbers only.
     #[serde(default)]
-    pub condition: Vec<Condition>,
+    pub condition: Vec<JobConditionTable>,
     /// Camera of a condition without a recording.
     pub camera: Option<Camera>,
     /// Free parameters.
     #[serde(default)]
-    pub parameter: Vec<Parameter>,
+    pub parameter: Vec<JobParameterTable>,
     /// Constants of the scene that are freed within priors, with [[trace]]: "3 %", or a list.
-    pub nuisance: Option<Nuisance>,
+    pub nuisance: Option<JobNuisanceEntry>,
     /// Recordings whose frames are fitted.
     #[serde(default)]
-    pub trace: Vec<Trace>,
+    pub trace: Vec<JobTraceTable>,
     /// Which runs count.
-    pub plausible: Option<Plausible>,
+    pub plausible: Option<JobPlausibleTable>,
     /// Frequencies that the model must meet.
     #[serde(default)]
-    pub component: Vec<Component>,
+    pub component: Vec<JobComponentTable>,
     /// Other features that the model must meet.
     #[serde(default)]
     pub feature: Vec<Feature>,
     /// Budgets of a search on features.
-    pub search: Option<Search>,
+    pub search: Option<JobSearchTable>,
     /// How intervals are found.
-    pub intervals: Option<Intervals>,
+    pub intervals: Option<JobIntervalsTable>,
 }
 
 /// Starting states over which the model is averaged.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Ensemble {
+pub struct JobEnsembleTable {
     /// Number of starting states, 1 to 64; 1 if left out.
     pub members: Option<usize>,
     /// Their relative spread, above 0 and at most 1; 0.1 if left out.
@@ -68,7 +68,7 @@ pub struct Ensemble {
 /// A recording that is fitted.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Recording {
+pub struct JobRecordingTable {
     /// Different from every other; "recording N" if left out.
     pub name: Option<String>,
     /// Folder of the recording, or its trace.csv; relative to this file.
@@ -92,7 +92,7 @@ pub struct Recording {
 /// An operating condition with published numbers only.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Condition {
+pub struct JobConditionTable {
     /// Different from every other.
     pub name: String,
     /// Its own scene; that of the job if left out.
@@ -109,7 +109,7 @@ pub struct Condition {
 /// A free parameter.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Parameter {
+pub struct JobParameterTable {
     /// Key of the scene with its table, such as "friction.a".
     pub name: String,
     /// Lower bound, SI.
@@ -117,15 +117,15 @@ pub struct Parameter {
     /// Upper bound, SI.
     pub upper: f64,
     /// How the search moves along it.
-    pub scale: Spacing,
+    pub scale: BoundsSpacing,
     /// What is known beforehand; nothing if left out.
-    pub prior: Option<Prior>,
+    pub prior: Option<JobPriorTable>,
 }
 
 /// What is known of a parameter beforehand.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Prior {
+pub struct JobPriorTable {
     /// Mean, within the bounds, SI.
     pub mean: f64,
     /// Standard deviation in the unit of the parameter.
@@ -137,7 +137,7 @@ pub struct Prior {
 /// Which runs count.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Plausible {
+pub struct JobPlausibleTable {
     /// A run in which neck or lip leans farther from the vertical fails, degrees.
     pub largest_tilt_deg: Option<f64>,
 }
@@ -145,7 +145,7 @@ pub struct Plausible {
 /// A frequency that the model must meet.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Component {
+pub struct JobComponentTable {
     /// Different from every other component and feature.
     pub name: String,
     /// "deflection", "head-drop", "tip-x" or "head-x".
@@ -153,7 +153,7 @@ pub struct Component {
     /// Frames from which it is read, as of `wiperlab spectrum`.
     pub window: String,
     /// Lowest and highest frequency, Hz.
-    pub band_hz: Pair,
+    pub band_hz: NumberPair,
     /// What is removed first; "cubic" if left out.
     pub detrend: Option<String>,
     /// Published target, Hz; measured on the recording if left out.
@@ -163,7 +163,7 @@ pub struct Component {
     /// Largest relative error that passes; 0.02 if left out.
     pub tolerance_relative: Option<f64>,
     /// Name or number of the recording; 1 if left out.
-    pub recording: Option<Which>,
+    pub recording: Option<ConditionReference>,
 }
 
 with_reading_keys!(define_entry {
@@ -178,12 +178,12 @@ with_reading_keys!(define_entry {
         /// Its standard deviation, SI.
         target_sd: Option<f64>,
         /// Name or number of the recording; 1 if left out.
-        recording: Option<Which>,
+        recording: Option<ConditionReference>,
     }
 });
 
-impl Component {
-    pub fn keys(&self) -> Keys {
+impl JobComponentTable {
+    pub fn reading_keys(&self) -> Keys {
         Keys {
             channel: Some(self.channel.clone()),
             window: Some(self.window.clone()),
@@ -197,7 +197,7 @@ impl Component {
 /// Budgets of a search on features.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Search {
+pub struct JobSearchTable {
     /// Evaluations of the first stage.
     pub global_evaluations: Option<usize>,
     /// Evaluations of the second stage.
@@ -213,7 +213,7 @@ pub struct Search {
 /// How intervals are found.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Intervals {
+pub struct JobIntervalsTable {
     /// Intervals from profiles of the cost; true if left out.
     pub profile: Option<bool>,
     /// Fits to twins of the best model, 0 to 1000.
@@ -223,9 +223,9 @@ pub struct Intervals {
 /// A recording of which every frame is fitted.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Trace {
+pub struct JobTraceTable {
     /// Name or number of the recording; 1 if left out.
-    pub recording: Option<Which>,
+    pub recording: Option<ConditionReference>,
     /// "tip-x", "head-drop" or "deflection"; what it has of the first two if left out.
     pub channels: Option<Vec<String>>,
     /// Lengths of the segments of each stage, rising, s.
@@ -238,13 +238,13 @@ pub struct Trace {
     pub drive: Option<String>,
     /// What is not known of its camera.
     #[serde(default)]
-    pub camera: TraceCamera,
+    pub camera: JobTraceCameraTable,
 }
 
 /// What is not known of a camera: standard deviations; 0 holds one.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct TraceCamera {
+pub struct JobTraceCameraTable {
     /// Of its tilt, degrees; 0.3 if left out.
     pub tilt_sd_deg: Option<f64>,
     /// Of its scale, relative; 0.005 if left out.
@@ -262,7 +262,7 @@ pub struct TraceCamera {
 #[schemars(untagged, extend("x-expected" = "\"exact\", or a table such as { scale_sd = 0.005, offset_sd_m = 0.001 }"))]
 pub enum RecordingCamera {
     Word(String),
-    Doubt(TraceCamera),
+    Doubt(JobTraceCameraTable),
 }
 
 impl<'de> Deserialize<'de> for RecordingCamera {
@@ -285,14 +285,14 @@ impl<'de> Visitor<'de> for RecordingCameraVisitor {
     }
 
     fn visit_map<A: MapAccess<'de>>(self, map: A) -> Result<RecordingCamera, A::Error> {
-        TraceCamera::deserialize(MapAccessDeserializer::new(map)).map(RecordingCamera::Doubt)
+        JobTraceCameraTable::deserialize(MapAccessDeserializer::new(map)).map(RecordingCamera::Doubt)
     }
 }
 
 /// Constants that are freed with a prior: all of them with one deviation, or those of a list.
 #[derive(Debug, JsonSchema)]
 #[schemars(untagged, extend("x-expected" = "a percentage such as \"3 %\", or a list such as [{ name = \"blade.lip_mass_kg\", sd = \"5 %\" }]"))]
-pub enum Nuisance {
+pub enum JobNuisanceEntry {
     All(String),
     Listed(Vec<ListedNuisance>),
 }
@@ -309,7 +309,7 @@ pub struct ListedNuisance {
     pub sd_relative: Option<f64>,
 }
 
-impl<'de> Deserialize<'de> for Nuisance {
+impl<'de> Deserialize<'de> for JobNuisanceEntry {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(NuisanceVisitor)
     }
@@ -318,55 +318,55 @@ impl<'de> Deserialize<'de> for Nuisance {
 struct NuisanceVisitor;
 
 impl<'de> Visitor<'de> for NuisanceVisitor {
-    type Value = Nuisance;
+    type Value = JobNuisanceEntry;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("a percentage such as \"3 %\", or a list such as [{ name = \"blade.lip_mass_kg\", sd = \"5 %\" }]")
     }
 
-    fn visit_str<E: Error>(self, value: &str) -> Result<Nuisance, E> {
-        Ok(Nuisance::All(value.to_owned()))
+    fn visit_str<E: Error>(self, value: &str) -> Result<JobNuisanceEntry, E> {
+        Ok(JobNuisanceEntry::All(value.to_owned()))
     }
 
-    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<Nuisance, A::Error> {
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<JobNuisanceEntry, A::Error> {
         let mut listed = Vec::new();
         while let Some(one) = list.next_element()? {
             listed.push(one);
         }
-        Ok(Nuisance::Listed(listed))
+        Ok(JobNuisanceEntry::Listed(listed))
     }
 }
 
 /// A recording or condition by its number, counted from 1, or its name.
 #[derive(Debug, JsonSchema)]
 #[schemars(untagged, extend("x-expected" = "the number of a recording, counted from 1, or its name"))]
-pub enum Which {
+pub enum ConditionReference {
     Number(usize),
     Name(String),
 }
 
-impl<'de> Deserialize<'de> for Which {
+impl<'de> Deserialize<'de> for ConditionReference {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
-        deserializer.deserialize_any(WhichVisitor)
+        deserializer.deserialize_any(ConditionReferenceVisitor)
     }
 }
 
-struct WhichVisitor;
+struct ConditionReferenceVisitor;
 
-impl Visitor<'_> for WhichVisitor {
-    type Value = Which;
+impl Visitor<'_> for ConditionReferenceVisitor {
+    type Value = ConditionReference;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str("the number of a recording, counted from 1, or its name")
     }
 
-    fn visit_i64<E: Error>(self, value: i64) -> Result<Which, E> {
+    fn visit_i64<E: Error>(self, value: i64) -> Result<ConditionReference, E> {
         // one below 1 is no number of a recording either way, and 0 is refused with the numbers that there
         // are
-        Ok(Which::Number(usize::try_from(value).unwrap_or(0)))
+        Ok(ConditionReference::Number(usize::try_from(value).unwrap_or(0)))
     }
 
-    fn visit_str<E: Error>(self, value: &str) -> Result<Which, E> {
-        Ok(Which::Name(value.to_owned()))
+    fn visit_str<E: Error>(self, value: &str) -> Result<ConditionReference, E> {
+        Ok(ConditionReference::Name(value.to_owned()))
     }
 }

@@ -1,19 +1,19 @@
 //! What is not known of cameras: what those of features and of traces have in common, and those of features.
 
 use super::as_written::{self, RecordingCamera};
-use super::refusal::{Refusal, refuse};
+use super::refusal::{JobRefusal, refuse};
 use serde::Serialize;
 
 /// Relative standard deviation of the scale unless the job says otherwise: a scale bar of 20 mm that is read
 /// to a tenth of a millimetre.
-pub(super) const SCALE_SD: f64 = 0.005;
+pub(super) const DEFAULT_SCALE_SD: f64 = 0.005;
 /// Largest of it: a scale that is known worse is not a calibration.
-pub(super) const MOST_SCALE_SD: f64 = 0.1;
+pub(super) const MAX_SCALE_SD: f64 = 0.1;
 /// Standard deviation of the places of both markers unless the job says otherwise, m: nobody's marker sits on
 /// the hinge to better than a millimetre.
-pub(super) const OFFSET_SD_M: f64 = 1e-3;
+pub(super) const DEFAULT_OFFSET_SD_M: f64 = 1e-3;
 /// Largest of it, m: the length of a blade.
-pub(super) const MOST_OFFSET_SD_M: f64 = 0.1;
+pub(super) const MAX_OFFSET_SD_M: f64 = 0.1;
 
 /// Standard deviations of what is not known of the camera of a recording from which features are read; one
 /// that is 0 is held at its nominal value.
@@ -28,11 +28,14 @@ pub struct FeatureCamera {
 impl FeatureCamera {
     /// One of which everything is known.
     pub const EXACT: Self = Self { scale_sd: 0.0, offset_sd_m: 0.0 };
-    const USUAL: Self = Self { scale_sd: SCALE_SD, offset_sd_m: OFFSET_SD_M };
+    const USUAL: Self = Self { scale_sd: DEFAULT_SCALE_SD, offset_sd_m: DEFAULT_OFFSET_SD_M };
 }
 
 /// The camera of the recording `entry`, such as `recording 1`.
-pub(super) fn camera(entry: &str, written: Option<&RecordingCamera>) -> Result<FeatureCamera, Refusal> {
+pub(super) fn check_feature_camera(
+    entry: &str,
+    written: Option<&RecordingCamera>,
+) -> Result<FeatureCamera, JobRefusal> {
     let table = match written {
         None => return Ok(FeatureCamera::USUAL),
         Some(RecordingCamera::Word(word)) if word == "exact" => return Ok(FeatureCamera::EXACT),
@@ -47,7 +50,8 @@ pub(super) fn camera(entry: &str, written: Option<&RecordingCamera>) -> Result<F
         Some(RecordingCamera::Doubt(table)) => table,
     };
     let key = |key: &str| format!("{entry}, `camera.{key}`");
-    let as_written::TraceCamera { tilt_sd_deg, scale_sd, offset_sd_m, drift_sd_m_per_s, clock_sd_s } = table;
+    let as_written::JobTraceCameraTable { tilt_sd_deg, scale_sd, offset_sd_m, drift_sd_m_per_s, clock_sd_s } =
+        table;
     let of_traces = [
         (
             "tilt_sd_deg",
@@ -68,13 +72,14 @@ pub(super) fn camera(entry: &str, written: Option<&RecordingCamera>) -> Result<F
         }
     }
     Ok(FeatureCamera {
-        scale_sd: doubt(key("scale_sd"), *scale_sd, MOST_SCALE_SD)?.unwrap_or(SCALE_SD),
-        offset_sd_m: doubt(key("offset_sd_m"), *offset_sd_m, MOST_OFFSET_SD_M)?.unwrap_or(OFFSET_SD_M),
+        scale_sd: check_camera_sd(key("scale_sd"), *scale_sd, MAX_SCALE_SD)?.unwrap_or(DEFAULT_SCALE_SD),
+        offset_sd_m: check_camera_sd(key("offset_sd_m"), *offset_sd_m, MAX_OFFSET_SD_M)?
+            .unwrap_or(DEFAULT_OFFSET_SD_M),
     })
 }
 
 /// A job with traces has its cameras there.
-pub(super) fn check_beside_traces(written: &as_written::Job) -> Result<(), Refusal> {
+pub(super) fn check_no_camera_with_traces(written: &as_written::JobFile) -> Result<(), JobRefusal> {
     let both = (1..).zip(&written.recording).find(|(_, r)| !written.trace.is_empty() && r.camera.is_some());
     match both {
         None => Ok(()),
@@ -87,7 +92,7 @@ pub(super) fn check_beside_traces(written: &as_written::Job) -> Result<(), Refus
 }
 
 /// A standard deviation of a camera's number, where it is written.
-pub(super) fn doubt(key: String, found: Option<f64>, most: f64) -> Result<Option<f64>, Refusal> {
+pub(super) fn check_camera_sd(key: String, found: Option<f64>, most: f64) -> Result<Option<f64>, JobRefusal> {
     match found {
         Some(sd) if !(0.0..=most).contains(&sd) => {
             refuse(key, format!("found {sd}, expected 0 (held) to {most}"))

@@ -1,23 +1,23 @@
 //! One component or feature of a job: its keys, checked one by one.
 
-use super::aim::Source;
-use super::as_written::Which;
-use super::conditions::Condition;
-use super::refusal::{Refusal, refuse};
-use crate::feature::Measure;
-use crate::toml_file::nearest;
+use super::aim::TargetSource;
+use super::as_written::ConditionReference;
+use super::conditions::JobCondition;
+use super::refusal::{JobRefusal, refuse};
+use crate::feature::ValueComparison;
+use crate::toml_file::suggest_key;
 
 /// Least standard deviation relative to a target: beyond what any camera gives, and far from overflow of a
 /// squared residual.
-const LEAST_SD_RELATIVE: f64 = 1e-9;
+const MIN_SD_RELATIVE: f64 = 1e-9;
 
 /// A component or feature, for messages.
-pub(super) struct Entry {
+pub(super) struct JobEntry {
     pub(super) what: String,
 }
 
 /// The recording or condition that an entry belongs to.
-pub(super) struct Place {
+pub(super) struct EntryCondition {
     /// Counted from 0.
     pub index: usize,
     /// Whether there is a recording on which a target can be measured.
@@ -27,66 +27,66 @@ pub(super) struct Place {
     pub nyquist_hz: Option<f64>,
 }
 
-impl Entry {
-    pub(super) fn key(&self, key: &str) -> String {
+impl JobEntry {
+    pub(super) fn key_path(&self, key: &str) -> String {
         format!("{}, `{key}`", self.what)
     }
 
-    pub(super) fn given(
+    pub(super) fn given_source(
         &self,
         target: f64,
         sd: f64,
         sd_key: &str,
-        measure: Measure,
-    ) -> Result<Source, Refusal> {
+        measure: ValueComparison,
+    ) -> Result<TargetSource, JobRefusal> {
         let least = match measure {
-            Measure::Log if !(target.is_finite() && target != 0.0) => {
+            ValueComparison::Log if !(target.is_finite() && target != 0.0) => {
                 return refuse(
-                    self.key("target"),
+                    self.key_path("target"),
                     format!(
                         "found {target}, expected a finite number that is not 0 (residuals are logarithms)"
                     ),
                 );
             }
-            Measure::Log => LEAST_SD_RELATIVE * target.abs(),
-            Measure::Linear { .. } if !target.is_finite() => {
-                return refuse(self.key("target"), format!("found {target}, expected a finite number"));
+            ValueComparison::Log => MIN_SD_RELATIVE * target.abs(),
+            ValueComparison::Linear { .. } if !target.is_finite() => {
+                return refuse(self.key_path("target"), format!("found {target}, expected a finite number"));
             }
-            Measure::Linear { scale } => LEAST_SD_RELATIVE * scale,
+            ValueComparison::Linear { scale } => MIN_SD_RELATIVE * scale,
         };
         if !(sd.is_finite() && sd >= least) {
             return refuse(
-                self.key(sd_key),
+                self.key_path(sd_key),
                 format!("found {sd}, expected a finite number of at least {least:e}"),
             );
         }
-        Ok(Source::Given { target, sd })
+        Ok(TargetSource::Given { target, sd })
     }
 
-    pub(super) fn relative_sd(&self, found: f64) -> Result<f64, Refusal> {
-        if found.is_finite() && found >= LEAST_SD_RELATIVE {
+    pub(super) fn check_relative_sd(&self, found: f64) -> Result<f64, JobRefusal> {
+        if found.is_finite() && found >= MIN_SD_RELATIVE {
             return Ok(found);
         }
         refuse(
-            self.key("sd_relative"),
+            self.key_path("sd_relative"),
             format!(
-                "found {found}, expected a finite number of at least {LEAST_SD_RELATIVE:e}; 0.05 means 5 % of the measured value"
+                "found {found}, expected a finite number of at least {MIN_SD_RELATIVE:e}; 0.05 means 5 % of the measured value"
             ),
         )
     }
 
     /// The recording or condition of that number, counted from 1, or name; the first where there is neither.
-    pub(super) fn place(
+    pub(super) fn find_condition(
         &self,
-        which: Option<&Which>,
-        conditions: &[Condition],
+        which: Option<&ConditionReference>,
+        conditions: &[JobCondition],
         nyquist_hz: Option<f64>,
-    ) -> Result<Place, Refusal> {
-        let (key, most) = (self.key("recording"), conditions.len());
+    ) -> Result<EntryCondition, JobRefusal> {
+        let (key, most) = (self.key_path("recording"), conditions.len());
         let index = match which {
             None => 0,
-            Some(Which::Number(number)) if (1..=most).contains(number) => number - 1,
-            Some(Which::Number(number)) => {
+            Some(ConditionReference::Number(number)) if (1..=most).contains(number) => number - 1,
+            Some(ConditionReference::Number(number)) => {
                 return refuse(
                     key,
                     format!(
@@ -94,22 +94,25 @@ impl Entry {
                     ),
                 );
             }
-            Some(Which::Name(name)) => {
+            Some(ConditionReference::Name(name)) => {
                 let names: Vec<&str> = conditions.iter().map(|c| c.name.as_str()).collect();
                 let unknown = || {
                     refuse(
                         key,
-                        format!("no recording or condition is called `{name}`; {}", nearest(name, &names)),
+                        format!(
+                            "no recording or condition is called `{name}`; {}",
+                            suggest_key(name, &names)
+                        ),
                     )
                 };
                 conditions.iter().position(|c| c.name == *name).map_or_else(unknown, Ok)?
             }
         };
         let Some(condition) = conditions.get(index) else {
-            return refuse(self.key("recording"), "there is no recording and no condition");
+            return refuse(self.key_path("recording"), "there is no recording and no condition");
         };
         let measured = condition.recording.is_some();
-        Ok(Place {
+        Ok(EntryCondition {
             index,
             measured,
             held_out: condition.held_out,

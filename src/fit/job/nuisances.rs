@@ -1,10 +1,10 @@
 //! Constants of the scene that are freed within a prior: nobody knows a mass or a damping exactly.
 
 use super::as_written::{self, ListedNuisance};
-use super::conditions::same_quantity;
+use super::conditions::is_same_quantity;
 use super::parameters::FreeParameter;
-use super::refusal::{Refusal, refuse, repeated};
-use crate::toml_file::nearest;
+use super::refusal::{JobRefusal, find_repeated, refuse};
+use crate::toml_file::suggest_key;
 use serde::Serialize;
 
 /// Least standard deviation, %: below it a constant is better held.
@@ -25,12 +25,12 @@ pub enum Constants {
         sd_relative: f64,
     },
     /// Those of a list.
-    Listed(Vec<Nuisance>),
+    Listed(Vec<NuisanceParameter>),
 }
 
 /// A constant that is freed within a prior.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Nuisance {
+pub struct NuisanceParameter {
     /// Key of the scene with its table.
     pub name: String,
     /// Standard deviation of its logarithm about the scene's value.
@@ -45,7 +45,7 @@ impl Constants {
     }
 
     /// Names that the job lists.
-    pub(super) fn names(&self) -> impl Iterator<Item = &str> {
+    pub(super) fn listed_names(&self) -> impl Iterator<Item = &str> {
         let listed = match self {
             Self::Listed(listed) => listed.as_slice(),
             _ => &[],
@@ -54,11 +54,11 @@ impl Constants {
     }
 }
 
-pub(super) fn constants(
-    written: &as_written::Job,
+pub(super) fn check_constants(
+    written: &as_written::JobFile,
     free: &[FreeParameter],
     known: &[&str],
-) -> Result<Constants, Refusal> {
+) -> Result<Constants, JobRefusal> {
     let Some(nuisance) = &written.nuisance else { return Ok(Constants::Exact) };
     if written.trace.is_empty() {
         return refuse(
@@ -67,35 +67,47 @@ pub(super) fn constants(
         );
     }
     match nuisance {
-        as_written::Nuisance::All(text) => Ok(Constants::All { sd_relative: percentage("nuisance", text)? }),
-        as_written::Nuisance::Listed(list) => Ok(Constants::Listed(listed(list, free, known)?)),
+        as_written::JobNuisanceEntry::All(text) => {
+            Ok(Constants::All { sd_relative: parse_percentage("nuisance", text)? })
+        }
+        as_written::JobNuisanceEntry::Listed(list) => {
+            Ok(Constants::Listed(check_listed_nuisances(list, free, known)?))
+        }
     }
 }
 
-fn listed(list: &[ListedNuisance], free: &[FreeParameter], known: &[&str]) -> Result<Vec<Nuisance>, Refusal> {
+fn check_listed_nuisances(
+    list: &[ListedNuisance],
+    free: &[FreeParameter],
+    known: &[&str],
+) -> Result<Vec<NuisanceParameter>, JobRefusal> {
     if list.is_empty() {
         return refuse("nuisance", "found an empty list, expected names, or a percentage such as \"3 %\"");
     }
-    if let Some(name) = repeated(list.iter().map(|one| one.name.as_str())) {
+    if let Some(name) = find_repeated(list.iter().map(|one| one.name.as_str())) {
         return refuse(format!("nuisance `{name}`"), "found twice; remove one of them");
     }
     for (at, second) in list.iter().enumerate() {
-        if let Some(first) = list[..at].iter().find(|first| same_quantity(&first.name, &second.name)) {
+        if let Some(first) = list[..at].iter().find(|first| is_same_quantity(&first.name, &second.name)) {
             return refuse(
                 format!("nuisance `{}`", second.name),
                 format!("sets the same quantity as `{}`; remove one of them", first.name),
             );
         }
     }
-    list.iter().map(|one| nuisance(one, free, known)).collect()
+    list.iter().map(|one| check_nuisance(one, free, known)).collect()
 }
 
-fn nuisance(written: &ListedNuisance, free: &[FreeParameter], known: &[&str]) -> Result<Nuisance, Refusal> {
+fn check_nuisance(
+    written: &ListedNuisance,
+    free: &[FreeParameter],
+    known: &[&str],
+) -> Result<NuisanceParameter, JobRefusal> {
     let (name, key) = (&written.name, format!("nuisance `{}`", written.name));
     if !known.contains(&name.as_str()) {
-        return refuse(key, format!("not a parameter of a scene; {}", nearest(name, known)));
+        return refuse(key, format!("not a parameter of a scene; {}", suggest_key(name, known)));
     }
-    if let Some(free) = free.iter().find(|free| same_quantity(&free.name, name)) {
+    if let Some(free) = free.iter().find(|free| is_same_quantity(&free.name, name)) {
         return refuse(
             key,
             format!(
@@ -105,24 +117,24 @@ fn nuisance(written: &ListedNuisance, free: &[FreeParameter], known: &[&str]) ->
         );
     }
     let sd_relative = match (&written.sd, written.sd_relative) {
-        (Some(text), None) => percentage(&key, text)?,
-        (None, Some(relative)) => within(&key, 100.0 * relative)?,
+        (Some(text), None) => parse_percentage(&key, text)?,
+        (None, Some(relative)) => check_percentage(&key, 100.0 * relative)?,
         _ => return refuse(key, "expected either `sd`, such as \"3 %\", or `sd_relative`, such as 0.03"),
     };
-    Ok(Nuisance { name: name.clone(), sd_relative })
+    Ok(NuisanceParameter { name: name.clone(), sd_relative })
 }
 
 /// `3 %` as 0.03.
-fn percentage(key: &str, text: &str) -> Result<f64, Refusal> {
+fn parse_percentage(key: &str, text: &str) -> Result<f64, JobRefusal> {
     let number = text.trim().strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok());
     let Some(percent) = number else {
         return refuse(key, format!("found \"{text}\", expected a percentage such as \"3 %\""));
     };
-    within(key, percent)
+    check_percentage(key, percent)
 }
 
 /// A percentage as a share.
-fn within(key: &str, percent: f64) -> Result<f64, Refusal> {
+fn check_percentage(key: &str, percent: f64) -> Result<f64, JobRefusal> {
     if (LEAST_PERCENT..=MOST_PERCENT).contains(&percent) {
         return Ok(percent / 100.0);
     }

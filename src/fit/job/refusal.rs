@@ -1,6 +1,6 @@
 //! Why a job is refused, and the checks that many keys share.
 
-use crate::fit::scale::ScaleError;
+use crate::fit::scale::BoundsError;
 use crate::toml_file::{self, TomlError};
 use std::collections::HashSet;
 
@@ -18,7 +18,7 @@ pub enum JobError {
         /// Name of the parameter.
         name: String,
         /// What is wrong with them.
-        problem: ScaleError,
+        problem: BoundsError,
     },
     /// A value that cannot be used.
     #[error("{file}: {key}: {problem}")]
@@ -33,12 +33,12 @@ pub enum JobError {
 }
 
 /// A refusal that does not know its file yet.
-pub(super) enum Refusal {
+pub(super) enum JobRefusal {
     Value { key: String, problem: String },
-    Bounds { name: String, problem: ScaleError },
+    Bounds { name: String, problem: BoundsError },
 }
 
-impl Refusal {
+impl JobRefusal {
     pub(super) fn in_file(self, file: &str) -> JobError {
         let file = file.to_owned();
         match self {
@@ -48,28 +48,28 @@ impl Refusal {
     }
 }
 
-impl From<toml_file::Refusal> for Refusal {
-    fn from((key, problem): toml_file::Refusal) -> Self {
+impl From<toml_file::KeyRefusal> for JobRefusal {
+    fn from((key, problem): toml_file::KeyRefusal) -> Self {
         Self::Value { key, problem }
     }
 }
 
-pub(super) fn refuse<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, Refusal> {
-    Err(Refusal::Value { key: key.into(), problem: problem.into() })
+pub(super) fn refuse<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, JobRefusal> {
+    Err(JobRefusal::Value { key: key.into(), problem: problem.into() })
 }
 
-pub(super) fn non_empty(key: &str, found: &str, expected: &str) -> Result<String, Refusal> {
+pub(super) fn check_non_empty(key: &str, found: &str, expected: &str) -> Result<String, JobRefusal> {
     if found.trim().is_empty() {
         return refuse(key, format!("found \"{found}\", expected {expected}"));
     }
     Ok(found.to_owned())
 }
 
-pub(super) fn above_zero(key: impl Into<String>, found: f64) -> Result<f64, Refusal> {
-    Ok(toml_file::above_zero(key, found)?)
+pub(super) fn check_above_zero(key: impl Into<String>, found: f64) -> Result<f64, JobRefusal> {
+    Ok(toml_file::check_above_zero(key, found)?)
 }
 
-pub(super) fn repeated<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+pub(super) fn find_repeated<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     let mut met = HashSet::new();
     names.find(|name| !met.insert(*name))
 }

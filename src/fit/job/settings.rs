@@ -1,9 +1,9 @@
 //! Tables of a job that say how it is computed: ensemble, camera, plausibility, search, intervals.
 
 use super::as_written;
-use super::refusal::{Refusal, above_zero, refuse};
-use crate::fit::settings::{STAGNANT_GENERATIONS, Settings};
-use crate::fit::trace::MOST_TWINS;
+use super::refusal::{JobRefusal, check_above_zero, refuse};
+use crate::fit::settings::{STAGNANT_GENERATIONS, SearchSettings};
+use crate::fit::trace::MAX_TWINS;
 use crate::twin::Camera;
 use serde::Serialize;
 
@@ -31,7 +31,7 @@ const MOST_ENTRIES: usize = 1000;
 /// Fits to twins of the best model unless the job says otherwise: forty know a standard deviation to a tenth.
 const REPLICATES: usize = 40;
 /// Most of them: a thousand know a 95 % interval to a few hundredths of its width.
-const MOST_REPLICATES: usize = MOST_TWINS;
+const MOST_REPLICATES: usize = MAX_TWINS;
 
 /// Starting states of a model run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -52,7 +52,7 @@ pub struct IntervalSettings {
 }
 
 /// Refuses a job of more entries than anybody reads, before they are compared with each other.
-pub(super) fn check_counts(written: &as_written::Job) -> Result<(), Refusal> {
+pub(super) fn check_counts(written: &as_written::JobFile) -> Result<(), JobRefusal> {
     let counts = [
         ("recording", written.recording.len()),
         ("condition", written.condition.len()),
@@ -61,13 +61,13 @@ pub(super) fn check_counts(written: &as_written::Job) -> Result<(), Refusal> {
         ("feature", written.feature.len()),
         ("trace", written.trace.len()),
     ];
-    counts.into_iter().try_for_each(|(key, found)| within(key, found, 0, MOST_ENTRIES, "leave some out"))
+    counts.into_iter().try_for_each(|(key, found)| check_count(key, found, 0, MOST_ENTRIES, "leave some out"))
 }
 
-pub(super) fn camera(written: &as_written::Job) -> Result<Option<Camera>, Refusal> {
+pub(super) fn check_camera_table(written: &as_written::JobFile) -> Result<Option<Camera>, JobRefusal> {
     let needed = written.recording.is_empty() || !written.condition.is_empty();
     match (&written.camera, needed) {
-        (Some(camera), true) => checked(camera).map(Some),
+        (Some(camera), true) => check_camera(camera).map(Some),
         (None, false) => Ok(None),
         (Some(_), false) => {
             refuse("camera", "found with a [[recording]], which has its own camera; remove [camera]")
@@ -79,8 +79,8 @@ pub(super) fn camera(written: &as_written::Job) -> Result<Option<Camera>, Refusa
     }
 }
 
-fn checked(camera: &Camera) -> Result<Camera, Refusal> {
-    let frame_rate_hz = above_zero("camera.frame_rate_hz", camera.frame_rate_hz)?;
+fn check_camera(camera: &Camera) -> Result<Camera, JobRefusal> {
+    let frame_rate_hz = check_above_zero("camera.frame_rate_hz", camera.frame_rate_hz)?;
     let exposure_s = camera.exposure_s;
     if !(exposure_s >= 0.0 && exposure_s * frame_rate_hz <= 1.0) {
         return refuse(
@@ -91,10 +91,10 @@ fn checked(camera: &Camera) -> Result<Camera, Refusal> {
     Ok(Camera { frame_rate_hz, exposure_s })
 }
 
-pub(super) fn ensemble(written: &as_written::Job) -> Result<Ensemble, Refusal> {
+pub(super) fn check_ensemble(written: &as_written::JobFile) -> Result<Ensemble, JobRefusal> {
     let (members, spread) = written.ensemble.as_ref().map_or((None, None), |e| (e.members, e.spread));
     let (members, spread) = (members.unwrap_or(1), spread.unwrap_or(SPREAD));
-    within("ensemble.members", members, 1, MOST_MEMBERS, "starting states that are averaged over")?;
+    check_count("ensemble.members", members, 1, MOST_MEMBERS, "starting states that are averaged over")?;
     if !(spread > 0.0 && spread <= 1.0) {
         return refuse(
             "ensemble.spread",
@@ -104,7 +104,7 @@ pub(super) fn ensemble(written: &as_written::Job) -> Result<Ensemble, Refusal> {
     Ok(Ensemble { members, spread })
 }
 
-pub(super) fn largest_tilt_rad(written: &as_written::Job) -> Result<Option<f64>, Refusal> {
+pub(super) fn check_largest_tilt_rad(written: &as_written::JobFile) -> Result<Option<f64>, JobRefusal> {
     let Some(tilt_deg) = written.plausible.as_ref().and_then(|p| p.largest_tilt_deg) else { return Ok(None) };
     if tilt_deg > 0.0 && tilt_deg < 90.0 {
         return Ok(Some(tilt_deg.to_radians()));
@@ -117,11 +117,11 @@ pub(super) fn largest_tilt_rad(written: &as_written::Job) -> Result<Option<f64>,
     )
 }
 
-pub(super) fn intervals(written: &as_written::Job) -> Result<IntervalSettings, Refusal> {
+pub(super) fn check_intervals(written: &as_written::JobFile) -> Result<IntervalSettings, JobRefusal> {
     let (profile, bootstrap) = written.intervals.as_ref().map_or((None, None), |i| (i.profile, i.bootstrap));
     // (a trace has the scatter of its segments, and a refit of it takes as long as a tenth of the search)
     let bootstrap = bootstrap.unwrap_or(if written.trace.is_empty() { REPLICATES } else { 0 });
-    within(
+    check_count(
         "intervals.bootstrap",
         bootstrap,
         0,
@@ -132,11 +132,11 @@ pub(super) fn intervals(written: &as_written::Job) -> Result<IntervalSettings, R
 }
 
 /// Budgets of the search for features; a job that fits traces needs none, because its search ends by itself.
-pub(super) fn search(written: &as_written::Job) -> Result<Settings, Refusal> {
+pub(super) fn check_search(written: &as_written::JobFile) -> Result<SearchSettings, JobRefusal> {
     let traced = !written.trace.is_empty();
     let Some(search) = &written.search else {
         return match traced {
-            true => Ok(of_traces(written.seed)),
+            true => Ok(default_search_settings(written.seed)),
             false => refuse(
                 "search",
                 "missing; without a [[trace]] expected [search] with `global_evaluations` and `local_evaluations`; add it",
@@ -144,21 +144,21 @@ pub(super) fn search(written: &as_written::Job) -> Result<Settings, Refusal> {
         };
     };
     let particles = search.particles.unwrap_or(PARTICLES);
-    within("search.particles", particles, 2, MOST_PARTICLES, "a cloud needs at least two")?;
+    check_count("search.particles", particles, 2, MOST_PARTICLES, "a cloud needs at least two")?;
     let starts = search.starts.unwrap_or(STARTS);
-    within("search.starts", starts, 1, MOST_STARTS, "points from which a local search starts")?;
-    Ok(Settings {
+    check_count("search.starts", starts, 1, MOST_STARTS, "points from which a local search starts")?;
+    Ok(SearchSettings {
         seed: written.seed,
-        global_evaluations: global_evaluations(search, particles, traced)?,
-        local_evaluations: local_evaluations(search, written.parameter.len(), traced)?,
+        global_evaluations: check_global_evaluations(search, particles, traced)?,
+        local_evaluations: check_local_evaluations(search, written.parameter.len(), traced)?,
         particles,
         stagnation_generations: search.stagnation_generations.unwrap_or(STAGNANT_GENERATIONS),
         starts,
     })
 }
 
-fn of_traces(seed: u64) -> Settings {
-    Settings {
+fn default_search_settings(seed: u64) -> SearchSettings {
+    SearchSettings {
         seed,
         global_evaluations: 0,
         local_evaluations: 0,
@@ -168,16 +168,24 @@ fn of_traces(seed: u64) -> Settings {
     }
 }
 
-fn global_evaluations(search: &as_written::Search, particles: usize, traced: bool) -> Result<usize, Refusal> {
+fn check_global_evaluations(
+    search: &as_written::JobSearchTable,
+    particles: usize,
+    traced: bool,
+) -> Result<usize, JobRefusal> {
     let key = "search.global_evaluations";
-    let Some(found) = search.global_evaluations else { return absent(key, traced) };
-    within(key, found, particles, MOST_EVALUATIONS, "the first generation takes one a particle")?;
+    let Some(found) = search.global_evaluations else { return missing_budget(key, traced) };
+    check_count(key, found, particles, MOST_EVALUATIONS, "the first generation takes one a particle")?;
     Ok(found)
 }
 
-fn local_evaluations(search: &as_written::Search, dimensions: usize, traced: bool) -> Result<usize, Refusal> {
+fn check_local_evaluations(
+    search: &as_written::JobSearchTable,
+    dimensions: usize,
+    traced: bool,
+) -> Result<usize, JobRefusal> {
     let key = "search.local_evaluations";
-    let Some(found) = search.local_evaluations else { return absent(key, traced) };
+    let Some(found) = search.local_evaluations else { return missing_budget(key, traced) };
     if found > MOST_EVALUATIONS || (found != 0 && found <= dimensions) {
         return refuse(
             key,
@@ -190,14 +198,14 @@ fn local_evaluations(search: &as_written::Search, dimensions: usize, traced: boo
     Ok(found)
 }
 
-fn absent(key: &str, traced: bool) -> Result<usize, Refusal> {
+fn missing_budget(key: &str, traced: bool) -> Result<usize, JobRefusal> {
     if traced {
         return Ok(0);
     }
     refuse(key, "missing; a job without a [[trace]] needs this budget; add it")
 }
 
-fn within(key: &str, found: usize, least: usize, most: usize, why: &str) -> Result<(), Refusal> {
+fn check_count(key: &str, found: usize, least: usize, most: usize, why: &str) -> Result<(), JobRefusal> {
     if (least..=most).contains(&found) {
         return Ok(());
     }

@@ -1,8 +1,8 @@
 use super::aims::TOLERANCE_RELATIVE;
 use super::settings::{PARTICLES, STARTS};
 use super::*;
-use crate::blade::parameters::find;
-use crate::feature::{Interval, Reading};
+use crate::blade::parameters::find_parameter;
+use crate::feature::{Reading, ReversalInterval};
 use crate::fit::axis::Prior;
 use crate::fit::settings::STAGNANT_GENERATIONS;
 use crate::recording::channel::Channel;
@@ -171,19 +171,19 @@ fn a_job_against_published_numbers() {
     let job = job(PUBLISHED).unwrap();
     assert_eq!(job.camera, Some(Camera { frame_rate_hz: 10_000.0, exposure_s: 5e-5 }));
     assert_eq!(job.parameter_names(), ["friction.a"]);
-    assert_eq!(job.aims.len(), 2);
+    assert_eq!(job.targets.len(), 2);
     assert_eq!(
-        (job.aims[0].source, job.aims[0].tolerance_relative),
-        (Source::Given { target: 78.4, sd: 0.5 }, Some(TOLERANCE_RELATIVE))
+        (job.targets[0].source, job.targets[0].tolerance_relative),
+        (TargetSource::Given { target: 78.4, sd: 0.5 }, Some(TOLERANCE_RELATIVE))
     );
-    let reading = Reading::Interval { interval: Interval::ReleaseAfterReversal, reversal: 1 };
+    let reading = Reading::Interval { interval: ReversalInterval::ReleaseAfterReversal, reversal: 1 };
     assert_eq!(
-        job.aims[1].feature,
+        job.targets[1].feature,
         Feature { name: "release-after-reversal".to_owned(), reading, condition: 0 }
     );
     assert_eq!(
         job.search,
-        Settings {
+        SearchSettings {
             seed: 1,
             global_evaluations: 240,
             local_evaluations: 100,
@@ -198,18 +198,18 @@ fn a_job_against_published_numbers() {
 fn a_job_against_a_recording() {
     let job = job(MEASURED).unwrap();
     assert_eq!((job.recordings().collect::<Vec<_>>(), job.camera), (vec!["../../data/x"], None));
-    assert_eq!(job.aims[0].source, Source::Measured { least_sd: 4.0, least_sd_relative: 1e-3 });
-    assert_eq!(job.aims[0].tolerance_relative, Some(0.05));
-    let Reading::Frequency(band) = &job.aims[0].feature.reading else { panic!() };
+    assert_eq!(job.targets[0].source, TargetSource::Measured { least_sd: 4.0, least_sd_relative: 1e-3 });
+    assert_eq!(job.targets[0].tolerance_relative, Some(0.05));
+    let Reading::Frequency(band) = &job.targets[0].feature.reading else { panic!() };
     assert_eq!(
         (band.channel, band.band_hz, band.detrend),
         (Channel::Deflection, (500.0, 1500.0), Detrend::Line)
     );
     assert_eq!(
-        job.aims.iter().map(|a| a.feature.name.as_str()).collect::<Vec<_>>(),
+        job.targets.iter().map(|a| a.feature.name.as_str()).collect::<Vec<_>>(),
         ["high", "chatter", "mean-deflection"]
     );
-    assert_eq!(job.aims[2].source, Source::Measured { least_sd: 0.0, least_sd_relative: 0.05 });
+    assert_eq!(job.targets[2].source, TargetSource::Measured { least_sd: 0.0, least_sd_relative: 0.05 });
 }
 
 #[test]
@@ -252,7 +252,7 @@ fn parameters_are_checked() {
     );
     let second = "[[parameter]]\nname = \"NAME\"\nlower = 1.0\nupper = 2.0\nscale = \"log\"\n[[component]]";
     let [stiffness, frequency] = ["neck_stiffness_n_m_per_rad", "neck_natural_frequency_hz"]
-        .map(|name| find(&format!("blade.{name}")).unwrap().name);
+        .map(|name| find_parameter(&format!("blade.{name}")).unwrap().name);
     let same = PUBLISHED.replace("friction.a", stiffness);
     assert_eq!(
         refusal(&same, "[[component]]", &second.replace("NAME", frequency)),

@@ -1,12 +1,12 @@
 //! Traces of a job: which recordings are fitted frame by frame, and what is not known of their cameras.
 
 use super::as_written;
-use super::cameras::{MOST_OFFSET_SD_M, MOST_SCALE_SD, OFFSET_SD_M, SCALE_SD, doubt};
-use super::conditions::{Condition, Head, head};
-use super::entry::Entry;
-use super::refusal::{Refusal, above_zero, refuse};
+use super::cameras::{DEFAULT_OFFSET_SD_M, DEFAULT_SCALE_SD, MAX_OFFSET_SD_M, MAX_SCALE_SD, check_camera_sd};
+use super::conditions::{HeadSource, JobCondition, parse_head_source};
+use super::entry::JobEntry;
+use super::refusal::{JobRefusal, check_above_zero, refuse};
 use crate::recording::channel::Window;
-use crate::toml_file::nearest;
+use crate::toml_file::suggest_key;
 use serde::Serialize;
 use std::f64::consts::PI;
 
@@ -27,7 +27,7 @@ const MOST_CLOCK_SD_S: f64 = 0.1;
 
 /// A recording whose trace is fitted.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct TraceAim {
+pub struct TraceTarget {
     /// Number of its condition, from 0.
     pub condition: usize,
     /// What of it is fitted; `None` for what it has of `tip-x` and `head-drop`.
@@ -39,9 +39,9 @@ pub struct TraceAim {
     /// Standard deviation of a tracked coordinate, m; `None` for the measured one.
     pub noise_m: Option<f64>,
     /// What drives the head of its model; `None` for the recording's own where it tracks the head.
-    pub head: Option<Head>,
+    pub head: Option<HeadSource>,
     /// What is not known of its camera.
-    pub camera: CameraDoubt,
+    pub camera: CameraPriorSds,
 }
 
 /// A tracked quantity that a trace fit compares frame by frame.
@@ -63,14 +63,14 @@ impl TraceChannel {
 
     /// The word in a job and in a result.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         Self::WORDS[self as usize].1
     }
 }
 
 /// Standard deviations of what is not known of a camera; one that is 0 is held at its nominal value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct CameraDoubt {
+pub struct CameraPriorSds {
     /// Of the angle from the picture's x axis to the glass, rad.
     pub tilt_sd_rad: f64,
     /// Of the scale, relative.
@@ -83,88 +83,104 @@ pub struct CameraDoubt {
     clock_sd_s: Option<f64>,
 }
 
-impl CameraDoubt {
+impl CameraPriorSds {
     /// Of the camera's clock against the drive's, s, with this drive.
     #[must_use]
-    pub fn clock_sd_s(&self, head: Head) -> f64 {
+    pub fn clock_sd_s(&self, head: HeadSource) -> f64 {
         self.clock_sd_s.unwrap_or(match head {
-            Head::Recording => 0.0,
-            Head::Scene => CLOCK_SD_S,
+            HeadSource::Recording => 0.0,
+            HeadSource::Scene => CLOCK_SD_S,
         })
     }
 }
 
-pub(super) fn traces(
-    written: &[as_written::Trace],
-    conditions: &[Condition],
-) -> Result<Vec<TraceAim>, Refusal> {
-    let mut traces: Vec<TraceAim> = Vec::new();
+pub(super) fn check_traces(
+    written: &[as_written::JobTraceTable],
+    conditions: &[JobCondition],
+) -> Result<Vec<TraceTarget>, JobRefusal> {
+    let mut traces: Vec<TraceTarget> = Vec::new();
     for (number, written) in (1..).zip(written) {
-        let entry = Entry { what: format!("trace {number}") };
-        let trace = trace(&entry, written, conditions)?;
-        check_beside(&entry, &trace, &traces, conditions)?;
+        let entry = JobEntry { what: format!("trace {number}") };
+        let trace = check_trace(&entry, written, conditions)?;
+        check_trace_consistency(&entry, &trace, &traces, conditions)?;
         traces.push(trace);
     }
     Ok(traces)
 }
 
 /// One trace a recording, and the stages of the others.
-fn check_beside(
-    entry: &Entry,
-    trace: &TraceAim,
-    before: &[TraceAim],
-    conditions: &[Condition],
-) -> Result<(), Refusal> {
+fn check_trace_consistency(
+    entry: &JobEntry,
+    trace: &TraceTarget,
+    before: &[TraceTarget],
+    conditions: &[JobCondition],
+) -> Result<(), JobRefusal> {
     if before.iter().any(|other| other.condition == trace.condition) {
         let name = &conditions[trace.condition].name;
         return refuse(
-            entry.key("recording"),
+            entry.key_path("recording"),
             format!("`{name}` has a [[trace]] already, and its camera is one; remove one of them"),
         );
     }
     match before.first().filter(|first| first.segment_s != trace.segment_s) {
         Some(_) => refuse(
-            entry.key("segment_s"),
+            entry.key_path("segment_s"),
             "differs from that of trace 1, expected the same: all recordings go through the stages together",
         ),
         None => Ok(()),
     }
 }
 
-fn trace(entry: &Entry, written: &as_written::Trace, conditions: &[Condition]) -> Result<TraceAim, Refusal> {
-    let place = entry.place(written.recording.as_ref(), conditions, None)?;
+fn check_trace(
+    entry: &JobEntry,
+    written: &as_written::JobTraceTable,
+    conditions: &[JobCondition],
+) -> Result<TraceTarget, JobRefusal> {
+    let place = entry.find_condition(written.recording.as_ref(), conditions, None)?;
     let name = &conditions[place.index].name;
     if !place.measured {
         return refuse(
-            entry.key("recording"),
+            entry.key_path("recording"),
             format!("`{name}` has no recording; a [[trace]] needs a [[recording]]"),
         );
     }
     if place.held_out {
         return refuse(
-            entry.key("recording"),
+            entry.key_path("recording"),
             format!("`{name}` is held out of the fit; remove `held_out`, or the [[trace]]"),
         );
     }
-    let window = |text: &String| Window::parse(text).or_else(|e| refuse(entry.key("window"), e.to_string()));
-    Ok(TraceAim {
+    let window =
+        |text: &String| Window::parse(text).or_else(|e| refuse(entry.key_path("window"), e.to_string()));
+    Ok(TraceTarget {
         condition: place.index,
-        channels: written.channels.as_deref().map(|found| channels(entry, found)).transpose()?,
-        segment_s: written.segment_s.as_deref().map(|found| segments(entry, found)).transpose()?,
+        channels: written.channels.as_deref().map(|found| check_channels(entry, found)).transpose()?,
+        segment_s: written
+            .segment_s
+            .as_deref()
+            .map(|found| check_segment_lengths(entry, found))
+            .transpose()?,
         window: written.window.as_ref().map(window).transpose()?,
-        noise_m: written.noise_m.map(|noise| above_zero(entry.key("noise_m"), noise)).transpose()?,
-        head: written.drive.as_deref().map(|word| head(entry.key("drive"), word)).transpose()?,
-        camera: camera(entry, &written.camera)?,
+        noise_m: written
+            .noise_m
+            .map(|noise| check_above_zero(entry.key_path("noise_m"), noise))
+            .transpose()?,
+        head: written
+            .drive
+            .as_deref()
+            .map(|word| parse_head_source(entry.key_path("drive"), word))
+            .transpose()?,
+        camera: check_trace_camera(entry, &written.camera)?,
     })
 }
 
-fn channels(entry: &Entry, words: &[String]) -> Result<Vec<TraceChannel>, Refusal> {
-    let key = || entry.key("channels");
+fn check_channels(entry: &JobEntry, words: &[String]) -> Result<Vec<TraceChannel>, JobRefusal> {
+    let key = || entry.key_path("channels");
     let known = TraceChannel::WORDS.map(|(_, word)| word);
     let one = |word: &String| {
         let found = TraceChannel::WORDS.iter().find(|(_, known)| known == word);
         found.map_or_else(
-            || refuse(key(), format!("found \"{word}\"; {}", nearest(word, &known))),
+            || refuse(key(), format!("found \"{word}\"; {}", suggest_key(word, &known))),
             |(channel, _)| Ok(*channel),
         )
     };
@@ -184,8 +200,8 @@ fn channels(entry: &Entry, words: &[String]) -> Result<Vec<TraceChannel>, Refusa
     Ok(found)
 }
 
-fn segments(entry: &Entry, found: &[f64]) -> Result<Vec<f64>, Refusal> {
-    let key = || entry.key("segment_s");
+fn check_segment_lengths(entry: &JobEntry, found: &[f64]) -> Result<Vec<f64>, JobRefusal> {
+    let key = || entry.key_path("segment_s");
     if !(1..=MOST_STAGES).contains(&found.len()) {
         return refuse(
             key(),
@@ -195,7 +211,7 @@ fn segments(entry: &Entry, found: &[f64]) -> Result<Vec<f64>, Refusal> {
             ),
         );
     }
-    found.iter().try_for_each(|length| above_zero(key(), *length).map(|_| ()))?;
+    found.iter().try_for_each(|length| check_above_zero(key(), *length).map(|_| ()))?;
     match found.windows(2).find(|pair| pair[0] >= pair[1]) {
         Some(pair) => refuse(
             key(),
@@ -208,15 +224,18 @@ fn segments(entry: &Entry, found: &[f64]) -> Result<Vec<f64>, Refusal> {
     }
 }
 
-fn camera(entry: &Entry, written: &as_written::TraceCamera) -> Result<CameraDoubt, Refusal> {
-    let sd = |key: &str, found, most| doubt(entry.key(&format!("camera.{key}")), found, most);
+fn check_trace_camera(
+    entry: &JobEntry,
+    written: &as_written::JobTraceCameraTable,
+) -> Result<CameraPriorSds, JobRefusal> {
+    let sd = |key: &str, found, most| check_camera_sd(entry.key_path(&format!("camera.{key}")), found, most);
     let tilt_sd_deg = sd("tilt_sd_deg", written.tilt_sd_deg, MOST_TILT_SD_DEG)?;
-    Ok(CameraDoubt {
+    Ok(CameraPriorSds {
         tilt_sd_rad: tilt_sd_deg.unwrap_or(TILT_SD_DEG) * PI / 180.0,
-        scale_sd: sd("scale_sd", written.scale_sd, MOST_SCALE_SD)?.unwrap_or(SCALE_SD),
+        scale_sd: sd("scale_sd", written.scale_sd, MAX_SCALE_SD)?.unwrap_or(DEFAULT_SCALE_SD),
         drift_sd_m_per_s: sd("drift_sd_m_per_s", written.drift_sd_m_per_s, MOST_DRIFT_SD_M_PER_S)?
             .unwrap_or(0.0),
-        offset_sd_m: sd("offset_sd_m", written.offset_sd_m, MOST_OFFSET_SD_M)?.unwrap_or(OFFSET_SD_M),
+        offset_sd_m: sd("offset_sd_m", written.offset_sd_m, MAX_OFFSET_SD_M)?.unwrap_or(DEFAULT_OFFSET_SD_M),
         clock_sd_s: sd("clock_sd_s", written.clock_sd_s, MOST_CLOCK_SD_S)?,
     })
 }

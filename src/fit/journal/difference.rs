@@ -1,19 +1,21 @@
 //! What differs between two outcomes at one point, in words.
 
-use crate::fit::evaluation::{Observed, Outcome};
+use crate::fit::evaluation::{EvaluationOutcome, Observed};
 use crate::fit::failure::RunFailure;
 use std::fmt::Debug;
 
 /// The first difference: what the one has there, and what the other.
-pub(super) fn between(one: &Outcome, other: &Outcome) -> Option<[String; 2]> {
-    values(one, other).or_else(|| failures(one, other)).or_else(|| features(one, other))
+pub(super) fn first_difference(one: &EvaluationOutcome, other: &EvaluationOutcome) -> Option<[String; 2]> {
+    value_difference(one, other)
+        .or_else(|| failure_difference(one, other))
+        .or_else(|| feature_difference(one, other))
 }
 
-fn values(one: &Outcome, other: &Outcome) -> Option<[String; 2]> {
+fn value_difference(one: &EvaluationOutcome, other: &EvaluationOutcome) -> Option<[String; 2]> {
     (one.values != other.values).then(|| [one, other].map(|outcome| format!("values {:?}", outcome.values)))
 }
 
-fn failures(one: &Outcome, other: &Outcome) -> Option<[String; 2]> {
+fn failure_difference(one: &EvaluationOutcome, other: &EvaluationOutcome) -> Option<[String; 2]> {
     let words = |failure: Option<&RunFailure>| match failure {
         Some(RunFailure { reason, message, progress }) => {
             format!("failure {reason} ({message}) after {progress} of the run")
@@ -23,16 +25,16 @@ fn failures(one: &Outcome, other: &Outcome) -> Option<[String; 2]> {
     (one.failure != other.failure).then(|| [one, other].map(|outcome| words(outcome.failure.as_ref())))
 }
 
-fn features(one: &Outcome, other: &Outcome) -> Option<[String; 2]> {
+fn feature_difference(one: &EvaluationOutcome, other: &EvaluationOutcome) -> Option<[String; 2]> {
     if one.features.len() != other.features.len() {
         return Some([one, other].map(|outcome| format!("{} features", outcome.features.len())));
     }
     let mut pairs = one.features.iter().zip(&other.features).enumerate();
     let (at, (a, b)) = pairs.find(|(_, (a, b))| a != b)?;
-    Some([a, b].map(|observed| format!("feature {} {}", at + 1, feature(observed))))
+    Some([a, b].map(|observed| format!("feature {} {}", at + 1, describe_observed(observed))))
 }
 
-fn feature(observed: &Observed) -> String {
+fn describe_observed(observed: &Observed) -> String {
     let number = |name: &str, number: &dyn Debug| format!(", {name} {number:?}");
     match observed {
         Observed::Value(found) => {

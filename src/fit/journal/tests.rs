@@ -1,58 +1,63 @@
 use super::*;
-use crate::feature::Measure;
-use crate::fit::scale::{Bounds, Spacing};
-use crate::fit::target::Target;
-use crate::journal::{JournalError, header_line, line};
-use crate::simulate::Status;
+use crate::feature::ValueComparison;
+use crate::fit::scale::{Bounds, BoundsSpacing};
+use crate::fit::target::TargetValue;
+use crate::journal::{CheckpointError, format_header_line, format_record_line};
+use crate::simulate::RunStatus;
 
-fn header(fingerprint: &str) -> Header {
-    let bounds = [Bounds::new(0.001, 10.0, Spacing::Log), Bounds::new(-1.0, 2.0, Spacing::Linear)];
-    let parameters = ["a", "b"].iter().zip(bounds).map(|(name, bounds)| Parameter {
+fn header(fingerprint: &str) -> FeatureHeader {
+    let bounds =
+        [Bounds::new(0.001, 10.0, BoundsSpacing::Log), Bounds::new(-1.0, 2.0, BoundsSpacing::Linear)];
+    let parameters = ["a", "b"].iter().zip(bounds).map(|(name, bounds)| HeaderParameter {
         name: (*name).to_owned(),
         unit: "N".to_owned(),
         axis: bounds.unwrap().into(),
     });
-    let features = ["low", "high"].map(|name| Aimed {
+    let features = ["low", "high"].map(|name| HeaderFeature {
         name: name.to_owned(),
         unit: "Hz".to_owned(),
         target: target(name),
     });
     let (parameters, features) = (parameters.collect(), features.into());
-    Header::of::<Entry>(fingerprint, "0.1.0", Body { seed: 1, parameters, features })
+    FeatureHeader::new::<EvaluationRecord>(
+        fingerprint,
+        "0.1.0",
+        FeatureHeaderBody { seed: 1, parameters, features },
+    )
 }
 
-fn target(name: &str) -> Target {
+fn target(name: &str) -> TargetValue {
     let name = name.to_owned();
-    Target {
+    TargetValue {
         name,
         value: 0.1 + 0.2,
         sd: 1e-3,
         scatter: 0.0,
-        measure: Measure::Log,
+        measure: ValueComparison::Log,
         last: false,
         calibration: None,
     }
 }
 
-fn read(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<Journal>, JournalError> {
-    journal::read(file, bytes)
+fn read(file: &str, bytes: impl AsRef<[u8]>) -> Result<Option<FeatureCheckpoint>, CheckpointError> {
+    journal::read_checkpoint(file, bytes)
 }
 
-fn entry_line(at: usize, stage: Stage, outcome: &Outcome) -> String {
-    line(&Entry { stage, outcome: outcome.clone() }, at)
+fn entry_line(at: usize, stage: EvaluationStage, outcome: &EvaluationOutcome) -> String {
+    format_record_line(&EvaluationRecord { stage, outcome: outcome.clone() }, at)
 }
 
-fn outcome(u: f64) -> Outcome {
-    let features = vec![Observed::of(1e23 * u), Observed::Missing("no peak".to_owned())];
+fn outcome(u: f64) -> EvaluationOutcome {
+    let features = vec![Observed::from_value(1e23 * u), Observed::Missing("no peak".to_owned())];
     let unit = vec![u, 0.1 + 0.2];
     let parameters = header("f").body.parameters;
     let values = parameters.iter().zip(&unit).map(|(p, u)| p.axis.bounds.from_unit(*u)).collect();
-    Outcome { unit, values, features, failure: None }
+    EvaluationOutcome { unit, values, features, failure: None }
 }
 
 fn text(units: &[f64]) -> String {
-    let lines = units.iter().enumerate().map(|(i, u)| entry_line(i, Stage::Global, &outcome(*u)));
-    header_line(&header("f")) + &lines.collect::<String>()
+    let lines = units.iter().enumerate().map(|(i, u)| entry_line(i, EvaluationStage::Global, &outcome(*u)));
+    format_header_line(&header("f")) + &lines.collect::<String>()
 }
 
 #[test]
@@ -63,15 +68,15 @@ fn every_bit_survives() {
     for (entry, u) in journal.records.iter().zip(&units) {
         assert_eq!(entry.outcome, outcome(*u));
     }
-    let failed = Outcome {
-        failure: Some(RunFailure::new(FailureReason::Ended(Status::Jammed), "at 0.1 s", 0.3)),
+    let failed = EvaluationOutcome {
+        failure: Some(RunFailure::new(FailureReason::Ended(RunStatus::Jammed), "at 0.1 s", 0.3)),
         features: vec![],
         ..outcome(0.5)
     };
-    let line = header_line(&header("f")) + &entry_line(0, Stage::Local, &failed);
+    let line = format_header_line(&header("f")) + &entry_line(0, EvaluationStage::Local, &failed);
     assert_eq!(
         read("j", &line).unwrap().unwrap().records,
-        vec![Entry { stage: Stage::Local, outcome: failed }]
+        vec![EvaluationRecord { stage: EvaluationStage::Local, outcome: failed }]
     );
 }
 
@@ -91,7 +96,7 @@ fn a_torn_last_line_is_dropped_and_said() {
 fn forged(text: &str, from: &str, to: &str) -> String {
     let resealed = |line: &str| {
         let content = line.split_once(",\"sha256\"").unwrap().0;
-        crate::journal::sealed(&(content.replacen(from, to, 1) + "}")) + "\n"
+        crate::journal::append_checksum(&(content.replacen(from, to, 1) + "}")) + "\n"
     };
     let at = text.lines().position(|line| line.contains(from)).unwrap();
     let lines = text.lines().enumerate();
@@ -140,7 +145,7 @@ fn a_line_without_end_counts_when_its_checksum_holds() {
     let journal = read("j", whole.trim_end()).unwrap().unwrap();
     assert_eq!((journal.records.len(), journal.end.torn, journal.end.unended), (2, false, true));
     assert_eq!(journal.end.intact_bytes, whole.len() - 1);
-    let header = header_line(&header("f"));
+    let header = format_header_line(&header("f"));
     let journal = read("j", header.trim_end()).unwrap().unwrap();
     assert_eq!((journal.records.len(), journal.end.unended), (0, true));
 }
@@ -177,28 +182,31 @@ fn line_ends_of_other_systems_and_a_byte_order_mark_are_read() {
 #[test]
 fn a_journal_of_another_fit_is_refused_with_what_differs_and_what_to_do() {
     let expected = header("f");
-    let refused = |found: Header| found.check::<Entry>("j", &expected).unwrap_err().to_string();
-    assert_eq!(expected.check::<Entry>("j", &expected), Ok(()));
+    let refused = |found: FeatureHeader| {
+        found.check_matches::<EvaluationRecord>("j", &expected).unwrap_err().to_string()
+    };
+    assert_eq!(expected.check_matches::<EvaluationRecord>("j", &expected), Ok(()));
     assert!(
         refused(header("g"))
             .starts_with("j: fingerprint g, expected f: the job, a scene or a recording has changed")
     );
-    let version = refused(Header { version: "0.0.9".to_owned(), fingerprint: "g".to_owned(), ..header("f") });
+    let version =
+        refused(FeatureHeader { version: "0.0.9".to_owned(), fingerprint: "g".to_owned(), ..header("f") });
     assert!(
         version.starts_with("j: written by version 0.0.9 of the program, this is version 0.1.0")
             && version.contains("resume with version 0.0.9")
     );
-    let body = |body: Body| Header { body, ..header("f") };
+    let body = |body: FeatureHeaderBody| FeatureHeader { body, ..header("f") };
     let mut wider = expected.body.clone();
-    wider.parameters[0].axis = Bounds::new(0.001, 20.0, Spacing::Log).unwrap().into();
-    for other in [Body { features: vec![], ..expected.body.clone() }, wider] {
+    wider.parameters[0].axis = Bounds::new(0.001, 20.0, BoundsSpacing::Log).unwrap().into();
+    for other in [FeatureHeaderBody { features: vec![], ..expected.body.clone() }, wider] {
         assert!(
             refused(body(other))
                 .starts_with("j:1: the header has other parameters, bounds, features or targets")
         );
     }
-    let seed = body(Body { seed: 7, ..expected.body.clone() });
-    assert_eq!(seed.check::<Entry>("j", &expected), Ok(()));
+    let seed = body(FeatureHeaderBody { seed: 7, ..expected.body.clone() });
+    assert_eq!(seed.check_matches::<EvaluationRecord>("j", &expected), Ok(()));
 }
 
 #[test]
@@ -230,12 +238,17 @@ fn an_evaluation_that_is_computed_otherwise_is_refused_with_both_outcomes() {
         vec![Observed::Value(shown), Observed::Missing("no peak".to_owned())]
     };
     let failed = |message: &str, progress| {
-        let failure = RunFailure::new(FailureReason::Ended(Status::Jammed), message, progress);
-        Outcome { features: vec![], failure: Some(failure), ..outcome(0.5) }
+        let failure = RunFailure::new(FailureReason::Ended(RunStatus::Jammed), message, progress);
+        EvaluationOutcome { features: vec![], failure: Some(failure), ..outcome(0.5) }
     };
-    let with = |features| Outcome { features, ..outcome(0.5) };
-    let pairs: [(Outcome, Outcome, &str, &str); 7] = [
-        (with(vec![Observed::of(2.0), Observed::of(1.0)]), outcome(0.5), "feature 1 2.0", "feature 1 5e22"),
+    let with = |features| EvaluationOutcome { features, ..outcome(0.5) };
+    let pairs: [(EvaluationOutcome, EvaluationOutcome, &str, &str); 7] = [
+        (
+            with(vec![Observed::from_value(2.0), Observed::from_value(1.0)]),
+            outcome(0.5),
+            "feature 1 2.0",
+            "feature 1 5e22",
+        ),
         (with(averaged(0.25, 0.0)), outcome(0.5), "feature 1 5e22, spread 0.25", "feature 1 5e22"),
         (
             with(averaged(0.0, 3.0)),
@@ -244,7 +257,7 @@ fn an_evaluation_that_is_computed_otherwise_is_refused_with_both_outcomes() {
             "feature 1 5e22",
         ),
         (
-            with(vec![Observed::of(5e22), Observed::Missing("lost".to_owned())]),
+            with(vec![Observed::from_value(5e22), Observed::Missing("lost".to_owned())]),
             outcome(0.5),
             "feature 2 missing (lost)",
             "feature 2 missing (no peak)",
@@ -255,12 +268,12 @@ fn an_evaluation_that_is_computed_otherwise_is_refused_with_both_outcomes() {
     ];
     for (stored, again, found, computed) in pairs {
         journal.records[1].outcome = stored;
-        let again = Entry { stage: Stage::Local, outcome: again };
-        let refused = journal.check_again("j", 1, &again).unwrap_err().to_string();
+        let again = EvaluationRecord { stage: EvaluationStage::Local, outcome: again };
+        let refused = journal.check_recomputed("j", 1, &again).unwrap_err().to_string();
         let (before, after) = refused.split_once(", but computed again the evaluation gives ").unwrap();
         assert!(before.starts_with(&format!("j:3: found {found}")), "{refused}");
         assert!(after.starts_with(computed) && after.contains("to the last digit"), "{refused}");
     }
-    let same = Entry { stage: Stage::Local, outcome: outcome(0.25) };
-    assert_eq!(journal.check_again("j", 0, &same), Ok(()), "the purpose of an evaluation may differ");
+    let same = EvaluationRecord { stage: EvaluationStage::Local, outcome: outcome(0.25) };
+    assert_eq!(journal.check_recomputed("j", 0, &same), Ok(()), "the purpose of an evaluation may differ");
 }

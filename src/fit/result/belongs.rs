@@ -7,7 +7,7 @@ use std::collections::BTreeSet;
 
 /// An estimate at a bound has been through a logarithm and back, which costs a few units in the last place;
 /// relative.
-const ROUNDING: f64 = 1e-12;
+const BOUND_ROUNDING: f64 = 1e-12;
 
 impl FitResult {
     /// Holds the result against the job that it is said to be of: the same parameters within their bounds,
@@ -16,27 +16,31 @@ impl FitResult {
     ///
     /// # Errors
     /// [`ResultError`] with the first key that does not fit.
-    pub fn check_of(&self, job: &Job, file: &str) -> Result<(), ResultError> {
+    pub fn check_against_job(&self, job: &Job, file: &str) -> Result<(), ResultError> {
         let problem = self
-            .names(job)
-            .or_else(|| job.parameters.iter().find_map(|free| bad(free, self.parameters.get(&free.name)?)))
-            .or_else(|| self.deviation());
+            .name_mismatch(job)
+            .or_else(|| {
+                job.parameters
+                    .iter()
+                    .find_map(|free| parameter_problem(free, self.parameters.get(&free.name)?))
+            })
+            .or_else(|| self.negative_sd());
         problem.map_or(Ok(()), |problem| Err(ResultError { file: file.to_owned(), problem }))
     }
 
     /// A name that result or job alone has.
-    fn names(&self, job: &Job) -> Option<String> {
+    fn name_mismatch(&self, job: &Job) -> Option<String> {
         let parameters: BTreeSet<&str> = job.parameters.iter().map(|p| p.name.as_str()).collect();
         let features = self.features.iter().chain(&self.held_out).map(|f| f.name.as_str());
         let read = self.components.iter().map(|c| c.name.as_str()).chain(features).collect();
-        let asked = job.aims.iter().map(|aim| aim.feature.name.as_str()).collect();
+        let asked = job.targets.iter().map(|aim| aim.feature.name.as_str()).collect();
         let found = self.parameters.keys().map(String::as_str).collect();
-        differs("parameters", &found, &parameters)
-            .or_else(|| differs("components, features and held_out", &read, &asked))
+        set_difference("parameters", &found, &parameters)
+            .or_else(|| set_difference("components, features and held_out", &read, &asked))
     }
 
     /// A standard deviation below zero.
-    fn deviation(&self) -> Option<String> {
+    fn negative_sd(&self) -> Option<String> {
         let components = self.components.iter().map(|c| ("components", &c.name, c.target_sd_hz));
         let features = self.features.iter().chain(&self.held_out).map(|f| ("features", &f.name, f.target_sd));
         let (key, name, sd) = components.chain(features).find(|(.., sd)| *sd < 0.0)?;
@@ -44,7 +48,7 @@ impl FitResult {
     }
 }
 
-fn differs(key: &str, found: &BTreeSet<&str>, expected: &BTreeSet<&str>) -> Option<String> {
+fn set_difference(key: &str, found: &BTreeSet<&str>, expected: &BTreeSet<&str>) -> Option<String> {
     let missing =
         expected.difference(found).next().map(|name| format!("{key}: found no `{name}`, which the job has"));
     missing.or_else(|| {
@@ -56,9 +60,9 @@ fn differs(key: &str, found: &BTreeSet<&str>, expected: &BTreeSet<&str>) -> Opti
 }
 
 /// What cannot be of a parameter's numbers.
-fn bad(free: &FreeParameter, found: &ParameterResult) -> Option<String> {
+fn parameter_problem(free: &FreeParameter, found: &ParameterResult) -> Option<String> {
     let (name, lower, upper) = (&free.name, free.bounds.lower(), free.bounds.upper());
-    let reach = (lower - ROUNDING * lower.abs())..=(upper + ROUNDING * upper.abs());
+    let reach = (lower - BOUND_ROUNDING * lower.abs())..=(upper + BOUND_ROUNDING * upper.abs());
     if !reach.contains(&found.estimate) {
         return Some(format!(
             "parameters, `{name}`, estimate: found {}, expected a value within the bounds of the job, {lower} to {upper}",
@@ -90,7 +94,7 @@ mod tests {
         let job = Job::parse("job.toml", JOB).unwrap();
         serde_json::from_str::<FitResult>(text)
             .unwrap()
-            .check_of(&job, "result.json")
+            .check_against_job(&job, "result.json")
             .map_err(|error| error.to_string())
     }
 

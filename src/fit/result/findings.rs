@@ -1,43 +1,43 @@
 //! From what a fit found to its result.
 
 use super::{
-    ComponentResult, Evaluations, FeatureResult, FitResult, NuisanceResult, Optimum, ParameterResult,
-    RunnerUp, Status,
+    ComponentResult, EvaluationCounts, FeatureResult, FitResult, FitStatus, LocalOptimum, NuisanceResult,
+    ParameterResult, RunnerUpPeak,
 };
-use crate::feature::Value;
-use crate::fit::cameras::{CameraEstimate, Cameras};
-use crate::fit::context::Context;
+use crate::feature::FeatureValue;
+use crate::fit::cameras::{CameraEstimate, CameraFit};
+use crate::fit::context::FitContext;
 use crate::fit::evaluation::{Evaluation, Observed};
-use crate::fit::gate::Gate;
+use crate::fit::gate::Identifiability;
 use crate::fit::information::Z_95;
-use crate::fit::job::{Aim, Job};
+use crate::fit::job::{FitTarget, Job};
 use crate::fit::ledger::Ledger;
-use crate::fit::search::{Descent, Searched};
-use crate::fit::target::Target;
-use crate::fit::uncertainty::{CHI_SQUARED_95, Interval, Uncertainty};
+use crate::fit::search::{LocalDescent, SearchOutcome};
+use crate::fit::target::TargetValue;
+use crate::fit::uncertainty::{CHI_SQUARED_95, FitUncertainty, ParameterInterval};
 use crate::math;
-use crate::text::short;
+use crate::text::format_short;
 use std::collections::BTreeMap;
 
 /// Everything that goes into a result.
-pub(in crate::fit) struct Findings<'a> {
+pub(in crate::fit) struct FitFindings<'a> {
     pub job: &'a Job,
     /// Aims that were fitted, in the order of the targets.
-    pub aims: &'a [Aim],
-    pub targets: &'a [Target],
-    pub found: &'a Uncertainty,
-    pub searched: &'a Searched,
-    pub gate: Gate,
+    pub aims: &'a [FitTarget],
+    pub targets: &'a [TargetValue],
+    pub found: &'a FitUncertainty,
+    pub searched: &'a SearchOutcome,
+    pub gate: Identifiability,
     /// Aims that were held out, with what the best model shows of them.
-    pub held_out: Vec<(Aim, Target, Result<f64, String>)>,
-    pub status: Status,
+    pub held_out: Vec<(FitTarget, TargetValue, Result<f64, String>)>,
+    pub status: FitStatus,
     pub synthetic: bool,
-    pub context: &'a Context<'a>,
+    pub context: &'a FitContext<'a>,
 }
 
-impl Findings<'_> {
+impl FitFindings<'_> {
     /// The result; `reads` are the features of the best model, read once more.
-    pub(in crate::fit) fn into_result(self, ledger: &Ledger, reads: &[Option<Value>]) -> FitResult {
+    pub(in crate::fit) fn into_result(self, ledger: &Ledger, reads: &[Option<FeatureValue>]) -> FitResult {
         let names = self.job.parameter_names();
         let sensitivities = self
             .targets
@@ -47,17 +47,22 @@ impl Findings<'_> {
         let correlation = |row: &Vec<Option<f64>>| {
             names.iter().zip(row).filter_map(|(name, r)| Some((name.clone(), (*r)?))).collect()
         };
-        let shown = Shown::of(self.aims, self.targets, &self.found.twin_sd, &self.found.best, reads);
+        let shown =
+            ModelledTargets::compare(self.aims, self.targets, &self.found.twin_sd, &self.found.best, reads);
         FitResult {
             title: self.job.title.clone(),
             status: self.status,
             misfit: None,
-            nuisances: camera_nuisances(self.job, &self.found.cameras),
+            nuisances: camera_nuisance_results(self.job, &self.found.cameras),
             starts: Vec::new(),
-            parameters: names.iter().cloned().zip(self.found.intervals.iter().map(parameter)).collect(),
+            parameters: names
+                .iter()
+                .cloned()
+                .zip(self.found.intervals.iter().map(parameter_result))
+                .collect(),
             components: shown.components,
             features: shown.features,
-            held_out: self.held_out.iter().map(predicted).collect(),
+            held_out: self.held_out.iter().map(predicted_feature_result).collect(),
             rank: self.found.rank,
             condition: Some(self.found.condition).filter(|condition| condition.is_finite()),
             combinations: self.found.combinations.clone(),
@@ -69,11 +74,14 @@ impl Findings<'_> {
             cost: self.found.best.cost,
             threshold: CHI_SQUARED_95,
             twins: self.found.twins,
-            waterfall: waterfall(&names, &self.searched.descents),
+            waterfall: sorted_optima(&names, &self.searched.descents),
             sensitivities: sensitivities.collect(),
-            evaluations: Evaluations { total: ledger.run().len(), failed: ledger.failures() },
+            evaluations: EvaluationCounts {
+                total: ledger.run_evaluations().len(),
+                failed: ledger.count_failures(),
+            },
             synthetic: self.synthetic,
-            notes: self.notes(),
+            notes: self.collect_notes(),
             seed: self.job.search.seed,
             fingerprint: self.context.fingerprint.to_owned(),
             version: self.context.version.to_owned(),
@@ -81,11 +89,15 @@ impl Findings<'_> {
         }
     }
 
-    fn notes(&self) -> Vec<String> {
+    fn collect_notes(&self) -> Vec<String> {
         let mut notes = self.found.notes.clone();
         notes.extend(self.gate.notes.iter().cloned());
         notes.extend(
-            self.found.twin_sd.iter().zip(self.targets).filter_map(|(sd, target)| noisier(target, (*sd)?)),
+            self.found
+                .twin_sd
+                .iter()
+                .zip(self.targets)
+                .filter_map(|(sd, target)| twin_noise_note(target, (*sd)?)),
         );
         if self.synthetic {
             notes.push("the recording is synthetic: no camera took it".to_owned());
@@ -95,40 +107,40 @@ impl Findings<'_> {
 }
 
 /// What the best model shows of the aims that were fitted, next to their targets.
-pub(in crate::fit) struct Shown {
+pub(in crate::fit) struct ModelledTargets {
     pub components: Vec<ComponentResult>,
     pub features: Vec<FeatureResult>,
 }
 
-impl Shown {
+impl ModelledTargets {
     /// Of aims, their targets and deviations over twins in one order; `reads` are the features of the best
     /// model, read once more.
-    pub(in crate::fit) fn of(
-        aims: &[Aim],
-        targets: &[Target],
+    pub(in crate::fit) fn compare(
+        aims: &[FitTarget],
+        targets: &[TargetValue],
         twin_sd: &[Option<f64>],
         best: &Evaluation,
-        reads: &[Option<Value>],
+        reads: &[Option<FeatureValue>],
     ) -> Self {
-        let cameras = &Cameras::of(targets, &best.features);
+        let cameras = &CameraFit::estimate(targets, &best.features);
         let met = |(at, (aim, target))| {
             let twin_sd = twin_sd.get(at).copied().flatten();
-            Met { at, aim, target, best, cameras, twin_sd }
+            ModelledTarget { at, aim, target, best, cameras, twin_sd }
         };
-        let met: Vec<Met> = aims.iter().zip(targets).enumerate().map(met).collect();
+        let met: Vec<ModelledTarget> = aims.iter().zip(targets).enumerate().map(met).collect();
         Self {
-            components: met.iter().filter_map(|met| met.component(reads)).collect(),
+            components: met.iter().filter_map(|met| met.component_result(reads)).collect(),
             features: met
                 .iter()
                 .filter(|met| met.aim.tolerance_relative.is_none())
-                .map(Met::feature)
+                .map(ModelledTarget::feature_result)
                 .collect(),
         }
     }
 }
 
 /// What was estimated of the cameras of features.
-pub(in crate::fit) fn camera_nuisances(job: &Job, found: &[CameraEstimate]) -> Vec<NuisanceResult> {
+pub(in crate::fit) fn camera_nuisance_results(job: &Job, found: &[CameraEstimate]) -> Vec<NuisanceResult> {
     let nuisance = |found: &CameraEstimate| NuisanceResult {
         recording: job.conditions.get(found.condition).map(|condition| condition.name.clone()),
         name: found.name.to_owned(),
@@ -142,20 +154,20 @@ pub(in crate::fit) fn camera_nuisances(job: &Job, found: &[CameraEstimate]) -> V
 }
 
 /// Twins scatter by more than a target's deviation by this factor before it is said.
-const NOISIER: f64 = 2.0;
+const NOISY_TWIN_FACTOR: f64 = 2.0;
 
-fn noisier(target: &Target, twin_sd: f64) -> Option<String> {
-    (twin_sd > NOISIER * target.sd).then(|| {
+fn twin_noise_note(target: &TargetValue, twin_sd: f64) -> Option<String> {
+    (twin_sd > NOISY_TWIN_FACTOR * target.sd).then(|| {
         format!(
             "`{}` scatters by {} over twins of the best model, more than its stated deviation of {}: noise alone moves it so far",
             target.name,
-            short(twin_sd),
-            short(target.sd)
+            format_short(twin_sd),
+            format_short(target.sd)
         )
     })
 }
 
-fn parameter(i: &Interval) -> ParameterResult {
+fn parameter_result(i: &ParameterInterval) -> ParameterResult {
     ParameterResult {
         estimate: i.estimate,
         lower_95: i.lower_95,
@@ -169,21 +181,23 @@ fn parameter(i: &Interval) -> ParameterResult {
     }
 }
 
-fn waterfall(names: &[String], descents: &[Descent]) -> Vec<Optimum> {
-    let optimum = |descent: &Descent| Optimum {
+fn sorted_optima(names: &[String], descents: &[LocalDescent]) -> Vec<LocalOptimum> {
+    let optimum = |descent: &LocalDescent| LocalOptimum {
         start_cost: descent.start.cost,
         cost: descent.end.cost,
         evaluations: descent.evaluations,
         values: names.iter().cloned().zip(descent.end.values.iter().copied()).collect::<BTreeMap<_, _>>(),
         failure: descent.end.failure.as_ref().map(ToString::to_string),
     };
-    let mut optima: Vec<Optimum> = descents.iter().map(optimum).collect();
+    let mut optima: Vec<LocalOptimum> = descents.iter().map(optimum).collect();
     optima.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     optima
 }
 
 /// A held-out aim, with what the best model predicts.
-pub(in crate::fit) fn predicted((aim, target, found): &(Aim, Target, Result<f64, String>)) -> FeatureResult {
+pub(in crate::fit) fn predicted_feature_result(
+    (aim, target, found): &(FitTarget, TargetValue, Result<f64, String>),
+) -> FeatureResult {
     let model = found.as_ref().ok().copied();
     let near = |model: f64| match aim.tolerance_relative {
         Some(tolerance) => (model / target.value - 1.0).abs() <= tolerance,
@@ -210,35 +224,35 @@ pub(in crate::fit) fn predicted((aim, target, found): &(Aim, Target, Result<f64,
 }
 
 /// An aim against the best model.
-struct Met<'a> {
+struct ModelledTarget<'a> {
     at: usize,
-    aim: &'a Aim,
-    target: &'a Target,
+    aim: &'a FitTarget,
+    target: &'a TargetValue,
     best: &'a Evaluation,
-    cameras: &'a Cameras,
+    cameras: &'a CameraFit,
     twin_sd: Option<f64>,
 }
 
-impl Met<'_> {
-    fn model(&self) -> Option<f64> {
+impl ModelledTarget<'_> {
+    fn model_value(&self) -> Option<f64> {
         self.best.features.get(self.at).and_then(Observed::value)
     }
 
     /// What the camera shows of the model's value.
-    fn shown(&self) -> Option<f64> {
-        self.cameras.shown_value(self.target, self.best.features.get(self.at)?)
+    fn value_seen(&self) -> Option<f64> {
+        self.cameras.apply_to_value(self.target, self.best.features.get(self.at)?)
     }
 
-    fn spread(&self) -> Option<f64> {
+    fn start_spread(&self) -> Option<f64> {
         let spread = self.best.features.get(self.at)?.observation()?.spread;
         (spread > 0.0).then_some(spread)
     }
 
-    fn scatter(&self) -> Option<f64> {
+    fn model_scatter(&self) -> Option<f64> {
         (self.target.scatter > 0.0).then_some(self.target.scatter)
     }
 
-    fn missing(&self) -> Option<String> {
+    fn missing_reason(&self) -> Option<String> {
         match (self.best.features.get(self.at), &self.best.failure) {
             (Some(Observed::Missing(why)), _) => Some(why.clone()),
             (Some(Observed::Value(_)), _) => None,
@@ -247,47 +261,47 @@ impl Met<'_> {
     }
 
     fn relative_error(&self) -> Option<f64> {
-        self.shown().map(|model| model / self.target.value - 1.0).filter(|error| error.is_finite())
+        self.value_seen().map(|model| model / self.target.value - 1.0).filter(|error| error.is_finite())
     }
 
-    fn component(&self, reads: &[Option<Value>]) -> Option<ComponentResult> {
+    fn component_result(&self, reads: &[Option<FeatureValue>]) -> Option<ComponentResult> {
         let tolerance_relative = self.aim.tolerance_relative?;
         let runner_up = reads.get(self.at).and_then(|read| read.as_ref()?.runner_up);
         Some(ComponentResult {
             name: self.target.name.clone(),
             target_hz: self.target.value,
             target_sd_hz: self.target.sd,
-            model_hz: self.model(),
+            model_hz: self.model_value(),
             relative_error: self.relative_error(),
             tolerance_relative,
             pass: self.relative_error().is_some_and(|error| error.abs() <= tolerance_relative),
-            model_scatter_hz: self.scatter(),
-            model_spread_hz: self.spread(),
+            model_scatter_hz: self.model_scatter(),
+            model_spread_hz: self.start_spread(),
             below_db: self.best.features.get(self.at).and_then(|f| Some(f.observation()?.below_db)),
             runner_up: runner_up
-                .map(|peak| RunnerUp { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
+                .map(|peak| RunnerUpPeak { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
             twin_sd_hz: self.twin_sd,
-            missing: self.missing(),
+            missing: self.missing_reason(),
         })
     }
 
-    fn feature(&self) -> FeatureResult {
+    fn feature_result(&self) -> FeatureResult {
         FeatureResult {
             name: self.target.name.clone(),
             kind: self.aim.feature.reading.kind().to_owned(),
             unit: self.aim.feature.reading.unit().name.to_owned(),
             target: self.target.value,
             target_sd: self.target.sd,
-            model: self.model(),
-            model_seen: self.target.calibration.and_then(|_| self.shown()),
+            model: self.model_value(),
+            model_seen: self.target.calibration.and_then(|_| self.value_seen()),
             relative_error: self.relative_error(),
             pass: self
-                .shown()
+                .value_seen()
                 .is_some_and(|model| (model - self.target.value).abs() <= Z_95 * self.target.sd),
-            model_scatter: self.scatter(),
-            model_spread: self.spread(),
+            model_scatter: self.model_scatter(),
+            model_spread: self.start_spread(),
             twin_sd: self.twin_sd,
-            missing: self.missing(),
+            missing: self.missing_reason(),
         }
     }
 }

@@ -1,11 +1,11 @@
 //! Clouds of points over the unit box, one after another.
 
-use super::costs::Costs;
-use super::evolution::{Evolution, Reach, WIDE};
-use super::patience::Patience;
-use crate::fit::ledger::{Ledger, Stop};
-use crate::fit::settings::Settings;
-use crate::fit::stage::Stage;
+use super::costs::StageCosts;
+use super::evolution::{CmaEs, PopulationExtent, WIDE_EXTENT};
+use super::patience::StagnationCounter;
+use crate::fit::ledger::{Ledger, StopReason};
+use crate::fit::settings::SearchSettings;
+use crate::fit::stage::EvaluationStage;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
@@ -15,40 +15,46 @@ const STAGNANT_GAIN: f64 = 1e-3;
 /// Clouds of points, the first about the middle of the box and the others about random places, until the
 /// evaluations of the stage are used up: each ends where it has shrunk or gains nothing any more. `None` when
 /// the ledger was not stopped.
-pub(super) fn clouds(ledger: &mut Ledger, dimensions: usize, settings: &Settings) -> Option<Stop> {
+pub(super) fn search_with_populations(
+    ledger: &mut Ledger,
+    dimensions: usize,
+    settings: &SearchSettings,
+) -> Option<StopReason> {
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
     let mut middle = vec![0.5; dimensions];
-    let mut used = ledger.remaining();
-    while ledger.remaining() > 0 {
+    let mut used = ledger.remaining_evaluations();
+    while ledger.remaining_evaluations() > 0 {
         let seed = generator.random();
-        if let stop @ Some(_) = cloud(ledger, Stage::Global, middle, (WIDE, seed), settings) {
+        if let stop @ Some(_) =
+            evolve_population(ledger, EvaluationStage::Global, middle, (WIDE_EXTENT, seed), settings)
+        {
             return stop;
         }
         middle = (0..dimensions).map(|_| generator.random()).collect();
         // a cloud that meets known points alone makes no evaluation
-        if ledger.remaining() == used {
+        if ledger.remaining_evaluations() == used {
             break;
         }
-        used = ledger.remaining();
+        used = ledger.remaining_evaluations();
     }
     None
 }
 
 /// One cloud about a place; why it was stopped, if it was.
-pub(super) fn cloud(
+pub(super) fn evolve_population(
     ledger: &mut Ledger,
-    stage: Stage,
+    stage: EvaluationStage,
     middle: Vec<f64>,
-    (reach, seed): (Reach, u64),
-    settings: &Settings,
-) -> Option<Stop> {
+    (reach, seed): (PopulationExtent, u64),
+    settings: &SearchSettings,
+) -> Option<StopReason> {
     let generator = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut solver = Evolution::new(middle, settings.particles, reach, generator);
-    let mut costs = Costs::new(ledger, stage);
-    let mut patience = Patience::new(settings.stagnation_generations, STAGNANT_GAIN);
-    while !solver.has_settled() && !patience.is_over(solver.least_cost()) {
-        solver.generation(&mut costs);
-        if let stop @ Some(_) = costs.stop() {
+    let mut solver = CmaEs::new(middle, settings.particles, reach, generator);
+    let mut costs = StageCosts::new(ledger, stage);
+    let mut patience = StagnationCounter::new(settings.stagnation_generations, STAGNANT_GAIN);
+    while !solver.has_converged() && !patience.is_stagnant(solver.least_cost()) {
+        solver.run_generation(&mut costs);
+        if let stop @ Some(_) = costs.stop_reason() {
             return stop;
         }
     }

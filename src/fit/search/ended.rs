@@ -1,20 +1,20 @@
 //! What a search did.
 
 use crate::fit::evaluation::Evaluation;
-use crate::fit::ledger::Stop;
+use crate::fit::ledger::StopReason;
 
 /// How a search ended; the best point is in the ledger.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Ended {
+pub enum SearchTermination {
     /// Simplices of several sizes from the best point gained nothing.
     Converged,
     /// It was stopped, most often by the budget.
-    Stopped(Stop),
+    Stopped(StopReason),
 }
 
 /// A local search: where it started and where it came to.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Descent {
+pub struct LocalDescent {
     /// Where it started.
     pub start: Evaluation,
     /// Where it came to.
@@ -25,9 +25,9 @@ pub struct Descent {
 
 /// What a search did.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Searched {
+pub struct SearchOutcome {
     /// How it ended.
-    pub ended: Ended,
+    pub termination: SearchTermination,
     /// The local searches, one a start; the last one is the polish of the best.
-    pub descents: Vec<Descent>,
+    pub descents: Vec<LocalDescent>,
 }

@@ -5,7 +5,7 @@
 //!
 //! The cloud moves in the unit box; a point outside is evaluated at its mirror image inside.
 
-use super::costs::Costs;
+use super::costs::StageCosts;
 use crate::fit::scale::clamp_unit;
 use crate::math;
 use crate::math::StandardNormal;
@@ -16,22 +16,22 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 /// How far a cloud reaches at first and when it has found its place, as lengths of its longest axis in the
 /// unit box.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Reach {
+pub(super) struct PopulationExtent {
     first: f64,
     last: f64,
 }
 
 /// Over the whole box: three lengths reach every corner. Where it ends damped Gauss-Newton steps are better.
-pub(super) const WIDE: Reach = Reach { first: 0.3, last: 0.01 };
+pub(super) const WIDE_EXTENT: PopulationExtent = PopulationExtent { first: 0.3, last: 0.01 };
 /// About a place at which such steps are caught by ripples.
-pub(super) const NEAR: Reach = Reach { first: 0.06, last: 0.003 };
+pub(super) const NEAR_EXTENT: PopulationExtent = PopulationExtent { first: 0.06, last: 0.003 };
 
 /// A cloud of points.
-pub(super) struct Evolution {
+pub(super) struct CmaEs {
     generator: Xoshiro256PlusPlus,
     points: usize,
     weights: Vec<f64>,
-    rates: Rates,
+    rates: AdaptationRates,
     mean: DVector<f64>,
     length: f64,
     shape: DMatrix<f64>,
@@ -46,7 +46,7 @@ pub(super) struct Evolution {
 
 /// A step from the mean, in units of the length.
 #[derive(Debug, Clone)]
-struct Step {
+struct PopulationStep {
     /// Along the axes, in units of theirs.
     along: DVector<f64>,
     /// In the box.
@@ -54,7 +54,7 @@ struct Step {
 }
 
 /// How fast what is learnt.
-struct Rates {
+struct AdaptationRates {
     effective: f64,
     length: f64,
     damping: f64,
@@ -65,7 +65,7 @@ struct Rates {
     expected: f64,
 }
 
-impl Rates {
+impl AdaptationRates {
     fn new(n: f64, weights: &[f64]) -> Self {
         let effective = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
         let length = (effective + 2.0) / (n + effective + 5.0);
@@ -79,9 +79,14 @@ impl Rates {
     }
 }
 
-impl Evolution {
+impl CmaEs {
     /// A cloud of `points` points (at least 4) about a place in the unit box.
-    pub(super) fn new(mean: Vec<f64>, points: usize, reach: Reach, generator: Xoshiro256PlusPlus) -> Self {
+    pub(super) fn new(
+        mean: Vec<f64>,
+        points: usize,
+        reach: PopulationExtent,
+        generator: Xoshiro256PlusPlus,
+    ) -> Self {
         let (n, points) = (mean.len(), points.max(4));
         let raw: Vec<f64> = (0..points / 2)
             .map(|rank| math::ln((points as f64 + 1.0) / 2.0) - math::ln(rank as f64 + 1.0))
@@ -91,7 +96,7 @@ impl Evolution {
         Self {
             generator,
             points,
-            rates: Rates::new(n as f64, &weights),
+            rates: AdaptationRates::new(n as f64, &weights),
             weights,
             mean: DVector::from_vec(mean),
             length: reach.first,
@@ -106,14 +111,14 @@ impl Evolution {
     }
 
     /// One generation: points are drawn, evaluated and learnt from.
-    pub(super) fn generation(&mut self, costs: &mut Costs) {
-        let steps = self.draw();
-        let points: Vec<Vec<f64>> = steps.iter().map(|step| self.place(step)).collect();
-        let costs = costs.of(&points);
+    pub(super) fn run_generation(&mut self, costs: &mut StageCosts) {
+        let steps = self.draw_steps();
+        let points: Vec<Vec<f64>> = steps.iter().map(|step| self.point_of(step)).collect();
+        let costs = costs.evaluate_points(&points);
         let mut order: Vec<usize> = (0..points.len()).collect();
         order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
         let ranked: Vec<_> = order.iter().map(|at| steps[*at].clone()).collect();
-        self.learn(&ranked);
+        self.update_distribution(&ranked);
         let best = order.first().map_or(f64::INFINITY, |at| costs[*at]);
         if best < self.least_cost {
             self.least_cost = best;
@@ -126,17 +131,17 @@ impl Evolution {
     }
 
     /// Whether it has shrunk to its last reach.
-    pub(super) fn has_settled(&self) -> bool {
-        self.longest() < self.last || !self.length.is_finite()
+    pub(super) fn has_converged(&self) -> bool {
+        self.longest_axis() < self.last || !self.length.is_finite()
     }
 
     /// The point of the box to which a step leads.
-    fn place(&self, step: &Step) -> Vec<f64> {
-        (&self.mean + &step.inside * self.length).iter().map(|u| mirrored(*u)).collect()
+    fn point_of(&self, step: &PopulationStep) -> Vec<f64> {
+        (&self.mean + &step.inside * self.length).iter().map(|u| reflect_into_unit(*u)).collect()
     }
 
     /// Steps of a generation.
-    fn draw(&mut self) -> Vec<Step> {
+    fn draw_steps(&mut self) -> Vec<PopulationStep> {
         let n = self.mean.len();
         (0..self.points)
             .map(|_| {
@@ -144,22 +149,22 @@ impl Evolution {
                     n,
                     (0..n).map(|_| self.generator.sample::<f64, _>(StandardNormal)),
                 );
-                Step { inside: &self.axes * &along, along }
+                PopulationStep { inside: &self.axes * &along, along }
             })
             .collect()
     }
 
     /// Learns from the steps of a generation, best first.
-    fn learn(&mut self, ranked: &[Step]) {
+    fn update_distribution(&mut self, ranked: &[PopulationStep]) {
         let (n, rates) = (self.mean.len(), &self.rates);
         self.generation += 1;
-        let sum = |of: fn(&Step) -> &DVector<f64>| {
+        let sum = |of: fn(&PopulationStep) -> &DVector<f64>| {
             self.weights.iter().zip(ranked).fold(DVector::zeros(n), |sum, (w, step)| sum + of(step) * *w)
         };
         // the inverse square root of the shape times the step is the step along the axes, turned back
         let (along, step) = (sum(|step| &step.along), sum(|step| &step.inside));
         self.mean += &step * self.length;
-        let turned = self.turned(&along);
+        let turned = self.rotate_to_box(&along);
         self.path_length = &self.path_length * (1.0 - rates.length)
             + turned * (rates.length * (2.0 - rates.length) * rates.effective).sqrt();
         let settled =
@@ -180,11 +185,11 @@ impl Evolution {
         self.length *=
             math::exp((rates.length / rates.damping) * (self.path_length.norm() / rates.expected - 1.0))
                 .min(std::f64::consts::E);
-        self.reshape();
+        self.decompose_shape();
     }
 
     /// A vector along the axes as a vector of the box without their lengths.
-    fn turned(&self, along: &DVector<f64>) -> DVector<f64> {
+    fn rotate_to_box(&self, along: &DVector<f64>) -> DVector<f64> {
         let mut turned = DVector::zeros(along.len());
         for (column, z) in self.axes.column_iter().zip(along.iter()) {
             let norm = column.norm();
@@ -195,20 +200,20 @@ impl Evolution {
         turned
     }
 
-    fn reshape(&mut self) {
+    fn decompose_shape(&mut self) {
         let symmetric = (&self.shape + self.shape.transpose()) * 0.5;
         let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(symmetric.clone());
         self.shape = symmetric;
         self.axes = eigenvectors * DMatrix::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()));
     }
 
-    fn longest(&self) -> f64 {
+    fn longest_axis(&self) -> f64 {
         self.length * self.axes.column_iter().map(|column| column.norm()).fold(0.0, f64::max)
     }
 }
 
 /// The mirror image inside the unit interval.
-fn mirrored(u: f64) -> f64 {
+fn reflect_into_unit(u: f64) -> f64 {
     let folded = u.rem_euclid(2.0);
     clamp_unit(if folded > 1.0 { 2.0 - folded } else { folded })
 }
@@ -220,15 +225,15 @@ mod tests {
 
     /// Generations until the mean is this near to the minimum of `cost`.
     fn run(cost: impl Fn(&[f64]) -> f64, generations: usize) -> Vec<f64> {
-        let mut cloud = Evolution::new(vec![0.5; 3], 16, WIDE, Xoshiro256PlusPlus::seed_from_u64(1));
+        let mut cloud = CmaEs::new(vec![0.5; 3], 16, WIDE_EXTENT, Xoshiro256PlusPlus::seed_from_u64(1));
         for _ in 0..generations {
-            let drawn = cloud.draw();
+            let drawn = cloud.draw_steps();
             let mut steps: Vec<(f64, _)> =
-                drawn.into_iter().map(|step| (cost(&cloud.place(&step)), step)).collect();
+                drawn.into_iter().map(|step| (cost(&cloud.point_of(&step)), step)).collect();
             steps.sort_by(|a, b| a.0.total_cmp(&b.0));
-            cloud.learn(&steps.into_iter().map(|(_, step)| step).collect::<Vec<_>>());
+            cloud.update_distribution(&steps.into_iter().map(|(_, step)| step).collect::<Vec<_>>());
         }
-        cloud.mean.iter().map(|u| mirrored(*u)).collect()
+        cloud.mean.iter().map(|u| reflect_into_unit(*u)).collect()
     }
 
     #[test]
@@ -257,6 +262,6 @@ mod tests {
     fn a_minimum_on_a_side_of_the_box_is_reached() {
         let found = run(|p| p.iter().sum(), 100);
         assert!(found.iter().all(|u| *u < 1e-3), "{found:?}");
-        assert_eq!([-0.25, 1.25, 2.5, 0.5].map(mirrored), [0.25, 0.75, 0.5, 0.5]);
+        assert_eq!([-0.25, 1.25, 2.5, 0.5].map(reflect_into_unit), [0.25, 0.75, 0.5, 0.5]);
     }
 }

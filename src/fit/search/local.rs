@@ -1,54 +1,57 @@
 //! The local searches: from each of the best points downhill, clouds about the best ends, and the best of all
 //! polished.
 
-use super::clouds::cloud;
-use super::ended::{Descent, Ended};
-use super::evolution::NEAR;
-use super::gauss_newton::gauss_newton;
-use super::rules::{DISTINCT, EXACT, SIMPLICES, WORTH};
-use super::simplex::simplex;
+use super::clouds::evolve_population;
+use super::ended::{LocalDescent, SearchTermination};
+use super::evolution::NEAR_EXTENT;
+use super::gauss_newton::descend_gauss_newton;
+use super::rules::{EXACT_COST, MIN_START_DISTANCE, MIN_WORTHWHILE_GAIN, SIMPLEX_EDGES};
+use super::simplex::run_simplex;
 use crate::fit::evaluation::Evaluation;
-use crate::fit::ledger::{Ledger, Stop};
-use crate::fit::settings::Settings;
-use crate::fit::stage::Stage;
+use crate::fit::ledger::{Ledger, StopReason};
+use crate::fit::settings::SearchSettings;
+use crate::fit::stage::EvaluationStage;
 
 /// Ends of local searches about which a cloud looks for a better one.
-const CLOUDED: usize = 3;
+const REFINED_ENDS: usize = 3;
 
 /// A descent from each of the starts, clouds about the best ends, then the best of all polished.
-pub(super) fn local(
+pub(super) fn search_locally(
     ledger: &mut Ledger,
-    settings: &Settings,
+    settings: &SearchSettings,
     limit: usize,
-    descents: &mut Vec<Descent>,
-) -> Ended {
+    descents: &mut Vec<LocalDescent>,
+) -> SearchTermination {
     ledger.set_limit(limit);
-    let starts = distinct_best(ledger.run().iter(), settings.starts);
+    let starts = distinct_best_points(ledger.run_evaluations().iter(), settings.starts);
     if starts.len() > 1 {
         let share = settings.local_evaluations / (3 * starts.len());
         for start in starts {
-            if let Some(stop) = allotted(ledger, limit, share, descents, |ledger| descended(ledger, start)) {
-                return Ended::Stopped(stop);
+            if let Some(stop) =
+                search_within_share(ledger, limit, share, descents, |ledger| descend_from(ledger, start))
+            {
+                return SearchTermination::Stopped(stop);
             }
         }
-        let share = settings.local_evaluations / (3 * CLOUDED);
+        let share = settings.local_evaluations / (3 * REFINED_ENDS);
         descents.sort_by(|a, b| a.end.cost.total_cmp(&b.end.cost));
-        for at in 0..descents.len().min(CLOUDED) {
+        for at in 0..descents.len().min(REFINED_ENDS) {
             let (from, seed) = (descents[at].clone(), settings.seed.wrapping_add(at as u64 + 1));
             let mut further = Vec::new();
-            let stop =
-                allotted(ledger, limit, share, &mut further, |ledger| clouded(ledger, from, seed, settings));
+            let stop = search_within_share(ledger, limit, share, &mut further, |ledger| {
+                refine_with_population(ledger, from, seed, settings)
+            });
             further.into_iter().for_each(|descent| descents[at] = descent);
             if let Some(stop) = stop {
-                return Ended::Stopped(stop);
+                return SearchTermination::Stopped(stop);
             }
         }
         ledger.set_limit(limit);
     }
-    let (start, made) = (ledger.best().cloned(), ledger.run().len());
-    let ended = polish(ledger);
-    let evaluations = ledger.run().len() - made;
-    descents.extend(start.zip(ledger.best().cloned()).map(|(start, end)| Descent {
+    let (start, made) = (ledger.best_evaluation().cloned(), ledger.run_evaluations().len());
+    let ended = polish_best(ledger);
+    let evaluations = ledger.run_evaluations().len() - made;
+    descents.extend(start.zip(ledger.best_evaluation().cloned()).map(|(start, end)| LocalDescent {
         start,
         end,
         evaluations,
@@ -58,85 +61,99 @@ pub(super) fn local(
 
 /// A local search within its share of the evaluations, unless there is nothing left to gain; why everything
 /// has to stop, if it has.
-fn allotted(
+fn search_within_share(
     ledger: &mut Ledger,
     limit: usize,
     share: usize,
-    descents: &mut Vec<Descent>,
-    search: impl FnOnce(&mut Ledger) -> (Descent, Option<Stop>),
-) -> Option<Stop> {
-    if is_exact(ledger) {
+    descents: &mut Vec<LocalDescent>,
+    search: impl FnOnce(&mut Ledger) -> (LocalDescent, Option<StopReason>),
+) -> Option<StopReason> {
+    if is_exact_fit(ledger) {
         return None;
     }
-    ledger.set_limit(limit.min(ledger.run().len().saturating_add(share)));
+    ledger.set_limit(limit.min(ledger.run_evaluations().len().saturating_add(share)));
     let (descent, stop) = search(ledger);
     descents.push(descent);
-    stop.filter(|stop| *stop != Stop::Budget)
+    stop.filter(|stop| *stop != StopReason::Budget)
 }
 
 /// A local search that goes on with a small cloud about its end, and Gauss-Newton steps from the best of it.
-fn clouded(ledger: &mut Ledger, from: Descent, seed: u64, settings: &Settings) -> (Descent, Option<Stop>) {
-    let made = ledger.run().len();
-    let stop = cloud(ledger, Stage::Local, from.end.unit.clone(), (NEAR, seed), settings);
+fn refine_with_population(
+    ledger: &mut Ledger,
+    from: LocalDescent,
+    seed: u64,
+    settings: &SearchSettings,
+) -> (LocalDescent, Option<StopReason>) {
+    let made = ledger.run_evaluations().len();
+    let stop = evolve_population(
+        ledger,
+        EvaluationStage::Local,
+        from.end.unit.clone(),
+        (NEAR_EXTENT, seed),
+        settings,
+    );
     let better = ledger
-        .run()
+        .run_evaluations()
         .iter()
         .skip(made)
         .filter(|found| found.cost < from.end.cost)
         .min_by(|a, b| a.cost.total_cmp(&b.cost))
         .cloned();
     let (further, stop) = match (stop, better) {
-        (None, Some(better)) => descended(ledger, better),
+        (None, Some(better)) => descend_from(ledger, better),
         (stop, better) => {
             let end = better.unwrap_or_else(|| from.end.clone());
-            (Descent { start: end.clone(), end, evaluations: 0 }, stop)
+            (LocalDescent { start: end.clone(), end, evaluations: 0 }, stop)
         }
     };
     (
-        Descent {
+        LocalDescent {
             start: from.start,
             end: further.end,
-            evaluations: from.evaluations + ledger.run().len() - made,
+            evaluations: from.evaluations + ledger.run_evaluations().len() - made,
         },
         stop,
     )
 }
 
 /// Gauss-Newton steps from a point that was evaluated.
-fn descended(ledger: &mut Ledger, start: Evaluation) -> (Descent, Option<Stop>) {
-    let made = ledger.run().len();
-    let (unit, stop) = gauss_newton(ledger, &start.unit);
-    let end = ledger.find(&unit).cloned().unwrap_or_else(|| start.clone());
-    (Descent { start, end, evaluations: ledger.run().len() - made }, stop)
+fn descend_from(ledger: &mut Ledger, start: Evaluation) -> (LocalDescent, Option<StopReason>) {
+    let made = ledger.run_evaluations().len();
+    let (unit, stop) = descend_gauss_newton(ledger, &start.unit);
+    let end = ledger.find_evaluation(&unit).cloned().unwrap_or_else(|| start.clone());
+    (LocalDescent { start, end, evaluations: ledger.run_evaluations().len() - made }, stop)
 }
 
 /// Descent and simplices from the best point until one simplex of each size in a row has gained nothing.
-pub fn polish(ledger: &mut Ledger) -> Ended {
+pub fn polish_best(ledger: &mut Ledger) -> SearchTermination {
     let mut barren = 0;
-    while let Some(edge) = SIMPLICES.get(barren).filter(|_| !is_exact(ledger)) {
-        let Some((start, before)) = ledger.best().map(|best| (best.unit.clone(), best.cost)) else { break };
+    while let Some(edge) = SIMPLEX_EDGES.get(barren).filter(|_| !is_exact_fit(ledger)) {
+        let Some((start, before)) = ledger.best_evaluation().map(|best| (best.unit.clone(), best.cost))
+        else {
+            break;
+        };
         if barren == 0
-            && let (_, Some(stop)) = gauss_newton(ledger, &start)
+            && let (_, Some(stop)) = descend_gauss_newton(ledger, &start)
         {
-            return Ended::Stopped(stop);
+            return SearchTermination::Stopped(stop);
         }
-        let start = ledger.best().map_or(start, |best| best.unit.clone());
-        let ended = simplex(ledger, &start, *edge);
-        if ended != Ended::Converged {
+        let start = ledger.best_evaluation().map_or(start, |best| best.unit.clone());
+        let ended = run_simplex(ledger, &start, *edge);
+        if ended != SearchTermination::Converged {
             return ended;
         }
-        let gain = before - ledger.best().map_or(before, |best| best.cost);
-        barren = if gain > WORTH { 0 } else { barren + 1 };
+        let gain = before - ledger.best_evaluation().map_or(before, |best| best.cost);
+        barren = if gain > MIN_WORTHWHILE_GAIN { 0 } else { barren + 1 };
     }
-    Ended::Converged
+    SearchTermination::Converged
 }
 
-fn is_exact(ledger: &Ledger) -> bool {
-    ledger.best().is_some_and(|best| best.cost <= EXACT)
+fn is_exact_fit(ledger: &Ledger) -> bool {
+    ledger.best_evaluation().is_some_and(|best| best.cost <= EXACT_COST)
 }
 
 /// The best points of the global stage that lie apart, best first.
-pub(super) fn distinct_best<'e>(
+pub(super) fn distinct_best_points<'e>(
     known: impl IntoIterator<Item = &'e Evaluation>,
     most: usize,
 ) -> Vec<Evaluation> {
@@ -145,7 +162,7 @@ pub(super) fn distinct_best<'e>(
     let mut chosen: Vec<Evaluation> = Vec::new();
     for evaluation in order {
         let apart = |other: &Evaluation| {
-            other.unit.iter().zip(&evaluation.unit).any(|(a, b)| (a - b).abs() > DISTINCT)
+            other.unit.iter().zip(&evaluation.unit).any(|(a, b)| (a - b).abs() > MIN_START_DISTANCE)
         };
         if chosen.iter().all(apart) {
             chosen.push(evaluation.clone());
@@ -181,7 +198,7 @@ mod tests {
             evaluation(&[0.1, 0.1], 4.0),
             evaluation(&[0.1, 0.9], 5.0),
         ];
-        let places: Vec<Vec<f64>> = distinct_best(&run, 3).into_iter().map(|e| e.unit).collect();
+        let places: Vec<Vec<f64>> = distinct_best_points(&run, 3).into_iter().map(|e| e.unit).collect();
         assert_eq!(places, vec![vec![0.55, 0.45], vec![0.9, 0.5], vec![0.1, 0.1]]);
     }
 }

@@ -1,20 +1,20 @@
 //! When a solver that gains nothing is left.
 
 /// Counts steps without progress.
-pub(super) struct Patience {
+pub(super) struct StagnationCounter {
     allowed: usize,
     gain: f64,
     mark: f64,
     waited: usize,
 }
 
-impl Patience {
+impl StagnationCounter {
     /// So many steps that each gain less than this share of the cost.
     pub(super) fn new(allowed: usize, gain: f64) -> Self {
         Self { allowed, gain, mark: f64::MAX, waited: 0 }
     }
 
-    pub(super) fn is_over(&mut self, cost: f64) -> bool {
+    pub(super) fn is_stagnant(&mut self, cost: f64) -> bool {
         if cost < self.mark * (1.0 - self.gain) {
             self.mark = cost;
             self.waited = 0;
@@ -31,9 +31,9 @@ mod tests {
 
     #[test]
     fn patience_counts_steps_without_gain() {
-        let mut patience = Patience::new(2, 0.01);
+        let mut patience = StagnationCounter::new(2, 0.01);
         let over: Vec<bool> =
-            [10.0, 9.95, 9.0, 9.0, 8.95, 8.92].into_iter().map(|cost| patience.is_over(cost)).collect();
+            [10.0, 9.95, 9.0, 9.0, 8.95, 8.92].into_iter().map(|cost| patience.is_stagnant(cost)).collect();
         assert_eq!(over, [false, false, false, false, false, true]);
     }
 }

@@ -2,16 +2,16 @@
 
 /// Points closer than this in every coordinate of the unit box are one starting point: a descent crosses half
 /// of that in a step.
-pub(crate) const DISTINCT: f64 = 0.2;
+pub(crate) const MIN_START_DISTANCE: f64 = 0.2;
 /// Edges of the simplices in the unit box, taken in turn from the best point: the first stays in a basin that
 /// a cloud has found, the second steps over a kink or along a valley that has collapsed the first, the third
 /// fits into a narrow one.
-pub(crate) const SIMPLICES: [f64; 3] = [0.05, 0.2, 0.01];
+pub(crate) const SIMPLEX_EDGES: [f64; 3] = [0.05, 0.2, 0.01];
 /// Spread of the costs in a simplex at which it has converged, in squared standard deviations: a hundredth of
 /// an sd of a feature.
-pub const SPREAD: f64 = 1e-4;
+pub const SIMPLEX_COST_SPREAD: f64 = 1e-4;
 /// Gain in cost below which another step is not worth taking: 2 % of the gain of 1 that a 68 % interval
 /// spans.
-pub(crate) const WORTH: f64 = 0.02;
+pub(crate) const MIN_WORTHWHILE_GAIN: f64 = 0.02;
 /// Cost that leaves nothing to gain: a thousandth of a standard deviation in one feature.
-pub(crate) const EXACT: f64 = 1e-6;
+pub(crate) const EXACT_COST: f64 = 1e-6;

@@ -4,13 +4,13 @@
 //! Its solver is stepped from here. It has no bounds, so it works on the real line ([`line_to_unit`]), and
 //! it panics on an error of its first costs, so costs are never errors.
 
-use super::costs::Costs;
-use super::ended::Ended;
-use super::patience::Patience;
-use super::rules::{EXACT, SPREAD};
-use crate::fit::ledger::{Ledger, Stop};
+use super::costs::StageCosts;
+use super::ended::SearchTermination;
+use super::patience::StagnationCounter;
+use super::rules::{EXACT_COST, SIMPLEX_COST_SPREAD};
+use crate::fit::ledger::{Ledger, StopReason};
 use crate::fit::scale::{line_to_unit, unit_to_line};
-use crate::fit::stage::Stage;
+use crate::fit::stage::EvaluationStage;
 use argmin::core::{CostFunction, Error, IterState, Problem, Solver, State};
 use argmin::solver::neldermead::NelderMead;
 use std::cell::RefCell;
@@ -19,53 +19,60 @@ use std::cell::RefCell;
 const STAGNANT_STEPS: usize = 20;
 
 /// State without derivatives.
-type Plain = IterState<Vec<f64>, (), (), (), (), f64>;
+type SimplexState = IterState<Vec<f64>, (), (), (), (), f64>;
 
 /// Costs as a function of places on the real line.
-struct OnTheLine<'l, 'a>(RefCell<Costs<'l, 'a>>);
+struct UnboundedCost<'l, 'a>(RefCell<StageCosts<'l, 'a>>);
 
-impl CostFunction for OnTheLine<'_, '_> {
+impl CostFunction for UnboundedCost<'_, '_> {
     type Param = Vec<f64>;
     type Output = f64;
 
     fn cost(&self, place: &Vec<f64>) -> Result<f64, Error> {
-        Ok(self.0.borrow_mut().of_one(place.iter().map(|z| line_to_unit(*z)).collect()))
+        Ok(self.0.borrow_mut().evaluate_point(place.iter().map(|z| line_to_unit(*z)).collect()))
     }
 }
 
 /// One simplex from `start` with edges of this length in the unit box, until it has shrunk or gains nothing.
-pub(super) fn simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> Ended {
-    let vertices = first_simplex(start, edge);
-    let steps = ledger.remaining().saturating_mul(2).saturating_add(vertices.len());
-    if ledger.remaining() < vertices.len() {
-        return Ended::Stopped(Stop::Budget);
+pub(super) fn run_simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> SearchTermination {
+    let vertices = initial_simplex(start, edge);
+    let steps = ledger.remaining_evaluations().saturating_mul(2).saturating_add(vertices.len());
+    if ledger.remaining_evaluations() < vertices.len() {
+        return SearchTermination::Stopped(StopReason::Budget);
     }
-    let mut patience = Patience::new(STAGNANT_STEPS * vertices.len(), 0.0);
-    let Ok(mut solver) = NelderMead::new(vertices).with_sd_tolerance(SPREAD) else { return Ended::Converged };
-    let mut problem = Problem::new(OnTheLine(RefCell::new(Costs::new(ledger, Stage::Local))));
-    let Ok((mut state, _)) = solver.init(&mut problem, Plain::new()) else { return Ended::Converged };
+    let mut patience = StagnationCounter::new(STAGNANT_STEPS * vertices.len(), 0.0);
+    let Ok(mut solver) = NelderMead::new(vertices).with_sd_tolerance(SIMPLEX_COST_SPREAD) else {
+        return SearchTermination::Converged;
+    };
+    let mut problem =
+        Problem::new(UnboundedCost(RefCell::new(StageCosts::new(ledger, EvaluationStage::Local))));
+    let Ok((mut state, _)) = solver.init(&mut problem, SimplexState::new()) else {
+        return SearchTermination::Converged;
+    };
     for _ in 0..steps {
-        if let Some(stop) = problem.problem.as_ref().and_then(|costs| costs.0.borrow().stop()) {
-            return Ended::Stopped(stop);
+        if let Some(stop) = problem.problem.as_ref().and_then(|costs| costs.0.borrow().stop_reason()) {
+            return SearchTermination::Stopped(stop);
         }
-        if state.get_cost() <= EXACT || has_shrunk(&mut solver, &state) || patience.is_over(state.get_cost())
+        if state.get_cost() <= EXACT_COST
+            || has_shrunk(&mut solver, &state)
+            || patience.is_stagnant(state.get_cost())
         {
-            return Ended::Converged;
+            return SearchTermination::Converged;
         }
         match solver.next_iter(&mut problem, state) {
             Ok((next, _)) => state = next,
-            Err(_) => return Ended::Converged,
+            Err(_) => return SearchTermination::Converged,
         }
     }
-    Ended::Converged
+    SearchTermination::Converged
 }
 
-fn has_shrunk(solver: &mut NelderMead<Vec<f64>, f64>, state: &Plain) -> bool {
-    <NelderMead<_, _> as Solver<OnTheLine, Plain>>::terminate(solver, state).terminated()
+fn has_shrunk(solver: &mut NelderMead<Vec<f64>, f64>, state: &SimplexState) -> bool {
+    <NelderMead<_, _> as Solver<UnboundedCost, SimplexState>>::terminate(solver, state).terminated()
 }
 
 /// `start` and one step of `edge` inwards along each coordinate of the box, as places on the real line.
-fn first_simplex(start: &[f64], edge: f64) -> Vec<Vec<f64>> {
+fn initial_simplex(start: &[f64], edge: f64) -> Vec<Vec<f64>> {
     let moved = (0..start.len()).map(|axis| {
         let step =
             |(at, u): (usize, &f64)| if at == axis { u + if *u > 0.5 { -edge } else { edge } } else { *u };
@@ -83,7 +90,7 @@ mod tests {
 
     #[test]
     fn the_first_simplex_stays_in_the_box_and_is_not_flat() {
-        let vertices = first_simplex(&[0.0, 1.0], 0.05);
+        let vertices = initial_simplex(&[0.0, 1.0], 0.05);
         let units: Vec<Vec<f64>> =
             vertices.iter().map(|v| v.iter().map(|z| line_to_unit(*z)).collect()).collect();
         let expected = [[0.0, 1.0], [0.05, 1.0], [0.0, 0.95]];

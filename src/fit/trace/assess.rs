@@ -1,27 +1,27 @@
 //! What is known at the end of a search: intervals, and whether anything speaks against them.
 
-use super::agreement::{Lengths, rivals};
-use super::branch::{Branch, End, Z_95};
-use super::chain::MOST_STEPS;
-use super::descent::{AGREES_SD, Descent};
-use super::iterate::{Iterate, Settings};
+use super::agreement::{SegmentLengthComparison, count_rivals};
+use super::branch::{SearchEnd, UncertaintyRun, Z_95};
+use super::chain::MAX_STEPS;
+use super::descent::{SAME_END_SD, TraceDescent};
+use super::iterate::{Iterate, TraceSearchSettings};
 use super::model::TraceModel;
-use super::profile::distances;
-use super::unknown::Kind;
-use crate::fit::bootstrap::FEWEST;
+use super::profile::profile_distances;
+use super::unknown::UnknownKind;
+use crate::fit::bootstrap::MIN_TWINS;
 use crate::math;
 use nalgebra::DMatrix;
 use std::collections::BTreeSet;
 
 /// Least eigenvalue of the information, in units of its diagonal, that counts as known: below it rounding
 /// decides.
-const LEAST_EIGENVALUE: f64 = 1e-10;
+const MIN_EIGENVALUE: f64 = 1e-10;
 
 /// An unknown at the end of a search.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Estimate {
+pub struct UnknownEstimate {
     /// What it is.
-    pub kind: Kind,
+    pub kind: UnknownKind,
     /// Value in its SI unit.
     pub value: f64,
     /// Ends of the 95 % interval by curvature, segments and rise of the cost, in its SI unit.
@@ -36,7 +36,7 @@ pub struct Estimate {
     pub at_bound: bool,
 }
 
-impl Estimate {
+impl UnknownEstimate {
     /// Ends of the widest 95 % interval, in its SI unit.
     #[must_use]
     pub fn widest_95(&self) -> [f64; 2] {
@@ -47,9 +47,9 @@ impl Estimate {
 
 /// Everything that is known at the best end.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Assessment {
+pub struct TraceAssessment {
     /// One an unknown, in order.
-    pub estimates: Vec<Estimate>,
+    pub estimates: Vec<UnknownEstimate>,
     /// Correlation of the estimates.
     pub correlation: DMatrix<f64>,
     /// Number of combinations of the parameters that the recordings themselves determine.
@@ -62,12 +62,12 @@ pub struct Assessment {
     pub doubts: Vec<String>,
 }
 
-impl Assessment {
+impl TraceAssessment {
     /// Adds the intervals that follow from the scatter of refitted twins about the end. (The twins move by
     /// the same head, so that what is not known of it is added.)
     fn add_twins(&mut self, model: &TraceModel, end: &Iterate, refits: &[&[f64]]) {
         self.twins = refits.len();
-        if refits.len() < FEWEST {
+        if refits.len() < MIN_TWINS {
             return;
         }
         for (i, found) in self.estimates.iter_mut().enumerate() {
@@ -81,36 +81,36 @@ impl Assessment {
 }
 
 /// What is known at the end of the best of some descents; `branches` are its branches, and where they end.
-pub(super) fn assess(
-    end: &End<'_>,
-    (descents, best): (&[Descent], usize),
-    branches: &[(Branch, Option<Iterate>)],
-) -> Assessment {
-    let End { model, settings, at, sd, .. } = end;
+pub(super) fn assess_end(
+    end: &SearchEnd<'_>,
+    (descents, best): (&[TraceDescent], usize),
+    branches: &[(UncertaintyRun, Option<Iterate>)],
+) -> TraceAssessment {
+    let SearchEnd { model, settings, at, sd, .. } = end;
     let (curvature, information) = (&end.covariance.curvature, &end.covariance.information);
     let n = at.point.len();
-    let ended = |wanted: Branch| {
+    let ended = |wanted: UncertaintyRun| {
         let found = branches.iter().find(|(branch, _)| *branch == wanted);
         found.and_then(|(_, last)| last.as_ref())
     };
-    let distances = distances(end, ended);
-    let rank = rank(model, information);
-    let shorter = ended(Branch::Shorter);
+    let distances = profile_distances(end, ended);
+    let rank = count_determined(model, information);
+    let shorter = ended(UncertaintyRun::Shorter);
     let mut doubts = shared_doubts(model, settings, descents, best, sd, rank);
-    let lengths = shorter.and_then(|shorter| Lengths::new(model, at, shorter, sd));
-    doubts.extend(lengths.as_ref().and_then(|lengths| lengths.doubt(model)));
+    let lengths = shorter.and_then(|shorter| SegmentLengthComparison::new(model, at, shorter, sd));
+    doubts.extend(lengths.as_ref().and_then(|lengths| lengths.disagreement(model)));
     let bias = |i: usize| lengths.as_ref().map_or(0.0, |lengths| lengths.bias[i]);
     let estimates = (0..n)
         .map(|i| {
             let by_heads = end.covariance.heads[(i, i)];
             let ends = distances[i].map(|end| math::hypot(end, Z_95 * bias(i)));
-            Estimate { by_heads, ..estimate(model, at, i, math::hypot(sd[i], bias(i)), ends) }
+            UnknownEstimate { by_heads, ..estimate_unknown(model, at, i, math::hypot(sd[i], bias(i)), ends) }
         })
         .collect();
     let correlation =
         DMatrix::from_fn(n, n, |i, j| curvature[(i, j)] / (curvature[(i, i)] * curvature[(j, j)]).sqrt());
     let shorter = shorter.cloned();
-    let mut known = Assessment { estimates, correlation, rank, shorter, twins: 0, doubts };
+    let mut known = TraceAssessment { estimates, correlation, rank, shorter, twins: 0, doubts };
     let twins = branches.iter().filter(|(branch, _)| branch.is_twin());
     let refits: Vec<&[f64]> =
         twins.filter_map(|(_, last)| last.as_ref()).map(|last| &last.point[..]).collect();
@@ -118,9 +118,15 @@ pub(super) fn assess(
     known
 }
 
-fn estimate(model: &TraceModel, end: &Iterate, i: usize, sd: f64, [below, above]: [f64; 2]) -> Estimate {
+fn estimate_unknown(
+    model: &TraceModel,
+    end: &Iterate,
+    i: usize,
+    sd: f64,
+    [below, above]: [f64; 2],
+) -> UnknownEstimate {
     let (unknown, z) = (&model.unknowns.0[i], end.point[i]);
-    Estimate {
+    UnknownEstimate {
         kind: unknown.kind.clone(),
         value: unknown.value(z),
         ends_95: [-below, above].map(|far| unknown.value(z + far)),
@@ -139,13 +145,13 @@ fn is_at_bound(model: &TraceModel, end: &Iterate, i: usize) -> bool {
 }
 
 /// Whether the interval of unknown `i` leaves its range at both ends.
-fn is_open(model: &TraceModel, end: &Iterate, i: usize, sd: f64) -> bool {
+fn is_interval_open(model: &TraceModel, end: &Iterate, i: usize, sd: f64) -> bool {
     let [low, high] = model.unknowns.0[i].range;
     end.point[i] - Z_95 * sd <= low && end.point[i] + Z_95 * sd >= high
 }
 
 /// Combinations of the parameters without a prior that the recordings determine.
-fn rank(model: &TraceModel, information: &DMatrix<f64>) -> usize {
+fn count_determined(model: &TraceModel, information: &DMatrix<f64>) -> usize {
     let free: Vec<usize> = (0..information.nrows())
         .filter(|&i| model.unknowns.is_parameter(i) && model.unknowns.0[i].prior.is_none())
         .collect();
@@ -156,40 +162,42 @@ fn rank(model: &TraceModel, information: &DMatrix<f64>) -> usize {
     let priors = (0..information.nrows())
         .filter(|&i| model.unknowns.is_parameter(i) && model.unknowns.0[i].prior.is_some())
         .count();
-    scaled.symmetric_eigenvalues().iter().filter(|value| **value > LEAST_EIGENVALUE).count() + priors
+    scaled.symmetric_eigenvalues().iter().filter(|value| **value > MIN_EIGENVALUE).count() + priors
 }
 
 fn shared_doubts(
     model: &TraceModel,
-    settings: &Settings,
-    descents: &[Descent],
+    settings: &TraceSearchSettings,
+    descents: &[TraceDescent],
     best: usize,
     sd: &[f64],
     rank: usize,
 ) -> Vec<String> {
-    let Some(end) = descents[best].end() else { return Vec::new() };
+    let Some(end) = descents[best].last_iterate() else { return Vec::new() };
     let mut doubts = Vec::new();
     let bad = end.segments.iter().filter(|segment| segment.is_bad()).count();
     if bad > 0 {
         doubts.push(format!("{bad} of {} segments fit worse than noise ever does", end.segments.len()));
     }
-    if end.number >= MOST_STEPS {
-        doubts.push(format!("the search still moved after {MOST_STEPS} steps"));
+    if end.number >= MAX_STEPS {
+        doubts.push(format!("the search still moved after {MAX_STEPS} steps"));
     }
     if end.stage + 1 < settings.segment_s.len() {
         doubts.push("the search did not reach the longest segments".to_owned());
     }
-    let agree = descents.iter().enumerate().filter(|(at, _)| *at != best).filter_map(|(_, d)| d.end());
+    let agree =
+        descents.iter().enumerate().filter(|(at, _)| *at != best).filter_map(|(_, d)| d.last_iterate());
     let agree = agree
         .filter(|other| {
             let pairs = end.point.iter().zip(&other.point).zip(sd);
-            other.stage == end.stage && pairs.into_iter().all(|((a, b), sd)| (a - b).abs() <= AGREES_SD * sd)
+            other.stage == end.stage
+                && pairs.into_iter().all(|((a, b), sd)| (a - b).abs() <= SAME_END_SD * sd)
         })
         .count();
     if agree == 0 {
         doubts.push(format!("no two of {} starts end at the same place", descents.len()));
     }
-    let rivals = rivals(end, descents, sd);
+    let rivals = count_rivals(end, descents, sd);
     if rivals > 0 {
         doubts.push(format!("{rivals} of {} starts end elsewhere and fit nearly as well", descents.len()));
     }
@@ -200,8 +208,8 @@ fn shared_doubts(
     let names = |which: &dyn Fn(usize) -> bool| -> Option<String> {
         let named =
             (0..end.point.len()).filter(|i| which(*i)).filter_map(|i| match &model.unknowns.0[i].kind {
-                Kind::Parameter { name, .. } => Some(name.as_str()),
-                Kind::Camera { .. } => None,
+                UnknownKind::Parameter { name, .. } => Some(name.as_str()),
+                UnknownKind::Camera { .. } => None,
             });
         let named: Vec<&str> = named.collect::<BTreeSet<&str>>().into_iter().collect();
         (!named.is_empty()).then(|| named.join(", "))
@@ -209,7 +217,7 @@ fn shared_doubts(
     if let Some(names) = names(&|i| is_at_bound(model, end, i)) {
         doubts.push(format!("{names} ends at a bound, which may exclude a better value"));
     }
-    if let Some(names) = names(&|i| is_open(model, end, i, sd[i])) {
+    if let Some(names) = names(&|i| is_interval_open(model, end, i, sd[i])) {
         doubts.push(format!("nothing within the bounds is excluded for {names}, nor for what depends on it"));
     }
     doubts

@@ -2,52 +2,52 @@
 //!
 //! argmin's own Gauss-Newton solvers know neither states that are eliminated nor stages.
 
-use super::chain::{advance, begin};
-use super::iterate::{Iterate, Settings};
-use super::keep::Keep;
+use super::chain::{first_iterate, next_iterate};
+use super::iterate::{Iterate, TraceSearchSettings};
+use super::keep::Checkpoint;
 use super::model::TraceModel;
 use argmin::core::{Error, Executor, IterState, KV, Problem, Solver, TerminationReason, TerminationStatus};
 
 /// Distance of two ends, in standard deviations of each unknown, up to which they are one place.
-pub const AGREES_SD: f64 = 1.0;
+pub const SAME_END_SD: f64 = 1.0;
 
 /// The end of one start.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Descent {
+pub struct TraceDescent {
     /// Number of its start, from 0.
     pub start: usize,
     /// Last iterate of each stage that was reached, in order.
     pub stages: Vec<Iterate>,
 }
 
-impl Descent {
+impl TraceDescent {
     /// Cost at the end of the first stage.
     #[must_use]
-    pub fn first_cost(&self) -> f64 {
+    pub fn first_stage_cost(&self) -> f64 {
         self.stages.first().map_or(f64::INFINITY, |first| first.cost)
     }
 
     /// The last iterate.
     #[must_use]
-    pub fn end(&self) -> Option<&Iterate> {
+    pub fn last_iterate(&self) -> Option<&Iterate> {
         self.stages.last()
     }
 }
 
 /// What a chain works on.
-struct Chain<'a> {
+struct DescentProblem<'a> {
     model: &'a TraceModel,
-    settings: &'a Settings,
+    settings: &'a TraceSearchSettings,
     start: usize,
     point: Vec<f64>,
     /// Cost at the end of the first stage beyond which a start is given up.
     limit: f64,
-    keep: &'a mut dyn Keep,
+    checkpoint: &'a mut dyn Checkpoint,
 }
 
 /// Where a chain is.
 #[derive(Default)]
-struct Progress {
+struct DescentSolver {
     place: usize,
     stages: Vec<Iterate>,
     current: Option<Iterate>,
@@ -55,26 +55,26 @@ struct Progress {
     stopped: bool,
 }
 
-type Plain = IterState<Vec<f64>, (), (), (), (), f64>;
+type DescentState = IterState<Vec<f64>, (), (), (), (), f64>;
 
-impl Progress {
+impl DescentSolver {
     /// The next iterate: that of a journal, or a new one, which is kept.
-    fn next(&mut self, chain: &mut Chain<'_>) {
+    fn take_iterate(&mut self, chain: &mut DescentProblem<'_>) {
         if self.current.as_ref().is_some_and(|at| at.settled && at.stage == 0 && at.cost > chain.limit) {
             self.ended = true;
             return;
         }
-        let known = chain.keep.known(chain.start, self.place);
+        let known = chain.checkpoint.find_iterate(chain.start, self.place);
         let is_new = known.is_none();
         let next = known.or_else(|| match &self.current {
-            None => begin(chain.model, chain.settings, &chain.point),
-            Some(before) => advance(chain.model, chain.settings, before),
+            None => first_iterate(chain.model, chain.settings, &chain.point),
+            Some(before) => next_iterate(chain.model, chain.settings, before),
         });
         let Some(next) = next else {
             self.ended = true;
             return;
         };
-        if is_new && chain.keep.add(chain.start, self.place, &next).is_break() {
+        if is_new && chain.checkpoint.store_iterate(chain.start, self.place, &next).is_break() {
             self.stopped = true;
         }
         if let Some(before) = self.current.take().filter(|before| before.stage != next.stage) {
@@ -84,24 +84,24 @@ impl Progress {
     }
 }
 
-impl<'a> Solver<Chain<'a>, Plain> for &mut Progress {
+impl<'a> Solver<DescentProblem<'a>, DescentState> for &mut DescentSolver {
     fn name(&self) -> &'static str {
         "segments with eliminated states"
     }
 
     fn next_iter(
         &mut self,
-        problem: &mut Problem<Chain<'a>>,
-        state: Plain,
-    ) -> Result<(Plain, Option<KV>), Error> {
+        problem: &mut Problem<DescentProblem<'a>>,
+        state: DescentState,
+    ) -> Result<(DescentState, Option<KV>), Error> {
         if let Some(chain) = &mut problem.problem {
-            self.next(chain);
+            self.take_iterate(chain);
         }
         let cost = self.current.as_ref().map_or(f64::INFINITY, |iterate| iterate.cost);
         Ok((state.cost(cost), None))
     }
 
-    fn terminate(&mut self, _: &Plain) -> TerminationStatus {
+    fn terminate(&mut self, _: &DescentState) -> TerminationStatus {
         match () {
             () if self.stopped => TerminationStatus::Terminated(TerminationReason::Interrupt),
             () if self.ended => TerminationStatus::Terminated(TerminationReason::SolverConverged),
@@ -112,20 +112,20 @@ impl<'a> Solver<Chain<'a>, Plain> for &mut Progress {
 
 /// A chain from a start to its end, given up where its first stage ends above `limit`; whether it was asked
 /// to stop before.
-pub(super) fn descend(
+pub(super) fn descend_from_start(
     model: &TraceModel,
-    settings: &Settings,
+    settings: &TraceSearchSettings,
     point: Vec<f64>,
     start: usize,
     limit: f64,
-    keep: &mut dyn Keep,
-) -> (Descent, bool) {
-    let mut progress = Progress::default();
-    let chain = Chain { model, settings, start, point, limit, keep };
+    keep: &mut dyn Checkpoint,
+) -> (TraceDescent, bool) {
+    let mut progress = DescentSolver::default();
+    let chain = DescentProblem { model, settings, start, point, limit, checkpoint: keep };
     // (the solver never fails)
     let _ =
         Executor::new(chain, &mut progress).timer(false).configure(|state| state.max_iters(u64::MAX)).run();
     let mut stages = progress.stages;
     stages.extend(progress.current);
-    (Descent { start, stages }, progress.stopped)
+    (TraceDescent { start, stages }, progress.stopped)
 }

@@ -1,10 +1,10 @@
 //! What a search passes on from step to step.
 
-use super::shot::State;
+use super::shot::LinkState;
 
 /// How a trace is searched.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Settings {
+pub struct TraceSearchSettings {
     /// Length of the segments in each stage, s, rising.
     pub segment_s: Vec<f64>,
     /// Number of twins of the end that are fitted again.
@@ -15,7 +15,7 @@ pub struct Settings {
 #[derive(Debug, Clone, PartialEq)]
 pub struct SegmentState {
     /// Number of the recording.
-    pub film: usize,
+    pub recording: usize,
     /// First frame.
     pub first: usize,
     /// Frame before which it ends.
@@ -31,15 +31,15 @@ pub struct SegmentState {
 }
 
 impl SegmentState {
-    pub(super) fn state(&self) -> State {
-        State::from(self.start)
+    pub(super) fn start_state(&self) -> LinkState {
+        LinkState::from(self.start)
     }
 
-    pub(super) fn seen(&self) -> State {
-        State::from(self.shown)
+    pub(super) fn recorded_state(&self) -> LinkState {
+        LinkState::from(self.shown)
     }
 
-    pub(super) fn set_state(&mut self, state: &State) {
+    pub(super) fn set_start_state(&mut self, state: &LinkState) {
         self.start = (*state).into();
     }
 
@@ -51,7 +51,7 @@ impl SegmentState {
 
     /// How far chi2 lies above its mean, in standard deviations.
     #[must_use]
-    pub fn excess(&self) -> f64 {
+    pub fn chi2_excess_sd(&self) -> f64 {
         let freedoms = (self.data as f64 - 4.0).max(1.0);
         (self.chi2 - freedoms) / (2.0 * freedoms).sqrt()
     }
@@ -67,7 +67,7 @@ pub struct Iterate {
     /// How often the segments of this stage were cut anew.
     pub cuts: usize,
     /// How often segments that did not fit were tried from elsewhere at the end of this stage.
-    pub mended: usize,
+    pub rescues: usize,
     /// Whether segments count plainly, not robustly.
     pub plain: bool,
     /// Whether the stage has converged.

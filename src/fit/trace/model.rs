@@ -1,23 +1,23 @@
 //! What a trace fit works on.
 
-use super::film::Film;
-use super::unknown::Unknowns;
+use super::film::CameraObservation;
+use super::unknown::TraceUnknowns;
 use crate::simulate::scene::Scene;
 
 /// A recording with the scene that it is fitted with.
 #[derive(Clone)]
-pub struct Shoot {
+pub struct TraceRecording {
     /// The scene; its drive is the one that the model runs on.
     pub scene: Scene,
     /// The recording.
-    pub film: Film,
+    pub observation: CameraObservation,
 }
 
 /// Everything that decides a trace fit but the search's settings.
 #[derive(Clone)]
 pub struct TraceModel {
     /// One a recording.
-    pub shoots: Vec<Shoot>,
+    pub recordings: Vec<TraceRecording>,
     /// What is estimated besides starting states.
-    pub unknowns: Unknowns,
+    pub unknowns: TraceUnknowns,
 }

@@ -1,8 +1,8 @@
 //! Where segments begin, and the states in which a recording shows the blade there.
 
-use super::film::Film;
-use super::shot::State;
-use super::unknown::View;
+use super::film::CameraObservation;
+use super::shot::LinkState;
+use super::unknown::CameraParameters;
 use crate::blade::Linkage;
 use crate::math;
 use crate::simulate::scene::Scene;
@@ -10,34 +10,39 @@ use nalgebra::{DMatrix, DVector};
 
 /// Least angle between the links from which the two coordinates of the tip give both angles: a straight
 /// blade hides it.
-const LEAST_BEND_RAD: f64 = 0.15;
+const MIN_BEND_RAD: f64 = 0.15;
 /// Least speed of the tip over the glass at which it counts as sliding, m/s: in stick the state is bound to
 /// three dimensions.
-const LEAST_SPEED_M_PER_S: f64 = 0.05;
+const MIN_SPEED_M_PER_S: f64 = 0.05;
 /// Time on either side of a frame from which its rates are taken, s: a third of a stick-slip cycle.
 const HALF_WIDTH_S: f64 = 3.5e-4;
 
 /// A frame at which a segment may begin, with the state that the recording shows.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Boundary {
+pub(super) struct SegmentBoundary {
     pub frame: usize,
-    pub state: State,
+    pub state: LinkState,
 }
 
 /// Boundaries about `length_s` apart, each the frame nearest to its place at which the tip slides and the
 /// blade is bent. (The fastest frame nearby would be the one with the largest noise.)
-pub(super) fn boundaries(scene: &Scene, film: &Film, view: &View, length_s: f64) -> Vec<Boundary> {
+pub(super) fn segment_boundaries(
+    scene: &Scene,
+    film: &CameraObservation,
+    view: &CameraParameters,
+    length_s: f64,
+) -> Vec<SegmentBoundary> {
     let [from, to] = film.settings.frames;
     let step = ((length_s * film.rate_hz).round() as usize).max(4);
     // (rates from one side alone are far off)
-    let inner = half_width(film)..film.times_s.len().saturating_sub(half_width(film));
-    let usable = |frame: usize| -> Option<Boundary> {
+    let inner = half_width_frames(film)..film.times_s.len().saturating_sub(half_width_frames(film));
+    let usable = |frame: usize| -> Option<SegmentBoundary> {
         inner.contains(&frame).then_some(())?;
-        let (state, speed) = seen_state(scene, film, view, frame)?;
-        let bent = (state[1] - state[0]).abs() > LEAST_BEND_RAD && speed.abs() > LEAST_SPEED_M_PER_S;
-        bent.then_some(Boundary { frame, state })
+        let (state, speed) = recorded_state(scene, film, view, frame)?;
+        let bent = (state[1] - state[0]).abs() > MIN_BEND_RAD && speed.abs() > MIN_SPEED_M_PER_S;
+        bent.then_some(SegmentBoundary { frame, state })
     };
-    let mut found: Vec<Boundary> = Vec::new();
+    let mut found: Vec<SegmentBoundary> = Vec::new();
     let mut place = from;
     while place + step / 2 < to {
         let width = (step / 3).max(3);
@@ -60,16 +65,21 @@ pub(super) fn boundaries(scene: &Scene, film: &Film, view: &View, length_s: f64)
 
 /// State at the beginning of a frame's shutter as a parabola through the frames around shows it, and the
 /// tip's speed over the glass, m/s.
-fn seen_state(scene: &Scene, film: &Film, view: &View, frame: usize) -> Option<(State, f64)> {
+fn recorded_state(
+    scene: &Scene,
+    film: &CameraObservation,
+    view: &CameraParameters,
+    frame: usize,
+) -> Option<(LinkState, f64)> {
     let linkage = &scene.linkage;
     let start_s = film.times_s[frame] - film.lead_s();
-    let head = scene.drive.at(start_s - view.clock_s);
+    let head = scene.drive.motion_at(start_s - view.clock_s);
     let scale = 1.0 + view.scale;
-    let (lean, lean_rate) = parabola(film, frame, |k| {
+    let (lean, lean_rate) = fit_parabola(film, frame, |k| {
         let head = film.head_m[k] * if film.own_head { 1.0 } else { scale };
         Some((film.tip_x_m[k]? - head - view.offsets_m(film.after_middle_s(k))[0]) / scale)
     })?;
-    let fall = parabola(film, frame, |k| {
+    let fall = fit_parabola(film, frame, |k| {
         let along = film.head_m[k] - film.centre_m;
         Some((film.drop_m[k]? + view.tilt_rad * along - view.offsets_m(film.after_middle_s(k))[1]) / scale)
     });
@@ -78,31 +88,35 @@ fn seen_state(scene: &Scene, film: &Film, view: &View, frame: usize) -> Option<(
     let state = match fall {
         Some((drop, drop_rate)) => {
             let lean = lean + view.tilt_rad * drop;
-            let [theta, phi] = angles(linkage, lean, drop)?;
-            let [theta_rate, phi_rate] = rates(linkage, [theta, phi], lean_rate, drop_rate);
-            State::new(theta, phi, theta_rate, phi_rate)
+            let [theta, phi] = link_angles(linkage, lean, drop)?;
+            let [theta_rate, phi_rate] = link_rates(linkage, [theta, phi], lean_rate, drop_rate);
+            LinkState::new(theta, phi, theta_rate, phi_rate)
         }
         None => {
             /// Relative change of the lean from which the path of static poses is differentiated.
             const NEXT: f64 = 0.02;
-            let [theta, phi] = static_angles(linkage, lean)?;
-            let [theta_next, phi_next] = static_angles(linkage, lean * (1.0 + NEXT))?;
+            let [theta, phi] = equilibrium_angles(linkage, lean)?;
+            let [theta_next, phi_next] = equilibrium_angles(linkage, lean * (1.0 + NEXT))?;
             let per_length = lean_rate / (NEXT * lean);
-            State::new(theta, phi, (theta_next - theta) * per_length, (phi_next - phi) * per_length)
+            LinkState::new(theta, phi, (theta_next - theta) * per_length, (phi_next - phi) * per_length)
         }
     };
     Some((state, speed))
 }
 
 /// Frames on either side of one from which its rates are taken.
-fn half_width(film: &Film) -> usize {
+fn half_width_frames(film: &CameraObservation) -> usize {
     ((HALF_WIDTH_S * film.rate_hz).round() as usize).max(1)
 }
 
 /// Value and slope, per second, at the beginning of a frame's shutter, of the parabola (or line) that fits
 /// the frames around.
-fn parabola(film: &Film, frame: usize, of: impl Fn(usize) -> Option<f64>) -> Option<(f64, f64)> {
-    let half = half_width(film);
+fn fit_parabola(
+    film: &CameraObservation,
+    frame: usize,
+    of: impl Fn(usize) -> Option<f64>,
+) -> Option<(f64, f64)> {
+    let half = half_width_frames(film);
     let start_s = film.times_s[frame] - film.lead_s();
     let near = frame.saturating_sub(half)..=(frame + half).min(film.times_s.len() - 1);
     let points: Vec<[f64; 2]> =
@@ -119,7 +133,7 @@ fn parabola(film: &Film, frame: usize, of: impl Fn(usize) -> Option<f64>) -> Opt
 
 /// Angles of both links that put the tip `lean` along the sweep from the head and drop the head by `drop`,
 /// the lip trailing; `None` out of reach.
-fn angles(linkage: &Linkage, lean: f64, drop: f64) -> Option<[f64; 2]> {
+fn link_angles(linkage: &Linkage, lean: f64, drop: f64) -> Option<[f64; 2]> {
     /// A straight blade may look longer than it is by noise.
     const REACH: f64 = 1.02;
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
@@ -134,7 +148,7 @@ fn angles(linkage: &Linkage, lean: f64, drop: f64) -> Option<[f64; 2]> {
 }
 
 /// Rates of both links from those of lean and drop.
-fn rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_rate: f64) -> [f64; 2] {
+fn link_rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_rate: f64) -> [f64; 2] {
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
     let determinant = l1 * l2 * math::sin(phi - theta);
     [
@@ -145,7 +159,7 @@ fn rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_rate: f
 
 /// Angles at which springs, preload and whatever friction balance with the tip `lean` from the head: where
 /// the drop is not seen.
-fn static_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
+fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
     /// Angles of the neck that are looked at.
     const LARGEST_RAD: f64 = 0.7;
     const POINTS: usize = 140;
@@ -179,8 +193,8 @@ fn neck_moment(linkage: &Linkage, theta: f64, phi: f64) -> f64 {
     let normal = linkage.head.stiffness * (linkage.preload_displacement_m - drop);
     let lip = linkage.lip.stiffness * (phi - theta);
     let friction = (lip - normal * l2 * math::sin(phi)) / (l2 * math::cos(phi));
-    let shoulder = linkage.shoulder.map_or(0.0, |s| s.moment(theta, 0.0, s.lean(theta).sign()));
-    let leans = linkage.shoulder.is_some_and(|s| s.lean(theta).sign() != 0.0);
+    let shoulder = linkage.shoulder.map_or(0.0, |s| s.moment(theta, 0.0, s.contact_at(theta).angle_sign()));
+    let leans = linkage.shoulder.is_some_and(|s| s.contact_at(theta).angle_sign() != 0.0);
     linkage.neck.stiffness * theta + if leans { shoulder } else { 0.0 }
         - lip
         - normal * l1 * math::sin(theta)

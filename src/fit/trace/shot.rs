@@ -1,16 +1,18 @@
 //! One run of the model over a segment as the camera sees it, with its derivatives.
 
-use super::film::Film;
-use super::unknown::{CameraUnknown, Kind, Unknowns, View};
+use super::film::CameraObservation;
+use super::unknown::{CameraParameters, CameraUnknown, TraceUnknowns, UnknownKind};
 use crate::blade::Pose;
 use crate::simulate::scene::{Scene, StartKind};
-use crate::simulate::sensitivity::{Channel, Direction, Runner, Seeds, TangentObserver, TangentPiece};
-use crate::simulate::{Effort, Status};
+use crate::simulate::sensitivity::{
+    Channel, TangentDirection, TangentObserver, TangentRunner, TangentSeeds, TangentSegment,
+};
+use crate::simulate::{RunStatus, SolverOptions};
 use nalgebra::{DMatrix, DVector, Vector4};
 use std::cell::RefCell;
 
 /// Angles and rates of neck and lip.
-pub(super) type State = Vector4<f64>;
+pub(super) type LinkState = Vector4<f64>;
 
 /// Changes of angles, rad, and rates, rad/s, that are small against what a segment may do.
 pub(super) const STATE_STEPS: [f64; 4] = [3e-5, 3e-5, 0.1, 0.1];
@@ -27,30 +29,30 @@ const CHANNELS: [Channel; 3] = [Channel::TipX, Channel::HeadX, Channel::HeadDrop
 
 thread_local! {
     /// The room in which this thread's runs are expanded.
-    static RUNNER: RefCell<Runner> = RefCell::new(Runner::with_accuracy(ACCURACY));
+    static RUNNER: RefCell<TangentRunner> = RefCell::new(TangentRunner::with_accuracy(ACCURACY));
 }
 
-pub(super) fn pose_of(s: &State) -> Pose {
+pub(super) fn state_to_pose(s: &LinkState) -> Pose {
     Pose { theta: s[0], phi: s[1], theta_rate: s[2], phi_rate: s[3] }
 }
 
-pub(super) fn state_of(pose: &Pose) -> State {
-    State::new(pose.theta, pose.phi, pose.theta_rate, pose.phi_rate)
+pub(super) fn pose_to_state(pose: &Pose) -> LinkState {
+    LinkState::new(pose.theta, pose.phi, pose.theta_rate, pose.phi_rate)
 }
 
 /// What the camera sees of a run: means of tip, head and drop over the shutter, m, a row a frame, and their
 /// derivatives by every direction.
-struct Shot {
+struct SegmentObservation {
     means: Vec<[f64; 3]>,
     /// One row a frame of [tip, head, drop] by direction.
     slopes: Vec<f64>,
-    end: State,
+    end: LinkState,
     /// Whether there are derivatives to its end.
     is_known: bool,
 }
 
 /// Adds up what the shutter sees.
-struct Eye<'a> {
+struct ShutterAverage<'a> {
     times_s: &'a [f64],
     clock_s: f64,
     half_s: f64,
@@ -64,8 +66,8 @@ struct Eye<'a> {
     is_known: bool,
 }
 
-impl TangentObserver for Eye<'_> {
-    fn piece(&mut self, piece: &TangentPiece<'_>) {
+impl TangentObserver for ShutterAverage<'_> {
+    fn observe_segment(&mut self, piece: &TangentSegment<'_>) {
         self.is_known &= piece.is_known;
         while let Some(time) = self.times_s.get(self.frame).map(|t| t - self.clock_s) {
             let (opens, closes) = (time - self.half_s, time + self.half_s);
@@ -73,15 +75,15 @@ impl TangentObserver for Eye<'_> {
                 break;
             }
             let (weights, share) = if self.half_s > 0.0 {
-                let weights = piece.over(opens.max(piece.start_s), closes.min(piece.end_s));
+                let weights = piece.weights_over(opens.max(piece.start_s), closes.min(piece.end_s));
                 (weights, 0.5 / self.half_s)
             } else {
-                (piece.at(time.max(piece.start_s)), 1.0)
+                (piece.weights_at(time.max(piece.start_s)), 1.0)
             };
             for (k, channel) in CHANNELS.into_iter().enumerate() {
-                self.means[self.frame][k] += share * piece.value(channel, &weights);
+                self.means[self.frame][k] += share * piece.channel_value(channel, &weights);
                 if self.directions > 0 {
-                    piece.derivatives(channel, &weights, &mut self.row);
+                    piece.channel_derivatives(channel, &weights, &mut self.row);
                     let at = (self.frame * CHANNELS.len() + k) * self.directions;
                     for (sum, slope) in self.slopes[at..].iter_mut().zip(&self.row) {
                         *sum += share * slope;
@@ -94,32 +96,32 @@ impl TangentObserver for Eye<'_> {
             self.frame += 1;
         }
         if piece.end_s >= self.stop_s {
-            self.end = Some(piece.sample(piece.end_s).pose);
+            self.end = Some(piece.sample_at(piece.end_s).pose);
         }
     }
 }
 
 /// Residuals with their derivatives by the starting state and by the unknowns.
-pub(super) struct Linear {
+pub(super) struct LinearizedSegment {
     pub residuals: DVector<f64>,
     pub by_state: DMatrix<f64>,
     pub by_unknown: DMatrix<f64>,
 }
 
 /// The model of a recording at one point of the search.
-pub(super) struct Point<'a> {
-    pub film: &'a Film,
-    pub view: View,
+pub(super) struct RecordingModel<'a> {
+    pub observation: &'a CameraObservation,
+    pub camera: CameraParameters,
     pub scene: Scene,
-    none: Seeds,
-    states: Seeds,
-    all: Seeds,
+    none: TangentSeeds,
+    states: TangentSeeds,
+    all: TangentSeeds,
     /// How each unknown enters.
-    enters: Vec<Enters>,
+    effects: Vec<UnknownEffect>,
 }
 
 /// How an unknown enters the residuals of a recording.
-enum Enters {
+enum UnknownEffect {
     /// Not at all: it is another recording's.
     Nowhere,
     /// By the run: number of its direction, and derivative of that by the coordinate.
@@ -128,59 +130,75 @@ enum Enters {
     Picture(CameraUnknown, f64, Option<(usize, f64)>),
 }
 
-impl<'a> Point<'a> {
-    pub fn new(base: &Scene, film: &'a Film, number: usize, unknowns: &Unknowns, z: &[f64]) -> Option<Self> {
-        let scene = unknowns.scene(base, film.own_head, number, z)?;
-        let view = unknowns.view(number, z);
-        let mut directions =
-            vec![Direction::NeckAngle, Direction::LipAngle, Direction::NeckRate, Direction::LipRate];
-        let states = Seeds::new(&scene, &directions).ok()?;
+impl<'a> RecordingModel<'a> {
+    pub fn new(
+        base: &Scene,
+        film: &'a CameraObservation,
+        number: usize,
+        unknowns: &TraceUnknowns,
+        z: &[f64],
+    ) -> Option<Self> {
+        let scene = unknowns.scene_at(base, film.own_head, number, z)?;
+        let view = unknowns.camera_at(number, z);
+        let mut directions = vec![
+            TangentDirection::NeckAngle,
+            TangentDirection::LipAngle,
+            TangentDirection::NeckRate,
+            TangentDirection::LipRate,
+        ];
+        let states = TangentSeeds::new(&scene, &directions).ok()?;
         let mut enters = Vec::new();
         for (unknown, z) in unknowns.0.iter().zip(z) {
-            let mut direction = |direction: Direction| {
+            let mut direction = |direction: TangentDirection| {
                 directions.push(direction);
                 directions.len() - 1
             };
             let slope = unknown.slope(*z);
             enters.push(match &unknown.kind {
-                Kind::Parameter { name, .. } => {
-                    Enters::Run(direction(Direction::Parameter(name.clone())), slope)
+                UnknownKind::Parameter { name, .. } => {
+                    UnknownEffect::Run(direction(TangentDirection::Parameter(name.clone())), slope)
                 }
-                Kind::Camera { film, .. } if *film != number => Enters::Nowhere,
-                Kind::Camera { what: CameraUnknown::Clock, .. } => {
-                    Enters::Run(direction(Direction::DriveDelay), slope)
+                UnknownKind::Camera { film, .. } if *film != number => UnknownEffect::Nowhere,
+                UnknownKind::Camera { what: CameraUnknown::Clock, .. } => {
+                    UnknownEffect::Run(direction(TangentDirection::DriveDelay), slope)
                 }
                 // the picture's lengths drive the model: its own are smaller by the scale
-                Kind::Camera { what: CameraUnknown::Scale, .. } if film.own_head => {
+                UnknownKind::Camera { what: CameraUnknown::Scale, .. } if film.own_head => {
                     let by_scale = -1.0 / (1.0 + view.scale);
-                    let own = Some((direction(Direction::DriveScale), by_scale));
-                    Enters::Picture(CameraUnknown::Scale, slope, own)
+                    let own = Some((direction(TangentDirection::DriveScale), by_scale));
+                    UnknownEffect::Picture(CameraUnknown::Scale, slope, own)
                 }
-                Kind::Camera { what, .. } => Enters::Picture(*what, slope, None),
+                UnknownKind::Camera { what, .. } => UnknownEffect::Picture(*what, slope, None),
             });
         }
-        let (none, all) = (Seeds::new(&scene, &[]).ok()?, Seeds::new(&scene, &directions).ok()?);
-        Some(Self { film, view, scene, none, states, all, enters })
+        let (none, all) =
+            (TangentSeeds::new(&scene, &[]).ok()?, TangentSeeds::new(&scene, &directions).ok()?);
+        Some(Self { observation: film, camera: view, scene, none, states, all, effects: enters })
     }
 
     /// The state at the end of frames `first` to before `last`: where the next segment starts. `None` where
     /// the run ends early.
-    pub fn end(&self, frames: [usize; 2], state: &State) -> Option<State> {
-        Some(self.shoot(frames, state, &self.none)?.end)
+    pub fn end_state(&self, frames: [usize; 2], state: &LinkState) -> Option<LinkState> {
+        Some(self.simulate_segment(frames, state, &self.none)?.end)
     }
 
-    fn shoot(&self, [first, last]: [usize; 2], state: &State, seeds: &Seeds) -> Option<Shot> {
-        let (film, clock_s) = (self.film, self.view.clock_s);
+    fn simulate_segment(
+        &self,
+        [first, last]: [usize; 2],
+        state: &LinkState,
+        seeds: &TangentSeeds,
+    ) -> Option<SegmentObservation> {
+        let (film, clock_s) = (self.observation, self.camera.clock_s);
         let (lead, count) = (film.lead_s(), last - first);
         let mut scene = self.scene.clone();
         scene.start_s = film.times_s[first] - clock_s - lead;
-        scene.start = StartKind::State(pose_of(state));
+        scene.start = StartKind::State(state_to_pose(state));
         scene.run.stop_s = match film.times_s.get(last) {
             Some(next) => next - clock_s - lead,
             // (a little longer than the last shutter)
             None => film.times_s[last - 1] - clock_s + lead + 1e-9,
         };
-        let mut eye = Eye {
+        let mut eye = ShutterAverage {
             times_s: &film.times_s[first..last],
             clock_s,
             half_s: lead,
@@ -193,90 +211,116 @@ impl<'a> Point<'a> {
             end: None,
             is_known: true,
         };
-        let effort = Effort { most_evaluations: MOST_EVALUATIONS, ..Effort::new(TOLERANCE) };
-        let run = RUNNER.with_borrow_mut(|runner| runner.run(&scene, effort, seeds, &mut eye));
-        let whole = run.status == Status::Completed && eye.frame == count;
+        let effort = SolverOptions { most_evaluations: MOST_EVALUATIONS, ..SolverOptions::new(TOLERANCE) };
+        let run = RUNNER.with_borrow_mut(|runner| runner.run_scene(&scene, effort, seeds, &mut eye));
+        let whole = run.status == RunStatus::Completed && eye.frame == count;
         (whole && (eye.is_known || seeds.is_empty())).then_some(())?;
         let is_known = eye.is_known;
-        Some(Shot { means: eye.means, slopes: eye.slopes, end: state_of(&eye.end?), is_known })
+        Some(SegmentObservation {
+            means: eye.means,
+            slopes: eye.slopes,
+            end: pose_to_state(&eye.end?),
+            is_known,
+        })
     }
 
     /// Residuals of unit variance: the tip's frames, then the drop's.
-    pub fn residuals(&self, frames: [usize; 2], state: &State) -> Option<DVector<f64>> {
+    pub fn whitened_residuals(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
         let mut residuals = self.residuals_m(frames, state)?;
-        self.film.whitening(frames[0], frames[1]).apply(residuals.as_mut_slice());
+        self.observation.segment_whitening(frames[0], frames[1]).whiten_column(residuals.as_mut_slice());
         Some(residuals).filter(|r| r.iter().all(|x| x.is_finite()))
     }
 
-    /// The same where the run has derivatives; `None` where [`Self::by_state`] has none.
-    pub fn residuals_with_slope(&self, frames: [usize; 2], state: &State) -> Option<DVector<f64>> {
-        let shot = self.shoot(frames, state, &self.none).filter(|shot| shot.is_known)?;
-        let mut residuals = self.compare(frames[0], &shot);
-        self.film.whitening(frames[0], frames[1]).apply(residuals.as_mut_slice());
+    /// The same where the run has derivatives; `None` where [`Self::residuals_by_state`] has none.
+    pub fn differentiable_residuals(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
+        let shot = self.simulate_segment(frames, state, &self.none).filter(|shot| shot.is_known)?;
+        let mut residuals = self.model_minus_measured(frames[0], &shot);
+        self.observation.segment_whitening(frames[0], frames[1]).whiten_column(residuals.as_mut_slice());
         Some(residuals).filter(|r| r.iter().all(|x| x.is_finite()))
     }
 
     /// Model minus measured, m: the tip's frames, then the drop's.
-    pub fn residuals_m(&self, frames: [usize; 2], state: &State) -> Option<DVector<f64>> {
-        Some(self.compare(frames[0], &self.shoot(frames, state, &self.none)?))
+    pub fn residuals_m(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
+        Some(self.model_minus_measured(frames[0], &self.simulate_segment(frames, state, &self.none)?))
     }
 
     /// Residuals with their derivatives by the starting state.
-    pub fn by_state(&self, frames: [usize; 2], state: &State) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let shot = self.shoot(frames, state, &self.states)?;
-        let mut columns = DMatrix::zeros(self.film.count(frames[0], frames[1]), STATES);
-        (0..STATES).for_each(|i| self.run_column(frames[0], &shot, STATES, i, 1.0, &mut columns, i));
-        let mut residuals = self.compare(frames[0], &shot);
-        self.whiten(frames, &mut residuals, [&mut columns]);
+    pub fn residuals_by_state(
+        &self,
+        frames: [usize; 2],
+        state: &LinkState,
+    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
+        let shot = self.simulate_segment(frames, state, &self.states)?;
+        let mut columns = DMatrix::zeros(self.observation.count_data(frames[0], frames[1]), STATES);
+        (0..STATES).for_each(|i| self.add_run_derivative(frames[0], &shot, STATES, i, 1.0, &mut columns, i));
+        let mut residuals = self.model_minus_measured(frames[0], &shot);
+        self.whiten_columns(frames, &mut residuals, [&mut columns]);
         let finite = residuals.iter().chain(&columns).all(|x| x.is_finite());
         finite.then_some((residuals, columns))
     }
 
     /// Residuals with all derivatives.
-    pub fn linear(&self, frames: [usize; 2], state: &State) -> Option<Linear> {
-        let shot = self.shoot(frames, state, &self.all)?;
-        let (rows, directions) = (self.film.count(frames[0], frames[1]), self.all.len());
+    pub fn linearize(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
+        let shot = self.simulate_segment(frames, state, &self.all)?;
+        let (rows, directions) = (self.observation.count_data(frames[0], frames[1]), self.all.len());
         let mut by_state = DMatrix::zeros(rows, STATES);
-        (0..STATES).for_each(|i| self.run_column(frames[0], &shot, directions, i, 1.0, &mut by_state, i));
-        let mut by_unknown = DMatrix::zeros(rows, self.enters.len());
-        for (column, enters) in self.enters.iter().enumerate() {
+        (0..STATES)
+            .for_each(|i| self.add_run_derivative(frames[0], &shot, directions, i, 1.0, &mut by_state, i));
+        let mut by_unknown = DMatrix::zeros(rows, self.effects.len());
+        for (column, enters) in self.effects.iter().enumerate() {
             match enters {
-                Enters::Nowhere => {}
-                Enters::Run(i, slope) => {
-                    self.run_column(frames[0], &shot, directions, *i, *slope, &mut by_unknown, column);
+                UnknownEffect::Nowhere => {}
+                UnknownEffect::Run(i, slope) => {
+                    self.add_run_derivative(
+                        frames[0],
+                        &shot,
+                        directions,
+                        *i,
+                        *slope,
+                        &mut by_unknown,
+                        column,
+                    );
                 }
-                Enters::Picture(what, slope, run) => {
+                UnknownEffect::Picture(what, slope, run) => {
                     if let Some((i, by_value)) = run {
                         let slope = slope * by_value;
-                        self.run_column(frames[0], &shot, directions, *i, slope, &mut by_unknown, column);
+                        self.add_run_derivative(
+                            frames[0],
+                            &shot,
+                            directions,
+                            *i,
+                            slope,
+                            &mut by_unknown,
+                            column,
+                        );
                     }
-                    self.picture_column(frames[0], &shot, *what, *slope, &mut by_unknown, column);
+                    self.add_picture_derivative(frames[0], &shot, *what, *slope, &mut by_unknown, column);
                 }
             }
         }
-        let mut residuals = self.compare(frames[0], &shot);
-        self.whiten(frames, &mut residuals, [&mut by_state, &mut by_unknown]);
+        let mut residuals = self.model_minus_measured(frames[0], &shot);
+        self.whiten_columns(frames, &mut residuals, [&mut by_state, &mut by_unknown]);
         let finite = residuals.iter().chain(&by_state).chain(&by_unknown).all(|x| x.is_finite());
-        finite.then_some(Linear { residuals, by_state, by_unknown })
+        finite.then_some(LinearizedSegment { residuals, by_state, by_unknown })
     }
 
-    fn whiten<const N: usize>(
+    fn whiten_columns<const N: usize>(
         &self,
         [first, last]: [usize; 2],
         residuals: &mut DVector<f64>,
         jacobians: [&mut DMatrix<f64>; N],
     ) {
-        let whitening = self.film.whitening(first, last);
-        whitening.apply(residuals.as_mut_slice());
+        let whitening = self.observation.segment_whitening(first, last);
+        whitening.whiten_column(residuals.as_mut_slice());
         for jacobian in jacobians {
             let rows = jacobian.nrows().max(1);
-            jacobian.as_mut_slice().chunks_mut(rows).for_each(|column| whitening.apply(column));
+            jacobian.as_mut_slice().chunks_mut(rows).for_each(|column| whitening.whiten_column(column));
         }
     }
 
     /// What the picture shows of a frame, tip and drop, from means of tip, head and drop.
-    fn picture(&self, frame: usize, [tip, head, drop]: [f64; 3]) -> [f64; 2] {
-        let (film, view) = (self.film, &self.view);
+    fn project_to_picture(&self, frame: usize, [tip, head, drop]: [f64; 3]) -> [f64; 2] {
+        let (film, view) = (self.observation, &self.camera);
         let scale = 1.0 + view.scale;
         let shown = if film.own_head { film.head_m[frame] } else { scale * head };
         let along = film.head_m[frame] - film.centre_m;
@@ -287,24 +331,24 @@ impl<'a> Point<'a> {
         ]
     }
 
-    fn compare(&self, first: usize, shot: &Shot) -> DVector<f64> {
-        let mut found = DVector::zeros(self.film.count(first, first + shot.means.len()));
-        self.fill(first, shot.means.len(), found.as_mut_slice(), |i, seen| {
-            let shown = self.picture(first + i, shot.means[i]);
+    fn model_minus_measured(&self, first: usize, shot: &SegmentObservation) -> DVector<f64> {
+        let mut found = DVector::zeros(self.observation.count_data(first, first + shot.means.len()));
+        self.fill_column(first, shot.means.len(), found.as_mut_slice(), |i, seen| {
+            let shown = self.project_to_picture(first + i, shot.means[i]);
             [shown[0] - seen[0].unwrap_or(0.0), shown[1] - seen[1].unwrap_or(0.0)]
         });
         found
     }
 
     /// Fills a column, an entry a datum, from values in metres.
-    fn fill(
+    fn fill_column(
         &self,
         first: usize,
         count: usize,
         column: &mut [f64],
         of: impl Fn(usize, [Option<f64>; 2]) -> [f64; 2],
     ) {
-        let film = self.film;
+        let film = self.observation;
         let tips = film.tip_x_m[first..first + count].iter().flatten().count();
         let (tip, drop) = column.split_at_mut(tips);
         let (mut tip, mut drop) = (tip.iter_mut(), drop.iter_mut());
@@ -323,20 +367,20 @@ impl<'a> Point<'a> {
 
     /// Adds the derivative by a direction of the run, times `slope`, to a column.
     #[allow(clippy::too_many_arguments)] // one private place
-    fn run_column(
+    fn add_run_derivative(
         &self,
         first: usize,
-        shot: &Shot,
+        shot: &SegmentObservation,
         directions: usize,
         direction: usize,
         slope: f64,
         columns: &mut DMatrix<f64>,
         column: usize,
     ) {
-        let (film, view) = (self.film, &self.view);
+        let (film, view) = (self.observation, &self.camera);
         let scale = 1.0 + view.scale;
         let mut own = vec![0.0; columns.nrows()];
-        self.fill(first, shot.means.len(), &mut own, |i, _| {
+        self.fill_column(first, shot.means.len(), &mut own, |i, _| {
             let of = |k: usize| shot.slopes[(i * CHANNELS.len() + k) * directions + direction];
             let [tip, head, drop] = [of(0), of(1), of(2)];
             let shown = if film.own_head { 0.0 } else { scale * head };
@@ -346,19 +390,19 @@ impl<'a> Point<'a> {
     }
 
     /// Adds the derivative by something of the picture, times `slope`, to a column.
-    fn picture_column(
+    fn add_picture_derivative(
         &self,
         first: usize,
-        shot: &Shot,
+        shot: &SegmentObservation,
         what: CameraUnknown,
         slope: f64,
         columns: &mut DMatrix<f64>,
         column: usize,
     ) {
-        let (film, view) = (self.film, &self.view);
+        let (film, view) = (self.observation, &self.camera);
         let scale = 1.0 + view.scale;
         let mut own = vec![0.0; columns.nrows()];
-        self.fill(first, shot.means.len(), &mut own, |i, _| {
+        self.fill_column(first, shot.means.len(), &mut own, |i, _| {
             let [tip, head, drop] = shot.means[i];
             let shown = if film.own_head { 0.0 } else { head };
             let by_value = match what {

@@ -25,7 +25,7 @@ pub enum CameraUnknown {
 
 impl CameraUnknown {
     /// Size of a unit of the coordinate: of the order of what is found.
-    pub(super) fn unit(self) -> f64 {
+    pub(super) fn coordinate_unit(self) -> f64 {
         match self {
             Self::OffsetX | Self::OffsetDrop | Self::DriftX | Self::DriftDrop => 1e-4,
             Self::Scale | Self::Tilt => 1e-2,
@@ -36,7 +36,7 @@ impl CameraUnknown {
 
 /// What an unknown is.
 #[derive(Debug, Clone, PartialEq)]
-pub enum Kind {
+pub enum UnknownKind {
     /// A parameter of every scene by name; searched in its logarithm or in units of its range.
     Parameter {
         /// Name in the table of parameters.
@@ -55,9 +55,9 @@ pub enum Kind {
 
 /// An unknown with its range and what is known beforehand, in its coordinate.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Unknown {
+pub struct TraceUnknown {
     /// What it is.
-    pub kind: Kind,
+    pub kind: UnknownKind,
     /// Lower and upper end of the range, in the coordinate.
     pub range: [f64; 2],
     /// Mean and standard deviation of its normal prior, in the coordinate.
@@ -66,14 +66,14 @@ pub struct Unknown {
     pub start: f64,
 }
 
-impl Unknown {
+impl TraceUnknown {
     /// The quantity at a coordinate, in its SI unit.
     #[must_use]
     pub fn value(&self, coordinate: f64) -> f64 {
         match &self.kind {
-            Kind::Parameter { unit: None, .. } => math::exp(coordinate),
-            Kind::Parameter { unit: Some(unit), .. } => coordinate * unit,
-            Kind::Camera { what, .. } => coordinate * what.unit(),
+            UnknownKind::Parameter { unit: None, .. } => math::exp(coordinate),
+            UnknownKind::Parameter { unit: Some(unit), .. } => coordinate * unit,
+            UnknownKind::Camera { what, .. } => coordinate * what.coordinate_unit(),
         }
     }
 
@@ -81,9 +81,9 @@ impl Unknown {
     #[must_use]
     pub fn coordinate(&self, value: f64) -> f64 {
         match &self.kind {
-            Kind::Parameter { unit: None, .. } => math::ln(value),
-            Kind::Parameter { unit: Some(unit), .. } => value / unit,
-            Kind::Camera { what, .. } => value / what.unit(),
+            UnknownKind::Parameter { unit: None, .. } => math::ln(value),
+            UnknownKind::Parameter { unit: Some(unit), .. } => value / unit,
+            UnknownKind::Camera { what, .. } => value / what.coordinate_unit(),
         }
     }
 
@@ -91,9 +91,9 @@ impl Unknown {
     #[must_use]
     pub fn slope(&self, coordinate: f64) -> f64 {
         match &self.kind {
-            Kind::Parameter { unit: None, .. } => math::exp(coordinate),
-            Kind::Parameter { unit: Some(unit), .. } => *unit,
-            Kind::Camera { what, .. } => what.unit(),
+            UnknownKind::Parameter { unit: None, .. } => math::exp(coordinate),
+            UnknownKind::Parameter { unit: Some(unit), .. } => *unit,
+            UnknownKind::Camera { what, .. } => what.coordinate_unit(),
         }
     }
 
@@ -106,11 +106,11 @@ impl Unknown {
 
 /// All unknowns in order: parameters first.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Unknowns(pub Vec<Unknown>);
+pub struct TraceUnknowns(pub Vec<TraceUnknown>);
 
 /// What the camera makes of places, at one point of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct View {
+pub(super) struct CameraParameters {
     pub offset_x_m: f64,
     pub offset_drop_m: f64,
     pub drift_x_m_per_s: f64,
@@ -120,7 +120,7 @@ pub(super) struct View {
     pub clock_s: f64,
 }
 
-impl View {
+impl CameraParameters {
     /// What the markers read too much along the sweep and as drop, m, so long after the middle.
     pub fn offsets_m(&self, after_s: f64) -> [f64; 2] {
         [
@@ -130,17 +130,17 @@ impl View {
     }
 }
 
-impl Unknowns {
+impl TraceUnknowns {
     /// Whether unknown `i` is a parameter of the scene.
     pub(super) fn is_parameter(&self, i: usize) -> bool {
-        matches!(self.0[i].kind, Kind::Parameter { .. })
+        matches!(self.0[i].kind, UnknownKind::Parameter { .. })
     }
 
     /// The camera of a recording at a point.
-    pub(super) fn view(&self, film: usize, point: &[f64]) -> View {
-        let mut view = View::default();
+    pub(super) fn camera_at(&self, film: usize, point: &[f64]) -> CameraParameters {
+        let mut view = CameraParameters::default();
         for (unknown, z) in self.0.iter().zip(point) {
-            if let Kind::Camera { film: of, what } = unknown.kind
+            if let UnknownKind::Camera { film: of, what } = unknown.kind
                 && of == film
             {
                 let value = unknown.value(*z);
@@ -159,15 +159,15 @@ impl Unknowns {
     }
 
     /// The scene of a recording at a point; `None` where it refuses a value.
-    pub(super) fn scene(&self, base: &Scene, own_head: bool, film: usize, point: &[f64]) -> Option<Scene> {
+    pub(super) fn scene_at(&self, base: &Scene, own_head: bool, film: usize, point: &[f64]) -> Option<Scene> {
         let mut scene = base.clone();
         for (unknown, z) in self.0.iter().zip(point) {
-            if let Kind::Parameter { name, .. } = &unknown.kind {
-                scene = scene.with(name, unknown.value(*z)).ok()?;
+            if let UnknownKind::Parameter { name, .. } = &unknown.kind {
+                scene = scene.with_parameter(name, unknown.value(*z)).ok()?;
             }
         }
         if own_head {
-            scene.drive = scene.drive.scaled(1.0 / (1.0 + self.view(film, point).scale));
+            scene.drive = scene.drive.scale_lengths(1.0 / (1.0 + self.camera_at(film, point).scale));
         }
         Some(scene)
     }
@@ -183,7 +183,7 @@ impl Unknowns {
     }
 
     /// A point moved into the ranges.
-    pub(super) fn clamped(&self, point: &[f64]) -> Vec<f64> {
+    pub(super) fn clamp_to_ranges(&self, point: &[f64]) -> Vec<f64> {
         self.0.iter().zip(point).map(|(u, z)| z.clamp(u.range[0], u.range[1])).collect()
     }
 }

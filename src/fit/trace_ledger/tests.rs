@@ -1,6 +1,6 @@
 use super::*;
 use crate::fit::iterates::tests::{header, iterate};
-use crate::journal::read;
+use crate::journal::read_checkpoint;
 
 /// Iterates of a whole search.
 const STEPS: usize = 6;
@@ -13,16 +13,16 @@ fn next(before: Option<&Iterate>) -> Option<Iterate> {
 
 /// Whether it came to its end, the iterates that it counts, and those that it made.
 #[derive(Debug, PartialEq)]
-struct Searched {
-    stopped: Option<Stopped>,
+struct SearchTally {
+    stopped: Option<TraceStopReason>,
     iterates: usize,
     made: usize,
 }
 
 /// Two searches that go on from `journal`, as the engine makes them.
-fn searched(journal: &mut String, most: usize, asked_to_stop_at: usize) -> Searched {
+fn searched(journal: &mut String, most: usize, asked_to_stop_at: usize) -> SearchTally {
     let before = journal.clone();
-    let found = read::<Step>("j", &before).unwrap();
+    let found = read_checkpoint::<IterateRecord>("j", &before).unwrap();
     journal.truncate(found.as_ref().map_or(0, |found| found.end.intact_bytes));
     let resume = found.as_ref().map(|found| ("j", found));
     let mut on_iterate = |now: &TraceProgress| {
@@ -33,20 +33,20 @@ fn searched(journal: &mut String, most: usize, asked_to_stop_at: usize) -> Searc
     'all: for start in 0..STARTS {
         let mut last: Option<Iterate> = None;
         for step in 0.. {
-            let known = ledger.known(start, step);
+            let known = ledger.find_iterate(start, step);
             let fresh = known.is_none();
             let Some(iterate) = known.or_else(|| next(last.as_ref())) else { break };
-            if fresh && ledger.add(start, step, &iterate).is_break() {
+            if fresh && ledger.store_iterate(start, step, &iterate).is_break() {
                 break 'all;
             }
             made += usize::from(fresh);
             last = Some(iterate);
         }
     }
-    Searched { stopped: ledger.stopped().cloned(), iterates: ledger.iterates(), made }
+    SearchTally { stopped: ledger.stop_reason().cloned(), iterates: ledger.count_iterates(), made }
 }
 
-const WHOLE: Searched = Searched { stopped: None, iterates: STARTS * STEPS, made: STARTS * STEPS };
+const WHOLE: SearchTally = SearchTally { stopped: None, iterates: STARTS * STEPS, made: STARTS * STEPS };
 
 #[test]
 fn a_search_that_is_cut_anywhere_goes_on_with_the_same_lines() {
@@ -59,7 +59,7 @@ fn a_search_that_is_cut_anywhere_goes_on_with_the_same_lines() {
         let again = searched(&mut journal, usize::MAX, usize::MAX);
         assert_eq!(
             (again, &journal),
-            (Searched { made: WHOLE.made - kept, ..WHOLE }, &whole),
+            (SearchTally { made: WHOLE.made - kept, ..WHOLE }, &whole),
             "cut at {cut}"
         );
     }
@@ -69,9 +69,9 @@ fn a_search_that_is_cut_anywhere_goes_on_with_the_same_lines() {
 fn a_search_stops_when_it_is_asked_to_and_extends() {
     let (mut whole, mut stopped) = (String::new(), String::new());
     searched(&mut whole, usize::MAX, usize::MAX);
-    assert_eq!(searched(&mut stopped, usize::MAX, 4).stopped, Some(Stopped::Interrupted));
+    assert_eq!(searched(&mut stopped, usize::MAX, 4).stopped, Some(TraceStopReason::Interrupted));
     assert_eq!(stopped.matches('\n').count(), 5, "a line an iterate");
-    assert_eq!(searched(&mut stopped, 7, usize::MAX).stopped, Some(Stopped::Budget));
+    assert_eq!(searched(&mut stopped, 7, usize::MAX).stopped, Some(TraceStopReason::Budget));
     assert_eq!(stopped.matches('\n').count(), 8);
     assert!(whole.starts_with(&stopped));
     assert_eq!((searched(&mut stopped, usize::MAX, usize::MAX).iterates, stopped), (WHOLE.iterates, whole));
@@ -80,26 +80,29 @@ fn a_search_stops_when_it_is_asked_to_and_extends() {
 #[test]
 fn a_journal_that_cannot_be_written_ends_the_search() {
     struct Full;
-    impl Sink for Full {
+    impl CheckpointSink for Full {
         fn append(&mut self, _: &str) -> Result<(), String> {
             Err("no space".to_owned())
         }
     }
     let (mut full, mut on_iterate) = (Full, |_: &TraceProgress| ControlFlow::Continue(()));
     let mut ledger = TraceLedger::new(&header(), None, usize::MAX, &mut full, &mut on_iterate).unwrap();
-    assert!(ledger.add(0, 0, &iterate(0)).is_break());
-    assert_eq!((ledger.stopped(), ledger.iterates()), (Some(&Stopped::Journal("no space".to_owned())), 0));
+    assert!(ledger.store_iterate(0, 0, &iterate(0)).is_break());
+    assert_eq!(
+        (ledger.stop_reason(), ledger.count_iterates()),
+        (Some(&TraceStopReason::Journal("no space".to_owned())), 0)
+    );
 }
 
 #[test]
 fn an_iterate_that_the_model_does_not_give_is_refused() {
     let mut whole = String::new();
     searched(&mut whole, usize::MAX, usize::MAX);
-    let journal = read::<Step>("j", &whole).unwrap().unwrap();
-    assert_eq!(recheck("j", &journal, |_, before| next(before)), Ok(()));
+    let journal = read_checkpoint::<IterateRecord>("j", &whole).unwrap().unwrap();
+    assert_eq!(recheck_iterates("j", &journal, |_, before| next(before)), Ok(()));
     let other =
         |before: Option<&Iterate>| next(before).map(|found| Iterate { cost: found.cost + 1e-9, ..found });
-    let refused = recheck("j", &journal, |_, before| other(before)).unwrap_err().to_string();
+    let refused = recheck_iterates("j", &journal, |_, before| other(before)).unwrap_err().to_string();
     assert!(refused.contains("cost"), "{refused}");
 }
 
@@ -107,7 +110,7 @@ fn an_iterate_that_the_model_does_not_give_is_refused() {
 fn a_journal_of_another_seed_is_refused() {
     let mut whole = String::new();
     searched(&mut whole, usize::MAX, usize::MAX);
-    let journal = read::<Step>("j", &whole).unwrap().unwrap();
+    let journal = read_checkpoint::<IterateRecord>("j", &whole).unwrap().unwrap();
     let mut other = header();
     other.body.seed += 1;
     let (mut sink, mut on_iterate) = (String::new(), |_: &TraceProgress| ControlFlow::Continue(()));

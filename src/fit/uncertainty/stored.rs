@@ -1,13 +1,13 @@
 //! The verdicts that the numbers of a stored result deserve.
 
-use super::bound::followed;
-use super::{Verdict, verdict};
+use super::bound::strongest_bound_correlation;
+use super::{ParameterVerdict, interval_verdict};
 use crate::fit::job::Job;
-use crate::fit::result::{FitResult, Status};
+use crate::fit::result::{FitResult, FitStatus};
 
 /// One a parameter, in job order, by the same rules as in a fit; a parameter that the result does not have is
 /// not identified.
-pub(in crate::fit) fn stored_verdicts(job: &Job, result: &FitResult) -> Vec<Verdict> {
+pub(in crate::fit) fn stored_verdicts(job: &Job, result: &FitResult) -> Vec<ParameterVerdict> {
     let names = job.parameter_names();
     let found = |axis: usize| result.parameters.get(&names[axis]);
     // the linear model gives a correlation to every parameter that it determines, with itself too
@@ -16,12 +16,18 @@ pub(in crate::fit) fn stored_verdicts(job: &Job, result: &FitResult) -> Vec<Verd
         .map(|(axis, free)| found(axis).map_or(0.5, |p| free.bounds.to_unit(p.estimate)))
         .collect();
     let of = |axis: usize| {
-        let Some(p) = found(axis) else { return Verdict::NotIdentified };
-        match verdict(unit[axis], p.lower_95, p.upper_95, correlation(axis, axis).is_some()) {
+        let Some(p) = found(axis) else { return ParameterVerdict::NotIdentified };
+        match interval_verdict(unit[axis], p.lower_95, p.upper_95, correlation(axis, axis).is_some()) {
             // a search that had not come to its end identifies nothing
-            _ if matches!(result.status, Status::BudgetExhausted | Status::Failed) => Verdict::NotIdentified,
-            Verdict::Identified if !p.reasons.is_empty() => Verdict::NotIdentified,
-            Verdict::Identified if followed(axis, &unit, correlation).is_some() => Verdict::NotIdentified,
+            _ if matches!(result.status, FitStatus::BudgetExhausted | FitStatus::Failed) => {
+                ParameterVerdict::NotIdentified
+            }
+            ParameterVerdict::Identified if !p.reasons.is_empty() => ParameterVerdict::NotIdentified,
+            ParameterVerdict::Identified
+                if strongest_bound_correlation(axis, &unit, correlation).is_some() =>
+            {
+                ParameterVerdict::NotIdentified
+            }
             other => other,
         }
     };

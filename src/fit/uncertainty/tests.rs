@@ -1,34 +1,35 @@
-use super::super::axis::Axis;
+use super::super::axis::SearchAxis;
 use super::super::evaluation::Observed;
 use super::super::failure::{FailureReason, RunFailure};
-use super::super::ledger::Progress;
-use super::super::model::Predict;
-use super::super::scale::{Bounds, Spacing};
-use super::super::settings::Settings;
-use super::super::target::Target;
+use super::super::ledger::FitProgress;
+use super::super::model::FeaturePredictor;
+use super::super::scale::{Bounds, BoundsSpacing};
+use super::super::settings::SearchSettings;
+use super::super::target::TargetValue;
 use super::*;
-use crate::feature::Measure;
-use crate::journal::Discard;
+use crate::feature::ValueComparison;
+use crate::journal::NullSink;
 use crate::math::StandardNormal;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::ops::ControlFlow;
 
 /// Features of two parameters; twins scatter by the standard deviations, as normal variables do.
-struct Fake<'a> {
+struct FakePredictor<'a> {
     features: fn(f64, f64) -> Result<Vec<f64>, RunFailure>,
     sds: &'a [f64],
 }
 
-impl Predict for Fake<'_> {
-    fn predict(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
-        (self.features)(values[0], values[1]).map(|features| features.into_iter().map(Observed::of).collect())
+impl FeaturePredictor for FakePredictor<'_> {
+    fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
+        (self.features)(values[0], values[1])
+            .map(|features| features.into_iter().map(Observed::from_value).collect())
     }
 
-    fn twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
+    fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
         let mut generator = Xoshiro256PlusPlus::seed_from_u64(draw);
         let mut noisy = |(value, sd): (f64, &f64)| {
-            Observed::of(value * (sd * generator.sample::<f64, _>(StandardNormal)).exp())
+            Observed::from_value(value * (sd * generator.sample::<f64, _>(StandardNormal)).exp())
         };
         Ok((self.features)(values[0], values[1])?.into_iter().zip(self.sds).map(&mut noisy).collect())
     }
@@ -42,31 +43,33 @@ type Features = fn(f64, f64) -> Result<Vec<f64>, RunFailure>;
 
 /// Both parameters from 0.1 to 10, logarithmic; every target is 1 with the given standard deviation; the
 /// search ended at `unit`.
-fn at(features: Features, sds: &[f64], unit: [f64; 2], settings: IntervalSettings) -> Uncertainty {
+fn at(features: Features, sds: &[f64], unit: [f64; 2], settings: IntervalSettings) -> FitUncertainty {
     with(features, sds, &[unit], settings)
 }
 
 /// The same after several points were tried.
-fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalSettings) -> Uncertainty {
-    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
-    let target = |(i, sd): (usize, &f64)| Target {
+fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalSettings) -> FitUncertainty {
+    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
+    let target = |(i, sd): (usize, &f64)| TargetValue {
         name: format!("f{i}"),
         value: 1.0,
         sd: *sd,
         scatter: 0.0,
-        measure: Measure::Log,
+        measure: ValueComparison::Log,
         last: false,
         calibration: None,
     };
-    let fake = Fake { features, sds };
+    let fake = FakePredictor { features, sds };
     let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
-    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
+    let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
-    ledger.evaluate(Stage::Local, &tried.iter().map(|unit| unit.to_vec()).collect::<Vec<_>>()).unwrap();
-    at_best(&mut ledger, &["p".to_owned(), "q".to_owned()], &settings, 500).unwrap()
+    ledger
+        .evaluate_points(EvaluationStage::Local, &tried.iter().map(|unit| unit.to_vec()).collect::<Vec<_>>())
+        .unwrap();
+    assess_best(&mut ledger, &["p".to_owned(), "q".to_owned()], &settings, 500).unwrap()
 }
 
-fn ln_ends(interval: &Interval) -> [f64; 2] {
+fn ln_ends(interval: &ParameterInterval) -> [f64; 2] {
     [interval.lower_95.unwrap().ln(), interval.upper_95.unwrap().ln()]
 }
 
@@ -76,7 +79,7 @@ fn intervals_of_powers_are_exact_by_the_linear_model_and_by_profiles() {
         let found = at(|p, q| Ok(vec![p * p, q.powi(-4)]), &[0.01, 0.02], [0.5, 0.5], settings);
         assert_eq!((found.rank, found.informative_features), (2, 2));
         for (interval, sd_ln) in found.intervals.iter().zip([0.01 / 2.0, 0.02 / 4.0]) {
-            assert_eq!(interval.verdict, Verdict::Identified);
+            assert_eq!(interval.verdict, ParameterVerdict::Identified);
             let half = CHI_SQUARED_95.sqrt() * sd_ln;
             // a crossing is interpolated in the root of the rise, which is straight here
             assert!(
@@ -109,7 +112,7 @@ fn a_profile_lets_the_other_parameter_follow() {
 fn what_is_correlated_with_a_parameter_at_its_bound_is_not_identified() {
     // the first target asks for p = 0.05, below the bound of 0.1
     let follows = at(|p, q| Ok(vec![20.0 * p, 10.0 * p * q]), &[0.02, 0.01], [0.0, 0.5], PROFILE);
-    assert_eq!(follows.intervals[1].verdict, Verdict::NotIdentified);
+    assert_eq!(follows.intervals[1].verdict, ParameterVerdict::NotIdentified);
     assert!(
         follows.notes[0].starts_with("q is not called identified: p is at its bound"),
         "{:?}",
@@ -120,12 +123,12 @@ fn what_is_correlated_with_a_parameter_at_its_bound_is_not_identified() {
 #[test]
 fn a_bound_that_excludes_a_better_value_leaves_nothing_identified() {
     let excluding = at(|p, q| Ok(vec![20.0 * p, q]), &[0.02, 0.01], [0.0, 0.5], PROFILE);
-    assert_eq!(excluding.intervals[1].verdict, Verdict::NotIdentified);
+    assert_eq!(excluding.intervals[1].verdict, ParameterVerdict::NotIdentified);
     let said = "nothing is called identified (q): p is at its bound, and a value beyond the bound would";
     assert!(excluding.notes[0].starts_with(said), "{:?}", excluding.notes);
     // the optimum lies at the bound itself
     let met = at(|p, q| Ok(vec![10.0 * p, q]), &[0.02, 0.01], [0.0, 0.5], PROFILE);
-    assert_eq!(met.intervals[1].verdict, Verdict::Identified);
+    assert_eq!(met.intervals[1].verdict, ParameterVerdict::Identified);
 }
 
 #[test]
@@ -166,7 +169,11 @@ fn an_interval_reaches_to_every_point_that_is_as_good() {
     assert!((6.9..7.2).contains(&upper), "the profile goes on from that point: {upper}");
     let to_the_bound: Features = |p, q| Ok(vec![p * p, if q > 5.0 { 1.001 } else { q }]);
     let open = with(to_the_bound, &[0.01, 0.01], &[[0.5, 0.5], [0.5, 1.0]], LINEAR);
-    assert_eq!(open.intervals[1].verdict, Verdict::OpenAbove, "an equal at a bound leaves the end open");
+    assert_eq!(
+        open.intervals[1].verdict,
+        ParameterVerdict::OpenAbove,
+        "an equal at a bound leaves the end open"
+    );
     assert!(found(&[[0.6, 0.9]], PROFILE).upper_95.unwrap() < 1.1, "a point that costs more widens nothing");
 }
 
@@ -179,7 +186,7 @@ fn one_feature_of_two_parameters_identifies_neither() {
             found
                 .intervals
                 .iter()
-                .all(|i| (i.verdict, i.lower_95, i.upper_95) == (Verdict::NotIdentified, None, None)),
+                .all(|i| (i.verdict, i.lower_95, i.upper_95) == (ParameterVerdict::NotIdentified, None, None)),
             "{:?}",
             found.intervals
         );
@@ -188,7 +195,7 @@ fn one_feature_of_two_parameters_identifies_neither() {
             "{}",
             found.notes[0]
         );
-        assert_eq!(found.combinations[0].in_words(), "p q");
+        assert_eq!(found.combinations[0].describe(), "p q");
     }
 }
 
@@ -205,7 +212,7 @@ fn an_insensitive_parameter_alone_is_not_identified() {
         let found = at(|p, _| Ok(vec![p, p * p]), &[0.01, 0.01], [0.5, 0.5], settings);
         assert_eq!(
             found.intervals.iter().map(|i| i.verdict).collect::<Vec<_>>(),
-            [Verdict::Identified, Verdict::NotIdentified]
+            [ParameterVerdict::Identified, ParameterVerdict::NotIdentified]
         );
     }
 }
@@ -215,7 +222,7 @@ fn a_parameter_that_only_stops_mattering_on_one_side_is_open_there() {
     // above q = 1 nothing changes any more: the linear model alone would close the interval
     let features: Features = |p, q| Ok(vec![p, q.min(1.0)]);
     let found = at(features, &[0.01, 0.01], [0.5, 0.5], PROFILE);
-    assert_eq!(found.intervals[1].verdict, Verdict::OpenAbove, "{:?}", found.intervals[1]);
+    assert_eq!(found.intervals[1].verdict, ParameterVerdict::OpenAbove, "{:?}", found.intervals[1]);
     assert!((found.intervals[1].lower_95.unwrap().ln() + CHI_SQUARED_95.sqrt() * 0.01).abs() < 1e-3);
 }
 
@@ -231,12 +238,18 @@ fn intervals_that_reach_a_bound_are_open_and_a_best_point_at_one_says_so() {
     };
     for settings in [LINEAR, PROFILE] {
         let low = verdicts(|p, q| Ok(vec![p / (0.1 * 100.0_f64.powf(0.1)), q]), [0.1, 0.5], settings);
-        assert_eq!(low, [(Verdict::OpenBelow, false, true), (Verdict::Identified, true, true)]);
+        assert_eq!(
+            low,
+            [(ParameterVerdict::OpenBelow, false, true), (ParameterVerdict::Identified, true, true)]
+        );
         let high = verdicts(|p, q| Ok(vec![p / (0.1 * 100.0_f64.powf(0.9)), q / 10.0]), [0.9, 1.0], settings);
-        assert_eq!(high, [(Verdict::OpenAbove, true, false), (Verdict::AtBound, true, false)]);
+        assert_eq!(
+            high,
+            [(ParameterVerdict::OpenAbove, true, false), (ParameterVerdict::AtBound, true, false)]
+        );
         assert_eq!(
             verdicts(|p, q| Ok(vec![p, q / 0.1]), [0.5, 0.0], settings)[1],
-            (Verdict::AtBound, false, true)
+            (ParameterVerdict::AtBound, false, true)
         );
     }
 }
@@ -256,7 +269,7 @@ fn where_the_model_ends_nothing_is_identified() {
     // p q alone is known, and the blade does not run beyond 3 and below 1/3
     let features: Features = |p, q| {
         if p.ln().abs() > 1.1 {
-            Err(RunFailure::new(FailureReason::Ended(crate::simulate::Status::ContactLost), "", 0.5))
+            Err(RunFailure::new(FailureReason::Ended(crate::simulate::RunStatus::ContactLost), "", 0.5))
         } else {
             Ok(vec![p * q])
         }
@@ -264,7 +277,7 @@ fn where_the_model_ends_nothing_is_identified() {
     let found = at(features, &[0.01], [0.5, 0.5], PROFILE);
     let p = &found.intervals[0];
     assert!(p.lower_95.is_some() && p.upper_95.is_some(), "{p:?}");
-    assert_eq!(p.verdict, Verdict::NotIdentified);
+    assert_eq!(p.verdict, ParameterVerdict::NotIdentified);
 }
 
 #[test]
@@ -278,53 +291,59 @@ fn a_better_point_on_the_way_is_followed() {
 #[test]
 fn a_misfit_that_one_search_alone_came_to_identifies_nothing() {
     let features: Features = |p, q| Ok(vec![p, q, q * 0.05_f64.exp()]);
-    let fake = Fake { features, sds: &[0.01; 3] };
-    let target = |i: usize| Target {
+    let fake = FakePredictor { features, sds: &[0.01; 3] };
+    let target = |i: usize| TargetValue {
         name: format!("f{i}"),
         value: 1.0,
         sd: 0.01,
         scatter: 0.0,
-        measure: Measure::Log,
+        measure: ValueComparison::Log,
         last: false,
         calibration: None,
     };
-    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
     let best = objective.evaluate(&[0.5, 0.5 - 0.025 / 100.0_f64.ln()]);
     // a sum of squares of 12.5 with one degree of freedom: one in a thousand exceeds 10.8
     assert!(
-        believed(&objective, &best, &[best.cost, best.cost + 4.0])
+        check_best_point(&objective, &best, &[best.cost, best.cost + 4.0])
             .unwrap_err()
             .contains("a sum of squares of 12.5")
     );
-    assert!(believed(&objective, &best, &[best.cost, best.cost + 3.0]).is_ok(), "another search came to it");
-    assert!(believed(&objective, &best, &[best.cost]).is_err(), "one search, and a misfit");
-    let near = objective.with_scatter(&[0.0, 0.01, 0.01]);
-    let best = near.price(best.into());
-    assert!(believed(&near, &best, &[best.cost]).is_ok(), "with deviations of 0.014 it is no misfit");
-    assert!(believed(&near, &best, &[best.cost, best.cost + 9.0]).is_err(), "another search ended elsewhere");
+    assert!(
+        check_best_point(&objective, &best, &[best.cost, best.cost + 3.0]).is_ok(),
+        "another search came to it"
+    );
+    assert!(check_best_point(&objective, &best, &[best.cost]).is_err(), "one search, and a misfit");
+    let near = objective.with_feature_scatter(&[0.0, 0.01, 0.01]);
+    let best = near.add_costs(best.into());
+    assert!(check_best_point(&near, &best, &[best.cost]).is_ok(), "with deviations of 0.014 it is no misfit");
+    assert!(
+        check_best_point(&near, &best, &[best.cost, best.cost + 9.0]).is_err(),
+        "another search ended elsewhere"
+    );
 }
 
 #[test]
 fn a_misfit_widens_the_deviations() {
     let features: Features = |p, q| Ok(vec![p, q, q * 0.05_f64.exp()]);
-    let fake = Fake { features, sds: &[0.01; 3] };
-    let target = |i: usize| Target {
+    let fake = FakePredictor { features, sds: &[0.01; 3] };
+    let target = |i: usize| TargetValue {
         name: format!("f{i}"),
         value: 1.0,
         sd: 0.01,
         scatter: 0.0,
-        measure: Measure::Log,
+        measure: ValueComparison::Log,
         last: false,
         calibration: None,
     };
-    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..3).map(target).collect(), &fake);
-    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
+    let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
     let best = vec![0.5, 0.5 - 0.025 / 100.0_f64.ln()];
-    ledger.evaluate(Stage::Local, &[best]).unwrap();
-    let found = weighed(&mut ledger).unwrap();
+    ledger.evaluate_points(EvaluationStage::Local, &[best]).unwrap();
+    let found = weigh_features(&mut ledger).unwrap();
     // two features that differ by 5 deviations: 2.5 from their mean each, one degree of freedom
     assert!((found.inflation - 12.5_f64.sqrt()).abs() < 1e-6);
     assert!(
@@ -338,22 +357,22 @@ fn a_feature_that_is_not_smooth_counts_for_less() {
     // 0.02 up or down from step to step, on a deviation of 0.01
     let features: Features =
         |p, q| Ok(vec![p * if (p.ln() * 43.0).rem_euclid(2.0) < 1.0 { 1.02 } else { 0.98 }, q]);
-    let fake = Fake { features, sds: &[0.01; 2] };
-    let target = |i: usize| Target {
+    let fake = FakePredictor { features, sds: &[0.01; 2] };
+    let target = |i: usize| TargetValue {
         name: format!("f{i}"),
         value: 1.0,
         sd: 0.01,
         scatter: 0.0,
-        measure: Measure::Log,
+        measure: ValueComparison::Log,
         last: false,
         calibration: None,
     };
-    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
+    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
     let objective = Objective::new(axes, (0..2).map(target).collect(), &fake);
-    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
+    let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
-    ledger.evaluate(Stage::Local, &[vec![0.5, 0.5]]).unwrap();
-    let found = weighed(&mut ledger).unwrap();
+    ledger.evaluate_points(EvaluationStage::Local, &[vec![0.5, 0.5]]).unwrap();
+    let found = weigh_features(&mut ledger).unwrap();
     assert!(found.scatter[0] > 0.01 && found.scatter[1] < 1e-9, "{found:?}");
 }
 
@@ -361,7 +380,7 @@ fn a_feature_that_is_not_smooth_counts_for_less() {
 fn a_model_that_fails_on_one_side_is_differenced_on_the_other() {
     let features: Features = |p, q| {
         if p > 1.001 {
-            Err(RunFailure::new(FailureReason::Ended(crate::simulate::Status::Jammed), "", 0.5))
+            Err(RunFailure::new(FailureReason::Ended(crate::simulate::RunStatus::Jammed), "", 0.5))
         } else {
             Ok(vec![p, q])
         }
@@ -379,24 +398,24 @@ fn a_model_that_fails_on_one_side_is_differenced_on_the_other() {
 }
 
 /// The same as [`at`], confirmed by searches elsewhere.
-fn confirmed_at(features: Features, sds: &[f64], unit: [f64; 2]) -> Uncertainty {
-    let axes = vec![Axis::from(Bounds::new(0.1, 10.0, Spacing::Log).unwrap()); 2];
-    let target = |(i, sd): (usize, &f64)| Target {
+fn confirmed_at(features: Features, sds: &[f64], unit: [f64; 2]) -> FitUncertainty {
+    let axes = vec![SearchAxis::from(Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap()); 2];
+    let target = |(i, sd): (usize, &f64)| TargetValue {
         name: format!("f{i}"),
         value: 1.0,
         sd: *sd,
         scatter: 0.0,
-        measure: Measure::Log,
+        measure: ValueComparison::Log,
         last: false,
         calibration: None,
     };
-    let fake = Fake { features, sds };
+    let fake = FakePredictor { features, sds };
     let objective = Objective::new(axes, sds.iter().enumerate().map(target).collect(), &fake);
-    let (mut journal, mut watch) = (Discard, |_: &Progress| ControlFlow::Continue(()));
+    let (mut journal, mut watch) = (NullSink, |_: &FitProgress| ControlFlow::Continue(()));
     let mut ledger = Ledger::new(&objective, &[], &mut journal, &mut watch, usize::MAX);
-    ledger.evaluate(Stage::Local, &[unit.to_vec()]).unwrap();
+    ledger.evaluate_points(EvaluationStage::Local, &[unit.to_vec()]).unwrap();
     let names = ["p".to_owned(), "q".to_owned()];
-    let settings = Settings {
+    let settings = SearchSettings {
         seed: 1,
         global_evaluations: 400,
         local_evaluations: 400,
@@ -404,8 +423,8 @@ fn confirmed_at(features: Features, sds: &[f64], unit: [f64; 2]) -> Uncertainty 
         stagnation_generations: 20,
         starts: 2,
     };
-    let found = at_best(&mut ledger, &names, &PROFILE, 500).unwrap();
-    confirmed(&mut ledger, &names, (&settings, &PROFILE), found)
+    let found = assess_best(&mut ledger, &names, &PROFILE, 500).unwrap();
+    confirm_identified(&mut ledger, &names, (&settings, &PROFILE), found)
 }
 
 #[test]
@@ -413,11 +432,11 @@ fn a_value_that_fits_as_well_at_twice_the_estimate_bars_identified() {
     // q = 1 and q = 2 show the same, and every slope says that q is known to a percent
     let folded: Features = |p, q| Ok(vec![p, 1.0 + (q - 1.0) * (q - 2.0) / 3.0]);
     let near = at(folded, &[0.01, 0.01], [0.5, 0.5], PROFILE);
-    assert_eq!(near.intervals[1].verdict, Verdict::Identified);
+    assert_eq!(near.intervals[1].verdict, ParameterVerdict::Identified);
     let found = confirmed_at(folded, &[0.01, 0.01], [0.5, 0.5]);
     assert_eq!(
         found.intervals.iter().map(|i| i.verdict).collect::<Vec<_>>(),
-        [Verdict::Identified, Verdict::NotIdentified]
+        [ParameterVerdict::Identified, ParameterVerdict::NotIdentified]
     );
     assert!((found.intervals[1].upper_95.unwrap() - 2.0).abs() < 0.1, "{:?}", found.intervals[1]);
     assert!(found.notes.iter().any(|note| note.starts_with("q is not called identified: ")));
@@ -426,7 +445,9 @@ fn a_value_that_fits_as_well_at_twice_the_estimate_bars_identified() {
 #[test]
 fn what_nothing_elsewhere_meets_stays_identified() {
     let found = confirmed_at(|p, q| Ok(vec![p * q, p / q]), &[0.01, 0.01], [0.5, 0.5]);
-    assert!(found.intervals.iter().all(|i| i.verdict == Verdict::Identified) && found.notes.is_empty());
+    assert!(
+        found.intervals.iter().all(|i| i.verdict == ParameterVerdict::Identified) && found.notes.is_empty()
+    );
 }
 
 #[test]

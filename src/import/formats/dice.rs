@@ -1,15 +1,17 @@
 //! DICe (Digital Image Correlation Engine) in tracking mode: a file a subset, a row a frame.
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::options::Options;
-use crate::import::reader::{Document, Facts, Layout, LostRule, PointCells, Row, Table, TrackFile, Unit};
+use crate::import::format::FileFormat;
+use crate::import::options::ImportOptions;
+use crate::import::reader::{
+    CoordinateUnit, DelimitedTable, Document, Facts, LostRule, PointCells, TableLayout, TextRow, TrackFile,
+};
 use crate::recording::files::YAxis;
 
 const FRAME: &str = "FRAME";
 /// Where the centre of the subset was in the reference picture, and how far it has moved since.
 const REFERENCE: [&str; 2] = ["COORDINATE_X", "COORDINATE_Y"];
-const MOVED: [&str; 2] = ["DISPLACEMENT_X", "DISPLACEMENT_Y"];
+const DISPLACEMENT: [&str; 2] = ["DISPLACEMENT_X", "DISPLACEMENT_Y"];
 const SIGMA: &str = "SIGMA";
 const STATUS: &str = "STATUS_FLAG";
 /// Values of [`STATUS`] with which a frame was correlated: `CORRELATION_SUCCESSFUL`, the
@@ -24,25 +26,31 @@ const PREAMBLE_LINES: usize = 64;
 /// DICe's solution files.
 pub(crate) struct Dice;
 
-impl Format for Dice {
+impl FileFormat for Dice {
     fn name(&self) -> &'static str {
         "dice"
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
-        let (_, row) = header(document.table.as_ref().ok()?)?;
+        let (_, row) = find_header(document.table.as_ref().ok()?)?;
         Some(format!("line {} names {} and {} as DICe does", row.line, REFERENCE[0], REFERENCE[1]))
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
-        let (index, row) = header(table).ok_or_else(|| no_header(table))?;
+        let (index, row) = find_header(table).ok_or_else(|| no_header_error(table))?;
         refuse_incremental(document)?;
         let at = |name: &str| row.cells.iter().position(|cell| cell == name);
-        let [Some(dx), Some(dy)] = MOVED.map(at) else { return Err(not_moved(table, row)) };
+        let [Some(dx), Some(dy)] = DISPLACEMENT.map(at) else {
+            return Err(no_displacements_error(table, row));
+        };
         let (Some(frame), [Some(x), Some(y)]) = (at(FRAME), REFERENCE.map(at)) else {
-            return Err(full_field(
-                table.place(row.line, 1).to_string(),
+            return Err(full_field_error(
+                table.location(row.line, 1).to_string(),
                 format!("the columns {}", row.texts().join(", ")),
             ));
         };
@@ -57,10 +65,10 @@ impl Format for Dice {
             is: |flag, _| !SUCCESSFUL.contains(&flag),
             words: "whose STATUS_FLAG is a failure",
         });
-        let layout = Layout {
+        let layout = TableLayout {
             start: index + 1,
-            width: row.filled(),
-            most: row.filled(),
+            width: row.used_width(),
+            most: row.used_width(),
             frame: Some(frame),
             points: vec![PointCells {
                 name: document.stem.to_owned(),
@@ -69,12 +77,12 @@ impl Format for Dice {
                 confidence: None,
             }],
             lost: sigma.into_iter().chain(status).collect(),
-            ..Layout::default()
+            ..TableLayout::default()
         };
-        let mut export = layout.read(document, table, facts())?;
+        let mut export = layout.read_tracks(document, table, facts())?;
         export.notes.push(format!(
             "positions are {} + {}, and so for y; the track is called like its file",
-            REFERENCE[0], MOVED[0]
+            REFERENCE[0], DISPLACEMENT[0]
         ));
         Ok(export)
     }
@@ -83,17 +91,17 @@ impl Format for Dice {
 fn facts() -> Facts {
     let why = "DICe counts from the upper left corner of the picture, y downwards".to_owned();
     let unit = "DICe's coordinates and displacements are pixels".to_owned();
-    Facts { y_axis: Some((YAxis::Down, why)), unit: Some((Unit::Pixel, unit)), ..Facts::default() }
+    Facts { y_axis: Some((YAxis::Down, why)), unit: Some((CoordinateUnit::Pixel, unit)), ..Facts::default() }
 }
 
 /// Index of the row of column names, and the row.
-fn header<'t>(table: &'t Table) -> Option<(usize, &'t Row)> {
-    let is_header = |row: &Row| REFERENCE.iter().all(|name| row.cells.iter().any(|cell| cell == name));
+fn find_header<'t>(table: &'t DelimitedTable) -> Option<(usize, &'t TextRow)> {
+    let is_header = |row: &TextRow| REFERENCE.iter().all(|name| row.cells.iter().any(|cell| cell == name));
     table.head.iter().enumerate().find(|(_, row)| is_header(row))
 }
 
-fn no_header(table: &Table) -> ImportError {
-    let found = table.head.first().map(Row::texts).unwrap_or_default();
+fn no_header_error(table: &DelimitedTable) -> ImportError {
+    let found = table.head.first().map(TextRow::texts).unwrap_or_default();
     ImportError::columns(
         table.file,
         table.head.first().map_or(1, |row| row.line),
@@ -102,8 +110,8 @@ fn no_header(table: &Table) -> ImportError {
             found.join(" "),
             REFERENCE[0],
             REFERENCE[1],
-            MOVED[0],
-            MOVED[1]
+            DISPLACEMENT[0],
+            DISPLACEMENT[1]
         ),
         "give the solution file of a subset, DICe_solution_N.txt, as DICe wrote it",
     )
@@ -112,7 +120,7 @@ fn no_header(table: &Table) -> ImportError {
 /// In tracking mode the reference stays where it is while the frames count up; a field has many references in
 /// one frame.
 fn refuse_full_field(
-    table: &Table,
+    table: &DelimitedTable,
     start: usize,
     frame: usize,
     reference: [usize; 2],
@@ -120,7 +128,7 @@ fn refuse_full_field(
     let cells = [frame, reference[0], reference[1]];
     let mut rows = table.rows(start);
     let mut first: Option<[String; 3]> = None;
-    while let Some(record) = rows.next()? {
+    while let Some(record) = rows.next_row()? {
         let texts = cells.map(|cell| record.cell(cell));
         let Some(first) = &first else {
             first = Some(texts.map(str::to_owned));
@@ -128,16 +136,16 @@ fn refuse_full_field(
         };
         let line = record.line;
         if texts[0] == first[0] && !texts[0].is_empty() {
-            return Err(full_field(
-                table.place(line, table.column(line, frame)).to_string(),
+            return Err(full_field_error(
+                table.location(line, table.text_column(line, frame)).to_string(),
                 format!("frame {} again", texts[0]),
             ));
         }
         if let Some(axis) = (1..3).find(|&axis| {
-            texts[axis] != first[axis] && table.number(texts[axis]) != table.number(&first[axis])
+            texts[axis] != first[axis] && table.parse_cell(texts[axis]) != table.parse_cell(&first[axis])
         }) {
-            let place = table.place(line, table.column(line, cells[axis]));
-            return Err(full_field(
+            let place = table.location(line, table.text_column(line, cells[axis]));
+            return Err(full_field_error(
                 place.to_string(),
                 format!("{} {} after {}", REFERENCE[axis - 1], texts[axis], first[axis]),
             ));
@@ -147,17 +155,17 @@ fn refuse_full_field(
 }
 
 /// Without displacements there is only the place of the subset in the reference picture.
-fn not_moved(table: &Table, row: &Row) -> ImportError {
+fn no_displacements_error(table: &DelimitedTable, row: &TextRow) -> ImportError {
     ImportError::wrong_table(
-        table.place(row.line, 1).to_string(),
-        format!("{} and {} without {} and {}", REFERENCE[0], REFERENCE[1], MOVED[0], MOVED[1]),
+        table.location(row.line, 1).to_string(),
+        format!("{} and {} without {} and {}", REFERENCE[0], REFERENCE[1], DISPLACEMENT[0], DISPLACEMENT[1]),
         "the displacements too: the coordinates alone are where the subset was in the reference picture, the \
             same in every frame",
         "add DISPLACEMENT_X and DISPLACEMENT_Y to DICe's output fields and run it again",
     )
 }
 
-fn full_field(place: String, found: String) -> ImportError {
+fn full_field_error(place: String, found: String) -> ImportError {
     ImportError::wrong_table(
         place,
         found,

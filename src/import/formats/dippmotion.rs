@@ -1,12 +1,13 @@
 //! DIPP-MOTION (DITECT): the table behind an X-Y graph, in CP932, under a header of varying length.
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::options::Options;
+use crate::import::format::FileFormat;
+use crate::import::options::ImportOptions;
 use crate::import::reader::{
-    Column, Document, Fact, Facts, Layout, PointCells, Row, Table, TimeUnit, TrackFile, Unit, finding,
+    Column, CoordinateUnit, DelimitedTable, Document, Fact, Facts, PointCells, TableLayout, TextRow,
+    TimeUnit, TrackFile, new_finding,
 };
-use crate::recording::quality::{Check, Finding, Severity};
+use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// Start of the first line.
 const MARK: &str = "DIPP-MOTION";
@@ -19,7 +20,7 @@ const COORDINATE: &str = "\u{5ea7}\u{6a19}\u{5024}";
 /// Ends of the column names of a point.
 const AXES: [&str; 2] = ["(X)", "(Y)"];
 /// Units of time by their sign in a column's name.
-const TIMES: [(&str, f64); 4] = [("s", 1.0), ("sec", 1.0), ("ms", 1e-3), ("\u{79d2}", 1.0)];
+const TIME_UNITS: [(&str, f64); 4] = [("s", 1.0), ("sec", 1.0), ("ms", 1e-3), ("\u{79d2}", 1.0)];
 /// Largest distance of a point from (0, 0), in units of the file, that is the rounding of a local origin:
 /// some 1e-11 are seen.
 const AT_ORIGIN: f64 = 1e-6;
@@ -29,7 +30,7 @@ const MENU: &str = "save the data of the graph of X coordinate against Y coordin
 /// DIPP-MOTION's tables.
 pub(crate) struct DippMotion;
 
-impl Format for DippMotion {
+impl FileFormat for DippMotion {
     fn name(&self) -> &'static str {
         "dippmotion"
     }
@@ -43,25 +44,35 @@ impl Format for DippMotion {
             .then(|| format!("line 1 starts with `{MARK}`"))
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         refuse_other_graph(table)?;
-        let header = header(table)?;
+        let header = find_header(table)?;
         let row = &table.head[header];
-        let points = points(table, row)?;
-        let facts = Facts { unit: unit(table)?, time: time_unit(table, row)?, ..Facts::default() };
+        let points = point_columns(table, row)?;
+        let facts = Facts { unit: coordinate_unit(table)?, time: time_unit(table, row)?, ..Facts::default() };
         let width = points.iter().flat_map(|point| &point.y).max().map_or(0, |last| last + 1);
-        let layout =
-            Layout { start: header + 1, width, most: width, time: Some(0), points, ..Layout::default() };
-        let mut export = layout.read(document, table, facts)?;
-        let origin = local_origin(&export);
+        let layout = TableLayout {
+            start: header + 1,
+            width,
+            most: width,
+            time: Some(0),
+            points,
+            ..TableLayout::default()
+        };
+        let mut export = layout.read_tracks(document, table, facts)?;
+        let origin = local_origin_finding(&export);
         export.findings.extend(origin);
         Ok(export)
     }
 }
 
 /// A bracketed line names the graph: one of speeds or of one coordinate over time has no positions.
-fn refuse_other_graph(table: &Table) -> Result<(), ImportError> {
+fn refuse_other_graph(table: &DelimitedTable) -> Result<(), ImportError> {
     let named = table
         .head
         .iter()
@@ -69,19 +80,19 @@ fn refuse_other_graph(table: &Table) -> Result<(), ImportError> {
         .find(|(_, cell)| cell.starts_with('[') && cell.contains("] - ["));
     match named {
         Some((row, graph)) if graph.matches(COORDINATE).count() != 2 => {
-            Err(wrong(table.place(row.line, 1).to_string(), format!("the graph {graph}")))
+            Err(graph_error(table.location(row.line, 1).to_string(), format!("the graph {graph}")))
         }
         _ => Ok(()),
     }
 }
 
-fn wrong(place: String, found: String) -> ImportError {
+fn graph_error(place: String, found: String) -> ImportError {
     ImportError::wrong_table(place, found, "the X and Y coordinates of points over time", MENU)
 }
 
 /// The row that names the columns is the one that starts with the time.
-fn header(table: &Table) -> Result<usize, ImportError> {
-    let names_time = |row: &Row| {
+fn find_header(table: &DelimitedTable) -> Result<usize, ImportError> {
+    let names_time = |row: &TextRow| {
         row.cells.first().is_some_and(|cell| cell.starts_with(TIME))
             && row.cells.iter().skip(1).any(|cell| !cell.is_empty())
     };
@@ -95,16 +106,16 @@ fn header(table: &Table) -> Result<usize, ImportError> {
     })
 }
 
-fn points(table: &Table, row: &Row) -> Result<Vec<PointCells>, ImportError> {
-    let names: Vec<&str> = row.texts().into_iter().take(row.filled()).collect();
+fn point_columns(table: &DelimitedTable, row: &TextRow) -> Result<Vec<PointCells>, ImportError> {
+    let names: Vec<&str> = row.texts().into_iter().take(row.used_width()).collect();
     let mut points = vec![];
     let mut rest = names.iter().enumerate().skip(1);
     while let Some((column, name)) = rest.next() {
         let track = name.strip_suffix(AXES[0]);
         let pair = rest.next().and_then(|(_, name)| name.strip_suffix(AXES[1]));
         let Some(track) = track.filter(|track| pair == Some(*track)) else {
-            return Err(wrong(
-                table.place(row.line, table.column(row.line, column)).to_string(),
+            return Err(graph_error(
+                table.location(row.line, table.text_column(row.line, column)).to_string(),
                 format!("the column `{name}` without a pair NAME(X), NAME(Y)"),
             ));
         };
@@ -114,18 +125,23 @@ fn points(table: &Table, row: &Row) -> Result<Vec<PointCells>, ImportError> {
 }
 
 /// The unit of both axes, where the header has it.
-fn unit(table: &Table) -> Result<Fact<Unit>, ImportError> {
+fn coordinate_unit(table: &DelimitedTable) -> Result<Fact<CoordinateUnit>, ImportError> {
     let named = |name: &str| table.head.iter().find(|row| row.cells.first().is_some_and(|cell| cell == name));
     let [Some(x), Some(y)] = UNITS.map(named) else { return Ok(None) };
-    let of = |row: &Row| row.cells.get(1).cloned().unwrap_or_default();
+    let of = |row: &TextRow| row.cells.get(1).cloned().unwrap_or_default();
     let (unit, other) = (of(x), of(y));
-    let refuse = |row: &Row, found: String, expected: &str| {
-        ImportError::wrong_table(table.place(row.line, table.column(row.line, 1)), found, expected, MENU)
+    let refuse = |row: &TextRow, found: String, expected: &str| {
+        ImportError::wrong_table(
+            table.location(row.line, table.text_column(row.line, 1)),
+            found,
+            expected,
+            MENU,
+        )
     };
     if unit != other {
         return Err(refuse(y, format!("the unit `{other}` for y and `{unit}` for x"), "one unit for both"));
     }
-    match Unit::named(&unit) {
+    match CoordinateUnit::parse(&unit) {
         Some(named) => Ok(Some((named, format!("line {} names the unit {unit}", x.line)))),
         None if unit.is_empty() => Ok(None),
         None => Err(refuse(x, format!("the unit `{unit}`"), "a unit of length or pixels")),
@@ -133,16 +149,16 @@ fn unit(table: &Table) -> Result<Fact<Unit>, ImportError> {
 }
 
 /// Seconds, unless the column names another unit.
-fn time_unit(table: &Table, row: &Row) -> Result<TimeUnit, ImportError> {
+fn time_unit(table: &DelimitedTable, row: &TextRow) -> Result<TimeUnit, ImportError> {
     let name = row.cells.first().map_or("", |cell| cell.trim_start_matches(TIME));
     let sign = name.trim_matches(|c: char| {
         c.is_whitespace() || matches!(c, '(' | ')' | '[' | ']' | '\u{ff08}' | '\u{ff09}')
     });
-    match TIMES.iter().find(|unit| unit.0 == sign) {
+    match TIME_UNITS.iter().find(|unit| unit.0 == sign) {
         Some(unit) => Ok(TimeUnit::Seconds(unit.1)),
-        None if sign.is_empty() => Ok(TimeUnit::Usual),
+        None if sign.is_empty() => Ok(TimeUnit::AssumedSeconds),
         None => Err(ImportError::wrong_table(
-            table.place(row.line, 1),
+            table.location(row.line, 1),
             format!("times in `{sign}`"),
             "seconds or milliseconds",
             "save the graph with times in seconds",
@@ -151,12 +167,13 @@ fn time_unit(table: &Table, row: &Row) -> Result<TimeUnit, ImportError> {
 }
 
 /// A point that never leaves (0, 0) is the origin of a local system, and all others are measured from it.
-fn local_origin(export: &TrackFile) -> Option<Finding> {
-    let near =
-        |column: &Column| column.has_any() && column.iter().flatten().all(|value| value.abs() <= AT_ORIGIN);
+fn local_origin_finding(export: &TrackFile) -> Option<QualityFinding> {
+    let near = |column: &Column| {
+        column.has_values() && column.iter().flatten().all(|value| value.abs() <= AT_ORIGIN)
+    };
     let origin = export.tracks.iter().find(|track| near(&track.x) && track.y.as_ref().is_some_and(near))?;
     let name = &origin.name;
-    Some(finding(
+    Some(new_finding(
         Check::RelativePositions,
         Severity::Caution,
         (AT_ORIGIN, ""),
@@ -176,13 +193,13 @@ mod tests {
 
     fn time(name: &str) -> Result<TimeUnit, ImportError> {
         let text = format!("{TIME}{name},a(X),a(Y)\n0,1,2\n1,2,3\n");
-        let table = Table::read("a.csv", &text).unwrap();
+        let table = DelimitedTable::parse("a.csv", &text).unwrap();
         time_unit(&table, &table.head[0])
     }
 
     #[test]
     fn times_are_seconds_unless_their_column_says_otherwise() {
-        assert_eq!(time(""), Ok(TimeUnit::Usual));
+        assert_eq!(time(""), Ok(TimeUnit::AssumedSeconds));
         assert_eq!(time("[ms]"), Ok(TimeUnit::Seconds(1e-3)));
         assert_eq!(time(" (\u{79d2})"), Ok(TimeUnit::Seconds(1.0)));
         assert!(

@@ -2,11 +2,12 @@
 //! points and camera rate.
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::options::{Options, TimeColumn};
+use crate::import::format::FileFormat;
+use crate::import::options::{ImportOptions, TimeColumn};
 use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::reader::{
-    Document, Fact, Facts, Layout, LostRule, Number, PointCells, Row, Table, TimeUnit, TrackFile,
+    CellNumber, DelimitedTable, Document, Fact, Facts, LostRule, PointCells, TableLayout, TextRow, TimeUnit,
+    TrackFile,
 };
 use crate::import::source::base_name;
 
@@ -24,7 +25,7 @@ const LONGEST_STEP_S: f64 = 10.0;
 /// Frame-DIAS' tables.
 pub(crate) struct FrameDias;
 
-impl Format for FrameDias {
+impl FileFormat for FrameDias {
     fn name(&self) -> &'static str {
         "framedias"
     }
@@ -33,8 +34,8 @@ impl Format for FrameDias {
     /// program.
     fn recognises(&self, document: &Document) -> Option<String> {
         let table = document.table.as_ref().ok()?;
-        let counts = Counts::find(table)?;
-        let cells = table.head.get(1)?.filled();
+        let counts = FrameDiasCounts::find(table)?;
+        let cells = table.head.get(1)?.used_width();
         let fits = cells != COUNTS && cells.is_multiple_of(2) && counts.points == (cells / 2) as f64;
         let named = document.file.to_lowercase().ends_with(EXTENSION);
         let line = table.head.first()?.line;
@@ -46,11 +47,15 @@ impl Format for FrameDias {
         })
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
-        let counts = Counts::find(table).ok_or_else(|| no_counts(table))?;
+        let counts = FrameDiasCounts::find(table).ok_or_else(|| no_counts_error(table))?;
         let points = count_points(table, counts)?;
-        let settings = Settings::of_companion(document);
+        let settings = FrameDiasSettings::from_companion(document);
         let names = settings.names(table, points)?;
         let cells = 2 * points;
         let lost = LostRule { cell: None, is: |x, y| x == 0.0 && y == 0.0, words: "at exactly (0, 0)" };
@@ -59,15 +64,21 @@ impl Format for FrameDias {
             .enumerate()
             .map(|(index, name)| PointCells::new(name.as_str(), 2 * index, Some(2 * index + 1)))
             .collect();
-        let layout =
-            Layout { start: 1, width: cells, most: cells, points, lost: vec![lost], ..Layout::default() };
+        let layout = TableLayout {
+            start: 1,
+            width: cells,
+            most: cells,
+            points,
+            lost: vec![lost],
+            ..TableLayout::default()
+        };
         let facts = Facts {
-            frame_rate_hz: settings.rate(table, counts, options)?,
+            frame_rate_hz: settings.frame_rate(table, counts, options)?,
             time: TimeUnit::Seconds(1.0),
             ..Facts::default()
         };
-        let mut export = layout.read(document, table, facts)?;
-        check_frames(table, counts, &export)?;
+        let mut export = layout.read_tracks(document, table, facts)?;
+        check_frame_count(table, counts, &export)?;
         if counts.step_s > 0.0 {
             for clock in &mut export.clocks {
                 clock.time = clock.frame.as_ref().map(|frames| {
@@ -82,22 +93,22 @@ impl Format for FrameDias {
 
 /// The first line.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Counts {
+struct FrameDiasCounts {
     frames: f64,
     points: f64,
     step_s: f64,
 }
 
-impl Counts {
-    fn find(table: &Table) -> Option<Self> {
+impl FrameDiasCounts {
+    fn find(table: &DelimitedTable) -> Option<Self> {
         let row = table.head.first()?;
-        let value = |cell: usize| match table.number(row.cells.get(cell)?) {
-            Number::Value(value) => Some(value),
+        let value = |cell: usize| match table.parse_cell(row.cells.get(cell)?) {
+            CellNumber::Value(value) => Some(value),
             _ => None,
         };
         let counts = Self { frames: value(0)?, points: value(1)?, step_s: value(2)? };
         let count = |value: f64| value >= 1.0 && value.fract() == 0.0;
-        (row.filled() == COUNTS
+        (row.used_width() == COUNTS
             && count(counts.frames)
             && count(counts.points)
             && (0.0..=LONGEST_STEP_S).contains(&counts.step_s))
@@ -105,26 +116,31 @@ impl Counts {
     }
 }
 
-fn columns(table: &Table, row: Option<&Row>, problem: String, advice: &str) -> ImportError {
+fn columns_error(
+    table: &DelimitedTable,
+    row: Option<&TextRow>,
+    problem: String,
+    advice: &str,
+) -> ImportError {
     ImportError::columns(table.file, row.map_or(1, |row| row.line), problem, advice)
 }
 
-fn no_counts(table: &Table) -> ImportError {
+fn no_counts_error(table: &DelimitedTable) -> ImportError {
     let first = table.head.first();
-    let found = first.map(Row::texts).unwrap_or_default().join(",");
+    let found = first.map(TextRow::texts).unwrap_or_default().join(",");
     let problem = format!(
         "found `{found}`, expected the numbers of frames and points and the seconds from frame to frame, \
          such as 3000,2,0.0005"
     );
-    columns(table, first, problem, "save the two-dimensional coordinates (.rd) again")
+    columns_error(table, first, problem, "save the two-dimensional coordinates (.rd) again")
 }
 
 /// Points of a row, where the first line counts as many.
-fn count_points(table: &Table, counts: Counts) -> Result<usize, ImportError> {
+fn count_points(table: &DelimitedTable, counts: FrameDiasCounts) -> Result<usize, ImportError> {
     let Some(row) = table.head.get(1) else {
         return Err(ImportError::HeaderOnly { file: table.file.to_owned(), line: 1 });
     };
-    let cells = row.filled();
+    let cells = row.used_width();
     if cells.is_multiple_of(2) && (cells / 2) as f64 == counts.points {
         return Ok(cells / 2);
     }
@@ -132,7 +148,7 @@ fn count_points(table: &Table, counts: Counts) -> Result<usize, ImportError> {
         "found {cells} coordinates in the row, expected x and y of the {} points that the first line counts",
         counts.points
     );
-    Err(columns(
+    Err(columns_error(
         table,
         Some(row),
         problem,
@@ -140,7 +156,11 @@ fn count_points(table: &Table, counts: Counts) -> Result<usize, ImportError> {
     ))
 }
 
-fn check_frames(table: &Table, counts: Counts, export: &TrackFile) -> Result<(), ImportError> {
+fn check_frame_count(
+    table: &DelimitedTable,
+    counts: FrameDiasCounts,
+    export: &TrackFile,
+) -> Result<(), ImportError> {
     let rows = export.clocks.first().map_or(0, crate::import::reader::track_file::Clock::len);
     if rows as f64 == counts.frames {
         return Ok(());
@@ -149,12 +169,17 @@ fn check_frames(table: &Table, counts: Counts, export: &TrackFile) -> Result<(),
         "found {rows} rows of coordinates, expected the {} frames that the first line counts",
         counts.frames
     );
-    Err(columns(table, table.head.first(), problem, "the file is cut short or was edited: save it again"))
+    Err(columns_error(
+        table,
+        table.head.first(),
+        problem,
+        "the file is cut short or was edited: save it again",
+    ))
 }
 
 /// What the `.set` says.
 #[derive(Debug, Clone, Default, PartialEq)]
-struct Settings {
+struct FrameDiasSettings {
     file: Option<String>,
     rate_hz: Option<f64>,
     /// Whether only some of the camera's frames were recorded.
@@ -162,13 +187,13 @@ struct Settings {
     names: Vec<String>,
 }
 
-impl Settings {
-    fn of_companion(document: &Document) -> Self {
+impl FrameDiasSettings {
+    fn from_companion(document: &Document) -> Self {
         let found = document.companions.iter().find(|(name, _)| name.to_lowercase().ends_with(".set"));
-        found.map_or_else(Self::default, |(name, text)| Self::read(name, text))
+        found.map_or_else(Self::default, |(name, text)| Self::parse(name, text))
     }
 
-    fn read(file: &str, text: &str) -> Self {
+    fn parse(file: &str, text: &str) -> Self {
         let value = |key: &str| {
             text.lines()
                 .filter_map(|line| line.split_once('='))
@@ -184,28 +209,28 @@ impl Settings {
             file: Some(base_name(file).to_owned()),
             rate_hz: number(RATE).filter(|rate| *rate > 0.0),
             interval: number(INTERVAL).is_some_and(|interval| interval > 1.0),
-            names: value(NAMES).map(quoted).unwrap_or_default(),
+            names: value(NAMES).map(split_quoted_names).unwrap_or_default(),
         }
     }
 
-    fn file(&self) -> &str {
+    fn file_name(&self) -> &str {
         self.file.as_deref().unwrap_or_default()
     }
 
     /// A list of another length belongs to another file, and would give the points wrong names.
-    fn names(&self, table: &Table, points: usize) -> Result<Vec<String>, ImportError> {
+    fn names(&self, table: &DelimitedTable, points: usize) -> Result<Vec<String>, ImportError> {
         if self.names.is_empty() {
             return Ok((1..=points).map(|point| format!("point{point}")).collect());
         }
         if self.names.len() == points {
             return Ok(self.names.clone());
         }
-        let (file, names) = (self.file(), self.names.len());
+        let (file, names) = (self.file_name(), self.names.len());
         let problem = format!(
             "found {points} points, expected the {names} that {NAMES} in {file} names ({})",
             self.names.join(", ")
         );
-        Err(columns(
+        Err(columns_error(
             table,
             table.head.first(),
             problem,
@@ -214,20 +239,25 @@ impl Settings {
     }
 
     /// The camera's rate, where nothing contradicts it.
-    fn rate(&self, table: &Table, counts: Counts, options: &Options) -> Result<Fact<f64>, ImportError> {
+    fn frame_rate(
+        &self,
+        table: &DelimitedTable,
+        counts: FrameDiasCounts,
+        options: &ImportOptions,
+    ) -> Result<Fact<f64>, ImportError> {
         let Some(rate) = self.rate_hz.filter(|_| !self.interval) else { return Ok(None) };
         let agrees = counts.step_s == 0.0 || (rate * counts.step_s - 1.0).abs() <= RATE_AGREEMENT;
         if agrees || options.time == Some(TimeColumn::Playback) {
-            return Ok(Some((rate, format!("{RATE} in {}", self.file()))));
+            return Ok(Some((rate, format!("{RATE} in {}", self.file_name()))));
         }
         let (step, implied) = (counts.step_s, 1.0 / counts.step_s);
         let problem = format!(
             "found {step} s from frame to frame ({implied} frames/s), expected that of {RATE}={rate} in {}",
-            self.file()
+            self.file_name()
         );
         let advice = "if the camera recorded at the rate of the .set and the seconds only count frames, add \
             --time playback; else move the .set to another folder and give --frame-rate-hz";
-        Err(columns(table, table.head.first(), problem, advice))
+        Err(columns_error(table, table.head.first(), problem, advice))
     }
 
     fn notes(&self) -> Vec<String> {
@@ -239,7 +269,7 @@ impl Settings {
             format!(
                 "{INTERVAL} in {} is above 1: not every frame was recorded, so \
                 {RATE} is not taken for the rate",
-                self.file()
+                self.file_name()
             )
         });
         points.into_iter().chain(interval).collect()
@@ -247,7 +277,7 @@ impl Settings {
 }
 
 /// `"a","b"` as names; a name may hold a comma.
-fn quoted(list: &str) -> Vec<String> {
+fn split_quoted_names(list: &str) -> Vec<String> {
     let (mut names, mut open) = (vec![String::new()], false);
     for c in list.chars() {
         match c {
@@ -268,12 +298,16 @@ mod tests {
     fn the_settings_name_points_and_rate() {
         let text = "Memo=\"a=b\"\r\nRecInterval=0\r\nCameraSpeed=2000\r\nPointName=\"tip\",\"a,b\", \
             \"\u{5148}\u{7aef}\"\r\n";
-        let found = Settings::read("x/a.set", text);
-        assert_eq!((found.rate_hz, found.interval, found.file()), (Some(2000.0), false, "a.set"));
+        let found = FrameDiasSettings::parse("x/a.set", text);
+        assert_eq!((found.rate_hz, found.interval, found.file_name()), (Some(2000.0), false, "a.set"));
         assert_eq!(found.names, ["tip", "a,b", "\u{5148}\u{7aef}"]);
         assert_eq!(
-            Settings::read("a.set", "CameraSpeed=-1\nRecInterval=2\n"),
-            Settings { file: Some("a.set".to_owned()), interval: true, ..Settings::default() }
+            FrameDiasSettings::parse("a.set", "CameraSpeed=-1\nRecInterval=2\n"),
+            FrameDiasSettings {
+                file: Some("a.set".to_owned()),
+                interval: true,
+                ..FrameDiasSettings::default()
+            }
         );
     }
 }

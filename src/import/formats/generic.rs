@@ -3,12 +3,13 @@
 mod other_clocks;
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::options::{COLUMN_KEYS, ColumnName, Columns, Options, ROW};
+use crate::import::format::FileFormat;
+use crate::import::options::{COLUMN_KEYS, ColumnMap, ColumnName, ImportOptions, ROW_COLUMN};
 use crate::import::reader::{
-    Document, Facts, Layout, Number, Order, PointCells, Row, Table, TimeUnit, TrackFile,
+    CellNumber, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow, TimeUnit,
+    TrackFile,
 };
-use crate::toml_file::nearest;
+use crate::toml_file::suggest_key;
 
 /// Seconds in a millisecond.
 const MILLI: f64 = 1e-3;
@@ -16,9 +17,9 @@ const MILLI: f64 = 1e-3;
 const CLOCKS: [&str; 3] = ["frame", "time", "time-ms"];
 
 /// A plain table with `--columns`.
-pub(crate) struct Generic;
+pub(crate) struct GenericFormat;
 
-impl Format for Generic {
+impl FileFormat for GenericFormat {
     fn name(&self) -> &'static str {
         "generic"
     }
@@ -28,19 +29,27 @@ impl Format for Generic {
         None
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
-        let columns = options.columns.as_ref().ok_or_else(|| unnamed(table))?;
-        let named = Named::find(table, columns)?;
+        let columns = options.columns.as_ref().ok_or_else(|| unnamed_columns_error(table))?;
+        let named = ColumnPositions::find(table, columns)?;
         let start = named.first_data_row(table)?;
         if let Some(header) = named.header.or(start.checked_sub(1)).and_then(|at| table.head.get(at)) {
-            other_clocks::check(table, header, start, &named.columns)?;
+            other_clocks::check_unused_clocks(table, header, start, &named.columns)?;
         }
         let facts = Facts {
-            time: if named.at("time-ms").is_some() { TimeUnit::Seconds(MILLI) } else { TimeUnit::Usual },
+            time: if named.column_of("time-ms").is_some() {
+                TimeUnit::Seconds(MILLI)
+            } else {
+                TimeUnit::AssumedSeconds
+            },
             ..Facts::default()
         };
-        let mut export = named.layout(table, start).read(document, table, facts)?;
+        let mut export = named.table_layout(table, start).read_tracks(document, table, facts)?;
         if let Some(row) = table.head.get(start).filter(|_| start > 0) {
             let with = named.header.map_or("", |_| ", with the named columns");
             export
@@ -57,7 +66,7 @@ const MOST_SHOWN: usize = 16;
 const LONGEST_SHOWN: usize = 24;
 
 /// The refusal of a table whose columns nobody names: its first row with the numbers to name them by.
-pub(crate) fn unnamed(table: &Table) -> ImportError {
+pub(crate) fn unnamed_columns_error(table: &DelimitedTable) -> ImportError {
     let first = table.head.first();
     let shown = |(at, cell): (usize, &String)| {
         format!("{}: {}", at + 1, cell.chars().take(LONGEST_SHOWN).collect::<String>())
@@ -80,19 +89,19 @@ pub(crate) fn unnamed(table: &Table) -> ImportError {
 }
 
 /// 0-based positions of the columns that are used, with their keys.
-struct Named {
+struct ColumnPositions {
     columns: Vec<(&'static str, usize)>,
     /// Row of the head that has the names.
     header: Option<usize>,
 }
 
-impl Named {
+impl ColumnPositions {
     /// Finds the named columns in the header row, which is the first row that has all of them.
-    fn find(table: &Table, columns: &Columns) -> Result<Self, ImportError> {
+    fn find(table: &DelimitedTable, columns: &ColumnMap) -> Result<Self, ImportError> {
         let used = columns
             .0
             .iter()
-            .filter(|(key, column)| !(*key == "frame" && *column == ColumnName::Name(ROW.to_owned())));
+            .filter(|(key, column)| !(*key == "frame" && *column == ColumnName::Name(ROW_COLUMN.to_owned())));
         let used: Vec<&(&'static str, ColumnName)> = used.collect();
         let names: Vec<&str> = used
             .iter()
@@ -100,7 +109,7 @@ impl Named {
                 |(_, column)| if let ColumnName::Name(name) = column { Some(name.as_str()) } else { None },
             )
             .collect();
-        let has = |row: &Row, name: &str| row.cells.iter().any(|cell| cell == name);
+        let has = |row: &TextRow, name: &str| row.cells.iter().any(|cell| cell == name);
         let header = if names.is_empty() {
             None
         } else {
@@ -109,12 +118,12 @@ impl Named {
                     .head
                     .iter()
                     .position(|row| names.iter().all(|name| has(row, name)))
-                    .ok_or_else(|| no_such_column(table, &names))?,
+                    .ok_or_else(|| no_such_column_error(table, &names))?,
             )
         };
         let position = |column: &ColumnName| match column {
             ColumnName::Number(number) => Ok(number - 1),
-            ColumnName::Name(name) => Self::named(table, header.unwrap_or(0), name),
+            ColumnName::Name(name) => Self::find_column(table, header.unwrap_or(0), name),
         };
         let columns = used
             .iter()
@@ -126,7 +135,7 @@ impl Named {
         Ok(named)
     }
 
-    fn named(table: &Table, header: usize, name: &str) -> Result<usize, ImportError> {
+    fn find_column(table: &DelimitedTable, header: usize, name: &str) -> Result<usize, ImportError> {
         let row = &table.head[header];
         let mut at = row.cells.iter().enumerate().filter(|(_, cell)| *cell == name).map(|(index, _)| index);
         match (at.next(), at.next()) {
@@ -141,15 +150,15 @@ impl Named {
                 ),
                 "give the number of the column instead of its name",
             )),
-            _ => Err(no_such_column(table, &[name])),
+            _ => Err(no_such_column_error(table, &[name])),
         }
     }
 
-    fn widest(&self) -> usize {
+    fn min_row_width(&self) -> usize {
         self.columns.iter().map(|(_, at)| at + 1).max().unwrap_or(0)
     }
 
-    fn check_width(&self, table: &Table) -> Result<(), ImportError> {
+    fn check_width(&self, table: &DelimitedTable) -> Result<(), ImportError> {
         let cells = table.head.iter().map(|row| row.cells.len()).max().unwrap_or(0);
         match self.columns.iter().find(|(_, at)| *at >= cells) {
             None => Ok(()),
@@ -169,11 +178,14 @@ impl Named {
     }
 
     /// A column is one thing: the same numbers for two of them make a motion that nobody measured.
-    fn check_distinct(&self, table: &Table) -> Result<(), ImportError> {
+    fn check_distinct(&self, table: &DelimitedTable) -> Result<(), ImportError> {
         let pairs = self.columns.iter().enumerate().flat_map(|(index, first)| {
             self.columns.iter().skip(index + 1).map(move |second| (first, second))
         });
-        match pairs.into_iter().find(|(first, second)| first.1 == second.1 && !share(first.0, second.0)) {
+        match pairs
+            .into_iter()
+            .find(|(first, second)| first.1 == second.1 && !may_share_column(first.0, second.0))
+        {
             None => Ok(()),
             Some((first, second)) => Err(ImportError::columns(
                 table.file,
@@ -190,28 +202,34 @@ impl Named {
         }
     }
 
-    fn at(&self, key: &str) -> Option<usize> {
+    fn column_of(&self, key: &str) -> Option<usize> {
         self.columns.iter().find(|(known, _)| *known == key).map(|(_, at)| *at)
     }
 
     /// The column that numbers or times the rows; where every row is a frame, that of the first point.
-    fn clock(&self) -> usize {
+    fn clock_column(&self) -> usize {
         let positions = ["tip-x", "head-x", "x"];
-        CLOCKS.iter().chain(&positions).find_map(|key| self.at(key)).unwrap_or(0)
+        CLOCKS.iter().chain(&positions).find_map(|key| self.column_of(key)).unwrap_or(0)
     }
 
     /// The first row below the header whose clock is a number; a row above it that holds positions is damage,
     /// not a header.
-    fn first_data_row(&self, table: &Table) -> Result<usize, ImportError> {
+    fn first_data_row(&self, table: &DelimitedTable) -> Result<usize, ImportError> {
         let from = self.header.map_or(0, |header| header + 1);
-        let number =
-            |row: &Row, at: usize| row.cells.get(at).map_or(Number::Missing, |cell| table.number(cell));
+        let number = |row: &TextRow, at: usize| {
+            row.cells.get(at).map_or(CellNumber::Missing, |cell| table.parse_cell(cell))
+        };
         for (index, row) in table.head.iter().enumerate().skip(from) {
-            match number(row, self.clock()) {
-                Number::Value(_) => return Ok(index),
+            match number(row, self.clock_column()) {
+                CellNumber::Value(_) => return Ok(index),
                 _ if self.is_row_of_numbers(number, row) => {
-                    let cell = row.cells.get(self.clock()).map_or("", String::as_str);
-                    return Err(table.not_a_number(row.line, self.clock(), cell, self.key_of(self.clock())));
+                    let cell = row.cells.get(self.clock_column()).map_or("", String::as_str);
+                    return Err(table.not_a_number_error(
+                        row.line,
+                        self.clock_column(),
+                        cell,
+                        self.key_of_column(self.clock_column()),
+                    ));
                 }
                 _ => {}
             }
@@ -224,52 +242,55 @@ impl Named {
 
     /// Whether the named cells next to the clock hold nothing but numbers; lines of settings above a table
     /// hold some.
-    fn is_row_of_numbers(&self, number: impl Fn(&Row, usize) -> Number, row: &Row) -> bool {
-        let others = self.columns.iter().filter(|(key, at)| *key != "track" && *at != self.clock());
-        let found: Vec<Number> = others.map(|(_, at)| number(row, *at)).collect();
-        found.iter().any(|found| matches!(found, Number::Value(_))) && !found.contains(&Number::Text)
+    fn is_row_of_numbers(&self, number: impl Fn(&TextRow, usize) -> CellNumber, row: &TextRow) -> bool {
+        let others = self.columns.iter().filter(|(key, at)| *key != "track" && *at != self.clock_column());
+        let found: Vec<CellNumber> = others.map(|(_, at)| number(row, *at)).collect();
+        found.iter().any(|found| matches!(found, CellNumber::Value(_))) && !found.contains(&CellNumber::Text)
     }
 
-    fn key_of(&self, at: usize) -> &'static str {
+    fn key_of_column(&self, at: usize) -> &'static str {
         self.columns.iter().find(|(_, known)| *known == at).map_or(COLUMN_KEYS[0], |(key, _)| key)
     }
 
-    fn layout(&self, table: &Table, start: usize) -> Layout {
-        let widest = self.widest();
-        let filled = table.head.get(start).map_or(0, Row::filled).max(widest);
+    fn table_layout(&self, table: &DelimitedTable, start: usize) -> TableLayout {
+        let widest = self.min_row_width();
+        let filled = table.head.get(start).map_or(0, TextRow::used_width).max(widest);
         let header = self.header.and_then(|header| table.head.get(header)).map_or(0, |row| row.cells.len());
         let point = |name: &str, [x, y, confidence]: [&str; 3]| {
-            let confidence = self.at(confidence);
-            self.at(x).map(|x| PointCells { confidence, ..PointCells::new(name, x, self.at(y)) })
+            let confidence = self.column_of(confidence);
+            self.column_of(x)
+                .map(|x| PointCells { confidence, ..PointCells::new(name, x, self.column_of(y)) })
         };
         let named = [
             point("tip", ["tip-x", "tip-y", "tip-confidence"]),
             point("head", ["head-x", "head-y", "head-confidence"]),
         ];
-        let listed = point(if self.at("track").is_some() { "" } else { "point" }, ["x", "y", "confidence"]);
-        Layout {
+        let listed =
+            point(if self.column_of("track").is_some() { "" } else { "point" }, ["x", "y", "confidence"]);
+        TableLayout {
             start,
             width: widest,
             most: filled.max(header),
-            frame: self.at("frame"),
-            time: self.at("time").or(self.at("time-ms")),
-            key: self.at("track").into_iter().collect(),
+            frame: self.column_of("frame"),
+            time: self.column_of("time").or(self.column_of("time-ms")),
+            key: self.column_of("track").into_iter().collect(),
             skip_nameless: true,
-            order: if self.at("track").is_some() { Order::Any } else { Order::AsWritten },
+            order: if self.column_of("track").is_some() { RowOrder::Any } else { RowOrder::AsWritten },
             points: named.into_iter().chain([listed]).flatten().collect(),
-            ..Layout::default()
+            ..TableLayout::default()
         }
     }
 }
 
 /// Whether two keys may name one column: some trackers give one confidence for all points of a frame.
-fn share(first: &str, second: &str) -> bool {
+fn may_share_column(first: &str, second: &str) -> bool {
     first.ends_with("confidence") && second.ends_with("confidence")
 }
 
 /// The refusal of names that no row has together: the row that has most of them is taken for the header.
-fn no_such_column(table: &Table, names: &[&str]) -> ImportError {
-    let hits = |row: &Row| names.iter().filter(|name| row.cells.iter().any(|cell| cell == **name)).count();
+fn no_such_column_error(table: &DelimitedTable, names: &[&str]) -> ImportError {
+    let hits =
+        |row: &TextRow| names.iter().filter(|name| row.cells.iter().any(|cell| cell == **name)).count();
     let best = table
         .head
         .iter()
@@ -285,7 +306,8 @@ fn no_such_column(table: &Table, names: &[&str]) -> ImportError {
         format!("found the columns {}, expected also `{}`", header.join(", "), missing.join("`, `")),
         format!(
             "{} or give the number of the column",
-            nearest(missing.first().unwrap_or(&""), &header).replace("known keys here", "name one of these")
+            suggest_key(missing.first().unwrap_or(&""), &header)
+                .replace("known keys here", "name one of these")
         ),
     )
 }

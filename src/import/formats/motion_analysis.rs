@@ -1,9 +1,9 @@
 //! motion-analysis-2d (Saga University): one row a frame, times with four decimals.
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::options::Options;
-use crate::import::reader::{Document, Facts, Layout, PointCells, Row, Table, TrackFile};
+use crate::import::format::FileFormat;
+use crate::import::options::ImportOptions;
+use crate::import::reader::{DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow, TrackFile};
 
 /// Names of the first columns.
 const CLOCK: [&str; 2] = ["frame_no", "time"];
@@ -16,7 +16,7 @@ const ANGLES: [&str; 3] = ["-\u{3b8}", "-\u{3f4}", "-theta"];
 /// motion-analysis-2d's tables.
 pub(crate) struct MotionAnalysis;
 
-impl Format for MotionAnalysis {
+impl FileFormat for MotionAnalysis {
     fn name(&self) -> &'static str {
         "motion-analysis-2d"
     }
@@ -30,31 +30,35 @@ impl Format for MotionAnalysis {
             .then(|| format!("line {} names frame_no, time and points as NAME-x and NAME-y", row.line))
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let row = table
             .head
             .first()
             .filter(|row| row.texts().starts_with(&CLOCK))
-            .ok_or_else(|| no_header(table))?;
-        let names: Vec<&str> = row.texts().into_iter().take(row.filled()).collect();
+            .ok_or_else(|| no_header_error(table))?;
+        let names: Vec<&str> = row.texts().into_iter().take(row.used_width()).collect();
         let is_angle = |name: &&str| ANGLES.iter().any(|end| name.ends_with(end));
         let angles = names.iter().position(is_angle).unwrap_or(names.len());
-        let points = points(table, row, &names[..angles])?;
+        let points = point_columns(table, row, &names[..angles])?;
         if points.is_empty() {
-            return Err(no_points(table, row));
+            return Err(no_points_error(table, row));
         }
         let several = points.len() > 2;
-        let layout = Layout {
+        let layout = TableLayout {
             start: 1,
             width: names.len(),
             most: names.len(),
             frame: Some(0),
             time: Some(1),
             points,
-            ..Layout::default()
+            ..TableLayout::default()
         };
-        let mut export = layout.read(document, table, Facts::default())?;
+        let mut export = layout.read_tracks(document, table, Facts::default())?;
         if angles < names.len() {
             export
                 .notes
@@ -69,45 +73,49 @@ impl Format for MotionAnalysis {
     }
 }
 
-fn points(table: &Table, row: &Row, names: &[&str]) -> Result<Vec<PointCells>, ImportError> {
+fn point_columns(
+    table: &DelimitedTable,
+    row: &TextRow,
+    names: &[&str],
+) -> Result<Vec<PointCells>, ImportError> {
     let mut points = vec![];
     let mut rest = names.iter().enumerate().skip(CLOCK.len());
     while let Some((column, name)) = rest.next() {
         let track = name.strip_suffix(AXES[0]);
         let pair = rest.next().and_then(|(_, name)| name.strip_suffix(AXES[1]));
         let Some(track) = track.filter(|track| pair == Some(*track)) else {
-            return Err(unpaired(table, row, column, name));
+            return Err(unpaired_column_error(table, row, column, name));
         };
         points.push(PointCells::new(track, column, Some(column + 1)));
     }
     Ok(points)
 }
 
-fn no_header(table: &Table) -> ImportError {
+fn no_header_error(table: &DelimitedTable) -> ImportError {
     let first = table.head.first();
     ImportError::columns(
         table.file,
         first.map_or(1, |row| row.line),
         format!(
             "found `{}`, expected `frame_no`, `time` and points as NAME-x and NAME-y",
-            first.map(Row::texts).unwrap_or_default().join(" | ")
+            first.map(TextRow::texts).unwrap_or_default().join(" | ")
         ),
         "export the tracking data as CSV again, or leave --format out",
     )
 }
 
-fn no_points(table: &Table, row: &Row) -> ImportError {
+fn no_points_error(table: &DelimitedTable, row: &TextRow) -> ImportError {
     ImportError::wrong_table(
-        table.place(row.line, 1),
+        table.location(row.line, 1),
         "a table of angles alone",
         "points as NAME-x and NAME-y",
         "export with the trackers of the tip and the head",
     )
 }
 
-fn unpaired(table: &Table, row: &Row, column: usize, name: &str) -> ImportError {
+fn unpaired_column_error(table: &DelimitedTable, row: &TextRow, column: usize, name: &str) -> ImportError {
     ImportError::wrong_table(
-        table.place(row.line, table.column(row.line, column)),
+        table.location(row.line, table.text_column(row.line, column)),
         format!("the column `{name}`"),
         "columns in pairs called NAME-x and NAME-y",
         "export again without changing the columns, or name them with --columns",

@@ -3,16 +3,17 @@
 mod header;
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::options::Options;
+use crate::import::format::FileFormat;
+use crate::import::options::ImportOptions;
 use crate::import::reader::several_clocks::{self, ClockCell};
 use crate::import::reader::{
-    Document, Facts, Layout, Number, Order, PointCells, Row, Table, TimeUnit, TrackFile, Unit,
+    CellNumber, CoordinateUnit, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow,
+    TimeUnit, TrackFile,
 };
-use header::Meaning;
+use header::ColumnMeaning;
 
 /// Its name on the command line.
-pub(crate) const NAME: &str = "plain";
+pub(crate) const PLAIN_NAME: &str = "plain";
 /// Rows above the data that may hold the names.
 const HEADER_ROWS: usize = 6;
 /// What a table with doubtful names needs.
@@ -20,37 +21,41 @@ const ADVICE: &str = "say which columns are meant by their numbers (from 1): --c
      with numbers for A to E";
 
 /// Columns of the frames' numbers, and of their times with the unit.
-type Clocks = (Option<usize>, Option<(usize, TimeUnit)>);
+type ClockColumns = (Option<usize>, Option<(usize, TimeUnit)>);
 
 /// Plain tables with a telling header.
-pub(crate) struct Plain;
+pub(crate) struct PlainFormat;
 
-impl Format for Plain {
+impl FileFormat for PlainFormat {
     fn name(&self) -> &'static str {
-        NAME
+        PLAIN_NAME
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
-        let header = Header::find(document.table.as_ref().ok()?)?;
+        let header = PlainHeader::find(document.table.as_ref().ok()?)?;
         Some(format!("line {} names a clock and coordinates", header.row.line))
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
-        let header = Header::find(table).ok_or_else(|| no_header(table))?;
-        let (frame, time) = header.clock()?;
-        let points = header.points()?;
-        let unit = header.unit()?;
+        let header = PlainHeader::find(table).ok_or_else(|| no_header_error(table))?;
+        let (frame, time) = header.clock_columns()?;
+        let points = header.all_point_cells()?;
+        let unit = header.coordinate_unit()?;
         let start = header.first_data_row(table)?;
         header.compare_times(table, start)?;
         let key = if points.iter().all(|point| point.name.is_empty()) {
-            header.one(|meaning| *meaning == Meaning::Key, "names of the object of a row")?
+            header.only_column(|meaning| *meaning == ColumnMeaning::Key, "names of the object of a row")?
         } else {
             None
         };
         let key: Vec<usize> = key.into_iter().collect();
         if key == [0] {
-            table.refuse_comments(
+            table.refuse_comment_names(
                 header.row.line,
                 "the name of an object",
                 "rename it; if the line is a comment, move it above the header",
@@ -62,50 +67,57 @@ impl Format for Plain {
             }
             point
         };
-        let layout = Layout {
+        let layout = TableLayout {
             start,
-            width: header.widest(&points, [frame, time.map(|time| time.0)]),
-            most: header.row.filled(),
+            width: header.min_row_width(&points, [frame, time.map(|time| time.0)]),
+            most: header.row.used_width(),
             frame,
             time: time.map(|time| time.0),
-            order: if key.is_empty() { Order::AsWritten } else { Order::Any },
+            order: if key.is_empty() { RowOrder::AsWritten } else { RowOrder::Any },
             skip_nameless: true,
             points: points.into_iter().map(name).collect(),
             key,
-            ..Layout::default()
+            ..TableLayout::default()
         };
-        let facts = Facts { unit, time: time.map_or(TimeUnit::Usual, |time| time.1), ..Facts::default() };
-        let mut export = layout.read(document, table, facts)?;
-        export.notes.extend(header.note(&layout));
+        let facts =
+            Facts { unit, time: time.map_or(TimeUnit::AssumedSeconds, |time| time.1), ..Facts::default() };
+        let mut export = layout.read_tracks(document, table, facts)?;
+        export.notes.extend(header.column_notes(&layout));
         Ok(export)
     }
 }
 
 /// The row of names and what they mean.
-struct Header<'t> {
+struct PlainHeader<'t> {
     file: &'t str,
     index: usize,
-    row: &'t Row,
-    meanings: Vec<Meaning>,
+    row: &'t TextRow,
+    meanings: Vec<ColumnMeaning>,
     /// The row of units below the names, where there is one.
-    units: Option<&'t Row>,
+    units: Option<&'t TextRow>,
 }
 
-impl<'t> Header<'t> {
+impl<'t> PlainHeader<'t> {
     /// The first row that names a clock and a coordinate.
-    fn find(table: &'t Table) -> Option<Self> {
+    fn find(table: &'t DelimitedTable) -> Option<Self> {
         table.head.iter().take(HEADER_ROWS).enumerate().find_map(|(index, row)| {
-            let meanings: Vec<Meaning> = row.cells.iter().map(|cell| Meaning::of(cell)).collect();
-            let clock = meanings.iter().any(|meaning| matches!(meaning, Meaning::Frame | Meaning::Time(_)));
-            let coordinate = meanings.iter().any(|meaning| matches!(meaning, Meaning::Coordinate { .. }));
+            let meanings: Vec<ColumnMeaning> =
+                row.cells.iter().map(|cell| ColumnMeaning::parse(cell)).collect();
+            let clock = meanings
+                .iter()
+                .any(|meaning| matches!(meaning, ColumnMeaning::Frame | ColumnMeaning::Time(_)));
+            let coordinate =
+                meanings.iter().any(|meaning| matches!(meaning, ColumnMeaning::Coordinate { .. }));
             (clock && coordinate)
                 .then_some(Self { file: table.file, index, row, meanings, units: None }.with_units(table))
         })
     }
 
     /// Units that stand in a row of their own below the names.
-    fn with_units(mut self, table: &'t Table) -> Self {
-        let words = |row: &&Row| row.cells.iter().all(|cell| !matches!(table.number(cell), Number::Value(_)));
+    fn with_units(mut self, table: &'t DelimitedTable) -> Self {
+        let words = |row: &&TextRow| {
+            row.cells.iter().all(|cell| !matches!(table.parse_cell(cell), CellNumber::Value(_)))
+        };
         let Some(row) = table.head.get(self.index + 1).filter(words) else { return self };
         let taken = self
             .meanings
@@ -118,23 +130,31 @@ impl<'t> Header<'t> {
     }
 
     /// The columns that mean what is wanted.
-    fn all(&self, wanted: impl Fn(&Meaning) -> bool) -> Vec<usize> {
+    fn columns_where(&self, wanted: impl Fn(&ColumnMeaning) -> bool) -> Vec<usize> {
         self.meanings.iter().enumerate().filter(|(_, meaning)| wanted(meaning)).map(|(at, _)| at).collect()
     }
 
     /// The only column that means what is wanted, if any does.
-    fn one(&self, wanted: impl Fn(&Meaning) -> bool, what: &str) -> Result<Option<usize>, ImportError> {
-        let found = self.all(wanted);
-        if found.len() > 1 { Err(self.ambiguous(&found, what)) } else { Ok(found.first().copied()) }
+    fn only_column(
+        &self,
+        wanted: impl Fn(&ColumnMeaning) -> bool,
+        what: &str,
+    ) -> Result<Option<usize>, ImportError> {
+        let found = self.columns_where(wanted);
+        if found.len() > 1 { Err(self.ambiguous_error(&found, what)) } else { Ok(found.first().copied()) }
     }
 
     /// The columns of frames and of times. Times in several units are the same times, which
     /// [`Self::compare_times`] makes sure of: the first column counts.
-    fn clock(&self) -> Result<Clocks, ImportError> {
-        let frame = self.one(|meaning| *meaning == Meaning::Frame, "numbers of the frames")?;
-        let times = self.all(|meaning| matches!(meaning, Meaning::Time(_)));
+    fn clock_columns(&self) -> Result<ClockColumns, ImportError> {
+        let frame = self.only_column(|meaning| *meaning == ColumnMeaning::Frame, "numbers of the frames")?;
+        let times = self.columns_where(|meaning| matches!(meaning, ColumnMeaning::Time(_)));
         let unit = |at: usize| {
-            if let Some(Meaning::Time(unit)) = self.meanings.get(at) { *unit } else { TimeUnit::Usual }
+            if let Some(ColumnMeaning::Time(unit)) = self.meanings.get(at) {
+                *unit
+            } else {
+                TimeUnit::AssumedSeconds
+            }
         };
         let doubtful = |at: &usize| {
             times.iter().any(|other| {
@@ -142,25 +162,25 @@ impl<'t> Header<'t> {
             })
         };
         if times.iter().any(doubtful) {
-            return Err(self.ambiguous(&times, "times"));
+            return Err(self.ambiguous_error(&times, "times"));
         }
         Ok((frame, times.first().map(|&at| (at, unit(at)))))
     }
 
     /// Refuses times in several units that are not the same times.
-    fn compare_times(&self, table: &Table, start: usize) -> Result<(), ImportError> {
-        let clock = |(cell, meaning): (usize, &Meaning)| match meaning {
-            Meaning::Time(TimeUnit::Seconds(unit)) => Some(ClockCell { cell, unit: *unit }),
-            Meaning::Time(_) => Some(ClockCell { cell, unit: 1.0 }),
+    fn compare_times(&self, table: &DelimitedTable, start: usize) -> Result<(), ImportError> {
+        let clock = |(cell, meaning): (usize, &ColumnMeaning)| match meaning {
+            ColumnMeaning::Time(TimeUnit::Seconds(unit)) => Some(ClockCell { cell, unit: *unit }),
+            ColumnMeaning::Time(_) => Some(ClockCell { cell, unit: 1.0 }),
             _ => None,
         };
         let clocks: Vec<ClockCell> = self.meanings.iter().enumerate().filter_map(clock).collect();
         let [first, others @ ..] = clocks.as_slice() else { return Ok(()) };
         for other in others {
-            if let Some(found) = several_clocks::difference(table, start, *first, *other)? {
-                let place = table.place(found.line, table.column(found.line, found.cell));
+            if let Some(found) = several_clocks::find_clock_difference(table, start, *first, *other)? {
+                let place = table.location(found.line, table.text_column(found.line, found.cell));
                 let [one, two] = &found.texts;
-                let (first, other) = (self.name(first.cell), self.name(other.cell));
+                let (first, other) = (self.column_name(first.cell), self.column_name(other.cell));
                 return Err(ImportError::format(
                     place,
                     format!("`{two}` in `{other}` where `{first}` says `{one}`"),
@@ -173,77 +193,81 @@ impl<'t> Header<'t> {
     }
 
     /// Every named point with its cells.
-    fn points(&self) -> Result<Vec<PointCells>, ImportError> {
+    fn all_point_cells(&self) -> Result<Vec<PointCells>, ImportError> {
         let mut names: Vec<&str> = vec![];
         for meaning in &self.meanings {
-            if let Meaning::Coordinate { point, .. } = meaning
+            if let ColumnMeaning::Coordinate { point, .. } = meaning
                 && !names.contains(&point.as_str())
             {
                 names.push(point);
             }
         }
-        names.into_iter().map(|name| self.point(name)).collect()
+        names.into_iter().map(|name| self.point_cells(name)).collect()
     }
 
-    fn point(&self, name: &str) -> Result<PointCells, ImportError> {
+    fn point_cells(&self, name: &str) -> Result<PointCells, ImportError> {
         let called = if name.is_empty() { String::new() } else { format!(" of `{name}`") };
         let axis = |wanted: usize, letter: &str| {
-            let is = |meaning: &Meaning| match meaning {
-                Meaning::Coordinate { point, axis, .. } => point == name && *axis == wanted,
+            let is = |meaning: &ColumnMeaning| match meaning {
+                ColumnMeaning::Coordinate { point, axis, .. } => point == name && *axis == wanted,
                 _ => false,
             };
-            self.one(is, &format!("the {letter}{called}"))
+            self.only_column(is, &format!("the {letter}{called}"))
         };
         let (x, y) = (axis(0, "x")?, axis(1, "y")?);
-        let confidence = self.one(
-            |meaning| matches!(meaning, Meaning::Confidence { point } if point == name),
+        let confidence = self.only_column(
+            |meaning| matches!(meaning, ColumnMeaning::Confidence { point } if point == name),
             &format!("the confidence{called}"),
         )?;
         match x {
             Some(x) => Ok(PointCells { confidence, ..PointCells::new(name, x, y) }),
-            None => Err(self.refuse(format!("a y{called} and no x"), "both")),
+            None => Err(self.header_error(format!("a y{called} and no x"), "both")),
         }
     }
 
     /// The unit that all coordinates name.
-    fn unit(&self) -> Result<Option<(Unit, String)>, ImportError> {
-        let units: Vec<(usize, Option<Unit>)> =
-            self.meanings
-                .iter()
-                .enumerate()
-                .filter_map(|(at, meaning)| {
-                    if let Meaning::Coordinate { unit, .. } = meaning { Some((at, *unit)) } else { None }
-                })
-                .collect();
+    fn coordinate_unit(&self) -> Result<Option<(CoordinateUnit, String)>, ImportError> {
+        let units: Vec<(usize, Option<CoordinateUnit>)> = self
+            .meanings
+            .iter()
+            .enumerate()
+            .filter_map(|(at, meaning)| {
+                if let ColumnMeaning::Coordinate { unit, .. } = meaning { Some((at, *unit)) } else { None }
+            })
+            .collect();
         let Some((first, unit)) = units.first().copied() else { return Ok(None) };
         match units.iter().find(|(_, other)| *other != unit) {
-            Some((other, _)) => Err(self.ambiguous(&[first, *other], "coordinates, in different units")),
-            None => Ok(unit.map(|unit| (unit, self.says_unit(first)))),
+            Some((other, _)) => {
+                Err(self.ambiguous_error(&[first, *other], "coordinates, in different units"))
+            }
+            None => Ok(unit.map(|unit| (unit, self.unit_source(first)))),
         }
     }
 
     /// Where the unit of a column stands.
-    fn says_unit(&self, at: usize) -> String {
+    fn unit_source(&self, at: usize) -> String {
         match self
             .units
             .and_then(|row| Some((row.line, row.cells.get(at)?)))
-            .filter(|_| Meaning::of(self.name(at)) != self.meanings[at])
+            .filter(|_| ColumnMeaning::parse(self.column_name(at)) != self.meanings[at])
         {
             Some((line, unit)) => {
-                format!("line {line} gives `{unit}` for column {} (`{}`)", at + 1, self.name(at))
+                format!("line {line} gives `{unit}` for column {} (`{}`)", at + 1, self.column_name(at))
             }
-            None => format!("column {} is called `{}`", at + 1, self.name(at)),
+            None => format!("column {} is called `{}`", at + 1, self.column_name(at)),
         }
     }
 
-    fn name(&self, at: usize) -> &str {
+    fn column_name(&self, at: usize) -> &str {
         self.row.cells.get(at).map_or("", String::as_str)
     }
 
     /// The first row of numbers; a row of units may stand above it.
-    fn first_data_row(&self, table: &Table) -> Result<usize, ImportError> {
+    fn first_data_row(&self, table: &DelimitedTable) -> Result<usize, ImportError> {
         let below = self.index + 1;
-        let words = |row: &Row| row.cells.iter().all(|cell| !matches!(table.number(cell), Number::Value(_)));
+        let words = |row: &TextRow| {
+            row.cells.iter().all(|cell| !matches!(table.parse_cell(cell), CellNumber::Value(_)))
+        };
         match table.head.get(below) {
             None => Err(ImportError::HeaderOnly { file: table.file.to_owned(), line: self.row.line }),
             Some(row) if words(row) && table.head.len() > below + 1 => Ok(below + 1),
@@ -252,16 +276,20 @@ impl<'t> Header<'t> {
     }
 
     /// Cells that every row must have.
-    fn widest(&self, points: &[PointCells], clock: [Option<usize>; 2]) -> usize {
+    fn min_row_width(&self, points: &[PointCells], clock: [Option<usize>; 2]) -> usize {
         let of_points =
             points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied().chain(point.confidence));
         of_points.chain(clock.into_iter().flatten()).max().map_or(0, |last| last + 1)
     }
 
     /// Which columns were read, and which were not.
-    fn note(&self, layout: &Layout) -> Vec<String> {
-        let clock: Vec<String> =
-            layout.frame.iter().chain(&layout.time).map(|&at| format!("`{}`", self.name(at))).collect();
+    fn column_notes(&self, layout: &TableLayout) -> Vec<String> {
+        let clock: Vec<String> = layout
+            .frame
+            .iter()
+            .chain(&layout.time)
+            .map(|&at| format!("`{}`", self.column_name(at)))
+            .collect();
         let units = match self.units {
             Some(row) => format!("; line {} names the units", row.line),
             None if layout.start > self.index + 1 => {
@@ -270,9 +298,9 @@ impl<'t> Header<'t> {
             None => String::new(),
         };
         let other: Vec<&str> = self
-            .all(|meaning| *meaning == Meaning::Other)
+            .columns_where(|meaning| *meaning == ColumnMeaning::Other)
             .into_iter()
-            .map(|at| self.name(at))
+            .map(|at| self.column_name(at))
             .filter(|name| !name.is_empty())
             .collect();
         let other =
@@ -280,18 +308,18 @@ impl<'t> Header<'t> {
         vec![format!("the rows are placed by {}{units}{other}", clock.join(" and "))]
     }
 
-    fn ambiguous(&self, columns: &[usize], what: &str) -> ImportError {
+    fn ambiguous_error(&self, columns: &[usize], what: &str) -> ImportError {
         let named: Vec<String> =
-            columns.iter().map(|at| format!("{} (`{}`)", at + 1, self.name(*at))).collect();
-        self.refuse(format!("columns {} that could all be {what}", named.join(", ")), "one")
+            columns.iter().map(|at| format!("{} (`{}`)", at + 1, self.column_name(*at))).collect();
+        self.header_error(format!("columns {} that could all be {what}", named.join(", ")), "one")
     }
 
-    fn refuse(&self, found: String, expected: &str) -> ImportError {
+    fn header_error(&self, found: String, expected: &str) -> ImportError {
         ImportError::columns(self.file, self.row.line, format!("found {found}, expected {expected}"), ADVICE)
     }
 }
 
-fn no_header(table: &Table) -> ImportError {
+fn no_header_error(table: &DelimitedTable) -> ImportError {
     let row = table.head.first();
     ImportError::columns(
         table.file,
@@ -299,7 +327,7 @@ fn no_header(table: &Table) -> ImportError {
         format!(
             "found `{}` and no row that names the columns, expected a clock such as frame or time_s, and \
              coordinates such as tip_x, tip_y",
-            row.map(Row::texts).unwrap_or_default().join(" ")
+            row.map(TextRow::texts).unwrap_or_default().join(" ")
         ),
         ADVICE,
     )

@@ -2,14 +2,15 @@
 
 mod columns;
 
-use crate::import::error::{ImportError, Place};
-use crate::import::format::Format;
-use crate::import::options::Options;
-use crate::import::reader::picked::picked;
+use crate::import::error::{ImportError, TextLocation};
+use crate::import::format::FileFormat;
+use crate::import::options::ImportOptions;
+use crate::import::reader::picked::picked_frames_finding;
 use crate::import::reader::{
-    Collector, Document, Facts, Order, Position, Record, Stamp, Table, Track, TrackFile,
+    DelimitedTable, Document, Facts, RowOrder, RowPosition, RowStamp, RowView, Track, TrackCollector,
+    TrackFile,
 };
-use columns::{Columns, FRAME, Slot, Whose};
+use columns::{FRAME, InstanceColumns, SleapColumns, TrackSource};
 
 /// Between track and node in the key of a row of one point: no name has it.
 const SEPARATOR: char = '\u{1f}';
@@ -19,7 +20,7 @@ const TRACK_FIRST: &str = "give every instance a track of its own in SLEAP (run 
 /// Tables of SLEAP and sleap-io; sleap-io's table in DeepLabCut's layout is DeepLabCut's.
 pub(crate) struct Sleap;
 
-impl Format for Sleap {
+impl FileFormat for Sleap {
     fn name(&self) -> &'static str {
         "sleap"
     }
@@ -33,28 +34,33 @@ impl Format for Sleap {
             .then(|| format!("line {} names `{FRAME}` and coordinates of nodes as SLEAP does", row.line))
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
         let header =
             table.head.first().ok_or_else(|| ImportError::Empty { file: document.file.to_owned() })?;
-        let columns = Columns::find(table, header)?;
-        table.refuse_comments(header.line, "a track or video", "rename it in SLEAP and export again")?;
-        let mut collector = Collector::new(columns.shape());
+        let columns = SleapColumns::find(table, header)?;
+        table.refuse_comment_names(header.line, "a track or video", "rename it in SLEAP and export again")?;
+        let mut collector = TrackCollector::new(columns.instance_shape());
         let mut video: Option<String> = None;
         let mut rows = table.rows(1);
-        while let Some(record) = rows.next()? {
+        while let Some(record) = rows.next_row()? {
             if !record.is_empty() {
-                columns.check(table, &record, &mut video)?;
+                columns.check_row(table, &record, &mut video)?;
                 for slot in &columns.slots {
                     read_instance(table, &record, &columns, slot, &mut collector)?;
                 }
             }
         }
-        let (clocks, mut tracks) = collector.finish(document.file, Order::Any).map_err(twice)?;
+        let (clocks, mut tracks) =
+            collector.finish(document.file, RowOrder::Any).map_err(duplicate_instance_error)?;
         match (columns.node, columns.slots.as_slice(), tracks.as_mut_slice()) {
             (Some(_), ..) => name_by_node(&mut tracks),
             // the only node of the only instance is called by what it is
-            (None, [Slot { nodes, .. }], [track]) if nodes.len() == 1 => {
+            (None, [InstanceColumns { nodes, .. }], [track]) if nodes.len() == 1 => {
                 track.name.clone_from(&nodes[0].name)
             }
             _ => {}
@@ -62,13 +68,16 @@ impl Format for Sleap {
         // (a table of labels looks like one of predictions)
         let longest = clocks.iter().max_by_key(|clock| clock.len());
         Ok(TrackFile {
-            findings: longest.and_then(|clock| picked(document.file, clock)).into_iter().collect(),
+            findings: longest
+                .and_then(|clock| picked_frames_finding(document.file, clock))
+                .into_iter()
+                .collect(),
             clocks,
             tracks,
             texts: header.cells.clone(),
             facts: facts(),
             table: Some(table),
-            ..TrackFile::of(document)
+            ..TrackFile::for_document(document)
         })
     }
 }
@@ -79,28 +88,28 @@ fn facts() -> Facts {
 
 /// An instance of a row; one that has neither a track nor a position only fills the row.
 fn read_instance(
-    table: &Table,
-    record: &Record,
-    columns: &Columns,
-    slot: &Slot,
-    collector: &mut Collector,
+    table: &DelimitedTable,
+    record: &RowView,
+    columns: &SleapColumns,
+    slot: &InstanceColumns,
+    collector: &mut TrackCollector,
 ) -> Result<(), ImportError> {
     let number =
-        |cell: Option<usize>, name: &str| cell.map_or(Ok(None), |cell| table.value(record, cell, name));
+        |cell: Option<usize>, name: &str| cell.map_or(Ok(None), |cell| table.number_at(record, cell, name));
     let coordinate = |cell: usize, axis: &str, cells: &columns::NodeCells| {
         // (its name is put together only for a refusal)
         let named = |_| {
-            table.not_a_number(
+            table.not_a_number_error(
                 record.line,
                 cell,
                 record.cell(cell),
                 format!("{}.{axis}", cells.name).trim_start_matches('.'),
             )
         };
-        table.value(record, cell, axis).map_err(named)
+        table.number_at(record, cell, axis).map_err(named)
     };
-    let position = |cells: &columns::NodeCells| -> Result<Position, ImportError> {
-        Ok(Position {
+    let position = |cells: &columns::NodeCells| -> Result<RowPosition, ImportError> {
+        Ok(RowPosition {
             x: coordinate(cells.x, "x", cells)?,
             y: coordinate(cells.y, "y", cells)?,
             confidence: number(cells.score, "score")?,
@@ -108,25 +117,25 @@ fn read_instance(
     };
     let positions = slot.nodes.iter().map(position).collect::<Result<Vec<_>, _>>()?;
     let track = match &slot.whose {
-        Whose::Cell(cell) => record.cell(*cell),
-        Whose::Name(name) => name,
-        Whose::Nobody => "",
+        TrackSource::Cell(cell) => record.cell(*cell),
+        TrackSource::Name(name) => name,
+        TrackSource::Nobody => "",
     };
     if track.is_empty() && positions.iter().all(|position| position.x.is_none() && position.y.is_none()) {
         return Ok(());
     }
     if track.is_empty() && columns.slots.len() > 1 {
-        return Err(untracked(
-            table.place(record.line, 1).to_string(),
+        return Err(untracked_error(
+            table.location(record.line, 1).to_string(),
             "an instance without a track in a frame with others".to_owned(),
         ));
     }
     let key = columns
         .node
         .map_or_else(|| track.to_owned(), |node| format!("{track}{SEPARATOR}{}", record.cell(node)));
-    collector.push(
+    collector.add_row(
         &key,
-        Stamp { line: record.line, frame: number(Some(columns.frame), FRAME)?, time: None },
+        RowStamp { line: record.line, frame: number(Some(columns.frame), FRAME)?, time: None },
         &positions,
     );
     Ok(())
@@ -152,8 +161,10 @@ fn name_by_node(tracks: &mut [Track]) {
 }
 
 /// Two instances of one track, or of none, in one frame: which of them is which nobody can tell.
-fn twice(error: ImportError) -> ImportError {
-    let ImportError::Twice { place: Place { file, line, column }, found, track, first, .. } = error else {
+fn duplicate_instance_error(error: ImportError) -> ImportError {
+    let ImportError::DuplicateRow { place: TextLocation { file, line, column }, found, track, first, .. } =
+        error
+    else {
         return error;
     };
     let name = track.trim_matches(SEPARATOR).replace(SEPARATOR, ":");
@@ -162,12 +173,12 @@ fn twice(error: ImportError) -> ImportError {
     } else {
         format!("`{name}`")
     };
-    untracked(
-        Place { file, line, column }.to_string(),
+    untracked_error(
+        TextLocation { file, line, column }.to_string(),
         format!("frame {found} of {whose} a second time (first in line {first})"),
     )
 }
 
-fn untracked(place: String, found: String) -> ImportError {
+fn untracked_error(place: String, found: String) -> ImportError {
     ImportError::wrong_table(place, found, "one instance of a track in a frame", TRACK_FIRST)
 }

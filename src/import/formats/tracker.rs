@@ -4,10 +4,10 @@
 mod clocks;
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::options::Options;
+use crate::import::format::FileFormat;
+use crate::import::options::ImportOptions;
 use crate::import::reader::several_clocks;
-use crate::import::reader::{Document, Facts, Layout, PointCells, Row, Table, TrackFile};
+use crate::import::reader::{DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow, TrackFile};
 
 /// Rows above the data that may hold names.
 const HEADER_ROWS: usize = 6;
@@ -21,16 +21,16 @@ const TIME: &str = "t";
 const FRAME: &str = "frame";
 
 /// Tracker's tables.
-pub(crate) struct Tracker;
+pub(crate) struct TrackerFormat;
 
-impl Format for Tracker {
+impl FileFormat for TrackerFormat {
     fn name(&self) -> &'static str {
         "tracker"
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
         let table = document.table.as_ref().ok()?;
-        let row = table.head.get(header(table)?)?;
+        let row = table.head.get(find_header(table)?)?;
         if table.multi {
             return Some(format!("line 1 is `#multi:` and line {} names t, x and y", row.line));
         }
@@ -45,33 +45,48 @@ impl Format for Tracker {
         names.contains(&TIME).then(|| format!("line {} names {names_of}", row.line))
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
-        let header = header(table).ok_or_else(|| no_header(table))?;
+        let header = find_header(table).ok_or_else(|| no_header_error(table))?;
         let row = &table.head[header];
         let columns = row.texts();
-        let titles =
-            header.checked_sub(1).and_then(|above| table.head.get(above)).map(Row::texts).unwrap_or_default();
+        let titles = header
+            .checked_sub(1)
+            .and_then(|above| table.head.get(above))
+            .map(TextRow::texts)
+            .unwrap_or_default();
         let pair = if columns.contains(&WORLD[0]) { WORLD } else { IMAGE };
-        let mut points = points(&columns, &titles, pair);
+        let mut points = find_points(&columns, &titles, pair);
         if points.is_empty() {
-            return Err(no_positions(table, row, &columns));
+            return Err(no_positions_error(table, row, &columns));
         }
-        let notes = name_unnamed(&mut points, document.stem);
+        let notes = name_unnamed_points(&mut points, document.stem);
         let at = |name: &str| columns.iter().position(|column| *column == name);
         // (speeds behind the positions are blank at the ends of a track, and editors cut blanks off)
         let layout = |time: Option<usize>, frame: Option<usize>, points: Vec<PointCells>| {
             let cells = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
             let width = cells.chain(time).chain(frame).max().map_or(0, |last| last + 1);
-            Layout { start: header + 1, width, most: row.filled(), frame, time, points, ..Layout::default() }
+            TableLayout {
+                start: header + 1,
+                width,
+                most: row.used_width(),
+                frame,
+                time,
+                points,
+                ..TableLayout::default()
+            }
         };
-        let mut export = if clocks::are_one(table, header + 1, &columns)? {
-            layout(at(TIME), at(FRAME), points).read(document, table, facts(pair))?
+        let mut export = if clocks::clocks_agree(table, header + 1, &columns)? {
+            layout(at(TIME), at(FRAME), points).read_tracks(document, table, facts(pair))?
         } else {
-            let groups = clocks::groups(table, row, &columns, &titles, points)?;
+            let groups = clocks::group_by_clock(table, row, &columns, &titles, points)?;
             let layouts =
                 groups.into_iter().map(|group| layout(group.time, group.frame, group.points)).collect();
-            several_clocks::read_apart(layouts, document, table, facts(pair))?
+            several_clocks::read_clocks_apart(layouts, document, table, facts(pair))?
         };
         export.notes.extend(notes);
         Ok(export)
@@ -93,8 +108,8 @@ fn facts(pair: [&str; 2]) -> Facts {
 }
 
 /// Index of the row of column names.
-fn header(table: &Table) -> Option<usize> {
-    let is_header = |row: &Row| {
+fn find_header(table: &DelimitedTable) -> Option<usize> {
+    let is_header = |row: &TextRow| {
         let names = row.texts();
         (names.contains(&TIME) || names.contains(&FRAME))
             && !names.iter().any(|name| name.parse::<f64>().is_ok())
@@ -103,14 +118,14 @@ fn header(table: &Table) -> Option<usize> {
 }
 
 /// Whether the first row is the name of a track and nothing else.
-fn has_title(table: &Table) -> bool {
+fn has_title(table: &DelimitedTable) -> bool {
     let names =
-        |row: &Row| row.cells.len() > 1 && row.cells.iter().filter(|cell| !cell.is_empty()).count() == 1;
-    header(table) == Some(1) && table.head.first().is_some_and(names)
+        |row: &TextRow| row.cells.len() > 1 && row.cells.iter().filter(|cell| !cell.is_empty()).count() == 1;
+    find_header(table) == Some(1) && table.head.first().is_some_and(names)
 }
 
-fn no_header(table: &Table) -> ImportError {
-    let found = table.head.first().map(Row::texts).unwrap_or_default();
+fn no_header_error(table: &DelimitedTable) -> ImportError {
+    let found = table.head.first().map(TextRow::texts).unwrap_or_default();
     ImportError::columns(
         table.file,
         table.head.first().map_or(1, |row| row.line),
@@ -125,13 +140,13 @@ fn no_header(table: &Table) -> ImportError {
 }
 
 /// The title of a column: above it or to its left, with where it stands.
-fn title_of<'t>(titles: &[&'t str], column: usize) -> Option<(usize, &'t str)> {
+fn find_title<'t>(titles: &[&'t str], column: usize) -> Option<(usize, &'t str)> {
     titles.iter().take(column + 1).rposition(|title| !title.is_empty()).map(|at| (at, titles[at]))
 }
 
 /// A track is an x and the next y before another x; its title stands above it or to its left.
-fn points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -> Vec<PointCells> {
-    let title_of = |column: usize| title_of(titles, column);
+fn find_points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -> Vec<PointCells> {
+    let title_of = |column: usize| find_title(titles, column);
     let (mut points, mut seen) = (vec![], vec![]);
     for (x, _) in columns.iter().enumerate().filter(|(_, name)| **name == x_name) {
         let title = title_of(x);
@@ -154,7 +169,7 @@ fn points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -> Vec
 }
 
 /// Without a row of titles a single track takes the name of its file, several are numbered; says so.
-fn name_unnamed(points: &mut [PointCells], stem: &str) -> Vec<String> {
+fn name_unnamed_points(points: &mut [PointCells], stem: &str) -> Vec<String> {
     let several = points.len() > 1;
     let unnamed = points.iter_mut().enumerate().filter(|(_, point)| point.name.is_empty());
     let name = |(index, point): (usize, &mut PointCells)| {
@@ -164,7 +179,7 @@ fn name_unnamed(points: &mut [PointCells], stem: &str) -> Vec<String> {
     unnamed.map(name).collect()
 }
 
-fn no_positions(table: &Table, row: &Row, columns: &[&str]) -> ImportError {
+fn no_positions_error(table: &DelimitedTable, row: &TextRow, columns: &[&str]) -> ImportError {
     let momentum = MOMENTUM.iter().any(|name| columns.contains(name));
     let remedy = "export again with the columns t, x and y selected";
     let other =

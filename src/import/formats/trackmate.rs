@@ -7,37 +7,41 @@ mod tracks;
 mod xml;
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::options::Options;
+use crate::import::format::FileFormat;
+use crate::import::options::ImportOptions;
 use crate::import::reader::{Document, TrackFile};
 
 /// TrackMate's tables and files.
 pub(crate) struct TrackMate;
 
-impl Format for TrackMate {
+impl FileFormat for TrackMate {
     fn name(&self) -> &'static str {
         "trackmate"
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
-        match root(document) {
+        match root_element(document) {
             Some(root) => Some(format!("the root element is <{root}>")),
-            None => spots::recognises(document.table.as_ref().ok()?),
+            None => spots::recognise_spots(document.table.as_ref().ok()?),
         }
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, options: &Options) -> Result<TrackFile<'a>, ImportError> {
-        let found = match root(document) {
-            Some(simple::ROOT) => simple::read(document)?,
-            Some(_) => project::read(document)?,
-            None => spots::read(document)?,
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError> {
+        let found = match root_element(document) {
+            Some(simple::SIMPLE_ROOT) => simple::read_simple_tracks(document)?,
+            Some(_) => project::read_project(document)?,
+            None => spots::read_spot_table(document)?,
         };
-        found.export(document, options)
+        found.into_track_file(document, options)
     }
 }
 
 /// The name of the root element, where it is one of TrackMate's.
-fn root(document: &Document) -> Option<&'static str> {
-    let element = xml::Xml::root(document)?;
-    [simple::ROOT, project::ROOT].into_iter().find(|known| element == *known)
+fn root_element(document: &Document) -> Option<&'static str> {
+    let element = xml::XmlReader::root_name(document)?;
+    [simple::SIMPLE_ROOT, project::PROJECT_ROOT].into_iter().find(|known| element == *known)
 }

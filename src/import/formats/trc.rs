@@ -2,11 +2,12 @@
 //! columns each.
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::options::Options;
+use crate::import::format::FileFormat;
+use crate::import::options::ImportOptions;
 use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::reader::{
-    Column, Document, Facts, Layout, Number, PointCells, Row, Table, TimeUnit, TrackFile, Unit, finding,
+    CellNumber, Column, CoordinateUnit, DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow,
+    TimeUnit, TrackFile, new_finding,
 };
 use crate::recording::quality::{Check, Severity};
 
@@ -23,7 +24,7 @@ const LONG_UNITS: [(&str, &str); 4] =
 /// TRC files.
 pub(crate) struct Trc;
 
-impl Format for Trc {
+impl FileFormat for Trc {
     fn name(&self) -> &'static str {
         "trc"
     }
@@ -37,42 +38,53 @@ impl Format for Trc {
             .then(|| format!("line {} starts with {MAGIC}", first.line))
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError> {
         let table = document.table()?;
-        let settings = Settings::read(table)?;
-        let (start, points) = settings.markers(table)?;
+        let settings = TrcSettings::read(table)?;
+        let (start, points) = settings.marker_columns(table)?;
         let width = CLOCK_CELLS + AXES * points.len();
-        let layout =
-            Layout { start, width, most: width, frame: Some(0), time: Some(1), points, ..Layout::default() };
-        let mut export = layout.read(document, table, settings.facts())?;
-        settings.agree(&export)?;
+        let layout = TableLayout {
+            start,
+            width,
+            most: width,
+            frame: Some(0),
+            time: Some(1),
+            points,
+            ..TableLayout::default()
+        };
+        let mut export = layout.read_tracks(document, table, settings.facts())?;
+        settings.check_rows(&export)?;
         export.notes.push(
             "x and y of the markers are taken and z is left out; for another plane number the columns, e.g. \
              --columns frame=1,tip-x=3,tip-y=5"
                 .to_owned(),
         );
-        export.findings.extend(settings.resampled());
+        export.findings.extend(settings.resampling_finding());
         Ok(export)
     }
 }
 
 /// Lines 2 and 3: names and values.
-struct Settings<'t> {
-    table: &'t Table<'t>,
-    names: &'t Row,
-    values: &'t Row,
+struct TrcSettings<'t> {
+    table: &'t DelimitedTable<'t>,
+    names: &'t TextRow,
+    values: &'t TextRow,
     /// Row of the head with the names of the markers.
     markers: usize,
 }
 
-impl<'t> Settings<'t> {
-    fn read(table: &'t Table<'t>) -> Result<Self, ImportError> {
+impl<'t> TrcSettings<'t> {
+    fn read(table: &'t DelimitedTable<'t>) -> Result<Self, ImportError> {
         let at = table.head.iter().position(|row| row.cells.iter().any(|cell| cell == "DataRate"));
         let found = at.and_then(|at| Some((at + 2, table.head.get(at)?, table.head.get(at + 1)?)));
         let Some((markers, names, values)) = found else {
             let found = "no line of settings with DataRate".to_owned();
-            return Err(wrong(
-                table.place(2, 1).to_string(),
+            return Err(settings_error(
+                table.location(2, 1).to_string(),
                 found,
                 "DataRate, CameraRate, NumFrames, NumMarkers and Units in line 2",
             ));
@@ -81,19 +93,22 @@ impl<'t> Settings<'t> {
     }
 
     /// Text and place of a setting.
-    fn text(&self, name: &str) -> Option<(&'t str, String)> {
+    fn setting(&self, name: &str) -> Option<(&'t str, String)> {
         let at = self.names.cells.iter().position(|cell| cell == name)?;
         let text = self.values.cells.get(at).filter(|text| !text.is_empty())?;
-        Some((text, self.table.place(self.values.line, self.table.column(self.values.line, at)).to_string()))
+        Some((
+            text,
+            self.table.location(self.values.line, self.table.text_column(self.values.line, at)).to_string(),
+        ))
     }
 
     /// A number above 0.
-    fn number(&self, name: &str) -> Result<(f64, String), ImportError> {
+    fn positive_setting(&self, name: &str) -> Result<(f64, String), ImportError> {
         let (text, place) =
-            self.text(name).unwrap_or_else(|| ("", self.table.place(self.values.line, 1).to_string()));
-        match self.table.number(text) {
-            Number::Value(value) if value > 0.0 => Ok((value, place)),
-            _ => Err(wrong(
+            self.setting(name).unwrap_or_else(|| ("", self.table.location(self.values.line, 1).to_string()));
+        match self.table.parse_cell(text) {
+            CellNumber::Value(value) if value > 0.0 => Ok((value, place)),
+            _ => Err(settings_error(
                 place,
                 format!("{name} `{}`", text.chars().take(40).collect::<String>()),
                 "a number above 0",
@@ -102,14 +117,14 @@ impl<'t> Settings<'t> {
     }
 
     /// First row of data, and the cells of every marker.
-    fn markers(&self, table: &Table) -> Result<(usize, Vec<PointCells>), ImportError> {
+    fn marker_columns(&self, table: &DelimitedTable) -> Result<(usize, Vec<PointCells>), ImportError> {
         let row = table.head.get(self.markers);
         let line = row.map_or(self.values.line, |row| row.line);
-        let texts = row.map(Row::texts).unwrap_or_default();
+        let texts = row.map(TextRow::texts).unwrap_or_default();
         if !texts.first().is_some_and(|name| name.to_lowercase().starts_with("frame")) {
             let found = format!("`{}`", texts.join(" ").chars().take(60).collect::<String>());
-            return Err(wrong(
-                table.place(line, 1).to_string(),
+            return Err(settings_error(
+                table.location(line, 1).to_string(),
                 found,
                 "Frame#, Time and the names of the markers",
             ));
@@ -122,22 +137,22 @@ impl<'t> Settings<'t> {
             .find(|(index, (at, _))| *at != CLOCK_CELLS + AXES * index)
             .map(|(_, marker)| marker)
         {
-            let place = table.place(line, table.column(line, *at)).to_string();
-            return Err(wrong(
+            let place = table.location(line, table.text_column(line, *at)).to_string();
+            return Err(settings_error(
                 place,
                 format!("the marker `{name}` in column {}", at + 1),
                 "a marker over every third column from the third on",
             ));
         }
-        let (count, place) = self.number("NumMarkers")?;
+        let (count, place) = self.positive_setting("NumMarkers")?;
         if count != names.len() as f64 {
-            return Err(wrong(
+            return Err(settings_error(
                 place,
                 format!("NumMarkers {count}, but {} names in line {line}", names.len()),
                 "as many as there are markers",
             ));
         }
-        let start = table.first_numeric(self.markers + 1, &[0]);
+        let start = table.first_numeric_row(self.markers + 1, &[0]);
         let Some(start) = start else {
             return Err(ImportError::HeaderOnly { file: table.file.to_owned(), line });
         };
@@ -145,30 +160,30 @@ impl<'t> Settings<'t> {
     }
 
     fn facts(&self) -> Facts {
-        let unit = self.text("Units").and_then(|(text, place)| {
+        let unit = self.setting("Units").and_then(|(text, place)| {
             let long = text.to_lowercase();
             let short = LONG_UNITS.iter().find(|unit| unit.0 == long).map_or(text, |unit| unit.1);
-            Some((Unit::named(short)?, format!("{place} says Units {text}")))
+            Some((CoordinateUnit::parse(short)?, format!("{place} says Units {text}")))
         });
-        let camera = self.number("CameraRate").or_else(|_| self.number("DataRate")).ok();
+        let camera = self.positive_setting("CameraRate").or_else(|_| self.positive_setting("DataRate")).ok();
         // a camera's rate is that of the rows only where nothing was resampled
-        let rows = self.number("DataRate").ok();
+        let rows = self.positive_setting("DataRate").ok();
         let frame_rate_hz = rows.or(camera).map(|(rate, place)| (rate, format!("the settings in {place}")));
         Facts { unit, frame_rate_hz, time: TimeUnit::Seconds(1.0), ..Facts::default() }
     }
 
     /// What the settings say of the rows must be true of them.
-    fn agree(&self, export: &TrackFile) -> Result<(), ImportError> {
+    fn check_rows(&self, export: &TrackFile) -> Result<(), ImportError> {
         let Some(clock) = export.clocks.first() else { return Ok(()) };
-        let (frames, place) = self.number("NumFrames")?;
+        let (frames, place) = self.positive_setting("NumFrames")?;
         if frames != clock.len() as f64 {
-            return Err(wrong(
+            return Err(settings_error(
                 place,
                 format!("NumFrames {frames}, but {} rows", clock.len()),
                 "as many rows as frames: the file was cut or joined",
             ));
         }
-        let (rate_hz, place) = self.number("DataRate")?;
+        let (rate_hz, place) = self.positive_setting("DataRate")?;
         let span = |column: &Column| Some(column.get(clock.len().checked_sub(1)?)? - column.get(0)?);
         let implied_hz = clock
             .frame
@@ -177,7 +192,7 @@ impl<'t> Settings<'t> {
             .zip(clock.time.as_ref().and_then(span))
             .map(|(frames, seconds)| frames / seconds);
         match implied_hz.filter(|rate| rate.is_finite() && (rate / rate_hz - 1.0).abs() > RATE_AGREEMENT) {
-            Some(implied) => Err(wrong(
+            Some(implied) => Err(settings_error(
                 place,
                 format!("DataRate {rate_hz}, but times that imply {implied:.6} frames/s"),
                 "one rate",
@@ -187,9 +202,9 @@ impl<'t> Settings<'t> {
     }
 
     /// Rows at another rate than the camera's.
-    fn resampled(&self) -> Option<crate::recording::quality::Finding> {
-        let (camera_hz, place) = self.number("CameraRate").ok()?;
-        let (rate_hz, _) = self.number("DataRate").ok()?;
+    fn resampling_finding(&self) -> Option<crate::recording::quality::QualityFinding> {
+        let (camera_hz, place) = self.positive_setting("CameraRate").ok()?;
+        let (rate_hz, _) = self.positive_setting("DataRate").ok()?;
         let found = format!(
             "{place}: the camera ran at {camera_hz} frames/s, but the rows are {rate_hz} a second: they were \
              resampled"
@@ -197,11 +212,11 @@ impl<'t> Settings<'t> {
         let advice =
             "export the rows as they were recorded: resampling filters or folds what lies above its rate";
         ((camera_hz / rate_hz - 1.0).abs() > RATE_AGREEMENT)
-            .then(|| finding(Check::Resampled, Severity::Caution, (camera_hz, "1/s"), found, advice))
+            .then(|| new_finding(Check::Resampled, Severity::Caution, (camera_hz, "1/s"), found, advice))
     }
 }
 
-fn wrong(place: String, found: String, expected: &str) -> ImportError {
+fn settings_error(place: String, found: String, expected: &str) -> ImportError {
     let advice =
         "export the TRC file again from the program that tracked the markers, or number the columns \
         with --columns"

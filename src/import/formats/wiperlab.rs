@@ -1,15 +1,15 @@
 //! This program's own `trace.csv`: metres, seconds, y upwards; read back to the bit.
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::options::Options;
-use crate::import::reader::{Clock, Column, Document, Facts, TimeUnit, Track, TrackFile, Unit};
+use crate::import::format::FileFormat;
+use crate::import::options::ImportOptions;
+use crate::import::reader::{Clock, Column, CoordinateUnit, Document, Facts, TimeUnit, Track, TrackFile};
 use crate::recording::files::{HEADER, YAxis, parse_trace_csv};
 
 /// The format of recordings.
 pub(crate) struct Wiperlab;
 
-impl Format for Wiperlab {
+impl FileFormat for Wiperlab {
     fn name(&self) -> &'static str {
         "wiperlab"
     }
@@ -19,7 +19,11 @@ impl Format for Wiperlab {
         first.starts_with(HEADER).then(|| "line 1 is the header of a trace.csv".to_owned())
     }
 
-    fn read<'a>(&self, document: &'a Document<'a>, _options: &Options) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        _options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError> {
         let (grid, traces) = parse_trace_csv(document.file, document.text)?;
         let column = |values: Vec<Option<f64>>| values.into_iter().collect::<Column>();
         let track = |name: &str, x, y, confidence: Option<Vec<Option<f64>>>| Track {
@@ -44,7 +48,7 @@ impl Format for Wiperlab {
             ],
             facts: Facts {
                 y_axis: Some((YAxis::Up, why())),
-                unit: Some((Unit::Metres(1.0), why())),
+                unit: Some((CoordinateUnit::Metres(1.0), why())),
                 frame_rate_hz: Some((
                     grid.frame_rate_hz,
                     "the column time_s of a trace.csv, which holds times of the recording itself".to_owned(),
@@ -56,7 +60,7 @@ impl Format for Wiperlab {
                 "whether a camera took it stands in its recording.toml, not here: give --twin if none did"
                     .to_owned(),
             ],
-            ..TrackFile::of(document)
+            ..TrackFile::for_document(document)
         })
     }
 }

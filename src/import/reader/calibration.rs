@@ -2,11 +2,11 @@
 //! or the file does, or the documentation of its format; otherwise it is asked for.
 
 use crate::import::error::ImportError;
-use crate::import::options::{Options, Scale, TimeColumn};
+use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
 use crate::import::outcome::ImportReport;
-use crate::import::reader::rounding::{RATE_AGREEMENT, explains};
+use crate::import::reader::rounding::{RATE_AGREEMENT, times_fit_rate};
 use crate::import::reader::track_file::TrackFile;
-use crate::import::reader::units::{TimeUnit, Unit};
+use crate::import::reader::units::{CoordinateUnit, TimeUnit};
 use crate::import::reader::{findings, track_choice};
 use crate::recording::clock;
 use crate::recording::files::YAxis;
@@ -20,9 +20,9 @@ const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were tur
 
 /// What an import cannot do without.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Calibration {
+pub(crate) struct ImportCalibration {
     pub rate_hz: f64,
-    pub scale: Scale,
+    pub scale: CoordinateScale,
     pub y_axis: YAxis,
     /// Exposure of a frame, s.
     pub exposure_s: Option<f64>,
@@ -32,35 +32,35 @@ pub(crate) struct Calibration {
 /// at once, with what the files suggest.
 pub(crate) fn calibrate(
     exports: &mut [TrackFile],
-    options: &Options,
+    options: &ImportOptions,
     report: &mut ImportReport,
-) -> Result<Calibration, ImportError> {
+) -> Result<ImportCalibration, ImportError> {
     let mut missing = vec![];
-    if !exports.iter_mut().all(|export| in_seconds(export, options.time)) {
+    if !exports.iter_mut().all(|export| convert_times(export, options.time)) {
         missing.push(ASK_TIME.to_owned());
     }
-    let rate_hz = rate(exports, options, report)?;
+    let rate_hz = frame_rate_hz(exports, options, report)?;
     if rate_hz.is_none() {
         missing.push(ask_rate(exports));
     }
-    let scale = scale(exports, options, report);
+    let scale = coordinate_scale(exports, options, report);
     if scale.is_none() {
         missing.push(ask_scale(exports));
     }
-    let y_axis = y_axis(exports, options, report);
+    let y_axis = y_direction(exports, options, report);
     if y_axis.is_none() {
         let open = exports.iter().find_map(|export| export.facts.y_axis_open).unwrap_or(Y_AXIS_OPEN);
         missing.push(format!("--y-axis up|down    {open}"));
     }
     if let (Some(rate_hz), Some(scale), Some(y_axis), true) = (rate_hz, scale, y_axis, missing.is_empty()) {
         let exposure_s = exposure_s(exports, options, report)?;
-        return Ok(Calibration { rate_hz, scale, y_axis, exposure_s });
+        return Ok(ImportCalibration { rate_hz, scale, y_axis, exposure_s });
     }
-    if let Err(ImportError::Point { advice, .. }) = track_choice::choose(exports, options) {
+    if let Err(ImportError::Point { advice, .. }) = track_choice::choose_tracks(exports, options) {
         missing.push(format!("--point tip=NAME --point head=NAME   which tracks are meant; {advice}"));
     }
     let files = exports.iter().map(|export| export.file).collect::<Vec<_>>().join(", ");
-    Err(ImportError::Unset { files, format: report.format.clone(), missing })
+    Err(ImportError::MissingOptions { files, format: report.format.clone(), missing })
 }
 
 /// What is asked for where the unit of the times is not known.
@@ -97,7 +97,7 @@ fn ask_scale(exports: &[TrackFile]) -> String {
 
 /// Times into seconds, or into frames where `declared` says that they count them; false where their unit is
 /// not known.
-fn in_seconds(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
+fn convert_times(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
     let numbered = export.clocks.iter().all(|clock| clock.frame.is_some());
     let factor = match (declared, export.facts.time) {
         (Some(TimeColumn::Frames), _) => {
@@ -110,7 +110,7 @@ fn in_seconds(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
         }
         (Some(TimeColumn::Milliseconds), _) => 1e-3,
         (_, TimeUnit::Seconds(seconds)) => seconds,
-        (Some(TimeColumn::Real | TimeColumn::Playback), _) | (None, TimeUnit::Usual) => 1.0,
+        (Some(TimeColumn::Real | TimeColumn::Playback), _) | (None, TimeUnit::AssumedSeconds) => 1.0,
         (None, TimeUnit::Unknown) => {
             export
                 .clocks
@@ -131,9 +131,9 @@ fn in_seconds(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
 }
 
 /// The declared rate, or that of the camera's record, or that of times which are declared to be real.
-fn rate(
+fn frame_rate_hz(
     exports: &[TrackFile],
-    options: &Options,
+    options: &ImportOptions,
     report: &mut ImportReport,
 ) -> Result<Option<f64>, ImportError> {
     let records: Vec<&(f64, String)> =
@@ -143,7 +143,7 @@ fn rate(
         let disagrees = |rate_hz: f64| (rate_hz / declared_hz - 1.0).abs() > RATE_AGREEMENT;
         if let Some((recorded_hz, record)) = records.iter().find(|record| disagrees(record.0)) {
             let (recorded_hz, record) = (*recorded_hz, record.clone());
-            return Err(ImportError::RateRecord { declared_hz, record, recorded_hz });
+            return Err(ImportError::RecordedRateMismatch { declared_hz, record, recorded_hz });
         }
         if options.frame_rate_hz.is_none() {
             let note = |(rate, record): &&(f64, String)| format!("recording rate {rate} frames/s: {record}");
@@ -155,7 +155,7 @@ fn rate(
         return Ok(None);
     }
     let implied = exports.iter().find_map(implied_hz);
-    report.findings.extend(implied.filter(|hz| *hz <= SLOWEST_HZ).map(findings::counted_frames));
+    report.findings.extend(implied.filter(|hz| *hz <= SLOWEST_HZ).map(findings::counted_frames_finding));
     report.notes.extend(implied.map(|hz| {
         format!(
             "recording rate {hz} frames/s: from the times, which --time declares to be the recording's own"
@@ -167,7 +167,7 @@ fn rate(
 /// The declared exposure, which those of the cameras' records have to agree with, or theirs.
 fn exposure_s(
     exports: &[TrackFile],
-    options: &Options,
+    options: &ImportOptions,
     report: &mut ImportReport,
 ) -> Result<Option<f64>, ImportError> {
     let recorded = || exports.iter().filter_map(|export| export.facts.exposure_s.as_ref());
@@ -197,32 +197,36 @@ fn implied_hz(export: &TrackFile) -> Option<f64> {
             frames.iter().zip(column.iter()).filter_map(|(frame, time)| frame.zip(time)).unzip();
         let rate = (frames.last()? - frames.first()?) / (times.last()? - times.first()?);
         return (rate.is_finite() && rate > 0.0)
-            .then(|| clock::simplest_rate(rate, |rate| explains(&times, &frames, rate)));
+            .then(|| clock::simplest_rate(rate, |rate| times_fit_rate(&times, &frames, rate)));
     }
     let step_s = clock::median_step_s(&times)?;
     let fit = (step_s > 0.0).then(|| clock::number_frames(&times, step_s))??;
     let frames: Vec<f64> = fit.frames.iter().map(|frame| *frame as f64).collect();
-    Some(clock::simplest_rate(1.0 / fit.frame_s, |rate| explains(&times, &frames, rate)))
+    Some(clock::simplest_rate(1.0 / fit.frame_s, |rate| times_fit_rate(&times, &frames, rate)))
 }
 
 /// The user's scale counts; a file or format that contradicts it gives a finding.
-fn scale(exports: &[TrackFile], options: &Options, report: &mut ImportReport) -> Option<Scale> {
+fn coordinate_scale(
+    exports: &[TrackFile],
+    options: &ImportOptions,
+    report: &mut ImportReport,
+) -> Option<CoordinateScale> {
     let stated = exports.iter().find_map(|export| export.facts.unit.as_ref());
     match (options.scale, stated) {
         (Some(scale), Some((unit, why))) => {
-            report.findings.extend(findings::other_unit(scale, *unit, why));
+            report.findings.extend(findings::unit_mismatch_finding(scale, *unit, why));
             Some(scale)
         }
         (Some(scale), None) => Some(scale),
-        (None, Some((Unit::Metres(metres), why))) => {
-            report.notes.push(format!("lengths in {}: {why}", Unit::Metres(*metres).word()));
-            Some(Scale::Unit(*metres))
+        (None, Some((CoordinateUnit::Metres(metres), why))) => {
+            report.notes.push(format!("lengths in {}: {why}", CoordinateUnit::Metres(*metres).describe()));
+            Some(CoordinateScale::Unit(*metres))
         }
         (None, _) => None,
     }
 }
 
-fn y_axis(exports: &[TrackFile], options: &Options, report: &mut ImportReport) -> Option<YAxis> {
+fn y_direction(exports: &[TrackFile], options: &ImportOptions, report: &mut ImportReport) -> Option<YAxis> {
     let (stated, why) = exports
         .iter()
         .find_map(|export| export.facts.y_axis.as_ref())
@@ -230,7 +234,7 @@ fn y_axis(exports: &[TrackFile], options: &Options, report: &mut ImportReport) -
     let word = |axis: YAxis| if axis == YAxis::Up { "up" } else { "down" };
     match (options.y_axis, stated) {
         (Some(declared), Some(stated)) if declared != stated => {
-            report.findings.push(findings::other_axis(word(declared), word(stated), why));
+            report.findings.push(findings::y_axis_mismatch_finding(word(declared), word(stated), why));
             Some(declared)
         }
         (Some(declared), _) => Some(declared),

@@ -25,12 +25,12 @@ impl Column {
         self.0.iter_mut().for_each(|value| *value /= divisor);
     }
 
-    pub(crate) fn has_any(&self) -> bool {
+    pub(crate) fn has_values(&self) -> bool {
         self.0.iter().any(|value| !value.is_nan())
     }
 
     /// The rows in the order of `order`.
-    pub(crate) fn reordered(&self, order: &[usize]) -> Self {
+    pub(crate) fn reorder(&self, order: &[usize]) -> Self {
         Self(order.iter().filter_map(|row| self.0.get(*row).copied()).collect())
     }
 }

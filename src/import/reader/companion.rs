@@ -2,13 +2,13 @@
 //! saved step and the exposure. A record that contradicts the options or the table is of another video.
 
 use crate::import::error::ImportError;
-use crate::import::options::Options;
-use crate::import::reader::findings::finding;
-use crate::import::reader::photron::{Record, SavedStep};
+use crate::import::options::ImportOptions;
+use crate::import::reader::findings::new_finding;
+use crate::import::reader::photron::{CameraRecord, SavedStep};
 use crate::import::reader::rounding::RATE_AGREEMENT;
 use crate::import::reader::track_file::{Clock, Fact, TrackFile};
-use crate::import::source::{Source, base_name};
-use crate::recording::quality::{Check, Finding, Severity};
+use crate::import::source::{ImportSource, base_name};
+use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// Names of files that may belong to the export `file` and lie in its folder, in the order in which they are
 /// read.
@@ -17,11 +17,11 @@ pub fn companion_names(file: &str) -> Vec<String> {
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
     let by_extension =
         ["cih", "CIH", "cihx", "CIHX", "set", "SET"].iter().map(|extension| format!("{stem}.{extension}"));
-    by_extension.chain(point_names(file)).collect()
+    by_extension.chain(point_names_file(file)).collect()
 }
 
 /// DLTdv's list of point names, which belongs to a sparse table of positions.
-fn point_names(file: &str) -> Option<String> {
+fn point_names_file(file: &str) -> Option<String> {
     let (folder, base) = file.split_at(file.len() - base_name(file).len());
     base.rsplit_once("xypts")
         .filter(|(_, end)| end.starts_with('.'))
@@ -33,17 +33,21 @@ fn point_names(file: &str) -> Option<String> {
 /// # Errors
 /// [`ImportError::Format`] for a record that cannot be used or contradicts the options or the table; one that
 /// says no rate, or is of fewer frames than the table, is a finding where the rate is declared.
-pub(crate) fn read_records(
-    sources: &[Source],
+pub(crate) fn read_camera_records(
+    sources: &[ImportSource],
     exports: &mut [TrackFile],
-    options: &Options,
+    options: &ImportOptions,
 ) -> Result<(), ImportError> {
     for (source, export) in sources.iter().zip(exports) {
-        for record in source.companions.iter().filter_map(Record::of) {
-            match (take(&record, export, options), options.frame_rate_hz) {
+        for record in source.companions.iter().filter_map(CameraRecord::parse) {
+            match (take_record(&record, export, options), options.frame_rate_hz) {
                 (Ok(()), _) => {}
-                (Err(Doubt::Unusable(error)), Some(_)) => export.findings.push(unused(&error)),
-                (Err(Doubt::Unusable(error) | Doubt::Contradiction(error)), _) => return Err(error),
+                (Err(RecordRefusal::Unusable(error)), Some(_)) => {
+                    export.findings.push(unused_record_finding(&error))
+                }
+                (Err(RecordRefusal::Unusable(error) | RecordRefusal::Contradiction(error)), _) => {
+                    return Err(error);
+                }
             }
         }
     }
@@ -51,43 +55,50 @@ pub(crate) fn read_records(
 }
 
 /// Why a record is not taken.
-enum Doubt {
+enum RecordRefusal {
     /// It does not say what it should: a declared rate does without it.
     Unusable(ImportError),
     /// It says something else than the options, the table or another record.
     Contradiction(ImportError),
 }
 
-fn unused(error: &ImportError) -> Finding {
+fn unused_record_finding(error: &ImportError) -> QualityFinding {
     let found = format!("the camera's record is not used: {error}");
-    finding(Check::CameraRecord, Severity::Caution, (0.0, ""), found, "--frame-rate-hz counts")
+    new_finding(Check::CameraRecord, Severity::Caution, (0.0, ""), found, "--frame-rate-hz counts")
 }
 
-fn take(record: &Record, export: &mut TrackFile, options: &Options) -> Result<(), Doubt> {
-    too_few_frames(record, export)?;
-    let (rate_hz, line) = record.rate_hz().map_err(Doubt::Unusable)?;
-    let step = record.saved_step().map_err(Doubt::Unusable)?;
-    let exposure_s = record.exposure_s(rate_hz).map_err(Doubt::Unusable)?;
+fn take_record(
+    record: &CameraRecord,
+    export: &mut TrackFile,
+    options: &ImportOptions,
+) -> Result<(), RecordRefusal> {
+    refuse_too_few_frames(record, export)?;
+    let (rate_hz, line) = record.rate_hz().map_err(RecordRefusal::Unusable)?;
+    let step = record.saved_step().map_err(RecordRefusal::Unusable)?;
+    let exposure_s = record.exposure_s(rate_hz).map_err(RecordRefusal::Unusable)?;
     let name = || format!("the camera's record {}", base_name(record.name));
     if step.frames > 1 {
-        let finding = stepped(record, export, options, rate_hz, &step).map_err(Doubt::Contradiction)?;
+        let finding = saved_step_finding(record, export, options, rate_hz, &step)
+            .map_err(RecordRefusal::Contradiction)?;
         export.findings.push(finding);
     } else {
         let fact = &mut export.facts.frame_rate_hz;
-        agree(record, fact, (rate_hz, line), "a recording rate", "frames/s").map_err(Doubt::Contradiction)?;
+        check_agreement(record, fact, (rate_hz, line), "a recording rate", "frames/s")
+            .map_err(RecordRefusal::Contradiction)?;
         *fact = Some((rate_hz, name()));
     }
     if let Some((exposure_s, line)) = exposure_s {
         let fact = &mut export.facts.exposure_s;
-        agree(record, fact, (exposure_s, line), "an exposure", "s").map_err(Doubt::Contradiction)?;
+        check_agreement(record, fact, (exposure_s, line), "an exposure", "s")
+            .map_err(RecordRefusal::Contradiction)?;
         *fact = Some((exposure_s, name()));
     }
     Ok(())
 }
 
 /// Two records, or a record and the export itself, must agree.
-fn agree(
-    record: &Record,
+fn check_agreement(
+    record: &CameraRecord,
     known: &Fact<f64>,
     (value, line): (f64, usize),
     what: &str,
@@ -95,7 +106,7 @@ fn agree(
 ) -> Result<(), ImportError> {
     match known.as_ref().filter(|(known, _)| !is_near(*known, value)) {
         Some((known, place)) => {
-            Err(record.refuse(line, format!("{what} of {value} {unit}"), &format!("{known} as in {place}")))
+            Err(record.refusal(line, format!("{what} of {value} {unit}"), &format!("{known} as in {place}")))
         }
         None => Ok(()),
     }
@@ -107,13 +118,13 @@ fn is_near(one: f64, other: f64) -> bool {
 
 /// Where not every frame was saved, the rate of the table is that of the pictures, or that of the camera if
 /// the table counts the camera's frames: nobody can say which but the user.
-fn stepped(
-    record: &Record,
+fn saved_step_finding(
+    record: &CameraRecord,
     export: &TrackFile,
-    options: &Options,
+    options: &ImportOptions,
     rate_hz: f64,
     step: &SavedStep,
-) -> Result<Finding, ImportError> {
+) -> Result<QualityFinding, ImportError> {
     let pictures_hz = rate_hz / step.frames as f64;
     let found = format!("`{}`: not every frame of the {rate_hz} a second was saved", step.written);
     let choice = format!(
@@ -127,10 +138,10 @@ fn stepped(
     let fits = declared.is_some_and(|hz| is_near(hz, pictures_hz) || (is_near(hz, rate_hz) && counts_all()));
     if !fits {
         let found = declared.map_or(found.clone(), |hz| format!("{found}, and --frame-rate-hz {hz}"));
-        return Err(record.refuse(step.line, found, &choice));
+        return Err(record.refusal(step.line, found, &choice));
     }
     let found = format!("{}: {found}", base_name(record.name));
-    Ok(finding(
+    Ok(new_finding(
         Check::CameraRecord,
         Severity::Note,
         (step.frames as f64, "frames"),
@@ -147,10 +158,10 @@ fn steps_by(clock: &Clock, step: usize) -> bool {
 }
 
 /// A record of fewer frames than the table has belongs to another video.
-fn too_few_frames(record: &Record, export: &TrackFile) -> Result<(), Doubt> {
+fn refuse_too_few_frames(record: &CameraRecord, export: &TrackFile) -> Result<(), RecordRefusal> {
     let rows = export.clocks.iter().map(Clock::len).max().unwrap_or(0);
-    match record.frames().filter(|frames| rows > *frames) {
-        Some(frames) => Err(Doubt::Unusable(record.refuse(
+    match record.frame_count().filter(|frames| rows > *frames) {
+        Some(frames) => Err(RecordRefusal::Unusable(record.refusal(
             1,
             format!("a record of {frames} frames, but a track of {} with {rows} rows", export.file),
             "the record of the video that was tracked",

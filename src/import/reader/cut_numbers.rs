@@ -1,16 +1,16 @@
 //! Numbers that a spreadsheet cut to three digits when it saved a table as it showed it.
 
 use crate::import::error::ImportError;
-use crate::import::reader::findings::finding;
-use crate::import::reader::number::Number;
-use crate::import::reader::table::Table;
-use crate::recording::quality::{Check, Finding, Severity};
+use crate::import::reader::findings::new_finding;
+use crate::import::reader::number::CellNumber;
+use crate::import::reader::table::DelimitedTable;
+use crate::recording::quality::{Check, QualityFinding, Severity};
 
-const ROUNDED: &str = "a spreadsheet shows numbers so and saves what it shows: import the tracking program's own \
+const CUT_NUMBER_ADVICE: &str = "a spreadsheet shows numbers so and saves what it shows: import the tracking program's own \
     export, which no spreadsheet has saved";
 
 /// `1.23E+05`: the form in which spreadsheets show a number that does not fit its cell.
-fn is_cut(text: &str) -> bool {
+fn is_cut_number(text: &str) -> bool {
     let digits = text.strip_prefix('-').unwrap_or(text).as_bytes();
     matches!(digits, [a, b'.' | b',', b, c, b'E', b'+' | b'-', d, e]
         if [a, b, c, d, e].iter().all(|byte| byte.is_ascii_digit()))
@@ -21,21 +21,25 @@ fn is_cut(text: &str) -> bool {
 ///
 /// # Errors
 /// [`ImportError`] for rows that cannot be read.
-pub(crate) fn rounded(table: &Table, start: usize, cells: &[usize]) -> Result<Option<Finding>, ImportError> {
-    if !table.may_be_cut() {
+pub(crate) fn cut_numbers_finding(
+    table: &DelimitedTable,
+    start: usize,
+    cells: &[usize],
+) -> Result<Option<QualityFinding>, ImportError> {
+    if !table.may_have_cut_numbers() {
         return Ok(None);
     }
     // for each column: cut numbers with the place of the first, and whether others are written out
     let mut found = vec![(0_usize, None, false); cells.len()];
     let mut rows = table.rows(start);
-    while let Some(record) = rows.next()? {
+    while let Some(record) = rows.next_row()? {
         for ((count, first, plain), &cell) in found.iter_mut().zip(cells) {
             let text = record.cell(cell);
-            if is_cut(text) {
+            if is_cut_number(text) {
                 *count += 1;
                 first.get_or_insert_with(|| (record.line, text.to_owned()));
             } else if !text.contains(['e', 'E']) {
-                *plain |= matches!(table.number(text), Number::Value(value) if value != 0.0);
+                *plain |= matches!(table.parse_cell(text), CellNumber::Value(value) if value != 0.0);
             }
         }
     }
@@ -46,10 +50,10 @@ pub(crate) fn rounded(table: &Table, start: usize, cells: &[usize]) -> Result<Op
         let found = format!(
             "{}: `{text}` has three digits where others of its column are written out ({count} such numbers in \
              column {})",
-            table.place(line, table.column(line, cell)),
+            table.location(line, table.text_column(line, cell)),
             cell + 1
         );
-        finding(Check::SpreadsheetRounding, Severity::Caution, (count as f64, ""), found, ROUNDED)
+        new_finding(Check::SpreadsheetRounding, Severity::Caution, (count as f64, ""), found, CUT_NUMBER_ADVICE)
     }))
 }
 
@@ -60,8 +64,8 @@ mod tests {
     #[test]
     fn numbers_cut_to_three_digits_among_others_are_found_at_their_place() {
         let found = |text: &str| {
-            let table = Table::read("a.csv", text).unwrap();
-            rounded(&table, 1, &[0, 1]).unwrap()
+            let table = DelimitedTable::parse("a.csv", text).unwrap();
+            cut_numbers_finding(&table, 1, &[0, 1]).unwrap()
         };
         let cut = found("t,x\n0,101.25\n1,1.23E+05\n2,103.5\n3,1.25E+05\n").unwrap();
         assert!(cut.found.starts_with("a.csv:3:3: `1.23E+05` has three digits"), "{}", cut.found);

@@ -22,7 +22,7 @@ pub(crate) enum Delimiter {
 pub(crate) const DELIMITERS: [Delimiter; 5] =
     [Delimiter::Tab, Delimiter::Semicolon, Delimiter::Comma, Delimiter::Space, Delimiter::Blanks];
 /// First line with which spreadsheets declare their delimiter.
-const DECLARATION: &str = "sep=";
+const DELIMITER_DECLARATION: &str = "sep=";
 /// A word for "missing" that starts like a comment.
 const NOT_COMMENT: &str = "#n/a";
 /// What ends the first cell of a row that starts like a comment.
@@ -31,7 +31,7 @@ const CELL_ENDS: [char; 3] = [',', ';', '\t'];
 const COMMENTS: [&str; 4] = ["#", "//", "***", "%"];
 
 /// A line with its 1-based number.
-pub(crate) type Line<'a> = (usize, &'a str);
+pub(crate) type NumberedLine<'a> = (usize, &'a str);
 
 impl Delimiter {
     /// Its byte, where it is one.
@@ -84,9 +84,9 @@ fn starts_with_damage(line: &str) -> bool {
 }
 
 /// The delimiter that the first line declares, and the length of that line in bytes.
-pub(crate) fn declaration(text: &str) -> Option<(Delimiter, usize)> {
+pub(crate) fn declared_delimiter(text: &str) -> Option<(Delimiter, usize)> {
     let first = text.lines().next()?;
-    let mark = first.trim_matches('"').strip_prefix(DECLARATION)?.bytes().next()?;
+    let mark = first.trim_matches('"').strip_prefix(DELIMITER_DECLARATION)?.bytes().next()?;
     let delimiter = DELIMITERS.into_iter().find(|d| d.byte() == Some(mark))?;
     Some((delimiter, text.find('\n').map_or(text.len(), |end| end + 1)))
 }

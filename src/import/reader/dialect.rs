@@ -1,9 +1,9 @@
 //! How a table is written: which delimiter and which decimal mark explain the whole file best.
 
-use crate::import::error::{ImportError, Place};
-use crate::import::reader::delimiter::{DELIMITERS, Delimiter, Line, declaration, is_comment};
-use crate::import::reader::number::{Number, number};
-use crate::import::reader::rows::{Row, rows_of};
+use crate::import::error::{ImportError, TextLocation};
+use crate::import::reader::delimiter::{DELIMITERS, Delimiter, NumberedLine, declared_delimiter, is_comment};
+use crate::import::reader::number::{CellNumber, parse_number};
+use crate::import::reader::rows::{TextRow, parse_rows};
 
 /// Lines at the start of a file that decide the dialect, and as many spread over the rest of
 /// it.
@@ -14,7 +14,7 @@ const SAMPLE_BYTES: usize = 1 << 20;
 const MOST_COLUMNS: usize = 20_000;
 /// One row in ten shows the leading zeros of a fraction if every second cell is one: a tenth do in each,
 /// by chance alone.
-const FRACTIONS: usize = 10;
+const ROWS_PER_FRACTION: usize = 10;
 /// Share of numbers that a row of data has at least.
 const MOSTLY_NUMBERS: f64 = 0.5;
 /// The same where no row has it: three cells that name a picture and one labelled point are two numbers of
@@ -42,23 +42,23 @@ impl Dialect {
     /// # Errors
     /// [`ImportError`] when no delimiter makes columns, when there are no numbers, or when commas are both.
     pub(crate) fn find(file: &str, text: &str) -> Result<Self, ImportError> {
-        let declared = declaration(text);
-        let of_the_table = |line: &Line| !(is_comment(line.1) || (declared.is_some() && line.0 == 1));
-        let lines: Vec<Line> = sample(text).into_iter().filter(of_the_table).collect();
-        refuse_columns(file, &lines)?;
+        let declared = declared_delimiter(text);
+        let of_the_table = |line: &NumberedLine| !(is_comment(line.1) || (declared.is_some() && line.0 == 1));
+        let lines: Vec<NumberedLine> = sample_lines(text).into_iter().filter(of_the_table).collect();
+        refuse_too_many_columns(file, &lines)?;
         let candidates = declared.map_or(DELIMITERS.to_vec(), |(delimiter, _)| vec![delimiter]);
         let best = |least: f64, cells: usize| {
-            let scored = candidates
-                .iter()
-                .map(|&delimiter| (score(&rows_of(&lines, delimiter), delimiter, (least, cells)), delimiter));
+            let scored = candidates.iter().map(|&delimiter| {
+                (delimiter_score(&parse_rows(&lines, delimiter), delimiter, (least, cells)), delimiter)
+            });
             scored
                 .reduce(|best, next| if next.0 > best.0 + 1e-9 { next } else { best })
                 .filter(|best| best.0 > 0.0)
         };
         let found = best(MOSTLY_NUMBERS, 2)
             .or_else(|| best(FEW_NUMBERS, FEWEST_CELLS).filter(|(_, delimiter)| delimiter.separates_words()));
-        let Some((_, delimiter)) = found else { return Err(no_columns(file, &lines)) };
-        let rows = rows_of(&lines, delimiter);
+        let Some((_, delimiter)) = found else { return Err(no_columns_error(file, &lines)) };
+        let rows = parse_rows(&lines, delimiter);
         if delimiter == Delimiter::Comma {
             refuse_double_comma(file, &rows)?;
         }
@@ -67,8 +67,8 @@ impl Dialect {
 }
 
 /// The first lines with anything in them, and some from all over the rest.
-fn sample(text: &str) -> Vec<Line<'_>> {
-    let mut lines: Vec<Line> = vec![];
+fn sample_lines(text: &str) -> Vec<NumberedLine<'_>> {
+    let mut lines: Vec<NumberedLine> = vec![];
     let (mut number, mut at) = (0, 0);
     for line in text.split_inclusive('\n') {
         if lines.len() == SAMPLE_LINES || at > SAMPLE_BYTES {
@@ -98,14 +98,14 @@ fn sample(text: &str) -> Vec<Line<'_>> {
 }
 
 /// Refuses rows of more columns than any table has, before their cells fill memory.
-fn refuse_columns(file: &str, lines: &[Line]) -> Result<(), ImportError> {
+fn refuse_too_many_columns(file: &str, lines: &[NumberedLine]) -> Result<(), ImportError> {
     let columns = |text: &str, mark: u8| text.bytes().filter(|byte| *byte == mark).count() + 1;
     let most = |text: &str| {
         DELIMITERS.iter().filter_map(|delimiter| Some(columns(text, delimiter.byte()?))).max().unwrap_or(0)
     };
     match lines.iter().find(|(_, text)| text.len() >= MOST_COLUMNS && most(text) > MOST_COLUMNS) {
         Some((line, text)) => Err(ImportError::format(
-            Place { file: file.to_owned(), line: *line, column: 1 },
+            TextLocation { file: file.to_owned(), line: *line, column: 1 },
             format!("a row of {} columns", most(text)),
             format!("at most {MOST_COLUMNS}"),
             "export the tracks of tip and head alone, with a row a frame",
@@ -116,7 +116,7 @@ fn refuse_columns(file: &str, lines: &[Line]) -> Result<(), ImportError> {
 
 /// How well `delimiter` explains the rows: the share of numbers, summed over rows of the usual length that
 /// have more than the share `least` of them in at least `cells` cells.
-fn score(rows: &[Row], delimiter: Delimiter, (least, cells): (f64, usize)) -> f64 {
+fn delimiter_score(rows: &[TextRow], delimiter: Delimiter, (least, cells): (f64, usize)) -> f64 {
     let measured = rows.iter().map(|row| (row.cells.len(), numeric_share(&row.cells, delimiter)));
     let numeric: Vec<(usize, f64)> =
         measured.filter(|(count, share)| *count >= cells && *share > least).collect();
@@ -134,7 +134,8 @@ fn score(rows: &[Row], delimiter: Delimiter, (least, cells): (f64, usize)) -> f6
 fn numeric_share(cells: &[String], delimiter: Delimiter) -> f64 {
     let is_number =
         |text: &str| is_value(text, '.') || (delimiter != Delimiter::Comma && is_value(text, ','));
-    let present: Vec<&String> = cells.iter().filter(|cell| number(cell, '.') != Number::Missing).collect();
+    let present: Vec<&String> =
+        cells.iter().filter(|cell| parse_number(cell, '.') != CellNumber::Missing).collect();
     if present.is_empty() {
         0.0
     } else {
@@ -143,11 +144,11 @@ fn numeric_share(cells: &[String], delimiter: Delimiter) -> f64 {
 }
 
 fn is_value(text: &str, decimal: char) -> bool {
-    matches!(number(text, decimal), Number::Value(_))
+    matches!(parse_number(text, decimal), CellNumber::Value(_))
 }
 
 /// The mark that more of the numbers need; a comma that delimits cannot be one.
-fn decimal_mark(rows: &[Row], delimiter: Delimiter) -> char {
+fn decimal_mark(rows: &[TextRow], delimiter: Delimiter) -> char {
     if delimiter == Delimiter::Comma {
         return '.';
     }
@@ -160,28 +161,32 @@ fn decimal_mark(rows: &[Row], delimiter: Delimiter) -> char {
     if numbers(',') > numbers('.') { ',' } else { '.' }
 }
 
-fn is_numeric(row: &&Row) -> bool {
+fn is_numeric(row: &&TextRow) -> bool {
     row.cells.first().is_some_and(|cell| is_value(cell, '.'))
 }
 
 /// `1,5,2,5` under a header of two: digits on both sides of every second comma.
-fn refuse_double_comma(file: &str, rows: &[Row]) -> Result<(), ImportError> {
-    let text = |cell: &String| cell.is_empty() || number(cell, '.') != Number::Missing;
+fn refuse_double_comma(file: &str, rows: &[TextRow]) -> Result<(), ImportError> {
+    let text = |cell: &String| cell.is_empty() || parse_number(cell, '.') != CellNumber::Missing;
     // (the column of row numbers has no name in several programs)
-    let first = |row: &Row| {
-        row.cells.iter().find(|cell| !cell.is_empty()).is_some_and(|cell| number(cell, '.') == Number::Text)
+    let first = |row: &TextRow| {
+        row.cells
+            .iter()
+            .find(|cell| !cell.is_empty())
+            .is_some_and(|cell| parse_number(cell, '.') == CellNumber::Text)
     };
-    let named = |row: &&Row| row.cells.iter().all(text) && first(row);
-    let numeric: Vec<&Row> = rows.iter().filter(is_numeric).collect();
+    let named = |row: &&TextRow| row.cells.iter().all(text) && first(row);
+    let numeric: Vec<&TextRow> = rows.iter().filter(is_numeric).collect();
     let Some(header) = rows.iter().take_while(|row| !is_numeric(row)).filter(named).last() else {
-        return refuse_halves(file, &numeric);
+        return refuse_split_numbers(file, &numeric);
     };
-    let expected = header.filled();
-    let whole = |row: &Row| row.filled() > expected && row.cells.iter().all(|cell| !cell.contains('.'));
-    let long: Vec<&Row> = numeric.iter().copied().filter(|row| whole(row)).collect();
+    let expected = header.used_width();
+    let whole =
+        |row: &TextRow| row.used_width() > expected && row.cells.iter().all(|cell| !cell.contains('.'));
+    let long: Vec<&TextRow> = numeric.iter().copied().filter(|row| whole(row)).collect();
     match long.first() {
         Some(row) if 2 * long.len() > numeric.len() => {
-            Err(double_comma(file, row, format!("under a header of {expected}")))
+            Err(double_comma_error(file, row, format!("under a header of {expected}")))
         }
         _ => Ok(()),
     }
@@ -189,39 +194,44 @@ fn refuse_double_comma(file: &str, rows: &[Row]) -> Result<(), ImportError> {
 
 /// `0,000,10,050` without a header: every second cell has the leading zeros of a fraction, as no whole number
 /// does.
-fn refuse_halves(file: &str, rows: &[&Row]) -> Result<(), ImportError> {
+fn refuse_split_numbers(file: &str, rows: &[&TextRow]) -> Result<(), ImportError> {
     let fraction = |cell: &String| {
         cell.strip_prefix('0').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
     };
-    let even =
-        |row: &&&Row| row.cells.len().is_multiple_of(2) && !row.cells.iter().any(|cell| cell.contains('.'));
-    let fits = |row: &&&Row| even(row) && !row.cells.iter().step_by(2).any(fraction);
+    let even = |row: &&&TextRow| {
+        row.cells.len().is_multiple_of(2) && !row.cells.iter().any(|cell| cell.contains('.'))
+    };
+    let fits = |row: &&&TextRow| even(row) && !row.cells.iter().step_by(2).any(fraction);
     let shown = rows.iter().filter(|row| row.cells.iter().skip(1).step_by(2).any(fraction)).count();
     match rows.first() {
-        Some(row) if FRACTIONS * shown > rows.len() && rows.iter().all(|row| fits(&row)) => {
-            Err(double_comma(file, row, format!("that look like {} numbers cut in two", row.cells.len() / 2)))
+        Some(row) if ROWS_PER_FRACTION * shown > rows.len() && rows.iter().all(|row| fits(&row)) => {
+            Err(double_comma_error(
+                file,
+                row,
+                format!("that look like {} numbers cut in two", row.cells.len() / 2),
+            ))
         }
         _ => Ok(()),
     }
 }
 
-fn double_comma(file: &str, row: &Row, instead: String) -> ImportError {
+fn double_comma_error(file: &str, row: &TextRow, instead: String) -> ImportError {
     ImportError::DecimalComma {
-        place: Place { file: file.to_owned(), line: row.line, column: 1 },
+        place: TextLocation { file: file.to_owned(), line: row.line, column: 1 },
         found: row.cells.len(),
         instead,
     }
 }
 
 /// The refusal where no delimiter makes rows of numbers.
-fn no_columns(file: &str, lines: &[Line]) -> ImportError {
-    let starts_like_data = |line: &&Line| {
+fn no_columns_error(file: &str, lines: &[NumberedLine]) -> ImportError {
+    let starts_like_data = |line: &&NumberedLine| {
         line.1.trim_start_matches(['"', '-', '\u{2212}', ' ']).starts_with(|c: char| c.is_ascii_digit())
     };
     match (lines.iter().find(starts_like_data), lines.last()) {
         (Some((line, text)), _) => {
-            let place = Place { file: file.to_owned(), line: *line, column: 1 };
-            if let Some(cell) = quoted_comma(text) {
+            let place = TextLocation { file: file.to_owned(), line: *line, column: 1 };
+            if let Some(cell) = find_quoted_comma(text) {
                 return ImportError::QuotedComma { place, found: cell };
             }
             ImportError::Delimiter { place, found: text.trim().chars().take(60).collect() }
@@ -232,7 +242,7 @@ fn no_columns(file: &str, lines: &[Line]) -> ImportError {
 }
 
 /// A number in quotes that holds a comma, in a line of commas: a decimal mark or a separator of thousands.
-fn quoted_comma(line: &str) -> Option<String> {
+fn find_quoted_comma(line: &str) -> Option<String> {
     let is_number = |part: &&str| {
         part.contains(',')
             && (is_value(part, ',')
@@ -288,7 +298,7 @@ mod tests {
     #[test]
     fn sampled_lines_keep_their_numbers() {
         let text: String = (1..=5000).map(|i| format!("line {i}\r\n")).collect();
-        let lines = sample(&text);
+        let lines = sample_lines(&text);
         assert!(lines.len() > SAMPLE_LINES + SAMPLE_LINES / 2, "{}", lines.len());
         assert!(lines.iter().all(|(number, line)| *line == format!("line {number}")));
     }

@@ -7,7 +7,7 @@ use std::borrow::Cow;
 
 /// Text of an export with the encoding it was in; line ends are `\n` or `\r\n`.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Decoded<'a> {
+pub(crate) struct DecodedText<'a> {
     /// The text, without a byte-order mark.
     pub text: Cow<'a, str>,
     /// Name of the encoding, as in the WHATWG standard.
@@ -20,21 +20,21 @@ pub(crate) struct Decoded<'a> {
 /// # Errors
 /// [`ImportError`] for files that are not text, unknown encodings and bytes that the wanted one does not
 /// have.
-pub(crate) fn decode<'a>(
+pub(crate) fn decode_text<'a>(
     file: &str,
     bytes: &'a [u8],
     wanted: Option<&str>,
-) -> Result<Decoded<'a>, ImportError> {
+) -> Result<DecodedText<'a>, ImportError> {
     if let Some(error) = file_type::refuse_bytes(file, bytes) {
         return Err(error);
     }
     let padding = bytes.iter().rev().take_while(|byte| **byte == 0).count();
     let (text, encoding) = match wanted {
-        Some(name) => decode_as(file, bytes, named(name)?)?,
-        None if has_wide_mark(bytes) => {
+        Some(name) => decode_as(file, bytes, encoding_by_name(name)?)?,
+        None if has_utf16_mark(bytes) => {
             decode_as(file, bytes, if bytes.starts_with(b"\xff\xfe") { UTF_16LE } else { UTF_16BE })?
         }
-        None => detect(file, &bytes[..bytes.len() - padding])?,
+        None => detect_encoding(file, &bytes[..bytes.len() - padding])?,
     };
     if let Some(offset) = text.find('\0') {
         return Err(file_type::refuse_zero_bytes(file, &text[..offset]));
@@ -42,11 +42,11 @@ pub(crate) fn decode<'a>(
     if text.trim().is_empty() {
         return Err(ImportError::Empty { file: file.to_owned() });
     }
-    Ok(Decoded { text: with_line_feeds(text), encoding })
+    Ok(DecodedText { text: normalise_line_ends(text), encoding })
 }
 
 /// A carriage return alone ends a line too, in files from old Macintosh programs.
-fn with_line_feeds(text: Cow<str>) -> Cow<str> {
+fn normalise_line_ends(text: Cow<str>) -> Cow<str> {
     if !text.contains('\r') {
         return text;
     }
@@ -59,17 +59,17 @@ fn with_line_feeds(text: Cow<str>) -> Cow<str> {
     }
 }
 
-fn named(name: &str) -> Result<&'static Encoding, ImportError> {
+fn encoding_by_name(name: &str) -> Result<&'static Encoding, ImportError> {
     let label = if name.eq_ignore_ascii_case("cp932") { "shift_jis" } else { name };
     Encoding::for_label(label.as_bytes())
         .ok_or_else(|| ImportError::UnknownEncoding { found: name.to_owned() })
 }
 
-fn has_wide_mark(bytes: &[u8]) -> bool {
+fn has_utf16_mark(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff")
 }
 
-fn detect<'a>(file: &str, bytes: &'a [u8]) -> Result<(Cow<'a, str>, &'static str), ImportError> {
+fn detect_encoding<'a>(file: &str, bytes: &'a [u8]) -> Result<(Cow<'a, str>, &'static str), ImportError> {
     let utf_8 = decode_as(file, bytes, UTF_8);
     if utf_8.is_ok() {
         return utf_8;
@@ -117,7 +117,7 @@ mod tests {
     use super::*;
 
     fn decoded(bytes: &[u8]) -> (String, &'static str) {
-        let decoded = decode("a.txt", bytes, None).unwrap();
+        let decoded = decode_text("a.txt", bytes, None).unwrap();
         (decoded.text.into_owned(), decoded.encoding)
     }
 
@@ -136,15 +136,15 @@ mod tests {
 
     #[test]
     fn an_encoding_that_does_not_fit_is_refused() {
-        assert!(matches!(decode("a", b"n\xb0", Some("utf-8")), Err(ImportError::Encoding { .. })));
-        assert!(matches!(decode("a", b"n", Some("utf-99")), Err(ImportError::UnknownEncoding { .. })));
-        assert_eq!(decode("a", b"\x8e\x9e\x8a\xd4", Some("cp932")).unwrap().text, "\u{6642}\u{9593}");
+        assert!(matches!(decode_text("a", b"n\xb0", Some("utf-8")), Err(ImportError::Encoding { .. })));
+        assert!(matches!(decode_text("a", b"n", Some("utf-99")), Err(ImportError::UnknownEncoding { .. })));
+        assert_eq!(decode_text("a", b"\x8e\x9e\x8a\xd4", Some("cp932")).unwrap().text, "\u{6642}\u{9593}");
     }
 
     #[test]
     fn nothing_but_blanks_is_empty() {
         for bytes in [&b""[..], b"\r\n \n", b"\0\0"] {
-            let message = decode("a.bin", bytes, None).unwrap_err().to_string();
+            let message = decode_text("a.bin", bytes, None).unwrap_err().to_string();
             assert_eq!(
                 message,
                 "a.bin:1:1: the file is empty, expected a table; export the track data again"

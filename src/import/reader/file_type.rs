@@ -78,7 +78,7 @@ const IN_ZIP: [(&[u8], (&str, &str)); 6] = [
 ];
 /// Bytes at either end of a file in which names are looked for: a zip archive has its first entries there,
 /// and its directory.
-const ENDS: usize = 65_536;
+const SEARCHED_BYTES: usize = 65_536;
 /// Kinds of boxes that an MP4 or QuickTime file starts with.
 const MP4_BOXES: [&[u8]; 5] = [b"ftyp", b"moov", b"mdat", b"wide", b"free"];
 /// Protocols of Python's pickle that start with their number.
@@ -144,33 +144,36 @@ const IN_JSON: [(&str, (&str, &str)); 3] = [
     ("", ("JSON", "export the tracks as CSV")),
 ];
 /// Characters at the start of a file in which its kind shows.
-const START: usize = 4000;
+const SEARCHED_CHARACTERS: usize = 4000;
 
 /// The refusal of a file whose bytes show that it is no text.
 pub(crate) fn refuse_bytes(file: &str, bytes: &[u8]) -> Option<ImportError> {
     let found = BY_BYTES.iter().find(|kind| bytes.starts_with(kind.0)).map(|kind| kind.1);
-    let found = found.or_else(|| in_zip(bytes)).or_else(|| by_layout(bytes));
-    let found =
-        found.or_else(|| holds(bytes.get(..ENDS).unwrap_or(bytes), b"<cih>").then_some(CAMERA_RECORD));
-    found.map(|kind| wrong(file, kind))
+    let found = found.or_else(|| kind_of_zip(bytes)).or_else(|| kind_by_layout(bytes));
+    let found = found.or_else(|| {
+        contains_bytes(bytes.get(..SEARCHED_BYTES).unwrap_or(bytes), b"<cih>").then_some(CAMERA_RECORD)
+    });
+    found.map(|kind| wrong_kind_error(file, kind))
 }
 
 /// A zip archive shows what it is by the names in it.
-fn in_zip(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
+fn kind_of_zip(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     if !bytes.starts_with(b"PK\x03\x04") {
         return None;
     }
-    let ends =
-        [bytes.get(..ENDS).unwrap_or(bytes), bytes.get(bytes.len().saturating_sub(ENDS)..).unwrap_or(bytes)];
-    IN_ZIP.iter().find(|kind| ends.iter().any(|end| holds(end, kind.0))).map(|kind| kind.1)
+    let ends = [
+        bytes.get(..SEARCHED_BYTES).unwrap_or(bytes),
+        bytes.get(bytes.len().saturating_sub(SEARCHED_BYTES)..).unwrap_or(bytes),
+    ];
+    IN_ZIP.iter().find(|kind| ends.iter().any(|end| contains_bytes(end, kind.0))).map(|kind| kind.1)
 }
 
-fn holds(bytes: &[u8], name: &[u8]) -> bool {
+fn contains_bytes(bytes: &[u8], name: &[u8]) -> bool {
     name.is_empty() || bytes.windows(name.len()).any(|part| part == name)
 }
 
 /// Kinds that show in more than their first bytes.
-fn by_layout(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
+fn kind_by_layout(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
     let at = |index: usize| bytes.get(index).copied();
     if at(0) == Some(0) && bytes.get(4..8).is_some_and(|kind| MP4_BOXES.contains(&kind)) {
         return Some(VIDEO);
@@ -197,8 +200,12 @@ fn by_layout(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
 /// The refusal of a text that shows itself to be no table.
 pub(crate) fn refuse_text(file: &str, text: &str) -> Option<ImportError> {
     // a tab in front is an empty cell: what follows is the name of a track
-    let start =
-        text.trim_start_matches([' ', '\r', '\n']).chars().take(START).collect::<String>().to_lowercase();
+    let start = text
+        .trim_start_matches([' ', '\r', '\n'])
+        .chars()
+        .take(SEARCHED_CHARACTERS)
+        .collect::<String>()
+        .to_lowercase();
     let inside = |kinds: &[(&str, (&'static str, &'static str))]| {
         kinds.iter().find(|kind| start.contains(kind.0)).map(|kind| kind.1)
     };
@@ -207,7 +214,7 @@ pub(crate) fn refuse_text(file: &str, text: &str) -> Option<ImportError> {
     let json = start.starts_with('{')
         || start.strip_prefix('[').is_some_and(|rest| rest.trim_start().starts_with(['{', '[']));
     let found = found.or_else(|| if json { inside(&IN_JSON) } else { None });
-    found.map(|kind| wrong(file, kind))
+    found.map(|kind| wrong_kind_error(file, kind))
 }
 
 /// The refusal of a text with zero bytes in it, which stand behind `before`.
@@ -218,17 +225,17 @@ pub(crate) fn refuse_zero_bytes(file: &str, before: &str) -> ImportError {
     ImportError::WrongKind { file: file.to_owned(), line, found: "binary data (zero bytes)", advice }
 }
 
-fn wrong(file: &str, (found, advice): (&'static str, &'static str)) -> ImportError {
+fn wrong_kind_error(file: &str, (found, advice): (&'static str, &'static str)) -> ImportError {
     ImportError::WrongKind { file: file.to_owned(), line: 1, found, advice }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::import::reader::encoding::decode;
+    use crate::import::reader::encoding::decode_text;
 
     fn says(bytes: &[u8]) -> String {
-        decode("a.bin", bytes, None).map_or_else(
+        decode_text("a.bin", bytes, None).map_or_else(
             |error| error.to_string(),
             |decoded| refuse_text("a.bin", &decoded.text).map_or(String::new(), |e| e.to_string()),
         )

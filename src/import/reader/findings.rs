@@ -1,20 +1,20 @@
 //! What only the export can show of a recording's quality: its times, lost points, units that do not look
 //! like the declared one.
 
-use crate::import::options::Scale;
-use crate::import::reader::rounding::{QUANTA_S, is_multiple};
-use crate::import::reader::units::Unit;
+use crate::import::options::CoordinateScale;
+use crate::import::reader::rounding::{QUANTA_S, are_multiples};
+use crate::import::reader::units::CoordinateUnit;
 use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
-use crate::recording::quality::{Check, Finding, Severity};
+use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// Exact (0, 0) positions in a row that look like a lost point: one may be a point on the origin.
 const ZERO_RUN: usize = 3;
 /// A lost point as scripts around OpenCV write it: no pixel is there, so that one of them shows it.
-const OUTSIDE: f64 = -1.0;
+const OUTSIDE_PICTURE: f64 = -1.0;
 /// Coordinates beyond which a length in millimetres or more looks like pixels: views in which a lip is
 /// resolved are rarely wider than this many millimetres, pictures are hardly ever narrower than this many
 /// pixels.
-const LIKE_PIXELS: f64 = 100.0;
+const PIXEL_LIKE_LIMIT: f64 = 100.0;
 /// Smallest unit of which that holds, m: in micrometres every view has such numbers.
 const MILLIMETRE_M: f64 = 1e-3;
 /// Fewest values from which "all are whole numbers" means pixels.
@@ -26,19 +26,20 @@ const COARSE_FRAMES: f64 = 0.1;
 const SAME_UNIT: f64 = 1e-9;
 
 /// A finding of the check `check` in the unit `unit`.
-pub(crate) fn finding(
+pub(crate) fn new_finding(
     check: Check,
     severity: Severity,
     (value, unit): (f64, &str),
     found: String,
     advice: &str,
-) -> Finding {
-    Finding::new(check, severity, value, unit, found).advise(advice)
+) -> QualityFinding {
+    QualityFinding::new(check, severity, value, unit, found).with_advice(advice)
 }
 
 /// Times that are rounded to a noticeable part of a frame.
-pub(crate) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<Finding> {
-    let quantum_s = QUANTA_S.into_iter().find(|quantum| !times.is_empty() && is_multiple(times, *quantum))?;
+pub(crate) fn rounded_times_finding(file: &str, times: &[f64], rate_hz: f64) -> Option<QualityFinding> {
+    let quantum_s =
+        QUANTA_S.into_iter().find(|quantum| !times.is_empty() && are_multiples(times, *quantum))?;
     let frames = quantum_s * rate_hz;
     // evenly spaced times lose nothing by it
     let even =
@@ -46,7 +47,7 @@ pub(crate) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<F
     let severity = if frames > COARSE_FRAMES { Severity::Caution } else { Severity::Note };
     let found = format!("{file}: the times are rounded to {quantum_s} s, {frames:.2} of a frame");
     (!even && frames > OFF_GRID_LIMIT_FRAMES / 100.0).then(|| {
-        finding(
+        new_finding(
             Check::RoundedTimes,
             severity,
             (quantum_s, "s"),
@@ -58,9 +59,9 @@ pub(crate) fn rounded_times(file: &str, times: &[f64], rate_hz: f64) -> Option<F
 }
 
 /// Rate that the times imply, next to the declared one.
-pub(crate) fn implied_rate(file: &str, implied_hz: f64, playback: bool) -> Finding {
+pub(crate) fn implied_rate_finding(file: &str, implied_hz: f64, playback: bool) -> QualityFinding {
     let meaning = if playback { "taken as playback: the times only count frames" } else { "as declared" };
-    finding(
+    new_finding(
         Check::ImpliedRate,
         Severity::Note,
         (implied_hz, "1/s"),
@@ -70,9 +71,9 @@ pub(crate) fn implied_rate(file: &str, implied_hz: f64, playback: bool) -> Findi
 }
 
 /// Times that are declared as seconds and count like frame numbers.
-pub(crate) fn counted_frames(implied_hz: f64) -> Finding {
+pub(crate) fn counted_frames_finding(implied_hz: f64) -> QualityFinding {
     let found = format!("the times imply {implied_hz} frames/s: they look like frame numbers, not seconds");
-    finding(
+    new_finding(
         Check::ImpliedRate,
         Severity::Serious,
         (implied_hz, "1/s"),
@@ -82,18 +83,23 @@ pub(crate) fn counted_frames(implied_hz: f64) -> Finding {
 }
 
 /// A unit that the file names otherwise than the user.
-pub(crate) fn other_unit(scale: Scale, unit: Unit, why: &str) -> Option<Finding> {
+pub(crate) fn unit_mismatch_finding(
+    scale: CoordinateScale,
+    unit: CoordinateUnit,
+    why: &str,
+) -> Option<QualityFinding> {
     let (stated, agrees) = match (scale, unit) {
-        (Scale::MetresPerPixel(_), Unit::Pixel) => return None,
-        (Scale::Unit(metres), Unit::Metres(stated)) => {
+        (CoordinateScale::MetresPerPixel(_), CoordinateUnit::Pixel) => return None,
+        (CoordinateScale::Unit(metres), CoordinateUnit::Metres(stated)) => {
             (format!("units of {metres} m"), (metres / stated - 1.0).abs() <= SAME_UNIT)
         }
-        (Scale::Unit(metres), Unit::Pixel) => (format!("units of {metres} m"), false),
-        (Scale::MetresPerPixel(_), Unit::Metres(_)) => ("pixels".to_owned(), false),
+        (CoordinateScale::Unit(metres), CoordinateUnit::Pixel) => (format!("units of {metres} m"), false),
+        (CoordinateScale::MetresPerPixel(_), CoordinateUnit::Metres(_)) => ("pixels".to_owned(), false),
     };
-    let found = format!("--scale takes the coordinates for {stated}, but they are {} ({why})", unit.word());
+    let found =
+        format!("--scale takes the coordinates for {stated}, but they are {} ({why})", unit.describe());
     (!agrees).then(|| {
-        finding(
+        new_finding(
             Check::Unit,
             Severity::Caution,
             (scale.metres(), "m"),
@@ -104,9 +110,9 @@ pub(crate) fn other_unit(scale: Scale, unit: Unit, why: &str) -> Option<Finding>
 }
 
 /// A direction of y that is another one than the format's.
-pub(crate) fn other_axis(declared: &str, stated: &str, why: &str) -> Finding {
+pub(crate) fn y_axis_mismatch_finding(declared: &str, stated: &str, why: &str) -> QualityFinding {
     let found = format!("--y-axis says {declared}, but y points {stated} ({why})");
-    finding(
+    new_finding(
         Check::YAxis,
         Severity::Caution,
         (0.0, ""),
@@ -116,19 +122,25 @@ pub(crate) fn other_axis(declared: &str, stated: &str, why: &str) -> Finding {
 }
 
 /// Runs of exact (0, 0) or (-1, -1), and numbers that do not look like their declared unit.
-pub(crate) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale: Scale) -> Vec<Finding> {
+pub(crate) fn position_findings(
+    name: &str,
+    x: &[Option<f64>],
+    y: &[Option<f64>],
+    scale: CoordinateScale,
+) -> Vec<QualityFinding> {
     let mut findings = vec![];
-    let in_pixels = matches!(scale, Scale::MetresPerPixel(_));
-    for (check, value, fewest) in
-        [(Check::ZeroRun, 0.0, ZERO_RUN), (Check::MinusOneRun, OUTSIDE, if in_pixels { 1 } else { ZERO_RUN })]
-    {
+    let in_pixels = matches!(scale, CoordinateScale::MetresPerPixel(_));
+    for (check, value, fewest) in [
+        (Check::ZeroRun, 0.0, ZERO_RUN),
+        (Check::MinusOneRun, OUTSIDE_PICTURE, if in_pixels { 1 } else { ZERO_RUN }),
+    ] {
         let (frame, run) = longest_run(x, y, value);
         if run >= fewest {
             let found = format!(
                 "{name}: {run} frames in a row from frame {frame} at exactly ({value}, {value}), which often \
                  means a lost point"
             );
-            findings.push(finding(
+            findings.push(new_finding(
                 check,
                 Severity::Caution,
                 (run as f64, "frames"),
@@ -142,7 +154,7 @@ pub(crate) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale:
         (count, whole, largest) = (count + 1, whole && value.fract() == 0.0, largest.max(value.abs()));
     }
     let whole = whole && count >= FEWEST_WHOLE && largest > 0.0;
-    let large = largest > LIKE_PIXELS && scale.metres() >= MILLIMETRE_M;
+    let large = largest > PIXEL_LIKE_LIMIT && scale.metres() >= MILLIMETRE_M;
     if !in_pixels && (whole || large) {
         let sign = if whole {
             "are all whole numbers"
@@ -150,7 +162,7 @@ pub(crate) fn positions(name: &str, x: &[Option<f64>], y: &[Option<f64>], scale:
             "are larger than lengths in a camera's view usually are"
         };
         let found = format!("{name}: the coordinates {sign} (largest {largest:.6e})");
-        findings.push(finding(
+        findings.push(new_finding(
             Check::UnitSuspicion,
             Severity::Caution,
             (largest, ""),
@@ -174,13 +186,13 @@ fn longest_run(x: &[Option<f64>], y: &[Option<f64>], value: f64) -> (usize, usiz
 }
 
 /// Positions that were rejected for their confidence.
-pub(crate) fn rejected(name: &str, count: usize, tracked: usize, limit: f64) -> Finding {
+pub(crate) fn rejected_finding(name: &str, count: usize, tracked: usize, limit: f64) -> QualityFinding {
     let share = count as f64 / tracked.max(1) as f64;
     let found = format!(
         "{name}: {count} of {tracked} positions below the confidence {limit} count as missing ({:.1} %)",
         100.0 * share
     );
-    finding(Check::ConfidenceRejected, Severity::Note, (share, ""), found, "")
+    new_finding(Check::ConfidenceRejected, Severity::Note, (share, ""), found, "")
 }
 
 #[cfg(test)]
@@ -191,16 +203,16 @@ mod tests {
     fn pixels_declared_as_millimetres_are_suspected_whole_or_not() {
         let suspected = |from: f64, step: f64, scale| {
             let x: Vec<Option<f64>> = (0..20).map(|i| Some(from + f64::from(i) * step)).collect();
-            positions("tip", &x, &[None; 20], scale)
+            position_findings("tip", &x, &[None; 20], scale)
                 .iter()
                 .filter(|finding| finding.check == Check::UnitSuspicion)
                 .count()
         };
-        let millimetres = Scale::Unit(1e-3);
+        let millimetres = CoordinateScale::Unit(1e-3);
         assert_eq!(suspected(511.37, 0.75, millimetres), 1);
         assert_eq!(suspected(3.0, 1.0, millimetres), 1);
         assert_eq!(suspected(20.37, 0.75, millimetres), 0);
-        assert_eq!(suspected(5113.7, 7.5, Scale::Unit(1e-6)), 0);
-        assert_eq!(suspected(511.37, 0.75, Scale::MetresPerPixel(2e-5)), 0);
+        assert_eq!(suspected(5113.7, 7.5, CoordinateScale::Unit(1e-6)), 0);
+        assert_eq!(suspected(511.37, 0.75, CoordinateScale::MetresPerPixel(2e-5)), 0);
     }
 }

@@ -1,63 +1,64 @@
 //! Chosen tracks on one frame grid: which frames they share, and their points frame by frame.
 
 use crate::import::error::ImportError;
-use crate::import::options::{Options, Scale, TimeColumn};
+use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
 use crate::import::outcome::ImportReport;
-use crate::import::reader::calibration::Calibration;
+use crate::import::reader::calibration::ImportCalibration;
 use crate::import::reader::column::Column;
-use crate::import::reader::timing::{Declared, Placed, Rows};
+use crate::import::reader::timing::{ClockRows, DeclaredTiming, RowFrames};
 use crate::import::reader::track_choice::TrackIndex;
 use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{findings, timing};
 use crate::recording::FrameGrid;
 use crate::recording::clock::MAX_FRAMES;
 use crate::recording::files::YAxis;
-use crate::recording::quality::Finding;
+use crate::recording::quality::QualityFinding;
 
 /// The clocks of the chosen tracks on one frame grid.
-pub(crate) struct Clocks {
+pub(crate) struct ClockGrid {
     pub(crate) grid: FrameGrid,
-    used: Vec<UsedClock>,
+    used: Vec<PlacedClock>,
 }
 
 /// A clock with the frames of its rows.
-struct UsedClock {
+struct PlacedClock {
     /// Index of its file.
     file: usize,
     /// Its index in the file.
     clock: usize,
-    placed: Placed,
+    placed: RowFrames,
     /// What to add to its frames to count from the start of the grid.
     shift: i64,
 }
 
-impl UsedClock {
-    fn begin(&self) -> i64 {
+impl PlacedClock {
+    fn first_frame(&self) -> i64 {
         self.placed.frames.first().map_or(0, |frame| frame + self.shift)
     }
 
-    fn end(&self) -> i64 {
+    fn last_frame(&self) -> i64 {
         self.placed.frames.last().map_or(0, |frame| frame + self.shift)
     }
 }
 
-impl Clocks {
-    pub(crate) fn place(
+impl ClockGrid {
+    pub(crate) fn align(
         exports: &[TrackFile],
         chosen: &[Option<TrackIndex>; 2],
-        calibration: &Calibration,
-        options: &Options,
+        calibration: &ImportCalibration,
+        options: &ImportOptions,
     ) -> Result<Self, ImportError> {
-        let mut used = place_each(exports, chosen, calibration, options)?;
-        let Some(earliest) = used.iter().min_by_key(|clock| clock.begin()) else {
+        let mut used = place_clocks(exports, chosen, calibration, options)?;
+        let Some(earliest) = used.iter().min_by_key(|clock| clock.first_frame()) else {
             return Err(ImportError::NoSource);
         };
-        let (from, to) = (earliest.begin(), used.iter().map(UsedClock::end).max().unwrap_or(0));
+        let (from, to) =
+            (earliest.first_frame(), used.iter().map(PlacedClock::last_frame).max().unwrap_or(0));
         let frames = to - from + 1;
         let rows: usize = used.iter().map(|clock| clock.placed.frames.len()).sum();
         let most = (MAX_FRAMES as i64).min(timing::MOST_SPREAD * rows as i64);
         if frames > most {
-            return Err(ImportError::Grids {
+            return Err(ImportError::GridMismatch {
                 file: exports[earliest.file].file.to_owned(),
                 found: format!("frames from {from} to {to}"),
                 expected: format!("at most {most} frames for {rows} rows"),
@@ -70,28 +71,28 @@ impl Clocks {
         Ok(Self { grid, used })
     }
 
-    fn of(&self, file: usize, clock: usize) -> Option<&UsedClock> {
+    fn placed_clock(&self, file: usize, clock: usize) -> Option<&PlacedClock> {
         self.used.iter().find(|used| (used.file, used.clock) == (file, clock))
     }
 
-    pub(crate) fn findings(
+    pub(crate) fn report_findings(
         &self,
         exports: &[TrackFile],
-        calibration: &Calibration,
-        options: &Options,
+        calibration: &ImportCalibration,
+        options: &ImportOptions,
         report: &mut ImportReport,
     ) {
-        for UsedClock { file, clock, placed, .. } in &self.used {
+        for PlacedClock { file, clock, placed, .. } in &self.used {
             let export = &exports[*file];
             let implied = placed.implied_hz.map(|hz| {
-                findings::implied_rate(export.file, hz, options.time == Some(TimeColumn::Playback))
+                findings::implied_rate_finding(export.file, hz, options.time == Some(TimeColumn::Playback))
             });
             let times: Vec<f64> =
                 export.clocks[*clock].time.iter().flat_map(Column::iter).flatten().collect();
             let rounded = (options.time != Some(TimeColumn::Playback))
-                .then(|| findings::rounded_times(export.file, &times, calibration.rate_hz))
+                .then(|| findings::rounded_times_finding(export.file, &times, calibration.rate_hz))
                 .flatten();
-            let new: Vec<Finding> = implied
+            let new: Vec<QualityFinding> = implied
                 .into_iter()
                 .chain(rounded)
                 .filter(|finding| !report.findings.contains(finding))
@@ -102,54 +103,62 @@ impl Clocks {
 }
 
 /// Every clock of a chosen track once, shifted to count as the first one does.
-fn place_each(
+fn place_clocks(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
-    calibration: &Calibration,
-    options: &Options,
-) -> Result<Vec<UsedClock>, ImportError> {
+    calibration: &ImportCalibration,
+    options: &ImportOptions,
+) -> Result<Vec<PlacedClock>, ImportError> {
     let rate_hz = calibration.rate_hz;
     let playback = options.time == Some(TimeColumn::Playback);
-    let declared = Declared { rate_hz, playback, step: options.frame_step.unwrap_or(1) };
-    let mut used: Vec<UsedClock> = vec![];
+    let declared = DeclaredTiming { rate_hz, playback, step: options.frame_step.unwrap_or(1) };
+    let mut used: Vec<PlacedClock> = vec![];
     for &(file, track) in chosen.iter().flatten() {
         let (export, clock) = (&exports[file], exports[file].tracks[track].clock);
         if used.iter().any(|used| (used.file, used.clock) == (file, clock)) {
             continue;
         }
-        let placed = timing::place(Rows { export, clock: &export.clocks[clock] }, declared)?;
+        let placed = timing::place_rows(ClockRows { export, clock: &export.clocks[clock] }, declared)?;
         if let Some(first) = used.iter().find(|used| used.file == file && !playback) {
-            timing::refuse_apart(
-                Rows { export, clock: &export.clocks[clock] },
+            timing::refuse_clock_mismatch(
+                ClockRows { export, clock: &export.clocks[clock] },
                 [&first.placed, &placed],
                 rate_hz,
             )?;
         }
         let shift = match used.first() {
-            Some(first) => timing::offset((&exports[first.file], &first.placed), (export, &placed), rate_hz)?,
+            Some(first) => {
+                timing::frame_offset((&exports[first.file], &first.placed), (export, &placed), rate_hz)?
+            }
             None => 0,
         };
-        used.push(UsedClock { file, clock, placed, shift });
+        used.push(PlacedClock { file, clock, placed, shift });
     }
     Ok(used)
 }
 
 /// A point on the frame grid.
 #[derive(Default)]
-pub(crate) struct Point {
+pub(crate) struct GridPositions {
     pub(crate) x: Vec<Option<f64>>,
     pub(crate) y: Vec<Option<f64>>,
     pub(crate) confidence: Option<Vec<Option<f64>>>,
 }
 
-impl Point {
+impl GridPositions {
     /// Absent rows stay missing. The track's columns are used up.
-    pub(crate) fn spread(exports: &mut [TrackFile], clocks: &Clocks, choice: Option<TrackIndex>) -> Self {
+    pub(crate) fn from_track(
+        exports: &mut [TrackFile],
+        clocks: &ClockGrid,
+        choice: Option<TrackIndex>,
+    ) -> Self {
         let empty = || vec![None; clocks.grid.frames];
         let none = || Self { x: empty(), y: empty(), confidence: None };
         let Some((file, track)) = choice else { return none() };
         let track = &mut exports[file].tracks[track];
-        let Some(UsedClock { placed, shift, .. }) = clocks.of(file, track.clock) else { return none() };
+        let Some(PlacedClock { placed, shift, .. }) = clocks.placed_clock(file, track.clock) else {
+            return none();
+        };
         let column = |values: Column| {
             let mut on_grid = empty();
             for (value, frame) in values.iter().zip(&placed.frames) {
@@ -170,7 +179,7 @@ impl Point {
     }
 
     /// Positions in which the tracker had too little confidence become missing.
-    pub(crate) fn reject(
+    pub(crate) fn reject_unlikely(
         &mut self,
         name: &str,
         limit: Option<f64>,
@@ -194,17 +203,18 @@ impl Point {
             count += usize::from(self.x[frame].is_some());
             (self.x[frame], self.y[frame]) = (None, None);
         }
-        report.findings.push(findings::rejected(name, count, tracked, limit));
+        report.findings.push(findings::rejected_finding(name, count, tracked, limit));
         Ok(())
     }
 
-    pub(crate) fn convert(&mut self, calibration: &Calibration) {
+    pub(crate) fn convert_to_metres(&mut self, calibration: &ImportCalibration) {
         let metres = calibration.scale.metres();
         // a quotient by a whole number is the nearest double to the decimal that was written; a product with
         // 1e-3 is not
         let parts = (1.0 / metres).round();
         let length = |value: f64| {
-            if matches!(calibration.scale, Scale::Unit(_)) && metres < 1.0 && metres == 1.0 / parts {
+            if matches!(calibration.scale, CoordinateScale::Unit(_)) && metres < 1.0 && metres == 1.0 / parts
+            {
                 value / parts
             } else {
                 value * metres
@@ -218,7 +228,7 @@ impl Point {
         }
     }
 
-    pub(crate) fn tracked(&self) -> Option<(usize, usize)> {
+    pub(crate) fn tracked_frames(&self) -> Option<(usize, usize)> {
         Some((self.x.iter().position(Option::is_some)?, self.x.iter().rposition(Option::is_some)?))
     }
 }

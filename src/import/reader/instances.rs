@@ -1,6 +1,6 @@
 //! Rows of one or of many instances (tracks, blocks), gathered into clocks and tracks.
 
-use crate::import::error::{ImportError, Place};
+use crate::import::error::{ImportError, TextLocation};
 use crate::import::reader::column::Column;
 use crate::import::reader::track_file::{Clock, Track};
 use std::collections::HashMap;
@@ -10,7 +10,7 @@ const MOST_TRACKS: usize = 20_000;
 
 /// A position as it is read.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Position {
+pub(crate) struct RowPosition {
     pub x: Option<f64>,
     pub y: Option<f64>,
     pub confidence: Option<f64>,
@@ -18,7 +18,7 @@ pub(crate) struct Position {
 
 /// When a row was taken, and its line.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(crate) struct Stamp {
+pub(crate) struct RowStamp {
     /// 1-based line.
     pub line: usize,
     pub frame: Option<f64>,
@@ -27,7 +27,7 @@ pub(crate) struct Stamp {
 
 /// A point of every instance.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct PointShape {
+pub(crate) struct PointFields {
     pub name: String,
     pub has_y: bool,
     pub has_confidence: bool,
@@ -35,17 +35,17 @@ pub(crate) struct PointShape {
 
 /// Which columns there are.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Shape {
+pub(crate) struct InstanceFields {
     pub has_frame: bool,
     pub has_time: bool,
     /// Index of the cell with frame or time, for messages.
     pub clock_cell: usize,
-    pub points: Vec<PointShape>,
+    pub points: Vec<PointFields>,
 }
 
 /// Whether the rows of an instance have to be in order of time as they stand.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Order {
+pub(crate) enum RowOrder {
     /// They do: disorder is damage.
     AsWritten,
     /// They need not: the program writes them in any order.
@@ -53,38 +53,39 @@ pub(crate) enum Order {
 }
 
 /// Gathers rows by instance, in the order in which the instances appear.
-pub(crate) struct Collector {
-    shape: Shape,
+pub(crate) struct TrackCollector {
+    shape: InstanceFields,
     known: HashMap<String, usize>,
-    instances: Vec<Instance>,
+    instances: Vec<CollectedInstance>,
     /// The instance of the row before: most rows follow one of the same.
     last: usize,
     /// Line of the first row of a track too many; no row is gathered from there on.
     too_many: Option<usize>,
 }
 
-struct Instance {
+struct CollectedInstance {
     key: String,
     clock: Clock,
     points: Vec<[Column; 3]>,
 }
 
-impl Collector {
-    pub(crate) fn new(shape: Shape) -> Self {
+impl TrackCollector {
+    pub(crate) fn new(shape: InstanceFields) -> Self {
         Self { shape, known: HashMap::new(), instances: vec![], last: 0, too_many: None }
     }
 
     /// Adds a row of the instance `key`: a position for each point of the shape.
-    pub(crate) fn push(&mut self, key: &str, stamp: Stamp, positions: &[Position]) {
-        let same =
-            |instance: &Instance| instance.key.len() == key.len() && (key.is_empty() || instance.key == key);
+    pub(crate) fn add_row(&mut self, key: &str, stamp: RowStamp, positions: &[RowPosition]) {
+        let same = |instance: &CollectedInstance| {
+            instance.key.len() == key.len() && (key.is_empty() || instance.key == key)
+        };
         if !self.instances.get(self.last).is_some_and(same) {
             let known = self.known.get(key).copied();
             if self.too_many.is_some() || (known.is_none() && self.instances.len() == MOST_TRACKS) {
                 self.too_many.get_or_insert(stamp.line);
                 return;
             }
-            self.last = known.unwrap_or_else(|| self.add(key));
+            self.last = known.unwrap_or_else(|| self.add_instance(key));
         }
         let Some(instance) = self.instances.get_mut(self.last) else { return };
         instance.clock.lines.push(u32::try_from(stamp.line).unwrap_or(u32::MAX));
@@ -106,7 +107,7 @@ impl Collector {
         }
     }
 
-    fn add(&mut self, key: &str) -> usize {
+    fn add_instance(&mut self, key: &str) -> usize {
         let column = |present: bool| present.then(Column::default);
         let clock = Clock {
             cell: self.shape.clock_cell,
@@ -115,7 +116,7 @@ impl Collector {
             lines: vec![],
         };
         let points = self.shape.points.iter().map(|_| <[Column; 3]>::default()).collect();
-        self.instances.push(Instance { key: key.to_owned(), clock, points });
+        self.instances.push(CollectedInstance { key: key.to_owned(), clock, points });
         self.known.insert(key.to_owned(), self.instances.len() - 1);
         self.instances.len() - 1
     }
@@ -124,12 +125,12 @@ impl Collector {
     /// or by both.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] for more tracks than anybody chooses from, [`ImportError::Twice`] where
+    /// [`ImportError::WrongTable`] for more tracks than anybody chooses from, [`ImportError::DuplicateRow`] where
     /// rows come in any order and an instance has two of one frame.
-    pub(crate) fn finish(self, file: &str, order: Order) -> Result<(Vec<Clock>, Vec<Track>), ImportError> {
+    pub(crate) fn finish(self, file: &str, order: RowOrder) -> Result<(Vec<Clock>, Vec<Track>), ImportError> {
         if let Some(line) = self.too_many {
             return Err(ImportError::wrong_table(
-                Place { file: file.to_owned(), line, column: 1 },
+                TextLocation { file: file.to_owned(), line, column: 1 },
                 format!("more than {MOST_TRACKS} tracks"),
                 "the tracks of a few points",
                 "link the detections to tracks in the tracking program, and export those of tip and head",
@@ -138,8 +139,8 @@ impl Collector {
         let (alone, single) = (self.instances.len() == 1, self.shape.points.len() == 1);
         let (mut clocks, mut tracks) = (vec![], vec![]);
         for mut instance in self.instances {
-            if order == Order::Any {
-                instance.sort(file)?;
+            if order == RowOrder::Any {
+                instance.sort_rows(file)?;
             }
             for (shape, [x, y, confidence]) in self.shape.points.iter().zip(instance.points) {
                 let name = match (instance.key.as_str(), shape.name.as_str()) {
@@ -158,9 +159,9 @@ impl Collector {
     }
 }
 
-impl Instance {
+impl CollectedInstance {
     /// Puts the rows into the order of their frames, or of their times where there are no frames.
-    fn sort(&mut self, file: &str) -> Result<(), ImportError> {
+    fn sort_rows(&mut self, file: &str) -> Result<(), ImportError> {
         let clock = &self.clock;
         let Some(column) = clock.frame.as_ref().or(clock.time.as_ref()) else { return Ok(()) };
         let key = |row: usize| column.get(row).unwrap_or(f64::INFINITY);
@@ -169,9 +170,9 @@ impl Instance {
         if let Some(pair) =
             order.windows(2).find(|pair| key(pair[0]) == key(pair[1]) && key(pair[0]).is_finite())
         {
-            let (first, again) = (clock.line(pair[0]), clock.line(pair[1]));
-            return Err(ImportError::Twice {
-                place: Place { file: file.to_owned(), line: again, column: 1 },
+            let (first, again) = (clock.line_number(pair[0]), clock.line_number(pair[1]));
+            return Err(ImportError::DuplicateRow {
+                place: TextLocation { file: file.to_owned(), line: again, column: 1 },
                 what: if clock.frame.is_some() { "frame" } else { "time" },
                 found: key(pair[0]),
                 track: self.key.clone(),
@@ -179,14 +180,14 @@ impl Instance {
             });
         }
         let lines = order.iter().map(|row| clock.lines[*row]).collect();
-        let reordered = |column: &Column| column.reordered(&order);
+        let reordered = |column: &Column| column.reorder(&order);
         self.clock = Clock {
             lines,
             cell: clock.cell,
             frame: clock.frame.as_ref().map(reordered),
             time: clock.time.as_ref().map(reordered),
         };
-        self.points.iter_mut().flatten().for_each(|column| *column = column.reordered(&order));
+        self.points.iter_mut().flatten().for_each(|column| *column = column.reorder(&order));
         Ok(())
     }
 }
@@ -195,9 +196,10 @@ impl Instance {
 mod tests {
     use super::*;
 
-    fn collector(points: &[&str]) -> Collector {
-        let point = |name: &&str| PointShape { name: (*name).to_owned(), has_y: true, has_confidence: false };
-        Collector::new(Shape {
+    fn collector(points: &[&str]) -> TrackCollector {
+        let point =
+            |name: &&str| PointFields { name: (*name).to_owned(), has_y: true, has_confidence: false };
+        TrackCollector::new(InstanceFields {
             has_frame: true,
             has_time: false,
             clock_cell: 0,
@@ -205,21 +207,21 @@ mod tests {
         })
     }
 
-    fn at(line: usize, frame: f64) -> Stamp {
-        Stamp { line, frame: Some(frame), time: None }
+    fn at(line: usize, frame: f64) -> RowStamp {
+        RowStamp { line, frame: Some(frame), time: None }
     }
 
-    fn position(x: f64) -> Position {
-        Position { x: Some(x), y: Some(-x), confidence: None }
+    fn position(x: f64) -> RowPosition {
+        RowPosition { x: Some(x), y: Some(-x), confidence: None }
     }
 
     #[test]
     fn rows_of_each_instance_come_into_order() {
         let mut rows = collector(&[""]);
         for (line, (key, frame)) in [("a", 0.0), ("a", 9.0), ("b", 1.0), ("a", 4.0)].into_iter().enumerate() {
-            rows.push(key, at(line + 2, frame), &[position(frame)]);
+            rows.add_row(key, at(line + 2, frame), &[position(frame)]);
         }
-        let (clocks, tracks) = rows.finish("a.csv", Order::Any).unwrap();
+        let (clocks, tracks) = rows.finish("a.csv", RowOrder::Any).unwrap();
         assert_eq!(tracks.iter().map(|t| t.name.as_str()).collect::<Vec<_>>(), ["a", "b"]);
         assert_eq!(clocks[0].lines, [2, 5, 3]);
         assert_eq!(tracks[0].x.iter().collect::<Vec<_>>(), [Some(0.0), Some(4.0), Some(9.0)]);
@@ -229,9 +231,9 @@ mod tests {
     fn a_frame_twice_in_one_track_is_refused() {
         let mut rows = collector(&[""]);
         for (line, frame) in [(2, 0.0), (3, 1.0), (4, 0.0)] {
-            rows.push("7", at(line, frame), &[position(1.0)]);
+            rows.add_row("7", at(line, frame), &[position(1.0)]);
         }
-        let message = rows.finish("a.csv", Order::Any).unwrap_err().to_string();
+        let message = rows.finish("a.csv", RowOrder::Any).unwrap_err().to_string();
         assert!(
             message.starts_with("a.csv:4:1: found frame 0 of track `7` a second time (first in line 2)"),
             "{message}"
@@ -243,9 +245,9 @@ mod tests {
         let names = |keys: &[&str], points: &[&str]| {
             let mut rows = collector(points);
             for (line, key) in keys.iter().enumerate() {
-                rows.push(key, at(line, 0.0), &vec![position(1.0); points.len()]);
+                rows.add_row(key, at(line, 0.0), &vec![position(1.0); points.len()]);
             }
-            rows.finish("a.csv", Order::Any)
+            rows.finish("a.csv", RowOrder::Any)
                 .unwrap()
                 .1
                 .into_iter()

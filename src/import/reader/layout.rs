@@ -4,12 +4,14 @@
 use crate::import::error::ImportError;
 use crate::import::reader::cut_numbers;
 use crate::import::reader::document::Document;
-use crate::import::reader::instances::{Collector, Order, PointShape, Position, Shape, Stamp};
-use crate::import::reader::number::Number;
-use crate::import::reader::rows::Record;
-use crate::import::reader::table::Table;
+use crate::import::reader::instances::{
+    InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector,
+};
+use crate::import::reader::number::CellNumber;
+use crate::import::reader::rows::RowView;
+use crate::import::reader::table::DelimitedTable;
 use crate::import::reader::track_file::{Facts, TrackFile};
-use crate::recording::quality::{Check, Finding, Severity};
+use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// Cells of a point. Coordinates are sums of cells: most have one, a displacement from a reference has two.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -41,7 +43,7 @@ pub(crate) struct LostRule {
 
 /// A table's cells.
 #[derive(Clone)]
-pub(crate) struct Layout {
+pub(crate) struct TableLayout {
     /// First row of data, as an index of the table's head.
     pub start: usize,
     /// Cells that every row must have.
@@ -56,7 +58,7 @@ pub(crate) struct Layout {
     pub key: Vec<usize>,
     /// Whether rows without a name of their instance are left out.
     pub skip_nameless: bool,
-    pub order: Order,
+    pub order: RowOrder,
     /// Whether rows without a clock and without positions are those of other clocks in the same table.
     pub of_others: bool,
     pub points: Vec<PointCells>,
@@ -64,14 +66,14 @@ pub(crate) struct Layout {
 }
 
 /// What is not read as a position.
-struct LeftOut {
+struct SkippedRows {
     /// Positions that each rule marks as lost.
     lost: Vec<usize>,
     /// Rows without a name of their instance.
     nameless: usize,
 }
 
-impl Default for Layout {
+impl Default for TableLayout {
     fn default() -> Self {
         Self {
             start: 0,
@@ -83,37 +85,37 @@ impl Default for Layout {
             key: vec![],
             skip_nameless: false,
             of_others: false,
-            order: Order::AsWritten,
+            order: RowOrder::AsWritten,
             points: vec![],
             lost: vec![],
         }
     }
 }
 
-impl Layout {
+impl TableLayout {
     /// Reads every row.
     ///
     /// # Errors
     /// [`ImportError`] for a row of another length and for a cell that is no number.
-    pub(crate) fn read<'a>(
+    pub(crate) fn read_tracks<'a>(
         &self,
         document: &'a Document,
-        table: &'a Table,
+        table: &'a DelimitedTable,
         facts: Facts,
     ) -> Result<TrackFile<'a>, ImportError> {
-        let mut collector = Collector::new(self.shape());
-        let left_out = self.collect(table, &mut collector)?;
+        let mut collector = TrackCollector::new(self.instance_fields());
+        let left_out = self.collect_rows(table, &mut collector)?;
         let (clocks, tracks) = collector.finish(document.file, self.order)?;
         let mut export = TrackFile {
             table: Some(table),
             clocks,
             tracks,
             facts,
-            findings: self.findings(&left_out.lost),
+            findings: self.lost_point_findings(&left_out.lost),
             texts: table.head.iter().take(self.start).flat_map(|row| row.cells.iter().cloned()).collect(),
-            ..TrackFile::of(document)
+            ..TrackFile::for_document(document)
         };
-        export.findings.extend(cut_numbers::rounded(table, self.start, &self.numbers())?);
+        export.findings.extend(cut_numbers::cut_numbers_finding(table, self.start, &self.number_cells())?);
         if left_out.nameless > 0 {
             export.notes.push(format!("{} rows belong to no track and are left out", left_out.nameless));
         }
@@ -125,47 +127,50 @@ impl Layout {
         self.frame.is_none() && self.time.is_none()
     }
 
-    fn collect(&self, table: &Table, collector: &mut Collector) -> Result<LeftOut, ImportError> {
-        let mut left_out = LeftOut { lost: vec![0; self.lost.len()], nameless: 0 };
+    fn collect_rows(
+        &self,
+        table: &DelimitedTable,
+        collector: &mut TrackCollector,
+    ) -> Result<SkippedRows, ImportError> {
+        let mut left_out = SkippedRows { lost: vec![0; self.lost.len()], nameless: 0 };
         let (mut counted, mut last_line, mut key) = (0.0, 0, String::new());
-        let mut positions = vec![Position::default(); self.points.len()];
+        let mut positions = vec![RowPosition::default(); self.points.len()];
         let mut rows = table.rows(self.start);
-        while let Some(record) = rows.next()? {
+        while let Some(record) = rows.next_row()? {
             if self.counts_rows() && last_line > 0 && record.line > last_line + 1 {
-                return Err(ImportError::BlankLine { place: table.place(last_line + 1, 1) });
+                return Err(ImportError::BlankLine { place: table.location(last_line + 1, 1) });
             }
             last_line = record.line;
-            if (record.is_empty() && !self.counts_rows()) || (self.of_others && self.has_nothing_in(&record))
-            {
+            if (record.is_empty() && !self.counts_rows()) || (self.of_others && self.is_blank_row(&record)) {
                 continue;
             }
-            table.check_length(&record, self.width, self.most)?;
-            self.key_of(&record, &mut key);
+            table.check_row_length(&record, self.width, self.most)?;
+            self.write_key(&record, &mut key);
             if self.skip_nameless && key.is_empty() && !self.key.is_empty() {
                 left_out.nameless += 1;
                 continue;
             }
             for (position, cells) in positions.iter_mut().zip(&self.points) {
-                *position = self.position(table, &record, cells, &mut left_out.lost)?;
+                *position = self.read_position(table, &record, cells, &mut left_out.lost)?;
             }
             let frame = if self.counts_rows() {
                 Some(self.first_frame + counted)
             } else {
-                table.optional(&record, self.frame, "frame")?
+                table.optional_number_at(&record, self.frame, "frame")?
             };
-            let time = table.optional(&record, self.time, "time")?;
+            let time = table.optional_number_at(&record, self.time, "time")?;
             counted += 1.0;
-            collector.push(&key, Stamp { line: record.line, frame, time }, &positions);
+            collector.add_row(&key, RowStamp { line: record.line, frame, time }, &positions);
         }
         Ok(left_out)
     }
 
-    fn has_nothing_in(&self, record: &Record) -> bool {
-        self.numbers().into_iter().all(|cell| record.cell(cell).is_empty())
+    fn is_blank_row(&self, record: &RowView) -> bool {
+        self.number_cells().into_iter().all(|cell| record.cell(cell).is_empty())
     }
 
     /// Every cell that is read as a number, each once.
-    fn numbers(&self) -> Vec<usize> {
+    fn number_cells(&self) -> Vec<usize> {
         let of_points = self.points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
         let mut cells: Vec<usize> = self.frame.into_iter().chain(self.time).chain(of_points).collect();
         cells.sort_unstable();
@@ -173,13 +178,13 @@ impl Layout {
         cells
     }
 
-    fn shape(&self) -> Shape {
-        let point = |p: &PointCells| PointShape {
+    fn instance_fields(&self) -> InstanceFields {
+        let point = |p: &PointCells| PointFields {
             name: p.name.clone(),
             has_y: !p.y.is_empty(),
             has_confidence: p.confidence.is_some(),
         };
-        Shape {
+        InstanceFields {
             has_frame: self.frame.is_some() || self.counts_rows(),
             has_time: self.time.is_some(),
             clock_cell: self.frame.or(self.time).unwrap_or(0),
@@ -187,7 +192,7 @@ impl Layout {
         }
     }
 
-    fn key_of(&self, record: &Record, key: &mut String) {
+    fn write_key(&self, record: &RowView, key: &mut String) {
         key.clear();
         for &cell in &self.key {
             if !key.is_empty() {
@@ -197,21 +202,21 @@ impl Layout {
         }
     }
 
-    fn position(
+    fn read_position(
         &self,
-        table: &Table,
-        record: &Record,
+        table: &DelimitedTable,
+        record: &RowView,
         cells: &PointCells,
         lost: &mut [usize],
-    ) -> Result<Position, ImportError> {
+    ) -> Result<RowPosition, ImportError> {
         let sum = |parts: &[usize], axis: &str| -> Result<Option<f64>, ImportError> {
             let mut total = 0.0;
             for &part in parts {
-                match table.number(record.cell(part)) {
-                    Number::Value(value) => total += value,
-                    Number::Missing => return Ok(None),
-                    Number::Text => {
-                        return Err(table.not_a_number(
+                match table.parse_cell(record.cell(part)) {
+                    CellNumber::Value(value) => total += value,
+                    CellNumber::Missing => return Ok(None),
+                    CellNumber::Text => {
+                        return Err(table.not_a_number_error(
                             record.line,
                             part,
                             record.cell(part),
@@ -222,29 +227,29 @@ impl Layout {
             }
             Ok((!parts.is_empty()).then_some(total))
         };
-        let confidence = table.optional(record, cells.confidence, "confidence")?;
-        let mut position = Position { x: sum(&cells.x, "x")?, y: sum(&cells.y, "y")?, confidence };
+        let confidence = table.optional_number_at(record, cells.confidence, "confidence")?;
+        let mut position = RowPosition { x: sum(&cells.x, "x")?, y: sum(&cells.y, "y")?, confidence };
         for (rule, count) in self.lost.iter().zip(lost) {
             let asked = match rule.cell {
-                Some(cell) => table.value(record, cell, "status")?.map(|value| (value, value)),
+                Some(cell) => table.number_at(record, cell, "status")?.map(|value| (value, value)),
                 None => position.x.zip(position.y),
             };
             if asked.is_some_and(|(x, y)| (rule.is)(x, y)) && position.x.is_some() {
                 *count += 1;
-                position = Position { x: None, y: None, confidence };
+                position = RowPosition { x: None, y: None, confidence };
             }
         }
         Ok(position)
     }
 
-    fn findings(&self, lost: &[usize]) -> Vec<Finding> {
+    fn lost_point_findings(&self, lost: &[usize]) -> Vec<QualityFinding> {
         let counted = self.lost.iter().zip(lost).filter(|(_, count)| **count > 0);
         let finding = |(rule, count): (&LostRule, &usize)| {
             let found = format!(
                 "{count} positions {} count as missing, as this format writes lost points",
                 rule.words
             );
-            Finding::new(Check::LostPoints, Severity::Note, *count as f64, "", found)
+            QualityFinding::new(Check::LostPoints, Severity::Note, *count as f64, "", found)
         };
         counted.map(finding).collect()
     }

@@ -1,14 +1,14 @@
 //! Numbers as tables write them: decimal point or comma, typographic minus signs, words for "missing".
 
 /// Words for a missing value, in lower case.
-const MISSING: [&str; 9] = ["", "nan", "na", "none", "-", "*", "null", "#n/a", "n/a"];
+const MISSING_WORDS: [&str; 9] = ["", "nan", "na", "none", "-", "*", "null", "#n/a", "n/a"];
 /// Longest number with a decimal comma or a typographic minus, bytes: 17 digits, an exponent and room to
 /// spare.
-const LONGEST: usize = 64;
+const MAX_NUMBER_BYTES: usize = 64;
 
 /// What a cell says.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Number {
+pub(crate) enum CellNumber {
     /// One of the words for a missing value.
     Missing,
     /// A finite number.
@@ -18,23 +18,23 @@ pub(crate) enum Number {
 }
 
 /// Reads a trimmed cell with the decimal mark `decimal` (`.` or `,`).
-pub(crate) fn number(text: &str, decimal: char) -> Number {
+pub(crate) fn parse_number(text: &str, decimal: char) -> CellNumber {
     if decimal == '.'
-        && let Some(value) = finite(text)
+        && let Some(value) = parse_finite(text)
     {
-        return Number::Value(value);
+        return CellNumber::Value(value);
     }
-    if is_missing(text) { Number::Missing } else { spelled(text, decimal) }
+    if is_missing(text) { CellNumber::Missing } else { parse_spelled(text, decimal) }
 }
 
 /// Rust also reads `inf`, `nan` and `infinity` as numbers: no cell of digits holds any other letter than an
 /// exponent's.
-fn finite(text: &str) -> Option<f64> {
+fn parse_finite(text: &str) -> Option<f64> {
     text.parse::<f64>().ok().filter(|value| value.is_finite())
 }
 
 fn is_missing(text: &str) -> bool {
-    MISSING.iter().any(|word| text.eq_ignore_ascii_case(word))
+    MISSING_WORDS.iter().any(|word| text.eq_ignore_ascii_case(word))
         || (is_minus(text.chars().next()) && text.chars().count() == 1)
 }
 
@@ -43,26 +43,26 @@ fn is_minus(c: Option<char>) -> bool {
     matches!(c, Some('-' | '\u{2212}' | '\u{2010}'..='\u{2013}'))
 }
 
-fn spelled(text: &str, decimal: char) -> Number {
-    let mut plain = [0_u8; LONGEST];
+fn parse_spelled(text: &str, decimal: char) -> CellNumber {
+    let mut plain = [0_u8; MAX_NUMBER_BYTES];
     let mut length = 0;
     for c in text.chars() {
         let byte = match c {
             c if is_minus(Some(c)) => b'-',
             c if c == decimal => b'.',
             '0'..='9' | '+' | 'e' | 'E' => c as u8,
-            _ => return Number::Text,
+            _ => return CellNumber::Text,
         };
-        let Some(place) = plain.get_mut(length) else { return Number::Text };
+        let Some(place) = plain.get_mut(length) else { return CellNumber::Text };
         *place = byte;
         length += 1;
     }
     let text = std::str::from_utf8(&plain[..length]).unwrap_or_default(); // (all of it is ASCII)
     // `12,` is a number before a delimiter that went astray
     if decimal == ',' && text.ends_with('.') {
-        return Number::Text;
+        return CellNumber::Text;
     }
-    finite(text).map_or(Number::Text, Number::Value)
+    parse_finite(text).map_or(CellNumber::Text, CellNumber::Value)
 }
 
 #[cfg(test)]
@@ -71,7 +71,7 @@ mod tests {
 
     #[test]
     fn numbers_in_every_spelling() {
-        assert_eq!(number("\u{2212}1,25E\u{2212}1", ','), Number::Value(-0.125));
+        assert_eq!(parse_number("\u{2212}1,25E\u{2212}1", ','), CellNumber::Value(-0.125));
         for (text, value) in [
             ("1.234E0", 1.234),
             ("5", 5.0),
@@ -81,12 +81,12 @@ mod tests {
             ("+1e-3", 1e-3),
             ("\u{2013}2.5", -2.5),
         ] {
-            assert_eq!(number(text, '.'), Number::Value(value), "{text}");
+            assert_eq!(parse_number(text, '.'), CellNumber::Value(value), "{text}");
         }
         for word in ["", "NaN", "nan", "NA", "None", "-", "*", "null", "#N/A", "N/A", "\u{2212}", "\u{2013}"]
         {
-            assert_eq!(number(word, '.'), Number::Missing, "{word}");
-            assert_eq!(number(word, ','), Number::Missing, "{word}");
+            assert_eq!(parse_number(word, '.'), CellNumber::Missing, "{word}");
+            assert_eq!(parse_number(word, ','), CellNumber::Missing, "{word}");
         }
         for word in [
             "1,5",
@@ -104,11 +104,11 @@ mod tests {
             "infinity",
             "1-",
         ] {
-            assert_eq!(number(word, '.'), Number::Text, "{word}");
+            assert_eq!(parse_number(word, '.'), CellNumber::Text, "{word}");
         }
         for word in ["1.5", "12,", "1,2,3", "1 000,5", ","] {
-            assert_eq!(number(word, ','), Number::Text, "{word}");
+            assert_eq!(parse_number(word, ','), CellNumber::Text, "{word}");
         }
-        assert_eq!(number(&format!("1,{}", "0".repeat(LONGEST)), ','), Number::Text);
+        assert_eq!(parse_number(&format!("1,{}", "0".repeat(MAX_NUMBER_BYTES)), ','), CellNumber::Text);
     }
 }

@@ -3,34 +3,35 @@
 
 use crate::import::error::ImportError;
 use crate::import::reader::rounding::RATE_AGREEMENT;
-use crate::import::source::Companion;
+use crate::import::source::CompanionFile;
 
 /// An entry: the start of its key in a `.cih`, in lower case, and its element in a `.cihx`.
 #[derive(Clone, Copy)]
-struct Entry {
+struct CameraRecordKey {
     key: &'static str,
     element: &'static str,
 }
 
-const RATE: Entry = Entry { key: "record rate", element: "recordRate" };
-const FRAMES: Entry = Entry { key: "total frame", element: "totalFrame" };
+const RATE: CameraRecordKey = CameraRecordKey { key: "record rate", element: "recordRate" };
+const FRAMES: CameraRecordKey = CameraRecordKey { key: "total frame", element: "totalFrame" };
 /// Every n-th frame of the recording was saved in the pictures.
-const STEP: Entry = Entry { key: "save step", element: "skipFrame" };
+const STEP: CameraRecordKey = CameraRecordKey { key: "save step", element: "skipFrame" };
 /// Exposure, ns.
-const SHUTTER_NS: Entry = Entry { key: "shutter type2(nsec)", element: "shutterSpeedNsec" };
+const SHUTTER_NS: CameraRecordKey =
+    CameraRecordKey { key: "shutter type2(nsec)", element: "shutterSpeedNsec" };
 /// Exposure, s, as `1/10000` or as `0.0001`; a `.cihx` has the 10000 alone.
-const SHUTTER: Entry = Entry { key: "shutter speed", element: "shutterSpeed" };
+const SHUTTER: CameraRecordKey = CameraRecordKey { key: "shutter speed", element: "shutterSpeed" };
 /// Start of the element that all of a `.cihx` stands in.
 const CIHX: &str = "<cih>";
 /// Most characters of a value that a refusal shows.
 const LONGEST_SHOWN: usize = 40;
 
 /// What a refusal of a record says to do.
-const ADVICE: &str = "give the rate at which the pictures that were tracked follow each other, --frame-rate-hz N, or \
+const RECORD_ADVICE: &str = "give the rate at which the pictures that were tracked follow each other, --frame-rate-hz N, or \
     move the record to another folder if it belongs to another video";
 
 /// A camera's record.
-pub(crate) struct Record<'a> {
+pub(crate) struct CameraRecord<'a> {
     /// File as named by the user.
     pub name: &'a str,
     text: String,
@@ -39,7 +40,7 @@ pub(crate) struct Record<'a> {
 }
 
 /// A value with its line, and the key or element as the file writes it.
-struct Value<'r> {
+struct CameraRecordValue<'r> {
     text: &'r str,
     line: usize,
     key: &'r str,
@@ -56,9 +57,9 @@ pub(crate) struct SavedStep {
     pub written: String,
 }
 
-impl<'a> Record<'a> {
+impl<'a> CameraRecord<'a> {
     /// The record in a companion; bytes that are no text in it do not matter.
-    pub(crate) fn of(file: &'a Companion) -> Option<Self> {
+    pub(crate) fn parse(file: &'a CompanionFile) -> Option<Self> {
         let extension = file.name.rsplit_once('.').map(|(_, extension)| extension.to_lowercase())?;
         let text = String::from_utf8_lossy(&file.bytes);
         let start = match extension.as_str() {
@@ -71,26 +72,30 @@ impl<'a> Record<'a> {
     }
 
     /// Every value of an entry, in the order of the file; a record that was saved again has its own first.
-    fn values(&self, entry: Entry) -> Vec<Value<'_>> {
-        if self.text.starts_with(CIHX) { self.elements(entry.element) } else { self.lines(entry.key) }
+    fn values(&self, entry: CameraRecordKey) -> Vec<CameraRecordValue<'_>> {
+        if self.text.starts_with(CIHX) { self.xml_values(entry.element) } else { self.text_values(entry.key) }
     }
 
-    fn lines(&self, wanted: &str) -> Vec<Value<'_>> {
+    fn text_values(&self, wanted: &str) -> Vec<CameraRecordValue<'_>> {
         let lines = self.text.lines().enumerate().filter_map(|(at, line)| {
             let (key, value) = line.split_once(':')?;
             let known = key.trim().to_lowercase().starts_with(wanted);
-            known.then(|| Value { text: value.trim(), line: self.skipped + at + 1, key: key.trim() })
+            known.then(|| CameraRecordValue {
+                text: value.trim(),
+                line: self.skipped + at + 1,
+                key: key.trim(),
+            })
         });
         lines.collect()
     }
 
-    fn elements(&self, name: &'static str) -> Vec<Value<'_>> {
+    fn xml_values(&self, name: &'static str) -> Vec<CameraRecordValue<'_>> {
         let (open, close) = (format!("<{name}>"), format!("</{name}>"));
         let element = |(at, _): (usize, &str)| {
             let rest = self.text.get(at + open.len()..)?;
             let text = rest.get(..rest.find(&close)?)?.trim();
             let line = self.skipped + self.text.get(..at)?.matches('\n').count() + 1;
-            Some(Value { text, line, key: name })
+            Some(CameraRecordValue { text, line, key: name })
         };
         self.text.match_indices(&open).filter_map(element).collect()
     }
@@ -98,13 +103,13 @@ impl<'a> Record<'a> {
     /// The rate at which the camera recorded, frames/s, with its line.
     pub(crate) fn rate_hz(&self) -> Result<(f64, usize), ImportError> {
         let Some(value) = self.values(RATE).into_iter().next() else {
-            return Err(self.refuse(1, "no recording rate".to_owned(), "the entry `Record Rate(fps)`"));
+            return Err(self.refusal(1, "no recording rate".to_owned(), "the entry `Record Rate(fps)`"));
         };
-        match positive(value.text) {
+        match parse_positive(value.text) {
             Some(rate) => Ok((rate, value.line)),
-            None => Err(self.refuse(
+            None => Err(self.refusal(
                 value.line,
-                format!("the recording rate `{}`", shown(value.text)),
+                format!("the recording rate `{}`", shorten_value(value.text)),
                 "a number above 0",
             )),
         }
@@ -118,11 +123,11 @@ impl<'a> Record<'a> {
         }
         let mut found = SavedStep { frames: 1, line: 1, written: String::new() };
         for value in values {
-            let written = format!("{} : {}", value.key, shown(value.text));
+            let written = format!("{} : {}", value.key, shorten_value(value.text));
             let frames = match value.text {
                 "" | "0" => 1,
                 text => text.parse::<usize>().map_err(|_| {
-                    self.refuse(
+                    self.refusal(
                         value.line,
                         format!("`{written}`"),
                         "a whole number of frames from picture to picture",
@@ -137,7 +142,7 @@ impl<'a> Record<'a> {
     }
 
     /// Pictures of the record.
-    pub(crate) fn frames(&self) -> Option<usize> {
+    pub(crate) fn frame_count(&self) -> Option<usize> {
         self.values(FRAMES).first()?.text.parse().ok()
     }
 
@@ -147,12 +152,13 @@ impl<'a> Record<'a> {
     /// [`ImportError::Format`] for an exposure longer than the time of a frame.
     pub(crate) fn exposure_s(&self, rate_hz: f64) -> Result<Option<(f64, usize)>, ImportError> {
         let (nanoseconds, seconds) = (self.values(SHUTTER_NS), self.values(SHUTTER));
-        let found = nanoseconds.first().and_then(|value| Some((positive(value.text)? * 1e-9, value)));
-        let found = found.or_else(|| seconds.first().and_then(|value| Some((exposure(value.text)?, value))));
+        let found = nanoseconds.first().and_then(|value| Some((parse_positive(value.text)? * 1e-9, value)));
+        let found =
+            found.or_else(|| seconds.first().and_then(|value| Some((parse_exposure(value.text)?, value))));
         match found {
-            Some((exposure_s, value)) if exposure_s * rate_hz > 1.0 + RATE_AGREEMENT => Err(self.refuse(
+            Some((exposure_s, value)) if exposure_s * rate_hz > 1.0 + RATE_AGREEMENT => Err(self.refusal(
                 value.line,
-                format!("`{} : {}`, an exposure of {exposure_s} s", value.key, shown(value.text)),
+                format!("`{} : {}`, an exposure of {exposure_s} s", value.key, shorten_value(value.text)),
                 &format!("at most the time of a frame, {} s at {rate_hz} frames/s", 1.0 / rate_hz),
             )),
             found => Ok(found.map(|(exposure_s, value)| (exposure_s, value.line))),
@@ -160,26 +166,26 @@ impl<'a> Record<'a> {
     }
 
     /// The refusal of what line `line` says.
-    pub(crate) fn refuse(&self, line: usize, found: String, expected: &str) -> ImportError {
-        ImportError::format(format!("{}:{line}:1", self.name), found, expected, ADVICE)
+    pub(crate) fn refusal(&self, line: usize, found: String, expected: &str) -> ImportError {
+        ImportError::format(format!("{}:{line}:1", self.name), found, expected, RECORD_ADVICE)
     }
 }
 
-fn shown(text: &str) -> String {
+fn shorten_value(text: &str) -> String {
     text.chars().take(LONGEST_SHOWN).collect()
 }
 
-fn positive(text: &str) -> Option<f64> {
+fn parse_positive(text: &str) -> Option<f64> {
     text.parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0)
 }
 
 /// `1/10000`, `0.0001` or `10000`, with or without a unit behind: no exposure of such a camera is a second
 /// long.
-fn exposure(text: &str) -> Option<f64> {
+fn parse_exposure(text: &str) -> Option<f64> {
     let number = text.trim_end_matches(|c: char| c.is_alphabetic() || c.is_whitespace() || c == '.');
     match number.split_once('/') {
-        Some((above, below)) => Some(positive(above.trim())? / positive(below.trim())?),
-        None => positive(number).map(|value| if value < 1.0 { value } else { 1.0 / value }),
+        Some((above, below)) => Some(parse_positive(above.trim())? / parse_positive(below.trim())?),
+        None => parse_positive(number).map(|value| if value < 1.0 { value } else { 1.0 / value }),
     }
 }
 
@@ -194,16 +200,16 @@ mod tests {
         <shutterSpeed>40000</shutterSpeed></recordInfo>\n<totalFrame>8</totalFrame>\
         <skipFrame>\n1\n</skipFrame></cih>\n\x00";
 
-    fn companion(name: &str, bytes: &[u8]) -> Companion {
-        Companion { name: name.to_owned(), bytes: bytes.to_vec() }
+    fn companion(name: &str, bytes: &[u8]) -> CompanionFile {
+        CompanionFile { name: name.to_owned(), bytes: bytes.to_vec() }
     }
 
     fn ask<T>(
         name: &str,
         bytes: &[u8],
-        ask: impl Fn(&Record) -> Result<T, ImportError>,
+        ask: impl Fn(&CameraRecord) -> Result<T, ImportError>,
     ) -> Result<T, String> {
-        ask(&Record::of(&companion(name, bytes)).unwrap()).map_err(|error| error.to_string())
+        ask(&CameraRecord::parse(&companion(name, bytes)).unwrap()).map_err(|error| error.to_string())
     }
 
     fn rate(name: &str, bytes: &[u8]) -> Result<f64, String> {
@@ -215,8 +221,8 @@ mod tests {
         assert_eq!(rate("a/run.cih", CIH.as_bytes()), Ok(5000.0));
         assert_eq!(rate("run.CIH", CIH.replace(" : ", " :").as_bytes()), Ok(5000.0));
         assert_eq!(rate("run.cihx", CIHX), Ok(20_000.0));
-        assert_eq!(Record::of(&companion("run.cihx", CIHX)).unwrap().frames(), Some(8));
-        assert!(Record::of(&companion("run.set", b"")).is_none());
+        assert_eq!(CameraRecord::parse(&companion("run.cihx", CIHX)).unwrap().frame_count(), Some(8));
+        assert!(CameraRecord::parse(&companion("run.set", b"")).is_none());
     }
 
     #[test]
@@ -235,10 +241,10 @@ mod tests {
     #[test]
     fn exposures_are_fractions_seconds_or_nanoseconds() {
         for (text, seconds) in [("1/10000", 1e-4), ("0.0001", 1e-4), ("10000", 1e-4), ("1/10000 sec", 1e-4)] {
-            assert_eq!(exposure(text), Some(seconds), "{text}");
+            assert_eq!(parse_exposure(text), Some(seconds), "{text}");
         }
         for text in ["", "open", "1/0", "1/frame", "-1", "0"] {
-            assert_eq!(exposure(text), None, "{text}");
+            assert_eq!(parse_exposure(text), None, "{text}");
         }
         let of = |name: &str, text: &str| {
             ask(name, text.as_bytes(), |record| record.exposure_s(5000.0))

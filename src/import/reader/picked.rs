@@ -1,15 +1,15 @@
 //! Labels of single pictures: somebody picked frames of a video, and the rows are no motion.
 
-use crate::import::reader::findings::finding;
+use crate::import::reader::findings::new_finding;
 use crate::import::reader::track_file::Clock;
-use crate::recording::quality::{Check, Finding, Severity};
+use crate::recording::quality::{Check, QualityFinding, Severity};
 use std::collections::BTreeMap;
 
-const ADVICE: &str = "import the positions that the program finds in every frame of the video, not the labels \
+const PICKED_FRAMES_ADVICE: &str = "import the positions that the program finds in every frame of the video, not the labels \
     it is trained with";
 
 /// What to say of rows whose frames follow each other in no common step.
-pub(crate) fn picked(file: &str, clock: &Clock) -> Option<Finding> {
+pub(crate) fn picked_frames_finding(file: &str, clock: &Clock) -> Option<QualityFinding> {
     let frames: Vec<f64> = clock.frame.as_ref()?.iter().flatten().collect();
     let (first, last) = (*frames.first()?, *frames.last()?);
     let mut steps: BTreeMap<i64, usize> = BTreeMap::new();
@@ -25,7 +25,13 @@ pub(crate) fn picked(file: &str, clock: &Clock) -> Option<Finding> {
         frames.len()
     );
     (!is_series).then(|| {
-        finding(Check::PickedFrames, Severity::Serious, (frames.len() as f64, "frames"), found, ADVICE)
+        new_finding(
+            Check::PickedFrames,
+            Severity::Serious,
+            (frames.len() as f64, "frames"),
+            found,
+            PICKED_FRAMES_ADVICE,
+        )
     })
 }
 
@@ -35,7 +41,7 @@ mod tests {
 
     fn is_picked(frames: &[f64]) -> bool {
         let clock = Clock { frame: Some(frames.iter().copied().map(Some).collect()), ..Clock::default() };
-        picked("a.csv", &clock).is_some()
+        picked_frames_finding("a.csv", &clock).is_some()
     }
 
     #[test]

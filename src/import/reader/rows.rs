@@ -1,12 +1,12 @@
 //! The rows of a table, one after the other: the only file that names `csv`.
 
-use crate::import::error::{ImportError, Place};
-use crate::import::reader::delimiter::{Delimiter, Line, is_comment};
+use crate::import::error::{ImportError, TextLocation};
+use crate::import::reader::delimiter::{Delimiter, NumberedLine, is_comment};
 use csv::{ReaderBuilder, StringRecord};
 
 /// A row with its cells, trimmed and without their quotes.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Row {
+pub(crate) struct TextRow {
     /// 1-based line.
     pub line: usize,
     /// Its cells.
@@ -15,14 +15,14 @@ pub(crate) struct Row {
     pub(crate) start: usize,
 }
 
-impl Row {
+impl TextRow {
     /// Cells up to the last one with anything in it.
-    pub(crate) fn filled(&self) -> usize {
+    pub(crate) fn used_width(&self) -> usize {
         self.cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1)
     }
 
     /// The first cell; empty where there is none.
-    pub(crate) fn first(&self) -> &str {
+    pub(crate) fn first_cell(&self) -> &str {
         self.cells.first().map_or("", String::as_str)
     }
 
@@ -34,21 +34,21 @@ impl Row {
 
 /// A row while it is read.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Record<'r> {
+pub(crate) struct RowView<'r> {
     /// 1-based line.
     pub line: usize,
     cells: &'r StringRecord,
 }
 
-impl<'r> Record<'r> {
+impl<'r> RowView<'r> {
     /// All cells, trimmed and without their quotes.
     pub(crate) fn cells(&self) -> Vec<String> {
-        self.cells.iter().map(|cell| bare(cell).to_owned()).collect()
+        self.cells.iter().map(|cell| trim_cell(cell).to_owned()).collect()
     }
 
     /// A cell, trimmed and without its quotes; empty beyond the end of the row.
     pub(crate) fn cell(&self, index: usize) -> &'r str {
-        self.cells.get(index).map_or("", bare)
+        self.cells.get(index).map_or("", trim_cell)
     }
 
     /// Number of cells.
@@ -58,11 +58,11 @@ impl<'r> Record<'r> {
 
     /// Whether there is nothing in any cell.
     pub(crate) fn is_empty(&self) -> bool {
-        self.cells.iter().all(|cell| bare(cell).is_empty())
+        self.cells.iter().all(|cell| trim_cell(cell).is_empty())
     }
 
     /// Cells up to the last one with anything in it.
-    pub(crate) fn filled(&self) -> usize {
+    pub(crate) fn used_width(&self) -> usize {
         (0..self.len()).rev().find(|&index| !self.cell(index).is_empty()).map_or(0, |last| last + 1)
     }
 }
@@ -73,7 +73,7 @@ pub(crate) fn count_lines(bytes: &[u8]) -> usize {
 }
 
 /// A cell without the blanks and quotes around it.
-fn bare(cell: &str) -> &str {
+fn trim_cell(cell: &str) -> &str {
     let plain = |byte: Option<&u8>| byte.is_some_and(|b| b.is_ascii_graphic() && *b != b'"');
     if plain(cell.as_bytes().first()) && plain(cell.as_bytes().last()) {
         return cell; // nearly every cell there is
@@ -83,11 +83,11 @@ fn bare(cell: &str) -> &str {
 }
 
 /// The rows of a table, one after the other in the same memory.
-pub(crate) struct Rows<'t> {
+pub(crate) struct RowReader<'t> {
     file: &'t str,
     text: &'t str,
     delimiter: Delimiter,
-    source: Reader<'t>,
+    source: RecordReader<'t>,
     /// Where the source starts in the text of the table, bytes.
     base: usize,
     /// Up to where lines are counted, bytes; `line` is the line there.
@@ -98,12 +98,12 @@ pub(crate) struct Rows<'t> {
     record: StringRecord,
 }
 
-enum Reader<'t> {
+enum RecordReader<'t> {
     Csv(Box<csv::Reader<&'t [u8]>>),
     Blanks(&'t str, usize),
 }
 
-impl<'t> Reader<'t> {
+impl<'t> RecordReader<'t> {
     fn new(text: &'t str, delimiter: Delimiter) -> Self {
         match delimiter.byte() {
             Some(byte) => Self::Csv(Box::new(
@@ -118,7 +118,7 @@ impl<'t> Reader<'t> {
     }
 
     /// Reads a row and gives the bytes that it spans, line ends before it included.
-    fn read(&mut self, record: &mut StringRecord) -> Option<(usize, usize)> {
+    fn read_record(&mut self, record: &mut StringRecord) -> Option<(usize, usize)> {
         match self {
             Self::Csv(reader) => {
                 let from = reader.position().byte() as usize;
@@ -138,14 +138,14 @@ impl<'t> Reader<'t> {
     }
 }
 
-impl<'t> Rows<'t> {
+impl<'t> RowReader<'t> {
     /// The rows from byte `start` of `text` on; `file` is its name, for messages.
     pub(crate) fn new(file: &'t str, text: &'t str, delimiter: Delimiter, start: usize) -> Self {
         Self {
             file,
             text,
             delimiter,
-            source: Reader::new(text.get(start..).unwrap_or_default(), delimiter),
+            source: RecordReader::new(text.get(start..).unwrap_or_default(), delimiter),
             base: start,
             counted: start,
             line: count_lines(&text.as_bytes()[..start.min(text.len())]) + 1,
@@ -155,18 +155,18 @@ impl<'t> Rows<'t> {
     }
 
     /// Where the present row starts in the text, bytes.
-    pub(crate) fn start(&self) -> usize {
+    pub(crate) fn row_start(&self) -> usize {
         self.start
     }
 
     /// The next row that is no comment, rows of empty cells included, lines without anything in them not.
     ///
     /// # Errors
-    /// [`ImportError::Quote`] for a quoted cell that does not end in its line.
+    /// [`ImportError::OpenQuote`] for a quoted cell that does not end in its line.
     #[allow(clippy::should_implement_trait)] // (a row lives until the next is read)
-    pub(crate) fn next(&mut self) -> Result<Option<Record<'_>>, ImportError> {
+    pub(crate) fn next_row(&mut self) -> Result<Option<RowView<'_>>, ImportError> {
         let text = self.text;
-        while let Some((from, to)) = self.source.read(&mut self.record) {
+        while let Some((from, to)) = self.source.read_record(&mut self.record) {
             let span = text.get(self.base + from..self.base + to).unwrap_or_default();
             let is_end = |byte: &&u8| matches!(**byte, b'\n' | b'\r');
             let before = span.as_bytes().iter().take_while(is_end).count();
@@ -181,36 +181,40 @@ impl<'t> Rows<'t> {
             }
             if is_comment(row) {
                 if let Some(end) = row.find('\n') {
-                    self.start_again(self.start + end); // a quotation mark in a comment quotes nothing
+                    self.restart_at(self.start + end); // a quotation mark in a comment quotes nothing
                 }
                 continue;
             }
             if row.as_bytes().contains(&b'\n') {
-                return Err(ImportError::Quote {
-                    place: Place { file: self.file.to_owned(), line: self.line, column: 1 },
+                return Err(ImportError::OpenQuote {
+                    place: TextLocation { file: self.file.to_owned(), line: self.line, column: 1 },
                     lines: count_lines(row.as_bytes()) + 1,
                 });
             }
-            return Ok(Some(Record { line: self.line, cells: &self.record }));
+            return Ok(Some(RowView { line: self.line, cells: &self.record }));
         }
         Ok(None)
     }
 
     /// Reads on from a line end, byte `at` of the text.
-    fn start_again(&mut self, at: usize) {
-        self.source = Reader::new(self.text.get(at..).unwrap_or_default(), self.delimiter);
+    fn restart_at(&mut self, at: usize) {
+        self.source = RecordReader::new(self.text.get(at..).unwrap_or_default(), self.delimiter);
         (self.base, self.counted) = (at, at);
     }
 }
 
 /// Cells of single lines; a line with an open quote takes the next ones in.
-pub(crate) fn rows_of(lines: &[Line], delimiter: Delimiter) -> Vec<Row> {
+pub(crate) fn parse_rows(lines: &[NumberedLine], delimiter: Delimiter) -> Vec<TextRow> {
     let text: String = lines.iter().flat_map(|(_, line)| [*line, "\n"]).collect();
-    let mut source = Reader::new(&text, delimiter);
+    let mut source = RecordReader::new(&text, delimiter);
     let (mut record, mut rows, mut line) = (StringRecord::new(), vec![], 0);
-    while let Some((from, to)) = source.read(&mut record) {
+    while let Some((from, to)) = source.read_record(&mut record) {
         let number = lines.get(line).map_or(0, |line| line.0);
-        rows.push(Row { line: number, cells: Record { line: number, cells: &record }.cells(), start: from });
+        rows.push(TextRow {
+            line: number,
+            cells: RowView { line: number, cells: &record }.cells(),
+            start: from,
+        });
         line += count_lines(text.as_bytes().get(from..to).unwrap_or_default());
     }
     rows

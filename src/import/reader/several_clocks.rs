@@ -2,10 +2,10 @@
 
 use crate::import::error::ImportError;
 use crate::import::reader::document::Document;
-use crate::import::reader::layout::Layout;
-use crate::import::reader::number::Number;
-use crate::import::reader::rows::Record;
-use crate::import::reader::table::Table;
+use crate::import::reader::layout::TableLayout;
+use crate::import::reader::number::CellNumber;
+use crate::import::reader::rows::RowView;
+use crate::import::reader::table::DelimitedTable;
 use crate::import::reader::track_file::{Facts, TrackFile};
 use crate::math;
 
@@ -17,7 +17,7 @@ pub(crate) struct ClockCell {
 }
 
 /// A row in which two clocks differ.
-pub(crate) struct Difference {
+pub(crate) struct ClockDifference {
     pub line: usize,
     /// Cell of the second clock.
     pub cell: usize,
@@ -30,15 +30,15 @@ pub(crate) struct Difference {
 ///
 /// # Errors
 /// [`ImportError`] for rows that cannot be read, and for clocks that are no numbers.
-pub(crate) fn difference(
-    table: &Table,
+pub(crate) fn find_clock_difference(
+    table: &DelimitedTable,
     start: usize,
     first: ClockCell,
     other: ClockCell,
-) -> Result<Option<Difference>, ImportError> {
+) -> Result<Option<ClockDifference>, ImportError> {
     let mut rows = table.rows(start);
-    while let Some(record) = rows.next()? {
-        let [one, two] = [first, other].map(|clock| reading(table, &record, clock));
+    while let Some(record) = rows.next_row()? {
+        let [one, two] = [first, other].map(|clock| read_clock(table, &record, clock));
         let (one, two) = (one?, two?);
         let differs = match (one, two) {
             (Some((a, a_digit)), Some((b, b_digit))) => (a - b).abs() > (a_digit + b_digit) * (1.0 + 1e-6),
@@ -47,26 +47,30 @@ pub(crate) fn difference(
         };
         if differs {
             let texts = [first, other].map(|clock| record.cell(clock.cell).to_owned());
-            return Ok(Some(Difference { line: record.line, cell: other.cell, texts }));
+            return Ok(Some(ClockDifference { line: record.line, cell: other.cell, texts }));
         }
     }
     Ok(None)
 }
 
 /// What a clock says in a row, and what its last digit is worth.
-fn reading(table: &Table, record: &Record, clock: ClockCell) -> Result<Option<(f64, f64)>, ImportError> {
+fn read_clock(
+    table: &DelimitedTable,
+    record: &RowView,
+    clock: ClockCell,
+) -> Result<Option<(f64, f64)>, ImportError> {
     let text = record.cell(clock.cell);
-    match table.number(text) {
-        Number::Value(value) => {
-            Ok(Some((value * clock.unit, last_digit(text, table.dialect.decimal) * clock.unit)))
+    match table.parse_cell(text) {
+        CellNumber::Value(value) => {
+            Ok(Some((value * clock.unit, last_digit_value(text, table.dialect.decimal) * clock.unit)))
         }
-        Number::Missing => Ok(None),
-        Number::Text => Err(table.not_a_number(record.line, clock.cell, text, "time")),
+        CellNumber::Missing => Ok(None),
+        CellNumber::Text => Err(table.not_a_number_error(record.line, clock.cell, text, "time")),
     }
 }
 
 /// What the last digit of a written number is worth.
-fn last_digit(text: &str, decimal: char) -> f64 {
+fn last_digit_value(text: &str, decimal: char) -> f64 {
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let decimals = mantissa.split_once(decimal).map_or(0, |(_, decimals)| decimals.len());
     let exponent: i32 = exponent.replace('\u{2212}', "-").parse().unwrap_or(0);
@@ -76,16 +80,17 @@ fn last_digit(text: &str, decimal: char) -> f64 {
 /// The tracks of each clock of a table in one file: rows that hold nothing of a clock are not its own.
 ///
 /// # Errors
-/// As [`Layout::read`].
-pub(crate) fn read_apart<'a>(
-    layouts: Vec<Layout>,
+/// As [`TableLayout::read_tracks`].
+pub(crate) fn read_clocks_apart<'a>(
+    layouts: Vec<TableLayout>,
     document: &'a Document,
-    table: &'a Table,
+    table: &'a DelimitedTable,
     facts: Facts,
 ) -> Result<TrackFile<'a>, ImportError> {
-    let mut all = TrackFile { table: Some(table), facts: facts.clone(), ..TrackFile::of(document) };
+    let mut all = TrackFile { table: Some(table), facts: facts.clone(), ..TrackFile::for_document(document) };
     for layout in layouts {
-        let mut part = Layout { of_others: true, ..layout }.read(document, table, facts.clone())?;
+        let mut part =
+            TableLayout { of_others: true, ..layout }.read_tracks(document, table, facts.clone())?;
         part.tracks.iter_mut().for_each(|track| track.clock += all.clocks.len());
         all.clocks.append(&mut part.clocks);
         all.tracks.append(&mut part.tracks);
@@ -102,9 +107,9 @@ mod tests {
     #[test]
     fn clocks_are_one_as_far_as_their_digits_show() {
         let line = |text: &str, unit: f64| {
-            let table = Table::read("a.txt", text).unwrap();
+            let table = DelimitedTable::parse("a.txt", text).unwrap();
             let clock = |cell: usize, unit: f64| ClockCell { cell, unit };
-            difference(&table, 1, clock(0, 1.0), clock(1, unit)).unwrap().map(|found| found.line)
+            find_clock_difference(&table, 1, clock(0, 1.0), clock(1, unit)).unwrap().map(|found| found.line)
         };
         assert_eq!(line("t,u\n0,0\n0.5,0.5\n1,1\n", 1.0), None);
         assert_eq!(line("t,u\n0,0\n0.5,500\n1,1000.0\n", 1e-3), None);

@@ -25,7 +25,7 @@ const LONGEST_MONTH: usize = 4;
 const DATE_MARKS: [char; 6] = ['.', '-', '/', ' ', '\'', ','];
 
 /// What a spreadsheet did to the number that belongs into a cell, and what to do about it.
-pub(crate) fn damage(text: &str) -> Option<&'static str> {
+pub(crate) fn describe_damage(text: &str) -> Option<&'static str> {
     type Sign = fn(&str) -> bool;
     let signs: [(Sign, &str); 4] =
         [(is_hidden, HIDDEN), (is_error, FAILED), (is_date, DATE), (is_grouped, GROUPED)];
@@ -116,11 +116,11 @@ mod tests {
         ];
         for (words, texts) in cases {
             for text in texts {
-                assert_eq!(damage(text), Some(words), "{text}");
+                assert_eq!(describe_damage(text), Some(words), "{text}");
             }
         }
         for text in ["1,5", "1.2.3", "lost", "Tip 1", "a 1,2,3", "", "#", "marker 3", "32.1.x", "maybe"] {
-            assert_eq!(damage(text), None, "{text}");
+            assert_eq!(describe_damage(text), None, "{text}");
         }
     }
 

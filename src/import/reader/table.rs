@@ -1,10 +1,10 @@
 //! A delimited file: its first rows as a whole, all of them one by one, and where a cell stands.
 
-use crate::import::error::{CellProblem, ImportError, Place};
-use crate::import::reader::delimiter::{declaration, is_comment};
+use crate::import::error::{CellProblem, ImportError, TextLocation};
+use crate::import::reader::delimiter::{declared_delimiter, is_comment};
 use crate::import::reader::dialect::Dialect;
-use crate::import::reader::number::{Number, number};
-use crate::import::reader::rows::{Record, Row, Rows, count_lines, rows_of};
+use crate::import::reader::number::{CellNumber, parse_number};
+use crate::import::reader::rows::{RowReader, RowView, TextRow, count_lines, parse_rows};
 use crate::import::reader::spreadsheet;
 
 /// Rows at the start that formats look at as a whole: the longest header known has a dozen.
@@ -14,42 +14,42 @@ const BROKEN_MINUS: &str = "\u{e2}\u{2c6}";
 /// Rows of a header behind comment marks: names and units.
 const COMMENTED_ROWS: usize = 2;
 /// Tracker's mark of a file with several tracks; other lines that start so are comments.
-pub(crate) const MULTI: &str = "#multi:";
+pub(crate) const MULTI_TRACK_MARK: &str = "#multi:";
 /// What belongs in a cell, by the decimal mark of the file.
 const POINT_NUMBER: &str = "a number with a decimal point as in the rest of the file, or an empty cell";
 const COMMA_NUMBER: &str = "a number with a decimal comma as in the rest of the file, or an empty cell";
 
 /// A delimited file; comments are left out.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(crate) struct Table<'a> {
+pub(crate) struct DelimitedTable<'a> {
     /// File as named by the user.
     pub file: &'a str,
     /// How it is written.
     pub dialect: Dialect,
-    /// Whether it starts with [`MULTI`].
+    /// Whether it starts with [`MULTI_TRACK_MARK`].
     pub multi: bool,
     /// Its first rows with anything in them, header rows included.
-    pub head: Vec<Row>,
+    pub head: Vec<TextRow>,
     text: &'a str,
 }
 
-impl<'a> Table<'a> {
+impl<'a> DelimitedTable<'a> {
     /// Finds the dialect of a file and reads its first rows.
     ///
     /// # Errors
     /// [`ImportError`] when no delimiter makes columns, when there are no numbers, or when commas are both.
-    pub(crate) fn read(file: &'a str, text: &'a str) -> Result<Self, ImportError> {
+    pub(crate) fn parse(file: &'a str, text: &'a str) -> Result<Self, ImportError> {
         let dialect = Dialect::find(file, text)?;
-        let multi = text.lines().next().is_some_and(|line| line.trim() == MULTI);
+        let multi = text.lines().next().is_some_and(|line| line.trim() == MULTI_TRACK_MARK);
         let mut table = Self { file, dialect, multi, head: vec![], text };
-        let mut rows = table.rows_from(declaration(text).map_or(0, |(_, length)| length));
+        let mut rows = table.rows_from(declared_delimiter(text).map_or(0, |(_, length)| length));
         let mut head = vec![];
         while head.len() < HEAD_ROWS
-            && let Some(record) = rows.next()?
+            && let Some(record) = rows.next_row()?
         {
             if !record.is_empty() {
                 let (line, cells) = (record.line, record.cells());
-                head.push(Row { line, cells, start: rows.start() });
+                head.push(TextRow { line, cells, start: rows.row_start() });
             }
         }
         let names = head.first().map(|first| table.names_in_comments(first)).unwrap_or_default();
@@ -60,17 +60,17 @@ impl<'a> Table<'a> {
 
     /// Names of columns, and perhaps their units below, behind `#` or `%` directly above the first row of
     /// numbers: what numpy's `savetxt` and scripts for gnuplot and MATLAB write.
-    fn names_in_comments(&self, first: &Row) -> Vec<Row> {
-        let kind = |cell: &String| self.number(cell);
-        let numbers = first.cells.iter().any(|cell| matches!(kind(cell), Number::Value(_)))
-            && !first.cells.iter().any(|cell| kind(cell) == Number::Text);
-        let mut rows: Vec<Row> = vec![];
+    fn names_in_comments(&self, first: &TextRow) -> Vec<TextRow> {
+        let kind = |cell: &String| self.parse_cell(cell);
+        let numbers = first.cells.iter().any(|cell| matches!(kind(cell), CellNumber::Value(_)))
+            && !first.cells.iter().any(|cell| kind(cell) == CellNumber::Text);
+        let mut rows: Vec<TextRow> = vec![];
         while numbers && rows.len() < COMMENTED_ROWS {
             let Some(row) = self.comment_above(rows.last().map_or(first.start, |row| row.start)) else {
                 break;
             };
             if row.cells.len() != first.cells.len()
-                || !row.cells.iter().all(|cell| kind(cell) == Number::Text)
+                || !row.cells.iter().all(|cell| kind(cell) == CellNumber::Text)
             {
                 break;
             }
@@ -82,40 +82,40 @@ impl<'a> Table<'a> {
 
     /// The line that ends where `end` starts, bytes, as cells without the comment mark; none where it has
     /// none.
-    fn comment_above(&self, end: usize) -> Option<Row> {
+    fn comment_above(&self, end: usize) -> Option<TextRow> {
         let above = self.text.get(..end)?.strip_suffix('\n')?.trim_end_matches('\r');
         let start = above.rfind('\n').map_or(0, |end| end + 1);
         let line = count_lines(&above.as_bytes()[..start]) + 1;
         let names = above.get(start..)?.strip_prefix(['#', '%'])?.trim();
-        let cells = rows_of(&[(line, names)], self.dialect.delimiter).pop()?.cells;
-        Some(Row { line, cells, start })
+        let cells = parse_rows(&[(line, names)], self.dialect.delimiter).pop()?.cells;
+        Some(TextRow { line, cells, start })
     }
 
     /// The rows from row `from` of the head on, rows of empty cells included.
-    pub(crate) fn rows(&self, from: usize) -> Rows<'_> {
+    pub(crate) fn rows(&self, from: usize) -> RowReader<'_> {
         self.rows_from(self.head.get(from).map_or(self.text.len(), |row| row.start))
     }
 
     /// The rows from byte `start` of the text on.
-    fn rows_from(&self, start: usize) -> Rows<'_> {
-        Rows::new(self.file, self.text, self.dialect.delimiter, start)
+    fn rows_from(&self, start: usize) -> RowReader<'_> {
+        RowReader::new(self.file, self.text, self.dialect.delimiter, start)
     }
 
     /// Whether some number has an exponent as spreadsheets write it: nothing else is worth a second reading.
-    pub(crate) fn may_be_cut(&self) -> bool {
+    pub(crate) fn may_have_cut_numbers(&self) -> bool {
         self.text.contains("E+") || self.text.contains("E-")
     }
 
     /// What `cell` says in the table's decimal mark.
-    pub(crate) fn number(&self, cell: &str) -> Number {
-        number(cell, self.dialect.decimal)
+    pub(crate) fn parse_cell(&self, cell: &str) -> CellNumber {
+        parse_number(cell, self.dialect.decimal)
     }
 
     /// Whether the first row of the head with a number in each of `cells` is row `from` or a later one; its
     /// index.
-    pub(crate) fn first_numeric(&self, from: usize, cells: &[usize]) -> Option<usize> {
-        let is_value = |row: &Row, cell: usize| {
-            row.cells.get(cell).is_some_and(|text| matches!(self.number(text), Number::Value(_)))
+    pub(crate) fn first_numeric_row(&self, from: usize, cells: &[usize]) -> Option<usize> {
+        let is_value = |row: &TextRow, cell: usize| {
+            row.cells.get(cell).is_some_and(|text| matches!(self.parse_cell(text), CellNumber::Value(_)))
         };
         (from..self.head.len()).find(|&row| cells.iter().all(|cell| is_value(&self.head[row], *cell)))
     }
@@ -124,38 +124,48 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// [`ImportError::Cell`] for anything else.
-    pub(crate) fn value(&self, record: &Record, cell: usize, name: &str) -> Result<Option<f64>, ImportError> {
-        match self.number(record.cell(cell)) {
-            Number::Value(value) => Ok(Some(value)),
-            Number::Missing => Ok(None),
-            Number::Text => Err(self.not_a_number(record.line, cell, record.cell(cell), name)),
+    pub(crate) fn number_at(
+        &self,
+        record: &RowView,
+        cell: usize,
+        name: &str,
+    ) -> Result<Option<f64>, ImportError> {
+        match self.parse_cell(record.cell(cell)) {
+            CellNumber::Value(value) => Ok(Some(value)),
+            CellNumber::Missing => Ok(None),
+            CellNumber::Text => Err(self.not_a_number_error(record.line, cell, record.cell(cell), name)),
         }
     }
 
     /// The same of a cell that the table may not have.
-    pub(crate) fn optional(
+    pub(crate) fn optional_number_at(
         &self,
-        record: &Record,
+        record: &RowView,
         cell: Option<usize>,
         name: &str,
     ) -> Result<Option<f64>, ImportError> {
-        cell.map_or(Ok(None), |cell| self.value(record, cell, name))
+        cell.map_or(Ok(None), |cell| self.number_at(record, cell, name))
     }
 
     /// Cells may not be left off below `width`, and nothing may follow cell `most`.
-    pub(crate) fn check_length(&self, record: &Record, width: usize, most: usize) -> Result<(), ImportError> {
-        if record.len() >= width && (record.len() <= most || record.filled() <= most) {
+    pub(crate) fn check_row_length(
+        &self,
+        record: &RowView,
+        width: usize,
+        most: usize,
+    ) -> Result<(), ImportError> {
+        if record.len() >= width && (record.len() <= most || record.used_width() <= most) {
             return Ok(());
         }
-        let place = self.place(record.line, 1);
+        let place = self.location(record.line, 1);
         Err(ImportError::Ragged { place, found: record.len(), expected: width.max(1) })
     }
 
     /// The refusal of a cell that is no number.
-    pub(crate) fn not_a_number(&self, line: usize, cell: usize, text: &str, name: &str) -> ImportError {
+    pub(crate) fn not_a_number_error(&self, line: usize, cell: usize, text: &str, name: &str) -> ImportError {
         let other = if self.dialect.decimal == '.' { ',' } else { '.' };
-        let advice = match number(text, other) {
-            Number::Value(_) => {
+        let advice = match parse_number(text, other) {
+            CellNumber::Value(_) => {
                 "the decimal mark changes within the file, or a mark separates thousands: export again with one \
                  format of numbers"
             }
@@ -167,13 +177,13 @@ impl<'a> Table<'a> {
                 "export times as seconds, or use a column of frame numbers (--columns frame=...; frame=row \
                  if every row is a frame)"
             }
-            _ => spreadsheet::damage(text).unwrap_or(
+            _ => spreadsheet::describe_damage(text).unwrap_or(
                 "correct the cell from what the tracking program shows, or export again; a lost point is an \
                  empty cell",
             ),
         };
         ImportError::Cell {
-            place: self.place(line, self.column(line, cell)),
+            place: self.location(line, self.text_column(line, cell)),
             problem: CellProblem::NotANumber,
             name: name.to_owned(),
             found: text.chars().take(60).collect::<String>().into(),
@@ -186,7 +196,7 @@ impl<'a> Table<'a> {
     ///
     /// # Errors
     /// [`ImportError::Columns`] for the first such line below line `header`.
-    pub(crate) fn refuse_comments(
+    pub(crate) fn refuse_comment_names(
         &self,
         header: usize,
         named: &str,
@@ -205,12 +215,12 @@ impl<'a> Table<'a> {
     }
 
     /// A place in this file.
-    pub(crate) fn place(&self, line: usize, column: usize) -> Place {
-        Place { file: self.file.to_owned(), line, column }
+    pub(crate) fn location(&self, line: usize, column: usize) -> TextLocation {
+        TextLocation { file: self.file.to_owned(), line, column }
     }
 
     /// 1-based column of the first character of a cell.
-    pub(crate) fn column(&self, line: usize, cell: usize) -> usize {
+    pub(crate) fn text_column(&self, line: usize, cell: usize) -> usize {
         let Some(text) = self.text.lines().nth(line.saturating_sub(1)) else { return 1 };
         let Some(delimiter) = self.dialect.delimiter.byte() else { return column_of_word(text, cell) };
         let (mut quoted, mut passed) = (false, 0);
@@ -246,10 +256,10 @@ mod tests {
     use super::*;
 
     fn rows(text: &str) -> Vec<(usize, Vec<String>)> {
-        let table = Table::read("a.txt", text).unwrap();
+        let table = DelimitedTable::parse("a.txt", text).unwrap();
         let mut rows = table.rows(0);
         let mut found = vec![];
-        while let Some(record) = rows.next().unwrap() {
+        while let Some(record) = rows.next_row().unwrap() {
             found.push((record.line, (0..record.len()).map(|cell| record.cell(cell).to_owned()).collect()));
         }
         found
@@ -282,15 +292,15 @@ mod tests {
     fn quoted_cells_hold_delimiters_and_end_in_their_line() {
         assert_eq!(rows("\"t\",\"a,b\"\n \"1\" ,\"2\"\n")[0].1, ["t", "a,b"]);
         assert_eq!(rows("\"t\",\"a,b\"\n \"1\" ,\"2\"\n")[1].1, ["1", "2"]);
-        let table = Table::read("a.txt", "t,x\n0,1\n1,2\n2,3\n3,4\n").unwrap();
-        assert_eq!(table.rows(1).next().unwrap().map(|record| record.line), Some(2));
+        let table = DelimitedTable::parse("a.txt", "t,x\n0,1\n1,2\n2,3\n3,4\n").unwrap();
+        assert_eq!(table.rows(1).next_row().unwrap().map(|record| record.line), Some(2));
         let open = (0..200)
             .map(|i| if i == 150 { "150,\"2\n".to_owned() } else { format!("{i},2\n") })
             .collect::<String>();
-        let table = Table::read("a.txt", &open).unwrap();
+        let table = DelimitedTable::parse("a.txt", &open).unwrap();
         let mut rows = table.rows(0);
         let error = loop {
-            match rows.next() {
+            match rows.next_row() {
                 Ok(row) => assert!(row.is_some()),
                 Err(error) => break error.to_string(),
             }
@@ -300,8 +310,8 @@ mod tests {
 
     #[test]
     fn cells_that_are_no_numbers_say_what_to_do() {
-        let table = Table::read("a.txt", "t,x\n0,1\n1,2\n").unwrap();
-        let says = |cell: &str| table.not_a_number(2, 1, cell, "x").to_string();
+        let table = DelimitedTable::parse("a.txt", "t,x\n0,1\n1,2\n").unwrap();
+        let says = |cell: &str| table.not_a_number_error(2, 1, cell, "x").to_string();
         assert!(says("1,234.5").contains("separators of thousands"), "{}", says("1,234.5"));
         assert!(says("1,5").contains("the decimal mark changes within the file"), "{}", says("1,5"));
         for other in ["1.2.3", "lost", "Tip 1", "a 1,2,3"] {
@@ -318,10 +328,10 @@ mod tests {
 
     #[test]
     fn a_cell_is_found_in_its_line() {
-        let table = Table::read("a.txt", "name,\"a,b\", x\n1,\"2,5\",  3\n4,5,6\n").unwrap();
-        assert_eq!([0, 1, 2].map(|cell| table.column(1, cell)), [1, 6, 13]);
-        assert_eq!([0, 1, 2].map(|cell| table.column(2, cell)), [1, 3, 11]);
-        let table = Table::read("a.txt", "  t   x\n 0   1.5\n 1   2.5\n").unwrap();
-        assert_eq!((table.column(2, 0), table.column(2, 1)), (2, 6));
+        let table = DelimitedTable::parse("a.txt", "name,\"a,b\", x\n1,\"2,5\",  3\n4,5,6\n").unwrap();
+        assert_eq!([0, 1, 2].map(|cell| table.text_column(1, cell)), [1, 6, 13]);
+        assert_eq!([0, 1, 2].map(|cell| table.text_column(2, cell)), [1, 3, 11]);
+        let table = DelimitedTable::parse("a.txt", "  t   x\n 0   1.5\n 1   2.5\n").unwrap();
+        assert_eq!((table.text_column(2, 0), table.text_column(2, 1)), (2, 6));
     }
 }

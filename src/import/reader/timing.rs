@@ -2,7 +2,7 @@
 
 use crate::import::error::{CellProblem, ImportError};
 use crate::import::reader::column::Column;
-use crate::import::reader::rounding::{QUANTA_S, RATE_AGREEMENT, is_multiple};
+use crate::import::reader::rounding::{QUANTA_S, RATE_AGREEMENT, are_multiples};
 use crate::import::reader::track_file::{Clock, TrackFile};
 use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
@@ -16,7 +16,7 @@ pub(crate) const MOST_SPREAD: i64 = 1000;
 
 /// What the user declares about time.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Declared {
+pub(crate) struct DeclaredTiming {
     pub rate_hz: f64,
     /// Whether times are those of playback, which only count frames.
     pub playback: bool,
@@ -25,7 +25,7 @@ pub(crate) struct Declared {
 
 /// Rows of a clock with their frames.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Placed {
+pub(crate) struct RowFrames {
     /// Frame of every row: the file's own numbers, or counted from its first row.
     pub frames: Vec<i64>,
     /// Whether they are the file's own numbers.
@@ -38,30 +38,33 @@ pub(crate) struct Placed {
 
 /// A clock with the export it belongs to.
 #[derive(Clone, Copy)]
-pub(crate) struct Rows<'e> {
+pub(crate) struct ClockRows<'e> {
     pub export: &'e TrackFile<'e>,
     pub clock: &'e Clock,
 }
 
 /// Gives every row its frame.
-pub(crate) fn place(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
+pub(crate) fn place_rows(rows: ClockRows, declared: DeclaredTiming) -> Result<RowFrames, ImportError> {
     let file = || rows.export.file.to_owned();
     match rows.clock.len() {
         0 => return Err(ImportError::HeaderOnly { file: file(), line: 1 }),
         // (a point may be digitized once where others are tracked: its frame has a number)
         1 if rows.clock.frame.is_none() || rows.export.clocks.iter().all(|clock| clock.len() < 2) => {
-            return Err(ImportError::OneRow { file: file(), line: rows.clock.line(0) });
+            return Err(ImportError::OneRow { file: file(), line: rows.clock.line_number(0) });
         }
         _ => {}
     }
-    let placed =
-        if rows.clock.frame.is_some() { by_number(rows, declared) } else { by_time(rows, declared) }?;
+    let placed = if rows.clock.frame.is_some() {
+        place_by_number(rows, declared)
+    } else {
+        place_by_time(rows, declared)
+    }?;
     refuse_sparse(rows, &placed)?;
     Ok(placed)
 }
 
 /// Rows spread so thin that one of their numbers is damaged; this also bounds memory by the size of the file.
-fn refuse_sparse(rows: Rows, placed: &Placed) -> Result<(), ImportError> {
+fn refuse_sparse(rows: ClockRows, placed: &RowFrames) -> Result<(), ImportError> {
     let jump = |row: usize| placed.frames[row] - placed.frames[row - 1];
     let span = placed.frames.last().zip(placed.frames.first()).map_or(0, |(last, first)| last - first);
     if span <= MOST_SPREAD * placed.frames.len() as i64 {
@@ -74,40 +77,44 @@ fn refuse_sparse(rows: Rows, placed: &Placed) -> Result<(), ImportError> {
         .as_ref()
         .or(clock.time.as_ref())
         .and_then(|column| column.get(row))
-        .map_or_else(String::new, readable);
-    Err(cell(rows, row, CellProblem::FarAway, found))
+        .map_or_else(String::new, format_number);
+    Err(cell_error(rows, row, CellProblem::FarAway, found))
 }
 
 /// Refuses two clocks of a file that number the same frames at other times.
-pub(crate) fn refuse_apart(rows: Rows, placed: [&Placed; 2], rate_hz: f64) -> Result<(), ImportError> {
-    let zero_s = |placed: &Placed| {
+pub(crate) fn refuse_clock_mismatch(
+    rows: ClockRows,
+    placed: [&RowFrames; 2],
+    rate_hz: f64,
+) -> Result<(), ImportError> {
+    let zero_s = |placed: &RowFrames| {
         let timed = placed.numbered && placed.implied_hz.is_some();
         placed.frames.first().filter(|_| timed).map(|first| placed.start_s - *first as f64 / rate_hz)
     };
     let [Some(first_s), Some(other_s)] = placed.map(zero_s) else { return Ok(()) };
     let times: Vec<f64> = rows.clock.time.iter().flat_map(Column::iter).flatten().collect();
-    let rounding_s = QUANTA_S.into_iter().find(|quantum| is_multiple(&times, *quantum)).unwrap_or(0.0);
+    let rounding_s = QUANTA_S.into_iter().find(|quantum| are_multiples(&times, *quantum)).unwrap_or(0.0);
     // (rates that agree within their tolerance part over many frames)
     let [first, other] = placed.map(|placed| placed.frames.first().copied().unwrap_or(0));
     let drift_s = RATE_AGREEMENT * (other - first).abs() as f64 / rate_hz;
     if (first_s - other_s).abs() <= 0.5 / rate_hz + rounding_s + drift_s {
         return Ok(());
     }
-    Err(ImportError::Grids {
+    Err(ImportError::GridMismatch {
         file: rows.export.file.to_owned(),
-        found: format!("a clock whose frame 0 is at {} s", readable(other_s)),
-        expected: format!("{} s", readable(first_s)),
+        found: format!("a clock whose frame 0 is at {} s", format_number(other_s)),
+        expected: format!("{} s", format_number(first_s)),
         other: "the other track".to_owned(),
     })
 }
 
 /// Frames between the first rows of two clocks; a refusal when it is no whole number.
-pub(crate) fn offset(
-    first: (&TrackFile, &Placed),
-    other: (&TrackFile, &Placed),
+pub(crate) fn frame_offset(
+    first: (&TrackFile, &RowFrames),
+    other: (&TrackFile, &RowFrames),
     rate_hz: f64,
 ) -> Result<i64, ImportError> {
-    let refuse = |found: String, expected: String| ImportError::Grids {
+    let refuse = |found: String, expected: String| ImportError::GridMismatch {
         file: other.0.file.to_owned(),
         found,
         expected,
@@ -133,20 +140,22 @@ pub(crate) fn offset(
 }
 
 /// The file counts its frames; its times only serve to check the rate and to place the start.
-fn by_number(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
+fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> Result<RowFrames, ImportError> {
     let clock = rows.clock;
     let mut frames: Vec<i64> = Vec::with_capacity(clock.len());
     let numbers = clock.frame.iter().flat_map(|column| column.iter());
     for (row, number) in numbers.enumerate() {
-        let Some(number) = number else { return Err(cell(rows, row, CellProblem::NoTime, String::new())) };
+        let Some(number) = number else {
+            return Err(cell_error(rows, row, CellProblem::NoTime, String::new()));
+        };
         let too_far = frames.first().is_some_and(|&first| number - first as f64 > MAX_FRAMES);
         if number.fract().abs() > 0.0 || number.abs() > LARGEST_FRAME || too_far {
-            return Err(cell(rows, row, CellProblem::NotAFrame, readable(number)));
+            return Err(cell_error(rows, row, CellProblem::NotAFrame, format_number(number)));
         }
         refuse_disorder(rows, row, frames.last().map(|&last| last as f64), number)?;
         frames.push(number as i64);
     }
-    every_nth(&mut frames, declared.step)?;
+    apply_frame_step(&mut frames, declared.step)?;
     let (Some(first), Some(last)) = (frames.first().copied(), frames.last().copied()) else {
         return Err(ImportError::HeaderOnly { file: rows.export.file.to_owned(), line: 1 });
     };
@@ -157,19 +166,19 @@ fn by_number(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
     if let Some(implied) = implied_hz.filter(|_| !declared.playback) {
         // rounded ends of a short record move the rate without contradicting it
         let times: Vec<f64> = clock.time.iter().flat_map(Column::iter).flatten().collect();
-        let rounding_s = QUANTA_S.into_iter().find(|quantum| is_multiple(&times, *quantum)).unwrap_or(0.0);
+        let rounding_s = QUANTA_S.into_iter().find(|quantum| are_multiples(&times, *quantum)).unwrap_or(0.0);
         let expected_s = (last - first) as f64 / declared.rate_hz;
         if span_s.is_none_or(|span| (span - expected_s).abs() > rounding_s) {
-            agree(rows, implied, declared.rate_hz, None)?;
+            check_rate(rows, implied, declared.rate_hz, None)?;
         }
     }
     let counted_s = first as f64 / declared.rate_hz;
     let start_s = if declared.playback { counted_s } else { time_s(0).unwrap_or(counted_s) };
-    Ok(Placed { frames, numbered: true, start_s, implied_hz })
+    Ok(RowFrames { frames, numbered: true, start_s, implied_hz })
 }
 
 /// Numbers that count the tracked frames alone, where only every n-th was tracked.
-fn every_nth(frames: &mut [i64], step: usize) -> Result<(), ImportError> {
+fn apply_frame_step(frames: &mut [i64], step: usize) -> Result<(), ImportError> {
     if step == 1 {
         return Ok(());
     }
@@ -183,45 +192,55 @@ fn every_nth(frames: &mut [i64], step: usize) -> Result<(), ImportError> {
     Ok(())
 }
 
-fn by_time(rows: Rows, declared: Declared) -> Result<Placed, ImportError> {
-    let times = times(rows)?;
+fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> Result<RowFrames, ImportError> {
+    let times = read_times(rows)?;
     let row_s = declared.step as f64 / declared.rate_hz;
     let fit = if declared.playback {
-        by_spacing(rows, &times)?
+        fit_shown_grid(rows, &times)?
     } else {
-        by_real_time(rows, &times, row_s, declared)?
+        fit_declared_grid(rows, &times, row_s, declared)?
     };
     let start_s = if declared.playback { (times[0] / fit.frame_s).round() * row_s } else { times[0] };
     let frames = fit.frames.iter().map(|&row| (row * declared.step) as i64).collect();
-    Ok(Placed { frames, numbered: false, start_s, implied_hz: Some(1.0 / fit.frame_s) })
+    Ok(RowFrames { frames, numbered: false, start_s, implied_hz: Some(1.0 / fit.frame_s) })
 }
 
 /// The declared grid first: it explains times that are rounded too coarsely to show their own.
-fn by_real_time(rows: Rows, times: &[f64], row_s: f64, declared: Declared) -> Result<FrameFit, ImportError> {
+fn fit_declared_grid(
+    rows: ClockRows,
+    times: &[f64],
+    row_s: f64,
+    declared: DeclaredTiming,
+) -> Result<FrameFit, ImportError> {
     let agrees = |fit: &FrameFit| (fit.frame_s / row_s - 1.0).abs() <= RATE_AGREEMENT;
     if let Some(fit) = clock::number_frames(times, row_s)
-        .filter(|fit| fit.holds() && agrees(fit) && fit.smallest_step() == 1)
+        .filter(|fit| fit.is_on_grid() && agrees(fit) && fit.smallest_step() == 1)
     {
         return Ok(fit);
     }
-    refuse_coarse(rows, times, row_s, declared)?;
-    let fit = by_spacing(rows, times)?;
+    refuse_coarse_times(rows, times, row_s, declared)?;
+    let fit = fit_shown_grid(rows, times)?;
     if !agrees(&fit) {
         let step = (fit.frame_s / row_s).round();
         let plausible = declared.step == 1
             && (2.0..=LARGEST_STEP).contains(&step)
             && (fit.frame_s / row_s / step - 1.0).abs() <= RATE_AGREEMENT;
-        agree(rows, 1.0 / fit.frame_s, 1.0 / row_s, plausible.then_some(step as usize))?;
+        check_rate(rows, 1.0 / fit.frame_s, 1.0 / row_s, plausible.then_some(step as usize))?;
     }
     Ok(fit)
 }
 
 /// Times that follow the declared rate, but are rounded so coarsely that they show another one, or none.
-fn refuse_coarse(rows: Rows, times: &[f64], row_s: f64, declared: Declared) -> Result<(), ImportError> {
+fn refuse_coarse_times(
+    rows: ClockRows,
+    times: &[f64],
+    row_s: f64,
+    declared: DeclaredTiming,
+) -> Result<(), ImportError> {
     let limit_s = 2.0 * OFF_GRID_LIMIT_FRAMES * row_s; // rounding moves a time by half a quantum
     let Some(quantum_s) = QUANTA_S
         .into_iter()
-        .find(|quantum| is_multiple(times, *quantum))
+        .find(|quantum| are_multiples(times, *quantum))
         .filter(|quantum| *quantum > limit_s)
     else {
         return Ok(());
@@ -245,30 +264,30 @@ fn refuse_coarse(rows: Rows, times: &[f64], row_s: f64, declared: Declared) -> R
 }
 
 /// The grid that the times themselves show.
-fn by_spacing(rows: Rows, times: &[f64]) -> Result<FrameFit, ImportError> {
+fn fit_shown_grid(rows: ClockRows, times: &[f64]) -> Result<FrameFit, ImportError> {
     let fit = clock::median_step_s(times).and_then(|seed_s| clock::number_frames(times, seed_s));
-    let found = |row: usize| readable(times[row]);
+    let found = |row: usize| format_number(times[row]);
     match fit {
-        Some(fit) if fit.holds() => Ok(fit),
-        Some(fit) => Err(cell(rows, fit.worst_row, CellProblem::OffGrid, found(fit.worst_row))),
+        Some(fit) if fit.is_on_grid() => Ok(fit),
+        Some(fit) => Err(cell_error(rows, fit.worst_row, CellProblem::OffGrid, found(fit.worst_row))),
         None => {
             let jump = |row: usize| times[row] - times[row - 1];
             let row = (1..times.len()).max_by(|&a, &b| jump(a).total_cmp(&jump(b))).unwrap_or(0);
-            Err(cell(rows, row, CellProblem::OffGrid, found(row)))
+            Err(cell_error(rows, row, CellProblem::OffGrid, found(row)))
         }
     }
 }
 
 /// A number for a message: as written where that is short.
-fn readable(value: f64) -> String {
+fn format_number(value: f64) -> String {
     if value == 0.0 || (1e-9..1e15).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
 
-fn times(rows: Rows) -> Result<Vec<f64>, ImportError> {
+fn read_times(rows: ClockRows) -> Result<Vec<f64>, ImportError> {
     let mut times: Vec<f64> = Vec::with_capacity(rows.clock.len());
     for row in 0..rows.clock.len() {
         let Some(time) = rows.clock.time.as_ref().and_then(|column| column.get(row)) else {
-            return Err(cell(rows, row, CellProblem::NoTime, String::new()));
+            return Err(cell_error(rows, row, CellProblem::NoTime, String::new()));
         };
         refuse_disorder(rows, row, times.last().copied(), time)?;
         times.push(time);
@@ -276,22 +295,27 @@ fn times(rows: Rows) -> Result<Vec<f64>, ImportError> {
     Ok(times)
 }
 
-fn refuse_disorder(rows: Rows, row: usize, last: Option<f64>, next: f64) -> Result<(), ImportError> {
+fn refuse_disorder(rows: ClockRows, row: usize, last: Option<f64>, next: f64) -> Result<(), ImportError> {
     match last {
-        Some(last) if next == last => Err(cell(rows, row, CellProblem::Duplicate, readable(next))),
-        Some(last) if next < last => Err(cell(rows, row, CellProblem::Backwards, readable(next))),
+        Some(last) if next == last => Err(cell_error(rows, row, CellProblem::Duplicate, format_number(next))),
+        Some(last) if next < last => Err(cell_error(rows, row, CellProblem::Backwards, format_number(next))),
         _ => Ok(()),
     }
 }
 
-fn agree(rows: Rows, implied_hz: f64, declared_hz: f64, step: Option<usize>) -> Result<(), ImportError> {
+fn check_rate(
+    rows: ClockRows,
+    implied_hz: f64,
+    declared_hz: f64,
+    step: Option<usize>,
+) -> Result<(), ImportError> {
     if (implied_hz / declared_hz - 1.0).abs() <= RATE_AGREEMENT {
         return Ok(());
     }
-    Err(ImportError::Rate { file: rows.export.file.to_owned(), implied_hz, declared_hz, step })
+    Err(ImportError::RateMismatch { file: rows.export.file.to_owned(), implied_hz, declared_hz, step })
 }
 
-fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportError {
+fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: String) -> ImportError {
     let (expected, advice) = match problem {
         CellProblem::NotANumber | CellProblem::NoTime => (
             "a number in every row",
@@ -322,7 +346,7 @@ fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportEr
         ),
     };
     ImportError::Cell {
-        place: rows.export.place(rows.clock, row),
+        place: rows.export.row_location(rows.clock, row),
         problem,
         name: if rows.clock.frame.is_some() { "frame" } else { "time" }.to_owned(),
         found: found.into(),
@@ -335,16 +359,16 @@ fn cell(rows: Rows, row: usize, problem: CellProblem, found: String) -> ImportEr
 mod tests {
     use super::*;
 
-    fn placed(times: &[f64], declared: Declared) -> Result<Placed, ImportError> {
+    fn placed(times: &[f64], declared: DeclaredTiming) -> Result<RowFrames, ImportError> {
         let lines = (0..times.len()).map(|row| row as u32 + 2).collect();
         let clock =
             Clock { lines, time: Some(times.iter().copied().map(Some).collect()), ..Clock::default() };
         let export = TrackFile { file: "a.csv", ..TrackFile::default() };
-        place(Rows { export: &export, clock: &clock }, declared)
+        place_rows(ClockRows { export: &export, clock: &clock }, declared)
     }
 
-    fn declared(rate_hz: f64) -> Declared {
-        Declared { rate_hz, playback: false, step: 1 }
+    fn declared(rate_hz: f64) -> DeclaredTiming {
+        DeclaredTiming { rate_hz, playback: false, step: 1 }
     }
 
     #[test]
@@ -370,7 +394,7 @@ mod tests {
         let gaps: Vec<f64> =
             rounded(1000.0).into_iter().enumerate().filter(|(i, _)| i % 50 != 7).map(|(_, t)| t).collect();
         for times in [rounded(1000.0), gaps] {
-            assert!(matches!(placed(&times, declared(800.0)), Err(ImportError::Rate { .. })));
+            assert!(matches!(placed(&times, declared(800.0)), Err(ImportError::RateMismatch { .. })));
         }
     }
 
@@ -389,7 +413,7 @@ mod tests {
                 .contains("imply 25.000000 frames/s, but --frame-rate-hz says 10000 (a factor of 400.0000)"),
             "{message}"
         );
-        let placed = placed(&times, Declared { playback: true, ..declared(10_000.0) }).unwrap();
+        let placed = placed(&times, DeclaredTiming { playback: true, ..declared(10_000.0) }).unwrap();
         assert_eq!((placed.start_s, placed.frames[49]), (0.0025, 49));
     }
 
@@ -398,7 +422,10 @@ mod tests {
         let times: Vec<f64> = (0..50).map(|i| f64::from(i) / 500.0).collect();
         let message = placed(&times, declared(1000.0)).unwrap_err().to_string();
         assert!(message.contains("add --frame-step 2"), "{message}");
-        assert_eq!(placed(&times, Declared { step: 2, ..declared(1000.0) }).unwrap().frames[..3], [0, 2, 4]);
+        assert_eq!(
+            placed(&times, DeclaredTiming { step: 2, ..declared(1000.0) }).unwrap().frames[..3],
+            [0, 2, 4]
+        );
     }
 
     #[test]
@@ -409,9 +436,9 @@ mod tests {
                 frame: Some(numbers.iter().copied().map(Some).collect()),
                 ..Clock::default()
             };
-            place(
-                Rows { export: &TrackFile { file: "a.csv", ..TrackFile::default() }, clock: &clock },
-                Declared { step: 3, ..declared(1000.0) },
+            place_rows(
+                ClockRows { export: &TrackFile { file: "a.csv", ..TrackFile::default() }, clock: &clock },
+                DeclaredTiming { step: 3, ..declared(1000.0) },
             )
         };
         assert_eq!(numbered(&[4.0, 5.0, 6.0]).unwrap().frames, [12, 15, 18]);
@@ -428,10 +455,10 @@ mod tests {
             ..Clock::default()
         };
         let export = TrackFile { file: "a.csv", ..TrackFile::default() };
-        assert!(place(Rows { export: &export, clock: &clock }, declared(3000.0)).is_ok());
+        assert!(place_rows(ClockRows { export: &export, clock: &clock }, declared(3000.0)).is_ok());
         assert!(matches!(
-            place(Rows { export: &export, clock: &clock }, declared(1000.0)),
-            Err(ImportError::Rate { .. })
+            place_rows(ClockRows { export: &export, clock: &clock }, declared(1000.0)),
+            Err(ImportError::RateMismatch { .. })
         ));
     }
 

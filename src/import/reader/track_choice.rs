@@ -1,11 +1,11 @@
 //! Which track is the lip tip and which the head: as the user says, or as they are called.
 
 use crate::import::error::ImportError;
-use crate::import::options::Options;
-use crate::import::reader::findings::finding;
+use crate::import::options::ImportOptions;
+use crate::import::reader::findings::new_finding;
 use crate::import::reader::track_file::TrackFile;
 use crate::recording::quality::{Check, Severity};
-use crate::toml_file::nearest;
+use crate::toml_file::suggest_key;
 use std::collections::HashMap;
 
 /// Most names of tracks in a refusal: a file of detections has thousands.
@@ -37,7 +37,7 @@ pub(crate) fn number_repeated_names(exports: &mut [TrackFile]) {
                 "{}: {times} tracks are called `{name}`: here they are `{name}#1` to `{name}#{times}`",
                 export.file
             );
-            finding(
+            new_finding(
                 Check::TrackNames,
                 Severity::Caution,
                 (times as f64, ""),
@@ -50,16 +50,16 @@ pub(crate) fn number_repeated_names(exports: &mut [TrackFile]) {
 
 /// The tracks of tip and head: those that `--point` names, and for a point that it does not name the track of
 /// that name, if there is one.
-pub(crate) fn choose(
+pub(crate) fn choose_tracks(
     exports: &[TrackFile],
-    options: &Options,
+    options: &ImportOptions,
 ) -> Result<[Option<TrackIndex>; 2], ImportError> {
     let named = [("tip", &options.tip), ("head", &options.head)];
     if named.iter().all(|(_, name)| name.is_none()) {
-        return by_default(exports);
+        return choose_by_default(exports);
     }
     let find_named = |(point, name): (&'static str, &Option<String>)| {
-        name.as_deref().map(|name| find(exports, point, name)).transpose()
+        name.as_deref().map(|name| find_track(exports, point, name)).transpose()
     };
     let [tip, head] = named;
     let chosen = [find_named(tip)?, find_named(head)?];
@@ -69,48 +69,54 @@ pub(crate) fn choose(
             point: "head",
             found: options.head.clone().unwrap_or_default(),
             expected,
-            advice: list(exports),
+            advice: list_tracks(exports),
         });
     }
     let [tip, head] = chosen;
     // (of several none is taken by chance)
-    let only = |point: &str| Some(called(exports, point)).filter(|found| found.len() == 1)?.first().copied();
+    let only =
+        |point: &str| Some(tracks_called(exports, point)).filter(|found| found.len() == 1)?.first().copied();
     let left = |point, other: Option<TrackIndex>| only(point).filter(|track| Some(*track) != other);
     Ok([tip.or_else(|| left("tip", head)), head.or_else(|| left("head", tip))])
 }
 
 /// Tracks of a point's own name, in any case of letters where none has it exactly.
-fn called(exports: &[TrackFile], name: &str) -> Vec<TrackIndex> {
-    let exact = matches(exports, |_, track| track == name);
-    if exact.is_empty() { matches(exports, |_, track| track.eq_ignore_ascii_case(name)) } else { exact }
+fn tracks_called(exports: &[TrackFile], name: &str) -> Vec<TrackIndex> {
+    let exact = matching_tracks(exports, |_, track| track == name);
+    if exact.is_empty() {
+        matching_tracks(exports, |_, track| track.eq_ignore_ascii_case(name))
+    } else {
+        exact
+    }
 }
 
 /// Tracks that are called what they are need no `--point`.
-fn by_default(exports: &[TrackFile]) -> Result<[Option<TrackIndex>; 2], ImportError> {
-    let [tip, head] = [called(exports, "tip"), called(exports, "head")];
+fn choose_by_default(exports: &[TrackFile]) -> Result<[Option<TrackIndex>; 2], ImportError> {
+    let [tip, head] = [tracks_called(exports, "tip"), tracks_called(exports, "head")];
     if tip.len() > 1 || head.len() > 1 || (tip.is_empty() && head.is_empty()) {
         let expected = "--point tip=NAME and --point head=NAME, or tracks called tip and head".to_owned();
         return Err(ImportError::Point {
             point: "tip",
             found: "no track named for it".to_owned(),
             expected,
-            advice: list(exports),
+            advice: list_tracks(exports),
         });
     }
     Ok([tip.first().copied(), head.first().copied()])
 }
 
 /// A track by its name, by `FILE:NAME`, or by `FILE` when the file holds one track.
-fn find(exports: &[TrackFile], point: &'static str, name: &str) -> Result<TrackIndex, ImportError> {
-    let file_is =
-        |export: &TrackFile, file: &str| export.file == file || export.base() == file || export.stem == file;
-    let by_name = matches(exports, |_, track| track == name);
-    let by_both = matches(exports, |export, track| {
+fn find_track(exports: &[TrackFile], point: &'static str, name: &str) -> Result<TrackIndex, ImportError> {
+    let file_is = |export: &TrackFile, file: &str| {
+        export.file == file || export.file_name() == file || export.stem == file
+    };
+    let by_name = matching_tracks(exports, |_, track| track == name);
+    let by_both = matching_tracks(exports, |export, track| {
         name.strip_suffix(track)
             .and_then(|file| file.strip_suffix(':'))
             .is_some_and(|file| file_is(export, file))
     });
-    let by_file = matches(exports, |export, _| export.tracks.len() == 1 && file_is(export, name));
+    let by_file = matching_tracks(exports, |export, _| export.tracks.len() == 1 && file_is(export, name));
     let found = [by_name, by_both, by_file].into_iter().find(|found| !found.is_empty()).unwrap_or_default();
     match found.as_slice() {
         [one] => Ok(*one),
@@ -118,7 +124,7 @@ fn find(exports: &[TrackFile], point: &'static str, name: &str) -> Result<TrackI
             point,
             found: format!("`{name}`"),
             expected: "the name of a track".to_owned(),
-            advice: unknown(exports, name),
+            advice: unknown_track_advice(exports, name),
         }),
         _ => {
             let found = format!("`{name}` {} times", found.len());
@@ -126,13 +132,13 @@ fn find(exports: &[TrackFile], point: &'static str, name: &str) -> Result<TrackI
                 point,
                 found,
                 expected: "one track; write FILE:NAME".to_owned(),
-                advice: list(exports),
+                advice: list_tracks(exports),
             })
         }
     }
 }
 
-fn matches(exports: &[TrackFile], accept: impl Fn(&TrackFile, &str) -> bool) -> Vec<TrackIndex> {
+fn matching_tracks(exports: &[TrackFile], accept: impl Fn(&TrackFile, &str) -> bool) -> Vec<TrackIndex> {
     let all = exports.iter().enumerate().flat_map(|(file, export)| {
         export.tracks.iter().enumerate().map(move |(track, t)| (file, track, export, t))
     });
@@ -141,33 +147,37 @@ fn matches(exports: &[TrackFile], accept: impl Fn(&TrackFile, &str) -> bool) -> 
         .collect()
 }
 
-fn unknown(exports: &[TrackFile], name: &str) -> String {
+fn unknown_track_advice(exports: &[TrackFile], name: &str) -> String {
     let names: Vec<&str> =
         exports.iter().flat_map(|export| export.tracks.iter().map(|track| track.name.as_str())).collect();
-    let suggestion = nearest(name, &names);
-    if suggestion.starts_with("did") { format!("{suggestion} {}", list(exports)) } else { list(exports) }
+    let suggestion = suggest_key(name, &names);
+    if suggestion.starts_with("did") {
+        format!("{suggestion} {}", list_tracks(exports))
+    } else {
+        list_tracks(exports)
+    }
 }
 
 /// What to say where no track was found for `point` and others are left over.
-pub(crate) fn unchosen(
+pub(crate) fn unchosen_advice(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
     point: &str,
 ) -> Option<String> {
-    let free: Vec<&str> = matches(exports, |_, _| true)
+    let free: Vec<&str> = matching_tracks(exports, |_, _| true)
         .into_iter()
         .filter(|track| !chosen.contains(&Some(*track)))
         .map(|(file, track)| exports[file].tracks[track].name.as_str())
         .collect();
-    let suggestion = nearest(point, &free);
+    let suggestion = suggest_key(point, &free);
     let hint = if suggestion.starts_with("did") { format!("{suggestion} ") } else { String::new() };
-    (!free.is_empty()).then(|| format!("{hint}{}: name it with --point {point}=NAME", list(exports)))
+    (!free.is_empty()).then(|| format!("{hint}{}: name it with --point {point}=NAME", list_tracks(exports)))
 }
 
 /// The tracks there are, with their files where there are several.
-fn list(exports: &[TrackFile]) -> String {
+fn list_tracks(exports: &[TrackFile]) -> String {
     let full = |export: &TrackFile, name: &str| {
-        if exports.len() > 1 { format!("{}:{name}", export.base()) } else { name.to_owned() }
+        if exports.len() > 1 { format!("{}:{name}", export.file_name()) } else { name.to_owned() }
     };
     let names: Vec<String> = exports
         .iter()

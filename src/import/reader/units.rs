@@ -1,6 +1,6 @@
 //! Units of times and coordinates, by the names that files give them.
 
-use crate::import::options::Scale;
+use crate::import::options::CoordinateScale;
 
 /// Unit of a file's times.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -9,14 +9,14 @@ pub(crate) enum TimeUnit {
     Seconds(f64),
     /// Seconds, as in nearly every table.
     #[default]
-    Usual,
+    AssumedSeconds,
     /// The format has several and the file does not say which.
     Unknown,
 }
 
 impl TimeUnit {
     /// The unit of that name in a file: `s`, `sec`, `ms`, ...; `None` for any other.
-    pub(crate) fn named(name: &str) -> Option<Self> {
+    pub(crate) fn parse(name: &str) -> Option<Self> {
         let seconds = match name.trim().trim_matches(['(', ')', '[', ']']).to_lowercase().as_str() {
             "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
             "ms" | "msec" | "millisecond" | "milliseconds" => 1e-3,
@@ -31,26 +31,26 @@ impl TimeUnit {
 
 /// What one unit of the file's coordinates is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum Unit {
+pub(crate) enum CoordinateUnit {
     /// A pixel of unknown size.
     Pixel,
     /// A length, m.
     Metres(f64),
 }
 
-impl Unit {
+impl CoordinateUnit {
     /// The unit of that name in a file: `px`, `pixel`, `mm`, `micron`, ...; `None` for any other.
-    pub(crate) fn named(name: &str) -> Option<Self> {
+    pub(crate) fn parse(name: &str) -> Option<Self> {
         let name = name.trim().trim_matches(['(', ')', '[', ']']).to_lowercase();
         match name.as_str() {
             "px" | "pixel" | "pixels" => Some(Self::Pixel),
             "micron" | "microns" | "micrometer" | "micrometre" => Some(Self::Metres(1e-6)),
             "inch" | "in" => Some(Self::Metres(0.0254)),
-            name => Scale::parse(name).ok().map(|scale| Self::Metres(scale.metres())),
+            name => CoordinateScale::parse(name).ok().map(|scale| Self::Metres(scale.metres())),
         }
     }
 
-    pub(crate) fn word(self) -> String {
+    pub(crate) fn describe(self) -> String {
         match self {
             Self::Pixel => "pixels".to_owned(),
             Self::Metres(metres) => format!("units of {metres} m"),

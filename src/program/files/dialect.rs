@@ -20,12 +20,12 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 impl CsvDialect {
     /// Whether a table that is written with commas and points has to be written anew.
-    pub fn is_other(self) -> bool {
+    pub fn needs_conversion(self) -> bool {
         self != Self::Plain
     }
 
     /// A table in this dialect. Cells that are numbers get its decimal mark, all others stay as they are.
-    pub fn convert(self, plain: impl Read, mut to: impl Write) -> io::Result<()> {
+    pub fn convert_table(self, plain: impl Read, mut to: impl Write) -> io::Result<()> {
         to.write_all(BYTE_ORDER_MARK)?;
         let decimal_comma = self == Self::ExcelDe;
         let mut table = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(plain);
@@ -52,7 +52,7 @@ mod tests {
 
     fn converted(dialect: CsvDialect) -> String {
         let mut found = Vec::new();
-        dialect.convert(PLAIN.as_bytes(), &mut found).unwrap();
+        dialect.convert_table(PLAIN.as_bytes(), &mut found).unwrap();
         String::from_utf8(found).unwrap()
     }
 

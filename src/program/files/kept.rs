@@ -1,7 +1,7 @@
 //! Which recording a folder holds, and what of it no command overwrites.
 
-use super::maker::Maker;
-use super::marker::{Marker, hash_of, small};
+use super::maker::OutputCommand;
+use super::marker::{FolderMarker, hash_file, read_small_file};
 use crate::program::failure::Failure;
 use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE};
 use std::path::Path;
@@ -14,13 +14,13 @@ const KEYS_OF_A_SIMULATION: [&str; 2] = ["stopped_at_s", "rhs_evaluations"];
 /// Whether there is the summary of a simulation.
 pub fn is_simulation_summary(path: &Path) -> bool {
     let summary: Option<serde_json::Value> =
-        path.is_file().then(|| serde_json::from_slice(&small(path).ok()?).ok()).flatten();
+        path.is_file().then(|| serde_json::from_slice(&read_small_file(path).ok()?).ok()).flatten();
     summary.is_some_and(|summary| KEYS_OF_A_SIMULATION.iter().all(|key| summary.get(key).is_some()))
 }
 
 /// The recording that a folder holds.
 #[derive(Debug, PartialEq, Eq)]
-pub enum Kept {
+pub enum FolderRecording {
     /// None.
     Nothing,
     /// One that is proven to be synthetic.
@@ -36,23 +36,23 @@ pub enum Kept {
     },
 }
 
-impl Kept {
-    pub fn of(folder: &Path, marker: &Marker) -> Result<Self, Failure> {
-        let trace = hash_of(&folder.join(TRACE_FILE))?;
+impl FolderRecording {
+    pub fn detect(folder: &Path, marker: &FolderMarker) -> Result<Self, Failure> {
+        let trace = hash_file(&folder.join(TRACE_FILE))?;
         if folder.join(DESCRIPTION_FILE).exists() {
-            return Ok(described(folder, marker, trace.as_deref()));
+            return Ok(from_description(folder, marker, trace.as_deref()));
         }
         let Some(trace) = trace else { return Ok(Self::Nothing) };
         let listed = marker.files.get(TRACE_FILE);
         Ok(match listed {
-            Some(made) if made.is(&trace) && made.by != Maker::Import => Self::Synthetic,
+            Some(made) if made.matches_hash(&trace) && made.by != OutputCommand::Import => Self::Synthetic,
             None if is_simulation_summary(&folder.join(SIMULATION_SUMMARY)) => Self::Synthetic,
-            Some(made) if made.by != Maker::Import => Self::measured(
+            Some(made) if made.by != OutputCommand::Import => Self::new_measured(
                 marker,
-                format!("was changed since `wiperlab {}` wrote it", made.by.word()),
+                format!("was changed since `wiperlab {}` wrote it", made.by.command_name()),
                 None,
             ),
-            _ => Self::measured(
+            _ => Self::new_measured(
                 marker,
                 "has nothing next to it that says where it comes from".to_owned(),
                 None,
@@ -60,42 +60,47 @@ impl Kept {
         })
     }
 
-    fn measured(marker: &Marker, why: String, file: Option<&RecordingFile>) -> Self {
+    fn new_measured(marker: &FolderMarker, why: String, file: Option<&RecordingFile>) -> Self {
         let source = file.and_then(|file| file.source.as_ref());
-        let imported = marker.files.iter().filter(|(_, made)| made.by == Maker::Import);
-        let named = source.iter().flat_map(|source| source.file.all());
+        let imported = marker.files.iter().filter(|(_, made)| made.by == OutputCommand::Import);
+        let named = source.iter().flat_map(|source| source.file.as_slice());
         let files = imported.map(|(name, _)| name.clone()).chain(named.cloned());
         let own = [TRACE_FILE, DESCRIPTION_FILE].map(str::to_owned);
         Self::Measured {
             why,
-            exports: source.map_or_else(Vec::new, |source| source.sha256.all().to_vec()),
+            exports: source.map_or_else(Vec::new, |source| source.sha256.as_slice().to_vec()),
             files: files.chain(own).collect(),
         }
     }
 }
 
 /// Of a folder with a description.
-fn described(folder: &Path, marker: &Marker, trace: Option<&str>) -> Kept {
+fn from_description(folder: &Path, marker: &FolderMarker, trace: Option<&str>) -> FolderRecording {
     let path = folder.join(DESCRIPTION_FILE);
-    let text = small(&path).and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string()));
+    let text =
+        read_small_file(&path).and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string()));
     let parsed = text.and_then(|text| {
         RecordingFile::parse(DESCRIPTION_FILE, text.trim_start_matches('\u{feff}'))
             .map_err(|error| error.to_string())
     });
     match parsed {
-        Err(why) => {
-            Kept::measured(marker, format!("has a {DESCRIPTION_FILE} that cannot be read ({why})"), None)
-        }
-        Ok(file) if !file.synthetic => {
-            Kept::measured(marker, format!("is measured, as its {DESCRIPTION_FILE} says"), Some(&file))
-        }
+        Err(why) => FolderRecording::new_measured(
+            marker,
+            format!("has a {DESCRIPTION_FILE} that cannot be read ({why})"),
+            None,
+        ),
+        Ok(file) if !file.synthetic => FolderRecording::new_measured(
+            marker,
+            format!("is measured, as its {DESCRIPTION_FILE} says"),
+            Some(&file),
+        ),
         Ok(file) if trace.zip(file.trace_sha256.as_deref()).is_some_and(|(found, said)| found != said) => {
-            Kept::measured(
+            FolderRecording::new_measured(
                 marker,
                 format!("is not the one that its {DESCRIPTION_FILE} describes"),
                 Some(&file),
             )
         }
-        Ok(_) => Kept::Synthetic,
+        Ok(_) => FolderRecording::Synthetic,
     }
 }

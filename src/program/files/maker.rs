@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 /// A command that writes files into a folder; the word that the marker keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Maker {
+pub enum OutputCommand {
     Accuracy,
     Blade,
     Demo,
@@ -24,9 +24,9 @@ pub enum Maker {
     Twin,
 }
 
-impl Maker {
+impl OutputCommand {
     /// The command's name.
-    pub fn word(self) -> &'static str {
+    pub fn command_name(self) -> &'static str {
         match self {
             Self::Accuracy => "accuracy",
             Self::Blade => "blade",
@@ -53,12 +53,12 @@ impl Maker {
     /// Whether all its files in a folder are of one run: those of an earlier run that the next one does not
     /// make are then removed. An import keeps exports, and init, demo and figures write next
     /// to files of others.
-    pub fn replaces_its_last_run(self) -> bool {
+    pub fn replaces_last_run(self) -> bool {
         !matches!(self, Self::Demo | Self::Figures | Self::Import | Self::Init)
     }
 
     /// What to do instead of overwriting a file.
-    pub fn other_place(self) -> &'static str {
+    pub fn overwrite_advice(self) -> &'static str {
         match self {
             Self::Fit => "move the file away",
             Self::Figures => "choose another folder, move the file away",
@@ -78,8 +78,8 @@ pub struct Overwrite {
 
 /// Who writes, and what it may overwrite.
 #[derive(Debug, Clone)]
-pub struct Writer {
-    pub maker: Maker,
+pub struct WritePolicy {
+    pub maker: OutputCommand,
     pub force: bool,
     /// SHA-256 of the exports that an import reads; a measured recording gives way to an import of the same
     /// ones.
@@ -88,13 +88,13 @@ pub struct Writer {
     pub csv: CsvDialect,
 }
 
-impl Writer {
-    pub fn new(maker: Maker, overwrite: Overwrite) -> Self {
+impl WritePolicy {
+    pub fn new(maker: OutputCommand, overwrite: Overwrite) -> Self {
         Self { maker, force: overwrite.force, exports: Vec::new(), csv: CsvDialect::Plain }
     }
 
     /// The same with tables in a dialect.
-    pub fn csv(self, csv: CsvDialect) -> Self {
+    pub fn with_csv_dialect(self, csv: CsvDialect) -> Self {
         Self { csv, ..self }
     }
 }

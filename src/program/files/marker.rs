@@ -1,6 +1,6 @@
 //! The marker of an output folder: which command made which file, and what was in it.
 
-use super::maker::Maker;
+use super::maker::OutputCommand;
 use crate::program::failure::Failure;
 use crate::text::TextHash;
 use serde::{Deserialize, Serialize};
@@ -10,23 +10,23 @@ use std::io::{self, Read};
 use std::path::Path;
 
 /// Name of the marker in a folder.
-pub const MARKER: &str = ".wiperlab.json";
-const FORMAT: u32 = 1;
+pub const MARKER_FILE: &str = ".wiperlab.json";
+const MARKER_FORMAT: u32 = 1;
 
 /// What the commands made in a folder. It holds no times: the same outputs have the same marker.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Marker {
+pub struct FolderMarker {
     format: u32,
     /// By name from the folder, with `/`.
-    pub files: BTreeMap<String, Made>,
+    pub files: BTreeMap<String, MarkedFile>,
 }
 
 /// A file that a command made.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Made {
-    pub by: Maker,
+pub struct MarkedFile {
+    pub by: OutputCommand,
     pub version: String,
     /// Of its contents as a text: line ends and a byte-order mark do not count.
     pub sha256: String,
@@ -36,32 +36,32 @@ pub struct Made {
     pub replaces: Option<String>,
 }
 
-impl Made {
-    pub fn is(&self, sha256: &str) -> bool {
+impl MarkedFile {
+    pub fn matches_hash(&self, sha256: &str) -> bool {
         self.sha256 == sha256 || self.replaces.as_deref() == Some(sha256)
     }
 }
 
-impl Default for Marker {
+impl Default for FolderMarker {
     fn default() -> Self {
-        Self { format: FORMAT, files: BTreeMap::new() }
+        Self { format: MARKER_FORMAT, files: BTreeMap::new() }
     }
 }
 
-impl Marker {
+impl FolderMarker {
     /// The marker of a folder; an empty one where there is none. One that cannot be read proves nothing, and
     /// the reason is given.
-    pub fn of(folder: &Path) -> Result<(Self, Option<String>), Failure> {
-        let path = folder.join(MARKER);
+    pub fn load(folder: &Path) -> Result<(Self, Option<String>), Failure> {
+        let path = folder.join(MARKER_FILE);
         if !path.exists() {
             return Ok((Self::default(), None));
         }
-        let bytes = small(&path);
+        let bytes = read_small_file(&path);
         let parsed =
             bytes.and_then(|bytes| serde_json::from_slice::<Self>(&bytes).map_err(|error| error.to_string()));
         let known = parsed.and_then(|marker| match marker.format {
-            FORMAT => Ok(marker),
-            other => Err(format!("found format {other}, expected {FORMAT}")),
+            MARKER_FORMAT => Ok(marker),
+            other => Err(format!("found format {other}, expected {MARKER_FORMAT}")),
         });
         Ok(match known {
             Ok(marker) => (marker, None),
@@ -76,41 +76,41 @@ impl Marker {
     }
 
     /// Whether a file is, unchanged, what a command made; its maker.
-    pub fn maker_of(&self, name: &str, sha256: &str) -> Option<Maker> {
-        self.files.get(name).filter(|made| made.is(sha256)).map(|made| made.by)
+    pub fn maker_if_unchanged(&self, name: &str, sha256: &str) -> Option<OutputCommand> {
+        self.files.get(name).filter(|made| made.matches_hash(sha256)).map(|made| made.by)
     }
 }
 
 /// Largest file that says what is in a folder, bytes; this program writes none so large.
-const LARGEST: u64 = 16_000_000;
+const MAX_MARKER_BYTES: u64 = 16_000_000;
 
 /// Bytes of a file that says what is in a folder, if it is a file and no larger than such files are.
-pub fn small(path: &Path) -> Result<Vec<u8>, String> {
+pub fn read_small_file(path: &Path) -> Result<Vec<u8>, String> {
     let found = fs::metadata(path).map_err(|error| error.to_string())?;
-    if !found.is_file() || found.len() > LARGEST {
-        return Err(format!("expected a file of at most {LARGEST} bytes"));
+    if !found.is_file() || found.len() > MAX_MARKER_BYTES {
+        return Err(format!("expected a file of at most {MAX_MARKER_BYTES} bytes"));
     }
     fs::read(path).map_err(|error| error.to_string())
 }
 
 /// Hash of a file as markers have it; `None` where there is no file.
-pub fn hash_of(path: &Path) -> Result<Option<String>, Failure> {
+pub fn hash_file(path: &Path) -> Result<Option<String>, Failure> {
     let refused = |error: io::Error| Failure::Input(format!("{}: cannot be read: {error}", path.display()));
     if !path.is_file() {
         return Ok(None);
     }
-    let mut hashing = Hashing::new(File::open(path).map_err(refused)?);
+    let mut hashing = HashingReader::new(File::open(path).map_err(refused)?);
     io::copy(&mut hashing, &mut io::sink()).map_err(refused)?;
     Ok(Some(hashing.finish()))
 }
 
 /// A reader that hashes what passes through it.
-pub struct Hashing<R> {
+pub struct HashingReader<R> {
     from: R,
     hash: TextHash,
 }
 
-impl<R: Read> Hashing<R> {
+impl<R: Read> HashingReader<R> {
     pub fn new(from: R) -> Self {
         Self { from, hash: TextHash::default() }
     }
@@ -120,7 +120,7 @@ impl<R: Read> Hashing<R> {
     }
 }
 
-impl<R: Read> Read for Hashing<R> {
+impl<R: Read> Read for HashingReader<R> {
     fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
         let read = self.from.read(buffer)?;
         self.hash.update(&buffer[..read]);

@@ -1,29 +1,29 @@
 //! Several jobs one after the other, or a shard of them: whole fits, none of which is divided.
 
 use super::FitArgs;
-use crate::fit::result::{FitResult, Status};
-use crate::program::failure::{Failure, Outcome};
-use crate::program::files::{self, RESULT};
-use crate::program::global::Global;
+use crate::fit::result::{FitResult, FitStatus};
+use crate::program::failure::{CommandOutcome, Failure};
+use crate::program::files::{self, RESULT_FILE};
+use crate::program::global::GlobalArgs;
 use crate::program::interrupt;
-use crate::program::journal::JOURNAL;
-use crate::program::problem::{Problem, job_file};
+use crate::program::journal::CHECKPOINT_FILE;
+use crate::program::problem::{LoadedJob, job_path};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// How a job of a list stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Standing {
+pub enum BatchJobState {
     /// Its result lies next to it, is of this job and version, and the search had converged; with how the fit
     /// ended then.
-    Done(Outcome),
+    Done(CommandOutcome),
     /// There is none, or it is of something else, or the search had not converged.
     Due,
 }
 
-impl Standing {
-    pub fn of(problem: &Problem) -> Self {
-        let path = problem.folder.join(RESULT);
+impl BatchJobState {
+    pub fn read(problem: &LoadedJob) -> Self {
+        let path = problem.folder.join(RESULT_FILE);
         let name = path.display().to_string();
         let text = path.exists().then(|| files::read_json(&path).ok()).flatten();
         let result = text.and_then(|text| FitResult::parse(&name, &text).ok());
@@ -31,31 +31,35 @@ impl Standing {
             let of = (result.fingerprint.as_str(), result.version.as_str(), result.seed);
             let expected =
                 (problem.problem.fingerprint(), env!("CARGO_PKG_VERSION"), problem.job().search.seed);
-            result.status == Status::Converged && of == expected
+            result.status == FitStatus::Converged && of == expected
         });
-        let ended = |result: FitResult| if result.explains() { Outcome::Done } else { Outcome::StoppedEarly };
+        let ended = |result: FitResult| {
+            if result.explains_recordings() { CommandOutcome::Done } else { CommandOutcome::StoppedEarly }
+        };
         done.map_or(Self::Due, |result| Self::Done(ended(result)))
     }
 
-    pub fn word(self) -> &'static str {
+    pub fn describe(self) -> &'static str {
         match self {
-            Self::Done(Outcome::Done) => "converged",
-            Self::Done(Outcome::StoppedEarly) => "converged, and the model does not explain the recording",
+            Self::Done(CommandOutcome::Done) => "converged",
+            Self::Done(CommandOutcome::StoppedEarly) => {
+                "converged, and the model does not explain the recording"
+            }
             Self::Due => "no result of this job and version, or the search has not converged",
         }
     }
 }
 
 /// Refuses a list in which two jobs would write the same files.
-pub fn check_folders(jobs: &[PathBuf]) -> Result<(), Failure> {
+pub fn check_distinct_folders(jobs: &[PathBuf]) -> Result<(), Failure> {
     let mut folders: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     for job in jobs {
-        let file = job_file(job);
-        let folder = files::folder_of(&file);
+        let file = job_path(job);
+        let folder = files::containing_folder(&file);
         let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         if let Some(other) = folders.insert(folder, job) {
             return Err(Failure::Input(format!(
-                "{}: lies in the folder of {}, where both would write {JOURNAL} and {RESULT}; expected a folder \
+                "{}: lies in the folder of {}, where both would write {CHECKPOINT_FILE} and {RESULT_FILE}; expected a folder \
                  for each job",
                 job.display(),
                 other.display()
@@ -68,23 +72,24 @@ pub fn check_folders(jobs: &[PathBuf]) -> Result<(), Failure> {
 impl FitArgs {
     /// Fits the jobs of the list that are in the shard and not done yet. One that is refused does not stop
     /// the others.
-    pub fn run_batch(&self, global: &Global) -> Result<Outcome, Failure> {
-        check_folders(&self.jobs)?;
+    pub fn run_batch(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        check_distinct_folders(&self.jobs)?;
         let (mut refused, mut early) = (None, Vec::new());
-        let mine = self.jobs.iter().enumerate().filter(|(at, _)| self.shard.is_none_or(|of| of.holds(*at)));
+        let mine =
+            self.jobs.iter().enumerate().filter(|(at, _)| self.shard.is_none_or(|of| of.contains(*at)));
         let mine: Vec<&PathBuf> = mine.map(|(_, job)| job).collect();
         for (at, job) in mine.iter().enumerate() {
-            if interrupt::flow().is_break() {
+            if interrupt::control_flow().is_break() {
                 let left = mine.len() - at;
                 warn_line!("stopped: {left} of {} jobs were not begun; the same command goes on", mine.len());
-                return Ok(Outcome::StoppedEarly);
+                return Ok(CommandOutcome::StoppedEarly);
             }
             if !global.quiet {
                 print_line!("{} ({} of {})", job.display(), at + 1, mine.len());
             }
-            match self.run_of_batch(job, global) {
-                Ok(Outcome::Done) => {}
-                Ok(Outcome::StoppedEarly) => early.push(job.display().to_string()),
+            match self.run_batch_job(job, global) {
+                Ok(CommandOutcome::Done) => {}
+                Ok(CommandOutcome::StoppedEarly) => early.push(job.display().to_string()),
                 Err(failure) => {
                     warn_line!("error: {failure}");
                     refused.get_or_insert(failure);
@@ -99,14 +104,14 @@ impl FitArgs {
                 Err(Failure::Input("not every job of the list could be fitted, see above".to_owned()))
             }
             Some(internal) => Err(internal),
-            None if early.is_empty() => Ok(Outcome::Done),
-            None => Ok(Outcome::StoppedEarly),
+            None if early.is_empty() => Ok(CommandOutcome::Done),
+            None => Ok(CommandOutcome::StoppedEarly),
         }
     }
 
-    fn run_of_batch(&self, job: &Path, global: &Global) -> Result<Outcome, Failure> {
-        let problem = Problem::load(job)?;
-        if let Standing::Done(ended) = Standing::of(&problem)
+    fn run_batch_job(&self, job: &Path, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let problem = LoadedJob::load(job)?;
+        if let BatchJobState::Done(ended) = BatchJobState::read(&problem)
             && self.shard.is_some()
         {
             if !global.quiet {
@@ -114,8 +119,8 @@ impl FitArgs {
             }
             return Ok(ended);
         }
-        let has_journal = problem.folder.join(JOURNAL).exists();
+        let has_journal = problem.folder.join(CHECKPOINT_FILE).exists();
         let resume = has_journal && (self.resume || self.shard.is_some());
-        self.fit(&problem, resume, global)
+        self.fit_job(&problem, resume, global)
     }
 }

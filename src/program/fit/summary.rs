@@ -1,38 +1,43 @@
 //! What a fit found, on standard output: what is met, what is known of the parameters, and what a reader has
 //! to know.
 
-use super::Solved;
+use super::CompletedFit;
 use super::misfit::{print_misfit, print_nuisances};
-use crate::fit::information::Combination;
-use crate::fit::misfit::{far_from_priors, unexplained};
+use crate::fit::information::ParameterCombination;
+use crate::fit::misfit::{far_from_priors, unexplained_headline};
 use crate::fit::result::{FeatureResult, FitResult, ParameterResult};
-use crate::text::{self, ascii, digits};
+use crate::text::{self, format_digits, to_ascii};
 
 /// Digits of a number that is shown.
 const DIGITS: usize = 5;
 
 /// Features, parameters and reservations.
-pub fn print_summary(solved: &Solved) {
+pub fn print_summary(solved: &CompletedFit) {
     let result = &solved.result;
     if let Some(misfit) = &result.misfit {
         print_misfit(misfit);
-    } else if !result.explains() {
-        print_line!("{}", ascii(&unexplained(&far_from_priors(&result.nuisances))));
+    } else if !result.explains_recordings() {
+        print_line!("{}", to_ascii(&unexplained_headline(&far_from_priors(&result.nuisances))));
     }
-    print_line!("{}: {}; cost {:.4}", result.status.word(), pace(solved), result.cost);
+    print_line!("{}: {}; cost {:.4}", result.status.name(), describe_evaluations(solved), result.cost);
     print_features(result);
     print_line!("");
     print_line!("{:<36} {:>11}  {:<25} verdict", "parameter", "estimate", "95 % interval");
     for (name, p) in &result.parameters {
-        print_line!("{name:<36} {:>11}  {:<25} {}", shown(p.estimate), interval(p), p.verdict.word());
+        print_line!(
+            "{name:<36} {:>11}  {:<25} {}",
+            format_value(p.estimate),
+            format_interval(p),
+            p.verdict.name()
+        );
         p.reasons.iter().for_each(|why| print_line!("  {why}"));
     }
     print_nuisances(&result.nuisances);
-    print_known(result);
+    print_notes(result);
 }
 
 /// Such as `1,234 evaluations of the model in 12.3 s (100/s)`.
-fn pace(solved: &Solved) -> String {
+fn describe_evaluations(solved: &CompletedFit) -> String {
     let evaluations = &solved.result.evaluations;
     let what = match solved.result.misfit {
         Some(_) => "iterates of the search",
@@ -60,7 +65,7 @@ fn print_features(result: &FitResult) {
     }
     print_line!("{:<36} {:>11} {:>11} {:<4} {:>8}  met", "feature", "target", "model", "unit", "error, %");
     for c in &result.components {
-        print_row(&c.name, (c.target_hz, c.model_hz, "Hz"), c.relative_error, c.pass);
+        print_feature_row(&c.name, (c.target_hz, c.model_hz, "Hz"), c.relative_error, c.pass);
     }
     for f in &result.features {
         print_feature(f, "");
@@ -71,28 +76,38 @@ fn print_features(result: &FitResult) {
 }
 
 fn print_feature(f: &FeatureResult, prefix: &str) {
-    print_row(&format!("{prefix}{}", f.name), (f.target, f.shown(), &f.unit), f.relative_error, f.pass);
+    print_feature_row(
+        &format!("{prefix}{}", f.name),
+        (f.target, f.value_seen(), &f.unit),
+        f.relative_error,
+        f.pass,
+    );
 }
 
-fn print_row(name: &str, (target, model, unit): (f64, Option<f64>, &str), error: Option<f64>, met: bool) {
-    let model = model.map_or("none".to_owned(), shown);
+fn print_feature_row(
+    name: &str,
+    (target, model, unit): (f64, Option<f64>, &str),
+    error: Option<f64>,
+    met: bool,
+) {
+    let model = model.map_or("none".to_owned(), format_value);
     let error = error.map_or("-".to_owned(), |error| format!("{:+.2}", 100.0 * error));
     print_line!(
         "{name:<36} {:>11} {model:>11} {unit:<4} {error:>8}  {}",
-        shown(target),
+        format_value(target),
         if met { "yes" } else { "no" }
     );
 }
 
-fn interval(p: &ParameterResult) -> String {
-    text::interval(p.lower_95, p.upper_95, shown)
+fn format_interval(p: &ParameterResult) -> String {
+    text::format_interval(p.lower_95, p.upper_95, format_value)
 }
 
 /// What was known before the search, what the features determine together, and the notes.
-fn print_known(result: &FitResult) {
+fn print_notes(result: &FitResult) {
     print_line!("");
     for combination in &result.combinations {
-        print_line!("{}", in_words(combination));
+        print_line!("{}", describe_combination(combination));
     }
     for note in &result.notes {
         // those of the gate say when they were made
@@ -100,9 +115,9 @@ fn print_known(result: &FitResult) {
     }
 }
 
-fn in_words(combination: &Combination) -> String {
+fn describe_combination(combination: &ParameterCombination) -> String {
     let percent = 100.0 * combination.sd_relative;
-    let product = combination.in_words();
+    let product = combination.describe();
     match combination.determined {
         true if percent > 0.0 => format!("determined: {product} (standard deviation {percent:.2} %)"),
         true => format!("determined: {product}"),
@@ -110,6 +125,6 @@ fn in_words(combination: &Combination) -> String {
     }
 }
 
-pub(super) fn shown(value: f64) -> String {
-    ascii(&digits(value, DIGITS))
+pub(super) fn format_value(value: f64) -> String {
+    to_ascii(&format_digits(value, DIGITS))
 }

@@ -1,16 +1,16 @@
 //! A fit to traces, with its journal of iterates.
 
-use super::Solved;
-use crate::fit::iterates::Step;
-use crate::fit::result::Status;
-use crate::fit::trace::Branch;
+use super::CompletedFit;
+use crate::fit::iterates::IterateRecord;
+use crate::fit::result::FitStatus;
+use crate::fit::trace::UncertaintyRun;
 use crate::fit::trace_ledger::TraceProgress;
 use crate::program::failure::Failure;
-use crate::program::files::{Maker, Overwrite, Writer};
-use crate::program::global::Global;
+use crate::program::files::{OutputCommand, Overwrite, WritePolicy};
+use crate::program::global::GlobalArgs;
 use crate::program::interrupt;
-use crate::program::journal::{JOURNAL, JournalFile};
-use crate::program::problem::Problem;
+use crate::program::journal::{CHECKPOINT_FILE, CheckpointWriter};
+use crate::program::problem::LoadedJob;
 use crate::program::progress;
 use indicatif::ProgressBar;
 use std::sync::Arc;
@@ -25,47 +25,47 @@ const STARTS: usize = 2;
 const ITERATES_A_TWIN: usize = 5;
 const ITERATES_A_SIDE: usize = 2;
 
-impl Problem {
+impl LoadedJob {
     /// Fits the traces, and writes the journal as it goes and the result at the end.
     pub fn solve_traces(
         &self,
-        global: &Global,
+        global: &GlobalArgs,
         resume: bool,
         most: Option<usize>,
         overwrite: Overwrite,
-    ) -> Result<Solved, Failure> {
-        let writer = Writer::new(Maker::Fit, overwrite).csv(global.csv_dialect);
-        self.check_place(&writer)?;
-        let path = self.folder.join(JOURNAL);
-        let (mut sink, resumed) = JournalFile::open::<Step>(&path, resume)?;
+    ) -> Result<CompletedFit, Failure> {
+        let writer = WritePolicy::new(OutputCommand::Fit, overwrite).with_csv_dialect(global.csv_dialect);
+        self.check_outputs(&writer)?;
+        let path = self.folder.join(CHECKPOINT_FILE);
+        let (mut sink, resumed) = CheckpointWriter::open::<IterateRecord>(&path, resume)?;
         let name = path.display().to_string();
         let expected = self.expected_iterates().min(most.unwrap_or(usize::MAX));
-        let bar = progress::bar(expected as u64, "fit", "iterates", global.quiet);
+        let bar = progress::start_bar(expected as u64, "fit", "iterates", global.quiet);
         let journaled = Arc::new(AtomicUsize::new(resumed.as_ref().map_or(0, |found| found.records.len())));
-        let kept = self.kept(&name, "iterates", &journaled);
-        let stops = interrupt::stops(kept.clone());
+        let kept = self.saved_progress(&name, "iterates", &journaled);
+        let stops = interrupt::register_stoppable(kept.clone());
         let mut replayed = 0;
         let stages = self.problem.segment_s().to_vec();
         let mut on_iterate = |now: &TraceProgress| {
-            show(&bar, now, replayed, &stages);
+            update_trace_bar(&bar, now, replayed, &stages);
             replayed = now.replayed;
             journaled.fetch_max(now.iterates, Ordering::Relaxed);
-            interrupt::flow()
+            interrupt::control_flow()
         };
         let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
         let clock = Instant::now();
         let fitted = self.problem.fit_traces(resume, most, &mut sink, &mut on_iterate);
-        let result = fitted.map_err(|error| self.failure(&error))?;
+        let result = fitted.map_err(|error| self.fit_failure(&error))?;
         let wall = clock.elapsed();
         bar.finish_and_clear();
         sink.finish()?;
-        if result.status == Status::Interrupted {
+        if result.status == FitStatus::Interrupted {
             // an earlier result stays: what is new is in the journal, and a resumed fit gives its result
-            stops.finishing(&kept());
+            stops.announce_stop(&kept());
         } else {
-            self.write(&result, &writer)?;
+            self.write_outputs(&result, &writer)?;
         }
-        Ok(Solved { result, replayed, wall })
+        Ok(CompletedFit { result, replayed, wall })
     }
 
     fn expected_iterates(&self) -> usize {
@@ -77,7 +77,7 @@ impl Problem {
 
 /// Moves the bar; the time left follows from the iterates that are made, not from those that were just
 /// replayed.
-fn show(bar: &ProgressBar, now: &TraceProgress, replayed_before: usize, stages: &[f64]) {
+fn update_trace_bar(bar: &ProgressBar, now: &TraceProgress, replayed_before: usize, stages: &[f64]) {
     bar.set_length(bar.length().unwrap_or(0).max(now.iterates as u64));
     bar.set_position(now.iterates as u64);
     if now.replayed > replayed_before {
@@ -85,10 +85,10 @@ fn show(bar: &ProgressBar, now: &TraceProgress, replayed_before: usize, stages: 
     }
     let (bad, all) = (now.bad_segments, now.segments);
     let length_ms = 1e3 * stages.get(now.stage).copied().unwrap_or_default();
-    let chain = match Branch::of(now.start) {
+    let chain = match UncertaintyRun::from_chain_number(now.start) {
         None => format!("start {}", now.start + 1),
-        Some(Branch::Twin(twin)) => format!("twin {}", twin + 1),
-        Some(Branch::Shorter | Branch::Side { .. }) => "intervals".to_owned(),
+        Some(UncertaintyRun::Twin(twin)) => format!("twin {}", twin + 1),
+        Some(UncertaintyRun::Shorter | UncertaintyRun::Side { .. }) => "intervals".to_owned(),
     };
     bar.set_message(format!("{chain}, segments of {length_ms} ms, {bad} of {all} bad, cost {:.1}", now.cost));
 }

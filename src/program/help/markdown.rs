@@ -1,10 +1,10 @@
 //! Pages of the documentation for a terminal: what the pages use of Markdown, no more.
 
-use crate::text::wrapped;
+use crate::text::wrap_words;
 
 /// A section without those below it, by the text of its heading; with an empty heading what stands before the
 /// first one.
-pub fn section<'a>(page: &'a str, heading: &str) -> &'a str {
+pub fn find_section<'a>(page: &'a str, heading: &str) -> &'a str {
     let level = |line: &str| line.bytes().take_while(|byte| *byte == b'#').count();
     let mut places = page.split_inclusive('\n').scan(0, |at, line| {
         let start = *at;
@@ -21,7 +21,7 @@ pub fn section<'a>(page: &'a str, heading: &str) -> &'a str {
 
 /// A page with lines of at most so many characters: links as their words, the rows of a table one below the
 /// other, code as it is.
-pub fn terminal(page: &str, width: usize) -> String {
+pub fn render_for_terminal(page: &str, width: usize) -> String {
     let mut out = String::new();
     let mut paragraph = String::new();
     let mut columns: Option<Vec<String>> = None;
@@ -32,7 +32,7 @@ pub fn terminal(page: &str, width: usize) -> String {
         let begins =
             fence || code || row || line.trim().is_empty() || line.starts_with('#') || starts_item(line);
         if begins {
-            flush(&mut out, &mut paragraph, width);
+            flush_paragraph(&mut out, &mut paragraph, width);
         }
         if !row {
             columns = None;
@@ -40,13 +40,13 @@ pub fn terminal(page: &str, width: usize) -> String {
         if fence {
             code = !code;
         } else if code {
-            push(&mut out, &format!("    {line}"));
+            push_line(&mut out, &format!("    {line}"));
         } else if row {
-            table_row(&mut out, line, &mut columns, width);
+            push_table_row(&mut out, line, &mut columns, width);
         } else if line.trim().is_empty() {
-            push(&mut out, "");
+            push_line(&mut out, "");
         } else if line.starts_with('#') {
-            push(&mut out, line.trim_start_matches('#').trim());
+            push_line(&mut out, line.trim_start_matches('#').trim());
         } else {
             paragraph.push_str(line);
             paragraph.push('\n');
@@ -55,7 +55,7 @@ pub fn terminal(page: &str, width: usize) -> String {
     out.trim_end().replace("\n\n\n", "\n\n")
 }
 
-fn push(out: &mut String, line: &str) {
+fn push_line(out: &mut String, line: &str) {
     out.push_str(line.trim_end());
     out.push('\n');
 }
@@ -67,21 +67,21 @@ fn starts_item(line: &str) -> bool {
 }
 
 /// A paragraph or an item, indented as it was.
-fn flush(out: &mut String, paragraph: &mut String, width: usize) {
+fn flush_paragraph(out: &mut String, paragraph: &mut String, width: usize) {
     let indent = paragraph.len() - paragraph.trim_start_matches(' ').len();
     let hanging = if starts_item(paragraph) { indent + 2 } else { indent };
-    for (at, line) in wrapped(&plain(paragraph), width - hanging).iter().enumerate() {
+    for (at, line) in wrap_words(&strip_markup(paragraph), width - hanging).iter().enumerate() {
         let margin = if at == 0 { indent } else { hanging };
-        push(out, &format!("{}{line}", " ".repeat(margin)));
+        push_line(out, &format!("{}{line}", " ".repeat(margin)));
     }
     paragraph.clear();
 }
 
 /// The first row names the columns; of the others the first cell stands alone, with the rest below it.
-fn table_row(out: &mut String, line: &str, columns: &mut Option<Vec<String>>, width: usize) {
+fn push_table_row(out: &mut String, line: &str, columns: &mut Option<Vec<String>>, width: usize) {
     let cells = line.replace("\\|", "\u{1}");
     let cells: Vec<String> =
-        cells.trim().trim_matches('|').split('|').map(|cell| plain(cell.trim())).collect();
+        cells.trim().trim_matches('|').split('|').map(|cell| strip_markup(cell.trim())).collect();
     let cells: Vec<String> = cells.into_iter().map(|cell| cell.replace('\u{1}', "|")).collect();
     let Some(names) = columns else {
         *columns = Some(cells);
@@ -90,15 +90,15 @@ fn table_row(out: &mut String, line: &str, columns: &mut Option<Vec<String>>, wi
     if cells.iter().all(|cell| cell.bytes().all(|byte| matches!(byte, b'-' | b':'))) {
         return;
     }
-    push(out, &format!("  {}", cells[0]));
+    push_line(out, &format!("  {}", cells[0]));
     for (name, cell) in names.iter().zip(&cells).skip(1).filter(|(_, cell)| !cell.is_empty()) {
         let words = if name.is_empty() { cell.clone() } else { format!("{name}: {cell}") };
-        wrapped(&words, width - 6).iter().for_each(|line| push(out, &format!("      {line}")));
+        wrap_words(&words, width - 6).iter().for_each(|line| push_line(out, &format!("      {line}")));
     }
 }
 
 /// Words without their links, bold and slanted letters.
-fn plain(words: &str) -> String {
+fn strip_markup(words: &str) -> String {
     let mut plain = String::new();
     let mut rest = words;
     while let Some((before, after)) = rest.split_once('[') {
@@ -129,14 +129,14 @@ mod tests {
 
     #[test]
     fn a_section_ends_where_the_next_of_its_level_begins() {
-        let one = section(PAGE, "One");
+        let one = find_section(PAGE, "One");
         assert!(one.starts_with("## One\n") && one.ends_with("Deep.\n\n"), "{one}");
-        assert_eq!(section(PAGE, ""), "# Top\n\nFirst.\n\n");
+        assert_eq!(find_section(PAGE, ""), "# Top\n\nFirst.\n\n");
     }
 
     #[test]
     fn paragraphs_items_tables_and_code_are_laid_out() {
         let expected = "One\n\nTakes a link and `a[1]`, bold\nover two lines.\n\n- an item that goes on\n\n  `a`\n      unit: m\n      means: one | two\n\n    wiperlab   fit\n\nBelow\n\nDeep.";
-        assert_eq!(terminal(section(PAGE, "One"), 30), expected);
+        assert_eq!(render_for_terminal(find_section(PAGE, "One"), 30), expected);
     }
 }

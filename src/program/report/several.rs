@@ -1,13 +1,13 @@
 //! Several fits side by side.
 
-use super::folder::{self, Output};
-use super::{Fit, reports_folder};
+use super::folder::{self, ReportFiles};
+use super::{ReportedFit, default_reports_folder};
 use crate::program::failure::Failure;
-use crate::program::files::{self, Writer};
-use crate::program::global::Global;
+use crate::program::files::{self, WritePolicy};
+use crate::program::global::GlobalArgs;
 use crate::program::progress;
 use crate::report::comparison;
-use crate::report::several::{Fitted, compare, page, several_json};
+use crate::report::several::{ComparisonInput, compare_fits, comparison_json, render_page};
 use std::path::{Path, PathBuf};
 
 /// Longest name of a folder that is made up: far from what file systems take, and still one that a person
@@ -16,52 +16,52 @@ const LONGEST_NAME: usize = 100;
 
 /// Writes the comparison of fits; says whether any of them does not explain its recording or misses a
 /// component.
-pub fn write(
+pub fn write_comparison(
     jobs: &[PathBuf],
     out: Option<&Path>,
-    writer: &Writer,
-    global: &Global,
+    writer: &WritePolicy,
+    global: &GlobalArgs,
 ) -> Result<bool, Failure> {
-    let folders: Vec<&Path> = jobs.iter().map(|job| files::folder_of(job)).collect();
-    distinct(&folders)?;
-    let out = out.map_or_else(|| default_folder(&folders), |out| Ok(out.to_owned()))?;
-    folder::check(&out, writer)?;
-    let steps = progress::steps("report", global.quiet);
-    steps.on("reading the fits, running and comparing their models");
-    let fits = jobs.iter().map(|job| Fit::load(job)).collect::<Result<Vec<_>, _>>()?;
-    let best = fits.iter().map(Fit::best).collect::<Result<Vec<_>, _>>()?;
+    let folders: Vec<&Path> = jobs.iter().map(|job| files::containing_folder(job)).collect();
+    check_distinct_fits(&folders)?;
+    let out = out.map_or_else(|| default_comparison_folder(&folders), |out| Ok(out.to_owned()))?;
+    folder::check_report_folder(&out, writer)?;
+    let steps = progress::start_steps("report", global.quiet);
+    steps.show_step("reading the fits, running and comparing their models");
+    let fits = jobs.iter().map(|job| ReportedFit::load(job)).collect::<Result<Vec<_>, _>>()?;
+    let best = fits.iter().map(ReportedFit::run_best_models).collect::<Result<Vec<_>, _>>()?;
     let reports = fits
         .iter()
         .zip(&best)
-        .map(|(fit, best)| fit.report(comparison::in_words, best))
+        .map(|(fit, best)| fit.build_report(comparison::build_report_without_figures, best))
         .collect::<Result<Vec<_>, _>>()?;
-    let measured: Vec<_> = fits.iter().map(Fit::measured).collect();
+    let measured: Vec<_> = fits.iter().map(ReportedFit::measured_recordings).collect();
     let fitted = |((fit, report), (best, measured))| {
-        let fit: &Fit = fit;
-        Fitted { name: &fit.name, report, job: fit.problem.job(), measured, best }
+        let fit: &ReportedFit = fit;
+        ComparisonInput { name: &fit.name, report, job: fit.problem.job(), measured, best }
     };
-    let fitted: Vec<Fitted> = fits
+    let fitted: Vec<ComparisonInput> = fits
         .iter()
         .zip(&reports)
         .zip(best.iter().map(Vec::as_slice).zip(measured.iter().map(Vec::as_slice)))
         .map(fitted)
         .collect();
-    let several = compare(&fitted);
-    let json = several_json(&several).map_err(Failure::internal)?;
-    let output = Output {
+    let several = compare_fits(&fitted);
+    let json = comparison_json(&several).map_err(Failure::internal)?;
+    let output = ReportFiles {
         figures: several.figures.iter().collect(),
         json,
         tables: &[],
-        page: page(&several),
+        page: render_page(&several),
         summary: several.summary(),
     };
     drop(steps);
-    output.write(&out, writer, global)?;
+    output.write_to_folder(&out, writer, global)?;
     Ok(!several.passes())
 }
 
 /// Refuses a fit that is given twice, and two fits that would go by the same name.
-fn distinct(fits: &[&Path]) -> Result<(), Failure> {
+fn check_distinct_fits(fits: &[&Path]) -> Result<(), Failure> {
     let place = |fit: &Path| fit.canonicalize().unwrap_or_else(|_| fit.to_owned());
     for (i, fit) in fits.iter().enumerate() {
         for other in &fits[..i] {
@@ -85,7 +85,7 @@ fn distinct(fits: &[&Path]) -> Result<(), Failure> {
 }
 
 /// `reports/A-and-B` next to the first fit's folder `fits`.
-fn default_folder(fits: &[&Path]) -> Result<PathBuf, Failure> {
+fn default_comparison_folder(fits: &[&Path]) -> Result<PathBuf, Failure> {
     let name = fits.iter().map(|fit| files::display_name(fit)).collect::<Vec<_>>().join("-and-");
     if name.len() > LONGEST_NAME {
         let found = name.len();
@@ -94,5 +94,5 @@ fn default_folder(fits: &[&Path]) -> Result<PathBuf, Failure> {
              {LONGEST_NAME}; name a folder with --out DIR"
         )));
     }
-    Ok(fits.first().map(|fit| reports_folder(fit)).unwrap_or_default().join(name))
+    Ok(fits.first().map(|fit| default_reports_folder(fit)).unwrap_or_default().join(name))
 }

@@ -2,33 +2,34 @@
 
 use crate::program::failure::Failure;
 use crate::program::files;
-use crate::program::load::{Loaded, description_of};
-use crate::recording::files::{FilesError, Place};
-use crate::recording::film::{Film, Picture, Pictures};
+use crate::program::load::{LoadedRecording, description_path};
+use crate::recording::files::{FilesError, PixelMapping};
+use crate::recording::film::{Picture, PictureSource, RecordingVideo};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// The pictures of a recording.
-pub struct Video {
-    place: Place,
+pub struct VideoFrames {
+    place: PixelMapping,
     first_frame: usize,
     files: Vec<PathBuf>,
     /// The first picture that could not be read, and why.
     failed: Mutex<Option<Failure>>,
 }
 
-impl Video {
+impl VideoFrames {
     /// The pictures of the recording at `path`, where its description names some.
-    pub fn of(path: &Path, loaded: &Loaded) -> Result<Option<Self>, Failure> {
+    pub fn load(path: &Path, loaded: &LoadedRecording) -> Result<Option<Self>, Failure> {
         let Some((file, video)) = loaded.file.as_ref().and_then(|file| Some((file, file.video.as_ref()?)))
         else {
             return Ok(None);
         };
-        let described = description_of(path);
+        let described = description_path(path);
         let description = described.display().to_string();
-        let place = video.place(&description, &file.camera, file.level.as_ref()).map_err(Failure::input)?;
-        let frames = files::path_in(&described, &video.frames);
+        let place =
+            video.pixel_mapping(&description, &file.camera, file.level.as_ref()).map_err(Failure::input)?;
+        let frames = files::resolve_path(&described, &video.frames);
         let refuse = |found: &str| {
             let problem = format!(
                 "found \"{}\", expected a folder of PNG pictures, a frame each, or one PNG, relative to this file; {} {found}",
@@ -52,25 +53,25 @@ impl Video {
         if files.is_empty() {
             return Err(refuse("holds none"));
         }
-        files.sort_by_cached_key(|file| natural(&file.to_string_lossy()));
+        files.sort_by_cached_key(|file| natural_sort_key(&file.to_string_lossy()));
         Ok(Some(Self { place, first_frame: video.first_frame, files, failed: Mutex::new(None) }))
     }
 
-    pub fn film(&self) -> Film<'_> {
-        Film { place: self.place, pictures: self }
+    pub fn as_film(&self) -> RecordingVideo<'_> {
+        RecordingVideo { mapping: self.place, pictures: self }
     }
 
     /// Refuses if a picture could not be read.
-    pub fn check(&self) -> Result<(), Failure> {
+    pub fn check_pictures(&self) -> Result<(), Failure> {
         self.failed.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
     }
 }
 
-impl Pictures for Video {
-    fn picture(&self, frame: usize) -> Option<Picture> {
+impl PictureSource for VideoFrames {
+    fn frame_picture(&self, frame: usize) -> Option<Picture> {
         let path = self.files.get(frame.checked_sub(self.first_frame)?)?;
         let refused = |error| Failure::Input(format!("{}: {error}", path.display()));
-        let read = files::read(path).and_then(|bytes| Picture::read(&bytes).map_err(refused));
+        let read = files::read_data(path).and_then(|bytes| Picture::from_png(&bytes).map_err(refused));
         read.map_err(|failure| {
             self.failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(failure);
         })
@@ -80,7 +81,7 @@ impl Pictures for Video {
 
 /// What names with numbers in them are ordered by, frame9 before frame10: texts, and numbers by how many
 /// digits they have and then as texts; of equals by the whole name.
-fn natural(name: &str) -> (Vec<(usize, String)>, String) {
+fn natural_sort_key(name: &str) -> (Vec<(usize, String)>, String) {
     let mut parts: Vec<(bool, String)> = Vec::new();
     for letter in name.chars() {
         let digit = letter.is_ascii_digit();
@@ -103,7 +104,7 @@ mod tests {
     #[test]
     fn pictures_are_in_the_order_of_their_numbers() {
         let mut names = ["f10.png", "f9.png", "f09.png", "e11.png", "f1.png", "f100000000000000000000.png"];
-        names.sort_by_cached_key(|name| natural(name));
+        names.sort_by_cached_key(|name| natural_sort_key(name));
         assert_eq!(
             names,
             ["e11.png", "f1.png", "f09.png", "f9.png", "f10.png", "f100000000000000000000.png"]

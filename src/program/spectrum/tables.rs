@@ -1,12 +1,12 @@
-//! What `spectrum` writes and prints in addition to its figures.
+//! What `spectrum_csv` writes and prints in addition to its figures.
 
-use super::{Request, Studied};
+use super::{SpectrumRequest, StudiedWindow};
 use crate::figures::analysis::CoursePoint;
 use crate::program::failure::Failure;
-use crate::recording::channel::{Channel, Instants, named_windows};
-use crate::spectrum::time_frequency::Range;
-use crate::spectrum::{Analysis, Component, Verdict};
-use crate::text::{ascii, with_sd};
+use crate::recording::channel::{Channel, ReversalInstants, phase_windows};
+use crate::spectrum::time_frequency::FrequencyRange;
+use crate::spectrum::{Component, ComponentVerdict, SpectralAnalysis};
+use crate::text::{format_with_sd, to_ascii};
 use rayon::prelude::*;
 use serde::Serialize;
 use std::fmt::Write;
@@ -15,13 +15,13 @@ use std::fmt::Write;
 const BLOCK_ROWS: usize = 4096;
 
 /// `components.json`; what begins inside the window does so at a time of the recording.
-pub fn components(studied: &Studied) -> Result<Vec<u8>, Failure> {
+pub fn components_json(studied: &StudiedWindow) -> Result<Vec<u8>, Failure> {
     let from_s = studied.recording.grid().time_s(studied.frames.start);
     let timed = |c: &Component| Component { begins_s: c.begins_s.map(|s| from_s + s), ..c.clone() };
-    json(&studied.analysis.spectrum.components.iter().map(timed).collect::<Vec<_>>())
+    to_json(&studied.analysis.spectrum.components.iter().map(timed).collect::<Vec<_>>())
 }
 
-fn json(value: &impl Serialize) -> Result<Vec<u8>, Failure> {
+fn to_json(value: &impl Serialize) -> Result<Vec<u8>, Failure> {
     let mut bytes = serde_json::to_vec_pretty(value).map_err(Failure::internal)?;
     bytes.push(b'\n');
     Ok(bytes)
@@ -29,7 +29,7 @@ fn json(value: &impl Serialize) -> Result<Vec<u8>, Failure> {
 
 /// `spectrum.json`: what was analysed, and how.
 #[derive(Serialize)]
-struct Description<'a> {
+struct SpectrumDescription<'a> {
     recording: &'a str,
     synthetic: bool,
     channel: &'static str,
@@ -45,26 +45,26 @@ struct Description<'a> {
     resolution_hz: f64,
     noise_floor_m: f64,
     fastest_hz: f64,
-    windows: Vec<NamedSpan>,
+    windows: Vec<NamedWindowSpan>,
     /// Range of the ridge, whether or not it is a component that drifts.
-    ridge_hz: Option<Range>,
+    ridge_hz: Option<FrequencyRange>,
     note: &'a str,
     hint: Option<&'a str>,
 }
 
 #[derive(Serialize)]
-struct NamedSpan {
+struct NamedWindowSpan {
     name: String,
     from_s: f64,
     to_s: f64,
 }
 
 /// `spectrum.json`.
-pub fn description(request: &Request, studied: &Studied) -> Result<Vec<u8>, Failure> {
-    let Studied { recording, analysis, frames, .. } = studied;
+pub fn description_json(request: &SpectrumRequest, studied: &StudiedWindow) -> Result<Vec<u8>, Failure> {
+    let StudiedWindow { recording, analysis, frames, .. } = studied;
     let grid = recording.grid();
-    let windows = named_windows(recording, &Instants::find(recording));
-    json(&Description {
+    let windows = phase_windows(recording, &ReversalInstants::find_instants(recording));
+    to_json(&SpectrumDescription {
         recording: recording.name(),
         synthetic: recording.is_synthetic(),
         channel: request.channel.name(),
@@ -72,7 +72,7 @@ pub fn description(request: &Request, studied: &Studied) -> Result<Vec<u8>, Fail
         from_s: grid.time_s(frames.start),
         to_s: grid.time_s(frames.end),
         frames: frames.len(),
-        missing_frames: analysis.left_m.iter().filter(|x| x.is_none()).count(),
+        missing_frames: analysis.residual_m.iter().filter(|x| x.is_none()).count(),
         frame_rate_hz: grid.frame_rate_hz,
         exposure_s: studied.exposure_s,
         detrend: analysis.removed.detrend.to_string(),
@@ -82,7 +82,7 @@ pub fn description(request: &Request, studied: &Studied) -> Result<Vec<u8>, Fail
         fastest_hz: request.settings.fastest_hz,
         windows: windows
             .into_iter()
-            .map(|w| NamedSpan { name: w.name, from_s: w.from_s, to_s: w.to_s })
+            .map(|w| NamedWindowSpan { name: w.name, from_s: w.from_s, to_s: w.to_s })
             .collect(),
         ridge_hz: analysis.ridge.as_ref().and_then(|ridge| ridge.range_hz()),
         note: &studied.note,
@@ -91,7 +91,7 @@ pub fn description(request: &Request, studied: &Studied) -> Result<Vec<u8>, Fail
 }
 
 /// `spectrum.csv`: a row a bin; what a long or gappy record has not is empty.
-pub fn spectrum(analysis: &Analysis) -> Vec<u8> {
+pub fn spectrum_csv(analysis: &SpectralAnalysis) -> Vec<u8> {
     let spectrum = &analysis.spectrum;
     let cell = |text: &mut String, value: Option<f64>| match value {
         Some(value) => write!(text, ",{value:e}"),
@@ -125,7 +125,7 @@ pub fn spectrum(analysis: &Analysis) -> Vec<u8> {
 }
 
 /// `ridge.csv`: the course of the strongest component above the slow ones.
-pub fn ridge(course: &[CoursePoint]) -> Vec<u8> {
+pub fn ridge_csv(course: &[CoursePoint]) -> Vec<u8> {
     let speed = |speed: Option<f64>| speed.map_or_else(String::new, |speed| format!("{speed:e}"));
     let row = |p: &CoursePoint| {
         let speeds = [p.tip_speed_m_per_s, p.head_speed_m_per_s].map(speed);
@@ -139,7 +139,7 @@ pub fn ridge(course: &[CoursePoint]) -> Vec<u8> {
 }
 
 /// The components on standard output.
-pub fn summary(channel: Channel, studied: &Studied) {
+pub fn print_summary(channel: Channel, studied: &StudiedWindow) {
     let (recording, spectrum) = (&studied.recording, &studied.analysis.spectrum);
     let synthetic = if recording.is_synthetic() { " (synthetic: no camera took it)" } else { "" };
     print_line!("{}{synthetic}: {channel}, {}", recording.name(), studied.note);
@@ -166,10 +166,12 @@ pub fn summary(channel: Channel, studied: &Studied) {
         let damping = c
             .damping_ratio
             .zip(c.damping_ratio_sd)
-            .map_or_else(|| "-".to_owned(), |(ratio, sd)| shown(ratio, sd));
-        let (frequency, amplitude) =
-            (shown(c.frequency_hz, c.frequency_sd_hz), shown(c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6));
-        print_line!("{frequency:>18} {amplitude:>16} {damping:>16} {:>8.1}  {}", c.snr_db, c.verdict.word());
+            .map_or_else(|| "-".to_owned(), |(ratio, sd)| ascii_with_sd(ratio, sd));
+        let (frequency, amplitude) = (
+            ascii_with_sd(c.frequency_hz, c.frequency_sd_hz),
+            ascii_with_sd(c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6),
+        );
+        print_line!("{frequency:>18} {amplitude:>16} {damping:>16} {:>8.1}  {}", c.snr_db, c.verdict.name());
         if let Some(begins_s) = c.begins_s {
             print_line!("{:>18} begins at {:.4} s", "", from_s + begins_s);
         }
@@ -177,21 +179,22 @@ pub fn summary(channel: Channel, studied: &Studied) {
             print_line!(
                 "{:>18} drifts from {} to {} Hz",
                 "",
-                shown(range.low_hz, range.low_sd_hz),
-                shown(range.high_hz, range.high_sd_hz)
+                ascii_with_sd(range.low_hz, range.low_sd_hz),
+                ascii_with_sd(range.high_hz, range.high_sd_hz)
             );
         }
         c.reasons
             .iter()
-            .for_each(|reason| print_line!("{:>18} {}: {}", "", reason.verdict.word(), reason.words));
-        if let Some(leakage_m) =
-            c.leakage_m.filter(|leakage_m| *leakage_m > c.amplitude_m && c.verdict != Verdict::NotResolvable)
+            .for_each(|reason| print_line!("{:>18} {}: {}", "", reason.verdict.name(), reason.words));
+        if let Some(leakage_m) = c
+            .leakage_m
+            .filter(|leakage_m| *leakage_m > c.amplitude_m && c.verdict != ComponentVerdict::NotResolvable)
         {
             print_line!("{:>18} the flip, not removed, would show {:.3} um here", "", leakage_m * 1e6);
         }
     }
 }
 
-fn shown(value: f64, sd: f64) -> String {
-    ascii(&with_sd(value, sd))
+fn ascii_with_sd(value: f64, sd: f64) -> String {
+    to_ascii(&format_with_sd(value, sd))
 }

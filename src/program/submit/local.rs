@@ -1,10 +1,10 @@
 //! Tasks as processes on this machine: several at once, each with its cores. Then the shards are put
 //! together.
 
-use super::plan::Plan;
+use super::plan::SubmissionPlan;
 use super::shell;
-use crate::program::failure::{BAD_INPUT, Failure, Outcome, STOPPED_EARLY};
-use crate::program::global::Global;
+use crate::program::failure::{BAD_INPUT, CommandOutcome, Failure, STOPPED_EARLY};
+use crate::program::global::GlobalArgs;
 use crate::program::{interrupt, progress};
 use std::fs::{self, File};
 use std::path::PathBuf;
@@ -16,8 +16,8 @@ use std::time::Duration;
 const PAUSE: Duration = Duration::from_millis(20);
 
 /// The command of a task, as words.
-fn command(plan: &Plan, task: usize) -> Vec<String> {
-    let mut words = plan.task();
+fn shard_command(plan: &SubmissionPlan, task: usize) -> Vec<String> {
+    let mut words = plan.task_command();
     words.extend(["--shard".to_owned(), format!("{task}/{}", plan.shards)]);
     words.extend(["--threads".to_owned(), plan.threads.to_string()]);
     if let Some(limit) = plan.time_limit() {
@@ -27,41 +27,41 @@ fn command(plan: &Plan, task: usize) -> Vec<String> {
 }
 
 /// All commands on standard output.
-pub fn show(plan: &Plan) {
-    let commands = plan.tasks.iter().map(|task| command(plan, task));
-    for words in commands.chain([plan.collect()]) {
-        print_line!("{} {}", shell::quoted(&plan.program), shell::line(&words));
+pub fn print_commands(plan: &SubmissionPlan) {
+    let commands = plan.tasks.iter().map(|task| shard_command(plan, task));
+    for words in commands.chain([plan.collect_command()]) {
+        print_line!("{} {}", shell::quote_word(&plan.program), shell::join_words(&words));
     }
 }
 
 /// Runs the tasks, then puts the shards together.
-pub fn run(plan: &Plan, global: &Global) -> Result<Outcome, Failure> {
-    plan.make_logs()?;
+pub fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    plan.create_logs_folder()?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let at_once = (cores / plan.threads).max(1);
     let kept = format!(
         "the points that were done are in {}; the same command goes on",
         plan.work.folder().display()
     );
-    let stops = interrupt::stops({
+    let stops = interrupt::register_stoppable({
         let kept = kept.clone();
         move || kept.clone()
     });
-    let bar = progress::bar(plan.tasks.len() as u64, "submit", "tasks", global.quiet);
+    let bar = progress::start_bar(plan.tasks.len() as u64, "submit", "tasks", global.quiet);
     let mut tasks = plan.tasks.iter();
-    let (mut running, mut ended): (Vec<Task>, Vec<Ended>) = (Vec::new(), Vec::new());
+    let (mut running, mut ended): (Vec<LocalTask>, Vec<FinishedTask>) = (Vec::new(), Vec::new());
     loop {
-        if interrupt::flow().is_break() {
+        if interrupt::control_flow().is_break() {
             drop(running); // (they are killed)
             bar.finish_and_clear();
-            stops.finishing(&kept);
-            return Ok(Outcome::StoppedEarly);
+            stops.announce_stop(&kept);
+            return Ok(CommandOutcome::StoppedEarly);
         }
         // what one refuses the others refuse too
-        let refused = ended.iter().any(Ended::is_refused);
+        let refused = ended.iter().any(FinishedTask::is_refused);
         while !refused && running.len() < at_once {
             let Some(task) = tasks.next() else { break };
-            running.push(Task::start(plan, task)?);
+            running.push(LocalTask::start(plan, task)?);
         }
         if running.is_empty() {
             break;
@@ -69,7 +69,7 @@ pub fn run(plan: &Plan, global: &Global) -> Result<Outcome, Failure> {
         sleep(PAUSE);
         let mut still = Vec::new();
         for task in running {
-            match task.end()? {
+            match task.try_finish()? {
                 Ok(end) => {
                     bar.inc(1);
                     ended.push(end);
@@ -87,17 +87,17 @@ pub fn run(plan: &Plan, global: &Global) -> Result<Outcome, Failure> {
         warn_line!("warning: {}", end.message(plan));
     }
     drop(stops);
-    collect(plan, global)
+    run_collect(plan, global)
 }
 
 /// The job at the end: it says by itself what is missing.
-fn collect(plan: &Plan, global: &Global) -> Result<Outcome, Failure> {
+fn run_collect(plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
     let mut command = Command::new(&plan.program);
-    command.args(plan.collect()).args(global.quiet.then_some("--quiet"));
-    let status = command.status().map_err(|error| unstarted(plan, &error))?;
+    command.args(plan.collect_command()).args(global.quiet.then_some("--quiet"));
+    let status = command.status().map_err(|error| start_failure(plan, &error))?;
     match status.code() {
-        Some(0) => Ok(Outcome::Done),
-        Some(code) if code == i32::from(STOPPED_EARLY) => Ok(Outcome::StoppedEarly),
+        Some(0) => Ok(CommandOutcome::Done),
+        Some(code) if code == i32::from(STOPPED_EARLY) => Ok(CommandOutcome::StoppedEarly),
         Some(code) if code == i32::from(BAD_INPUT) => {
             Err(Failure::Input("the shards cannot be put together, see above".to_owned()))
         }
@@ -105,40 +105,40 @@ fn collect(plan: &Plan, global: &Global) -> Result<Outcome, Failure> {
     }
 }
 
-fn unstarted(plan: &Plan, error: &std::io::Error) -> Failure {
+fn start_failure(plan: &SubmissionPlan, error: &std::io::Error) -> Failure {
     Failure::Internal(format!("{}: cannot be started: {error}", plan.program))
 }
 
 /// A task that runs; dropped, it is killed, and loses the points on which it was working.
-struct Task {
+struct LocalTask {
     number: usize,
     child: Child,
     log: PathBuf,
 }
 
-impl Task {
-    fn start(plan: &Plan, number: usize) -> Result<Self, Failure> {
-        let log = plan.logs().join(format!("{number}-of-{}.log", plan.shards));
+impl LocalTask {
+    fn start(plan: &SubmissionPlan, number: usize) -> Result<Self, Failure> {
+        let log = plan.logs_folder().join(format!("{number}-of-{}.log", plan.shards));
         let unmade = |error| Failure::Internal(format!("{}: cannot be written: {error}", log.display()));
         let to = File::create(&log).map_err(unmade)?;
         let both = to.try_clone().map_err(unmade)?;
         let mut process = Command::new(&plan.program);
-        process.args(command(plan, number)).stdin(Stdio::null()).stdout(to).stderr(both);
-        let child = process.spawn().map_err(|error| unstarted(plan, &error))?;
+        process.args(shard_command(plan, number)).stdin(Stdio::null()).stdout(to).stderr(both);
+        let child = process.spawn().map_err(|error| start_failure(plan, &error))?;
         Ok(Self { number, child, log })
     }
 
     /// How it has ended, or the task where it still runs.
-    fn end(mut self) -> Result<Result<Ended, Self>, Failure> {
+    fn try_finish(mut self) -> Result<Result<FinishedTask, Self>, Failure> {
         let status = self.child.try_wait().map_err(Failure::internal)?;
         Ok(match status {
-            Some(status) => Ok(Ended { number: self.number, status, log: self.log.clone() }),
+            Some(status) => Ok(FinishedTask { number: self.number, status, log: self.log.clone() }),
             None => Err(self),
         })
     }
 }
 
-impl Drop for Task {
+impl Drop for LocalTask {
     fn drop(&mut self) {
         let _ = self.child.kill(); // (it may have ended)
         let _ = self.child.wait();
@@ -146,13 +146,13 @@ impl Drop for Task {
 }
 
 /// A task that has ended.
-struct Ended {
+struct FinishedTask {
     number: usize,
     status: ExitStatus,
     log: PathBuf,
 }
 
-impl Ended {
+impl FinishedTask {
     fn is_refused(&self) -> bool {
         self.status.code() == Some(i32::from(BAD_INPUT))
     }
@@ -163,7 +163,7 @@ impl Ended {
     }
 
     /// Its last line, or where it printed nothing how it ended.
-    fn message(&self, plan: &Plan) -> String {
+    fn message(&self, plan: &SubmissionPlan) -> String {
         let text = fs::read(&self.log).unwrap_or_default();
         let text = String::from_utf8_lossy(&text);
         let said = text.lines().rev().find(|line| !line.trim().is_empty());

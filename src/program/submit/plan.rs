@@ -1,7 +1,7 @@
 //! What is submitted, checked.
 
-use super::tasks::Tasks;
-use super::work::Work;
+use super::tasks::TaskList;
+use super::work::SubmittedWork;
 use crate::program::failure::Failure;
 use crate::program::time_limit::TimeLimit;
 use std::fs;
@@ -18,14 +18,14 @@ const MARGINS_S: (u64, u64) = (30, 300);
 
 /// An array of tasks and the job after them.
 #[derive(Debug)]
-pub struct Plan {
+pub struct SubmissionPlan {
     /// This program, for other machines.
     pub program: String,
     /// Where the tasks run: names in scenes may start from here.
     pub folder: String,
-    pub work: Work,
+    pub work: SubmittedWork,
     pub shards: usize,
-    pub tasks: Tasks,
+    pub tasks: TaskList,
     /// Cores of a task.
     pub threads: usize,
     pub walltime: Option<Duration>,
@@ -34,52 +34,52 @@ pub struct Plan {
     pub options: Vec<String>,
 }
 
-impl Plan {
+impl SubmissionPlan {
     /// Command of a task, without its shard.
-    pub fn task(&self) -> Vec<String> {
-        [self.work.task(), self.options.clone()].concat()
+    pub fn task_command(&self) -> Vec<String> {
+        [self.work.task_command(), self.options.clone()].concat()
     }
 
     /// Command of the job at the end.
-    pub fn collect(&self) -> Vec<String> {
-        [self.work.collect(self.shards), self.options.clone()].concat()
+    pub fn collect_command(&self) -> Vec<String> {
+        [self.work.collect_command(self.shards), self.options.clone()].concat()
     }
 
     /// After what time a task ends by itself.
     pub fn time_limit(&self) -> Option<Duration> {
-        self.walltime.map(|walltime| walltime.saturating_sub(margin(walltime)))
+        self.walltime.map(|walltime| walltime.saturating_sub(time_margin(walltime)))
     }
 
     /// Folder of the scripts.
-    pub fn scripts(&self) -> PathBuf {
+    pub fn scripts_folder(&self) -> PathBuf {
         self.work.folder().join("submit")
     }
 
     /// Folder of what the tasks print.
-    pub fn logs(&self) -> PathBuf {
+    pub fn logs_folder(&self) -> PathBuf {
         self.work.folder().join("logs")
     }
 
-    pub fn make_logs(&self) -> Result<(), Failure> {
-        let logs = self.logs();
+    pub fn create_logs_folder(&self) -> Result<(), Failure> {
+        let logs = self.logs_folder();
         fs::create_dir_all(&logs)
             .map_err(|error| Failure::Internal(format!("{}: cannot be made: {error}", logs.display())))
     }
 
     /// `1 core`, `4 cores`.
-    pub fn cores(&self) -> String {
+    pub fn describe_cores(&self) -> String {
         format!("{} core{}", self.threads, if self.threads == 1 { "" } else { "s" })
     }
 }
 
-fn margin(walltime: Duration) -> Duration {
+fn time_margin(walltime: Duration) -> Duration {
     let (least, most) = MARGINS_S;
     let margin_s = (walltime.as_secs() as f64 * MARGIN) as u64;
     Duration::from_secs(margin_s.clamp(least, most))
 }
 
 /// Time that Slurm gives a task, for [`clap`].
-pub fn walltime(text: &str) -> Result<TimeLimit, String> {
+pub fn parse_walltime(text: &str) -> Result<TimeLimit, String> {
     let limit: TimeLimit = text.parse()?;
     if limit.0.as_secs() < SHORTEST_S {
         return Err("expected at least a minute, as Slurm counts in minutes".to_owned());
@@ -93,9 +93,9 @@ mod tests {
 
     #[test]
     fn a_task_ends_a_little_before_its_walltime() {
-        let of = |time: &str| margin(walltime(time).unwrap().0).as_secs();
+        let of = |time: &str| time_margin(parse_walltime(time).unwrap().0).as_secs();
         assert_eq!([of("1min"), of("10min"), of("20min"), of("1h"), of("24h")], [30, 30, 60, 180, 300]);
-        assert!(walltime("59s").unwrap_err().contains("at least a minute"));
-        assert!(walltime("x").is_err());
+        assert!(parse_walltime("59s").unwrap_err().contains("at least a minute"));
+        assert!(parse_walltime("x").is_err());
     }
 }

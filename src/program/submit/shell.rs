@@ -3,7 +3,7 @@
 use std::path::Path;
 
 /// A word that the shell takes as it is.
-pub fn quoted(word: &str) -> String {
+pub fn quote_word(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,=@".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();
@@ -12,12 +12,12 @@ pub fn quoted(word: &str) -> String {
 }
 
 /// A command line from its words.
-pub fn line(words: &[String]) -> String {
-    words.iter().map(|word| quoted(word)).collect::<Vec<_>>().join(" ")
+pub fn join_words(words: &[String]) -> String {
+    words.iter().map(|word| quote_word(word)).collect::<Vec<_>>().join(" ")
 }
 
 /// Whether a program is found on PATH.
-pub fn is_on_path(program: &str) -> bool {
+pub fn is_program_on_path(program: &str) -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
     std::env::split_paths(&path).any(|folder| is_program(&folder.join(program)))
 }
@@ -48,9 +48,9 @@ mod tests {
             ("", "''"),
             ("~a", "'~a'"),
         ] {
-            assert_eq!(quoted(word), written);
+            assert_eq!(quote_word(word), written);
         }
-        assert_eq!(line(&["sweep".into(), "a b".into(), "--out".into()]), "sweep 'a b' --out");
+        assert_eq!(join_words(&["sweep".into(), "a b".into(), "--out".into()]), "sweep 'a b' --out");
     }
 
     #[cfg(unix)]
@@ -59,7 +59,7 @@ mod tests {
         let words =
             ["a b", "it's", "$HOME `x` \"y\" \\", "Wischblätter", "-x", "*", "a;b&c|d>e#f!g%h", "tab\t"];
         for word in words {
-            let script = format!("printf %s {}", quoted(word));
+            let script = format!("printf %s {}", quote_word(word));
             let ran = std::process::Command::new("/bin/sh").args(["-c", &script]).output().unwrap();
             assert_eq!(String::from_utf8(ran.stdout).unwrap(), word);
         }

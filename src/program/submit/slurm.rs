@@ -5,16 +5,16 @@
 //! logs. `--signal=B:` names the process of the script itself, which is the program; without `B:` only steps
 //! of `srun` would get the signal. After the loss of a node a task is queued again and goes on.
 
-use super::plan::Plan;
+use super::plan::SubmissionPlan;
 use super::shell;
 use std::time::Duration;
 
 /// The program that submits.
-pub const PROGRAM: &str = "sbatch";
+pub const SBATCH: &str = "sbatch";
 /// Submits the other scripts.
 pub const SUBMIT_SH: &str = "submit.sh";
 
-const COMMANDS: &str = r#"array=$(sbatch --parsable ../submit/array.sh)
+const SUBMIT_COMMANDS: &str = r#"array=$(sbatch --parsable ../submit/array.sh)
 array=${array%%;*}
 echo "array: $array"
 collect=$(sbatch --parsable --dependency="afterany:$array" ../submit/collect.sh)
@@ -22,13 +22,13 @@ echo "collect: ${collect%%;*}"
 "#;
 
 /// All scripts by name.
-pub fn scripts(plan: &Plan) -> [(&'static str, String); 3] {
-    [("array.sh", array(plan)), ("collect.sh", collect(plan)), (SUBMIT_SH, submit(plan))]
+pub fn slurm_scripts(plan: &SubmissionPlan) -> [(&'static str, String); 3] {
+    [("array.sh", array_script(plan)), ("collect.sh", collect_script(plan)), (SUBMIT_SH, submit_script(plan))]
 }
 
 /// A script of a task. The program takes the place of the shell, so that it gets every signal itself.
-fn array(plan: &Plan) -> String {
-    let own = [format!("--job-name={}", plan.work.name()), format!("--array={}", plan.tasks)];
+fn array_script(plan: &SubmissionPlan) -> String {
+    let own = [format!("--job-name={}", plan.work.job_name()), format!("--array={}", plan.tasks)];
     let limit =
         plan.time_limit().map_or_else(String::new, |limit| format!(" --time-limit {}s", limit.as_secs()));
     format!(
@@ -37,47 +37,47 @@ fn array(plan: &Plan) -> String {
          {limit}\n",
         tasks = plan.tasks.len(),
         shards = plan.shards,
-        directives = directives(plan, &own, plan.threads, "%x-%A_%a.log"),
-        start = start(plan, &plan.task()),
+        directives = directive_lines(plan, &own, plan.threads, "%x-%A_%a.log"),
+        start = start_lines(plan, &plan.task_command()),
         threads = plan.threads,
     )
 }
 
 /// A script of the job that puts the shards together.
-fn collect(plan: &Plan) -> String {
+fn collect_script(plan: &SubmissionPlan) -> String {
     format!(
         "#!/bin/sh\n# Puts the shards together. Made by `wiperlab submit`.\n{}\n{}\n",
-        directives(plan, &["--job-name=wl-collect".to_owned()], 1, "%x-%j.log"),
-        start(plan, &plan.collect())
+        directive_lines(plan, &["--job-name=wl-collect".to_owned()], 1, "%x-%j.log"),
+        start_lines(plan, &plan.collect_command())
     )
 }
 
 /// A script that submits, from the folder of the logs.
-fn submit(plan: &Plan) -> String {
-    let logs = shell::quoted(&plan.logs().to_string_lossy());
+fn submit_script(plan: &SubmissionPlan) -> String {
+    let logs = shell::quote_word(&plan.logs_folder().to_string_lossy());
     format!(
         "#!/bin/sh\n# Submits the tasks and the job after them. Made by `wiperlab submit`.\nset -e\nmkdir -p \
-         {logs}\ncd {logs}\n{COMMANDS}"
+         {logs}\ncd {logs}\n{SUBMIT_COMMANDS}"
     )
 }
 
-fn start(plan: &Plan, command: &[String]) -> String {
-    let (folder, program) = (shell::quoted(&plan.folder), shell::quoted(&plan.program));
-    format!("cd {folder} || exit 2\nexec {program} {}", shell::line(command))
+fn start_lines(plan: &SubmissionPlan, command: &[String]) -> String {
+    let (folder, program) = (shell::quote_word(&plan.folder), shell::quote_word(&plan.program));
+    format!("cd {folder} || exit 2\nexec {program} {}", shell::join_words(command))
 }
 
-fn directives(plan: &Plan, own: &[String], cores: usize, log: &str) -> String {
+fn directive_lines(plan: &SubmissionPlan, own: &[String], cores: usize, log: &str) -> String {
     let mut lines = own.to_vec();
     lines.extend(["--nodes=1", "--ntasks=1"].map(str::to_owned));
     lines.push(format!("--cpus-per-task={cores}"));
-    lines.extend(plan.walltime.map(|walltime| format!("--time={}", clock(walltime))));
+    lines.extend(plan.walltime.map(|walltime| format!("--time={}", format_clock(walltime))));
     lines.extend(["--signal=B:TERM@30", "--requeue", "--open-mode=append"].map(str::to_owned));
     lines.push(format!("--output={log}"));
     lines.iter().chain(&plan.directives).map(|line| format!("#SBATCH {line}\n")).collect()
 }
 
 /// `HH:MM:SS` with as many hours as it takes.
-fn clock(time: Duration) -> String {
+fn format_clock(time: Duration) -> String {
     let s = time.as_secs();
     format!("{:02}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)
 }

@@ -1,22 +1,22 @@
 //! What is divided among tasks: the commands that a task and the last job run.
 
 use crate::program::failure::Failure;
-use crate::program::files::{self, Maker, Overwrite, Writer};
+use crate::program::files::{self, OutputCommand, Overwrite, WritePolicy};
 use crate::program::load::is_study;
-use crate::program::problem::Problem;
+use crate::program::problem::LoadedJob;
 use crate::program::{fit, sweep};
 use std::path::{Path, PathBuf};
 
 /// What is divided, by absolute paths.
 #[derive(Debug, Clone)]
-pub enum Work {
+pub enum SubmittedWork {
     /// A parameter study, whose shards and results lie in a folder.
     Study { study: String, out: String },
     /// Jobs of fits, each of which is done whole, next to its file; and a folder for scripts and logs.
     Jobs { jobs: Vec<String>, out: String },
 }
 
-impl Work {
+impl SubmittedWork {
     /// A study or jobs that were read and checked as `wiperlab sweep` and `wiperlab fit` do.
     pub fn load(files: &[PathBuf], out: Option<&Path>, overwrite: Overwrite) -> Result<Self, Failure> {
         if let Some(name) = files.iter().find(|file| files::is_standard_input(file)) {
@@ -30,7 +30,7 @@ impl Work {
             studies.extend(is_study(file)?.then_some(file));
         }
         match (files, studies.as_slice(), out) {
-            ([study], [_], Some(out)) => Self::study(study, out, overwrite),
+            ([study], [_], Some(out)) => Self::load_study(study, out, overwrite),
             ([study], [_], None) => Err(Failure::Input(format!(
                 "{}: found a study without --out, expected the folder for its results; add --out DIR",
                 study.display()
@@ -40,7 +40,7 @@ impl Work {
                  run `wiperlab fit` with it",
                 job.display()
             ))),
-            (_, [], out) => Self::jobs(files, out),
+            (_, [], out) => Self::load_jobs(files, out),
             (_, [study, ..], _) => Err(Failure::Input(format!(
                 "{}: found a study among {} files, expected one study alone or jobs of fits; submit it by itself",
                 study.display(),
@@ -49,39 +49,39 @@ impl Work {
         }
     }
 
-    fn study(study: &Path, out: &Path, overwrite: Overwrite) -> Result<Self, Failure> {
-        let problem = sweep::Problem::load(study)?;
-        let writer = Writer::new(Maker::Sweep, overwrite);
-        problem.check_place(out, &writer)?;
-        Ok(Self::Study { study: absolute(study)?, out: absolute(out)? })
+    fn load_study(study: &Path, out: &Path, overwrite: Overwrite) -> Result<Self, Failure> {
+        let problem = sweep::LoadedStudy::load(study)?;
+        let writer = WritePolicy::new(OutputCommand::Sweep, overwrite);
+        problem.check_outputs(out, &writer)?;
+        Ok(Self::Study { study: absolute_path(study)?, out: absolute_path(out)? })
     }
 
-    fn jobs(jobs: &[PathBuf], out: Option<&Path>) -> Result<Self, Failure> {
-        fit::check_folders(jobs)?;
-        jobs.iter().try_for_each(|job| Problem::load(job).map(|_| ()))?;
-        let jobs = jobs.iter().map(|job| absolute(job)).collect::<Result<Vec<_>, _>>()?;
+    fn load_jobs(jobs: &[PathBuf], out: Option<&Path>) -> Result<Self, Failure> {
+        fit::check_distinct_folders(jobs)?;
+        jobs.iter().try_for_each(|job| LoadedJob::load(job).map(|_| ()))?;
+        let jobs = jobs.iter().map(|job| absolute_path(job)).collect::<Result<Vec<_>, _>>()?;
         let out = match out {
-            Some(out) => absolute(out)?,
-            None => common(&jobs),
+            Some(out) => absolute_path(out)?,
+            None => common_folder(&jobs),
         };
         Ok(Self::Jobs { jobs, out })
     }
 
     /// Command of a task, without its shard.
-    pub fn task(&self) -> Vec<String> {
+    pub fn task_command(&self) -> Vec<String> {
         match self {
-            Self::Study { study, out } => words(&["sweep", study, "--out", out]),
-            Self::Jobs { jobs, .. } => [words(&["fit"]), jobs.clone()].concat(),
+            Self::Study { study, out } => to_strings(&["sweep", study, "--out", out]),
+            Self::Jobs { jobs, .. } => [to_strings(&["fit"]), jobs.clone()].concat(),
         }
     }
 
     /// Command of the job at the end.
-    pub fn collect(&self, shards: usize) -> Vec<String> {
+    pub fn collect_command(&self, shards: usize) -> Vec<String> {
         let shards = shards.to_string();
         match self {
-            Self::Study { out, .. } => words(&["collect", out, "--shards", &shards]),
+            Self::Study { out, .. } => to_strings(&["collect", out, "--shards", &shards]),
             Self::Jobs { jobs, .. } => {
-                [words(&["collect"]), jobs.clone(), words(&["--shards", &shards])].concat()
+                [to_strings(&["collect"]), jobs.clone(), to_strings(&["--shards", &shards])].concat()
             }
         }
     }
@@ -89,12 +89,12 @@ impl Work {
     /// Folder in which scripts and logs have theirs.
     pub fn folder(&self) -> PathBuf {
         let (Self::Study { out, .. } | Self::Jobs { out, .. }) = self;
-        Path::new(out).join(crate::program::shards::SHARDS)
+        Path::new(out).join(crate::program::shards::SHARDS_FOLDER)
     }
 
     /// Name of the tasks for the scheduler, with which the names of their logs start: at most 15 plain letters
     /// and digits.
-    pub fn name(&self) -> String {
+    pub fn job_name(&self) -> String {
         const LONGEST: usize = 15;
         let stem = match self {
             Self::Study { study, .. } => Path::new(study).file_stem().unwrap_or_default().to_string_lossy(),
@@ -106,7 +106,7 @@ impl Work {
 }
 
 /// The folder in which all files lie, absolute.
-fn common(files: &[String]) -> String {
+fn common_folder(files: &[String]) -> String {
     let mut folders = files.iter().filter_map(|file| Path::new(file).parent());
     let first = folders.next().unwrap_or(Path::new("/"));
     let shared = |some: &Path, other: &Path| -> PathBuf {
@@ -116,12 +116,12 @@ fn common(files: &[String]) -> String {
     folders.fold(first.to_owned(), |all, folder| shared(&all, folder)).to_string_lossy().into_owned()
 }
 
-fn words(words: &[&str]) -> Vec<String> {
+fn to_strings(words: &[&str]) -> Vec<String> {
     words.iter().map(|word| (*word).to_owned()).collect()
 }
 
 /// A path as text that stands in a script and holds in every folder.
-pub fn absolute(path: &Path) -> Result<String, Failure> {
+pub fn absolute_path(path: &Path) -> Result<String, Failure> {
     let refused = |problem: &str| Failure::Input(format!("{}: {problem}", path.display()));
     let whole = std::path::absolute(path).map_err(|error| refused(&error.to_string()))?;
     let text = whole.to_str().ok_or_else(|| {
@@ -142,7 +142,7 @@ mod tests {
 
     #[test]
     fn scripts_of_jobs_lie_where_all_jobs_do() {
-        let of = |files: &[&str]| common(&words(files));
+        let of = |files: &[&str]| common_folder(&to_strings(files));
         assert_eq!(of(&["/a/fits/one/job.toml", "/a/fits/two/job.toml"]), "/a/fits");
         assert_eq!(of(&["/a/x/job.toml", "/b/x/job.toml"]), "/");
     }

@@ -55,7 +55,7 @@ impl Channel {
         let channel = Self::ALL.into_iter().find(|c| c.name() == text);
         channel.ok_or_else(|| UnknownChannel {
             found: text.to_owned(),
-            advice: crate::toml_file::nearest(text, &names),
+            advice: crate::toml_file::suggest_key(text, &names),
         })
     }
 

@@ -1,18 +1,18 @@
 //! The flip: the passage of the deflection from the side on which the tip trails before a turn of the head to
 //! the other side.
 
-use super::tracked::{at, median_of_three, median_position};
+use super::tracked::{index_at_frame, median_of_three, median_position};
 use std::ops::Range;
 
 /// Share of the change at which the deflection has left its level before: that of rise times, far above
 /// tracking noise.
-const LEFT: f64 = 0.05;
+const START_SHARE: f64 = 0.05;
 /// Share of the change at which it has reached its level after.
-const REACHED: f64 = 0.95;
+const END_SHARE: f64 = 0.95;
 /// Tracked frames on either side of the turn that belong to the level before whenever the tip came to rest.
 const NEAR_TURN: usize = 5;
 /// Fewest tracked frames of the level after; a median of fewer is one of noise.
-const FEWEST: usize = 8;
+const FEWEST_POINTS: usize = 8;
 /// Least change in units of the deflection's noise: two extremes of white noise in 1e5 frames are about 9
 /// apart.
 const CHANGE_NOISES: f64 = 12.0;
@@ -34,7 +34,7 @@ pub struct Flip {
 
 /// A turn and its hold, in frames (real numbers).
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Around {
+pub(super) struct TurnNeighbourhood {
     pub turn: f64,
     pub hold: Option<f64>,
     pub release: f64,
@@ -44,37 +44,47 @@ pub(super) struct Around {
 
 /// Start and end of the flip, frames; `points` are the tracked frames of the deflection. `None` where the
 /// deflection is tracked too little or changes by no more than its noise does.
-pub(super) fn find(points: &[(usize, f64)], noise_m: f64, around: &Around) -> Option<(f64, f64)> {
+pub(super) fn find_flip(
+    points: &[(usize, f64)],
+    noise_m: f64,
+    around: &TurnNeighbourhood,
+) -> Option<(f64, f64)> {
     let before_m = median_position(points.get(level_before(points, around))?)?;
     let after = points.get(level_after(points, around))?;
     let change_m = median_position(after)? - before_m;
-    if after.len() < FEWEST || change_m.abs() <= CHANGE_NOISES * noise_m {
+    if after.len() < FEWEST_POINTS || change_m.abs() <= CHANGE_NOISES * noise_m {
         return None;
     }
     let share = |index: usize| (median_of_three(points, index) - before_m) / change_m;
-    let from = at(points, around.turn);
-    let end = (from..points.len()).find(|index| share(*index) >= REACHED)?;
-    let start = (0..end).rev().find(|index| share(*index) <= LEFT)?;
-    let start = crossing(points, &share, start, LEFT).max(around.hold.unwrap_or(0.0));
-    Some((start, crossing(points, &share, end.checked_sub(1)?, REACHED)))
+    let from = index_at_frame(points, around.turn);
+    let end = (from..points.len()).find(|index| share(*index) >= END_SHARE)?;
+    let start = (0..end).rev().find(|index| share(*index) <= START_SHARE)?;
+    let start = interpolate_crossing(points, &share, start, START_SHARE).max(around.hold.unwrap_or(0.0));
+    Some((start, interpolate_crossing(points, &share, end.checked_sub(1)?, END_SHARE)))
 }
 
 /// From rest to the turn, in either order, and a few points about the turn.
-fn level_before(points: &[(usize, f64)], around: &Around) -> Range<usize> {
-    let (turn, hold) = (at(points, around.turn), at(points, around.hold.unwrap_or(around.turn)));
+fn level_before(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<usize> {
+    let (turn, hold) =
+        (index_at_frame(points, around.turn), index_at_frame(points, around.hold.unwrap_or(around.turn)));
     turn.min(hold).min(turn.saturating_sub(NEAR_TURN))
         ..turn.max(hold).max((turn + NEAR_TURN).min(points.len()))
 }
 
 /// As long after the release as the tip rested before it, but not beyond the next turn.
-fn level_after(points: &[(usize, f64)], around: &Around) -> Range<usize> {
+fn level_after(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<usize> {
     let rested = around.release - around.hold.unwrap_or(around.turn).min(around.turn);
-    let from = at(points, around.release);
-    from..at(points, (around.release + rested).min(around.next_turn)).max(from)
+    let from = index_at_frame(points, around.release);
+    from..index_at_frame(points, (around.release + rested).min(around.next_turn)).max(from)
 }
 
 /// Frame at which the share passes `level` on the way from a point to the next.
-fn crossing(points: &[(usize, f64)], share: &impl Fn(usize) -> f64, index: usize, level: f64) -> f64 {
+fn interpolate_crossing(
+    points: &[(usize, f64)],
+    share: &impl Fn(usize) -> f64,
+    index: usize,
+    level: f64,
+) -> f64 {
     let next = (index + 1).min(points.len() - 1);
     let (frame, next_frame) = (points[index].0 as f64, points[next].0 as f64);
     let (low, high) = (share(index), share(next));
@@ -86,7 +96,7 @@ fn crossing(points: &[(usize, f64)], share: &impl Fn(usize) -> f64, index: usize
 mod tests {
     use super::*;
     use crate::math::StandardNormal;
-    use crate::recording::channel::{Instants, Reversal, named_windows};
+    use crate::recording::channel::{Reversal, ReversalInstants, phase_windows};
     use crate::recording::{FrameGrid, Recording, Traces};
     use rand::{Rng, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
@@ -150,7 +160,7 @@ mod tests {
     }
 
     fn find(recording: &Recording) -> Vec<Reversal> {
-        Instants::find(recording).reversals
+        ReversalInstants::find_instants(recording).reversals
     }
 
     /// 5 % and 95 % of the way from the median of the deflection at rest, which the head passes half-way in
@@ -177,7 +187,7 @@ mod tests {
         assert_eq!(found.len(), 2);
         assert_flip(&found[0], 1.0, 2.0);
         assert_flip(&found[1], 2.0, 2.0);
-        assert!(found[0].settled_s().unwrap() >= found[0].flip.unwrap().end_s);
+        assert!(found[0].settling_time_s().unwrap() >= found[0].flip.unwrap().end_s);
     }
 
     #[test]
@@ -212,7 +222,7 @@ mod tests {
     fn without_a_release_there_is_no_flip() {
         let found = find(&stroke(0.8, 1.04, [2e-6, 0.0], |_| false));
         assert_eq!(found.len(), 1);
-        assert_eq!((found[0].release_s, found[0].flip, found[0].settled_s()), (None, None, None));
+        assert_eq!((found[0].release_s, found[0].flip, found[0].settling_time_s()), (None, None, None));
     }
 
     #[test]
@@ -226,7 +236,7 @@ mod tests {
     #[test]
     fn the_windows_of_a_stroke_follow_one_another_to_its_ends() {
         let recording = stroke(0.8, 2.4, [2e-6, 0.1e-3], |i| i % 11 == 4);
-        let windows = named_windows(&recording, &Instants::find(&recording));
+        let windows = phase_windows(&recording, &ReversalInstants::find_instants(&recording));
         assert_eq!(
             windows.iter().map(|w| w.name.as_str()).collect::<Vec<_>>(),
             ["before", "stick", "flip", "after", "stick[2]", "flip[2]", "after[2]"]
@@ -238,13 +248,14 @@ mod tests {
     #[test]
     fn a_change_within_the_noise_is_no_flip() {
         let points: Vec<(usize, f64)> = (0..400).map(|i| (i, if i < 200 { 0.0 } else { 1.0 })).collect();
-        let around = Around { turn: 100.0, hold: Some(90.0), release: 250.0, next_turn: f64::INFINITY };
+        let around =
+            TurnNeighbourhood { turn: 100.0, hold: Some(90.0), release: 250.0, next_turn: f64::INFINITY };
         assert_eq!(find_in(&points, 0.05, &around), Some((199.05, 199.95)));
         assert_eq!(find_in(&points, 0.1, &around), None);
         assert_eq!(find_in(&[], 0.0, &around), None);
     }
 
-    fn find_in(points: &[(usize, f64)], noise_m: f64, around: &Around) -> Option<(f64, f64)> {
-        super::find(points, noise_m, around)
+    fn find_in(points: &[(usize, f64)], noise_m: f64, around: &TurnNeighbourhood) -> Option<(f64, f64)> {
+        super::find_flip(points, noise_m, around)
     }
 }

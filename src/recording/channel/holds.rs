@@ -1,7 +1,7 @@
 //! Where the tip keeps its place while the head turns.
 
-use super::tracked::{Tracked, median_position, noise, range, smoothed};
-use super::turns::{LEAST_RETURN_M, Turn};
+use super::tracked::{TrackPoints, median_filter, median_position, noise_sd_m, value_range};
+use super::turns::{HeadTurn, LEAST_RETURN_M};
 use crate::math;
 
 /// The tip holds while it stays this many noises near its place: one frame in 2 million of white noise lies
@@ -30,26 +30,26 @@ const HOLD_POWER: f64 = 2.0;
 
 /// An interval in which the tip keeps its place, in frames (real numbers); an end outside the recording is
 /// `None`.
-pub(super) struct Hold {
+pub(super) struct TipHold {
     pub start: Option<f64>,
     pub end: Option<f64>,
     points: usize,
 }
 
-pub(super) fn longest_hold(head: &Tracked, tip: &Tracked, turn: &Turn) -> Option<Hold> {
-    let tolerance_m = tolerance(tip, turn);
+pub(super) fn longest_hold(head: &TrackPoints, tip: &TrackPoints, turn: &HeadTurn) -> Option<TipHold> {
+    let tolerance_m = hold_tolerance_m(tip, turn);
     let half = (turn.last - turn.first) as f64 / 2.0;
     let seeds = (-SEEDS..=SEEDS).map(|k| turn.frame + half * k as f64 / SEEDS as f64);
-    let holds = seeds.filter_map(|seed| hold_around(head, tip, tip.at(seed), tolerance_m));
+    let holds = seeds.filter_map(|seed| hold_around(head, tip, tip.index_at_frame(seed), tolerance_m));
     holds.reduce(|best, hold| if hold.points > best.points { hold } else { best })
 }
 
 /// How far the tip may stray from its place: by the noise in the middle third about the turn, where the drive
 /// is slow and the tip calm.
-fn tolerance(tip: &Tracked, turn: &Turn) -> f64 {
+fn hold_tolerance_m(tip: &TrackPoints, turn: &HeadTurn) -> f64 {
     let sixth = (turn.last - turn.first) as f64 / 6.0;
-    let near = &tip.points[tip.at(turn.frame - sixth)..tip.at(turn.frame + sixth)];
-    let local = Some(noise(near)).filter(|_| near.len() >= 4 * SEED_HALF);
+    let near = &tip.points[tip.index_at_frame(turn.frame - sixth)..tip.index_at_frame(turn.frame + sixth)];
+    let local = Some(noise_sd_m(near)).filter(|_| near.len() >= 4 * SEED_HALF);
     let noise_m = local.map_or(tip.noise_m, |local| local.min(tip.noise_m));
     LEAST_TOLERANCE_M.max(HOLD_NOISES * noise_m).max(if noise_m == 0.0 {
         HOLD_STEPS * tip.step_m.min(LEAST_RETURN_M * 2.0)
@@ -58,24 +58,25 @@ fn tolerance(tip: &Tracked, turn: &Turn) -> f64 {
     })
 }
 
-fn hold_around(head: &Tracked, tip: &Tracked, seed: usize, tolerance_m: f64) -> Option<Hold> {
+fn hold_around(head: &TrackPoints, tip: &TrackPoints, seed: usize, tolerance_m: f64) -> Option<TipHold> {
     let nearby =
         tip.points.get(seed.saturating_sub(SEED_HALF)..(seed + SEED_HALF + 1).min(tip.points.len()))?;
     let place = median_position(nearby)?;
-    let (first, last) = stay(tip, seed.min(tip.points.len() - 1), place, tolerance_m);
+    let (first, last) = hold_extent(tip, seed.min(tip.points.len() - 1), place, tolerance_m);
     let place = median_position(&tip.points[first..=last])?;
-    let (first, last) = stay(tip, first + (last - first) / 2, place, tolerance_m);
+    let (first, last) = hold_extent(tip, first + (last - first) / 2, place, tolerance_m);
     if !head_covers(head, tip.points[first].0, tip.points[last].0, HEAD_TOLERANCES * tolerance_m) {
         return None;
     }
     let (before, after) = (first.checked_sub(1), Some(last + 1).filter(|i| *i < tip.points.len()));
-    let start = before.map(|outside| leaves(tip, outside, outside.checked_sub(1), place, HOLD_POWER));
-    let end = after.map(|outside| leaves(tip, outside, Some(outside + 1), place, RELEASE_POWER));
-    Some(Hold { start, end, points: last - first + 1 })
+    let start =
+        before.map(|outside| departure_frame(tip, outside, outside.checked_sub(1), place, HOLD_POWER));
+    let end = after.map(|outside| departure_frame(tip, outside, Some(outside + 1), place, RELEASE_POWER));
+    Some(TipHold { start, end, points: last - first + 1 })
 }
 
 /// First and last point of the interval around `seed` in which the tip stays near `place`.
-fn stay(tip: &Tracked, seed: usize, place: f64, tolerance_m: f64) -> (usize, usize) {
+fn hold_extent(tip: &TrackPoints, seed: usize, place: f64, tolerance_m: f64) -> (usize, usize) {
     let outside = |i: usize| {
         let off = tip.points[i].1 - place;
         if off.abs() <= tolerance_m { 0.0 } else { off.signum() }
@@ -91,14 +92,16 @@ fn stay(tip: &Tracked, seed: usize, place: f64, tolerance_m: f64) -> (usize, usi
     (first, last)
 }
 
-fn head_covers(head: &Tracked, first: usize, last: usize, least_m: f64) -> bool {
-    let during = smoothed(&head.points[head.at(first as f64)..head.at(last as f64 + 1.0)]);
-    let (low, high) = range(&during);
+fn head_covers(head: &TrackPoints, first: usize, last: usize, least_m: f64) -> bool {
+    let during = median_filter(
+        &head.points[head.index_at_frame(first as f64)..head.index_at_frame(last as f64 + 1.0)],
+    );
+    let (low, high) = value_range(&during);
     high - low >= least_m
 }
 
 /// Where the path `distance = c |t - t0|^power` through two points outside the hold starts, frames.
-fn leaves(tip: &Tracked, outside: usize, next: Option<usize>, place: f64, power: f64) -> f64 {
+fn departure_frame(tip: &TrackPoints, outside: usize, next: Option<usize>, place: f64, power: f64) -> f64 {
     let (frame, x) = tip.points[outside];
     let frame = frame as f64;
     let Some((next_frame, next_x)) = next.and_then(|i| tip.points.get(i)) else { return frame };

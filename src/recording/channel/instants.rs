@@ -2,17 +2,17 @@
 //! slips again.
 
 use super::channels::Channel;
-use super::flip::{self, Around, Flip};
+use super::flip::{self, Flip, TurnNeighbourhood};
 use super::holds::longest_hold;
-use super::tracked::{Tracked, points};
-use super::turns::turns;
+use super::tracked::{TrackPoints, present_points};
+use super::turns::find_turns;
 use crate::math;
 use crate::recording::Recording;
 use serde::Serialize;
 
 /// An instant that is found in the data.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Anchor {
+pub enum InstantKind {
     /// The tip stops.
     Hold,
     /// The head turns.
@@ -23,7 +23,7 @@ pub enum Anchor {
     Release,
 }
 
-impl Anchor {
+impl InstantKind {
     /// Every instant.
     pub const ALL: [Self; 4] = [Self::Hold, Self::Reversal, Self::Flip, Self::Release];
 
@@ -57,14 +57,14 @@ impl Reversal {
     /// End of the flip and of the tip's rest, whichever is later, s: from then on the blade trails on its new
     /// side.
     #[must_use]
-    pub(crate) fn settled_s(&self) -> Option<f64> {
+    pub(crate) fn settling_time_s(&self) -> Option<f64> {
         Some(self.flip?.end_s.max(self.release_s?))
     }
 }
 
 /// Why a recording does not show an instant.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
-pub enum NoInstant {
+pub enum InstantNotFound {
     /// There is no head to turn.
     #[error("the head was tracked in none of its frames")]
     HeadNotTracked,
@@ -93,29 +93,33 @@ pub enum NoInstant {
 
 /// Every turn of the head that a recording shows, in order of time.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Instants {
+pub struct ReversalInstants {
     /// The turns.
     pub reversals: Vec<Reversal>,
 }
 
-impl Instants {
+impl ReversalInstants {
     /// Finds the turns of the head and, around each, the interval in which the tip stays in its place.
     #[must_use]
-    pub fn find(recording: &Recording) -> Self {
+    pub fn find_instants(recording: &Recording) -> Self {
         let rate = recording.grid().frame_rate_hz;
-        let head = Tracked::new(&recording.traces().head_x_m);
-        let tip = Tracked::new(&recording.traces().tip_x_m);
+        let head = TrackPoints::from_samples(&recording.traces().head_x_m);
+        let tip = TrackPoints::from_samples(&recording.traces().tip_x_m);
         let time_s = |frame: f64| recording.grid().start_s + frame / rate;
-        let turns = turns(&head);
+        let turns = find_turns(&head);
         let next_turn = |i: usize| turns.get(i + 1).map_or(f64::INFINITY, |next| next.frame);
-        let deflection = points(&Channel::Deflection.samples(recording));
+        let deflection = present_points(&Channel::Deflection.samples(recording));
         let noise_m = math::hypot(head.noise_m, tip.noise_m);
         let reversals = turns.iter().enumerate().map(|(i, turn)| {
             let hold = longest_hold(&head, &tip, turn);
             let (start, end) = hold.map_or((None, None), |hold| (hold.start, hold.end));
-            let around =
-                end.map(|release| Around { turn: turn.frame, hold: start, release, next_turn: next_turn(i) });
-            let flip = around.and_then(|around| flip::find(&deflection, noise_m, &around));
+            let around = end.map(|release| TurnNeighbourhood {
+                turn: turn.frame,
+                hold: start,
+                release,
+                next_turn: next_turn(i),
+            });
+            let flip = around.and_then(|around| flip::find_flip(&deflection, noise_m, &around));
             let flip = flip.map(|(start, end)| Flip { start_s: time_s(start), end_s: time_s(end) });
             Reversal {
                 reversal_s: time_s(turn.frame),
@@ -129,26 +133,26 @@ impl Instants {
 
     /// When the head of a recording turns first, s; `None` where it does not.
     pub(crate) fn first_turn_s(recording: &Recording) -> Option<f64> {
-        Self::find(recording).time_s(Anchor::Reversal, 1).ok()
+        Self::find_instants(recording).time_s(InstantKind::Reversal, 1).ok()
     }
 
     /// Time of an instant of the `reversal`-th turn (counted from 1), s.
     ///
     /// # Errors
-    /// [`NoInstant`] with what was found instead.
-    pub fn time_s(&self, anchor: Anchor, reversal: usize) -> Result<f64, NoInstant> {
+    /// [`InstantNotFound`] with what was found instead.
+    pub fn time_s(&self, anchor: InstantKind, reversal: usize) -> Result<f64, InstantNotFound> {
         let Some(found) = reversal.checked_sub(1).and_then(|index| self.reversals.get(index)) else {
             return Err(match self.reversals.len() {
-                0 => NoInstant::NoTurn,
-                turns => NoInstant::FewerTurns { turns },
+                0 => InstantNotFound::NoTurn,
+                turns => InstantNotFound::FewerTurns { turns },
             });
         };
         match anchor {
-            Anchor::Reversal => Ok(found.reversal_s),
-            Anchor::Hold => found.hold_s.ok_or(NoInstant::NoHold),
-            Anchor::Release => found.release_s.ok_or(NoInstant::NoRelease),
-            Anchor::Flip => {
-                let missing = found.release_s.map_or(NoInstant::NoRelease, |_| NoInstant::NoFlip);
+            InstantKind::Reversal => Ok(found.reversal_s),
+            InstantKind::Hold => found.hold_s.ok_or(InstantNotFound::NoHold),
+            InstantKind::Release => found.release_s.ok_or(InstantNotFound::NoRelease),
+            InstantKind::Flip => {
+                let missing = found.release_s.map_or(InstantNotFound::NoRelease, |_| InstantNotFound::NoFlip);
                 found.flip.map(|flip| flip.start_s).ok_or(missing)
             }
         }
@@ -158,11 +162,11 @@ impl Instants {
     /// later, s.
     ///
     /// # Errors
-    /// As [`Self::time_s`] of [`Anchor::Flip`].
-    pub(crate) fn settled_s(&self, reversal: usize) -> Result<f64, NoInstant> {
-        self.time_s(Anchor::Flip, reversal)?;
+    /// As [`Self::time_s`] of [`InstantKind::Flip`].
+    pub(crate) fn settling_time_s(&self, reversal: usize) -> Result<f64, InstantNotFound> {
+        self.time_s(InstantKind::Flip, reversal)?;
         let found = reversal.checked_sub(1).and_then(|index| self.reversals.get(index));
-        found.and_then(Reversal::settled_s).ok_or(NoInstant::NoRelease)
+        found.and_then(Reversal::settling_time_s).ok_or(InstantNotFound::NoRelease)
     }
 }
 
@@ -228,7 +232,7 @@ mod tests {
 
     #[test]
     fn noiseless_instants_are_found_to_a_frame() {
-        let found = Instants::find(&stroke(0.8, 3.2, 0.0, |_| false)).reversals;
+        let found = ReversalInstants::find_instants(&stroke(0.8, 3.2, 0.0, |_| false)).reversals;
         assert_eq!(found.len(), 3);
         for (turn, reversal) in [1.0, 2.0, 3.0].into_iter().zip(&found) {
             assert_near(Some(reversal.reversal_s), turn, 0.1);
@@ -239,7 +243,7 @@ mod tests {
 
     #[test]
     fn tracking_noise_of_a_tenth_of_a_pixel_moves_them_by_a_few_frames() {
-        let found = Instants::find(&stroke(0.8, 1.4, 2e-6, |_| false)).reversals;
+        let found = ReversalInstants::find_instants(&stroke(0.8, 1.4, 2e-6, |_| false)).reversals;
         assert_eq!(found.len(), 1);
         assert_near(Some(found[0].reversal_s), 1.0, 5.0);
         assert_near(found[0].hold_s, 1.0 - HOLD_BEFORE_S, 4.0);
@@ -248,8 +252,10 @@ mod tests {
 
     #[test]
     fn gaps_do_not_hide_them() {
-        let found =
-            Instants::find(&stroke(0.8, 1.4, 2e-6, |i| i % 7 == 3 || (1900..2100).contains(&i))).reversals;
+        let found = ReversalInstants::find_instants(&stroke(0.8, 1.4, 2e-6, |i| {
+            i % 7 == 3 || (1900..2100).contains(&i)
+        }))
+        .reversals;
         assert_eq!(found.len(), 1);
         assert_near(Some(found[0].reversal_s), 1.0, 10.0);
         assert_near(found[0].release_s, 1.0 + RELEASE_AFTER_S, 5.0);
@@ -257,7 +263,7 @@ mod tests {
 
     #[test]
     fn a_release_after_the_end_is_not_found() {
-        let found = Instants::find(&stroke(0.8, 1.04, 2e-6, |_| false)).reversals;
+        let found = ReversalInstants::find_instants(&stroke(0.8, 1.04, 2e-6, |_| false)).reversals;
         assert_eq!(found.len(), 1);
         assert!(found[0].hold_s.is_some() && found[0].release_s.is_none());
     }
@@ -281,7 +287,7 @@ mod tests {
             true,
         )
         .unwrap();
-        assert_eq!(Instants::find(&recording), Instants::default());
+        assert_eq!(ReversalInstants::find_instants(&recording), ReversalInstants::default());
     }
 
     #[test]
@@ -295,7 +301,7 @@ mod tests {
             true,
         )
         .unwrap();
-        let found = Instants::find(&recording).reversals;
+        let found = ReversalInstants::find_instants(&recording).reversals;
         assert_eq!(found.len(), 1);
         assert_eq!((found[0].hold_s, found[0].release_s), (None, None));
     }
@@ -313,7 +319,7 @@ mod tests {
             });
         }
         let recording = Recording::new("r", calm.grid(), traces, true).unwrap();
-        let found = Instants::find(&recording).reversals;
+        let found = ReversalInstants::find_instants(&recording).reversals;
         assert_eq!(found.len(), 1);
         assert_near(found[0].hold_s, 1.0 - HOLD_BEFORE_S, 5.0);
         assert_near(found[0].release_s, 1.0 + RELEASE_AFTER_S, 5.0);
@@ -322,6 +328,6 @@ mod tests {
     #[test]
     fn nothing_tracked_is_nothing_found() {
         let recording = stroke(0.8, 1.4, 0.0, |_| true);
-        assert_eq!(Instants::find(&recording), Instants::default());
+        assert_eq!(ReversalInstants::find_instants(&recording), ReversalInstants::default());
     }
 }

@@ -1,18 +1,18 @@
 //! The phases of every reversal as windows of a recording.
 
-use super::instants::Instants;
-use super::phase::Phase;
+use super::instants::ReversalInstants;
+use super::phase::ReversalPhase;
 use super::window::{Window, WindowEnd, WindowError};
 use crate::recording::Recording;
 use std::ops::Range;
 
 /// A phase of a reversal as a recording shows it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct NamedWindow {
+pub struct PhaseWindow {
     /// As written in a window: `after`, `after[2]`.
     pub name: String,
     /// Which phase.
-    pub phase: Phase,
+    pub phase: ReversalPhase,
     /// Of which reversal, counted from 1.
     pub reversal: usize,
     /// Its frames: those with `from_s <= time < to_s`; at least one.
@@ -27,30 +27,31 @@ pub struct NamedWindow {
 /// between two reversals is listed once, as `after` of the first. A phase of which an instant was not found
 /// is left out.
 #[must_use]
-pub fn named_windows(recording: &Recording, instants: &Instants) -> Vec<NamedWindow> {
-    let mut windows: Vec<NamedWindow> = Vec::new();
+pub fn phase_windows(recording: &Recording, instants: &ReversalInstants) -> Vec<PhaseWindow> {
+    let mut windows: Vec<PhaseWindow> = Vec::new();
     for reversal in 1..=instants.reversals.len() {
-        for phase in Phase::ALL.into_iter().skip(usize::from(reversal > 1)) {
-            let named =
-                named(phase, reversal, recording, instants).ok().filter(|named| !named.frames.is_empty());
+        for phase in ReversalPhase::ALL.into_iter().skip(usize::from(reversal > 1)) {
+            let named = phase_window(phase, reversal, recording, instants)
+                .ok()
+                .filter(|named| !named.frames.is_empty());
             let follows =
-                |named: &NamedWindow| windows.last().is_none_or(|last| last.frames.end <= named.frames.start);
+                |named: &PhaseWindow| windows.last().is_none_or(|last| last.frames.end <= named.frames.start);
             windows.extend(named.filter(follows));
         }
     }
     windows
 }
 
-fn named(
-    phase: Phase,
+fn phase_window(
+    phase: ReversalPhase,
     reversal: usize,
     recording: &Recording,
-    instants: &Instants,
-) -> Result<NamedWindow, WindowError> {
+    instants: &ReversalInstants,
+) -> Result<PhaseWindow, WindowError> {
     let end = WindowEnd::Phase { phase, reversal };
     let window = Window { from: end, to: end };
-    let (frames, from_s, to_s) = window.span(recording, instants)?;
-    Ok(NamedWindow { name: window.to_string(), phase, reversal, frames, from_s, to_s })
+    let (frames, from_s, to_s) = window.locate_span(recording, instants)?;
+    Ok(PhaseWindow { name: window.to_string(), phase, reversal, frames, from_s, to_s })
 }
 
 #[cfg(test)]
@@ -78,12 +79,15 @@ mod tests {
     }
 
     fn listed(reversals: Vec<Reversal>) -> Vec<(String, Range<usize>)> {
-        named_windows(&recording(), &Instants { reversals }).into_iter().map(|w| (w.name, w.frames)).collect()
+        phase_windows(&recording(), &ReversalInstants { reversals })
+            .into_iter()
+            .map(|w| (w.name, w.frames))
+            .collect()
     }
 
     fn frames(text: &str, reversals: Vec<Reversal>) -> Result<Range<usize>, String> {
         Window::parse(text)
-            .and_then(|w| w.resolve(&recording(), &Instants { reversals }))
+            .and_then(|w| w.resolve_frames(&recording(), &ReversalInstants { reversals }))
             .map_err(|e| e.to_string())
     }
 
@@ -103,8 +107,8 @@ mod tests {
             ("after[2]", 760..1000),
         ];
         assert_eq!(listed(vec![turn(0.7), turn(1.2)]), names(&expected));
-        let found = named_windows(&recording(), &Instants { reversals: vec![turn(0.7)] });
-        assert_eq!((found.len(), found[2].phase, found[2].reversal), (4, Phase::Flip, 1));
+        let found = phase_windows(&recording(), &ReversalInstants { reversals: vec![turn(0.7)] });
+        assert_eq!((found.len(), found[2].phase, found[2].reversal), (4, ReversalPhase::Flip, 1));
         assert!((found[2].from_s - 0.72).abs() < 1e-12 && (found[2].to_s - 0.76).abs() < 1e-12);
     }
 

@@ -1,6 +1,6 @@
 //! The phases of a reversal: before, stick, flip, after.
 
-use super::instants::{Anchor, Instants, NoInstant};
+use super::instants::{InstantKind, InstantNotFound, ReversalInstants};
 use serde::Serialize;
 
 /// A part of the motion around a reversal. The four follow one another without a gap: each ends where the
@@ -17,7 +17,7 @@ use serde::Serialize;
 /// blade rests, so that what rings there rides on no flip. `before` of a later reversal is `after` of the one
 /// before it. How the flip is found says [`super::Flip`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Phase {
+pub enum ReversalPhase {
     /// The blade trails on its old side.
     Before,
     /// The tip sticks and the blade rests.
@@ -28,7 +28,7 @@ pub enum Phase {
     After,
 }
 
-impl Phase {
+impl ReversalPhase {
     /// Every phase, in order of time.
     pub const ALL: [Self; 4] = [Self::Before, Self::Stick, Self::Flip, Self::After];
 
@@ -50,14 +50,14 @@ impl Phase {
     pub(super) fn start_s(
         self,
         reversal: usize,
-        instants: &Instants,
-    ) -> Result<Option<f64>, (String, NoInstant)> {
+        instants: &ReversalInstants,
+    ) -> Result<Option<f64>, (String, InstantNotFound)> {
         match self {
             Self::Before if reversal == 1 => Ok(None),
-            Self::Before => settled_s(reversal.saturating_sub(1), instants).map(Some),
-            Self::Stick => found(Anchor::Hold, reversal, instants).map(Some),
-            Self::Flip => found(Anchor::Flip, reversal, instants).map(Some),
-            Self::After => settled_s(reversal, instants).map(Some),
+            Self::Before => settling_time_s(reversal.saturating_sub(1), instants).map(Some),
+            Self::Stick => instant_time_s(InstantKind::Hold, reversal, instants).map(Some),
+            Self::Flip => instant_time_s(InstantKind::Flip, reversal, instants).map(Some),
+            Self::After => settling_time_s(reversal, instants).map(Some),
         }
     }
 
@@ -68,22 +68,28 @@ impl Phase {
     pub(super) fn end_s(
         self,
         reversal: usize,
-        instants: &Instants,
-    ) -> Result<Option<f64>, (String, NoInstant)> {
+        instants: &ReversalInstants,
+    ) -> Result<Option<f64>, (String, InstantNotFound)> {
         match self {
-            Self::Before => found(Anchor::Hold, reversal, instants).map(Some),
-            Self::Stick => found(Anchor::Flip, reversal, instants).map(Some),
-            Self::Flip => settled_s(reversal, instants).map(Some),
+            Self::Before => instant_time_s(InstantKind::Hold, reversal, instants).map(Some),
+            Self::Stick => instant_time_s(InstantKind::Flip, reversal, instants).map(Some),
+            Self::Flip => settling_time_s(reversal, instants).map(Some),
             Self::After if reversal >= instants.reversals.len() => Ok(None),
-            Self::After => found(Anchor::Hold, reversal + 1, instants).map(Some),
+            Self::After => instant_time_s(InstantKind::Hold, reversal + 1, instants).map(Some),
         }
     }
 }
 
-fn found(anchor: Anchor, reversal: usize, instants: &Instants) -> Result<f64, (String, NoInstant)> {
+fn instant_time_s(
+    anchor: InstantKind,
+    reversal: usize,
+    instants: &ReversalInstants,
+) -> Result<f64, (String, InstantNotFound)> {
     instants.time_s(anchor, reversal).map_err(|reason| (format!("{}[{reversal}]", anchor.name()), reason))
 }
 
-fn settled_s(reversal: usize, instants: &Instants) -> Result<f64, (String, NoInstant)> {
-    instants.settled_s(reversal).map_err(|reason| (format!("{}[{reversal}]", Anchor::Flip.name()), reason))
+fn settling_time_s(reversal: usize, instants: &ReversalInstants) -> Result<f64, (String, InstantNotFound)> {
+    instants
+        .settling_time_s(reversal)
+        .map_err(|reason| (format!("{}[{reversal}]", InstantKind::Flip.name()), reason))
 }

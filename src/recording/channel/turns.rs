@@ -1,6 +1,6 @@
 //! Where the head turns.
 
-use super::tracked::{Tracked, range, smoothed};
+use super::tracked::{TrackPoints, median_filter, value_range};
 
 /// Least return of the head after a turn, m: one pixel of the usual 20 um, so that jitter of a resting head
 /// is none.
@@ -13,26 +13,26 @@ const RETURN_TRAVEL: f64 = 0.005;
 const FIT_RETURNS: f64 = 4.0;
 
 /// A turn of the head: its frame (a real number) and the frames of the parabola that timed it.
-pub(super) struct Turn {
+pub(super) struct HeadTurn {
     pub frame: f64,
     pub first: usize,
     pub last: usize,
 }
 
 /// Extrema from which the head returns by more than noise, jitter and vibration do.
-pub(super) fn turns(head: &Tracked) -> Vec<Turn> {
-    let smooth = smoothed(&head.points);
-    let (low, high) = range(&smooth);
+pub(super) fn find_turns(head: &TrackPoints) -> Vec<HeadTurn> {
+    let smooth = median_filter(&head.points);
+    let (low, high) = value_range(&smooth);
     let least = LEAST_RETURN_M.max(RETURN_NOISES * head.noise_m).max(RETURN_TRAVEL * (high - low));
-    extrema(&smooth, least)
+    alternating_extrema(&smooth, least)
         .into_iter()
-        .map(|index| refine(head, &smooth, index, FIT_RETURNS * least))
+        .map(|index| time_extremum(head, &smooth, index, FIT_RETURNS * least))
         .collect()
 }
 
 /// Indices of alternating maxima and minima, each followed by a return of at least `least` and preceded by an
 /// approach of as much.
-fn extrema(values: &[f64], least: f64) -> Vec<usize> {
+fn alternating_extrema(values: &[f64], least: f64) -> Vec<usize> {
     let Some(first) = values.first() else { return Vec::new() };
     let (mut top, mut bottom) = ((0, *first), (0, *first));
     let mut rising = None;
@@ -60,21 +60,21 @@ fn extrema(values: &[f64], least: f64) -> Vec<usize> {
 }
 
 /// Times an extremum by the vertex of a parabola through the frames within `reach_m` of it.
-fn refine(head: &Tracked, smooth: &[f64], index: usize, reach_m: f64) -> Turn {
+fn time_extremum(head: &TrackPoints, smooth: &[f64], index: usize, reach_m: f64) -> HeadTurn {
     let near = |i: &usize| (smooth[*i] - smooth[index]).abs() <= reach_m;
     let first = (0..=index).rev().take_while(near).last().unwrap_or(index);
     let last = (index..smooth.len()).take_while(near).last().unwrap_or(index);
     let points = &head.points[first..=last];
     let (start, end) = (head.points[first].0, head.points[last].0);
-    let plain = Turn { frame: head.points[index].0 as f64, first: start, last: end };
-    match vertex(points) {
-        Some(frame) if frame >= start as f64 && frame <= end as f64 => Turn { frame, ..plain },
+    let plain = HeadTurn { frame: head.points[index].0 as f64, first: start, last: end };
+    match parabola_vertex(points) {
+        Some(frame) if frame >= start as f64 && frame <= end as f64 => HeadTurn { frame, ..plain },
         _ => plain,
     }
 }
 
 /// Frame of the vertex of the least-squares parabola through the points.
-fn vertex(points: &[(usize, f64)]) -> Option<f64> {
+fn parabola_vertex(points: &[(usize, f64)]) -> Option<f64> {
     let (first, last) = (points.first()?.0 as f64, points.last()?.0 as f64);
     let (centre, half) = ((first + last) / 2.0, (last - first) / 2.0);
     if points.len() < 5 || half <= 0.0 {

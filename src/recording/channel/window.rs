@@ -1,8 +1,8 @@
 //! Windows `A..B` in seconds of the recording's time or relative to instants found in it, or a phase of a
 //! reversal by its name.
 
-use super::instants::{Anchor, Instants, NoInstant};
-use super::phase::Phase;
+use super::instants::{InstantKind, InstantNotFound, ReversalInstants};
+use super::phase::ReversalPhase;
 use crate::recording::{FrameGrid, Recording};
 use serde::Serialize;
 use std::ops::Range;
@@ -23,7 +23,7 @@ pub enum WindowEnd {
     /// An instant found in the data and an offset from it.
     Found {
         /// Which instant.
-        anchor: Anchor,
+        anchor: InstantKind,
         /// Of which reversal, counted from 1.
         reversal: usize,
         /// Time from the instant, s.
@@ -32,7 +32,7 @@ pub enum WindowEnd {
     /// Where a phase of a reversal starts, or ends where it stands at the end of a window.
     Phase {
         /// Which phase.
-        phase: Phase,
+        phase: ReversalPhase,
         /// Of which reversal, counted from 1.
         reversal: usize,
     },
@@ -76,7 +76,7 @@ pub enum WindowError {
         /// The instant as written.
         instant: String,
         /// What was found instead.
-        reason: NoInstant,
+        reason: InstantNotFound,
     },
     /// The window leaves the recording.
     #[error(
@@ -126,8 +126,12 @@ impl Window {
     /// # Errors
     /// [`WindowError`] when an instant was not found, or the window leaves the recording, runs backwards or
     /// is shorter than `MIN_FRAMES`.
-    pub fn resolve(&self, recording: &Recording, instants: &Instants) -> Result<Range<usize>, WindowError> {
-        let (frames, _, _) = self.span(recording, instants)?;
+    pub fn resolve_frames(
+        &self,
+        recording: &Recording,
+        instants: &ReversalInstants,
+    ) -> Result<Range<usize>, WindowError> {
+        let (frames, _, _) = self.locate_span(recording, instants)?;
         if frames.len() < MIN_FRAMES {
             return Err(WindowError::TooShort { window: self.to_string(), frames: frames.len() });
         }
@@ -135,10 +139,10 @@ impl Window {
     }
 
     /// Frames, however few, start and end, s.
-    pub(super) fn span(
+    pub(super) fn locate_span(
         &self,
         recording: &Recording,
-        instants: &Instants,
+        instants: &ReversalInstants,
     ) -> Result<(Range<usize>, f64, f64), WindowError> {
         let grid = recording.grid();
         let from_s = self
@@ -173,13 +177,13 @@ impl Window {
 
     fn not_found(
         &self,
-        (instant, reason): (String, NoInstant),
+        (instant, reason): (String, InstantNotFound),
         recording: &Recording,
-        instants: &Instants,
+        instants: &ReversalInstants,
     ) -> WindowError {
         let untracked =
             instants.reversals.is_empty() && recording.traces().head_x_m.iter().all(Option::is_none);
-        let reason = if untracked { NoInstant::HeadNotTracked } else { reason };
+        let reason = if untracked { InstantNotFound::HeadNotTracked } else { reason };
         WindowError::NotFound {
             window: self.to_string(),
             recording: recording.name().to_owned(),
@@ -192,21 +196,21 @@ impl Window {
 impl WindowEnd {
     /// Its time at the start of a window, s; `None` for that of the recording. Else the instant that was not
     /// found, and why.
-    fn start_s(&self, instants: &Instants) -> Result<Option<f64>, (String, NoInstant)> {
+    fn start_s(&self, instants: &ReversalInstants) -> Result<Option<f64>, (String, InstantNotFound)> {
         match *self {
             Self::Phase { phase, reversal } => phase.start_s(reversal, instants),
             _ => self.time_s(instants),
         }
     }
 
-    fn end_s(&self, instants: &Instants) -> Result<Option<f64>, (String, NoInstant)> {
+    fn end_s(&self, instants: &ReversalInstants) -> Result<Option<f64>, (String, InstantNotFound)> {
         match *self {
             Self::Phase { phase, reversal } => phase.end_s(reversal, instants),
             _ => self.time_s(instants),
         }
     }
 
-    fn time_s(&self, instants: &Instants) -> Result<Option<f64>, (String, NoInstant)> {
+    fn time_s(&self, instants: &ReversalInstants) -> Result<Option<f64>, (String, InstantNotFound)> {
         match *self {
             Self::Open | Self::Phase { .. } => Ok(None),
             Self::Time(time_s) => Ok(Some(time_s)),
@@ -242,14 +246,14 @@ mod tests {
             .unwrap()
     }
 
-    fn instants() -> Instants {
+    fn instants() -> ReversalInstants {
         let first = Reversal {
             reversal_s: 0.7,
             hold_s: Some(0.69),
             release_s: Some(0.75),
             flip: Some(Flip { start_s: 0.71, end_s: 0.745 }),
         };
-        Instants {
+        ReversalInstants {
             reversals: vec![
                 first,
                 Reversal { reversal_s: 1.2, hold_s: Some(1.19), release_s: None, flip: None },
@@ -258,7 +262,9 @@ mod tests {
     }
 
     fn frames(text: &str) -> Result<Range<usize>, String> {
-        Window::parse(text).and_then(|w| w.resolve(&recording(), &instants())).map_err(|e| e.to_string())
+        Window::parse(text)
+            .and_then(|w| w.resolve_frames(&recording(), &instants()))
+            .map_err(|e| e.to_string())
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Windows as text: `A..B`, or the name of a phase.
 
-use super::instants::Anchor;
-use super::phase::Phase;
+use super::instants::InstantKind;
+use super::phase::ReversalPhase;
 use super::window::{Window, WindowEnd, WindowError};
 use std::fmt;
 
@@ -12,7 +12,7 @@ const EXPECTED_PHASE: &str = "two ends with `..` between them, or one of `before
 impl Window {
     /// Reads `A..B`; an end is empty, seconds, or `hold|reversal|flip|release`, then `[k]` (the k-th
     /// reversal, default 1), then `+seconds` or `-seconds`. Or a whole phase of a reversal,
-    /// `before|stick|flip|after`, then `[k]`: see [`Phase`].
+    /// `before|stick|flip|after`, then `[k]`: see [`ReversalPhase`].
     ///
     /// # Errors
     /// [`WindowError::Syntax`] naming the part at fault.
@@ -74,9 +74,9 @@ fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
         return Ok(WindowEnd::Open);
     }
     if !part.starts_with(|c: char| c.is_alphabetic()) {
-        return seconds(part).map(WindowEnd::Time).ok_or("seconds");
+        return parse_seconds(part).map(WindowEnd::Time).ok_or("seconds");
     }
-    let (anchor, rest) = Anchor::ALL
+    let (anchor, rest) = InstantKind::ALL
         .into_iter()
         .find_map(|anchor| part.strip_prefix(anchor.name()).map(|rest| (anchor, rest)))
         .ok_or(EXPECTED_END)?;
@@ -84,7 +84,7 @@ fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
     let offset_s = match rest.trim() {
         "" => 0.0,
         rest if rest.starts_with(['+', '-']) => {
-            seconds(rest).ok_or("an offset in seconds after `+` or `-`")?
+            parse_seconds(rest).ok_or("an offset in seconds after `+` or `-`")?
         }
         _ => return Err("`+` or `-` and an offset in seconds after the instant"),
     };
@@ -93,8 +93,9 @@ fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
 
 /// A phase of a reversal as a window of its own.
 fn parse_phase(text: &str) -> Result<Window, &'static str> {
-    let named =
-        Phase::ALL.into_iter().find_map(|phase| text.strip_prefix(phase.name()).map(|rest| (phase, rest)));
+    let named = ReversalPhase::ALL
+        .into_iter()
+        .find_map(|phase| text.strip_prefix(phase.name()).map(|rest| (phase, rest)));
     let (phase, rest) = named.ok_or(EXPECTED_PHASE)?;
     let (reversal, rest) = parse_reversal(rest)?;
     let end = WindowEnd::Phase { phase, reversal };
@@ -112,6 +113,6 @@ fn parse_reversal(text: &str) -> Result<(usize, &str), &'static str> {
 }
 
 /// A finite number; words such as `inf` are not seconds.
-fn seconds(text: &str) -> Option<f64> {
+fn parse_seconds(text: &str) -> Option<f64> {
     text.parse().ok().filter(|value: &f64| value.is_finite())
 }

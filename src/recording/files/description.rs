@@ -1,8 +1,8 @@
 //! `recording.toml`: where a recording comes from, how it was taken and what was measured on it.
 
 use super::{FilesError, VideoEntry};
-use crate::recording::quality::{Finding, Optics, Quality};
-use crate::text::{degrees, text_sha256};
+use crate::recording::quality::{Optics, Quality, QualityFinding};
+use crate::text::{format_degrees, text_sha256};
 use crate::toml_file::{self, FORMAT};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -62,7 +62,7 @@ pub struct SourceEntry {
     pub encoding: String,
     /// What only the export could show: its times, its rejected positions, how it was filtered.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub findings: Vec<Finding>,
+    pub findings: Vec<QualityFinding>,
 }
 
 /// One text or a list of them.
@@ -78,7 +78,7 @@ pub enum OneOrMany {
 impl OneOrMany {
     /// All of them, in order.
     #[must_use]
-    pub fn all(&self) -> &[String] {
+    pub fn as_slice(&self) -> &[String] {
         match self {
             Self::One(one) => std::slice::from_ref(one),
             Self::Many(many) => many,
@@ -143,8 +143,8 @@ pub struct LevelEntry {
 impl LevelEntry {
     /// The rotation in words.
     #[must_use]
-    pub fn words(&self) -> String {
-        let angle = degrees(self.angle_rad, self.sd_rad);
+    pub fn describe(&self) -> String {
+        let angle = format_degrees(self.angle_rad, self.sd_rad);
         if !self.applied {
             return format!(
                 "a slope of the glass of {angle} along x is not clear of its standard deviation, or \
@@ -158,7 +158,7 @@ impl LevelEntry {
         )
     }
 
-    fn numbers(&self) -> [(&'static str, f64); 4] {
+    fn named_numbers(&self) -> [(&'static str, f64); 4] {
         [
             ("angle_rad", self.angle_rad),
             ("sd_rad", self.sd_rad),
@@ -182,7 +182,7 @@ impl RecordingFile {
     /// The JSON Schema of recording.toml: for editors, and for messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
-        toml_file::schema::<Self>()
+        toml_file::schema_of::<Self>()
     }
 
     /// A description of the present format with nothing but its camera.
@@ -207,7 +207,7 @@ impl RecordingFile {
     /// # Errors
     /// [`FilesError`] with file, line and key.
     pub fn parse(file: &str, text: &str) -> Result<Self, FilesError> {
-        let parsed: Self = toml_file::parse(file, text)?;
+        let parsed: Self = toml_file::parse_toml(file, text)?;
         toml_file::check_format(file, parsed.format)?;
         let camera = &parsed.camera;
         let lengths = [
@@ -221,9 +221,9 @@ impl RecordingFile {
             }
         }
         if let Some(video) = &parsed.video {
-            video.place(file, camera, parsed.level.as_ref())?;
+            video.pixel_mapping(file, camera, parsed.level.as_ref())?;
         }
-        let mut level = parsed.level.iter().flat_map(LevelEntry::numbers);
+        let mut level = parsed.level.iter().flat_map(LevelEntry::named_numbers);
         match level.find(|(_, value)| !value.is_finite()) {
             Some((key, found)) => Err(FilesError::Level { file: file.to_owned(), key, found }),
             None => Ok(parsed),

@@ -75,12 +75,12 @@ fn push_number(text: &mut String, value: f64) {
 /// # Errors
 /// [`FilesError`] with file, line and column.
 pub fn parse_trace_csv(file: &str, text: &str) -> Result<(FrameGrid, Traces), FilesError> {
-    let table = Table::read(file, text)?;
+    let table = TraceTable::parse(file, text)?;
     let seed_s =
         clock::median_step_s(&table.times_s).ok_or_else(|| FilesError::Empty { file: file.to_owned() })?;
-    let fit = table.number(file, seed_s)?;
-    let frame_rate_hz = simplest_rate(&table.times_s, &fit);
-    Ok(table.on_grid(&fit, frame_rate_hz))
+    let fit = table.number_rows(file, seed_s)?;
+    let frame_rate_hz = simplest_frame_rate_hz(&table.times_s, &fit);
+    Ok(table.place_on_grid(&fit, frame_rate_hz))
 }
 
 /// Reads `trace.csv` on a grid of known rate, 1/s. Absent rows become missing frames.
@@ -92,13 +92,13 @@ pub(crate) fn parse_trace_csv_at(
     text: &str,
     frame_rate_hz: f64,
 ) -> Result<(FrameGrid, Traces), FilesError> {
-    let table = Table::read(file, text)?;
-    let fit = table.number(file, 1.0 / frame_rate_hz)?;
-    let (row, off_frames) = furthest_off(&table.times_s, &fit.frames, frame_rate_hz);
+    let table = TraceTable::parse(file, text)?;
+    let fit = table.number_rows(file, 1.0 / frame_rate_hz)?;
+    let (row, off_frames) = farthest_off_grid(&table.times_s, &fit.frames, frame_rate_hz);
     if off_frames > clock::OFF_GRID_LIMIT_FRAMES {
-        return Err(table.off_grid(file, row, off_frames, frame_rate_hz));
+        return Err(table.off_grid_error(file, row, off_frames, frame_rate_hz));
     }
-    Ok(table.on_grid(&fit, frame_rate_hz))
+    Ok(table.place_on_grid(&fit, frame_rate_hz))
 }
 
 /// Frames that a table may have without rows: this many, and this many for each row. Beyond them it is no
@@ -106,15 +106,15 @@ pub(crate) fn parse_trace_csv_at(
 const FRAMES_WITHOUT_ROWS: (usize, usize) = (250_000, 4);
 
 /// The rows as written, before they have frames.
-struct Table<'a> {
+struct TraceTable<'a> {
     text: &'a str,
     confidences: [bool; 2],
     times_s: Vec<f64>,
     columns: Vec<Vec<Option<f64>>>,
 }
 
-impl<'a> Table<'a> {
-    fn read(file: &str, text: &'a str) -> Result<Self, FilesError> {
+impl<'a> TraceTable<'a> {
+    fn parse(file: &str, text: &'a str) -> Result<Self, FilesError> {
         let text = text.strip_prefix('\u{feff}').unwrap_or(text);
         let header = text.lines().next().unwrap_or_default().trim();
         let confidences = CONFIDENCES.map(|name| header.split(',').any(|found| found == name));
@@ -130,20 +130,20 @@ impl<'a> Table<'a> {
             });
         }
         let names: Vec<&str> = header.split(',').collect();
-        let rows = rows(text).count();
+        let rows = numbered_rows(text).count();
         if rows as f64 > clock::MAX_FRAMES {
             return Err(FilesError::TooLong { file: file.to_owned() });
         }
         let column = || Vec::with_capacity(rows);
         let columns = names.iter().skip(1).map(|_| Vec::with_capacity(rows)).collect();
         let mut table = Self { text, confidences, times_s: column(), columns };
-        for (line, row) in self::rows(text) {
-            table.add(file, line, row, &names)?;
+        for (line, row) in self::numbered_rows(text) {
+            table.add_row(file, line, row, &names)?;
         }
         if table.times_s.len() < 2 { Err(FilesError::Empty { file: file.to_owned() }) } else { Ok(table) }
     }
 
-    fn add(&mut self, file: &str, line: u64, row: &str, names: &[&str]) -> Result<(), FilesError> {
+    fn add_row(&mut self, file: &str, line: u64, row: &str, names: &[&str]) -> Result<(), FilesError> {
         let (found, expected) = (row.split(',').count(), names.len());
         if found != expected {
             return Err(FilesError::Cells { file: file.to_owned(), line, found, expected });
@@ -174,12 +174,12 @@ impl<'a> Table<'a> {
         Ok(())
     }
 
-    fn number(&self, file: &str, seed_s: f64) -> Result<FrameFit, FilesError> {
+    fn number_rows(&self, file: &str, seed_s: f64) -> Result<FrameFit, FilesError> {
         let fit = clock::number_frames(&self.times_s, seed_s)
             .ok_or_else(|| FilesError::TooLong { file: file.to_owned() })?;
-        let (rows, frames) = (self.times_s.len(), frames(&fit));
-        if !fit.holds() {
-            return Err(self.off_grid(file, fit.worst_row, fit.worst_frames, 1.0 / fit.frame_s));
+        let (rows, frames) = (self.times_s.len(), frame_count(&fit));
+        if !fit.is_on_grid() {
+            return Err(self.off_grid_error(file, fit.worst_row, fit.worst_frames, 1.0 / fit.frame_s));
         }
         if frames > FRAMES_WITHOUT_ROWS.0 + (1 + FRAMES_WITHOUT_ROWS.1) * rows {
             return Err(FilesError::Sparse { file: file.to_owned(), rows, frames });
@@ -187,18 +187,18 @@ impl<'a> Table<'a> {
         Ok(fit)
     }
 
-    fn off_grid(&self, file: &str, row: usize, off_frames: f64, frame_rate_hz: f64) -> FilesError {
+    fn off_grid_error(&self, file: &str, row: usize, off_frames: f64, frame_rate_hz: f64) -> FilesError {
         FilesError::OffGrid {
             file: file.to_owned(),
-            line: rows(self.text).nth(row).map_or(1, |(line, _)| line),
+            line: numbered_rows(self.text).nth(row).map_or(1, |(line, _)| line),
             found_s: self.times_s[row],
             off_frames,
             frame_rate_hz,
         }
     }
 
-    fn on_grid(self, fit: &FrameFit, frame_rate_hz: f64) -> (FrameGrid, Traces) {
-        let frames = frames(fit);
+    fn place_on_grid(self, fit: &FrameFit, frame_rate_hz: f64) -> (FrameGrid, Traces) {
+        let frames = frame_count(fit);
         let mut spread = self.columns.into_iter().map(|column| {
             if column.len() == frames {
                 return column; // every frame has its row
@@ -225,26 +225,26 @@ impl<'a> Table<'a> {
 }
 
 /// The rows of numbers with their 1-based lines.
-fn rows(text: &str) -> impl Iterator<Item = (u64, &str)> {
+fn numbered_rows(text: &str) -> impl Iterator<Item = (u64, &str)> {
     let lines = (1..).zip(text.lines()).skip(1);
     lines.filter(|(_, line)| !line.trim().is_empty())
 }
 
-fn frames(fit: &FrameFit) -> usize {
+fn frame_count(fit: &FrameFit) -> usize {
     fit.frames.last().map_or(0, |last| last + 1)
 }
 
 /// Row furthest from its frame on a grid that starts at the first row, and how far, frames.
-fn furthest_off(times_s: &[f64], frames: &[usize], frame_rate_hz: f64) -> (usize, f64) {
+fn farthest_off_grid(times_s: &[f64], frames: &[usize], frame_rate_hz: f64) -> (usize, f64) {
     let off = times_s.iter().zip(frames).map(|(t, &n)| ((t - times_s[0]) * frame_rate_hz - n as f64).abs());
     off.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))
 }
 
 /// The rate with the fewest digits that explains the times as well as the fitted one does.
-fn simplest_rate(times_s: &[f64], fit: &FrameFit) -> f64 {
+fn simplest_frame_rate_hz(times_s: &[f64], fit: &FrameFit) -> f64 {
     let fitted = 1.0 / fit.frame_s;
-    let allowed = SNAP_FRAMES.max(1.5 * furthest_off(times_s, &fit.frames, fitted).1);
-    clock::simplest_rate(fitted, |rate| furthest_off(times_s, &fit.frames, rate).1 <= allowed)
+    let allowed = SNAP_FRAMES.max(1.5 * farthest_off_grid(times_s, &fit.frames, fitted).1);
+    clock::simplest_rate(fitted, |rate| farthest_off_grid(times_s, &fit.frames, rate).1 <= allowed)
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use super::{CameraEntry, FilesError, LevelEntry};
 use crate::math;
-use crate::toml_file::Pair;
+use crate::toml_file::NumberPair;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -22,7 +22,7 @@ pub struct VideoEntry {
     #[serde(default)]
     pub first_frame: usize,
     /// Pixel at which x and y of the export are 0: to the right and down from the upper left corner.
-    pub origin_px: Pair,
+    pub origin_px: NumberPair,
     /// Length that a pixel shows, m; that of the camera if left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub metres_per_pixel: Option<f64>,
@@ -33,20 +33,22 @@ impl VideoEntry {
     ///
     /// # Errors
     /// [`FilesError::Video`] for a number that no picture has, or without the length of a pixel.
-    pub fn place(
+    pub fn pixel_mapping(
         &self,
         file: &str,
         camera: &CameraEntry,
         level: Option<&LevelEntry>,
-    ) -> Result<Place, FilesError> {
+    ) -> Result<PixelMapping, FilesError> {
         let refuse = |key, problem: String| Err(FilesError::Video { file: file.to_owned(), key, problem });
-        let Pair(origin_px) = self.origin_px;
+        let NumberPair(origin_px) = self.origin_px;
         if !origin_px.iter().all(|px| px.abs() <= MOST_PIXELS) {
             let expected = "two numbers of pixels up to ten million, as in [0.0, 512.0]";
             return refuse("origin_px", format!("found {origin_px:?}, expected {expected}; correct them"));
         }
         match self.metres_per_pixel.or(camera.metres_per_pixel) {
-            Some(length_m) if LENGTHS_M.contains(&length_m) => Ok(Place::new(origin_px, length_m, level)),
+            Some(length_m) if LENGTHS_M.contains(&length_m) => {
+                Ok(PixelMapping::new(origin_px, length_m, level))
+            }
             Some(found) => {
                 let expected = "the length that a pixel shows, from 1e-9 to 1 m";
                 refuse(
@@ -65,28 +67,28 @@ impl VideoEntry {
 
 /// Where a tracked point lies in the pictures.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Place {
+pub struct PixelMapping {
     /// Pixel of the export's origin.
     pub origin_px: [f64; 2],
     /// Length that a pixel shows, m.
     pub metres_per_pixel: f64,
     /// Turn of the tracks since the export: angle, rad, and its centre, m.
-    turned: Option<(f64, [f64; 2])>,
+    rotation: Option<(f64, [f64; 2])>,
 }
 
-impl Place {
+impl PixelMapping {
     /// The place of a recording whose tracks may have been levelled.
     #[must_use]
     pub fn new(origin_px: [f64; 2], metres_per_pixel: f64, level: Option<&LevelEntry>) -> Self {
         let turned = level.filter(|level| level.applied);
-        let turned = turned.map(|level| (level.angle_rad, [level.centre_x_m, level.centre_y_m]));
-        Self { origin_px, metres_per_pixel, turned }
+        let rotation = turned.map(|level| (level.angle_rad, [level.centre_x_m, level.centre_y_m]));
+        Self { origin_px, metres_per_pixel, rotation }
     }
 
     /// Pixel of a point of the recording, m, y upwards.
     #[must_use]
-    pub fn pixel(&self, [x_m, y_m]: [f64; 2]) -> [f64; 2] {
-        let [x_m, y_m] = match self.turned {
+    pub fn to_pixel(&self, [x_m, y_m]: [f64; 2]) -> [f64; 2] {
+        let [x_m, y_m] = match self.rotation {
             None => [x_m, y_m],
             Some((angle_rad, [cx_m, cy_m])) => {
                 let (sin, cos) = math::sin_cos(angle_rad);
@@ -104,8 +106,8 @@ mod tests {
 
     #[test]
     fn a_levelled_point_lies_where_the_export_had_it() {
-        let plain = Place::new([100.0, 50.0], 1e-3, None);
-        assert_eq!(plain.pixel([0.01, 0.02]), [110.0, 30.0]);
+        let plain = PixelMapping::new([100.0, 50.0], 1e-3, None);
+        assert_eq!(plain.to_pixel([0.01, 0.02]), [110.0, 30.0]);
         let level = LevelEntry {
             applied: true,
             angle_rad: std::f64::consts::FRAC_PI_2,
@@ -116,9 +118,9 @@ mod tests {
             curvature_per_m: None,
         };
         // turned clockwise, a point above the centre came to lie to its right
-        let [x, y] = Place::new([100.0, 50.0], 1e-3, Some(&level)).pixel([0.02, 0.0]);
+        let [x, y] = PixelMapping::new([100.0, 50.0], 1e-3, Some(&level)).to_pixel([0.02, 0.0]);
         assert!((x - 110.0).abs() < 1e-9 && (y - 40.0).abs() < 1e-9, "{x} {y}");
         let unused = LevelEntry { applied: false, ..level };
-        assert_eq!(Place::new([100.0, 50.0], 1e-3, Some(&unused)), plain);
+        assert_eq!(PixelMapping::new([100.0, 50.0], 1e-3, Some(&unused)), plain);
     }
 }

@@ -5,7 +5,7 @@ pub const MOST_COEFFICIENTS: usize = 8;
 
 /// Stationary autoregressive noise of a channel.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Ar {
+pub struct AutoregressiveNoise {
     sd: f64,
     coefficients: Vec<f64>,
 }
@@ -22,7 +22,7 @@ pub struct NotStationary {
     pub coefficients: Vec<f64>,
 }
 
-impl Ar {
+impl AutoregressiveNoise {
     /// Noise with this standard deviation, in the unit of its channel, and these coefficients, that of the
     /// frame before first.
     ///
@@ -30,7 +30,7 @@ impl Ar {
     /// [`NotStationary`] unless the standard deviation is positive and the noise stays finite.
     pub fn new(sd: f64, coefficients: Vec<f64>) -> Result<Self, NotStationary> {
         let usable = sd > 0.0 && sd.is_finite() && coefficients.len() <= MOST_COEFFICIENTS;
-        if usable && reflections(&coefficients).iter().all(|kappa| kappa.abs() < 1.0) {
+        if usable && reflection_coefficients(&coefficients).iter().all(|kappa| kappa.abs() < 1.0) {
             Ok(Self { sd, coefficients })
         } else {
             Err(NotStationary { sd, coefficients })
@@ -61,7 +61,7 @@ impl Ar {
     #[must_use]
     pub fn innovation_sd(&self) -> f64 {
         let unexplained: f64 =
-            reflections(&self.coefficients).iter().map(|kappa| 1.0 - kappa * kappa).product();
+            reflection_coefficients(&self.coefficients).iter().map(|kappa| 1.0 - kappa * kappa).product();
         self.sd * unexplained.sqrt()
     }
 
@@ -70,13 +70,13 @@ impl Ar {
     pub fn correlations(&self, count: usize) -> Vec<f64> {
         let mut correlations = vec![1.0];
         let (mut known, mut unexplained) = (Vec::new(), 1.0);
-        for kappa in reflections(&self.coefficients) {
-            correlations.push(kappa * unexplained + predicted(&known, &correlations));
-            known = extended(&known, kappa);
+        for kappa in reflection_coefficients(&self.coefficients) {
+            correlations.push(kappa * unexplained + predict_value(&known, &correlations));
+            known = raise_order(&known, kappa);
             unexplained *= 1.0 - kappa * kappa;
         }
         while correlations.len() < count {
-            correlations.push(predicted(&self.coefficients, &correlations));
+            correlations.push(predict_value(&self.coefficients, &correlations));
         }
         correlations.truncate(count);
         correlations
@@ -84,13 +84,13 @@ impl Ar {
 }
 
 /// Sum of coefficients times the latest of a row of values, the last first.
-fn predicted(coefficients: &[f64], values: &[f64]) -> f64 {
+fn predict_value(coefficients: &[f64], values: &[f64]) -> f64 {
     coefficients.iter().zip(values.iter().rev()).map(|(a, b)| a * b).sum()
 }
 
 /// Coefficients of one order more by its reflection coefficient (Levinson's recursion; Percival and Walden
 /// 1993, section 9.4).
-pub(super) fn extended(coefficients: &[f64], kappa: f64) -> Vec<f64> {
+pub(super) fn raise_order(coefficients: &[f64], kappa: f64) -> Vec<f64> {
     let turned = coefficients.iter().rev();
     let mut longer: Vec<f64> = coefficients.iter().zip(turned).map(|(a, b)| a - kappa * b).collect();
     longer.push(kappa);
@@ -98,7 +98,7 @@ pub(super) fn extended(coefficients: &[f64], kappa: f64) -> Vec<f64> {
 }
 
 /// Reflection coefficients, that of the lowest order first: the recursion backwards.
-fn reflections(coefficients: &[f64]) -> Vec<f64> {
+fn reflection_coefficients(coefficients: &[f64]) -> Vec<f64> {
     let mut left = coefficients.to_vec();
     let mut found = Vec::with_capacity(left.len());
     while let Some(kappa) = left.pop() {
@@ -116,7 +116,7 @@ mod tests {
 
     #[test]
     fn one_coefficient_is_the_correlation_of_neighbours() {
-        let noise = Ar::new(2.0, vec![0.7]).unwrap();
+        let noise = AutoregressiveNoise::new(2.0, vec![0.7]).unwrap();
         let exact = (0..6).map(|lag| 0.7f64.powi(lag));
         assert!(noise.correlations(6).iter().zip(exact).all(|(a, b)| (a - b).abs() < 1e-15));
         assert!((noise.innovation_sd() - 2.0 * 0.51f64.sqrt()).abs() < 1e-15);
@@ -126,7 +126,7 @@ mod tests {
     #[test]
     fn two_coefficients_have_their_closed_form() {
         let (a, b) = (1.1, -0.4);
-        let noise = Ar::new(1.0, vec![a, b]).unwrap();
+        let noise = AutoregressiveNoise::new(1.0, vec![a, b]).unwrap();
         let [_, first, second] = noise.correlations(3).try_into().unwrap();
         assert!((first - a / (1.0 - b)).abs() < 1e-15);
         assert!((second - (a * first + b)).abs() < 1e-15);
@@ -137,10 +137,10 @@ mod tests {
     #[test]
     fn noise_that_grows_is_refused() {
         for coefficients in [vec![1.0], vec![-1.2], vec![1.5, -0.4], vec![f64::NAN], vec![0.0; 9]] {
-            assert!(Ar::new(1.0, coefficients.clone()).is_err(), "{coefficients:?}");
+            assert!(AutoregressiveNoise::new(1.0, coefficients.clone()).is_err(), "{coefficients:?}");
         }
         for sd in [0.0, -1.0, f64::NAN, f64::INFINITY] {
-            assert!(Ar::white(sd).is_err(), "{sd}");
+            assert!(AutoregressiveNoise::white(sd).is_err(), "{sd}");
         }
     }
 }

@@ -7,78 +7,78 @@ const LEAST_SHARE: f64 = 0.5;
 /// Fewest frames that a block has beyond its freedoms.
 const LEAST_LEFT: usize = 4;
 /// Times the median scatter from which on a block holds more than noise: an outlier, or a tip off the glass.
-const FAR: f64 = 3.0;
+const OUTLYING_SCATTER: f64 = 3.0;
 
 /// How a channel is cut.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Cut<'a> {
+pub(super) struct BlockCut<'a> {
     /// Frames of a block.
     pub length: usize,
     /// Degree of the polynomial of time.
     pub degree: usize,
     /// A channel that enters linearly too.
-    pub beside: Option<&'a [Option<f64>]>,
+    pub covariate: Option<&'a [Option<f64>]>,
 }
 
 /// Frames in which the motion is a sum of a few columns.
 #[derive(Debug, Clone)]
-pub(super) struct Block {
+pub(super) struct NoiseBlock {
     /// Numbers of the frames that are present.
     pub frames: Vec<usize>,
     pub values: Vec<f64>,
     pub columns: Vec<Vec<f64>>,
 }
 
-impl Block {
+impl NoiseBlock {
     /// Data beyond the freedoms of the motion.
-    pub fn freedoms(&self) -> usize {
+    pub fn degrees_of_freedom(&self) -> usize {
         self.values.len() - self.columns.len()
     }
 
     /// Sum of squares that the columns leave of the values.
-    pub fn left(&self) -> f64 {
+    pub fn residual_sum_of_squares(&self) -> f64 {
         self.residuals().iter().map(|x| x * x).sum()
     }
 
     /// What the columns leave of the values.
     pub fn residuals(&self) -> Vec<f64> {
         let mut values = self.values.clone();
-        project(&mut self.columns.clone(), &mut values);
+        project_out(&mut self.columns.clone(), &mut values);
         values
     }
 }
 
 /// Takes the columns out of the values; the logarithm of the determinant of the columns' products.
-pub(super) fn project(columns: &mut [Vec<f64>], values: &mut [f64]) -> f64 {
+pub(super) fn project_out(columns: &mut [Vec<f64>], values: &mut [f64]) -> f64 {
     let mut log = 0.0;
     for j in 0..columns.len() {
         let (done, rest) = columns.split_at_mut(j + 1);
         let column = &mut done[j];
-        let squared = dot(column, column);
+        let squared = dot_product(column, column);
         log += math::ln(squared);
         for other in rest.iter_mut().map(Vec::as_mut_slice).chain([&mut *values]) {
-            let share = dot(column, other) / squared;
+            let share = dot_product(column, other) / squared;
             other.iter_mut().zip(column.iter()).for_each(|(x, c)| *x -= share * c);
         }
     }
     log
 }
 
-pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
+pub(super) fn dot_product(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
 /// The blocks of a channel that hold enough frames.
-pub(super) fn blocks(channel: &[Option<f64>], cut: &Cut<'_>) -> Vec<Block> {
+pub(super) fn cut_blocks(channel: &[Option<f64>], cut: &BlockCut<'_>) -> Vec<NoiseBlock> {
     let starts = (0..channel.len()).step_by(cut.length);
-    starts.filter_map(|first| block(channel, cut, first)).collect()
+    starts.filter_map(|first| cut_block(channel, cut, first)).collect()
 }
 
-fn block(channel: &[Option<f64>], cut: &Cut<'_>, first: usize) -> Option<Block> {
+fn cut_block(channel: &[Option<f64>], cut: &BlockCut<'_>, first: usize) -> Option<NoiseBlock> {
     let last = (first + cut.length).min(channel.len());
-    let beside = |i: usize| cut.beside.map_or(Some(0.0), |beside| beside[i]);
+    let beside = |i: usize| cut.covariate.map_or(Some(0.0), |beside| beside[i]);
     let frames: Vec<usize> = (first..last).filter(|&i| channel[i].is_some() && beside(i).is_some()).collect();
-    let freedoms = cut.degree + 1 + usize::from(cut.beside.is_some());
+    let freedoms = cut.degree + 1 + usize::from(cut.covariate.is_some());
     if (frames.len() as f64) < LEAST_SHARE * cut.length as f64 || frames.len() < freedoms + LEAST_LEFT {
         return None;
     }
@@ -91,24 +91,25 @@ fn block(channel: &[Option<f64>], cut: &Cut<'_>, first: usize) -> Option<Block> 
     let place = |i: &usize| ((i - first) as f64 + 0.5) / half - 1.0;
     let powers = (0..=cut.degree).map(|k| frames.iter().map(|i| math::powi(place(i), k as i32)).collect());
     let mut columns: Vec<Vec<f64>> = powers.collect();
-    if cut.beside.is_some() {
+    if cut.covariate.is_some() {
         let moved = centred(&beside)?;
         // (a channel that does not move adds nothing to the constant)
-        if dot(&moved, &moved) > 0.0 {
+        if dot_product(&moved, &moved) > 0.0 {
             columns.push(moved);
         }
     }
-    Some(Block { values: centred(&|i| channel[i])?, columns, frames })
+    Some(NoiseBlock { values: centred(&|i| channel[i])?, columns, frames })
 }
 
 /// The blocks that hold noise alone: those that scatter much more than most are left out.
-pub(super) fn quiet(blocks: Vec<Block>) -> Vec<Block> {
-    let scatter = |block: &Block| (block.left() / block.freedoms() as f64).sqrt();
+pub(super) fn keep_quiet_blocks(blocks: Vec<NoiseBlock>) -> Vec<NoiseBlock> {
+    let scatter =
+        |block: &NoiseBlock| (block.residual_sum_of_squares() / block.degrees_of_freedom() as f64).sqrt();
     let mut sizes: Vec<f64> = blocks.iter().map(scatter).collect();
     if sizes.is_empty() {
         return blocks;
     }
     let middle = sizes.len() / 2;
     let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
-    blocks.into_iter().filter(|block| scatter(block) <= FAR * median).collect()
+    blocks.into_iter().filter(|block| scatter(block) <= OUTLYING_SCATTER * median).collect()
 }

@@ -5,8 +5,8 @@
 //! itself, as fast as frames follow, so theirs cannot be told from it: one tracker is taken to treat both
 //! points alike, and the tip along the sweep to have the noise of the head, the head upwards that of the tip.
 
-use super::autoregressive::Ar;
-use super::blocks::{Block, Cut, blocks, quiet};
+use super::autoregressive::AutoregressiveNoise;
+use super::blocks::{BlockCut, NoiseBlock, cut_blocks, keep_quiet_blocks};
 use super::likelihood;
 use crate::recording::Recording;
 
@@ -25,7 +25,7 @@ const LEAST_SD_M: f64 = 1e-9;
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChannelNoise {
     /// The noise, m.
-    pub noise: Ar,
+    pub noise: AutoregressiveNoise,
     /// Standard deviation of its standard deviation, m.
     pub sd_of_sd_m: f64,
     /// Standard deviations of its coefficients.
@@ -33,12 +33,12 @@ pub struct ChannelNoise {
     /// Frames that it was measured on, less the freedoms of the motion.
     pub frames: usize,
     /// On which motion.
-    pub source: Source,
+    pub source: NoiseSource,
 }
 
 /// What a channel's noise was measured on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Source {
+pub enum NoiseSource {
     /// The head along the sweep, against its smooth motion.
     SmoothHead,
     /// The tip upwards, against the glass.
@@ -49,7 +49,7 @@ pub enum Source {
 #[derive(Debug, Clone, PartialEq)]
 pub struct RecordingNoise {
     /// Of the tip and of the head along the sweep.
-    pub along: Option<ChannelNoise>,
+    pub along_sweep: Option<ChannelNoise>,
     /// Of the tip and of the head upwards.
     pub upwards: Option<ChannelNoise>,
 }
@@ -62,27 +62,32 @@ pub(super) fn block_length(frame_rate_hz: f64) -> usize {
 /// Measures the noise of a recording: along the sweep and upwards, each by its own channel where that is
 /// tracked, by the other one where not; `None` where neither is, or where a recording has none.
 #[must_use]
-pub fn noise_of(recording: &Recording) -> RecordingNoise {
+pub fn measure_noise(recording: &Recording) -> RecordingNoise {
     let (traces, length) = (recording.traces(), block_length(recording.grid().frame_rate_hz));
-    let head = Cut { length, degree: 3, beside: None };
-    let glass = Cut { length, degree: 1, beside: Some(&traces.tip_x_m) };
-    let head = channel(&traces.head_x_m, &head, Source::SmoothHead);
-    let glass = channel(&traces.tip_y_m, &glass, Source::Glass);
-    RecordingNoise { along: head.clone().or_else(|| glass.clone()), upwards: glass.or(head) }
+    let head = BlockCut { length, degree: 3, covariate: None };
+    let glass = BlockCut { length, degree: 1, covariate: Some(&traces.tip_x_m) };
+    let head = measure_channel_noise(&traces.head_x_m, &head, NoiseSource::SmoothHead);
+    let glass = measure_channel_noise(&traces.tip_y_m, &glass, NoiseSource::Glass);
+    RecordingNoise { along_sweep: head.clone().or_else(|| glass.clone()), upwards: glass.or(head) }
 }
 
-fn channel(values: &[Option<f64>], cut: &Cut<'_>, source: Source) -> Option<ChannelNoise> {
-    let blocks = spread(quiet(blocks(values, cut)));
-    let found = likelihood::noise_of(&blocks)?;
+fn measure_channel_noise(
+    values: &[Option<f64>],
+    cut: &BlockCut<'_>,
+    source: NoiseSource,
+) -> Option<ChannelNoise> {
+    let blocks = thin_blocks(keep_quiet_blocks(cut_blocks(values, cut)));
+    let found = likelihood::estimate_noise(&blocks)?;
     if found.freedoms < FEWEST_FRAMES || found.noise.sd() < LEAST_SD_M {
         return None;
     }
-    let likelihood::Found { noise, sd_of_sd: sd_of_sd_m, sd_of_coefficients, freedoms: frames } = found;
+    let likelihood::NoiseEstimate { noise, sd_of_sd: sd_of_sd_m, sd_of_coefficients, freedoms: frames } =
+        found;
     Some(ChannelNoise { noise, sd_of_sd_m, sd_of_coefficients, frames, source })
 }
 
 /// Every n-th block, so that no more frames than needed are looked at.
-fn spread(blocks: Vec<Block>) -> Vec<Block> {
+fn thin_blocks(blocks: Vec<NoiseBlock>) -> Vec<NoiseBlock> {
     let frames: usize = blocks.iter().map(|block| block.values.len()).sum();
     blocks.into_iter().step_by(frames.div_ceil(MOST_FRAMES).max(1)).collect()
 }

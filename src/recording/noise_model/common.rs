@@ -4,7 +4,7 @@
 //! parabola; a block counts by how still it is, so that a blade that rings says little and one that sticks
 //! much.
 
-use super::blocks::{Block, Cut, blocks, dot};
+use super::blocks::{BlockCut, NoiseBlock, cut_blocks, dot_product};
 use super::channels::block_length;
 use crate::math;
 use crate::recording::Recording;
@@ -12,13 +12,13 @@ use crate::recording::Recording;
 /// Fewest frames of a short block: a parabola leaves three quarters of them.
 const SHORT_BLOCK: usize = 12;
 /// Standard deviations from which on a share is one: chance reaches them in one recording of 370.
-const CLEAR: f64 = 3.0;
+const CLEAR_DEVIATIONS: f64 = 3.0;
 /// Fewest blocks: with fewer their scatter is not known.
 const FEWEST_BLOCKS: usize = 30;
 
 /// The part of a channel's noise that the other point shows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Shared {
+pub struct SharedNoise {
     /// Noise of the channel for a unit of the other point's.
     pub share: f64,
     /// Its standard deviation.
@@ -30,30 +30,36 @@ pub struct Shared {
 
 /// Common noise of a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Common {
+pub struct CommonNoise {
     /// In the tip along the sweep, as the head shows it; `None` where nothing clear is shared.
-    pub tip_x: Option<Shared>,
+    pub tip_x: Option<SharedNoise>,
     /// In the head upwards, as the tip on the glass shows it.
-    pub head_y: Option<Shared>,
+    pub head_y: Option<SharedNoise>,
 }
 
 /// Measures what the points of a recording have in common.
 #[must_use]
-pub fn common(recording: &Recording) -> Common {
+pub fn measure_common_noise(recording: &Recording) -> CommonNoise {
     let (traces, length) = (recording.traces(), block_length(recording.grid().frame_rate_hz));
-    let head = residuals(&traces.head_x_m, &Cut { length, degree: 3, beside: None });
-    let glass = residuals(&traces.tip_y_m, &Cut { length, degree: 1, beside: Some(&traces.tip_x_m) });
-    let short = |beside| Cut { length: SHORT_BLOCK, degree: 2, beside };
-    Common {
-        tip_x: shared(&traces.tip_x_m, &traces.head_x_m, head, &short(None)),
-        head_y: shared(&traces.head_y_m, &traces.tip_y_m, glass, &short(Some(&traces.tip_x_m))),
+    let head = channel_residuals(&traces.head_x_m, &BlockCut { length, degree: 3, covariate: None });
+    let glass =
+        channel_residuals(&traces.tip_y_m, &BlockCut { length, degree: 1, covariate: Some(&traces.tip_x_m) });
+    let short = |beside| BlockCut { length: SHORT_BLOCK, degree: 2, covariate: beside };
+    CommonNoise {
+        tip_x: regress_on_other_point(&traces.tip_x_m, &traces.head_x_m, head, &short(None)),
+        head_y: regress_on_other_point(
+            &traces.head_y_m,
+            &traces.tip_y_m,
+            glass,
+            &short(Some(&traces.tip_x_m)),
+        ),
     }
 }
 
 /// What a channel's motion leaves of it, frame by frame.
-fn residuals(channel: &[Option<f64>], cut: &Cut<'_>) -> Vec<Option<f64>> {
+fn channel_residuals(channel: &[Option<f64>], cut: &BlockCut<'_>) -> Vec<Option<f64>> {
     let mut left = vec![None; channel.len()];
-    for block in super::blocks::quiet(blocks(channel, cut)) {
+    for block in super::blocks::keep_quiet_blocks(cut_blocks(channel, cut)) {
         for (frame, residual) in block.frames.iter().zip(block.residuals()) {
             left[*frame] = Some(residual);
         }
@@ -61,36 +67,36 @@ fn residuals(channel: &[Option<f64>], cut: &Cut<'_>) -> Vec<Option<f64>> {
     left
 }
 
-/// Regression of a channel on the other point's where its noise, `residuals`, is known.
-fn shared(
+/// Regression of a channel on the other point's where its noise, `channel_residuals`, is known.
+fn regress_on_other_point(
     channel: &[Option<f64>],
     other: &[Option<f64>],
     residuals: Vec<Option<f64>>,
-    cut: &Cut<'_>,
-) -> Option<Shared> {
+    cut: &BlockCut<'_>,
+) -> Option<SharedNoise> {
     let known = channel.iter().zip(&residuals).map(|(value, residual)| value.filter(|_| residual.is_some()));
     let both: Vec<Option<f64>> = known.collect();
     let pairs: Vec<[Vec<f64>; 2]> =
-        blocks(&both, cut).iter().filter_map(|block| pair(block, other)).collect();
+        cut_blocks(&both, cut).iter().filter_map(|block| residual_pair(block, other)).collect();
     if pairs.len() < FEWEST_BLOCKS {
         return None;
     }
-    let (share, sd) = regressed(&pairs)?;
+    let (share, sd) = regress_pairs(&pairs)?;
     let noise_m = residuals.iter().map(|x| x.map(|x| share * x)).collect();
-    (share.abs() > CLEAR * sd).then_some(Shared { share, sd, noise_m })
+    (share.abs() > CLEAR_DEVIATIONS * sd).then_some(SharedNoise { share, sd, noise_m })
 }
 
 /// Residuals of the channel and of the other point in a block.
-fn pair(block: &Block, other: &[Option<f64>]) -> Option<[Vec<f64>; 2]> {
+fn residual_pair(block: &NoiseBlock, other: &[Option<f64>]) -> Option<[Vec<f64>; 2]> {
     let first = other[*block.frames.first()?]?;
     let values =
         block.frames.iter().map(|&frame| Some(other[frame]? - first)).collect::<Option<Vec<f64>>>()?;
-    Some([block.residuals(), Block { values, ..block.clone() }.residuals()])
+    Some([block.residuals(), NoiseBlock { values, ..block.clone() }.residuals()])
 }
 
 /// Share and its standard deviation by the scatter over blocks, each with the weight of its own variance;
 /// weights follow from what the share before leaves.
-fn regressed(pairs: &[[Vec<f64>; 2]]) -> Option<(f64, f64)> {
+fn regress_pairs(pairs: &[[Vec<f64>; 2]]) -> Option<(f64, f64)> {
     const ROUNDS: usize = 4;
     let mut share = 0.0;
     let mut sd = f64::INFINITY;
@@ -102,9 +108,9 @@ fn regressed(pairs: &[[Vec<f64>; 2]]) -> Option<(f64, f64)> {
             .iter()
             .map(|pair| {
                 let rest = left(pair);
-                let variance = dot(&rest, &rest) / rest.len() as f64;
+                let variance = dot_product(&rest, &rest) / rest.len() as f64;
                 let weight = if variance > 0.0 { variance.recip() } else { 0.0 };
-                [weight, dot(&pair[1], &pair[1]), dot(&pair[1], &rest)]
+                [weight, dot_product(&pair[1], &pair[1]), dot_product(&pair[1], &rest)]
             })
             .collect();
         let information: f64 = parts.iter().map(|[weight, squared, _]| weight * squared).sum();

@@ -1,8 +1,8 @@
 //! The autoregressive noise that blocks of frames show: by residual likelihood, which counts what the motion
 //! takes away (Patterson and Thompson 1971, *Biometrika* 58), its order by Schwarz's criterion.
 
-use super::autoregressive::{Ar, extended};
-use super::blocks::{Block, dot, project};
+use super::autoregressive::{AutoregressiveNoise, raise_order};
+use super::blocks::{NoiseBlock, dot_product, project_out};
 use super::whitener::Whitener;
 use crate::math;
 use nalgebra::{DMatrix, DVector};
@@ -10,12 +10,12 @@ use nalgebra::{DMatrix, DVector};
 /// Highest order that is tried: the noise of trackers is vibration and sub-pixel bias over a few frames.
 const MOST_ORDER: usize = 6;
 /// Orders in a row that do not pay, after which none is tried.
-const PATIENCE: usize = 2;
+const ORDERS_WITHOUT_GAIN: usize = 2;
 
 /// Noise as blocks show it.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Found {
-    pub noise: Ar,
+pub(super) struct NoiseEstimate {
+    pub noise: AutoregressiveNoise,
     /// Standard deviation of its standard deviation, in the unit of the channel.
     pub sd_of_sd: f64,
     /// Standard deviations of its coefficients.
@@ -25,32 +25,32 @@ pub(super) struct Found {
 }
 
 /// `None` where the blocks hold too little, or no noise.
-pub(super) fn noise_of(blocks: &[Block]) -> Option<Found> {
-    let freedoms: usize = blocks.iter().map(Block::freedoms).sum();
+pub(super) fn estimate_noise(blocks: &[NoiseBlock]) -> Option<NoiseEstimate> {
+    let freedoms: usize = blocks.iter().map(NoiseBlock::degrees_of_freedom).sum();
     let price = math::ln(freedoms as f64);
     let mut turns: Vec<f64> = Vec::new();
-    let mut best = (criterion(blocks, &turns)?, turns.clone());
+    let mut best = (restricted_deviance(blocks, &turns)?, turns.clone());
     for order in 1..=MOST_ORDER {
         turns.push(0.0);
-        let Some(found) = best_of(blocks, &mut turns) else { break };
+        let Some(found) = minimise_deviance(blocks, &mut turns) else { break };
         let cost = found + price * order as f64;
         if cost < best.0 {
             best = (cost, turns.clone());
         }
-        if order >= best.1.len() + PATIENCE {
+        if order >= best.1.len() + ORDERS_WITHOUT_GAIN {
             break;
         }
     }
-    described(blocks, &best.1, freedoms)
+    estimate_at_optimum(blocks, &best.1, freedoms)
 }
 
 /// The noise at the lowest criterion, with standard deviations by the curvature there.
-fn described(blocks: &[Block], turns: &[f64], freedoms: usize) -> Option<Found> {
+fn estimate_at_optimum(blocks: &[NoiseBlock], turns: &[f64], freedoms: usize) -> Option<NoiseEstimate> {
     const STEP: f64 = 1e-3;
     let at = |turns: &[f64]| {
-        let coefficients = coefficients(turns);
-        let unit = Ar::new(1.0, coefficients.clone()).ok()?;
-        Some((math::ln(likelihood(blocks, &unit)?.1), coefficients))
+        let coefficients = coefficients_from_turns(turns);
+        let unit = AutoregressiveNoise::new(1.0, coefficients.clone()).ok()?;
+        Some((math::ln(deviance_and_variance(blocks, &unit)?.1), coefficients))
     };
     let (log_variance, coefficients) = at(turns)?;
     let mut by_turn = DMatrix::zeros(turns.len() + 1, turns.len());
@@ -63,12 +63,12 @@ fn described(blocks: &[Block], turns: &[f64], freedoms: usize) -> Option<Found> 
             by_turn[(j + 1, i)] = (a - b) / STEP;
         }
     }
-    let (_, curvature) = derivatives(blocks, turns, criterion(blocks, turns)?)?;
+    let (_, curvature) = deviance_derivatives(blocks, turns, restricted_deviance(blocks, turns)?)?;
     // the criterion is minus twice the logarithm of the likelihood
     let covariance = 2.0 * &by_turn * curvature.cholesky()?.inverse() * by_turn.transpose();
     let sd = math::exp(0.5 * log_variance);
-    Some(Found {
-        noise: Ar::new(sd, coefficients).ok()?,
+    Some(NoiseEstimate {
+        noise: AutoregressiveNoise::new(sd, coefficients).ok()?,
         sd_of_sd: 0.5 * sd * (2.0 / freedoms as f64 + covariance[(0, 0)]).sqrt(),
         sd_of_coefficients: (1..=turns.len()).map(|i| covariance[(i, i)].sqrt()).collect(),
         freedoms,
@@ -76,17 +76,21 @@ fn described(blocks: &[Block], turns: &[f64], freedoms: usize) -> Option<Found> 
 }
 
 /// Coefficients of the reflection coefficients `tanh(turn)`.
-fn coefficients(turns: &[f64]) -> Vec<f64> {
-    turns.iter().fold(Vec::new(), |known, turn| extended(&known, math::tanh(*turn)))
+fn coefficients_from_turns(turns: &[f64]) -> Vec<f64> {
+    turns.iter().fold(Vec::new(), |known, turn| raise_order(&known, math::tanh(*turn)))
 }
 
 /// Minus twice the logarithm of the residual likelihood, but for a constant.
-fn criterion(blocks: &[Block], turns: &[f64]) -> Option<f64> {
-    Some(likelihood(blocks, &Ar::new(1.0, coefficients(turns)).ok()?)?.0).filter(|x| x.is_finite())
+fn restricted_deviance(blocks: &[NoiseBlock], turns: &[f64]) -> Option<f64> {
+    Some(
+        deviance_and_variance(blocks, &AutoregressiveNoise::new(1.0, coefficients_from_turns(turns)).ok()?)?
+            .0,
+    )
+    .filter(|x| x.is_finite())
 }
 
 /// The criterion and the variance of the noise.
-fn likelihood(blocks: &[Block], noise: &Ar) -> Option<(f64, f64)> {
+fn deviance_and_variance(blocks: &[NoiseBlock], noise: &AutoregressiveNoise) -> Option<(f64, f64)> {
     let (mut left, mut logs, mut freedoms) = (0.0, 0.0, 0);
     let mut last: Option<(Vec<usize>, Whitener)> = None;
     for block in blocks {
@@ -98,11 +102,11 @@ fn likelihood(blocks: &[Block], noise: &Ar) -> Option<(f64, f64)> {
             (pattern, whitener)
         });
         let (mut values, mut columns) = (block.values.clone(), block.columns.clone());
-        whitener.apply(&mut values);
-        columns.iter_mut().for_each(|column| whitener.apply(column));
-        logs += project(&mut columns, &mut values) + whitener.log_determinant();
-        left += dot(&values, &values);
-        freedoms += block.freedoms();
+        whitener.whiten_column(&mut values);
+        columns.iter_mut().for_each(|column| whitener.whiten_column(column));
+        logs += project_out(&mut columns, &mut values) + whitener.log_determinant();
+        left += dot_product(&values, &values);
+        freedoms += block.degrees_of_freedom();
         last = Some((pattern, whitener));
     }
     let variance = left / freedoms as f64;
@@ -110,13 +114,13 @@ fn likelihood(blocks: &[Block], noise: &Ar) -> Option<(f64, f64)> {
 }
 
 /// Moves to the lowest criterion by Newton's steps; its value.
-fn best_of(blocks: &[Block], turns: &mut Vec<f64>) -> Option<f64> {
+fn minimise_deviance(blocks: &[NoiseBlock], turns: &mut Vec<f64>) -> Option<f64> {
     const ROUNDS: usize = 12;
     const LONGEST: f64 = 0.7;
     const SMALL: f64 = 1e-3;
-    let mut here = criterion(blocks, turns)?;
+    let mut here = restricted_deviance(blocks, turns)?;
     for _ in 0..ROUNDS {
-        let (slope, curvature) = derivatives(blocks, turns, here)?;
+        let (slope, curvature) = deviance_derivatives(blocks, turns, here)?;
         let mut step = match curvature.clone().cholesky() {
             Some(cholesky) => -cholesky.solve(&slope),
             None => -&slope * (LONGEST / slope.norm()),
@@ -126,7 +130,7 @@ fn best_of(blocks: &[Block], turns: &mut Vec<f64>) -> Option<f64> {
         }
         let moved = (0..8).find_map(|_| {
             let there: Vec<f64> = turns.iter().zip(&step).map(|(x, dx)| x + dx).collect();
-            let value = criterion(blocks, &there).filter(|value| *value < here);
+            let value = restricted_deviance(blocks, &there).filter(|value| *value < here);
             step *= if value.is_some() { 1.0 } else { 0.4 };
             value.map(|value| (there, value))
         });
@@ -140,13 +144,17 @@ fn best_of(blocks: &[Block], turns: &mut Vec<f64>) -> Option<f64> {
 }
 
 /// Slope and curvature by differences.
-fn derivatives(blocks: &[Block], turns: &[f64], here: f64) -> Option<(DVector<f64>, DMatrix<f64>)> {
+fn deviance_derivatives(
+    blocks: &[NoiseBlock],
+    turns: &[f64],
+    here: f64,
+) -> Option<(DVector<f64>, DMatrix<f64>)> {
     const STEP: f64 = 1e-2;
     let n = turns.len();
     let at = |moves: &[(usize, f64)]| {
         let mut moved = turns.to_vec();
         moves.iter().for_each(|(i, share)| moved[*i] += share * STEP);
-        criterion(blocks, &moved)
+        restricted_deviance(blocks, &moved)
     };
     let up: Vec<f64> = (0..n).map(|i| at(&[(i, 1.0)])).collect::<Option<_>>()?;
     let down: Vec<f64> = (0..n).map(|i| at(&[(i, -1.0)])).collect::<Option<_>>()?;

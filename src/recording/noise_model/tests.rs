@@ -9,7 +9,7 @@ use std::f64::consts::TAU;
 
 const SD_M: f64 = 2e-6;
 
-fn series(noise: &Ar, frames: usize, generator: &mut Xoshiro256PlusPlus) -> Vec<f64> {
+fn series(noise: &AutoregressiveNoise, frames: usize, generator: &mut Xoshiro256PlusPlus) -> Vec<f64> {
     const BEFORE: usize = 300;
     let mut values: Vec<f64> = Vec::new();
     for _ in 0..frames + BEFORE {
@@ -24,7 +24,7 @@ fn series(noise: &Ar, frames: usize, generator: &mut Xoshiro256PlusPlus) -> Vec<
 /// sees tilted, and a part of the frames lost.
 struct Sweep {
     rate_hz: f64,
-    noise: Ar,
+    noise: AutoregressiveNoise,
     /// Share of the variance that both points have in common.
     shared: f64,
     lost: f64,
@@ -83,9 +83,10 @@ impl Sweep {
 fn white_noise_is_found_to_be_white_and_of_its_size() {
     let mut coloured = 0;
     for seed in 0..15 {
-        let noise = Ar::white(SD_M).unwrap();
-        let found = noise_of(&Sweep { rate_hz: 5000.0, noise, shared: 0.0, lost: 0.05, seed }.recording());
-        for channel in [found.along.unwrap(), found.upwards.unwrap()] {
+        let noise = AutoregressiveNoise::white(SD_M).unwrap();
+        let found =
+            measure_noise(&Sweep { rate_hz: 5000.0, noise, shared: 0.0, lost: 0.05, seed }.recording());
+        for channel in [found.along_sweep.unwrap(), found.upwards.unwrap()] {
             assert!((channel.noise.sd() - SD_M).abs() < 4.0 * channel.sd_of_sd_m, "{channel:?}");
             coloured += usize::from(!channel.noise.coefficients().is_empty());
         }
@@ -99,9 +100,9 @@ fn noise_that_resembles_its_neighbours_is_found() {
     let mut scores = Vec::new();
     for (rate_hz, rho) in [(2000.0, 0.3), (5000.0, 0.6), (10_000.0, 0.9), (20_000.0, 0.9)] {
         for seed in 0..3 {
-            let noise = Ar::new(SD_M, vec![rho]).unwrap();
-            let found = noise_of(&Sweep { rate_hz, noise, shared: 0.0, lost: 0.05, seed }.recording());
-            for channel in [found.along.unwrap(), found.upwards.unwrap()] {
+            let noise = AutoregressiveNoise::new(SD_M, vec![rho]).unwrap();
+            let found = measure_noise(&Sweep { rate_hz, noise, shared: 0.0, lost: 0.05, seed }.recording());
+            for channel in [found.along_sweep.unwrap(), found.upwards.unwrap()] {
                 assert_eq!(channel.noise.coefficients().len(), 1, "{rho}: {channel:?}");
                 let off = channel.noise.coefficients()[0] - rho;
                 scores.push(off / channel.sd_of_coefficients[0]);
@@ -120,10 +121,10 @@ fn noise_that_resembles_its_neighbours_is_found() {
 fn a_bias_within_the_pixel_counts_as_noise() {
     const PIXEL_M: f64 = 2e-5;
     for seed in 0..3 {
-        let noise = Ar::white(SD_M).unwrap();
+        let noise = AutoregressiveNoise::white(SD_M).unwrap();
         let sweep = Sweep { rate_hz: 5000.0, noise, shared: 0.0, lost: 0.05, seed };
         let (recording, _) = sweep.with_bias(|x_m| 0.05 * PIXEL_M * (TAU * x_m / PIXEL_M).sin());
-        let found = noise_of(&recording).along.unwrap().noise;
+        let found = measure_noise(&recording).along_sweep.unwrap().noise;
         let expected = SD_M.hypot(0.05 * PIXEL_M / 2f64.sqrt());
         assert!((found.sd() / expected - 1.0).abs() < 0.06, "{found:?} instead of {expected}");
     }
@@ -134,11 +135,11 @@ fn a_bias_within_the_pixel_counts_as_noise() {
 #[test]
 fn what_both_points_share_is_found_and_taken_out() {
     for (rate_hz, rho, share) in [(5000.0, 0.0, 0.6), (10_000.0, 0.6, 0.5), (10_000.0, 0.9, 0.8)] {
-        let noise = Ar::new(SD_M, vec![rho]).unwrap();
+        let noise = AutoregressiveNoise::new(SD_M, vec![rho]).unwrap();
         for seed in 0..3 {
             let sweep = Sweep { rate_hz, noise: noise.clone(), shared: share, lost: 0.05, seed };
             let (recording, noise) = sweep.with_bias(|_| 0.0);
-            let Common { tip_x, head_y } = common(&recording);
+            let CommonNoise { tip_x, head_y } = measure_common_noise(&recording);
             let shared = [tip_x.unwrap(), head_y.unwrap()];
             for found in &shared {
                 let off = found.share - share;
@@ -169,9 +170,9 @@ fn variances(noise: &[f64], taken: &[Option<f64>]) -> [f64; 2] {
 fn points_without_common_noise_share_nothing() {
     let mut found = 0;
     for seed in 0..15 {
-        let noise = Ar::new(SD_M, vec![0.5]).unwrap();
+        let noise = AutoregressiveNoise::new(SD_M, vec![0.5]).unwrap();
         let recording = Sweep { rate_hz: 5000.0, noise, shared: 0.0, lost: 0.05, seed }.recording();
-        let Common { tip_x, head_y } = common(&recording);
+        let CommonNoise { tip_x, head_y } = measure_common_noise(&recording);
         found += usize::from(tip_x.is_some()) + usize::from(head_y.is_some());
     }
     assert!(found <= 2, "{found} of 30");
@@ -179,11 +180,11 @@ fn points_without_common_noise_share_nothing() {
 
 #[test]
 fn a_recording_without_noise_or_without_points_has_none() {
-    let noise = Ar::white(1e-13).unwrap();
+    let noise = AutoregressiveNoise::white(1e-13).unwrap();
     let exact = Sweep { rate_hz: 5000.0, noise, shared: 0.0, lost: 0.0, seed: 1 }.recording();
     let still = Traces { head_x_m: vec![None; 5000], tip_y_m: vec![None; 5000], ..exact.traces().clone() };
     let blind = Recording::new("blind", exact.grid(), still, true).unwrap();
     for recording in [exact, blind] {
-        assert_eq!(noise_of(&recording), RecordingNoise { along: None, upwards: None });
+        assert_eq!(measure_noise(&recording), RecordingNoise { along_sweep: None, upwards: None });
     }
 }

@@ -5,58 +5,58 @@
 //! do not depend on the data, so they are computed once and a column costs a few products a frame; there is
 //! no cut-off, and a gap is a prediction over several frames.
 
-use super::autoregressive::{Ar, MOST_COEFFICIENTS};
+use super::autoregressive::{AutoregressiveNoise, MOST_COEFFICIENTS};
 use crate::math;
 
 /// The last frames of the noise, the latest first.
-type Memory = [f64; MOST_COEFFICIENTS];
+type NoiseMemory = [f64; MOST_COEFFICIENTS];
 
 /// Makes noise white on a pattern of frames.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Whitener {
-    coefficients: Memory,
+    coefficients: NoiseMemory,
     /// Frames that the noise remembers, at least one.
     order: usize,
-    steps: Vec<Step>,
+    steps: Vec<WhiteningStep>,
 }
 
 /// From one frame that is present to the next.
 #[derive(Debug, Clone, PartialEq)]
-struct Step {
+struct WhiteningStep {
     /// Frames on from the one before.
     ahead: usize,
     /// Standard deviation of what those before do not tell.
     sd: f64,
     /// What a unit of it says of the last frames.
-    gain: Memory,
+    gain: NoiseMemory,
 }
 
 impl Whitener {
     /// The map for `frames`, the rising numbers of the frames that are present.
     #[must_use]
-    pub fn new(noise: &Ar, frames: &[usize]) -> Self {
+    pub fn new(noise: &AutoregressiveNoise, frames: &[usize]) -> Self {
         let mut coefficients = [0.0; MOST_COEFFICIENTS];
         coefficients[..noise.coefficients().len()].copy_from_slice(noise.coefficients());
         let order = noise.coefficients().len().max(1);
         let mut whitener = Self { coefficients, order, steps: Vec::with_capacity(frames.len()) };
-        let mut uncertain = Uncertain::stationary(noise, order);
+        let mut uncertain = PredictionCovariance::from_stationary(noise, order);
         let innovation = math::powi(noise.innovation_sd(), 2);
         let mut before = frames.first().copied();
         for &frame in frames {
             let ahead = before.replace(frame).map_or(0, |before| frame.saturating_sub(before));
-            (0..ahead).for_each(|_| uncertain.predict(&whitener.coefficients, innovation));
-            let (sd, gain) = uncertain.observe();
-            whitener.steps.push(Step { ahead, sd, gain });
+            (0..ahead).for_each(|_| uncertain.advance_frame(&whitener.coefficients, innovation));
+            let (sd, gain) = uncertain.observe_latest();
+            whitener.steps.push(WhiteningStep { ahead, sd, gain });
         }
         whitener
     }
 
     /// Replaces a column, one value a frame in the unit of the noise, by its whitened values: of the noise
     /// itself they are independent with unit variance.
-    pub fn apply(&self, column: &mut [f64]) {
+    pub fn whiten_column(&self, column: &mut [f64]) {
         let mut memory = [0.0; MOST_COEFFICIENTS];
         for (value, step) in column.iter_mut().zip(&self.steps) {
-            (0..step.ahead).for_each(|_| self.predict(&mut memory));
+            (0..step.ahead).for_each(|_| self.predict_next(&mut memory));
             let innovation = *value - memory[0];
             memory.iter_mut().zip(&step.gain).for_each(|(past, gain)| *past += gain * innovation);
             *value = innovation / step.sd;
@@ -70,7 +70,7 @@ impl Whitener {
     }
 
     #[inline]
-    fn predict(&self, memory: &mut Memory) {
+    fn predict_next(&self, memory: &mut NoiseMemory) {
         let next = (0..self.order).map(|i| self.coefficients[i] * memory[i]).sum();
         memory.copy_within(..self.order - 1, 1);
         memory[0] = next;
@@ -78,13 +78,13 @@ impl Whitener {
 }
 
 /// Covariance of the last frames given those that were present.
-struct Uncertain {
+struct PredictionCovariance {
     order: usize,
-    covariance: [Memory; MOST_COEFFICIENTS],
+    covariance: [NoiseMemory; MOST_COEFFICIENTS],
 }
 
-impl Uncertain {
-    fn stationary(noise: &Ar, order: usize) -> Self {
+impl PredictionCovariance {
+    fn from_stationary(noise: &AutoregressiveNoise, order: usize) -> Self {
         let (correlations, variance) = (noise.correlations(order), noise.sd() * noise.sd());
         let mut covariance = [[0.0; MOST_COEFFICIENTS]; MOST_COEFFICIENTS];
         for i in 0..order {
@@ -96,7 +96,7 @@ impl Uncertain {
     }
 
     /// One frame on.
-    fn predict(&mut self, coefficients: &Memory, innovation: f64) {
+    fn advance_frame(&mut self, coefficients: &NoiseMemory, innovation: f64) {
         let n = self.order;
         let mut with_next = [0.0; MOST_COEFFICIENTS];
         for (with, row) in with_next.iter_mut().zip(&self.covariance).take(n) {
@@ -116,7 +116,7 @@ impl Uncertain {
     }
 
     /// The latest frame becomes known: its standard deviation until then, and what a unit of it says of all.
-    fn observe(&mut self) -> (f64, Memory) {
+    fn observe_latest(&mut self) -> (f64, NoiseMemory) {
         let variance = self.covariance[0][0];
         let gain = std::array::from_fn(|i| if i == 0 { 1.0 } else { self.covariance[i][0] / variance });
         for i in 1..self.order {
@@ -140,10 +140,13 @@ mod tests {
     use rand::{Rng, SeedableRng};
     use rand_xoshiro::Xoshiro256PlusPlus;
 
-    fn models() -> Vec<Ar> {
+    fn models() -> Vec<AutoregressiveNoise> {
         let coefficients =
             [vec![], vec![0.9], vec![-0.5], vec![1.1, -0.4], vec![0.5, 0.1, -0.2, 0.1, 0.05, 0.2]];
-        coefficients.into_iter().map(|coefficients| Ar::new(3e-6, coefficients).unwrap()).collect()
+        coefficients
+            .into_iter()
+            .map(|coefficients| AutoregressiveNoise::new(3e-6, coefficients).unwrap())
+            .collect()
     }
 
     fn patterns() -> Vec<Vec<usize>> {
@@ -158,7 +161,7 @@ mod tests {
         ]
     }
 
-    fn covariance(noise: &Ar, frames: &[usize]) -> DMatrix<f64> {
+    fn covariance(noise: &AutoregressiveNoise, frames: &[usize]) -> DMatrix<f64> {
         let correlations = noise.correlations(100);
         DMatrix::from_fn(frames.len(), frames.len(), |i, j| {
             noise.sd() * noise.sd() * correlations[frames[i].abs_diff(frames[j])]
@@ -174,7 +177,7 @@ mod tests {
                 let column = DVector::from_fn(frames.len(), |i, _| 1e-6 * (1.7 * i as f64).sin());
                 let expected = lower.solve_lower_triangular(&column).unwrap();
                 let mut found = column.as_slice().to_vec();
-                whitener.apply(&mut found);
+                whitener.whiten_column(&mut found);
                 let error = expected.iter().zip(&found).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
                 assert!(error < 1e-13, "{noise:?} {frames:?}: {error:e}");
                 let log = 2.0 * lower.diagonal().iter().map(|x| x.ln()).sum::<f64>();
@@ -187,9 +190,9 @@ mod tests {
     /// variance `1 - r^(2 g)`.
     #[test]
     fn one_coefficient_has_its_closed_form_over_gaps() {
-        let noise = Ar::new(2.0, vec![0.8]).unwrap();
+        let noise = AutoregressiveNoise::new(2.0, vec![0.8]).unwrap();
         let mut column = [1.0, -2.0, 0.5];
-        Whitener::new(&noise, &[3, 4, 9]).apply(&mut column);
+        Whitener::new(&noise, &[3, 4, 9]).whiten_column(&mut column);
         let innovation = |value: f64, before: f64, gap: i32| {
             (value - 0.8f64.powi(gap) * before) / (2.0 * (1.0 - 0.64f64.powi(gap)).sqrt())
         };
@@ -201,7 +204,7 @@ mod tests {
     fn white_noise_is_divided_by_its_standard_deviation() {
         let mut column = [1e-6, 5e-6, -3e-7];
         let expected = column.map(|x| x / 3e-6);
-        Whitener::new(&Ar::white(3e-6).unwrap(), &[0, 1, 8]).apply(&mut column);
+        Whitener::new(&AutoregressiveNoise::white(3e-6).unwrap(), &[0, 1, 8]).whiten_column(&mut column);
         assert_eq!(column, expected);
     }
 
@@ -220,7 +223,7 @@ mod tests {
             }
             let frames: Vec<usize> = (0..FRAMES).filter(|_| generator.random::<f64>() > 0.2).collect();
             let mut column: Vec<f64> = frames.iter().map(|&i| values[1000 + i]).collect();
-            Whitener::new(noise, &frames).apply(&mut column);
+            Whitener::new(noise, &frames).whiten_column(&mut column);
             let n = column.len() as f64;
             let variance = column.iter().map(|x| x * x).sum::<f64>() / n;
             assert!((variance - 1.0).abs() < 4.0 * (2.0 / n).sqrt(), "{noise:?}: {variance}");

@@ -1,9 +1,9 @@
 //! Checks of the frame grid, the exposure, the single columns and the tracker's confidence.
 
-use super::finding::{Check, Finding, Severity};
-use super::measured::{CYCLES, ChannelQuality, MeasuredColumn, Optics, Quality};
-use super::noise::Gaps;
-use crate::camera::exposure_passes;
+use super::finding::{Check, QualityFinding, Severity};
+use super::measured::{ChannelQuality, FEWEST_CYCLES, MeasuredColumn, Optics, Quality};
+use super::noise::FrameGaps;
+use crate::camera::exposure_gain;
 use crate::recording::{FrameGrid, Traces};
 
 /// Share of missing frames above which a spectrum deserves attention; least-squares spectra on true frame
@@ -39,87 +39,102 @@ pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
 }
 
 /// Frames, rate, length, and the frames without a deflection.
-pub(super) fn of_the_grid(measured: &Quality) -> Vec<Finding> {
+pub(super) fn check_grid(measured: &Quality) -> Vec<QualityFinding> {
     let words = format!(
         "{} frames at {} frames/s, {:.6} s",
         measured.frames, measured.frame_rate_hz, measured.duration_s
     );
     let mut found =
-        vec![Finding::new(Check::FrameGrid, Severity::Note, measured.frames as f64, "frames", words)];
+        vec![QualityFinding::new(Check::FrameGrid, Severity::Note, measured.frames as f64, "frames", words)];
     let (low_hz, high_hz) = measured.band_hz();
     if low_hz >= high_hz {
-        let words =
-            format!("{} frames hold fewer than {CYCLES} cycles of anything they can show", measured.frames);
+        let words = format!(
+            "{} frames hold fewer than {FEWEST_CYCLES} cycles of anything they can show",
+            measured.frames
+        );
         let advice = "track more frames of the video";
         found.push(
-            Finding::new(Check::TooShort, Severity::Serious, measured.frames as f64, "frames", words)
-                .advise(advice),
+            QualityFinding::new(Check::TooShort, Severity::Serious, measured.frames as f64, "frames", words)
+                .with_advice(advice),
         );
     } else {
         let words = format!("shows oscillations from {low_hz:.3} Hz to {high_hz:.0} Hz");
-        found.push(Finding::new(Check::Bandwidth, Severity::Note, high_hz, "Hz", words));
+        found.push(QualityFinding::new(Check::Bandwidth, Severity::Note, high_hz, "Hz", words));
     }
     if is_playback_rate(measured.frame_rate_hz) {
         let words =
             format!("{} frames/s is a rate of playback or of an ordinary camera", measured.frame_rate_hz);
         let advice = "check that it is the recording rate, or every frequency is too low by their ratio";
         found.push(
-            Finding::new(Check::PlaybackRate, Severity::Serious, measured.frame_rate_hz, "Hz", words)
-                .advise(advice),
+            QualityFinding::new(Check::PlaybackRate, Severity::Serious, measured.frame_rate_hz, "Hz", words)
+                .with_advice(advice),
         );
     }
-    found.extend(deflection_gaps(measured));
+    found.extend(check_deflection_gaps(measured));
     found
 }
 
-fn deflection_gaps(measured: &Quality) -> Option<Finding> {
+fn check_deflection_gaps(measured: &Quality) -> Option<QualityFinding> {
     let (missing, frames) = (measured.missing_deflection_frames, measured.frames);
     if missing == frames {
         let words = "in no frame are tip and head both tracked along the sweep".to_owned();
         return Some(
-            Finding::new(Check::Gaps, Severity::Serious, missing as f64, "frames", words)
-                .advise("the single channels may still serve"),
+            QualityFinding::new(Check::Gaps, Severity::Serious, missing as f64, "frames", words)
+                .with_advice("the single channels may still serve"),
         );
     }
-    let gaps = Gaps { missing, runs: measured.gaps, longest: measured.longest_gap_frames, ..Gaps::default() };
+    let gaps = FrameGaps {
+        missing,
+        runs: measured.gaps,
+        longest: measured.longest_gap_frames,
+        ..FrameGaps::default()
+    };
     Some(gaps_finding(&gaps, frames, measured.longest_gap_at_s?, "no deflection in"))
 }
 
 /// How much is missing, in words, graver where it is much.
-fn gaps_finding(gaps: &Gaps, frames: usize, longest_at_s: f64, what: &str) -> Finding {
+fn gaps_finding(gaps: &FrameGaps, frames: usize, longest_at_s: f64, what: &str) -> QualityFinding {
     let share = gaps.missing as f64 / frames as f64;
-    let Gaps { missing, runs, longest, .. } = gaps;
+    let FrameGaps { missing, runs, longest, .. } = gaps;
     let words = format!(
         "{what} {missing} frames ({:.1} %) in {runs} gaps, the longest {longest} frames from \
          {longest_at_s:.6} s",
         100.0 * share
     );
-    let finding = |severity| Finding::new(Check::Gaps, severity, *missing as f64, "frames", words.clone());
+    let finding =
+        |severity| QualityFinding::new(Check::Gaps, severity, *missing as f64, "frames", words.clone());
     if share > MANY_MISSING {
-        finding(Severity::Caution)
-            .advise("weak components are lost; track the lost frames again if the points are visible there")
+        finding(Severity::Caution).with_advice(
+            "weak components are lost; track the lost frames again if the points are visible there",
+        )
     } else if *longest as f64 > LONG_GAP * frames as f64 {
-        finding(Severity::Caution).advise("choose windows outside the longest gap, or track its frames again")
+        finding(Severity::Caution)
+            .with_advice("choose windows outside the longest gap, or track its frames again")
     } else {
         finding(Severity::Note)
     }
 }
 
 /// Missing frames, noise and step of one column; a column that was never tracked is only named.
-pub(super) fn of_a_column(column: &MeasuredColumn, grid: FrameGrid, optics: &Optics) -> Vec<Finding> {
+pub(super) fn check_track_column(
+    column: &MeasuredColumn,
+    grid: FrameGrid,
+    optics: &Optics,
+) -> Vec<QualityFinding> {
     let missing = column.quality.missing_frames;
     if missing == grid.frames {
         let words = "not in the recording".to_owned();
         return vec![
-            Finding::new(Check::Absent, Severity::Note, missing as f64, "frames", words).on(column.name),
+            QualityFinding::new(Check::Absent, Severity::Note, missing as f64, "frames", words)
+                .on_channel(column.name),
         ];
     }
     let mut found = vec![];
     if missing > 0 {
-        let gaps = Gaps::of(column.samples.iter().map(Option::is_some));
+        let gaps = FrameGaps::count_gaps(column.samples.iter().map(Option::is_some));
         found.push(
             gaps_finding(&gaps, grid.frames, grid.time_s(gaps.longest_from), "not tracked in")
-                .on(column.name),
+                .on_channel(column.name),
         );
     }
     if let Some(noise) = column.quality.noise_m {
@@ -127,59 +142,69 @@ pub(super) fn of_a_column(column: &MeasuredColumn, grid: FrameGrid, optics: &Opt
             .metres_per_pixel
             .map_or_else(String::new, |pixel| format!(" ({:.3} pixels)", noise / pixel));
         let words = format!("noise of {:.3} um{pixels}, standard deviation", noise * 1e6);
-        found.push(Finding::new(Check::Noise, Severity::Note, noise, "m", words).on(column.name));
+        found.push(
+            QualityFinding::new(Check::Noise, Severity::Note, noise, "m", words).on_channel(column.name),
+        );
     }
-    found.extend(step(column.quality, optics).map(|finding| finding.on(column.name)));
+    found.extend(check_position_step(column.quality, optics).map(|finding| finding.on_channel(column.name)));
     found
 }
 
 /// Channels that are written in steps coarser than their noise.
 #[must_use]
-pub fn position_steps(measured: &Quality, optics: &Optics) -> Vec<Finding> {
+pub fn check_position_steps(measured: &Quality, optics: &Optics) -> Vec<QualityFinding> {
     let channels = measured.channels().into_iter();
-    channels.filter_map(|(name, quality)| Some(step(quality, optics)?.on(name))).collect()
+    channels
+        .filter_map(|(name, quality)| Some(check_position_step(quality, optics)?.on_channel(name)))
+        .collect()
 }
 
 /// A step that is coarser than the noise: then the step, not the tracking, limits what can be measured.
-fn step(channel: &ChannelQuality, optics: &Optics) -> Option<Finding> {
+fn check_position_step(channel: &ChannelQuality, optics: &Optics) -> Option<QualityFinding> {
     let step_m = channel.step_m.filter(|&step| channel.noise_m.is_some_and(|noise| noise < step))?;
     let whole = optics.metres_per_pixel.filter(|pixel| (step_m / pixel - 1.0).abs() < PIXEL_NEARNESS);
     let kind = if whole.is_some() { " (whole pixels)" } else { "" };
     let words = format!("written in steps of {:.3} um{kind}, coarser than the noise", step_m * 1e6);
     let advice = "export more digits, or track with sub-pixel accuracy";
-    Some(Finding::new(Check::PositionStep, Severity::Caution, step_m, "m", words).advise(advice))
+    Some(QualityFinding::new(Check::PositionStep, Severity::Caution, step_m, "m", words).with_advice(advice))
 }
 
 /// What the exposure leaves of an amplitude at the highest usable frequency.
-pub(super) fn of_the_exposure(measured: &Quality) -> Option<Finding> {
+pub(super) fn check_exposure(measured: &Quality) -> Option<QualityFinding> {
     let (_, high_hz) = measured.band_hz();
     let Some(exposure_s) = measured.exposure_s() else {
         let words = "the exposure is not known".to_owned();
         let advice = "give it at import (--exposure-s) so that amplitudes can be corrected for it";
-        return Some(Finding::new(Check::Exposure, Severity::Note, 0.0, "s", words).advise(advice));
+        return Some(
+            QualityFinding::new(Check::Exposure, Severity::Note, 0.0, "s", words).with_advice(advice),
+        );
     };
-    let passes = exposure_passes(high_hz, exposure_s);
+    let passes = exposure_gain(high_hz, exposure_s);
     let words = format!("the exposure passes {:.0} % of an amplitude at {high_hz:.0} Hz", 100.0 * passes);
     if passes < EXPOSURE_PASSES {
         let advice = "amplitudes of fast components are too small; expose shorter";
-        return Some(Finding::new(Check::Exposure, Severity::Caution, passes, "", words).advise(advice));
+        return Some(
+            QualityFinding::new(Check::Exposure, Severity::Caution, passes, "", words).with_advice(advice),
+        );
     }
-    Some(Finding::new(Check::Exposure, Severity::Note, passes, "", words))
+    Some(QualityFinding::new(Check::Exposure, Severity::Note, passes, "", words))
 }
 
 /// Positions that the tracker itself doubts.
-pub(super) fn of_the_confidence(traces: &Traces) -> Vec<Finding> {
+pub(super) fn check_confidence(traces: &Traces) -> Vec<QualityFinding> {
     let points = [
         ("tip", &traces.tip_confidence, &traces.tip_x_m),
         ("head", &traces.head_confidence, &traces.head_x_m),
     ];
     points
         .into_iter()
-        .filter_map(|(name, confidence, x)| Some(doubtful(confidence.as_deref()?, x)?.on(name)))
+        .filter_map(|(name, confidence, x)| {
+            Some(low_confidence_finding(confidence.as_deref()?, x)?.on_channel(name))
+        })
         .collect()
 }
 
-fn doubtful(confidence: &[Option<f64>], x: &[Option<f64>]) -> Option<Finding> {
+fn low_confidence_finding(confidence: &[Option<f64>], x: &[Option<f64>]) -> Option<QualityFinding> {
     let tracked =
         confidence.iter().zip(x).filter(|(_, x)| x.is_some()).filter_map(|(confidence, _)| *confidence);
     let (low, all) =
@@ -197,7 +222,7 @@ fn doubtful(confidence: &[Option<f64>], x: &[Option<f64>]) -> Option<Finding> {
         format!("{low} of {all} positions ({:.1} %) have a confidence below {LOW_CONFIDENCE}", 100.0 * share);
     let advice =
         format!("import again with --min-likelihood {LOW_CONFIDENCE}, so that they count as missing");
-    Some(Finding::new(Check::LowConfidence, severity, share, "", words).advise(&advice))
+    Some(QualityFinding::new(Check::LowConfidence, severity, share, "", words).with_advice(&advice))
 }
 
 #[cfg(test)]

@@ -18,7 +18,7 @@ pub enum Severity {
 impl Severity {
     /// The word for it.
     #[must_use]
-    pub fn word(self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Self::Note => "note",
             Self::Caution => "caution",
@@ -138,7 +138,7 @@ checks! {
 /// One finding.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Finding {
+pub struct QualityFinding {
     /// The check that made it.
     pub check: Check,
     /// How much it matters.
@@ -156,9 +156,9 @@ pub struct Finding {
     pub advice: String,
 }
 
-impl Finding {
-    /// A finding on the whole recording without advice; the other parts are added by [`Self::on`] and
-    /// [`Self::advise`].
+impl QualityFinding {
+    /// A finding on the whole recording without advice; the other parts are added by [`Self::on_channel`] and
+    /// [`Self::with_advice`].
     #[must_use]
     pub fn new(check: Check, severity: Severity, value: f64, unit: &str, found: String) -> Self {
         Self { check, severity, channel: None, value, unit: unit.to_owned(), found, advice: String::new() }
@@ -166,21 +166,21 @@ impl Finding {
 
     /// The same on one channel.
     #[must_use]
-    pub fn on(self, channel: &str) -> Self {
+    pub fn on_channel(self, channel: &str) -> Self {
         Self { channel: Some(channel.to_owned()), ..self }
     }
 
     /// The same with what to do.
     #[must_use]
-    pub fn advise(self, advice: &str) -> Self {
+    pub fn with_advice(self, advice: &str) -> Self {
         Self { advice: advice.to_owned(), ..self }
     }
 
     /// The finding as one line for reading.
     #[must_use]
-    pub fn line(&self) -> String {
+    pub fn to_line(&self) -> String {
         let channel = self.channel.as_ref().map_or_else(String::new, |channel| format!("{channel}: "));
         let advice = if self.advice.is_empty() { String::new() } else { format!("; {}", self.advice) };
-        format!("{}: {channel}{}{advice}", self.severity.word(), self.found)
+        format!("{}: {channel}{}{advice}", self.severity.name(), self.found)
     }
 }

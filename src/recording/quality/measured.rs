@@ -1,16 +1,16 @@
 //! A recording as measured: frames, rate, gaps, exposure, and the noise and step of each column.
 
-use super::noise::{Gaps, noise_floor, quantisation_step};
-use crate::camera::{exposure_passes, half_power_hz};
+use super::noise::{FrameGaps, noise_floor, quantisation_step};
+use crate::camera::{exposure_gain, half_power_hz};
 use crate::math;
 use crate::recording::{Recording, Traces};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Cycles of a component that must fit into the recording before its frequency means much.
-pub(super) const CYCLES: f64 = 3.0;
+pub(super) const FEWEST_CYCLES: f64 = 3.0;
 /// Share of the Nyquist frequency up to which a component is well clear of its own alias.
-pub(super) const CLEAR_OF_NYQUIST: f64 = 0.8;
+pub(super) const NYQUIST_SHARE: f64 = 0.8;
 
 /// A recording as measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -75,9 +75,9 @@ pub struct Optics {
 
 /// Measures `recording`; `exposure_s` is the exposure of a frame, s, where known.
 #[must_use]
-pub fn quality(recording: &Recording, exposure_s: Option<f64>) -> Quality {
+pub fn measure_quality(recording: &Recording, exposure_s: Option<f64>) -> Quality {
     let (grid, traces) = (recording.grid(), recording.traces());
-    let gaps = Gaps::of(
+    let gaps = FrameGaps::count_gaps(
         traces.tip_x_m.iter().zip(&traces.head_x_m).map(|(tip, head)| tip.is_some() && head.is_some()),
     );
     let nyquist_hz = grid.frame_rate_hz / (2 * gaps.stride.max(1)) as f64;
@@ -91,15 +91,15 @@ pub fn quality(recording: &Recording, exposure_s: Option<f64>) -> Quality {
         longest_gap_frames: gaps.longest,
         longest_gap_at_s: (gaps.longest > 0).then(|| grid.time_s(gaps.longest_from)),
         exposure_half_power_hz: exposure_s.map(half_power_hz),
-        exposure_passes_at_nyquist: exposure_s.map(|exposure| exposure_passes(nyquist_hz, exposure)),
-        tip_x: channel(&traces.tip_x_m),
-        tip_y: channel(&traces.tip_y_m),
-        head_x: channel(&traces.head_x_m),
-        head_y: channel(&traces.head_y_m),
+        exposure_passes_at_nyquist: exposure_s.map(|exposure| exposure_gain(nyquist_hz, exposure)),
+        tip_x: measure_channel(&traces.tip_x_m),
+        tip_y: measure_channel(&traces.tip_y_m),
+        head_x: measure_channel(&traces.head_x_m),
+        head_y: measure_channel(&traces.head_y_m),
     }
 }
 
-fn channel(samples: &[Option<f64>]) -> ChannelQuality {
+fn measure_channel(samples: &[Option<f64>]) -> ChannelQuality {
     let missing_frames = samples.iter().filter(|v| v.is_none()).count();
     ChannelQuality { missing_frames, noise_m: noise_floor(samples), step_m: quantisation_step(samples) }
 }
@@ -109,7 +109,7 @@ impl Quality {
     /// Nyquist frequency. Where the first is not below the second, it is too short for a spectrum.
     #[must_use]
     pub fn band_hz(&self) -> (f64, f64) {
-        (CYCLES / self.duration_s, CLEAR_OF_NYQUIST * self.nyquist_hz)
+        (FEWEST_CYCLES / self.duration_s, NYQUIST_SHARE * self.nyquist_hz)
     }
 
     /// Exposure of a frame, s, where known.
@@ -139,7 +139,7 @@ pub(super) struct MeasuredColumn<'a> {
     pub quality: &'a ChannelQuality,
 }
 
-pub(super) fn columns<'a>(traces: &'a Traces, measured: &'a Quality) -> [MeasuredColumn<'a>; 4] {
+pub(super) fn measured_columns<'a>(traces: &'a Traces, measured: &'a Quality) -> [MeasuredColumn<'a>; 4] {
     let samples = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
     let mut samples = samples.into_iter();
     measured.channels().map(|(name, quality)| MeasuredColumn {

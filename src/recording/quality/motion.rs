@@ -1,9 +1,9 @@
 //! Checks of both points together: repeated frames, common frames, scale, direction of y, and the turns of
 //! the head.
 
-use super::finding::{Check, Finding, Severity};
-use super::measured::{ChannelQuality, Quality, columns};
-use crate::recording::channel::Instants;
+use super::finding::{Check, QualityFinding, Severity};
+use super::measured::{ChannelQuality, Quality, measured_columns};
+use crate::recording::channel::ReversalInstants;
 use crate::recording::{FrameGrid, Recording, Traces};
 use std::f64::consts::PI;
 
@@ -38,14 +38,19 @@ const TRIMMED: f64 = 0.01;
 const LEAST_HEIGHT_M: f64 = 1e-3;
 
 /// Everything that takes both points.
-pub(super) fn of_both_points(recording: &Recording, measured: &Quality) -> Vec<Finding> {
+pub(super) fn check_motion(recording: &Recording, measured: &Quality) -> Vec<QualityFinding> {
     let (traces, grid) = (recording.traces(), recording.grid());
-    let found = [repeated(traces, measured), overlap(traces, grid), travel(traces), above(traces)];
+    let found = [
+        check_repeated_frames(traces, measured),
+        check_overlap(traces, grid),
+        check_travel(traces),
+        check_head_above_tip(traces),
+    ];
     found.into_iter().flatten().collect()
 }
 
 /// Frames in which nothing has moved since the one before, where noise otherwise moves everything.
-fn repeated(traces: &Traces, measured: &Quality) -> Option<Finding> {
+fn check_repeated_frames(traces: &Traces, measured: &Quality) -> Option<QualityFinding> {
     let by_chance = repeat_probability(traces, measured)?;
     let axes = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
     let still = |frame: usize| {
@@ -67,7 +72,9 @@ fn repeated(traces: &Traces, measured: &Quality) -> Option<Finding> {
         100.0 * share
     );
     let advice = "the video was converted or frames were doubled: track the file that the camera wrote";
-    Some(Finding::new(Check::FrozenFrames, severity, count as f64, "frames", words).advise(advice))
+    Some(
+        QualityFinding::new(Check::FrozenFrames, severity, count as f64, "frames", words).with_advice(advice),
+    )
 }
 
 /// Probability that noise, rounded to the step of each column, leaves every column in its place: `q/(2
@@ -78,7 +85,7 @@ fn repeat_probability(traces: &Traces, measured: &Quality) -> Option<f64> {
     let unchanged = |channel: &ChannelQuality| {
         (channel.step_m.unwrap_or(0.0) / (2.0 * PI.sqrt() * channel.noise_m?)).min(1.0).into()
     };
-    let columns = columns(traces, measured);
+    let columns = measured_columns(traces, measured);
     let probability: f64 = columns
         .iter()
         .filter(|column| moved(column.quality))
@@ -88,13 +95,13 @@ fn repeat_probability(traces: &Traces, measured: &Quality) -> Option<f64> {
 }
 
 /// First and last frame of a column.
-fn span(samples: &[Option<f64>]) -> Option<(usize, usize)> {
+fn tracked_span(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     Some((samples.iter().position(Option::is_some)?, samples.iter().rposition(Option::is_some)?))
 }
 
 /// The frames that both tracks reach over.
-fn overlap(traces: &Traces, grid: FrameGrid) -> Option<Finding> {
-    let (tip, head) = (span(&traces.tip_x_m)?, span(&traces.head_x_m)?);
+fn check_overlap(traces: &Traces, grid: FrameGrid) -> Option<QualityFinding> {
+    let (tip, head) = (tracked_span(&traces.tip_x_m)?, tracked_span(&traces.head_x_m)?);
     let (first, last) = (tip.0.max(head.0), tip.1.min(head.1));
     let both = (last + 1).saturating_sub(first);
     if both == 0 {
@@ -103,20 +110,25 @@ fn overlap(traces: &Traces, grid: FrameGrid) -> Option<Finding> {
             tip.0, tip.1, head.0, head.1
         );
         let advice = "track both points in the same frames, or check the frame offset of the two files";
-        return Some(Finding::new(Check::Overlap, Severity::Serious, 0.0, "frames", words).advise(advice));
+        return Some(
+            QualityFinding::new(Check::Overlap, Severity::Serious, 0.0, "frames", words).with_advice(advice),
+        );
     }
     let words = format!(
         "both tracks run from frame {first} to {last} ({:.6} s to {:.6} s)",
         grid.time_s(first),
         grid.time_s(last)
     );
-    let found = |severity| Finding::new(Check::Overlap, severity, both as f64, "frames", words.clone());
+    let found =
+        |severity| QualityFinding::new(Check::Overlap, severity, both as f64, "frames", words.clone());
     let alone = tip.0.abs_diff(head.0) + tip.1.abs_diff(head.1);
     let advice = "one point is tracked longer: there is no deflection outside these frames";
     match alone {
         0 => Some(found(Severity::Note)),
-        _ if alone as f64 > MANY_ALONE * grid.frames as f64 => Some(found(Severity::Caution).advise(advice)),
-        _ => Some(found(Severity::Note).advise(advice)),
+        _ if alone as f64 > MANY_ALONE * grid.frames as f64 => {
+            Some(found(Severity::Caution).with_advice(advice))
+        }
+        _ => Some(found(Severity::Note).with_advice(advice)),
     }
 }
 
@@ -134,11 +146,11 @@ fn largest_travel_m(traces: &Traces) -> Option<f64> {
 }
 
 /// A travel that is no wiper's: pixels taken for a length, or the reverse.
-fn travel(traces: &Traces) -> Option<Finding> {
+fn check_travel(traces: &Traces) -> Option<QualityFinding> {
     let travel_m = largest_travel_m(traces)?;
     let found = |severity, words: &str, advice: &str| {
         let words = format!("tip and head travel {travel_m:.3e} m along the sweep, {words}");
-        Some(Finding::new(Check::Scale, severity, travel_m, "m", words).advise(advice))
+        Some(QualityFinding::new(Check::Scale, severity, travel_m, "m", words).with_advice(advice))
     };
     let pixels = "check --scale: pixels may have been taken for millimetres";
     match travel_m {
@@ -151,7 +163,7 @@ fn travel(traces: &Traces) -> Option<Finding> {
             found(Severity::Caution, "a few pixels of a usual view", advice)
         }
         _ => found(Severity::Note, "as a wiper's stroke in a camera's view may", "")
-            .map(|finding| finding.advise("")),
+            .map(|finding| finding.with_advice("")),
     }
 }
 
@@ -166,7 +178,7 @@ pub(super) fn head_height_m(traces: &Traces) -> Option<f64> {
 
 /// The blade stands on its lip, so the tip is the lower point; a tip above the head means that y points the
 /// other way.
-fn above(traces: &Traces) -> Option<Finding> {
+fn check_head_above_tip(traces: &Traces) -> Option<QualityFinding> {
     let height_m = -head_height_m(traces)?;
     if height_m < LEAST_HEIGHT_M {
         return None;
@@ -174,16 +186,17 @@ fn above(traces: &Traces) -> Option<Finding> {
     let words = format!("the tip lies {:.3} mm above the head", 1e3 * height_m);
     let advice = "a blade stands on its lip: check --y-axis (image coordinates point down), and which point \
         is the tip; no matter if the camera stood on its head";
-    Some(Finding::new(Check::YDirection, Severity::Caution, height_m, "m", words).advise(advice))
+    Some(QualityFinding::new(Check::YDirection, Severity::Caution, height_m, "m", words).with_advice(advice))
 }
 
 /// Turns of the head that windows can be named after.
-pub(super) fn of_the_turns(instants: &Instants) -> Option<Finding> {
+pub(super) fn check_turns(instants: &ReversalInstants) -> Option<QualityFinding> {
     let count = instants.reversals.len();
-    let found = |words: String| Finding::new(Check::Reversals, Severity::Note, count as f64, "", words);
+    let found =
+        |words: String| QualityFinding::new(Check::Reversals, Severity::Note, count as f64, "", words);
     if count == 0 {
         let advice = "windows cannot be named after hold, reversal or release: give them in seconds";
-        return Some(found("the head does not turn in the recording".to_owned()).advise(advice));
+        return Some(found("the head does not turn in the recording".to_owned()).with_advice(advice));
     }
     let resting =
         instants.reversals.iter().filter(|turn| turn.hold_s.is_some() || turn.release_s.is_some()).count();

@@ -44,7 +44,7 @@ pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
     }
     let mut step = moves().next()?;
     for distance in moves() {
-        step = common_divisor(distance, step, rounding);
+        step = approximate_common_divisor(distance, step, rounding);
         if step < largest / MOST_STEPS {
             return None;
         }
@@ -53,7 +53,7 @@ pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
 }
 
 /// Euclid's algorithm, in which a remainder within `rounding` of zero is zero.
-fn common_divisor(mut larger: f64, mut smaller: f64, rounding: f64) -> f64 {
+fn approximate_common_divisor(mut larger: f64, mut smaller: f64, rounding: f64) -> f64 {
     while smaller > rounding {
         let remainder = (larger - (larger / smaller).round() * smaller).abs();
         (larger, smaller) = (smaller, remainder);
@@ -63,7 +63,7 @@ fn common_divisor(mut larger: f64, mut smaller: f64, rounding: f64) -> f64 {
 
 /// Runs of absent frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(super) struct Gaps {
+pub(super) struct FrameGaps {
     /// Absent frames.
     pub missing: usize,
     /// Runs of them.
@@ -77,12 +77,12 @@ pub(super) struct Gaps {
     pub stride: usize,
 }
 
-impl Gaps {
-    pub fn of(present: impl Iterator<Item = bool>) -> Self {
+impl FrameGaps {
+    pub fn count_gaps(present: impl Iterator<Item = bool>) -> Self {
         let (mut gaps, mut run, mut last) = (Self::default(), 0, None);
         for (frame, present) in present.enumerate() {
             if present {
-                gaps.stride = last.map_or(0, |last| whole_divisor(gaps.stride, frame - last));
+                gaps.stride = last.map_or(0, |last| greatest_common_divisor(gaps.stride, frame - last));
                 last = Some(frame);
             }
             run = if present { 0 } else { run + 1 };
@@ -97,8 +97,8 @@ impl Gaps {
 }
 
 /// Euclid's.
-fn whole_divisor(a: usize, b: usize) -> usize {
-    if b == 0 { a } else { whole_divisor(b, a % b) }
+fn greatest_common_divisor(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }
 
 #[cfg(test)]
@@ -115,7 +115,8 @@ mod tests {
 
     #[test]
     fn the_stride_is_what_all_distances_between_frames_present_share() {
-        let stride = |present: &[usize]| Gaps::of((0..100).map(|frame| present.contains(&frame))).stride;
+        let stride =
+            |present: &[usize]| FrameGaps::count_gaps((0..100).map(|frame| present.contains(&frame))).stride;
         assert_eq!([stride(&[]), stride(&[3]), stride(&[3, 4, 90])], [0, 0, 1]);
         assert_eq!([stride(&[1, 38, 75]), stride(&[0, 6, 15, 99]), stride(&[2, 4, 8])], [37, 3, 2]);
     }
@@ -140,9 +141,12 @@ mod tests {
     fn gaps_at_both_ends_and_the_first_of_equal_ones_count() {
         let present = [false, true, false, false, true, true, false, false];
         assert_eq!(
-            Gaps::of(present.into_iter()),
-            Gaps { missing: 5, runs: 3, longest: 2, longest_from: 2, stride: 1 }
+            FrameGaps::count_gaps(present.into_iter()),
+            FrameGaps { missing: 5, runs: 3, longest: 2, longest_from: 2, stride: 1 }
         );
-        assert_eq!(Gaps::of([true; 3].into_iter()), Gaps { stride: 1, ..Gaps::default() });
+        assert_eq!(
+            FrameGaps::count_gaps([true; 3].into_iter()),
+            FrameGaps { stride: 1, ..FrameGaps::default() }
+        );
     }
 }

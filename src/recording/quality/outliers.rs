@@ -11,7 +11,7 @@
 //!
 //! A point with a missing frame within two frames of it is not judged.
 
-use super::finding::{Check, Finding, Severity};
+use super::finding::{Check, QualityFinding, Severity};
 use super::measured::{ChannelQuality, MeasuredColumn, Optics};
 use crate::recording::FrameGrid;
 
@@ -40,7 +40,7 @@ const MORE_THAN_AROUND: f64 = 4.0;
 /// Frames before and after whose own neighbours do not include the point.
 const AROUND: std::ops::RangeInclusive<usize> = 3..=5;
 /// Share of outliers that a spectrum does not notice; each is an impulse that lifts all of its noise.
-const MANY: f64 = 1e-3;
+const MANY_OUTLIERS: f64 = 1e-3;
 
 /// Frames of the outliers in a column, in order; `metres_per_pixel` where known.
 #[must_use]
@@ -53,13 +53,14 @@ pub fn outlier_frames(
     let by_step = BEYOND_STEPS * channel.step_m.unwrap_or(0.0);
     let by_pixel = LEAST_MISS_PX * metres_per_pixel.unwrap_or(0.0);
     let least_m = (BEYOND_NOISE * MISS_SD * noise_m).max(by_step).max(by_pixel).max(LEAST_MISS_M);
-    let candidates = samples.windows(5).enumerate().filter_map(|(before, w)| Some((before + 2, miss(w)?)));
+    let candidates =
+        samples.windows(5).enumerate().filter_map(|(before, w)| Some((before + 2, distance_from_cubic(w)?)));
     let far = candidates.filter(|(_, miss)| miss.abs() > least_m);
     far.filter(|&(frame, miss)| is_isolated(samples, frame, miss, noise_m)).map(|(frame, _)| frame).collect()
 }
 
 /// How far the middle of five frames is from the cubic through the others.
-fn miss(five: &[Option<f64>]) -> Option<f64> {
+fn distance_from_cubic(five: &[Option<f64>]) -> Option<f64> {
     match *five {
         [Some(a), Some(b), Some(c), Some(d), Some(e)] => Some(c - (NEARER * (b + d) - (a + e)) / WEIGHTS),
         _ => None,
@@ -83,7 +84,8 @@ fn lies_off_both_lines(samples: &[Option<f64>], frame: usize, miss_m: f64, noise
 
 /// Whether every point around is well predicted by its own neighbours; false where none can be judged.
 fn is_calm_around(samples: &[Option<f64>], frame: usize, miss_m: f64) -> bool {
-    let miss_at = |centre: Option<usize>| miss(samples.get(centre?.checked_sub(2)?..centre? + 3)?);
+    let miss_at =
+        |centre: Option<usize>| distance_from_cubic(samples.get(centre?.checked_sub(2)?..centre? + 3)?);
     let around =
         AROUND.flat_map(|apart| [frame.checked_sub(apart), frame.checked_add(apart)]).filter_map(miss_at);
     let largest = around.map(f64::abs).reduce(f64::max);
@@ -91,10 +93,14 @@ fn is_calm_around(samples: &[Option<f64>], frame: usize, miss_m: f64) -> bool {
 }
 
 /// The outliers of a column as a finding.
-pub(super) fn finding(column: &MeasuredColumn, grid: FrameGrid, optics: &Optics) -> Option<Finding> {
+pub(super) fn check_outliers(
+    column: &MeasuredColumn,
+    grid: FrameGrid,
+    optics: &Optics,
+) -> Option<QualityFinding> {
     let frames = outlier_frames(column.samples, column.quality, optics.metres_per_pixel);
     let first = *frames.first()?;
-    let many = frames.len() as f64 > MANY * grid.frames as f64;
+    let many = frames.len() as f64 > MANY_OUTLIERS * grid.frames as f64;
     let severity = if many { Severity::Caution } else { Severity::Note };
     let words = format!(
         "{} isolated outliers, the first in frame {first} at {:.6} s",
@@ -103,8 +109,8 @@ pub(super) fn finding(column: &MeasuredColumn, grid: FrameGrid, optics: &Optics)
     );
     let advice = "the tracker jumped away and came back: correct these points in it, or delete them there";
     Some(
-        Finding::new(Check::Outliers, severity, frames.len() as f64, "frames", words)
-            .advise(advice)
-            .on(column.name),
+        QualityFinding::new(Check::Outliers, severity, frames.len() as f64, "frames", words)
+            .with_advice(advice)
+            .on_channel(column.name),
     )
 }

@@ -7,7 +7,7 @@
 //! White noise does not fall; motion without noise has no plateau, or one that does not scatter so; a trace
 //! in steps coarser than its noise is not judged.
 
-use super::finding::{Check, Finding, Severity};
+use super::finding::{Check, QualityFinding, Severity};
 use super::measured::MeasuredColumn;
 use crate::math;
 use std::f64::consts::TAU;
@@ -49,44 +49,46 @@ const ROUNDING: f64 = 1e-26;
 /// Frequency to which a trace holds noise before it was cut off, Hz, if it was; `frame_rate_hz` is its rate.
 #[must_use]
 pub(crate) fn cutoff_hz(samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f64> {
-    let bands = bands(samples)?;
+    let bands = median_band_powers(samples)?;
     let largest = samples.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));
     let ends_at = |start: usize| {
-        let level = level(&bands, start);
+        let level = mean_level(&bands, start);
         let end = (start + PLATEAU..bands.len()).find(|&band| bands[band].power < level / 2.0)?;
         let filtered = level > ROUNDING * largest * largest
             && is_plateau(&bands[start..start + PLATEAU])
-            && falls(&bands, end, level);
+            && falls_steeply(&bands, end, level);
         filtered.then(|| EDGES[end] as f64 / SEGMENT as f64 * frame_rate_hz)
     };
     (0..=bands.len() - PLATEAU).find_map(ends_at)
 }
 
 /// First band that starts at or above `bin`; the last where there is none.
-fn band_from(bin: f64) -> usize {
+fn first_band_from(bin: f64) -> usize {
     EDGES.iter().position(|&edge| edge as f64 >= bin).unwrap_or(EDGES.len()).min(EDGES.len() - 2)
 }
 
 /// Whether the power falls steeply about band `end`, the first below half the plateau's level, and far, and
 /// stays there.
-fn falls(bands: &[Band], end: usize, level: f64) -> bool {
-    let stays = bands[band_from(ABOVE * EDGES[end] as f64)..].iter().all(|band| band.power <= FALLEN * level);
-    let steep = |band: usize| bands[band].power >= STEEP * bands[band_from(2.0 * EDGES[band] as f64)].power;
+fn falls_steeply(bands: &[PrefilterBand], end: usize, level: f64) -> bool {
+    let stays =
+        bands[first_band_from(ABOVE * EDGES[end] as f64)..].iter().all(|band| band.power <= FALLEN * level);
+    let steep =
+        |band: usize| bands[band].power >= STEEP * bands[first_band_from(2.0 * EDGES[band] as f64)].power;
     stays && (end - 1..bands.len()).any(steep)
 }
 
-fn level(bands: &[Band], start: usize) -> f64 {
+fn mean_level(bands: &[PrefilterBand], start: usize) -> f64 {
     bands[start..start + PLATEAU].iter().map(|band| band.power).sum::<f64>() / PLATEAU as f64
 }
 
-fn is_plateau(bands: &[Band]) -> bool {
+fn is_plateau(bands: &[PrefilterBand]) -> bool {
     let powers = || bands.iter().map(|band| band.power);
     let (low, high) = (powers().fold(f64::INFINITY, f64::min), powers().fold(0.0, f64::max));
     low > 0.0 && high <= FLAT * low && bands.iter().all(|band| NOISE_SCATTER.contains(&band.scatter))
 }
 
 /// Power between two bins, over all segments.
-struct Band {
+struct PrefilterBand {
     /// Median over the segments of the power a bin: kinks, outliers and bursts of chatter in fewer than half
     /// of them do not reach it.
     power: f64,
@@ -94,21 +96,24 @@ struct Band {
     scatter: f64,
 }
 
-fn bands(samples: &[Option<f64>]) -> Option<Vec<Band>> {
+fn median_band_powers(samples: &[Option<f64>]) -> Option<Vec<PrefilterBand>> {
     let starts: Vec<usize> = (0..samples.len().saturating_sub(SEGMENT - 1)).step_by(SEGMENT / 2).collect();
     let every = starts.len() / MOST_SEGMENTS + 1;
-    let segments: Vec<Vec<f64>> =
-        starts.iter().step_by(every).filter_map(|&start| segment(&samples[start..start + SEGMENT])).collect();
+    let segments: Vec<Vec<f64>> = starts
+        .iter()
+        .step_by(every)
+        .filter_map(|&start| windowed_segment(&samples[start..start + SEGMENT]))
+        .collect();
     if segments.len() < FEWEST_SEGMENTS {
         return None;
     }
     let band = |edges: &[usize]| {
         let quartiles: Vec<(f64, f64)> = (edges[0]..edges[1])
-            .map(|bin| quartile_and_median(segments.iter().map(|s| power(s, bin)).collect()))
+            .map(|bin| quartile_and_median(segments.iter().map(|s| goertzel_power(s, bin)).collect()))
             .collect();
         let quartile: f64 = quartiles.iter().map(|q| q.0).sum();
         let median: f64 = quartiles.iter().map(|q| q.1).sum();
-        Band { power: median / quartiles.len() as f64, scatter: median / quartile }
+        PrefilterBand { power: median / quartiles.len() as f64, scatter: median / quartile }
     };
     Some(EDGES.windows(2).map(band).collect())
 }
@@ -119,8 +124,8 @@ fn quartile_and_median(mut values: Vec<f64>) -> (f64, f64) {
 }
 
 /// One segment without its parabola, weighted with a Hann window; `None` where too many frames are missing.
-fn segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
-    let mut values = bridged(samples)?;
+fn windowed_segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
+    let mut values = interpolate_gaps(samples)?;
     let centre = (SEGMENT - 1) as f64 / 2.0;
     let place = |i: usize| (i as f64 - centre) / centre;
     let mean_square = (0..SEGMENT).map(|i| math::powi(place(i), 2)).sum::<f64>() / SEGMENT as f64;
@@ -137,7 +142,7 @@ fn segment(samples: &[Option<f64>]) -> Option<Vec<f64>> {
     Some(values)
 }
 
-fn bridged(samples: &[Option<f64>]) -> Option<Vec<f64>> {
+fn interpolate_gaps(samples: &[Option<f64>]) -> Option<Vec<f64>> {
     let missing = samples.iter().filter(|x| x.is_none()).count();
     if missing > MOST_BRIDGED || samples.first()?.is_none() || samples.last()?.is_none() {
         return None;
@@ -153,7 +158,7 @@ fn bridged(samples: &[Option<f64>]) -> Option<Vec<f64>> {
 }
 
 /// Power of a segment at a bin, by Goertzel's recurrence.
-fn power(values: &[f64], bin: usize) -> f64 {
+fn goertzel_power(values: &[f64], bin: usize) -> f64 {
     let twice_cosine = 2.0 * math::cos(TAU * bin as f64 / SEGMENT as f64);
     let (last, before) =
         values.iter().fold((0.0, 0.0), |(last, before), x| (x + twice_cosine * last - before, last));
@@ -161,7 +166,7 @@ fn power(values: &[f64], bin: usize) -> f64 {
 }
 
 /// A cut-off as a finding.
-pub(super) fn finding(column: &MeasuredColumn, frame_rate_hz: f64) -> Option<Finding> {
+pub(super) fn check_prefilter(column: &MeasuredColumn, frame_rate_hz: f64) -> Option<QualityFinding> {
     let stepped =
         column.quality.step_m.is_some_and(|step| column.quality.noise_m.is_none_or(|noise| noise < step));
     let cut_hz = if stepped { None } else { cutoff_hz(column.samples, frame_rate_hz) }?;
@@ -170,9 +175,9 @@ pub(super) fn finding(column: &MeasuredColumn, frame_rate_hz: f64) -> Option<Fin
     let advice = "faster components are too small or gone: export the raw positions, without the tracker's \
         filter or smoothing";
     Some(
-        Finding::new(Check::PreFiltered, Severity::Caution, cut_hz, "Hz", words)
-            .advise(advice)
-            .on(column.name),
+        QualityFinding::new(Check::PreFiltered, Severity::Caution, cut_hz, "Hz", words)
+            .with_advice(advice)
+            .on_channel(column.name),
     )
 }
 
@@ -183,21 +188,26 @@ mod tests {
     #[test]
     fn gaps_are_bridged_by_straight_lines() {
         let samples = [Some(1.0), None, Some(3.0), Some(5.0), None, None, None, Some(1.0)];
-        assert_eq!(bridged(&samples), Some(vec![1.0, 2.0, 3.0, 5.0, 4.0, 3.0, 2.0, 1.0]));
-        assert_eq!((bridged(&[None, Some(1.0)]), bridged(&[Some(1.0), None])), (None, None));
+        assert_eq!(interpolate_gaps(&samples), Some(vec![1.0, 2.0, 3.0, 5.0, 4.0, 3.0, 2.0, 1.0]));
+        assert_eq!(
+            (interpolate_gaps(&[None, Some(1.0)]), interpolate_gaps(&[Some(1.0), None])),
+            (None, None)
+        );
     }
 
     #[test]
     fn the_power_of_a_cosine_is_at_its_bin() {
         let cosine: Vec<f64> = (0..SEGMENT).map(|i| (TAU * 9.0 * i as f64 / SEGMENT as f64).cos()).collect();
         let half = SEGMENT as f64 / 2.0;
-        assert!((power(&cosine, 9) - half * half).abs() < 1e-8 && power(&cosine, 10) < 1e-8);
+        assert!(
+            (goertzel_power(&cosine, 9) - half * half).abs() < 1e-8 && goertzel_power(&cosine, 10) < 1e-8
+        );
     }
 
     #[test]
     fn a_segment_is_freed_of_its_parabola() {
         let parabola: Vec<Option<f64>> =
             (0..SEGMENT).map(|i| Some(3.0 + 0.2 * i as f64 - 0.01 * (i * i) as f64)).collect();
-        assert!(segment(&parabola).unwrap().iter().all(|x| x.abs() < 1e-10));
+        assert!(windowed_segment(&parabola).unwrap().iter().all(|x| x.abs() < 1e-10));
     }
 }

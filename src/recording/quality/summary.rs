@@ -1,13 +1,13 @@
 //! Quality as text: the grade, the verdict with the worst finding first, and the table of measurements.
 
-use super::finding::{Check, Finding, Severity};
-use super::measured::{CLEAR_OF_NYQUIST, CYCLES, Quality};
+use super::finding::{Check, QualityFinding, Severity};
+use super::measured::{FEWEST_CYCLES, NYQUIST_SHARE, Quality};
 use crate::recording::FrameGrid;
-use crate::text::{ascii, decimals, or_dash};
+use crate::text::{format_decimals, format_or_dash, to_ascii};
 use serde::Serialize;
 
 /// Times the noise that an oscillation must reach to be seen frame by frame.
-const VISIBLE: f64 = 3.0;
+const VISIBLE_COMPONENTS: f64 = 3.0;
 
 /// A recording in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -23,7 +23,7 @@ pub enum Grade {
 
 /// The grade: the gravest finding decides.
 #[must_use]
-pub fn grade(findings: &[Finding]) -> Grade {
+pub fn grade_findings(findings: &[QualityFinding]) -> Grade {
     match findings.iter().map(|finding| finding.severity).max() {
         None | Some(Severity::Note) => Grade::Good,
         Some(Severity::Caution) => Grade::UsableWithCare,
@@ -35,26 +35,26 @@ pub fn grade(findings: &[Finding]) -> Grade {
 /// first. A finding on several channels is one line with its largest number; notes without advice are left to
 /// the table.
 #[must_use]
-pub fn verdict(measured: &Quality, findings: &[Finding]) -> Vec<String> {
-    let mut lines = vec![first_line(measured, findings)];
+pub fn verdict_lines(measured: &Quality, findings: &[QualityFinding]) -> Vec<String> {
+    let mut lines = vec![grade_line(measured, findings)];
     let mut stated: Vec<(Check, Severity)> = vec![];
-    let mut ordered: Vec<&Finding> =
+    let mut ordered: Vec<&QualityFinding> =
         findings.iter().filter(|f| f.severity > Severity::Note || !f.advice.is_empty()).collect();
     ordered.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     for finding in &ordered {
         let key = (finding.check, finding.severity);
         if finding.channel.is_none() {
-            lines.push(finding.line());
+            lines.push(finding.to_line());
         } else if !stated.contains(&key) {
             stated.push(key);
-            lines.extend(line_of_channels(&ordered, key));
+            lines.extend(join_channel_findings(&ordered, key));
         }
     }
-    lines.extend(visible(measured));
+    lines.extend(describe_visible_band(measured));
     lines
 }
 
-fn first_line(measured: &Quality, findings: &[Finding]) -> String {
+fn grade_line(measured: &Quality, findings: &[QualityFinding]) -> String {
     if measured.missing_deflection_frames == measured.frames {
         return "not usable for deflection: in no frame are tip and head both tracked along the sweep; the \
             single channels may still serve"
@@ -64,31 +64,33 @@ fn first_line(measured: &Quality, findings: &[Finding]) -> String {
     if low_hz >= high_hz {
         let (frames, rate) = (measured.frames, measured.frame_rate_hz);
         return format!(
-            "too short for a spectrum: {frames} frames at {rate} frames/s hold fewer than {CYCLES} cycles of \
+            "too short for a spectrum: {frames} frames at {rate} frames/s hold fewer than {FEWEST_CYCLES} cycles of \
              anything they can show"
         );
     }
-    let grade = match grade(findings) {
+    let grade = match grade_findings(findings) {
         Grade::Good => "good: shows",
         Grade::UsableWithCare => "usable with care: shows",
         Grade::NotUsable => "not usable until the serious findings are resolved: would show",
     };
-    let (cycles, nyquist) =
-        (format!("{CYCLES} cycles in the recording"), format!("{CLEAR_OF_NYQUIST} of the Nyquist frequency"));
+    let (cycles, nyquist) = (
+        format!("{FEWEST_CYCLES} cycles in the recording"),
+        format!("{NYQUIST_SHARE} of the Nyquist frequency"),
+    );
     format!("{grade} oscillations from about {low_hz:.3} Hz ({cycles}) to {high_hz:.0} Hz ({nyquist})")
 }
 
-fn visible(measured: &Quality) -> Option<String> {
-    let floor_m = VISIBLE * measured.deflection_floor_m()?;
+fn describe_visible_band(measured: &Quality) -> Option<String> {
+    let floor_m = VISIBLE_COMPONENTS * measured.deflection_floor_m()?;
     Some(format!(
         "note: a deflection above about {:.3} um stands out from the noise in single frames \
-         ({VISIBLE} standard deviations)",
+         ({VISIBLE_COMPONENTS} standard deviations)",
         floor_m * 1e6
     ))
 }
 
 /// The findings of one check and severity on single channels as one line.
-fn line_of_channels(findings: &[&Finding], key: (Check, Severity)) -> Option<String> {
+fn join_channel_findings(findings: &[&QualityFinding], key: (Check, Severity)) -> Option<String> {
     let alike = || {
         findings
             .iter()
@@ -98,14 +100,14 @@ fn line_of_channels(findings: &[&Finding], key: (Check, Severity)) -> Option<Str
     let worst = alike()
         .copied()
         .reduce(|worst, finding| if finding.value > worst.value { finding } else { worst })?;
-    let Some((_, [_, ..])) = channels.split_first() else { return Some(worst.line()) };
+    let Some((_, [_, ..])) = channels.split_first() else { return Some(worst.to_line()) };
     let named = format!("{} (most in {})", channels.join(", "), worst.channel.as_deref().unwrap_or_default());
-    Some(worst.clone().on(&named).line())
+    Some(worst.clone().on_channel(&named).to_line())
 }
 
 /// The measurements as a table for reading, display units, one fact a line.
 #[must_use]
-pub fn table(quality: &Quality, start_s: f64) -> String {
+pub fn measurement_table(quality: &Quality, start_s: f64) -> String {
     let grid = FrameGrid { start_s, frame_rate_hz: quality.frame_rate_hz, frames: quality.frames };
     let share = 100.0 * quality.missing_deflection_frames as f64 / quality.frames as f64;
     let mut lines = vec![
@@ -135,7 +137,7 @@ pub fn table(quality: &Quality, start_s: f64) -> String {
         ));
     }
     lines.push(format!("{:<10}{:>10}{:>14}{:>14}", "channel", "missing", "noise (um)", "step (um)"));
-    let micro = |value: Option<f64>| ascii(&or_dash(value, |v| decimals(v * 1e6, 4)));
+    let micro = |value: Option<f64>| to_ascii(&format_or_dash(value, |v| format_decimals(v * 1e6, 4)));
     lines.extend(quality.channels().map(|(name, c)| {
         format!("{name:<10}{:>10}{:>14}{:>14}", c.missing_frames, micro(c.noise_m), micro(c.step_m))
     }));

@@ -12,13 +12,13 @@ mod path;
 mod spread;
 
 use crate::math;
-pub(super) use findings::findings;
+pub(super) use findings::check_tilt;
 
 use super::measured::Quality;
 use crate::recording::Recording;
-use crate::recording::channel::Instants;
-use line::Line;
-use path::Path;
+use crate::recording::channel::ReversalInstants;
+use line::GlassLine;
+use path::TipPath;
 use serde::Serialize;
 
 /// Fewest frames with a height: the correlation of the errors of fewer is not known.
@@ -30,7 +30,7 @@ const LEAST_TRAVEL_M: f64 = 5e-3;
 const LEAST_ON_GLASS: f64 = 0.5;
 /// Standard deviations from which a slope or a curvature is one: chance reaches them in one level recording
 /// of 370.
-const CLEAR: f64 = 3.0;
+const CLEAR_DEVIATIONS: f64 = 3.0;
 /// Least sag of a curved path, m: below it lies the rounding of a path without noise.
 const LEAST_SAG_M: f64 = 1e-9;
 /// Least tilt that matters, rad: 0.01 degrees shift the deflection of a blade 6 mm high by 1 um, a twentieth
@@ -39,7 +39,7 @@ const LEAST_TILT_RAD: f64 = 0.01 * std::f64::consts::PI / 180.0;
 
 /// Slope of the glass in the picture.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Tilt {
+pub struct CameraTilt {
     /// Angle from the x axis to the glass, rad; positive where the glass rises towards positive x.
     pub angle_rad: f64,
     /// Its standard deviation, rad: correlated errors, rounding, and the change of slope along a curved
@@ -71,7 +71,7 @@ pub struct Curvature {
 
 /// Why a recording shows no tilt.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NoTilt {
+pub enum TiltNotFound {
     /// The tip has no height, or in too few frames.
     #[error("the tip has x and y in {frames} frames, expected at least {FEWEST_FRAMES}")]
     TooFewFrames {
@@ -100,25 +100,29 @@ pub enum NoTilt {
 /// Measures the tilt of the camera; `instants` are those of the recording and `measured` is its quality.
 ///
 /// # Errors
-/// [`NoTilt`]: why the recording shows none.
-pub fn tilt(recording: &Recording, instants: &Instants, measured: &Quality) -> Result<Tilt, NoTilt> {
-    let path = Path::of(recording, instants);
+/// [`TiltNotFound`]: why the recording shows none.
+pub fn measure_tilt(
+    recording: &Recording,
+    instants: &ReversalInstants,
+    measured: &Quality,
+) -> Result<CameraTilt, TiltNotFound> {
+    let path = TipPath::from_recording(recording, instants);
     let frames = path.points.len();
     if frames < FEWEST_FRAMES {
-        return Err(NoTilt::TooFewFrames { frames });
+        return Err(TiltNotFound::TooFewFrames { frames });
     }
     let step_m = height_step_m(measured);
-    let line = on_glass::fit(&path, long_enough(&path)?, step_m);
-    let on_glass = path.only(&line.on_glass);
+    let line = on_glass::fit_glass_line(&path, sufficient_travel_m(&path)?, step_m);
+    let on_glass = path.select_points(&line.on_glass);
     let on_line = on_glass.points.len();
     if (on_line as f64) < LEAST_ON_GLASS * frames as f64 {
-        return Err(NoTilt::NoLine { on_line, frames });
+        return Err(TiltNotFound::NoLine { on_line, frames });
     }
-    let travel_m = long_enough(&on_glass)?;
+    let travel_m = sufficient_travel_m(&on_glass)?;
     let hidden_step_m = if measured.tip_y.noise_m.is_some_and(|noise| noise < step_m) { step_m } else { 0.0 };
-    let (angle_rad, sd_rad, curvature) = angle(&path, &line, hidden_step_m);
+    let (angle_rad, sd_rad, curvature) = angle_with_sd(&path, &line, hidden_step_m);
     let frames_off_glass = frames - on_line;
-    Ok(Tilt {
+    Ok(CameraTilt {
         angle_rad,
         sd_rad,
         curvature,
@@ -138,36 +142,36 @@ fn height_step_m(measured: &Quality) -> f64 {
 }
 
 /// Longest travel within a stroke, m.
-fn long_enough(path: &Path) -> Result<f64, NoTilt> {
+fn sufficient_travel_m(path: &TipPath) -> Result<f64, TiltNotFound> {
     let travel_m = path.travel_m();
-    if travel_m < LEAST_TRAVEL_M { Err(NoTilt::TooLittleTravel { travel_m }) } else { Ok(travel_m) }
+    if travel_m < LEAST_TRAVEL_M { Err(TiltNotFound::TooLittleTravel { travel_m }) } else { Ok(travel_m) }
 }
 
 /// The angle of a line with its uncertainty, rad, and its curvature; `hidden_step_m` is a step of the heights
 /// that noise does not blur.
-fn angle(path: &Path, line: &Line, hidden_step_m: f64) -> (f64, f64, Option<Curvature>) {
+fn angle_with_sd(path: &TipPath, line: &GlassLine, hidden_step_m: f64) -> (f64, f64, Option<Curvature>) {
     // at worst the rounding to a step is alike in all frames: a whole stroke may lie within one step
     let rounding_m2 = path.points.len() as f64 * math::powi(hidden_step_m, 2) / 12.0;
     let variance_m2 = spread::long_run_variance(path, line) + rounding_m2;
-    let curvature = curvature(line, variance_m2);
+    let curvature = significant_curvature(line, variance_m2);
     let bending = curvature.map_or(0.0, |curvature| curvature.slope_sd_rad);
     let slope_sd = math::hypot((variance_m2 / line.slope_information_m2).sqrt(), bending);
     (math::atan(line.slope), slope_sd / (1.0 + line.slope * line.slope), curvature)
 }
 
-fn curvature(line: &Line, variance_m2: f64) -> Option<Curvature> {
+fn significant_curvature(line: &GlassLine, variance_m2: f64) -> Option<Curvature> {
     let sd_per_m = 2.0 * (variance_m2 / line.bend_information_m4).sqrt();
     let per_m = 2.0 * line.bend_per_m;
     let slope_sd_rad = per_m.abs() * line.x_sd_m;
-    let clear = per_m.abs() > CLEAR * sd_per_m && slope_sd_rad * line.x_sd_m > LEAST_SAG_M;
+    let clear = per_m.abs() > CLEAR_DEVIATIONS * sd_per_m && slope_sd_rad * line.x_sd_m > LEAST_SAG_M;
     clear.then_some(Curvature { per_m, sd_per_m, slope_sd_rad })
 }
 
-impl Tilt {
+impl CameraTilt {
     /// Whether the tilt is one: clear of its uncertainty, and large enough to matter.
     #[must_use]
     pub fn is_clear(&self) -> bool {
-        self.angle_rad.abs() > (CLEAR * self.sd_rad).max(LEAST_TILT_RAD)
+        self.angle_rad.abs() > (CLEAR_DEVIATIONS * self.sd_rad).max(LEAST_TILT_RAD)
     }
 
     /// Height by which the glass rises along the travel, m.

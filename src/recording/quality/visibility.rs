@@ -1,7 +1,7 @@
 //! Whether a recording can show a component of a given frequency.
 
-use super::measured::{CLEAR_OF_NYQUIST, CYCLES, Quality};
-use crate::camera::{alias_hz, exposure_passes};
+use super::measured::{FEWEST_CYCLES, NYQUIST_SHARE, Quality};
+use crate::camera::{alias_hz, exposure_gain};
 use serde::Serialize;
 
 /// Title of the paper whose experiment found [`PUBLISHED_COMPONENTS_HZ`].
@@ -46,14 +46,14 @@ pub struct ComponentVisibility {
 impl Quality {
     /// What the recording makes of a component of `frequency_hz`, a positive number.
     #[must_use]
-    pub fn shows(&self, frequency_hz: f64) -> ComponentVisibility {
+    pub fn component_visibility(&self, frequency_hz: f64) -> ComponentVisibility {
         let cycles = frequency_hz * self.duration_s;
-        let passes = self.exposure_s().map(|exposure| exposure_passes(frequency_hz, exposure));
+        let passes = self.exposure_s().map(|exposure| exposure_gain(frequency_hz, exposure));
         let verdict = if frequency_hz > self.nyquist_hz {
             Visibility::Aliased
-        } else if cycles < CYCLES {
+        } else if cycles < FEWEST_CYCLES {
             Visibility::TooFewCycles
-        } else if frequency_hz > CLEAR_OF_NYQUIST * self.nyquist_hz {
+        } else if frequency_hz > NYQUIST_SHARE * self.nyquist_hz {
             Visibility::NearNyquist
         } else if passes.is_some_and(|part| part < NEARLY_ALL) {
             Visibility::Attenuated
@@ -73,13 +73,13 @@ impl Quality {
 impl ComponentVisibility {
     /// The verdict in words, with its numbers.
     #[must_use]
-    pub fn words(&self) -> String {
+    pub fn describe(&self) -> String {
         let what = match self.verdict {
             Visibility::Shown => "shown".to_owned(),
             Visibility::Attenuated => "attenuated".to_owned(),
             Visibility::NearNyquist => "close to the Nyquist frequency and to its own alias".to_owned(),
             Visibility::Aliased => format!("aliased to {:.1} Hz", self.appears_at_hz),
-            Visibility::TooFewCycles => format!("too few cycles for a frequency ({CYCLES} needed)"),
+            Visibility::TooFewCycles => format!("too few cycles for a frequency ({FEWEST_CYCLES} needed)"),
         };
         let exposure = self.exposure_passes.map_or_else(
             || "exposure unknown".to_owned(),

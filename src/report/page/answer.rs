@@ -1,55 +1,66 @@
 //! The first screen: whether the model explains the recording, the blade's numbers, and what to do next.
 
-use super::html::{Cell, Set, Table, sentence, text, verdict, worded};
+use super::html::{
+    CellStyle, HtmlCell, HtmlTable, escape_text, sentence_html, verdict_cell, words_with_keys,
+};
 use crate::report::statement::Statement;
-use crate::report::{Answer, Quantity, Report};
-use crate::text::{self, interval, number};
+use crate::report::{Report, ReportSummary, SummaryQuantity};
+use crate::text::{self, format_interval, format_number};
 
-pub(super) fn answer(report: &Report) -> String {
-    let answer = Answer::of(report);
+pub(super) fn summary_html(report: &Report) -> String {
+    let answer = ReportSummary::from_report(report);
     format!(
         "{}{}<p>{}</p>\n<p><strong>Next:</strong> {}</p>\n",
-        headline(&answer.headline),
-        quantities(&answer.quantities),
-        sentence(&answer.certainty),
-        sentence(&answer.next)
+        headline_html(&answer.headline),
+        quantities_html(&answer.quantities),
+        sentence_html(&answer.certainty),
+        sentence_html(&answer.next)
     )
 }
 
-fn headline(said: &Statement) -> String {
+fn headline_html(said: &Statement) -> String {
     let class = match said.good {
         Some(true) => " good",
         Some(false) => " bad",
         None => "",
     };
-    let details: String = said.details.iter().map(|d| format!("<li>{}</li>\n", sentence(d))).collect();
+    let details: String = said.details.iter().map(|d| format!("<li>{}</li>\n", sentence_html(d))).collect();
     let details = if details.is_empty() { details } else { format!("<ul>\n{details}</ul>\n") };
-    format!("<div class=\"headline{class}\"><p>{}</p>\n{details}</div>\n", sentence(&said.statement))
+    format!("<div class=\"headline{class}\"><p>{}</p>\n{details}</div>\n", sentence_html(&said.statement))
 }
 
-fn quantities(list: &[Quantity]) -> String {
-    let head =
-        [("quantity", Set::Prose), ("value", Set::Number), ("95 % interval", Set::Number), ("", Set::Words)];
-    Table { caption: "The blade", head: Table::heads(&head), rows: list.iter().map(row).collect() }.html()
+fn quantities_html(list: &[SummaryQuantity]) -> String {
+    let head = [
+        ("quantity", CellStyle::Prose),
+        ("value", CellStyle::Number),
+        ("95 % interval", CellStyle::Number),
+        ("", CellStyle::Words),
+    ];
+    HtmlTable {
+        caption: "The blade",
+        head: HtmlTable::column_heads(&head),
+        rows: list.iter().map(quantity_row).collect(),
+    }
+    .render()
 }
 
-fn row(q: &Quantity) -> Vec<Cell> {
-    let (unit, factor) = text::unit(&q.unit, [q.value]);
-    let unit = if unit.is_empty() { unit } else { format!(" {}", text(&unit)) };
+fn quantity_row(q: &SummaryQuantity) -> Vec<HtmlCell> {
+    let (unit, factor) = text::choose_prefix(&q.unit, [q.value]);
+    let unit = if unit.is_empty() { unit } else { format!(" {}", escape_text(&unit)) };
     let range = match q.lower_95.or(q.upper_95) {
-        Some(_) => interval(q.lower_95, q.upper_95, |end| number(end * factor)),
+        Some(_) => format_interval(q.lower_95, q.upper_95, |end| format_number(end * factor)),
         None if q.fitted => "not known".to_owned(),
         None => "held fixed".to_owned(),
     };
     let sure = if q.fitted {
-        verdict(q.identified, ["determined", "not determined"])
+        verdict_cell(q.identified, ["determined", "not determined"])
     } else {
-        (text("from the scene"), Set::Words)
+        (escape_text("from the scene"), CellStyle::Words)
     };
     vec![
-        (worded(&q.name, &q.keys), Set::Prose),
-        (format!("{}{unit}", number(q.value * factor)), Set::Number),
-        (text(&range), Set::Number),
+        (words_with_keys(&q.name, &q.keys), CellStyle::Prose),
+        (format!("{}{unit}", format_number(q.value * factor)), CellStyle::Number),
+        (escape_text(&range), CellStyle::Number),
         sure,
     ]
 }

@@ -3,85 +3,88 @@
 use crate::blade::parameters;
 use crate::chart::Medium;
 use crate::figures::{Drawing, FigureBlock};
-use crate::report::statement::{Piece, Sentence, Statement};
-use crate::text::{capitalised, printable};
+use crate::report::statement::{Sentence, SentencePart, Statement};
+use crate::text::{capitalise, make_printable};
 use html_escape::encode_safe;
 
 /// Text from anywhere as HTML.
-pub(in crate::report) fn text(raw: &str) -> String {
-    encode_safe(&printable(raw)).into_owned()
+pub(in crate::report) fn escape_text(raw: &str) -> String {
+    encode_safe(&make_printable(raw)).into_owned()
 }
 
 /// A name that a user chose: whichever way it is written, it does not turn its neighbours.
-pub(in crate::report) fn name(raw: &str) -> String {
-    format!("<bdi>{}</bdi>", text(raw))
+pub(in crate::report) fn isolate_name(raw: &str) -> String {
+    format!("<bdi>{}</bdi>", escape_text(raw))
 }
 
 /// A key such as `friction.b_s_per_m`, which may break at its dots and underscores.
-pub(in crate::report) fn key(raw: &str) -> String {
-    format!("<code>{}</code>", text(raw).replace('_', "_<wbr>").replace('.', ".<wbr>"))
+pub(in crate::report) fn breakable_key(raw: &str) -> String {
+    format!("<code>{}</code>", escape_text(raw).replace('_', "_<wbr>").replace('.', ".<wbr>"))
 }
 
 /// What a number is, in words, with the keys of a scene that it comes from in small print.
-pub(in crate::report) fn worded(words: &str, keys: &[&str]) -> String {
-    let keys: Vec<String> = keys.iter().map(|name| key(name)).collect();
+pub(in crate::report) fn words_with_keys(words: &str, keys: &[&str]) -> String {
+    let keys: Vec<String> = keys.iter().map(|name| breakable_key(name)).collect();
     let small = if keys.is_empty() {
         String::new()
     } else {
         format!("<small class=\"key\">{}</small>", keys.join(", "))
     };
-    text(&capitalised(words)) + &small
+    escape_text(&capitalise(words)) + &small
 }
 
 /// A parameter of a scene in the same way; the key alone of one that no scene has.
-pub(in crate::report) fn parameter(name: &str) -> String {
-    parameters::find(name).map_or_else(|| key(name), |row| worded(row.meaning, &[row.name]))
+pub(in crate::report) fn parameter_html(name: &str) -> String {
+    parameters::find_parameter(name)
+        .map_or_else(|| breakable_key(name), |row| words_with_keys(row.meaning, &[row.name]))
 }
 
 /// Prose in which names stand between backticks.
-pub(in crate::report) fn prose(raw: &str) -> String {
+pub(in crate::report) fn prose_html(raw: &str) -> String {
     let parts: Vec<&str> = raw.split('`').collect();
     if parts.len().is_multiple_of(2) {
         // backticks that are not in pairs mark no names
-        return format!("<span dir=\"auto\">{}</span>", text(raw));
+        return format!("<span dir=\"auto\">{}</span>", escape_text(raw));
     }
     parts
         .iter()
         .enumerate()
-        .map(
-            |(i, part)| {
-                if i % 2 == 0 { text(part) } else { format!("<bdi class=\"name\">{}</bdi>", text(part)) }
-            },
-        )
+        .map(|(i, part)| {
+            if i % 2 == 0 {
+                escape_text(part)
+            } else {
+                format!("<bdi class=\"name\">{}</bdi>", escape_text(part))
+            }
+        })
         .collect()
 }
 
 /// A sentence with its names isolated.
-pub(in crate::report) fn sentence(sentence: &Sentence) -> String {
-    let piece = |piece: &Piece| match piece {
-        Piece::Words(words) => prose(words),
-        Piece::Name(chosen) => name(chosen),
+pub(in crate::report) fn sentence_html(sentence: &Sentence) -> String {
+    let piece = |piece: &SentencePart| match piece {
+        SentencePart::Words(words) => prose_html(words),
+        SentencePart::Name(chosen) => isolate_name(chosen),
     };
-    sentence.pieces().iter().map(piece).collect()
+    sentence.parts().iter().map(piece).collect()
 }
 
 /// Statements as paragraphs, each with its details as a list.
-pub(in crate::report) fn statements(list: &[Statement]) -> String {
+pub(in crate::report) fn statements_html(list: &[Statement]) -> String {
     let one = |s: &Statement| {
-        let details: String = s.details.iter().map(|d| format!("<li>{}</li>\n", sentence(d))).collect();
+        let details: String = s.details.iter().map(|d| format!("<li>{}</li>\n", sentence_html(d))).collect();
         let details = if details.is_empty() { details } else { format!("<ul>\n{details}</ul>\n") };
         let class = s.good.map_or("", |good| if good { " class=\"good\"" } else { " class=\"bad\"" });
-        format!("<p{class}>{}</p>\n{details}", sentence(&s.statement))
+        format!("<p{class}>{}</p>\n{details}", sentence_html(&s.statement))
     };
     list.iter().map(one).collect()
 }
 
 /// A cell: its contents as HTML, and how it is set.
-pub(in crate::report) type Cell = (String, Set);
+pub(in crate::report) type HtmlCell = (String, CellStyle);
 
 /// How a cell is set.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::report) enum Set {
+pub(in crate::report) enum CellStyle {
     /// Words, from their own side.
     Words,
     /// Longer words, which may fill a wide column.
@@ -96,8 +99,8 @@ pub(in crate::report) enum Set {
     Bad,
 }
 
-impl Set {
-    fn class(self) -> &'static str {
+impl CellStyle {
+    fn css_class(self) -> &'static str {
         match self {
             Self::Words => "t",
             Self::Prose => "t wide",
@@ -110,27 +113,27 @@ impl Set {
 }
 
 /// A verdict as a word in its colour.
-pub(in crate::report) fn verdict(good: bool, words: [&str; 2]) -> Cell {
-    if good { (text(words[0]), Set::Good) } else { (text(words[1]), Set::Bad) }
+pub(in crate::report) fn verdict_cell(good: bool, words: [&str; 2]) -> HtmlCell {
+    if good { (escape_text(words[0]), CellStyle::Good) } else { (escape_text(words[1]), CellStyle::Bad) }
 }
 
 /// A table: what it shows, the heads of its columns with how they are set, and its rows, whose first cell is
 /// their head.
-pub(in crate::report) struct Table<'a> {
+pub(in crate::report) struct HtmlTable<'a> {
     pub caption: &'a str,
-    pub head: Vec<(String, Set)>,
-    pub rows: Vec<Vec<Cell>>,
+    pub head: Vec<(String, CellStyle)>,
+    pub rows: Vec<Vec<HtmlCell>>,
 }
 
-impl Table<'_> {
+impl HtmlTable<'_> {
     /// Heads of columns in the program's own words.
-    pub fn heads(list: &[(&str, Set)]) -> Vec<(String, Set)> {
-        list.iter().map(|(name, set)| (text(name), *set)).collect()
+    pub fn column_heads(list: &[(&str, CellStyle)]) -> Vec<(String, CellStyle)> {
+        list.iter().map(|(name, set)| (escape_text(name), *set)).collect()
     }
 
     /// The table in a box that scrolls by itself where it is wider than the page; nothing when it has no
     /// rows.
-    pub fn html(&self) -> String {
+    pub fn render(&self) -> String {
         if self.rows.is_empty() {
             return String::new();
         }
@@ -138,20 +141,20 @@ impl Table<'_> {
             .head
             .iter()
             .map(|(html, set)| {
-                format!("<th role=\"columnheader\" scope=\"col\" class=\"{}\">{html}</th>", set.class())
+                format!("<th role=\"columnheader\" scope=\"col\" class=\"{}\">{html}</th>", set.css_class())
             })
             .collect();
         // (on a narrow screen every row is a list, in which a cell says whose it is)
-        let cell = |(i, ((html, set), (of, _))): (usize, (&Cell, &(String, Set)))| match i {
-            0 => format!("<th role=\"rowheader\" scope=\"row\" class=\"{}\">{html}</th>", set.class()),
+        let cell = |(i, ((html, set), (of, _))): (usize, (&HtmlCell, &(String, CellStyle)))| match i {
+            0 => format!("<th role=\"rowheader\" scope=\"row\" class=\"{}\">{html}</th>", set.css_class()),
             _ if html.is_empty() => "<td role=\"cell\" class=\"none\"></td>".to_owned(),
-            _ => format!("<td role=\"cell\" class=\"{}\"><i>{of}</i> {html}</td>", set.class()),
+            _ => format!("<td role=\"cell\" class=\"{}\"><i>{of}</i> {html}</td>", set.css_class()),
         };
-        let row = |cells: &Vec<Cell>| {
+        let row = |cells: &Vec<HtmlCell>| {
             let cells: String = cells.iter().zip(&self.head).enumerate().map(cell).collect();
             format!("<tr role=\"row\">{cells}</tr>\n")
         };
-        let (caption, rows) = (text(self.caption), self.rows.iter().map(row).collect::<String>());
+        let (caption, rows) = (escape_text(self.caption), self.rows.iter().map(row).collect::<String>());
         format!(
             "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table: \
              {caption}\"><table role=\"table\">\n<caption>{caption}</caption>\n\
@@ -162,48 +165,49 @@ impl Table<'_> {
 }
 
 /// Named values as a list; nothing for none.
-pub(in crate::report) fn facts(list: &[(String, String)]) -> String {
+pub(in crate::report) fn facts_list(list: &[(String, String)]) -> String {
     let items: String = list.iter().map(|(name, html)| format!("<dt>{name}</dt><dd>{html}</dd>\n")).collect();
     if list.is_empty() { items } else { format!("<dl>\n{items}</dl>\n") }
 }
 
 /// Sentences as a list; nothing for none.
-pub(in crate::report) fn list(sentences: &[String]) -> String {
-    let items: String = sentences.iter().map(|s| format!("<li>{}</li>\n", prose(s))).collect();
+pub(in crate::report) fn sentence_list(sentences: &[String]) -> String {
+    let items: String = sentences.iter().map(|s| format!("<li>{}</li>\n", prose_html(s))).collect();
     if sentences.is_empty() { items } else { format!("<ul>\n{items}</ul>\n") }
 }
 
 /// A paragraph that says how to read what follows.
-pub(in crate::report) fn about(words: &str) -> String {
-    format!("<p class=\"about\">{}</p>\n", text(words))
+pub(in crate::report) fn reading_hint(words: &str) -> String {
+    format!("<p class=\"about\">{}</p>\n", escape_text(words))
 }
 
 /// Figures with their captions, numbered on from `before`; with `narrow` also as a telephone shows them, with
 /// letters that can be read there.
-pub(in crate::report) fn figures<'a>(
+pub(in crate::report) fn figures_html<'a>(
     blocks: impl IntoIterator<Item = &'a FigureBlock>,
     before: usize,
     narrow: bool,
 ) -> String {
     let one = |(index, f): (usize, &FigureBlock)| {
-        let (number, caption, drawn) = (before + index + 1, prose(&f.caption), on_screens(f, narrow));
+        let (number, caption, drawn) =
+            (before + index + 1, prose_html(&f.caption), responsive_figure(f, narrow));
         let clock = f.condition.map_or_else(String::new, |clock| format!(" data-clock=\"{clock}\""));
         format!(
             "<figure id=\"figure-{number}\"{clock} aria-labelledby=\"caption-{number}\">\n<div \
              class=\"drawing\">{drawn}</div>\n<figcaption><p id=\"caption-{number}\"><span \
              class=\"number\">Figure {number}.</span> {caption}</p>{}</figcaption>\n</figure>\n",
-            details(&f.details)
+            details_html(&f.details)
         )
     };
     blocks.into_iter().enumerate().map(one).collect()
 }
 
 /// A figure for wide screens, and the same for narrow ones where it is wanted and does not move.
-fn on_screens(block: &FigureBlock, narrow: bool) -> String {
+fn responsive_figure(block: &FigureBlock, narrow: bool) -> String {
     let wide = block.drawing.on_screen();
     match &block.drawing {
         Drawing::Chart(figure) if narrow => {
-            let column = figure.svg(Medium::Column);
+            let column = figure.to_svg(Medium::Column);
             format!("<div class=\"broad\">{wide}</div><div class=\"narrow\">{column}</div>")
         }
         _ => wide,
@@ -211,8 +215,8 @@ fn on_screens(block: &FigureBlock, narrow: bool) -> String {
 }
 
 /// How a figure was made, folded away, a paragraph a line; nothing for none.
-fn details(text: &str) -> String {
-    let paragraph = |words: &str| format!("<p>{}</p>\n", prose(words));
+fn details_html(text: &str) -> String {
+    let paragraph = |words: &str| format!("<p>{}</p>\n", prose_html(words));
     let told: String = text.lines().filter(|line| !line.is_empty()).map(paragraph).collect();
     if told.is_empty() {
         return told;
@@ -221,7 +225,7 @@ fn details(text: &str) -> String {
 }
 
 /// A section of the page: where a link finds it, its heading and its contents.
-pub(in crate::report) struct Section {
+pub(in crate::report) struct PageSection {
     pub id: &'static str,
     pub heading: &'static str,
     pub html: String,
@@ -229,8 +233,8 @@ pub(in crate::report) struct Section {
     pub folded: bool,
 }
 
-impl Section {
-    fn html(&self) -> String {
+impl PageSection {
+    fn render(&self) -> String {
         let Self { id, heading, html, folded } = self;
         let heading = format!("<h2 id=\"{id}-heading\">{heading}</h2>");
         let section = |inside: &str| {
@@ -245,11 +249,11 @@ impl Section {
 }
 
 /// The whole document; sections without contents are left out.
-pub(in crate::report) fn document(title: &str, lead: &str, sections: &[Section]) -> String {
-    let shown: Vec<&Section> = sections.iter().filter(|s| !s.html.is_empty()).collect();
+pub(in crate::report) fn render_document(title: &str, lead: &str, sections: &[PageSection]) -> String {
+    let shown: Vec<&PageSection> = sections.iter().filter(|s| !s.html.is_empty()).collect();
     let links: String =
         shown.iter().map(|s| format!("<li><a href=\"#{}\">{}</a></li>\n", s.id, s.heading)).collect();
-    let body: String = shown.iter().map(|s| s.html()).collect();
+    let body: String = shown.iter().map(|s| s.render()).collect();
     let first = shown.first().map_or("", |s| s.id);
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<meta name=\"viewport\" \
@@ -258,9 +262,9 @@ pub(in crate::report) fn document(title: &str, lead: &str, sections: &[Section])
          to the contents</a>\n<header>\n<h1>{}</h1>\n{lead}</header>\n\
          <nav aria-label=\"Contents\">\n<ul>\n{links}</ul>\n</nav>\n<main>\n{body}</main>\n\
          <script>\n{}</script>\n</body>\n</html>\n",
-        text(title),
+        escape_text(title),
         include_str!("../page.css"),
-        name(title),
+        isolate_name(title),
         include_str!("../page.js"),
     )
 }
@@ -271,21 +275,21 @@ mod tests {
 
     #[test]
     fn names_are_isolated_and_nothing_turns_the_line() {
-        assert_eq!(name("\u{202e}\u{5d0} <b>\"'"), "<bdi>\u{5d0} &lt;b&gt;&quot;&#x27;</bdi>");
-        let said = sentence(&Sentence::of("a & ").name("<script>"));
+        assert_eq!(isolate_name("\u{202e}\u{5d0} <b>\"'"), "<bdi>\u{5d0} &lt;b&gt;&quot;&#x27;</bdi>");
+        let said = sentence_html(&Sentence::new("a & ").with_name("<script>"));
         assert_eq!(said, "a &amp; <bdi>&lt;script&gt;</bdi>");
-        assert_eq!(prose("the `x<y` is"), "the <bdi class=\"name\">x&lt;y</bdi> is");
-        assert_eq!(prose("a ` b"), "<span dir=\"auto\">a ` b</span>");
+        assert_eq!(prose_html("the `x<y` is"), "the <bdi class=\"name\">x&lt;y</bdi> is");
+        assert_eq!(prose_html("a ` b"), "<span dir=\"auto\">a ` b</span>");
     }
 
     #[test]
     fn a_table_has_a_caption_heads_of_rows_and_columns_and_a_named_box() {
-        let table = Table {
+        let table = HtmlTable {
             caption: "C",
-            head: Table::heads(&[("a", Set::Words), ("b", Set::Number)]),
-            rows: vec![vec![("x".to_owned(), Set::Words), ("1".to_owned(), Set::Number)]],
+            head: HtmlTable::column_heads(&[("a", CellStyle::Words), ("b", CellStyle::Number)]),
+            rows: vec![vec![("x".to_owned(), CellStyle::Words), ("1".to_owned(), CellStyle::Number)]],
         };
-        let html = table.html();
+        let html = table.render();
         for part in [
             "<caption>C</caption>",
             "<th role=\"columnheader\" scope=\"col\" class=\"n\">b</th>",
@@ -295,6 +299,6 @@ mod tests {
         ] {
             assert!(html.contains(part), "{part}: {html}");
         }
-        assert_eq!(Table { rows: vec![], ..table }.html(), "");
+        assert_eq!(HtmlTable { rows: vec![], ..table }.render(), "");
     }
 }

@@ -1,23 +1,26 @@
 //! Sections on what is known of the parameters, and on how the search and the gate before it went.
 
-use super::html::{Cell, Set, Table, about, facts, key, list, parameter, prose, text, verdict};
+use super::html::{
+    CellStyle, HtmlCell, HtmlTable, breakable_key, escape_text, facts_list, parameter_html, prose_html,
+    reading_hint, sentence_list, verdict_cell,
+};
 use crate::compare::ParameterLine;
-use crate::fit::result::Status;
+use crate::fit::result::FitStatus;
 use crate::report::{CombinationLine, ProbeLine, Report};
-use crate::text::{self, DASH, interval, number, or_dash, percent};
+use crate::text::{self, DASH, format_interval, format_number, format_or_dash, format_percent};
 
-pub(super) fn parameters(report: &Report) -> String {
+pub(super) fn parameters_html(report: &Report) -> String {
     if report.parameters.is_empty() {
         return String::new();
     }
     if report.misfit.is_some() {
-        return [about(OF_TRACES), estimates(&report.parameters)].concat();
+        return [reading_hint(OF_TRACES), estimates_table(&report.parameters)].concat();
     }
     [
-        about(OF_FEATURES),
-        estimates(&report.parameters),
-        intervals(&report.parameters, report.search.twins),
-        combinations(&report.combinations),
+        reading_hint(OF_FEATURES),
+        estimates_table(&report.parameters),
+        intervals_table(&report.parameters, report.search.twins),
+        combinations_table(&report.combinations),
     ]
     .concat()
 }
@@ -31,192 +34,212 @@ const OF_TRACES: &str = "The 95 % interval is the widest of those from the curva
                          there are any. A parameter is identified \
                          if nothing speaks against its interval; what does stands next to it.";
 
-fn estimates(list: &[ParameterLine]) -> String {
+fn estimates_table(list: &[ParameterLine]) -> String {
     let with_truth = list.iter().any(|p| p.truth.is_some());
     let mut head = vec![
-        ("parameter", Set::Words),
-        ("symbol", Set::Words),
-        ("unit", Set::Words),
-        ("estimate", Set::Number),
-        ("95 % interval", Set::Number),
+        ("parameter", CellStyle::Words),
+        ("symbol", CellStyle::Words),
+        ("unit", CellStyle::Words),
+        ("estimate", CellStyle::Number),
+        ("95 % interval", CellStyle::Number),
     ];
-    head.push(("verdict", Set::Words));
+    head.push(("verdict", CellStyle::Words));
     if with_truth {
-        head.extend([("truth (synthetic)", Set::Number), ("truth inside", Set::Words)]);
+        head.extend([("truth (synthetic)", CellStyle::Number), ("truth inside", CellStyle::Words)]);
     }
     let with_reason = list.iter().any(|p| p.why.is_some());
-    head.extend(with_reason.then_some(("why not", Set::Prose)));
+    head.extend(with_reason.then_some(("why not", CellStyle::Prose)));
     let row = |p: &ParameterLine| {
-        let (unit, factor) = text::unit(&p.unit, [p.estimate]);
-        let number = |value: f64| number(value * factor);
-        let mut cells =
-            vec![(parameter(&p.name), Set::Words), (text(&p.symbol), Set::Words), (text(&unit), Set::Words)];
+        let (unit, factor) = text::choose_prefix(&p.unit, [p.estimate]);
+        let number = |value: f64| format_number(value * factor);
+        let mut cells = vec![
+            (parameter_html(&p.name), CellStyle::Words),
+            (escape_text(&p.symbol), CellStyle::Words),
+            (escape_text(&unit), CellStyle::Words),
+        ];
         cells.extend([
-            (number(p.estimate), Set::Number),
-            (interval(p.lower_95, p.upper_95, number), Set::Number),
-            verdict(p.is_identified(), [p.verdict.word(); 2]),
+            (number(p.estimate), CellStyle::Number),
+            (format_interval(p.lower_95, p.upper_95, number), CellStyle::Number),
+            verdict_cell(p.is_identified(), [p.verdict.name(); 2]),
         ]);
         if with_truth {
             let inside = p.truth.filter(|_| p.is_bounded()).map_or_else(
-                || (DASH.to_owned(), Set::Words),
-                |truth| verdict(truth.inside_95, ["yes", "no"]),
+                || (DASH.to_owned(), CellStyle::Words),
+                |truth| verdict_cell(truth.inside_95, ["yes", "no"]),
             );
-            cells.extend([(or_dash(p.truth, |truth| number(truth.value)), Set::Number), inside]);
+            cells.extend([(format_or_dash(p.truth, |truth| number(truth.value)), CellStyle::Number), inside]);
         }
-        cells.extend(with_reason.then(|| (or_dash(p.why.as_deref(), prose), Set::Prose)));
+        cells.extend(with_reason.then(|| (format_or_dash(p.why.as_deref(), prose_html), CellStyle::Prose)));
         cells
     };
-    Table {
+    HtmlTable {
         caption: "Estimates and verdicts",
-        head: Table::heads(&head),
+        head: HtmlTable::column_heads(&head),
         rows: list.iter().map(row).collect(),
     }
-    .html()
+    .render()
 }
 
-fn intervals(list: &[ParameterLine], twins: usize) -> String {
+fn intervals_table(list: &[ParameterLine], twins: usize) -> String {
     let head = [
-        ("parameter", Set::Words),
-        ("profile likelihood", Set::Number),
-        ("twins fitted again", Set::Number),
-        ("linear model", Set::Number),
+        ("parameter", CellStyle::Words),
+        ("profile likelihood", CellStyle::Number),
+        ("twins fitted again", CellStyle::Number),
+        ("linear model", CellStyle::Number),
     ];
-    let head = [&head[..], &[("bounds of the search", Set::Number), ("prior", Set::Words)]].concat();
-    let row = |p: &ParameterLine| -> Vec<Cell> {
+    let head =
+        [&head[..], &[("bounds of the search", CellStyle::Number), ("prior", CellStyle::Words)]].concat();
+    let row = |p: &ParameterLine| -> Vec<HtmlCell> {
         let [lower, upper] = p.profile_95;
         let prior = if p.prior { "counts" } else { "none" };
-        let (_, factor) = text::unit(&p.unit, [p.estimate]);
-        let number = |value: f64| number(value * factor);
+        let (_, factor) = text::choose_prefix(&p.unit, [p.estimate]);
+        let number = |value: f64| format_number(value * factor);
         let ends = |ends: Option<[f64; 2]>, none: &str| {
-            ends.map_or_else(|| none.to_owned(), |[lower, upper]| interval(Some(lower), Some(upper), number))
+            ends.map_or_else(
+                || none.to_owned(),
+                |[lower, upper]| format_interval(Some(lower), Some(upper), number),
+            )
         };
         vec![
-            (parameter(&p.name), Set::Words),
-            (interval(lower, upper, number), Set::Number),
-            (ends(p.bootstrap_95, if twins == 0 { "no twins" } else { "too few twins" }), Set::Number),
-            (ends(p.linear_95, "not determined"), Set::Number),
-            (ends(Some(p.bounds), ""), Set::Number),
-            (prior.to_owned(), Set::Words),
+            (parameter_html(&p.name), CellStyle::Words),
+            (format_interval(lower, upper, number), CellStyle::Number),
+            (ends(p.bootstrap_95, if twins == 0 { "no twins" } else { "too few twins" }), CellStyle::Number),
+            (ends(p.linear_95, "not determined"), CellStyle::Number),
+            (ends(Some(p.bounds), ""), CellStyle::Number),
+            (prior.to_owned(), CellStyle::Words),
         ]
     };
     let words = "In the units of the table above. Profile: where the lowest cost over all other parameters has risen by the threshold. \
                  Twins: synthetic data from the best model, fitted again. Linear: from the sensitivities at \
                  the estimates alone.";
-    Table {
+    HtmlTable {
         caption: "The three 95 % intervals",
-        head: Table::heads(&head),
+        head: HtmlTable::column_heads(&head),
         rows: list.iter().map(row).collect(),
     }
-    .html()
-        + &about(words)
+    .render()
+        + &reading_hint(words)
 }
 
 /// `friction.c friction.a^0.31` with its exponents raised.
-fn product(words: &str) -> String {
+fn product_html(words: &str) -> String {
     let factor = |factor: &str| match factor.split_once('^') {
-        Some((of, exponent)) => format!("{}<sup>{}</sup>", key(of), text(exponent).replace('-', "\u{2212}")),
-        None => key(factor),
+        Some((of, exponent)) => {
+            format!("{}<sup>{}</sup>", breakable_key(of), escape_text(exponent).replace('-', "\u{2212}"))
+        }
+        None => breakable_key(factor),
     };
     words.split(' ').map(factor).collect::<Vec<_>>().join(" \u{b7} ")
 }
 
-fn combinations(list: &[CombinationLine]) -> String {
+fn combinations_table(list: &[CombinationLine]) -> String {
     let row = |c: &CombinationLine| {
-        let sd = if c.determined { percent(c.sd_relative) } else { DASH.to_owned() };
+        let sd = if c.determined { format_percent(c.sd_relative) } else { DASH.to_owned() };
         vec![
-            (product(&c.words), Set::Prose),
-            verdict(c.determined, ["determined", "open"]),
-            (sd, Set::Number),
+            (product_html(&c.words), CellStyle::Prose),
+            verdict_cell(c.determined, ["determined", "open"]),
+            (sd, CellStyle::Number),
         ]
     };
     let words = "These products of the parameters are what the features respond to. Those determined are \
                  known to the deviation given; along those left open the parameters can move together without \
                  a change of the features.";
-    let head = [("combination", Set::Prose), ("verdict", Set::Words), ("standard deviation", Set::Number)];
-    let table = Table {
+    let head = [
+        ("combination", CellStyle::Prose),
+        ("verdict", CellStyle::Words),
+        ("standard deviation", CellStyle::Number),
+    ];
+    let table = HtmlTable {
         caption: "Combinations of the parameters",
-        head: Table::heads(&head),
+        head: HtmlTable::column_heads(&head),
         rows: list.iter().map(row).collect(),
     }
-    .html();
-    if table.is_empty() { table } else { format!("<h3>Combinations</h3>\n{}{table}", about(words)) }
+    .render();
+    if table.is_empty() { table } else { format!("<h3>Combinations</h3>\n{}{table}", reading_hint(words)) }
 }
 
-pub(super) fn search(report: &Report) -> String {
+pub(super) fn search_html(report: &Report) -> String {
     let s = &report.search;
     let Some(status) = s.status else { return String::new() };
     if report.misfit.is_some() {
-        return facts(&of_traces(report, status));
+        return facts_list(&trace_search_facts(report, status));
     }
     let failed: Vec<String> = s.failed.iter().map(|f| format!("{} {}", f.count, f.reason)).collect();
     let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
     let mut found =
-        vec![("status", status.word().to_owned()), ("evaluations of the model", s.evaluations.to_string())];
+        vec![("status", status.name().to_owned()), ("evaluations of the model", s.evaluations.to_string())];
     found.extend([
         ("failed", failed),
         ("local searches", s.local_searches.to_string()),
-        ("cost at the estimates", number(s.cost)),
+        ("cost at the estimates", format_number(s.cost)),
     ]);
-    found.push(("rise in cost that bounds a 95 % interval", number(s.threshold)));
+    found.push(("rise in cost that bounds a 95 % interval", format_number(s.threshold)));
     found.push(("twins fitted again", if s.twins == 0 { "none".to_owned() } else { s.twins.to_string() }));
     found.push(("combinations determined", format!("{} of {}", s.rank, report.parameters.len())));
     found.push((
         "condition number",
-        s.condition
-            .map_or_else(|| "infinite: no feature responds to one of the combinations".to_owned(), number),
+        s.condition.map_or_else(
+            || "infinite: no feature responds to one of the combinations".to_owned(),
+            format_number,
+        ),
     ));
     let found: Vec<(String, String)> =
-        found.into_iter().map(|(name, value)| (text(name), text(&value))).collect();
-    [facts(&found), gate(&report.gate), list(&report.gate_notes)].concat()
+        found.into_iter().map(|(name, value)| (escape_text(name), escape_text(&value))).collect();
+    [facts_list(&found), gate_table(&report.gate), sentence_list(&report.gate_notes)].concat()
 }
 
 /// A fit to traces has iterates and starts in place of evaluations and a gate.
-fn of_traces(report: &Report, status: Status) -> Vec<(String, String)> {
+fn trace_search_facts(report: &Report, status: FitStatus) -> Vec<(String, String)> {
     let s = &report.search;
     let found = [
-        ("status", status.word().to_owned()),
+        ("status", status.name().to_owned()),
         ("iterates", s.evaluations.to_string()),
         ("starts", s.local_searches.to_string()),
-        ("cost at the estimates", number(s.cost)),
+        ("cost at the estimates", format_number(s.cost)),
         ("combinations determined", format!("{} of {}", s.rank, report.parameters.len())),
     ];
-    found.into_iter().map(|(name, value)| (text(name), text(&value))).collect()
+    found.into_iter().map(|(name, value)| (escape_text(name), escape_text(&value))).collect()
 }
 
-fn gate(probes: &[ProbeLine]) -> String {
+fn gate_table(probes: &[ProbeLine]) -> String {
     let row = |(i, p): (usize, &ProbeLine)| {
-        let ran =
-            p.failure.as_deref().map_or_else(|| ("ran".to_owned(), Set::Good), |why| (prose(why), Set::Bad));
-        let condition = or_dash(p.condition, number);
+        let ran = p
+            .failure
+            .as_deref()
+            .map_or_else(|| ("ran".to_owned(), CellStyle::Good), |why| (prose_html(why), CellStyle::Bad));
+        let condition = format_or_dash(p.condition, format_number);
         let determines = if p.determines.is_empty() {
             "none alone".to_owned()
         } else {
-            p.determines.iter().map(|name| key(name)).collect::<Vec<_>>().join(", ")
+            p.determines.iter().map(|name| breakable_key(name)).collect::<Vec<_>>().join(", ")
         };
-        let number = |count: usize| (count.to_string(), Set::Number);
+        let number = |count: usize| (count.to_string(), CellStyle::Number);
         vec![
             number(i + 1),
             ran,
             number(p.features_seen),
             number(p.rank),
-            (condition, Set::Number),
-            (determines, Set::Prose),
+            (condition, CellStyle::Number),
+            (determines, CellStyle::Prose),
         ]
     };
     let head = [
-        ("place", Set::Number),
-        ("model", Set::Words),
-        ("features found", Set::Number),
-        ("combinations determined", Set::Number),
+        ("place", CellStyle::Number),
+        ("model", CellStyle::Words),
+        ("features found", CellStyle::Number),
+        ("combinations determined", CellStyle::Number),
     ];
-    let head = [&head[..], &[("condition number", Set::Number), ("parameters determined alone", Set::Prose)]]
-        .concat();
+    let head = [
+        &head[..],
+        &[("condition number", CellStyle::Number), ("parameters determined alone", CellStyle::Prose)],
+    ]
+    .concat();
     let rows = probes.iter().enumerate().map(row).collect();
-    let table = Table {
+    let table = HtmlTable {
         caption: "The gate: places of the box that were probed before the search",
-        head: Table::heads(&head),
+        head: HtmlTable::column_heads(&head),
         rows,
     }
-    .html();
+    .render();
     if table.is_empty() { table } else { format!("<h3>Gate</h3>\n{table}") }
 }

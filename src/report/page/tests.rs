@@ -1,12 +1,12 @@
 use super::*;
 use crate::compare::{Comparison, ParameterLine, Truth};
 use crate::figures::{Drawing, FigureBlock};
-use crate::fit::misfit::{ChannelMisfit, Misfit, WorstSegment};
-use crate::fit::result::{NuisanceResult, Status};
-use crate::recording::quality::{Check, Finding, Grade, Severity};
+use crate::fit::misfit::{ChannelMisfit, TraceMisfit, WorstSegment};
+use crate::fit::result::{FitStatus, NuisanceResult};
+use crate::recording::quality::{Check, Grade, QualityFinding, Severity};
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::report::{
-    CombinationLine, Failed, FigureGroup, ProbeLine, Provenance, RecordingLine, RunLine, SearchLine,
+    CombinationLine, FailureCount, FigureGroup, ProbeLine, Provenance, RecordingLine, RunSummary, SearchLine,
     SourceFile,
 };
 
@@ -22,9 +22,12 @@ pub(in crate::report) fn recording(name: &str, synthetic: bool) -> RecordingLine
     let recording =
         Recording::new(name, FrameGrid { start_s: 0.0, frame_rate_hz: 1e3, frames: 10 }, traces, synthetic)
             .unwrap();
-    let findings =
-        vec![Finding::new(Check::Gaps, Severity::Caution, 3.0, name, name.to_owned()).on(name).advise(name)];
-    let measurements = crate::recording::quality::quality(&recording, None);
+    let findings = vec![
+        QualityFinding::new(Check::Gaps, Severity::Caution, 3.0, name, name.to_owned())
+            .on_channel(name)
+            .with_advice(name),
+    ];
+    let measurements = crate::recording::quality::measure_quality(&recording, None);
     RecordingLine {
         name: name.to_owned(),
         synthetic,
@@ -61,8 +64,8 @@ fn everywhere(t: &str) -> Report {
     Report {
         title: own(),
         search: SearchLine {
-            status: Some(Status::Failed),
-            failed: vec![Failed { reason: own(), count: 1 }],
+            status: Some(FitStatus::Failed),
+            failed: vec![FailureCount { reason: own(), count: 1 }],
             ..SearchLine::default()
         },
         recordings: vec![recording(t, true)],
@@ -77,7 +80,7 @@ fn everywhere(t: &str) -> Report {
             truth,
             ..ParameterLine::default()
         }],
-        misfit: Some(Misfit {
+        misfit: Some(TraceMisfit {
             reasons: vec![own()],
             channels: vec![ChannelMisfit {
                 recording: own(),
@@ -85,7 +88,7 @@ fn everywhere(t: &str) -> Report {
                 worst: vec![WorstSegment { start_s: 0.1, end_s: 0.2, chi2_per_dof: 3.0 }],
                 ..ChannelMisfit::default()
             }],
-            ..Misfit::default()
+            ..TraceMisfit::default()
         }),
         nuisances: vec![NuisanceResult {
             recording: Some(own()),
@@ -101,11 +104,11 @@ fn everywhere(t: &str) -> Report {
         advice: vec![own()],
         comparison: Vec::new(),
         tables: Vec::new(),
-        runs: vec![RunLine { name: own(), ..RunLine::default() }],
+        runs: vec![RunSummary { name: own(), ..RunSummary::default() }],
         gate: vec![ProbeLine { determines: vec![own()], failure: Some(own()), ..ProbeLine::default() }],
         gate_notes: vec![own()],
         figures: vec![FigureGroup {
-            subject: Subject::Blade,
+            subject: FigureSubject::Blade,
             figures: vec![FigureBlock {
                 condition: None,
                 file: own(),
@@ -132,7 +135,7 @@ fn names_from_files_stay_text_wherever_they_stand() {
         "`<img src=x onerror=alert(1)>`",
         "\u{5e9}\u{5dc}\u{5d5}\u{5dd} \u{1f600}<b>",
     ] {
-        let html = page(&everywhere(hostile));
+        let html = render_page(&everywhere(hostile));
         let html = without_script(&html);
         for bad in ["<script", "<img", "<b>\u{5e9}", "'x'", "\u{7}", "\u{202e}", "\"q\"", "<b></"] {
             assert!(!html.contains(bad), "{bad:?} of {hostile:?}");
@@ -152,14 +155,14 @@ fn names_that_users_chose_are_isolated_from_the_words_beside_them() {
         components: vec![comparison(4)],
         features: vec![comparison(5)],
         held_out: vec![comparison(6)],
-        runs: vec![RunLine { name: named(7), ..RunLine::default() }],
+        runs: vec![RunSummary { name: named(7), ..RunSummary::default() }],
         provenance: Provenance {
             files: vec![SourceFile { name: named(8), ..SourceFile::default() }],
             ..Provenance::default()
         },
         ..Report::default()
     };
-    let html = page(&report);
+    let html = render_page(&report);
     for k in [1, 2, 3, 4, 5, 6, 7, 8, 14, 15, 16] {
         assert!(html.contains(&format!("<bdi>{}</bdi>", named(k))), "{k}");
     }
@@ -178,7 +181,7 @@ fn the_page_stands_alone_and_leads_with_the_answer() {
         components: vec![Comparison { name: "low".to_owned(), ..Comparison::default() }],
         ..Report::default()
     };
-    let html = page(&report);
+    let html = render_page(&report);
     for asked in ["http", "src=", "url(", "@import"] {
         assert!(!without_script(&html).contains(asked), "{asked}");
     }
@@ -189,7 +192,7 @@ fn the_page_stands_alone_and_leads_with_the_answer() {
         html.contains("Only published numbers were fitted")
             && html.contains("no recording: the traces shown are the model")
     );
-    assert_eq!(html, page(&report));
+    assert_eq!(html, render_page(&report));
 }
 
 #[test]
@@ -200,25 +203,25 @@ fn synthetic_data_carry_a_banner_and_the_truth() {
         parameters: vec![ParameterLine { truth, ..ParameterLine::default() }],
         ..Report::default()
     };
-    let html = page(&report);
+    let html = render_page(&report);
     assert!(
         html.contains("Synthetic data: no camera took <bdi>twin</bdi>.")
             && html.contains("truth (synthetic)")
     );
-    let measured = page(&Report { recordings: vec![recording("film", false)], ..Report::default() });
+    let measured = render_page(&Report { recordings: vec![recording("film", false)], ..Report::default() });
     assert!(!measured.contains("class=\"banner\"") && !measured.contains("synthetic"));
 }
 
 #[test]
 fn hard_events_that_did_not_happen_are_said_to_be_none() {
-    let quiet = RunLine { name: "slow".to_owned(), ..RunLine::default() };
-    let lost = RunLine {
+    let quiet = RunSummary { name: "slow".to_owned(), ..RunSummary::default() };
+    let lost = RunSummary {
         name: "fast".to_owned(),
-        status: crate::simulate::Status::ContactLost,
+        status: crate::simulate::RunStatus::ContactLost,
         contact_losses: 1,
-        ..RunLine::default()
+        ..RunSummary::default()
     };
-    let html = page(&Report { runs: vec![quiet, lost], ..Report::default() });
+    let html = render_page(&Report { runs: vec![quiet, lost], ..Report::default() });
     assert!(
         html.contains(
             "<th role=\"rowheader\" scope=\"row\" class=\"t\">loss of contact</th><td role=\"cell\" \
@@ -243,7 +246,7 @@ fn headings(html: &str) -> Vec<u8> {
 
 #[test]
 fn the_page_can_be_read_by_ear_and_by_keyboard() {
-    let html = page(&everywhere("x"));
+    let html = render_page(&everywhere("x"));
     let levels = headings(&html);
     assert!(
         levels[0] == 1
@@ -298,14 +301,18 @@ fn every_text_has_the_contrast_of_wcag_aa_in_every_scheme() {
 #[test]
 fn a_force_that_vanishes_is_zero_and_twins_too_few_for_an_interval_are_said_to_be() {
     let report = |twins: usize, force: f64| Report {
-        search: SearchLine { status: Some(Status::Converged), twins, ..SearchLine::default() },
+        search: SearchLine { status: Some(FitStatus::Converged), twins, ..SearchLine::default() },
         parameters: vec![ParameterLine { name: "friction.a".to_owned(), ..ParameterLine::default() }],
-        runs: vec![RunLine { name: "r".to_owned(), least_normal_force_n: Some(force), ..RunLine::default() }],
+        runs: vec![RunSummary {
+            name: "r".to_owned(),
+            least_normal_force_n: Some(force),
+            ..RunSummary::default()
+        }],
         ..Report::default()
     };
-    let few = page(&report(3, -3.8e-12));
+    let few = render_page(&report(3, -3.8e-12));
     assert!(few.contains(" too few twins<") && !few.contains(" no twins<"));
     assert!(few.contains(" 0 N<"));
-    let none = page(&report(0, 0.0669));
+    let none = render_page(&report(0, 0.0669));
     assert!(none.contains(" no twins<") && none.contains(" 0.06690 N<"));
 }

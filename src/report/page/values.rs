@@ -1,31 +1,35 @@
 //! Tables of what was measured and what the model shows.
 
-use super::html::{Cell, Set, Table, about, name, prose, text, verdict};
+use super::html::{
+    CellStyle, HtmlCell, HtmlTable, escape_text, isolate_name, prose_html, reading_hint, verdict_cell,
+};
 use crate::compare::Comparison;
-use crate::text::{self, digits, number, or_dash, percent, signed_percent, with_sd};
+use crate::text::{
+    self, format_digits, format_number, format_or_dash, format_percent, format_signed_percent, format_with_sd,
+};
 
-pub(super) fn components(list: &[Comparison]) -> String {
+pub(super) fn components_table(list: &[Comparison]) -> String {
     let words = "Frequencies that the model has to meet. A component is met if it lies within the tolerance; \
                  relative error is model / target \u{2212} 1. The standard deviation of a target stands in units \
                  of the last digit: 78.40(3) is 78.40 with 0.03. A target from the job is published or assumed.";
-    table("Components: target against model", words, ["component", "condition"], list)
+    comparison_table("Components: target against model", words, ["component", "condition"], list)
 }
 
-pub(super) fn features(list: &[Comparison]) -> String {
+pub(super) fn features_table(list: &[Comparison]) -> String {
     let words = "Everything else that was fitted. A feature is met if the model lies within the 95 % interval \
                  of the target, 1.96 standard deviations either side. A target from the job is published or \
                  assumed.";
-    table("Features: target against model", words, ["feature", "condition"], list)
+    comparison_table("Features: target against model", words, ["feature", "condition"], list)
 }
 
-pub(super) fn held_out(list: &[Comparison]) -> String {
+pub(super) fn held_out_table(list: &[Comparison]) -> String {
     let words = "Not fitted, but predicted by the model at the estimates and then compared with the target.";
-    table("Held-out values: target against prediction", words, ["value", "condition"], list)
+    comparison_table("Held-out values: target against prediction", words, ["value", "condition"], list)
 }
 
 /// Values of several fits, whose names stand in place of conditions.
-pub(in crate::report) fn of_fits(caption: &str, list: &[Comparison]) -> String {
-    table(
+pub(in crate::report) fn fits_table(caption: &str, list: &[Comparison]) -> String {
+    comparison_table(
         caption,
         "Relative error is model / target \u{2212} 1; what counts as met is as on the page of each fit.",
         ["name", "fit"],
@@ -33,66 +37,72 @@ pub(in crate::report) fn of_fits(caption: &str, list: &[Comparison]) -> String {
     )
 }
 
-fn table(caption: &str, words: &str, [kind, condition]: [&str; 2], list: &[Comparison]) -> String {
+fn comparison_table(caption: &str, words: &str, [kind, condition]: [&str; 2], list: &[Comparison]) -> String {
     if list.is_empty() {
         return String::new();
     }
     let several = list.iter().any(|c| c.condition.is_some());
-    let mut head = vec![(kind, Set::Words)];
-    head.extend(several.then_some((condition, Set::Words)));
+    let mut head = vec![(kind, CellStyle::Words)];
+    head.extend(several.then_some((condition, CellStyle::Words)));
     head.extend([
-        ("unit", Set::Words),
-        ("target", Set::Number),
-        ("from", Set::Words),
-        ("model", Set::Number),
-        ("relative error", Set::Number),
+        ("unit", CellStyle::Words),
+        ("target", CellStyle::Number),
+        ("from", CellStyle::Words),
+        ("model", CellStyle::Number),
+        ("relative error", CellStyle::Number),
     ]);
-    head.extend([("tolerance", Set::Number), ("verdict", Set::Words), ("remarks", Set::Prose)]);
-    let rows = list.iter().map(|c| row(c, several)).collect();
-    Table { caption, head: Table::heads(&head), rows }.html() + &about(words)
+    head.extend([
+        ("tolerance", CellStyle::Number),
+        ("verdict", CellStyle::Words),
+        ("remarks", CellStyle::Prose),
+    ]);
+    let rows = list.iter().map(|c| comparison_row(c, several)).collect();
+    HtmlTable { caption, head: HtmlTable::column_heads(&head), rows }.render() + &reading_hint(words)
 }
 
-fn row(c: &Comparison, several: bool) -> Vec<Cell> {
-    let (unit, factor) = text::unit(&c.unit, [c.target]);
-    let target = with_sd(c.target * factor, c.target_sd.map(|sd| sd * factor));
-    let model = or_dash(c.model, |model| number(model * factor));
-    let error = or_dash(c.relative_error, signed_percent);
-    let tolerance = c.tolerance_relative.map_or_else(|| "95 % interval".to_owned(), percent);
+fn comparison_row(c: &Comparison, several: bool) -> Vec<HtmlCell> {
+    let (unit, factor) = text::choose_prefix(&c.unit, [c.target]);
+    let target = format_with_sd(c.target * factor, c.target_sd.map(|sd| sd * factor));
+    let model = format_or_dash(c.model, |model| format_number(model * factor));
+    let error = format_or_dash(c.relative_error, format_signed_percent);
+    let tolerance = c.tolerance_relative.map_or_else(|| "95 % interval".to_owned(), format_percent);
     let from = match (c.given, c.synthetic) {
         (true, _) => "job",
         (_, true) => "synthetic",
         _ => "recording",
     };
-    let mut cells = vec![(name(&c.name), Set::Words)];
-    cells.extend(several.then(|| (c.condition.as_deref().map(name).unwrap_or_default(), Set::Name)));
+    let mut cells = vec![(isolate_name(&c.name), CellStyle::Words)];
+    cells.extend(
+        several.then(|| (c.condition.as_deref().map(isolate_name).unwrap_or_default(), CellStyle::Name)),
+    );
     cells.extend([
-        (text(&unit), Set::Words),
-        (target, Set::Number),
-        (from.to_owned(), Set::Words),
-        (model, Set::Number),
-        (error, Set::Number),
+        (escape_text(&unit), CellStyle::Words),
+        (target, CellStyle::Number),
+        (from.to_owned(), CellStyle::Words),
+        (model, CellStyle::Number),
+        (error, CellStyle::Number),
     ]);
     cells.extend([
-        (tolerance, Set::Number),
-        verdict(c.pass, ["met", "not met"]),
-        (prose(&remarks(c)), Set::Prose),
+        (tolerance, CellStyle::Number),
+        verdict_cell(c.pass, ["met", "not met"]),
+        (prose_html(&value_remarks(c)), CellStyle::Prose),
     ]);
     cells
 }
 
 /// What else is known of a value.
-fn remarks(c: &Comparison) -> String {
+fn value_remarks(c: &Comparison) -> String {
     let size = |value: f64| {
         // nobody reads millihertz
         let (unit, factor) =
-            if c.unit == "Hz" { (c.unit.clone(), 1.0) } else { text::unit(&c.unit, [value]) };
-        format!("{} {unit}", digits(value * factor, 2)).trim_end().to_owned()
+            if c.unit == "Hz" { (c.unit.clone(), 1.0) } else { text::choose_prefix(&c.unit, [value]) };
+        format!("{} {unit}", format_digits(value * factor, 2)).trim_end().to_owned()
     };
     let parts = [
         c.missing.clone(),
         c.without_camera.map(|model| {
-            let (unit, factor) = text::unit(&c.unit, [c.target]);
-            format!("{} {unit} without the offset and the scale of its camera", number(model * factor))
+            let (unit, factor) = text::choose_prefix(&c.unit, [c.target]);
+            format!("{} {unit} without the offset and the scale of its camera", format_number(model * factor))
         }),
         c.below_db
             .filter(|db| *db > 0.0)
@@ -100,7 +110,7 @@ fn remarks(c: &Comparison) -> String {
         c.next_peak.map(|p| {
             format!(
                 "next peak of the model at {} Hz, {:.1} dB below the strongest",
-                number(p.frequency_hz),
+                format_number(p.frequency_hz),
                 p.below_db
             )
         }),

@@ -1,17 +1,17 @@
 //! The fits that are compared, and what the comparison holds.
 
 use super::shared::SharedParameter;
-use crate::compare::{Measured, ModelRun};
+use crate::compare::{FittedRecording, ModelRun};
 use crate::figures::FigureBlock;
 use crate::fit::job::Job;
 use crate::report::Report;
 use crate::report::statement::Statement;
-use crate::report::verdict::Verdict;
+use crate::report::verdict::ReportVerdict;
 use crate::text;
 
 /// A fit with everything that it is compared by.
 #[derive(Debug, Clone, Copy)]
-pub struct Fitted<'a> {
+pub struct ComparisonInput<'a> {
     /// Name of its folder.
     pub name: &'a str,
     /// What its own report says.
@@ -19,18 +19,18 @@ pub struct Fitted<'a> {
     /// Its job.
     pub job: &'a Job,
     /// Its recordings: those of the first conditions.
-    pub measured: &'a [Measured<'a>],
+    pub measured: &'a [FittedRecording<'a>],
     /// Its best model, condition by condition.
     pub best: &'a [ModelRun],
 }
 
 /// A comparison of fits.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Several {
+pub struct FitComparison {
     /// Heading.
     pub title: String,
     /// The fits, without figures of their own.
-    pub fits: Vec<Entry>,
+    pub fits: Vec<ComparedFit>,
     /// Every parameter of any of them.
     pub parameters: Vec<SharedParameter>,
     /// Figures in the order of the page.
@@ -41,20 +41,20 @@ pub struct Several {
 
 /// A fit of a comparison.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
+pub struct ComparedFit {
     /// Name of its folder.
     pub name: String,
     /// What its own report says.
     pub report: Report,
     /// The verdict on it.
-    pub verdict: Verdict,
+    pub verdict: ReportVerdict,
 }
 
-impl Several {
+impl FitComparison {
     /// The statements as lines of text.
     #[must_use]
     pub fn summary(&self) -> Vec<String> {
-        self.statements.iter().map(Statement::plain).collect()
+        self.statements.iter().map(Statement::plain_text).collect()
     }
 
     /// Whether every component is met in every fit.
@@ -71,8 +71,8 @@ impl Several {
 }
 
 /// A name that fits over a panel or into a legend.
-pub(super) fn short(name: &str) -> String {
+pub(super) fn shorten_name(name: &str) -> String {
     /// Letters that a legend of one column of a journal takes.
     const MOST: usize = 24;
-    text::shortened(name, MOST)
+    text::truncate_text(name, MOST)
 }

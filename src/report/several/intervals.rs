@@ -1,15 +1,16 @@
 //! Estimates with their 95 % intervals: a panel for each parameter that at least two fits have, a row for
 //! each of them.
 
-use super::fitted::{Entry, short};
-use super::shared::{Relation, SharedParameter};
+use super::fitted::{ComparedFit, shorten_name};
+use super::shared::{IntervalRelation, SharedParameter};
 use crate::chart::{
-    Axis, Bar, Colour, FULL_WIDTH_MM, Figure, MOST_HEIGHT_MM, Mark, Medium, Panel, Series, Shape,
+    ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, MAX_HEIGHT_MM, Mark, MarkerShape, Medium, Panel,
+    Series,
 };
 use crate::compare::ParameterLine;
 use crate::figures::{Drawing, FigureBlock};
 use crate::math;
-use crate::text::{interval, number};
+use crate::text::{format_interval, format_number};
 
 const ROW_MM: f64 = 5.5;
 const LEAST_HEIGHT_MM: f64 = 16.0;
@@ -22,13 +23,13 @@ const WIDE: f64 = 30.0;
 
 /// The figures, none where no parameter is shared: as few as have room in a column of a journal, with rows as
 /// high as their letters.
-pub(super) fn figures(entries: &[Entry], parameters: &[SharedParameter]) -> Vec<FigureBlock> {
+pub(super) fn interval_figures(entries: &[ComparedFit], parameters: &[SharedParameter]) -> Vec<FigureBlock> {
     let shared: Vec<&SharedParameter> = parameters.iter().filter(|p| !p.pairs.is_empty()).collect();
     let fits = |figures: &Vec<Figure>| {
-        figures.iter().all(|figure| figure.height_mm(Medium::Column) <= MOST_HEIGHT_MM)
+        figures.iter().all(|figure| figure.height_mm(Medium::Column) <= MAX_HEIGHT_MM)
     };
     let parted = |parts: usize| shared.chunks(shared.len().div_ceil(parts));
-    let drawn = |parts: usize| parted(parts).map(|part| figure(entries, part)).collect::<Vec<Figure>>();
+    let drawn = |parts: usize| parted(parts).map(|part| draw_figure(entries, part)).collect::<Vec<Figure>>();
     // a figure that one parameter alone makes too high stays so
     let Some(parts) = (1..=shared.len()).find(|parts| fits(&drawn(*parts)) || *parts == shared.len()) else {
         return Vec::new();
@@ -36,31 +37,31 @@ pub(super) fn figures(entries: &[Entry], parameters: &[SharedParameter]) -> Vec<
     let block = |(i, (figure, part)): (usize, (Figure, &[&SharedParameter]))| FigureBlock {
         condition: None,
         file: if parts == 1 { "parameters.svg".to_owned() } else { format!("parameters-{}.svg", i + 1) },
-        caption: caption(part),
-        details: details(part),
+        caption: figure_caption(part),
+        details: figure_details(part),
         drawing: Drawing::Chart(figure),
     };
     drawn(parts).into_iter().zip(parted(parts)).enumerate().map(block).collect()
 }
 
-fn figure(entries: &[Entry], parameters: &[&SharedParameter]) -> Figure {
+fn draw_figure(entries: &[ComparedFit], parameters: &[&SharedParameter]) -> Figure {
     Figure {
-        title: claim(parameters),
-        subtitle: sources(entries),
-        synthetic: entries.iter().any(|e| e.verdict.synthetic),
+        title: claim_sentence(parameters),
+        subtitle: describe_sources(entries),
+        watermarked: entries.iter().any(|e| e.verdict.synthetic),
         description:
             "A panel a parameter, a row a fit: estimate and 95 % interval; an open end reaches the frame."
                 .to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
-        panels: parameters.iter().map(|p| panel(entries, p)).collect(),
+        panels: parameters.iter().map(|p| draw_panel(entries, p)).collect(),
     }
 }
 
 /// What the estimates rest on, where that is not a film.
-fn sources(entries: &[Entry]) -> String {
-    let names = |is: fn(&&Entry) -> bool| {
-        entries.iter().filter(is).map(|e| short(&e.name)).collect::<Vec<_>>().join(", ")
+fn describe_sources(entries: &[ComparedFit]) -> String {
+    let names = |is: fn(&&ComparedFit) -> bool| {
+        entries.iter().filter(is).map(|e| shorten_name(&e.name)).collect::<Vec<_>>().join(", ")
     };
     let named = |(what, names): (&str, String)| (!names.is_empty()).then(|| format!("{what}: {names}"));
     let kinds = [
@@ -71,24 +72,24 @@ fn sources(entries: &[Entry]) -> String {
 }
 
 /// How many pairs of intervals can be compared, and how many of them do not overlap.
-fn counted(parameters: &[&SharedParameter]) -> (usize, usize) {
+fn count_pairs(parameters: &[&SharedParameter]) -> (usize, usize) {
     let pairs = || parameters.iter().flat_map(|p| p.pairs.iter().map(|pair| pair.relation));
     (
-        pairs().filter(|r| *r != Relation::NotComparable).count(),
-        pairs().filter(|r| *r == Relation::Disjoint).count(),
+        pairs().filter(|r| *r != IntervalRelation::NotComparable).count(),
+        pairs().filter(|r| *r == IntervalRelation::Disjoint).count(),
     )
 }
 
 /// The claim with its number.
-fn claim(parameters: &[&SharedParameter]) -> String {
-    match counted(parameters) {
+fn claim_sentence(parameters: &[&SharedParameter]) -> String {
+    match count_pairs(parameters) {
         (0, _) => "No two of the 95 % intervals can be compared".to_owned(),
         (all, apart) => format!("{} of {all} comparable pairs of 95 % intervals overlap", all - apart),
     }
 }
 
-fn caption(parameters: &[&SharedParameter]) -> String {
-    let (comparable, apart) = counted(parameters);
+fn figure_caption(parameters: &[&SharedParameter]) -> String {
+    let (comparable, apart) = count_pairs(parameters);
     let overlaps = match comparable {
         0 => "no two of the intervals can be compared".to_owned(),
         _ => format!("{apart} of {comparable} pairs of intervals that can be compared do not overlap"),
@@ -96,7 +97,7 @@ fn caption(parameters: &[&SharedParameter]) -> String {
     format!("Estimates and 95 % intervals of the parameters that at least two of the fits share: {overlaps}.")
 }
 
-fn details(parameters: &[&SharedParameter]) -> String {
+fn figure_details(parameters: &[&SharedParameter]) -> String {
     let lines = || parameters.iter().flat_map(|p| p.lines.iter().flatten());
     let (known, all) = (lines().filter(|p| p.is_identified()).count(), lines().count());
     let truth =
@@ -110,22 +111,23 @@ fn details(parameters: &[&SharedParameter]) -> String {
 
 /// Looks of an estimate: label, colour, mark, and whether it is of an identified parameter.
 const LOOKS: [(&str, Colour, Mark, bool); 2] = [
-    ("identified", Colour::Blue, Mark::Joined(Shape::Disc), true),
-    ("not identified, or a limit", Colour::Vermilion, Mark::Hollow(Shape::Diamond), false),
+    ("identified", Colour::Blue, Mark::Joined(MarkerShape::Disc), true),
+    ("not identified, or a limit", Colour::Vermilion, Mark::Hollow(MarkerShape::Diamond), false),
 ];
 
-fn panel(entries: &[Entry], parameter: &SharedParameter) -> Panel {
+fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
     // the first fit stands at the top, and an axis counts from the bottom
-    let having: Vec<(&Entry, &ParameterLine)> = entries
+    let having: Vec<(&ComparedFit, &ParameterLine)> = entries
         .iter()
         .zip(&parameter.lines)
         .rev()
         .filter_map(|(entry, line)| Some((entry, line.as_ref()?)))
         .collect();
-    let (log, low, high) = range(&having);
-    let label = if parameter.symbol.is_empty() { short(&parameter.name) } else { parameter.symbol.clone() };
+    let (log, low, high) = axis_range(&having);
+    let label =
+        if parameter.symbol.is_empty() { shorten_name(&parameter.name) } else { parameter.symbol.clone() };
     let label = if parameter.unit.is_empty() { label } else { format!("{label}, {}", parameter.unit) };
-    let x = if log { Axis::log(label) } else { Axis::linear(label) };
+    let x = if log { ChartAxis::log(label) } else { ChartAxis::linear(label) };
     let series = |(label, colour, mark, identified): &(&str, Colour, Mark, bool)| -> Vec<Series> {
         let of = having.iter().enumerate().filter(|(_, (_, line))| line.is_identified() == *identified);
         // a series each: the symbols of one would be joined
@@ -134,7 +136,7 @@ fn panel(entries: &[Entry], parameter: &SharedParameter) -> Panel {
             colour: *colour,
             mark: *mark,
             points: vec![Some((line.estimate, row as f64))],
-            bars: vec![bar(line, row as f64, (log, low, high))],
+            error_bars: vec![interval_bar(line, row as f64, (log, low, high))],
         })
         .collect()
     };
@@ -152,8 +154,8 @@ fn panel(entries: &[Entry], parameter: &SharedParameter) -> Panel {
     };
     Panel {
         title: parameter.name.clone(),
-        x: x.between(low, high),
-        y: Axis::named("", having.iter().map(|(entry, _)| entry.name.clone())),
+        x: x.with_range(low, high),
+        y: ChartAxis::categorical("", having.iter().map(|(entry, _)| entry.name.clone())),
         height_mm: (having.len() as f64 * ROW_MM).max(LEAST_HEIGHT_MM),
         series: LOOKS.iter().flat_map(series).chain(Some(truth).filter(|t| !t.points.is_empty())).collect(),
         ..Panel::default()
@@ -161,13 +163,13 @@ fn panel(entries: &[Entry], parameter: &SharedParameter) -> Panel {
 }
 
 /// The 95 % interval; an open end lies beyond the frame, which cuts it without a cap.
-fn bar(line: &ParameterLine, y: f64, (log, low, high): (bool, f64, f64)) -> Bar {
+fn interval_bar(line: &ParameterLine, y: f64, (log, low, high): (bool, f64, f64)) -> ErrorBar {
     let beyond = if log { (low / 10.0, high * 10.0) } else { (2.0 * low - high, 2.0 * high - low) };
-    Bar::Horizontal { y, from: line.lower_95.unwrap_or(beyond.0), to: line.upper_95.unwrap_or(beyond.1) }
+    ErrorBar::Horizontal { y, from: line.lower_95.unwrap_or(beyond.0), to: line.upper_95.unwrap_or(beyond.1) }
 }
 
 /// Whether the axis is logarithmic, and its ends: a little beyond every finite end, estimate and truth.
-fn range(having: &[(&Entry, &ParameterLine)]) -> (bool, f64, f64) {
+fn axis_range(having: &[(&ComparedFit, &ParameterLine)]) -> (bool, f64, f64) {
     let ends =
         having.iter().flat_map(|(_, p)| [Some(p.estimate), p.lower_95, p.upper_95, p.truth.map(|t| t.value)]);
     let (low, high) = ends
@@ -186,6 +188,6 @@ fn range(having: &[(&Entry, &ParameterLine)]) -> (bool, f64, f64) {
 }
 
 /// An estimate with its unit and interval, for the tables next to the figure.
-pub(super) fn estimate(line: &ParameterLine) -> [String; 2] {
-    [number(line.estimate), interval(line.lower_95, line.upper_95, number)]
+pub(super) fn estimate_text(line: &ParameterLine) -> [String; 2] {
+    [format_number(line.estimate), format_interval(line.lower_95, line.upper_95, format_number)]
 }

@@ -1,8 +1,8 @@
 //! Parameters of several fits side by side, and whether their intervals overlap.
 
-use super::fitted::Entry;
+use super::fitted::ComparedFit;
 use crate::compare::ParameterLine;
-use crate::fit::uncertainty::Verdict;
+use crate::fit::uncertainty::ParameterVerdict;
 use serde::Serialize;
 
 /// A parameter and what each fit knows of it.
@@ -17,22 +17,22 @@ pub struct SharedParameter {
     /// What each fit knows, in the order of the fits; `None` where it is not free there.
     pub lines: Vec<Option<ParameterLine>>,
     /// Every pair of fits that have it.
-    pub pairs: Vec<Pair>,
+    pub pairs: Vec<IntervalPair>,
 }
 
 /// Two fits and one parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Pair {
+pub struct IntervalPair {
     /// Names of the fits.
     pub fits: [String; 2],
     /// How their 95 % intervals lie.
-    pub relation: Relation,
+    pub relation: IntervalRelation,
 }
 
 /// How two 95 % intervals lie.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum Relation {
+pub enum IntervalRelation {
     /// They have no value in common.
     Disjoint,
     /// They have values in common, which does not show that the parameters are equal.
@@ -41,9 +41,9 @@ pub enum Relation {
     NotComparable,
 }
 
-impl Relation {
+impl IntervalRelation {
     /// In words.
-    pub(super) fn words(self) -> &'static str {
+    pub(super) fn describe(self) -> &'static str {
         match self {
             Self::Disjoint => "do not overlap",
             Self::Overlap => "overlap",
@@ -53,33 +53,34 @@ impl Relation {
 }
 
 /// Verdicts whose interval is one of the data: an open end reaches beyond every value.
-const COMPARABLE: [Verdict; 3] = [Verdict::Identified, Verdict::OpenBelow, Verdict::OpenAbove];
+const COMPARABLE_VERDICTS: [ParameterVerdict; 3] =
+    [ParameterVerdict::Identified, ParameterVerdict::OpenBelow, ParameterVerdict::OpenAbove];
 
 /// How the intervals of two estimates lie.
-pub(super) fn relation(a: &ParameterLine, b: &ParameterLine) -> Relation {
-    let comparable = |p: &ParameterLine| COMPARABLE.contains(&p.verdict);
+pub(super) fn interval_relation(a: &ParameterLine, b: &ParameterLine) -> IntervalRelation {
+    let comparable = |p: &ParameterLine| COMPARABLE_VERDICTS.contains(&p.verdict);
     let below = |a: &ParameterLine, b: &ParameterLine| {
         a.upper_95.zip(b.lower_95).is_some_and(|(upper, lower)| upper < lower)
     };
     match comparable(a) && comparable(b) {
-        false => Relation::NotComparable,
-        true if below(a, b) || below(b, a) => Relation::Disjoint,
-        true => Relation::Overlap,
+        false => IntervalRelation::NotComparable,
+        true if below(a, b) || below(b, a) => IntervalRelation::Disjoint,
+        true => IntervalRelation::Overlap,
     }
 }
 
 /// Every parameter of any fit, in the order in which they appear.
-pub(super) fn parameters(entries: &[Entry]) -> Vec<SharedParameter> {
+pub(super) fn shared_parameters(entries: &[ComparedFit]) -> Vec<SharedParameter> {
     let mut named: Vec<&ParameterLine> = Vec::new();
     for line in entries.iter().flat_map(|entry| &entry.report.parameters) {
         if !named.iter().any(|known| known.name == line.name) {
             named.push(line);
         }
     }
-    named.into_iter().map(|of| shared(of, entries)).collect()
+    named.into_iter().map(|of| shared_parameter(of, entries)).collect()
 }
 
-fn shared(of: &ParameterLine, entries: &[Entry]) -> SharedParameter {
+fn shared_parameter(of: &ParameterLine, entries: &[ComparedFit]) -> SharedParameter {
     let lines: Vec<Option<ParameterLine>> = entries
         .iter()
         .map(|entry| entry.report.parameters.iter().find(|p| p.name == of.name).cloned())
@@ -91,9 +92,9 @@ fn shared(of: &ParameterLine, entries: &[Entry]) -> SharedParameter {
         .collect();
     let pair = |(i, (name, a)): (usize, &(&str, &ParameterLine))| {
         let (name, a) = ((*name).to_owned(), (*a).clone());
-        let with = |(other, b): &(&str, &ParameterLine)| Pair {
+        let with = |(other, b): &(&str, &ParameterLine)| IntervalPair {
             fits: [name.clone(), (*other).to_owned()],
-            relation: relation(&a, b),
+            relation: interval_relation(&a, b),
         };
         having.iter().skip(i + 1).map(with).collect::<Vec<_>>()
     };

@@ -3,15 +3,15 @@
 
 mod panels;
 
-use super::fitted::Fitted;
+use super::fitted::ComparisonInput;
 use crate::chart::{FULL_WIDTH_MM, Figure};
-use crate::feature::{Band, Reading};
+use crate::feature::{FeatureBand, Reading};
 use crate::figures::{Drawing, FigureBlock, NO_TRACES, subtitle};
-use crate::fit::job::Aim;
+use crate::fit::job::FitTarget;
 use crate::recording::Recording;
-use crate::recording::channel::{Anchor, Channel, Instants, WindowEnd};
-use crate::spectrum::{self, Settings, Spectrum};
-use crate::text::{digits, listed, trimmed};
+use crate::recording::channel::{Channel, InstantKind, ReversalInstants, WindowEnd};
+use crate::spectrum::{self, Spectrum, SpectrumSettings};
+use crate::text::{format_digits, format_trimmed, join_with_and};
 
 const MICROMETRES: f64 = 1e6;
 
@@ -21,24 +21,24 @@ const MIXED: &str = "some recordings are synthetic: no camera took those marked 
 /// What the windows of a group have in common: the channel, at which instants they begin and end, and which
 /// one of its fit each is.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Kind {
+struct WindowKind {
     channel: Channel,
-    ends: [Option<Anchor>; 2],
+    ends: [Option<InstantKind>; 2],
     number: usize,
 }
 
 /// The component of a fit in a group.
-struct Member<'a> {
-    fitted: &'a Fitted<'a>,
-    aim: &'a Aim,
-    band: &'a Band,
-    kind: Kind,
+struct SpectrumGroupMember<'a> {
+    fitted: &'a ComparisonInput<'a>,
+    aim: &'a FitTarget,
+    band: &'a FeatureBand,
+    kind: WindowKind,
 }
 
 /// A figure for every kind of window that at least two fits have.
-pub(super) fn figures(fits: &[Fitted]) -> Vec<FigureBlock> {
-    let members: Vec<Member> = fits.iter().flat_map(members).collect();
-    let mut kinds: Vec<Kind> = Vec::new();
+pub(super) fn spectra_figures(fits: &[ComparisonInput]) -> Vec<FigureBlock> {
+    let members: Vec<SpectrumGroupMember> = fits.iter().flat_map(group_members).collect();
+    let mut kinds: Vec<WindowKind> = Vec::new();
     for member in &members {
         if !kinds.contains(&member.kind) {
             kinds.push(member.kind);
@@ -47,13 +47,13 @@ pub(super) fn figures(fits: &[Fitted]) -> Vec<FigureBlock> {
     let groups = kinds.into_iter().map(|kind| members.iter().filter(|m| m.kind == kind).collect::<Vec<_>>());
     groups
         .filter(|group| group.len() > 1)
-        .filter_map(|group| figure(&group))
+        .filter_map(|group| draw_figure(&group))
         .enumerate()
-        .map(|(i, f)| block(i, f))
+        .map(|(i, f)| figure_block(i, f))
         .collect()
 }
 
-fn block(index: usize, (figure, caption, details): (Figure, String, String)) -> FigureBlock {
+fn figure_block(index: usize, (figure, caption, details): (Figure, String, String)) -> FigureBlock {
     FigureBlock {
         condition: None,
         file: format!("spectra-{}.svg", index + 1),
@@ -64,37 +64,37 @@ fn block(index: usize, (figure, caption, details): (Figure, String, String)) -> 
 }
 
 /// The components of a fit; several windows of a kind are distinguished by their order.
-fn members<'a>(fitted: &'a Fitted<'a>) -> Vec<Member<'a>> {
+fn group_members<'a>(fitted: &'a ComparisonInput<'a>) -> Vec<SpectrumGroupMember<'a>> {
     let anchor = |end: WindowEnd| if let WindowEnd::Found { anchor, .. } = end { Some(anchor) } else { None };
-    let mut found: Vec<Member> = Vec::new();
-    for aim in &fitted.job.aims {
+    let mut found: Vec<SpectrumGroupMember> = Vec::new();
+    for aim in &fitted.job.targets {
         let Reading::Frequency(band) = &aim.feature.reading else { continue };
-        let kind = Kind {
+        let kind = WindowKind {
             channel: band.channel,
             ends: [anchor(band.window.from), anchor(band.window.to)],
             number: 0,
         };
-        let number = found.iter().filter(|m| m.kind == Kind { number: m.kind.number, ..kind }).count();
-        found.push(Member { fitted, aim, band, kind: Kind { number, ..kind } });
+        let number = found.iter().filter(|m| m.kind == WindowKind { number: m.kind.number, ..kind }).count();
+        found.push(SpectrumGroupMember { fitted, aim, band, kind: WindowKind { number, ..kind } });
     }
     found
 }
 
-fn analysed(band: &Band, recording: &Recording) -> Option<Spectrum> {
-    let frames = band.window.resolve(recording, &Instants::find(recording)).ok()?;
+fn window_spectrum(band: &FeatureBand, recording: &Recording) -> Option<Spectrum> {
+    let frames = band.window.resolve_frames(recording, &ReversalInstants::find_instants(recording)).ok()?;
     let samples = band.channel.samples(recording);
-    spectrum::analyse(
+    spectrum::analyse_spectrum(
         samples.get(frames)?,
         recording.grid().frame_rate_hz,
-        &Settings { detrend: Some(band.detrend), ..Settings::default() },
+        &SpectrumSettings { detrend: Some(band.detrend), ..SpectrumSettings::default() },
     )
     .ok()
 }
 
 /// Amplitude, um, over frequency, Hz.
-type Points = Vec<Option<(f64, f64)>>;
+type SpectrumPoints = Vec<Option<(f64, f64)>>;
 
-fn points(spectrum: &Spectrum) -> Points {
+fn spectrum_points(spectrum: &Spectrum) -> SpectrumPoints {
     spectrum
         .frequency_hz
         .iter()
@@ -103,17 +103,20 @@ fn points(spectrum: &Spectrum) -> Points {
         .collect()
 }
 
-impl<'a> Member<'a> {
-    fn measured(&self) -> Option<&'a Recording> {
+impl<'a> SpectrumGroupMember<'a> {
+    fn measured_recording(&self) -> Option<&'a Recording> {
         self.fitted.measured.get(self.aim.feature.condition).map(|m| m.recording)
     }
 
-    fn measured_spectrum(&self) -> Option<Points> {
-        Some(points(&analysed(self.band, self.measured()?)?))
+    fn measured_spectrum(&self) -> Option<SpectrumPoints> {
+        Some(spectrum_points(&window_spectrum(self.band, self.measured_recording()?)?))
     }
 
-    fn model_spectrum(&self) -> Option<Points> {
-        Some(points(&analysed(self.band, &self.fitted.best.get(self.aim.feature.condition)?.view.recording)?))
+    fn model_spectrum(&self) -> Option<SpectrumPoints> {
+        Some(spectrum_points(&window_spectrum(
+            self.band,
+            &self.fitted.best.get(self.aim.feature.condition)?.view.recording,
+        )?))
     }
 
     /// Target, or what was measured in its place.
@@ -134,7 +137,7 @@ impl<'a> Member<'a> {
         all.filter(|c| c.name == self.aim.feature.name).find_map(|c| c.model)
     }
 
-    fn says(&self) -> String {
+    fn describe(&self) -> String {
         let found = self
             .fitted
             .report
@@ -144,8 +147,9 @@ impl<'a> Member<'a> {
             .find(|c| c.name == self.aim.feature.name);
         let model = found
             .and_then(|c| c.model)
-            .map_or_else(|| "absent".to_owned(), |hz| format!("{} Hz", trimmed(hz, 4)));
-        let target = found.map_or_else(String::new, |c| format!(" (target {} Hz)", trimmed(c.target, 4)));
+            .map_or_else(|| "absent".to_owned(), |hz| format!("{} Hz", format_trimmed(hz, 4)));
+        let target =
+            found.map_or_else(String::new, |c| format!(" (target {} Hz)", format_trimmed(c.target, 4)));
         format!(
             "`{}` of `{}`, window {}: {model}{target}",
             self.aim.feature.name, self.fitted.name, self.band.window
@@ -154,36 +158,36 @@ impl<'a> Member<'a> {
 }
 
 /// The claim with its numbers: the frequencies of the models.
-fn claim(group: &[&Member], channel: &str) -> String {
-    let found: Vec<String> = group.iter().filter_map(|m| Some(digits(m.model_hz()?, 3))).collect();
+fn claim_sentence(group: &[&SpectrumGroupMember], channel: &str) -> String {
+    let found: Vec<String> = group.iter().filter_map(|m| Some(format_digits(m.model_hz()?, 3))).collect();
     if found.is_empty() {
         return format!("No model has the component that is sought in the {channel}");
     }
-    format!("The models have {} Hz in the {channel}", listed(&found))
+    format!("The models have {} Hz in the {channel}", join_with_and(&found))
 }
 
-fn figure(group: &[&Member]) -> Option<(Figure, String, String)> {
+fn draw_figure(group: &[&SpectrumGroupMember]) -> Option<(Figure, String, String)> {
     let channel = group.first()?.band.channel.label();
-    let panels = panels::of(group)?;
+    let panels = panels::draw_panels(group)?;
     let a_panel_each = if panels.len() > 1 { " A panel a fit, in the same axes." } else { "" };
-    let recordings = || group.iter().filter_map(|m| m.measured());
+    let recordings = || group.iter().filter_map(|m| m.measured_recording());
     let (synthetic, films) =
         (recordings().any(Recording::is_synthetic), recordings().any(|r| !r.is_synthetic()));
     let figure = Figure {
-        title: claim(group, &channel),
+        title: claim_sentence(group, &channel),
         subtitle: match (synthetic, films) {
             (true, true) => MIXED.to_owned(),
             (false, false) => NO_TRACES.to_owned(),
             _ => subtitle(synthetic, ""),
         },
-        synthetic,
+        watermarked: synthetic,
         description: format!("Amplitude spectra of the {channel} of several fits."),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
         panels,
     };
-    let says: Vec<String> = group.iter().map(|m| m.says()).collect();
-    let lone = if group.iter().any(|m| m.measured().is_none()) {
+    let says: Vec<String> = group.iter().map(|m| m.describe()).collect();
+    let lone = if group.iter().any(|m| m.measured_recording().is_none()) {
         " Fits to published numbers have no measured spectrum."
     } else {
         ""

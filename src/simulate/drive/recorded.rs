@@ -1,6 +1,6 @@
 //! The head's motion from a recording.
 
-use super::Spline;
+use super::HeadSpline;
 use crate::recording::Recording;
 
 /// Time over which frames are averaged before they are smoothed, and between knots of the spline, s. The
@@ -12,16 +12,16 @@ const FEWEST_FRAMES: usize = 10;
 
 /// Time at either end of a recording in which the acceleration of its head is less certain by a factor of
 /// ten, s: a run keeps away from it.
-pub const UNCERTAIN_S: f64 = 0.01;
+pub const UNCERTAIN_END_S: f64 = 0.01;
 /// Share of the greatest speed of a head from which a tip slides evenly enough for a run to start there.
-pub const EVEN: f64 = 0.2;
+pub const EVEN_SPEED_SHARE: f64 = 0.2;
 
 /// Steps in which an even motion is looked for, s.
-const STEP_S: f64 = 1e-3;
+const EVEN_SEARCH_STEP_S: f64 = 1e-3;
 
 /// Why a recording does not give the head's motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum HeadError {
+pub enum HeadMotionError {
     /// The head is tracked in too few frames.
     #[error(
         "found the head's x in {found} of {frames} frames of `{recording}`, expected it in at least {FEWEST_FRAMES}: track the head through the whole run"
@@ -38,11 +38,11 @@ pub enum HeadError {
 
 /// The head's `x` as a smooth curve through the frames in which it was tracked.
 ///
-/// [`Spline::covariance_times`] says how well it is known; less so within [`UNCERTAIN_S`] of either end.
+/// [`HeadSpline::covariance_times`] says how well it is known; less so within [`UNCERTAIN_END_S`] of either end.
 ///
 /// # Errors
-/// [`HeadError`] when the head is tracked in too few frames.
-pub fn head_motion(recording: &Recording) -> Result<Spline, HeadError> {
+/// [`HeadMotionError`] when the head is tracked in too few frames.
+pub fn smooth_head_motion(recording: &Recording) -> Result<HeadSpline, HeadMotionError> {
     let points: Vec<(usize, f64)> = recording
         .traces()
         .head_x_m
@@ -51,7 +51,7 @@ pub fn head_motion(recording: &Recording) -> Result<Spline, HeadError> {
         .filter_map(|(frame, x)| Some((frame, (*x)?)))
         .collect();
     if points.len() < FEWEST_FRAMES {
-        return Err(HeadError::Few {
+        return Err(HeadMotionError::Few {
             recording: recording.name().to_owned(),
             found: points.len(),
             frames: recording.grid().frames,
@@ -63,18 +63,18 @@ pub fn head_motion(recording: &Recording) -> Result<Spline, HeadError> {
     let block = if block < 3 || (last - first) / block < FEWEST_FRAMES { 1 } else { block };
     let knots: Vec<usize> =
         (first..last).step_by(block).filter(|knot| last - knot > block / 2).chain([last]).collect();
-    Ok(Spline::smoothed(&grid, &points, block, &knots))
+    Ok(HeadSpline::from_points(&grid, &points, block, &knots))
 }
 
 /// The first time at which a head moves fast enough for a run to start in steady slip, s, behind the
 /// uncertain start of its motion.
 #[must_use]
-pub fn even_from_s(motion: &Spline) -> f64 {
+pub fn even_motion_start_s(motion: &HeadSpline) -> f64 {
     let [first_s, last_s] = motion.span_s();
-    let count = ((last_s - first_s) / STEP_S) as usize;
-    let times = || (0..=count).map(|step| first_s + UNCERTAIN_S + step as f64 * STEP_S);
-    let times = || times().take_while(|time_s| *time_s < last_s - UNCERTAIN_S);
-    let speed = |time_s: f64| motion.at(time_s).velocity_m_per_s.abs();
+    let count = ((last_s - first_s) / EVEN_SEARCH_STEP_S) as usize;
+    let times = || (0..=count).map(|step| first_s + UNCERTAIN_END_S + step as f64 * EVEN_SEARCH_STEP_S);
+    let times = || times().take_while(|time_s| *time_s < last_s - UNCERTAIN_END_S);
+    let speed = |time_s: f64| motion.motion_at(time_s).velocity_m_per_s.abs();
     let greatest = times().map(speed).fold(0.0, f64::max);
-    times().find(|time_s| speed(*time_s) >= EVEN * greatest).unwrap_or(last_s)
+    times().find(|time_s| speed(*time_s) >= EVEN_SPEED_SHARE * greatest).unwrap_or(last_s)
 }

@@ -17,9 +17,9 @@ use nalgebra::{DMatrix, DVector};
 /// Degree of the pieces.
 const DEGREE: usize = 5;
 /// Values of B-splines that are not zero in a piece.
-const LIVE: usize = DEGREE + 1;
+const SUPPORT: usize = DEGREE + 1;
 /// The same over two pieces: a block may lie across a knot.
-const ACROSS: usize = LIVE + 1;
+const BLOCK_WIDTH: usize = SUPPORT + 1;
 /// Weight of the third differences of the coefficients against that of a block: it decides where a gap
 /// leaves a piece without points, and nothing else.
 const BRIDGE: f64 = 1e-7;
@@ -28,54 +28,56 @@ const CAUTION: f64 = 1.4;
 /// Blocks a piece, at least.
 const BLOCKS_A_PIECE: f64 = 2.0;
 /// Factor between numbers of pieces that are tried.
-const LADDER: f64 = 1.25;
+const PIECE_RATIO: f64 = 1.25;
 
 /// A curve.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Smoothing {
-    span: Span,
+pub(super) struct SmoothingSpline {
+    span: FrameSpan,
     /// Polynomial over the whole span, lowest coefficient first, to which the spline adds.
-    trend: [f64; LIVE],
+    trend: [f64; SUPPORT],
     pieces: usize,
     coefficients: Vec<f64>,
     /// Factor of the information of the coefficients, a frame's noise being 1.
-    information: Factor,
+    information: CholeskyFactor,
     /// Variance of a frame's noise by the scatter of the blocks, m2.
     variance_m2: f64,
 }
 
 /// First and last frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
-struct Span(f64, f64);
+struct FrameSpan(f64, f64);
 
 /// Frames whose mean is one datum.
-struct Block<'a> {
+struct FrameBlock<'a> {
     frames: &'a [usize],
     /// Mean position above the trend, m.
     mean: f64,
 }
 
 /// The curve through positions, m, at rising frames, at least three, in blocks of `length` frames.
-pub(super) fn smooth(frames: &[usize], positions: &[f64], length: usize) -> Smoothing {
-    let span = Span(frames[0] as f64, frames[frames.len() - 1] as f64);
-    let trend = trend(frames, positions, span);
-    let blocks = blocks(frames, positions, length, |frame| polynomial(&trend, span.place(frame)));
+pub(super) fn fit_smoothing_spline(frames: &[usize], positions: &[f64], length: usize) -> SmoothingSpline {
+    let span = FrameSpan(frames[0] as f64, frames[frames.len() - 1] as f64);
+    let trend = fit_trend(frames, positions, span);
+    let blocks = average_blocks(frames, positions, length, |frame| {
+        evaluate_polynomial(&trend, span.to_unit_interval(frame))
+    });
     let most = ((blocks.len() as f64 / BLOCKS_A_PIECE) as usize).max(1);
-    let ladder = std::iter::successors(Some(1), |&n| Some(((LADDER * n as f64) as usize).max(n + 1)));
+    let ladder = std::iter::successors(Some(1), |&n| Some(((PIECE_RATIO * n as f64) as usize).max(n + 1)));
     let tried = ladder
         .take_while(|pieces| *pieces <= most)
-        .map(|pieces| Smoothing::fitted(span, trend, pieces, &blocks));
+        .map(|pieces| SmoothingSpline::fit_pieces(span, trend, pieces, &blocks));
     let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
     // (one piece is always tried)
     best.map_or_else(|| unreachable!("no curve"), |(_, curve)| curve)
 }
 
-fn blocks<'a>(
+fn average_blocks<'a>(
     frames: &'a [usize],
     positions: &[f64],
     length: usize,
     trend: impl Fn(f64) -> f64,
-) -> Vec<Block<'a>> {
+) -> Vec<FrameBlock<'a>> {
     let number = |at: usize| (frames[at] - frames[0]) / length;
     let mut blocks = Vec::new();
     let mut from = 0;
@@ -83,28 +85,29 @@ fn blocks<'a>(
         let count = frames[from..].partition_point(|frame| (frame - frames[0]) / length == number(from));
         let here = from..from + count;
         let above = here.clone().map(|at| positions[at] - trend(frames[at] as f64));
-        blocks.push(Block { mean: above.sum::<f64>() / count as f64, frames: &frames[here] });
+        blocks.push(FrameBlock { mean: above.sum::<f64>() / count as f64, frames: &frames[here] });
         from += count;
     }
     blocks
 }
 
-impl Span {
+impl FrameSpan {
     /// Place of a frame on [-1, 1].
-    fn place(self, frame: f64) -> f64 {
+    fn to_unit_interval(self, frame: f64) -> f64 {
         2.0 * (frame - self.0) / (self.1 - self.0) - 1.0
     }
 }
 
-fn polynomial(coefficients: &[f64], x: f64) -> f64 {
+fn evaluate_polynomial(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
 /// The polynomial through all points that is nearest to them; of lower degree where they are few.
-fn trend(frames: &[usize], positions: &[f64], span: Span) -> [f64; LIVE] {
-    let terms = LIVE.min(frames.len());
-    let powers =
-        DMatrix::from_fn(frames.len(), terms, |row, k| math::powi(span.place(frames[row] as f64), k as i32));
+fn fit_trend(frames: &[usize], positions: &[f64], span: FrameSpan) -> [f64; SUPPORT] {
+    let terms = SUPPORT.min(frames.len());
+    let powers = DMatrix::from_fn(frames.len(), terms, |row, k| {
+        math::powi(span.to_unit_interval(frames[row] as f64), k as i32)
+    });
     let factors = powers.col_piv_qr();
     let mut right = factors.q().tr_mul(&DVector::from_column_slice(positions));
     let solved = factors.r().solve_upper_triangular_mut(&mut right);
@@ -112,25 +115,26 @@ fn trend(frames: &[usize], positions: &[f64], span: Span) -> [f64; LIVE] {
     std::array::from_fn(|k| right.get(k).copied().filter(|_| solved).unwrap_or(0.0))
 }
 
-impl Smoothing {
+impl SmoothingSpline {
     /// Position at a frame, m.
     pub fn position(&self, frame: f64) -> f64 {
-        let (piece, x) = self.piece(frame);
-        let above: f64 = dot(&b_splines::<LIVE>(x), &self.coefficients[piece..]);
-        above + polynomial(&self.trend, self.span.place(frame))
+        let (piece, x) = self.piece_at(frame);
+        let above: f64 = dot(&b_splines::<SUPPORT>(x), &self.coefficients[piece..]);
+        above + evaluate_polynomial(&self.trend, self.span.to_unit_interval(frame))
     }
 
     /// Second derivative at a frame, m/frame2.
     pub fn curvature(&self, frame: f64) -> f64 {
-        let (piece, x) = self.piece(frame);
-        let seconds: [f64; LIVE - 2] = std::array::from_fn(|k| {
+        let (piece, x) = self.piece_at(frame);
+        let seconds: [f64; SUPPORT - 2] = std::array::from_fn(|k| {
             let c = &self.coefficients[piece + k..];
             c[0] - 2.0 * c[1] + c[2]
         });
-        let above = dot(&b_splines::<{ LIVE - 2 }>(x), &seconds) * math::powi(self.per_frame(), 2);
-        let trend: [f64; LIVE - 2] = std::array::from_fn(|k| ((k + 1) * (k + 2)) as f64 * self.trend[k + 2]);
+        let above = dot(&b_splines::<{ SUPPORT - 2 }>(x), &seconds) * math::powi(self.per_frame(), 2);
+        let trend: [f64; SUPPORT - 2] =
+            std::array::from_fn(|k| ((k + 1) * (k + 2)) as f64 * self.trend[k + 2]);
         let per_frame = 2.0 / (self.span.1 - self.span.0);
-        above + polynomial(&trend, self.span.place(frame)) * per_frame * per_frame
+        above + evaluate_polynomial(&trend, self.span.to_unit_interval(frame)) * per_frame * per_frame
     }
 
     fn per_frame(&self) -> f64 {
@@ -138,31 +142,37 @@ impl Smoothing {
     }
 
     /// The piece in which a frame lies, and where in it.
-    fn piece(&self, frame: f64) -> (usize, f64) {
+    fn piece_at(&self, frame: f64) -> (usize, f64) {
         let x = (frame - self.span.0) * self.per_frame();
         let piece = (x as usize).min(self.pieces - 1);
         (piece, x - piece as f64)
     }
 
     /// The curve of least squares with its score.
-    fn fitted(span: Span, trend: [f64; LIVE], pieces: usize, blocks: &[Block<'_>]) -> (f64, Self) {
+    fn fit_pieces(
+        span: FrameSpan,
+        trend: [f64; SUPPORT],
+        pieces: usize,
+        blocks: &[FrameBlock<'_>],
+    ) -> (f64, Self) {
         let count = pieces + DEGREE;
-        let information = Factor(Vec::new());
+        let information = CholeskyFactor(Vec::new());
         let coefficients = Vec::new();
         let mut curve = Self { span, trend, pieces, coefficients, information, variance_m2: 0.0 };
-        let rows: Vec<(usize, [f64; ACROSS])> = blocks.iter().map(|block| curve.row(block)).collect();
-        let mut normal = Banded::new(count);
+        let rows: Vec<(usize, [f64; BLOCK_WIDTH])> =
+            blocks.iter().map(|block| curve.block_row(block)).collect();
+        let mut normal = BandedMatrix::new(count);
         let mut right = vec![0.0; count];
         for ((from, row), block) in rows.iter().zip(blocks) {
             let weight = block.frames.len() as f64;
-            normal.add(*from, row, weight);
+            normal.add_outer_product(*from, row, weight);
             right[*from..].iter_mut().zip(row).for_each(|(sum, b)| *sum += weight * b * block.mean);
         }
         for from in 0..count - 3 {
-            normal.add(from, &[-1.0, 3.0, -3.0, 1.0], BRIDGE * blocks[0].frames.len() as f64);
+            normal.add_outer_product(from, &[-1.0, 3.0, -3.0, 1.0], BRIDGE * blocks[0].frames.len() as f64);
         }
-        curve.information = normal.factor();
-        curve.information.solve(&mut right);
+        curve.information = normal.factorise();
+        curve.information.solve_in_place(&mut right);
         curve.coefficients = right;
         let squares: f64 = rows
             .iter()
@@ -179,30 +189,30 @@ impl Smoothing {
     }
 
     /// Number of coefficients.
-    pub fn count(&self) -> usize {
+    pub fn coefficient_count(&self) -> usize {
         self.coefficients.len()
     }
 
     /// How the position at a frame depends on the coefficients: the first that counts, and its weight and
     /// those of the next.
-    pub fn weights(&self, frame: f64) -> (usize, [f64; LIVE]) {
-        let (piece, x) = self.piece(frame);
+    pub fn position_weights(&self, frame: f64) -> (usize, [f64; SUPPORT]) {
+        let (piece, x) = self.piece_at(frame);
         (piece, b_splines(x))
     }
 
     /// The covariance of the coefficients, m2, times a row of them.
-    pub fn covariance_times(&self, row: &mut [f64]) {
-        self.information.solve(row);
+    pub fn multiply_covariance(&self, row: &mut [f64]) {
+        self.information.solve_in_place(row);
         row.iter_mut().for_each(|x| *x *= self.variance_m2);
     }
 
     /// Mean of the B-splines over a block: the first that is not zero, and the values from there.
-    fn row(&self, block: &Block<'_>) -> (usize, [f64; ACROSS]) {
-        let (from, _) = self.piece(block.frames[0] as f64);
-        let mut row = [0.0; ACROSS];
+    fn block_row(&self, block: &FrameBlock<'_>) -> (usize, [f64; BLOCK_WIDTH]) {
+        let (from, _) = self.piece_at(block.frames[0] as f64);
+        let mut row = [0.0; BLOCK_WIDTH];
         for &frame in block.frames {
-            let (piece, x) = self.piece(frame as f64);
-            let values = b_splines::<LIVE>(x);
+            let (piece, x) = self.piece_at(frame as f64);
+            let values = b_splines::<SUPPORT>(x);
             row[piece - from..].iter_mut().zip(values).for_each(|(sum, b)| *sum += b);
         }
         (from, row.map(|sum| sum / block.frames.len() as f64))
@@ -232,15 +242,15 @@ fn b_splines<const N: usize>(x: f64) -> [f64; N] {
 }
 
 /// A symmetric positive matrix with few diagonals: of each column the elements from the main diagonal down.
-struct Banded(Vec<[f64; ACROSS]>);
+struct BandedMatrix(Vec<[f64; BLOCK_WIDTH]>);
 
-impl Banded {
+impl BandedMatrix {
     fn new(count: usize) -> Self {
-        Self(vec![[0.0; ACROSS]; count])
+        Self(vec![[0.0; BLOCK_WIDTH]; count])
     }
 
     /// Adds `weight row row^T`, the row's first element at column `from`.
-    fn add(&mut self, from: usize, row: &[f64], weight: f64) {
+    fn add_outer_product(&mut self, from: usize, row: &[f64], weight: f64) {
         for (a, left) in row.iter().enumerate().filter(|(_, left)| **left != 0.0) {
             for (b, right) in row[a..].iter().enumerate() {
                 self.0[from + a][b] += weight * left * right;
@@ -249,29 +259,29 @@ impl Banded {
     }
 
     /// The factor of Cholesky.
-    fn factor(mut self) -> Factor {
+    fn factorise(mut self) -> CholeskyFactor {
         let count = self.0.len();
         for j in 0..count {
             let root = self.0[j][0].max(f64::MIN_POSITIVE).sqrt();
             self.0[j].iter_mut().for_each(|x| *x /= root);
             let column = self.0[j];
-            for a in (1..ACROSS).take_while(|a| j + a < count) {
-                for b in a..ACROSS {
+            for a in (1..BLOCK_WIDTH).take_while(|a| j + a < count) {
+                for b in a..BLOCK_WIDTH {
                     self.0[j + a][b - a] -= column[a] * column[b];
                 }
             }
         }
-        Factor(self.0)
+        CholeskyFactor(self.0)
     }
 }
 
 /// The lower factor of a matrix with few diagonals, likewise by columns.
 #[derive(Debug, Clone, PartialEq)]
-struct Factor(Vec<[f64; ACROSS]>);
+struct CholeskyFactor(Vec<[f64; BLOCK_WIDTH]>);
 
-impl Factor {
+impl CholeskyFactor {
     /// Puts the solution in place of the right-hand side.
-    fn solve(&self, right: &mut [f64]) {
+    fn solve_in_place(&self, right: &mut [f64]) {
         for (j, column) in self.0.iter().enumerate() {
             right[j] /= column[0];
             let solved = right[j];

@@ -1,6 +1,6 @@
 //! A C2 piecewise cubic over the frames of a recording.
 
-use super::smoothing::{Smoothing, smooth};
+use super::smoothing::{SmoothingSpline, fit_smoothing_spline};
 use crate::blade::HeadMotion;
 use crate::math;
 use crate::recording::FrameGrid;
@@ -14,7 +14,7 @@ pub(super) const NEAR_FRAMES: f64 = 1e-6;
 /// Position of the head as cubics between knots; position, velocity and acceleration are continuous, the
 /// third derivative jumps at knots. Before the first and after the last knot the outermost cubics go on.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Spline {
+pub struct HeadSpline {
     grid: FrameGrid,
     first_frame: usize,
     knots_s: Vec<f64>,
@@ -24,25 +24,30 @@ pub struct Spline {
     piece_of_frame: Vec<usize>,
     /// The curve that the cubics follow, where they were smoothed.
     #[serde(skip)]
-    curve: Option<Arc<Smoothing>>,
+    curve: Option<Arc<SmoothingSpline>>,
 }
 
-impl Spline {
+impl HeadSpline {
     /// The smooth curve through points given as frame of `grid` and position, m, the frames rising, at least
     /// three of them, each `block` frames counting by their mean: a cubic spline through its places at the
     /// frames `knots`.
     #[must_use]
-    pub(super) fn smoothed(grid: &FrameGrid, points: &[(usize, f64)], block: usize, knots: &[usize]) -> Self {
+    pub(super) fn from_points(
+        grid: &FrameGrid,
+        points: &[(usize, f64)],
+        block: usize,
+        knots: &[usize],
+    ) -> Self {
         let (frames, positions): (Vec<usize>, Vec<f64>) = points.iter().copied().unzip();
-        let curve = smooth(&frames, &positions, block);
+        let curve = fit_smoothing_spline(&frames, &positions, block);
         let places: Vec<f64> = knots.iter().map(|&frame| curve.position(frame as f64)).collect();
         let ends = [knots[0], knots[knots.len() - 1]].map(|frame| curve.curvature(frame as f64));
-        Self { curve: Some(Arc::new(curve)), ..Self::through(grid, knots, &places, ends) }
+        Self { curve: Some(Arc::new(curve)), ..Self::interpolate_positions(grid, knots, &places, ends) }
     }
 
     /// The cubic spline through positions, m, with given second derivatives at the ends, m/frame2.
-    fn through(grid: &FrameGrid, frames: &[usize], positions: &[f64], ends: [f64; 2]) -> Self {
-        let curvatures = curvatures(frames, positions, ends);
+    fn interpolate_positions(grid: &FrameGrid, frames: &[usize], positions: &[f64], ends: [f64; 2]) -> Self {
+        let curvatures = solve_curvatures(frames, positions, ends);
         let knots_s: Vec<f64> = frames.iter().map(|&frame| grid.time_s(frame)).collect();
         let per_frame =
             [1.0, grid.frame_rate_hz, math::powi(grid.frame_rate_hz, 2), math::powi(grid.frame_rate_hz, 3)];
@@ -62,28 +67,28 @@ impl Spline {
 
     /// The same motion with every length multiplied by `factor`.
     #[must_use]
-    pub(super) fn scaled(&self, factor: f64) -> Self {
+    pub(super) fn scale_lengths(&self, factor: f64) -> Self {
         let pieces = self.pieces.iter().map(|piece| piece.map(|c| factor * c)).collect();
         Self { pieces, ..self.clone() }
     }
 
     /// Number of coefficients of the smooth curve; 0 where nothing was smoothed.
     #[must_use]
-    pub fn coefficients(&self) -> usize {
-        self.curve.as_ref().map_or(0, |curve| curve.count())
+    pub fn coefficient_count(&self) -> usize {
+        self.curve.as_ref().map_or(0, |curve| curve.coefficient_count())
     }
 
     /// How the position at a frame depends on the coefficients: the first that counts, and its weight and
     /// those of the next.
     #[must_use]
-    pub fn weights(&self, frame: usize) -> (usize, [f64; 6]) {
-        self.curve.as_ref().map_or((0, [0.0; 6]), |curve| curve.weights(frame as f64))
+    pub fn position_weights(&self, frame: usize) -> (usize, [f64; 6]) {
+        self.curve.as_ref().map_or((0, [0.0; 6]), |curve| curve.position_weights(frame as f64))
     }
 
     /// Puts the covariance of the coefficients, m2, times a row of them in place of the row.
-    pub fn covariance_times(&self, row: &mut [f64]) {
+    pub fn multiply_covariance(&self, row: &mut [f64]) {
         if let Some(curve) = &self.curve {
-            curve.covariance_times(row);
+            curve.multiply_covariance(row);
         }
     }
 
@@ -103,8 +108,8 @@ impl Spline {
     /// Motion of the head at time `t`, s.
     #[inline]
     #[must_use]
-    pub fn at(&self, t: f64) -> HeadMotion {
-        let ([a, b, c, d], x) = self.piece(t);
+    pub fn motion_at(&self, t: f64) -> HeadMotion {
+        let ([a, b, c, d], x) = self.piece_at(t);
         HeadMotion {
             position_m: a + x * (b + x * (c + x * d)),
             velocity_m_per_s: b + x * (2.0 * c + x * 3.0 * d),
@@ -115,26 +120,26 @@ impl Spline {
     /// Taylor coefficients of the velocity about `t` within its piece; higher ones are zero.
     #[inline]
     pub(super) fn velocity_series(&self, t: f64) -> [f64; 3] {
-        let ([_, b, c, d], x) = self.piece(t);
+        let ([_, b, c, d], x) = self.piece_at(t);
         [b + x * (2.0 * c + x * 3.0 * d), 2.0 * c + 6.0 * d * x, 3.0 * d]
     }
 
     /// The first knot after `t`, s; `None` from the last piece's end on.
     #[inline]
     pub(super) fn next_knot_s(&self, t: f64) -> Option<f64> {
-        let next = self.knots_s[self.index(t) + 1];
+        let next = self.knots_s[self.piece_index(t) + 1];
         (next > t).then_some(next)
     }
 
     /// Coefficients of the piece at `t` and the time since it started.
     #[inline]
-    fn piece(&self, t: f64) -> (&[f64; 4], f64) {
-        let index = self.index(t);
+    fn piece_at(&self, t: f64) -> (&[f64; 4], f64) {
+        let index = self.piece_index(t);
         (&self.pieces[index], t - self.knots_s[index])
     }
 
     #[inline]
-    fn index(&self, t: f64) -> usize {
+    fn piece_index(&self, t: f64) -> usize {
         let frame = (t - self.grid.start_s) * self.grid.frame_rate_hz + NEAR_FRAMES - self.first_frame as f64;
         // (a negative number becomes 0)
         self.piece_of_frame[(frame as usize).min(self.piece_of_frame.len() - 1)]
@@ -142,7 +147,7 @@ impl Spline {
 }
 
 /// Second derivatives of the cubic spline through positions, those at the ends given.
-fn curvatures(frames: &[usize], positions: &[f64], [first, last]: [f64; 2]) -> Vec<f64> {
+fn solve_curvatures(frames: &[usize], positions: &[f64], [first, last]: [f64; 2]) -> Vec<f64> {
     let h = |i: usize| (frames[i + 1] - frames[i]) as f64;
     let slope = |i: usize| (positions[i + 1] - positions[i]) / h(i);
     let count = frames.len();
@@ -174,9 +179,9 @@ mod tests {
         (0..GRID.frames).map(|i| (i, motion(GRID.time_s(i)))).collect()
     }
 
-    fn smoothed(points: &[(usize, f64)]) -> Spline {
+    fn smoothed(points: &[(usize, f64)]) -> HeadSpline {
         let knots: Vec<usize> = points.iter().map(|point| point.0).collect();
-        Spline::smoothed(&GRID, points, 1, &knots)
+        HeadSpline::from_points(&GRID, points, 1, &knots)
     }
 
     /// A cubic is a spline of any number of pieces, gaps or not.
@@ -195,7 +200,7 @@ mod tests {
         let mut worst = [0.0f64; 3];
         for i in 0..=1000 {
             let t = 0.25 + 0.2 * f64::from(i) / 1000.0;
-            let (found, exact) = (spline.at(t), exact(t));
+            let (found, exact) = (spline.motion_at(t), exact(t));
             let found = [found.position_m, found.velocity_m_per_s, found.acceleration_m_per_s2];
             worst = std::array::from_fn(|k| worst[k].max((found[k] - exact[k]).abs()));
         }
@@ -215,10 +220,10 @@ mod tests {
         let points: Vec<(usize, f64)> =
             all(bump).into_iter().filter(|(i, _)| ![36, 47, 48, 61].contains(i)).collect();
         let (frames, positions): (Vec<usize>, Vec<f64>) = points.into_iter().unzip();
-        let spline = Spline::through(&GRID, &frames, &positions, [0.0; 2]);
+        let spline = HeadSpline::interpolate_positions(&GRID, &frames, &positions, [0.0; 2]);
         for i in 0..=1000 {
             let t = 0.25 + 0.2 * f64::from(i) / 1000.0;
-            let error = spline.at(t).position_m - bump(t);
+            let error = spline.motion_at(t).position_m - bump(t);
             assert!(error.abs() < 1e-13, "at {t}: {error:e}");
         }
     }
@@ -229,7 +234,7 @@ mod tests {
         let spline = smoothed(&all(noisy));
         for knot in 1..100 {
             let t = GRID.time_s(knot);
-            let (before, after) = (spline.at(t - 2.1e-6 / 500.0), spline.at(t));
+            let (before, after) = (spline.motion_at(t - 2.1e-6 / 500.0), spline.motion_at(t));
             let moved = 2.1e-6 / 500.0 * after.velocity_m_per_s;
             assert!((after.position_m - before.position_m - moved).abs() < 1e-15);
             assert!((after.velocity_m_per_s - before.velocity_m_per_s).abs() < 1e-7);

@@ -1,51 +1,55 @@
 //! Off the glass and back: lift-off, flight, landing, and the impact without collision that resolves the
 //! Painlevé paradox.
 
-use super::{Before, Machine, Next, Strike, Watch, integrate};
-use crate::blade::flight::Airborne;
-use crate::blade::shoulder::Lean;
-use crate::blade::{Directions, Pose};
-use crate::ode::{self, Cause as Ended, Start};
-use crate::simulate::flight::{Flight, LANDS, airborne_of, states_of};
-use crate::simulate::impact::{Origin, Outcome, TipVelocity};
-use crate::simulate::mode::Mode;
+use super::{EventLoop, NextPhase, PendingTransition, RunWatcher, TipStrike, integrate_phase};
+use crate::blade::flight::FlightState;
+use crate::blade::shoulder::ShoulderContact;
+use crate::blade::{LinkDirections, Pose};
+use crate::ode::{self, PhaseEndCause as Ended, PhaseStart};
+use crate::simulate::flight::{FlightPhase, LANDING, flight_state_from, flight_state_vector};
+use crate::simulate::impact::{ImpactOrigin, ImpactOutcome, TipVelocity};
+use crate::simulate::mode::TipMode;
 use crate::simulate::phases::{GUARDS, LEVEL_GUARDS};
-use crate::simulate::piece::{Piece, Solution};
-use crate::simulate::scene::{Jam, Loss};
-use crate::simulate::{Cause, Impact, Run, Status};
+use crate::simulate::piece::{SegmentSolution, SolutionSegment};
+use crate::simulate::scene::{ContactLossRule, JamRule};
+use crate::simulate::{Impact, RunResult, RunStatus, TransitionCause};
 
-impl<W: Watch> Machine<'_, W> {
+impl<W: RunWatcher> EventLoop<'_, W> {
     /// A run that starts off the glass.
-    pub(in crate::simulate) fn run_airborne(&mut self, state: &Airborne, stop: f64) -> Run {
-        self.lean = self.system.linkage.shoulder.map_or(Lean::Off, |s| s.lean(state.pose.theta));
+    pub(in crate::simulate) fn run_from_flight(&mut self, state: &FlightState, stop: f64) -> RunResult {
+        self.lean =
+            self.system.linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(state.pose.theta));
         let mut zero_order = [0; GUARDS];
-        zero_order[LANDS] = if state.gap_m > 0.0 { 0 } else { self.order_of_gap(state) };
-        self.follow(Next::Flight(*state, zero_order), stop)
+        zero_order[LANDING] = if state.gap_m > 0.0 { 0 } else { self.gap_order(state) };
+        self.run_phases(NextPhase::Flight(*state, zero_order), stop)
     }
 
     /// The normal force has reached zero.
-    pub(super) fn lose_contact(&mut self, pose: &Pose, before: Before) -> Next {
-        self.leave(Airborne { pose: *pose, gap_m: 0.0, gap_rate_m_per_s: 0.0 }, before)
+    pub(super) fn lose_contact(&mut self, pose: &Pose, before: PendingTransition) -> NextPhase {
+        self.lift_off(FlightState { pose: *pose, gap_m: 0.0, gap_rate_m_per_s: 0.0 }, before)
     }
 
-    fn leave(&mut self, state: Airborne, before: Before) -> Next {
-        if self.rules.loss == Loss::Stop {
-            return Next::End(Status::ContactLost);
+    fn lift_off(&mut self, state: FlightState, before: PendingTransition) -> NextPhase {
+        if self.rules.loss == ContactLossRule::Stop {
+            return NextPhase::End(RunStatus::ContactLost);
         }
         if let Some((from, cause)) = before {
             if cause.is_none() {
-                self.recent.note(self.t); // impacts have noted themselves
+                self.recent.note_event(self.t); // impacts have noted themselves
             }
-            self.change(from, Mode::Flight, cause.unwrap_or(Cause::LiftOff));
+            self.record_transition(from, TipMode::Flight, cause.unwrap_or(TransitionCause::LiftOff));
         }
         let mut zero_order = [0; GUARDS];
-        zero_order[LANDS] = self.order_of_gap(&state);
-        Next::Flight(state, zero_order)
+        zero_order[LANDING] = self.gap_order(&state);
+        NextPhase::Flight(state, zero_order)
     }
 
-    fn gap_acceleration(&self, t: f64, state: &Airborne) -> f64 {
-        let d = Directions::of(&state.pose);
-        self.system.linkage.flight(state, &d, &self.system.drive.at(t), self.lean).gap_m_per_s2
+    fn gap_acceleration(&self, t: f64, state: &FlightState) -> f64 {
+        let d = LinkDirections::from_pose(&state.pose);
+        self.system
+            .linkage
+            .flight_accelerations(state, &d, &self.system.drive.motion_at(t), self.lean)
+            .gap_m_per_s2
     }
 
     /// Order of the gap's zero at lift-off: 1 after a rebound, 2 where forces have jumped, 3 where the normal
@@ -53,18 +57,18 @@ impl<W: Watch> Machine<'_, W> {
     /// solution: the order of the term that counts most over a short time. Only a rebound that falls back
     /// needs its order independent of the others; a term of lower order that is left over and positive makes
     /// the gap clearer, not less clear.
-    fn order_of_gap(&self, state: &Airborne) -> u8 {
+    fn gap_order(&self, state: &FlightState) -> u8 {
         /// The short time, as a share of the shortest period.
         const SHARE: f64 = 1e-3;
         let time = SHARE * self.shortest_period_s;
-        let rates = ode::Phase::derivative(
-            &Flight { system: self.system, lean: self.lean },
+        let rates = ode::HybridPhase::derivative(
+            &FlightPhase { system: self.system, lean: self.lean },
             self.t,
-            &states_of(state),
+            &flight_state_vector(state),
         );
-        let (mut ahead, now) = (states_of(state), rates[5]);
+        let (mut ahead, now) = (flight_state_vector(state), rates[5]);
         ahead.iter_mut().zip(rates).for_each(|(y, rate)| *y += time * rate);
-        let change = self.gap_acceleration(self.t + time, &airborne_of(&ahead)) - now;
+        let change = self.gap_acceleration(self.t + time, &flight_state_from(&ahead)) - now;
         let [first, second, third] = [state.gap_rate_m_per_s, 0.5 * now * time, change * time / 6.0];
         match () {
             () if first > 0.0 && (now < 0.0 || first > second.max(third)) => 1,
@@ -74,15 +78,25 @@ impl<W: Watch> Machine<'_, W> {
         }
     }
 
-    pub(super) fn flight(&mut self, state: &Airborne, zero_order: [u8; GUARDS], stop: f64) -> Next {
-        let phase = Flight { system: self.system, lean: self.lean };
+    pub(super) fn integrate_flight(
+        &mut self,
+        state: &FlightState,
+        zero_order: [u8; GUARDS],
+        stop: f64,
+    ) -> NextPhase {
+        let phase = FlightPhase { system: self.system, lean: self.lean };
         /// A little more than a rebound lasts, so that one step holds its end.
         const MARGIN: f64 = 1.25;
         let (started, rebound) = (self.t, self.rebound_s(state).map(|time| MARGIN * time));
         // (the steps of rebounds are no measure for a flight that begins with the gap's acceleration at zero)
-        let start = Start { t: self.t, y: states_of(state), zero_order, step: rebound.or(self.steps[2]) };
+        let start = PhaseStart {
+            t: self.t,
+            y: flight_state_vector(state),
+            zero_order,
+            step: rebound.or(self.steps[2]),
+        };
         let (watch, drive) = (&mut *self.watch, &self.system.drive);
-        let end = integrate(
+        let end = integrate_phase(
             &phase,
             start,
             |t| drive.horizon(t, stop),
@@ -90,91 +104,98 @@ impl<W: Watch> Machine<'_, W> {
             &mut self.rooms.2,
             &mut self.work,
             |step, motion| {
-                watch.piece(&Piece {
+                watch.watch_segment(&SolutionSegment {
                     start_s: step.start,
                     end_s: step.end,
-                    mode: Mode::Flight,
+                    mode: TipMode::Flight,
                     motion,
-                    solution: Solution::Flight(&phase, step),
+                    solution: SegmentSolution::Flight(&phase, step),
                 });
-                watch.flow()
+                watch.control_flow()
             },
         );
         self.t = end.t;
         if rebound.is_none() {
             self.steps[2] = Some(end.first_step);
         }
-        let state = airborne_of(&end.y);
+        let state = flight_state_from(&end.y);
         if let Ended::Guard(guard) = end.cause {
-            self.watch.fell(guard, &self.rooms.2.tape);
+            self.watch.watch_guard(guard, &self.rooms.2.tape);
         }
         match end.cause {
-            Ended::Stop => Next::End(Status::Completed),
-            Ended::Asked => Next::End(Status::Interrupted),
-            Ended::StepTooSmall => Next::End(self.gave_up()),
-            Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => Next::End(Status::Diverged),
-            Ended::Guard(LANDS) => self.land(&state),
+            Ended::Stop => NextPhase::End(RunStatus::Completed),
+            Ended::Interrupted => NextPhase::End(RunStatus::Interrupted),
+            Ended::StepTooSmall => NextPhase::End(self.failure_status()),
+            Ended::Guard(guard) if LEVEL_GUARDS.contains(&guard) => NextPhase::End(RunStatus::Diverged),
+            Ended::Guard(LANDING) => self.land_tip(&state),
             Ended::Guard(guard) => {
                 let corner = self.cross_corner(guard);
                 let mut next_order = if end.t == started { zero_order } else { [0; GUARDS] };
                 next_order[corner] = 1;
-                Next::Flight(state, next_order)
+                NextPhase::Flight(state, next_order)
             }
         }
     }
 
     /// How long a tip that leaves the glass at a velocity stays off it if the gap's acceleration stays, `2
     /// v_n / |gap''|`, s.
-    fn rebound_s(&self, state: &Airborne) -> Option<f64> {
+    fn rebound_s(&self, state: &FlightState) -> Option<f64> {
         let acceleration = self.gap_acceleration(self.t, state);
         (state.gap_m == 0.0 && state.gap_rate_m_per_s > 0.0 && acceleration < 0.0)
             .then(|| -2.0 * state.gap_rate_m_per_s / acceleration)
     }
 
     /// The gap has fallen to zero.
-    fn land(&mut self, state: &Airborne) -> Next {
-        self.recent.note(self.t);
+    fn land_tip(&mut self, state: &FlightState) -> NextPhase {
+        self.recent.note_event(self.t);
         // a tip that only grazes the glass may be found to leave it, within the tolerance
-        self.strike(
+        self.strike_glass(
             &state.pose,
             state.gap_rate_m_per_s.min(0.0),
-            Origin::Collision,
-            (Mode::Flight, Cause::Landing),
+            ImpactOrigin::Collision,
+            (TipMode::Flight, TransitionCause::Landing),
         )
     }
 
     /// No finite force is admissible in slip, or leaving stick into it. Where the tip would rise without
     /// contact it does; otherwise the paradox is an impact without collision.
-    pub(super) fn jam(&mut self, pose: &Pose, from: Mode) -> Next {
-        if self.rules.jam == Jam::Stop {
-            return Next::End(Status::Jammed);
+    pub(super) fn resolve_jam(&mut self, pose: &Pose, from: TipMode) -> NextPhase {
+        if self.rules.jam == JamRule::Stop {
+            return NextPhase::End(RunStatus::Jammed);
         }
-        let at = self.system.instant(self.t, pose, self.lean);
+        let at = self.system.contact_instant(self.t, pose, self.lean);
         if at.contact.n_free < 0.0 {
             return self.lose_contact(pose, Some((from, None)));
         }
-        if from == Mode::Stick {
-            return Next::End(Status::Jammed); // at rest there is nothing that an impact could brake
+        if from == TipMode::Stick {
+            return NextPhase::End(RunStatus::Jammed); // at rest there is nothing that an impact could brake
         }
-        self.recent.note(self.t);
-        self.strike(pose, 0.0, Origin::Jam, (from, Cause::JamImpact))
+        self.recent.note_event(self.t);
+        self.strike_glass(pose, 0.0, ImpactOrigin::Jam, (from, TransitionCause::JamImpact))
     }
 
     /// An impact and what follows it.
-    fn strike(&mut self, pose: &Pose, normal: f64, origin: Origin, (from, cause): (Mode, Cause)) -> Next {
-        let d = Directions::of(pose);
-        let tangential = self.system.linkage.tip_velocity_m_per_s(pose, &d, &self.system.drive.at(self.t));
+    fn strike_glass(
+        &mut self,
+        pose: &Pose,
+        normal: f64,
+        origin: ImpactOrigin,
+        (from, cause): (TipMode, TransitionCause),
+    ) -> NextPhase {
+        let d = LinkDirections::from_pose(pose);
+        let tangential =
+            self.system.linkage.tip_velocity_m_per_s(pose, &d, &self.system.drive.motion_at(self.t));
         let before = TipVelocity { normal, tangential };
-        let strike = Strike { pose: *pose, before, origin, restitution: self.rules.restitution };
+        let strike = TipStrike { pose: *pose, before, origin, restitution: self.rules.restitution };
         let Some((after, outcome)) = self.rebound_or_close(strike) else {
-            return Next::End(Status::Diverged);
+            return NextPhase::End(RunStatus::Diverged);
         };
-        self.tell(&d, pose, &after.pose, before, &outcome);
+        self.report_impact(&d, pose, &after.pose, before, &outcome);
         let before = Some((from, Some(cause)));
         match outcome.velocity {
-            TipVelocity { normal, .. } if normal > 0.0 => self.leave(after, before),
+            TipVelocity { normal, .. } if normal > 0.0 => self.lift_off(after, before),
             TipVelocity { tangential: 0.0, .. } => {
-                self.decide_at_rest(&self.at_standstill(after.pose), before)
+                self.decide_at_rest(&self.remove_tip_velocity(after.pose), before)
             }
             TipVelocity { tangential, .. } => self.decide_in_motion(&after.pose, tangential, before),
         }
@@ -183,7 +204,7 @@ impl<W: Watch> Machine<'_, W> {
     /// The impact with the scene's restitution, or without any where the train of rebounds that it belongs to
     /// counts as over: the rest of a train, `T (1 + e + e^2 + ...)`, passes on the same impulse as contact
     /// does in the same time, so that closing it early moves the tip by no more than the height of a rebound.
-    fn rebound_or_close(&mut self, strike: Strike) -> Option<(Airborne, Outcome)> {
+    fn rebound_or_close(&mut self, strike: TipStrike) -> Option<(FlightState, ImpactOutcome)> {
         /// Share of the shortest period that a rebound must last to be followed: ten times the share within
         /// which a whole window of events counts as chattering, so that a train closes before it does.
         const RESOLUTION: f64 = 1e-5;
@@ -192,40 +213,40 @@ impl<W: Watch> Machine<'_, W> {
         /// comes from one share to the other in 690.
         const SHORT: f64 = 1e-2;
         const MOST_SHORT: u32 = 1000;
-        let rebound = self.struck(&strike)?;
+        let rebound = self.solve_strike(&strike)?;
         let share = self.rebound_s(&rebound.0).map_or(f64::INFINITY, |time| time / self.shortest_period_s);
         self.short_rebounds = if share < SHORT { self.short_rebounds + 1 } else { 0 };
         if share < RESOLUTION || self.short_rebounds > MOST_SHORT {
             self.short_rebounds = 0;
-            let closed = Strike { restitution: 0.0, ..strike };
-            self.watch.strikes(&closed);
-            return self.struck(&closed);
+            let closed = TipStrike { restitution: 0.0, ..strike };
+            self.watch.watch_strike(&closed);
+            return self.solve_strike(&closed);
         }
-        self.watch.strikes(&strike);
+        self.watch.watch_strike(&strike);
         Some(rebound)
     }
 
-    fn struck(&mut self, strike: &Strike) -> Option<(Airborne, Outcome)> {
-        strike.outcome(&self.system.linkage, self.effort.relative_tolerance, &mut self.work)
+    fn solve_strike(&mut self, strike: &TipStrike) -> Option<(FlightState, ImpactOutcome)> {
+        strike.solve_on_blade(&self.system.linkage, self.effort.relative_tolerance, &mut self.work)
     }
 
-    fn tell(
+    fn report_impact(
         &mut self,
-        d: &Directions,
+        d: &LinkDirections,
         before: &Pose,
         after: &Pose,
         velocity: TipVelocity,
-        outcome: &Outcome,
+        outcome: &ImpactOutcome,
     ) {
         let changes = [after.theta_rate - before.theta_rate, after.phi_rate - before.phi_rate];
         let drive = self.system.linkage.drive_impulse_n_s(d, changes, outcome.impulse_n_s[1]);
-        self.watch.impact(&Impact {
+        self.watch.watch_impact(&Impact {
             time_s: self.t,
             before: velocity,
             after: outcome.velocity,
             impulse_n_s: outcome.impulse_n_s,
             lost_j: outcome.lost_j,
-            driven_j: drive * self.system.drive.at(self.t).velocity_m_per_s,
+            driven_j: drive * self.system.drive.motion_at(self.t).velocity_m_per_s,
         });
     }
 }

@@ -1,13 +1,13 @@
 //! Whether events accumulate in no time.
 
 /// The last events, to tell chattering from motion.
-pub(super) struct Recent {
+pub(super) struct ChatterDetector {
     times: [f64; Self::WINDOW],
     next: usize,
     shortest_s: f64,
 }
 
-impl Recent {
+impl ChatterDetector {
     /// Events compared with each other.
     const WINDOW: usize = 64;
     /// Share of the blade's shortest period that as many events must take together: real cycles take about a
@@ -18,7 +18,7 @@ impl Recent {
         Self { times: [f64::NEG_INFINITY; Self::WINDOW], next: 0, shortest_s: Self::SHARE * period_s }
     }
 
-    pub(super) fn note(&mut self, t: f64) {
+    pub(super) fn note_event(&mut self, t: f64) {
         self.times[self.next] = t;
         self.next = (self.next + 1) % Self::WINDOW;
     }
@@ -37,16 +37,16 @@ mod tests {
     #[test]
     fn events_that_accumulate_differ_from_cycles() {
         let period_s = 2e-3;
-        let mut recent = Recent::new(period_s);
+        let mut recent = ChatterDetector::new(period_s);
         for cycle in 0..1000 {
             let t = f64::from(cycle) * period_s;
             assert!(!recent.is_chattering(t), "cycle {cycle}");
-            recent.note(t);
+            recent.note_event(t);
         }
         let t = 1000.0 * period_s;
-        for event in 0..Recent::WINDOW {
+        for event in 0..ChatterDetector::WINDOW {
             assert!(!recent.is_chattering(t), "event {event}");
-            recent.note(t + event as f64 * 1e-12);
+            recent.note_event(t + event as f64 * 1e-12);
         }
         assert!(recent.is_chattering(t + 1e-10));
     }

@@ -1,40 +1,40 @@
 //! Who looks on while a run goes on: an observer alone, or one with derivatives.
 
-use super::strike::Strike;
-use crate::simulate::phases::Motion;
-use crate::simulate::{Impact, Observer, Piece, Transition};
+use super::strike::TipStrike;
+use crate::simulate::phases::TaylorMotion;
+use crate::simulate::{Impact, Observer, SolutionSegment, Transition};
 use std::ops::ControlFlow;
 
 /// What the machine says of a run as it goes on.
-pub(in crate::simulate) trait Watch {
+pub(in crate::simulate) trait RunWatcher {
     /// A piece of the solution, in order of time.
-    fn piece(&mut self, piece: &Piece<'_>);
+    fn watch_segment(&mut self, piece: &SolutionSegment<'_>);
     /// A guard has fallen at the end of the last piece, whose series this is.
-    fn fell(&mut self, _guard: usize, _motion: &Motion) {}
+    fn watch_guard(&mut self, _guard: usize, _motion: &TaylorMotion) {}
     /// The tip strikes the glass there.
-    fn strikes(&mut self, _strike: &Strike) {}
+    fn watch_strike(&mut self, _strike: &TipStrike) {}
     /// A change of mode, between the pieces it separates.
-    fn transition(&mut self, transition: &Transition);
+    fn watch_transition(&mut self, transition: &Transition);
     /// An impact, before the transition that it causes.
-    fn impact(&mut self, impact: &Impact);
+    fn watch_impact(&mut self, impact: &Impact);
     /// `Break` ends the run.
-    fn flow(&self) -> ControlFlow<()>;
+    fn control_flow(&self) -> ControlFlow<()>;
 }
 
 /// An observer and nothing else.
-pub(in crate::simulate) struct Plain<'a, O>(pub &'a mut O);
+pub(in crate::simulate) struct ObserverWatcher<'a, O>(pub &'a mut O);
 
-impl<O: Observer> Watch for Plain<'_, O> {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        self.0.piece(piece);
+impl<O: Observer> RunWatcher for ObserverWatcher<'_, O> {
+    fn watch_segment(&mut self, piece: &SolutionSegment<'_>) {
+        self.0.observe_segment(piece);
     }
-    fn transition(&mut self, transition: &Transition) {
-        self.0.transition(transition);
+    fn watch_transition(&mut self, transition: &Transition) {
+        self.0.observe_transition(transition);
     }
-    fn impact(&mut self, impact: &Impact) {
-        self.0.impact(impact);
+    fn watch_impact(&mut self, impact: &Impact) {
+        self.0.observe_impact(impact);
     }
-    fn flow(&self) -> ControlFlow<()> {
-        self.0.flow()
+    fn control_flow(&self) -> ControlFlow<()> {
+        self.0.control_flow()
     }
 }

@@ -1,8 +1,8 @@
 //! scene.toml as people write it: tables and types only, nothing checked against anything else.
 
-use super::contact::{Jam, Loss};
-use super::output::Output;
-use crate::blade::parameters::{PARAMETERS, Range};
+use super::contact::{ContactLossRule, JamRule};
+use super::output::OutputTable;
+use crate::blade::parameters::{PARAMETERS, ParameterRange};
 use crate::toml_file::table_schema;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;
@@ -10,7 +10,7 @@ use serde_json::json;
 use std::collections::BTreeMap;
 use toml::Spanned;
 
-pub(super) type Numbers = BTreeMap<String, Spanned<f64>>;
+pub(super) type SceneNumbers = BTreeMap<String, Spanned<f64>>;
 
 /// A blade, its friction, the motion of its head, and what is computed.
 #[derive(Deserialize, JsonSchema)]
@@ -23,14 +23,14 @@ pub(crate) struct SceneFile {
     pub(super) title: String,
     /// Masses, lengths, stiffnesses and dampings, all for one length of blade.
     #[schemars(schema_with = "blade")]
-    pub(super) blade: Numbers,
+    pub(super) blade: SceneNumbers,
     /// What stiffens the neck beyond an angle; left out for a blade without a shoulder.
     #[schemars(schema_with = "shoulder")]
     #[serde(default)]
-    pub(super) shoulder: Option<Numbers>,
+    pub(super) shoulder: Option<SceneNumbers>,
     /// Coefficient of friction `A exp(-B |v|) + C` between lip and glass.
     #[schemars(schema_with = "friction")]
-    pub(super) friction: Numbers,
+    pub(super) friction: SceneNumbers,
     /// How the head moves: a cosine, or as in a recording.
     pub(super) drive: DriveFile,
     /// What a loss of contact does.
@@ -67,10 +67,10 @@ pub(crate) struct DriveFile {
 pub(crate) struct ContactFile {
     /// What happens when the normal force reaches zero; "stop" if left out.
     #[serde(default)]
-    pub(super) loss: Loss,
+    pub(super) loss: ContactLossRule,
     /// What happens when the Painleve condition fails; "stop" if left out.
     #[serde(default)]
-    pub(super) jam: Jam,
+    pub(super) jam: JamRule,
     /// Normal restitution of a landing, 0 to 1; 0 if left out.
     #[schemars(with = "Option<f64>")]
     pub(super) restitution: Option<Spanned<f64>>,
@@ -122,24 +122,24 @@ pub(crate) struct RunFile {
     /// Right-hand sides after which a run ends, so that none runs for ever.
     pub(super) most_evaluations: Option<u64>,
     /// Tables that `simulate` writes; all if left out.
-    pub(super) outputs: Option<Vec<Output>>,
+    pub(super) outputs: Option<Vec<OutputTable>>,
 }
 
 fn blade(_: &mut SchemaGenerator) -> Schema {
-    numbers("blade")
+    number_table_schema("blade")
 }
 
 fn shoulder(_: &mut SchemaGenerator) -> Schema {
-    numbers("shoulder")
+    number_table_schema("shoulder")
 }
 
 fn friction(_: &mut SchemaGenerator) -> Schema {
-    numbers("friction")
+    number_table_schema("friction")
 }
 
 /// The keys of a table of numbers, from the table of parameters. What can be written in two ways is not
 /// required in either.
-fn numbers(table: &str) -> Schema {
+fn number_table_schema(table: &str) -> Schema {
     let rows = || PARAMETERS.iter().filter_map(|row| Some((row.name.split_once('.')?, row)));
     let rows = || rows().filter(|((of, _), _)| *of == table);
     let keys = rows()
@@ -147,12 +147,12 @@ fn numbers(table: &str) -> Schema {
             let unit = if row.unit == "1" { String::new() } else { format!(", {}", row.unit) };
             let mut schema = json!({
                 "type": "number",
-                "description": format!("{}{unit}. How to measure it: {}.", row.meaning, row.quantity.how_measured()),
+                "description": format!("{}{unit}. How to measure it: {}.", row.meaning, row.quantity.measurement_method()),
             });
             match row.range {
-                Range::Positive => schema["exclusiveMinimum"] = json!(0),
-                Range::NotNegative => schema["minimum"] = json!(0),
-                Range::Within(least, most) => {
+                ParameterRange::Positive => schema["exclusiveMinimum"] = json!(0),
+                ParameterRange::NotNegative => schema["minimum"] = json!(0),
+                ParameterRange::Within(least, most) => {
                     schema["minimum"] = json!(least);
                     schema["maximum"] = json!(most);
                 }

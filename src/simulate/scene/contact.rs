@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// What happens when the normal force reaches zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Loss {
+pub enum ContactLossRule {
     /// The run ends and says so.
     #[default]
     Stop,
@@ -17,7 +17,7 @@ pub enum Loss {
 /// What happens when the Painlevé condition fails.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Jam {
+pub enum JamRule {
     /// The run ends and says so.
     #[default]
     Stop,

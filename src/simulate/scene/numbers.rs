@@ -1,32 +1,34 @@
 //! The numbers of a scene under the names of the parameter table.
 
-use super::as_written::{DriveFile, Numbers};
+use super::as_written::{DriveFile, SceneNumbers};
 use super::error::{SceneError, key_error};
-use crate::blade::parameters::{self, PARAMETERS, Parameter};
+use crate::blade::parameters::{self, ModelParameter, PARAMETERS};
 use crate::toml_file;
 use std::collections::BTreeMap;
 use toml::Spanned;
 
 /// Collects the numbers of a file under the names of the parameter table.
-pub(super) struct Reader<'a> {
+pub(super) struct SceneReader<'a> {
     pub file: &'a str,
     pub text: &'a str,
     pub values: BTreeMap<&'static str, f64>,
 }
 
-impl Reader<'_> {
-    pub fn table(&mut self, table: &str, numbers: Numbers) -> Result<(), SceneError> {
-        numbers.into_iter().try_for_each(|(key, value)| self.number(&format!("{table}.{key}"), Some(value)))
+impl SceneReader<'_> {
+    pub fn read_table(&mut self, table: &str, numbers: SceneNumbers) -> Result<(), SceneError> {
+        numbers
+            .into_iter()
+            .try_for_each(|(key, value)| self.read_number(&format!("{table}.{key}"), Some(value)))
     }
 
     /// Place and path of the recording that drives the head, where there is one instead of numbers.
-    pub fn drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
+    pub fn read_drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
         let numbers = [("amplitude_m", &written.amplitude_m), ("frequency_hz", &written.frequency_hz)];
         let all = numbers.into_iter().chain([("delay_s", &written.delay_s)]);
         let Some(recording) = &written.recording else {
             numbers
                 .into_iter()
-                .try_for_each(|(key, value)| self.number(&format!("drive.{key}"), value.clone()))?;
+                .try_for_each(|(key, value)| self.read_number(&format!("drive.{key}"), value.clone()))?;
             return Ok(None);
         };
         let (line, _) = toml_file::line_and_column(self.text, recording.span().start);
@@ -45,7 +47,7 @@ impl Reader<'_> {
     }
 
     /// When the cosine starts, s.
-    pub fn delay_s(&self, written: &DriveFile) -> Result<f64, SceneError> {
+    pub fn read_delay_s(&self, written: &DriveFile) -> Result<f64, SceneError> {
         let Some(delay) = &written.delay_s else { return Ok(0.0) };
         let found = *delay.get_ref();
         if found.is_finite() {
@@ -57,12 +59,12 @@ impl Reader<'_> {
         Err(key_error(&place, "drive.delay_s", &found.to_string(), expected, "correct the value"))
     }
 
-    pub fn number(&mut self, name: &str, value: Option<Spanned<f64>>) -> Result<(), SceneError> {
+    pub fn read_number(&mut self, name: &str, value: Option<Spanned<f64>>) -> Result<(), SceneError> {
         let Some(value) = value else { return Ok(()) };
         let (line, _) = toml_file::line_and_column(self.text, value.span().start);
         let place = format!("{}:{line}", self.file);
-        let parameter = parameter(&place, name)?;
-        check_range(&place, parameter, *value.get_ref())?;
+        let parameter = find_known_parameter(&place, name)?;
+        check_parameter_range(&place, parameter, *value.get_ref())?;
         if let Some(twin) =
             PARAMETERS.iter().find(|p| p.quantity == parameter.quantity && self.values.contains_key(p.name))
         {
@@ -79,29 +81,33 @@ impl Reader<'_> {
     }
 }
 
-pub(super) fn parameter(place: &str, name: &str) -> Result<&'static Parameter, SceneError> {
-    parameters::find(name).ok_or_else(|| {
+pub(super) fn find_known_parameter(place: &str, name: &str) -> Result<&'static ModelParameter, SceneError> {
+    parameters::find_parameter(name).ok_or_else(|| {
         let table = name.split_once('.').map_or("", |(table, _)| table);
-        let known: Vec<&str> = parameters::names()
+        let known: Vec<&str> = parameters::parameter_names()
             .into_iter()
             .filter(|n| table.is_empty() || n.split('.').next() == Some(table))
             .collect();
-        let known = if known.is_empty() { parameters::names() } else { known };
+        let known = if known.is_empty() { parameters::parameter_names() } else { known };
         key_error(
             place,
             name,
             "an unknown key",
             "a key of the scene format",
-            &toml_file::nearest(name, &known),
+            &toml_file::suggest_key(name, &known),
         )
     })
 }
 
-pub(super) fn check_range(place: &str, parameter: &Parameter, value: f64) -> Result<(), SceneError> {
+pub(super) fn check_parameter_range(
+    place: &str,
+    parameter: &ModelParameter,
+    value: f64,
+) -> Result<(), SceneError> {
     if parameter.range.admits(value) {
         return Ok(());
     }
-    let expected = format!("{} ({}, {})", parameter.range.in_words(), parameter.meaning, parameter.unit);
+    let expected = format!("{} ({}, {})", parameter.range.describe(), parameter.meaning, parameter.unit);
     Err(key_error(place, parameter.name, &value.to_string(), &expected, "correct the value"))
 }
 
@@ -113,10 +119,10 @@ pub(super) fn check_complete(
     has_shoulder: bool,
     recorded: bool,
 ) -> Result<(), SceneError> {
-    let absent = |p: &Parameter| {
+    let absent = |p: &ModelParameter| {
         (!has_shoulder && p.name.starts_with("shoulder.")) || (recorded && p.name.starts_with("drive."))
     };
-    let needed = |p: &&Parameter| p.default.is_none() && !absent(p);
+    let needed = |p: &&ModelParameter| p.default.is_none() && !absent(p);
     for parameter in PARAMETERS.iter().filter(needed) {
         let ways: Vec<&str> =
             PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity).map(|p| p.name).collect();

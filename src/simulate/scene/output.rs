@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 /// What `simulate` writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum Output {
+pub enum OutputTable {
     /// `trace.csv`.
     Trace,
     /// `state.csv`.

@@ -2,7 +2,7 @@
 
 use super::as_written::RunFile;
 use super::error::{SceneError, key_error};
-use super::output::Output;
+use super::output::OutputTable;
 use serde::Serialize;
 
 /// What is to be computed.
@@ -19,7 +19,7 @@ pub struct RunSettings {
     pub most_evaluations: Option<u64>,
     /// What is written.
     #[serde(skip)]
-    pub outputs: Vec<Output>,
+    pub outputs: Vec<OutputTable>,
 }
 
 /// Largest number of samples that a run may ask for: a longer trace is not read again
@@ -32,10 +32,14 @@ pub const MOST_EVALUATIONS: u64 = 10_000_000_000;
 /// Most that a scene may ask for: a week of computing.
 const LARGEST_EVALUATIONS: u64 = 10_000_000_000_000;
 /// Tolerances that double precision can meet.
-const TOLERANCES: (f64, f64) = (1e-13, 1e-2);
+const TOLERANCE_RANGE: (f64, f64) = (1e-13, 1e-2);
 const DEFAULT_TOLERANCE: f64 = 1e-8;
 
-pub(super) fn run_settings(file: &str, written: &RunFile, start_s: f64) -> Result<RunSettings, SceneError> {
+pub(super) fn check_run_settings(
+    file: &str,
+    written: &RunFile,
+    start_s: f64,
+) -> Result<RunSettings, SceneError> {
     let refuse = |key: &str, value: f64, expected: &str| {
         Err(key_error(file, key, &value.to_string(), expected, "correct the value"))
     };
@@ -65,8 +69,10 @@ pub(super) fn run_settings(file: &str, written: &RunFile, start_s: f64) -> Resul
         let expected = format!("a whole number from 1 to {LARGEST_EVALUATIONS}");
         return Err(key_error(file, "run.most_evaluations", &found.to_string(), &expected, "correct it"));
     }
-    let outputs =
-        written.outputs.clone().unwrap_or_else(|| vec![Output::Trace, Output::State, Output::Events]);
+    let outputs = written
+        .outputs
+        .clone()
+        .unwrap_or_else(|| vec![OutputTable::Trace, OutputTable::State, OutputTable::Events]);
     Ok(RunSettings {
         stop_s: written.stop_s,
         sample_rate_hz: written.sample_rate_hz,
@@ -78,7 +84,7 @@ pub(super) fn run_settings(file: &str, written: &RunFile, start_s: f64) -> Resul
 
 /// Refuses a run that its work limit ends long before the stop time: a radian of the fastest oscillation
 /// takes at least one right-hand side.
-pub(super) fn check_work(
+pub(super) fn check_work_limit(
     file: &str,
     run: &RunSettings,
     start_s: f64,
@@ -106,7 +112,7 @@ pub(super) fn check_work(
 /// # Errors
 /// The expected range in words.
 pub fn check_tolerance(relative: f64) -> Result<(), String> {
-    let (least, most) = TOLERANCES;
+    let (least, most) = TOLERANCE_RANGE;
     if (least..=most).contains(&relative) {
         Ok(())
     } else {

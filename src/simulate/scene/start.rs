@@ -2,10 +2,10 @@
 
 use super::as_written::{StartFile, StartWord};
 use super::error::{SceneError, key_error};
-use crate::blade::flight::Airborne;
+use crate::blade::flight::FlightState;
 use crate::blade::{Linkage, Pose};
 use crate::simulate::drive::Drive;
-use crate::simulate::equilibrium::steady_slide;
+use crate::simulate::equilibrium::steady_slip_pose;
 use serde::Serialize;
 
 /// How the blade starts.
@@ -18,10 +18,10 @@ pub enum StartKind {
     /// In a given state.
     State(Pose),
     /// In a given state off the glass; not reachable from a scene file, it serves the exact cases.
-    Airborne(Airborne),
+    Airborne(FlightState),
 }
 
-pub(super) fn start(file: &str, written: &StartFile) -> Result<(f64, StartKind), SceneError> {
+pub(super) fn check_start(file: &str, written: &StartFile) -> Result<(f64, StartKind), SceneError> {
     let numbers = [
         ("start.neck_angle_rad", written.neck_angle_rad),
         ("start.lip_angle_rad", written.lip_angle_rad),
@@ -62,15 +62,15 @@ pub(super) fn start(file: &str, written: &StartFile) -> Result<(f64, StartKind),
 }
 
 /// A run that starts in steady slip needs a head that moves and a blade that has such an equilibrium.
-pub(super) fn check_slide(
+pub(super) fn check_steady_start(
     file: &str,
     start_s: f64,
     kind: StartKind,
     linkage: &Linkage,
     drive: &Drive,
 ) -> Result<(), SceneError> {
-    let speed = drive.at(start_s).velocity_m_per_s;
-    if kind != StartKind::SteadySlide || steady_slide(linkage, speed).is_some() {
+    let speed = drive.motion_at(start_s).velocity_m_per_s;
+    if kind != StartKind::SteadySlide || steady_slip_pose(linkage, speed).is_some() {
         return Ok(());
     }
     let found = format!(

@@ -13,10 +13,10 @@ pub(super) const SIX_POINTS: [(f64, f64); 6] = [
 
 /// Step relative to the scale on which a function changes: its sixth power, the truncation, is below
 /// rounding, and rounding over it leaves 1e-13.
-pub(super) const SHARE: f64 = 1e-3;
+pub(super) const DIFFERENCE_STEP: f64 = 1e-3;
 
 /// Derivative of `f` at 0 along its argument; `None` where `f` has no value.
-pub(super) fn derivative<const N: usize>(
+pub(super) fn central_difference<const N: usize>(
     step: f64,
     mut f: impl FnMut(f64) -> Option<[f64; N]>,
 ) -> Option<[f64; N]> {

@@ -2,7 +2,7 @@
 
 /// What a derivative is taken by.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Direction {
+pub enum TangentDirection {
     /// A parameter of the scene by its name; quantities that the scene writes by others (a stiffness by a
     /// natural frequency) follow them.
     Parameter(String),
@@ -21,20 +21,20 @@ pub enum Direction {
 }
 
 /// Names of the directions that are no parameters, with their units.
-const OTHERS: [(Direction, &str, &str); 6] = [
-    (Direction::NeckAngle, "start.neck_angle_rad", "rad"),
-    (Direction::LipAngle, "start.lip_angle_rad", "rad"),
-    (Direction::NeckRate, "start.neck_rate_rad_per_s", "rad/s"),
-    (Direction::LipRate, "start.lip_rate_rad_per_s", "rad/s"),
-    (Direction::DriveScale, "drive.scale", "1"),
-    (Direction::DriveDelay, "drive.delay_s", "s"),
+const NAMED_DIRECTIONS: [(TangentDirection, &str, &str); 6] = [
+    (TangentDirection::NeckAngle, "start.neck_angle_rad", "rad"),
+    (TangentDirection::LipAngle, "start.lip_angle_rad", "rad"),
+    (TangentDirection::NeckRate, "start.neck_rate_rad_per_s", "rad/s"),
+    (TangentDirection::LipRate, "start.lip_rate_rad_per_s", "rad/s"),
+    (TangentDirection::DriveScale, "drive.scale", "1"),
+    (TangentDirection::DriveDelay, "drive.delay_s", "s"),
 ];
 
-impl Direction {
+impl TangentDirection {
     /// The direction of a name: one of [`Self::other_names`], otherwise a parameter.
     #[must_use]
-    pub fn of(name: &str) -> Self {
-        let other = OTHERS.iter().find(|(_, other, _)| *other == name);
+    pub fn from_name(name: &str) -> Self {
+        let other = NAMED_DIRECTIONS.iter().find(|(_, other, _)| *other == name);
         other.map_or_else(|| Self::Parameter(name.to_owned()), |(direction, ..)| direction.clone())
     }
 
@@ -43,12 +43,15 @@ impl Direction {
     pub fn name(&self) -> &str {
         match self {
             Self::Parameter(name) => name,
-            other => OTHERS.iter().find(|(direction, ..)| direction == other).map_or("", |(_, name, _)| name),
+            other => NAMED_DIRECTIONS
+                .iter()
+                .find(|(direction, ..)| direction == other)
+                .map_or("", |(_, name, _)| name),
         }
     }
 
     /// Names of the directions that are no parameters.
     pub fn other_names() -> impl Iterator<Item = &'static str> {
-        OTHERS.iter().map(|(_, name, _)| *name)
+        NAMED_DIRECTIONS.iter().map(|(_, name, _)| *name)
     }
 }

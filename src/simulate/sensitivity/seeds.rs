@@ -1,42 +1,42 @@
 //! What each direction changes directly: constants, the head's motion, the state at the start.
 
-use super::Direction;
-use super::difference::{SHARE, SIX_POINTS};
-use super::source::Source;
+use super::TangentDirection;
+use super::difference::{DIFFERENCE_STEP, SIX_POINTS};
+use super::source::TangentSource;
 use crate::blade::Linkage;
-use crate::blade::parameters::{Parameter, Quantity};
-use crate::blade::tangent::{LANES, LinkageTangent, Row, StateTangent};
+use crate::blade::parameters::{ModelParameter, ParameterQuantity};
+use crate::blade::tangent::{LANES, LaneVector, LinkageTangent, StateTangent};
 use crate::simulate::scene::{Scene, SceneError};
 
 /// How the head's motion `x(t)` changes, `dx = scale x + (stretch t - delay) x'`, and its velocity
 /// accordingly.
 #[derive(Debug, Clone, Default)]
-pub(super) struct DriveSeed {
-    pub scale: Row,
-    pub delay: Row,
-    pub stretch: Row,
+pub(super) struct DriveTangent {
+    pub scale: LaneVector,
+    pub delay: LaneVector,
+    pub stretch: LaneVector,
 }
 
 /// A few directions that are carried side by side.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BlockSeed {
     /// What the directions change, one by one.
-    pub changes: Vec<Change>,
+    pub changes: Vec<SourceFactor>,
     /// Of the linkage's constants, where any changes.
     pub linkage: Option<Box<LinkageTangent>>,
     /// Of the head's motion, where it changes.
-    pub drive: Option<DriveSeed>,
+    pub drive: Option<DriveTangent>,
     /// Of the state at the start.
     pub start: StateTangent,
     /// Of the coefficient of restitution.
-    pub restitution: Row,
+    pub restitution: LaneVector,
     /// Relative change of what changes, over the unit of the direction: 0 where no constant does.
-    pub relative: Row,
+    pub relative: LaneVector,
 }
 
 /// How much of a source a direction is made of.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Change {
+pub(super) struct SourceFactor {
     /// Place in the list of the seeds' sources.
     pub source: usize,
     pub lane: usize,
@@ -45,23 +45,23 @@ pub(super) struct Change {
 
 /// A list of directions, resolved for a scene.
 #[derive(Debug, Clone)]
-pub struct Seeds {
+pub struct TangentSeeds {
     pub(super) blocks: Vec<BlockSeed>,
     /// Block and lane of each direction.
     pub(super) places: Vec<(usize, usize)>,
     /// All that any direction changes.
-    pub(super) sources: Vec<Source>,
+    pub(super) sources: Vec<TangentSource>,
 }
 
-impl Seeds {
+impl TangentSeeds {
     /// Resolves directions for a scene; any number of them, four cost as much as one.
     ///
     /// # Errors
     /// [`SceneError::Key`] for a parameter that is unknown or that the scene does not have.
-    pub fn new(scene: &Scene, directions: &[Direction]) -> Result<Self, SceneError> {
+    pub fn new(scene: &Scene, directions: &[TangentDirection]) -> Result<Self, SceneError> {
         // directions of the same kind lie side by side: a block in which no constant changes costs less
         let mut order: Vec<usize> = (0..directions.len()).collect();
-        order.sort_by_key(|&i| kind(&directions[i]));
+        order.sort_by_key(|&i| direction_group(&directions[i]));
         let mut seeds = Self {
             blocks: vec![BlockSeed::default(); directions.len().div_ceil(LANES)],
             places: vec![(0, 0); directions.len()],
@@ -69,7 +69,7 @@ impl Seeds {
         };
         for (place, i) in order.into_iter().enumerate() {
             seeds.places[i] = (place / LANES, place % LANES);
-            seeds.resolve(scene, &directions[i], seeds.places[i])?;
+            seeds.set_direction(scene, &directions[i], seeds.places[i])?;
         }
         let Self { blocks, sources, .. } = &mut seeds;
         blocks.iter_mut().for_each(|block| block.list_changes(sources));
@@ -88,23 +88,23 @@ impl Seeds {
         self.places.is_empty()
     }
 
-    fn resolve(
+    fn set_direction(
         &mut self,
         scene: &Scene,
-        direction: &Direction,
+        direction: &TangentDirection,
         (block, lane): (usize, usize),
     ) -> Result<(), SceneError> {
         let block = &mut self.blocks[block];
         match direction {
-            Direction::NeckAngle => block.start.angle[0][lane] = 1.0,
-            Direction::LipAngle => block.start.angle[1][lane] = 1.0,
-            Direction::NeckRate => block.start.rate[0][lane] = 1.0,
-            Direction::LipRate => block.start.rate[1][lane] = 1.0,
-            Direction::DriveScale => block.drive().scale[lane] = 1.0,
-            Direction::DriveDelay => block.drive().delay[lane] = 1.0,
-            Direction::Parameter(name) => {
-                let parameter = scene.parameter(name)?;
-                block.parameter(scene, parameter, lane);
+            TangentDirection::NeckAngle => block.start.angle[0][lane] = 1.0,
+            TangentDirection::LipAngle => block.start.angle[1][lane] = 1.0,
+            TangentDirection::NeckRate => block.start.rate[0][lane] = 1.0,
+            TangentDirection::LipRate => block.start.rate[1][lane] = 1.0,
+            TangentDirection::DriveScale => block.drive_mut().scale[lane] = 1.0,
+            TangentDirection::DriveDelay => block.drive_mut().delay[lane] = 1.0,
+            TangentDirection::Parameter(name) => {
+                let parameter = scene.find_own_parameter(name)?;
+                block.set_parameter(scene, parameter, lane);
             }
         }
         Ok(())
@@ -112,72 +112,73 @@ impl Seeds {
 }
 
 /// What stands side by side: parameters of the blade, those of the drive, states.
-fn kind(direction: &Direction) -> u8 {
+fn direction_group(direction: &TangentDirection) -> u8 {
     match direction {
-        Direction::Parameter(name) if !name.starts_with("drive.") => 0,
-        Direction::Parameter(_) | Direction::DriveScale | Direction::DriveDelay => 1,
+        TangentDirection::Parameter(name) if !name.starts_with("drive.") => 0,
+        TangentDirection::Parameter(_) | TangentDirection::DriveScale | TangentDirection::DriveDelay => 1,
         _ => 2,
     }
 }
 
-impl DriveSeed {
-    fn changes(&self, lane: usize) -> impl Iterator<Item = (Source, f64)> {
+impl DriveTangent {
+    fn list_changes(&self, lane: usize) -> impl Iterator<Item = (TangentSource, f64)> {
         let changes = [
-            (Source::HeadScale, self.scale[lane]),
-            (Source::HeadDelay, self.delay[lane]),
-            (Source::HeadStretch, self.stretch[lane]),
+            (TangentSource::HeadScale, self.scale[lane]),
+            (TangentSource::HeadDelay, self.delay[lane]),
+            (TangentSource::HeadStretch, self.stretch[lane]),
         ];
         changes.into_iter().filter(|(_, factor)| *factor != 0.0)
     }
 }
 
 impl BlockSeed {
-    fn drive(&mut self) -> &mut DriveSeed {
+    fn drive_mut(&mut self) -> &mut DriveTangent {
         self.drive.get_or_insert_default()
     }
 
     /// Lists what the directions are made of; `sources` are those known so far.
-    fn list_changes(&mut self, sources: &mut Vec<Source>) {
+    fn list_changes(&mut self, sources: &mut Vec<TangentSource>) {
         let Self { changes, linkage, drive, .. } = self;
         for lane in 0..LANES {
-            let constants = linkage.iter().flat_map(|linkage| linkage.changes(lane));
-            let head = drive.iter().flat_map(|drive| drive.changes(lane));
-            let all = constants.map(|(constant, factor)| (Source::Constant(constant), factor)).chain(head);
+            let constants = linkage.iter().flat_map(|linkage| linkage.nonzero_changes(lane));
+            let head = drive.iter().flat_map(|drive| drive.list_changes(lane));
+            let all =
+                constants.map(|(constant, factor)| (TangentSource::Constant(constant), factor)).chain(head);
             for (source, factor) in all {
                 let place = sources.iter().position(|known| *known == source).unwrap_or_else(|| {
                     sources.push(source);
                     sources.len() - 1
                 });
-                changes.push(Change { source: place, lane, factor });
+                changes.push(SourceFactor { source: place, lane, factor });
             }
         }
     }
 
-    fn parameter(&mut self, scene: &Scene, parameter: &Parameter, lane: usize) {
+    fn set_parameter(&mut self, scene: &Scene, parameter: &ModelParameter, lane: usize) {
         let value = scene.value(parameter.name).or(parameter.default).unwrap_or(0.0);
         match parameter.quantity {
-            Quantity::DriveAmplitude => self.drive().scale[lane] = 1.0 / value,
-            Quantity::DriveFrequency => {
+            ParameterQuantity::DriveAmplitude => self.drive_mut().scale[lane] = 1.0 / value,
+            ParameterQuantity::DriveFrequency => {
                 // (the cosine is stretched about its own start)
-                self.drive().stretch[lane] = 1.0 / value;
-                self.drive().delay[lane] = scene.drive.delay_s() / value;
+                self.drive_mut().stretch[lane] = 1.0 / value;
+                self.drive_mut().delay[lane] = scene.drive.delay_s() / value;
             }
-            Quantity::Restitution => self.restitution[lane] = 1.0,
+            ParameterQuantity::Restitution => self.restitution[lane] = 1.0,
             _ => {
-                let scale = if value == 0.0 { scale(parameter, &scene.linkage) } else { value.abs() };
-                let step = SHARE * scale;
+                let scale = if value == 0.0 { scale_at_zero(parameter, &scene.linkage) } else { value.abs() };
+                let step = DIFFERENCE_STEP * scale;
                 self.relative[lane] = 1.0 / scale;
                 let terms = SIX_POINTS.map(|(point, weight)| {
                     (weight / step, scene.linkage_with(parameter, value + point * step))
                 });
-                self.linkage.get_or_insert_default().set(lane, &terms);
+                self.linkage.get_or_insert_default().set_direction(lane, &terms);
             }
         }
     }
 }
 
 /// The scale of a parameter that is zero: what others of its kind are.
-fn scale(parameter: &Parameter, linkage: &Linkage) -> f64 {
+fn scale_at_zero(parameter: &ModelParameter, linkage: &Linkage) -> f64 {
     match parameter.unit {
         "m" => linkage.l1_m.min(linkage.l2_m),
         "kg" => linkage.m_phi / (linkage.l2_m * linkage.l2_m),
@@ -189,7 +190,7 @@ fn scale(parameter: &Parameter, linkage: &Linkage) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::blade::tangent::Constant;
+    use crate::blade::tangent::LinkageConstant;
 
     /// A difference quotient leaves rounding in constants that stay, and each would cost as much as one that
     /// moves.
@@ -198,16 +199,20 @@ mod tests {
         let text = include_str!("../../../data/scenes/actual-blade.toml");
         let scene = Scene::parse("actual-blade.toml", text).unwrap();
         let sources = |name: &str| {
-            let seeds = Seeds::new(&scene, &[Direction::Parameter(name.to_owned())]).unwrap();
+            let seeds = TangentSeeds::new(&scene, &[TangentDirection::Parameter(name.to_owned())]).unwrap();
             seeds.sources.clone()
         };
-        let constants = |constants: &[Constant]| constants.iter().copied().map(Source::Constant).collect();
-        let expected: Vec<Source> = constants(&[Constant::FrictionA]);
+        let constants =
+            |constants: &[LinkageConstant]| constants.iter().copied().map(TangentSource::Constant).collect();
+        let expected: Vec<TangentSource> = constants(&[LinkageConstant::FrictionA]);
         assert_eq!(sources("friction.a"), expected);
-        let expected: Vec<Source> = constants(&[Constant::ShoulderStiffness]);
+        let expected: Vec<TangentSource> = constants(&[LinkageConstant::ShoulderStiffness]);
         assert_eq!(sources("shoulder.stiffness_ratio"), expected);
-        let expected: Vec<Source> =
-            constants(&[Constant::NeckStiffness, Constant::NeckDamping, Constant::ShoulderStiffness]);
+        let expected: Vec<TangentSource> = constants(&[
+            LinkageConstant::NeckStiffness,
+            LinkageConstant::NeckDamping,
+            LinkageConstant::ShoulderStiffness,
+        ]);
         assert_eq!(sources("blade.neck_natural_frequency_hz"), expected);
     }
 }

@@ -1,13 +1,15 @@
 //! What the directions change: constants of the linkage and the head's motion.
 
-use super::span::Course;
-use crate::blade::tangent::{Attitude, Constant, Effect, HeadShift, Instants, Row};
+use super::span::SeriesReference;
+use crate::blade::tangent::{
+    ForcingTerms, HeadMotionChange, LaneVector, LinkAttitudes, LinkageConstant, MotionSamples,
+};
 use crate::simulate::drive::Drive;
 
 /// A change that directions are made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Source {
-    Constant(Constant),
+pub(super) enum TangentSource {
+    Constant(LinkageConstant),
     /// The head's motion `x(t)` changes by `x`, by `-x'` or by `t x'`.
     HeadScale,
     HeadDelay,
@@ -19,7 +21,7 @@ pub(super) const MOST_SOURCES: usize = 24;
 
 /// The head's motion about the start of a piece.
 #[derive(Debug, Clone)]
-pub(super) struct Head<'a> {
+pub(super) struct HeadPolynomial<'a> {
     start_s: f64,
     position_m: f64,
     /// Taylor coefficients of the velocity, m/s, up to the last that is not zero: between its knots a
@@ -27,106 +29,123 @@ pub(super) struct Head<'a> {
     velocity: &'a [f64],
 }
 
-impl<'a> Head<'a> {
+impl<'a> HeadPolynomial<'a> {
     /// What the sources need of it; `None` where they leave the head alone.
-    pub fn of(sources: &[Source], drive: &Drive, start_s: f64, velocity: &'a [f64]) -> Option<Self> {
-        sources.iter().find(|source| !matches!(source, Source::Constant(_)))?;
+    pub fn from_drive(
+        sources: &[TangentSource],
+        drive: &Drive,
+        start_s: f64,
+        velocity: &'a [f64],
+    ) -> Option<Self> {
+        sources.iter().find(|source| !matches!(source, TangentSource::Constant(_)))?;
         let used = velocity.iter().rposition(|&v| v != 0.0).map_or(0, |last| last + 1);
-        let is_scaled = sources.contains(&Source::HeadScale);
-        let position_m = if is_scaled { drive.at(start_s).position_m } else { 0.0 };
+        let is_scaled = sources.contains(&TangentSource::HeadScale);
+        let position_m = if is_scaled { drive.motion_at(start_s).position_m } else { 0.0 };
         Some(Self { start_s, position_m, velocity: &velocity[..used] })
     }
 
     /// The head's place, m.
-    fn position(&self, x: Row) -> Row {
-        let mut sum = Row::ZERO;
+    fn position(&self, x: LaneVector) -> LaneVector {
+        let mut sum = LaneVector::ZERO;
         for (k, v) in self.velocity.iter().enumerate().rev() {
-            sum = sum * x + Row::all(v / (k + 1) as f64);
+            sum = sum * x + LaneVector::splat(v / (k + 1) as f64);
         }
-        Row::all(self.position_m) + sum * x
+        LaneVector::splat(self.position_m) + sum * x
     }
 
     /// Velocity, acceleration and jerk.
-    fn rates(&self, x: Row) -> [Row; 3] {
-        let mut sums = [Row::ZERO; 3];
+    fn motion_rates(&self, x: LaneVector) -> [LaneVector; 3] {
+        let mut sums = [LaneVector::ZERO; 3];
         for (k, &v) in self.velocity.iter().enumerate().rev() {
             let power = k as f64;
             let [velocity, acceleration, jerk] = &mut sums;
-            *velocity = *velocity * x + Row::all(v);
+            *velocity = *velocity * x + LaneVector::splat(v);
             if k > 0 {
-                *acceleration = *acceleration * x + Row::all(power * v);
+                *acceleration = *acceleration * x + LaneVector::splat(power * v);
             }
             if k > 1 {
-                *jerk = *jerk * x + Row::all(power * (power - 1.0) * v);
+                *jerk = *jerk * x + LaneVector::splat(power * (power - 1.0) * v);
             }
         }
         sums
     }
 
     /// How the head's place moves with a source, m.
-    pub fn moved(&self, source: Source, x: Row) -> Row {
+    pub fn position_change(&self, source: TangentSource, x: LaneVector) -> LaneVector {
         let velocity = || {
-            self.velocity.iter().rev().fold(Row::ZERO, |sum, &coefficient| sum * x + Row::all(coefficient))
+            self.velocity
+                .iter()
+                .rev()
+                .fold(LaneVector::ZERO, |sum, &coefficient| sum * x + LaneVector::splat(coefficient))
         };
         match source {
-            Source::Constant(_) => Row::ZERO,
-            Source::HeadScale => self.position(x),
-            Source::HeadDelay => -velocity(),
-            Source::HeadStretch => (Row::all(self.start_s) + x) * velocity(),
+            TangentSource::Constant(_) => LaneVector::ZERO,
+            TangentSource::HeadScale => self.position(x),
+            TangentSource::HeadDelay => -velocity(),
+            TangentSource::HeadStretch => (LaneVector::splat(self.start_s) + x) * velocity(),
         }
     }
 
     /// The same with two derivatives in time.
-    fn shift(&self, source: Source, x: Row) -> Option<HeadShift> {
-        if let Source::Constant(_) = source {
+    fn motion_change(&self, source: TangentSource, x: LaneVector) -> Option<HeadMotionChange> {
+        if let TangentSource::Constant(_) = source {
             return None;
         }
-        let ([v, a, jerk], t) = (self.rates(x), Row::all(self.start_s) + x);
+        let ([v, a, jerk], t) = (self.motion_rates(x), LaneVector::splat(self.start_s) + x);
         Some(match source {
-            Source::HeadDelay => [-v, -a, -jerk],
-            Source::HeadStretch => [t * v, v + t * a, 2.0 * a + t * jerk],
+            TangentSource::HeadDelay => [-v, -a, -jerk],
+            TangentSource::HeadStretch => [t * v, v + t * a, 2.0 * a + t * jerk],
             _ => [self.position(x), v, a],
         })
     }
 }
 
-impl Source {
+impl TangentSource {
     /// Whether it matters in this course.
-    pub fn acts(self, course: &Course<'_>) -> bool {
+    pub fn affects_motion(self, course: &SeriesReference<'_>) -> bool {
         match self {
-            Self::Constant(constant) => course.uses(constant),
+            Self::Constant(constant) => course.depends_on(constant),
             _ => true,
         }
     }
 
     /// Whether it moves head or tip where the angles stay.
-    pub fn moves(self, course: &Course<'_>) -> bool {
+    pub fn displaces_points(self, course: &SeriesReference<'_>) -> bool {
         match self {
-            Self::Constant(constant) => course.moves(constant),
+            Self::Constant(constant) => course.displaces_points(constant),
             _ => true,
         }
     }
 
     /// All that a unit of it does.
     #[inline(always)]
-    pub fn effect(self, course: &Course<'_>, head: Option<&Head<'_>>, at: &Instants) -> Effect {
+    pub fn forcing_terms(
+        self,
+        course: &SeriesReference<'_>,
+        head: Option<&HeadPolynomial<'_>>,
+        at: &MotionSamples,
+    ) -> ForcingTerms {
         match self {
-            Self::Constant(constant) => course.effect(at, constant),
+            Self::Constant(constant) => course.constant_forcing(at, constant),
             _ => head
-                .and_then(|head| head.shift(self, at.x))
-                .map_or_else(Effect::default, |shift| course.head_effect(at, &shift)),
+                .and_then(|head| head.motion_change(self, at.x))
+                .map_or_else(ForcingTerms::default, |shift| course.head_motion_forcing(at, &shift)),
         }
     }
 
     /// Where a unit of it moves head and tip.
-    pub fn moved(self, course: &Course<'_>, head: Option<&Head<'_>>, at: &Attitude) -> Effect {
+    pub fn displacement_terms(
+        self,
+        course: &SeriesReference<'_>,
+        head: Option<&HeadPolynomial<'_>>,
+        at: &LinkAttitudes,
+    ) -> ForcingTerms {
         match self {
-            Self::Constant(constant) => course.moved(at, constant),
-            _ => head.and_then(|head| head.shift(self, at.x)).map_or_else(Effect::default, |shift| Effect {
-                head: shift[0],
-                tip: shift,
-                ..Effect::default()
-            }),
+            Self::Constant(constant) => course.displacement_terms(at, constant),
+            _ => head.and_then(|head| head.motion_change(self, at.x)).map_or_else(
+                ForcingTerms::default,
+                |shift| ForcingTerms { head: shift[0], tip: shift, ..ForcingTerms::default() },
+            ),
         }
     }
 }

@@ -7,57 +7,58 @@
 mod brief;
 mod pieces;
 
-use super::{Analysis, Record, Removed};
+use super::{RemovedTrend, SampledRecord, SpectralAnalysis};
 use crate::math;
-use crate::spectrum::judge::{Circumstances, Evidence, judge};
+use crate::spectrum::judge::{ComponentEvidence, RecordContext, classify_components};
 use crate::spectrum::trend::Trend;
 use crate::spectrum::window;
-use crate::spectrum::{Component, Detrend, Settings, Spectrum, SpectrumError, analyse};
-use brief::Brief;
+use crate::spectrum::{Component, Detrend, Spectrum, SpectrumError, SpectrumSettings, analyse_spectrum};
+use brief::TransientComponent;
 use rayon::prelude::*;
 use std::f64::consts::{LN_2, TAU};
 
 /// Pieces of the record, and the part of them that is independent where each overlaps half of the next.
-const PIECES: usize = 31;
-const INDEPENDENT: f64 = 16.0;
+const PHASE_SEGMENTS: usize = 31;
+const INDEPENDENT_SEGMENTS: f64 = 16.0;
 /// Scatter of a steady line over its pieces, as a share of its amplitude, or in that of the noise.
-const STEADY: f64 = 0.25;
-const STEADY_IN_NOISE: f64 = 1.7;
+const STEADY_SCATTER: f64 = 0.25;
+const STEADY_SCATTER_IN_NOISE: f64 = 1.7;
 /// Width of an even distribution over its deviation, the root of twelve.
-const EVEN: f64 = 3.464_101_615_137_754_6;
+const UNIFORM_WIDTH_IN_SD: f64 = 3.464_101_615_137_754_6;
 /// Half width of the neighbourhood of which the noise is the median, resolutions.
 const NEIGHBOURHOOD: f64 = 40.0;
 /// Level over the noise there from which there is a component: once in a hundred spectra of a million frames.
 const DETECTION: f64 = 4.5;
 
-pub(super) fn analysis(
-    record: &Record,
-    settings: &Settings,
+pub(super) fn analyse_long_record(
+    record: &SampledRecord,
+    settings: &SpectrumSettings,
     trend: Trend,
-) -> Result<Analysis, SpectrumError> {
-    let mut spectrum = analyse(record.samples, record.frame_rate_hz, settings)?;
-    let circumstances = Circumstances {
+) -> Result<SpectralAnalysis, SpectrumError> {
+    let mut spectrum = analyse_spectrum(record.samples, record.frame_rate_hz, settings)?;
+    let circumstances = RecordContext {
         frame_rate_hz: record.frame_rate_hz,
         exposure_s: record.exposure_s,
         resolution_hz: spectrum.resolution_hz,
         fastest_hz: settings.fastest_hz,
     };
-    let removed_m = trend.of(record.samples);
+    let removed_m = trend.fit_values(record.samples);
     let left_m: Vec<Option<f64>> =
         record.samples.iter().zip(&removed_m).map(|(x, removed)| x.map(|x| x - removed)).collect();
-    let read = Reading { spectrum: &spectrum, left_m: &left_m, frame_rate_hz: record.frame_rate_hz };
-    let lines: Vec<(Component, Evidence)> =
-        spectrum.components.par_iter().filter_map(|c| read.line(c)).collect();
-    let brief = brief::components(record, settings);
-    spectrum.components = listed(lines, brief, &circumstances, settings.max_components);
-    Ok(Analysis {
+    let read =
+        LongRecordSpectrum { spectrum: &spectrum, left_m: &left_m, frame_rate_hz: record.frame_rate_hz };
+    let lines: Vec<(Component, ComponentEvidence)> =
+        spectrum.components.par_iter().filter_map(|c| read.assess_component(c)).collect();
+    let brief = brief::find_transients(record, settings);
+    spectrum.components = merge_components(lines, brief, &circumstances, settings.max_components);
+    Ok(SpectralAnalysis {
         spectrum,
-        left_out: 0,
+        skipped_frames: 0,
         stride: 1,
-        removed: Removed { detrend: settings.detrend.unwrap_or(Detrend::Cubic), relaxations: 0 },
+        removed: RemovedTrend { detrend: settings.detrend.unwrap_or(Detrend::Cubic), relaxations: 0 },
         leakage_m: Vec::new(),
         model_m: vec![0.0; record.samples.len()],
-        left_m,
+        residual_m: left_m,
         removed_m,
         oscillations: Vec::new(),
         ridge: None,
@@ -67,21 +68,23 @@ pub(super) fn analysis(
 }
 
 /// The lines, largest first, and what is there for a short time only, each once and largest first.
-fn listed(
-    mut lines: Vec<(Component, Evidence)>,
-    mut brief: Vec<Brief>,
-    circumstances: &Circumstances,
+fn merge_components(
+    mut lines: Vec<(Component, ComponentEvidence)>,
+    mut brief: Vec<TransientComponent>,
+    circumstances: &RecordContext,
     most: usize,
 ) -> Vec<Component> {
-    let known = |b: &Brief| lines.iter().any(|(c, line)| b.is(c) && !(line.changes && b.says_more()));
+    let known = |b: &TransientComponent| {
+        lines.iter().any(|(c, line)| b.matches_component(c) && !(line.changes && b.is_more_specific()))
+    };
     brief.retain(|b| !known(b));
-    lines.retain(|(c, line)| !(line.changes && brief.iter().any(|b| b.shows(c))));
+    lines.retain(|(c, line)| !(line.changes && brief.iter().any(|b| b.explains_component(c))));
     // what a flip shows would fill the list: what is known better has its place first
     let better = brief.len() + lines.iter().filter(|(_, line)| !line.changes).count();
     let mut room = 0..most.saturating_sub(better);
     lines.retain(|(_, line)| !line.changes || room.next().is_some());
-    let (mut components, evidence): (Vec<Component>, Vec<Evidence>) = lines.into_iter().unzip();
-    judge(&mut components, &evidence, circumstances);
+    let (mut components, evidence): (Vec<Component>, Vec<ComponentEvidence>) = lines.into_iter().unzip();
+    classify_components(&mut components, &evidence, circumstances);
     components.extend(brief.into_iter().map(|b| b.component));
     components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
     components.truncate(most);
@@ -89,30 +92,30 @@ fn listed(
 }
 
 /// A long record and its spectrum.
-struct Reading<'a> {
+struct LongRecordSpectrum<'a> {
     spectrum: &'a Spectrum,
     left_m: &'a [Option<f64>],
     frame_rate_hz: f64,
 }
 
-impl Reading<'_> {
+impl LongRecordSpectrum<'_> {
     /// A component that stands out of the noise around it, with what the whole record says of it.
-    fn line(&self, c: &Component) -> Option<(Component, Evidence)> {
-        let floor_m = floor_m(self.spectrum, c.frequency_hz);
+    fn assess_component(&self, c: &Component) -> Option<(Component, ComponentEvidence)> {
+        let floor_m = local_noise_floor_m(self.spectrum, c.frequency_hz);
         if c.amplitude_m <= DETECTION * floor_m {
             return None;
         }
         let changes = !is_steady(self.left_m, self.frame_rate_hz, c, floor_m);
-        let width_hz = if changes { width_hz(self.spectrum, c) } else { 0.0 };
-        let frequency_sd_hz = math::hypot(c.frequency_sd_hz, width_hz / EVEN);
-        let evidence = Evidence { stays: true, changes, ..Evidence::default() };
+        let width_hz = if changes { half_maximum_width_hz(self.spectrum, c) } else { 0.0 };
+        let frequency_sd_hz = math::hypot(c.frequency_sd_hz, width_hz / UNIFORM_WIDTH_IN_SD);
+        let evidence = ComponentEvidence { keeps_peak: true, changes, ..ComponentEvidence::default() };
         Some((Component { frequency_sd_hz, ..c.clone() }, evidence))
     }
 }
 
 /// Distance between the places where a peak has fallen to half of its top, Hz: the frequency of what changes
 /// lies somewhere between them.
-fn width_hz(spectrum: &Spectrum, c: &Component) -> f64 {
+fn half_maximum_width_hz(spectrum: &Spectrum, c: &Component) -> f64 {
     let top = spectrum.frequency_hz.partition_point(|hz| *hz < c.frequency_hz);
     let (before, behind) = spectrum.amplitude_m.split_at(top.min(spectrum.amplitude_m.len()));
     let stays = |a: &&f64| **a > c.amplitude_m / 2.0;
@@ -121,7 +124,7 @@ fn width_hz(spectrum: &Spectrum, c: &Component) -> f64 {
 }
 
 /// The noise floor around a frequency, m: noise need not be white.
-fn floor_m(spectrum: &Spectrum, frequency_hz: f64) -> f64 {
+fn local_noise_floor_m(spectrum: &Spectrum, frequency_hz: f64) -> f64 {
     let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
     let bin = |hz: f64| ((hz / bin_hz).max(0.0) as usize).min(spectrum.amplitude_m.len());
     let reach_hz = NEIGHBOURHOOD * spectrum.resolution_hz;
@@ -137,8 +140,8 @@ fn floor_m(spectrum: &Spectrum, frequency_hz: f64) -> f64 {
 /// Whether a component keeps amplitude and phase over the pieces of the record, each seen through a Hann
 /// window.
 fn is_steady(left_m: &[Option<f64>], frame_rate_hz: f64, c: &Component, floor_m: f64) -> bool {
-    let length = 2 * left_m.len() / (PIECES + 1);
-    let hann = window::hann(&vec![Some(0.0); length]);
+    let length = 2 * left_m.len() / (PHASE_SEGMENTS + 1);
+    let hann = window::hann_weights(&vec![Some(0.0); length]);
     let turn = -TAU * c.frequency_hz / frame_rate_hz;
     let piece = |k: usize| {
         let first = k * length / 2;
@@ -153,19 +156,19 @@ fn is_steady(left_m: &[Option<f64>], frame_rate_hz: f64, c: &Component, floor_m:
         let [re, im, sum] = samples.iter().zip(&hann).enumerate().fold([0.0; 3], add);
         (sum > 0.0).then(|| [2.0 * re / sum, 2.0 * im / sum])
     };
-    let pieces: Vec<[f64; 2]> = (0..PIECES).filter_map(piece).collect();
+    let pieces: Vec<[f64; 2]> = (0..PHASE_SEGMENTS).filter_map(piece).collect();
     let count = pieces.len().max(1) as f64;
     let mean = [0, 1].map(|part| pieces.iter().map(|piece| piece[part]).sum::<f64>() / count);
     let off = |piece: &[f64; 2]| math::powi(piece[0] - mean[0], 2) + math::powi(piece[1] - mean[1], 2);
     let scatter_m = (pieces.iter().map(off).sum::<f64>() / count).sqrt();
-    let noise_m = floor_m * INDEPENDENT.sqrt();
-    scatter_m < (STEADY * c.amplitude_m).max(STEADY_IN_NOISE * noise_m)
+    let noise_m = floor_m * INDEPENDENT_SEGMENTS.sqrt();
+    scatter_m < (STEADY_SCATTER * c.amplitude_m).max(STEADY_SCATTER_IN_NOISE * noise_m)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::spectrum::{Estimator, Verdict};
+    use crate::spectrum::{ComponentVerdict, Estimator};
 
     const RATE_HZ: f64 = 5000.0;
     const FRAMES: usize = 40_000;
@@ -191,8 +194,8 @@ mod tests {
         };
         let noise_m = 1e-6 * 12.0_f64.sqrt();
         let samples: Vec<Option<f64>> = (0..FRAMES).map(|i| Some(value(i) + noise_m * draw())).collect();
-        let record = Record { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None };
-        Analysis::of(&record, &Settings::default()).unwrap().spectrum.components
+        let record = SampledRecord { samples: &samples, frame_rate_hz: RATE_HZ, exposure_s: None };
+        SpectralAnalysis::from_record(&record, &SpectrumSettings::default()).unwrap().spectrum.components
     }
 
     /// Those of ring-downs and a steady 900.5 Hz of 10 um.
@@ -209,7 +212,7 @@ mod tests {
     }
 
     fn assert_read(c: &Component, Rings(hz, ratio, _, first): &Rings) {
-        assert_eq!((c.estimator, c.verdict), (Estimator::LeastSquares, Verdict::Clear), "{c:?}");
+        assert_eq!((c.estimator, c.verdict), (Estimator::LeastSquares, ComponentVerdict::Clear), "{c:?}");
         assert!((c.frequency_hz - hz).abs() < 4.0 * c.frequency_sd_hz, "{hz} Hz: {c:?}");
         let off = (c.damping_ratio.unwrap() - ratio).abs() / c.damping_ratio_sd.unwrap();
         assert!(off < 4.0, "{ratio}: {c:?}");
@@ -224,7 +227,7 @@ mod tests {
         assert_eq!(list.len(), 2, "{list:?}");
         assert_read(near(&list, 413.0), &rings);
         let steady = near(&list, 900.5);
-        assert_eq!((steady.estimator, steady.verdict), (Estimator::Periodogram, Verdict::Clear));
+        assert_eq!((steady.estimator, steady.verdict), (Estimator::Periodogram, ComponentVerdict::Clear));
         assert_eq!(steady.begins_s, None);
     }
 
@@ -271,6 +274,9 @@ mod tests {
     fn what_goes_on_outside_the_piece_that_shows_it_is_not_clear() {
         let drifts = |i: usize| 2e-5 * (TAU * (400.0 + 4.0 * i as f64 / RATE_HZ) * i as f64 / RATE_HZ).cos();
         let list = components(drifts);
-        assert!(!list.is_empty() && list.iter().all(|c| c.verdict == Verdict::Ambiguous), "{list:?}");
+        assert!(
+            !list.is_empty() && list.iter().all(|c| c.verdict == ComponentVerdict::Ambiguous),
+            "{list:?}"
+        );
     }
 }

@@ -1,6 +1,6 @@
 //! Inner products of a trend, (decaying) sinusoids and the data over the frames present.
 
-use super::Term;
+use super::SinusoidTerm;
 use crate::math;
 use crate::spectrum::trend::{MOST_COLUMNS, Trend, abscissa};
 use nalgebra::{DMatrix, DMatrixViewMut};
@@ -19,7 +19,7 @@ const BLOCKS_A_TASK: usize = 64;
 /// phase is `pi n u` and the envelope `exp(-d ((u + 1) / 2 - s))`, which is 1 at the share `s` of the record
 /// where the term starts, and zero before.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Of {
+pub(super) enum TermColumn {
     Cosine,
     Sine,
     /// Derivative of the cosine with respect to the cycles.
@@ -29,20 +29,20 @@ pub(super) enum Of {
 }
 
 /// Columns of each term that its amplitudes need: cosine and sine.
-pub(super) const PAIR: usize = 2;
+pub(super) const QUADRATURE_COLUMNS: usize = 2;
 /// Columns of each term that a step needs: the slopes too.
-pub(super) const WITH_SLOPES: usize = 4;
+pub(super) const COLUMNS_WITH_SLOPES: usize = 4;
 
-impl Of {
+impl TermColumn {
     /// Where the column stands after those of the trend, among all four of each term.
-    pub(super) fn column(self, trend: usize, term: usize) -> usize {
-        trend + WITH_SLOPES * term + self as usize
+    pub(super) fn column_index(self, trend: usize, term: usize) -> usize {
+        trend + COLUMNS_WITH_SLOPES * term + self as usize
     }
 }
 
 /// A record's frames, weighted, and a trend's columns over them: what no step of a fit changes.
 #[derive(Debug)]
-pub(super) struct Fixed {
+pub(super) struct FixedColumns {
     frames: usize,
     /// Frames that take part and the root of their weight.
     rows: Vec<(usize, f64)>,
@@ -55,36 +55,36 @@ pub(super) struct Fixed {
 }
 
 /// Cosine and sine with their envelope, and `pi u`, of the frames of a block.
-type Turning = [[f64; 3]; BLOCK];
+type PhasorBlock = [[f64; 3]; BLOCK];
 
-impl Fixed {
-    pub(super) fn of(trend: Trend, data: &[f64], weights: &[f64]) -> Self {
+impl FixedColumns {
+    pub(super) fn new(trend: Trend, data: &[f64], weights: &[f64]) -> Self {
         let rows: Vec<(usize, f64)> =
             weights.iter().enumerate().filter(|(_, w)| **w > 0.0).map(|(i, w)| (i, w.sqrt())).collect();
         let at = |frame: usize| rows.partition_point(|row| row.0 < frame);
         let blocks: Vec<Range<usize>> =
             (0..data.len()).step_by(BLOCK).map(|first| at(first)..at(first + BLOCK)).collect();
-        let mut columns = DMatrix::zeros(rows.len(), trend.columns() + 1);
+        let mut columns = DMatrix::zeros(rows.len(), trend.column_count() + 1);
         let mut basis = [0.0; MOST_COLUMNS];
         for (row, &(frame, root)) in rows.iter().enumerate() {
-            trend.fill(abscissa(frame, data.len()), &mut basis);
+            trend.fill_row(abscissa(frame, data.len()), &mut basis);
             basis
                 .iter()
-                .take(trend.columns())
+                .take(trend.column_count())
                 .enumerate()
                 .for_each(|(column, value)| columns[(row, column)] = root * value);
-            columns[(row, trend.columns())] = root * data[frame];
+            columns[(row, trend.column_count())] = root * data[frame];
         }
         let gram = columns.tr_mul(&columns);
         Self { frames: data.len(), rows, blocks, columns, gram }
     }
 
     /// Inner products of the trend's columns, the first `EACH` of every term and the data, in this order.
-    pub(super) fn gram<const EACH: usize>(&self, terms: &[Term]) -> DMatrix<f64> {
+    pub(super) fn gram_matrix<const EACH: usize>(&self, terms: &[SinusoidTerm]) -> DMatrix<f64> {
         let (trend, width) = (self.columns.ncols() - 1, EACH * terms.len());
         let tasks: Vec<&[Range<usize>]> = self.blocks.chunks(BLOCKS_A_TASK).collect();
         let of = |(task, blocks): (usize, &&[Range<usize>])| {
-            self.with_terms::<EACH>(terms, task * BLOCKS_A_TASK, blocks)
+            self.term_products::<EACH>(terms, task * BLOCKS_A_TASK, blocks)
         };
         let parts: Vec<_> = if tasks.len() > 1 {
             tasks.par_iter().enumerate().map(of).collect()
@@ -109,9 +109,9 @@ impl Fixed {
 
     /// Inner products of the fixed columns with those of the terms, and of these with each other, over blocks
     /// from `first` on.
-    fn with_terms<const EACH: usize>(
+    fn term_products<const EACH: usize>(
         &self,
-        terms: &[Term],
+        terms: &[SinusoidTerm],
         first: usize,
         blocks: &[Range<usize>],
     ) -> (DMatrix<f64>, DMatrix<f64>) {
@@ -123,7 +123,11 @@ impl Fixed {
             let rows = &self.rows[range.clone()];
             for (place, term) in terms.iter().enumerate() {
                 let mut columns = block.columns_mut(EACH * place, EACH);
-                fill::<EACH>(&mut columns, rows, &turning(term, (first + b) * BLOCK, self.frames));
+                fill_term_columns::<EACH>(
+                    &mut columns,
+                    rows,
+                    &rotate_phasors(term, (first + b) * BLOCK, self.frames),
+                );
             }
             let of_terms = block.rows(0, rows.len());
             mixed.gemm_tr(1.0, &self.columns.rows(range.start, rows.len()), &of_terms, 1.0);
@@ -136,27 +140,31 @@ impl Fixed {
     }
 }
 
-fn fill<const EACH: usize>(columns: &mut DMatrixViewMut<'_, f64>, rows: &[(usize, f64)], turning: &Turning) {
-    let mut column = |of: Of, value: fn(f64, [f64; 3]) -> f64| {
+fn fill_term_columns<const EACH: usize>(
+    columns: &mut DMatrixViewMut<'_, f64>,
+    rows: &[(usize, f64)],
+    turning: &PhasorBlock,
+) {
+    let mut column = |of: TermColumn, value: fn(f64, [f64; 3]) -> f64| {
         let mut column = columns.column_mut(of as usize);
         column
             .iter_mut()
             .zip(rows)
             .for_each(|(entry, (frame, root))| *entry = value(*root, turning[frame % BLOCK]));
     };
-    column(Of::Cosine, |root, [cosine, _, _]| root * cosine);
-    column(Of::Sine, |root, [_, sine, _]| root * sine);
-    if EACH == WITH_SLOPES {
-        column(Of::CosineSlope, |root, [_, sine, angle_per_cycle]| -root * angle_per_cycle * sine);
-        column(Of::SineSlope, |root, [cosine, _, angle_per_cycle]| root * angle_per_cycle * cosine);
+    column(TermColumn::Cosine, |root, [cosine, _, _]| root * cosine);
+    column(TermColumn::Sine, |root, [_, sine, _]| root * sine);
+    if EACH == COLUMNS_WITH_SLOPES {
+        column(TermColumn::CosineSlope, |root, [_, sine, angle_per_cycle]| -root * angle_per_cycle * sine);
+        column(TermColumn::SineSlope, |root, [cosine, _, angle_per_cycle]| root * angle_per_cycle * cosine);
     }
 }
 
 /// A term with its cosine and sine amplitude in every frame.
-pub(super) fn course(term: &Term, [cosine_m, sine_m]: [f64; 2], frames: usize) -> Vec<f64> {
+pub(super) fn term_values(term: &SinusoidTerm, [cosine_m, sine_m]: [f64; 2], frames: usize) -> Vec<f64> {
     let mut values = Vec::with_capacity(frames);
     for first in (0..frames).step_by(BLOCK) {
-        let turning = turning(term, first, frames);
+        let turning = rotate_phasors(term, first, frames);
         values.extend(
             turning.iter().take(frames - first).map(|[cosine, sine, _]| cosine_m * cosine + sine_m * sine),
         );
@@ -165,7 +173,7 @@ pub(super) fn course(term: &Term, [cosine_m, sine_m]: [f64; 2], frames: usize) -
 }
 
 /// The frames of a block, each turned by the same angle and shrunk by the same factor from the one before.
-fn turning(term: &Term, first: usize, frames: usize) -> Turning {
+fn rotate_phasors(term: &SinusoidTerm, first: usize, frames: usize) -> PhasorBlock {
     let angle_per_cycle = |frame: usize| PI * abscissa(frame, frames);
     let mut turning = [[0.0; 3]; BLOCK];
     let before = term.first.saturating_sub(first).min(BLOCK);
@@ -193,18 +201,20 @@ fn turning(term: &Term, first: usize, frames: usize) -> Turning {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Free;
+    use super::super::FreeParameters;
     use super::*;
 
     #[test]
     fn inner_products_are_those_summed_frame_by_frame() {
         let frames = 700; // two whole blocks and a part
-        let terms =
-            [(31.3, 0.0), (122.9, 2.5)].map(|(cycles, nepers)| Term::from_start(cycles, nepers, Free::Both));
+        let terms = [(31.3, 0.0), (122.9, 2.5)].map(|(cycles, nepers)| {
+            SinusoidTerm::from_start(cycles, nepers, FreeParameters::CyclesAndNepers)
+        });
         let weights: Vec<f64> =
             (0..frames).map(|i| if i % 3 == 1 { 0.0 } else { 1.0 + i as f64 / 700.0 }).collect();
         let data: Vec<f64> = (0..frames).map(|i| (i as f64 * 0.37).sin()).collect();
-        let gram = Fixed::of(Trend::Polynomial(2), &data, &weights).gram::<WITH_SLOPES>(&terms);
+        let gram = FixedColumns::new(Trend::Polynomial(2), &data, &weights)
+            .gram_matrix::<COLUMNS_WITH_SLOPES>(&terms);
         assert_eq!(gram.shape(), (11, 11));
         let u = |i: usize| abscissa(i, frames);
         let envelope = |i: usize| (-2.5 * (u(i) + 1.0) / 2.0).exp();
@@ -213,10 +223,12 @@ mod tests {
             (0..frames).map(|i| weights[i] * a(i) * b(i)).sum::<f64>()
         };
         let cosine = |i: usize| (PI * 31.3 * u(i)).cos();
-        assert!((gram[(Of::SineSlope.column(2, 1), 10)] - sum(&slope, &|i| data[i])).abs() < 1e-9);
-        assert!((gram[(Of::Cosine.column(2, 0), 1)] - sum(&cosine, &u)).abs() < 1e-9);
+        assert!(
+            (gram[(TermColumn::SineSlope.column_index(2, 1), 10)] - sum(&slope, &|i| data[i])).abs() < 1e-9
+        );
+        assert!((gram[(TermColumn::Cosine.column_index(2, 0), 1)] - sum(&cosine, &u)).abs() < 1e-9);
         assert!((gram[(0, 0)] - sum(&|_| 1.0, &|_| 1.0)).abs() < 1e-9);
-        let of_term = course(&terms[1], [0.0, 2.0], frames);
+        let of_term = term_values(&terms[1], [0.0, 2.0], frames);
         assert!(
             (0..frames).all(|i| (of_term[i] - 2.0 * envelope(i) * (PI * 122.9 * u(i)).sin()).abs() < 1e-10)
         );

@@ -1,30 +1,31 @@
 //! The noise under the lines of a density: a running median, freed from the lines.
 
-use super::each;
+use super::map_parallel_above;
 use crate::math;
 
 /// Knots of the curve in the width of its window; between them it is a line through the logarithms.
 const KNOTS_PER_WINDOW: usize = 4;
 /// A bin this many times above the curve is taken for a line and not for noise: of 14 degrees of freedom one
 /// bin in seventy is.
-const LINE: f64 = 2.0;
+const LINE_RATIO: f64 = 2.0;
 
 /// Times the curve is drawn again without the lines found; the skirts of a line 60 dB above the noise are
 /// gone after three.
-const PASSES: usize = 3;
+const FLOOR_PASSES: usize = 3;
 
 /// Mean of the noise in every bin; `window` is the width of the median, bins, and `degrees` are those of
 /// chi-square in a bin.
-pub(super) fn curve(density: &[f64], window: usize, degrees: f64) -> Vec<f64> {
-    let all = median(density, window, |_| true);
-    let without_lines = |curve: Vec<f64>, _| median(density, window, |bin| density[bin] <= LINE * curve[bin]);
+pub(super) fn noise_floor_curve(density: &[f64], window: usize, degrees: f64) -> Vec<f64> {
+    let all = running_median(density, window, |_| true);
+    let without_lines =
+        |curve: Vec<f64>, _| running_median(density, window, |bin| density[bin] <= LINE_RATIO * curve[bin]);
     let mean_over_median = math::powi(1.0 - 2.0 / (9.0 * degrees), -3); // Wilson and Hilferty 1931
-    (0..PASSES).fold(all, without_lines).into_iter().map(|m| m * mean_over_median).collect()
+    (0..FLOOR_PASSES).fold(all, without_lines).into_iter().map(|m| m * mean_over_median).collect()
 }
 
 /// Running median over the bins that count; a window that holds fewer of them than half its width grows until
 /// it does not, and at the ends it is cut.
-fn median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
+fn running_median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
     let Some(last) = density.len().checked_sub(1) else { return Vec::new() };
     let (half, step) = ((window / 2).max(1), (window / KNOTS_PER_WINDOW).max(1));
     let knots = last.div_ceil(step) + 1;
@@ -47,7 +48,7 @@ fn median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync)
         };
         math::ln(median.max(f64::MIN_POSITIVE))
     };
-    let logs = each(knots, density.len(), of_knot);
+    let logs = map_parallel_above(knots, density.len(), of_knot);
     let between = |bin: usize| {
         let knot = bin / step;
         let (from, to) = (knot * step, ((knot + 1) * step).min(last));
@@ -55,7 +56,7 @@ fn median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync)
         let next = logs.get(knot + 1).unwrap_or(&logs[knot]);
         math::exp(logs[knot] + share * (next - logs[knot]))
     };
-    each(density.len(), density.len(), between)
+    map_parallel_above(density.len(), density.len(), between)
 }
 
 #[cfg(test)]
@@ -67,7 +68,7 @@ mod tests {
         let slope = |bin: usize| (-(bin as f64) / 300.0).exp();
         let mut density: Vec<f64> = (0..1000).map(slope).collect();
         density[480..520].iter_mut().for_each(|d| *d *= 1e6);
-        let curve = curve(&density, 200, 1e9); // of endless degrees of freedom mean and median are one
+        let curve = noise_floor_curve(&density, 200, 1e9); // of endless degrees of freedom mean and median are one
         assert_eq!(curve.len(), 1000);
         // next to the line the median is that of the bins that are left, at most 20 bins aside: 7 %
         assert!((100..900).all(|bin| (curve[bin] / slope(bin) - 1.0).abs() < 0.07), "{:?}", &curve[380..620]);
@@ -76,8 +77,8 @@ mod tests {
 
     #[test]
     fn few_bins_have_a_curve_too() {
-        assert!(curve(&[], 10, 14.0).is_empty());
-        assert!(curve(&[2.0], 10, 1e15).iter().all(|d| (d - 2.0).abs() < 1e-12));
-        assert!(curve(&[2.0; 7], 3, 1e15).iter().all(|d| (d - 2.0).abs() < 1e-12));
+        assert!(noise_floor_curve(&[], 10, 14.0).is_empty());
+        assert!(noise_floor_curve(&[2.0], 10, 1e15).iter().all(|d| (d - 2.0).abs() < 1e-12));
+        assert!(noise_floor_curve(&[2.0; 7], 3, 1e15).iter().all(|d| (d - 2.0).abs() < 1e-12));
     }
 }

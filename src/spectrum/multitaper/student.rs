@@ -5,19 +5,19 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 /// The `t` with the chance `inside` that a value of `degrees` degrees of freedom, one or more, lies between
 /// `-t` and `t`.
-pub(super) fn two_sided(inside: f64, degrees: usize) -> f64 {
+pub(super) fn student_t_quantile(inside: f64, degrees: usize) -> f64 {
     /// Halvings that leave the last bit of an angle.
     const HALVINGS: usize = 60;
     let (mut low, mut high) = (0.0, FRAC_PI_2);
     for _ in 0..HALVINGS {
         let angle = (low + high) / 2.0;
-        *(if within(angle, degrees) < inside { &mut low } else { &mut high }) = angle;
+        *(if student_t_probability(angle, degrees) < inside { &mut low } else { &mut high }) = angle;
     }
     (degrees as f64).sqrt() * math::tan(low)
 }
 
 /// The chance to lie within `sqrt(degrees) tan(angle)` (Abramowitz and Stegun 26.7.3, 26.7.4).
-fn within(angle: f64, degrees: usize) -> f64 {
+fn student_t_probability(angle: f64, degrees: usize) -> f64 {
     let (sine, cosine) = math::sin_cos(angle);
     let odd = degrees % 2;
     let mut term = if odd == 1 { cosine } else { 1.0 };
@@ -51,7 +51,7 @@ mod tests {
             (13, 2.160),
             (30, 2.042),
         ] {
-            let found = two_sided(0.95, degrees);
+            let found = student_t_quantile(0.95, degrees);
             assert!((found - tabled).abs() < 6e-4, "{degrees}: {found}");
         }
     }

@@ -5,34 +5,34 @@
 //! products `G` over the frames present, `G^(-1/2)` times the tapers are, and of all such sets these are the
 //! nearest to the tapers themselves.
 
-use super::each;
+use super::map_parallel_above;
 use crate::math;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
 
 /// Frames whose inner products are summed at a time: the sum is the same for any number of threads.
-const BLOCK: usize = 1 << 15;
+const PRODUCT_BLOCK: usize = 1 << 15;
 /// Combinations of tapers with less than this share of the largest's energy on the frames present are left
 /// out: they lie in the gaps, and brought to unit energy they would leak over the whole spectrum.
-const LEAST_SHARE: f64 = 0.1;
+const LEAST_ENERGY_SHARE: f64 = 0.1;
 
 /// Combinations of sine tapers.
-pub(super) struct Tapers {
+pub(super) struct SineTapers {
     /// Angle from frame to frame of the first taper.
     turn: f64,
     /// A row for each taper: its combination of the sines.
     rows: DMatrix<f64>,
 }
 
-impl Tapers {
+impl SineTapers {
     /// At most `count` tapers for a record; fewer where its gaps leave room for fewer only.
-    pub(super) fn over(samples: &[Option<f64>], count: usize) -> Self {
+    pub(super) fn new(samples: &[Option<f64>], count: usize) -> Self {
         let turn = PI / (samples.len() + 1) as f64;
         let sines = DMatrix::identity(count, count) * (2.0 / (samples.len() + 1) as f64).sqrt();
         let rows = if samples.iter().all(Option::is_some) {
             sines
         } else {
-            orthonormal(&inner_products(samples, turn, count))
+            orthonormal_combinations(&taper_inner_products(samples, turn, count))
         };
         Self { turn, rows }
     }
@@ -49,18 +49,18 @@ impl Tapers {
     }
 
     /// What the sines are multiplied with to give a taper.
-    pub(super) fn row(&self, taper: usize) -> Vec<f64> {
+    pub(super) fn coefficients(&self, taper: usize) -> Vec<f64> {
         self.rows.row(taper).iter().copied().collect()
     }
 }
 
 /// `sum sin(j a) sin(k a)` over the frames present, `a` the angle of the frame.
-fn inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMatrix<f64> {
+fn taper_inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMatrix<f64> {
     let block = |index: usize| {
         let mut sum = DMatrix::zeros(count, count);
         let mut sines = DVector::zeros(count);
-        for frame in
-            (index * BLOCK..samples.len().min((index + 1) * BLOCK)).filter(|frame| samples[*frame].is_some())
+        for frame in (index * PRODUCT_BLOCK..samples.len().min((index + 1) * PRODUCT_BLOCK))
+            .filter(|frame| samples[*frame].is_some())
         {
             let (sine, cosine) = math::sin_cos(turn * (frame + 1) as f64);
             let (mut before, mut now) = (0.0, sine);
@@ -72,13 +72,13 @@ fn inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMatrix<f
         }
         sum
     };
-    each(samples.len().div_ceil(BLOCK), samples.len(), block).into_iter().sum()
+    map_parallel_above(samples.len().div_ceil(PRODUCT_BLOCK), samples.len(), block).into_iter().sum()
 }
 
 /// `G^(-1/2)`, or where some combinations lie in the gaps, the combinations that do not, each of unit energy.
-fn orthonormal(products: &DMatrix<f64>) -> DMatrix<f64> {
+fn orthonormal_combinations(products: &DMatrix<f64>) -> DMatrix<f64> {
     let eigen = products.clone().symmetric_eigen();
-    let least = LEAST_SHARE * eigen.eigenvalues.max();
+    let least = LEAST_ENERGY_SHARE * eigen.eigenvalues.max();
     let kept: Vec<usize> = (0..eigen.eigenvalues.len()).filter(|i| eigen.eigenvalues[*i] > least).collect();
     let directions = eigen.eigenvectors.select_columns(&kept);
     let scale = DMatrix::from_diagonal(&DVector::from_iterator(
@@ -97,9 +97,11 @@ mod tests {
     use super::*;
 
     fn table(samples: &[Option<f64>], count: usize) -> Vec<Vec<f64>> {
-        let tapers = Tapers::over(samples, count);
+        let tapers = SineTapers::new(samples, count);
         let taper = |k: usize| {
-            (0..samples.len()).map(|i| samples[i].map_or(0.0, |_| tapers.value(&tapers.row(k), i))).collect()
+            (0..samples.len())
+                .map(|i| samples[i].map_or(0.0, |_| tapers.value(&tapers.coefficients(k), i)))
+                .collect()
         };
         (0..tapers.len()).map(taper).collect()
     }

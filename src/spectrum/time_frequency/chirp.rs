@@ -10,22 +10,22 @@ use nalgebra::{SMatrix, SVector};
 use std::f64::consts::PI;
 
 /// Unknowns with a frequency that changes linearly: p, q, s, a, b.
-pub(super) const LINEAR: usize = 5;
+pub(super) const LINEAR_UNKNOWNS: usize = 5;
 /// And c, with a rate that changes too.
-pub(super) const CURVED: usize = 6;
+pub(super) const CURVED_UNKNOWNS: usize = 6;
 /// Most steps; five are usual.
 const MOST_STEPS: usize = 20;
 /// A step that turns the phase at the ends of the segment by less, rad, is the last: the next is its square.
-const SETTLED: f64 = 1e-3;
+const SMALLEST_PHASE_STEP: f64 = 1e-3;
 /// First damping of a step that does not descend, as a share of the diagonal.
-const DAMPING: f64 = 1e-2;
+const FIRST_DAMPING: f64 = 1e-2;
 /// Damping at which no step descends any more.
-const STUCK: f64 = 1e4;
+const LARGEST_DAMPING: f64 = 1e4;
 /// Frames for each unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 3;
 
 /// Frames of a segment and what they weigh.
-pub(super) struct Segment<'a> {
+pub(super) struct ChirpSegment<'a> {
     pub samples: &'a [Option<f64>],
     /// One weight a frame; a frame without value takes no part.
     pub weights: &'a [f64],
@@ -33,23 +33,23 @@ pub(super) struct Segment<'a> {
 
 /// The unknowns p, q, s, a, b, c.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Shape(pub [f64; CURVED]);
+pub(super) struct ChirpParameters(pub [f64; CURVED_UNKNOWNS]);
 
 /// A fit of the first `N` unknowns.
-pub(super) struct Fitted<const N: usize> {
-    pub shape: Shape,
+pub(super) struct ChirpFit<const N: usize> {
+    pub parameters: ChirpParameters,
     /// Covariance of the unknowns for a noise of deviation 1 in each frame.
     pub covariance: SMatrix<f64, N, N>,
 }
 
-impl Shape {
+impl ChirpParameters {
     /// A start from a frequency, cycles in the segment, and its change over the segment, cycles.
-    pub(super) fn start(cycles: f64, change: f64) -> Self {
+    pub(super) fn from_cycles(cycles: f64, change: f64) -> Self {
         Self([0.0, 0.0, 0.0, PI * cycles, PI * change / 4.0, 0.0])
     }
 
     /// Frequency at `x`, cycles in the segment.
-    pub(super) fn cycles(&self, x: f64) -> f64 {
+    pub(super) fn cycles_at(&self, x: f64) -> f64 {
         let [.., a, b, c] = self.0;
         (a + x * (2.0 * b + 3.0 * x * c)) / PI
     }
@@ -60,7 +60,7 @@ impl Shape {
     }
 
     /// The same shape with a rate that changes by given cycles a segment from one segment to the next.
-    pub(super) fn bent(mut self, cycles: f64) -> Self {
+    pub(super) fn with_curvature(mut self, cycles: f64) -> Self {
         self.0[5] = PI * cycles / 24.0;
         self
     }
@@ -97,7 +97,7 @@ impl Shape {
     }
 
     /// The value at `x` where the phase has this cosine and sine.
-    fn value(&self, (x, cosine, sine): (f64, f64, f64)) -> f64 {
+    fn value_at(&self, (x, cosine, sine): (f64, f64, f64)) -> f64 {
         (1.0 + self.0[2] * x) * (self.0[0] * cosine + self.0[1] * sine)
     }
 
@@ -109,11 +109,11 @@ impl Shape {
 
     /// The values in every frame of a segment.
     pub(super) fn values(self, frames: usize) -> impl Iterator<Item = f64> {
-        self.phases(frames).map(move |at| self.value(at))
+        self.phases(frames).map(move |at| self.value_at(at))
     }
 
     /// Derivatives of the value with respect to the unknowns.
-    fn slopes(&self, (x, cosine, sine): (f64, f64, f64)) -> [f64; CURVED] {
+    fn derivatives(&self, (x, cosine, sine): (f64, f64, f64)) -> [f64; CURVED_UNKNOWNS] {
         let [p, q, s, ..] = self.0;
         let level = 1.0 + s * x;
         let turned = level * x * (q * cosine - p * sine);
@@ -122,54 +122,58 @@ impl Shape {
 }
 
 /// Normal equations at a shape.
-struct Normal<const N: usize> {
+struct ChirpNormalEquations<const N: usize> {
     matrix: SMatrix<f64, N, N>,
-    towards: SVector<f64, N>,
+    right_hand_side: SVector<f64, N>,
     misfit: f64,
 }
 
-impl Segment<'_> {
+impl ChirpSegment<'_> {
     /// The frequency at which the misfit is least, from a start; `None` where the frames do not fix it.
-    pub(super) fn fit<const N: usize>(&self, start: Shape) -> Option<Fitted<N>> {
+    pub(super) fn fit_chirp<const N: usize>(&self, start: ChirpParameters) -> Option<ChirpFit<N>> {
         if self.samples.iter().flatten().count() < FRAMES_PER_UNKNOWN * N {
             return None;
         }
-        let mut shape = self.amplitude(start)?;
-        let mut normal = self.normal::<N>(&shape, |w| w);
+        let mut shape = self.with_fitted_amplitude(start)?;
+        let mut normal = self.normal_equations::<N>(&shape, |w| w);
         let mut damping = 0.0;
         for _ in 0..MOST_STEPS {
-            let step = damped(&normal.matrix, damping).cholesky()?.solve(&normal.towards);
-            let next = stepped(shape, &step);
-            let found = self.normal::<N>(&next, |w| w);
-            let settled = step.iter().skip(3).all(|s| s.abs() < SETTLED);
+            let step = damp_diagonal(&normal.matrix, damping).cholesky()?.solve(&normal.right_hand_side);
+            let next = apply_step(shape, &step);
+            let found = self.normal_equations::<N>(&next, |w| w);
+            let settled = step.iter().skip(3).all(|s| s.abs() < SMALLEST_PHASE_STEP);
             if found.misfit <= normal.misfit {
                 (shape, normal, damping) =
-                    (next, found, if damping > DAMPING { damping / 10.0 } else { 0.0 });
+                    (next, found, if damping > FIRST_DAMPING { damping / 10.0 } else { 0.0 });
             } else {
-                damping = (10.0 * damping).max(DAMPING);
+                damping = (10.0 * damping).max(FIRST_DAMPING);
             }
-            if settled || damping > STUCK {
+            if settled || damping > LARGEST_DAMPING {
                 break;
             }
         }
         let inverse = normal.matrix.cholesky()?.inverse();
-        let spread = self.normal::<N>(&shape, |w| w * w).matrix;
-        Some(Fitted { shape, covariance: inverse * spread * inverse })
+        let spread = self.normal_equations::<N>(&shape, |w| w * w).matrix;
+        Some(ChirpFit { parameters: shape, covariance: inverse * spread * inverse })
     }
 
     /// The start with the amplitude that fits it, and no slope of it.
-    fn amplitude(&self, start: Shape) -> Option<Shape> {
+    fn with_fitted_amplitude(&self, start: ChirpParameters) -> Option<ChirpParameters> {
         let [.., a, b, c] = start.0;
-        let normal = self.normal::<2>(&Shape([0.0, 0.0, 0.0, a, b, c]), |w| w);
-        let [p, q] = normal.matrix.cholesky()?.solve(&normal.towards).into();
-        Some(Shape([p, q, 0.0, a, b, c]))
+        let normal = self.normal_equations::<2>(&ChirpParameters([0.0, 0.0, 0.0, a, b, c]), |w| w);
+        let [p, q] = normal.matrix.cholesky()?.solve(&normal.right_hand_side).into();
+        Some(ChirpParameters([p, q, 0.0, a, b, c]))
     }
 
-    fn normal<const N: usize>(&self, shape: &Shape, weight: impl Fn(f64) -> f64) -> Normal<N> {
+    fn normal_equations<const N: usize>(
+        &self,
+        shape: &ChirpParameters,
+        weight: impl Fn(f64) -> f64,
+    ) -> ChirpNormalEquations<N> {
         let (mut matrix, mut towards, mut misfit) = ([[0.0; N]; N], [0.0; N], 0.0);
         for ((sample, w), at) in self.samples.iter().zip(self.weights).zip(shape.phases(self.samples.len())) {
             let Some(sample) = sample else { continue };
-            let (rest, slopes, w) = (sample - shape.value(at), shape.slopes(at), weight(*w));
+            let (rest, slopes, w) = (sample - shape.value_at(at), shape.derivatives(at), weight(*w));
             for i in 0..N {
                 let weighted = w * slopes[i];
                 (0..=i).for_each(|j| matrix[i][j] += weighted * slopes[j]);
@@ -178,25 +182,25 @@ impl Segment<'_> {
             misfit += w * rest * rest;
         }
         let matrix = SMatrix::from_fn(|i, j| matrix[i.max(j)][i.min(j)]);
-        Normal { matrix, towards: SVector::from(towards), misfit }
+        ChirpNormalEquations { matrix, right_hand_side: SVector::from(towards), misfit }
     }
 }
 
-fn damped<const N: usize>(matrix: &SMatrix<f64, N, N>, damping: f64) -> SMatrix<f64, N, N> {
+fn damp_diagonal<const N: usize>(matrix: &SMatrix<f64, N, N>, damping: f64) -> SMatrix<f64, N, N> {
     let mut damped = *matrix;
     (0..N).for_each(|i| damped[(i, i)] *= 1.0 + damping);
     damped
 }
 
 /// The shape after a step; an amplitude falls at most to nothing at one end of the segment.
-fn stepped<const N: usize>(shape: Shape, step: &SVector<f64, N>) -> Shape {
+fn apply_step<const N: usize>(shape: ChirpParameters, step: &SVector<f64, N>) -> ChirpParameters {
     let mut next = shape.0;
     next.iter_mut().zip(step.iter()).for_each(|(value, step)| *value += step);
     next[2] = next[2].clamp(-1.0, 1.0);
-    Shape(next)
+    ChirpParameters(next)
 }
 
-impl<const N: usize> Fitted<N> {
+impl<const N: usize> ChirpFit<N> {
     /// Variance of the frequency at `x`, square cycles in the segment, for a noise of deviation 1 in each
     /// frame.
     pub(super) fn cycles_variance(&self, x: f64) -> f64 {
@@ -213,21 +217,22 @@ mod tests {
 
     #[test]
     fn an_exact_chirp_is_restored_also_with_missing_frames() {
-        let truth = Shape([3.0, -2.0, 0.3, PI * 9.3, PI * 0.6, 0.2]);
+        let truth = ChirpParameters([3.0, -2.0, 0.3, PI * 9.3, PI * 0.6, 0.2]);
         let samples: Vec<_> = truth.values(90).enumerate().map(|(i, x)| (i % 5 != 3).then_some(x)).collect();
         let weights = vec![1.0; 90];
-        let fitted =
-            Segment { samples: &samples, weights: &weights }.fit::<CURVED>(Shape::start(9.1, 1.0)).unwrap();
-        for (found, expected) in fitted.shape.0.iter().zip(truth.0) {
-            assert!((found - expected).abs() < 1e-5, "{:?}", fitted.shape);
+        let fitted = ChirpSegment { samples: &samples, weights: &weights }
+            .fit_chirp::<CURVED_UNKNOWNS>(ChirpParameters::from_cycles(9.1, 1.0))
+            .unwrap();
+        for (found, expected) in fitted.parameters.0.iter().zip(truth.0) {
+            assert!((found - expected).abs() < 1e-5, "{:?}", fitted.parameters);
         }
-        assert!((fitted.shape.cycles(0.5) - (9.3 + 0.6 + 0.15 / PI)).abs() < 1e-5);
+        assert!((fitted.parameters.cycles_at(0.5) - (9.3 + 0.6 + 0.15 / PI)).abs() < 1e-5);
         assert!((truth.change() - 2.4).abs() < 1e-12);
     }
 
     #[test]
     fn the_phase_is_that_of_the_polynomial() {
-        let shape = Shape([1.0, 0.5, -0.4, 400.0, 70.0, -20.0]);
+        let shape = ChirpParameters([1.0, 0.5, -0.4, 400.0, 70.0, -20.0]);
         let frames = 2048;
         for (i, value) in shape.values(frames).enumerate() {
             let x = (2 * i + 1) as f64 / frames as f64 - 1.0;
@@ -240,13 +245,13 @@ mod tests {
     fn too_few_frames_fix_nothing() {
         let samples = [Some(1.0); 14];
         assert!(
-            Segment { samples: &samples, weights: &[1.0; 14] }
-                .fit::<LINEAR>(Shape::start(3.0, 0.0))
+            ChirpSegment { samples: &samples, weights: &[1.0; 14] }
+                .fit_chirp::<LINEAR_UNKNOWNS>(ChirpParameters::from_cycles(3.0, 0.0))
                 .is_none()
         );
         assert!(
-            Segment { samples: &[Some(0.0); 40], weights: &[1.0; 40] }
-                .fit::<LINEAR>(Shape::start(5.0, 0.0))
+            ChirpSegment { samples: &[Some(0.0); 40], weights: &[1.0; 40] }
+                .fit_chirp::<LINEAR_UNKNOWNS>(ChirpParameters::from_cycles(5.0, 0.0))
                 .is_none()
         );
     }

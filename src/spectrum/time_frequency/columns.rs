@@ -1,65 +1,65 @@
 //! Transforms of the segments.
 
-use super::segment::Layout;
-use crate::spectrum::transform::Transform;
+use super::segment::SegmentLayout;
+use crate::spectrum::transform::RealTransform;
 use crate::spectrum::window;
 use std::ops::RangeInclusive;
 
 /// Bins for each resolution at least; the power of two above a segment makes up to twice as many.
-const FINE: usize = 4;
+const FINE_PADDING: usize = 4;
 /// The same where only a maximum is sought: a Hann lobe seen at half its resolution is at most 0.4 dB low.
-const COARSE: usize = 2;
+const COARSE_PADDING: usize = 2;
 /// Share of the window's weight that must be present.
 const LEAST_PRESENT: f64 = 0.5;
 
 /// The bins of a transform.
-pub(super) struct Bins {
+pub(super) struct SegmentBins {
     /// Length of the transform, samples.
     pub padded: usize,
 }
 
-impl Bins {
+impl SegmentBins {
     /// Those of a spectrogram.
-    pub(super) fn of(layout: &Layout) -> Self {
-        Self { padded: (FINE * layout.frames).next_power_of_two() }
+    pub(super) fn fine(layout: &SegmentLayout) -> Self {
+        Self { padded: (FINE_PADDING * layout.frames).next_power_of_two() }
     }
 
     /// Those that are enough for a maximum.
-    pub(super) fn coarse(layout: &Layout) -> Self {
-        Self { padded: (COARSE * layout.frames).next_power_of_two() }
+    pub(super) fn coarse(layout: &SegmentLayout) -> Self {
+        Self { padded: (COARSE_PADDING * layout.frames).next_power_of_two() }
     }
 
     /// From zero to half the frame rate.
-    pub(super) fn all(&self) -> RangeInclusive<usize> {
+    pub(super) fn all_bins(&self) -> RangeInclusive<usize> {
         0..=self.padded / 2
     }
 
     /// Those in a band, at least one.
-    pub(super) fn within(&self, (low, high): (f64, f64), frame_rate_hz: f64) -> RangeInclusive<usize> {
+    pub(super) fn bins_in_band(&self, (low, high): (f64, f64), frame_rate_hz: f64) -> RangeInclusive<usize> {
         let bin = |hz: f64| hz / frame_rate_hz * self.padded as f64;
         let first = (bin(low).ceil() as usize).min(self.padded / 2);
         first..=(bin(high).floor() as usize).clamp(first, self.padded / 2)
     }
 
     /// Amplitudes of each segment in some of the bins, m; `None` where too much is missing.
-    pub(super) fn columns(
+    pub(super) fn column_amplitudes(
         &self,
         samples: &[Option<f64>],
-        layout: &Layout,
+        layout: &SegmentLayout,
         bins: RangeInclusive<usize>,
     ) -> Vec<Option<Vec<f64>>> {
-        let transform = Transform::of(self.padded);
-        let window = window::hann(&vec![Some(0.0); layout.frames]);
+        let transform = RealTransform::new(self.padded);
+        let window = window::hann_weights(&vec![Some(0.0); layout.frames]);
         let whole: f64 = window.iter().sum();
         let column = |c: usize| {
-            let segment = samples.get(layout.first(c)..layout.first(c) + layout.frames)?;
+            let segment = samples.get(layout.first_frame(c)..layout.first_frame(c) + layout.frames)?;
             let present: f64 =
                 segment.iter().zip(&window).map(|(x, w)| if x.is_some() { *w } else { 0.0 }).sum();
             let scale = 2.0 / present;
             let weighted = || segment.iter().zip(&window).map(|(x, w)| x.map_or(0.0, |x| x * w * scale));
             let amplitudes = || {
                 transform
-                    .squares(weighted())
+                    .squared_magnitudes(weighted())
                     .get(bins.clone())
                     .unwrap_or_default()
                     .iter()

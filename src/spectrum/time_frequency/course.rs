@@ -10,16 +10,16 @@ use super::{Ridge, RidgePoint, Spectrogram};
 use crate::math;
 
 /// Range of amplitudes that counts, and that the colours of a spectrogram hold, dB.
-pub(crate) const MOST_RANGE_DB: f64 = 60.0;
+pub(crate) const DYNAMIC_RANGE_DB: f64 = 60.0;
 /// Largest step from a segment to the next beyond what the fitted rates say, resolutions, where segments
 /// share three quarters of their frames: the quarter within which neighbours of a range agree too. For the
 /// weakest component that a ridge accepts noise makes it less than a tenth, and a single component has no
 /// other reason to jump.
-const LARGEST_STEP: f64 = 0.25;
+const MAX_FREQUENCY_STEP: f64 = 0.25;
 /// Distance of such segments, segments.
 const USUAL_HOP: f64 = 0.25;
 /// Fewest segments of a part where they share few frames with each other.
-const FEWEST: usize = 3;
+const MIN_PART_SEGMENTS: usize = 3;
 
 /// A frequency at a speed of the tip.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -34,26 +34,28 @@ pub struct SpeedPoint {
 
 /// The parts of a ridge, in order of time, with a gap between one and the next.
 #[must_use]
-pub fn parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePoint>> {
+pub fn coherent_parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePoint>> {
     let amplitudes = of.amplitude_m.iter().flatten().flatten();
-    let least_m = math::powf(10.0, -MOST_RANGE_DB / 20.0) * amplitudes.fold(0.0, |most: f64, a| most.max(*a));
+    let least_m =
+        math::powf(10.0, -DYNAMIC_RANGE_DB / 20.0) * amplitudes.fold(0.0, |most: f64, a| most.max(*a));
     let strong: Vec<RidgePoint> = ridge.points.iter().filter(|p| p.amplitude_m >= least_m).copied().collect();
     // from one segment to the next that shares no frame with it: less is hardly more than one segment, and
     // may agree by chance
-    let fewest = FEWEST.max((ridge.segment_s / ridge.hop_s).round() as usize + 1);
+    let fewest = MIN_PART_SEGMENTS.max((ridge.segment_s / ridge.hop_s).round() as usize + 1);
     strong
-        .chunk_by(|a, b| follows(ridge, a, b))
+        .chunk_by(|a, b| is_continuous(ridge, a, b))
         .filter(|part| part.len() >= fewest)
         .map(<[RidgePoint]>::to_vec)
         .collect()
 }
 
 /// Whether one point is the next of the course that the other is on.
-fn follows(ridge: &Ridge, a: &RidgePoint, b: &RidgePoint) -> bool {
+fn is_continuous(ridge: &Ridge, a: &RidgePoint, b: &RidgePoint) -> bool {
     let apart_s = b.time_s - a.time_s;
     let step_hz = b.frequency_hz - a.frequency_hz - apart_s * (a.rate_hz_per_s + b.rate_hz_per_s) / 2.0;
     // segments that share fewer frames may differ by as much more
-    let allowed_hz = LARGEST_STEP / ridge.segment_s * (ridge.hop_s / (USUAL_HOP * ridge.segment_s)).max(1.0);
+    let allowed_hz =
+        MAX_FREQUENCY_STEP / ridge.segment_s * (ridge.hop_s / (USUAL_HOP * ridge.segment_s)).max(1.0);
     apart_s < 1.5 * ridge.hop_s && step_hz.abs() <= allowed_hz
 }
 
@@ -71,9 +73,9 @@ mod tests {
     fn times(at_m: impl Fn(f64) -> f64) -> [Vec<f64>; 2] {
         let record: Vec<Option<f64>> = (0..3000).map(|i| Some(at_m(f64::from(i) / RATE_HZ))).collect();
         let settings = SpectrogramSettings { segment_s: Some(0.0288), band_hz: Some(BAND_HZ) };
-        let spectrogram = Spectrogram::of(&record, RATE_HZ, &settings).unwrap();
-        let ridge = spectrogram.ridge(&record, BAND_HZ).unwrap();
-        let drawn = parts(&ridge, &spectrogram);
+        let spectrogram = Spectrogram::new(&record, RATE_HZ, &settings).unwrap();
+        let ridge = spectrogram.find_ridge(&record, BAND_HZ).unwrap();
+        let drawn = coherent_parts(&ridge, &spectrogram);
         let time = |p: &RidgePoint| p.time_s;
         [ridge.points.iter().map(time).collect(), drawn.iter().flatten().map(time).collect()]
     }

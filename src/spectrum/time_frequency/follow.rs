@@ -2,7 +2,7 @@
 
 use super::ridge::{Ridge, RidgePoint};
 use super::spectrogram::Spectrogram;
-use super::tracker::Tracker;
+use super::tracker::RidgeTracker;
 use crate::spectrum::error::SpectrumError;
 
 /// Points in a row that make a part of a ridge; fewer span less than half a segment more than one of them.
@@ -14,23 +14,28 @@ impl Spectrogram {
     ///
     /// # Errors
     /// [`SpectrumError::Band`] when the band holds no frequency of the spectrogram.
-    pub fn ridge(&self, samples: &[Option<f64>], band_hz: (f64, f64)) -> Result<Ridge, SpectrumError> {
+    pub fn find_ridge(&self, samples: &[Option<f64>], band_hz: (f64, f64)) -> Result<Ridge, SpectrumError> {
         let (low, high) = band_hz;
         let nyquist = self.frame_rate_hz / 2.0;
         if !(low >= 0.0 && low < high && low < nyquist) {
             return Err(SpectrumError::Band { low, high, nyquist });
         }
-        Ok(follow(self, samples, (low, high.min(nyquist))))
+        Ok(follow_ridge(self, samples, (low, high.min(nyquist))))
     }
 }
 
-fn follow(spectrogram: &Spectrogram, samples: &[Option<f64>], band_hz: (f64, f64)) -> Ridge {
-    let tracker = Tracker::of(spectrogram, samples, band_hz);
-    let fits = tracker.bent(&tracker.repaired(&tracker.fits(&tracker.starts(spectrogram))));
-    let points: Vec<Option<RidgePoint>> =
-        fits.iter().enumerate().map(|(c, fit)| fit.as_ref().and_then(|fit| tracker.point(c, fit))).collect();
-    let points = without_short_runs(points);
-    let end = |c: usize| points[c].and(fits[c].as_ref()).and_then(|fit| tracker.end(c, fit));
+fn follow_ridge(spectrogram: &Spectrogram, samples: &[Option<f64>], band_hz: (f64, f64)) -> Ridge {
+    let tracker = RidgeTracker::new(spectrogram, samples, band_hz);
+    let fits = tracker.refit_with_curvature(
+        &tracker.refit_from_neighbours(&tracker.fit_segments(&tracker.fit_starts(spectrogram))),
+    );
+    let points: Vec<Option<RidgePoint>> = fits
+        .iter()
+        .enumerate()
+        .map(|(c, fit)| fit.as_ref().and_then(|fit| tracker.ridge_point(c, fit)))
+        .collect();
+    let points = remove_short_runs(points);
+    let end = |c: usize| points[c].and(fits[c].as_ref()).and_then(|fit| tracker.ridge_end(c, fit));
     Ridge {
         start: end(0),
         end: end(points.len() - 1),
@@ -41,7 +46,7 @@ fn follow(spectrogram: &Spectrogram, samples: &[Option<f64>], band_hz: (f64, f64
 }
 
 /// Takes out points in runs that are too short for a course.
-fn without_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoint>> {
+fn remove_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoint>> {
     let fewest = FEWEST_POINTS.min(points.len());
     for run in points.chunk_by_mut(|a, b| a.is_some() == b.is_some()).filter(|run| run.len() < fewest) {
         run.fill(None);

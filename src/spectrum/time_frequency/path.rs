@@ -5,12 +5,12 @@ use crate::math;
 /// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of half a
 /// resolution in a quarter of a segment moves the frequency by two within the segment, about as much as a
 /// segment of the chosen length sees.
-const JUMP: f64 = 0.5;
+const JUMP_SD: f64 = 0.5;
 /// Farthest jump, in standard deviations: six resolutions within a segment.
-const REACH: f64 = 3.0;
+const LONGEST_JUMP: f64 = 3.0;
 
 /// Levels of the bins of the columns, and how far apart both are.
-pub(super) struct Field<'a> {
+pub(super) struct PathLevels<'a> {
     /// Amplitudes over noise for each column in the band; `None` where there is no spectrum.
     pub levels: &'a [Option<Vec<f64>>],
     /// Bins in the band.
@@ -21,27 +21,28 @@ pub(super) struct Field<'a> {
     pub quarters: f64,
 }
 
-impl Field<'_> {
+impl PathLevels<'_> {
     /// The bin of each column on the best path. A level counts by the logarithm of its power, so that the
     /// path holds on to a component that fades; a jump costs half the square of its size in standard
     /// deviations.
-    pub(super) fn best(&self) -> Vec<usize> {
-        let sd = (JUMP * self.quarters * self.bins_per_resolution).max(1.0);
-        let reach = ((REACH * sd) as usize).clamp(1, self.bins);
+    pub(super) fn best_path(&self) -> Vec<usize> {
+        let sd = (JUMP_SD * self.quarters * self.bins_per_resolution).max(1.0);
+        let reach = ((LONGEST_JUMP * sd) as usize).clamp(1, self.bins);
         let costs: Vec<f64> = (0..=reach).map(|jump| 0.5 * math::powi(jump as f64 / sd, 2)).collect();
         let mut sums = vec![0.0; self.bins];
         let mut from: Vec<Vec<u32>> = Vec::with_capacity(self.levels.len());
         for (column, levels) in self.levels.iter().enumerate() {
-            let came = if column == 0 { (0..self.bins as u32).collect() } else { advance(&mut sums, &costs) };
+            let came =
+                if column == 0 { (0..self.bins as u32).collect() } else { advance_column(&mut sums, &costs) };
             from.push(came);
             if let Some(levels) = levels {
                 sums.iter_mut().zip(levels).for_each(|(sum, level)| *sum += math::ln(1.0 + level * level));
             }
         }
-        self.back(&sums, &from)
+        self.trace_back(&sums, &from)
     }
 
-    fn back(&self, sums: &[f64], from: &[Vec<u32>]) -> Vec<usize> {
+    fn trace_back(&self, sums: &[f64], from: &[Vec<u32>]) -> Vec<usize> {
         let greatest = |best: usize, bin: usize| if sums[bin] > sums[best] { bin } else { best };
         let mut bin = (0..self.bins).fold(0, greatest);
         let mut path: Vec<usize> = Vec::with_capacity(from.len());
@@ -55,7 +56,7 @@ impl Field<'_> {
 }
 
 /// Moves the sums on by one column; returns the bin each came from.
-fn advance(sums: &mut Vec<f64>, costs: &[f64]) -> Vec<u32> {
+fn advance_column(sums: &mut Vec<f64>, costs: &[f64]) -> Vec<u32> {
     let bins = sums.len();
     let reach = costs.len() - 1;
     let came = |bin: usize| {
@@ -79,7 +80,7 @@ mod tests {
     use super::*;
 
     fn best(levels: &[Option<Vec<f64>>], bins: usize) -> Vec<usize> {
-        Field { levels, bins, bins_per_resolution: 4.0, quarters: 1.0 }.best()
+        PathLevels { levels, bins, bins_per_resolution: 4.0, quarters: 1.0 }.best_path()
     }
 
     fn peak(at: usize, height: f64) -> Option<Vec<f64>> {

@@ -5,17 +5,17 @@ use crate::math;
 use serde::Serialize;
 
 /// Resolutions within which neighbours agree.
-const AGREES: f64 = 0.25;
+const AGREEMENT_RESOLUTIONS: f64 = 0.25;
 /// Deviations of their difference within which neighbours agree.
-const AGREES_DEVIATIONS: f64 = 4.0;
+const AGREEMENT_DEVIATIONS: f64 = 4.0;
 /// Distance of points that share too few frames to follow each other's noise, segments.
-const INDEPENDENT: f64 = 0.5;
+const INDEPENDENT_SEGMENTS: f64 = 0.5;
 /// Deviations of a normal number that are exceeded upwards once in a thousand.
 const ONCE_IN_A_THOUSAND: f64 = 3.09;
 
 /// Least and greatest frequency of a course.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Range {
+pub struct FrequencyRange {
     /// Least frequency, Hz.
     pub low_hz: f64,
     /// Its standard deviation, Hz.
@@ -32,37 +32,47 @@ impl Ridge {
     /// within a quarter of a resolution or four deviations, so that a single bad point sets neither; `None`
     /// where no point is so confirmed.
     #[must_use]
-    pub fn range_hz(&self) -> Option<Range> {
-        of(self)
+    pub fn range_hz(&self) -> Option<FrequencyRange> {
+        frequency_range(self)
     }
 
     /// Whether the frequency changes: the scatter of points half a segment apart about their mean is larger
     /// than their deviations explain but once in a thousand records.
     #[must_use]
-    pub fn drifts(&self) -> bool {
-        drifts(self)
+    pub fn is_drifting(&self) -> bool {
+        has_significant_drift(self)
     }
 }
 
-fn of(ridge: &Ridge) -> Option<Range> {
+fn frequency_range(ridge: &Ridge) -> Option<FrequencyRange> {
     // an end that was carried there with a wide deviation bounds nothing
-    let known = |end: &&RidgeEnd| end.frequency_sd_hz < AGREES / ridge.segment_s;
+    let known = |end: &&RidgeEnd| end.frequency_sd_hz < AGREEMENT_RESOLUTIONS / ridge.segment_s;
     let start = ridge.start.as_ref().filter(known).zip(ridge.points.first());
     let end = ridge.end.as_ref().filter(known).zip(ridge.points.last());
     let ends = start.iter().chain(&end).map(|(end, point)| {
-        (end.frequency_hz, norm([end.frequency_sd_hz, off_hz(end, point), within_a_cycle_hz(point)]))
+        (
+            end.frequency_hz,
+            root_sum_of_squares([
+                end.frequency_sd_hz,
+                end_mismatch_hz(end, point),
+                change_within_cycle_hz(point),
+            ]),
+        )
     });
-    let confirmed = ridge.parts().flat_map(|part| {
+    let confirmed = ridge.unbroken_parts().flat_map(|part| {
         let outer = |i: usize| {
             let carried = |end: Option<(&RidgeEnd, &RidgePoint)>| end.is_some_and(|(_, p)| p == &part[i]);
             (i == 0 || i + 1 == part.len()) && !carried(start) && !carried(end)
         };
-        let with_sd = move |i: usize| (&part[i], if outer(i) { beyond_hz(ridge, &part[i]) } else { 0.0 });
+        let with_sd =
+            move |i: usize| (&part[i], if outer(i) { change_beyond_hz(ridge, &part[i]) } else { 0.0 });
         (0..part.len()).filter(|i| is_confirmed(ridge, part, *i)).map(with_sd).collect::<Vec<_>>()
     });
-    let bent = bend_hz(ridge);
+    let bent = curvature_bias_hz(ridge);
     let all: Vec<(f64, f64)> = confirmed
-        .map(|(p, beyond)| (p.frequency_hz, norm([p.frequency_sd_hz, beyond, within_a_cycle_hz(p)])))
+        .map(|(p, beyond)| {
+            (p.frequency_hz, root_sum_of_squares([p.frequency_sd_hz, beyond, change_within_cycle_hz(p)]))
+        })
         .chain(ends)
         .map(|(hz, sd_hz)| (hz, math::hypot(sd_hz, bent)))
         .collect();
@@ -71,7 +81,7 @@ fn of(ridge: &Ridge) -> Option<Range> {
     // two deviations of another that is less well known may reach farther
     let beyond =
         |of: &dyn Fn(f64, f64) -> f64| all.iter().map(|(hz, sd_hz)| of(*hz, *sd_hz)).fold(0.0, f64::max);
-    Some(Range {
+    Some(FrequencyRange {
         low_hz,
         low_sd_hz: low_sd_hz.max(beyond(&|hz, sd_hz| (low_hz - hz) / 2.0 + sd_hz)),
         high_hz,
@@ -81,34 +91,34 @@ fn of(ridge: &Ridge) -> Option<Range> {
 
 /// What the frequency changes by in the outer half of the segment of a point beyond which the course is not
 /// known, Hz: it may go on.
-fn beyond_hz(ridge: &Ridge, point: &RidgePoint) -> f64 {
+fn change_beyond_hz(ridge: &Ridge, point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s * ridge.segment_s / 2.0).abs()
 }
 
 /// A third of the distance between an end and where the rate of the point next to it leads, Hz: a course that
 /// bends there leaves a part of it open.
-fn off_hz(end: &RidgeEnd, point: &RidgePoint) -> f64 {
+fn end_mismatch_hz(end: &RidgeEnd, point: &RidgePoint) -> f64 {
     let led_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s);
     (end.frequency_hz - led_hz).abs() / 3.0
 }
 
 /// Half of what the frequency changes by within a cycle, Hz: an instant within it is not defined, since its
 /// form changes with its frequency.
-fn within_a_cycle_hz(point: &RidgePoint) -> f64 {
+fn change_within_cycle_hz(point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s / point.frequency_hz / 2.0).abs()
 }
 
-fn norm(values: [f64; 3]) -> f64 {
+fn root_sum_of_squares(values: [f64; 3]) -> f64 {
     values.into_iter().fold(0.0, math::hypot)
 }
 
 /// What a course that bends is read off by where it turns, Hz: a fit of a changing but steady rate to a
 /// segment of length `T` cuts a corner of curvature `c` by up to `c T^2 / 24`, the curvature taken from the
 /// change of the rate half a segment on.
-fn bend_hz(ridge: &Ridge) -> f64 {
-    let apart = (INDEPENDENT * ridge.segment_s / ridge.hop_s).round().max(1.0) as usize;
+fn curvature_bias_hz(ridge: &Ridge) -> f64 {
+    let apart = (INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round().max(1.0) as usize;
     let bends = ridge
-        .parts()
+        .unbroken_parts()
         .flat_map(|part| part.windows(apart + 1))
         .map(|w| (w[apart].rate_hz_per_s - w[0].rate_hz_per_s).abs() / (w[apart].time_s - w[0].time_s));
     let mut bends: Vec<f64> = bends.collect();
@@ -123,21 +133,20 @@ fn is_confirmed(ridge: &Ridge, part: &[RidgePoint], index: usize) -> bool {
     let point = &part[index];
     let agrees = |other: &RidgePoint| {
         let carried_hz = other.frequency_hz + other.rate_hz_per_s * (point.time_s - other.time_s);
-        let allowed_hz = (AGREES / ridge.segment_s)
-            .max(AGREES_DEVIATIONS * math::hypot(point.frequency_sd_hz, other.frequency_sd_hz));
+        let allowed_hz = (AGREEMENT_RESOLUTIONS / ridge.segment_s)
+            .max(AGREEMENT_DEVIATIONS * math::hypot(point.frequency_sd_hz, other.frequency_sd_hz));
         (carried_hz - point.frequency_hz).abs() <= allowed_hz
     };
     let neighbours = [index.checked_sub(1), Some(index + 1)];
     part.len() == 1 || neighbours.into_iter().flatten().filter_map(|i| part.get(i)).any(agrees)
 }
 
-fn drifts(ridge: &Ridge) -> bool {
+fn has_significant_drift(ridge: &Ridge) -> bool {
     let mut apart: Vec<&RidgePoint> = Vec::new();
     for point in &ridge.points {
-        if apart
-            .last()
-            .is_none_or(|last| point.time_s - last.time_s >= (1.0 - 1e-9) * INDEPENDENT * ridge.segment_s)
-        {
+        if apart.last().is_none_or(|last| {
+            point.time_s - last.time_s >= (1.0 - 1e-9) * INDEPENDENT_SEGMENTS * ridge.segment_s
+        }) {
             apart.push(point);
         }
     }
@@ -167,7 +176,7 @@ mod tests {
             amplitude_m: 1e-6,
             phase_rad: 0.0,
             snr_db: 30.0,
-            left: 0.0,
+            residual_ratio: 0.0,
         };
         Ridge {
             points: course.iter().enumerate().map(point).collect(),
@@ -211,8 +220,8 @@ mod tests {
 
     #[test]
     fn a_course_drifts_when_its_deviations_do_not_explain_it() {
-        assert!(!ridge(&[500.0, 501.0, 499.0, 500.5, 501.5]).drifts());
-        assert!(ridge(&[500.0, 502.0, 504.0, 506.0, 508.0]).drifts());
-        assert!(!ridge(&[500.0]).drifts());
+        assert!(!ridge(&[500.0, 501.0, 499.0, 500.5, 501.5]).is_drifting());
+        assert!(ridge(&[500.0, 502.0, 504.0, 506.0, 508.0]).is_drifting());
+        assert!(!ridge(&[500.0]).is_drifting());
     }
 }

@@ -19,7 +19,7 @@ pub struct RidgePoint {
     /// Amplitude over that of noise in a bin of the column, `20 log10`, dB.
     pub snr_db: f64,
     /// What the fit leaves where the component is, as a share of its amplitude in a bin of the column.
-    pub left: f64,
+    pub residual_ratio: f64,
 }
 
 /// A frequency carried to an end of the record.
@@ -52,7 +52,7 @@ pub struct Ridge {
 
 impl Ridge {
     /// The parts of the ridge between its interruptions.
-    pub fn parts(&self) -> impl Iterator<Item = &[RidgePoint]> {
+    pub fn unbroken_parts(&self) -> impl Iterator<Item = &[RidgePoint]> {
         self.points.chunk_by(|a, b| b.time_s - a.time_s < 1.5 * self.hop_s)
     }
 }

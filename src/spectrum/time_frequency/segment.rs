@@ -16,7 +16,7 @@ pub(super) const OVERLAP: usize = 4;
 
 /// Segments of a record, in frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Layout {
+pub(super) struct SegmentLayout {
     /// Of a segment.
     pub frames: usize,
     /// From one segment to the next.
@@ -27,32 +27,36 @@ pub(super) struct Layout {
     pub record: usize,
 }
 
-impl Layout {
+impl SegmentLayout {
     /// Segments a share of their length apart, farther where there would be too many columns.
-    pub(super) fn of(record: usize, frames: usize, overlap: usize, most: usize) -> Self {
+    pub(super) fn with_overlap(record: usize, frames: usize, overlap: usize, most: usize) -> Self {
         let room = record.saturating_sub(frames);
         let hop = (frames / overlap).max(room.div_ceil(most - 1)).max(1);
         Self { frames, hop, columns: room / hop + 1, record }
     }
 
     /// Segments of a length in seconds.
-    pub(super) fn given(record: usize, segment_s: f64, frame_rate_hz: f64) -> Result<Self, SpectrumError> {
+    pub(super) fn from_duration(
+        record: usize,
+        segment_s: f64,
+        frame_rate_hz: f64,
+    ) -> Result<Self, SpectrumError> {
         let frames = (segment_s * frame_rate_hz).round();
         if !(frames >= FEWEST_FRAMES as f64 && frames <= record as f64) {
             let (least_s, most_s) = (FEWEST_FRAMES as f64 / frame_rate_hz, record as f64 / frame_rate_hz);
             return Err(SpectrumError::Segment { found_s: segment_s, least_s, most_s });
         }
-        Ok(Self::of(record, frames as usize, OVERLAP, MOST_COLUMNS))
+        Ok(Self::with_overlap(record, frames as usize, OVERLAP, MOST_COLUMNS))
     }
 
     /// First frame of a segment. The last segment need not end with the record.
-    pub(super) fn first(&self, column: usize) -> usize {
+    pub(super) fn first_frame(&self, column: usize) -> usize {
         column * self.hop
     }
 
     /// Middle of a segment, frames from the first frame of the record.
-    pub(super) fn centre(&self, column: usize) -> f64 {
-        self.first(column) as f64 + (self.frames as f64 - 1.0) / 2.0
+    pub(super) fn centre_frame(&self, column: usize) -> f64 {
+        self.first_frame(column) as f64 + (self.frames as f64 - 1.0) / 2.0
     }
 }
 
@@ -65,10 +69,10 @@ mod tests {
         for (record, frames) in
             [(1_000_000, 80), (1_000_000, 2048), (3000, 80), (10_000, 16), (401, 1), (16, 16)]
         {
-            let layout = Layout::of(record, frames, OVERLAP, MOST_COLUMNS);
+            let layout = SegmentLayout::with_overlap(record, frames, OVERLAP, MOST_COLUMNS);
             assert!((1..=MOST_COLUMNS).contains(&layout.columns), "{layout:?}");
-            assert!(layout.first(layout.columns - 1) + frames <= record, "{layout:?}");
-            assert!(layout.first(layout.columns) + frames > record, "{layout:?}");
+            assert!(layout.first_frame(layout.columns - 1) + frames <= record, "{layout:?}");
+            assert!(layout.first_frame(layout.columns) + frames > record, "{layout:?}");
         }
     }
 }

@@ -1,21 +1,21 @@
 //! Short-time spectra of a record.
 
-use super::choice::chosen;
-use super::columns::Bins;
-use super::segment::{Layout, SEGMENT_CYCLES};
-use crate::spectrum::check::check;
+use super::choice::choose_segment_layout;
+use super::columns::SegmentBins;
+use super::segment::{SEGMENT_CYCLES, SegmentLayout};
+use crate::spectrum::check::check_record;
 use crate::spectrum::error::SpectrumError;
 use crate::spectrum::limits::MIN_SAMPLES;
-use crate::spectrum::settings::Settings;
+use crate::spectrum::settings::SpectrumSettings;
 
 /// Upper end of a band that nobody gave, as a share of half the frame rate: above, a component is as likely
 /// to be folded down onto it.
-const BAND_TOP: f64 = 0.9;
+const DEFAULT_BAND_TOP: f64 = 0.9;
 /// Lower end of such a band over the largest slow component: a ring-down has died away in a Hann spectrum of
 /// four of its cycles there.
-const ABOVE_SLOW: f64 = 4.0;
+const SLOW_COMPONENT_MARGIN: f64 = 4.0;
 /// Segments of `SEGMENT_CYCLES` that a record should hold at the lower end of such a band.
-const SEGMENTS: f64 = 4.0;
+const SEGMENTS_AT_LOWEST: f64 = 4.0;
 
 /// How a record is cut into short spectra.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -45,7 +45,7 @@ pub struct Spectrogram {
     pub hop_s: f64,
     /// One over a segment's length, Hz; two components closer than two of these are one in a column.
     pub resolution_hz: f64,
-    pub(super) layout: Layout,
+    pub(super) layout: SegmentLayout,
     pub(super) frame_rate_hz: f64,
 }
 
@@ -55,26 +55,26 @@ impl Spectrogram {
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate, the band or the segment cannot give one.
-    pub fn of(
+    pub fn new(
         samples: &[Option<f64>],
         frame_rate_hz: f64,
         settings: &SpectrogramSettings,
     ) -> Result<Self, SpectrumError> {
-        check(
+        check_record(
             samples,
             frame_rate_hz,
-            &Settings { zero_padding: 1, band_hz: settings.band_hz, ..Default::default() },
+            &SpectrumSettings { zero_padding: 1, band_hz: settings.band_hz, ..Default::default() },
         )?;
         let band_hz = settings.band_hz.unwrap_or_else(|| default_band_hz(samples.len(), frame_rate_hz, None));
         let layout = match settings.segment_s {
-            Some(segment_s) => Layout::given(samples.len(), segment_s, frame_rate_hz)?,
-            None => chosen(samples, frame_rate_hz, band_hz),
+            Some(segment_s) => SegmentLayout::from_duration(samples.len(), segment_s, frame_rate_hz)?,
+            None => choose_segment_layout(samples, frame_rate_hz, band_hz),
         };
-        let bins = Bins::of(&layout);
-        let amplitude_m = bins.columns(samples, &layout, bins.all());
+        let bins = SegmentBins::fine(&layout);
+        let amplitude_m = bins.column_amplitudes(samples, &layout, bins.all_bins());
         Ok(Self {
-            time_s: (0..layout.columns).map(|c| layout.centre(c) / frame_rate_hz).collect(),
-            frequency_hz: bins.all().map(|k| k as f64 * frame_rate_hz / bins.padded as f64).collect(),
+            time_s: (0..layout.columns).map(|c| layout.centre_frame(c) / frame_rate_hz).collect(),
+            frequency_hz: bins.all_bins().map(|k| k as f64 * frame_rate_hz / bins.padded as f64).collect(),
             amplitude_m,
             segment_s: layout.frames as f64 / frame_rate_hz,
             hop_s: layout.hop as f64 / frame_rate_hz,
@@ -90,8 +90,8 @@ impl Spectrogram {
 /// cycles, up to nine tenths of half the frame rate.
 #[must_use]
 pub fn default_band_hz(frames: usize, frame_rate_hz: f64, slow_hz: Option<f64>) -> (f64, f64) {
-    let top = BAND_TOP * frame_rate_hz / 2.0;
-    let resolved = SEGMENTS * SEGMENT_CYCLES * frame_rate_hz / frames.max(MIN_SAMPLES) as f64;
-    let low = slow_hz.map_or(resolved, |slow| resolved.max(ABOVE_SLOW * slow));
+    let top = DEFAULT_BAND_TOP * frame_rate_hz / 2.0;
+    let resolved = SEGMENTS_AT_LOWEST * SEGMENT_CYCLES * frame_rate_hz / frames.max(MIN_SAMPLES) as f64;
+    let low = slow_hz.map_or(resolved, |slow| resolved.max(SLOW_COMPONENT_MARGIN * slow));
     (low.min(top / 2.0), top)
 }

@@ -1,12 +1,12 @@
 //! The points of a ridge: fits to the segments, and to the ends of the record, from the path through the
 //! columns.
 
-use super::chirp::{CURVED, Fitted, LINEAR, Segment, Shape};
-use super::columns::Bins;
-use super::noise::{Noise, Rest, median, smoothed};
-use super::path::Field;
+use super::chirp::{CURVED_UNKNOWNS, ChirpFit, ChirpParameters, ChirpSegment, LINEAR_UNKNOWNS};
+use super::columns::SegmentBins;
+use super::noise::{ResidualNoise, SegmentNoise, median_filter, upper_median};
+use super::path::PathLevels;
 use super::ridge::{RidgeEnd, RidgePoint};
-use super::segment::Layout;
+use super::segment::SegmentLayout;
 use super::spectrogram::Spectrogram;
 use crate::math;
 use crate::spectrum::limits::ROUNDING;
@@ -18,11 +18,11 @@ const FALSE_ALARM: f64 = 0.01;
 /// than their independent values.
 const TRIALS: f64 = 10.0;
 /// Farthest a fit moves from the path, resolutions: half way down the lobe of a Hann window.
-const FARTHEST: f64 = 1.0;
+const FARTHEST_FROM_PATH: f64 = 1.0;
 /// Deviation of a frequency that noise does not explain, resolutions: what other components leak into a fit.
-const LEAKS: f64 = 0.002;
+const LEAKAGE_SD: f64 = 0.002;
 /// The same at the end of a fit whose rate may change, resolutions of that fit.
-const END_LEAKS: f64 = 0.01;
+const END_LEAKAGE_SD: f64 = 0.01;
 /// Lengths of the fits at an end of the record, segments: the change of the rate takes a longer stretch than
 /// the rate.
 const END_SEGMENTS: [f64; 6] = [1.75, 1.3, 1.0, 0.75, 0.55, 0.4];
@@ -32,38 +32,38 @@ const END_CYCLES: f64 = 8.0;
 const CONTRADICTS: f64 = 3.5;
 /// What a changing rate adds to the fitted frequency with the sine weights, over its change from one segment
 /// to the next: `<x^4>/<x^2>/24`.
-const BEND: f64 = 0.4154 / 24.0;
+const CURVATURE_BIAS: f64 = 0.4154 / 24.0;
 /// Deviations of the frequency from which on the rate of a point may change too.
-const MATTERS: f64 = 0.5;
+const SIGNIFICANT_CURVATURE: f64 = 0.5;
 /// Farthest that the fit at an end may lie from the ridge in the middle of its outermost segment,
 /// resolutions.
-const AGREES: f64 = 0.25;
+const END_AGREEMENT: f64 = 0.25;
 
 /// A fitted column.
 #[derive(Clone, Copy)]
-pub(super) struct Fit {
-    shape: Shape,
+pub(super) struct SegmentFit {
+    chirp: ChirpParameters,
     /// Deviation of the frequency for a noise of deviation 1 in each frame, cycles in the segment.
     unit_sd: f64,
     /// What the fit leaves in a frame next to the component and where it was, m.
-    rest: Rest,
+    residual: ResidualNoise,
 }
 
-impl Fit {
-    fn of<const N: usize>(fitted: &Fitted<N>, rest: Rest) -> Self {
-        Self { shape: fitted.shape, unit_sd: fitted.cycles_variance(0.0).sqrt(), rest }
+impl SegmentFit {
+    fn from_chirp<const N: usize>(fitted: &ChirpFit<N>, residual: ResidualNoise) -> Self {
+        Self { chirp: fitted.parameters, unit_sd: fitted.cycles_variance(0.0).sqrt(), residual }
     }
 
     /// Noise that the deviations of the fit follow from, m.
     fn noise_m(&self) -> f64 {
-        self.rest.around_m.max(self.rest.under_m)
+        self.residual.around_m.max(self.residual.under_m)
     }
 }
 
 /// What the fits share.
-pub(super) struct Tracker<'a> {
+pub(super) struct RidgeTracker<'a> {
     samples: &'a [Option<f64>],
-    layout: Layout,
+    layout: SegmentLayout,
     frame_rate_hz: f64,
     resolution_hz: f64,
     band_hz: (f64, f64),
@@ -71,8 +71,8 @@ pub(super) struct Tracker<'a> {
     least_m: f64,
 }
 
-impl<'a> Tracker<'a> {
-    pub(super) fn of(spectrogram: &Spectrogram, samples: &'a [Option<f64>], band_hz: (f64, f64)) -> Self {
+impl<'a> RidgeTracker<'a> {
+    pub(super) fn new(spectrogram: &Spectrogram, samples: &'a [Option<f64>], band_hz: (f64, f64)) -> Self {
         let largest = samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         Self {
             samples,
@@ -85,12 +85,12 @@ impl<'a> Tracker<'a> {
     }
 
     /// Where the path through the columns has each fit start; `None` where there is no spectrum.
-    pub(super) fn starts(&self, spectrogram: &Spectrogram) -> Vec<Option<Shape>> {
-        let bins = Bins::of(&self.layout);
-        let band = bins.within(self.band_hz, self.frame_rate_hz);
+    pub(super) fn fit_starts(&self, spectrogram: &Spectrogram) -> Vec<Option<ChirpParameters>> {
+        let bins = SegmentBins::fine(&self.layout);
+        let band = bins.bins_in_band(self.band_hz, self.frame_rate_hz);
         let level = |column: &Vec<f64>| {
             let inside = column.get(band.clone()).unwrap_or_default();
-            let middle = median(inside.to_vec()).unwrap_or(0.0).max(self.least_m);
+            let middle = upper_median(inside.to_vec()).unwrap_or(0.0).max(self.least_m);
             inside.iter().map(|a| a / middle).collect::<Vec<f64>>()
         };
         let levels: Vec<_> =
@@ -98,19 +98,22 @@ impl<'a> Tracker<'a> {
         let segment = self.layout.frames as f64;
         let bins_per_resolution = bins.padded as f64 / segment;
         let quarters = 4.0 * self.layout.hop as f64 / segment;
-        let path =
-            Field { levels: &levels, bins: band.clone().count(), bins_per_resolution, quarters }.best();
+        let path = PathLevels { levels: &levels, bins: band.clone().count(), bins_per_resolution, quarters }
+            .best_path();
         let cycles = |c: usize| (band.start() + path[c]) as f64 / bins_per_resolution;
         let start = |c: usize| {
-            let (before, after) = self.around(c);
+            let (before, after) = self.columns_around(c);
             let apart = self.segments_apart(before, after);
-            Shape::start(cycles(c), if apart > 0.0 { (cycles(after) - cycles(before)) / apart } else { 0.0 })
+            ChirpParameters::from_cycles(
+                cycles(c),
+                if apart > 0.0 { (cycles(after) - cycles(before)) / apart } else { 0.0 },
+            )
         };
         (0..path.len()).map(|c| levels[c].as_ref().map(|_| start(c))).collect()
     }
 
     /// The columns half a segment before and after one, as far as there are any.
-    fn around(&self, column: usize) -> (usize, usize) {
+    fn columns_around(&self, column: usize) -> (usize, usize) {
         let near = (self.layout.frames / (2 * self.layout.hop)).max(1);
         (column.saturating_sub(near), (column + near).min(self.layout.columns - 1))
     }
@@ -119,32 +122,37 @@ impl<'a> Tracker<'a> {
         (after - before) as f64 * self.layout.hop as f64 / self.layout.frames as f64
     }
 
-    fn segment(&self, column: usize) -> Option<&[Option<f64>]> {
-        self.samples.get(self.layout.first(column)..self.layout.first(column) + self.layout.frames)
+    fn segment_samples(&self, column: usize) -> Option<&[Option<f64>]> {
+        self.samples
+            .get(self.layout.first_frame(column)..self.layout.first_frame(column) + self.layout.frames)
     }
 
-    fn noise(&self) -> Noise {
-        Noise::of(
+    fn segment_noise(&self) -> SegmentNoise {
+        SegmentNoise::new(
             self.layout.frames,
             (self.band_hz.0 / self.resolution_hz, self.band_hz.1 / self.resolution_hz),
         )
     }
 
-    pub(super) fn fits(&self, starts: &[Option<Shape>]) -> Vec<Option<Fit>> {
-        let (weights, noise) = (weights(self.layout.frames), self.noise());
-        let fit = |(c, start): (usize, &Option<Shape>)| {
-            let samples = self.segment(c)?;
-            let fitted = Segment { samples, weights: &weights }.fit::<LINEAR>((*start)?)?;
-            Some(Fit::of(&fitted, noise.rest(samples, &fitted.shape)))
+    pub(super) fn fit_segments(&self, starts: &[Option<ChirpParameters>]) -> Vec<Option<SegmentFit>> {
+        let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
+        let fit = |(c, start): (usize, &Option<ChirpParameters>)| {
+            let samples = self.segment_samples(c)?;
+            let fitted =
+                ChirpSegment { samples, weights: &weights }.fit_chirp::<LINEAR_UNKNOWNS>((*start)?)?;
+            Some(SegmentFit::from_chirp(&fitted, noise.measure_residual(samples, &fitted.parameters)))
         };
-        let fits: Vec<Option<Fit>> = starts.iter().enumerate().map(fit).collect();
-        let noise_m = smoothed(&fits.iter().map(|fit| fit.map(|fit| fit.rest.around_m)).collect::<Vec<_>>());
-        let is_near = |fit: &Fit, start: &Option<Shape>| {
-            start.is_some_and(|start| (fit.shape.cycles(0.0) - start.cycles(0.0)).abs() < FARTHEST)
+        let fits: Vec<Option<SegmentFit>> = starts.iter().enumerate().map(fit).collect();
+        let noise_m =
+            median_filter(&fits.iter().map(|fit| fit.map(|fit| fit.residual.around_m)).collect::<Vec<_>>());
+        let is_near = |fit: &SegmentFit, start: &Option<ChirpParameters>| {
+            start.is_some_and(|start| {
+                (fit.chirp.cycles_at(0.0) - start.cycles_at(0.0)).abs() < FARTHEST_FROM_PATH
+            })
         };
         let near = fits.into_iter().zip(starts).map(|(fit, start)| fit.filter(|fit| is_near(fit, start)));
-        let with_noise = |fit: Fit, noise_m: f64| Fit {
-            rest: Rest { around_m: noise_m.max(self.least_m), ..fit.rest },
+        let with_noise = |fit: SegmentFit, noise_m: f64| SegmentFit {
+            residual: ResidualNoise { around_m: noise_m.max(self.least_m), ..fit.residual },
             ..fit
         };
         near.zip(noise_m).map(|(fit, noise_m)| fit.map(|fit| with_noise(fit, noise_m))).collect()
@@ -152,16 +160,17 @@ impl<'a> Tracker<'a> {
 
     /// The fits, with one from where the next column's would have been a segment's hop earlier, or the last
     /// one's later, where the path led to none: the spectrum of a fast chirp is flat on top.
-    pub(super) fn repaired(&self, fits: &[Option<Fit>]) -> Vec<Option<Fit>> {
-        let (weights, noise) = (weights(self.layout.frames), self.noise());
+    pub(super) fn refit_from_neighbours(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
+        let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
         let from = |c: usize, near: usize, segments: f64| {
-            let (samples, neighbour) = (self.segment(c)?, (*fits.get(near)?)?);
-            let cycles = neighbour.shape.cycles(0.0) + segments * neighbour.shape.change();
-            let found = Segment { samples, weights: &weights }
-                .fit::<LINEAR>(Shape::start(cycles, neighbour.shape.change()))?;
-            let under_m = noise.rest(samples, &found.shape).under_m;
-            ((found.shape.cycles(0.0) - cycles).abs() < FARTHEST)
-                .then(|| Fit::of(&found, Rest { under_m, ..neighbour.rest }))
+            let (samples, neighbour) = (self.segment_samples(c)?, (*fits.get(near)?)?);
+            let cycles = neighbour.chirp.cycles_at(0.0) + segments * neighbour.chirp.change();
+            let found = ChirpSegment { samples, weights: &weights }.fit_chirp::<LINEAR_UNKNOWNS>(
+                ChirpParameters::from_cycles(cycles, neighbour.chirp.change()),
+            )?;
+            let under_m = noise.measure_residual(samples, &found.parameters).under_m;
+            ((found.parameters.cycles_at(0.0) - cycles).abs() < FARTHEST_FROM_PATH)
+                .then(|| SegmentFit::from_chirp(&found, ResidualNoise { under_m, ..neighbour.residual }))
         };
         let hop = self.segments_apart(0, 1);
         let mend =
@@ -171,56 +180,58 @@ impl<'a> Tracker<'a> {
 
     /// The fits with a rate that changes where the rates half a segment before and after say that it moves
     /// the frequency.
-    pub(super) fn bent(&self, fits: &[Option<Fit>]) -> Vec<Option<Fit>> {
-        let (weights, noise) = (weights(self.layout.frames), self.noise());
+    pub(super) fn refit_with_curvature(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
+        let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
         let bent = |c: usize| {
             let fit = fits[c]?;
-            let (before, after) = self.around(c);
+            let (before, after) = self.columns_around(c);
             let (Some(earlier), Some(later)) = (&fits[before], &fits[after]) else { return Some(fit) };
-            let bend = (later.shape.change() - earlier.shape.change())
+            let bend = (later.chirp.change() - earlier.chirp.change())
                 / self.segments_apart(before, after).max(f64::MIN_POSITIVE);
-            if (BEND * bend).abs() <= MATTERS * fit.unit_sd * fit.rest.around_m {
+            if (CURVATURE_BIAS * bend).abs() <= SIGNIFICANT_CURVATURE * fit.unit_sd * fit.residual.around_m {
                 return Some(fit);
             }
-            let samples = self.segment(c)?;
-            let found = Segment { samples, weights: &weights }.fit::<CURVED>(fit.shape.bent(bend));
-            let near =
-                found.filter(|found| (found.shape.cycles(0.0) - fit.shape.cycles(0.0)).abs() < FARTHEST);
-            let with_rest = |found: &Fitted<CURVED>| Rest {
-                under_m: noise.rest(samples, &found.shape).under_m,
-                ..fit.rest
+            let samples = self.segment_samples(c)?;
+            let found = ChirpSegment { samples, weights: &weights }
+                .fit_chirp::<CURVED_UNKNOWNS>(fit.chirp.with_curvature(bend));
+            let near = found.filter(|found| {
+                (found.parameters.cycles_at(0.0) - fit.chirp.cycles_at(0.0)).abs() < FARTHEST_FROM_PATH
+            });
+            let with_rest = |found: &ChirpFit<CURVED_UNKNOWNS>| ResidualNoise {
+                under_m: noise.measure_residual(samples, &found.parameters).under_m,
+                ..fit.residual
             };
-            Some(near.map_or(fit, |found| Fit::of(&found, with_rest(&found))))
+            Some(near.map_or(fit, |found| SegmentFit::from_chirp(&found, with_rest(&found))))
         };
         (0..fits.len()).map(bent).collect()
     }
 
     /// Amplitude over that of noise which noise alone reaches anywhere in band and record with the chance
     /// [`FALSE_ALARM`].
-    fn detection(&self) -> f64 {
+    fn detection_threshold(&self) -> f64 {
         let resolutions = (self.band_hz.1 - self.band_hz.0) / self.resolution_hz;
         let segments = self.samples.len() as f64 / self.layout.frames as f64;
         math::ln((TRIALS * resolutions * segments).max(1.0) / FALSE_ALARM).sqrt()
     }
 
-    pub(super) fn point(&self, column: usize, fit: &Fit) -> Option<RidgePoint> {
-        let window = window::Sums::of(&window::hann(self.segment(column)?));
-        let in_bin_m = 2.0 * fit.rest.around_m * window.second.sqrt() / window.first;
-        let level = fit.shape.amplitude() / in_bin_m;
-        let frequency_hz = fit.shape.cycles(0.0) * self.resolution_hz;
+    pub(super) fn ridge_point(&self, column: usize, fit: &SegmentFit) -> Option<RidgePoint> {
+        let window = window::WindowSums::from_weights(&window::hann_weights(self.segment_samples(column)?));
+        let in_bin_m = 2.0 * fit.residual.around_m * window.second.sqrt() / window.first;
+        let level = fit.chirp.amplitude() / in_bin_m;
+        let frequency_hz = fit.chirp.cycles_at(0.0) * self.resolution_hz;
         let inside = frequency_hz >= self.band_hz.0 && frequency_hz <= self.band_hz.1;
-        (inside && !fit.shape.vanishes() && level >= self.detection()).then(|| RidgePoint {
-            time_s: self.layout.centre(column) / self.frame_rate_hz,
+        (inside && !fit.chirp.vanishes() && level >= self.detection_threshold()).then(|| RidgePoint {
+            time_s: self.layout.centre_frame(column) / self.frame_rate_hz,
             frequency_hz,
             frequency_sd_hz: math::hypot(
                 fit.unit_sd * fit.noise_m() * self.resolution_hz,
-                LEAKS * self.resolution_hz,
+                LEAKAGE_SD * self.resolution_hz,
             ),
-            rate_hz_per_s: fit.shape.change() * self.resolution_hz * self.resolution_hz,
-            amplitude_m: fit.shape.amplitude(),
-            phase_rad: fit.shape.phase(),
+            rate_hz_per_s: fit.chirp.change() * self.resolution_hz * self.resolution_hz,
+            amplitude_m: fit.chirp.amplitude(),
+            phase_rad: fit.chirp.phase(),
             snr_db: 20.0 * math::log10(level),
-            left: fit.rest.under_m / fit.rest.around_m / level,
+            residual_ratio: fit.residual.under_m / fit.residual.around_m / level,
         })
     }
 
@@ -228,9 +239,11 @@ impl<'a> Tracker<'a> {
     /// change: half a segment farther out, the deviation of a straight course would be smaller, and wrong. A
     /// long stretch knows it best, as far as the course is smooth there: the longest is taken with which all
     /// shorter ones agree. The shortest, which others leak into most, only confirms.
-    pub(super) fn end(&self, column: usize, fit: &Fit) -> Option<RidgeEnd> {
-        let ends: Vec<RidgeEnd> =
-            END_SEGMENTS.into_iter().filter_map(|segments| self.carried(column, fit, segments)).collect();
+    pub(super) fn ridge_end(&self, column: usize, fit: &SegmentFit) -> Option<RidgeEnd> {
+        let ends: Vec<RidgeEnd> = END_SEGMENTS
+            .into_iter()
+            .filter_map(|segments| self.extrapolate_to_end(column, fit, segments))
+            .collect();
         // the noise of the longer one is a part of that of the shorter one
         let agree = |longer: &RidgeEnd, shorter: &RidgeEnd| {
             let variance = math::powi(shorter.frequency_sd_hz, 2) - math::powi(longer.frequency_sd_hz, 2);
@@ -243,37 +256,38 @@ impl<'a> Tracker<'a> {
         confirmed.map(|(_, end)| end).or(ends.first()).copied()
     }
 
-    fn carried(&self, column: usize, fit: &Fit, segments: f64) -> Option<RidgeEnd> {
+    fn extrapolate_to_end(&self, column: usize, fit: &SegmentFit, segments: f64) -> Option<RidgeEnd> {
         let frames = ((segments * self.layout.frames as f64) as usize).min(self.samples.len());
         let at_start = column == 0;
         let first = if at_start { 0 } else { self.samples.len() - frames };
         let longer = frames as f64 / self.layout.frames as f64;
-        let away = (first as f64 + (frames as f64 - 1.0) / 2.0 - self.layout.centre(column))
+        let away = (first as f64 + (frames as f64 - 1.0) / 2.0 - self.layout.centre_frame(column))
             / self.layout.frames as f64; // segments
-        let middle = fit.shape.cycles(0.0);
-        let led = (middle + away * fit.shape.change()) * longer;
+        let middle = fit.chirp.cycles_at(0.0);
+        let led = (middle + away * fit.chirp.change()) * longer;
         if segments < 1.0 && led < END_CYCLES {
             return None;
         }
-        let start = Shape::start(led, fit.shape.change() * longer * longer);
+        let start = ChirpParameters::from_cycles(led, fit.chirp.change() * longer * longer);
         let samples = self.samples.get(first..first + frames)?;
-        let found = Segment { samples, weights: &weights(frames) }.fit::<CURVED>(start)?;
+        let found =
+            ChirpSegment { samples, weights: &sine_weights(frames) }.fit_chirp::<CURVED_UNKNOWNS>(start)?;
         let agrees = if longer < 1.0 {
-            (found.shape.cycles(0.0) - led).abs() < FARTHEST
+            (found.parameters.cycles_at(0.0) - led).abs() < FARTHEST_FROM_PATH
         } else {
-            (found.shape.cycles(-2.0 * away / longer) / longer - middle).abs() < AGREES
+            (found.parameters.cycles_at(-2.0 * away / longer) / longer - middle).abs() < END_AGREEMENT
         };
         let x = (1.0 - 1.0 / frames as f64) * if at_start { -1.0 } else { 1.0 };
         let resolution_hz = self.frame_rate_hz / frames as f64;
         let band = (self.band_hz.0 / resolution_hz, self.band_hz.1 / resolution_hz);
-        let under_m = Noise::of(frames, band).rest(samples, &found.shape).under_m;
+        let under_m = SegmentNoise::new(frames, band).measure_residual(samples, &found.parameters).under_m;
         let noise_m = fit.noise_m().max(under_m);
-        (agrees && !found.shape.vanishes()).then(|| RidgeEnd {
+        (agrees && !found.parameters.vanishes()).then(|| RidgeEnd {
             time_s: if at_start { 0.0 } else { (self.samples.len() - 1) as f64 / self.frame_rate_hz },
-            frequency_hz: found.shape.cycles(x) * resolution_hz,
+            frequency_hz: found.parameters.cycles_at(x) * resolution_hz,
             frequency_sd_hz: math::hypot(
                 found.cycles_variance(x).sqrt() * noise_m * resolution_hz,
-                END_LEAKS * resolution_hz,
+                END_LEAKAGE_SD * resolution_hz,
             ),
         })
     }
@@ -281,6 +295,6 @@ impl<'a> Tracker<'a> {
 
 /// Weights of a fit: a sine, the root of a Hann window. It keeps components five resolutions away below a
 /// hundredth and costs less of the frames' information than the Hann window does.
-fn weights(frames: usize) -> Vec<f64> {
-    window::hann(&vec![Some(0.0); frames]).into_iter().map(f64::sqrt).collect()
+fn sine_weights(frames: usize) -> Vec<f64> {
+    window::hann_weights(&vec![Some(0.0); frames]).into_iter().map(f64::sqrt).collect()
 }

@@ -14,28 +14,28 @@ use std::ops::{Add, Div, Mul, Neg, Rem, Sub};
 
 thread_local! {
     /// Parts of a turn in the plan that is being made; zero where none is.
-    static PARTS: Cell<usize> = const { Cell::new(0) };
+    static TWIDDLE_DIVISIONS: Cell<usize> = const { Cell::new(0) };
 }
 
 /// How far the system's cosine may be from ours: many last digits, and much less than two cosines of a plan
 /// differ.
-const NEAR: f64 = 1e-14;
+const COSINE_TOLERANCE: f64 = 1e-14;
 
 /// A number of a transform.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Real(pub f64);
+pub(super) struct PortableReal(pub f64);
 
 /// Makes a plan whose turns have so many parts, a power of two.
-pub(super) fn in_turns_of<T>(parts: usize, plan: impl FnOnce() -> T) -> T {
-    PARTS.set(parts);
+pub(super) fn with_exact_twiddles<T>(parts: usize, plan: impl FnOnce() -> T) -> T {
+    TWIDDLE_DIVISIONS.set(parts);
     let made = plan();
-    PARTS.set(0);
+    TWIDDLE_DIVISIONS.set(0);
     made
 }
 
 /// The cosine of a part of a turn that is given to all but its last digits; any other number as it is.
-fn settled(number: f64) -> f64 {
-    let parts = PARTS.get() as f64;
+fn exact_cosine(number: f64) -> f64 {
+    let parts = TWIDDLE_DIVISIONS.get() as f64;
     let (size, quarter) = (number.abs(), parts / 4.0);
     // a transform itself asks for a half in each of its steps
     if size > 1.0 || parts == 0.0 {
@@ -48,10 +48,10 @@ fn settled(number: f64) -> f64 {
         part if 2.0 * part <= quarter => math::cos(TAU * (part / parts)),
         part => math::sin(TAU * ((quarter - part) / parts)),
     };
-    if (cosine - size).abs() < NEAR { cosine.copysign(number) } else { number }
+    if (cosine - size).abs() < COSINE_TOLERANCE { cosine.copysign(number) } else { number }
 }
 
-impl FromPrimitive for Real {
+impl FromPrimitive for PortableReal {
     fn from_i64(number: i64) -> Option<Self> {
         Some(Self(number as f64))
     }
@@ -61,13 +61,13 @@ impl FromPrimitive for Real {
     }
 
     fn from_f64(number: f64) -> Option<Self> {
-        Some(Self(settled(number)))
+        Some(Self(exact_cosine(number)))
     }
 }
 
 macro_rules! operators {
     ($($name:ident $function:ident $operator:tt),*) => {$(
-        impl $name for Real {
+        impl $name for PortableReal {
             type Output = Self;
             #[inline]
             fn $function(self, other: Self) -> Self {
@@ -79,7 +79,7 @@ macro_rules! operators {
 
 operators!(Add add +, Sub sub -, Mul mul *, Div div /, Rem rem %);
 
-impl Neg for Real {
+impl Neg for PortableReal {
     type Output = Self;
     #[inline]
     fn neg(self) -> Self {
@@ -87,7 +87,7 @@ impl Neg for Real {
     }
 }
 
-impl Zero for Real {
+impl Zero for PortableReal {
     #[inline]
     fn zero() -> Self {
         Self(0.0)
@@ -98,14 +98,14 @@ impl Zero for Real {
     }
 }
 
-impl One for Real {
+impl One for PortableReal {
     #[inline]
     fn one() -> Self {
         Self(1.0)
     }
 }
 
-impl Num for Real {
+impl Num for PortableReal {
     type FromStrRadixErr = ParseFloatError;
 
     /// (decimal digits only; the library reads no numbers)
@@ -114,7 +114,7 @@ impl Num for Real {
     }
 }
 
-impl Signed for Real {
+impl Signed for PortableReal {
     fn abs(&self) -> Self {
         Self(self.0.abs())
     }
@@ -146,9 +146,10 @@ mod tests {
             for part in (0..parts).step_by((parts / 512).max(1)) {
                 let angle = TAU * (part as f64 / parts as f64);
                 for wrong in [-2e-16, 0.0, 2e-16] {
-                    let found = in_turns_of(parts, || settled((angle.cos() + wrong).clamp(-1.0, 1.0)));
+                    let found =
+                        with_exact_twiddles(parts, || exact_cosine((angle.cos() + wrong).clamp(-1.0, 1.0)));
                     assert!((found - angle.cos()).abs() < 1e-15, "{part} of {parts}: {found}");
-                    assert_eq!(found.abs(), in_turns_of(parts, || settled(angle.cos())).abs());
+                    assert_eq!(found.abs(), with_exact_twiddles(parts, || exact_cosine(angle.cos())).abs());
                 }
             }
         }
@@ -157,8 +158,8 @@ mod tests {
     #[test]
     fn a_number_that_is_no_cosine_stays() {
         for number in [0.5, -0.5, 0.3, 2.0, 1e-3, f64::INFINITY] {
-            assert_eq!(in_turns_of(1024, || settled(number)), number);
+            assert_eq!(with_exact_twiddles(1024, || exact_cosine(number)), number);
         }
-        assert!(settled(f64::NAN).is_nan());
+        assert!(exact_cosine(f64::NAN).is_nan());
     }
 }

@@ -1,9 +1,9 @@
 //! sweep.toml as people write it: types and keys only, nothing checked against anything else.
 
 use crate::feature::{define_entry, with_reading_keys};
-use crate::sweep::grid::Spacing;
-use crate::sweep::sample::Sample;
-use crate::toml_file::Pair;
+use crate::sweep::grid::AxisSpacing;
+use crate::sweep::sample::SamplePlan;
+use crate::toml_file::NumberPair;
 use crate::twin::Camera;
 use schemars::JsonSchema;
 use serde::Deserialize;
@@ -12,7 +12,7 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "study.toml")]
-pub struct Study {
+pub struct StudyFile {
     /// Version of the format: 1.
     pub format: u32,
     /// Title for pages and figures.
@@ -22,10 +22,10 @@ pub struct Study {
     /// Camera through which every run is seen.
     pub camera: Camera,
     /// Points drawn from the box of the axes; a grid if left out.
-    pub sample: Option<Sample>,
+    pub sample: Option<SamplePlan>,
     /// What varies.
     #[serde(default)]
-    pub axis: Vec<Axis>,
+    pub axis: Vec<StudyAxisFile>,
     /// What is read at every point.
     #[serde(default)]
     pub map: Vec<Map>,
@@ -34,7 +34,7 @@ pub struct Study {
 /// A parameter that varies.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct Axis {
+pub struct StudyAxisFile {
     /// Key of the scene with its table, such as "friction.a".
     pub name: String,
     /// First value, SI.
@@ -44,7 +44,7 @@ pub struct Axis {
     /// Number of values of a grid.
     pub points: Option<usize>,
     /// How the values lie; "linear" if left out.
-    pub scale: Option<Spacing>,
+    pub scale: Option<AxisSpacing>,
     /// The values themselves, in place of from, to and points.
     pub values: Option<Vec<f64>>,
 }
@@ -55,6 +55,6 @@ with_reading_keys!(define_entry {
         /// Different from every other map.
         name: String,
         /// Ends of the colours, in the unit of the map; from the values if left out.
-        range: Option<Pair>,
+        range: Option<NumberPair>,
     }
 });

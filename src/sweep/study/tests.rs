@@ -1,6 +1,6 @@
 use super::*;
-use crate::feature::{Interval, Reading};
-use crate::sweep::Spacing;
+use crate::feature::{Reading, ReversalInterval};
+use crate::sweep::AxisSpacing;
 
 const STUDY: &str = r#"format = 1
 title = "A study"
@@ -53,21 +53,24 @@ fn scene() -> Scene {
 fn a_study_is_read() {
     let study = Study::parse("s.toml", STUDY).unwrap();
     study.check_scene("s.toml", &scene()).unwrap();
-    assert_eq!((study.points(), study.camera.exposure_s), (6, 5e-5));
+    assert_eq!((study.point_count(), study.camera.exposure_s), (6, 5e-5));
     assert_eq!(
         (study.axes[0].values.as_slice(), study.axes[1].values.as_slice()),
         ([0.1, 0.2, 0.3].as_slice(), [200.0, 519.0].as_slice())
     );
     assert_eq!(
         study.axes.iter().map(|axis| axis.spacing).collect::<Vec<_>>(),
-        [Spacing::Linear, Spacing::Log]
+        [AxisSpacing::Linear, AxisSpacing::Log]
     );
-    let columns: Vec<String> = study.maps.iter().map(Map::column).collect();
+    let columns: Vec<String> = study.maps.iter().map(SweepMap::column).collect();
     assert_eq!(columns, ["high_component_hz", "stick_fraction", "release_s", "least_force_n"]);
     assert_eq!(study.maps[0].slug, "high-component");
     assert_eq!(
         (study.maps[3].range, study.maps[2].reading.clone()),
-        (Some((0.0, 0.2)), Reading::Interval { interval: Interval::ReleaseAfterReversal, reversal: 2 })
+        (
+            Some((0.0, 0.2)),
+            Reading::Interval { interval: ReversalInterval::ReleaseAfterReversal, reversal: 2 }
+        )
     );
 }
 
@@ -218,10 +221,10 @@ fn of_three(sample: &str, keys: &str) -> Result<Study, StudyError> {
 #[test]
 fn a_grid_has_any_number_of_axes() {
     let study = of_three("", "points = 4").unwrap();
-    assert_eq!((study.points(), study.is_mapped()), (64, false));
-    assert_eq!(study.place(0), [0.01; 3]);
-    assert_eq!(study.place(63), [0.1; 3]);
-    assert_eq!(study.place(7), [0.01, 0.04, 0.1]);
+    assert_eq!((study.point_count(), study.is_mapped()), (64, false));
+    assert_eq!(study.point_values(0), [0.01; 3]);
+    assert_eq!(study.point_values(63), [0.1; 3]);
+    assert_eq!(study.point_values(7), [0.01, 0.04, 0.1]);
     assert!(of_three("", "points = 1000").is_err());
 }
 
@@ -230,16 +233,16 @@ fn a_sample_fills_the_ranges_and_its_seed_matters() {
     let sampled = |sample: &str, keys| of_three(&format!("[sample]\n{sample}\n"), keys);
     let study = sampled("points = 1000", "").unwrap();
     study.check_scene("s.toml", &scene()).unwrap();
-    let places: Vec<Vec<f64>> = (0..1000).map(|index| study.place(index)).collect();
+    let places: Vec<Vec<f64>> = (0..1000).map(|index| study.point_values(index)).collect();
     assert!(places.iter().flatten().all(|value| (0.01..=0.1).contains(value)));
     let mean = |axis: usize| places.iter().map(|place| place[axis]).sum::<f64>() / 1000.0;
     assert!((0..3).all(|axis| (mean(axis) - 0.055).abs() < 3e-4));
     let other = sampled("points = 1000\nseed = 1\nmethod = \"sobol\"", "").unwrap();
-    assert_ne!(other.place(0), study.place(0));
+    assert_ne!(other.point_values(0), study.point_values(0));
     assert_ne!(other.fingerprint(&scene()), study.fingerprint(&scene()));
     let log = sampled("points = 1000", "scale = \"log\"").unwrap();
     assert_ne!(log.fingerprint(&scene()), study.fingerprint(&scene()));
-    let below = (0..1000).filter(|index| log.place(*index)[1] < 0.001_f64.sqrt()).count();
+    let below = (0..1000).filter(|index| log.point_values(*index)[1] < 0.001_f64.sqrt()).count();
     assert!((495..=505).contains(&below), "{below}");
     for (sample, keys, part) in [
         ("points = 1", "", "sample.points: found 1, expected 2 to 100000000"),

@@ -3,12 +3,12 @@
 use super::{Ended, JOB, Ringing, attempt, line_ends, resumed, whole};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::fit::journal::Journal;
-use wiperlab::fit::ledger::Progress;
-use wiperlab::fit::{Context, FitError, fit, job::Job};
-use wiperlab::journal::{self, Record, Shard, Sink, header_line};
+use wiperlab::fit::journal::FeatureCheckpoint;
+use wiperlab::fit::ledger::FitProgress;
+use wiperlab::fit::{FitContext, FitError, fit_features, job::Job};
+use wiperlab::journal::{self, CheckpointRecord, CheckpointSink, Shard, format_header_line};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::sweep::{self, Collection, Outcome, Study, SweepError, journal as points};
+use wiperlab::sweep::{self, PointCollection, PointOutcome, Study, SweepError, journal as points};
 
 /// Keeps so many appends, and of the next one a part.
 struct Failing {
@@ -23,7 +23,7 @@ impl Failing {
     }
 }
 
-impl Sink for Failing {
+impl CheckpointSink for Failing {
     fn append(&mut self, lines: &str) -> Result<(), String> {
         assert!(!self.failed, "something is written after a failure");
         let fails = self.left == 0;
@@ -41,19 +41,19 @@ fn a_fit_whose_journal_fails_at_any_write_ends_with_a_reason_and_goes_on() {
     let mut failures = 0;
     loop {
         let (mut disk, mut reported) = (Failing::after(failures), 0);
-        let mut watch = |progress: &Progress| {
+        let mut watch = |progress: &FitProgress| {
             reported = progress.evaluations;
             ControlFlow::Continue(())
         };
-        let context = Context { fingerprint: "f", version: "1", ..Context::default() };
-        let ended = fit(&job, &[None], &Ringing::default(), &context, &mut disk, &mut watch);
+        let context = FitContext { fingerprint: "f", version: "1", ..FitContext::default() };
+        let ended = fit_features(&job, &[None], &Ringing::default(), &context, &mut disk, &mut watch);
         if !disk.failed {
             assert_eq!(disk.text, uncut.journal);
             break;
         }
         let expected = FitError::JournalWrite { problem: "input/output error".to_owned() };
         assert_eq!(ended, Err(expected), "write {failures}");
-        let kept: Option<Journal> = journal::read("j", &disk.text).unwrap();
+        let kept: Option<FeatureCheckpoint> = journal::read_checkpoint("j", &disk.text).unwrap();
         let kept = kept.map_or(0, |journal| journal.records.len());
         // the gate holds its lines back until it has passed the job, and reports them before
         assert!(
@@ -84,23 +84,25 @@ fn study() -> (Study, Scene) {
 }
 
 /// The study from what a journal holds: its outcomes, how many points were reported, and what is appended.
-fn run_study(text: &str, sink: &mut Failing) -> (Result<Vec<Outcome>, SweepError>, usize) {
+fn run_study(text: &str, sink: &mut Failing) -> (Result<Vec<PointOutcome>, SweepError>, usize) {
     let (study, scene) = study();
-    let mut collected = Collection::new(points::header(&study, "f"), tempfile::tempfile().unwrap());
-    let mut collect = |name: &str, text: &str| collected.add(name, text.as_bytes()).unwrap();
+    let mut collected =
+        PointCollection::new(points::study_header(&study, "f"), tempfile::tempfile().unwrap());
+    let mut collect = |name: &str, text: &str| collected.add_journal(name, text.as_bytes()).unwrap();
     collect("before", text);
-    let known: Option<points::Journal> = journal::read("j", text).unwrap();
+    let known: Option<points::SweepJournal> = journal::read_checkpoint("j", text).unwrap();
     let known: Vec<usize> = known.iter().flat_map(|known| &known.records).map(|point| point.index).collect();
     let reported = AtomicUsize::new(0);
     let done = || {
         reported.fetch_add(1, Ordering::Relaxed);
     };
     let due = |index: usize| !known.contains(&index);
-    let ran = sweep::run(&study, &scene, Shard::WHOLE, &due, sink, &done, &|| ControlFlow::Continue(()));
-    collect("now", &(header_line(&points::header(&study, "f")) + &sink.text));
+    let ran =
+        sweep::run_sweep(&study, &scene, Shard::WHOLE, &due, sink, &done, &|| ControlFlow::Continue(()));
+    collect("now", &(format_header_line(&points::study_header(&study, "f")) + &sink.text));
     let outcomes = ran.map(|()| {
         let mut outcomes = Vec::new();
-        collected.each(|_, outcome| outcomes.push(outcome)).unwrap();
+        collected.for_each_point(|_, outcome| outcomes.push(outcome)).unwrap();
         outcomes
     });
     (outcomes, reported.into_inner())
@@ -108,7 +110,7 @@ fn run_study(text: &str, sink: &mut Failing) -> (Result<Vec<Outcome>, SweepError
 
 #[test]
 fn a_study_whose_journal_fails_at_any_write_ends_with_a_reason_and_goes_on() {
-    let header = header_line(&points::header(&study().0, "f"));
+    let header = format_header_line(&points::study_header(&study().0, "f"));
     let expected = run_study("", &mut Failing::after(usize::MAX)).0.unwrap();
     let mut failures = 0;
     loop {
@@ -120,7 +122,7 @@ fn a_study_whose_journal_fails_at_any_write_ends_with_a_reason_and_goes_on() {
         }
         assert_eq!(ended, Err(SweepError::JournalWrite { problem: "input/output error".to_owned() }));
         let text = header.clone() + &disk.text;
-        let kept: points::Journal = journal::read("j", &text).unwrap().unwrap();
+        let kept: points::SweepJournal = journal::read_checkpoint("j", &text).unwrap().unwrap();
         assert!(kept.records.len() >= reported);
         assert_eq!(run_study(&text, &mut Failing::after(usize::MAX)).0.unwrap(), expected);
         failures += 1;
@@ -146,8 +148,8 @@ fn left_by_a_power_failure(text: &str) -> Vec<Vec<u8>> {
 }
 
 /// What is read of it is the first part of what was written.
-fn holds_nothing_else<R: Record>(left: &[u8], written: &[R]) {
-    let Some(journal) = journal::read::<R>("j", left).unwrap() else { return };
+fn holds_nothing_else<R: CheckpointRecord>(left: &[u8], written: &[R]) {
+    let Some(journal) = journal::read_checkpoint::<R>("j", left).unwrap() else { return };
     assert_eq!(journal.records, written[..journal.records.len()]);
     let complete = left.iter().filter(|byte| **byte == b'\n').count();
     assert!(journal.records.len() + 1 >= complete, "a complete line was dropped");
@@ -177,8 +179,8 @@ fn what_a_power_failure_leaves_of_a_fit_is_read_as_far_as_it_is_whole_and_goes_o
 fn what_a_power_failure_leaves_of_a_study_is_read_as_far_as_it_is_whole_and_goes_on() {
     let mut disk = Failing::after(usize::MAX);
     let expected = run_study("", &mut disk).0.unwrap();
-    let text = header_line(&points::header(&study().0, "f")) + &disk.text;
-    let written: points::Journal = journal::read("j", &text).unwrap().unwrap();
+    let text = format_header_line(&points::study_header(&study().0, "f")) + &disk.text;
+    let written: points::SweepJournal = journal::read_checkpoint("j", &text).unwrap().unwrap();
     for (at, left) in left_by_a_power_failure(&text).iter().enumerate() {
         holds_nothing_else(left, &written.records);
         if at % 211 == 0 {

@@ -5,11 +5,11 @@ use super::scenes::{committed, upright_light_blade};
 use super::{MORE, cases, ran};
 use wiperlab::blade::Pose;
 use wiperlab::simulate::scene::{Scene, StartKind};
-use wiperlab::simulate::{Cause, Method, Status};
+use wiperlab::simulate::{IntegrationMethod, RunStatus, TransitionCause};
 
 fn with(mut scene: Scene, values: &[(&str, f64)]) -> Scene {
     for (name, value) in values {
-        scene = scene.with(name, *value).unwrap();
+        scene = scene.with_parameter(name, *value).unwrap();
     }
     scene
 }
@@ -38,15 +38,15 @@ type From = [f64; 2];
 
 /// Runs a scene by both methods; from the given tolerances on the list is that of the reference and its times
 /// differ by at most `MORE` tolerances. Energy and stick are held to theirs at every tolerance.
-fn assert_one_list(name: &str, scene: &Scene, from: From, status: Status) {
-    let reference = ran(scene, Method::Taylor, 1e-12);
+fn assert_one_list(name: &str, scene: &Scene, from: From, status: RunStatus) {
+    let reference = ran(scene, IntegrationMethod::Taylor, 1e-12);
     assert_eq!(reference.run.status, status, "{name}: {:?}", reference.run);
     for (method, relative) in cases() {
         let what = format!("{name}, {method:?} at {relative:e}");
         let seen = ran(scene, method, relative);
         let shift = seen.shift_s(&reference) / relative;
         seen.assert_sound(&what, relative);
-        if relative <= from[usize::from(method != Method::Taylor)] {
+        if relative <= from[usize::from(method != IntegrationMethod::Taylor)] {
             seen.assert_same_list(&what, &reference);
             assert!(shift <= MORE, "{what}: times are off by {shift} tolerances");
         }
@@ -59,16 +59,16 @@ const ALL_BUT_LOOSEST: From = [1e-4, 1e-6];
 
 #[test]
 fn ordinary_blades() {
-    assert_one_list("light blade", &light(&[]), ALL, Status::Completed);
-    assert_one_list("actual blade", &actual(&[]), ALL_BUT_LOOSEST, Status::Completed);
+    assert_one_list("light blade", &light(&[]), ALL, RunStatus::Completed);
+    assert_one_list("actual blade", &actual(&[]), ALL_BUT_LOOSEST, RunStatus::Completed);
 }
 
 #[test]
 fn friction_without_a_falling_part() {
     let scene = light(&[("friction.a", 0.0)]);
-    assert_one_list("pure Coulomb", &scene, ALL, Status::Completed);
+    assert_one_list("pure Coulomb", &scene, ALL, RunStatus::Completed);
     assert_eq!(
-        ran(&scene, Method::Taylor, 1e-8).transitions.len(),
+        ran(&scene, IntegrationMethod::Taylor, 1e-8).transitions.len(),
         2,
         "it turns once: stick, then slip back"
     );
@@ -78,11 +78,11 @@ fn friction_without_a_falling_part() {
 #[test]
 fn no_friction() {
     let scene = light(&[("friction.a", 0.0), ("friction.c", 0.0)]);
-    assert_one_list("frictionless", &scene, ALL, Status::Completed);
-    let seen = ran(&scene, Method::Taylor, 1e-8);
+    assert_one_list("frictionless", &scene, ALL, RunStatus::Completed);
+    let seen = ran(&scene, IntegrationMethod::Taylor, 1e-8);
     assert!(
         seen.ends.iter().all(|s| s.friction_n == 0.0)
-            && seen.transitions.iter().all(|t| t.cause == Cause::DirectReversal),
+            && seen.transitions.iter().all(|t| t.cause == TransitionCause::DirectReversal),
         "{:?}",
         seen.transitions
     );
@@ -94,7 +94,7 @@ fn very_steep_friction() {
         "B = 200 s/m",
         &light(&[("friction.b_s_per_m", 200.0)]),
         ALL_BUT_LOOSEST,
-        Status::Completed,
+        RunStatus::Completed,
     );
     // friction that grows by tens of powers of ten within the time in which nothing else changes: a tip that
     // stops in it draws Runge-Kutta's errors out at 1e-6, to 150 tolerances where the lists are equal
@@ -102,13 +102,13 @@ fn very_steep_friction() {
         "B = 1000 s/m",
         &light(&[("friction.b_s_per_m", 1000.0)]),
         [1e-4, 1e-8],
-        Status::Completed,
+        RunStatus::Completed,
     );
     assert_one_list(
         "B = 5000 s/m",
         &light(&[("friction.b_s_per_m", 5000.0)]),
         [1e-4, 1e-8],
-        Status::Completed,
+        RunStatus::Completed,
     );
 }
 
@@ -116,7 +116,7 @@ fn very_steep_friction() {
 fn no_damping() {
     let none = ["blade.head_damping_ratio", "blade.neck_damping_ratio", "blade.lip_damping_ratio"]
         .map(|name| (name, 0.0));
-    assert_one_list("undamped", &light(&none), ALL_BUT_LOOSEST, Status::Completed);
+    assert_one_list("undamped", &light(&none), ALL_BUT_LOOSEST, RunStatus::Completed);
 }
 
 #[test]
@@ -126,9 +126,9 @@ fn a_stiff_lip_and_a_soft_one() {
         "lip 1000 times as stiff",
         &light(&[(lip, times(lip, 1e3))]),
         ALL_BUT_LOOSEST,
-        Status::ContactLost,
+        RunStatus::ContactLost,
     );
-    assert_one_list("lip a tenth as stiff", &light(&[(lip, times(lip, 0.1))]), ALL, Status::Completed);
+    assert_one_list("lip a tenth as stiff", &light(&[(lip, times(lip, 0.1))]), ALL, RunStatus::Completed);
 }
 
 /// On a damped shoulder the motion is not sensitive. On an undamped one the neck rebounds, and an error
@@ -141,13 +141,13 @@ fn a_shoulder_a_thousand_times_as_stiff_as_the_neck() {
         "damped stiff shoulder",
         &actual(&[stiff, ("shoulder.damping_ratio", 0.1)]),
         ALL_BUT_LOOSEST,
-        Status::Completed,
+        RunStatus::Completed,
     );
     let sensitive = actual(&[stiff]);
-    assert_one_list("stiff shoulder", &sensitive, [1e-8, 0.0], Status::Completed);
-    let reference = ran(&sensitive, Method::Taylor, 1e-12);
+    assert_one_list("stiff shoulder", &sensitive, [1e-8, 0.0], RunStatus::Completed);
+    let reference = ran(&sensitive, IntegrationMethod::Taylor, 1e-12);
     for relative in [1e-8, 1e-10, 1e-12] {
-        let seen = ran(&sensitive, Method::RungeKutta, relative);
+        let seen = ran(&sensitive, IntegrationMethod::RungeKutta, relative);
         seen.assert_same_list(&format!("stiff shoulder, RungeKutta at {relative:e}"), &reference);
         assert!(
             relative > 1e-9 || seen.shift_s(&reference) < 1e4 * relative,
@@ -162,10 +162,10 @@ fn a_shoulder_a_thousand_times_as_stiff_as_the_neck() {
 /// a tolerance of 1e-4 does not tell from a jam.
 #[test]
 fn mass_ratios_of_a_million() {
-    assert_one_list("no head mass", &light(&[("blade.head_mass_kg", 0.0)]), ALL, Status::Completed);
+    assert_one_list("no head mass", &light(&[("blade.head_mass_kg", 0.0)]), ALL, RunStatus::Completed);
     let [mass, inertia] =
         ["blade.lip_mass_kg", "blade.lip_inertia_kg_m2"].map(|name| (name, times(name, 1e-6)));
-    assert_one_list("lip of a millionth", &light(&[mass, inertia]), [1e-6, 1e-6], Status::Diverged);
+    assert_one_list("lip of a millionth", &light(&[mass, inertia]), [1e-6, 1e-6], RunStatus::Diverged);
 }
 
 /// A head of a million lips on the same spring hardly moves, and the motion is sensitive: with the preload
@@ -176,7 +176,7 @@ fn a_head_of_a_million_lips_makes_the_motion_sensitive() {
     let head = times("blade.lip_mass_kg", 1e6);
     let spring = ("blade.head_stiffness_n_per_m", times("blade.head_stiffness_n_per_m", 1.0));
     let scene = light(&[("blade.head_mass_kg", head), spring]);
-    assert_one_list("head of a million lips", &scene, [0.0; 2], Status::Completed);
+    assert_one_list("head of a million lips", &scene, [0.0; 2], RunStatus::Completed);
     let moved =
         with(scene.clone(), &[("blade.preload_force_n", times("blade.preload_force_n", 1.0 + 2e-10))]);
     for method in super::METHODS {
@@ -194,10 +194,10 @@ fn a_head_of_a_million_lips_makes_the_motion_sensitive() {
 #[test]
 fn links_tilted_almost_level() {
     let ends = [
-        (1.5, 0.2, Status::Jammed),
-        (0.2, -1.5, Status::Diverged),
-        (1.5, -1.5, Status::Diverged),
-        (-1.5, -1.5, Status::ContactLost),
+        (1.5, 0.2, RunStatus::Jammed),
+        (0.2, -1.5, RunStatus::Diverged),
+        (1.5, -1.5, RunStatus::Diverged),
+        (-1.5, -1.5, RunStatus::ContactLost),
     ];
     for (theta, phi, status) in ends {
         let mut scene = light(&[("blade.preload_force_n", 3.0)]);

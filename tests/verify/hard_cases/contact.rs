@@ -4,14 +4,14 @@
 use super::scenes::upright_light_blade;
 use super::{ENERGY, ERRORS, Ran, cases, ran};
 use std::f64::consts::TAU;
-use wiperlab::blade::flight::Airborne;
-use wiperlab::blade::friction::Friction;
+use wiperlab::blade::flight::FlightState;
+use wiperlab::blade::friction::FrictionLaw;
 use wiperlab::blade::modes::time_scales_rad_per_s;
-use wiperlab::blade::shoulder::Lean;
-use wiperlab::blade::{Directions, Linkage, Pose, Spring};
-use wiperlab::simulate::mode::Mode;
-use wiperlab::simulate::scene::{Drive, Jam, Loss, Scene, StartKind};
-use wiperlab::simulate::{Cause, Method, Status};
+use wiperlab::blade::shoulder::ShoulderContact;
+use wiperlab::blade::{LinkDirections, Linkage, Pose, Spring};
+use wiperlab::simulate::mode::TipMode;
+use wiperlab::simulate::scene::{ContactLossRule, Drive, JamRule, Scene, StartKind};
+use wiperlab::simulate::{IntegrationMethod, RunStatus, TransitionCause};
 
 const AT_REST: Pose = Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 };
 /// Force with which the head presses, N, whatever its height: its spring is very long and very soft.
@@ -32,7 +32,7 @@ pub fn lip_alone(friction: f64) -> Scene {
         neck: Spring { stiffness: 1e18, damping: 0.0 },
         lip: Spring { damping: 0.0, ..scene.linkage.lip },
         preload_displacement_m: PRESS_N / SOFT_N_PER_M,
-        friction: Friction { a: 0.0, b_s_per_m: 0.0, c: friction },
+        friction: FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: friction },
         ..scene.linkage
     };
     scene
@@ -77,13 +77,13 @@ fn coulomb_friction_alone_turns_and_stops_the_tip_at_the_exact_angles() {
         let seen = ran(&scene, method, relative);
         let what = format!("{method:?} at {relative:e}");
         seen.assert_sound(&what, relative);
-        assert_eq!(seen.run.status, Status::Completed, "{what}");
+        assert_eq!(seen.run.status, RunStatus::Completed, "{what}");
         assert_eq!(seen.transitions.len(), turns.len() - 1, "{what}: {:?}", seen.transitions);
         for (i, (transition, exact)) in seen.transitions.iter().zip(&turns[1..]).enumerate() {
             let stops = i + 2 == turns.len();
             assert_eq!(
                 transition.cause,
-                if stops { Cause::TipStops } else { Cause::DirectReversal },
+                if stops { TransitionCause::TipStops } else { TransitionCause::DirectReversal },
                 "{what}: turn {i}"
             );
             let found = seen.ends.iter().find(|s| s.time_s == transition.time_s).unwrap().pose.phi;
@@ -98,7 +98,7 @@ fn coulomb_friction_alone_turns_and_stops_the_tip_at_the_exact_angles() {
 /// The holding force of the lip alone while the tip is held and the head moves: `(m phi'' + k2 phi - N l2 sin
 /// phi) / (l2 cos phi)` with `l2 sin phi = -v`.
 fn holding_force(scene: &Scene, t: f64) -> f64 {
-    let (blade, head) = (&scene.linkage, scene.drive.at(t));
+    let (blade, head) = (&scene.linkage, scene.drive.motion_at(t));
     let (l2, sin) = (blade.l2_m, -head.position_m / blade.l2_m);
     let cos = (1.0 - sin * sin).sqrt();
     let rate = -head.velocity_m_per_s / (l2 * cos);
@@ -125,7 +125,7 @@ fn a_release_with_vanishing_jerk_happens_and_ends_or_does_not_happen() {
         for (method, relative) in cases().filter(|(_, relative)| depth >= 10.0 * ERRORS * relative) {
             // the place of the lip follows from the tip's, so nothing limits a Runge-Kutta step but the
             // guards it samples
-            if method != Method::Taylor && depth < 1e-7 {
+            if method != IntegrationMethod::Taylor && depth < 1e-7 {
                 continue;
             }
             let what = format!("depth {depth:e}, {method:?} at {relative:e}");
@@ -134,7 +134,7 @@ fn a_release_with_vanishing_jerk_happens_and_ends_or_does_not_happen() {
             held.assert_sound(&what, relative);
             assert_eq!(
                 (held.run.status, held.transitions.len()),
-                (Status::Completed, 0),
+                (RunStatus::Completed, 0),
                 "{what}: {:?}",
                 held.transitions
             );
@@ -147,7 +147,10 @@ fn a_release_with_vanishing_jerk_happens_and_ends_or_does_not_happen() {
             let causes: Vec<_> = let_go.transitions.iter().map(|t| (t.to, t.cause)).collect();
             assert_eq!(
                 causes,
-                [(Mode::SlipForward, Cause::FrictionLimit), (Mode::Stick, Cause::TipStops)],
+                [
+                    (TipMode::SlipForward, TransitionCause::FrictionLimit),
+                    (TipMode::Stick, TransitionCause::TipStops)
+                ],
                 "{what}"
             );
             let [release, stop] = [0, 1].map(|i: usize| let_go.transitions[i].time_s);
@@ -176,14 +179,14 @@ fn a_train_of_rebounds_has_its_exact_landings_and_ends_in_stick() {
     const RESOLUTION: f64 = 1e-5;
     const RESTITUTION: f64 = 0.6;
     let mut scene = upright_light_blade()
-        .with("contact.restitution", RESTITUTION)
+        .with_parameter("contact.restitution", RESTITUTION)
         .unwrap()
-        .with("blade.preload_force_n", 0.02)
+        .with_parameter("blade.preload_force_n", 0.02)
         .unwrap();
     scene.linkage.head.damping = 0.0;
     scene.drive = Drive::Uniform { speed_m_per_s: 0.0 };
-    scene.loss = Loss::Fly;
-    scene.start = StartKind::Airborne(Airborne { pose: AT_REST, gap_m: 1e-3, gap_rate_m_per_s: 0.0 });
+    scene.loss = ContactLossRule::Fly;
+    scene.start = StartKind::Airborne(FlightState { pose: AT_REST, gap_m: 1e-3, gap_rate_m_per_s: 0.0 });
     let blade = &scene.linkage;
     let (omega, hd) = ((blade.head.stiffness / blade.mass_kg).sqrt(), blade.preload_displacement_m);
     let shortest = TAU / time_scales_rad_per_s(blade).1;
@@ -201,8 +204,8 @@ fn a_train_of_rebounds_has_its_exact_landings_and_ends_in_stick() {
         let what = format!("{method:?} at {relative:e}");
         let seen = ran(&scene, method, relative);
         seen.assert_sound(&what, relative);
-        assert_eq!((seen.run.status, seen.transitions.len()), (Status::Completed, exact.len()), "{what}");
-        assert_eq!(seen.transitions.last().map(|t| t.to), Some(Mode::Stick), "{what}");
+        assert_eq!((seen.run.status, seen.transitions.len()), (RunStatus::Completed, exact.len()), "{what}");
+        assert_eq!(seen.transitions.last().map(|t| t.to), Some(TipMode::Stick), "{what}");
         for (found, exact) in seen.transitions.iter().zip(&exact) {
             assert!(
                 (found.time_s - exact).abs() <= ERRORS * relative * exact,
@@ -216,16 +219,16 @@ fn a_train_of_rebounds_has_its_exact_landings_and_ends_in_stick() {
 /// Pressed on by nothing, upright, over a head at rest: the blade does not move, whatever contact does.
 #[test]
 fn without_preload_the_upright_blade_stays_where_it_is() {
-    for loss in [Loss::Stop, Loss::Fly] {
-        let mut scene = upright_light_blade().with("blade.preload_force_n", 0.0).unwrap();
+    for loss in [ContactLossRule::Stop, ContactLossRule::Fly] {
+        let mut scene = upright_light_blade().with_parameter("blade.preload_force_n", 0.0).unwrap();
         (scene.loss, scene.drive) = (loss, Drive::Uniform { speed_m_per_s: 0.0 });
         for (method, relative) in cases() {
             let what = format!("{loss:?}, {method:?} at {relative:e}");
             let seen = ran(&scene, method, relative);
-            let expected = if loss == Loss::Stop {
-                (Status::ContactLost, 0.0)
+            let expected = if loss == ContactLossRule::Stop {
+                (RunStatus::ContactLost, 0.0)
             } else {
-                (Status::Completed, scene.run.stop_s)
+                (RunStatus::Completed, scene.run.stop_s)
             };
             assert_eq!((seen.run.status, seen.run.stopped_at_s), expected, "{what}: {:?}", seen.run);
             seen.assert_sound(&what, relative);
@@ -237,18 +240,23 @@ fn without_preload_the_upright_blade_stays_where_it_is() {
 /// A heavy head whose leading tip slides under Coulomb friction that leaves the Painlevé indicator at a given
 /// value: the first of a list of poses in which the tip is pressed on and friction presses it harder.
 fn beside_the_paradox(indicator: f64) -> Scene {
-    let mut scene = upright_light_blade().with("blade.head_mass_kg", 0.5).unwrap();
-    let head = scene.drive.at(scene.start_s);
+    let mut scene = upright_light_blade().with_parameter("blade.head_mass_kg", 0.5).unwrap();
+    let head = scene.drive.motion_at(scene.start_s);
     let places = [0.2, 0.4, 0.6, 0.8];
     let poses = places
         .into_iter()
         .flat_map(|theta| places.map(|phi| Pose { theta, phi, theta_rate: 150.0, phi_rate: 50.0 }));
     let mut pressed = poses.filter_map(|pose| {
-        let contact = scene.linkage.contact(&pose, &Directions::of(&pose), &head, Lean::Off);
+        let contact = scene.linkage.friction_response(
+            &pose,
+            &LinkDirections::from_pose(&pose),
+            &head,
+            ShoulderContact::Off,
+        );
         (contact.nu < -1.0 && contact.n_free > 0.0).then_some((pose, contact.nu))
     });
     let (pose, nu) = pressed.next().expect("a pose beside the paradox");
-    scene.linkage.friction = Friction { a: 0.0, b_s_per_m: 0.0, c: (indicator - 1.0) / nu };
+    scene.linkage.friction = FrictionLaw { a: 0.0, b_s_per_m: 0.0, c: (indicator - 1.0) / nu };
     scene.start = StartKind::State(pose);
     scene.run.stop_s = 0.02;
     scene
@@ -260,8 +268,8 @@ fn beside_the_paradox(indicator: f64) -> Scene {
 fn next_to_the_paradox_the_tip_slides_on() {
     for indicator in [1e-1, 1e-2, 1e-3] {
         let scene = beside_the_paradox(indicator);
-        let reference = ran(&scene, Method::Taylor, 1e-12);
-        assert_eq!(reference.run.status, Status::Completed);
+        let reference = ran(&scene, IntegrationMethod::Taylor, 1e-12);
+        assert_eq!(reference.run.status, RunStatus::Completed);
         for (method, relative) in cases() {
             let what = format!("indicator {indicator:e}, {method:?} at {relative:e}");
             let seen = ran(&scene, method, relative);
@@ -286,21 +294,21 @@ fn beyond_the_paradox_the_tip_jams() {
         let mut scene = beside_the_paradox(indicator);
         for (method, relative) in cases() {
             let what = format!("indicator {indicator:e}, {method:?} at {relative:e}");
-            (scene.loss, scene.jam) = (Loss::Stop, Jam::Stop);
+            (scene.loss, scene.jam) = (ContactLossRule::Stop, JamRule::Stop);
             let stopped: Ran = ran(&scene, method, relative);
             assert_eq!(
                 (stopped.run.status, stopped.run.stopped_at_s, stopped.transitions.len()),
-                (Status::Jammed, scene.start_s, 0),
+                (RunStatus::Jammed, scene.start_s, 0),
                 "{what}"
             );
-            (scene.loss, scene.jam) = (Loss::Fly, Jam::Impact);
+            (scene.loss, scene.jam) = (ContactLossRule::Fly, JamRule::Impact);
             let struck = ran(&scene, method, relative);
             assert_eq!(
                 struck.transitions.first().map(|t| (t.time_s, t.cause)),
-                Some((scene.start_s, Cause::JamImpact)),
+                Some((scene.start_s, TransitionCause::JamImpact)),
                 "{what}"
             );
-            assert!(struck.run.status == Status::Completed, "{what}: {:?}", struck.run);
+            assert!(struck.run.status == RunStatus::Completed, "{what}: {:?}", struck.run);
             let energy = struck.audit.energy_residual_relative();
             assert!(energy <= ENERGY * relative, "{what}: energy residual {energy:e}");
         }

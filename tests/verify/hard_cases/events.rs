@@ -3,14 +3,14 @@
 
 use super::{ERRORS, cases};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use wiperlab::ode::taylor::{self, Expand, Expansion, Room};
-use wiperlab::ode::{self, Cause, End, Phase, Start, Work};
-use wiperlab::simulate::Method;
+use wiperlab::ode::taylor::{self, TaylorExpansion, TaylorPhase, TaylorWorkspace};
+use wiperlab::ode::{self, HybridPhase, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters};
+use wiperlab::simulate::IntegrationMethod;
 
 /// `x'' = -x` with guards `offset + slope x`; from `x = 1` at rest the solution is `cos t`.
 struct Swing<const G: usize>([[f64; 2]; G]);
 
-impl<const G: usize> Phase<2, G> for Swing<G> {
+impl<const G: usize> HybridPhase<2, G> for Swing<G> {
     fn derivative(&self, _: f64, y: &[f64; 2]) -> [f64; 2] {
         [y[1], -y[0]]
     }
@@ -22,9 +22,9 @@ impl<const G: usize> Phase<2, G> for Swing<G> {
     }
 }
 
-impl<const G: usize> Expand<2, G> for Swing<G> {
+impl<const G: usize> TaylorPhase<2, G> for Swing<G> {
     type Tape = ();
-    fn expand(&self, _: f64, y: &[f64; 2], (): &mut (), out: &mut Expansion<2, G>) {
+    fn expand_series(&self, _: f64, y: &[f64; 2], (): &mut (), out: &mut TaylorExpansion<2, G>) {
         let [mut x, mut v] = *y;
         for k in 0..=out.order {
             out.states[k] = [x, v];
@@ -38,18 +38,24 @@ const TOP: [f64; 2] = [1.0, 0.0];
 
 /// From a state to a guard or the stop time, with the number of steps.
 fn go<const G: usize>(
-    method: Method,
+    method: IntegrationMethod,
     relative: f64,
     swing: &Swing<G>,
     (t, y): (f64, [f64; 2]),
     zero_order: [u8; G],
     stop: f64,
-) -> (End<2>, u64) {
-    let (start, mut work) = (Start { t, y, zero_order, step: None }, Work::default());
+) -> (PhaseEnd<2>, u64) {
+    let (start, mut work) = (PhaseStart { t, y, zero_order, step: None }, WorkCounters::default());
     let end = match method {
-        Method::Taylor => {
-            taylor::integrate(swing, start, stop, relative, &mut Room::default(), &mut work, |_, _| ())
-        }
+        IntegrationMethod::Taylor => taylor::integrate_taylor(
+            swing,
+            start,
+            stop,
+            relative,
+            &mut TaylorWorkspace::default(),
+            &mut work,
+            |_, _| (),
+        ),
         _ => ode::integrate(swing, start, stop, relative, &mut work, |_| ()),
     };
     (end, work.steps)
@@ -67,14 +73,14 @@ fn a_grazing_dip_is_seen_and_a_near_miss_is_not() {
             }
             let what = format!("depth {depth:e}, {method:?} at {relative:e}");
             let (dip, _) = go(method, relative, &Swing([[1.0 - depth, 1.0]]), (0.0, TOP), [0], 6.0);
-            assert_eq!(dip.cause, Cause::Guard(0), "{what}");
+            assert_eq!(dip.cause, PhaseEndCause::Guard(0), "{what}");
             let error = dip.t - (depth - 1.0).acos();
             assert!(
                 error.abs() <= (ERRORS * relative + 1e-15) / (2.0 * depth).sqrt(),
                 "{what}: off by {error:e}"
             );
             let (miss, _) = go(method, relative, &Swing([[1.0 + depth, 1.0]]), (0.0, TOP), [0], 6.0);
-            assert_eq!((miss.cause, miss.t), (Cause::Stop, 6.0), "{what}");
+            assert_eq!((miss.cause, miss.t), (PhaseEndCause::Stop, 6.0), "{what}");
         }
     }
 }
@@ -85,7 +91,7 @@ fn two_transitions_within_one_step_are_both_found() {
     for (method, relative) in cases() {
         let depth: f64 = (100.0 * ERRORS * relative).clamp(1e-8, 1e-2);
         let (whole, steps) = go(method, relative, &Swing([[2.0, 1.0]]), (0.0, TOP), [0], TAU);
-        assert_eq!(whole.cause, Cause::Stop);
+        assert_eq!(whole.cause, PhaseEndCause::Stop);
         let down_at = (depth - 1.0).acos();
         assert!(TAU - 2.0 * down_at < TAU / steps as f64, "both lie within a step");
         let what = format!("{method:?} at {relative:e}");
@@ -94,7 +100,7 @@ fn two_transitions_within_one_step_are_both_found() {
         let (rest, _) = go(method, relative, &Swing([[1.0 - depth, 1.0]]), (up.t, up.y), [1], TAU);
         assert_eq!(
             [down.cause, up.cause, rest.cause],
-            [Cause::Guard(0), Cause::Guard(0), Cause::Stop],
+            [PhaseEndCause::Guard(0), PhaseEndCause::Guard(0), PhaseEndCause::Stop],
             "{what}"
         );
         let most = 2.0 * (ERRORS * relative + 1e-15) / (2.0 * depth).sqrt();
@@ -116,18 +122,18 @@ fn simultaneous_events_come_in_order_and_none_is_lost() {
         let what = format!("{method:?} at {relative:e}");
         let close = Swing([[-0.5, 1.0], [-0.5 - 1e-9, 1.0]]);
         let (first, _) = go(method, relative, &close, (0.0, TOP), [0, 0], TAU);
-        assert_eq!(first.cause, Cause::Guard(1), "{what}");
+        assert_eq!(first.cause, PhaseEndCause::Guard(1), "{what}");
         let (second, _) = go(method, relative, &Swing([close.0[0]]), (first.t, first.y), [0], TAU);
-        assert_eq!(second.cause, Cause::Guard(0), "{what}");
+        assert_eq!(second.cause, PhaseEndCause::Guard(0), "{what}");
         let apart = second.t - first.t;
         assert!((apart - 1e-9 / 0.75f64.sqrt()).abs() <= 1e-12, "{what}: {apart:e} s apart");
 
         let same = Swing([[-0.5, 1.0], [-1.0, 2.0]]);
         let (one, _) = go(method, relative, &same, (0.0, TOP), [0, 0], TAU);
         assert!((one.t - PI / 3.0).abs() <= ERRORS * relative, "{what}");
-        let Cause::Guard(told) = one.cause else { panic!("{what}: {:?}", one.cause) };
+        let PhaseEndCause::Guard(told) = one.cause else { panic!("{what}: {:?}", one.cause) };
         let (other, steps) = go(method, relative, &Swing([same.0[1 - told]]), (one.t, one.y), [0], TAU);
-        assert_eq!(other.cause, Cause::Guard(0), "{what}");
+        assert_eq!(other.cause, PhaseEndCause::Guard(0), "{what}");
         assert!(
             (other.t - one.t).abs() <= 1e-14 && steps <= 1,
             "{what}: {:e} s later after {steps} steps",
@@ -137,18 +143,18 @@ fn simultaneous_events_come_in_order_and_none_is_lost() {
 }
 
 /// Zeros of `cos t` up to 20, with the run cut at the given times: 6 zeros, however the cuts lie to them.
-fn zeros(method: Method, relative: f64, cuts: impl IntoIterator<Item = f64>) -> Vec<f64> {
+fn zeros(method: IntegrationMethod, relative: f64, cuts: impl IntoIterator<Item = f64>) -> Vec<f64> {
     let (mut at, mut side, mut order, mut found) = ((0.0, TOP), 1.0, [0], Vec::new());
     for cut in cuts.into_iter().chain([20.0]) {
         loop {
             let (end, _) = go(method, relative, &Swing([[0.0, side]]), at, order, cut);
             at = (end.t, end.y);
-            if end.cause == Cause::Stop {
+            if end.cause == PhaseEndCause::Stop {
                 // a state within rounding of its guard's zero is said to start there
                 order = [u8::from(found.last().is_some_and(|last| end.t - last < 1e-13))];
                 break;
             }
-            assert_eq!(end.cause, Cause::Guard(0));
+            assert_eq!(end.cause, PhaseEndCause::Guard(0));
             assert!(
                 found.len() < 10,
                 "{method:?} at {relative:e} loops at {}: {found:?}, cut {cut:e}, order {order:?}, at {at:?}",
@@ -167,7 +173,7 @@ fn a_transition_at_the_end_of_a_step_or_at_an_output_time_counts_once() {
         let exact: Vec<f64> = (0..6).map(|k| FRAC_PI_2 + f64::from(k) * PI).collect();
         let own = zeros(method, relative, []);
         // (a step of one unit of rounding tells Runge-Kutta nothing about its guard)
-        let rounding = if method == Method::Taylor { 1e-15 } else { 0.0 };
+        let rounding = if method == IntegrationMethod::Taylor { 1e-15 } else { 0.0 };
         for shift in [0.0, rounding, -rounding, 1e-12, -1e-12, relative, -relative] {
             for nominal in [&exact, &own] {
                 let found = zeros(method, relative, nominal.iter().map(|t| t + shift));
@@ -194,14 +200,14 @@ fn a_transition_at_the_start_counts_once() {
     for (method, relative) in cases() {
         let rising = Swing([[0.0, -1.0]]); // x < 0 after pi/2
         let (end, _) = go(method, relative, &rising, (FRAC_PI_2, [0.0, -1.0]), [1], 20.0);
-        assert_eq!(end.cause, Cause::Guard(0));
+        assert_eq!(end.cause, PhaseEndCause::Guard(0));
         assert!((end.t - 3.0 * FRAC_PI_2).abs() <= ERRORS * relative, "{}", end.t);
         let falling = Swing([[0.0, 1.0]]);
         let (at_once, _) = go(method, relative, &falling, (FRAC_PI_2, [0.0, -1.0]), [1], 20.0);
-        assert_eq!((at_once.cause, at_once.t), (Cause::Guard(0), FRAC_PI_2), "no time passes");
+        assert_eq!((at_once.cause, at_once.t), (PhaseEndCause::Guard(0), FRAC_PI_2), "no time passes");
         // a double zero, `1 - x` from the top: it opens and closes after a whole turn without a sign change
         // between
         let (turn, _) = go(method, relative, &Swing([[1.0, -1.0]]), (0.0, TOP), [2], 6.0);
-        assert_eq!((turn.cause, turn.t), (Cause::Stop, 6.0), "{method:?} at {relative:e}");
+        assert_eq!((turn.cause, turn.t), (PhaseEndCause::Stop, 6.0), "{method:?} at {relative:e}");
     }
 }

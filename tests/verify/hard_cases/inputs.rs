@@ -5,8 +5,8 @@ use super::METHODS;
 use super::scenes::upright_light_blade;
 use wiperlab::blade::Pose;
 use wiperlab::blade::parameters::PARAMETERS;
-use wiperlab::simulate::scene::{Jam, Loss, Scene, StartKind};
-use wiperlab::simulate::{Effort, Observer, Piece, Status, run_with};
+use wiperlab::simulate::scene::{ContactLossRule, JamRule, Scene, StartKind};
+use wiperlab::simulate::{Observer, RunStatus, SolutionSegment, SolverOptions, run_scene_with};
 
 const LIGHT_BLADE: &str = include_str!("../../fixtures/light-blade.toml");
 /// Right-hand sides after which a run counts as done: a hang would show.
@@ -18,8 +18,8 @@ struct Numbers {
 }
 
 impl Observer for Numbers {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        let end = piece.sample(piece.end_s);
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        let end = piece.sample_at(piece.end_s);
         let numbers =
             [end.pose.theta, end.pose.phi, end.pose.theta_rate, end.pose.phi_rate, end.tip_x_m, end.normal_n];
         if self.broken.is_none() && !numbers.iter().all(|x| x.is_finite()) {
@@ -33,10 +33,11 @@ fn assert_ends(what: &str, scene: &Scene) {
     for method in METHODS {
         for relative in [1e-4, 1e-8, 1e-12] {
             let mut numbers = Numbers::default();
-            let effort = Effort { method, most_evaluations: MOST_EVALUATIONS, ..Effort::new(relative) };
-            let run = run_with(scene, effort, &mut numbers);
+            let effort =
+                SolverOptions { method, most_evaluations: MOST_EVALUATIONS, ..SolverOptions::new(relative) };
+            let run = run_scene_with(scene, effort, &mut numbers);
             assert!(
-                run.status != Status::Completed || numbers.broken.is_none(),
+                run.status != RunStatus::Completed || numbers.broken.is_none(),
                 "{what}, {method:?} at {relative:e}: no number at {:?} s",
                 numbers.broken
             );
@@ -70,7 +71,7 @@ fn no_parameter_however_extreme_panics_hangs_or_goes_unnoticed() {
             f64::MAX,
         ] {
             let what = format!("{} = {value:e}", parameter.name);
-            let scene = match upright_light_blade().with(parameter.name, value) {
+            let scene = match upright_light_blade().with_parameter(parameter.name, value) {
                 Ok(scene) => scene,
                 Err(error) => {
                     refused += 1;
@@ -86,7 +87,9 @@ fn no_parameter_however_extreme_panics_hangs_or_goes_unnoticed() {
             assert!(value.is_finite() && value >= 0.0, "{what} is accepted");
             let mut scene = scene;
             scene.run.stop_s = 0.05;
-            for (loss, jam) in [(Loss::Stop, Jam::Stop), (Loss::Fly, Jam::Impact)] {
+            for (loss, jam) in
+                [(ContactLossRule::Stop, JamRule::Stop), (ContactLossRule::Fly, JamRule::Impact)]
+            {
                 (scene.loss, scene.jam) = (loss, jam);
                 assert_ends(&what, &scene);
             }
@@ -131,7 +134,9 @@ fn no_start_however_extreme_panics_or_goes_unnoticed() {
     scene.run.stop_s = 0.01;
     for theta in [0.0, 1.5, -1.57, 1.6, 1e10, 1e300] {
         for rate in [0.0, -1e3, 1e8, 1e160, f64::MAX] {
-            for (loss, jam) in [(Loss::Stop, Jam::Stop), (Loss::Fly, Jam::Impact)] {
+            for (loss, jam) in
+                [(ContactLossRule::Stop, JamRule::Stop), (ContactLossRule::Fly, JamRule::Impact)]
+            {
                 scene.start = StartKind::State(Pose { theta, phi: 0.5, theta_rate: rate, phi_rate: -rate });
                 (scene.loss, scene.jam) = (loss, jam);
                 assert_ends(&format!("neck at {theta:e} rad, {rate:e} rad/s"), &scene);

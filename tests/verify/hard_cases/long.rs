@@ -5,10 +5,13 @@ use super::scenes::{committed, upright_light_blade};
 use super::{DRIFT_M, ERRORS, METHODS};
 use rayon::prelude::*;
 use wiperlab::blade::Pose;
-use wiperlab::simulate::mode::Mode;
-use wiperlab::simulate::outputs::{Sampler, Transitions, push_event, push_state};
+use wiperlab::simulate::mode::TipMode;
+use wiperlab::simulate::outputs::{SampleObserver, Transitions, push_event_row, push_state_row};
 use wiperlab::simulate::scene::{Drive, Scene, StartKind};
-use wiperlab::simulate::{Cause, Effort, Method, Observer, Piece, Status, Transition, run_with};
+use wiperlab::simulate::{
+    IntegrationMethod, Observer, RunStatus, SolutionSegment, SolverOptions, Transition, TransitionCause,
+    run_scene_with,
+};
 
 /// Releases of the tip, and the worst drift of what stick holds.
 #[derive(Default)]
@@ -18,13 +21,13 @@ struct Releases {
 }
 
 impl Observer for Releases {
-    fn piece(&mut self, piece: &Piece<'_>) {
-        if piece.mode == Mode::Stick {
-            self.drift_m = self.drift_m.max(piece.sample(piece.end_s).constraint_drift_m.abs());
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        if piece.mode == TipMode::Stick {
+            self.drift_m = self.drift_m.max(piece.sample_at(piece.end_s).constraint_drift_m.abs());
         }
     }
-    fn transition(&mut self, transition: &Transition) {
-        if transition.cause == Cause::FrictionLimit {
+    fn observe_transition(&mut self, transition: &Transition) {
+        if transition.cause == TransitionCause::FrictionLimit {
             self.times.push(transition.time_s);
         }
     }
@@ -44,10 +47,10 @@ fn a_hundred_thousand_cycles_do_not_drift() {
         let mut scene = scene.clone();
         scene.run.stop_s = (cycles as f64 + 2.5) * 4.737e-3;
         let mut seen = Releases::default();
-        let run = run_with(&scene, Effort::new(relative), &mut seen);
+        let run = run_scene_with(&scene, SolverOptions::new(relative), &mut seen);
         assert_eq!(
             (run.status, seen.times.len() as u64),
-            (Status::Completed, run.transitions / 2),
+            (RunStatus::Completed, run.transitions / 2),
             "at {relative:e}"
         );
         assert!(seen.times.len() > cycles, "{}", seen.times.len());
@@ -70,22 +73,22 @@ fn a_hundred_thousand_cycles_do_not_drift() {
 }
 
 /// Samples and events of a run as the files hold them.
-fn files(scene: &Scene, method: Method) -> String {
+fn files(scene: &Scene, method: IntegrationMethod) -> String {
     let (mut text, mut list) = (String::new(), Transitions::default());
     let (from, to) = (scene.start_s, scene.run.stop_s);
     let times = (0..=500).map(|i| from + (to - from) * f64::from(i) / 500.0);
-    let run = run_with(
+    let run = run_scene_with(
         scene,
-        Effort { method, ..Effort::new(1e-8) },
-        &mut (Sampler::new(times, |s| push_state(&mut text, s)), &mut list),
+        SolverOptions { method, ..SolverOptions::new(1e-8) },
+        &mut (SampleObserver::new(times, |s| push_state_row(&mut text, s)), &mut list),
     );
-    list.0.iter().for_each(|t| push_event(&mut text, t));
+    list.0.iter().for_each(|t| push_event_row(&mut text, t));
     format!("{text}{run:?}")
 }
 
 #[test]
 fn a_run_is_the_same_to_the_bit_again_and_on_any_number_of_threads() {
-    let runs: Vec<(Scene, Method)> =
+    let runs: Vec<(Scene, IntegrationMethod)> =
         [committed("light-blade"), committed("actual-blade"), upright_light_blade()]
             .into_iter()
             .flat_map(|scene| METHODS.map(|method| (scene.clone(), method)))

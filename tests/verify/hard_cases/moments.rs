@@ -4,10 +4,10 @@
 use super::scenes::upright_light_blade;
 use super::{METHODS, MORE, Ran, cases, ran};
 use wiperlab::blade::shoulder::Shoulder;
-use wiperlab::simulate::mode::Mode;
-use wiperlab::simulate::outputs::Sampler;
-use wiperlab::simulate::scene::Loss;
-use wiperlab::simulate::{Effort, Method, Status, run_with};
+use wiperlab::simulate::mode::TipMode;
+use wiperlab::simulate::outputs::SampleObserver;
+use wiperlab::simulate::scene::ContactLossRule;
+use wiperlab::simulate::{IntegrationMethod, RunStatus, SolverOptions, run_scene_with};
 
 const RELATIVE: f64 = 1e-8;
 
@@ -25,10 +25,10 @@ fn a_sample_at_a_transition_is_reported_once() {
         times.sort_by(f64::total_cmp);
         times.dedup();
         let mut samples = Vec::new();
-        run_with(
+        run_scene_with(
             &scene,
-            Effort { method, ..Effort::new(RELATIVE) },
-            &mut Sampler::new(times.iter().copied(), |s| samples.push(*s)),
+            SolverOptions { method, ..SolverOptions::new(RELATIVE) },
+            &mut SampleObserver::new(times.iter().copied(), |s| samples.push(*s)),
         );
         assert!(samples.iter().map(|s| s.time_s).eq(times), "{method:?}");
         for transition in &transitions {
@@ -52,7 +52,7 @@ fn a_transition_at_the_stop_time_adds_nothing_else() {
                 let seen = ran(&scene, method, RELATIVE);
                 assert_eq!(
                     (seen.run.status, seen.run.stopped_at_s),
-                    (Status::Completed, scene.run.stop_s),
+                    (RunStatus::Completed, scene.run.stop_s),
                     "{method:?}"
                 );
                 assert!(
@@ -73,9 +73,10 @@ fn a_transition_at_the_stop_time_adds_nothing_else() {
 fn the_shoulders_corner_at_the_instant_of_release() {
     let mut scene = upright_light_blade();
     scene.run.stop_s = 0.3;
-    let plain = ran(&scene, Method::Taylor, 1e-12);
+    let plain = ran(&scene, IntegrationMethod::Taylor, 1e-12);
     let release = plain.transitions[0];
-    let pose = plain.ends.iter().find(|s| s.time_s == release.time_s && s.mode == Mode::Stick).unwrap().pose;
+    let pose =
+        plain.ends.iter().find(|s| s.time_s == release.time_s && s.mode == TipMode::Stick).unwrap().pose;
     let angle = pose.theta.abs();
     assert!(
         plain.ends.iter().all(|s| s.time_s >= release.time_s || s.pose.theta.abs() < angle),
@@ -91,7 +92,7 @@ fn the_shoulders_corner_at_the_instant_of_release() {
         });
         scene
     };
-    let reference = ran(&shouldered(0.0), Method::Taylor, 1e-12);
+    let reference = ran(&shouldered(0.0), IntegrationMethod::Taylor, 1e-12);
     let modes = |seen: &Ran| seen.transitions.iter().map(|t| (t.from, t.to)).collect::<Vec<_>>();
     assert!(
         (reference.transitions[0].time_s - release.time_s).abs() < 1e-10
@@ -100,7 +101,7 @@ fn the_shoulders_corner_at_the_instant_of_release() {
     for shift in [0.0, 1e-15, -1e-15, 1e-13, -1e-13] {
         let scene = shouldered(shift);
         for (method, relative) in
-            cases().filter(|(method, relative)| *method == Method::Taylor || *relative < 1e-5)
+            cases().filter(|(method, relative)| *method == IntegrationMethod::Taylor || *relative < 1e-5)
         {
             let what = format!("shifted by {shift:e}, {method:?} at {relative:e}");
             let seen = ran(&scene, method, relative);
@@ -122,8 +123,8 @@ fn the_shoulders_corner_at_the_instant_of_release() {
 /// the other, in a phase of no length. On the glass and off it the run goes on.
 #[test]
 fn a_shoulder_without_play_makes_phases_of_no_length() {
-    for (loss, preload) in [(Loss::Stop, 0.2813), (Loss::Fly, 0.03)] {
-        let mut scene = upright_light_blade().with("blade.preload_force_n", preload).unwrap();
+    for (loss, preload) in [(ContactLossRule::Stop, 0.2813), (ContactLossRule::Fly, 0.03)] {
+        let mut scene = upright_light_blade().with_parameter("blade.preload_force_n", preload).unwrap();
         (scene.loss, scene.run.stop_s) = (loss, 0.75);
         let stiffness_n_m_per_rad = scene.linkage.neck.stiffness;
         scene.linkage.shoulder =
@@ -131,15 +132,15 @@ fn a_shoulder_without_play_makes_phases_of_no_length() {
         // without play the shoulder only doubles the neck's stiffness
         let mut plain = scene.clone();
         (plain.linkage.shoulder, plain.linkage.neck.stiffness) = (None, 2.0 * stiffness_n_m_per_rad);
-        let reference = ran(&plain, Method::Taylor, 1e-12);
+        let reference = ran(&plain, IntegrationMethod::Taylor, 1e-12);
         assert!(
-            loss == Loss::Fly
+            loss == ContactLossRule::Fly
                 || reference.ends.iter().any(|s| s.pose.theta > 0.0)
                     && reference.ends.iter().any(|s| s.pose.theta < 0.0),
             "the neck swings through"
         );
         for (method, relative) in
-            cases().filter(|(method, relative)| *method == Method::Taylor && *relative < 1e-7)
+            cases().filter(|(method, relative)| *method == IntegrationMethod::Taylor && *relative < 1e-7)
         {
             let what = format!("{loss:?}, {method:?} at {relative:e}");
             let seen = ran(&scene, method, relative);

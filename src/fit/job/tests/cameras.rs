@@ -1,8 +1,8 @@
 //! Cameras of features.
 
 use super::*;
-use crate::feature::Length;
-use crate::fit::calibration::Calibration;
+use crate::feature::LengthCalibration;
+use crate::fit::calibration::TargetCalibration;
 
 /// What a job with this in its recording says.
 fn with(camera: &str) -> Job {
@@ -14,14 +14,14 @@ fn with(camera: &str) -> Job {
     .unwrap()
 }
 
-fn calibrations(job: &Job) -> Vec<Option<Calibration>> {
-    job.aims.iter().map(|aim| job.calibration(aim)).collect()
+fn calibrations(job: &Job) -> Vec<Option<TargetCalibration>> {
+    job.targets.iter().map(|aim| job.target_calibration(aim)).collect()
 }
 
 #[test]
 fn lengths_of_a_recording_have_a_camera_unless_the_job_says_otherwise() {
-    let usual = |length| Some(Calibration { condition: 0, scale_sd: 0.005, offset_sd_m: 1e-3, length });
-    let both = [usual(Length::Size { floor_m: 0.0 }), usual(Length::Place)];
+    let usual = |length| Some(TargetCalibration { condition: 0, scale_sd: 0.005, offset_sd_m: 1e-3, length });
+    let both = [usual(LengthCalibration::Size { floor_m: 0.0 }), usual(LengthCalibration::Position)];
     let [frequency, size, place] = calibrations(&with("")).try_into().unwrap();
     assert_eq!((frequency, [size, place]), (None, both));
     let stated = with("[recording.camera]\nscale_sd = 0.002\noffset_sd_m = 0\n");
@@ -46,7 +46,7 @@ fn a_number_that_the_job_gives_has_its_deviation_there() {
 
 #[test]
 fn a_camera_is_part_of_the_problem_where_a_length_depends_on_it() {
-    let content = |job: &Job| serde_json::to_string(&job.content()).unwrap();
+    let content = |job: &Job| serde_json::to_string(&job.identity()).unwrap();
     let exact = content(&with("camera = \"exact\"\n"));
     assert!(!exact.contains("cameras"), "what was exact stays the same problem");
     let usual = content(&with(""));

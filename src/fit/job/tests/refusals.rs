@@ -224,7 +224,7 @@ fn the_keys_of_each_kind_are_checked() {
 
 #[test]
 fn the_problem_is_what_decides_a_cost_and_nothing_else() {
-    let of = |from: &str, to: &str| fingerprint(&job(&WHOLE.replacen(from, to, 1)).unwrap().content());
+    let of = |from: &str, to: &str| fingerprint(&job(&WHOLE.replacen(from, to, 1)).unwrap().identity());
     let problem = of("", "");
     let same = [
         ("title = \"whole\"", "title = \"w\""),

@@ -48,22 +48,22 @@ fn of(text: &str) -> Job {
 #[test]
 fn a_trace_needs_no_more_than_its_name() {
     let job = of(TRACED);
-    assert!(job.aims.is_empty());
+    assert!(job.targets.is_empty());
     let [first, second] = job.traces.as_slice() else { panic!() };
     assert_eq!((first.condition, &first.channels, first.noise_m, first.head), (0, &None, None, None));
-    assert_eq!(first.camera.clock_sd_s(Head::Recording), 0.0, "one camera took head and tip");
+    assert_eq!(first.camera.clock_sd_s(HeadSource::Recording), 0.0, "one camera took head and tip");
     assert!(first.camera.tilt_sd_rad > 0.0 && first.camera.scale_sd > 0.0 && first.camera.offset_sd_m > 0.0);
     assert_eq!(second.condition, 1);
     assert_eq!(second.channels, Some(vec![TraceChannel::Deflection, TraceChannel::HeadDrop]));
-    assert_eq!((second.head, second.noise_m), (Some(Head::Scene), Some(2e-6)));
-    assert_eq!((second.camera.tilt_sd_rad, second.camera.clock_sd_s(Head::Recording)), (0.0, 0.002));
+    assert_eq!((second.head, second.noise_m), (Some(HeadSource::Scene), Some(2e-6)));
+    assert_eq!((second.camera.tilt_sd_rad, second.camera.clock_sd_s(HeadSource::Recording)), (0.0, 0.002));
     assert_eq!(job.constants, Constants::All { sd_relative: 0.03 });
     assert_eq!((job.search.seed, job.search.global_evaluations), (1, 0));
 }
 
 #[test]
 fn traces_are_part_of_what_is_fitted() {
-    let content = |text: &str| serde_json::to_string(&of(text).content()).unwrap();
+    let content = |text: &str| serde_json::to_string(&of(text).identity()).unwrap();
     let base = content(TRACED);
     for (from, to) in [
         ("2e-6", "3e-6"),
@@ -73,7 +73,7 @@ fn traces_are_part_of_what_is_fitted() {
     ] {
         assert_ne!(content(&TRACED.replacen(from, to, 1)), base, "{from}");
     }
-    let without = serde_json::to_string(&super::job(MEASURED).unwrap().content()).unwrap();
+    let without = serde_json::to_string(&super::job(MEASURED).unwrap().identity()).unwrap();
     assert!(!without.contains("traces") && !without.contains("constants"), "old fingerprints stay");
 }
 
@@ -123,7 +123,7 @@ fn constants_are_checked() {
         assert!(refused.contains(words), "{refused}");
     }
     let listed = TRACED.replacen("\"3 %\"", "[{ name = \"friction.c\", sd_relative = 0.05 }]", 1);
-    let expected = Nuisance { name: "friction.c".to_owned(), sd_relative: 0.05 };
+    let expected = NuisanceParameter { name: "friction.c".to_owned(), sd_relative: 0.05 };
     assert_eq!(of(&listed).constants, Constants::Listed(vec![expected]));
     let without = refusal(MEASURED, "seed = 7", "seed = 7\nnuisance = \"3 %\"");
     assert!(without.contains("nuisance: found without a [[trace]], expected one"), "{without}");

@@ -5,11 +5,11 @@ use super::*;
 #[test]
 fn recordings_and_conditions_have_names_scenes_and_values_of_their_own() {
     let job = job(WHOLE).unwrap();
-    let condition = |name: &str, recording: Option<&str>, scene: &str, set: &[f64], held_out| Condition {
+    let condition = |name: &str, recording: Option<&str>, scene: &str, set: &[f64], held_out| JobCondition {
         name: name.to_owned(),
         recording: recording.map(str::to_owned),
         scene: scene.to_owned(),
-        head: Head::Scene,
+        head: HeadSource::Scene,
         set: set.iter().map(|value| ("friction.c".to_owned(), *value)).collect(),
         held_out,
         camera: recording.map(|_| FeatureCamera { scale_sd: 0.005, offset_sd_m: 1e-3 }),
@@ -29,40 +29,40 @@ fn recordings_and_conditions_have_names_scenes_and_values_of_their_own() {
 fn aims_know_their_condition_their_stage_and_whether_they_are_held_out() {
     let job = job(WHOLE).unwrap();
     let found: Vec<_> = job
-        .aims
+        .targets
         .iter()
         .map(|a| (a.feature.name.as_str(), a.feature.condition, a.held_out, a.stage))
         .collect();
     let expected = [
-        ("low", 0, false, When::Always),
-        ("low, fast", 1, true, When::Always),
-        ("flip-after-reversal", 2, false, When::Always),
-        ("friction at 0.05 m/s", 0, false, When::Always),
-        ("friction at 0.1 m/s", 0, false, When::Always),
-        ("cycle at 550.0 Hz", 0, false, When::Last),
-        ("cycle at 650.0 Hz", 0, false, When::Last),
-        ("cycle at 750.0 Hz", 0, false, When::Last),
-        ("cycle at 850.0 Hz", 0, false, When::Last),
-        ("cycle-frequency-high", 0, false, When::Always),
+        ("low", 0, false, TargetStage::Always),
+        ("low, fast", 1, true, TargetStage::Always),
+        ("flip-after-reversal", 2, false, TargetStage::Always),
+        ("friction at 0.05 m/s", 0, false, TargetStage::Always),
+        ("friction at 0.1 m/s", 0, false, TargetStage::Always),
+        ("cycle at 550.0 Hz", 0, false, TargetStage::Last),
+        ("cycle at 650.0 Hz", 0, false, TargetStage::Last),
+        ("cycle at 750.0 Hz", 0, false, TargetStage::Last),
+        ("cycle at 850.0 Hz", 0, false, TargetStage::Last),
+        ("cycle-frequency-high", 0, false, TargetStage::Always),
     ];
     assert_eq!(found, expected);
 }
 
 #[test]
 fn a_target_needs_no_deviation_where_the_recording_gives_one() {
-    let sources: Vec<Source> = job(WHOLE).unwrap().aims.iter().map(|a| a.source).collect();
-    let least = |least_sd_relative| Source::Measured { least_sd: 0.0, least_sd_relative };
+    let sources: Vec<TargetSource> = job(WHOLE).unwrap().targets.iter().map(|a| a.source).collect();
+    let least = |least_sd_relative| TargetSource::Measured { least_sd: 0.0, least_sd_relative };
     assert_eq!(
         (sources[0], sources[3], sources[5], sources[9]),
         (least(1e-3), least(0.0), least(0.3), least(1e-3))
     );
     assert_eq!(
         sources[2],
-        Source::Given { target: 0.0, sd: 0.002 },
+        TargetSource::Given { target: 0.0, sd: 0.002 },
         "the flip may start when the head turns"
     );
     let flip = WHOLE.replace("recording = 3\ntarget = 0.0\ntarget_sd = 0.002", "sd_relative = 0.1");
-    let Source::Measured { least_sd, least_sd_relative } = job(&flip).unwrap().aims[2].source else {
+    let TargetSource::Measured { least_sd, least_sd_relative } = job(&flip).unwrap().targets[2].source else {
         panic!()
     };
     assert!(

@@ -2,54 +2,55 @@
 //! number.
 
 use crate::import::error::{CellProblem, ImportError};
-use crate::import::formats::deeplabcut::header::Header;
-use crate::import::reader::picked::picked;
+use crate::import::formats::deeplabcut::header::DeepLabCutHeader;
+use crate::import::reader::picked::picked_frames_finding;
 use crate::import::reader::{
-    Collector, Document, Facts, Order, PointCells, PointShape, Position, Record, Shape, Stamp, Table,
-    TrackFile,
+    DelimitedTable, Document, Facts, InstanceFields, PointCells, PointFields, RowOrder, RowPosition,
+    RowStamp, RowView, TrackCollector, TrackFile,
 };
 
 /// Reads every picture's row; a video's pictures come in any order and leave most frames out.
-pub(crate) fn read<'a>(
+pub(crate) fn read_labels<'a>(
     document: &'a Document,
-    table: &'a Table,
-    header: &Header,
+    table: &'a DelimitedTable,
+    header: &DeepLabCutHeader,
     facts: Facts,
 ) -> Result<TrackFile<'a>, ImportError> {
-    let point = |p: &PointCells| PointShape {
+    let point = |p: &PointCells| PointFields {
         name: p.name.clone(),
         has_y: true,
         has_confidence: p.confidence.is_some(),
     };
     let image_cell = header.index_cells - 1;
-    let shape = Shape {
+    let shape = InstanceFields {
         has_frame: true,
         has_time: false,
         clock_cell: image_cell,
         points: header.points.iter().map(point).collect(),
     };
-    let mut collector = Collector::new(shape);
+    let mut collector = TrackCollector::new(shape);
     let (mut video, mut count): (Option<String>, usize) = (None, 0);
-    let mut positions = vec![Position::default(); header.points.len()];
+    let mut positions = vec![RowPosition::default(); header.points.len()];
     let mut rows = table.rows(header.start);
-    while let Some(record) = rows.next()? {
+    while let Some(record) = rows.next_row()? {
         if record.is_empty() {
             continue;
         }
-        table.check_length(&record, header.cells, header.cells)?;
-        let (folder, image) = picture(&record, header.index_cells);
-        one_video(table, &record, video.get_or_insert_with(|| folder.clone()), &folder)?;
-        let frame = frame_number(image).ok_or_else(|| unnumbered(table, &record, image_cell))?;
+        table.check_row_length(&record, header.cells, header.cells)?;
+        let (folder, image) = split_picture_path(&record, header.index_cells);
+        check_same_video(table, &record, video.get_or_insert_with(|| folder.clone()), &folder)?;
+        let frame =
+            frame_number(image).ok_or_else(|| unnumbered_picture_error(table, &record, image_cell))?;
         for (position, cells) in positions.iter_mut().zip(&header.points) {
-            *position = label(table, &record, cells)?;
+            *position = read_label(table, &record, cells)?;
         }
-        collector.push("", Stamp { line: record.line, frame: Some(frame), time: None }, &positions);
+        collector.add_row("", RowStamp { line: record.line, frame: Some(frame), time: None }, &positions);
         count += 1;
     }
     let video = video.unwrap_or_default();
     let (clocks, tracks) =
-        collector.finish(document.file, Order::Any).map_err(|error| of_video(error, &video))?;
-    let findings = clocks.iter().filter_map(|clock| picked(document.file, clock)).collect();
+        collector.finish(document.file, RowOrder::Any).map_err(|error| name_video_in_error(error, &video))?;
+    let findings = clocks.iter().filter_map(|clock| picked_frames_finding(document.file, clock)).collect();
     Ok(TrackFile {
         table: Some(table),
         findings,
@@ -60,19 +61,28 @@ pub(crate) fn read<'a>(
             "labels of {count} pictures of the video `{video}`; the names of the pictures give the frames"
         )],
         texts: table.head.iter().take(header.start).flat_map(|row| row.cells.iter().cloned()).collect(),
-        ..TrackFile::of(document)
+        ..TrackFile::for_document(document)
     })
 }
 
-fn label(table: &Table, record: &Record, cells: &PointCells) -> Result<Position, ImportError> {
-    let value =
-        |cell: Option<usize>, axis: &str| table.optional(record, cell, &format!("{axis} of {}", cells.name));
+fn read_label(
+    table: &DelimitedTable,
+    record: &RowView,
+    cells: &PointCells,
+) -> Result<RowPosition, ImportError> {
+    let value = |cell: Option<usize>, axis: &str| {
+        table.optional_number_at(record, cell, &format!("{axis} of {}", cells.name))
+    };
     let [x, y] = [&cells.x, &cells.y].map(|cells| cells.first().copied());
-    Ok(Position { x: value(x, "x")?, y: value(y, "y")?, confidence: value(cells.confidence, "likelihood")? })
+    Ok(RowPosition {
+        x: value(x, "x")?,
+        y: value(y, "y")?,
+        confidence: value(cells.confidence, "likelihood")?,
+    })
 }
 
 /// The folder of a row's picture (its video's name) and the picture's name.
-fn picture<'r>(record: &Record<'r>, index_cells: usize) -> (String, &'r str) {
+fn split_picture_path<'r>(record: &RowView<'r>, index_cells: usize) -> (String, &'r str) {
     if index_cells > 1 {
         return (record.cell(index_cells - 2).to_owned(), record.cell(index_cells - 1));
     }
@@ -88,21 +98,26 @@ fn frame_number(image: &str) -> Option<f64> {
     stem.get(digits..)?.parse::<u32>().ok().map(f64::from)
 }
 
-fn one_video(table: &Table, record: &Record, video: &str, folder: &str) -> Result<(), ImportError> {
+fn check_same_video(
+    table: &DelimitedTable,
+    record: &RowView,
+    video: &str,
+    folder: &str,
+) -> Result<(), ImportError> {
     if video == folder {
         return Ok(());
     }
     Err(ImportError::wrong_table(
-        table.place(record.line, 1),
+        table.location(record.line, 1),
         format!("a picture of the video `{folder}` after those of `{video}`"),
         "the labels of one video",
         "import the CollectedData file in the folder of one video, not the merged data set",
     ))
 }
 
-fn unnumbered(table: &Table, record: &Record, cell: usize) -> ImportError {
+fn unnumbered_picture_error(table: &DelimitedTable, record: &RowView, cell: usize) -> ImportError {
     ImportError::Cell {
-        place: table.place(record.line, table.column(record.line, cell)),
+        place: table.location(record.line, table.text_column(record.line, cell)),
         problem: CellProblem::NotAFrame,
         name: "picture".to_owned(),
         found: record.cell(cell).chars().take(60).collect::<String>().into(),
@@ -113,10 +128,10 @@ fn unnumbered(table: &Table, record: &Record, cell: usize) -> ImportError {
 }
 
 /// The track of all points of a picture has no name: a refusal names the video.
-fn of_video(error: ImportError, video: &str) -> ImportError {
+fn name_video_in_error(error: ImportError, video: &str) -> ImportError {
     match error {
-        ImportError::Twice { place, what, found, first, .. } => {
-            ImportError::Twice { place, what, found, first, track: video.to_owned() }
+        ImportError::DuplicateRow { place, what, found, first, .. } => {
+            ImportError::DuplicateRow { place, what, found, first, track: video.to_owned() }
         }
         other => other,
     }

@@ -1,22 +1,22 @@
 //! The flat table: one row a frame, without its number; columns `NAME_cam1_X`, `NAME_cam1_Y`, ...
 
 use crate::import::error::ImportError;
-use crate::import::formats::dltdv::pixels::{FIRST_PIXEL, SEVERAL_CAMERAS, facts, track_name};
-use crate::import::reader::{Document, Fact, Layout, PointCells, Row, Table, TrackFile};
+use crate::import::formats::dltdv::pixels::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
+use crate::import::reader::{DelimitedTable, Document, Fact, PointCells, TableLayout, TextRow, TrackFile};
 use crate::recording::files::YAxis;
 
 /// Mark between the name of a point and its camera.
 const CAMERA: &str = "_cam";
 /// Ends of x and y columns, and which program writes them so.
-const AXES: [(&str, &str, Writer); 4] = [
-    ("_U", "_V", Writer::Version8),
-    ("_X", "_Y", Writer::Unknown),
-    ("_x", "_y", Writer::Argus),
-    ("_u", "_v", Writer::Unknown),
+const AXES: [(&str, &str, DltdvWriter); 4] = [
+    ("_U", "_V", DltdvWriter::Version8),
+    ("_X", "_Y", DltdvWriter::Unknown),
+    ("_x", "_y", DltdvWriter::Argus),
+    ("_u", "_v", DltdvWriter::Unknown),
 ];
 
 #[derive(Clone, Copy, PartialEq, Eq)]
-enum Writer {
+enum DltdvWriter {
     /// DLTdv 8.4, which counts y downwards.
     Version8,
     /// Argus, which counts y upwards.
@@ -27,7 +27,7 @@ enum Writer {
 
 /// What a column's name says.
 #[derive(Clone, Copy)]
-struct Column<'t> {
+struct DltdvColumn<'t> {
     point: &'t str,
     camera: &'t str,
     /// Index in [`AXES`].
@@ -35,9 +35,9 @@ struct Column<'t> {
     is_x: bool,
 }
 
-impl<'t> Column<'t> {
+impl<'t> DltdvColumn<'t> {
     /// Names may hold underscores: the last `_cam` counts.
-    fn named(name: &'t str) -> Option<Self> {
+    fn parse(name: &'t str) -> Option<Self> {
         let ends =
             AXES.iter().enumerate().flat_map(|(axes, (x, y, _))| [(axes, *x, true), (axes, *y, false)]);
         let (axes, is_x, rest) =
@@ -49,45 +49,48 @@ impl<'t> Column<'t> {
     }
 }
 
-fn header<'t>(table: &'t Table) -> Option<(usize, &'t Row)> {
+fn find_header<'t>(table: &'t DelimitedTable) -> Option<(usize, &'t TextRow)> {
     table
         .head
         .iter()
         .enumerate()
         .take(2)
-        .find(|(_, row)| row.cells.iter().any(|cell| Column::named(cell).is_some()))
+        .find(|(_, row)| row.cells.iter().any(|cell| DltdvColumn::parse(cell).is_some()))
 }
 
-pub(crate) fn recognises(table: &Table) -> Option<String> {
-    let (_, row) = header(table)?;
-    let name = row.cells.iter().find(|cell| Column::named(cell).is_some())?;
+pub(crate) fn recognise_flat_table(table: &DelimitedTable) -> Option<String> {
+    let (_, row) = find_header(table)?;
+    let name = row.cells.iter().find(|cell| DltdvColumn::parse(cell).is_some())?;
     Some(format!("line {} names `{name}`, a point in a camera as DLTdv and Argus do", row.line))
 }
 
-pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<TrackFile<'a>, ImportError> {
-    let Some((index, row)) = header(table) else {
+pub(crate) fn read_flat_table<'a>(
+    document: &'a Document,
+    table: &'a DelimitedTable,
+) -> Result<TrackFile<'a>, ImportError> {
+    let Some((index, row)) = find_header(table) else {
         let first = table.head.first();
         let shown = first
             .map(|row| row.texts().into_iter().take(8).collect::<Vec<_>>().join(", "))
             .unwrap_or_default();
-        return Err(lacks(table, first.map_or(1, |row| row.line), format!("`{shown}`")));
+        return Err(columns_error(table, first.map_or(1, |row| row.line), format!("`{shown}`")));
     };
-    let columns: Vec<Option<Column>> = row.cells.iter().map(|cell| Column::named(cell)).collect();
+    let columns: Vec<Option<DltdvColumn>> = row.cells.iter().map(|cell| DltdvColumn::parse(cell)).collect();
     let several = columns
         .iter()
         .flatten()
         .any(|column| columns.iter().flatten().any(|other| other.camera != column.camera));
-    let points = points(table, row, &columns, several)?;
-    let cells = row.filled();
-    let layout = Layout {
+    let points = point_columns(table, row, &columns, several)?;
+    let cells = row.used_width();
+    let layout = TableLayout {
         start: index + 1,
         width: cells,
         most: cells,
-        first_frame: empty_rows(table, index)?,
+        first_frame: count_empty_rows(table, index)?,
         points,
-        ..Layout::default()
+        ..TableLayout::default()
     };
-    let mut export = layout.read(document, table, facts(y_axis(&columns)))?;
+    let mut export = layout.read_tracks(document, table, pixel_facts(y_axis_of_writer(&columns)))?;
     export.notes.push(format!("rows are frames, the first one frame 0; {FIRST_PIXEL}"));
     let ignored: Vec<&str> = row
         .texts()
@@ -106,10 +109,10 @@ pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<Track
 }
 
 /// Every x has its y to the right.
-fn points(
-    table: &Table,
-    row: &Row,
-    columns: &[Option<Column>],
+fn point_columns(
+    table: &DelimitedTable,
+    row: &TextRow,
+    columns: &[Option<DltdvColumn>],
     several: bool,
 ) -> Result<Vec<PointCells>, ImportError> {
     let mut points = vec![];
@@ -123,23 +126,23 @@ fn points(
         let pairs = y
             .is_some_and(|y| !y.is_x && x.is_x && (x.point, x.camera, x.axes) == (y.point, y.camera, y.axes));
         if !pairs {
-            return Err(lacks(
+            return Err(columns_error(
                 table,
                 row.line,
                 format!("`{}` in cell {} without its partner", row.cells[at], at + 1),
             ));
         }
-        points.push(PointCells::new(track_name(x.point, x.camera, several), at, Some(at + 1)));
+        points.push(PointCells::new(camera_track_name(x.point, x.camera, several), at, Some(at + 1)));
         at += 2;
     }
     Ok(points)
 }
 
 /// Rows of empty cells between the header and the first row with anything in it: they are frames too.
-fn empty_rows(table: &Table, header: usize) -> Result<f64, ImportError> {
+fn count_empty_rows(table: &DelimitedTable, header: usize) -> Result<f64, ImportError> {
     let mut rows = table.rows(header);
     let (mut count, mut in_data) = (0.0, false);
-    while let Some(record) = rows.next()? {
+    while let Some(record) = rows.next_row()? {
         match (in_data, record.is_empty()) {
             (false, _) => in_data = true, // the header itself
             (true, true) => count += 1.0,
@@ -149,28 +152,28 @@ fn empty_rows(table: &Table, header: usize) -> Result<f64, ImportError> {
     Ok(count)
 }
 
-fn y_axis(columns: &[Option<Column>]) -> Fact<YAxis> {
+fn y_axis_of_writer(columns: &[Option<DltdvColumn>]) -> Fact<YAxis> {
     let mut writers = columns.iter().flatten().map(|column| AXES[column.axes].2);
     let first = writers.next()?;
     match first {
         _ if writers.any(|writer| writer != first) => None,
-        Writer::Version8 => Some((
+        DltdvWriter::Version8 => Some((
             YAxis::Down,
             "columns that end in _U and _V are those of DLTdv 8, which counts pixels from \
                 the top of the picture"
                 .to_owned(),
         )),
-        Writer::Argus => Some((
+        DltdvWriter::Argus => Some((
             YAxis::Up,
             "columns that end in _x and _y are those of Argus, which counts \
             pixels from the bottom of the picture"
                 .to_owned(),
         )),
-        Writer::Unknown => None,
+        DltdvWriter::Unknown => None,
     }
 }
 
-fn lacks(table: &Table, line: usize, found: String) -> ImportError {
+fn columns_error(table: &DelimitedTable, line: usize, found: String) -> ImportError {
     ImportError::columns(
         table.file,
         line,
@@ -186,7 +189,7 @@ mod tests {
 
     #[test]
     fn the_last_camera_of_a_columns_name_counts() {
-        let named = |name| Column::named(name).map(|column| (column.point, column.camera, column.is_x));
+        let named = |name| DltdvColumn::parse(name).map(|column| (column.point, column.camera, column.is_x));
         assert_eq!(named("pt1_cam1_X"), Some(("pt1", "1", true)));
         assert_eq!(named("lip_cam_left_cam12_V"), Some(("lip_cam_left", "12", false)));
         assert_eq!(named("Track 1_cam_2_y"), Some(("Track 1", "2", false)));

@@ -1,11 +1,11 @@
 //! Files that DLTdv writes next to the positions and that hold none: each is refused with the one to import.
 
 use crate::import::error::ImportError;
-use crate::import::reader::{Document, Row};
+use crate::import::reader::{Document, TextRow};
 use crate::import::source::base_name;
 
 /// End of a file's name, what is in it.
-const BY_NAME: [(&str, &str); 5] = [
+const SIBLING_KINDS: [(&str, &str); 5] = [
     ("xyzpts", "positions in space, reconstructed from several cameras"),
     ("xyzres", "residuals of a reconstruction"),
     ("offsets", "offsets between the frames of several cameras"),
@@ -18,16 +18,16 @@ const COEFFICIENTS_KIND: usize = 3;
 const COEFFICIENTS: usize = 11;
 
 /// The refusal of such a file, and why it is one.
-pub(crate) fn recognises(document: &Document) -> Option<(ImportError, String)> {
+pub(crate) fn recognise_sibling(document: &Document) -> Option<(ImportError, String)> {
     if document.text.starts_with("PointNames_to_go_with") {
         return Some((
-            refusal(document, 1, 4),
+            sibling_error(document, 1, 4),
             "line 1 says that it is a list of DLTdv's point names".to_owned(),
         ));
     }
     let row = document.table.as_ref().ok()?.head.first()?;
     let all = |is: fn(&str) -> bool| !row.cells.is_empty() && row.cells.iter().all(|cell| is(cell));
-    let kind = if is_space(row) {
+    let kind = if has_space_columns(row) {
         Some(0)
     } else if all(|cell| cell.ends_with("_dltres")) {
         Some(1)
@@ -38,19 +38,19 @@ pub(crate) fn recognises(document: &Document) -> Option<(ImportError, String)> {
     };
     if let Some(kind) = kind {
         return Some((
-            refusal(document, row.line, kind),
-            format!("line {} names the columns of DLTdv's {} file", row.line, BY_NAME[kind].0),
+            sibling_error(document, row.line, kind),
+            format!("line {} names the columns of DLTdv's {} file", row.line, SIBLING_KINDS[kind].0),
         ));
     }
-    let kind = by_name(document)?;
+    let kind = kind_by_name(document)?;
     Some((
-        refusal(document, row.line, kind),
-        format!("its name ends in {} as that of a file of DLTdv does", BY_NAME[kind].0),
+        sibling_error(document, row.line, kind),
+        format!("its name ends in {} as that of a file of DLTdv does", SIBLING_KINDS[kind].0),
     ))
 }
 
 /// Columns in threes that end in `_X`, `_Y`, `_Z`.
-fn is_space(row: &Row) -> bool {
+fn has_space_columns(row: &TextRow) -> bool {
     let of_point = |cells: &[String]| {
         let names: Vec<Option<&str>> =
             cells.iter().zip(["_X", "_Y", "_Z"]).map(|(cell, end)| cell.strip_suffix(end)).collect();
@@ -60,17 +60,17 @@ fn is_space(row: &Row) -> bool {
 }
 
 /// Names alone show it only where the content cannot be another program's: triplets and plain numbers.
-fn by_name(document: &Document) -> Option<usize> {
+fn kind_by_name(document: &Document) -> Option<usize> {
     let table = document.table.as_ref().ok()?;
     let stem = base_name(document.stem).to_lowercase();
-    let kind = BY_NAME.iter().position(|(end, _)| stem.ends_with(&end.to_lowercase()))?;
+    let kind = SIBLING_KINDS.iter().position(|(end, _)| stem.ends_with(&end.to_lowercase()))?;
     let title = table.head.first()?.texts().join(" ").to_lowercase();
     (title.starts_with("sparse format") || (kind == COEFFICIENTS_KIND && table.head.len() == COEFFICIENTS))
         .then_some(kind)
 }
 
-fn refusal(document: &Document, line: usize, kind: usize) -> ImportError {
-    let (name, what) = BY_NAME[kind];
+fn sibling_error(document: &Document, line: usize, kind: usize) -> ImportError {
+    let (name, what) = SIBLING_KINDS[kind];
     ImportError::wrong_table(
         format!("{}:{line}:1", document.file),
         format!("{what} (DLTdv's {name} file)"),

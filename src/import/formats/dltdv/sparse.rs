@@ -2,34 +2,34 @@
 //! own.
 
 use crate::import::error::{CellProblem, ImportError};
-use crate::import::formats::dltdv::pixels::{FIRST_PIXEL, SEVERAL_CAMERAS, facts, track_name};
-use crate::import::reader::{Clock, Document, Fact, Record, Row, Table, Track, TrackFile};
+use crate::import::formats::dltdv::pixels::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
+use crate::import::reader::{Clock, DelimitedTable, Document, Fact, RowView, TextRow, Track, TrackFile};
 use crate::recording::files::YAxis;
 use std::collections::BTreeMap;
 
 /// First line; its other kinds are positions in space and their residuals.
 const TITLE: &str = "sparse format camera coordinates";
-const AGAIN: &str = "the file was cut short or edited: export it again";
+const EXPORT_AGAIN: &str = "the file was cut short or edited: export it again";
 
 /// Frames of a pair of columns, in order.
-type Frames = BTreeMap<u64, Entry>;
+type SparseFrames = BTreeMap<u64, SparsePosition>;
 
 #[derive(Default)]
-struct Entry {
+struct SparsePosition {
     line: usize,
     x: Option<f64>,
     y: Option<f64>,
 }
 
 /// The second line: rows and columns of the whole table, and how many of its values follow.
-struct Size {
+struct SparseTableSize {
     line: usize,
     rows: u64,
     columns: u64,
     values: u64,
 }
 
-pub(crate) fn recognises(table: &Table) -> Option<String> {
+pub(crate) fn recognise_sparse_table(table: &DelimitedTable) -> Option<String> {
     let row = table.head.first()?;
     row.texts()
         .join(" ")
@@ -38,34 +38,42 @@ pub(crate) fn recognises(table: &Table) -> Option<String> {
         .then(|| format!("line {} is `{}`", row.line, row.texts().join(" ").trim_end()))
 }
 
-pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<TrackFile<'a>, ImportError> {
-    let size = size(table)?;
-    let names = Names::find(document, &size)?;
-    let mut pairs: BTreeMap<u64, Frames> = BTreeMap::new();
+pub(crate) fn read_sparse_table<'a>(
+    document: &'a Document,
+    table: &'a DelimitedTable,
+) -> Result<TrackFile<'a>, ImportError> {
+    let size = read_size(table)?;
+    let names = SparsePointNames::find(document, &size)?;
+    let mut pairs: BTreeMap<u64, SparseFrames> = BTreeMap::new();
     let mut rows = table.rows(2);
     let mut count = 0_u64;
-    while let Some(record) = rows.next()? {
+    while let Some(record) = rows.next_row()? {
         if !record.is_empty() {
-            let (row, column, value) = triplet(table, &record, &size)?;
+            let (row, column, value) = read_triplet(table, &record, &size)?;
             let entry = pairs.entry((column - 1) / 2).or_default().entry(row).or_default();
-            entry.put(column % 2 == 1, value).map_err(|()| twice(table, &record, row, column, entry.line))?;
+            entry
+                .set_coordinate(column % 2 == 1, value)
+                .map_err(|()| duplicate_value_error(table, &record, row, column, entry.line))?;
             entry.line = record.line;
             count += 1;
         }
     }
     if count != size.values {
-        return Err(wrong(
+        return Err(sparse_table_error(
             table,
             size.line,
             format!("{} values announced and {count} below", size.values),
             "as many as announced",
         ));
     }
-    let mut export =
-        TrackFile { table: Some(table), facts: facts(names.y_axis()), ..TrackFile::of(document) };
+    let mut export = TrackFile {
+        table: Some(table),
+        facts: pixel_facts(names.y_axis()),
+        ..TrackFile::for_document(document)
+    };
     for (pair, frames) in pairs {
-        let name = names.of(pair);
-        add(&mut export, name, &frames);
+        let name = names.name_of_pair(pair);
+        add_track(&mut export, name, &frames);
     }
     export.notes.push(format!("row 1 is frame 0; {FIRST_PIXEL}"));
     export.notes.extend(names.notes());
@@ -73,7 +81,7 @@ pub(crate) fn read<'a>(document: &'a Document, table: &'a Table) -> Result<Track
 }
 
 /// The track of a pair of columns; every track has its own frames.
-fn add(export: &mut TrackFile, name: String, frames: &Frames) {
+fn add_track(export: &mut TrackFile, name: String, frames: &SparseFrames) {
     let lines = frames.values().map(|entry| u32::try_from(entry.line).unwrap_or(u32::MAX)).collect();
     let numbers = frames.keys().map(|row| Some((row - 1) as f64)).collect();
     let x = frames.values().map(|entry| entry.x).collect();
@@ -82,9 +90,9 @@ fn add(export: &mut TrackFile, name: String, frames: &Frames) {
     export.clocks.push(Clock { lines, cell: 0, frame: Some(numbers), time: None });
 }
 
-impl Entry {
+impl SparsePosition {
     /// A value of zero is one that is missing.
-    fn put(&mut self, is_x: bool, value: Option<f64>) -> Result<(), ()> {
+    fn set_coordinate(&mut self, is_x: bool, value: Option<f64>) -> Result<(), ()> {
         let place = if is_x { &mut self.x } else { &mut self.y };
         if place.is_some() {
             return Err(());
@@ -94,13 +102,13 @@ impl Entry {
     }
 }
 
-fn size(table: &Table) -> Result<Size, ImportError> {
+fn read_size(table: &DelimitedTable) -> Result<SparseTableSize, ImportError> {
     let row = table.head.get(1);
     let line = row.map_or(1, |row| row.line);
-    let cells = row.map(Row::texts).unwrap_or_default();
+    let cells = row.map(TextRow::texts).unwrap_or_default();
     let whole = |cell: usize| cells.get(cell).and_then(|text| text.parse::<u64>().ok());
     let refuse = |found: String| {
-        wrong(
+        sparse_table_error(
             table,
             line,
             found,
@@ -114,14 +122,18 @@ fn size(table: &Table) -> Result<Size, ImportError> {
     if columns == 0 || columns % 2 == 1 {
         return Err(refuse(format!("{columns} columns")));
     }
-    Ok(Size { line, rows, columns, values })
+    Ok(SparseTableSize { line, rows, columns, values })
 }
 
-fn triplet(table: &Table, record: &Record, size: &Size) -> Result<(u64, u64, Option<f64>), ImportError> {
-    if record.filled() != 3 {
+fn read_triplet(
+    table: &DelimitedTable,
+    record: &RowView,
+    size: &SparseTableSize,
+) -> Result<(u64, u64, Option<f64>), ImportError> {
+    if record.used_width() != 3 {
         return Err(ImportError::Ragged {
-            place: table.place(record.line, 1),
-            found: record.filled(),
+            place: table.location(record.line, 1),
+            found: record.used_width(),
             expected: 3,
         });
     }
@@ -129,22 +141,22 @@ fn triplet(table: &Table, record: &Record, size: &Size) -> Result<(u64, u64, Opt
         |cell: usize, name: &str, most: u64, expected: &'static str| match record.cell(cell).parse::<u64>() {
             Ok(index) if (1..=most).contains(&index) => Ok(index),
             _ => Err(ImportError::Cell {
-                place: table.place(record.line, table.column(record.line, cell)),
+                place: table.location(record.line, table.text_column(record.line, cell)),
                 problem: CellProblem::NotAFrame,
                 name: name.to_owned(),
                 found: record.cell(cell).chars().take(60).collect::<String>().into(),
                 expected,
-                advice: AGAIN,
+                advice: EXPORT_AGAIN,
             }),
         };
     let row = index(0, "row", size.rows, "a whole number from 1 to the rows that line 2 announces")?;
     let column =
         index(1, "column", size.columns, "a whole number from 1 to the columns that line 2 announces")?;
-    Ok((row, column, table.value(record, 2, "value")?))
+    Ok((row, column, table.number_at(record, 2, "value")?))
 }
 
 /// Who the pairs of columns are.
-struct Names {
+struct SparsePointNames {
     points: Vec<String>,
     /// Cameras of a point; `None` where no list of names tells it.
     cameras: Option<u64>,
@@ -153,8 +165,8 @@ struct Names {
     pairs: u64,
 }
 
-impl Names {
-    fn find(document: &Document, size: &Size) -> Result<Self, ImportError> {
+impl SparsePointNames {
+    fn find(document: &Document, size: &SparseTableSize) -> Result<Self, ImportError> {
         let pairs = size.columns / 2;
         let Some((file, text)) =
             document.companions.iter().find(|(_, text)| text.to_lowercase().starts_with("pointnames"))
@@ -178,7 +190,7 @@ impl Names {
     }
 
     /// Of a pair of columns, counted from 0: all cameras of the first point come first.
-    fn of(&self, pair: u64) -> String {
+    fn name_of_pair(&self, pair: u64) -> String {
         let Some(cameras) = self.cameras else {
             return if self.pairs == 1 {
                 "pt1".to_owned()
@@ -191,7 +203,7 @@ impl Names {
             .and_then(|point| self.points.get(point))
             .filter(|name| !name.is_empty());
         let name = name.cloned().unwrap_or_else(|| format!("pt{}", pair / cameras + 1));
-        track_name(&name, &(pair % cameras + 1).to_string(), cameras > 1)
+        camera_track_name(&name, &(pair % cameras + 1).to_string(), cameras > 1)
     }
 
     fn y_axis(&self) -> Fact<YAxis> {
@@ -219,13 +231,19 @@ impl Names {
     }
 }
 
-fn wrong(table: &Table, line: usize, found: String, expected: &str) -> ImportError {
-    ImportError::wrong_table(table.place(line, 1), found, expected, AGAIN)
+fn sparse_table_error(table: &DelimitedTable, line: usize, found: String, expected: &str) -> ImportError {
+    ImportError::wrong_table(table.location(line, 1), found, expected, EXPORT_AGAIN)
 }
 
-fn twice(table: &Table, record: &Record, row: u64, column: u64, first: usize) -> ImportError {
-    ImportError::Twice {
-        place: table.place(record.line, 1),
+fn duplicate_value_error(
+    table: &DelimitedTable,
+    record: &RowView,
+    row: u64,
+    column: u64,
+    first: usize,
+) -> ImportError {
+    ImportError::DuplicateRow {
+        place: table.location(record.line, 1),
         what: "row",
         found: row as f64,
         track: format!("column {column}"),

@@ -1,11 +1,11 @@
 //! Kinovea's text export, made for gnuplot: a block of rows a track, each with its own times.
 
-use crate::import::error::{CellProblem, ImportError, Place};
-use crate::import::formats::kinovea::preferences::{PREFERENCES, facts};
+use crate::import::error::{CellProblem, ImportError, TextLocation};
+use crate::import::formats::kinovea::preferences::{PREFERENCES_NOTE, kinovea_facts};
 use crate::import::reader::table::column_of_word;
 use crate::import::reader::{
-    Clock, Collector, Document, Number, Order, PointShape, Position, Shape, Stamp, TimeUnit, Track,
-    TrackFile, number,
+    CellNumber, Clock, Document, InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TimeUnit,
+    Track, TrackCollector, TrackFile, parse_number,
 };
 use crate::math;
 
@@ -21,38 +21,44 @@ const CODE_PARTS: usize = 4;
 const CODE_DIGITS: usize = 9;
 
 /// Reads the blocks.
-pub(crate) fn read<'a>(document: &'a Document<'a>) -> Result<TrackFile<'a>, ImportError> {
-    let style = Style::find(document.text);
-    let mut reader =
-        Reader { file: document.file, style, block: None, clocks: vec![], tracks: vec![], unnamed: 0 };
+pub(crate) fn read_text_export<'a>(document: &'a Document<'a>) -> Result<TrackFile<'a>, ImportError> {
+    let style = NumberStyle::detect(document.text);
+    let mut reader = KinoveaTextReader {
+        file: document.file,
+        style,
+        block: None,
+        clocks: vec![],
+        tracks: vec![],
+        unnamed: 0,
+    };
     let mut last = 1;
     for (index, line) in document.text.lines().enumerate() {
-        reader.line(index + 1, line)?;
+        reader.read_line(index + 1, line)?;
         last = if line.trim().is_empty() { last } else { index + 1 };
     }
-    reader.close()?;
+    reader.end_track()?;
     if reader.clocks.is_empty() {
         return Err(ImportError::HeaderOnly { file: document.file.to_owned(), line: last });
     }
-    let mut facts = facts();
+    let mut facts = kinovea_facts();
     facts.time = if style.code { TimeUnit::Seconds(1.0) } else { TimeUnit::Unknown };
-    let notes = style.notes(reader.unnamed).into_iter().chain([PREFERENCES.to_owned()]).collect();
-    let Reader { clocks, tracks, .. } = reader;
-    Ok(TrackFile { clocks, tracks, facts, notes, ..TrackFile::of(document) })
+    let notes = style.notes(reader.unnamed).into_iter().chain([PREFERENCES_NOTE.to_owned()]).collect();
+    let KinoveaTextReader { clocks, tracks, .. } = reader;
+    Ok(TrackFile { clocks, tracks, facts, notes, ..TrackFile::for_document(document) })
 }
 
 /// How the numbers of a file are written. Old versions take the decimal mark of the times from elsewhere than
 /// that of the positions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-struct Style {
+struct NumberStyle {
     /// Whether times are `h:mm:ss:cc`.
     code: bool,
     time_mark: char,
     position_mark: char,
 }
 
-impl Style {
-    fn find(text: &str) -> Self {
+impl NumberStyle {
+    fn detect(text: &str) -> Self {
         let rows = || text.lines().filter(|line| !line.trim_start().starts_with('#'));
         let mark = |c: char| matches!(c, '.' | ',');
         let time = || rows().filter_map(|row| row.split_whitespace().next());
@@ -79,17 +85,17 @@ impl Style {
         notes.into_iter().filter_map(|(holds, note)| holds.then_some(note)).collect()
     }
 
-    fn time(self, cell: &str) -> Number {
+    fn parse_time(self, cell: &str) -> CellNumber {
         if self.code {
-            code_s(cell).map_or(Number::Text, Number::Value)
+            time_code_s(cell).map_or(CellNumber::Text, CellNumber::Value)
         } else {
-            number(cell, self.time_mark)
+            parse_number(cell, self.time_mark)
         }
     }
 }
 
 /// Seconds of `h:mm:ss:cc`; the last part has as many digits as the fraction.
-fn code_s(cell: &str) -> Option<f64> {
+fn time_code_s(cell: &str) -> Option<f64> {
     let (sign, digits) = cell.strip_prefix('-').map_or((1.0, cell), |rest| (-1.0, rest));
     let parts: Vec<&str> = digits.split(':').collect();
     let plain = |part: &&str| {
@@ -104,10 +110,10 @@ fn code_s(cell: &str) -> Option<f64> {
     Some(sign * (seconds * divisor + value(3)?) / divisor)
 }
 
-struct Reader<'f> {
+struct KinoveaTextReader<'f> {
     file: &'f str,
-    style: Style,
-    block: Option<Block>,
+    style: NumberStyle,
+    block: Option<TrackBlock>,
     clocks: Vec<Clock>,
     tracks: Vec<Track>,
     /// Tracks without a name so far.
@@ -115,35 +121,35 @@ struct Reader<'f> {
 }
 
 /// Rows of one track.
-struct Block {
+struct TrackBlock {
     name: String,
     /// Cells of its rows, once there is one, and the rows.
-    rows: Option<(usize, Collector)>,
+    rows: Option<(usize, TrackCollector)>,
 }
 
-impl Reader<'_> {
-    fn line(&mut self, line: usize, text: &str) -> Result<(), ImportError> {
+impl KinoveaTextReader<'_> {
+    fn read_line(&mut self, line: usize, text: &str) -> Result<(), ImportError> {
         let trimmed = text.trim();
         if trimmed.is_empty() {
             // a blank line ends a track; some stand before its first row
             return if self.block.as_ref().is_some_and(|block| block.rows.is_some()) {
-                self.close()
+                self.end_track()
             } else {
                 Ok(())
             };
         }
-        let Some(name) = trimmed.strip_prefix('#') else { return self.row(line, text) };
+        let Some(name) = trimmed.strip_prefix('#') else { return self.read_row(line, text) };
         if trimmed.starts_with(TITLE) || trimmed == COLUMNS {
             return Ok(());
         }
-        self.close()?;
-        self.block = Some(Block { name: name.trim().to_owned(), rows: None });
+        self.end_track()?;
+        self.block = Some(TrackBlock { name: name.trim().to_owned(), rows: None });
         Ok(())
     }
 
-    fn row(&mut self, line: usize, text: &str) -> Result<(), ImportError> {
+    fn read_row(&mut self, line: usize, text: &str) -> Result<(), ImportError> {
         let style = self.style;
-        let block = self.block.get_or_insert_with(|| Block { name: String::new(), rows: None });
+        let block = self.block.get_or_insert_with(|| TrackBlock { name: String::new(), rows: None });
         let cells: Vec<&str> = text.split_whitespace().collect();
         let expected = block.rows.as_ref().map_or(CELLS, |rows| rows.0);
         let right = if block.rows.is_some() {
@@ -152,36 +158,42 @@ impl Reader<'_> {
             cells.len() >= CELLS && cells.len() % 2 == 1
         };
         if !right {
-            return Err(ImportError::Ragged { place: self.place(line, 1), found: cells.len(), expected });
+            return Err(ImportError::Ragged { place: self.location(line, 1), found: cells.len(), expected });
         }
-        let (_, collector) = block
-            .rows
-            .get_or_insert_with(|| (cells.len(), Collector::new(shape(&block.name, cells.len() / 2))));
+        let (_, collector) = block.rows.get_or_insert_with(|| {
+            (cells.len(), TrackCollector::new(block_shape(&block.name, cells.len() / 2)))
+        });
         let refuse = |cell: usize| {
-            not_a_number(self.file, (line, text), cell, cells.get(cell).copied().unwrap_or_default(), style)
+            not_a_number_error(
+                self.file,
+                (line, text),
+                cell,
+                cells.get(cell).copied().unwrap_or_default(),
+                style,
+            )
         };
-        let value = |cell: usize, found: Number| match found {
-            Number::Value(value) => Ok(Some(value)),
-            Number::Missing => Ok(None),
-            Number::Text => Err(refuse(cell)),
+        let value = |cell: usize, found: CellNumber| match found {
+            CellNumber::Value(value) => Ok(Some(value)),
+            CellNumber::Missing => Ok(None),
+            CellNumber::Text => Err(refuse(cell)),
         };
         let numbers = cells.iter().enumerate().map(|(at, cell)| {
-            value(at, if at == 0 { style.time(cell) } else { number(cell, style.position_mark) })
+            value(at, if at == 0 { style.parse_time(cell) } else { parse_number(cell, style.position_mark) })
         });
         let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
         let Some((time, positions)) = numbers.split_first() else { return Ok(()) };
-        let positions: Vec<Position> = positions
+        let positions: Vec<RowPosition> = positions
             .chunks(2)
-            .map(|pair| Position { x: pair[0], y: pair.get(1).copied().flatten(), confidence: None })
+            .map(|pair| RowPosition { x: pair[0], y: pair.get(1).copied().flatten(), confidence: None })
             .collect();
-        collector.push("", Stamp { line, frame: None, time: *time }, &positions);
+        collector.add_row("", RowStamp { line, frame: None, time: *time }, &positions);
         Ok(())
     }
 
     /// Ends the track that is being read.
-    fn close(&mut self) -> Result<(), ImportError> {
-        let Some(Block { name, rows: Some((_, collector)) }) = self.block.take() else { return Ok(()) };
-        let (clocks, mut tracks) = collector.finish(self.file, Order::AsWritten)?;
+    fn end_track(&mut self) -> Result<(), ImportError> {
+        let Some(TrackBlock { name, rows: Some((_, collector)) }) = self.block.take() else { return Ok(()) };
+        let (clocks, mut tracks) = collector.finish(self.file, RowOrder::AsWritten)?;
         let number = self.clocks.len() + 1;
         for track in &mut tracks {
             track.clock += self.clocks.len();
@@ -195,32 +207,32 @@ impl Reader<'_> {
         Ok(())
     }
 
-    fn place(&self, line: usize, column: usize) -> Place {
-        Place { file: self.file.to_owned(), line, column }
+    fn location(&self, line: usize, column: usize) -> TextLocation {
+        TextLocation { file: self.file.to_owned(), line, column }
     }
 }
 
 /// A track is called by its name; the points of an object are numbered, because this export does not name
 /// them.
-fn shape(name: &str, points: usize) -> Shape {
+fn block_shape(name: &str, points: usize) -> InstanceFields {
     let called = |index: usize| if points == 1 { name.to_owned() } else { format!("{name}/{}", index + 1) };
     let points = (0..points)
-        .map(|index| PointShape { name: called(index), has_y: true, has_confidence: false })
+        .map(|index| PointFields { name: called(index), has_y: true, has_confidence: false })
         .collect();
-    Shape { has_frame: false, has_time: true, clock_cell: 0, points }
+    InstanceFields { has_frame: false, has_time: true, clock_cell: 0, points }
 }
 
-fn not_a_number(
+fn not_a_number_error(
     file: &str,
     (line, text): (usize, &str),
     cell: usize,
     found: &str,
-    style: Style,
+    style: NumberStyle,
 ) -> ImportError {
     let mark = if cell == 0 { style.time_mark } else { style.position_mark };
     let other = if mark == '.' { ',' } else { '.' };
-    let (expected, advice) = match number(found, other) {
-        Number::Value(_) => (
+    let (expected, advice) = match parse_number(found, other) {
+        CellNumber::Value(_) => (
             "the decimal mark of the column's other numbers",
             "the decimal mark changes within the column, or a mark separates thousands: export again with one \
              format of numbers",
@@ -238,7 +250,7 @@ fn not_a_number(
         "Y"
     };
     ImportError::Cell {
-        place: Place { file: file.to_owned(), line, column: column_of_word(text, cell) },
+        place: TextLocation { file: file.to_owned(), line, column: column_of_word(text, cell) },
         problem: CellProblem::NotANumber,
         name: name.to_owned(),
         found: found.chars().take(60).collect::<String>().into(),
@@ -253,17 +265,17 @@ mod tests {
 
     #[test]
     fn time_codes_are_seconds() {
-        assert_eq!(code_s("0:00:00:03"), Some(0.03));
-        assert_eq!(code_s("1:02:03:250"), Some(3723.25));
-        assert_eq!(code_s("-0:00:01:50"), Some(-1.5));
+        assert_eq!(time_code_s("0:00:00:03"), Some(0.03));
+        assert_eq!(time_code_s("1:02:03:250"), Some(3723.25));
+        assert_eq!(time_code_s("-0:00:01:50"), Some(-1.5));
         for text in ["0:00:03", "0:00:00:", "0:00:0x:03", "1:2:3:4:5", "0:0:0:1234567890", "0.03"] {
-            assert_eq!(code_s(text), None, "{text}");
+            assert_eq!(time_code_s(text), None, "{text}");
         }
     }
 
     #[test]
     fn marks_are_found_for_times_and_positions_apart() {
-        let style = Style::find("#Kinovea 1.5\n# a,b\n0.008 1 -2,5\n");
-        assert_eq!(style, Style { code: false, time_mark: '.', position_mark: ',' });
+        let style = NumberStyle::detect("#Kinovea 1.5\n# a,b\n0.008 1 -2,5\n");
+        assert_eq!(style, NumberStyle { code: false, time_mark: '.', position_mark: ',' });
     }
 }

@@ -2,12 +2,14 @@
 //! milliseconds.
 
 use crate::import::error::ImportError;
-use crate::import::format::Format;
-use crate::import::formats::generic::Generic;
-use crate::import::formats::kinovea::preferences::MENU;
-use crate::import::options::Options;
-use crate::import::reader::{Column, Document, Number, Row, Table, TimeUnit, TrackFile, finding};
-use crate::recording::quality::{Check, Finding, Severity};
+use crate::import::format::FileFormat;
+use crate::import::formats::generic::GenericFormat;
+use crate::import::formats::kinovea::preferences::EXPORT_MENU;
+use crate::import::options::ImportOptions;
+use crate::import::reader::{
+    CellNumber, Column, DelimitedTable, Document, TextRow, TimeUnit, TrackFile, new_finding,
+};
+use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// End of the first column's name, in every language of the program.
 const MILLISECONDS: &str = "(ms)";
@@ -16,26 +18,26 @@ const MILLI: f64 = 1e-3;
 /// Rate above which samples share a millisecond, and the later one replaces the earlier, frames/s.
 const HIGHEST_RATE_HZ: f64 = 1000.0;
 /// Short names of a time that other programs use.
-const OTHERS: [&str; 2] = ["t", "T"];
+const OTHER_TIME_NAMES: [&str; 2] = ["t", "T"];
 
 /// Whether a table has a time in whole milliseconds and series that are called like tracks, not like
 /// coordinates.
-pub(crate) fn is_header(table: &Table, names: &[&str]) -> bool {
+pub(crate) fn is_window_header(table: &DelimitedTable, names: &[&str]) -> bool {
     let Some((time, series)) = names.split_first() else { return false };
     let of_time = time
         .strip_suffix(MILLISECONDS)
         .map(str::trim)
-        .is_some_and(|word| !word.is_empty() && !OTHERS.contains(&word));
-    let text = |name: &&str| matches!(table.number(name), Number::Text);
+        .is_some_and(|word| !word.is_empty() && !OTHER_TIME_NAMES.contains(&word));
+    let text = |name: &&str| matches!(table.parse_cell(name), CellNumber::Text);
     of_time
         && !series.is_empty()
         && series.iter().all(|name| text(name) && !is_coordinate(name))
-        && !has_pair(series)
-        && all_whole(table, 0)
+        && !has_coordinate_pair(series)
+        && is_whole_column(table, 0)
 }
 
 /// `tipX` next to `tipY`: coordinates, with any other text in the names.
-fn has_pair(series: &[&str]) -> bool {
+fn has_coordinate_pair(series: &[&str]) -> bool {
     let names: Vec<String> = series.iter().map(|name| name.to_lowercase()).collect();
     names.iter().any(|name| name.contains('x') && names.contains(&name.replace('x', "y")))
 }
@@ -47,20 +49,20 @@ fn is_coordinate(name: &str) -> bool {
 }
 
 /// The file does not say what its series are, so the user has to.
-pub(crate) fn read<'a>(
+pub(crate) fn read_window<'a>(
     document: &'a Document<'a>,
-    table: &Table,
-    options: &Options,
+    table: &DelimitedTable,
+    options: &ImportOptions,
 ) -> Result<TrackFile<'a>, ImportError> {
     if options.columns.is_none() {
-        return Err(unnamed(table));
+        return Err(unnamed_window_error(table));
     }
     if let Some(rate) = options.frame_rate_hz.filter(|rate| *rate > HIGHEST_RATE_HZ) {
-        return Err(samples_lost(table, rate));
+        return Err(samples_lost_error(table, rate));
     }
-    let mut export = Generic.read(document, options)?;
+    let mut export = GenericFormat.read(document, options)?;
     export.facts.time = TimeUnit::Seconds(MILLI);
-    export.findings.push(finding(
+    export.findings.push(new_finding(
         Check::Filtered,
         Severity::Caution,
         (0.0, ""),
@@ -70,16 +72,16 @@ pub(crate) fn read<'a>(
         ),
         "components near and above its cut-off are weakened; export the trajectories instead (File > Export)",
     ));
-    let lost = every_millisecond(&export).filter(|_| options.frame_rate_hz.is_none());
+    let lost = lost_samples_finding(&export).filter(|_| options.frame_rate_hz.is_none());
     export.findings.extend(lost);
     Ok(export)
 }
 
-fn unnamed(table: &Table) -> ImportError {
+fn unnamed_window_error(table: &DelimitedTable) -> ImportError {
     let header = table.head.first();
-    let names = header.map(Row::texts).unwrap_or_default();
+    let names = header.map(TextRow::texts).unwrap_or_default();
     ImportError::wrong_table(
-        table.place(header.map_or(1, |row| row.line), 1),
+        table.location(header.map_or(1, |row| row.line), 1),
         format!(
             "a table of Kinovea's kinematics windows ({}): filtered, and without a word on whether its \
              series are x, y or speeds",
@@ -87,30 +89,30 @@ fn unnamed(table: &Table) -> ImportError {
         ),
         "positions as x and y",
         format!(
-            "{MENU}; if these are positions along the sweep and nothing else is left, say so: --columns \
+            "{EXPORT_MENU}; if these are positions along the sweep and nothing else is left, say so: --columns \
              time-ms=1,tip-x=2,..."
         ),
     )
 }
 
-fn samples_lost(table: &Table, rate_hz: f64) -> ImportError {
+fn samples_lost_error(table: &DelimitedTable, rate_hz: f64) -> ImportError {
     ImportError::wrong_table(
-        table.place(table.head.first().map_or(1, |row| row.line), 1),
+        table.location(table.head.first().map_or(1, |row| row.line), 1),
         format!(
             "times in whole milliseconds for {rate_hz} frames/s: Kinovea's kinematics windows keep one \
              sample a millisecond and drop the others"
         ),
         format!("at most {HIGHEST_RATE_HZ} frames/s in such a table"),
-        format!("{MENU}; if another program wrote this table, add --format generic"),
+        format!("{EXPORT_MENU}; if another program wrote this table, add --format generic"),
     )
 }
 
 /// Rows at every millisecond are those of 1000 frames/s, or of a faster camera with samples dropped.
-fn every_millisecond(export: &TrackFile) -> Option<Finding> {
+fn lost_samples_finding(export: &TrackFile) -> Option<QualityFinding> {
     let times: Vec<f64> = export.clocks.first()?.time.iter().flat_map(Column::iter).flatten().collect();
     let every = times.len() > 1 && times.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
     every.then(|| {
-        finding(
+        new_finding(
             Check::SamplesLost,
             Severity::Serious,
             (HIGHEST_RATE_HZ, "1/s"),
@@ -125,10 +127,10 @@ fn every_millisecond(export: &TrackFile) -> Option<Finding> {
 }
 
 /// Whether every cell is a whole number.
-fn all_whole(table: &Table, column: usize) -> bool {
-    let whole = |row: &Row| {
-        let number = row.cells.get(column).map(|cell| table.number(cell));
-        matches!(number, Some(Number::Value(value)) if value.fract() == 0.0)
+fn is_whole_column(table: &DelimitedTable, column: usize) -> bool {
+    let whole = |row: &TextRow| {
+        let number = row.cells.get(column).map(|cell| table.parse_cell(cell));
+        matches!(number, Some(CellNumber::Value(value)) if value.fract() == 0.0)
     };
     table.head.len() > 1 && table.head.iter().skip(1).all(whole)
 }
@@ -143,8 +145,8 @@ mod tests {
             let cells = header.split(';').count();
             let row = |value: &str| [value; 8][..cells].join(";");
             let text = format!("{header}\n{}\n{}\n", row("1"), row("2"));
-            let table = Table::read("a.csv", &text).unwrap();
-            is_header(&table, &table.head[0].texts())
+            let table = DelimitedTable::parse("a.csv", &text).unwrap();
+            is_window_header(&table, &table.head[0].texts())
         };
         for header in ["Time (ms);tip;head", "Zeit (ms);Spitze", "\u{6642}\u{9593} (ms);1a"] {
             assert!(is(header), "{header}");
@@ -160,8 +162,8 @@ mod tests {
         ] {
             assert!(!is(header), "{header}");
         }
-        assert!(!is_header(
-            &Table::read("a.csv", "Time (ms);tip\n0,5;1\n1;2\n").unwrap(),
+        assert!(!is_window_header(
+            &DelimitedTable::parse("a.csv", "Time (ms);tip\n0,5;1\n1;2\n").unwrap(),
             &["Time (ms)", "tip"]
         ));
     }

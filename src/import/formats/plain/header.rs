@@ -1,6 +1,6 @@
 //! What the names of a plain table's columns say: which is the clock, which are coordinates, in which units.
 
-use crate::import::reader::{TimeUnit, Unit};
+use crate::import::reader::{CoordinateUnit, TimeUnit};
 
 /// Names of columns that number the frames, without blanks, underscores and the like.
 const FRAMES: [&str; 16] = [
@@ -72,7 +72,7 @@ const SEPARATORS: [char; 5] = ['_', '.', '-', ' ', ':'];
 
 /// What a column is.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) enum Meaning {
+pub(crate) enum ColumnMeaning {
     Frame,
     Time(TimeUnit),
     Key,
@@ -80,7 +80,7 @@ pub(crate) enum Meaning {
     Coordinate {
         point: String,
         axis: usize,
-        unit: Option<Unit>,
+        unit: Option<CoordinateUnit>,
     },
     Confidence {
         point: String,
@@ -88,26 +88,26 @@ pub(crate) enum Meaning {
     Other,
 }
 
-impl Meaning {
-    pub(crate) fn of(name: &str) -> Self {
+impl ColumnMeaning {
+    pub(crate) fn parse(name: &str) -> Self {
         let (base, unit) = split_unit(name);
-        if let Some(clock) = clock(base, unit) {
+        if let Some(clock) = parse_clock(base, unit) {
             return clock;
         }
-        let plain = squeezed(base);
+        let plain = squeeze_name(base);
         if unit.is_none() && KEYS.contains(&plain.as_str()) {
             return Self::Key;
         }
         if unit.is_none() && CONFIDENCES.contains(&plain.as_str()) {
             return Self::Confidence { point: String::new() };
         }
-        if let Some(point) = last_part(base)
+        if let Some(point) = split_last_part(base)
             .filter(|(_, last)| CONFIDENCES.contains(&last.to_lowercase().as_str()))
             .map(|(point, _)| point)
         {
             return Self::Confidence { point: point.to_owned() };
         }
-        match (coordinate(base), unit.map(Unit::named)) {
+        match (parse_coordinate(base), unit.map(CoordinateUnit::parse)) {
             (Some((point, axis)), None) => Self::Coordinate { point, axis, unit: None },
             (Some((point, axis)), Some(Some(unit))) => Self::Coordinate { point, axis, unit: Some(unit) },
             _ => Self::Other,
@@ -118,11 +118,11 @@ impl Meaning {
     pub(crate) fn take_unit(&mut self, text: &str) -> bool {
         match self {
             Self::Coordinate { unit: unit @ None, .. } => {
-                *unit = Unit::named(text);
+                *unit = CoordinateUnit::parse(text);
                 unit.is_some()
             }
-            Self::Time(unit @ TimeUnit::Usual) if !text.is_empty() => {
-                *unit = TimeUnit::named(text).unwrap_or(TimeUnit::Unknown);
+            Self::Time(unit @ TimeUnit::AssumedSeconds) if !text.is_empty() => {
+                *unit = TimeUnit::parse(text).unwrap_or(TimeUnit::Unknown);
                 true
             }
             _ => false,
@@ -143,7 +143,7 @@ fn split_unit(name: &str) -> (&str, Option<&str>) {
         Some((base, unit))
             if !base.is_empty()
                 && !["in", "min"].contains(&unit)
-                && (Unit::named(unit).is_some() || TimeUnit::named(unit).is_some()) =>
+                && (CoordinateUnit::parse(unit).is_some() || TimeUnit::parse(unit).is_some()) =>
         {
             (base, Some(unit))
         }
@@ -151,35 +151,35 @@ fn split_unit(name: &str) -> (&str, Option<&str>) {
     }
 }
 
-fn clock(base: &str, unit: Option<&str>) -> Option<Meaning> {
-    let plain = squeezed(base);
+fn parse_clock(base: &str, unit: Option<&str>) -> Option<ColumnMeaning> {
+    let plain = squeeze_name(base);
     if FRAMES.contains(&plain.as_str()) {
-        return unit.is_none().then_some(Meaning::Frame);
+        return unit.is_none().then_some(ColumnMeaning::Frame);
     }
     let (_, own) = TIMES.iter().find(|(name, _)| *name == plain)?;
     Some(match (unit, own) {
-        (Some(unit), _) if squeezed(unit).starts_with("frame") => Meaning::Frame,
-        (Some(unit), _) => Meaning::Time(TimeUnit::named(unit).unwrap_or(TimeUnit::Unknown)),
-        (None, own) => Meaning::Time(own.unwrap_or(TimeUnit::Usual)),
+        (Some(unit), _) if squeeze_name(unit).starts_with("frame") => ColumnMeaning::Frame,
+        (Some(unit), _) => ColumnMeaning::Time(TimeUnit::parse(unit).unwrap_or(TimeUnit::Unknown)),
+        (None, own) => ColumnMeaning::Time(own.unwrap_or(TimeUnit::AssumedSeconds)),
     })
 }
 
 /// The point and the axis of `tip_x`, `tip.x`, `x_tip`, `X tip` or `x`.
-fn coordinate(base: &str) -> Option<(String, usize)> {
+fn parse_coordinate(base: &str) -> Option<(String, usize)> {
     let axis = |part: &str| ["x", "y"].iter().position(|axis| part.eq_ignore_ascii_case(axis));
     if let Some(axis) = axis(base) {
         return Some((String::new(), axis));
     }
-    let behind = last_part(base).and_then(|(point, last)| Some((point, axis(last)?)));
+    let behind = split_last_part(base).and_then(|(point, last)| Some((point, axis(last)?)));
     let before = || base.split_once(SEPARATORS).and_then(|(first, point)| Some((point.trim(), axis(first)?)));
-    let (point, axis) = behind.or_else(before).or_else(|| without_separator(base))?;
+    let (point, axis) = behind.or_else(before).or_else(|| parse_joined_coordinate(base))?;
     let position = !point.is_empty()
         && !point.split(SEPARATORS).any(|part| NOT_POSITIONS.contains(&part.to_lowercase().as_str()));
     position.then(|| (point.to_owned(), axis))
 }
 
 /// The point and the axis of `TipX`, of a word in another script with `X` behind it, and of `x1`.
-fn without_separator(base: &str) -> Option<(&str, usize)> {
+fn parse_joined_coordinate(base: &str) -> Option<(&str, usize)> {
     if let Some(number) = base
         .strip_prefix(['x', 'X', 'y', 'Y'])
         .filter(|rest| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit()))
@@ -195,12 +195,12 @@ fn without_separator(base: &str) -> Option<(&str, usize)> {
 }
 
 /// A name and its last part.
-fn last_part(name: &str) -> Option<(&str, &str)> {
+fn split_last_part(name: &str) -> Option<(&str, &str)> {
     name.rsplit_once(SEPARATORS).map(|(point, last)| (point.trim_end_matches(SEPARATORS), last))
 }
 
 /// A name in small letters without what separates its parts.
-fn squeezed(name: &str) -> String {
+fn squeeze_name(name: &str) -> String {
     name.chars().filter(|c| !SEPARATORS.contains(c)).flat_map(char::to_lowercase).collect()
 }
 
@@ -208,8 +208,8 @@ fn squeezed(name: &str) -> String {
 mod tests {
     use super::*;
 
-    fn at(point: &str, axis: usize, unit: Option<Unit>) -> Meaning {
-        Meaning::Coordinate { point: point.to_owned(), axis, unit }
+    fn at(point: &str, axis: usize, unit: Option<CoordinateUnit>) -> ColumnMeaning {
+        ColumnMeaning::Coordinate { point: point.to_owned(), axis, unit }
     }
 
     #[test]
@@ -226,11 +226,11 @@ mod tests {
             "frame #",
             "time (frames)",
         ] {
-            assert_eq!(Meaning::of(name), Meaning::Frame, "{name}");
+            assert_eq!(ColumnMeaning::parse(name), ColumnMeaning::Frame, "{name}");
         }
         let times = [
-            ("t", TimeUnit::Usual),
-            ("Time", TimeUnit::Usual),
+            ("t", TimeUnit::AssumedSeconds),
+            ("Time", TimeUnit::AssumedSeconds),
             ("timestamp", TimeUnit::Unknown),
             ("time (h)", TimeUnit::Unknown),
         ];
@@ -248,31 +248,40 @@ mod tests {
         let milliseconds = ["time_ms", "Time [ms]", "t (ms)", "Time_ms", "timestamp_ms"]
             .map(|name| (name, TimeUnit::Seconds(1e-3)));
         for (name, unit) in times.into_iter().chain(seconds).chain(milliseconds) {
-            assert_eq!(Meaning::of(name), Meaning::Time(unit), "{name}");
+            assert_eq!(ColumnMeaning::parse(name), ColumnMeaning::Time(unit), "{name}");
         }
     }
 
     #[test]
     fn coordinates_in_every_spelling() {
         for name in ["tip_x", "tip.x", "tip-x", "tip X", "x_tip", "X_tip", "x tip", "x.tip"] {
-            assert_eq!(Meaning::of(name), at("tip", 0, None), "{name}");
+            assert_eq!(ColumnMeaning::parse(name), at("tip", 0, None), "{name}");
         }
         for name in ["tip_y_px", "tip_y (px)", "tip.y [pixel]", "tip y [px]"] {
-            assert_eq!(Meaning::of(name), at("tip", 1, Some(Unit::Pixel)), "{name}");
+            assert_eq!(ColumnMeaning::parse(name), at("tip", 1, Some(CoordinateUnit::Pixel)), "{name}");
         }
-        assert_eq!(Meaning::of("tip_x_m"), at("tip", 0, Some(Unit::Metres(1.0))));
-        assert_eq!(Meaning::of("X (mm)"), at("", 0, Some(Unit::Metres(1e-3))));
-        assert_eq!(Meaning::of("m_x"), at("m", 0, None));
-        assert_eq!(Meaning::of("x_min"), at("min", 0, None));
-        assert_eq!(Meaning::of("left_blade_tip_y"), at("left_blade_tip", 1, None));
-        assert_eq!(Meaning::of("tip_likelihood"), Meaning::Confidence { point: "tip".to_owned() });
+        assert_eq!(ColumnMeaning::parse("tip_x_m"), at("tip", 0, Some(CoordinateUnit::Metres(1.0))));
+        assert_eq!(ColumnMeaning::parse("X (mm)"), at("", 0, Some(CoordinateUnit::Metres(1e-3))));
+        assert_eq!(ColumnMeaning::parse("m_x"), at("m", 0, None));
+        assert_eq!(ColumnMeaning::parse("x_min"), at("min", 0, None));
+        assert_eq!(ColumnMeaning::parse("left_blade_tip_y"), at("left_blade_tip", 1, None));
+        assert_eq!(
+            ColumnMeaning::parse("tip_likelihood"),
+            ColumnMeaning::Confidence { point: "tip".to_owned() }
+        );
         for name in ["TipX", "Tip_X", "Tip X"] {
-            assert_eq!(Meaning::of(name), at("Tip", 0, None), "{name}");
+            assert_eq!(ColumnMeaning::parse(name), at("Tip", 0, None), "{name}");
         }
-        assert_eq!(Meaning::of("\u{5148}\u{7aef}Y(mm)"), at("\u{5148}\u{7aef}", 1, Some(Unit::Metres(1e-3))));
-        assert_eq!([Meaning::of("x1"), Meaning::of("Y12")], [at("1", 0, None), at("12", 1, None)]);
+        assert_eq!(
+            ColumnMeaning::parse("\u{5148}\u{7aef}Y(mm)"),
+            at("\u{5148}\u{7aef}", 1, Some(CoordinateUnit::Metres(1e-3)))
+        );
+        assert_eq!(
+            [ColumnMeaning::parse("x1"), ColumnMeaning::parse("Y12")],
+            [at("1", 0, None), at("12", 1, None)]
+        );
         for name in ["vX", "dY", "MAX", "MaxX2", "x1a", "x1.5", "Index", "lux"] {
-            assert_eq!(Meaning::of(name), Meaning::Other, "{name}");
+            assert_eq!(ColumnMeaning::parse(name), ColumnMeaning::Other, "{name}");
         }
         for name in [
             "vx",
@@ -291,7 +300,7 @@ mod tests {
             "frame_ms",
             "(mm)",
         ] {
-            assert_eq!(Meaning::of(name), Meaning::Other, "{name}");
+            assert_eq!(ColumnMeaning::parse(name), ColumnMeaning::Other, "{name}");
         }
     }
 }

@@ -1,7 +1,7 @@
 //! Which columns of a table of SLEAP are what.
 
 use crate::import::error::ImportError;
-use crate::import::reader::{PointShape, Record, Row, Shape, Table};
+use crate::import::reader::{DelimitedTable, InstanceFields, PointFields, RowView, TextRow};
 
 /// Column of the frame numbers, from 0.
 pub(crate) const FRAME: &str = "frame_idx";
@@ -22,7 +22,7 @@ pub(crate) struct NodeCells {
 }
 
 /// What says to which track an instance belongs.
-pub(crate) enum Whose {
+pub(crate) enum TrackSource {
     /// A cell of its row.
     Cell(usize),
     /// The names of its columns.
@@ -32,46 +32,46 @@ pub(crate) enum Whose {
 }
 
 /// Columns of an instance.
-pub(crate) struct Slot {
-    pub whose: Whose,
+pub(crate) struct InstanceColumns {
+    pub whose: TrackSource,
     pub nodes: Vec<NodeCells>,
 }
 
 /// Columns of a table.
-pub(crate) struct Columns {
+pub(crate) struct SleapColumns {
     pub frame: usize,
     /// Column that names the node, where every row is a point.
     pub node: Option<usize>,
-    pub slots: Vec<Slot>,
+    pub slots: Vec<InstanceColumns>,
     video: Option<usize>,
     cells: usize,
 }
 
-impl Columns {
-    pub(crate) fn find(table: &Table, header: &Row) -> Result<Self, ImportError> {
+impl SleapColumns {
+    pub(crate) fn find(table: &DelimitedTable, header: &TextRow) -> Result<Self, ImportError> {
         let names = header.texts();
         let at = |name: &str| names.iter().position(|known| *known == name);
         let refuse = |found: String, expected: &str| {
-            columns(table, header, format!("found {found}, expected {expected}"))
+            columns_error(table, header, format!("found {found}, expected {expected}"))
         };
         let frame = at(FRAME).ok_or_else(|| {
-            refuse(format!("the columns {}", shown(&names)), "frame_idx and the coordinates of nodes")
+            refuse(format!("the columns {}", join_names(&names)), "frame_idx and the coordinates of nodes")
         })?;
         let (node, track) = (at(NODE), at(TRACK));
         let nodes = match (node, at("x"), at("y")) {
             (Some(_), Some(x), Some(y)) => vec![NodeCells { name: String::new(), x, y, score: at("score") }],
             (Some(_), ..) => {
-                return Err(refuse(format!("the columns {}", shown(&names)), "x and y of every node"));
+                return Err(refuse(format!("the columns {}", join_names(&names)), "x and y of every node"));
             }
-            _ => nodes(&names).map_err(|(found, expected)| refuse(found, &expected))?,
+            _ => find_nodes(&names).map_err(|(found, expected)| refuse(found, &expected))?,
         };
-        let whose = |track: Option<usize>| track.map_or(Whose::Nobody, Whose::Cell);
+        let whose = |track: Option<usize>| track.map_or(TrackSource::Nobody, TrackSource::Cell);
         let slots = if node.is_some() || track.is_some() {
-            vec![Slot { whose: whose(track), nodes }]
+            vec![InstanceColumns { whose: whose(track), nodes }]
         } else {
-            slots(nodes, at)
+            find_instances(nodes, at)
         };
-        if slots.len() > 1 && slots.iter().any(|slot| matches!(slot.whose, Whose::Nobody)) {
+        if slots.len() > 1 && slots.iter().any(|slot| matches!(slot.whose, TrackSource::Nobody)) {
             return Err(refuse(
                 "instances that are numbered again in every frame".to_owned(),
                 "the track of each",
@@ -82,29 +82,35 @@ impl Columns {
         }) {
             return Err(refuse("instances with different nodes".to_owned(), "the same nodes in each"));
         }
-        Ok(Self { frame, node, slots, video: VIDEO.iter().find_map(|name| at(name)), cells: header.filled() })
+        Ok(Self {
+            frame,
+            node,
+            slots,
+            video: VIDEO.iter().find_map(|name| at(name)),
+            cells: header.used_width(),
+        })
     }
 
-    pub(crate) fn shape(&self) -> Shape {
-        let point = |node: &NodeCells| PointShape {
+    pub(crate) fn instance_shape(&self) -> InstanceFields {
+        let point = |node: &NodeCells| PointFields {
             name: node.name.clone(),
             has_y: true,
             has_confidence: node.score.is_some(),
         };
         let points = self.slots.first().map_or(vec![], |slot| slot.nodes.iter().map(point).collect());
-        Shape { has_frame: true, has_time: false, clock_cell: self.frame, points }
+        InstanceFields { has_frame: true, has_time: false, clock_cell: self.frame, points }
     }
 
     /// Refuses a row of another length or of another video than the `video` of the rows before.
-    pub(crate) fn check(
+    pub(crate) fn check_row(
         &self,
-        table: &Table,
-        record: &Record,
+        table: &DelimitedTable,
+        record: &RowView,
         video: &mut Option<String>,
     ) -> Result<(), ImportError> {
-        if record.len() < self.cells || record.filled() > self.cells {
+        if record.len() < self.cells || record.used_width() > self.cells {
             return Err(ImportError::Ragged {
-                place: table.place(record.line, 1),
+                place: table.location(record.line, 1),
                 found: record.len(),
                 expected: self.cells,
             });
@@ -115,7 +121,7 @@ impl Columns {
             return Ok(());
         }
         Err(ImportError::wrong_table(
-            table.place(record.line, table.column(record.line, cell)),
+            table.location(record.line, table.text_column(record.line, cell)),
             format!("a row of the video `{found}` after those of `{known}`"),
             "the rows of one video",
             "export each video to a file of its own",
@@ -124,7 +130,7 @@ impl Columns {
 }
 
 /// A column `NAME.x` and what belongs to it.
-fn nodes(names: &[&str]) -> Result<Vec<NodeCells>, (String, String)> {
+fn find_nodes(names: &[&str]) -> Result<Vec<NodeCells>, (String, String)> {
     let at = |name: String| names.iter().position(|known| *known == name);
     let node = |(x, name): (usize, &str)| -> Result<NodeCells, (String, String)> {
         let y = at(format!("{name}.y"))
@@ -138,15 +144,15 @@ fn nodes(names: &[&str]) -> Result<Vec<NodeCells>, (String, String)> {
         .map(node)
         .collect::<Result<_, (String, String)>>()?;
     if nodes.is_empty() {
-        Err((format!("the columns {}", shown(names)), "NODE.x and NODE.y of every node".to_owned()))
+        Err((format!("the columns {}", join_names(names)), "NODE.x and NODE.y of every node".to_owned()))
     } else {
         Ok(nodes)
     }
 }
 
 /// The instances of a table with a row a frame, whose columns are `INSTANCE.NODE.x`.
-fn slots(nodes: Vec<NodeCells>, at: impl Fn(&str) -> Option<usize>) -> Vec<Slot> {
-    let mut slots: Vec<(String, Slot)> = vec![];
+fn find_instances(nodes: Vec<NodeCells>, at: impl Fn(&str) -> Option<usize>) -> Vec<InstanceColumns> {
+    let mut slots: Vec<(String, InstanceColumns)> = vec![];
     for mut node in nodes {
         let (instance, name) = node
             .name
@@ -156,22 +162,22 @@ fn slots(nodes: Vec<NodeCells>, at: impl Fn(&str) -> Option<usize>) -> Vec<Slot>
         let numbered = instance.is_empty()
             || instance.strip_prefix(NUMBERED).is_some_and(|number| number.parse::<u32>().is_ok());
         let whose = match at(&format!("{instance}.{TRACK}")) {
-            Some(cell) => Whose::Cell(cell),
-            None if numbered => Whose::Nobody,
-            None => Whose::Name(instance.clone()),
+            Some(cell) => TrackSource::Cell(cell),
+            None if numbered => TrackSource::Nobody,
+            None => TrackSource::Name(instance.clone()),
         };
         match slots.iter_mut().find(|(known, _)| *known == instance) {
             Some((_, slot)) => slot.nodes.push(node),
-            None => slots.push((instance, Slot { whose, nodes: vec![node] })),
+            None => slots.push((instance, InstanceColumns { whose, nodes: vec![node] })),
         }
     }
     slots.into_iter().map(|(_, slot)| slot).collect()
 }
 
-fn shown(names: &[&str]) -> String {
+fn join_names(names: &[&str]) -> String {
     names.iter().take(12).copied().collect::<Vec<_>>().join(", ")
 }
 
-fn columns(table: &Table, header: &Row, problem: String) -> ImportError {
+fn columns_error(table: &DelimitedTable, header: &TextRow, problem: String) -> ImportError {
     ImportError::columns(table.file, header.line.max(1), problem, ADVICE)
 }

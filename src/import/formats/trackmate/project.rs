@@ -1,27 +1,27 @@
 //! A whole project: spots, the edges that link them, and the tracks that passed the filters.
 
 use crate::import::error::ImportError;
-use crate::import::formats::trackmate::tracks::{Found, REMEDY, Spot, Trajectory};
-use crate::import::formats::trackmate::xml::{Element, Node, Xml};
+use crate::import::formats::trackmate::tracks::{EXPORT_ADVICE, Spot, TrackMateFile, Trajectory};
+use crate::import::formats::trackmate::xml::{XmlElement, XmlReader, XmlTag};
 use crate::import::reader::Document;
 use std::collections::{HashMap, HashSet};
 
 /// The root element.
-pub(crate) const ROOT: &str = "TrackMate";
+pub(crate) const PROJECT_ROOT: &str = "TrackMate";
 
 /// What the elements say, before spots and edges are put together.
 #[derive(Default)]
-struct Parts {
+struct ProjectElements {
     space_unit: Option<String>,
     time_unit: Option<String>,
     spots: HashMap<String, Spot>,
-    tracks: Vec<Track>,
+    tracks: Vec<ProjectTrack>,
     /// Tracks that passed the filters, where the project lists them.
     kept: Option<HashSet<String>>,
     has_quality: bool,
 }
 
-struct Track {
+struct ProjectTrack {
     id: String,
     name: String,
     /// Spots in the order of their first edge.
@@ -29,46 +29,46 @@ struct Track {
     seen: HashSet<String>,
 }
 
-pub(crate) fn read<'a>(document: &'a Document<'a>) -> Result<Found<'a>, ImportError> {
-    let mut xml = Xml::new(document);
-    let mut parts = Parts::default();
-    let mut current: Option<Track> = None;
-    while let Some(node) = xml.next()? {
+pub(crate) fn read_project<'a>(document: &'a Document<'a>) -> Result<TrackMateFile<'a>, ImportError> {
+    let mut xml = XmlReader::new(document);
+    let mut parts = ProjectElements::default();
+    let mut current: Option<ProjectTrack> = None;
+    while let Some(node) = xml.next_tag()? {
         match node {
-            Node::Open(element) if element.is("Track") => current = Some(track(&xml, &element)?),
-            Node::Open(element) if element.is("Edge") => {
+            XmlTag::Open(element) if element.has_name("Track") => current = Some(read_track(&xml, &element)?),
+            XmlTag::Open(element) if element.has_name("Edge") => {
                 if let Some(track) = &mut current {
-                    track.link(&xml, &element, &parts.spots)?;
+                    track.add_edge(&xml, &element, &parts.spots)?;
                 }
             }
-            Node::Open(element) => parts.take(&xml, &element)?,
-            Node::Close(end) if end.is("Track") => parts.tracks.extend(current.take()),
-            Node::Close(_) => {}
+            XmlTag::Open(element) => parts.take_element(&xml, &element)?,
+            XmlTag::Close(end) if end.has_name("Track") => parts.tracks.extend(current.take()),
+            XmlTag::Close(_) => {}
         }
     }
-    parts.found(document)
+    parts.into_file(document)
 }
 
-fn track(xml: &Xml, element: &Element) -> Result<Track, ImportError> {
-    let id = xml.needed(element, "TRACK_ID")?;
+fn read_track(xml: &XmlReader, element: &XmlElement) -> Result<ProjectTrack, ImportError> {
+    let id = xml.required_attribute(element, "TRACK_ID")?;
     let name =
-        xml.text(element, "name")?.filter(|name| !name.trim().is_empty()).unwrap_or_else(|| id.clone());
-    Ok(Track { id, name, spots: vec![], seen: HashSet::new() })
+        xml.attribute(element, "name")?.filter(|name| !name.trim().is_empty()).unwrap_or_else(|| id.clone());
+    Ok(ProjectTrack { id, name, spots: vec![], seen: HashSet::new() })
 }
 
-impl Track {
+impl ProjectTrack {
     /// Adds the two ends of an edge.
-    fn link(
+    fn add_edge(
         &mut self,
-        xml: &Xml,
-        element: &Element,
+        xml: &XmlReader,
+        element: &XmlElement,
         spots: &HashMap<String, Spot>,
     ) -> Result<(), ImportError> {
         for end in ["SPOT_SOURCE_ID", "SPOT_TARGET_ID"] {
-            let id = xml.needed(element, end)?;
+            let id = xml.required_attribute(element, end)?;
             if !spots.contains_key(&id) {
                 return Err(ImportError::wrong_table(
-                    xml.place_of(element),
+                    xml.element_location(element),
                     format!(
                         "an edge of track `{}` to the spot {id}, which the file does not have",
                         self.name
@@ -85,41 +85,41 @@ impl Track {
     }
 }
 
-impl Parts {
+impl ProjectElements {
     /// Takes in an element that is no track.
-    fn take(&mut self, xml: &Xml, element: &Element) -> Result<(), ImportError> {
-        if element.is("Model") {
-            self.space_unit = xml.text(element, "spatialunits")?;
-            self.time_unit = xml.text(element, "timeunits")?;
-        } else if element.is("Spot") {
-            self.has_quality = self.has_quality || xml.text(element, "QUALITY")?.is_some();
-            self.spot(xml, element)?;
-        } else if element.is("FilteredTracks") {
+    fn take_element(&mut self, xml: &XmlReader, element: &XmlElement) -> Result<(), ImportError> {
+        if element.has_name("Model") {
+            self.space_unit = xml.attribute(element, "spatialunits")?;
+            self.time_unit = xml.attribute(element, "timeunits")?;
+        } else if element.has_name("Spot") {
+            self.has_quality = self.has_quality || xml.attribute(element, "QUALITY")?.is_some();
+            self.add_spot(xml, element)?;
+        } else if element.has_name("FilteredTracks") {
             self.kept.get_or_insert_default();
-        } else if element.is("TrackID") {
-            self.kept.get_or_insert_default().insert(xml.needed(element, "TRACK_ID")?);
+        } else if element.has_name("TrackID") {
+            self.kept.get_or_insert_default().insert(xml.required_attribute(element, "TRACK_ID")?);
         }
         Ok(())
     }
 
-    fn spot(&mut self, xml: &Xml, element: &Element) -> Result<(), ImportError> {
-        let id = xml.needed(element, "ID")?;
-        let time = if xml.text(element, "POSITION_T")?.is_some() {
-            xml.number(element, "POSITION_T")?
+    fn add_spot(&mut self, xml: &XmlReader, element: &XmlElement) -> Result<(), ImportError> {
+        let id = xml.required_attribute(element, "ID")?;
+        let time = if xml.attribute(element, "POSITION_T")?.is_some() {
+            xml.number_attribute(element, "POSITION_T")?
         } else {
             None
         };
         let spot = Spot {
             line: element.line,
-            frame: xml.number(element, "FRAME")?,
+            frame: xml.number_attribute(element, "FRAME")?,
             time,
-            x: xml.number(element, "POSITION_X")?,
-            y: xml.number(element, "POSITION_Y")?,
+            x: xml.number_attribute(element, "POSITION_X")?,
+            y: xml.number_attribute(element, "POSITION_Y")?,
         };
         match self.spots.insert(id.clone(), spot) {
             None => Ok(()),
             Some(first) => Err(ImportError::wrong_table(
-                xml.place_of(element),
+                xml.element_location(element),
                 format!("the spot {id} a second time (first in line {})", first.line),
                 "every spot once",
                 "save the project again in TrackMate",
@@ -127,10 +127,10 @@ impl Parts {
         }
     }
 
-    fn found<'a>(self, document: &Document) -> Result<Found<'a>, ImportError> {
+    fn into_file<'a>(self, document: &Document) -> Result<TrackMateFile<'a>, ImportError> {
         let all = self.tracks.len();
-        let kept = |track: &Track| self.kept.as_ref().is_none_or(|kept| kept.contains(&track.id));
-        let trajectory = |track: Track| Trajectory {
+        let kept = |track: &ProjectTrack| self.kept.as_ref().is_none_or(|kept| kept.contains(&track.id));
+        let trajectory = |track: ProjectTrack| Trajectory {
             name: track.name,
             spots: track.spots.iter().filter_map(|id| self.spots.get(id).copied()).collect(),
         };
@@ -143,7 +143,9 @@ impl Parts {
                     self.spots.len()
                 ),
                 "at least one track",
-                format!("run the tracking, loosen the filters of the tracks and save again; or {REMEDY}"),
+                format!(
+                    "run the tracking, loosen the filters of the tracks and save again; or {EXPORT_ADVICE}"
+                ),
             ));
         }
         let mut notes = vec![];
@@ -155,13 +157,13 @@ impl Parts {
         }
         let space_unit =
             self.space_unit.map(|unit| (unit, "the attribute spatialunits of <Model>".to_owned()));
-        Ok(Found {
+        Ok(TrackMateFile {
             trajectories,
             space_unit,
             time_unit: self.time_unit,
             has_quality: self.has_quality,
             notes,
-            ..Found::default()
+            ..TrackMateFile::default()
         })
     }
 }

@@ -1,13 +1,15 @@
 //! Spots to tracks: order, branches, and what the units of the file mean.
 
-use crate::import::error::{ImportError, Place};
-use crate::import::options::Options;
-use crate::import::reader::{Clock, Document, Facts, Table, TimeUnit, Track, TrackFile, Unit, finding};
+use crate::import::error::{ImportError, TextLocation};
+use crate::import::options::ImportOptions;
+use crate::import::reader::{
+    Clock, CoordinateUnit, DelimitedTable, Document, Facts, TimeUnit, Track, TrackFile, new_finding,
+};
 use crate::recording::files::YAxis;
-use crate::recording::quality::{Check, Finding, Severity};
+use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// What to export instead of a table or file without positions.
-pub(crate) const REMEDY: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then \
+pub(crate) const EXPORT_ADVICE: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then \
     Export to CSV; or run the action Export tracks to XML file";
 
 /// A position in one frame.
@@ -30,41 +32,41 @@ pub(crate) struct Trajectory {
 
 /// What a file of TrackMate holds.
 #[derive(Default)]
-pub(crate) struct Found<'a> {
+pub(crate) struct TrackMateFile<'a> {
     pub trajectories: Vec<Trajectory>,
     /// Unit of the coordinates, and where it stands.
     pub space_unit: Option<(String, String)>,
     pub time_unit: Option<String>,
-    pub table: Option<&'a Table<'a>>,
+    pub table: Option<&'a DelimitedTable<'a>>,
     pub clock_cell: usize,
     pub has_quality: bool,
     pub notes: Vec<String>,
 }
 
 /// What the times of the file are worth.
-struct Times {
+struct SpotTimes {
     /// Their unit; `None` where they only repeat the frames.
     unit: Option<TimeUnit>,
     note: Option<String>,
-    finding: Option<Finding>,
+    finding: Option<QualityFinding>,
 }
 
-impl<'a> Found<'a> {
+impl<'a> TrackMateFile<'a> {
     /// Puts every track in order.
     ///
     /// # Errors
-    /// [`ImportError::Twice`] where a track that is asked for has two spots in one frame, and a refusal of
+    /// [`ImportError::DuplicateRow`] where a track that is asked for has two spots in one frame, and a refusal of
     /// files without tracks.
-    pub(crate) fn export(
+    pub(crate) fn into_track_file(
         mut self,
         document: &'a Document<'a>,
-        options: &Options,
+        options: &ImportOptions,
     ) -> Result<TrackFile<'a>, ImportError> {
         if self.trajectories.is_empty() {
-            return Err(no_tracks(document));
+            return Err(no_tracks_error(document));
         }
         let branching = self.leave_out_branching(document, options)?;
-        let times = self.times(document.file);
+        let times = self.spot_times(document.file);
         let mut notes = std::mem::take(&mut self.notes);
         notes.extend(times.note);
         if self.has_quality {
@@ -74,14 +76,14 @@ impl<'a> Found<'a> {
             .trajectories
             .iter()
             .enumerate()
-            .map(|(index, track)| track.columns(index, self.clock_cell, times.unit.is_some()))
+            .map(|(index, track)| track.to_clock_and_track(index, self.clock_cell, times.unit.is_some()))
             .unzip();
         let facts = Facts {
             y_axis: Some((
                 YAxis::Down,
                 "TrackMate measures from the upper left corner of the image".to_owned(),
             )),
-            unit: self.space_unit.as_ref().and_then(|(unit, place)| unit_of(unit, place, &mut notes)),
+            unit: self.space_unit.as_ref().and_then(|(unit, place)| length_unit(unit, place, &mut notes)),
             time: times.unit.unwrap_or_default(),
             ..Facts::default()
         };
@@ -100,7 +102,7 @@ impl<'a> Found<'a> {
             notes,
             findings,
             texts,
-            ..TrackFile::of(document)
+            ..TrackFile::for_document(document)
         })
     }
 
@@ -108,15 +110,15 @@ impl<'a> Found<'a> {
     fn leave_out_branching(
         &mut self,
         document: &Document,
-        options: &Options,
-    ) -> Result<Option<Finding>, ImportError> {
+        options: &ImportOptions,
+    ) -> Result<Option<QualityFinding>, ImportError> {
         let all = self.trajectories.len();
         let (mut left_out, mut first) = (vec![], None);
         for track in std::mem::take(&mut self.trajectories) {
-            let track = track.ordered();
-            match track.twice(document.file) {
+            let track = track.sort_by_frame();
+            match track.duplicate_spot_error(document.file) {
                 None => self.trajectories.push(track),
-                Some(error) if asked(options, &track.name) => return Err(error),
+                Some(error) if is_requested(options, &track.name) => return Err(error),
                 Some(error) => {
                     left_out.push(track.name);
                     first.get_or_insert(error);
@@ -135,14 +137,14 @@ impl<'a> Found<'a> {
         let advice = "forbid splitting and merging in TrackMate's tracker, or cut the links in TrackScheme, \
             if one of them is needed";
         Ok((!left_out.is_empty()).then(|| {
-            finding(Check::BranchingTracks, Severity::Caution, (left_out.len() as f64, ""), found, advice)
+            new_finding(Check::BranchingTracks, Severity::Caution, (left_out.len() as f64, ""), found, advice)
         }))
     }
 
     /// Whether the times say more than the frames do.
-    fn times(&self, file: &str) -> Times {
+    fn spot_times(&self, file: &str) -> SpotTimes {
         let mut spots = self.trajectories.iter().flat_map(|track| &track.spots);
-        let none = Times { unit: None, note: None, finding: None };
+        let none = SpotTimes { unit: None, note: None, finding: None };
         let unit = self
             .time_unit
             .as_deref()
@@ -152,7 +154,7 @@ impl<'a> Found<'a> {
             return none;
         }
         if matches!(unit.as_str(), "frame" | "frames") {
-            return Times {
+            return SpotTimes {
                 note: Some(
                     "the times are numbers of frames: the interval was not set in TrackMate".to_owned(),
                 ),
@@ -167,13 +169,13 @@ impl<'a> Found<'a> {
             );
             let advice = "the times are left out and cannot check --frame-rate-hz; set the frame interval in \
                 Image > Properties before tracking";
-            return Times {
-                finding: Some(finding(Check::FrameInterval, Severity::Caution, (1.0, ""), found, advice)),
+            return SpotTimes {
+                finding: Some(new_finding(Check::FrameInterval, Severity::Caution, (1.0, ""), found, advice)),
                 ..none
             };
         }
-        match seconds(&unit) {
-            Some(seconds) => Times { unit: Some(TimeUnit::Seconds(seconds)), ..none },
+        match unit_seconds(&unit) {
+            Some(seconds) => SpotTimes { unit: Some(TimeUnit::Seconds(seconds)), ..none },
             None => {
                 let note = format!(
                     "the times have {}",
@@ -183,25 +185,25 @@ impl<'a> Found<'a> {
                         format!("the unknown unit `{unit}`")
                     }
                 );
-                Times { unit: Some(TimeUnit::Unknown), note: Some(note), ..none }
+                SpotTimes { unit: Some(TimeUnit::Unknown), note: Some(note), ..none }
             }
         }
     }
 }
 
 impl Trajectory {
-    fn ordered(mut self) -> Self {
+    fn sort_by_frame(mut self) -> Self {
         let key = |spot: &Spot| spot.frame.unwrap_or(f64::INFINITY);
         self.spots.sort_by(|a, b| key(a).total_cmp(&key(b)));
         self
     }
 
     /// The refusal of a second spot in one frame.
-    fn twice(&self, file: &str) -> Option<ImportError> {
+    fn duplicate_spot_error(&self, file: &str) -> Option<ImportError> {
         let pair =
             self.spots.windows(2).find(|pair| pair[0].frame.is_some() && pair[0].frame == pair[1].frame)?;
-        let place = Place { file: file.to_owned(), line: pair[1].line, column: 1 };
-        Some(ImportError::Twice {
+        let place = TextLocation { file: file.to_owned(), line: pair[1].line, column: 1 };
+        Some(ImportError::DuplicateRow {
             place,
             what: "frame",
             found: pair[1].frame?,
@@ -210,7 +212,7 @@ impl Trajectory {
         })
     }
 
-    fn columns(&self, clock: usize, cell: usize, timed: bool) -> (Clock, Track) {
+    fn to_clock_and_track(&self, clock: usize, cell: usize, timed: bool) -> (Clock, Track) {
         let lines = self.spots.iter().map(|spot| u32::try_from(spot.line).unwrap_or(u32::MAX)).collect();
         let column = |value: fn(&Spot) -> Option<f64>| self.spots.iter().map(value).collect();
         let clock_columns = Clock {
@@ -233,7 +235,7 @@ impl Trajectory {
 }
 
 /// Whether the user means the track of that name, or would get it for its name.
-fn asked(options: &Options, name: &str) -> bool {
+fn is_requested(options: &ImportOptions, name: &str) -> bool {
     let named = [options.tip.as_deref(), options.head.as_deref()];
     if named.iter().all(Option::is_none) {
         return ["tip", "head"].contains(&name);
@@ -243,17 +245,17 @@ fn asked(options: &Options, name: &str) -> bool {
     })
 }
 
-fn no_tracks(document: &Document) -> ImportError {
+fn no_tracks_error(document: &Document) -> ImportError {
     ImportError::wrong_table(
         document.file,
         "spots that belong to no track, or none",
         "at least one track",
-        format!("run the tracking first; then {REMEDY}"),
+        format!("run the tracking first; then {EXPORT_ADVICE}"),
     )
 }
 
 /// Seconds of a unit of time by its name.
-fn seconds(unit: &str) -> Option<f64> {
+fn unit_seconds(unit: &str) -> Option<f64> {
     match unit {
         "s" | "sec" | "secs" | "second" | "seconds" => Some(1.0),
         "ms" | "msec" | "millisecond" | "milliseconds" => Some(1e-3),
@@ -265,23 +267,23 @@ fn seconds(unit: &str) -> Option<f64> {
 }
 
 /// The unit that the file names; one that is not known is asked for.
-fn unit_of(text: &str, place: &str, notes: &mut Vec<String>) -> Option<(Unit, String)> {
+fn length_unit(text: &str, place: &str, notes: &mut Vec<String>) -> Option<(CoordinateUnit, String)> {
     let name = text.trim().trim_matches(['(', ')']).trim();
     // the only unit with a sign beyond ASCII is the micrometre: its sign is lost where the character set was
     let lost = name
         .strip_suffix('m')
         .is_some_and(|sign| !sign.is_empty() && sign.chars().all(|c| c == '?' || !c.is_ascii()));
     let unit = match name {
-        "nm" => Some(Unit::Metres(1e-9)),
-        _ if lost => Some(Unit::Metres(1e-6)),
-        _ => Unit::named(name),
+        "nm" => Some(CoordinateUnit::Metres(1e-9)),
+        _ if lost => Some(CoordinateUnit::Metres(1e-6)),
+        _ => CoordinateUnit::parse(name),
     };
     if unit.is_none() {
         notes.push(format!("the unit of length `{name}` ({place}) is not known"));
     }
     let shown = if lost { "micrometres" } else { name };
     unit.map(|unit| match unit {
-        Unit::Pixel => (unit, format!("{place} says `{shown}`: TrackMate was not calibrated")),
-        Unit::Metres(_) => (unit, format!("{place} says `{shown}`")),
+        CoordinateUnit::Pixel => (unit, format!("{place} says `{shown}`: TrackMate was not calibrated")),
+        CoordinateUnit::Metres(_) => (unit, format!("{place} says `{shown}`")),
     })
 }

@@ -3,8 +3,8 @@
 //! Elements are read one after the other, so that no depth of nesting costs stack. Only the five predefined
 //! entities and character references are resolved; a document type, which could define others, is refused.
 
-use crate::import::error::{CellProblem, ImportError, Place};
-use crate::import::reader::{Document, Number, number};
+use crate::import::error::{CellProblem, ImportError, TextLocation};
+use crate::import::reader::{CellNumber, Document, parse_number};
 use quick_xml::XmlVersion;
 use quick_xml::events::{BytesEnd, BytesStart, Event};
 use quick_xml::reader::Reader;
@@ -13,7 +13,7 @@ use quick_xml::reader::Reader;
 const REMEDY: &str = "save or export it again from TrackMate";
 
 /// The elements of a document in their order.
-pub(crate) struct Xml<'a> {
+pub(crate) struct XmlReader<'a> {
     file: &'a str,
     text: &'a str,
     reader: Reader<&'a [u8]>,
@@ -24,13 +24,13 @@ pub(crate) struct Xml<'a> {
 }
 
 /// An element's begin or end; an element without content has both.
-pub(crate) enum Node<'a> {
-    Open(Element<'a>),
-    Close(End<'a>),
+pub(crate) enum XmlTag<'a> {
+    Open(XmlElement<'a>),
+    Close(XmlElementEnd<'a>),
 }
 
 /// The begin of an element.
-pub(crate) struct Element<'a> {
+pub(crate) struct XmlElement<'a> {
     bytes: BytesStart<'a>,
     start: usize,
     /// 1-based line.
@@ -38,21 +38,21 @@ pub(crate) struct Element<'a> {
 }
 
 /// The end of an element.
-pub(crate) struct End<'a>(BytesEnd<'a>);
+pub(crate) struct XmlElementEnd<'a>(BytesEnd<'a>);
 
-impl Element<'_> {
-    pub(crate) fn is(&self, name: &str) -> bool {
+impl XmlElement<'_> {
+    pub(crate) fn has_name(&self, name: &str) -> bool {
         self.bytes.name().as_ref() == name
     }
 }
 
-impl End<'_> {
-    pub(crate) fn is(&self, name: &str) -> bool {
+impl XmlElementEnd<'_> {
+    pub(crate) fn has_name(&self, name: &str) -> bool {
         self.0.name().as_ref() == name
     }
 }
 
-impl<'a> Xml<'a> {
+impl<'a> XmlReader<'a> {
     pub(crate) fn new(document: &'a Document) -> Self {
         let mut reader = Reader::from_str(document.text);
         reader.config_mut().expand_empty_elements = true;
@@ -60,13 +60,13 @@ impl<'a> Xml<'a> {
     }
 
     /// Name of the root element, if the text starts as XML.
-    pub(crate) fn root(document: &Document) -> Option<String> {
+    pub(crate) fn root_name(document: &Document) -> Option<String> {
         if !document.text.trim_start().starts_with('<') {
             return None;
         }
-        match Xml::new(document).next().ok()?? {
-            Node::Open(element) => Some(element.bytes.name().as_ref().to_owned()),
-            Node::Close(_) => None,
+        match XmlReader::new(document).next_tag().ok()?? {
+            XmlTag::Open(element) => Some(element.bytes.name().as_ref().to_owned()),
+            XmlTag::Close(_) => None,
         }
     }
 
@@ -75,31 +75,33 @@ impl<'a> Xml<'a> {
     /// # Errors
     /// [`ImportError::WrongTable`] for text that is not well-formed, that ends within an element, or that has
     /// a document type.
-    pub(crate) fn next(&mut self) -> Result<Option<Node<'a>>, ImportError> {
+    pub(crate) fn next_tag(&mut self) -> Result<Option<XmlTag<'a>>, ImportError> {
         loop {
-            let start = self.position(self.reader.buffer_position());
+            let start = self.clamp_offset(self.reader.buffer_position());
             match self.reader.read_event() {
                 Ok(Event::Start(bytes)) => {
                     self.depth += 1;
-                    let line = self.line(start);
-                    return Ok(Some(Node::Open(Element { bytes, start, line })));
+                    let line = self.line_at(start);
+                    return Ok(Some(XmlTag::Open(XmlElement { bytes, start, line })));
                 }
                 Ok(Event::End(bytes)) => {
                     self.depth = self.depth.saturating_sub(1);
-                    return Ok(Some(Node::Close(End(bytes))));
+                    return Ok(Some(XmlTag::Close(XmlElementEnd(bytes))));
                 }
                 Ok(Event::DocType(_)) => {
-                    return Err(self.refuse(start, "a document type definition".to_owned()));
+                    return Err(self.damaged_error(start, "a document type definition".to_owned()));
                 }
                 Ok(Event::Eof) if self.depth > 0 => {
                     let found = format!("the end of the file within {} open elements", self.depth);
-                    return Err(self.refuse(self.text.trim_end().len(), found));
+                    return Err(self.damaged_error(self.text.trim_end().len(), found));
                 }
                 Ok(Event::Eof) => return Ok(None),
                 Ok(_) => {}
                 Err(error) => {
-                    let at = self.position(self.reader.error_position());
-                    return Err(self.refuse(at, format!("XML that is damaged or broken off ({error})")));
+                    let at = self.clamp_offset(self.reader.error_position());
+                    return Err(
+                        self.damaged_error(at, format!("XML that is damaged or broken off ({error})"))
+                    );
                 }
             }
         }
@@ -110,9 +112,10 @@ impl<'a> Xml<'a> {
     /// # Errors
     /// [`ImportError::WrongTable`] for attributes that are not well-formed and for entities that are not
     /// predefined.
-    pub(crate) fn text(&self, element: &Element, name: &str) -> Result<Option<String>, ImportError> {
-        let damaged =
-            |error: String| self.refuse(element.start, format!("an attribute that cannot be read ({error})"));
+    pub(crate) fn attribute(&self, element: &XmlElement, name: &str) -> Result<Option<String>, ImportError> {
+        let damaged = |error: String| {
+            self.damaged_error(element.start, format!("an attribute that cannot be read ({error})"))
+        };
         for attribute in element.bytes.attributes().with_checks(false) {
             let attribute = attribute.map_err(|error| damaged(error.to_string()))?;
             if attribute.key.as_ref() == name {
@@ -129,11 +132,11 @@ impl<'a> Xml<'a> {
     ///
     /// # Errors
     /// [`ImportError::WrongTable`] where it is missing.
-    pub(crate) fn needed(&self, element: &Element, name: &str) -> Result<String, ImportError> {
-        self.text(element, name)?.ok_or_else(|| {
+    pub(crate) fn required_attribute(&self, element: &XmlElement, name: &str) -> Result<String, ImportError> {
+        self.attribute(element, name)?.ok_or_else(|| {
             let found = format!("<{}> without {name}", element.bytes.name().as_ref());
             ImportError::wrong_table(
-                self.place(element.start),
+                self.location_at(element.start),
                 found,
                 format!("the attribute {name}"),
                 REMEDY,
@@ -145,13 +148,17 @@ impl<'a> Xml<'a> {
     ///
     /// # Errors
     /// [`ImportError::Cell`] for anything else.
-    pub(crate) fn number(&self, element: &Element, name: &str) -> Result<Option<f64>, ImportError> {
-        let text = self.needed(element, name)?;
-        match number(text.trim(), '.') {
-            Number::Value(value) => Ok(Some(value)),
-            Number::Missing => Ok(None),
-            Number::Text => Err(ImportError::Cell {
-                place: self.place(element.start),
+    pub(crate) fn number_attribute(
+        &self,
+        element: &XmlElement,
+        name: &str,
+    ) -> Result<Option<f64>, ImportError> {
+        let text = self.required_attribute(element, name)?;
+        match parse_number(text.trim(), '.') {
+            CellNumber::Value(value) => Ok(Some(value)),
+            CellNumber::Missing => Ok(None),
+            CellNumber::Text => Err(ImportError::Cell {
+                place: self.location_at(element.start),
                 problem: CellProblem::NotANumber,
                 name: name.to_owned(),
                 found: text.chars().take(60).collect::<String>().into(),
@@ -162,21 +169,21 @@ impl<'a> Xml<'a> {
     }
 
     /// The place of an element, for messages.
-    pub(crate) fn place_of(&self, element: &Element) -> Place {
-        self.place(element.start)
+    pub(crate) fn element_location(&self, element: &XmlElement) -> TextLocation {
+        self.location_at(element.start)
     }
 
-    fn refuse(&self, at: usize, found: String) -> ImportError {
+    fn damaged_error(&self, at: usize, found: String) -> ImportError {
         let expected = "a whole file as TrackMate writes it".to_owned();
-        ImportError::wrong_table(self.place(at), found, expected, REMEDY)
+        ImportError::wrong_table(self.location_at(at), found, expected, REMEDY)
     }
 
-    fn position(&self, offset: u64) -> usize {
+    fn clamp_offset(&self, offset: u64) -> usize {
         usize::try_from(offset).unwrap_or(usize::MAX).min(self.text.len())
     }
 
     /// Line of a position that is not before the last one asked for.
-    fn line(&mut self, at: usize) -> usize {
+    fn line_at(&mut self, at: usize) -> usize {
         let (from, line) = self.counted;
         let passed = self
             .text
@@ -190,11 +197,11 @@ impl<'a> Xml<'a> {
         self.counted.1
     }
 
-    fn place(&self, at: usize) -> Place {
+    fn location_at(&self, at: usize) -> TextLocation {
         let before = self.text.as_bytes().get(..at).unwrap_or_default();
         let line = before.iter().filter(|byte| **byte == b'\n').count() + 1;
         let start = before.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
         let column = self.text.get(start..at).map_or(1, |text| text.chars().count() + 1);
-        Place { file: self.file.to_owned(), line, column }
+        TextLocation { file: self.file.to_owned(), line, column }
     }
 }

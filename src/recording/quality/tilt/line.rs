@@ -1,6 +1,6 @@
 //! Least squares of a line and a parabola through the path, each stroke at its own height.
 
-use super::path::{Path, Point};
+use super::path::{TipPath, TipPoint};
 use crate::math;
 
 /// Least share that a parabola may differ from a line, in units of the fourth power of the places' spread:
@@ -9,7 +9,7 @@ const LEAST_BEND: f64 = 1e-6;
 
 /// A line `y = height(stroke) + slope x + bend q(x)`, in which `q` is the parabola `x^2` without its part
 /// along the line, so that `slope` is that of the line alone: the mean slope of a curved path.
-pub(super) struct Line {
+pub(super) struct GlassLine {
     pub slope: f64,
     pub bend_per_m: f64,
     /// Mean place, m.
@@ -30,7 +30,7 @@ pub(super) struct Line {
 }
 
 /// A point relative to the mean of its stroke.
-struct Centred {
+struct CentredPoint {
     x: f64,
     x2: f64,
     y: f64,
@@ -38,29 +38,29 @@ struct Centred {
 
 /// Sums over the points of a stroke that lie on the glass.
 #[derive(Clone, Copy, Default)]
-struct Sums {
+struct StrokeSums {
     points: f64,
     x: f64,
     x2: f64,
     y: f64,
 }
 
-impl Line {
+impl GlassLine {
     /// The line through the points for which `on_glass` holds; at least one.
-    pub(super) fn through(path: &Path, on_glass: Vec<bool>) -> Self {
+    pub(super) fn fit_through(path: &TipPath, on_glass: Vec<bool>) -> Self {
         let used = || path.points.iter().zip(&on_glass).filter(|(_, on)| **on).map(|(point, _)| point);
         let count = used().count() as f64;
         let centre_m =
             [used().map(|p| p.x_m).sum::<f64>() / count, used().map(|p| p.y_m).sum::<f64>() / count];
-        let means = means(path.strokes, used(), centre_m);
-        let all: Vec<Centred> =
-            path.points.iter().map(|point| centred(point, centre_m, &means[point.stroke])).collect();
+        let means = stroke_means(path.strokes, used(), centre_m);
+        let all: Vec<CentredPoint> =
+            path.points.iter().map(|point| centre_point(point, centre_m, &means[point.stroke])).collect();
         let fitted = || all.iter().zip(&on_glass).filter(|(_, on)| **on).map(|(point, _)| point);
-        let sum = |value: &dyn Fn(&Centred) -> f64| fitted().map(value).sum::<f64>();
+        let sum = |value: &dyn Fn(&CentredPoint) -> f64| fitted().map(value).sum::<f64>();
         let xx = sum(&|p| p.x * p.x);
         let along = |value: f64| if xx > 0.0 { value / xx } else { 0.0 };
         let (slope, lean) = (along(sum(&|p| p.x * p.y)), along(sum(&|p| p.x * p.x2)));
-        let bent = |p: &Centred| p.x2 - lean * p.x;
+        let bent = |p: &CentredPoint| p.x2 - lean * p.x;
         let qq = sum(&|p| math::powi(bent(p), 2));
         let qq = if qq > LEAST_BEND * xx * xx / count { qq } else { 0.0 };
         let bend_per_m = if qq > 0.0 { sum(&|p| bent(p) * p.y) / qq } else { 0.0 };
@@ -80,8 +80,12 @@ impl Line {
 }
 
 /// Means of the strokes about `centre_m`; infinite in a stroke without a point.
-fn means<'a>(strokes: usize, points: impl Iterator<Item = &'a Point>, centre_m: [f64; 2]) -> Vec<Sums> {
-    let mut sums = vec![Sums::default(); strokes];
+fn stroke_means<'a>(
+    strokes: usize,
+    points: impl Iterator<Item = &'a TipPoint>,
+    centre_m: [f64; 2],
+) -> Vec<StrokeSums> {
+    let mut sums = vec![StrokeSums::default(); strokes];
     for point in points {
         let (sum, x) = (&mut sums[point.stroke], point.x_m - centre_m[0]);
         sum.points += 1.0;
@@ -91,14 +95,14 @@ fn means<'a>(strokes: usize, points: impl Iterator<Item = &'a Point>, centre_m: 
     }
     for sum in &mut sums {
         *sum = match sum.points {
-            0.0 => Sums { y: f64::NEG_INFINITY, ..*sum },
-            n => Sums { points: n, x: sum.x / n, x2: sum.x2 / n, y: sum.y / n },
+            0.0 => StrokeSums { y: f64::NEG_INFINITY, ..*sum },
+            n => StrokeSums { points: n, x: sum.x / n, x2: sum.x2 / n, y: sum.y / n },
         };
     }
     sums
 }
 
-fn centred(point: &Point, centre_m: [f64; 2], mean: &Sums) -> Centred {
+fn centre_point(point: &TipPoint, centre_m: [f64; 2], mean: &StrokeSums) -> CentredPoint {
     let x = point.x_m - centre_m[0];
-    Centred { x: x - mean.x, x2: x * x - mean.x2, y: point.y_m - centre_m[1] - mean.y }
+    CentredPoint { x: x - mean.x, x2: x * x - mean.x2, y: point.y_m - centre_m[1] - mean.y }
 }

@@ -1,7 +1,7 @@
 //! The path of the tip, stroke by stroke.
 
 use crate::recording::Recording;
-use crate::recording::channel::Instants;
+use crate::recording::channel::ReversalInstants;
 
 /// Most frames looked at, every n-th of a longer recording: they give the angle far better than it matters.
 const MOST_FRAMES: usize = 100_000;
@@ -10,7 +10,7 @@ const TRIMMED: f64 = 0.01;
 
 /// The tip in a frame that has both its coordinates.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Point {
+pub(super) struct TipPoint {
     /// Its number among the frames that are looked at.
     pub frame: usize,
     /// Stroke that it belongs to: the number of turns before it.
@@ -20,14 +20,14 @@ pub(super) struct Point {
 }
 
 /// The path of the tip.
-pub(super) struct Path {
+pub(super) struct TipPath {
     /// In order of frames.
-    pub points: Vec<Point>,
+    pub points: Vec<TipPoint>,
     pub strokes: usize,
 }
 
-impl Path {
-    pub(super) fn of(recording: &Recording, instants: &Instants) -> Self {
+impl TipPath {
+    pub(super) fn from_recording(recording: &Recording, instants: &ReversalInstants) -> Self {
         let (grid, traces) = (recording.grid(), recording.traces());
         let turns_s: Vec<f64> = instants.reversals.iter().map(|turn| turn.reversal_s).collect();
         let mut stroke = 0;
@@ -37,29 +37,29 @@ impl Path {
             while turns_s.get(stroke).is_some_and(|turn_s| *turn_s <= grid.time_s(apart * frame)) {
                 stroke += 1;
             }
-            Some(Point { frame, stroke, x_m: (*x)?, y_m: (*y)? })
+            Some(TipPoint { frame, stroke, x_m: (*x)?, y_m: (*y)? })
         });
         Self { points: points.collect(), strokes: turns_s.len() + 1 }
     }
 
     /// The points for which `kept` holds.
-    pub(super) fn only(&self, kept: &[bool]) -> Self {
+    pub(super) fn select_points(&self, kept: &[bool]) -> Self {
         let points = self.points.iter().zip(kept).filter(|(_, kept)| **kept).map(|(point, _)| *point);
         Self { points: points.collect(), strokes: self.strokes }
     }
 
     /// The points of each stroke that has any.
-    pub(super) fn by_stroke(&self) -> impl Iterator<Item = &[Point]> {
+    pub(super) fn points_by_stroke(&self) -> impl Iterator<Item = &[TipPoint]> {
         self.points.chunk_by(|a, b| a.stroke == b.stroke)
     }
 
     /// Longest travel within a stroke, m, without the outermost places.
     pub(super) fn travel_m(&self) -> f64 {
-        self.by_stroke().map(travel_m).fold(0.0, f64::max)
+        self.points_by_stroke().map(stroke_travel_m).fold(0.0, f64::max)
     }
 }
 
-fn travel_m(stroke: &[Point]) -> f64 {
+fn stroke_travel_m(stroke: &[TipPoint]) -> f64 {
     let mut places: Vec<f64> = stroke.iter().map(|point| point.x_m).collect();
     places.sort_unstable_by(f64::total_cmp);
     let trimmed = (TRIMMED * places.len() as f64) as usize;

@@ -1,15 +1,15 @@
 //! What a long record holds for a short time only, read from pieces of it that are taken apart.
 
-use super::pieces::{self, Piece};
+use super::pieces::{self, UnusualSegment};
 use crate::math;
-use crate::spectrum::analysis::{Analysis, Record};
-use crate::spectrum::judge::DAMPED;
-use crate::spectrum::{Component, Reason, Settings, Verdict};
+use crate::spectrum::analysis::{SampledRecord, SpectralAnalysis};
+use crate::spectrum::judge::SINGLE_CYCLE_DAMPING;
+use crate::spectrum::{Component, ComponentReason, ComponentVerdict, SpectrumSettings};
 use rayon::prelude::*;
 use std::f64::consts::TAU;
 
 /// Pieces of a length, frames.
-struct Scale {
+struct SegmentScale {
     length: usize,
     /// How many are taken apart.
     most: usize,
@@ -19,23 +19,23 @@ struct Scale {
 }
 
 /// An oscillation shows best in pieces as long as it lasts. The longest take most of the time.
-const SCALES: [Scale; 3] = [
-    Scale { length: 4096, most: 2, first: false },
-    Scale { length: 1024, most: 4, first: true },
-    Scale { length: 256, most: 4, first: true },
+const SCALES: [SegmentScale; 3] = [
+    SegmentScale { length: 4096, most: 2, first: false },
+    SegmentScale { length: 1024, most: 4, first: true },
+    SegmentScale { length: 256, most: 4, first: true },
 ];
 /// Resolutions of a piece within which two components are one.
-const TOGETHER: f64 = 2.0;
+const SAME_WITHIN_RESOLUTIONS: f64 = 2.0;
 /// Deviations within which they are.
-const DEVIATIONS: f64 = 3.0;
+const SAME_WITHIN_DEVIATIONS: f64 = 3.0;
 /// Nepers after which an oscillation is over: a twentieth is left.
-const OVER: f64 = 3.0;
+const NEPERS_UNTIL_OVER: f64 = 3.0;
 /// Nepers by which one falls that is no steady line whose amplitude wavers, and that soon ends.
-const FALLS: f64 = 1.0;
+const NEPERS_OF_DECAY: f64 = 1.0;
 
 /// A component that was read from a piece.
 #[derive(Debug)]
-pub(super) struct Brief {
+pub(super) struct TransientComponent {
     pub component: Component,
     /// First frame of the stretch that was taken apart.
     first: usize,
@@ -44,12 +44,12 @@ pub(super) struct Brief {
     nepers: f64,
 }
 
-impl Brief {
+impl TransientComponent {
     /// Whether a component cannot be told from this one.
-    pub(super) fn is(&self, other: &Component) -> bool {
+    pub(super) fn matches_component(&self, other: &Component) -> bool {
         let c = &self.component;
         let sd_hz = math::hypot(c.frequency_sd_hz, other.frequency_sd_hz);
-        let within_hz = (TOGETHER * self.resolution_hz).max(DEVIATIONS * sd_hz);
+        let within_hz = (SAME_WITHIN_RESOLUTIONS * self.resolution_hz).max(SAME_WITHIN_DEVIATIONS * sd_hz);
         let holds = |a: &Component, b: &Component| {
             a.range_hz.is_some_and(|range| (range.low_hz..=range.high_hz).contains(&b.frequency_hz))
         };
@@ -58,20 +58,20 @@ impl Brief {
 
     /// Whether a component that changes over the window is what this one shows there: a line as wide as it
     /// decays.
-    pub(super) fn shows(&self, other: &Component) -> bool {
+    pub(super) fn explains_component(&self, other: &Component) -> bool {
         let c = &self.component;
         let width_hz = c.damping_ratio.map_or(0.0, |ratio| 2.0 * ratio * c.frequency_hz);
-        self.is(other) || (c.frequency_hz - other.frequency_hz).abs() < width_hz
+        self.matches_component(other) || (c.frequency_hz - other.frequency_hz).abs() < width_hz
     }
 
     /// With a doubt where it does not fall: what goes on outside the stretch may be another frequency.
-    fn doubted(mut self) -> Self {
-        if self.nepers < FALLS {
+    fn with_persistence_doubt(mut self) -> Self {
+        if self.nepers < NEPERS_OF_DECAY {
             let words = "it goes on outside the part of the window in which it was read, and may drift or \
                          change there"
                 .to_owned();
             let reasons = &mut self.component.reasons;
-            reasons.push(Reason { verdict: Verdict::Ambiguous, words });
+            reasons.push(ComponentReason { verdict: ComponentVerdict::Ambiguous, words });
             reasons.sort_by_key(|reason| reason.verdict);
             self.component.verdict = reasons[0].verdict;
         }
@@ -79,37 +79,40 @@ impl Brief {
     }
 
     /// Whether the piece says more of it than a window over which it changes.
-    pub(super) fn says_more(&self) -> bool {
-        self.nepers > FALLS || self.component.range_hz.is_some()
+    pub(super) fn is_more_specific(&self) -> bool {
+        self.nepers > NEPERS_OF_DECAY || self.component.range_hz.is_some()
     }
 }
 
 /// Every component that is there for a short time, once.
-pub(super) fn components(record: &Record, settings: &Settings) -> Vec<Brief> {
+pub(super) fn find_transients(
+    record: &SampledRecord,
+    settings: &SpectrumSettings,
+) -> Vec<TransientComponent> {
     let band_hz = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
     let band = (band_hz.0 / record.frame_rate_hz, (band_hz.1 / record.frame_rate_hz).min(0.5));
-    let of_scale = |scale: &Scale| {
-        let pieces = pieces::of(record.samples, scale.length, band);
-        let chosen = pieces::most_unlike(&pieces, scale.most);
+    let of_scale = |scale: &SegmentScale| {
+        let pieces = pieces::cut_segments(record.samples, scale.length, band);
+        let chosen = pieces::select_most_unusual(&pieces, scale.most);
         let is_read = |k: usize| chosen.contains(&k) || (scale.first && k == 0);
         let numbered = pieces.into_iter().enumerate();
         numbered.filter(|(k, _)| is_read(*k)).map(|(_, piece)| piece).collect::<Vec<_>>()
     };
-    let pieces: Vec<Piece> = SCALES.iter().flat_map(of_scale).collect();
-    let mut found: Vec<Brief> = pieces
+    let pieces: Vec<UnusualSegment> = SCALES.iter().flat_map(of_scale).collect();
+    let mut found: Vec<TransientComponent> = pieces
         .par_iter()
         .flat_map_iter(|piece| {
             let samples = &record.samples[piece.frames.clone()];
-            read(&Record { samples, ..*record }, settings, piece)
+            read_segment_transients(&SampledRecord { samples, ..*record }, settings, piece)
         })
         .collect();
     found.sort_by(|a, b| a.component.frequency_sd_hz.total_cmp(&b.component.frequency_sd_hz));
-    let mut once: Vec<Brief> = Vec::new();
+    let mut once: Vec<TransientComponent> = Vec::new();
     for brief in found {
         // two of one piece are two
-        let known = |known: &Brief| {
+        let known = |known: &TransientComponent| {
             (known.first, known.resolution_hz) != (brief.first, brief.resolution_hz)
-                && (known.is(&brief.component) || brief.is(&known.component))
+                && (known.matches_component(&brief.component) || brief.matches_component(&known.component))
         };
         if !once.iter().any(known) {
             once.push(brief);
@@ -120,36 +123,53 @@ pub(super) fn components(record: &Record, settings: &Settings) -> Vec<Brief> {
 
 /// The components of a piece that are not there all the time: those at whose frequency it exceeds the normal,
 /// and those that are over within it; but none that is over within a cycle, as every step would give one.
-fn read(of_piece: &Record, settings: &Settings, piece: &Piece) -> Vec<Brief> {
+fn read_segment_transients(
+    of_piece: &SampledRecord,
+    settings: &SpectrumSettings,
+    piece: &UnusualSegment,
+) -> Vec<TransientComponent> {
     let rate_hz = of_piece.frame_rate_hz;
-    let passes = |brief: &Brief| {
+    let passes = |brief: &TransientComponent| {
         let c = &brief.component;
         let (low_hz, high_hz) =
             c.range_hz.map_or((c.frequency_hz, c.frequency_hz), |range| (range.low_hz, range.high_hz));
-        let step = c.damping_ratio.is_some_and(|ratio| ratio > DAMPED);
-        !step && (brief.nepers > OVER || piece.exceeds(low_hz / rate_hz, high_hz / rate_hz))
+        let step = c.damping_ratio.is_some_and(|ratio| ratio > SINGLE_CYCLE_DAMPING);
+        !step
+            && (brief.nepers > NEPERS_UNTIL_OVER
+                || piece.exceeds_normal_power(low_hz / rate_hz, high_hz / rate_hz))
     };
-    let analyses = Analysis::between_flips(of_piece, settings);
-    let of_stretch = |analysis: Analysis| of_stretch(analysis, piece.frames.start, rate_hz);
-    analyses.into_iter().flat_map(of_stretch).filter(passes).map(Brief::doubted).collect()
+    let analyses = SpectralAnalysis::analyse_between_steps(of_piece, settings);
+    let of_stretch =
+        |analysis: SpectralAnalysis| transients_between_steps(analysis, piece.frames.start, rate_hz);
+    analyses
+        .into_iter()
+        .flat_map(of_stretch)
+        .filter(passes)
+        .map(TransientComponent::with_persistence_doubt)
+        .collect()
 }
 
 /// The components of a stretch of a piece that begins at a frame.
-fn of_stretch(analysis: Analysis, start: usize, rate_hz: f64) -> impl Iterator<Item = Brief> {
-    let first = start + analysis.left_out;
-    let lasts_s = analysis.left_m.len() as f64 / rate_hz;
+fn transients_between_steps(
+    analysis: SpectralAnalysis,
+    start: usize,
+    rate_hz: f64,
+) -> impl Iterator<Item = TransientComponent> {
+    let first = start + analysis.skipped_frames;
+    let lasts_s = analysis.residual_m.len() as f64 / rate_hz;
     let resolution_hz = analysis.spectrum.resolution_hz;
     analysis.spectrum.components.into_iter().map(move |c| {
-        let nepers = nepers(&c, lasts_s);
+        let nepers = decay_nepers(&c, lasts_s);
         let begins_s = first as f64 / rate_hz + c.begins_s.unwrap_or(0.0);
         let component = Component { begins_s: (begins_s > 0.0).then_some(begins_s), ..c };
-        Brief { component, first, resolution_hz, nepers }
+        TransientComponent { component, first, resolution_hz, nepers }
     })
 }
 
 /// Nepers by which a component decays before the end of a record; 0 where they may be none.
-fn nepers(c: &Component, lasts_s: f64) -> f64 {
-    let decays = c.damping_ratio.zip(c.damping_ratio_sd).filter(|(ratio, sd)| *ratio > DEVIATIONS * sd);
+fn decay_nepers(c: &Component, lasts_s: f64) -> f64 {
+    let decays =
+        c.damping_ratio.zip(c.damping_ratio_sd).filter(|(ratio, sd)| *ratio > SAME_WITHIN_DEVIATIONS * sd);
     decays.map_or(0.0, |(ratio, _)| {
         TAU * c.frequency_hz * ratio / (1.0 - ratio * ratio).sqrt() * (lasts_s - c.begins_s.unwrap_or(0.0))
     })
