@@ -10,7 +10,7 @@ use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits,
 use wiperlab::recording::channel::ReversalInstants;
 use wiperlab::simulate::SolverOptions;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::twin::{Camera, film_scene};
+use wiperlab::simulate::twin::{Camera, film_scene};
 
 const JOB: &str = include_str!("../fits/actual-blade-twin/job.toml");
 const SCENE: &str = include_str!("../data/scenes/actual-blade.toml");

@@ -8,8 +8,8 @@ use wiperlab::fit::model::{Draw, Model};
 use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
 use wiperlab::recording::channel::{Channel, ReversalInstants, Window};
 use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::twin::Camera;
 use wiperlab::spectrum::{Detrend, SampledRecord, SpectralAnalysis, SpectrumSettings, WindowedTransform};
-use wiperlab::twin::Camera;
 
 const JOB: &str = include_str!("../fits/actual-blade-twin/job.toml");
 const SCENE: &str = include_str!("../data/scenes/actual-blade.toml");

@@ -5,12 +5,12 @@ use serde_json::Value;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use wiperlab::fit::job::Job;
+use wiperlab::model::section::BladeSection;
 use wiperlab::recording::files::RecordingFile;
-use wiperlab::section::BladeSection;
 use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::twin::spec::TwinSpec;
 use wiperlab::sweep::Study;
 use wiperlab::toml_file::{FORMAT, KeyEntry, KeyTable, list_key_tables};
-use wiperlab::twin::spec::TwinSpec;
 
 /// A kind of file.
 struct Kind {

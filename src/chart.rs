@@ -12,40 +12,30 @@
 
 mod axis;
 mod canvas;
-mod cells;
-mod colours;
 mod compact_svg;
 mod contours;
 mod elements;
 mod figure;
 mod hatch;
-mod heat;
-mod heat_bar;
-mod height;
+mod heat_map;
 mod layout;
-mod letters;
-mod live;
-mod overlay;
 mod panel;
 mod path;
 mod series;
-mod sizes;
 mod style;
-mod svg;
 mod text;
-mod theme;
 
 pub use axis::{AxisScale, ChartAxis};
-pub use colours::ColourMap;
 pub use elements::{
     ErrorBar, Hatch, HatchPattern, Panel, Raster, Ribbon, SampledSeries, Series, ShadedSpan, TextAnnotation,
     TopLabel, VerticalLine,
 };
+pub use figure::PanelPlacement;
 pub use figure::{Figure, Medium};
-pub use heat::{HeatMap, cell_edges};
-pub use overlay::PanelPlacement;
-pub use sizes::MAX_HEIGHT_MM;
-pub(crate) use sizes::{COLUMN_WIDTH_MM, FULL_WIDTH_MM};
+pub use heat_map::{HeatMap, cell_edges};
+pub use style::ColourMap;
+pub use style::MAX_HEIGHT_MM;
+pub(crate) use style::{COLUMN_WIDTH_MM, FULL_WIDTH_MM};
 pub use style::{Colour, Mark, MarkerShape};
 
 #[cfg(test)]

@@ -6,29 +6,23 @@
 
 mod assemble;
 mod error;
-mod format;
 mod formats;
-mod level;
 mod options;
-mod outcome;
 mod reader;
-mod source;
 
+use crate::recording::Recording;
+use crate::recording::files::{DESCRIPTION_FILE, OneOrMany, RecordingFile, SourceEntry, TRACE_FILE};
+use crate::recording::quality::{QualityFinding, Severity};
+use crate::text::sha256;
+pub use assemble::LevelError;
+use assemble::assemble_recording;
 pub use error::{CellProblem, ImportError, TextLocation};
 pub use formats::format_names;
-
-pub use level::LevelError;
-pub use options::{ColumnMap, ColumnName, CoordinateScale, ImportOptions, TimeColumn};
-pub use outcome::{Import, ImportReport};
-pub use reader::companion::companion_names;
-pub use source::{CompanionFile, ImportSource, preserved_files};
-
-use crate::recording::files::{OneOrMany, SourceEntry};
-use assemble::assemble_recording;
 use formats::{choose_format, find_doubtful_columns};
-use reader::Document;
-use reader::encoding::{self, DecodedText};
-use source::{check_file_names, hash_sources};
+pub use options::{ColumnMap, ColumnName, CoordinateScale, ImportOptions, TimeColumn};
+pub use reader::companion::companion_names;
+use reader::encoding::DecodedText;
+use reader::{Document, encoding};
 
 /// Imports one recording from one or more files that share its frame grid.
 ///
@@ -61,4 +55,124 @@ fn read_exports(sources: &[ImportSource], options: &ImportOptions) -> Result<Imp
         .extend(documents.iter().zip(&decoded).map(|(document, decoded)| document.encoding_note(decoded)));
     report.findings.extend(find_doubtful_columns(format, &documents, options));
     assemble_recording(sources, &decoded, exports, options, report)
+}
+
+// What an import gives back: the recording, its description, and a report for the user.
+
+/// An import that succeeded.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Import {
+    /// The recording.
+    pub recording: Recording,
+    /// Its `recording.toml`.
+    pub file: RecordingFile,
+    /// What was found and decided.
+    pub report: ImportReport,
+}
+
+/// What was found and decided, for the user to check.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ImportReport {
+    /// Format that the files were read as.
+    pub format: String,
+    /// Why that one.
+    pub reason: String,
+    /// Facts worth knowing.
+    pub notes: Vec<String>,
+    /// What only the export could show: it is kept in `recording.toml`.
+    pub findings: Vec<QualityFinding>,
+}
+
+impl ImportReport {
+    /// The report as lines for reading.
+    #[must_use]
+    pub fn lines(&self) -> Vec<String> {
+        let first = format!("format: {} ({})", self.format, self.reason);
+        let notes = self.notes.iter().map(|note| format!("note: {note}"));
+        std::iter::once(first).chain(notes).chain(self.findings.iter().map(QualityFinding::to_line)).collect()
+    }
+
+    /// What may be wrong, in words.
+    pub fn warnings(&self) -> impl Iterator<Item = String> {
+        let graver = self.findings.iter().filter(|finding| finding.severity > Severity::Note);
+        graver.map(|finding| {
+            if finding.advice.is_empty() {
+                finding.found.clone()
+            } else {
+                format!("{}; {}", finding.found, finding.advice)
+            }
+        })
+    }
+}
+
+// The files of an import as bytes: exports, the companions that belong to them, and the copies that the
+// recording keeps.
+
+/// A file to import.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ImportSource {
+    /// Path or name as given by the user; its last part names the copy in the recording.
+    pub name: String,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+    /// Its companion files: see [`companion_names`](companion_names).
+    pub companions: Vec<CompanionFile>,
+}
+
+/// A file in the folder of an export that belongs to it, such as a camera's record.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct CompanionFile {
+    /// Its path or name.
+    pub name: String,
+    /// Its bytes.
+    pub bytes: Vec<u8>,
+}
+
+impl ImportSource {
+    /// A file without companions.
+    #[must_use]
+    pub fn without_companions(name: impl Into<String>, bytes: Vec<u8>) -> Self {
+        Self { name: name.into(), bytes, companions: vec![] }
+    }
+}
+
+/// Every copy in the recording's folder needs a name of its own.
+pub(crate) fn check_file_names(sources: &[ImportSource]) -> Result<(), ImportError> {
+    if sources.is_empty() {
+        return Err(ImportError::NoSource);
+    }
+    let mut taken = vec![TRACE_FILE, DESCRIPTION_FILE];
+    for source in sources {
+        let name = base_name(&source.name);
+        if name.is_empty() || taken.iter().any(|other| other.eq_ignore_ascii_case(name)) {
+            return Err(ImportError::Name { file: source.name.clone(), name: name.to_owned() });
+        }
+        taken.push(name);
+    }
+    Ok(())
+}
+
+/// Last part of a path, whichever way its slashes lean.
+pub(crate) fn base_name(path: &str) -> &str {
+    path.rsplit(['/', '\\']).next().unwrap_or(path)
+}
+
+/// Names and bytes of the files that are kept with the recording, in the order of `[source]`; a companion of
+/// several is kept once.
+#[must_use]
+pub fn preserved_files(sources: &[ImportSource]) -> Vec<(&str, &[u8])> {
+    let mut kept: Vec<(&str, &[u8])> =
+        sources.iter().map(|source| (base_name(&source.name), source.bytes.as_slice())).collect();
+    for file in sources.iter().flat_map(|source| &source.companions) {
+        let name = base_name(&file.name);
+        if !kept.iter().any(|(known, _)| known.eq_ignore_ascii_case(name)) {
+            kept.push((name, &file.bytes));
+        }
+    }
+    kept
+}
+
+/// SHA-256 of every kept file, in their order.
+pub(crate) fn hash_sources(sources: &[ImportSource]) -> Vec<String> {
+    preserved_files(sources).into_iter().map(|(_, bytes)| sha256(bytes)).collect()
 }

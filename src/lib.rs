@@ -89,28 +89,24 @@
 
 #![cfg_attr(not(test), warn(clippy::disallowed_methods))] // tests may use them
 
-pub mod accuracy;
-pub mod blade;
 pub mod camera;
 pub mod chart;
+pub mod checkpoint;
+pub mod cli;
 pub mod compare;
 pub mod draft;
 pub mod feature;
 pub mod figures;
 pub mod fit;
 pub mod import;
-pub mod journal;
 pub mod math;
+pub mod model;
 pub mod ode;
-pub mod plausibility;
 pub mod prelude;
-pub mod program;
 pub mod recording;
 pub mod report;
-pub mod section;
 pub mod simulate;
 pub mod spectrum;
 pub mod sweep;
 pub mod text;
 pub mod toml_file;
-pub mod twin;

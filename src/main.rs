@@ -3,5 +3,5 @@
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    ExitCode::from(wiperlab::program::run(std::env::args_os().collect()))
+    ExitCode::from(wiperlab::cli::run(std::env::args_os().collect()))
 }

@@ -5,7 +5,7 @@
 //! multiplications and divisions alone, whose rounding IEEE 754 fixes. So is that of `sqrt`, `mul_add`,
 //! `floor` and the like, which stay methods.
 
-pub(crate) mod gauss;
+pub(crate) mod gauss_legendre;
 mod normal;
 
 pub use normal::StandardNormal;

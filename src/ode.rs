@@ -9,12 +9,11 @@
 
 pub mod collocation;
 mod dop853;
-pub mod fixed;
+pub mod fixed_step;
 pub mod polynomial;
 pub mod roots;
 mod runge_kutta;
-mod slack;
-mod tableau;
+mod slack_variable;
 pub mod taylor;
 
 pub use runge_kutta::{EventLocator, integrate, integrate_with_locator};

@@ -1,16 +1,18 @@
 //! Results as figures and pages: plain data in, SVG, HTML and JSON as text out.
 
-pub mod answer;
-pub mod comparison;
+pub mod assembly;
+pub mod fit_comparison;
 pub mod json;
 pub mod page;
-mod rows;
-pub mod several;
-pub mod statement;
+pub mod rich_text;
+pub mod summary;
 pub mod verdict;
+mod view_model;
 
-pub use answer::{ReportSummary, SummaryQuantity};
-pub use rows::{CombinationLine, FailureCount, ProbeLine, Provenance, RecordingLine, SearchLine, SourceFile};
+pub use summary::{ReportSummary, SummaryQuantity};
+pub use view_model::{
+    CombinationLine, FailureCount, ProbeLine, Provenance, RecordingLine, SearchLine, SourceFile,
+};
 
 use crate::compare::{Comparison, ComparisonSummary, ComparisonTable, ParameterLine, RunSummary};
 use crate::figures::FigureBlock;

@@ -4,36 +4,36 @@
 //! decision what follows is a pure function of the forces ([`mode`]). Observers see every accepted piece of
 //! the solution, so nothing is stored and what is not asked for is not computed.
 
-mod cause;
+pub mod accuracy;
+pub mod bench_checks;
 pub mod drive;
 pub mod equilibrium;
+mod event_loop;
+pub mod fixed_step_scheme;
 pub mod flight;
 pub mod impact;
-mod machine;
 pub mod mode;
 pub(crate) mod motion;
 pub mod outputs;
-pub mod paper;
 pub mod phases;
-mod piece;
 pub mod scene;
 pub mod sensitivity;
-pub mod shutter;
+mod solution_segment;
+pub mod twin;
 
-use crate::blade::Pose;
-use crate::blade::flight::FlightState;
-use crate::blade::modes::time_scales_rad_per_s;
+use crate::model::Pose;
+use crate::model::flight::FlightState;
+use crate::model::modes::time_scales_rad_per_s;
 use crate::ode::WorkCounters;
-pub use cause::TransitionCause;
+use event_loop::{ContactRules, EventLoop, ObserverWatcher};
+use fixed_step_scheme::FixedStepScheme;
 use impact::TipVelocity;
-use machine::{ContactRules, EventLoop, ObserverWatcher};
 use mode::TipMode;
 pub use motion::RunMotion;
-use paper::FixedStepScheme;
 use phases::DrivenBlade;
-pub use piece::{BladePoints, ModelSample, SegmentPath, SolutionSegment};
 use scene::{MOST_EVALUATIONS, Scene, StartKind};
 use serde::Serialize;
+pub use solution_segment::{BladePoints, ModelSample, SegmentPath, SolutionSegment};
 use std::ops::ControlFlow;
 
 /// How a run ended.
@@ -268,5 +268,42 @@ fn initial_pose(scene: &Scene) -> Option<Pose> {
             &scene.linkage,
             scene.drive.motion_at(scene.start_s).velocity_m_per_s,
         ),
+    }
+}
+
+// Why a mode of contact gives way to another.
+
+/// Why contact changes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum TransitionCause {
+    /// The tip comes to rest and sticks.
+    TipStops,
+    /// The holding force reaches the static limit.
+    FrictionLimit,
+    /// The tip's velocity changes sign and nothing holds it at rest.
+    DirectReversal,
+    /// The shoulder's damping makes the holding force jump as the neck meets it.
+    ShoulderCorner,
+    /// The normal force reaches zero.
+    LiftOff,
+    /// An impact from flight; a rebound is one from flight to flight.
+    Landing,
+    /// The impact without collision that resolves the Painlevé paradox.
+    JamImpact,
+}
+
+impl TransitionCause {
+    /// The name used in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::TipStops => "tip-stops",
+            Self::FrictionLimit => "friction-limit",
+            Self::DirectReversal => "direct-reversal",
+            Self::ShoulderCorner => "shoulder-corner",
+            Self::LiftOff => "lift-off",
+            Self::Landing => "landing",
+            Self::JamImpact => "jam-impact",
+        }
     }
 }

@@ -12,60 +12,51 @@
 //! zeros and transformed. Amplitudes are scaled by the weights present, `2 |sum w x exp(-i w t)| / sum w`: a
 //! sine of amplitude A reads A at its peak.
 
-mod amplitudes;
+mod amplitude_spectrum;
 mod analysis;
-mod check;
-mod closely;
+mod chirp_alternatives;
+mod classification;
 mod component;
-mod cramer_rao;
-mod drifting;
+mod decimation;
 mod error;
-mod flip;
-mod gaps;
-mod judge;
+mod frequency_drift;
+mod gap_filling;
+mod gap_refinement;
 mod least_squares;
-mod left_over;
-mod limits;
 mod matrix_pencil;
+mod model_selection;
 mod multitaper;
-mod oscillations;
-mod pair;
-mod parabola;
+mod peak_zoom;
 mod peaks;
 mod periodogram;
-mod refine;
-mod regular;
 mod relations;
+mod residual_significance;
+mod ring_downs;
+mod second_pass;
 mod settings;
-mod shapes;
-mod sharp;
+mod step_detection;
 mod target;
 pub mod time_frequency;
 mod transform;
-mod transformed;
-mod transient;
 mod trend;
-mod verdict;
-mod window;
-mod windowed;
 
-pub use amplitudes::Spectrum;
+pub use amplitude_spectrum::Spectrum;
 pub use analysis::{LONGEST_DECOMPOSED, Oscillation, RemovedTrend, SampledRecord, SpectralAnalysis};
 pub use component::{Component, Estimator};
 pub use error::SpectrumError;
 
-pub use limits::{FASTEST_HZ, MAX_COMPONENTS, MIN_SAMPLES};
+pub use settings::{FASTEST_HZ, MAX_COMPONENTS, MIN_SAMPLES};
 
 pub use multitaper::{Multitaper, MultitaperError, TAPERS};
 
+pub use amplitude_spectrum::WindowedTransform;
 pub use settings::SpectrumSettings;
 pub use target::Target;
-pub use transformed::WindowedTransform;
 
-pub use trend::{Detrend, UnknownDetrend};
-pub use verdict::{
+pub use component::{
     AliasSource, ComponentReason, ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic,
 };
+pub use trend::{Detrend, UnknownDetrend};
 
 /// Spectrum of a record of displacement, m, one sample a frame (`None` where there is none).
 ///

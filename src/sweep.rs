@@ -11,20 +11,18 @@ pub mod journal;
 pub mod outputs;
 pub mod point;
 pub mod rank_correlation;
-mod recheck;
-pub mod sample;
 pub mod study;
 
 pub use crate::feature::MissingReason;
 pub use collect::{CollectError, PointCollection};
+pub use grid::SamplePlan;
 pub use grid::{AxisSpacing, SweepAxis};
+pub use journal::PointRecheck;
 pub use point::{EarlyEnd, PointOutcome};
 pub use rank_correlation::RankCorrelations;
-pub use recheck::PointRecheck;
-pub use sample::SamplePlan;
 pub use study::{SHEET_NAME, Study, StudyError, SweepMap};
 
-use crate::journal::{CheckpointSink, Shard, format_record_line};
+use crate::checkpoint::{CheckpointSink, Shard, format_record_line};
 use crate::simulate::scene::Scene;
 use journal::SweepPoint;
 use rayon::prelude::*;

@@ -4,18 +4,16 @@
 //! A value with its standard deviation is always written `78.40(3)`: 78.40 with a standard deviation of 0.03,
 //! which stands in units of the last digit shown (JCGM 100:2008, 7.2.2).
 
-mod deviation;
 mod hash;
 mod number;
 mod phrase;
-mod printable;
 mod unit;
 
-pub use deviation::format_with_sd;
 pub use hash::{TextHash, sha256, text_sha256};
+pub use number::format_with_sd;
 pub use number::{format_digits, format_number, format_plain, format_short, round_to_digits, to_ascii};
+pub use phrase::{escape_controls, make_printable};
 pub use phrase::{format_interval, join_with_and, pluralise, wrap_words};
-pub use printable::{escape_controls, make_printable};
 pub use unit::format_degrees;
 
 pub(crate) use number::{format_decimals, format_or_dash, format_scientific, format_trimmed, to_superscript};

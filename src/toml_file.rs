@@ -1,11 +1,11 @@
 //! TOML that people write, read into typed values; every refusal names file, line, column, key and the
 //! nearest known key, and all problems of a file are named at once.
 
-mod check;
 mod hint;
-mod reference;
+mod key_reference;
+mod schema_check;
 
-pub use reference::{KeyEntry, KeyTable, list_key_tables};
+pub use key_reference::{KeyEntry, KeyTable, list_key_tables};
 
 use crate::text::escape_controls;
 use schemars::{JsonSchema, Schema, json_schema, schema_for};
@@ -66,7 +66,7 @@ pub const FORMAT: u32 = 1;
 /// # Errors
 /// [`TomlError`] with the places of all problems that the schema of `T` shows, or else of the first one.
 pub fn parse_toml<T: DeserializeOwned + JsonSchema>(file: &str, text: &str) -> Result<T, TomlError> {
-    let mut problems = check::find_problems(file, text, schema_for!(T).as_value());
+    let mut problems = schema_check::find_problems(file, text, schema_for!(T).as_value());
     match problems.len() {
         0 => toml::from_str(text).map_err(|error| error_from_toml(file, text, &error)),
         1 => Err(problems.remove(0)),

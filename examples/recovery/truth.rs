@@ -8,7 +8,7 @@ use wiperlab::fit::model::{Draw, Model};
 use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
 use wiperlab::recording::Recording;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::twin::Camera;
+use wiperlab::simulate::twin::Camera;
 
 /// Ranges of the truths, in the order of the job's parameters; drawn evenly in the logarithm.
 const RANGES: [(f64, f64); 5] = [(0.07, 0.2), (2.5, 9.0), (0.2, 0.4), (0.0013, 0.0027), (0.018, 0.055)];

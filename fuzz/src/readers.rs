@@ -1,18 +1,18 @@
 //! What must hold of every file that the program reads besides tracking exports: it is refused with a
 //! message, or what was read can be used, and written and read back it is the same.
 
-use wiperlab::fit::job::Job;
-use wiperlab::fit::journal::EvaluationRecord;
-use wiperlab::fit::result::FitResult;
-use wiperlab::journal::{
+use wiperlab::checkpoint::{
     CheckpointFile, CheckpointRecord, append_checksum, format_header_line, format_record_line,
     read_checkpoint,
 };
+use wiperlab::fit::feature_checkpoint::EvaluationRecord;
+use wiperlab::fit::job::Job;
+use wiperlab::fit::result::FitResult;
 use wiperlab::recording::files::{RecordingFile, read_recording, trace_csv};
 use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::twin::spec::TwinSpec;
 use wiperlab::sweep::Study;
 use wiperlab::sweep::journal::SweepPoint;
-use wiperlab::twin::spec::TwinSpec;
 
 /// A reader, and the committed files, from the root of the project, from which its inputs grow.
 pub struct Reader {

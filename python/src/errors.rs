@@ -3,7 +3,7 @@
 use pyo3::PyErr;
 use pyo3::prelude::*;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use wiperlab::program::read::Failure;
+use wiperlab::cli::read::Failure;
 
 /// An exception of `wiperlab.errors`.
 fn new_exception(py: Python<'_>, class: &str, message: String) -> PyErr {

@@ -6,8 +6,8 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::prelude::*;
 use std::path::PathBuf;
 use std::sync::Arc;
+use wiperlab::cli::read;
 use wiperlab::fit::posterior::Posterior;
-use wiperlab::program::read;
 
 /// A job with its scenes and recordings.
 #[pyclass(module = "wiperlab", frozen, subclass, name = "Job")]

@@ -17,8 +17,8 @@ use std::path::PathBuf;
 #[pyo3(signature = (arguments, path = None))]
 fn run_program(py: Python<'_>, arguments: Vec<OsString>, path: Option<PathBuf>) -> u8 {
     py.detach(|| match path {
-        Some(path) => wiperlab::program::run_embedded(path, arguments),
-        None => wiperlab::program::run(arguments),
+        Some(path) => wiperlab::cli::run_embedded(path, arguments),
+        None => wiperlab::cli::run(arguments),
     })
 }
 

@@ -7,7 +7,8 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 use std::sync::Arc;
-use wiperlab::program::read::{self, SpectrumOptions};
+use wiperlab::cli::read;
+use wiperlab::cli::read::SpectrumOptions;
 use wiperlab::recording::{self, FrameGrid, Traces};
 
 /// Tracked positions of tip and head on the frame grid.

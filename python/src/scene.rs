@@ -9,7 +9,7 @@ use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use wiperlab::program::read;
+use wiperlab::cli::read;
 use wiperlab::simulate::outputs::{
     EnergyAudit, SampleObserver, SimulationSummary, Transitions, recorded_points_m, sample_times,
 };

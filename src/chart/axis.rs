@@ -1,6 +1,6 @@
 //! Axes: ranges, the map from values to the canvas, ticks and their labels.
 
-use super::sizes::{TICK_MM, UNITS_PER_MM};
+use super::style::{TICK_MM, UNITS_PER_MM};
 use crate::math;
 use crate::text::{self, format_scientific, to_superscript};
 

@@ -1,10 +1,10 @@
 //! Lines, rectangles, polygons, circles and text on a canvas in whole units, with the shapes and letterings
 //! of plotters.
 
-use super::colours::{BLACK, Rgb};
 use super::compact_svg::CompactSvg;
 use super::path::{CanvasArea, CanvasPoint};
-use super::sizes::UNITS_PER_MM;
+use super::style::UNITS_PER_MM;
+use super::style::{BLACK, Rgb};
 use crate::text::make_printable;
 use plotters::prelude::{DrawingBackend, IntoFont, RGBColor};
 use plotters::style::text_anchor::{HPos, Pos, VPos};

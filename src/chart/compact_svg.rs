@@ -1,8 +1,8 @@
 //! A back end of plotters that writes SVG in few bytes: neighbouring lines, rectangles or dots of one look
 //! become one path. plotters' own writes an element for each.
 
-use super::colours::format_hex;
 use super::path::CanvasArea;
+use super::style::format_hex;
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
 use plotters::prelude::DrawingBackend;

@@ -2,11 +2,11 @@
 
 use super::axis::{AxisScale, CanvasAxis};
 use super::canvas::{Canvas, Lettering, TextAnchor};
-use super::colours::{readable_on, sample_colour_map};
-use super::heat::{HeatMap, colour_fraction};
+use super::heat_map::{HeatMap, colour_fraction};
 use super::layout::PanelLayout;
 use super::path::{self, CanvasArea, CanvasPoint};
-use super::sizes::{SMALL_MM, UNITS_PER_MM};
+use super::style::{SMALL_MM, UNITS_PER_MM};
+use super::style::{readable_on, sample_colour_map};
 use super::text::text_width;
 use crate::math;
 use std::collections::BTreeMap;

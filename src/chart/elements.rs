@@ -1,7 +1,7 @@
 //! What a figure is made of: a panel with its axes, and what is drawn in it.
 
 use super::axis::ChartAxis;
-use super::heat::HeatMap;
+use super::heat_map::HeatMap;
 use super::style::{Colour, Mark};
 
 /// Points with one style and one entry in the legend.

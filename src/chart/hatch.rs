@@ -1,11 +1,11 @@
 //! Hatched cells: where a map has no value, with a pattern that says why, so that no colour has to.
 
 use super::canvas::Canvas;
-use super::colours::{FRAME, NO_VALUE, Rgb};
 use super::elements::{Hatch, HatchPattern};
 use super::layout::PanelLayout;
 use super::path::{self, CanvasArea, CanvasPoint};
-use super::sizes::UNITS_PER_MM;
+use super::style::UNITS_PER_MM;
+use super::style::{FRAME, NO_VALUE, Rgb};
 
 const HATCH_GREY: Rgb = (0x66, 0x66, 0x66);
 /// Distance of the lines, canvas units; doubled until there are no more than [`MOST_STROKES`], so that a

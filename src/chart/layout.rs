@@ -1,30 +1,19 @@
 //! Where everything of a figure stands: heading, legend, panels and the labels over them. Lengths in mm until
 //! the panels.
 
-mod columns;
 mod labels;
-mod legend;
-mod line_breaks;
-mod placed;
-mod ranges;
-mod ticks;
+mod panel_layout;
 
-pub(super) use columns::PanelColumns;
-pub(super) use labels::{label_span, shorten_to_panel};
-pub(super) use legend::{LegendEntry, legend_text};
-pub(super) use line_breaks::{subtitle_lines, title_lines, y_label_lines};
-pub(super) use placed::PanelLayout;
-pub(super) use ticks::{SMALL_LINE_MM, widest_label_mm};
-
-use super::axis::CanvasAxis;
-use super::elements::Panel;
+use super::axis::{AxisScale, CanvasAxis};
+use super::elements::{ErrorBar, Panel};
 use super::figure::Figure;
-use super::sizes::{LINE_MM, SMALL_MM};
-use labels::assign_label_rows;
-use legend::place_legend;
-use line_breaks::PANEL_GAP_MM;
-use ranges::x_ranges;
-use ticks::MOST_NAMES;
+use super::style::{EDGE_MM, LINE_MM, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS_PER_MM};
+use super::text::{WIDE_BOLD_LETTER, WIDE_LETTER, wrap_lines};
+use super::{axis, heat_map};
+pub(super) use labels::{LegendEntry, label_span, legend_text, shorten_to_panel};
+use labels::{assign_label_rows, place_legend};
+use panel_layout::{HALF_LABEL_MM, MOST_NAMES, y_axis_ticks};
+pub(super) use panel_layout::{PanelLayout, SMALL_LINE_MM, widest_label_mm};
 
 /// Height of a row of labels over a panel, mm.
 const LABEL_ROW_MM: f64 = SMALL_MM + 0.6;
@@ -76,5 +65,243 @@ impl<'a> FigureLayout<'a> {
             top += under + PANEL_GAP_MM;
         }
         Self { height: top.max(LINE_MM), legend, panels }
+    }
+}
+
+// Panels so low that a figure fits on a page.
+
+/// Height below which axes are not shrunk, mm: two labelled ticks, at the least distance of such ticks, with
+/// as much again beyond either.
+const MIN_AXES_HEIGHT_MM: f64 = 16.0;
+/// The same for each of the names along a y axis, mm: a line of letters and the gap to the next.
+const MIN_CATEGORY_HEIGHT_MM: f64 = 3.0;
+/// Rounds after which nothing moves any more: in lower panels labels take more lines, and those take room.
+const MAX_HEIGHT_ROUNDS: usize = 4;
+
+/// The figure with its panels lowered, all by the same share of what they can spare, until it is no higher
+/// than that, mm. Letters keep their size, so that a figure of very many panels or words stays higher.
+pub(super) fn limit_height(mut figure: Figure, most_mm: f64) -> Figure {
+    for _ in 0..MAX_HEIGHT_ROUNDS {
+        let over_mm = FigureLayout::new(&figure).height - most_mm;
+        let rows = figure.panels.chunks(PanelColumns::new(&figure).count);
+        let spare: f64 = rows.map(|row| row.iter().map(spare_height_mm).fold(0.0, f64::max)).sum();
+        if over_mm <= 0.0 || spare <= 0.0 {
+            break;
+        }
+        let share = (over_mm / spare).min(1.0);
+        figure.panels.iter_mut().for_each(|panel| panel.height_mm -= share * spare_height_mm(panel));
+    }
+    figure
+}
+
+/// By how much a panel can be lowered, mm.
+fn spare_height_mm(panel: &Panel) -> f64 {
+    let least_mm = MIN_AXES_HEIGHT_MM.max(panel.y.categories.len() as f64 * MIN_CATEGORY_HEIGHT_MM);
+    (panel.height_mm - least_mm).max(0.0)
+}
+
+// Panels side by side, and the room that each leaves next to its axes.
+
+/// Least width of the axes of a panel with neighbours at its side, and of one without axes, mm.
+const MIN_PANEL_WIDTH_MM: f64 = 30.0;
+const MIN_BARE_WIDTH_MM: f64 = 18.0;
+
+/// How many panels stand side by side, and the room that each leaves next to its axes.
+pub(in crate::chart) struct PanelColumns {
+    pub count: usize,
+    /// Room on the left and on the right of the axes of a column, mm.
+    margins: Vec<(f64, f64)>,
+}
+
+impl PanelColumns {
+    /// As many as the figure asks for and its width has room for.
+    pub fn new(figure: &Figure) -> Self {
+        let most = figure.columns.clamp(1, figure.panels.len().max(1));
+        let least =
+            if figure.panels.iter().all(|panel| panel.bare) { MIN_BARE_WIDTH_MM } else { MIN_PANEL_WIDTH_MM };
+        let fits =
+            |columns: &Self| (0..columns.count).all(|column| columns.width_mm(figure, column) >= least);
+        (1..=most)
+            .rev()
+            .map(|count| Self::with_count(figure, count))
+            .find(fits)
+            .unwrap_or_else(|| Self::with_count(figure, 1))
+    }
+
+    fn with_count(figure: &Figure, count: usize) -> Self {
+        let each_mm = figure.width_mm / count as f64;
+        let margins = |column: usize| {
+            let panels = || figure.panels.iter().skip(column).step_by(count);
+            (
+                panels().map(|p| left_margin(p, each_mm)).fold(0.0, f64::max),
+                panels().map(right_margin).fold(0.0, f64::max),
+            )
+        };
+        Self { count, margins: (0..count).map(margins).collect() }
+    }
+
+    fn width_mm(&self, figure: &Figure, column: usize) -> f64 {
+        let (left, right) = self.margins[column];
+        figure.width_mm / self.count as f64 - left - right
+    }
+
+    /// The x axis of a panel in a column.
+    pub fn x_axis(
+        &self,
+        figure: &Figure,
+        column: usize,
+        scale: AxisScale,
+        (low, high): (f64, f64),
+    ) -> CanvasAxis {
+        let left = figure.width_mm * column as f64 / self.count as f64 + self.margins[column].0;
+        CanvasAxis {
+            scale,
+            low,
+            high,
+            from: (left * UNITS_PER_MM).round(),
+            to: ((left + self.width_mm(figure, column)) * UNITS_PER_MM).round(),
+        }
+    }
+}
+
+/// Room for the widest label of a y axis and its title, mm.
+fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
+    if panel.bare {
+        return EDGE_MM / 2.0;
+    }
+    let (low, high) = axis::axis_limits(&panel.y, visible_y_values(panel, f64::NEG_INFINITY, f64::INFINITY));
+    let y = CanvasAxis { scale: panel.y.scale, low, high, from: 0.0, to: panel.height_mm * UNITS_PER_MM };
+    widest_label_mm(&y_axis_ticks(panel, &y, MOST_NAMES * column_mm))
+        + TICK_MM
+        + y_label_lines(panel).len() as f64 * LINE_MM
+        + EDGE_MM
+        + 1.0
+}
+
+/// Room on the right of a panel, mm: for the half of the last label of its x axis, or for the colour bar of a
+/// heat map.
+fn right_margin(panel: &Panel) -> f64 {
+    if panel.bare {
+        return EDGE_MM / 2.0;
+    }
+    EDGE_MM
+        + panel
+            .heat_map
+            .as_ref()
+            .map_or(0.0, |heat| heat_map::colour_bar_width_mm(heat, panel.height_mm))
+            .max(HALF_LABEL_MM)
+}
+
+// Headings and labels in lines that fit.
+
+/// Room between panels one below the other, mm.
+pub(super) const PANEL_GAP_MM: f64 = 2.5;
+
+/// The heading in lines that fit the figure; none for none.
+pub(in crate::chart) fn title_lines(figure: &Figure) -> Vec<String> {
+    if figure.title.is_empty() {
+        Vec::new()
+    } else {
+        wrap_lines(&figure.title, WIDE_BOLD_LETTER * TITLE_MM, figure.width_mm - 2.0 * EDGE_MM)
+    }
+}
+
+/// The line under the heading in lines that fit; none for none.
+pub(in crate::chart) fn subtitle_lines(figure: &Figure) -> Vec<String> {
+    if figure.subtitle.is_empty() {
+        Vec::new()
+    } else {
+        wrap_lines(&figure.subtitle, WIDE_LETTER * TEXT_MM, figure.width_mm - 2.0 * EDGE_MM)
+    }
+}
+
+/// The label of a y axis in lines that fit next to it.
+pub(in crate::chart) fn y_label_lines(panel: &Panel) -> Vec<String> {
+    if panel.y.label.is_empty() {
+        Vec::new()
+    } else {
+        wrap_lines(&panel.y.label, WIDE_LETTER * TEXT_MM, panel.height_mm + PANEL_GAP_MM)
+    }
+}
+
+// What of the data decides the ends of axes.
+
+/// Values of y within the ends of x.
+pub(super) fn visible_y_values(panel: &Panel, low: f64, high: f64) -> impl Iterator<Item = f64> {
+    let points = panel.series.iter().flat_map(|s| s.points.iter().flatten());
+    let bars = panel.series.iter().flat_map(|s| &s.error_bars).flat_map(|bar| match bar {
+        ErrorBar::Vertical { x, from, to } => [(*x, *from), (*x, *to)],
+        ErrorBar::Horizontal { y, from, to } => [(*from, *y), (*to, *y)],
+    });
+    let ribbons = panel
+        .ribbons
+        .iter()
+        .flat_map(|r| r.points.iter().flatten())
+        .flat_map(|(x, low, high)| [(*x, *low), (*x, *high)]);
+    let all = points.copied().chain(bars).chain(ribbons);
+    all.filter(move |(x, _)| *x >= low && *x <= high)
+        .map(|(_, y)| y)
+        .chain(panel.heat_map.iter().flat_map(|h| h.y.iter().copied()))
+}
+
+/// Ends of the x axis of every panel, common to those one below the other that share it.
+pub(super) fn x_ranges(panels: &[Panel], columns: usize) -> Vec<(f64, f64)> {
+    let values = |p: &'_ Panel| {
+        let points = p.series.iter().flat_map(|s| s.points.iter().flatten().map(|(x, _)| *x));
+        let ribbons = p.ribbons.iter().flat_map(|r| r.points.iter().flatten().map(|(x, ..)| *x));
+        points.chain(ribbons).chain(p.heat_map.iter().flat_map(|h| h.x.iter().copied())).collect::<Vec<_>>()
+    };
+    let mut ranges = vec![(0.0, 1.0); panels.len()];
+    for column in 0..columns {
+        let own: Vec<usize> = (column..panels.len()).step_by(columns).collect();
+        for group in own.chunk_by(|a, b| panels[*a].x == panels[*b].x) {
+            let range =
+                axis::axis_limits(&panels[group[0]].x, group.iter().flat_map(|at| values(&panels[*at])));
+            group.iter().for_each(|at| ranges[*at] = range);
+        }
+    }
+    ranges
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::chart::{COLUMN_WIDTH_MM, ChartAxis};
+
+    fn figure(heights_mm: &[f64]) -> Figure {
+        let panel =
+            |height_mm: &f64| Panel { y: ChartAxis::linear("y"), height_mm: *height_mm, ..Panel::default() };
+        Figure {
+            width_mm: COLUMN_WIDTH_MM,
+            panels: heights_mm.iter().map(panel).collect(),
+            ..Figure::default()
+        }
+    }
+
+    fn lowered(figure: &Figure, most_mm: f64) -> Vec<f64> {
+        limit_height(figure.clone(), most_mm).panels.iter().map(|p| p.height_mm).collect()
+    }
+
+    #[test]
+    fn a_figure_that_fits_stays_as_it_is() {
+        let fits = figure(&[60.0, 40.0]);
+        assert_eq!(limit_height(fits.clone(), FigureLayout::new(&fits).height), fits);
+    }
+
+    #[test]
+    fn panels_give_what_they_can_spare_and_no_more() {
+        let high = figure(&[56.0, 56.0, 36.0, 13.0]);
+        // 40 + 40 + 20 + 0 mm to spare, of which a half goes
+        let most_mm = FigureLayout::new(&high).height - 50.0;
+        assert_eq!(lowered(&high, most_mm), [36.0, 36.0, 26.0, 13.0]);
+        assert_eq!(FigureLayout::new(&limit_height(high.clone(), most_mm)).height, most_mm);
+        assert_eq!(lowered(&high, 10.0), [MIN_AXES_HEIGHT_MM, MIN_AXES_HEIGHT_MM, MIN_AXES_HEIGHT_MM, 13.0]);
+    }
+
+    #[test]
+    fn rows_of_names_keep_room_for_their_letters() {
+        let mut high = figure(&[90.0]);
+        high.panels[0].y = ChartAxis::categorical("", (0..12).map(|i| i.to_string()));
+        assert_eq!(lowered(&high, 10.0), [12.0 * MIN_CATEGORY_HEIGHT_MM]);
     }
 }

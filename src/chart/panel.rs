@@ -1,21 +1,24 @@
 //! Heading, legend, and panels with their axes, on the canvas.
 
-use super::axis::{CanvasAxis, Tick};
+use super::axis::{AxisScale, CanvasAxis, Tick};
 use super::canvas::{Canvas, Lettering, TextAnchor};
-use super::colours::{FRAME, GRID, Rgb, readable_on};
-use super::elements::{Raster, ShadedSpan, TextAnnotation, VerticalLine};
+use super::elements::{Raster, SampledSeries, Series, ShadedSpan, TextAnnotation, VerticalLine};
 use super::figure::Figure;
 use super::layout::{
     FigureLayout, LegendEntry, PanelLayout, SMALL_LINE_MM, label_span, legend_text, shorten_to_panel,
     subtitle_lines, title_lines, widest_label_mm, y_label_lines,
 };
-use super::letters::LETTER_WIDTH;
-use super::path::CanvasArea;
+use super::path::{CanvasArea, CanvasPoint};
 use super::series::{draw_marks, draw_ribbon, draw_series};
-use super::sizes::{EDGE_MM, LINE_MM, SHADING_OPACITY, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM, UNITS_PER_MM};
-use super::style::Mark;
-use super::text::text_width;
-use super::{contours, hatch, heat, heat_bar, live};
+use super::style::{
+    EDGE_MM, FRAME, GRID, LINE_MM, Mark, Rgb, SHADING_OPACITY, SMALL_MM, TEXT_MM, TICK_MM, TITLE_MM,
+    UNITS_PER_MM, WHITE, readable_on,
+};
+use super::text::{WIDE_LETTER, text_width};
+use super::{contours, hatch, heat_map};
+use crate::text::make_printable;
+use html_escape::encode_safe;
+use std::fmt::Write;
 
 pub(super) fn draw_heading(canvas: &mut Canvas, figure: &Figure, layout: &FigureLayout) {
     let plain = Lettering::plain(TEXT_MM, TextAnchor::Left);
@@ -69,18 +72,17 @@ fn draw_outline(canvas: &mut Canvas, area: &CanvasArea, colour: Rgb) {
 
 /// A panel; a `live` one with groups that a page's script can move.
 pub(super) fn draw_panel(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
-    let plot = live::panel_attributes(placed).filter(|_| live);
+    let plot = panel_attributes(placed).filter(|_| live);
     let is_live = plot.is_some();
     canvas.draw_group(plot.as_deref(), |canvas| {
-        canvas
-            .draw_group(is_live.then_some(live::WITHIN_AXES_CLASS), |canvas| draw_under_axes(canvas, placed));
+        canvas.draw_group(is_live.then_some(WITHIN_AXES_CLASS), |canvas| draw_under_axes(canvas, placed));
         if !placed.panel.bare {
             draw_axes(canvas, placed, is_live);
         }
-        canvas.draw_group(is_live.then_some(live::WITHIN_AXES_CLASS), |canvas| {
+        canvas.draw_group(is_live.then_some(WITHIN_AXES_CLASS), |canvas| {
             draw_over_axes(canvas, placed, is_live)
         });
-        canvas.draw_group(is_live.then_some(live::OVER_AXES_CLASS), |canvas| draw_top_labels(canvas, placed));
+        canvas.draw_group(is_live.then_some(OVER_AXES_CLASS), |canvas| draw_top_labels(canvas, placed));
         draw_title(canvas, placed);
     });
 }
@@ -126,7 +128,7 @@ fn draw_over_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
     }
     draw_vertical_lines(canvas, placed);
     for (index, drawn) in panel.series.iter().enumerate() {
-        let group = live.then(|| live::series_attributes(index, drawn, placed));
+        let group = live.then(|| series_attributes(index, drawn, placed));
         canvas.draw_group(group.as_deref(), |canvas| draw_series(canvas, placed, drawn));
     }
     for band in panel.shaded_spans.iter().filter(|b| b.outlined) {
@@ -160,7 +162,7 @@ fn mean_heat_colour(placed: &PanelLayout, text: &TextAnnotation, middle: f64) ->
     let step = COVERED * text_width(&text.text, SMALL_MM) / 2.0 * UNITS_PER_MM / f64::from(PLACES);
     let at = |k: i32| (placed.x.value_at(middle + f64::from(k) * step), text.at.1);
     let found: Vec<Rgb> = (-PLACES..=PLACES)
-        .filter_map(|k| heat::colour_at(heat, (placed.x.scale, placed.y.scale), at(k)))
+        .filter_map(|k| heat_map::colour_at(heat, (placed.x.scale, placed.y.scale), at(k)))
         .collect();
     let mean = |part: fn(&Rgb) -> u8| {
         let sum: u32 = found.iter().map(|colour| u32::from(part(colour))).sum();
@@ -234,7 +236,7 @@ fn draw_title(canvas: &mut Canvas, placed: &PanelLayout) {
 fn draw_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
     let (area, panel) = (&placed.area, placed.panel);
     let grid = panel.heat_map.is_none();
-    canvas.draw_group(live.then_some(live::TICKS_CLASS), |canvas| {
+    canvas.draw_group(live.then_some(TICKS_CLASS), |canvas| {
         for tick in placed.x_ticks() {
             draw_x_tick(canvas, placed, &tick, grid && panel.x.categories.is_empty());
         }
@@ -254,7 +256,7 @@ fn draw_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
         );
     }
     if let Some(heat) = panel.heat_map.as_ref().filter(|heat| !heat.without_bar) {
-        heat_bar::draw_colour_bar(canvas, heat, area);
+        heat_map::draw_colour_bar(canvas, heat, area);
     }
 }
 
@@ -305,5 +307,226 @@ fn draw_y_tick(canvas: &mut Canvas, placed: &PanelLayout, tick: &Tick, grid: boo
         }
         Some(Err(label)) => canvas.draw_text(label, (x, y), Lettering::plain(TEXT_MM, TextAnchor::Right)),
         None => {}
+    }
+}
+
+// Letters of panels, and what print says inside the axes.
+
+/// What print says of data that no camera took; the rest belongs in the caption.
+const WATERMARK: &str = "synthetic";
+/// Its grey, with a contrast of 5.7 to 1 on white.
+const WATERMARK_GREY: Rgb = (0x66, 0x66, 0x66);
+/// Distance of a letter from the axes under it, and of the word from the frame, mm.
+const LETTER_GAP_MM: f64 = 0.6;
+const WATERMARK_INSET_MM: f64 = 0.8;
+
+/// Width that the letter of a drawing without axes takes before its title, canvas units.
+pub(super) const LETTER_WIDTH: f64 = 4.4 * UNITS_PER_MM;
+
+/// The letters of all panels, each over the upper left corner of its panel with its labels.
+pub(super) fn draw_panel_letters(canvas: &mut Canvas, panels: &[PanelLayout]) {
+    let look = Lettering { bold: true, ..Lettering::plain(SMALL_MM, TextAnchor::Left) };
+    for placed in panels {
+        let Some(letter) = placed.letter else { continue };
+        let edge_mm = if placed.panel.bare { EDGE_MM / 2.0 } else { EDGE_MM };
+        let at = (
+            ((placed.column_mm + edge_mm) * UNITS_PER_MM).round(),
+            placed.area.top - (LETTER_GAP_MM + SMALL_MM / 2.0) * UNITS_PER_MM,
+        );
+        canvas.draw_text(&format!("({letter})"), at, look);
+    }
+}
+
+/// The word in the corner of a panel over which the fewest lines run.
+pub(super) fn draw_watermark(canvas: &mut Canvas, placed: &PanelLayout) {
+    let width = text_width(WATERMARK, SMALL_MM) * WIDE_LETTER / super::text::LETTER * UNITS_PER_MM;
+    let (height, inside) = (SMALL_MM * 1.2 * UNITS_PER_MM, WATERMARK_INSET_MM * UNITS_PER_MM);
+    let area = &placed.area;
+    let corner = |right: bool, bottom: bool| {
+        let left = if right { area.right - inside - width } else { area.left + inside };
+        let top = if bottom { area.bottom - inside - height } else { area.top + inside };
+        CanvasArea { left, top, right: left + width, bottom: top + height }
+    };
+    let corners = [(true, false), (false, false), (true, true), (false, true)].map(|(r, b)| corner(r, b));
+    // over the axes where every corner is a cell with its number
+    let over = CanvasArea { top: area.top - inside - height, bottom: area.top - inside, ..corners[0] };
+    let full = |corner: &CanvasArea| count_texts_in(placed, corner) > 0;
+    let free =
+        corners.iter().filter(|corner| !full(corner)).min_by_key(|corner| count_lines_in(placed, corner));
+    let free = free.unwrap_or(&over);
+    let at = ((free.left + free.right) / 2.0, (free.top + free.bottom) / 2.0);
+    let value = (placed.x.value_at(at.0), placed.y.value_at(at.1));
+    let scales = (placed.x.scale, placed.y.scale);
+    let heat = placed.panel.heat_map.as_ref().filter(|_| area.contains(at));
+    let map = heat.and_then(|heat| heat_map::colour_at(heat, scales, value));
+    if map.is_none() {
+        canvas.fill_rectangle(free, WHITE, 0.8);
+    }
+    let ink = map.map_or(WATERMARK_GREY, readable_on);
+    canvas.draw_coloured_text(WATERMARK, at, Lettering::plain(SMALL_MM, TextAnchor::Centre), ink);
+}
+
+/// Canvas coordinates of a point of a panel.
+fn canvas_point(placed: &PanelLayout, (x, y): (f64, f64)) -> Option<CanvasPoint> {
+    Some((placed.x.canvas_position(x)?, placed.y.canvas_position(y)?))
+}
+
+/// How many texts of a panel reach into an area.
+fn count_texts_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
+    let reaches = |text: &TextAnnotation| {
+        let Some((x, y)) = canvas_point(placed, text.at) else { return false };
+        let (wide, high) =
+            (text_width(&text.text, SMALL_MM) / 2.0 * UNITS_PER_MM, SMALL_MM / 2.0 * UNITS_PER_MM);
+        x + wide > area.left && x - wide < area.right && y + high > area.top && y - high < area.bottom
+    };
+    placed.panel.annotations.iter().filter(|text| reaches(text)).count()
+}
+
+/// How many pieces of lines and symbols of a panel lie in an area.
+fn count_lines_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
+    let of_series = placed.panel.series.iter().map(|series| {
+        let points: Vec<Option<CanvasPoint>> =
+            series.points.iter().map(|p| p.and_then(|p| canvas_point(placed, p))).collect();
+        let inside = points.iter().flatten().filter(|p| area.contains(**p)).count();
+        let between = points.windows(2).filter(|pair| {
+            let [Some(a), Some(b)] = pair else { return false };
+            !series.mark.is_symbol() && area.clip(*a, *b).is_some()
+        });
+        inside + between.count()
+    });
+    of_series.sum()
+}
+
+// What the script of a page has to know of a panel over time: where its axes are, and what belongs to what.
+
+/// What lies inside the axes and moves with their ends.
+pub(super) const WITHIN_AXES_CLASS: &str = "class=\"within\"";
+/// The ticks of the axis of time.
+pub(super) const TICKS_CLASS: &str = "class=\"ticks\"";
+/// What stands over the axes at an instant, and does not move.
+pub(super) const OVER_AXES_CLASS: &str = "class=\"over\"";
+
+/// Attributes of the group of a panel over time: the edges of its axes on the canvas, their ends, and the
+/// name of the other quantity; `None` for any other panel.
+pub(super) fn panel_attributes(placed: &PanelLayout) -> Option<String> {
+    let (panel, area, x, y) = (placed.panel, &placed.area, &placed.x, &placed.y);
+    let timed =
+        panel.x.is_time() && !panel.bare && [x.low, x.high, y.low, y.high].iter().all(|end| end.is_finite());
+    let scale = if y.scale == AxisScale::Log { "log" } else { "linear" };
+    timed.then(|| {
+        format!(
+            "class=\"plot\" data-area=\"{} {} {} {}\" data-x=\"{} {}\" data-y=\"{} {} {scale}\" \
+             data-label=\"{}\"{}",
+            area.left,
+            area.top,
+            area.right,
+            area.bottom,
+            x.low,
+            x.high,
+            y.low,
+            y.high,
+            encode_safe(&make_printable(&panel.y.label)),
+            if panel.heat_map.is_some() { " data-heat=\"1\"" } else { "" },
+        )
+    })
+}
+
+/// Attributes of the group of a series, with all of its values where it has more than are drawn.
+pub(super) fn series_attributes(index: usize, series: &Series, placed: &PanelLayout) -> String {
+    let label = encode_safe(&make_printable(&series.label)).into_owned();
+    let detail = placed.panel.sampled_series.get(index).and_then(Option::as_ref);
+    let detail = detail.map_or_else(String::new, |detail| sample_attributes(detail, placed));
+    format!("class=\"series\" data-label=\"{label}\"{detail}")
+}
+
+/// Steps of a value between the ends of an axis: an enlarged curve is as fine as a screen.
+const VALUE_STEPS: f64 = 1e4;
+
+/// Start, step, the value of zero and of one; then every value as a difference to the one before, a dash for
+/// a missing one.
+fn sample_attributes(detail: &SampledSeries, placed: &PanelLayout) -> String {
+    let (low, one) = (placed.y.low, (placed.y.high - placed.y.low) / VALUE_STEPS);
+    let mut before = 0_i64;
+    let mut values = String::new();
+    for value in &detail.values {
+        match value {
+            Some(value) => {
+                let now = ((value - low) / one).round() as i64;
+                let _ = write!(values, "{} ", now - before); // (a string takes everything)
+                before = now;
+            }
+            None => values.push_str("- "),
+        }
+    }
+    format!(
+        " data-grid=\"{} {} {low} {one}\" data-values=\"{}\"",
+        detail.start,
+        detail.step,
+        values.trim_end()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::chart::{ChartAxis, Figure, Medium, Panel, Series, TextAnnotation};
+
+    /// Place of a text in a figure, canvas units.
+    fn found(svg: &str, text: &str) -> Option<(f64, f64)> {
+        let before =
+            svg.split(&format!(">\n{text}\n</text>")).next().filter(|part| part.len() < svg.len())?;
+        let element = before.rsplit_once("<text ")?.1;
+        let number = |key: &str| element.split_once(key)?.1.split('"').next()?.parse().ok();
+        Some((number("x=\"")?, number(" y=\"")?))
+    }
+
+    fn panel() -> Panel {
+        let axis = || ChartAxis::linear("q").with_range(0.0, 1.0);
+        Panel { x: axis(), y: axis(), height_mm: 30.0, ..Panel::default() }
+    }
+
+    fn figure(panels: Vec<Panel>, synthetic: bool) -> Figure {
+        Figure {
+            width_mm: 170.0,
+            panels,
+            watermarked: synthetic,
+            title: "claim".to_owned(),
+            ..Figure::default()
+        }
+    }
+
+    #[test]
+    fn one_panel_has_no_letter_and_several_have_theirs_from_above() {
+        let alone = figure(vec![panel()], false).to_svg(Medium::Screen);
+        assert_eq!(found(&alone, "(a)"), None);
+        let both = figure(vec![panel(), panel()], false).to_svg(Medium::Column);
+        let [a, b] = ["(a)", "(b)"].map(|letter| found(&both, letter).unwrap());
+        assert!(a.0 == b.0 && a.1 < b.1, "{a:?} {b:?}");
+        let many = figure(vec![panel(); 27], false).to_svg(Medium::Screen);
+        assert_eq!(found(&many, "(a)"), None);
+    }
+
+    #[test]
+    fn print_marks_synthetic_data_where_no_line_runs() {
+        let mut falling = panel();
+        falling.series =
+            vec![Series { points: vec![Some((0.5, 1.0)), Some((1.0, 0.9))], ..Series::default() }];
+        let drawn = figure(vec![falling], true);
+        assert_eq!(found(&drawn.to_svg(Medium::Screen), "synthetic"), None);
+        let (x, _) = found(&drawn.to_svg(Medium::Column), "synthetic").unwrap();
+        assert!(x < 85.0 * 15.0 / 2.0, "on the left: {x}");
+        assert_eq!(found(&figure(vec![panel()], false).to_svg(Medium::Column), "synthetic"), None);
+    }
+
+    #[test]
+    fn the_mark_leaves_the_axes_where_all_corners_have_numbers() {
+        let mut table = panel();
+        let corners = [(0.05, 0.05), (0.95, 0.05), (0.05, 0.95), (0.95, 0.95)];
+        table.annotations = corners
+            .map(|at| TextAnnotation { text: "-0.27".to_owned(), at, ..TextAnnotation::default() })
+            .to_vec();
+        table.title = "t".to_owned();
+        let svg = figure(vec![table], true).to_svg(Medium::Column);
+        let [mark, number] = ["synthetic", "-0.27"].map(|text| found(&svg, text).unwrap());
+        assert!(mark.1 < number.1 - 30.0, "{mark:?} {number:?}");
     }
 }

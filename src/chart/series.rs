@@ -1,12 +1,12 @@
 //! Lines, symbols, error bars and ribbons of a panel, on the canvas.
 
 use super::canvas::Canvas;
-use super::colours::{Rgb, WHITE};
 use super::elements::{ErrorBar, Ribbon, Series};
 use super::layout::PanelLayout;
 use super::path::{self, CanvasArea, CanvasPoint};
-use super::sizes::{SHADING_OPACITY, UNITS_PER_MM};
 use super::style::{Colour, Mark, MarkerShape};
+use super::style::{Rgb, WHITE};
+use super::style::{SHADING_OPACITY, UNITS_PER_MM};
 use crate::math;
 
 /// Width of a column in which a line keeps four points, canvas units: one pixel.

@@ -1,7 +1,7 @@
 //! Text: how wide it is, about, and how it is broken or cut to fit. Widths can only be estimated, as the
 //! reader's fonts are not known here.
 
-use super::sizes::{SMALL_MM, TEXT_MM};
+use super::style::{SMALL_MM, TEXT_MM};
 use crate::text::make_printable;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 

@@ -1,13 +1,16 @@
 //! The model at the estimates: each condition's scene, run once.
 
-use crate::fit::failure::RunFailure;
+use crate::fit::evaluation::RunFailure;
 use crate::fit::job::Job;
 use crate::fit::result::FitResult;
 use crate::fit::scene_model::SceneModel;
+use crate::simulate::mode::TipMode;
 use crate::simulate::motion::{MotionRecorder, RunMotion};
 use crate::simulate::scene::Scene;
-use crate::twin::TwinView;
+use crate::simulate::twin::TwinView;
+use crate::simulate::{RunStatus, Transition, TransitionCause};
 use rayon::prelude::*;
+use serde::{Serialize, Serializer};
 
 /// The model at the estimates in one condition of the job.
 #[derive(Debug, Clone)]
@@ -38,4 +41,140 @@ pub fn run_conditions(
         Ok(ModelRun { motion: recorder.into_motion(&scene, view.run), scene, view })
     };
     (0..job.conditions.len()).into_par_iter().map(at).collect()
+}
+
+// The best model's run in a condition: how it ended and which hard events it had.
+
+/// The best model's run in a condition, with its hard events.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct RunSummary {
+    /// Name of the condition.
+    pub name: String,
+    /// How it ended; written as `status` and, in a sentence, `meaning`.
+    #[serde(flatten, serialize_with = "with_meaning")]
+    pub status: RunStatus,
+    /// Start of the run, s.
+    pub started_at_s: f64,
+    /// End of the run, s.
+    pub stopped_at_s: f64,
+    /// Changes of mode.
+    pub transitions: usize,
+    /// How often the tip stuck.
+    pub sticks: usize,
+    /// The longest stick, s.
+    pub longest_stick_s: Option<f64>,
+    /// Share of the run in which the tip stuck.
+    pub stick_share: Option<f64>,
+    /// How often the tip lost contact with the glass.
+    pub contact_losses: usize,
+    /// Impacts of the tip on the glass.
+    pub impacts: usize,
+    /// How often the Painlevé paradox jammed the tip.
+    pub jams: usize,
+    /// Whether it ended because more than one mode of contact was consistent with the forces.
+    pub indeterminate: bool,
+    /// Whether it ended because transitions accumulated in no time.
+    pub chattering: bool,
+    /// Whether the head of its recording turns the other way than the model's.
+    #[serde(rename = "opposed")]
+    pub opposite_turn: bool,
+    /// Least normal force in contact, N.
+    pub least_normal_force_n: Option<f64>,
+    /// Least Painlevé indicator in slip.
+    pub least_painleve_indicator: Option<f64>,
+}
+
+fn with_meaning<S: Serializer>(status: &RunStatus, to: S) -> Result<S::Ok, S::Error> {
+    #[derive(Serialize)]
+    struct StatusWithMeaning {
+        status: RunStatus,
+        meaning: &'static str,
+    }
+    StatusWithMeaning { status: *status, meaning: status.meaning() }.serialize(to)
+}
+
+/// The run of a condition of this name.
+pub(super) fn summarize_run(name: &str, started_at_s: f64, motion: &RunMotion) -> RunSummary {
+    let run = &motion.run;
+    let lasted_s = run.stopped_at_s - started_at_s;
+    let sticks = motion.stick_s.iter().map(|[from, to]| to - from);
+    let stuck_s: f64 = sticks.clone().fold(0.0, |all, one| all + one); // (the sum of none is -0)
+    let changes = |is: fn(&Transition) -> bool| motion.transitions.iter().filter(|t| is(t)).count();
+    // a run that stops at an event has no transition behind it
+    let stopped = |status: RunStatus| usize::from(run.status == status);
+    RunSummary {
+        name: name.to_owned(),
+        status: run.status,
+        started_at_s,
+        stopped_at_s: run.stopped_at_s,
+        transitions: motion.transitions.len(),
+        sticks: motion.stick_s.len(),
+        longest_stick_s: sticks.reduce(f64::max),
+        stick_share: (lasted_s > 0.0).then(|| stuck_s / lasted_s),
+        contact_losses: changes(|t| t.from != TipMode::Flight && t.to == TipMode::Flight)
+            + stopped(RunStatus::ContactLost),
+        impacts: motion.impacts.len(),
+        jams: changes(|t| t.cause == TransitionCause::JamImpact) + stopped(RunStatus::Jammed),
+        indeterminate: run.status == RunStatus::Indeterminate,
+        chattering: run.status == RunStatus::Chattering,
+        opposite_turn: false,
+        least_normal_force_n: motion.extremes.min_normal_force_n,
+        least_painleve_indicator: motion.extremes.min_painleve_indicator,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::simulate::scene::Scene;
+
+    const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
+    const FLY: &str = "\n[contact]\nloss = \"fly\"\njam = \"impact\"\n";
+
+    /// The actual blade pressed with another force and wiped faster than any wiper.
+    fn ran(preload_n: f64, frequency_hz: f64, contact: &str) -> RunSummary {
+        let text = SCENE.replace("preload_force_n = 0.126", &format!("preload_force_n = {preload_n}"));
+        let text = text.replace("frequency_hz = 0.749", &format!("frequency_hz = {frequency_hz:?}"));
+        let scene = Scene::parse("s", &format!("{text}{contact}")).unwrap();
+        summarize_run("c", scene.start_s, &RunMotion::simulate(&scene))
+    }
+
+    #[test]
+    fn a_quiet_run_has_no_hard_event_and_its_sticks_are_counted() {
+        let line = ran(0.126, 0.749, "");
+        assert_eq!(
+            (line.status, line.contact_losses, line.impacts, line.jams, line.indeterminate, line.chattering),
+            (RunStatus::Completed, 0, 0, 0, false, false)
+        );
+        assert!(line.least_normal_force_n.unwrap() > 0.0 && line.least_painleve_indicator.unwrap() > 0.0);
+        let (share, longest_s) = (line.stick_share.unwrap(), line.longest_stick_s.unwrap());
+        assert!(
+            line.sticks > 100 && line.transitions >= 2 * line.sticks - 2 && share > 0.05 && share < 0.5,
+            "{line:?}"
+        );
+        assert!(longest_s > 0.03 && longest_s < share * (line.stopped_at_s - line.started_at_s), "{line:?}");
+    }
+
+    #[test]
+    fn a_tip_that_never_sticks_does_so_for_no_share_of_the_run() {
+        let scene = Scene::parse("s", &SCENE.replace("a = 0.108", "a = 0.0").replace("c = 0.296", "c = 0.0"))
+            .unwrap();
+        let line = summarize_run("c", scene.start_s, &RunMotion::simulate(&scene));
+        assert_eq!((line.sticks, line.stick_share.map(f64::to_bits)), (0, Some(0.0_f64.to_bits())));
+    }
+
+    #[test]
+    fn lost_contact_counts_where_it_ends_the_run_and_where_the_tip_flies() {
+        let stopped = ran(0.126, 12.0, "");
+        assert_eq!((stopped.status, stopped.contact_losses, stopped.impacts), (RunStatus::ContactLost, 1, 0));
+        let flown = ran(0.126, 12.0, FLY);
+        assert_eq!(flown.status, RunStatus::Completed);
+        assert!(flown.contact_losses > 10 && flown.impacts >= flown.contact_losses - 1, "{flown:?}");
+    }
+
+    #[test]
+    fn a_jam_that_ends_the_run_counts() {
+        let line = ran(0.4, 20.0, "");
+        assert_eq!((line.status, line.jams, line.contact_losses), (RunStatus::Jammed, 1, 0));
+    }
 }

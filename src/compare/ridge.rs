@@ -1,7 +1,7 @@
 //! The deflection in segments of both sides, with the ridges that follow the stick-slip cycle.
 
-use super::case::{ConditionComparison, TimedRecording};
-use super::windows::spectral_band;
+use super::condition::spectral_band;
+use super::condition::{ConditionComparison, TimedRecording};
 use crate::feature::{FeatureBand, Reading};
 use crate::recording::channel::{Channel, InstantKind, Window, WindowEnd, mean_speed_m_per_s};
 use crate::spectrum::time_frequency::{

@@ -1,8 +1,8 @@
 //! What a comparison says in numbers, as `report.json` holds it.
 
-use super::case::{ConditionComparison, TimedRecording};
+use super::condition::{ConditionComparison, TimedRecording};
+use super::condition::{FitWindow, group_fit_windows};
 use super::ridge::TrackedRidge;
-use super::windows::{FitWindow, group_fit_windows};
 use crate::recording::alignment::AlignmentPoint;
 use crate::recording::channel::Channel;
 use crate::recording::motion_traces::MOTION_CHANNELS;

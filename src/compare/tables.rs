@@ -1,6 +1,6 @@
 //! The columns of a comparison as CSV, on the clocks of the recordings.
 
-use super::case::{ConditionComparison, FittedRecording};
+use super::condition::{ConditionComparison, FittedRecording};
 use super::model_run::ModelRun;
 use super::ridge::TrackedRidge;
 use crate::fit::job::Job;

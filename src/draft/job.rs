@@ -1,8 +1,8 @@
 //! job.toml of a draft.
 
-use super::commented::CommentedToml;
-use super::found::{DraftComponent, DraftFindings, DraftHead};
-use super::plan::{ParameterRole, plan_parameters};
+use super::CommentedToml;
+use super::findings::{DraftComponent, DraftFindings, DraftHead};
+use super::{ParameterRole, plan_parameters};
 use crate::fit::job::Job;
 use crate::fit::measure_targets;
 use crate::recording::Recording;

@@ -1,13 +1,14 @@
 //! scene.toml of a draft.
 
-use super::commented::CommentedToml;
-use super::found::{DraftFindings, DraftHead};
-use super::plan::{ParameterRole, plan_parameters};
+use super::findings::{DraftFindings, DraftHead};
 use super::stroke::Stroke;
-use crate::blade::measuring::SAME_LENGTH_ADVICE;
-use crate::blade::parameters;
-use crate::simulate::scene::{Scene, SceneError};
-use crate::text::{capitalise, format_percent};
+use super::{CommentedToml, ParameterRole, plan_parameters};
+use crate::fit::result::{FitResult, NuisanceResult};
+use crate::model::parameters;
+use crate::model::parameters::SAME_LENGTH_ADVICE;
+use crate::simulate::drive::Drive;
+use crate::simulate::scene::{Scene, SceneError, StartKind};
+use crate::text::{capitalise, format_digits, format_interval, format_percent, make_printable};
 
 /// The blade of every draft.
 const EXAMPLE_SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
@@ -136,4 +137,183 @@ fn add_run(text: CommentedToml, [start_s, stop_s]: [f64; 2], rate_hz: f64) -> Co
         .add_number("sample_rate_hz", rate_hz)
         .add_number("relative_tolerance", 1e-8)
         .add_line("outputs = [\"trace\", \"events\"]")
+}
+
+// The scene of a fit at its estimates.
+
+/// Tables of numbers in the order of a scene.
+const TABLES: [&str; 3] = ["blade", "shoulder", "friction"];
+/// Digits of the ends of an interval.
+const DIGITS: usize = 4;
+
+/// A scene with the estimates in it, and what it is the scene of.
+#[derive(Debug, Clone, Copy)]
+pub struct FittedScene<'a> {
+    /// The scene that the fit ran.
+    pub scene: &'a Scene,
+    /// Name of its condition.
+    pub condition: &'a str,
+    /// Whether its recording is synthetic; `None` where only numbers are published.
+    pub synthetic: Option<bool>,
+    /// Path of the recording that drives it, where one does, as seen from the scene's file.
+    pub recording: Option<&'a str>,
+    /// The result with the estimates.
+    pub result: &'a FitResult,
+}
+
+/// The scene of a fit at its estimates, with their intervals as comments; `None` for one that starts in the
+/// air, which no scene file says.
+#[must_use]
+pub fn write_fitted_scene(fitted: &FittedScene<'_>) -> Option<String> {
+    let FittedScene { scene, condition, synthetic, recording, result } = *fitted;
+    let of = match synthetic {
+        Some(true) => "fitted to a synthetic recording, which no camera took",
+        Some(false) => "fitted to a recording",
+        None => "fitted to published numbers",
+    };
+    let mut head = CommentedToml::default().add_comment(&format!(
+        "The scene of a fit at its estimates, {of}, for `wiperlab simulate` and for studies. The fit: {}; its \
+         condition: {condition}. Written by `wiperlab fit`, and written anew by the next.",
+        result.title
+    ));
+    if !result.explains_recordings() {
+        head =
+            head.add_comment("The model does not explain the recording: the numbers are those of no blade.");
+    }
+    let title = format!("{} ({condition})", make_printable(&result.title));
+    write_scene_toml(head, &title, scene, recording, |name| describe_estimate(result, name))
+}
+
+/// What a fit says of a number.
+fn describe_estimate(result: &FitResult, name: &str) -> Option<String> {
+    let ends = |lower, upper| format_interval(lower, upper, |end| format_digits(end, DIGITS));
+    if let Some(found) = result.parameters.get(name) {
+        let verdict = found.verdict.name();
+        return Some(format!("fitted, {verdict}; 95 %: {}", ends(found.lower_95, found.upper_95)));
+    }
+    let of_scene = |nuisance: &&NuisanceResult| nuisance.recording.is_none() && nuisance.name == name;
+    let constant = result.nuisances.iter().find(of_scene)?;
+    let (prior, sd) = (format_digits(constant.prior, DIGITS), format_digits(constant.prior_sd, 2));
+    Some(format!(
+        "freed around {prior} with standard deviation {sd}; 95 %: {}",
+        ends(constant.lower_95, constant.upper_95)
+    ))
+}
+
+/// A scene as a file that reads back as the same; `None` for a start in the air.
+fn write_scene_toml(
+    head: CommentedToml,
+    title: &str,
+    scene: &Scene,
+    recording: Option<&str>,
+    note: impl Fn(&str) -> Option<String>,
+) -> Option<String> {
+    let mut text = head.add_line("format = 1").add_text("title", title);
+    for table in TABLES {
+        let of_table =
+            scene.written_values().filter_map(|(name, value)| Some((name.split_once('.')?, name, value)));
+        let rows: Vec<_> = of_table.filter(|((of, _), ..)| *of == table).collect();
+        if !rows.is_empty() {
+            text = text.add_empty_line().add_line(&format!("[{table}]"));
+        }
+        for ((_, key), name, value) in rows {
+            text = text.add_comments(note(name)).add_number(key, value);
+        }
+    }
+    text = add_drive(text.add_empty_line().add_line("[drive]"), scene, recording, &note)?;
+    text =
+        text.add_empty_line().add_line("[contact]").add_word("loss", scene.loss).add_word("jam", scene.jam);
+    if let Some((_, restitution)) = scene.written_values().find(|(name, _)| *name == "contact.restitution") {
+        text = text.add_number("restitution", restitution);
+    }
+    text = add_start(
+        text.add_empty_line().add_line("[start]").add_number("time_s", scene.start_s),
+        scene.start,
+    )?;
+    let run = &scene.run;
+    text = text
+        .add_empty_line()
+        .add_line("[run]")
+        .add_number("stop_s", run.stop_s)
+        .add_number("sample_rate_hz", run.sample_rate_hz)
+        .add_number("relative_tolerance", run.relative_tolerance);
+    if let Some(most) = run.most_evaluations {
+        text = text.add_line(&format!("most_evaluations = {most}"));
+    }
+    Some(text.add_word("outputs", &run.outputs).into_text())
+}
+
+fn add_drive(
+    text: CommentedToml,
+    scene: &Scene,
+    recording: Option<&str>,
+    note: impl Fn(&str) -> Option<String>,
+) -> Option<CommentedToml> {
+    match &scene.drive {
+        Drive::Recorded(_) => Some(text.add_text("recording", recording?)),
+        Drive::Uniform { .. } => None,
+        Drive::Cosine { amplitude_m, frequency_hz, delay_s } => {
+            let text = text
+                .add_comments(note("drive.amplitude_m"))
+                .add_number("amplitude_m", *amplitude_m)
+                .add_comments(note("drive.frequency_hz"))
+                .add_number("frequency_hz", *frequency_hz);
+            Some(if *delay_s == 0.0 { text } else { text.add_number("delay_s", *delay_s) })
+        }
+    }
+}
+
+fn add_start(text: CommentedToml, start: StartKind) -> Option<CommentedToml> {
+    match start {
+        StartKind::Upright => Some(text.add_text("kind", "upright")),
+        StartKind::SteadySlide => Some(text.add_text("kind", "steady-slide")),
+        StartKind::State(pose) => Some(
+            text.add_text("kind", "state")
+                .add_number("neck_angle_rad", pose.theta)
+                .add_number("lip_angle_rad", pose.phi)
+                .add_number("neck_rate_rad_per_s", pose.theta_rate)
+                .add_number("lip_rate_rad_per_s", pose.phi_rate),
+        ),
+        StartKind::Airborne(_) => None,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SCENES: [&str; 4] = [
+        include_str!("../../data/scenes/actual-blade.toml"),
+        include_str!("../../data/scenes/light-blade-from-rest.toml"),
+        include_str!("../../data/scenes/light-blade-strokes.toml"),
+        include_str!("../../data/scenes/published-experiment.toml"),
+    ];
+
+    fn reads_back(scene: &Scene) {
+        let text = write_scene_toml(CommentedToml::default(), scene.title(), scene, None, |_| None).unwrap();
+        let again = Scene::parse("scene", &text).unwrap();
+        assert_eq!(&again, scene, "{text}");
+    }
+
+    #[test]
+    fn a_scene_reads_back_as_the_same() {
+        for text in SCENES {
+            let scene = Scene::parse("scene", text).unwrap();
+            reads_back(&scene);
+            // numbers with all their digits, and a quantity that is written another way
+            let moved = scene.with_parameter("friction.a", 0.1 + 0.2).unwrap();
+            reads_back(&moved.with_parameter("blade.neck_natural_frequency_hz", 1000.0 / 3.0).unwrap());
+        }
+    }
+
+    #[test]
+    fn start_contact_and_limits_are_kept() {
+        let text = SCENES[0]
+            .replacen("kind = \"steady-slide\"", "kind = \"state\"\nneck_angle_rad = 0.1\nlip_angle_rad = 1e-17\nneck_rate_rad_per_s = -3.0\nlip_rate_rad_per_s = 0.0", 1)
+            .replacen("frequency_hz = 0.749", "frequency_hz = 0.749\ndelay_s = -0.25", 1)
+            + "most_evaluations = 123456\n[contact]\nloss = \"fly\"\njam = \"impact\"\nrestitution = 0.25\n";
+        let scene = Scene::parse("scene", &text).unwrap();
+        assert!(matches!(scene.start, StartKind::State(_)) && scene.drive.delay_s() == -0.25);
+        reads_back(&scene);
+    }
 }

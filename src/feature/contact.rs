@@ -2,7 +2,7 @@
 
 use super::missing::MissingValue;
 use super::reader::FeatureReader;
-use super::run_record::RunRecord;
+use super::reader::RunRecord;
 use crate::recording::channel::{Window, WindowEnd};
 use crate::simulate::mode::TipMode;
 use crate::simulate::outputs::EnergyAudit;

@@ -1,6 +1,6 @@
 //! The keys of a job's `[[feature]]` and a study's `[[map]]` that say what is read, and their checks.
 
-use super::band::FeatureBand;
+use super::spectral::FeatureBand;
 use crate::recording::channel::{Channel, Window};
 use crate::spectrum::Detrend;
 use crate::toml_file::{KeyRefusal, NumberPair, check_above_zero, refuse_key};

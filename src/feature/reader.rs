@@ -1,13 +1,13 @@
 //! A recording from which many features are read: each channel is computed once, and each window
 //! transformed once.
 
-use super::band::FeatureBand;
-use super::cycle::CycleSegments;
-use super::head_speed::head_speeds_m_per_s;
+use super::deflection::head_speeds_m_per_s;
 use super::missing::MissingValue;
-use super::run_record::RunRecord;
+use super::spectral::{CycleSegments, FeatureBand};
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, ReversalInstants, Window};
+use crate::simulate::outputs::EnergyAudit;
+use crate::simulate::{RunResult, Transition};
 use crate::spectrum::{Detrend, SpectrumSettings, WindowedTransform};
 use std::cell::{OnceCell, RefCell};
 use std::ops::Range;
@@ -136,4 +136,21 @@ impl<'a> FeatureReader<'a> {
             found
         })
     }
+}
+
+// What is kept of a simulated run, for what its traces do not show.
+
+/// What is kept of a simulated run.
+#[derive(Debug, Clone)]
+pub struct RunRecord {
+    /// Start and stop time of its scene, s.
+    pub span_s: [f64; 2],
+    /// How it went.
+    pub run: RunResult,
+    /// When the tip stuck, s.
+    pub stick_s: Vec<[f64; 2]>,
+    /// Its changes of mode.
+    pub transitions: Vec<Transition>,
+    /// Its extremes, where a reading needs them ([`super::Reading::needs_audit`]).
+    pub audit: Option<EnergyAudit>,
 }

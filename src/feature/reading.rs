@@ -1,17 +1,17 @@
 //! What is read: the readings, and the one table of their kinds that jobs and studies share.
 
-use super::band::FeatureBand;
 use super::contact::ContactReading;
 use super::interval::ReversalInterval;
 use super::keys::ReadingEntry;
-use super::length::LengthCalibration;
+use super::missing::MissingReason;
 use super::missing::MissingValue;
 use super::reader::FeatureReader;
-use super::reason::MissingReason;
+use super::spectral::FeatureBand;
 use super::spectral::{self, CycleRangeEnd};
-use super::unit::{FeatureUnit, ValueComparison};
 use super::value::FeatureValue;
-use super::{damping, deflection};
+use super::value::LengthCalibration;
+use super::value::{FeatureUnit, ValueComparison};
+use super::{deflection};
 use crate::math;
 use crate::recording::channel::Window;
 use crate::toml_file::{KeyRefusal, refuse_key, suggest_key};
@@ -402,7 +402,7 @@ impl Reading {
             Self::Amplitude(band) => spectral::read_amplitude(band, reader),
             Self::Rms(band) => spectral::read_rms(band, reader),
             Self::BandLevel { band, floor_m } => spectral::read_band_level(band, *floor_m, reader),
-            Self::DampingRatio(band) => damping::read_damping_ratio(band, reader),
+            Self::DampingRatio(band) => spectral::read_damping_ratio(band, reader),
             Self::CycleFrequency { band, segment_s, end } => {
                 spectral::read_cycle_frequency(band, *segment_s, *end, reader)
             }

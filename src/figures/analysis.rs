@@ -1,18 +1,19 @@
 //! The complete analysis of a window of a recording: its parts as data, a file each, and their figures.
 
-mod compared;
-mod components;
-mod course;
-mod history;
-mod parts;
-mod window;
-
-pub use compared::compare_spectra;
-pub use course::CoursePoint;
-pub use window::AnalysedWindow;
-
+use super::ring_down::{ComponentDecay, RingDown, RingDownTrace, figure_title};
+use super::spectrogram::{SpectrogramRidgePoint, SpeedPoint};
+use super::spectrum::{
+    AmplitudeInterval, LabelledComponent, SpectraPlot, SpectrumCurve, SpectrumLevel, strongest_claim,
+};
+use super::windows::{WindowOverview, WindowSpan};
 use super::{about, ring_down, spectrogram, spectrum, windows};
 use crate::chart::Figure;
+use crate::recording::channel::{Channel, InstantKind, ReversalInstants, mean_speed_m_per_s, phase_windows};
+use crate::recording::{Recording, channel};
+use crate::spectrum::time_frequency::{RidgePoint as Followed, Spectrogram, SpectrogramSettings, course};
+use crate::spectrum::{Component, ComponentVerdict, Estimator, Oscillation, SpectralAnalysis, Spectrum};
+use crate::text::{format_digits, format_short, format_with_sd};
+use std::ops::Range;
 
 impl AnalysedWindow<'_> {
     /// Every figure, with its name.
@@ -27,5 +28,494 @@ impl AnalysedWindow<'_> {
         figures.map(|(name, figure)| {
             (name, Figure { subtitle: about(self.recording.name(), &figure.subtitle), ..figure })
         })
+    }
+}
+
+// What a recording and a model show in the same window, side by side.
+
+/// Components of a model under this share of its largest are of no account.
+const LEAST_OF_MODEL: f64 = 1e-3;
+
+/// The spectra of a recording and of a model that were read alike, with their components; of the model's,
+/// without those that no recording could show: under the noise floor of this one, or of no account. Heading,
+/// note and targets are left to the caller.
+#[must_use]
+pub fn compare_spectra(measured: Option<&SpectralAnalysis>, model: Option<&SpectralAnalysis>) -> SpectraPlot {
+    let components = |analysis: &SpectralAnalysis| -> Vec<LabelledComponent> {
+        analysis
+            .spectrum
+            .components
+            .iter()
+            .filter(|c| c.is_resolvable())
+            .map(|c| label_component(c, &analysis.spectrum))
+            .collect()
+    };
+    let noise_floor_m = measured.map(|m| m.spectrum.noise_floor_m);
+    let mut model_components = model.map_or_else(Vec::new, components);
+    let largest_m = model_components.iter().map(|c| c.amplitude_m).fold(0.0, f64::max);
+    let least_m = noise_floor_m.unwrap_or(0.0).max(LEAST_OF_MODEL * largest_m);
+    model_components.retain(|c| c.amplitude_m >= least_m);
+    SpectraPlot {
+        measured: measured.map(spectrum_curve),
+        model: model.map(spectrum_curve),
+        noise_floor_m,
+        noise_floor: measured.and_then(|m| spectrum_level(m, &m.noise_floor_m)),
+        components: measured.map_or_else(Vec::new, components),
+        model_components,
+        lowest_hz: measured.or(model).map_or(1.0, |a| a.spectrum.resolution_hz),
+        ..SpectraPlot::default()
+    }
+}
+
+// The spectrum of a window as curves, levels and named components.
+
+impl AnalysedWindow<'_> {
+    pub(super) fn spectra(&self) -> SpectraPlot {
+        let (analysis, spectrum) = (self.analysis, &self.analysis.spectrum);
+        let shown = SpectraPlot {
+            quantity: self.channel.to_string(),
+            note: self.figure_note("spectrum"),
+            synthetic: self.recording.is_synthetic(),
+            measured: Some(spectrum_curve(analysis)),
+            noise_floor_m: Some(spectrum.noise_floor_m),
+            noise_floor: spectrum_level(analysis, &analysis.noise_floor_m),
+            interval_95: self.noise_interval(),
+            leakage: spectrum_level(analysis, &analysis.leakage_m),
+            components: spectrum.components.iter().map(|c| label_component(c, spectrum)).collect(),
+            lowest_hz: spectrum.resolution_hz,
+            ..SpectraPlot::default()
+        };
+        SpectraPlot { title: strongest_claim(&shown), ..shown }
+    }
+
+    /// What the noise leaves open of every amplitude of the curve that is drawn.
+    fn noise_interval(&self) -> Option<AmplitudeInterval> {
+        let floor = spectrum_level(self.analysis, &self.analysis.noise_floor_m)?;
+        Some(AmplitudeInterval::from_noise_floor(&spectrum_curve(self.analysis), &floor))
+    }
+}
+
+pub(super) fn spectrum_curve(analysis: &SpectralAnalysis) -> SpectrumCurve {
+    SpectrumCurve {
+        frequency_hz: analysis.spectrum.frequency_hz.clone(),
+        amplitude_m: analysis.spectrum.amplitude_m.clone(),
+    }
+}
+
+/// Amplitudes at the frequencies of the spectrum; none where there are not as many.
+pub(super) fn spectrum_level(analysis: &SpectralAnalysis, amplitude_m: &[f64]) -> Option<SpectrumLevel> {
+    let frequency_hz = &analysis.spectrum.frequency_hz;
+    (amplitude_m.len() == frequency_hz.len())
+        .then(|| SpectrumLevel { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
+}
+
+/// A component at its height in the spectrum, as its amplitude may be that of a start, or the mean of one
+/// that drifts, which lies above its wide peak.
+pub(super) fn label_component(c: &Component, spectrum: &Spectrum) -> LabelledComponent {
+    let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
+    let height_m = spectrum.amplitude_m.get((c.frequency_hz / bin_hz).round() as usize).copied();
+    let shown_m = height_m.unwrap_or(c.amplitude_m);
+    let share = if c.amplitude_m > 0.0 { c.amplitude_sd_m / c.amplitude_m } else { 0.0 };
+    LabelledComponent {
+        frequency_hz: c.frequency_hz,
+        frequency_sd_hz: c.frequency_sd_hz,
+        range_hz: c.range_hz.map(|range| (range.low_hz, range.high_hz)),
+        amplitude_m: shown_m,
+        amplitude_sd_m: shown_m * share,
+        remark: if c.verdict == ComponentVerdict::Clear {
+            String::new()
+        } else {
+            c.verdict.name().to_owned()
+        },
+    }
+}
+
+// The course of the strongest component: over time, and over the speed of the tip.
+
+/// The frequency of a ridge at one time, with how fast the tip and the head moved then.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CoursePoint {
+    /// Time of the recording, s.
+    pub time_s: f64,
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Its standard deviation, Hz.
+    pub frequency_sd_hz: f64,
+    /// Amplitude, m.
+    pub amplitude_m: f64,
+    /// Mean speed of the tip over the segment, m/s.
+    pub tip_speed_m_per_s: Option<f64>,
+    /// Mean speed of the head over the segment, m/s.
+    pub head_speed_m_per_s: Option<f64>,
+}
+
+impl AnalysedWindow<'_> {
+    /// The course of the frequency, point by point.
+    #[must_use]
+    pub fn frequency_course(&self) -> Vec<CoursePoint> {
+        self.analysis.ridge.as_ref().map_or_else(Vec::new, |ridge| {
+            ridge.points.iter().map(|p| self.course_point(p, ridge.segment_s)).collect()
+        })
+    }
+
+    fn course_point(&self, p: &Followed, segment_s: f64) -> CoursePoint {
+        let (grid, traces) = (self.recording.grid(), self.recording.traces());
+        let half = (0.5 * segment_s * grid.frame_rate_hz).ceil() as usize;
+        let centre = self.frames.start + (p.time_s * grid.frame_rate_hz).round() as usize;
+        let segment = centre.saturating_sub(half)..(centre + half).min(grid.frames);
+        let speed =
+            |samples: &[Option<f64>]| mean_speed_m_per_s(samples, grid.frame_rate_hz, segment.clone());
+        CoursePoint {
+            time_s: grid.time_s(self.frames.start) + p.time_s,
+            frequency_hz: p.frequency_hz,
+            frequency_sd_hz: p.frequency_sd_hz,
+            amplitude_m: p.amplitude_m,
+            tip_speed_m_per_s: speed(&traces.tip_x_m),
+            head_speed_m_per_s: speed(&traces.head_x_m),
+        }
+    }
+
+    pub(super) fn spectrogram(&self) -> spectrogram::SpectrogramPlot {
+        let grid = self.recording.grid();
+        let start_s = grid.time_s(self.frames.start);
+        let settings = SpectrogramSettings {
+            segment_s: self.analysis.ridge.as_ref().map(|r| r.segment_s),
+            band_hz: None,
+        };
+        let cut = Spectrogram::new(&self.analysis.detrended_m(), grid.frame_rate_hz, &settings).ok();
+        let column = |bins: usize, column: &Option<Vec<f64>>| {
+            column.as_ref().map_or_else(|| vec![None; bins], |c| c.iter().copied().map(Some).collect())
+        };
+        let instants = named_instants(self.recording, (start_s, grid.time_s(self.frames.end)));
+        let (ridge, over_speed, drawn) = cut.as_ref().map(|cut| self.drawn_ridge(cut)).unwrap_or_default();
+        let ends_hz = ridge.iter().filter_map(|p| p.frequency_hz);
+        let range_hz = ends_hz.clone().reduce(f64::min).zip(ends_hz.reduce(f64::max));
+        spectrogram::SpectrogramPlot {
+            title: range_hz.map_or_else(
+                || "Nothing stands out long enough to be followed".to_owned(),
+                |(low, high)| {
+                    format!("The ridge runs from {} to {} Hz", format_digits(low, 3), format_digits(high, 3))
+                },
+            ),
+            quantity: self.channel.to_string(),
+            note: cut.as_ref().map_or_else(
+                || format!("{}; too short to be cut into segments", self.figure_note("spectrogram")),
+                |c| {
+                    format!(
+                        "{}; segments of {:.1} ms{drawn}",
+                        self.figure_note("spectrogram"),
+                        c.segment_s * 1e3
+                    )
+                },
+            ),
+            synthetic: self.recording.is_synthetic(),
+            time_s: cut.as_ref().map_or_else(Vec::new, |c| c.time_s.iter().map(|t| start_s + t).collect()),
+            frequency_hz: cut.as_ref().map_or_else(Vec::new, |c| c.frequency_hz.clone()),
+            amplitude_m: cut.as_ref().map_or_else(Vec::new, |c| {
+                c.amplitude_m.iter().map(|a| column(c.frequency_hz.len(), a)).collect()
+            }),
+            log_frequency: false,
+            shown_hz: None,
+            ridge,
+            instants,
+            targets: Vec::new(),
+            over_speed,
+        }
+    }
+
+    /// The ridge over time and over the speed of the tip, as far as it is drawn, and in how many segments
+    /// that is.
+    fn drawn_ridge(&self, of: &Spectrogram) -> (Vec<SpectrogramRidgePoint>, Vec<SpeedPoint>, String) {
+        let Some(ridge) = &self.analysis.ridge else { return Default::default() };
+        let drawn = course::coherent_parts(ridge, of);
+        let start_s = self.recording.grid().time_s(self.frames.start);
+        let gap = SpectrogramRidgePoint { time_s: start_s, frequency_hz: None };
+        let over_time = |part: &Vec<Followed>| {
+            let points = part.iter().map(|p| SpectrogramRidgePoint {
+                time_s: start_s + p.time_s,
+                frequency_hz: Some(p.frequency_hz),
+            });
+            std::iter::once(gap).chain(points).collect::<Vec<_>>()
+        };
+        let over_speed = |p: CoursePoint| {
+            Some(SpeedPoint {
+                tip_speed_m_per_s: p.tip_speed_m_per_s?.abs(),
+                frequency_hz: p.frequency_hz,
+                frequency_sd_hz: Some(p.frequency_sd_hz),
+            })
+        };
+        let speeds = drawn
+            .iter()
+            .flatten()
+            .filter_map(|p| over_speed(self.course_point(p, ridge.segment_s)))
+            .collect();
+        let said = format!("; ridge {}", spectrogram::describe_ridge_segments(&drawn, ridge, of));
+        (drawn.iter().flat_map(over_time).collect(), speeds, said)
+    }
+}
+
+// The whole recording with its named windows.
+
+impl AnalysedWindow<'_> {
+    pub(super) fn window_overview(&self) -> WindowOverview {
+        let (grid, found) = (self.recording.grid(), ReversalInstants::find_instants(self.recording));
+        let window = |w: channel::PhaseWindow| WindowSpan { name: w.name, from_s: w.from_s, to_s: w.to_s };
+        WindowOverview {
+            title: format!(
+                "Analysed: {} s of {} s, {} frames",
+                format_short(self.frames.len() as f64 / grid.frame_rate_hz),
+                format_short(grid.frames as f64 / grid.frame_rate_hz),
+                self.frames.len()
+            ),
+            quantity: self.channel.to_string(),
+            note: format!("named windows of {}", self.channel),
+            synthetic: self.recording.is_synthetic(),
+            time_s: (0..grid.frames).map(|i| grid.time_s(i)).collect(),
+            channel_m: self.channel.samples(self.recording),
+            head_x_m: if self.channel == Channel::HeadX {
+                Vec::new()
+            } else {
+                Channel::HeadX.samples(self.recording)
+            },
+            windows: phase_windows(self.recording, &found).into_iter().map(window).collect(),
+            analysed_s: Some((grid.time_s(self.frames.start), grid.time_s(self.frames.end))),
+            instants: named_instants(self.recording, (grid.start_s, grid.time_s(grid.frames))),
+        }
+    }
+}
+
+// A window as the sum of its trend and its components, and what is left.
+
+/// Points a cycle of the fastest oscillation for a smooth line.
+const POINTS_A_CYCLE: f64 = 12.0;
+/// Most points of a fitted line: beyond, they are closer than the pixels of the figure.
+const MOST_POINTS: f64 = 40_000.0;
+/// Deviations from zero from which a decay is drawn as one.
+const DECAYS: f64 = 3.0;
+
+impl AnalysedWindow<'_> {
+    /// The window as the sum of its trend and its components, and what is left.
+    #[must_use]
+    pub(crate) fn ring_down(&self) -> RingDown {
+        let grid = self.recording.grid();
+        let time_s: Vec<f64> = self.frames.clone().map(|i| grid.time_s(i)).collect();
+        let trace =
+            |values: Vec<Option<f64>>| RingDownTrace { time_s: time_s.clone(), displacement_m: values };
+        let analysis = self.analysis;
+        let samples = analysis
+            .residual_m
+            .iter()
+            .zip(&analysis.model_m)
+            .zip(&analysis.removed_m)
+            .map(|((left, m), removed)| left.map(|left| left + m + removed));
+        // white noise of density 2 s^2 / rate has this root mean square in a bin
+        let noise_m = analysis.spectrum.noise_floor_m
+            * (grid.frame_rate_hz / (4.0 * analysis.spectrum.noise_bandwidth_hz)).sqrt();
+        RingDown {
+            title: analysis.spectrum.components.first().map_or_else(
+                || format!("No oscillation is found in the {}", self.channel.label()),
+                |component| figure_title(&self.channel.label(), component),
+            ),
+            quantity: self.channel.label(),
+            note: self.figure_note("components and rest"),
+            synthetic: self.recording.is_synthetic(),
+            data: trace(samples.collect()),
+            fitted: self.fine_trace(|t| {
+                self.removed_trend_m(t)
+                    + analysis.oscillations.iter().map(|o| o.displacement_m(t)).sum::<f64>()
+            }),
+            trend: trace(analysis.removed_m.iter().copied().map(Some).collect()),
+            residual: trace(analysis.residual_m.clone()),
+            noise_sd_m: (noise_m > 0.0).then_some(noise_m),
+            decay: self.largest_decay(&time_s),
+        }
+    }
+
+    /// The largest component that decays, with what is left of the record added.
+    fn largest_decay(&self, time_s: &[f64]) -> Option<ComponentDecay> {
+        let analysis = self.analysis;
+        let decays = |c: &&Component| {
+            c.damping_ratio.zip(c.damping_ratio_sd).is_some_and(|(ratio, sd)| ratio > DECAYS * sd)
+        };
+        let component = analysis
+            .spectrum
+            .components
+            .iter()
+            .filter(|c| c.estimator == Estimator::LeastSquares)
+            .find(decays)?;
+        let near = |a: &&Oscillation, b: &&Oscillation| {
+            (a.frequency_hz - component.frequency_hz)
+                .abs()
+                .total_cmp(&(b.frequency_hz - component.frequency_hz).abs())
+        };
+        let own = analysis.oscillations.iter().min_by(near)?;
+        let start_s = time_s.first().copied()?;
+        let data = analysis
+            .residual_m
+            .iter()
+            .zip(time_s)
+            .map(|(left, t)| left.map(|left| left + own.displacement_m(t - start_s)))
+            .collect();
+        let ratio = component
+            .damping_ratio
+            .zip(component.damping_ratio_sd)
+            .map(|(ratio, sd)| format_with_sd(ratio, sd))?;
+        Some(ComponentDecay {
+            name: format!(
+                "{} Hz, damping ratio {ratio}",
+                format_with_sd(component.frequency_hz, component.frequency_sd_hz)
+            ),
+            fitted: self.fine_trace(|t| own.displacement_m(t)),
+            envelope: self.fine_trace(|t| own.envelope_m(t)),
+            data: RingDownTrace { time_s: time_s.to_vec(), displacement_m: data },
+        })
+    }
+
+    /// What was removed, between the frames on a straight line, m.
+    fn removed_trend_m(&self, time_s: f64) -> f64 {
+        let place = time_s * self.recording.grid().frame_rate_hz;
+        let before = (place.max(0.0) as usize).min(self.analysis.removed_m.len().saturating_sub(1));
+        let value = |i: usize| {
+            self.analysis.removed_m.get(i).or(self.analysis.removed_m.last()).copied().unwrap_or(0.0)
+        };
+        value(before) + (place - before as f64) * (value(before + 1) - value(before))
+    }
+
+    /// A function of the time from the first frame, drawn finer than the frames.
+    fn fine_trace(&self, value: impl Fn(f64) -> f64) -> RingDownTrace {
+        let grid = self.recording.grid();
+        let (start_s, length_s) =
+            (grid.time_s(self.frames.start), self.frames.len().saturating_sub(1) as f64 / grid.frame_rate_hz);
+        let fastest_hz = self.analysis.oscillations.iter().fold(0.0, |f: f64, o| f.max(o.frequency_hz));
+        let points =
+            (POINTS_A_CYCLE * fastest_hz * length_s).max(self.frames.len() as f64).min(MOST_POINTS) as usize;
+        let times: Vec<f64> = (0..=points).map(|i| length_s * i as f64 / points.max(1) as f64).collect();
+        RingDownTrace {
+            displacement_m: times.iter().map(|t| Some(value(*t))).collect(),
+            time_s: times.into_iter().map(|t| start_s + t).collect(),
+        }
+    }
+}
+
+// A window of a recording's channel with its analysis.
+
+/// A window of a channel, taken apart.
+pub struct AnalysedWindow<'a> {
+    /// The recording.
+    pub recording: &'a Recording,
+    /// The channel.
+    pub channel: Channel,
+    /// The frames analysed.
+    pub frames: Range<usize>,
+    /// What they hold.
+    pub analysis: &'a SpectralAnalysis,
+    /// What was done to them, in words.
+    pub note: String,
+}
+
+impl AnalysedWindow<'_> {
+    /// What a figure shows, for the line under its heading.
+    pub(super) fn figure_note(&self, what: &str) -> String {
+        about(&format!("{what} of {}", self.channel), &self.note)
+    }
+}
+
+/// Instants between two times, by name.
+pub(super) fn named_instants(recording: &Recording, (from_s, to_s): (f64, f64)) -> Vec<(String, f64)> {
+    let found = ReversalInstants::find_instants(recording);
+    let all = (1..=found.reversals.len()).flat_map(|k| InstantKind::ALL.map(|anchor| (anchor, k)));
+    let named = all.filter_map(|(anchor, k)| {
+        let suffix = if found.reversals.len() > 1 { format!("[{k}]") } else { String::new() };
+        Some((format!("{}{suffix}", anchor.name()), found.time_s(anchor, k).ok()?))
+    });
+    named.filter(|(_, t)| *t >= from_s && *t <= to_s).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::channel::Channel;
+    use crate::recording::{FrameGrid, Recording, Traces};
+    use crate::spectrum::{Detrend, SampledRecord, SpectrumSettings};
+    use std::f64::consts::TAU;
+
+    const RATE_HZ: f64 = 5000.0;
+
+    /// A record with noise, one frame in so many lost, as it is drawn, and its curve without noise.
+    fn drawn(of_m: impl Fn(f64) -> f64, noise_m: f64, lost: usize) -> (SpectraPlot, SpectrumCurve) {
+        let mut seed = 7_u64;
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12.0_f64.sqrt()
+        };
+        let exact: Vec<f64> = (0..1500).map(|i| of_m(f64::from(i) / RATE_HZ)).collect();
+        let seen = |x: f64, i: usize| Some(x).filter(|_| i % lost != lost / 2);
+        let noisy: Vec<_> = exact.iter().enumerate().map(|(i, x)| seen(x + noise_m * draw(), i)).collect();
+        let quiet: Vec<_> = exact.iter().enumerate().map(|(i, x)| seen(*x, i)).collect();
+        let analysed = |samples: &[Option<f64>]| {
+            let record = SampledRecord { samples, frame_rate_hz: RATE_HZ, exposure_s: None };
+            SpectralAnalysis::from_record(
+                &record,
+                &SpectrumSettings { detrend: Some(Detrend::Mean), ..SpectrumSettings::default() },
+            )
+            .unwrap()
+        };
+        let grid = FrameGrid { start_s: 0.0, frame_rate_hz: RATE_HZ, frames: noisy.len() };
+        let none = vec![None; noisy.len()];
+        let traces = Traces {
+            tip_x_m: noisy.clone(),
+            tip_y_m: none.clone(),
+            head_x_m: none.clone(),
+            head_y_m: none,
+            ..Traces::default()
+        };
+        let recording = Recording::new("r", grid, traces, true).unwrap();
+        let analysis = analysed(&noisy);
+        let window = AnalysedWindow {
+            recording: &recording,
+            channel: Channel::TipX,
+            frames: 0..noisy.len(),
+            analysis: &analysis,
+            note: String::new(),
+        };
+        (window.spectra(), spectrum_curve(&analysed(&quiet)))
+    }
+
+    /// Share of the bins above the lowest frequency whose interval holds an amplitude.
+    fn covered(shown: &SpectraPlot, amplitude_m: &[f64]) -> f64 {
+        let interval = shown.interval_95.as_ref().unwrap();
+        let bins = interval.lower_m.iter().zip(&interval.upper_m).zip(amplitude_m);
+        let inside = |((low, high), a): ((&f64, &f64), &f64)| low <= a && a <= high;
+        let all: Vec<bool> = bins.skip(20).map(inside).collect();
+        all.iter().filter(|is| **is).count() as f64 / all.len() as f64
+    }
+
+    #[test]
+    fn the_interval_holds_its_curve_and_the_true_one_of_noise_and_of_tones() {
+        const NOISE_M: f64 = 2e-6;
+        let silence = |_: f64| 0.0;
+        let tone = |t: f64| 2e-5 * (TAU * 80.0 * t).sin() + 1e-5 * (TAU * 907.0 * t).sin();
+        for lost in [10_000, 100, 7] {
+            for of_m in [&silence as &dyn Fn(f64) -> f64, &tone] {
+                let (shown, exact) = drawn(of_m, NOISE_M, lost);
+                let own = &shown.measured.as_ref().unwrap().amplitude_m;
+                assert_eq!(covered(&shown, own), 1.0, "one in {lost} lost");
+                let share = covered(&shown, &exact.amplitude_m);
+                assert!(share > 0.93, "{share}, one in {lost} lost");
+            }
+        }
+    }
+
+    #[test]
+    fn every_symbol_stands_on_its_curve() {
+        let drifting = |t: f64| 2e-5 * (TAU * (700.0 * t + 400.0 * t * t)).sin();
+        let (shown, _) = drawn(drifting, 1e-6, 10_000);
+        let curve = shown.measured.as_ref().unwrap();
+        assert!(shown.components.iter().any(|c| c.range_hz.is_some()), "{:?}", shown.components);
+        for component in &shown.components {
+            let near = |f: &f64| (f - component.frequency_hz).abs() <= 0.51 * curve.frequency_hz[1];
+            let bin = curve.frequency_hz.iter().position(near).unwrap();
+            assert_eq!(component.amplitude_m, curve.amplitude_m[bin]);
+        }
     }
 }

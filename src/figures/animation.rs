@@ -5,20 +5,21 @@
 //! enlarged one of the tip, and the deflection and the tip's velocity over time. Over it move head, neck and
 //! lip, the measured points, a word for the state of contact, and a line for the time.
 
-pub(crate) mod caption;
 mod drawing;
-mod moving;
-pub mod pace;
-mod strips;
-mod track;
+mod smil;
 
-use crate::blade::Linkage;
-use crate::chart::{FULL_WIDTH_MM, Figure};
+use super::{Drawing, FigureBlock, Words};
+use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, ShadedSpan};
+use crate::compare::ConditionComparison;
 use crate::figures::{NO_TRACES, about, subtitle};
-use crate::simulate::ModelSample;
+use crate::math;
+use crate::model::Linkage;
+use crate::recording::Recording;
+use crate::recording::alignment::{Alignment, is_tracked};
+use crate::recording::channel::Channel;
 use crate::simulate::mode::TipMode;
+use crate::simulate::{ModelSample, RunMotion};
 use crate::text::format_decimals;
-use pace::PlaybackPace;
 
 /// What an animation shows; all on one clock.
 #[derive(Debug, Clone)]
@@ -68,13 +69,13 @@ const LESS_MOTION: &str = "<style>@media (prefers-reduced-motion:reduce){svg .mo
 #[must_use]
 pub fn render_svg(animation: &Animation) -> String {
     draw_still(animation).svg_with_overlay(|plots| {
-        let part = |p: &pace::PlaybackPart| format!("{} {} {}", p.from_s, p.to_s, p.slower);
+        let part = |p: &PlaybackPart| format!("{} {} {}", p.from_s, p.to_s, p.slower);
         let parts: Vec<String> = animation.pace.parts.iter().map(part).collect();
         format!(
             "{LESS_MOTION}<g class=\"moves\" data-pace=\"{}\" data-duration=\"{}\">\n{}</g>\n",
             parts.join(";"),
             animation.pace.duration_s(),
-            moving::moving_elements(animation, plots)
+            smil::moving_elements(animation, plots)
         )
     })
 }
@@ -113,7 +114,7 @@ fn draw_still(animation: &Animation) -> Figure {
         ),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
-        panels: [vec![drawing, enlarged], strips::draw_strips(animation)].concat(),
+        panels: [vec![drawing, enlarged], draw_strips(animation)].concat(),
     }
 }
 
@@ -127,5 +128,370 @@ pub fn describe_pace(pace: &PlaybackPace) -> String {
             "{first} slower than the motion{}",
             rest.iter().map(|f| format!(", then {f}")).collect::<String>()
         ),
+    }
+}
+
+// The animation of a condition: the model's reversal in fine steps, with what was measured on the same
+// clock.
+
+/// Most states over what is shown: some twenty-five in a cycle of 1 kHz over the tenth of a second that a
+/// reversal and its release take.
+const MOST_SAMPLES: usize = 2500;
+
+/// The animation; none of a model whose tip never sticks.
+pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
+    let shown = build_animation(case)?;
+    let drawing = Drawing::Moving(render_svg(&shown));
+    Some(case.model_figure_block("animation", figure_text(&shown, case), drawing))
+}
+
+fn build_animation(case: &ConditionComparison) -> Option<Animation> {
+    let (motion, shift) = (&case.model.motion, case.alignment.shift_s);
+    let hold = motion.longest_stick_s()?;
+    let pace =
+        PlaybackPace::around_hold(hold, [motion.samples.first()?.time_s, motion.samples.last()?.time_s])?;
+    let span = pace.span_s();
+    let interval = |[from, to]: [f64; 2]| [from + shift, to + shift];
+    let stick = motion.stick_s.iter().filter(|[from, to]| *to > span[0] && *from < span[1]);
+    Some(Animation {
+        title: case.figure_title(),
+        synthetic: case.is_synthetic(),
+        turns: motion.turn_s().is_some_and(|turn_s| turn_s >= span[0] && turn_s <= span[1]),
+        linkage: motion.linkage,
+        samples: thin_samples(motion, span, shift),
+        modes: contact_modes(motion, span).into_iter().map(|(since, mode)| (since + shift, mode)).collect(),
+        stick_s: stick.map(|s| interval(*s)).collect(),
+        hold_s: interval(hold),
+        measured: case
+            .recording()
+            .map(|recording| tracked_motion(recording, &case.alignment, span.map(|t| t + shift))),
+        pace: pace.shift_by(shift),
+    })
+}
+
+/// The states of a span from its first to its last, on a clock that is this far ahead.
+fn thin_samples(motion: &RunMotion, span_s: [f64; 2], shift_s: f64) -> Vec<ModelSample> {
+    let fine = motion.fine_samples_between(span_s);
+    let every = fine.len().div_ceil(MOST_SAMPLES).max(1);
+    let last = fine.last().filter(|_| !(fine.len() - 1).is_multiple_of(every));
+    let chosen = fine.iter().step_by(every).chain(last);
+    chosen.map(|s| ModelSample { time_s: s.time_s + shift_s, ..*s }).collect()
+}
+
+/// The frames of a span, with one more on either side, from the origin of the model.
+fn tracked_motion(recording: &Recording, alignment: &Alignment, [from_s, to_s]: [f64; 2]) -> TrackedMotion {
+    let grid = recording.grid();
+    let place = |t: f64| ((t - grid.start_s) * grid.frame_rate_hz).clamp(0.0, grid.frames as f64);
+    let frames = (place(from_s).floor() as usize)..(place(to_s).ceil() as usize + 1).min(grid.frames);
+    let of = |channel: Channel, origin_m: f64| {
+        let samples = channel.samples(recording);
+        samples.get(frames.clone()).unwrap_or_default().iter().map(|x| x.map(|x| x - origin_m)).collect()
+    };
+    TrackedMotion {
+        time_s: frames.clone().map(|i| grid.time_s(i)).collect(),
+        tip_x_m: of(Channel::TipX, alignment.along_m),
+        head_x_m: of(Channel::HeadX, alignment.along_m),
+        head_drop_m: of(Channel::HeadDrop, alignment.drop_m),
+    }
+}
+
+/// The mode at the start of a span, and every later one of it with its first instant.
+fn contact_modes(motion: &RunMotion, [from_s, to_s]: [f64; 2]) -> Vec<(f64, TipMode)> {
+    let first = motion.samples.iter().rfind(|s| s.time_s <= from_s).map(|s| (from_s, s.mode));
+    let inside = motion.transitions.iter().filter(|t| t.time_s > from_s && t.time_s <= to_s);
+    first.into_iter().chain(inside.map(|t| (t.time_s, t.to))).collect()
+}
+
+/// Which points of a recording are drawn, and how they came to their places.
+fn describe_crosses(recording: &Recording, case: &ConditionComparison) -> String {
+    let traces = recording.traces();
+    let points =
+        match (is_tracked(&traces.tip_x_m), is_tracked(&traces.head_x_m) && is_tracked(&traces.head_y_m)) {
+            (true, false) => "tip",
+            (false, true) => "head",
+            _ => "tip and head",
+        };
+    let how = match case.alignment {
+        Alignment { opposite_turn: true, .. } => {
+            "brought together at the turn of the head, which turns the other way in the model".to_owned()
+        }
+        Alignment { followed, .. } => format!("aligned by the path of the {}", followed.name()),
+    };
+    format!(
+        " Crosses: {points} of {}, clock and origin {how}; the tip's height is that of the glass.",
+        case.source_name()
+    )
+}
+
+/// What is shown, with the numbers of the hold.
+fn figure_text(shown: &Animation, case: &ConditionComparison) -> Words {
+    let [from_s, to_s] = shown.hold_s;
+    let at = |time_s: f64| shown.samples.iter().rfind(|s| s.time_s <= time_s).or(shown.samples.first());
+    let mm = |x: f64| format_decimals(1e3 * x, 2);
+    let deflection = |s: &ModelSample| mm(s.tip_x_m - s.head_x_m);
+    let held = at(from_s).zip(at(to_s)).map(|(from, to)| {
+        let stuck = format!(
+            "tip sticks for {:.1} ms while its head moves by {} mm",
+            1e3 * (to_s - from_s),
+            mm(to.head_x_m - from.head_x_m)
+        );
+        (stuck, format!(" and its deflection goes from {} to {} mm.", deflection(from), deflection(to)))
+    });
+    let points = case.recording().map_or_else(
+        || " The model alone: no traces are published.".to_owned(),
+        |r| describe_crosses(r, case),
+    );
+    let caption = match &held {
+        Some((stuck, _)) => {
+            format!("The fitted model in motion through {}, slowed down: the {stuck}.", shown.part_name())
+        }
+        None => format!("The fitted model in motion through {}, slowed down.", shown.part_name()),
+    };
+    let held = held.map_or_else(String::new, |(stuck, bends)| format!(" The model's {stuck}{bends}"));
+    let details = format!(
+        "Animation: the linkage of the fitted model through {}, its links to scale, {}; the size of the \
+         head's block is no measurement. \
+         Right: the tip enlarged, and its velocity, over the slowest part.{points}{held}",
+        shown.part_name(),
+        describe_pace(&shown.pace),
+    );
+    Words { caption, details }
+}
+
+// How much slower than the motion an animation runs, part by part.
+
+/// A part of the motion that is shown at one pace.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlaybackPart {
+    /// First instant of the motion, s.
+    pub from_s: f64,
+    /// Last instant of the motion, s.
+    pub to_s: f64,
+    /// How many times slower than the motion.
+    pub slower: f64,
+}
+
+impl PlaybackPart {
+    /// The part, as many times slower (a round number) as makes it last about `wanted_s`.
+    fn with_duration(from_s: f64, to_s: f64, wanted_s: f64) -> Self {
+        Self { from_s, to_s, slower: round_to_125(wanted_s / (to_s - from_s)).max(1.0) }
+    }
+
+    fn duration_s(&self) -> f64 {
+        (self.to_s - self.from_s) * self.slower
+    }
+}
+
+/// Parts that follow each other without gaps, then a rest on the last picture.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct PlaybackPace {
+    /// The parts, in order of time.
+    pub parts: Vec<PlaybackPart>,
+}
+
+/// How long the last picture stays before the animation starts again, s.
+const REST_S: f64 = 1.0;
+/// How long a viewer should watch the tip at rest and what comes before, s.
+const HOLD_SHOWN_S: f64 = 7.0;
+/// The same of the release and what follows.
+const RELEASE_SHOWN_S: f64 = 10.0;
+/// How much is shown before the hold, at the end of it as part of the release, and after it, as shares of its
+/// length.
+const LEAD_IN: f64 = 0.06;
+const RELEASE_LEAD: f64 = 0.02;
+const FOLLOW_UP: f64 = 0.3;
+
+impl PlaybackPace {
+    /// The hold of the tip, then its release and some cycles after it slower still; within what was run.
+    /// `None` where nothing moves between.
+    #[must_use]
+    pub fn around_hold([hold_s, release_s]: [f64; 2], within: [f64; 2]) -> Option<Self> {
+        let length = release_s - hold_s;
+        let instants =
+            [hold_s - LEAD_IN * length, release_s - RELEASE_LEAD * length, release_s + FOLLOW_UP * length]
+                .map(|t| t.max(within[0]).min(within[1]));
+        let wanted = [HOLD_SHOWN_S, RELEASE_SHOWN_S];
+        let parts: Vec<PlaybackPart> = instants
+            .windows(2)
+            .zip(wanted)
+            .filter(|(pair, _)| pair[0] < pair[1])
+            .map(|(pair, s)| PlaybackPart::with_duration(pair[0], pair[1], s))
+            .collect();
+        (!parts.is_empty()).then_some(Self { parts })
+    }
+
+    /// First and last instant of the motion, s.
+    #[must_use]
+    pub fn span_s(&self) -> [f64; 2] {
+        [self.parts.first().map_or(0.0, |p| p.from_s), self.parts.last().map_or(1.0, |p| p.to_s)]
+    }
+
+    /// First and last instant of the last part, s.
+    #[must_use]
+    pub(crate) fn last_part_s(&self) -> [f64; 2] {
+        self.parts.last().map_or(self.span_s(), |p| [p.from_s, p.to_s])
+    }
+
+    /// The pace of the same motion on a clock that is this far ahead.
+    #[must_use]
+    pub fn shift_by(self, shift_s: f64) -> Self {
+        let later =
+            |p: PlaybackPart| PlaybackPart { from_s: p.from_s + shift_s, to_s: p.to_s + shift_s, ..p };
+        Self { parts: self.parts.into_iter().map(later).collect() }
+    }
+
+    /// How long the animation lasts, s.
+    #[must_use]
+    pub fn duration_s(&self) -> f64 {
+        self.parts.iter().map(PlaybackPart::duration_s).sum::<f64>() + REST_S
+    }
+
+    /// When an instant of the motion is shown, as a share of the animation.
+    #[must_use]
+    pub fn playback_fraction(&self, time_s: f64) -> f64 {
+        let shown_s: f64 =
+            self.parts.iter().map(|p| (time_s.clamp(p.from_s, p.to_s) - p.from_s) * p.slower).sum();
+        shown_s / self.duration_s()
+    }
+}
+
+/// The nearest of 1, 2 and 5 times a power of ten, by ratio.
+pub(super) fn round_to_125(value: f64) -> f64 {
+    let power = math::powf(10.0, math::log10(value).floor());
+    let apart = |candidate: &f64| math::ln(candidate / value).abs();
+    let nearest =
+        [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().min_by(|a, b| apart(a).total_cmp(&apart(b)));
+    nearest.unwrap_or(value)
+}
+
+// Deflection over all that is shown and velocity of the tip over the last part, under the drawings.
+
+const HEIGHT_MM: f64 = 27.0;
+const MM: f64 = 1e3;
+
+/// A quantity of the model's states over time.
+struct StripChart {
+    label: &'static str,
+    /// What the model's line is called in the legend, and how it is drawn.
+    line: (&'static str, Mark),
+    of: fn(&ModelSample) -> f64,
+    /// The instants that it covers, s.
+    span_s: fn(&PlaybackPace) -> [f64; 2],
+}
+
+const STRIPS: [StripChart; 2] = [
+    StripChart {
+        label: "deflection, mm",
+        line: ("model", Mark::Thick),
+        of: |s| MM * (s.tip_x_m - s.head_x_m),
+        span_s: PlaybackPace::span_s,
+    },
+    StripChart {
+        label: "tip velocity, m/s",
+        line: ("", Mark::Line),
+        of: |s| s.tip_velocity_m_per_s,
+        span_s: PlaybackPace::last_part_s,
+    },
+];
+
+/// The panels; the first one holds the measured deflection too.
+pub(super) fn draw_strips(animation: &Animation) -> Vec<Panel> {
+    let mut panels: Vec<Panel> = STRIPS.iter().map(|strip| draw_strip(animation, strip)).collect();
+    if let (Some(first), Some(measured)) = (panels.first_mut(), &animation.measured) {
+        let deflection =
+            measured.tip_x_m.iter().zip(&measured.head_x_m).map(|(tip, head)| Some((*tip)? - (*head)?));
+        let points = measured.time_s.iter().zip(deflection).map(|(t, x)| x.map(|x| (*t, MM * x))).collect();
+        first.series.push(Series {
+            label: "measured".to_owned(),
+            mark: Mark::Thin,
+            points,
+            ..Series::default()
+        });
+    }
+    panels
+}
+
+/// The instants that every strip covers, s.
+pub(super) fn strip_spans_s(animation: &Animation) -> [[f64; 2]; 2] {
+    STRIPS.map(|strip| (strip.span_s)(&animation.pace))
+}
+
+fn draw_strip(animation: &Animation, strip: &StripChart) -> Panel {
+    let [from_s, to_s] = (strip.span_s)(&animation.pace);
+    let whole = [from_s, to_s] == animation.pace.span_s();
+    let points = animation.samples.iter().map(|s| Some((s.time_s, (strip.of)(s)))).collect();
+    let stick = |[from, to]: &[f64; 2]| ShadedSpan {
+        label: "tip sticks (model)".to_owned(),
+        colour: Colour::SkyBlue,
+        from: *from,
+        to: *to,
+        ..ShadedSpan::default()
+    };
+    let slower = animation.pace.parts.iter().skip(1).filter(|_| whole).map(|p| ShadedSpan {
+        label: format!("shown {} times slower", p.slower),
+        colour: Colour::Grey,
+        from: p.from_s,
+        to: p.to_s,
+        outlined: true,
+    });
+    Panel {
+        x: ChartAxis::time().with_range(from_s, to_s),
+        y: ChartAxis::linear(strip.label),
+        height_mm: HEIGHT_MM,
+        series: vec![Series {
+            label: strip.line.0.to_owned(),
+            colour: Colour::Vermilion,
+            mark: strip.line.1,
+            points,
+            ..Series::default()
+        }],
+        shaded_spans: animation.stick_s.iter().map(stick).chain(slower).collect(),
+        ..Panel::default()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn factors_are_round() {
+        assert_eq!(
+            [0.7, 1.2, 1.6, 3.0, 4.0, 98.0, 640.0].map(round_to_125),
+            [0.5, 1.0, 2.0, 2.0, 5.0, 100.0, 500.0]
+        );
+    }
+
+    #[test]
+    fn the_release_is_slower_than_the_hold_and_both_last_about_as_long_as_wanted() {
+        let pace = PlaybackPace::around_hold([0.666, 0.732], [0.56, 1.15]).unwrap();
+        assert_eq!(pace.parts.iter().map(|p| p.slower).collect::<Vec<_>>(), [100.0, 500.0]);
+        assert!((12.0..=20.0).contains(&pace.duration_s()), "{}", pace.duration_s());
+        assert_eq!(pace.parts[0].to_s, pace.parts[1].from_s);
+    }
+
+    #[test]
+    fn shares_follow_the_parts_and_leave_a_rest() {
+        let part = |from_s, to_s, slower| PlaybackPart { from_s, to_s, slower };
+        let pace = PlaybackPace { parts: vec![part(1.0, 1.02, 100.0), part(1.02, 1.03, 500.0)] };
+        assert!((pace.duration_s() - 8.0).abs() < 1e-9); // 2 s, 5 s and the rest of 1 s
+        for (time_s, expected) in [
+            (0.5, 0.0),
+            (1.01, 1.0 / 8.0),
+            (1.02, 2.0 / 8.0),
+            (1.025, 4.5 / 8.0),
+            (1.03, 7.0 / 8.0),
+            (9.0, 7.0 / 8.0),
+        ] {
+            assert!((pace.playback_fraction(time_s) - expected).abs() < 1e-9, "{time_s}");
+        }
+    }
+
+    #[test]
+    fn a_run_that_ends_early_is_shown_as_far_as_it_goes() {
+        let pace = PlaybackPace::around_hold([0.666, 0.732], [0.56, 0.70]).unwrap();
+        assert_eq!((pace.parts.len(), pace.span_s()[1]), (1, 0.70));
+        assert_eq!(PlaybackPace::around_hold([0.666, 0.732], [0.9, 0.9]), None);
+        assert_eq!(PlaybackPace::around_hold([0.7, f64::NAN], [f64::NAN, f64::NAN]), None);
     }
 }

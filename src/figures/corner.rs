@@ -1,14 +1,14 @@
 //! What the data know of the parameters together: every pair with its regions, every parameter with its
 //! profile, its bounds, its prior, the truth of a twin and the interval that the page states.
 
-use super::symbol::parameter_symbol;
+use super::figure_text::parameter_symbol;
 use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
 use crate::compare::ParameterLine;
 use crate::figures::{Drawing, FigureBlock, about, subtitle};
-use crate::fit::axis::Prior;
+use crate::fit::bounds::Bounds;
+use crate::fit::bounds::Prior;
 use crate::fit::job::{FreeParameter, Job};
 use crate::fit::result::FitResult;
-use crate::fit::scale::Bounds;
 use crate::math;
 use crate::text::{choose_prefix, format_digits, format_interval, join_with_and};
 

@@ -1,13 +1,18 @@
 //! The evidence of a fit: measured and model on one axis of time, what lies between them in units of the
 //! noise, and the same enlarged at the release and where it fits worst.
 
-pub(crate) mod caption;
-
 use super::history::{length_unit, symmetric_axis, thin_points};
+use super::{FigureBlock, Words, history};
 use crate::chart::{
     ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, SampledSeries, Series, ShadedSpan,
 };
+use crate::compare::ConditionComparison;
 use crate::figures::subtitle;
+use crate::fit::misfit::ChannelMisfit;
+use crate::recording::channel::{Channel, InstantKind};
+use crate::recording::motion_traces::MotionTraces;
+use crate::simulate::ModelSample;
+use crate::text::{capitalise, format_decimals, format_digits, format_length, format_trimmed};
 
 /// A course over time, `None` where it is interrupted: times, s, and values.
 pub type TimeCurve = Vec<Option<(f64, f64)>>;
@@ -169,6 +174,195 @@ fn format_noise_ratio(rms: f64) -> String {
     crate::text::format_digits(rms, 2)
 }
 
+// The evidence of a condition: whole, at the release, and where it fits worst after it.
+
+/// How long before and after the tip's release the enlarged part lasts, s.
+const AROUND_RELEASE_S: (f64, f64) = (0.005, 0.03);
+/// Length of the part in which the later motion fits worst, s: a dozen cycles of the high component.
+const LATE_S: f64 = 0.015;
+/// Least share of the frames of a part that hold a value: fewer frames scatter more, and would be the worst
+/// by chance.
+const LEAST_PRESENT: f64 = 0.5;
+
+/// The figure of a condition; none without a recording, or where the two cannot agree.
+pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
+    let residual = case.residual.as_ref()?;
+    let (channel, noise_m) = case.judged_channel()?;
+    let measured = MotionTraces::from_recording(case.recording()?);
+    let model = MotionTraces::from_model(&case.model.view.recording, &case.alignment);
+    let whole_s = (*residual.time_s.first()?, *residual.time_s.last()?);
+    let part = |name: String, span_s: (f64, f64)| {
+        let rms = residual.rms_m(channel, Some(span_s))? / noise_m;
+        let own = channel_between(&model, channel, span_s);
+        let left = channel_between(residual, channel, span_s).into_iter();
+        let sticks = case.model.view.stick_s.iter();
+        let shift_s = case.alignment.shift_s;
+        let sticks: Vec<(f64, f64)> = sticks.map(|[from, to]| (from + shift_s, to + shift_s)).collect();
+        Some(EvidencePart {
+            name,
+            span_s,
+            measured: channel_between(&measured, channel, span_s),
+            model: if span_s == whole_s {
+                own
+            } else {
+                model_states_curve(case, channel, span_s).unwrap_or(own)
+            },
+            residual: left.map(|p| p.map(|(t, x)| (t, x / noise_m))).collect(),
+            rms,
+            sticks: history::stick_spans(&sticks, span_s),
+        })
+    };
+    let release_s = case.measured_or_model().instant_s(InstantKind::Release);
+    let around_s = release_s
+        .map(|t| ((t - AROUND_RELEASE_S.0).max(whole_s.0), (t + AROUND_RELEASE_S.1).min(whole_s.1)))
+        .filter(|(from, to)| from < to);
+    let later_s = (around_s.map_or(whole_s.0, |(_, to)| to), whole_s.1);
+    let worst_s = worst_s(residual, channel, later_s).filter(|(from, to)| from < to);
+    let later = if around_s.is_some() { "worst later" } else { "worst part" };
+    let parts: Vec<EvidencePart> = [
+        part("recording".to_owned(), whole_s),
+        around_s.and_then(|span_s| part("release".to_owned(), span_s)),
+        worst_s.and_then(|span_s| part(later.to_owned(), span_s)),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let whole = parts.first()?.rms;
+    let shown = EvidencePlot {
+        title: figure_title(channel, whole, noise_m),
+        note: describe_segments(case).map_or_else(String::new, |said| said.trim_end_matches('.').to_owned()),
+        synthetic: case.is_synthetic(),
+        quantity: channel.label(),
+        parts,
+    };
+    Some(case.figure_block("evidence", figure_text(case, &shown, channel, noise_m), draw_figure(&shown)))
+}
+
+/// The part of [`LATE_S`] with the greatest mean square of a channel between two instants, s: from when to
+/// when. All between the two where that is shorter; `None` without a value.
+fn worst_s(residual: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)) -> Option<(f64, f64)> {
+    let first = residual.time_s.partition_point(|t| *t < from_s);
+    let end = residual.time_s.partition_point(|t| *t <= to_s);
+    let times = residual.time_s.get(first..end)?;
+    let column = residual.column(channel).get(first..end)?;
+    let (start_s, last_s) = (*times.first()?, *times.last()?);
+    column.iter().flatten().next()?;
+    let frames = (LATE_S / (last_s - start_s) * (times.len() - 1) as f64).round() as usize + 1;
+    if frames >= times.len() || frames < 2 {
+        return Some((start_s, last_s));
+    }
+    // squares and numbers of values before each frame
+    let mut sums = vec![(0.0, 0usize)];
+    for value in column {
+        let (square, count) = sums.last().copied().unwrap_or_default();
+        sums.push(value.map_or((square, count), |x| (square + x * x, count + 1)));
+    }
+    let mean = |at: usize| {
+        let ((before, counted), (after, all)) = (sums[at], sums[at + frames]);
+        let count = all - counted;
+        let enough = count as f64 >= LEAST_PRESENT * frames as f64;
+        enough.then(|| (at, (after - before) / count as f64))
+    };
+    let worst = (0..=times.len() - frames).filter_map(mean).reduce(|a, b| if b.1 > a.1 { b } else { a });
+    worst.map_or(Some((start_s, last_s)), |(at, _)| Some((times[at], times[at + frames - 1])))
+}
+
+/// A channel between two instants.
+fn channel_between(motion: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)) -> TimeCurve {
+    let all = motion.time_s.iter().zip(motion.column(channel));
+    all.filter(|(t, _)| **t >= from_s && **t <= to_s).map(|(t, x)| x.map(|x| (*t, x))).collect()
+}
+
+/// The model's own states, for a line as smooth as its motion; `None` where its frames are closer.
+fn model_states_curve(
+    case: &ConditionComparison,
+    channel: Channel,
+    (from_s, to_s): (f64, f64),
+) -> Option<TimeCurve> {
+    let (shift_s, by_m) = (case.alignment.shift_s, case.alignment.along_m);
+    let samples = case.model.motion.fine_samples_between([from_s - shift_s, to_s - shift_s]);
+    let frames = (to_s - from_s) * case.model.view.recording.grid().frame_rate_hz;
+    let place = |s: &ModelSample| match channel {
+        Channel::Deflection => Some(s.tip_x_m - s.head_x_m),
+        Channel::TipX => Some(s.tip_x_m + by_m),
+        Channel::HeadX => Some(s.head_x_m + by_m),
+        Channel::HeadDrop => None,
+    };
+    let point = |s: &ModelSample| place(s).map(|x| Some((s.time_s + shift_s, x)));
+    samples.iter().map(point).collect::<Option<TimeCurve>>().filter(|_| samples.len() as f64 > frames)
+}
+
+/// The claim with its number.
+fn figure_title(channel: Channel, rms: f64, noise_m: f64) -> String {
+    let (label, left) = (channel.label(), format_length(rms * noise_m));
+    if rms <= NOTHING_LEFT {
+        return format!(
+            "One run of the model explains the {label} to within its noise of {}",
+            format_length(noise_m)
+        );
+    }
+    format!("One run of the model misses the {label} by {left}, {} times the noise", format_noise_ratio(rms))
+}
+
+fn figure_text(case: &ConditionComparison, shown: &EvidencePlot, channel: Channel, noise_m: f64) -> Words {
+    let rms = |part: &EvidencePart| {
+        let at = match part.name.as_str() {
+            "worst later" => "where it fits worst later",
+            "worst part" => "where it fits worst",
+            _ => "at the release of the tip",
+        };
+        format!("{} {at}", format_noise_ratio(part.rms))
+    };
+    let [whole, parts @ ..] = shown.parts.as_slice() else {
+        return Words { caption: String::new(), details: String::new() };
+    };
+    let enlarged: Vec<String> = parts.iter().map(rms).collect();
+    let enlarged = if enlarged.is_empty() { String::new() } else { format!(": {}", enlarged.join(", ")) };
+    let caption = format!(
+        "The {} of {} and of one run of the fitted model lie {} apart (root mean square), {} times the \
+         noise{enlarged}.",
+        channel.label(),
+        case.source_kind(),
+        format_length(whole.rms * noise_m),
+        format_noise_ratio(whole.rms),
+    );
+    let spans: Vec<String> = shown
+        .parts
+        .iter()
+        .map(|part| {
+            let (from_s, to_s) = part.span_s;
+            format!("{} from {} to {} s", part.name, format_decimals(from_s, 4), format_decimals(to_s, 4))
+        })
+        .collect();
+    let details = format!(
+        "Shown: {}. The noise of the {} is {}, measured on the recording where nothing but noise moves it \
+         from frame to frame; the shaded strip holds 95 % of such noise. The model runs once from its start \
+         state through the same camera, so that small errors of its frequency add up; enlarged, its line is \
+         its own motion, and every dot is a frame.",
+        spans.join("; "),
+        channel.label(),
+        format_length(noise_m),
+    );
+    let details =
+        describe_segments(case).map_or(details.clone(), |said| format!("{details} {}", capitalise(&said)));
+    Words { caption, details }
+}
+
+/// What a fit to traces says: how far its restarted segments are from the recording.
+fn describe_segments(case: &ConditionComparison) -> Option<String> {
+    let misfit = case.result.misfit.as_ref()?;
+    let own = |found: &&ChannelMisfit| found.recording == case.name();
+    let tip = misfit.channels.iter().find(own)?;
+    let longest = misfit.stages.last()?;
+    Some(format!(
+        "restarted every {} ms, as it is fitted, the model misses the {} by {}, {} times the noise.",
+        format_trimmed(1e3 * longest.segment_s, 3),
+        tip.channel.replace("tip-x", "tip").replace("head-drop", "head drop"),
+        format_length(tip.residual_rms_m),
+        format_digits(tip.residual_rms_m / tip.noise_m, 2),
+    ))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -211,5 +405,35 @@ mod tests {
         let mut quiet = shown();
         quiet.parts[0].residual = vec![Some((0.5, 0.1))];
         assert!(draw_figure(&quiet).panels[1].y.range.unwrap().1 > NOISE_95);
+    }
+
+    fn residual(of: impl Fn(usize) -> Option<f64>) -> MotionTraces {
+        MotionTraces {
+            time_s: (0..1000).map(|i| i as f64 * 1e-3).collect(),
+            tip_x_m: (0..1000).map(of).collect(),
+            head_x_m: vec![None; 1000],
+            deflection_m: vec![None; 1000],
+            head_drop_m: vec![None; 1000],
+        }
+    }
+
+    #[test]
+    fn the_worst_part_is_where_the_residual_is_largest() {
+        let found = residual(|i| Some(if (400..416).contains(&i) { 5.0 } else { 1.0 }));
+        assert_eq!(worst_s(&found, Channel::TipX, (0.0, 1.0)), Some((0.4, 0.415)));
+        assert_eq!(worst_s(&found, Channel::TipX, (0.5, 0.6)), Some((0.5, 0.515)));
+        assert_eq!(worst_s(&found, Channel::TipX, (0.5, 0.51)), Some((0.5, 0.51)));
+        assert_eq!(worst_s(&found, Channel::HeadX, (0.0, 1.0)), None);
+    }
+
+    #[test]
+    fn a_single_frame_among_lost_ones_is_not_the_worst_part() {
+        let gap = |i: usize| (100..200).contains(&i);
+        let found = residual(|i| match i {
+            150 => Some(9.0),
+            600..616 => Some(2.0),
+            _ => Some(1.0).filter(|_| !gap(i)),
+        });
+        assert_eq!(worst_s(&found, Channel::TipX, (0.0, 1.0)), Some((0.6, 0.615)));
     }
 }

@@ -1,12 +1,17 @@
 //! The Stribeck curve: the fitted law over the speed of the tip, what the recording itself shows of friction,
 //! and how long the tip moved at each speed.
 
-pub(crate) mod caption;
-
+use super::{FigureBlock, Words};
 use crate::chart::{
     ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Ribbon, Series, VerticalLine,
 };
+use crate::compare::friction::{COEFFICIENTS, LawCoefficient, friction_half_95, is_fitted};
+use crate::compare::{ConditionComparison, FrictionPoint, MeasuredFriction};
 use crate::figures::subtitle;
+use crate::model::friction::FrictionLaw;
+use crate::simulate::ModelSample;
+use crate::simulate::mode::TipMode;
+use crate::text::{format_digits, format_percent, format_speed, join_with_and};
 use serde::Serialize;
 
 /// Friction of the law of the best model.
@@ -195,6 +200,232 @@ fn histogram_outline(law: &FrictionPlot) -> Series {
         points: histogram_corners(law).map(Some).collect(),
         ..Series::default()
     }
+}
+
+// The friction law of the fitted model, with the speeds at which the tip moved and what is known of it.
+
+/// Points of the curve, bins of speed.
+const CURVE_POINTS: usize = 200;
+const SPEED_BINS: usize = 30;
+/// The curve goes on this far beyond the greatest speed.
+const SPEED_MARGIN: f64 = 1.15;
+
+/// The figure; none for a model that never slips.
+pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
+    let law = case.model.scene.linkage.friction;
+    let slips = slip_speeds(case);
+    let (Some(slowest), Some(fastest)) = (slips.first(), slips.last()) else { return None };
+    let (visited, top) = ((slowest.0, fastest.0), SPEED_MARGIN * fastest.0);
+    let speeds: Vec<f64> = (0..=CURVE_POINTS).map(|i| top * i as f64 / CURVE_POINTS as f64).collect();
+    let half = friction_half_95(case.job, case.result, &law);
+    let measured = MeasuredFriction::measure(case);
+    let points = |of: &[FrictionPoint]| of.iter().map(|p| (p.speed_m_per_s, p.coefficient)).collect();
+    let shown = FrictionPlot {
+        title: claim_sentence(&law, fastest.0),
+        note: case.heading_note("model at the estimates"),
+        synthetic: case.is_synthetic(),
+        curve: speeds.iter().map(|v| (*v, law.dynamic_coefficient(*v))).collect(),
+        visited: Some(visited),
+        interval_95: half.as_ref().map_or_else(Vec::new, |half| {
+            speeds
+                .iter()
+                .map(|v| (*v, law.dynamic_coefficient(*v) - half(*v), law.dynamic_coefficient(*v) + half(*v)))
+                .collect()
+        }),
+        truth: true_law(case)
+            .map_or_else(Vec::new, |law| speeds.iter().map(|v| (*v, law.dynamic_coefficient(*v))).collect()),
+        even: points(&measured.steady_sliding),
+        over_cycles: points(&measured.over_cycles),
+        of_model: points(&measured.model_over_cycles),
+        shares: slip_time_shares(&slips, top),
+        head: Some(mean_head_speed(case)),
+    };
+    let words = figure_text(case, &law, &slips, half.as_deref(), &measured);
+    Some(case.figure_block("friction", words, draw_figure(&shown)))
+}
+
+/// The claim with its numbers.
+fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
+    let (rest, moving) = (law.static_coefficient(), law.dynamic_coefficient(fastest));
+    let how = if moving < rest { "falls" } else { "goes" };
+    format!(
+        "Friction {how} from {} at rest to {} at {}",
+        format_digits(rest, 3),
+        format_digits(moving, 3),
+        format_speed(fastest)
+    )
+}
+
+/// The law of a synthetic blade; `None` where the recording does not say it.
+fn true_law(case: &ConditionComparison) -> Option<FrictionLaw> {
+    let twin = case.measured.and_then(|m| m.file).and_then(|file| file.twin.as_ref())?;
+    let known = twin.get("truth").and_then(toml::Value::as_table)?;
+    let [a, b_s_per_m, c] = COEFFICIENTS.map(|c| known.get(c.name).and_then(toml::Value::as_float));
+    Some(FrictionLaw { a: a?, b_s_per_m: b_s_per_m?, c: c? })
+}
+
+/// Speeds of the tip where it slips, with the coefficients there, the slowest first.
+fn slip_speeds(case: &ConditionComparison) -> Vec<(f64, f64)> {
+    let samples = case.model.motion.samples.iter().filter(|s| is_slip(s));
+    let mut slips: Vec<(f64, f64)> =
+        samples.map(|s| (s.tip_velocity_m_per_s.abs(), friction_coefficient(s))).collect();
+    slips.sort_by(|a, b| a.0.total_cmp(&b.0));
+    slips
+}
+
+/// Friction at rest and at the greatest speed of the tip.
+pub(crate) fn friction_lines(case: &ConditionComparison) -> Vec<FrictionLine> {
+    let law = case.model.scene.linkage.friction;
+    let half = friction_half_95(case.job, case.result, &law);
+    let speeds = std::iter::once(0.0).chain(slip_speeds(case).last().map(|(fastest, _)| *fastest));
+    let line = |speed_m_per_s: f64| FrictionLine {
+        speed_m_per_s,
+        coefficient: law.dynamic_coefficient(speed_m_per_s),
+        half_95: half.as_ref().map(|half| half(speed_m_per_s)),
+    };
+    speeds.map(line).collect()
+}
+
+fn is_slip(sample: &ModelSample) -> bool {
+    matches!(sample.mode, TipMode::SlipForward | TipMode::SlipBackward) && sample.normal_n > 0.0
+}
+
+fn friction_coefficient(sample: &ModelSample) -> f64 {
+    sample.friction_n.abs() / sample.normal_n
+}
+
+/// Share of the time of slip in each bin; the states are equally far apart in time.
+fn slip_time_shares(slips: &[(f64, f64)], top: f64) -> Vec<(f64, f64, f64)> {
+    let below = |v: f64| slips.partition_point(|s| s.0 < v) as f64;
+    let edge = |i: usize| top * i as f64 / SPEED_BINS as f64;
+    (0..SPEED_BINS)
+        .map(|i| (edge(i), edge(i + 1), (below(edge(i + 1)) - below(edge(i))) / slips.len() as f64))
+        .collect()
+}
+
+/// Mean of `|v|` of the head over the run, m/s.
+fn mean_head_speed(case: &ConditionComparison) -> f64 {
+    let samples = &case.model.motion.samples;
+    samples.iter().map(|s| case.model.scene.drive.motion_at(s.time_s).velocity_m_per_s.abs()).sum::<f64>()
+        / samples.len().max(1) as f64
+}
+
+fn figure_text(
+    case: &ConditionComparison,
+    law: &FrictionLaw,
+    slips: &[(f64, f64)],
+    half: Option<&(dyn Fn(f64) -> f64 + '_)>,
+    measured: &MeasuredFriction,
+) -> Words {
+    let fastest = slips.last().map_or(0.0, |s| s.0);
+    let (median, head) = (slips.get(slips.len() / 2).map_or(0.0, |s| s.0), mean_head_speed(case));
+    let slower = slips.partition_point(|s| s.0 < head) as f64 / slips.len().max(1) as f64;
+    let mut said = vec![format!(
+        "Friction law of the model at the estimates, \u{b5} = A exp(\u{2212}B|v|) + C with A = {}, B = {} \
+         s/m, C = {}: from {} at rest to {} at {}, the greatest \
+         speed of the tip.",
+        format_digits(law.a, 3),
+        format_digits(law.b_s_per_m, 3),
+        format_digits(law.c, 3),
+        format_digits(law.static_coefficient(), 3),
+        format_digits(law.dynamic_coefficient(fastest), 3),
+        format_speed(fastest),
+    )];
+    said.extend(describe_points(case, law, measured));
+    said.push(format!(
+        "Below: the time of slip at each speed; half of it is slower than {}, {} of it slower than the head \
+         on average ({}).",
+        format_speed(median),
+        format_percent(slower),
+        format_speed(head)
+    ));
+    said.push(describe_uncertainty(case, median, half));
+    let even = largest_deviation(law, &measured.steady_sliding).map_or_else(String::new, |(count, off)| {
+        format!(
+            "; {count} points measured where the tip slides evenly lie within {} of it",
+            format_digits(off, 2)
+        )
+    });
+    let caption = format!("{} in the law of the fitted model{even}.", claim_sentence(law, fastest));
+    Words { caption, details: said.join(" ") + &case.sharing_note() }
+}
+
+/// How many points there are, and by how much the one farthest from the law is off.
+fn largest_deviation(law: &FrictionLaw, points: &[FrictionPoint]) -> Option<(usize, f64)> {
+    let off = |p: &FrictionPoint| (p.coefficient - law.dynamic_coefficient(p.speed_m_per_s)).abs();
+    points.iter().map(off).reduce(f64::max).map(|most| (points.len(), most))
+}
+
+/// What the points are, and why some of them are not on the law.
+fn describe_points(
+    case: &ConditionComparison,
+    law: &FrictionLaw,
+    measured: &MeasuredFriction,
+) -> Option<String> {
+    case.recording()?;
+    let even = largest_deviation(law, &measured.steady_sliding).map_or_else(
+        || "The recorded tip nowhere slides evenly.".to_owned(),
+        |(count, off)| {
+            format!(
+                "Full circles ({count}): where the recorded tip slides evenly its deflection gives the friction, as \
+                 the blade is in equilibrium there; stiffnesses and preload are the model's. The farthest is {} off \
+                 the law.",
+                format_digits(off, 2)
+            )
+        },
+    );
+    let cycles = if measured.over_cycles.is_empty() {
+        ""
+    } else {
+        " Hollow circles: means over cycles of stick and slip, which lie off the law as sticking counts in them; \
+         crosses are the model's, read in the same way."
+    };
+    Some(format!("{even}{cycles}"))
+}
+
+/// What the fit knows of the law.
+fn describe_uncertainty(
+    case: &ConditionComparison,
+    at: f64,
+    half: Option<&(dyn Fn(f64) -> f64 + '_)>,
+) -> String {
+    let (free, held): (Vec<_>, Vec<_>) = COEFFICIENTS.iter().partition(|c| is_fitted(case.job, c));
+    let symbols =
+        |of: &[&LawCoefficient]| join_with_and(&of.iter().map(|c| c.symbol.to_owned()).collect::<Vec<_>>());
+    let taken = if held.is_empty() {
+        String::new()
+    } else {
+        format!(" {} taken as known.", is_or_are(&symbols(&held), held.len()))
+    };
+    match half {
+        _ if free.is_empty() => "A, B and C were not fitted.".to_owned(),
+        Some(half) => format!(
+            "Shaded: 95 %, propagated from the intervals of {}{}, \u{b1}{} at rest and \u{b1}{} at {}.{taken}",
+            symbols(&free),
+            if free.len() > 1 { " with their correlations" } else { "" },
+            format_digits(half(0.0), 2),
+            format_digits(half(at), 2),
+            format_speed(at)
+        ),
+        None => {
+            let open: Vec<_> = free
+                .iter()
+                .filter(|c| case.result.parameters.get(c.name).is_none_or(|p| !p.has_interval()))
+                .copied()
+                .collect();
+            // the linear model may know each of them, and yet not how they go together
+            let which = if open.is_empty() { symbols(&free) } else { symbols(&open) };
+            let separately = if open.is_empty() { "" } else { " separately" };
+            format!(
+                "The data do not fix {which}{separately}, so the law has no interval here: other values meet \
+                 the same targets.{taken}"
+            )
+        }
+    }
+}
+
+fn is_or_are(symbols: &str, count: usize) -> String {
+    format!("{symbols} {}", if count == 1 { "is" } else { "are" })
 }
 
 #[cfg(test)]

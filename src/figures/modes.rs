@@ -1,11 +1,11 @@
 //! Natural modes of a blade: how its tip answers a force, and how the links swing.
 
-use crate::blade::Linkage;
-use crate::blade::modes::{NaturalMode, TipConstraint, natural_modes, tip_compliance};
 use crate::chart::{
     ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, VerticalLine,
 };
 use crate::math;
+use crate::model::Linkage;
+use crate::model::modes::{NaturalMode, TipConstraint, natural_modes, tip_compliance};
 use crate::text::{format_digits, join_with_and};
 
 /// Frequencies of the answer.

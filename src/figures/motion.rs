@@ -1,6 +1,7 @@
 //! A run of a scene: where head and tip go, how the blade bends, and how it stands on the glass.
 
-use super::history::{self, TimeHistory, bands};
+use super::history;
+use super::history::TimeHistory;
 use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, VerticalLine};
 use crate::figures::history::thin_points;
 use crate::recording::motion_traces::MotionTraces;
@@ -72,7 +73,7 @@ fn draw_force_panel(motion: &RunMotion, history: &TimeHistory) -> Option<Panel> 
             points: thin_points(&points, span_s),
             ..Series::default()
         }],
-        shaded_spans: bands::stick_spans(&history.stick_s, span_s),
+        shaded_spans: history::stick_spans(&history.stick_s, span_s),
         vertical_lines: flights.map(rule).collect(),
         ..Panel::default()
     })

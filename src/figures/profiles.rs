@@ -1,7 +1,7 @@
 //! Profile likelihoods: how far the cost rises along each parameter while the others follow, with the
 //! intervals that are read from it.
 
-use super::symbol::parameter_symbol;
+use super::figure_text::parameter_symbol;
 use crate::chart::{
     ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan,
     VerticalLine,
@@ -445,7 +445,7 @@ fn describe_truths(drawn: &[&ParameterProfile]) -> Option<String> {
 mod tests {
     use super::*;
     use crate::chart::Medium;
-    use crate::fit::scale::{Bounds, BoundsSpacing};
+    use crate::fit::bounds::{Bounds, BoundsSpacing};
 
     fn profile() -> ParameterProfile {
         ParameterProfile {

@@ -1,11 +1,13 @@
 //! What a model leaves of a recording against white noise: how large, how alike from frame to frame, at which
 //! frequencies, and how it grows with the length of a run.
 
-pub(crate) mod caption;
-
+use super::{FigureBlock, Words};
 use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Ribbon, Series};
+use crate::compare::ConditionComparison;
 use crate::figures::subtitle;
 use crate::math;
+use crate::spectrum::Multitaper;
+use crate::text::{format_decimals, format_digits};
 
 /// What the figure shows.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -138,6 +140,140 @@ fn draw_growth(shown: &ResidualDiagnostics) -> Option<Panel> {
     })
 }
 
+// The residual of a condition against white noise.
+
+/// Bins of the histogram, and deviations to either side that it holds at least.
+const HISTOGRAM_BINS: usize = 40;
+const MIN_HISTOGRAM_RANGE: f64 = 4.0;
+/// Longest lag, frames, and share of the recording that it may be.
+const MAX_LAGS: usize = 60;
+const MAX_LAG_FRACTION: f64 = 0.25;
+/// Fewest frames of which anything is said.
+const MIN_FRAMES: usize = 50;
+/// Most points of the spectrum: neighbours are one, by their mean.
+const MAX_SPECTRUM_POINTS: usize = 300;
+/// Tapers of the spectrum: its values scatter by a quarter.
+const TAPERS: usize = 9;
+/// Deviations of a two-sided 95 % interval.
+const Z_95: f64 = 1.96;
+/// Correlation of neighbours and size, over those of white noise, up to which a residual looks like noise.
+const WHITE_NOISE_TOLERANCE: f64 = 0.1;
+
+/// The figure of a condition; none without a recording, or where the two cannot agree.
+pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
+    let residual = case.residual.as_ref()?;
+    let (channel, noise_m) = case.judged_channel()?;
+    let left: Vec<Option<f64>> = residual.column(channel).iter().map(|x| x.map(|x| x / noise_m)).collect();
+    let values: Vec<f64> = left.iter().flatten().copied().collect();
+    if values.len() < MIN_FRAMES {
+        return None;
+    }
+    let rate_hz = case.recording()?.grid().frame_rate_hz;
+    let rms = (values.iter().map(|x| x * x).sum::<f64>() / values.len() as f64).sqrt();
+    let correlation = autocorrelation(&left, rate_hz);
+    let neighbours = correlation.first()?.1;
+    let stages = case.result.misfit.iter().flat_map(|misfit| &misfit.stages);
+    let shown = ResidualDiagnostics {
+        title: claim_sentence(rms, neighbours),
+        note: format!("residual of the {} in one run of the model", channel.label()),
+        synthetic: case.is_synthetic(),
+        histogram: histogram_bins(&values),
+        correlation,
+        white_95: Z_95 / (values.len() as f64).sqrt(),
+        spectrum: power_density(&left, rate_hz),
+        growth: stages
+            .map(|stage| (stage.segment_s, stage.chi2_per_dof))
+            .filter(|(_, chi2)| chi2.is_finite())
+            .collect(),
+    };
+    let caption = format!(
+        "{}; that of white noise lies within \u{b1}{}.",
+        shown.title,
+        format_decimals(shown.white_95, 2)
+    );
+    let growth = match (shown.growth.first(), shown.growth.last()) {
+        (Some(first), Some(last)) => format!(
+            " Restarted in segments, as it is fitted, the model has a chi2 per degree of freedom of {} at {} ms \
+             and {} at {} ms; one that does not grow speaks for the model.",
+            format_digits(first.1, 3),
+            format_digits(1e3 * first.0, 2),
+            format_digits(last.1, 3),
+            format_digits(1e3 * last.0, 2)
+        ),
+        _ => String::new(),
+    };
+    let details = format!(
+        "Measured minus model of the {} over the whole recording, in deviations of the noise: density of its \
+         values with that of the noise, correlation with itself some frames later, and its power density over \
+         that of the noise ({TAPERS} tapers).{growth}",
+        channel.label()
+    );
+    Some(case.figure_block("residuals", Words { caption, details }, draw_figure(&shown)))
+}
+
+/// The claim with its numbers.
+fn claim_sentence(rms: f64, neighbours: f64) -> String {
+    let is = if rms < 1.0 + WHITE_NOISE_TOLERANCE && neighbours.abs() < WHITE_NOISE_TOLERANCE {
+        "like white"
+    } else {
+        "more than"
+    };
+    let (size, r) = (format_digits(rms, 2), format_decimals(neighbours, 2));
+    format!("The residual is {is} noise: {size} times its size, correlation {r}")
+}
+
+/// Density of the values in bins from the least to the greatest end, the same on both sides.
+fn histogram_bins(values: &[f64]) -> Vec<(f64, f64, f64)> {
+    let end = values.iter().map(|x| x.abs()).filter(|x| x.is_finite()).fold(MIN_HISTOGRAM_RANGE, f64::max);
+    let width = 2.0 * end / HISTOGRAM_BINS as f64;
+    let mut counts = vec![0usize; HISTOGRAM_BINS];
+    for value in values.iter().filter(|x| x.is_finite()) {
+        let bin = (((value + end) / width) as usize).min(HISTOGRAM_BINS - 1);
+        if let Some(count) = counts.get_mut(bin) {
+            *count += 1;
+        }
+    }
+    let bin = |(i, count): (usize, usize)| {
+        let from = -end + i as f64 * width;
+        (from, from + width, count as f64 / values.len() as f64 / width)
+    };
+    counts.into_iter().enumerate().map(bin).collect()
+}
+
+/// Correlation at every lag from one frame on, over the pairs of frames that were both compared.
+fn autocorrelation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
+    let values = || left.iter().flatten();
+    let count = values().count().max(1) as f64;
+    let mean = values().sum::<f64>() / count;
+    let variance = values().map(|x| (x - mean) * (x - mean)).sum::<f64>() / count;
+    let longest = MAX_LAGS.min((MAX_LAG_FRACTION * left.len() as f64) as usize);
+    let at = |lag: usize| {
+        let both = left.iter().zip(left.get(lag..)?);
+        let pairs: Vec<f64> = both.filter_map(|(a, b)| Some(((*a)? - mean) * ((*b)? - mean))).collect();
+        let r = pairs.iter().sum::<f64>() / pairs.len() as f64 / variance;
+        Some((lag as f64 / rate_hz, r)).filter(|(_, r)| r.is_finite())
+    };
+    (1..=longest).filter_map(at).collect()
+}
+
+/// Power density over that of white noise of unit size, in few points.
+fn power_density(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
+    let Ok(found) = Multitaper::new(left, rate_hz, left.len(), TAPERS) else { return Vec::new() };
+    let white = 2.0 / rate_hz;
+    let bins: Vec<(f64, f64)> = found
+        .frequency_hz
+        .iter()
+        .zip(&found.density_m2_per_hz)
+        .skip(1)
+        .map(|(f, d)| (*f, d / white))
+        .collect();
+    let mean = |group: &[(f64, f64)]| {
+        let count = group.len() as f64;
+        (group.iter().map(|p| p.0).sum::<f64>() / count, group.iter().map(|p| p.1).sum::<f64>() / count)
+    };
+    bins.chunks(bins.len().div_ceil(MAX_SPECTRUM_POINTS).max(1)).map(mean).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -154,5 +290,38 @@ mod tests {
         assert_eq!(titles, ["size", "memory"]);
         assert_eq!(draw_figure(&shown).panels[1].series[0].points[0], Some((0.2, 0.3)));
         assert!(draw_figure(&ResidualDiagnostics::default()).panels.is_empty());
+    }
+
+    fn noise(count: usize) -> Vec<Option<f64>> {
+        let mut seed = 7_u64;
+        let mut draw = || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            ((seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5) * 12.0_f64.sqrt()
+        };
+        (0..count).map(|i| Some(draw()).filter(|_| i % 50 != 7)).collect()
+    }
+
+    #[test]
+    fn white_noise_looks_like_white_noise() {
+        let left = noise(6000);
+        let values: Vec<f64> = left.iter().flatten().copied().collect();
+        let total: f64 =
+            histogram_bins(&values).iter().map(|(from, to, density)| (to - from) * density).sum();
+        assert!((total - 1.0).abs() < 1e-9, "{total}");
+        let inside = |(_, r): &&(f64, f64)| r.abs() < Z_95 / (values.len() as f64).sqrt();
+        let found = autocorrelation(&left, 5000.0);
+        assert!(found.len() == MAX_LAGS && found.iter().filter(inside).count() >= 53, "{found:?}");
+        let powers = power_density(&left, 5000.0);
+        let mean = powers.iter().map(|p| p.1).sum::<f64>() / powers.len() as f64;
+        assert!((mean - 1.0).abs() < 0.06, "{mean}");
+    }
+
+    #[test]
+    fn a_swing_is_found_with_its_memory_and_its_frequency() {
+        let left: Vec<Option<f64>> = (0..4000).map(|i| Some(3.0 * (0.9 * f64::from(i)).sin())).collect();
+        assert!((autocorrelation(&left, 5000.0)[0].1 - 0.9_f64.cos()).abs() < 0.01);
+        let top = power_density(&left, 5000.0).into_iter().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap();
+        assert!((top.0 - 0.9 * 5000.0 / std::f64::consts::TAU).abs() < 20.0 && top.1 > 50.0, "{top:?}");
+        assert!(claim_sentence(2.1, 0.6).contains("more than noise: 2.1 times its size, correlation 0.60"));
     }
 }

@@ -1,21 +1,25 @@
 //! Spectrogram: amplitude over time and frequency as colours, with the ridge that was followed, and the ridge
 //! over the speed of the tip.
 
-pub(crate) mod caption;
-mod compared;
-mod targets;
+mod comparison;
 
-use crate::math;
-pub use crate::spectrum::time_frequency::SpeedPoint;
-pub use compared::{SpectrogramComparison, SpectrogramSide, draw_comparison};
-
+use super::{FigureBlock, Words};
 use crate::chart::{
     ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, HeatMap, Mark, MarkerShape, Panel, Series,
-    VerticalLine,
+    TextAnnotation, VerticalLine,
 };
+use crate::compare::condition::{FrequencyComparison, group_fit_windows};
+use crate::compare::{ConditionComparison, TrackedRidge};
 use crate::figures::subtitle;
+use crate::math;
+use crate::recording::channel::{Channel, InstantKind};
 use crate::spectrum::time_frequency;
+use crate::spectrum::time_frequency::RidgePoint as Point;
+pub use crate::spectrum::time_frequency::SpeedPoint;
 use crate::spectrum::time_frequency::course::DYNAMIC_RANGE_DB;
+use crate::text::{format_digits, format_milliseconds, truncate_text};
+pub use comparison::{SpectrogramComparison, SpectrogramSide, draw_comparison};
+use std::ops::Range;
 
 /// A frequency followed over time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -140,12 +144,9 @@ fn draw_map(shown: &SpectrogramPlot) -> Panel {
         x: limit_axis(ChartAxis::time(), time_span(&shown.time_s)),
         y: limit_axis(y, shown.shown_hz.or_else(|| frequency_range(shown))),
         height_mm: HEIGHT_MM,
-        series: targets::target_lines_over_map(&shown.targets)
-            .into_iter()
-            .chain(ridge_series(&shown.ridge))
-            .collect(),
+        series: target_lines_over_map(&shown.targets).into_iter().chain(ridge_series(&shown.ridge)).collect(),
         vertical_lines: shown.instants.iter().map(rule).collect(),
-        annotations: targets::target_names(shown),
+        annotations: target_names(shown),
         heat_map: Some(heat),
         ..Panel::default()
     }
@@ -239,6 +240,265 @@ pub(crate) fn describe_ridge_segments(
     format!("in {drawn} of {} segments{without}", of.time_s.len())
 }
 
+// Spectrograms of the deflection after the release, of both sides alike, with the ridges that follow the
+// stick-slip cycle.
+
+/// The frequencies shown reach this far beyond the ridges.
+const RIDGE_MARGIN: f64 = 1.6;
+
+/// A side, and what is added to its times, s.
+type ShiftedRidge<'a> = (SpectrogramSide, &'a TrackedRidge, f64);
+
+/// The figure; none where nothing can be cut into segments.
+pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
+    let (measured, model) = (case.ridges.measured.as_ref(), case.ridges.model.as_ref());
+    let of =
+        [(SpectrogramSide::Measured, measured, 0.0), (SpectrogramSide::Model, model, case.alignment.shift_s)];
+    let sides: Vec<ShiftedRidge> =
+        of.into_iter().filter_map(|(of, ridge, shift_s)| Some((of, ridge?, shift_s))).collect();
+    let Some((_, first, _)) = sides.first() else { return Vec::new() };
+    let tops = sides.iter().filter_map(|(_, ridge, _)| ridge.frequency_range_hz());
+    let top_hz = tops.map(|(_, high)| high).fold(0.0, f64::max);
+    let nyquist_hz = case.model.view.recording.grid().frame_rate_hz / 2.0;
+    let shown_hz = (0.0, if top_hz > 0.0 { (RIDGE_MARGIN * top_hz).min(nyquist_hz) } else { nyquist_hz });
+    let note = format!(
+        "spectrogram of the deflection in segments of {}",
+        format_milliseconds(first.spectrogram.segment_s)
+    );
+    let figure = draw_comparison(&SpectrogramComparison {
+        title: figure_title(&sides),
+        note: case.heading_note(&note),
+        synthetic: case.is_synthetic(),
+        sides: sides
+            .iter()
+            .map(|side| {
+                let targets = target_frequencies(case, side);
+                (side.0, SpectrogramPlot { targets, ..spectrogram_plot(side.1, side.2, shown_hz) })
+            })
+            .collect(),
+    });
+    vec![case.figure_block("spectrogram", figure_text(case, &sides), figure)]
+}
+
+/// The frequencies of the deflection that the job seeks, in their windows on a side's recording.
+fn target_frequencies(case: &ConditionComparison, (of, _, shift_s): &ShiftedRidge) -> Vec<TargetFrequency> {
+    let side = match of {
+        SpectrogramSide::Measured => case.measured_side(),
+        SpectrogramSide::Model => Some(case.model_side()),
+    };
+    let Some(side) = side else { return Vec::new() };
+    let grid = side.recording.grid();
+    let windows = group_fit_windows(case.job, case.condition);
+    let own = windows.iter().filter(|window| window.channel == Channel::Deflection);
+    let found = own.flat_map(|window| {
+        let frames = side.window_frames(&window.window);
+        window
+            .frequency_comparisons(case.result)
+            .into_iter()
+            .filter_map(move |sought| Some((frames.clone()?, sought)))
+    });
+    let target = |(frames, sought): (Range<usize>, FrequencyComparison)| TargetFrequency {
+        name: sought.target.name,
+        frequency_hz: sought.target.frequency_hz,
+        frequency_sd_hz: sought.target.frequency_sd_hz,
+        span_s: (grid.time_s(frames.start) + shift_s, grid.time_s(frames.end) + shift_s),
+        met: sought.met,
+    };
+    found.map(target).collect()
+}
+
+fn spectrogram_plot(of: &TrackedRidge, shift_s: f64, shown_hz: (f64, f64)) -> SpectrogramPlot {
+    let (start_s, spectrogram) = (of.start_s + shift_s, &of.spectrogram);
+    // (of a fast camera most lie beyond what is shown)
+    let bins = spectrogram.frequency_hz.partition_point(|f| *f <= shown_hz.1);
+    let column = |column: &Option<Vec<f64>>| match column {
+        Some(column) => column.iter().take(bins).copied().map(Some).collect(),
+        None => vec![None; bins],
+    };
+    let gap = SpectrogramRidgePoint { time_s: start_s, frequency_hz: None };
+    let place =
+        |p: &Point| SpectrogramRidgePoint { time_s: start_s + p.time_s, frequency_hz: Some(p.frequency_hz) };
+    let part = |part: &Vec<Point>| std::iter::once(gap).chain(part.iter().map(place)).collect::<Vec<_>>();
+    SpectrogramPlot {
+        quantity: Channel::Deflection.to_string(),
+        time_s: spectrogram.time_s.iter().map(|t| start_s + t).collect(),
+        frequency_hz: spectrogram.frequency_hz.iter().take(bins).copied().collect(),
+        amplitude_m: spectrogram.amplitude_m.iter().map(column).collect(),
+        shown_hz: Some(shown_hz),
+        ridge: of.courses.iter().flat_map(part).collect(),
+        over_speed: of.over_speed.clone(),
+        ..SpectrogramPlot::default()
+    }
+}
+
+fn figure_text(case: &ConditionComparison, sides: &[ShiftedRidge]) -> Words {
+    let Some((first_of, first, _)) = sides.first() else {
+        return Words { caption: String::new(), details: String::new() };
+    };
+    let both = match (sides.len() > 1, first_of, case.recording()) {
+        (true, ..) => {
+            format!("{} and the fitted model, in the same segments and colours", case.source_name())
+        }
+        (false, SpectrogramSide::Model, Some(_)) => format!(
+            "the fitted model alone, as no segment of {} has frames enough with a deflection",
+            case.source_name()
+        ),
+        _ => case.source_name(),
+    };
+    let released = case
+        .measured_or_model()
+        .instant_s(InstantKind::Release)
+        .map_or("", |_| " from the release of the tip on");
+    let mut said = vec![format!(
+        "Amplitude of the deflection over time and frequency{released} (segments of {}, trend removed): \
+         {both}.",
+        format_milliseconds(first.spectrogram.segment_s)
+    )];
+    for (of, ridge, _) in sides {
+        let name = if *of == SpectrogramSide::Measured { "the recording" } else { "the model" };
+        said.push(match ridge.frequency_range_hz() {
+            Some((low, high)) => format!(
+                "The ridge of {name}, the strongest component between {} and {} Hz, is drawn {} and runs \
+                 from {} to {} Hz.",
+                format_digits(ridge.band_hz.0, 3),
+                format_digits(ridge.band_hz.1, 3),
+                describe_ridge_segments(&ridge.courses, &ridge.ridge, &ridge.spectrogram),
+                format_digits(low, 3),
+                format_digits(high, 3)
+            ),
+            None if !ridge.ridge.points.is_empty() => {
+                format!(
+                    "The ridge of {name} is drawn \
+                {}.",
+                    describe_ridge_segments(&ridge.courses, &ridge.ridge, &ridge.spectrogram)
+                )
+            }
+            None => format!("Nothing in {name} stands out long enough to be followed."),
+        });
+    }
+    if sides.iter().any(|(_, ridge, _)| ridge.frequency_range_hz().is_some()) {
+        said.push(
+            "Below: the ridges over time and over the mean speed of the tip in each segment.".to_owned(),
+        );
+    }
+    Words { caption: claim_sentence(case, sides), details: said.join(" ") }
+}
+
+/// The claim with its numbers: where the ridges run.
+fn figure_title(sides: &[ShiftedRidge]) -> String {
+    let found = |wanted: SpectrogramSide| {
+        let range_hz = sides.iter().find(|(of, ..)| *of == wanted)?.1.frequency_range_hz()?;
+        Some(format!("from {} to {} Hz", format_digits(range_hz.0, 3), format_digits(range_hz.1, 3)))
+    };
+    match (found(SpectrogramSide::Measured), found(SpectrogramSide::Model)) {
+        (Some(measured), Some(model)) if measured == model => {
+            format!("The strongest component runs {measured} in both")
+        }
+        (Some(measured), Some(model)) => format!("The ridge runs {measured}, in the model {model}"),
+        (Some(measured), None) => format!("The ridge of the recording alone runs {measured}"),
+        (None, Some(model)) => format!("The ridge of the model runs {model}"),
+        (None, None) => "Nothing stands out long enough to be followed".to_owned(),
+    }
+}
+
+/// Where the ridges run.
+fn claim_sentence(case: &ConditionComparison, sides: &[ShiftedRidge]) -> String {
+    let name = |of: &SpectrogramSide| {
+        if *of == SpectrogramSide::Measured { case.source_kind() } else { "the fitted model" }
+    };
+    let one = |(of, ridge, _): &ShiftedRidge| match ridge.frequency_range_hz() {
+        Some((low, high)) => {
+            format!("{} from {} to {} Hz", name(of), format_digits(low, 3), format_digits(high, 3))
+        }
+        None => format!("{} nowhere", name(of)),
+    };
+    let ridges: Vec<String> = sides.iter().map(one).collect();
+    let targets = sides.first().map_or_else(Vec::new, |side| target_frequencies(case, side));
+    let met = targets.iter().filter(|target| target.met).count();
+    let met = match targets.len() {
+        0 => String::new(),
+        all => format!("; {met} of {all} {} met", if all == 1 { "target is" } else { "targets are" }),
+    };
+    format!(
+        "Amplitude of the deflection over time and frequency: the strongest component can be followed in {}{met}.",
+        ridges.join(", in ")
+    )
+}
+
+// The frequencies that are sought, as lines over their windows with two deviations either side.
+
+/// Letters of a name that have room in a map.
+const MAX_LABEL_LETTERS: usize = 14;
+/// Distance of a name from its line, and distance of lines whose names would meet, shares of the height.
+const LABEL_OFFSET: f64 = 0.05;
+const CLOSE_TARGETS: f64 = 0.1;
+/// Where the middle of a name stays, shares of the width: its ends lie within the axes.
+const LABEL_LIMITS: (f64, f64) = (0.3, 0.7);
+
+/// The lines over a map, edged so that they are seen on every colour.
+pub(super) fn target_lines_over_map(targets: &[TargetFrequency]) -> Option<Series> {
+    (!targets.is_empty()).then(|| target_lines(targets, "target \u{b1} 2 sd", Colour::Black, Mark::Edged))
+}
+
+/// The same over the ridges, those that are met apart from the others.
+pub(super) fn target_lines_over_ridges(targets: &[TargetFrequency]) -> impl Iterator<Item = Series> {
+    let looks = [
+        (true, "target, met", Colour::Blue, Mark::Dashed),
+        (false, "target, missed", Colour::Purple, Mark::Dotted),
+    ];
+    looks.into_iter().filter_map(|(met, label, colour, mark)| {
+        let own: Vec<TargetFrequency> = targets.iter().filter(|t| t.met == met).cloned().collect();
+        (!own.is_empty()).then(|| target_lines(&own, label, colour, mark))
+    })
+}
+
+fn target_lines(targets: &[TargetFrequency], label: &str, colour: Colour, mark: Mark) -> Series {
+    let line = |t: &TargetFrequency| {
+        let (from_s, to_s) = t.span_s;
+        [Some((from_s, t.frequency_hz)), Some((to_s, t.frequency_hz)), None]
+    };
+    let ends = |t: &TargetFrequency| {
+        let (half, f) = (2.0 * t.frequency_sd_hz.unwrap_or(0.0), t.frequency_hz);
+        [t.span_s.0, t.span_s.1].map(|x| ErrorBar::Vertical { x, from: f - half, to: f + half })
+    };
+    Series {
+        label: label.to_owned(),
+        colour,
+        mark,
+        points: targets.iter().flat_map(line).collect(),
+        error_bars: targets.iter().filter(|t| t.frequency_sd_hz.is_some()).flat_map(ends).collect(),
+    }
+}
+
+/// "high 908 Hz, met" over every line; under it where the next one is close.
+pub(super) fn target_names(shown: &SpectrogramPlot) -> Vec<TextAnnotation> {
+    let Some((bottom, top)) = shown.shown_hz.or_else(|| frequency_range(shown)) else { return Vec::new() };
+    let Some((first, last)) = time_span(&shown.time_s) else { return Vec::new() };
+    let place = |share: f64| first + share * (last - first);
+    let text = |t: &TargetFrequency| {
+        let above = |other: &TargetFrequency| {
+            other.frequency_hz > t.frequency_hz
+                && other.frequency_hz - t.frequency_hz < CLOSE_TARGETS * (top - bottom)
+        };
+        let side = if shown.targets.iter().any(above) { -1.0 } else { 1.0 };
+        let middle = (t.span_s.0.max(first) + t.span_s.1.min(last)) / 2.0;
+        TextAnnotation {
+            text: format!(
+                "{} {} Hz, {}",
+                truncate_text(&t.name, MAX_LABEL_LETTERS),
+                format_digits(t.frequency_hz, 3),
+                if t.met { "met" } else { "missed" }
+            ),
+            colour: Colour::Black,
+            at: (
+                middle.clamp(place(LABEL_LIMITS.0), place(LABEL_LIMITS.1)),
+                t.frequency_hz + side * LABEL_OFFSET * (top - bottom),
+            ),
+        }
+    };
+    shown.targets.iter().map(text).collect()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -309,5 +569,31 @@ mod tests {
             [Some((-0.5, 1.5)), Some((-0.5, 4.0))]
         );
         assert_eq!([time_span(&[1.0]), time_span(&[])], [None, None]);
+    }
+
+    fn aimed(name: &str, frequency_hz: f64, met: bool) -> TargetFrequency {
+        let name = name.to_owned();
+        TargetFrequency { name, frequency_hz, frequency_sd_hz: Some(7.0), span_s: (0.2, 0.6), met }
+    }
+
+    #[test]
+    fn a_target_lies_in_its_window_with_two_deviations_and_says_whether_it_is_met() {
+        let shown = SpectrogramPlot {
+            time_s: vec![0.1, 0.3, 0.5, 0.7],
+            shown_hz: Some((0.0, 1000.0)),
+            targets: vec![aimed("lowest", 359.0, true), aimed("highest", 400.0, false)],
+            ..SpectrogramPlot::default()
+        };
+        let line = target_lines_over_map(&shown.targets).unwrap();
+        assert_eq!(line.points[..3], [Some((0.2, 359.0)), Some((0.6, 359.0)), None]);
+        assert_eq!(line.error_bars[0], ErrorBar::Vertical { x: 0.2, from: 345.0, to: 373.0 });
+        let texts: Vec<(String, f64)> = target_names(&shown).into_iter().map(|t| (t.text, t.at.1)).collect();
+        assert_eq!(
+            texts,
+            [("lowest 359 Hz, met".to_owned(), 309.0), ("highest 400 Hz, missed".to_owned(), 450.0)]
+        );
+        let labels: Vec<String> = target_lines_over_ridges(&shown.targets).map(|s| s.label).collect();
+        assert_eq!(labels, ["target, met", "target, missed"]);
+        assert!(target_lines_over_map(&[]).is_none() && target_lines_over_ridges(&[]).next().is_none());
     }
 }

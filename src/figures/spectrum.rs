@@ -1,20 +1,25 @@
 //! Spectra: measured against model in physical units, with components, published frequencies and the noise
 //! floor.
 
-pub(crate) mod caption;
-mod levels;
-mod named;
+mod components;
 
-pub use crate::spectrum::Target;
-pub use levels::{AmplitudeInterval, SpectrumLevel};
-pub use named::LabelledComponent;
-
+use super::analysis::compare_spectra;
+use super::figure_text::file_name_part;
+use super::{FigureBlock, Words, ring_down};
 use crate::chart::{
-    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, ShadedSpan, TopLabel, VerticalLine,
+    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series, ShadedSpan, TopLabel, VerticalLine,
 };
+use crate::compare::condition::{FitWindow, FrequencyComparison, group_fit_windows};
+use crate::compare::{ConditionComparison, TimedRecording};
+use crate::feature::{FeatureBand, Reading};
 use crate::figures::{NO_TRACES, subtitle};
-use crate::text::format_trimmed;
-use levels::{axis_points, level_series};
+pub use crate::spectrum::Target;
+use crate::spectrum::{SampledRecord, SpectralAnalysis, SpectrumSettings};
+use crate::text::{
+    capitalise, format_digits, format_length, format_percent, format_signed_percent, format_trimmed,
+    format_with_sd,
+};
+pub use components::LabelledComponent;
 
 /// An amplitude spectrum.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -158,7 +163,7 @@ fn spectrum_series(spectra: &SpectraPlot, highest: f64) -> Vec<Series> {
     let mut drawn = level_series(spectra, highest);
     drawn.extend(spectra.measured.as_ref().map(|c| curve("measured", Colour::Black, Mark::Thin, c)));
     drawn.extend(spectra.model.as_ref().map(|c| curve("model", Colour::Vermilion, Mark::Line, c)));
-    drawn.extend(named::component_series(&spectra.components, &spectra.model_components));
+    drawn.extend(components::component_series(&spectra.components, &spectra.model_components));
     drawn
 }
 
@@ -207,7 +212,7 @@ fn target_lines(spectra: &SpectraPlot) -> Vec<VerticalLine> {
         above: None,
     };
     let most = if spectra.targets.is_empty() { usize::MAX } else { MOST_NAMES };
-    spectra.targets.iter().map(target).chain(named::component_labels(named, most)).collect()
+    spectra.targets.iter().map(target).chain(components::component_labels(named, most)).collect()
 }
 
 /// Names of the targets, where components are named over them.
@@ -218,6 +223,305 @@ fn target_labels(spectra: &SpectraPlot) -> Vec<TopLabel> {
     } else {
         spectra.targets.iter().map(caption).collect()
     }
+}
+
+// Amplitude spectra, one for each window of a channel that the fit reads, and the one of the low
+// component taken apart.
+
+/// Frequencies are shown up to this many times the band that the fit reads, and to this one, Hz, at least:
+/// what a fast camera has beyond is noise.
+const BAND_MARGIN: f64 = 10.0;
+const MIN_TOP_HZ: f64 = 5e3;
+
+/// The spectra in the order of the job, then the ring-down. Every window is analysed once; one after the
+/// other, because long ones are large.
+pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
+    let all = group_fit_windows(case.job, case.condition);
+    let lowest = ring_down::lowest_window(case, &all);
+    let (mut spectra, mut ring_down) = (Vec::new(), None);
+    for (i, window) in all.iter().enumerate() {
+        let Some(band) = window.band else { continue };
+        let measured = case.measured_side().and_then(|side| analyse_window(case, &side, band));
+        let model = analyse_window(case, &case.model_side(), band);
+        if let Some((_, target_hz)) = lowest.filter(|(of, _)| *of == i) {
+            let shown = if case.recording().is_some() { &measured } else { &model };
+            ring_down = shown
+                .as_ref()
+                .and_then(|analysis| ring_down::figure_block(case, window, analysis, target_hz));
+        }
+        spectra.extend(window_block(case, window, band, measured.as_ref(), model.as_ref()));
+    }
+    spectra.into_iter().chain(ring_down).collect()
+}
+
+fn window_block(
+    case: &ConditionComparison,
+    window: &FitWindow,
+    band: &FeatureBand,
+    measured: Option<&SpectralAnalysis>,
+    model: Option<&SpectralAnalysis>,
+) -> Option<FigureBlock> {
+    let met = window.frequency_comparisons(case.result);
+    let spectra = SpectraPlot {
+        quantity: window.channel.label(),
+        note: format!("spectrum of the {} in the window {}", window.channel.label(), window.window),
+        synthetic: case.is_synthetic(),
+        targets: met.iter().map(|m| m.target.clone()).collect(),
+        ..limit_frequencies(compare_spectra(measured, model), band)
+    };
+    let spectra = SpectraPlot { title: figure_title(&spectra, &met), ..spectra };
+    let name = |aim: &&&crate::fit::job::FitTarget| matches!(aim.feature.reading, Reading::Frequency(_));
+    let first = window.targets.iter().find(name).or(window.targets.first())?;
+    let words = figure_text(case, window, band, &spectra, &met);
+    Some(case.figure_block(
+        &format!("spectrum-{}", file_name_part(&first.feature.name)),
+        words,
+        draw_figure(&spectra),
+    ))
+}
+
+/// Spectra up to the highest frequency that is shown.
+fn limit_frequencies(mut spectra: SpectraPlot, band: &FeatureBand) -> SpectraPlot {
+    let components = spectra.components.iter().chain(&spectra.model_components).map(|c| c.frequency_hz);
+    let top_hz = components.fold(MIN_TOP_HZ, f64::max).max(BAND_MARGIN * band.band_hz.1);
+    let cut = |frequency_hz: &mut Vec<f64>, amplitude_m: &mut Vec<f64>| {
+        frequency_hz.truncate(frequency_hz.partition_point(|f| *f <= top_hz));
+        amplitude_m.truncate(frequency_hz.len());
+    };
+    [&mut spectra.measured, &mut spectra.model]
+        .into_iter()
+        .flatten()
+        .for_each(|curve| cut(&mut curve.frequency_hz, &mut curve.amplitude_m));
+    spectra.noise_floor.iter_mut().for_each(|level| cut(&mut level.frequency_hz, &mut level.amplitude_m));
+    spectra
+}
+
+/// A window of one side, taken apart.
+fn analyse_window(
+    case: &ConditionComparison,
+    side: &TimedRecording,
+    band: &FeatureBand,
+) -> Option<SpectralAnalysis> {
+    let samples = side.samples(band.channel);
+    let record = SampledRecord {
+        samples: samples.get(side.window_frames(&band.window)?)?,
+        frame_rate_hz: side.recording.grid().frame_rate_hz,
+        exposure_s: case.exposure_s(),
+    };
+    SpectralAnalysis::from_record(
+        &record,
+        &SpectrumSettings { detrend: Some(band.detrend), ..SpectrumSettings::default() },
+    )
+    .ok()
+}
+
+fn figure_text(
+    case: &ConditionComparison,
+    window: &FitWindow,
+    band: &FeatureBand,
+    spectra: &SpectraPlot,
+    met: &[FrequencyComparison],
+) -> Words {
+    let both = if spectra.measured.is_some() {
+        format!("{} and the fitted model, read alike", case.source_name())
+    } else {
+        case.source_name()
+    };
+    let mut said = vec![format!(
+        "Amplitude spectrum of the {} in the window {} ({} removed, Hann window): {both}.",
+        window.channel.label(),
+        window.window,
+        band.detrend
+    )];
+    let kind = if case.recording().is_some() { "target" } else { "published" };
+    said.extend(met.iter().map(|met| describe_target(met, kind)));
+    for (of, components) in [("recording", &spectra.components), ("model", &spectra.model_components)]
+        .into_iter()
+        .filter(|(_, c)| !c.is_empty())
+    {
+        let names: Vec<String> = components.iter().map(LabelledComponent::label_text).collect();
+        said.push(format!("Components of the {of}, the largest first: {}.", names.join("; ")));
+    }
+    if let Some(floor_m) = spectra.noise_floor_m {
+        let floor = format_length(floor_m);
+        said.push(format!(
+            "The noise floor of the recording is {floor} in a bin of the window; the model is drawn without \
+             noise, its components above that floor."
+        ));
+    }
+    let channel = window.channel.label();
+    let caption = format!(
+        "Amplitude spectrum of the {channel}, {}: {}.",
+        whose_spectra(case, spectra),
+        claim_sentence(met)
+    );
+    Words { caption, details: said.join(" ") }
+}
+
+/// Whose spectra are drawn.
+fn whose_spectra(case: &ConditionComparison, spectra: &SpectraPlot) -> String {
+    match (&spectra.measured, &spectra.model) {
+        (Some(_), Some(_)) => format!("{} over the fitted model", case.source_kind()),
+        (None, Some(_)) => "the fitted model alone".to_owned(),
+        _ => format!("{} alone", case.source_kind()),
+    }
+}
+
+/// The claim with its number.
+fn figure_title(spectra: &SpectraPlot, met: &[FrequencyComparison]) -> String {
+    match met {
+        [] => strongest_claim(spectra),
+        [one] => match one.model_hz {
+            Some(hz) => format!(
+                "The model has {} Hz, {} from the target of {} Hz",
+                format_digits(hz, 4),
+                format_percent((hz / one.target.frequency_hz - 1.0).abs()),
+                format_with_sd(one.target.frequency_hz, one.target.frequency_sd_hz)
+            ),
+            None => format!(
+                "The model has no component at the target of {} Hz",
+                format_with_sd(one.target.frequency_hz, one.target.frequency_sd_hz)
+            ),
+        },
+        _ => capitalise(&claim_sentence(met).replace(" that are sought", "")),
+    }
+}
+
+/// How many of the frequencies that are sought the model has, and how near they are.
+fn claim_sentence(met: &[FrequencyComparison]) -> String {
+    let error = |met: &FrequencyComparison| met.model_hz.map(|hz| (hz / met.target.frequency_hz - 1.0).abs());
+    let errors: Vec<f64> = met.iter().filter_map(error).collect();
+    let largest = errors.iter().copied().fold(0.0, f64::max);
+    let (found, all) = (errors.len(), met.len());
+    match (found, all) {
+        (_, 0) => "no frequency is sought in it".to_owned(),
+        (0, _) => format!("the model has none of the {all} frequencies that are sought"),
+        (1, 1) => format!("the model meets the frequency that is sought within {}", format_percent(largest)),
+        _ if found == all => {
+            format!(
+                "the model meets all {all} frequencies that are sought within {}",
+                format_percent(largest)
+            )
+        }
+        _ => format!(
+            "the model has {found} of the {all} frequencies that are sought, within {}",
+            format_percent(largest)
+        ),
+    }
+}
+
+/// "high: target 908(4) Hz, model 908.0 Hz (+0.04 %)."
+fn describe_target(met: &FrequencyComparison, kind: &str) -> String {
+    let target = &met.target;
+    let model = met.model_hz.map_or_else(
+        || "the model shows none".to_owned(),
+        |hz| {
+            format!(
+                "model {} Hz ({})",
+                format_digits(hz, 4),
+                format_signed_percent(hz / target.frequency_hz - 1.0)
+            )
+        },
+    );
+    format!(
+        "{}: {kind} {} Hz, {model}.",
+        target.name,
+        format_with_sd(target.frequency_hz, target.frequency_sd_hz)
+    )
+}
+
+// Noise floor, leakage and interval of a spectrum.
+
+/// A level over frequency.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct SpectrumLevel {
+    /// Frequencies, Hz.
+    pub frequency_hz: Vec<f64>,
+    /// Amplitudes, m.
+    pub amplitude_m: Vec<f64>,
+}
+
+/// An interval of amplitudes over frequency.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct AmplitudeInterval {
+    /// Frequencies, Hz.
+    pub frequency_hz: Vec<f64>,
+    /// Lower ends, m.
+    pub lower_m: Vec<f64>,
+    /// Upper ends, m.
+    pub upper_m: Vec<f64>,
+}
+
+impl SpectrumLevel {
+    /// The lowest positive level from a frequency on, m.
+    pub(super) fn lowest_m(&self, lowest_hz: f64) -> Option<f64> {
+        let shown = self
+            .frequency_hz
+            .iter()
+            .zip(&self.amplitude_m)
+            .filter(|(f, a)| **f >= lowest_hz && **a > 0.0 && a.is_finite());
+        shown.map(|(_, a)| *a).reduce(f64::min)
+    }
+}
+
+/// Radius of the circle about a bin's complex amplitude that holds 95 % of the noise there, over the root
+/// mean square of the noise: `sqrt(-ln 0.05)`, as its magnitude follows Rayleigh's law.
+const CIRCLE_95: f64 = 1.730_818_382_602_285_7;
+
+impl AmplitudeInterval {
+    /// What noise of a level leaves open of every amplitude of a curve: the true one lies in it in 95 % of
+    /// the bins at least, and where it reaches down to zero the bin may hold noise alone.
+    #[must_use]
+    pub fn from_noise_floor(curve: &SpectrumCurve, floor: &SpectrumLevel) -> Self {
+        let ends = |sign: f64| {
+            let end = |(a, noise_m): (&f64, &f64)| (a + sign * CIRCLE_95 * noise_m).max(0.0);
+            curve.amplitude_m.iter().zip(&floor.amplitude_m).map(end).collect()
+        };
+        Self { frequency_hz: curve.frequency_hz.clone(), lower_m: ends(-1.0), upper_m: ends(1.0) }
+    }
+
+    pub(super) fn ribbon(&self) -> Ribbon {
+        let ends = self.lower_m.iter().zip(&self.upper_m);
+        let points = self
+            .frequency_hz
+            .iter()
+            .zip(ends)
+            .map(|(f, (low, high))| Some((*f, low * MICROMETRES, high * MICROMETRES)));
+        Ribbon {
+            label: "95 % interval by the noise floor".to_owned(),
+            colour: Colour::Black,
+            points: points.collect(),
+        }
+    }
+}
+
+/// Points in the units of the axes.
+pub(super) fn axis_points(frequency_hz: &[f64], amplitude_m: &[f64]) -> Vec<Option<(f64, f64)>> {
+    frequency_hz.iter().zip(amplitude_m).map(|(f, a)| Some((*f, a * MICROMETRES))).collect()
+}
+
+/// Noise floor and leakage, which lie under the spectra.
+pub(super) fn level_series(spectra: &SpectraPlot, highest: f64) -> Vec<Series> {
+    let constant = spectra
+        .noise_floor_m
+        .filter(|f| *f > 0.0)
+        .map(|floor_m| [spectra.lowest_hz, highest].map(|f| Some((f, floor_m * MICROMETRES))).to_vec());
+    let floor =
+        spectra.noise_floor.as_ref().map(|l| axis_points(&l.frequency_hz, &l.amplitude_m)).or(constant);
+    let floor = floor.map(|points| ("noise floor of the recording", Colour::Grey, Mark::Dotted, points));
+    let leakage = spectra.leakage.as_ref().map(|l| axis_points(&l.frequency_hz, &l.amplitude_m));
+    let leakage =
+        leakage.map(|points| ("leakage of the removed flip", Colour::Orange, Mark::ThinDashed, points));
+    let drawn = floor.into_iter().chain(leakage);
+    drawn
+        .map(|(label, colour, mark, points)| Series {
+            label: label.to_owned(),
+            colour,
+            mark,
+            points,
+            error_bars: Vec::new(),
+        })
+        .collect()
 }
 
 #[cfg(test)]

@@ -2,21 +2,17 @@
 //! where there is no value.
 
 mod claim;
-mod hatches;
-pub(super) mod labels;
-mod limits;
-
-pub(super) use claim::{MapClaim, map_values};
-pub(super) use hatches::ReasonPatterns;
 
 use crate::chart::{
-    COLUMN_WIDTH_MM, ChartAxis, Colour, Figure, HeatMap, Mark, MarkerShape, Panel, Series, VerticalLine,
-    cell_edges,
+    AxisScale, COLUMN_WIDTH_MM, ChartAxis, Colour, Figure, Hatch, HatchPattern, HeatMap, Mark, MarkerShape,
+    Panel, Series, VerticalLine, cell_edges,
 };
+use crate::feature::FeatureUnit;
+use crate::model::parameters::ModelParameter;
 use crate::simulate::scene::Scene;
-use crate::sweep::{MissingReason, PointOutcome, Study, SweepAxis, SweepMap};
-use labels::{axis_label, axis_scale, display_unit, map_label, map_range};
-use limits::colour_limits;
+use crate::sweep::{AxisSpacing, MissingReason, PointOutcome, Study, SweepAxis, SweepMap};
+pub(super) use claim::{MapClaim, map_values};
+use std::collections::BTreeMap;
 
 /// Heights of a map and of a curve, mm.
 const MAP_MM: f64 = 56.0;
@@ -183,5 +179,239 @@ impl<'a> DisplayAxis<'a> {
         let value = scene.value(self.axis.parameter.name)? * display_unit(self.axis.parameter).1;
         let within = value >= *self.edges.first()? && value <= *self.edges.last()?;
         within.then_some(value)
+    }
+}
+
+// Why cells have no value, as patterns.
+
+/// Patterns in the order in which they are given to reasons whose own is taken.
+const FALLBACK_PATTERNS: [HatchPattern; 9] = [
+    HatchPattern::Dotted,
+    HatchPattern::DashedUpright,
+    HatchPattern::Dashed,
+    HatchPattern::Upright,
+    HatchPattern::Level,
+    HatchPattern::Falling,
+    HatchPattern::Rising,
+    HatchPattern::Checked,
+    HatchPattern::Crossed,
+];
+
+/// The pattern of every reason of a study: two reasons in one study never share one while there are any left.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(in crate::figures) struct ReasonPatterns(BTreeMap<MissingReason, HatchPattern>);
+
+impl ReasonPatterns {
+    pub fn from_outcomes(outcomes: &[PointOutcome]) -> Self {
+        let mut found: Vec<MissingReason> =
+            outcomes.iter().flat_map(|outcome| &outcome.values).filter_map(|value| value.err()).collect();
+        found.sort_unstable();
+        found.dedup();
+        Self::for_reasons(&found)
+    }
+
+    fn for_reasons(reasons: &[MissingReason]) -> Self {
+        let mut given: BTreeMap<MissingReason, HatchPattern> = BTreeMap::new();
+        let mut late = Vec::new();
+        for reason in reasons {
+            let own = default_pattern(*reason);
+            if given.values().any(|taken| *taken == own) {
+                late.push(*reason);
+            } else {
+                given.insert(*reason, own);
+            }
+        }
+        for reason in late {
+            let free =
+                FALLBACK_PATTERNS.into_iter().find(|pattern| given.values().all(|taken| taken != pattern));
+            given.insert(reason, free.unwrap_or(default_pattern(reason)));
+        }
+        Self(given)
+    }
+
+    /// One hatch for each reason of a map that occurs, in the order of the table of reasons; `cell` gives the
+    /// place of a point.
+    pub fn reason_hatches(
+        &self,
+        reasons: &[Option<MissingReason>],
+        cell: impl Fn(usize) -> Option<[f64; 4]>,
+    ) -> Vec<Hatch> {
+        let hatch = |reason: MissingReason| {
+            let points = reasons.iter().enumerate().filter(|(_, found)| **found == Some(reason));
+            let cells: Vec<[f64; 4]> = points.filter_map(|(index, _)| cell(index)).collect();
+            let pattern = self.0.get(&reason).copied().unwrap_or(default_pattern(reason));
+            Hatch { label: reason.meaning().to_owned(), pattern, cells }
+        };
+        MissingReason::all().map(hatch).filter(|hatch| !hatch.cells.is_empty()).collect()
+    }
+}
+
+/// The pattern of a reason where no other of the study has it. None is plain grey: printed without colours it
+/// would look like a value.
+fn default_pattern(reason: MissingReason) -> HatchPattern {
+    match reason {
+        MissingReason::ContactLost => HatchPattern::Rising,
+        MissingReason::Jammed => HatchPattern::Falling,
+        MissingReason::Indeterminate => HatchPattern::Upright,
+        MissingReason::NoStart => HatchPattern::Level,
+        MissingReason::Chattering | MissingReason::Diverged | MissingReason::WorkLimit => {
+            HatchPattern::Crossed
+        }
+        MissingReason::NoComponent
+        | MissingReason::Never
+        | MissingReason::NoDecay
+        | MissingReason::Faded
+        | MissingReason::FewCycles => HatchPattern::Dotted,
+        _ => HatchPattern::Checked,
+    }
+}
+
+// Names, units and scales of the axes and maps of a study in figures.
+
+pub(in crate::figures) fn axis_scale(axis: &SweepAxis) -> AxisScale {
+    match axis.spacing {
+        AxisSpacing::Linear => AxisScale::Linear,
+        AxisSpacing::Log => AxisScale::Log,
+    }
+}
+
+/// The colours or the y axis that a study asks for, in the unit of figures.
+pub(in crate::figures) fn map_range(map: &SweepMap) -> Option<(f64, f64)> {
+    let factor = map.reading.unit().factor;
+    map.range.map(|(low, high)| (low * factor, high * factor))
+}
+
+/// Name and unit of a map.
+pub(in crate::figures) fn map_label(map: &SweepMap) -> String {
+    let FeatureUnit { shown, .. } = map.reading.unit();
+    if shown.is_empty() { map.name.clone() } else { format!("{}, {shown}", map.name) }
+}
+
+/// Unit of a parameter in figures, and what its SI value is multiplied by.
+pub(in crate::figures) fn display_unit(parameter: &ModelParameter) -> (&'static str, f64) {
+    match parameter.unit {
+        "m" => ("mm", 1e3),
+        "kg" => ("g", 1e3),
+        "N m/rad" => ("mN m/rad", 1e3),
+        unit => (unit, 1.0),
+    }
+}
+
+/// The name of a parameter in words: `drive.amplitude_m` is the "drive amplitude".
+pub(in crate::figures) fn parameter_words(axis: &SweepAxis) -> String {
+    let ModelParameter { name, symbol, unit, .. } = axis.parameter;
+    let (table, key) = name.split_once('.').unwrap_or(("", name));
+    let suffix = format!("_{}", unit.to_lowercase().replace('/', " per ").replace(' ', "_"));
+    let key = key.strip_suffix(&suffix).unwrap_or(key).replace('_', " ");
+    // (a key that is the symbol itself stands as the symbol)
+    let key = if key.eq_ignore_ascii_case(symbol) { (*symbol).to_owned() } else { key };
+    if table == "blade" { key } else { format!("{table} {key}") }
+}
+
+/// What an axis shows: `drive.amplitude_m` is the "drive amplitude a, mm".
+pub(in crate::figures) fn axis_label(axis: &SweepAxis) -> String {
+    let (words, symbol) = (parameter_words(axis), axis.parameter.symbol);
+    let named = if words.ends_with(&format!(" {symbol}")) { words } else { format!("{words} {symbol}") };
+    match display_unit(axis.parameter).0 {
+        "1" => named,
+        unit => format!("{named}, {unit}"),
+    }
+}
+
+// The values of the first and the last colour of a map.
+
+/// Shares of the sorted values at the first and the last colour, where values beyond lie far away.
+const COLOUR_QUANTILES: [f64; 2] = [0.02, 0.98];
+/// How far the extreme value may lie beyond such a share, over what lies between the two, before the colours
+/// end at the share: a smooth map keeps its extremes, one outlier does not stretch its colours.
+const OUTLIER_DISTANCE: f64 = 0.25;
+/// Fewest values of which some can be called outliers.
+const MIN_OUTLIER_SAMPLES: usize = 8;
+
+/// The first and last colour of finite values; `None` where they are too few, or nearly all equal: colours
+/// then go from the least to the greatest.
+pub(super) fn colour_limits(values: &[Option<f64>]) -> Option<(f64, f64)> {
+    let mut sorted: Vec<f64> = values.iter().flatten().copied().filter(|v| v.is_finite()).collect();
+    if sorted.len() < MIN_OUTLIER_SAMPLES {
+        return None;
+    }
+    sorted.sort_by(f64::total_cmp);
+    let last = sorted.len() - 1;
+    let [low, high] = COLOUR_QUANTILES.map(|share| share * last as f64);
+    // inwards to a value, so that of few values the extreme one can be left out too
+    let (low, high) = (sorted[low.ceil() as usize], sorted[high.floor() as usize]);
+    let between = high - low;
+    let end = |share: f64, extreme: f64| {
+        if (extreme - share).abs() > OUTLIER_DISTANCE * between { share } else { extreme }
+    };
+    (between > 0.0).then(|| (end(low, sorted[0]), end(high, sorted[last])))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::parameters::{PARAMETERS, find_parameter};
+
+    #[test]
+    fn reasons_of_one_study_differ_and_keep_their_usual_pattern_where_it_is_free() {
+        let reasons = [
+            MissingReason::ContactLost,
+            MissingReason::Diverged,
+            MissingReason::NoComponent,
+            MissingReason::NoDecay,
+        ];
+        let patterns = ReasonPatterns::for_reasons(&reasons);
+        let given: Vec<HatchPattern> = reasons.iter().map(|reason| patterns.0[reason]).collect();
+        assert_eq!(given[..3], [HatchPattern::Rising, HatchPattern::Crossed, HatchPattern::Dotted]);
+        assert!(!given[..3].contains(&given[3]));
+        let nine: Vec<MissingReason> = MissingReason::all().take(9).collect();
+        let patterns = ReasonPatterns::for_reasons(&nine);
+        let mut given: Vec<String> = patterns.0.values().map(|pattern| format!("{pattern:?}")).collect();
+        given.sort_unstable();
+        given.dedup();
+        assert_eq!(given.len(), 9);
+    }
+
+    fn axis(name: &str) -> SweepAxis {
+        SweepAxis {
+            parameter: find_parameter(name).unwrap(),
+            values: vec![1.0, 2.0],
+            spacing: AxisSpacing::Linear,
+        }
+    }
+
+    #[test]
+    fn axes_are_named_in_words_with_symbol_and_unit() {
+        let label = |name: &str| axis_label(&axis(name));
+        assert_eq!(label("friction.a"), "friction A");
+        assert_eq!(label("friction.b_s_per_m"), "friction B, s/m");
+        assert_eq!(label("drive.amplitude_m"), "drive amplitude a, mm");
+        assert_eq!(label("blade.neck_stiffness_n_m_per_rad"), "neck stiffness k1, mN m/rad");
+        assert_eq!(label("blade.preload_force_n"), "preload force k0 hd, N");
+        assert_eq!(parameter_words(&axis("blade.preload_force_n")), "preload force");
+        let longest = PARAMETERS.iter().map(|p| label(p.name).chars().count()).max().unwrap();
+        assert!(longest <= 45, "{longest} letters do not fit next to an axis of a narrow figure");
+    }
+
+    fn of(values: &[f64]) -> Option<(f64, f64)> {
+        colour_limits(&values.iter().copied().map(Some).collect::<Vec<_>>())
+    }
+
+    #[test]
+    fn one_outlier_does_not_stretch_the_colours_and_a_smooth_map_keeps_its_ends() {
+        let smooth: Vec<f64> = (0..50).map(f64::from).collect();
+        assert_eq!(of(&smooth), Some((0.0, 49.0)));
+        let outlier: Vec<f64> = smooth.iter().copied().chain([5000.0]).collect();
+        assert_eq!(of(&outlier), Some((0.0, 49.0)));
+        let below: Vec<f64> = smooth.iter().copied().chain([-5000.0]).collect();
+        assert_eq!(of(&below), Some((0.0, 49.0)));
+        assert_eq!(of(&[1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, 900.0]), Some((1.0, 8.0)));
+    }
+
+    #[test]
+    fn few_values_and_constants_have_the_colours_of_their_ends() {
+        assert_eq!(of(&[1.0, 2.0, 300.0]), None);
+        assert_eq!(of(&[3.0; 20]), None);
+        assert_eq!(colour_limits(&[None, Some(f64::NAN)]), None);
     }
 }

@@ -1,8 +1,8 @@
 //! Every map of a parameter study on one sheet, as small panels of one design: maps or curves over the same
 //! axes, or, of a study with many parameters, the rank correlation of every map with every parameter.
 
-use super::sweep_map::labels::{axis_label, parameter_words};
 use super::sweep_map::{MapClaim, ReasonPatterns, SweepMapValues, describe_axes};
+use super::sweep_map::{axis_label, parameter_words};
 use crate::chart::{
     COLUMN_WIDTH_MM, ChartAxis, Colour, ColourMap, FULL_WIDTH_MM, Figure, HeatMap, Panel, TextAnnotation,
 };

@@ -228,7 +228,7 @@ mod tests {
     use super::*;
     use crate::chart::Medium;
     use crate::recording::{FrameGrid, Traces};
-    use crate::twin::{TrackingModel, add_tracking_noise};
+    use crate::simulate::twin::{TrackingModel, add_tracking_noise};
 
     fn recording(frame_rate_hz: f64, frames: usize, of: impl Fn(f64) -> f64) -> Recording {
         let grid = FrameGrid { start_s: 1.0, frame_rate_hz, frames };

@@ -6,7 +6,7 @@ use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Raster
 use crate::compare::ConditionComparison;
 use crate::figures::{FigureBlock, subtitle};
 use crate::math;
-use crate::recording::film::RecordingVideo;
+use crate::recording::video::RecordingVideo;
 use crate::text::{format_length, join_with_and};
 
 /// The instants that are shown: the pose of the model, and what it is called over a recording.

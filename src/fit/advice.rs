@@ -4,12 +4,12 @@
 //! box, and held against the open directions there: a feature is worth measuring where it moves by more than
 //! its own 95 % interval across the box.
 
-use super::gate::ProbeEvaluation;
-use super::information::{MIN_INFORMATIVE, ParameterCombination};
+use super::identifiability::ProbeEvaluation;
 use super::job::{FitTarget, Job};
-use super::linear::difference_points;
+use super::linear_model::difference_points;
+use super::linear_model::{MIN_INFORMATIVE, ParameterCombination};
+use super::model::ModelFeatures;
 use super::model::{Draw, Model};
-use super::model_features::ModelFeatures;
 use crate::feature::{CycleRangeEnd, Feature, FeatureBand, Reading, ReversalInterval, WIDTH_RELATIVE};
 use crate::math;
 use crate::recording::Recording;

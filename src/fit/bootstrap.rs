@@ -6,13 +6,13 @@
 //! damped Gauss-Newton steps from the best point with the Jacobian there, corrected by Broyden's rule; the
 //! spread is taken about the best point, so that it includes the bias.
 
-use super::cameras::draw_camera_errors;
+use super::camera_calibration::draw_camera_errors;
+use super::evaluation::EvaluationStage;
 use super::evaluation::{Evaluation, Observed};
 use super::ledger::{Ledger, StopReason};
-use super::linear::{broyden_update, damped_step, residuals_against, step_in_box};
+use super::linear_model::{broyden_update, damped_step, residuals_against, step_in_box};
 use super::objective::Objective;
-use super::stage::EvaluationStage;
-use super::target::TargetValue;
+use super::targets::TargetValue;
 use crate::math;
 use nalgebra::DMatrix;
 use rayon::prelude::*;

@@ -1,35 +1,27 @@
 //! job.toml: what is fitted to what, checked completely before anything runs. Every key: `docs/fits.md`.
 
-mod aim;
-mod aims;
 mod as_written;
-mod cameras;
 mod conditions;
-mod entry;
-mod nuisances;
 mod parameters;
-mod refusal;
 mod settings;
+mod targets;
 mod traces;
 
-pub use aim::{FitTarget, TargetSource, TargetStage};
-pub use cameras::FeatureCamera;
-pub(crate) use conditions::is_same_quantity;
-pub use conditions::{HeadSource, JobCondition};
-
-pub use nuisances::{Constants, NuisanceParameter};
-pub use parameters::FreeParameter;
-pub use refusal::JobError;
-pub use settings::{Ensemble, IntervalSettings};
-pub use traces::{CameraPriorSds, TraceChannel, TraceTarget};
-
-use super::calibration::TargetCalibration;
-use super::settings::SearchSettings;
+use super::bounds::BoundsError;
+use super::camera_calibration::TargetCalibration;
+use super::search::SearchSettings;
 use crate::feature::Feature;
-use crate::toml_file::{check_format, parse_toml};
-use crate::twin::Camera;
-use refusal::JobRefusal;
+use crate::simulate::twin::Camera;
+use crate::toml_file;
+use crate::toml_file::{TomlError, check_format, parse_toml};
+pub(crate) use conditions::is_same_quantity;
+pub use conditions::{FeatureCamera, HeadSource, JobCondition};
+pub use parameters::{Constants, FreeParameter, NuisanceParameter};
 use serde::Serialize;
+pub use settings::{Ensemble, IntervalSettings};
+use std::collections::HashSet;
+pub use targets::{FitTarget, TargetSource, TargetStage};
+pub use traces::{CameraPriorSds, TraceChannel, TraceTarget};
 
 /// Name, what it sets, and whether it is held out.
 type ConditionIdentity<'a> = (&'a str, &'a [(String, f64)], bool);
@@ -87,7 +79,7 @@ impl Job {
     /// # Errors
     /// [`JobError`] at the first problem.
     pub fn parse(file: &str, text: &str) -> Result<Self, JobError> {
-        Self::parse_with_names(file, text, &crate::blade::parameters::parameter_names())
+        Self::parse_with_names(file, text, &crate::model::parameters::parameter_names())
     }
 
     /// The same for another model, whose parameters have the names `known`.
@@ -177,15 +169,15 @@ impl Job {
         let camera = settings::check_camera_table(written)?;
         let parameters = parameters::check_parameters(&written.parameter, known)?;
         parameters.iter().try_for_each(|p| conditions::check_not_set(&conditions, &p.name))?;
-        let context = aims::TargetContext {
+        let context = targets::TargetContext {
             conditions: &conditions,
             nyquist_hz: camera.map(|c| c.frame_rate_hz / 2.0),
         };
-        cameras::check_no_camera_with_traces(written)?;
+        conditions::check_no_camera_with_traces(written)?;
         let traces = traces::check_traces(&written.trace, &conditions)?;
-        let constants = nuisances::check_constants(written, &parameters, known)?;
+        let constants = parameters::check_constants(written, &parameters, known)?;
         constants.listed_names().try_for_each(|name| conditions::check_not_set(&conditions, name))?;
-        let aims = aims::check_targets(written, &context)?;
+        let aims = targets::check_targets(written, &context)?;
         let (search, ensemble) = (settings::check_search(written)?, settings::check_ensemble(written)?);
         let (largest_tilt_rad, intervals) =
             (settings::check_largest_tilt_rad(written)?, settings::check_intervals(written)?);
@@ -203,6 +195,78 @@ impl Job {
             intervals,
         })
     }
+}
+
+// Why a job is refused, and the checks that many keys share.
+
+/// Why a job was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum JobError {
+    /// It is not TOML of the right shape.
+    #[error(transparent)]
+    Toml(#[from] TomlError),
+    /// The bounds of a parameter are no bounds.
+    #[error("{file}: parameter `{name}`: {problem}")]
+    Bounds {
+        /// File as named by the user.
+        file: String,
+        /// Name of the parameter.
+        name: String,
+        /// What is wrong with them.
+        problem: BoundsError,
+    },
+    /// A value that cannot be used.
+    #[error("{file}: {key}: {problem}")]
+    Value {
+        /// File as named by the user.
+        file: String,
+        /// The key, with the entry that it belongs to.
+        key: String,
+        /// What was found, what was expected, and what to do.
+        problem: String,
+    },
+}
+
+/// A refusal that does not know its file yet.
+pub(super) enum JobRefusal {
+    Value { key: String, problem: String },
+    Bounds { name: String, problem: BoundsError },
+}
+
+impl JobRefusal {
+    pub(super) fn in_file(self, file: &str) -> JobError {
+        let file = file.to_owned();
+        match self {
+            Self::Value { key, problem } => JobError::Value { file, key, problem },
+            Self::Bounds { name, problem } => JobError::Bounds { file, name, problem },
+        }
+    }
+}
+
+impl From<toml_file::KeyRefusal> for JobRefusal {
+    fn from((key, problem): toml_file::KeyRefusal) -> Self {
+        Self::Value { key, problem }
+    }
+}
+
+pub(super) fn refuse<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, JobRefusal> {
+    Err(JobRefusal::Value { key: key.into(), problem: problem.into() })
+}
+
+pub(super) fn check_non_empty(key: &str, found: &str, expected: &str) -> Result<String, JobRefusal> {
+    if found.trim().is_empty() {
+        return refuse(key, format!("found \"{found}\", expected {expected}"));
+    }
+    Ok(found.to_owned())
+}
+
+pub(super) fn check_above_zero(key: impl Into<String>, found: f64) -> Result<f64, JobRefusal> {
+    Ok(toml_file::check_above_zero(key, found)?)
+}
+
+pub(super) fn find_repeated<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let mut met = HashSet::new();
+    names.find(|name| !met.insert(*name))
 }
 
 #[cfg(test)]

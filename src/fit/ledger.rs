@@ -2,11 +2,11 @@
 //! that does not depend on the number of threads.
 
 use super::evaluation::Evaluation;
-use super::failure::FailureReason;
-use super::journal::{EvaluationRecord, point_key};
+use super::evaluation::EvaluationStage;
+use super::evaluation::FailureReason;
+use super::feature_checkpoint::{EvaluationRecord, point_key};
 use super::objective::Objective;
-use super::stage::EvaluationStage;
-use crate::journal::{CheckpointSink, format_record_line};
+use crate::checkpoint::{CheckpointSink, format_record_line};
 use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use std::ops::ControlFlow;

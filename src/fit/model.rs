@@ -1,8 +1,10 @@
 //! What a fit needs of a model.
 
-use super::evaluation::Observed;
-use super::failure::{FailureReason, RunFailure};
+use super::evaluation::{FailureReason, Observation, Observed, RunFailure};
+use crate::feature::{Feature, FeatureValue, MissingValue, ValueComparison, read_assigned_features};
+use crate::math;
 use crate::recording::Recording;
+use rayon::prelude::*;
 
 /// Features of a model at parameter values: what the objective needs, and all that it knows.
 pub trait FeaturePredictor: Sync {
@@ -76,4 +78,212 @@ pub enum Restart {
     Earlier(f64),
     /// With angles that are larger by this share.
     Moved(f64),
+}
+
+// The features of a model's recordings, averaged over its starting states.
+
+/// The features of a model's recordings.
+pub struct ModelFeatures<'a> {
+    model: &'a dyn Model,
+    /// With conditions counted among those that are read.
+    features: Vec<Feature>,
+    targets: Vec<f64>,
+    conditions: Vec<usize>,
+    members: usize,
+}
+
+impl<'a> ModelFeatures<'a> {
+    /// Features with the targets to which peaks are assigned, averaged over `members` starting states (at
+    /// least 1). Conditions of which nothing is read are not simulated.
+    #[must_use]
+    pub fn new(model: &'a dyn Model, features: &[Feature], targets: Vec<f64>, members: usize) -> Self {
+        let mut conditions: Vec<usize> = features.iter().map(|feature| feature.condition).collect();
+        conditions.sort_unstable();
+        conditions.dedup();
+        let placed = |feature: &Feature| Feature {
+            condition: conditions.partition_point(|c| *c < feature.condition),
+            ..feature.clone()
+        };
+        Self {
+            model,
+            features: features.iter().map(placed).collect(),
+            targets,
+            members: members.max(1),
+            conditions,
+        }
+    }
+
+    /// Every feature of one draw.
+    ///
+    /// # Errors
+    /// [`RunFailure`] of the first condition that fails.
+    pub fn read_features(
+        &self,
+        values: &[f64],
+        draw: Draw,
+    ) -> Result<Vec<Result<FeatureValue, MissingValue>>, RunFailure> {
+        let recordings = self
+            .conditions
+            .iter()
+            .map(|condition| self.model.record_condition(values, *condition, draw))
+            .collect::<Result<Vec<Recording>, _>>()?;
+        Ok(read_assigned_features(&self.features, &self.targets, &recordings.iter().collect::<Vec<_>>()))
+    }
+}
+
+impl FeaturePredictor for ModelFeatures<'_> {
+    fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
+        let members = 0..self.members as u64;
+        let runs: Vec<_> = members
+            .into_par_iter()
+            .map(|member| self.read_features(values, Draw { member, ..Draw::default() }))
+            .collect();
+        let failed = runs.iter().filter(|run| run.is_err()).count();
+        if 2 * failed >= runs.len()
+            && let Some(Err(failure)) = runs.iter().find(|run| run.is_err())
+        {
+            return Err(failure.clone());
+        }
+        let read: Vec<_> = runs.into_iter().flatten().collect();
+        Ok(self.features.iter().enumerate().map(|(at, feature)| average_runs(&read, at, feature)).collect())
+    }
+
+    fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
+        // starting states of twins are none of those that are averaged over
+        let member = if self.members > 1 { self.members as u64 + draw } else { 0 };
+        let read = self.read_features(values, Draw { member, noise: draw, dropouts: true })?;
+        Ok(read.into_iter().map(observe_reading).collect())
+    }
+}
+
+fn observe_reading(read: Result<FeatureValue, MissingValue>) -> Observed {
+    read.map_or_else(
+        |missing| Observed::Missing(missing.to_string()),
+        |read| Observed::Value(make_observation(read.value, 0.0, read.below_db)),
+    )
+}
+
+fn make_observation(value: f64, spread: f64, below_db: f64) -> Observation {
+    Observation { value, spread, below_db }
+}
+
+/// Mean and spread of a feature over the starting states; missing where at most half of them show it.
+fn average_runs(runs: &[Vec<Result<FeatureValue, MissingValue>>], at: usize, feature: &Feature) -> Observed {
+    let shown: Vec<&FeatureValue> = runs.iter().filter_map(|run| run.get(at)?.as_ref().ok()).collect();
+    if 2 * shown.len() <= runs.len() {
+        let why = runs.iter().find_map(|run| run.get(at)?.as_ref().err());
+        return Observed::Missing(why.map_or_else(|| "no run shows it".to_owned(), ToString::to_string));
+    }
+    if let [only] = shown.as_slice() {
+        return Observed::Value(make_observation(only.value, 0.0, only.below_db));
+    }
+    let count = shown.len() as f64;
+    let below_db = shown.iter().map(|read| read.below_db).sum::<f64>() / count;
+    let values = shown.iter().map(|read| read.value);
+    // a mean of logarithms where residuals are logarithms and nothing changes its sign
+    let log = feature.reading.comparison() == ValueComparison::Log
+        && (shown.iter().all(|read| read.value > 0.0) || shown.iter().all(|read| read.value < 0.0));
+    let taken: Vec<f64> = if log { values.map(|v| math::ln(v.abs())).collect() } else { values.collect() };
+    let mean = taken.iter().sum::<f64>() / count;
+    let spread = (taken.iter().map(|v| math::powi(v - mean, 2)).sum::<f64>() / (count - 1.0)).sqrt();
+    let sign = shown.first().map_or(1.0, |read| read.value.signum());
+    let (value, spread) =
+        if log { (sign * math::exp(mean), spread * math::exp(mean)) } else { (mean, spread) };
+    Observed::Value(make_observation(value, spread, below_db))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::feature::Reading;
+    use crate::fit::evaluation::FailureReason;
+    use crate::recording::channel::Window;
+    use crate::recording::{FrameGrid, Traces};
+
+    /// A blade whose deflection is the parameter times a factor of the starting state; conditions differ by
+    /// their number; member 3 fails.
+    struct Still;
+
+    const FACTORS: [f64; 4] = [1.0, 1.2, 0.8, 1.0];
+
+    impl Model for Still {
+        fn record_condition(
+            &self,
+            values: &[f64],
+            condition: usize,
+            draw: Draw,
+        ) -> Result<Recording, RunFailure> {
+            if draw.member == 3 {
+                return Err(RunFailure::new(
+                    FailureReason::Ended(crate::simulate::RunStatus::ContactLost),
+                    "",
+                    0.5,
+                ));
+            }
+            let grid = FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 20 };
+            let deflection_m = values[0] * FACTORS.get(draw.member as usize).unwrap_or(&2.0)
+                + condition as f64
+                + 1e-3 * draw.noise as f64;
+            let (still, tip) = (vec![Some(0.0); 20], vec![Some(deflection_m); 20]);
+            let traces = Traces {
+                tip_x_m: tip,
+                tip_y_m: still.clone(),
+                head_x_m: still.clone(),
+                head_y_m: still,
+                ..Traces::default()
+            };
+            Recording::new("model", grid, traces, true)
+                .map_err(|error| RunFailure::new(FailureReason::NotFinite, error.to_string(), 1.0))
+        }
+    }
+
+    fn mean(condition: usize) -> Feature {
+        Feature { name: condition.to_string(), reading: Reading::MeanDeflection(Window::WHOLE), condition }
+    }
+
+    fn shown(members: usize, conditions: &[usize]) -> Vec<Observation> {
+        let features: Vec<Feature> = conditions.iter().map(|condition| mean(*condition)).collect();
+        let seen = ModelFeatures::new(&Still, &features, vec![0.01; conditions.len()], members);
+        seen.predict_features(&[0.01])
+            .unwrap()
+            .iter()
+            .map(|feature| *feature.observation().unwrap())
+            .collect()
+    }
+
+    #[test]
+    fn starting_states_are_averaged_and_their_spread_is_kept() {
+        let alone = shown(1, &[0])[0];
+        assert!((alone.value / 0.01 - 1.0).abs() < 1e-12 && alone.spread == 0.0);
+        let found = shown(3, &[0])[0];
+        let logs = FACTORS[..3].iter().map(|f: &f64| f.ln());
+        let mean = logs.clone().sum::<f64>() / 3.0;
+        let sd = (logs.map(|l| (l - mean).powi(2)).sum::<f64>() / 2.0).sqrt();
+        assert!(
+            (found.value / (0.01 * mean.exp()) - 1.0).abs() < 1e-9
+                && (found.spread / (found.value * sd) - 1.0).abs() < 1e-9,
+            "{found:?}"
+        );
+        assert_eq!(shown(4, &[0])[0], found, "a state from which the run fails is left out");
+    }
+
+    #[test]
+    fn each_feature_is_read_from_its_own_condition() {
+        let values: Vec<f64> = shown(1, &[5, 2, 5]).iter().map(|found| found.value).collect();
+        assert!(
+            values.iter().zip([5.01, 2.01, 5.01]).all(|(found, expected)| (found - expected).abs() < 1e-9),
+            "{values:?}"
+        );
+    }
+
+    #[test]
+    fn a_twin_has_its_own_noise_and_a_starting_state_that_is_not_averaged_over() {
+        let twin = |members| {
+            let features = [mean(0)];
+            ModelFeatures::new(&Still, &features, vec![0.01], members).simulate_twin(&[0.01], 7).unwrap()[0]
+                .value()
+                .unwrap()
+        };
+        assert!((twin(1) - 0.017).abs() < 1e-12 && (twin(2) - 0.027).abs() < 1e-12);
+    }
 }

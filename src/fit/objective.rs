@@ -13,12 +13,12 @@
 //! is assigned. A run that fails costs at least as much as one from which every feature is missing, and less
 //! the further it came.
 
-use super::axis::SearchAxis;
-use super::cameras::CameraFit;
+use super::bounds::SearchAxis;
+use super::camera_calibration::CameraFit;
 use super::evaluation::{Evaluation, EvaluationOutcome, Observation, Observed};
-use super::failure::{FailureReason, RunFailure};
+use super::evaluation::{FailureReason, RunFailure};
 use super::model::FeaturePredictor;
-use super::target::{MAX_RATIO, TargetValue};
+use super::targets::{MAX_RATIO, TargetValue};
 use crate::feature::ASSIGN_DB;
 use crate::math;
 use crate::text::panic_message;
@@ -234,8 +234,8 @@ fn panic_text(payload: &(dyn Any + Send)) -> String {
 mod tests {
     use super::*;
     use crate::feature::ValueComparison;
-    use crate::fit::axis::Prior;
-    use crate::fit::scale::{Bounds, BoundsSpacing};
+    use crate::fit::bounds::Prior;
+    use crate::fit::bounds::{Bounds, BoundsSpacing};
 
     struct Fake(fn(f64) -> Result<Vec<Observed>, RunFailure>);
 

@@ -6,17 +6,17 @@
 //! on traces it is `-chi^2 / 2` with the starting states of the segments where they fit best
 //! ([`super::trace::fit_states_at`]).
 
-use super::axis::{Prior, SearchAxis};
-use super::error::FitError;
-use super::iterates::HeaderCoordinate;
-use super::model_features::ModelFeatures;
+use super::FitError;
+use super::bounds::BoundsSpacing;
+use super::bounds::{Prior, SearchAxis};
+use super::model::ModelFeatures;
 use super::objective::{Objective, residual};
 use super::problem::Problem;
 use super::run::search_axis;
-use super::scale::BoundsSpacing;
-use super::target::TargetValue;
+use super::targets::TargetValue;
 use super::targets::measure_targets;
 use super::trace::{TraceModel, fit_states_at, frame_residuals};
+use super::trace_checkpoint::HeaderCoordinate;
 
 use crate::feature::Feature;
 use crate::math;

@@ -1,24 +1,30 @@
 //! A job with its scenes and recordings: everything that decides a fit.
 
-use super::constants::{FreedConstant, NuisanceError, check_scaling, free_constants};
-use super::context::FitContext;
-use super::error::FitError;
-use super::job::{self, FreeParameter, HeadSource, Job};
+use super::job::{FitTarget, FreeParameter, HeadSource, Job};
 use super::ledger::{FitProgress, OnProgress};
-use super::result::FitResult;
-use super::run::fit_features;
+use super::model::ModelFeatures;
+use super::nuisance_parameters::{FreedConstant, NuisanceError, check_scaling, free_constants};
+use super::objective::Objective;
+use super::result::{
+    FeatureResult, FitResult, ModelledTargets, NuisanceResult, StartState, predicted_feature_result,
+};
+use super::run::{FitContext, fit_features, predict_held_out, read_best_model, search_axis};
 use super::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
+use super::targets::TargetValue;
 use super::trace::{TraceModel, TraceSource};
+use super::trace_data::{TraceData, TraceError, prepare_traces};
 use super::trace_ledger::TraceProgress;
-use super::traced::{TraceData, TraceError, prepare_traces};
-use crate::journal::{CheckpointSink, NullSink, fingerprint};
+use super::{FitError, job};
+use crate::checkpoint::{CheckpointSink, NullSink, fingerprint};
+use crate::model::Pose;
 use crate::recording::quality::measure_quality;
 use crate::recording::{FrameGrid, Recording, Traces};
-use crate::simulate::drive::HeadMotionError;
-use crate::simulate::scene::{Scene, SceneError};
-use crate::twin::Camera;
+use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
+use crate::simulate::scene::{Scene, SceneError, StartKind};
+use crate::simulate::twin::Camera;
 use serde::Serialize;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 
 /// Most frames of a run of the model: each thread holds one run, a million frames are a tenth of a gigabyte,
 /// and a mistyped rate is refused instead of filling memory.
@@ -375,6 +381,89 @@ impl<'a> From<&'a MeasuredRecording> for RecordingIdentity<'a> {
     }
 }
 
+// The model of a fit over whole recordings: with the constants as they were fitted, and for a trace driven
+// by its own head from the state in which the first segment starts.
+
+impl Problem {
+    /// The model whose runs a result is about: that of the problem itself in a fit of features.
+    ///
+    /// # Errors
+    /// [`FitError::CannotBeFitted`] when a scene refuses what was fitted.
+    pub fn fitted_model(&self, result: &FitResult) -> Result<SceneModel, FitError> {
+        let conditions = self.model().conditions().iter().enumerate();
+        let whole = conditions.map(|(at, condition)| {
+            let scene = self.whole_scene(at, &condition.scene, result)?;
+            Ok(ModelCondition { scene, instrument: condition.instrument })
+        });
+        Ok(self.model().with_conditions(whole.collect::<Result<_, FitError>>()?))
+    }
+
+    /// The scene of condition `at` with the fitted constants, its drive and its start.
+    fn whole_scene(&self, at: usize, scene: &Scene, result: &FitResult) -> Result<Scene, FitError> {
+        let refused = |why: String| FitError::CannotBeFitted { why };
+        let mut constants = result.nuisances.iter().filter(|nuisance| nuisance.recording.is_none());
+        let set = |scene: Scene, constant: &NuisanceResult| {
+            scene
+                .with_parameter(&constant.name, constant.estimate)
+                .map_err(|error| refused(error.to_string()))
+        };
+        let mut scene = constants.try_fold(scene.clone(), set)?;
+        let trace = self.traces().iter().find(|trace| trace.condition == at);
+        let name = self.job().conditions.get(at).map(|condition| &condition.name);
+        let start = result.starts.iter().find(|start| Some(&start.recording) == name);
+        let recording = self.recordings().get(at).and_then(Option::as_ref);
+        if let (Some(HeadSource::Recording), Some(start), Some(recording)) =
+            (trace.map(|trace| trace.head), start, recording)
+        {
+            let motion = smooth_head_motion(recording).map_err(|error| refused(error.to_string()))?;
+            scene.run.stop_s = motion.span_s()[1];
+            scene.drive = Drive::Recorded(Arc::new(motion));
+            scene.start_s = start.time_s;
+            scene.start = StartKind::State(start_pose(start));
+        }
+        Ok(scene)
+    }
+
+    /// What the whole runs of a result's model show of the job's components and features.
+    pub(super) fn compare_with_targets(
+        &self,
+        result: &FitResult,
+        targets: Vec<TargetValue>,
+    ) -> Result<(ModelledTargets, Vec<FeatureResult>), FitError> {
+        let (job, model) = (self.job(), self.fitted_model(result)?);
+        let (fitted, held): (Vec<_>, Vec<_>) =
+            job.targets.iter().cloned().zip(targets).partition(|(aim, _)| !aim.held_out);
+        let (aims, targets): (Vec<FitTarget>, Vec<TargetValue>) = fitted.into_iter().unzip();
+        let wanted: Vec<_> = aims.iter().map(|aim| aim.feature.clone()).collect();
+        let goals = targets.iter().map(|target| target.value).collect();
+        let values = result.parameter_estimates(job);
+        let held_out = predict_held_out(held, &model, &values).iter().map(predicted_feature_result).collect();
+        if aims.is_empty() {
+            return Ok((ModelledTargets { components: Vec::new(), features: Vec::new() }, held_out));
+        }
+        let seen = ModelFeatures::new(&model, &wanted, goals, job.ensemble.members);
+        let objective = Objective::new(job.parameters.iter().map(search_axis).collect(), targets, &seen);
+        let best = objective.evaluate_values(values.clone());
+        let shown = ModelledTargets::compare(
+            &aims,
+            objective.targets(),
+            &[],
+            &best,
+            &read_best_model(&seen, &values),
+        );
+        Ok((shown, held_out))
+    }
+}
+
+fn start_pose(start: &StartState) -> Pose {
+    Pose {
+        theta: start.neck_angle_rad,
+        phi: start.lip_angle_rad,
+        theta_rate: start.neck_rate_rad_per_s,
+        phi_rate: start.lip_rate_rad_per_s,
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -431,7 +520,7 @@ mod tests {
         assert_eq!((trace.head, trace.frames.start), (job::HeadSource::Recording, 0));
         assert_eq!(
             (whole.segment_s(), whole.constants()),
-            (&crate::fit::traced::DEFAULT_SEGMENT_S[..], &[][..])
+            (&crate::fit::trace_data::DEFAULT_SEGMENT_S[..], &[][..])
         );
         let refused = |trace: &str| made("", trace).err().unwrap().to_string();
         let short = refused("segment_s = [1e-4]");
@@ -461,7 +550,7 @@ mod tests {
     fn all_masses_and_forces_at_once_are_refused() {
         let scene = Scene::parse("scene.toml", SCENE).unwrap();
         let heavy = |name: &str| {
-            crate::blade::parameters::find_parameter(name)
+            crate::model::parameters::find_parameter(name)
                 .is_some_and(|p| p.unit.starts_with("kg") || p.unit.starts_with('N'))
         };
         let block = |(name, value): (&str, f64)| {

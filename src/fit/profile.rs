@@ -10,15 +10,15 @@
 //! each place from the best that the fit already knows near it too, looks on behind the crossing that it has
 //! found, and goes on from the farthest point of the whole fit that is within the threshold.
 
+use super::bounds::clamp_unit;
 use super::evaluation::Evaluation;
-use super::information::SingularDirections;
+use super::evaluation::EvaluationStage;
 use super::ledger::{Ledger, StopReason};
-use super::linear::{
+use super::linear_model::SingularDirections;
+use super::linear_model::{
     FeatureSlopes, broyden_update, damped_step, difference_points, jacobian as measured, residuals,
     step_in_box,
 };
-use super::scale::clamp_unit;
-use super::stage::EvaluationStage;
 use crate::math;
 use nalgebra::DMatrix;
 

@@ -1,28 +1,26 @@
 //! One run of a fit, from the targets to the result.
 
 use super::advice::advise_measurements;
-use super::axis::SearchAxis;
-use super::context::FitContext;
-use super::error::FitError;
+use super::bounds::SearchAxis;
 use super::evaluation::Evaluation;
-use super::gate::{Identifiability, IdentifiabilityError, assess_identifiability};
+use super::feature_checkpoint::{
+    EvaluationRecord, FeatureCheckpoint, FeatureHeader, FeatureHeaderBody, HeaderFeature, HeaderParameter,
+};
+use super::identifiability::{Identifiability, IdentifiabilityError, assess_identifiability};
 use super::job::{FitTarget, FreeParameter, Job};
-use super::journal::{EvaluationRecord, FeatureHeader, FeatureHeaderBody, HeaderFeature, HeaderParameter};
 use super::ledger::{Ledger, OnProgress, StopReason};
 use super::misfit::{far_from_priors, unexplained_headline};
-use super::model::{Draw, Model};
-use super::model_features::ModelFeatures;
+use super::model::{Draw, Model, ModelFeatures};
 use super::objective::Objective;
-use super::recheck;
 use super::result::{FitFindings, FitResult, FitStatus, camera_nuisance_results};
-use super::search::{self, SearchOutcome, SearchTermination};
-use super::settled::start_notes;
-use super::target::TargetValue;
-use super::targets::measure_targets;
-use super::uncertainty::{self, FeatureWeights, FitUncertainty};
-use crate::blade::parameters;
+use super::search::{SearchOutcome, SearchTermination};
+use super::start_transient::start_notes;
+use super::targets::{TargetValue, measure_targets};
+use super::uncertainty::{FeatureWeights, FitUncertainty};
+use super::{FitError, feature_checkpoint, search, uncertainty};
+use crate::checkpoint::{CheckpointSink, format_header_line};
 use crate::feature::{Feature, FeatureUnit, FeatureValue};
-use crate::journal::CheckpointSink;
+use crate::model::parameters;
 use crate::recording::Recording;
 use std::cell::OnceCell;
 
@@ -68,7 +66,7 @@ pub fn fit_features(
         job.ensemble.members,
     );
     let objective = Objective::new(job.parameters.iter().map(search_axis).collect(), targets, &seen);
-    recheck::recheck_sample(&objective, context, job.search.seed)?;
+    feature_checkpoint::recheck_sample(&objective, context, job.search.seed)?;
     let allowed = context.max_evaluations.unwrap_or(usize::MAX);
     let (rough, local) = (OnceCell::new(), OnceCell::new());
     let mut ledger = Ledger::new(&objective, context.stored_records(), journal, on_progress, allowed);
@@ -102,7 +100,7 @@ pub fn fit_features(
     let found = add_start_notes(found, model, job, (&aims, ledger.objective().targets()));
     let far = far_from_priors(&camera_nuisance_results(job, &found.cameras));
     let found = found.with_model_objection((!far.is_empty()).then(|| unexplained_headline(&far)));
-    recheck::recheck_at(&objective, context, &found.best.unit)?;
+    feature_checkpoint::recheck_at(&objective, context, &found.best.unit)?;
     let held_out = predict_held_out(held, model, &found.best.values);
     let status = fit_status(&ledger, &found.best, &searched.termination);
     let synthetic = measured.iter().flatten().any(Recording::is_synthetic);
@@ -249,4 +247,42 @@ fn checkpoint_header(
 
 pub(super) fn search_axis(parameter: &FreeParameter) -> SearchAxis {
     SearchAxis { bounds: parameter.bounds, prior: parameter.prior }
+}
+
+// What a fit needs to know besides its job, its recordings and its model.
+
+/// Which run of which problem it is.
+#[derive(Debug, Clone, Default)]
+pub struct FitContext<'a> {
+    /// Fingerprint of the problem, from [`crate::checkpoint::checksum`].
+    pub fingerprint: &'a str,
+    /// Version of the program.
+    pub version: &'a str,
+    /// Most evaluations of this run, replayed ones included; `None` for what the job allows.
+    pub max_evaluations: Option<usize>,
+    /// The journal to be continued, with its file's name for refusals.
+    pub resume: Option<(&'a str, &'a FeatureCheckpoint)>,
+}
+
+impl<'a> FitContext<'a> {
+    /// Evaluations that are known before the first.
+    pub(super) fn stored_records(&self) -> &'a [EvaluationRecord] {
+        self.resume.map_or(&[][..], |(_, journal)| &journal.records)
+    }
+
+    /// What is written before the first new line: the header of a new journal.
+    pub(super) fn opening_lines(&self, header: &FeatureHeader) -> String {
+        self.resume.map_or_else(|| format_header_line(header), |_| String::new())
+    }
+
+    /// Refuses a journal from which a fit with this header cannot go on.
+    pub(super) fn check_resumable(&self, expected: &FeatureHeader) -> Result<(), FitError> {
+        let Some((file, journal)) = self.resume else { return Ok(()) };
+        journal.header.check_matches::<EvaluationRecord>(file, expected)?;
+        let (found, expected) = (journal.header.body.seed, expected.body.seed);
+        if found == expected {
+            return Ok(());
+        }
+        Err(FitError::OtherSeed { file: file.to_owned(), found, expected })
+    }
 }

@@ -1,19 +1,19 @@
 //! The model of a fit: scenes with some parameters replaced, each seen through the camera of its recording.
 
-use super::failure::{FailureReason, RunFailure};
+use super::evaluation::{FailureReason, RunFailure};
 use super::model::{Draw, Model, Restart};
-use crate::blade::Pose;
-use crate::blade::modes::{TipConstraint, natural_modes, time_scales_rad_per_s};
 use crate::math::StandardNormal;
+use crate::model::Pose;
+use crate::model::modes::{TipConstraint, natural_modes, time_scales_rad_per_s};
 use crate::recording::Recording;
 use crate::simulate::drive::Drive;
 use crate::simulate::equilibrium::steady_slip_pose;
 use crate::simulate::outputs::LargestTilt;
 use crate::simulate::scene::{Scene, StartKind};
-use crate::simulate::{Observer, RunResult, RunStatus, SolverOptions};
-use crate::twin::{
+use crate::simulate::twin::{
     Camera, TrackingModel, TwinView, TwinViewError, add_tracking_noise, film_scene, film_scene_with_observer,
 };
+use crate::simulate::{Observer, RunResult, RunStatus, SolverOptions};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;

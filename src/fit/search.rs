@@ -6,29 +6,22 @@
 //! (`simplex.rs`). Budgets, stagnation, the best point and every failure are kept in the ledger, so nothing
 //! depends on what a solver does with costs that are not numbers or with errors.
 
-mod clouds;
-mod costs;
-mod elsewhere;
-mod ended;
-mod evolution;
+mod excluded_region_search;
 mod gauss_newton;
 mod local;
-mod patience;
-mod rules;
+mod population;
 mod simplex;
-mod slab;
+mod stagnation;
+mod termination;
 
-pub(super) use elsewhere::{best_in_slab, search_excluded_region};
-pub use ended::{LocalDescent, SearchOutcome, SearchTermination};
-pub use local::polish_best;
-pub use rules::SIMPLEX_COST_SPREAD;
-pub(crate) use rules::{EXACT_COST, MIN_WORTHWHILE_GAIN};
-pub(super) use slab::Slab;
-
+use super::evaluation::{Evaluation, EvaluationStage};
 use super::ledger::{Ledger, StopReason};
-use super::settings::SearchSettings;
-use clouds::search_with_populations;
+pub(super) use excluded_region_search::{Slab, best_in_slab, search_excluded_region};
+pub use local::polish_best;
 use local::search_locally;
+use population::search_with_populations;
+pub(crate) use termination::{EXACT_COST, MIN_WORTHWHILE_GAIN};
+pub use termination::{LocalDescent, SIMPLEX_COST_SPREAD, SearchOutcome, SearchTermination};
 
 /// Searches within the budgets of `settings` and `limit` evaluations in all.
 pub fn search_minimum(
@@ -58,4 +51,83 @@ pub fn search_minimum(
         &mut searched.descents,
     );
     searched
+}
+
+// Costs of points of the unit box, as the solvers of a stage ask for them.
+//
+// A solver that asks after the ledger has stopped gets [`STOPPED_COST`], and is left before it uses it.
+
+/// Cost of every point after the ledger has stopped.
+const STOPPED_COST: f64 = 1e100;
+
+/// Costs of a stage.
+pub(super) struct StageCosts<'l, 'a> {
+    ledger: &'l mut Ledger<'a>,
+    stage: EvaluationStage,
+    stop: Option<StopReason>,
+    /// The part of the box to which every point is moved, where it is not the whole.
+    slab: Option<Slab>,
+}
+
+impl<'l, 'a> StageCosts<'l, 'a> {
+    pub(super) fn new(ledger: &'l mut Ledger<'a>, stage: EvaluationStage) -> Self {
+        Self { ledger, stage, stop: None, slab: None }
+    }
+
+    /// Costs of the points of a slab, which is asked for as if it were the whole box.
+    pub(super) fn new_within(ledger: &'l mut Ledger<'a>, stage: EvaluationStage, slab: Slab) -> Self {
+        Self { slab: Some(slab), ..Self::new(ledger, stage) }
+    }
+
+    /// One cost a point, in their order; the ledger evaluates them in parallel.
+    pub(super) fn evaluate_points(&mut self, points: &[Vec<f64>]) -> Vec<f64> {
+        let global = self.stage == EvaluationStage::Global;
+        let cost = |e: &Evaluation| if global { e.global_cost } else { e.cost };
+        let moved: Option<Vec<Vec<f64>>> =
+            self.slab.map(|slab| points.iter().map(|point| slab.map_into(point.clone())).collect());
+        match self.ledger.evaluate_points(self.stage, moved.as_deref().unwrap_or(points)) {
+            Ok(found) if found.len() == points.len() => found.into_iter().map(cost).collect(),
+            Ok(_) => vec![STOPPED_COST; points.len()],
+            Err(reason) => {
+                self.stop = Some(reason);
+                vec![STOPPED_COST; points.len()]
+            }
+        }
+    }
+
+    pub(super) fn evaluate_point(&mut self, point: Vec<f64>) -> f64 {
+        self.evaluate_points(&[point]).first().copied().unwrap_or(STOPPED_COST)
+    }
+
+    /// What is known, and how it is priced.
+    pub(super) fn ledger(&self) -> &Ledger<'a> {
+        self.ledger
+    }
+
+    /// Why no more evaluations are made, if none are.
+    pub(super) fn stop_reason(&self) -> Option<StopReason> {
+        self.stop.clone()
+    }
+}
+
+// Budgets and rules of a search.
+
+/// Generations without a gain after which a cloud is left, unless the job says otherwise.
+pub const STAGNANT_GENERATIONS: usize = 20;
+
+/// Budgets and rules.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SearchSettings {
+    /// Seed of the clouds.
+    pub seed: u64,
+    /// Evaluations of the global stage.
+    pub global_evaluations: usize,
+    /// Evaluations of the local stage.
+    pub local_evaluations: usize,
+    /// Points of a cloud.
+    pub particles: usize,
+    /// Generations without progress after which a cloud is left.
+    pub stagnation_generations: usize,
+    /// Points from which a local search starts.
+    pub starts: usize,
 }

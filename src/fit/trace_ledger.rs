@@ -3,12 +3,12 @@
 //! An iterate follows from the one before and from nothing else, so that a search that was killed goes on
 //! with the same bits. At most the iterates that were being made are lost.
 
-use super::error::FitError;
-use super::iterates::{IterateRecord, TraceCheckpoint, TraceHeader};
+use super::FitError;
+use super::evaluation::EvaluationStage;
 use super::ledger::FitProgress;
-use super::stage::EvaluationStage;
 use super::trace::{Checkpoint, Iterate, UncertaintyRun};
-use crate::journal::{CheckpointSink, format_header_line, format_record_line, sample_records};
+use super::trace_checkpoint::{IterateRecord, TraceCheckpoint, TraceHeader};
+use crate::checkpoint::{CheckpointSink, format_header_line, format_record_line, sample_records};
 use std::collections::{BTreeMap, HashMap};
 use std::ops::ControlFlow;
 

@@ -1,17 +1,28 @@
 //! One run of a trace fit, from the journal to the result.
 
-use super::error::FitError;
-use super::iterates::{HeaderCoordinate, IterateRecord, TraceCheckpoint, TraceHeader, TraceHeaderBody};
+use super::FitError;
+use super::identifiability::Identifiability;
+use super::job::{FreeParameter, TraceChannel};
+use super::linear_model::CHI_SQUARED_95;
+use super::misfit::{ChannelMisfit, StageMisfit, TraceMisfit, WorstSegment};
 use super::problem::Problem;
-use super::result::{FitResult, FitStatus};
+use super::result::{
+    EvaluationCounts, FitResult, FitStatus, LocalOptimum, NuisanceResult, ParameterResult, StartState,
+};
 use super::targets::measure_targets;
 use super::trace::{
-    SearchEnd, TraceDescent, TraceModel, TraceSearchSettings, UncertaintyRun, first_iterate, next_iterate,
-    search_trace, start_point,
+    CameraUnknown, Iterate, SearchEnd, SegmentResiduals, TraceAssessment, TraceDescent, TraceModel,
+    TraceSearchOutcome, TraceSearchSettings, UncertaintyRun, UnknownKind, chi2_per_dof, first_iterate,
+    next_iterate, search_trace, segment_residuals, start_point, undersampled_mode,
+};
+use super::trace_checkpoint::{
+    HeaderCoordinate, IterateRecord, TraceCheckpoint, TraceHeader, TraceHeaderBody, camera_unknown_name,
 };
 use super::trace_ledger::{OnIterate, TraceLedger, TraceStopReason, recheck_iterates};
-use super::trace_result::TraceFindings;
-use crate::journal::{CheckpointSink, ExactNumber};
+use super::uncertainty::ParameterVerdict;
+use crate::checkpoint::{CheckpointSink, ExactNumber};
+use crate::recording::Recording;
+use std::collections::BTreeMap;
 
 impl Problem {
     /// Fits the traces of the job, at most to `most` iterates (`None` for as many as it takes), and tells of
@@ -99,3 +110,358 @@ fn cannot_be_fitted(why: &str) -> FitError {
 /// Why nothing could be fitted at all.
 const NO_SEGMENT_STARTED: &str = "no segment of the traces could be started: the model runs nowhere within the bounds, or \
                           the tip slides in too few frames; look at the recording with `wiperlab inspect`";
+
+// From the end of a trace search to its result.
+
+/// Segments that a channel names as those that fit worst.
+const WORST_SEGMENTS: usize = 5;
+
+/// A bias of short segments shows in nothing but longer ones.
+const ONE_LENGTH_NOTE: &str = "segments of one length alone were fitted, and whether longer ones agree is not known: give \
+                          `segment_s` two lengths at least";
+
+/// Everything that a trace fit found.
+pub(super) struct TraceFindings<'a, 'l> {
+    pub problem: &'a Problem,
+    pub model: &'a TraceModel,
+    pub searched: &'a TraceSearchOutcome,
+    pub ledger: &'a TraceLedger<'l>,
+}
+
+impl TraceFindings<'_, '_> {
+    /// The result, but for what the whole run shows; `None` where no search came anywhere.
+    pub fn into_result(self) -> Option<FitResult> {
+        let job = self.problem.job();
+        let best = self.searched.descents.get(self.searched.best)?;
+        let end = best.last_iterate()?;
+        let nuisances = self.nuisance_results(end);
+        let misfit = self.trace_misfit(best, end, &nuisances);
+        let names = job.parameter_names();
+        let parameters = job.parameters.iter().enumerate();
+        let parameters =
+            parameters.map(|(at, free)| (free.name.clone(), self.parameter_result(at, free, end, &misfit)));
+        let assessment = self.searched.assessment.as_ref();
+        Some(FitResult {
+            title: job.title.clone(),
+            status: self.fit_status(best),
+            parameters: parameters.collect(),
+            nuisances,
+            starts: self.start_states(end),
+            misfit: Some(misfit),
+            components: Vec::new(),
+            features: Vec::new(),
+            held_out: Vec::new(),
+            rank: assessment.map_or(0, |found| found.rank.min(names.len())),
+            condition: None,
+            combinations: Vec::new(),
+            correlations: assessment.map(|found| correlation_table(&names, found)).unwrap_or_default(),
+            cost: end.cost,
+            threshold: CHI_SQUARED_95,
+            twins: assessment.map_or(0, |found| found.twins),
+            gate: Identifiability::default(),
+            waterfall: self.sorted_optima(&names),
+            sensitivities: BTreeMap::new(),
+            evaluations: EvaluationCounts {
+                total: self.ledger.count_iterates(),
+                ..EvaluationCounts::default()
+            },
+            synthetic: self.problem.recordings().iter().flatten().any(Recording::is_synthetic),
+            notes: self.collect_notes(end),
+            seed: job.search.seed,
+            fingerprint: self.problem.fingerprint().to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+        })
+    }
+
+    fn fit_status(&self, best: &TraceDescent) -> FitStatus {
+        match self.ledger.stop_reason() {
+            _ if !self.searched.stopped && self.searched.assessment.is_none() => FitStatus::Failed,
+            _ if !self.searched.stopped && best.stages.len() < self.problem.segment_s().len() => {
+                FitStatus::Failed
+            }
+            _ if !self.searched.stopped => FitStatus::Converged,
+            Some(TraceStopReason::Budget) => FitStatus::BudgetExhausted,
+            _ => FitStatus::Interrupted,
+        }
+    }
+
+    /// Name of the recording with this number among the traces.
+    fn recording_name(&self, film: usize) -> String {
+        let condition = self.problem.traces().get(film).map(|trace| trace.condition);
+        let name = condition.and_then(|at| self.problem.job().conditions.get(at)).map(|c| c.name.clone());
+        name.unwrap_or_default()
+    }
+
+    fn parameter_result(
+        &self,
+        at: usize,
+        free: &FreeParameter,
+        end: &Iterate,
+        misfit: &TraceMisfit,
+    ) -> ParameterResult {
+        let estimate = clamp_to_bounds(free, self.model.unknowns.0[at].value(end.point[at]));
+        let mut found = ParameterResult {
+            estimate,
+            lower_95: None,
+            upper_95: None,
+            verdict: ParameterVerdict::NotIdentified,
+            linear_95: None,
+            profile_95: [None; 2],
+            bootstrap_95: None,
+            profile: Vec::new(),
+            reasons: misfit.reasons.clone(),
+        };
+        let Some(known) = &self.searched.assessment else {
+            found.reasons = vec!["the search had not come to its end".to_owned()];
+            return found;
+        };
+        let own = &known.estimates[at];
+        found.linear_95 = Some(own.ends_95);
+        found.bootstrap_95 = own.twins_95;
+        let [lower, upper] = own.widest_95();
+        found.lower_95 = Some(lower).filter(|end| *end > free.bounds.lower());
+        found.upper_95 = Some(upper).filter(|end| *end < free.bounds.upper());
+        let wide = found.lower_95.is_none() && found.upper_95.is_none();
+        found.reasons.extend(wide.then(|| "the interval is wider than the bounds".to_owned()));
+        let alone = self.problem.segment_s().len() < 2;
+        found.reasons.extend(alone.then(|| ONE_LENGTH_NOTE.to_owned()));
+        found.reasons.extend(known.doubts.iter().cloned());
+        remove_duplicates(&mut found.reasons);
+        found.verdict = trace_verdict(free, &found);
+        found
+    }
+
+    fn nuisance_results(&self, end: &Iterate) -> Vec<NuisanceResult> {
+        let first = self.problem.job().parameters.len();
+        let all = self.model.unknowns.0.iter().zip(&end.point).enumerate().skip(first);
+        let nuisance = |(at, (unknown, z)): (usize, (&super::trace::TraceUnknown, &f64))| {
+            let [mean, sd] = unknown.prior.unwrap_or([unknown.start, f64::INFINITY]);
+            let ends = self.searched.assessment.as_ref().map(|known| known.estimates[at].widest_95());
+            let (recording, name) = match &unknown.kind {
+                UnknownKind::Parameter { name, .. } => (None, name.clone()),
+                UnknownKind::Camera { film, what } => {
+                    (Some(self.recording_name(*film)), camera_unknown_name(*what).to_owned())
+                }
+            };
+            NuisanceResult {
+                recording,
+                name,
+                prior: unknown.value(mean),
+                prior_sd: sd * unknown.slope(mean),
+                estimate: unknown.value(*z),
+                lower_95: ends.map(|ends| ends[0]),
+                upper_95: ends.map(|ends| ends[1]),
+            }
+        };
+        all.map(nuisance).collect()
+    }
+
+    /// The state in which the first segment of every recording starts.
+    fn start_states(&self, end: &Iterate) -> Vec<StartState> {
+        let start = |(film, shoot): (usize, &super::trace::TraceRecording)| {
+            let first =
+                end.segments.iter().find(|s| s.recording == film && s.chi2.is_finite() && !s.is_bad())?;
+            let clock_s = self.camera_value(end, film, CameraUnknown::Clock);
+            let [neck_angle_rad, lip_angle_rad, neck_rate_rad_per_s, lip_rate_rad_per_s] = first.start;
+            Some(StartState {
+                recording: self.recording_name(film),
+                time_s: shoot.observation.times_s[first.first]
+                    - 0.5 * shoot.observation.settings.exposure_s
+                    - clock_s,
+                neck_angle_rad,
+                lip_angle_rad,
+                neck_rate_rad_per_s,
+                lip_rate_rad_per_s,
+            })
+        };
+        self.model.recordings.iter().enumerate().filter_map(start).collect()
+    }
+
+    /// A number of a recording's camera, in its own unit; 0 where it is held.
+    fn camera_value(&self, end: &Iterate, film: usize, what: CameraUnknown) -> f64 {
+        let kind = UnknownKind::Camera { film, what };
+        let found = self.model.unknowns.0.iter().zip(&end.point).find(|(unknown, _)| unknown.kind == kind);
+        found.map_or(0.0, |(unknown, z)| unknown.value(*z))
+    }
+
+    fn trace_misfit(&self, best: &TraceDescent, end: &Iterate, nuisances: &[NuisanceResult]) -> TraceMisfit {
+        let found = segment_residuals(self.model, end);
+        let mut channels: BTreeMap<(usize, bool), Vec<&SegmentResiduals>> = BTreeMap::new();
+        // a recording of which nothing could be compared has its row too
+        for (film, trace) in self.problem.traces().iter().enumerate() {
+            for channel in &trace.channels {
+                channels.insert((film, *channel == TraceChannel::HeadDrop), Vec::new());
+            }
+        }
+        found.iter().for_each(|r| channels.entry((r.recording, r.is_drop)).or_default().push(r));
+        let (chi2, dof) = chi2_per_dof(end);
+        let data: usize = end.segments.iter().map(|segment| segment.data).sum();
+        // every datum pays its share of the unknowns; (a run that fails leaves chi2 without a number)
+        let share = if chi2.is_nan() || data == 0 { 1.0 } else { dof as f64 / data as f64 };
+        let rows =
+            channels.iter().map(|(channel, parts)| self.channel_misfit(*channel, parts, share)).collect();
+        // at the end, not on the way to it, where that is known
+        let known = self.searched.assessment.as_ref().and_then(|known| known.shorter.as_ref());
+        let shorter = |stage: usize| known.filter(|iterate| iterate.stage == stage);
+        let stages =
+            best.stages.iter().map(|way| self.stage_misfit(shorter(way.stage).unwrap_or(way))).collect();
+        TraceMisfit::judge(rows, stages, nuisances)
+    }
+
+    fn channel_misfit(
+        &self,
+        (film, is_drop): (usize, bool),
+        parts: &[&SegmentResiduals],
+        share: f64,
+    ) -> ChannelMisfit {
+        let shoot = &self.model.recordings[film].observation;
+        let has = |channel| self.problem.traces()[film].channels.contains(&channel);
+        let channel = match is_drop {
+            true => TraceChannel::HeadDrop,
+            false if has(TraceChannel::Deflection) => TraceChannel::Deflection,
+            false => TraceChannel::TipX,
+        };
+        let frames: usize = parts.iter().map(|part| part.frames.len()).sum();
+        let [first, last] = shoot.settings.frames;
+        let tracked = &(if is_drop { &shoot.drop_m } else { &shoot.tip_x_m })[first..last];
+        let squares =
+            |values: &dyn Fn(&SegmentResiduals) -> f64| parts.iter().map(|p| values(p)).sum::<f64>();
+        let chi2 = |part: &SegmentResiduals| part.whitened.iter().map(|r| r * r).sum::<f64>();
+        let mut worst: Vec<WorstSegment> = parts
+            .iter()
+            .filter_map(|part| {
+                let (first, last) = (*part.frames.first()?, *part.frames.last()?);
+                let end_s = shoot.times_s[last] + 1.0 / shoot.rate_hz;
+                let chi2_per_dof = chi2(part) / (share * part.frames.len() as f64);
+                Some(WorstSegment { start_s: shoot.times_s[first], end_s, chi2_per_dof })
+            })
+            .collect();
+        worst.sort_by(|a, b| b.chi2_per_dof.total_cmp(&a.chi2_per_dof));
+        worst.truncate(WORST_SEGMENTS);
+        let metres = squares(&|part| part.residual_m.iter().map(|r| r * r).sum());
+        ChannelMisfit {
+            recording: self.recording_name(film),
+            channel: channel.name().to_owned(),
+            frames,
+            frames_left_out: tracked.iter().flatten().count().saturating_sub(frames),
+            residual_rms_m: (metres / frames.max(1) as f64).sqrt(),
+            noise_m: shoot.settings.noise[usize::from(is_drop)].sd(),
+            chi2_per_dof: squares(&chi2) / (share * frames.max(1) as f64),
+            autocorrelation_1: residual_autocorrelation(parts),
+            worst,
+        }
+    }
+
+    fn stage_misfit(&self, iterate: &Iterate) -> StageMisfit {
+        let (chi2_per_dof, dof) = chi2_per_dof(iterate);
+        let names = self.problem.job().parameter_names().into_iter();
+        let values = self.model.unknowns.0.iter().zip(&iterate.point).map(|(unknown, z)| unknown.value(*z));
+        StageMisfit {
+            segment_s: self.problem.segment_s().get(iterate.stage).copied().unwrap_or_default(),
+            segments: iterate.segments.len(),
+            bad_segments: iterate.segments.iter().filter(|segment| segment.is_bad()).count(),
+            dof,
+            chi2_per_dof,
+            estimates: names.zip(values).collect(),
+        }
+    }
+
+    /// Where every start ended, the best first.
+    fn sorted_optima(&self, names: &[String]) -> Vec<LocalOptimum> {
+        let stages = self.problem.segment_s().len();
+        let optimum = |descent: &TraceDescent| {
+            let (first, end) = (descent.stages.first()?, descent.last_iterate()?);
+            let values = self.model.unknowns.0.iter().zip(&end.point).map(|(unknown, z)| unknown.value(*z));
+            let failure = (descent.stages.len() < stages)
+                .then(|| format!("ended at stage {} of {stages}", descent.stages.len()));
+            Some(LocalOptimum {
+                start_cost: first.cost,
+                cost: end.cost,
+                evaluations: self.ledger.count_start_iterates(descent.start),
+                values: names.iter().cloned().zip(values).collect(),
+                failure,
+            })
+        };
+        let mut found: Vec<LocalOptimum> = self.searched.descents.iter().filter_map(optimum).collect();
+        found.sort_by(|a, b| a.failure.is_some().cmp(&b.failure.is_some()).then(a.cost.total_cmp(&b.cost)));
+        found
+    }
+
+    fn collect_notes(&self, end: &Iterate) -> Vec<String> {
+        let mut notes = Vec::new();
+        if let Some([rate_hz, fastest_hz]) = undersampled_mode(self.model, end) {
+            notes.push(format!(
+                "{rate_hz} frames/s are fewer than two a period of the blade's fastest mode ({fastest_hz:.0} Hz): other values \
+                 may give nearly the same frames, so that more starts were compared; film faster if you can"
+            ));
+        }
+        if self.problem.constants().is_empty() {
+            notes.push(
+                "masses, inertias, dampings, preload and every other constant of the scene are taken as exact: the \
+                 intervals do not include their errors; `nuisance = \"3 %\"` in the job adds them"
+                    .to_owned(),
+            );
+        }
+        if self.problem.recordings().iter().flatten().any(Recording::is_synthetic) {
+            notes.push("the recording is synthetic: no camera took it".to_owned());
+        }
+        notes
+    }
+}
+
+/// A value that went through its coordinate, within the bounds to the last bit.
+fn clamp_to_bounds(free: &FreeParameter, value: f64) -> f64 {
+    value.clamp(free.bounds.lower(), free.bounds.upper())
+}
+
+/// What is known of a parameter: of one with a doubt, nothing is called known.
+pub(super) fn trace_verdict(free: &FreeParameter, found: &ParameterResult) -> ParameterVerdict {
+    /// Part of the bounds within which a value is at their end.
+    const NEAR: f64 = 1e-6;
+    let place = free.bounds.to_unit(found.estimate);
+    match (found.lower_95, found.upper_95) {
+        _ if !(NEAR..=1.0 - NEAR).contains(&place) => ParameterVerdict::AtBound,
+        (None, None) => ParameterVerdict::NotIdentified,
+        _ if !found.reasons.is_empty() => ParameterVerdict::NotIdentified,
+        (None, Some(_)) => ParameterVerdict::OpenBelow,
+        (Some(_), None) => ParameterVerdict::OpenAbove,
+        (Some(_), Some(_)) => ParameterVerdict::Identified,
+    }
+}
+
+fn remove_duplicates(sentences: &mut Vec<String>) {
+    let mut kept: Vec<String> = Vec::new();
+    for sentence in sentences.drain(..) {
+        if !kept.contains(&sentence) {
+            kept.push(sentence);
+        }
+    }
+    *sentences = kept;
+}
+
+fn correlation_table(names: &[String], known: &TraceAssessment) -> BTreeMap<String, BTreeMap<String, f64>> {
+    let row = |i: usize| {
+        let finite = |(j, name): (usize, &String)| {
+            Some((name.clone(), known.correlation[(i, j)])).filter(|(_, r)| r.is_finite())
+        };
+        names.iter().enumerate().filter_map(finite).collect()
+    };
+    names.iter().enumerate().map(|(i, name)| (name.clone(), row(i))).collect()
+}
+
+/// Correlation of residuals of neighbouring frames, in units of the noise.
+fn residual_autocorrelation(parts: &[&SegmentResiduals]) -> Option<f64> {
+    let (mut product, mut pairs, mut square, mut count) = (0.0, 0usize, 0.0, 0usize);
+    for part in parts {
+        square += part.whitened.iter().map(|r| r * r).sum::<f64>();
+        count += part.whitened.len();
+        for (frames, values) in part.frames.windows(2).zip(part.whitened.windows(2)) {
+            if frames[1] == frames[0] + 1 {
+                product += values[0] * values[1];
+                pairs += 1;
+            }
+        }
+    }
+    let variance = square / count.max(1) as f64;
+    Some(product / pairs as f64 / variance).filter(|r| r.is_finite())
+}

@@ -4,34 +4,32 @@
 //! best model fitted again ([`super::bootstrap_refits`]), and every point of the whole fit that is as good as the
 //! threshold allows. Without a profile the linear model at the best point takes its place.
 
-mod bound;
-mod confirm;
-mod doubt;
-mod stored;
+mod rivals;
+mod verdicts;
 
-pub(crate) use super::information::CHI_SQUARED_95;
-pub(crate) use confirm::confirm_identified;
-pub use doubt::FeatureWeights;
-pub(crate) use doubt::weigh_features;
-pub(super) use stored::stored_verdicts;
+pub(crate) use super::linear_model::CHI_SQUARED_95;
+pub(crate) use rivals::confirm_identified;
+pub use verdicts::FeatureWeights;
+pub(super) use verdicts::stored_verdicts;
+pub(crate) use verdicts::weigh_features;
 
 use super::bootstrap::{Bootstrap, bootstrap_refits};
-use super::cameras::CameraEstimate;
+use super::camera_calibration::CameraEstimate;
 use super::evaluation::Evaluation;
-use super::information::{MIN_INFORMATIVE, ParameterCombination, SingularDirections, Z_95};
+use super::evaluation::EvaluationStage;
 use super::job::IntervalSettings;
 use super::ledger::{Ledger, StopReason};
-use super::linear::{
+use super::linear_model::{
     DIFFERENCE_STEP, FeatureSlopes, camera_estimates, difference_points, jacobian, residuals,
 };
+use super::linear_model::{MIN_INFORMATIVE, ParameterCombination, SingularDirections, Z_95};
 use super::objective::Objective;
 use super::profile::{AT_BOUND, ProfileLikelihood, profile_parameters};
 use super::search::{MIN_WORTHWHILE_GAIN, polish_best};
-use super::stage::EvaluationStage;
-use bound::{best_excluded_gain, is_at_bound, withdraw_all, withdraw_correlated};
-use doubt::check_best_point;
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
+use verdicts::check_best_point;
+use verdicts::{best_excluded_gain, is_at_bound, withdraw_all, withdraw_correlated};
 
 /// How often a better point, met on the way along a profile, is followed and everything begun again.
 const MAX_RESTARTS: usize = 2;

@@ -1,9 +1,9 @@
 //! Tracks to a recording: points, frames, scale, direction, and what deserves a warning.
 
-use crate::import::error::ImportError;
-use crate::import::level::level_recording;
-use crate::import::options::{CoordinateScale, ImportOptions};
-use crate::import::outcome::{Import, ImportReport};
+use super::error::ImportError;
+use super::options::ImportOptions;
+use super::{Import, ImportReport, ImportSource, base_name, preserved_files};
+use crate::import::options::{CoordinateScale};
 use crate::import::reader::calibration::{ImportCalibration, calibrate};
 use crate::import::reader::encoding::DecodedText;
 use crate::import::reader::findings::new_finding;
@@ -11,10 +11,12 @@ use crate::import::reader::grid::{ClockGrid, GridPositions};
 use crate::import::reader::track_choice::TrackIndex;
 use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{companion, findings, track_choice};
-use crate::import::source::{ImportSource, base_name, preserved_files};
-use crate::recording::files::{CameraEntry, OneOrMany, RecordingFile, SourceEntry};
-use crate::recording::quality::{Check, Optics, Severity, measure_quality};
-use crate::recording::{Recording, Traces};
+use crate::recording::channel::ReversalInstants;
+use crate::recording::files::{CameraEntry, LevelEntry, OneOrMany, RecordingFile, SourceEntry};
+use crate::recording::quality::{
+    CameraTilt, Check, Optics, Severity, TiltNotFound, check_position_steps, measure_quality, measure_tilt,
+};
+use crate::recording::{Recording, RotationError, Traces, rotate_traces};
 use crate::toml_file;
 
 /// Word in a track's name or a header that marks data no camera took.
@@ -183,4 +185,62 @@ fn describe_recording(
     file.conditions = options.conditions.clone();
     file.twin = options.twin.as_ref().map(|(name, text)| toml_file::parse_table(name, text)).transpose()?;
     Ok(file)
+}
+
+// The tilt of the camera, measured on the imported path and taken out of both tracks on request.
+
+/// Why a recording cannot be levelled.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum LevelError {
+    /// It shows no tilt.
+    #[error(transparent)]
+    NoTilt(#[from] TiltNotFound),
+    /// A point has one coordinate alone.
+    #[error(transparent)]
+    NotTurnable(#[from] RotationError),
+}
+
+/// The recording as a level camera would have seen it, and what was done; `file` is the name used in
+/// refusals. A tilt that is not clear is left alone.
+///
+/// # Errors
+/// [`ImportError::Level`] where the path shows no tilt, or a point has one coordinate alone.
+pub(crate) fn level_recording(
+    recording: Recording,
+    file: &str,
+    (options, optics): (&ImportOptions, &Optics),
+    report: &mut ImportReport,
+) -> Result<(Recording, Option<LevelEntry>), ImportError> {
+    if !options.level {
+        return Ok((recording, None));
+    }
+    let refuse = |problem| ImportError::Level { file: file.to_owned(), problem };
+    let measured = measure_quality(&recording, optics.exposure_s);
+    let tilt = measure_tilt(&recording, &ReversalInstants::find_instants(&recording), &measured)
+        .map_err(|e| refuse(e.into()))?;
+    let entry = level_entry(&tilt);
+    report.notes.push(format!("level: {}", entry.describe()));
+    if !entry.applied {
+        return Ok((recording, Some(entry)));
+    }
+    let traces =
+        rotate_traces(recording.traces(), tilt.angle_rad, tilt.centre_m).map_err(|e| refuse(e.into()))?;
+    // turned coordinates no longer show the step of the export
+    report.findings.extend(check_position_steps(&measured, optics));
+    let (name, grid) = (recording.name().to_owned(), recording.grid());
+    let level = Recording::new(name, grid, traces, recording.is_synthetic())
+        .map_err(|problem| ImportError::Recording { file: file.to_owned(), problem })?;
+    Ok((level, Some(entry)))
+}
+
+fn level_entry(tilt: &CameraTilt) -> LevelEntry {
+    LevelEntry {
+        applied: tilt.is_clear(),
+        angle_rad: tilt.angle_rad,
+        sd_rad: tilt.sd_rad,
+        centre_x_m: tilt.centre_m[0],
+        centre_y_m: tilt.centre_m[1],
+        frames: tilt.frames,
+        curvature_per_m: tilt.curvature.map(|curvature| curvature.per_m),
+    }
 }

@@ -1,6 +1,6 @@
 //! Why an export was refused: the place, what was found, what was expected, what to do.
 
-use crate::import::level::LevelError;
+use super::assemble::LevelError;
 use crate::recording::RecordingError;
 use crate::recording::files::FilesError;
 use crate::toml_file::TomlError;

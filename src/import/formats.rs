@@ -18,11 +18,11 @@ mod trackpy;
 mod trc;
 mod wiperlab;
 
-use crate::import::error::ImportError;
-use crate::import::format::FileFormat;
-use crate::import::options::ImportOptions;
-use crate::import::reader::Document;
-use crate::import::reader::new_finding;
+use super::error::ImportError;
+use super::options::ImportOptions;
+use super::reader::Document;
+use super::reader::track_file::TrackFile;
+use crate::import::reader::{new_finding};
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::toml_file;
 
@@ -201,4 +201,21 @@ fn unknown_format_error(name: &str) -> ImportError {
 /// A file that no format recognises: its own problem, or a plain table whose columns have no names yet.
 fn unrecognised_error(document: &Document) -> ImportError {
     document.table().map_or_else(|error| error, generic::unnamed_columns_error)
+}
+
+// What a file format has to say: one implementation a file in `formats/`.
+
+/// One file format.
+pub(crate) trait FileFormat: Sync {
+    /// Its name on the command line.
+    fn name(&self) -> &'static str;
+    /// What in the content shows it, if anything does; also for tables of the same program that hold no
+    /// positions, which [`FileFormat::read`] then refuses.
+    fn recognises(&self, document: &Document) -> Option<String>;
+    /// Its rows and tracks, in the file's own units.
+    fn read<'a>(
+        &self,
+        document: &'a Document<'a>,
+        options: &ImportOptions,
+    ) -> Result<TrackFile<'a>, ImportError>;
 }

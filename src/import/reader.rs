@@ -1,12 +1,8 @@
 //! From text to tracks on a frame grid, the same for every format: encoding, dialect, table, layout, timing.
 
 pub(crate) mod calibration;
-pub(crate) mod column;
 pub(crate) mod companion;
-pub(crate) mod cut_numbers;
-pub(crate) mod delimiter;
 pub(crate) mod dialect;
-pub(crate) mod document;
 pub(crate) mod encoding;
 pub(crate) mod file_type;
 pub(crate) mod findings;
@@ -14,25 +10,62 @@ pub(crate) mod grid;
 pub(crate) mod instances;
 pub(crate) mod layout;
 pub(crate) mod number;
-pub(crate) mod photron;
-pub(crate) mod picked;
-pub(crate) mod rounding;
 pub(crate) mod rows;
-pub(crate) mod several_clocks;
 pub(crate) mod spreadsheet;
 pub(crate) mod table;
 pub(crate) mod timing;
 pub(crate) mod track_choice;
 pub(crate) mod track_file;
-pub(crate) mod units;
 
-pub(crate) use column::Column;
-pub(crate) use document::Document;
+use super::error::ImportError;
+use super::{ImportSource, base_name};
+use encoding::DecodedText;
 pub(crate) use findings::new_finding;
 pub(crate) use instances::{InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector};
 pub(crate) use layout::{LostRule, PointCells, TableLayout};
 pub(crate) use number::{CellNumber, parse_number};
 pub(crate) use rows::{RowView, TextRow};
 pub(crate) use table::DelimitedTable;
-pub(crate) use track_file::{Clock, Fact, Facts, Track, TrackFile};
-pub(crate) use units::{CoordinateUnit, TimeUnit};
+pub(crate) use track_file::{Clock, Column, CoordinateUnit, Fact, Facts, TimeUnit, Track, TrackFile};
+
+// A decoded file, with its table and the texts of its companions.
+
+/// A decoded file as the formats see it.
+pub(crate) struct Document<'a> {
+    /// File as named by the user.
+    pub file: &'a str,
+    /// Its name without folders and extension.
+    pub stem: &'a str,
+    /// Its text, without a byte-order mark.
+    pub text: &'a str,
+    /// The text as a table, or why it is not one.
+    pub table: Result<DelimitedTable<'a>, ImportError>,
+    /// The texts of the companions, with their names.
+    pub companions: Vec<(&'a str, String)>,
+}
+
+impl<'a> Document<'a> {
+    pub(crate) fn new(source: &'a ImportSource, decoded: &'a DecodedText) -> Self {
+        let base = base_name(&source.name);
+        let stem = base.rsplit_once('.').map_or(base, |(stem, _)| stem);
+        let companions = source.companions.iter().filter_map(|file| {
+            Some((
+                file.name.as_str(),
+                encoding::decode_text(&file.name, &file.bytes, None).ok()?.text.into_owned(),
+            ))
+        });
+        let table = file_type::refuse_text(&source.name, &decoded.text)
+            .map_or_else(|| DelimitedTable::parse(&source.name, &decoded.text), Err);
+        Self { file: &source.name, stem, text: &decoded.text, table, companions: companions.collect() }
+    }
+
+    pub(crate) fn table(&self) -> Result<&DelimitedTable<'_>, ImportError> {
+        self.table.as_ref().map_err(Clone::clone)
+    }
+
+    /// Its encoding, delimiter and decimal mark, for the report.
+    pub(crate) fn encoding_note(&self, decoded: &DecodedText) -> String {
+        let dialect = self.table.as_ref().map_or_else(|_| String::new(), |table| table.dialect.describe());
+        format!("{}: {}{dialect}", self.file, decoded.encoding)
+    }
+}

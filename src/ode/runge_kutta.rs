@@ -4,9 +4,9 @@
 use super::dop853::{
     Dop853DenseOutput, Dop853Stages, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP,
 };
-use super::fixed::{RUNGE_KUTTA_4_EVALUATIONS, runge_kutta_4_step};
+use super::fixed_step::{RUNGE_KUTTA_4_EVALUATIONS, runge_kutta_4_step};
 use super::roots::{self, COARSE_SAMPLES, FINE_SAMPLES};
-use super::slack::{MOST_HALVINGS, SlackVariable, StatePoint};
+use super::slack_variable::{MOST_HALVINGS, SlackVariable, StatePoint};
 use super::{AcceptedStep, HybridPhase, ObserverReply, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters};
 use crate::math;
 

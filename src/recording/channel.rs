@@ -1,22 +1,248 @@
 //! Channels derived from a recording, and the windows and instants that cut them.
 
-mod channels;
 mod flip;
-mod holds;
 mod instants;
-mod named_windows;
 mod phase;
-mod speed;
-mod tracked;
 mod turns;
 mod window;
-mod window_text;
 
-pub use channels::{Channel, UnknownChannel};
+use super::Recording;
+use crate::math;
 pub use flip::Flip;
 pub use instants::{InstantKind, InstantNotFound, Reversal, ReversalInstants};
-pub use named_windows::{PhaseWindow, phase_windows};
-pub use phase::ReversalPhase;
-pub use speed::mean_speed_m_per_s;
-
+pub use phase::{PhaseWindow, ReversalPhase, phase_windows};
+use serde::Serialize;
+use std::ops::Range;
 pub use window::{Window, WindowEnd, WindowError};
+
+// Channels: what of a recording is followed over the frames.
+
+/// A quantity followed over the frames, m.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
+pub enum Channel {
+    /// Deflection of the blade, `tip_x - head_x` = `v3 - v`.
+    Deflection,
+    /// Drop of the head towards the glass, `-head_y` = `u`.
+    HeadDrop,
+    /// Lip tip along the sweep, `v3`.
+    TipX,
+    /// Head along the sweep, `v`.
+    HeadX,
+}
+
+/// A channel name that does not exist.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("unknown channel `{found}`; {advice}")]
+pub struct UnknownChannel {
+    /// The name as written.
+    pub found: String,
+    /// The nearest known name, or the list of them.
+    pub advice: String,
+}
+
+impl Channel {
+    /// Every channel, in the order of the documentation.
+    pub const ALL: [Self; 4] = [Self::Deflection, Self::HeadDrop, Self::TipX, Self::HeadX];
+
+    /// Name on the command line and in files.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Deflection => "deflection",
+            Self::HeadDrop => "head-drop",
+            Self::TipX => "tip-x",
+            Self::HeadX => "head-x",
+        }
+    }
+
+    /// The same in a sentence.
+    pub(crate) fn label(self) -> String {
+        self.name().replace('-', " ")
+    }
+
+    /// The channel of that [`Self::name`].
+    ///
+    /// # Errors
+    /// [`UnknownChannel`] with the nearest known name.
+    pub fn parse(text: &str) -> Result<Self, UnknownChannel> {
+        let names = Self::ALL.map(Self::name);
+        let channel = Self::ALL.into_iter().find(|c| c.name() == text);
+        channel.ok_or_else(|| UnknownChannel {
+            found: text.to_owned(),
+            advice: crate::toml_file::suggest_key(text, &names),
+        })
+    }
+
+    /// The channel in every frame, m; `None` where a point that it needs was not tracked.
+    #[must_use]
+    pub fn samples(self, recording: &Recording) -> Vec<Option<f64>> {
+        let traces = recording.traces();
+        match self {
+            Self::Deflection => traces
+                .tip_x_m
+                .iter()
+                .zip(&traces.head_x_m)
+                .map(|(tip, head)| Some((*tip)? - (*head)?))
+                .collect(),
+            Self::HeadDrop => traces.head_y_m.iter().map(|y| y.map(|y| -y)).collect(),
+            Self::TipX => traces.tip_x_m.clone(),
+            Self::HeadX => traces.head_x_m.clone(),
+        }
+    }
+}
+
+impl std::str::FromStr for Channel {
+    type Err = UnknownChannel;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        Self::parse(text)
+    }
+}
+
+impl std::fmt::Display for Channel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+// Mean speed over a few frames.
+
+/// Slope of a channel over the frames present in `frames`, m/s, by least squares; `None` for fewer than two,
+/// or outside the recording.
+#[must_use]
+pub fn mean_speed_m_per_s(samples: &[Option<f64>], frame_rate_hz: f64, frames: Range<usize>) -> Option<f64> {
+    let first = frames.start;
+    let points: Vec<(f64, f64)> = samples
+        .get(frames)?
+        .iter()
+        .enumerate()
+        .filter_map(|(i, x)| Some(((first + i) as f64 / frame_rate_hz, (*x)?)))
+        .collect();
+    let count = points.len() as f64;
+    let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
+    let (spread, both) = points.iter().fold((0.0, 0.0), |sum, p| {
+        (sum.0 + math::powi(p.0 - mean.0, 2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1))
+    });
+    (spread > 0.0).then(|| both / spread)
+}
+
+// The tracked frames of a channel, their noise and their medians.
+
+/// The tracked frames of a channel and what their noise is.
+pub(super) struct TrackPoints {
+    /// Frame and position, m.
+    pub points: Vec<(usize, f64)>,
+    pub noise_m: f64,
+    pub step_m: f64,
+}
+
+impl TrackPoints {
+    pub(super) fn from_samples(samples: &[Option<f64>]) -> Self {
+        let points = present_points(samples);
+        let noise_m = noise_sd_m(&points);
+        let steps = points.windows(2).map(|w| (w[1].1 - w[0].1).abs()).filter(|step| *step > 0.0);
+        let step_m = steps.fold(f64::INFINITY, f64::min);
+        Self { points, noise_m, step_m: if step_m.is_finite() { step_m } else { 0.0 } }
+    }
+
+    /// Index of the first point at or after a frame.
+    pub(super) fn index_at_frame(&self, frame: f64) -> usize {
+        index_at_frame(&self.points, frame)
+    }
+}
+
+/// Frame and position, m, of the tracked frames.
+pub(super) fn present_points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
+    // (growing it would take a fifth of the search for instants)
+    let mut points = Vec::with_capacity(samples.len());
+    points.extend(samples.iter().enumerate().filter_map(|(frame, x)| x.map(|x| (frame, x))));
+    points
+}
+
+/// Standard deviation of white noise on a smooth path, from fourth differences over frames in a row:
+/// polynomials up to the third degree drop out.
+pub(super) fn noise_sd_m(points: &[(usize, f64)]) -> f64 {
+    /// Fourth differences of white noise have 1 + 16 + 36 + 16 + 1 times its variance.
+    const GAIN: f64 = 70.0;
+    /// Median of |x| of a standard normal variable.
+    const NORMAL_MEDIAN: f64 = 0.674_489_75;
+    let in_a_row = points.windows(5).filter(|w| w[4].0 - w[0].0 == 4);
+    let mut differences = Vec::with_capacity(points.len());
+    differences
+        .extend(in_a_row.map(|w| (w[0].1 - 4.0 * w[1].1 + 6.0 * w[2].1 - 4.0 * w[3].1 + w[4].1).abs()));
+    median_in_place(&mut differences).map_or(0.0, |m| m / (NORMAL_MEDIAN * GAIN.sqrt()))
+}
+
+pub(super) fn median_in_place(values: &mut [f64]) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
+
+/// Index of the first point at or after a frame.
+pub(super) fn index_at_frame(points: &[(usize, f64)], frame: f64) -> usize {
+    points.partition_point(|p| (p.0 as f64) < frame)
+}
+
+/// Median position, m; `None` of no points.
+pub(super) fn median_position(points: &[(usize, f64)]) -> Option<f64> {
+    median_in_place(&mut points.iter().map(|p| p.1).collect::<Vec<_>>())
+}
+
+/// Median of a point and its neighbours: an outlier of a single frame makes no extremum and reaches no level.
+pub(super) fn median_of_three(points: &[(usize, f64)], index: usize) -> f64 {
+    let last = points.len().saturating_sub(1);
+    let [a, b, c] = [index.saturating_sub(1), index, (index + 1).min(last)].map(|i| points[i].1);
+    a.max(b).min(a.min(b).max(c))
+}
+
+/// Smallest and largest; the wrong way round when there is none.
+pub(super) fn value_range(values: &[f64]) -> (f64, f64) {
+    values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
+}
+
+/// Medians of three points: an outlier of a single frame cannot make an extremum, and a turn is far longer.
+pub(super) fn median_filter(points: &[(usize, f64)]) -> Vec<f64> {
+    (0..points.len()).map(|index| median_of_three(points, index)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::{FrameGrid, Traces};
+
+    #[test]
+    fn a_channel_is_missing_where_any_of_its_points_is() {
+        let traces = Traces {
+            tip_x_m: vec![Some(3.0), None, Some(5.0)],
+            tip_y_m: vec![None; 3],
+            head_x_m: vec![Some(1.0), Some(1.0), None],
+            head_y_m: vec![Some(-0.5), Some(0.25), None],
+            ..Traces::default()
+        };
+        let recording =
+            Recording::new("r", FrameGrid { start_s: 0.0, frame_rate_hz: 1000.0, frames: 3 }, traces, false)
+                .unwrap();
+        assert_eq!(Channel::Deflection.samples(&recording), [Some(2.0), None, None]);
+        assert_eq!(Channel::HeadDrop.samples(&recording), [Some(0.5), Some(-0.25), None]);
+    }
+
+    #[test]
+    fn names_round_trip_and_a_mistyped_one_names_the_nearest() {
+        for channel in Channel::ALL {
+            assert_eq!(Channel::parse(channel.name()), Ok(channel));
+        }
+        assert_eq!(
+            Channel::parse("head_drop").unwrap_err().to_string(),
+            "unknown channel `head_drop`; did you mean `head-drop`?"
+        );
+    }
+
+    #[test]
+    fn the_speed_of_a_line_is_its_slope_also_with_gaps() {
+        let line: Vec<Option<f64>> =
+            (0..100).map(|i| (i % 3 != 0).then(|| 0.5 - 0.2 * f64::from(i) / 1000.0)).collect();
+        assert!((mean_speed_m_per_s(&line, 1000.0, 20..60).unwrap() + 0.2).abs() < 1e-12);
+        assert_eq!(mean_speed_m_per_s(&line, 1000.0, 60..62), None, "one point alone");
+        assert_eq!(mean_speed_m_per_s(&line, 1000.0, 90..101), None);
+    }
+}

@@ -2,12 +2,11 @@
 
 mod description;
 mod trace;
-mod video;
 
+pub use super::video::{PixelMapping, VideoEntry};
 pub use description::{CameraEntry, LevelEntry, OneOrMany, RecordingFile, SourceEntry, YAxis};
 pub(crate) use trace::parse_trace_csv_at;
 pub use trace::{HEADER, parse_trace_csv, push_trace_row, trace_blocks, trace_csv};
-pub use video::{PixelMapping, VideoEntry};
 
 use crate::recording::{Recording, RecordingError};
 use crate::toml_file::TomlError;

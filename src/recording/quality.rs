@@ -6,27 +6,28 @@
 
 mod checks;
 mod finding;
-mod measured;
+mod measurement;
 mod motion;
 mod noise;
 mod outliers;
 mod prefilter;
-mod summary;
 mod tilt;
-mod visibility;
 
-pub use checks::check_position_steps;
-pub use finding::{Check, QualityFinding, Severity};
-pub use measured::{ChannelQuality, Optics, Quality, measure_quality};
-pub use noise::{noise_floor, quantisation_step};
-pub use outliers::outlier_frames;
-
-pub use summary::{Grade, grade_findings, measurement_table, verdict_lines};
-pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
-pub use visibility::{ComponentVisibility, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Visibility};
-
+use super::FrameGrid;
 use crate::recording::Recording;
 use crate::recording::channel::ReversalInstants;
+use crate::text::{format_decimals, format_or_dash, to_ascii};
+pub use checks::check_position_steps;
+pub use finding::{Check, QualityFinding, Severity};
+pub use measurement::{
+    ChannelQuality, ComponentVisibility, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality,
+    Visibility, measure_quality,
+};
+use measurement::{FEWEST_CYCLES, NYQUIST_SHARE};
+pub use noise::{noise_floor, quantisation_step};
+pub use outliers::outlier_frames;
+use serde::Serialize;
+pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
 
 /// Every finding on a recording, the gravest first: what its traces show, and what only its
 /// export could show (`import`).
@@ -40,7 +41,7 @@ pub fn collect_findings(
     instants: &ReversalInstants,
     import: &[QualityFinding],
 ) -> Vec<QualityFinding> {
-    let columns = measured::measured_columns(recording.traces(), measured);
+    let columns = measurement::measured_columns(recording.traces(), measured);
     let mut found = import.to_vec();
     found.extend(checks::check_grid(measured));
     found.extend(checks::check_exposure(measured));
@@ -56,4 +57,148 @@ pub fn collect_findings(
     // (stable: the order above within a severity)
     found.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     found
+}
+
+// Quality as text: the grade, the verdict with the worst finding first, and the table of measurements.
+
+/// Times the noise that an oscillation must reach to be seen frame by frame.
+const VISIBLE_COMPONENTS: f64 = 3.0;
+
+/// A recording in one word.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Grade {
+    /// No finding above a note.
+    Good,
+    /// Cautions, nothing serious.
+    UsableWithCare,
+    /// A serious finding: frequencies, lengths or directions are probably wrong, or nothing can be shown.
+    NotUsable,
+}
+
+/// The grade: the gravest finding decides.
+#[must_use]
+pub fn grade_findings(findings: &[QualityFinding]) -> Grade {
+    match findings.iter().map(|finding| finding.severity).max() {
+        None | Some(Severity::Note) => Grade::Good,
+        Some(Severity::Caution) => Grade::UsableWithCare,
+        Some(Severity::Serious) => Grade::NotUsable,
+    }
+}
+
+/// The verdict, one statement a line: the grade with what the recording can show, then the findings, worst
+/// first. A finding on several channels is one line with its largest number; notes without advice are left to
+/// the table.
+#[must_use]
+pub fn verdict_lines(measured: &Quality, findings: &[QualityFinding]) -> Vec<String> {
+    let mut lines = vec![grade_line(measured, findings)];
+    let mut stated: Vec<(Check, Severity)> = vec![];
+    let mut ordered: Vec<&QualityFinding> =
+        findings.iter().filter(|f| f.severity > Severity::Note || !f.advice.is_empty()).collect();
+    ordered.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
+    for finding in &ordered {
+        let key = (finding.check, finding.severity);
+        if finding.channel.is_none() {
+            lines.push(finding.to_line());
+        } else if !stated.contains(&key) {
+            stated.push(key);
+            lines.extend(join_channel_findings(&ordered, key));
+        }
+    }
+    lines.extend(describe_visible_band(measured));
+    lines
+}
+
+fn grade_line(measured: &Quality, findings: &[QualityFinding]) -> String {
+    if measured.missing_deflection_frames == measured.frames {
+        return "not usable for deflection: in no frame are tip and head both tracked along the sweep; the \
+            single channels may still serve"
+            .to_owned();
+    }
+    let (low_hz, high_hz) = measured.band_hz();
+    if low_hz >= high_hz {
+        let (frames, rate) = (measured.frames, measured.frame_rate_hz);
+        return format!(
+            "too short for a spectrum: {frames} frames at {rate} frames/s hold fewer than {FEWEST_CYCLES} cycles of \
+             anything they can show"
+        );
+    }
+    let grade = match grade_findings(findings) {
+        Grade::Good => "good: shows",
+        Grade::UsableWithCare => "usable with care: shows",
+        Grade::NotUsable => "not usable until the serious findings are resolved: would show",
+    };
+    let (cycles, nyquist) = (
+        format!("{FEWEST_CYCLES} cycles in the recording"),
+        format!("{NYQUIST_SHARE} of the Nyquist frequency"),
+    );
+    format!("{grade} oscillations from about {low_hz:.3} Hz ({cycles}) to {high_hz:.0} Hz ({nyquist})")
+}
+
+fn describe_visible_band(measured: &Quality) -> Option<String> {
+    let floor_m = VISIBLE_COMPONENTS * measured.deflection_floor_m()?;
+    Some(format!(
+        "note: a deflection above about {:.3} um stands out from the noise in single frames \
+         ({VISIBLE_COMPONENTS} standard deviations)",
+        floor_m * 1e6
+    ))
+}
+
+/// The findings of one check and severity on single channels as one line.
+fn join_channel_findings(findings: &[&QualityFinding], key: (Check, Severity)) -> Option<String> {
+    let alike = || {
+        findings
+            .iter()
+            .filter(|finding| finding.channel.is_some() && (finding.check, finding.severity) == key)
+    };
+    let channels: Vec<&str> = alike().filter_map(|finding| finding.channel.as_deref()).collect();
+    let worst = alike()
+        .copied()
+        .reduce(|worst, finding| if finding.value > worst.value { finding } else { worst })?;
+    let Some((_, [_, ..])) = channels.split_first() else { return Some(worst.to_line()) };
+    let named = format!("{} (most in {})", channels.join(", "), worst.channel.as_deref().unwrap_or_default());
+    Some(worst.clone().on_channel(&named).to_line())
+}
+
+/// The measurements as a table for reading, display units, one fact a line.
+#[must_use]
+pub fn measurement_table(quality: &Quality, start_s: f64) -> String {
+    let grid = FrameGrid { start_s, frame_rate_hz: quality.frame_rate_hz, frames: quality.frames };
+    let share = 100.0 * quality.missing_deflection_frames as f64 / quality.frames as f64;
+    let mut lines = vec![
+        format!(
+            "frames            {} ({} s to {} s)",
+            quality.frames,
+            start_s,
+            grid.time_s(quality.frames.saturating_sub(1))
+        ),
+        format!("duration          {:.6} s", quality.duration_s),
+        format!("recording rate    {} frames/s (Nyquist {} Hz)", quality.frame_rate_hz, quality.nyquist_hz),
+        format!(
+            "no deflection     {} frames ({share:.1} %) in {} gaps",
+            quality.missing_deflection_frames, quality.gaps
+        ),
+    ];
+    if let Some(at_s) = quality.longest_gap_at_s {
+        lines.push(format!("longest gap       {} frames from {at_s:.6} s", quality.longest_gap_frames));
+    }
+    if let (Some(half_hz), Some(passes)) =
+        (quality.exposure_half_power_hz, quality.exposure_passes_at_nyquist)
+    {
+        lines.push(format!(
+            "exposure          passes half the power at {half_hz:.0} Hz, {:.0} % of an amplitude at the \
+             Nyquist frequency",
+            100.0 * passes
+        ));
+    }
+    lines.push(format!("{:<10}{:>10}{:>14}{:>14}", "channel", "missing", "noise (um)", "step (um)"));
+    let micro = |value: Option<f64>| to_ascii(&format_or_dash(value, |v| format_decimals(v * 1e6, 4)));
+    lines.extend(quality.channels().map(|(name, c)| {
+        format!("{name:<10}{:>10}{:>14}{:>14}", c.missing_frames, micro(c.noise_m), micro(c.step_m))
+    }));
+    lines.push(
+        "noise: median third difference as white noise, an upper estimate where the motion is fast"
+            .to_owned(),
+    );
+    lines.join("\n")
 }

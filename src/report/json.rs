@@ -1,6 +1,6 @@
 //! Reports as JSON for scripts: `docs/reports.md` lists the keys.
 
-use super::statement::Statement;
+use super::rich_text::Statement;
 use super::verdict::ReportVerdict;
 use super::{FigureSubject, Report, ReportSummary};
 use serde::Serialize;

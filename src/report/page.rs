@@ -1,20 +1,23 @@
 //! The page of a report: one HTML file with its style, figures and script inside, which asks for nothing from
 //! elsewhere and is complete without its script.
 
-mod answer;
+pub(super) mod agreement;
 pub(super) mod html;
-mod knowledge;
-mod misfit;
-mod origin;
-mod quality;
-mod runs;
-pub(super) mod values;
+mod parameters;
+mod recordings;
 
-pub(super) use origin::provenance_html;
-
+use super::rich_text::Statement;
 use super::verdict::ReportVerdict;
-use super::{FigureBlock, FigureSubject, Report};
-use html::{PageSection, figures_html, isolate_name, render_document, sentence_list, statements_html};
+use super::{
+    FigureBlock, FigureSubject, Provenance, Report, ReportSummary, RunSummary, SourceFile, SummaryQuantity,
+};
+use crate::text;
+use crate::text::{DASH, format_interval, format_number, format_percent};
+use html::{
+    CellStyle, HtmlCell, HtmlTable, PageSection, escape_text, facts_list, figures_html, isolate_name,
+    reading_hint, render_document, sentence_html, sentence_list, statements_html, verdict_cell,
+    words_with_keys,
+};
 
 impl Report {
     /// The page of the report: one HTML file; the same report always gives the same bytes.
@@ -45,7 +48,7 @@ fn assemble_page(report: &Report, narrow: bool) -> String {
         open(
             "answer",
             "Answer",
-            [answer::summary_html(report), first, values::components_table(&report.components)].concat(),
+            [summary_html(report), first, agreement::components_table(&report.components)].concat(),
         ),
         open("evidence", "Evidence", evidence),
         folded(
@@ -53,27 +56,27 @@ fn assemble_page(report: &Report, narrow: bool) -> String {
             "Every finding",
             format!("<div class=\"verdict\">\n{}</div>\n", statements_html(&verdict.statements)),
         ),
-        folded("features", "Features", values::features_table(&report.features)),
-        folded("held-out", "Held-out predictions", values::held_out_table(&report.held_out)),
-        folded("misfit", "Residuals", misfit::misfit_html(report.misfit.as_ref())),
+        folded("features", "Features", agreement::features_table(&report.features)),
+        folded("held-out", "Held-out predictions", agreement::held_out_table(&report.held_out)),
+        folded("misfit", "Residuals", agreement::misfit_html(report.misfit.as_ref())),
         folded("measured", measured_heading(report), subject_figures_html(report, FigureSubject::Measured)),
         folded(
             "blade",
             "The blade of the best model",
-            [runs::events_table(&report.runs), subject_figures_html(report, FigureSubject::Blade)].concat(),
+            [events_table(&report.runs), subject_figures_html(report, FigureSubject::Blade)].concat(),
         ),
         folded(
             "parameters",
             "Parameters",
             [
-                knowledge::parameters_html(report),
-                misfit::nuisances_table(&report.nuisances),
+                parameters::parameters_html(report),
+                agreement::nuisances_table(&report.nuisances),
                 subject_figures_html(report, FigureSubject::Parameters),
             ]
             .concat(),
         ),
-        folded("data", "Data quality", quality::recordings_html(&report.recordings)),
-        folded("search", search_heading(report), knowledge::search_html(report)),
+        folded("data", "Data quality", recordings::recordings_html(&report.recordings)),
+        folded("search", search_heading(report), parameters::search_html(report)),
         folded("reservations", "Reservations", sentence_list(&report.notes)),
         folded("provenance", "Provenance", provenance_html(&report.provenance)),
     ];
@@ -128,6 +131,217 @@ fn evidence_html(report: &Report, narrow: bool) -> (String, String) {
 fn subject_figures_html(report: &Report, subject: FigureSubject) -> String {
     let (all, before) = figures_of_subject(report, subject);
     figures_html(all, before, false)
+}
+
+// The first screen: whether the model explains the recording, the blade's numbers, and what to do next.
+
+pub(super) fn summary_html(report: &Report) -> String {
+    let answer = ReportSummary::from_report(report);
+    format!(
+        "{}{}<p>{}</p>\n<p><strong>Next:</strong> {}</p>\n",
+        headline_html(&answer.headline),
+        quantities_html(&answer.quantities),
+        sentence_html(&answer.certainty),
+        sentence_html(&answer.next)
+    )
+}
+
+fn headline_html(said: &Statement) -> String {
+    let class = match said.good {
+        Some(true) => " good",
+        Some(false) => " bad",
+        None => "",
+    };
+    let details: String = said.details.iter().map(|d| format!("<li>{}</li>\n", sentence_html(d))).collect();
+    let details = if details.is_empty() { details } else { format!("<ul>\n{details}</ul>\n") };
+    format!("<div class=\"headline{class}\"><p>{}</p>\n{details}</div>\n", sentence_html(&said.statement))
+}
+
+fn quantities_html(list: &[SummaryQuantity]) -> String {
+    let head = [
+        ("quantity", CellStyle::Prose),
+        ("value", CellStyle::Number),
+        ("95 % interval", CellStyle::Number),
+        ("", CellStyle::Words),
+    ];
+    HtmlTable {
+        caption: "The blade",
+        head: HtmlTable::column_heads(&head),
+        rows: list.iter().map(quantity_row).collect(),
+    }
+    .render()
+}
+
+fn quantity_row(q: &SummaryQuantity) -> Vec<HtmlCell> {
+    let (unit, factor) = text::choose_prefix(&q.unit, [q.value]);
+    let unit = if unit.is_empty() { unit } else { format!(" {}", escape_text(&unit)) };
+    let range = match q.lower_95.or(q.upper_95) {
+        Some(_) => format_interval(q.lower_95, q.upper_95, |end| format_number(end * factor)),
+        None if q.fitted => "not known".to_owned(),
+        None => "held fixed".to_owned(),
+    };
+    let sure = if q.fitted {
+        verdict_cell(q.identified, ["determined", "not determined"])
+    } else {
+        (escape_text("from the scene"), CellStyle::Words)
+    };
+    vec![
+        (words_with_keys(&q.name, &q.keys), CellStyle::Prose),
+        (format!("{}{unit}", format_number(q.value * factor)), CellStyle::Number),
+        (escape_text(&range), CellStyle::Number),
+        sure,
+    ]
+}
+
+// Where the numbers come from and how they are made again.
+
+pub(in crate::report) fn provenance_html(p: &Provenance) -> String {
+    let mut list = vec![("wiperlab", p.version.clone())];
+    list.extend(p.seed.map(|seed| ("seed", seed.to_string())));
+    list.push(("fingerprint of problem, data and program", p.fingerprint.clone()));
+    let list: Vec<(String, String)> = list
+        .into_iter()
+        .filter(|(_, value)| !value.is_empty())
+        .map(|(name, value)| (escape_text(name), escape_text(&value)))
+        .collect();
+    [facts_list(&list), files_table(&p.files), commands_html(p)].concat()
+}
+
+fn files_table(list: &[SourceFile]) -> String {
+    let row = |f: &SourceFile| {
+        let synthetic = if f.synthetic {
+            ("synthetic".to_owned(), CellStyle::Bad)
+        } else {
+            (DASH.to_owned(), CellStyle::Words)
+        };
+        vec![
+            (isolate_name(&f.name), CellStyle::Words),
+            (escape_text(&f.kind), CellStyle::Words),
+            synthetic,
+            (format!("<code class=\"hash\">{}</code>", escape_text(&f.sha256)), CellStyle::Words),
+        ]
+    };
+    let head = [
+        ("file", CellStyle::Words),
+        ("what it is", CellStyle::Words),
+        ("data", CellStyle::Words),
+        ("SHA-256", CellStyle::Words),
+    ];
+    HtmlTable {
+        caption: "Files behind this report",
+        head: HtmlTable::column_heads(&head),
+        rows: list.iter().map(row).collect(),
+    }
+    .render()
+}
+
+fn commands_html(p: &Provenance) -> String {
+    if p.commands.is_empty() {
+        return String::new();
+    }
+    let imported = if p.files.iter().any(|f| f.kind == EXPORT_KIND) {
+        reading_hint(
+            "The command that imported a recording is not kept: its trace.csv and recording.toml were made \
+             by wiperlab import from the exports above, with the rate and scale that recording.toml holds.",
+        )
+    } else {
+        String::new()
+    };
+    let lines = p.commands.iter().map(|command| escape_text(command)).collect::<Vec<_>>().join("\n");
+    format!(
+        "<p>To make it again:</p>\n<pre tabindex=\"0\" role=\"region\" \
+         aria-label=\"Commands\">{lines}</pre>\n{imported}"
+    )
+}
+
+/// Kind of a file that a tracking program wrote.
+const EXPORT_KIND: &str = "export";
+
+// How the best model ran, and its hard events: a zero is said as plainly as a number.
+
+/// A row: what is counted, what of a run, and whether it is a hard event that is better absent.
+type EventRow = (&'static str, fn(&RunSummary) -> String, bool);
+
+const EVENT_ROWS: [EventRow; 12] = [
+    ("how it ended", |r| format!("{}: {}", r.status.name(), r.status.meaning()), false),
+    (
+        "from, to",
+        |r| format!("{} s, {} s", format_number(r.started_at_s), format_number(r.stopped_at_s)),
+        false,
+    ),
+    ("loss of contact", |r| count_text(r.contact_losses), true),
+    ("impact on the glass", |r| count_text(r.impacts), true),
+    ("jam (Painlev\u{e9} paradox)", |r| count_text(r.jams), true),
+    ("indeterminate contact", |r| occurrence_text(r.indeterminate), true),
+    ("chattering", |r| occurrence_text(r.chattering), true),
+    ("least normal force in contact", |r| r.least_normal_force_n.map_or_else(absent_text, force_text), false),
+    (
+        "least Painlev\u{e9} indicator in slip",
+        |r| r.least_painleve_indicator.map_or_else(absent_text, format_number),
+        false,
+    ),
+    ("changes of mode", |r| r.transitions.to_string(), false),
+    (
+        "sticks, share of the run",
+        |r| {
+            format!(
+                "{}, {}",
+                count_text(r.sticks),
+                r.stick_share.map_or_else(absent_text, |s| format_percent((s * 1e3).round() / 1e3))
+            )
+        },
+        false,
+    ),
+    (
+        "longest stick",
+        |r| r.longest_stick_s.map_or_else(absent_text, |s| format!("{} ms", format_number(1e3 * s))),
+        false,
+    ),
+];
+
+const NO_EVENTS: &str = "none";
+/// Less is the rounding of a force that vanishes, N: the blade presses with some 0.1 N.
+const ROUNDING_N: f64 = 1e-9;
+
+fn force_text(newtons: f64) -> String {
+    if newtons.abs() < ROUNDING_N { "0 N".to_owned() } else { format!("{} N", format_number(newtons)) }
+}
+
+fn count_text(n: usize) -> String {
+    if n == 0 { NO_EVENTS.to_owned() } else { n.to_string() }
+}
+
+fn occurrence_text(happened: bool) -> String {
+    if happened { "ended the run".to_owned() } else { NO_EVENTS.to_owned() }
+}
+
+fn absent_text() -> String {
+    NO_EVENTS.to_owned()
+}
+
+/// The table, a column a condition.
+pub(super) fn events_table(runs: &[RunSummary]) -> String {
+    let one = |(what, of, hard): &EventRow| -> Vec<HtmlCell> {
+        let cell = |run| {
+            let value = of(run);
+            let set = if *hard && value != NO_EVENTS { CellStyle::Bad } else { CellStyle::Words };
+            (escape_text(&value), set)
+        };
+        std::iter::once((escape_text(what), CellStyle::Words)).chain(runs.iter().map(cell)).collect()
+    };
+    if runs.is_empty() {
+        return String::new();
+    }
+    let heads = std::iter::once((escape_text("event"), CellStyle::Words))
+        .chain(runs.iter().map(|run| (isolate_name(&run.name), CellStyle::Name)));
+    let table = HtmlTable {
+        caption: "Hard events of the best model, by condition",
+        head: heads.collect(),
+        rows: EVENT_ROWS.iter().map(one).collect(),
+    };
+    let words = "The normal force falls to zero where contact is lost; a Painlev\u{e9} indicator of zero or \
+                 less is a jam.";
+    reading_hint(words) + &table.render()
 }
 
 #[cfg(test)]

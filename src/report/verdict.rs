@@ -1,8 +1,8 @@
 //! What a report says of a fit, built once for the page, the JSON and the terminal.
 
 use super::Report;
-use super::answer;
-use super::statement::{Sentence, Statement};
+use super::rich_text::{Sentence, Statement};
+use super::summary;
 use crate::compare::{Comparison, ParameterLine, RunSummary, Truth};
 use crate::figures::OPPOSED;
 use crate::fit::misfit::{ChannelMisfit, TraceMisfit, far_from_priors, unexplained_headline};
@@ -77,7 +77,7 @@ fn verdict_statements(report: &Report) -> Vec<Statement> {
     let mut found: Vec<Statement> = report.misfit.iter().map(misfit_statement).collect();
     found.extend(far_camera_statement(report));
     if report.misfit.is_none() && !report.recordings.is_empty() {
-        found.push(Statement { details: Vec::new(), ..answer::report_headline(report) });
+        found.push(Statement { details: Vec::new(), ..summary::report_headline(report) });
     }
     found.extend(met_statement("component", "", &report.components, |_| true));
     found.extend(met_statement(

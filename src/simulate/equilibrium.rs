@@ -1,7 +1,7 @@
 //! Steady slip: the algebraic equilibrium of a blade that is dragged at constant speed.
 
-use crate::blade::shoulder::ShoulderContact;
-use crate::blade::{HeadMotion, LinkDirections, Linkage, Pose};
+use crate::model::shoulder::ShoulderContact;
+use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
 use nalgebra::{Matrix2, Vector2};
 
 /// Steps in which friction is brought from nothing to its value: each Newton iteration starts near its

@@ -1,11 +1,11 @@
 //! Flight of the blade as a smooth phase with guards: no contact forces, ended by the tip's landing.
 
 use super::phases::{DrivenBlade, GUARDS, LEVEL_GUARDS, SHOULDER_GUARDS, TaylorMotion};
-use crate::blade::flight::FlightState;
-use crate::blade::series::ContactMode;
-use crate::blade::shoulder::ShoulderContact;
-use crate::blade::{LinkDirections, Pose};
 use crate::math;
+use crate::model::flight::FlightState;
+use crate::model::series::ContactMode;
+use crate::model::shoulder::ShoulderContact;
+use crate::model::{LinkDirections, Pose};
 use crate::ode::HybridPhase;
 use crate::ode::taylor::{TaylorExpansion, TaylorPhase};
 

@@ -20,9 +20,11 @@
 //! so by `W_nt^2 < W_nn W_tt` the tip is braked at `sigma dv_t/dp < 0` down to rest, where `|W_nt| < mu
 //! W_tt` lets it stick, and sticking restores at `W_nn - W_nt^2 / W_tt > 0`.
 
-use crate::blade::friction::FrictionLaw;
-use crate::math;
-use crate::ode::{self, HybridPhase, PhaseEndCause, PhaseStart, WorkCounters};
+use crate::model::flight::FlightState;
+use crate::model::friction::FrictionLaw;
+use crate::model::{LinkDirections, Linkage, Pose};
+use crate::ode::{HybridPhase, PhaseEndCause, PhaseStart, WorkCounters};
+use crate::{math, ode};
 
 /// Inverse mass that the tip shows to impulses, 1/kg.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -342,5 +344,45 @@ impl HybridPhase<2, 3> for ImpactSlip<'_> {
 
     fn scale(&self) -> [f64; 2] {
         [1.0, 1.0]
+    }
+}
+
+// What a strike of the tip on the glass makes of the blade.
+
+/// How the tip strikes the glass.
+#[derive(Debug, Clone, Copy)]
+pub struct TipStrike {
+    /// Pose before.
+    pub pose: Pose,
+    /// Velocity of the tip before.
+    pub before: TipVelocity,
+    /// What begins it.
+    pub origin: ImpactOrigin,
+    /// The restitution that counts.
+    pub restitution: f64,
+}
+
+impl TipStrike {
+    /// State and impact behind it; `None` where the integration meets numbers that are not finite.
+    pub fn solve_on_blade(
+        &self,
+        linkage: &Linkage,
+        relative: f64,
+        work: &mut WorkCounters,
+    ) -> Option<(FlightState, ImpactOutcome)> {
+        let Self { pose, before, origin, restitution } = *self;
+        let [normal, along] = linkage.impulse_responses(&LinkDirections::from_pose(&pose));
+        let mass = InverseMass {
+            nn: normal.normal_per_kg,
+            nt: normal.tangential_per_kg,
+            tt: along.tangential_per_kg,
+        };
+        let surface = ContactSurface { friction: linkage.friction, restitution };
+        let outcome = solve_impact(&mass, &surface, before, origin, relative, work)?;
+        let [p_n, p_t] = outcome.impulse_n_s;
+        let changed = |rate: f64, link: usize| rate + p_n * normal.rates[link] + p_t * along.rates[link];
+        let pose =
+            Pose { theta_rate: changed(pose.theta_rate, 0), phi_rate: changed(pose.phi_rate, 1), ..pose };
+        Some((FlightState { pose, gap_m: 0.0, gap_rate_m_per_s: outcome.velocity.normal }, outcome))
     }
 }

@@ -1,7 +1,7 @@
 //! The states of contact and which of them follows when the tip is at rest on the glass: a pure function of
 //! the forces.
 
-use crate::blade::FrictionResponse;
+use crate::model::FrictionResponse;
 use serde::Serialize;
 
 /// How the tip touches the glass.

@@ -1,6 +1,6 @@
 //! The motion of a blade, state by state, with everything that one run shows of it.
 
-use crate::blade::Linkage;
+use crate::model::Linkage;
 use crate::simulate::outputs::{EnergyAudit, Impacts, StickIntervals, Transitions};
 use crate::simulate::scene::Scene;
 use crate::simulate::{Impact, ModelSample, Observer, RunResult, SolutionSegment, Transition, run_scene};

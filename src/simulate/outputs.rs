@@ -3,13 +3,17 @@
 
 use super::mode::TipMode;
 use super::scene::{ContactLossRule, Drive, JamRule, Scene, StartKind};
-use super::{Impact, ModelSample, Observer, RunResult, SolutionSegment, SolverOptions, Transition};
-use crate::blade::Linkage;
-use crate::math::gauss;
-use crate::plausibility::PlausibilityFinding;
+use super::{
+    BladePoints, Impact, ModelSample, Observer, RunResult, SegmentPath, SolutionSegment, SolverOptions,
+    Transition,
+};
+use crate::math::gauss_legendre;
+use crate::model::Linkage;
+use crate::model::plausibility::PlausibilityFinding;
 use crate::recording::FrameGrid;
 use serde::Serialize;
 use std::fmt::Write;
+use std::iter::Peekable;
 use std::ops::ControlFlow;
 
 /// Hands every sample at the given rising times to `sink`.
@@ -172,7 +176,7 @@ impl Observer for EnergyAudit {
             self.update_extremes(&start);
             self.start_energy_j = Some(start.energy_j);
         }
-        for (t, weight_s) in gauss::nodes_and_weights(piece.start_s, piece.end_s) {
+        for (t, weight_s) in gauss_legendre::nodes_and_weights(piece.start_s, piece.end_s) {
             let sample = piece.sample_at(t);
             self.update_extremes(&sample);
             self.supplied_j += weight_s * sample.power_w;
@@ -317,4 +321,60 @@ pub fn push_state_row(text: &mut String, sample: &ModelSample) {
 pub fn push_event_row(text: &mut String, Transition { time_s, from, to, cause }: &Transition) {
     let [from, to] = [from, to].map(|mode| mode.name());
     let _ = writeln!(text, "{time_s:.16e},{from},{to},{}", cause.name()); // writing to a String cannot fail
+}
+
+// What an open shutter sees of a run: the mean of the places over its interval.
+
+/// Hands the mean place over every interval to `sink`; that of an interval of no length is the place then.
+pub struct ShutterObserver<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> {
+    intervals: Peekable<I>,
+    sink: F,
+    sum: [f64; 4],
+    open_s: f64,
+}
+
+impl<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> ShutterObserver<I, F> {
+    /// Shutters that open at the first and close at the second of each two times, s. They follow one another
+    /// without overlap and lie within the run; one that the run does not see closed gives nothing.
+    pub fn new(intervals: I, sink: F) -> Self {
+        Self { intervals: intervals.peekable(), sink, sum: [0.0; 4], open_s: 0.0 }
+    }
+
+    /// Adds what lies within a piece.
+    fn add_exposure(&mut self, path: &SegmentPath<'_>, from_s: f64, to_s: f64) {
+        if to_s > from_s {
+            let integral = path.integrate_points(from_s, to_s).to_array();
+            self.sum.iter_mut().zip(integral).for_each(|(sum, part)| *sum += part);
+            self.open_s += to_s - from_s;
+        }
+    }
+
+    /// The mean of the interval that ends at `close_s`; the next one begins with nothing.
+    fn take_mean(&mut self, path: &SegmentPath<'_>, close_s: f64) -> BladePoints {
+        let (sum, open_s) = (std::mem::take(&mut self.sum), std::mem::take(&mut self.open_s));
+        if open_s > 0.0 {
+            BladePoints::from_array(sum.map(|sum| sum / open_s))
+        } else {
+            path.points_at(close_s)
+        }
+    }
+}
+
+impl<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> Observer for ShutterObserver<I, F> {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        let mut path = None;
+        while let Some(&[opens_s, closes_s]) = self.intervals.peek() {
+            if opens_s > piece.end_s {
+                return;
+            }
+            let path = path.get_or_insert_with(|| piece.path());
+            self.add_exposure(path, opens_s.max(piece.start_s), closes_s.min(piece.end_s));
+            if closes_s > piece.end_s {
+                return;
+            }
+            let mean = self.take_mean(path, closes_s.max(piece.start_s));
+            (self.sink)(&mean);
+            self.intervals.next();
+        }
+    }
 }

@@ -2,10 +2,10 @@
 
 use super::drive::Drive;
 use super::mode::TipMode;
-use crate::blade::series::{ContactMode, MotionSeries};
-use crate::blade::shoulder::ShoulderContact;
-use crate::blade::{FrictionResponse, HeadMotion, LinkDirections, Linkage, Pose};
 use crate::math;
+use crate::model::series::{ContactMode, MotionSeries};
+use crate::model::shoulder::ShoulderContact;
+use crate::model::{FrictionResponse, HeadMotion, LinkDirections, Linkage, Pose};
 use crate::ode::HybridPhase;
 use crate::ode::polynomial::TERMS;
 use crate::ode::taylor::{TaylorExpansion, TaylorPhase};

@@ -2,32 +2,25 @@
 //! validated.
 
 mod as_written;
-mod contact;
-mod error;
 mod linkage;
 mod numbers;
-mod output;
 mod run;
-mod start;
 
 pub use super::drive::Drive;
 use super::drive::{HeadSpline, UNCERTAIN_END_S, even_motion_start_s, smooth_head_motion};
-use crate::blade::Linkage;
-use crate::blade::modes::time_scales_rad_per_s;
-use crate::blade::parameters::{self, ModelParameter, PARAMETERS};
-use crate::plausibility::{self, PlausibilityFinding};
+use crate::model::modes::time_scales_rad_per_s;
+use crate::model::parameters::{ModelParameter, PARAMETERS};
+use crate::model::plausibility::PlausibilityFinding;
+use crate::model::{Linkage, parameters, plausibility};
 use crate::recording::Recording;
 use crate::toml_file;
+use crate::toml_file::TomlError;
 use as_written::SceneFile;
-pub use contact::{ContactLossRule, JamRule};
-pub use error::SceneError;
-use error::key_error;
 use linkage::{build_linkage, linkage_constants};
 use numbers::{SceneReader, check_complete, check_parameter_range, find_known_parameter};
-pub use output::OutputTable;
-pub use run::{MOST_EVALUATIONS, RunSettings, check_tolerance};
-use serde::Serialize;
-pub use start::StartKind;
+pub use run::{MOST_EVALUATIONS, RunSettings, StartKind, check_tolerance};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -92,7 +85,7 @@ impl Scene {
         reader.read_number("contact.restitution", written.contact.restitution)?;
         let values = reader.values;
         check_complete(file, &values, has_shoulder, recorded.is_some())?;
-        let (start_s, start) = start::check_start(file, &written.start)?;
+        let (start_s, start) = run::check_start(file, &written.start)?;
         let run = run::check_run_settings(file, &written.run, start_s)?;
         let linkage = build_linkage(file, &values, has_shoulder)?;
         run::check_work_limit(file, &run, start_s, time_scales_rad_per_s(&linkage).1)?;
@@ -100,7 +93,7 @@ impl Scene {
             Some((place, path)) => recorded_drive(&place, &recording(&path), [start_s, run.stop_s])?,
             None => cosine_drive(&values, delay_s),
         };
-        start::check_steady_start(file, start_s, start, &linkage, &drive)?;
+        run::check_steady_start(file, start_s, start, &linkage, &drive)?;
         let (loss, jam) = (written.contact.loss, written.contact.jam);
         Ok(Self {
             file: file.to_owned(),
@@ -177,7 +170,7 @@ impl Scene {
         scene.values.retain(|name, _| !name.starts_with("drive."));
         (scene.start_s, scene.run.stop_s) = (start_s, stop_s);
         scene.drive = Drive::Recorded(Arc::new(motion));
-        start::check_steady_start(&self.file, scene.start_s, scene.start, &scene.linkage, &scene.drive)?;
+        run::check_steady_start(&self.file, scene.start_s, scene.start, &scene.linkage, &scene.drive)?;
         Ok(scene)
     }
 
@@ -280,4 +273,79 @@ fn recorded_drive(
 fn read_head_motion(place: &str, recording: &Recording) -> Result<HeadSpline, SceneError> {
     smooth_head_motion(recording)
         .map_err(|problem| SceneError::Recording { place: place.to_owned(), problem: problem.to_string() })
+}
+
+// What a scene says of contact that is lost or jammed.
+
+/// What happens when the normal force reaches zero.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ContactLossRule {
+    /// The run ends and says so.
+    #[default]
+    Stop,
+    /// The tip flies and lands.
+    Fly,
+}
+
+/// What happens when the Painlevé condition fails.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum JamRule {
+    /// The run ends and says so.
+    #[default]
+    Stop,
+    /// An impact without collision.
+    Impact,
+}
+
+// Why a scene is refused.
+
+/// Why a scene was refused.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum SceneError {
+    /// The file is not TOML of this format.
+    #[error(transparent)]
+    Toml(#[from] TomlError),
+    /// A key is unknown, missing, doubled or out of range.
+    #[error("{place}: key `{key}`: found {found}, expected {expected}; {advice}")]
+    Key {
+        /// File, with the line where there is one.
+        place: String,
+        /// Table and key.
+        key: String,
+        /// What the file says.
+        found: String,
+        /// What the key takes.
+        expected: String,
+        /// What to do.
+        advice: String,
+    },
+    /// The recording that drives the head cannot be read or used.
+    #[error("{place}: key `drive.recording`: {problem}")]
+    Recording {
+        /// File and line.
+        place: String,
+        /// The recording's own refusal.
+        problem: String,
+    },
+}
+
+pub(super) fn key_error(place: &str, key: &str, found: &str, expected: &str, advice: &str) -> SceneError {
+    let [place, key, found, expected, advice] = [place, key, found, expected, advice].map(str::to_owned);
+    SceneError::Key { place, key, found, expected, advice }
+}
+
+// The tables of a run.
+
+/// What `simulate` writes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum OutputTable {
+    /// `trace.csv`.
+    Trace,
+    /// `state.csv`.
+    State,
+    /// `events.csv`.
+    Events,
 }

@@ -1,7 +1,7 @@
 //! Derivatives of a run by parameters, starting state and drive: exact but for the tolerance, along the same
 //! steps as the run itself and through its transitions.
 //!
-//! Between transitions the derivatives obey the linear equations of [`crate::blade::tangent`] along the
+//! Between transitions the derivatives obey the linear equations of [`crate::model::tangent`] along the
 //! series of each step, and are found by collocation ([`crate::ode::collocation`]); one factoring a step
 //! serves all directions. Where a guard
 //! `G` falls, the time of the transition changes by `d tau = -dG / G'` and the derivative of the state jumps
@@ -14,27 +14,21 @@
 //! with `f` the right-hand sides before and after and `R` the map of an impact, the identity elsewhere. Where
 //! a guard only grazes zero the derivative is infinite: from there on there is none.
 
-mod blocks;
-mod carrier;
-mod difference;
-mod direction;
-mod jumps;
-mod piece;
+mod propagation;
+mod saltation;
 mod seeds;
-mod slide;
 mod source;
-mod span;
-mod weights;
+mod stretch;
+mod tangent_blocks;
+mod tangent_segment;
 
-use super::machine::{ContactRules, EventLoop};
+use super::event_loop::{ContactRules, EventLoop};
 use super::scene::{Scene, StartKind};
 use super::{IntegrationMethod, RunResult, RunStatus, SolverOptions, Transition, build_system, initial_pose};
-use carrier::{TangentPropagator, TangentWorkspace};
-pub use direction::TangentDirection;
-pub use piece::TangentSegment;
-pub use seeds::TangentSeeds;
+use propagation::{TangentPropagator, TangentWorkspace};
+pub use seeds::{TangentDirection, TangentSeeds};
 use std::ops::ControlFlow;
-pub use weights::{Channel, ChannelWeights};
+pub use tangent_segment::{Channel, ChannelWeights, TangentSegment};
 
 /// Sees a run and its derivatives as they are accepted.
 pub trait TangentObserver {
@@ -101,6 +95,36 @@ pub fn run_with_tangents(
     observer: &mut impl TangentObserver,
 ) -> RunResult {
     TangentRunner::default().run_scene(scene, effort, seeds, observer)
+}
+
+// Central differences of functions that are cheap and smooth.
+
+/// Steps of the six-point central difference with their weights (Fornberg, Math. Comp. 51, 1988, table 1):
+/// order 6.
+pub(super) const SIX_POINTS: [(f64, f64); 6] = [
+    (-3.0, -1.0 / 60.0),
+    (-2.0, 9.0 / 60.0),
+    (-1.0, -45.0 / 60.0),
+    (1.0, 45.0 / 60.0),
+    (2.0, -9.0 / 60.0),
+    (3.0, 1.0 / 60.0),
+];
+
+/// Step relative to the scale on which a function changes: its sixth power, the truncation, is below
+/// rounding, and rounding over it leaves 1e-13.
+pub(super) const DIFFERENCE_STEP: f64 = 1e-3;
+
+/// Derivative of `f` at 0 along its argument; `None` where `f` has no value.
+pub(super) fn central_difference<const N: usize>(
+    step: f64,
+    mut f: impl FnMut(f64) -> Option<[f64; N]>,
+) -> Option<[f64; N]> {
+    let mut sum = [0.0; N];
+    for (point, weight) in SIX_POINTS {
+        let value = f(point * step)?;
+        sum.iter_mut().zip(value).for_each(|(sum, value)| *sum += weight / step * value);
+    }
+    Some(sum)
 }
 
 #[cfg(test)]

@@ -1,21 +1,22 @@
 //! The complete analysis of a record: what it is made of, how well each part is known, and what its frequency
 //! is worth.
 
-mod long;
-mod reading;
+mod component_estimates;
+mod long_record;
 
-use super::check::check_record;
-use super::drifting::{self, DriftCourse};
-use super::flip;
-use super::limits::ROUNDING;
+use super::error::check_record;
+use super::frequency_drift;
+use super::frequency_drift::DriftCourse;
+use super::model_selection::{FRAMES_PER_COLUMN, ModelSelector};
 use super::multitaper::{Multitaper, TAPERS};
-use super::oscillations::{FRAMES_PER_COLUMN, ModelSelector};
 use super::periodogram::Periodogram;
+use super::settings::ROUNDING;
+use super::step_detection;
 use super::time_frequency::Ridge;
 use super::trend::Trend;
-use super::{Detrend, MIN_SAMPLES, Spectrum, SpectrumError, SpectrumSettings, regular};
+use super::{Detrend, MIN_SAMPLES, Spectrum, SpectrumError, SpectrumSettings, decimation};
 use crate::math;
-use reading::FittedDecomposition;
+use component_estimates::FittedDecomposition;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -135,10 +136,10 @@ impl SpectralAnalysis {
     /// # Errors
     /// [`SpectrumError`] when the record, the rate or the band cannot give one.
     pub fn from_record(record: &SampledRecord, settings: &SpectrumSettings) -> Result<Self, SpectrumError> {
-        let Some(kept) = regular::find_stride(record.samples) else {
+        let Some(kept) = decimation::find_stride(record.samples) else {
             return Self::analyse_frames(record, settings);
         };
-        let samples = regular::decimate(record.samples, kept);
+        let samples = decimation::decimate(record.samples, kept);
         let frame_rate_hz = record.frame_rate_hz / kept.1 as f64;
         let analysis =
             Self::analyse_frames(&SampledRecord { samples: &samples, frame_rate_hz, ..*record }, settings)?;
@@ -170,13 +171,13 @@ impl SpectralAnalysis {
     fn analyse_frames(record: &SampledRecord, settings: &SpectrumSettings) -> Result<Self, SpectrumError> {
         let (padded, trend) = check_record(record.samples, record.frame_rate_hz, settings)?;
         if record.samples.len() > LONGEST_DECOMPOSED {
-            return long::analyse_long_record(record, settings, trend);
+            return long_record::analyse_long_record(record, settings, trend);
         }
         let whole = Self::decompose(record, settings, padded, trend)?;
         if whole.leaves_only_noise && !whole.trend_competes || settings.detrend.is_some() {
             return Ok(whole.analysis.with_densities(record.frame_rate_hz));
         }
-        let behind = flip::starts_after_step(record.samples).into_iter().filter_map(|start| {
+        let behind = step_detection::starts_after_step(record.samples).into_iter().filter_map(|start| {
             let rest = SampledRecord { samples: &record.samples[start..], ..*record };
             let (padded, trend) = check_record(rest.samples, rest.frame_rate_hz, settings).ok()?;
             Some((start, Self::decompose(&rest, settings, padded, trend).ok()?))
@@ -212,7 +213,7 @@ impl SpectralAnalysis {
             let best = if first.0 { first } else { parts.find(|part| part.0).unwrap_or(first) };
             Some(best.1.with_densities(record.frame_rate_hz))
         };
-        flip::stretches_between_steps(record.samples).iter().filter_map(of_stretch).collect()
+        step_detection::stretches_between_steps(record.samples).iter().filter_map(of_stretch).collect()
     }
 
     fn decompose(
@@ -230,7 +231,7 @@ impl SpectralAnalysis {
         let least = MIN_SAMPLES.max(FRAMES_PER_COLUMN * trend.column_count());
         let too_few = || SpectrumError::TooFew { found: record.samples.iter().flatten().count(), least };
         let mut explained = search.select_model(trend).ok_or_else(too_few)?;
-        let mut course = drifting::find_drift_course(&search, &explained, settings.band_hz);
+        let mut course = frequency_drift::find_drift_course(&search, &explained, settings.band_hz);
         search.noise_is_coloured = true;
         if let Some((drifting, range)) =
             course.as_ref().and_then(|course| Some((course.drift_region()?, course.range?)))

@@ -1,10 +1,9 @@
 //! An oscillation that was found in a record.
 
 use super::time_frequency::FrequencyRange;
-use super::verdict::{
-    AliasSource, ComponentReason, ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic,
-};
+use crate::math;
 use serde::Serialize;
+use std::f64::consts::TAU;
 
 /// One component of a spectrum.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -106,5 +105,168 @@ impl Component {
             verdict: ComponentVerdict::Clear,
             reasons: Vec::new(),
         }
+    }
+}
+
+// The least variance that any unbiased reading of a frequency can have (Rife and Boorstyn 1974, for a
+// decaying tone summed frame by frame).
+
+/// A decaying tone in white noise.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DecayingTone {
+    /// Amplitude where the record starts, m.
+    pub amplitude_m: f64,
+    /// Nepers by which it decays over the record.
+    pub nepers: f64,
+    /// Standard deviation of the noise, m.
+    pub noise_m: f64,
+}
+
+impl DecayingTone {
+    /// Bound on the standard deviation of the frequency, Hz, with amplitude, phase and decay unknown.
+    ///
+    /// Amplitude and decay say nothing of phase and frequency, so with weights `p = exp(-2 d t / T)` the
+    /// information on the frequency is `(2 pi A)^2 / (2 sigma^2)` times the spread `sum p t^2 - (sum p t)^2 /
+    /// sum p`. For a steady tone that is the closed form `fs / (2 pi) sqrt(12 / (eta N (N^2 - 1)))`, `eta =
+    /// A^2 / (2 sigma^2)`.
+    pub(super) fn cramer_rao_bound_hz(&self, frames: usize, frame_rate_hz: f64) -> f64 {
+        let shrink = math::exp(-2.0 * self.nepers / frames as f64);
+        let (mut power, mut sums) = (1.0, [0.0; 3]);
+        for i in 0..frames {
+            let t = i as f64 / frame_rate_hz;
+            sums = [sums[0] + power, sums[1] + power * t, sums[2] + power * t * t];
+            power *= shrink;
+        }
+        let spread = sums[2] - sums[1] * sums[1] / sums[0];
+        (2.0 / spread).sqrt() * self.noise_m / (self.amplitude_m * TAU)
+    }
+}
+
+// What a component's frequency is worth.
+
+/// What a component's frequency is worth, gravest reason first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ComponentVerdict {
+    /// Fewer than `MIN_CYCLES` in the record: the frequency depends on the trend and the window.
+    NotResolvable,
+    /// A faster oscillation that the motion may hold would appear at the same frequency.
+    AliasSuspected,
+    /// No trend describes what it rides on, or a richer one moves it by more than three deviations, its
+    /// amplitude is within three of zero, a quarter of it is left around it, or no oscillation that keeps its
+    /// frequency and decays steadily explains it.
+    Ambiguous,
+    /// A multiple of a stronger component, to within four deviations.
+    Harmonic,
+    /// A half or a third of a stronger component, or a multiple of these: not every beat is like the one
+    /// before.
+    Subharmonic,
+    /// A stronger component, modulated by another.
+    Sideband,
+    /// Within its deviation of a multiple of the mains frequency: a lamp may have made it.
+    Mains,
+    /// The exposure has passed less than nine tenths of the amplitude.
+    Attenuated,
+    /// Above what noise alone reaches once in a hundred spectra, but less than `CLEAR_DB` above the
+    /// noise floor.
+    Weak,
+    /// Nothing of the above.
+    Clear,
+}
+
+impl ComponentVerdict {
+    /// The word in files and tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::NotResolvable => "not-resolvable",
+            Self::AliasSuspected => "alias-suspected",
+            Self::Ambiguous => "ambiguous",
+            Self::Harmonic => "harmonic",
+            Self::Subharmonic => "subharmonic",
+            Self::Sideband => "sideband",
+            Self::Mains => "mains",
+            Self::Attenuated => "attenuated",
+            Self::Weak => "weak",
+            Self::Clear => "clear",
+        }
+    }
+}
+
+/// A verdict with what it rests on.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComponentReason {
+    /// The verdict.
+    pub verdict: ComponentVerdict,
+    /// The numbers behind it, in words.
+    pub words: String,
+}
+
+/// A frequency that would appear at a component's.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AliasSource {
+    /// The faster frequency, Hz.
+    pub frequency_hz: f64,
+    /// Part of its amplitude that the exposure would have passed, where that is known.
+    pub exposure_passes: Option<f64>,
+}
+
+/// A component of which another is a fraction.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Subharmonic {
+    /// Frequency of the component, Hz.
+    pub frequency_hz: f64,
+    /// The fraction's numerator.
+    pub numerator: usize,
+    /// Its denominator: so many beats pass until one is like the first.
+    pub denominator: usize,
+}
+
+/// A component that another is modulated from.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Sideband {
+    /// Frequency of the component, Hz.
+    pub frequency_hz: f64,
+    /// Frequency that it is modulated with, Hz.
+    pub modulation_hz: f64,
+}
+
+/// A multiple of the mains frequency.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub struct MainsMultiple {
+    /// Frequency of the mains, Hz.
+    pub frequency_hz: usize,
+    /// The multiple.
+    pub multiple: usize,
+}
+
+/// A component of which another is a multiple.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Harmonic {
+    /// Frequency of the component, Hz.
+    pub frequency_hz: f64,
+    /// The multiple.
+    pub multiple: usize,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_steady_tone_has_the_closed_form() {
+        let tone = DecayingTone { amplitude_m: 2.0, nepers: 0.0, noise_m: 0.1 };
+        let (frames, rate, eta) = (750.0_f64, 5000.0, 200.0);
+        let closed = rate / TAU * (12.0 / (eta * frames * (frames * frames - 1.0))).sqrt();
+        assert!((tone.cramer_rao_bound_hz(750, rate) / closed - 1.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn a_fast_decay_has_the_bound_of_an_endless_record() {
+        // in an endless record spread = 1 / (8 a^3 dt) for a decay of a per second
+        let (frames, rate, decay) = (100_000, 1e5, 40.0);
+        let tone = DecayingTone { amplitude_m: 1.0, nepers: decay * frames as f64 / rate, noise_m: 0.1 };
+        let closed = (2.0 * 8.0 * f64::powi(decay, 3) / rate).sqrt() * 0.1 / TAU;
+        assert!((tone.cramer_rao_bound_hz(frames, rate) / closed - 1.0).abs() < 1e-3);
     }
 }

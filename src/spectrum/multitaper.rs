@@ -10,15 +10,12 @@
 //! (Proc. IEEE 70, 1055) for F; Thomson and Chave 1991 (in Haykin, Advances in Spectrum Analysis and Array
 //! Processing) for the jackknife.
 
-mod floor;
-mod student;
-mod tapers;
-
 use super::transform::{Complex, RealTransform};
 use crate::math;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
+use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
 use std::ops::RangeInclusive;
-use tapers::SineTapers;
 
 /// Tapers unless asked for otherwise: a density of 14 degrees of freedom scatters by 38 %, and a line takes 8
 /// resolutions, 53 Hz in 0.15 s, so that 78 Hz is still apart from zero and from 900 Hz.
@@ -153,7 +150,7 @@ impl Multitaper {
             tapers: made.len(),
             resolution_hz,
             half_bandwidth_hz: (tapers + 1) as f64 / 2.0 * resolution_hz,
-            student_t: student::student_t_quantile(0.95, made.len() - 1),
+            student_t: student_t_quantile(0.95, made.len() - 1),
         })
     }
 
@@ -189,7 +186,7 @@ impl Multitaper {
         let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
         let width_hz = width_hz.max(2.0 * FLOOR_LINES * self.half_bandwidth_hz);
         let window = ((width_hz / bin_hz).ceil() as usize).min(2 * self.density_m2_per_hz.len());
-        floor::noise_floor_curve(&self.density_m2_per_hz, window, self.degrees_of_freedom() as f64)
+        noise_floor_curve(&self.density_m2_per_hz, window, self.degrees_of_freedom() as f64)
     }
 }
 
@@ -290,4 +287,275 @@ fn jackknife_log_sd<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I)
     let (count, sum, squares) = logs().fold((0.0, 0.0, 0.0), |(n, s, q), x| (n + 1.0, s + x, q + x * x));
     let scatter: f64 = squares - sum * sum / count;
     ((count - 1.0) / count * scatter.max(0.0)).sqrt()
+}
+
+// The noise under the lines of a density: a running median, freed from the lines.
+
+/// Knots of the curve in the width of its window; between them it is a line through the logarithms.
+const KNOTS_PER_WINDOW: usize = 4;
+/// A bin this many times above the curve is taken for a line and not for noise: of 14 degrees of freedom one
+/// bin in seventy is.
+const LINE_RATIO: f64 = 2.0;
+
+/// Times the curve is drawn again without the lines found; the skirts of a line 60 dB above the noise are
+/// gone after three.
+const FLOOR_PASSES: usize = 3;
+
+/// Mean of the noise in every bin; `window` is the width of the median, bins, and `degrees` are those of
+/// chi-square in a bin.
+pub(super) fn noise_floor_curve(density: &[f64], window: usize, degrees: f64) -> Vec<f64> {
+    let all = running_median(density, window, |_| true);
+    let without_lines =
+        |curve: Vec<f64>, _| running_median(density, window, |bin| density[bin] <= LINE_RATIO * curve[bin]);
+    let mean_over_median = math::powi(1.0 - 2.0 / (9.0 * degrees), -3); // Wilson and Hilferty 1931
+    (0..FLOOR_PASSES).fold(all, without_lines).into_iter().map(|m| m * mean_over_median).collect()
+}
+
+/// Running median over the bins that count; a window that holds fewer of them than half its width grows until
+/// it does not, and at the ends it is cut.
+fn running_median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
+    let Some(last) = density.len().checked_sub(1) else { return Vec::new() };
+    let (half, step) = ((window / 2).max(1), (window / KNOTS_PER_WINDOW).max(1));
+    let knots = last.div_ceil(step) + 1;
+    let within = |centre: usize, half: usize| -> Vec<f64> {
+        let bins = centre.saturating_sub(half)..centre.saturating_add(half + 1).min(density.len());
+        bins.filter(|bin| counts(*bin)).map(|bin| density[bin]).collect()
+    };
+    let of_knot = |knot: usize| {
+        let centre = (knot * step).min(last);
+        let (mut reach, mut values) = (half, within(centre, half));
+        while values.len() < half && reach < last {
+            reach *= 2;
+            values = within(centre, reach);
+        }
+        let middle = values.len() / 2;
+        let median = if values.is_empty() {
+            density[centre]
+        } else {
+            *values.select_nth_unstable_by(middle, f64::total_cmp).1
+        };
+        math::ln(median.max(f64::MIN_POSITIVE))
+    };
+    let logs = map_parallel_above(knots, density.len(), of_knot);
+    let between = |bin: usize| {
+        let knot = bin / step;
+        let (from, to) = (knot * step, ((knot + 1) * step).min(last));
+        let share = (bin - from) as f64 / (to.max(from + 1) - from) as f64;
+        let next = logs.get(knot + 1).unwrap_or(&logs[knot]);
+        math::exp(logs[knot] + share * (next - logs[knot]))
+    };
+    map_parallel_above(density.len(), density.len(), between)
+}
+
+// Quantiles of Student's t for whole degrees of freedom.
+
+/// The `t` with the chance `inside` that a value of `degrees` degrees of freedom, one or more, lies between
+/// `-t` and `t`.
+pub(super) fn student_t_quantile(inside: f64, degrees: usize) -> f64 {
+    /// Halvings that leave the last bit of an angle.
+    const HALVINGS: usize = 60;
+    let (mut low, mut high) = (0.0, FRAC_PI_2);
+    for _ in 0..HALVINGS {
+        let angle = (low + high) / 2.0;
+        *(if student_t_probability(angle, degrees) < inside { &mut low } else { &mut high }) = angle;
+    }
+    (degrees as f64).sqrt() * math::tan(low)
+}
+
+/// The chance to lie within `sqrt(degrees) tan(angle)` (Abramowitz and Stegun 26.7.3, 26.7.4).
+fn student_t_probability(angle: f64, degrees: usize) -> f64 {
+    let (sine, cosine) = math::sin_cos(angle);
+    let odd = degrees % 2;
+    let mut term = if odd == 1 { cosine } else { 1.0 };
+    let mut sum = 0.0;
+    for power in (odd..=degrees.saturating_sub(2)).step_by(2) {
+        sum += term;
+        term *= cosine * cosine * (power + 1) as f64 / (power + 2) as f64;
+    }
+    match (odd, degrees) {
+        (_, 1) => FRAC_2_PI * angle,
+        (1, _) => FRAC_2_PI * (angle + sine * sum),
+        _ => sine * sum,
+    }
+}
+
+// Sine tapers, orthonormal over the frames present.
+//
+// Over `n` frames without gaps the tapers `sqrt(2/(n+1)) sin(pi k m/(n+1))`, `m = 1..n`, `k = 1..K`, are
+// orthonormal (Riedel and Sidorenko 1995, eq. 2). Where frames are missing they are not; with their inner
+// products `G` over the frames present, `G^(-1/2)` times the tapers are, and of all such sets these are the
+// nearest to the tapers themselves.
+
+/// Frames whose inner products are summed at a time: the sum is the same for any number of threads.
+const PRODUCT_BLOCK: usize = 1 << 15;
+/// Combinations of tapers with less than this share of the largest's energy on the frames present are left
+/// out: they lie in the gaps, and brought to unit energy they would leak over the whole spectrum.
+const LEAST_ENERGY_SHARE: f64 = 0.1;
+
+/// Combinations of sine tapers.
+pub(super) struct SineTapers {
+    /// Angle from frame to frame of the first taper.
+    turn: f64,
+    /// A row for each taper: its combination of the sines.
+    rows: DMatrix<f64>,
+}
+
+impl SineTapers {
+    /// At most `count` tapers for a record; fewer where its gaps leave room for fewer only.
+    pub(super) fn new(samples: &[Option<f64>], count: usize) -> Self {
+        let turn = PI / (samples.len() + 1) as f64;
+        let sines = DMatrix::identity(count, count) * (2.0 / (samples.len() + 1) as f64).sqrt();
+        let rows = if samples.iter().all(Option::is_some) {
+            sines
+        } else {
+            orthonormal_combinations(&taper_inner_products(samples, turn, count))
+        };
+        Self { turn, rows }
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.rows.nrows()
+    }
+
+    /// The taper of a row in a frame, by Clenshaw's recurrence.
+    pub(super) fn value(&self, row: &[f64], frame: usize) -> f64 {
+        let (sine, cosine) = math::sin_cos(self.turn * (frame + 1) as f64);
+        let next = |(b1, b2): (f64, f64), c: &f64| (c + 2.0 * cosine * b1 - b2, b1);
+        sine * row.iter().rev().fold((0.0, 0.0), next).0
+    }
+
+    /// What the sines are multiplied with to give a taper.
+    pub(super) fn coefficients(&self, taper: usize) -> Vec<f64> {
+        self.rows.row(taper).iter().copied().collect()
+    }
+}
+
+/// `sum sin(j a) sin(k a)` over the frames present, `a` the angle of the frame.
+fn taper_inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMatrix<f64> {
+    let block = |index: usize| {
+        let mut sum = DMatrix::zeros(count, count);
+        let mut sines = DVector::zeros(count);
+        for frame in (index * PRODUCT_BLOCK..samples.len().min((index + 1) * PRODUCT_BLOCK))
+            .filter(|frame| samples[*frame].is_some())
+        {
+            let (sine, cosine) = math::sin_cos(turn * (frame + 1) as f64);
+            let (mut before, mut now) = (0.0, sine);
+            for value in &mut sines {
+                *value = now;
+                (before, now) = (now, 2.0 * cosine * now - before);
+            }
+            sum.ger(1.0, &sines, &sines, 1.0);
+        }
+        sum
+    };
+    map_parallel_above(samples.len().div_ceil(PRODUCT_BLOCK), samples.len(), block).into_iter().sum()
+}
+
+/// `G^(-1/2)`, or where some combinations lie in the gaps, the combinations that do not, each of unit energy.
+fn orthonormal_combinations(products: &DMatrix<f64>) -> DMatrix<f64> {
+    let eigen = products.clone().symmetric_eigen();
+    let least = LEAST_ENERGY_SHARE * eigen.eigenvalues.max();
+    let kept: Vec<usize> = (0..eigen.eigenvalues.len()).filter(|i| eigen.eigenvalues[*i] > least).collect();
+    let directions = eigen.eigenvectors.select_columns(&kept);
+    let scale = DMatrix::from_diagonal(&DVector::from_iterator(
+        kept.len(),
+        kept.iter().map(|i| eigen.eigenvalues[*i].sqrt().recip()),
+    ));
+    if kept.len() == eigen.eigenvalues.len() {
+        &directions * scale * directions.transpose()
+    } else {
+        scale * directions.transpose()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_monotonous_density_is_followed_and_a_line_is_not() {
+        let slope = |bin: usize| (-(bin as f64) / 300.0).exp();
+        let mut density: Vec<f64> = (0..1000).map(slope).collect();
+        density[480..520].iter_mut().for_each(|d| *d *= 1e6);
+        let curve = noise_floor_curve(&density, 200, 1e9); // of endless degrees of freedom mean and median are one
+        assert_eq!(curve.len(), 1000);
+        // next to the line the median is that of the bins that are left, at most 20 bins aside: 7 %
+        assert!((100..900).all(|bin| (curve[bin] / slope(bin) - 1.0).abs() < 0.07), "{:?}", &curve[380..620]);
+        assert!([150, 300, 700, 850].iter().all(|bin| (curve[*bin] / slope(*bin) - 1.0).abs() < 1e-3));
+    }
+
+    #[test]
+    fn few_bins_have_a_curve_too() {
+        assert!(noise_floor_curve(&[], 10, 14.0).is_empty());
+        assert!(noise_floor_curve(&[2.0], 10, 1e15).iter().all(|d| (d - 2.0).abs() < 1e-12));
+        assert!(noise_floor_curve(&[2.0; 7], 3, 1e15).iter().all(|d| (d - 2.0).abs() < 1e-12));
+    }
+
+    #[test]
+    fn the_quantiles_are_those_of_the_tables() {
+        // (Abramowitz and Stegun, table 26.10)
+        for (degrees, tabled) in [
+            (1, 12.706),
+            (2, 4.303),
+            (3, 3.182),
+            (4, 2.776),
+            (5, 2.571),
+            (6, 2.447),
+            (7, 2.365),
+            (13, 2.160),
+            (30, 2.042),
+        ] {
+            let found = student_t_quantile(0.95, degrees);
+            assert!((found - tabled).abs() < 6e-4, "{degrees}: {found}");
+        }
+    }
+
+    fn table(samples: &[Option<f64>], count: usize) -> Vec<Vec<f64>> {
+        let tapers = SineTapers::new(samples, count);
+        let taper = |k: usize| {
+            (0..samples.len())
+                .map(|i| samples[i].map_or(0.0, |_| tapers.value(&tapers.coefficients(k), i)))
+                .collect()
+        };
+        (0..tapers.len()).map(taper).collect()
+    }
+
+    fn worst(tapers: &[Vec<f64>]) -> f64 {
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| a * b).sum::<f64>();
+        let mut worst = 0.0_f64;
+        for (j, a) in tapers.iter().enumerate() {
+            for (k, b) in tapers.iter().enumerate() {
+                worst = worst.max((product(a, b) - f64::from(u8::from(j == k))).abs());
+            }
+        }
+        worst
+    }
+
+    #[test]
+    fn without_gaps_they_are_the_sines_and_orthonormal() {
+        let tapers = table(&[Some(0.0); 750], 7);
+        assert_eq!(tapers.len(), 7);
+        assert!((tapers[4][99] - (2.0_f64 / 751.0).sqrt() * (PI * 5.0 * 100.0 / 751.0).sin()).abs() < 1e-14);
+        assert!(worst(&tapers) < 1e-12, "{:e}", worst(&tapers));
+    }
+
+    #[test]
+    fn with_gaps_they_are_orthonormal_over_the_frames_present() {
+        let scattered: Vec<_> = (0..750).map(|i| (i * i % 7 != 2 && i % 11 != 5).then_some(0.0)).collect();
+        let one_long: Vec<_> = (0..750).map(|i| (!(300..420).contains(&i)).then_some(0.0)).collect();
+        for (samples, missing) in [(&scattered, 263), (&one_long, 120)] {
+            assert_eq!(samples.iter().filter(|x| x.is_none()).count(), missing);
+            let tapers = table(samples, 7);
+            assert_eq!(tapers.len(), 7);
+            assert!(worst(&tapers) < 1e-12, "{:e}", worst(&tapers));
+        }
+    }
+
+    #[test]
+    fn combinations_that_lie_in_a_gap_are_left_out() {
+        let half: Vec<_> = (0..750).map(|i| (!(200..550).contains(&i)).then_some(0.0)).collect();
+        let tapers = table(&half, 7);
+        assert!((2..7).contains(&tapers.len()), "{}", tapers.len());
+        assert!(worst(&tapers) < 1e-12, "{:e}", worst(&tapers));
+    }
 }

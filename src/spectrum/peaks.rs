@@ -1,13 +1,13 @@
 //! Components: local maxima that are no sidelobe, no ripple of a larger one, and not noise.
 
+use super::component::ComponentVerdict;
 use super::component::{Component, Estimator};
-use super::limits::{CLEAR_DB, MIN_CYCLES};
-use super::parabola::log_parabola_vertex;
-use super::refine::{MOST_REFINED, RefinementOutcome, RefinementStart};
-use super::sharp::WeightedRecord;
-use super::verdict::ComponentVerdict;
-use super::window::WindowSums;
-use super::windowed::WindowedSpectrum;
+use super::gap_refinement::{MOST_REFINED, RefinementOutcome, RefinementStart};
+use super::peak_zoom::WeightedRecord;
+use super::peak_zoom::log_parabola_vertex;
+use super::periodogram::WindowSums;
+use super::periodogram::WindowedSpectrum;
+use super::settings::{CLEAR_DB, MIN_CYCLES};
 use crate::math;
 use rayon::prelude::*;
 use std::f64::consts::TAU;

@@ -1,8 +1,6 @@
 //! The Hann-windowed amplitude spectrum of one pattern of frames, for record after record of it.
 
 use super::transform::RealTransform;
-use super::window::{self, WindowSums};
-use super::windowed::{WindowedSpectrum, sidelobe_maxima};
 use crate::math;
 use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
@@ -29,7 +27,7 @@ struct HannWindow {
 
 impl HannWindow {
     fn new(pattern: &[Option<f64>], padded: usize) -> Self {
-        let weights = window::hann_weights(pattern);
+        let weights = hann_weights(pattern);
         Self {
             sums: WindowSums::from_weights(&weights),
             weights: Arc::new(weights),
@@ -143,5 +141,94 @@ impl Periodogram {
     /// Standard deviation of white noise that shows this root mean square in a bin, m.
     pub(super) fn noise_sd_m(&self, rms_m: f64) -> f64 {
         rms_m * self.sums.first / (2.0 * self.sums.second.sqrt())
+    }
+}
+
+// The Hann window over the frames present.
+
+/// Sums over the weights of a record.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct WindowSums {
+    /// Of the weights.
+    pub first: f64,
+    /// Of their squares.
+    pub second: f64,
+    /// Frames that hold a value.
+    pub present: usize,
+}
+
+impl WindowSums {
+    pub(super) fn from_weights(weights: &[f64]) -> Self {
+        let add = |s: Self, w: &f64| Self {
+            first: s.first + w,
+            second: s.second + w * w,
+            present: s.present + usize::from(*w > 0.0),
+        };
+        weights.iter().fold(Self { first: 0.0, second: 0.0, present: 0 }, add)
+    }
+}
+
+/// Weights `sin^2(pi (i + 1/2) / n)`: symmetric, nowhere zero on a frame that holds a value, zero on one that
+/// does not.
+pub(super) fn hann_weights(samples: &[Option<f64>]) -> Vec<f64> {
+    let n = samples.len() as f64;
+    let weight = |i: usize| math::powi(math::sin(std::f64::consts::PI * (i as f64 + 0.5) / n), 2);
+    samples.iter().enumerate().map(|(i, x)| if x.is_some() { weight(i) } else { 0.0 }).collect()
+}
+
+// A spectrum and what its window does to a sine.
+
+/// Bins wider than this share of a resolution miss the top of a sidelobe, which is one resolution wide.
+const COARSE_BINS: f64 = 0.25;
+/// Bins by which the distance of two peaks then counts as nearer: half a bin for each, and one to have the
+/// sidelobe's top between two bins.
+const ROUNDED_BINS: usize = 2;
+
+/// A spectrum and what its window does to a sine.
+pub(super) struct WindowedSpectrum<'a> {
+    pub amplitude_m: &'a [f64],
+    /// From [`sidelobe_maxima`].
+    pub envelope: &'a [f64],
+    pub bin_hz: f64,
+    pub resolution_hz: f64,
+    pub frames: usize,
+    pub present: usize,
+    pub sums: WindowSums,
+    /// Amplitude of rounding, m.
+    pub least_m: f64,
+}
+
+/// Largest value of the transform of a window, which is 1 at zero, at or beyond each distance, in bins; gaps
+/// in the record raise it.
+pub(super) fn sidelobe_maxima(lobe: Vec<f64>, frames: usize, padded: usize) -> Vec<f64> {
+    let mut envelope = lobe;
+    for k in (0..envelope.len().saturating_sub(1)).rev() {
+        envelope[k] = envelope[k].max(envelope[k + 1]);
+    }
+    if frames as f64 > COARSE_BINS * padded as f64 {
+        // both peaks are half a bin off their own: of a sidelobe's width that is too much
+        let rounded = ROUNDED_BINS.min(envelope.len());
+        envelope.rotate_right(rounded);
+        envelope.iter_mut().take(rounded).for_each(|value| *value = 1.0);
+    }
+    envelope
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_sums_are_those_of_the_hann_window() {
+        let sums = WindowSums::from_weights(&hann_weights(&[Some(1.0); 64]));
+        assert!((sums.first - 32.0).abs() < 1e-12 && (sums.second - 24.0).abs() < 1e-12);
+        assert_eq!(sums.present, 64);
+    }
+
+    #[test]
+    fn a_missing_frame_has_no_weight() {
+        let weights = hann_weights(&[Some(1.0), None, Some(1.0), Some(1.0)]);
+        assert_eq!(weights[1], 0.0);
+        assert!((weights[2] - 0.853_553_390_593_273_8).abs() < 1e-15);
     }
 }

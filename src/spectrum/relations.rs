@@ -4,10 +4,10 @@
 //! are many or the deviations large, so no more of them are tried than meet a frequency by chance once in
 //! twenty.
 
+use super::classification::RecordContext;
 use super::component::Component;
-use super::judge::RecordContext;
-use super::limits::MIN_CYCLES;
-use super::verdict::{ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic};
+use super::component::{ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic};
+use super::settings::MIN_CYCLES;
 use crate::camera::alias_hz;
 use crate::math;
 

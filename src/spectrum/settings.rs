@@ -1,6 +1,5 @@
 //! How a record is analysed.
 
-use super::limits::{FASTEST_HZ, MAX_COMPONENTS, ZERO_PADDING};
 use super::trend::Detrend;
 
 /// How a record is analysed.
@@ -33,3 +32,32 @@ impl Default for SpectrumSettings {
         }
     }
 }
+
+// What a record and its components must have, and how finely a spectrum is made.
+
+/// Frames of padding for each frame of the record: bins fine enough that a parabola through three of them
+/// finds the peak of a Hann window.
+pub(crate) const ZERO_PADDING: usize = 8;
+/// Components listed unless asked for otherwise.
+pub const MAX_COMPONENTS: usize = 8;
+/// Fewest frames with a value: a cubic takes four and as many are left.
+pub const MIN_SAMPLES: usize = 8;
+/// Fewest cycles in the record for a frequency of its own: below, the window's lobe (half width two bins)
+/// reaches its own mirror image and the trend.
+pub(crate) const MIN_CYCLES: f64 = 3.0;
+/// Longest padded record, samples; beyond it memory, not the record, would be the limit.
+pub(super) const MOST_PADDED: usize = 1 << 26;
+/// Padded length, samples, up to which the padding is as asked for; a transform of this length takes some 50
+/// ms, and one eight times the length of a million samples half a second.
+pub(crate) const LONG_PADDED: usize = 1 << 21;
+/// Padded length from which record and window are transformed at once: below, a transform takes less than a
+/// hundredth of a second.
+pub(super) const PADDED_AT_ONCE: usize = 1 << 20;
+/// Amplitudes below this share of the largest sample are rounding.
+pub(super) const ROUNDING: f64 = 1e-12;
+/// Fastest oscillation that a blade is expected to show, Hz: blades of the model that meet both published
+/// frequencies have stick-slip cycles of 700 to 1,300 Hz, the published experiment shows about 900 Hz.
+pub const FASTEST_HZ: f64 = 1300.0;
+/// Amplitude over the noise floor from which a component is clear, dB: at 18 dB the frequency is known to a
+/// few hundredths of a resolution.
+pub(crate) const CLEAR_DB: f64 = 18.0;

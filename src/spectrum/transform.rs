@@ -1,10 +1,12 @@
 //! The Fourier transform of real samples; the only files that name the transform library.
 
-mod real;
-
 use crate::math;
-use real::{PortableReal, with_exact_twiddles};
+use realfft::num_traits::{FromPrimitive, Num, One, Signed, Zero};
 use realfft::{RealFftPlanner, RealToComplex};
+use std::cell::Cell;
+use std::f64::consts::TAU;
+use std::num::ParseFloatError;
+use std::ops::{Add, Div, Mul, Neg, Rem, Sub};
 use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 
 /// A value of a transform.
@@ -59,6 +61,137 @@ impl RealTransform {
     }
 }
 
+// The numbers that the transform library calculates with: those of `f64`, but for its sines and cosines.
+//
+// The library takes the turns of a plan from the system's sine and cosine, whose last bits depend on the
+// processor from lengths of 4,096 on, and has other orders of additions for the numbers that it knows. A
+// type of our own has neither: it is given every turn as a number, finds which part of a turn that is, and
+// takes its cosine from [`math`].
+
+thread_local! {
+    /// Parts of a turn in the plan that is being made; zero where none is.
+    static TWIDDLE_DIVISIONS: Cell<usize> = const { Cell::new(0) };
+}
+
+/// How far the system's cosine may be from ours: many last digits, and much less than two cosines of a plan
+/// differ.
+const COSINE_TOLERANCE: f64 = 1e-14;
+
+/// A number of a transform.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct PortableReal(pub f64);
+
+/// Makes a plan whose turns have so many parts, a power of two.
+pub(super) fn with_exact_twiddles<T>(parts: usize, plan: impl FnOnce() -> T) -> T {
+    TWIDDLE_DIVISIONS.set(parts);
+    let made = plan();
+    TWIDDLE_DIVISIONS.set(0);
+    made
+}
+
+/// The cosine of a part of a turn that is given to all but its last digits; any other number as it is.
+fn exact_cosine(number: f64) -> f64 {
+    let parts = TWIDDLE_DIVISIONS.get() as f64;
+    let (size, quarter) = (number.abs(), parts / 4.0);
+    // a transform itself asks for a half in each of its steps
+    if size > 1.0 || parts == 0.0 {
+        return number;
+    }
+    let part = (math::acos(size) / TAU * parts).round();
+    // the smaller of the angle and of what it lacks of a quarter
+    let cosine = match part {
+        part if part >= quarter => 0.0,
+        part if 2.0 * part <= quarter => math::cos(TAU * (part / parts)),
+        part => math::sin(TAU * ((quarter - part) / parts)),
+    };
+    if (cosine - size).abs() < COSINE_TOLERANCE { cosine.copysign(number) } else { number }
+}
+
+impl FromPrimitive for PortableReal {
+    fn from_i64(number: i64) -> Option<Self> {
+        Some(Self(number as f64))
+    }
+
+    fn from_u64(number: u64) -> Option<Self> {
+        Some(Self(number as f64))
+    }
+
+    fn from_f64(number: f64) -> Option<Self> {
+        Some(Self(exact_cosine(number)))
+    }
+}
+
+macro_rules! operators {
+    ($($name:ident $function:ident $operator:tt),*) => {$(
+        impl $name for PortableReal {
+            type Output = Self;
+            #[inline]
+            fn $function(self, other: Self) -> Self {
+                Self(self.0 $operator other.0)
+            }
+        }
+    )*};
+}
+
+operators!(Add add +, Sub sub -, Mul mul *, Div div /, Rem rem %);
+
+impl Neg for PortableReal {
+    type Output = Self;
+    #[inline]
+    fn neg(self) -> Self {
+        Self(-self.0)
+    }
+}
+
+impl Zero for PortableReal {
+    #[inline]
+    fn zero() -> Self {
+        Self(0.0)
+    }
+
+    fn is_zero(&self) -> bool {
+        self.0 == 0.0
+    }
+}
+
+impl One for PortableReal {
+    #[inline]
+    fn one() -> Self {
+        Self(1.0)
+    }
+}
+
+impl Num for PortableReal {
+    type FromStrRadixErr = ParseFloatError;
+
+    /// (decimal digits only; the library reads no numbers)
+    fn from_str_radix(text: &str, _: u32) -> Result<Self, ParseFloatError> {
+        text.parse().map(Self)
+    }
+}
+
+impl Signed for PortableReal {
+    fn abs(&self) -> Self {
+        Self(self.0.abs())
+    }
+
+    fn abs_sub(&self, other: &Self) -> Self {
+        Self((self.0 - other.0).max(0.0))
+    }
+
+    fn signum(&self) -> Self {
+        Self(self.0.signum())
+    }
+
+    fn is_positive(&self) -> bool {
+        self.0.is_sign_positive()
+    }
+
+    fn is_negative(&self) -> bool {
+        self.0.is_sign_negative()
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -109,5 +242,28 @@ mod tests {
             let expected = if k == 37 { length as f64 / 2.0 } else { 0.0 };
             assert!((magnitude - expected).abs() < 1e-11, "{k}: {magnitude:e}");
         }
+    }
+
+    #[test]
+    fn a_cosine_with_wrong_last_digits_is_that_of_its_part_of_a_turn() {
+        for parts in [4_usize, 8, 64, 4096, 1 << 20] {
+            for part in (0..parts).step_by((parts / 512).max(1)) {
+                let angle = TAU * (part as f64 / parts as f64);
+                for wrong in [-2e-16, 0.0, 2e-16] {
+                    let found =
+                        with_exact_twiddles(parts, || exact_cosine((angle.cos() + wrong).clamp(-1.0, 1.0)));
+                    assert!((found - angle.cos()).abs() < 1e-15, "{part} of {parts}: {found}");
+                    assert_eq!(found.abs(), with_exact_twiddles(parts, || exact_cosine(angle.cos())).abs());
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_number_that_is_no_cosine_stays() {
+        for number in [0.5, -0.5, 0.3, 2.0, 1e-3, f64::INFINITY] {
+            assert_eq!(with_exact_twiddles(1024, || exact_cosine(number)), number);
+        }
+        assert!(exact_cosine(f64::NAN).is_nan());
     }
 }

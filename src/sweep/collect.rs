@@ -4,7 +4,7 @@
 
 use super::journal::{SweepHeader, SweepPoint};
 use super::point::PointOutcome;
-use crate::journal::{CheckpointEnd, CheckpointError, CheckpointReader, CheckpointRecord, StoredRecord};
+use crate::checkpoint::{CheckpointEnd, CheckpointError, CheckpointReader, CheckpointRecord, StoredRecord};
 use std::io::{self, BufRead, BufWriter, Read, Seek, SeekFrom, Write};
 
 /// Why points cannot be collected.

@@ -1,12 +1,12 @@
 //! What a study writes: the table of all points and its summary.
 
+use super::grid::SamplePlan;
 use super::grid::{AxisSpacing, SweepAxis};
 use super::point::PointOutcome;
 use super::rank_correlation::{RankCorrelation, RankCorrelations};
-use super::sample::SamplePlan;
 use super::study::{SHEET_NAME, Study, SweepMap};
 use crate::feature::MissingReason;
-use crate::twin::Camera;
+use crate::simulate::twin::Camera;
 use serde::Serialize;
 use std::collections::BTreeMap;
 

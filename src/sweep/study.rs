@@ -1,18 +1,18 @@
 //! sweep.toml: which parameters are varied and what is mapped, checked completely before anything runs.
 
 mod as_written;
-mod axis;
-mod map;
 
-pub use map::{SHEET_NAME, SweepMap};
-
-use super::grid::{self, AxisValues, SweepAxis};
-use super::sample::SamplePlan;
-use crate::feature::Reading;
-use crate::journal::fingerprint;
+use super::grid;
+use super::grid::{AxisSpacing, AxisValues, SamplePlan, SweepAxis};
+use crate::checkpoint::fingerprint;
+use crate::feature::{Reading, ReadingEntry, ReadingKind};
+use crate::model::parameters::{ModelParameter, find_parameter, parameter_names};
+use crate::recording::channel::WindowEnd;
 use crate::simulate::scene::{Scene, SceneError};
-use crate::toml_file::{KeyRefusal, TomlError, check_format, parse_toml, refuse_key};
-use crate::twin::Camera;
+use crate::simulate::twin::Camera;
+use crate::toml_file::{
+    KeyRefusal, NumberPair, TomlError, check_format, parse_toml, refuse_key, suggest_key,
+};
 use serde::Serialize;
 
 /// Most frames of a run: a mistyped rate is refused instead of filling memory, once for every thread.
@@ -186,13 +186,13 @@ impl Study {
                 format!("found \"{}\", expected the path of a scene, relative to this file", written.scene),
             );
         }
-        let axes = axis::check_axes(&written.axis, written.sample.as_ref())?;
+        let axes = check_axes(&written.axis, written.sample.as_ref())?;
         Self::from_axes(written, axes)
     }
 
     fn from_axes(written: &as_written::StudyFile, axes: Vec<SweepAxis>) -> Result<Self, KeyRefusal> {
         let camera = check_study_camera(&written.camera)?;
-        let maps = map::check_maps(&written.map, camera.frame_rate_hz / 2.0)?;
+        let maps = check_maps(&written.map, camera.frame_rate_hz / 2.0)?;
         Ok(Self {
             title: written.title.clone(),
             scene: written.scene.clone(),
@@ -246,6 +246,302 @@ struct StudyFingerprint<'a> {
     #[serde(skip_serializing_if = "Option::is_none")]
     sample: Option<(SamplePlan, Vec<grid::AxisSpacing>)>,
     readings: Vec<&'a Reading>,
+}
+
+// The axes of a study: each is a parameter of a scene with rising values.
+
+/// Most points of a study: a mistyped number is refused; so many take a cluster a day.
+const MOST_POINTS: usize = 100_000_000;
+/// Most values of an axis.
+const MOST_VALUES: usize = 100_000;
+
+pub(super) fn check_axes(
+    written: &[as_written::StudyAxisFile],
+    sample: Option<&SamplePlan>,
+) -> Result<Vec<SweepAxis>, KeyRefusal> {
+    if written.is_empty() {
+        return refuse_key("axis", "found none, expected at least one [[axis]]: a parameter that is varied");
+    }
+    if let Some(SamplePlan { points, .. }) = sample
+        && !(2..=MOST_POINTS).contains(points)
+    {
+        return refuse_key("sample.points", format!("found {points}, expected 2 to {MOST_POINTS}"));
+    }
+    let counts = written.iter().map(|axis| axis.values.as_ref().map_or(axis.points.unwrap_or(0), Vec::len));
+    let points = counts.fold(1, usize::saturating_mul);
+    if sample.is_none() && points > MOST_POINTS {
+        return refuse_key(
+            "axis",
+            format!(
+                "found {points} points in all, expected at most {MOST_POINTS}; lower `points` of an axis, \
+                 or take a [sample]"
+            ),
+        );
+    }
+    let axes = written.iter().map(|written| check_axis(written, sample.is_some()));
+    let axes = axes.collect::<Result<Vec<_>, _>>()?;
+    let pairs = axes.iter().enumerate().flat_map(|(at, axis)| axes.iter().take(at).map(move |b| (b, axis)));
+    let same = |(a, b): &(&SweepAxis, &SweepAxis)| a.parameter.quantity == b.parameter.quantity;
+    if let Some((first, second)) = pairs.into_iter().find(same) {
+        let (first, second) = (first.parameter.name, second.parameter.name);
+        return refuse_key(
+            format!("axis `{second}`"),
+            format!(
+                "sets the same quantity as the axis `{first}`; vary another parameter or remove one axis"
+            ),
+        );
+    }
+    Ok(axes)
+}
+
+fn check_axis(written: &as_written::StudyAxisFile, sampled: bool) -> Result<SweepAxis, KeyRefusal> {
+    let key = |key: &str| format!("axis `{}`, `{key}`", written.name);
+    let Some(parameter) = find_parameter(&written.name) else {
+        return refuse_key(
+            key("name"),
+            format!("not a parameter of a scene; {}", suggest_key(&written.name, &parameter_names())),
+        );
+    };
+    let spacing = written.scale.unwrap_or_default();
+    let points = if sampled { check_sampled_ends(&key, written)? } else { written.points };
+    let values = match (&written.values, written.from, written.to, points) {
+        (Some(values), None, None, None) => values.clone(),
+        (Some(_), ..) => {
+            return refuse_key(
+                key("values"),
+                "found together with `from`, `to` or `points`, expected one of the two ways; \
+                 remove the other",
+            );
+        }
+        (None, Some(from), Some(to), Some(points)) => {
+            spread_between(&key, parameter, spacing, (from, to), points)?
+        }
+        _ => {
+            return refuse_key(
+                key("from"),
+                "expected `from`, `to` and `points`, or `values` alone; add what is missing",
+            );
+        }
+    };
+    check_rising(&key("values"), &values)?;
+    check_log_values(&key("scale"), spacing, &values)?;
+    if let Some(value) = values.iter().find(|value| !parameter.range.admits(**value)) {
+        let expected = parameter.range.describe();
+        return refuse_key(
+            format!("axis `{}`", parameter.name),
+            format!("found {value}, expected {expected} ({}, {})", parameter.meaning, parameter.unit),
+        );
+    }
+    Ok(SweepAxis { parameter, values, spacing })
+}
+
+/// An axis of a sample has a range; its ends are what is kept of it.
+fn check_sampled_ends(
+    key: &impl Fn(&str) -> String,
+    written: &as_written::StudyAxisFile,
+) -> Result<Option<usize>, KeyRefusal> {
+    let extra = match (&written.values, written.points) {
+        (Some(_), _) => "values",
+        (_, Some(_)) => "points",
+        _ if written.from.is_none() || written.to.is_none() => {
+            return refuse_key(
+                key("from"),
+                "expected `from` and `to`, the range that is sampled; add what is missing",
+            );
+        }
+        _ => return Ok(Some(2)),
+    };
+    refuse_key(
+        key(extra),
+        format!(
+            "found next to a [sample], which has points of its own between `from` and `to`; remove `{extra}`, or \
+             the table [sample] for a grid"
+        ),
+    )
+}
+
+fn spread_between(
+    key: &impl Fn(&str) -> String,
+    parameter: &ModelParameter,
+    spacing: AxisSpacing,
+    (from, to): (f64, f64),
+    points: usize,
+) -> Result<Vec<f64>, KeyRefusal> {
+    if !(from.is_finite() && to.is_finite() && from < to) {
+        return refuse_key(
+            key("to"),
+            format!(
+                "found {from} to {to}, expected `from` below `to`, in {}; exchange or correct them",
+                parameter.unit
+            ),
+        );
+    }
+    if !(2..=MOST_VALUES).contains(&points) {
+        let expected = format!("expected 2 to {MOST_VALUES}: both ends are points");
+        return refuse_key(key("points"), format!("found {points}, {expected}"));
+    }
+    check_log_values(&key("scale"), spacing, &[from, to])?;
+    Ok(spacing.spread_values(from, to, points))
+}
+
+fn check_rising(key: &str, values: &[f64]) -> Result<(), KeyRefusal> {
+    if values.len() < 2 {
+        return refuse_key(
+            key,
+            format!(
+                "found {}, expected two values or more; a single one belongs into the scene",
+                values.len()
+            ),
+        );
+    }
+    match values.windows(2).find(|pair| pair[0].is_nan() || pair[0] >= pair[1]) {
+        Some(pair) => refuse_key(
+            key,
+            format!(
+                "found {} before {}, expected rising values; sort them, or take fewer points",
+                pair[0], pair[1]
+            ),
+        ),
+        None => Ok(()),
+    }
+}
+
+fn check_log_values(key: &str, spacing: AxisSpacing, values: &[f64]) -> Result<(), KeyRefusal> {
+    match values.iter().find(|value| spacing == AxisSpacing::Log && **value <= 0.0) {
+        Some(value) => refuse_key(
+            key,
+            format!(
+                "found \"log\" with the value {value}, expected values above 0; \
+                 take \"linear\" or correct the value"
+            ),
+        ),
+        None => Ok(()),
+    }
+}
+
+// The maps of a study: their names, and what each reads.
+
+/// Most maps: each is a figure in three sizes.
+const MOST_MAPS: usize = 100;
+/// File of the figure with every map.
+pub const SHEET_NAME: &str = "all-maps";
+/// Names of columns that every table has.
+const RESERVED_COLUMNS: [&str; 4] = ["status", "stopped_at_s", "missing", "source"];
+
+/// A reading over the grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SweepMap {
+    /// Name as written.
+    pub name: String,
+    /// The name in letters and digits, with `-` between words: its figure is `SLUG.svg`.
+    pub slug: String,
+    /// What is read.
+    pub reading: Reading,
+    /// Values of the first and the last colour, in its unit; `None` for those of the data.
+    pub range: Option<(f64, f64)>,
+}
+
+impl SweepMap {
+    /// Its column in `sweep.csv`: the name with its unit.
+    #[must_use]
+    pub fn column(&self) -> String {
+        self.slug.replace('-', "_") + self.reading.unit().suffix
+    }
+
+    /// A window given in seconds lies in the run of the scene, or no point would have a value.
+    pub(super) fn check_window(&self, scene: &Scene) -> Result<(), KeyRefusal> {
+        let Some(window) = self.reading.window() else { return Ok(()) };
+        let run = scene.start_s..=scene.run.stop_s;
+        let outside = |end: &WindowEnd| matches!(end, WindowEnd::Time(time_s) if !run.contains(time_s));
+        if ![window.from, window.to].iter().any(outside) {
+            return Ok(());
+        }
+        let expected = format!(
+            "expected one within the scene's run, {} s to {} s; correct it, or change start.time_s \
+         and run.stop_s",
+            run.start(),
+            run.end()
+        );
+        refuse_key(map_key(&self.name, "window"), format!("found `{window}`, {expected}"))
+    }
+}
+
+fn map_key(name: &str, key: &str) -> String {
+    format!("map `{name}`, `{key}`")
+}
+
+pub(super) fn check_maps(written: &[as_written::Map], nyquist_hz: f64) -> Result<Vec<SweepMap>, KeyRefusal> {
+    if written.is_empty() {
+        return refuse_key("map", "found none, expected at least one [[map]]: what is read from every run");
+    }
+    if written.len() > MOST_MAPS {
+        return refuse_key(
+            "map",
+            format!("found {}, expected at most {MOST_MAPS}; leave some out", written.len()),
+        );
+    }
+    let mut maps: Vec<SweepMap> = Vec::new();
+    for written in written {
+        for map in maps_of_entry(written, nyquist_hz)? {
+            check_names(&map, &maps)?;
+            maps.push(map);
+        }
+    }
+    Ok(maps)
+}
+
+/// A map must not share its column or its file with another.
+fn check_names(map: &SweepMap, earlier: &[SweepMap]) -> Result<(), KeyRefusal> {
+    let problem = if RESERVED_COLUMNS.contains(&map.column().as_str()) {
+        format!("`{}` is a column of every table; give the map another name", map.column())
+    } else if map.slug == SHEET_NAME {
+        format!("`{SHEET_NAME}.svg` is the sheet with every map; give the map another name")
+    } else if let Some(other) = earlier.iter().find(|other| other.slug == map.slug) {
+        format!("its file `{}.svg` is that of the map `{}`; give each its own name", map.slug, other.name)
+    } else {
+        return Ok(());
+    };
+    refuse_key(map_key(&map.name, "name"), problem)
+}
+
+/// The maps of an entry: several where its kind stands for several readings.
+fn maps_of_entry(written: &as_written::Map, nyquist_hz: f64) -> Result<Vec<SweepMap>, KeyRefusal> {
+    if slugify(&written.name).is_empty() {
+        return refuse_key(
+            map_key(&written.name, "name"),
+            "expected a name with letters a to z or digits in it, such as \"high component\": \
+             it names a file",
+        );
+    }
+    let range = check_map_range(written)?;
+    let kind = ReadingKind::find(&written.kind)
+        .or_else(|problem| refuse_key(map_key(&written.name, "kind"), problem))?;
+    let entry = ReadingEntry {
+        name: &format!("map `{}`", written.name),
+        noun: "map",
+        keys: &written.keys(),
+        nyquist_hz: Some(nyquist_hz),
+        noisy: false,
+    };
+    let readings = kind.make_readings(&written.name, &entry)?;
+    let map = |(name, reading): (String, Reading)| SweepMap { slug: slugify(&name), name, reading, range };
+    Ok(readings.into_iter().map(map).collect())
+}
+
+fn check_map_range(written: &as_written::Map) -> Result<Option<(f64, f64)>, KeyRefusal> {
+    match written.range {
+        Some(NumberPair([low, high])) if !(low.is_finite() && high.is_finite() && low < high) => refuse_key(
+            map_key(&written.name, "range"),
+            format!("found [{low}, {high}], expected [lowest, highest] in the map's unit; correct them"),
+        ),
+        range => Ok(range.map(|NumberPair([low, high])| (low, high))),
+    }
+}
+
+/// Letters and digits of a name in lower case, with `-` between them.
+fn slugify(name: &str) -> String {
+    let words = name.split(|c: char| !c.is_ascii_alphanumeric()).filter(|word| !word.is_empty());
+    words.collect::<Vec<_>>().join("-").to_ascii_lowercase()
 }
 
 #[cfg(test)]

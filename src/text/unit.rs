@@ -1,6 +1,6 @@
 //! Units with the prefix that saves zeros, and shares as percentages.
 
-use super::deviation::format_with_sd;
+use super::number::format_with_sd;
 use super::number::{format_decimals, format_digits, format_short, to_ascii, typeset};
 
 /// Prefixes with their factors, the smallest last.

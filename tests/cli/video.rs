@@ -8,7 +8,7 @@ const RECORDING: &str = "data/actual-blade-twin";
 
 /// A grey PNG of the whole stroke, 560 x 60 pixels of 0.2 mm.
 fn png() -> Vec<u8> {
-    let picture = wiperlab::recording::film::Picture { width: 560, height: 60, grey: vec![90; 33_600] };
+    let picture = wiperlab::recording::video::Picture { width: 560, height: 60, grey: vec![90; 33_600] };
     picture.to_png().unwrap()
 }
 

@@ -1,6 +1,6 @@
 //! A recording that a fit can read without a blade: a deflection that rings about a mean.
 
-use wiperlab::fit::failure::{FailureReason, RunFailure};
+use wiperlab::fit::evaluation::{FailureReason, RunFailure};
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 
 /// So many frames at 1000 frames/s of a tone of 1 mm; head and heights rest.

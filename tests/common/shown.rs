@@ -5,8 +5,8 @@
 mod fitted;
 
 use wiperlab::chart::{Figure, Medium};
-use wiperlab::figures::animation::pace::{PlaybackPace, PlaybackPart};
 use wiperlab::figures::animation::{self, Animation, TrackedMotion};
+use wiperlab::figures::animation::{PlaybackPace, PlaybackPart};
 use wiperlab::figures::history::{self, TimeHistory};
 use wiperlab::figures::profiles::{self, ProfilePlot};
 use wiperlab::figures::ring_down::{self, ComponentDecay, RingDown, RingDownTrace};

@@ -12,10 +12,10 @@ use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits,
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{RecordingFile, parse_trace_csv};
 use wiperlab::report::Report;
-use wiperlab::report::comparison;
-use wiperlab::report::several::{ComparisonInput, compare_fits};
+use wiperlab::report::assembly;
+use wiperlab::report::fit_comparison::{ComparisonInput, compare_fits};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::twin::Camera;
+use wiperlab::simulate::twin::Camera;
 
 const MEDIA: [Medium; 3] = [Medium::Screen, Medium::Column, Medium::Page];
 
@@ -75,7 +75,7 @@ impl Bundled {
     }
 
     fn report(&self) -> Report {
-        comparison::build_report(&self.job, &self.measured(), &self.best, &self.result)
+        assembly::build_report(&self.job, &self.measured(), &self.best, &self.result)
     }
 }
 

@@ -11,11 +11,11 @@ use wiperlab::fit::result::FitResult;
 use wiperlab::fit::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
 use wiperlab::recording::files::parse_trace_csv;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
-use wiperlab::report::comparison;
-use wiperlab::report::several::{ComparisonInput, compare_fits};
+use wiperlab::report::assembly;
+use wiperlab::report::fit_comparison::{ComparisonInput, compare_fits};
 use wiperlab::report::{FigureSubject, Report};
 use wiperlab::simulate::scene::Scene;
-use wiperlab::twin::Camera;
+use wiperlab::simulate::twin::Camera;
 
 const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 const TRACE: &str = include_str!("../../data/actual-blade-twin/trace.csv");
@@ -79,7 +79,7 @@ impl Case {
     }
 
     fn report(&self) -> Report {
-        let report = comparison::build_report(&self.job, &self.measured(), &self.best(), &self.result);
+        let report = assembly::build_report(&self.job, &self.measured(), &self.best(), &self.result);
         one_sentence_each(&report);
         report
     }

@@ -10,7 +10,7 @@ use wiperlab::fit::result::FitResult;
 use wiperlab::fit::{MeasuredRecording as Fitted, Problem};
 use wiperlab::recording::Recording;
 use wiperlab::recording::files::{LevelEntry, PixelMapping, RecordingFile, parse_trace_csv};
-use wiperlab::recording::film::{Picture, PictureSource, RecordingVideo};
+use wiperlab::recording::video::{Picture, PictureSource, RecordingVideo};
 use wiperlab::simulate::scene::Scene;
 
 /// Pictures of two dark spots of Gaussian shape, at the pixels of the tracked head and tip.

@@ -2,14 +2,14 @@
 //! and to one that holds them.
 
 use std::ops::ControlFlow;
-use wiperlab::fit::failure::{FailureReason, RunFailure};
+use wiperlab::checkpoint::NullSink;
+use wiperlab::fit::evaluation::{FailureReason, RunFailure};
 use wiperlab::fit::job::Job;
 use wiperlab::fit::ledger::FitProgress;
 use wiperlab::fit::model::{Draw, Model};
 use wiperlab::fit::result::FitResult;
 use wiperlab::fit::uncertainty::ParameterVerdict;
 use wiperlab::fit::{FitContext, fit_features};
-use wiperlab::journal::NullSink;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 
 const JOB: &str = r#"format = 1

@@ -4,22 +4,23 @@
 use crate::ringing::ringing;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use wiperlab::checkpoint;
+use wiperlab::checkpoint::{CheckpointError, CheckpointSink};
 use wiperlab::feature::ValueComparison;
-use wiperlab::fit::axis::SearchAxis;
+use wiperlab::fit::bounds::SearchAxis;
+use wiperlab::fit::bounds::{Bounds, BoundsSpacing};
 use wiperlab::fit::evaluation::Observed;
-use wiperlab::fit::failure::{FailureReason, RunFailure};
-use wiperlab::fit::journal::FeatureCheckpoint;
+use wiperlab::fit::evaluation::{FailureReason, RunFailure};
+use wiperlab::fit::feature_checkpoint::FeatureCheckpoint;
 use wiperlab::fit::ledger::{FitProgress, Ledger, StopReason};
 use wiperlab::fit::model::{Draw, FeaturePredictor, Model};
 use wiperlab::fit::objective::Objective;
 use wiperlab::fit::result::{FitResult, FitStatus};
-use wiperlab::fit::scale::{Bounds, BoundsSpacing};
+use wiperlab::fit::search::{STAGNANT_GENERATIONS, SearchSettings};
 use wiperlab::fit::search::{SearchTermination, search_minimum};
-use wiperlab::fit::settings::{STAGNANT_GENERATIONS, SearchSettings};
-use wiperlab::fit::target::TargetValue;
+use wiperlab::fit::targets::TargetValue;
 use wiperlab::fit::uncertainty::ParameterVerdict;
 use wiperlab::fit::{FitContext, FitError, fit_features, job::Job, job_warnings};
-use wiperlab::journal::{self, CheckpointError, CheckpointSink};
 use wiperlab::recording::Recording;
 
 /// A journal in memory; refuses lines after `room`.
@@ -364,7 +365,7 @@ fn a_journal_that_cannot_be_written_ends_the_fit() {
 #[test]
 fn a_journal_of_another_fit_is_refused() {
     let (_, text) = run(JOB, &Ringing::new(), &FitContext { max_evaluations: Some(3), ..context(None) });
-    let journal: FeatureCheckpoint = journal::read_checkpoint("j", &text).unwrap().unwrap();
+    let journal: FeatureCheckpoint = checkpoint::read_checkpoint("j", &text).unwrap().unwrap();
     let (refused, appended) =
         run(JOB, &Ringing::new(), &FitContext { fingerprint: "g", ..context(Some(("j", &journal))) });
     assert!(matches!(refused, Err(FitError::Journal(CheckpointError::OtherProblem { .. }))));

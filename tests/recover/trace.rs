@@ -8,7 +8,7 @@ use wiperlab::fit::{MeasuredRecording, Problem};
 use wiperlab::recording::Recording;
 use wiperlab::simulate::SolverOptions;
 use wiperlab::simulate::scene::Scene;
-use wiperlab::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
+use wiperlab::simulate::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
 
 const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 /// A fifth of a second around the flip.

@@ -14,7 +14,7 @@ fn keys_and_schemas_are_what_their_command_writes() {
 /// Every number of the one table of parameters stands in the schema of a scene, with its unit.
 #[test]
 fn the_schema_of_a_scene_has_every_number_with_its_unit() {
-    use wiperlab::blade::parameters::PARAMETERS;
+    use wiperlab::model::parameters::PARAMETERS;
     let schema = wiperlab::simulate::scene::Scene::schema();
     let of_tables = ["blade", "shoulder", "friction"];
     let rows = PARAMETERS.iter().filter_map(|row| Some((row, row.name.split_once('.')?)));

@@ -7,13 +7,14 @@ mod killed;
 use crate::ringing::ringing;
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::fit::failure::{FailureReason, RunFailure};
-use wiperlab::fit::journal::FeatureCheckpoint;
+use wiperlab::checkpoint;
+use wiperlab::checkpoint::CheckpointError;
+use wiperlab::fit::evaluation::{FailureReason, RunFailure};
+use wiperlab::fit::feature_checkpoint::FeatureCheckpoint;
 use wiperlab::fit::ledger::FitProgress;
 use wiperlab::fit::model::{Draw, Model};
 use wiperlab::fit::result::{FitResult, FitStatus};
 use wiperlab::fit::{FitContext, FitError, fit_features, job::Job};
-use wiperlab::journal::{self, CheckpointError};
 use wiperlab::recording::Recording;
 
 const JOB: &str = r#"format = 1
@@ -98,11 +99,11 @@ impl Ended {
 }
 
 fn read(text: &str) -> FeatureCheckpoint {
-    journal::read_checkpoint("journal.jsonl", text).unwrap().unwrap()
+    checkpoint::read_checkpoint("journal.jsonl", text).unwrap().unwrap()
 }
 
 fn attempt(job: &str, text: &str, most: Option<usize>, version: &str) -> Result<Ended, FitError> {
-    let journal: Option<FeatureCheckpoint> = journal::read_checkpoint("journal.jsonl", text).unwrap();
+    let journal: Option<FeatureCheckpoint> = checkpoint::read_checkpoint("journal.jsonl", text).unwrap();
     let resume = journal.as_ref().map(|journal| ("journal.jsonl", journal));
     let context = FitContext { fingerprint: "f", version, max_evaluations: most, resume };
     let (mut lines, mut watch, model) =
@@ -145,14 +146,14 @@ fn a_fit_cut_anywhere_in_any_stage_is_the_uninterrupted_one_to_the_last_byte() {
             assert_eq!((&again.result, &again.journal), (&uncut.result, &uncut.journal), "cut at byte {cut}");
             // twins are made again, everything else is replayed
             let left: Option<FeatureCheckpoint> =
-                journal::read_checkpoint("journal.jsonl", &uncut.journal[..cut]).unwrap();
+                checkpoint::read_checkpoint("journal.jsonl", &uncut.journal[..cut]).unwrap();
             assert!(
                 left.as_ref().is_none_or(|journal| journal.end.torn == (cut != end && cut != end - 1)),
                 "cut at byte {cut}"
             );
             // and some that were replayed are made once more to check them, the best point perhaps too
             let kept = left.map_or(0, |journal| journal.records.len());
-            let checked = journal::RECHECKED_RECORDS.min(kept);
+            let checked = checkpoint::RECHECKED_RECORDS.min(kept);
             let fewest = uncut.calls - kept + checked;
             assert!((fewest..=fewest + 1).contains(&again.calls), "cut at byte {cut}");
         }
@@ -236,6 +237,6 @@ fn two_thousand_lines_are_replayed_without_one_evaluation() {
     assert!(uncut.read().records.len() > 1500, "{}", uncut.read().records.len());
     let again = resumed(&job, &uncut.journal);
     assert_eq!((&again.result, &again.journal), (&uncut.result, &uncut.journal));
-    let checked = journal::RECHECKED_RECORDS + 1;
+    let checked = checkpoint::RECHECKED_RECORDS + 1;
     assert!(again.calls <= checked + 1, "the best model alone is looked at once more: {}", again.calls);
 }

@@ -9,8 +9,8 @@ use wiperlab::recording::Recording;
 use wiperlab::recording::channel::{Channel, ReversalInstants, Window};
 use wiperlab::simulate::outputs::{LargestTilt, StickIntervals};
 use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::twin::{Camera, film_scene, film_scene_with_observer};
 use wiperlab::simulate::{RunStatus, SolverOptions};
-use wiperlab::twin::{Camera, film_scene, film_scene_with_observer};
 
 const TOLERANCE: f64 = 1e-8;
 

@@ -1,7 +1,7 @@
 //! How near the example of a section comes to the committed blades. No section of a real blade is published,
 //! so that this compares two examples, and nothing is tuned: the ratios are what they are.
 
-use wiperlab::section::{BladeEstimate, BladeSection};
+use wiperlab::model::section::{BladeEstimate, BladeSection};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::text::round_to_digits;
 

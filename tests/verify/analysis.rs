@@ -398,7 +398,7 @@ fn no_polynomial_swings_through_a_whole_reversal() {
     use wiperlab::recording::channel::Channel;
     use wiperlab::simulate::SolverOptions;
     use wiperlab::simulate::scene::Scene;
-    use wiperlab::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
+    use wiperlab::simulate::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
     let scene = Scene::parse("scene", include_str!("../../data/scenes/actual-blade.toml")).unwrap();
     for frame_rate_hz in [1000.0, 2000.0, 3000.0, 4000.0, 5000.0] {
         let camera = Camera { frame_rate_hz, exposure_s: 5e-5 };

@@ -2,8 +2,8 @@
 
 use crate::scenes::both;
 use std::f64::consts::TAU;
-use wiperlab::blade::modes::{TipConstraint, natural_modes, tip_compliance};
-use wiperlab::blade::{Linkage, Spring};
+use wiperlab::model::modes::{TipConstraint, natural_modes, tip_compliance};
+use wiperlab::model::{Linkage, Spring};
 
 /// A blade without damping.
 fn undamped(blade: &Linkage) -> Linkage {
@@ -19,7 +19,7 @@ fn it_is_the_sum_over_the_modes() {
         let blade = undamped(&scene.linkage);
         for on_shoulder in [false, true] {
             for frequency_hz in [1.0, 60.0, 300.0, 2500.0] {
-                let one = |mode: &wiperlab::blade::modes::NaturalMode| {
+                let one = |mode: &wiperlab::model::modes::NaturalMode| {
                     let (r, w) = (mode.lip_over_neck, TAU * frequency_hz);
                     let mass = blade.m_theta + 2.0 * r * blade.m_c + r * r * blade.m_phi;
                     let shown = blade.l1_m + r * blade.l2_m;

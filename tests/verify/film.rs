@@ -7,8 +7,10 @@ use wiperlab::camera::exposure_gain;
 use wiperlab::recording::quality::noise_floor;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 use wiperlab::simulate::SolverOptions;
-use wiperlab::twin::film::{DropoutPattern, FilmError, LEAST_OVERSAMPLING, film_like_recording, film_trace};
-use wiperlab::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
+use wiperlab::simulate::twin::film::{
+    DropoutPattern, FilmError, LEAST_OVERSAMPLING, film_like_recording, film_trace,
+};
+use wiperlab::simulate::twin::{Camera, TrackingModel, add_tracking_noise, film_scene};
 
 const AMPLITUDE_M: f64 = 1e-3;
 const START_S: f64 = 0.3;

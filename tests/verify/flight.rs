@@ -7,9 +7,9 @@ use crate::blade::{Parts, STROKE};
 use crate::scenes::upright_light_blade;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wiperlab::blade::flight::FlightState;
-use wiperlab::blade::shoulder::ShoulderContact;
-use wiperlab::blade::{HeadMotion, LinkDirections, Linkage, Pose};
+use wiperlab::model::flight::FlightState;
+use wiperlab::model::shoulder::ShoulderContact;
+use wiperlab::model::{HeadMotion, LinkDirections, Linkage, Pose};
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::{EnergyAudit, Transitions};
 use wiperlab::simulate::scene::{ContactLossRule, Drive, JamRule, Scene, StartKind};
@@ -255,7 +255,7 @@ fn a_bouncing_head_lands_when_its_spring_says() {
         for restitution in [0.0, 0.3, 0.8, 1.0] {
             let scene = bouncing(restitution);
             let blade = &scene.linkage;
-            let (_, fastest) = wiperlab::blade::modes::time_scales_rad_per_s(blade);
+            let (_, fastest) = wiperlab::model::modes::time_scales_rad_per_s(blade);
             let resolution = 1e-5 * std::f64::consts::TAU / fastest;
             let expected =
                 landings(&scene, restitution, scene.run.stop_s, |rebound_s| rebound_s < resolution);

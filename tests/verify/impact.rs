@@ -3,9 +3,9 @@
 
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wiperlab::blade::friction::FrictionLaw;
-use wiperlab::blade::shoulder::ShoulderContact;
-use wiperlab::blade::{HeadMotion, LinkDirections, Linkage, Pose, Spring};
+use wiperlab::model::friction::FrictionLaw;
+use wiperlab::model::shoulder::ShoulderContact;
+use wiperlab::model::{HeadMotion, LinkDirections, Linkage, Pose, Spring};
 use wiperlab::ode::WorkCounters;
 use wiperlab::simulate::impact::{
     ContactSurface, ImpactOrigin, ImpactOutcome, InverseMass, TipVelocity, solve_impact,

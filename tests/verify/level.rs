@@ -3,8 +3,8 @@
 
 use crate::scenes::{both, seen, upright_light_blade};
 use std::f64::consts::{FRAC_PI_2, FRAC_PI_8};
-use wiperlab::blade::friction::FrictionLaw;
-use wiperlab::blade::{Linkage, Pose, Spring};
+use wiperlab::model::friction::FrictionLaw;
+use wiperlab::model::{Linkage, Pose, Spring};
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::scene::{Drive, Scene, StartKind};
 use wiperlab::simulate::{RunStatus, run_scene};

@@ -3,11 +3,11 @@
 
 use crate::belt::{BELTS, Belt, Riding, Sliding};
 use crate::scenes::committed;
-use wiperlab::ode::fixed::{FixedStepLocator, FixedStepOptions, integrate_fixed};
+use wiperlab::ode::fixed_step::{FixedStepLocator, FixedStepOptions, integrate_fixed};
 use wiperlab::ode::{PhaseEndCause, WorkCounters};
+use wiperlab::simulate::fixed_step_scheme::FixedStepScheme;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::{EnergyAudit, Transitions};
-use wiperlab::simulate::paper::FixedStepScheme;
 use wiperlab::simulate::{
     IntegrationMethod, Observer, RunResult, RunStatus, SolutionSegment, SolverOptions, Transition,
     run_scene_with,

@@ -2,9 +2,10 @@
 
 use std::fs;
 use std::path::Path;
-use wiperlab::blade::parameters;
-use wiperlab::plausibility::{self, PlausibilitySubject};
-use wiperlab::section::BladeSection;
+use wiperlab::model::parameters;
+use wiperlab::model::plausibility;
+use wiperlab::model::plausibility::PlausibilitySubject;
+use wiperlab::model::section::BladeSection;
 use wiperlab::simulate::scene::Scene;
 
 const BLADE: &str = include_str!("../../data/scenes/actual-blade.toml");

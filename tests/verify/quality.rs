@@ -135,8 +135,8 @@ fn a_twin_without_noise_gives_no_alarm() {
     let path = concat!(env!("CARGO_MANIFEST_DIR"), "/data/scenes/actual-blade.toml");
     let scene = Scene::parse("scene", &std::fs::read_to_string(path).unwrap()).unwrap();
     for (frame_rate_hz, exposure_s) in [(5_000.0, 5e-5), (20_000.0, 0.0)] {
-        let camera = wiperlab::twin::Camera { frame_rate_hz, exposure_s };
-        let seen = wiperlab::twin::film_scene(
+        let camera = wiperlab::simulate::twin::Camera { frame_rate_hz, exposure_s };
+        let seen = wiperlab::simulate::twin::film_scene(
             &scene,
             &camera,
             scene.start_s,

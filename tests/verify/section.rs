@@ -1,7 +1,7 @@
 //! From a section to a blade: closed forms of rods, plates and beams, limits, additivity and scaling.
 
-use wiperlab::section::checks::BenchChecks;
-use wiperlab::section::{BladeEstimate, BladeSection, LinkSection, RubberHinge, plate_modulus_pa};
+use wiperlab::model::section::{BladeEstimate, BladeSection, LinkSection, RubberHinge, plate_modulus_pa};
+use wiperlab::simulate::bench_checks::BenchChecks;
 use wiperlab::simulate::scene::Scene;
 
 const EXAMPLE: &str = include_str!("../../data/sections/example.toml");

@@ -7,8 +7,8 @@ use crate::scenes::{committed, upright_light_blade};
 use rand::SeedableRng;
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::collections::HashMap;
-use wiperlab::blade::Pose;
-use wiperlab::blade::modes::{TipConstraint, natural_modes};
+use wiperlab::model::Pose;
+use wiperlab::model::modes::{TipConstraint, natural_modes};
 use wiperlab::simulate::drive::Drive;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::Transitions;
@@ -156,7 +156,7 @@ fn differences(scene: &Scene, direction: &TangentDirection, share: f64, values: 
 }
 
 fn every_direction(scene: &Scene) -> Vec<TangentDirection> {
-    let mut directions: Vec<TangentDirection> = wiperlab::blade::parameters::parameter_names()
+    let mut directions: Vec<TangentDirection> = wiperlab::model::parameters::parameter_names()
         .into_iter()
         .filter(|name| scene.value(name).is_some_and(|value| value != 0.0))
         .map(|name| TangentDirection::Parameter(name.to_owned()))

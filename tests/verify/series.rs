@@ -4,9 +4,9 @@
 use crate::blade::{Parts, STROKE};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wiperlab::blade::Pose;
-use wiperlab::blade::flight::FlightState;
-use wiperlab::blade::shoulder::ShoulderContact;
+use wiperlab::model::Pose;
+use wiperlab::model::flight::FlightState;
+use wiperlab::model::shoulder::ShoulderContact;
 use wiperlab::ode::taylor::{TaylorExpansion, TaylorPhase};
 use wiperlab::simulate::build_system;
 use wiperlab::simulate::flight::{FlightPhase, flight_state_vector};
@@ -97,7 +97,7 @@ fn slip_expands_to_its_own_motion() {
         let head = case.system.drive.motion_at(case.t);
         let speed = case.system.linkage.tip_velocity_m_per_s(
             &case.pose,
-            &wiperlab::blade::LinkDirections::from_pose(&case.pose),
+            &wiperlab::model::LinkDirections::from_pose(&case.pose),
             &head,
         );
         let slip = SlipPhase { system: &case.system, direction: speed.signum(), lean: case.lean };

@@ -4,10 +4,10 @@
 use crate::scenes::committed;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::scene::Scene;
+use wiperlab::simulate::twin::{Camera, film_scene};
 use wiperlab::simulate::{
     BladePoints, IntegrationMethod, Observer, SolutionSegment, SolverOptions, run_scene_with,
 };
-use wiperlab::twin::{Camera, film_scene};
 
 /// A blade that slips, sticks and flies, the last with impacts.
 fn flying() -> Scene {

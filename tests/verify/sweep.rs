@@ -4,20 +4,20 @@
 use resvg::{tiny_skia, usvg};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::blade::modes::{TipConstraint, natural_modes};
 use wiperlab::chart::Medium;
+use wiperlab::checkpoint::{Shard, format_header_line};
 use wiperlab::feature::{self, FeatureReader};
 use wiperlab::figures::sweep_map;
-use wiperlab::journal::{Shard, format_header_line};
+use wiperlab::model::modes::{TipConstraint, natural_modes};
 use wiperlab::recording::channel::ReversalInstants;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::Transitions;
 use wiperlab::simulate::scene::{ContactLossRule, Scene};
+use wiperlab::simulate::twin::film_scene;
 use wiperlab::simulate::{RunStatus, SolverOptions, run_scene};
 use wiperlab::sweep::{
     self, MissingReason, PointCollection, PointOutcome, Study, SweepMap, journal as points,
 };
-use wiperlab::twin::film_scene;
 
 const LIGHT_BLADE: &str = include_str!("../../data/scenes/light-blade.toml");
 const ACTUAL_BLADE: &str = include_str!("../../data/scenes/actual-blade.toml");

@@ -7,8 +7,8 @@ use std::f64::consts::TAU;
 use wiperlab::math::StandardNormal;
 use wiperlab::recording::channel::ReversalInstants;
 use wiperlab::recording::files::{RecordingFile, read_recording};
-use wiperlab::recording::level::rotate_traces;
 use wiperlab::recording::quality::*;
+use wiperlab::recording::rotate_traces;
 use wiperlab::recording::{FrameGrid, Recording, Traces};
 
 const RATE_HZ: f64 = 5_000.0;

@@ -7,7 +7,7 @@ use crate::blade::{Parts, STROKE};
 use crate::scenes::{both, committed, seen, upright_light_blade};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
-use wiperlab::blade::Pose;
+use wiperlab::model::Pose;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::SampleObserver;
 use wiperlab::simulate::scene::{Scene, StartKind};

@@ -2,9 +2,9 @@
 //! the glass.
 
 use super::Animation;
-use crate::blade::Linkage;
 use crate::chart::{ChartAxis, Colour, Mark, Panel, Series, TextAnnotation};
 use crate::figures::poses::joint_positions;
+use crate::model::Linkage;
 use crate::simulate::ModelSample;
 
 const MM: f64 = 1e3;

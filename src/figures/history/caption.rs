@@ -1,8 +1,8 @@
 //! Time histories: the whole and the release of the tip, with what lies between measurement and model.
 
-use super::thin::thin_frames;
+use super::thin_frames;
 use super::{TimeHistory, draw_enlarged, draw_figure};
-use crate::compare::windows::{FitWindow, group_fit_windows};
+use crate::compare::condition::{FitWindow, group_fit_windows};
 use crate::compare::{ConditionComparison, TimedRecording};
 use crate::feature::{Reading, ReversalInterval};
 use crate::figures::{FigureBlock, OPPOSED, Words};

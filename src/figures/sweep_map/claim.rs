@@ -1,6 +1,6 @@
 //! What a map says in words: from where to where its values go, and with which parameter they rise or fall.
 
-use super::labels::parameter_words;
+use super::parameter_words;
 use crate::feature::FeatureUnit;
 use crate::math;
 use crate::sweep::rank_correlation::spearman_correlation;

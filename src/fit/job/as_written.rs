@@ -1,9 +1,9 @@
 //! job.toml as people write it: types and keys only, nothing checked against anything else.
 
-use super::super::scale::BoundsSpacing;
 use crate::feature::{Keys, define_entry, with_reading_keys};
+use crate::fit::bounds::BoundsSpacing;
+use crate::simulate::twin::Camera;
 use crate::toml_file::NumberPair;
-use crate::twin::Camera;
 use schemars::JsonSchema;
 use serde::de::value::MapAccessDeserializer;
 use serde::de::{Error, MapAccess, SeqAccess, Visitor};

@@ -1,11 +1,11 @@
 //! Free parameters of a job: bounds, and what is known before any recording is read.
 
-use super::as_written;
-use super::refusal::{JobRefusal, check_above_zero, find_repeated, refuse};
-use crate::blade::parameters::find_parameter;
-use crate::fit::axis::Prior;
-use crate::fit::scale::{Bounds, BoundsSpacing};
+use super::as_written::ListedNuisance;
+use super::conditions::is_same_quantity;
+use super::{JobRefusal, as_written, check_above_zero, find_repeated, refuse};
+use crate::fit::bounds::{Bounds, BoundsSpacing, Prior};
 use crate::math;
+use crate::model::parameters::find_parameter;
 use crate::toml_file::suggest_key;
 use serde::Serialize;
 
@@ -94,4 +94,145 @@ fn check_prior(
         ),
         BoundsSpacing::Linear => Ok(Prior::Linear { mean, sd: written.sd.unwrap_or(relative * mean.abs()) }),
     }
+}
+
+// Constants of the scene that are freed within a prior: nobody knows a mass or a damping exactly.
+
+/// Least standard deviation, %: below it a constant is better held.
+const LEAST_PERCENT: f64 = 1e-4;
+/// Largest, %: what is known no better is a parameter.
+const MOST_PERCENT: f64 = 50.0;
+
+/// Constants of the scene that are freed within a prior.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Constants {
+    /// None: they are taken as exact.
+    Exact,
+    /// Every mass, inertia, stiffness, damping, preload and shoulder angle that a scene has, unlike zero, and
+    /// that is neither a free parameter nor set by a condition.
+    All {
+        /// Relative standard deviation of each.
+        sd_relative: f64,
+    },
+    /// Those of a list.
+    Listed(Vec<NuisanceParameter>),
+}
+
+/// A constant that is freed within a prior.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct NuisanceParameter {
+    /// Key of the scene with its table.
+    pub name: String,
+    /// Standard deviation of its logarithm about the scene's value.
+    pub sd_relative: f64,
+}
+
+impl Constants {
+    /// Whether all are taken as exact.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        *self == Self::Exact
+    }
+
+    /// Names that the job lists.
+    pub(super) fn listed_names(&self) -> impl Iterator<Item = &str> {
+        let listed = match self {
+            Self::Listed(listed) => listed.as_slice(),
+            _ => &[],
+        };
+        listed.iter().map(|nuisance| nuisance.name.as_str())
+    }
+}
+
+pub(super) fn check_constants(
+    written: &as_written::JobFile,
+    free: &[FreeParameter],
+    known: &[&str],
+) -> Result<Constants, JobRefusal> {
+    let Some(nuisance) = &written.nuisance else { return Ok(Constants::Exact) };
+    if written.trace.is_empty() {
+        return refuse(
+            "nuisance",
+            "found without a [[trace]], expected one: a dozen features do not hold so many unknowns; add a [[trace]], or free single constants as [[parameter]] with a `prior`",
+        );
+    }
+    match nuisance {
+        as_written::JobNuisanceEntry::All(text) => {
+            Ok(Constants::All { sd_relative: parse_percentage("nuisance", text)? })
+        }
+        as_written::JobNuisanceEntry::Listed(list) => {
+            Ok(Constants::Listed(check_listed_nuisances(list, free, known)?))
+        }
+    }
+}
+
+fn check_listed_nuisances(
+    list: &[ListedNuisance],
+    free: &[FreeParameter],
+    known: &[&str],
+) -> Result<Vec<NuisanceParameter>, JobRefusal> {
+    if list.is_empty() {
+        return refuse("nuisance", "found an empty list, expected names, or a percentage such as \"3 %\"");
+    }
+    if let Some(name) = find_repeated(list.iter().map(|one| one.name.as_str())) {
+        return refuse(format!("nuisance `{name}`"), "found twice; remove one of them");
+    }
+    for (at, second) in list.iter().enumerate() {
+        if let Some(first) = list[..at].iter().find(|first| is_same_quantity(&first.name, &second.name)) {
+            return refuse(
+                format!("nuisance `{}`", second.name),
+                format!("sets the same quantity as `{}`; remove one of them", first.name),
+            );
+        }
+    }
+    list.iter().map(|one| check_nuisance(one, free, known)).collect()
+}
+
+fn check_nuisance(
+    written: &ListedNuisance,
+    free: &[FreeParameter],
+    known: &[&str],
+) -> Result<NuisanceParameter, JobRefusal> {
+    let (name, key) = (&written.name, format!("nuisance `{}`", written.name));
+    if !known.contains(&name.as_str()) {
+        return refuse(key, format!("not a parameter of a scene; {}", suggest_key(name, known)));
+    }
+    if let Some(free) = free.iter().find(|free| is_same_quantity(&free.name, name)) {
+        return refuse(
+            key,
+            format!(
+                "the [[parameter]] `{}` is free already; give it a `prior`, and remove it here",
+                free.name
+            ),
+        );
+    }
+    let sd_relative = match (&written.sd, written.sd_relative) {
+        (Some(text), None) => parse_percentage(&key, text)?,
+        (None, Some(relative)) => check_percentage(&key, 100.0 * relative)?,
+        _ => return refuse(key, "expected either `sd`, such as \"3 %\", or `sd_relative`, such as 0.03"),
+    };
+    Ok(NuisanceParameter { name: name.clone(), sd_relative })
+}
+
+/// `3 %` as 0.03.
+fn parse_percentage(key: &str, text: &str) -> Result<f64, JobRefusal> {
+    let number = text.trim().strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok());
+    let Some(percent) = number else {
+        return refuse(key, format!("found \"{text}\", expected a percentage such as \"3 %\""));
+    };
+    check_percentage(key, percent)
+}
+
+/// A percentage as a share.
+fn check_percentage(key: &str, percent: f64) -> Result<f64, JobRefusal> {
+    if (LEAST_PERCENT..=MOST_PERCENT).contains(&percent) {
+        return Ok(percent / 100.0);
+    }
+    refuse(
+        key,
+        format!(
+            "found {percent} %, expected {LEAST_PERCENT} % to {MOST_PERCENT} %: what is known no better is a [[parameter]]"
+        ),
+    )
 }

@@ -1,10 +1,10 @@
 //! Tables of a job that say how it is computed: ensemble, camera, plausibility, search, intervals.
 
 use super::as_written;
-use super::refusal::{JobRefusal, check_above_zero, refuse};
-use crate::fit::settings::{STAGNANT_GENERATIONS, SearchSettings};
+use super::{JobRefusal, check_above_zero, refuse};
+use crate::fit::search::{STAGNANT_GENERATIONS, SearchSettings};
 use crate::fit::trace::MAX_TWINS;
-use crate::twin::Camera;
+use crate::simulate::twin::Camera;
 use serde::Serialize;
 
 /// Points of a cloud unless the job says otherwise: a few for each of up to six parameters, and a multiple of

@@ -1,17 +1,17 @@
-use super::aims::TOLERANCE_RELATIVE;
-use super::settings::{PARTICLES, STARTS};
-use super::*;
-use crate::blade::parameters::find_parameter;
-use crate::feature::{Reading, ReversalInterval};
-use crate::fit::axis::Prior;
-use crate::fit::settings::STAGNANT_GENERATIONS;
-use crate::recording::channel::Channel;
-use crate::spectrum::Detrend;
-
 mod cameras;
 mod refusals;
 mod traces;
 mod whole;
+
+use super::settings::{PARTICLES, STARTS};
+use super::targets::TOLERANCE_RELATIVE;
+use super::*;
+use crate::feature::{Reading, ReversalInterval};
+use crate::fit::bounds::Prior;
+use crate::fit::search::STAGNANT_GENERATIONS;
+use crate::model::parameters::find_parameter;
+use crate::recording::channel::Channel;
+use crate::spectrum::Detrend;
 
 const KNOWN: [&str; 3] = ["friction.a", "friction.c", "blade.neck_stiffness_n_m_per_rad"];
 

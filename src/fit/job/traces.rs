@@ -1,10 +1,12 @@
 //! Traces of a job: which recordings are fitted frame by frame, and what is not known of their cameras.
 
 use super::as_written;
-use super::cameras::{DEFAULT_OFFSET_SD_M, DEFAULT_SCALE_SD, MAX_OFFSET_SD_M, MAX_SCALE_SD, check_camera_sd};
+use super::conditions::{
+    DEFAULT_OFFSET_SD_M, DEFAULT_SCALE_SD, MAX_OFFSET_SD_M, MAX_SCALE_SD, check_camera_sd,
+};
 use super::conditions::{HeadSource, JobCondition, parse_head_source};
-use super::entry::JobEntry;
-use super::refusal::{JobRefusal, check_above_zero, refuse};
+use super::targets::JobEntry;
+use super::{JobRefusal, check_above_zero, refuse};
 use crate::recording::channel::Window;
 use crate::toml_file::suggest_key;
 use serde::Serialize;

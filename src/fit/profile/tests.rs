@@ -1,15 +1,15 @@
-use super::super::axis::SearchAxis;
 use super::super::evaluation::Observed;
-use super::super::failure::RunFailure;
 use super::super::ledger::FitProgress;
-use super::super::linear::{FeatureSlopes, difference_points, jacobian};
 use super::super::model::FeaturePredictor;
 use super::super::objective::Objective;
-use super::super::scale::{Bounds, BoundsSpacing};
-use super::super::target::TargetValue;
 use super::*;
+use crate::checkpoint::NullSink;
 use crate::feature::ValueComparison;
-use crate::journal::NullSink;
+use crate::fit::bounds::SearchAxis;
+use crate::fit::bounds::{Bounds, BoundsSpacing};
+use crate::fit::evaluation::RunFailure;
+use crate::fit::linear_model::{FeatureSlopes, difference_points, jacobian};
+use crate::fit::targets::TargetValue;
 use std::ops::ControlFlow;
 
 struct CurvedPredictor;

@@ -5,14 +5,14 @@
 //! every step by Broyden's rule and measured again when a step gains nothing. argmin's Gauss-Newton has no
 //! damping, no bounds and stops at the first failure.
 
-use super::costs::StageCosts;
-use super::rules::{EXACT_COST, MIN_WORTHWHILE_GAIN};
+use super::StageCosts;
+use super::termination::{EXACT_COST, MIN_WORTHWHILE_GAIN};
 use crate::fit::evaluation::Evaluation;
+use crate::fit::evaluation::EvaluationStage;
 use crate::fit::ledger::{Ledger, StopReason};
-use crate::fit::linear::{
+use crate::fit::linear_model::{
     FeatureSlopes, broyden_update, damped_step, difference_points, jacobian, residuals, step_in_box,
 };
-use crate::fit::stage::EvaluationStage;
 use nalgebra::DMatrix;
 
 /// Dampings tried at every step. The first is a prior of one length of the box, negligible for any

@@ -1,16 +1,16 @@
 //! The local searches: from each of the best points downhill, clouds about the best ends, and the best of all
 //! polished.
 
-use super::clouds::evolve_population;
-use super::ended::{LocalDescent, SearchTermination};
-use super::evolution::NEAR_EXTENT;
+use super::SearchSettings;
 use super::gauss_newton::descend_gauss_newton;
-use super::rules::{EXACT_COST, MIN_START_DISTANCE, MIN_WORTHWHILE_GAIN, SIMPLEX_EDGES};
+use super::population::NEAR_EXTENT;
+use super::population::evolve_population;
 use super::simplex::run_simplex;
+use super::termination::{EXACT_COST, MIN_START_DISTANCE, MIN_WORTHWHILE_GAIN, SIMPLEX_EDGES};
+use super::termination::{LocalDescent, SearchTermination};
 use crate::fit::evaluation::Evaluation;
+use crate::fit::evaluation::EvaluationStage;
 use crate::fit::ledger::{Ledger, StopReason};
-use crate::fit::settings::SearchSettings;
-use crate::fit::stage::EvaluationStage;
 
 /// Ends of local searches about which a cloud looks for a better one.
 const REFINED_ENDS: usize = 3;

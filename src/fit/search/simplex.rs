@@ -4,13 +4,13 @@
 //! Its solver is stepped from here. It has no bounds, so it works on the real line ([`line_to_unit`]), and
 //! it panics on an error of its first costs, so costs are never errors.
 
-use super::costs::StageCosts;
-use super::ended::SearchTermination;
-use super::patience::StagnationCounter;
-use super::rules::{EXACT_COST, SIMPLEX_COST_SPREAD};
+use super::StageCosts;
+use super::stagnation::StagnationCounter;
+use super::termination::SearchTermination;
+use super::termination::{EXACT_COST, SIMPLEX_COST_SPREAD};
+use crate::fit::bounds::{line_to_unit, unit_to_line};
+use crate::fit::evaluation::EvaluationStage;
 use crate::fit::ledger::{Ledger, StopReason};
-use crate::fit::scale::{line_to_unit, unit_to_line};
-use crate::fit::stage::EvaluationStage;
 use argmin::core::{CostFunction, Error, IterState, Problem, Solver, State};
 use argmin::solver::neldermead::NelderMead;
 use std::cell::RefCell;

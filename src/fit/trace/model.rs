@@ -1,8 +1,21 @@
 //! What a trace fit works on.
 
-use super::film::CameraObservation;
-use super::unknown::TraceUnknowns;
+use super::camera_observation::{CameraObservation, ObservationSettings};
+use super::unknowns::{CameraUnknown, TraceUnknown, TraceUnknowns, UnknownKind};
+use crate::fit::bounds::{BoundsSpacing, Prior, SearchAxis};
+use crate::fit::job::{FreeParameter, HeadSource, TraceChannel};
+use crate::fit::nuisance_parameters::FreedConstant;
+use crate::fit::trace_data::TraceData;
+use crate::math;
+use crate::recording::Recording;
+use crate::recording::channel::ReversalInstants;
+use crate::recording::noise_model::{
+    AutoregressiveNoise, ChannelNoise, SharedNoise, measure_common_noise, measure_noise,
+};
+use crate::recording::quality::{CameraTilt, measure_quality, measure_tilt};
+use crate::simulate::drive::{Drive, HeadMotionError, smooth_head_motion};
 use crate::simulate::scene::Scene;
+use std::sync::Arc;
 
 /// A recording with the scene that it is fitted with.
 #[derive(Clone)]
@@ -20,4 +33,168 @@ pub struct TraceModel {
     pub recordings: Vec<TraceRecording>,
     /// What is estimated besides starting states.
     pub unknowns: TraceUnknowns,
+}
+
+// A trace model from a job's scenes and recordings.
+
+/// Standard deviations of a camera's prior within which it is searched.
+const CAMERA_RANGE_SD: f64 = 20.0;
+
+/// What a recording is fitted with.
+pub struct TraceSource<'a> {
+    /// The scene of its condition.
+    pub scene: &'a Scene,
+    /// The recording.
+    pub recording: &'a Recording,
+    /// Time for which the shutter is open, s.
+    pub exposure_s: f64,
+    /// What of it is fitted.
+    pub traced: &'a TraceData,
+}
+
+impl TraceModel {
+    /// The model of a job's traces with its free parameters and the constants that are freed.
+    ///
+    /// # Errors
+    /// [`HeadMotionError`] where the head that drives a model is not tracked.
+    pub fn new(
+        sources: &[TraceSource<'_>],
+        parameters: &[FreeParameter],
+        constants: &[FreedConstant],
+    ) -> Result<Self, HeadMotionError> {
+        let shoots = sources.iter().map(build_recording).collect::<Result<Vec<_>, _>>()?;
+        let mut unknowns: Vec<TraceUnknown> = parameters.iter().map(parameter_unknown).collect();
+        unknowns.extend(constants.iter().map(constant_unknown));
+        for (number, (source, shoot)) in sources.iter().zip(&shoots).enumerate() {
+            unknowns.extend(camera_unknowns(number, source, &shoot.observation));
+        }
+        Ok(Self { recordings: shoots, unknowns: TraceUnknowns(unknowns) })
+    }
+}
+
+fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotionError> {
+    let TraceSource { recording, traced, exposure_s, .. } = *source;
+    let mut scene = source.scene.clone();
+    if traced.head == HeadSource::Recording {
+        scene.drive = Drive::Recorded(Arc::new(smooth_head_motion(recording)?));
+    }
+    let (shared, found) = (measure_common_noise(recording), measure_noise(recording));
+    let noise = [
+        channel_noise(traced, recording, found.along_sweep, shared.tip_x.as_ref()),
+        channel_noise(traced, recording, found.upwards, shared.head_y.as_ref()),
+    ];
+    let has = |channel| traced.channels.contains(&channel);
+    let settings = ObservationSettings {
+        tip_x: has(TraceChannel::TipX) || has(TraceChannel::Deflection),
+        head_drop: has(TraceChannel::HeadDrop),
+        exposure_s,
+        noise,
+        frames: [traced.frames.start, traced.frames.end],
+    };
+    let own_head = traced.head == HeadSource::Recording;
+    let shared = [shared.tip_x, shared.head_y].map(|shared| shared.map(|shared| shared.noise_m));
+    let film = CameraObservation::new(recording, &scene.drive, own_head, settings, &shared);
+    Ok(TraceRecording { scene, observation: film })
+}
+
+/// Noise of a channel: the job's, or the measured one less what the other point shows of it; white noise of
+/// the size that frames differ by where it cannot be measured.
+fn channel_noise(
+    traced: &TraceData,
+    recording: &Recording,
+    found: Option<ChannelNoise>,
+    shared: Option<&SharedNoise>,
+) -> AutoregressiveNoise {
+    let white = |sd_m: f64| {
+        // (a positive number is a standard deviation)
+        AutoregressiveNoise::white(sd_m.max(MIN_NOISE_M))
+            .unwrap_or_else(|_| unreachable!("a positive number"))
+    };
+    if let Some(noise_m) = traced.noise_m {
+        return white(noise_m);
+    }
+    let Some(ChannelNoise { noise, .. }) = found else {
+        let measured = measure_quality(recording, None);
+        return white(measured.head_x.noise_m.or(measured.tip_x.noise_m).unwrap_or(MIN_NOISE_M));
+    };
+    // what is left of it where both points have as much noise of their own; a large share says that they
+    // have not, and then nothing is known of what is left
+    let left = shared
+        .filter(|shared| shared.share + 2.0 * shared.sd < MAX_SHARED_NOISE)
+        .map_or(1.0, |shared| (1.0 - shared.share * shared.share).sqrt());
+    let sd_m = (noise.sd() * left).max(MIN_NOISE_M);
+    AutoregressiveNoise::new(sd_m, noise.coefficients().to_vec()).unwrap_or_else(|_| white(sd_m))
+}
+
+/// Share of the noise from which on the points do not have as much of their own.
+const MAX_SHARED_NOISE: f64 = 0.9;
+/// Least noise, m: simulated traces without any are written with as many digits.
+const MIN_NOISE_M: f64 = 1e-9;
+
+fn parameter_unknown(free: &FreeParameter) -> TraceUnknown {
+    let SearchAxis { bounds, prior } = SearchAxis { bounds: free.bounds, prior: free.prior };
+    let unit = match bounds.spacing() {
+        BoundsSpacing::Log => None,
+        BoundsSpacing::Linear => Some(bounds.upper() - bounds.lower()),
+    };
+    let along = |value: f64| unit.map_or_else(|| math::ln(value), |unit| value / unit);
+    let prior = prior.map(|prior| match prior {
+        Prior::Linear { mean, sd } => [along(mean), sd / unit.unwrap_or(mean)],
+        Prior::Log { mean_ln, sd_ln } => [mean_ln, sd_ln],
+    });
+    let range = [along(bounds.lower()), along(bounds.upper())];
+    let kind = UnknownKind::Parameter { name: free.name.clone(), unit };
+    TraceUnknown { kind, range, prior, start: 0.5 * (range[0] + range[1]) }
+}
+
+fn constant_unknown(freed: &FreedConstant) -> TraceUnknown {
+    let start = math::ln(freed.value);
+    TraceUnknown {
+        kind: UnknownKind::Parameter { name: freed.name.clone(), unit: None },
+        range: freed.range().map(math::ln),
+        prior: Some([start, freed.sd_relative]),
+        start,
+    }
+}
+
+/// What is not known of a recording's camera, those of no width left out.
+fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservation) -> Vec<TraceUnknown> {
+    let (doubt, head) = (&source.traced.camera, source.traced.head);
+    let has_drop = data.settings.head_drop;
+    let tilt_rad = recorded_tilt_rad(source.recording);
+    let [offset_x_m, offset_drop_m] = data.guess_offsets_m(tilt_rad);
+    let with_drop = |sd: f64| if has_drop { sd } else { 0.0 };
+    [
+        (CameraUnknown::OffsetX, doubt.offset_sd_m, offset_x_m),
+        (CameraUnknown::OffsetDrop, with_drop(doubt.offset_sd_m), offset_drop_m),
+        (CameraUnknown::DriftX, doubt.drift_sd_m_per_s, 0.0),
+        (CameraUnknown::DriftDrop, with_drop(doubt.drift_sd_m_per_s), 0.0),
+        (CameraUnknown::Scale, doubt.scale_sd, 0.0),
+        (CameraUnknown::Tilt, with_drop(doubt.tilt_sd_rad), tilt_rad),
+        (CameraUnknown::Clock, doubt.clock_sd_s(head), 0.0),
+    ]
+    .into_iter()
+    .filter(|(_, sd, _)| *sd > 0.0)
+    .map(|(what, sd, start)| {
+        let unit = what.coordinate_unit();
+        let reach = CAMERA_RANGE_SD * sd / unit;
+        let start = (start / unit).clamp(-reach, reach);
+        TraceUnknown {
+            kind: UnknownKind::Camera { film, what },
+            range: [-reach, reach],
+            prior: Some([0.0, sd / unit]),
+            start,
+        }
+    })
+    .collect()
+}
+
+/// The tilt that the path of the tip on the glass shows, rad; 0 where it shows none.
+fn recorded_tilt_rad(recording: &Recording) -> f64 {
+    let found = measure_tilt(
+        recording,
+        &ReversalInstants::find_instants(recording),
+        &measure_quality(recording, None),
+    );
+    found.ok().filter(CameraTilt::is_clear).map_or(0.0, |tilt| tilt.angle_rad)
 }

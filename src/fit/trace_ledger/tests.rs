@@ -1,6 +1,6 @@
 use super::*;
-use crate::fit::iterates::tests::{header, iterate};
-use crate::journal::read_checkpoint;
+use crate::checkpoint::read_checkpoint;
+use crate::fit::trace_checkpoint::tests::{header, iterate};
 
 /// Iterates of a whole search.
 const STEPS: usize = 6;

@@ -1,15 +1,15 @@
 //! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts, with a companion `.set` that names
 //! points and camera rate.
 
+use super::FileFormat;
+use crate::import::base_name;
 use crate::import::error::ImportError;
-use crate::import::format::FileFormat;
 use crate::import::options::{ImportOptions, TimeColumn};
-use crate::import::reader::rounding::RATE_AGREEMENT;
+use crate::import::reader::timing::RATE_AGREEMENT;
 use crate::import::reader::{
     CellNumber, DelimitedTable, Document, Fact, Facts, LostRule, PointCells, TableLayout, TextRow, TimeUnit,
     TrackFile,
 };
-use crate::import::source::base_name;
 
 /// Cells of the first line: frames, points, time from frame to frame.
 const COUNTS: usize = 3;

@@ -1,15 +1,14 @@
 //! ImageJ and Fiji: the Results table, the table of the plugin Manual Tracking, and MTrackJ's table of
 //! points.
 
-mod header;
-mod manual_tracking;
-mod mtrackj;
-mod results;
-
+use super::FileFormat;
 use crate::import::error::ImportError;
-use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
-use crate::import::reader::{DelimitedTable, Document, TextRow, TrackFile};
+use crate::import::reader::{
+    CoordinateUnit, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow, TimeUnit,
+    TrackFile,
+};
+use crate::recording::files::YAxis;
 
 /// ImageJ's tables.
 pub(crate) struct ImageJ;
@@ -47,21 +46,21 @@ impl FileFormat for ImageJ {
             return Err(no_header_error(table));
         };
         match kind {
-            ImageJTableKind::Results => results::read_results(document, table, row),
-            ImageJTableKind::ManualTracking => manual_tracking::read_manual_tracking(document, table, row),
-            ImageJTableKind::MTrackJ => mtrackj::read_mtrackj(document, table, row),
+            ImageJTableKind::Results => read_results(document, table, row),
+            ImageJTableKind::ManualTracking => read_manual_tracking(document, table, row),
+            ImageJTableKind::MTrackJ => read_mtrackj(document, table, row),
         }
     }
 }
 
 fn table_kind(row: &TextRow) -> Option<ImageJTableKind> {
     let names = row.texts();
-    if manual_tracking::is_manual_tracking_header(&names) {
+    if is_manual_tracking_header(&names) {
         Some(ImageJTableKind::ManualTracking)
-    } else if mtrackj::is_mtrackj_header(&names) {
+    } else if is_mtrackj_header(&names) {
         Some(ImageJTableKind::MTrackJ)
     } else {
-        results::is_results_header(&names).then_some(ImageJTableKind::Results)
+        is_results_header(&names).then_some(ImageJTableKind::Results)
     }
 }
 
@@ -76,5 +75,318 @@ fn no_header_error(table: &DelimitedTable) -> ImportError {
         ),
         "switch on Edit > Options > Input/Output > Save column headers and save the table again, or \
             number the columns: --format generic --columns frame=4,tip-x=2,tip-y=3",
+    )
+}
+
+// What all tables of ImageJ share: the direction of y, and a refusal at the header.
+
+/// What the documentation fixes of all three tables.
+pub(crate) fn imagej_facts() -> Facts {
+    let why = "ImageJ counts y from the top of the picture, unless `Invert Y coordinates` was ticked in \
+        Analyze > Set Measurements"
+        .to_owned();
+    Facts { y_axis: Some((YAxis::Down, why)), ..Facts::default() }
+}
+
+/// The refusal of a table at its header.
+pub(crate) fn header_error(
+    table: &DelimitedTable,
+    row: &TextRow,
+    found: String,
+    expected: &str,
+    advice: &str,
+) -> ImportError {
+    ImportError::wrong_table(table.location(row.line, 1), found, expected, advice)
+}
+
+// The table of the plugin Manual Tracking: whole pixels, a row a click.
+
+/// Starts of the two columns that are named with a degree sign, which comes in any encoding or is lost.
+const MANUAL_TRACK: &str = "Track n";
+const MANUAL_SLICE: &str = "Slice n";
+/// Characters that such a name has at most: the degree sign may have become two.
+const MANUAL_NAME_LENGTH: usize = MANUAL_TRACK.len() + 3;
+
+fn find_numbered_column(names: &[&str], start: &str) -> Option<usize> {
+    names.iter().position(|name| name.starts_with(start) && name.chars().count() <= MANUAL_NAME_LENGTH)
+}
+
+pub(crate) fn is_manual_tracking_header(names: &[&str]) -> bool {
+    find_numbered_column(names, MANUAL_TRACK).is_some() && find_numbered_column(names, MANUAL_SLICE).is_some()
+}
+
+pub(crate) fn read_manual_tracking<'a>(
+    document: &'a Document,
+    table: &'a DelimitedTable,
+    row: &TextRow,
+) -> Result<TrackFile<'a>, ImportError> {
+    let names = row.texts();
+    let named = |name: &str| names.iter().position(|other| *other == name);
+    let (Some(track), Some(slice), Some(x), Some(y)) = (
+        find_numbered_column(&names, MANUAL_TRACK),
+        find_numbered_column(&names, MANUAL_SLICE),
+        named("X"),
+        named("Y"),
+    ) else {
+        let advice = "save the plugin's results table as it is, with all its columns";
+        return Err(header_error(
+            table,
+            row,
+            format!("the columns {}", names.join(", ")),
+            "also X and Y",
+            advice,
+        ));
+    };
+    let layout = TableLayout {
+        start: 1,
+        width: [track, slice, x, y].into_iter().max().unwrap_or(0) + 1,
+        most: row.used_width(),
+        frame: Some(slice),
+        key: vec![track],
+        order: RowOrder::Any,
+        points: vec![PointCells::new("", x, Some(y))],
+        ..TableLayout::default()
+    };
+    let why = "Manual Tracking writes X and Y in whole pixels; its calibration is in Distance and Velocity \
+        only, which are not read"
+        .to_owned();
+    layout.read_tracks(document, table, Facts { unit: Some((CoordinateUnit::Pixel, why)), ..imagej_facts() })
+}
+
+// MTrackJ's table of points: coordinates and times with their units in the header.
+
+/// Columns that number clusters, tracks and points; a point's number starts again in each track and is no
+/// frame.
+const MTRACKJ_CLUSTER: &str = "CID";
+const MTRACKJ_TRACK: &str = "TID";
+const MTRACKJ_POINT: &str = "PID";
+/// Units in which the times number the frames.
+const FRAME_UNITS: [&str; 2] = ["frame", "frames"];
+
+pub(crate) fn is_mtrackj_header(names: &[&str]) -> bool {
+    names.first() == Some(&"Nr") && names.contains(&MTRACKJ_TRACK)
+}
+
+/// Index and unit of a column such as `x [pixel]`.
+fn find_quantity<'r>(names: &[&'r str], wanted: &str) -> Option<(usize, &'r str)> {
+    names.iter().enumerate().find_map(|(at, name)| {
+        let (quantity, unit) = name
+            .split_once('[')
+            .map_or((*name, ""), |(quantity, unit)| (quantity, unit.trim_end_matches(']')));
+        (quantity.trim() == wanted).then_some((at, unit.trim()))
+    })
+}
+
+pub(crate) fn read_mtrackj<'a>(
+    document: &'a Document,
+    table: &'a DelimitedTable,
+    row: &TextRow,
+) -> Result<TrackFile<'a>, ImportError> {
+    let names = row.texts();
+    let number = |name: &str| names.iter().position(|other| *other == name);
+    let quantities = (find_quantity(&names, "x"), find_quantity(&names, "y"), find_quantity(&names, "t"));
+    let (Some(track), Some(_), (Some((x, x_unit)), Some((y, y_unit)), Some((t, t_unit)))) =
+        (number(MTRACKJ_TRACK), number(MTRACKJ_POINT), quantities)
+    else {
+        let advice = "in MTrackJ press Measure with `Display point measurements` ticked and save that table";
+        return Err(header_error(
+            table,
+            row,
+            "a table of MTrackJ without the x, y and t of points".to_owned(),
+            "its table of point measurements",
+            advice,
+        ));
+    };
+    if x_unit != y_unit {
+        let advice = "give the picture one unit of length in Image > Properties and measure again";
+        return Err(header_error(
+            table,
+            row,
+            format!("x in `{x_unit}` and y in `{y_unit}`"),
+            "one unit of length",
+            advice,
+        ));
+    }
+    let counts = FRAME_UNITS.contains(&t_unit);
+    let layout = TableLayout {
+        start: 1,
+        width: row.used_width(),
+        most: row.used_width(),
+        frame: counts.then_some(t),
+        time: (!counts).then_some(t),
+        key: number(MTRACKJ_CLUSTER).into_iter().chain([track]).collect(),
+        order: RowOrder::Any,
+        points: vec![PointCells::new("", x, Some(y))],
+        ..TableLayout::default()
+    };
+    let unit = CoordinateUnit::parse(x_unit).map(|unit| (unit, format!("MTrackJ's header says [{x_unit}]")));
+    let time = TimeUnit::parse(t_unit).unwrap_or(TimeUnit::Unknown);
+    let mut export = layout
+        .read_tracks(document, table, Facts { unit, time, ..imagej_facts() })
+        .map_err(no_interval_error)?;
+    if !counts {
+        export.notes.push(
+            "MTrackJ's times are slices times the frame interval of Image > Properties, which \
+            may be that of playback or unset"
+                .to_owned(),
+        );
+    }
+    Ok(export)
+}
+
+/// Without a frame interval every time is 0.
+fn no_interval_error(error: ImportError) -> ImportError {
+    match error {
+        ImportError::DuplicateRow { place, what: "time", found, track, first } => ImportError::wrong_table(
+            place,
+            format!("the time {found} of track {track} a second time (first in line {first})"),
+            "one row a track and time",
+            "set the frame interval in Image > Properties and measure again",
+        ),
+        other => other,
+    }
+}
+
+// ImageJ's Results table: a row a measurement.
+
+/// Columns that name a point: its centroid, or else its centre of mass. `BX` and `BY` are a corner.
+const POSITIONS: [[&str; 2]; 2] = [["X", "Y"], ["XM", "YM"]];
+const SLICE: &str = "Slice";
+const FRAME: &str = "Frame";
+/// Number of the counter of the multi-point tool that a point belongs to.
+const COUNTER: &str = "Counter";
+/// Measurements that tables of other programs hardly have together with a nameless first column.
+const MEASUREMENTS: [&str; 13] = [
+    "Area",
+    "Mean",
+    "StdDev",
+    "Mode",
+    "Min",
+    "Max",
+    "XM",
+    "YM",
+    "IntDen",
+    "RawIntDen",
+    "Ch",
+    COUNTER,
+    "Label",
+];
+
+/// A nameless column of row numbers and ImageJ's measurements, or positions with a slice.
+pub(crate) fn is_results_header(names: &[&str]) -> bool {
+    let has = |name: &str| names.contains(&name);
+    let measured = MEASUREMENTS.iter().any(|name| has(name));
+    let positions = has("X") && has("Y");
+    (has(SLICE) && positions)
+        || (names.first() == Some(&"") && measured && (positions || has(SLICE) || has("Area")))
+}
+
+pub(crate) fn read_results<'a>(
+    document: &'a Document,
+    table: &'a DelimitedTable,
+    row: &TextRow,
+) -> Result<TrackFile<'a>, ImportError> {
+    let at = |name: &str| row.cells.iter().position(|cell| cell == name);
+    let frame = clock_column(table, row)?;
+    let Some([x, y]) = POSITIONS.iter().find_map(|[x, y]| Some([at(x)?, at(y)?])) else {
+        let advice = "tick `Centroid` and `Stack position` in Analyze > Set Measurements and measure again";
+        return Err(header_error(
+            table,
+            row,
+            "a Results table without X and Y".to_owned(),
+            "the columns X, Y and Slice",
+            advice,
+        ));
+    };
+    let key = match at(COUNTER) {
+        Some(counter) if column_varies(table, counter)? => vec![counter],
+        _ => vec![],
+    };
+    let name = if key.is_empty() { document.stem } else { "" };
+    let layout = TableLayout {
+        start: 1,
+        width: [frame, x, y].into_iter().max().unwrap_or(0) + 1,
+        most: row.used_width(),
+        frame: Some(frame),
+        order: RowOrder::Any,
+        points: vec![PointCells::new(name, x, Some(y))],
+        key,
+        ..TableLayout::default()
+    };
+    if at("Label") == Some(0) {
+        table.refuse_comment_names(
+            row.line,
+            "a label",
+            "rename the image, or untick `Display label` in Analyze > Set Measurements, and measure again",
+        )?;
+    }
+    let counted = !layout.key.is_empty();
+    let mut export = layout
+        .read_tracks(document, table, imagej_facts())
+        .map_err(|error| several_points_error(error, counted))?;
+    if counted {
+        export.notes.push("the tracks are the counters of the multi-point tool".to_owned());
+    }
+    Ok(export)
+}
+
+/// The slice, or the frame of a hyperstack: of two the one that counts up.
+fn clock_column(table: &DelimitedTable, row: &TextRow) -> Result<usize, ImportError> {
+    let at = |name: &str| row.cells.iter().position(|cell| cell == name);
+    match (at(SLICE), at(FRAME)) {
+        (Some(slice), Some(frame)) => match (column_varies(table, slice)?, column_varies(table, frame)?) {
+            (true, true) => {
+                let advice = "the table mixes depths and times: keep the rows of one depth, or say which \
+                    column counts: --columns frame=Frame,tip-x=X,tip-y=Y";
+                Err(header_error(
+                    table,
+                    row,
+                    "a table in which both Slice and Frame change".to_owned(),
+                    "one of them to count the frames",
+                    advice,
+                ))
+            }
+            (true, false) => Ok(slice),
+            _ => Ok(frame),
+        },
+        (Some(one), None) | (None, Some(one)) => Ok(one),
+        (None, None) => {
+            let advice = "tick `Stack position` in Analyze > Set Measurements and measure again";
+            Err(header_error(
+                table,
+                row,
+                "a Results table without Slice".to_owned(),
+                "a column that says in which slice a point was measured",
+                advice,
+            ))
+        }
+    }
+}
+
+/// Whether a column has more than one text in it.
+fn column_varies(table: &DelimitedTable, cell: usize) -> Result<bool, ImportError> {
+    let mut rows = table.rows(1);
+    let mut first: Option<String> = None;
+    while let Some(record) = rows.next_row()? {
+        let text = record.cell(cell);
+        match &first {
+            Some(first) if first != text => return Ok(true),
+            Some(_) => {}
+            None => first = Some(text.to_owned()),
+        }
+    }
+    Ok(false)
+}
+
+/// Several points in a slice: the table does not say which of them is which.
+fn several_points_error(error: ImportError, counted: bool) -> ImportError {
+    let ImportError::DuplicateRow { place, found, first, .. } = error else { return error };
+    let of = if counted { " and counter" } else { "" };
+    ImportError::wrong_table(
+        place,
+        format!("a second point in slice {found} (first in line {first})"),
+        format!("one row a slice{of}: the table does not say which point is which"),
+        "measure one point a slice and save a file for each point, or use Plugins > Tracking > \
+            Manual Tracking or MTrackJ, which number their tracks",
     )
 }

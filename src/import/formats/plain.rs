@@ -2,10 +2,11 @@
 
 mod header;
 
+use super::FileFormat;
 use crate::import::error::ImportError;
-use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
-use crate::import::reader::several_clocks::{self, ClockCell};
+use crate::import::reader::layout;
+use crate::import::reader::layout::ClockCell;
 use crate::import::reader::{
     CellNumber, CoordinateUnit, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow,
     TimeUnit, TrackFile,
@@ -177,7 +178,7 @@ impl<'t> PlainHeader<'t> {
         let clocks: Vec<ClockCell> = self.meanings.iter().enumerate().filter_map(clock).collect();
         let [first, others @ ..] = clocks.as_slice() else { return Ok(()) };
         for other in others {
-            if let Some(found) = several_clocks::find_clock_difference(table, start, *first, *other)? {
+            if let Some(found) = layout::find_clock_difference(table, start, *first, *other)? {
                 let place = table.location(found.line, table.text_column(found.line, found.cell));
                 let [one, two] = &found.texts;
                 let (first, other) = (self.column_name(first.cell), self.column_name(other.cell));

@@ -1,13 +1,13 @@
 //! Tracker (Open Source Physics): tables written by File > Export > Data, and tables copied from its data
 //! view.
 
-mod clocks;
-
+use super::FileFormat;
 use crate::import::error::ImportError;
-use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
-use crate::import::reader::several_clocks;
-use crate::import::reader::{DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow, TrackFile};
+use crate::import::reader::layout::{ClockCell, find_clock_difference};
+use crate::import::reader::{
+    DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow, TrackFile, layout,
+};
 
 /// Rows above the data that may hold names.
 const HEADER_ROWS: usize = 6;
@@ -80,13 +80,13 @@ impl FileFormat for TrackerFormat {
                 ..TableLayout::default()
             }
         };
-        let mut export = if clocks::clocks_agree(table, header + 1, &columns)? {
+        let mut export = if clocks_agree(table, header + 1, &columns)? {
             layout(at(TIME), at(FRAME), points).read_tracks(document, table, facts(pair))?
         } else {
-            let groups = clocks::group_by_clock(table, row, &columns, &titles, points)?;
+            let groups = group_by_clock(table, row, &columns, &titles, points)?;
             let layouts =
                 groups.into_iter().map(|group| layout(group.time, group.frame, group.points)).collect();
-            several_clocks::read_clocks_apart(layouts, document, table, facts(pair))?
+            layout::read_clocks_apart(layouts, document, table, facts(pair))?
         };
         export.notes.extend(notes);
         Ok(export)
@@ -193,5 +193,85 @@ fn no_positions_error(table: &DelimitedTable, row: &TextRow, columns: &[&str]) -
         } else {
             remedy.to_owned()
         },
+    )
+}
+
+// Tables of several tracks that were put next to each other, each with its own clock.
+
+/// A clock with its tracks.
+pub(crate) struct ClockGroup {
+    pub time: Option<usize>,
+    pub frame: Option<usize>,
+    pub points: Vec<PointCells>,
+}
+
+fn find_columns(columns: &[&str], name: &str) -> Vec<usize> {
+    columns.iter().enumerate().filter(|(_, column)| **column == name).map(|(at, _)| at).collect()
+}
+
+/// Whether all columns of times, and all of frame numbers, say the same in every row.
+pub(crate) fn clocks_agree(
+    table: &DelimitedTable,
+    start: usize,
+    columns: &[&str],
+) -> Result<bool, ImportError> {
+    for clocks in [find_columns(columns, TIME), find_columns(columns, FRAME)] {
+        let [first, others @ ..] = clocks.as_slice() else { continue };
+        for other in others {
+            let [first, other] = [*first, *other].map(|cell| ClockCell { cell, unit: 1.0 });
+            if find_clock_difference(table, start, first, other)?.is_some() {
+                return Ok(false);
+            }
+        }
+    }
+    Ok(true)
+}
+
+/// The tracks of each clock: those under its title, or those to its right.
+pub(crate) fn group_by_clock(
+    table: &DelimitedTable,
+    row: &TextRow,
+    columns: &[&str],
+    titles: &[&str],
+    points: Vec<PointCells>,
+) -> Result<Vec<ClockGroup>, ImportError> {
+    let (times, frames) = (find_columns(columns, TIME), find_columns(columns, FRAME));
+    let mut groups: Vec<ClockGroup> = vec![];
+    for point in points {
+        let x = point.x.first().copied().unwrap_or(0);
+        let own = |clocks: &[usize]| match clocks {
+            [only] => Some(*only),
+            several => clock_of_column(several, titles, x),
+        };
+        let (time, frame) = (own(&times), own(&frames));
+        if time.is_none() && frame.is_none() {
+            return Err(no_clock_error(table, row, &point, x));
+        }
+        match groups.iter_mut().find(|group| (group.time, group.frame) == (time, frame)) {
+            Some(group) => group.points.push(point),
+            None => groups.push(ClockGroup { time, frame, points: vec![point] }),
+        }
+    }
+    Ok(groups)
+}
+
+/// The clock under the title of column `x`, or the nearest on its left.
+fn clock_of_column(clocks: &[usize], titles: &[&str], x: usize) -> Option<usize> {
+    let title = find_title(titles, x).map(|(at, _)| at);
+    let under = |clock: &&usize| title.is_some() && find_title(titles, **clock).map(|(at, _)| at) == title;
+    clocks.iter().find(under).or_else(|| clocks.iter().rfind(|clock| **clock < x)).copied()
+}
+
+fn no_clock_error(table: &DelimitedTable, row: &TextRow, point: &PointCells, x: usize) -> ImportError {
+    ImportError::columns(
+        table.file,
+        row.line,
+        format!(
+            "found several clocks that differ, and none for the track `{}` in column {}, expected `t` or `frame` to \
+             the left of every track",
+            point.name,
+            x + 1
+        ),
+        "export again from Tracker, or each track to a file of its own",
     )
 }

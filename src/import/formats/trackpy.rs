@@ -1,8 +1,8 @@
 //! trackpy: its table of linked features, saved with `to_csv`. y stands before x, and the unnamed index may
 //! come first.
 
+use super::FileFormat;
 use crate::import::error::ImportError;
-use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow, TrackFile,

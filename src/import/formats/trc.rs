@@ -1,10 +1,10 @@
 //! TRC, the table of marker positions of motion-capture programs: two lines of settings, names over three
 //! columns each.
 
+use super::FileFormat;
 use crate::import::error::ImportError;
-use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
-use crate::import::reader::rounding::RATE_AGREEMENT;
+use crate::import::reader::timing::RATE_AGREEMENT;
 use crate::import::reader::{
     CellNumber, Column, CoordinateUnit, DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow,
     TimeUnit, TrackFile, new_finding,

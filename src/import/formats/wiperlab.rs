@@ -1,7 +1,7 @@
 //! This program's own `trace.csv`: metres, seconds, y upwards; read back to the bit.
 
+use super::FileFormat;
 use crate::import::error::ImportError;
-use crate::import::format::FileFormat;
 use crate::import::options::ImportOptions;
 use crate::import::reader::{Clock, Column, CoordinateUnit, Document, Facts, TimeUnit, Track, TrackFile};
 use crate::recording::files::{HEADER, YAxis, parse_trace_csv};

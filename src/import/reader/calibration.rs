@@ -1,12 +1,12 @@
 //! What an import cannot do without: rate, scale, direction of y and the unit of the times. The user says it,
 //! or the file does, or the documentation of its format; otherwise it is asked for.
 
+use super::timing::{RATE_AGREEMENT, times_fit_rate};
+use super::track_file::{CoordinateUnit, TimeUnit};
+use crate::import::ImportReport;
 use crate::import::error::ImportError;
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
-use crate::import::outcome::ImportReport;
-use crate::import::reader::rounding::{RATE_AGREEMENT, times_fit_rate};
 use crate::import::reader::track_file::TrackFile;
-use crate::import::reader::units::{CoordinateUnit, TimeUnit};
 use crate::import::reader::{findings, track_choice};
 use crate::recording::clock;
 use crate::recording::files::YAxis;

@@ -1,10 +1,10 @@
 //! Chosen tracks on one frame grid: which frames they share, and their points frame by frame.
 
+use super::track_file::Column;
+use crate::import::ImportReport;
 use crate::import::error::ImportError;
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
-use crate::import::outcome::ImportReport;
 use crate::import::reader::calibration::ImportCalibration;
-use crate::import::reader::column::Column;
 use crate::import::reader::timing::{ClockRows, DeclaredTiming, RowFrames};
 use crate::import::reader::track_choice::TrackIndex;
 use crate::import::reader::track_file::TrackFile;

@@ -1,7 +1,7 @@
 //! Rows of one or of many instances (tracks, blocks), gathered into clocks and tracks.
 
+use super::track_file::Column;
 use crate::import::error::{ImportError, TextLocation};
-use crate::import::reader::column::Column;
 use crate::import::reader::track_file::{Clock, Track};
 use std::collections::HashMap;
 

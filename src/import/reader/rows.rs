@@ -1,7 +1,7 @@
 //! The rows of a table, one after the other: the only file that names `csv`.
 
+use super::dialect::{Delimiter, NumberedLine, is_comment};
 use crate::import::error::{ImportError, TextLocation};
-use crate::import::reader::delimiter::{Delimiter, NumberedLine, is_comment};
 use csv::{ReaderBuilder, StringRecord};
 
 /// A row with its cells, trimmed and without their quotes.

@@ -1,7 +1,7 @@
 //! A delimited file: its first rows as a whole, all of them one by one, and where a cell stands.
 
+use super::dialect::{declared_delimiter, is_comment};
 use crate::import::error::{CellProblem, ImportError, TextLocation};
-use crate::import::reader::delimiter::{declared_delimiter, is_comment};
 use crate::import::reader::dialect::Dialect;
 use crate::import::reader::number::{CellNumber, parse_number};
 use crate::import::reader::rows::{RowReader, RowView, TextRow, count_lines, parse_rows};

@@ -1,10 +1,10 @@
 //! Rows to frames: the frame column where there is one, else the time column on the grid that fits it.
 
+use super::track_file::Column;
 use crate::import::error::{CellProblem, ImportError};
-use crate::import::reader::column::Column;
-use crate::import::reader::rounding::{QUANTA_S, RATE_AGREEMENT, are_multiples};
 use crate::import::reader::track_file::{Clock, TrackFile};
-use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
+use crate::recording::clock;
+use crate::recording::clock::{FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
 /// Largest step between tracked frames that is suggested where the rates are an integer apart.
 const LARGEST_STEP: f64 = 10.0;
@@ -353,6 +353,32 @@ fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: String) 
         expected,
         advice,
     }
+}
+
+// Whether times and rates agree within their digits.
+
+/// Largest difference between two rates that are meant to be one: cameras hold theirs to parts in ten
+/// thousand, and wrong rates are wrong by far more.
+pub(crate) const RATE_AGREEMENT: f64 = 0.01;
+
+/// Decimal places to which programs round times, s.
+pub(crate) const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
+
+/// Whether times lie on the grid of `rate_hz` from the first one on, as near as their last digit.
+pub(crate) fn times_fit_rate(times: &[f64], frames: &[f64], rate_hz: f64) -> bool {
+    let (Some(start), Some(first)) = (times.first(), frames.first()) else { return false };
+    let half_quantum =
+        QUANTA_S.into_iter().find(|q| are_multiples(times, *q)).map_or(1e-9, |q| q / 2.0 * (1.0 + 1e-6));
+    // the first time is rounded too
+    times
+        .iter()
+        .zip(frames)
+        .all(|(time, frame)| (start + (frame - first) / rate_hz - time).abs() <= 2.0 * half_quantum)
+}
+
+/// Whether every time is a multiple of `quantum_s`.
+pub(crate) fn are_multiples(times: &[f64], quantum_s: f64) -> bool {
+    times.iter().all(|t| (t / quantum_s - (t / quantum_s).round()).abs() <= 1e-6)
 }
 
 #[cfg(test)]

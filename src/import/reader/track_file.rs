@@ -1,11 +1,10 @@
 //! What a format makes of a file: clocks, tracks, and what the file itself says of its units.
 
+use super::Document;
+use crate::import::base_name;
 use crate::import::error::TextLocation;
-use crate::import::reader::column::Column;
-use crate::import::reader::document::Document;
+use crate::import::options::CoordinateScale;
 use crate::import::reader::table::DelimitedTable;
-use crate::import::reader::units::{CoordinateUnit, TimeUnit};
-use crate::import::source::base_name;
 use crate::recording::files::YAxis;
 use crate::recording::quality::QualityFinding;
 
@@ -104,5 +103,106 @@ impl<'a> TrackFile<'a> {
         let line = clock.line_number(row);
         let column = self.table.map_or(1, |table| table.text_column(line, clock.cell));
         TextLocation { file: self.file.to_owned(), line, column }
+    }
+}
+
+// The numbers of one column, with its missing cells.
+
+/// Numbers of a column; a missing one is kept as NaN inside and is `None` outside.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Column(Vec<f64>);
+
+impl Column {
+    pub(crate) fn push(&mut self, value: Option<f64>) {
+        self.0.push(value.unwrap_or(f64::NAN));
+    }
+
+    pub(crate) fn get(&self, row: usize) -> Option<f64> {
+        self.0.get(row).copied().filter(|value| !value.is_nan())
+    }
+
+    pub(crate) fn iter(&self) -> impl Iterator<Item = Option<f64>> {
+        self.0.iter().map(|value| Some(*value).filter(|value| !value.is_nan()))
+    }
+
+    pub(crate) fn scale(&mut self, factor: f64) {
+        self.0.iter_mut().for_each(|value| *value *= factor);
+    }
+
+    pub(crate) fn divide(&mut self, divisor: f64) {
+        self.0.iter_mut().for_each(|value| *value /= divisor);
+    }
+
+    pub(crate) fn has_values(&self) -> bool {
+        self.0.iter().any(|value| !value.is_nan())
+    }
+
+    /// The rows in the order of `order`.
+    pub(crate) fn reorder(&self, order: &[usize]) -> Self {
+        Self(order.iter().filter_map(|row| self.0.get(*row).copied()).collect())
+    }
+}
+
+impl FromIterator<Option<f64>> for Column {
+    fn from_iter<I: IntoIterator<Item = Option<f64>>>(values: I) -> Self {
+        Self(values.into_iter().map(|value| value.unwrap_or(f64::NAN)).collect())
+    }
+}
+
+// Units of times and coordinates, by the names that files give them.
+
+/// Unit of a file's times.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) enum TimeUnit {
+    /// Lengths of this many seconds.
+    Seconds(f64),
+    /// Seconds, as in nearly every table.
+    #[default]
+    AssumedSeconds,
+    /// The format has several and the file does not say which.
+    Unknown,
+}
+
+impl TimeUnit {
+    /// The unit of that name in a file: `s`, `sec`, `ms`, ...; `None` for any other.
+    pub(crate) fn parse(name: &str) -> Option<Self> {
+        let seconds = match name.trim().trim_matches(['(', ')', '[', ']']).to_lowercase().as_str() {
+            "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
+            "ms" | "msec" | "millisecond" | "milliseconds" => 1e-3,
+            "min" | "minute" | "minutes" => 60.0,
+            "us" | "usec" | "\u{b5}s" | "\u{3bc}s" | "microsecond" | "microseconds" => 1e-6,
+            "ns" | "nsec" | "nanosecond" | "nanoseconds" => 1e-9,
+            _ => return None,
+        };
+        Some(Self::Seconds(seconds))
+    }
+}
+
+/// What one unit of the file's coordinates is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum CoordinateUnit {
+    /// A pixel of unknown size.
+    Pixel,
+    /// A length, m.
+    Metres(f64),
+}
+
+impl CoordinateUnit {
+    /// The unit of that name in a file: `px`, `pixel`, `mm`, `micron`, ...; `None` for any other.
+    pub(crate) fn parse(name: &str) -> Option<Self> {
+        let name = name.trim().trim_matches(['(', ')', '[', ']']).to_lowercase();
+        match name.as_str() {
+            "px" | "pixel" | "pixels" => Some(Self::Pixel),
+            "micron" | "microns" | "micrometer" | "micrometre" => Some(Self::Metres(1e-6)),
+            "inch" | "in" => Some(Self::Metres(0.0254)),
+            name => CoordinateScale::parse(name).ok().map(|scale| Self::Metres(scale.metres())),
+        }
+    }
+
+    pub(crate) fn describe(self) -> String {
+        match self {
+            Self::Pixel => "pixels".to_owned(),
+            Self::Metres(metres) => format!("units of {metres} m"),
+        }
     }
 }

@@ -1,7 +1,7 @@
 //! The flip: the passage of the deflection from the side on which the tip trails before a turn of the head to
 //! the other side.
 
-use super::tracked::{index_at_frame, median_of_three, median_position};
+use super::{index_at_frame, median_of_three, median_position};
 use std::ops::Range;
 
 /// Share of the change at which the deflection has left its level before: that of rise times, far above

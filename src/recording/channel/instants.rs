@@ -1,11 +1,11 @@
 //! Instants of a stroke found in a recording: the head turns, the tip stops, the deflection flips, the tip
 //! slips again.
 
-use super::channels::Channel;
+use super::Channel;
 use super::flip::{self, Flip, TurnNeighbourhood};
-use super::holds::longest_hold;
-use super::tracked::{TrackPoints, present_points};
 use super::turns::find_turns;
+use super::turns::longest_hold;
+use super::{TrackPoints, present_points};
 use crate::math;
 use crate::recording::Recording;
 use serde::Serialize;

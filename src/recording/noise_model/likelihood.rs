@@ -1,9 +1,9 @@
 //! The autoregressive noise that blocks of frames show: by residual likelihood, which counts what the motion
 //! takes away (Patterson and Thompson 1971, *Biometrika* 58), its order by Schwarz's criterion.
 
+use super::autoregressive::Whitener;
 use super::autoregressive::{AutoregressiveNoise, raise_order};
 use super::blocks::{NoiseBlock, dot_product, project_out};
-use super::whitener::Whitener;
 use crate::math;
 use nalgebra::{DMatrix, DVector};
 

@@ -1,7 +1,7 @@
 //! Checks of the frame grid, the exposure, the single columns and the tracker's confidence.
 
 use super::finding::{Check, QualityFinding, Severity};
-use super::measured::{ChannelQuality, FEWEST_CYCLES, MeasuredColumn, Optics, Quality};
+use super::measurement::{ChannelQuality, FEWEST_CYCLES, MeasuredColumn, Optics, Quality};
 use super::noise::FrameGaps;
 use crate::camera::exposure_gain;
 use crate::recording::{FrameGrid, Traces};

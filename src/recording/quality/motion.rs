@@ -2,7 +2,7 @@
 //! the head.
 
 use super::finding::{Check, QualityFinding, Severity};
-use super::measured::{ChannelQuality, Quality, measured_columns};
+use super::measurement::{ChannelQuality, Quality, measured_columns};
 use crate::recording::channel::ReversalInstants;
 use crate::recording::{FrameGrid, Recording, Traces};
 use std::f64::consts::PI;

@@ -12,7 +12,7 @@
 //! A point with a missing frame within two frames of it is not judged.
 
 use super::finding::{Check, QualityFinding, Severity};
-use super::measured::{ChannelQuality, MeasuredColumn, Optics};
+use super::measurement::{ChannelQuality, MeasuredColumn, Optics};
 use crate::recording::FrameGrid;
 
 /// Weight of the nearer two neighbours in the cubic through four, of 6; the further two have -1.

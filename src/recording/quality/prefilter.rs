@@ -8,7 +8,7 @@
 //! in steps coarser than its noise is not judged.
 
 use super::finding::{Check, QualityFinding, Severity};
-use super::measured::MeasuredColumn;
+use super::measurement::MeasuredColumn;
 use crate::math;
 use std::f64::consts::TAU;
 

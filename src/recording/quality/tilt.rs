@@ -5,20 +5,16 @@
 //! leans to the other side. Frames in which the tip is off the glass do not count. A curved glass has no
 //! single slope: how much its slope varies along the path is part of the uncertainty.
 
-mod findings;
-mod line;
-mod on_glass;
-mod path;
-mod spread;
+mod glass_line;
 
+use super::finding::{Check, QualityFinding, Severity};
+use super::measurement::Quality;
+use super::motion::head_height_m;
 use crate::math;
-pub(super) use findings::check_tilt;
-
-use super::measured::Quality;
 use crate::recording::Recording;
 use crate::recording::channel::ReversalInstants;
-use line::GlassLine;
-use path::TipPath;
+use crate::text::{format_degrees, format_with_sd, to_ascii};
+use glass_line::{GlassLine, TipPath};
 use serde::Serialize;
 
 /// Fewest frames with a height: the correlation of the errors of fewer is not known.
@@ -112,7 +108,7 @@ pub fn measure_tilt(
         return Err(TiltNotFound::TooFewFrames { frames });
     }
     let step_m = height_step_m(measured);
-    let line = on_glass::fit_glass_line(&path, sufficient_travel_m(&path)?, step_m);
+    let line = glass_line::fit_glass_line(&path, sufficient_travel_m(&path)?, step_m);
     let on_glass = path.select_points(&line.on_glass);
     let on_line = on_glass.points.len();
     if (on_line as f64) < LEAST_ON_GLASS * frames as f64 {
@@ -152,7 +148,7 @@ fn sufficient_travel_m(path: &TipPath) -> Result<f64, TiltNotFound> {
 fn angle_with_sd(path: &TipPath, line: &GlassLine, hidden_step_m: f64) -> (f64, f64, Option<Curvature>) {
     // at worst the rounding to a step is alike in all frames: a whole stroke may lie within one step
     let rounding_m2 = path.points.len() as f64 * math::powi(hidden_step_m, 2) / 12.0;
-    let variance_m2 = spread::long_run_variance(path, line) + rounding_m2;
+    let variance_m2 = glass_line::long_run_variance(path, line) + rounding_m2;
     let curvature = significant_curvature(line, variance_m2);
     let bending = curvature.map_or(0.0, |curvature| curvature.slope_sd_rad);
     let slope_sd = math::hypot((variance_m2 / line.slope_information_m2).sqrt(), bending);
@@ -177,5 +173,92 @@ impl CameraTilt {
     /// Height by which the glass rises along the travel, m.
     fn rise_m(&self) -> f64 {
         self.travel_m * math::tan(self.angle_rad)
+    }
+}
+
+// What a tilt or a curved glass does to the deflection, in words.
+
+/// The tilt and the curvature of a recording, where they are clear; nothing where it shows none.
+pub(in crate::recording::quality) fn check_tilt(
+    recording: &Recording,
+    measured: &Quality,
+    instants: &ReversalInstants,
+) -> Vec<QualityFinding> {
+    let Ok(tilt) = measure_tilt(recording, instants, measured) else { return vec![] };
+    let effect =
+        TiltEffect { height_m: head_height_m(recording.traces()), noise_m: measured.deflection_floor_m() };
+    [effect.tilt_finding(&tilt), effect.curvature_finding(&tilt)].into_iter().flatten().collect()
+}
+
+/// What an angle changes: the head stands above the tip, so turning the picture moves it along the sweep.
+struct TiltEffect {
+    /// Height of the head above the tip, m.
+    height_m: Option<f64>,
+    /// Noise of a deflection, m.
+    noise_m: Option<f64>,
+}
+
+impl TiltEffect {
+    fn tilt_finding(&self, tilt: &CameraTilt) -> Option<QualityFinding> {
+        if !tilt.is_clear() {
+            return None;
+        }
+        let words = format!(
+            "the glass rises by {} along x, over {:.1} mm in {} frames{}",
+            format_degrees(tilt.angle_rad, tilt.sd_rad),
+            1e3 * tilt.travel_m,
+            tilt.frames,
+            self.describe_shift(tilt.angle_rad, "every deflection is shifted by")
+        );
+        let rise =
+            format!(", and the head drop changes by {:.1} um along the path", 1e6 * tilt.rise_m().abs());
+        let advice = "import again with --level, which turns both tracks by this angle, or level the camera";
+        let severity = self.severity(tilt.angle_rad);
+        Some(
+            QualityFinding::new(Check::Tilt, severity, tilt.angle_rad.to_degrees(), "degrees", words + &rise)
+                .with_advice(advice),
+        )
+    }
+
+    fn curvature_finding(&self, tilt: &CameraTilt) -> Option<QualityFinding> {
+        let Curvature { per_m, sd_per_m, slope_sd_rad } = tilt.curvature?;
+        let change = (per_m * tilt.travel_m).abs();
+        if change < LEAST_TILT_RAD.max(CLEAR_DEVIATIONS * sd_per_m * tilt.travel_m) {
+            return None;
+        }
+        let words = format!(
+            "the glass is curved in the picture by {} 1/m: its slope changes by {:.3} degrees along the \
+             path{}",
+            to_ascii(&format_with_sd(per_m, sd_per_m)),
+            change.to_degrees(),
+            self.describe_shift(slope_sd_rad, "deflections at different places differ by")
+        );
+        let advice = "no rotation levels a curved path: compare windows at the same place, and check the lens \
+            for distortion";
+        Some(
+            QualityFinding::new(Check::CurvedGlass, self.severity(slope_sd_rad), per_m, "1/m", words)
+                .with_advice(advice),
+        )
+    }
+
+    /// Shift of a deflection, m.
+    fn shift_m(&self, angle_rad: f64) -> Option<f64> {
+        Some(self.height_m? * math::sin(angle_rad))
+    }
+
+    /// A shift that single frames show is more than worth knowing.
+    fn severity(&self, angle_rad: f64) -> Severity {
+        match (self.shift_m(angle_rad), self.noise_m) {
+            (Some(shift), Some(noise)) if shift.abs() > noise => Severity::Caution,
+            _ => Severity::Note,
+        }
+    }
+
+    fn describe_shift(&self, angle_rad: f64, what: &str) -> String {
+        let Some(shift_m) = self.shift_m(angle_rad) else { return String::new() };
+        let noises = self.noise_m.filter(|noise| *noise > 0.0).map_or_else(String::new, |noise| {
+            format!(" ({:.1} standard deviations of its noise)", shift_m.abs() / noise)
+        });
+        format!(": {what} {:.1} um{noises}", 1e6 * shift_m)
     }
 }

@@ -1,9 +1,9 @@
 //! Parts of a page: text that stays text, tables, figures, sections, the document.
 
-use crate::blade::parameters;
 use crate::chart::Medium;
 use crate::figures::{Drawing, FigureBlock};
-use crate::report::statement::{Sentence, SentencePart, Statement};
+use crate::model::parameters;
+use crate::report::rich_text::{Sentence, SentencePart, Statement};
 use crate::text::{capitalise, make_printable};
 use html_escape::encode_safe;
 

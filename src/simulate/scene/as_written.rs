@@ -1,8 +1,8 @@
 //! scene.toml as people write it: tables and types only, nothing checked against anything else.
 
-use super::contact::{ContactLossRule, JamRule};
-use super::output::OutputTable;
-use crate::blade::parameters::{PARAMETERS, ParameterRange};
+use super::OutputTable;
+use super::{ContactLossRule, JamRule};
+use crate::model::parameters::{PARAMETERS, ParameterRange};
 use crate::toml_file::table_schema;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::Deserialize;

@@ -1,10 +1,10 @@
 //! From the numbers of a scene to the constants of the linkage.
 
-use super::error::{SceneError, key_error};
-use crate::blade::friction::FrictionLaw;
-use crate::blade::parameters::{PARAMETERS, ParameterQuantity, damping_from_ratio, stiffness_from_frequency};
-use crate::blade::shoulder::Shoulder;
-use crate::blade::{Linkage, Spring};
+use super::{SceneError, key_error};
+use crate::model::friction::FrictionLaw;
+use crate::model::parameters::{PARAMETERS, ParameterQuantity, damping_from_ratio, stiffness_from_frequency};
+use crate::model::shoulder::Shoulder;
+use crate::model::{Linkage, Spring};
 use std::collections::BTreeMap;
 
 type SceneValues = BTreeMap<&'static str, f64>;
@@ -44,7 +44,7 @@ pub(super) fn build_linkage(
     Ok(linkage)
 }
 
-/// The constants that follow from the numbers of a scene (model notation in [`crate::blade`]).
+/// The constants that follow from the numbers of a scene (model notation in [`crate::model`]).
 pub(super) fn linkage_constants(values: &SceneValues, has_shoulder: bool) -> Linkage {
     let of = |quantity: ParameterQuantity| {
         PARAMETERS

@@ -1,8 +1,9 @@
 //! The numbers of a scene under the names of the parameter table.
 
 use super::as_written::{DriveFile, SceneNumbers};
-use super::error::{SceneError, key_error};
-use crate::blade::parameters::{self, ModelParameter, PARAMETERS};
+use super::{SceneError, key_error};
+use crate::model::parameters;
+use crate::model::parameters::{ModelParameter, PARAMETERS};
 use crate::toml_file;
 use std::collections::BTreeMap;
 use toml::Spanned;

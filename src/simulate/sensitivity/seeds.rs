@@ -1,12 +1,15 @@
 //! What each direction changes directly: constants, the head's motion, the state at the start.
 
-use super::TangentDirection;
-use super::difference::{DIFFERENCE_STEP, SIX_POINTS};
 use super::source::TangentSource;
-use crate::blade::Linkage;
-use crate::blade::parameters::{ModelParameter, ParameterQuantity};
-use crate::blade::tangent::{LANES, LaneVector, LinkageTangent, StateTangent};
+use super::{DIFFERENCE_STEP, SIX_POINTS, central_difference};
+use crate::model::parameters::{ModelParameter, ParameterQuantity};
+use crate::model::shoulder::ShoulderContact;
+use crate::model::tangent::{LANES, LaneVector, LinkageTangent, StateTangent};
+use crate::model::{Linkage, Pose};
+use crate::simulate::equilibrium::residual_moments;
+use crate::simulate::phases::DrivenBlade;
 use crate::simulate::scene::{Scene, SceneError};
+use nalgebra::{Matrix2, Vector2};
 
 /// How the head's motion `x(t)` changes, `dx = scale x + (stretch t - delay) x'`, and its velocity
 /// accordingly.
@@ -187,10 +190,110 @@ fn scale_at_zero(parameter: &ModelParameter, linkage: &Linkage) -> f64 {
     }
 }
 
+// What a derivative is taken by.
+
+/// What a derivative is taken by.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum TangentDirection {
+    /// A parameter of the scene by its name; quantities that the scene writes by others (a stiffness by a
+    /// natural frequency) follow them.
+    Parameter(String),
+    /// Angle of the neck at the start, rad.
+    NeckAngle,
+    /// Angle of the lip at the start, rad.
+    LipAngle,
+    /// Angular rate of the neck at the start, rad/s.
+    NeckRate,
+    /// Angular rate of the lip at the start, rad/s.
+    LipRate,
+    /// A factor on the head's motion, 1 at the scene's own.
+    DriveScale,
+    /// A delay of the head's motion, s, 0 at the scene's own.
+    DriveDelay,
+}
+
+/// Names of the directions that are no parameters, with their units.
+const NAMED_DIRECTIONS: [(TangentDirection, &str, &str); 6] = [
+    (TangentDirection::NeckAngle, "start.neck_angle_rad", "rad"),
+    (TangentDirection::LipAngle, "start.lip_angle_rad", "rad"),
+    (TangentDirection::NeckRate, "start.neck_rate_rad_per_s", "rad/s"),
+    (TangentDirection::LipRate, "start.lip_rate_rad_per_s", "rad/s"),
+    (TangentDirection::DriveScale, "drive.scale", "1"),
+    (TangentDirection::DriveDelay, "drive.delay_s", "s"),
+];
+
+impl TangentDirection {
+    /// The direction of a name: one of [`Self::other_names`], otherwise a parameter.
+    #[must_use]
+    pub fn from_name(name: &str) -> Self {
+        let other = NAMED_DIRECTIONS.iter().find(|(_, other, _)| *other == name);
+        other.map_or_else(|| Self::Parameter(name.to_owned()), |(direction, ..)| direction.clone())
+    }
+
+    /// Its name.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Parameter(name) => name,
+            other => NAMED_DIRECTIONS
+                .iter()
+                .find(|(direction, ..)| direction == other)
+                .map_or("", |(_, name, _)| name),
+        }
+    }
+
+    /// Names of the directions that are no parameters.
+    pub fn other_names() -> impl Iterator<Item = &'static str> {
+        NAMED_DIRECTIONS.iter().map(|(_, name, _)| *name)
+    }
+}
+
+// How the equilibrium of steady slip moves with the parameters.
+
+/// Derivatives of both angles of steady slip: `J d q + dR = 0` for the moments `R(q, p)`; `None` where the
+/// equilibrium turns back.
+///
+/// `d_speed` are the derivatives of the head's velocity, m/s.
+pub(super) fn steady_slip_tangent(
+    system: &DrivenBlade,
+    seed: &BlockSeed,
+    lean: ShoulderContact,
+    pose: &Pose,
+    speed: f64,
+    d_speed: LaneVector,
+) -> Option<[LaneVector; 2]> {
+    let linkage = &system.linkage;
+    let angles = Vector2::new(pose.theta, pose.phi);
+    let mu =
+        |linkage: &Linkage, speed: f64| speed.signum() * linkage.friction.dynamic_coefficient(speed.abs());
+    let column = |direction: Vector2<f64>| {
+        let at = |x: f64| {
+            Some(residual_moments(linkage, mu(linkage, speed), &(angles + x * direction), lean).into())
+        };
+        central_difference(DIFFERENCE_STEP, at).map(|column: [f64; 2]| Vector2::from(column))
+    };
+    let jacobian = Matrix2::from_columns(&[column(Vector2::x())?, column(Vector2::y())?]).lu();
+    let mut moved = [LaneVector::ZERO; 2];
+    for lane in 0..LANES {
+        let at = |x: f64| {
+            let linkage =
+                seed.linkage.as_ref().map_or(*linkage, |own| own.displace_linkage(linkage, lane, x));
+            Some(residual_moments(&linkage, mu(&linkage, speed + x * d_speed[lane]), &angles, lean).into())
+        };
+        let step = DIFFERENCE_STEP / seed.relative[lane].max((d_speed[lane] / speed).abs());
+        if step.is_finite() {
+            let by_direction: [f64; 2] = central_difference(step, at)?;
+            let solution = jacobian.solve(&-Vector2::from(by_direction))?;
+            (moved[0][lane], moved[1][lane]) = (solution[0], solution[1]);
+        }
+    }
+    Some(moved)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::blade::tangent::LinkageConstant;
+    use crate::model::tangent::LinkageConstant;
 
     /// A difference quotient leaves rounding in constants that stay, and each would cost as much as one that
     /// moves.

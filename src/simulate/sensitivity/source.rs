@@ -1,7 +1,7 @@
 //! What the directions change: constants of the linkage and the head's motion.
 
-use super::span::SeriesReference;
-use crate::blade::tangent::{
+use super::stretch::SeriesReference;
+use crate::model::tangent::{
     ForcingTerms, HeadMotionChange, LaneVector, LinkAttitudes, LinkageConstant, MotionSamples,
 };
 use crate::simulate::drive::Drive;

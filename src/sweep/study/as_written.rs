@@ -1,10 +1,10 @@
 //! sweep.toml as people write it: types and keys only, nothing checked against anything else.
 
 use crate::feature::{define_entry, with_reading_keys};
+use crate::simulate::twin::Camera;
 use crate::sweep::grid::AxisSpacing;
-use crate::sweep::sample::SamplePlan;
+use crate::sweep::grid::SamplePlan;
 use crate::toml_file::NumberPair;
-use crate::twin::Camera;
 use schemars::JsonSchema;
 use serde::Deserialize;
 

@@ -3,10 +3,11 @@
 use super::{Ended, JOB, Ringing, attempt, line_ends, resumed, whole};
 use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicUsize, Ordering};
-use wiperlab::fit::journal::FeatureCheckpoint;
+use wiperlab::checkpoint;
+use wiperlab::checkpoint::{CheckpointRecord, CheckpointSink, Shard, format_header_line};
+use wiperlab::fit::feature_checkpoint::FeatureCheckpoint;
 use wiperlab::fit::ledger::FitProgress;
 use wiperlab::fit::{FitContext, FitError, fit_features, job::Job};
-use wiperlab::journal::{self, CheckpointRecord, CheckpointSink, Shard, format_header_line};
 use wiperlab::simulate::scene::Scene;
 use wiperlab::sweep::{self, PointCollection, PointOutcome, Study, SweepError, journal as points};
 
@@ -53,7 +54,7 @@ fn a_fit_whose_journal_fails_at_any_write_ends_with_a_reason_and_goes_on() {
         }
         let expected = FitError::JournalWrite { problem: "input/output error".to_owned() };
         assert_eq!(ended, Err(expected), "write {failures}");
-        let kept: Option<FeatureCheckpoint> = journal::read_checkpoint("j", &disk.text).unwrap();
+        let kept: Option<FeatureCheckpoint> = checkpoint::read_checkpoint("j", &disk.text).unwrap();
         let kept = kept.map_or(0, |journal| journal.records.len());
         // the gate holds its lines back until it has passed the job, and reports them before
         assert!(
@@ -90,7 +91,7 @@ fn run_study(text: &str, sink: &mut Failing) -> (Result<Vec<PointOutcome>, Sweep
         PointCollection::new(points::study_header(&study, "f"), tempfile::tempfile().unwrap());
     let mut collect = |name: &str, text: &str| collected.add_journal(name, text.as_bytes()).unwrap();
     collect("before", text);
-    let known: Option<points::SweepJournal> = journal::read_checkpoint("j", text).unwrap();
+    let known: Option<points::SweepJournal> = checkpoint::read_checkpoint("j", text).unwrap();
     let known: Vec<usize> = known.iter().flat_map(|known| &known.records).map(|point| point.index).collect();
     let reported = AtomicUsize::new(0);
     let done = || {
@@ -122,7 +123,7 @@ fn a_study_whose_journal_fails_at_any_write_ends_with_a_reason_and_goes_on() {
         }
         assert_eq!(ended, Err(SweepError::JournalWrite { problem: "input/output error".to_owned() }));
         let text = header.clone() + &disk.text;
-        let kept: points::SweepJournal = journal::read_checkpoint("j", &text).unwrap().unwrap();
+        let kept: points::SweepJournal = checkpoint::read_checkpoint("j", &text).unwrap().unwrap();
         assert!(kept.records.len() >= reported);
         assert_eq!(run_study(&text, &mut Failing::after(usize::MAX)).0.unwrap(), expected);
         failures += 1;
@@ -149,7 +150,7 @@ fn left_by_a_power_failure(text: &str) -> Vec<Vec<u8>> {
 
 /// What is read of it is the first part of what was written.
 fn holds_nothing_else<R: CheckpointRecord>(left: &[u8], written: &[R]) {
-    let Some(journal) = journal::read_checkpoint::<R>("j", left).unwrap() else { return };
+    let Some(journal) = checkpoint::read_checkpoint::<R>("j", left).unwrap() else { return };
     assert_eq!(journal.records, written[..journal.records.len()]);
     let complete = left.iter().filter(|byte| **byte == b'\n').count();
     assert!(journal.records.len() + 1 >= complete, "a complete line was dropped");
@@ -180,7 +181,7 @@ fn what_a_power_failure_leaves_of_a_study_is_read_as_far_as_it_is_whole_and_goes
     let mut disk = Failing::after(usize::MAX);
     let expected = run_study("", &mut disk).0.unwrap();
     let text = format_header_line(&points::study_header(&study().0, "f")) + &disk.text;
-    let written: points::SweepJournal = journal::read_checkpoint("j", &text).unwrap().unwrap();
+    let written: points::SweepJournal = checkpoint::read_checkpoint("j", &text).unwrap().unwrap();
     for (at, left) in left_by_a_power_failure(&text).iter().enumerate() {
         holds_nothing_else(left, &written.records);
         if at % 211 == 0 {

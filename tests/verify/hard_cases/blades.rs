@@ -3,7 +3,7 @@
 
 use super::scenes::{committed, upright_light_blade};
 use super::{MORE, cases, ran};
-use wiperlab::blade::Pose;
+use wiperlab::model::Pose;
 use wiperlab::simulate::scene::{Scene, StartKind};
 use wiperlab::simulate::{IntegrationMethod, RunStatus, TransitionCause};
 

@@ -4,11 +4,11 @@
 use super::scenes::upright_light_blade;
 use super::{ENERGY, ERRORS, Ran, cases, ran};
 use std::f64::consts::TAU;
-use wiperlab::blade::flight::FlightState;
-use wiperlab::blade::friction::FrictionLaw;
-use wiperlab::blade::modes::time_scales_rad_per_s;
-use wiperlab::blade::shoulder::ShoulderContact;
-use wiperlab::blade::{LinkDirections, Linkage, Pose, Spring};
+use wiperlab::model::flight::FlightState;
+use wiperlab::model::friction::FrictionLaw;
+use wiperlab::model::modes::time_scales_rad_per_s;
+use wiperlab::model::shoulder::ShoulderContact;
+use wiperlab::model::{LinkDirections, Linkage, Pose, Spring};
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::scene::{ContactLossRule, Drive, JamRule, Scene, StartKind};
 use wiperlab::simulate::{IntegrationMethod, RunStatus, TransitionCause};

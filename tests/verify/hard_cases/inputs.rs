@@ -3,8 +3,8 @@
 
 use super::METHODS;
 use super::scenes::upright_light_blade;
-use wiperlab::blade::Pose;
-use wiperlab::blade::parameters::PARAMETERS;
+use wiperlab::model::Pose;
+use wiperlab::model::parameters::PARAMETERS;
 use wiperlab::simulate::scene::{ContactLossRule, JamRule, Scene, StartKind};
 use wiperlab::simulate::{Observer, RunStatus, SolutionSegment, SolverOptions, run_scene_with};
 

@@ -4,7 +4,7 @@ use super::contact::lip_alone;
 use super::scenes::{committed, upright_light_blade};
 use super::{DRIFT_M, ERRORS, METHODS};
 use rayon::prelude::*;
-use wiperlab::blade::Pose;
+use wiperlab::model::Pose;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::{SampleObserver, Transitions, push_event_row, push_state_row};
 use wiperlab::simulate::scene::{Drive, Scene, StartKind};

@@ -3,7 +3,7 @@
 
 use super::scenes::upright_light_blade;
 use super::{METHODS, MORE, Ran, cases, ran};
-use wiperlab::blade::shoulder::Shoulder;
+use wiperlab::model::shoulder::Shoulder;
 use wiperlab::simulate::mode::TipMode;
 use wiperlab::simulate::outputs::SampleObserver;
 use wiperlab::simulate::scene::ContactLossRule;

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::feature::LengthCalibration;
-use crate::fit::calibration::TargetCalibration;
+use crate::fit::camera_calibration::TargetCalibration;
 
 /// What a job with this in its recording says.
 fn with(camera: &str) -> Job {

@@ -1,7 +1,7 @@
 //! Refusals of conditions, tables and kinds.
 
 use super::*;
-use crate::journal::fingerprint;
+use crate::checkpoint::fingerprint;
 
 #[test]
 fn recordings_and_conditions_are_checked() {

@@ -1,7 +1,7 @@
 //! The flat table: one row a frame, without its number; columns `NAME_cam1_X`, `NAME_cam1_Y`, ...
 
+use super::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
 use crate::import::error::ImportError;
-use crate::import::formats::dltdv::pixels::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
 use crate::import::reader::{DelimitedTable, Document, Fact, PointCells, TableLayout, TextRow, TrackFile};
 use crate::recording::files::YAxis;
 

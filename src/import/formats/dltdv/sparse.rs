@@ -1,8 +1,8 @@
 //! The sparse table of DLTdv 8: rows of frame, column and value. Names of the points stand in a file of their
 //! own.
 
+use super::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
 use crate::import::error::{CellProblem, ImportError};
-use crate::import::formats::dltdv::pixels::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
 use crate::import::reader::{Clock, DelimitedTable, Document, Fact, RowView, TextRow, Track, TrackFile};
 use crate::recording::files::YAxis;
 use std::collections::BTreeMap;

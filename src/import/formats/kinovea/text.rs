@@ -1,7 +1,7 @@
 //! Kinovea's text export, made for gnuplot: a block of rows a track, each with its own times.
 
+use super::{PREFERENCES_NOTE, kinovea_facts};
 use crate::import::error::{CellProblem, ImportError, TextLocation};
-use crate::import::formats::kinovea::preferences::{PREFERENCES_NOTE, kinovea_facts};
 use crate::import::reader::table::column_of_word;
 use crate::import::reader::{
     CellNumber, Clock, Document, InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TimeUnit,

@@ -1,7 +1,7 @@
 //! A whole project: spots, the edges that link them, and the tracks that passed the filters.
 
+use super::{EXPORT_ADVICE, Spot, TrackMateFile, Trajectory};
 use crate::import::error::ImportError;
-use crate::import::formats::trackmate::tracks::{EXPORT_ADVICE, Spot, TrackMateFile, Trajectory};
 use crate::import::formats::trackmate::xml::{XmlElement, XmlReader, XmlTag};
 use crate::import::reader::Document;
 use std::collections::{HashMap, HashSet};

@@ -1,7 +1,7 @@
 //! The table of spots: one to four header rows, rows in any order, nothing quoted.
 
+use super::{EXPORT_ADVICE, Spot, TrackMateFile, Trajectory};
 use crate::import::error::ImportError;
-use crate::import::formats::trackmate::tracks::{EXPORT_ADVICE, Spot, TrackMateFile, Trajectory};
 use crate::import::reader::{CellNumber, DelimitedTable, Document, RowView, TextRow};
 use std::collections::HashMap;
 

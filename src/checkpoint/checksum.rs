@@ -1,0 +1,142 @@
+//! The checksum at the end of a line.
+//!
+//! A line is a JSON object of which `sha256` is the last key: the first digits of the SHA-256 of every byte
+//! of the line before that key's comma. Whoever edits a line by hand sees that it is guarded, and whoever
+//! wants to check one needs no more than `sha256sum`.
+
+use serde::Serialize;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+const CHECKSUM_KEY: &str = ",\"sha256\":\"";
+const LINE_END: &str = "\"}";
+/// Hexadecimal digits of the checksum: 64 bits, so that an accident is missed once in 2e19.
+const CHECKSUM_DIGITS: usize = 16;
+
+/// A JSON object with its checksum, as it stands in a line; for whoever writes journals by another program.
+#[must_use]
+pub fn append_checksum(object: &str) -> String {
+    let content = object.strip_suffix('}').unwrap_or(object);
+    format!("{content}{CHECKSUM_KEY}{}{LINE_END}", hex_checksum(content.as_bytes()))
+}
+
+/// What the end of a line says of the rest.
+#[derive(Debug, PartialEq, Eq)]
+pub(super) enum LineChecksum {
+    /// The checksum holds; the object without it.
+    Valid(Vec<u8>),
+    /// The checksum does not hold: what stands there, and what the line has.
+    Broken {
+        found: String,
+        computed: String,
+    },
+    Absent,
+}
+
+impl LineChecksum {
+    pub(super) fn check(line: &[u8]) -> Self {
+        let Some((content, found)) = split_checksum(line) else { return Self::Absent };
+        let computed = hex_checksum(content);
+        match String::from_utf8_lossy(found).into_owned() {
+            found if found == computed => Self::Valid([content, b"}"].concat()),
+            found => Self::Broken { found, computed },
+        }
+    }
+}
+
+/// The bytes before the checksum, and the checksum.
+fn split_checksum(line: &[u8]) -> Option<(&[u8], &[u8])> {
+    let line = line.strip_suffix(LINE_END.as_bytes())?;
+    let (rest, digits) = line.split_at_checked(line.len().checked_sub(CHECKSUM_DIGITS)?)?;
+    Some((rest.strip_suffix(CHECKSUM_KEY.as_bytes())?, digits))
+}
+
+fn hex_checksum(content: &[u8]) -> String {
+    Sha256::digest(content).iter().take(CHECKSUM_DIGITS / 2).map(|byte| format!("{byte:02x}")).collect()
+}
+
+// What tells two problems apart.
+
+/// SHA-256 over the canonical JSON of a problem, in hexadecimal: keys sorted, numbers as the shortest
+/// decimals that give the same bits back. Equal values have equal fingerprints, however their files are
+/// written.
+#[must_use]
+pub fn fingerprint(problem: &impl Serialize) -> String {
+    // a problem holds finite numbers and keys that are strings: nothing that cannot be written
+    let value = serde_json::to_value(problem).unwrap_or_default();
+    let mut text = String::new();
+    write_canonical(&value, &mut text);
+    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+fn write_canonical(value: &Value, text: &mut String) {
+    match value {
+        Value::Object(map) => {
+            let mut entries: Vec<_> = map.iter().collect();
+            entries.sort_by_key(|(key, _)| *key);
+            text.push('{');
+            for (key, value) in entries {
+                *text += &format!("{}:", Value::from(key.as_str()));
+                write_canonical(value, text);
+                text.push(',');
+            }
+            text.push('}');
+        }
+        Value::Array(values) => {
+            text.push('[');
+            for value in values {
+                write_canonical(value, text);
+                text.push(',');
+            }
+            text.push(']');
+        }
+        plain => *text += &plain.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn every_changed_byte_of_a_line_is_found() {
+        let line = append_checksum("{\"index\":3,\"values\":[\"0.25\"]}");
+        // printf '%s' '{"index":3,"values":["0.25"]' | sha256sum
+        assert_eq!(line, "{\"index\":3,\"values\":[\"0.25\"],\"sha256\":\"3e7e4b4d0d5fce91\"}");
+        assert_eq!(
+            LineChecksum::check(line.as_bytes()),
+            LineChecksum::Valid(b"{\"index\":3,\"values\":[\"0.25\"]}".to_vec())
+        );
+        for at in 0..line.len() {
+            for bit in 0..8 {
+                let mut changed = line.clone().into_bytes();
+                changed[at] ^= 1 << bit;
+                assert!(
+                    !matches!(LineChecksum::check(&changed), LineChecksum::Valid(_)),
+                    "byte {at}, bit {bit}"
+                );
+            }
+        }
+        for cut in 0..line.len() {
+            assert_eq!(LineChecksum::check(&line.as_bytes()[..cut]), LineChecksum::Absent, "cut at {cut}");
+        }
+    }
+
+    #[test]
+    fn the_order_of_keys_does_not_matter_and_every_bit_of_a_number_does() {
+        let of = |text: &str| fingerprint(&serde_json::from_str::<Value>(text).unwrap());
+        assert_eq!(of("{\"a\":1.5,\"b\":[2]}"), of("{ \"b\": [2], \"a\": 1.50 }"));
+        assert_eq!(of("{}").len(), 64);
+        let next = f64::from_bits(0.3_f64.to_bits() + 1);
+        let base = json!({ "a": 0.3, "b": ["c", "d"] });
+        let others = [
+            json!({ "a": next, "b": ["c", "d"] }),
+            json!({ "a": 0.3, "b": ["cd"] }),
+            json!({ "a": 0.3, "b": ["d", "c"] }),
+            json!({ "a": 0.3, "b": "[\"c\",\"d\",]" }),
+            json!({ "c": 0.3, "b": ["c", "d"] }),
+        ];
+        assert!(others.iter().all(|other| fingerprint(other) != fingerprint(&base)));
+    }
+}

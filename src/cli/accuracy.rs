@@ -1,0 +1,240 @@
+//! `wiperlab accuracy`.
+
+use super::args::GlobalArgs;
+use super::failure::describe_early_end;
+use super::failure::{CommandOutcome, Failure};
+use super::files;
+use super::files::{OutputCommand, OutputFolder, Overwrite, WritePolicy};
+use super::load::read_scene;
+use super::progress;
+use crate::figures::work_precision::{WorkPrecision, WorkPrecisionRun, draw_figure};
+use crate::simulate::accuracy::{
+    AccuracyRow, HIGH_COMPONENT, LOW_COMPONENT, REFERENCE_TOLERANCE, ReferenceRun, TOLERANCES, list_settings,
+    write_accuracy_csv, write_work_precision_csv,
+};
+use crate::simulate::scene::Scene;
+use crate::simulate::{IntegrationMethod, RunStatus};
+use crate::text::format_digits;
+use clap::Args;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+#[derive(Debug, Args)]
+pub struct AccuracyArgs {
+    /// Scene to study (scene.toml)
+    pub scene: PathBuf,
+    /// Folder for work-precision.csv, accuracy.csv and work-precision.svg
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+/// The tables of a study.
+const WORK_PRECISION: &str = "work-precision.csv";
+const ACCURACY: &str = "accuracy.csv";
+/// Everything that a study writes.
+const OUTPUTS: [&str; 5] = [
+    WORK_PRECISION,
+    ACCURACY,
+    "work-precision.svg",
+    "paper/work-precision-85mm.svg",
+    "paper/work-precision-170mm.svg",
+];
+/// Rounds in which every setting is timed once: what else the machine does then falls on all of them.
+const ROUNDS: u32 = 15;
+/// Rounds in which a setting takes part however long it takes, and what it may have taken in all to take part
+/// in more.
+const MIN_TIMING: (u32, Duration) = (3, Duration::from_millis(250));
+
+impl AccuracyArgs {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let scene = read_scene(&self.scene)?;
+        let writer =
+            WritePolicy::new(OutputCommand::Accuracy, self.overwrite).with_csv_dialect(global.csv_dialect);
+        OutputFolder::check(&self.out, &writer, &OUTPUTS)?;
+        let settings = list_settings(&scene);
+        let steps = settings.len() as u64 + u64::from(ROUNDS);
+        let bar = progress::start_bar(steps, "accuracy", "settings and rounds", global.quiet);
+        let reference = ReferenceRun::from_scene(&scene);
+        let measured =
+            settings.into_iter().map(|setting| reference.measure_setting(setting)).inspect(|_| bar.inc(1));
+        let mut rows: Vec<AccuracyRow> = measured.collect();
+        time_settings(&reference, &mut rows, || bar.inc(1));
+        bar.finish_and_clear();
+        let mut outputs = vec![
+            (WORK_PRECISION.to_owned(), write_work_precision_csv(&rows).into_bytes()),
+            (ACCURACY.to_owned(), write_accuracy_csv(&reference, &rows).into_bytes()),
+        ];
+        outputs.extend(files::figure_files(
+            "work-precision",
+            &draw_figure(&work_precision_diagram(&scene, &reference, &rows)),
+        ));
+        files::write_outputs(&self.out, &writer, &outputs)?;
+        if !global.quiet {
+            print_study(&scene, &reference, &rows);
+            print_line!("written to {}", self.out.display());
+        }
+        Ok(if reference.run_result().status == RunStatus::Completed {
+            CommandOutcome::Done
+        } else {
+            CommandOutcome::StoppedEarly
+        })
+    }
+}
+
+/// The least time of every setting over the rounds.
+fn time_settings(reference: &ReferenceRun<'_>, rows: &mut [AccuracyRow], after_round: impl Fn()) {
+    let (least_rounds, long_enough) = MIN_TIMING;
+    let mut taken = vec![Duration::ZERO; rows.len()];
+    for round in 0..ROUNDS {
+        for (row, taken) in
+            rows.iter_mut().zip(&mut taken).filter(|(_, taken)| round < least_rounds || **taken < long_enough)
+        {
+            let clock = Instant::now();
+            std::hint::black_box(reference.run_untracked(&row.setting));
+            let elapsed = clock.elapsed();
+            *taken += elapsed;
+            row.wall_s = row.wall_s.min(elapsed.as_secs_f64());
+        }
+        after_round();
+    }
+}
+
+fn work_precision_diagram(
+    scene: &Scene,
+    reference: &ReferenceRun<'_>,
+    rows: &[AccuracyRow],
+) -> WorkPrecision {
+    let transitions = reference.run_result().transitions;
+    let length_s = (1e4 * (reference.run_result().stopped_at_s - scene.start_s)).round() / 1e4;
+    // without transitions, or with references that disagree on them, the error is that of the deflection
+    let timed = transitions > 0 && reference.lists_agree;
+    let error = |row: &AccuracyRow| if timed { row.lists.worst_s } else { Some(row.state_worst) };
+    let point = |row: &AccuracyRow| {
+        let wrong_transitions = if timed { row.lists.missed + row.lists.invented } else { 0 };
+        WorkPrecisionRun {
+            method: row.setting.name().to_owned(),
+            wall_s: row.wall_s,
+            error: error(row),
+            wrong_transitions,
+        }
+    };
+    WorkPrecision {
+        title: diagram_title(rows, error, if timed { " s" } else { "" }),
+        subtitle: format!(
+            "work-precision of {}: {transitions} transitions in {length_s} s of motion",
+            scene.title()
+        ),
+        error_label: if timed {
+            "worst error of a transition time, s"
+        } else {
+            "worst error of the deflection over its range"
+        }
+        .to_owned(),
+        points: rows.iter().map(point).collect(),
+        floor: if timed { reference.apart_s } else { Some(reference.state_apart) }
+            .filter(|floor| *floor > 0.0),
+    }
+}
+
+/// The claim of the diagram: the setting with the least error, and its time.
+fn diagram_title(rows: &[AccuracyRow], error: impl Fn(&AccuracyRow) -> Option<f64>, unit: &str) -> String {
+    let least = rows.iter().filter_map(|row| Some((error(row)?, row))).min_by(|a, b| a.0.total_cmp(&b.0));
+    match least {
+        Some((error, row)) => format!(
+            "Least error {}{unit}: {} in {} ms",
+            format_digits(error, 2),
+            row.setting.name(),
+            format_digits(1e3 * row.wall_s, 2)
+        ),
+        None => "No setting has an error to show".to_owned(),
+    }
+}
+
+fn print_study(scene: &Scene, reference: &ReferenceRun<'_>, rows: &[AccuracyRow]) {
+    let run = reference.run_result();
+    let method = IntegrationMethod::default().name();
+    print_line!(
+        "{}: {} transitions from {} s to {} s",
+        scene.title(),
+        run.transitions,
+        scene.start_s,
+        run.stopped_at_s
+    );
+    if let Some(how) = describe_early_end(run) {
+        print_line!("the reference ends early: {how}");
+    }
+    print_reference_error(reference, method);
+    let [low, high] = [LOW_COMPONENT, HIGH_COMPONENT]
+        .map(|i| reference.components.hz[i].map_or("none".to_owned(), |hz| format!("{hz:.3} Hz")));
+    print_line!("components of the reference: low {low}, high {high}");
+    print_line!(
+        "{:<17} {:>9} {:>11} {:>13} {:>6} {:>8} {:>12} {:>11} {:>9} {:>9} {:>10} {:>11}",
+        "method",
+        "tolerance",
+        "transitions",
+        "worst time, s",
+        "missed",
+        "invented",
+        "deflection",
+        "rms",
+        "low, Hz",
+        "high, Hz",
+        "wall, ms",
+        "rhs"
+    );
+    rows.iter().for_each(|row| print_row(reference, row));
+    print_line!(
+        "times are the least of several runs; deflection: worst and rms error over its range; \"<\": below what the reference is sure of"
+    );
+}
+
+/// What the reference is worth.
+fn print_reference_error(reference: &ReferenceRun<'_>, method: &str) {
+    let finest = TOLERANCES.iter().fold(f64::INFINITY, |a: f64, b| a.min(*b));
+    let other = reference.checked_by.name();
+    if !reference.lists_agree {
+        print_line!(
+            "reference: {method} and {other} at {REFERENCE_TOLERANCE:e} have different transitions: errors of transition times are not to be trusted"
+        );
+        return;
+    }
+    let apart = reference
+        .apart_s
+        .map_or("without transitions".to_owned(), |s| format!("{s:.1e} s apart in the transition times"));
+    print_line!(
+        "reference: {method} at {REFERENCE_TOLERANCE:e}; {other} at the same is {apart}, {:.1e} of its range in the deflection",
+        reference.state_apart
+    );
+    if let Some(apart) = reference.apart_s.filter(|apart| *apart > finest) {
+        print_line!(
+            "that is more than the finest tolerance, {finest:e}: errors below {apart:.1e} s do not count"
+        );
+    }
+}
+
+fn print_row(reference: &ReferenceRun<'_>, row: &AccuracyRow) {
+    let small = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.1e}"));
+    let error = row
+        .lists
+        .worst_s
+        .map_or("-".to_owned(), |s| format!("{}{s:.1e}", if reference.resolves_error(s) { "" } else { "<" }));
+    let sets = row.setting.relative_tolerance.map_or_else(
+        || row.setting.method.step_s().map_or(String::new(), |h| format!("{h:e} s")),
+        |r| format!("{r:e}"),
+    );
+    print_line!(
+        "{:<17} {sets:>9} {:>11} {error:>13} {:>6} {:>8} {:>12} {:>11} {:>9} {:>9} {:>10.3} {:>11}",
+        row.setting.name(),
+        row.run.transitions,
+        row.lists.missed,
+        row.lists.invented,
+        small(Some(row.state_worst)),
+        small(Some(row.state_rms)),
+        small(row.components_hz[LOW_COMPONENT]),
+        small(row.components_hz[HIGH_COMPONENT]),
+        1e3 * row.wall_s,
+        row.run.work.rhs_evaluations
+    );
+}

@@ -1,0 +1,254 @@
+//! The command line as typed; each command validates its own part in its own file.
+
+use super::failure::{CommandOutcome, Failure};
+use super::files::{CsvDialect, FileSize};
+use super::{
+    accuracy, blade, collect, demo, fit, help, import, init, inspect, modes, report, simulate, spectrum,
+    submit, sweep, twin,
+};
+use clap::{Args, CommandFactory, Parser, Subcommand};
+use std::str::FromStr;
+use std::time::Duration;
+
+/// How the program was built.
+const LONG_VERSION: &str = concat!(
+    env!("CARGO_PKG_VERSION"),
+    "\nbuilt for ",
+    env!("WIPERLAB_BUILT_FOR"),
+    " at optimisation level ",
+    env!("WIPERLAB_OPT_LEVEL"),
+    "\nwith ",
+    env!("WIPERLAB_BUILT_WITH"),
+    "\ncommit ",
+    env!("WIPERLAB_BUILT_FROM"),
+);
+
+/// Holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
+#[derive(Debug, Parser)]
+#[command(
+    version,
+    long_version = LONG_VERSION,
+    about,
+    long_about = None,
+    propagate_version = true,
+    disable_help_subcommand = true,
+    after_help = help::list_help_pages()
+)]
+pub struct CommandLine {
+    #[command(flatten)]
+    pub global: GlobalArgs,
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Bundled recording -> import -> spectrum -> fit -> report
+    Demo(demo::DemoArgs),
+    /// Read a tracking export into data/NAME
+    Import(import::ImportArgs),
+    /// Write a first scene and a first job for a recording, with comments
+    Init(init::InitArgs),
+    /// Say what a recording holds and what it can show: rates, gaps, noise, doubts
+    Inspect(inspect::InspectArgs),
+    /// Components of a recording's spectrum
+    Spectrum(spectrum::SpectrumArgs),
+    /// Run the model of a scene
+    Simulate(simulate::SimulateArgs),
+    /// A scene's [blade] table from the section of a blade, or what ruler and scale show of a scene
+    ///
+    /// SECTION.toml has the length of the piece, density, modulus and loss factor of the rubber, heights and
+    /// thicknesses of neck and lip, and mass, stiffness and force of the head per metre. Prints the table
+    /// with the equation and the uncertainty of each number: an estimate for the start of a fit. With
+    /// --check, prints the natural frequencies, deflections and weights of a scene's blade.
+    Blade(blade::BladeArgs),
+    /// Natural frequencies and modes of a scene's blade
+    Modes(modes::ModesArgs),
+    /// Speed against error of every method on a scene
+    Accuracy(accuracy::AccuracyArgs),
+    /// A synthetic recording: a scene seen by a camera
+    Twin(twin::TwinArgs),
+    /// A parameter study: quantities over one or two parameters of a scene
+    Sweep(sweep::SweepArgs),
+    /// Divide a parameter study, or a list of fits, among the machines of a cluster
+    ///
+    /// Makes an array of tasks for the scheduler, each of which does a shard, and a job after them that puts
+    /// the shards together (`wiperlab collect`). All files are checked before anything is submitted. What is
+    /// missing in the end is named by that job, in DIR/shards/logs; submit those --tasks again.
+    Submit(submit::SubmitArgs),
+    /// Put the shards of a parameter study together, or see which fits of a list are done
+    ///
+    /// Writes the files that `wiperlab sweep` writes on one machine, byte for byte. Points that several
+    /// shards did count once. Of a list of fits, says which have a result. Exit code 3: something is missing,
+    /// and the tasks that have to be submitted again are named.
+    Collect(collect::CollectArgs),
+    /// Fit a scene's parameters to recordings or published components
+    ///
+    /// Every evaluation goes into journal.jsonl next to the job as it is made, and the result into
+    /// result.json at the end. A fit that was killed, or whose budgets in [search] were raised since, goes on
+    /// with
+    /// --resume and ends with the result that it would have had in one run. A fit without anything to learn
+    /// is refused before the search. Exit code 3: the evaluations allowed were used up before the search had
+    /// converged.
+    Fit(fit::FitArgs),
+    /// Figures and page of a fit
+    Report(report::ReportArgs),
+    /// What a shell completes, to standard output
+    Completions(help::CompletionsArgs),
+    /// The help of every command as manual pages
+    Man(help::ManArgs),
+    /// The help of a command, or a page about files, windows and features
+    Help(help::HelpArgs),
+}
+
+impl Command {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        match self {
+            Self::Demo(args) => args.run(global),
+            Self::Import(args) => args.run(global),
+            Self::Init(args) => args.run(global),
+            Self::Inspect(args) => args.run(global),
+            Self::Spectrum(args) => args.run(global),
+            Self::Simulate(args) => args.run(global),
+            Self::Blade(args) => args.run(global),
+            Self::Modes(args) => args.run(global),
+            Self::Accuracy(args) => args.run(global),
+            Self::Twin(args) => args.run(global),
+            Self::Sweep(args) => args.run(global),
+            Self::Submit(args) => args.run(global),
+            Self::Collect(args) => args.run(global),
+            Self::Fit(args) => args.run(global),
+            Self::Report(args) => args.run(global),
+            Self::Completions(args) => args.run(&mut CommandLine::command()),
+            Self::Man(args) => args.run(&mut CommandLine::command(), global),
+            Self::Help(args) => args.run(&mut CommandLine::command()),
+        }
+    }
+}
+
+// Options that count something.
+
+/// A whole number, 1 or more; [`clap`] names the option and what was found.
+pub fn parse_count(text: &str) -> Result<usize, String> {
+    match text.parse() {
+        Ok(count) if count > 0 => Ok(count),
+        _ => Err("expected a whole number, 1 or more".to_owned()),
+    }
+}
+
+// What every command takes.
+
+#[derive(Debug, Clone, Args)]
+pub struct GlobalArgs {
+    /// No progress and no summary; refusals are still shown
+    #[arg(long, global = true)]
+    pub quiet: bool,
+    /// Threads for parallel work, at most 1024 (default: every core); results do not depend on it
+    #[arg(long, global = true, value_name = "N", value_parser = parse_threads, allow_negative_numbers = true)]
+    pub threads: Option<usize>,
+    /// Largest file with data that is read, such as 500MB or 4GB; a recording takes up to four times as much
+    /// memory
+    #[arg(long, global = true, value_name = "SIZE", default_value_t = FileSize::DEFAULT)]
+    pub max_file_size: FileSize,
+    /// How tables are written, for a spreadsheet; trace.csv is always plain, as programs read it
+    #[arg(long, global = true, value_name = "DIALECT", value_enum, default_value_t)]
+    pub csv_dialect: CsvDialect,
+}
+
+/// Most threads: more than a machine has cores. Each takes megabytes, and a hundred thousand stop a machine.
+const MOST_THREADS: usize = 1024;
+
+fn parse_threads(text: &str) -> Result<usize, String> {
+    parse_count(text).ok().filter(|threads| *threads <= MOST_THREADS).ok_or_else(|| {
+        format!("expected a whole number from 1 to {MOST_THREADS}; leave it out for every core")
+    })
+}
+
+impl GlobalArgs {
+    /// Sets what holds for the whole program, before anything runs.
+    pub fn apply_settings(&self) -> Result<(), Failure> {
+        self.max_file_size.set_read_limit();
+        let Some(threads) = self.threads else { return Ok(()) };
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::internal)
+    }
+}
+
+// How long a command may take, as people and schedulers write it.
+
+/// A time such as `90s`, `45min`, `1h30min`, `02:00:00` or `1-12:00:00`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TimeLimit(pub Duration);
+
+/// Longest time that is taken, s: a year.
+const MAX_TIME_LIMIT_S: u64 = 366 * DAY_S;
+const DAY_S: u64 = 86_400;
+const TIME_LIMIT_UNITS: [(&str, u64); 5] = [("min", 60), ("d", DAY_S), ("h", 3600), ("m", 60), ("s", 1)];
+
+impl FromStr for TimeLimit {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let seconds = if text.contains(':') { parse_clock_time(text) } else { parse_unit_time(text) };
+        let allowed = seconds.filter(|seconds| (1..=MAX_TIME_LIMIT_S).contains(seconds));
+        allowed.map(|seconds| Self(Duration::from_secs(seconds))).ok_or_else(|| {
+            "expected a time such as 90s, 45min, 1h30min, 02:00:00 (hours, minutes, seconds) or 1-12:00:00 \
+             (and days)"
+                .to_owned()
+        })
+    }
+}
+
+/// `HH:MM:SS`, or `D-HH:MM:SS`.
+fn parse_clock_time(text: &str) -> Option<u64> {
+    let (days, time) = text.split_once('-').unwrap_or(("0", text));
+    let mut parts = time.split(':').map(parse_digits);
+    let (hours, minutes, seconds) = (parts.next()??, parts.next()??, parts.next()??);
+    let in_range = minutes < 60 && seconds < 60 && parts.next().is_none();
+    let total = parse_digits(days)?.checked_mul(DAY_S)?.checked_add(hours.checked_mul(3600)?)?;
+    in_range.then_some(total.checked_add(minutes * 60 + seconds)?)
+}
+
+/// Numbers, each with its unit.
+fn parse_unit_time(text: &str) -> Option<u64> {
+    let mut rest = text;
+    let mut total: u64 = 0;
+    while !rest.is_empty() {
+        let digits = rest.find(|c: char| !c.is_ascii_digit())?;
+        let (count, behind) = rest.split_at(digits);
+        let (unit, seconds) = TIME_LIMIT_UNITS.iter().find(|(unit, _)| behind.starts_with(unit))?;
+        total = total.checked_add(parse_digits(count)?.checked_mul(*seconds)?)?;
+        rest = behind.get(unit.len()..)?;
+    }
+    Some(total)
+}
+
+fn parse_digits(text: &str) -> Option<u64> {
+    text.bytes().all(|byte| byte.is_ascii_digit()).then(|| text.parse().ok())?
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_read_as_people_and_schedulers_write_them() {
+        let read = |text: &str| text.parse::<TimeLimit>().map(|limit| limit.0.as_secs());
+        for (text, seconds) in [
+            ("90s", 90),
+            ("45min", 2700),
+            ("45m", 2700),
+            ("2h", 7200),
+            ("1h30min", 5400),
+            ("1d12h", 129_600),
+            ("02:00:00", 7200),
+            ("00:00:30", 30),
+            ("1-12:00:00", 129_600),
+        ] {
+            assert_eq!(read(text), Ok(seconds), "{text}");
+        }
+        let huge = "99999999999999999999h";
+        for text in ["", "0s", "5", "1.5h", "h", "-1h", "1:30", "01:60:00", "1:2:3:4", "1 h", "400d", huge] {
+            assert!(read(text).unwrap_err().contains("such as 90s"), "{text}");
+        }
+    }
+}

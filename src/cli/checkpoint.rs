@@ -1,0 +1,273 @@
+//! A journal on disk: locked, shortened by nothing but a torn line, and kept when a new one is begun.
+//!
+//! Every append waits until the disk has the lines (`fdatasync`), and a new file also until the disk has its
+//! name. What was counted or reported survives a power failure.
+
+use super::failure::Failure;
+use super::files;
+use crate::checkpoint::{
+    CheckpointEnd, CheckpointError, CheckpointFile, CheckpointHeader, CheckpointKind, CheckpointReader,
+    CheckpointRecord, CheckpointSink, StoredRecord, detect_kind, has_whole_line,
+};
+use std::fs::{self, File, OpenOptions, TryLockError};
+use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
+use std::path::{Path, PathBuf};
+
+/// Name of a journal in the folder of its fit or study.
+pub const CHECKPOINT_FILE: &str = "journal.jsonl";
+
+/// Longest first line that is looked at, bytes.
+const MAX_HEADER_BYTES: u64 = 1 << 24;
+
+/// A journal on disk.
+pub struct CheckpointWriter {
+    path: PathBuf,
+    /// `None` before the first line of a new journal.
+    file: Option<File>,
+    /// What has to be done with what is there, before the first line is appended.
+    due: Option<PendingAction>,
+    kind: CheckpointKind,
+}
+
+/// A journal that is written, and what it holds if it is to be resumed.
+type OpenedCheckpoint<T> = Result<(CheckpointWriter, Option<T>), Failure>;
+
+/// What looks at the records of a journal, one by one.
+type RecordVisitor<'a, R> = dyn FnMut(StoredRecord<R>) -> Result<(), CheckpointError> + 'a;
+
+/// What is done with a journal that is there.
+#[derive(Clone, Copy)]
+enum PendingAction {
+    /// It is kept under another name: hours of work should not be lost because `--resume` was forgotten.
+    SetAside,
+    /// It is continued after this number of bytes, and a line end where the last line has none.
+    Continue { intact_bytes: usize, unended: bool },
+}
+
+impl CheckpointWriter {
+    /// The journal at `path`, or where it will be, and what it holds if it is to be resumed; nothing is
+    /// changed before the first line.
+    pub fn open<R: CheckpointRecord>(path: &Path, resume: bool) -> OpenedCheckpoint<CheckpointFile<R>> {
+        Self::open_with(path, resume, |file, stream| {
+            files::check_data_size(path, file)?;
+            let journal = stream.read_all().map_err(Failure::input)?;
+            let end = journal.end;
+            Ok((journal, end))
+        })
+    }
+
+    /// The same where what it holds may be larger than memory: `each` sees its records one by one, and the
+    /// header is given back.
+    pub fn open_each<R: CheckpointRecord>(
+        path: &Path,
+        resume: bool,
+        each: &mut RecordVisitor<R>,
+    ) -> OpenedCheckpoint<CheckpointHeader<R::Body>> {
+        Self::open_with(path, resume, |_, mut stream: CheckpointReader<R, _>| {
+            let header = stream.header().clone();
+            while let Some(found) = stream.next_record().map_err(Failure::input)? {
+                each(found).map_err(Failure::input)?;
+            }
+            Ok((header, stream.end()))
+        })
+    }
+
+    /// Locks the file, and lets `take` read it where it is to be resumed and has a header.
+    fn open_with<R: CheckpointRecord, T>(
+        path: &Path,
+        resume: bool,
+        take: impl FnOnce(&File, CheckpointReader<R, BufReader<&File>>) -> Result<(T, CheckpointEnd), Failure>,
+    ) -> OpenedCheckpoint<T> {
+        let name = path.display().to_string();
+        let mut opened = Self::open_locked(path, R::KIND)?;
+        let refused = |error: io::Error| Failure::Input(format!("{name}: cannot be read: {error}"));
+        let Some(file) = &opened.file else {
+            if resume {
+                opened.plan_resume(&name, R::KIND, true, None);
+            }
+            return Ok((opened, None));
+        };
+        if !resume {
+            let mut start = Vec::new();
+            BufReader::new(file.take(MAX_HEADER_BYTES)).read_until(b'\n', &mut start).map_err(refused)?;
+            check_same_kind(&name, &start, R::KIND)?;
+            return Ok((opened, None));
+        }
+        let is_empty = file.metadata().map_err(refused)?.len() == 0;
+        let stream = CheckpointReader::<R, _>::open(&name, BufReader::new(file)).map_err(Failure::input)?;
+        let Some(stream) = stream else {
+            opened.plan_resume(&name, R::KIND, is_empty, None);
+            return Ok((opened, None));
+        };
+        let (taken, end) = take(file, stream)?;
+        opened.plan_resume(&name, R::KIND, is_empty, Some(end));
+        Ok((opened, Some(taken)))
+    }
+
+    fn open_locked(path: &Path, kind: CheckpointKind) -> Result<Self, Failure> {
+        let file = lock_existing(path, kind)?;
+        Ok(Self { path: path.to_owned(), file, due: Some(PendingAction::SetAside), kind })
+    }
+
+    /// Notes how a journal goes on that ends like this; `None` where it has no complete header.
+    fn plan_resume(&mut self, name: &str, kind: CheckpointKind, is_empty: bool, end: Option<CheckpointEnd>) {
+        self.due = Some(match end {
+            None => {
+                let lack = if is_empty { "" } else { "no complete header, so " };
+                warn_line!("warning: {name}: {lack}nothing to resume; starting over");
+                let empty = PendingAction::Continue { intact_bytes: 0, unended: false };
+                if is_empty { empty } else { PendingAction::SetAside }
+            }
+            Some(CheckpointEnd { intact_bytes, torn, unended }) => {
+                if torn {
+                    let record = kind.record();
+                    warn_line!(
+                        "warning: {name}: the last line is incomplete and was dropped; its {record} is computed again"
+                    );
+                }
+                PendingAction::Continue { intact_bytes, unended }
+            }
+        });
+    }
+
+    /// Drops what is torn, also where nothing had to be appended.
+    pub fn finish(mut self) -> Result<(), Failure> {
+        self.apply_pending()
+            .map_err(|problem| Failure::Internal(format!("{}: {problem}", self.path.display())))
+    }
+
+    /// Does what is due.
+    fn apply_pending(&mut self) -> Result<(), String> {
+        let refused = |error: io::Error| error.to_string();
+        match (self.due.take(), &mut self.file) {
+            (Some(PendingAction::Continue { intact_bytes, unended }), Some(file)) => {
+                file.set_len(intact_bytes as u64).map_err(refused)?;
+                if unended { file.write_all(b"\n").map_err(refused) } else { Ok(()) }
+            }
+            (Some(PendingAction::SetAside), Some(_)) => {
+                self.file = None;
+                let kept = set_aside(&self.path).map_err(refused)?;
+                warn_line!("{}: the old journal is kept as {}", self.path.display(), kept.display());
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn append_lines(&mut self, lines: &str) -> Result<(), String> {
+        let refused = |error: io::Error| error.to_string();
+        self.apply_pending()?;
+        let file = match &mut self.file {
+            Some(file) => file,
+            none => none.insert(create_checkpoint(&self.path, self.kind)?),
+        };
+        file.write_all(lines.as_bytes()).and_then(|()| file.sync_data()).map_err(refused)
+    }
+}
+
+impl CheckpointSink for CheckpointWriter {
+    fn append(&mut self, lines: &str) -> Result<(), String> {
+        self.append_lines(lines).map_err(|problem| format!("{}: {problem}", self.path.display()))
+    }
+}
+
+/// A new journal, whose name the disk has.
+fn create_checkpoint(path: &Path, kind: CheckpointKind) -> Result<File, String> {
+    let refused = |error: io::Error| error.to_string();
+    let folder = path.parent().unwrap_or(Path::new(""));
+    fs::create_dir_all(folder).map_err(refused)?;
+    let file = OpenOptions::new().create(true).append(true).open(path).map_err(refused)?;
+    lock_file(&file, kind)?;
+    sync_folder(folder);
+    Ok(file)
+}
+
+/// Waits until the disk has the names in a folder, where the system can.
+fn sync_folder(folder: &Path) {
+    let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+    let _ = File::open(folder).and_then(|folder| folder.sync_all()); // (Windows opens no folder)
+}
+
+/// The file, if there is one.
+fn lock_existing(path: &Path, kind: CheckpointKind) -> Result<Option<File>, Failure> {
+    let refused = |problem: String| Failure::Input(format!("{}: {problem}", path.display()));
+    let file = match OpenOptions::new().read(true).append(true).open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
+        Err(error) => {
+            return Err(refused(format!(
+                "cannot be read and written: {error}; correct that, or move it away"
+            )));
+        }
+    };
+    if !file.metadata().is_ok_and(|found| found.is_file()) {
+        return Err(refused("found no regular file, expected a journal; move it away".to_owned()));
+    }
+    lock_file(&file, kind).map_err(refused)?;
+    Ok(Some(file))
+}
+
+/// Two programs that append to one file would tear each other's lines. File systems without locks are taken
+/// as they are.
+fn lock_file(file: &File, kind: CheckpointKind) -> Result<(), String> {
+    match file.try_lock() {
+        Err(TryLockError::WouldBlock) => Err(format!(
+            "another {kind} is writing this journal; wait until it has ended, or use a folder of its own"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// Only a journal of the same kind of input, or what is left of one, gives way to a new one: a job may turn
+/// from features to traces.
+fn check_same_kind(name: &str, bytes: &[u8], kind: CheckpointKind) -> Result<(), Failure> {
+    if !has_whole_line(bytes) || detect_kind(bytes).is_some_and(|found| found.input() == kind.input()) {
+        return Ok(());
+    }
+    Err(Failure::Input(format!(
+        "{name}: found a file that is no journal of a {kind}; choose another folder, or move it away"
+    )))
+}
+
+/// Gives a journal the next free name of its kind, `journal.previous-1.jsonl`: none is ever written over.
+fn set_aside(path: &Path) -> io::Result<PathBuf> {
+    let mut number = 1;
+    loop {
+        let to = numbered_path(path, number);
+        // (a new file: whoever comes at the same time finds the name taken)
+        match File::create_new(&to) {
+            Ok(_) => {
+                fs::rename(path, &to)?;
+                return Ok(to);
+            }
+            Err(error) if error.kind() == ErrorKind::AlreadyExists => number += 1,
+            Err(error) => return Err(error),
+        }
+    }
+}
+
+fn numbered_path(path: &Path, number: usize) -> PathBuf {
+    let extension = path.extension().map_or_else(String::new, |e| format!(".{}", e.to_string_lossy()));
+    path.with_extension(format!("previous-{number}{extension}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_old_journal_has_a_number_of_its_own() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(CHECKPOINT_FILE);
+        let set_aside = |content| {
+            fs::write(&path, content).unwrap();
+            set_aside(&path).unwrap()
+        };
+        ["a", "b", "c"].into_iter().for_each(|content| drop(set_aside(content)));
+        fs::remove_file(numbered_path(&path, 2)).unwrap();
+        assert_eq!(set_aside("d"), folder.path().join("journal.previous-2.jsonl"));
+        let read = |number| fs::read_to_string(numbered_path(&path, number)).unwrap();
+        assert_eq!([read(1), read(2), read(3)], ["a", "d", "c"]);
+        assert!(!path.exists());
+    }
+}

@@ -1,0 +1,151 @@
+//! `wiperlab demo`: the whole pipeline on the bundled synthetic recording.
+
+use super::args::GlobalArgs;
+use super::args::parse_count;
+use super::failure::{CommandOutcome, Failure};
+use super::files;
+use super::files::{OutputCommand, OutputFolder, Overwrite, WritePolicy};
+use super::fit::print_summary;
+use super::import::import_into;
+use super::load::LoadedJob;
+use super::progress::print_progress;
+use super::report;
+use super::spectrum::SpectrumArgs;
+use crate::fit::result::{FitResult, FitStatus};
+use crate::import::{CoordinateScale, ImportOptions, ImportSource};
+use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis};
+use crate::simulate::twin::SYNTHETIC_TRACK_NAMES;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+const NAME: &str = "actual-blade-twin";
+const EXPORT: &str = "synthetic-tracker-export.txt";
+const EXPORT_TEXT: &str = include_str!("../../data/actual-blade-twin/synthetic-tracker-export.txt");
+const TWIN: &str = include_str!("../../data/actual-blade-twin/twin.toml");
+const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
+const JOB: &str = include_str!("../../fits/actual-blade-twin/job.toml");
+
+/// Channel and window of the two spectra that the demo shows.
+const SPECTRA: [(&str, &str, &str); 2] =
+    [("low", "head-drop", "release+0.01..release+0.2"), ("high", "deflection", "release+0.01..release+0.1")];
+
+#[derive(Debug, Args)]
+pub struct DemoArgs {
+    /// Folder for everything that the demo makes
+    #[arg(long, default_value = "demo", value_name = "DIR")]
+    pub out: PathBuf,
+    /// Most iterates of the fit: fewer are quicker and settle less (default: as many as it takes)
+    #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
+    pub max_evaluations: Option<usize>,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+impl DemoArgs {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        self.check_outputs()?;
+        let quiet = GlobalArgs { quiet: true, ..global.clone() };
+        let data = self.out.join("data").join(NAME);
+        print_progress(global.quiet, &format!("1/4 import    {EXPORT} -> {}", data.display()));
+        self.write_bundled_files()?;
+        import_export(&data, self.overwrite)?;
+
+        print_progress(global.quiet, "2/4 spectrum  of the head's drop (low) and of the deflection (high)");
+        for (name, channel, window) in SPECTRA {
+            SpectrumArgs::new(&data, channel, window, &self.out.join("spectra").join(name), self.overwrite)
+                .run(&quiet)?;
+        }
+
+        let fit = self.out.join("fits").join(NAME);
+        print_progress(
+            global.quiet,
+            &format!("3/4 fit       {} (some ten seconds)", fit.join("job.toml").display()),
+        );
+        let problem = LoadedJob::load(&fit.join("job.toml"))?;
+        let solved = problem.solve(global, false, self.max_evaluations, self.overwrite)?;
+        if solved.result.status == FitStatus::Interrupted {
+            return Ok(CommandOutcome::StoppedEarly);
+        }
+
+        let page = self.out.join("reports").join(NAME);
+        print_progress(global.quiet, &format!("4/4 report    {}", page.join("index.html").display()));
+        let missed = report::write_report(
+            &fit,
+            &page,
+            &WritePolicy::new(OutputCommand::Report, self.overwrite).with_csv_dialect(global.csv_dialect),
+            &quiet,
+        )?;
+        if !global.quiet {
+            print_summary(&solved);
+            print_truth(&solved.result)?;
+            print_line!("open {}", page.join("index.html").display());
+        }
+        Ok(if missed || solved.result.status != FitStatus::Converged {
+            CommandOutcome::StoppedEarly
+        } else {
+            CommandOutcome::Done
+        })
+    }
+
+    /// Refuses before anything is written what one of the steps would refuse.
+    fn check_outputs(&self) -> Result<(), Failure> {
+        let steps: [(OutputCommand, &str, &[&str]); 4] = [
+            (OutputCommand::Import, "data", &[TRACE_FILE, DESCRIPTION_FILE, EXPORT]),
+            (OutputCommand::Fit, "fits", &[files::RESULT_FILE]),
+            (OutputCommand::Report, "reports", &["index.html", "report.json"]),
+            (OutputCommand::Demo, "fits", &["job.toml"]),
+        ];
+        steps.iter().try_for_each(|(maker, folder, names)| {
+            let writer = WritePolicy::new(*maker, self.overwrite);
+            OutputFolder::check(&self.out.join(folder).join(NAME), &writer, names).map(|_| ())
+        })
+    }
+
+    /// The bundled export, scene and job, laid out as a project has them.
+    fn write_bundled_files(&self) -> Result<(), Failure> {
+        let write = |folder: PathBuf, name: &str, text: &str| {
+            files::write_outputs(
+                &folder,
+                &WritePolicy::new(OutputCommand::Demo, self.overwrite),
+                &[(name, text.as_bytes().to_vec())],
+            )
+        };
+        write(self.out.join("data").join("scenes"), "actual-blade.toml", SCENE)?;
+        write(self.out.join("fits").join(NAME), "job.toml", JOB)
+    }
+}
+
+/// What `wiperlab import` does with the export, its scale and rate.
+fn import_export(folder: &Path, overwrite: Overwrite) -> Result<(), Failure> {
+    let [tip, head] = SYNTHETIC_TRACK_NAMES;
+    let options = ImportOptions {
+        name: NAME.to_owned(),
+        frame_rate_hz: Some(5000.0),
+        scale: Some(CoordinateScale::parse("20um/px").map_err(Failure::internal)?),
+        y_axis: Some(YAxis::Up),
+        exposure_s: Some(5e-5),
+        tip: Some(tip.to_owned()),
+        head: Some(head.to_owned()),
+        twin: Some(("twin.toml".to_owned(), TWIN.to_owned())),
+        ..ImportOptions::default()
+    };
+    import_into(
+        folder,
+        &[ImportSource::without_companions(EXPORT, EXPORT_TEXT.as_bytes().to_vec())],
+        &options,
+        overwrite,
+    )
+}
+
+/// The truth behind the synthetic recording, next to the estimates.
+fn print_truth(result: &FitResult) -> Result<(), Failure> {
+    let twin: toml::Table = TWIN.parse().map_err(Failure::internal)?;
+    let truth = twin.get("truth").and_then(toml::Value::as_table);
+    print_line!("{:<36} {:>12} {:>12}  in the interval", "parameter", "estimate", "truth");
+    for (name, p) in &result.parameters {
+        let Some(truth) = truth.and_then(|t| t.get(name)).and_then(toml::Value::as_float) else { continue };
+        let inside = p.lower_95.is_some_and(|l| l <= truth) && p.upper_95.is_some_and(|u| truth <= u);
+        print_line!("{name:<36} {:>12.6} {truth:>12.6}  {}", p.estimate, if inside { "yes" } else { "no" });
+    }
+    Ok(())
+}

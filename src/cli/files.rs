@@ -1,0 +1,407 @@
+//! Reading and writing: outputs of a command appear all together or not at all, and replace nothing but what
+//! the command made itself.
+
+mod guard;
+mod input;
+mod marker;
+mod preserved_files;
+mod staging;
+
+use super::args::GlobalArgs;
+use super::failure::Failure;
+use crate::chart::{Figure, Medium};
+use crate::toml_file;
+use clap::{Args, ValueEnum};
+use guard::OutputGuard;
+pub use input::{FileSize, check_data_size, is_standard_input, read_data, read_json, read_text, read_toml};
+use marker::MARKER_FILE;
+pub use marker::{FolderMarker, OutputCommand, Overwrite, WritePolicy};
+pub use preserved_files::{SIMULATION_SUMMARY, is_simulation_summary};
+pub use staging::{OutputStaging, check_path_free};
+use std::fs::File;
+use std::io;
+use std::io::{BufWriter, Read, Seek, Write};
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+/// What a fit found, in its folder.
+pub const RESULT_FILE: &str = "result.json";
+
+/// Name of a file or folder for messages and headings.
+pub fn display_name(path: &Path) -> String {
+    if is_standard_input(path) {
+        return "standard-input".to_owned();
+    }
+    let full = path.canonicalize().unwrap_or_else(|_| path.to_owned());
+    full.file_name().map_or_else(|| path.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
+/// The folder in which a file lies.
+pub fn containing_folder(file: &Path) -> &Path {
+    file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// Where a path leads that stands in `file`: it is relative to the folder of that file, whatever the working
+/// folder is.
+pub fn resolve_path(file: &Path, named: &str) -> PathBuf {
+    containing_folder(file).join(named)
+}
+
+/// The same where something has to be there; otherwise why it is refused.
+pub fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf, String> {
+    let path = resolve_path(file, named);
+    if path.exists() {
+        return Ok(path);
+    }
+    Err(format!(
+        "found \"{named}\", but there is no `{}`; a path in a file is relative to that file{}",
+        path.display(),
+        toml_file::path_hint(named)
+    ))
+}
+
+/// A path as a file in `folder` names it: from there, or in full where no way leads from one to the other.
+pub fn relative_path(folder: &Path, path: &Path) -> Result<String, Failure> {
+    let in_full = |path: &Path| {
+        std::path::absolute(path).map_err(|error| {
+            Failure::Input(format!("{}: cannot be found from here: {error}", path.display()))
+        })
+    };
+    // (links are followed in what there is, as `..` behind a link leads elsewhere)
+    let real = |path: &Path| -> Result<PathBuf, Failure> {
+        let full = in_full(path)?;
+        let there = full.ancestors().find(|part| part.exists()).unwrap_or(Path::new(""));
+        let rest = full.strip_prefix(there).unwrap_or(Path::new(""));
+        Ok(there.canonicalize().map_or_else(|_| full.clone(), |there| there.join(rest)))
+    };
+    let target = real(path)?;
+    let way = pathdiff::diff_paths(&target, real(folder)?).unwrap_or(target);
+    way.to_str().map(|text| text.replace(std::path::MAIN_SEPARATOR, "/")).ok_or_else(|| {
+        Failure::Input(format!(
+            "{}: found a path that is no Unicode text, expected one that a TOML file can name; rename the folder",
+            path.display()
+        ))
+    })
+}
+
+/// Writes every file of a command into `folder` (made if missing): all are staged next to their places first,
+/// then renamed.
+pub fn write_outputs(
+    folder: &Path,
+    writer: &WritePolicy,
+    files: &[(impl AsRef<str>, Vec<u8>)],
+) -> Result<(), Failure> {
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
+    OutputFolder::find_writable_ancestor(folder)?;
+    commit_files(OutputStaging::new(folder, writer, &names)?, files)
+}
+
+/// The same for files that no marker lists, of which the caller knows that they replace nothing of value.
+pub fn write_unmarked(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
+    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
+    OutputFolder::find_writable_ancestor(folder)?;
+    commit_files(OutputStaging::new_unmarked(folder, &names)?, files)
+}
+
+fn commit_files(mut staging: OutputStaging, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
+    for (name, bytes) in files {
+        staging.stage_file(name.as_ref(), bytes.as_slice())?;
+    }
+    staging.commit()
+}
+
+/// A figure as files: for the screen, and under `paper/` for a journal's column and page.
+pub fn figure_files(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
+    let file = |name: String, medium| (name, figure.to_svg(medium).into_bytes());
+    [
+        file(format!("{name}.svg"), Medium::Screen),
+        file(format!("paper/{name}-85mm.svg"), Medium::Column),
+        file(format!("paper/{name}-170mm.svg"), Medium::Page),
+    ]
+}
+
+/// Text that is made piece by piece, as a reader.
+pub struct ChunkReader<I> {
+    pieces: I,
+    present: io::Cursor<Vec<u8>>,
+}
+
+impl<I: Iterator<Item = String>> ChunkReader<I> {
+    pub fn new(pieces: I) -> Self {
+        Self { pieces, present: io::Cursor::default() }
+    }
+}
+
+impl<I: Iterator<Item = String>> Read for ChunkReader<I> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        loop {
+            let read = self.present.read(buffer)?;
+            if read > 0 || buffer.is_empty() {
+                return Ok(read);
+            }
+            match self.pieces.next() {
+                Some(piece) => self.present = io::Cursor::new(piece.into_bytes()),
+                None => return Ok(0),
+            }
+        }
+    }
+}
+
+/// A folder for results that are written while they are computed: nothing is seen of them before all are
+/// complete, and nothing is left of them when the program is killed.
+#[derive(Debug)]
+pub struct OutputFolder {
+    folder: PathBuf,
+    writer: WritePolicy,
+    /// Where the nameless files are kept meanwhile: the folder, or what there is of the way to it.
+    temporary_folder: PathBuf,
+}
+
+impl OutputFolder {
+    /// Checks that `folder` is one or can be made, can be written to, and holds nothing that the files
+    /// `names` must not replace: asked before the work, as it is again when they are placed.
+    pub fn check(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
+        let near = Self::find_writable_ancestor(folder)?;
+        names.iter().chain([&MARKER_FILE]).try_for_each(|name| check_path_free(&folder.join(name)))?;
+        let guard = OutputGuard::new(folder, writer, names)?;
+        names.iter().try_for_each(|name| guard.check_overwrite(name, None).map(|_| ()))?;
+        Ok(Self { folder: folder.to_owned(), writer: writer.clone(), temporary_folder: near })
+    }
+
+    /// What there is of the way to a folder, which can be written to.
+    fn find_writable_ancestor(folder: &Path) -> Result<PathBuf, Failure> {
+        let near = folder
+            .ancestors()
+            .find(|path| path.exists() || path.is_symlink())
+            .unwrap_or(Path::new(""))
+            .to_owned();
+        let near = if near.as_os_str().is_empty() { PathBuf::from(".") } else { near };
+        if !near.is_dir() {
+            let found = if near.exists() { "a file" } else { "a broken link" };
+            return Err(Failure::Input(format!(
+                "{}: is {found}, expected a folder for the results; choose another one",
+                near.display()
+            )));
+        }
+        tempfile::tempfile_in(&near).map_err(|error| {
+            Failure::Input(format!(
+                "{}: cannot be written: {error}; expected a folder for the results, so choose another one",
+                folder.display()
+            ))
+        })?;
+        Ok(near)
+    }
+
+    /// A file that is written to as it grows and gets its name when all are [finished](Self::commit).
+    pub fn create_file(&self, name: &'static str) -> Result<PendingFile, Failure> {
+        let path = self.folder.join(name);
+        let file =
+            tempfile::tempfile_in(&self.temporary_folder).map_err(|error| write_failure(&path, &error))?;
+        Ok(PendingFile { name, path, to: BufWriter::new(file), failed: None })
+    }
+
+    /// Puts the files that grew and the others into the folder under their names, or none of them.
+    pub fn commit(
+        &self,
+        files: Vec<PendingFile>,
+        others: &[(impl AsRef<str>, Vec<u8>)],
+    ) -> Result<(), Failure> {
+        let files = files.into_iter().map(PendingFile::into_rewound_file).collect::<Result<Vec<_>, _>>()?;
+        let others = others.iter().map(|(name, bytes)| (name.as_ref(), bytes.as_slice()));
+        let names: Vec<&str> =
+            files.iter().map(|(name, _)| *name).chain(others.clone().map(|(name, _)| name)).collect();
+        let mut staging = OutputStaging::new(&self.folder, &self.writer, &names)?;
+        for (name, file) in files {
+            staging.stage_file(name, file)?;
+        }
+        for (name, bytes) in others {
+            staging.stage_file(name, bytes)?;
+        }
+        staging.commit()
+    }
+}
+
+/// A file without a name for what does not fit into memory, in a folder or in what there is of the way to it.
+pub fn create_scratch_file(folder: &Path) -> Result<File, Failure> {
+    let near = OutputFolder::find_writable_ancestor(folder)?;
+    tempfile::tempfile_in(&near).map_err(|error| write_failure(&near, &error))
+}
+
+/// A file on its way; after its first failure nothing more is written, and the failure is reported at the
+/// end.
+#[derive(Debug)]
+pub struct PendingFile {
+    name: &'static str,
+    path: PathBuf,
+    to: BufWriter<File>,
+    failed: Option<io::Error>,
+}
+
+impl PendingFile {
+    pub fn write_text(&mut self, text: &str) {
+        if self.failed.is_none() {
+            self.failed = self.to.write_all(text.as_bytes()).err();
+        }
+    }
+
+    /// The whole file, to be read from its start.
+    fn into_rewound_file(self) -> Result<(&'static str, File), Failure> {
+        let Self { name, path, to, failed } = self;
+        let rewound = || {
+            let mut file = to.into_inner().map_err(io::IntoInnerError::into_error)?;
+            file.rewind()?;
+            Ok(file)
+        };
+        let file = failed.map_or_else(rewound, Err).map_err(|error| write_failure(&path, &error))?;
+        Ok((name, file))
+    }
+}
+
+fn write_failure(path: &Path, error: &io::Error) -> Failure {
+    Failure::Internal(format!("{}: cannot be written: {error}", path.display()))
+}
+
+// Figures of commands that print or write tables.
+
+#[derive(Debug, Args)]
+pub struct FigureArgs {
+    /// Draw figures into a folder, each in three files: one for a screen, and below paper/ one for a column
+    /// and one for a page
+    #[arg(long = "figures", value_name = "DIR")]
+    pub folder: Option<PathBuf>,
+}
+
+impl FigureArgs {
+    /// Refuses a folder that figures of these names cannot go to; asked before the work.
+    pub fn check_folder(&self, names: &[&str], overwrite: Overwrite) -> Result<(), Failure> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let files = names.iter().flat_map(|name| figure_files(name, &Figure::default()));
+        let names: Vec<String> = files.map(|(name, _)| name).collect();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        OutputFolder::check(folder, &figure_policy(overwrite), &names).map(|_| ())
+    }
+
+    /// Writes named figures, where they are wanted.
+    pub fn write_figures(
+        &self,
+        overwrite: Overwrite,
+        global: &GlobalArgs,
+        figures: impl FnOnce() -> Vec<(&'static str, Figure)>,
+    ) -> Result<(), Failure> {
+        let Some(folder) = &self.folder else { return Ok(()) };
+        let figures = figures();
+        let files: Vec<_> = figures.iter().flat_map(|(name, figure)| figure_files(name, figure)).collect();
+        write_outputs(folder, &figure_policy(overwrite), &files)?;
+        for (name, _) in figures.iter().filter(|_| !global.quiet) {
+            print_line!("figure: {}", folder.join(format!("{name}.svg")).display());
+        }
+        Ok(())
+    }
+}
+
+fn figure_policy(overwrite: Overwrite) -> WritePolicy {
+    WritePolicy::new(OutputCommand::Figures, overwrite)
+}
+
+// Tables as a spreadsheet opens them.
+
+/// How tables are written for those who open them with a double click.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub enum CsvDialect {
+    /// Commas between cells, decimal points (RFC 4180 with line feeds): what every program reads
+    #[default]
+    Plain,
+    /// Excel where a comma is decimal, as in Germany: semicolons between cells, decimal commas
+    ExcelDe,
+    /// Excel where a point is decimal, as in the US
+    ExcelUs,
+}
+
+/// What tells Excel that a file is UTF-8.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+impl CsvDialect {
+    /// Whether a table that is written with commas and points has to be written anew.
+    pub fn needs_conversion(self) -> bool {
+        self != Self::Plain
+    }
+
+    /// A table in this dialect. Cells that are numbers get its decimal mark, all others stay as they are.
+    pub fn convert_table(self, plain: impl Read, mut to: impl Write) -> io::Result<()> {
+        to.write_all(BYTE_ORDER_MARK)?;
+        let decimal_comma = self == Self::ExcelDe;
+        let mut table = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(plain);
+        let mut writer = csv::WriterBuilder::new();
+        writer.delimiter(if decimal_comma { b';' } else { b',' }).flexible(true);
+        let mut writer = writer.terminator(csv::Terminator::CRLF).from_writer(to);
+        for row in table.records() {
+            let row = row?;
+            let cells = row.iter().map(|cell| {
+                let decimal = decimal_comma && cell.contains('.') && cell.parse::<f64>().is_ok();
+                if decimal { cell.replace('.', ",") } else { cell.to_owned() }
+            });
+            writer.write_record(cells)?;
+        }
+        writer.flush()
+    }
+}
+
+// Tables that are written row by row.
+
+/// A table on its way to its file.
+pub struct StreamedTable {
+    pub file: PendingFile,
+    row: String,
+    /// Rows that are held back until there are enough of them, and how many those are.
+    held: String,
+    missing: usize,
+    /// Time spent on text and file, which is not the run's.
+    pub spent: Duration,
+}
+
+impl StreamedTable {
+    pub fn new(mut file: PendingFile, header: &str, least_rows: usize) -> Self {
+        file.write_text(header);
+        file.write_text("\n");
+        Self { file, row: String::new(), held: String::new(), missing: least_rows, spent: Duration::ZERO }
+    }
+
+    pub fn add_row(&mut self, push: impl FnOnce(&mut String)) {
+        let clock = Instant::now();
+        self.row.clear();
+        push(&mut self.row);
+        if self.missing > 1 {
+            self.held.push_str(&self.row);
+        } else {
+            self.file.write_text(&std::mem::take(&mut self.held));
+            self.file.write_text(&self.row);
+        }
+        self.missing = self.missing.saturating_sub(1);
+        self.spent += clock.elapsed();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PLAIN: &str = "time_s,name,x_m\n0.5,\"a, b\",-1.5e-3\n1,\"1;2\",\n2,friction.a,1e5\n";
+
+    fn converted(dialect: CsvDialect) -> String {
+        let mut found = Vec::new();
+        dialect.convert_table(PLAIN.as_bytes(), &mut found).unwrap();
+        String::from_utf8(found).unwrap()
+    }
+
+    #[test]
+    fn numbers_get_decimal_commas_and_texts_stay() {
+        let german = "\u{feff}time_s;name;x_m\r\n0,5;a, b;-1,5e-3\r\n1;\"1;2\";\r\n2;friction.a;1e5\r\n";
+        assert_eq!(converted(CsvDialect::ExcelDe), german);
+    }
+
+    #[test]
+    fn points_stay_points() {
+        let american = "\u{feff}".to_owned() + &PLAIN.replace('\n', "\r\n").replace("\"1;2\"", "1;2");
+        assert_eq!(converted(CsvDialect::ExcelUs), american);
+    }
+}

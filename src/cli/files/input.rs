@@ -1,0 +1,213 @@
+//! Reading what the user names: regular files and, as `-`, standard input, up to a stated size. The size is
+//! checked before a byte is read and again while reading: a file may be sparse, grow, or have none.
+
+use crate::cli::failure::Failure;
+use std::fmt;
+use std::fs::{self, File, Metadata};
+use std::io::{self, ErrorKind, Read};
+use std::path::Path;
+use std::str::FromStr;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The name of standard input on the command line.
+const STANDARD_INPUT: &str = "-";
+/// Largest file that people write by hand: a thousand components have a quarter of it. Parsed, it takes up to
+/// a hundred times as much memory.
+const TOML_LIMIT: ReadLimit =
+    ReadLimit { largest: FileSize(500_000), advice: "this is no file that people write; name another one" };
+/// Largest result of a fit: some hundred times those that are committed.
+const JSON_LIMIT: ReadLimit =
+    ReadLimit { largest: FileSize(16_000_000), advice: "this program writes none so large; make it again" };
+
+/// Largest file with data, bytes: `--max-file-size`.
+static MAX_DATA_BYTES: AtomicU64 = AtomicU64::new(FileSize::DEFAULT.0);
+
+/// A number of bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct FileSize(u64);
+
+impl FileSize {
+    /// The longest recording that is read, ten million frames, has about so much.
+    pub const DEFAULT: Self = Self(1_000_000_000);
+    const UNITS: [(&str, u64); 5] =
+        [("GB", 1_000_000_000), ("MB", 1_000_000), ("kB", 1_000), ("B", 1), ("", 1)];
+
+    /// Reads no file with data above this size from now on.
+    pub fn set_read_limit(self) {
+        MAX_DATA_BYTES.store(self.0, Ordering::Relaxed);
+    }
+}
+
+impl fmt::Display for FileSize {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let fits = |unit: &&(&str, u64)| self.0.is_multiple_of(unit.1) && self.0 >= unit.1;
+        let (unit, bytes) = Self::UNITS.iter().find(fits).copied().unwrap_or(("B", 1));
+        write!(f, "{} {unit}", self.0 / bytes)
+    }
+}
+
+impl FromStr for FileSize {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let lower = text.trim().to_ascii_lowercase();
+        let number = |(unit, bytes): &(&str, u64)| {
+            let digits = lower.strip_suffix(&unit.to_ascii_lowercase())?.trim();
+            digits.parse::<u64>().ok()?.checked_mul(*bytes).filter(|bytes| *bytes > 0)
+        };
+        let size = Self::UNITS.iter().find_map(number).map(Self);
+        size.ok_or_else(|| "expected a size such as 500MB or 2GB".to_owned())
+    }
+}
+
+/// The largest file of a kind, and what to do with a larger one.
+#[derive(Clone, Copy)]
+struct ReadLimit {
+    largest: FileSize,
+    advice: &'static str,
+}
+
+impl ReadLimit {
+    fn for_data() -> Self {
+        Self {
+            largest: FileSize(MAX_DATA_BYTES.load(Ordering::Relaxed)),
+            advice: "read a larger one with --max-file-size, such as --max-file-size 4GB",
+        }
+    }
+
+    fn check_open_file(self, path: &Path, file: &File) -> Result<(), Failure> {
+        let found = file.metadata().map_err(|error| read_failure(path, &error))?;
+        check_regular_file(path, &found)?;
+        if found.len() > self.largest.0 {
+            return Err(self.too_large_failure(path, &format!("{} bytes", found.len())));
+        }
+        Ok(())
+    }
+
+    fn too_large_failure(self, path: &Path, found: &str) -> Failure {
+        let Self { largest, advice } = self;
+        input_failure(path, &format!("found {found}, expected at most {largest}; {advice}"))
+    }
+}
+
+/// Whether a path is the name of standard input.
+pub fn is_standard_input(path: &Path) -> bool {
+    path.as_os_str() == STANDARD_INPUT
+}
+
+/// Bytes of a file with data.
+pub fn read_data(path: &Path) -> Result<Vec<u8>, Failure> {
+    read_limited(path, ReadLimit::for_data())
+}
+
+/// Refuses a file with data that is open, and larger than what is read into memory.
+pub fn check_data_size(path: &Path, file: &File) -> Result<(), Failure> {
+    ReadLimit::for_data().check_open_file(path, file)
+}
+
+/// Text of a UTF-8 file with data (a byte-order mark is dropped).
+pub fn read_text(path: &Path) -> Result<String, Failure> {
+    decode_utf8(path, read_data(path)?)
+}
+
+/// Text of a TOML file, which people write.
+pub fn read_toml(path: &Path) -> Result<String, Failure> {
+    decode_utf8(path, read_limited(path, TOML_LIMIT)?)
+}
+
+/// Text of a JSON file, which this program writes.
+pub fn read_json(path: &Path) -> Result<String, Failure> {
+    decode_utf8(path, read_limited(path, JSON_LIMIT)?)
+}
+
+fn decode_utf8(path: &Path, bytes: Vec<u8>) -> Result<String, Failure> {
+    let mut text = String::from_utf8(bytes).map_err(|error| {
+        Failure::Input(format!(
+            "{}: byte {} is not UTF-8; save the file as UTF-8",
+            path.display(),
+            error.utf8_error().valid_up_to()
+        ))
+    })?;
+    if text.starts_with('\u{feff}') {
+        text.remove(0);
+    }
+    Ok(text)
+}
+
+fn read_limited(path: &Path, limit: ReadLimit) -> Result<Vec<u8>, Failure> {
+    if is_standard_input(path) {
+        return read_all(path, io::stdin().lock(), limit);
+    }
+    // asked before it is opened: to open a pipe waits for whoever writes into it
+    check_regular_file(path, &fs::metadata(path).map_err(|error| read_failure(path, &error))?)?;
+    let file = File::open(path).map_err(|error| read_failure(path, &error))?;
+    limit.check_open_file(path, &file)?;
+    read_all(path, &file, limit)
+}
+
+fn read_all(path: &Path, from: impl Read, limit: ReadLimit) -> Result<Vec<u8>, Failure> {
+    let bytes = read_at_most(from, limit.largest).map_err(|error| read_failure(path, &error))?;
+    bytes.ok_or_else(|| limit.too_large_failure(path, &format!("more than {}", limit.largest)))
+}
+
+/// All bytes, or `None` where there are more than allowed.
+fn read_at_most(from: impl Read, largest: FileSize) -> io::Result<Option<Vec<u8>>> {
+    let mut bytes = Vec::new();
+    from.take(largest.0.saturating_add(1)).read_to_end(&mut bytes)?;
+    Ok((bytes.len() as u64 <= largest.0).then_some(bytes))
+}
+
+/// Only a regular file has an end and gives the same twice.
+fn check_regular_file(path: &Path, found: &Metadata) -> Result<(), Failure> {
+    match found.file_type() {
+        kind if kind.is_file() => Ok(()),
+        kind if kind.is_dir() => Err(input_failure(path, "a folder, expected a file")),
+        _ => Err(input_failure(
+            path,
+            "a pipe, a socket or a device, expected a file; write what it gives into a file, or give it on standard input and name that `-`",
+        )),
+    }
+}
+
+fn read_failure(path: &Path, error: &io::Error) -> Failure {
+    let problem = match error.kind() {
+        ErrorKind::NotFound => "no such file; check the path",
+        ErrorKind::PermissionDenied => "not readable; check its permissions",
+        ErrorKind::IsADirectory => "a folder, expected a file",
+        ErrorKind::NotADirectory => "no such file, as a part of its path is a file; check the path",
+        _ => return input_failure(path, &error.to_string()),
+    };
+    input_failure(path, problem)
+}
+
+fn input_failure(path: &Path, problem: &str) -> Failure {
+    Failure::Input(format!("{}: {problem}", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_read_and_shown() {
+        let read = |text: &str| text.parse::<FileSize>().map(|size| size.0);
+        assert_eq!(read("2GB"), Ok(2_000_000_000));
+        assert_eq!(read("500 mb"), Ok(500_000_000));
+        assert_eq!(read("12"), Ok(12));
+        for text in ["", "0", "-1", "1TB", "1.5GB", "99999999999GB", "GB"] {
+            assert!(read(text).is_err(), "{text}");
+        }
+        assert_eq!(
+            [FileSize(2_000_000_000), FileSize(1_500_000), FileSize(1)].map(|s| s.to_string()),
+            ["2 GB", "1500 kB", "1 B"]
+        );
+        assert_eq!(FileSize::DEFAULT.to_string().parse(), Ok(FileSize::DEFAULT));
+    }
+
+    /// What the metadata says is not what is read: the limit holds all the same.
+    #[test]
+    fn no_more_is_taken_than_allowed() {
+        assert_eq!(read_at_most(&b"1234"[..], FileSize(4)).unwrap(), Some(b"1234".to_vec()));
+        assert_eq!(read_at_most(io::repeat(0), FileSize(4)).unwrap(), None);
+    }
+}

@@ -1,0 +1,228 @@
+//! The marker of an output folder: which command made which file, and what was in it.
+
+use super::CsvDialect;
+use crate::cli::failure::Failure;
+use crate::text::TextHash;
+use clap::Args;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::Read;
+use std::path::Path;
+use std::{fs, io};
+
+/// Name of the marker in a folder.
+pub const MARKER_FILE: &str = ".wiperlab.json";
+const MARKER_FORMAT: u32 = 1;
+
+/// What the commands made in a folder. It holds no times: the same outputs have the same marker.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FolderMarker {
+    format: u32,
+    /// By name from the folder, with `/`.
+    pub files: BTreeMap<String, MarkedFile>,
+}
+
+/// A file that a command made.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct MarkedFile {
+    pub by: OutputCommand,
+    pub version: String,
+    /// Of its contents as a text: line ends and a byte-order mark do not count.
+    pub sha256: String,
+    /// Hash of the file that it takes the place of, if a command made that too: while the files get their
+    /// names either may be there, also after the program was killed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub replaces: Option<String>,
+}
+
+impl MarkedFile {
+    pub fn matches_hash(&self, sha256: &str) -> bool {
+        self.sha256 == sha256 || self.replaces.as_deref() == Some(sha256)
+    }
+}
+
+impl Default for FolderMarker {
+    fn default() -> Self {
+        Self { format: MARKER_FORMAT, files: BTreeMap::new() }
+    }
+}
+
+impl FolderMarker {
+    /// The marker of a folder; an empty one where there is none. One that cannot be read proves nothing, and
+    /// the reason is given.
+    pub fn load(folder: &Path) -> Result<(Self, Option<String>), Failure> {
+        let path = folder.join(MARKER_FILE);
+        if !path.exists() {
+            return Ok((Self::default(), None));
+        }
+        let bytes = read_small_file(&path);
+        let parsed =
+            bytes.and_then(|bytes| serde_json::from_slice::<Self>(&bytes).map_err(|error| error.to_string()));
+        let known = parsed.and_then(|marker| match marker.format {
+            MARKER_FORMAT => Ok(marker),
+            other => Err(format!("found format {other}, expected {MARKER_FORMAT}")),
+        });
+        Ok(match known {
+            Ok(marker) => (marker, None),
+            Err(why) => (Self::default(), Some(format!("{} cannot be read: {why}", path.display()))),
+        })
+    }
+
+    pub fn to_bytes(&self) -> Result<Vec<u8>, Failure> {
+        let mut text = serde_json::to_vec_pretty(self).map_err(Failure::internal)?;
+        text.push(b'\n');
+        Ok(text)
+    }
+
+    /// Whether a file is, unchanged, what a command made; its maker.
+    pub fn maker_if_unchanged(&self, name: &str, sha256: &str) -> Option<OutputCommand> {
+        self.files.get(name).filter(|made| made.matches_hash(sha256)).map(|made| made.by)
+    }
+}
+
+/// Largest file that says what is in a folder, bytes; this program writes none so large.
+const MAX_MARKER_BYTES: u64 = 16_000_000;
+
+/// Bytes of a file that says what is in a folder, if it is a file and no larger than such files are.
+pub fn read_small_file(path: &Path) -> Result<Vec<u8>, String> {
+    let found = fs::metadata(path).map_err(|error| error.to_string())?;
+    if !found.is_file() || found.len() > MAX_MARKER_BYTES {
+        return Err(format!("expected a file of at most {MAX_MARKER_BYTES} bytes"));
+    }
+    fs::read(path).map_err(|error| error.to_string())
+}
+
+/// Hash of a file as markers have it; `None` where there is no file.
+pub fn hash_file(path: &Path) -> Result<Option<String>, Failure> {
+    let refused = |error: io::Error| Failure::Input(format!("{}: cannot be read: {error}", path.display()));
+    if !path.is_file() {
+        return Ok(None);
+    }
+    let mut hashing = HashingReader::new(File::open(path).map_err(refused)?);
+    io::copy(&mut hashing, &mut io::sink()).map_err(refused)?;
+    Ok(Some(hashing.finish()))
+}
+
+/// A reader that hashes what passes through it.
+pub struct HashingReader<R> {
+    from: R,
+    hash: TextHash,
+}
+
+impl<R: Read> HashingReader<R> {
+    pub fn new(from: R) -> Self {
+        Self { from, hash: TextHash::default() }
+    }
+
+    pub fn finish(self) -> String {
+        self.hash.finish()
+    }
+}
+
+impl<R: Read> Read for HashingReader<R> {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        let read = self.from.read(buffer)?;
+        self.hash.update(&buffer[..read]);
+        Ok(read)
+    }
+}
+
+// Who writes an output folder.
+
+/// A command that writes files into a folder; the word that the marker keeps.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OutputCommand {
+    Accuracy,
+    Blade,
+    Demo,
+    Figures,
+    Fit,
+    Import,
+    Init,
+    Man,
+    Report,
+    Simulate,
+    Spectrum,
+    Submit,
+    Sweep,
+    Twin,
+}
+
+impl OutputCommand {
+    /// The command's name.
+    pub fn command_name(self) -> &'static str {
+        match self {
+            Self::Accuracy => "accuracy",
+            Self::Blade => "blade",
+            Self::Demo => "demo",
+            Self::Figures => "figures",
+            Self::Fit => "fit",
+            Self::Import => "import",
+            Self::Init => "init",
+            Self::Man => "man",
+            Self::Report => "report",
+            Self::Simulate => "simulate",
+            Self::Spectrum => "spectrum",
+            Self::Submit => "submit",
+            Self::Sweep => "sweep",
+            Self::Twin => "twin",
+        }
+    }
+
+    /// Whether what it makes is a recording, of which a folder holds one.
+    pub fn makes_recordings(self) -> bool {
+        matches!(self, Self::Import | Self::Simulate | Self::Twin)
+    }
+
+    /// Whether all its files in a folder are of one run: those of an earlier run that the next one does not
+    /// make are then removed. An import keeps exports, and init, demo and figures write next
+    /// to files of others.
+    pub fn replaces_last_run(self) -> bool {
+        !matches!(self, Self::Demo | Self::Figures | Self::Import | Self::Init)
+    }
+
+    /// What to do instead of overwriting a file.
+    pub fn overwrite_advice(self) -> &'static str {
+        match self {
+            Self::Fit => "move the file away",
+            Self::Figures => "choose another folder, move the file away",
+            _ => "choose another --out, move the file away",
+        }
+    }
+}
+
+/// The option of every command that writes into a folder.
+#[derive(Debug, Clone, Copy, Default, Args)]
+pub struct Overwrite {
+    /// Overwrite also files that this command did not make, or that were changed since it made them; never a
+    /// measured recording
+    #[arg(long)]
+    pub force: bool,
+}
+
+/// Who writes, and what it may overwrite.
+#[derive(Debug, Clone)]
+pub struct WritePolicy {
+    pub maker: OutputCommand,
+    pub force: bool,
+    /// SHA-256 of the exports that an import reads; a measured recording gives way to an import of the same
+    /// ones.
+    pub exports: Vec<String>,
+    /// How its tables are written; a trace is always plain, as programs read it.
+    pub csv: CsvDialect,
+}
+
+impl WritePolicy {
+    pub fn new(maker: OutputCommand, overwrite: Overwrite) -> Self {
+        Self { maker, force: overwrite.force, exports: Vec::new(), csv: CsvDialect::Plain }
+    }
+
+    /// The same with tables in a dialect.
+    pub fn with_csv_dialect(self, csv: CsvDialect) -> Self {
+        Self { csv, ..self }
+    }
+}

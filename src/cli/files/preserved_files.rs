@@ -1,0 +1,106 @@
+//! Which recording a folder holds, and what of it no command overwrites.
+
+use super::marker::OutputCommand;
+use super::marker::{FolderMarker, hash_file, read_small_file};
+use crate::cli::failure::Failure;
+use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE};
+use std::path::Path;
+
+/// What `simulate` writes next to its trace and no import does.
+pub const SIMULATION_SUMMARY: &str = "summary.json";
+/// Keys that the summary of a simulation has and that of a study has not.
+const KEYS_OF_A_SIMULATION: [&str; 2] = ["stopped_at_s", "rhs_evaluations"];
+
+/// Whether there is the summary of a simulation.
+pub fn is_simulation_summary(path: &Path) -> bool {
+    let summary: Option<serde_json::Value> =
+        path.is_file().then(|| serde_json::from_slice(&read_small_file(path).ok()?).ok()).flatten();
+    summary.is_some_and(|summary| KEYS_OF_A_SIMULATION.iter().all(|key| summary.get(key).is_some()))
+}
+
+/// The recording that a folder holds.
+#[derive(Debug, PartialEq, Eq)]
+pub enum FolderRecording {
+    /// None.
+    Nothing,
+    /// One that is proven to be synthetic.
+    Synthetic,
+    /// One that a camera took, or of which nothing proves that none did.
+    Measured {
+        /// Why it counts as measured.
+        why: String,
+        /// SHA-256 of its exports, as far as known.
+        exports: Vec<String>,
+        /// Names of its files.
+        files: Vec<String>,
+    },
+}
+
+impl FolderRecording {
+    pub fn detect(folder: &Path, marker: &FolderMarker) -> Result<Self, Failure> {
+        let trace = hash_file(&folder.join(TRACE_FILE))?;
+        if folder.join(DESCRIPTION_FILE).exists() {
+            return Ok(from_description(folder, marker, trace.as_deref()));
+        }
+        let Some(trace) = trace else { return Ok(Self::Nothing) };
+        let listed = marker.files.get(TRACE_FILE);
+        Ok(match listed {
+            Some(made) if made.matches_hash(&trace) && made.by != OutputCommand::Import => Self::Synthetic,
+            None if is_simulation_summary(&folder.join(SIMULATION_SUMMARY)) => Self::Synthetic,
+            Some(made) if made.by != OutputCommand::Import => Self::new_measured(
+                marker,
+                format!("was changed since `wiperlab {}` wrote it", made.by.command_name()),
+                None,
+            ),
+            _ => Self::new_measured(
+                marker,
+                "has nothing next to it that says where it comes from".to_owned(),
+                None,
+            ),
+        })
+    }
+
+    fn new_measured(marker: &FolderMarker, why: String, file: Option<&RecordingFile>) -> Self {
+        let source = file.and_then(|file| file.source.as_ref());
+        let imported = marker.files.iter().filter(|(_, made)| made.by == OutputCommand::Import);
+        let named = source.iter().flat_map(|source| source.file.as_slice());
+        let files = imported.map(|(name, _)| name.clone()).chain(named.cloned());
+        let own = [TRACE_FILE, DESCRIPTION_FILE].map(str::to_owned);
+        Self::Measured {
+            why,
+            exports: source.map_or_else(Vec::new, |source| source.sha256.as_slice().to_vec()),
+            files: files.chain(own).collect(),
+        }
+    }
+}
+
+/// Of a folder with a description.
+fn from_description(folder: &Path, marker: &FolderMarker, trace: Option<&str>) -> FolderRecording {
+    let path = folder.join(DESCRIPTION_FILE);
+    let text =
+        read_small_file(&path).and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string()));
+    let parsed = text.and_then(|text| {
+        RecordingFile::parse(DESCRIPTION_FILE, text.trim_start_matches('\u{feff}'))
+            .map_err(|error| error.to_string())
+    });
+    match parsed {
+        Err(why) => FolderRecording::new_measured(
+            marker,
+            format!("has a {DESCRIPTION_FILE} that cannot be read ({why})"),
+            None,
+        ),
+        Ok(file) if !file.synthetic => FolderRecording::new_measured(
+            marker,
+            format!("is measured, as its {DESCRIPTION_FILE} says"),
+            Some(&file),
+        ),
+        Ok(file) if trace.zip(file.trace_sha256.as_deref()).is_some_and(|(found, said)| found != said) => {
+            FolderRecording::new_measured(
+                marker,
+                format!("is not the one that its {DESCRIPTION_FILE} describes"),
+                Some(&file),
+            )
+        }
+        Ok(_) => FolderRecording::Synthetic,
+    }
+}

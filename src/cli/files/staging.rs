@@ -1,0 +1,319 @@
+//! Files that appear all together or not at all: written next to their places under temporary names, then
+//! renamed.
+//!
+//! What is on the disk when: every file is flushed before any gets its name; then the folder's marker says
+//! what comes and what it replaces, and is flushed too; then the files are renamed one by one and the names
+//! flushed; at last the marker says what is there. So a reader meets each file old or new and whole, also
+//! after a loss of power, and the next run of the command can prove what it finds.
+
+use super::CsvDialect;
+use super::guard::{OutputGuard, refuse_measured};
+use super::marker::WritePolicy;
+use super::marker::{FolderMarker, HashingReader, MARKER_FILE, MarkedFile};
+use super::write_failure;
+use crate::cli::failure::Failure;
+use crate::cli::interrupt;
+use crate::recording::files::TRACE_FILE;
+use std::collections::BTreeSet;
+use std::fs::{self, File};
+use std::io::{self, ErrorKind, Read, Seek};
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use tempfile::NamedTempFile;
+
+/// How passing names begin and end.
+const TEMPORARY_NAME: (&str, &str) = (".wiperlab-", ".tmp");
+/// A file on its way is locked microseconds after it is made, and the lock goes with the program. One that is
+/// older than this and not locked belongs to a program that was killed.
+const ABANDONED_AFTER: Duration = Duration::from_secs(60);
+
+/// Files of a command on their way into a folder. Dropped before [`OutputStaging::commit`], nothing is left of them.
+pub struct OutputStaging {
+    folder: PathBuf,
+    guard: Option<(OutputGuard, WritePolicy)>,
+    files: Vec<StagedFile>,
+    made: CreatedFolders,
+}
+
+/// A file under a temporary name next to its place.
+struct StagedFile {
+    name: String,
+    path: PathBuf,
+    file: NamedTempFile,
+    sha256: String,
+}
+
+impl OutputStaging {
+    /// For the files `names`; refuses what [`OutputGuard`] refuses.
+    pub fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
+        let guard = OutputGuard::new(folder, writer, names)?;
+        Ok(Self { guard: Some((guard, writer.clone())), ..Self::new_unguarded(folder, names)? })
+    }
+
+    /// For files of which the caller knows that nothing is lost with what they replace.
+    pub fn new_unmarked(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
+        refuse_measured(folder, names)?;
+        Self::new_unguarded(folder, names)
+    }
+
+    fn new_unguarded(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
+        names.iter().try_for_each(|name| check_path_free(&folder.join(name)))?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            guard: None,
+            files: Vec::new(),
+            made: CreatedFolders::default(),
+        })
+    }
+
+    /// Writes a file next to its place; gives the hash of its contents.
+    pub fn stage_file(&mut self, name: &str, contents: impl Read) -> Result<String, Failure> {
+        let path = self.folder.join(name);
+        self.made.create(path.parent().unwrap_or(Path::new("")))?;
+        let dialect = self.guard.as_ref().map_or(CsvDialect::Plain, |(_, writer)| writer.csv);
+        let is_table = name.ends_with(".csv") && name != TRACE_FILE;
+        let staged = match is_table && dialect.needs_conversion() {
+            true => write_temporary_table(&path, contents, dialect),
+            false => write_temporary(&path, contents),
+        };
+        let (file, sha256) = staged.map_err(|error| write_failure(&path, &error))?;
+        self.files.push(StagedFile { name: name.to_owned(), path, file, sha256: sha256.clone() });
+        Ok(sha256)
+    }
+
+    /// Gives every file its name, or none.
+    pub fn commit(self) -> Result<(), Failure> {
+        let (made, files) = (self.made, self.files); // (folders are dropped after what is in them)
+        let (folder, guard) = (self.folder, self.guard);
+        flush_files(&files)?;
+        let within: BTreeSet<PathBuf> =
+            files.iter().filter_map(|staged| staged.path.parent()).map(Path::to_owned).collect();
+        match guard {
+            None => rename_staged(files)?,
+            Some((guard, writer)) => {
+                let plan = MarkerUpdate::new(&folder, &guard, &writer, &files)?;
+                plan.write_pending()?;
+                rename_staged(files)?;
+                sync_folders(&within)?;
+                plan.write_final()?;
+            }
+        }
+        sync_folders(&within)?;
+        made.keep()?;
+        within.iter().for_each(|folder| remove_abandoned(folder));
+        Ok(())
+    }
+}
+
+fn rename_staged(files: Vec<StagedFile>) -> Result<(), Failure> {
+    let whole = interrupt::lock_renames();
+    for staged in files {
+        staged.file.persist(&staged.path).map_err(|e| write_failure(&staged.path, &e.error))?;
+    }
+    whole.forget_temporaries();
+    Ok(())
+}
+
+/// What the marker of a folder says while files get their names, and afterwards.
+struct MarkerUpdate<'a> {
+    folder: &'a Path,
+    before: &'a FolderMarker,
+    /// Of every file what it is and what it replaces: true before, between and after the renaming.
+    pending: FolderMarker,
+    after: FolderMarker,
+    outdated: Vec<String>,
+}
+
+impl<'a> MarkerUpdate<'a> {
+    fn new(
+        folder: &'a Path,
+        guard: &'a OutputGuard,
+        writer: &WritePolicy,
+        files: &[StagedFile],
+    ) -> Result<Self, Failure> {
+        let names: Vec<&str> = files.iter().map(|staged| staged.name.as_str()).collect();
+        let outdated = guard.outdated_files(&names);
+        let mut meanwhile = guard.marker.clone();
+        for staged in files {
+            let own = guard.check_overwrite(&staged.name, Some(&staged.sha256))?;
+            let made = MarkedFile {
+                by: writer.maker,
+                version: env!("CARGO_PKG_VERSION").to_owned(),
+                replaces: own.filter(|found| *found != staged.sha256),
+                sha256: staged.sha256.clone(),
+            };
+            meanwhile.files.insert(staged.name.clone(), made);
+        }
+        let mut after = meanwhile.clone();
+        after.files.retain(|name, _| !outdated.contains(name));
+        after.files.iter_mut().filter(|(name, _)| names.contains(&name.as_str())).for_each(|(_, made)| {
+            made.replaces = None;
+        });
+        Ok(Self { folder, before: &guard.marker, pending: meanwhile, after, outdated })
+    }
+
+    fn write_pending(&self) -> Result<(), Failure> {
+        if self.pending == *self.before { Ok(()) } else { self.write_marker(&self.pending) }
+    }
+
+    /// Removes what is outdated, then says what is there.
+    fn write_final(&self) -> Result<(), Failure> {
+        for path in self.outdated.iter().map(|name| self.folder.join(name)) {
+            if let Err(error) = fs::remove_file(&path) {
+                warn_line!(
+                    "warning: {}: left from an earlier run, and cannot be removed: {error}",
+                    path.display()
+                );
+            }
+        }
+        if self.after == self.pending { Ok(()) } else { self.write_marker(&self.after) }
+    }
+
+    fn write_marker(&self, marker: &FolderMarker) -> Result<(), Failure> {
+        let path = self.folder.join(MARKER_FILE);
+        let written = write_temporary(&path, marker.to_bytes()?.as_slice()).and_then(|(file, _)| {
+            file.as_file().sync_all()?;
+            file.persist(&path)?;
+            Ok(())
+        });
+        written.map_err(|error| write_failure(&path, &error))?;
+        sync_folders(&BTreeSet::from([self.folder.to_owned()]))
+    }
+}
+
+/// Puts the names of files on the disk: a file that was flushed is found again after a loss of power only if
+/// its name was too. A file system that cannot flush folders does it by itself or not at all.
+fn sync_folders(folders: &BTreeSet<PathBuf>) -> Result<(), Failure> {
+    #[cfg(unix)]
+    for folder in folders {
+        let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
+        let unknown =
+            |error: &io::Error| matches!(error.kind(), ErrorKind::InvalidInput | ErrorKind::Unsupported);
+        match File::open(folder).and_then(|folder| folder.sync_all()) {
+            Err(error) if !unknown(&error) => return Err(write_failure(folder, &error)),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Folders that were made for files; those that stay empty go.
+#[derive(Default)]
+struct CreatedFolders(Vec<PathBuf>);
+
+impl CreatedFolders {
+    /// Makes a folder and what is missing of the way to it; the outermost is kept first.
+    fn create(&mut self, folder: &Path) -> Result<(), Failure> {
+        let missing: Vec<&Path> =
+            folder.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists()).collect();
+        let missing: Vec<PathBuf> = missing.into_iter().rev().map(Path::to_owned).collect();
+        self.0.extend_from_slice(&missing);
+        interrupt::track_new_folders(missing, || fs::create_dir_all(folder))
+            .map_err(|error| write_failure(folder, &error))
+    }
+
+    /// They hold files now.
+    fn keep(mut self) -> Result<(), Failure> {
+        let parents = std::mem::take(&mut self.0);
+        sync_folders(&parents.iter().filter_map(|made| made.parent()).map(Path::to_owned).collect())
+    }
+}
+
+impl Drop for CreatedFolders {
+    fn drop(&mut self) {
+        for folder in self.0.iter().rev() {
+            // only an empty one goes; the failure itself is reported
+            let _ = fs::remove_dir(folder);
+        }
+    }
+}
+
+/// Refuses a place that something else than a file takes, or that no file can take: asked of all before any
+/// gets its name, so that none is left alone.
+pub fn check_path_free(path: &Path) -> Result<(), Failure> {
+    let taken = |at: &Path, found: &str, expected: &str| {
+        let at = at.display();
+        Err(Failure::Input(format!(
+            "{at}: is {found}, expected {expected} or nothing; remove it or choose another folder"
+        )))
+    };
+    let found = fs::symlink_metadata(path);
+    match path.parent() {
+        _ if path.is_dir() => taken(path, "a folder", "a file"),
+        Some(within) if within.exists() && !within.is_dir() => taken(within, "a file", "a folder"),
+        // (a name that is too long, for instance)
+        _ => found
+            .err()
+            .filter(|error| error.kind() != ErrorKind::NotFound)
+            .map_or(Ok(()), |error| Err(write_failure(path, &error))),
+    }
+}
+
+/// The file under a temporary name next to its place, locked where the file system can, and its hash.
+fn write_temporary(path: &Path, contents: impl Read) -> io::Result<(NamedTempFile, String)> {
+    let within = path.parent().unwrap_or(Path::new(""));
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(TEMPORARY_NAME.0).suffix(TEMPORARY_NAME.1).permissions(readable_by_all());
+    let mut file = interrupt::track_temporary_file(|| builder.tempfile_in(within))?;
+    let _ = file.as_file().try_lock();
+    let mut contents = HashingReader::new(contents);
+    io::copy(&mut contents, file.as_file_mut())?;
+    Ok((file, contents.finish()))
+}
+
+/// The same for a table in another dialect.
+fn write_temporary_table(
+    path: &Path,
+    plain: impl Read,
+    dialect: CsvDialect,
+) -> io::Result<(NamedTempFile, String)> {
+    let mut converted = tempfile::tempfile_in(path.parent().unwrap_or(Path::new("")))?;
+    dialect.convert_table(plain, io::BufWriter::new(&mut converted))?;
+    converted.rewind()?;
+    write_temporary(path, converted)
+}
+
+/// Removes what programs that were killed left in a folder on its way.
+fn remove_abandoned(folder: &Path) {
+    let passing = |name: &str| name.starts_with(TEMPORARY_NAME.0) && name.ends_with(TEMPORARY_NAME.1);
+    for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
+        if passing(&entry.file_name().to_string_lossy()) && is_abandoned(&entry.path()) {
+            let _ = fs::remove_file(entry.path()); // (it does no harm; the next command tries again)
+        }
+    }
+}
+
+fn is_abandoned(path: &Path) -> bool {
+    let is_old = |found: &fs::Metadata| {
+        found.is_file()
+            && found.modified().is_ok_and(|at| at.elapsed().is_ok_and(|age| age > ABANDONED_AFTER))
+    };
+    fs::symlink_metadata(path).is_ok_and(|found| is_old(&found))
+        && File::open(path).is_ok_and(|file| file.try_lock().is_ok())
+}
+
+/// Flushes files to the disk side by side: one commit of the file system then serves many, where one after
+/// the other would wait for one each.
+fn flush_files(staged: &[StagedFile]) -> Result<(), Failure> {
+    const AT_ONCE: usize = 64;
+    let flushed = |staged: &StagedFile| {
+        staged.file.as_file().sync_all().map_err(|error| write_failure(&staged.path, &error))
+    };
+    staged.chunks(AT_ONCE).try_for_each(|files| {
+        std::thread::scope(|scope| {
+            let waiting: Vec<_> = files.iter().map(|file| scope.spawn(move || flushed(file))).collect();
+            let stopped = |_| Err(Failure::Internal("a file could not be flushed to the disk".to_owned()));
+            waiting.into_iter().try_for_each(|handle| handle.join().unwrap_or_else(stopped))
+        })
+    })
+}
+
+/// What a new file gets from an ordinary program (the user's mask still applies); temporary files are private
+/// otherwise.
+#[cfg(unix)]
+fn readable_by_all() -> fs::Permissions {
+    std::os::unix::fs::PermissionsExt::from_mode(0o666)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,127 @@
+//! Several jobs one after the other, or a shard of them: whole fits, none of which is divided.
+
+use super::FitArgs;
+use crate::cli::args::GlobalArgs;
+use crate::cli::checkpoint::CHECKPOINT_FILE;
+use crate::cli::failure::{CommandOutcome, Failure};
+use crate::cli::files;
+use crate::cli::files::RESULT_FILE;
+use crate::cli::interrupt;
+use crate::cli::load::{LoadedJob, job_path};
+use crate::fit::result::{FitResult, FitStatus};
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// How a job of a list stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum BatchJobState {
+    /// Its result lies next to it, is of this job and version, and the search had converged; with how the fit
+    /// ended then.
+    Done(CommandOutcome),
+    /// There is none, or it is of something else, or the search had not converged.
+    Due,
+}
+
+impl BatchJobState {
+    pub fn read(problem: &LoadedJob) -> Self {
+        let path = problem.folder.join(RESULT_FILE);
+        let name = path.display().to_string();
+        let text = path.exists().then(|| files::read_json(&path).ok()).flatten();
+        let result = text.and_then(|text| FitResult::parse(&name, &text).ok());
+        let done = result.filter(|result| {
+            let of = (result.fingerprint.as_str(), result.version.as_str(), result.seed);
+            let expected =
+                (problem.problem.fingerprint(), env!("CARGO_PKG_VERSION"), problem.job().search.seed);
+            result.status == FitStatus::Converged && of == expected
+        });
+        let ended = |result: FitResult| {
+            if result.explains_recordings() { CommandOutcome::Done } else { CommandOutcome::StoppedEarly }
+        };
+        done.map_or(Self::Due, |result| Self::Done(ended(result)))
+    }
+
+    pub fn describe(self) -> &'static str {
+        match self {
+            Self::Done(CommandOutcome::Done) => "converged",
+            Self::Done(CommandOutcome::StoppedEarly) => {
+                "converged, and the model does not explain the recording"
+            }
+            Self::Due => "no result of this job and version, or the search has not converged",
+        }
+    }
+}
+
+/// Refuses a list in which two jobs would write the same files.
+pub fn check_distinct_folders(jobs: &[PathBuf]) -> Result<(), Failure> {
+    let mut folders: BTreeMap<PathBuf, &Path> = BTreeMap::new();
+    for job in jobs {
+        let file = job_path(job);
+        let folder = files::containing_folder(&file);
+        let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
+        if let Some(other) = folders.insert(folder, job) {
+            return Err(Failure::Input(format!(
+                "{}: lies in the folder of {}, where both would write {CHECKPOINT_FILE} and {RESULT_FILE}; expected a folder \
+                 for each job",
+                job.display(),
+                other.display()
+            )));
+        }
+    }
+    Ok(())
+}
+
+impl FitArgs {
+    /// Fits the jobs of the list that are in the shard and not done yet. One that is refused does not stop
+    /// the others.
+    pub fn run_batch(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        check_distinct_folders(&self.jobs)?;
+        let (mut refused, mut early) = (None, Vec::new());
+        let mine =
+            self.jobs.iter().enumerate().filter(|(at, _)| self.shard.is_none_or(|of| of.contains(*at)));
+        let mine: Vec<&PathBuf> = mine.map(|(_, job)| job).collect();
+        for (at, job) in mine.iter().enumerate() {
+            if interrupt::control_flow().is_break() {
+                let left = mine.len() - at;
+                warn_line!("stopped: {left} of {} jobs were not begun; the same command goes on", mine.len());
+                return Ok(CommandOutcome::StoppedEarly);
+            }
+            if !global.quiet {
+                print_line!("{} ({} of {})", job.display(), at + 1, mine.len());
+            }
+            match self.run_batch_job(job, global) {
+                Ok(CommandOutcome::Done) => {}
+                Ok(CommandOutcome::StoppedEarly) => early.push(job.display().to_string()),
+                Err(failure) => {
+                    warn_line!("error: {failure}");
+                    refused.get_or_insert(failure);
+                }
+            }
+        }
+        if !early.is_empty() && !global.quiet {
+            print_line!("not converged, or not explained by the model: {}", early.join(", "));
+        }
+        match refused {
+            Some(Failure::Input(_)) => {
+                Err(Failure::Input("not every job of the list could be fitted, see above".to_owned()))
+            }
+            Some(internal) => Err(internal),
+            None if early.is_empty() => Ok(CommandOutcome::Done),
+            None => Ok(CommandOutcome::StoppedEarly),
+        }
+    }
+
+    fn run_batch_job(&self, job: &Path, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let problem = LoadedJob::load(job)?;
+        if let BatchJobState::Done(ended) = BatchJobState::read(&problem)
+            && self.shard.is_some()
+        {
+            if !global.quiet {
+                print_line!("its result is there already");
+            }
+            return Ok(ended);
+        }
+        let has_journal = problem.folder.join(CHECKPOINT_FILE).exists();
+        let resume = has_journal && (self.resume || self.shard.is_some());
+        self.fit_job(&problem, resume, global)
+    }
+}

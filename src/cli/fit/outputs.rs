@@ -1,0 +1,140 @@
+//! What a fit leaves next to its result: the parameters in a row, the recordings beside the model, and the
+//! scenes at the estimates.
+
+use crate::cli::failure::Failure;
+use crate::cli::files;
+use crate::cli::files::{OutputFolder, WritePolicy};
+use crate::cli::load::LoadedJob;
+use crate::compare::{COMPARISON_FILE, FittedRecording, ModelRun, comparison_table, run_conditions};
+use crate::draft::{FittedScene, write_fitted_scene};
+use crate::fit::job::HeadSource;
+use crate::fit::result::{FitResult, FitStatus, NuisanceResult};
+
+/// The parameters in a row.
+const PARAMETERS_FILE: &str = "parameters.csv";
+
+impl LoadedJob {
+    /// Refuses a folder in which the files of this fit have no place.
+    pub fn check_outputs(&self, writer: &WritePolicy) -> Result<(), Failure> {
+        let names = self.output_names();
+        let names: Vec<&str> = names.iter().map(String::as_str).collect();
+        OutputFolder::check(&self.folder, writer, &names)?;
+        (0..self.job().conditions.len()).try_for_each(|at| self.driver_path(at).map(|_| ()))
+    }
+
+    fn output_names(&self) -> Vec<String> {
+        let scenes = (0..self.job().conditions.len()).map(|at| self.scene_file_name(at));
+        [files::RESULT_FILE, PARAMETERS_FILE, COMPARISON_FILE]
+            .map(str::to_owned)
+            .into_iter()
+            .chain(scenes)
+            .collect()
+    }
+
+    /// Writes what was found into the folder of the job.
+    pub fn write_outputs(&self, result: &FitResult, writer: &WritePolicy) -> Result<(), Failure> {
+        let mut files = vec![(files::RESULT_FILE.to_owned(), result.to_json().into_bytes())];
+        if result.status != FitStatus::Failed {
+            files.push((PARAMETERS_FILE.to_owned(), self.parameters_csv(result)?));
+            files.extend(self.comparison_files(result)?);
+        }
+        files::write_outputs(&self.folder, writer, &files)
+    }
+
+    /// A file for each condition; of one condition alone without a number.
+    fn scene_file_name(&self, condition: usize) -> String {
+        match self.job().conditions.len() {
+            1 => "fitted-scene.toml".to_owned(),
+            _ => format!("fitted-scene-{}.toml", condition + 1),
+        }
+    }
+
+    /// Every estimate with its interval in one row, so that rows of many fits make a table.
+    fn parameters_csv(&self, result: &FitResult) -> Result<Vec<u8>, Failure> {
+        let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
+        let synthetic = self.measured.iter().any(|loaded| loaded.recording.is_synthetic());
+        let mut columns = vec![
+            ("title".to_owned(), result.title.clone()),
+            ("status".to_owned(), result.status.name().to_owned()),
+            ("explained".to_owned(), result.explains_recordings().to_string()),
+            ("synthetic".to_owned(), synthetic.to_string()),
+        ];
+        let mut add = |name: &str, found: [Option<f64>; 3]| {
+            let ends = ["", "_lower_95", "_upper_95"].map(|end| format!("{name}{end}"));
+            columns.extend(ends.into_iter().zip(found.map(number)));
+        };
+        let of_scene = |nuisance: &&NuisanceResult| nuisance.recording.is_none();
+        for constant in result.nuisances.iter().filter(of_scene) {
+            add(&constant.name, [Some(constant.estimate), constant.lower_95, constant.upper_95]);
+        }
+        for (name, found) in &result.parameters {
+            add(name, [Some(found.estimate), found.lower_95, found.upper_95]);
+        }
+        let verdicts = result.parameters.iter();
+        columns.extend(
+            verdicts.map(|(name, found)| (format!("{name}_verdict"), found.verdict.name().to_owned())),
+        );
+        let (names, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
+        let mut table = csv::Writer::from_writer(Vec::new());
+        table.write_record(names).map_err(Failure::internal)?;
+        table.write_record(values).map_err(Failure::internal)?;
+        table.into_inner().map_err(Failure::internal)
+    }
+
+    /// The recordings beside the model, and the scenes.
+    fn comparison_files(&self, result: &FitResult) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+        let model = self.problem.fitted_model(result).map_err(Failure::input)?;
+        let runs = match run_conditions(self.job(), &model, result) {
+            Ok(runs) => runs,
+            Err(why) => {
+                warn_line!(
+                    "warning: {}: no {COMPARISON_FILE} and no scene: the best model does not run: {why}",
+                    self.file
+                );
+                return Ok(Vec::new());
+            }
+        };
+        let measured = self.measured.iter();
+        let measured: Vec<_> = measured
+            .map(|m| FittedRecording { recording: &m.recording, file: m.file.as_ref(), film: None })
+            .collect();
+        let table = comparison_table(self.job(), &measured, &runs);
+        let mut files: Vec<_> =
+            table.into_iter().map(|table| (table.file.to_owned(), table.text.into_bytes())).collect();
+        for (at, run) in runs.iter().enumerate() {
+            files.extend(
+                self.fitted_scene_text(at, run, result)?
+                    .map(|text| (self.scene_file_name(at), text.into_bytes())),
+            );
+        }
+        Ok(files)
+    }
+
+    /// The recording that drives the fitted scene of a condition, as that scene names it.
+    fn driver_path(&self, at: usize) -> Result<Option<String>, Failure> {
+        let condition = &self.job().conditions[at];
+        let by_trace =
+            self.problem.traces().iter().find(|trace| trace.condition == at).map(|trace| trace.head);
+        let driven = [Some(condition.head), by_trace].contains(&Some(HeadSource::Recording));
+        let driver = if driven { self.recording_paths.get(at) } else { self.drivers[at].as_ref() };
+        driver.map(|path| files::relative_path(&self.folder, path)).transpose()
+    }
+
+    fn fitted_scene_text(
+        &self,
+        at: usize,
+        run: &ModelRun,
+        result: &FitResult,
+    ) -> Result<Option<String>, Failure> {
+        let condition = &self.job().conditions[at];
+        let recording = self.measured.get(at).map(|loaded| &loaded.recording);
+        let driver = self.driver_path(at)?;
+        Ok(write_fitted_scene(&FittedScene {
+            scene: &run.scene,
+            condition: &condition.name,
+            synthetic: recording.map(|recording| recording.is_synthetic()),
+            recording: driver.as_deref(),
+            result,
+        }))
+    }
+}

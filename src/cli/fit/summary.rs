@@ -1,0 +1,206 @@
+//! What a fit found, on standard output: what is met, what is known of the parameters, and what a reader has
+//! to know.
+
+use super::CompletedFit;
+use crate::fit::linear_model::ParameterCombination;
+use crate::fit::misfit::{ChannelMisfit, TraceMisfit, far_from_priors, unexplained_headline};
+use crate::fit::result::{FeatureResult, FitResult, NuisanceResult, ParameterResult};
+use crate::text;
+use crate::text::{format_digits, to_ascii};
+
+/// Digits of a number that is shown.
+const DIGITS: usize = 5;
+
+/// Features, parameters and reservations.
+pub fn print_summary(solved: &CompletedFit) {
+    let result = &solved.result;
+    if let Some(misfit) = &result.misfit {
+        print_misfit(misfit);
+    } else if !result.explains_recordings() {
+        print_line!("{}", to_ascii(&unexplained_headline(&far_from_priors(&result.nuisances))));
+    }
+    print_line!("{}: {}; cost {:.4}", result.status.name(), describe_evaluations(solved), result.cost);
+    print_features(result);
+    print_line!("");
+    print_line!("{:<36} {:>11}  {:<25} verdict", "parameter", "estimate", "95 % interval");
+    for (name, p) in &result.parameters {
+        print_line!(
+            "{name:<36} {:>11}  {:<25} {}",
+            format_value(p.estimate),
+            format_interval(p),
+            p.verdict.name()
+        );
+        p.reasons.iter().for_each(|why| print_line!("  {why}"));
+    }
+    print_nuisances(&result.nuisances);
+    print_notes(result);
+}
+
+/// Such as `1,234 evaluations of the model in 12.3 s (100/s)`.
+fn describe_evaluations(solved: &CompletedFit) -> String {
+    let evaluations = &solved.result.evaluations;
+    let what = match solved.result.misfit {
+        Some(_) => "iterates of the search",
+        None => "evaluations of the model",
+    };
+    let (total, made) = (evaluations.total, evaluations.total.saturating_sub(solved.replayed));
+    let seconds = solved.wall.as_secs_f64();
+    let rate = format!("in {seconds:.1} s ({:.1}/s)", made as f64 / seconds.max(f64::MIN_POSITIVE));
+    let made = match (solved.replayed, made) {
+        (0, _) => format!("{total} {what} {rate}"),
+        (_, 0) => format!("{total} {what}, all from the journal"),
+        (replayed, made) => {
+            format!("{total} {what}, {replayed} from the journal and {made} {rate}")
+        }
+    };
+    let failed: Vec<String> =
+        evaluations.failed.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
+    let failed = if failed.is_empty() { String::new() } else { format!(", failed: {}", failed.join(", ")) };
+    made + &failed
+}
+
+fn print_features(result: &FitResult) {
+    if result.components.is_empty() && result.features.is_empty() && result.held_out.is_empty() {
+        return;
+    }
+    print_line!("{:<36} {:>11} {:>11} {:<4} {:>8}  met", "feature", "target", "model", "unit", "error, %");
+    for c in &result.components {
+        print_feature_row(&c.name, (c.target_hz, c.model_hz, "Hz"), c.relative_error, c.pass);
+    }
+    for f in &result.features {
+        print_feature(f, "");
+    }
+    for f in &result.held_out {
+        print_feature(f, "held out: ");
+    }
+}
+
+fn print_feature(f: &FeatureResult, prefix: &str) {
+    print_feature_row(
+        &format!("{prefix}{}", f.name),
+        (f.target, f.value_seen(), &f.unit),
+        f.relative_error,
+        f.pass,
+    );
+}
+
+fn print_feature_row(
+    name: &str,
+    (target, model, unit): (f64, Option<f64>, &str),
+    error: Option<f64>,
+    met: bool,
+) {
+    let model = model.map_or("none".to_owned(), format_value);
+    let error = error.map_or("-".to_owned(), |error| format!("{:+.2}", 100.0 * error));
+    print_line!(
+        "{name:<36} {:>11} {model:>11} {unit:<4} {error:>8}  {}",
+        format_value(target),
+        if met { "yes" } else { "no" }
+    );
+}
+
+fn format_interval(p: &ParameterResult) -> String {
+    text::format_interval(p.lower_95, p.upper_95, format_value)
+}
+
+/// What was known before the search, what the features determine together, and the notes.
+fn print_notes(result: &FitResult) {
+    print_line!("");
+    for combination in &result.combinations {
+        print_line!("{}", describe_combination(combination));
+    }
+    for note in &result.notes {
+        // those of the gate say when they were made
+        print_line!("{}{note}", if result.gate.notes.contains(note) { "" } else { "note: " });
+    }
+}
+
+fn describe_combination(combination: &ParameterCombination) -> String {
+    let percent = 100.0 * combination.sd_relative;
+    let product = combination.describe();
+    match combination.determined {
+        true if percent > 0.0 => format!("determined: {product} (standard deviation {percent:.2} %)"),
+        true => format!("determined: {product}"),
+        false => format!("left open:  {product}"),
+    }
+}
+
+pub(super) fn format_value(value: f64) -> String {
+    to_ascii(&format_digits(value, DIGITS))
+}
+
+// Residuals of the traces on standard output, before anything else is said.
+
+/// Most segments of a channel that are named.
+const MOST_SEGMENTS: usize = 3;
+
+/// The first sentence, residuals against noise, and the misfit over the length of the segments.
+pub fn print_misfit(misfit: &TraceMisfit) {
+    print_line!("{}", text::to_ascii(&misfit.headline()));
+    print_line!(
+        "{:<24} {:<11} {:>12} {:>10} {:>9} {:>12}",
+        "recording",
+        "channel",
+        "residual, um",
+        "noise, um",
+        "chi2/dof",
+        "neighbours"
+    );
+    misfit.channels.iter().for_each(print_channel_misfit);
+    print_line!("");
+    print_line!("{:<24} {:>11} {:>12} {:>9}", "segments", "number", "bad ones", "chi2/dof");
+    for stage in &misfit.stages {
+        let length = format!("of {} ms", format_value(1e3 * stage.segment_s));
+        let (count, bad, chi2) = (stage.segments, stage.bad_segments, format_value(stage.chi2_per_dof));
+        print_line!("{length:<24} {count:>11} {bad:>12} {chi2:>9}");
+    }
+    misfit.channels.iter().for_each(print_worst_segments);
+    print_line!("");
+}
+
+fn print_channel_misfit(c: &ChannelMisfit) {
+    print_line!(
+        "{:<24} {:<11} {:>12} {:>10} {:>9} {:>12}",
+        c.recording,
+        c.channel,
+        format_value(1e6 * c.residual_rms_m),
+        format_value(1e6 * c.noise_m),
+        format_value(c.chi2_per_dof),
+        c.autocorrelation_1.map_or_else(|| "-".to_owned(), |r| format!("{r:+.2}"))
+    );
+}
+
+fn print_worst_segments(c: &ChannelMisfit) {
+    let segment = |w: &crate::fit::misfit::WorstSegment| {
+        format!(
+            "{} to {} s (chi2/dof {})",
+            format_value(w.start_s),
+            format_value(w.end_s),
+            format_value(w.chi2_per_dof)
+        )
+    };
+    let named: Vec<String> = c.worst.iter().take(MOST_SEGMENTS).map(segment).collect();
+    if !named.is_empty() {
+        print_line!("worst in {}, {}: {}", c.recording, c.channel, named.join(", "));
+    }
+}
+
+/// What was estimated besides the parameters.
+pub fn print_nuisances(list: &[NuisanceResult]) {
+    if list.is_empty() {
+        return;
+    }
+    print_line!("");
+    print_line!(
+        "{:<36} {:>11}  {:<25} known beforehand",
+        "camera and constants",
+        "estimate",
+        "95 % interval"
+    );
+    for n in list {
+        let name = n.recording.as_ref().map_or_else(|| n.name.clone(), |of| format!("{of}: {}", n.name));
+        let interval = text::format_interval(n.lower_95, n.upper_95, format_value);
+        let (prior, sd) = (format_value(n.prior), format_value(n.prior_sd));
+        print_line!("{name:<36} {:>11}  {interval:<25} {prior} +- {sd}", format_value(n.estimate));
+    }
+}

@@ -1,0 +1,359 @@
+//! `wiperlab import`.
+
+use super::args::GlobalArgs;
+use super::args::parse_count;
+use super::failure::{CommandOutcome, Failure};
+use super::files;
+use super::files::{OutputCommand, OutputFolder, OutputStaging, Overwrite, WritePolicy};
+use super::inspect::Inspection;
+use super::output;
+use super::progress;
+use crate::import::{
+    self, ColumnMap, CompanionFile, CoordinateScale, Import, ImportOptions, ImportSource, TimeColumn,
+};
+use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_blocks};
+use clap::{Args, ValueEnum};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// Names of formats in a line of the help.
+const NAMES_A_LINE: usize = 8;
+
+fn after_help() -> String {
+    let names: Vec<String> =
+        import::format_names().chunks(NAMES_A_LINE).map(|names| names.join(", ")).collect();
+    format!(
+        "The format is found from the content (docs/formats.md describes each):\n{}.\n\n{DETAILS}",
+        names.join(",\n")
+    )
+}
+
+const DETAILS: &str = "\
+Points: tracks called `tip` and `head` need no option. Otherwise name them: NAME, or FILE:NAME when several
+files have a track of that name, or FILE when the file has a single track.
+
+Columns (any plain table): KEY=COLUMN pairs; a column is a number from 1 or a name of the header. Keys: frame
+(whole numbers; frame=row if every row is a frame), time (s), time-ms, tip-x, tip-y, head-x, head-y,
+tip-confidence, head-confidence; or track, x, y, confidence if each row names its point. Frame or time and
+one x are required; other columns stay empty.
+
+Coordinates keep the file's origin: they are scaled, and y is mirrored if it points down. The import asks for
+every rate, unit or direction of y that neither the file, nor its format, nor a camera's .cih fixes.
+
+Examples:
+  wiperlab import run7.txt --out data/run7 --frame-rate-hz 10000 --scale mm --y-axis up \\
+      --point tip=lip --point head=holder
+  wiperlab import run7.csv --out data/run7 --frame-rate-hz 10000 --scale 21.5um/px --y-axis down \\
+      --columns frame=1,tip-x=2,tip-y=3,head-x=4,head-y=5";
+
+#[derive(Debug, Args)]
+#[command(after_help = after_help())]
+pub struct ImportArgs {
+    #[command(flatten)]
+    typed: Box<ImportOptionArgs>, // far larger than the arguments of any other command
+}
+
+impl ImportArgs {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        self.typed.run(global)
+    }
+}
+
+#[derive(Debug, Args)]
+pub struct ImportOptionArgs {
+    /// Exported tables; several are merged on one frame grid
+    #[arg(value_name = "FILE", required = true)]
+    pub sources: Vec<PathBuf>,
+    /// Folder of the recording, e.g. data/NAME
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    /// auto, or the name of a format (see below)
+    #[arg(long, default_value = "auto", value_name = "FORMAT")]
+    pub format: String,
+    /// Rate at which the camera recorded, frames/s (required unless the file or the camera's record has it)
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
+    pub frame_rate_hz: Option<f64>,
+    /// Length a pixel such as 21.5um/px, or the unit of the file: m, cm, mm, um (required unless the
+    /// file names a length)
+    #[arg(long, value_name = "SCALE", allow_hyphen_values = true)]
+    pub scale: Option<String>,
+    /// Direction of y in the file (required unless the format fixes it)
+    #[arg(long, value_enum)]
+    pub y_axis: Option<YDirection>,
+    /// Track of a point: tip=NAME or head=NAME
+    #[arg(long, value_name = "POINT=TRACK")]
+    pub point: Vec<String>,
+    /// Columns of a plain table, e.g. time=1,tip-x=2,tip-y=3,head-x=4,head-y=5
+    #[arg(long, value_name = "KEY=COLUMN,...")]
+    pub columns: Option<String>,
+    /// What the time column holds: seconds or milliseconds of the recording itself (the rate may then be left
+    /// out), numbers of frames, or times of playback (then they only count frames)
+    #[arg(long, value_enum)]
+    pub time: Option<TimeMeaning>,
+    /// Frames from row to row where only every n-th frame was tracked and the table has no frame column
+    #[arg(long, value_name = "N", value_parser = parse_count, allow_negative_numbers = true)]
+    pub frame_step: Option<usize>,
+    /// Exposure of a frame, s
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    pub exposure_s: Option<f64>,
+    /// Positions of less confidence count as missing, 0 to 1
+    #[arg(long, value_name = "P", allow_negative_numbers = true)]
+    pub min_likelihood: Option<f64>,
+    /// Measure the tilt of the camera on the path of the tip and turn both tracks by it
+    #[arg(long)]
+    pub level: bool,
+    /// Text encoding if the content does not show it, e.g. shift_jis
+    #[arg(long, value_name = "NAME")]
+    pub encoding: Option<String>,
+    /// A fact of the test for [conditions], e.g. glass=wet (repeatable)
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub condition: Vec<String>,
+    /// Specification of the twin that made the export; marks the recording as synthetic
+    #[arg(long, value_name = "SPEC.toml")]
+    pub twin: Option<PathBuf>,
+    /// One JSON object on standard output: format, notes, and everything that `inspect --json` says
+    #[arg(long)]
+    pub json: bool,
+    /// Check and report only, with the first rows; write nothing
+    #[arg(long)]
+    pub dry_run: bool,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum YDirection {
+    Up,
+    Down,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TimeMeaning {
+    Real,
+    Ms,
+    Frames,
+    Playback,
+}
+
+impl ImportOptionArgs {
+    fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let options = self.import_options()?;
+        let steps = progress::start_steps("import", global.quiet);
+        steps.show_step("reading the export");
+        let sources =
+            self.sources.iter().map(|path| read_source(path)).collect::<Result<Vec<_>, Failure>>()?;
+        let imported = import::import(&sources, &options).map_err(Failure::input)?;
+        let writer = self.write_policy(&sources);
+        OutputFolder::check(&self.out, &writer, &[TRACE_FILE, DESCRIPTION_FILE])?;
+        if !self.dry_run {
+            steps.show_step("writing the recording");
+            write_recording(&self.out, &writer, &sources, &imported)?;
+        }
+        drop(steps);
+        if self.json {
+            let text = serde_json::to_string_pretty(&self.json_summary(&imported, &sources));
+            output::write_stdout(&output::escape_lines(&text.map_err(Failure::internal)?));
+        } else if global.quiet {
+            imported.report.warnings().for_each(|warning| warn_line!("warning: {warning}"));
+        } else {
+            self.print_report(&imported, &sources);
+        }
+        Ok(CommandOutcome::Done)
+    }
+
+    /// The options as typed become the library's.
+    fn import_options(&self) -> Result<ImportOptions, Failure> {
+        let mut options = ImportOptions {
+            name: self
+                .out
+                .file_name()
+                .map_or_else(|| self.out.display().to_string(), |name| name.to_string_lossy().into_owned()),
+            format: Some(self.format.clone()),
+            encoding: self.encoding.clone(),
+            frame_rate_hz: self.frame_rate_hz,
+            scale: self.scale.as_deref().map(CoordinateScale::parse).transpose().map_err(Failure::input)?,
+            y_axis: self
+                .y_axis
+                .map(|direction| if direction == YDirection::Up { YAxis::Up } else { YAxis::Down }),
+            exposure_s: self.exposure_s,
+            time: self.time.map(|meaning| match meaning {
+                TimeMeaning::Real => TimeColumn::Real,
+                TimeMeaning::Ms => TimeColumn::Milliseconds,
+                TimeMeaning::Frames => TimeColumn::Frames,
+                TimeMeaning::Playback => TimeColumn::Playback,
+            }),
+            frame_step: self.frame_step,
+            columns: self.columns.as_deref().map(ColumnMap::parse).transpose().map_err(Failure::input)?,
+            min_likelihood: self.min_likelihood,
+            level: self.level,
+            ..ImportOptions::default()
+        };
+        for point in &self.point {
+            options.add_point(point).map_err(Failure::input)?;
+        }
+        for condition in &self.condition {
+            options.add_condition(condition).map_err(Failure::input)?;
+        }
+        if let Some(path) = &self.twin {
+            options.twin = Some((path.display().to_string(), files::read_toml(path)?));
+        }
+        Ok(options)
+    }
+
+    /// A folder keeps one recording, and a measured one for ever.
+    fn write_policy(&self, sources: &[ImportSource]) -> WritePolicy {
+        let exports = import::preserved_files(sources)
+            .into_iter()
+            .map(|(_, bytes)| crate::text::sha256(bytes))
+            .collect();
+        WritePolicy { exports, ..WritePolicy::new(OutputCommand::Import, self.overwrite) }
+    }
+
+    fn json_summary(&self, imported: &Import, sources: &[ImportSource]) -> ImportSummary {
+        ImportSummary {
+            out: self.out.display().to_string(),
+            written: !self.dry_run,
+            files: output_names(sources).map(str::to_owned).collect(),
+            format: imported.report.format.clone(),
+            reason: imported.report.reason.clone(),
+            notes: imported.report.notes.clone(),
+            inspection: Inspection::from_import(&imported.recording, &imported.file),
+        }
+    }
+
+    fn print_report(&self, imported: &Import, sources: &[ImportSource]) {
+        let grid = imported.recording.grid();
+        let verb = if self.dry_run { "would write" } else { "wrote" };
+        let kind = if imported.recording.is_synthetic() { "synthetic recording" } else { "recording" };
+        print_line!(
+            "{verb} {}: {kind}, {} frames at {} frames/s, {:.6} s",
+            self.out.display(),
+            grid.frames,
+            grid.frame_rate_hz,
+            grid.duration_s()
+        );
+        print_line!("format: {} ({})", imported.report.format, imported.report.reason);
+        for note in &imported.report.notes {
+            print_line!("note: {note}");
+        }
+        if self.dry_run {
+            print_preview(imported, sources);
+        }
+        let inspection = Inspection::from_import(&imported.recording, &imported.file);
+        for line in inspection.verdict_lines() {
+            print_line!("verdict: {line}");
+        }
+    }
+}
+
+/// What `--json` prints of an import.
+#[derive(Debug, Serialize)]
+struct ImportSummary {
+    out: String,
+    /// False for a dry run.
+    written: bool,
+    /// Files in the folder.
+    files: Vec<String>,
+    format: String,
+    reason: String,
+    notes: Vec<String>,
+    #[serde(flatten)]
+    inspection: Inspection,
+}
+
+/// Names of the files that an import writes.
+fn output_names(sources: &[ImportSource]) -> impl Iterator<Item = &str> {
+    import::preserved_files(sources).into_iter().map(|(name, _)| name).chain([TRACE_FILE, DESCRIPTION_FILE])
+}
+
+/// Rows of the trace that a dry run shows.
+const PREVIEWED_ROWS: usize = 3;
+
+/// The names of the files and the first rows of the traces.
+fn print_preview(imported: &Import, sources: &[ImportSource]) {
+    print_line!("files: {}", output_names(sources).collect::<Vec<_>>().join(", "));
+    let start: String = trace_blocks(&imported.recording).take(2).collect();
+    for line in start.lines().take(PREVIEWED_ROWS + 1) {
+        print_line!("{TRACE_FILE}: {line}");
+    }
+}
+
+/// Longest line of an export, bytes: a hundred thousand columns.
+const LONGEST_LINE: usize = 1_000_000;
+/// Bytes of it that a refusal shows.
+const LINE_SHOWN: usize = 40;
+
+/// Bytes of a table; what has no lines is none, and its cells would fill memory. (Markup may be one line.)
+fn read_table(path: &Path) -> Result<Vec<u8>, Failure> {
+    let bytes = files::read_data(path)?;
+    let is_markup = bytes.iter().take(16).any(|byte| *byte == b'<');
+    let mut lines = bytes.split(|byte| matches!(byte, b'\n' | b'\r'));
+    match lines.find(|line| line.len() > LONGEST_LINE).filter(|_| !is_markup) {
+        Some(line) => Err(Failure::Input(format!(
+            "{}: found a line of {} bytes, which begins with `{}`, expected at most {LONGEST_LINE} and a row a frame; export the table again, with line ends",
+            path.display(),
+            line.len(),
+            String::from_utf8_lossy(&line[..LINE_SHOWN])
+        ))),
+        None => Ok(bytes),
+    }
+}
+
+/// A file with its companions.
+fn read_source(path: &Path) -> Result<ImportSource, Failure> {
+    if files::is_standard_input(path) {
+        return Ok(ImportSource::without_companions(files::display_name(path), read_table(path)?));
+    }
+    let name = path.display().to_string();
+    let mut names = import::companion_names(&name);
+    names.retain(|companion| *companion != name && Path::new(companion).is_file());
+    // one file under two spellings where the file system knows no capitals
+    names.dedup_by(|a, b| a.eq_ignore_ascii_case(b));
+    let companions = names
+        .into_iter()
+        .map(|name| Ok(CompanionFile { bytes: files::read_data(Path::new(&name))?, name }))
+        .collect::<Result<Vec<_>, Failure>>()?;
+    Ok(ImportSource { bytes: read_table(path)?, name, companions })
+}
+
+/// Imports sources into a folder.
+pub fn import_into(
+    folder: &Path,
+    sources: &[ImportSource],
+    options: &ImportOptions,
+    overwrite: Overwrite,
+) -> Result<(), Failure> {
+    let imported = import::import(sources, options).map_err(Failure::input)?;
+    write_recording(folder, &WritePolicy::new(OutputCommand::Import, overwrite), sources, &imported)
+}
+
+/// What the user noted in a description which is replaced, and the command line does not give, stays: facts
+/// of the test, and where the pictures of its frames are.
+fn keep_user_notes(folder: &Path, description: &mut RecordingFile) {
+    let replaced = files::read_text(&folder.join(DESCRIPTION_FILE)).ok();
+    let replaced = replaced.and_then(|text| RecordingFile::parse(DESCRIPTION_FILE, &text).ok());
+    let Some(replaced) = replaced else { return };
+    description.video = replaced.video;
+    for (key, value) in replaced.conditions {
+        description.conditions.entry(key).or_insert(value);
+    }
+}
+
+/// The exports as they came, the traces and the description.
+fn write_recording(
+    folder: &Path,
+    writer: &WritePolicy,
+    sources: &[ImportSource],
+    imported: &Import,
+) -> Result<(), Failure> {
+    let names: Vec<&str> = output_names(sources).collect();
+    let mut staging = OutputStaging::new(folder, writer, &names)?;
+    for (name, bytes) in import::preserved_files(sources) {
+        staging.stage_file(name, bytes)?;
+    }
+    let trace = staging.stage_file(TRACE_FILE, files::ChunkReader::new(trace_blocks(&imported.recording)))?;
+    let mut description = RecordingFile { trace_sha256: Some(trace), ..imported.file.clone() };
+    keep_user_notes(folder, &mut description);
+    staging.stage_file(DESCRIPTION_FILE, description.to_toml().map_err(Failure::internal)?.as_bytes())?;
+    staging.commit()
+}

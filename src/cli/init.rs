@@ -1,0 +1,130 @@
+//! `wiperlab init`.
+
+use super::args::GlobalArgs;
+use super::failure::{CommandOutcome, Failure};
+use super::files;
+use super::files::{OutputCommand, OutputFolder, Overwrite, WritePolicy};
+use super::load::load_recording;
+use crate::draft::{self, KnownStroke};
+use crate::simulate::scene::Scene;
+use clap::Args;
+use std::path::{Path, PathBuf};
+
+const SCENE: &str = "scene.toml";
+const JOB: &str = "job.toml";
+
+const AFTER_HELP: &str = "\
+Both files have comments: what was found in the recording, why each number was chosen, and which numbers only
+you can measure (marked YOURS). Replace those, then:
+
+    wiperlab fit DIR/job.toml
+    wiperlab report DIR";
+
+#[derive(Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct InitArgs {
+    /// A recording's folder, or a trace.csv alone
+    #[arg(value_name = "RECORDING", required_unless_present = "scene", conflicts_with = "scene")]
+    pub recording: Option<PathBuf>,
+    /// Only a scene, without a recording
+    #[arg(long)]
+    pub scene: bool,
+    /// For a blade whose neck has no shoulder to lean on
+    #[arg(long)]
+    pub no_shoulder: bool,
+    /// Amplitude of the head, half its stroke, m, where the head was not tracked; otherwise estimated
+    #[arg(long, value_name = "M", requires = "recording", allow_negative_numbers = true)]
+    pub amplitude_m: Option<f64>,
+    /// Strokes there and back a second, Hz, where the head was not tracked; otherwise estimated
+    #[arg(long, value_name = "HZ", requires = "recording", allow_negative_numbers = true)]
+    pub frequency_hz: Option<f64>,
+    /// Folder for scene.toml and job.toml
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+/// Files with their names, and what they rest on.
+struct DraftFiles {
+    texts: Vec<(&'static str, String)>,
+    words: Vec<String>,
+}
+
+impl InitArgs {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let writer = WritePolicy::new(OutputCommand::Init, self.overwrite);
+        let names: &[&str] = if self.scene { &[SCENE] } else { &[SCENE, JOB] };
+        OutputFolder::check(&self.out, &writer, names)?;
+        let DraftFiles { texts, words } = match &self.recording {
+            Some(recording) => self.draft_for_recording(recording)?,
+            None => {
+                let scene = draft::write_scene_alone(!self.no_shoulder).map_err(Failure::internal)?;
+                DraftFiles { texts: vec![(SCENE, scene)], words: Vec::new() }
+            }
+        };
+        let outputs: Vec<_> = texts.into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
+        files::write_outputs(&self.out, &writer, &outputs)?;
+        if !global.quiet {
+            self.print_next_steps(&words);
+        }
+        Ok(CommandOutcome::Done)
+    }
+
+    fn draft_for_recording(&self, path: &Path) -> Result<DraftFiles, Failure> {
+        if files::is_standard_input(path) {
+            let expected = "a folder or a file, which scene and job can name";
+            return Err(Failure::Input(format!(
+                "-: found standard input, expected {expected}; save it as trace.csv"
+            )));
+        }
+        let loaded = load_recording(path)?;
+        let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
+        let found = draft::DraftFindings::from_recording(&loaded.recording, exposure_s, self.known_stroke()?)
+            .map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
+        let seen = files::relative_path(&self.out, path)?;
+        let scene = draft::write_scene(&found, &seen, !self.no_shoulder).map_err(Failure::internal)?;
+        let file = self.out.join(SCENE).display().to_string();
+        Scene::parse_with_recording(&file, &scene, |_| Ok(loaded.recording.clone()))
+            .map_err(|error| {
+                Failure::Input(format!(
+                    "{}: found {:.4} s, too short or too slow a motion for a run to start in; expected a head that moves by several millimetres; film more of the stroke ({error})",
+                    path.display(),
+                    found.length_s()
+                ))
+            })?;
+        let job = draft::write_job(&found, &loaded.recording, [&seen, SCENE], !self.no_shoulder);
+        Ok(DraftFiles { texts: vec![(SCENE, scene), (JOB, job)], words: found.describe() })
+    }
+
+    /// The stroke as typed.
+    fn known_stroke(&self) -> Result<KnownStroke, Failure> {
+        let typed = [("--amplitude-m", self.amplitude_m), ("--frequency-hz", self.frequency_hz)];
+        for (option, value) in typed {
+            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
+                return Err(Failure::Input(format!("{option}: found {value}, expected a number above 0")));
+            }
+        }
+        Ok(KnownStroke { amplitude_m: self.amplitude_m, frequency_hz: self.frequency_hz })
+    }
+
+    fn print_next_steps(&self, words: &[String]) {
+        words.iter().for_each(|line| print_line!("found: {line}"));
+        let (scene, job) = (self.out.join(SCENE), self.out.join(JOB));
+        print_line!("written to {}", self.out.display());
+        print_line!(
+            "next: replace the numbers marked {} in {}; they are those of an example",
+            draft::YOURS_MARK,
+            scene.display()
+        );
+        if self.scene {
+            print_line!(
+                "then: wiperlab simulate {} --out {}",
+                scene.display(),
+                self.out.join("run").display()
+            );
+        } else {
+            print_line!("then: wiperlab fit {}", job.display());
+        }
+    }
+}

@@ -1,0 +1,319 @@
+//! `wiperlab inspect`.
+
+use super::args::GlobalArgs;
+use super::failure::{CommandOutcome, Failure};
+use super::files::{FigureArgs, Overwrite};
+use super::load::{LoadedRecording, load_recording, read_scene};
+use super::output;
+use crate::figures::recorded;
+use crate::model::modes::{TipConstraint, body_frequencies, natural_modes};
+use crate::recording::channel::{Reversal, ReversalInstants};
+use crate::recording::files::{LevelEntry, RecordingFile};
+use crate::recording::quality::{
+    CameraTilt, ComponentVisibility, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality,
+    QualityFinding,
+};
+use crate::recording::{Recording, quality};
+use crate::simulate::scene::Scene;
+use crate::text::format_degrees;
+use clap::Args;
+use serde::Serialize;
+use std::path::PathBuf;
+
+const AFTER_HELP: &str = "\
+The verdict starts with the grade: good, usable with care, or not usable. Every finding follows with a number
+and advice, worst first. docs/quality.md describes each finding, its threshold and what to do.
+
+Components: whether the recording can show the modes of a scene's blade or, without a scene, the two
+components of the published experiment.";
+
+#[derive(Debug, Args)]
+#[command(after_help = AFTER_HELP)]
+pub struct InspectArgs {
+    /// A recording's folder, or a trace.csv alone
+    #[arg(value_name = "RECORDING")]
+    pub recording: PathBuf,
+    /// Scene whose modes the recording is to show (scene.toml); otherwise the components of the published
+    /// experiment
+    #[arg(long, value_name = "SCENE.toml")]
+    pub scene: Option<PathBuf>,
+    /// One JSON object on standard output: measurements, findings, components, reversals
+    #[arg(long)]
+    pub json: bool,
+    #[command(flatten)]
+    pub figures: FigureArgs,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+impl InspectArgs {
+    /// What is asked for is the text itself, so `--quiet` leaves the verdict.
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let scene = self.scene.as_deref().map(read_scene).transpose()?;
+        self.figures.check_folder(&[FIGURE], self.overwrite)?;
+        let loaded = load_recording(&self.recording)?;
+        let changed = loaded.changed_sources(&self.recording).into_iter().collect();
+        let found = Inspection::from_folder(&loaded.recording, loaded.file.as_ref(), changed, scene.as_ref());
+        let turns_s = found.reversal_times_s();
+        let drawn =
+            || vec![(FIGURE, recorded::draw_figure(&loaded.recording, &turns_s, &found.verdict_headline()))];
+        if self.json {
+            let text = serde_json::to_string_pretty(&found).map_err(Failure::internal)?;
+            output::write_stdout(&output::escape_lines(&text));
+            let silent = GlobalArgs { quiet: true, ..global.clone() };
+            self.figures.write_figures(self.overwrite, &silent, drawn)?;
+            return Ok(CommandOutcome::Done);
+        }
+        if !global.quiet {
+            print_line!(
+                "{}{}",
+                found.recording,
+                if found.synthetic { " (synthetic: no camera took it)" } else { "" }
+            );
+            print_origin(&loaded);
+            output::write_stdout(&output::escape_lines(&quality::measurement_table(
+                &found.measurements,
+                loaded.recording.grid().start_s,
+            )));
+            print_slope(&found);
+            print_reversals(&found.reversals);
+            print_components(&found.components);
+        }
+        for line in found.verdict_lines() {
+            print_line!("verdict: {line}");
+        }
+        self.figures.write_figures(self.overwrite, global, drawn)?;
+        Ok(CommandOutcome::Done)
+    }
+}
+
+const FIGURE: &str = "recorded";
+
+fn print_origin(loaded: &LoadedRecording) {
+    let Some(file) = &loaded.file else {
+        print_line!("no recording.toml: the rate is estimated from the times");
+        return;
+    };
+    if file.trace_sha256.is_none() {
+        print_line!("trace             not verified: recording.toml has no SHA-256 of it");
+    }
+    if let Some(source) = &file.source {
+        print_line!(
+            "source            {} ({}, {})",
+            source.file.as_slice().join(", "),
+            source.detected_format,
+            source.encoding
+        );
+    }
+    for (key, value) in &file.conditions {
+        print_line!("condition         {key} = {value}");
+    }
+}
+
+fn print_slope(found: &Inspection) {
+    match &found.tilt {
+        GlassSlope::Tilt(tilt) => {
+            print_line!(
+                "tilt              {}, the slope of the glass in {} frames (off the glass: {})",
+                format_degrees(tilt.angle_rad, tilt.sd_rad),
+                tilt.frames,
+                tilt.frames_off_glass
+            );
+        }
+        GlassSlope::NoTilt(reason) => print_line!("tilt              not known: {reason}"),
+    }
+    if let Some(level) = &found.level {
+        print_line!("level             {}", level.describe());
+    }
+}
+
+/// Turns listed in the table; a longer recording has them all in the JSON.
+const MOST_TURNS: usize = 10;
+
+fn print_reversals(turns: &[InspectedReversal]) {
+    let time = |instant: Option<f64>| instant.map_or_else(|| "-".to_owned(), |t| format!("{t:.6}"));
+    for (i, turn) in turns.iter().take(MOST_TURNS).enumerate() {
+        let (hold, release) = (time(turn.hold_s), time(turn.release_s));
+        print_line!("reversal {:<9}at {:.6} s (hold {hold} s, release {release} s)", i + 1, turn.reversal_s);
+    }
+    if turns.len() > MOST_TURNS {
+        print_line!("                  and {} more (--json lists all)", turns.len() - MOST_TURNS);
+    }
+}
+
+fn print_components(components: &InspectedComponents) {
+    print_line!("components        of the {}", components.source);
+    for component in &components.shown {
+        print_line!(
+            "  {:<36}{:>9.1} Hz  {}",
+            component.name,
+            component.showing.frequency_hz,
+            component.showing.describe()
+        );
+    }
+}
+
+// Everything that is said of a recording.
+
+/// Everything that is said of a recording; the JSON object.
+#[derive(Debug, Serialize)]
+pub struct Inspection {
+    pub recording: String,
+    pub synthetic: bool,
+    grade: Grade,
+    pub measurements: Quality,
+    findings: Vec<QualityFinding>,
+    #[serde(flatten)]
+    pub tilt: GlassSlope,
+    /// The rotation of the import, where it was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub level: Option<LevelEntry>,
+    pub components: InspectedComponents,
+    pub reversals: Vec<InspectedReversal>,
+}
+
+/// The slope of the glass in the picture, or why the recording shows none.
+#[derive(Debug, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum GlassSlope {
+    Tilt(CameraTilt),
+    NoTilt(String),
+}
+
+#[derive(Debug, Serialize)]
+pub struct InspectedComponents {
+    pub source: String,
+    pub shown: Vec<InspectedComponent>,
+}
+
+#[derive(Debug, Serialize)]
+pub struct InspectedComponent {
+    pub name: String,
+    #[serde(flatten)]
+    pub showing: ComponentVisibility,
+}
+
+/// The instants of a turn, s; null where one is not in the recording.
+#[derive(Debug, Serialize)]
+pub struct InspectedReversal {
+    pub hold_s: Option<f64>,
+    pub reversal_s: f64,
+    pub release_s: Option<f64>,
+}
+
+impl From<&Reversal> for InspectedReversal {
+    fn from(turn: &Reversal) -> Self {
+        Self { hold_s: turn.hold_s, reversal_s: turn.reversal_s, release_s: turn.release_s }
+    }
+}
+
+impl Inspection {
+    /// Everything that is said of a recording with its description; `more` findings are of its folder.
+    pub fn from_folder(
+        recording: &Recording,
+        file: Option<&RecordingFile>,
+        more: Vec<QualityFinding>,
+        scene: Option<&Scene>,
+    ) -> Self {
+        let optics = file.map_or_else(Optics::default, |file| Optics::from(&file.camera));
+        let measurements = quality::measure_quality(recording, optics.exposure_s);
+        Self::from_measurements(recording, file, measurements, more, scene)
+    }
+
+    /// The same of a recording that was just imported, and measured for its description.
+    pub fn from_import(recording: &Recording, file: &RecordingFile) -> Self {
+        let measurements = file
+            .quality
+            .clone()
+            .unwrap_or_else(|| quality::measure_quality(recording, file.camera.exposure_s));
+        Self::from_measurements(recording, Some(file), measurements, vec![], None)
+    }
+
+    fn from_measurements(
+        recording: &Recording,
+        file: Option<&RecordingFile>,
+        measurements: Quality,
+        more: Vec<QualityFinding>,
+        scene: Option<&Scene>,
+    ) -> Self {
+        let optics = file.map_or_else(Optics::default, |file| Optics::from(&file.camera));
+        let instants = ReversalInstants::find_instants(recording);
+        let kept =
+            file.iter().filter_map(|file| file.source.as_ref()).flat_map(|source| source.findings.clone());
+        let import: Vec<QualityFinding> = more.into_iter().chain(kept).collect();
+        let findings = quality::collect_findings(recording, &measurements, &optics, &instants, &import);
+        let slope = quality::measure_tilt(recording, &instants, &measurements);
+        Self {
+            recording: recording.name().to_owned(),
+            synthetic: recording.is_synthetic(),
+            grade: quality::grade_findings(&findings),
+            tilt: slope.map_or_else(|reason| GlassSlope::NoTilt(reason.to_string()), GlassSlope::Tilt),
+            level: file.and_then(|file| file.level.clone()),
+            components: scene
+                .map_or_else(published_components, scene_components)
+                .check_visibility(&measurements),
+            measurements,
+            findings,
+            reversals: instants.reversals.iter().map(InspectedReversal::from).collect(),
+        }
+    }
+
+    /// Instants of the reversals, s.
+    pub fn reversal_times_s(&self) -> Vec<f64> {
+        self.reversals.iter().map(|turn| turn.reversal_s).collect()
+    }
+
+    /// The first line of the verdict.
+    pub fn verdict_headline(&self) -> String {
+        self.verdict_lines().into_iter().next().unwrap_or_default()
+    }
+
+    /// The verdict as lines for reading, worst first.
+    pub fn verdict_lines(&self) -> Vec<String> {
+        quality::verdict_lines(&self.measurements, &self.findings)
+    }
+}
+
+/// Components to look for, before it is known what the recording makes of them.
+struct SoughtComponents {
+    source: String,
+    named: Vec<(String, f64)>,
+}
+
+impl SoughtComponents {
+    fn check_visibility(self, measurements: &Quality) -> InspectedComponents {
+        let shown = self.named.into_iter().map(|(name, frequency_hz)| InspectedComponent {
+            name,
+            showing: measurements.component_visibility(frequency_hz),
+        });
+        InspectedComponents { source: self.source, shown: shown.collect() }
+    }
+}
+
+fn published_components() -> SoughtComponents {
+    let named = PUBLISHED_COMPONENTS_HZ.map(|(name, frequency_hz)| (name.to_owned(), frequency_hz)).to_vec();
+    SoughtComponents { source: format!("published experiment, \"{PUBLISHED_TITLE}\""), named }
+}
+
+/// The head on its spring and the coupled modes of the links; a mode that does not oscillate has nothing to
+/// show.
+fn scene_components(scene: &Scene) -> SoughtComponents {
+    let blade = &scene.linkage;
+    let mut found = vec![("head on its spring".to_owned(), body_frequencies(blade).head_hz)];
+    let sides: &[bool] = if blade.shoulder.is_some() { &[false, true] } else { &[false] };
+    for &on_shoulder in sides {
+        for (tip, word) in [(TipConstraint::Held, "tip held"), (TipConstraint::Free, "tip slides")] {
+            let leaning = if on_shoulder { ", on the shoulder" } else { "" };
+            let oscillating = natural_modes(blade, tip, on_shoulder)
+                .into_iter()
+                .filter_map(|mode| mode.damped_frequency_hz);
+            found.extend(
+                oscillating
+                    .enumerate()
+                    .map(|(i, frequency_hz)| (format!("{word}{leaning}, mode {}", i + 1), frequency_hz)),
+            );
+        }
+    }
+    found.retain(|(_, frequency_hz)| frequency_hz.is_finite() && *frequency_hz > 0.0);
+    SoughtComponents { source: format!("modes of the scene \"{}\"", scene.title()), named: found }
+}

@@ -1,0 +1,150 @@
+//! The options that choose how a scene is integrated.
+
+use super::failure::Failure;
+use crate::simulate::fixed_step_scheme::{
+    DEFAULT_GAIN_PER_S, FixedStepLocator, FixedStepScheme, LARGEST_GAIN_TIMES_STEP,
+};
+use crate::simulate::scene::{ContactLossRule, JamRule, Scene, check_tolerance};
+use crate::simulate::{IntegrationMethod, SolverOptions};
+use clap::{Args, ValueEnum};
+
+#[derive(Debug, Args)]
+pub struct MethodArgs {
+    /// Tolerated relative error of a step, instead of the scene's
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    pub relative_tolerance: Option<f64>,
+    /// Method of integration
+    #[arg(long, value_enum, default_value = "adaptive")]
+    pub method: MethodName,
+    /// Length of a step, s (fixed-step needs it)
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true)]
+    pub step: Option<f64>,
+    /// Where fixed-step takes transitions (default: slack)
+    #[arg(long, value_enum, value_name = "WHERE")]
+    pub transitions: Option<TransitionsAt>,
+    /// Gain with which fixed-step stabilises stick, 1/s (default: 1e4; 0 takes the tip's velocity out at the
+    /// transition instead)
+    #[arg(long, value_name = "NUMBER", allow_hyphen_values = true)]
+    pub gain: Option<f64>,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum MethodName {
+    /// Taylor series with error control, the default; transitions are roots of the guards' own series
+    Adaptive,
+    /// Order 8 with error control; transitions bracketed on the dense output
+    RungeKutta,
+    /// The same; transitions located by the slack variable method
+    Slack,
+    /// The paper's scheme: order 4 in fixed steps, stick as a stabilised constraint
+    FixedStep,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum TransitionsAt {
+    /// At the end of the step: order 1
+    StepEnd,
+    /// Where the slack variable is zero: order 4
+    Slack,
+}
+
+/// Steps after which a run is refused: an hour of computing.
+const MOST_STEPS: f64 = 1e10;
+
+impl MethodArgs {
+    /// How the scene is integrated.
+    pub fn integration_effort(&self, scene: &Scene) -> Result<SolverOptions, Failure> {
+        let tolerance = self.relative_tolerance.unwrap_or(scene.run.relative_tolerance);
+        check_tolerance(tolerance).map_err(|expected| {
+            Failure::Input(format!("--relative-tolerance: found {tolerance}, expected {expected}"))
+        })?;
+        let method = match self.method {
+            MethodName::FixedStep => IntegrationMethod::FixedStep(self.fixed_step_method(scene)?),
+            MethodName::Adaptive => IntegrationMethod::default(),
+            MethodName::RungeKutta => IntegrationMethod::RungeKutta,
+            MethodName::Slack => IntegrationMethod::Slack,
+        };
+        if self.method != MethodName::FixedStep {
+            let [transitions, step, gain] = [
+                self.transitions.map(|w| value_name(&w)),
+                self.step.map(|x| x.to_string()),
+                self.gain.map(|x| x.to_string()),
+            ];
+            for (option, found) in [("--step", step), ("--transitions", transitions), ("--gain", gain)] {
+                if let Some(found) = found {
+                    let with = value_name(&self.method);
+                    let message = format!(
+                        "{option}: found {found} with --method {with}, expected it with --method fixed-step alone; remove it or choose that method"
+                    );
+                    return Err(Failure::Input(message));
+                }
+            }
+        }
+        Ok(SolverOptions { method, relative_tolerance: tolerance, ..SolverOptions::from_scene(scene) })
+    }
+
+    fn fixed_step_method(&self, scene: &Scene) -> Result<FixedStepScheme, Failure> {
+        let refuse = |option: &str, found: &str, expected: &str| {
+            Err(Failure::Input(format!("{option}: found {found}, expected {expected}")))
+        };
+        if let Some(tolerance) = self.relative_tolerance {
+            return refuse(
+                "--relative-tolerance",
+                &format!("{tolerance} with --method fixed-step"),
+                "none, as the step sets the error; remove it",
+            );
+        }
+        refuse_flight(scene)?;
+        let Some(step_s) = self.step else {
+            return refuse(
+                "--step",
+                "nothing",
+                "a length in seconds, as --method fixed-step needs one; add --step 1e-5",
+            );
+        };
+        let length = scene.run.stop_s - scene.start_s;
+        if !(step_s > 0.0 && step_s <= length && length / step_s <= MOST_STEPS) {
+            return refuse(
+                "--step",
+                &step_s.to_string(),
+                &format!(
+                    "a number of seconds above 0, at most the run's {length}, in at most {MOST_STEPS:e} steps"
+                ),
+            );
+        }
+        let gain_per_s = self.gain.unwrap_or(DEFAULT_GAIN_PER_S);
+        let most = LARGEST_GAIN_TIMES_STEP / step_s;
+        if !(0.0..=most).contains(&gain_per_s) {
+            let expected = format!(
+                "a number from 0 to {most:.4e} 1/s, beyond which steps of {step_s} s are unstable; choose a shorter step or a smaller gain"
+            );
+            return refuse("--gain", &gain_per_s.to_string(), &expected);
+        }
+        let locate = match self.transitions {
+            Some(TransitionsAt::StepEnd) => FixedStepLocator::StepEnd,
+            Some(TransitionsAt::Slack) | None => FixedStepLocator::Slack,
+        };
+        Ok(FixedStepScheme { step_s, locate, gain_per_s })
+    }
+}
+
+/// The fixed-step scheme has neither flight nor impacts.
+fn refuse_flight(scene: &Scene) -> Result<(), Failure> {
+    let [loss, jam] = [
+        ("contact.loss", "fly", scene.loss == ContactLossRule::Fly),
+        ("contact.jam", "impact", scene.jam == JamRule::Impact),
+    ];
+    for (key, found, is_set) in [loss, jam] {
+        if is_set {
+            let message = format!(
+                "--method fixed-step: found {key} = \"{found}\", expected \"stop\"; the fixed-step scheme has no flight: change the key or the method"
+            );
+            return Err(Failure::Input(message));
+        }
+    }
+    Ok(())
+}
+
+fn value_name(value: &impl ValueEnum) -> String {
+    value.to_possible_value().map_or_else(String::new, |v| v.get_name().to_owned())
+}

@@ -1,0 +1,73 @@
+//! `wiperlab modes`.
+
+use super::args::GlobalArgs;
+use super::failure::{CommandOutcome, Failure};
+use super::files::FigureArgs;
+use super::files::Overwrite;
+use super::load::{print_warnings, read_scene};
+use crate::figures::modes::draw_figures;
+use crate::model::modes::{NaturalMode, TipConstraint, body_frequencies, natural_modes};
+use clap::Args;
+use std::path::PathBuf;
+
+#[derive(Debug, Args)]
+pub struct ModesArgs {
+    /// Scene of the blade (scene.toml)
+    pub scene: PathBuf,
+    #[command(flatten)]
+    pub figures: FigureArgs,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+impl ModesArgs {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let scene = read_scene(&self.scene)?;
+        let blade = &scene.linkage;
+        self.figures.check_folder(&FIGURES, self.overwrite)?;
+        print_warnings(&self.scene, &scene.find_implausible(), global);
+        let names = body_frequencies(blade);
+        print_line!("{}", scene.title());
+        print_line!("");
+        print_line!("natural frequencies of the single parts");
+        print_line!("  head  sqrt(k0/M)/2pi        {:10.3} Hz", names.head_hz);
+        print_line!("  neck  sqrt(k1/m_theta)/2pi  {:10.3} Hz", names.neck_hz);
+        print_line!("  lip   sqrt(k2/m_phi)/2pi    {:10.3} Hz", names.lip_hz);
+        let sides: &[bool] = if blade.shoulder.is_some() { &[false, true] } else { &[false] };
+        for &on_shoulder in sides {
+            let neck = if on_shoulder { ", neck on the shoulder" } else { "" };
+            print_line!("");
+            print_line!("coupled modes about the upright position, no friction{neck}");
+            print_line!(
+                "  {:12} {:>12} {:>12} {:>9} {:>9}",
+                "tip",
+                "undamped Hz",
+                "damped Hz",
+                "ratio",
+                "lip/neck"
+            );
+            for (tip, word) in [(TipConstraint::Free, "slides"), (TipConstraint::Held, "held")] {
+                natural_modes(blade, tip, on_shoulder).iter().for_each(|mode| print_mode(word, mode));
+            }
+        }
+        let drawn = || FIGURES.into_iter().zip(draw_figures(scene.title(), blade)).collect();
+        self.figures.write_figures(self.overwrite, global, drawn)?;
+        Ok(CommandOutcome::Done)
+    }
+}
+
+/// The answer of the tip, and the shapes.
+const FIGURES: [&str; 2] = ["tip-compliance", "mode-shapes"];
+
+fn print_mode(tip: &str, mode: &NaturalMode) {
+    let number = |value: Option<f64>, digits: usize, none: &str| {
+        value.map_or(none.to_owned(), |v| format!("{v:.digits$}"))
+    };
+    print_line!(
+        "  {tip:12} {:>12} {:>12} {:>9} {:>9.3}",
+        number(mode.frequency_hz, 3, "unstable"),
+        number(mode.damped_frequency_hz, 3, "-"),
+        number(mode.damping_ratio, 4, "-"),
+        mode.lip_over_neck
+    );
+}

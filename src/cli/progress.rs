@@ -1,0 +1,164 @@
+//! Progress on a terminal, silence elsewhere.
+
+use super::args::GlobalArgs;
+use super::interrupt;
+use crate::simulate::{Observer, SolutionSegment};
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::io::IsTerminal;
+use std::ops::ControlFlow;
+use std::sync::{Mutex, PoisonError};
+use std::time::{Duration, Instant};
+
+/// What is going on, and the unit that it is counted in.
+static CURRENT_WORK: Mutex<Option<(ProgressBar, &'static str, &'static str)>> = Mutex::new(None);
+
+/// A bar over `total` steps of a unit such as `evaluations`; drawn unless `quiet`, where standard error is a
+/// terminal.
+pub fn start_bar(total: u64, what: &'static str, unit: &'static str, quiet: bool) -> ProgressBar {
+    let bar = ProgressBar::with_draw_target(Some(total), draw_target(quiet));
+    let template =
+        format!("{{prefix}} {{bar:20}} {{pos}}/{{len}} {unit} ({{per_sec}}, {{eta}} left) {{wide_msg}}");
+    bar.set_style(ProgressStyle::with_template(&template).unwrap_or_else(|_| ProgressStyle::default_bar()));
+    bar.set_prefix(what);
+    *CURRENT_WORK.lock().unwrap_or_else(PoisonError::into_inner) = Some((bar.clone(), what, unit));
+    bar
+}
+
+/// Work in steps of unknown length.
+pub struct StepSpinner(ProgressBar);
+
+/// Steps of a command; drawn as a [`start_bar`] is.
+pub fn start_steps(what: &'static str, quiet: bool) -> StepSpinner {
+    /// From one sign of life to the next.
+    const TICK: Duration = Duration::from_millis(200);
+    let bar = ProgressBar::with_draw_target(None, draw_target(quiet));
+    let style = ProgressStyle::with_template("{spinner} {prefix}: {wide_msg} {elapsed}");
+    bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_spinner()));
+    bar.set_prefix(what);
+    if !bar.is_hidden() {
+        bar.enable_steady_tick(TICK);
+    }
+    *CURRENT_WORK.lock().unwrap_or_else(PoisonError::into_inner) = Some((bar.clone(), what, ""));
+    StepSpinner(bar)
+}
+
+impl StepSpinner {
+    /// The next step, such as `reading the recording`.
+    pub fn show_step(&self, step: &'static str) {
+        self.0.set_message(step);
+    }
+}
+
+impl Drop for StepSpinner {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}
+
+fn draw_target(quiet: bool) -> ProgressDrawTarget {
+    let is_drawn = !quiet && std::io::stderr().is_terminal();
+    if is_drawn { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() }
+}
+
+/// How far the present work has come, in words; nothing more is drawn of it.
+pub fn finish_in_words() -> Option<String> {
+    let present = CURRENT_WORK.lock().unwrap_or_else(PoisonError::into_inner);
+    let (bar, what, unit) = present.as_ref().filter(|(bar, ..)| !bar.is_finished())?;
+    let reached = match bar.length() {
+        Some(total) => format!("{what} had done {} of {total} {unit}", bar.position()),
+        None => format!("{what} was {}", bar.message()),
+    };
+    bar.finish_and_clear();
+    Some(reached)
+}
+
+/// A line of progress to standard error, unless `quiet`.
+pub fn print_progress(quiet: bool, line: &str) {
+    if !quiet {
+        warn_line!("{line}");
+    }
+}
+
+/// Says how far a bar has come where it is not drawn, such as in the log of a batch system.
+pub struct ProgressReporter {
+    bar: ProgressBar,
+    due: Mutex<Option<Instant>>,
+}
+
+impl ProgressReporter {
+    /// From one line to the next.
+    const PAUSE: Duration = Duration::from_secs(60);
+    /// Up to the first line: a typing error shows early.
+    const FIRST: Duration = Duration::from_secs(10);
+
+    /// Says nothing where `says` is false or the bar is drawn.
+    pub fn new(bar: &ProgressBar, says: bool) -> Self {
+        let due = (says && bar.is_hidden()).then(|| Instant::now() + Self::FIRST);
+        Self { bar: bar.clone(), due: Mutex::new(due) }
+    }
+
+    /// A line where one is due.
+    pub fn report_if_due(&self) {
+        let now = Instant::now();
+        let mut due = self.due.lock().unwrap_or_else(PoisonError::into_inner);
+        if due.is_none_or(|due| now < due) {
+            return;
+        }
+        *due = Some(now + Self::PAUSE);
+        let (done, all) = (self.bar.position(), self.bar.length().unwrap_or_default());
+        let left_s = self.bar.elapsed().as_secs_f64() / done.max(1) as f64 * all.saturating_sub(done) as f64;
+        warn_line!("{done} of {all} done, about {} left", format_duration(left_s));
+    }
+}
+
+/// A time of which the order of magnitude matters.
+fn format_duration(time_s: f64) -> String {
+    match time_s {
+        time_s if time_s < 90.0 => format!("{time_s:.0} s"),
+        time_s if time_s < 5400.0 => format!("{:.0} min", time_s / 60.0),
+        time_s => format!("{:.1} h", time_s / 3600.0),
+    }
+}
+
+// Who watches a run of the model for the user: how far it has come, and whether it is to stop.
+
+/// Pieces from one look at the clock to the next: they take microseconds each.
+const PIECES_A_LOOK: u32 = 64;
+
+/// The observer of a run that a user waits for.
+pub struct ProgressObserver {
+    bar: ProgressBar,
+    start_s: f64,
+    pieces: u32,
+}
+
+impl ProgressObserver {
+    /// Of a run from one instant to another, s.
+    pub fn new([start_s, stop_s]: [f64; 2], command: &'static str, global: &GlobalArgs) -> Self {
+        let bar = start_bar(to_milliseconds(stop_s - start_s), command, "ms of the model", global.quiet);
+        Self { bar, start_s, pieces: 0 }
+    }
+}
+
+impl Observer for ProgressObserver {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        self.pieces = (self.pieces + 1) % PIECES_A_LOOK;
+        if self.pieces == 0 {
+            self.bar.set_position(to_milliseconds(piece.end_s - self.start_s));
+        }
+    }
+
+    fn control_flow(&self) -> ControlFlow<()> {
+        interrupt::control_flow()
+    }
+}
+
+impl Drop for ProgressObserver {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+fn to_milliseconds(time_s: f64) -> u64 {
+    (1e3 * time_s) as u64
+}

@@ -1,0 +1,84 @@
+//! What the program reads, for other programs: the same files, found and checked in the same way, refused in
+//! the same words.
+
+pub use super::failure::Failure;
+use super::load::{load_recording, read_driven_scene};
+use super::spectrum::SpectrumArgs;
+use crate::fit::Problem;
+use crate::recording::Recording;
+use crate::simulate::scene::Scene;
+use std::path::{Path, PathBuf};
+
+/// A scene, with the place of the recording that drives it, if one does.
+///
+/// # Errors
+/// [`Failure::Input`] with file, key, what was found, what was expected and what to do.
+pub fn read_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
+    read_driven_scene(path)
+}
+
+/// A recording: a folder with `trace.csv`, or a trace alone; with the exposure of a frame, s, where that is
+/// known.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_recording(path: &Path) -> Result<(Recording, Option<f64>), Failure> {
+    let loaded = load_recording(path)?;
+    let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
+    Ok((loaded.recording, exposure_s))
+}
+
+/// A job with its scenes and recordings.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_problem(path: &Path) -> Result<Problem, Failure> {
+    Ok(super::load::LoadedJob::load(path)?.problem)
+}
+
+/// Where a path leads that stands in a file: from the folder of that file.
+///
+/// # Errors
+/// Says where nothing is.
+pub fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf, String> {
+    super::files::resolve_existing_path(file, named)
+}
+
+/// Text of a TOML file, which people write.
+///
+/// # Errors
+/// As [`read_scene`].
+pub fn read_toml_text(path: &Path) -> Result<String, Failure> {
+    super::files::read_toml(path)
+}
+
+/// What of a recording is analysed, as on the command line.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SpectrumOptions {
+    /// Its channel, such as `head-drop`.
+    pub channel: String,
+    /// Its window, such as `after`.
+    pub window: String,
+    /// What is removed first; `auto` for what the record asks for.
+    pub detrend: String,
+    /// Where components are sought, Hz; everywhere if left out.
+    pub band_hz: Option<(f64, f64)>,
+    /// Most components that are listed; the default if left out.
+    pub max_components: Option<usize>,
+    /// Exposure of a frame, s.
+    pub exposure_s: Option<f64>,
+}
+
+/// The files that `wiperlab spectrum` writes, by name.
+///
+/// # Errors
+/// As [`read_scene`], with the options in place of keys.
+pub fn spectrum_files(recording: Recording, of: &SpectrumOptions) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+    let mut args =
+        SpectrumArgs::new(Path::new(""), &of.channel, &of.window, Path::new(""), Default::default());
+    args.detrend.clone_from(&of.detrend);
+    args.band = of.band_hz.map(|(low, high)| format!("{low}..{high}"));
+    args.max_components = of.max_components.unwrap_or(args.max_components);
+    args.exposure_s = of.exposure_s;
+    args.output_files(recording)
+}

@@ -1,0 +1,216 @@
+//! `wiperlab report`: the page of a fit, or of several side by side.
+
+mod fit_comparison;
+mod provenance;
+mod video;
+
+use super::args::GlobalArgs;
+use super::failure::{CommandOutcome, Failure, describe_early_end};
+use super::files::{OutputCommand, OutputFolder, Overwrite, RESULT_FILE, WritePolicy, figure_files};
+use super::load::{LoadedJob, job_path};
+use super::{files, progress};
+use crate::compare::{ComparisonTable, FittedRecording, ModelRun, run_conditions};
+use crate::figures::{Drawing, FigureBlock};
+use crate::fit::job::Job;
+use crate::fit::result::FitResult;
+use crate::report::json::report_json;
+use crate::report::page::render_page;
+use crate::report::verdict::ReportVerdict;
+use crate::report::{Report, assembly};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use video::VideoFrames;
+
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Folder of a fit (fits/NAME), with its job.toml and result.json, or its job; several are compared
+    #[arg(required = true, value_name = "FIT")]
+    pub fits: Vec<PathBuf>,
+    /// Folder of the report (default: reports/NAME next to the fits, of several reports/A-and-B)
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Exit with 3 when the model does not explain the recording or misses a component, in any of the fits
+    #[arg(long)]
+    pub check: bool,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+impl ReportArgs {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let writer =
+            WritePolicy::new(OutputCommand::Report, self.overwrite).with_csv_dialect(global.csv_dialect);
+        let jobs: Vec<PathBuf> = self.fits.iter().map(|fit| job_path(fit)).collect();
+        let missed = match jobs.as_slice() {
+            [job] => {
+                let fit = files::containing_folder(job);
+                let out = || default_reports_folder(fit).join(files::display_name(fit));
+                write_report(job, &self.out.clone().unwrap_or_else(out), &writer, global)?
+            }
+            jobs => fit_comparison::write_comparison(jobs, self.out.as_deref(), &writer, global)?,
+        };
+        Ok(if self.check && missed { CommandOutcome::StoppedEarly } else { CommandOutcome::Done })
+    }
+}
+
+/// The folder `reports` next to the folder `fits` that holds `fits/NAME`.
+fn default_reports_folder(fit: &Path) -> PathBuf {
+    let full = fit.canonicalize().unwrap_or_else(|_| fit.to_owned());
+    full.parent().and_then(Path::parent).unwrap_or(Path::new("")).join("reports")
+}
+
+/// A fit with its result, which belongs to the job as it is now.
+struct ReportedFit {
+    name: String,
+    problem: LoadedJob,
+    result: FitResult,
+    /// Pictures of the frames of every recording that has some.
+    videos: Vec<Option<VideoFrames>>,
+}
+
+/// What makes a report of the model at the estimates.
+type ReportBuilder = fn(&Job, &[FittedRecording], &[ModelRun], &FitResult) -> Report;
+
+impl ReportedFit {
+    fn load(job: &Path) -> Result<Self, Failure> {
+        let problem = LoadedJob::load(job)?;
+        let path = problem.folder.join(RESULT_FILE);
+        if !path.exists() {
+            return Err(Failure::Input(format!(
+                "{}: no such file; run `wiperlab fit {}` first",
+                path.display(),
+                problem.file
+            )));
+        }
+        let file = path.display().to_string();
+        let text = files::read_json(&path)?;
+        let result = FitResult::parse(&file, &text).map_err(Failure::input)?;
+        if result.fingerprint != problem.problem.fingerprint() {
+            return Err(Failure::Input(format!(
+                "{file}: fingerprint {}, expected {}: job, scene, data or program have changed since the fit; run `wiperlab fit` again",
+                result.fingerprint,
+                problem.problem.fingerprint()
+            )));
+        }
+        result.check_against_job(problem.job(), &file).map_err(Failure::input)?;
+        problem.problem.check_result(&result, &file).map_err(Failure::input)?;
+        let videos = problem.recordings().map(|(path, loaded)| VideoFrames::load(path, loaded));
+        let videos = videos.collect::<Result<_, _>>()?;
+        Ok(Self { name: files::display_name(&problem.folder), problem, result, videos })
+    }
+
+    fn measured_recordings(&self) -> Vec<FittedRecording<'_>> {
+        let measured = self.problem.measured.iter().zip(&self.videos);
+        let measured = measured.map(|(loaded, video)| FittedRecording {
+            recording: &loaded.recording,
+            file: loaded.file.as_ref(),
+            film: video.as_ref().map(VideoFrames::as_film),
+        });
+        measured.collect()
+    }
+
+    fn run_best_models(&self) -> Result<Vec<ModelRun>, Failure> {
+        let model = self.problem.problem.fitted_model(&self.result).map_err(Failure::input)?;
+        let best = run_conditions(self.problem.job(), &model, &self.result);
+        let best = best
+            .map_err(|why| Failure::Internal(format!("{}: the best model does not run: {why}", self.name)))?;
+        for how in best.iter().filter_map(|best| describe_early_end(&best.view.run)) {
+            warn_line!("warning: {}: the best model's run ended early: {how}", self.name);
+        }
+        Ok(best)
+    }
+
+    /// The report, made by [`comparison::build_report`] or, where its figures are not asked for, by
+    /// [`comparison::in_words`].
+    fn build_report(&self, made: ReportBuilder, best: &[ModelRun]) -> Result<Report, Failure> {
+        let mut report = made(self.problem.job(), &self.measured_recordings(), best, &self.result);
+        self.videos.iter().flatten().try_for_each(VideoFrames::check_pictures)?;
+        for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.problem.recordings()) {
+            line.add_findings(loaded.changed_sources(path));
+        }
+        report.provenance = provenance::collect_provenance(self)?;
+        Ok(report)
+    }
+}
+
+/// Writes the report of a fit; says whether the model does not explain the recording, or misses a component.
+pub fn write_report(
+    fit: &Path,
+    out: &Path,
+    writer: &WritePolicy,
+    global: &GlobalArgs,
+) -> Result<bool, Failure> {
+    check_report_folder(out, writer)?;
+    let steps = progress::start_steps("report", global.quiet);
+    let report = {
+        steps.show_step("reading the fit");
+        let fit = ReportedFit::load(fit)?;
+        steps.show_step("running the model");
+        let best = fit.run_best_models()?;
+        steps.show_step("comparing and drawing");
+        fit.build_report(assembly::build_report, &best)?
+    };
+    let verdict = ReportVerdict::from_report(&report);
+    let json = report_json(&report).map_err(Failure::internal)?;
+    let output = ReportFiles {
+        figures: report.all_figures().collect(),
+        json,
+        tables: &report.tables,
+        page: render_page(&report),
+        summary: verdict.summary(),
+    };
+    drop(steps);
+    output.write_to_folder(out, writer, global)?;
+    Ok(!verdict.passes())
+}
+
+// The folder of a report: what is written into it.
+
+const JSON_FILE: &str = "report.json";
+const PAGE_FILE: &str = "index.html";
+const FIGURE_EXTENSION: &str = ".svg";
+
+/// What goes into a folder.
+pub struct ReportFiles<'a> {
+    pub figures: Vec<&'a FigureBlock>,
+    pub json: String,
+    pub tables: &'a [ComparisonTable],
+    pub page: String,
+    /// What is printed.
+    pub summary: Vec<String>,
+}
+
+impl ReportFiles<'_> {
+    /// Writes everything or nothing.
+    pub fn write_to_folder(
+        &self,
+        folder: &Path,
+        writer: &WritePolicy,
+        global: &GlobalArgs,
+    ) -> Result<(), Failure> {
+        files::write_outputs(folder, writer, &self.to_files())?;
+        if !global.quiet {
+            self.summary.iter().for_each(|line| print_line!("{line}"));
+            print_line!("written to {}", folder.join(PAGE_FILE).display());
+        }
+        Ok(())
+    }
+
+    fn to_files(&self) -> Vec<(String, Vec<u8>)> {
+        let figure = |block: &&FigureBlock| match &block.drawing {
+            Drawing::Chart(figure) => {
+                figure_files(block.file.trim_end_matches(FIGURE_EXTENSION), figure).to_vec()
+            }
+            Drawing::Moving(svg) => vec![(block.file.clone(), svg.clone().into_bytes())],
+        };
+        let page = [(JSON_FILE, &self.json), (PAGE_FILE, &self.page)]
+            .map(|(name, text)| (name.to_owned(), text.clone().into_bytes()));
+        let tables = self.tables.iter().map(|t| (t.file.to_owned(), t.text.clone().into_bytes()));
+        self.figures.iter().flat_map(figure).chain(tables).chain(page).collect()
+    }
+}
+
+/// Refuses a folder that a report must not be written into, before the model is run.
+pub fn check_report_folder(folder: &Path, writer: &WritePolicy) -> Result<(), Failure> {
+    OutputFolder::check(folder, writer, &[JSON_FILE, PAGE_FILE]).map(|_| ())
+}

@@ -1,0 +1,100 @@
+//! Several fits side by side.
+
+use super::ReportFiles;
+use super::{ReportedFit, default_reports_folder};
+use crate::cli::args::GlobalArgs;
+use crate::cli::failure::Failure;
+use crate::cli::files;
+use crate::cli::files::WritePolicy;
+use crate::cli::progress;
+use crate::cli::report;
+use crate::report::assembly;
+use crate::report::fit_comparison::{ComparisonInput, compare_fits, comparison_json, render_page};
+use std::path::{Path, PathBuf};
+
+/// Longest name of a folder that is made up: far from what file systems take, and still one that a person
+/// types.
+const LONGEST_NAME: usize = 100;
+
+/// Writes the comparison of fits; says whether any of them does not explain its recording or misses a
+/// component.
+pub fn write_comparison(
+    jobs: &[PathBuf],
+    out: Option<&Path>,
+    writer: &WritePolicy,
+    global: &GlobalArgs,
+) -> Result<bool, Failure> {
+    let folders: Vec<&Path> = jobs.iter().map(|job| files::containing_folder(job)).collect();
+    check_distinct_fits(&folders)?;
+    let out = out.map_or_else(|| default_comparison_folder(&folders), |out| Ok(out.to_owned()))?;
+    report::check_report_folder(&out, writer)?;
+    let steps = progress::start_steps("report", global.quiet);
+    steps.show_step("reading the fits, running and comparing their models");
+    let fits = jobs.iter().map(|job| ReportedFit::load(job)).collect::<Result<Vec<_>, _>>()?;
+    let best = fits.iter().map(ReportedFit::run_best_models).collect::<Result<Vec<_>, _>>()?;
+    let reports = fits
+        .iter()
+        .zip(&best)
+        .map(|(fit, best)| fit.build_report(assembly::build_report_without_figures, best))
+        .collect::<Result<Vec<_>, _>>()?;
+    let measured: Vec<_> = fits.iter().map(ReportedFit::measured_recordings).collect();
+    let fitted = |((fit, report), (best, measured))| {
+        let fit: &ReportedFit = fit;
+        ComparisonInput { name: &fit.name, report, job: fit.problem.job(), measured, best }
+    };
+    let fitted: Vec<ComparisonInput> = fits
+        .iter()
+        .zip(&reports)
+        .zip(best.iter().map(Vec::as_slice).zip(measured.iter().map(Vec::as_slice)))
+        .map(fitted)
+        .collect();
+    let several = compare_fits(&fitted);
+    let json = comparison_json(&several).map_err(Failure::internal)?;
+    let output = ReportFiles {
+        figures: several.figures.iter().collect(),
+        json,
+        tables: &[],
+        page: render_page(&several),
+        summary: several.summary(),
+    };
+    drop(steps);
+    output.write_to_folder(&out, writer, global)?;
+    Ok(!several.passes())
+}
+
+/// Refuses a fit that is given twice, and two fits that would go by the same name.
+fn check_distinct_fits(fits: &[&Path]) -> Result<(), Failure> {
+    let place = |fit: &Path| fit.canonicalize().unwrap_or_else(|_| fit.to_owned());
+    for (i, fit) in fits.iter().enumerate() {
+        for other in &fits[..i] {
+            if place(fit) == place(other) {
+                return Err(Failure::Input(format!(
+                    "{}: given twice, expected different fits; leave one out",
+                    fit.display()
+                )));
+            }
+            let name = files::display_name(fit);
+            if name == files::display_name(other) {
+                let (a, b) = (other.display(), fit.display());
+                return Err(Failure::Input(format!(
+                    "{b}: called `{name}` like {a}, expected fits of different names; rename one of the \
+                     folders"
+                )));
+            }
+        }
+    }
+    Ok(())
+}
+
+/// `reports/A-and-B` next to the first fit's folder `fits`.
+fn default_comparison_folder(fits: &[&Path]) -> Result<PathBuf, Failure> {
+    let name = fits.iter().map(|fit| files::display_name(fit)).collect::<Vec<_>>().join("-and-");
+    if name.len() > LONGEST_NAME {
+        let found = name.len();
+        return Err(Failure::Input(format!(
+            "FIT: the names of the fits make a folder name of {found} bytes, expected at most \
+             {LONGEST_NAME}; name a folder with --out DIR"
+        )));
+    }
+    Ok(fits.first().map(|fit| default_reports_folder(fit)).unwrap_or_default().join(name))
+}

@@ -1,0 +1,113 @@
+//! Pictures of a recording's frames, from the folder that its `[video]` names.
+
+use crate::cli::failure::Failure;
+use crate::cli::files;
+use crate::cli::load::{LoadedRecording, description_path};
+use crate::recording::files::{FilesError, PixelMapping};
+use crate::recording::video::{Picture, PictureSource, RecordingVideo};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// The pictures of a recording.
+pub struct VideoFrames {
+    place: PixelMapping,
+    first_frame: usize,
+    files: Vec<PathBuf>,
+    /// The first picture that could not be read, and why.
+    failed: Mutex<Option<Failure>>,
+}
+
+impl VideoFrames {
+    /// The pictures of the recording at `path`, where its description names some.
+    pub fn load(path: &Path, loaded: &LoadedRecording) -> Result<Option<Self>, Failure> {
+        let Some((file, video)) = loaded.file.as_ref().and_then(|file| Some((file, file.video.as_ref()?)))
+        else {
+            return Ok(None);
+        };
+        let described = description_path(path);
+        let description = described.display().to_string();
+        let place =
+            video.pixel_mapping(&description, &file.camera, file.level.as_ref()).map_err(Failure::input)?;
+        let frames = files::resolve_path(&described, &video.frames);
+        let refuse = |found: &str| {
+            let problem = format!(
+                "found \"{}\", expected a folder of PNG pictures, a frame each, or one PNG, relative to this file; {} {found}",
+                video.frames,
+                frames.display()
+            );
+            Failure::input(FilesError::Video { file: description.clone(), key: "frames", problem })
+        };
+        let is_png = |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
+        let mut files = vec![frames.clone()];
+        if !(is_png(&frames) && frames.is_file()) {
+            let entries =
+                fs::read_dir(&frames).map_err(|error| refuse(&format!("cannot be read: {error}")))?;
+            files = entries
+                .flatten()
+                .map(|entry| entry.path())
+                .filter(is_png)
+                .filter(|path| path.is_file())
+                .collect();
+        }
+        if files.is_empty() {
+            return Err(refuse("holds none"));
+        }
+        files.sort_by_cached_key(|file| natural_sort_key(&file.to_string_lossy()));
+        Ok(Some(Self { place, first_frame: video.first_frame, files, failed: Mutex::new(None) }))
+    }
+
+    pub fn as_film(&self) -> RecordingVideo<'_> {
+        RecordingVideo { mapping: self.place, pictures: self }
+    }
+
+    /// Refuses if a picture could not be read.
+    pub fn check_pictures(&self) -> Result<(), Failure> {
+        self.failed.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+    }
+}
+
+impl PictureSource for VideoFrames {
+    fn frame_picture(&self, frame: usize) -> Option<Picture> {
+        let path = self.files.get(frame.checked_sub(self.first_frame)?)?;
+        let refused = |error| Failure::Input(format!("{}: {error}", path.display()));
+        let read = files::read_data(path).and_then(|bytes| Picture::from_png(&bytes).map_err(refused));
+        read.map_err(|failure| {
+            self.failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(failure);
+        })
+        .ok()
+    }
+}
+
+/// What names with numbers in them are ordered by, frame9 before frame10: texts, and numbers by how many
+/// digits they have and then as texts; of equals by the whole name.
+fn natural_sort_key(name: &str) -> (Vec<(usize, String)>, String) {
+    let mut parts: Vec<(bool, String)> = Vec::new();
+    for letter in name.chars() {
+        let digit = letter.is_ascii_digit();
+        match parts.last_mut() {
+            Some((of_digits, part)) if *of_digits == digit => part.push(letter),
+            _ => parts.push((digit, letter.to_string())),
+        }
+    }
+    let key = |(digits, part): (bool, String)| {
+        let number = part.trim_start_matches('0');
+        if digits { (number.len(), number.to_owned()) } else { (0, part) }
+    };
+    (parts.into_iter().map(key).collect(), name.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_are_in_the_order_of_their_numbers() {
+        let mut names = ["f10.png", "f9.png", "f09.png", "e11.png", "f1.png", "f100000000000000000000.png"];
+        names.sort_by_cached_key(|name| natural_sort_key(name));
+        assert_eq!(
+            names,
+            ["e11.png", "f1.png", "f09.png", "f9.png", "f10.png", "f100000000000000000000.png"]
+        );
+    }
+}

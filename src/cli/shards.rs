@@ -1,0 +1,89 @@
+//! Shards on disk: `FOLDER/shards/K-of-N.jsonl` next to the results of a study, each written by one program.
+
+use super::failure::Failure;
+use crate::checkpoint::{
+    CheckpointError, CheckpointHeader, CheckpointReader, CheckpointRecord, Shard, StoredRecord,
+};
+use std::collections::BTreeMap;
+use std::fs::{self, File};
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+/// Folder of the shards in that of the results.
+pub const SHARDS_FOLDER: &str = "shards";
+
+/// Journal of a shard.
+pub fn shard_checkpoint(folder: &Path, shard: Shard) -> PathBuf {
+    folder.join(SHARDS_FOLDER).join(shard.file_stem() + ".jsonl")
+}
+
+/// The shards in a folder of results, by number of shards and number.
+pub fn shard_files(folder: &Path) -> Result<Vec<(Shard, PathBuf)>, Failure> {
+    let folder = folder.join(SHARDS_FOLDER);
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let unread = |error| Failure::Input(format!("{}: cannot be read: {error}", folder.display()));
+    let mut shards = Vec::new();
+    for entry in fs::read_dir(&folder).map_err(unread)? {
+        let name = entry.map_err(unread)?.file_name();
+        let shard =
+            name.to_str().and_then(|name| name.strip_suffix(".jsonl")).and_then(Shard::from_file_stem);
+        shards.extend(shard.map(|shard| (shard, folder.join(&name))));
+    }
+    shards.sort_by_key(|(shard, _)| (shard.total(), shard.number()));
+    Ok(shards)
+}
+
+/// Shows `each` what another shard has written, where that is `wanted`; one of another problem or version is
+/// refused, and one that is damaged is left to `wiperlab collect`.
+pub fn scan_shard<R: CheckpointRecord>(
+    path: &Path,
+    header: &CheckpointHeader<R::Body>,
+    wanted: bool,
+    mut each: impl FnMut(StoredRecord<R>),
+) -> Result<(), Failure> {
+    let name = path.display().to_string();
+    let Ok(file) = File::open(path) else { return Ok(()) };
+    let look = || -> Result<(), CheckpointError> {
+        let Some(mut journal) = CheckpointReader::<R, _>::open(&name, BufReader::new(file))? else {
+            return Ok(());
+        };
+        journal.header().check_matches::<R>(&name, header)?;
+        while wanted && let Some(found) = journal.next_record()? {
+            each(found);
+        }
+        Ok(())
+    };
+    match look() {
+        Err(refused @ (CheckpointError::OtherProblem { .. } | CheckpointError::OtherVersion { .. })) => {
+            Err(Failure::input(refused))
+        }
+        Err(damaged) => {
+            warn_line!("warning: {damaged}");
+            Ok(())
+        }
+        Ok(()) => Ok(()),
+    }
+}
+
+/// The number of shards of most files; of two, the larger.
+pub fn usual_shard_count(shards: &[(Shard, PathBuf)]) -> usize {
+    let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
+    shards.iter().for_each(|(shard, _)| *counts.entry(shard.total()).or_default() += 1);
+    counts.into_iter().max_by_key(|(of, files)| (*files, *of)).map_or(1, |(of, _)| of)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_usual_number_of_shards_is_that_of_most_files() {
+        let shards = |list: &[(usize, usize)]| -> Vec<(Shard, PathBuf)> {
+            list.iter().map(|(at, of)| (Shard::new(*at, *of).unwrap(), PathBuf::new())).collect()
+        };
+        assert_eq!(usual_shard_count(&shards(&[(0, 4), (1, 4), (0, 7)])), 4);
+        assert_eq!(usual_shard_count(&shards(&[(0, 4), (0, 7)])), 7);
+    }
+}

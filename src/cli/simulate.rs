@@ -1,0 +1,169 @@
+//! `wiperlab simulate`.
+
+use super::args::GlobalArgs;
+use super::failure::{CommandOutcome, Failure};
+use super::files::FigureArgs;
+use super::files::StreamedTable;
+use super::files::{OutputCommand, OutputFolder, Overwrite, SIMULATION_SUMMARY, WritePolicy};
+use super::interrupt;
+use super::load::{print_warnings, read_scene};
+use super::method::MethodArgs;
+use super::progress::ProgressObserver;
+use super::sensitivities;
+use super::sensitivities::SensitivityRequest;
+use crate::figures::motion;
+use crate::recording::files::{HEADER, push_trace_row};
+use crate::simulate::RunMotion;
+use crate::simulate::outputs::{
+    EVENTS_HEADER, EnergyAudit, STATE_HEADER, SampleObserver, SimulationSummary, push_event_row,
+    push_state_row, recorded_points_m, sample_times,
+};
+use crate::simulate::scene::{OutputTable, Scene};
+use crate::simulate::{
+    ModelSample, Observer, RunStatus, SolutionSegment, SolverOptions, Transition, run_scene_with,
+};
+use clap::Args;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+#[derive(Debug, Args)]
+pub struct SimulateArgs {
+    /// Scene to run (scene.toml)
+    pub scene: PathBuf,
+    /// Folder for trace.csv, state.csv, events.csv and summary.json
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+    #[command(flatten)]
+    pub method: MethodArgs,
+    /// Parameters by which sensitivities.csv and event_sensitivities.csv have derivatives, such as
+    /// friction.a,start.neck_angle_rad,drive.scale
+    #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
+    pub sensitivities: Vec<String>,
+    #[command(flatten)]
+    pub figures: FigureArgs,
+}
+
+impl SimulateArgs {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let scene = read_scene(&self.scene)?;
+        let effort = self.method.integration_effort(&scene)?;
+        let sensitivities = SensitivityRequest::parse(&scene, &self.sensitivities, &effort)?;
+        let writer =
+            WritePolicy::new(OutputCommand::Simulate, self.overwrite).with_csv_dialect(global.csv_dialect);
+        let watch = ProgressObserver::new([scene.start_s, scene.run.stop_s], "simulate", global);
+        let names = output_names(&scene, sensitivities.is_some());
+        let place = OutputFolder::check(&self.out, &writer, &names)?;
+        self.figures.check_folder(&[FIGURE], self.overwrite)?;
+        print_warnings(&self.scene, &scene.find_implausible(), global);
+        let summary = run_to_files(&scene, effort, sensitivities.as_ref(), &place, watch)?;
+        if !global.quiet {
+            print_summary(&summary, &self.out);
+        }
+        // (a run more than the tables need: they hold no more than a row of it)
+        let drawn = || vec![(FIGURE, motion::draw_figure(scene.title(), &RunMotion::simulate(&scene)))];
+        self.figures.write_figures(self.overwrite, global, drawn)?;
+        Ok(if summary.status == RunStatus::Completed {
+            CommandOutcome::Done
+        } else {
+            CommandOutcome::StoppedEarly
+        })
+    }
+}
+
+const FIGURE: &str = "motion";
+
+/// The tables of a run, and what each is called.
+const TABLES: [(OutputTable, &str); 3] = [
+    (OutputTable::Trace, "trace.csv"),
+    (OutputTable::State, "state.csv"),
+    (OutputTable::Events, "events.csv"),
+];
+
+/// Files that the scene asks for.
+fn output_names(scene: &Scene, sensitivities: bool) -> Vec<&'static str> {
+    let asked = TABLES.into_iter().filter(|(output, _)| scene.run.outputs.contains(output));
+    let derivatives = sensitivities::SENSITIVITY_FILES.into_iter().filter(|_| sensitivities);
+    asked.map(|(_, name)| name).chain(derivatives).chain([SIMULATION_SUMMARY]).collect()
+}
+
+/// Runs the scene; every row goes to its file as soon as it is known.
+fn run_to_files(
+    scene: &Scene,
+    effort: SolverOptions,
+    sensitivities: Option<&SensitivityRequest>,
+    place: &OutputFolder,
+    mut watch: ProgressObserver,
+) -> Result<SimulationSummary, Failure> {
+    let table = |output: OutputTable, name, header: &str, least_rows| {
+        scene
+            .run
+            .outputs
+            .contains(&output)
+            .then(|| Ok(StreamedTable::new(place.create_file(name)?, header, least_rows)))
+            .transpose()
+    };
+    // a trace of one row would have no frame rate
+    let mut trace = table(OutputTable::Trace, "trace.csv", HEADER, 2)?;
+    let mut state = table(OutputTable::State, "state.csv", STATE_HEADER, 1)?;
+    let mut events = table(OutputTable::Events, "events.csv", EVENTS_HEADER, 1)?;
+    let wanted = trace.is_some() || state.is_some();
+    let sampler = SampleObserver::new(sample_times(scene).take_while(|_| wanted), |sample: &ModelSample| {
+        let points_m = recorded_points_m(&scene.linkage, sample).map(Some);
+        trace.iter_mut().for_each(|table| table.add_row(|row| push_trace_row(row, sample.time_s, points_m)));
+        state.iter_mut().for_each(|table| table.add_row(|row| push_state_row(row, sample)));
+    });
+    let mut audit = EnergyAudit::default();
+    let stops = interrupt::register_stoppable(|| {
+        "the run did not stop in time, and nothing of it is written".to_owned()
+    });
+    let clock = Instant::now();
+    let mut observers = ((sampler, EventTableWriter(events.as_mut())), (&mut audit, &mut watch));
+    let run = run_scene_with(scene, effort, &mut observers);
+    let elapsed = clock.elapsed();
+    if run.status == RunStatus::Interrupted {
+        let (at_s, stop_s) = (run.stopped_at_s, scene.run.stop_s);
+        stops.announce_stop(&format!("the run has reached {at_s} s of {stop_s} s; what it has is written"));
+    }
+
+    let mut tables: Vec<StreamedTable> = [trace, state, events].into_iter().flatten().collect();
+    let wall_s = tables.iter().fold(elapsed, |left, table| left.saturating_sub(table.spent)).as_secs_f64();
+    let summary = SimulationSummary::new(scene, &run, &audit, wall_s, &effort);
+    let bytes = serde_json::to_vec_pretty(&summary).map_err(Failure::internal)?;
+    if let Some(sensitivities) = sensitivities.filter(|_| run.status != RunStatus::Interrupted) {
+        tables.extend(sensitivities.run_to_tables(scene, effort, place, sample_times(scene))?);
+    }
+    place.commit(tables.into_iter().map(|table| table.file).collect(), &[(SIMULATION_SUMMARY, bytes)])?;
+    Ok(summary)
+}
+
+/// Transitions to their table.
+struct EventTableWriter<'a>(Option<&'a mut StreamedTable>);
+
+impl Observer for EventTableWriter<'_> {
+    fn observe_segment(&mut self, _: &SolutionSegment<'_>) {}
+    fn observe_transition(&mut self, transition: &Transition) {
+        self.0.iter_mut().for_each(|table| table.add_row(|row| push_event_row(row, transition)));
+    }
+}
+
+fn print_summary(summary: &SimulationSummary, out: &Path) {
+    print_line!("{}: {}", summary.status.name(), summary.status_meaning);
+    print_line!(
+        "stopped at {} s after {} transitions, {} right-hand sides, {} steps ({} rejected), {:.1} ms",
+        summary.stopped_at_s,
+        summary.transitions,
+        summary.rhs_evaluations,
+        summary.steps,
+        summary.rejected_steps,
+        1e3 * summary.wall_s
+    );
+    print_line!(
+        "energy residual {:.1e}, drift in stick {:.1e} m",
+        summary.energy_residual_relative,
+        summary.max_constraint_drift_m
+    );
+    print_line!("model parts: {}", summary.model_parts.join(", "));
+    print_line!("written to {}", out.display());
+}

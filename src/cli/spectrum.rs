@@ -1,0 +1,307 @@
+//! `wiperlab spectrum`.
+
+mod tables;
+
+use super::args::GlobalArgs;
+use super::args::parse_count;
+use super::failure::{CommandOutcome, Failure};
+use super::files::{OutputCommand, OutputFolder, Overwrite, WritePolicy, figure_files, write_outputs};
+use super::load::{LoadedRecording, load_recording};
+use super::progress;
+use crate::chart::Figure;
+use crate::figures::analysis::{AnalysedWindow, compare_spectra};
+use crate::figures::spectrum::{self, SpectraPlot};
+use crate::recording::Recording;
+use crate::recording::channel::{Channel, ReversalInstants, Window};
+use crate::simulate::twin::film::{DropoutPattern, film_like_recording};
+use crate::spectrum::{
+    Detrend, FASTEST_HZ, MAX_COMPONENTS, SampledRecord, SpectralAnalysis, SpectrumSettings,
+};
+use clap::Args;
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+/// The tables of a spectrum.
+const TABLES: [&str; 4] = ["components.json", "spectrum.json", "spectrum.csv", "ridge.csv"];
+/// How the trend is chosen from the record.
+const AUTO: &str = "auto";
+/// Seed of the tracking noise with which a simulated trace is filmed.
+const FILM_SEED: u64 = 0;
+
+#[derive(Debug, Args)]
+pub struct SpectrumArgs {
+    /// A recording's folder, or a trace.csv alone
+    #[arg(value_name = "RECORDING")]
+    pub recording: PathBuf,
+    /// Quantity: deflection, head-drop, tip-x or head-x
+    #[arg(long, default_value = "deflection", value_name = "CHANNEL")]
+    pub channel: String,
+    /// Window: before, stick, flip or after (`after[2]`), seconds (`0.10..0.25`), or from found instants
+    /// (`release+0.02..release[2]-0.1`); default: all
+    #[arg(long, default_value = "..", value_name = "A..B", allow_hyphen_values = true)]
+    pub window: String,
+    /// What is removed first: auto, none, mean, line, cubic, polynomial:N or high-pass:HZ
+    #[arg(long, default_value = AUTO, value_name = "TREND")]
+    pub detrend: String,
+    /// Band in which components are sought, Hz; default: all
+    #[arg(long, value_name = "LO..HI", allow_hyphen_values = true)]
+    pub band: Option<String>,
+    /// Most components listed
+    #[arg(long, default_value_t = MAX_COMPONENTS, value_name = "N", value_parser = parse_count,
+        allow_negative_numbers = true)]
+    pub max_components: usize,
+    /// Exposure of a frame, s (default: as recording.toml says)
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub exposure_s: Option<f64>,
+    /// Fastest oscillation that the blade may show, Hz: what could fold onto a component is looked for up to
+    /// it
+    #[arg(long, default_value_t = FASTEST_HZ, value_name = "HZ", allow_negative_numbers = true)]
+    pub fastest_hz: f64,
+    /// A recording whose camera the trace is seen through first: its rate, exposure, noise and lost frames;
+    /// both are analysed alike
+    #[arg(long, value_name = "RECORDING")]
+    pub like: Option<PathBuf>,
+    /// Folder for components.json, spectrum.json, the tables and the figures
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+/// The command line once checked.
+struct SpectrumRequest {
+    channel: Channel,
+    window: Window,
+    settings: SpectrumSettings,
+}
+
+/// A recording, its window and what is in it.
+struct StudiedWindow {
+    recording: Recording,
+    exposure_s: Option<f64>,
+    frames: Range<usize>,
+    analysis: SpectralAnalysis,
+    /// What was done, in words.
+    note: String,
+    /// What to try instead, where the window asks for it.
+    hint: Option<String>,
+}
+
+impl SpectrumArgs {
+    /// The command with its defaults.
+    pub fn new(recording: &Path, channel: &str, window: &str, out: &Path, overwrite: Overwrite) -> Self {
+        Self {
+            recording: recording.to_owned(),
+            channel: channel.to_owned(),
+            window: window.to_owned(),
+            detrend: AUTO.to_owned(),
+            band: None,
+            max_components: MAX_COMPONENTS,
+            exposure_s: None,
+            fastest_hz: FASTEST_HZ,
+            like: None,
+            out: out.to_owned(),
+            overwrite,
+        }
+    }
+
+    /// The files of a recording at hand.
+    pub fn output_files(&self, recording: Recording) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+        let request = self.parse_request()?;
+        let exposure_s = self.given_exposure_s()?;
+        request.output_files(&request.study_recording(exposure_s, recording)?)
+    }
+
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let request = self.parse_request()?;
+        OutputFolder::check(&self.out, &self.write_policy(global), &TABLES)?;
+        let steps = progress::start_steps("spectrum", global.quiet);
+        steps.show_step("reading the recording");
+        let loaded = load_recording(&self.recording)?;
+        steps.show_step("analysing the window");
+        let Some(like) = &self.like else {
+            let studied = request.study_recording(self.exposure_for(&loaded)?, loaded.recording)?;
+            let outputs = request.output_files(&studied)?;
+            drop(steps);
+            return self.write_and_print(global, &request, &outputs, &[&studied]);
+        };
+        let model = load_recording(like)?;
+        let exposure_s = self.exposure_for(&model)?;
+        let filmed =
+            film_like_recording(&loaded.recording, &model.recording, exposure_s.unwrap_or(0.0), FILM_SEED)
+                .map_err(|e| {
+                    Failure::Input(format!("{} like {}: {e}", self.recording.display(), like.display()))
+                })?;
+        let mut simulated = request.study_recording(exposure_s, filmed.recording)?;
+        let frames = if filmed.dropouts == DropoutPattern::SameFrames {
+            "the same frames lost"
+        } else {
+            "as many frames lost"
+        };
+        simulated.note = format!(
+            "{}; seen as in {}: its rate, exposure and noise, {frames}",
+            simulated.note,
+            model.recording.name()
+        );
+        let measured = request.study_recording(exposure_s, model.recording)?;
+        let mut outputs = request.output_files(&simulated)?;
+        outputs.push(("components-like.json".to_owned(), tables::components_json(&measured)?));
+        outputs.extend(figure_files("comparison", &request.comparison_figure(&simulated, &measured)));
+        drop(steps);
+        self.write_and_print(global, &request, &outputs, &[&simulated, &measured])
+    }
+
+    fn write_and_print(
+        &self,
+        global: &GlobalArgs,
+        request: &SpectrumRequest,
+        outputs: &[(String, Vec<u8>)],
+        studied: &[&StudiedWindow],
+    ) -> Result<CommandOutcome, Failure> {
+        write_outputs(&self.out, &self.write_policy(global), outputs)?;
+        if !global.quiet {
+            studied.iter().for_each(|studied| tables::print_summary(request.channel, studied));
+        }
+        Ok(CommandOutcome::Done)
+    }
+
+    fn write_policy(&self, global: &GlobalArgs) -> WritePolicy {
+        WritePolicy::new(OutputCommand::Spectrum, self.overwrite).with_csv_dialect(global.csv_dialect)
+    }
+
+    /// Exposure as given, or as the recording says.
+    fn exposure_for(&self, loaded: &LoadedRecording) -> Result<Option<f64>, Failure> {
+        let recorded = || loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
+        Ok(self.given_exposure_s()?.or_else(recorded))
+    }
+
+    fn given_exposure_s(&self) -> Result<Option<f64>, Failure> {
+        match self.exposure_s {
+            Some(found) if !(found.is_finite() && found > 0.0) => Err(Failure::Input(format!(
+                "--exposure-s: found {found}, expected a time in seconds above 0, like 0.0002"
+            ))),
+            given => Ok(given),
+        }
+    }
+
+    fn parse_request(&self) -> Result<SpectrumRequest, Failure> {
+        let named =
+            |option: &str, error: &dyn std::fmt::Display| Failure::Input(format!("{option}: {error}"));
+        let channel = Channel::parse(&self.channel).map_err(|e| named("--channel", &e))?;
+        let window = Window::parse(&self.window).map_err(|e| named("--window", &e))?;
+        let detrend = (self.detrend != AUTO).then(|| Detrend::parse(&self.detrend)).transpose();
+        let detrend = detrend.map_err(|e| named("--detrend", &format!("{e}, or `{AUTO}`")))?;
+        let band_hz = self.band.as_deref().map(parse_band).transpose()?;
+        if !(self.fastest_hz.is_finite() && self.fastest_hz > 0.0) {
+            return Err(Failure::Input(format!(
+                "--fastest-hz: found {}, expected a frequency in Hz above 0",
+                self.fastest_hz
+            )));
+        }
+        let settings = SpectrumSettings {
+            detrend,
+            band_hz,
+            max_components: self.max_components,
+            fastest_hz: self.fastest_hz,
+            ..SpectrumSettings::default()
+        };
+        Ok(SpectrumRequest { channel, window, settings })
+    }
+}
+
+impl SpectrumRequest {
+    fn study_recording(
+        &self,
+        exposure_s: Option<f64>,
+        recording: Recording,
+    ) -> Result<StudiedWindow, Failure> {
+        let instants = ReversalInstants::find_instants(&recording);
+        let frames = self.window.resolve_frames(&recording, &instants).map_err(Failure::input)?;
+        let grid = recording.grid();
+        let samples = self.channel.samples(&recording);
+        let inside = samples.get(frames.clone()).unwrap_or_default(); // a resolved window lies inside
+        let record = SampledRecord { samples: inside, frame_rate_hz: grid.frame_rate_hz, exposure_s };
+        let refuse = |error| {
+            Failure::Input(format!("{}, {} in `{}`: {error}", recording.name(), self.channel, self.window))
+        };
+        let analysis = SpectralAnalysis::from_record(&record, &self.settings).map_err(refuse)?;
+        let hint = flip_hint(&instants, (grid.time_s(frames.start), grid.time_s(frames.end)));
+        let frames = frames.start + analysis.skipped_frames..frames.end;
+        let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
+        let cut = if analysis.skipped_frames >= analysis.stride {
+            ", cut behind a flip that no trend describes"
+        } else {
+            ""
+        };
+        let kept = match analysis.stride {
+            1 => String::new(),
+            stride => {
+                format!(" (one of {stride} is tracked: {:.6} frames/s)", grid.frame_rate_hz / stride as f64)
+            }
+        };
+        let note = format!(
+            "{from_s:.4} s to {to_s:.4} s{cut}, {} frames{kept}, {} removed",
+            frames.len(),
+            analysis.removed
+        );
+        Ok(StudiedWindow { recording, exposure_s, frames, analysis, note, hint })
+    }
+
+    fn output_files(&self, studied: &StudiedWindow) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+        let shown = AnalysedWindow {
+            recording: &studied.recording,
+            channel: self.channel,
+            frames: studied.frames.clone(),
+            analysis: &studied.analysis,
+            note: studied.note.clone(),
+        };
+        let mut outputs = vec![
+            (TABLES[0].to_owned(), tables::components_json(studied)?),
+            (TABLES[1].to_owned(), tables::description_json(self, studied)?),
+            (TABLES[2].to_owned(), tables::spectrum_csv(&studied.analysis)),
+            (TABLES[3].to_owned(), tables::ridge_csv(&shown.frequency_course())),
+        ];
+        outputs.extend(shown.figures().iter().flat_map(|(name, figure)| figure_files(name, figure)));
+        Ok(outputs)
+    }
+
+    /// Both spectra in one figure.
+    fn comparison_figure(&self, simulated: &StudiedWindow, measured: &StudiedWindow) -> Figure {
+        let shown = SpectraPlot {
+            quantity: self.channel.to_string(),
+            note: format!(
+                "spectra of {} and {}; model: {}; recording: {}",
+                measured.recording.name(),
+                simulated.recording.name(),
+                simulated.note,
+                measured.note
+            ),
+            synthetic: measured.recording.is_synthetic(),
+            ..compare_spectra(Some(&measured.analysis), Some(&simulated.analysis))
+        };
+        spectrum::draw_figure(&SpectraPlot { title: spectrum::strongest_claim(&shown), ..shown })
+    }
+}
+
+/// What to do where the window holds a whole flip and more: nothing slow and steady describes both of its
+/// sides.
+fn flip_hint(instants: &ReversalInstants, (from_s, to_s): (f64, f64)) -> Option<String> {
+    let flips =
+        instants.reversals.iter().enumerate().filter_map(|(i, reversal)| Some((i + 1, reversal.flip?)));
+    let (k, flip) = flips.into_iter().find(|(_, flip)| from_s < flip.start_s && flip.end_s < to_s)?;
+    let after = if instants.reversals.len() > 1 { format!("after[{k}]") } else { "after".to_owned() };
+    Some(format!(
+        "the window holds the flip from {:.4} s to {:.4} s; `--window {after}` starts behind it",
+        flip.start_s, flip.end_s
+    ))
+}
+
+fn parse_band(text: &str) -> Result<(f64, f64), Failure> {
+    let ends = text
+        .split_once("..")
+        .and_then(|(low, high)| Some((low.trim().parse().ok()?, high.trim().parse().ok()?)));
+    let ordered = ends.filter(|(low, high): &(f64, f64)| *low >= 0.0 && low < high && high.is_finite());
+    ordered.ok_or_else(|| {
+        Failure::Input(format!("--band: found `{text}`, expected two frequencies in Hz with `..` between them, the lower first, like `60..100`"))
+    })
+}

@@ -1,0 +1,200 @@
+//! What `spectrum_csv` writes and prints in addition to its figures.
+
+use super::{SpectrumRequest, StudiedWindow};
+use crate::cli::failure::Failure;
+use crate::figures::analysis::CoursePoint;
+use crate::recording::channel::{Channel, ReversalInstants, phase_windows};
+use crate::spectrum::time_frequency::FrequencyRange;
+use crate::spectrum::{Component, ComponentVerdict, SpectralAnalysis};
+use crate::text::{format_with_sd, to_ascii};
+use rayon::prelude::*;
+use serde::Serialize;
+use std::fmt::Write;
+
+/// Rows of text that are made at a time; of a long record many such blocks are made in parallel.
+const BLOCK_ROWS: usize = 4096;
+
+/// `components.json`; what begins inside the window does so at a time of the recording.
+pub fn components_json(studied: &StudiedWindow) -> Result<Vec<u8>, Failure> {
+    let from_s = studied.recording.grid().time_s(studied.frames.start);
+    let timed = |c: &Component| Component { begins_s: c.begins_s.map(|s| from_s + s), ..c.clone() };
+    to_json(&studied.analysis.spectrum.components.iter().map(timed).collect::<Vec<_>>())
+}
+
+fn to_json(value: &impl Serialize) -> Result<Vec<u8>, Failure> {
+    let mut bytes = serde_json::to_vec_pretty(value).map_err(Failure::internal)?;
+    bytes.push(b'\n');
+    Ok(bytes)
+}
+
+/// `spectrum.json`: what was analysed, and how.
+#[derive(Serialize)]
+struct SpectrumDescription<'a> {
+    recording: &'a str,
+    synthetic: bool,
+    channel: &'static str,
+    window: String,
+    from_s: f64,
+    to_s: f64,
+    frames: usize,
+    missing_frames: usize,
+    frame_rate_hz: f64,
+    exposure_s: Option<f64>,
+    detrend: String,
+    relaxations: usize,
+    resolution_hz: f64,
+    noise_floor_m: f64,
+    fastest_hz: f64,
+    windows: Vec<NamedWindowSpan>,
+    /// Range of the ridge, whether or not it is a component that drifts.
+    ridge_hz: Option<FrequencyRange>,
+    note: &'a str,
+    hint: Option<&'a str>,
+}
+
+#[derive(Serialize)]
+struct NamedWindowSpan {
+    name: String,
+    from_s: f64,
+    to_s: f64,
+}
+
+/// `spectrum.json`.
+pub fn description_json(request: &SpectrumRequest, studied: &StudiedWindow) -> Result<Vec<u8>, Failure> {
+    let StudiedWindow { recording, analysis, frames, .. } = studied;
+    let grid = recording.grid();
+    let windows = phase_windows(recording, &ReversalInstants::find_instants(recording));
+    to_json(&SpectrumDescription {
+        recording: recording.name(),
+        synthetic: recording.is_synthetic(),
+        channel: request.channel.name(),
+        window: request.window.to_string(),
+        from_s: grid.time_s(frames.start),
+        to_s: grid.time_s(frames.end),
+        frames: frames.len(),
+        missing_frames: analysis.residual_m.iter().filter(|x| x.is_none()).count(),
+        frame_rate_hz: grid.frame_rate_hz,
+        exposure_s: studied.exposure_s,
+        detrend: analysis.removed.detrend.to_string(),
+        relaxations: analysis.removed.relaxations,
+        resolution_hz: analysis.spectrum.resolution_hz,
+        noise_floor_m: analysis.spectrum.noise_floor_m,
+        fastest_hz: request.settings.fastest_hz,
+        windows: windows
+            .into_iter()
+            .map(|w| NamedWindowSpan { name: w.name, from_s: w.from_s, to_s: w.to_s })
+            .collect(),
+        ridge_hz: analysis.ridge.as_ref().and_then(|ridge| ridge.range_hz()),
+        note: &studied.note,
+        hint: studied.hint.as_deref(),
+    })
+}
+
+/// `spectrum.csv`: a row a bin; what a long or gappy record has not is empty.
+pub fn spectrum_csv(analysis: &SpectralAnalysis) -> Vec<u8> {
+    let spectrum = &analysis.spectrum;
+    let cell = |text: &mut String, value: Option<f64>| match value {
+        Some(value) => write!(text, ",{value:e}"),
+        None => write!(text, ","),
+    };
+    let block = |(block, frequency_hz): (usize, &[f64])| {
+        let mut text = String::new();
+        for (i, f) in frequency_hz.iter().enumerate() {
+            let bin = block * BLOCK_ROWS + i;
+            let tapers = analysis.multitaper.as_ref();
+            let interval = tapers.and_then(|m| m.interval_95(bin));
+            let values = [
+                spectrum.amplitude_m.get(bin).copied(),
+                analysis.noise_floor_m.get(bin).copied(),
+                analysis.leakage_m.get(bin).copied(),
+                tapers.and_then(|m| m.density_m2_per_hz.get(bin).copied()),
+                interval.map(|ends| ends.0),
+                interval.map(|ends| ends.1),
+                tapers.and_then(|m| m.line_probability(bin)),
+            ];
+            let _ = write!(text, "{f}"); // writing to a String cannot fail
+            values.into_iter().for_each(|value| cell(&mut text, value).unwrap_or_default());
+            text.push('\n');
+        }
+        text
+    };
+    let blocks: Vec<String> = spectrum.frequency_hz.par_chunks(BLOCK_ROWS).enumerate().map(block).collect();
+    let header = "frequency_hz,amplitude_m,noise_floor_m,leakage_m,density_m2_per_hz,\
+                  density_lower_95_m2_per_hz,density_upper_95_m2_per_hz,line_probability\n";
+    std::iter::once(header.to_owned()).chain(blocks).collect::<String>().into_bytes()
+}
+
+/// `ridge.csv`: the course of the strongest component above the slow ones.
+pub fn ridge_csv(course: &[CoursePoint]) -> Vec<u8> {
+    let speed = |speed: Option<f64>| speed.map_or_else(String::new, |speed| format!("{speed:e}"));
+    let row = |p: &CoursePoint| {
+        let speeds = [p.tip_speed_m_per_s, p.head_speed_m_per_s].map(speed);
+        format!(
+            "{},{},{},{:e},{},{}\n",
+            p.time_s, p.frequency_hz, p.frequency_sd_hz, p.amplitude_m, speeds[0], speeds[1]
+        )
+    };
+    let header = "time_s,frequency_hz,frequency_sd_hz,amplitude_m,tip_speed_m_per_s,head_speed_m_per_s\n";
+    std::iter::once(header.to_owned()).chain(course.iter().map(row)).collect::<String>().into_bytes()
+}
+
+/// The components on standard output.
+pub fn print_summary(channel: Channel, studied: &StudiedWindow) {
+    let (recording, spectrum) = (&studied.recording, &studied.analysis.spectrum);
+    let synthetic = if recording.is_synthetic() { " (synthetic: no camera took it)" } else { "" };
+    print_line!("{}{synthetic}: {channel}, {}", recording.name(), studied.note);
+    let from_s = recording.grid().time_s(studied.frames.start);
+    let missing = 100.0 * (1.0 - spectrum.present);
+    print_line!(
+        "resolution {:.2} Hz, noise floor {:.4} um, {missing:.1} % of the frames missing",
+        spectrum.resolution_hz,
+        spectrum.noise_floor_m * 1e6
+    );
+    studied.hint.iter().for_each(|hint| print_line!("{hint}"));
+    if spectrum.components.is_empty() {
+        print_line!("no component stands out of the noise");
+        return;
+    }
+    print_line!(
+        "{:>18} {:>16} {:>16} {:>8}  verdict",
+        "frequency, Hz",
+        "amplitude, um",
+        "damping ratio",
+        "SNR, dB"
+    );
+    for c in &spectrum.components {
+        let damping = c
+            .damping_ratio
+            .zip(c.damping_ratio_sd)
+            .map_or_else(|| "-".to_owned(), |(ratio, sd)| ascii_with_sd(ratio, sd));
+        let (frequency, amplitude) = (
+            ascii_with_sd(c.frequency_hz, c.frequency_sd_hz),
+            ascii_with_sd(c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6),
+        );
+        print_line!("{frequency:>18} {amplitude:>16} {damping:>16} {:>8.1}  {}", c.snr_db, c.verdict.name());
+        if let Some(begins_s) = c.begins_s {
+            print_line!("{:>18} begins at {:.4} s", "", from_s + begins_s);
+        }
+        if let Some(range) = &c.range_hz {
+            print_line!(
+                "{:>18} drifts from {} to {} Hz",
+                "",
+                ascii_with_sd(range.low_hz, range.low_sd_hz),
+                ascii_with_sd(range.high_hz, range.high_sd_hz)
+            );
+        }
+        c.reasons
+            .iter()
+            .for_each(|reason| print_line!("{:>18} {}: {}", "", reason.verdict.name(), reason.words));
+        if let Some(leakage_m) = c
+            .leakage_m
+            .filter(|leakage_m| *leakage_m > c.amplitude_m && c.verdict != ComponentVerdict::NotResolvable)
+        {
+            print_line!("{:>18} the flip, not removed, would show {:.3} um here", "", leakage_m * 1e6);
+        }
+    }
+}
+
+fn ascii_with_sd(value: f64, sd: f64) -> String {
+    to_ascii(&format_with_sd(value, sd))
+}

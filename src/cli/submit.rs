@@ -1,0 +1,249 @@
+//! `wiperlab submit`.
+
+mod local;
+mod plan;
+mod slurm;
+mod tasks;
+
+use super::args::{GlobalArgs, TimeLimit};
+use super::failure::{CommandOutcome, Failure};
+use super::files;
+use super::files::{FileSize, OutputCommand, Overwrite, WritePolicy};
+use crate::cli;
+use clap::{Args, ValueEnum};
+use plan::{SubmissionPlan, SubmittedWork, absolute_path};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+pub use tasks::TaskList;
+
+/// Who runs the tasks.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub enum Scheduler {
+    Slurm,
+    Local,
+}
+
+#[derive(Debug, Args)]
+pub struct SubmitArgs {
+    /// Study to run (sweep.toml), or jobs of fits (fits/NAME/job.toml), each of which one task does whole
+    #[arg(required = true, value_name = "STUDY|JOB")]
+    pub files: Vec<PathBuf>,
+    /// Folder for the results of a study, which every machine sees under the same path; scripts go into
+    /// DIR/shards/submit, logs into DIR/shards/logs (default for jobs, whose results lie next to them: the
+    /// folder in which all of them are)
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Who runs the tasks; `local` is this machine, without a scheduler
+    #[arg(long, value_enum)]
+    pub scheduler: Scheduler,
+    /// Number of tasks that the work is divided into, at most 1000; --threads is the number of cores of each
+    /// (default: 1)
+    #[arg(long, value_name = "N", value_parser = tasks::parse_shard_count, allow_negative_numbers = true)]
+    pub shards: usize,
+    /// Walltime of a task, such as 01:30:00 or 45min, at least a minute; the task ends by itself shortly
+    /// before
+    #[arg(long, value_name = "TIME", value_parser = plan::parse_walltime)]
+    pub time: Option<TimeLimit>,
+    /// Only these tasks, as `wiperlab collect` names them, such as 3,7-12 (default: all)
+    #[arg(long, value_name = "LIST")]
+    pub tasks: Option<TaskList>,
+    /// A further line for Slurm, such as --directive=--partition=short; may be given again
+    #[arg(long = "directive", value_name = "TEXT", allow_hyphen_values = true)]
+    pub directives: Vec<String>,
+    /// Show scripts and commands on standard output; write and run nothing
+    #[arg(long)]
+    pub print: bool,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+}
+
+impl SubmitArgs {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let plan = self.make_plan(global)?;
+        match self.scheduler {
+            Scheduler::Slurm => self.submit_scripts(&plan, global),
+            Scheduler::Local => self.run_locally(&plan, global),
+        }
+    }
+
+    fn make_plan(&self, global: &GlobalArgs) -> Result<SubmissionPlan, Failure> {
+        let tasks = self.tasks.clone().unwrap_or_else(|| TaskList::all(self.shards));
+        if let Some(last) = tasks.last().filter(|last| *last >= self.shards) {
+            return Err(Failure::Input(format!(
+                "--tasks: found {last}, expected numbers below the {} of --shards; correct one of them",
+                self.shards
+            )));
+        }
+        if let Some(line) = self.directives.iter().find(|line| line.contains(char::is_control)) {
+            return Err(Failure::Input(format!(
+                "--directive: found \"{line}\", expected one line; give --directive again for another"
+            )));
+        }
+        let here = |error| Failure::Input(format!("the working directory cannot be found: {error}"));
+        Ok(SubmissionPlan {
+            work: SubmittedWork::load(&self.files, self.out.as_deref(), self.overwrite)?,
+            program: absolute_path(&cli::executable_path()?)?,
+            folder: absolute_path(&std::env::current_dir().map_err(here)?)?,
+            shards: self.shards,
+            tasks,
+            threads: global.threads.unwrap_or(1),
+            walltime: self.time.map(|TimeLimit(time)| time),
+            directives: self.directives.clone(),
+            options: task_options(global),
+        })
+    }
+
+    fn run_locally(&self, plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        if !self.directives.is_empty() {
+            return Err(Failure::Input(format!(
+                "--directive: found \"{}\" with --scheduler local, expected none, as there is no scheduler; \
+                 leave it out",
+                self.directives.join("\", \"")
+            )));
+        }
+        if self.print {
+            local::print_commands(plan);
+            return Ok(CommandOutcome::Done);
+        }
+        local::run_tasks(plan, global)
+    }
+
+    /// Writes the scripts and hands them over.
+    fn submit_scripts(&self, plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let scripts = slurm::slurm_scripts(plan);
+        if self.print {
+            print_scripts(&scripts);
+            return Ok(CommandOutcome::Done);
+        }
+        if !is_program_on_path(slurm::SBATCH) {
+            return Err(Failure::Input(format!(
+                "--scheduler: found no program `{}` on PATH, expected that of the scheduler; submit from a \
+                 machine that has it, or see the scripts with --print",
+                slurm::SBATCH
+            )));
+        }
+        let scripts = scripts.map(|(name, text)| (name, text.into_bytes()));
+        files::write_outputs(
+            &plan.scripts_folder(),
+            &WritePolicy::new(OutputCommand::Submit, self.overwrite),
+            &scripts,
+        )?;
+        let script = plan.scripts_folder().join(slurm::SUBMIT_SH);
+        let ran = Command::new("/bin/sh").arg(&script).output();
+        let ran = ran.map_err(|error| Failure::Internal(format!("/bin/sh: cannot be run: {error}")))?;
+        let submitted = String::from_utf8_lossy(&ran.stdout);
+        super::output::write_stdout(&super::output::escape_lines(&submitted));
+        let complaint = String::from_utf8_lossy(&ran.stderr);
+        if ran.status.success() {
+            super::output::write_stderr(&super::output::escape_lines(&complaint));
+        } else {
+            return Err(submission_failure(&script.display().to_string(), &submitted, &complaint));
+        }
+        if !global.quiet {
+            print_line!(
+                "{} tasks with {} each; logs: {}",
+                plan.tasks.len(),
+                plan.describe_cores(),
+                plan.logs_folder().display()
+            );
+            print_line!("scripts: {}", plan.scripts_folder().display());
+        }
+        Ok(CommandOutcome::Done)
+    }
+}
+
+/// What the tasks have to be told to read the files that were read here.
+fn task_options(global: &GlobalArgs) -> Vec<String> {
+    let size = global.max_file_size;
+    let words = ["--max-file-size".to_owned(), size.to_string().replace(' ', "")];
+    if size == FileSize::DEFAULT { Vec::new() } else { words.to_vec() }
+}
+
+/// Scripts on standard output.
+fn print_scripts(scripts: &[(&str, String)]) {
+    for (place, (name, text)) in scripts.iter().enumerate() {
+        if place > 0 {
+            print_line!("");
+        }
+        print_line!("# ---- {name} ----");
+        super::output::write_stdout(&super::output::escape_lines(text));
+    }
+}
+
+/// Why nothing, or not everything, was submitted.
+fn submission_failure(script: &str, submitted: &str, complaint: &str) -> Failure {
+    let state = if submitted.trim().is_empty() {
+        "nothing was submitted: correct the cause and submit again"
+    } else {
+        "what is named above is submitted, the rest is not: run `wiperlab collect` yourself when its tasks \
+         have ended"
+    };
+    let complaint = complaint.split_whitespace().collect::<Vec<_>>().join(" ");
+    Failure::Internal(format!("{script}: `{}` failed: {complaint}; {state}", slurm::SBATCH))
+}
+
+// Words and programs of the POSIX shell.
+
+/// A word that the shell takes as it is.
+pub fn quote_word(word: &str) -> String {
+    let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,=@".contains(c);
+    if !word.is_empty() && word.chars().all(plain) {
+        return word.to_owned();
+    }
+    format!("'{}'", word.replace('\'', r"'\''"))
+}
+
+/// A command line from its words.
+pub fn join_words(words: &[String]) -> String {
+    words.iter().map(|word| quote_word(word)).collect::<Vec<_>>().join(" ")
+}
+
+/// Whether a program is found on PATH.
+pub fn is_program_on_path(program: &str) -> bool {
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    std::env::split_paths(&path).any(|folder| is_program(&folder.join(program)))
+}
+
+#[cfg(unix)]
+fn is_program(path: &Path) -> bool {
+    use std::os::unix::fs::PermissionsExt;
+    path.metadata().is_ok_and(|found| found.is_file() && found.permissions().mode() & 0o111 != 0)
+}
+
+#[cfg(not(unix))]
+fn is_program(path: &Path) -> bool {
+    path.is_file() || path.with_extension("exe").is_file()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_reach_the_program_as_they_are() {
+        for (word, written) in [
+            ("/home/a/study.toml", "/home/a/study.toml"),
+            ("a b", "'a b'"),
+            ("it's", r"'it'\''s'"),
+            ("$HOME `x` \"y\" \\", "'$HOME `x` \"y\" \\'"),
+            ("Wischblätter", "'Wischblätter'"),
+            ("", "''"),
+            ("~a", "'~a'"),
+        ] {
+            assert_eq!(quote_word(word), written);
+        }
+        assert_eq!(join_words(&["sweep".into(), "a b".into(), "--out".into()]), "sweep 'a b' --out");
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn the_shell_reads_them_back() {
+        let words =
+            ["a b", "it's", "$HOME `x` \"y\" \\", "Wischblätter", "-x", "*", "a;b&c|d>e#f!g%h", "tab\t"];
+        for word in words {
+            let script = format!("printf %s {}", quote_word(word));
+            let ran = std::process::Command::new("/bin/sh").args(["-c", &script]).output().unwrap();
+            assert_eq!(String::from_utf8(ran.stdout).unwrap(), word);
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! What is submitted, checked.
+
+use super::tasks::TaskList;
+use crate::cli::args::TimeLimit;
+use crate::cli::failure::Failure;
+use crate::cli::files::{OutputCommand, Overwrite, WritePolicy};
+use crate::cli::load::{LoadedJob, is_study};
+use crate::cli::{files, fit, sweep};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Shortest walltime, s: Slurm counts in minutes.
+const SHORTEST_S: u64 = 60;
+
+/// Part of the walltime by which a task ends earlier: enough to finish points and to be started late.
+const MARGIN: f64 = 0.05;
+/// Smallest and largest of these margins, s.
+const MARGINS_S: (u64, u64) = (30, 300);
+
+/// An array of tasks and the job after them.
+#[derive(Debug)]
+pub struct SubmissionPlan {
+    /// This program, for other machines.
+    pub program: String,
+    /// Where the tasks run: names in scenes may start from here.
+    pub folder: String,
+    pub work: SubmittedWork,
+    pub shards: usize,
+    pub tasks: TaskList,
+    /// Cores of a task.
+    pub threads: usize,
+    pub walltime: Option<Duration>,
+    pub directives: Vec<String>,
+    /// Options of every command that the files need.
+    pub options: Vec<String>,
+}
+
+impl SubmissionPlan {
+    /// Command of a task, without its shard.
+    pub fn task_command(&self) -> Vec<String> {
+        [self.work.task_command(), self.options.clone()].concat()
+    }
+
+    /// Command of the job at the end.
+    pub fn collect_command(&self) -> Vec<String> {
+        [self.work.collect_command(self.shards), self.options.clone()].concat()
+    }
+
+    /// After what time a task ends by itself.
+    pub fn time_limit(&self) -> Option<Duration> {
+        self.walltime.map(|walltime| walltime.saturating_sub(time_margin(walltime)))
+    }
+
+    /// Folder of the scripts.
+    pub fn scripts_folder(&self) -> PathBuf {
+        self.work.folder().join("submit")
+    }
+
+    /// Folder of what the tasks print.
+    pub fn logs_folder(&self) -> PathBuf {
+        self.work.folder().join("logs")
+    }
+
+    pub fn create_logs_folder(&self) -> Result<(), Failure> {
+        let logs = self.logs_folder();
+        fs::create_dir_all(&logs)
+            .map_err(|error| Failure::Internal(format!("{}: cannot be made: {error}", logs.display())))
+    }
+
+    /// `1 core`, `4 cores`.
+    pub fn describe_cores(&self) -> String {
+        format!("{} core{}", self.threads, if self.threads == 1 { "" } else { "s" })
+    }
+}
+
+fn time_margin(walltime: Duration) -> Duration {
+    let (least, most) = MARGINS_S;
+    let margin_s = (walltime.as_secs() as f64 * MARGIN) as u64;
+    Duration::from_secs(margin_s.clamp(least, most))
+}
+
+/// Time that Slurm gives a task, for [`clap`].
+pub fn parse_walltime(text: &str) -> Result<TimeLimit, String> {
+    let limit: TimeLimit = text.parse()?;
+    if limit.0.as_secs() < SHORTEST_S {
+        return Err("expected at least a minute, as Slurm counts in minutes".to_owned());
+    }
+    Ok(limit)
+}
+
+// What is divided among tasks: the commands that a task and the last job run.
+
+/// What is divided, by absolute paths.
+#[derive(Debug, Clone)]
+pub enum SubmittedWork {
+    /// A parameter study, whose shards and results lie in a folder.
+    Study { study: String, out: String },
+    /// Jobs of fits, each of which is done whole, next to its file; and a folder for scripts and logs.
+    Jobs { jobs: Vec<String>, out: String },
+}
+
+impl SubmittedWork {
+    /// A study or jobs that were read and checked as `wiperlab sweep` and `wiperlab fit` do.
+    pub fn load(files: &[PathBuf], out: Option<&Path>, overwrite: Overwrite) -> Result<Self, Failure> {
+        if let Some(name) = files.iter().find(|file| files::is_standard_input(file)) {
+            return Err(Failure::Input(format!(
+                "{}: found standard input, expected a file, as every task reads it; save it",
+                name.display()
+            )));
+        }
+        let mut studies = Vec::new();
+        for file in files {
+            studies.extend(is_study(file)?.then_some(file));
+        }
+        match (files, studies.as_slice(), out) {
+            ([study], [_], Some(out)) => Self::load_study(study, out, overwrite),
+            ([study], [_], None) => Err(Failure::Input(format!(
+                "{}: found a study without --out, expected the folder for its results; add --out DIR",
+                study.display()
+            ))),
+            ([job], [], _) => Err(Failure::Input(format!(
+                "{}: found one job, expected a study or a list of jobs, as a fit takes seconds and is not divided; \
+                 run `wiperlab fit` with it",
+                job.display()
+            ))),
+            (_, [], out) => Self::load_jobs(files, out),
+            (_, [study, ..], _) => Err(Failure::Input(format!(
+                "{}: found a study among {} files, expected one study alone or jobs of fits; submit it by itself",
+                study.display(),
+                files.len()
+            ))),
+        }
+    }
+
+    fn load_study(study: &Path, out: &Path, overwrite: Overwrite) -> Result<Self, Failure> {
+        let problem = sweep::LoadedStudy::load(study)?;
+        let writer = WritePolicy::new(OutputCommand::Sweep, overwrite);
+        problem.check_outputs(out, &writer)?;
+        Ok(Self::Study { study: absolute_path(study)?, out: absolute_path(out)? })
+    }
+
+    fn load_jobs(jobs: &[PathBuf], out: Option<&Path>) -> Result<Self, Failure> {
+        fit::check_distinct_folders(jobs)?;
+        jobs.iter().try_for_each(|job| LoadedJob::load(job).map(|_| ()))?;
+        let jobs = jobs.iter().map(|job| absolute_path(job)).collect::<Result<Vec<_>, _>>()?;
+        let out = match out {
+            Some(out) => absolute_path(out)?,
+            None => common_folder(&jobs),
+        };
+        Ok(Self::Jobs { jobs, out })
+    }
+
+    /// Command of a task, without its shard.
+    pub fn task_command(&self) -> Vec<String> {
+        match self {
+            Self::Study { study, out } => to_strings(&["sweep", study, "--out", out]),
+            Self::Jobs { jobs, .. } => [to_strings(&["fit"]), jobs.clone()].concat(),
+        }
+    }
+
+    /// Command of the job at the end.
+    pub fn collect_command(&self, shards: usize) -> Vec<String> {
+        let shards = shards.to_string();
+        match self {
+            Self::Study { out, .. } => to_strings(&["collect", out, "--shards", &shards]),
+            Self::Jobs { jobs, .. } => {
+                [to_strings(&["collect"]), jobs.clone(), to_strings(&["--shards", &shards])].concat()
+            }
+        }
+    }
+
+    /// Folder in which scripts and logs have theirs.
+    pub fn folder(&self) -> PathBuf {
+        let (Self::Study { out, .. } | Self::Jobs { out, .. }) = self;
+        Path::new(out).join(crate::cli::shards::SHARDS_FOLDER)
+    }
+
+    /// Name of the tasks for the scheduler, with which the names of their logs start: at most 15 plain letters
+    /// and digits.
+    pub fn job_name(&self) -> String {
+        const LONGEST: usize = 15;
+        let stem = match self {
+            Self::Study { study, .. } => Path::new(study).file_stem().unwrap_or_default().to_string_lossy(),
+            Self::Jobs { .. } => "fits".into(),
+        };
+        let plain = stem.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '-' });
+        "wl-".chars().chain(plain).take(LONGEST).collect::<String>().trim_end_matches('-').to_owned()
+    }
+}
+
+/// The folder in which all files lie, absolute.
+fn common_folder(files: &[String]) -> String {
+    let mut folders = files.iter().filter_map(|file| Path::new(file).parent());
+    let first = folders.next().unwrap_or(Path::new("/"));
+    let shared = |some: &Path, other: &Path| -> PathBuf {
+        let both = some.components().zip(other.components());
+        both.take_while(|(a, b)| a == b).map(|(part, _)| part).collect()
+    };
+    folders.fold(first.to_owned(), |all, folder| shared(&all, folder)).to_string_lossy().into_owned()
+}
+
+fn to_strings(words: &[&str]) -> Vec<String> {
+    words.iter().map(|word| (*word).to_owned()).collect()
+}
+
+/// A path as text that stands in a script and holds in every folder.
+pub fn absolute_path(path: &Path) -> Result<String, Failure> {
+    let refused = |problem: &str| Failure::Input(format!("{}: {problem}", path.display()));
+    let whole = std::path::absolute(path).map_err(|error| refused(&error.to_string()))?;
+    let text = whole.to_str().ok_or_else(|| {
+        refused("found a name that is not UTF-8, expected one that a script can hold; rename it")
+    })?;
+    if text.contains(char::is_control) {
+        let expected = "expected none, as scripts are read line by line; rename it";
+        return Err(refused(&format!(
+            "found a line break or another control character in the name, {expected}"
+        )));
+    }
+    Ok(text.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_task_ends_a_little_before_its_walltime() {
+        let of = |time: &str| time_margin(parse_walltime(time).unwrap().0).as_secs();
+        assert_eq!([of("1min"), of("10min"), of("20min"), of("1h"), of("24h")], [30, 30, 60, 180, 300]);
+        assert!(parse_walltime("59s").unwrap_err().contains("at least a minute"));
+        assert!(parse_walltime("x").is_err());
+    }
+
+    #[test]
+    fn scripts_of_jobs_lie_where_all_jobs_do() {
+        let of = |files: &[&str]| common_folder(&to_strings(files));
+        assert_eq!(of(&["/a/fits/one/job.toml", "/a/fits/two/job.toml"]), "/a/fits");
+        assert_eq!(of(&["/a/x/job.toml", "/b/x/job.toml"]), "/");
+    }
+}

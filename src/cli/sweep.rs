@@ -1,0 +1,121 @@
+//! `wiperlab sweep`.
+
+mod results;
+mod shards;
+mod solve;
+
+use super::args::{GlobalArgs, TimeLimit};
+use super::checkpoint::CHECKPOINT_FILE;
+use super::failure::{CommandOutcome, Failure};
+use super::files::{OutputCommand, Overwrite, WritePolicy};
+use super::load::read_named_scene;
+use super::{files, interrupt};
+use crate::checkpoint::Shard;
+use crate::simulate::scene::Scene;
+use crate::sweep::journal::{SweepHeader, study_header};
+use crate::sweep::{CollectError, PointCollection, Study};
+use clap::Args;
+pub use shards::find_study;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::{Path, PathBuf};
+
+#[derive(Debug, Args)]
+pub struct SweepArgs {
+    /// Study to run (sweep.toml): a scene, the parameters that are varied, and what is mapped
+    pub sweep: PathBuf,
+    /// Folder for sweep.csv, summary.json, one SVG a map, and journal.jsonl, which grows with every point
+    #[arg(long, value_name = "DIR")]
+    pub out: PathBuf,
+    #[command(flatten)]
+    pub overwrite: Overwrite,
+    /// Go on from the journal in DIR; without it a study starts over and the old journal is kept as
+    /// journal.previous-1.jsonl (the next free number)
+    #[arg(long)]
+    pub resume: bool,
+    /// Do only every N-th point from point K on (K from 0), into DIR/shards/K-of-N.jsonl; goes on from what
+    /// is there, and `wiperlab collect DIR` puts the shards together
+    #[arg(long, value_name = "K/N", conflicts_with = "force")]
+    pub shard: Option<Shard>,
+    /// Stop after this time with what is done (exit code 3); such as 45min, 1h30min or 02:00:00
+    #[arg(long, value_name = "TIME")]
+    pub time_limit: Option<TimeLimit>,
+}
+
+impl SweepArgs {
+    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+        let problem = LoadedStudy::load(&self.sweep)?;
+        if let Some(TimeLimit(time)) = self.time_limit {
+            interrupt::set_time_limit(time);
+        }
+        if let Some(shard) = self.shard {
+            return problem.solve_shard(&self.sweep, &self.out, shard, global);
+        }
+        let journal = self.out.join(CHECKPOINT_FILE);
+        files::check_path_free(&journal)?;
+        let writer =
+            WritePolicy::new(OutputCommand::Sweep, self.overwrite).with_csv_dialect(global.csv_dialect);
+        problem.check_outputs(&self.out, &writer)?;
+        if !problem.solve(&journal, self.resume, global)? {
+            return Ok(CommandOutcome::StoppedEarly);
+        }
+        let mut points = problem.new_collection(&self.out)?;
+        problem.add_checkpoint(&mut points, &journal)?;
+        problem.write_outputs(&mut points, &self.out, &writer, global)
+    }
+}
+
+// A study with its scene, read from disk.
+
+/// A checked study with its scene.
+pub struct LoadedStudy {
+    pub study: Study,
+    pub scene: Scene,
+    pub fingerprint: String,
+}
+
+impl LoadedStudy {
+    pub fn load(path: &Path) -> Result<Self, Failure> {
+        let file = path.display().to_string();
+        let text = files::read_toml(path)?;
+        let study = Study::parse(&file, &text).map_err(Failure::input)?;
+        let scene = read_named_scene(path, &study.scene)?;
+        study.check_scene(&file, &scene).map_err(Failure::input)?;
+        let fingerprint = study.fingerprint(&scene);
+        Ok(Self { study, scene, fingerprint })
+    }
+
+    /// First line of every journal of the study.
+    pub fn header(&self) -> SweepHeader {
+        study_header(&self.study, &self.fingerprint)
+    }
+
+    /// No point yet; the temporary file lies where `out` will be.
+    pub fn new_collection(&self, out: &Path) -> Result<PointCollection<File>, Failure> {
+        Ok(PointCollection::new(self.header(), files::create_scratch_file(out)?))
+    }
+
+    /// Adds the points of a journal.
+    pub fn add_checkpoint(&self, points: &mut PointCollection<File>, journal: &Path) -> Result<(), Failure> {
+        let name = journal.display().to_string();
+        let refused = |problem: String| Failure::Input(format!("{name}: {problem}"));
+        let file = File::open(journal).map_err(|error| refused(format!("cannot be read: {error}")))?;
+        let added = points.add_journal(&name, BufReader::new(file)).map_err(collection_failure)?;
+        match added {
+            None => warn_line!("warning: {name}: holds no complete line"),
+            Some(added) if added.end.torn => {
+                warn_line!("warning: {name}: the last line is incomplete and left out")
+            }
+            Some(_) => {}
+        }
+        Ok(())
+    }
+}
+
+/// Why points cannot be collected.
+pub fn collection_failure(error: CollectError) -> Failure {
+    match error {
+        CollectError::Journal(refused) => Failure::input(refused),
+        CollectError::Spool(_) => Failure::internal(error),
+    }
+}

@@ -1,0 +1,114 @@
+//! The runs of a study, or of a part of it, into a journal.
+
+use super::LoadedStudy;
+use crate::checkpoint::{CheckpointSink, Shard, StoredRecord, format_header_line};
+use crate::cli::args::GlobalArgs;
+use crate::cli::checkpoint::CheckpointWriter;
+use crate::cli::failure::Failure;
+use crate::cli::interrupt;
+use crate::cli::progress;
+use crate::sweep::journal::SweepPoint;
+use crate::sweep::{self, PointRecheck, SweepError};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+/// A part of a study on its way into a journal.
+pub struct StudyPart<'a> {
+    pub shard: Shard,
+    pub journal: &'a Path,
+    /// Whether the journal goes on; without it a new one is begun.
+    pub resume: bool,
+    /// Points that other journals hold.
+    pub elsewhere: Vec<bool>,
+    /// What to do with what is done when it stops early.
+    pub advice: String,
+    /// Whether progress is said where there is no terminal.
+    pub reports: bool,
+}
+
+impl LoadedStudy {
+    /// Runs what the journal of the whole study does not hold; `false` where it was interrupted.
+    pub fn solve(&self, journal: &Path, resume: bool, global: &GlobalArgs) -> Result<bool, Failure> {
+        let advice = "go on with --resume".to_owned();
+        let part =
+            StudyPart { shard: Shard::WHOLE, journal, resume, elsewhere: Vec::new(), advice, reports: false };
+        self.solve_part(&part, global)
+    }
+
+    /// Runs what no journal holds of a part, and writes its journal as it goes; `false` where it was
+    /// interrupted.
+    pub fn solve_part(&self, part: &StudyPart, global: &GlobalArgs) -> Result<bool, Failure> {
+        let (header, name) = (self.header(), part.journal.display().to_string());
+        let points = self.study.point_count();
+        let mut known = part.elsewhere.clone();
+        known.resize(points, false);
+        let mut own = vec![false; points];
+        let mut recheck = PointRecheck::new(points as u64);
+        let mut each = |found: StoredRecord<SweepPoint>| {
+            let index = found.record.index;
+            match own.get_mut(index) {
+                Some(before) if *before => {
+                    return Err(crate::checkpoint::duplicate_record_error(&name, &found, ""));
+                }
+                Some(before) => *before = true,
+                None => {}
+            }
+            recheck.offer_point(found);
+            Ok(())
+        };
+        let (mut sink, found) =
+            CheckpointWriter::open_each::<SweepPoint>(part.journal, part.resume, &mut each)?;
+        if let Some(found) = &found {
+            found.check_matches::<SweepPoint>(&name, &header).map_err(Failure::input)?;
+            recheck.check_points(&self.study, &self.scene, &name).map_err(Failure::input)?;
+        } else {
+            sink.append(&format_header_line(&header)).map_err(Failure::Internal)?;
+        }
+        known.iter_mut().zip(&own).for_each(|(known, own)| *known |= own);
+        let all = part.shard.count_points(points);
+        let taken = (0..all).filter(|place| known.get(part.shard.point_index(*place)) == Some(&true)).count();
+        if taken > 0 {
+            progress::print_progress(
+                global.quiet,
+                &format!("{taken} of {all} points are taken from the journal"),
+            );
+        }
+        let bar = progress::start_bar((all - taken) as u64, "sweep", "points", global.quiet);
+        let reporter = progress::ProgressReporter::new(&bar, part.reports && !global.quiet);
+        let journaled = Arc::new(AtomicUsize::new(taken));
+        let kept = {
+            let (advice, journaled) = (part.advice.clone(), Arc::clone(&journaled));
+            move || {
+                let done = journaled.load(Ordering::Relaxed);
+                format!("{name} holds {done} of {all} points; {advice}")
+            }
+        };
+        let stops = interrupt::register_stoppable(kept.clone());
+        let done = || {
+            bar.inc(1);
+            journaled.fetch_add(1, Ordering::Relaxed);
+            reporter.report_if_due();
+        };
+        let due = |index: usize| known.get(index) != Some(&true);
+        let ran = sweep::run_sweep(
+            &self.study,
+            &self.scene,
+            part.shard,
+            &due,
+            &mut sink,
+            &done,
+            &interrupt::control_flow,
+        );
+        bar.finish_and_clear();
+        sink.finish()?;
+        match ran {
+            Ok(()) => Ok(true),
+            Err(SweepError::Interrupted) => {
+                stops.announce_stop(&kept());
+                Ok(false)
+            }
+            Err(failed) => Err(Failure::internal(failed)),
+        }
+    }
+}

@@ -1,0 +1,283 @@
+//! Friction read from a recording itself: where the tip moves evenly, the deflection says how large it is.
+//!
+//! A blade whose links turn slowly is in equilibrium, and of an equilibrium the deflection `tip_x - head_x`
+//! decides everything: both angles, the normal force and the coefficient of friction. Where the tip sticks
+//! and slips, inertia cancels over whole cycles, so that the mean deflection gives a mean of the coefficient;
+//! that is none of the law's, and the model is read in the same way next to it.
+
+use super::condition::{ConditionComparison, TimedRecording};
+use crate::fit::job::Job;
+use crate::fit::result::FitResult;
+use crate::math;
+use crate::model::friction::FrictionLaw;
+use crate::recording::channel::Channel;
+use crate::simulate::equilibrium::static_deflections;
+use std::array;
+
+/// A coefficient at a speed.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrictionPoint {
+    /// Mean speed of the tip, m/s.
+    pub speed_m_per_s: f64,
+    /// Friction over normal force.
+    pub coefficient: f64,
+}
+
+/// What a recording shows of friction.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct MeasuredFriction {
+    /// Where the tip moved evenly.
+    pub steady_sliding: Vec<FrictionPoint>,
+    /// Means over cycles of stick and slip.
+    pub over_cycles: Vec<FrictionPoint>,
+    /// The same means of the model.
+    pub model_over_cycles: Vec<FrictionPoint>,
+}
+
+/// Length of a block in which the tip may move evenly, s, and fewest frames of it.
+const STEADY_BLOCK_S: f64 = 5e-3;
+const MIN_BLOCK_FRAMES: usize = 8;
+/// Length of a block of cycles, s, where no slow frequency is known: a dozen cycles of the fast one;
+/// otherwise this many cycles of the slow one.
+const CYCLE_BLOCK_S: f64 = 0.02;
+const SLOW_CYCLES: f64 = 2.0;
+/// Scatter about a parabola, over the noise, up to which a tip moves evenly.
+const MAX_SCATTER_OVER_NOISE: f64 = 1.2;
+/// Share of its mean by which the speed may change within a block.
+const MAX_SPEED_CHANGE: f64 = 0.4;
+/// Deviations from rest from which a speed is one.
+const MIN_SPEED_SD: f64 = 5.0;
+/// Most points of a kind.
+const MAX_POINTS: usize = 60;
+
+impl MeasuredFriction {
+    /// What the recording of a condition shows; empty without tip and head.
+    #[must_use]
+    pub fn measure(case: &ConditionComparison) -> Self {
+        let Some(side) = case.measured_side() else { return Self::default() };
+        let deflections = static_deflections(&case.model.scene.linkage);
+        let slowest_hz =
+            case.frequency_comparisons().map(|sought| sought.target.frequency_hz).reduce(f64::min);
+        let cycles_s = slowest_hz.map_or(CYCLE_BLOCK_S, |hz| (SLOW_CYCLES / hz).max(CYCLE_BLOCK_S));
+        let noise_m = case.noise_m(Channel::TipX).unwrap_or(0.0);
+        let evenly = one_way_blocks(&side, STEADY_BLOCK_S, noise_m);
+        let cycles = one_way_blocks(&side, cycles_s, noise_m);
+        let model_side = case.model_side();
+        let shift_s = case.alignment.shift_s;
+        let model: Vec<FrictionBlock> = one_way_blocks(&model_side, cycles_s, noise_m)
+            .into_iter()
+            .map(|b| FrictionBlock { start_s: b.start_s + shift_s, ..b })
+            .collect();
+        let shown = |from_s: f64| {
+            let grid = side.recording.grid();
+            from_s >= grid.start_s && from_s <= grid.time_s(grid.frames)
+        };
+        let points = |blocks: &[FrictionBlock], even: bool| {
+            let found: Vec<FrictionPoint> = blocks
+                .iter()
+                .filter(|block| block.is_even == even && shown(block.start_s))
+                .filter_map(|block| block.friction_point(&deflections))
+                .collect();
+            let every = found.len().div_ceil(MAX_POINTS).max(1);
+            found.into_iter().step_by(every).collect()
+        };
+        Self {
+            steady_sliding: points(&evenly, true),
+            over_cycles: points(&cycles, false),
+            model_over_cycles: points(&model, false),
+        }
+    }
+}
+
+/// A few frames in which the tip moves one way.
+#[derive(Debug, Clone, Copy)]
+struct FrictionBlock {
+    start_s: f64,
+    /// Mean velocity of the tip, m/s.
+    velocity_m_per_s: f64,
+    /// Mean deflection, m.
+    deflection_m: f64,
+    is_even: bool,
+}
+
+impl FrictionBlock {
+    /// The coefficient at which the blade rests at that deflection.
+    fn friction_point(&self, deflections: &[(f64, f64)]) -> Option<FrictionPoint> {
+        let after = deflections.partition_point(|(_, deflection_m)| *deflection_m < self.deflection_m);
+        let (a, b) = (deflections.get(after.checked_sub(1)?)?, deflections.get(after)?);
+        let share = (self.deflection_m - a.1) / (b.1 - a.1);
+        let coefficient = (a.0 + share * (b.0 - a.0)) * self.velocity_m_per_s.signum();
+        Some(FrictionPoint { speed_m_per_s: self.velocity_m_per_s.abs(), coefficient })
+    }
+}
+
+/// The blocks of one side in which the tip keeps moving one way at nearly one speed.
+fn one_way_blocks(side: &TimedRecording, length_s: f64, noise_m: f64) -> Vec<FrictionBlock> {
+    let grid = side.recording.grid();
+    let frames = ((length_s * grid.frame_rate_hz).round() as usize).max(MIN_BLOCK_FRAMES);
+    let (tip, deflection) = (side.samples(Channel::TipX), side.samples(Channel::Deflection));
+    let block = |i: usize, tip: &[Option<f64>], deflection: &[Option<f64>]| {
+        let path = TipParabola::fit(tip, 1.0 / grid.frame_rate_hz)?;
+        let present: Vec<f64> = deflection.iter().flatten().copied().collect();
+        if present.len() < MIN_BLOCK_FRAMES {
+            return None;
+        }
+        let least = MIN_SPEED_SD * noise_m / length_s;
+        let changes = path.curvature_m_per_s2.abs() * length_s;
+        let moves =
+            path.velocity_m_per_s.abs() > least && changes < MAX_SPEED_CHANGE * path.velocity_m_per_s.abs();
+        moves.then(|| FrictionBlock {
+            start_s: grid.time_s(i * frames),
+            velocity_m_per_s: path.velocity_m_per_s,
+            deflection_m: present.iter().sum::<f64>() / present.len() as f64,
+            is_even: path.scatter_m <= MAX_SCATTER_OVER_NOISE * noise_m,
+        })
+    };
+    let pairs = tip.chunks(frames).zip(deflection.chunks(frames)).enumerate();
+    pairs.filter_map(|(i, (tip, deflection))| block(i, tip, deflection)).collect()
+}
+
+/// A parabola through the frames of a block.
+struct TipParabola {
+    velocity_m_per_s: f64,
+    curvature_m_per_s2: f64,
+    scatter_m: f64,
+}
+
+impl TipParabola {
+    /// Least squares; `None` with too few frames.
+    fn fit(samples: &[Option<f64>], frame_s: f64) -> Option<Self> {
+        let middle = 0.5 * (samples.len() as f64 - 1.0);
+        let points: Vec<(f64, f64)> = samples
+            .iter()
+            .enumerate()
+            .filter_map(|(i, x)| Some(((i as f64 - middle) / middle, (*x)?)))
+            .collect();
+        if points.len() < MIN_BLOCK_FRAMES {
+            return None;
+        }
+        let mut normal = nalgebra::Matrix3::<f64>::zeros();
+        let mut right = nalgebra::Vector3::<f64>::zeros();
+        let origin = points.first()?.1;
+        for (t, x) in &points {
+            let row = nalgebra::Vector3::new(1.0, *t, t * t);
+            normal += row * row.transpose();
+            right += row * (x - origin);
+        }
+        let found = normal.cholesky()?.solve(&right);
+        let left = points.iter().map(|(t, x)| x - origin - found[0] - found[1] * t - found[2] * t * t);
+        let scatter = left.map(|x| x * x).sum::<f64>() / (points.len() - 3) as f64;
+        let unit_s = middle * frame_s;
+        Some(Self {
+            velocity_m_per_s: found[1] / unit_s,
+            curvature_m_per_s2: 2.0 * found[2] / (unit_s * unit_s),
+            scatter_m: scatter.sqrt(),
+        })
+    }
+}
+
+// The friction law of a fit with what is known of it at every speed.
+
+/// A coefficient of the law: its name in a scene, its symbol, and how the law changes with it at a speed.
+#[derive(Debug, Clone, Copy)]
+pub struct LawCoefficient {
+    /// Name in a scene.
+    pub name: &'static str,
+    /// Symbol in the law.
+    pub symbol: &'static str,
+    slope: fn(&FrictionLaw, f64) -> f64,
+}
+
+/// The coefficients of `A exp(-B |v|) + C`.
+pub const COEFFICIENTS: [LawCoefficient; 3] = [
+    LawCoefficient { name: "friction.a", symbol: "A", slope: |law, v| math::exp(-law.b_s_per_m * v) },
+    LawCoefficient {
+        name: "friction.b_s_per_m",
+        symbol: "B",
+        slope: |law, v| -law.a * v * math::exp(-law.b_s_per_m * v),
+    },
+    LawCoefficient { name: "friction.c", symbol: "C", slope: |_, _| 1.0 },
+];
+
+/// Half of an interval at a tip speed, m/s.
+pub type HalfInterval = Box<dyn Fn(f64) -> f64>;
+
+/// Half of the 95 % interval of the coefficient of friction at a speed, propagated linearly from the stated
+/// intervals of the fitted coefficients with their correlations; `None` where nothing of the law was fitted,
+/// an interval is open, or the linear model does not determine a coefficient that was fitted.
+#[must_use]
+pub fn friction_half_95(job: &Job, result: &FitResult, law: &FrictionLaw) -> Option<HalfInterval> {
+    let half = |coefficient: &LawCoefficient| {
+        if !is_fitted(job, coefficient) {
+            return Some(0.0);
+        }
+        let found = result.parameters.get(coefficient.name).filter(|found| found.has_interval())?;
+        Some((found.estimate - found.lower_95?).max(found.upper_95? - found.estimate))
+    };
+    let [a, b, c] = COEFFICIENTS.each_ref().map(half);
+    let halves = [a?, b?, c?];
+    let correlation = |i: usize, j: usize| {
+        if i == j || halves[i] == 0.0 || halves[j] == 0.0 {
+            return Some(f64::from(u8::from(i == j)));
+        }
+        result.correlations.get(COEFFICIENTS[i].name)?.get(COEFFICIENTS[j].name).copied()
+    };
+    let row = |i: usize| Some([correlation(i, 0)?, correlation(i, 1)?, correlation(i, 2)?]);
+    let correlations = [row(0)?, row(1)?, row(2)?];
+    let law = *law;
+    let half = move |v: f64| {
+        let moved: [f64; 3] = array::from_fn(|i| (COEFFICIENTS[i].slope)(&law, v) * halves[i]);
+        let row = |i: usize| (0..3).map(|j| moved[i] * moved[j] * correlations[i][j]).sum::<f64>();
+        (0..3).map(row).sum::<f64>().max(0.0).sqrt()
+    };
+    COEFFICIENTS.iter().any(|c| is_fitted(job, c)).then(|| Box::new(half) as HalfInterval)
+}
+
+/// Whether a job fits a coefficient.
+#[must_use]
+pub fn is_fitted(job: &Job, coefficient: &LawCoefficient) -> bool {
+    job.parameters.iter().any(|p| p.name == coefficient.name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::model::Linkage;
+    use crate::simulate::equilibrium::steady_slip_pose;
+    use crate::simulate::scene::Scene;
+
+    fn linkage() -> Linkage {
+        let text = include_str!("../../data/scenes/actual-blade.toml");
+        Scene::parse("s", text).unwrap().linkage
+    }
+
+    #[test]
+    fn the_deflection_of_a_blade_that_slides_gives_its_friction_back() {
+        let linkage = linkage();
+        let deflections = static_deflections(&linkage);
+        for velocity_m_per_s in [-0.3, -0.05, 0.02, 0.2] {
+            let pose = steady_slip_pose(&linkage, velocity_m_per_s).unwrap();
+            let d = crate::model::LinkDirections::from_pose(&pose);
+            let block = FrictionBlock {
+                start_s: 0.0,
+                velocity_m_per_s,
+                deflection_m: linkage.l1_m * d.sin_theta + linkage.l2_m * d.sin_phi,
+                is_even: true,
+            };
+            let found = block.friction_point(&deflections).unwrap();
+            let law = linkage.friction.dynamic_coefficient(velocity_m_per_s.abs());
+            assert!((found.coefficient - law).abs() < 1e-4, "{velocity_m_per_s}: {found:?} {law}");
+        }
+    }
+
+    #[test]
+    fn a_parabola_is_found_with_its_scatter() {
+        let place = |i: u32| 0.03 + 0.2 * f64::from(i) * 1e-3 + 0.5 * 4.0 * (f64::from(i) * 1e-3).powi(2);
+        let noise = |i: u32| if i.is_multiple_of(2) { 1e-6 } else { -1e-6 };
+        let samples: Vec<Option<f64>> = (0..40).map(|i| (i != 11).then(|| place(i) + noise(i))).collect();
+        let found = TipParabola::fit(&samples, 1e-3).unwrap();
+        assert!((found.velocity_m_per_s - (0.2 + 4.0 * 19.5e-3)).abs() < 1e-4, "{}", found.velocity_m_per_s);
+        assert!((found.curvature_m_per_s2 - 4.0).abs() < 0.05 && (found.scatter_m - 1e-6).abs() < 2e-7);
+        assert!(TipParabola::fit(&samples[..5], 1e-3).is_none());
+    }
+}

@@ -1,0 +1,168 @@
+//! What the figures of a condition say of it: its name, its files, where its motion comes from.
+
+use super::{Drawing, FigureBlock, NO_TRACES, Words, about};
+use crate::chart::Figure;
+use crate::compare::ConditionComparison;
+use crate::model::parameters;
+use crate::recording::Recording;
+use crate::text::{join_with_and, truncate_text};
+
+/// Letters of a title and of a name in a heading, which has to leave room for the figure: the longest titles
+/// in use fit.
+const TITLE_LETTERS: usize = 120;
+const NAME_LETTERS: usize = 50;
+
+impl ConditionComparison<'_> {
+    /// Name of the condition where there are several.
+    fn distinct_name(&self) -> Option<&str> {
+        Some(self.name()).filter(|_| self.job.conditions.len() > 1)
+    }
+
+    /// What a figure is about: the job, and the condition where there are several.
+    pub(crate) fn figure_title(&self) -> String {
+        let of = self
+            .distinct_name()
+            .map_or_else(String::new, |name| format!(", {}", truncate_text(name, NAME_LETTERS)));
+        format!("{}{of}", truncate_text(&self.job.title, TITLE_LETTERS))
+    }
+
+    /// What is said under a heading.
+    pub(crate) fn heading_note(&self, text: &str) -> String {
+        match (self.recording(), text.is_empty()) {
+            (None, true) => NO_TRACES.to_owned(),
+            (None, false) => format!("{NO_TRACES}; {text}"),
+            (Some(_), _) => text.to_owned(),
+        }
+    }
+
+    /// "the synthetic recording `twin`", or "the model alone".
+    pub(crate) fn source_name(&self) -> String {
+        match self.recording() {
+            Some(r) => format!("{} {}", recording_kind(r), r.name()),
+            None => "the fitted model alone, as no traces are published".to_owned(),
+        }
+    }
+
+    /// The same without its name.
+    pub(crate) fn source_kind(&self) -> &'static str {
+        self.recording().map_or("the fitted model alone, as no traces are published", recording_kind)
+    }
+
+    /// A figure of both sides.
+    pub(crate) fn figure_block(&self, name: &str, words: Words, figure: Figure) -> FigureBlock {
+        let figure = Figure { subtitle: about(&self.figure_title(), &figure.subtitle), ..figure };
+        self.drawing_block(name, words, Drawing::Chart(figure))
+    }
+
+    /// A figure of the model alone, which conditions with the same run share; its details name the condition.
+    pub(crate) fn model_figure_block(&self, name: &str, words: Words, drawing: Drawing) -> FigureBlock {
+        let of = self.distinct_name().map_or_else(String::new, |name| format!("{name}: "));
+        let details = format!("{of}{}{}", words.details, self.sharing_note());
+        self.drawing_block(name, Words { details, ..words }, drawing)
+    }
+
+    fn drawing_block(&self, name: &str, Words { caption, details }: Words, drawing: Drawing) -> FigureBlock {
+        let number = self.distinct_name().map_or_else(String::new, |_| format!("-{}", self.condition + 1));
+        let drawing = match drawing {
+            Drawing::Chart(figure) => Drawing::Chart(Figure { watermarked: self.is_synthetic(), ..figure }),
+            moving @ Drawing::Moving(_) => moving,
+        };
+        FigureBlock {
+            file: format!("{name}{number}.svg"),
+            caption,
+            details,
+            drawing,
+            condition: Some(self.condition),
+        }
+    }
+
+    /// What is said of later conditions with the same run.
+    pub(crate) fn sharing_note(&self) -> String {
+        let same = self.same_run.iter().flatten().filter_map(|i| self.job.conditions.get(*i));
+        let names: Vec<String> = same.map(|c| truncate_text(&c.name, NAME_LETTERS)).collect();
+        if names.is_empty() {
+            return String::new();
+        }
+        format!(
+            " The model's run is the same in {}, but for the clock of the recording.",
+            join_with_and(&names)
+        )
+    }
+}
+
+fn recording_kind(recording: &Recording) -> &'static str {
+    if recording.is_synthetic() { "the synthetic recording" } else { "the recording" }
+}
+
+/// Names that differ in signs alone are one as file names: later ones get a number.
+pub(crate) fn make_file_names_unique(mut blocks: Vec<FigureBlock>) -> Vec<FigureBlock> {
+    for i in 1..blocks.len() {
+        let (before, rest) = blocks.split_at_mut(i);
+        let taken = |file: &str| before.iter().any(|b| b.file == file);
+        let Some(block) = rest.first_mut().filter(|b| taken(&b.file)) else { continue };
+        let stem = block.file.trim_end_matches(".svg").to_owned();
+        let free = (2..).map(|n| format!("{stem}-{n}.svg")).find(|file| !taken(file));
+        block.file = free.unwrap_or_default();
+    }
+    blocks
+}
+
+/// Longest part of a file name that a name from a job makes: file systems take some 255 bytes of a whole
+/// name.
+const LONGEST_WORD: usize = 60;
+
+/// A name from a job as part of a file name: letters and digits, everything else a hyphen, no longer than a
+/// file system takes.
+pub(crate) fn file_name_part(name: &str) -> String {
+    let word: String = name
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
+        .take(LONGEST_WORD)
+        .collect();
+    // (a name in another script leaves no letter)
+    if word.chars().all(|c| c == '-') { "window".to_owned() } else { word }
+}
+
+// What stands for a parameter in figures.
+
+/// Letters of a name that stand in for a symbol.
+const LETTERS: usize = 10;
+
+/// Symbol of a parameter in the equations; a short form of its name where it has none.
+pub(super) fn parameter_symbol(name: &str) -> String {
+    parameters::find_parameter(name).map_or_else(|| truncate_text(name, LETTERS), |row| row.symbol.to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_of_any_length_and_script_makes_a_file_name() {
+        let long = file_name_part(&"A very long name, ".repeat(20));
+        assert!(long.starts_with("a-very-long-name--a-very") && long.len() == LONGEST_WORD, "{long}");
+        assert_eq!(
+            [file_name_part("high, lowest"), file_name_part("\u{53cd}\u{8ee2}")],
+            ["high--lowest", "window"]
+        );
+    }
+
+    #[test]
+    fn no_figure_overwrites_another() {
+        let named = |file: &str| FigureBlock { file: file.to_owned(), ..FigureBlock::default() };
+        let files: Vec<String> =
+            make_file_names_unique(["a.svg", "a.svg", "a-2.svg", "a.svg"].map(named).to_vec())
+                .into_iter()
+                .map(|b| b.file)
+                .collect();
+        assert_eq!(files, ["a.svg", "a-2.svg", "a-2-2.svg", "a-3.svg"]);
+    }
+
+    #[test]
+    fn a_symbol_stands_for_a_known_name_and_a_short_form_for_any_other() {
+        assert_eq!(
+            [parameter_symbol("friction.a"), parameter_symbol("something.unheard_of")],
+            ["A".to_owned(), "something\u{2026}".to_owned()]
+        );
+    }
+}

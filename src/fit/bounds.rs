@@ -1,0 +1,287 @@
+//! Bounds as one invertible transform: physical value, unit box, real line.
+//!
+//! Clouds of points search the unit box. A search without bounds works on the real line instead, through `u =
+//! (1 + sin z) / 2` (the transform of MINUIT, James and Roos, Comput. Phys. Commun. 10 (1975) 343): it
+//! reaches both bounds at finite `z` and cannot leave the box.
+
+use crate::math;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::f64::consts::FRAC_PI_2;
+
+/// How a parameter's range is divided.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "lowercase")]
+pub enum BoundsSpacing {
+    /// Equal ratios take equal lengths; both bounds above 0.
+    Log,
+    /// Equal differences take equal lengths.
+    Linear,
+}
+
+/// Why two numbers are not bounds.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum BoundsError {
+    /// A bound is infinite or not a number.
+    #[error("`{key}`: found {found}, expected a finite number")]
+    NotFinite {
+        /// `lower` or `upper`.
+        key: &'static str,
+        /// Its value.
+        found: f64,
+    },
+    /// The bounds cross or touch, or lie so close that no number fits between.
+    #[error(
+        "`lower` = {lower} and `upper` = {upper}: expected lower < upper; exchange or widen them, or fix the parameter in the scene"
+    )]
+    Crossed {
+        /// Lower bound as written.
+        lower: f64,
+        /// Upper bound as written.
+        upper: f64,
+    },
+    /// A logarithmic range must lie above zero.
+    #[error(
+        "`lower` = {lower}: expected a number above 0 because `scale` is \"log\"; raise the bound or use scale = \"linear\""
+    )]
+    LogOfNonPositive {
+        /// Lower bound as written.
+        lower: f64,
+    },
+}
+
+/// A parameter's range, in the parameter's own SI unit.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Bounds {
+    lower: f64,
+    upper: f64,
+    spacing: BoundsSpacing,
+}
+
+impl Bounds {
+    /// Checks the bounds.
+    ///
+    /// # Errors
+    /// [`BoundsError`] when they are not finite, cross or touch, or are logarithmic and not above zero.
+    pub fn new(lower: f64, upper: f64, spacing: BoundsSpacing) -> Result<Self, BoundsError> {
+        for (key, found) in [("lower", lower), ("upper", upper)] {
+            if !found.is_finite() {
+                return Err(BoundsError::NotFinite { key, found });
+            }
+        }
+        if spacing == BoundsSpacing::Log && lower <= 0.0 {
+            return Err(BoundsError::LogOfNonPositive { lower });
+        }
+        let bounds = Self { lower, upper, spacing };
+        let length = bounds.scaled_length();
+        if lower >= upper || !length.is_finite() || length <= 0.0 {
+            return Err(BoundsError::Crossed { lower, upper });
+        }
+        Ok(bounds)
+    }
+
+    /// Lower bound, in the parameter's unit.
+    #[must_use]
+    pub fn lower(&self) -> f64 {
+        self.lower
+    }
+
+    /// Upper bound, in the parameter's unit.
+    #[must_use]
+    pub fn upper(&self) -> f64 {
+        self.upper
+    }
+
+    /// How the range is divided.
+    #[must_use]
+    pub fn spacing(&self) -> BoundsSpacing {
+        self.spacing
+    }
+
+    /// Place of `value` in the unit interval; values outside the bounds go to the nearer end.
+    #[must_use]
+    pub fn to_unit(&self, value: f64) -> f64 {
+        let value = value.clamp(self.lower, self.upper);
+        let along = match self.spacing {
+            BoundsSpacing::Log => math::ln(value / self.lower),
+            BoundsSpacing::Linear => value - self.lower,
+        };
+        clamp_unit(along / self.scaled_length())
+    }
+
+    /// Value at `unit` (taken into 0 to 1 first); the ends give the bounds exactly.
+    #[must_use]
+    pub fn from_unit(&self, unit: f64) -> f64 {
+        let unit = clamp_unit(unit);
+        if unit == 0.0 {
+            return self.lower;
+        }
+        if unit == 1.0 {
+            return self.upper;
+        }
+        let value = match self.spacing {
+            BoundsSpacing::Log => self.lower * math::exp(unit * self.scaled_length()),
+            BoundsSpacing::Linear => self.lower + unit * self.scaled_length(),
+        };
+        value.clamp(self.lower, self.upper)
+    }
+
+    /// `d p / d u` at `unit`, in the parameter's unit.
+    #[must_use]
+    pub fn slope(&self, unit: f64) -> f64 {
+        match self.spacing {
+            BoundsSpacing::Log => self.scaled_length() * self.from_unit(unit),
+            BoundsSpacing::Linear => self.scaled_length(),
+        }
+    }
+
+    /// `d ln p / d u` at `unit`; `None` where the parameter is zero.
+    #[must_use]
+    pub(crate) fn log_slope(&self, unit: f64) -> Option<f64> {
+        match self.spacing {
+            BoundsSpacing::Log => Some(self.scaled_length()),
+            BoundsSpacing::Linear => {
+                let value = self.from_unit(unit);
+                (value != 0.0).then(|| self.scaled_length() / value)
+            }
+        }
+    }
+
+    fn scaled_length(&self) -> f64 {
+        match self.spacing {
+            BoundsSpacing::Log => math::ln(self.upper / self.lower),
+            BoundsSpacing::Linear => self.upper - self.lower,
+        }
+    }
+}
+
+/// `unit` taken into 0 to 1; minus zero becomes zero, so that equal places have equal bits; not a number
+/// becomes one half.
+#[must_use]
+pub(crate) fn clamp_unit(unit: f64) -> f64 {
+    if unit.is_nan() { 0.5 } else { unit.clamp(0.0, 1.0) + 0.0 }
+}
+
+/// The place on the real line of a place in the unit interval, `z = asin(2 u - 1)`, between minus and plus
+/// pi/2.
+#[must_use]
+pub(crate) fn unit_to_line(unit: f64) -> f64 {
+    math::asin(2.0 * clamp_unit(unit) - 1.0)
+}
+
+/// The place in the unit interval of any real number, `u = (1 + sin z) / 2`; the ends are exact at odd
+/// multiples of pi/2.
+#[must_use]
+pub(crate) fn line_to_unit(line: f64) -> f64 {
+    if line.abs() == FRAC_PI_2 {
+        return if line > 0.0 { 1.0 } else { 0.0 };
+    }
+    clamp_unit(0.5 * (1.0 + math::sin(line)))
+}
+
+// A free parameter as the search sees it: its range, and what is known of it beforehand.
+
+/// A free parameter as the search sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SearchAxis {
+    /// Its range.
+    pub bounds: Bounds,
+    /// What is known of it beforehand.
+    pub prior: Option<Prior>,
+}
+
+impl From<Bounds> for SearchAxis {
+    fn from(bounds: Bounds) -> Self {
+        Self { bounds, prior: None }
+    }
+}
+
+/// A normal distribution of a parameter, or of its logarithm.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub enum Prior {
+    /// Of the parameter, in its own SI unit.
+    Linear {
+        /// Mean.
+        mean: f64,
+        /// Standard deviation.
+        sd: f64,
+    },
+    /// Of its natural logarithm (a parameter with a logarithmic scale).
+    Log {
+        /// Mean of the logarithm of the parameter in its SI unit.
+        mean_ln: f64,
+        /// Standard deviation of the logarithm.
+        sd_ln: f64,
+    },
+}
+
+impl Prior {
+    /// Distance of a value, in the parameter's SI unit, from the mean, in standard deviations.
+    #[must_use]
+    pub fn residual(&self, value: f64) -> f64 {
+        match *self {
+            Self::Linear { mean, sd } => (value - mean) / sd,
+            Self::Log { mean_ln, sd_ln } => (math::ln(value) - mean_ln) / sd_ln,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_survive_the_round_trip() {
+        let log = Bounds::new(1e-3, 10.0, BoundsSpacing::Log).unwrap();
+        let linear = Bounds::new(-2.0, 5.0, BoundsSpacing::Linear).unwrap();
+        for step in 0..=1000 {
+            let unit = f64::from(step) / 1000.0;
+            for bounds in [log, linear] {
+                assert!((bounds.to_unit(bounds.from_unit(unit)) - unit).abs() < 1e-14, "{unit}");
+            }
+            // near the ends u = (1 + sin z)/2 is quadratic in z: half the digits of z, all the digits of u
+            assert!((line_to_unit(unit_to_line(unit)) - unit).abs() < 1e-15, "{unit}");
+        }
+    }
+
+    #[test]
+    fn the_ends_and_the_middle_are_exact() {
+        let log = Bounds::new(0.01, 100.0, BoundsSpacing::Log).unwrap();
+        assert_eq!((log.from_unit(0.0), log.from_unit(1.0)), (0.01, 100.0));
+        assert!((log.from_unit(0.5) - 1.0).abs() < 1e-15);
+        assert_eq!((log.to_unit(0.001), log.to_unit(1e9)), (0.0, 1.0));
+        assert_eq!((line_to_unit(unit_to_line(0.0)), line_to_unit(unit_to_line(1.0))), (0.0, 1.0));
+        let linear = Bounds::new(-1.0, 3.0, BoundsSpacing::Linear).unwrap();
+        assert_eq!(linear.from_unit(0.5), 1.0);
+    }
+
+    #[test]
+    fn no_real_number_leaves_the_box() {
+        for line in [-1e300, -7.0, -0.0, 1.5, 40.0, 1e300, f64::NAN, f64::INFINITY] {
+            let unit = line_to_unit(line);
+            assert!((0.0..=1.0).contains(&unit) && !unit.is_sign_negative(), "{line} -> {unit}");
+        }
+    }
+
+    #[test]
+    fn slopes_are_those_of_the_transform() {
+        let log = Bounds::new(1.0, 4.0, BoundsSpacing::Log).unwrap();
+        let linear = Bounds::new(-1.0, 1.0, BoundsSpacing::Linear).unwrap();
+        assert_eq!(log.log_slope(0.3), Some(4.0_f64.ln()));
+        assert_eq!((linear.log_slope(1.0), linear.log_slope(0.5)), (Some(2.0), None));
+        assert_eq!((log.slope(0.5), linear.slope(0.5)), (2.0 * 4.0_f64.ln(), 2.0));
+    }
+
+    #[test]
+    fn bad_bounds_are_refused() {
+        let refused = |lower, upper, spacing| Bounds::new(lower, upper, spacing).unwrap_err();
+        assert!(matches!(refused(1.0, 1.0, BoundsSpacing::Linear), BoundsError::Crossed { .. }));
+        assert!(matches!(refused(2.0, 1.0, BoundsSpacing::Log), BoundsError::Crossed { .. }));
+        assert!(matches!(refused(0.0, 1.0, BoundsSpacing::Log), BoundsError::LogOfNonPositive { .. }));
+        assert!(matches!(refused(-f64::MAX, f64::MAX, BoundsSpacing::Linear), BoundsError::Crossed { .. }));
+        assert!(matches!(
+            refused(0.0, f64::INFINITY, BoundsSpacing::Linear),
+            BoundsError::NotFinite { key: "upper", .. }
+        ));
+    }
+}

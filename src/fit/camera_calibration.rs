@@ -1,0 +1,388 @@
+//! What is not known of a camera, and what it does to features: a camera is not a caliper.
+//!
+//! Of a deflection `d` a camera shows `(1 + scale) d + offset`: its scale is known to half a percent, and a
+//! marker is never on the hinge. Both are unknowns with priors, common to all features of a recording. What
+//! they do is known without a run of the model, so that no search has to look for them: at every point of the
+//! search they take the values at which the cost is lowest ([`CameraFit::estimate`]), and the linear model of the
+//! residuals is projected onto what they cannot explain (variable projection, Golub and
+//! Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, in the form of Kaufman, BIT 15 (1975) 49).
+
+use super::evaluation::{Observation, Observed};
+use super::objective::{LOSS_KNEE, residual, robust_loss, total_sd};
+use super::targets::{MAX_RATIO, TargetValue};
+use crate::feature::{LengthCalibration, ValueComparison};
+use crate::math;
+use crate::math::StandardNormal;
+use nalgebra::{DMatrix, Matrix2, Vector2};
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Steps towards the lowest cost: within a few deviations three are exact, from afar a dozen are made.
+const MAX_STEPS: usize = 60;
+/// Halvings of a step that raises the cost.
+const MAX_HALVINGS: usize = 12;
+/// A step that is shorter, in prior deviations, is the last.
+const MIN_STEP: f64 = 1e-12;
+/// So that no camera draws the numbers of another one in the next twin.
+const CAMERA_SEEDS: u64 = 1 << 40;
+/// Variance of a place in a box about which nothing is known.
+const BOX_VARIANCE: f64 = 1.0 / 12.0;
+
+/// A number of a camera that is estimated.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CameraEstimate {
+    /// Number of the condition whose camera it is, from 0.
+    pub condition: usize,
+    /// Its name in a result.
+    pub name: &'static str,
+    /// Standard deviation of its prior, whose mean is 0.
+    pub prior_sd: f64,
+    /// Best value, in the unit of its name.
+    pub estimate: f64,
+    /// Half of its 95 % interval by the linear model, in the same unit; `None` where there is no such model.
+    pub half_95: Option<f64>,
+}
+
+/// The camera of a condition.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct ConditionCamera {
+    condition: usize,
+    sds: [f64; 2],
+    /// In prior deviations.
+    place: [f64; 2],
+}
+
+impl ConditionCamera {
+    fn scale_and_offset(&self) -> [f64; 2] {
+        [self.sds[0] * self.place[0], self.sds[1] * self.place[1]]
+    }
+}
+
+/// Names of a camera's numbers.
+const CAMERA_NUMBER_NAMES: [&str; 2] = ["scale_relative", "offset_x_m"];
+
+/// The cameras of the targets, each with the numbers at which the cost of what was observed is lowest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraFit(Vec<ConditionCamera>);
+
+impl CameraFit {
+    /// Those of `targets`, against features in their order. A camera whose features are all missing has the
+    /// numbers of its prior.
+    #[must_use]
+    pub fn estimate(targets: &[TargetValue], features: &[Observed]) -> Self {
+        let mut cameras: Vec<ConditionCamera> = Vec::new();
+        for calibration in targets.iter().filter_map(|target| target.calibration) {
+            let condition = calibration.condition;
+            let at = cameras.iter().position(|camera| camera.condition == condition).unwrap_or_else(|| {
+                cameras.push(ConditionCamera { condition, sds: [0.0; 2], place: [0.0; 2] });
+                cameras.len() - 1
+            });
+            let sds = cameras[at].sds;
+            cameras[at].sds = [0, 1].map(|k| sds[k].max(calibration.standard_deviations()[k]));
+        }
+        for camera in &mut cameras {
+            let pairs = targets.iter().zip(features).filter_map(|(target, observed)| {
+                let calibration = target.calibration.filter(|c| c.condition == camera.condition)?;
+                Some((target, calibration, *observed.observation()?))
+            });
+            camera.place = minimize_camera_cost(&pairs.collect::<Vec<_>>());
+        }
+        Self(cameras)
+    }
+
+    /// Numbers that are estimated: scales and offsets that are not held.
+    #[must_use]
+    pub fn count_unknowns(&self) -> usize {
+        self.free_numbers().count()
+    }
+
+    /// Camera, and which of its numbers.
+    fn free_numbers(&self) -> impl Iterator<Item = (&ConditionCamera, usize)> {
+        self.0
+            .iter()
+            .flat_map(|camera| [0, 1].map(|k| (camera, k)))
+            .filter(|(camera, k)| camera.sds[*k] > 0.0)
+    }
+
+    /// Distances from the priors, in their standard deviations, one an unknown.
+    pub(crate) fn prior_residuals(&self) -> impl Iterator<Item = f64> {
+        self.free_numbers().map(|(camera, k)| camera.place[k])
+    }
+
+    /// A feature as its camera shows it.
+    #[must_use]
+    pub fn apply(&self, target: &TargetValue, observation: &Observation) -> Observation {
+        let camera = target.calibration.and_then(|calibration| {
+            Some((calibration, self.0.iter().find(|camera| camera.condition == calibration.condition)?))
+        });
+        camera.map_or(*observation, |(calibration, camera)| {
+            let value = calibration.apply(observation.value, camera.scale_and_offset());
+            Observation { value, ..*observation }
+        })
+    }
+
+    /// A feature's value as its camera shows it.
+    pub(crate) fn apply_to_value(&self, target: &TargetValue, observed: &Observed) -> Option<f64> {
+        observed.observation().map(|observation| self.apply(target, observation).value)
+    }
+
+    /// The linear model of residuals after the cameras have followed: what of the columns of `jacobian` they
+    /// cannot explain. Rows are the features, then others, and one an unknown of the cameras at the end;
+    /// weights are those of the cost.
+    #[must_use]
+    pub(crate) fn project_jacobian(
+        &self,
+        jacobian: DMatrix<f64>,
+        targets: &[TargetValue],
+        features: &[Observed],
+    ) -> DMatrix<f64> {
+        if self.count_unknowns() == 0 {
+            return jacobian;
+        }
+        let (own, weights) = self.jacobian(jacobian.nrows(), targets, features);
+        let weighted = weight_rows(&own, &weights);
+        let normal = own.tr_mul(&weighted);
+        let Some(normal) = normal.cholesky() else { return jacobian };
+        let followed = normal.solve(&weighted.tr_mul(&jacobian));
+        jacobian - own * followed
+    }
+
+    /// The numbers with what the linear model says of them: `jacobian` has the rows that [`Self::project_jacobian`]
+    /// takes and gives.
+    #[must_use]
+    pub(crate) fn estimates(
+        &self,
+        jacobian: Option<&DMatrix<f64>>,
+        targets: &[TargetValue],
+        features: &[Observed],
+    ) -> Vec<CameraEstimate> {
+        let sds = jacobian.and_then(|jacobian| self.standard_deviations(jacobian, targets, features));
+        let estimate = |(at, (camera, k)): (usize, (&ConditionCamera, usize))| CameraEstimate {
+            condition: camera.condition,
+            name: CAMERA_NUMBER_NAMES[k],
+            prior_sd: camera.sds[k],
+            estimate: camera.scale_and_offset()[k],
+            half_95: sds.as_ref().map(|sds| super::linear_model::Z_95 * sds[at] * camera.sds[k]),
+        };
+        self.free_numbers().enumerate().map(estimate).collect()
+    }
+
+    /// Standard deviations of the unknowns in units of their priors, those of the parameters included, of
+    /// which the box is known alone where the features say nothing.
+    fn standard_deviations(
+        &self,
+        jacobian: &DMatrix<f64>,
+        targets: &[TargetValue],
+        features: &[Observed],
+    ) -> Option<Vec<f64>> {
+        let (own, weights) = self.jacobian(jacobian.nrows(), targets, features);
+        let all = DMatrix::from_fn(own.nrows(), jacobian.ncols() + own.ncols(), |row, column| {
+            match column.checked_sub(jacobian.ncols()) {
+                None => jacobian[(row, column)],
+                Some(column) => own[(row, column)],
+            }
+        });
+        let mut information = all.tr_mul(&weight_rows(&all, &weights));
+        for at in 0..jacobian.ncols() {
+            information[(at, at)] += 1.0 / BOX_VARIANCE;
+        }
+        let covariance = information.cholesky()?.inverse();
+        Some((jacobian.ncols()..all.ncols()).map(|at| covariance[(at, at)].sqrt()).collect())
+    }
+
+    /// Derivatives of `rows` residuals by the unknowns in units of their priors, and the weights of the rows.
+    fn jacobian(
+        &self,
+        rows: usize,
+        targets: &[TargetValue],
+        features: &[Observed],
+    ) -> (DMatrix<f64>, Vec<f64>) {
+        let free: Vec<(&ConditionCamera, usize)> = self.free_numbers().collect();
+        let mut slopes = DMatrix::zeros(rows, free.len());
+        let mut weights = vec![1.0; rows];
+        for (row, (target, observed)) in targets.iter().zip(features).enumerate() {
+            let Some(observation) = observed.observation() else { continue };
+            weights[row] = robust_weight(residual(&self.apply(target, observation), target));
+            let Some(calibration) = target.calibration else { continue };
+            for (column, (camera, k)) in free.iter().enumerate() {
+                if camera.condition == calibration.condition {
+                    slopes[(row, column)] =
+                        linearize_residual(target, &calibration, observation, camera.place).1[*k];
+                }
+            }
+        }
+        for (column, (camera, k)) in free.iter().enumerate() {
+            let row = rows - free.len() + column;
+            (slopes[(row, column)], weights[row]) = (1.0, robust_weight(camera.place[*k]));
+        }
+        (slopes, weights)
+    }
+}
+
+/// Features as cameras of the priors show them, another draw for every twin.
+#[must_use]
+pub(crate) fn draw_camera_errors(targets: &[TargetValue], features: &[Observed], draw: u64) -> Vec<Observed> {
+    let one = |(target, observed): (&TargetValue, &Observed)| match (target.calibration, observed) {
+        (Some(calibration), Observed::Value(observation)) => {
+            let seed = draw + calibration.condition as u64 * CAMERA_SEEDS;
+            let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
+            let numbers =
+                calibration.standard_deviations().map(|sd| sd * generator.sample::<f64, _>(StandardNormal));
+            Observed::Value(Observation {
+                value: calibration.apply(observation.value, numbers),
+                ..*observation
+            })
+        }
+        _ => observed.clone(),
+    };
+    targets.iter().zip(features).map(one).collect()
+}
+
+fn weight_rows(matrix: &DMatrix<f64>, weights: &[f64]) -> DMatrix<f64> {
+    let mut weighted = matrix.clone();
+    weights.iter().enumerate().for_each(|(row, weight)| weighted.row_mut(row).scale_mut(*weight));
+    weighted
+}
+
+/// The weight of a squared residual that belongs to the cost ([`robust_loss`]).
+fn robust_weight(residual: f64) -> f64 {
+    math::powi(LOSS_KNEE / residual.abs().max(LOSS_KNEE), 2)
+}
+
+/// A target of one camera with what the model shows of it.
+type TargetObservation<'a> = (&'a TargetValue, TargetCalibration, Observation);
+
+/// The residual of a feature with the camera at `place`, and its derivatives by it, both in prior deviations.
+fn linearize_residual(
+    target: &TargetValue,
+    calibration: &TargetCalibration,
+    observation: &Observation,
+    place: [f64; 2],
+) -> (f64, [f64; 2]) {
+    let sds = calibration.standard_deviations();
+    let numbers = [sds[0] * place[0], sds[1] * place[1]];
+    let value = calibration.apply(observation.value, numbers);
+    let distance = target.distance(value);
+    let sd = total_sd(observation, target);
+    let per_metre = match target.measure {
+        // where the distance is stopped nothing moves it
+        _ if distance.abs() >= math::ln(MAX_RATIO) => 0.0,
+        ValueComparison::Log => 1.0 / value,
+        ValueComparison::Linear { scale } => 1.0 / scale,
+    };
+    let slopes = calibration.derivatives(observation.value, numbers);
+    (distance / sd, [0, 1].map(|k| slopes[k] * sds[k] * per_metre / sd))
+}
+
+/// The place of a camera, in prior deviations, at which the cost of its features is lowest. The cost grows as
+/// a logarithm far off and may have two minima, so that steps start from the prior's mean and from where the
+/// squares are least.
+fn minimize_camera_cost(pairs: &[TargetObservation]) -> [f64; 2] {
+    let cost = |place: &[f64; 2]| camera_cost(pairs, *place, robust_loss);
+    let squares = gauss_newton_descent(pairs, [0.0; 2], |r| r * r, |_| 1.0);
+    let [near, far] =
+        [[0.0; 2], squares].map(|start| gauss_newton_descent(pairs, start, robust_loss, robust_weight));
+    if cost(&far) < cost(&near) { far } else { near }
+}
+
+/// Cost of a camera's features and of its priors.
+fn camera_cost(pairs: &[TargetObservation], place: [f64; 2], cost: fn(f64) -> f64) -> f64 {
+    let of = |(target, calibration, observation): &TargetObservation| {
+        let residual = linearize_residual(target, calibration, observation, place).0;
+        if residual.is_finite() { cost(residual) } else { 0.0 }
+    };
+    pairs.iter().map(of).sum::<f64>() + place.into_iter().map(cost).sum::<f64>()
+}
+
+/// Gauss-Newton steps with weights, each halved until the cost falls.
+fn gauss_newton_descent(
+    pairs: &[TargetObservation],
+    start: [f64; 2],
+    cost: fn(f64) -> f64,
+    weight: fn(f64) -> f64,
+) -> [f64; 2] {
+    let (mut place, mut lowest) = (start, camera_cost(pairs, start, cost));
+    for _ in 0..MAX_STEPS {
+        let mut normal = Matrix2::from_diagonal(&Vector2::from(place.map(weight)));
+        let mut right = Vector2::from(place.map(|z| weight(z) * z));
+        for (target, calibration, observation) in pairs {
+            let (residual, slopes) = linearize_residual(target, calibration, observation, place);
+            if residual.is_finite() {
+                let slopes = Vector2::from(slopes);
+                normal += weight(residual) * slopes * slopes.transpose();
+                right += weight(residual) * residual * slopes;
+            }
+        }
+        let Some(step) = normal.cholesky().map(|normal| normal.solve(&right)) else { return place };
+        let shorter = (0..MAX_HALVINGS).map(|halvings| {
+            let share = math::powi(0.5, halvings as i32);
+            [place[0] - share * step[0], place[1] - share * step[1]]
+        });
+        let better =
+            shorter.map(|place| (place, camera_cost(pairs, place, cost))).find(|(_, cost)| *cost < lowest);
+        let Some(better) = better else { return place };
+        (place, lowest) = better;
+        if step.amax() < MIN_STEP {
+            return place;
+        }
+    }
+    place
+}
+
+// What the calibration of a camera does to a value: `(1 + scale) value + offset`.
+
+/// How a value depends on what is not known of its camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TargetCalibration {
+    /// Number of the condition whose camera it is, from 0.
+    pub condition: usize,
+    /// Standard deviation of the scale, relative; 0 where it is held.
+    pub scale_sd: f64,
+    /// Standard deviation of the offset, m; 0 where it is held.
+    pub offset_sd_m: f64,
+    /// What of the camera the value depends on.
+    pub length: LengthCalibration,
+}
+
+impl TargetCalibration {
+    /// What a camera with this `[scale, offset]` shows of a value, m.
+    #[must_use]
+    pub fn apply(&self, value: f64, [scale, offset_m]: [f64; 2]) -> f64 {
+        match self.length {
+            LengthCalibration::Position => (1.0 + scale) * value + offset_m,
+            LengthCalibration::Size { floor_m } => {
+                let of_motion = (value * value - floor_m * floor_m).max(0.0).sqrt();
+                math::hypot((1.0 + scale) * of_motion, floor_m)
+            }
+        }
+    }
+
+    /// Its derivatives by scale and offset, m.
+    pub(crate) fn derivatives(&self, value: f64, [scale, offset_m]: [f64; 2]) -> [f64; 2] {
+        match self.length {
+            LengthCalibration::Position => [value, 1.0],
+            LengthCalibration::Size { floor_m } => {
+                let motion2 = (value * value - floor_m * floor_m).max(0.0);
+                [(1.0 + scale) * motion2 / self.apply(value, [scale, offset_m]), 0.0]
+            }
+        }
+    }
+
+    /// Standard deviation of what is shown of a value, m.
+    #[must_use]
+    pub fn sd_m(&self, value: f64) -> f64 {
+        let [by_scale, by_offset] = self.derivatives(value, [0.0; 2]);
+        math::hypot(self.scale_sd * by_scale, self.offset_sd_m * by_offset)
+    }
+
+    /// Standard deviations of scale and offset; 0 also of an offset on which the value does not depend.
+    pub(crate) fn standard_deviations(&self) -> [f64; 2] {
+        match self.length {
+            LengthCalibration::Position => [self.scale_sd, self.offset_sd_m],
+            LengthCalibration::Size { .. } => [self.scale_sd, 0.0],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

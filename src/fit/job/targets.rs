@@ -1,0 +1,386 @@
+//! Components and features of a job: what is read, and where its target comes from.
+
+use super::as_written::ConditionReference;
+use super::conditions::JobCondition;
+use super::{JobRefusal, as_written, check_above_zero, check_non_empty, find_repeated, refuse};
+use crate::feature;
+use crate::feature::{FREQUENCY_SD_FLOOR, Feature, Keys, Reading, ReadingKind, ValueComparison};
+use crate::toml_file::suggest_key;
+use serde::Serialize;
+
+/// Standard deviation of the logarithm of a level of a log-spectrum unless the job says otherwise: a
+/// periodogram of a few resolutions scatters as much.
+const LEVEL_SD_RELATIVE: f64 = 0.3;
+
+/// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this
+/// program, 2 %.
+pub(super) const TOLERANCE_RELATIVE: f64 = 0.02;
+
+/// What the entries have to agree with.
+pub(super) struct TargetContext<'a> {
+    pub conditions: &'a [JobCondition],
+    /// Half the rate of the job's own camera, Hz.
+    pub nyquist_hz: Option<f64>,
+}
+
+/// Components first, then features, in the order of the file.
+pub(super) fn check_targets(
+    written: &as_written::JobFile,
+    context: &TargetContext,
+) -> Result<Vec<FitTarget>, JobRefusal> {
+    let mut aims =
+        written.component.iter().map(|c| check_component(c, context)).collect::<Result<Vec<_>, _>>()?;
+    for entry in &written.feature {
+        aims.extend(check_feature(entry, context)?);
+    }
+    let traced = !written.trace.is_empty();
+    if aims.is_empty() && !traced {
+        return refuse(
+            "component",
+            "found none, and no [[feature]] or [[trace]]; expected at least one thing to fit: add a [[trace]]",
+        );
+    }
+    if aims.iter().all(|aim| aim.held_out) && !traced {
+        return refuse(
+            "component",
+            "every [[component]] and [[feature]] belongs to something that is held out; expected at least one thing to fit",
+        );
+    }
+    match find_repeated(aims.iter().map(|aim| aim.feature.name.as_str())) {
+        Some(name) => refuse(
+            format!("component or feature `{name}`"),
+            "the name is used twice; give each its own `name`",
+        ),
+        None => Ok(aims),
+    }
+}
+
+fn check_component(
+    written: &as_written::JobComponentTable,
+    context: &TargetContext,
+) -> Result<FitTarget, JobRefusal> {
+    let entry = JobEntry { what: format!("component `{}`", written.name) };
+    let name = check_non_empty("component, `name`", &written.name, "a name such as \"low\"")?;
+    let place = entry.find_condition(written.recording.as_ref(), context.conditions, context.nyquist_hz)?;
+    let band = reading_entry(&entry, &written.reading_keys(), &place).parse_band()?;
+    let sd =
+        written.target_sd_hz.map(|sd| check_above_zero(entry.key_path("target_sd_hz"), sd)).transpose()?;
+    let source = match (written.target_hz, sd) {
+        (Some(target), Some(sd)) => entry.given_source(
+            check_above_zero(entry.key_path("target_hz"), target)?,
+            sd,
+            "target_sd_hz",
+            ValueComparison::Log,
+        )?,
+        (Some(_), None) => {
+            return refuse(
+                entry.key_path("target_sd_hz"),
+                "missing; a given `target_hz` needs its standard deviation",
+            );
+        }
+        (None, _) if !place.measured => {
+            return refuse(
+                entry.key_path("target_hz"),
+                "missing; without a [[recording]] expected `target_hz` and `target_sd_hz`",
+            );
+        }
+        (None, sd) => {
+            TargetSource::Measured { least_sd: sd.unwrap_or(0.0), least_sd_relative: FREQUENCY_SD_FLOOR }
+        }
+    };
+    let tolerance = check_above_zero(
+        entry.key_path("tolerance_relative"),
+        written.tolerance_relative.unwrap_or(TOLERANCE_RELATIVE),
+    )?;
+    let feature = Feature { name, reading: Reading::Frequency(band), condition: place.index };
+    Ok(FitTarget {
+        feature,
+        source,
+        tolerance_relative: Some(tolerance),
+        held_out: place.held_out,
+        stage: TargetStage::Always,
+    })
+}
+
+fn check_feature(
+    written: &as_written::Feature,
+    context: &TargetContext,
+) -> Result<Vec<FitTarget>, JobRefusal> {
+    let kind = find_feature_kind(written)?;
+    let name = written.name.clone().unwrap_or_else(|| kind.word.to_owned());
+    check_non_empty("feature, `name`", &name, "a name, or no such key")?;
+    let entry = JobEntry { what: format!("feature `{name}` ({})", kind.word) };
+    let place = entry.find_condition(written.recording.as_ref(), context.conditions, context.nyquist_hz)?;
+    let readings = kind.make_readings(&name, &reading_entry(&entry, &written.keys(), &place))?;
+    if kind.is_series() {
+        check_several_measured(&entry, written, &place)?;
+    }
+    let aim = |(name, reading): (String, Reading)| {
+        let source = target_source(&entry, written, &reading, &place)?;
+        let stage =
+            if let Reading::BandLevel { .. } = reading { TargetStage::Last } else { TargetStage::Always };
+        let feature = Feature { name, reading, condition: place.index };
+        Ok(FitTarget { feature, source, tolerance_relative: None, held_out: place.held_out, stage })
+    };
+    readings.into_iter().map(aim).collect()
+}
+
+/// The kind of a feature that a recording shows; a frequency is a component of its own.
+fn find_feature_kind(written: &as_written::Feature) -> Result<&'static ReadingKind, JobRefusal> {
+    let problem = match ReadingKind::find(&written.kind) {
+        Ok(kind) if kind.is_of_run() => format!(
+            "found \"{}\", which only a simulated run shows; map it in a study, or remove it",
+            kind.word
+        ),
+        Ok(ReadingKind { word: "frequency", .. }) => {
+            "found \"frequency\", which is a [[component]] with a `tolerance_relative`; write it as one"
+                .to_owned()
+        }
+        Ok(kind) => return Ok(kind),
+        Err(problem) => problem,
+    };
+    let key = written.name.as_ref().map_or_else(String::new, |name| format!(" `{name}`"));
+    refuse(format!("feature{key}, `kind`"), problem)
+}
+
+/// Several features have targets of their own, which are measured.
+fn check_several_measured(
+    entry: &JobEntry,
+    written: &as_written::Feature,
+    place: &EntryCondition,
+) -> Result<(), JobRefusal> {
+    if !place.measured {
+        return refuse(
+            entry.key_path("kind"),
+            "found without a [[recording]], expected one on which its targets are measured; give each as a feature of its own",
+        );
+    }
+    if written.target.is_some() || written.target_sd.is_some() {
+        return refuse(
+            entry.key_path("target"),
+            "one target has no meaning for several features, which are measured on the recording; remove it",
+        );
+    }
+    Ok(())
+}
+
+/// The part of an entry that says what is read.
+fn reading_entry<'a>(
+    entry: &'a JobEntry,
+    keys: &'a Keys,
+    place: &EntryCondition,
+) -> feature::ReadingEntry<'a> {
+    feature::ReadingEntry {
+        name: &entry.what,
+        noun: "feature",
+        keys,
+        nyquist_hz: place.nyquist_hz,
+        noisy: true,
+    }
+}
+
+fn target_source(
+    entry: &JobEntry,
+    written: &as_written::Feature,
+    reading: &Reading,
+    place: &EntryCondition,
+) -> Result<TargetSource, JobRefusal> {
+    let measure = reading.comparison();
+    match (written.target, written.target_sd, written.sd_relative) {
+        (Some(target), Some(sd), None) => entry.given_source(target, sd, "target_sd", measure),
+        (None, None, _) if !place.measured => refuse(
+            entry.key_path("target"),
+            "missing; without a [[recording]] expected `target` and `target_sd`",
+        ),
+        (None, None, relative) => {
+            let relative = relative.map(|relative| entry.check_relative_sd(relative)).transpose()?;
+            Ok(measured_source(measure, relative.unwrap_or_else(|| default_min_sd_relative(reading))))
+        }
+        _ => refuse(
+            entry.key_path("sd_relative"),
+            "expected either `sd_relative` or nothing (the target is measured on the recording), or `target` and `target_sd` together",
+        ),
+    }
+}
+
+/// A share of the target, or of the scale of a value that may be zero.
+fn measured_source(measure: ValueComparison, relative: f64) -> TargetSource {
+    match measure {
+        ValueComparison::Log => TargetSource::Measured { least_sd: 0.0, least_sd_relative: relative },
+        ValueComparison::Linear { scale } => {
+            TargetSource::Measured { least_sd: relative * scale, least_sd_relative: 0.0 }
+        }
+    }
+}
+
+/// What a reading is known to at best, where the job does not say: the rest is the recording's own noise.
+fn default_min_sd_relative(reading: &Reading) -> f64 {
+    match reading {
+        Reading::Frequency(_) | Reading::CycleFrequency { .. } => FREQUENCY_SD_FLOOR,
+        Reading::BandLevel { .. } => LEVEL_SD_RELATIVE,
+        _ => 0.0,
+    }
+}
+
+// What is fitted: a feature, and where its target comes from.
+
+/// A feature and where its target comes from.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct FitTarget {
+    /// What is read from measurement and model alike.
+    pub feature: Feature,
+    /// Where target and standard deviation come from.
+    pub source: TargetSource,
+    /// Relative error that passes, for a component; `None` for any other feature.
+    pub tolerance_relative: Option<f64>,
+    /// Whether it is only predicted, never fitted.
+    pub held_out: bool,
+    /// From when on it counts.
+    pub stage: TargetStage,
+}
+
+/// Stages of a search in which an aim counts.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum TargetStage {
+    /// In all of them.
+    Always,
+    /// In the last stage alone: the lines of a log-spectrum have many minima, and help only near the right
+    /// one.
+    Last,
+}
+
+/// Where a target comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub enum TargetSource {
+    /// Given in the job, in the feature's unit.
+    Given {
+        /// The target.
+        target: f64,
+        /// Its standard deviation.
+        sd: f64,
+    },
+    /// Measured on the recording; its standard deviation is at least `least_sd` and `least_sd_relative` times
+    /// its size, and where both are 0 that of the recording's own noise.
+    Measured {
+        /// In the feature's unit.
+        least_sd: f64,
+        /// As a share of the target.
+        least_sd_relative: f64,
+    },
+}
+
+// One component or feature of a job: its keys, checked one by one.
+
+/// Least standard deviation relative to a target: beyond what any camera gives, and far from overflow of a
+/// squared residual.
+const MIN_SD_RELATIVE: f64 = 1e-9;
+
+/// A component or feature, for messages.
+pub(super) struct JobEntry {
+    pub(super) what: String,
+}
+
+/// The recording or condition that an entry belongs to.
+pub(super) struct EntryCondition {
+    /// Counted from 0.
+    pub index: usize,
+    /// Whether there is a recording on which a target can be measured.
+    pub measured: bool,
+    pub held_out: bool,
+    /// Half the rate of the job's own camera, Hz, where the condition is seen through it.
+    pub nyquist_hz: Option<f64>,
+}
+
+impl JobEntry {
+    pub(super) fn key_path(&self, key: &str) -> String {
+        format!("{}, `{key}`", self.what)
+    }
+
+    pub(super) fn given_source(
+        &self,
+        target: f64,
+        sd: f64,
+        sd_key: &str,
+        measure: ValueComparison,
+    ) -> Result<TargetSource, JobRefusal> {
+        let least = match measure {
+            ValueComparison::Log if !(target.is_finite() && target != 0.0) => {
+                return refuse(
+                    self.key_path("target"),
+                    format!(
+                        "found {target}, expected a finite number that is not 0 (residuals are logarithms)"
+                    ),
+                );
+            }
+            ValueComparison::Log => MIN_SD_RELATIVE * target.abs(),
+            ValueComparison::Linear { .. } if !target.is_finite() => {
+                return refuse(self.key_path("target"), format!("found {target}, expected a finite number"));
+            }
+            ValueComparison::Linear { scale } => MIN_SD_RELATIVE * scale,
+        };
+        if !(sd.is_finite() && sd >= least) {
+            return refuse(
+                self.key_path(sd_key),
+                format!("found {sd}, expected a finite number of at least {least:e}"),
+            );
+        }
+        Ok(TargetSource::Given { target, sd })
+    }
+
+    pub(super) fn check_relative_sd(&self, found: f64) -> Result<f64, JobRefusal> {
+        if found.is_finite() && found >= MIN_SD_RELATIVE {
+            return Ok(found);
+        }
+        refuse(
+            self.key_path("sd_relative"),
+            format!(
+                "found {found}, expected a finite number of at least {MIN_SD_RELATIVE:e}; 0.05 means 5 % of the measured value"
+            ),
+        )
+    }
+
+    /// The recording or condition of that number, counted from 1, or name; the first where there is neither.
+    pub(super) fn find_condition(
+        &self,
+        which: Option<&ConditionReference>,
+        conditions: &[JobCondition],
+        nyquist_hz: Option<f64>,
+    ) -> Result<EntryCondition, JobRefusal> {
+        let (key, most) = (self.key_path("recording"), conditions.len());
+        let index = match which {
+            None => 0,
+            Some(ConditionReference::Number(number)) if (1..=most).contains(number) => number - 1,
+            Some(ConditionReference::Number(number)) => {
+                return refuse(
+                    key,
+                    format!(
+                        "found {number}, expected 1 to {most}: recordings, then conditions, are counted from 1 in the order of the file"
+                    ),
+                );
+            }
+            Some(ConditionReference::Name(name)) => {
+                let names: Vec<&str> = conditions.iter().map(|c| c.name.as_str()).collect();
+                let unknown = || {
+                    refuse(
+                        key,
+                        format!(
+                            "no recording or condition is called `{name}`; {}",
+                            suggest_key(name, &names)
+                        ),
+                    )
+                };
+                conditions.iter().position(|c| c.name == *name).map_or_else(unknown, Ok)?
+            }
+        };
+        let Some(condition) = conditions.get(index) else {
+            return refuse(self.key_path("recording"), "there is no recording and no condition");
+        };
+        let measured = condition.recording.is_some();
+        Ok(EntryCondition {
+            index,
+            measured,
+            held_out: condition.held_out,
+            nyquist_hz: nyquist_hz.filter(|_| !measured),
+        })
+    }
+}

@@ -1,0 +1,454 @@
+//! The model near a point of the unit box, to first order: how its residuals change with the place.
+//!
+//! Rows are the features in the order of the targets, then the priors, then those of the cameras
+//! ([`CameraFit`]), each in standard deviations; columns are the parameters, which the cameras follow. Slopes
+//! are central differences of [`DIFFERENCE_STEP`], wide enough to average over the scatter of features that are read
+//! from sampled traces.
+
+use super::bounds::{Prior, SearchAxis, clamp_unit};
+use super::camera_calibration::{CameraEstimate, CameraFit};
+use super::evaluation::Evaluation;
+use super::objective::{LOSS_KNEE, Objective, prior_residuals, residual, total_sd};
+use super::targets::TargetValue;
+use crate::feature::ValueComparison;
+use crate::math;
+use nalgebra::{DMatrix, DVector};
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Step of the differences in the unit box: about 2 % of a parameter whose bounds are a decade apart.
+pub const DIFFERENCE_STEP: f64 = 0.01;
+/// Longest step in the unit box: a linear model does not hold farther.
+const MAX_STEP: f64 = 0.2;
+
+/// The points whose evaluations [`FeatureSlopes::from_differences`] needs: two a parameter, one step below and above `unit` where
+/// the box allows.
+#[must_use]
+pub fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
+    let moved = |axis: usize, step: f64| {
+        unit.iter().enumerate().map(|(at, u)| if at == axis { clamp_unit(u + step) } else { *u }).collect()
+    };
+    (0..unit.len()).flat_map(|axis| [moved(axis, -DIFFERENCE_STEP), moved(axis, DIFFERENCE_STEP)]).collect()
+}
+
+/// `d distance / d u` of every feature as its camera shows it, a row a feature; `None` where it is missing on
+/// both sides, or at the point and on one.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FeatureSlopes(pub Vec<Vec<Option<f64>>>);
+
+impl FeatureSlopes {
+    /// Of the evaluations `around` a point, in the order of [`difference_points`].
+    #[must_use]
+    pub fn from_differences(targets: &[TargetValue], centre: &Evaluation, around: &[&Evaluation]) -> Self {
+        let cameras = CameraFit::estimate(targets, &centre.features);
+        let of = |(feature, target): (usize, &TargetValue), axis: usize| {
+            let shown = |e: &Evaluation| cameras.apply_to_value(target, e.features.get(feature)?);
+            let sides = [Some(centre), around.get(2 * axis).copied(), around.get(2 * axis + 1).copied()];
+            let [centre, below, above] = sides.map(|e| e.and_then(|e| Some((*e.unit.get(axis)?, shown(e)?))));
+            feature_slope(target, below.or(centre)?, above.or(centre)?)
+        };
+        Self(
+            targets
+                .iter()
+                .enumerate()
+                .map(|row| (0..centre.unit.len()).map(|axis| of(row, axis)).collect())
+                .collect(),
+        )
+    }
+}
+
+fn feature_slope(target: &TargetValue, below: (f64, f64), above: (f64, f64)) -> Option<f64> {
+    let width = above.0 - below.0;
+    let change = match target.measure {
+        ValueComparison::Log => {
+            let ratio = above.1 / below.1;
+            (ratio > 0.0).then(|| math::ln(ratio))?
+        }
+        ValueComparison::Linear { scale } => (above.1 - below.1) / scale,
+    };
+    (width > 0.0 && change.is_finite()).then(|| change / width)
+}
+
+/// How far each feature departs from a straight line between the points next to a centre, as a standard
+/// deviation in its own unit: `f(+) + f(-) - 2 f(0)` of independent scatter has six times its variance.
+/// `None` where it is missing on the way.
+#[must_use]
+pub fn feature_scatter(
+    targets: &[TargetValue],
+    centre: &Evaluation,
+    around: &[&Evaluation],
+) -> Vec<Option<f64>> {
+    let cameras = CameraFit::estimate(targets, &centre.features);
+    let of = |(at, target): (usize, &TargetValue)| {
+        let value = |e: &Evaluation| cameras.apply_to_value(target, e.features.get(at)?);
+        let middle = value(centre)?;
+        let bends = around.chunks(2).filter_map(|pair| {
+            let [below, above] = pair else { return None };
+            Some(math::powi(
+                target.distance_between(value(below)?, middle)
+                    + target.distance_between(value(above)?, middle),
+                2,
+            ))
+        });
+        let bends: Vec<f64> = bends.collect();
+        let mean = bends.iter().sum::<f64>() / bends.len() as f64;
+        (!bends.is_empty()).then(|| (mean / 6.0).sqrt() * target.reference_size())
+    };
+    targets.iter().enumerate().map(of).collect()
+}
+
+/// Residuals of an evaluation; `None` where a feature is missing.
+#[must_use]
+pub fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f64>> {
+    residuals_against(objective.axes(), objective.targets(), evaluation)
+}
+
+/// The same against other targets; `None` also where one is not a number.
+#[must_use]
+pub(crate) fn residuals_against(
+    axes: &[SearchAxis],
+    targets: &[TargetValue],
+    evaluation: &Evaluation,
+) -> Vec<Option<f64>> {
+    let cameras = CameraFit::estimate(targets, &evaluation.features);
+    let features = targets.iter().enumerate().map(|(at, target)| {
+        let seen = evaluation.features.get(at).and_then(|feature| feature.observation())?;
+        Some(residual(&cameras.apply(target, seen), target)).filter(|r| r.is_finite())
+    });
+    let priors = prior_residuals(axes, &evaluation.values).map(Some);
+    features.chain(priors).chain(cameras.prior_residuals().map(Some)).collect()
+}
+
+/// `d r / d u` at a point, where the cameras follow; zero where it is unknown.
+#[must_use]
+pub fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &FeatureSlopes) -> DMatrix<f64> {
+    let (targets, features) = (objective.targets(), &centre.features);
+    let cameras = CameraFit::estimate(targets, features);
+    cameras.project_jacobian(
+        jacobian_with_cameras_held(objective, centre, slopes, &cameras),
+        targets,
+        features,
+    )
+}
+
+/// What is estimated of the cameras at a point, with intervals where its slopes are known.
+#[must_use]
+pub(crate) fn camera_estimates(
+    objective: &Objective,
+    centre: &Evaluation,
+    slopes: Option<&FeatureSlopes>,
+) -> Vec<CameraEstimate> {
+    let (targets, features) = (objective.targets(), &centre.features);
+    let cameras = CameraFit::estimate(targets, features);
+    let held = slopes.map(|slopes| jacobian_with_cameras_held(objective, centre, slopes, &cameras));
+    cameras.estimates(held.as_ref(), targets, features)
+}
+
+/// `d r / d u` with the cameras as they are at the point.
+fn jacobian_with_cameras_held(
+    objective: &Objective,
+    centre: &Evaluation,
+    slopes: &FeatureSlopes,
+    cameras: &CameraFit,
+) -> DMatrix<f64> {
+    let columns = centre.unit.len();
+    let features = slopes.0.iter().zip(objective.targets()).enumerate().map(|(at, (row, target))| {
+        let sd = centre
+            .features
+            .get(at)
+            .and_then(|f| f.observation())
+            .map_or(target.relative_sd(), |seen| total_sd(seen, target));
+        row.iter().map(|slope| slope.map_or(0.0, |slope| slope / sd)).collect::<Vec<f64>>()
+    });
+    let priors = objective.axes().iter().enumerate().filter_map(|(at, axis)| {
+        let unit = *centre.unit.get(at)?;
+        let slope = match axis.prior? {
+            Prior::Linear { sd, .. } => axis.bounds.slope(unit) / sd,
+            Prior::Log { sd_ln, .. } => axis.bounds.log_slope(unit)? / sd_ln,
+        };
+        Some((0..columns).map(|column| if column == at { slope } else { 0.0 }).collect::<Vec<f64>>())
+    });
+    let mut rows: Vec<Vec<f64>> = features.chain(priors).collect();
+    rows.resize(rows.len() + cameras.count_unknowns(), vec![0.0; columns]);
+    DMatrix::from_fn(rows.len(), columns, |row, column| rows[row][column])
+}
+
+/// The linear model after a step, corrected such that it explains what the step did (Broyden, Math. Comput.
+/// 19 (1965) 577).
+pub fn broyden_update(
+    jacobian: &mut DMatrix<f64>,
+    before: &[Option<f64>],
+    after: &[Option<f64>],
+    step: &[f64],
+) {
+    let length2: f64 = step.iter().map(|d| d * d).sum();
+    if length2 == 0.0 {
+        return;
+    }
+    for (row, (before, after)) in before.iter().zip(after).enumerate() {
+        let (Some(before), Some(after)) = (before, after) else { continue };
+        let expected: f64 = step.iter().enumerate().map(|(at, d)| jacobian[(row, at)] * d).sum();
+        let missed = (after - before - expected) / length2;
+        for (at, d) in step.iter().enumerate() {
+            jacobian[(row, at)] += missed * d;
+        }
+    }
+}
+
+/// The step that a damped Gauss-Newton model suggests: `(J^T W J + damping) d = -J^T W r` with the weights
+/// `min(1, KNEE / |r|)^2` that belong to the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to
+/// a length at which it may hold. A coordinate that is `held` does not move.
+#[must_use]
+pub fn damped_step(
+    jacobian: &DMatrix<f64>,
+    residuals: &[Option<f64>],
+    damping: f64,
+    held: Option<usize>,
+) -> Option<Vec<f64>> {
+    let weight = |r: f64| LOSS_KNEE / r.abs().max(LOSS_KNEE);
+    let mut weighted = jacobian.clone();
+    let right =
+        DVector::from_iterator(residuals.len(), residuals.iter().map(|r| r.map_or(0.0, |r| -weight(r) * r)));
+    for (row, r) in residuals.iter().enumerate() {
+        weighted.row_mut(row).scale_mut(r.map_or(0.0, weight));
+    }
+    if let Some(held) = held {
+        weighted.column_mut(held).fill(0.0);
+    }
+    let mut normal = weighted.tr_mul(&weighted);
+    for at in 0..normal.nrows() {
+        normal[(at, at)] += damping;
+    }
+    let solution = normal.cholesky()?.solve(&weighted.tr_mul(&right));
+    let longest = solution.amax();
+    let shorten = if longest > MAX_STEP { MAX_STEP / longest } else { 1.0 };
+    longest.is_finite().then(|| solution.iter().map(|d| d * shorten).collect())
+}
+
+/// The point one step away, inside the box.
+#[must_use]
+pub fn step_in_box(unit: &[f64], step: &[f64]) -> Vec<f64> {
+    unit.iter().zip(step).map(|(u, d)| clamp_unit(u + d)).collect()
+}
+
+// What a linear model of the residuals can determine: rank, condition, deviations, correlations,
+// combinations.
+//
+// `J = d r / d u` is in standard deviations of the features per length of the unit box. A singular direction
+// is informative if its 95 % interval fits into the box; the information matrix `J^T J` is inverted on those
+// directions alone.
+
+/// Half-width of a 95 % interval in standard deviations of a normal variable.
+pub const Z_95: f64 = 1.96;
+/// Gain in cost that a parameter's 95 % interval spans (chi-squared of one degree of freedom).
+pub(crate) const CHI_SQUARED_95: f64 = 3.84;
+/// Smallest singular value, per length of the box, of an informative direction: its 95 % interval is as wide
+/// as the box.
+pub(crate) const MIN_INFORMATIVE: f64 = 2.0 * Z_95;
+/// Singular values below this share of the largest are rounding.
+pub const ROUNDING_SHARE: f64 = 1e-9;
+/// Share (squared cosine) of uninformative directions in a parameter from which on the parameter is not
+/// determined.
+pub(crate) const OPEN_SHARE: f64 = 0.01;
+/// Exponents below this share of the largest one of a combination are not named.
+const MIN_NAMED_EXPONENT: f64 = 0.05;
+
+/// Singular directions of a Jacobian in the space of the parameters.
+#[derive(Debug, Clone)]
+pub struct SingularDirections {
+    /// Singular value and direction, the most informative first; all of unit length and at right angles.
+    all: Vec<(f64, Vec<f64>)>,
+    /// Number of informative directions.
+    pub rank: usize,
+}
+
+/// A product of powers of the parameters that the features determine, or leave open.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ParameterCombination {
+    /// Exponents by parameter; the largest is 1, those below 0.05 are left out.
+    pub exponents: BTreeMap<String, f64>,
+    /// Standard deviation of its logarithm; for one that is left open, that of which the box allows.
+    pub sd_relative: f64,
+    /// Whether the features determine it.
+    pub determined: bool,
+}
+
+impl ParameterCombination {
+    /// Such as `friction.c friction.a^0.31`.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let mut factors: Vec<(&String, f64)> = self.exponents.iter().map(|(name, e)| (name, *e)).collect();
+        factors.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
+        let factor = |(name, e): (&String, f64)| {
+            if (e - 1.0).abs() < 0.005 { name.clone() } else { format!("{name}^{e:.2}") }
+        };
+        factors.into_iter().map(factor).collect::<Vec<_>>().join(" ")
+    }
+}
+
+impl SingularDirections {
+    /// Of a Jacobian, a column a parameter.
+    #[must_use]
+    pub fn from_jacobian(jacobian: &DMatrix<f64>) -> Self {
+        let columns = jacobian.ncols();
+        // rows of zeros say nothing and make the decomposition complete
+        let padded = jacobian.clone().resize_vertically(jacobian.nrows().max(columns), 0.0);
+        let svd = padded.svd(false, true);
+        let rows = svd.v_t.iter().flat_map(|v_t| {
+            v_t.row_iter().map(|row| row.iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>()
+        });
+        let mut all: Vec<(f64, Vec<f64>)> = svd.singular_values.iter().copied().zip(rows).collect();
+        all.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let threshold =
+            all.first().map_or(MIN_INFORMATIVE, |(largest, _)| MIN_INFORMATIVE.max(ROUNDING_SHARE * largest));
+        let rank = all.iter().filter(|(value, _)| *value > threshold).count();
+        Self { all, rank }
+    }
+
+    /// Largest singular value over the smallest; infinite where one is zero.
+    #[must_use]
+    pub fn condition_number(&self) -> f64 {
+        match (self.all.first(), self.all.last()) {
+            (Some((largest, _)), Some((smallest, _))) if *smallest > ROUNDING_SHARE * largest => {
+                largest / smallest
+            }
+            _ => f64::INFINITY,
+        }
+    }
+
+    /// Standard deviation of a coordinate from the informative directions, and its share in the others.
+    #[must_use]
+    pub fn coordinate_sd(&self, axis: usize) -> (f64, f64) {
+        let component = |direction: &Vec<f64>| math::powi(direction.get(axis).copied().unwrap_or(0.0), 2);
+        let (known, open) = self.all.split_at(self.rank);
+        let variance: f64 =
+            known.iter().map(|(value, direction)| component(direction) / (value * value)).sum();
+        (variance.sqrt(), open.iter().map(|(_, direction)| component(direction)).sum())
+    }
+
+    /// Whether the informative directions determine a coordinate.
+    #[must_use]
+    pub fn determines(&self, axis: usize) -> bool {
+        self.coordinate_sd(axis).1 < OPEN_SHARE
+    }
+
+    /// Directions that the features leave open.
+    #[must_use]
+    pub fn open_directions(&self) -> Vec<&[f64]> {
+        self.all.iter().skip(self.rank).map(|(_, direction)| direction.as_slice()).collect()
+    }
+
+    /// Correlation of two estimates; `None` where either is not determined.
+    #[must_use]
+    pub fn correlation(&self, a: usize, b: usize) -> Option<f64> {
+        if !(self.determines(a) && self.determines(b)) {
+            return None;
+        }
+        let product = |direction: &[f64]| Some(direction.get(a)? * direction.get(b)?);
+        let covariance: f64 = self
+            .all
+            .iter()
+            .take(self.rank)
+            .filter_map(|(value, direction)| Some(product(direction)? / (value * value)))
+            .sum();
+        Some((covariance / (self.coordinate_sd(a).0 * self.coordinate_sd(b).0)).clamp(-1.0, 1.0))
+    }
+
+    /// What is determined (most precise first) and what is left open, as products of powers at the point
+    /// `unit`.
+    #[must_use]
+    pub fn combinations(
+        &self,
+        names: &[String],
+        axes: &[SearchAxis],
+        unit: &[f64],
+    ) -> Vec<ParameterCombination> {
+        let slopes: Vec<f64> =
+            axes.iter().zip(unit).map(|(axis, u)| axis.bounds.log_slope(*u).unwrap_or(0.0)).collect();
+        let one = |(rank, (value, direction)): (usize, &(f64, Vec<f64>))| {
+            let determined = rank < self.rank;
+            // a determined sum d_i u_i has exponents d_i / slope_i; along an open direction ln p_i moves by
+            // d_i slope_i
+            let exponent = |(d, slope): (&f64, &f64)| {
+                let determines = if *slope == 0.0 { 0.0 } else { d / slope };
+                if determined { determines } else { d * slope }
+            };
+            let exponents: Vec<f64> = direction.iter().zip(&slopes).map(exponent).collect();
+            let largest = exponents
+                .iter()
+                .copied()
+                .fold(0.0, |most: f64, e| if e.abs() > most.abs() { e } else { most });
+            let named = names
+                .iter()
+                .zip(&exponents)
+                .filter(|(_, e)| e.abs() >= MIN_NAMED_EXPONENT * largest.abs() && largest != 0.0);
+            let sd = if determined {
+                1.0 / (value * largest.abs())
+            } else {
+                largest.abs() / value.max(MIN_INFORMATIVE / 2.0 / Z_95)
+            };
+            let exponents = named.map(|(name, e)| (name.clone(), e / largest)).collect();
+            ParameterCombination { exponents, sd_relative: if sd.is_finite() { sd } else { 0.0 }, determined }
+        };
+        self.all.iter().enumerate().map(one).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::bounds::{Bounds, BoundsSpacing};
+
+    fn names() -> [String; 2] {
+        ["p".to_owned(), "q".to_owned()]
+    }
+
+    fn axes() -> Vec<SearchAxis> {
+        vec![
+            Bounds::new(0.1, 10.0, BoundsSpacing::Log).unwrap().into(),
+            Bounds::new(1.0, 10.0, BoundsSpacing::Log).unwrap().into(),
+        ]
+    }
+
+    /// `r = ln(p^a q^b) / sd` as rows of the Jacobian in the unit box.
+    fn rows(of: &[(f64, f64, f64)]) -> DMatrix<f64> {
+        let (lp, lq) = (100.0_f64.ln(), 10.0_f64.ln());
+        DMatrix::from_fn(of.len(), 2, |row, column| {
+            if column == 0 { of[row].0 * lp / of[row].2 } else { of[row].1 * lq / of[row].2 }
+        })
+    }
+
+    #[test]
+    fn a_product_is_named_with_its_exponents_and_deviation() {
+        let found = SingularDirections::from_jacobian(&rows(&[(1.0, 0.5, 0.01)]));
+        assert_eq!(found.rank, 1);
+        assert!(!found.determines(0) && !found.determines(1) && found.condition_number().is_infinite());
+        let combinations = found.combinations(&names(), &axes(), &[0.5, 0.5]);
+        assert_eq!(combinations[0].describe(), "p q^0.50");
+        assert!(combinations[0].determined && (combinations[0].sd_relative - 0.01).abs() < 1e-12);
+        // p q^0.5 stays the same where ln q = -2 ln p
+        let open = &combinations[1];
+        assert!(
+            !open.determined && (open.exponents["p"] / open.exponents["q"] + 0.5).abs() < 1e-9,
+            "{open:?}"
+        );
+    }
+
+    #[test]
+    fn two_features_determine_both_and_their_correlation_is_that_of_least_squares() {
+        // r1 = ln p / 0.01, r2 = ln(p q) / 0.02: cov = [[1, -1], [-1, 5]] 1e-4
+        let found = SingularDirections::from_jacobian(&rows(&[(1.0, 0.0, 0.01), (1.0, 1.0, 0.02)]));
+        assert_eq!(found.rank, 2);
+        assert!((found.coordinate_sd(0).0 * 100.0_f64.ln() - 0.01).abs() < 1e-12);
+        assert!((found.coordinate_sd(1).0 * 10.0_f64.ln() - 0.01 * 5.0_f64.sqrt()).abs() < 1e-12);
+        assert!((found.correlation(0, 1).unwrap() + 1.0 / 5.0_f64.sqrt()).abs() < 1e-12);
+        assert!(found.condition_number() > 1.0 && found.open_directions().is_empty());
+    }
+
+    #[test]
+    fn nothing_is_known_from_nothing() {
+        let found = SingularDirections::from_jacobian(&DMatrix::zeros(0, 2));
+        assert_eq!((found.rank, found.open_directions().len()), (0, 2));
+        assert_eq!(found.correlation(0, 1), None);
+    }
+}

@@ -1,0 +1,169 @@
+//! Constants of the scenes that a trace fit frees within priors, and the one combination of all parameters
+//! that no motion shows.
+
+use super::job::{Constants, FreeParameter, Job, NuisanceParameter, is_same_quantity};
+use crate::math;
+use crate::model::parameters::{ModelParameter, ParameterQuantity, ParameterRange, find_parameter};
+use crate::simulate::scene::Scene;
+
+/// How far a freed constant may move, in standard deviations of its prior.
+const RANGE_SD: f64 = 5.0;
+
+/// A constant that is freed, with what is known of it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FreedConstant {
+    /// Key of the scene with its table.
+    pub name: String,
+    /// The scene's value, in its SI unit.
+    pub value: f64,
+    /// Standard deviation of its logarithm.
+    pub sd_relative: f64,
+}
+
+impl FreedConstant {
+    /// Lowest and highest value that it may take, in its SI unit.
+    #[must_use]
+    pub fn range(&self) -> [f64; 2] {
+        let factor = math::exp(RANGE_SD * self.sd_relative);
+        let [low, high] = [self.value / factor, self.value * factor];
+        match find_parameter(&self.name).map(|parameter| parameter.range) {
+            Some(ParameterRange::Within(least, most)) => [low.max(least), high.min(most)],
+            _ => [low, high],
+        }
+    }
+}
+
+/// Why constants or parameters cannot be freed as the job wants it.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum NuisanceError {
+    /// A scene has no such number, or none that a ratio can change.
+    #[error(
+        "nuisance `{name}`: found {found} in the scene of `{condition}`, expected a number above 0, because its prior is one of its logarithm; remove it"
+    )]
+    Absent {
+        /// Key of the scene.
+        name: String,
+        /// Name of the condition.
+        condition: String,
+        /// Its value, in words.
+        found: String,
+    },
+    /// Two scenes have different values of one constant.
+    #[error(
+        "nuisance `{name}`: found {first} in the scene of `{one}` and {second} in that of `{other}`, expected one value for all; correct a scene, or remove it"
+    )]
+    Differs {
+        /// Key of the scene.
+        name: String,
+        /// Name of the first condition.
+        one: String,
+        /// Value there.
+        first: f64,
+        /// Name of another condition.
+        other: String,
+        /// Value there.
+        second: f64,
+    },
+    /// All masses and forces are free.
+    #[error(
+        "parameters: everything of the scene that has a unit of mass or force is free and without a prior ({names}): multiplied by one factor, masses, inertias, stiffnesses, dampings and preload give the same motion, so no recording tells their size; give one of them a `prior`, or leave one out"
+    )]
+    Scaling {
+        /// Names of the parameters.
+        names: String,
+    },
+}
+
+/// Constants that a job frees, in the order of its list or of their names.
+///
+/// # Errors
+/// [`NuisanceError`] for one of a list that a scene does not have, or of which scenes differ.
+pub fn free_constants(job: &Job, scenes: &[Scene]) -> Result<Vec<FreedConstant>, NuisanceError> {
+    match &job.constants {
+        Constants::Exact => Ok(Vec::new()),
+        Constants::Listed(list) => list.iter().map(|one| free_listed_constant(one, job, scenes)).collect(),
+        Constants::All { sd_relative } => Ok(free_all_constants(*sd_relative, job, scenes)),
+    }
+}
+
+fn free_listed_constant(
+    wanted: &NuisanceParameter,
+    job: &Job,
+    scenes: &[Scene],
+) -> Result<FreedConstant, NuisanceError> {
+    let NuisanceParameter { name, sd_relative } = wanted;
+    let mut first: Option<(f64, &str)> = None;
+    for (scene, condition) in scenes.iter().zip(&job.conditions) {
+        let found = scene.value(name);
+        let Some(value) = found.filter(|value| *value > 0.0) else {
+            let found = found.map_or("nothing".to_owned(), |value| value.to_string());
+            let (name, condition) = (name.clone(), condition.name.clone());
+            return Err(NuisanceError::Absent { name, condition, found });
+        };
+        let (before, one) = *first.get_or_insert((value, &condition.name));
+        if before.to_bits() != value.to_bits() {
+            let (name, one, other) = (name.clone(), one.to_owned(), condition.name.clone());
+            return Err(NuisanceError::Differs { name, one, first: before, other, second: value });
+        }
+    }
+    let value = first.map_or(0.0, |(value, _)| value);
+    Ok(FreedConstant { name: name.clone(), value, sd_relative: *sd_relative })
+}
+
+/// Everything that is measured with an error of percents, as the first scene writes it, where all scenes have
+/// one value.
+fn free_all_constants(sd_relative: f64, job: &Job, scenes: &[Scene]) -> Vec<FreedConstant> {
+    let Some((scene, others)) = scenes.split_first() else { return Vec::new() };
+    let is_set = |name: &str| {
+        job.conditions.iter().flat_map(|c| &c.set).any(|(set, _)| is_same_quantity(set, name))
+            || find_free_parameter(job, name).is_some()
+    };
+    scene
+        .written_values()
+        .filter(|(name, value)| {
+            *value > 0.0 && find_parameter(name).is_some_and(is_constant) && !is_set(name)
+        })
+        .filter(|(name, value)| others.iter().all(|other| other.value(name) == Some(*value)))
+        .map(|(name, value)| FreedConstant { name: name.to_owned(), value, sd_relative })
+        .collect()
+}
+
+/// Lengths and centres of mass are measured with a ruler; friction is what is sought; drive and restitution
+/// belong to the experiment.
+fn is_constant(parameter: &ModelParameter) -> bool {
+    use ParameterQuantity as Q;
+    let exact = [Q::NeckLength, Q::LipLength, Q::NeckCentre, Q::LipCentre, Q::Restitution];
+    let sought = [Q::FrictionA, Q::FrictionB, Q::FrictionC, Q::DriveAmplitude, Q::DriveFrequency];
+    !exact.contains(&parameter.quantity) && !sought.contains(&parameter.quantity)
+}
+
+/// Refuses a job in which everything that has a unit of mass is free and nothing holds its size.
+///
+/// # Errors
+/// [`NuisanceError::Scaling`].
+pub fn check_scaling(job: &Job, scenes: &[Scene]) -> Result<(), NuisanceError> {
+    // a constant that is not free, or free within a prior, has a size of its own
+    let is_held = |(name, _): (&str, f64)| match find_free_parameter(job, name) {
+        // what is free is written as the job writes it: a stiffness as a frequency has no unit of mass
+        Some(free) => has_mass(&free.name) && free.prior.is_some(),
+        None => has_mass(name),
+    };
+    let all_loose = |scene: &Scene| !scene.written_values().filter(|(_, value)| *value != 0.0).any(is_held);
+    if !scenes.iter().any(all_loose) {
+        return Ok(());
+    }
+    let heavy = job.parameters.iter().filter(|free| has_mass(&free.name));
+    let names = heavy.map(|free| format!("`{}`", free.name)).collect::<Vec<_>>().join(", ");
+    Err(NuisanceError::Scaling { names })
+}
+
+/// The parameter that a job frees of this quantity, however it writes it.
+fn find_free_parameter<'a>(job: &'a Job, name: &str) -> Option<&'a FreeParameter> {
+    job.parameters.iter().find(|free| is_same_quantity(&free.name, name))
+}
+
+/// Whether the unit of a parameter holds a mass: kg and N do.
+fn has_mass(name: &str) -> bool {
+    find_parameter(name)
+        .is_some_and(|parameter| parameter.unit.starts_with("kg") || parameter.unit.starts_with('N'))
+}

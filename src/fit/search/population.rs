@@ -1,0 +1,324 @@
+//! Clouds of points over the unit box, one after another.
+
+use super::stagnation::StagnationCounter;
+use super::{SearchSettings, StageCosts};
+use crate::fit::bounds::clamp_unit;
+use crate::fit::evaluation::EvaluationStage;
+use crate::fit::ledger::{Ledger, StopReason};
+use crate::math;
+use crate::math::StandardNormal;
+use nalgebra::{DMatrix, DVector, SymmetricEigen};
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Relative gain in cost that counts as progress of a cloud.
+const STAGNANT_GAIN: f64 = 1e-3;
+
+/// Clouds of points, the first about the middle of the box and the others about random places, until the
+/// evaluations of the stage are used up: each ends where it has shrunk or gains nothing any more. `None` when
+/// the ledger was not stopped.
+pub(super) fn search_with_populations(
+    ledger: &mut Ledger,
+    dimensions: usize,
+    settings: &SearchSettings,
+) -> Option<StopReason> {
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(settings.seed);
+    let mut middle = vec![0.5; dimensions];
+    let mut used = ledger.remaining_evaluations();
+    while ledger.remaining_evaluations() > 0 {
+        let seed = generator.random();
+        if let stop @ Some(_) =
+            evolve_population(ledger, EvaluationStage::Global, middle, (WIDE_EXTENT, seed), settings)
+        {
+            return stop;
+        }
+        middle = (0..dimensions).map(|_| generator.random()).collect();
+        // a cloud that meets known points alone makes no evaluation
+        if ledger.remaining_evaluations() == used {
+            break;
+        }
+        used = ledger.remaining_evaluations();
+    }
+    None
+}
+
+/// One cloud about a place; why it was stopped, if it was.
+pub(super) fn evolve_population(
+    ledger: &mut Ledger,
+    stage: EvaluationStage,
+    middle: Vec<f64>,
+    (reach, seed): (PopulationExtent, u64),
+    settings: &SearchSettings,
+) -> Option<StopReason> {
+    let generator = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let mut solver = CmaEs::new(middle, settings.particles, reach, generator);
+    let mut costs = StageCosts::new(ledger, stage);
+    let mut patience = StagnationCounter::new(settings.stagnation_generations, STAGNANT_GAIN);
+    while !solver.has_converged() && !patience.is_stagnant(solver.least_cost()) {
+        solver.run_generation(&mut costs);
+        if let stop @ Some(_) = costs.stop_reason() {
+            return stop;
+        }
+    }
+    None
+}
+
+// Covariance matrix adaptation: a cloud of points that learns the shape of the valley it lies in and is not
+// caught by ripples on its floor (Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults
+// of Hansen, arXiv:1604.00772, without the negative weights). argmin has no such method, and its frame for
+// solvers of one's own would add nothing here.
+//
+// The cloud moves in the unit box; a point outside is evaluated at its mirror image inside.
+
+/// How far a cloud reaches at first and when it has found its place, as lengths of its longest axis in the
+/// unit box.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct PopulationExtent {
+    first: f64,
+    last: f64,
+}
+
+/// Over the whole box: three lengths reach every corner. Where it ends damped Gauss-Newton steps are better.
+pub(super) const WIDE_EXTENT: PopulationExtent = PopulationExtent { first: 0.3, last: 0.01 };
+/// About a place at which such steps are caught by ripples.
+pub(super) const NEAR_EXTENT: PopulationExtent = PopulationExtent { first: 0.06, last: 0.003 };
+
+/// A cloud of points.
+pub(super) struct CmaEs {
+    generator: Xoshiro256PlusPlus,
+    points: usize,
+    weights: Vec<f64>,
+    rates: AdaptationRates,
+    mean: DVector<f64>,
+    length: f64,
+    shape: DMatrix<f64>,
+    /// Columns are the axes of the shape times their lengths.
+    axes: DMatrix<f64>,
+    path_length: DVector<f64>,
+    path_shape: DVector<f64>,
+    generation: usize,
+    last: f64,
+    least_cost: f64,
+}
+
+/// A step from the mean, in units of the length.
+#[derive(Debug, Clone)]
+struct PopulationStep {
+    /// Along the axes, in units of theirs.
+    along: DVector<f64>,
+    /// In the box.
+    inside: DVector<f64>,
+}
+
+/// How fast what is learnt.
+struct AdaptationRates {
+    effective: f64,
+    length: f64,
+    damping: f64,
+    path: f64,
+    rank_one: f64,
+    rank_mu: f64,
+    /// Expected length of a standard normal vector.
+    expected: f64,
+}
+
+impl AdaptationRates {
+    fn new(n: f64, weights: &[f64]) -> Self {
+        let effective = 1.0 / weights.iter().map(|w| w * w).sum::<f64>();
+        let length = (effective + 2.0) / (n + effective + 5.0);
+        let damping = 1.0 + 2.0 * (((effective - 1.0) / (n + 1.0)).sqrt() - 1.0).max(0.0) + length;
+        let path = (4.0 + effective / n) / (n + 4.0 + 2.0 * effective / n);
+        let rank_one = 2.0 / (math::powi(n + 1.3, 2) + effective);
+        let rank_mu = (1.0 - rank_one)
+            .min(2.0 * (effective - 2.0 + 1.0 / effective) / (math::powi(n + 2.0, 2) + effective));
+        let expected = n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n));
+        Self { effective, length, damping, path, rank_one, rank_mu, expected }
+    }
+}
+
+impl CmaEs {
+    /// A cloud of `points` points (at least 4) about a place in the unit box.
+    pub(super) fn new(
+        mean: Vec<f64>,
+        points: usize,
+        reach: PopulationExtent,
+        generator: Xoshiro256PlusPlus,
+    ) -> Self {
+        let (n, points) = (mean.len(), points.max(4));
+        let raw: Vec<f64> = (0..points / 2)
+            .map(|rank| math::ln((points as f64 + 1.0) / 2.0) - math::ln(rank as f64 + 1.0))
+            .collect();
+        let sum: f64 = raw.iter().sum();
+        let weights: Vec<f64> = raw.into_iter().map(|w| w / sum).collect();
+        Self {
+            generator,
+            points,
+            rates: AdaptationRates::new(n as f64, &weights),
+            weights,
+            mean: DVector::from_vec(mean),
+            length: reach.first,
+            shape: DMatrix::identity(n, n),
+            axes: DMatrix::identity(n, n),
+            path_length: DVector::zeros(n),
+            path_shape: DVector::zeros(n),
+            generation: 0,
+            last: reach.last,
+            least_cost: f64::INFINITY,
+        }
+    }
+
+    /// One generation: points are drawn, evaluated and learnt from.
+    pub(super) fn run_generation(&mut self, costs: &mut StageCosts) {
+        let steps = self.draw_steps();
+        let points: Vec<Vec<f64>> = steps.iter().map(|step| self.point_of(step)).collect();
+        let costs = costs.evaluate_points(&points);
+        let mut order: Vec<usize> = (0..points.len()).collect();
+        order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
+        let ranked: Vec<_> = order.iter().map(|at| steps[*at].clone()).collect();
+        self.update_distribution(&ranked);
+        let best = order.first().map_or(f64::INFINITY, |at| costs[*at]);
+        if best < self.least_cost {
+            self.least_cost = best;
+        }
+    }
+
+    /// Lowest cost of any point so far.
+    pub(super) fn least_cost(&self) -> f64 {
+        self.least_cost
+    }
+
+    /// Whether it has shrunk to its last reach.
+    pub(super) fn has_converged(&self) -> bool {
+        self.longest_axis() < self.last || !self.length.is_finite()
+    }
+
+    /// The point of the box to which a step leads.
+    fn point_of(&self, step: &PopulationStep) -> Vec<f64> {
+        (&self.mean + &step.inside * self.length).iter().map(|u| reflect_into_unit(*u)).collect()
+    }
+
+    /// Steps of a generation.
+    fn draw_steps(&mut self) -> Vec<PopulationStep> {
+        let n = self.mean.len();
+        (0..self.points)
+            .map(|_| {
+                let along = DVector::from_iterator(
+                    n,
+                    (0..n).map(|_| self.generator.sample::<f64, _>(StandardNormal)),
+                );
+                PopulationStep { inside: &self.axes * &along, along }
+            })
+            .collect()
+    }
+
+    /// Learns from the steps of a generation, best first.
+    fn update_distribution(&mut self, ranked: &[PopulationStep]) {
+        let (n, rates) = (self.mean.len(), &self.rates);
+        self.generation += 1;
+        let sum = |of: fn(&PopulationStep) -> &DVector<f64>| {
+            self.weights.iter().zip(ranked).fold(DVector::zeros(n), |sum, (w, step)| sum + of(step) * *w)
+        };
+        // the inverse square root of the shape times the step is the step along the axes, turned back
+        let (along, step) = (sum(|step| &step.along), sum(|step| &step.inside));
+        self.mean += &step * self.length;
+        let turned = self.rotate_to_box(&along);
+        self.path_length = &self.path_length * (1.0 - rates.length)
+            + turned * (rates.length * (2.0 - rates.length) * rates.effective).sqrt();
+        let settled =
+            1.0 - math::powi(1.0 - rates.length, 2 * i32::try_from(self.generation).unwrap_or(i32::MAX));
+        let steady =
+            self.path_length.norm() / settled.sqrt() < (1.4 + 2.0 / (n as f64 + 1.0)) * rates.expected;
+        let kept = if steady { 1.0 } else { 0.0 };
+        self.path_shape = &self.path_shape * (1.0 - rates.path)
+            + &step * (kept * (rates.path * (2.0 - rates.path) * rates.effective).sqrt());
+        let lost = (1.0 - kept) * rates.path * (2.0 - rates.path);
+        let spread =
+            self.weights.iter().zip(ranked).fold(DMatrix::zeros(n, n), |sum, (w, step)| {
+                sum + &step.inside * step.inside.transpose() * *w
+            });
+        self.shape = &self.shape * (1.0 - rates.rank_one - rates.rank_mu + rates.rank_one * lost)
+            + &self.path_shape * self.path_shape.transpose() * rates.rank_one
+            + spread * rates.rank_mu;
+        self.length *=
+            math::exp((rates.length / rates.damping) * (self.path_length.norm() / rates.expected - 1.0))
+                .min(std::f64::consts::E);
+        self.decompose_shape();
+    }
+
+    /// A vector along the axes as a vector of the box without their lengths.
+    fn rotate_to_box(&self, along: &DVector<f64>) -> DVector<f64> {
+        let mut turned = DVector::zeros(along.len());
+        for (column, z) in self.axes.column_iter().zip(along.iter()) {
+            let norm = column.norm();
+            if norm > 0.0 {
+                turned += column * (*z / norm);
+            }
+        }
+        turned
+    }
+
+    fn decompose_shape(&mut self) {
+        let symmetric = (&self.shape + self.shape.transpose()) * 0.5;
+        let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(symmetric.clone());
+        self.shape = symmetric;
+        self.axes = eigenvectors * DMatrix::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()));
+    }
+
+    fn longest_axis(&self) -> f64 {
+        self.length * self.axes.column_iter().map(|column| column.norm()).fold(0.0, f64::max)
+    }
+}
+
+/// The mirror image inside the unit interval.
+fn reflect_into_unit(u: f64) -> f64 {
+    let folded = u.rem_euclid(2.0);
+    clamp_unit(if folded > 1.0 { 2.0 - folded } else { folded })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+
+    /// Generations until the mean is this near to the minimum of `cost`.
+    fn run(cost: impl Fn(&[f64]) -> f64, generations: usize) -> Vec<f64> {
+        let mut cloud = CmaEs::new(vec![0.5; 3], 16, WIDE_EXTENT, Xoshiro256PlusPlus::seed_from_u64(1));
+        for _ in 0..generations {
+            let drawn = cloud.draw_steps();
+            let mut steps: Vec<(f64, _)> =
+                drawn.into_iter().map(|step| (cost(&cloud.point_of(&step)), step)).collect();
+            steps.sort_by(|a, b| a.0.total_cmp(&b.0));
+            cloud.update_distribution(&steps.into_iter().map(|(_, step)| step).collect::<Vec<_>>());
+        }
+        cloud.mean.iter().map(|u| reflect_into_unit(*u)).collect()
+    }
+
+    #[test]
+    fn a_narrow_turned_valley_is_learnt() {
+        // a hundred times longer than wide, along (1, 1, 1)
+        let minimum = [0.3, 0.35, 0.4];
+        let cost = |p: &[f64]| {
+            let d: Vec<f64> = p.iter().zip(minimum).map(|(a, b)| a - b).collect();
+            let along = (d[0] + d[1] + d[2]) / 3.0;
+            1e4 * d.iter().map(|d| (d - along).powi(2)).sum::<f64>() + along * along
+        };
+        let found = run(cost, 120);
+        assert!(found.iter().zip(minimum).all(|(a, b)| (a - b).abs() < 1e-5), "{found:?}");
+    }
+
+    #[test]
+    fn ripples_do_not_catch_it() {
+        let cost = |p: &[f64]| {
+            p.iter().map(|u| 100.0 * (u - 0.62).powi(2) + 1.0 - (60.0 * (u - 0.62)).cos()).sum::<f64>()
+        };
+        let found = run(cost, 80);
+        assert!(found.iter().all(|u| (u - 0.62).abs() < 1e-3), "{found:?}");
+    }
+
+    #[test]
+    fn a_minimum_on_a_side_of_the_box_is_reached() {
+        let found = run(|p| p.iter().sum(), 100);
+        assert!(found.iter().all(|u| *u < 1e-3), "{found:?}");
+        assert_eq!([-0.25, 1.25, 2.5, 0.5].map(reflect_into_unit), [0.25, 0.75, 0.5, 0.5]);
+    }
+}

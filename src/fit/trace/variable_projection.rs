@@ -1,0 +1,53 @@
+//! One segment's part of the normal equations with its starting state eliminated.
+
+use super::segment_simulation::{LinearizedSegment, LinkState};
+use nalgebra::{DMatrix, DVector};
+
+/// Smallest singular value of the scaled state columns, against the largest, that counts.
+const MIN_SINGULAR: f64 = 1e-4;
+
+/// Normal equations of one segment for the unknowns, and how its state follows them.
+#[derive(Debug, Clone)]
+pub(super) struct ProjectedSegment {
+    /// Jacobian's product with itself after the state is projected out.
+    pub matrix: DMatrix<f64>,
+    /// Its product with the residuals.
+    pub slope: DVector<f64>,
+    /// Move of the state with the unknowns held (to be subtracted).
+    pub move_held: LinkState,
+    /// Its derivative by the unknowns (likewise).
+    pub move_by_unknown: DMatrix<f64>,
+}
+
+/// Projects the columns of the state out of residuals and Jacobian.
+pub(super) fn project_out_state(linear: &LinearizedSegment) -> Option<ProjectedSegment> {
+    let LinearizedSegment { residuals, by_state, by_unknown } = linear;
+    let scales: [f64; 4] = std::array::from_fn(|i| by_state.column(i).norm().max(1e-12));
+    let mut scaled = by_state.clone();
+    (0..4).for_each(|i| scaled.column_mut(i).scale_mut(1.0 / scales[i]));
+    let svd = scaled.svd(true, true);
+    let basis = svd.u.as_ref()?;
+    let largest = svd.singular_values.max();
+    let (mut rest, mut columns) = (residuals.clone(), by_unknown.clone());
+    for i in (0..4).filter(|&i| svd.singular_values[i] > MIN_SINGULAR * largest) {
+        let axis = basis.column(i);
+        rest.axpy(-axis.dot(residuals), &axis, 1.0);
+        for (k, mut column) in columns.column_iter_mut().enumerate() {
+            column.axpy(-axis.dot(&by_unknown.column(k)), &axis, 1.0);
+        }
+    }
+    let solve = |b: &DVector<f64>| -> Option<LinkState> {
+        let found = svd.solve(b, MIN_SINGULAR * largest).ok()?;
+        Some(LinkState::from_fn(|i, _| found[i] / scales[i]))
+    };
+    let mut move_by_unknown = DMatrix::zeros(4, by_unknown.ncols());
+    for k in 0..by_unknown.ncols() {
+        move_by_unknown.set_column(k, &solve(&by_unknown.column(k).into_owned())?);
+    }
+    Some(ProjectedSegment {
+        matrix: columns.transpose() * &columns,
+        slope: columns.transpose() * rest,
+        move_held: solve(residuals)?,
+        move_by_unknown,
+    })
+}

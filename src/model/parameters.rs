@@ -1,0 +1,290 @@
+//! The one table of a scene's numbers: name, symbol, unit, admissible range, scale and meaning.
+//!
+//! Files, refusals, fits and reports all read this table. Where a quantity can be written in two ways (a
+//! stiffness or a natural frequency), both rows carry the same [`ParameterQuantity`] and a scene gives exactly one of
+//! them.
+
+use super::{Linkage, Spring};
+use crate::math;
+use ParameterRange::{NotNegative, Positive, Within};
+use std::f64::consts::TAU;
+
+/// Which values of a parameter make sense.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum ParameterRange {
+    /// Above zero.
+    Positive,
+    /// Zero or above.
+    NotNegative,
+    /// Between two limits, the limits included.
+    Within(f64, f64),
+}
+
+impl ParameterRange {
+    /// Whether a value is admissible; infinities and NaN never are.
+    #[must_use]
+    pub fn admits(self, value: f64) -> bool {
+        value.is_finite()
+            && match self {
+                Self::Positive => value > 0.0,
+                Self::NotNegative => value >= 0.0,
+                Self::Within(least, most) => (least..=most).contains(&value),
+            }
+    }
+
+    /// The range in words.
+    #[must_use]
+    pub fn describe(self) -> String {
+        match self {
+            Self::Positive => "a number above 0".to_owned(),
+            Self::NotNegative => "a number of 0 or more".to_owned(),
+            Self::Within(least, most) => format!("a number from {least} to {most}"),
+        }
+    }
+}
+
+/// How a search should move along a parameter.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ParameterScale {
+    /// By factors.
+    Log,
+    /// By differences.
+    Linear,
+}
+
+/// What a parameter says, whichever way it is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[allow(missing_docs)] // the rows of the table say what each is
+pub enum ParameterQuantity {
+    HeadMass,
+    NeckMass,
+    LipMass,
+    NeckLength,
+    LipLength,
+    NeckCentre,
+    LipCentre,
+    NeckInertia,
+    LipInertia,
+    HeadStiffness,
+    NeckStiffness,
+    LipStiffness,
+    HeadDamping,
+    NeckDamping,
+    LipDamping,
+    Preload,
+    ShoulderAngle,
+    ShoulderStiffness,
+    ShoulderDamping,
+    FrictionA,
+    FrictionB,
+    FrictionC,
+    DriveAmplitude,
+    DriveFrequency,
+    Restitution,
+}
+
+/// One row of the table.
+#[derive(Debug, Clone, Copy)]
+pub struct ModelParameter {
+    /// Name: the scene's table and key.
+    pub name: &'static str,
+    /// The paper's letter.
+    pub symbol: &'static str,
+    /// Unit as shown.
+    pub unit: &'static str,
+    /// What it says.
+    pub quantity: ParameterQuantity,
+    /// Value of the quantity when a scene leaves it out; `None` if it must be given.
+    pub default: Option<f64>,
+    /// Admissible values.
+    pub range: ParameterRange,
+    /// How a search should move along it.
+    pub scale: ParameterScale,
+    /// What it is, in words.
+    pub meaning: &'static str,
+}
+
+macro_rules! table {
+    ($(
+        $name:literal $symbol:literal $unit:literal $quantity:ident
+        $default:expr, $range:expr, $scale:ident, $meaning:literal;
+    )*) => {
+        /// Every number of a scene that a file may set and a fit may free.
+        pub const PARAMETERS: &[ModelParameter] = &[$(ModelParameter {
+            name: $name, symbol: $symbol, unit: $unit, quantity: ParameterQuantity::$quantity,
+            default: $default, range: $range, scale: ParameterScale::$scale, meaning: $meaning,
+        }),*];
+    };
+}
+
+/// The angle of a shoulder lies between upright and level.
+const RIGHT_ANGLE: f64 = std::f64::consts::FRAC_PI_2;
+
+table! {
+    "blade.head_mass_kg" "m0" "kg" HeadMass None, NotNegative, Log, "mass of the head";
+    "blade.neck_mass_kg" "m1" "kg" NeckMass None, NotNegative, Log, "mass of the neck";
+    "blade.lip_mass_kg" "m2" "kg" LipMass None, Positive, Log, "mass of the lip";
+    "blade.neck_length_m" "l1" "m" NeckLength None, Positive, Log, "length of the neck";
+    "blade.lip_length_m" "l2" "m" LipLength None, Positive, Log, "length of the lip";
+    "blade.neck_centre_m" "g1" "m" NeckCentre None, NotNegative, Linear, "neck: upper hinge to centre of mass";
+    "blade.lip_centre_m" "g2" "m" LipCentre None, NotNegative, Linear, "lip: upper hinge to centre of mass";
+    "blade.neck_inertia_kg_m2" "J1" "kg m2" NeckInertia None, NotNegative, Log, "inertia of the neck about its centre of mass";
+    "blade.lip_inertia_kg_m2" "J2" "kg m2" LipInertia None, NotNegative, Log, "inertia of the lip about its centre of mass";
+    "blade.head_stiffness_n_per_m" "k0" "N/m" HeadStiffness None, Positive, Log, "stiffness of the head's support";
+    "blade.head_natural_frequency_hz" "f0" "Hz" HeadStiffness None, Positive, Log, "natural frequency of the head, sqrt(k0/M)/2 pi";
+    "blade.neck_stiffness_n_m_per_rad" "k1" "N m/rad" NeckStiffness None, Positive, Log, "stiffness of the neck off the shoulder";
+    "blade.neck_natural_frequency_hz" "f1" "Hz" NeckStiffness None, Positive, Log, "natural frequency of the neck off the shoulder, sqrt(k1/m_theta)/2 pi";
+    "blade.lip_stiffness_n_m_per_rad" "k2" "N m/rad" LipStiffness None, Positive, Log, "stiffness of the lip";
+    "blade.lip_natural_frequency_hz" "f2" "Hz" LipStiffness None, Positive, Log, "natural frequency of the lip, sqrt(k2/m_phi)/2 pi";
+    "blade.head_damping_n_s_per_m" "c0" "N s/m" HeadDamping Some(0.0), NotNegative, Log, "damping of the head's support";
+    "blade.head_damping_ratio" "z0" "1" HeadDamping Some(0.0), NotNegative, Log, "damping ratio of the head, c0/(2 sqrt(k0 M))";
+    "blade.neck_damping_n_m_s_per_rad" "c1" "N m s/rad" NeckDamping Some(0.0), NotNegative, Log, "damping of the neck";
+    "blade.neck_damping_ratio" "z1" "1" NeckDamping Some(0.0), NotNegative, Log, "damping ratio of the neck, c1/(2 sqrt(k1 m_theta))";
+    "blade.lip_damping_n_m_s_per_rad" "c2" "N m s/rad" LipDamping Some(0.0), NotNegative, Log, "damping of the lip";
+    "blade.lip_damping_ratio" "z2" "1" LipDamping Some(0.0), NotNegative, Log, "damping ratio of the lip, c2/(2 sqrt(k2 m_phi))";
+    "blade.preload_displacement_m" "hd" "m" Preload None, NotNegative, Log, "how far the support is pressed down";
+    "blade.preload_force_n" "k0 hd" "N" Preload None, NotNegative, Log, "force of the tip on the glass when upright";
+    "shoulder.contact_angle_rad" "theta_s" "rad" ShoulderAngle None, Within(0.0, RIGHT_ANGLE), Linear, "neck angle at which it meets the shoulder";
+    "shoulder.stiffness_n_m_per_rad" "ks" "N m/rad" ShoulderStiffness None, Positive, Log, "stiffness that the shoulder adds to the neck";
+    "shoulder.stiffness_ratio" "ks/k1" "1" ShoulderStiffness None, Positive, Log, "stiffness that the shoulder adds, over the neck's";
+    "shoulder.damping_n_m_s_per_rad" "cs" "N m s/rad" ShoulderDamping Some(0.0), NotNegative, Log, "damping that the shoulder adds";
+    "shoulder.damping_ratio" "zs" "1" ShoulderDamping Some(0.0), NotNegative, Log, "damping ratio of the shoulder, cs/(2 sqrt(ks m_theta))";
+    "friction.a" "A" "1" FrictionA None, NotNegative, Linear, "part of the friction coefficient that falls with speed";
+    "friction.b_s_per_m" "B" "s/m" FrictionB None, NotNegative, Log, "decay of friction with speed";
+    "friction.c" "C" "1" FrictionC None, NotNegative, Linear, "part of the friction coefficient that stays";
+    "drive.amplitude_m" "a" "m" DriveAmplitude None, Positive, Log, "half the stroke of the head";
+    "drive.frequency_hz" "f" "Hz" DriveFrequency None, Positive, Log, "strokes there and back a second";
+    "contact.restitution" "e" "1" Restitution Some(0.0), Within(0.0, 1.0), Linear, "normal restitution of a landing";
+}
+
+/// The row of a name.
+#[must_use]
+pub fn find_parameter(name: &str) -> Option<&'static ModelParameter> {
+    PARAMETERS.iter().find(|p| p.name == name)
+}
+
+/// Every name, in the order of the table.
+#[must_use]
+pub fn parameter_names() -> Vec<&'static str> {
+    PARAMETERS.iter().map(|p| p.name).collect()
+}
+
+/// Natural frequency `sqrt(stiffness/inertia)/2 pi`, Hz.
+#[must_use]
+pub(crate) fn natural_frequency_hz(stiffness: f64, inertia: f64) -> f64 {
+    (stiffness / inertia).sqrt() / TAU
+}
+
+/// Stiffness that gives an inertia this natural frequency.
+#[must_use]
+pub fn stiffness_from_frequency(frequency_hz: f64, inertia: f64) -> f64 {
+    inertia * math::powi(TAU * frequency_hz, 2)
+}
+
+/// Damping of `ratio` times the critical one, `2 sqrt(stiffness inertia)`.
+#[must_use]
+pub fn damping_from_ratio(ratio: f64, stiffness: f64, inertia: f64) -> f64 {
+    2.0 * ratio * (stiffness * inertia).sqrt()
+}
+
+/// The value of a parameter that a blade was given in the other way; `None` where a name has no second way or
+/// the blade no such part.
+#[must_use]
+pub fn convert_value(name: &str, blade: &Linkage) -> Option<f64> {
+    let ratio =
+        |spring: &Spring, inertia: f64| spring.damping / damping_from_ratio(1.0, spring.stiffness, inertia);
+    let (mass, theta, phi) = (blade.mass_kg, blade.m_theta, blade.m_phi);
+    let (_, key) = name.split_once('.')?;
+    if name.starts_with("shoulder.") {
+        let shoulder = blade.shoulder?;
+        return match key {
+            "stiffness_n_m_per_rad" => Some(shoulder.stiffness_n_m_per_rad),
+            "stiffness_ratio" => Some(shoulder.stiffness_n_m_per_rad / blade.neck.stiffness),
+            "damping_n_m_s_per_rad" => Some(shoulder.damping_n_m_s_per_rad),
+            "damping_ratio" => Some(
+                shoulder.damping_n_m_s_per_rad
+                    / damping_from_ratio(1.0, shoulder.stiffness_n_m_per_rad, theta),
+            ),
+            _ => None,
+        };
+    }
+    match key {
+        "head_stiffness_n_per_m" => Some(blade.head.stiffness),
+        "head_natural_frequency_hz" => Some(natural_frequency_hz(blade.head.stiffness, mass)),
+        "neck_stiffness_n_m_per_rad" => Some(blade.neck.stiffness),
+        "neck_natural_frequency_hz" => Some(natural_frequency_hz(blade.neck.stiffness, theta)),
+        "lip_stiffness_n_m_per_rad" => Some(blade.lip.stiffness),
+        "lip_natural_frequency_hz" => Some(natural_frequency_hz(blade.lip.stiffness, phi)),
+        "head_damping_n_s_per_m" => Some(blade.head.damping),
+        "head_damping_ratio" => Some(ratio(&blade.head, mass)),
+        "neck_damping_n_m_s_per_rad" => Some(blade.neck.damping),
+        "neck_damping_ratio" => Some(ratio(&blade.neck, theta)),
+        "lip_damping_n_m_s_per_rad" => Some(blade.lip.damping),
+        "lip_damping_ratio" => Some(ratio(&blade.lip, phi)),
+        "preload_displacement_m" => Some(blade.preload_displacement_m),
+        "preload_force_n" => Some(blade.preload_displacement_m * blade.head.stiffness),
+        _ => None,
+    }
+}
+
+// How each number of a scene is measured on a blade.
+
+/// What the masses, inertias, stiffnesses, dampings and the preload of a scene are for.
+///
+/// The equations of motion keep their solution if all of these are multiplied by one factor, so that any
+/// length of blade will do.
+pub const SAME_LENGTH_ADVICE: &str = "Masses, inertias, stiffnesses, dampings and the preload are all for one and \
+                               the same length of blade: the whole blade, the piece on the rig, or one metre.";
+
+impl ParameterQuantity {
+    /// How the quantity is measured, in one sentence.
+    #[must_use]
+    pub fn measurement_method(self) -> &'static str {
+        match self {
+            Self::HeadMass => "weigh everything that moves with the head: upper profile, spring strip, claws",
+            Self::NeckMass => "density times cross section times length of blade, or weigh a neck cut free",
+            Self::LipMass => "density times cross section times length of blade, or weigh a lip cut free",
+            Self::NeckLength => {
+                "on a picture of the cross section: from where the neck bends below the head to where the lip \
+                 bends"
+            }
+            Self::LipLength => "on a picture of the cross section: from where the lip bends to its edge",
+            Self::NeckCentre | Self::LipCentre => {
+                "on the cross section, from the upper hinge; half the length if the part is a rectangle, 0.4 \
+                 of it for a lip that tapers"
+            }
+            Self::NeckInertia | Self::LipInertia => {
+                "from the cross section: m (length^2 + thickness^2)/12 for a rectangle, m length^2/18 for a \
+                 triangle"
+            }
+            Self::HeadStiffness => {
+                "push the head towards the glass and read force over way, or let it ring without the blade \
+                 on the glass and read the frequency"
+            }
+            Self::NeckStiffness => {
+                "bend the neck by a known torque, or flick the lip off the glass and read the lower frequency \
+                 that rings"
+            }
+            Self::LipStiffness => {
+                "hold the neck, bend the lip by a known torque, or flick it and read the frequency that rings"
+            }
+            Self::HeadDamping | Self::NeckDamping | Self::LipDamping => {
+                "from a ring-down: ln(amplitude ratio of neighbouring cycles)/2 pi is the damping ratio"
+            }
+            Self::Preload => "the force on the glass with the head at rest, from a scale below the blade",
+            Self::ShoulderAngle => {
+                "on a picture of the cross section: how far the neck turns until it touches the shoulder"
+            }
+            Self::ShoulderStiffness => {
+                "bend the neck beyond the shoulder by a known torque: what it is stiffer than before"
+            }
+            Self::ShoulderDamping => "from a ring-down on the shoulder; leave it out where it is not known",
+            Self::FrictionA | Self::FrictionB | Self::FrictionC => {
+                "side force over normal force at several steady speeds gives A exp(-B |v|) + C"
+            }
+            Self::DriveAmplitude => "half the way of the head from one end of the stroke to the other",
+            Self::DriveFrequency => "one over the time of a stroke there and back",
+            Self::Restitution => "0 for a lip that does not bounce",
+        }
+    }
+}

@@ -1,0 +1,466 @@
+//! Whether the numbers of a blade are believable: a table of quantities with the range in which each is
+//! expected and the slips that usually lead out of it.
+//!
+//! A value out of its range is a finding and no refusal: a blade may be unlike all others.
+
+use super::parameters;
+use crate::text::{format_plain, round_to_digits};
+use serde::Serialize;
+use std::f64::consts::{PI, TAU};
+
+/// Digits of a number in a finding.
+const DIGITS: usize = 6;
+
+/// A value that is hard to believe.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct PlausibilityFinding {
+    /// Table and key.
+    pub key: String,
+    /// The value and its unit.
+    pub found: String,
+    /// The range and its reason.
+    pub expected: String,
+    /// What it probably is, and what to do.
+    pub advice: String,
+}
+
+impl std::fmt::Display for PlausibilityFinding {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { key, found, expected, advice } = self;
+        write!(f, "key `{key}`: found {found}, expected {expected}; {advice}")
+    }
+}
+
+/// A usual slip: the factor by which it is undone, and its name.
+#[derive(Debug, Clone, Copy)]
+pub struct UnitSlip {
+    /// What the value has to be multiplied by.
+    pub factor: f64,
+    /// What was written as what.
+    pub words: &'static str,
+}
+
+/// Values by key; `None` for what is not there.
+pub type ValueLookup<'a> = dyn Fn(&str) -> Option<f64> + 'a;
+
+/// What is held against a range.
+#[derive(Debug, Clone, Copy)]
+pub enum PlausibilitySubject {
+    /// The value of the key.
+    Value,
+    /// A number that is computed from it and from others; not judged where one of those has a finding.
+    Derived {
+        /// What it is.
+        name: &'static str,
+        /// The keys that it depends on, its own first.
+        keys: &'static [&'static str],
+        /// How it is computed.
+        of: fn(&ValueLookup<'_>) -> Option<f64>,
+    },
+}
+
+/// A row of the table.
+#[derive(Debug, Clone, Copy)]
+pub struct PlausibleRange {
+    /// Table and key.
+    pub key: &'static str,
+    /// What is judged.
+    pub judged: PlausibilitySubject,
+    /// Unit of what is judged.
+    pub unit: &'static str,
+    /// Least and greatest value without a finding.
+    pub range: [f64; 2],
+    /// Why these limits.
+    pub reason: &'static str,
+    /// Slips to look for, the likeliest first.
+    pub slips: &'static [UnitSlip],
+}
+
+/// What is hard to believe among the values of a file, in the order of the table.
+///
+/// `written` gives the key under which a file has the quantity of another key; a quantity that is written
+/// another way is judged like a derived one.
+#[must_use]
+pub fn find_implausible(
+    table: &[PlausibleRange],
+    value: &ValueLookup<'_>,
+    written: &dyn Fn(&'static str) -> &'static str,
+) -> Vec<PlausibilityFinding> {
+    let mut found: Vec<PlausibilityFinding> = Vec::new();
+    for row in table {
+        let doubted = |key: &&str| found.iter().any(|finding| finding.key == *key);
+        let (judged, rests_on_doubt) = match row.judged {
+            PlausibilitySubject::Derived { keys, of, .. } => (of(value), keys.iter().any(doubted)),
+            // a frequency from a stiffness rests on masses and lengths, and the other way round
+            PlausibilitySubject::Value => (value(row.key), written(row.key) != row.key && !found.is_empty()),
+        };
+        let judged = judged.filter(|judged| !rests_on_doubt && !row.admits(*judged));
+        found.extend(judged.map(|judged| row.describe_finding(judged, value, written(row.key))));
+    }
+    found
+}
+
+impl PlausibleRange {
+    fn admits(&self, judged: f64) -> bool {
+        let [least, greatest] = self.range;
+        (least..=greatest).contains(&judged)
+    }
+
+    fn describe_finding(
+        &self,
+        judged: f64,
+        value: &ValueLookup<'_>,
+        key: &'static str,
+    ) -> PlausibilityFinding {
+        let [least, greatest] = self.range.map(format_value);
+        let unit = if self.unit == "1" { String::new() } else { format!(" {}", self.unit) };
+        let name = match self.judged {
+            PlausibilitySubject::Derived { name, .. } => format!(" for {name}"),
+            PlausibilitySubject::Value if key != self.key => {
+                format!(" for {}", parameters::find_parameter(self.key).map_or(self.key, |p| p.meaning))
+            }
+            PlausibilitySubject::Value => String::new(),
+        };
+        PlausibilityFinding {
+            key: key.to_owned(),
+            found: format!("{}{unit}{name}", format_value(judged)),
+            expected: format!("{least} to {greatest}{unit} ({})", self.reason),
+            // a slip is one of the row's own unit
+            advice: self.advise_correction(judged, value(key).filter(|_| key == self.key)),
+        }
+    }
+
+    /// The likeliest slip that leads back into the range, or else what to check. All that is judged by slips
+    /// is proportional to the value of its own key.
+    fn advise_correction(&self, judged: f64, written: Option<f64>) -> String {
+        let slip = self.slips.iter().find(|slip| self.admits(judged * slip.factor));
+        match slip.zip(written) {
+            Some((slip, written)) => {
+                format!("probably {}: then write {}", slip.words, format_value(written * slip.factor))
+            }
+            None => "check the value and its unit".to_owned(),
+        }
+    }
+}
+
+fn format_value(value: f64) -> String {
+    format_plain(round_to_digits(value, DIGITS))
+}
+
+// The ranges, each with its reason. They are wide: no blade that is in use lies outside.
+
+/// Height of a link, m: the whole rubber of a wiper is 5 to 20 mm high, and no part that bends on its own is
+/// much lower than half a millimetre.
+const LINK_M: [f64; 2] = [5e-4, 2e-2];
+/// Thickness of a link, m: from the edge of a lip to the widest body of a profile.
+const THICKNESS_M: [f64; 2] = [1e-4, 1e-2];
+/// Thickness of a hinge, m: thinner ones tear, thicker ones are bodies.
+const HINGE_THICKNESS_M: [f64; 2] = [1e-4, 3e-3];
+/// Height of a hinge, m.
+const HINGE_M: [f64; 2] = [1e-4, 5e-3];
+/// Length of blade, m: from a slice on a rig to the longest blade of a bus.
+const PIECE_M: [f64; 2] = [5e-3, 1.5];
+/// Density of rubber, kg/m3: from pure natural rubber and EPDM (860 to 930) to highly filled chloroprene.
+const DENSITY_KG_PER_M3: [f64; 2] = [850.0, 1600.0];
+/// Young's modulus of rubber, Pa: from 30 Shore A (about 1 MPa) to 90 Shore A (about 20 MPa), and twice that
+/// at the frequencies of chatter.
+const MODULUS_PA: [f64; 2] = [5e5, 5e7];
+/// Loss factor of rubber: resilient natural rubber to damping compounds near their glass transition.
+const LOSS_FACTOR: [f64; 2] = [0.01, 1.0];
+/// Mass of a link, kg: the smallest section and piece, and the largest.
+const LINK_MASS_KG: [f64; 2] = [
+    DENSITY_KG_PER_M3[0] * THICKNESS_M[0] * LINK_M[0] * PIECE_M[0],
+    DENSITY_KG_PER_M3[1] * THICKNESS_M[1] * LINK_M[1] * PIECE_M[1],
+];
+/// Mass of a link over its height, kg/m: density, thickness and length of blade.
+const MASS_OVER_HEIGHT_KG_PER_M: [f64; 2] =
+    [DENSITY_KG_PER_M3[0] * THICKNESS_M[0] * PIECE_M[0], DENSITY_KG_PER_M3[1] * THICKNESS_M[1] * PIECE_M[1]];
+/// Mass per metre of what moves with a head, kg/m: spring strips and upper profile alone (12 g for a strip of
+/// 2 mm x 0.8 mm) to a carriage on a rig.
+const HEAD_KG_PER_M: [f64; 2] = [0.01, 20.0];
+/// Mass of a head, kg: 10 mm of the lightest, and a whole blade with arm or a carriage.
+const HEAD_MASS_KG: [f64; 2] = [1e-4, 5.0];
+/// Centre of mass over length: a third is that of a triangle on its base, two thirds on its edge; with room
+/// for a bead at either end.
+const CENTRE_OVER_LENGTH: [f64; 2] = [0.2, 0.8];
+/// Inertia over mass times length squared: 1/12 for a rod, 1/18 for a triangle, 1/4 for two masses at the
+/// ends; a link may be twice as thick as it is long, which adds 1/3.
+const INERTIA_OVER_ROD: [f64; 2] = [0.02, 0.6];
+/// Natural frequency of the head, Hz; 8.88 and 20 are published.
+const HEAD_HZ: [f64; 2] = [0.5, 200.0];
+/// Natural frequency of the neck, Hz; 195 and 519 are published: a tenth and ten times of these.
+const NECK_HZ: [f64; 2] = [20.0, 5e3];
+/// Natural frequency of the lip, Hz: a tongue of rubber of 1 to 10 mm with the thickness of a lip rings at
+/// 100 to 10,000 Hz.
+const LIP_HZ: [f64; 2] = [50.0, 5e4];
+/// Damping ratio of a rubber link: half the loss factor.
+const RUBBER_RATIO: [f64; 2] = [0.0, 0.5];
+/// Damping ratio of the head: beyond 1 it does not ring.
+const HEAD_RATIO: [f64; 2] = [0.0, 1.0];
+/// Force on the glass per metre, N/m: arms press with 10 to 20 N/m.
+const PRESS_N_PER_M: [f64; 2] = [1.0, 60.0];
+/// Force on the glass, N: the shortest piece and a whole blade.
+const PRESS_N: [f64; 2] = [PRESS_N_PER_M[0] * PIECE_M[0], PRESS_N_PER_M[1] * PIECE_M[1]];
+/// Neck angle at the shoulder, rad: below 0.3 degrees the shoulder touches always, beyond 57 degrees never.
+const SHOULDER_RAD: [f64; 2] = [5e-3, 1.0];
+/// Stiffness of a shoulder over that of the neck: less is no shoulder, more is a wall.
+const SHOULDER_OVER_NECK: [f64; 2] = [0.1, 1e3];
+/// Friction coefficient of rubber on glass: 0.1 to 0.6 wet, up to 2 dry.
+const FRICTION: [f64; 2] = [0.0, 2.0];
+/// Decay of friction with speed, s/m: beyond it friction falls within 1 mm/s, and a wiper moves at 0.1 to 2
+/// m/s.
+const DECAY_S_PER_M: [f64; 2] = [0.0, 1e3];
+/// Half the stroke of a head, m: a rig's to that of a bus.
+const AMPLITUDE_M: [f64; 2] = [1e-3, 1.0];
+/// Strokes there and back a second: a slow rig to a wiper on its fastest (about 1.2).
+const STROKES_HZ: [f64; 2] = [0.01, 5.0];
+/// Top speed of the head, m/s: a wiper's tip reaches 2 to 3.
+const TOP_SPEED_M_PER_S: [f64; 2] = [1e-4, 5.0];
+
+const MILLIMETRES: UnitSlip = UnitSlip { factor: 1e-3, words: "millimetres written as metres" };
+const CENTIMETRES: UnitSlip = UnitSlip { factor: 1e-2, words: "centimetres written as metres" };
+const METRES_TWICE: UnitSlip = UnitSlip { factor: 1e3, words: "millimetres turned into metres twice" };
+const GRAMS: UnitSlip = UnitSlip { factor: 1e-3, words: "grams written as kilograms" };
+const MILLIGRAMS: UnitSlip = UnitSlip { factor: 1e-6, words: "milligrams written as kilograms" };
+const THOUSAND_TOO_LARGE: UnitSlip = UnitSlip { factor: 1e-3, words: "three powers of ten too many" };
+const THOUSAND_TOO_SMALL: UnitSlip = UnitSlip { factor: 1e3, words: "three powers of ten too few" };
+const KG_MM2: UnitSlip = UnitSlip { factor: 1e-6, words: "kg mm2 written as kg m2" };
+const G_CM2: UnitSlip = UnitSlip { factor: 1e-7, words: "g cm2 written as kg m2" };
+const G_MM2: UnitSlip = UnitSlip { factor: 1e-9, words: "g mm2 written as kg m2" };
+const PERCENT: UnitSlip = UnitSlip { factor: 1e-2, words: "percent written as a ratio" };
+const POINT: UnitSlip = UnitSlip { factor: 0.1, words: "a decimal point one place too far to the right" };
+const DEGREES: UnitSlip = UnitSlip { factor: PI / 180.0, words: "degrees written as radians" };
+const KILOHERTZ: UnitSlip = UnitSlip { factor: 1e3, words: "kHz written as Hz" };
+const GRAM_FORCE: UnitSlip = UnitSlip { factor: 9.806_65e-3, words: "grams of a scale written as newtons" };
+const MEGAPASCALS: UnitSlip = UnitSlip { factor: 1e6, words: "MPa written as Pa" };
+const KILOPASCALS: UnitSlip = UnitSlip { factor: 1e3, words: "kPa written as Pa" };
+const G_PER_CM3: UnitSlip = UnitSlip { factor: 1e3, words: "g/cm3 written as kg/m3" };
+const G_PER_M: UnitSlip = UnitSlip { factor: 1e-3, words: "g/m written as kg/m" };
+const PER_MILLIMETRE: UnitSlip = UnitSlip { factor: 1e3, words: "N/mm written as N/m" };
+
+const LENGTHS: &[UnitSlip] = &[MILLIMETRES, CENTIMETRES, METRES_TWICE];
+const MASSES: &[UnitSlip] = &[GRAMS, MILLIGRAMS];
+const INERTIAS: &[UnitSlip] = &[THOUSAND_TOO_LARGE, KG_MM2, G_CM2, G_MM2, THOUSAND_TOO_SMALL];
+
+const fn value_range(
+    key: &'static str,
+    unit: &'static str,
+    range: [f64; 2],
+    reason: &'static str,
+    slips: &'static [UnitSlip],
+) -> PlausibleRange {
+    PlausibleRange { key, judged: PlausibilitySubject::Value, unit, range, reason, slips }
+}
+
+const fn derived_range(
+    row: PlausibleRange,
+    name: &'static str,
+    keys: &'static [&'static str],
+    of: fn(&ValueLookup<'_>) -> Option<f64>,
+) -> PlausibleRange {
+    PlausibleRange { judged: PlausibilitySubject::Derived { name, keys, of }, ..row }
+}
+
+const LINK_WHY: &str = "the rubber of a wiper is 5 to 20 mm high, a part of it at least 0.5 mm";
+const THICKNESS_WHY: &str = "a profile is 0.1 mm thick at its edge and at most 10 mm at its body";
+const HINGE_WHY: &str = "thinner ones tear, larger ones are no hinge";
+const MASS_WHY: &str = "density 850 to 1600 kg/m3 times the cross section times 5 mm to 1.5 m of blade";
+const HEAD_WHY: &str = "10 mm of upper profile with its strip, to a blade with its arm or a carriage";
+const CENTRE_WHY: &str = "half for a rectangle, a third or two thirds for a triangle";
+const INERTIA_WHY: &str = "1/12 for a rod, 1/18 for a triangle, up to 1/3 more if thick";
+const RUBBER_WHY: &str = "half the loss factor of rubber, which is at most about 1";
+const FRICTION_WHY: &str = "rubber on glass has 0.1 to 0.6 wet and up to 2 dry";
+
+/// The numbers of a scene.
+pub const SCENE_RANGES: &[PlausibleRange] = &[
+    value_range("blade.neck_length_m", "m", LINK_M, LINK_WHY, LENGTHS),
+    value_range("blade.lip_length_m", "m", LINK_M, LINK_WHY, LENGTHS),
+    value_range("blade.head_mass_kg", "kg", HEAD_MASS_KG, HEAD_WHY, MASSES),
+    value_range("blade.neck_mass_kg", "kg", LINK_MASS_KG, MASS_WHY, MASSES),
+    value_range("blade.lip_mass_kg", "kg", LINK_MASS_KG, MASS_WHY, MASSES),
+    derived_range(
+        value_range("blade.neck_mass_kg", "kg/m", MASS_OVER_HEIGHT_KG_PER_M, MASS_WHY, MASSES),
+        "the mass over the height of the neck",
+        &["blade.neck_mass_kg", "blade.neck_length_m"],
+        |value| Some(value("blade.neck_mass_kg")? / value("blade.neck_length_m")?),
+    ),
+    derived_range(
+        value_range("blade.lip_mass_kg", "kg/m", MASS_OVER_HEIGHT_KG_PER_M, MASS_WHY, MASSES),
+        "the mass over the height of the lip",
+        &["blade.lip_mass_kg", "blade.lip_length_m"],
+        |value| Some(value("blade.lip_mass_kg")? / value("blade.lip_length_m")?),
+    ),
+    derived_range(
+        value_range("blade.neck_centre_m", "1", CENTRE_OVER_LENGTH, CENTRE_WHY, LENGTHS),
+        "the centre of the neck over its length",
+        &["blade.neck_centre_m", "blade.neck_length_m"],
+        |value| Some(value("blade.neck_centre_m")? / value("blade.neck_length_m")?),
+    ),
+    derived_range(
+        value_range("blade.lip_centre_m", "1", CENTRE_OVER_LENGTH, CENTRE_WHY, LENGTHS),
+        "the centre of the lip over its length",
+        &["blade.lip_centre_m", "blade.lip_length_m"],
+        |value| Some(value("blade.lip_centre_m")? / value("blade.lip_length_m")?),
+    ),
+    derived_range(
+        value_range("blade.neck_inertia_kg_m2", "1", INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS),
+        "the inertia of the neck over mass times length squared",
+        &["blade.neck_inertia_kg_m2", "blade.neck_mass_kg", "blade.neck_length_m"],
+        |value| {
+            let length = value("blade.neck_length_m")?;
+            Some(value("blade.neck_inertia_kg_m2")? / (value("blade.neck_mass_kg")? * length * length))
+        },
+    ),
+    derived_range(
+        value_range("blade.lip_inertia_kg_m2", "1", INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS),
+        "the inertia of the lip over mass times length squared",
+        &["blade.lip_inertia_kg_m2", "blade.lip_mass_kg", "blade.lip_length_m"],
+        |value| {
+            let length = value("blade.lip_length_m")?;
+            Some(value("blade.lip_inertia_kg_m2")? / (value("blade.lip_mass_kg")? * length * length))
+        },
+    ),
+    value_range(
+        "blade.head_natural_frequency_hz",
+        "Hz",
+        HEAD_HZ,
+        "arms and rigs spring slowly; 8.88 and 20 Hz are published",
+        &[],
+    ),
+    value_range(
+        "blade.neck_natural_frequency_hz",
+        "Hz",
+        NECK_HZ,
+        "195 and 519 Hz are published; a tenth to ten times of these",
+        &[KILOHERTZ],
+    ),
+    value_range(
+        "blade.lip_natural_frequency_hz",
+        "Hz",
+        LIP_HZ,
+        "a tongue of rubber of 1 to 10 mm rings at 100 Hz to 10 kHz",
+        &[KILOHERTZ],
+    ),
+    value_range("blade.head_damping_ratio", "1", HEAD_RATIO, "beyond 1 a head does not ring", &[PERCENT]),
+    value_range("blade.neck_damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
+    value_range("blade.lip_damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
+    value_range(
+        "blade.preload_force_n",
+        "N",
+        PRESS_N,
+        "arms press with 10 to 20 N per metre, here 1 to 60, on 5 mm to 1.5 m of blade",
+        &[GRAM_FORCE],
+    ),
+    value_range(
+        "shoulder.contact_angle_rad",
+        "rad",
+        SHOULDER_RAD,
+        "a neck that leans on its shoulder has turned by 0.3 to 57 degrees",
+        &[DEGREES],
+    ),
+    value_range(
+        "shoulder.stiffness_ratio",
+        "1",
+        SHOULDER_OVER_NECK,
+        "less is no shoulder, more is a wall",
+        &[PERCENT],
+    ),
+    value_range("shoulder.damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
+    value_range("friction.a", "1", FRICTION, FRICTION_WHY, &[POINT, PERCENT]),
+    value_range("friction.c", "1", FRICTION, FRICTION_WHY, &[POINT, PERCENT]),
+    derived_range(
+        value_range("friction.a", "1", FRICTION, FRICTION_WHY, &[]),
+        "the static friction A + C",
+        &["friction.a", "friction.c"],
+        |value| Some(value("friction.a")? + value("friction.c")?),
+    ),
+    value_range(
+        "friction.b_s_per_m",
+        "s/m",
+        DECAY_S_PER_M,
+        "above 1000 friction falls within 1 mm/s, and a wiper moves at 0.1 to 2 m/s",
+        &[THOUSAND_TOO_LARGE],
+    ),
+    value_range("drive.amplitude_m", "m", AMPLITUDE_M, "half a stroke, on a rig or a bus", LENGTHS),
+    value_range(
+        "drive.frequency_hz",
+        "Hz",
+        STROKES_HZ,
+        "a wiper makes at most about 1.2 strokes a second",
+        &[],
+    ),
+    derived_range(
+        value_range(
+            "drive.amplitude_m",
+            "m/s",
+            TOP_SPEED_M_PER_S,
+            "a wiper's tip reaches 2 to 3 m/s",
+            LENGTHS,
+        ),
+        "the top speed of the head",
+        &["drive.amplitude_m", "drive.frequency_hz"],
+        |value| Some(TAU * value("drive.amplitude_m")? * value("drive.frequency_hz")?),
+    ),
+];
+
+/// The numbers of a blade's section.
+pub const SECTION_RANGES: &[PlausibleRange] = &[
+    value_range("length_m", "m", PIECE_M, "a slice on a rig to the longest blade of a bus", LENGTHS),
+    value_range(
+        "rubber.density_kg_per_m3",
+        "kg/m3",
+        DENSITY_KG_PER_M3,
+        "pure rubber has 860 to 930, highly filled rubber 1600",
+        &[G_PER_CM3],
+    ),
+    value_range(
+        "rubber.youngs_modulus_pa",
+        "Pa",
+        MODULUS_PA,
+        "30 to 90 Shore A are about 1 to 20 MPa, and twice that at the frequencies of chatter",
+        &[MEGAPASCALS, KILOPASCALS],
+    ),
+    value_range(
+        "rubber.loss_factor",
+        "1",
+        LOSS_FACTOR,
+        "0.05 to 0.5 is usual for rubber, 1 the peak of a damping one",
+        &[PERCENT],
+    ),
+    value_range(
+        "head.mass_kg_per_m",
+        "kg/m",
+        HEAD_KG_PER_M,
+        "a strip and its profile, to a carriage",
+        &[G_PER_M],
+    ),
+    derived_range(
+        value_range(
+            "head.stiffness_n_per_m2",
+            "Hz",
+            HEAD_HZ,
+            "arms and rigs spring slowly; 8.88 and 20 Hz are published",
+            &[],
+        ),
+        "the natural frequency of the head",
+        &["head.stiffness_n_per_m2", "head.mass_kg_per_m"],
+        |value| Some((value("head.stiffness_n_per_m2")? / value("head.mass_kg_per_m")?).sqrt() / TAU),
+    ),
+    value_range(
+        "head.press_force_n_per_m",
+        "N/m",
+        PRESS_N_PER_M,
+        "arms press with 10 to 20 N per metre of blade",
+        &[GRAM_FORCE, PER_MILLIMETRE],
+    ),
+    value_range("neck.height_m", "m", LINK_M, LINK_WHY, LENGTHS),
+    value_range("neck.top_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
+    value_range("neck.bottom_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
+    value_range("neck.hinge_thickness_m", "m", HINGE_THICKNESS_M, HINGE_WHY, LENGTHS),
+    value_range("neck.hinge_height_m", "m", HINGE_M, HINGE_WHY, LENGTHS),
+    value_range("lip.height_m", "m", LINK_M, LINK_WHY, LENGTHS),
+    value_range("lip.top_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
+    value_range("lip.bottom_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
+    value_range("lip.hinge_thickness_m", "m", HINGE_THICKNESS_M, HINGE_WHY, LENGTHS),
+    value_range("lip.hinge_height_m", "m", HINGE_M, HINGE_WHY, LENGTHS),
+];

@@ -1,0 +1,247 @@
+//! From the cross section of a rubber blade to the `[blade]` table of a scene, and from a scene back to what
+//! ruler and scale show.
+//!
+//! Neck and lip are trapezoids of rubber of density `rho` over a length `b` of blade: height `h`, thickness
+//! `t1` at the top and `t2` at the bottom.
+//!
+//! ```text
+//! mass       m = rho b h (t1 + t2)/2
+//! centre     g = h (t1 + 2 t2)/(3 (t1 + t2)), from the top
+//! inertia    J = rho b (h^3 (t1^2 + 4 t1 t2 + t2^2)/(36 (t1 + t2)) + h (t1 + t2) (t1^2 + t2^2)/48)
+//! ```
+//!
+//! For a rectangle that is `g = h/2` and `J = m (h^2 + t^2)/12`. A blade is long compared with its thickness
+//! and bends as a plate, with `E' = E/(1 - nu^2)` in place of Young's modulus; rubber keeps its volume, `nu =
+//! 1/2`. A link turns on a hinge of thickness `t` and height `L`, or where it has none bends over its own
+//! height, `s` from the bottom, so that a force at its bottom moves that as far as the spring does:
+//!
+//! ```text
+//! with a hinge     k = E' b t^3/(12 L)
+//! without          1/k = 12/(E' b h^2) int_0^h s^2/t(s)^3 ds     (rectangle: k = 3 E' b t^3/(12 h))
+//! ```
+//!
+//! A loss factor `eta` gives a resonance the damping ratio `eta/2`. Everything but lengths of the section,
+//! ratios and frequencies is proportional to `b`.
+
+mod input;
+
+use crate::math::{gauss_legendre, powi};
+use crate::text::{escape_controls, round_to_digits};
+pub use input::{BladeSection, SectionError};
+use input::{InputDeviation, SectionKey};
+use serde::Serialize;
+use std::fmt::Write;
+
+// The `[blade]` table that follows from a section, with the equation and the uncertainty of each number.
+
+/// Significant digits of a number in the table: more than any of them is known to.
+const DIGITS: usize = 4;
+/// Numbers of the table.
+const COUNT: usize = 15;
+/// A dimension that may be wrong by more than itself is varied down to this share of it, as it stays above
+/// zero.
+const LEAST_SHARE: f64 = 0.1;
+
+/// A number of the `[blade]` table.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct BladeTableEntry {
+    /// Key in the table.
+    pub key: &'static str,
+    /// Value, in the unit of the key.
+    pub value: f64,
+    /// Standard deviation over the value: from those of the inputs alone.
+    pub relative_uncertainty: f64,
+    /// How it follows from the section; letters of [`super::section`], `b` is `length_m`.
+    pub equation: &'static str,
+}
+
+/// The `[blade]` table of a section.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BladeEstimate {
+    /// Title of the section.
+    pub title: String,
+    /// Length of blade that every number is for, m.
+    pub length_m: f64,
+    /// The numbers, in the order of the table.
+    pub blade: Vec<BladeTableEntry>,
+}
+
+const MASS: &str = "rho b h (t1 + t2)/2";
+const CENTRE: &str = "h (t1 + 2 t2)/(3 (t1 + t2))";
+const INERTIA: &str = "rho b (h^3 (t1^2 + 4 t1 t2 + t2^2)/(36 (t1 + t2)) + h (t1 + t2) (t1^2 + t2^2)/48)";
+const HINGE: &str = "E/(1 - nu^2) b t^3/(12 L), nu = 1/2, of the hinge";
+const BENDING: &str = "E/(1 - nu^2) b h^2/(12 int s^2/t(s)^3 ds), nu = 1/2, of the link's own bending";
+const RATIO: &str = "eta/2";
+
+impl BladeEstimate {
+    /// Of a section.
+    #[must_use]
+    pub fn from_section(section: &BladeSection) -> Self {
+        let numbers = compute_entries(section);
+        let blade = numbers.iter().enumerate().map(|(at, &(key, value, equation))| {
+            let variance: f64 =
+                section.present_keys().map(|input| entry_change(section, input, at)).map(|d| d * d).sum();
+            BladeTableEntry { key, value, equation, relative_uncertainty: variance.sqrt() / value }
+        });
+        Self { title: section.title().to_owned(), length_m: section.length_m(), blade: blade.collect() }
+    }
+
+    /// The value of a key of the table.
+    #[must_use]
+    pub fn value(&self, key: &str) -> Option<f64> {
+        self.blade.iter().find(|quantity| quantity.key == key).map(|quantity| quantity.value)
+    }
+
+    /// The table as a scene has it, with comments.
+    #[must_use]
+    pub fn to_toml(&self) -> String {
+        let mut text = format!(
+            "# An estimate from the section of a blade, for the start of a fit: no measurement of the blade's motion.\n\
+             # Section: {}\n\
+             # Masses, inertias, stiffnesses and the preload are those of {} mm of blade, all together.\n\
+             # The percentages are standard deviations from those of the inputs alone. That rubber stiffens with\n\
+             # frequency, and that a link is no rigid body, comes on top.\n\
+             # The head's damping does not follow from a section: add head_damping_ratio from a ring-down.\n\
+             [blade]\n",
+            escape_controls(&self.title),
+            round_to_digits(1e3 * self.length_m, DIGITS)
+        );
+        for BladeTableEntry { key, value, relative_uncertainty, equation } in &self.blade {
+            let (value, percent) =
+                (round_to_digits(*value, DIGITS), round_to_digits(100.0 * relative_uncertainty, 2));
+            let _ = writeln!(text, "{key} = {value:?} # +-{percent} %: {equation}"); // cannot fail
+        }
+        text
+    }
+}
+
+/// Key, value and equation of every number.
+fn compute_entries(section: &BladeSection) -> [(&'static str, f64, &'static str); COUNT] {
+    let b = section.length_m();
+    let rho = section.number("rubber.density_kg_per_m3");
+    let modulus = plate_modulus_pa(section.number("rubber.youngs_modulus_pa"));
+    let ratio = 0.5 * section.number("rubber.loss_factor");
+    let (neck, lip) = (section.neck(), section.lip());
+    let bending = |link: &LinkSection| if link.hinge.is_some() { HINGE } else { BENDING };
+    let stiffness = |link: &LinkSection| b * link.stiffness_n_per_rad(modulus);
+    let of_head = |key: &str| b * section.number(key);
+    [
+        ("head_mass_kg", of_head("head.mass_kg_per_m"), "head.mass_kg_per_m b"),
+        ("neck_mass_kg", rho * b * neck.area_m2(), MASS),
+        ("lip_mass_kg", rho * b * lip.area_m2(), MASS),
+        ("neck_length_m", neck.height_m, "neck.height_m"),
+        ("lip_length_m", lip.height_m, "lip.height_m"),
+        ("neck_centre_m", neck.centre_m(), CENTRE),
+        ("lip_centre_m", lip.centre_m(), CENTRE),
+        ("neck_inertia_kg_m2", rho * b * neck.polar_moment_m4(), INERTIA),
+        ("lip_inertia_kg_m2", rho * b * lip.polar_moment_m4(), INERTIA),
+        ("head_stiffness_n_per_m", of_head("head.stiffness_n_per_m2"), "head.stiffness_n_per_m2 b"),
+        ("neck_stiffness_n_m_per_rad", stiffness(&neck), bending(&neck)),
+        ("lip_stiffness_n_m_per_rad", stiffness(&lip), bending(&lip)),
+        ("neck_damping_ratio", ratio, RATIO),
+        ("lip_damping_ratio", ratio, RATIO),
+        ("preload_force_n", of_head("head.press_force_n_per_m"), "head.press_force_n_per_m b"),
+    ]
+}
+
+/// How far a standard deviation of an input moves the number `at`, from a central difference over it.
+fn entry_change(section: &BladeSection, input: &SectionKey, at: usize) -> f64 {
+    let value = section.number(input.name);
+    let deviation = match input.deviation {
+        InputDeviation::Absolute(deviation) => deviation,
+        InputDeviation::Relative(share) => share * value,
+    };
+    let (low, high) = ((value - deviation).max(LEAST_SHARE * value), value + deviation);
+    let moved = |value: f64| compute_entries(&section.with_value(input.name, value))[at].1;
+    (moved(high) - moved(low)) / (high - low) * deviation
+}
+
+// Closed forms of a link's section (equations in [`super::section`]).
+
+/// Poisson's ratio of rubber: its volume hardly changes.
+const POISSON_RATIO: f64 = 0.5;
+/// Parts over which the bending of a link is integrated by the five-point rule. A link that is 20 times
+/// thinner at its edge is still integrated to 1e-12.
+const PARTS: u32 = 256;
+
+/// Modulus of a wide plate `E/(1 - nu^2)`, Pa, from Young's modulus, Pa.
+#[must_use]
+pub fn plate_modulus_pa(youngs_modulus_pa: f64) -> f64 {
+    youngs_modulus_pa / (1.0 - POISSON_RATIO * POISSON_RATIO)
+}
+
+/// The trapezoid of a link, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinkSection {
+    /// Height `h`, from hinge to hinge or to the edge.
+    pub height_m: f64,
+    /// Thickness at the top `t1`.
+    pub top_thickness_m: f64,
+    /// Thickness at the bottom `t2`.
+    pub bottom_thickness_m: f64,
+    /// The hinge at its top, where it has one.
+    pub hinge: Option<RubberHinge>,
+}
+
+/// A thin neck of rubber that bends in place of the link below it, m.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RubberHinge {
+    /// Thickness `t`.
+    pub thickness_m: f64,
+    /// Height `L`.
+    pub height_m: f64,
+}
+
+impl RubberHinge {
+    /// Stiffness per length of blade under a moment, N m/rad/m: `E' t^3/(12 L)`.
+    #[must_use]
+    pub fn stiffness_n_per_rad(&self, plate_modulus_pa: f64) -> f64 {
+        plate_modulus_pa * powi(self.thickness_m, 3) / (12.0 * self.height_m)
+    }
+}
+
+impl LinkSection {
+    /// Area of the section, m2: `h (t1 + t2)/2`.
+    #[must_use]
+    pub fn area_m2(&self) -> f64 {
+        0.5 * self.height_m * (self.top_thickness_m + self.bottom_thickness_m)
+    }
+
+    /// Centre of the area from the top, m: `h (t1 + 2 t2)/(3 (t1 + t2))`.
+    #[must_use]
+    pub fn centre_m(&self) -> f64 {
+        let (t1, t2) = (self.top_thickness_m, self.bottom_thickness_m);
+        self.height_m * (t1 + 2.0 * t2) / (3.0 * (t1 + t2))
+    }
+
+    /// Polar second moment of the area about its centre, m4: the inertia per density and length of blade.
+    #[must_use]
+    pub fn polar_moment_m4(&self) -> f64 {
+        let (h, t1, t2) = (self.height_m, self.top_thickness_m, self.bottom_thickness_m);
+        let along = powi(h, 3) * (t1 * t1 + 4.0 * t1 * t2 + t2 * t2) / (36.0 * (t1 + t2));
+        let across = h * (t1 + t2) * (t1 * t1 + t2 * t2) / 48.0;
+        along + across
+    }
+
+    /// Stiffness at the top per length of blade, N m/rad/m: that of the hinge, or of the link's own bending
+    /// under a force at its bottom.
+    #[must_use]
+    pub fn stiffness_n_per_rad(&self, plate_modulus_pa: f64) -> f64 {
+        match self.hinge {
+            Some(hinge) => hinge.stiffness_n_per_rad(plate_modulus_pa),
+            None => plate_modulus_pa * powi(self.height_m, 2) / (12.0 * self.bending_integral()),
+        }
+    }
+
+    /// `int_0^h s^2/t(s)^3 ds` with `s` from the bottom.
+    fn bending_integral(&self) -> f64 {
+        let part = self.height_m / f64::from(PARTS);
+        let thickness = |s: f64| {
+            self.bottom_thickness_m + (self.top_thickness_m - self.bottom_thickness_m) * s / self.height_m
+        };
+        (0..PARTS)
+            .flat_map(|i| gauss_legendre::nodes_and_weights(part * f64::from(i), part * f64::from(i + 1)))
+            .map(|(s, weight)| weight * s * s / powi(thickness(s), 3))
+            .sum()
+    }
+}

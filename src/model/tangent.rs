@@ -1,0 +1,246 @@
+//! The first variation of the motion: linear equations for the derivatives of the blade's angles, along a
+//! motion whose Taylor series are known.
+//!
+//! The unknowns are the derivatives `y_i = cos(angle_i) d angle_i` of the sines of both angles: those of the
+//! tip's place are `l1 y1 + l2 y2`, whatever the angles are. With `t` for the tangent of an angle,
+//! `S_i = t_i y_i` for the derivative of minus its cosine, and in the notation of
+//! [`series`](super::series), the equation of each link over its cosine becomes
+//!
+//! ```text
+//! (I_i d angle_i'' + d moment_i + Z_i d angle_i) / cos_i + dX_i + t_i dY_i + (d I_i angle_i'') / cos_i = 0
+//! dX_1 = m_c y2'' + m_a d v'' - l1 df + (d m_c p2' + d m_a v'' - d l1 f)       Z_i = cos_i Y_i - sin_i X_i
+//! dY_1 = m_c S2'' - m_a du'' - l1 dN + (d m_c q2' - d m_a u'' - d l1 N)        likewise for the lip
+//! slip:   df = -sigma mu dN + b N E d v3' - sigma N (d a e + d c) + d b v3' N E,   E = a e
+//! stick:  l1 y1 + l2 y2 + d v + d l1 sin theta + d l2 sin phi stays, and df is what holds it
+//! flight: dN = df = 0, and the gap between tip and glass is a third unknown
+//! ```
+//!
+//! Everything that multiplies an unknown is the same for all directions, and so is what a change of one
+//! constant adds.
+
+mod forcing;
+mod lane_vector;
+mod linear_forms;
+mod linkage_tangent;
+mod motion_samples;
+
+use super::Linkage;
+use super::series::{ContactMode, MotionSeries};
+use super::shoulder::ShoulderContact;
+pub use forcing::{ForcingTerms, HeadMotionChange};
+pub use lane_vector::{LANES, LaneVector};
+pub use linear_forms::{LinearForm, ModelChannel};
+pub use linkage_tangent::{LinkageConstant, LinkageTangent, SpringTangent};
+pub use motion_samples::{LinkAttitudes, MotionSamples, fill_lanes};
+
+/// Derivatives of the state at the start of a step.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct StateTangent {
+    /// Of the angles of neck and lip, rad over the unit of the direction, and so on.
+    pub angle: [LaneVector; 2],
+    /// Of the angular rates, rad/s.
+    pub rate: [LaneVector; 2],
+    /// Of the gap between tip and glass, m: nothing in contact.
+    pub gap_m: LaneVector,
+    /// Of its rate, m/s.
+    pub gap_rate: LaneVector,
+}
+
+// A motion whose variation is asked for.
+
+/// A quantity of neck and lip.
+pub(super) type LaneVectorPair = [LaneVector; 2];
+
+/// A motion whose variation is asked for; `K` is that of its series.
+#[derive(Debug, Clone, Copy)]
+pub struct ReferenceMotion<'a, const K: usize> {
+    /// The linkage that moves.
+    pub linkage: &'a Linkage,
+    /// How its tip touches the glass.
+    pub touch: ContactMode,
+    /// On which side its neck leans.
+    pub lean: ShoulderContact,
+    /// Its series.
+    pub motion: &'a MotionSeries<K>,
+}
+
+impl<const K: usize> ReferenceMotion<'_, K> {
+    pub(super) fn is_in_flight(&self) -> bool {
+        matches!(self.touch, ContactMode::Flight(..))
+    }
+
+    pub(super) fn lengths(&self) -> [f64; 2] {
+        [self.linkage.l1_m, self.linkage.l2_m]
+    }
+
+    pub(super) fn moments(&self) -> [f64; 2] {
+        [self.linkage.m_a, self.linkage.m_b]
+    }
+
+    /// `m_a - M l1`, `m_b - M l2`: what the normal force takes of `q'`.
+    pub(super) fn arms(&self) -> [f64; 2] {
+        let (l, m) = (self.lengths(), self.moments());
+        [m[0] - self.linkage.mass_kg * l[0], m[1] - self.linkage.mass_kg * l[1]]
+    }
+}
+
+/// One row a link.
+#[inline(always)]
+pub(super) fn lanes_per_link(f: impl Fn(usize) -> LaneVector) -> LaneVectorPair {
+    [f(0), f(1)]
+}
+
+/// The sum over both links.
+#[inline(always)]
+pub(super) fn sum_over_links(weights: [f64; 2], rows: &LaneVectorPair) -> LaneVector {
+    weights[0] * rows[0] + weights[1] * rows[1]
+}
+
+// What multiplies the derivatives in their equations.
+
+/// Matrices of the derivatives' second, first and own values at a few instants: equations by unknowns, the
+/// third of both in flight alone.
+#[derive(Debug, Clone)]
+pub struct TangentMatrices {
+    /// Of the second derivatives in time.
+    pub mass: [[LaneVector; 3]; 3],
+    /// Of the first.
+    pub damping: [[LaneVector; 3]; 3],
+    /// Of the values.
+    pub stiffness: [[LaneVector; 3]; 3],
+}
+
+/// The one equation of a tip that sticks, without the force that holds it: `y2` follows from `y1`.
+#[derive(Debug, Clone, Copy)]
+pub struct StickEquation {
+    /// Factors of `y1''`, `y1'` and `y1`.
+    pub first: [LaneVector; 3],
+    /// What the same of `y2` would be multiplied by.
+    pub second: [LaneVector; 3],
+}
+
+impl<const K: usize> ReferenceMotion<'_, K> {
+    /// What a newton of normal force does to each link's equation; nothing presses in flight.
+    #[inline(always)]
+    pub(super) fn normal_force_arms(&self, at: &MotionSamples) -> [LaneVector; 2] {
+        let l = self.lengths();
+        if self.is_in_flight() {
+            [LaneVector::ZERO; 2]
+        } else {
+            lanes_per_link(|i| l[i] * (at.mu - at.tangent[0][i]))
+        }
+    }
+
+    /// What friction gains with the tip's speed, N s/m.
+    #[inline(always)]
+    pub(super) fn friction_per_speed(&self, at: &MotionSamples) -> LaneVector {
+        self.linkage.friction.b_s_per_m * at.falling
+    }
+
+    /// The matrices at these instants; in stick without the force that holds the tip.
+    #[must_use]
+    pub fn tangent_matrices(&self, at: &MotionSamples) -> TangentMatrices {
+        let linkage = self.linkage;
+        let (l, m, arms, m_c) = (self.lengths(), self.moments(), self.arms(), linkage.m_c);
+        let inertias = [linkage.m_theta, linkage.m_phi];
+        let [secant, secant_1, secant_2] = &at.secant;
+        let n = self.normal_force_arms(at);
+        let zero = [[LaneVector::ZERO; 3]; 3];
+        let mut out = TangentMatrices { mass: zero, damping: zero, stiffness: zero };
+        for i in 0..2 {
+            let o = 1 - i;
+            let x = m_c * at.along[o] + m[i] * at.head_acceleration - l[i] * at.friction;
+            let y = m_c * at.across[o] - m[i] * at.drop_acceleration - l[i] * at.normal;
+            let turned = at.cos[i] * y - at.sin[i] * x;
+            let carried = inertias[i] * secant[i];
+            out.mass[i][i] = carried * secant[i];
+            out.mass[i][o] = LaneVector::splat(m_c);
+            out.damping[i][i] = 2.0 * carried * secant_1[i];
+            out.stiffness[i][i] = carried * secant_2[i] + turned * secant[i] * secant[i];
+            for j in 0..2 {
+                let coupled = if i == j { -m[i] * l[j] } else { m_c - m[i] * l[j] };
+                let pushed = coupled * at.tangent[0][i] + arms[j] * n[i];
+                let held = l[j] * n[i];
+                self.add_support(&mut out, at, (i, j), pushed, held);
+            }
+        }
+        self.add_springs(&mut out, secant, secant_1);
+        match self.touch {
+            ContactMode::Slip(_) => {
+                let per_speed = self.friction_per_speed(at);
+                for i in 0..2 {
+                    for j in 0..2 {
+                        out.damping[i][j] -= (l[i] * l[j]) * per_speed;
+                    }
+                }
+            }
+            ContactMode::Stick => {}
+            ContactMode::Flight(..) => self.add_gap(&mut out, at),
+        }
+        out
+    }
+
+    /// What `S_j = t_j y_j` does in equation `i`: by its second derivative, and by the support, which its
+    /// first and itself take from the normal force.
+    #[inline(always)]
+    fn add_support(
+        &self,
+        out: &mut TangentMatrices,
+        at: &MotionSamples,
+        (i, j): (usize, usize),
+        pushed: LaneVector,
+        held: LaneVector,
+    ) {
+        let head = self.linkage.head;
+        let [t, t_1, t_2] = [at.tangent[0][j], at.tangent[1][j], at.tangent[2][j]];
+        let (by_rate, by_value) = (-head.damping * held, -head.stiffness * held);
+        out.mass[i][j] += pushed * t;
+        out.damping[i][j] += 2.0 * pushed * t_1 + by_rate * t;
+        out.stiffness[i][j] += pushed * t_2 + by_rate * t_1 + by_value * t;
+    }
+
+    /// The springs of both links, by their angles `y / cos`.
+    #[inline(always)]
+    fn add_springs(&self, out: &mut TangentMatrices, secant: &[LaneVector; 2], secant_1: &[LaneVector; 2]) {
+        let lip = self.linkage.lip;
+        let [stiffness, damping, _] = self.linkage.neck_spring(self.lean);
+        let square = |neck: f64, lip: f64| [[neck + lip, -lip], [-lip, lip]];
+        let (k, c) = (square(stiffness, lip.stiffness), square(damping, lip.damping));
+        for i in 0..2 {
+            for j in 0..2 {
+                out.damping[i][j] += c[i][j] * (secant[i] * secant[j]);
+                out.stiffness[i][j] += secant[i] * (k[i][j] * secant[j] + c[i][j] * secant_1[j]);
+            }
+        }
+    }
+
+    /// Flight: the gap lifts the head, whose own equation is the third.
+    #[inline(always)]
+    fn add_gap(&self, out: &mut TangentMatrices, at: &MotionSamples) {
+        const GAP: usize = 2;
+        let (m, l, arms, linkage) = (self.moments(), self.lengths(), self.arms(), self.linkage);
+        for i in 0..2 {
+            out.mass[i][GAP] = m[i] * at.tangent[0][i];
+            let head = linkage.head;
+            let [t, t_1, t_2] = [at.tangent[0][i], at.tangent[1][i], at.tangent[2][i]];
+            out.mass[GAP][i] = -arms[i] * t;
+            out.damping[GAP][i] = -2.0 * arms[i] * t_1 + head.damping * l[i] * t;
+            out.stiffness[GAP][i] = -arms[i] * t_2 + head.damping * l[i] * t_1 + head.stiffness * l[i] * t;
+        }
+        out.mass[GAP][GAP] = LaneVector::splat(-linkage.mass_kg);
+        out.damping[GAP][GAP] = LaneVector::splat(-linkage.head.damping);
+        out.stiffness[GAP][GAP] = LaneVector::splat(-linkage.head.stiffness);
+    }
+
+    /// The one equation of stick.
+    #[must_use]
+    pub fn stick_equation(&self, matrices: &TangentMatrices) -> StickEquation {
+        let l = self.lengths();
+        let ratio = l[0] / l[1];
+        let column = |m: &[[LaneVector; 3]; 3], j: usize| l[1] * m[0][j] - l[0] * m[1][j];
+        let all = [&matrices.mass, &matrices.damping, &matrices.stiffness];
+        let second = all.map(|m| column(m, 1));
+        let first = [0, 1, 2].map(|k| column(all[k], 0) - ratio * second[k]);
+        StickEquation { first, second }
+    }
+}

@@ -1,0 +1,219 @@
+//! Quantities of the blade by the derivatives of its angles.
+
+#![allow(clippy::needless_range_loop)] // indices are those of the equations
+
+use super::ReferenceMotion;
+use super::TangentMatrices;
+use super::forcing::ForcingTerms;
+use super::lane_vector::LaneVector;
+use super::motion_samples::{LinkAttitudes, MotionSamples};
+use crate::model::series::ContactMode;
+
+/// A quantity whose derivatives follow from those of the angles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ModelChannel {
+    /// Position of the tip along the sweep, m.
+    TipX,
+    /// Drop of the head towards the glass, m.
+    HeadDrop,
+    /// Position of the head along the sweep, m.
+    HeadX,
+    /// Height of the tip above the glass, m; zero in contact.
+    TipHeight,
+    /// Angle of the neck, rad.
+    NeckAngle,
+    /// Angle of the lip, rad.
+    LipAngle,
+    /// Angular rate of the neck, rad/s.
+    NeckRate,
+    /// Angular rate of the lip, rad/s.
+    LipRate,
+    /// Velocity of the tip along the sweep, m/s.
+    TipVelocity,
+    /// Normal force, N.
+    NormalForce,
+    /// Friction force, N.
+    FrictionForce,
+}
+
+/// A quantity's derivative as a sum: factors at a few instants.
+#[derive(Debug, Clone, Default)]
+pub struct LinearForm {
+    /// Of `y1`, `y2` and the gap.
+    pub value: [LaneVector; 3],
+    /// Of their rates.
+    pub rate: [LaneVector; 3],
+    /// Of their second derivatives; nothing once they are resolved.
+    second: [LaneVector; 3],
+    /// Of the place where the tip sticks.
+    pub place: LaneVector,
+    /// Of what a change adds.
+    pub forcing: ForcingTerms,
+}
+
+impl<const K: usize> ReferenceMotion<'_, K> {
+    /// The place of the tip, at any instants, as [`Self::channel_form`] has it.
+    #[must_use]
+    pub fn tip_position_form(&self) -> LinearForm {
+        let (mut form, l) = (LinearForm::default(), self.lengths());
+        let one = LaneVector::splat(1.0);
+        if self.touch == ContactMode::Stick {
+            form.place = one;
+        } else {
+            (form.value[0], form.value[1], form.forcing.tip[0]) =
+                (LaneVector::splat(l[0]), LaneVector::splat(l[1]), one);
+        }
+        form
+    }
+
+    /// The place of the head along the sweep, likewise.
+    #[must_use]
+    pub fn head_position_form(&self) -> LinearForm {
+        let mut form = LinearForm::default();
+        form.forcing.head = LaneVector::splat(1.0);
+        form
+    }
+
+    /// A quantity at these instants; in stick without `y2`, which follows. A force needs all of them:
+    /// [`Self::force_form`].
+    #[must_use]
+    pub fn channel_form(&self, at: &LinkAttitudes, quantity: ModelChannel) -> LinearForm {
+        let mut form = LinearForm::default();
+        let l = self.lengths();
+        let one = LaneVector::splat(1.0);
+        let gap = if self.is_in_flight() { one } else { LaneVector::ZERO };
+        let secant = |i: usize| at.cos[i].inverse();
+        match quantity {
+            ModelChannel::TipX => return self.tip_position_form(),
+            ModelChannel::TipVelocity => {
+                (form.rate[0], form.rate[1], form.forcing.tip[1]) =
+                    (LaneVector::splat(l[0]), LaneVector::splat(l[1]), one);
+            }
+            ModelChannel::HeadX => return self.head_position_form(),
+            ModelChannel::HeadDrop => {
+                for i in 0..2 {
+                    form.value[i] = l[i] * (at.sin[i] * secant(i));
+                }
+                (form.value[2], form.forcing.drop) = (-gap, one);
+            }
+            ModelChannel::TipHeight => form.value[2] = gap,
+            ModelChannel::NeckAngle => form.value[0] = secant(0),
+            ModelChannel::LipAngle => form.value[1] = secant(1),
+            ModelChannel::NeckRate | ModelChannel::LipRate => {
+                let i = usize::from(quantity == ModelChannel::LipRate);
+                let secant = secant(i);
+                form.value[i] = at.sin[i] * at.rate[i] * secant * secant;
+                form.rate[i] = secant;
+            }
+            ModelChannel::NormalForce | ModelChannel::FrictionForce => {}
+        }
+        if self.touch == ContactMode::Stick {
+            self.eliminate_lip(&mut form);
+        }
+        form
+    }
+
+    /// A force at these instants, likewise; there is none in flight.
+    #[must_use]
+    pub fn force_form(&self, at: &MotionSamples, quantity: ModelChannel) -> LinearForm {
+        let mut form = match (quantity, self.touch) {
+            (_, ContactMode::Flight(..)) => return LinearForm::default(),
+            (ModelChannel::NormalForce, _) => self.normal_force_form(at),
+            (_, ContactMode::Stick) => self.stick_friction_form(&self.tangent_matrices(at)),
+            (_, ContactMode::Slip(_)) => self.slip_friction_form(at),
+        };
+        self.eliminate_accelerations(&mut form, &self.tangent_matrices(at));
+        form
+    }
+
+    /// `dN = sum arm S'' - k0 l S - c0 l S' + ...`.
+    fn normal_force_form(&self, at: &MotionSamples) -> LinearForm {
+        let mut form = LinearForm::default();
+        let (l, arms, head) = (self.lengths(), self.arms(), self.linkage.head);
+        for j in 0..2 {
+            let [t, t_1, t_2] = [at.tangent[0][j], at.tangent[1][j], at.tangent[2][j]];
+            let (by_rate, by_value) = (-head.damping * l[j], -head.stiffness * l[j]);
+            form.second[j] = arms[j] * t;
+            form.rate[j] = (2.0 * arms[j]) * t_1 + by_rate * t;
+            form.value[j] = arms[j] * t_2 + by_rate * t_1 + by_value * t;
+        }
+        form.forcing.normal = LaneVector::splat(1.0);
+        form
+    }
+
+    /// `df = -sigma mu dN + b N E d v3' + ...`.
+    fn slip_friction_form(&self, at: &MotionSamples) -> LinearForm {
+        let mut form = self.normal_force_form(at);
+        let (l, per_speed) = (self.lengths(), self.friction_per_speed(at));
+        for j in 0..2 {
+            form.second[j] = -at.mu * form.second[j];
+            form.rate[j] = l[j] * per_speed - at.mu * form.rate[j];
+            form.value[j] = -at.mu * form.value[j];
+        }
+        (form.forcing.normal, form.forcing.force) = (-at.mu, LaneVector::splat(1.0));
+        form
+    }
+
+    /// What the neck's equation leaves for the force that holds the tip.
+    fn stick_friction_form(&self, matrices: &TangentMatrices) -> LinearForm {
+        let mut form = LinearForm::default();
+        let share = 1.0 / self.linkage.l1_m;
+        for j in 0..2 {
+            form.second[j] = share * matrices.mass[0][j];
+            form.rate[j] = share * matrices.damping[0][j];
+            form.value[j] = share * matrices.stiffness[0][j];
+        }
+        form.forcing.equations[0] = LaneVector::splat(share);
+        form
+    }
+
+    /// Puts what the equations say in place of the second derivatives.
+    fn eliminate_accelerations(&self, form: &mut LinearForm, matrices: &TangentMatrices) {
+        if self.touch == ContactMode::Stick {
+            self.eliminate_lip(form);
+            return self.eliminate_in_stick(form, matrices);
+        }
+        let [[a, b], [c, d]] = [0, 1].map(|i| [matrices.mass[i][0], matrices.mass[i][1]]);
+        let share = (a * d - b * c).inverse();
+        let [first, second] = [form.second[0], form.second[1]];
+        let by_equation = [share * (first * d - second * c), share * (second * a - first * b)];
+        for (i, factor) in by_equation.into_iter().enumerate() {
+            for j in 0..2 {
+                form.rate[j] -= factor * matrices.damping[i][j];
+                form.value[j] -= factor * matrices.stiffness[i][j];
+            }
+            form.forcing.equations[i] -= factor;
+        }
+        form.second = [LaneVector::ZERO; 3];
+    }
+
+    /// The same where the tip sticks: `y1''` follows from the one equation.
+    fn eliminate_in_stick(&self, form: &mut LinearForm, matrices: &TangentMatrices) {
+        let (single, l) = (self.stick_equation(matrices), self.lengths());
+        let factor = form.second[0] * single.first[0].inverse();
+        form.rate[0] -= factor * single.first[1];
+        form.value[0] -= factor * single.first[2];
+        let share = 1.0 / l[1];
+        form.place -= share * (factor * single.second[2]);
+        for k in 0..3 {
+            // (the second derivative comes first in the equation)
+            form.forcing.tip[k] += share * (factor * single.second[2 - k]);
+        }
+        form.forcing.equations[0] -= l[1] * factor;
+        form.forcing.equations[1] += l[0] * factor;
+        form.second = [LaneVector::ZERO; 3];
+    }
+
+    /// Puts `y2 = (place - tip - l1 y1) / l2` and its derivatives in place of `y2`.
+    fn eliminate_lip(&self, form: &mut LinearForm) {
+        let l = self.lengths();
+        let (ratio, share) = (l[0] / l[1], 1.0 / l[1]);
+        let LinearForm { value, rate, second, place, forcing: own } = form;
+        *place += share * value[1];
+        for (k, factors) in [value, rate, second].into_iter().enumerate() {
+            own.tip[k] -= share * factors[1];
+            factors[0] -= ratio * factors[1];
+            factors[1] = LaneVector::ZERO;
+        }
+    }
+}

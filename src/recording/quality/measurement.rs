@@ -1,0 +1,237 @@
+//! A recording as measured: frames, rate, gaps, exposure, and the noise and step of each column.
+
+use super::noise::{FrameGaps, noise_floor, quantisation_step};
+use crate::camera::{alias_hz, exposure_gain, half_power_hz};
+use crate::math;
+use crate::recording::{Recording, Traces};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Cycles of a component that must fit into the recording before its frequency means much.
+pub(super) const FEWEST_CYCLES: f64 = 3.0;
+/// Share of the Nyquist frequency up to which a component is well clear of its own alias.
+pub(super) const NYQUIST_SHARE: f64 = 0.8;
+
+/// A recording as measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Quality {
+    /// Frames of the grid, missing ones included.
+    pub frames: usize,
+    /// From the first to the last frame, s.
+    pub duration_s: f64,
+    /// Recording rate, 1/s.
+    pub frame_rate_hz: f64,
+    /// Half the recording rate, or half the rate of the frames tracked where only every n-th was: what is
+    /// faster appears at a wrong, lower frequency.
+    pub nyquist_hz: f64,
+    /// Frames in which tip and head do not both have an x, so that there is no deflection.
+    pub missing_deflection_frames: usize,
+    /// Runs of such frames.
+    pub gaps: usize,
+    /// Length of the longest of them, frames.
+    pub longest_gap_frames: usize,
+    /// Where it starts, s.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub longest_gap_at_s: Option<f64>,
+    /// Frequency of which the exposure passes half the power, where the exposure is known, Hz.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposure_half_power_hz: Option<f64>,
+    /// Part of an amplitude at the Nyquist frequency that the exposure passes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub exposure_passes_at_nyquist: Option<f64>,
+    /// Lip tip along the sweep.
+    pub tip_x: ChannelQuality,
+    /// Lip tip upwards.
+    pub tip_y: ChannelQuality,
+    /// Head along the sweep.
+    pub head_x: ChannelQuality,
+    /// Head upwards.
+    pub head_y: ChannelQuality,
+}
+
+/// One column as measured.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelQuality {
+    /// Frames without a value.
+    pub missing_frames: usize,
+    /// Standard deviation of the noise, m, by the scatter from frame to frame.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub noise_m: Option<f64>,
+    /// Step in which the values are written, m, where they are.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub step_m: Option<f64>,
+}
+
+/// The camera beyond its rate; empty for a trace without a `recording.toml`.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Optics {
+    /// Exposure of a frame, s.
+    pub exposure_s: Option<f64>,
+    /// Length that a pixel shows, m.
+    pub metres_per_pixel: Option<f64>,
+}
+
+/// Measures `recording`; `exposure_s` is the exposure of a frame, s, where known.
+#[must_use]
+pub fn measure_quality(recording: &Recording, exposure_s: Option<f64>) -> Quality {
+    let (grid, traces) = (recording.grid(), recording.traces());
+    let gaps = FrameGaps::count_gaps(
+        traces.tip_x_m.iter().zip(&traces.head_x_m).map(|(tip, head)| tip.is_some() && head.is_some()),
+    );
+    let nyquist_hz = grid.frame_rate_hz / (2 * gaps.stride.max(1)) as f64;
+    Quality {
+        frames: grid.frames,
+        duration_s: grid.duration_s(),
+        frame_rate_hz: grid.frame_rate_hz,
+        nyquist_hz,
+        missing_deflection_frames: gaps.missing,
+        gaps: gaps.runs,
+        longest_gap_frames: gaps.longest,
+        longest_gap_at_s: (gaps.longest > 0).then(|| grid.time_s(gaps.longest_from)),
+        exposure_half_power_hz: exposure_s.map(half_power_hz),
+        exposure_passes_at_nyquist: exposure_s.map(|exposure| exposure_gain(nyquist_hz, exposure)),
+        tip_x: measure_channel(&traces.tip_x_m),
+        tip_y: measure_channel(&traces.tip_y_m),
+        head_x: measure_channel(&traces.head_x_m),
+        head_y: measure_channel(&traces.head_y_m),
+    }
+}
+
+fn measure_channel(samples: &[Option<f64>]) -> ChannelQuality {
+    let missing_frames = samples.iter().filter(|v| v.is_none()).count();
+    ChannelQuality { missing_frames, noise_m: noise_floor(samples), step_m: quantisation_step(samples) }
+}
+
+impl Quality {
+    /// Lowest and highest frequency that the recording shows well, Hz: three cycles in it, and 0.8 of the
+    /// Nyquist frequency. Where the first is not below the second, it is too short for a spectrum.
+    #[must_use]
+    pub fn band_hz(&self) -> (f64, f64) {
+        (FEWEST_CYCLES / self.duration_s, NYQUIST_SHARE * self.nyquist_hz)
+    }
+
+    /// Exposure of a frame, s, where known.
+    pub(super) fn exposure_s(&self) -> Option<f64> {
+        self.exposure_half_power_hz.map(half_power_hz)
+    }
+
+    /// The single columns with their names.
+    pub(super) fn channels(&self) -> [(&'static str, &ChannelQuality); 4] {
+        [("tip-x", &self.tip_x), ("tip-y", &self.tip_y), ("head-x", &self.head_x), ("head-y", &self.head_y)]
+    }
+
+    /// Noise of tip and head together, m, at least what rounding to their steps adds.
+    pub(super) fn deflection_floor_m(&self) -> Option<f64> {
+        let variance = |c: &ChannelQuality| {
+            Some(math::powi(c.noise_m?, 2).max(math::powi(c.step_m.unwrap_or(0.0), 2) / 12.0))
+        };
+        Some((variance(&self.tip_x)? + variance(&self.head_x)?).sqrt())
+    }
+}
+
+/// A column with its name and what was measured on it.
+#[derive(Clone, Copy)]
+pub(super) struct MeasuredColumn<'a> {
+    pub name: &'static str,
+    pub samples: &'a [Option<f64>],
+    pub quality: &'a ChannelQuality,
+}
+
+pub(super) fn measured_columns<'a>(traces: &'a Traces, measured: &'a Quality) -> [MeasuredColumn<'a>; 4] {
+    let samples = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
+    let mut samples = samples.into_iter();
+    measured.channels().map(|(name, quality)| MeasuredColumn {
+        name,
+        samples: samples.next().map_or(&[], Vec::as_slice),
+        quality,
+    })
+}
+
+// Whether a recording can show a component of a given frequency.
+
+/// Title of the paper whose experiment found [`PUBLISHED_COMPONENTS_HZ`].
+pub const PUBLISHED_TITLE: &str = "Investigation of the dynamics of the wiper blade around the reversal";
+/// The two components of the published experiment, with their names, Hz.
+pub const PUBLISHED_COMPONENTS_HZ: [(&str, f64); 2] =
+    [("low", 78.4), ("high (printed as about 900 Hz)", 900.0)];
+/// Share of an amplitude that still counts as shown in full: a scale is rarely known better than to a tenth.
+const NEARLY_ALL: f64 = 0.9;
+
+/// What a recording makes of a component.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Visibility {
+    /// Frequency and amplitude can be read.
+    Shown,
+    /// The frequency can be read; the exposure makes the amplitude smaller.
+    Attenuated,
+    /// Above 0.8 of the Nyquist frequency: it is close to its own alias.
+    NearNyquist,
+    /// Above the Nyquist frequency: it appears at a wrong, lower frequency.
+    Aliased,
+    /// Fewer than three cycles in the recording.
+    TooFewCycles,
+}
+
+/// A component as a recording shows it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ComponentVisibility {
+    /// Frequency of the component, Hz.
+    pub frequency_hz: f64,
+    /// Whether it can be seen.
+    pub verdict: Visibility,
+    /// Frequency at which it appears, Hz; the same unless it is aliased.
+    pub appears_at_hz: f64,
+    /// Cycles of it in the whole recording.
+    pub cycles: f64,
+    /// Part of its amplitude that the exposure passes; `None` where the exposure is not known.
+    pub exposure_passes: Option<f64>,
+}
+
+impl Quality {
+    /// What the recording makes of a component of `frequency_hz`, a positive number.
+    #[must_use]
+    pub fn component_visibility(&self, frequency_hz: f64) -> ComponentVisibility {
+        let cycles = frequency_hz * self.duration_s;
+        let passes = self.exposure_s().map(|exposure| exposure_gain(frequency_hz, exposure));
+        let verdict = if frequency_hz > self.nyquist_hz {
+            Visibility::Aliased
+        } else if cycles < FEWEST_CYCLES {
+            Visibility::TooFewCycles
+        } else if frequency_hz > NYQUIST_SHARE * self.nyquist_hz {
+            Visibility::NearNyquist
+        } else if passes.is_some_and(|part| part < NEARLY_ALL) {
+            Visibility::Attenuated
+        } else {
+            Visibility::Shown
+        };
+        ComponentVisibility {
+            frequency_hz,
+            verdict,
+            appears_at_hz: alias_hz(frequency_hz, self.frame_rate_hz),
+            cycles,
+            exposure_passes: passes,
+        }
+    }
+}
+
+impl ComponentVisibility {
+    /// The verdict in words, with its numbers.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        let what = match self.verdict {
+            Visibility::Shown => "shown".to_owned(),
+            Visibility::Attenuated => "attenuated".to_owned(),
+            Visibility::NearNyquist => "close to the Nyquist frequency and to its own alias".to_owned(),
+            Visibility::Aliased => format!("aliased to {:.1} Hz", self.appears_at_hz),
+            Visibility::TooFewCycles => format!("too few cycles for a frequency ({FEWEST_CYCLES} needed)"),
+        };
+        let exposure = self.exposure_passes.map_or_else(
+            || "exposure unknown".to_owned(),
+            |part| format!("{:.1} % of the amplitude", 100.0 * part),
+        );
+        format!("{what}: {:.1} cycles, {exposure}", self.cycles)
+    }
+}

@@ -1,0 +1,334 @@
+//! Least squares of a line and a parabola through the path, each stroke at its own height.
+
+use crate::math;
+use crate::recording::Recording;
+use crate::recording::channel::ReversalInstants;
+
+/// Least share that a parabola may differ from a line, in units of the fourth power of the places' spread:
+/// below it the places hold two values and show no curvature.
+const LEAST_BEND: f64 = 1e-6;
+
+/// A line `y = height(stroke) + slope x + bend q(x)`, in which `q` is the parabola `x^2` without its part
+/// along the line, so that `slope` is that of the line alone: the mean slope of a curved path.
+pub(super) struct GlassLine {
+    pub slope: f64,
+    pub bend_per_m: f64,
+    /// Mean place, m.
+    pub centre_m: [f64; 2],
+    /// Standard deviation of the places, m.
+    pub x_sd_m: f64,
+    /// Sum of the squared places from the mean of their stroke, m^2: the variance of `slope` is that of a
+    /// height over it.
+    pub slope_information_m2: f64,
+    /// The same of the bend, m^4; zero where no curvature shows.
+    pub bend_information_m4: f64,
+    /// Which points the line is fitted through.
+    pub on_glass: Vec<bool>,
+    /// Height above the line, m, of every point; infinite in a stroke without a point on the glass.
+    pub residuals_m: Vec<f64>,
+    /// Numbers that were fitted.
+    pub fitted: usize,
+}
+
+/// A point relative to the mean of its stroke.
+struct CentredPoint {
+    x: f64,
+    x2: f64,
+    y: f64,
+}
+
+/// Sums over the points of a stroke that lie on the glass.
+#[derive(Clone, Copy, Default)]
+struct StrokeSums {
+    points: f64,
+    x: f64,
+    x2: f64,
+    y: f64,
+}
+
+impl GlassLine {
+    /// The line through the points for which `on_glass` holds; at least one.
+    pub(super) fn fit_through(path: &TipPath, on_glass: Vec<bool>) -> Self {
+        let used = || path.points.iter().zip(&on_glass).filter(|(_, on)| **on).map(|(point, _)| point);
+        let count = used().count() as f64;
+        let centre_m =
+            [used().map(|p| p.x_m).sum::<f64>() / count, used().map(|p| p.y_m).sum::<f64>() / count];
+        let means = stroke_means(path.strokes, used(), centre_m);
+        let all: Vec<CentredPoint> =
+            path.points.iter().map(|point| centre_point(point, centre_m, &means[point.stroke])).collect();
+        let fitted = || all.iter().zip(&on_glass).filter(|(_, on)| **on).map(|(point, _)| point);
+        let sum = |value: &dyn Fn(&CentredPoint) -> f64| fitted().map(value).sum::<f64>();
+        let xx = sum(&|p| p.x * p.x);
+        let along = |value: f64| if xx > 0.0 { value / xx } else { 0.0 };
+        let (slope, lean) = (along(sum(&|p| p.x * p.y)), along(sum(&|p| p.x * p.x2)));
+        let bent = |p: &CentredPoint| p.x2 - lean * p.x;
+        let qq = sum(&|p| math::powi(bent(p), 2));
+        let qq = if qq > LEAST_BEND * xx * xx / count { qq } else { 0.0 };
+        let bend_per_m = if qq > 0.0 { sum(&|p| bent(p) * p.y) / qq } else { 0.0 };
+        let spread = used().map(|p| math::powi(p.x_m - centre_m[0], 2)).sum::<f64>() / count;
+        Self {
+            slope,
+            bend_per_m,
+            centre_m,
+            x_sd_m: spread.sqrt(),
+            slope_information_m2: xx,
+            bend_information_m4: qq,
+            residuals_m: all.iter().map(|p| p.y - slope * p.x - bend_per_m * bent(p)).collect(),
+            fitted: means.iter().filter(|mean| mean.points > 0.0).count() + 2,
+            on_glass,
+        }
+    }
+}
+
+/// Means of the strokes about `centre_m`; infinite in a stroke without a point.
+fn stroke_means<'a>(
+    strokes: usize,
+    points: impl Iterator<Item = &'a TipPoint>,
+    centre_m: [f64; 2],
+) -> Vec<StrokeSums> {
+    let mut sums = vec![StrokeSums::default(); strokes];
+    for point in points {
+        let (sum, x) = (&mut sums[point.stroke], point.x_m - centre_m[0]);
+        sum.points += 1.0;
+        sum.x += x;
+        sum.x2 += x * x;
+        sum.y += point.y_m - centre_m[1];
+    }
+    for sum in &mut sums {
+        *sum = match sum.points {
+            0.0 => StrokeSums { y: f64::NEG_INFINITY, ..*sum },
+            n => StrokeSums { points: n, x: sum.x / n, x2: sum.x2 / n, y: sum.y / n },
+        };
+    }
+    sums
+}
+
+fn centre_point(point: &TipPoint, centre_m: [f64; 2], mean: &StrokeSums) -> CentredPoint {
+    let x = point.x_m - centre_m[0];
+    CentredPoint { x: x - mean.x, x2: x * x - mean.x2, y: point.y_m - centre_m[1] - mean.y }
+}
+
+// Which frames have the tip on the glass: those near the line that most frames lie on.
+
+/// Blocks of frames whose medians give the first line: enough for a steady median of slopes, few enough for
+/// all pairs.
+const SLOPE_BLOCKS: usize = 64;
+/// Least distance of two blocks whose slope counts, as a share of the travel: noise makes the slopes of
+/// nearer ones arbitrary.
+const OUTLYING_PLACES: f64 = 0.25;
+/// Standard deviations from the line within which the tip lies on the glass: 1 frame of 16,000 is lost by
+/// chance.
+const NEAR_DEVIATIONS: f64 = 4.0;
+/// Median of |x| of a standard normal variable.
+const NORMAL_MEDIAN: f64 = 0.674_489_75;
+/// Least distance that is off the glass, m: below it lies the rounding of a trace without noise.
+const LEAST_DISTANCE_M: f64 = 1e-9;
+/// Share of the travel that a place may lie beyond it: farther ones are outliers.
+const BEYOND_STEPS: f64 = 0.1;
+/// Most repetitions; the frames on the glass rarely change after five.
+const MOST_REPETITIONS: usize = 30;
+
+/// The line through the frames with the tip on the glass. The first line is the median of the slopes between
+/// blocks of frames, which a quarter of wrong blocks does not move; it is then fitted to the frames near it,
+/// until these stay the same.
+pub(super) fn fit_glass_line(path: &TipPath, travel_m: f64, step_m: f64) -> GlassLine {
+    let within = inliers_along_sweep(path);
+    let first = distances_from_line(path, median_slope(path, travel_m));
+    let mut line = GlassLine::fit_through(path, points_near_line(&first, &within, step_m));
+    for _ in 0..MOST_REPETITIONS {
+        let on_glass = points_near_line(&line.residuals_m, &within, step_m);
+        if on_glass == line.on_glass {
+            break;
+        }
+        line = GlassLine::fit_through(path, on_glass);
+    }
+    line
+}
+
+/// Which points are no outliers along the sweep.
+fn inliers_along_sweep(path: &TipPath) -> Vec<bool> {
+    let mut sorted: Vec<f64> = path.points.iter().map(|point| point.x_m).collect();
+    sorted.sort_unstable_by(f64::total_cmp);
+    let end = sorted.len() / 100;
+    let (low, high) = (sorted[end], sorted[sorted.len() - 1 - end]);
+    let beyond = BEYOND_STEPS * (high - low);
+    path.points.iter().map(|p| p.x_m >= low - beyond && p.x_m <= high + beyond).collect()
+}
+
+/// The points whose distance from the line is that of noise or of the step in which heights are written.
+fn points_near_line(distances_m: &[f64], within: &[bool], step_m: f64) -> Vec<bool> {
+    let mut sizes: Vec<f64> = distances_m.iter().map(|distance| distance.abs()).collect();
+    let scale = median_in_place(&mut sizes) / NORMAL_MEDIAN;
+    let limit = (NEAR_DEVIATIONS * scale.max(step_m)).max(LEAST_DISTANCE_M);
+    distances_m.iter().zip(within).map(|(distance, within)| *within && distance.abs() <= limit).collect()
+}
+
+/// Distance of every point from the line of a slope through the median of its stroke, m.
+fn distances_from_line(path: &TipPath, slope: f64) -> Vec<f64> {
+    path.points_by_stroke()
+        .flat_map(|stroke| {
+            let height = |point: &TipPoint| point.y_m - slope * point.x_m;
+            let middle = median_in_place(&mut stroke.iter().map(height).collect::<Vec<_>>());
+            stroke.iter().map(move |point| height(point) - middle)
+        })
+        .collect()
+}
+
+/// Median slope between blocks of one stroke that lie far enough apart (Theil 1950, Sen 1968).
+fn median_slope(path: &TipPath, travel_m: f64) -> f64 {
+    let length = path.points.len().div_ceil(SLOPE_BLOCKS);
+    let mut slopes = vec![];
+    for stroke in path.points_by_stroke() {
+        let blocks: Vec<(f64, f64)> = stroke.chunks(length).map(block_middle).collect();
+        for (i, a) in blocks.iter().enumerate() {
+            let far = blocks[..i].iter().filter(|b| (a.0 - b.0).abs() > OUTLYING_PLACES * travel_m);
+            slopes.extend(far.map(|b| (a.1 - b.1) / (a.0 - b.0)));
+        }
+    }
+    if slopes.is_empty() { 0.0 } else { median_in_place(&mut slopes) }
+}
+
+/// Median place and height of a block.
+fn block_middle(block: &[TipPoint]) -> (f64, f64) {
+    let median_of =
+        |value: fn(&TipPoint) -> f64| median_in_place(&mut block.iter().map(value).collect::<Vec<_>>());
+    (median_of(|point| point.x_m), median_of(|point| point.y_m))
+}
+
+/// Median of at least one value.
+fn median_in_place(values: &mut [f64]) -> f64 {
+    let middle = values.len() / 2;
+    *values.select_nth_unstable_by(middle, f64::total_cmp).1
+}
+
+// The path of the tip, stroke by stroke.
+
+/// Most frames looked at, every n-th of a longer recording: they give the angle far better than it matters.
+const MOST_FRAMES: usize = 100_000;
+/// Share of the places of a stroke at either end that do not count for its travel, so that outliers do not.
+const TRIMMED: f64 = 0.01;
+
+/// The tip in a frame that has both its coordinates.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TipPoint {
+    /// Its number among the frames that are looked at.
+    pub frame: usize,
+    /// Stroke that it belongs to: the number of turns before it.
+    pub stroke: usize,
+    pub x_m: f64,
+    pub y_m: f64,
+}
+
+/// The path of the tip.
+pub(super) struct TipPath {
+    /// In order of frames.
+    pub points: Vec<TipPoint>,
+    pub strokes: usize,
+}
+
+impl TipPath {
+    pub(super) fn from_recording(recording: &Recording, instants: &ReversalInstants) -> Self {
+        let (grid, traces) = (recording.grid(), recording.traces());
+        let turns_s: Vec<f64> = instants.reversals.iter().map(|turn| turn.reversal_s).collect();
+        let mut stroke = 0;
+        let apart = grid.frames.div_ceil(MOST_FRAMES).max(1);
+        let both = traces.tip_x_m.iter().zip(&traces.tip_y_m).step_by(apart).enumerate();
+        let points = both.filter_map(|(frame, (x, y))| {
+            while turns_s.get(stroke).is_some_and(|turn_s| *turn_s <= grid.time_s(apart * frame)) {
+                stroke += 1;
+            }
+            Some(TipPoint { frame, stroke, x_m: (*x)?, y_m: (*y)? })
+        });
+        Self { points: points.collect(), strokes: turns_s.len() + 1 }
+    }
+
+    /// The points for which `kept` holds.
+    pub(super) fn select_points(&self, kept: &[bool]) -> Self {
+        let points = self.points.iter().zip(kept).filter(|(_, kept)| **kept).map(|(point, _)| *point);
+        Self { points: points.collect(), strokes: self.strokes }
+    }
+
+    /// The points of each stroke that has any.
+    pub(super) fn points_by_stroke(&self) -> impl Iterator<Item = &[TipPoint]> {
+        self.points.chunk_by(|a, b| a.stroke == b.stroke)
+    }
+
+    /// Longest travel within a stroke, m, without the outermost places.
+    pub(super) fn travel_m(&self) -> f64 {
+        self.points_by_stroke().map(stroke_travel_m).fold(0.0, f64::max)
+    }
+}
+
+fn stroke_travel_m(stroke: &[TipPoint]) -> f64 {
+    let mut places: Vec<f64> = stroke.iter().map(|point| point.x_m).collect();
+    places.sort_unstable_by(f64::total_cmp);
+    let trimmed = (TRIMMED * places.len() as f64) as usize;
+    match (places.get(trimmed), places.get(places.len().saturating_sub(1 + trimmed))) {
+        (Some(low), Some(high)) => high - low,
+        _ => 0.0,
+    }
+}
+
+// How far correlated errors let a fitted line stray.
+
+/// Most values whose correlation is looked at: longer recordings are averaged in groups of frames, which
+/// leaves the slow errors that matter for a slope.
+const MOST_VALUES: usize = 20_000;
+/// Lags that the sum of correlations reaches over, in units of that sum: five correlation times (Sokal 1997).
+/// What lies beyond is noise of the estimate.
+const WINDOW: f64 = 2.5;
+/// Least share of the variance of errors that a fit leaves in the residuals; below it their correlation
+/// reaches over the whole recording.
+const LEAST_LEFT: f64 = 0.1;
+
+/// Variance of the heights about the line as a slow line sees it, m^2: that of a frame times the number of
+/// frames over which errors are alike. A sum of `n` errors has `n` times this variance.
+pub(super) fn long_run_variance(path: &TipPath, line: &GlassLine) -> f64 {
+    let group = path.points.len().div_ceil(MOST_VALUES);
+    let values = group_averages(path, line, group);
+    let present = values.iter().flatten().count() as f64;
+    let variance = values.iter().flatten().map(|v| v * v).sum::<f64>() / present;
+    if variance <= 0.0 {
+        return 0.0;
+    }
+    let (alike, lags) = correlated_values(&values, variance);
+    // every fitted number takes its share of each covariance
+    let taken = line.fitted as f64 * (1 + 2 * lags) as f64 / present;
+    group as f64 * variance * alike / (1.0 - taken).max(LEAST_LEFT)
+}
+
+/// Residuals of the frames on the glass, averaged over groups of frames; `None` where a group has none.
+fn group_averages(path: &TipPath, line: &GlassLine, group: usize) -> Vec<Option<f64>> {
+    let first = path.points.first().map_or(0, |point| point.frame);
+    let last = path.points.last().map_or(0, |point| point.frame);
+    let mut sums = vec![(0.0, 0_usize); (last - first) / group + 1];
+    for ((point, residual), on) in path.points.iter().zip(&line.residuals_m).zip(&line.on_glass) {
+        if *on {
+            let (sum, count) = &mut sums[(point.frame - first) / group];
+            *sum += residual;
+            *count += 1;
+        }
+    }
+    sums.into_iter().map(|(sum, count)| (count > 0).then(|| sum / count as f64)).collect()
+}
+
+/// Number of values over which errors are alike, at least 1: one and twice the sum of the correlations; and
+/// the lags of that sum, [`WINDOW`] times as many.
+fn correlated_values(values: &[Option<f64>], variance: f64) -> (f64, usize) {
+    let (mut alike, mut lags) = (1.0, 0);
+    for lag in 1..values.len() / 2 {
+        alike += 2.0 * lag_covariance(values, lag) / variance;
+        lags = lag;
+        if lag as f64 >= WINDOW * alike {
+            break;
+        }
+    }
+    (alike.max(1.0), lags)
+}
+
+/// Mean product of the values a lag apart; zero where there is no such pair.
+fn lag_covariance(values: &[Option<f64>], lag: usize) -> f64 {
+    let products = values.iter().zip(&values[lag..]).filter_map(|(a, b)| Some((*a)? * (*b)?));
+    let (sum, pairs) = products.fold((0.0, 0_usize), |(sum, pairs), product| (sum + product, pairs + 1));
+    if pairs == 0 { 0.0 } else { sum / pairs as f64 }
+}

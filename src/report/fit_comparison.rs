@@ -1,0 +1,263 @@
+//! Several fits side by side: what each meets, where their parameters agree and where they do not.
+
+mod intervals;
+mod page;
+mod spectra;
+mod verdict;
+
+use super::Report;
+use super::json::{FORMAT, FigureEntry, ReportDocument};
+use super::rich_text::Statement;
+use super::verdict::ReportVerdict;
+use crate::compare::{FittedRecording, ModelRun, ParameterLine};
+use crate::figures::FigureBlock;
+use crate::fit::job::Job;
+use crate::fit::uncertainty::ParameterVerdict;
+use crate::text;
+pub use page::render_page;
+use serde::Serialize;
+
+/// Compares fits, in the order given.
+#[must_use]
+pub fn compare_fits(fits: &[ComparisonInput]) -> FitComparison {
+    let entry = |fit: &ComparisonInput| ComparedFit {
+        name: fit.name.to_owned(),
+        report: Report { figures: Vec::new(), ..fit.report.clone() },
+        verdict: ReportVerdict::from_report(fit.report),
+    };
+    let entries: Vec<ComparedFit> = fits.iter().map(entry).collect();
+    let parameters = shared_parameters(&entries);
+    let names: Vec<String> = fits.iter().map(|fit| fit.name.to_owned()).collect();
+    FitComparison {
+        title: format!("Comparison of {}", text::join_with_and(&names)),
+        figures: intervals::interval_figures(&entries, &parameters)
+            .into_iter()
+            .chain(spectra::spectra_figures(fits))
+            .collect(),
+        statements: verdict::comparison_statements(&entries, &parameters),
+        fits: entries,
+        parameters,
+    }
+}
+
+/// The comparison as JSON, with the verdict of the page and without the drawings.
+///
+/// # Errors
+/// None in practice: every field can be written (a value that is no number becomes `null`).
+pub fn comparison_json(several: &FitComparison) -> Result<String, serde_json::Error> {
+    #[derive(Serialize)]
+    struct ComparedFitDocument<'a> {
+        name: &'a str,
+        #[serde(flatten)]
+        written: ReportDocument<'a>,
+    }
+    #[derive(Serialize)]
+    struct FitComparisonFile<'a> {
+        format: u32,
+        title: &'a str,
+        every_model_explains_recording: bool,
+        all_components_met: bool,
+        all_parameters_identified: bool,
+        summary: Vec<String>,
+        statements: &'a [Statement],
+        parameters: &'a [SharedParameter],
+        fits: Vec<ComparedFitDocument<'a>>,
+        figures: Vec<FigureEntry<'a>>,
+    }
+    let file = FitComparisonFile {
+        format: FORMAT,
+        title: &several.title,
+        every_model_explains_recording: (several.fits.iter()).all(|fit| fit.verdict.model_explains_recording),
+        all_components_met: several.all_components_met(),
+        all_parameters_identified: several.fits.iter().all(|fit| fit.verdict.all_parameters_identified),
+        summary: several.summary(),
+        statements: &several.statements,
+        parameters: &several.parameters,
+        fits: several
+            .fits
+            .iter()
+            .map(|fit| ComparedFitDocument {
+                name: &fit.name,
+                written: ReportDocument::new(&fit.report, &fit.verdict),
+            })
+            .collect(),
+        figures: several
+            .figures
+            .iter()
+            .map(|f| FigureEntry { file: &f.file, caption: &f.caption, details: &f.details, subject: None })
+            .collect(),
+    };
+    serde_json::to_string_pretty(&file).map(|text| text + "\n")
+}
+
+// The fits that are compared, and what the comparison holds.
+
+/// A fit with everything that it is compared by.
+#[derive(Debug, Clone, Copy)]
+pub struct ComparisonInput<'a> {
+    /// Name of its folder.
+    pub name: &'a str,
+    /// What its own report says.
+    pub report: &'a Report,
+    /// Its job.
+    pub job: &'a Job,
+    /// Its recordings: those of the first conditions.
+    pub measured: &'a [FittedRecording<'a>],
+    /// Its best model, condition by condition.
+    pub best: &'a [ModelRun],
+}
+
+/// A comparison of fits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FitComparison {
+    /// Heading.
+    pub title: String,
+    /// The fits, without figures of their own.
+    pub fits: Vec<ComparedFit>,
+    /// Every parameter of any of them.
+    pub parameters: Vec<SharedParameter>,
+    /// Figures in the order of the page.
+    pub figures: Vec<FigureBlock>,
+    /// What the comparison says, in words.
+    pub statements: Vec<Statement>,
+}
+
+/// A fit of a comparison.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComparedFit {
+    /// Name of its folder.
+    pub name: String,
+    /// What its own report says.
+    pub report: Report,
+    /// The verdict on it.
+    pub verdict: ReportVerdict,
+}
+
+impl FitComparison {
+    /// The statements as lines of text.
+    #[must_use]
+    pub fn summary(&self) -> Vec<String> {
+        self.statements.iter().map(Statement::plain_text).collect()
+    }
+
+    /// Whether every component is met in every fit.
+    #[must_use]
+    pub fn all_components_met(&self) -> bool {
+        self.fits.iter().all(|fit| fit.verdict.all_components_met)
+    }
+
+    /// Whether every model explains its traces and meets every component.
+    #[must_use]
+    pub fn passes(&self) -> bool {
+        self.fits.iter().all(|fit| fit.verdict.passes())
+    }
+}
+
+/// A name that fits over a panel or into a legend.
+pub(super) fn shorten_name(name: &str) -> String {
+    /// Letters that a legend of one column of a journal takes.
+    const MOST: usize = 24;
+    text::truncate_text(name, MOST)
+}
+
+// Parameters of several fits side by side, and whether their intervals overlap.
+
+/// A parameter and what each fit knows of it.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct SharedParameter {
+    /// Name as in a scene.
+    pub name: String,
+    /// Symbol in the equations.
+    pub symbol: String,
+    /// Unit; empty for a plain number.
+    pub unit: String,
+    /// What each fit knows, in the order of the fits; `None` where it is not free there.
+    pub lines: Vec<Option<ParameterLine>>,
+    /// Every pair of fits that have it.
+    pub pairs: Vec<IntervalPair>,
+}
+
+/// Two fits and one parameter.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct IntervalPair {
+    /// Names of the fits.
+    pub fits: [String; 2],
+    /// How their 95 % intervals lie.
+    pub relation: IntervalRelation,
+}
+
+/// How two 95 % intervals lie.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum IntervalRelation {
+    /// They have no value in common.
+    Disjoint,
+    /// They have values in common, which does not show that the parameters are equal.
+    Overlap,
+    /// The interval of one of them does not say what the data know: it is not identified, or at a bound.
+    NotComparable,
+}
+
+impl IntervalRelation {
+    /// In words.
+    pub(super) fn describe(self) -> &'static str {
+        match self {
+            Self::Disjoint => "do not overlap",
+            Self::Overlap => "overlap",
+            Self::NotComparable => "cannot be compared",
+        }
+    }
+}
+
+/// Verdicts whose interval is one of the data: an open end reaches beyond every value.
+const COMPARABLE_VERDICTS: [ParameterVerdict; 3] =
+    [ParameterVerdict::Identified, ParameterVerdict::OpenBelow, ParameterVerdict::OpenAbove];
+
+/// How the intervals of two estimates lie.
+pub(super) fn interval_relation(a: &ParameterLine, b: &ParameterLine) -> IntervalRelation {
+    let comparable = |p: &ParameterLine| COMPARABLE_VERDICTS.contains(&p.verdict);
+    let below = |a: &ParameterLine, b: &ParameterLine| {
+        a.upper_95.zip(b.lower_95).is_some_and(|(upper, lower)| upper < lower)
+    };
+    match comparable(a) && comparable(b) {
+        false => IntervalRelation::NotComparable,
+        true if below(a, b) || below(b, a) => IntervalRelation::Disjoint,
+        true => IntervalRelation::Overlap,
+    }
+}
+
+/// Every parameter of any fit, in the order in which they appear.
+pub(super) fn shared_parameters(entries: &[ComparedFit]) -> Vec<SharedParameter> {
+    let mut named: Vec<&ParameterLine> = Vec::new();
+    for line in entries.iter().flat_map(|entry| &entry.report.parameters) {
+        if !named.iter().any(|known| known.name == line.name) {
+            named.push(line);
+        }
+    }
+    named.into_iter().map(|of| shared_parameter(of, entries)).collect()
+}
+
+fn shared_parameter(of: &ParameterLine, entries: &[ComparedFit]) -> SharedParameter {
+    let lines: Vec<Option<ParameterLine>> = entries
+        .iter()
+        .map(|entry| entry.report.parameters.iter().find(|p| p.name == of.name).cloned())
+        .collect();
+    let having: Vec<(&str, &ParameterLine)> = entries
+        .iter()
+        .zip(&lines)
+        .filter_map(|(entry, line)| Some((entry.name.as_str(), line.as_ref()?)))
+        .collect();
+    let pair = |(i, (name, a)): (usize, &(&str, &ParameterLine))| {
+        let (name, a) = ((*name).to_owned(), (*a).clone());
+        let with = |(other, b): &(&str, &ParameterLine)| IntervalPair {
+            fits: [name.clone(), (*other).to_owned()],
+            relation: interval_relation(&a, b),
+        };
+        having.iter().skip(i + 1).map(with).collect::<Vec<_>>()
+    };
+    let pairs = having.iter().enumerate().flat_map(pair).collect();
+    SharedParameter { name: of.name.clone(), symbol: of.symbol.clone(), unit: of.unit.clone(), lines, pairs }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,193 @@
+//! Estimates with their 95 % intervals: a panel for each parameter that at least two fits have, a row for
+//! each of them.
+
+use super::{ComparedFit, shorten_name};
+use super::{IntervalRelation, SharedParameter};
+use crate::chart::{
+    ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, MAX_HEIGHT_MM, Mark, MarkerShape, Medium, Panel,
+    Series,
+};
+use crate::compare::ParameterLine;
+use crate::figures::{Drawing, FigureBlock};
+use crate::math;
+use crate::text::{format_interval, format_number};
+
+const ROW_MM: f64 = 5.5;
+const LEAST_HEIGHT_MM: f64 = 16.0;
+/// Room beyond the farthest finite end, as a share of what the ends span.
+const ROOM: f64 = 0.12;
+/// The same as a share of the value, where there is but one end.
+const ALONE: f64 = 0.1;
+/// From this ratio of the largest to the smallest end on the axis is logarithmic.
+const WIDE: f64 = 30.0;
+
+/// The figures, none where no parameter is shared: as few as have room in a column of a journal, with rows as
+/// high as their letters.
+pub(super) fn interval_figures(entries: &[ComparedFit], parameters: &[SharedParameter]) -> Vec<FigureBlock> {
+    let shared: Vec<&SharedParameter> = parameters.iter().filter(|p| !p.pairs.is_empty()).collect();
+    let fits = |figures: &Vec<Figure>| {
+        figures.iter().all(|figure| figure.height_mm(Medium::Column) <= MAX_HEIGHT_MM)
+    };
+    let parted = |parts: usize| shared.chunks(shared.len().div_ceil(parts));
+    let drawn = |parts: usize| parted(parts).map(|part| draw_figure(entries, part)).collect::<Vec<Figure>>();
+    // a figure that one parameter alone makes too high stays so
+    let Some(parts) = (1..=shared.len()).find(|parts| fits(&drawn(*parts)) || *parts == shared.len()) else {
+        return Vec::new();
+    };
+    let block = |(i, (figure, part)): (usize, (Figure, &[&SharedParameter]))| FigureBlock {
+        condition: None,
+        file: if parts == 1 { "parameters.svg".to_owned() } else { format!("parameters-{}.svg", i + 1) },
+        caption: figure_caption(part),
+        details: figure_details(part),
+        drawing: Drawing::Chart(figure),
+    };
+    drawn(parts).into_iter().zip(parted(parts)).enumerate().map(block).collect()
+}
+
+fn draw_figure(entries: &[ComparedFit], parameters: &[&SharedParameter]) -> Figure {
+    Figure {
+        title: claim_sentence(parameters),
+        subtitle: describe_sources(entries),
+        watermarked: entries.iter().any(|e| e.verdict.synthetic),
+        description:
+            "A panel a parameter, a row a fit: estimate and 95 % interval; an open end reaches the frame."
+                .to_owned(),
+        width_mm: FULL_WIDTH_MM,
+        columns: 2,
+        panels: parameters.iter().map(|p| draw_panel(entries, p)).collect(),
+    }
+}
+
+/// What the estimates rest on, where that is not a film.
+fn describe_sources(entries: &[ComparedFit]) -> String {
+    let names = |is: fn(&&ComparedFit) -> bool| {
+        entries.iter().filter(is).map(|e| shorten_name(&e.name)).collect::<Vec<_>>().join(", ")
+    };
+    let named = |(what, names): (&str, String)| (!names.is_empty()).then(|| format!("{what}: {names}"));
+    let kinds = [
+        ("synthetic recording", names(|e| e.verdict.synthetic)),
+        ("published numbers alone", names(|e| e.verdict.published_only)),
+    ];
+    kinds.into_iter().filter_map(named).collect::<Vec<_>>().join("; ")
+}
+
+/// How many pairs of intervals can be compared, and how many of them do not overlap.
+fn count_pairs(parameters: &[&SharedParameter]) -> (usize, usize) {
+    let pairs = || parameters.iter().flat_map(|p| p.pairs.iter().map(|pair| pair.relation));
+    (
+        pairs().filter(|r| *r != IntervalRelation::NotComparable).count(),
+        pairs().filter(|r| *r == IntervalRelation::Disjoint).count(),
+    )
+}
+
+/// The claim with its number.
+fn claim_sentence(parameters: &[&SharedParameter]) -> String {
+    match count_pairs(parameters) {
+        (0, _) => "No two of the 95 % intervals can be compared".to_owned(),
+        (all, apart) => format!("{} of {all} comparable pairs of 95 % intervals overlap", all - apart),
+    }
+}
+
+fn figure_caption(parameters: &[&SharedParameter]) -> String {
+    let (comparable, apart) = count_pairs(parameters);
+    let overlaps = match comparable {
+        0 => "no two of the intervals can be compared".to_owned(),
+        _ => format!("{apart} of {comparable} pairs of intervals that can be compared do not overlap"),
+    };
+    format!("Estimates and 95 % intervals of the parameters that at least two of the fits share: {overlaps}.")
+}
+
+fn figure_details(parameters: &[&SharedParameter]) -> String {
+    let lines = || parameters.iter().flat_map(|p| p.lines.iter().flatten());
+    let (known, all) = (lines().filter(|p| p.is_identified()).count(), lines().count());
+    let truth =
+        if lines().any(|p| p.truth.is_some()) { " Crosses: the values behind synthetic data." } else { "" };
+    format!(
+        "Filled: identified ({known} of {all}); hollow: not identified, or only a limit is known. A bar that \
+         reaches the frame is open there. For a parameter that is not identified the bar shows where equally \
+         good fits lie.{truth}"
+    )
+}
+
+/// Looks of an estimate: label, colour, mark, and whether it is of an identified parameter.
+const LOOKS: [(&str, Colour, Mark, bool); 2] = [
+    ("identified", Colour::Blue, Mark::Joined(MarkerShape::Disc), true),
+    ("not identified, or a limit", Colour::Vermilion, Mark::Hollow(MarkerShape::Diamond), false),
+];
+
+fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
+    // the first fit stands at the top, and an axis counts from the bottom
+    let having: Vec<(&ComparedFit, &ParameterLine)> = entries
+        .iter()
+        .zip(&parameter.lines)
+        .rev()
+        .filter_map(|(entry, line)| Some((entry, line.as_ref()?)))
+        .collect();
+    let (log, low, high) = axis_range(&having);
+    let label =
+        if parameter.symbol.is_empty() { shorten_name(&parameter.name) } else { parameter.symbol.clone() };
+    let label = if parameter.unit.is_empty() { label } else { format!("{label}, {}", parameter.unit) };
+    let x = if log { ChartAxis::log(label) } else { ChartAxis::linear(label) };
+    let series = |(label, colour, mark, identified): &(&str, Colour, Mark, bool)| -> Vec<Series> {
+        let of = having.iter().enumerate().filter(|(_, (_, line))| line.is_identified() == *identified);
+        // a series each: the symbols of one would be joined
+        of.map(|(row, (_, line))| Series {
+            label: (*label).to_owned(),
+            colour: *colour,
+            mark: *mark,
+            points: vec![Some((line.estimate, row as f64))],
+            error_bars: vec![interval_bar(line, row as f64, (log, low, high))],
+        })
+        .collect()
+    };
+    let truths: Vec<_> = having
+        .iter()
+        .enumerate()
+        .filter_map(|(row, (_, line))| Some(Some((line.truth?.value, row as f64))))
+        .collect();
+    let truth = Series {
+        label: "truth (synthetic)".to_owned(),
+        colour: Colour::Black,
+        mark: Mark::Crosses,
+        points: truths,
+        ..Series::default()
+    };
+    Panel {
+        title: parameter.name.clone(),
+        x: x.with_range(low, high),
+        y: ChartAxis::categorical("", having.iter().map(|(entry, _)| entry.name.clone())),
+        height_mm: (having.len() as f64 * ROW_MM).max(LEAST_HEIGHT_MM),
+        series: LOOKS.iter().flat_map(series).chain(Some(truth).filter(|t| !t.points.is_empty())).collect(),
+        ..Panel::default()
+    }
+}
+
+/// The 95 % interval; an open end lies beyond the frame, which cuts it without a cap.
+fn interval_bar(line: &ParameterLine, y: f64, (log, low, high): (bool, f64, f64)) -> ErrorBar {
+    let beyond = if log { (low / 10.0, high * 10.0) } else { (2.0 * low - high, 2.0 * high - low) };
+    ErrorBar::Horizontal { y, from: line.lower_95.unwrap_or(beyond.0), to: line.upper_95.unwrap_or(beyond.1) }
+}
+
+/// Whether the axis is logarithmic, and its ends: a little beyond every finite end, estimate and truth.
+fn axis_range(having: &[(&ComparedFit, &ParameterLine)]) -> (bool, f64, f64) {
+    let ends =
+        having.iter().flat_map(|(_, p)| [Some(p.estimate), p.lower_95, p.upper_95, p.truth.map(|t| t.value)]);
+    let (low, high) = ends
+        .flatten()
+        .filter(|x| x.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h): (f64, f64), x| (l.min(x), h.max(x)));
+    if low > high {
+        return (false, 0.0, 1.0);
+    }
+    if low > 0.0 && high / low > WIDE {
+        let room = math::powf(high / low, ROOM);
+        return (true, low / room, high * room);
+    }
+    let room = if high > low { ROOM * (high - low) } else { (ALONE * high.abs()).max(f64::MIN_POSITIVE) };
+    (false, low - room, high + room)
+}
+
+/// An estimate with its unit and interval, for the tables next to the figure.
+pub(super) fn estimate_text(line: &ParameterLine) -> [String; 2] {
+    [format_number(line.estimate), format_interval(line.lower_95, line.upper_95, format_number)]
+}

@@ -1,0 +1,208 @@
+//! The page of a comparison of fits.
+
+use super::SharedParameter;
+use super::intervals::estimate_text;
+use super::{ComparedFit, FitComparison};
+use crate::compare::{Comparison, ParameterLine};
+use crate::report::page::html::{
+    CellStyle, HtmlCell, HtmlTable, PageSection, breakable_key, escape_text, figures_html, isolate_name,
+    reading_hint, render_document, sentence_list, statements_html,
+};
+use crate::report::page::{agreement, data_banner, provenance_html};
+use crate::text::{DASH, format_number, format_or_dash};
+
+/// The page; the same comparison always gives the same bytes.
+#[must_use]
+pub fn render_page(several: &FitComparison) -> String {
+    let section = |id, heading, html: String| PageSection { id, heading, html, folded: false };
+    let sections = [
+        section(
+            "verdict",
+            "Verdict",
+            format!("<div class=\"verdict\">\n{}</div>\n", statements_html(&several.statements)),
+        ),
+        section("fits", "Fits", fits_table(&several.fits)),
+        section("parameters", "Parameters", parameters_table(several)),
+        section("figures", "Figures", figures_html(&several.figures, 0, true)),
+        section(
+            "components",
+            "Components",
+            agreement::fits_table(
+                "Components: target against model, by fit",
+                &merge_comparisons(several, |e| &e.report.components),
+            ),
+        ),
+        section(
+            "features",
+            "Features",
+            agreement::fits_table(
+                "Features: target against model, by fit",
+                &merge_comparisons(several, |e| &e.report.features),
+            ),
+        ),
+        section(
+            "held-out",
+            "Held-out predictions",
+            agreement::fits_table(
+                "Held-out values, by fit",
+                &merge_comparisons(several, |e| &e.report.held_out),
+            ),
+        ),
+        section("reservations", "Reservations", section_per_fit(several, |e| sentence_list(&e.report.notes))),
+        section(
+            "provenance",
+            "Provenance",
+            section_per_fit(several, |e| provenance_html(&e.report.provenance)),
+        ),
+    ];
+    render_document(&several.title, &several.fits.iter().map(data_lead).collect::<String>(), &sections)
+}
+
+/// What the data of a fit are, with its name.
+fn data_lead(entry: &ComparedFit) -> String {
+    data_banner(&entry.report).replacen(
+        "role=\"note\">",
+        &format!("role=\"note\">{}: ", isolate_name(&entry.name)),
+        1,
+    )
+}
+
+/// The fits in a table.
+fn fits_table(entries: &[ComparedFit]) -> String {
+    let row = |e: &ComparedFit| -> Vec<HtmlCell> {
+        let share = |met: usize, of: usize| {
+            (format!("{met} of {of}"), if met == of { CellStyle::Good } else { CellStyle::Bad })
+        };
+        let of = |list: &[Comparison]| share(list.iter().filter(|c| c.pass).count(), list.len());
+        let known = e.report.parameters.iter().filter(|p| p.is_identified()).count();
+        let data: Vec<String> = e
+            .report
+            .recordings
+            .iter()
+            .map(|r| format!("{}{}", isolate_name(&r.name), if r.synthetic { " (synthetic)" } else { "" }))
+            .collect();
+        let data = if data.is_empty() { "published numbers".to_owned() } else { data.join(", ") };
+        let status = (
+            format_or_dash(e.report.search.status, |status| escape_text(status.name())),
+            if e.verdict.search_converged { CellStyle::Good } else { CellStyle::Bad },
+        );
+        let title = (isolate_name(&e.report.title), CellStyle::Prose);
+        vec![
+            (isolate_name(&e.name), CellStyle::Words),
+            title,
+            (data, CellStyle::Words),
+            of(&e.report.components),
+            of(&e.report.features),
+            share(known, e.report.parameters.len()),
+            status,
+        ]
+    };
+    let head = [
+        ("fit", CellStyle::Words),
+        ("title", CellStyle::Prose),
+        ("data", CellStyle::Words),
+        ("components met", CellStyle::Words),
+        ("features met", CellStyle::Words),
+    ];
+    let head =
+        [&head[..], &[("parameters determined", CellStyle::Words), ("search", CellStyle::Words)]].concat();
+    HtmlTable {
+        caption: "The fits",
+        head: HtmlTable::column_heads(&head),
+        rows: entries.iter().map(row).collect(),
+    }
+    .render()
+}
+
+/// Estimates side by side.
+fn parameters_table(several: &FitComparison) -> String {
+    let cell = |line: &Option<ParameterLine>| -> HtmlCell {
+        let Some(line) = line else { return ("not free".to_owned(), CellStyle::Words) };
+        let [estimate, interval] = estimate_text(line);
+        let place = |inside: bool| if inside { " inside" } else { " outside" };
+        let placed = |inside| if line.is_bounded() { place(inside) } else { "" };
+        let truth = line.truth.map_or_else(String::new, |t| {
+            format!("<br>truth {}{}", format_number(t.value), placed(t.inside_95))
+        });
+        let class = if line.is_identified() { "good" } else { "bad" };
+        (
+            format!(
+                "{estimate}<br>{interval}<br><span class=\"{class}\">{}</span>{truth}",
+                escape_text(line.verdict.name())
+            ),
+            CellStyle::Words,
+        )
+    };
+    let pairs = |p: &SharedParameter| -> HtmlCell {
+        let said: Vec<String> = p
+            .pairs
+            .iter()
+            .map(|pair| {
+                format!(
+                    "{} and {} {}",
+                    isolate_name(&pair.fits[0]),
+                    isolate_name(&pair.fits[1]),
+                    pair.relation.describe()
+                )
+            })
+            .collect();
+        (if said.is_empty() { DASH.to_owned() } else { said.join("<br>") }, CellStyle::Prose)
+    };
+    let row = |p: &SharedParameter| -> Vec<HtmlCell> {
+        let named = [
+            (breakable_key(&p.name), CellStyle::Words),
+            (escape_text(&p.symbol), CellStyle::Words),
+            (escape_text(&p.unit), CellStyle::Words),
+        ];
+        named.into_iter().chain(p.lines.iter().map(cell)).chain([pairs(p)]).collect()
+    };
+    if several.parameters.is_empty() {
+        return String::new();
+    }
+    let head = [("parameter", CellStyle::Words), ("symbol", CellStyle::Words), ("unit", CellStyle::Words)];
+    let fits = several.fits.iter().map(|fit| (isolate_name(&fit.name), CellStyle::Words));
+    let head = HtmlTable::column_heads(&head)
+        .into_iter()
+        .chain(fits)
+        .chain([("95 % intervals".to_owned(), CellStyle::Prose)])
+        .collect();
+    let words = "Estimate, 95 % interval and verdict of each fit. Intervals that do not overlap differ by \
+                 more than their own uncertainty; that they overlap does not show \
+                 that the values are equal. A parameter that is not identified, or lies at a bound, is not \
+                 compared.";
+    reading_hint(words)
+        + &HtmlTable {
+            caption: "Parameters, by fit",
+            head,
+            rows: several.parameters.iter().map(row).collect(),
+        }
+        .render()
+}
+
+/// Lines of all fits, those of the same name together, each with the name of its fit.
+fn merge_comparisons(
+    several: &FitComparison,
+    of: impl Fn(&ComparedFit) -> &Vec<Comparison>,
+) -> Vec<Comparison> {
+    let mut lines: Vec<Comparison> = Vec::new();
+    for entry in &several.fits {
+        for line in of(entry) {
+            let condition = line
+                .condition
+                .as_ref()
+                .map_or_else(|| entry.name.clone(), |condition| format!("{}: {condition}", entry.name));
+            let at = lines.iter().rposition(|l| l.name == line.name).map_or(lines.len(), |at| at + 1);
+            lines.insert(at, Comparison { condition: Some(condition), ..line.clone() });
+        }
+    }
+    lines
+}
+
+/// Something of every fit, under its name.
+fn section_per_fit(several: &FitComparison, of: impl Fn(&ComparedFit) -> String) -> String {
+    several
+        .fits
+        .iter()
+        .map(|entry| format!("<h3>{}</h3>\n{}", isolate_name(&entry.name), of(entry)))
+        .collect()
+}

@@ -1,0 +1,329 @@
+//! Spectra of several fits: those of a channel in windows that begin and end at the same instants, over each
+//! other or in a panel each.
+
+use super::{ComparisonInput, shorten_name};
+use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, VerticalLine};
+use crate::feature::{FeatureBand, Reading};
+use crate::figures::{Drawing, FigureBlock, NO_TRACES, subtitle};
+use crate::fit::job::FitTarget;
+use crate::recording::Recording;
+use crate::recording::channel::{Channel, InstantKind, ReversalInstants, WindowEnd};
+use crate::spectrum;
+use crate::spectrum::{Spectrum, SpectrumSettings};
+use crate::text::{format_digits, format_trimmed, join_with_and};
+
+const MICROMETRES: f64 = 1e6;
+
+/// What stands under the heading where recordings of both kinds are drawn.
+const MIXED: &str = "some recordings are synthetic: no camera took those marked so";
+
+/// What the windows of a group have in common: the channel, at which instants they begin and end, and which
+/// one of its fit each is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct WindowKind {
+    channel: Channel,
+    ends: [Option<InstantKind>; 2],
+    number: usize,
+}
+
+/// The component of a fit in a group.
+struct SpectrumGroupMember<'a> {
+    fitted: &'a ComparisonInput<'a>,
+    aim: &'a FitTarget,
+    band: &'a FeatureBand,
+    kind: WindowKind,
+}
+
+/// A figure for every kind of window that at least two fits have.
+pub(super) fn spectra_figures(fits: &[ComparisonInput]) -> Vec<FigureBlock> {
+    let members: Vec<SpectrumGroupMember> = fits.iter().flat_map(group_members).collect();
+    let mut kinds: Vec<WindowKind> = Vec::new();
+    for member in &members {
+        if !kinds.contains(&member.kind) {
+            kinds.push(member.kind);
+        }
+    }
+    let groups = kinds.into_iter().map(|kind| members.iter().filter(|m| m.kind == kind).collect::<Vec<_>>());
+    groups
+        .filter(|group| group.len() > 1)
+        .filter_map(|group| draw_figure(&group))
+        .enumerate()
+        .map(|(i, f)| figure_block(i, f))
+        .collect()
+}
+
+fn figure_block(index: usize, (figure, caption, details): (Figure, String, String)) -> FigureBlock {
+    FigureBlock {
+        condition: None,
+        file: format!("spectra-{}.svg", index + 1),
+        caption,
+        details,
+        drawing: Drawing::Chart(figure),
+    }
+}
+
+/// The components of a fit; several windows of a kind are distinguished by their order.
+fn group_members<'a>(fitted: &'a ComparisonInput<'a>) -> Vec<SpectrumGroupMember<'a>> {
+    let anchor = |end: WindowEnd| if let WindowEnd::Found { anchor, .. } = end { Some(anchor) } else { None };
+    let mut found: Vec<SpectrumGroupMember> = Vec::new();
+    for aim in &fitted.job.targets {
+        let Reading::Frequency(band) = &aim.feature.reading else { continue };
+        let kind = WindowKind {
+            channel: band.channel,
+            ends: [anchor(band.window.from), anchor(band.window.to)],
+            number: 0,
+        };
+        let number = found.iter().filter(|m| m.kind == WindowKind { number: m.kind.number, ..kind }).count();
+        found.push(SpectrumGroupMember { fitted, aim, band, kind: WindowKind { number, ..kind } });
+    }
+    found
+}
+
+fn window_spectrum(band: &FeatureBand, recording: &Recording) -> Option<Spectrum> {
+    let frames = band.window.resolve_frames(recording, &ReversalInstants::find_instants(recording)).ok()?;
+    let samples = band.channel.samples(recording);
+    spectrum::analyse_spectrum(
+        samples.get(frames)?,
+        recording.grid().frame_rate_hz,
+        &SpectrumSettings { detrend: Some(band.detrend), ..SpectrumSettings::default() },
+    )
+    .ok()
+}
+
+/// Amplitude, um, over frequency, Hz.
+type SpectrumPoints = Vec<Option<(f64, f64)>>;
+
+fn spectrum_points(spectrum: &Spectrum) -> SpectrumPoints {
+    spectrum
+        .frequency_hz
+        .iter()
+        .zip(&spectrum.amplitude_m)
+        .map(|(f, a)| Some((*f, a * MICROMETRES)))
+        .collect()
+}
+
+impl<'a> SpectrumGroupMember<'a> {
+    fn measured_recording(&self) -> Option<&'a Recording> {
+        self.fitted.measured.get(self.aim.feature.condition).map(|m| m.recording)
+    }
+
+    fn measured_spectrum(&self) -> Option<SpectrumPoints> {
+        Some(spectrum_points(&window_spectrum(self.band, self.measured_recording()?)?))
+    }
+
+    fn model_spectrum(&self) -> Option<SpectrumPoints> {
+        Some(spectrum_points(&window_spectrum(
+            self.band,
+            &self.fitted.best.get(self.aim.feature.condition)?.view.recording,
+        )?))
+    }
+
+    /// Target, or what was measured in its place.
+    fn target_hz(&self) -> Option<f64> {
+        self.fitted
+            .report
+            .components
+            .iter()
+            .chain(&self.fitted.report.held_out)
+            .find(|c| c.name == self.aim.feature.name)
+            .map(|c| c.target)
+    }
+
+    /// Frequency of the model, Hz.
+    fn model_hz(&self) -> Option<f64> {
+        let report = &self.fitted.report;
+        let all = report.components.iter().chain(&report.held_out);
+        all.filter(|c| c.name == self.aim.feature.name).find_map(|c| c.model)
+    }
+
+    fn describe(&self) -> String {
+        let found = self
+            .fitted
+            .report
+            .components
+            .iter()
+            .chain(&self.fitted.report.held_out)
+            .find(|c| c.name == self.aim.feature.name);
+        let model = found
+            .and_then(|c| c.model)
+            .map_or_else(|| "absent".to_owned(), |hz| format!("{} Hz", format_trimmed(hz, 4)));
+        let target =
+            found.map_or_else(String::new, |c| format!(" (target {} Hz)", format_trimmed(c.target, 4)));
+        format!(
+            "`{}` of `{}`, window {}: {model}{target}",
+            self.aim.feature.name, self.fitted.name, self.band.window
+        )
+    }
+}
+
+/// The claim with its numbers: the frequencies of the models.
+fn claim_sentence(group: &[&SpectrumGroupMember], channel: &str) -> String {
+    let found: Vec<String> = group.iter().filter_map(|m| Some(format_digits(m.model_hz()?, 3))).collect();
+    if found.is_empty() {
+        return format!("No model has the component that is sought in the {channel}");
+    }
+    format!("The models have {} Hz in the {channel}", join_with_and(&found))
+}
+
+fn draw_figure(group: &[&SpectrumGroupMember]) -> Option<(Figure, String, String)> {
+    let channel = group.first()?.band.channel.label();
+    let panels = draw_panels(group)?;
+    let a_panel_each = if panels.len() > 1 { " A panel a fit, in the same axes." } else { "" };
+    let recordings = || group.iter().filter_map(|m| m.measured_recording());
+    let (synthetic, films) =
+        (recordings().any(Recording::is_synthetic), recordings().any(|r| !r.is_synthetic()));
+    let figure = Figure {
+        title: claim_sentence(group, &channel),
+        subtitle: match (synthetic, films) {
+            (true, true) => MIXED.to_owned(),
+            (false, false) => NO_TRACES.to_owned(),
+            _ => subtitle(synthetic, ""),
+        },
+        watermarked: synthetic,
+        description: format!("Amplitude spectra of the {channel} of several fits."),
+        width_mm: FULL_WIDTH_MM,
+        columns: 2,
+        panels,
+    };
+    let says: Vec<String> = group.iter().map(|m| m.describe()).collect();
+    let lone = if group.iter().any(|m| m.measured_recording().is_none()) {
+        " Fits to published numbers have no measured spectrum."
+    } else {
+        ""
+    };
+    let caption = format!(
+        "Amplitude spectra of the {channel} in {} fits; vertical lines mark the targets.{a_panel_each}",
+        group.len()
+    );
+    let details = format!(
+        "Components of the models: {}. Windows of different lengths resolve differently: peaks of the same \
+         oscillation agree in place and height, not in width.{lone}",
+        says.join("; ")
+    );
+    Some((figure, caption, details))
+}
+
+// The panels: the spectra of a few fits over each other, those of more in a panel each.
+
+/// Most fits whose spectra lie over each other: with as many recordings they make six lines, and of more the
+/// last would hide the others.
+const MOST_OVER_EACH_OTHER: usize = 3;
+/// Heights, mm: of all spectra in one panel, and of those of one fit.
+const HEIGHT_MM: f64 = 70.0;
+const EACH_HEIGHT_MM: f64 = 36.0;
+/// The axes reach this factor beyond the bands in which components are sought, this one over the highest peak
+/// and this one below it.
+const BAND_MARGIN: f64 = 2.0;
+const OVER_PEAK: f64 = 2.0;
+const UNDER_PEAK: f64 = 2e-4;
+/// Looks of models that lie over each other.
+const MODEL_LOOKS: [(Colour, Mark); MOST_OVER_EACH_OTHER] =
+    [(Colour::Vermilion, Mark::Line), (Colour::Blue, Mark::Dashed), (Colour::Green, Mark::Dotted)];
+
+/// What the panels of a group show; `None` where none of it has a spectrum.
+fn draw_panels(group: &[&SpectrumGroupMember]) -> Option<Vec<Panel>> {
+    let panels = if group.len() > MOST_OVER_EACH_OTHER {
+        group.iter().map(|m| draw_fit_panel(m)).collect()
+    } else {
+        vec![draw_overlay_panel(group)]
+    };
+    let panels: Vec<Panel> = panels.into_iter().filter(|panel| !panel.series.is_empty()).collect();
+    let (x, y) = common_axes(group, &panels)?;
+    Some(panels.into_iter().map(|panel| Panel { x: x.clone(), y: y.clone(), ..panel }).collect())
+}
+
+/// The axes that all have in common.
+fn common_axes(group: &[&SpectrumGroupMember], panels: &[Panel]) -> Option<(ChartAxis, ChartAxis)> {
+    let bands = || group.iter().map(|m| m.band.band_hz);
+    let (low, high) = (
+        bands().fold(f64::INFINITY, |l, b| l.min(b.0)) / BAND_MARGIN,
+        bands().fold(0.0, |h: f64, b| h.max(b.1)) * BAND_MARGIN,
+    );
+    let points = || panels.iter().flat_map(|p| &p.series).flat_map(|s| s.points.iter().flatten());
+    let shown = points().filter(|(f, a)| *f >= low && *f <= high && a.is_finite());
+    let peak = shown.map(|(_, a)| *a).fold(0.0, f64::max);
+    let last_hz = points().map(|(f, _)| *f).fold(low, f64::max);
+    let x = ChartAxis::log("frequency, Hz").with_range(low, high.min(last_hz));
+    (peak > 0.0)
+        .then(|| (x, ChartAxis::log("amplitude, \u{b5}m").with_range(peak * UNDER_PEAK, peak * OVER_PEAK)))
+}
+
+fn spectrum_line(label: String, (colour, mark): (Colour, Mark), points: SpectrumPoints) -> Series {
+    Series { label, colour, mark, points, error_bars: Vec::new() }
+}
+
+fn target_line(member: &SpectrumGroupMember, colour: Colour) -> Option<VerticalLine> {
+    let at = member.target_hz()?;
+    Some(VerticalLine {
+        label: format!("{} Hz", format_trimmed(at, 4)),
+        colour,
+        mark: Mark::ThinDashed,
+        at,
+        above: None,
+    })
+}
+
+/// One fit: its model under its recording.
+fn draw_fit_panel(member: &SpectrumGroupMember) -> Panel {
+    let what = if member.measured_recording().is_some_and(Recording::is_synthetic) {
+        "synthetic recording"
+    } else {
+        "recording"
+    };
+    let model = member
+        .model_spectrum()
+        .map(|points| spectrum_line("model".to_owned(), (Colour::Vermilion, Mark::Thick), points));
+    let measured = member
+        .measured_spectrum()
+        .map(|points| spectrum_line(what.to_owned(), (Colour::Black, Mark::Thin), points));
+    Panel {
+        title: shorten_name(member.fitted.name),
+        height_mm: EACH_HEIGHT_MM,
+        series: model.into_iter().chain(measured).collect(),
+        vertical_lines: target_line(member, Colour::Blue).into_iter().collect(),
+        ..Panel::default()
+    }
+}
+
+fn draw_overlay_panel(group: &[&SpectrumGroupMember]) -> Panel {
+    let looking = || group.iter().zip(MODEL_LOOKS);
+    let models = looking().filter_map(|(m, look)| {
+        Some(spectrum_line(format!("model, {}", shorten_name(m.fitted.name)), look, m.model_spectrum()?))
+    });
+    let mut rules: Vec<VerticalLine> = Vec::new();
+    for rule in looking().filter_map(|(m, (colour, _))| target_line(m, colour)) {
+        // several that are written alike are one line
+        if rules.iter().all(|known| known.label != rule.label) {
+            rules.push(rule);
+        }
+    }
+    Panel {
+        height_mm: HEIGHT_MM,
+        series: measured_series(group).into_iter().chain(models).collect(),
+        vertical_lines: rules,
+        ..Panel::default()
+    }
+}
+
+/// The measured spectra, one a recording and window however many fits share it.
+fn measured_series(group: &[&SpectrumGroupMember]) -> Vec<Series> {
+    let mut drawn: Vec<(&Recording, &SpectrumGroupMember)> = Vec::new();
+    for (recording, member) in group.iter().filter_map(|m| Some((m.measured_recording()?, *m))) {
+        let known = |(r, m): &(&Recording, &SpectrumGroupMember)| {
+            *r == recording && m.band.window == member.band.window && m.band.detrend == member.band.detrend
+        };
+        if !drawn.iter().any(known) {
+            drawn.push((recording, member));
+        }
+    }
+    let series = |(i, (recording, member)): (usize, &(&Recording, &SpectrumGroupMember))| {
+        let look = if i % 2 == 0 { (Colour::Black, Mark::Thin) } else { (Colour::Grey, Mark::ThinDashed) };
+        let what = if recording.is_synthetic() { "synthetic" } else { "measured" };
+        Some(spectrum_line(
+            format!("{what}, {}", shorten_name(recording.name())),
+            look,
+            member.measured_spectrum()?,
+        ))
+    };
+    drawn.iter().enumerate().filter_map(series).collect()
+}

@@ -1,0 +1,194 @@
+use super::interval_relation;
+use super::*;
+use crate::chart::{MAX_HEIGHT_MM, Medium};
+use crate::compare::{Comparison, ParameterLine};
+use crate::fit::uncertainty::ParameterVerdict as Knowledge;
+
+fn line(verdict: Knowledge, lower_95: Option<f64>, upper_95: Option<f64>) -> ParameterLine {
+    ParameterLine {
+        name: "friction.c".to_owned(),
+        symbol: "C".to_owned(),
+        verdict,
+        estimate: 0.5,
+        lower_95,
+        upper_95,
+        ..ParameterLine::default()
+    }
+}
+
+fn report(parameters: Vec<ParameterLine>, pass: bool) -> Report {
+    Report {
+        components: vec![Comparison { name: "low".to_owned(), pass, ..Comparison::default() }],
+        parameters,
+        ..Report::default()
+    }
+}
+
+fn entry(name: &str, report: Report) -> ComparedFit {
+    ComparedFit { name: name.to_owned(), verdict: ReportVerdict::from_report(&report), report }
+}
+
+#[test]
+fn intervals_are_apart_only_where_both_ends_are_known() {
+    let known = |lower, upper| line(Knowledge::Identified, Some(lower), Some(upper));
+    assert_eq!(interval_relation(&known(0.1, 0.2), &known(0.3, 0.4)), IntervalRelation::Disjoint);
+    assert_eq!(interval_relation(&known(0.3, 0.4), &known(0.1, 0.2)), IntervalRelation::Disjoint);
+    assert_eq!(interval_relation(&known(0.1, 0.3), &known(0.3, 0.4)), IntervalRelation::Overlap);
+    // an open end reaches beyond everything, a closed one does not
+    assert_eq!(
+        interval_relation(&line(Knowledge::OpenAbove, Some(0.1), None), &known(0.3, 0.4)),
+        IntervalRelation::Overlap
+    );
+    assert_eq!(
+        interval_relation(&line(Knowledge::OpenAbove, Some(0.5), None), &known(0.3, 0.4)),
+        IntervalRelation::Disjoint
+    );
+    for verdict in [Knowledge::NotIdentified, Knowledge::AtBound] {
+        assert_eq!(
+            interval_relation(&line(verdict, Some(0.1), Some(0.2)), &known(0.3, 0.4)),
+            IntervalRelation::NotComparable
+        );
+    }
+}
+
+#[test]
+fn the_verdict_says_which_intervals_do_not_overlap_and_no_more() {
+    let entries = [
+        entry("a", report(vec![line(Knowledge::Identified, Some(0.1), Some(0.2))], true)),
+        entry("b", report(vec![line(Knowledge::Identified, Some(0.3), Some(0.4))], false)),
+        entry("c", report(vec![line(Knowledge::AtBound, Some(0.3), None)], true)),
+        entry("d", report(vec![], true)),
+    ];
+    let parameters = shared_parameters(&entries);
+    assert_eq!(
+        (parameters.len(), parameters[0].pairs.len(), parameters[0].lines.iter().flatten().count()),
+        (1, 3, 3)
+    );
+    let lines: Vec<String> =
+        verdict::comparison_statements(&entries, &parameters).iter().map(Statement::plain_text).collect();
+    assert!(
+        lines[0].starts_with(
+            "Every component is met in 3 of 4 fits: a: 1 of 1 component met, 1 of 1 parameter determined"
+        ),
+        "{}",
+        lines[0]
+    );
+    assert!(
+        lines[0].contains(
+            "b: 0 of 1 component met, 1 of 1 parameter determined, search not converged; missed: low"
+        ),
+        "{}",
+        lines[0]
+    );
+    assert_eq!(
+        lines[1],
+        "95 % intervals do not overlap in 1 of 1 pairs of estimates that can be compared: friction.c: a, b."
+    );
+    assert!(
+        lines[2].starts_with("2 of 3 pairs of estimates cannot be compared")
+            && !lines.iter().any(|l| l.starts_with("They overlap")),
+        "{lines:?}"
+    );
+}
+
+#[test]
+fn of_many_pairs_the_number_is_told_and_none_is_compared_where_nothing_is_known() {
+    let entries: Vec<ComparedFit> = (0..8)
+        .map(|k| entry(&format!("fit {k}"), report(vec![line(Knowledge::AtBound, Some(0.3), None)], true)))
+        .collect();
+    let lines: Vec<String> = verdict::comparison_statements(&entries, &shared_parameters(&entries))
+        .iter()
+        .map(Statement::plain_text)
+        .collect();
+    assert!(
+        lines[1].starts_with("28 of 28 pairs of estimates cannot be compared")
+            && lines[1].ends_with("friction.c: 28 pairs."),
+        "{}",
+        lines[1]
+    );
+    assert!(!lines.iter().any(|l| l.contains("do not overlap")), "{lines:?}");
+}
+
+#[test]
+fn an_open_end_reaches_the_frame_and_the_first_fit_stands_at_the_top() {
+    let entries = [
+        entry("first", report(vec![line(Knowledge::OpenAbove, Some(0.4), None)], true)),
+        entry("second", report(vec![line(Knowledge::Identified, Some(0.3), Some(0.6))], true)),
+    ];
+    let block = intervals::interval_figures(&entries, &shared_parameters(&entries)).remove(0);
+    let crate::figures::Drawing::Chart(figure) = &block.drawing else { panic!("a chart") };
+    let panel = &figure.panels[0];
+    assert_eq!(panel.y.categories, [(0.0, "second".to_owned()), (1.0, "first".to_owned())]);
+    let (low, high) = panel.x.range.unwrap();
+    assert!(low < 0.3 && high > 0.6, "{low} {high}");
+    let open = panel.series.iter().find(|s| s.points == [Some((0.5, 1.0))]).unwrap();
+    assert!(
+        matches!(open.error_bars[0], crate::chart::ErrorBar::Horizontal { y: 1.0, from: 0.4, to } if to > high),
+        "{open:?}"
+    );
+    assert!(block.caption.contains("0 of 1 pairs"), "{}", block.caption);
+    assert!(intervals::interval_figures(&entries[..1], &shared_parameters(&entries[..1])).is_empty());
+}
+
+#[test]
+fn parameters_of_eight_fits_are_parted_into_figures_that_fit_a_column() {
+    let named = |name: &str| ParameterLine {
+        name: name.to_owned(),
+        ..line(Knowledge::Identified, Some(0.4), Some(0.6))
+    };
+    let names = ["a", "b", "c", "d", "e", "f", "g", "h"];
+    let entries: Vec<ComparedFit> =
+        (0..8).map(|i| entry(&format!("fit {i}"), report(names.map(named).to_vec(), true))).collect();
+    let blocks = intervals::interval_figures(&entries, &shared_parameters(&entries));
+    let charts: Vec<_> = blocks
+        .iter()
+        .map(|block| match &block.drawing {
+            crate::figures::Drawing::Chart(figure) => figure,
+            crate::figures::Drawing::Moving(_) => panic!("a chart"),
+        })
+        .collect();
+    assert!(charts.iter().all(|figure| figure.height_mm(Medium::Column) <= MAX_HEIGHT_MM));
+    assert_eq!(
+        charts.iter().flat_map(|figure| &figure.panels).map(|panel| panel.title.as_str()).collect::<Vec<_>>(),
+        names
+    );
+    assert_eq!(
+        blocks.iter().map(|block| block.file.as_str()).collect::<Vec<_>>(),
+        ["parameters-1.svg", "parameters-2.svg"]
+    );
+    // 28 pairs of eight fits a parameter
+    let pairs: Vec<usize> = charts.iter().map(|figure| 28 * figure.panels.len()).collect();
+    assert!(
+        blocks.iter().zip(pairs).all(|(block, pairs)| block.caption.contains(&format!("0 of {pairs} pairs"))),
+        "{:?}",
+        blocks[0].caption
+    );
+}
+
+#[test]
+fn page_and_json_of_hostile_names_are_text_and_say_the_same() {
+    let hostile = "<script>\"'\u{202e}";
+    let entries = vec![
+        entry(hostile, report(vec![line(Knowledge::Identified, Some(0.1), Some(0.2))], true)),
+        entry("\u{5e9}", report(vec![line(Knowledge::Identified, Some(0.3), None)], false)),
+    ];
+    let parameters = shared_parameters(&entries);
+    let several = FitComparison {
+        title: hostile.to_owned(),
+        figures: Vec::new(),
+        statements: verdict::comparison_statements(&entries, &parameters),
+        fits: entries,
+        parameters,
+    };
+    let html = render_page(&several);
+    let (html, _script) = html.rsplit_once("<script>").unwrap();
+    assert!(!html.contains("<script") && !html.contains('\u{202e}') && html.contains("<bdi>\u{5e9}</bdi>"));
+    assert!(!html.contains("http") && !html.contains("src="));
+    let json: serde_json::Value = serde_json::from_str(&comparison_json(&several).unwrap()).unwrap();
+    assert_eq!(
+        (&json["all_components_met"], &json["fits"][0]["name"], &json["fits"][1]["all_components_met"]),
+        (&false.into(), &hostile.into(), &false.into())
+    );
+    assert_eq!(json["parameters"][0]["pairs"][0]["relation"], "disjoint");
+    assert_eq!(json["summary"][0], several.statements[0].plain_text());
+}

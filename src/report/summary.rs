@@ -1,0 +1,609 @@
+//! What a reader wants to know first, in plain words: whether the model explains the recording, the blade's
+//! numbers, how sure they are, and what to do next.
+
+use super::Report;
+use super::rich_text::{Sentence, Statement};
+use super::verdict::comparison_sentence;
+use crate::compare::summary::ResidualSummary;
+use crate::compare::{Comparison, ComparisonSummary, ParameterLine};
+use crate::figures::evidence::NOTHING_LEFT;
+use crate::figures::friction::FrictionLine;
+use crate::fit::misfit::{ChannelMisfit, TraceMisfit, WorstSegment, far_from_priors};
+use crate::model::parameters;
+use crate::text::{capitalise, format_digits, format_length, format_speed, join_with_and, pluralise};
+use serde::Serialize;
+
+/// Residual over noise above which a run is seen to be off.
+const SEEN: f64 = 3.0;
+/// Standard deviations between model and target that are worth a word.
+const FAR_SD: f64 = 1.96;
+
+/// The answer of a report.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct ReportSummary {
+    /// Whether the model explains what was measured, with residual and noise.
+    pub headline: Statement,
+    /// The numbers of the blade: friction at rest and at speed, then every other parameter.
+    pub quantities: Vec<SummaryQuantity>,
+    /// How sure they are.
+    pub certainty: Sentence,
+    /// What to do next.
+    pub next: Sentence,
+}
+
+/// A number of the blade, in SI units.
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
+pub struct SummaryQuantity {
+    /// What it is, in words.
+    pub name: String,
+    /// The keys of a scene that it comes from.
+    pub keys: Vec<&'static str>,
+    /// Unit; empty for a plain number.
+    pub unit: String,
+    /// Value.
+    pub value: f64,
+    /// Lower end of the 95 % interval; `None` where it is open.
+    pub lower_95: Option<f64>,
+    /// Upper end of the 95 % interval; `None` where it is open.
+    pub upper_95: Option<f64>,
+    /// Whether the data determine it.
+    pub identified: bool,
+    /// Whether anything of it was fitted.
+    pub fitted: bool,
+}
+
+impl ReportSummary {
+    /// The answer of a report.
+    #[must_use]
+    pub fn from_report(report: &Report) -> Self {
+        Self {
+            headline: report_headline(report),
+            quantities: blade_quantities(report),
+            certainty: certainty_sentence(report),
+            next: next_step_sentence(report),
+        }
+    }
+}
+
+/// The coefficients of the friction law, which say less than friction at rest and at speed.
+fn is_friction_coefficient(name: &str) -> bool {
+    name.starts_with("friction.")
+}
+
+fn blade_quantities(report: &Report) -> Vec<SummaryQuantity> {
+    let of_law: Vec<&ParameterLine> =
+        report.parameters.iter().filter(|p| is_friction_coefficient(&p.name)).collect();
+    let keys: Vec<&'static str> =
+        of_law.iter().filter_map(|p| parameters::find_parameter(&p.name)).map(|p| p.name).collect();
+    let friction = |line: &FrictionLine| SummaryQuantity {
+        name: if line.speed_m_per_s > 0.0 {
+            format!("friction coefficient at {}, the tip's greatest speed", format_speed(line.speed_m_per_s))
+        } else {
+            "friction coefficient at rest".to_owned()
+        },
+        keys: keys.clone(),
+        unit: String::new(),
+        value: line.coefficient,
+        lower_95: line.half_95.map(|half| line.coefficient - half),
+        upper_95: line.half_95.map(|half| line.coefficient + half),
+        identified: line.half_95.is_some() && of_law.iter().all(|p| p.is_identified()),
+        fitted: !of_law.is_empty(),
+    };
+    let parameter = |p: &ParameterLine| {
+        let row = parameters::find_parameter(&p.name)?;
+        Some(SummaryQuantity {
+            name: row.meaning.to_owned(),
+            keys: vec![row.name],
+            unit: p.unit.clone(),
+            value: p.estimate,
+            lower_95: p.lower_95,
+            upper_95: p.upper_95,
+            identified: p.is_identified(),
+            fitted: true,
+        })
+    };
+    let others = report.parameters.iter().filter(|p| !is_friction_coefficient(&p.name)).filter_map(parameter);
+    report.friction.iter().map(friction).chain(others).collect()
+}
+
+pub(in crate::report) fn report_headline(report: &Report) -> Statement {
+    match (&report.misfit, report.recordings.is_empty()) {
+        (Some(misfit), _) => trace_headline(report, misfit),
+        (None, false) => feature_headline(report),
+        (None, true) => published_headline(report),
+    }
+}
+
+/// The channel whose segments are farthest from their noise.
+fn worst_channel(misfit: &TraceMisfit) -> Option<&ChannelMisfit> {
+    let ratio = |c: &&ChannelMisfit| c.residual_rms_m / c.noise_m;
+    misfit.channels.iter().filter(|c| c.frames > 0).max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
+}
+
+fn trace_headline(report: &Report, misfit: &TraceMisfit) -> Statement {
+    let shown = if misfit.explained { misfit.channels.first() } else { worst_channel(misfit) };
+    let left = shown.map(|c| {
+        let (point, ratio) = (channel_point_name(&c.channel), c.residual_rms_m / c.noise_m);
+        let (residual, noise) = (format_length(c.residual_rms_m), format_length(c.noise_m));
+        if misfit.explained {
+            format!(
+                "what is left of the {point} is {residual} rms, and the noise of the recording is {noise}"
+            )
+        } else {
+            format!(
+                "it misses the {point} by {residual} rms, {} times the noise of {noise}",
+                format_digits(ratio, 2)
+            )
+        }
+    });
+    let left = left.map_or_else(String::new, |left| format!(": {left}"));
+    let words = if misfit.explained {
+        format!("The model explains the recording{left}.")
+    } else {
+        format!(
+            "The model does not explain the recording{left}. What was fitted need not be the blade\u{2019}s."
+        )
+    };
+    let why = misfit.reasons.iter().map(|reason| Sentence::new(capitalise(reason)));
+    Statement {
+        details: why.chain(missed_target_sentences(report)).chain(single_run_sentence(report)).collect(),
+        ..Statement::new(Sentence::new(words)).with_verdict(misfit.explained)
+    }
+}
+
+/// How far a run leads that is started once; traces are fitted in segments.
+fn single_run_sentence(report: &Report) -> Option<Sentence> {
+    let (condition, r) = farthest_residual(report)?;
+    let ratio = r.rms_over_noise.filter(|ratio| *ratio > NOTHING_LEFT)?;
+    let of = if report.comparison.len() > 1 {
+        Sentence::new("In ").with_name(condition).with_words(", run")
+    } else {
+        Sentence::new("Run")
+    };
+    let drift = report.misfit.as_ref().is_some_and(|misfit| misfit.explained);
+    Some(of.with_words(format!(
+        " once from its start, the model lies {} rms off the {}, {} times the noise{}",
+        format_length(r.rms_m),
+        r.channel,
+        format_digits(ratio, 2),
+        if drift { ": small errors of its frequency add up." } else { "." }
+    )))
+}
+
+/// A channel of a trace as a point of the blade.
+fn channel_point_name(channel: &str) -> &str {
+    match channel {
+        "tip-x" => "tip",
+        "head-x" => "head",
+        "head-drop" => "head\u{2019}s drop",
+        other => other,
+    }
+}
+
+/// The condition in which one run of the model is farthest from the recording, for its noise, and what is
+/// left there.
+pub(in crate::report) fn farthest_condition(
+    conditions: &[ComparisonSummary],
+) -> Option<(usize, &ResidualSummary)> {
+    let ratio = |line: &ResidualSummary| line.rms_over_noise.unwrap_or(0.0);
+    let left =
+        conditions.iter().enumerate().filter_map(|(i, condition)| Some((i, condition.judged_residual()?)));
+    left.max_by(|(i, a), (j, b)| ratio(a).total_cmp(&ratio(b)).then(j.cmp(i)))
+}
+
+/// What one run leaves where it is farthest from its recording.
+fn farthest_residual(report: &Report) -> Option<(&str, &ResidualSummary)> {
+    let (condition, line) = farthest_condition(&report.comparison)?;
+    Some((report.comparison.get(condition)?.condition.as_str(), line))
+}
+
+/// Every target that was fitted.
+fn fitted_targets(report: &Report) -> impl Iterator<Item = &Comparison> {
+    report.components.iter().chain(&report.features)
+}
+
+/// "all 3 targets", "2 of 3 targets".
+fn count_met_targets(report: &Report) -> (bool, String) {
+    let (met, all) = (fitted_targets(report).filter(|c| c.pass).count(), fitted_targets(report).count());
+    let count = match (met, all) {
+        (1, 1) => "its one target".to_owned(),
+        (met, all) if met == all => format!("all {all} targets"),
+        _ => format!("{met} of {all} {}", pluralise("target", all)),
+    };
+    (met == all, count)
+}
+
+/// The targets that are missed, then those that are met and yet far for their deviation.
+fn missed_target_sentences(report: &Report) -> Vec<Sentence> {
+    let apart = |c: &Comparison| c.model.zip(c.target_sd).map(|(m, sd)| (m - c.target).abs() / sd);
+    let far = |c: &&Comparison| c.pass && apart(c).is_some_and(|sds| sds > FAR_SD);
+    let missed = fitted_targets(report).filter(|c| !c.pass).map(comparison_sentence);
+    let met = fitted_targets(report).filter(far).map(|c| {
+        comparison_sentence(c).with_words(format!(
+            ", yet {} standard deviations off",
+            format_digits(apart(c).unwrap_or(0.0), 2)
+        ))
+    });
+    missed.chain(met).collect()
+}
+
+fn feature_headline(report: &Report) -> Statement {
+    let (all_met, count) = count_met_targets(report);
+    let (followed, good) = match farthest_residual(report) {
+        Some((_, r)) => {
+            let (channel, ratio) = (r.channel, r.rms_over_noise.unwrap_or(f64::INFINITY));
+            let rms = format_length(r.rms_m);
+            if ratio <= NOTHING_LEFT {
+                (format!("; one run of it follows the {channel} to within its noise"), Some(all_met))
+            } else {
+                let words = format!(
+                    "{}one run of it misses the {channel} by {rms} rms, {} times its noise",
+                    if ratio > SEEN && all_met { ", but " } else { "; " },
+                    format_digits(ratio, 2)
+                );
+                (words, if ratio > SEEN { Some(false) } else { (!all_met).then_some(false) })
+            }
+        }
+        None => (String::new(), Some(all_met)),
+    };
+    let words = format!("The model meets {count}{followed}.");
+    Statement { statement: Sentence::new(words), details: missed_target_sentences(report), good }
+}
+
+fn published_headline(report: &Report) -> Statement {
+    let (all_met, count) = count_met_targets(report);
+    let (open, good) = describe_undetermined(report, all_met);
+    let words =
+        format!("The model meets {count} from publications or assumptions{open}. No recording was compared.");
+    Statement { statement: Sentence::new(words), details: missed_target_sentences(report), good }
+}
+
+/// What is said of targets that are met and leave parameters open, and whether that is good.
+fn describe_undetermined(report: &Report, all_met: bool) -> (String, Option<bool>) {
+    let open = report.parameters.iter().filter(|p| !p.is_identified()).count();
+    let all = report.parameters.len();
+    match (all_met, open) {
+        (true, 0) => (String::new(), Some(true)),
+        (true, open) => (format!(", which leave {open} of {all} {} open", pluralise("parameter", all)), None),
+        (false, _) => (String::new(), Some(false)),
+    }
+}
+
+fn certainty_sentence(report: &Report) -> Sentence {
+    let all = report.parameters.len();
+    let (known, open): (Vec<_>, Vec<_>) = report.parameters.iter().partition(|p| p.is_identified());
+    let words = |list: &[&ParameterLine]| {
+        let name = |p: &&ParameterLine| {
+            parameters::find_parameter(&p.name).map_or_else(|| p.name.clone(), |row| row.symbol.to_owned())
+        };
+        join_with_and(&list.iter().map(name).collect::<Vec<_>>())
+    };
+    if all == 0 {
+        return Sentence::new("No parameter was fitted.");
+    }
+    if report.misfit.as_ref().is_some_and(|misfit| !misfit.explained) {
+        return Sentence::new(
+            "No parameter counts as determined, as a model that does not explain the recording has narrow \
+             intervals too.",
+        );
+    }
+    let why = shared_reason(&open).unwrap_or("other values fit as well");
+    let known_words = match (known.len(), all) {
+        (1, 1) => "The data determine the one parameter that was fitted.".to_owned(),
+        (n, all) if n == all => format!("The data determine all {all} fitted parameters."),
+        (0, 1) => format!("The data do not determine {}: {why}.", words(&open)),
+        (0, _) => format!("The data determine none of {} alone: {why}.", words(&open)),
+        (n, all) => {
+            format!("The data determine {n} of {all} fitted parameters, and not {}: {why}.", words(&open))
+        }
+    };
+    let constants = if report.nuisances.iter().any(|n| n.recording.is_none()) {
+        " Constants that were not set free are taken as exact."
+    } else {
+        " Masses, dampings and every other constant are taken as exact."
+    };
+    Sentence::new(known_words + constants)
+}
+
+/// Why parameters are open, where one reason holds for all of them.
+fn shared_reason<'a>(open: &[&'a ParameterLine]) -> Option<&'a str> {
+    let (first, rest) = open.split_first()?;
+    let why = first.why.as_deref()?;
+    rest.iter().all(|p| p.why.as_deref() == Some(why)).then_some(why)
+}
+
+/// The most urgent thing to do, one sentence.
+fn next_step_sentence(report: &Report) -> Sentence {
+    let all_known = report.parameters.iter().all(ParameterLine::is_identified);
+    if let Some(run) = report.runs.iter().find(|run| run.opposite_turn) {
+        return Sentence::new("Start the scene of ")
+            .with_name(&run.name)
+            .with_words(" half a period of its drive later: the recorded head turns the other way.");
+    }
+    if !report.search.converged && report.search.status.is_some() {
+        return Sentence::new(
+            "Give the search a larger budget and fit again: it ended before it had converged.",
+        );
+    }
+    if let Some(p) = report.parameters.iter().find(|p| is_at_bound(p)) {
+        return Sentence::new("Widen the bounds of ")
+            .with_name(&p.name)
+            .with_words(" in the job: its best value lies at one.");
+    }
+    if let Some(misfit) = report.misfit.as_ref().filter(|misfit| !misfit.explained) {
+        return describe_unexplained(report, misfit);
+    }
+    if !all_known {
+        return match report.advice.first() {
+            Some(advice) => Sentence::new(format!("{}.", capitalise(advice).trim_end_matches('.'))),
+            None => Sentence::new(
+                "Give the fit more to tell these parameters apart: recordings at other speeds, further \
+                 features, or a prior for one that is known from elsewhere.",
+            ),
+        };
+    }
+    if farthest_residual(report).is_some_and(|(_, r)| r.rms_over_noise.is_some_and(|ratio| ratio > SEEN))
+        && report.misfit.is_none()
+    {
+        return Sentence::new(
+            "Fit the traces themselves (`[[trace]]` in the job), which use what the features leave out.",
+        );
+    }
+    if fitted_targets(report).any(|c| !c.pass) || report.held_out.iter().any(|c| !c.pass) {
+        return Sentence::new("Look at the targets that are missed, in the table below and in the pulls.");
+    }
+    if report.recordings.is_empty() {
+        return Sentence::new("Film the blade and fit the recording: published numbers alone prove little.");
+    }
+    Sentence::new("Test the model on a recording that was not fitted, at another speed or preload.")
+}
+
+/// Share of the way between its bounds within which an estimate lies at one.
+const AT_BOUND: f64 = 1e-3;
+
+/// Whether a search ended at a bound: the best value may lie beyond.
+fn is_at_bound(p: &ParameterLine) -> bool {
+    let [lower, upper] = p.bounds;
+    let near = AT_BOUND * (upper - lower);
+    upper > lower && (p.estimate - lower < near || upper - p.estimate < near)
+}
+
+fn describe_unexplained(report: &Report, misfit: &TraceMisfit) -> Sentence {
+    if let [far, ..] = far_from_priors(&report.nuisances).as_slice() {
+        return Sentence::new(format!("Check the calibration or the constant first: {far}."));
+    }
+    let worst = misfit.channels.iter().flat_map(|c| c.worst.iter().map(move |w| (c, w)));
+    let worst = worst.max_by(|(_, a): &(_, &WorstSegment), (_, b)| a.chi2_per_dof.total_cmp(&b.chi2_per_dof));
+    match worst.filter(|_| misfit.stages.last().is_some_and(|stage| stage.bad_segments > 0)) {
+        Some((c, w)) => Sentence::new(format!(
+            "Look at {} to {} s of ",
+            crate::text::format_decimals(w.start_s, 4),
+            crate::text::format_decimals(w.end_s, 4)
+        ))
+        .with_name(&c.recording)
+        .with_words(
+            ", where it fits worst: a point that the tracker lost, or a motion that the model does not have?",
+        ),
+        None => Sentence::new(
+            "Check what the fit holds fixed \u{2013} masses, dampings, preload, the drive \u{2013} or set it \
+             free within a prior (`nuisance`), and fit again.",
+        ),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::fit::misfit::StageMisfit;
+    use crate::fit::result::FitStatus;
+    use crate::fit::uncertainty::ParameterVerdict as Knowledge;
+    use crate::report::{RunSummary, SearchLine};
+
+    fn target(model: f64, sd: f64, pass: bool) -> Comparison {
+        Comparison {
+            name: "low".to_owned(),
+            unit: "Hz".to_owned(),
+            target: 100.0,
+            target_sd: Some(sd),
+            model: Some(model),
+            pass,
+            tolerance_relative: Some(0.02),
+            ..Comparison::default()
+        }
+    }
+
+    fn left_of(ratio: f64) -> ComparisonSummary {
+        let line = |channel, rms_over_noise: Option<f64>| ResidualSummary {
+            channel,
+            rms_m: 2e-6 * rms_over_noise.unwrap_or(9.0),
+            noise_m: Some(2e-6),
+            rms_over_noise,
+        };
+        ComparisonSummary {
+            residuals: vec![line("tip-x", None), line("head-x", Some(99.0)), line("deflection", Some(ratio))],
+            judged: Some("deflection"),
+            ..ComparisonSummary::default()
+        }
+    }
+
+    fn line(name: &str, verdict: Knowledge) -> ParameterLine {
+        let (lower_95, upper_95) = (Some(0.4), Some(0.6));
+        ParameterLine {
+            name: name.to_owned(),
+            estimate: 0.5,
+            lower_95,
+            upper_95,
+            verdict,
+            ..ParameterLine::default()
+        }
+    }
+
+    fn filmed(ratio: f64, targets: Vec<Comparison>) -> Report {
+        Report {
+            recordings: vec![crate::report::page::tests::recording("film", false)],
+            comparison: vec![left_of(ratio)],
+            components: targets,
+            ..Report::default()
+        }
+    }
+
+    #[test]
+    fn met_targets_beside_a_run_that_is_far_off_are_no_good_answer() {
+        let near = report_headline(&filmed(1.02, vec![target(100.1, 1.0, true)]));
+        assert_eq!(near.good, Some(true));
+        assert!(
+            near.plain_text().contains("follows the deflection to within its noise"),
+            "{}",
+            near.plain_text()
+        );
+        let far = report_headline(&filmed(51.0, vec![target(100.1, 1.0, true)]));
+        assert_eq!(far.good, Some(false));
+        assert_eq!(
+            far.plain_text(),
+            "The model meets its one target, but one run of it misses the deflection by 102 \u{b5}m rms, 51 times \
+             its noise."
+        );
+        assert!(
+            next_step_sentence(&filmed(51.0, vec![target(100.1, 1.0, true)]))
+                .plain_text()
+                .starts_with("Fit the traces")
+        );
+    }
+
+    #[test]
+    fn a_target_that_is_met_and_yet_far_for_its_deviation_is_said() {
+        let said = report_headline(&filmed(1.0, vec![target(101.2, 0.5, true), target(100.1, 0.5, true)]));
+        assert_eq!(said.details.len(), 1);
+        assert!(said.plain_text().contains("yet 2.4 standard deviations off"), "{}", said.plain_text());
+    }
+
+    #[test]
+    fn a_trace_that_is_not_explained_comes_with_its_reasons_and_a_place_to_look() {
+        let channel = |name: &str, residual_rms_m| ChannelMisfit {
+            recording: "film".to_owned(),
+            channel: name.to_owned(),
+            frames: 400,
+            residual_rms_m,
+            noise_m: 2e-6,
+            worst: vec![WorstSegment { start_s: 0.25, end_s: 0.266, chi2_per_dof: 9.0 }],
+            ..ChannelMisfit::default()
+        };
+        let stage = StageMisfit {
+            segments: 40,
+            bad_segments: 3,
+            dof: 900,
+            chi2_per_dof: 1.0,
+            ..StageMisfit::default()
+        };
+        let report = |stage: StageMisfit| Report {
+            misfit: Some(TraceMisfit::judge(
+                vec![channel("tip-x", 2e-6), channel("head-drop", 8e-6)],
+                vec![stage],
+                &[],
+            )),
+            ..Report::default()
+        };
+        let wrong = report(stage.clone());
+        let said = report_headline(&wrong);
+        assert_eq!((said.good, said.details.len()), (Some(false), 1));
+        assert!(
+            said.plain_text().contains("misses the head\u{2019}s drop by 8.0 \u{b5}m rms, 4.0 times"),
+            "{said:?}"
+        );
+        assert!(
+            certainty_sentence(&Report {
+                parameters: vec![line("friction.a", Knowledge::Identified)],
+                ..wrong.clone()
+            })
+            .plain_text()
+            .starts_with("No parameter counts as determined")
+        );
+        assert!(
+            next_step_sentence(&wrong).plain_text().starts_with("Look at 0.2500 to 0.2660 s of film"),
+            "{:?}",
+            next_step_sentence(&wrong)
+        );
+        let right = report_headline(&report(StageMisfit { bad_segments: 0, ..stage }));
+        assert!(
+            right.good == Some(true)
+                && right.plain_text().contains("what is left of the tip is 2.0 \u{b5}m rms")
+        );
+    }
+
+    #[test]
+    fn a_target_that_an_explained_trace_misses_stands_under_the_headline() {
+        let channel =
+            ChannelMisfit { frames: 400, residual_rms_m: 2e-6, noise_m: 2e-6, ..Default::default() };
+        let stage = StageMisfit { segments: 40, dof: 900, chi2_per_dof: 1.0, ..StageMisfit::default() };
+        let report = Report {
+            misfit: Some(TraceMisfit::judge(vec![channel], vec![stage], &[])),
+            ..filmed(1.0, vec![target(103.0, 1.0, false), target(100.1, 1.0, true)])
+        };
+        let said = report_headline(&report);
+        assert_eq!((said.good, said.details.len()), (Some(true), 1));
+        assert!(said.details[0].plain_text().contains("beyond the tolerance"), "{said:?}");
+    }
+
+    #[test]
+    fn the_condition_that_is_farthest_for_its_noise_is_told() {
+        let silent = ComparisonSummary { judged: None, ..left_of(80.0) };
+        let conditions = [left_of(1.0), silent, left_of(7.0), left_of(7.0)];
+        let (condition, line) = farthest_condition(&conditions).unwrap();
+        assert_eq!((condition, line.rms_over_noise), (2, Some(7.0)));
+        assert!(farthest_condition(&[ComparisonSummary::default()]).is_none());
+    }
+
+    #[test]
+    fn friction_is_said_at_rest_and_at_speed_in_place_of_its_coefficients() {
+        let at = |speed_m_per_s, half_95| FrictionLine { speed_m_per_s, coefficient: 0.4, half_95 };
+        let report = |half, verdict| Report {
+            friction: vec![at(0.0, half), at(0.3, half)],
+            parameters: vec![
+                line("friction.a", verdict),
+                line("blade.neck_stiffness_n_m_per_rad", Knowledge::Identified),
+            ],
+            ..Report::default()
+        };
+        let known = blade_quantities(&report(Some(0.01), Knowledge::Identified));
+        let names: Vec<&str> = known.iter().map(|q| q.name.as_str()).collect();
+        assert_eq!(
+            names,
+            [
+                "friction coefficient at rest",
+                "friction coefficient at 300 mm/s, the tip's greatest speed",
+                "stiffness of the neck off the shoulder"
+            ]
+        );
+        assert!(known.iter().all(|q| q.identified && q.fitted));
+        assert_eq!((known[0].lower_95, known[0].upper_95), (Some(0.4 - 0.01), Some(0.4 + 0.01)));
+        let open = blade_quantities(&report(None, Knowledge::OpenAbove));
+        assert_eq!((open[0].lower_95, open[0].identified, open[2].identified), (None, false, true));
+    }
+
+    #[test]
+    fn the_next_step_is_the_most_urgent_one() {
+        let turned = Report {
+            runs: vec![RunSummary { name: "fast".to_owned(), opposite_turn: true, ..RunSummary::default() }],
+            search: SearchLine { status: Some(FitStatus::BudgetExhausted), ..SearchLine::default() },
+            ..Report::default()
+        };
+        assert!(
+            next_step_sentence(&turned).plain_text().starts_with("Start the scene of fast half a period")
+        );
+        let unfinished = Report { runs: Vec::new(), ..turned };
+        assert!(next_step_sentence(&unfinished).plain_text().starts_with("Give the search a larger budget"));
+        let open = Report {
+            parameters: vec![line("friction.a", Knowledge::OpenAbove)],
+            advice: vec!["measure the release".to_owned()],
+            ..Report::default()
+        };
+        assert_eq!(next_step_sentence(&open).plain_text(), "Measure the release.");
+        assert!(next_step_sentence(&Report::default()).plain_text().starts_with("Film the blade"));
+        let mut stopped = line("friction.a", Knowledge::NotIdentified);
+        stopped.bounds = [0.1, 0.5];
+        let stopped = Report { parameters: vec![stopped], ..Report::default() };
+        assert!(next_step_sentence(&stopped).plain_text().starts_with("Widen the bounds of friction.a"));
+        let good = filmed(1.0, vec![target(100.0, 1.0, true)]);
+        assert!(next_step_sentence(&good).plain_text().starts_with("Test the model on a recording"));
+    }
+}

@@ -1,0 +1,118 @@
+//! The paper's own scheme, for comparison: the classical Runge-Kutta method in fixed steps on all four
+//! states, stick as the constraint `Phi = v3 - alpha = 0` imposed at the level of accelerations and
+//! stabilised (Baumgarte, Comp. Meth. Appl. Mech. Eng. 1, 1972),
+//!
+//! ```text
+//! Phi'' + 2 a Phi' + b^2 Phi = 0,   a = b
+//! ```
+//!
+//! and transitions taken at a step's end or located by the slack variable method. The paper prints neither
+//! step nor gain.
+
+use super::phases::{ContactInstant, DrivenBlade, GUARDS, TipForces, apply_friction, pose_from_states};
+use crate::model::shoulder::ShoulderContact;
+use crate::model::{LinkDirections, Pose};
+use crate::ode::HybridPhase;
+pub use crate::ode::fixed_step::FixedStepLocator;
+use crate::ode::fixed_step::FixedStepOptions;
+
+/// Gain of the stabilisation unless asked for otherwise, 1/s: what the tip has drifted decays within 0.1 ms,
+/// a tenth of a stick-slip cycle.
+pub const DEFAULT_GAIN_PER_S: f64 = 1e4;
+/// Largest product of gain and step: beyond it the classical Runge-Kutta method is unstable for the double
+/// pole at `-a` (Hairer and Wanner, "Solving Ordinary Differential Equations II", section IV.2).
+pub const LARGEST_GAIN_TIMES_STEP: f64 = 2.785;
+
+/// The scheme's settings.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FixedStepScheme {
+    /// Length of a step, s.
+    pub step_s: f64,
+    /// Where a transition takes place.
+    pub locate: FixedStepLocator,
+    /// Gains `a = b` of the stabilisation, 1/s. Without gain the tip's velocity is taken out at the
+    /// transition, or it would never decay.
+    pub gain_per_s: f64,
+}
+
+impl FixedStepScheme {
+    /// What the integrator takes of it.
+    #[must_use]
+    pub fn integrator_options(&self) -> FixedStepOptions {
+        FixedStepOptions { step_s: self.step_s, locate: self.locate }
+    }
+}
+
+/// The tip is drawn to `place_m`; states `(theta, phi, theta_rate, phi_rate)`. The guards are those of
+/// [`super::phases::Stick`].
+#[derive(Debug, Clone, Copy)]
+pub struct StabilisedStickPhase<'a> {
+    /// The blade on its drive.
+    pub system: &'a DrivenBlade,
+    /// Where the tip is held, `alpha`, m.
+    pub place_m: f64,
+    /// Side of the shoulder.
+    pub lean: ShoulderContact,
+    /// Gains of the stabilisation, 1/s.
+    pub gain_per_s: f64,
+}
+
+impl<'a> StabilisedStickPhase<'a> {
+    /// Holds the tip where it is in this pose.
+    #[must_use]
+    pub fn from_pose(
+        system: &'a DrivenBlade,
+        t: f64,
+        pose: &Pose,
+        lean: ShoulderContact,
+        gain_per_s: f64,
+    ) -> Self {
+        let place_m =
+            system.linkage.tip_position_m(&LinkDirections::from_pose(pose), &system.drive.motion_at(t));
+        Self { system, place_m, lean, gain_per_s }
+    }
+
+    /// The forces that draw the tip to its place: `v3dd = a_free + kappa f = -2 a Phi' - a^2 Phi`.
+    #[inline]
+    pub(super) fn stabilised_forces(&self, pose: &Pose, at: &ContactInstant) -> TipForces {
+        let ContactInstant { head, directions, contact } = at;
+        let (linkage, gain) = (&self.system.linkage, self.gain_per_s);
+        let drift = linkage.tip_position_m(directions, head) - self.place_m;
+        let wanted = -gain * (2.0 * linkage.tip_velocity_m_per_s(pose, directions, head) + gain * drift);
+        let friction = (wanted - contact.a_free) / contact.kappa;
+        apply_friction(contact, friction, contact.n_free + contact.nu * friction, 1.0)
+    }
+}
+
+impl HybridPhase<4, GUARDS> for StabilisedStickPhase<'_> {
+    #[inline]
+    fn derivative(&self, t: f64, y: &[f64; 4]) -> [f64; 4] {
+        let pose = pose_from_states(y);
+        let forces = self.stabilised_forces(&pose, &self.system.contact_instant(t, &pose, self.lean));
+        [y[2], y[3], forces.accelerations[0], forces.accelerations[1]]
+    }
+
+    #[inline]
+    fn guards(&self, t: f64, y: &[f64; 4]) -> [f64; GUARDS] {
+        let pose = pose_from_states(y);
+        let at = self.system.contact_instant(t, &pose, self.lean);
+        let forces = self.stabilised_forces(&pose, &at);
+        let limit = self.system.linkage.friction.static_coefficient() * forces.normal_n;
+        let [forward, backward] = self.system.corner_distances(y[0], self.lean);
+        let LinkDirections { cos_theta, cos_phi, .. } = at.directions;
+        [
+            limit + forces.friction_n,
+            limit - forces.friction_n,
+            forces.normal_n,
+            forward,
+            backward,
+            cos_theta,
+            cos_phi,
+        ]
+    }
+
+    fn scale(&self) -> [f64; 4] {
+        let DrivenBlade { angle_scale, rate_scale, .. } = *self.system;
+        [angle_scale, angle_scale, rate_scale, rate_scale]
+    }
+}

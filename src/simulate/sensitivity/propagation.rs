@@ -1,0 +1,289 @@
+//! Carries derivatives along a run, from piece to piece and through its transitions.
+
+use super::TangentObserver;
+use super::saltation;
+use super::saltation::StrikeTangent;
+use super::seeds::TangentSeeds;
+use super::seeds::steady_slip_tangent;
+use super::stretch::{SeriesReference, StretchPlace, StretchPlanner, TangentStretch};
+use super::tangent_blocks::{StretchWorkspace, TangentBlock, TangentBlocks, rates_after};
+use super::tangent_segment::TangentSegment;
+use crate::model::modes::time_scales_rad_per_s;
+use crate::model::series::ContactMode;
+use crate::model::shoulder::ShoulderContact;
+use crate::model::tangent::LaneVector;
+use crate::simulate::event_loop::{RunWatcher, TipStrike};
+use crate::simulate::impact::ImpactOrigin;
+use crate::simulate::mode::TipMode;
+use crate::simulate::phases::{DrivenBlade, TaylorMotion};
+use crate::simulate::scene::{Scene, StartKind};
+use crate::simulate::solution_segment::{SegmentSolution, SolutionSegment};
+use crate::simulate::{Impact, Transition, initial_pose};
+use std::ops::ControlFlow;
+
+/// A guard that has fallen, before what follows is known.
+#[derive(Debug, Clone, Copy)]
+struct TriggeredGuard {
+    /// Its rate; `None` where derivatives are infinite or unknown.
+    rate: Option<f64>,
+    /// Rates of the state there: `theta'`, `phi'`, `theta''`, `phi''`, those of the gap and of its rate.
+    rates: [f64; 6],
+}
+
+/// Where the derivatives stand.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum TangentStatus {
+    /// At the end of the last piece.
+    Current,
+    /// Moved with a transition: what follows has not begun.
+    AtTransition,
+    /// There are none from here on.
+    Lost,
+}
+
+/// Where derivatives are computed, kept from run to run.
+#[derive(Debug, Default)]
+pub(super) struct TangentWorkspace {
+    blocks: Vec<TangentBlock>,
+    works: StretchWorkspace,
+}
+
+/// Watches a run and carries derivatives along.
+pub(super) struct TangentPropagator<'a, O> {
+    observer: &'a mut O,
+    blocks: TangentBlocks<'a>,
+    stand: TangentStatus,
+    fallen: Option<TriggeredGuard>,
+    last: Option<(TipMode, ShoulderContact)>,
+    /// The last stretch of the derivatives.
+    place: Option<StretchPlace>,
+    /// End of the last piece, s.
+    end_s: f64,
+    /// Share of its terms below which a guard's rate counts as that of a touch.
+    grazing: f64,
+    d_time_s: Vec<f64>,
+}
+
+impl<'a, O> TangentPropagator<'a, O> {
+    pub(super) fn new(
+        observer: &'a mut O,
+        system: &'a DrivenBlade,
+        seeds: &'a TangentSeeds,
+        room: &'a mut TangentWorkspace,
+        [tolerance, accuracy]: [f64; 2],
+    ) -> Self {
+        /// A guard's rate carries the error of the solution: above this share of its terms, and this many
+        /// tolerances, the time of its fall has derivatives good to about a thousandth.
+        const GRAZING: f64 = 1e-6;
+        const TOLERANCES: f64 = 1e3;
+        let TangentWorkspace { blocks, works } = room;
+        blocks.resize_with(seeds.blocks.len(), TangentBlock::default);
+        let fastest = time_scales_rad_per_s(&system.linkage).1;
+        Self {
+            observer,
+            blocks: TangentBlocks {
+                system,
+                seeds,
+                all: blocks,
+                works,
+                pace: StretchPlanner::new(accuracy, fastest),
+            },
+            stand: TangentStatus::Current,
+            fallen: None,
+            last: None,
+            place: None,
+            end_s: f64::NEG_INFINITY,
+            grazing: GRAZING.max(TOLERANCES * tolerance),
+            d_time_s: vec![0.0; seeds.len()],
+        }
+    }
+
+    /// Sets the derivatives of the state that a scene starts in.
+    pub(super) fn set_start(&mut self, scene: &Scene) {
+        let system = self.blocks.system;
+        let head = system.drive.motion_at(scene.start_s);
+        let slides = scene.start == StartKind::SteadySlide;
+        let pose = initial_pose(scene).filter(|_| slides);
+        for (block, seed) in self.blocks.iter_with_seeds() {
+            // (what a run before left there may be no number, and nought times that is none either)
+            *block = TangentBlock { state: seed.start, ..TangentBlock::default() };
+            let Some(pose) = pose else { continue };
+            let lean = scene.linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(pose.theta));
+            let d_speed = seed.head_velocity(system, scene.start_s);
+            match steady_slip_tangent(system, seed, lean, &pose, head.velocity_m_per_s, d_speed) {
+                Some(moved) => {
+                    block.state.angle[0] += moved[0];
+                    block.state.angle[1] += moved[1];
+                }
+                None => self.stand = TangentStatus::Lost,
+            }
+        }
+    }
+
+    /// Moves the derivatives with the transition at the guard that has fallen.
+    fn apply_transition(&mut self) {
+        let Some(fallen) = self.fallen.take() else { return };
+        if self.stand == TangentStatus::Lost {
+            return; // what is lost does not come back
+        }
+        let Some(rate) = fallen.rate else {
+            self.stand = TangentStatus::Lost;
+            return;
+        };
+        for block in self.blocks.all.iter_mut() {
+            block.time = (-1.0 / rate) * block.guard;
+            block.state.shift_in_time(&fallen.rates, block.time);
+        }
+        self.stand = TangentStatus::AtTransition;
+    }
+
+    /// What the derivatives of the next piece start from: the transition before it is over.
+    fn begin_segment(&mut self, mode: TipMode, motion: &TaylorMotion) {
+        let moved = self.stand == TangentStatus::AtTransition;
+        let rates = moved.then(|| rates_after(motion, mode, 0.0));
+        for block in self.blocks.all.iter_mut() {
+            if let Some(rates) = &rates {
+                block.state.shift_in_time(rates, -block.time);
+            }
+            if mode != TipMode::Flight {
+                (block.state.gap_m, block.state.gap_rate) = (LaneVector::ZERO, LaneVector::ZERO);
+            }
+        }
+        if moved {
+            self.stand = TangentStatus::Current;
+        }
+    }
+}
+
+/// Touch and lean of a piece.
+fn contact_of(piece: &SolutionSegment<'_>, motion: &TaylorMotion) -> (ContactMode, ShoulderContact) {
+    match &piece.solution {
+        SegmentSolution::Slip(slip, _) => (ContactMode::Slip(slip.direction), slip.lean),
+        SegmentSolution::Stick(stick, _) => (ContactMode::Stick, stick.lean),
+        SegmentSolution::Flight(flight, _) => (ContactMode::Flight(motion.drop_m[0], 0.0), flight.lean),
+        SegmentSolution::Held(held, _) => (ContactMode::Stick, held.lean),
+    }
+}
+
+impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
+    fn watch_segment(&mut self, piece: &SolutionSegment<'_>) {
+        let Some(motion) = piece.motion else {
+            self.stand = TangentStatus::Lost; // only Taylor series carry derivatives
+            return;
+        };
+        let (touch, lean) = contact_of(piece, motion);
+        let is_fresh = self.last != Some((piece.mode, lean));
+        if is_fresh {
+            self.apply_transition();
+        }
+        // (a guard after which the same goes on was only touched)
+        self.fallen = None;
+        self.last = Some((piece.mode, lean));
+        if self.stand != TangentStatus::Lost {
+            self.begin_segment(piece.mode, motion);
+        }
+        self.end_s = piece.end_s;
+        let course = SeriesReference { linkage: &self.blocks.system.linkage, touch, lean, motion };
+        let (mut from, end) = (0.0, piece.end_s - piece.start_s);
+        loop {
+            let TangentBlocks { system, seeds, .. } = self.blocks;
+            let span = if self.stand != TangentStatus::Lost && !self.blocks.all.is_empty() {
+                let span = self.blocks.propagate_stretch(
+                    &course,
+                    piece.start_s,
+                    [from, end],
+                    is_fresh && from == 0.0,
+                );
+                if !self.blocks.are_finite() {
+                    self.stand = TangentStatus::Lost;
+                }
+                span
+            } else {
+                let place = StretchPlace::whole_segment(touch, lean, piece.start_s, end);
+                TangentStretch::new(system, &seeds.sources, course, place)
+            };
+            let to = span.place.from + span.place.length;
+            let is_last = to >= end;
+            self.place = Some(span.place);
+            self.observer.observe_segment(&TangentSegment {
+                start_s: piece.start_s + from,
+                end_s: if is_last { piece.end_s } else { piece.start_s + to },
+                mode: piece.mode,
+                is_known: self.stand != TangentStatus::Lost,
+                piece,
+                span,
+                blocks: self.blocks.all,
+                seeds,
+            });
+            if is_last {
+                return;
+            }
+            from = to;
+        }
+    }
+
+    fn watch_guard(&mut self, guard: usize, motion: &TaylorMotion) {
+        let (Some(contact), Some(place)) = (self.last, self.place) else { return };
+        let TangentBlocks { system, seeds, .. } = self.blocks;
+        let StretchPlace { touch, lean, .. } = place;
+        let course = SeriesReference { linkage: &system.linkage, touch, lean, motion };
+        let span = TangentStretch::new(system, &seeds.sources, course, place);
+        let x = place.from + place.length;
+        let fall = saltation::FallingGuard { mode: contact.0, guard, x, span: &span };
+        let rate = fall.guard_slope().filter(|slope| slope.rate.abs() > self.grazing * slope.size);
+        if self.stand != TangentStatus::Lost {
+            fall.set_guard_derivatives(&mut self.blocks);
+        }
+        self.fallen = Some(TriggeredGuard {
+            rate: rate.map(|slope| slope.rate),
+            rates: rates_after(motion, contact.0, x),
+        });
+    }
+
+    fn watch_strike(&mut self, strike: &TipStrike) {
+        let is_fall = self.fallen.is_some();
+        self.apply_transition();
+        // (a tip jams where its force has a pole, or where a run begins: neither has a guard)
+        if !is_fall || strike.origin == ImpactOrigin::Jam || self.stand == TangentStatus::Lost {
+            self.stand = TangentStatus::Lost;
+            return;
+        }
+        let (t, system) = (self.end_s, self.blocks.system);
+        let head = system.drive.motion_at(t);
+        let struck = StrikeTangent { system, head, strike: *strike };
+        for (block, seed) in self.blocks.iter_with_seeds() {
+            let d_velocity = seed.head_velocity(system, t) + head.acceleration_m_per_s2 * block.time;
+            match struck.state_after(seed, &block.state, d_velocity) {
+                Some(after) => block.state = after,
+                None => self.stand = TangentStatus::Lost,
+            }
+        }
+    }
+
+    fn watch_transition(&mut self, transition: &Transition) {
+        if self.fallen.is_none() && self.stand == TangentStatus::Current {
+            self.stand = TangentStatus::Lost; // a transition without a guard: the tip jams
+        }
+        self.apply_transition();
+        for (time, &(block, lane)) in self.d_time_s.iter_mut().zip(&self.blocks.seeds.places) {
+            *time = self.blocks.all[block].time[lane];
+        }
+        let known = self.stand != TangentStatus::Lost && self.d_time_s.iter().all(|time| time.is_finite());
+        self.observer.observe_transition(transition, known.then_some(&self.d_time_s));
+    }
+
+    fn watch_impact(&mut self, _: &Impact) {}
+
+    fn control_flow(&self) -> ControlFlow<()> {
+        self.observer.control_flow()
+    }
+}
+
+#[cfg(test)]
+impl TangentWorkspace {
+    /// A room as a run whose derivatives are lost may leave it.
+    pub(super) fn of_no_numbers(blocks: usize) -> Self {
+        let blocks = std::iter::repeat_with(TangentBlock::of_no_numbers).take(blocks).collect();
+        Self { blocks, works: StretchWorkspace::of_no_numbers() }
+    }
+}

@@ -1,0 +1,193 @@
+//! How guards and impacts change with the state before them.
+
+use super::seeds::BlockSeed;
+use super::stretch::{SeriesReference, TangentStretch};
+use super::tangent_blocks::TangentBlocks;
+use super::tangent_segment::{Channel, ChannelWeights, DerivativeSum};
+use super::{DIFFERENCE_STEP, central_difference};
+use crate::model::shoulder::ShoulderContact;
+use crate::model::tangent::{LANES, LaneVector, StateTangent};
+use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
+use crate::ode::WorkCounters;
+use crate::simulate::event_loop::TipStrike;
+use crate::simulate::flight::LANDING;
+use crate::simulate::mode::TipMode;
+use crate::simulate::phases::{
+    BACKWARD_LIMIT, DrivenBlade, FORWARD_LIMIT, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST,
+    TIP_STOPS,
+};
+
+/// A guard that falls at the end of a stretch.
+pub(super) struct FallingGuard<'a> {
+    pub mode: TipMode,
+    pub guard: usize,
+    /// Time of its fall, s after the start of the motion's series.
+    pub x: f64,
+    pub span: &'a TangentStretch<'a>,
+}
+
+/// How a guard falls.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct GuardSlope {
+    /// Its rate there.
+    pub rate: f64,
+    /// What the rate's terms are in size: a rate far below is that of a guard that grazes zero.
+    pub size: f64,
+}
+
+/// A quantity of which a guard consists, with its factor.
+type GuardTerm = (Channel, f64);
+
+impl FallingGuard<'_> {
+    /// The guard as a sum; empty for one that has no derivative here.
+    fn guard_terms(&self) -> [Option<GuardTerm>; 2] {
+        let TangentStretch { system, course, .. } = self.span;
+        let limit = Some((Channel::NormalForce, system.linkage.friction.static_coefficient()));
+        if let Some(side) = SHOULDER_GUARDS.iter().position(|&corner| corner == self.guard) {
+            return [Some((Channel::NeckAngle, system.corner_signs(course.lean)[side])), None];
+        }
+        match (self.mode, self.guard) {
+            (TipMode::Flight, LANDING) => [Some((Channel::TipHeight, 1.0)), None],
+            (TipMode::SlipForward | TipMode::SlipBackward, TIP_STOPS) => {
+                [Some((Channel::TipVelocity, self.mode.direction())), None]
+            }
+            (TipMode::SlipForward | TipMode::SlipBackward, SLIP_CONTACT_LOST)
+            | (TipMode::Stick, STICK_CONTACT_LOST) => [Some((Channel::NormalForce, 1.0)), None],
+            (TipMode::Stick, FORWARD_LIMIT) => [limit, Some((Channel::FrictionForce, 1.0))],
+            (TipMode::Stick, BACKWARD_LIMIT) => [limit, Some((Channel::FrictionForce, -1.0))],
+            _ => [None; 2],
+        }
+    }
+
+    /// Rate of the guard; `None` for one that has no derivative.
+    pub fn guard_slope(&self) -> Option<GuardSlope> {
+        let (terms, motion) = (self.guard_terms(), self.span.course.motion);
+        terms[0]?;
+        let (mut slope, mut power) = (GuardSlope { rate: 0.0, size: 0.0 }, 1.0);
+        for k in 1..=motion.order {
+            let coefficient = |(channel, factor): GuardTerm| {
+                factor
+                    * match channel {
+                        Channel::TipVelocity => motion.tip_velocity[k],
+                        Channel::NormalForce => motion.normal_n(k),
+                        Channel::FrictionForce => motion.friction_n[k],
+                        Channel::NeckAngle => motion.angle[k][0],
+                        _ => motion.gap_rate[k - 1] / k as f64,
+                    }
+            };
+            let sum: f64 = terms.into_iter().flatten().map(coefficient).sum();
+            slope.rate += k as f64 * sum * power;
+            slope.size += (k as f64 * sum * power).abs();
+            power *= self.x;
+        }
+        Some(slope)
+    }
+
+    /// Sets the derivatives of the guard in all directions.
+    pub fn set_guard_derivatives(&self, blocks: &mut TangentBlocks<'_>) {
+        let SeriesReference { motion, lean, .. } = self.span.course;
+        let weights = ChannelWeights::at_time(self.x, motion.order);
+        let terms = self.guard_terms();
+        let sums = terms.map(|term| {
+            term.map(|(channel, factor)| (DerivativeSum::from_weights(self.span, channel, &weights), factor))
+        });
+        let normal: f64 = (0..=motion.order).rev().fold(0.0, |sum, k| sum * self.x + motion.normal_n(k));
+        for (block, seed) in blocks.iter_with_seeds() {
+            block.guard = LaneVector::ZERO;
+            for (sum, factor) in sums.iter().flatten() {
+                let row = sum.block_derivatives(block, seed);
+                block.guard.add_scaled(*factor, &row);
+            }
+            let Some(own) = &seed.linkage else { continue };
+            match terms[0] {
+                // the corners lie at the contact angle, whose sign in both is that of the free neck's guards
+                Some((Channel::NeckAngle, _)) if lean == ShoulderContact::Off => {
+                    block.guard += own.contact_angle_rad
+                }
+                Some((Channel::NeckAngle, _)) => block.guard -= own.contact_angle_rad,
+                Some((Channel::NormalForce, _)) if terms[1].is_some() => {
+                    block.guard += normal * (own.friction_a + own.friction_c);
+                }
+                _ => {}
+            }
+        }
+    }
+}
+
+/// The state at a strike.
+pub(super) struct StrikeTangent<'a> {
+    pub system: &'a DrivenBlade,
+    pub head: HeadMotion,
+    pub strike: TipStrike,
+}
+
+impl StrikeTangent<'_> {
+    /// Derivatives of the state behind an impact from those before it, at the instant that moves with the
+    /// strike; `d_velocity` are those of the head's velocity there. `None` where they do not exist.
+    pub(super) fn state_after(
+        &self,
+        seed: &BlockSeed,
+        before: &StateTangent,
+        d_velocity: LaneVector,
+    ) -> Option<StateTangent> {
+        let mut after = StateTangent { gap_m: LaneVector::ZERO, ..*before };
+        for lane in 0..LANES {
+            let [neck, lip, gap] = self.lane_after(seed, before, d_velocity[lane], lane)?;
+            (after.rate[0][lane], after.rate[1][lane], after.gap_rate[lane]) = (neck, lip, gap);
+        }
+        Some(after)
+    }
+
+    fn lane_after(
+        &self,
+        seed: &BlockSeed,
+        before: &StateTangent,
+        d_velocity: f64,
+        lane: usize,
+    ) -> Option<[f64; 3]> {
+        /// Tolerance of the impacts that are compared: far below what the differences show.
+        const TOLERANCE: f64 = 1e-14;
+        let TipStrike { pose, restitution, .. } = self.strike;
+        let d = [before.angle[0], before.angle[1], before.rate[0], before.rate[1]].map(|row| row[lane]);
+        // (a train of rebounds that is closed has none)
+        let d_restitution = if restitution == 0.0 { 0.0 } else { seed.restitution[lane] };
+        let d_normal = before.gap_rate[lane];
+        let relative =
+            self.relative_change(d, d_normal, d_velocity).max(seed.relative[lane]).max(d_restitution.abs());
+        if relative == 0.0 {
+            return Some([d[2], d[3], 0.0]);
+        }
+        central_difference(DIFFERENCE_STEP / relative, |x| {
+            let linkage: Linkage = seed
+                .linkage
+                .as_ref()
+                .map_or(self.system.linkage, |own| own.displace_linkage(&self.system.linkage, lane, x));
+            let pose = Pose {
+                theta: pose.theta + x * d[0],
+                phi: pose.phi + x * d[1],
+                theta_rate: pose.theta_rate + x * d[2],
+                phi_rate: pose.phi_rate + x * d[3],
+            };
+            let head =
+                HeadMotion { velocity_m_per_s: self.head.velocity_m_per_s + x * d_velocity, ..self.head };
+            let mut strike = TipStrike { pose, restitution: restitution + x * d_restitution, ..self.strike };
+            strike.before.normal += x * d_normal;
+            strike.before.tangential =
+                linkage.tip_velocity_m_per_s(&pose, &LinkDirections::from_pose(&pose), &head);
+            let (after, _) = strike.solve_on_blade(&linkage, TOLERANCE, &mut WorkCounters::default())?;
+            Some([after.pose.theta_rate, after.pose.phi_rate, after.gap_rate_m_per_s])
+        })
+    }
+
+    /// Largest change of what decides an impact, relative to its scale, over the unit of the direction.
+    fn relative_change(&self, d: [f64; 4], d_normal: f64, d_velocity: f64) -> f64 {
+        let TipStrike { before, .. } = self.strike;
+        let Linkage { l1_m: l1, l2_m: l2, friction, .. } = self.system.linkage;
+        let speed = before.normal.abs().max(before.tangential.abs());
+        let along = l1 * d[2].abs() + l2 * d[3].abs() + d_velocity.abs();
+        // speeds change friction on the scale of its decay
+        let scale = if friction.b_s_per_m > 0.0 { speed.min(1.0 / friction.b_s_per_m) } else { speed };
+        let normal = if d_normal == 0.0 { 0.0 } else { (d_normal / before.normal).abs() };
+        d[0].abs().max(d[1].abs()).max(along / scale).max(normal)
+    }
+}

@@ -1,0 +1,181 @@
+//! A stretch of a piece over which derivatives are collocated, and how long it may be.
+
+use super::source::{HeadPolynomial, TangentSource};
+use crate::math;
+use crate::model::series::ContactMode;
+use crate::model::shoulder::ShoulderContact;
+use crate::model::tangent;
+use crate::model::tangent::LaneVector;
+use crate::ode::collocation::{
+    CollocationRule, LEAST_NODES, LaneNumber, MOST_NODES, SquareMatrix, collocation_rule, invert_square,
+    multiply_row,
+};
+use crate::simulate::phases::DrivenBlade;
+
+/// Number of coefficients of a motion's series.
+pub(super) const SERIES_TERMS: usize = crate::ode::polynomial::TERMS + 2;
+
+/// The motion that is varied.
+pub(super) type SeriesReference<'a> = tangent::ReferenceMotion<'a, SERIES_TERMS>;
+
+impl LaneNumber for LaneVector {
+    #[inline(always)]
+    fn splat(x: f64) -> Self {
+        Self::splat(x)
+    }
+
+    #[inline(always)]
+    fn scale_by(self, factor: f64) -> Self {
+        factor * self
+    }
+}
+
+/// Where a stretch lies in the motion of its piece.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct StretchPlace {
+    /// How the tip touches the glass, and on which side the neck leans.
+    pub touch: ContactMode,
+    pub lean: ShoulderContact,
+    /// Start of the motion's series, s.
+    pub start_s: f64,
+    /// Start of the stretch after it, s, and its length, s.
+    pub from: f64,
+    pub length: f64,
+    pub rule: &'static CollocationRule,
+    /// Rate of change of the fastest derivative, 1/s.
+    pub rapid: f64,
+}
+
+impl StretchPlace {
+    /// A piece as one stretch, without derivatives.
+    pub fn whole_segment(touch: ContactMode, lean: ShoulderContact, start_s: f64, length: f64) -> Self {
+        Self { touch, lean, start_s, from: 0.0, length, rule: collocation_rule(LEAST_NODES), rapid: 0.0 }
+    }
+}
+
+/// A stretch and what moves along it.
+pub(super) struct TangentStretch<'a> {
+    pub system: &'a DrivenBlade,
+    pub course: SeriesReference<'a>,
+    pub place: StretchPlace,
+    pub sources: &'a [TangentSource],
+    pub head: Option<HeadPolynomial<'a>>,
+}
+
+impl<'a> TangentStretch<'a> {
+    pub fn new(
+        system: &'a DrivenBlade,
+        sources: &'a [TangentSource],
+        course: SeriesReference<'a>,
+        place: StretchPlace,
+    ) -> Self {
+        let velocity = &course.motion.head_velocity[..=course.motion.order];
+        let head = HeadPolynomial::from_drive(sources, &system.drive, place.start_s, velocity);
+        Self { system, course, place, sources, head }
+    }
+
+    /// Number of unknowns.
+    pub fn unknown_count(&self) -> usize {
+        match self.place.touch {
+            ContactMode::Stick => 1,
+            ContactMode::Slip(_) => 2,
+            ContactMode::Flight(..) => 3,
+        }
+    }
+
+    /// Times of nodes four by four, s after the start of the motion.
+    pub fn node_chunks(&self) -> impl Iterator<Item = LaneVector> {
+        let StretchPlace { from, length, rule, .. } = self.place;
+        let chunks = rule.positions.as_chunks().0;
+        chunks[..rule.nodes.div_ceil(tangent::LANES)]
+            .iter()
+            .map(move |&places| LaneVector::splat(from) + length * LaneVector(places))
+    }
+}
+
+/// How many nodes a stretch takes.
+#[derive(Debug, Clone)]
+pub(super) struct StretchPlanner {
+    /// Radians, or decays, of the fastest derivative that each number of nodes resolves.
+    limits: [f64; MOST_NODES + 1],
+    /// Rates that were found last in stick, slip and flight off the shoulder, and on it, 1/s.
+    rapid: [f64; 6],
+}
+
+impl StretchPlanner {
+    /// At this tolerance, relative; `fastest` is a first guess of the fastest rate, 1/s.
+    ///
+    /// Within a step of `z` radians `s` nodes leave of a sine `z^(s + 2) s! / (4 s^2 (2 s)!)`: the first
+    /// Legendre polynomial that is missing in its second derivative, integrated twice.
+    pub fn new(relative: f64, fastest: f64) -> Self {
+        let mut limits = [0.0; MOST_NODES + 1];
+        let mut ratio = 1.0; // (2 s)! / s!
+        for (s, limit) in limits.iter_mut().enumerate().skip(1) {
+            ratio *= (2 * (2 * s - 1)) as f64;
+            *limit = math::powf(relative * 4.0 * (s * s) as f64 * ratio, 1.0 / (s + 2) as f64);
+        }
+        Self { limits, rapid: [fastest; 6] }
+    }
+
+    /// Nodes and length of the next stretch, at most `rest`.
+    pub fn plan_stretch(&self, course: &SeriesReference<'_>, rest: f64) -> (&'static CollocationRule, f64) {
+        /// Parts of a step at most: numbers that are none make no end.
+        const MOST_PARTS: f64 = 1e3;
+        /// Share by which the rate may have risen since.
+        const MARGIN: f64 = 1.1;
+        let rapid = MARGIN * self.rapid[rate_index(course)];
+        let parts = (rapid * rest / self.limits[MOST_NODES]).ceil().clamp(1.0, MOST_PARTS);
+        let length = if parts > 1.0 { rest / parts } else { rest };
+        let wanted = rapid * length;
+        let nodes = (LEAST_NODES..MOST_NODES).find(|&s| wanted <= self.limits[s]).unwrap_or(MOST_NODES);
+        (collocation_rule(nodes), length)
+    }
+
+    /// Learns the rate that was found on a stretch; whether its nodes resolve it.
+    pub fn record_rate(
+        &mut self,
+        course: &SeriesReference<'_>,
+        found: f64,
+        rule: &CollocationRule,
+        length: f64,
+    ) -> bool {
+        let rapid = &mut self.rapid[rate_index(course)];
+        if found.is_finite() {
+            *rapid = found;
+        }
+        *rapid * length <= self.limits[rule.nodes]
+    }
+}
+
+/// Place of a course among the rates.
+fn rate_index(course: &SeriesReference<'_>) -> usize {
+    let touch = match course.touch {
+        ContactMode::Stick => 0,
+        ContactMode::Slip(_) => 1,
+        ContactMode::Flight(..) => 2,
+    };
+    touch + if course.lean == ShoulderContact::Off { 0 } else { 3 }
+}
+
+/// A bound of the rates of `m y'' + d y' + k y = 0`, 1/s: the root of `x^2 = x |m^-1 d| + |m^-1 k|` with the
+/// sizes of the matrices' eigenvalues.
+pub(super) fn bound_rate<const D: usize>(
+    mass: &SquareMatrix<D>,
+    damping: &SquareMatrix<D>,
+    stiffness: &SquareMatrix<D>,
+) -> f64 {
+    let inverse = invert_square(mass);
+    let size = |matrix: &SquareMatrix<D>| {
+        let columns: [[f64; D]; D] =
+            std::array::from_fn(|c| multiply_row(&inverse, &matrix.map(|row| row[c])));
+        if D == 1 {
+            return columns[0][0].abs();
+        }
+        // (the gap in flight is slower than the links)
+        let half = 0.5 * (columns[0][0] + columns[1][1]);
+        let determinant = columns[0][0] * columns[1][1] - columns[1][0] * columns[0][1];
+        half.abs() + (half * half - determinant).abs().sqrt()
+    };
+    let (damping, stiffness) = (0.5 * size(damping), size(stiffness));
+    damping + (damping * damping + stiffness).sqrt()
+}

@@ -1,0 +1,243 @@
+//! A scene seen by a camera: frame rate, exposure, pixel size, tracking noise and dropouts. What comes out is
+//! synthetic and says so.
+
+pub mod film;
+pub mod spec;
+
+use super::outputs::{ShutterObserver, StickIntervals};
+use super::scene::Scene;
+use super::{Observer, RunResult, SolverOptions, run_scene_with};
+pub use crate::camera::Camera;
+use crate::math::StandardNormal;
+use crate::model::parameters::PARAMETERS;
+use crate::recording::{FrameGrid, Recording, RecordingError, Traces};
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+use std::fmt::Write;
+
+/// What tracking adds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TrackingModel {
+    /// Length that a pixel shows, m.
+    pub metres_per_pixel: f64,
+    /// Standard deviation of a tracked coordinate, pixels.
+    pub noise_px: f64,
+    /// Probability that a point is lost in a frame.
+    pub dropout_fraction: f64,
+    /// Seed of noise and dropouts.
+    pub seed: u64,
+}
+
+/// What the camera saw of a scene, before tracking.
+#[derive(Debug, Clone)]
+pub struct TwinView {
+    /// The traces, without noise.
+    pub recording: Recording,
+    /// How the simulation went.
+    pub run: RunResult,
+    /// When the tip stuck, s of the scene's time.
+    pub stick_s: Vec<[f64; 2]>,
+}
+
+/// Why a view cannot be made.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum TwinViewError {
+    /// The simulation stopped before two frames were taken.
+    #[error("the simulation ended as {} at {stopped_at_s} s, before two frames were taken: {}", .status.name(), .status.meaning())]
+    Early {
+        /// How it ended.
+        status: super::RunStatus,
+        /// When, s.
+        stopped_at_s: f64,
+    },
+    /// The traces do not make a recording.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+}
+
+/// Runs the scene and records it from `start_s` to `stop_s` of its own time, without noise.
+///
+/// The glass lies at `y = -(l1 + l2)`: the origin is the head of the upright blade. A frame is the mean over
+/// its exposure, which is cut to the time from `start_s` to `stop_s`.
+///
+/// # Errors
+/// [`TwinViewError`]; a run that stops after some frames is a view of those frames.
+pub fn film_scene(
+    scene: &Scene,
+    camera: &Camera,
+    start_s: f64,
+    stop_s: f64,
+    effort: SolverOptions,
+) -> Result<TwinView, TwinViewError> {
+    film_scene_with_observer(scene, camera, [start_s, stop_s], effort, &mut ())
+}
+
+/// As [`film_scene`], from the first to the second of two instants; `observer` sees the run too.
+///
+/// # Errors
+/// As [`film_scene`].
+pub fn film_scene_with_observer(
+    scene: &Scene,
+    camera: &Camera,
+    [start_s, stop_s]: [f64; 2],
+    effort: SolverOptions,
+    observer: &mut impl Observer,
+) -> Result<TwinView, TwinViewError> {
+    let frames = ((stop_s - start_s) * camera.frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1;
+    let grid = FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames };
+    let half_s = 0.5 * camera.exposure_s;
+    let open = (0..frames)
+        .map(|i| [grid.time_s(i) - half_s, grid.time_s(i) + half_s].map(|t| t.clamp(start_s, stop_s)));
+    let glass_y_m = -(scene.linkage.l1_m + scene.linkage.l2_m);
+    let mut traces = Traces::default();
+    let shutters = ShutterObserver::new(open, |place| {
+        traces.tip_x_m.push(Some(place.tip_x_m));
+        traces.tip_y_m.push(Some(glass_y_m + place.tip_height_m));
+        traces.head_x_m.push(Some(place.head_x_m));
+        traces.head_y_m.push(Some(-place.head_drop_m));
+    });
+    let mut observers = ((shutters, StickIntervals::default()), observer);
+    let run = run_scene_with(scene, effort, &mut observers);
+    let stick_s = observers.0.1.0;
+    let frames = traces.tip_x_m.len();
+    if frames < 2 {
+        return Err(TwinViewError::Early { status: run.status, stopped_at_s: run.stopped_at_s });
+    }
+    let recording = Recording::new(scene.title(), FrameGrid { frames, ..grid }, traces, true)?;
+    Ok(TwinView { recording, run, stick_s })
+}
+
+/// What a tracking program makes of a view: white noise on every coordinate and lost points.
+///
+/// # Errors
+/// [`RecordingError`] when noise leaves the finite numbers.
+pub fn add_tracking_noise(
+    view: &Recording,
+    name: &str,
+    tracking: &TrackingModel,
+) -> Result<Recording, RecordingError> {
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(tracking.seed);
+    let noise_m = tracking.noise_px * tracking.metres_per_pixel;
+    let mut traces = Traces::default();
+    let seen = view.traces();
+    for i in 0..view.grid().frames {
+        let mut point = |x: Option<f64>, y: Option<f64>| {
+            // three draws a point even where it is lost, so that one setting does not reshuffle the others
+            let lost = generator.random::<f64>() < tracking.dropout_fraction;
+            let (dx, dy): (f64, f64) = (generator.sample(StandardNormal), generator.sample(StandardNormal));
+            let place = |value: Option<f64>, noise: f64| value.filter(|_| !lost).map(|v| v + noise_m * noise);
+            (place(x, dx), place(y, dy))
+        };
+        let (tip_x, tip_y) = point(seen.tip_x_m[i], seen.tip_y_m[i]);
+        let (head_x, head_y) = point(seen.head_x_m[i], seen.head_y_m[i]);
+        traces.tip_x_m.push(tip_x);
+        traces.tip_y_m.push(tip_y);
+        traces.head_x_m.push(head_x);
+        traces.head_y_m.push(head_y);
+    }
+    Recording::new(name, view.grid(), traces, true)
+}
+
+/// Every parameter of the scene behind a twin, by name, in SI: the truth that a fit is held against.
+#[must_use]
+pub fn true_parameters(scene: &Scene) -> toml::Table {
+    PARAMETERS
+        .iter()
+        .filter_map(|p| scene.value(p.name).map(|value| (p.name.to_owned(), toml::Value::Float(value))))
+        .collect()
+}
+
+// A twin in the layout that Tracker's export dialog writes, so that the real importer can be tried on it.
+
+/// Names of the tracks: the mark that the data are synthetic travels in the file itself.
+pub const SYNTHETIC_TRACK_NAMES: [&str; 2] = ["synthetic tip", "synthetic head"];
+
+/// The recording as a tab-separated table of two tracks in pixels, y upwards, time from the first frame; an
+/// empty cell where a point was lost. Numbers carry seven digits, as Tracker's do.
+#[must_use]
+pub fn write_tracker_table(recording: &Recording, metres_per_pixel: f64) -> String {
+    let [tip, head] = SYNTHETIC_TRACK_NAMES;
+    let mut text = format!("#multi:\n\t{tip}\t\t{head}\t\t\nt\tx\ty\tx\ty\t\n");
+    let traces = recording.traces();
+    let columns = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
+    for i in 0..recording.grid().frames {
+        // writing to a String cannot fail
+        let _ = write!(text, "{}", format_java_number(i as f64 / recording.grid().frame_rate_hz));
+        for column in columns {
+            text.push('\t');
+            if let Some(value) = column[i] {
+                text.push_str(&format_java_number(value / metres_per_pixel));
+            }
+        }
+        text.push('\n');
+    }
+    text
+}
+
+/// `1.234567E-1`: Java's scientific notation without a sign in front of a positive exponent.
+fn format_java_number(value: f64) -> String {
+    format!("{value:.6E}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::recording::{FrameGrid, Traces};
+
+    #[test]
+    fn noise_and_dropouts_have_the_stated_size() {
+        let frames = 20_000;
+        let column = vec![Some(1.0); frames];
+        let traces = Traces {
+            tip_x_m: column.clone(),
+            tip_y_m: column.clone(),
+            head_x_m: column.clone(),
+            head_y_m: column,
+            ..Traces::default()
+        };
+        let view =
+            Recording::new("still", FrameGrid { start_s: 0.0, frame_rate_hz: 1e4, frames }, traces, true)
+                .unwrap();
+        let tracking =
+            TrackingModel { metres_per_pixel: 2e-5, noise_px: 0.1, dropout_fraction: 0.05, seed: 3 };
+        let seen = add_tracking_noise(&view, "noisy", &tracking).unwrap();
+        let present: Vec<f64> = seen.traces().tip_x_m.iter().flatten().copied().collect();
+        let sd = (present.iter().map(|x| (x - 1.0).powi(2)).sum::<f64>() / present.len() as f64).sqrt();
+        assert!((sd / 2e-6 - 1.0).abs() < 0.03, "{sd}"); // 6 standard errors of a standard deviation
+        let lost = 1.0 - present.len() as f64 / frames as f64;
+        assert!((lost - 0.05).abs() < 6.0 * (0.05 * 0.95 / frames as f64).sqrt(), "{lost}");
+        assert_eq!(
+            seen,
+            add_tracking_noise(&view, "noisy", &tracking).unwrap(),
+            "a seed gives one recording"
+        );
+        let again =
+            add_tracking_noise(&view, "noisy", &TrackingModel { dropout_fraction: 0.0, ..tracking }).unwrap();
+        let kept = seen
+            .traces()
+            .tip_x_m
+            .iter()
+            .zip(&again.traces().tip_x_m)
+            .filter(|(a, _)| a.is_some())
+            .all(|(a, b)| a == b);
+        assert!(kept, "dropouts do not reshuffle the noise");
+    }
+
+    #[test]
+    fn the_table_has_trackers_layout() {
+        let column = |a: Option<f64>, b: f64| vec![a, Some(b)];
+        let traces = Traces {
+            tip_x_m: column(Some(2e-3), 4e-3),
+            tip_y_m: column(Some(-6e-3), -6e-3),
+            head_x_m: column(None, 0.0),
+            head_y_m: column(None, 1e-6),
+            ..Traces::default()
+        };
+        let recording =
+            Recording::new("r", FrameGrid { start_s: 0.3, frame_rate_hz: 1e4, frames: 2 }, traces, true)
+                .unwrap();
+        let lines = "#multi:\n\tsynthetic tip\t\tsynthetic head\t\t\nt\tx\ty\tx\ty\t\n0.000000E0\t1.000000E2\t-3.000000E2\t\t\n\
+                     1.000000E-4\t2.000000E2\t-3.000000E2\t0.000000E0\t5.000000E-2\n";
+        assert_eq!(write_tracker_table(&recording, 2e-5), lines);
+    }
+}

@@ -1,0 +1,385 @@
+//! A finely sampled trace seen by a camera, so that a simulated trace can be held against a measured one like
+//! with like.
+//!
+//! Between its samples the trace is a polynomial of the fifth degree through the six samples around, of which
+//! the mean over the open shutter is exact. At [`LEAST_OVERSAMPLING`] samples a frame a sine of half the
+//! frame rate is passed with an error of 0.12 % of its amplitude next to the sinc of its exposure, one of a
+//! quarter of the frame rate with 0.002 %; what is faster than half the frame rate (and appears folded) takes
+//! 8 samples a cycle for 0.12 %. A stick-slip cycle jumps in its acceleration: there the error falls with the
+//! square of the time between samples, and on the bundled blade it is 2 nm at 20,000 samples/s.
+
+use super::Camera;
+use crate::math::StandardNormal;
+use crate::recording::channel::ReversalInstants;
+use crate::recording::quality::noise_floor;
+use crate::recording::{
+    FrameGrid, ON_FRAME_TOLERANCE, Recording, RecordingError, STENCIL, Traces, frame_at, lagrange_through_six,
+};
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+/// Samples of the fine trace in the time of a frame, at least, so that the error above holds.
+pub const LEAST_OVERSAMPLING: f64 = 4.0;
+/// Nodes and weights of the three-point Gauss-Legendre rule on [0, 1] (Abramowitz and Stegun, table 25.4):
+/// exact to the fifth degree.
+const GAUSS: [(f64, f64); 3] =
+    [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
+
+/// Why a trace cannot be filmed.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum FilmError {
+    /// The camera cannot film.
+    #[error("camera: found {key} = {found}, expected {expected}; correct the value")]
+    Camera {
+        /// Which key.
+        key: &'static str,
+        /// Its value.
+        found: f64,
+        /// What it takes.
+        expected: &'static str,
+    },
+    /// The trace has too few samples between frames.
+    #[error(
+        "{trace}: found {fine_hz} samples/s, expected at least {least_hz} for a camera of {frame_rate_hz} frames/s; raise [run] sample_rate_hz in the scene and simulate again"
+    )]
+    TooCoarse {
+        /// Name of the trace.
+        trace: String,
+        /// Its rate, 1/s.
+        fine_hz: f64,
+        /// [`LEAST_OVERSAMPLING`] times the frame rate, 1/s.
+        least_hz: f64,
+        /// Rate of the camera, 1/s.
+        frame_rate_hz: f64,
+    },
+    /// The trace has fewer samples than a piece of the path runs through.
+    #[error(
+        "{trace}: found {found} samples, expected at least {STENCIL}; raise [run] stop_s in the scene and simulate again"
+    )]
+    TooShort {
+        /// Name of the trace.
+        trace: String,
+        /// Number of its samples.
+        found: usize,
+    },
+    /// The first frame lies outside the trace.
+    #[error(
+        "{trace}: found a first frame at {found_s} s, expected one between {start_s} and {end_s} s, in the trace"
+    )]
+    Outside {
+        /// Name of the trace.
+        trace: String,
+        /// Instant of the first frame, s.
+        found_s: f64,
+        /// First sample, s.
+        start_s: f64,
+        /// Last sample, s.
+        end_s: f64,
+    },
+    /// The frames do not make a recording.
+    #[error("{trace}: {error}")]
+    Recording {
+        /// Name of the trace.
+        trace: String,
+        /// Why.
+        error: RecordingError,
+    },
+}
+
+/// What `camera` sees of the trace `fine` from `start_s`, s of its time, to its end, without noise; marked
+/// synthetic, with the trace's clock and name. Every frame is the mean over the exposure centred on its
+/// instant; what the shutter shows beyond the ends of the trace is its outermost sample, as in
+/// [`super::view`]. A frame that rests on a missing sample is missing.
+///
+/// A camera without exposure whose every frame falls on a sample takes those samples, at any rate.
+///
+/// # Errors
+/// [`FilmError`].
+pub fn film_trace(fine: &Recording, camera: &Camera, start_s: f64) -> Result<Recording, FilmError> {
+    check_film_camera(camera)?;
+    let grid = plan_frames(fine, camera, start_s)?;
+    let shutter = FrameShutter::new(fine, camera, &grid);
+    shutter.check_sampling(fine, camera, &grid)?;
+    let seen = |column: &[Option<f64>]| -> Vec<Option<f64>> {
+        (0..grid.frames).map(|frame| shutter.frame_mean(column, frame)).collect()
+    };
+    let traces = fine.traces();
+    let traces = Traces {
+        tip_x_m: seen(&traces.tip_x_m),
+        tip_y_m: seen(&traces.tip_y_m),
+        head_x_m: seen(&traces.head_x_m),
+        head_y_m: seen(&traces.head_y_m),
+        ..Traces::default()
+    };
+    Recording::new(fine.name(), grid, traces, true)
+        .map_err(|error| FilmError::Recording { trace: fine.name().to_owned(), error })
+}
+
+fn check_film_camera(camera: &Camera) -> Result<(), FilmError> {
+    let Camera { frame_rate_hz, exposure_s } = *camera;
+    if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
+        return Err(FilmError::Camera {
+            key: "frame_rate_hz",
+            found: frame_rate_hz,
+            expected: "a number above 0",
+        });
+    }
+    if !(0.0..=1.0 / frame_rate_hz).contains(&exposure_s) {
+        return Err(FilmError::Camera {
+            key: "exposure_s",
+            found: exposure_s,
+            expected: "0 to the time between frames",
+        });
+    }
+    Ok(())
+}
+
+/// The camera's frames from `start_s` to the last sample; never more than samples.
+fn plan_frames(fine: &Recording, camera: &Camera, start_s: f64) -> Result<FrameGrid, FilmError> {
+    let (trace, grid) = (fine.name().to_owned(), fine.grid());
+    let (fine_hz, end_s) = (grid.frame_rate_hz, grid.time_s(grid.frames - 1));
+    let least_hz = LEAST_OVERSAMPLING * camera.frame_rate_hz;
+    if fine_hz < camera.frame_rate_hz * (1.0 - ON_FRAME_TOLERANCE) {
+        return Err(FilmError::TooCoarse { trace, fine_hz, least_hz, frame_rate_hz: camera.frame_rate_hz });
+    }
+    let slack_s = ON_FRAME_TOLERANCE / fine_hz;
+    if !(grid.start_s - slack_s..=end_s + slack_s).contains(&start_s) {
+        return Err(FilmError::Outside { trace, found_s: start_s, start_s: grid.start_s, end_s });
+    }
+    // bounded by the samples
+    let frames =
+        ((end_s - start_s) * camera.frame_rate_hz + ON_FRAME_TOLERANCE).floor().max(0.0) as usize + 1;
+    Ok(FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames })
+}
+
+/// Where the open shutter lies on the samples, in samples (real numbers).
+struct FrameShutter {
+    first: f64,
+    samples_per_frame: f64,
+    open: f64,
+    last: f64,
+}
+
+impl FrameShutter {
+    fn new(fine: &Recording, camera: &Camera, grid: &FrameGrid) -> Self {
+        let (start_s, rate_hz, frames) = (fine.grid().start_s, fine.grid().frame_rate_hz, fine.grid().frames);
+        Self {
+            first: (grid.start_s - start_s) * rate_hz,
+            samples_per_frame: rate_hz / camera.frame_rate_hz,
+            open: camera.exposure_s * rate_hz,
+            last: (frames - 1) as f64,
+        }
+    }
+
+    /// Whether the path between samples is known well enough, or not needed.
+    fn check_sampling(&self, fine: &Recording, camera: &Camera, grid: &FrameGrid) -> Result<(), FilmError> {
+        let trace = || fine.name().to_owned();
+        if self.open == 0.0 && (0..grid.frames).all(|frame| frame_at(self.frame_centre(frame)).is_some()) {
+            return Ok(());
+        }
+        let (fine_hz, frame_rate_hz) = (fine.grid().frame_rate_hz, camera.frame_rate_hz);
+        let least_hz = LEAST_OVERSAMPLING * frame_rate_hz;
+        if fine_hz < least_hz * (1.0 - ON_FRAME_TOLERANCE) {
+            return Err(FilmError::TooCoarse { trace: trace(), fine_hz, least_hz, frame_rate_hz });
+        }
+        let found = fine.grid().frames;
+        if found < STENCIL { Err(FilmError::TooShort { trace: trace(), found }) } else { Ok(()) }
+    }
+
+    fn frame_centre(&self, frame: usize) -> f64 {
+        (self.first + frame as f64 * self.samples_per_frame).clamp(0.0, self.last)
+    }
+
+    /// Mean of a column over the shutter of a frame: its pieces between samples, each by a rule that is exact
+    /// for it.
+    fn frame_mean(&self, column: &[Option<f64>], frame: usize) -> Option<f64> {
+        let centre = self.first + frame as f64 * self.samples_per_frame;
+        if self.open == 0.0 {
+            return interpolate_column(column, centre.clamp(0.0, self.last));
+        }
+        let (from, to) = (centre - self.open / 2.0, centre + self.open / 2.0);
+        let (inner_from, inner_to) = (from.clamp(0.0, self.last), to.clamp(0.0, self.last));
+        let mut sum = 0.0;
+        let mut at = inner_from;
+        while at < inner_to {
+            let next = (at.floor() + 1.0).min(inner_to);
+            for (node, weight) in GAUSS {
+                sum += weight * (next - at) * interpolate_column(column, at + node * (next - at))?;
+            }
+            at = next;
+        }
+        if inner_from > from {
+            sum += (inner_from - from) * column.first().copied().flatten()?;
+        }
+        if to > inner_to {
+            sum += (to - inner_to) * column.last().copied().flatten()?;
+        }
+        Some(sum / self.open)
+    }
+}
+
+/// The path at `at`, counted in samples, inside the column: the sample itself, or the polynomial through the
+/// six samples around, which near the ends lie more to one side.
+fn interpolate_column(column: &[Option<f64>], at: f64) -> Option<f64> {
+    if let Some(sample) = frame_at(at) {
+        return *column.get(sample)?;
+    }
+    let first = (at.floor() as usize).saturating_sub(STENCIL / 2 - 1).min(column.len().checked_sub(STENCIL)?);
+    lagrange_through_six(column, first, at)
+}
+
+// A fine trace as the tracking of a given recording would show it: its frames, its noise, its lost points.
+
+/// Columns of a recording: tip x, tip y, head x, head y.
+const COORDINATES: usize = 4;
+
+/// Which frames were dropped.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DropoutPattern {
+    /// Those that the recording misses: both clocks were aligned at the first turn of the head that each
+    /// shows.
+    SameFrames,
+    /// As large a share, at random: one of them shows no turn of the head, so that their clocks cannot be
+    /// aligned.
+    AtRandom,
+}
+
+/// A trace filmed like a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MatchedFilm {
+    /// What was seen, on the clock of the fine trace; marked synthetic.
+    pub recording: Recording,
+    /// Standard deviation of the white noise added to tip x, tip y, head x, head y, m; 0 where the recording
+    /// has no such column.
+    pub noise_m: [f64; COORDINATES],
+    /// Which frames were dropped.
+    pub dropouts: DropoutPattern,
+}
+
+/// Why a trace cannot be filmed like a recording.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub enum MatchedFilmError {
+    /// The trace cannot be filmed.
+    #[error(transparent)]
+    Film(#[from] FilmError),
+    /// A column has too few frames in a row for its noise.
+    #[error(
+        "{recording}, column {column}: found too few frames in a row to measure its noise, expected 11; track the lost frames again"
+    )]
+    NoNoise {
+        /// Name of the recording.
+        recording: String,
+        /// The column.
+        column: &'static str,
+    },
+}
+
+/// Films `fine` at the rate of `like` with `exposure_s`, adds white noise of the size that [`noise_floor`]
+/// measures on each column of `like` (an upper estimate where that oscillates within a few frames), and drops
+/// frames: the same ones where the first turn of the head shows in both, else as many at random. Frames that
+/// the aligned recording does not have are not taken. `seed` settles noise and random dropouts; dropouts do
+/// not reshuffle the noise.
+///
+/// # Errors
+/// [`MatchedFilmError`].
+pub fn film_like_recording(
+    fine: &Recording,
+    like: &Recording,
+    exposure_s: f64,
+    seed: u64,
+) -> Result<MatchedFilm, MatchedFilmError> {
+    let camera = Camera { frame_rate_hz: like.grid().frame_rate_hz, exposure_s };
+    let noise_m = measure_noises(like)?;
+    let shown = align_recordings(fine, like).filter(|shown| shown.frames >= 2);
+    let seen = film_trace(fine, &camera, shown.as_ref().map_or(fine.grid().start_s, |shown| shown.start_s))?;
+    let frames = shown.as_ref().map_or(seen.grid().frames, |shown| shown.frames.min(seen.grid().frames));
+    let tracker = MatchedTracker {
+        like: coordinate_columns(like).map(|(_, column)| column),
+        first: shown.as_ref().map(|shown| shown.first),
+        noise_m,
+        seed,
+    };
+    let [tip_x_m, tip_y_m, head_x_m, head_y_m] = tracker.track_frames(&seen, frames);
+    let traces = Traces { tip_x_m, tip_y_m, head_x_m, head_y_m, ..Traces::default() };
+    let refused = |error: RecordingError| FilmError::Recording { trace: fine.name().to_owned(), error };
+    let recording =
+        Recording::new(fine.name(), FrameGrid { frames, ..seen.grid() }, traces, true).map_err(refused)?;
+    let dropouts = if shown.is_some() { DropoutPattern::SameFrames } else { DropoutPattern::AtRandom };
+    Ok(MatchedFilm { recording, noise_m, dropouts })
+}
+
+fn coordinate_columns(recording: &Recording) -> [(&'static str, &[Option<f64>]); COORDINATES] {
+    let traces = recording.traces();
+    [
+        ("tip_x_m", &traces.tip_x_m),
+        ("tip_y_m", &traces.tip_y_m),
+        ("head_x_m", &traces.head_x_m),
+        ("head_y_m", &traces.head_y_m),
+    ]
+}
+
+fn measure_noises(like: &Recording) -> Result<[f64; COORDINATES], MatchedFilmError> {
+    let mut noises = [0.0; COORDINATES];
+    for (noise, (column, samples)) in noises.iter_mut().zip(coordinate_columns(like)) {
+        if samples.iter().any(Option::is_some) {
+            let refused = || MatchedFilmError::NoNoise { recording: like.name().to_owned(), column };
+            *noise = noise_floor(samples).ok_or_else(refused)?;
+        }
+    }
+    Ok(noises)
+}
+
+fn missing_share(column: &[Option<f64>]) -> f64 {
+    column.iter().filter(|x| x.is_none()).count() as f64 / column.len() as f64
+}
+
+/// The part of a recording whose frames lie in the fine trace.
+struct SharedFrames {
+    /// Its first frame in the recording.
+    first: usize,
+    /// The same on the clock of the fine trace, s.
+    start_s: f64,
+    frames: usize,
+}
+
+/// Lays the first turn of the head of both on the same instant.
+fn align_recordings(fine: &Recording, like: &Recording) -> Option<SharedFrames> {
+    let shift_s = ReversalInstants::first_turn_s(fine)? - ReversalInstants::first_turn_s(like)?;
+    let (grid, on) = (like.grid(), fine.grid());
+    let end_s = on.time_s(on.frames.checked_sub(1)?);
+    let inside = |frame: &usize| (on.start_s..=end_s).contains(&(grid.time_s(*frame) + shift_s));
+    let first = (0..grid.frames).find(inside)?;
+    let frames = (first..grid.frames).take_while(inside).count();
+    Some(SharedFrames { first, start_s: grid.time_s(first) + shift_s, frames })
+}
+
+/// What tracking does to a film.
+struct MatchedTracker<'a> {
+    /// Columns of the recording that is followed.
+    like: [&'a [Option<f64>]; COORDINATES],
+    /// Its frame that is the film's first; `None` where points are lost at random.
+    first: Option<usize>,
+    noise_m: [f64; COORDINATES],
+    seed: u64,
+}
+
+impl MatchedTracker<'_> {
+    /// The first `frames` frames with noise and lost points.
+    fn track_frames(&self, seen: &Recording, frames: usize) -> [Vec<Option<f64>>; COORDINATES] {
+        let mut generator = Xoshiro256PlusPlus::seed_from_u64(self.seed);
+        let clean = coordinate_columns(seen).map(|(_, column)| column);
+        let shares = self.like.map(missing_share);
+        let mut tracked = [const { Vec::new() }; COORDINATES];
+        (0..frames).for_each(|frame| {
+            let points: [f64; COORDINATES / 2] = generator.random(); // (one for both coordinates of a point)
+            for (c, column) in tracked.iter_mut().enumerate() {
+                let lost = self
+                    .first
+                    .map_or(points[c / 2] < shares[c], |first| self.like[c][first + frame].is_none());
+                let noise: f64 = generator.sample(StandardNormal);
+                column.push(clean[c][frame].filter(|_| !lost).map(|x| x + self.noise_m[c] * noise));
+            }
+        });
+        tracked
+    }
+}

@@ -1,0 +1,420 @@
+//! Oscillations that are over soon or begin inside the record: a window that starts at zero hides them.
+//!
+//! What is left is held against decaying oscillations that begin at any frame: `z = sum x exp(-d s - 2 pi i n
+//! s)` over the frames since. A term of this frequency, decay and beginning lowers the sum of squares by `2
+//! |z|^2 / sum exp(-2 d s)`; in white noise of variance one half of that exceeds `q` with the chance
+//! `exp(-q)`.
+
+use super::least_squares::{FreeParameters, SinusoidTerm, Tolerance};
+use super::model_selection::{Decomposition, ModelSelector, STEP_CYCLES, SinusoidModel, lobe_half_width};
+use super::second_pass::DoubtfulTerm;
+use super::settings::MIN_CYCLES;
+use super::transform::RealTransform;
+use crate::math;
+use std::f64::consts::TAU;
+use std::ops::Range;
+
+/// Nepers over the record of the decays that are tried: of one between two, nine tenths of the energy are
+/// met.
+const DECAYS: [f64; 6] = [6.0, 12.0, 24.0, 48.0, 96.0, 192.0];
+/// Nepers after which a decay is over.
+const NEPERS_UNTIL_OVER: f64 = 3.5;
+/// Fewest frames in which an amplitude falls by a neper.
+const FRAMES_PER_NEPER: f64 = 4.0;
+/// Beginnings that are tried in a neper of the decay.
+const STARTS_PER_NEPER: f64 = 3.0;
+/// Chance that noise alone begins an oscillation anywhere.
+const FALSE_ALARM: f64 = 0.01;
+/// Nepers over the record from which a window that starts at zero shows too little of a decay.
+const TRANSIENT_NEPERS: f64 = 8.0;
+/// Least width of an octave, cycles in the record: its floor is a median.
+const OCTAVE: f64 = 20.0;
+/// Moves of a term that is placed; each halving of the steps is one.
+const MOST_MOVES: usize = 30;
+/// Cycles in the record up to which what explains most may be what a flip leaves: twice those of its peaks.
+const SLOW_CYCLES: f64 = 2.0 * STEP_CYCLES;
+/// Nepers of a decay that are lost where it is seen to begin late because others hide its start.
+const MOST_NEPERS_LOST: f64 = 2.0;
+/// Share of a record's sum of squares that is rounding: a misfit is a difference of such sums.
+const ROUNDING_SHARE: f64 = 1e-12;
+/// Rounds in which terms are placed again; each changes one.
+const MOST_ROUNDS: usize = 6;
+/// Determinant of cosine and sine, over the product of their squares, below which they are one.
+const SINGULAR: f64 = 1e-3;
+/// Values of the transform in the length of a decay: bins a seventh of its width apart.
+const PADDING: usize = 4;
+
+impl SinusoidTerm {
+    /// Whether it is over soon or begins inside the record.
+    pub(super) fn is_transient(&self) -> bool {
+        self.cycles > 0.0 && (self.first > 0 || self.nepers > TRANSIENT_NEPERS)
+    }
+
+    /// Its envelope from its first frame on, as far as it is not over.
+    fn envelope_values(&self, frames: usize) -> impl Iterator<Item = (usize, f64)> + Clone + use<> {
+        let (first, decay) = (self.first, self.nepers / frames as f64);
+        let lasts = if decay > 0.0 { (NEPERS_UNTIL_OVER / decay).ceil() as usize } else { frames };
+        (first..frames.min(first.saturating_add(lasts)))
+            .map(move |i| (i, math::exp(-decay * ((i - first) as f64 + 0.5))))
+    }
+}
+
+/// A decay that is tried everywhere in what is left.
+struct DecayTrial {
+    nepers: f64,
+    /// Values of its transform.
+    padded: usize,
+    /// Frames from one beginning to the next.
+    step: usize,
+    /// Bins of the transform where it may be, with the deviation of the noise there, m.
+    bins: Vec<(usize, f64)>,
+}
+
+/// The decays that were found in what is left: the one that stands out most of the noise around it, and the
+/// one that lowers the sum of squares most, if it is no slow one. A large one raises the noise around itself.
+#[derive(Default)]
+struct DecayMatches {
+    stands_out: Option<(f64, SinusoidTerm)>,
+    explains: Option<(f64, SinusoidTerm)>,
+}
+
+impl DecayMatches {
+    /// Takes a decay that lowers the sum of squares by twice `square`, which is `half` variances of noise.
+    fn keep_larger(&mut self, term: SinusoidTerm, half: f64, square: f64) {
+        let larger =
+            |value: f64, than: &Option<(f64, SinusoidTerm)>| than.is_none_or(|(least, _)| value > least);
+        if larger(half, &self.stands_out) {
+            self.stands_out = Some((half, term));
+        }
+        if term.cycles > SLOW_CYCLES && larger(square, &self.explains) {
+            self.explains = Some((square, term));
+        }
+    }
+
+    /// The first, and with `both` the second, if that is another.
+    fn terms(self, both: bool) -> impl Iterator<Item = SinusoidTerm> {
+        let (first, second) = (self.stands_out.map(|met| met.1), self.explains.map(|met| met.1));
+        first.into_iter().chain(second.filter(|second| both && Some(*second) != first))
+    }
+}
+
+impl ModelSelector<'_> {
+    /// The parts with a decaying oscillation more, or with one in the place of a doubtful term or of
+    /// relaxations: the first half-wave of a ring-down looks like one.
+    pub(super) fn with_ring_downs(
+        &self,
+        explained: &Decomposition,
+        doubtful: &[DoubtfulTerm],
+    ) -> Vec<SinusoidModel> {
+        let parts = &explained.model;
+        let terms = &parts.solution.terms;
+        let left: Vec<f64> = explained.residual_m.iter().map(|x| x.unwrap_or(0.0)).collect();
+        let noise = NoiseCurve::from_residual(self, explained);
+        let relaxations: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].cycles == 0.0).collect();
+        let mut places: Vec<Vec<usize>> = vec![vec![]];
+        places.extend(doubtful.iter().filter(|d| terms[d.index].first == 0).map(|d| vec![d.index]));
+        places.extend(relaxations.iter().map(|k| vec![*k]));
+        places.extend((relaxations.len() > 1).then_some(relaxations));
+        // what begins late and is large raises the noise around itself: no line in its place is doubtful
+        if doubtful.is_empty() && !self.leaves_only_noise(explained) {
+            let steady = |k: &usize| terms[*k].cycles > 0.0 && !terms[*k].is_transient();
+            places.extend((0..terms.len()).filter(steady).map(|k| vec![k]));
+        }
+        let least = self.information_criterion(parts);
+        let placed = |out: &Vec<usize>| {
+            let left = self.add_terms_back(parts, &left, out);
+            let fitted = |met: SinusoidTerm| {
+                let kept = (0..terms.len()).filter(|k| !out.contains(k)).map(|k| terms[k]);
+                let terms: Vec<SinusoidTerm> = kept.chain([self.optimise_placement(&left, met)]).collect();
+                let fitted = self.fit_model(parts.problem.clone(), &terms, Tolerance::Coarse)?;
+                let new = fitted.solution.terms.last()?;
+                (new.free == FreeParameters::CyclesAndNepers && self.information_criterion(&fitted) < least)
+                    .then_some(fitted)
+            };
+            let met = self.match_decays(explained, &left, &noise, replacement_range(terms, out));
+            // of a doubtful term, what explains most may be a piece
+            met.terms(doubtful.is_empty()).filter_map(fitted).collect::<Vec<SinusoidModel>>()
+        };
+        places.iter().flat_map(placed).collect()
+    }
+
+    /// The parts with brief terms placed anew and without relaxations that explain nothing, as long as that
+    /// explains more with less: what was found first was placed while the others were missing, and no fit
+    /// moves a first frame. Where only rounding is left, no criterion tells anything.
+    pub(super) fn relocate_transients(&self, mut parts: SinusoidModel) -> SinusoidModel {
+        let power: f64 = self.data.iter().zip(&self.weights).map(|(x, weight)| weight * x * x).sum();
+        for _ in 0..MOST_ROUNDS {
+            if parts.solution.misfit < ROUNDING_SHARE * power {
+                break;
+            }
+            let least = self.information_criterion(&parts);
+            let better = self.transient_variants(&parts).into_iter().filter_map(|terms| {
+                let fitted = self.fit_model(parts.problem.clone(), &terms, Tolerance::Coarse)?;
+                (self.information_criterion(&fitted) < least).then_some(fitted)
+            });
+            match better
+                .min_by(|a, b| self.information_criterion(a).total_cmp(&self.information_criterion(b)))
+            {
+                Some(better) => parts = better,
+                None => break,
+            }
+        }
+        parts
+    }
+
+    /// The terms with a brief one in another place, with two for those in its lobe, with all from the start
+    /// on, or with a relaxation less.
+    fn transient_variants(&self, parts: &SinusoidModel) -> Vec<Vec<SinusoidTerm>> {
+        let terms = &parts.solution.terms;
+        let brief: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].is_transient()).collect();
+        if brief.is_empty() {
+            return Vec::new();
+        }
+        let left: Vec<f64> =
+            self.decompose(parts.clone()).residual_m.iter().map(|x| x.unwrap_or(0.0)).collect();
+        let with = |out: &[usize], new: &[SinusoidTerm]| {
+            let kept = (0..terms.len()).filter(|k| !out.contains(k)).map(|k| terms[k]);
+            kept.chain(new.iter().copied()).collect::<Vec<SinusoidTerm>>()
+        };
+        let again = brief.iter().map(|k| {
+            let term = self.optimise_placement(&self.add_terms_back(parts, &left, &[*k]), terms[*k]);
+            with(&[*k], &[term])
+        });
+        let split = brief.iter().map(|k| {
+            let term = terms[*k];
+            let near = |j: &usize| (terms[*j].cycles - term.cycles).abs() < lobe_half_width(&term);
+            let together: Vec<usize> = brief.iter().copied().filter(near).collect();
+            let (by, nepers) = (term.nepers / TAU / 2.0, term.nepers / 2.0);
+            with(&together, &[-by, by].map(|by| SinusoidTerm { cycles: term.cycles + by, nepers, ..term }))
+        });
+        let from_start =
+            [with(&brief, &brief.iter().map(|k| self.extend_to_start(&terms[*k])).collect::<Vec<_>>())];
+        let relaxed = (0..terms.len()).filter(|k| terms[*k].cycles == 0.0).map(|k| with(&[k], &[]));
+        again.chain(split).chain(from_start).chain(relaxed).collect()
+    }
+
+    /// The term from the start on, if it has lost little by then.
+    fn extend_to_start(&self, term: &SinusoidTerm) -> SinusoidTerm {
+        let lost = term.nepers * term.first as f64 / self.samples.len() as f64;
+        if lost < MOST_NEPERS_LOST { SinusoidTerm { first: 0, ..*term } } else { *term }
+    }
+
+    /// What is left with some terms put back, m.
+    pub(super) fn add_terms_back(&self, parts: &SinusoidModel, left: &[f64], back: &[usize]) -> Vec<f64> {
+        let mut with = left.to_vec();
+        for k in back {
+            let of_term = parts.problem.term_values(&parts.solution, *k);
+            let present = of_term.iter().zip(&self.weights).map(|(value, weight)| value * weight);
+            with.iter_mut().zip(present).for_each(|(x, value)| *x += value);
+        }
+        with
+    }
+
+    /// The largest amplitude left under the envelope of a term around its frequency, m; 0 where noise alone
+    /// may have made it.
+    pub(super) fn residual_in_envelope(&self, explained: &Decomposition, term: &SinusoidTerm) -> f64 {
+        let frames = self.samples.len();
+        let values = term.envelope_values(frames).map(|(i, e)| e * explained.residual_m[i].unwrap_or(0.0));
+        let (length, energy) = self.envelope_energy(term);
+        let transform = RealTransform::new((PADDING * length).next_power_of_two().max(2));
+        let spectrum = transform.magnitudes(values);
+        let bin = frames as f64 / (PADDING * length).next_power_of_two().max(2) as f64;
+        let width = lobe_half_width(term) + 1.0;
+        let near = |k: &usize| (*k as f64 * bin - term.cycles).abs() < width;
+        let most = (0..spectrum.len()).filter(near).fold(0.0, |most: f64, k| most.max(spectrum[k]));
+        let noise = self.noise_sd_of_octaves(explained, term.cycles);
+        if most * most > math::powi(explained.peaks.detection, 2) * energy * noise * noise {
+            2.0 * most / energy
+        } else {
+            0.0
+        }
+    }
+
+    /// Amplitude of a term over the noise of its estimate under its own envelope.
+    pub(super) fn level_in_envelope(
+        &self,
+        explained: &Decomposition,
+        term: &SinusoidTerm,
+        amplitude_m: f64,
+    ) -> f64 {
+        amplitude_m * self.envelope_energy(term).1.sqrt()
+            / (2.0 * self.noise_sd_of_octaves(explained, term.cycles))
+    }
+
+    /// Frames of a term's envelope, and the sum of its squares over the frames present.
+    fn envelope_energy(&self, term: &SinusoidTerm) -> (usize, f64) {
+        let add =
+            |(count, sum): (usize, f64), (i, e): (usize, f64)| (count + 1, sum + self.weights[i] * e * e);
+        term.envelope_values(self.samples.len()).fold((0, 0.0), add)
+    }
+
+    /// The decays that noise alone would make once in a hundred records and that stand out or explain most.
+    fn match_decays(
+        &self,
+        explained: &Decomposition,
+        left: &[f64],
+        noise: &NoiseCurve,
+        within: Range<f64>,
+    ) -> DecayMatches {
+        let frames = self.samples.len();
+        let tried = self.plan_trials(explained, noise, &within);
+        let trials = |t: &DecayTrial| t.bins.len() as f64 / PADDING as f64 * frames as f64 / t.step as f64;
+        let least = math::ln(tried.iter().map(trials).sum::<f64>().max(1.0) / FALSE_ALARM);
+        let mut met = DecayMatches::default();
+        for DecayTrial { nepers, padded, step, bins } in tried {
+            let transform = RealTransform::new(padded);
+            let alone = SinusoidTerm { cycles: 1.0, nepers, first: 0, free: FreeParameters::CyclesAndNepers };
+            let envelope: Vec<f64> = alone.envelope_values(frames).map(|(_, e)| e).collect();
+            // a decay of which less than one neper is in the record is an impulse at its end
+            for first in (0..frames.saturating_sub(envelope.len() / 3)).step_by(step) {
+                let present = envelope.iter().zip(&self.weights[first..]);
+                let energy: f64 = present.map(|(e, weight)| weight * e * e).sum();
+                if energy <= 0.0 {
+                    continue;
+                }
+                let squares =
+                    transform.squared_magnitudes(envelope.iter().zip(&left[first..]).map(|(e, x)| e * x));
+                for (bin, noise) in &bins {
+                    let square = squares[*bin] / energy;
+                    let half = square / (noise * noise);
+                    if half > least {
+                        let cycles = *bin as f64 * frames as f64 / padded as f64;
+                        met.keep_larger(
+                            SinusoidTerm { cycles, nepers, first, free: FreeParameters::CyclesAndNepers },
+                            half,
+                            square,
+                        );
+                    }
+                }
+            }
+        }
+        met
+    }
+
+    /// The decays that are tried, and where.
+    fn plan_trials(
+        &self,
+        explained: &Decomposition,
+        noise: &NoiseCurve,
+        within: &Range<f64>,
+    ) -> Vec<DecayTrial> {
+        let frames = self.samples.len() as f64;
+        let lowest = MIN_CYCLES.max(explained.model.trend().fastest_waves() + 1.0);
+        let of = |nepers: f64| {
+            let padded =
+                (PADDING * (NEPERS_UNTIL_OVER * frames / nepers).ceil() as usize).next_power_of_two();
+            let cycles = |bin: usize| bin as f64 * frames / padded as f64;
+            let usable = |bin: &usize| {
+                let term = SinusoidTerm::from_start(cycles(*bin), nepers, FreeParameters::CyclesAndNepers);
+                term.cycles >= lowest
+                    && within.contains(&term.cycles)
+                    && term.cycles + 1.0 < frames / 2.0
+                    && term.is_oscillation()
+                    && nepers < term.nepers_bounds().1
+                    && !self.is_in_drift_region(term.cycles * self.resolution_hz())
+            };
+            let bins = (1..padded / 2).filter(usable).map(|bin| (bin, noise.sd_at(cycles(bin)))).collect();
+            DecayTrial { nepers, padded, step: ((frames / nepers / STARTS_PER_NEPER) as usize).max(1), bins }
+        };
+        DECAYS.into_iter().filter(|nepers| FRAMES_PER_NEPER * nepers <= frames).map(of).collect()
+    }
+
+    /// Frequency, decay and first frame that explain most, by steps that are halved where none helps.
+    fn optimise_placement(&self, left: &[f64], start: SinusoidTerm) -> SinusoidTerm {
+        let frames = self.samples.len() as f64;
+        let mut best = (self.power_of_term(left, &start), start);
+        let mut share = 1.0;
+        for _ in 0..MOST_MOVES {
+            let term = best.1;
+            let by = share * term.nepers / TAU;
+            // one that keeps its amplitude lasts as long as the record
+            let frame = ((share * frames / term.nepers.max(1.0) / STARTS_PER_NEPER) as usize).max(1);
+            let with = |cycles: f64, nepers: f64, first: usize| SinusoidTerm {
+                cycles,
+                nepers,
+                first,
+                free: FreeParameters::CyclesAndNepers,
+            };
+            let stretched = 1.0 + share;
+            let moves = [
+                with(term.cycles + by, term.nepers, term.first),
+                with(term.cycles - by, term.nepers, term.first),
+                with(term.cycles, term.nepers * stretched, term.first),
+                with(term.cycles, term.nepers / stretched, term.first),
+                with(term.cycles, term.nepers, term.first + frame),
+                with(term.cycles, term.nepers, term.first.saturating_sub(frame)),
+            ];
+            let usable = |term: &SinusoidTerm| term.is_oscillation() && term.first < self.samples.len();
+            let tried = moves.into_iter().filter(usable).map(|term| (self.power_of_term(left, &term), term));
+            match tried.max_by(|a, b| a.0.total_cmp(&b.0)).filter(|tried| tried.0 > best.0) {
+                Some(better) => best = better,
+                None => share /= 2.0,
+            }
+        }
+        best.1
+    }
+
+    /// What a term with the best amplitude and phase lowers the sum of squares by, m^2.
+    fn power_of_term(&self, left: &[f64], term: &SinusoidTerm) -> f64 {
+        let turn = TAU * term.cycles / left.len() as f64;
+        let add = |[cc, cs, ss, xc, xs]: [f64; 5], (i, e): (usize, f64)| {
+            let (sine, cosine) = math::sin_cos(turn * i as f64);
+            let (c, s, w) = (e * cosine, e * sine, self.weights[i]);
+            [cc + w * c * c, cs + w * c * s, ss + w * s * s, xc + c * left[i], xs + s * left[i]]
+        };
+        let [cc, cs, ss, xc, xs] = term.envelope_values(left.len()).fold([0.0; 5], add);
+        let determinant = cc * ss - cs * cs;
+        if determinant > SINGULAR * cc * ss {
+            (ss * xc * xc - 2.0 * cs * xc * xs + cc * xs * xs) / determinant
+        } else {
+            0.0
+        }
+    }
+
+    /// Whether more than noise is left in the lobe of a term.
+    pub(super) fn leaves_peak(&self, explained: &Decomposition, term: &SinusoidTerm) -> bool {
+        let width = lobe_half_width(term) + 1.0;
+        let around = self.residual_spectrum_between(explained, term.cycles - width, term.cycles + width);
+        let most = around.iter().fold(0.0, |most: f64, a| most.max(*a));
+        self.periodogram.noise_sd_m(most)
+            > explained.peaks.detection * self.noise_sd_of_octaves(explained, term.cycles)
+    }
+
+    /// Deviation of the noise around a frequency, m: what decays within the record is wider than the
+    /// neighbourhood of a line, so the floor is that of the octave below or above, whichever is higher.
+    pub(super) fn noise_sd_of_octaves(&self, explained: &Decomposition, cycles: f64) -> f64 {
+        let octaves = [(cycles / 2.0).min(cycles - OCTAVE), cycles, (2.0 * cycles).max(cycles + OCTAVE)];
+        let floors = octaves.windows(2).map(|side| self.noise_floor_between(explained, side[0], side[1]));
+        self.periodogram.noise_sd_m(floors.fold(explained.peaks.floor_m, f64::max))
+    }
+}
+
+/// Where what takes the place of terms may lie, cycles in the record.
+fn replacement_range(terms: &[SinusoidTerm], out: &[usize]) -> Range<f64> {
+    match out.first().map(|k| &terms[*k]).filter(|term| term.cycles > 0.0) {
+        Some(term) => term.cycles - lobe_half_width(term)..term.cycles + lobe_half_width(term),
+        None => 0.0..f64::INFINITY,
+    }
+}
+
+/// Deviation of the noise as a function of frequency.
+struct NoiseCurve {
+    /// Distance of the knots, cycles in the record.
+    apart: f64,
+    deviation_m: Vec<f64>,
+}
+
+impl NoiseCurve {
+    fn from_residual(search: &ModelSelector, explained: &Decomposition) -> Self {
+        const APART: f64 = 16.0;
+        let knots = (search.samples.len() as f64 / 2.0 / APART).ceil() as usize + 1;
+        let deviation_m =
+            (0..knots).map(|knot| search.noise_sd_of_octaves(explained, knot as f64 * APART)).collect();
+        Self { apart: APART, deviation_m }
+    }
+
+    fn sd_at(&self, cycles: f64) -> f64 {
+        let knot = ((cycles / self.apart).round() as usize).min(self.deviation_m.len() - 1);
+        self.deviation_m[knot]
+    }
+}
