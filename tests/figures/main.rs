@@ -14,6 +14,8 @@ mod project;
 mod raster;
 #[path = "../common/shown.rs"]
 mod shown;
+#[path = "../../examples/sketch.rs"]
+mod sketch_file;
 #[path = "../common/small_fit.rs"]
 mod small_fit;
 
@@ -23,5 +25,6 @@ mod hard_reports;
 mod hostile_names;
 mod media;
 mod numbers;
+mod sketch;
 mod spectrum;
 mod video;
