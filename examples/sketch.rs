@@ -4,8 +4,8 @@
 //! than in steady slip, so that the drop is easy to see.
 
 use std::path::{Path, PathBuf};
-use wiperlab::blade::{Directions, Linkage, Pose};
 use wiperlab::math;
+use wiperlab::model::{LinkDirections, Linkage, Pose};
 use wiperlab::simulate::scene::Scene;
 
 /// Width and height of the drawing, tenths of a millimetre.
@@ -65,7 +65,7 @@ pub fn sketch(root: &Path) -> Result<(PathBuf, String), String> {
 fn drawing(blade: &Linkage) -> Result<String, String> {
     let contact_rad = blade.shoulder.ok_or("the scene has no shoulder")?.contact_angle_rad;
     let theta = NECK_OVER_SHOULDER * contact_rad;
-    let d = Directions::of(&Pose { theta, phi: LIP_RAD, theta_rate: 0.0, phi_rate: 0.0 });
+    let d = LinkDirections::from_pose(&Pose { theta, phi: LIP_RAD, theta_rate: 0.0, phi_rate: 0.0 });
     let (l1, l2) = (SCALE * blade.l1_m, SCALE * blade.l2_m);
     let drop = SCALE * blade.head_drop_m(&d);
     let hinge_y = GLASS_Y - l1 - l2 + drop;

@@ -32,8 +32,7 @@ pub fn exposure_gain(frequency_hz: f64, exposure_s: f64) -> f64 {
 
 /// Frequency of which an exposure of `exposure_s` passes half the power, Hz; the same function gives the
 /// exposure back, s.
-#[must_use]
-pub fn half_power_hz(exposure_s: f64) -> f64 {
+pub(crate) fn half_power_hz(exposure_s: f64) -> f64 {
     HALF_POWER_CYCLES / exposure_s
 }
 
@@ -50,8 +49,7 @@ pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
 /// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`, Hz:
 /// `k rate - f` and `k rate + f`, ascending, each once, at most 1000. None for a frequency that
 /// does not lie between 0 and half the rate, where nothing appears.
-#[must_use]
-pub fn aliased_frequencies_hz(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
+pub(crate) fn aliased_frequencies_hz(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
     let half_hz = frame_rate_hz / 2.0;
     if !(half_hz.is_finite() && half_hz > 0.0 && (0.0..=half_hz).contains(&frequency_hz)) {
         return vec![];

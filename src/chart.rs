@@ -25,18 +25,18 @@ mod series;
 mod style;
 mod text;
 
-pub use axis::{AxisScale, ChartAxis};
+pub(crate) use axis::{AxisScale, ChartAxis};
 pub use elements::{
     ErrorBar, Hatch, HatchPattern, Panel, Raster, Ribbon, SampledSeries, Series, ShadedSpan, TextAnnotation,
     TopLabel, VerticalLine,
 };
-pub use figure::PanelPlacement;
+pub(crate) use figure::PanelPlacement;
 pub use figure::{Figure, Medium};
 pub use heat_map::{HeatMap, cell_edges};
-pub use style::ColourMap;
+pub(crate) use style::ColourMap;
 pub use style::MAX_HEIGHT_MM;
-pub(crate) use style::{COLUMN_WIDTH_MM, FULL_WIDTH_MM};
-pub use style::{Colour, Mark, MarkerShape};
+pub use style::{COLUMN_WIDTH_MM, FULL_WIDTH_MM};
+pub(crate) use style::{Colour, Mark, MarkerShape};
 
 #[cfg(test)]
 mod tests;

@@ -16,7 +16,7 @@ mod record;
 mod shard;
 
 pub use checksum::append_checksum;
-pub use checksum::fingerprint;
+pub(crate) use checksum::fingerprint;
 pub use error::CheckpointError;
 pub use header::{CheckpointHeader, CheckpointKind, detect_kind, has_whole_line};
 pub use read::{CheckpointEnd, CheckpointReader, StoredRecord};

@@ -72,12 +72,11 @@ pub fn run(arguments: Vec<OsString>) -> u8 {
 static EXECUTABLE_PATH: OnceLock<PathBuf> = OnceLock::new();
 
 /// Says where it lies; the first word counts.
-pub fn set_executable_path(path: PathBuf) {
+pub(crate) fn set_executable_path(path: PathBuf) {
     let _ = EXECUTABLE_PATH.set(path);
 }
 
-/// Its path.
-pub fn executable_path() -> Result<PathBuf, Failure> {
+pub(crate) fn executable_path() -> Result<PathBuf, Failure> {
     let unknown = |error| Failure::Internal(format!("the path of this program is not known: {error}"));
     EXECUTABLE_PATH.get().map_or_else(|| std::env::current_exe().map_err(unknown), |path| Ok(path.clone()))
 }

@@ -10,11 +10,10 @@ pub mod summary;
 pub mod tables;
 
 pub use condition::{ConditionComparison, FittedRecording, TimedRecording};
-pub use condition::{FitWindow, FrequencyComparison};
-pub use friction::{FrictionPoint, MeasuredFriction};
-pub use model_run::RunSummary;
+pub(crate) use friction::{FrictionPoint, MeasuredFriction};
+pub(crate) use model_run::RunSummary;
 pub use model_run::{ModelRun, run_conditions};
 pub use ridge::{RidgePair, TrackedRidge};
-pub use rows::{Comparison, NextPeak, ParameterLine, Truth};
-pub use summary::ComparisonSummary;
-pub use tables::{COMPARISON_FILE, ComparisonTable, comparison_table};
+pub(crate) use rows::{Comparison, NextPeak, ParameterLine, Truth};
+pub(crate) use summary::ComparisonSummary;
+pub(crate) use tables::{COMPARISON_FILE, ComparisonTable, comparison_table};

@@ -11,11 +11,11 @@ mod scene;
 mod stroke;
 
 use crate::text::{make_printable, wrap_words};
-pub use findings::{DraftComponent, DraftError, DraftFindings};
-pub use job::write_job;
-pub use scene::{FittedScene, YOURS_MARK, write_fitted_scene, write_scene, write_scene_alone};
+pub(crate) use findings::DraftFindings;
+pub(crate) use job::write_job;
+pub(crate) use scene::{FittedScene, YOURS_MARK, write_fitted_scene, write_scene, write_scene_alone};
 use serde::Serialize;
-pub use stroke::{KnownStroke, Stroke};
+pub(crate) use stroke::KnownStroke;
 
 // TOML with comments.
 
@@ -46,7 +46,6 @@ impl CommentedToml {
         self
     }
 
-    /// An empty line.
     pub(super) fn add_empty_line(self) -> Self {
         self.add_line("")
     }
@@ -88,7 +87,7 @@ pub(super) fn format_toml_number(value: f64) -> String {
 
 /// What becomes of a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ParameterRole {
+pub(crate) enum ParameterRole {
     /// The user measures it on the blade, to this relative standard deviation: it is held there, or freed
     /// within it where it is a constant that a fit may free.
     Yours(Option<f64>),
@@ -125,7 +124,7 @@ const SIMILAR: ParameterRole = ParameterRole::Guessed(0.2);
 const UNKNOWN: ParameterRole = ParameterRole::Guessed(0.5);
 
 /// Every number of the example's blade, shoulder and friction in the form in which a draft writes it.
-pub const PARAMETER_PLAN: [(&str, ParameterRole); 21] = [
+pub(crate) const PARAMETER_PLAN: [(&str, ParameterRole); 21] = [
     ("blade.head_mass_kg", WEIGHED),
     ("blade.neck_mass_kg", WEIGHED),
     ("blade.lip_mass_kg", WEIGHED),

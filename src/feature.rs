@@ -17,10 +17,10 @@ mod value;
 
 use crate::recording::Recording;
 use crate::recording::channel::ReversalInstants;
-pub use contact::ContactReading;
 pub use interval::ReversalInterval;
+pub use keys::ReadingEntry;
 pub use keys::WIDTH_RELATIVE;
-pub(crate) use keys::{Keys, ReadingEntry, define_entry, with_reading_keys};
+pub(crate) use keys::{Keys, define_entry, with_reading_keys};
 pub use missing::{MissingReason, MissingValue};
 pub use reader::{FeatureReader, RunRecord};
 pub use reading::Reading;
@@ -31,7 +31,7 @@ pub use value::{FeatureUnit, FeatureValue, LengthCalibration, RunnerUpComponent,
 
 /// Least relative standard deviation of a measured frequency. Reading a peak of 0.15 s leaves 0.03 Hz at 78
 /// Hz (4e-4) without any noise, and the model is read through another window of the same length.
-pub const FREQUENCY_SD_FLOOR: f64 = 1e-3;
+pub(crate) const FREQUENCY_SD_FLOOR: f64 = 1e-3;
 
 // Features of several conditions, each read from the recording of its own.
 

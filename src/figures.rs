@@ -50,7 +50,6 @@ pub struct FigureBlock {
 pub(crate) struct Words {
     /// One sentence: what the reader sees and what follows from it.
     pub caption: String,
-    /// The rest.
     pub details: String,
 }
 

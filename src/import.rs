@@ -14,13 +14,12 @@ use crate::recording::Recording;
 use crate::recording::files::{DESCRIPTION_FILE, OneOrMany, RecordingFile, SourceEntry, TRACE_FILE};
 use crate::recording::quality::{QualityFinding, Severity};
 use crate::text::sha256;
-pub use assemble::LevelError;
 use assemble::assemble_recording;
 pub use error::{CellProblem, ImportError, TextLocation};
 pub use formats::format_names;
 use formats::{choose_format, find_doubtful_columns};
 pub use options::{ColumnMap, ColumnName, CoordinateScale, ImportOptions, TimeColumn};
-pub use reader::companion::companion_names;
+pub(crate) use reader::companion::companion_names;
 use reader::encoding::DecodedText;
 use reader::{Document, encoding};
 
@@ -159,8 +158,7 @@ pub(crate) fn base_name(path: &str) -> &str {
 
 /// Names and bytes of the files that are kept with the recording, in the order of `[source]`; a companion of
 /// several is kept once.
-#[must_use]
-pub fn preserved_files(sources: &[ImportSource]) -> Vec<(&str, &[u8])> {
+pub(crate) fn preserved_files(sources: &[ImportSource]) -> Vec<(&str, &[u8])> {
     let mut kept: Vec<(&str, &[u8])> =
         sources.iter().map(|source| (base_name(&source.name), source.bytes.as_slice())).collect();
     for file in sources.iter().flat_map(|source| &source.companions) {

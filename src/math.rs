@@ -95,9 +95,8 @@ pub fn ln_1p(x: f64) -> f64 {
 }
 
 /// The complementary error function.
-#[must_use]
 #[inline]
-pub fn erfc(x: f64) -> f64 {
+pub(crate) fn erfc(x: f64) -> f64 {
     libm::erfc(x)
 }
 

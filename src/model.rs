@@ -224,8 +224,7 @@ impl Linkage {
 
     /// Position of the tip along the sweep, `v3`, m.
     #[inline]
-    #[must_use]
-    pub fn tip_position_m(&self, d: &LinkDirections, head: &HeadMotion) -> f64 {
+    pub(crate) fn tip_position_m(&self, d: &LinkDirections, head: &HeadMotion) -> f64 {
         head.position_m + self.l1_m * d.sin_theta + self.l2_m * d.sin_phi
     }
 
@@ -240,14 +239,12 @@ impl Linkage {
 
     /// Drop of the head towards the glass while the tip touches it, `u`, m.
     #[inline]
-    #[must_use]
     pub fn head_drop_m(&self, d: &LinkDirections) -> f64 {
         self.l1_m * (1.0 - d.cos_theta) + self.l2_m * (1.0 - d.cos_phi)
     }
 
     /// Rate of the head's drop, m/s.
     #[inline]
-    #[must_use]
     pub(crate) fn head_drop_rate_m_per_s(&self, pose: &Pose, d: &LinkDirections) -> f64 {
         self.l1_m * d.sin_theta * pose.theta_rate + self.l2_m * d.sin_phi * pose.phi_rate
     }

@@ -90,8 +90,7 @@ pub struct WorkCounters {
 impl WorkCounters {
     /// Whether the bound is passed.
     #[inline]
-    #[must_use]
-    pub fn is_spent(&self) -> bool {
+    pub(crate) fn is_spent(&self) -> bool {
         self.most_rhs_evaluations.is_some_and(|most| self.rhs_evaluations > most)
     }
 }

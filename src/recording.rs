@@ -34,8 +34,7 @@ impl FrameGrid {
     }
 
     /// Time from the first to the last frame, s.
-    #[must_use]
-    pub fn duration_s(&self) -> f64 {
+    pub(crate) fn duration_s(&self) -> f64 {
         self.frames.saturating_sub(1) as f64 / self.frame_rate_hz
     }
 }
@@ -112,7 +111,7 @@ pub enum RecordingError {
 
 /// Largest distance from the origin, m: no wiper's recording reaches a thousandth of it, and squares of it
 /// are far from overflow.
-pub const LARGEST_M: f64 = 1e6;
+pub(crate) const LARGEST_M: f64 = 1e6;
 
 /// Traces on their frame grid, with a name for messages; its invariants (equal lengths, finite values) hold
 /// by construction.
@@ -215,8 +214,7 @@ impl Recording {
     /// A column of this recording at a time, s: on the polynomial through three frames before and three
     /// after, and on a straight line where one of the outer four is missing. `None` beyond the frames and
     /// next to a missing one.
-    #[must_use]
-    pub fn interpolate_column(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
+    pub(crate) fn interpolate_column(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
         let place = (time_s - self.grid.start_s) * self.grid.frame_rate_hz;
         if let Some(frame) = frame_at(place) {
             return *column.get(frame)?;

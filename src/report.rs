@@ -9,8 +9,8 @@ pub mod summary;
 pub mod verdict;
 mod view_model;
 
-pub use summary::{ReportSummary, SummaryQuantity};
-pub use view_model::{
+pub(crate) use summary::{ReportSummary, SummaryQuantity};
+pub(crate) use view_model::{
     CombinationLine, FailureCount, ProbeLine, Provenance, RecordingLine, SearchLine, SourceFile,
 };
 
@@ -94,8 +94,7 @@ pub enum FigureSubject {
 
 impl Report {
     /// Whether any recording is one that no camera took.
-    #[must_use]
-    pub fn is_synthetic(&self) -> bool {
+    pub(crate) fn is_synthetic(&self) -> bool {
         self.recordings.iter().any(|r| r.synthetic)
     }
 

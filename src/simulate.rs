@@ -76,8 +76,7 @@ impl RunStatus {
     }
 
     /// What it means, in a sentence.
-    #[must_use]
-    pub fn meaning(self) -> &'static str {
+    pub(crate) fn meaning(self) -> &'static str {
         match self {
             Self::Completed => "the stop time was reached",
             Self::ContactLost => "the normal force reached zero: the tip lifts off the glass",
@@ -138,7 +137,6 @@ pub trait Observer {
     }
 }
 
-/// Observes nothing.
 impl Observer for () {
     fn observe_segment(&mut self, _: &SolutionSegment<'_>) {}
 }
@@ -172,8 +170,7 @@ pub enum IntegrationMethod {
 
 impl IntegrationMethod {
     /// The name on the command line and in files.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
+    pub(crate) fn name(&self) -> &'static str {
         match self {
             Self::Taylor => "taylor",
             Self::RungeKutta => "runge-kutta",
@@ -183,8 +180,7 @@ impl IntegrationMethod {
     }
 
     /// The length of its steps, s, where that is fixed.
-    #[must_use]
-    pub fn step_s(&self) -> Option<f64> {
+    pub(crate) fn step_s(&self) -> Option<f64> {
         match self {
             Self::FixedStep(scheme) => Some(scheme.step_s),
             Self::Taylor | Self::RungeKutta | Self::Slack => None,

@@ -45,7 +45,7 @@ pub use analysis::{LONGEST_DECOMPOSED, Oscillation, RemovedTrend, SampledRecord,
 pub use component::{Component, Estimator};
 pub use error::SpectrumError;
 
-pub use settings::{FASTEST_HZ, MAX_COMPONENTS, MIN_SAMPLES};
+pub(crate) use settings::{FASTEST_HZ, MAX_COMPONENTS, MIN_SAMPLES};
 
 pub use multitaper::{Multitaper, MultitaperError, TAPERS};
 

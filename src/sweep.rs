@@ -15,9 +15,9 @@ pub mod study;
 
 pub use crate::feature::MissingReason;
 pub use collect::{CollectError, PointCollection};
-pub use grid::SamplePlan;
-pub use grid::{AxisSpacing, SweepAxis};
-pub use journal::PointRecheck;
+pub(crate) use grid::SamplePlan;
+pub(crate) use grid::{AxisSpacing, SweepAxis};
+pub(crate) use journal::PointRecheck;
 pub use point::{EarlyEnd, PointOutcome};
 pub use rank_correlation::RankCorrelations;
 pub use study::{SHEET_NAME, Study, StudyError, SweepMap};

@@ -10,11 +10,11 @@ mod phrase;
 mod unit;
 
 pub use hash::{TextHash, sha256, text_sha256};
-pub use number::format_with_sd;
+pub(crate) use number::format_with_sd;
 pub use number::{format_digits, format_number, format_plain, format_short, round_to_digits, to_ascii};
 pub use phrase::{escape_controls, make_printable};
-pub use phrase::{format_interval, join_with_and, pluralise, wrap_words};
-pub use unit::format_degrees;
+pub(crate) use phrase::{format_interval, join_with_and, pluralise, wrap_words};
+pub(crate) use unit::format_degrees;
 
 pub(crate) use number::{format_decimals, format_or_dash, format_scientific, format_trimmed, to_superscript};
 pub(crate) use phrase::{capitalise, format_times, panic_message, truncate_text};

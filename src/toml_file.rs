@@ -65,7 +65,7 @@ pub const FORMAT: u32 = 1;
 ///
 /// # Errors
 /// [`TomlError`] with the places of all problems that the schema of `T` shows, or else of the first one.
-pub fn parse_toml<T: DeserializeOwned + JsonSchema>(file: &str, text: &str) -> Result<T, TomlError> {
+pub(crate) fn parse_toml<T: DeserializeOwned + JsonSchema>(file: &str, text: &str) -> Result<T, TomlError> {
     let mut problems = schema_check::find_problems(file, text, schema_for!(T).as_value());
     match problems.len() {
         0 => toml::from_str(text).map_err(|error| error_from_toml(file, text, &error)),
@@ -96,7 +96,7 @@ pub(crate) fn table_schema(
 ///
 /// # Errors
 /// [`TomlError`] with the places of what is no TOML.
-pub fn parse_table(file: &str, text: &str) -> Result<toml::Table, TomlError> {
+pub(crate) fn parse_table(file: &str, text: &str) -> Result<toml::Table, TomlError> {
     toml::from_str(text).map_err(|error| error_from_toml(file, text, &error))
 }
 
@@ -110,7 +110,7 @@ fn lines(problems: &[TomlError]) -> String {
 ///
 /// # Errors
 /// [`TomlError::Format`] unless it is [`FORMAT`].
-pub fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
+pub(crate) fn check_format(file: &str, found: u32) -> Result<(), TomlError> {
     if found == FORMAT {
         return Ok(());
     }
@@ -149,8 +149,7 @@ pub(crate) fn check_above_zero(key: impl Into<String>, found: f64) -> Result<f64
 }
 
 /// The nearest of `known` to a mistyped `key`, capitals or not, as advice in words.
-#[must_use]
-pub fn suggest_key(key: &str, known: &[&str]) -> String {
+pub(crate) fn suggest_key(key: &str, known: &[&str]) -> String {
     /// Jaro-Winkler similarity above which a known key is worth suggesting; below it the list is shown
     /// instead.
     const SIMILAR: f64 = 0.75;
@@ -173,8 +172,7 @@ pub fn suggest_key(key: &str, known: &[&str]) -> String {
 
 /// Advice on a path of a TOML file in which `\t` or the like became a character that no path has; nothing for
 /// any other.
-#[must_use]
-pub fn path_hint(path: &str) -> &'static str {
+pub(crate) fn path_hint(path: &str) -> &'static str {
     if path.chars().any(char::is_control) {
         "; a backslash between double quotes starts an escape: write the path with `/`, or between single quotes"
     } else {
@@ -183,8 +181,7 @@ pub fn path_hint(path: &str) -> &'static str {
 }
 
 /// 1-based line and column of a byte offset.
-#[must_use]
-pub fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
+pub(crate) fn line_and_column(text: &str, offset: usize) -> (usize, usize) {
     let before = &text.as_bytes()[..offset.min(text.len())];
     let line = before.iter().filter(|&&b| b == b'\n').count() + 1;
     let start = before.iter().rposition(|&b| b == b'\n').map_or(0, |p| p + 1);

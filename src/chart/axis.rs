@@ -7,7 +7,6 @@ use crate::text::{self, format_scientific, to_superscript};
 /// How values are spread along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AxisScale {
-    /// In proportion.
     #[default]
     Linear,
     /// By their logarithm; values of zero or less are not drawn.
@@ -17,9 +16,7 @@ pub enum AxisScale {
 /// An axis of a panel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ChartAxis {
-    /// Quantity and unit.
     pub label: String,
-    /// Linear or logarithmic.
     pub scale: AxisScale,
     /// Ends; `None` to take them from the data.
     pub range: Option<(f64, f64)>,
@@ -32,14 +29,12 @@ const TIME_LABEL: &str = "time, s";
 
 impl ChartAxis {
     /// A linear axis that fits the data.
-    #[must_use]
-    pub fn linear(label: impl Into<String>) -> Self {
+    pub(crate) fn linear(label: impl Into<String>) -> Self {
         Self { label: label.into(), scale: AxisScale::Linear, ..Self::default() }
     }
 
     /// A linear axis of time, s: the panels of a page that have one share a cursor.
-    #[must_use]
-    pub fn time() -> Self {
+    pub(crate) fn time() -> Self {
         Self::linear(TIME_LABEL)
     }
 
@@ -49,15 +44,13 @@ impl ChartAxis {
     }
 
     /// A logarithmic axis that fits the data.
-    #[must_use]
-    pub fn log(label: impl Into<String>) -> Self {
+    pub(crate) fn log(label: impl Into<String>) -> Self {
         Self { label: label.into(), scale: AxisScale::Log, ..Self::default() }
     }
 
     /// An axis of things, one at every whole number from 0, with half a place before the first and after the
     /// last.
-    #[must_use]
-    pub fn categorical(label: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
+    pub(crate) fn categorical(label: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
         let categories: Vec<(f64, String)> =
             names.into_iter().enumerate().map(|(i, name)| (i as f64, name)).collect();
         let end = categories.len().max(1) as f64 - 0.5;
@@ -65,8 +58,7 @@ impl ChartAxis {
     }
 
     /// The same axis with fixed ends.
-    #[must_use]
-    pub fn with_range(self, low: f64, high: f64) -> Self {
+    pub(crate) fn with_range(self, low: f64, high: f64) -> Self {
         Self { range: Some((low, high)), ..self }
     }
 }
@@ -80,7 +72,7 @@ pub(super) struct Tick {
 
 impl Tick {
     /// Length, canvas units: minor ones are half as long.
-    pub fn length(&self) -> f64 {
+    pub(crate) fn length(&self) -> f64 {
         if self.label.is_some() { TICK_MM * UNITS_PER_MM } else { TICK_MM / 2.0 * UNITS_PER_MM }
     }
 }
@@ -138,7 +130,7 @@ pub(super) fn axis_limits(axis: &ChartAxis, values: impl Iterator<Item = f64>) -
 
 impl CanvasAxis {
     /// Canvas coordinate of a value; `None` where it has none.
-    pub fn canvas_position(&self, value: f64) -> Option<f64> {
+    pub(crate) fn canvas_position(&self, value: f64) -> Option<f64> {
         let share = match self.scale {
             AxisScale::Linear => (value - self.low) / (self.high - self.low),
             AxisScale::Log if value > 0.0 => math::ln(value / self.low) / math::ln(self.high / self.low),
@@ -159,7 +151,7 @@ impl CanvasAxis {
     }
 
     /// The value at a canvas coordinate.
-    pub fn value_at(&self, place: f64) -> f64 {
+    pub(crate) fn value_at(&self, place: f64) -> f64 {
         let share = (place - self.from) / (self.to - self.from);
         match self.scale {
             AxisScale::Linear => self.low + share * (self.high - self.low),

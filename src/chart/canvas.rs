@@ -21,7 +21,6 @@ pub(super) enum TextAnchor {
     Top,
     /// Middle of the lower edge.
     Bottom,
-    /// The middle.
     Centre,
 }
 
@@ -35,7 +34,7 @@ pub(super) struct Lettering {
 }
 
 impl Lettering {
-    pub fn plain(size_mm: f64, anchor: TextAnchor) -> Self {
+    pub(crate) fn plain(size_mm: f64, anchor: TextAnchor) -> Self {
         Self { size_mm, anchor, bold: false, upwards: false }
     }
 }
@@ -48,14 +47,14 @@ pub(super) struct Canvas {
 // Drawing into a string cannot fail, so the results of the back end are dropped below.
 impl Canvas {
     /// The elements that `draw` leaves on a canvas of that size.
-    pub fn render_elements(size: (u32, u32), draw: impl FnOnce(&mut Canvas)) -> String {
+    pub(crate) fn render_elements(size: (u32, u32), draw: impl FnOnce(&mut Canvas)) -> String {
         let mut canvas = Canvas { back: CompactSvg::new(size) };
         draw(&mut canvas);
         canvas.back.into_elements()
     }
 
     /// What `draw` leaves, as a group with attributes; `None` for no group.
-    pub fn draw_group(&mut self, attributes: Option<&str>, draw: impl FnOnce(&mut Canvas)) {
+    pub(crate) fn draw_group(&mut self, attributes: Option<&str>, draw: impl FnOnce(&mut Canvas)) {
         match attributes {
             None => draw(self),
             Some(attributes) => {
@@ -66,7 +65,7 @@ impl Canvas {
         }
     }
 
-    pub fn draw_line(&mut self, points: &[CanvasPoint], colour: Rgb, width: u32) {
+    pub(crate) fn draw_line(&mut self, points: &[CanvasPoint], colour: Rgb, width: u32) {
         let mut whole = round_points(points);
         whole.dedup();
         if whole.len() == 1 {
@@ -76,7 +75,7 @@ impl Canvas {
     }
 
     /// A PNG in an area, as far as it lies within another.
-    pub fn draw_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
+    pub(crate) fn draw_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
         self.back.append_png(area, within, png);
     }
 
@@ -94,16 +93,16 @@ impl Canvas {
         let _ = self.back.fill_polygon(round_points(corners), &plotters_colour(colour).mix(opacity).filled());
     }
 
-    pub fn draw_circle(&mut self, at: CanvasPoint, radius: u32, colour: Rgb, filled: bool) {
+    pub(crate) fn draw_circle(&mut self, at: CanvasPoint, radius: u32, colour: Rgb, filled: bool) {
         let style = ShapeStyle { color: plotters_colour(colour).to_rgba(), filled, stroke_width: 4 };
         let _ = self.back.draw_circle((at.0.round() as i32, at.1.round() as i32), radius, &style, filled);
     }
 
-    pub fn draw_text(&mut self, text: &str, at: CanvasPoint, look: Lettering) {
+    pub(crate) fn draw_text(&mut self, text: &str, at: CanvasPoint, look: Lettering) {
         self.draw_coloured_text(text, at, look, BLACK);
     }
 
-    pub fn draw_coloured_text(&mut self, text: &str, at: CanvasPoint, look: Lettering, colour: Rgb) {
+    pub(crate) fn draw_coloured_text(&mut self, text: &str, at: CanvasPoint, look: Lettering, colour: Rgb) {
         let font = ("sans-serif", look.size_mm * UNITS_PER_MM).into_font();
         let font = if look.bold { font.style(FontStyle::Bold) } else { font };
         let font = if look.upwards { font.transform(FontTransform::Rotate270) } else { font };

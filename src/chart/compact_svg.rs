@@ -25,12 +25,12 @@ pub(super) struct CompactSvg {
 }
 
 impl CompactSvg {
-    pub fn new(size: (u32, u32)) -> Self {
+    pub(crate) fn new(size: (u32, u32)) -> Self {
         Self { size, elements: String::new(), open: None }
     }
 
     /// The elements, one a line.
-    pub fn into_elements(mut self) -> String {
+    pub(crate) fn into_elements(mut self) -> String {
         self.close_path();
         self.elements
     }
@@ -52,19 +52,19 @@ impl CompactSvg {
     }
 
     /// Begins a group with attributes; what is drawn until its end belongs to it.
-    pub fn open_group(&mut self, attributes: &str) {
+    pub(crate) fn open_group(&mut self, attributes: &str) {
         self.close_path();
         self.elements.push_str(&format!("<g {attributes}>\n"));
     }
 
     /// Ends the last group that was begun.
-    pub fn close_group(&mut self) {
+    pub(crate) fn close_group(&mut self) {
         self.close_path();
         self.elements.push_str("</g>\n");
     }
 
     /// A PNG, cut at the edges of `within`, the text of the file in the element.
-    pub fn append_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
+    pub(crate) fn append_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
         let (x, y) = (area.left - within.left, area.top - within.top);
         let _ = self.append_element(&format!(
             "<svg x=\"{:.0}\" y=\"{:.0}\" width=\"{:.0}\" height=\"{:.0}\"><image x=\"{x:.1}\" y=\"{y:.1}\" \

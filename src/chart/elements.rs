@@ -128,22 +128,16 @@ pub struct Hatch {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(missing_docs)]
 pub enum HatchPattern {
-    /// The grey alone.
     #[default]
     Plain,
     Rising,
     Falling,
     Level,
     Upright,
-    /// Rising and falling.
     Crossed,
-    /// Level and upright.
     Checked,
-    /// Dots in rows.
     Dotted,
-    /// Level dashes.
     Dashed,
-    /// Upright dashes.
     DashedUpright,
 }
 

@@ -115,7 +115,7 @@ pub(in crate::chart) struct PanelColumns {
 
 impl PanelColumns {
     /// As many as the figure asks for and its width has room for.
-    pub fn new(figure: &Figure) -> Self {
+    pub(crate) fn new(figure: &Figure) -> Self {
         let most = figure.columns.clamp(1, figure.panels.len().max(1));
         let least =
             if figure.panels.iter().all(|panel| panel.bare) { MIN_BARE_WIDTH_MM } else { MIN_PANEL_WIDTH_MM };
@@ -146,7 +146,7 @@ impl PanelColumns {
     }
 
     /// The x axis of a panel in a column.
-    pub fn x_axis(
+    pub(crate) fn x_axis(
         &self,
         figure: &Figure,
         column: usize,

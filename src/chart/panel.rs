@@ -171,7 +171,6 @@ fn mean_heat_colour(placed: &PanelLayout, text: &TextAnnotation, middle: f64) ->
     if found.is_empty() { None } else { Some((mean(|c| c.0)?, mean(|c| c.1)?, mean(|c| c.2)?)) }
 }
 
-/// Vertical lines.
 fn draw_vertical_lines(canvas: &mut Canvas, placed: &PanelLayout) {
     let area = &placed.area;
     for rule in &placed.panel.vertical_lines {

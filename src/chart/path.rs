@@ -16,12 +16,12 @@ pub(super) struct CanvasArea {
 
 impl CanvasArea {
     /// Whether a point lies in it.
-    pub fn contains(&self, (x, y): CanvasPoint) -> bool {
+    pub(crate) fn contains(&self, (x, y): CanvasPoint) -> bool {
         x >= self.left && x <= self.right && y >= self.top && y <= self.bottom
     }
 
     /// Its corners, the first one again at the end.
-    pub fn outline(&self) -> [CanvasPoint; 5] {
+    pub(crate) fn outline(&self) -> [CanvasPoint; 5] {
         [
             (self.left, self.top),
             (self.right, self.top),
@@ -32,7 +32,7 @@ impl CanvasArea {
     }
 
     /// The part of a segment inside (Liang and Barsky); slopes are kept.
-    pub fn clip(&self, a: CanvasPoint, b: CanvasPoint) -> Option<(CanvasPoint, CanvasPoint)> {
+    pub(crate) fn clip(&self, a: CanvasPoint, b: CanvasPoint) -> Option<(CanvasPoint, CanvasPoint)> {
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
         for (p, q) in

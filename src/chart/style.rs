@@ -37,7 +37,6 @@ impl Colour {
     ];
 
     /// As SVG writes it.
-    #[must_use]
     pub(crate) fn hex(self) -> String {
         format_hex(self.rgb())
     }
@@ -60,16 +59,13 @@ impl Colour {
 /// How the points of a series are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mark {
-    /// A full line.
     #[default]
     Line,
     /// A thin full line.
     Thin,
     /// A thick full line, to lie under a thin one.
     Thick,
-    /// A dashed line.
     Dashed,
-    /// A dotted line.
     Dotted,
     /// A thin dashed line.
     ThinDashed,
@@ -77,9 +73,7 @@ pub enum Mark {
     Edged,
     /// Small dots, not joined.
     Dots,
-    /// Circles, not joined.
     Circles,
-    /// Crosses, not joined.
     Crosses,
     /// Full symbols of this shape, joined by a line.
     Joined(MarkerShape),
@@ -218,9 +212,9 @@ pub(super) fn readable_on(colour: Rgb) -> Rgb {
 /// Canvas units for a millimetre: four for a pixel of 1/96 inch.
 pub(super) const UNITS_PER_MM: f64 = 15.0;
 /// Width of a figure over two columns of a journal, mm.
-pub(crate) const FULL_WIDTH_MM: f64 = 170.0;
+pub const FULL_WIDTH_MM: f64 = 170.0;
 /// Width of a figure in one column, mm.
-pub(crate) const COLUMN_WIDTH_MM: f64 = 85.0;
+pub const COLUMN_WIDTH_MM: f64 = 85.0;
 /// Most height of a figure in print, mm: Springer's journals, among the strictest, take figures up to 234 mm
 /// high, about the text of an A4 page.
 pub const MAX_HEIGHT_MM: f64 = 230.0;

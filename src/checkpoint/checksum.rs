@@ -60,8 +60,7 @@ fn hex_checksum(content: &[u8]) -> String {
 /// SHA-256 over the canonical JSON of a problem, in hexadecimal: keys sorted, numbers as the shortest
 /// decimals that give the same bits back. Equal values have equal fingerprints, however their files are
 /// written.
-#[must_use]
-pub fn fingerprint(problem: &impl Serialize) -> String {
+pub(crate) fn fingerprint(problem: &impl Serialize) -> String {
     // a problem holds finite numbers and keys that are strings: nothing that cannot be written
     let value = serde_json::to_value(problem).unwrap_or_default();
     let mut text = String::new();

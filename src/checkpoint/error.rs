@@ -5,10 +5,10 @@ use super::header::{CheckpointKind, LAYOUT};
 /// Why a journal was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CheckpointError {
-    /// Another layout.
     #[error(
         "{file}: a journal of layout {found}, expected layout {LAYOUT}; move it away and run the {kind} again"
     )]
+    /// The file has another layout.
     Layout {
         /// File as named by the user.
         file: String,

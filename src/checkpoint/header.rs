@@ -23,8 +23,7 @@ pub enum CheckpointKind {
 
 impl CheckpointKind {
     /// What one of its records is called.
-    #[must_use]
-    pub fn record(self) -> &'static str {
+    pub(crate) fn record(self) -> &'static str {
         match self {
             Self::Fit => "evaluation",
             Self::Trace => "iterate",
@@ -33,8 +32,7 @@ impl CheckpointKind {
     }
 
     /// The file that says what is computed.
-    #[must_use]
-    pub fn input(self) -> &'static str {
+    pub(crate) fn input(self) -> &'static str {
         match self {
             Self::Fit | Self::Trace => "job",
             Self::Sweep => "study",
@@ -74,7 +72,7 @@ impl<B> CheckpointHeader<B> {
     /// # Errors
     /// [`CheckpointError::OtherVersion`], [`CheckpointError::OtherProblem`], or [`CheckpointError::Header`] when it
     /// was edited.
-    pub fn check_matches<R: CheckpointRecord<Body = B>>(
+    pub(crate) fn check_matches<R: CheckpointRecord<Body = B>>(
         &self,
         file: &str,
         expected: &Self,

@@ -44,7 +44,7 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
     /// # Errors
     /// [`CheckpointError`] at the first complete line that the program did not write, and at a record that
     /// stands in a line before too.
-    pub fn read_all(mut self) -> Result<CheckpointFile<R>, CheckpointError> {
+    pub(crate) fn read_all(mut self) -> Result<CheckpointFile<R>, CheckpointError> {
         let (mut records, mut lines) = (Vec::new(), HashMap::new());
         while let Some(StoredRecord { record, line }) = self.next_record()? {
             if let Some(before) = lines.insert(record.identity(), line) {
@@ -77,7 +77,12 @@ impl<R: CheckpointRecord> CheckpointFile<R> {
     ///
     /// # Errors
     /// [`CheckpointError::Recomputed`].
-    pub fn check_recomputed(&self, file: &str, place: usize, again: &R) -> Result<(), CheckpointError> {
+    pub(crate) fn check_recomputed(
+        &self,
+        file: &str,
+        place: usize,
+        again: &R,
+    ) -> Result<(), CheckpointError> {
         let Some(stored) = self.records.get(place) else { return Ok(()) };
         check_recomputed(file, &StoredRecord { record: stored.clone(), line: place + FIRST_LINE }, again)
     }
@@ -244,7 +249,7 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
     ///
     /// # Errors
     /// [`CheckpointError`] where it cannot be read, or the program did not write its first line.
-    pub fn open(file: &str, from: S) -> Result<Option<Self>, CheckpointError> {
+    pub(crate) fn open(file: &str, from: S) -> Result<Option<Self>, CheckpointError> {
         let mut text = LineReader { from, chunk: Vec::new(), start: 0, used: 0 };
         let unreadable = |problem| CheckpointError::Unreadable { file: file.to_owned(), problem };
         let Some(first) = text.next_line().map_err(unreadable)?.filter(is_complete) else { return Ok(None) };
@@ -258,8 +263,7 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
         &self.file
     }
 
-    /// Its header.
-    pub fn header(&self) -> &CheckpointHeader<R::Body> {
+    pub(crate) fn header(&self) -> &CheckpointHeader<R::Body> {
         &self.header
     }
 
@@ -267,7 +271,7 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
     ///
     /// # Errors
     /// [`CheckpointError`] where it cannot be read, or at a complete line that the program did not write.
-    pub fn next_record(&mut self) -> Result<Option<StoredRecord<R>>, CheckpointError> {
+    pub(crate) fn next_record(&mut self) -> Result<Option<StoredRecord<R>>, CheckpointError> {
         let Self { file, header, line_reader: text, line, end } = self;
         let unreadable = |problem| CheckpointError::Unreadable { file: file.clone(), problem };
         let Some(found) = text.next_line().map_err(unreadable)? else { return Ok(None) };
@@ -289,7 +293,7 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
     }
 
     /// How it ends, once there is no further record.
-    pub fn end(&self) -> CheckpointEnd {
+    pub(crate) fn end(&self) -> CheckpointEnd {
         self.end
     }
 }

@@ -42,7 +42,7 @@ pub trait CheckpointRecord: Clone + Debug + PartialEq {
 
 impl<B: Serialize> CheckpointHeader<B> {
     /// The header of a journal of such records.
-    pub fn new<R: CheckpointRecord<Body = B>>(fingerprint: &str, version: &str, body: B) -> Self {
+    pub(crate) fn new<R: CheckpointRecord<Body = B>>(fingerprint: &str, version: &str, body: B) -> Self {
         let (fingerprint, version) = (fingerprint.to_owned(), version.to_owned());
         Self { journal: R::KIND, layout: LAYOUT, fingerprint, version, body }
     }

@@ -19,38 +19,31 @@ impl Shard {
     pub const WHOLE: Self = Self { number: 0, total: 1 };
 
     /// Shard `at` (counted from 0) of `of`; `None` where there is none.
-    #[must_use]
-    pub fn new(at: usize, of: usize) -> Option<Self> {
+    pub(crate) fn new(at: usize, of: usize) -> Option<Self> {
         (at < of && of <= MAX_SHARDS).then_some(Self { number: at, total: of })
     }
 
     /// Its number, from 0.
-    #[must_use]
-    pub fn number(self) -> usize {
+    pub(crate) fn number(self) -> usize {
         self.number
     }
 
-    /// Number of shards.
-    #[must_use]
-    pub fn total(self) -> usize {
+    pub(crate) fn total(self) -> usize {
         self.total
     }
 
     /// How many of `points` it holds.
-    #[must_use]
-    pub fn count_points(self, points: usize) -> usize {
+    pub(crate) fn count_points(self, points: usize) -> usize {
         points.saturating_sub(self.number).div_ceil(self.total)
     }
 
     /// Whether it holds point `index`.
-    #[must_use]
-    pub fn contains(self, index: usize) -> bool {
+    pub(crate) fn contains(self, index: usize) -> bool {
         index % self.total == self.number
     }
 
     /// Whether both may hold the same point: not where their numbers differ by what divides both counts.
-    #[must_use]
-    pub fn overlaps(self, other: Self) -> bool {
+    pub(crate) fn overlaps(self, other: Self) -> bool {
         let (mut common, mut rest) = (self.total, other.total);
         while rest > 0 {
             (common, rest) = (rest, common % rest);
@@ -59,20 +52,17 @@ impl Shard {
     }
 
     /// Index of its point `place`, counted from 0.
-    #[must_use]
-    pub fn point_index(self, place: usize) -> usize {
+    pub(crate) fn point_index(self, place: usize) -> usize {
         self.number + place * self.total
     }
 
     /// Name of its journal, without an ending: `3-of-64`.
-    #[must_use]
-    pub fn file_stem(self) -> String {
+    pub(crate) fn file_stem(self) -> String {
         format!("{}-of-{}", self.number, self.total)
     }
 
     /// The shard whose journal has this name.
-    #[must_use]
-    pub fn from_file_stem(name: &str) -> Option<Self> {
+    pub(crate) fn from_file_stem(name: &str) -> Option<Self> {
         let (at, of) = name.split_once("-of-")?;
         Self::new(at.parse().ok()?, of.parse().ok()?).filter(|shard| shard.file_stem() == name)
     }

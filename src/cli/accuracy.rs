@@ -20,7 +20,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 #[derive(Debug, Args)]
-pub struct AccuracyArgs {
+pub(crate) struct AccuracyArgs {
     /// Scene to study (scene.toml)
     pub scene: PathBuf,
     /// Folder for work-precision.csv, accuracy.csv and work-precision.svg
@@ -48,7 +48,7 @@ const ROUNDS: u32 = 15;
 const MIN_TIMING: (u32, Duration) = (3, Duration::from_millis(250));
 
 impl AccuracyArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let scene = read_scene(&self.scene)?;
         let writer =
             WritePolicy::new(OutputCommand::Accuracy, self.overwrite).with_csv_dialect(global.csv_dialect);

@@ -34,7 +34,7 @@ const LONG_VERSION: &str = concat!(
     disable_help_subcommand = true,
     after_help = help::list_help_pages()
 )]
-pub struct CommandLine {
+pub(crate) struct CommandLine {
     #[command(flatten)]
     pub global: GlobalArgs,
     #[command(subcommand)]
@@ -42,7 +42,7 @@ pub struct CommandLine {
 }
 
 #[derive(Debug, Subcommand)]
-pub enum Command {
+pub(crate) enum Command {
     /// Bundled recording -> import -> spectrum -> fit -> report
     Demo(demo::DemoArgs),
     /// Read a tracking export into data/NAME
@@ -102,7 +102,7 @@ pub enum Command {
 }
 
 impl Command {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         match self {
             Self::Demo(args) => args.run(global),
             Self::Import(args) => args.run(global),
@@ -129,7 +129,7 @@ impl Command {
 // Options that count something.
 
 /// A whole number, 1 or more; [`clap`] names the option and what was found.
-pub fn parse_count(text: &str) -> Result<usize, String> {
+pub(crate) fn parse_count(text: &str) -> Result<usize, String> {
     match text.parse() {
         Ok(count) if count > 0 => Ok(count),
         _ => Err("expected a whole number, 1 or more".to_owned()),
@@ -139,7 +139,7 @@ pub fn parse_count(text: &str) -> Result<usize, String> {
 // What every command takes.
 
 #[derive(Debug, Clone, Args)]
-pub struct GlobalArgs {
+pub(crate) struct GlobalArgs {
     /// No progress and no summary; refusals are still shown
     #[arg(long, global = true)]
     pub quiet: bool,
@@ -166,7 +166,7 @@ fn parse_threads(text: &str) -> Result<usize, String> {
 
 impl GlobalArgs {
     /// Sets what holds for the whole program, before anything runs.
-    pub fn apply_settings(&self) -> Result<(), Failure> {
+    pub(crate) fn apply_settings(&self) -> Result<(), Failure> {
         self.max_file_size.set_read_limit();
         let Some(threads) = self.threads else { return Ok(()) };
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::internal)
@@ -177,7 +177,7 @@ impl GlobalArgs {
 
 /// A time such as `90s`, `45min`, `1h30min`, `02:00:00` or `1-12:00:00`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct TimeLimit(pub Duration);
+pub(crate) struct TimeLimit(pub Duration);
 
 /// Longest time that is taken, s: a year.
 const MAX_TIME_LIMIT_S: u64 = 366 * DAY_S;
@@ -198,7 +198,6 @@ impl FromStr for TimeLimit {
     }
 }
 
-/// `HH:MM:SS`, or `D-HH:MM:SS`.
 fn parse_clock_time(text: &str) -> Option<u64> {
     let (days, time) = text.split_once('-').unwrap_or(("0", text));
     let mut parts = time.split(':').map(parse_digits);

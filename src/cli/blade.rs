@@ -14,7 +14,7 @@ use serde::Serialize;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
-pub struct BladeArgs {
+pub(crate) struct BladeArgs {
     /// Section of the blade (section.toml)
     #[arg(required_unless_present = "check")]
     pub section: Option<PathBuf>,
@@ -55,7 +55,7 @@ struct BladeJson<T> {
 }
 
 impl BladeArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         match (&self.check, &self.section) {
             (Some(scene), _) => self.check_scene(scene, global)?,
             (None, Some(section)) => self.estimate_from_section(section, global)?,

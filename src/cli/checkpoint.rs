@@ -14,13 +14,13 @@ use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 
 /// Name of a journal in the folder of its fit or study.
-pub const CHECKPOINT_FILE: &str = "journal.jsonl";
+pub(crate) const CHECKPOINT_FILE: &str = "journal.jsonl";
 
 /// Longest first line that is looked at, bytes.
 const MAX_HEADER_BYTES: u64 = 1 << 24;
 
 /// A journal on disk.
-pub struct CheckpointWriter {
+pub(crate) struct CheckpointWriter {
     path: PathBuf,
     /// `None` before the first line of a new journal.
     file: Option<File>,
@@ -47,7 +47,10 @@ enum PendingAction {
 impl CheckpointWriter {
     /// The journal at `path`, or where it will be, and what it holds if it is to be resumed; nothing is
     /// changed before the first line.
-    pub fn open<R: CheckpointRecord>(path: &Path, resume: bool) -> OpenedCheckpoint<CheckpointFile<R>> {
+    pub(crate) fn open<R: CheckpointRecord>(
+        path: &Path,
+        resume: bool,
+    ) -> OpenedCheckpoint<CheckpointFile<R>> {
         Self::open_with(path, resume, |file, stream| {
             files::check_data_size(path, file)?;
             let journal = stream.read_all().map_err(Failure::input)?;
@@ -58,7 +61,7 @@ impl CheckpointWriter {
 
     /// The same where what it holds may be larger than memory: `each` sees its records one by one, and the
     /// header is given back.
-    pub fn open_each<R: CheckpointRecord>(
+    pub(crate) fn open_each<R: CheckpointRecord>(
         path: &Path,
         resume: bool,
         each: &mut RecordVisitor<R>,
@@ -131,7 +134,7 @@ impl CheckpointWriter {
     }
 
     /// Drops what is torn, also where nothing had to be appended.
-    pub fn finish(mut self) -> Result<(), Failure> {
+    pub(crate) fn finish(mut self) -> Result<(), Failure> {
         self.apply_pending()
             .map_err(|problem| Failure::Internal(format!("{}: {problem}", self.path.display())))
     }

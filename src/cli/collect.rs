@@ -16,7 +16,7 @@ use std::fs::File;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
-pub struct CollectArgs {
+pub(crate) struct CollectArgs {
     /// Folder of the study, the --out of its shards; or the jobs of a list of fits, as they were given to
     /// `wiperlab fit`
     #[arg(required = true, value_name = "DIR|JOB")]
@@ -32,7 +32,7 @@ pub struct CollectArgs {
 }
 
 impl CollectArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         match self.paths.as_slice() {
             [dir] if !dir.is_file() => self.collect_study(dir, global),
             [file] => Err(one_file_failure(file)?),

@@ -30,7 +30,7 @@ const SPECTRA: [(&str, &str, &str); 2] =
     [("low", "head-drop", "release+0.01..release+0.2"), ("high", "deflection", "release+0.01..release+0.1")];
 
 #[derive(Debug, Args)]
-pub struct DemoArgs {
+pub(crate) struct DemoArgs {
     /// Folder for everything that the demo makes
     #[arg(long, default_value = "demo", value_name = "DIR")]
     pub out: PathBuf,
@@ -42,7 +42,7 @@ pub struct DemoArgs {
 }
 
 impl DemoArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         self.check_outputs()?;
         let quiet = GlobalArgs { quiet: true, ..global.clone() };
         let data = self.out.join("data").join(NAME);

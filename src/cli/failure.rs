@@ -3,23 +3,22 @@
 use crate::simulate::{RunResult, RunStatus};
 
 /// Bad usage or bad input: nothing was written.
-pub const BAD_INPUT: u8 = 2;
+pub(crate) const BAD_INPUT: u8 = 2;
 /// The machine or the program failed.
-pub const INTERNAL: u8 = 1;
+pub(crate) const INTERNAL: u8 = 1;
 /// The command ran but stopped early; what was computed is written and says so.
-pub const STOPPED_EARLY: u8 = 3;
+pub(crate) const STOPPED_EARLY: u8 = 3;
 
 /// How a command that ran has ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum CommandOutcome {
-    /// Everything was done.
+pub(crate) enum CommandOutcome {
     Done,
     /// It stopped early or did not converge; what was computed is written and says so.
     StoppedEarly,
 }
 
 impl CommandOutcome {
-    pub fn exit_code(self) -> u8 {
+    pub(crate) fn exit_code(self) -> u8 {
         match self {
             Self::Done => 0,
             Self::StoppedEarly => STOPPED_EARLY,
@@ -40,17 +39,17 @@ pub enum Failure {
 
 impl Failure {
     /// Any typed refusal of the library is bad input.
-    pub fn input(error: impl std::fmt::Display) -> Self {
+    pub(crate) fn input(error: impl std::fmt::Display) -> Self {
         Self::Input(error.to_string())
     }
 
     /// What should not happen.
-    pub fn internal(error: impl std::fmt::Display) -> Self {
+    pub(crate) fn internal(error: impl std::fmt::Display) -> Self {
         Self::Internal(error.to_string())
     }
 
     /// Prints the message and gives the exit code.
-    pub fn print_message(&self) -> u8 {
+    pub(crate) fn print_message(&self) -> u8 {
         // (each problem of a file has a line of its own; no line but the first begins at the margin)
         for (i, line) in self.to_string().split('\n').enumerate() {
             warn_line!("{}{line}", if i == 0 { "error: " } else { "       " });
@@ -65,7 +64,7 @@ impl Failure {
 // How a model run that did not complete ended, for the user.
 
 /// Status, time and meaning; `None` for a run that completed.
-pub fn describe_early_end(run: &RunResult) -> Option<String> {
+pub(crate) fn describe_early_end(run: &RunResult) -> Option<String> {
     (run.status != RunStatus::Completed)
         .then(|| format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning()))
 }

@@ -13,11 +13,13 @@ use crate::chart::{Figure, Medium};
 use crate::toml_file;
 use clap::{Args, ValueEnum};
 use guard::OutputGuard;
-pub use input::{FileSize, check_data_size, is_standard_input, read_data, read_json, read_text, read_toml};
+pub(crate) use input::{
+    FileSize, check_data_size, is_standard_input, read_data, read_json, read_text, read_toml,
+};
 use marker::MARKER_FILE;
-pub use marker::{FolderMarker, OutputCommand, Overwrite, WritePolicy};
-pub use preserved_files::{SIMULATION_SUMMARY, is_simulation_summary};
-pub use staging::{OutputStaging, check_path_free};
+pub(crate) use marker::{FolderMarker, OutputCommand, Overwrite, WritePolicy};
+pub(crate) use preserved_files::{SIMULATION_SUMMARY, is_simulation_summary};
+pub(crate) use staging::{OutputStaging, check_path_free};
 use std::fs::File;
 use std::io;
 use std::io::{BufWriter, Read, Seek, Write};
@@ -25,10 +27,10 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 /// What a fit found, in its folder.
-pub const RESULT_FILE: &str = "result.json";
+pub(crate) const RESULT_FILE: &str = "result.json";
 
 /// Name of a file or folder for messages and headings.
-pub fn display_name(path: &Path) -> String {
+pub(crate) fn display_name(path: &Path) -> String {
     if is_standard_input(path) {
         return "standard-input".to_owned();
     }
@@ -37,18 +39,18 @@ pub fn display_name(path: &Path) -> String {
 }
 
 /// The folder in which a file lies.
-pub fn containing_folder(file: &Path) -> &Path {
+pub(crate) fn containing_folder(file: &Path) -> &Path {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Where a path leads that stands in `file`: it is relative to the folder of that file, whatever the working
 /// folder is.
-pub fn resolve_path(file: &Path, named: &str) -> PathBuf {
+pub(crate) fn resolve_path(file: &Path, named: &str) -> PathBuf {
     containing_folder(file).join(named)
 }
 
 /// The same where something has to be there; otherwise why it is refused.
-pub fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf, String> {
+pub(crate) fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf, String> {
     let path = resolve_path(file, named);
     if path.exists() {
         return Ok(path);
@@ -61,7 +63,7 @@ pub fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf, String
 }
 
 /// A path as a file in `folder` names it: from there, or in full where no way leads from one to the other.
-pub fn relative_path(folder: &Path, path: &Path) -> Result<String, Failure> {
+pub(crate) fn relative_path(folder: &Path, path: &Path) -> Result<String, Failure> {
     let in_full = |path: &Path| {
         std::path::absolute(path).map_err(|error| {
             Failure::Input(format!("{}: cannot be found from here: {error}", path.display()))
@@ -86,7 +88,7 @@ pub fn relative_path(folder: &Path, path: &Path) -> Result<String, Failure> {
 
 /// Writes every file of a command into `folder` (made if missing): all are staged next to their places first,
 /// then renamed.
-pub fn write_outputs(
+pub(crate) fn write_outputs(
     folder: &Path,
     writer: &WritePolicy,
     files: &[(impl AsRef<str>, Vec<u8>)],
@@ -97,7 +99,7 @@ pub fn write_outputs(
 }
 
 /// The same for files that no marker lists, of which the caller knows that they replace nothing of value.
-pub fn write_unmarked(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
+pub(crate) fn write_unmarked(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
     let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
     OutputFolder::find_writable_ancestor(folder)?;
     commit_files(OutputStaging::new_unmarked(folder, &names)?, files)
@@ -111,7 +113,7 @@ fn commit_files(mut staging: OutputStaging, files: &[(impl AsRef<str>, Vec<u8>)]
 }
 
 /// A figure as files: for the screen, and under `paper/` for a journal's column and page.
-pub fn figure_files(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
+pub(crate) fn figure_files(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
     let file = |name: String, medium| (name, figure.to_svg(medium).into_bytes());
     [
         file(format!("{name}.svg"), Medium::Screen),
@@ -121,13 +123,13 @@ pub fn figure_files(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3] {
 }
 
 /// Text that is made piece by piece, as a reader.
-pub struct ChunkReader<I> {
+pub(crate) struct ChunkReader<I> {
     pieces: I,
     present: io::Cursor<Vec<u8>>,
 }
 
 impl<I: Iterator<Item = String>> ChunkReader<I> {
-    pub fn new(pieces: I) -> Self {
+    pub(crate) fn new(pieces: I) -> Self {
         Self { pieces, present: io::Cursor::default() }
     }
 }
@@ -150,7 +152,7 @@ impl<I: Iterator<Item = String>> Read for ChunkReader<I> {
 /// A folder for results that are written while they are computed: nothing is seen of them before all are
 /// complete, and nothing is left of them when the program is killed.
 #[derive(Debug)]
-pub struct OutputFolder {
+pub(crate) struct OutputFolder {
     folder: PathBuf,
     writer: WritePolicy,
     /// Where the nameless files are kept meanwhile: the folder, or what there is of the way to it.
@@ -160,7 +162,7 @@ pub struct OutputFolder {
 impl OutputFolder {
     /// Checks that `folder` is one or can be made, can be written to, and holds nothing that the files
     /// `names` must not replace: asked before the work, as it is again when they are placed.
-    pub fn check(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
+    pub(crate) fn check(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
         let near = Self::find_writable_ancestor(folder)?;
         names.iter().chain([&MARKER_FILE]).try_for_each(|name| check_path_free(&folder.join(name)))?;
         let guard = OutputGuard::new(folder, writer, names)?;
@@ -193,7 +195,7 @@ impl OutputFolder {
     }
 
     /// A file that is written to as it grows and gets its name when all are [finished](Self::commit).
-    pub fn create_file(&self, name: &'static str) -> Result<PendingFile, Failure> {
+    pub(crate) fn create_file(&self, name: &'static str) -> Result<PendingFile, Failure> {
         let path = self.folder.join(name);
         let file =
             tempfile::tempfile_in(&self.temporary_folder).map_err(|error| write_failure(&path, &error))?;
@@ -201,7 +203,7 @@ impl OutputFolder {
     }
 
     /// Puts the files that grew and the others into the folder under their names, or none of them.
-    pub fn commit(
+    pub(crate) fn commit(
         &self,
         files: Vec<PendingFile>,
         others: &[(impl AsRef<str>, Vec<u8>)],
@@ -222,7 +224,7 @@ impl OutputFolder {
 }
 
 /// A file without a name for what does not fit into memory, in a folder or in what there is of the way to it.
-pub fn create_scratch_file(folder: &Path) -> Result<File, Failure> {
+pub(crate) fn create_scratch_file(folder: &Path) -> Result<File, Failure> {
     let near = OutputFolder::find_writable_ancestor(folder)?;
     tempfile::tempfile_in(&near).map_err(|error| write_failure(&near, &error))
 }
@@ -230,7 +232,7 @@ pub fn create_scratch_file(folder: &Path) -> Result<File, Failure> {
 /// A file on its way; after its first failure nothing more is written, and the failure is reported at the
 /// end.
 #[derive(Debug)]
-pub struct PendingFile {
+pub(crate) struct PendingFile {
     name: &'static str,
     path: PathBuf,
     to: BufWriter<File>,
@@ -238,7 +240,7 @@ pub struct PendingFile {
 }
 
 impl PendingFile {
-    pub fn write_text(&mut self, text: &str) {
+    pub(crate) fn write_text(&mut self, text: &str) {
         if self.failed.is_none() {
             self.failed = self.to.write_all(text.as_bytes()).err();
         }
@@ -264,7 +266,7 @@ fn write_failure(path: &Path, error: &io::Error) -> Failure {
 // Figures of commands that print or write tables.
 
 #[derive(Debug, Args)]
-pub struct FigureArgs {
+pub(crate) struct FigureArgs {
     /// Draw figures into a folder, each in three files: one for a screen, and below paper/ one for a column
     /// and one for a page
     #[arg(long = "figures", value_name = "DIR")]
@@ -273,7 +275,7 @@ pub struct FigureArgs {
 
 impl FigureArgs {
     /// Refuses a folder that figures of these names cannot go to; asked before the work.
-    pub fn check_folder(&self, names: &[&str], overwrite: Overwrite) -> Result<(), Failure> {
+    pub(crate) fn check_folder(&self, names: &[&str], overwrite: Overwrite) -> Result<(), Failure> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let files = names.iter().flat_map(|name| figure_files(name, &Figure::default()));
         let names: Vec<String> = files.map(|(name, _)| name).collect();
@@ -282,7 +284,7 @@ impl FigureArgs {
     }
 
     /// Writes named figures, where they are wanted.
-    pub fn write_figures(
+    pub(crate) fn write_figures(
         &self,
         overwrite: Overwrite,
         global: &GlobalArgs,
@@ -307,7 +309,7 @@ fn figure_policy(overwrite: Overwrite) -> WritePolicy {
 
 /// How tables are written for those who open them with a double click.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub enum CsvDialect {
+pub(crate) enum CsvDialect {
     /// Commas between cells, decimal points (RFC 4180 with line feeds): what every program reads
     #[default]
     Plain,
@@ -322,12 +324,12 @@ const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 impl CsvDialect {
     /// Whether a table that is written with commas and points has to be written anew.
-    pub fn needs_conversion(self) -> bool {
+    pub(crate) fn needs_conversion(self) -> bool {
         self != Self::Plain
     }
 
     /// A table in this dialect. Cells that are numbers get its decimal mark, all others stay as they are.
-    pub fn convert_table(self, plain: impl Read, mut to: impl Write) -> io::Result<()> {
+    pub(crate) fn convert_table(self, plain: impl Read, mut to: impl Write) -> io::Result<()> {
         to.write_all(BYTE_ORDER_MARK)?;
         let decimal_comma = self == Self::ExcelDe;
         let mut table = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(plain);
@@ -349,7 +351,7 @@ impl CsvDialect {
 // Tables that are written row by row.
 
 /// A table on its way to its file.
-pub struct StreamedTable {
+pub(crate) struct StreamedTable {
     pub file: PendingFile,
     row: String,
     /// Rows that are held back until there are enough of them, and how many those are.
@@ -360,13 +362,13 @@ pub struct StreamedTable {
 }
 
 impl StreamedTable {
-    pub fn new(mut file: PendingFile, header: &str, least_rows: usize) -> Self {
+    pub(crate) fn new(mut file: PendingFile, header: &str, least_rows: usize) -> Self {
         file.write_text(header);
         file.write_text("\n");
         Self { file, row: String::new(), held: String::new(), missing: least_rows, spent: Duration::ZERO }
     }
 
-    pub fn add_row(&mut self, push: impl FnOnce(&mut String)) {
+    pub(crate) fn add_row(&mut self, push: impl FnOnce(&mut String)) {
         let clock = Instant::now();
         self.row.clear();
         push(&mut self.row);

@@ -5,8 +5,8 @@ mod outputs;
 mod summary;
 mod traces;
 
-pub use batch::{BatchJobState, check_distinct_folders};
-pub use summary::print_summary;
+pub(crate) use batch::{BatchJobState, check_distinct_folders};
+pub(crate) use summary::print_summary;
 
 use super::args::GlobalArgs;
 use super::args::TimeLimit;
@@ -31,7 +31,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
 #[derive(Debug, Args)]
-pub struct FitArgs {
+pub(crate) struct FitArgs {
     /// Job of the fit (fits/NAME/job.toml), or its folder; several are fitted one after the other, each in a
     /// folder of its own
     #[arg(required = true, value_name = "JOB")]
@@ -56,7 +56,7 @@ pub struct FitArgs {
 }
 
 /// A result, and what it took.
-pub struct CompletedFit {
+pub(crate) struct CompletedFit {
     pub result: FitResult,
     /// How much of it was taken from journals.
     pub replayed: usize,
@@ -64,7 +64,7 @@ pub struct CompletedFit {
 }
 
 impl FitArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         if let Some(TimeLimit(time)) = self.time_limit {
             interrupt::set_time_limit(time);
         }
@@ -97,7 +97,7 @@ impl FitArgs {
 
 impl CompletedFit {
     /// Says what was found and where it is.
-    pub fn print_outcome(&self, problem: &LoadedJob, global: &GlobalArgs) -> CommandOutcome {
+    pub(crate) fn print_outcome(&self, problem: &LoadedJob, global: &GlobalArgs) -> CommandOutcome {
         if !global.quiet {
             print_summary(self);
         }
@@ -111,7 +111,7 @@ impl CompletedFit {
 
 impl LoadedJob {
     /// Fits, and writes the journal as it goes and the result at the end.
-    pub fn solve(
+    pub(crate) fn solve(
         &self,
         global: &GlobalArgs,
         resume: bool,

@@ -26,7 +26,7 @@ use std::path::PathBuf;
 const WIDTH: usize = 96;
 
 #[derive(Debug, Args)]
-pub struct HelpArgs {
+pub(crate) struct HelpArgs {
     /// A command, such as `fit`, or a page; all are listed without it
     #[arg(value_name = "COMMAND|PAGE")]
     pub word: Option<String>,
@@ -66,7 +66,7 @@ const PAGES: [HelpPage; 12] = [
 ];
 
 /// The list of the pages, below the help of the program.
-pub fn list_help_pages() -> String {
+pub(crate) fn list_help_pages() -> String {
     let width = PAGES.iter().map(|(name, ..)| name.len()).max().unwrap_or_default();
     let rows = PAGES.iter().map(|(name, about, _)| format!("  {name:<width$}  {about}"));
     let rows: Vec<String> = rows.collect();
@@ -74,7 +74,7 @@ pub fn list_help_pages() -> String {
 }
 
 impl HelpArgs {
-    pub fn run(&self, program: &mut Command) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, program: &mut Command) -> Result<CommandOutcome, Failure> {
         let text = match self.word.as_deref().and_then(find_help_page) {
             Some(content) => content.render(),
             None => self.command_help(program)?,
@@ -160,13 +160,13 @@ For example:
 
 #[derive(Debug, Args)]
 #[command(after_help = COMPLETIONS_HELP)]
-pub struct CompletionsArgs {
+pub(crate) struct CompletionsArgs {
     /// The shell
     pub shell: Shell,
 }
 
 impl CompletionsArgs {
-    pub fn run(&self, program: &mut Command) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, program: &mut Command) -> Result<CommandOutcome, Failure> {
         let mut script = Vec::new();
         generate(self.shell, program, "wiperlab", &mut script);
         write_stdout(&escape_lines(&String::from_utf8_lossy(&script)));
@@ -177,7 +177,7 @@ impl CompletionsArgs {
 // `wiperlab man`: the help of every command as manual pages.
 
 #[derive(Debug, Args)]
-pub struct ManArgs {
+pub(crate) struct ManArgs {
     /// Folder for wiperlab.1, wiperlab-fit.1 and so on, such as ~/.local/share/man/man1
     #[arg(long, value_name = "DIR")]
     pub out: PathBuf,
@@ -186,7 +186,7 @@ pub struct ManArgs {
 }
 
 impl ManArgs {
-    pub fn run(&self, program: &mut Command, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, program: &mut Command, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         program.build();
         let mut pages = Vec::new();
         add_manual_page(&mut pages, program, "wiperlab")?;

@@ -48,19 +48,19 @@ Examples:
 
 #[derive(Debug, Args)]
 #[command(after_help = after_help())]
-pub struct ImportArgs {
+pub(crate) struct ImportArgs {
     #[command(flatten)]
     typed: Box<ImportOptionArgs>, // far larger than the arguments of any other command
 }
 
 impl ImportArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         self.typed.run(global)
     }
 }
 
 #[derive(Debug, Args)]
-pub struct ImportOptionArgs {
+pub(crate) struct ImportOptionArgs {
     /// Exported tables; several are merged on one frame grid
     #[arg(value_name = "FILE", required = true)]
     pub sources: Vec<PathBuf>,
@@ -122,13 +122,13 @@ pub struct ImportOptionArgs {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum YDirection {
+pub(crate) enum YDirection {
     Up,
     Down,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum TimeMeaning {
+pub(crate) enum TimeMeaning {
     Real,
     Ms,
     Frames,
@@ -317,7 +317,7 @@ fn read_source(path: &Path) -> Result<ImportSource, Failure> {
 }
 
 /// Imports sources into a folder.
-pub fn import_into(
+pub(crate) fn import_into(
     folder: &Path,
     sources: &[ImportSource],
     options: &ImportOptions,

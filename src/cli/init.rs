@@ -22,7 +22,7 @@ you can measure (marked YOURS). Replace those, then:
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
-pub struct InitArgs {
+pub(crate) struct InitArgs {
     /// A recording's folder, or a trace.csv alone
     #[arg(value_name = "RECORDING", required_unless_present = "scene", conflicts_with = "scene")]
     pub recording: Option<PathBuf>,
@@ -52,7 +52,7 @@ struct DraftFiles {
 }
 
 impl InitArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let writer = WritePolicy::new(OutputCommand::Init, self.overwrite);
         let names: &[&str] = if self.scene { &[SCENE] } else { &[SCENE, JOB] };
         OutputFolder::check(&self.out, &writer, names)?;

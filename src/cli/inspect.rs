@@ -29,7 +29,7 @@ components of the published experiment.";
 
 #[derive(Debug, Args)]
 #[command(after_help = AFTER_HELP)]
-pub struct InspectArgs {
+pub(crate) struct InspectArgs {
     /// A recording's folder, or a trace.csv alone
     #[arg(value_name = "RECORDING")]
     pub recording: PathBuf,
@@ -48,7 +48,7 @@ pub struct InspectArgs {
 
 impl InspectArgs {
     /// What is asked for is the text itself, so `--quiet` leaves the verdict.
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let scene = self.scene.as_deref().map(read_scene).transpose()?;
         self.figures.check_folder(&[FIGURE], self.overwrite)?;
         let loaded = load_recording(&self.recording)?;
@@ -157,7 +157,7 @@ fn print_components(components: &InspectedComponents) {
 
 /// Everything that is said of a recording; the JSON object.
 #[derive(Debug, Serialize)]
-pub struct Inspection {
+pub(crate) struct Inspection {
     pub recording: String,
     pub synthetic: bool,
     grade: Grade,
@@ -175,19 +175,19 @@ pub struct Inspection {
 /// The slope of the glass in the picture, or why the recording shows none.
 #[derive(Debug, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum GlassSlope {
+pub(crate) enum GlassSlope {
     Tilt(CameraTilt),
     NoTilt(String),
 }
 
 #[derive(Debug, Serialize)]
-pub struct InspectedComponents {
+pub(crate) struct InspectedComponents {
     pub source: String,
     pub shown: Vec<InspectedComponent>,
 }
 
 #[derive(Debug, Serialize)]
-pub struct InspectedComponent {
+pub(crate) struct InspectedComponent {
     pub name: String,
     #[serde(flatten)]
     pub showing: ComponentVisibility,
@@ -195,7 +195,7 @@ pub struct InspectedComponent {
 
 /// The instants of a turn, s; null where one is not in the recording.
 #[derive(Debug, Serialize)]
-pub struct InspectedReversal {
+pub(crate) struct InspectedReversal {
     pub hold_s: Option<f64>,
     pub reversal_s: f64,
     pub release_s: Option<f64>,
@@ -209,7 +209,7 @@ impl From<&Reversal> for InspectedReversal {
 
 impl Inspection {
     /// Everything that is said of a recording with its description; `more` findings are of its folder.
-    pub fn from_folder(
+    pub(crate) fn from_folder(
         recording: &Recording,
         file: Option<&RecordingFile>,
         more: Vec<QualityFinding>,
@@ -221,7 +221,7 @@ impl Inspection {
     }
 
     /// The same of a recording that was just imported, and measured for its description.
-    pub fn from_import(recording: &Recording, file: &RecordingFile) -> Self {
+    pub(crate) fn from_import(recording: &Recording, file: &RecordingFile) -> Self {
         let measurements = file
             .quality
             .clone()
@@ -259,17 +259,17 @@ impl Inspection {
     }
 
     /// Instants of the reversals, s.
-    pub fn reversal_times_s(&self) -> Vec<f64> {
+    pub(crate) fn reversal_times_s(&self) -> Vec<f64> {
         self.reversals.iter().map(|turn| turn.reversal_s).collect()
     }
 
     /// The first line of the verdict.
-    pub fn verdict_headline(&self) -> String {
+    pub(crate) fn verdict_headline(&self) -> String {
         self.verdict_lines().into_iter().next().unwrap_or_default()
     }
 
     /// The verdict as lines for reading, worst first.
-    pub fn verdict_lines(&self) -> Vec<String> {
+    pub(crate) fn verdict_lines(&self) -> Vec<String> {
         quality::verdict_lines(&self.measurements, &self.findings)
     }
 }

@@ -35,7 +35,7 @@ struct InterruptState {
 }
 
 /// Answers signals from now on.
-pub fn install_handler() -> Result<(), Failure> {
+pub(crate) fn install_handler() -> Result<(), Failure> {
     let mut signals = 0;
     let answer = move || {
         signals += 1;
@@ -50,7 +50,7 @@ pub fn install_handler() -> Result<(), Failure> {
 }
 
 /// Whether a computation goes on.
-pub fn control_flow() -> ControlFlow<()> {
+pub(crate) fn control_flow() -> ControlFlow<()> {
     if STOP_REQUESTED.load(Ordering::Relaxed) || LATE.load(Ordering::Relaxed) {
         ControlFlow::Break(())
     } else {
@@ -59,7 +59,7 @@ pub fn control_flow() -> ControlFlow<()> {
 }
 
 /// From now on the command may take this long; then it is asked to stop as by a signal.
-pub fn set_time_limit(time: Duration) {
+pub(crate) fn set_time_limit(time: Duration) {
     std::thread::spawn(move || {
         std::thread::sleep(time);
         LATE.store(true, Ordering::Relaxed);
@@ -68,18 +68,17 @@ pub fn set_time_limit(time: Duration) {
 }
 
 /// A command that asks [`control_flow`] and stops; `kept` says what is on the disk if it does not in time.
-#[must_use]
-pub fn register_stoppable(kept: impl Fn() -> String + Send + 'static) -> StopGuard {
+pub(crate) fn register_stoppable(kept: impl Fn() -> String + Send + 'static) -> StopGuard {
     lock_state().kept = Some(Box::new(kept));
     StopGuard
 }
 
 /// While it lives, the command stops by itself.
-pub struct StopGuard;
+pub(crate) struct StopGuard;
 
 impl StopGuard {
     /// The command has stopped and writes what it has: that takes what it takes, or until a second signal.
-    pub fn announce_stop(&self, what: &str) {
+    pub(crate) fn announce_stop(&self, what: &str) {
         lock_state().finishing = true;
         progress::finish_in_words(); // the sentence says it better
         warn_line!("{}: {what}", why());
@@ -94,7 +93,9 @@ impl Drop for StopGuard {
 }
 
 /// Makes a temporary file that goes when the program ends before the file has its place.
-pub fn track_temporary_file(make: impl FnOnce() -> io::Result<NamedTempFile>) -> io::Result<NamedTempFile> {
+pub(crate) fn track_temporary_file(
+    make: impl FnOnce() -> io::Result<NamedTempFile>,
+) -> io::Result<NamedTempFile> {
     let mut state = lock_state();
     let file = make()?;
     state.passing.push(file.path().to_owned());
@@ -102,7 +103,10 @@ pub fn track_temporary_file(make: impl FnOnce() -> io::Result<NamedTempFile>) ->
 }
 
 /// Makes folders that go when the program ends before there is a file in them; the outermost is first.
-pub fn track_new_folders(folders: Vec<PathBuf>, make: impl FnOnce() -> io::Result<()>) -> io::Result<()> {
+pub(crate) fn track_new_folders(
+    folders: Vec<PathBuf>,
+    make: impl FnOnce() -> io::Result<()>,
+) -> io::Result<()> {
     let mut state = lock_state();
     make()?;
     state.passing.extend(folders);
@@ -110,17 +114,15 @@ pub fn track_new_folders(folders: Vec<PathBuf>, make: impl FnOnce() -> io::Resul
 }
 
 /// The program does not end while this is held: files that belong together get their names together.
-#[must_use]
-pub fn lock_renames() -> RenameLock {
+pub(crate) fn lock_renames() -> RenameLock {
     RenameLock(lock_state())
 }
 
-/// See [`lock_renames`].
-pub struct RenameLock(MutexGuard<'static, InterruptState>);
+pub(crate) struct RenameLock(MutexGuard<'static, InterruptState>);
 
 impl RenameLock {
     /// Every temporary file has its place.
-    pub fn forget_temporaries(mut self) {
+    pub(crate) fn forget_temporaries(mut self) {
         self.0.passing.clear();
     }
 }

@@ -18,12 +18,12 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Reads a scene that the user named, with the recording that drives it, if one does.
-pub fn read_scene(path: &Path) -> Result<Scene, Failure> {
+pub(crate) fn read_scene(path: &Path) -> Result<Scene, Failure> {
     Ok(read_driven_scene(path)?.0)
 }
 
 /// The same with the place of the recording that drives it, if one does.
-pub fn read_driven_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
+pub(crate) fn read_driven_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
     let mut driver = None;
     let recording = |named: &str| {
         let place = files::resolve_existing_path(path, named)?;
@@ -36,28 +36,32 @@ pub fn read_driven_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failur
 }
 
 /// Says what is hard to believe in a file.
-pub fn print_warnings(file: &Path, findings: &[plausibility::PlausibilityFinding], global: &GlobalArgs) {
+pub(crate) fn print_warnings(
+    file: &Path,
+    findings: &[plausibility::PlausibilityFinding],
+    global: &GlobalArgs,
+) {
     for finding in findings.iter().filter(|_| !global.quiet) {
         warn_line!("warning: {}: {finding}", file.display());
     }
 }
 
 /// Reads the scene that another file names with its key `scene`.
-pub fn read_named_scene(file: &Path, named: &str) -> Result<Scene, Failure> {
+pub(crate) fn read_named_scene(file: &Path, named: &str) -> Result<Scene, Failure> {
     let refused = |problem| Failure::Input(format!("{}: key `scene`: {problem}", file.display()));
     read_scene(&files::resolve_existing_path(file, named).map_err(refused)?)
 }
 
 /// A recording with its description, where it has one.
 #[derive(Debug)]
-pub struct LoadedRecording {
+pub(crate) struct LoadedRecording {
     pub recording: Recording,
     pub file: Option<RecordingFile>,
 }
 
 impl LoadedRecording {
     /// Sources that lie in the folder of the recording at `path` but are no longer what was imported.
-    pub fn changed_sources(&self, path: &Path) -> Option<QualityFinding> {
+    pub(crate) fn changed_sources(&self, path: &Path) -> Option<QualityFinding> {
         let source = self.file.as_ref()?.source.as_ref()?;
         let description = description_path(path);
         let changed = source.file.as_slice().iter().zip(source.sha256.as_slice()).filter(|(name, hash)| {
@@ -79,7 +83,7 @@ impl LoadedRecording {
 
 /// Reads the recording at `path`: a folder, or a trace alone; a description next to the trace counts in
 /// either case.
-pub fn load_recording(path: &Path) -> Result<LoadedRecording, Failure> {
+pub(crate) fn load_recording(path: &Path) -> Result<LoadedRecording, Failure> {
     let trace = trace_path(path)?;
     let text = files::read_text(&trace)?;
     let description = description_path(path);
@@ -117,7 +121,7 @@ fn is_simulated(trace: &Path, text: &str) -> Result<bool, Failure> {
 }
 
 /// Where the description of the recording at `path` lies, if it has one.
-pub fn description_path(path: &Path) -> PathBuf {
+pub(crate) fn description_path(path: &Path) -> PathBuf {
     let folder = if path.is_dir() { path } else { files::containing_folder(path) };
     folder.join(DESCRIPTION_FILE)
 }
@@ -141,7 +145,7 @@ fn mark_synthetic(recording: Recording) -> Result<Recording, Failure> {
 }
 
 /// Whether a file is written as a study: it has axes or maps, which no job has.
-pub fn is_study(file: &Path) -> Result<bool, Failure> {
+pub(crate) fn is_study(file: &Path) -> Result<bool, Failure> {
     let table: Option<toml::Table> = files::read_toml(file)?.parse().ok();
     Ok(table.is_some_and(|table| ["axis", "map"].iter().any(|key| table.contains_key(*key))))
 }
@@ -149,15 +153,15 @@ pub fn is_study(file: &Path) -> Result<bool, Failure> {
 // A job with the scenes and recordings that it names, read from disk.
 
 /// The job of a fit in its folder.
-pub const JOB_FILE: &str = "job.toml";
+pub(crate) const JOB_FILE: &str = "job.toml";
 
 /// The file of a job that is named by that file or by its folder.
-pub fn job_path(named: &Path) -> PathBuf {
+pub(crate) fn job_path(named: &Path) -> PathBuf {
     if named.is_dir() { named.join(JOB_FILE) } else { named.to_owned() }
 }
 
 /// A problem with where it lies on disk.
-pub struct LoadedJob {
+pub(crate) struct LoadedJob {
     pub folder: PathBuf,
     /// The file of the job, and its name in messages.
     pub path: PathBuf,
@@ -177,7 +181,7 @@ pub struct LoadedJob {
 
 impl LoadedJob {
     /// Reads and checks a job, named by its file or its folder, its scenes and its recordings.
-    pub fn load(named: &Path) -> Result<Self, Failure> {
+    pub(crate) fn load(named: &Path) -> Result<Self, Failure> {
         let path = job_path(named);
         if files::is_standard_input(&path) {
             let expected = "a file: journal and result of a fit lie next to its job";
@@ -217,12 +221,12 @@ impl LoadedJob {
         })
     }
 
-    pub fn job(&self) -> &Job {
+    pub(crate) fn job(&self) -> &Job {
         self.problem.job()
     }
 
     /// Every recording with where it lies.
-    pub fn recordings(&self) -> impl Iterator<Item = (&Path, &LoadedRecording)> {
+    pub(crate) fn recordings(&self) -> impl Iterator<Item = (&Path, &LoadedRecording)> {
         self.recording_paths.iter().map(PathBuf::as_path).zip(&self.measured)
     }
 }

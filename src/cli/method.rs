@@ -9,7 +9,7 @@ use crate::simulate::{IntegrationMethod, SolverOptions};
 use clap::{Args, ValueEnum};
 
 #[derive(Debug, Args)]
-pub struct MethodArgs {
+pub(crate) struct MethodArgs {
     /// Tolerated relative error of a step, instead of the scene's
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
     pub relative_tolerance: Option<f64>,
@@ -29,7 +29,7 @@ pub struct MethodArgs {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum MethodName {
+pub(crate) enum MethodName {
     /// Taylor series with error control, the default; transitions are roots of the guards' own series
     Adaptive,
     /// Order 8 with error control; transitions bracketed on the dense output
@@ -41,7 +41,7 @@ pub enum MethodName {
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum TransitionsAt {
+pub(crate) enum TransitionsAt {
     /// At the end of the step: order 1
     StepEnd,
     /// Where the slack variable is zero: order 4
@@ -53,7 +53,7 @@ const MOST_STEPS: f64 = 1e10;
 
 impl MethodArgs {
     /// How the scene is integrated.
-    pub fn integration_effort(&self, scene: &Scene) -> Result<SolverOptions, Failure> {
+    pub(crate) fn integration_effort(&self, scene: &Scene) -> Result<SolverOptions, Failure> {
         let tolerance = self.relative_tolerance.unwrap_or(scene.run.relative_tolerance);
         check_tolerance(tolerance).map_err(|expected| {
             Failure::Input(format!("--relative-tolerance: found {tolerance}, expected {expected}"))

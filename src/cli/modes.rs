@@ -11,7 +11,7 @@ use clap::Args;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
-pub struct ModesArgs {
+pub(crate) struct ModesArgs {
     /// Scene of the blade (scene.toml)
     pub scene: PathBuf,
     #[command(flatten)]
@@ -21,7 +21,7 @@ pub struct ModesArgs {
 }
 
 impl ModesArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let scene = read_scene(&self.scene)?;
         let blade = &scene.linkage;
         self.figures.check_folder(&FIGURES, self.overwrite)?;

@@ -27,17 +27,17 @@ macro_rules! warn_line {
 static STDOUT_FAILURE: Mutex<Option<io::Error>> = Mutex::new(None);
 
 /// A line of text with its end; ends within it are escaped like everything else that steers.
-pub fn escape_line(words: Arguments<'_>) -> String {
+pub(crate) fn escape_line(words: Arguments<'_>) -> String {
     escape_controls(&words.to_string()) + "\n"
 }
 
 /// Lines that the program itself has broken, such as those of a table or of JSON.
-pub fn escape_lines(text: &str) -> String {
+pub(crate) fn escape_lines(text: &str) -> String {
     text.lines().map(|line| escape_controls(line) + "\n").collect()
 }
 
 /// Text that has passed the filter to standard output.
-pub fn write_stdout(text: &str) {
+pub(crate) fn write_stdout(text: &str) {
     let mut failed = STDOUT_FAILURE.lock().unwrap_or_else(PoisonError::into_inner);
     if failed.is_none() {
         let mut output = io::stdout().lock();
@@ -46,12 +46,12 @@ pub fn write_stdout(text: &str) {
 }
 
 /// Text that has passed the filter to standard error.
-pub fn write_stderr(text: &str) {
+pub(crate) fn write_stderr(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes()); // (there is no place left to say so)
 }
 
 /// Whether everything that was said was written.
-pub fn check_stdout() -> Result<(), Failure> {
+pub(crate) fn check_stdout() -> Result<(), Failure> {
     let failed = STDOUT_FAILURE.lock().unwrap_or_else(PoisonError::into_inner);
     match failed.as_ref() {
         Some(error) if error.kind() != ErrorKind::BrokenPipe => Err(stdout_failure(error)),
@@ -60,7 +60,7 @@ pub fn check_stdout() -> Result<(), Failure> {
 }
 
 /// What clap says: help to standard output, a refusal to standard error. A refusal repeats what was typed.
-pub fn print_usage(error: &clap::Error, arguments: &[OsString]) -> Result<(), Failure> {
+pub(crate) fn print_usage(error: &clap::Error, arguments: &[OsString]) -> Result<(), Failure> {
     let typed = arguments.iter().any(|word| {
         let word = word.to_string_lossy();
         escape_controls(&word) != word

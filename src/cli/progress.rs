@@ -14,7 +14,7 @@ static CURRENT_WORK: Mutex<Option<(ProgressBar, &'static str, &'static str)>> = 
 
 /// A bar over `total` steps of a unit such as `evaluations`; drawn unless `quiet`, where standard error is a
 /// terminal.
-pub fn start_bar(total: u64, what: &'static str, unit: &'static str, quiet: bool) -> ProgressBar {
+pub(crate) fn start_bar(total: u64, what: &'static str, unit: &'static str, quiet: bool) -> ProgressBar {
     let bar = ProgressBar::with_draw_target(Some(total), draw_target(quiet));
     let template =
         format!("{{prefix}} {{bar:20}} {{pos}}/{{len}} {unit} ({{per_sec}}, {{eta}} left) {{wide_msg}}");
@@ -25,10 +25,10 @@ pub fn start_bar(total: u64, what: &'static str, unit: &'static str, quiet: bool
 }
 
 /// Work in steps of unknown length.
-pub struct StepSpinner(ProgressBar);
+pub(crate) struct StepSpinner(ProgressBar);
 
 /// Steps of a command; drawn as a [`start_bar`] is.
-pub fn start_steps(what: &'static str, quiet: bool) -> StepSpinner {
+pub(crate) fn start_steps(what: &'static str, quiet: bool) -> StepSpinner {
     /// From one sign of life to the next.
     const TICK: Duration = Duration::from_millis(200);
     let bar = ProgressBar::with_draw_target(None, draw_target(quiet));
@@ -44,7 +44,7 @@ pub fn start_steps(what: &'static str, quiet: bool) -> StepSpinner {
 
 impl StepSpinner {
     /// The next step, such as `reading the recording`.
-    pub fn show_step(&self, step: &'static str) {
+    pub(crate) fn show_step(&self, step: &'static str) {
         self.0.set_message(step);
     }
 }
@@ -61,7 +61,7 @@ fn draw_target(quiet: bool) -> ProgressDrawTarget {
 }
 
 /// How far the present work has come, in words; nothing more is drawn of it.
-pub fn finish_in_words() -> Option<String> {
+pub(crate) fn finish_in_words() -> Option<String> {
     let present = CURRENT_WORK.lock().unwrap_or_else(PoisonError::into_inner);
     let (bar, what, unit) = present.as_ref().filter(|(bar, ..)| !bar.is_finished())?;
     let reached = match bar.length() {
@@ -73,14 +73,14 @@ pub fn finish_in_words() -> Option<String> {
 }
 
 /// A line of progress to standard error, unless `quiet`.
-pub fn print_progress(quiet: bool, line: &str) {
+pub(crate) fn print_progress(quiet: bool, line: &str) {
     if !quiet {
         warn_line!("{line}");
     }
 }
 
 /// Says how far a bar has come where it is not drawn, such as in the log of a batch system.
-pub struct ProgressReporter {
+pub(crate) struct ProgressReporter {
     bar: ProgressBar,
     due: Mutex<Option<Instant>>,
 }
@@ -92,13 +92,13 @@ impl ProgressReporter {
     const FIRST: Duration = Duration::from_secs(10);
 
     /// Says nothing where `says` is false or the bar is drawn.
-    pub fn new(bar: &ProgressBar, says: bool) -> Self {
+    pub(crate) fn new(bar: &ProgressBar, says: bool) -> Self {
         let due = (says && bar.is_hidden()).then(|| Instant::now() + Self::FIRST);
         Self { bar: bar.clone(), due: Mutex::new(due) }
     }
 
     /// A line where one is due.
-    pub fn report_if_due(&self) {
+    pub(crate) fn report_if_due(&self) {
         let now = Instant::now();
         let mut due = self.due.lock().unwrap_or_else(PoisonError::into_inner);
         if due.is_none_or(|due| now < due) {
@@ -126,7 +126,7 @@ fn format_duration(time_s: f64) -> String {
 const PIECES_A_LOOK: u32 = 64;
 
 /// The observer of a run that a user waits for.
-pub struct ProgressObserver {
+pub(crate) struct ProgressObserver {
     bar: ProgressBar,
     start_s: f64,
     pieces: u32,
@@ -134,7 +134,7 @@ pub struct ProgressObserver {
 
 impl ProgressObserver {
     /// Of a run from one instant to another, s.
-    pub fn new([start_s, stop_s]: [f64; 2], command: &'static str, global: &GlobalArgs) -> Self {
+    pub(crate) fn new([start_s, stop_s]: [f64; 2], command: &'static str, global: &GlobalArgs) -> Self {
         let bar = start_bar(to_milliseconds(stop_s - start_s), command, "ms of the model", global.quiet);
         Self { bar, start_s, pieces: 0 }
     }

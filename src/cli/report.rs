@@ -22,7 +22,7 @@ use std::path::{Path, PathBuf};
 use video::VideoFrames;
 
 #[derive(Debug, Args)]
-pub struct ReportArgs {
+pub(crate) struct ReportArgs {
     /// Folder of a fit (fits/NAME), with its job.toml and result.json, or its job; several are compared
     #[arg(required = true, value_name = "FIT")]
     pub fits: Vec<PathBuf>,
@@ -37,7 +37,7 @@ pub struct ReportArgs {
 }
 
 impl ReportArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let writer =
             WritePolicy::new(OutputCommand::Report, self.overwrite).with_csv_dialect(global.csv_dialect);
         let jobs: Vec<PathBuf> = self.fits.iter().map(|fit| job_path(fit)).collect();
@@ -134,7 +134,7 @@ impl ReportedFit {
 }
 
 /// Writes the report of a fit; says whether the model does not explain the recording, or misses a component.
-pub fn write_report(
+pub(crate) fn write_report(
     fit: &Path,
     out: &Path,
     writer: &WritePolicy,
@@ -171,18 +171,17 @@ const PAGE_FILE: &str = "index.html";
 const FIGURE_EXTENSION: &str = ".svg";
 
 /// What goes into a folder.
-pub struct ReportFiles<'a> {
+pub(crate) struct ReportFiles<'a> {
     pub figures: Vec<&'a FigureBlock>,
     pub json: String,
     pub tables: &'a [ComparisonTable],
     pub page: String,
-    /// What is printed.
     pub summary: Vec<String>,
 }
 
 impl ReportFiles<'_> {
     /// Writes everything or nothing.
-    pub fn write_to_folder(
+    pub(crate) fn write_to_folder(
         &self,
         folder: &Path,
         writer: &WritePolicy,
@@ -211,6 +210,6 @@ impl ReportFiles<'_> {
 }
 
 /// Refuses a folder that a report must not be written into, before the model is run.
-pub fn check_report_folder(folder: &Path, writer: &WritePolicy) -> Result<(), Failure> {
+pub(crate) fn check_report_folder(folder: &Path, writer: &WritePolicy) -> Result<(), Failure> {
     OutputFolder::check(folder, writer, &[JSON_FILE, PAGE_FILE]).map(|_| ())
 }

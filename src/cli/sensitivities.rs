@@ -16,8 +16,7 @@ use std::fmt::Write;
 use std::iter::Peekable;
 use std::ops::ControlFlow;
 
-/// Files with derivatives.
-pub const SENSITIVITY_FILES: [&str; 2] = ["sensitivities.csv", "event_sensitivities.csv"];
+pub(crate) const SENSITIVITY_FILES: [&str; 2] = ["sensitivities.csv", "event_sensitivities.csv"];
 
 /// Columns that have derivatives.
 const COLUMNS: [(Channel, &str); 7] = [
@@ -31,14 +30,18 @@ const COLUMNS: [(Channel, &str); 7] = [
 ];
 
 /// What the user wants derivatives by.
-pub struct SensitivityRequest {
+pub(crate) struct SensitivityRequest {
     names: Vec<String>,
     seeds: TangentSeeds,
 }
 
 impl SensitivityRequest {
     /// Of these names; `None` where there is none.
-    pub fn parse(scene: &Scene, names: &[String], effort: &SolverOptions) -> Result<Option<Self>, Failure> {
+    pub(crate) fn parse(
+        scene: &Scene,
+        names: &[String],
+        effort: &SolverOptions,
+    ) -> Result<Option<Self>, Failure> {
         if names.is_empty() {
             return Ok(None);
         }
@@ -68,7 +71,7 @@ impl SensitivityRequest {
     }
 
     /// Runs the scene again with its derivatives, which go to their tables row by row.
-    pub fn run_to_tables(
+    pub(crate) fn run_to_tables(
         &self,
         scene: &Scene,
         effort: SolverOptions,

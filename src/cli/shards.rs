@@ -10,15 +10,15 @@ use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 /// Folder of the shards in that of the results.
-pub const SHARDS_FOLDER: &str = "shards";
+pub(crate) const SHARDS_FOLDER: &str = "shards";
 
 /// Journal of a shard.
-pub fn shard_checkpoint(folder: &Path, shard: Shard) -> PathBuf {
+pub(crate) fn shard_checkpoint(folder: &Path, shard: Shard) -> PathBuf {
     folder.join(SHARDS_FOLDER).join(shard.file_stem() + ".jsonl")
 }
 
 /// The shards in a folder of results, by number of shards and number.
-pub fn shard_files(folder: &Path) -> Result<Vec<(Shard, PathBuf)>, Failure> {
+pub(crate) fn shard_files(folder: &Path) -> Result<Vec<(Shard, PathBuf)>, Failure> {
     let folder = folder.join(SHARDS_FOLDER);
     if !folder.is_dir() {
         return Ok(Vec::new());
@@ -37,7 +37,7 @@ pub fn shard_files(folder: &Path) -> Result<Vec<(Shard, PathBuf)>, Failure> {
 
 /// Shows `each` what another shard has written, where that is `wanted`; one of another problem or version is
 /// refused, and one that is damaged is left to `wiperlab collect`.
-pub fn scan_shard<R: CheckpointRecord>(
+pub(crate) fn scan_shard<R: CheckpointRecord>(
     path: &Path,
     header: &CheckpointHeader<R::Body>,
     wanted: bool,
@@ -68,7 +68,7 @@ pub fn scan_shard<R: CheckpointRecord>(
 }
 
 /// The number of shards of most files; of two, the larger.
-pub fn usual_shard_count(shards: &[(Shard, PathBuf)]) -> usize {
+pub(crate) fn usual_shard_count(shards: &[(Shard, PathBuf)]) -> usize {
     let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
     shards.iter().for_each(|(shard, _)| *counts.entry(shard.total()).or_default() += 1);
     counts.into_iter().max_by_key(|(of, files)| (*files, *of)).map_or(1, |(of, _)| of)

@@ -27,7 +27,7 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 #[derive(Debug, Args)]
-pub struct SimulateArgs {
+pub(crate) struct SimulateArgs {
     /// Scene to run (scene.toml)
     pub scene: PathBuf,
     /// Folder for trace.csv, state.csv, events.csv and summary.json
@@ -46,7 +46,7 @@ pub struct SimulateArgs {
 }
 
 impl SimulateArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let scene = read_scene(&self.scene)?;
         let effort = self.method.integration_effort(&scene)?;
         let sensitivities = SensitivityRequest::parse(&scene, &self.sensitivities, &effort)?;

@@ -29,7 +29,7 @@ const AUTO: &str = "auto";
 const FILM_SEED: u64 = 0;
 
 #[derive(Debug, Args)]
-pub struct SpectrumArgs {
+pub(crate) struct SpectrumArgs {
     /// A recording's folder, or a trace.csv alone
     #[arg(value_name = "RECORDING")]
     pub recording: PathBuf,
@@ -89,7 +89,13 @@ struct StudiedWindow {
 
 impl SpectrumArgs {
     /// The command with its defaults.
-    pub fn new(recording: &Path, channel: &str, window: &str, out: &Path, overwrite: Overwrite) -> Self {
+    pub(crate) fn new(
+        recording: &Path,
+        channel: &str,
+        window: &str,
+        out: &Path,
+        overwrite: Overwrite,
+    ) -> Self {
         Self {
             recording: recording.to_owned(),
             channel: channel.to_owned(),
@@ -106,13 +112,13 @@ impl SpectrumArgs {
     }
 
     /// The files of a recording at hand.
-    pub fn output_files(&self, recording: Recording) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+    pub(crate) fn output_files(&self, recording: Recording) -> Result<Vec<(String, Vec<u8>)>, Failure> {
         let request = self.parse_request()?;
         let exposure_s = self.given_exposure_s()?;
         request.output_files(&request.study_recording(exposure_s, recording)?)
     }
 
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let request = self.parse_request()?;
         OutputFolder::check(&self.out, &self.write_policy(global), &TABLES)?;
         let steps = progress::start_steps("spectrum", global.quiet);

@@ -14,17 +14,17 @@ use clap::{Args, ValueEnum};
 use plan::{SubmissionPlan, SubmittedWork, absolute_path};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-pub use tasks::TaskList;
+pub(crate) use tasks::TaskList;
 
 /// Who runs the tasks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub enum Scheduler {
+pub(crate) enum Scheduler {
     Slurm,
     Local,
 }
 
 #[derive(Debug, Args)]
-pub struct SubmitArgs {
+pub(crate) struct SubmitArgs {
     /// Study to run (sweep.toml), or jobs of fits (fits/NAME/job.toml), each of which one task does whole
     #[arg(required = true, value_name = "STUDY|JOB")]
     pub files: Vec<PathBuf>,
@@ -58,7 +58,7 @@ pub struct SubmitArgs {
 }
 
 impl SubmitArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let plan = self.make_plan(global)?;
         match self.scheduler {
             Scheduler::Slurm => self.submit_scripts(&plan, global),
@@ -185,7 +185,7 @@ fn submission_failure(script: &str, submitted: &str, complaint: &str) -> Failure
 // Words and programs of the POSIX shell.
 
 /// A word that the shell takes as it is.
-pub fn quote_word(word: &str) -> String {
+pub(crate) fn quote_word(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,=@".contains(c);
     if !word.is_empty() && word.chars().all(plain) {
         return word.to_owned();
@@ -194,12 +194,12 @@ pub fn quote_word(word: &str) -> String {
 }
 
 /// A command line from its words.
-pub fn join_words(words: &[String]) -> String {
+pub(crate) fn join_words(words: &[String]) -> String {
     words.iter().map(|word| quote_word(word)).collect::<Vec<_>>().join(" ")
 }
 
 /// Whether a program is found on PATH.
-pub fn is_program_on_path(program: &str) -> bool {
+pub(crate) fn is_program_on_path(program: &str) -> bool {
     let path = std::env::var_os("PATH").unwrap_or_default();
     std::env::split_paths(&path).any(|folder| is_program(&folder.join(program)))
 }

@@ -15,13 +15,13 @@ use crate::simulate::scene::Scene;
 use crate::sweep::journal::{SweepHeader, study_header};
 use crate::sweep::{CollectError, PointCollection, Study};
 use clap::Args;
-pub use shards::find_study;
+pub(crate) use shards::find_study;
 use std::fs::File;
 use std::io::BufReader;
 use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
-pub struct SweepArgs {
+pub(crate) struct SweepArgs {
     /// Study to run (sweep.toml): a scene, the parameters that are varied, and what is mapped
     pub sweep: PathBuf,
     /// Folder for sweep.csv, summary.json, one SVG a map, and journal.jsonl, which grows with every point
@@ -43,7 +43,7 @@ pub struct SweepArgs {
 }
 
 impl SweepArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let problem = LoadedStudy::load(&self.sweep)?;
         if let Some(TimeLimit(time)) = self.time_limit {
             interrupt::set_time_limit(time);
@@ -68,14 +68,14 @@ impl SweepArgs {
 // A study with its scene, read from disk.
 
 /// A checked study with its scene.
-pub struct LoadedStudy {
+pub(crate) struct LoadedStudy {
     pub study: Study,
     pub scene: Scene,
     pub fingerprint: String,
 }
 
 impl LoadedStudy {
-    pub fn load(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn load(path: &Path) -> Result<Self, Failure> {
         let file = path.display().to_string();
         let text = files::read_toml(path)?;
         let study = Study::parse(&file, &text).map_err(Failure::input)?;
@@ -86,17 +86,21 @@ impl LoadedStudy {
     }
 
     /// First line of every journal of the study.
-    pub fn header(&self) -> SweepHeader {
+    pub(crate) fn header(&self) -> SweepHeader {
         study_header(&self.study, &self.fingerprint)
     }
 
     /// No point yet; the temporary file lies where `out` will be.
-    pub fn new_collection(&self, out: &Path) -> Result<PointCollection<File>, Failure> {
+    pub(crate) fn new_collection(&self, out: &Path) -> Result<PointCollection<File>, Failure> {
         Ok(PointCollection::new(self.header(), files::create_scratch_file(out)?))
     }
 
     /// Adds the points of a journal.
-    pub fn add_checkpoint(&self, points: &mut PointCollection<File>, journal: &Path) -> Result<(), Failure> {
+    pub(crate) fn add_checkpoint(
+        &self,
+        points: &mut PointCollection<File>,
+        journal: &Path,
+    ) -> Result<(), Failure> {
         let name = journal.display().to_string();
         let refused = |problem: String| Failure::Input(format!("{name}: {problem}"));
         let file = File::open(journal).map_err(|error| refused(format!("cannot be read: {error}")))?;
@@ -113,7 +117,7 @@ impl LoadedStudy {
 }
 
 /// Why points cannot be collected.
-pub fn collection_failure(error: CollectError) -> Failure {
+pub(crate) fn collection_failure(error: CollectError) -> Failure {
     match error {
         CollectError::Journal(refused) => Failure::input(refused),
         CollectError::Spool(_) => Failure::internal(error),

@@ -24,7 +24,7 @@ use clap::Args;
 use std::path::PathBuf;
 
 #[derive(Debug, Args)]
-pub struct TwinArgs {
+pub(crate) struct TwinArgs {
     /// Specification of the twin: a scene and a camera (twin.toml)
     pub spec: PathBuf,
     /// Folder of the synthetic recording (data/NAME)
@@ -37,7 +37,7 @@ pub struct TwinArgs {
 }
 
 impl TwinArgs {
-    pub fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         let file = self.spec.display().to_string();
         let text = files::read_toml(&self.spec)?;
         let spec = TwinSpec::parse(&file, &text).map_err(Failure::input)?;

@@ -115,42 +115,36 @@ impl<'a> ConditionComparison<'a> {
     }
 
     /// The recording, where there is one.
-    #[must_use]
-    pub fn recording(&self) -> Option<&'a Recording> {
+    pub(crate) fn recording(&self) -> Option<&'a Recording> {
         self.measured.map(|m| m.recording)
     }
 
     /// Whether there is a recording that no camera took.
-    #[must_use]
-    pub fn is_synthetic(&self) -> bool {
+    pub(crate) fn is_synthetic(&self) -> bool {
         self.recording().is_some_and(Recording::is_synthetic)
     }
 
     /// The recording with its instants, where there is one.
-    #[must_use]
-    pub fn measured_side(&self) -> Option<TimedRecording<'_>> {
+    pub(crate) fn measured_side(&self) -> Option<TimedRecording<'_>> {
         self.recording()
             .zip(self.measured_instants.as_ref())
             .map(|(recording, instants)| TimedRecording { recording, instants })
     }
 
     /// The model with its instants, on its own clock.
-    #[must_use]
-    pub fn model_side(&self) -> TimedRecording<'_> {
+    pub(crate) fn model_side(&self) -> TimedRecording<'_> {
         TimedRecording { recording: &self.model.view.recording, instants: &self.model_instants }
     }
 
     /// The recording, otherwise the model.
-    #[must_use]
-    pub fn measured_or_model(&self) -> TimedRecording<'_> {
+    pub(crate) fn measured_or_model(&self) -> TimedRecording<'_> {
         self.measured_side().unwrap_or_else(|| self.model_side())
     }
 
     /// Noise of a recorded channel, m, measured as a fit to traces measures it: against the smooth head and
     /// the glass, as stick and slip move the tip as fast as noise does. By the scatter from frame to frame
     /// where neither was tracked; `None` without a recording or without noise.
-    #[must_use]
-    pub fn noise_m(&self, channel: Channel) -> Option<f64> {
+    pub(crate) fn noise_m(&self, channel: Channel) -> Option<f64> {
         let noise = self.noise.as_ref()?;
         let along_m = noise.along_sweep.as_ref().map(|found| found.noise.sd());
         let known_m = match channel {
@@ -163,8 +157,7 @@ impl<'a> ConditionComparison<'a> {
 
     /// The channel by which what is left is judged, and its noise, m; `None` without a recording, where the
     /// two cannot agree, or where nothing is known of the noise.
-    #[must_use]
-    pub fn judged_channel(&self) -> Option<(Channel, f64)> {
+    pub(crate) fn judged_channel(&self) -> Option<(Channel, f64)> {
         let residual = self.residual.as_ref().filter(|_| !self.alignment.opposite_turn)?;
         let is_known = |channel: &Channel| residual.column(*channel).iter().any(Option::is_some);
         let channel = JUDGED.into_iter().find(is_known)?;
@@ -172,31 +165,28 @@ impl<'a> ConditionComparison<'a> {
     }
 
     /// Exposure of a frame, s, where known.
-    #[must_use]
-    pub fn exposure_s(&self) -> Option<f64> {
+    pub(crate) fn exposure_s(&self) -> Option<f64> {
         let of_recording = self.measured.and_then(|m| m.file).and_then(|f| f.camera.exposure_s);
         of_recording.or(self.job.camera.filter(|_| self.measured.is_none()).map(|camera| camera.exposure_s))
     }
 
     /// The frequencies that the fit seeks in the condition.
-    pub fn frequency_comparisons(&self) -> impl Iterator<Item = FrequencyComparison> + '_ {
+    pub(crate) fn frequency_comparisons(&self) -> impl Iterator<Item = FrequencyComparison> + '_ {
         self.targets().filter_map(|aim| compare_frequency(aim, self.result))
     }
 
     /// What the job reads in the condition.
-    pub fn targets(&self) -> impl Iterator<Item = &'a FitTarget> + '_ {
+    pub(crate) fn targets(&self) -> impl Iterator<Item = &'a FitTarget> + '_ {
         self.job.targets.iter().filter(|aim| aim.feature.condition == self.condition)
     }
 
     /// Name of the condition.
-    #[must_use]
-    pub fn name(&self) -> &'a str {
+    pub(crate) fn name(&self) -> &'a str {
         self.job.conditions.get(self.condition).map_or("", |condition| condition.name.as_str())
     }
 
     /// The model's run and its hard events.
-    #[must_use]
-    pub fn run_summary(&self) -> RunSummary {
+    pub(crate) fn run_summary(&self) -> RunSummary {
         let line = model_run::summarize_run(self.name(), self.model.scene.start_s, &self.model.motion);
         RunSummary { opposite_turn: self.alignment.opposite_turn, ..line }
     }
@@ -211,26 +201,22 @@ fn later_same_runs(runs: &[ModelRun], condition: usize) -> Option<Vec<usize>> {
 
 impl TimedRecording<'_> {
     /// Time of an instant of the first turn, s.
-    #[must_use]
-    pub fn instant_s(&self, anchor: InstantKind) -> Option<f64> {
+    pub(crate) fn instant_s(&self, anchor: InstantKind) -> Option<f64> {
         self.instants.time_s(anchor, 1).ok()
     }
 
     /// Samples of a channel.
-    #[must_use]
-    pub fn samples(&self, channel: Channel) -> Vec<Option<f64>> {
+    pub(crate) fn samples(&self, channel: Channel) -> Vec<Option<f64>> {
         channel.samples(self.recording)
     }
 
     /// Frames of a window; `None` where it does not show it.
-    #[must_use]
-    pub fn window_frames(&self, window: &Window) -> Option<Range<usize>> {
+    pub(crate) fn window_frames(&self, window: &Window) -> Option<Range<usize>> {
         window.resolve_frames(self.recording, self.instants).ok()
     }
 
     /// Frames between two of its own times.
-    #[must_use]
-    pub fn frames_between(&self, (from_s, to_s): (f64, f64)) -> Range<usize> {
+    pub(crate) fn frames_between(&self, (from_s, to_s): (f64, f64)) -> Range<usize> {
         let grid = self.recording.grid();
         let frame =
             |t: f64| ((t - grid.start_s) * grid.frame_rate_hz).ceil().clamp(0.0, grid.frames as f64) as usize;
@@ -242,10 +228,8 @@ impl TimedRecording<'_> {
 
 /// A window of a channel that aims share.
 #[derive(Debug, Clone)]
-pub struct FitWindow<'a> {
-    /// The channel.
+pub(crate) struct FitWindow<'a> {
     pub channel: Channel,
-    /// The window.
     pub window: Window,
     /// The first band in it, where there is one: it says what is removed.
     pub band: Option<&'a FeatureBand>,
@@ -255,7 +239,7 @@ pub struct FitWindow<'a> {
 
 /// A frequency that the fit seeks, and the model's.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrequencyComparison {
+pub(crate) struct FrequencyComparison {
     /// The frequency of the recording, or the published one.
     pub target: Target,
     /// That of the model at the estimates, Hz; `None` where it has none.
@@ -275,8 +259,7 @@ fn channel_window(aim: &FitTarget) -> Option<(Channel, Window)> {
 }
 
 /// The windows of a condition, in the order of the job, each with the aims that it serves.
-#[must_use]
-pub fn group_fit_windows(job: &Job, condition: usize) -> Vec<FitWindow<'_>> {
+pub(crate) fn group_fit_windows(job: &Job, condition: usize) -> Vec<FitWindow<'_>> {
     let mut found: Vec<FitWindow> = Vec::new();
     for aim in job.targets.iter().filter(|aim| aim.feature.condition == condition) {
         let Some((channel, window)) = channel_window(aim) else { continue };
@@ -299,14 +282,12 @@ pub fn group_fit_windows(job: &Job, condition: usize) -> Vec<FitWindow<'_>> {
 
 impl FitWindow<'_> {
     /// Names of what is read in it.
-    #[must_use]
-    pub fn feature_names(&self) -> Vec<String> {
+    pub(crate) fn feature_names(&self) -> Vec<String> {
         self.targets.iter().map(|aim| aim.feature.name.clone()).collect()
     }
 
     /// The frequencies that the fit seeks in it.
-    #[must_use]
-    pub fn frequency_comparisons(&self, result: &FitResult) -> Vec<FrequencyComparison> {
+    pub(crate) fn frequency_comparisons(&self, result: &FitResult) -> Vec<FrequencyComparison> {
         self.targets.iter().filter_map(|aim| compare_frequency(aim, result)).collect()
     }
 }

@@ -16,7 +16,7 @@ use std::array;
 
 /// A coefficient at a speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FrictionPoint {
+pub(crate) struct FrictionPoint {
     /// Mean speed of the tip, m/s.
     pub speed_m_per_s: f64,
     /// Friction over normal force.
@@ -25,7 +25,7 @@ pub struct FrictionPoint {
 
 /// What a recording shows of friction.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct MeasuredFriction {
+pub(crate) struct MeasuredFriction {
     /// Where the tip moved evenly.
     pub steady_sliding: Vec<FrictionPoint>,
     /// Means over cycles of stick and slip.
@@ -52,8 +52,7 @@ const MAX_POINTS: usize = 60;
 
 impl MeasuredFriction {
     /// What the recording of a condition shows; empty without tip and head.
-    #[must_use]
-    pub fn measure(case: &ConditionComparison) -> Self {
+    pub(crate) fn measure(case: &ConditionComparison) -> Self {
         let Some(side) = case.measured_side() else { return Self::default() };
         let deflections = static_deflections(&case.model.scene.linkage);
         let slowest_hz =
@@ -95,7 +94,6 @@ struct FrictionBlock {
     start_s: f64,
     /// Mean velocity of the tip, m/s.
     velocity_m_per_s: f64,
-    /// Mean deflection, m.
     deflection_m: f64,
     is_even: bool,
 }
@@ -180,7 +178,7 @@ impl TipParabola {
 
 /// A coefficient of the law: its name in a scene, its symbol, and how the law changes with it at a speed.
 #[derive(Debug, Clone, Copy)]
-pub struct LawCoefficient {
+pub(crate) struct LawCoefficient {
     /// Name in a scene.
     pub name: &'static str,
     /// Symbol in the law.
@@ -189,7 +187,7 @@ pub struct LawCoefficient {
 }
 
 /// The coefficients of `A exp(-B |v|) + C`.
-pub const COEFFICIENTS: [LawCoefficient; 3] = [
+pub(crate) const COEFFICIENTS: [LawCoefficient; 3] = [
     LawCoefficient { name: "friction.a", symbol: "A", slope: |law, v| math::exp(-law.b_s_per_m * v) },
     LawCoefficient {
         name: "friction.b_s_per_m",
@@ -200,13 +198,12 @@ pub const COEFFICIENTS: [LawCoefficient; 3] = [
 ];
 
 /// Half of an interval at a tip speed, m/s.
-pub type HalfInterval = Box<dyn Fn(f64) -> f64>;
+pub(crate) type HalfInterval = Box<dyn Fn(f64) -> f64>;
 
 /// Half of the 95 % interval of the coefficient of friction at a speed, propagated linearly from the stated
 /// intervals of the fitted coefficients with their correlations; `None` where nothing of the law was fitted,
 /// an interval is open, or the linear model does not determine a coefficient that was fitted.
-#[must_use]
-pub fn friction_half_95(job: &Job, result: &FitResult, law: &FrictionLaw) -> Option<HalfInterval> {
+pub(crate) fn friction_half_95(job: &Job, result: &FitResult, law: &FrictionLaw) -> Option<HalfInterval> {
     let half = |coefficient: &LawCoefficient| {
         if !is_fitted(job, coefficient) {
             return Some(0.0);
@@ -234,8 +231,7 @@ pub fn friction_half_95(job: &Job, result: &FitResult, law: &FrictionLaw) -> Opt
 }
 
 /// Whether a job fits a coefficient.
-#[must_use]
-pub fn is_fitted(job: &Job, coefficient: &LawCoefficient) -> bool {
+pub(crate) fn is_fitted(job: &Job, coefficient: &LawCoefficient) -> bool {
     job.parameters.iter().any(|p| p.name == coefficient.name)
 }
 

@@ -208,8 +208,7 @@ impl TrackedRidge {
     }
 
     /// Least and greatest frequency of the courses, Hz.
-    #[must_use]
-    pub fn frequency_range_hz(&self) -> Option<(f64, f64)> {
+    pub(crate) fn frequency_range_hz(&self) -> Option<(f64, f64)> {
         let all = || self.courses.iter().flatten().map(|p| p.frequency_hz);
         all().reduce(f64::min).zip(all().reduce(f64::max))
     }

@@ -97,20 +97,17 @@ pub struct Truth {
 
 impl ParameterLine {
     /// Whether the 95 % interval holds a value; an open end holds everything beyond.
-    #[must_use]
-    pub fn holds(&self, value: f64) -> bool {
+    pub(crate) fn holds(&self, value: f64) -> bool {
         self.lower_95.is_none_or(|lower| lower <= value) && self.upper_95.is_none_or(|upper| value <= upper)
     }
 
     /// Whether the interval ends anywhere: one that is open on both sides holds every value, and says
     /// nothing.
-    #[must_use]
     pub(crate) fn is_bounded(&self) -> bool {
         self.lower_95.is_some() || self.upper_95.is_some()
     }
 
     /// Whether the data determine it.
-    #[must_use]
     pub(crate) fn is_identified(&self) -> bool {
         self.verdict == ParameterVerdict::Identified
     }

@@ -94,14 +94,12 @@ pub struct RidgeSummary {
 
 impl ComparisonSummary {
     /// What is left of the channel by which the model is judged.
-    #[must_use]
-    pub fn judged_residual(&self) -> Option<&ResidualSummary> {
+    pub(crate) fn judged_residual(&self) -> Option<&ResidualSummary> {
         self.residuals.iter().find(|line| Some(line.channel) == self.judged)
     }
 
     /// The numbers of a condition.
-    #[must_use]
-    pub fn summarize(case: &ConditionComparison) -> Self {
+    pub(crate) fn summarize(case: &ConditionComparison) -> Self {
         let alignment = case.recording().map(|_| case.alignment);
         let windows = group_fit_windows(case.job, case.condition);
         Self {

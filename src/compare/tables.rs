@@ -11,7 +11,7 @@ use crate::simulate::Transition;
 use crate::spectrum::time_frequency::RidgePoint;
 
 /// The recordings beside the model.
-pub const COMPARISON_FILE: &str = "comparison.csv";
+pub(crate) const COMPARISON_FILE: &str = "comparison.csv";
 
 /// A file of a comparison.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -24,8 +24,7 @@ pub struct ComparisonTable {
 
 /// Residuals, ridges and transitions of every condition, in the order of the job. `reference_kind` says in every
 /// row what the model is compared with.
-#[must_use]
-pub fn comparison_tables(cases: &[ConditionComparison]) -> Vec<ComparisonTable> {
+pub(crate) fn comparison_tables(cases: &[ConditionComparison]) -> Vec<ComparisonTable> {
     const RESIDUALS: &[&str] =
         &["condition", "recording", "time_s", "tip_x_m", "head_x_m", "deflection_m", "head_drop_m"];
     const RIDGE: &[&str] = &[
@@ -56,8 +55,7 @@ pub fn comparison_tables(cases: &[ConditionComparison]) -> Vec<ComparisonTable> 
 
 /// Every recording and the model at its frames, on its clock and from its origin, in the order of the job;
 /// `None` without a recording.
-#[must_use]
-pub fn comparison_table(
+pub(crate) fn comparison_table(
     job: &Job,
     measured: &[FittedRecording<'_>],
     models: &[ModelRun],

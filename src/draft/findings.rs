@@ -20,18 +20,16 @@ pub(super) enum DraftHead {
 
 /// A component that a job can ask for.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DraftComponent {
+pub(crate) struct DraftComponent {
     /// Name in the job.
     pub name: &'static str,
     /// Where it was found.
     pub channel: Channel,
     /// Window as a job has it.
     pub window: String,
-    /// Frequency, Hz.
     pub frequency_hz: f64,
     /// Its standard deviation, Hz.
     pub sd_hz: f64,
-    /// Amplitude, m.
     pub amplitude_m: f64,
     /// Band in which the job looks for it, Hz.
     pub band_hz: [f64; 2],
@@ -39,7 +37,7 @@ pub struct DraftComponent {
 
 /// Why nothing can be drafted for a recording.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum DraftError {
+pub(crate) enum DraftError {
     /// The tip was not tracked.
     #[error(
         "found the tip's x in {found} of {frames} frames, expected it in most of them; track the tip of the lip, as a fit follows it"
@@ -47,7 +45,6 @@ pub enum DraftError {
     NoTip {
         /// Frames with the tip.
         found: usize,
-        /// Frames.
         frames: usize,
     },
     /// The head was not tracked, and the tip does not show its stroke.
@@ -57,7 +54,6 @@ pub enum DraftError {
     NoHead {
         /// Frames with the head.
         found: usize,
-        /// Frames.
         frames: usize,
     },
     /// The stroke is given, and the head was tracked.
@@ -75,14 +71,12 @@ pub enum DraftError {
     },
 }
 
-/// What was found.
 #[derive(Debug, Clone, PartialEq)]
-pub struct DraftFindings {
+pub(crate) struct DraftFindings {
     /// Name of the recording.
     pub name: String,
     /// Whether no camera took it.
     pub synthetic: bool,
-    /// Frames.
     pub frames: usize,
     /// Frames a second, 1/s.
     pub frame_rate_hz: f64,
@@ -140,7 +134,7 @@ impl DraftFindings {
     ///
     /// # Errors
     /// [`DraftError`] if no job could follow it.
-    pub fn from_recording(
+    pub(crate) fn from_recording(
         recording: &Recording,
         exposure_s: Option<f64>,
         known: KnownStroke,
@@ -229,14 +223,12 @@ impl DraftFindings {
     }
 
     /// Length of the recording, s.
-    #[must_use]
-    pub fn length_s(&self) -> f64 {
+    pub(crate) fn length_s(&self) -> f64 {
         self.frames as f64 / self.frame_rate_hz
     }
 
     /// What was found, in sentences.
-    #[must_use]
-    pub fn describe(&self) -> Vec<String> {
+    pub(crate) fn describe(&self) -> Vec<String> {
         let rate = format_digits(self.frame_rate_hz, 4);
         let mut words = vec![format!(
             "{} frames at {rate} frames/s; {} moves at up to {}",
@@ -277,8 +269,7 @@ impl DraftFindings {
 
 impl DraftComponent {
     /// What was found, in words.
-    #[must_use]
-    pub fn describe(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         format!(
             "{} Hz in the {} ({}), amplitude {}",
             format_with_sd(self.frequency_hz, self.sd_hz),

@@ -19,8 +19,12 @@ const ORIGIN_SD_M: f64 = 0.1;
 
 /// A job for a recording; `paths` are those of recording and scene as seen from the job. Of the components,
 /// those that a fit reads in the recording.
-#[must_use]
-pub fn write_job(found: &DraftFindings, measured: &Recording, paths: [&str; 2], shoulder: bool) -> String {
+pub(crate) fn write_job(
+    found: &DraftFindings,
+    measured: &Recording,
+    paths: [&str; 2],
+    shoulder: bool,
+) -> String {
     let whole = |components: &[DraftComponent], release: bool| {
         add_features(
             add_traces(add_parameters(write_head(found, paths, shoulder), found, shoulder), found),

@@ -13,7 +13,7 @@ use crate::text::{capitalise, format_digits, format_interval, format_percent, ma
 /// The blade of every draft.
 const EXAMPLE_SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 /// How a number is marked that only the user knows.
-pub const YOURS_MARK: &str = "YOURS";
+pub(crate) const YOURS_MARK: &str = "YOURS";
 /// Frames a second of the output of a run where no camera gives a rate, 1/s.
 const SAMPLE_RATE_HZ: f64 = 10_000.0;
 /// The stroke of a scene alone: a head that moves half a metre a second at most, and its first reversal.
@@ -24,7 +24,11 @@ const DEFAULT_RUN_S: [f64; 2] = [0.4, 1.0];
 ///
 /// # Errors
 /// [`SceneError`] if the bundled example cannot be read.
-pub fn write_scene(found: &DraftFindings, recording: &str, shoulder: bool) -> Result<String, SceneError> {
+pub(crate) fn write_scene(
+    found: &DraftFindings,
+    recording: &str,
+    shoulder: bool,
+) -> Result<String, SceneError> {
     let head = CommentedToml::default()
         .add_comment(&format!(
             "The blade of the recording {}, for `wiperlab simulate` and for job.toml.",
@@ -47,7 +51,7 @@ pub fn write_scene(found: &DraftFindings, recording: &str, shoulder: bool) -> Re
 ///
 /// # Errors
 /// [`SceneError`] if the bundled example cannot be read.
-pub fn write_scene_alone(shoulder: bool) -> Result<String, SceneError> {
+pub(crate) fn write_scene_alone(shoulder: bool) -> Result<String, SceneError> {
     let head =
         CommentedToml::default().add_comment("A blade, its friction and its drive, for `wiperlab simulate`.");
     let drive = add_cosine_drive(write_blade(head, shoulder)?.add_empty_line(), DEFAULT_STROKE);
@@ -148,7 +152,7 @@ const DIGITS: usize = 4;
 
 /// A scene with the estimates in it, and what it is the scene of.
 #[derive(Debug, Clone, Copy)]
-pub struct FittedScene<'a> {
+pub(crate) struct FittedScene<'a> {
     /// The scene that the fit ran.
     pub scene: &'a Scene,
     /// Name of its condition.
@@ -163,8 +167,7 @@ pub struct FittedScene<'a> {
 
 /// The scene of a fit at its estimates, with their intervals as comments; `None` for one that starts in the
 /// air, which no scene file says.
-#[must_use]
-pub fn write_fitted_scene(fitted: &FittedScene<'_>) -> Option<String> {
+pub(crate) fn write_fitted_scene(fitted: &FittedScene<'_>) -> Option<String> {
     let FittedScene { scene, condition, synthetic, recording, result } = *fitted;
     let of = match synthetic {
         Some(true) => "fitted to a synthetic recording, which no camera took",

@@ -11,21 +11,17 @@ use std::f64::consts::TAU;
 
 /// A head on a cosine, `a (1 - cos(2 pi f (t - t0)))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stroke {
-    /// `a`, m.
+pub(crate) struct Stroke {
     pub amplitude_m: f64,
-    /// `f`, Hz.
     pub frequency_hz: f64,
-    /// `t0`, s.
     pub delay_s: f64,
 }
 
 /// What the user knows of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct KnownStroke {
+pub(crate) struct KnownStroke {
     /// Amplitude of the head, m.
     pub amplitude_m: Option<f64>,
-    /// Its frequency, Hz.
     pub frequency_hz: Option<f64>,
 }
 

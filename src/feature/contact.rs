@@ -30,8 +30,7 @@ pub enum ContactReading {
 
 impl ContactReading {
     /// Its kind in a study.
-    #[must_use]
-    pub fn kind(self) -> &'static str {
+    pub(crate) fn kind(self) -> &'static str {
         match self {
             Self::StickFraction(_) => "stick-fraction",
             Self::LongestStick(_) => "longest-stick",
@@ -44,8 +43,7 @@ impl ContactReading {
     }
 
     /// The window that it is read from, where it has one.
-    #[must_use]
-    pub fn window(&self) -> Option<&Window> {
+    pub(crate) fn window(&self) -> Option<&Window> {
         match self {
             Self::StickFraction(window) | Self::LongestStick(window) | Self::Transitions(window) => {
                 Some(window)

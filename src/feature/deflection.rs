@@ -92,7 +92,6 @@ impl HeadSpeeds {
 impl Iterator for HeadSpeeds {
     type Item = f64;
 
-    /// Never ends.
     fn next(&mut self) -> Option<f64> {
         let frame = self.frame as f64;
         while self.pair + 2 < self.blocks.len() && self.blocks[self.pair + 1].0 < frame {

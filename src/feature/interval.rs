@@ -21,8 +21,7 @@ pub enum ReversalInterval {
 
 impl ReversalInterval {
     /// Its kind in a job or a study.
-    #[must_use]
-    pub const fn kind(self) -> &'static str {
+    pub(crate) const fn kind(self) -> &'static str {
         match self {
             Self::ReleaseAfterReversal => "release-after-reversal",
             Self::StickDuration => "stick-duration",

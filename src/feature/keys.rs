@@ -37,7 +37,7 @@ macro_rules! define_keys {
     ({} $(#[doc = $doc:literal] $key:ident: $type:ty),*) => {
         /// The keys of an entry that say what is read.
         #[derive(Debug, Default)]
-        pub(crate) struct Keys { $(pub $key: Option<$type>),* }
+        pub struct Keys { $(pub $key: Option<$type>),* }
 
         impl Keys {
             /// Those that are given.
@@ -75,7 +75,7 @@ macro_rules! define_entry {
 pub(crate) use {define_entry, with_reading_keys};
 
 /// An entry of a file that says what is read.
-pub(crate) struct ReadingEntry<'a> {
+pub struct ReadingEntry<'a> {
     /// Its name in messages: "feature `x` (rms)".
     pub name: &'a str,
     /// What an entry of the file is called: `feature` or `map`.
@@ -90,7 +90,7 @@ pub(crate) struct ReadingEntry<'a> {
 
 impl ReadingEntry<'_> {
     /// A key as messages name it.
-    pub fn describe_key(&self, key: &str) -> String {
+    pub(crate) fn describe_key(&self, key: &str) -> String {
         format!("{}, `{key}`", self.name)
     }
 
@@ -105,14 +105,19 @@ impl ReadingEntry<'_> {
     }
 
     /// A number above 0 that has to be there.
-    pub fn require_positive(&self, key: &str, found: Option<f64>, expected: &str) -> Result<f64, KeyRefusal> {
+    pub(crate) fn require_positive(
+        &self,
+        key: &str,
+        found: Option<f64>,
+        expected: &str,
+    ) -> Result<f64, KeyRefusal> {
         match found {
             Some(found) => check_above_zero(self.describe_key(key), found),
             None => refuse_key(self.describe_key(key), format!("missing; expected {expected}")),
         }
     }
 
-    pub fn parse_window(&self) -> Result<Window, KeyRefusal> {
+    pub(crate) fn parse_window(&self) -> Result<Window, KeyRefusal> {
         match self.window_if_given()? {
             Some(window) => Ok(window),
             None => refuse_key(
@@ -134,7 +139,7 @@ impl ReadingEntry<'_> {
         self.keys.window.as_ref().map(parse).transpose()
     }
 
-    pub fn parse_band(&self) -> Result<FeatureBand, KeyRefusal> {
+    pub(crate) fn parse_band(&self) -> Result<FeatureBand, KeyRefusal> {
         let names = || Channel::ALL.map(Channel::name).join(", ");
         match &self.keys.channel {
             Some(channel) => self.parse_band_of_channel(channel),
@@ -186,7 +191,7 @@ impl ReadingEntry<'_> {
     }
 
     /// Number of a reversal, counted from 1.
-    pub fn reversal_number(&self) -> Result<usize, KeyRefusal> {
+    pub(crate) fn reversal_number(&self) -> Result<usize, KeyRefusal> {
         match self.keys.reversal {
             Some(0) => refuse_key(
                 self.describe_key("reversal"),
@@ -197,7 +202,7 @@ impl ReadingEntry<'_> {
     }
 
     /// The part of a stroke in which a speed is sought: `part` of the reversal, or a window.
-    pub fn stroke_window(&self) -> Result<Window, KeyRefusal> {
+    pub(crate) fn stroke_window(&self) -> Result<Window, KeyRefusal> {
         match (self.keys.part.as_deref(), &self.keys.window) {
             (Some(part @ ("before" | "after")), None) => {
                 Window::parse(&format!("{part}[{}]", self.reversal_number()?))
@@ -219,7 +224,7 @@ impl ReadingEntry<'_> {
         }
     }
 
-    pub fn width_relative(&self) -> Result<f64, KeyRefusal> {
+    pub(crate) fn width_relative(&self) -> Result<f64, KeyRefusal> {
         let width = self.keys.width_relative.unwrap_or(WIDTH_RELATIVE);
         if width > 0.0 && width <= WIDEST_RELATIVE {
             return Ok(width);

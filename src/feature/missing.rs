@@ -219,8 +219,7 @@ const REASONS: [(MissingReason, &str, &str); 22] = [
 
 impl MissingReason {
     /// Why a run has ended before its stop time; `None` if it has not.
-    #[must_use]
-    pub fn from_status(status: RunStatus) -> Option<Self> {
+    pub(crate) fn from_status(status: RunStatus) -> Option<Self> {
         match status {
             RunStatus::Completed => None,
             RunStatus::ContactLost => Some(Self::ContactLost),
@@ -234,7 +233,7 @@ impl MissingReason {
     }
 
     /// Every reason, in the order of legends.
-    pub fn all() -> impl Iterator<Item = Self> {
+    pub(crate) fn all() -> impl Iterator<Item = Self> {
         REASONS.into_iter().map(|(reason, ..)| reason)
     }
 
@@ -245,8 +244,7 @@ impl MissingReason {
     }
 
     /// The same in words.
-    #[must_use]
-    pub fn meaning(self) -> &'static str {
+    pub(crate) fn meaning(self) -> &'static str {
         REASONS[self as usize].2
     }
 }

@@ -38,8 +38,11 @@ impl<'a> FeatureReader<'a> {
     }
 
     /// Of a simulated run and the recording that a camera took of it.
-    #[must_use]
-    pub fn with_run(recording: &'a Recording, instants: &'a ReversalInstants, run: &'a RunRecord) -> Self {
+    pub(crate) fn with_run(
+        recording: &'a Recording,
+        instants: &'a ReversalInstants,
+        run: &'a RunRecord,
+    ) -> Self {
         Self { run: Some(run), ..Self::new(recording, instants) }
     }
 

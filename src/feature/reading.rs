@@ -1,6 +1,7 @@
 //! What is read: the readings, and the one table of their kinds that jobs and studies share.
 
 use super::contact::ContactReading;
+use super::deflection;
 use super::interval::ReversalInterval;
 use super::keys::ReadingEntry;
 use super::missing::MissingReason;
@@ -11,7 +12,6 @@ use super::spectral::{self, CycleRangeEnd};
 use super::value::FeatureValue;
 use super::value::LengthCalibration;
 use super::value::{FeatureUnit, ValueComparison};
-use super::{deflection};
 use crate::math;
 use crate::recording::channel::Window;
 use crate::toml_file::{KeyRefusal, refuse_key, suggest_key};
@@ -176,19 +176,19 @@ impl ReadingKind {
     ///
     /// # Errors
     /// What was found, and the nearest name.
-    pub fn find(word: &str) -> Result<&'static Self, String> {
+    pub(crate) fn find(word: &str) -> Result<&'static Self, String> {
         let words: Vec<&str> = KINDS.iter().map(|kind| kind.word).collect();
         let unknown = || format!("unknown kind `{word}`; {}", suggest_key(word, &words));
         KINDS.iter().find(|kind| kind.word == word).ok_or_else(unknown)
     }
 
     /// Whether an entry stands for several readings.
-    pub fn is_series(&self) -> bool {
+    pub(crate) fn is_series(&self) -> bool {
         matches!(self.make, ReadingConstructor::Series(_))
     }
 
     /// Whether only a simulated run shows it.
-    pub fn is_of_run(&self) -> bool {
+    pub(crate) fn is_of_run(&self) -> bool {
         matches!(self.make, ReadingConstructor::OfRun(_))
     }
 
@@ -197,7 +197,7 @@ impl ReadingKind {
     ///
     /// # Errors
     /// The key at fault, what was found and what was expected.
-    pub fn make_readings(
+    pub(crate) fn make_readings(
         &self,
         name: &str,
         entry: &ReadingEntry,
@@ -301,8 +301,7 @@ fn split_band((low, high): (f64, f64), count: usize) -> impl Iterator<Item = (f6
 
 impl Reading {
     /// Its kind in a job or a study.
-    #[must_use]
-    pub fn kind(&self) -> &'static str {
+    pub(crate) fn kind(&self) -> &'static str {
         match self {
             Self::Frequency(_) => "frequency",
             Self::Amplitude(_) => "amplitude",
@@ -319,15 +318,13 @@ impl Reading {
     }
 
     /// Unit of its value.
-    #[must_use]
-    pub fn unit(&self) -> FeatureUnit {
+    pub(crate) fn unit(&self) -> FeatureUnit {
         let row = KINDS.iter().find(|kind| kind.word == self.kind());
         row.map_or(FeatureUnit::DIMENSIONLESS, |kind| kind.unit)
     }
 
     /// How two of its values are compared.
-    #[must_use]
-    pub fn comparison(&self) -> ValueComparison {
+    pub(crate) fn comparison(&self) -> ValueComparison {
         match self {
             Self::Interval { interval: ReversalInterval::FlipAfterReversal, .. } => {
                 ValueComparison::Linear { scale: TIME_SCALE_S }
@@ -337,8 +334,7 @@ impl Reading {
     }
 
     /// The band that it is read from, where it has one.
-    #[must_use]
-    pub fn band(&self) -> Option<&FeatureBand> {
+    pub(crate) fn band(&self) -> Option<&FeatureBand> {
         match self {
             Self::Frequency(band)
             | Self::Amplitude(band)
@@ -354,8 +350,7 @@ impl Reading {
     }
 
     /// The window that it is read from, where it has one.
-    #[must_use]
-    pub fn window(&self) -> Option<&Window> {
+    pub(crate) fn window(&self) -> Option<&Window> {
         match self {
             Self::Frequency(band)
             | Self::Amplitude(band)
@@ -370,8 +365,7 @@ impl Reading {
     }
 
     /// How it depends on the calibration of a camera; `None` where it is no length in a picture.
-    #[must_use]
-    pub fn length_calibration(&self) -> Option<LengthCalibration> {
+    pub(crate) fn length_calibration(&self) -> Option<LengthCalibration> {
         match self {
             Self::MeanDeflection(_) | Self::DeflectionAtSpeed { .. } => Some(LengthCalibration::Position),
             Self::Amplitude(_) | Self::Rms(_) => Some(LengthCalibration::Size { floor_m: 0.0 }),
@@ -385,8 +379,7 @@ impl Reading {
     }
 
     /// Whether it takes the extremes over a run ([`crate::simulate::outputs::Audit`]).
-    #[must_use]
-    pub fn needs_audit(&self) -> bool {
+    pub(crate) fn needs_audit(&self) -> bool {
         matches!(self, Self::Contact(contact) if contact.needs_audit())
     }
 

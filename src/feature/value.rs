@@ -60,20 +60,13 @@ pub struct FeatureUnit {
 }
 
 impl FeatureUnit {
-    /// Frequencies.
-    pub const HERTZ: Self = Self { name: "Hz", suffix: "_hz", shown: "Hz", factor: 1.0 };
-    /// Amplitudes, m.
-    pub const MICROMETRES: Self = Self { name: "m", suffix: "_m", shown: "\u{b5}m", factor: 1e6 };
-    /// Deflections, m.
-    pub const MILLIMETRES: Self = Self { name: "m", suffix: "_m", shown: "mm", factor: 1e3 };
-    /// Durations, s.
-    pub const MILLISECONDS: Self = Self { name: "s", suffix: "_s", shown: "ms", factor: 1e3 };
-    /// Instants, s.
-    pub const SECONDS: Self = Self { name: "s", suffix: "_s", shown: "s", factor: 1.0 };
-    /// Forces.
+    pub(crate) const HERTZ: Self = Self { name: "Hz", suffix: "_hz", shown: "Hz", factor: 1.0 };
+    pub(crate) const MICROMETRES: Self = Self { name: "m", suffix: "_m", shown: "\u{b5}m", factor: 1e6 };
+    pub(crate) const MILLIMETRES: Self = Self { name: "m", suffix: "_m", shown: "mm", factor: 1e3 };
+    pub(crate) const MILLISECONDS: Self = Self { name: "s", suffix: "_s", shown: "ms", factor: 1e3 };
+    pub(crate) const SECONDS: Self = Self { name: "s", suffix: "_s", shown: "s", factor: 1.0 };
     pub(crate) const NEWTONS: Self = Self { name: "N", suffix: "_n", shown: "N", factor: 1.0 };
-    /// Ratios and counts.
-    pub const DIMENSIONLESS: Self = Self { name: "1", suffix: "", shown: "", factor: 1.0 };
+    pub(crate) const DIMENSIONLESS: Self = Self { name: "1", suffix: "", shown: "", factor: 1.0 };
 }
 
 /// How two values are compared.

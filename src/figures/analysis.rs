@@ -17,8 +17,7 @@ use std::ops::Range;
 
 impl AnalysedWindow<'_> {
     /// Every figure, with its name.
-    #[must_use]
-    pub fn figures(&self) -> [(&'static str, Figure); 4] {
+    pub(crate) fn figures(&self) -> [(&'static str, Figure); 4] {
         let figures = [
             ("spectrum", spectrum::draw_figure(&self.spectra())),
             ("spectrogram", spectrogram::draw_figure(&self.spectrogram())),
@@ -134,14 +133,12 @@ pub(super) fn label_component(c: &Component, spectrum: &Spectrum) -> LabelledCom
 
 /// The frequency of a ridge at one time, with how fast the tip and the head moved then.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CoursePoint {
+pub(crate) struct CoursePoint {
     /// Time of the recording, s.
     pub time_s: f64,
-    /// Frequency, Hz.
     pub frequency_hz: f64,
     /// Its standard deviation, Hz.
     pub frequency_sd_hz: f64,
-    /// Amplitude, m.
     pub amplitude_m: f64,
     /// Mean speed of the tip over the segment, m/s.
     pub tip_speed_m_per_s: Option<f64>,
@@ -151,8 +148,7 @@ pub struct CoursePoint {
 
 impl AnalysedWindow<'_> {
     /// The course of the frequency, point by point.
-    #[must_use]
-    pub fn frequency_course(&self) -> Vec<CoursePoint> {
+    pub(crate) fn frequency_course(&self) -> Vec<CoursePoint> {
         self.analysis.ridge.as_ref().map_or_else(Vec::new, |ridge| {
             ridge.points.iter().map(|p| self.course_point(p, ridge.segment_s)).collect()
         })
@@ -295,7 +291,6 @@ const DECAYS: f64 = 3.0;
 
 impl AnalysedWindow<'_> {
     /// The window as the sum of its trend and its components, and what is left.
-    #[must_use]
     pub(crate) fn ring_down(&self) -> RingDown {
         let grid = self.recording.grid();
         let time_s: Vec<f64> = self.frames.clone().map(|i| grid.time_s(i)).collect();
@@ -400,14 +395,10 @@ impl AnalysedWindow<'_> {
 // A window of a recording's channel with its analysis.
 
 /// A window of a channel, taken apart.
-pub struct AnalysedWindow<'a> {
-    /// The recording.
+pub(crate) struct AnalysedWindow<'a> {
     pub recording: &'a Recording,
-    /// The channel.
     pub channel: Channel,
-    /// The frames analysed.
     pub frames: Range<usize>,
-    /// What they hold.
     pub analysis: &'a SpectralAnalysis,
     /// What was done to them, in words.
     pub note: String,

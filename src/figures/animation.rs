@@ -82,8 +82,7 @@ pub fn render_svg(animation: &Animation) -> String {
 
 impl Animation {
     /// Which part of the motion is shown.
-    #[must_use]
-    pub fn part_name(&self) -> &'static str {
+    pub(crate) fn part_name(&self) -> &'static str {
         if self.turns { "the reversal" } else { "its longest stick" }
     }
 
@@ -119,8 +118,7 @@ fn draw_still(animation: &Animation) -> Figure {
 }
 
 /// "100 times slower than the motion, then 500 times".
-#[must_use]
-pub fn describe_pace(pace: &PlaybackPace) -> String {
+pub(crate) fn describe_pace(pace: &PlaybackPace) -> String {
     let factors: Vec<String> = pace.parts.iter().map(|p| format!("{} times", p.slower)).collect();
     match factors.as_slice() {
         [] => String::new(),
@@ -327,28 +325,24 @@ impl PlaybackPace {
     }
 
     /// First and last instant of the last part, s.
-    #[must_use]
     pub(crate) fn last_part_s(&self) -> [f64; 2] {
         self.parts.last().map_or(self.span_s(), |p| [p.from_s, p.to_s])
     }
 
     /// The pace of the same motion on a clock that is this far ahead.
-    #[must_use]
-    pub fn shift_by(self, shift_s: f64) -> Self {
+    pub(crate) fn shift_by(self, shift_s: f64) -> Self {
         let later =
             |p: PlaybackPart| PlaybackPart { from_s: p.from_s + shift_s, to_s: p.to_s + shift_s, ..p };
         Self { parts: self.parts.into_iter().map(later).collect() }
     }
 
     /// How long the animation lasts, s.
-    #[must_use]
-    pub fn duration_s(&self) -> f64 {
+    pub(crate) fn duration_s(&self) -> f64 {
         self.parts.iter().map(PlaybackPart::duration_s).sum::<f64>() + REST_S
     }
 
     /// When an instant of the motion is shown, as a share of the animation.
-    #[must_use]
-    pub fn playback_fraction(&self, time_s: f64) -> f64 {
+    pub(crate) fn playback_fraction(&self, time_s: f64) -> f64 {
         let shown_s: f64 =
             self.parts.iter().map(|p| (time_s.clamp(p.from_s, p.to_s) - p.from_s) * p.slower).sum();
         shown_s / self.duration_s()

@@ -73,8 +73,7 @@ const Z_95: f64 = 1.96;
 
 impl CornerPlot {
     /// The parameters of a fit; `lines` bring units and true values.
-    #[must_use]
-    pub fn from_fit(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
+    pub(crate) fn from_fit(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
         let free: Vec<&FreeParameter> =
             job.parameters.iter().filter(|p| result.parameters.contains_key(&p.name)).take(MOST).collect();
         let correlation = |a: &FreeParameter, b: &FreeParameter| {
@@ -89,8 +88,7 @@ impl CornerPlot {
     }
 
     /// The figure with its caption; nothing without a parameter.
-    #[must_use]
-    pub fn figure_block(&self) -> Option<FigureBlock> {
+    pub(crate) fn figure_block(&self) -> Option<FigureBlock> {
         (!self.parameters.is_empty()).then(|| FigureBlock {
             condition: None,
             file: "corner.svg".to_owned(),
@@ -368,8 +366,7 @@ const DETAILS: &str = "Below the diagonal: every pair of estimates with the regi
     interval that the table states. Every cell is as wide as what is known; scales are those of the search.";
 
 /// What the figure shows, with its number.
-#[must_use]
-pub fn figure_caption(shown: &CornerPlot) -> String {
+pub(crate) fn figure_caption(shown: &CornerPlot) -> String {
     let all = shown.parameters.len();
     let bounded = shown.parameters.iter().filter(|p| p.stated.iter().all(Option::is_some)).count();
     let truths: Vec<bool> = shown.parameters.iter().filter_map(interval_holds_truth).collect();

@@ -330,9 +330,13 @@ mod tests {
         let rises = shown_cycles(&[(0.1, 359.0), (0.3, 692.0)]);
         assert!(claim_sentence(&rises, (359.0, 692.0)).contains("rises from 359 to 692 Hz"));
         assert!(
-            claim_sentence(&shown_cycles(&[(0.1, 900.0), (0.3, 905.0)]), (900.0, 905.0)).contains("stays between")
+            claim_sentence(&shown_cycles(&[(0.1, 900.0), (0.3, 905.0)]), (900.0, 905.0))
+                .contains("stays between")
         );
-        assert!(claim_sentence(&shown_cycles(&[(0.1, 700.0)]), (600.0, 800.0)).contains("runs from 600 to 800 Hz"));
+        assert!(
+            claim_sentence(&shown_cycles(&[(0.1, 700.0)]), (600.0, 800.0))
+                .contains("runs from 600 to 800 Hz")
+        );
         let natural_hz = vec![("head".to_owned(), 20.0), ("neck".to_owned(), 195.0)];
         let swing = CycleOverSpeed { natural_hz, ..shown_cycles(&[(0.1, 77.0)]) };
         assert!(

@@ -15,7 +15,7 @@ use crate::simulate::ModelSample;
 use crate::text::{capitalise, format_decimals, format_digits, format_length, format_trimmed};
 
 /// A course over time, `None` where it is interrupted: times, s, and values.
-pub type TimeCurve = Vec<Option<(f64, f64)>>;
+pub(crate) type TimeCurve = Vec<Option<(f64, f64)>>;
 
 /// A part of the recording.
 #[derive(Debug, Clone, PartialEq, Default)]

@@ -62,7 +62,6 @@ pub fn draw_figure(history: &TimeHistory) -> Figure {
 }
 
 /// A part of the motion enlarged; `None` where there is no such part.
-#[must_use]
 pub(crate) fn draw_enlarged(history: &TimeHistory) -> Option<Figure> {
     let zoom_s = history.zoom_s.filter(|(from, to)| from < to)?;
     let panels = stack_panels(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM);

@@ -21,8 +21,7 @@ const SWING: f64 = 0.35;
 const HALF_WIDTH: f64 = 0.5;
 
 /// What the tip answers, and the shapes of the modes.
-#[must_use]
-pub fn draw_figures(title: &str, blade: &Linkage) -> [Figure; 2] {
+pub(crate) fn draw_figures(title: &str, blade: &Linkage) -> [Figure; 2] {
     let sides: &[bool] = if blade.shoulder.is_some() { &[false, true] } else { &[false] };
     let of = |on: bool| natural_modes(blade, TipConstraint::Free, on);
     let found: Vec<f64> = sides.iter().flat_map(|on| of(*on)).filter_map(|mode| mode.frequency_hz).collect();

@@ -12,9 +12,7 @@ use crate::text::{format_short, pluralise};
 /// Height of the normal force's panel, mm.
 const FORCE_MM: f64 = 24.0;
 
-/// The figure.
-#[must_use]
-pub fn draw_figure(title: &str, motion: &RunMotion) -> Figure {
+pub(crate) fn draw_figure(title: &str, motion: &RunMotion) -> Figure {
     let history = TimeHistory { model: Some(motion_traces(motion)), ..TimeHistory::default() };
     let history = TimeHistory {
         stick_s: motion.stick_s.iter().map(|[from, to]| (*from, *to)).collect(),

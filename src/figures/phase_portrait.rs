@@ -11,7 +11,7 @@ use crate::simulate::ModelSample;
 use crate::text::{format_digits, format_milliseconds, format_percent, format_speed, join_with_and};
 
 /// A point of the motion: deflection, m, and velocity of the tip, m/s; `None` interrupts it.
-pub type PhasePoint = Option<(f64, f64)>;
+pub(crate) type PhasePoint = Option<(f64, f64)>;
 
 /// A part of the motion.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -120,7 +120,7 @@ const MAX_DIFFERENCE_PERIODS: f64 = 0.2;
 
 /// How velocities are taken: as the difference of the places in two frames, as many frames before as after.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CentralDifference {
+pub(crate) struct CentralDifference {
     /// Frames to either side.
     pub half_frames: usize,
     /// Frames per second, 1/s.
@@ -129,16 +129,19 @@ pub struct CentralDifference {
 
 impl CentralDifference {
     /// Of the neighbouring frames.
-    #[must_use]
-    pub fn of_neighbouring_frames(frame_rate_hz: f64) -> Self {
+    pub(crate) fn of_neighbouring_frames(frame_rate_hz: f64) -> Self {
         Self { half_frames: 1, frame_rate_hz }
     }
 
     /// The shortest in which white noise of the place of a standard deviation, m, leaves `MAX_VELOCITY_NOISE` of
     /// the swing of the velocity, m/s; no longer than a fifth of the period of the fastest component, Hz, and
     /// the shortest there is where none is known.
-    #[must_use]
-    pub fn for_noise(frame_rate_hz: f64, noise_m: f64, swing_m_per_s: f64, fastest_hz: Option<f64>) -> Self {
+    pub(crate) fn for_noise(
+        frame_rate_hz: f64,
+        noise_m: f64,
+        swing_m_per_s: f64,
+        fastest_hz: Option<f64>,
+    ) -> Self {
         let shortest = Self::of_neighbouring_frames(frame_rate_hz);
         let quiet = if noise_m > 0.0 {
             (shortest.noise_m_per_s(noise_m) / (MAX_VELOCITY_NOISE * swing_m_per_s)).ceil()
@@ -151,36 +154,35 @@ impl CentralDifference {
     }
 
     /// Time between the two frames, s.
-    #[must_use]
-    pub fn frame_gap_s(&self) -> f64 {
+    pub(crate) fn frame_gap_s(&self) -> f64 {
         2.0 * self.half_frames as f64 / self.frame_rate_hz
     }
 
     /// Standard deviation of the velocity, m/s, that white noise of the place leaves, m: `sqrt(2)` times it
     /// over the time between the frames.
-    #[must_use]
     pub(crate) fn noise_m_per_s(&self, noise_m: f64) -> f64 {
         noise_m * std::f64::consts::SQRT_2 / self.frame_gap_s()
     }
 
     /// Share that is left of a velocity that swings at a frequency, Hz: `sin(x)/x` of pi times the frequency
     /// and the time between the frames.
-    #[must_use]
-    pub fn velocity_gain(&self, frequency_hz: f64) -> f64 {
+    pub(crate) fn velocity_gain(&self, frequency_hz: f64) -> f64 {
         let x = std::f64::consts::PI * frequency_hz * self.frame_gap_s();
         if x > 0.0 { math::sin(x) / x } else { 1.0 }
     }
 
     /// Time from the frame to either of the two, s.
-    #[must_use]
     pub(crate) fn half_width_s(&self) -> f64 {
         self.half_frames as f64 / self.frame_rate_hz
     }
 
     /// Deflection and velocity of the tip in every frame that has one so far before and after it; `None`
     /// where one of the three is missing.
-    #[must_use]
-    pub fn phase_points(&self, deflection_m: &[Option<f64>], tip_x_m: &[Option<f64>]) -> Vec<PhasePoint> {
+    pub(crate) fn phase_points(
+        &self,
+        deflection_m: &[Option<f64>],
+        tip_x_m: &[Option<f64>],
+    ) -> Vec<PhasePoint> {
         let (half, apart_s) = (self.half_frames, self.frame_gap_s());
         let middle = |(deflection, tip): (&Option<f64>, &[Option<f64>])| {
             let (before, after) = (tip.first().copied().flatten()?, tip.last().copied().flatten()?);
@@ -191,7 +193,6 @@ impl CentralDifference {
 }
 
 /// From the least to the greatest velocity, m/s; `None` without a state.
-#[must_use]
 pub(crate) fn swing_m_per_s(states: &[PhasePoint]) -> Option<f64> {
     let velocities = || states.iter().flatten().map(|(_, v)| *v).filter(|v| v.is_finite());
     velocities().reduce(f64::max).zip(velocities().reduce(f64::min)).map(|(high, low)| high - low)

@@ -32,7 +32,6 @@ const NEAR_TURN: f64 = 0.05;
 const HALF_WAY: f64 = 0.5;
 
 /// The blade before, during and after the first turn of the head; empty where the head does not turn.
-#[must_use]
 pub(crate) fn reversal_poses(motion: &RunMotion) -> Vec<ReversalPose> {
     let samples = &motion.samples;
     let Some(turn) = motion.turn() else { return Vec::new() };
@@ -99,7 +98,6 @@ fn first_slip(motion: &RunMotion, released: usize) -> Option<usize> {
 }
 
 /// Head, hinge and tip as places along the sweep and over the glass, m.
-#[must_use]
 pub(crate) fn joint_positions(linkage: &Linkage, sample: &ModelSample) -> [(f64, f64); 3] {
     let head = (sample.head_x_m, linkage.l1_m + linkage.l2_m - sample.head_drop_m);
     let below = |(x, y): (f64, f64), angle: f64, length: f64| {
@@ -170,8 +168,7 @@ fn claim_sentence(shown: &PoseSequence) -> String {
 }
 
 /// One sentence on the figure.
-#[must_use]
-pub fn figure_caption(shown: &PoseSequence) -> String {
+pub(crate) fn figure_caption(shown: &PoseSequence) -> String {
     let at = |name: &str| shown.poses.iter().find(|p| p.name == name);
     let rests = describe_rest(shown)
         .map(|(time, way)| format!(": its tip rests for {time} while the head moves by {way}"));
@@ -200,8 +197,7 @@ fn describe_rest(shown: &PoseSequence) -> Option<(String, String)> {
 }
 
 /// The rest of what is said of the figure.
-#[must_use]
-pub fn figure_details(shown: &PoseSequence) -> String {
+pub(crate) fn figure_details(shown: &PoseSequence) -> String {
     let longest = ArrowScale::from_poses(&shown.poses);
     let mut sentences = vec![format!(
         "The fitted model on the glass, to scale, with the head in the middle of every drawing; times are \
@@ -291,7 +287,7 @@ pub(super) struct ArrowScale {
 }
 
 impl ArrowScale {
-    pub fn from_poses(poses: &[ReversalPose]) -> Self {
+    pub(crate) fn from_poses(poses: &[ReversalPose]) -> Self {
         let most =
             |value: &dyn Fn(&ReversalPose) -> f64| poses.iter().map(|p| value(p).abs()).fold(0.0, f64::max);
         Self { speed_m_per_s: most(&|p| p.head_m_per_s), force_n: most(&|p| p.sample.friction_n) }

@@ -72,8 +72,7 @@ const ROOM: f64 = 0.06;
 
 impl ProfilePlot {
     /// The profiles of a fit; `lines` bring units and true values.
-    #[must_use]
-    pub fn from_fit(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
+    pub(crate) fn from_fit(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
         Self {
             title: job.title.clone(),
             synthetic: result.synthetic,
@@ -88,8 +87,7 @@ impl ProfilePlot {
     }
 
     /// The figure with its caption; nothing where no parameter has a profile.
-    #[must_use]
-    pub fn figure_block(&self) -> Option<FigureBlock> {
+    pub(crate) fn figure_block(&self) -> Option<FigureBlock> {
         let figure = draw_figure(self);
         (!figure.panels.is_empty()).then(|| FigureBlock {
             condition: None,
@@ -328,8 +326,7 @@ fn crossing_at_top(profile: &ParameterProfile, at: usize, (value, rise): (f64, f
 }
 
 /// What the figure shows, with its number.
-#[must_use]
-pub fn figure_caption(shown: &ProfilePlot) -> String {
+pub(crate) fn figure_caption(shown: &ProfilePlot) -> String {
     format!("Rise of the cost along each parameter while the others are refitted: {}.", claim_sentence(shown))
 }
 
@@ -343,8 +340,7 @@ fn claim_sentence(shown: &ProfilePlot) -> String {
 }
 
 /// How to read the figure, and its numbers.
-#[must_use]
-pub fn figure_details(shown: &ProfilePlot) -> String {
+pub(crate) fn figure_details(shown: &ProfilePlot) -> String {
     let drawn = drawn_profiles(shown);
     let mut sentences = vec![
         format!(

@@ -43,8 +43,7 @@ const LEAST_END: f64 = 3.0;
 
 impl PullPlot {
     /// Those of a report's rows.
-    #[must_use]
-    pub fn from_comparisons(title: &str, fitted: &[&[Comparison]], held_out: &[Comparison]) -> Self {
+    pub(crate) fn from_comparisons(title: &str, fitted: &[&[Comparison]], held_out: &[Comparison]) -> Self {
         let deviations = |row: &Comparison| {
             let sd = row.target_sd.filter(|sd| *sd > 0.0)?;
             Some((row.model? - row.target) / sd).filter(|deviations| deviations.is_finite())
@@ -67,8 +66,7 @@ impl PullPlot {
     }
 
     /// The figure with its caption; nothing without a feature.
-    #[must_use]
-    pub fn figure_block(&self) -> Option<FigureBlock> {
+    pub(crate) fn figure_block(&self) -> Option<FigureBlock> {
         (!self.pulls.is_empty()).then(|| FigureBlock {
             condition: None,
             file: "pulls.svg".to_owned(),
@@ -158,8 +156,7 @@ fn claim_sentence(shown: &PullPlot) -> String {
 }
 
 /// What the figure shows, with its number.
-#[must_use]
-pub fn figure_caption(shown: &PullPlot) -> String {
+pub(crate) fn figure_caption(shown: &PullPlot) -> String {
     let without = if shown.without.is_empty() {
         String::new()
     } else {

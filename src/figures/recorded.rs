@@ -15,8 +15,7 @@ const MOST_GAPS: usize = 20;
 const LEAST_GAP: usize = 3;
 
 /// The figure; `reversals` are instants, s, and `said` is what a reader has to know.
-#[must_use]
-pub fn draw_figure(recording: &Recording, reversals: &[f64], said: &str) -> Figure {
+pub(crate) fn draw_figure(recording: &Recording, reversals: &[f64], said: &str) -> Figure {
     let name = |(number, at): (usize, &f64)| (format!("reversal {}", number + 1), *at);
     let named = reversals.iter().enumerate().take(MOST_NAMED).map(name);
     let history = TimeHistory {

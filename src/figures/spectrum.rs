@@ -118,8 +118,7 @@ pub fn draw_figure(spectra: &SpectraPlot) -> Figure {
 }
 
 /// The claim of a spectrum that nothing is sought in: its largest component.
-#[must_use]
-pub fn strongest_claim(spectra: &SpectraPlot) -> String {
+pub(crate) fn strongest_claim(spectra: &SpectraPlot) -> String {
     let largest = |all: &[LabelledComponent]| {
         all.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m)).cloned()
     };
@@ -471,8 +470,7 @@ const CIRCLE_95: f64 = 1.730_818_382_602_285_7;
 impl AmplitudeInterval {
     /// What noise of a level leaves open of every amplitude of a curve: the true one lies in it in 95 % of
     /// the bins at least, and where it reaches down to zero the bin may hold noise alone.
-    #[must_use]
-    pub fn from_noise_floor(curve: &SpectrumCurve, floor: &SpectrumLevel) -> Self {
+    pub(crate) fn from_noise_floor(curve: &SpectrumCurve, floor: &SpectrumLevel) -> Self {
         let ends = |sign: f64| {
             let end = |(a, noise_m): (&f64, &f64)| (a + sign * CIRCLE_95 * noise_m).max(0.0);
             curve.amplitude_m.iter().zip(&floor.amplitude_m).map(end).collect()

@@ -59,14 +59,19 @@ pub(super) struct SweepMapValues<'a> {
 
 impl<'a> SweepMapValues<'a> {
     /// Map number `at` of a study.
-    pub fn new(study: &Study, map: &'a SweepMap, outcomes: &[PointOutcome], at: usize) -> Self {
+    pub(crate) fn new(study: &Study, map: &'a SweepMap, outcomes: &[PointOutcome], at: usize) -> Self {
         let reason = |outcome: &PointOutcome| outcome.values.get(at)?.err();
         let reasons = outcomes.iter().map(reason).collect();
         Self { map, values: map_values(study, outcomes, at), reasons }
     }
 
     /// The panel of the map; `None` of a study without axes.
-    pub fn draw_panel(&self, study: &Study, scene: &Scene, patterns: &ReasonPatterns) -> Option<Panel> {
+    pub(crate) fn draw_panel(
+        &self,
+        study: &Study,
+        scene: &Scene,
+        patterns: &ReasonPatterns,
+    ) -> Option<Panel> {
         match study.axes.as_slice() {
             [x] => Some(self.draw_curve(x, scene, patterns)),
             [x, y, ..] => Some(self.draw_heat_map([x, y], scene, patterns)),
@@ -202,7 +207,7 @@ const FALLBACK_PATTERNS: [HatchPattern; 9] = [
 pub(in crate::figures) struct ReasonPatterns(BTreeMap<MissingReason, HatchPattern>);
 
 impl ReasonPatterns {
-    pub fn from_outcomes(outcomes: &[PointOutcome]) -> Self {
+    pub(crate) fn from_outcomes(outcomes: &[PointOutcome]) -> Self {
         let mut found: Vec<MissingReason> =
             outcomes.iter().flat_map(|outcome| &outcome.values).filter_map(|value| value.err()).collect();
         found.sort_unstable();
@@ -231,7 +236,7 @@ impl ReasonPatterns {
 
     /// One hatch for each reason of a map that occurs, in the order of the table of reasons; `cell` gives the
     /// place of a point.
-    pub fn reason_hatches(
+    pub(crate) fn reason_hatches(
         &self,
         reasons: &[Option<MissingReason>],
         cell: impl Fn(usize) -> Option<[f64; 4]>,

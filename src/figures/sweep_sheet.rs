@@ -68,8 +68,7 @@ fn count_maps(maps: usize) -> String {
 }
 
 /// The sheet of a study that is not drawn as maps: rank correlations as numbers over colours.
-#[must_use]
-pub fn draw_correlations(study: &Study, found: &RankCorrelations) -> Figure {
+pub(crate) fn draw_correlations(study: &Study, found: &RankCorrelations) -> Figure {
     let of = |at: usize| -> Vec<Option<f64>> {
         found.of_map(study, at).into_iter().rev().map(|one| one.rank_correlation).collect()
     };

@@ -7,7 +7,7 @@ use crate::recording::Recording;
 use crate::text::{format_length, format_milliseconds, format_percent, format_short};
 
 /// Samples of the motion in the time of a frame.
-pub const MOTION_SAMPLES: f64 = 8.0;
+pub(crate) const MOTION_SAMPLES: f64 = 8.0;
 /// Frames of an enlarged part, and how many of them lie before its instant.
 const ENLARGED: f64 = 40.0;
 const BEFORE: f64 = 10.0;
@@ -18,14 +18,12 @@ const PANEL_MM: f64 = 40.0;
 
 /// A twin with the motion behind it; all on one clock.
 #[derive(Debug, Clone, Copy)]
-pub struct TwinPlot<'a> {
-    /// Heading.
+pub(crate) struct TwinPlot<'a> {
     pub title: &'a str,
     /// The motion without exposure and noise, about [`MOTION_SAMPLES`] times as many samples as frames.
     pub motion: &'a Recording,
     /// What the camera sees of it, without noise.
     pub seen: &'a Recording,
-    /// What was tracked.
     pub tracked: &'a Recording,
     /// Exposure of a frame, s.
     pub exposure_s: f64,
@@ -37,8 +35,7 @@ pub struct TwinPlot<'a> {
 
 /// The deflection of the whole run, of the frames about the release of the longest stick and about that of a
 /// late one, and what the camera adds to it.
-#[must_use]
-pub fn draw_figure(twin: &TwinPlot) -> Figure {
+pub(crate) fn draw_figure(twin: &TwinPlot) -> Figure {
     let words = figure_text(twin);
     let mut panels = vec![draw_run_panel(twin)];
     panels.extend(release_instants(twin).into_iter().map(|(name, at)| draw_enlarged_panel(twin, name, at)));

@@ -186,8 +186,7 @@ fn farthest(shown: &VideoFrames) -> Option<(&Instant, &'static str, f64)> {
 }
 
 /// One sentence on the figure.
-#[must_use]
-pub fn caption(shown: &VideoFrames) -> String {
+pub(crate) fn caption(shown: &VideoFrames) -> String {
     let Some((instant, point, distance_m)) = farthest(shown) else { return String::new() };
     format!(
         "At {} instants through the reversal head and tip of the model lie at most {} from the tracked points: the \

@@ -34,8 +34,7 @@ struct CandidateFeature {
 }
 
 /// Sentences for the directions that are open at a place that was probed; none where nothing is open.
-#[must_use]
-pub fn advise_measurements(
+pub(crate) fn advise_measurements(
     job: &Job,
     model: &dyn Model,
     probed: &ProbeEvaluation,

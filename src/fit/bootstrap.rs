@@ -22,11 +22,11 @@ const REFIT_STEPS: usize = 3;
 /// Damping of a refit: a prior of one length of the box, negligible for any informative direction.
 const REFIT_DAMPING: f64 = 1.0;
 /// Fewest twins from which a spread is taken.
-pub const MIN_TWINS: usize = 8;
+pub(crate) const MIN_TWINS: usize = 8;
 
 /// What the twins say.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Bootstrap {
+pub(crate) struct Bootstrap {
     /// Places in the unit box at which the twins were fitted again, one a twin.
     pub refits: Vec<Vec<f64>>,
     /// Twins that could not be made.
@@ -39,8 +39,7 @@ pub struct Bootstrap {
 impl Bootstrap {
     /// Root mean square distance of the refits from the best point along a coordinate; `None` with too few
     /// twins.
-    #[must_use]
-    pub fn refit_spread(&self, axis: usize, best: f64) -> Option<f64> {
+    pub(crate) fn refit_spread(&self, axis: usize, best: f64) -> Option<f64> {
         let places: Vec<f64> = self.refits.iter().filter_map(|unit| unit.get(axis).copied()).collect();
         let mean_square = places.iter().map(|u| math::powi(u - best, 2)).sum::<f64>() / places.len() as f64;
         (places.len() >= MIN_TWINS).then(|| mean_square.sqrt())
@@ -51,7 +50,7 @@ impl Bootstrap {
 ///
 /// # Errors
 /// [`StopReason`] when the evaluations are used up or may not go on.
-pub fn bootstrap_refits(
+pub(crate) fn bootstrap_refits(
     ledger: &mut Ledger,
     best: &Evaluation,
     jacobian: &DMatrix<f64>,

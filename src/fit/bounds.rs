@@ -81,26 +81,22 @@ impl Bounds {
     }
 
     /// Lower bound, in the parameter's unit.
-    #[must_use]
-    pub fn lower(&self) -> f64 {
+    pub(crate) fn lower(&self) -> f64 {
         self.lower
     }
 
     /// Upper bound, in the parameter's unit.
-    #[must_use]
-    pub fn upper(&self) -> f64 {
+    pub(crate) fn upper(&self) -> f64 {
         self.upper
     }
 
     /// How the range is divided.
-    #[must_use]
-    pub fn spacing(&self) -> BoundsSpacing {
+    pub(crate) fn spacing(&self) -> BoundsSpacing {
         self.spacing
     }
 
     /// Place of `value` in the unit interval; values outside the bounds go to the nearer end.
-    #[must_use]
-    pub fn to_unit(&self, value: f64) -> f64 {
+    pub(crate) fn to_unit(&self, value: f64) -> f64 {
         let value = value.clamp(self.lower, self.upper);
         let along = match self.spacing {
             BoundsSpacing::Log => math::ln(value / self.lower),
@@ -110,8 +106,7 @@ impl Bounds {
     }
 
     /// Value at `unit` (taken into 0 to 1 first); the ends give the bounds exactly.
-    #[must_use]
-    pub fn from_unit(&self, unit: f64) -> f64 {
+    pub(crate) fn from_unit(&self, unit: f64) -> f64 {
         let unit = clamp_unit(unit);
         if unit == 0.0 {
             return self.lower;
@@ -127,8 +122,7 @@ impl Bounds {
     }
 
     /// `d p / d u` at `unit`, in the parameter's unit.
-    #[must_use]
-    pub fn slope(&self, unit: f64) -> f64 {
+    pub(crate) fn slope(&self, unit: f64) -> f64 {
         match self.spacing {
             BoundsSpacing::Log => self.scaled_length() * self.from_unit(unit),
             BoundsSpacing::Linear => self.scaled_length(),
@@ -136,7 +130,6 @@ impl Bounds {
     }
 
     /// `d ln p / d u` at `unit`; `None` where the parameter is zero.
-    #[must_use]
     pub(crate) fn log_slope(&self, unit: f64) -> Option<f64> {
         match self.spacing {
             BoundsSpacing::Log => Some(self.scaled_length()),
@@ -157,21 +150,18 @@ impl Bounds {
 
 /// `unit` taken into 0 to 1; minus zero becomes zero, so that equal places have equal bits; not a number
 /// becomes one half.
-#[must_use]
 pub(crate) fn clamp_unit(unit: f64) -> f64 {
     if unit.is_nan() { 0.5 } else { unit.clamp(0.0, 1.0) + 0.0 }
 }
 
 /// The place on the real line of a place in the unit interval, `z = asin(2 u - 1)`, between minus and plus
 /// pi/2.
-#[must_use]
 pub(crate) fn unit_to_line(unit: f64) -> f64 {
     math::asin(2.0 * clamp_unit(unit) - 1.0)
 }
 
 /// The place in the unit interval of any real number, `u = (1 + sin z) / 2`; the ends are exact at odd
 /// multiples of pi/2.
-#[must_use]
 pub(crate) fn line_to_unit(line: f64) -> f64 {
     if line.abs() == FRAC_PI_2 {
         return if line > 0.0 { 1.0 } else { 0.0 };
@@ -217,8 +207,7 @@ pub enum Prior {
 
 impl Prior {
     /// Distance of a value, in the parameter's SI unit, from the mean, in standard deviations.
-    #[must_use]
-    pub fn residual(&self, value: f64) -> f64 {
+    pub(crate) fn residual(&self, value: f64) -> f64 {
         match *self {
             Self::Linear { mean, sd } => (value - mean) / sd,
             Self::Log { mean_ln, sd_ln } => (math::ln(value) - mean_ln) / sd_ln,

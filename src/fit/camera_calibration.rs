@@ -30,7 +30,7 @@ const BOX_VARIANCE: f64 = 1.0 / 12.0;
 
 /// A number of a camera that is estimated.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CameraEstimate {
+pub(crate) struct CameraEstimate {
     /// Number of the condition whose camera it is, from 0.
     pub condition: usize,
     /// Its name in a result.
@@ -48,7 +48,6 @@ pub struct CameraEstimate {
 struct ConditionCamera {
     condition: usize,
     sds: [f64; 2],
-    /// In prior deviations.
     place: [f64; 2],
 }
 
@@ -63,13 +62,12 @@ const CAMERA_NUMBER_NAMES: [&str; 2] = ["scale_relative", "offset_x_m"];
 
 /// The cameras of the targets, each with the numbers at which the cost of what was observed is lowest.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CameraFit(Vec<ConditionCamera>);
+pub(crate) struct CameraFit(Vec<ConditionCamera>);
 
 impl CameraFit {
     /// Those of `targets`, against features in their order. A camera whose features are all missing has the
     /// numbers of its prior.
-    #[must_use]
-    pub fn estimate(targets: &[TargetValue], features: &[Observed]) -> Self {
+    pub(crate) fn estimate(targets: &[TargetValue], features: &[Observed]) -> Self {
         let mut cameras: Vec<ConditionCamera> = Vec::new();
         for calibration in targets.iter().filter_map(|target| target.calibration) {
             let condition = calibration.condition;
@@ -91,8 +89,7 @@ impl CameraFit {
     }
 
     /// Numbers that are estimated: scales and offsets that are not held.
-    #[must_use]
-    pub fn count_unknowns(&self) -> usize {
+    pub(crate) fn count_unknowns(&self) -> usize {
         self.free_numbers().count()
     }
 
@@ -110,8 +107,7 @@ impl CameraFit {
     }
 
     /// A feature as its camera shows it.
-    #[must_use]
-    pub fn apply(&self, target: &TargetValue, observation: &Observation) -> Observation {
+    pub(crate) fn apply(&self, target: &TargetValue, observation: &Observation) -> Observation {
         let camera = target.calibration.and_then(|calibration| {
             Some((calibration, self.0.iter().find(|camera| camera.condition == calibration.condition)?))
         });
@@ -129,7 +125,6 @@ impl CameraFit {
     /// The linear model of residuals after the cameras have followed: what of the columns of `jacobian` they
     /// cannot explain. Rows are the features, then others, and one an unknown of the cameras at the end;
     /// weights are those of the cost.
-    #[must_use]
     pub(crate) fn project_jacobian(
         &self,
         jacobian: DMatrix<f64>,
@@ -149,7 +144,6 @@ impl CameraFit {
 
     /// The numbers with what the linear model says of them: `jacobian` has the rows that [`Self::project_jacobian`]
     /// takes and gives.
-    #[must_use]
     pub(crate) fn estimates(
         &self,
         jacobian: Option<&DMatrix<f64>>,
@@ -220,7 +214,6 @@ impl CameraFit {
 }
 
 /// Features as cameras of the priors show them, another draw for every twin.
-#[must_use]
 pub(crate) fn draw_camera_errors(targets: &[TargetValue], features: &[Observed], draw: u64) -> Vec<Observed> {
     let one = |(target, observed): (&TargetValue, &Observed)| match (target.calibration, observed) {
         (Some(calibration), Observed::Value(observation)) => {
@@ -346,8 +339,7 @@ pub struct TargetCalibration {
 
 impl TargetCalibration {
     /// What a camera with this `[scale, offset]` shows of a value, m.
-    #[must_use]
-    pub fn apply(&self, value: f64, [scale, offset_m]: [f64; 2]) -> f64 {
+    pub(crate) fn apply(&self, value: f64, [scale, offset_m]: [f64; 2]) -> f64 {
         match self.length {
             LengthCalibration::Position => (1.0 + scale) * value + offset_m,
             LengthCalibration::Size { floor_m } => {
@@ -369,8 +361,7 @@ impl TargetCalibration {
     }
 
     /// Standard deviation of what is shown of a value, m.
-    #[must_use]
-    pub fn sd_m(&self, value: f64) -> f64 {
+    pub(crate) fn sd_m(&self, value: f64) -> f64 {
         let [by_scale, by_offset] = self.derivatives(value, [0.0; 2]);
         math::hypot(self.scale_sd * by_scale, self.offset_sd_m * by_offset)
     }

@@ -35,7 +35,6 @@ impl Observed {
     }
 
     /// What was observed, if anything.
-    #[must_use]
     pub(crate) fn observation(&self) -> Option<&Observation> {
         match self {
             Self::Value(observation) => Some(observation),
@@ -44,8 +43,7 @@ impl Observed {
     }
 
     /// The value, if there is one.
-    #[must_use]
-    pub fn value(&self) -> Option<f64> {
+    pub(crate) fn value(&self) -> Option<f64> {
         self.observation().map(|observation| observation.value)
     }
 }
@@ -126,8 +124,7 @@ impl FailureReason {
     ];
 
     /// The word in files, such as `contact-lost`.
-    #[must_use]
-    pub fn as_str(self) -> &'static str {
+    pub(crate) fn as_str(self) -> &'static str {
         match self {
             Self::Ended(status) => status.name(),
             Self::Refused => "refused",
@@ -221,8 +218,7 @@ pub enum EvaluationStage {
 
 impl EvaluationStage {
     /// The word in files and on a terminal.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Gate => "gate",
             Self::Global => "global",

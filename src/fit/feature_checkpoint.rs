@@ -18,8 +18,7 @@ use std::fmt::Debug;
 
 /// The journal of a fit.
 pub type FeatureCheckpoint = checkpoint::CheckpointFile<EvaluationRecord>;
-/// Its header.
-pub type FeatureHeader = checkpoint::CheckpointHeader<FeatureHeaderBody>;
+pub(crate) type FeatureHeader = checkpoint::CheckpointHeader<FeatureHeaderBody>;
 
 /// One evaluation in a journal.
 #[derive(Debug, Clone, PartialEq)]
@@ -31,8 +30,7 @@ pub struct EvaluationRecord {
 }
 
 /// Exact coordinates of a point of the unit box, for look-up.
-#[must_use]
-pub fn point_key(unit: &[f64]) -> Vec<u64> {
+pub(crate) fn point_key(unit: &[f64]) -> Vec<u64> {
     unit.iter().map(|u| u.to_bits()).collect()
 }
 

@@ -16,7 +16,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Places that are probed: the middle of the box and points of a Halton sequence around it.
-pub const PROBE_COUNT: usize = 5;
+pub(crate) const PROBE_COUNT: usize = 5;
 /// The share of the box, about its middle, in which the probes lie: corners are rarely blades.
 const INNER_BOX: f64 = 0.7;
 
@@ -57,7 +57,7 @@ pub struct Identifiability {
 
 /// Why there is no gate to pass.
 #[derive(Debug, Clone, PartialEq)]
-pub enum IdentifiabilityError {
+pub(crate) enum IdentifiabilityError {
     /// Nothing can be learned, and why.
     CannotBeFitted(String),
     /// The evaluations are used up or may not go on.
@@ -66,10 +66,8 @@ pub enum IdentifiabilityError {
 
 /// A place that was probed and where the model ran.
 #[derive(Debug, Clone)]
-pub struct ProbeEvaluation {
-    /// The evaluation there.
+pub(crate) struct ProbeEvaluation {
     pub centre: Evaluation,
-    /// Its directions.
     pub directions: SingularDirections,
     /// Scatter of each feature there.
     scatter: Vec<Option<f64>>,
@@ -79,7 +77,7 @@ pub struct ProbeEvaluation {
 ///
 /// # Errors
 /// [`IdentifiabilityError`] when the job cannot be fitted, or the ledger has stopped.
-pub fn assess_identifiability(
+pub(crate) fn assess_identifiability(
     ledger: &mut Ledger,
     names: &[String],
 ) -> Result<(Identifiability, ProbeEvaluation), IdentifiabilityError> {

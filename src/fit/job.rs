@@ -15,13 +15,13 @@ use crate::simulate::twin::Camera;
 use crate::toml_file;
 use crate::toml_file::{TomlError, check_format, parse_toml};
 pub(crate) use conditions::is_same_quantity;
-pub use conditions::{FeatureCamera, HeadSource, JobCondition};
-pub use parameters::{Constants, FreeParameter, NuisanceParameter};
+pub(crate) use conditions::{FeatureCamera, HeadSource, JobCondition};
+pub(crate) use parameters::{Constants, FreeParameter, NuisanceParameter};
 use serde::Serialize;
-pub use settings::{Ensemble, IntervalSettings};
+pub(crate) use settings::{Ensemble, IntervalSettings};
 use std::collections::HashSet;
 pub use targets::{FitTarget, TargetSource, TargetStage};
-pub use traces::{CameraPriorSds, TraceChannel, TraceTarget};
+pub(crate) use traces::{CameraPriorSds, TraceChannel, TraceTarget};
 
 /// Name, what it sets, and whether it is held out.
 type ConditionIdentity<'a> = (&'a str, &'a [(String, f64)], bool);
@@ -148,8 +148,7 @@ impl Job {
 
     /// How the target of an aim depends on what is not known of its camera. `None` for what is no length, for
     /// a number that the job gives, whose deviation is the job's, and in a job with traces.
-    #[must_use]
-    pub fn target_calibration(&self, aim: &FitTarget) -> Option<TargetCalibration> {
+    pub(crate) fn target_calibration(&self, aim: &FitTarget) -> Option<TargetCalibration> {
         let measured = matches!(aim.source, TargetSource::Measured { .. }) && self.traces.is_empty();
         let condition = aim.feature.condition;
         let camera = self.conditions.get(condition)?.camera.filter(|_| measured)?;

@@ -25,7 +25,7 @@ pub struct FitProgress {
 }
 
 /// Called with every entry; `Break` ends the search, and what was found so far is the result.
-pub type OnProgress<'a> = dyn FnMut(&FitProgress) -> ControlFlow<()> + Send + 'a;
+pub(crate) type OnProgress<'a> = dyn FnMut(&FitProgress) -> ControlFlow<()> + Send + 'a;
 
 /// Why no more evaluations are made.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -92,7 +92,7 @@ impl<'a> Ledger<'a> {
     ///
     /// # Errors
     /// [`StopReason`] when not all of them could be made; what was made is kept.
-    pub fn evaluate_points(
+    pub(crate) fn evaluate_points(
         &mut self,
         stage: EvaluationStage,
         points: &[Vec<f64>],
@@ -122,7 +122,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// Holds new lines back until [`Self::release_lines`]: what is refused at the gate leaves no journal.
-    pub fn hold_lines(&mut self) {
+    pub(crate) fn hold_lines(&mut self) {
         self.held_lines = Some(Vec::new());
     }
 
@@ -130,7 +130,7 @@ impl<'a> Ledger<'a> {
     ///
     /// # Errors
     /// Why the journal cannot be written.
-    pub fn release_lines(&mut self, opening: &str) -> Result<(), String> {
+    pub(crate) fn release_lines(&mut self, opening: &str) -> Result<(), String> {
         let held = self.held_lines.take().unwrap_or_default();
         let entries: Vec<_> = held
             .into_iter()
@@ -178,9 +178,7 @@ impl<'a> Ledger<'a> {
         self.best = best.cloned();
     }
 
-    /// What is evaluated.
-    #[must_use]
-    pub fn objective(&self) -> &'a Objective<'a> {
+    pub(crate) fn objective(&self) -> &'a Objective<'a> {
         self.objective
     }
 
@@ -197,14 +195,12 @@ impl<'a> Ledger<'a> {
     }
 
     /// Evaluations that this run may still make.
-    #[must_use]
-    pub fn remaining_evaluations(&self) -> usize {
+    pub(crate) fn remaining_evaluations(&self) -> usize {
         self.limit.saturating_sub(self.evaluations.len())
     }
 
     /// The number of evaluations of this run, at most.
-    #[must_use]
-    pub fn evaluation_limit(&self) -> usize {
+    pub(crate) fn evaluation_limit(&self) -> usize {
         self.limit
     }
 
@@ -214,8 +210,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// Why nothing more can be evaluated at all, other than the budget.
-    #[must_use]
-    pub fn stop_reason(&self) -> Option<&StopReason> {
+    pub(crate) fn stop_reason(&self) -> Option<&StopReason> {
         self.stop.as_ref()
     }
 
@@ -265,8 +260,7 @@ impl<'a> Ledger<'a> {
     }
 
     /// What this run knows of a point.
-    #[must_use]
-    pub fn find_evaluation(&self, point: &[f64]) -> Option<&Evaluation> {
+    pub(crate) fn find_evaluation(&self, point: &[f64]) -> Option<&Evaluation> {
         self.places.get(&point_key(point)).and_then(|at| self.evaluations.get(*at))
     }
 }

@@ -17,14 +17,13 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
 /// Step of the differences in the unit box: about 2 % of a parameter whose bounds are a decade apart.
-pub const DIFFERENCE_STEP: f64 = 0.01;
+pub(crate) const DIFFERENCE_STEP: f64 = 0.01;
 /// Longest step in the unit box: a linear model does not hold farther.
 const MAX_STEP: f64 = 0.2;
 
 /// The points whose evaluations [`FeatureSlopes::from_differences`] needs: two a parameter, one step below and above `unit` where
 /// the box allows.
-#[must_use]
-pub fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
+pub(crate) fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
     let moved = |axis: usize, step: f64| {
         unit.iter().enumerate().map(|(at, u)| if at == axis { clamp_unit(u + step) } else { *u }).collect()
     };
@@ -34,12 +33,15 @@ pub fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
 /// `d distance / d u` of every feature as its camera shows it, a row a feature; `None` where it is missing on
 /// both sides, or at the point and on one.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FeatureSlopes(pub Vec<Vec<Option<f64>>>);
+pub(crate) struct FeatureSlopes(pub Vec<Vec<Option<f64>>>);
 
 impl FeatureSlopes {
     /// Of the evaluations `around` a point, in the order of [`difference_points`].
-    #[must_use]
-    pub fn from_differences(targets: &[TargetValue], centre: &Evaluation, around: &[&Evaluation]) -> Self {
+    pub(crate) fn from_differences(
+        targets: &[TargetValue],
+        centre: &Evaluation,
+        around: &[&Evaluation],
+    ) -> Self {
         let cameras = CameraFit::estimate(targets, &centre.features);
         let of = |(feature, target): (usize, &TargetValue), axis: usize| {
             let shown = |e: &Evaluation| cameras.apply_to_value(target, e.features.get(feature)?);
@@ -72,8 +74,7 @@ fn feature_slope(target: &TargetValue, below: (f64, f64), above: (f64, f64)) -> 
 /// How far each feature departs from a straight line between the points next to a centre, as a standard
 /// deviation in its own unit: `f(+) + f(-) - 2 f(0)` of independent scatter has six times its variance.
 /// `None` where it is missing on the way.
-#[must_use]
-pub fn feature_scatter(
+pub(crate) fn feature_scatter(
     targets: &[TargetValue],
     centre: &Evaluation,
     around: &[&Evaluation],
@@ -98,13 +99,11 @@ pub fn feature_scatter(
 }
 
 /// Residuals of an evaluation; `None` where a feature is missing.
-#[must_use]
-pub fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f64>> {
+pub(crate) fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<Option<f64>> {
     residuals_against(objective.axes(), objective.targets(), evaluation)
 }
 
 /// The same against other targets; `None` also where one is not a number.
-#[must_use]
 pub(crate) fn residuals_against(
     axes: &[SearchAxis],
     targets: &[TargetValue],
@@ -120,8 +119,7 @@ pub(crate) fn residuals_against(
 }
 
 /// `d r / d u` at a point, where the cameras follow; zero where it is unknown.
-#[must_use]
-pub fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &FeatureSlopes) -> DMatrix<f64> {
+pub(crate) fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &FeatureSlopes) -> DMatrix<f64> {
     let (targets, features) = (objective.targets(), &centre.features);
     let cameras = CameraFit::estimate(targets, features);
     cameras.project_jacobian(
@@ -132,7 +130,6 @@ pub fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &FeatureSlop
 }
 
 /// What is estimated of the cameras at a point, with intervals where its slopes are known.
-#[must_use]
 pub(crate) fn camera_estimates(
     objective: &Objective,
     centre: &Evaluation,
@@ -175,7 +172,7 @@ fn jacobian_with_cameras_held(
 
 /// The linear model after a step, corrected such that it explains what the step did (Broyden, Math. Comput.
 /// 19 (1965) 577).
-pub fn broyden_update(
+pub(crate) fn broyden_update(
     jacobian: &mut DMatrix<f64>,
     before: &[Option<f64>],
     after: &[Option<f64>],
@@ -198,8 +195,7 @@ pub fn broyden_update(
 /// The step that a damped Gauss-Newton model suggests: `(J^T W J + damping) d = -J^T W r` with the weights
 /// `min(1, KNEE / |r|)^2` that belong to the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to
 /// a length at which it may hold. A coordinate that is `held` does not move.
-#[must_use]
-pub fn damped_step(
+pub(crate) fn damped_step(
     jacobian: &DMatrix<f64>,
     residuals: &[Option<f64>],
     damping: f64,
@@ -226,8 +222,7 @@ pub fn damped_step(
 }
 
 /// The point one step away, inside the box.
-#[must_use]
-pub fn step_in_box(unit: &[f64], step: &[f64]) -> Vec<f64> {
+pub(crate) fn step_in_box(unit: &[f64], step: &[f64]) -> Vec<f64> {
     unit.iter().zip(step).map(|(u, d)| clamp_unit(u + d)).collect()
 }
 
@@ -239,14 +234,14 @@ pub fn step_in_box(unit: &[f64], step: &[f64]) -> Vec<f64> {
 // directions alone.
 
 /// Half-width of a 95 % interval in standard deviations of a normal variable.
-pub const Z_95: f64 = 1.96;
+pub(crate) const Z_95: f64 = 1.96;
 /// Gain in cost that a parameter's 95 % interval spans (chi-squared of one degree of freedom).
 pub(crate) const CHI_SQUARED_95: f64 = 3.84;
 /// Smallest singular value, per length of the box, of an informative direction: its 95 % interval is as wide
 /// as the box.
 pub(crate) const MIN_INFORMATIVE: f64 = 2.0 * Z_95;
 /// Singular values below this share of the largest are rounding.
-pub const ROUNDING_SHARE: f64 = 1e-9;
+pub(crate) const ROUNDING_SHARE: f64 = 1e-9;
 /// Share (squared cosine) of uninformative directions in a parameter from which on the parameter is not
 /// determined.
 pub(crate) const OPEN_SHARE: f64 = 0.01;
@@ -255,7 +250,7 @@ const MIN_NAMED_EXPONENT: f64 = 0.05;
 
 /// Singular directions of a Jacobian in the space of the parameters.
 #[derive(Debug, Clone)]
-pub struct SingularDirections {
+pub(crate) struct SingularDirections {
     /// Singular value and direction, the most informative first; all of unit length and at right angles.
     all: Vec<(f64, Vec<f64>)>,
     /// Number of informative directions.
@@ -275,8 +270,7 @@ pub struct ParameterCombination {
 
 impl ParameterCombination {
     /// Such as `friction.c friction.a^0.31`.
-    #[must_use]
-    pub fn describe(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         let mut factors: Vec<(&String, f64)> = self.exponents.iter().map(|(name, e)| (name, *e)).collect();
         factors.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
         let factor = |(name, e): (&String, f64)| {
@@ -288,8 +282,7 @@ impl ParameterCombination {
 
 impl SingularDirections {
     /// Of a Jacobian, a column a parameter.
-    #[must_use]
-    pub fn from_jacobian(jacobian: &DMatrix<f64>) -> Self {
+    pub(crate) fn from_jacobian(jacobian: &DMatrix<f64>) -> Self {
         let columns = jacobian.ncols();
         // rows of zeros say nothing and make the decomposition complete
         let padded = jacobian.clone().resize_vertically(jacobian.nrows().max(columns), 0.0);
@@ -306,8 +299,7 @@ impl SingularDirections {
     }
 
     /// Largest singular value over the smallest; infinite where one is zero.
-    #[must_use]
-    pub fn condition_number(&self) -> f64 {
+    pub(crate) fn condition_number(&self) -> f64 {
         match (self.all.first(), self.all.last()) {
             (Some((largest, _)), Some((smallest, _))) if *smallest > ROUNDING_SHARE * largest => {
                 largest / smallest
@@ -317,8 +309,7 @@ impl SingularDirections {
     }
 
     /// Standard deviation of a coordinate from the informative directions, and its share in the others.
-    #[must_use]
-    pub fn coordinate_sd(&self, axis: usize) -> (f64, f64) {
+    pub(crate) fn coordinate_sd(&self, axis: usize) -> (f64, f64) {
         let component = |direction: &Vec<f64>| math::powi(direction.get(axis).copied().unwrap_or(0.0), 2);
         let (known, open) = self.all.split_at(self.rank);
         let variance: f64 =
@@ -327,20 +318,17 @@ impl SingularDirections {
     }
 
     /// Whether the informative directions determine a coordinate.
-    #[must_use]
-    pub fn determines(&self, axis: usize) -> bool {
+    pub(crate) fn determines(&self, axis: usize) -> bool {
         self.coordinate_sd(axis).1 < OPEN_SHARE
     }
 
     /// Directions that the features leave open.
-    #[must_use]
-    pub fn open_directions(&self) -> Vec<&[f64]> {
+    pub(crate) fn open_directions(&self) -> Vec<&[f64]> {
         self.all.iter().skip(self.rank).map(|(_, direction)| direction.as_slice()).collect()
     }
 
     /// Correlation of two estimates; `None` where either is not determined.
-    #[must_use]
-    pub fn correlation(&self, a: usize, b: usize) -> Option<f64> {
+    pub(crate) fn correlation(&self, a: usize, b: usize) -> Option<f64> {
         if !(self.determines(a) && self.determines(b)) {
             return None;
         }
@@ -356,8 +344,7 @@ impl SingularDirections {
 
     /// What is determined (most precise first) and what is left open, as products of powers at the point
     /// `unit`.
-    #[must_use]
-    pub fn combinations(
+    pub(crate) fn combinations(
         &self,
         names: &[String],
         axes: &[SearchAxis],

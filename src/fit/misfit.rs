@@ -105,8 +105,7 @@ impl StageMisfit {
 
 impl TraceMisfit {
     /// The judgement on what was found.
-    #[must_use]
-    pub fn judge(
+    pub(crate) fn judge(
         channels: Vec<ChannelMisfit>,
         stages: Vec<StageMisfit>,
         nuisances: &[NuisanceResult],
@@ -124,8 +123,7 @@ impl TraceMisfit {
     }
 
     /// The first sentence of everything that is said of the fit.
-    #[must_use]
-    pub fn headline(&self) -> String {
+    pub(crate) fn headline(&self) -> String {
         let chi2 = self.stages.last().map_or(f64::NAN, |stage| stage.chi2_per_dof);
         if self.explained {
             let chi2 = format_trimmed(chi2, DIGITS);
@@ -138,14 +136,12 @@ impl TraceMisfit {
 }
 
 /// The first sentence of a fit of which something speaks against the model.
-#[must_use]
-pub fn unexplained_headline(reasons: &[String]) -> String {
+pub(crate) fn unexplained_headline(reasons: &[String]) -> String {
     format!("The model does not explain the recording: {}", reasons.join("; "))
 }
 
 /// What is only explained by a camera or a constant that is not where it is thought to be, a sentence each.
-#[must_use]
-pub fn far_from_priors(nuisances: &[NuisanceResult]) -> Vec<String> {
+pub(crate) fn far_from_priors(nuisances: &[NuisanceResult]) -> Vec<String> {
     nuisances.iter().filter_map(far_from_prior).collect()
 }
 

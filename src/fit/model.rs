@@ -83,7 +83,7 @@ pub enum Restart {
 // The features of a model's recordings, averaged over its starting states.
 
 /// The features of a model's recordings.
-pub struct ModelFeatures<'a> {
+pub(crate) struct ModelFeatures<'a> {
     model: &'a dyn Model,
     /// With conditions counted among those that are read.
     features: Vec<Feature>,
@@ -95,8 +95,7 @@ pub struct ModelFeatures<'a> {
 impl<'a> ModelFeatures<'a> {
     /// Features with the targets to which peaks are assigned, averaged over `members` starting states (at
     /// least 1). Conditions of which nothing is read are not simulated.
-    #[must_use]
-    pub fn new(model: &'a dyn Model, features: &[Feature], targets: Vec<f64>, members: usize) -> Self {
+    pub(crate) fn new(model: &'a dyn Model, features: &[Feature], targets: Vec<f64>, members: usize) -> Self {
         let mut conditions: Vec<usize> = features.iter().map(|feature| feature.condition).collect();
         conditions.sort_unstable();
         conditions.dedup();
@@ -117,7 +116,7 @@ impl<'a> ModelFeatures<'a> {
     ///
     /// # Errors
     /// [`RunFailure`] of the first condition that fails.
-    pub fn read_features(
+    pub(crate) fn read_features(
         &self,
         values: &[f64],
         draw: Draw,

@@ -11,7 +11,7 @@ const RANGE_SD: f64 = 5.0;
 
 /// A constant that is freed, with what is known of it.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FreedConstant {
+pub(crate) struct FreedConstant {
     /// Key of the scene with its table.
     pub name: String,
     /// The scene's value, in its SI unit.
@@ -22,8 +22,7 @@ pub struct FreedConstant {
 
 impl FreedConstant {
     /// Lowest and highest value that it may take, in its SI unit.
-    #[must_use]
-    pub fn range(&self) -> [f64; 2] {
+    pub(crate) fn range(&self) -> [f64; 2] {
         let factor = math::exp(RANGE_SD * self.sd_relative);
         let [low, high] = [self.value / factor, self.value * factor];
         match find_parameter(&self.name).map(|parameter| parameter.range) {
@@ -78,7 +77,7 @@ pub enum NuisanceError {
 ///
 /// # Errors
 /// [`NuisanceError`] for one of a list that a scene does not have, or of which scenes differ.
-pub fn free_constants(job: &Job, scenes: &[Scene]) -> Result<Vec<FreedConstant>, NuisanceError> {
+pub(crate) fn free_constants(job: &Job, scenes: &[Scene]) -> Result<Vec<FreedConstant>, NuisanceError> {
     match &job.constants {
         Constants::Exact => Ok(Vec::new()),
         Constants::Listed(list) => list.iter().map(|one| free_listed_constant(one, job, scenes)).collect(),
@@ -141,7 +140,7 @@ fn is_constant(parameter: &ModelParameter) -> bool {
 ///
 /// # Errors
 /// [`NuisanceError::Scaling`].
-pub fn check_scaling(job: &Job, scenes: &[Scene]) -> Result<(), NuisanceError> {
+pub(crate) fn check_scaling(job: &Job, scenes: &[Scene]) -> Result<(), NuisanceError> {
     // a constant that is not free, or free within a prior, has a size of its own
     let is_held = |(name, _): (&str, f64)| match find_free_parameter(job, name) {
         // what is free is written as the job writes it: a stiffness as a frequency has no unit of mass

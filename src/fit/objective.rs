@@ -45,31 +45,26 @@ impl<'a> Objective<'a> {
     }
 
     /// The free parameters in job order.
-    #[must_use]
-    pub fn axes(&self) -> &[SearchAxis] {
+    pub(crate) fn axes(&self) -> &[SearchAxis] {
         &self.axes
     }
 
     /// Targets in job order.
-    #[must_use]
-    pub fn targets(&self) -> &[TargetValue] {
+    pub(crate) fn targets(&self) -> &[TargetValue] {
         &self.targets
     }
 
     /// Parameter values at a place in the unit box.
-    #[must_use]
-    pub fn values(&self, unit: &[f64]) -> Vec<f64> {
+    pub(crate) fn values(&self, unit: &[f64]) -> Vec<f64> {
         self.axes.iter().zip(unit).map(|(axis, u)| axis.bounds.from_unit(*u)).collect()
     }
 
     /// Runs the model at a place in the unit box; never fails and never panics.
-    #[must_use]
-    pub fn evaluate(&self, unit: &[f64]) -> Evaluation {
+    pub(crate) fn evaluate(&self, unit: &[f64]) -> Evaluation {
         self.evaluate_at(unit.to_vec(), self.values(unit))
     }
 
     /// Runs the model at parameter values, whose place in the unit box is not needed.
-    #[must_use]
     pub(crate) fn evaluate_values(&self, values: Vec<f64>) -> Evaluation {
         self.evaluate_at(Vec::new(), values)
     }
@@ -87,7 +82,6 @@ impl<'a> Objective<'a> {
     }
 
     /// What a point shows with its costs, which follow from its features or its failure and its values.
-    #[must_use]
     pub(crate) fn add_costs(&self, outcome: EvaluationOutcome) -> Evaluation {
         let EvaluationOutcome { unit, values, features, failure } = outcome;
         let priors: f64 = prior_residuals(&self.axes, &values)
@@ -105,7 +99,6 @@ impl<'a> Objective<'a> {
     }
 
     /// The same with the scatter of each feature, in its unit.
-    #[must_use]
     pub(crate) fn with_feature_scatter(&self, scatter: &[f64]) -> Self {
         let targets = self
             .targets
@@ -119,13 +112,12 @@ impl<'a> Objective<'a> {
     ///
     /// # Errors
     /// [`RunFailure`], also for a panic and for numbers that are not finite.
-    pub fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
+    pub(crate) fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
         catch_panic(|| self.model.simulate_twin(values, draw))
             .and_then(|features| self.check_features(features))
     }
 
     /// Numbers of cameras that are estimated at every point.
-    #[must_use]
     pub(crate) fn count_camera_unknowns(&self) -> usize {
         CameraFit::estimate(&self.targets, &[]).count_unknowns()
     }
@@ -185,13 +177,11 @@ fn first_stage_targets(targets: &[TargetValue], features: &[Observed]) -> (Vec<T
 const MAX_PRIOR_RESIDUAL: f64 = 1e6;
 
 /// Distance over its standard deviation, the spread over starting states included.
-#[must_use]
-pub fn residual(observation: &Observation, target: &TargetValue) -> f64 {
+pub(crate) fn residual(observation: &Observation, target: &TargetValue) -> f64 {
     target.distance(observation.value) / total_sd(observation, target)
 }
 
 /// Standard deviation of the distance: of the target and over starting states.
-#[must_use]
 pub(crate) fn total_sd(observation: &Observation, target: &TargetValue) -> f64 {
     math::hypot(target.relative_sd(), observation.spread / target.reference_size())
 }
@@ -208,7 +198,6 @@ fn missing_cost(target: &TargetValue) -> f64 {
 }
 
 /// A residual's share of the cost: its square, and beyond `LOSS_KNEE` a logarithm with the same slope there.
-#[must_use]
 pub(crate) fn robust_loss(residual: f64) -> f64 {
     let size = residual.abs();
     if size <= LOSS_KNEE {

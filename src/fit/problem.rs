@@ -181,20 +181,17 @@ impl Problem {
     }
 
     /// Each scene through the camera of its recording, or through the job's own.
-    #[must_use]
-    pub fn model(&self) -> &SceneModel {
+    pub(crate) fn model(&self) -> &SceneModel {
         &self.model
     }
 
     /// One for each condition of the job that has one.
-    #[must_use]
-    pub fn recordings(&self) -> &[Option<Recording>] {
+    pub(crate) fn recordings(&self) -> &[Option<Recording>] {
         &self.recordings
     }
 
     /// The traces that are fitted; none in a job on features alone.
-    #[must_use]
-    pub fn traces(&self) -> &[TraceData] {
+    pub(crate) fn traces(&self) -> &[TraceData] {
         &self.traces
     }
 
@@ -205,8 +202,7 @@ impl Problem {
     }
 
     /// Constants of the scenes that are freed within priors.
-    #[must_use]
-    pub fn constants(&self) -> &[FreedConstant] {
+    pub(crate) fn constants(&self) -> &[FreedConstant] {
         &self.constants
     }
 

@@ -47,19 +47,18 @@ const OVERSHOOT: f64 = 1.1;
 /// A bracket is narrow enough when its outer end costs no more than this many thresholds, in the root.
 const NARROW_BRACKET: f64 = 1.35;
 /// Nearer than this to a bound, in the unit box, a place lies at it: a search resolves no less.
-pub const AT_BOUND: f64 = 1e-3;
+pub(crate) const AT_BOUND: f64 = 1e-3;
 /// A step grows by this factor at most.
 const MAX_STEP_GROWTH: f64 = 3.0;
 
 /// The profile of one parameter.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ProfileLikelihood {
+pub(crate) struct ProfileLikelihood {
     /// Place in the unit interval and lowest cost there, from below to above, the best point included.
     pub points: Vec<(f64, f64)>,
     /// Where the cost crosses the threshold below; `None` where it does not within the range, or only because
     /// another parameter is at its bound there.
     pub lower: Option<f64>,
-    /// The same above.
     pub upper: Option<f64>,
 }
 
@@ -67,7 +66,7 @@ pub struct ProfileLikelihood {
 ///
 /// # Errors
 /// [`StopReason`] when the evaluations are used up or may not go on.
-pub fn profile_parameters(
+pub(crate) fn profile_parameters(
     ledger: &mut Ledger,
     best: &Evaluation,
     jacobian: &DMatrix<f64>,

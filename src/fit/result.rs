@@ -30,8 +30,7 @@ pub enum FitStatus {
 
 impl FitStatus {
     /// The word in files and summaries.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Converged => "converged",
             Self::BudgetExhausted => "budget-exhausted",
@@ -69,8 +68,7 @@ pub struct ParameterResult {
 
 impl ParameterResult {
     /// Whether the 95 % interval has both ends, and the linear model knows how it goes with the others.
-    #[must_use]
-    pub fn has_interval(&self) -> bool {
+    pub(crate) fn has_interval(&self) -> bool {
         self.linear_95.is_some() && self.lower_95.is_some() && self.upper_95.is_some()
     }
 }
@@ -217,8 +215,7 @@ pub struct FeatureResult {
 
 impl FeatureResult {
     /// The model's value, as its camera shows it where that is estimated.
-    #[must_use]
-    pub fn value_seen(&self) -> Option<f64> {
+    pub(crate) fn value_seen(&self) -> Option<f64> {
         self.model_seen.or(self.model)
     }
 }
@@ -321,8 +318,7 @@ impl FitResult {
     }
 
     /// Estimates of the job's parameters, in their order.
-    #[must_use]
-    pub fn parameter_estimates(&self, job: &Job) -> Vec<f64> {
+    pub(crate) fn parameter_estimates(&self, job: &Job) -> Vec<f64> {
         let estimate = |p: &FreeParameter| self.parameters.get(&p.name).map_or(f64::NAN, |p| p.estimate);
         job.parameters.iter().map(estimate).collect()
     }

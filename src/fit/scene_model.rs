@@ -76,14 +76,11 @@ impl SceneModel {
     }
 
     /// The same for other conditions.
-    #[must_use]
     pub(super) fn with_conditions(&self, conditions: Vec<ModelCondition>) -> Self {
         Self { conditions, names: self.names.clone(), plausible: self.plausible }
     }
 
-    /// The conditions.
-    #[must_use]
-    pub fn conditions(&self) -> &[ModelCondition] {
+    pub(crate) fn conditions(&self) -> &[ModelCondition] {
         &self.conditions
     }
 
@@ -91,7 +88,7 @@ impl SceneModel {
     ///
     /// # Errors
     /// The scene's refusal, as a failure of the run.
-    pub fn scene_at(&self, values: &[f64], condition: usize) -> Result<Scene, RunFailure> {
+    pub(crate) fn scene_at(&self, values: &[f64], condition: usize) -> Result<Scene, RunFailure> {
         let scene = self.condition(condition)?.scene.clone();
         let set = |scene: Scene, (name, value): (&String, &f64)| scene.with_parameter(name, *value);
         self.names

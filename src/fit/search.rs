@@ -17,10 +17,10 @@ mod termination;
 use super::evaluation::{Evaluation, EvaluationStage};
 use super::ledger::{Ledger, StopReason};
 pub(super) use excluded_region_search::{Slab, best_in_slab, search_excluded_region};
-pub use local::polish_best;
+pub(crate) use local::polish_best;
 use local::search_locally;
 use population::search_with_populations;
-pub(crate) use termination::{EXACT_COST, MIN_WORTHWHILE_GAIN};
+pub use termination::{EXACT_COST, MIN_WORTHWHILE_GAIN};
 pub use termination::{LocalDescent, SIMPLEX_COST_SPREAD, SearchOutcome, SearchTermination};
 
 /// Searches within the budgets of `settings` and `limit` evaluations in all.

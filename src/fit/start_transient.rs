@@ -75,7 +75,6 @@ impl ConditionFeatures<'_> {
 
 /// A sentence for each condition in whose features the start of its scene shows. `targets` count as much as
 /// at the end of the fit; `names` are those of the conditions.
-#[must_use]
 pub(super) fn start_notes(
     model: &dyn Model,
     names: &[String],

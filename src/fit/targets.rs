@@ -156,7 +156,7 @@ fn not_measurable_error(aim: &FitTarget, measured: &[Option<Recording>], problem
 
 /// Ratio of model and target beyond which a residual no longer grows: two decades, more than any two bounds
 /// of a physical feature, so that every value found beats a missing one.
-pub const MAX_RATIO: f64 = 100.0;
+pub(crate) const MAX_RATIO: f64 = 100.0;
 
 /// Least relative standard deviation in the first stage: far from the targets everything is missed by many
 /// deviations, and the most precise features would outvote the others.
@@ -184,14 +184,12 @@ pub struct TargetValue {
 impl TargetValue {
     /// Standard deviation of the residual's numerator, the model's scatter included, in units of
     /// [`Self::reference_size`].
-    #[must_use]
     pub(crate) fn relative_sd(&self) -> f64 {
         math::hypot(self.sd, self.scatter) / self.reference_size()
     }
 
     /// Distance of a value from the target in units of [`Self::reference_size`], stopped at the logarithm of [`MAX_RATIO`].
-    #[must_use]
-    pub fn distance(&self, value: f64) -> f64 {
+    pub(crate) fn distance(&self, value: f64) -> f64 {
         let most = math::ln(MAX_RATIO);
         match self.measure {
             ValueComparison::Log => {
@@ -204,7 +202,6 @@ impl TargetValue {
 
     /// Distance of one value from another, as [`Self::distance`] has it; zero where no logarithm can be
     /// taken.
-    #[must_use]
     pub(crate) fn distance_between(&self, value: f64, from: f64) -> f64 {
         match self.measure {
             ValueComparison::Log => {
@@ -223,8 +220,7 @@ impl TargetValue {
 
     /// What a relative change refers to, in the feature's unit: the target's size, or the scale of its
     /// differences.
-    #[must_use]
-    pub fn reference_size(&self) -> f64 {
+    pub(crate) fn reference_size(&self) -> f64 {
         match self.measure {
             ValueComparison::Log => self.value.abs(),
             ValueComparison::Linear { scale } => scale,

@@ -7,18 +7,16 @@ use crate::{checkpoint, math};
 use serde::{Deserialize, Serialize};
 
 /// The journal of a trace fit.
-pub type TraceCheckpoint = checkpoint::CheckpointFile<IterateRecord>;
-/// Its header.
-pub type TraceHeader = checkpoint::CheckpointHeader<TraceHeaderBody>;
+pub(crate) type TraceCheckpoint = checkpoint::CheckpointFile<IterateRecord>;
+pub(crate) type TraceHeader = checkpoint::CheckpointHeader<TraceHeaderBody>;
 
 /// One iterate of one search in a journal.
 #[derive(Debug, Clone, PartialEq)]
-pub struct IterateRecord {
+pub(crate) struct IterateRecord {
     /// Number of its chain: that of its start, from 0, or of a [`Branch`](super::trace::Branch).
     pub start: usize,
     /// Which iterate of that search, from 0: each follows from the one before.
     pub step: usize,
-    /// What it holds.
     pub iterate: Iterate,
 }
 
@@ -111,7 +109,7 @@ impl CheckpointRecord for IterateRecord {
 /// An iterate as it stands in a line.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct Row {
+pub(crate) struct Row {
     index: usize,
     start: usize,
     step: usize,
@@ -198,7 +196,7 @@ impl SegmentRow {
 /// What the header of a trace fit says besides.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct TraceHeaderBody {
+pub(crate) struct TraceHeaderBody {
     /// Seed of the job.
     pub seed: u64,
     /// Names of the recordings, in the order of their numbers.
@@ -212,7 +210,7 @@ pub struct TraceHeaderBody {
 /// Something that is estimated, and what its coordinate means.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct HeaderCoordinate {
+pub(crate) struct HeaderCoordinate {
     /// Key of the scene, or the recording and what of its camera.
     pub name: String,
     /// Unit of its value.
@@ -229,8 +227,7 @@ pub struct HeaderCoordinate {
 
 impl HeaderCoordinate {
     /// An unknown of a fit to these recordings.
-    #[must_use]
-    pub fn from_unknown(unknown: &TraceUnknown, recordings: &[String]) -> Self {
+    pub(crate) fn from_unknown(unknown: &TraceUnknown, recordings: &[String]) -> Self {
         let (name, unit) = match &unknown.kind {
             UnknownKind::Parameter { name, .. } => {
                 (name.clone(), parameters::find_parameter(name).map_or("1", |row| row.unit).to_owned())
@@ -254,15 +251,13 @@ impl HeaderCoordinate {
     }
 
     /// The value at a coordinate, in its unit.
-    #[must_use]
-    pub fn value(&self, coordinate: f64) -> f64 {
+    pub(crate) fn value(&self, coordinate: f64) -> f64 {
         self.per_unit.map_or_else(|| math::exp(coordinate), |unit| coordinate * unit.0)
     }
 }
 
 /// Key of a number of a camera in files, its unit included.
-#[must_use]
-pub fn camera_unknown_name(what: CameraUnknown) -> &'static str {
+pub(crate) fn camera_unknown_name(what: CameraUnknown) -> &'static str {
     match what {
         CameraUnknown::OffsetX => "offset_x_m",
         CameraUnknown::OffsetDrop => "offset_drop_m",

@@ -10,20 +10,19 @@ use std::ops::Range;
 
 /// Lengths of segments unless the job says otherwise, s: from 4 ms on, the first converges from the middle of
 /// the bounds, and the last is as long as starting states are carried over safely.
-pub const DEFAULT_SEGMENT_S: [f64; 3] = [0.004, 0.008, 0.016];
+pub(crate) const DEFAULT_SEGMENT_S: [f64; 3] = [0.004, 0.008, 0.016];
 /// Frames a second below which one more stage has segments of [`EXTRA_SEGMENT_S`]: with few frames the bias of short
 /// segments is larger.
 const SLOW_HZ: f64 = 4_000.0;
-/// Its length, s.
 const EXTRA_SEGMENT_S: f64 = 0.032;
 /// Fewest frames of a segment: four of them pay for the starting state.
-pub const MIN_SEGMENT_FRAMES: usize = 8;
+pub(crate) const MIN_SEGMENT_FRAMES: usize = 8;
 /// Fewest frames in which a channel is tracked: a handful more than one segment has.
 const MIN_TRACKED_FRAMES: usize = 10;
 
 /// A trace with everything that its recording decides.
 #[derive(Debug, Clone, PartialEq)]
-pub struct TraceData {
+pub(crate) struct TraceData {
     /// Number of its condition, from 0.
     pub condition: usize,
     /// What is fitted, at least one.
@@ -58,7 +57,7 @@ type TraceRefusal = (&'static str, String);
 ///
 /// # Errors
 /// [`TraceError`] at the first that does not fit.
-pub fn prepare_traces(
+pub(crate) fn prepare_traces(
     job: &Job,
     scenes: &[Scene],
     recordings: &[Option<Recording>],

@@ -14,7 +14,7 @@ use std::ops::ControlFlow;
 
 /// How far a trace fit has come.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct TraceProgress {
+pub(crate) struct TraceProgress {
     /// Number of the chain: that of the start, or of a [`UncertaintyRun`].
     pub start: usize,
     /// Iterates of all searches so far, those of the journal included.
@@ -27,7 +27,6 @@ pub struct TraceProgress {
     pub cost: f64,
     /// Segments that fit worse than noise ever does.
     pub bad_segments: usize,
-    /// All segments.
     pub segments: usize,
 }
 
@@ -44,11 +43,11 @@ impl From<TraceProgress> for FitProgress {
 }
 
 /// Called with every iterate; `Break` ends the fit, and what was found so far is kept.
-pub type OnIterate<'a> = dyn FnMut(&TraceProgress) -> ControlFlow<()> + Send + 'a;
+pub(crate) type OnIterate<'a> = dyn FnMut(&TraceProgress) -> ControlFlow<()> + Send + 'a;
 
 /// Why no more iterates are made.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum TraceStopReason {
+pub(crate) enum TraceStopReason {
     /// It was asked to stop.
     Interrupted,
     /// As many iterates as were allowed have been made.
@@ -58,7 +57,7 @@ pub enum TraceStopReason {
 }
 
 /// The iterates of all searches of a trace fit, and where they are written.
-pub struct TraceLedger<'a> {
+pub(crate) struct TraceLedger<'a> {
     journal: &'a mut dyn CheckpointSink,
     on_iterate: &'a mut OnIterate<'a>,
     /// Iterates of the journal that is resumed.
@@ -80,7 +79,7 @@ impl<'a> TraceLedger<'a> {
     ///
     /// # Errors
     /// [`FitError`] when the journal is that of another fit.
-    pub fn new(
+    pub(crate) fn new(
         header: &TraceHeader,
         resume: Option<(&str, &TraceCheckpoint)>,
         most: usize,
@@ -100,20 +99,17 @@ impl<'a> TraceLedger<'a> {
     }
 
     /// Iterates so far, those of the journal included.
-    #[must_use]
-    pub fn count_iterates(&self) -> usize {
+    pub(crate) fn count_iterates(&self) -> usize {
         self.counts.values().sum()
     }
 
     /// The same of one start, from 0.
-    #[must_use]
-    pub fn count_start_iterates(&self, start: usize) -> usize {
+    pub(crate) fn count_start_iterates(&self, start: usize) -> usize {
         self.counts.get(&start).copied().unwrap_or(0)
     }
 
     /// Why nothing more was made.
-    #[must_use]
-    pub fn stop_reason(&self) -> Option<&TraceStopReason> {
+    pub(crate) fn stop_reason(&self) -> Option<&TraceStopReason> {
         self.stopped.as_ref()
     }
 
@@ -185,7 +181,7 @@ impl Checkpoint for TraceLedger<'_> {
 ///
 /// # Errors
 /// [`FitError::Journal`] with the line that differs.
-pub fn recheck_iterates(
+pub(crate) fn recheck_iterates(
     file: &str,
     journal: &TraceCheckpoint,
     next: impl Fn(usize, Option<&Iterate>) -> Option<Iterate>,

@@ -32,7 +32,7 @@ impl Problem {
     ///
     /// # Errors
     /// [`FitError`]; a search that stops early or does not converge is a result and says so.
-    pub fn fit_traces(
+    pub(crate) fn fit_traces(
         &self,
         resume: Option<(&str, &TraceCheckpoint)>,
         most: Option<usize>,
@@ -130,7 +130,7 @@ pub(super) struct TraceFindings<'a, 'l> {
 
 impl TraceFindings<'_, '_> {
     /// The result, but for what the whole run shows; `None` where no search came anywhere.
-    pub fn into_result(self) -> Option<FitResult> {
+    pub(crate) fn into_result(self) -> Option<FitResult> {
         let job = self.problem.job();
         let best = self.searched.descents.get(self.searched.best)?;
         let end = best.last_iterate()?;

@@ -9,7 +9,7 @@ mod verdicts;
 
 pub(crate) use super::linear_model::CHI_SQUARED_95;
 pub(crate) use rivals::confirm_identified;
-pub use verdicts::FeatureWeights;
+pub(crate) use verdicts::FeatureWeights;
 pub(super) use verdicts::stored_verdicts;
 pub(crate) use verdicts::weigh_features;
 
@@ -67,14 +67,12 @@ impl ParameterVerdict {
 
 /// Estimate and interval of one parameter, in its own SI unit.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ParameterInterval {
-    /// Best value.
+pub(crate) struct ParameterInterval {
     pub estimate: f64,
     /// Lower end of the 95 % interval; `None` where the features give none.
     pub lower_95: Option<f64>,
     /// Upper end of the 95 % interval; `None` where the features give none.
     pub upper_95: Option<f64>,
-    /// What is known.
     pub verdict: ParameterVerdict,
     /// Lower and upper end by the linear model at the best point, where it determines the parameter.
     pub linear_95: Option<[f64; 2]>,
@@ -99,8 +97,7 @@ impl ParameterInterval {
 
 /// Everything found at the best point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FitUncertainty {
-    /// The best point.
+pub(crate) struct FitUncertainty {
     pub best: Evaluation,
     /// One a parameter, in job order.
     pub intervals: Vec<ParameterInterval>,
@@ -129,7 +126,6 @@ pub struct FitUncertainty {
 }
 
 /// The warning that fewer informative features than parameters deserve, before a search or after it.
-#[must_use]
 pub(crate) fn count_warning(features: usize, rank: Option<usize>, parameters: usize) -> Option<String> {
     let known = rank.map_or(features, |rank| rank.min(features));
     if known >= parameters {
@@ -149,7 +145,6 @@ pub(crate) fn count_warning(features: usize, rank: Option<usize>, parameters: us
 
 /// Assesses the ledger's best point; `None` when the ledger is empty. A better point that is met on the way
 /// is polished with at most `polishing` evaluations and assessed instead.
-#[must_use]
 pub(crate) fn assess_best(
     ledger: &mut Ledger,
     names: &[String],
@@ -210,7 +205,6 @@ fn keep_or_note<T>(found: Option<Result<T, StopReason>>, what: &str, notes: &mut
 }
 
 /// An assessment of a point around which nothing could be evaluated.
-#[must_use]
 pub(crate) fn unassessed_point(objective: &Objective, best: &Evaluation, why: &str) -> FitUncertainty {
     let open = |estimate: &f64| ParameterInterval {
         estimate: *estimate,
@@ -242,8 +236,12 @@ pub(crate) fn unassessed_point(objective: &Objective, best: &Evaluation, why: &s
 impl FitUncertainty {
     /// The same, where nothing is called identified if the search had not come to its end, or no other local
     /// search came to the best point; `ends` are where they ended.
-    #[must_use]
-    pub fn with_search_doubts(self, converged: bool, objective: &Objective, ends: &[Evaluation]) -> Self {
+    pub(crate) fn with_search_doubts(
+        self,
+        converged: bool,
+        objective: &Objective,
+        ends: &[Evaluation],
+    ) -> Self {
         if !converged {
             return self.withhold_intervals(SEARCH_UNFINISHED.to_owned());
         }
@@ -255,8 +253,7 @@ impl FitUncertainty {
     }
 
     /// The same, where nothing is called identified for a reason that speaks against the model.
-    #[must_use]
-    pub fn with_model_objection(mut self, why: Option<String>) -> Self {
+    pub(crate) fn with_model_objection(mut self, why: Option<String>) -> Self {
         if let Some(why) = why {
             let known = self.intervals.iter_mut().filter(|i| i.verdict == ParameterVerdict::Identified);
             known.for_each(|interval| interval.withdraw_verdict(why.clone()));

@@ -3,7 +3,7 @@
 use super::error::ImportError;
 use super::options::ImportOptions;
 use super::{Import, ImportReport, ImportSource, base_name, preserved_files};
-use crate::import::options::{CoordinateScale};
+use crate::import::options::CoordinateScale;
 use crate::import::reader::calibration::{ImportCalibration, calibrate};
 use crate::import::reader::encoding::DecodedText;
 use crate::import::reader::findings::new_finding;

@@ -22,7 +22,7 @@ use super::error::ImportError;
 use super::options::ImportOptions;
 use super::reader::Document;
 use super::reader::track_file::TrackFile;
-use crate::import::reader::{new_finding};
+use crate::import::reader::new_finding;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::toml_file;
 
@@ -205,7 +205,6 @@ fn unrecognised_error(document: &Document) -> ImportError {
 
 // What a file format has to say: one implementation a file in `formats/`.
 
-/// One file format.
 pub(crate) trait FileFormat: Sync {
     /// Its name on the command line.
     fn name(&self) -> &'static str;

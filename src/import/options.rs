@@ -101,8 +101,7 @@ impl CoordinateScale {
     }
 
     /// Metres of one unit of the file.
-    #[must_use]
-    pub fn metres(self) -> f64 {
+    pub(crate) fn metres(self) -> f64 {
         match self {
             Self::MetresPerPixel(metres) | Self::Unit(metres) => metres,
         }
@@ -131,7 +130,6 @@ impl std::fmt::Display for ColumnName {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ColumnMap(pub Vec<(&'static str, ColumnName)>);
 
-/// Keys of `--columns`.
 pub(crate) const COLUMN_KEYS: [&str; 13] = [
     "frame",
     "time",
@@ -207,8 +205,7 @@ impl ColumnMap {
     }
 
     /// The column of `key`.
-    #[must_use]
-    pub fn get(&self, key: &str) -> Option<&ColumnName> {
+    pub(crate) fn get(&self, key: &str) -> Option<&ColumnName> {
         self.0.iter().find(|(known, _)| *known == key).map(|(_, column)| column)
     }
 }
@@ -243,7 +240,7 @@ impl ImportOptions {
     ///
     /// # Errors
     /// [`ImportError::Option`] for another point, or one given before.
-    pub fn add_point(&mut self, text: &str) -> Result<(), ImportError> {
+    pub(crate) fn add_point(&mut self, text: &str) -> Result<(), ImportError> {
         let refuse = |expected: &str| ImportError::option("--point", text, expected);
         let (point, track) = text
             .split_once('=')
@@ -272,7 +269,7 @@ const RATES_HZ: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
 ///
 /// # Errors
 /// [`ImportError::Option`] naming the option.
-pub fn check_options(options: &ImportOptions) -> Result<(), ImportError> {
+pub(crate) fn check_options(options: &ImportOptions) -> Result<(), ImportError> {
     let positive = [("--frame-rate-hz", options.frame_rate_hz), ("--exposure-s", options.exposure_s)];
     for (option, value) in positive {
         if let Some(found) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {

@@ -10,7 +10,7 @@ const FIVE_POINT_RULE: [(f64, f64); 5] = [
 ];
 
 /// Nodes between two limits, with their weights, both in the unit of the limits.
-pub fn nodes_and_weights(from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
+pub(crate) fn nodes_and_weights(from: f64, to: f64) -> impl Iterator<Item = (f64, f64)> {
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
     FIVE_POINT_RULE.into_iter().map(move |(node, weight)| (middle + half * node, half * weight))
 }

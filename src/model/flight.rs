@@ -135,8 +135,7 @@ impl Linkage {
 
     /// Impulse along the sweep by which the drive keeps the head's velocity while the links' rates change by
     /// `rates`, rad/s, under a tangential impulse on the tip, N s.
-    #[must_use]
-    pub fn drive_impulse_n_s(&self, d: &LinkDirections, rates: [f64; 2], tangential_n_s: f64) -> f64 {
+    pub(crate) fn drive_impulse_n_s(&self, d: &LinkDirections, rates: [f64; 2], tangential_n_s: f64) -> f64 {
         self.m_a * d.cos_theta * rates[0] + self.m_b * d.cos_phi * rates[1] - tangential_n_s
     }
 }

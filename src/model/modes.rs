@@ -33,12 +33,9 @@ pub struct NaturalMode {
 
 /// The three single-body natural frequencies that the paper names, Hz.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct BodyFrequencies {
-    /// `sqrt(k0/M)/2 pi`.
+pub(crate) struct BodyFrequencies {
     pub head_hz: f64,
-    /// `sqrt(k1/m_theta)/2 pi`.
     pub neck_hz: f64,
-    /// `sqrt(k2/m_phi)/2 pi`.
     pub lip_hz: f64,
 }
 
@@ -52,8 +49,7 @@ pub enum TipConstraint {
 }
 
 /// The named frequencies of a blade.
-#[must_use]
-pub fn body_frequencies(blade: &Linkage) -> BodyFrequencies {
+pub(crate) fn body_frequencies(blade: &Linkage) -> BodyFrequencies {
     BodyFrequencies {
         head_hz: natural_frequency_hz(blade.head.stiffness, blade.mass_kg),
         neck_hz: natural_frequency_hz(blade.neck.stiffness, blade.m_theta),

@@ -33,8 +33,7 @@ impl ParameterRange {
     }
 
     /// The range in words.
-    #[must_use]
-    pub fn describe(self) -> String {
+    pub(crate) fn describe(self) -> String {
         match self {
             Self::Positive => "a number above 0".to_owned(),
             Self::NotNegative => "a number of 0 or more".to_owned(),
@@ -170,27 +169,23 @@ pub fn parameter_names() -> Vec<&'static str> {
 }
 
 /// Natural frequency `sqrt(stiffness/inertia)/2 pi`, Hz.
-#[must_use]
 pub(crate) fn natural_frequency_hz(stiffness: f64, inertia: f64) -> f64 {
     (stiffness / inertia).sqrt() / TAU
 }
 
 /// Stiffness that gives an inertia this natural frequency.
-#[must_use]
-pub fn stiffness_from_frequency(frequency_hz: f64, inertia: f64) -> f64 {
+pub(crate) fn stiffness_from_frequency(frequency_hz: f64, inertia: f64) -> f64 {
     inertia * math::powi(TAU * frequency_hz, 2)
 }
 
 /// Damping of `ratio` times the critical one, `2 sqrt(stiffness inertia)`.
-#[must_use]
-pub fn damping_from_ratio(ratio: f64, stiffness: f64, inertia: f64) -> f64 {
+pub(crate) fn damping_from_ratio(ratio: f64, stiffness: f64, inertia: f64) -> f64 {
     2.0 * ratio * (stiffness * inertia).sqrt()
 }
 
 /// The value of a parameter that a blade was given in the other way; `None` where a name has no second way or
 /// the blade no such part.
-#[must_use]
-pub fn convert_value(name: &str, blade: &Linkage) -> Option<f64> {
+pub(crate) fn convert_value(name: &str, blade: &Linkage) -> Option<f64> {
     let ratio =
         |spring: &Spring, inertia: f64| spring.damping / damping_from_ratio(1.0, spring.stiffness, inertia);
     let (mass, theta, phi) = (blade.mass_kg, blade.m_theta, blade.m_phi);
@@ -233,13 +228,12 @@ pub fn convert_value(name: &str, blade: &Linkage) -> Option<f64> {
 ///
 /// The equations of motion keep their solution if all of these are multiplied by one factor, so that any
 /// length of blade will do.
-pub const SAME_LENGTH_ADVICE: &str = "Masses, inertias, stiffnesses, dampings and the preload are all for one and \
+pub(crate) const SAME_LENGTH_ADVICE: &str = "Masses, inertias, stiffnesses, dampings and the preload are all for one and \
                                the same length of blade: the whole blade, the piece on the rig, or one metre.";
 
 impl ParameterQuantity {
     /// How the quantity is measured, in one sentence.
-    #[must_use]
-    pub fn measurement_method(self) -> &'static str {
+    pub(crate) fn measurement_method(self) -> &'static str {
         match self {
             Self::HeadMass => "weigh everything that moves with the head: upper profile, spring strip, claws",
             Self::NeckMass => "density times cross section times length of blade, or weigh a neck cut free",

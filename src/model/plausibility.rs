@@ -41,7 +41,7 @@ pub struct UnitSlip {
 }
 
 /// Values by key; `None` for what is not there.
-pub type ValueLookup<'a> = dyn Fn(&str) -> Option<f64> + 'a;
+pub(crate) type ValueLookup<'a> = dyn Fn(&str) -> Option<f64> + 'a;
 
 /// What is held against a range.
 #[derive(Debug, Clone, Copy)]
@@ -80,8 +80,7 @@ pub struct PlausibleRange {
 ///
 /// `written` gives the key under which a file has the quantity of another key; a quantity that is written
 /// another way is judged like a derived one.
-#[must_use]
-pub fn find_implausible(
+pub(crate) fn find_implausible(
     table: &[PlausibleRange],
     value: &ValueLookup<'_>,
     written: &dyn Fn(&'static str) -> &'static str,

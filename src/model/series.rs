@@ -23,7 +23,7 @@ pub(super) type LinkPair = [f64; 2];
 
 /// How the tip touches the glass while the motion is expanded.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum ContactMode {
+pub(crate) enum ContactMode {
     /// It slides in this direction, +1 or -1.
     Slip(f64),
     /// It is held at its place.
@@ -132,7 +132,6 @@ struct ProductSums {
 #[derive(Debug, Clone)]
 pub(super) struct RecurrenceConstants {
     pub l: LinkPair,
-    /// `m_a`, `m_b`.
     pub m: LinkPair,
     /// `m_a - M l1`, `m_b - M l2`: what the normal force takes of `q'`.
     pub arm: LinkPair,
@@ -167,7 +166,7 @@ pub(super) struct RecurrenceConstants {
 
 impl<const K: usize> MotionSeries<K> {
     /// Coefficients up to `x^order` of the motion from `pose`; `self.head_velocity` holds those of the head.
-    pub fn expand(
+    pub(crate) fn expand(
         &mut self,
         linkage: &Linkage,
         touch: ContactMode,
@@ -193,22 +192,19 @@ impl<const K: usize> MotionSeries<K> {
 
     /// Cosines of both angles, coefficient `k`.
     #[inline]
-    #[must_use]
-    pub fn cosines(&self, k: usize) -> [f64; 2] {
+    pub(crate) fn cosines(&self, k: usize) -> [f64; 2] {
         self.left[k].cos
     }
 
     /// Sines of both angles, coefficient `k`.
     #[inline]
-    #[must_use]
-    pub fn sines(&self, k: usize) -> [f64; 2] {
+    pub(crate) fn sines(&self, k: usize) -> [f64; 2] {
         self.left[k].sin
     }
 
     /// Normal force, N, coefficient `k`.
     #[inline]
-    #[must_use]
-    pub fn normal_n(&self, k: usize) -> f64 {
+    pub(crate) fn normal_n(&self, k: usize) -> f64 {
         self.right[k].slip[0]
     }
 

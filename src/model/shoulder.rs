@@ -37,8 +37,7 @@ impl Shoulder {
     }
 
     /// Energy stored in the shoulder at the neck angle `theta`, J.
-    #[must_use]
-    pub fn energy_j(&self, theta: f64) -> f64 {
+    pub(crate) fn energy_j(&self, theta: f64) -> f64 {
         0.5 * self.stiffness_n_m_per_rad * math::powi((theta.abs() - self.contact_angle_rad).max(0.0), 2)
     }
 }

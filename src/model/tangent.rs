@@ -27,15 +27,15 @@ mod motion_samples;
 use super::Linkage;
 use super::series::{ContactMode, MotionSeries};
 use super::shoulder::ShoulderContact;
-pub use forcing::{ForcingTerms, HeadMotionChange};
-pub use lane_vector::{LANES, LaneVector};
+pub(crate) use forcing::{ForcingTerms, HeadMotionChange};
+pub(crate) use lane_vector::{LANES, LaneVector};
 pub use linear_forms::{LinearForm, ModelChannel};
 pub use linkage_tangent::{LinkageConstant, LinkageTangent, SpringTangent};
-pub use motion_samples::{LinkAttitudes, MotionSamples, fill_lanes};
+pub(crate) use motion_samples::{LinkAttitudes, MotionSamples, fill_lanes};
 
 /// Derivatives of the state at the start of a step.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct StateTangent {
+pub(crate) struct StateTangent {
     /// Of the angles of neck and lip, rad over the unit of the direction, and so on.
     pub angle: [LaneVector; 2],
     /// Of the angular rates, rad/s.
@@ -53,14 +53,13 @@ pub(super) type LaneVectorPair = [LaneVector; 2];
 
 /// A motion whose variation is asked for; `K` is that of its series.
 #[derive(Debug, Clone, Copy)]
-pub struct ReferenceMotion<'a, const K: usize> {
+pub(crate) struct ReferenceMotion<'a, const K: usize> {
     /// The linkage that moves.
     pub linkage: &'a Linkage,
     /// How its tip touches the glass.
     pub touch: ContactMode,
     /// On which side its neck leans.
     pub lean: ShoulderContact,
-    /// Its series.
     pub motion: &'a MotionSeries<K>,
 }
 
@@ -101,18 +100,16 @@ pub(super) fn sum_over_links(weights: [f64; 2], rows: &LaneVectorPair) -> LaneVe
 /// Matrices of the derivatives' second, first and own values at a few instants: equations by unknowns, the
 /// third of both in flight alone.
 #[derive(Debug, Clone)]
-pub struct TangentMatrices {
+pub(crate) struct TangentMatrices {
     /// Of the second derivatives in time.
     pub mass: [[LaneVector; 3]; 3],
-    /// Of the first.
     pub damping: [[LaneVector; 3]; 3],
-    /// Of the values.
     pub stiffness: [[LaneVector; 3]; 3],
 }
 
 /// The one equation of a tip that sticks, without the force that holds it: `y2` follows from `y1`.
 #[derive(Debug, Clone, Copy)]
-pub struct StickEquation {
+pub(crate) struct StickEquation {
     /// Factors of `y1''`, `y1'` and `y1`.
     pub first: [LaneVector; 3],
     /// What the same of `y2` would be multiplied by.
@@ -138,8 +135,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     }
 
     /// The matrices at these instants; in stick without the force that holds the tip.
-    #[must_use]
-    pub fn tangent_matrices(&self, at: &MotionSamples) -> TangentMatrices {
+    pub(crate) fn tangent_matrices(&self, at: &MotionSamples) -> TangentMatrices {
         let linkage = self.linkage;
         let (l, m, arms, m_c) = (self.lengths(), self.moments(), self.arms(), linkage.m_c);
         let inertias = [linkage.m_theta, linkage.m_phi];
@@ -233,8 +229,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     }
 
     /// The one equation of stick.
-    #[must_use]
-    pub fn stick_equation(&self, matrices: &TangentMatrices) -> StickEquation {
+    pub(crate) fn stick_equation(&self, matrices: &TangentMatrices) -> StickEquation {
         let l = self.lengths();
         let ratio = l[0] / l[1];
         let column = |m: &[[LaneVector; 3]; 3], j: usize| l[1] * m[0][j] - l[0] * m[1][j];

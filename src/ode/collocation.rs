@@ -20,17 +20,16 @@ use std::ops::{Add, Mul, Sub};
 use std::sync::LazyLock;
 
 /// Nodes of a step at most.
-pub const MOST_NODES: usize = 12;
+pub(crate) const MOST_NODES: usize = 12;
 /// Nodes of a step at least.
-pub const LEAST_NODES: usize = 3;
+pub(crate) const LEAST_NODES: usize = 3;
 
 /// One number a node.
-pub type NodeArray<T> = [T; MOST_NODES];
+pub(crate) type NodeArray<T> = [T; MOST_NODES];
 
 /// The nodes of a step and what they integrate.
 #[derive(Debug, Clone)]
-pub struct CollocationRule {
-    /// Their number.
+pub(crate) struct CollocationRule {
     pub nodes: usize,
     /// Where they lie on [0, 1].
     pub positions: NodeArray<f64>,
@@ -48,18 +47,18 @@ static RULES: LazyLock<Vec<CollocationRule>> =
     LazyLock::new(|| (0..=MOST_NODES).map(CollocationRule::new).collect());
 
 /// The rule of this many nodes, at most [`MOST_NODES`].
-#[must_use]
-pub fn collocation_rule(nodes: usize) -> &'static CollocationRule {
+pub(crate) fn collocation_rule(nodes: usize) -> &'static CollocationRule {
     &RULES[nodes]
 }
 
 /// Numbers that are computed side by side: one, or one a lane.
-pub trait LaneNumber: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> {
+pub(crate) trait LaneNumber:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
+{
     /// The same number in every lane.
     fn splat(x: f64) -> Self;
 
     /// All of them times the same.
-    #[must_use]
     fn scale_by(self, factor: f64) -> Self;
 }
 
@@ -99,8 +98,7 @@ impl CollocationRule {
     }
 
     /// Integrals from 0 to `x` on [0, 1] of each `l_j`, once and twice.
-    #[must_use]
-    pub fn integrals(&self, x: f64) -> [NodeArray<f64>; 2] {
+    pub(crate) fn integrals(&self, x: f64) -> [NodeArray<f64>; 2] {
         let [mut once, mut twice] = [[0.0; MOST_NODES]; 2];
         self.integrals_by_degree(x, &mut once, &mut twice);
         [self.to_nodal(&once), self.to_nodal(&twice)]
@@ -109,7 +107,7 @@ impl CollocationRule {
     /// Integrals from 0 to `x` of Legendre's polynomials of `2 x - 1`, once and twice, by degree: as many as
     /// there are nodes. `int P_m = (P_(m+1) - P_(m-1)) / (2 (2 m + 1))`, and likewise again.
     #[inline(always)]
-    pub fn integrals_by_degree<R: LaneNumber>(
+    pub(crate) fn integrals_by_degree<R: LaneNumber>(
         &self,
         x: R,
         once: &mut NodeArray<R>,
@@ -132,8 +130,7 @@ impl CollocationRule {
     }
 
     /// By nodes what is known by degrees.
-    #[must_use]
-    pub fn to_nodal(&self, by_degree: &NodeArray<f64>) -> NodeArray<f64> {
+    pub(crate) fn to_nodal(&self, by_degree: &NodeArray<f64>) -> NodeArray<f64> {
         let mut sums = [0.0; MOST_NODES];
         for (sum, legendre) in sums.iter_mut().zip(&self.legendre[..self.nodes]) {
             for (a, b) in legendre[..self.nodes].iter().zip(by_degree) {
@@ -175,7 +172,6 @@ fn legendre_polynomials<R: LaneNumber>(x: R, nodes: usize) -> [R; MOST_NODES + 2
     p
 }
 
-/// `1 / m`.
 const RECIPROCALS: [f64; 2 * MOST_NODES + 4] = {
     let mut shares = [0.0; 2 * MOST_NODES + 4];
     let mut m = 1;
@@ -187,16 +183,13 @@ const RECIPROCALS: [f64; 2 * MOST_NODES + 4] = {
 };
 
 /// A square of the equations of one instant.
-pub type SquareMatrix<const D: usize> = [[f64; D]; D];
+pub(crate) type SquareMatrix<const D: usize> = [[f64; D]; D];
 
 /// Matrices of `D` equations at the nodes of a step.
 #[derive(Debug, Clone, Copy)]
-pub struct CollocationEquations<const D: usize> {
-    /// `M`.
+pub(crate) struct CollocationEquations<const D: usize> {
     pub mass: NodeArray<SquareMatrix<D>>,
-    /// `D`.
     pub damping: NodeArray<SquareMatrix<D>>,
-    /// `K`.
     pub stiffness: NodeArray<SquareMatrix<D>>,
 }
 
@@ -209,7 +202,7 @@ impl<const D: usize> Default for CollocationEquations<D> {
 
 /// The equations of a step, factored.
 #[derive(Debug, Clone)]
-pub struct CollocationStep<const D: usize> {
+pub(crate) struct CollocationStep<const D: usize> {
     rule: &'static CollocationRule,
     length: f64,
     /// Factors: multipliers left of the diagonal, inverses on it, what remains right of it.
@@ -224,7 +217,7 @@ impl<const D: usize> Default for CollocationStep<D> {
 
 impl<const D: usize> CollocationStep<D> {
     /// Factors the equations of a step of this length.
-    pub fn factor(
+    pub(crate) fn factor(
         &mut self,
         rule: &'static CollocationRule,
         length: f64,
@@ -262,7 +255,7 @@ impl<const D: usize> CollocationStep<D> {
 
     /// Turns right-hand sides at the nodes into accelerations there; what starting values do is part of them.
     #[inline(always)]
-    pub fn solve<R: LaneNumber>(&self, rows: &mut [[R; D]]) {
+    pub(crate) fn solve<R: LaneNumber>(&self, rows: &mut [[R; D]]) {
         let nodes = self.rule.nodes;
         let rows = &mut rows[..nodes];
         for i in 1..nodes {
@@ -294,9 +287,8 @@ fn subtract_product<const D: usize, R: LaneNumber>(sum: &mut [R; D], block: &Squ
     }
 }
 
-/// `block row`.
 #[inline(always)]
-pub fn multiply_row<const D: usize, R: LaneNumber>(block: &SquareMatrix<D>, row: &[R; D]) -> [R; D] {
+pub(crate) fn multiply_row<const D: usize, R: LaneNumber>(block: &SquareMatrix<D>, row: &[R; D]) -> [R; D] {
     from_fn(|r| {
         let mut sum = row[0].scale_by(block[r][0]);
         for c in 1..D {
@@ -311,8 +303,7 @@ fn multiply_squares<const D: usize>(a: &SquareMatrix<D>, b: &SquareMatrix<D>) ->
 }
 
 /// Inverse of a matrix of at most three rows, by Cramer's rule.
-#[must_use]
-pub fn invert_square<const D: usize>(m: &SquareMatrix<D>) -> SquareMatrix<D> {
+pub(crate) fn invert_square<const D: usize>(m: &SquareMatrix<D>) -> SquareMatrix<D> {
     let mut out = [[0.0; D]; D];
     match D {
         1 => out[0][0] = 1.0 / m[0][0],

@@ -16,7 +16,7 @@ const ORDER_3_WEIGHT: f64 = 0.01;
 
 /// The stages of one step of length `h` from `(t, y)`.
 #[derive(Debug, Clone)]
-pub struct Dop853Stages<const N: usize> {
+pub(crate) struct Dop853Stages<const N: usize> {
     /// Start of the step, s.
     pub t: f64,
     /// Length of the step, s.
@@ -53,7 +53,7 @@ impl<const N: usize> Dop853Stages<N> {
     /// Takes the step; `first` is the derivative at its start, `f(t, y)` the right-hand side (12
     /// evaluations).
     #[inline]
-    pub fn take_step(
+    pub(crate) fn take_step(
         f: impl Fn(f64, &[f64; N]) -> [f64; N],
         t: f64,
         y: &[f64; N],
@@ -92,7 +92,7 @@ impl<const N: usize> Dop853Stages<N> {
     /// Combined error estimate in units of the tolerance: at most 1 is accepted. `scale` is the tolerated
     /// error of each component.
     #[inline]
-    pub fn error_norm(&self, scale: &[f64; N]) -> f64 {
+    pub(crate) fn error_norm(&self, scale: &[f64; N]) -> f64 {
         let zero = [0.0; N];
         let e5 = combine_stages(&zero, 1.0, &self.k, &E5);
         let e3 = combine_stages(&zero, 1.0, &self.k, &E3);
@@ -109,7 +109,7 @@ impl<const N: usize> Dop853Stages<N> {
 
     /// Adds the three stages of the dense output and returns it.
     #[inline]
-    pub fn dense_output(&mut self, f: impl Fn(f64, &[f64; N]) -> [f64; N]) -> Dop853DenseOutput<N> {
+    pub(crate) fn dense_output(&mut self, f: impl Fn(f64, &[f64; N]) -> [f64; N]) -> Dop853DenseOutput<N> {
         let (t, h) = (self.t, self.h);
         self.k[13] = f(t + C[13] * h, &combine_stages(&self.y, h, &self.k, &A13));
         self.k[14] = f(t + C[14] * h, &combine_stages(&self.y, h, &self.k, &A14));
@@ -132,7 +132,7 @@ impl<const N: usize> Dop853Stages<N> {
 
 /// The solution between the ends of a step, of order 7.
 #[derive(Debug, Clone)]
-pub struct Dop853DenseOutput<const N: usize> {
+pub(crate) struct Dop853DenseOutput<const N: usize> {
     t: f64,
     h: f64,
     y: [f64; N],
@@ -142,7 +142,6 @@ pub struct Dop853DenseOutput<const N: usize> {
 impl<const N: usize> Dop853DenseOutput<N> {
     /// State at the fraction `x` of the step, 0 at its start and 1 at its end.
     #[inline]
-    #[must_use]
     pub(crate) fn state_at_fraction(&self, x: f64) -> [f64; N] {
         let rest = 1.0 - x;
         let mut y = self.y;
@@ -169,11 +168,11 @@ impl<const N: usize> DenseOutput<N> for Dop853DenseOutput<N> {
 // counted from 0, coefficient).
 
 /// One row of coefficients: (stage, coefficient) for the nonzero entries.
-pub type TableauRow<const M: usize> = [(usize, f64); M];
+pub(crate) type TableauRow<const M: usize> = [(usize, f64); M];
 
 /// Nodes `c` of the 16 stages; stage 12 is the derivative at the end of the step, 13 to 15 serve the dense
 /// output.
-pub const C: [f64; 16] = [
+pub(crate) const C: [f64; 16] = [
     0.0,
     0.05260015195876773,
     0.0789002279381516,
@@ -198,7 +197,8 @@ pub(crate) const A2: TableauRow<2> = [(0, 0.0197250569845379), (1, 0.05917517095
 /// Row of stage 3.
 pub(crate) const A3: TableauRow<2> = [(0, 0.02958758547680685), (2, 0.08876275643042054)];
 /// Row of stage 4.
-pub const A4: TableauRow<3> = [(0, 0.2413651341592667), (2, -0.8845494793282861), (3, 0.924834003261792)];
+pub(crate) const A4: TableauRow<3> =
+    [(0, 0.2413651341592667), (2, -0.8845494793282861), (3, 0.924834003261792)];
 /// Row of stage 5.
 pub(crate) const A5: TableauRow<3> =
     [(0, 0.037037037037037035), (3, 0.17082860872947386), (4, 0.12546768756682242)];
@@ -244,7 +244,7 @@ pub(crate) const A10: TableauRow<8> = [
     (9, -3.0467644718982196),
 ];
 /// Row of stage 11.
-pub const A11: TableauRow<9> = [
+pub(crate) const A11: TableauRow<9> = [
     (0, 2.273310147516538),
     (3, -10.53449546673725),
     (4, -2.0008720582248625),
@@ -256,7 +256,7 @@ pub const A11: TableauRow<9> = [
     (10, 0.6433927460157636),
 ];
 /// Row of stage 12: the weights `b` of the order 8 solution.
-pub const A12: TableauRow<8> = [
+pub(crate) const A12: TableauRow<8> = [
     (0, 0.054293734116568765),
     (5, 4.450312892752409),
     (6, 1.8915178993145003),

@@ -8,11 +8,11 @@
 /// Highest order of an expansion; beyond it rounding, not truncation, limits double precision.
 pub(crate) const MOST_ORDER: usize = 20;
 /// Coefficients kept, those of `x^0` to `x^MOST_ORDER`.
-pub const TERMS: usize = MOST_ORDER + 1;
+pub(crate) const TERMS: usize = MOST_ORDER + 1;
 
 /// Taylor coefficients about the start of a step: `g(t + x) = sum g_k x^k`, those beyond the order in use
 /// unspecified.
-pub type TaylorSeries = [f64; TERMS];
+pub(crate) type TaylorSeries = [f64; TERMS];
 
 /// Halvings after which a root that cannot be distinguished from a touch is taken for a touch: 2^-30 of a
 /// step is below every tolerance.
@@ -26,8 +26,7 @@ const FLAT: f64 = 4.0 * f64::EPSILON;
 
 /// What a guard does on a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum GuardFall {
-    /// It stays positive.
+pub(crate) enum GuardFall {
     Nowhere,
     /// It falls to zero this far after the start, in the units of `h`.
     At(f64),
@@ -40,7 +39,6 @@ pub enum GuardFall {
 /// `zero_order` is the multiplicity of the zero at which the guard is known to start, 0 where it is positive.
 /// A zero at the start is armed by the first coefficient that rounding does not explain: if it is positive
 /// that zero is divided out, if it is negative the guard falls at once.
-#[must_use]
 pub(crate) fn first_fall(guard: &TaylorSeries, order: usize, zero_order: usize, h: f64) -> GuardFall {
     if guard[0] == f64::INFINITY {
         return GuardFall::Nowhere;

@@ -8,9 +8,9 @@
 use crate::math;
 
 /// Samples a quick look takes: fractions 0, 1/4, 1/2, 3/4, 1.
-pub const COARSE_SAMPLES: usize = 5;
+pub(crate) const COARSE_SAMPLES: usize = 5;
 /// Samples a full look takes: fractions 0, 1/8, ..., 1.
-pub const FINE_SAMPLES: usize = 9;
+pub(crate) const FINE_SAMPLES: usize = 9;
 
 /// Halvings after which a root that cannot be distinguished from a touch is taken for a touch: 2^-30 of a
 /// step is below every tolerance.
@@ -28,8 +28,7 @@ const INNER_TO_BERNSTEIN: [[f64; FINE_SAMPLES - 1]; FINE_SAMPLES - 1] = bernstei
 /// least Bernstein coefficient must exceed the error of interpolation that the check sample shows, with a
 /// margin.
 #[inline]
-#[must_use]
-pub fn is_root_free(samples: &[f64; COARSE_SAMPLES], check: f64) -> bool {
+pub(crate) fn is_root_free(samples: &[f64; COARSE_SAMPLES], check: f64) -> bool {
     /// The check sample sees the error of interpolation at one place; elsewhere it may be larger.
     const MARGIN: f64 = 8.0;
     /// Lagrange weights of the five coarse nodes at fraction 7/8.
@@ -41,14 +40,12 @@ pub fn is_root_free(samples: &[f64; COARSE_SAMPLES], check: f64) -> bool {
 }
 
 /// First fraction of the step at which the polynomial through the fine samples falls to zero, if it does.
-#[must_use]
 pub(crate) fn first_root(samples: &[f64; FINE_SAMPLES]) -> Option<f64> {
     find_first_root(multiply_matrix(&FINE_TO_BERNSTEIN, samples))
 }
 
 /// The same for a guard that starts at a zero of multiplicity `order` and grows: the samples (the first is
 /// not used) are divided by `fraction^order`, which removes that zero, and the quotient is searched.
-#[must_use]
 pub(crate) fn first_root_after_zero(samples: &[f64; FINE_SAMPLES], order: i32) -> Option<f64> {
     let mut quotient = [0.0; FINE_SAMPLES - 1];
     for (i, q) in quotient.iter_mut().enumerate() {

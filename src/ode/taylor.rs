@@ -147,7 +147,6 @@ impl<const N: usize, const G: usize> DenseOutput<N> for TaylorExpansion<N, G> {
 /// Order of the series at a tolerance: that of least work for a series that falls geometrically, `1 -
 /// ln(relative)/2` (Jorba and Zou 2005, section 3.1), and a little more, because the coefficients of
 /// oscillations fall faster. The optimum is flat: on the light test blade 2 to 6 more cost the same time.
-#[must_use]
 pub(crate) fn order_for_tolerance(relative: f64) -> usize {
     const MORE: f64 = 3.0;
     /// Below it the step length, taken from two coefficients, would rest on too few.

@@ -41,8 +41,7 @@ impl AlignmentPoint {
     }
 
     /// Its name in a sentence and in files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Head => "head",
             Self::Tip => "tip",
@@ -73,8 +72,7 @@ impl Alignment {
     /// Starts from the first turn of the head in both, then least squares over the frames that both show, of
     /// the head or, where none was tracked, of the tip: neither a camera's origin nor its clock is the
     /// model's.
-    #[must_use]
-    pub fn estimate(measured: &Recording, model: &Recording) -> Self {
+    pub(crate) fn estimate(measured: &Recording, model: &Recording) -> Self {
         let turns = ReversalInstants::first_turn_s(measured).zip(ReversalInstants::first_turn_s(model));
         let by = AlignmentPoint::choose_for(measured);
         let opposite = |(of_measured, of_model): &(f64, f64)| {
@@ -113,7 +111,6 @@ impl Alignment {
 
 impl Alignment {
     /// What is added to a channel of the model, m.
-    #[must_use]
     pub(crate) fn offset_m(&self, channel: Channel) -> f64 {
         match channel {
             Channel::TipX | Channel::HeadX => self.along_m,

@@ -8,7 +8,6 @@ mod window;
 
 use super::Recording;
 use crate::math;
-pub use flip::Flip;
 pub use instants::{InstantKind, InstantNotFound, Reversal, ReversalInstants};
 pub use phase::{PhaseWindow, ReversalPhase, phase_windows};
 use serde::Serialize;
@@ -42,11 +41,10 @@ pub struct UnknownChannel {
 
 impl Channel {
     /// Every channel, in the order of the documentation.
-    pub const ALL: [Self; 4] = [Self::Deflection, Self::HeadDrop, Self::TipX, Self::HeadX];
+    pub(crate) const ALL: [Self; 4] = [Self::Deflection, Self::HeadDrop, Self::TipX, Self::HeadX];
 
     /// Name on the command line and in files.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Deflection => "deflection",
             Self::HeadDrop => "head-drop",
@@ -64,7 +62,7 @@ impl Channel {
     ///
     /// # Errors
     /// [`UnknownChannel`] with the nearest known name.
-    pub fn parse(text: &str) -> Result<Self, UnknownChannel> {
+    pub(crate) fn parse(text: &str) -> Result<Self, UnknownChannel> {
         let names = Self::ALL.map(Self::name);
         let channel = Self::ALL.into_iter().find(|c| c.name() == text);
         channel.ok_or_else(|| UnknownChannel {
@@ -109,8 +107,11 @@ impl std::fmt::Display for Channel {
 
 /// Slope of a channel over the frames present in `frames`, m/s, by least squares; `None` for fewer than two,
 /// or outside the recording.
-#[must_use]
-pub fn mean_speed_m_per_s(samples: &[Option<f64>], frame_rate_hz: f64, frames: Range<usize>) -> Option<f64> {
+pub(crate) fn mean_speed_m_per_s(
+    samples: &[Option<f64>],
+    frame_rate_hz: f64,
+    frames: Range<usize>,
+) -> Option<f64> {
     let first = frames.start;
     let points: Vec<(f64, f64)> = samples
         .get(frames)?

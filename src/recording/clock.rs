@@ -2,11 +2,11 @@
 
 /// Largest distance of a time from its frame, in frames, that rounding may explain: a quantum of half a frame
 /// moves a time by a quarter of one, and beyond a third the nearest frame is no longer certain.
-pub const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
+pub(crate) const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
 
 /// Longest grid that is built, frames: 17 minutes at 10,000 frames/s. A jump beyond it is damage, not a
 /// recording.
-pub const MAX_FRAMES: f64 = 10_000_000.0;
+pub(crate) const MAX_FRAMES: f64 = 10_000_000.0;
 
 /// Share of a row's distance from the grid by which the grid's phase follows: a seed 1 % off lags by a tenth
 /// of a frame.
@@ -18,7 +18,7 @@ const ROUNDS: usize = 4;
 
 /// Numbered rows and the line that fits their times.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FrameFit {
+pub(crate) struct FrameFit {
     /// Frame of every row, counted from the first row.
     pub frames: Vec<usize>,
     /// Time from frame to frame by least squares, s.
@@ -31,14 +31,12 @@ pub struct FrameFit {
 
 impl FrameFit {
     /// Whether every row lies on the grid within [`OFF_GRID_LIMIT_FRAMES`].
-    #[must_use]
-    pub fn is_on_grid(&self) -> bool {
+    pub(crate) fn is_on_grid(&self) -> bool {
         self.worst_frames <= OFF_GRID_LIMIT_FRAMES
     }
 
     /// Fewest frames from one row to the next; above 1 when only every n-th frame has a row.
-    #[must_use]
-    pub fn smallest_step(&self) -> usize {
+    pub(crate) fn smallest_step(&self) -> usize {
         self.frames.windows(2).map(|w| w[1].saturating_sub(w[0])).min().unwrap_or(1)
     }
 }
@@ -47,8 +45,7 @@ impl FrameFit {
 /// the grid follows the times slowly, so that neither rounded times nor a seed that is a percent off
 /// accumulate, and one damaged row does not shift those below it; then a line is fitted and the rows are
 /// numbered again. `None` for fewer than two rows, a useless seed or a grid longer than [`MAX_FRAMES`].
-#[must_use]
-pub fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
+pub(crate) fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     let first = *times_s.first()?;
     let span_frames = (times_s.last()? - first) / seed_s;
     if times_s.len() < 2
@@ -85,8 +82,7 @@ fn follow_grid(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
 
 /// Median time from row to row, s: the frame time where most rows are neighbours. Of two middle ones the
 /// shorter, because gaps only lengthen.
-#[must_use]
-pub fn median_step_s(times_s: &[f64]) -> Option<f64> {
+pub(crate) fn median_step_s(times_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len().saturating_sub(1) / 2).copied()
@@ -94,7 +90,7 @@ pub fn median_step_s(times_s: &[f64]) -> Option<f64> {
 
 /// The rate with the fewest digits near `fitted`, 1/s, of which `explains` says that it explains the times;
 /// else `fitted` itself.
-pub fn simplest_rate(fitted: f64, explains: impl Fn(f64) -> bool) -> f64 {
+pub(crate) fn simplest_rate(fitted: f64, explains: impl Fn(f64) -> bool) -> f64 {
     let mut rounded = (0..RATE_DIGITS).filter_map(|digits| format!("{fitted:.digits$e}").parse::<f64>().ok());
     rounded.find(|&rate| explains(rate)).unwrap_or(fitted)
 }

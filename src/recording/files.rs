@@ -5,16 +5,16 @@ mod trace;
 
 pub use super::video::{PixelMapping, VideoEntry};
 pub use description::{CameraEntry, LevelEntry, OneOrMany, RecordingFile, SourceEntry, YAxis};
-pub(crate) use trace::parse_trace_csv_at;
+pub use trace::parse_trace_csv_at;
 pub use trace::{HEADER, parse_trace_csv, push_trace_row, trace_blocks, trace_csv};
 
 use crate::recording::{Recording, RecordingError};
 use crate::toml_file::TomlError;
 
 /// Name of the traces in a recording's folder.
-pub const TRACE_FILE: &str = "trace.csv";
+pub(crate) const TRACE_FILE: &str = "trace.csv";
 /// Name of the description in a recording's folder.
-pub const DESCRIPTION_FILE: &str = "recording.toml";
+pub(crate) const DESCRIPTION_FILE: &str = "recording.toml";
 
 /// Why a recording's files were refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]

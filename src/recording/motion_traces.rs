@@ -21,19 +21,17 @@ pub struct MotionTraces {
 }
 
 /// The channels in the order of a figure.
-pub const MOTION_CHANNELS: [Channel; 4] =
+pub(crate) const MOTION_CHANNELS: [Channel; 4] =
     [Channel::TipX, Channel::HeadX, Channel::Deflection, Channel::HeadDrop];
 
 impl MotionTraces {
     /// What a recording shows, on its own clock.
-    #[must_use]
-    pub fn from_recording(recording: &Recording) -> Self {
+    pub(crate) fn from_recording(recording: &Recording) -> Self {
         Self::from_columns(recording, |channel| channel.samples(recording))
     }
 
     /// What a model shows, on the clock and from the origin of a recording.
-    #[must_use]
-    pub fn from_model(model: &Recording, alignment: &Alignment) -> Self {
+    pub(crate) fn from_model(model: &Recording, alignment: &Alignment) -> Self {
         let mut moved = Self::from_recording(model);
         moved.time_s.iter_mut().for_each(|t| *t += alignment.shift_s);
         for channel in MOTION_CHANNELS {
@@ -44,8 +42,11 @@ impl MotionTraces {
     }
 
     /// What a model shows at the frames of a recording, on its clock and from its origin.
-    #[must_use]
-    pub fn from_model_at_frames(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {
+    pub(crate) fn from_model_at_frames(
+        recording: &Recording,
+        model: &Recording,
+        alignment: &Alignment,
+    ) -> Self {
         let grid = recording.grid();
         Self::from_columns(recording, |channel| {
             let (of_model, by_m) = (channel.samples(model), alignment.offset_m(channel));
@@ -56,8 +57,7 @@ impl MotionTraces {
     }
 
     /// Measured minus model, frame by frame of the recording; missing where either is.
-    #[must_use]
-    pub fn residual(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {
+    pub(crate) fn residual(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {
         let grid = recording.grid();
         Self::from_columns(recording, |channel| {
             let (of_model, by_m) = (channel.samples(model), alignment.offset_m(channel));
@@ -83,9 +83,7 @@ impl MotionTraces {
         }
     }
 
-    /// A channel, m.
-    #[must_use]
-    pub fn column(&self, channel: Channel) -> &[Option<f64>] {
+    pub(crate) fn column(&self, channel: Channel) -> &[Option<f64>] {
         match channel {
             Channel::TipX => &self.tip_x_m,
             Channel::HeadX => &self.head_x_m,
@@ -104,8 +102,7 @@ impl MotionTraces {
     }
 
     /// Root mean square of a channel between two instants, s, or over all; `None` without a value.
-    #[must_use]
-    pub fn rms_m(&self, channel: Channel, within_s: Option<(f64, f64)>) -> Option<f64> {
+    pub(crate) fn rms_m(&self, channel: Channel, within_s: Option<(f64, f64)>) -> Option<f64> {
         let inside = |t: f64| within_s.is_none_or(|(from, to)| t >= from && t <= to);
         let frames = self.time_s.iter().zip(self.column(channel)).filter(|(t, _)| inside(**t));
         let squares: Vec<f64> = frames.filter_map(|(_, x)| x.map(|x| x * x)).collect();

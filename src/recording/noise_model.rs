@@ -7,9 +7,9 @@ mod common_noise;
 mod likelihood;
 
 use super::Recording;
-pub use autoregressive::{AutoregressiveNoise, MOST_COEFFICIENTS, NotStationary, Whitener};
+pub(crate) use autoregressive::{AutoregressiveNoise, Whitener};
 use blocks::{BlockCut, NoiseBlock, cut_blocks, keep_quiet_blocks};
-pub use common_noise::{CommonNoise, SharedNoise, measure_common_noise};
+pub(crate) use common_noise::{SharedNoise, measure_common_noise};
 
 // The noise of a recording's channels.
 //
@@ -31,8 +31,7 @@ const LEAST_SD_M: f64 = 1e-9;
 
 /// Noise of a channel.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ChannelNoise {
-    /// The noise, m.
+pub(crate) struct ChannelNoise {
     pub noise: AutoregressiveNoise,
     /// Standard deviation of its standard deviation, m.
     pub sd_of_sd_m: f64,
@@ -40,13 +39,12 @@ pub struct ChannelNoise {
     pub sd_of_coefficients: Vec<f64>,
     /// Frames that it was measured on, less the freedoms of the motion.
     pub frames: usize,
-    /// On which motion.
     pub source: NoiseSource,
 }
 
 /// What a channel's noise was measured on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum NoiseSource {
+pub(crate) enum NoiseSource {
     /// The head along the sweep, against its smooth motion.
     SmoothHead,
     /// The tip upwards, against the glass.
@@ -55,7 +53,7 @@ pub enum NoiseSource {
 
 /// Noise of a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct RecordingNoise {
+pub(crate) struct RecordingNoise {
     /// Of the tip and of the head along the sweep.
     pub along_sweep: Option<ChannelNoise>,
     /// Of the tip and of the head upwards.
@@ -69,8 +67,7 @@ pub(super) fn block_length(frame_rate_hz: f64) -> usize {
 
 /// Measures the noise of a recording: along the sweep and upwards, each by its own channel where that is
 /// tracked, by the other one where not; `None` where neither is, or where a recording has none.
-#[must_use]
-pub fn measure_noise(recording: &Recording) -> RecordingNoise {
+pub(crate) fn measure_noise(recording: &Recording) -> RecordingNoise {
     let (traces, length) = (recording.traces(), block_length(recording.grid().frame_rate_hz));
     let head = BlockCut { length, degree: 3, covariate: None };
     let glass = BlockCut { length, degree: 1, covariate: Some(&traces.tip_x_m) };

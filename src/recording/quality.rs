@@ -17,7 +17,7 @@ use super::FrameGrid;
 use crate::recording::Recording;
 use crate::recording::channel::ReversalInstants;
 use crate::text::{format_decimals, format_or_dash, to_ascii};
-pub use checks::check_position_steps;
+pub(crate) use checks::check_position_steps;
 pub use finding::{Check, QualityFinding, Severity};
 pub use measurement::{
     ChannelQuality, ComponentVisibility, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality,
@@ -25,11 +25,9 @@ pub use measurement::{
 };
 use measurement::{FEWEST_CYCLES, NYQUIST_SHARE};
 pub use noise::{noise_floor, quantisation_step};
-pub use outliers::outlier_frames;
 use serde::Serialize;
-pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
 
-/// Every finding on a recording, the gravest first: what its traces show, and what only its
+pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
 /// export could show (`import`).
 ///
 /// `measured` is the [`measure_quality`] of the same recording, `instants` what [`ReversalInstants::find`] finds in it.
@@ -77,8 +75,7 @@ pub enum Grade {
 }
 
 /// The grade: the gravest finding decides.
-#[must_use]
-pub fn grade_findings(findings: &[QualityFinding]) -> Grade {
+pub(crate) fn grade_findings(findings: &[QualityFinding]) -> Grade {
     match findings.iter().map(|finding| finding.severity).max() {
         None | Some(Severity::Note) => Grade::Good,
         Some(Severity::Caution) => Grade::UsableWithCare,
@@ -89,8 +86,7 @@ pub fn grade_findings(findings: &[QualityFinding]) -> Grade {
 /// The verdict, one statement a line: the grade with what the recording can show, then the findings, worst
 /// first. A finding on several channels is one line with its largest number; notes without advice are left to
 /// the table.
-#[must_use]
-pub fn verdict_lines(measured: &Quality, findings: &[QualityFinding]) -> Vec<String> {
+pub(crate) fn verdict_lines(measured: &Quality, findings: &[QualityFinding]) -> Vec<String> {
     let mut lines = vec![grade_line(measured, findings)];
     let mut stated: Vec<(Check, Severity)> = vec![];
     let mut ordered: Vec<&QualityFinding> =
@@ -161,8 +157,7 @@ fn join_channel_findings(findings: &[&QualityFinding], key: (Check, Severity)) -
 }
 
 /// The measurements as a table for reading, display units, one fact a line.
-#[must_use]
-pub fn measurement_table(quality: &Quality, start_s: f64) -> String {
+pub(crate) fn measurement_table(quality: &Quality, start_s: f64) -> String {
     let grid = FrameGrid { start_s, frame_rate_hz: quality.frame_rate_hz, frames: quality.frames };
     let share = 100.0 * quality.missing_deflection_frames as f64 / quality.frames as f64;
     let mut lines = vec![

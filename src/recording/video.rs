@@ -92,8 +92,7 @@ impl Picture {
     /// A picture of `width` x `height` points, each the mean of what lies within it; `pixel` gives the place
     /// in this picture of a place in that one, both in pixels from the upper left corner. White where there
     /// is nothing.
-    #[must_use]
-    pub fn resample(&self, width: usize, height: usize, pixel: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
+    pub(crate) fn resample(&self, width: usize, height: usize, pixel: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
         let ([x0, y0], [x1, y1]) = (pixel([0.0, 0.0]), pixel([1.0, 0.0]));
         let samples = math::hypot(x1 - x0, y1 - y0).ceil().clamp(1.0, MOST_SAMPLES) as usize;
         let samples = samples.max(1); // (of places that are no numbers)
@@ -108,8 +107,7 @@ impl Picture {
     }
 
     /// Whether a place lies in the picture.
-    #[must_use]
-    pub fn contains_point(&self, [x, y]: [f64; 2]) -> bool {
+    pub(crate) fn contains_point(&self, [x, y]: [f64; 2]) -> bool {
         (0.0..self.width as f64).contains(&x) && (0.0..self.height as f64).contains(&y)
     }
 
@@ -185,7 +183,7 @@ impl VideoEntry {
     ///
     /// # Errors
     /// [`FilesError::Video`] for a number that no picture has, or without the length of a pixel.
-    pub fn pixel_mapping(
+    pub(crate) fn pixel_mapping(
         &self,
         file: &str,
         camera: &CameraEntry,

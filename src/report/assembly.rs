@@ -76,8 +76,7 @@ pub fn build_report(
 }
 
 /// The same without its figures, which take most of the time.
-#[must_use]
-pub fn build_report_without_figures(
+pub(crate) fn build_report_without_figures(
     job: &Job,
     measured: &[FittedRecording],
     models: &[ModelRun],

@@ -14,7 +14,7 @@ use crate::figures::FigureBlock;
 use crate::fit::job::Job;
 use crate::fit::uncertainty::ParameterVerdict;
 use crate::text;
-pub use page::render_page;
+pub(crate) use page::render_page;
 use serde::Serialize;
 
 /// Compares fits, in the order given.
@@ -44,7 +44,7 @@ pub fn compare_fits(fits: &[ComparisonInput]) -> FitComparison {
 ///
 /// # Errors
 /// None in practice: every field can be written (a value that is no number becomes `null`).
-pub fn comparison_json(several: &FitComparison) -> Result<String, serde_json::Error> {
+pub(crate) fn comparison_json(several: &FitComparison) -> Result<String, serde_json::Error> {
     #[derive(Serialize)]
     struct ComparedFitDocument<'a> {
         name: &'a str,
@@ -135,20 +135,17 @@ pub struct ComparedFit {
 
 impl FitComparison {
     /// The statements as lines of text.
-    #[must_use]
-    pub fn summary(&self) -> Vec<String> {
+    pub(crate) fn summary(&self) -> Vec<String> {
         self.statements.iter().map(Statement::plain_text).collect()
     }
 
     /// Whether every component is met in every fit.
-    #[must_use]
-    pub fn all_components_met(&self) -> bool {
+    pub(crate) fn all_components_met(&self) -> bool {
         self.fits.iter().all(|fit| fit.verdict.all_components_met)
     }
 
     /// Whether every model explains its traces and meets every component.
-    #[must_use]
-    pub fn passes(&self) -> bool {
+    pub(crate) fn passes(&self) -> bool {
         self.fits.iter().all(|fit| fit.verdict.passes())
     }
 }
@@ -199,7 +196,6 @@ pub enum IntervalRelation {
 }
 
 impl IntervalRelation {
-    /// In words.
     pub(super) fn describe(self) -> &'static str {
         match self {
             Self::Disjoint => "do not overlap",

@@ -32,7 +32,7 @@ pub(super) struct ReportDocument<'a> {
 }
 
 impl<'a> ReportDocument<'a> {
-    pub fn new(report: &'a Report, verdict: &'a ReportVerdict) -> Self {
+    pub(crate) fn new(report: &'a Report, verdict: &'a ReportVerdict) -> Self {
         let listed = report.figures.iter().flat_map(|group| {
             group.figures.iter().map(|f| FigureEntry {
                 file: &f.file,
@@ -56,7 +56,7 @@ impl<'a> ReportDocument<'a> {
 ///
 /// # Errors
 /// None in practice: every field can be written (a value that is no number becomes `null`).
-pub fn report_json(report: &Report) -> Result<String, serde_json::Error> {
+pub(crate) fn report_json(report: &Report) -> Result<String, serde_json::Error> {
     #[derive(Serialize)]
     struct ReportFile<'a> {
         format: u32,

@@ -32,8 +32,7 @@ const MOST_BYTES: usize = 1_000_000;
 
 /// The page; the same report always gives the same bytes. One that would be too large for it does without the
 /// figures for telephones, which show the others smaller.
-#[must_use]
-pub fn render_page(report: &Report) -> String {
+pub(crate) fn render_page(report: &Report) -> String {
     let whole = assemble_page(report, true);
     if whole.len() <= MOST_BYTES { whole } else { assemble_page(report, false) }
 }

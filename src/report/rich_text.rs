@@ -12,7 +12,7 @@ pub struct Sentence(Vec<SentencePart>);
 
 /// A part of a sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum SentencePart {
+pub(crate) enum SentencePart {
     /// The program's own words.
     Words(String),
     /// A name that a user chose.
@@ -21,28 +21,24 @@ pub enum SentencePart {
 
 impl Sentence {
     /// A sentence of own words.
-    #[must_use]
-    pub fn new(words: impl Into<String>) -> Self {
+    pub(crate) fn new(words: impl Into<String>) -> Self {
         Self::default().with_words(words)
     }
 
     /// The same, continued with own words.
-    #[must_use]
-    pub fn with_words(mut self, words: impl Into<String>) -> Self {
+    pub(crate) fn with_words(mut self, words: impl Into<String>) -> Self {
         self.0.push(SentencePart::Words(words.into()));
         self
     }
 
     /// The same, continued with a name.
-    #[must_use]
-    pub fn with_name(mut self, name: &str) -> Self {
+    pub(crate) fn with_name(mut self, name: &str) -> Self {
         self.0.push(SentencePart::Name(make_printable(name)));
         self
     }
 
     /// The same, continued with names and commas between them.
-    #[must_use]
-    pub fn with_names<'a>(self, names: impl IntoIterator<Item = &'a str>) -> Self {
+    pub(crate) fn with_names<'a>(self, names: impl IntoIterator<Item = &'a str>) -> Self {
         let joined = |sentence: Self, (i, name): (usize, &str)| {
             if i == 0 { sentence.with_name(name) } else { sentence.with_words(", ").with_name(name) }
         };
@@ -50,14 +46,12 @@ impl Sentence {
     }
 
     /// Its parts in order.
-    #[must_use]
-    pub fn parts(&self) -> &[SentencePart] {
+    pub(crate) fn parts(&self) -> &[SentencePart] {
         &self.0
     }
 
     /// As text without markup.
-    #[must_use]
-    pub fn plain_text(&self) -> String {
+    pub(crate) fn plain_text(&self) -> String {
         self.0
             .iter()
             .map(|piece| match piece {
@@ -86,20 +80,17 @@ pub struct Statement {
 
 impl Statement {
     /// A statement without details.
-    #[must_use]
-    pub fn new(statement: Sentence) -> Self {
+    pub(crate) fn new(statement: Sentence) -> Self {
         Self { statement, ..Self::default() }
     }
 
     /// The same, being as one would have it or not.
-    #[must_use]
-    pub fn with_verdict(self, good: bool) -> Self {
+    pub(crate) fn with_verdict(self, good: bool) -> Self {
         Self { good: Some(good), ..self }
     }
 
     /// The whole as one line of text.
-    #[must_use]
-    pub fn plain_text(&self) -> String {
+    pub(crate) fn plain_text(&self) -> String {
         let details: Vec<String> = self.details.iter().map(Sentence::plain_text).collect();
         let statement = self.statement.plain_text();
         if details.is_empty() {

@@ -20,7 +20,7 @@ const FAR_SD: f64 = 1.96;
 
 /// The answer of a report.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct ReportSummary {
+pub(crate) struct ReportSummary {
     /// Whether the model explains what was measured, with residual and noise.
     pub headline: Statement,
     /// The numbers of the blade: friction at rest and at speed, then every other parameter.
@@ -33,14 +33,13 @@ pub struct ReportSummary {
 
 /// A number of the blade, in SI units.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
-pub struct SummaryQuantity {
+pub(crate) struct SummaryQuantity {
     /// What it is, in words.
     pub name: String,
     /// The keys of a scene that it comes from.
     pub keys: Vec<&'static str>,
     /// Unit; empty for a plain number.
     pub unit: String,
-    /// Value.
     pub value: f64,
     /// Lower end of the 95 % interval; `None` where it is open.
     pub lower_95: Option<f64>,
@@ -54,8 +53,7 @@ pub struct SummaryQuantity {
 
 impl ReportSummary {
     /// The answer of a report.
-    #[must_use]
-    pub fn from_report(report: &Report) -> Self {
+    pub(crate) fn from_report(report: &Report) -> Self {
         Self {
             headline: report_headline(report),
             quantities: blade_quantities(report),

@@ -43,8 +43,7 @@ pub struct ReportVerdict {
 
 impl ReportVerdict {
     /// The verdict on what a report holds.
-    #[must_use]
-    pub fn from_report(report: &Report) -> Self {
+    pub(crate) fn from_report(report: &Report) -> Self {
         let met = |list: &[Comparison]| list.iter().all(|c| c.pass);
         Self {
             model_explains_recording: is_explained(report),
@@ -61,14 +60,12 @@ impl ReportVerdict {
     }
 
     /// Whether the model does what was asked of it: explains the traces, and meets every component.
-    #[must_use]
-    pub fn passes(&self) -> bool {
+    pub(crate) fn passes(&self) -> bool {
         self.model_explains_recording && self.all_components_met
     }
 
     /// The statements as lines of text.
-    #[must_use]
-    pub fn summary(&self) -> Vec<String> {
+    pub(crate) fn summary(&self) -> Vec<String> {
         self.statements.iter().map(Statement::plain_text).collect()
     }
 }

@@ -7,7 +7,6 @@ use serde::Serialize;
 /// A recording and what it can show.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RecordingLine {
-    /// Name.
     pub name: String,
     /// Whether no camera took it.
     pub synthetic: bool,
@@ -25,7 +24,7 @@ pub struct RecordingLine {
 
 impl RecordingLine {
     /// The same with findings that only its folder could show.
-    pub fn add_findings(&mut self, more: impl IntoIterator<Item = QualityFinding>) {
+    pub(crate) fn add_findings(&mut self, more: impl IntoIterator<Item = QualityFinding>) {
         let kept = std::mem::take(&mut self.findings);
         self.findings = more.into_iter().chain(kept).collect();
         // stable: the order above within a severity
@@ -57,7 +56,6 @@ pub struct SearchLine {
     pub evaluations: usize,
     /// Those that failed, by reason.
     pub failed: Vec<FailureCount>,
-    /// Local searches.
     pub local_searches: usize,
     /// Sum of squared residuals at the estimates.
     pub cost: f64,
@@ -76,7 +74,6 @@ pub struct SearchLine {
 pub struct FailureCount {
     /// The reason, such as `contact-lost`.
     pub reason: String,
-    /// How many.
     pub count: usize,
 }
 
@@ -115,9 +112,7 @@ pub struct Provenance {
 pub struct SourceFile {
     /// What it is, such as `job`, `result`, `scene`, `trace`, `description`, `export`.
     pub kind: String,
-    /// Name.
     pub name: String,
-    /// SHA-256, hexadecimal.
     pub sha256: String,
     /// Whether it holds a motion that no camera took.
     pub synthetic: bool,

@@ -11,22 +11,20 @@ mod transition_lists;
 use super::fixed_step_scheme::{DEFAULT_GAIN_PER_S, FixedStepLocator, FixedStepScheme};
 use super::scene::{ContactLossRule, JamRule, Scene};
 use super::{IntegrationMethod, SolverOptions};
-pub use reference::{AccuracyRow, ComponentPair, HIGH_COMPONENT, LOW_COMPONENT, ReferenceRun};
-pub use transition_lists::TransitionDifference;
+pub(crate) use reference::{AccuracyRow, HIGH_COMPONENT, LOW_COMPONENT, ReferenceRun};
 
 // What a scene is run with in a study.
 
 /// Tolerances of a study.
-pub const TOLERANCES: [f64; 9] = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12];
+pub(crate) const TOLERANCES: [f64; 9] = [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12];
 /// Fixed steps of a study, s: from a tenth of a stick-slip cycle of 1 kHz to where rounding takes over.
 pub(crate) const FIXED_STEPS_S: [f64; 5] = [1e-4, 3e-5, 1e-5, 3e-6, 1e-6];
 /// Tolerance of the reference.
-pub const REFERENCE_TOLERANCE: f64 = 1e-13;
+pub(crate) const REFERENCE_TOLERANCE: f64 = 1e-13;
 
 /// A method with what sets its error.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SolverSetting {
-    /// The method.
+pub(crate) struct SolverSetting {
     pub method: IntegrationMethod,
     /// Its tolerance; a fixed step has none.
     pub relative_tolerance: Option<f64>,
@@ -34,8 +32,7 @@ pub struct SolverSetting {
 
 impl SolverSetting {
     /// The method's name in tables and figures.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
+    pub(crate) fn name(&self) -> &'static str {
         match self.method {
             IntegrationMethod::FixedStep(FixedStepScheme { locate: FixedStepLocator::StepEnd, .. }) => {
                 "fixed-step-end"
@@ -57,8 +54,7 @@ impl SolverSetting {
 
 /// Every setting that a scene can be run with: each adaptive method at each tolerance, then the fixed steps,
 /// unless the scene flies or has impacts.
-#[must_use]
-pub fn list_settings(scene: &Scene) -> Vec<SolverSetting> {
+pub(crate) fn list_settings(scene: &Scene) -> Vec<SolverSetting> {
     let adaptive = [IntegrationMethod::Taylor, IntegrationMethod::RungeKutta, IntegrationMethod::Slack];
     let tolerances =
         |method| TOLERANCES.map(|relative| SolverSetting { method, relative_tolerance: Some(relative) });
@@ -83,8 +79,7 @@ fn format_optional(value: Option<f64>) -> String {
 
 /// `work-precision.csv`: one row a setting; `error` is the worst error of a transition time, s, empty where
 /// the list of transitions is not the reference's.
-#[must_use]
-pub fn write_work_precision_csv(rows: &[AccuracyRow]) -> String {
+pub(crate) fn write_work_precision_csv(rows: &[AccuracyRow]) -> String {
     let row = |r: &AccuracyRow| {
         let [tolerance, step, error] =
             [r.setting.relative_tolerance, r.setting.method.step_s(), r.lists.worst_s].map(format_optional);
@@ -97,8 +92,7 @@ pub fn write_work_precision_csv(rows: &[AccuracyRow]) -> String {
 
 /// `accuracy.csv`: every error of every setting. `above_reference_uncertainty` says whether the error of the
 /// transition times is larger than the distance of the two references.
-#[must_use]
-pub fn write_accuracy_csv(reference: &ReferenceRun<'_>, rows: &[AccuracyRow]) -> String {
+pub(crate) fn write_accuracy_csv(reference: &ReferenceRun<'_>, rows: &[AccuracyRow]) -> String {
     let row = |r: &AccuracyRow| {
         let [tolerance, step, error] =
             [r.setting.relative_tolerance, r.setting.method.step_s(), r.lists.worst_s].map(format_optional);

@@ -10,7 +10,7 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 
 /// Standard acceleration of free fall, m/s2 (CGPM 1901): what turns a mass into a weight.
-pub const FREE_FALL_M_PER_S2: f64 = 9.806_65;
+pub(crate) const FREE_FALL_M_PER_S2: f64 = 9.806_65;
 
 /// Numbers to check with simple means; lengths in m, forces in N, masses in kg.
 #[derive(Debug, Clone, PartialEq, Serialize)]

@@ -60,7 +60,7 @@ impl Drive {
     /// Taylor coefficients of the head's velocity about `t`, as many as `out` holds; they are those of the
     /// motion after `t` and hold up to the [next break](Self::next_break).
     #[inline]
-    pub fn velocity_series(&self, t: f64, out: &mut [f64]) {
+    pub(crate) fn velocity_series(&self, t: f64, out: &mut [f64]) {
         match *self {
             Self::Cosine { amplitude_m, frequency_hz, delay_s } => {
                 let omega = TAU * frequency_hz;
@@ -86,8 +86,7 @@ impl Drive {
     }
 
     /// The same motion with every length multiplied by `factor`.
-    #[must_use]
-    pub fn scale_lengths(&self, factor: f64) -> Self {
+    pub(crate) fn scale_lengths(&self, factor: f64) -> Self {
         match self {
             _ if factor == 1.0 => self.clone(),
             &Self::Cosine { amplitude_m, frequency_hz, delay_s } => {
@@ -99,8 +98,7 @@ impl Drive {
     }
 
     /// Time of the scene at which the cosine starts, s; 0 for any other motion.
-    #[must_use]
-    pub fn delay_s(&self) -> f64 {
+    pub(crate) fn delay_s(&self) -> f64 {
         if let Self::Cosine { delay_s, .. } = *self { delay_s } else { 0.0 }
     }
 
@@ -117,7 +115,6 @@ impl Drive {
 
     /// How far integration may go from `t`, s: to the next break, and no further than `stop`.
     #[inline]
-    #[must_use]
     pub(crate) fn horizon(&self, t: f64, stop: f64) -> f64 {
         self.next_break(t).map_or(stop, |next| next.min(stop))
     }
@@ -139,9 +136,9 @@ const FEWEST_FRAMES: usize = 10;
 
 /// Time at either end of a recording in which the acceleration of its head is less certain by a factor of
 /// ten, s: a run keeps away from it.
-pub const UNCERTAIN_END_S: f64 = 0.01;
+pub(crate) const UNCERTAIN_END_S: f64 = 0.01;
 /// Share of the greatest speed of a head from which a tip slides evenly enough for a run to start there.
-pub const EVEN_SPEED_SHARE: f64 = 0.2;
+pub(crate) const EVEN_SPEED_SHARE: f64 = 0.2;
 
 /// Steps in which an even motion is looked for, s.
 const EVEN_SEARCH_STEP_S: f64 = 1e-3;
@@ -195,8 +192,7 @@ pub fn smooth_head_motion(recording: &Recording) -> Result<HeadSpline, HeadMotio
 
 /// The first time at which a head moves fast enough for a run to start in steady slip, s, behind the
 /// uncertain start of its motion.
-#[must_use]
-pub fn even_motion_start_s(motion: &HeadSpline) -> f64 {
+pub(crate) fn even_motion_start_s(motion: &HeadSpline) -> f64 {
     let [first_s, last_s] = motion.span_s();
     let count = ((last_s - first_s) / EVEN_SEARCH_STEP_S) as usize;
     let times = || (0..=count).map(|step| first_s + UNCERTAIN_END_S + step as f64 * EVEN_SEARCH_STEP_S);

@@ -41,8 +41,7 @@ const FRICTIONS: u32 = 300;
 /// velocity, and the deflection `tip_x - head_x`, m, of each, both rising in size; as far as there are
 /// equilibria, and as long as a larger coefficient bends the blade farther. Their order is that of the
 /// deflection.
-#[must_use]
-pub fn static_deflections(linkage: &Linkage) -> Vec<(f64, f64)> {
+pub(crate) fn static_deflections(linkage: &Linkage) -> Vec<(f64, f64)> {
     let one_way = |sign: f64| {
         let mut angles = Vector2::zeros();
         let mut found: Vec<(f64, f64)> = Vec::new();

@@ -12,8 +12,7 @@ use super::phases::{
 use super::scene::{ContactLossRule, JamRule, Scene};
 use super::solution_segment::{SegmentSolution, SolutionSegment};
 use super::{
-    Impact, IntegrationMethod, Observer, RunResult, RunStatus, SolverOptions, Transition,
-    TransitionCause,
+    Impact, IntegrationMethod, Observer, RunResult, RunStatus, SolverOptions, Transition, TransitionCause,
 };
 use crate::model::flight::FlightState;
 use crate::model::modes::time_scales_rad_per_s;

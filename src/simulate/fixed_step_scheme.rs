@@ -13,15 +13,15 @@ use super::phases::{ContactInstant, DrivenBlade, GUARDS, TipForces, apply_fricti
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{LinkDirections, Pose};
 use crate::ode::HybridPhase;
-pub use crate::ode::fixed_step::FixedStepLocator;
+pub(crate) use crate::ode::fixed_step::FixedStepLocator;
 use crate::ode::fixed_step::FixedStepOptions;
 
 /// Gain of the stabilisation unless asked for otherwise, 1/s: what the tip has drifted decays within 0.1 ms,
 /// a tenth of a stick-slip cycle.
-pub const DEFAULT_GAIN_PER_S: f64 = 1e4;
+pub(crate) const DEFAULT_GAIN_PER_S: f64 = 1e4;
 /// Largest product of gain and step: beyond it the classical Runge-Kutta method is unstable for the double
 /// pole at `-a` (Hairer and Wanner, "Solving Ordinary Differential Equations II", section IV.2).
-pub const LARGEST_GAIN_TIMES_STEP: f64 = 2.785;
+pub(crate) const LARGEST_GAIN_TIMES_STEP: f64 = 2.785;
 
 /// The scheme's settings.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,8 +37,7 @@ pub struct FixedStepScheme {
 
 impl FixedStepScheme {
     /// What the integrator takes of it.
-    #[must_use]
-    pub fn integrator_options(&self) -> FixedStepOptions {
+    pub(crate) fn integrator_options(&self) -> FixedStepOptions {
         FixedStepOptions { step_s: self.step_s, locate: self.locate }
     }
 }
@@ -46,7 +45,7 @@ impl FixedStepScheme {
 /// The tip is drawn to `place_m`; states `(theta, phi, theta_rate, phi_rate)`. The guards are those of
 /// [`super::phases::Stick`].
 #[derive(Debug, Clone, Copy)]
-pub struct StabilisedStickPhase<'a> {
+pub(crate) struct StabilisedStickPhase<'a> {
     /// The blade on its drive.
     pub system: &'a DrivenBlade,
     /// Where the tip is held, `alpha`, m.
@@ -59,8 +58,7 @@ pub struct StabilisedStickPhase<'a> {
 
 impl<'a> StabilisedStickPhase<'a> {
     /// Holds the tip where it is in this pose.
-    #[must_use]
-    pub fn from_pose(
+    pub(crate) fn from_pose(
         system: &'a DrivenBlade,
         t: f64,
         pose: &Pose,

@@ -24,7 +24,6 @@ pub struct FlightPhase<'a> {
 
 /// The state behind the six numbers.
 #[inline]
-#[must_use]
 pub(crate) fn flight_state_from(y: &[f64; 6]) -> FlightState {
     FlightState {
         pose: Pose { theta: y[0], phi: y[1], theta_rate: y[3], phi_rate: y[4] },

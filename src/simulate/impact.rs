@@ -148,9 +148,7 @@ struct ImpactState {
 
 /// An impact without units.
 struct ScaledImpact {
-    /// `W_nt / W_nn`.
     cross: f64,
-    /// `W_tt / W_nn`.
     along: f64,
     friction: FrictionLaw,
     restitution: f64,
@@ -351,12 +349,10 @@ impl HybridPhase<2, 3> for ImpactSlip<'_> {
 
 /// How the tip strikes the glass.
 #[derive(Debug, Clone, Copy)]
-pub struct TipStrike {
-    /// Pose before.
+pub(crate) struct TipStrike {
     pub pose: Pose,
     /// Velocity of the tip before.
     pub before: TipVelocity,
-    /// What begins it.
     pub origin: ImpactOrigin,
     /// The restitution that counts.
     pub restitution: f64,
@@ -364,7 +360,7 @@ pub struct TipStrike {
 
 impl TipStrike {
     /// State and impact behind it; `None` where the integration meets numbers that are not finite.
-    pub fn solve_on_blade(
+    pub(crate) fn solve_on_blade(
         &self,
         linkage: &Linkage,
         relative: f64,

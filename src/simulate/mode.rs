@@ -44,15 +44,14 @@ impl TipMode {
     }
 
     /// The slip mode of a direction.
-    #[must_use]
-    pub fn slip_towards(direction: f64) -> Self {
+    pub(crate) fn slip_towards(direction: f64) -> Self {
         if direction < 0.0 { Self::SlipBackward } else { Self::SlipForward }
     }
 }
 
 /// What contact does next with the tip at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum RestDecision {
+pub(crate) enum RestDecision {
     /// Contact goes on in this mode.
     Becomes(TipMode),
     /// More than one mode is consistent with the forces.
@@ -72,8 +71,7 @@ pub fn holding_force(contact: &FrictionResponse) -> f64 {
 /// Where `1 + sigma mu nu` is positive in both directions exactly one mode is consistent: stick if the
 /// holding force is within the static limit and the tip is pressed on, lift-off if the glass would have to
 /// pull, otherwise slip against the holding force. Where it is not (the Painlevé region) every mode is tried.
-#[must_use]
-pub fn decide_mode_at_rest(contact: &FrictionResponse, mu: f64) -> RestDecision {
+pub(crate) fn decide_mode_at_rest(contact: &FrictionResponse, mu: f64) -> RestDecision {
     let force = holding_force(contact);
     let normal = contact.n_free + contact.nu * force;
     let sticks = normal > 0.0 && force.abs() <= mu * normal;

@@ -7,7 +7,7 @@ use crate::simulate::{Impact, ModelSample, Observer, RunResult, SolutionSegment,
 
 /// Samples of a run: enough for twenty points in a cycle of 1 kHz over the quarter of a second that a
 /// reversal takes.
-pub const MOTION_SAMPLES: usize = 6000;
+pub(crate) const MOTION_SAMPLES: usize = 6000;
 /// Time between fine samples, s: fifty in a cycle of 1 kHz. Of a long run there are [`MAX_FINE_SAMPLES`] (14 MB).
 const FINE_STEP_S: f64 = 2e-5;
 const MAX_FINE_SAMPLES: usize = 100_000;
@@ -46,15 +46,13 @@ impl RunMotion {
     }
 
     /// The fine samples between two instants, s.
-    #[must_use]
-    pub fn fine_samples_between(&self, [from_s, to_s]: [f64; 2]) -> &[ModelSample] {
+    pub(crate) fn fine_samples_between(&self, [from_s, to_s]: [f64; 2]) -> &[ModelSample] {
         let first = self.fine.partition_point(|s| s.time_s < from_s);
         let end = self.fine.partition_point(|s| s.time_s <= to_s);
         self.fine.get(first..end).unwrap_or_default()
     }
 
     /// The sample at the first extremum of the head's path from which it comes back, and to which it had come.
-    #[must_use]
     pub(crate) fn turn(&self) -> Option<usize> {
         let x = |at: usize| self.samples[at].head_x_m;
         let (least, most) = self
@@ -75,14 +73,12 @@ impl RunMotion {
     }
 
     /// When the head turns, s; `None` where it does not.
-    #[must_use]
-    pub fn turn_s(&self) -> Option<f64> {
+    pub(crate) fn turn_s(&self) -> Option<f64> {
         self.samples.get(self.turn()?).map(|sample| sample.time_s)
     }
 
     /// The longest stick, s; the last of several as long.
-    #[must_use]
-    pub fn longest_stick_s(&self) -> Option<[f64; 2]> {
+    pub(crate) fn longest_stick_s(&self) -> Option<[f64; 2]> {
         self.stick_s.iter().copied().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
     }
 }

@@ -50,7 +50,7 @@ impl Observer for Transitions {
 
 /// The list of impacts.
 #[derive(Debug, Clone, Default)]
-pub struct Impacts(pub Vec<Impact>);
+pub(crate) struct Impacts(pub Vec<Impact>);
 
 impl Observer for Impacts {
     fn observe_segment(&mut self, _: &SolutionSegment<'_>) {}
@@ -198,7 +198,6 @@ impl Observer for EnergyAudit {
     }
 }
 
-/// `summary.json`.
 #[derive(Debug, Clone, Serialize)]
 #[allow(missing_docs)] // the fields are those of the file, named with their units
 pub struct SimulationSummary {
@@ -262,8 +261,7 @@ impl SimulationSummary {
 }
 
 /// What the scene makes active.
-#[must_use]
-pub fn model_parts(scene: &Scene) -> Vec<&'static str> {
+pub(crate) fn model_parts(scene: &Scene) -> Vec<&'static str> {
     let Linkage { head, neck, lip, friction, shoulder, .. } = &scene.linkage;
     let parts = [
         (true, "stick"),
@@ -283,10 +281,8 @@ pub fn model_parts(scene: &Scene) -> Vec<&'static str> {
     parts.into_iter().filter(|(active, _)| *active).map(|(_, name)| name).collect()
 }
 
-/// Header of `state.csv`.
-pub const STATE_HEADER: &str = "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode";
-/// Header of `events.csv`.
-pub const EVENTS_HEADER: &str = "time_s,from,to,cause";
+pub(crate) const STATE_HEADER: &str = "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode";
+pub(crate) const EVENTS_HEADER: &str = "time_s,from,to,cause";
 
 /// The instants of the sampled outputs of a scene, s.
 pub fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> + use<> {
@@ -326,7 +322,7 @@ pub fn push_event_row(text: &mut String, Transition { time_s, from, to, cause }:
 // What an open shutter sees of a run: the mean of the places over its interval.
 
 /// Hands the mean place over every interval to `sink`; that of an interval of no length is the place then.
-pub struct ShutterObserver<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> {
+pub(crate) struct ShutterObserver<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> {
     intervals: Peekable<I>,
     sink: F,
     sum: [f64; 4],
@@ -336,7 +332,7 @@ pub struct ShutterObserver<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)>
 impl<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> ShutterObserver<I, F> {
     /// Shutters that open at the first and close at the second of each two times, s. They follow one another
     /// without overlap and lie within the run; one that the run does not see closed gives nothing.
-    pub fn new(intervals: I, sink: F) -> Self {
+    pub(crate) fn new(intervals: I, sink: F) -> Self {
         Self { intervals: intervals.peekable(), sink, sum: [0.0; 4], open_s: 0.0 }
     }
 

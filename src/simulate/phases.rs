@@ -112,11 +112,11 @@ impl DrivenBlade {
 
 /// Taylor coefficients of the blade's motion, one order more than is used of the states: forces are known to
 /// one less.
-pub type TaylorMotion = MotionSeries<{ TERMS + 2 }>;
+pub(crate) type TaylorMotion = MotionSeries<{ TERMS + 2 }>;
 
 /// Friction and normal force at one instant, N, with the angular accelerations they cause, rad/s2.
 #[derive(Debug, Clone, Copy)]
-pub struct TipForces {
+pub(crate) struct TipForces {
     /// Friction force on the tip, N.
     pub friction_n: f64,
     /// Normal force on the tip, N.
@@ -140,7 +140,6 @@ pub struct SlipPhase<'a> {
 
 /// The pose of the four slip states.
 #[inline]
-#[must_use]
 pub(crate) fn pose_from_states(y: &[f64; 4]) -> Pose {
     Pose { theta: y[0], phi: y[1], theta_rate: y[2], phi_rate: y[3] }
 }
@@ -411,8 +410,7 @@ impl TaylorPhase<2, GUARDS> for StickPhase<'_> {
 }
 
 /// Mode that follows when a guard of stick falls to the friction limit.
-#[must_use]
-pub fn mode_after_release(guard: usize) -> Option<TipMode> {
+pub(crate) fn mode_after_release(guard: usize) -> Option<TipMode> {
     match guard {
         FORWARD_LIMIT => Some(TipMode::SlipForward),
         BACKWARD_LIMIT => Some(TipMode::SlipBackward),

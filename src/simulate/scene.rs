@@ -123,8 +123,7 @@ impl Scene {
     }
 
     /// Energetic coefficient of restitution of the tip's impacts on the glass.
-    #[must_use]
-    pub fn restitution(&self) -> f64 {
+    pub(crate) fn restitution(&self) -> f64 {
         self.values.get("contact.restitution").copied().unwrap_or(0.0)
     }
 
@@ -175,7 +174,6 @@ impl Scene {
     }
 
     /// The linkage with one parameter set to any value, admissible or not: for differences.
-    #[must_use]
     pub(super) fn linkage_with(&self, parameter: &ModelParameter, value: f64) -> Linkage {
         linkage_constants(&self.values_with(parameter, value), self.has_shoulder)
     }

@@ -139,8 +139,7 @@ pub fn add_tracking_noise(
 }
 
 /// Every parameter of the scene behind a twin, by name, in SI: the truth that a fit is held against.
-#[must_use]
-pub fn true_parameters(scene: &Scene) -> toml::Table {
+pub(crate) fn true_parameters(scene: &Scene) -> toml::Table {
     PARAMETERS
         .iter()
         .filter_map(|p| scene.value(p.name).map(|value| (p.name.to_owned(), toml::Value::Float(value))))
@@ -150,12 +149,11 @@ pub fn true_parameters(scene: &Scene) -> toml::Table {
 // A twin in the layout that Tracker's export dialog writes, so that the real importer can be tried on it.
 
 /// Names of the tracks: the mark that the data are synthetic travels in the file itself.
-pub const SYNTHETIC_TRACK_NAMES: [&str; 2] = ["synthetic tip", "synthetic head"];
+pub(crate) const SYNTHETIC_TRACK_NAMES: [&str; 2] = ["synthetic tip", "synthetic head"];
 
 /// The recording as a tab-separated table of two tracks in pixels, y upwards, time from the first frame; an
 /// empty cell where a point was lost. Numbers carry seven digits, as Tracker's do.
-#[must_use]
-pub fn write_tracker_table(recording: &Recording, metres_per_pixel: f64) -> String {
+pub(crate) fn write_tracker_table(recording: &Recording, metres_per_pixel: f64) -> String {
     let [tip, head] = SYNTHETIC_TRACK_NAMES;
     let mut text = format!("#multi:\n\t{tip}\t\t{head}\t\t\nt\tx\ty\tx\ty\t\n");
     let traces = recording.traces();

@@ -58,8 +58,7 @@ impl WindowedTransform {
     }
 
     /// Length of the record, s.
-    #[must_use]
-    pub fn duration_s(&self) -> f64 {
+    pub(crate) fn duration_s(&self) -> f64 {
         self.samples.len() as f64 / self.frame_rate_hz
     }
 
@@ -76,13 +75,12 @@ impl WindowedTransform {
     ///
     /// # Errors
     /// [`SpectrumError::Band`] where it does not.
-    pub fn check_band(&self, band_hz: (f64, f64)) -> Result<(), SpectrumError> {
+    pub(crate) fn check_band(&self, band_hz: (f64, f64)) -> Result<(), SpectrumError> {
         check_band(Some(band_hz), self.frame_rate_hz)
     }
 
     /// Root mean square of what lies between two frequencies, m, as [`Spectrum::rms_in_band_m`].
-    #[must_use]
-    pub fn rms_in_band_m(&self, low_hz: f64, high_hz: f64) -> f64 {
+    pub(crate) fn rms_in_band_m(&self, low_hz: f64, high_hz: f64) -> f64 {
         let bandwidth_hz = self.periodogram.noise_bandwidth_hz(self.frame_rate_hz);
         rms_in_band_m(
             &self.amplitude_m,
@@ -94,8 +92,7 @@ impl WindowedTransform {
 
     /// Amplitude at a frequency in the first and the second half of the record, m, each by a Hann window of
     /// its own over the frames present.
-    #[must_use]
-    pub fn half_amplitudes_m(&self, frequency_hz: f64) -> [f64; 2] {
+    pub(crate) fn half_amplitudes_m(&self, frequency_hz: f64) -> [f64; 2] {
         let half = self.samples.len() / 2;
         let of = |from: usize| {
             let pattern = &self.samples[from..from + half];

@@ -91,8 +91,7 @@ impl Oscillation {
     }
 
     /// Amplitude at a time from the record's first frame, m.
-    #[must_use]
-    pub fn envelope_m(&self, time_s: f64) -> f64 {
+    pub(crate) fn envelope_m(&self, time_s: f64) -> f64 {
         if time_s < self.begins_s {
             return 0.0;
         }
@@ -125,8 +124,7 @@ const MAX_SMOOTH_TREND_COLUMNS: usize = 20;
 
 impl SpectralAnalysis {
     /// The record less what was removed, m.
-    #[must_use]
-    pub fn detrended_m(&self) -> Vec<Option<f64>> {
+    pub(crate) fn detrended_m(&self) -> Vec<Option<f64>> {
         self.residual_m.iter().zip(&self.model_m).map(|(left, m)| left.map(|left| left + m)).collect()
     }
 

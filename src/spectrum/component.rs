@@ -74,8 +74,7 @@ pub enum Estimator {
 
 impl Component {
     /// Whether the record holds enough of its cycles for a frequency of its own.
-    #[must_use]
-    pub fn is_resolvable(&self) -> bool {
+    pub(crate) fn is_resolvable(&self) -> bool {
         self.verdict != ComponentVerdict::NotResolvable
     }
 

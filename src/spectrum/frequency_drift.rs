@@ -237,7 +237,6 @@ impl RidgeMean {
 #[derive(Default)]
 struct CycleCount {
     cycles: f64,
-    /// Of the cycles.
     variance: f64,
     duration_s: f64,
 }

@@ -18,7 +18,6 @@ use rayon::prelude::*;
 /// Longest gap that is bridged, frames: beyond it the fill amplifies noise more than a gap of weight zero
 /// costs.
 pub(crate) const LONGEST_FILLED_GAP: usize = 4;
-/// Fourth difference.
 const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const ORDER: usize = DIFFERENCE.len() - 1;
 /// Most frames solved for together; a record with so dense gaps keeps the rest as gaps.
@@ -30,8 +29,7 @@ const PARALLEL_FROM: usize = 1 << 17;
 const CLUSTERS_AT_ONCE: usize = 256;
 
 /// The record with its short gaps filled; what cannot be filled stays `None`.
-#[must_use]
-pub fn fill_short_gaps(samples: &[Option<f64>]) -> Vec<Option<f64>> {
+pub(crate) fn fill_short_gaps(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut filled = samples.to_vec();
     let short: Vec<usize> = missing_runs(samples)
         .into_iter()

@@ -50,7 +50,6 @@ pub(super) struct RefinementStart {
 pub(super) struct RefinedComponent {
     /// Frequency, cycles in the record.
     pub cycles: f64,
-    /// Amplitude, m.
     pub amplitude_m: f64,
     /// How well they are known; `None` where the rest is no noise, and tells nothing of it.
     pub deviations: Option<RefinedDeviations>,
@@ -73,7 +72,6 @@ pub(super) enum RefinementOutcome {
     /// It stands as the transform saw it, though at that frequency the frames present leave it this
     /// amplitude, m.
     FixedFrequency(f64),
-    /// It was refined.
     Refined(RefinedComponent),
 }
 

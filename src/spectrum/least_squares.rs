@@ -42,11 +42,8 @@ const MOST_RELAXED_AT_END: f64 = 330.0;
 /// What of a term moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum FreeParameters {
-    /// Its amplitude alone.
     Amplitude,
-    /// Its frequency too.
     Cycles,
-    /// Frequency and decay.
     CyclesAndNepers,
     /// The decay alone: with no cycles, a relaxation.
     Nepers,
@@ -140,7 +137,6 @@ pub(super) struct SinusoidProblem {
     fixed_columns: Rc<FixedColumns>,
 }
 
-/// Terms solved for.
 #[derive(Debug, Clone)]
 pub(super) struct SinusoidSolution {
     pub terms: Vec<SinusoidTerm>,
@@ -342,7 +338,6 @@ pub(super) struct TermDeviations {
     pub cycles: f64,
     /// Of the nepers over the record; 0 where they are held.
     pub nepers: f64,
-    /// Of the amplitude.
     pub amplitude: f64,
 }
 

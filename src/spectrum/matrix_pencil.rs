@@ -27,7 +27,6 @@ const MOST_ITERATIONS: usize = 2000;
 /// gives such poles.
 const MOST_NEPERS: f64 = 200.0;
 
-/// A decaying oscillation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pole {
     /// Cycles in the record.

@@ -26,7 +26,6 @@ pub(super) const STEP_CYCLES: f64 = 8.0;
 pub(super) const LOBE: f64 = 2.0;
 /// Nepers over the record at which a relaxation is tried, at its start or, negative, at its end.
 const RELAXATION_NEPERS: [f64; 8] = [5.0, 15.0, 45.0, 135.0, -5.0, -15.0, -45.0, -135.0];
-/// Most relaxations.
 const MOST_RELAXATIONS: usize = 3;
 /// Frames for each unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
@@ -65,9 +64,7 @@ pub(super) struct ModelSelector<'a> {
 /// Where a drifting cycle shows itself.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DriftRegion {
-    /// Least frequency, Hz.
     pub low_hz: f64,
-    /// Greatest frequency, Hz.
     pub high_hz: f64,
     /// Half width of the lobe of the segments in which it was followed, Hz: it keeps no frequency for longer.
     pub lobe_hz: f64,
@@ -82,7 +79,6 @@ pub(super) struct SinusoidModel {
 }
 
 impl SinusoidModel {
-    /// The trend.
     pub(super) fn trend(&self) -> Trend {
         self.problem.trend
     }
@@ -93,7 +89,6 @@ pub(super) struct Decomposition {
     pub model: SinusoidModel,
     /// What is left in each frame, m.
     pub residual_m: Vec<Option<f64>>,
-    /// Its spectrum.
     pub amplitude_m: Vec<f64>,
     /// Its peaks and noise floor.
     pub peaks: PeakList,

@@ -47,7 +47,6 @@ impl WindowedSpectrum<'_> {
 
 /// The peaks that are components of their own.
 pub(super) struct PeakList {
-    /// Noise floor, m.
     pub floor_m: f64,
     /// Level over the noise from which there is a component.
     pub detection: f64,
@@ -109,13 +108,11 @@ impl PeakList {
     }
 }
 
-/// A local maximum.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Peak {
     bin: usize,
     /// Frequency of the parabola's top, Hz.
     pub frequency_hz: f64,
-    /// Its height, m.
     pub amplitude_m: f64,
 }
 

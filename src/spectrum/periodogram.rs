@@ -149,9 +149,7 @@ impl Periodogram {
 /// Sums over the weights of a record.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct WindowSums {
-    /// Of the weights.
     pub first: f64,
-    /// Of their squares.
     pub second: f64,
     /// Frames that hold a value.
     pub present: usize,
@@ -187,7 +185,6 @@ const ROUNDED_BINS: usize = 2;
 /// A spectrum and what its window does to a sine.
 pub(super) struct WindowedSpectrum<'a> {
     pub amplitude_m: &'a [f64],
-    /// From [`sidelobe_maxima`].
     pub envelope: &'a [f64],
     pub bin_hz: f64,
     pub resolution_hz: f64,

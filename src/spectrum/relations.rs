@@ -19,7 +19,6 @@ const MOST_FOLDED: usize = 8;
 const ALWAYS_TRIED_MULTIPLES: usize = 5;
 /// Beats after which one is like the first: more have never been seen.
 const SUBHARMONIC_DENOMINATORS: [usize; 2] = [2, 3];
-/// Highest fraction tried.
 const MOST_FRACTION: usize = 5;
 /// Sidebands on each side of a component.
 const SIDEBANDS: usize = 2;
@@ -33,7 +32,6 @@ const CHANCE_MATCHES: f64 = 0.05;
 const SIDEBAND_RATIO: f64 = 0.5;
 /// Deviations within which a frequency is that of the mains.
 const MAINS_DEVIATIONS: f64 = 3.0;
-/// Mains frequencies, Hz.
 const MAINS_HZ: [usize; 2] = [50, 60];
 /// Highest multiple of the mains that a lamp shows: it flickers at the second.
 const MOST_MAINS: usize = 12;

@@ -21,7 +21,6 @@ const DECISIVE_DIFFERENCE: f64 = 10.0;
 
 /// A term that leaves more than noise around it.
 pub(super) struct DoubtfulTerm {
-    /// Its number.
     pub index: usize,
     /// The criterion that what takes its place must fall below.
     pub criterion: f64,

@@ -39,9 +39,9 @@ impl Default for SpectrumSettings {
 /// finds the peak of a Hann window.
 pub(crate) const ZERO_PADDING: usize = 8;
 /// Components listed unless asked for otherwise.
-pub const MAX_COMPONENTS: usize = 8;
+pub(crate) const MAX_COMPONENTS: usize = 8;
 /// Fewest frames with a value: a cubic takes four and as many are left.
-pub const MIN_SAMPLES: usize = 8;
+pub(crate) const MIN_SAMPLES: usize = 8;
 /// Fewest cycles in the record for a frequency of its own: below, the window's lobe (half width two bins)
 /// reaches its own mirror image and the trend.
 pub(crate) const MIN_CYCLES: f64 = 3.0;
@@ -57,7 +57,7 @@ pub(super) const PADDED_AT_ONCE: usize = 1 << 20;
 pub(super) const ROUNDING: f64 = 1e-12;
 /// Fastest oscillation that a blade is expected to show, Hz: blades of the model that meet both published
 /// frequencies have stick-slip cycles of 700 to 1,300 Hz, the published experiment shows about 900 Hz.
-pub const FASTEST_HZ: f64 = 1300.0;
+pub(crate) const FASTEST_HZ: f64 = 1300.0;
 /// Amplitude over the noise floor from which a component is clear, dB: at 18 dB the frequency is known to a
 /// few hundredths of a resolution.
 pub(crate) const CLEAR_DB: f64 = 18.0;

@@ -177,13 +177,10 @@ pub(super) const OVERLAP: usize = 4;
 /// Segments of a record, in frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SegmentLayout {
-    /// Of a segment.
     pub frames: usize,
     /// From one segment to the next.
     pub hop: usize,
-    /// Segments.
     pub columns: usize,
-    /// Of the record.
     pub record: usize,
 }
 

@@ -36,7 +36,6 @@ impl RealTransform {
         self.execute_plan(values).into_iter().map(|z| Complex { re: z.re.0, im: z.im.0 }).collect()
     }
 
-    /// Magnitudes of [`Self::spectrum_values`].
     pub(super) fn magnitudes(&self, values: impl Iterator<Item = f64>) -> Vec<f64> {
         self.execute_plan(values).iter().map(|z| math::hypot(z.re.0, z.im.0)).collect()
     }

@@ -54,7 +54,7 @@ impl Detrend {
     ///
     /// # Errors
     /// [`UnknownDetrend`] with the known names.
-    pub fn parse(text: &str) -> Result<Self, UnknownDetrend> {
+    pub(crate) fn parse(text: &str) -> Result<Self, UnknownDetrend> {
         let named = Self::NAMED.into_iter().find(|(name, _)| *name == text).map(|(_, detrend)| detrend);
         let polynomial = || {
             text.strip_prefix("polynomial:")?
@@ -138,7 +138,6 @@ const LEGENDRE: [[f64; 2]; HIGHEST_DEGREE + 1] = {
 pub(super) type TrendBasis = [f64; MOST_COLUMNS];
 
 impl Trend {
-    /// Number of columns.
     pub(super) fn column_count(self) -> usize {
         match self {
             Self::Polynomial(columns) => columns,

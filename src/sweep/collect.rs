@@ -77,19 +77,12 @@ impl<F: Read + Write + Seek> PointCollection<F> {
     }
 
     /// Number of points that are known.
-    #[must_use]
-    pub fn known_count(&self) -> usize {
+    pub(crate) fn known_count(&self) -> usize {
         self.known
     }
 
-    /// Whether a point is known.
-    #[must_use]
-    pub fn has_point(&self, index: usize) -> bool {
-        self.places.get(index).is_some_and(|place| *place > 0)
-    }
-
     /// Indices of the points that are missing.
-    pub fn missing_indices(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn missing_indices(&self) -> impl Iterator<Item = usize> + '_ {
         self.places.iter().enumerate().filter(|(_, place)| **place == 0).map(|(index, _)| index)
     }
 
@@ -97,7 +90,7 @@ impl<F: Read + Write + Seek> PointCollection<F> {
     ///
     /// # Errors
     /// [`CollectError::Spool`].
-    pub fn read_outcome(&mut self, index: usize) -> Result<Option<PointOutcome>, CollectError> {
+    pub(crate) fn read_outcome(&mut self, index: usize) -> Result<Option<PointOutcome>, CollectError> {
         Ok(self.read_point(index)?.map(|there| there.point.outcome))
     }
 

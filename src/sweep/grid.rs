@@ -38,8 +38,7 @@ pub struct SweepAxis {
 
 impl AxisSpacing {
     /// The value at a share of the way from one end to the other.
-    #[must_use]
-    pub fn interpolate_value(self, from: f64, to: f64, share: f64) -> f64 {
+    pub(crate) fn interpolate_value(self, from: f64, to: f64, share: f64) -> f64 {
         round_value(match self {
             Self::Linear => from + share * (to - from),
             Self::Log => from * math::exp(share * math::ln(to / from)),
@@ -47,8 +46,7 @@ impl AxisSpacing {
     }
 
     /// `points` values (two or more) from one end to the other, both included and exact.
-    #[must_use]
-    pub fn spread_values(self, from: f64, to: f64, points: usize) -> Vec<f64> {
+    pub(crate) fn spread_values(self, from: f64, to: f64, points: usize) -> Vec<f64> {
         let last = points.saturating_sub(1);
         let inner = |i: usize| self.interpolate_value(from, to, i as f64 / last as f64);
         let ends = |i: usize| {
@@ -66,16 +64,14 @@ impl AxisSpacing {
 
 /// A range that is walked in one way.
 #[derive(Debug, Clone, Copy)]
-pub struct AxisValues<'a> {
-    /// The values, rising.
+pub(crate) struct AxisValues<'a> {
     pub of: &'a [f64],
     /// How they are spread.
     pub spacing: AxisSpacing,
 }
 
 /// Value of every axis at point `index`; the first axis of a grid is the slowest.
-#[must_use]
-pub fn point_values(axes: &[AxisValues], sample: Option<&SamplePlan>, index: usize) -> Vec<f64> {
+pub(crate) fn point_values(axes: &[AxisValues], sample: Option<&SamplePlan>, index: usize) -> Vec<f64> {
     match sample {
         Some(sample) => {
             let sampled = |(axis, share): (&AxisValues, f64)| {
@@ -96,8 +92,7 @@ fn round_value(value: f64) -> f64 {
 }
 
 /// Places of point `index` along axes of these lengths; the first axis is the slowest.
-#[must_use]
-pub fn grid_indices(lengths: &[usize], index: usize) -> Vec<usize> {
+pub(crate) fn grid_indices(lengths: &[usize], index: usize) -> Vec<usize> {
     let mut rest = index;
     let mut places: Vec<usize> = lengths
         .iter()
@@ -146,7 +141,7 @@ pub enum SampleSequence {
 impl SamplePlan {
     /// Coordinates of point `index` in a unit box, each above 0 and below 1; any point by itself, without
     /// those before it.
-    pub fn unit_coordinates(&self, index: usize) -> impl Iterator<Item = f64> {
+    pub(crate) fn unit_coordinates(&self, index: usize) -> impl Iterator<Item = f64> {
         let SampleSequence::Sobol = self.method;
         let mut shifts = Xoshiro256PlusPlus::seed_from_u64(self.seed);
         let gray = index as u64 ^ (index as u64 >> 1);

@@ -17,8 +17,7 @@ use serde::{Deserialize, Serialize};
 
 /// The journal of a study.
 pub type SweepJournal = checkpoint::CheckpointFile<SweepPoint>;
-/// Its header.
-pub type SweepHeader = checkpoint::CheckpointHeader<SweepHeaderBody>;
+pub(crate) type SweepHeader = checkpoint::CheckpointHeader<SweepHeaderBody>;
 
 /// What the header of a study says besides.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -186,7 +185,7 @@ struct MissingCell {
 
 /// Points drawn from a journal while it is read, each as likely as every other.
 #[derive(Debug)]
-pub struct PointRecheck {
+pub(crate) struct PointRecheck {
     drawn: Vec<StoredRecord<SweepPoint>>,
     offered: usize,
     generator: Xoshiro256PlusPlus,
@@ -194,13 +193,12 @@ pub struct PointRecheck {
 
 impl PointRecheck {
     /// None drawn yet; others are drawn for every `seed`.
-    #[must_use]
-    pub fn new(seed: u64) -> Self {
+    pub(crate) fn new(seed: u64) -> Self {
         Self { drawn: Vec::new(), offered: 0, generator: Xoshiro256PlusPlus::seed_from_u64(seed) }
     }
 
     /// The next point of the journal.
-    pub fn offer_point(&mut self, found: StoredRecord<SweepPoint>) {
+    pub(crate) fn offer_point(&mut self, found: StoredRecord<SweepPoint>) {
         self.offered += 1;
         if self.drawn.len() < RECHECKED_RECORDS {
             self.drawn.push(found);
@@ -214,7 +212,12 @@ impl PointRecheck {
     ///
     /// # Errors
     /// [`CheckpointError::Recomputed`] at the first that differs.
-    pub fn check_points(&self, study: &Study, scene: &Scene, file: &str) -> Result<(), CheckpointError> {
+    pub(crate) fn check_points(
+        &self,
+        study: &Study,
+        scene: &Scene,
+        file: &str,
+    ) -> Result<(), CheckpointError> {
         let check = |found: &StoredRecord<SweepPoint>| {
             let index = found.record.index;
             check_recomputed(

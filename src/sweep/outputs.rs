@@ -14,8 +14,7 @@ use std::collections::BTreeMap;
 const SOURCE: &str = "simulation";
 
 /// First row of `sweep.csv`.
-#[must_use]
-pub fn csv_header(study: &Study) -> String {
+pub(crate) fn csv_header(study: &Study) -> String {
     let mut cells: Vec<String> = study.axes.iter().map(|axis| axis.parameter.name.to_owned()).collect();
     cells.extend(["status", "stopped_at_s"].map(str::to_owned));
     cells.extend(study.maps.iter().map(SweepMap::column));
@@ -25,8 +24,7 @@ pub fn csv_header(study: &Study) -> String {
 
 /// Row of a point in `sweep.csv`, in which the first axis is the slowest; a cell without a value is empty,
 /// and `status` or `describe_missing` says why.
-#[must_use]
-pub fn csv_row(study: &Study, index: usize, outcome: &PointOutcome) -> String {
+pub(crate) fn csv_row(study: &Study, index: usize, outcome: &PointOutcome) -> String {
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
     let mut cells: Vec<String> = study.point_values(index).iter().map(|value| value.to_string()).collect();
     cells.extend([outcome.status().to_owned(), number(outcome.stopped_at_s)]);
@@ -45,10 +43,9 @@ fn describe_missing(study: &Study, outcome: &PointOutcome) -> String {
     study.maps.iter().zip(&outcome.values).filter_map(of).collect::<Vec<_>>().join("; ")
 }
 
-/// `summary.json`.
 #[derive(Debug, Clone, Serialize)]
 #[allow(missing_docs)] // the fields are those of the file, named with their units
-pub struct SweepSummary {
+pub(crate) struct SweepSummary {
     pub title: String,
     pub scene: String,
     pub scene_title: String,
@@ -71,7 +68,7 @@ pub struct SweepSummary {
 
 #[derive(Debug, Clone, Serialize)]
 #[allow(missing_docs)]
-pub struct AxisSummary {
+pub(crate) struct AxisSummary {
     pub name: &'static str,
     pub unit: &'static str,
     pub scale: AxisSpacing,
@@ -84,7 +81,7 @@ pub struct AxisSummary {
 
 #[derive(Debug, Clone, Serialize)]
 #[allow(missing_docs)]
-pub struct MapSummary {
+pub(crate) struct MapSummary {
     pub name: String,
     pub kind: &'static str,
     pub unit: &'static str,
@@ -103,8 +100,7 @@ pub struct MapSummary {
 
 impl SweepSummary {
     /// That of a study of which no point is counted yet.
-    #[must_use]
-    pub fn new(study: &Study, scene_title: &str, fingerprint: &str) -> Self {
+    pub(crate) fn new(study: &Study, scene_title: &str, fingerprint: &str) -> Self {
         Self {
             title: study.title.clone(),
             scene: study.scene.clone(),
@@ -127,8 +123,7 @@ impl SweepSummary {
         }
     }
 
-    /// Counts a point.
-    pub fn count_point(&mut self, outcome: &PointOutcome) {
+    pub(crate) fn count_point(&mut self, outcome: &PointOutcome) {
         self.points += 1;
         *self.status.entry(outcome.status()).or_default() += 1;
         for (map, value) in self.maps.iter_mut().zip(&outcome.values) {
@@ -137,15 +132,14 @@ impl SweepSummary {
     }
 
     /// Adds the rank correlations of every map.
-    pub fn add_correlations(&mut self, study: &Study, found: &RankCorrelations) {
+    pub(crate) fn add_correlations(&mut self, study: &Study, found: &RankCorrelations) {
         for (at, map) in self.maps.iter_mut().enumerate() {
             map.rank_correlations = found.of_map(study, at);
         }
     }
 
     /// Whether any map has a value anywhere.
-    #[must_use]
-    pub fn has_values(&self) -> bool {
+    pub(crate) fn has_values(&self) -> bool {
         self.maps.iter().any(|map| map.values > 0)
     }
 
@@ -153,7 +147,7 @@ impl SweepSummary {
     ///
     /// # Errors
     /// None for what [`Self::new`] makes.
-    pub fn to_json(&self) -> Result<String, serde_json::Error> {
+    pub(crate) fn to_json(&self) -> Result<String, serde_json::Error> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
     }
 }

@@ -49,8 +49,7 @@ impl PointOutcome {
     pub(crate) const COMPLETED: &'static str = "completed";
 
     /// Runs point `index` of a checked study; a panic is a reason like any other.
-    #[must_use]
-    pub fn run_point(study: &Study, scene: &Scene, index: usize) -> Self {
+    pub(crate) fn run_point(study: &Study, scene: &Scene, index: usize) -> Self {
         Self::run_point_scene(study, || study.scene_of_point(scene, index), || ControlFlow::Continue(()))
     }
 

@@ -28,7 +28,7 @@ pub struct RankCorrelations {
 
 /// Rank correlation (Spearman's) of a map with a parameter.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct RankCorrelation {
+pub(crate) struct RankCorrelation {
     /// Name of the parameter.
     pub parameter: &'static str,
     /// From -1 to 1; `None` where too few points have a value, or all have the same.
@@ -36,9 +36,7 @@ pub struct RankCorrelation {
 }
 
 impl RankCorrelations {
-    /// No point yet.
-    #[must_use]
-    pub fn new(study: &Study) -> Self {
+    pub(crate) fn new(study: &Study) -> Self {
         let (axes, maps) = (study.axes.len(), study.maps.len());
         let most = (MOST_NUMBERS / (axes + maps).max(1)).min(MOST_POINTS);
         let share = (most as f64 / study.point_count().max(1) as f64).min(1.0);
@@ -46,7 +44,7 @@ impl RankCorrelations {
     }
 
     /// Looks at a point, or leaves it out.
-    pub fn look(&mut self, study: &Study, index: usize, outcome: &PointOutcome) {
+    pub(crate) fn look(&mut self, study: &Study, index: usize, outcome: &PointOutcome) {
         // multiples of the golden ratio are spread evenly over every regular part of a grid
         if (index as f64 * 0.618_033_988_749_894_9).fract() >= self.share {
             return;
@@ -57,8 +55,7 @@ impl RankCorrelations {
     }
 
     /// Rank correlation of map `map` with every parameter.
-    #[must_use]
-    pub fn of_map(&self, study: &Study, map: usize) -> Vec<RankCorrelation> {
+    pub(crate) fn of_map(&self, study: &Study, map: usize) -> Vec<RankCorrelation> {
         let of = |(at, axis): (usize, &SweepAxis)| {
             let (x, y): (Vec<f64>, Vec<f64>) = self.pairs(map, at).unzip();
             RankCorrelation { parameter: axis.parameter.name, rank_correlation: spearman_correlation(&x, &y) }
@@ -76,8 +73,7 @@ impl RankCorrelations {
 
 /// Rank correlation (Spearman's) of two lists, pair by pair; `None` where they are too short, or one is
 /// constant.
-#[must_use]
-pub fn spearman_correlation(x: &[f64], y: &[f64]) -> Option<f64> {
+pub(crate) fn spearman_correlation(x: &[f64], y: &[f64]) -> Option<f64> {
     if x.len() < FEWEST_PAIRS {
         return None;
     }

@@ -16,7 +16,7 @@ use crate::toml_file::{
 use serde::Serialize;
 
 /// Most frames of a run: a mistyped rate is refused instead of filling memory, once for every thread.
-pub const MOST_FRAMES: f64 = 1e6;
+pub(crate) const MOST_FRAMES: f64 = 1e6;
 
 /// Most points of a map: 200 by 200 cells are as many as a figure in one column can show.
 const MOST_MAPPED: usize = 40_000;
@@ -102,14 +102,12 @@ impl Study {
     }
 
     /// Whether every map is drawn over the axes, point by point.
-    #[must_use]
-    pub fn is_mapped(&self) -> bool {
+    pub(crate) fn is_mapped(&self) -> bool {
         self.sample.is_none() && self.axes.len() <= 2 && self.point_count() <= MOST_MAPPED
     }
 
     /// Whether there is a sheet with every map: one alone that is drawn has its own figure.
-    #[must_use]
-    pub fn has_sheet(&self) -> bool {
+    pub(crate) fn has_sheet(&self) -> bool {
         self.maps.len() > 1 || !self.is_mapped()
     }
 
@@ -161,8 +159,7 @@ impl Study {
 
     /// SHA-256 over everything that decides the outcome, from [`fingerprint`]: values of the study and its
     /// scene, and the version of the program.
-    #[must_use]
-    pub fn fingerprint(&self, scene: &Scene) -> String {
+    pub(crate) fn fingerprint(&self, scene: &Scene) -> String {
         fingerprint(&StudyFingerprint {
             version: env!("CARGO_PKG_VERSION"),
             scene,

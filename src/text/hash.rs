@@ -19,7 +19,7 @@ pub struct TextHash {
 
 impl TextHash {
     /// Takes the next bytes.
-    pub fn update(&mut self, mut bytes: &[u8]) {
+    pub(crate) fn update(&mut self, mut bytes: &[u8]) {
         if !self.started {
             let missing = BYTE_ORDER_MARK.len() - self.start.len();
             let (first, rest) = bytes.split_at(missing.min(bytes.len()));
@@ -34,8 +34,7 @@ impl TextHash {
     }
 
     /// The hash in 64 hexadecimal digits.
-    #[must_use]
-    pub fn finish(mut self) -> String {
+    pub(crate) fn finish(mut self) -> String {
         if !self.started {
             self.check_byte_order_mark();
         }

@@ -1,7 +1,7 @@
 //! Numbers with a given number of digits, a true minus sign, and a power of ten where plain digits would be
 //! long.
 
-use super::{DASH};
+use super::DASH;
 use crate::math;
 
 /// Powers of ten that are written in plain digits.
@@ -39,7 +39,7 @@ pub fn format_plain(value: f64) -> String {
 }
 
 /// A value as it is written, or a dash for a missing one.
-pub fn format_or_dash<T>(value: Option<T>, written: impl FnOnce(T) -> String) -> String {
+pub(crate) fn format_or_dash<T>(value: Option<T>, written: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| DASH.to_owned(), written)
 }
 
@@ -51,8 +51,7 @@ pub fn format_digits(value: f64, count: usize) -> String {
 }
 
 /// The same without zeros at the end of a fraction.
-#[must_use]
-pub fn format_trimmed(value: f64, count: usize) -> String {
+pub(crate) fn format_trimmed(value: f64, count: usize) -> String {
     format_significant(value, count, trim_zeros)
 }
 
@@ -77,14 +76,12 @@ fn format_significant(value: f64, count: usize, shorten: impl Fn(&str) -> &str) 
 }
 
 /// A fixed number of decimals.
-#[must_use]
-pub fn format_decimals(value: f64, count: usize) -> String {
+pub(crate) fn format_decimals(value: f64, count: usize) -> String {
     if value.is_finite() { typeset(&format!("{value:.count$}")) } else { DASH.to_owned() }
 }
 
 /// Digits, without zeros at the end, times a power of ten.
-#[must_use]
-pub fn format_scientific(value: f64, count: usize) -> String {
+pub(crate) fn format_scientific(value: f64, count: usize) -> String {
     let written = format!("{value:.count$e}");
     match split_exponent(&written) {
         _ if value == 0.0 => "0".to_owned(),
@@ -95,7 +92,6 @@ pub fn format_scientific(value: f64, count: usize) -> String {
 
 /// A number as a program writes it, such as `-1.5e-7`, as it is printed: a true minus sign, none before zero,
 /// and a power of ten.
-#[must_use]
 pub(crate) fn typeset(written: &str) -> String {
     let (digits, power) = match split_exponent(written) {
         Some((digits, power)) => (digits, format!("{TIMES_TEN}{}", to_superscript(power))),
@@ -119,8 +115,7 @@ const SUPERSCRIPTS: [char; 11] = [
 ];
 
 /// An exponent as it stands behind a ten.
-#[must_use]
-pub fn to_superscript(exponent: i32) -> String {
+pub(crate) fn to_superscript(exponent: i32) -> String {
     let raised =
         |c: char| SUPERSCRIPTS[c.to_digit(10).map_or(SUPERSCRIPTS.len() - 1, |digit| digit as usize)];
     exponent.to_string().chars().map(raised).collect()
@@ -148,8 +143,7 @@ const PLAIN_POWERS_WITH_SD: std::ops::RangeInclusive<i32> = -4..=6;
 /// A value with its standard deviation in units of the last digit shown, `78.40(3)` for 78.40 with 0.03
 /// (JCGM 100:2008, 7.2.2), one digit of it. Four significant digits without a deviation (none, zero or no
 /// finite number); a dash for a value that is no finite number.
-#[must_use]
-pub fn format_with_sd(value: f64, sd: impl Into<Option<f64>>) -> String {
+pub(crate) fn format_with_sd(value: f64, sd: impl Into<Option<f64>>) -> String {
     if !value.is_finite() {
         return DASH.to_owned();
     }

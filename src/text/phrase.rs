@@ -3,8 +3,7 @@
 use std::fmt::Write;
 
 /// "a, b and c".
-#[must_use]
-pub fn join_with_and(items: &[String]) -> String {
+pub(crate) fn join_with_and(items: &[String]) -> String {
     match items {
         [] => String::new(),
         [one] => one.clone(),
@@ -13,14 +12,12 @@ pub fn join_with_and(items: &[String]) -> String {
 }
 
 /// A noun as a count has it.
-#[must_use]
-pub fn pluralise(noun: &str, count: usize) -> String {
+pub(crate) fn pluralise(noun: &str, count: usize) -> String {
     if count == 1 { noun.to_owned() } else { format!("{noun}s") }
 }
 
 /// "once", "twice", "14 times".
-#[must_use]
-pub fn format_times(count: usize) -> String {
+pub(crate) fn format_times(count: usize) -> String {
     match count {
         1 => "once".to_owned(),
         2 => "twice".to_owned(),
@@ -29,8 +26,11 @@ pub fn format_times(count: usize) -> String {
 }
 
 /// `0.09656 to 0.1355`, or what an open end leaves of it.
-#[must_use]
-pub fn format_interval(lower: Option<f64>, upper: Option<f64>, written: impl Fn(f64) -> String) -> String {
+pub(crate) fn format_interval(
+    lower: Option<f64>,
+    upper: Option<f64>,
+    written: impl Fn(f64) -> String,
+) -> String {
     match (lower, upper) {
         (Some(lower), Some(upper)) => format!("{} to {}", written(lower), written(upper)),
         (Some(lower), None) => format!("above {}", written(lower)),
@@ -40,8 +40,7 @@ pub fn format_interval(lower: Option<f64>, upper: Option<f64>, written: impl Fn(
 }
 
 /// The first letters of a text, with an ellipsis where some are left out.
-#[must_use]
-pub fn truncate_text(text: &str, most: usize) -> String {
+pub(crate) fn truncate_text(text: &str, most: usize) -> String {
     if text.chars().count() <= most {
         return text.to_owned();
     }
@@ -50,8 +49,7 @@ pub fn truncate_text(text: &str, most: usize) -> String {
 }
 
 /// The first letter a capital.
-#[must_use]
-pub fn capitalise(text: &str) -> String {
+pub(crate) fn capitalise(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
@@ -63,8 +61,7 @@ pub(crate) fn panic_message(payload: &(dyn std::any::Any + Send)) -> Option<Stri
 }
 
 /// Words broken into lines of at most so many characters; a longer word has a line of its own.
-#[must_use]
-pub fn wrap_words(words: &str, width: usize) -> Vec<String> {
+pub(crate) fn wrap_words(words: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in words.split_whitespace() {
         match lines.last_mut() {

@@ -13,8 +13,7 @@ const LEAST_UNPREFIXED: f64 = 0.1;
 
 /// A unit with the prefix that makes the largest of some values readable, and the factor to it; nothing for a
 /// plain number.
-#[must_use]
-pub fn choose_prefix(unit: &str, values: impl IntoIterator<Item = f64>) -> (String, f64) {
+pub(crate) fn choose_prefix(unit: &str, values: impl IntoIterator<Item = f64>) -> (String, f64) {
     if let Some((_, shown, factor)) = UNPREFIXED_UNITS.iter().find(|(name, ..)| *name == unit) {
         return ((*shown).to_owned(), *factor);
     }
@@ -25,14 +24,12 @@ pub fn choose_prefix(unit: &str, values: impl IntoIterator<Item = f64>) -> (Stri
 }
 
 /// A name with its unit, as an axis has it.
-#[must_use]
-pub fn label_with_unit(name: &str, unit: &str) -> String {
+pub(crate) fn label_with_unit(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
 }
 
 /// A length in metres: micrometres with two digits, or millimetres with three.
-#[must_use]
-pub fn format_length(metres: f64) -> String {
+pub(crate) fn format_length(metres: f64) -> String {
     if metres.abs() < 1e-3 {
         format!("{} \u{b5}m", format_digits(metres * 1e6, 2))
     } else {
@@ -41,14 +38,12 @@ pub fn format_length(metres: f64) -> String {
 }
 
 /// A speed in m/s, as mm/s with three digits.
-#[must_use]
-pub fn format_speed(metres_per_s: f64) -> String {
+pub(crate) fn format_speed(metres_per_s: f64) -> String {
     format!("{} mm/s", format_digits(metres_per_s * 1e3, 3))
 }
 
 /// A time in seconds, as ms to a tenth. One that is a clock's, and no length of a motion, stays in seconds.
-#[must_use]
-pub fn format_milliseconds(seconds: f64) -> String {
+pub(crate) fn format_milliseconds(seconds: f64) -> String {
     const CLOCK_S: f64 = 10.0;
     if seconds.abs() >= CLOCK_S {
         format!("{} s", format_decimals(seconds, 4))
@@ -58,14 +53,12 @@ pub fn format_milliseconds(seconds: f64) -> String {
 }
 
 /// A share as a percentage of three digits without zeros at the end: a tolerance of 0.02 is `2 %`.
-#[must_use]
-pub fn format_percent(share: f64) -> String {
+pub(crate) fn format_percent(share: f64) -> String {
     format!("{} %", format_short(100.0 * share))
 }
 
 /// A relative error as a signed percentage.
-#[must_use]
-pub fn format_signed_percent(share: f64) -> String {
+pub(crate) fn format_signed_percent(share: f64) -> String {
     let written = format!("{:+.2}", 100.0 * share);
     let written = if written[1..] == *"0.00" { "0.00" } else { &written };
     format!("{} %", typeset(written))
@@ -76,8 +69,7 @@ pub fn format_signed_percent(share: f64) -> String {
 const LEAST_SHOWN_DEGREES: f64 = 1e-4;
 
 /// An angle with its standard deviation, rad, as degrees in plain letters: `0.300(1) degrees`.
-#[must_use]
-pub fn format_degrees(angle_rad: f64, sd_rad: f64) -> String {
+pub(crate) fn format_degrees(angle_rad: f64, sd_rad: f64) -> String {
     let sd = sd_rad.to_degrees().max(LEAST_SHOWN_DEGREES);
     format!("{} degrees", to_ascii(&format_with_sd(angle_rad.to_degrees(), sd)))
 }

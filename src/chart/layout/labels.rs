@@ -74,7 +74,6 @@ pub(in crate::chart) fn shorten_to_panel(label: &str, x: &CanvasAxis) -> String 
 #[derive(Clone, Copy, PartialEq)]
 pub(in crate::chart) enum LegendEntry<'a> {
     Series(&'a str, Colour, Mark),
-    /// Filled, or outlined.
     Area(&'a str, Colour, bool),
     Hatch(&'a str, HatchPattern),
 }
@@ -118,7 +117,7 @@ pub(in crate::chart) fn legend_text(label: &str, figure: &Figure) -> String {
 }
 
 impl<'a> LegendEntry<'a> {
-    pub fn label(&self) -> &'a str {
+    pub(crate) fn label(&self) -> &'a str {
         match self {
             Self::Series(label, ..) | Self::Area(label, ..) | Self::Hatch(label, _) => label,
         }

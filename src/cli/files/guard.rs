@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// Refuses files that are those of a measured recording: no command replaces them, whatever it knows of them.
-pub fn refuse_measured(folder: &Path, names: &[&str]) -> Result<(), Failure> {
+pub(crate) fn refuse_measured(folder: &Path, names: &[&str]) -> Result<(), Failure> {
     let (marker, _) = FolderMarker::load(folder)?;
     let FolderRecording::Measured { why, files, .. } = FolderRecording::detect(folder, &marker)? else {
         return Ok(());
@@ -29,7 +29,7 @@ fn other_recording_failure(path: &Path, why: &str, advice: &str) -> Failure {
 
 /// A folder before a command writes into it.
 #[derive(Debug)]
-pub struct OutputGuard {
+pub(crate) struct OutputGuard {
     folder: PathBuf,
     writer: WritePolicy,
     pub marker: FolderMarker,
@@ -40,7 +40,7 @@ pub struct OutputGuard {
 impl OutputGuard {
     /// Refuses a folder whose recording the command would destroy or contradict; `names` are the files that
     /// it writes.
-    pub fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
+    pub(crate) fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
         let (marker, unreadable) = FolderMarker::load(folder)?;
         let guard = Self { folder: folder.to_owned(), writer: writer.clone(), marker, unreadable };
         guard.protect_recording(names)?;
@@ -51,7 +51,11 @@ impl OutputGuard {
     /// Refuses to overwrite a file that is not provably the command's own; gives the hash of one that is.
     /// `coming` is the hash of what is to be written, where it is known: writing what is there changes
     /// nothing.
-    pub fn check_overwrite(&self, name: &str, coming: Option<&str>) -> Result<Option<String>, Failure> {
+    pub(crate) fn check_overwrite(
+        &self,
+        name: &str,
+        coming: Option<&str>,
+    ) -> Result<Option<String>, Failure> {
         let path = self.folder.join(name);
         let Some(found) = hash_file(&path)? else { return Ok(None) };
         let by = self.marker.maker_if_unchanged(name, &found);
@@ -80,7 +84,7 @@ impl OutputGuard {
 
     /// Files in the folder that go when the command has written `names`, none of which anything else holds:
     /// those of the same command's last run, and with `--force` those of another recording.
-    pub fn outdated_files(&self, names: &[&str]) -> Vec<String> {
+    pub(crate) fn outdated_files(&self, names: &[&str]) -> Vec<String> {
         let maker = self.writer.maker;
         let of_last_run = |by: OutputCommand| by == maker && maker.replaces_last_run();
         let of_other = |by: OutputCommand| by != maker && by.makes_recordings() && maker.makes_recordings();

@@ -24,16 +24,16 @@ static MAX_DATA_BYTES: AtomicU64 = AtomicU64::new(FileSize::DEFAULT.0);
 
 /// A number of bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FileSize(u64);
+pub(crate) struct FileSize(u64);
 
 impl FileSize {
     /// The longest recording that is read, ten million frames, has about so much.
-    pub const DEFAULT: Self = Self(1_000_000_000);
+    pub(crate) const DEFAULT: Self = Self(1_000_000_000);
     const UNITS: [(&str, u64); 5] =
         [("GB", 1_000_000_000), ("MB", 1_000_000), ("kB", 1_000), ("B", 1), ("", 1)];
 
     /// Reads no file with data above this size from now on.
-    pub fn set_read_limit(self) {
+    pub(crate) fn set_read_limit(self) {
         MAX_DATA_BYTES.store(self.0, Ordering::Relaxed);
     }
 }
@@ -91,32 +91,32 @@ impl ReadLimit {
 }
 
 /// Whether a path is the name of standard input.
-pub fn is_standard_input(path: &Path) -> bool {
+pub(crate) fn is_standard_input(path: &Path) -> bool {
     path.as_os_str() == STANDARD_INPUT
 }
 
 /// Bytes of a file with data.
-pub fn read_data(path: &Path) -> Result<Vec<u8>, Failure> {
+pub(crate) fn read_data(path: &Path) -> Result<Vec<u8>, Failure> {
     read_limited(path, ReadLimit::for_data())
 }
 
 /// Refuses a file with data that is open, and larger than what is read into memory.
-pub fn check_data_size(path: &Path, file: &File) -> Result<(), Failure> {
+pub(crate) fn check_data_size(path: &Path, file: &File) -> Result<(), Failure> {
     ReadLimit::for_data().check_open_file(path, file)
 }
 
 /// Text of a UTF-8 file with data (a byte-order mark is dropped).
-pub fn read_text(path: &Path) -> Result<String, Failure> {
+pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
     decode_utf8(path, read_data(path)?)
 }
 
 /// Text of a TOML file, which people write.
-pub fn read_toml(path: &Path) -> Result<String, Failure> {
+pub(crate) fn read_toml(path: &Path) -> Result<String, Failure> {
     decode_utf8(path, read_limited(path, TOML_LIMIT)?)
 }
 
 /// Text of a JSON file, which this program writes.
-pub fn read_json(path: &Path) -> Result<String, Failure> {
+pub(crate) fn read_json(path: &Path) -> Result<String, Failure> {
     decode_utf8(path, read_limited(path, JSON_LIMIT)?)
 }
 

@@ -12,13 +12,13 @@ use std::path::Path;
 use std::{fs, io};
 
 /// Name of the marker in a folder.
-pub const MARKER_FILE: &str = ".wiperlab.json";
+pub(crate) const MARKER_FILE: &str = ".wiperlab.json";
 const MARKER_FORMAT: u32 = 1;
 
 /// What the commands made in a folder. It holds no times: the same outputs have the same marker.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct FolderMarker {
+pub(crate) struct FolderMarker {
     format: u32,
     /// By name from the folder, with `/`.
     pub files: BTreeMap<String, MarkedFile>,
@@ -27,7 +27,7 @@ pub struct FolderMarker {
 /// A file that a command made.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct MarkedFile {
+pub(crate) struct MarkedFile {
     pub by: OutputCommand,
     pub version: String,
     /// Of its contents as a text: line ends and a byte-order mark do not count.
@@ -39,7 +39,7 @@ pub struct MarkedFile {
 }
 
 impl MarkedFile {
-    pub fn matches_hash(&self, sha256: &str) -> bool {
+    pub(crate) fn matches_hash(&self, sha256: &str) -> bool {
         self.sha256 == sha256 || self.replaces.as_deref() == Some(sha256)
     }
 }
@@ -53,7 +53,7 @@ impl Default for FolderMarker {
 impl FolderMarker {
     /// The marker of a folder; an empty one where there is none. One that cannot be read proves nothing, and
     /// the reason is given.
-    pub fn load(folder: &Path) -> Result<(Self, Option<String>), Failure> {
+    pub(crate) fn load(folder: &Path) -> Result<(Self, Option<String>), Failure> {
         let path = folder.join(MARKER_FILE);
         if !path.exists() {
             return Ok((Self::default(), None));
@@ -71,14 +71,14 @@ impl FolderMarker {
         })
     }
 
-    pub fn to_bytes(&self) -> Result<Vec<u8>, Failure> {
+    pub(crate) fn to_bytes(&self) -> Result<Vec<u8>, Failure> {
         let mut text = serde_json::to_vec_pretty(self).map_err(Failure::internal)?;
         text.push(b'\n');
         Ok(text)
     }
 
     /// Whether a file is, unchanged, what a command made; its maker.
-    pub fn maker_if_unchanged(&self, name: &str, sha256: &str) -> Option<OutputCommand> {
+    pub(crate) fn maker_if_unchanged(&self, name: &str, sha256: &str) -> Option<OutputCommand> {
         self.files.get(name).filter(|made| made.matches_hash(sha256)).map(|made| made.by)
     }
 }
@@ -87,7 +87,7 @@ impl FolderMarker {
 const MAX_MARKER_BYTES: u64 = 16_000_000;
 
 /// Bytes of a file that says what is in a folder, if it is a file and no larger than such files are.
-pub fn read_small_file(path: &Path) -> Result<Vec<u8>, String> {
+pub(crate) fn read_small_file(path: &Path) -> Result<Vec<u8>, String> {
     let found = fs::metadata(path).map_err(|error| error.to_string())?;
     if !found.is_file() || found.len() > MAX_MARKER_BYTES {
         return Err(format!("expected a file of at most {MAX_MARKER_BYTES} bytes"));
@@ -96,7 +96,7 @@ pub fn read_small_file(path: &Path) -> Result<Vec<u8>, String> {
 }
 
 /// Hash of a file as markers have it; `None` where there is no file.
-pub fn hash_file(path: &Path) -> Result<Option<String>, Failure> {
+pub(crate) fn hash_file(path: &Path) -> Result<Option<String>, Failure> {
     let refused = |error: io::Error| Failure::Input(format!("{}: cannot be read: {error}", path.display()));
     if !path.is_file() {
         return Ok(None);
@@ -107,17 +107,17 @@ pub fn hash_file(path: &Path) -> Result<Option<String>, Failure> {
 }
 
 /// A reader that hashes what passes through it.
-pub struct HashingReader<R> {
+pub(crate) struct HashingReader<R> {
     from: R,
     hash: TextHash,
 }
 
 impl<R: Read> HashingReader<R> {
-    pub fn new(from: R) -> Self {
+    pub(crate) fn new(from: R) -> Self {
         Self { from, hash: TextHash::default() }
     }
 
-    pub fn finish(self) -> String {
+    pub(crate) fn finish(self) -> String {
         self.hash.finish()
     }
 }
@@ -135,7 +135,7 @@ impl<R: Read> Read for HashingReader<R> {
 /// A command that writes files into a folder; the word that the marker keeps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum OutputCommand {
+pub(crate) enum OutputCommand {
     Accuracy,
     Blade,
     Demo,
@@ -153,8 +153,7 @@ pub enum OutputCommand {
 }
 
 impl OutputCommand {
-    /// The command's name.
-    pub fn command_name(self) -> &'static str {
+    pub(crate) fn command_name(self) -> &'static str {
         match self {
             Self::Accuracy => "accuracy",
             Self::Blade => "blade",
@@ -174,19 +173,19 @@ impl OutputCommand {
     }
 
     /// Whether what it makes is a recording, of which a folder holds one.
-    pub fn makes_recordings(self) -> bool {
+    pub(crate) fn makes_recordings(self) -> bool {
         matches!(self, Self::Import | Self::Simulate | Self::Twin)
     }
 
     /// Whether all its files in a folder are of one run: those of an earlier run that the next one does not
     /// make are then removed. An import keeps exports, and init, demo and figures write next
     /// to files of others.
-    pub fn replaces_last_run(self) -> bool {
+    pub(crate) fn replaces_last_run(self) -> bool {
         !matches!(self, Self::Demo | Self::Figures | Self::Import | Self::Init)
     }
 
     /// What to do instead of overwriting a file.
-    pub fn overwrite_advice(self) -> &'static str {
+    pub(crate) fn overwrite_advice(self) -> &'static str {
         match self {
             Self::Fit => "move the file away",
             Self::Figures => "choose another folder, move the file away",
@@ -197,7 +196,7 @@ impl OutputCommand {
 
 /// The option of every command that writes into a folder.
 #[derive(Debug, Clone, Copy, Default, Args)]
-pub struct Overwrite {
+pub(crate) struct Overwrite {
     /// Overwrite also files that this command did not make, or that were changed since it made them; never a
     /// measured recording
     #[arg(long)]
@@ -206,7 +205,7 @@ pub struct Overwrite {
 
 /// Who writes, and what it may overwrite.
 #[derive(Debug, Clone)]
-pub struct WritePolicy {
+pub(crate) struct WritePolicy {
     pub maker: OutputCommand,
     pub force: bool,
     /// SHA-256 of the exports that an import reads; a measured recording gives way to an import of the same
@@ -217,12 +216,12 @@ pub struct WritePolicy {
 }
 
 impl WritePolicy {
-    pub fn new(maker: OutputCommand, overwrite: Overwrite) -> Self {
+    pub(crate) fn new(maker: OutputCommand, overwrite: Overwrite) -> Self {
         Self { maker, force: overwrite.force, exports: Vec::new(), csv: CsvDialect::Plain }
     }
 
     /// The same with tables in a dialect.
-    pub fn with_csv_dialect(self, csv: CsvDialect) -> Self {
+    pub(crate) fn with_csv_dialect(self, csv: CsvDialect) -> Self {
         Self { csv, ..self }
     }
 }

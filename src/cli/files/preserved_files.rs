@@ -7,12 +7,12 @@ use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE};
 use std::path::Path;
 
 /// What `simulate` writes next to its trace and no import does.
-pub const SIMULATION_SUMMARY: &str = "summary.json";
+pub(crate) const SIMULATION_SUMMARY: &str = "summary.json";
 /// Keys that the summary of a simulation has and that of a study has not.
 const KEYS_OF_A_SIMULATION: [&str; 2] = ["stopped_at_s", "rhs_evaluations"];
 
 /// Whether there is the summary of a simulation.
-pub fn is_simulation_summary(path: &Path) -> bool {
+pub(crate) fn is_simulation_summary(path: &Path) -> bool {
     let summary: Option<serde_json::Value> =
         path.is_file().then(|| serde_json::from_slice(&read_small_file(path).ok()?).ok()).flatten();
     summary.is_some_and(|summary| KEYS_OF_A_SIMULATION.iter().all(|key| summary.get(key).is_some()))
@@ -20,8 +20,7 @@ pub fn is_simulation_summary(path: &Path) -> bool {
 
 /// The recording that a folder holds.
 #[derive(Debug, PartialEq, Eq)]
-pub enum FolderRecording {
-    /// None.
+pub(crate) enum FolderRecording {
     Nothing,
     /// One that is proven to be synthetic.
     Synthetic,
@@ -37,7 +36,7 @@ pub enum FolderRecording {
 }
 
 impl FolderRecording {
-    pub fn detect(folder: &Path, marker: &FolderMarker) -> Result<Self, Failure> {
+    pub(crate) fn detect(folder: &Path, marker: &FolderMarker) -> Result<Self, Failure> {
         let trace = hash_file(&folder.join(TRACE_FILE))?;
         if folder.join(DESCRIPTION_FILE).exists() {
             return Ok(from_description(folder, marker, trace.as_deref()));

@@ -28,7 +28,7 @@ const TEMPORARY_NAME: (&str, &str) = (".wiperlab-", ".tmp");
 const ABANDONED_AFTER: Duration = Duration::from_secs(60);
 
 /// Files of a command on their way into a folder. Dropped before [`OutputStaging::commit`], nothing is left of them.
-pub struct OutputStaging {
+pub(crate) struct OutputStaging {
     folder: PathBuf,
     guard: Option<(OutputGuard, WritePolicy)>,
     files: Vec<StagedFile>,
@@ -45,13 +45,13 @@ struct StagedFile {
 
 impl OutputStaging {
     /// For the files `names`; refuses what [`OutputGuard`] refuses.
-    pub fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
+    pub(crate) fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
         let guard = OutputGuard::new(folder, writer, names)?;
         Ok(Self { guard: Some((guard, writer.clone())), ..Self::new_unguarded(folder, names)? })
     }
 
     /// For files of which the caller knows that nothing is lost with what they replace.
-    pub fn new_unmarked(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
+    pub(crate) fn new_unmarked(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
         refuse_measured(folder, names)?;
         Self::new_unguarded(folder, names)
     }
@@ -67,7 +67,7 @@ impl OutputStaging {
     }
 
     /// Writes a file next to its place; gives the hash of its contents.
-    pub fn stage_file(&mut self, name: &str, contents: impl Read) -> Result<String, Failure> {
+    pub(crate) fn stage_file(&mut self, name: &str, contents: impl Read) -> Result<String, Failure> {
         let path = self.folder.join(name);
         self.made.create(path.parent().unwrap_or(Path::new("")))?;
         let dialect = self.guard.as_ref().map_or(CsvDialect::Plain, |(_, writer)| writer.csv);
@@ -82,7 +82,7 @@ impl OutputStaging {
     }
 
     /// Gives every file its name, or none.
-    pub fn commit(self) -> Result<(), Failure> {
+    pub(crate) fn commit(self) -> Result<(), Failure> {
         let (made, files) = (self.made, self.files); // (folders are dropped after what is in them)
         let (folder, guard) = (self.folder, self.guard);
         flush_files(&files)?;
@@ -230,7 +230,7 @@ impl Drop for CreatedFolders {
 
 /// Refuses a place that something else than a file takes, or that no file can take: asked of all before any
 /// gets its name, so that none is left alone.
-pub fn check_path_free(path: &Path) -> Result<(), Failure> {
+pub(crate) fn check_path_free(path: &Path) -> Result<(), Failure> {
     let taken = |at: &Path, found: &str, expected: &str| {
         let at = at.display();
         Err(Failure::Input(format!(

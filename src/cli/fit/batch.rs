@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 
 /// How a job of a list stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum BatchJobState {
+pub(crate) enum BatchJobState {
     /// Its result lies next to it, is of this job and version, and the search had converged; with how the fit
     /// ended then.
     Done(CommandOutcome),
@@ -23,7 +23,7 @@ pub enum BatchJobState {
 }
 
 impl BatchJobState {
-    pub fn read(problem: &LoadedJob) -> Self {
+    pub(crate) fn read(problem: &LoadedJob) -> Self {
         let path = problem.folder.join(RESULT_FILE);
         let name = path.display().to_string();
         let text = path.exists().then(|| files::read_json(&path).ok()).flatten();
@@ -40,7 +40,7 @@ impl BatchJobState {
         done.map_or(Self::Due, |result| Self::Done(ended(result)))
     }
 
-    pub fn describe(self) -> &'static str {
+    pub(crate) fn describe(self) -> &'static str {
         match self {
             Self::Done(CommandOutcome::Done) => "converged",
             Self::Done(CommandOutcome::StoppedEarly) => {
@@ -52,7 +52,7 @@ impl BatchJobState {
 }
 
 /// Refuses a list in which two jobs would write the same files.
-pub fn check_distinct_folders(jobs: &[PathBuf]) -> Result<(), Failure> {
+pub(crate) fn check_distinct_folders(jobs: &[PathBuf]) -> Result<(), Failure> {
     let mut folders: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     for job in jobs {
         let file = job_path(job);
@@ -73,7 +73,7 @@ pub fn check_distinct_folders(jobs: &[PathBuf]) -> Result<(), Failure> {
 impl FitArgs {
     /// Fits the jobs of the list that are in the shard and not done yet. One that is refused does not stop
     /// the others.
-    pub fn run_batch(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run_batch(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
         check_distinct_folders(&self.jobs)?;
         let (mut refused, mut early) = (None, Vec::new());
         let mine =

@@ -15,7 +15,7 @@ const PARAMETERS_FILE: &str = "parameters.csv";
 
 impl LoadedJob {
     /// Refuses a folder in which the files of this fit have no place.
-    pub fn check_outputs(&self, writer: &WritePolicy) -> Result<(), Failure> {
+    pub(crate) fn check_outputs(&self, writer: &WritePolicy) -> Result<(), Failure> {
         let names = self.output_names();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         OutputFolder::check(&self.folder, writer, &names)?;
@@ -32,7 +32,7 @@ impl LoadedJob {
     }
 
     /// Writes what was found into the folder of the job.
-    pub fn write_outputs(&self, result: &FitResult, writer: &WritePolicy) -> Result<(), Failure> {
+    pub(crate) fn write_outputs(&self, result: &FitResult, writer: &WritePolicy) -> Result<(), Failure> {
         let mut files = vec![(files::RESULT_FILE.to_owned(), result.to_json().into_bytes())];
         if result.status != FitStatus::Failed {
             files.push((PARAMETERS_FILE.to_owned(), self.parameters_csv(result)?));

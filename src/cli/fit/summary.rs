@@ -12,7 +12,7 @@ use crate::text::{format_digits, to_ascii};
 const DIGITS: usize = 5;
 
 /// Features, parameters and reservations.
-pub fn print_summary(solved: &CompletedFit) {
+pub(crate) fn print_summary(solved: &CompletedFit) {
     let result = &solved.result;
     if let Some(misfit) = &result.misfit {
         print_misfit(misfit);
@@ -135,7 +135,7 @@ pub(super) fn format_value(value: f64) -> String {
 const MOST_SEGMENTS: usize = 3;
 
 /// The first sentence, residuals against noise, and the misfit over the length of the segments.
-pub fn print_misfit(misfit: &TraceMisfit) {
+pub(crate) fn print_misfit(misfit: &TraceMisfit) {
     print_line!("{}", text::to_ascii(&misfit.headline()));
     print_line!(
         "{:<24} {:<11} {:>12} {:>10} {:>9} {:>12}",
@@ -186,7 +186,7 @@ fn print_worst_segments(c: &ChannelMisfit) {
 }
 
 /// What was estimated besides the parameters.
-pub fn print_nuisances(list: &[NuisanceResult]) {
+pub(crate) fn print_nuisances(list: &[NuisanceResult]) {
     if list.is_empty() {
         return;
     }

@@ -27,7 +27,7 @@ const ITERATES_A_SIDE: usize = 2;
 
 impl LoadedJob {
     /// Fits the traces, and writes the journal as it goes and the result at the end.
-    pub fn solve_traces(
+    pub(crate) fn solve_traces(
         &self,
         global: &GlobalArgs,
         resume: bool,

@@ -4,7 +4,7 @@ use crate::text::wrap_words;
 
 /// A section without those below it, by the text of its heading; with an empty heading what stands before the
 /// first one.
-pub fn find_section<'a>(page: &'a str, heading: &str) -> &'a str {
+pub(crate) fn find_section<'a>(page: &'a str, heading: &str) -> &'a str {
     let level = |line: &str| line.bytes().take_while(|byte| *byte == b'#').count();
     let mut places = page.split_inclusive('\n').scan(0, |at, line| {
         let start = *at;
@@ -21,7 +21,7 @@ pub fn find_section<'a>(page: &'a str, heading: &str) -> &'a str {
 
 /// A page with lines of at most so many characters: links as their words, the rows of a table one below the
 /// other, code as it is.
-pub fn render_for_terminal(page: &str, width: usize) -> String {
+pub(crate) fn render_for_terminal(page: &str, width: usize) -> String {
     let mut out = String::new();
     let mut paragraph = String::new();
     let mut columns: Option<Vec<String>> = None;

@@ -18,7 +18,7 @@ const LONGEST_NAME: usize = 100;
 
 /// Writes the comparison of fits; says whether any of them does not explain its recording or misses a
 /// component.
-pub fn write_comparison(
+pub(crate) fn write_comparison(
     jobs: &[PathBuf],
     out: Option<&Path>,
     writer: &WritePolicy,

@@ -11,7 +11,7 @@ use crate::report::{Provenance, SourceFile};
 use crate::text::sha256;
 use std::path::{Component, Path};
 
-pub fn collect_provenance(fit: &ReportedFit) -> Result<Provenance, Failure> {
+pub(crate) fn collect_provenance(fit: &ReportedFit) -> Result<Provenance, Failure> {
     let within = format!("fits/{}", fit.name);
     let named = |path: &str| normalise_path(&within, path);
     let job = fit.problem.path.file_name().unwrap_or_default().to_string_lossy();

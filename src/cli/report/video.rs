@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// The pictures of a recording.
-pub struct VideoFrames {
+pub(crate) struct VideoFrames {
     place: PixelMapping,
     first_frame: usize,
     files: Vec<PathBuf>,
@@ -20,7 +20,7 @@ pub struct VideoFrames {
 
 impl VideoFrames {
     /// The pictures of the recording at `path`, where its description names some.
-    pub fn load(path: &Path, loaded: &LoadedRecording) -> Result<Option<Self>, Failure> {
+    pub(crate) fn load(path: &Path, loaded: &LoadedRecording) -> Result<Option<Self>, Failure> {
         let Some((file, video)) = loaded.file.as_ref().and_then(|file| Some((file, file.video.as_ref()?)))
         else {
             return Ok(None);
@@ -57,12 +57,12 @@ impl VideoFrames {
         Ok(Some(Self { place, first_frame: video.first_frame, files, failed: Mutex::new(None) }))
     }
 
-    pub fn as_film(&self) -> RecordingVideo<'_> {
+    pub(crate) fn as_film(&self) -> RecordingVideo<'_> {
         RecordingVideo { mapping: self.place, pictures: self }
     }
 
     /// Refuses if a picture could not be read.
-    pub fn check_pictures(&self) -> Result<(), Failure> {
+    pub(crate) fn check_pictures(&self) -> Result<(), Failure> {
         self.failed.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
     }
 }

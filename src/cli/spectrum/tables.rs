@@ -15,7 +15,7 @@ use std::fmt::Write;
 const BLOCK_ROWS: usize = 4096;
 
 /// `components.json`; what begins inside the window does so at a time of the recording.
-pub fn components_json(studied: &StudiedWindow) -> Result<Vec<u8>, Failure> {
+pub(crate) fn components_json(studied: &StudiedWindow) -> Result<Vec<u8>, Failure> {
     let from_s = studied.recording.grid().time_s(studied.frames.start);
     let timed = |c: &Component| Component { begins_s: c.begins_s.map(|s| from_s + s), ..c.clone() };
     to_json(&studied.analysis.spectrum.components.iter().map(timed).collect::<Vec<_>>())
@@ -59,8 +59,10 @@ struct NamedWindowSpan {
     to_s: f64,
 }
 
-/// `spectrum.json`.
-pub fn description_json(request: &SpectrumRequest, studied: &StudiedWindow) -> Result<Vec<u8>, Failure> {
+pub(crate) fn description_json(
+    request: &SpectrumRequest,
+    studied: &StudiedWindow,
+) -> Result<Vec<u8>, Failure> {
     let StudiedWindow { recording, analysis, frames, .. } = studied;
     let grid = recording.grid();
     let windows = phase_windows(recording, &ReversalInstants::find_instants(recording));
@@ -91,7 +93,7 @@ pub fn description_json(request: &SpectrumRequest, studied: &StudiedWindow) -> R
 }
 
 /// `spectrum.csv`: a row a bin; what a long or gappy record has not is empty.
-pub fn spectrum_csv(analysis: &SpectralAnalysis) -> Vec<u8> {
+pub(crate) fn spectrum_csv(analysis: &SpectralAnalysis) -> Vec<u8> {
     let spectrum = &analysis.spectrum;
     let cell = |text: &mut String, value: Option<f64>| match value {
         Some(value) => write!(text, ",{value:e}"),
@@ -125,7 +127,7 @@ pub fn spectrum_csv(analysis: &SpectralAnalysis) -> Vec<u8> {
 }
 
 /// `ridge.csv`: the course of the strongest component above the slow ones.
-pub fn ridge_csv(course: &[CoursePoint]) -> Vec<u8> {
+pub(crate) fn ridge_csv(course: &[CoursePoint]) -> Vec<u8> {
     let speed = |speed: Option<f64>| speed.map_or_else(String::new, |speed| format!("{speed:e}"));
     let row = |p: &CoursePoint| {
         let speeds = [p.tip_speed_m_per_s, p.head_speed_m_per_s].map(speed);
@@ -139,7 +141,7 @@ pub fn ridge_csv(course: &[CoursePoint]) -> Vec<u8> {
 }
 
 /// The components on standard output.
-pub fn print_summary(channel: Channel, studied: &StudiedWindow) {
+pub(crate) fn print_summary(channel: Channel, studied: &StudiedWindow) {
     let (recording, spectrum) = (&studied.recording, &studied.analysis.spectrum);
     let synthetic = if recording.is_synthetic() { " (synthetic: no camera took it)" } else { "" };
     print_line!("{}{synthetic}: {channel}, {}", recording.name(), studied.note);

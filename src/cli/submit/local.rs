@@ -27,7 +27,7 @@ fn shard_command(plan: &SubmissionPlan, task: usize) -> Vec<String> {
 }
 
 /// All commands on standard output.
-pub fn print_commands(plan: &SubmissionPlan) {
+pub(crate) fn print_commands(plan: &SubmissionPlan) {
     let commands = plan.tasks.iter().map(|task| shard_command(plan, task));
     for words in commands.chain([plan.collect_command()]) {
         print_line!("{} {}", submit::quote_word(&plan.program), submit::join_words(&words));
@@ -35,7 +35,7 @@ pub fn print_commands(plan: &SubmissionPlan) {
 }
 
 /// Runs the tasks, then puts the shards together.
-pub fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+pub(crate) fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
     plan.create_logs_folder()?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let at_once = (cores / plan.threads).max(1);

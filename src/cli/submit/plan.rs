@@ -20,7 +20,7 @@ const MARGINS_S: (u64, u64) = (30, 300);
 
 /// An array of tasks and the job after them.
 #[derive(Debug)]
-pub struct SubmissionPlan {
+pub(crate) struct SubmissionPlan {
     /// This program, for other machines.
     pub program: String,
     /// Where the tasks run: names in scenes may start from here.
@@ -38,38 +38,38 @@ pub struct SubmissionPlan {
 
 impl SubmissionPlan {
     /// Command of a task, without its shard.
-    pub fn task_command(&self) -> Vec<String> {
+    pub(crate) fn task_command(&self) -> Vec<String> {
         [self.work.task_command(), self.options.clone()].concat()
     }
 
     /// Command of the job at the end.
-    pub fn collect_command(&self) -> Vec<String> {
+    pub(crate) fn collect_command(&self) -> Vec<String> {
         [self.work.collect_command(self.shards), self.options.clone()].concat()
     }
 
     /// After what time a task ends by itself.
-    pub fn time_limit(&self) -> Option<Duration> {
+    pub(crate) fn time_limit(&self) -> Option<Duration> {
         self.walltime.map(|walltime| walltime.saturating_sub(time_margin(walltime)))
     }
 
     /// Folder of the scripts.
-    pub fn scripts_folder(&self) -> PathBuf {
+    pub(crate) fn scripts_folder(&self) -> PathBuf {
         self.work.folder().join("submit")
     }
 
     /// Folder of what the tasks print.
-    pub fn logs_folder(&self) -> PathBuf {
+    pub(crate) fn logs_folder(&self) -> PathBuf {
         self.work.folder().join("logs")
     }
 
-    pub fn create_logs_folder(&self) -> Result<(), Failure> {
+    pub(crate) fn create_logs_folder(&self) -> Result<(), Failure> {
         let logs = self.logs_folder();
         fs::create_dir_all(&logs)
             .map_err(|error| Failure::Internal(format!("{}: cannot be made: {error}", logs.display())))
     }
 
     /// `1 core`, `4 cores`.
-    pub fn describe_cores(&self) -> String {
+    pub(crate) fn describe_cores(&self) -> String {
         format!("{} core{}", self.threads, if self.threads == 1 { "" } else { "s" })
     }
 }
@@ -81,7 +81,7 @@ fn time_margin(walltime: Duration) -> Duration {
 }
 
 /// Time that Slurm gives a task, for [`clap`].
-pub fn parse_walltime(text: &str) -> Result<TimeLimit, String> {
+pub(crate) fn parse_walltime(text: &str) -> Result<TimeLimit, String> {
     let limit: TimeLimit = text.parse()?;
     if limit.0.as_secs() < SHORTEST_S {
         return Err("expected at least a minute, as Slurm counts in minutes".to_owned());
@@ -93,7 +93,7 @@ pub fn parse_walltime(text: &str) -> Result<TimeLimit, String> {
 
 /// What is divided, by absolute paths.
 #[derive(Debug, Clone)]
-pub enum SubmittedWork {
+pub(crate) enum SubmittedWork {
     /// A parameter study, whose shards and results lie in a folder.
     Study { study: String, out: String },
     /// Jobs of fits, each of which is done whole, next to its file; and a folder for scripts and logs.
@@ -102,7 +102,7 @@ pub enum SubmittedWork {
 
 impl SubmittedWork {
     /// A study or jobs that were read and checked as `wiperlab sweep` and `wiperlab fit` do.
-    pub fn load(files: &[PathBuf], out: Option<&Path>, overwrite: Overwrite) -> Result<Self, Failure> {
+    pub(crate) fn load(files: &[PathBuf], out: Option<&Path>, overwrite: Overwrite) -> Result<Self, Failure> {
         if let Some(name) = files.iter().find(|file| files::is_standard_input(file)) {
             return Err(Failure::Input(format!(
                 "{}: found standard input, expected a file, as every task reads it; save it",
@@ -152,7 +152,7 @@ impl SubmittedWork {
     }
 
     /// Command of a task, without its shard.
-    pub fn task_command(&self) -> Vec<String> {
+    pub(crate) fn task_command(&self) -> Vec<String> {
         match self {
             Self::Study { study, out } => to_strings(&["sweep", study, "--out", out]),
             Self::Jobs { jobs, .. } => [to_strings(&["fit"]), jobs.clone()].concat(),
@@ -160,7 +160,7 @@ impl SubmittedWork {
     }
 
     /// Command of the job at the end.
-    pub fn collect_command(&self, shards: usize) -> Vec<String> {
+    pub(crate) fn collect_command(&self, shards: usize) -> Vec<String> {
         let shards = shards.to_string();
         match self {
             Self::Study { out, .. } => to_strings(&["collect", out, "--shards", &shards]),
@@ -171,14 +171,14 @@ impl SubmittedWork {
     }
 
     /// Folder in which scripts and logs have theirs.
-    pub fn folder(&self) -> PathBuf {
+    pub(crate) fn folder(&self) -> PathBuf {
         let (Self::Study { out, .. } | Self::Jobs { out, .. }) = self;
         Path::new(out).join(crate::cli::shards::SHARDS_FOLDER)
     }
 
     /// Name of the tasks for the scheduler, with which the names of their logs start: at most 15 plain letters
     /// and digits.
-    pub fn job_name(&self) -> String {
+    pub(crate) fn job_name(&self) -> String {
         const LONGEST: usize = 15;
         let stem = match self {
             Self::Study { study, .. } => Path::new(study).file_stem().unwrap_or_default().to_string_lossy(),
@@ -205,7 +205,7 @@ fn to_strings(words: &[&str]) -> Vec<String> {
 }
 
 /// A path as text that stands in a script and holds in every folder.
-pub fn absolute_path(path: &Path) -> Result<String, Failure> {
+pub(crate) fn absolute_path(path: &Path) -> Result<String, Failure> {
     let refused = |problem: &str| Failure::Input(format!("{}: {problem}", path.display()));
     let whole = std::path::absolute(path).map_err(|error| refused(&error.to_string()))?;
     let text = whole.to_str().ok_or_else(|| {

@@ -10,9 +10,9 @@ use crate::cli::submit;
 use std::time::Duration;
 
 /// The program that submits.
-pub const SBATCH: &str = "sbatch";
+pub(crate) const SBATCH: &str = "sbatch";
 /// Submits the other scripts.
-pub const SUBMIT_SH: &str = "submit.sh";
+pub(crate) const SUBMIT_SH: &str = "submit.sh";
 
 const SUBMIT_COMMANDS: &str = r#"array=$(sbatch --parsable ../submit/array.sh)
 array=${array%%;*}
@@ -22,7 +22,7 @@ echo "collect: ${collect%%;*}"
 "#;
 
 /// All scripts by name.
-pub fn slurm_scripts(plan: &SubmissionPlan) -> [(&'static str, String); 3] {
+pub(crate) fn slurm_scripts(plan: &SubmissionPlan) -> [(&'static str, String); 3] {
     [("array.sh", array_script(plan)), ("collect.sh", collect_script(plan)), (SUBMIT_SH, submit_script(plan))]
 }
 

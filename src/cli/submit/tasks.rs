@@ -6,26 +6,26 @@ use std::str::FromStr;
 
 /// Most tasks of an array: Slurm takes indices up to 1,000 (MaxArraySize 1001) where nobody has raised the
 /// limit.
-pub const MAX_TASKS: usize = 1000;
+pub(crate) const MAX_TASKS: usize = 1000;
 
 /// Numbers of tasks, rising.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct TaskList(Vec<usize>);
+pub(crate) struct TaskList(Vec<usize>);
 
 impl TaskList {
-    pub fn all(shards: usize) -> Self {
+    pub(crate) fn all(shards: usize) -> Self {
         (0..shards).collect()
     }
 
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.0.len()
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn iter(&self) -> impl Iterator<Item = usize> + '_ {
         self.0.iter().copied()
     }
 
-    pub fn last(&self) -> Option<usize> {
+    pub(crate) fn last(&self) -> Option<usize> {
         self.0.last().copied()
     }
 }
@@ -76,7 +76,7 @@ fn parse_task(text: &str) -> Option<usize> {
 }
 
 /// Number of shards, for [`clap`].
-pub fn parse_shard_count(text: &str) -> Result<usize, String> {
+pub(crate) fn parse_shard_count(text: &str) -> Result<usize, String> {
     crate::cli::args::parse_count(text).ok().filter(|shards| *shards <= MAX_TASKS).ok_or_else(|| {
         format!(
             "expected a whole number from 1 to {MAX_TASKS}, as Slurm takes no longer array; a task does any \

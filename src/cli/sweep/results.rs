@@ -20,7 +20,7 @@ const SUMMARY: &str = "summary.json";
 
 impl LoadedStudy {
     /// Checks that a study can write its files into a folder.
-    pub fn check_outputs(&self, out: &Path, writer: &WritePolicy) -> Result<OutputFolder, Failure> {
+    pub(crate) fn check_outputs(&self, out: &Path, writer: &WritePolicy) -> Result<OutputFolder, Failure> {
         let sheet = self.study.has_sheet().then_some(SHEET_NAME);
         let mapped = self.study.maps.iter().filter(|_| self.study.is_mapped());
         let maps = mapped.map(|map| map.slug.as_str()).chain(sheet).map(|name| format!("{name}.svg"));
@@ -29,7 +29,7 @@ impl LoadedStudy {
     }
 
     /// Writes table, summary and figures of a study of which every point is known.
-    pub fn write_outputs(
+    pub(crate) fn write_outputs(
         &self,
         points: &mut PointCollection<File>,
         out: &Path,

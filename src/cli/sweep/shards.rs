@@ -24,7 +24,7 @@ struct StudyNote {
 
 impl LoadedStudy {
     /// Runs what no shard in the folder holds of a shard.
-    pub fn solve_shard(
+    pub(crate) fn solve_shard(
         &self,
         study: &Path,
         out: &Path,
@@ -84,7 +84,7 @@ fn write_study_note(study: &Path, out: &Path) -> Result<(), Failure> {
 }
 
 /// The study whose shards are in a folder.
-pub fn find_study(out: &Path) -> Result<PathBuf, Failure> {
+pub(crate) fn find_study(out: &Path) -> Result<PathBuf, Failure> {
     let path = out.join(SHARDS_FOLDER).join(NOTE);
     let refused = |found: String| {
         Failure::Input(format!(

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 /// A part of a study on its way into a journal.
-pub struct StudyPart<'a> {
+pub(crate) struct StudyPart<'a> {
     pub shard: Shard,
     pub journal: &'a Path,
     /// Whether the journal goes on; without it a new one is begun.
@@ -29,7 +29,7 @@ pub struct StudyPart<'a> {
 
 impl LoadedStudy {
     /// Runs what the journal of the whole study does not hold; `false` where it was interrupted.
-    pub fn solve(&self, journal: &Path, resume: bool, global: &GlobalArgs) -> Result<bool, Failure> {
+    pub(crate) fn solve(&self, journal: &Path, resume: bool, global: &GlobalArgs) -> Result<bool, Failure> {
         let advice = "go on with --resume".to_owned();
         let part =
             StudyPart { shard: Shard::WHOLE, journal, resume, elsewhere: Vec::new(), advice, reports: false };
@@ -38,7 +38,7 @@ impl LoadedStudy {
 
     /// Runs what no journal holds of a part, and writes its journal as it goes; `false` where it was
     /// interrupted.
-    pub fn solve_part(&self, part: &StudyPart, global: &GlobalArgs) -> Result<bool, Failure> {
+    pub(crate) fn solve_part(&self, part: &StudyPart, global: &GlobalArgs) -> Result<bool, Failure> {
         let (header, name) = (self.header(), part.journal.display().to_string());
         let points = self.study.point_count();
         let mut known = part.elsewhere.clone();

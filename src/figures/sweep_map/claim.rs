@@ -31,7 +31,7 @@ pub(in crate::figures) struct MapClaim {
 }
 
 impl MapClaim {
-    pub fn new(study: &Study, map: &SweepMap, values: &[Option<f64>]) -> Self {
+    pub(crate) fn new(study: &Study, map: &SweepMap, values: &[Option<f64>]) -> Self {
         let trends = clear_trends(study, values);
         let said = |trends: &[(f64, &SweepAxis)], name: &dyn Fn(&SweepAxis) -> String| {
             let one = |(r, axis): &(f64, &SweepAxis)| {
@@ -50,12 +50,12 @@ impl MapClaim {
     }
 
     /// All in one line.
-    pub fn title(&self) -> String {
+    pub(crate) fn title(&self) -> String {
         format!("{}: {}", self.name, join_trend(&self.range, &self.trend))
     }
 
     /// Range and trend in that many letters: in words, by symbols, or the strongest trend alone.
-    pub fn fit_in_letters(&self, letters: usize) -> String {
+    pub(crate) fn fit_in_letters(&self, letters: usize) -> String {
         let ways =
             [&self.trend, &self.short_trend, &self.strongest].map(|trend| join_trend(&self.range, trend));
         let fits = ways.iter().find(|way| way.chars().count() <= letters);

@@ -14,7 +14,7 @@ use std::fmt;
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "job.toml")]
-pub struct JobFile {
+pub(crate) struct JobFile {
     /// Version of the format: 1.
     pub format: u32,
     /// Title for pages and figures.
@@ -58,7 +58,7 @@ pub struct JobFile {
 /// Starting states over which the model is averaged.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JobEnsembleTable {
+pub(crate) struct JobEnsembleTable {
     /// Number of starting states, 1 to 64; 1 if left out.
     pub members: Option<usize>,
     /// Their relative spread, above 0 and at most 1; 0.1 if left out.
@@ -68,7 +68,7 @@ pub struct JobEnsembleTable {
 /// A recording that is fitted.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JobRecordingTable {
+pub(crate) struct JobRecordingTable {
     /// Different from every other; "recording N" if left out.
     pub name: Option<String>,
     /// Folder of the recording, or its trace.csv; relative to this file.
@@ -92,7 +92,7 @@ pub struct JobRecordingTable {
 /// An operating condition with published numbers only.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JobConditionTable {
+pub(crate) struct JobConditionTable {
     /// Different from every other.
     pub name: String,
     /// Its own scene; that of the job if left out.
@@ -109,7 +109,7 @@ pub struct JobConditionTable {
 /// A free parameter.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JobParameterTable {
+pub(crate) struct JobParameterTable {
     /// Key of the scene with its table, such as "friction.a".
     pub name: String,
     /// Lower bound, SI.
@@ -125,7 +125,7 @@ pub struct JobParameterTable {
 /// What is known of a parameter beforehand.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JobPriorTable {
+pub(crate) struct JobPriorTable {
     /// Mean, within the bounds, SI.
     pub mean: f64,
     /// Standard deviation in the unit of the parameter.
@@ -137,7 +137,7 @@ pub struct JobPriorTable {
 /// Which runs count.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JobPlausibleTable {
+pub(crate) struct JobPlausibleTable {
     /// A run in which neck or lip leans farther from the vertical fails, degrees.
     pub largest_tilt_deg: Option<f64>,
 }
@@ -145,7 +145,7 @@ pub struct JobPlausibleTable {
 /// A frequency that the model must meet.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JobComponentTable {
+pub(crate) struct JobComponentTable {
     /// Different from every other component and feature.
     pub name: String,
     /// "deflection", "head-drop", "tip-x" or "head-x".
@@ -183,7 +183,7 @@ with_reading_keys!(define_entry {
 });
 
 impl JobComponentTable {
-    pub fn reading_keys(&self) -> Keys {
+    pub(crate) fn reading_keys(&self) -> Keys {
         Keys {
             channel: Some(self.channel.clone()),
             window: Some(self.window.clone()),
@@ -197,7 +197,7 @@ impl JobComponentTable {
 /// Budgets of a search on features.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JobSearchTable {
+pub(crate) struct JobSearchTable {
     /// Evaluations of the first stage.
     pub global_evaluations: Option<usize>,
     /// Evaluations of the second stage.
@@ -213,7 +213,7 @@ pub struct JobSearchTable {
 /// How intervals are found.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JobIntervalsTable {
+pub(crate) struct JobIntervalsTable {
     /// Intervals from profiles of the cost; true if left out.
     pub profile: Option<bool>,
     /// Fits to twins of the best model, 0 to 1000.
@@ -223,7 +223,7 @@ pub struct JobIntervalsTable {
 /// A recording of which every frame is fitted.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JobTraceTable {
+pub(crate) struct JobTraceTable {
     /// Name or number of the recording; 1 if left out.
     pub recording: Option<ConditionReference>,
     /// "tip-x", "head-drop" or "deflection"; what it has of the first two if left out.
@@ -244,7 +244,7 @@ pub struct JobTraceTable {
 /// What is not known of a camera: standard deviations; 0 holds one.
 #[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct JobTraceCameraTable {
+pub(crate) struct JobTraceCameraTable {
     /// Of its tilt, degrees; 0.3 if left out.
     pub tilt_sd_deg: Option<f64>,
     /// Of its scale, relative; 0.005 if left out.
@@ -260,7 +260,7 @@ pub struct JobTraceCameraTable {
 /// The camera of a recording from which features are read: `"exact"`, or what is not known of it.
 #[derive(Debug, JsonSchema)]
 #[schemars(untagged, extend("x-expected" = "\"exact\", or a table such as { scale_sd = 0.005, offset_sd_m = 0.001 }"))]
-pub enum RecordingCamera {
+pub(crate) enum RecordingCamera {
     Word(String),
     Doubt(JobTraceCameraTable),
 }
@@ -292,7 +292,7 @@ impl<'de> Visitor<'de> for RecordingCameraVisitor {
 /// Constants that are freed with a prior: all of them with one deviation, or those of a list.
 #[derive(Debug, JsonSchema)]
 #[schemars(untagged, extend("x-expected" = "a percentage such as \"3 %\", or a list such as [{ name = \"blade.lip_mass_kg\", sd = \"5 %\" }]"))]
-pub enum JobNuisanceEntry {
+pub(crate) enum JobNuisanceEntry {
     All(String),
     Listed(Vec<ListedNuisance>),
 }
@@ -300,7 +300,7 @@ pub enum JobNuisanceEntry {
 /// A constant of the scene that is freed within a prior.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct ListedNuisance {
+pub(crate) struct ListedNuisance {
     /// Key of the scene with its table, such as "blade.lip_mass_kg".
     pub name: String,
     /// Standard deviation, such as "5 %".
@@ -340,7 +340,7 @@ impl<'de> Visitor<'de> for NuisanceVisitor {
 /// A recording or condition by its number, counted from 1, or its name.
 #[derive(Debug, JsonSchema)]
 #[schemars(untagged, extend("x-expected" = "the number of a recording, counted from 1, or its name"))]
-pub enum ConditionReference {
+pub(crate) enum ConditionReference {
     Number(usize),
     Name(String),
 }

@@ -231,7 +231,7 @@ pub struct FeatureCamera {
 
 impl FeatureCamera {
     /// One of which everything is known.
-    pub const EXACT: Self = Self { scale_sd: 0.0, offset_sd_m: 0.0 };
+    pub(crate) const EXACT: Self = Self { scale_sd: 0.0, offset_sd_m: 0.0 };
     const USUAL: Self = Self { scale_sd: DEFAULT_SCALE_SD, offset_sd_m: DEFAULT_OFFSET_SD_M };
 }
 

@@ -130,8 +130,7 @@ pub struct NuisanceParameter {
 
 impl Constants {
     /// Whether all are taken as exact.
-    #[must_use]
-    pub fn is_none(&self) -> bool {
+    pub(crate) fn is_none(&self) -> bool {
         *self == Self::Exact
     }
 

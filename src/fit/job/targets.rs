@@ -282,7 +282,6 @@ pub(super) struct JobEntry {
 
 /// The recording or condition that an entry belongs to.
 pub(super) struct EntryCondition {
-    /// Counted from 0.
     pub index: usize,
     /// Whether there is a recording on which a target can be measured.
     pub measured: bool,

@@ -64,8 +64,7 @@ impl TraceChannel {
         [(Self::TipX, "tip-x"), (Self::HeadDrop, "head-drop"), (Self::Deflection, "deflection")];
 
     /// The word in a job and in a result.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         Self::WORDS[self as usize].1
     }
 }
@@ -87,8 +86,7 @@ pub struct CameraPriorSds {
 
 impl CameraPriorSds {
     /// Of the camera's clock against the drive's, s, with this drive.
-    #[must_use]
-    pub fn clock_sd_s(&self, head: HeadSource) -> f64 {
+    pub(crate) fn clock_sd_s(&self, head: HeadSource) -> f64 {
         self.clock_sd_s.unwrap_or(match head {
             HeadSource::Recording => 0.0,
             HeadSource::Scene => CLOCK_SD_S,

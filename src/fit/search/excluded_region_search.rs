@@ -21,7 +21,7 @@ const DESCENTS: usize = 3;
 /// are then known there; at most `share` evaluations. Why it was stopped before that, if it was.
 ///
 /// The best of them lies next to what was found, and leads back to it; so the others are followed too.
-pub fn search_excluded_region(
+pub(crate) fn search_excluded_region(
     ledger: &mut Ledger,
     slab: Slab,
     settings: &SearchSettings,
@@ -64,8 +64,7 @@ fn evolve_in_slab(ledger: &mut Ledger, slab: Slab, settings: &SearchSettings) ->
 }
 
 /// The best known point of a slab.
-#[must_use]
-pub fn best_in_slab<'l>(ledger: &'l Ledger, slab: Slab) -> Option<&'l Evaluation> {
+pub(crate) fn best_in_slab<'l>(ledger: &'l Ledger, slab: Slab) -> Option<&'l Evaluation> {
     let there = ledger.run_evaluations().iter().filter(|e| e.failure.is_none() && slab.contains(&e.unit));
     there.min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
@@ -74,25 +73,21 @@ pub fn best_in_slab<'l>(ledger: &'l Ledger, slab: Slab) -> Option<&'l Evaluation
 
 /// Part of the unit box in which one coordinate is held within a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Slab {
+pub(crate) struct Slab {
     /// Number of the parameter.
     pub axis: usize,
-    /// Least coordinate.
     pub lower: f64,
-    /// Largest coordinate.
     pub upper: f64,
 }
 
 impl Slab {
     /// Whether a point lies in it.
-    #[must_use]
-    pub fn contains(&self, unit: &[f64]) -> bool {
+    pub(crate) fn contains(&self, unit: &[f64]) -> bool {
         unit.get(self.axis).is_some_and(|u| (self.lower..=self.upper).contains(u))
     }
 
     /// The same without what lies within `margin` of its ends that are not ends of the box.
-    #[must_use]
-    pub fn shrink_by(self, margin: f64) -> Self {
+    pub(crate) fn shrink_by(self, margin: f64) -> Self {
         let lower = if self.lower > 0.0 { self.lower + margin } else { self.lower };
         let upper = if self.upper < 1.0 { self.upper - margin } else { self.upper };
         Self { lower, upper, ..self }

@@ -125,7 +125,7 @@ fn descend_from(ledger: &mut Ledger, start: Evaluation) -> (LocalDescent, Option
 }
 
 /// Descent and simplices from the best point until one simplex of each size in a row has gained nothing.
-pub fn polish_best(ledger: &mut Ledger) -> SearchTermination {
+pub(crate) fn polish_best(ledger: &mut Ledger) -> SearchTermination {
     let mut barren = 0;
     while let Some(edge) = SIMPLEX_EDGES.get(barren).filter(|_| !is_exact_fit(ledger)) {
         let Some((start, before)) = ledger.best_evaluation().map(|best| (best.unit.clone(), best.cost))

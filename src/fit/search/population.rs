@@ -106,7 +106,6 @@ pub(super) struct CmaEs {
 struct PopulationStep {
     /// Along the axes, in units of theirs.
     along: DVector<f64>,
-    /// In the box.
     inside: DVector<f64>,
 }
 

@@ -18,7 +18,6 @@ use std::cell::RefCell;
 /// Steps of one simplex without a lower cost after which it is left, per vertex.
 const STAGNANT_STEPS: usize = 20;
 
-/// State without derivatives.
 type SimplexState = IterState<Vec<f64>, (), (), (), (), f64>;
 
 /// Costs as a function of places on the real line.

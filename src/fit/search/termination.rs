@@ -46,6 +46,6 @@ pub(crate) const SIMPLEX_EDGES: [f64; 3] = [0.05, 0.2, 0.01];
 pub const SIMPLEX_COST_SPREAD: f64 = 1e-4;
 /// Gain in cost below which another step is not worth taking: 2 % of the gain of 1 that a 68 % interval
 /// spans.
-pub(crate) const MIN_WORTHWHILE_GAIN: f64 = 0.02;
+pub const MIN_WORTHWHILE_GAIN: f64 = 0.02;
 /// Cost that leaves nothing to gain: a thousandth of a standard deviation in one feature.
-pub(crate) const EXACT_COST: f64 = 1e-6;
+pub const EXACT_COST: f64 = 1e-6;

@@ -238,7 +238,7 @@ pub(super) struct SegmentLengthComparison {
 
 impl SegmentLengthComparison {
     /// Compares an end with where the segments of the stage before lead from there; `sd` is that of the end.
-    pub fn new(model: &TraceModel, end: &Iterate, shorter: &Iterate, sd: &[f64]) -> Option<Self> {
+    pub(crate) fn new(model: &TraceModel, end: &Iterate, shorter: &Iterate, sd: &[f64]) -> Option<Self> {
         let earlier = trace_covariance(model, shorter)?;
         let variance = |i: usize| earlier.curvature[(i, i)].max(earlier.sandwich[(i, i)]).max(sd[i] * sd[i]);
         let moved: Vec<f64> = (0..sd.len()).map(|i| shorter.point[i] - end.point[i]).collect();
@@ -249,7 +249,7 @@ impl SegmentLengthComparison {
     }
 
     /// A parameter whose estimates differ by more than they may: where one is off, all are.
-    pub fn disagreement(&self, model: &TraceModel) -> Option<String> {
+    pub(crate) fn disagreement(&self, model: &TraceModel) -> Option<String> {
         let parameters = (0..self.apart.len()).filter(|&i| model.unknowns.is_parameter(i));
         let i = parameters.max_by(|a, b| self.apart[*a].total_cmp(&self.apart[*b]))?;
         let UnknownKind::Parameter { name, .. } = &model.unknowns.0[i].kind else { return None };

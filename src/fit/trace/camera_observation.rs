@@ -27,7 +27,6 @@ pub struct ObservationSettings {
 pub struct CameraObservation {
     /// Instants of the frames, s.
     pub times_s: Vec<f64>,
-    /// Frames a second.
     pub rate_hz: f64,
     /// The tip along the sweep, m; empty cells where it is lost or no data.
     pub tip_x_m: Vec<Option<f64>>,
@@ -41,15 +40,13 @@ pub struct CameraObservation {
     pub own_curve: Option<Arc<HeadSpline>>,
     /// Mean of `head_m`, about which a tilt turns, m.
     pub centre_m: f64,
-    /// What is fitted.
     pub settings: ObservationSettings,
 }
 
 impl CameraObservation {
     /// The frames of a recording; `drive` is the head's motion on which its model runs, `shared` what the
     /// other point shows of the noise of the tip's x and of the head's y, m.
-    #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         recording: &Recording,
         drive: &Drive,
         own_head: bool,
@@ -193,7 +190,7 @@ enum ChannelWhitening {
 
 impl SegmentWhitening {
     /// Whitens a column: the tip's frames, then the drop's.
-    pub fn whiten_column(&self, column: &mut [f64]) {
+    pub(crate) fn whiten_column(&self, column: &mut [f64]) {
         let (tip, drop) = column.split_at_mut(self.tips);
         self.maps[0].whiten_column(tip);
         self.maps[1].whiten_column(drop);

@@ -11,7 +11,6 @@ pub trait Checkpoint {
     fn store_iterate(&mut self, chain: usize, place: usize, iterate: &Iterate) -> ControlFlow<()>;
 }
 
-/// Keeps nothing.
 impl Checkpoint for () {
     fn find_iterate(&mut self, _: usize, _: usize) -> Option<Iterate> {
         None
@@ -66,16 +65,8 @@ impl SegmentState {
     }
 
     /// Whether its misfit is beyond anything that noise explains.
-    #[must_use]
-    pub fn is_bad(&self) -> bool {
+    pub(crate) fn is_bad(&self) -> bool {
         self.chi2 >= 2.0 * self.data as f64
-    }
-
-    /// How far chi2 lies above its mean, in standard deviations.
-    #[must_use]
-    pub fn chi2_excess_sd(&self) -> f64 {
-        let freedoms = (self.data as f64 - 4.0).max(1.0);
-        (self.chi2 - freedoms) / (2.0 * freedoms).sqrt()
     }
 }
 

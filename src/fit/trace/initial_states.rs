@@ -8,7 +8,6 @@ use rayon::prelude::*;
 /// How a segment that does not fit is tried again.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum RescuePolicy {
-    /// Not at all.
     Never,
     /// From the state that the recording shows and from where the segment before ends, where chi2 exceeds
     /// this many times the number of data.

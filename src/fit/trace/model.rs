@@ -22,14 +22,12 @@ use std::sync::Arc;
 pub struct TraceRecording {
     /// The scene; its drive is the one that the model runs on.
     pub scene: Scene,
-    /// The recording.
     pub observation: CameraObservation,
 }
 
 /// Everything that decides a trace fit but the search's settings.
 #[derive(Clone)]
 pub struct TraceModel {
-    /// One a recording.
     pub recordings: Vec<TraceRecording>,
     /// What is estimated besides starting states.
     pub unknowns: TraceUnknowns,
@@ -41,10 +39,9 @@ pub struct TraceModel {
 const CAMERA_RANGE_SD: f64 = 20.0;
 
 /// What a recording is fitted with.
-pub struct TraceSource<'a> {
+pub(crate) struct TraceSource<'a> {
     /// The scene of its condition.
     pub scene: &'a Scene,
-    /// The recording.
     pub recording: &'a Recording,
     /// Time for which the shutter is open, s.
     pub exposure_s: f64,
@@ -57,7 +54,7 @@ impl TraceModel {
     ///
     /// # Errors
     /// [`HeadMotionError`] where the head that drives a model is not tracked.
-    pub fn new(
+    pub(crate) fn new(
         sources: &[TraceSource<'_>],
         parameters: &[FreeParameter],
         constants: &[FreedConstant],

@@ -133,7 +133,7 @@ pub(super) fn carry_states(
 
 /// Covariance of the unknowns' coordinates: by the curvature of the cost, and the sandwich over segments.
 #[derive(Debug, Clone)]
-pub struct TraceCovariance {
+pub(crate) struct TraceCovariance {
     /// Information of the recordings and the priors.
     pub information: DMatrix<f64>,
     /// Inverse of the information, with what is not known of the head added.
@@ -145,8 +145,10 @@ pub struct TraceCovariance {
 }
 
 /// Covariance at an iterate; `None` where the information is singular.
-#[must_use]
-pub fn trace_covariance(model: &TraceModel, at: &super::checkpoint::Iterate) -> Option<TraceCovariance> {
+pub(crate) fn trace_covariance(
+    model: &TraceModel,
+    at: &super::checkpoint::Iterate,
+) -> Option<TraceCovariance> {
     let found = normal_equations(model, &at.point, &at.segments, true)?;
     let curvature = found.matrix.clone().cholesky()?.inverse();
     let n = at.point.len();

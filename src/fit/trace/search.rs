@@ -144,7 +144,7 @@ fn another_start_agrees(model: &TraceModel, descents: &[TraceDescent]) -> bool {
 // argmin's own Gauss-Newton solvers know neither states that are eliminated nor stages.
 
 /// Distance of two ends, in standard deviations of each unknown, up to which they are one place.
-pub const SAME_END_SD: f64 = 1.0;
+pub(crate) const SAME_END_SD: f64 = 1.0;
 
 /// The end of one start.
 #[derive(Debug, Clone, PartialEq)]
@@ -157,14 +157,11 @@ pub struct TraceDescent {
 
 impl TraceDescent {
     /// Cost at the end of the first stage.
-    #[must_use]
-    pub fn first_stage_cost(&self) -> f64 {
+    pub(crate) fn first_stage_cost(&self) -> f64 {
         self.stages.first().map_or(f64::INFINITY, |first| first.cost)
     }
 
-    /// The last iterate.
-    #[must_use]
-    pub fn last_iterate(&self) -> Option<&Iterate> {
+    pub(crate) fn last_iterate(&self) -> Option<&Iterate> {
         self.stages.last()
     }
 }

@@ -137,7 +137,7 @@ enum UnknownEffect {
 }
 
 impl<'a> RecordingModel<'a> {
-    pub fn new(
+    pub(crate) fn new(
         base: &Scene,
         film: &'a CameraObservation,
         number: usize,
@@ -184,7 +184,7 @@ impl<'a> RecordingModel<'a> {
 
     /// The state at the end of frames `first` to before `last`: where the next segment starts. `None` where
     /// the run ends early.
-    pub fn end_state(&self, frames: [usize; 2], state: &LinkState) -> Option<LinkState> {
+    pub(crate) fn end_state(&self, frames: [usize; 2], state: &LinkState) -> Option<LinkState> {
         Some(self.simulate_segment(frames, state, &self.none)?.end)
     }
 
@@ -231,14 +231,18 @@ impl<'a> RecordingModel<'a> {
     }
 
     /// Residuals of unit variance: the tip's frames, then the drop's.
-    pub fn whitened_residuals(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
+    pub(crate) fn whitened_residuals(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
         let mut residuals = self.residuals_m(frames, state)?;
         self.observation.segment_whitening(frames[0], frames[1]).whiten_column(residuals.as_mut_slice());
         Some(residuals).filter(|r| r.iter().all(|x| x.is_finite()))
     }
 
     /// The same where the run has derivatives; `None` where [`Self::residuals_by_state`] has none.
-    pub fn differentiable_residuals(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
+    pub(crate) fn differentiable_residuals(
+        &self,
+        frames: [usize; 2],
+        state: &LinkState,
+    ) -> Option<DVector<f64>> {
         let shot = self.simulate_segment(frames, state, &self.none).filter(|shot| shot.is_known)?;
         let mut residuals = self.model_minus_measured(frames[0], &shot);
         self.observation.segment_whitening(frames[0], frames[1]).whiten_column(residuals.as_mut_slice());
@@ -246,12 +250,12 @@ impl<'a> RecordingModel<'a> {
     }
 
     /// Model minus measured, m: the tip's frames, then the drop's.
-    pub fn residuals_m(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
+    pub(crate) fn residuals_m(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
         Some(self.model_minus_measured(frames[0], &self.simulate_segment(frames, state, &self.none)?))
     }
 
     /// Residuals with their derivatives by the starting state.
-    pub fn residuals_by_state(
+    pub(crate) fn residuals_by_state(
         &self,
         frames: [usize; 2],
         state: &LinkState,
@@ -266,7 +270,7 @@ impl<'a> RecordingModel<'a> {
     }
 
     /// Residuals with all derivatives.
-    pub fn linearize(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
+    pub(crate) fn linearize(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
         let shot = self.simulate_segment(frames, state, &self.all)?;
         let (rows, directions) = (self.observation.count_data(frames[0], frames[1]), self.all.len());
         let mut by_state = DMatrix::zeros(rows, STATES);
@@ -430,8 +434,7 @@ impl<'a> RecordingModel<'a> {
 
 /// The segments of the last stage at a point, their states where they fit best; `None` where a scene refuses
 /// the point. A function of the point alone.
-#[must_use]
-pub fn fit_states_at(model: &TraceModel, segment_s: &[f64], point: &[f64]) -> Option<Iterate> {
+pub(crate) fn fit_states_at(model: &TraceModel, segment_s: &[f64], point: &[f64]) -> Option<Iterate> {
     let last = TraceSearchSettings { segment_s: segment_s.last().copied().into_iter().collect(), twins: 0 };
     let mut at = first_iterate(model, &last, point)?;
     let points = recording_models(model, point)?;
@@ -444,8 +447,7 @@ pub fn fit_states_at(model: &TraceModel, segment_s: &[f64], point: &[f64]) -> Op
 
 /// Whitened residuals of every frame that is fitted, recording by recording, tip before head; `None` where
 /// the model has none.
-#[must_use]
-pub fn frame_residuals(model: &TraceModel, at: Option<&Iterate>) -> Vec<Option<f64>> {
+pub(crate) fn frame_residuals(model: &TraceModel, at: Option<&Iterate>) -> Vec<Option<f64>> {
     let mut known = BTreeMap::new();
     for segment in at.map(|at| segment_residuals(model, at)).unwrap_or_default() {
         let place = |frame: &usize| (segment.recording, segment.is_drop, *frame);

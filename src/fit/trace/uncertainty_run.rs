@@ -19,13 +19,13 @@ use std::borrow::Cow;
 pub(super) const Z_95: f64 = 1.959_963_984_540_054;
 
 /// Starts that are tried, at most, until two of them end at the same place.
-pub const MAX_STARTS: usize = 6;
+pub(crate) const MAX_STARTS: usize = 6;
 
 /// Most twins of a search.
-pub const MAX_TWINS: usize = 1000;
+pub(crate) const MAX_TWINS: usize = 1000;
 /// What a chain is for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum UncertaintyRun {
+pub(crate) enum UncertaintyRun {
     /// A twin of the data, fitted again.
     Twin(usize),
     /// The segments of the stage before, from the end.
@@ -41,8 +41,7 @@ pub enum UncertaintyRun {
 
 impl UncertaintyRun {
     /// Number of its chain, behind those of the starts.
-    #[must_use]
-    pub fn chain_number(self) -> usize {
+    pub(crate) fn chain_number(self) -> usize {
         MAX_STARTS
             + match self {
                 Self::Twin(twin) => twin,
@@ -52,8 +51,7 @@ impl UncertaintyRun {
     }
 
     /// What the chain with a number is for; `None` for a start.
-    #[must_use]
-    pub fn from_chain_number(chain: usize) -> Option<Self> {
+    pub(crate) fn from_chain_number(chain: usize) -> Option<Self> {
         let number = chain.checked_sub(MAX_STARTS)?;
         Some(match number.checked_sub(MAX_TWINS) {
             None => Self::Twin(number),
@@ -82,16 +80,13 @@ impl UncertaintyRun {
 }
 
 /// The end of a search, and what its branches need to know of it.
-pub struct SearchEnd<'a> {
-    /// What was fitted.
+pub(crate) struct SearchEnd<'a> {
     pub model: &'a TraceModel,
     /// How it was searched.
     pub settings: &'a TraceSearchSettings,
     /// Seed of the job.
     pub seed: u64,
-    /// The best iterate.
     pub at: &'a Iterate,
-    /// Covariance there.
     pub covariance: TraceCovariance,
     /// Factor on variances: noise that is larger than measured widens everything.
     pub widening: f64,
@@ -101,8 +96,7 @@ pub struct SearchEnd<'a> {
 
 impl<'a> SearchEnd<'a> {
     /// `None` where the recordings do not determine the unknowns there.
-    #[must_use]
-    pub fn new(
+    pub(crate) fn new(
         model: &'a TraceModel,
         settings: &'a TraceSearchSettings,
         seed: u64,
@@ -142,8 +136,7 @@ const RUNS_TOGETHER: usize = 8;
 
 impl<'a> SearchEnd<'a> {
     /// The iterate of a branch after one, and the first one; `None` at its end.
-    #[must_use]
-    pub fn next_iterate(&self, branch: UncertaintyRun, before: Option<&Iterate>) -> Option<Iterate> {
+    pub(crate) fn next_iterate(&self, branch: UncertaintyRun, before: Option<&Iterate>) -> Option<Iterate> {
         if before.is_some_and(|before| branch.is_complete(before)) {
             return None;
         }

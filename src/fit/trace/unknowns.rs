@@ -48,7 +48,6 @@ pub enum UnknownKind {
     Camera {
         /// Number of the recording.
         film: usize,
-        /// What.
         what: CameraUnknown,
     },
 }
@@ -56,7 +55,6 @@ pub enum UnknownKind {
 /// An unknown with its range and what is known beforehand, in its coordinate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceUnknown {
-    /// What it is.
     pub kind: UnknownKind,
     /// Lower and upper end of the range, in the coordinate.
     pub range: [f64; 2],
@@ -68,8 +66,7 @@ pub struct TraceUnknown {
 
 impl TraceUnknown {
     /// The quantity at a coordinate, in its SI unit.
-    #[must_use]
-    pub fn value(&self, coordinate: f64) -> f64 {
+    pub(crate) fn value(&self, coordinate: f64) -> f64 {
         match &self.kind {
             UnknownKind::Parameter { unit: None, .. } => math::exp(coordinate),
             UnknownKind::Parameter { unit: Some(unit), .. } => coordinate * unit,
@@ -78,8 +75,7 @@ impl TraceUnknown {
     }
 
     /// The coordinate of a value in its SI unit.
-    #[must_use]
-    pub fn coordinate(&self, value: f64) -> f64 {
+    pub(crate) fn coordinate(&self, value: f64) -> f64 {
         match &self.kind {
             UnknownKind::Parameter { unit: None, .. } => math::ln(value),
             UnknownKind::Parameter { unit: Some(unit), .. } => value / unit,
@@ -88,8 +84,7 @@ impl TraceUnknown {
     }
 
     /// Derivative of the value by the coordinate.
-    #[must_use]
-    pub fn slope(&self, coordinate: f64) -> f64 {
+    pub(crate) fn slope(&self, coordinate: f64) -> f64 {
         match &self.kind {
             UnknownKind::Parameter { unit: None, .. } => math::exp(coordinate),
             UnknownKind::Parameter { unit: Some(unit), .. } => *unit,
@@ -98,7 +93,6 @@ impl TraceUnknown {
     }
 
     /// Distance from the prior's mean and its weight, both in standard deviations.
-    #[must_use]
     pub(super) fn prior_residual(&self, coordinate: f64) -> Option<[f64; 2]> {
         self.prior.map(|[mean, sd]| [(coordinate - mean) / sd, 1.0 / sd])
     }
@@ -122,7 +116,7 @@ pub(super) struct CameraParameters {
 
 impl CameraParameters {
     /// What the markers read too much along the sweep and as drop, m, so long after the middle.
-    pub fn offsets_m(&self, after_s: f64) -> [f64; 2] {
+    pub(crate) fn offsets_m(&self, after_s: f64) -> [f64; 2] {
         [
             self.offset_x_m + self.drift_x_m_per_s * after_s,
             self.offset_drop_m + self.drift_drop_m_per_s * after_s,

@@ -29,7 +29,6 @@ const EVALUATION_SHARE: f64 = 0.5;
 
 /// What was found, where nothing stays identified that a search elsewhere contradicts. A better point that is
 /// met on the way is polished and assessed instead.
-#[must_use]
 pub(crate) fn confirm_identified(
     ledger: &mut Ledger,
     names: &[String],

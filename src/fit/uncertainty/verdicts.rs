@@ -109,7 +109,7 @@ pub(super) fn withdraw_correlated(
 
 /// How much each feature counts at the best point.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FeatureWeights {
+pub(crate) struct FeatureWeights {
     /// Scatter of each feature, in its unit, that makes its deviation what the misfit and the model's
     /// roughness there say.
     pub scatter: Vec<f64>,
@@ -122,7 +122,6 @@ pub struct FeatureWeights {
 
 /// Weighs the features at the ledger's best point. `None` when the model failed there or its neighbours
 /// cannot be evaluated.
-#[must_use]
 pub(crate) fn weigh_features(ledger: &mut Ledger) -> Option<FeatureWeights> {
     let best = ledger.best_evaluation().filter(|best| best.failure.is_none())?.clone();
     let around: Vec<Evaluation> = ledger

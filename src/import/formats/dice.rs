@@ -23,7 +23,6 @@ const INCREMENTAL: &str = "Incremental correlation:";
 /// Lines in which the comment block ends.
 const PREAMBLE_LINES: usize = 64;
 
-/// DICe's solution files.
 pub(crate) struct Dice;
 
 impl FileFormat for Dice {

@@ -27,7 +27,6 @@ const AT_ORIGIN: f64 = 1e-6;
 /// The table that has the positions.
 const MENU: &str = "save the data of the graph of X coordinate against Y coordinate of the points as CSV";
 
-/// DIPP-MOTION's tables.
 pub(crate) struct DippMotion;
 
 impl FileFormat for DippMotion {

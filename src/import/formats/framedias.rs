@@ -22,7 +22,6 @@ const INTERVAL: &str = "RecInterval";
 /// Longest time from frame to frame of any camera, s: beyond it the third number is something else.
 const LONGEST_STEP_S: f64 = 10.0;
 
-/// Frame-DIAS' tables.
 pub(crate) struct FrameDias;
 
 impl FileFormat for FrameDias {
@@ -91,7 +90,6 @@ impl FileFormat for FrameDias {
     }
 }
 
-/// The first line.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct FrameDiasCounts {
     frames: f64,

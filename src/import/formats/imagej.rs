@@ -10,10 +10,8 @@ use crate::import::reader::{
 };
 use crate::recording::files::YAxis;
 
-/// ImageJ's tables.
 pub(crate) struct ImageJ;
 
-/// Which of them.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum ImageJTableKind {
     Results,

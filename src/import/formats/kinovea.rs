@@ -26,7 +26,6 @@ const AXES: [&str; 2] = ["/X", "/Y"];
 const PLAIN_TRACK_KEY: &str = "0";
 /// Ends of the row names of chronometers.
 const CHRONOMETER: [&str; 2] = ["(Cumulative)", "(Duration)"];
-/// Kinovea's tables.
 pub(crate) struct Kinovea;
 
 enum KinoveaFileKind {

@@ -13,7 +13,6 @@ const AXES: [&str; 2] = ["-x", "-y"];
 /// encoding.
 const ANGLES: [&str; 3] = ["-\u{3b8}", "-\u{3f4}", "-theta"];
 
-/// motion-analysis-2d's tables.
 pub(crate) struct MotionAnalysis;
 
 impl FileFormat for MotionAnalysis {

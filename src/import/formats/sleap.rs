@@ -206,7 +206,6 @@ pub(crate) enum TrackSource {
     Cell(usize),
     /// The names of its columns.
     Name(String),
-    /// Nothing.
     Nobody,
 }
 

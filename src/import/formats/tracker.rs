@@ -15,12 +15,10 @@ const HEADER_ROWS: usize = 6;
 const WORLD: [&str; 2] = ["x", "y"];
 /// Positions in image pixels, y downwards. `px` and `py` are momentum in Tracker and never positions.
 const IMAGE: [&str; 2] = ["pixelx", "pixely"];
-/// Momentum.
 const MOMENTUM: [&str; 2] = ["px", "py"];
 const TIME: &str = "t";
 const FRAME: &str = "frame";
 
-/// Tracker's tables.
 pub(crate) struct TrackerFormat;
 
 impl FileFormat for TrackerFormat {

@@ -51,7 +51,6 @@ fn root_element(document: &Document) -> Option<&'static str> {
 
 // Simple tracks: `<Tracks><particle><detection t x y z/>`, where `t` counts frames.
 
-/// The root element.
 pub(crate) const SIMPLE_ROOT: &str = "Tracks";
 const SIMPLE_TRACK: &str = "particle";
 const SIMPLE_SPOT: &str = "detection";
@@ -118,7 +117,6 @@ pub(crate) const EXPORT_ADVICE: &str = "in TrackMate's display panel press Track
 /// A position in one frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Spot {
-    /// 1-based line.
     pub line: usize,
     pub frame: Option<f64>,
     /// In the file's unit of time.

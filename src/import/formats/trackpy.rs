@@ -18,7 +18,6 @@ const MIN_FEATURE_PROPERTIES: usize = 3;
 /// Rows at the top that may hold the names: the first, unless a line of somebody's own was put above it.
 const HEADER_ROWS: usize = 3;
 
-/// trackpy's tables.
 pub(crate) struct Trackpy;
 
 /// The first row whose cells `names` accepts, with its index.

@@ -21,7 +21,6 @@ const AXES: usize = 3;
 const LONG_UNITS: [(&str, &str); 4] =
     [("millimeters", "mm"), ("centimeters", "cm"), ("meters", "m"), ("metres", "m")];
 
-/// TRC files.
 pub(crate) struct Trc;
 
 impl FileFormat for Trc {

@@ -11,8 +11,7 @@ use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// Names of files that may belong to the export `file` and lie in its folder, in the order in which they are
 /// read.
-#[must_use]
-pub fn companion_names(file: &str) -> Vec<String> {
+pub(crate) fn companion_names(file: &str) -> Vec<String> {
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
     let by_extension =
         ["cih", "CIH", "cihx", "CIHX", "set", "SET"].iter().map(|extension| format!("{stem}.{extension}"));
@@ -183,7 +182,6 @@ const RATE: CameraRecordKey = CameraRecordKey { key: "record rate", element: "re
 const FRAMES: CameraRecordKey = CameraRecordKey { key: "total frame", element: "totalFrame" };
 /// Every n-th frame of the recording was saved in the pictures.
 const STEP: CameraRecordKey = CameraRecordKey { key: "save step", element: "skipFrame" };
-/// Exposure, ns.
 const SHUTTER_NS: CameraRecordKey =
     CameraRecordKey { key: "shutter type2(nsec)", element: "shutterSpeedNsec" };
 /// Exposure, s, as `1/10000` or as `0.0001`; a `.cihx` has the 10000 alone.
@@ -197,7 +195,6 @@ const LONGEST_SHOWN: usize = 40;
 const RECORD_ADVICE: &str = "give the rate at which the pictures that were tracked follow each other, --frame-rate-hz N, or \
     move the record to another folder if it belongs to another video";
 
-/// A camera's record.
 pub(crate) struct CameraRecord<'a> {
     /// File as named by the user.
     pub name: &'a str,
@@ -218,7 +215,6 @@ struct CameraRecordValue<'r> {
 pub(crate) struct SavedStep {
     /// 1 where every frame was saved.
     pub frames: usize,
-    /// 1-based.
     pub line: usize,
     /// The entry as the file writes it.
     pub written: String,

@@ -25,7 +25,6 @@ const FEWEST_CELLS: usize = 5;
 /// Delimiter and decimal mark of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Dialect {
-    /// Its delimiter.
     pub delimiter: Delimiter,
     /// Its decimal mark, `.` or `,`.
     pub decimal: char,
@@ -261,11 +260,8 @@ fn find_quoted_comma(line: &str) -> Option<String> {
 /// What stands between cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Delimiter {
-    /// A tab.
     Tab,
-    /// A semicolon.
     Semicolon,
-    /// A comma.
     Comma,
     /// One space; two in a row enclose an empty cell.
     Space,

@@ -19,7 +19,6 @@ pub(crate) struct RowPosition {
 /// When a row was taken, and its line.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct RowStamp {
-    /// 1-based line.
     pub line: usize,
     pub frame: Option<f64>,
     pub time: Option<f64>,

@@ -41,7 +41,6 @@ pub(crate) struct LostRule {
     pub words: &'static str,
 }
 
-/// A table's cells.
 #[derive(Clone)]
 pub(crate) struct TableLayout {
     /// First row of data, as an index of the table's head.

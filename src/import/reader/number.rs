@@ -11,9 +11,7 @@ const MAX_NUMBER_BYTES: usize = 64;
 pub(crate) enum CellNumber {
     /// One of the words for a missing value.
     Missing,
-    /// A finite number.
     Value(f64),
-    /// Something else.
     Text,
 }
 

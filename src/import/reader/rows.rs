@@ -7,9 +7,7 @@ use csv::{ReaderBuilder, StringRecord};
 /// A row with its cells, trimmed and without their quotes.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) struct TextRow {
-    /// 1-based line.
     pub line: usize,
-    /// Its cells.
     pub cells: Vec<String>,
     /// Where it starts in the text, bytes.
     pub(crate) start: usize,
@@ -35,7 +33,6 @@ impl TextRow {
 /// A row while it is read.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct RowView<'r> {
-    /// 1-based line.
     pub line: usize,
     cells: &'r StringRecord,
 }
@@ -51,7 +48,6 @@ impl<'r> RowView<'r> {
         self.cells.get(index).map_or("", trim_cell)
     }
 
-    /// Number of cells.
     pub(crate) fn len(&self) -> usize {
         self.cells.len()
     }

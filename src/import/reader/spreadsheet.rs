@@ -38,12 +38,10 @@ pub(crate) fn describe_damage(text: &str) -> Option<&'static str> {
     signs.into_iter().find(|(is, _)| is(text)).map(|(_, words)| words)
 }
 
-/// `#####`.
 pub(crate) fn is_hidden(text: &str) -> bool {
     text.len() > 1 && text.bytes().all(|byte| byte == b'#')
 }
 
-/// `#REF!`, `#WERT!`, `#NAME?`.
 pub(crate) fn is_error(text: &str) -> bool {
     text.starts_with('#') && text.ends_with(['!', '?']) && !text.contains(char::is_whitespace)
 }

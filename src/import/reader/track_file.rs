@@ -48,7 +48,6 @@ pub(crate) type Fact<T> = Option<(T, String)>;
 /// What the file, or the documentation of its format, fixes. What is missing here the user must give.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Facts {
-    /// Direction of y.
     pub y_axis: Fact<YAxis>,
     /// What decides the direction of y where the format leaves it open, for the question.
     pub y_axis_open: Option<&'static str>,
@@ -183,7 +182,6 @@ impl TimeUnit {
 pub(crate) enum CoordinateUnit {
     /// A pixel of unknown size.
     Pixel,
-    /// A length, m.
     Metres(f64),
 }
 

@@ -126,14 +126,12 @@ impl BladeSection {
     }
 
     /// Title of the section.
-    #[must_use]
-    pub fn title(&self) -> &str {
+    pub(crate) fn title(&self) -> &str {
         &self.title
     }
 
     /// Length of the piece of blade, m.
-    #[must_use]
-    pub fn length_m(&self) -> f64 {
+    pub(crate) fn length_m(&self) -> f64 {
         self.number("length_m")
     }
 
@@ -144,15 +142,11 @@ impl BladeSection {
         plausibility::find_implausible(plausibility::SECTION_RANGES, &value, &|key| key)
     }
 
-    /// The neck.
-    #[must_use]
-    pub fn neck(&self) -> LinkSection {
+    pub(crate) fn neck(&self) -> LinkSection {
         self.link_section("neck")
     }
 
-    /// The lip.
-    #[must_use]
-    pub fn lip(&self) -> LinkSection {
+    pub(crate) fn lip(&self) -> LinkSection {
         self.link_section("lip")
     }
 
@@ -242,7 +236,7 @@ pub(super) struct SectionKey {
 }
 
 impl SectionKey {
-    pub fn schema(&self) -> Schema {
+    pub(crate) fn schema(&self) -> Schema {
         json_schema!({
             "type": "number",
             "minimum": LEAST_VALUE,
@@ -252,7 +246,7 @@ impl SectionKey {
     }
 
     /// What it takes, in words.
-    pub fn describe_expected(&self) -> String {
+    pub(crate) fn describe_expected(&self) -> String {
         format!("a number from {LEAST_VALUE:e} to {GREATEST_VALUE:e} ({}, {})", self.meaning, self.unit)
     }
 }

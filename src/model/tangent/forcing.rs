@@ -18,7 +18,6 @@ pub struct ForcingTerms {
     pub tip: [LaneVector; 3],
     /// Lowers the head likewise, m.
     pub drop: LaneVector,
-    /// Normal force, N.
     pub normal: LaneVector,
     /// Friction force in slip, N, at the same normal force and speed of the blade's own.
     pub force: LaneVector,
@@ -27,7 +26,7 @@ pub struct ForcingTerms {
 }
 
 /// A change of the head's motion along the sweep at a few instants, m, with the first two derivatives.
-pub type HeadMotionChange = [LaneVector; 3];
+pub(crate) type HeadMotionChange = [LaneVector; 3];
 
 /// What a constant does directly.
 #[derive(Default)]
@@ -35,14 +34,12 @@ struct DirectForcing {
     effect: ForcingTerms,
     /// To the equation of each link over its cosine.
     links: [LaneVector; 2],
-    /// To `u''`.
     drop_acceleration: LaneVector,
 }
 
 impl ForcingTerms {
     /// Sum of the products with the factors of another.
-    #[must_use]
-    pub fn dot(&self, factors: &Self) -> LaneVector {
+    pub(crate) fn dot(&self, factors: &Self) -> LaneVector {
         let numbers = |e: &Self| {
             let ([t_0, t_1, t_2], [e_0, e_1, e_2]) = (e.tip, e.equations);
             [e.head, t_0, t_1, t_2, e.drop, e.normal, e.force, e_0, e_1, e_2]
@@ -55,8 +52,7 @@ impl ForcingTerms {
 
 impl<const K: usize> ReferenceMotion<'_, K> {
     /// Whether a constant matters in this course.
-    #[must_use]
-    pub fn depends_on(&self, constant: LinkageConstant) -> bool {
+    pub(crate) fn depends_on(&self, constant: LinkageConstant) -> bool {
         match constant {
             LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC => {
                 matches!(self.touch, ContactMode::Slip(_))
@@ -70,8 +66,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
 
     /// What a unit of a constant does.
     #[inline(always)]
-    #[must_use]
-    pub fn constant_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> ForcingTerms {
+    pub(crate) fn constant_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> ForcingTerms {
         let mut direct = DirectForcing::default();
         if let LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC = constant
         {
@@ -87,14 +82,12 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     }
 
     /// Whether a constant moves tip or head where the angles stay; only then there is [`Self::displacement_terms`].
-    #[must_use]
-    pub fn displaces_points(&self, constant: LinkageConstant) -> bool {
+    pub(crate) fn displaces_points(&self, constant: LinkageConstant) -> bool {
         matches!(constant, LinkageConstant::Length(_))
     }
 
     /// Where a unit of a constant moves tip and head; no forces.
-    #[must_use]
-    pub fn displacement_terms(&self, at: &LinkAttitudes, constant: LinkageConstant) -> ForcingTerms {
+    pub(crate) fn displacement_terms(&self, at: &LinkAttitudes, constant: LinkageConstant) -> ForcingTerms {
         let mut effect = ForcingTerms::default();
         if let LinkageConstant::Length(j) = constant {
             (effect.tip[0], effect.tip[1]) = (at.sin[j], at.cos[j] * at.rate[j]);
@@ -105,8 +98,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
 
     /// What a change of the head's motion does.
     #[inline(always)]
-    #[must_use]
-    pub fn head_motion_forcing(&self, at: &MotionSamples, shift: &HeadMotionChange) -> ForcingTerms {
+    pub(crate) fn head_motion_forcing(&self, at: &MotionSamples, shift: &HeadMotionChange) -> ForcingTerms {
         let m = self.moments();
         let effect = ForcingTerms { head: shift[0], tip: *shift, ..ForcingTerms::default() };
         self.complete_forcing(

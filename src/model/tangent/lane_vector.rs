@@ -4,7 +4,7 @@ use std::array::from_fn;
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
 
 /// Numbers in a row: as many as a vector register of most processors holds.
-pub const LANES: usize = 4;
+pub(crate) const LANES: usize = 4;
 
 /// One number a direction, or one an instant.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -12,47 +12,42 @@ pub struct LaneVector(pub [f64; LANES]);
 
 impl LaneVector {
     /// Nothing in every lane.
-    pub const ZERO: Self = Self([0.0; LANES]);
+    pub(crate) const ZERO: Self = Self([0.0; LANES]);
 
     /// The same number in every lane.
     #[inline(always)]
-    #[must_use]
-    pub const fn splat(x: f64) -> Self {
+    pub(crate) const fn splat(x: f64) -> Self {
         Self([x; LANES])
     }
 
     /// One over each number.
     #[inline(always)]
-    #[must_use]
-    pub fn inverse(self) -> Self {
+    pub(crate) fn inverse(self) -> Self {
         Self(from_fn(|lane| 1.0 / self.0[lane]))
     }
 
     /// Sum of the products of two rows' numbers.
     #[inline(always)]
-    #[must_use]
-    pub fn dot(&self, other: &Self) -> f64 {
+    pub(crate) fn dot(&self, other: &Self) -> f64 {
         (0..LANES).map(|lane| self.0[lane] * other.0[lane]).sum()
     }
 
     /// Sum of the numbers.
     #[inline(always)]
-    #[must_use]
-    pub fn sum(&self) -> f64 {
+    pub(crate) fn sum(&self) -> f64 {
         self.0.iter().sum()
     }
 
     /// Adds `factor` times a row.
     #[inline(always)]
-    pub fn add_scaled(&mut self, factor: f64, row: &Self) {
+    pub(crate) fn add_scaled(&mut self, factor: f64, row: &Self) {
         for lane in 0..LANES {
             self.0[lane] += factor * row.0[lane];
         }
     }
 
     /// Whether all numbers are finite.
-    #[must_use]
-    pub fn is_finite(&self) -> bool {
+    pub(crate) fn is_finite(&self) -> bool {
         self.0.iter().all(|x| x.is_finite())
     }
 }

@@ -53,8 +53,7 @@ pub struct LinearForm {
 
 impl<const K: usize> ReferenceMotion<'_, K> {
     /// The place of the tip, at any instants, as [`Self::channel_form`] has it.
-    #[must_use]
-    pub fn tip_position_form(&self) -> LinearForm {
+    pub(crate) fn tip_position_form(&self) -> LinearForm {
         let (mut form, l) = (LinearForm::default(), self.lengths());
         let one = LaneVector::splat(1.0);
         if self.touch == ContactMode::Stick {
@@ -67,8 +66,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     }
 
     /// The place of the head along the sweep, likewise.
-    #[must_use]
-    pub fn head_position_form(&self) -> LinearForm {
+    pub(crate) fn head_position_form(&self) -> LinearForm {
         let mut form = LinearForm::default();
         form.forcing.head = LaneVector::splat(1.0);
         form
@@ -76,8 +74,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
 
     /// A quantity at these instants; in stick without `y2`, which follows. A force needs all of them:
     /// [`Self::force_form`].
-    #[must_use]
-    pub fn channel_form(&self, at: &LinkAttitudes, quantity: ModelChannel) -> LinearForm {
+    pub(crate) fn channel_form(&self, at: &LinkAttitudes, quantity: ModelChannel) -> LinearForm {
         let mut form = LinearForm::default();
         let l = self.lengths();
         let one = LaneVector::splat(1.0);
@@ -114,8 +111,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     }
 
     /// A force at these instants, likewise; there is none in flight.
-    #[must_use]
-    pub fn force_form(&self, at: &MotionSamples, quantity: ModelChannel) -> LinearForm {
+    pub(crate) fn force_form(&self, at: &MotionSamples, quantity: ModelChannel) -> LinearForm {
         let mut form = match (quantity, self.touch) {
             (_, ContactMode::Flight(..)) => return LinearForm::default(),
             (ModelChannel::NormalForce, _) => self.normal_force_form(at),

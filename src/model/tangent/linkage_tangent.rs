@@ -9,12 +9,9 @@ use crate::model::Linkage;
 #[allow(missing_docs)] // the fields are those of the linkage
 pub struct LinkageTangent {
     pub mass_kg: LaneVector,
-    /// `l1`, `l2`.
     pub lengths_m: [LaneVector; 2],
-    /// `m_a`, `m_b`.
     pub moments: [LaneVector; 2],
     pub m_c: LaneVector,
-    /// `m_theta`, `m_phi`.
     pub inertias: [LaneVector; 2],
     pub head: SpringTangent,
     pub neck: SpringTangent,
@@ -87,7 +84,7 @@ const CONSTANTS: [LinkageConstant; 21] = [
 impl LinkageTangent {
     /// Sets a direction to `sum weight * linkage` over these linkages: a difference quotient, whose weights
     /// add up to zero.
-    pub fn set_direction(&mut self, lane: usize, terms: &[(f64, Linkage)]) {
+    pub(crate) fn set_direction(&mut self, lane: usize, terms: &[(f64, Linkage)]) {
         self.rows_mut().into_iter().for_each(|row| row[lane] = 0.0);
         let Some((_, mut first)) = terms.first().copied() else { return };
         for (weight, linkage) in terms {
@@ -103,14 +100,13 @@ impl LinkageTangent {
     }
 
     /// The constants that change in a direction, each with its derivative.
-    pub fn nonzero_changes(&self, lane: usize) -> impl Iterator<Item = (LinkageConstant, f64)> {
+    pub(crate) fn nonzero_changes(&self, lane: usize) -> impl Iterator<Item = (LinkageConstant, f64)> {
         let changes = self.clone().rows_mut().map(|row| row[lane]);
         CONSTANTS.into_iter().zip(changes).filter(|(_, change)| *change != 0.0)
     }
 
     /// The linkage `step` along a direction.
-    #[must_use]
-    pub fn displace_linkage(&self, linkage: &Linkage, lane: usize, step: f64) -> Linkage {
+    pub(crate) fn displace_linkage(&self, linkage: &Linkage, lane: usize, step: f64) -> Linkage {
         let (mut tangent, mut moved) = (self.clone(), *linkage);
         for (row, constant) in tangent.rows_mut().into_iter().zip(constants_mut(&mut moved)) {
             if let Some(constant) = constant {

@@ -9,20 +9,19 @@ use std::ops::Deref;
 
 /// Where the links point at a few instants, one a lane.
 #[derive(Debug, Clone)]
-pub struct LinkAttitudes {
+pub(crate) struct LinkAttitudes {
     /// Times since the start of the series, s.
     pub x: LaneVector,
     /// Cosines of both angles.
     pub cos: [LaneVector; 2],
     /// Sines of both angles.
     pub sin: [LaneVector; 2],
-    /// Angular rates, rad/s.
     pub rate: [LaneVector; 2],
 }
 
 /// A motion at a few instants, one a lane.
 #[derive(Debug, Clone)]
-pub struct MotionSamples {
+pub(crate) struct MotionSamples {
     /// Where the links point.
     pub attitude: LinkAttitudes,
     pub(super) acceleration: LaneVectorPair,
@@ -30,11 +29,9 @@ pub struct MotionSamples {
     pub(super) secant: [LaneVectorPair; 3],
     /// `sin / cos` likewise.
     pub(super) tangent: [LaneVectorPair; 3],
-    /// `p'`, `q'`.
     pub(super) along: LaneVectorPair,
     pub(super) across: LaneVectorPair,
     pub(super) head_acceleration: LaneVector,
-    /// `u''`.
     pub(super) drop_acceleration: LaneVector,
     pub(super) normal: LaneVector,
     pub(super) friction: LaneVector,
@@ -73,8 +70,7 @@ impl Deref for MotionSamples {
 impl<const K: usize> ReferenceMotion<'_, K> {
     /// Where the links point at these times after the start of the series.
     #[inline]
-    #[must_use]
-    pub fn sample_attitudes(&self, x: LaneVector) -> LinkAttitudes {
+    pub(crate) fn sample_attitudes(&self, x: LaneVector) -> LinkAttitudes {
         let motion = self.motion;
         let [cos_0, cos_1, sin_0, sin_1] = sum_horner(x, motion.order, |k| {
             let ([cos_0, cos_1], [sin_0, sin_1]) = (motion.cosines(k), motion.sines(k));
@@ -86,8 +82,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
 
     /// The motion at these times after the start of its series.
     #[inline]
-    #[must_use]
-    pub fn sample_motion(&self, x: LaneVector) -> MotionSamples {
+    pub(crate) fn sample_motion(&self, x: LaneVector) -> MotionSamples {
         let motion = self.motion;
         let order = motion.order;
         let attitude = self.sample_attitudes(x);
@@ -196,8 +191,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
 }
 
 /// Times that fill a row: the last one fills what is left.
-#[must_use]
-pub fn fill_lanes(times: impl IntoIterator<Item = f64>) -> LaneVector {
+pub(crate) fn fill_lanes(times: impl IntoIterator<Item = f64>) -> LaneVector {
     let mut row = LaneVector::ZERO;
     for (lane, time) in times.into_iter().take(LANES).enumerate() {
         row.0[lane..].fill(time);

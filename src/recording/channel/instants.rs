@@ -24,12 +24,10 @@ pub enum InstantKind {
 }
 
 impl InstantKind {
-    /// Every instant.
-    pub const ALL: [Self; 4] = [Self::Hold, Self::Reversal, Self::Flip, Self::Release];
+    pub(crate) const ALL: [Self; 4] = [Self::Hold, Self::Reversal, Self::Flip, Self::Release];
 
     /// Name in a window.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Hold => "hold",
             Self::Reversal => "reversal",
@@ -56,7 +54,6 @@ pub struct Reversal {
 impl Reversal {
     /// End of the flip and of the tip's rest, whichever is later, s: from then on the blade trails on its new
     /// side.
-    #[must_use]
     pub(crate) fn settling_time_s(&self) -> Option<f64> {
         Some(self.flip?.end_s.max(self.release_s?))
     }

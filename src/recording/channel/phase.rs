@@ -33,11 +33,10 @@ pub enum ReversalPhase {
 
 impl ReversalPhase {
     /// Every phase, in order of time.
-    pub const ALL: [Self; 4] = [Self::Before, Self::Stick, Self::Flip, Self::After];
+    pub(crate) const ALL: [Self; 4] = [Self::Before, Self::Stick, Self::Flip, Self::After];
 
     /// Name on the command line.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Before => "before",
             Self::Stick => "stick",
@@ -150,7 +149,8 @@ fn phase_window(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::recording::channel::{Flip, Reversal};
+    use crate::recording::channel::Reversal;
+    use crate::recording::channel::flip::Flip;
     use crate::recording::{FrameGrid, Traces};
 
     fn recording() -> Recording {

@@ -346,7 +346,8 @@ fn parse_seconds(text: &str) -> Option<f64> {
 mod tests {
     use super::*;
     use crate::recording::Traces;
-    use crate::recording::channel::{Flip, Reversal};
+    use crate::recording::channel::Reversal;
+    use crate::recording::channel::flip::Flip;
 
     fn recording() -> Recording {
         let column = vec![None; 1000];

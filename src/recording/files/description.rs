@@ -142,8 +142,7 @@ pub struct LevelEntry {
 
 impl LevelEntry {
     /// The rotation in words.
-    #[must_use]
-    pub fn describe(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         let angle = format_degrees(self.angle_rad, self.sd_rad);
         if !self.applied {
             return format!(
@@ -186,8 +185,7 @@ impl RecordingFile {
     }
 
     /// A description of the present format with nothing but its camera.
-    #[must_use]
-    pub fn new(camera: CameraEntry, synthetic: bool) -> Self {
+    pub(crate) fn new(camera: CameraEntry, synthetic: bool) -> Self {
         Self {
             format: FORMAT,
             synthetic,
@@ -235,7 +233,7 @@ impl RecordingFile {
     ///
     /// # Errors
     /// [`FilesError::OtherTrace`].
-    pub fn check_trace(&self, file: &str, trace: &str) -> Result<(), FilesError> {
+    pub(crate) fn check_trace(&self, file: &str, trace: &str) -> Result<(), FilesError> {
         let Some(expected) = &self.trace_sha256 else { return Ok(()) };
         let found = text_sha256(trace);
         if found == *expected {

@@ -87,7 +87,7 @@ pub fn parse_trace_csv(file: &str, text: &str) -> Result<(FrameGrid, Traces), Fi
 ///
 /// # Errors
 /// [`FilesError`] with file, line and column; also where the times do not lie on that grid.
-pub(crate) fn parse_trace_csv_at(
+pub fn parse_trace_csv_at(
     file: &str,
     text: &str,
     frame_rate_hz: f64,

@@ -3,7 +3,7 @@
 use crate::math;
 
 /// Most coefficients of a process.
-pub const MOST_COEFFICIENTS: usize = 8;
+pub(crate) const MOST_COEFFICIENTS: usize = 8;
 
 /// Stationary autoregressive noise of a channel.
 #[derive(Debug, Clone, PartialEq)]
@@ -17,10 +17,8 @@ pub struct AutoregressiveNoise {
 #[error(
     "found a standard deviation of {sd} and the coefficients {coefficients:?} of noise, expected a positive number and at most {MOST_COEFFICIENTS} coefficients of a stationary process"
 )]
-pub struct NotStationary {
-    /// Standard deviation.
+pub(crate) struct NotStationary {
     pub sd: f64,
-    /// Coefficients.
     pub coefficients: Vec<f64>,
 }
 
@@ -30,7 +28,7 @@ impl AutoregressiveNoise {
     ///
     /// # Errors
     /// [`NotStationary`] unless the standard deviation is positive and the noise stays finite.
-    pub fn new(sd: f64, coefficients: Vec<f64>) -> Result<Self, NotStationary> {
+    pub(crate) fn new(sd: f64, coefficients: Vec<f64>) -> Result<Self, NotStationary> {
         let usable = sd > 0.0 && sd.is_finite() && coefficients.len() <= MOST_COEFFICIENTS;
         if usable && reflection_coefficients(&coefficients).iter().all(|kappa| kappa.abs() < 1.0) {
             Ok(Self { sd, coefficients })
@@ -43,33 +41,29 @@ impl AutoregressiveNoise {
     ///
     /// # Errors
     /// [`NotStationary`] unless the standard deviation is positive.
-    pub fn white(sd: f64) -> Result<Self, NotStationary> {
+    pub(crate) fn white(sd: f64) -> Result<Self, NotStationary> {
         Self::new(sd, Vec::new())
     }
 
     /// Standard deviation of the noise itself, in the unit of its channel.
-    #[must_use]
-    pub fn sd(&self) -> f64 {
+    pub(crate) fn sd(&self) -> f64 {
         self.sd
     }
 
     /// Coefficients, that of the frame before first; none for white noise.
-    #[must_use]
-    pub fn coefficients(&self) -> &[f64] {
+    pub(crate) fn coefficients(&self) -> &[f64] {
         &self.coefficients
     }
 
     /// Standard deviation of what the frames before do not tell of a frame.
-    #[must_use]
-    pub fn innovation_sd(&self) -> f64 {
+    pub(crate) fn innovation_sd(&self) -> f64 {
         let unexplained: f64 =
             reflection_coefficients(&self.coefficients).iter().map(|kappa| 1.0 - kappa * kappa).product();
         self.sd * unexplained.sqrt()
     }
 
     /// Correlation of frames 0, 1, ... `count - 1` apart.
-    #[must_use]
-    pub fn correlations(&self, count: usize) -> Vec<f64> {
+    pub(crate) fn correlations(&self, count: usize) -> Vec<f64> {
         let mut correlations = vec![1.0];
         let (mut known, mut unexplained) = (Vec::new(), 1.0);
         for kappa in reflection_coefficients(&self.coefficients) {
@@ -124,7 +118,7 @@ type NoiseMemory = [f64; MOST_COEFFICIENTS];
 
 /// Makes noise white on a pattern of frames.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Whitener {
+pub(crate) struct Whitener {
     coefficients: NoiseMemory,
     /// Frames that the noise remembers, at least one.
     order: usize,
@@ -144,8 +138,7 @@ struct WhiteningStep {
 
 impl Whitener {
     /// The map for `frames`, the rising numbers of the frames that are present.
-    #[must_use]
-    pub fn new(noise: &AutoregressiveNoise, frames: &[usize]) -> Self {
+    pub(crate) fn new(noise: &AutoregressiveNoise, frames: &[usize]) -> Self {
         let mut coefficients = [0.0; MOST_COEFFICIENTS];
         coefficients[..noise.coefficients().len()].copy_from_slice(noise.coefficients());
         let order = noise.coefficients().len().max(1);
@@ -164,7 +157,7 @@ impl Whitener {
 
     /// Replaces a column, one value a frame in the unit of the noise, by its whitened values: of the noise
     /// itself they are independent with unit variance.
-    pub fn whiten_column(&self, column: &mut [f64]) {
+    pub(crate) fn whiten_column(&self, column: &mut [f64]) {
         let mut memory = [0.0; MOST_COEFFICIENTS];
         for (value, step) in column.iter_mut().zip(&self.steps) {
             (0..step.ahead).for_each(|_| self.predict_next(&mut memory));
@@ -175,8 +168,7 @@ impl Whitener {
     }
 
     /// Logarithm of the determinant of the covariance of the frames.
-    #[must_use]
-    pub fn log_determinant(&self) -> f64 {
+    pub(crate) fn log_determinant(&self) -> f64 {
         self.steps.iter().map(|step| 2.0 * math::ln(step.sd)).sum()
     }
 
@@ -206,7 +198,6 @@ impl PredictionCovariance {
         Self { order, covariance }
     }
 
-    /// One frame on.
     fn advance_frame(&mut self, coefficients: &NoiseMemory, innovation: f64) {
         let n = self.order;
         let mut with_next = [0.0; MOST_COEFFICIENTS];

@@ -31,17 +31,17 @@ pub(super) struct NoiseBlock {
 
 impl NoiseBlock {
     /// Data beyond the freedoms of the motion.
-    pub fn degrees_of_freedom(&self) -> usize {
+    pub(crate) fn degrees_of_freedom(&self) -> usize {
         self.values.len() - self.columns.len()
     }
 
     /// Sum of squares that the columns leave of the values.
-    pub fn residual_sum_of_squares(&self) -> f64 {
+    pub(crate) fn residual_sum_of_squares(&self) -> f64 {
         self.residuals().iter().map(|x| x * x).sum()
     }
 
     /// What the columns leave of the values.
-    pub fn residuals(&self) -> Vec<f64> {
+    pub(crate) fn residuals(&self) -> Vec<f64> {
         let mut values = self.values.clone();
         project_out(&mut self.columns.clone(), &mut values);
         values

@@ -18,10 +18,9 @@ const FEWEST_BLOCKS: usize = 30;
 
 /// The part of a channel's noise that the other point shows.
 #[derive(Debug, Clone, PartialEq)]
-pub struct SharedNoise {
+pub(crate) struct SharedNoise {
     /// Noise of the channel for a unit of the other point's.
     pub share: f64,
-    /// Its standard deviation.
     pub sd: f64,
     /// What to take from the channel in every frame, m; empty where the other point is lost, or its noise is
     /// not known.
@@ -30,7 +29,7 @@ pub struct SharedNoise {
 
 /// Common noise of a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct CommonNoise {
+pub(crate) struct CommonNoise {
     /// In the tip along the sweep, as the head shows it; `None` where nothing clear is shared.
     pub tip_x: Option<SharedNoise>,
     /// In the head upwards, as the tip on the glass shows it.
@@ -38,8 +37,7 @@ pub struct CommonNoise {
 }
 
 /// Measures what the points of a recording have in common.
-#[must_use]
-pub fn measure_common_noise(recording: &Recording) -> CommonNoise {
+pub(crate) fn measure_common_noise(recording: &Recording) -> CommonNoise {
     let (traces, length) = (recording.traces(), block_length(recording.grid().frame_rate_hz));
     let head = channel_residuals(&traces.head_x_m, &BlockCut { length, degree: 3, covariate: None });
     let glass =

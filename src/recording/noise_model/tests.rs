@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::math::StandardNormal;
+use crate::recording::noise_model::common_noise::CommonNoise;
 use crate::recording::{FrameGrid, Recording, Traces};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -33,7 +33,6 @@ const PLAYBACK_RATES_HZ: [f64; 8] =
 const PLAYBACK_NEARNESS: f64 = 1e-3;
 
 /// Whether `rate_hz` is a rate of playback, which is what a wrong time column usually holds.
-#[must_use]
 pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
     PLAYBACK_RATES_HZ.iter().any(|playback| (rate_hz / playback - 1.0).abs() <= PLAYBACK_NEARNESS)
 }
@@ -151,8 +150,7 @@ pub(super) fn check_track_column(
 }
 
 /// Channels that are written in steps coarser than their noise.
-#[must_use]
-pub fn check_position_steps(measured: &Quality, optics: &Optics) -> Vec<QualityFinding> {
+pub(crate) fn check_position_steps(measured: &Quality, optics: &Optics) -> Vec<QualityFinding> {
     let channels = measured.channels().into_iter();
     channels
         .filter_map(|(name, quality)| Some(check_position_step(quality, optics)?.on_channel(name)))

@@ -17,8 +17,7 @@ pub enum Severity {
 
 impl Severity {
     /// The word for it.
-    #[must_use]
-    pub fn name(self) -> &'static str {
+    pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Note => "note",
             Self::Caution => "caution",

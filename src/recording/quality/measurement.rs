@@ -107,8 +107,7 @@ fn measure_channel(samples: &[Option<f64>]) -> ChannelQuality {
 impl Quality {
     /// Lowest and highest frequency that the recording shows well, Hz: three cycles in it, and 0.8 of the
     /// Nyquist frequency. Where the first is not below the second, it is too short for a spectrum.
-    #[must_use]
-    pub fn band_hz(&self) -> (f64, f64) {
+    pub(crate) fn band_hz(&self) -> (f64, f64) {
         (FEWEST_CYCLES / self.duration_s, NYQUIST_SHARE * self.nyquist_hz)
     }
 
@@ -219,8 +218,7 @@ impl Quality {
 
 impl ComponentVisibility {
     /// The verdict in words, with its numbers.
-    #[must_use]
-    pub fn describe(&self) -> String {
+    pub(crate) fn describe(&self) -> String {
         let what = match self.verdict {
             Visibility::Shown => "shown".to_owned(),
             Visibility::Attenuated => "attenuated".to_owned(),

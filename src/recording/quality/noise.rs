@@ -64,13 +64,10 @@ fn approximate_common_divisor(mut larger: f64, mut smaller: f64, rounding: f64) 
 /// Runs of absent frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct FrameGaps {
-    /// Absent frames.
     pub missing: usize,
-    /// Runs of them.
     pub runs: usize,
     /// Length of the longest run, frames; the first of equal ones.
     pub longest: usize,
-    /// Its first frame.
     pub longest_from: usize,
     /// Largest number of which all distances between frames present are multiples; above 1 where only every
     /// n-th frame was tracked. 0 where fewer than two are present.
@@ -78,7 +75,7 @@ pub(super) struct FrameGaps {
 }
 
 impl FrameGaps {
-    pub fn count_gaps(present: impl Iterator<Item = bool>) -> Self {
+    pub(crate) fn count_gaps(present: impl Iterator<Item = bool>) -> Self {
         let (mut gaps, mut run, mut last) = (Self::default(), 0, None);
         for (frame, present) in present.enumerate() {
             if present {
@@ -96,7 +93,6 @@ impl FrameGaps {
     }
 }
 
-/// Euclid's.
 fn greatest_common_divisor(a: usize, b: usize) -> usize {
     if b == 0 { a } else { greatest_common_divisor(b, a % b) }
 }

@@ -47,7 +47,6 @@ const NOISE_SCATTER: std::ops::RangeInclusive<f64> = 1.6..=3.8;
 const ROUNDING: f64 = 1e-26;
 
 /// Frequency to which a trace holds noise before it was cut off, Hz, if it was; `frame_rate_hz` is its rate.
-#[must_use]
 pub(crate) fn cutoff_hz(samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f64> {
     let bands = median_band_powers(samples)?;
     let largest = samples.iter().flatten().fold(0.0_f64, |most, x| most.max(x.abs()));

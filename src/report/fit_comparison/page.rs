@@ -12,8 +12,7 @@ use crate::report::page::{agreement, data_banner, provenance_html};
 use crate::text::{DASH, format_number, format_or_dash};
 
 /// The page; the same comparison always gives the same bytes.
-#[must_use]
-pub fn render_page(several: &FitComparison) -> String {
+pub(crate) fn render_page(several: &FitComparison) -> String {
     let section = |id, heading, html: String| PageSection { id, heading, html, folded: false };
     let sections = [
         section(

@@ -93,9 +93,7 @@ pub(in crate::report) enum CellStyle {
     Name,
     /// A number, from the right.
     Number,
-    /// A good verdict.
     Good,
-    /// A bad verdict.
     Bad,
 }
 
@@ -127,13 +125,13 @@ pub(in crate::report) struct HtmlTable<'a> {
 
 impl HtmlTable<'_> {
     /// Heads of columns in the program's own words.
-    pub fn column_heads(list: &[(&str, CellStyle)]) -> Vec<(String, CellStyle)> {
+    pub(crate) fn column_heads(list: &[(&str, CellStyle)]) -> Vec<(String, CellStyle)> {
         list.iter().map(|(name, set)| (escape_text(name), *set)).collect()
     }
 
     /// The table in a box that scrolls by itself where it is wider than the page; nothing when it has no
     /// rows.
-    pub fn render(&self) -> String {
+    pub(crate) fn render(&self) -> String {
         if self.rows.is_empty() {
             return String::new();
         }

@@ -12,11 +12,10 @@ use crate::spectrum::{SpectrumSettings, analyse_spectrum};
 use std::ops::Range;
 
 /// The run that the others are held against.
-pub struct ReferenceRun<'a> {
+pub(crate) struct ReferenceRun<'a> {
     scene: &'a Scene,
     motion: SampledRun,
     spectral: ComponentReader,
-    /// Its components, Hz.
     pub components: ComponentPair,
     /// The method that it is checked against, at the same tolerance.
     pub checked_by: IntegrationMethod,
@@ -30,8 +29,7 @@ pub struct ReferenceRun<'a> {
 
 /// What a setting errs by and costs.
 #[derive(Debug, Clone, PartialEq)]
-pub struct AccuracyRow {
-    /// The setting.
+pub(crate) struct AccuracyRow {
     pub setting: SolverSetting,
     /// How the run went.
     pub run: RunResult,
@@ -51,8 +49,7 @@ pub struct AccuracyRow {
 
 impl<'a> ReferenceRun<'a> {
     /// Runs a scene by the default method and checks it against Runge-Kutta.
-    #[must_use]
-    pub fn from_scene(scene: &'a Scene) -> Self {
+    pub(crate) fn from_scene(scene: &'a Scene) -> Self {
         let reference = |method| {
             SampledRun::run_scene(scene, SolverOptions { method, ..SolverOptions::new(REFERENCE_TOLERANCE) })
         };
@@ -75,26 +72,22 @@ impl<'a> ReferenceRun<'a> {
     }
 
     /// How the reference itself went.
-    #[must_use]
-    pub fn run_result(&self) -> &RunResult {
+    pub(crate) fn run_result(&self) -> &RunResult {
         &self.motion.run
     }
 
     /// Whether an error of transition times is larger than what the reference is sure of.
-    #[must_use]
-    pub fn resolves_error(&self, error_s: f64) -> bool {
+    pub(crate) fn resolves_error(&self, error_s: f64) -> bool {
         self.lists_agree && self.apart_s.is_none_or(|apart| error_s > apart)
     }
 
     /// Runs a setting and nothing else, to be timed.
-    #[must_use]
-    pub fn run_untracked(&self, setting: &SolverSetting) -> RunResult {
+    pub(crate) fn run_untracked(&self, setting: &SolverSetting) -> RunResult {
         run_scene_with(self.scene, setting.solver_options(), &mut ())
     }
 
     /// Runs a setting and holds it against the reference.
-    #[must_use]
-    pub fn measure_setting(&self, setting: SolverSetting) -> AccuracyRow {
+    pub(crate) fn measure_setting(&self, setting: SolverSetting) -> AccuracyRow {
         let motion = SampledRun::run_scene(self.scene, setting.solver_options());
         let (state_rms, state_worst) = SampledRun::deflection_differences(&self.motion, &motion);
         let components = self.spectral.read_components(&motion.deflection_m, &motion.head_drop_m);
@@ -115,9 +108,9 @@ impl<'a> ReferenceRun<'a> {
 // The two spectral components that fits are held against, read by the same code.
 
 /// Place of the low component: the head on its spring, read from the head's drop.
-pub const LOW_COMPONENT: usize = 0;
+pub(crate) const LOW_COMPONENT: usize = 0;
 /// Place of the high component: the stick-slip cycle, read from the deflection.
-pub const HIGH_COMPONENT: usize = 1;
+pub(crate) const HIGH_COMPONENT: usize = 1;
 
 /// Frequencies between which each component is sought, in units of the head's natural frequency: the low one
 /// was published at 1.5 and 3.9 times that frequency, the high one at 40 to 80 times it.
@@ -127,14 +120,14 @@ const AFTER_RELEASE_S: f64 = 0.01;
 
 /// The components of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct ComponentPair {
+pub(crate) struct ComponentPair {
     /// Frequency of the low and the high component, Hz; `None` where there is none.
     pub hz: [Option<f64>; 2],
 }
 
 /// What is read from every run: the same frames, whenever its own tip was released.
 #[derive(Debug, Clone, PartialEq)]
-pub struct ComponentReader {
+pub(crate) struct ComponentReader {
     frames: Range<usize>,
     frame_rate_hz: f64,
     bands_hz: [(f64, f64); 2],
@@ -142,7 +135,7 @@ pub struct ComponentReader {
 
 impl ComponentReader {
     /// From the release that the reference shows to its end; all of it where it shows none.
-    pub fn from_reference(scene: &Scene, reference: Option<&Recording>) -> Self {
+    pub(crate) fn from_reference(scene: &Scene, reference: Option<&Recording>) -> Self {
         let from = WindowEnd::Found { anchor: InstantKind::Release, reversal: 1, offset_s: AFTER_RELEASE_S };
         let window = Window { from, to: WindowEnd::Open };
         let released = reference.and_then(|recording| {
@@ -157,7 +150,7 @@ impl ComponentReader {
     }
 
     /// The components of a run, of which each column has one sample a frame, m.
-    pub fn read_components(&self, deflection_m: &[f64], head_drop_m: &[f64]) -> ComponentPair {
+    pub(crate) fn read_components(&self, deflection_m: &[f64], head_drop_m: &[f64]) -> ComponentPair {
         let strongest = |column: &[f64], (low, high): (f64, f64)| {
             let inside: Vec<Option<f64>> =
                 column.get(self.frames.clone())?.iter().map(|x| Some(*x)).collect();

@@ -28,8 +28,7 @@ pub(super) fn comparison_grid(scene: &Scene) -> FrameGrid {
 }
 
 impl SampledRun {
-    /// Runs a scene.
-    pub fn run_scene(scene: &Scene, effort: SolverOptions) -> Self {
+    pub(crate) fn run_scene(scene: &Scene, effort: SolverOptions) -> Self {
         let grid = comparison_grid(scene);
         let (mut deflection_m, mut head_drop_m, mut transitions) =
             (Vec::new(), Vec::new(), Transitions::default());
@@ -44,7 +43,7 @@ impl SampledRun {
 
     /// Root mean square and worst difference of the deflection over the samples that both runs reached,
     /// relative to its range.
-    pub fn deflection_differences(reference: &Self, other: &Self) -> (f64, f64) {
+    pub(crate) fn deflection_differences(reference: &Self, other: &Self) -> (f64, f64) {
         let (low, high) = reference
             .deflection_m
             .iter()
@@ -61,7 +60,7 @@ impl SampledRun {
 
     /// The run as a camera without fault would record it; `None` for a run that ended before its second
     /// sample.
-    pub fn to_recording(&self, scene: &Scene) -> Option<Recording> {
+    pub(crate) fn to_recording(&self, scene: &Scene) -> Option<Recording> {
         let grid = comparison_grid(scene);
         let frames = self.deflection_m.len();
         let head: Vec<f64> = (0..frames).map(|i| scene.drive.motion_at(grid.time_s(i)).position_m).collect();

@@ -4,7 +4,7 @@ use crate::simulate::Transition;
 
 /// How a list differs from the reference's.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct TransitionDifference {
+pub(crate) struct TransitionDifference {
     /// Transitions of the reference that the list lacks.
     pub missed: usize,
     /// Transitions that the reference lacks.
@@ -17,8 +17,7 @@ impl TransitionDifference {
     /// Two lists agree when they have the same changes of mode in the same order. When they do not,
     /// transitions are paired that are of one kind and less than half of the reference's median gap apart;
     /// the others are missed or invented.
-    #[must_use]
-    pub fn from_lists(reference: &[Transition], found: &[Transition]) -> Self {
+    pub(crate) fn from_lists(reference: &[Transition], found: &[Transition]) -> Self {
         let same =
             reference.len() == found.len() && reference.iter().zip(found).all(|(a, b)| is_of_one_kind(a, b));
         if same {
@@ -38,8 +37,7 @@ impl TransitionDifference {
     }
 
     /// Whether the list has the reference's transitions and no others.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.missed + self.invented == 0
     }
 }

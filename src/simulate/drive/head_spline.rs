@@ -31,7 +31,6 @@ impl HeadSpline {
     /// The smooth curve through points given as frame of `grid` and position, m, the frames rising, at least
     /// three of them, each `block` frames counting by their mean: a cubic spline through its places at the
     /// frames `knots`.
-    #[must_use]
     pub(super) fn from_points(
         grid: &FrameGrid,
         points: &[(usize, f64)],
@@ -66,27 +65,24 @@ impl HeadSpline {
     }
 
     /// The same motion with every length multiplied by `factor`.
-    #[must_use]
     pub(super) fn scale_lengths(&self, factor: f64) -> Self {
         let pieces = self.pieces.iter().map(|piece| piece.map(|c| factor * c)).collect();
         Self { pieces, ..self.clone() }
     }
 
     /// Number of coefficients of the smooth curve; 0 where nothing was smoothed.
-    #[must_use]
-    pub fn coefficient_count(&self) -> usize {
+    pub(crate) fn coefficient_count(&self) -> usize {
         self.curve.as_ref().map_or(0, |curve| curve.coefficient_count())
     }
 
     /// How the position at a frame depends on the coefficients: the first that counts, and its weight and
     /// those of the next.
-    #[must_use]
-    pub fn position_weights(&self, frame: usize) -> (usize, [f64; 6]) {
+    pub(crate) fn position_weights(&self, frame: usize) -> (usize, [f64; 6]) {
         self.curve.as_ref().map_or((0, [0.0; 6]), |curve| curve.position_weights(frame as f64))
     }
 
     /// Puts the covariance of the coefficients, m2, times a row of them in place of the row.
-    pub fn multiply_covariance(&self, row: &mut [f64]) {
+    pub(crate) fn multiply_covariance(&self, row: &mut [f64]) {
         if let Some(curve) = &self.curve {
             curve.multiply_covariance(row);
         }
@@ -99,8 +95,7 @@ impl HeadSpline {
     }
 
     /// Whether a run over this time stays within the knots.
-    #[must_use]
-    pub fn covers(&self, start_s: f64, stop_s: f64) -> bool {
+    pub(crate) fn covers(&self, start_s: f64, stop_s: f64) -> bool {
         let ([first, last], near_s) = (self.span_s(), NEAR_FRAMES / self.grid.frame_rate_hz);
         first - near_s <= start_s && stop_s <= last + near_s
     }

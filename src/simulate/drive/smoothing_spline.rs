@@ -30,7 +30,6 @@ const BLOCKS_A_PIECE: f64 = 2.0;
 /// Factor between numbers of pieces that are tried.
 const PIECE_RATIO: f64 = 1.25;
 
-/// A curve.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SmoothingSpline {
     span: FrameSpan,
@@ -117,14 +116,14 @@ fn fit_trend(frames: &[usize], positions: &[f64], span: FrameSpan) -> [f64; SUPP
 
 impl SmoothingSpline {
     /// Position at a frame, m.
-    pub fn position(&self, frame: f64) -> f64 {
+    pub(crate) fn position(&self, frame: f64) -> f64 {
         let (piece, x) = self.piece_at(frame);
         let above: f64 = dot(&b_splines::<SUPPORT>(x), &self.coefficients[piece..]);
         above + evaluate_polynomial(&self.trend, self.span.to_unit_interval(frame))
     }
 
     /// Second derivative at a frame, m/frame2.
-    pub fn curvature(&self, frame: f64) -> f64 {
+    pub(crate) fn curvature(&self, frame: f64) -> f64 {
         let (piece, x) = self.piece_at(frame);
         let seconds: [f64; SUPPORT - 2] = std::array::from_fn(|k| {
             let c = &self.coefficients[piece + k..];
@@ -188,20 +187,19 @@ impl SmoothingSpline {
         (if left > 0.0 { squares / (left * left) } else { f64::INFINITY }, curve)
     }
 
-    /// Number of coefficients.
-    pub fn coefficient_count(&self) -> usize {
+    pub(crate) fn coefficient_count(&self) -> usize {
         self.coefficients.len()
     }
 
     /// How the position at a frame depends on the coefficients: the first that counts, and its weight and
     /// those of the next.
-    pub fn position_weights(&self, frame: f64) -> (usize, [f64; SUPPORT]) {
+    pub(crate) fn position_weights(&self, frame: f64) -> (usize, [f64; SUPPORT]) {
         let (piece, x) = self.piece_at(frame);
         (piece, b_splines(x))
     }
 
     /// The covariance of the coefficients, m2, times a row of them.
-    pub fn multiply_covariance(&self, row: &mut [f64]) {
+    pub(crate) fn multiply_covariance(&self, row: &mut [f64]) {
         self.information.solve_in_place(row);
         row.iter_mut().for_each(|x| *x *= self.variance_m2);
     }

@@ -16,14 +16,14 @@ pub(super) struct SceneReader<'a> {
 }
 
 impl SceneReader<'_> {
-    pub fn read_table(&mut self, table: &str, numbers: SceneNumbers) -> Result<(), SceneError> {
+    pub(crate) fn read_table(&mut self, table: &str, numbers: SceneNumbers) -> Result<(), SceneError> {
         numbers
             .into_iter()
             .try_for_each(|(key, value)| self.read_number(&format!("{table}.{key}"), Some(value)))
     }
 
     /// Place and path of the recording that drives the head, where there is one instead of numbers.
-    pub fn read_drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
+    pub(crate) fn read_drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
         let numbers = [("amplitude_m", &written.amplitude_m), ("frequency_hz", &written.frequency_hz)];
         let all = numbers.into_iter().chain([("delay_s", &written.delay_s)]);
         let Some(recording) = &written.recording else {
@@ -48,7 +48,7 @@ impl SceneReader<'_> {
     }
 
     /// When the cosine starts, s.
-    pub fn read_delay_s(&self, written: &DriveFile) -> Result<f64, SceneError> {
+    pub(crate) fn read_delay_s(&self, written: &DriveFile) -> Result<f64, SceneError> {
         let Some(delay) = &written.delay_s else { return Ok(0.0) };
         let found = *delay.get_ref();
         if found.is_finite() {
@@ -60,7 +60,7 @@ impl SceneReader<'_> {
         Err(key_error(&place, "drive.delay_s", &found.to_string(), expected, "correct the value"))
     }
 
-    pub fn read_number(&mut self, name: &str, value: Option<Spanned<f64>>) -> Result<(), SceneError> {
+    pub(crate) fn read_number(&mut self, name: &str, value: Option<Spanned<f64>>) -> Result<(), SceneError> {
         let Some(value) = value else { return Ok(()) };
         let (line, _) = toml_file::line_and_column(self.text, value.span().start);
         let place = format!("{}:{line}", self.file);

@@ -29,7 +29,6 @@ pub(super) struct FallingGuard<'a> {
 /// How a guard falls.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GuardSlope {
-    /// Its rate there.
     pub rate: f64,
     /// What the rate's terms are in size: a rate far below is that of a guard that grazes zero.
     pub size: f64,
@@ -60,7 +59,7 @@ impl FallingGuard<'_> {
     }
 
     /// Rate of the guard; `None` for one that has no derivative.
-    pub fn guard_slope(&self) -> Option<GuardSlope> {
+    pub(crate) fn guard_slope(&self) -> Option<GuardSlope> {
         let (terms, motion) = (self.guard_terms(), self.span.course.motion);
         terms[0]?;
         let (mut slope, mut power) = (GuardSlope { rate: 0.0, size: 0.0 }, 1.0);
@@ -84,7 +83,7 @@ impl FallingGuard<'_> {
     }
 
     /// Sets the derivatives of the guard in all directions.
-    pub fn set_guard_derivatives(&self, blocks: &mut TangentBlocks<'_>) {
+    pub(crate) fn set_guard_derivatives(&self, blocks: &mut TangentBlocks<'_>) {
         let SeriesReference { motion, lean, .. } = self.span.course;
         let weights = ChannelWeights::at_time(self.x, motion.order);
         let terms = self.guard_terms();

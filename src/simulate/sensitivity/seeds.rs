@@ -79,15 +79,12 @@ impl TangentSeeds {
         Ok(seeds)
     }
 
-    /// Number of directions.
-    #[must_use]
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.places.len()
     }
 
     /// Whether there is no direction.
-    #[must_use]
-    pub fn is_empty(&self) -> bool {
+    pub(crate) fn is_empty(&self) -> bool {
         self.places.is_empty()
     }
 
@@ -224,26 +221,13 @@ const NAMED_DIRECTIONS: [(TangentDirection, &str, &str); 6] = [
 
 impl TangentDirection {
     /// The direction of a name: one of [`Self::other_names`], otherwise a parameter.
-    #[must_use]
-    pub fn from_name(name: &str) -> Self {
+    pub(crate) fn from_name(name: &str) -> Self {
         let other = NAMED_DIRECTIONS.iter().find(|(_, other, _)| *other == name);
         other.map_or_else(|| Self::Parameter(name.to_owned()), |(direction, ..)| direction.clone())
     }
 
-    /// Its name.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        match self {
-            Self::Parameter(name) => name,
-            other => NAMED_DIRECTIONS
-                .iter()
-                .find(|(direction, ..)| direction == other)
-                .map_or("", |(_, name, _)| name),
-        }
-    }
-
     /// Names of the directions that are no parameters.
-    pub fn other_names() -> impl Iterator<Item = &'static str> {
+    pub(crate) fn other_names() -> impl Iterator<Item = &'static str> {
         NAMED_DIRECTIONS.iter().map(|(_, name, _)| *name)
     }
 }

@@ -31,7 +31,7 @@ pub(super) struct HeadPolynomial<'a> {
 
 impl<'a> HeadPolynomial<'a> {
     /// What the sources need of it; `None` where they leave the head alone.
-    pub fn from_drive(
+    pub(crate) fn from_drive(
         sources: &[TangentSource],
         drive: &Drive,
         start_s: f64,
@@ -71,7 +71,7 @@ impl<'a> HeadPolynomial<'a> {
     }
 
     /// How the head's place moves with a source, m.
-    pub fn position_change(&self, source: TangentSource, x: LaneVector) -> LaneVector {
+    pub(crate) fn position_change(&self, source: TangentSource, x: LaneVector) -> LaneVector {
         let velocity = || {
             self.velocity
                 .iter()
@@ -102,7 +102,7 @@ impl<'a> HeadPolynomial<'a> {
 
 impl TangentSource {
     /// Whether it matters in this course.
-    pub fn affects_motion(self, course: &SeriesReference<'_>) -> bool {
+    pub(crate) fn affects_motion(self, course: &SeriesReference<'_>) -> bool {
         match self {
             Self::Constant(constant) => course.depends_on(constant),
             _ => true,
@@ -110,7 +110,7 @@ impl TangentSource {
     }
 
     /// Whether it moves head or tip where the angles stay.
-    pub fn displaces_points(self, course: &SeriesReference<'_>) -> bool {
+    pub(crate) fn displaces_points(self, course: &SeriesReference<'_>) -> bool {
         match self {
             Self::Constant(constant) => course.displaces_points(constant),
             _ => true,
@@ -119,7 +119,7 @@ impl TangentSource {
 
     /// All that a unit of it does.
     #[inline(always)]
-    pub fn forcing_terms(
+    pub(crate) fn forcing_terms(
         self,
         course: &SeriesReference<'_>,
         head: Option<&HeadPolynomial<'_>>,
@@ -134,7 +134,7 @@ impl TangentSource {
     }
 
     /// Where a unit of it moves head and tip.
-    pub fn displacement_terms(
+    pub(crate) fn displacement_terms(
         self,
         course: &SeriesReference<'_>,
         head: Option<&HeadPolynomial<'_>>,

@@ -48,7 +48,12 @@ pub(super) struct StretchPlace {
 
 impl StretchPlace {
     /// A piece as one stretch, without derivatives.
-    pub fn whole_segment(touch: ContactMode, lean: ShoulderContact, start_s: f64, length: f64) -> Self {
+    pub(crate) fn whole_segment(
+        touch: ContactMode,
+        lean: ShoulderContact,
+        start_s: f64,
+        length: f64,
+    ) -> Self {
         Self { touch, lean, start_s, from: 0.0, length, rule: collocation_rule(LEAST_NODES), rapid: 0.0 }
     }
 }
@@ -63,7 +68,7 @@ pub(super) struct TangentStretch<'a> {
 }
 
 impl<'a> TangentStretch<'a> {
-    pub fn new(
+    pub(crate) fn new(
         system: &'a DrivenBlade,
         sources: &'a [TangentSource],
         course: SeriesReference<'a>,
@@ -74,8 +79,7 @@ impl<'a> TangentStretch<'a> {
         Self { system, course, place, sources, head }
     }
 
-    /// Number of unknowns.
-    pub fn unknown_count(&self) -> usize {
+    pub(crate) fn unknown_count(&self) -> usize {
         match self.place.touch {
             ContactMode::Stick => 1,
             ContactMode::Slip(_) => 2,
@@ -84,7 +88,7 @@ impl<'a> TangentStretch<'a> {
     }
 
     /// Times of nodes four by four, s after the start of the motion.
-    pub fn node_chunks(&self) -> impl Iterator<Item = LaneVector> {
+    pub(crate) fn node_chunks(&self) -> impl Iterator<Item = LaneVector> {
         let StretchPlace { from, length, rule, .. } = self.place;
         let chunks = rule.positions.as_chunks().0;
         chunks[..rule.nodes.div_ceil(tangent::LANES)]
@@ -107,7 +111,7 @@ impl StretchPlanner {
     ///
     /// Within a step of `z` radians `s` nodes leave of a sine `z^(s + 2) s! / (4 s^2 (2 s)!)`: the first
     /// Legendre polynomial that is missing in its second derivative, integrated twice.
-    pub fn new(relative: f64, fastest: f64) -> Self {
+    pub(crate) fn new(relative: f64, fastest: f64) -> Self {
         let mut limits = [0.0; MOST_NODES + 1];
         let mut ratio = 1.0; // (2 s)! / s!
         for (s, limit) in limits.iter_mut().enumerate().skip(1) {
@@ -118,7 +122,11 @@ impl StretchPlanner {
     }
 
     /// Nodes and length of the next stretch, at most `rest`.
-    pub fn plan_stretch(&self, course: &SeriesReference<'_>, rest: f64) -> (&'static CollocationRule, f64) {
+    pub(crate) fn plan_stretch(
+        &self,
+        course: &SeriesReference<'_>,
+        rest: f64,
+    ) -> (&'static CollocationRule, f64) {
         /// Parts of a step at most: numbers that are none make no end.
         const MOST_PARTS: f64 = 1e3;
         /// Share by which the rate may have risen since.
@@ -132,7 +140,7 @@ impl StretchPlanner {
     }
 
     /// Learns the rate that was found on a stretch; whether its nodes resolve it.
-    pub fn record_rate(
+    pub(crate) fn record_rate(
         &mut self,
         course: &SeriesReference<'_>,
         found: f64,

@@ -68,13 +68,13 @@ struct StretchEnds {
 
 impl<'a> TangentBlocks<'a> {
     /// Blocks with what their directions change.
-    pub fn iter_with_seeds(&mut self) -> impl Iterator<Item = (&mut TangentBlock, &BlockSeed)> {
+    pub(crate) fn iter_with_seeds(&mut self) -> impl Iterator<Item = (&mut TangentBlock, &BlockSeed)> {
         self.all.iter_mut().zip(&self.seeds.blocks)
     }
 
     /// Carries the derivatives over a stretch of a motion that starts at `start_s`, from `from` after it
     /// towards `to`; `is_fresh` where the tip may not yet be at rest in stick.
-    pub fn propagate_stretch<'c>(
+    pub(crate) fn propagate_stretch<'c>(
         &mut self,
         course: &SeriesReference<'c>,
         start_s: f64,
@@ -133,7 +133,7 @@ impl<'a> TangentBlocks<'a> {
     }
 
     /// Whether all derivatives are numbers.
-    pub fn are_finite(&self) -> bool {
+    pub(crate) fn are_finite(&self) -> bool {
         self.all.iter().all(|block| block.state.is_finite())
     }
 }

@@ -8,7 +8,7 @@ pub use crate::model::tangent::ModelChannel as Channel;
 use crate::model::tangent::{LANES, LaneVector, LinearForm, LinkAttitudes};
 use crate::ode::collocation::{MOST_NODES, NodeArray, collocation_rule};
 use crate::simulate::mode::TipMode;
-use crate::simulate::solution_segment::{BladePoints, ModelSample, SolutionSegment};
+use crate::simulate::solution_segment::{ModelSample, SolutionSegment};
 
 /// A piece of the solution with its derivatives.
 pub struct TangentSegment<'a> {
@@ -27,12 +27,6 @@ pub struct TangentSegment<'a> {
 }
 
 impl TangentSegment<'_> {
-    /// Where the blade is at a time within the piece.
-    #[must_use]
-    pub fn points_at(&self, t: f64) -> BladePoints {
-        self.piece.points_at(t)
-    }
-
     /// The model at a time within the piece.
     #[must_use]
     pub fn sample_at(&self, t: f64) -> ModelSample {
@@ -129,7 +123,6 @@ const MOST_BLOCKS: usize = 64 / LANES;
 /// Parts of an integral at most, each by the rule of four nodes.
 const MOST_PARTS: usize = 3;
 
-/// `1 / k`.
 pub(super) const RECIPROCALS: [f64; SERIES_TERMS + 1] = {
     let mut shares = [0.0; SERIES_TERMS + 1];
     let mut k = 1;
@@ -222,7 +215,11 @@ pub(super) struct DerivativeSum {
 }
 
 impl DerivativeSum {
-    pub fn from_weights(span: &TangentStretch<'_>, channel: Channel, weights: &ChannelWeights) -> Self {
+    pub(crate) fn from_weights(
+        span: &TangentStretch<'_>,
+        channel: Channel,
+        weights: &ChannelWeights,
+    ) -> Self {
         let mut sum = Self {
             value: [0.0; 3],
             rate: [0.0; 3],
@@ -346,7 +343,7 @@ impl DerivativeSum {
     }
 
     /// The derivatives in the directions of a block.
-    pub fn block_derivatives(&self, block: &TangentBlock, seed: &BlockSeed) -> LaneVector {
+    pub(crate) fn block_derivatives(&self, block: &TangentBlock, seed: &BlockSeed) -> LaneVector {
         let mut row = self.place * block.place;
         if self.has_second {
             for d in 0..self.unknowns {

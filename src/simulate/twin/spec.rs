@@ -196,7 +196,7 @@ impl TwinSpec {
     ///
     /// # Errors
     /// [`TwinSpecError::Value`] when the window is outside the scene's run or holds too few or too many frames.
-    pub fn window_within(&self, file: &str, scene: &Scene) -> Result<[f64; 2], TwinSpecError> {
+    pub(crate) fn window_within(&self, file: &str, scene: &Scene) -> Result<[f64; 2], TwinSpecError> {
         let [start, stop] = self.window_s.unwrap_or([scene.start_s, scene.run.stop_s]);
         if start < scene.start_s || stop > scene.run.stop_s {
             let expected = format!("a window within the scene's {} to {} s", scene.start_s, scene.run.stop_s);

@@ -414,7 +414,6 @@ impl<'a> FittedDecomposition<'a> {
 
 /// Another oscillation that may be a piece of the same.
 struct PossibleFragment {
-    /// Distance, resolutions.
     distance: f64,
     /// Its amplitude over that of this one, at most 1.
     amplitude_ratio: f64,

@@ -50,7 +50,6 @@ pub(super) struct FixedColumns {
     blocks: Vec<Range<usize>>,
     /// The trend's columns and, last, the data; one row for each that takes part.
     columns: DMatrix<f64>,
-    /// Their inner products.
     gram: DMatrix<f64>,
 }
 

@@ -33,8 +33,7 @@ pub struct SpeedPoint {
 }
 
 /// The parts of a ridge, in order of time, with a gap between one and the next.
-#[must_use]
-pub fn coherent_parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePoint>> {
+pub(crate) fn coherent_parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePoint>> {
     let amplitudes = of.amplitude_m.iter().flatten().flatten();
     let least_m =
         math::powf(10.0, -DYNAMIC_RANGE_DB / 20.0) * amplitudes.fold(0.0, |most: f64, a| most.max(*a));

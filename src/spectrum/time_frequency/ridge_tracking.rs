@@ -39,7 +39,6 @@ const SIGNIFICANT_CURVATURE: f64 = 0.5;
 /// resolutions.
 const END_AGREEMENT: f64 = 0.25;
 
-/// A fitted column.
 #[derive(Clone, Copy)]
 pub(super) struct SegmentFit {
     chirp: ChirpParameters,

@@ -12,7 +12,7 @@ use serde::Deserialize;
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 #[schemars(title = "study.toml")]
-pub struct StudyFile {
+pub(crate) struct StudyFile {
     /// Version of the format: 1.
     pub format: u32,
     /// Title for pages and figures.
@@ -34,7 +34,7 @@ pub struct StudyFile {
 /// A parameter that varies.
 #[derive(Debug, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct StudyAxisFile {
+pub(crate) struct StudyAxisFile {
     /// Key of the scene with its table, such as "friction.a".
     pub name: String,
     /// First value, SI.

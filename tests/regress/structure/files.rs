@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
 /// Module of the program.
-const PROGRAM: &str = "program";
+const PROGRAM: &str = "cli";
 
 /// A file of `src`.
 pub struct SourceFile {
@@ -39,8 +39,8 @@ impl SourceFile {
         }
     }
 
-    /// Top-level module of the library; `None` for the root.
-    pub fn room(&self) -> Option<&str> {
+    /// Its top-level module; `None` for the root.
+    pub fn layer(&self) -> Option<&str> {
         (self.module[0] == "lib").then(|| self.module.get(1).map(String::as_str)).flatten()
     }
 
@@ -59,14 +59,27 @@ fn module_of(path: &str) -> Vec<String> {
 }
 
 /// Every file of `src` but those of tests.
-pub fn all_files() -> Vec<SourceFile> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+pub fn read_source_files() -> Vec<SourceFile> {
+    read_files_below(&Path::new(env!("CARGO_MANIFEST_DIR")).join("src"))
+}
+
+/// The same of every package of the workspace; a path is from the `src` of its package.
+pub fn read_workspace_files() -> Vec<SourceFile> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let packages =
+        std::fs::read_dir(root.join("crates")).into_iter().flatten().map(|entry| entry.unwrap().path());
+    let mut packages: Vec<_> = packages.chain([root.to_owned(), root.join("python")]).collect();
+    packages.sort();
+    packages.iter().flat_map(|package| read_files_below(&package.join("src"))).collect()
+}
+
+fn read_files_below(root: &Path) -> Vec<SourceFile> {
     let mut files = Vec::new();
-    let mut folders = vec![root.clone()];
+    let mut folders = vec![root.to_owned()];
     while let Some(folder) = folders.pop() {
         for entry in std::fs::read_dir(folder).unwrap() {
             let path = entry.unwrap().path();
-            let name = path.strip_prefix(&root).unwrap().to_str().unwrap().replace('\\', "/");
+            let name = path.strip_prefix(root).unwrap().to_str().unwrap().replace('\\', "/");
             if path.is_dir() {
                 folders.push(path);
             } else if name.ends_with(".rs")
@@ -82,7 +95,7 @@ pub fn all_files() -> Vec<SourceFile> {
 
 /// Which file uses which, by place in the list. A name counts for the file that defines it, whoever re-exports
 /// it; a re-export counts only where the file that makes it uses the name too.
-pub fn edges(files: &[SourceFile]) -> Vec<(usize, usize)> {
+pub fn find_edges(files: &[SourceFile]) -> Vec<(usize, usize)> {
     let tree = Tree { files, modules: files.iter().enumerate().map(|(i, f)| (&f.module[..], i)).collect() };
     let mut edges = BTreeSet::new();
     for (from, file) in files.iter().enumerate() {
@@ -152,8 +165,10 @@ fn who_uses_whom_is_read_from_the_text() {
         ("main.rs", "use wiperlab::a::Thing;\n"),
     ];
     let files: Vec<SourceFile> = made.iter().map(|(path, text)| SourceFile::new(path, text)).collect();
-    let found: Vec<_> =
-        edges(&files).into_iter().map(|(from, to)| (&files[from].path[..], &files[to].path[..])).collect();
+    let found: Vec<_> = find_edges(&files)
+        .into_iter()
+        .map(|(from, to)| (&files[from].path[..], &files[to].path[..]))
+        .collect();
     assert_eq!(
         found,
         [("a.rs", "b.rs"), ("a.rs", "b/deep.rs"), ("b.rs", "b/deep.rs"), ("b/deep.rs", "a/inner.rs")]

@@ -30,7 +30,6 @@ enum DltdvWriter {
 struct DltdvColumn<'t> {
     point: &'t str,
     camera: &'t str,
-    /// Index in [`AXES`].
     axes: usize,
     is_x: bool,
 }

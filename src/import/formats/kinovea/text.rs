@@ -20,7 +20,6 @@ const CODE_PARTS: usize = 4;
 /// Longest part of a time code, digits: more are no time.
 const CODE_DIGITS: usize = 9;
 
-/// Reads the blocks.
 pub(crate) fn read_text_export<'a>(document: &'a Document<'a>) -> Result<TrackFile<'a>, ImportError> {
     let style = NumberStyle::detect(document.text);
     let mut reader = KinoveaTextReader {

@@ -6,7 +6,6 @@ use crate::import::formats::trackmate::xml::{XmlElement, XmlReader, XmlTag};
 use crate::import::reader::Document;
 use std::collections::{HashMap, HashSet};
 
-/// The root element.
 pub(crate) const PROJECT_ROOT: &str = "TrackMate";
 
 /// What the elements say, before spots and edges are put together.

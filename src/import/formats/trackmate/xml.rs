@@ -33,7 +33,6 @@ pub(crate) enum XmlTag<'a> {
 pub(crate) struct XmlElement<'a> {
     bytes: BytesStart<'a>,
     start: usize,
-    /// 1-based line.
     pub line: usize,
 }
 

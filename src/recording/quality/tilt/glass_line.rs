@@ -13,7 +13,6 @@ const LEAST_BEND: f64 = 1e-6;
 pub(super) struct GlassLine {
     pub slope: f64,
     pub bend_per_m: f64,
-    /// Mean place, m.
     pub centre_m: [f64; 2],
     /// Standard deviation of the places, m.
     pub x_sd_m: f64,
