@@ -25,9 +25,11 @@ pub use measurement::{
 };
 use measurement::{FEWEST_CYCLES, NYQUIST_SHARE};
 pub use noise::{noise_floor, quantisation_step};
+pub use outliers::outlier_frames;
 use serde::Serialize;
-
 pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
+
+/// Every finding on a recording, the gravest first: what its traces show, and what only its
 /// export could show (`import`).
 ///
 /// `measured` is the [`measure_quality`] of the same recording, `instants` what [`ReversalInstants::find`] finds in it.
@@ -75,7 +77,7 @@ pub enum Grade {
 }
 
 /// The grade: the gravest finding decides.
-pub(crate) fn grade_findings(findings: &[QualityFinding]) -> Grade {
+pub fn grade_findings(findings: &[QualityFinding]) -> Grade {
     match findings.iter().map(|finding| finding.severity).max() {
         None | Some(Severity::Note) => Grade::Good,
         Some(Severity::Caution) => Grade::UsableWithCare,
@@ -86,7 +88,7 @@ pub(crate) fn grade_findings(findings: &[QualityFinding]) -> Grade {
 /// The verdict, one statement a line: the grade with what the recording can show, then the findings, worst
 /// first. A finding on several channels is one line with its largest number; notes without advice are left to
 /// the table.
-pub(crate) fn verdict_lines(measured: &Quality, findings: &[QualityFinding]) -> Vec<String> {
+pub fn verdict_lines(measured: &Quality, findings: &[QualityFinding]) -> Vec<String> {
     let mut lines = vec![grade_line(measured, findings)];
     let mut stated: Vec<(Check, Severity)> = vec![];
     let mut ordered: Vec<&QualityFinding> =

@@ -43,7 +43,7 @@ const AROUND: std::ops::RangeInclusive<usize> = 3..=5;
 const MANY_OUTLIERS: f64 = 1e-3;
 
 /// Frames of the outliers in a column, in order; `metres_per_pixel` where known.
-pub(crate) fn outlier_frames(
+pub fn outlier_frames(
     samples: &[Option<f64>],
     channel: &ChannelQuality,
     metres_per_pixel: Option<f64>,

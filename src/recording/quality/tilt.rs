@@ -165,7 +165,7 @@ fn significant_curvature(line: &GlassLine, variance_m2: f64) -> Option<Curvature
 
 impl CameraTilt {
     /// Whether the tilt is one: clear of its uncertainty, and large enough to matter.
-    pub(crate) fn is_clear(&self) -> bool {
+    pub fn is_clear(&self) -> bool {
         self.angle_rad.abs() > (CLEAR_DEVIATIONS * self.sd_rad).max(LEAST_TILT_RAD)
     }
 
