@@ -420,9 +420,10 @@ mod tests {
     #[test]
     fn the_worst_part_is_where_the_residual_is_largest() {
         let found = residual(|i| Some(if (400..416).contains(&i) { 5.0 } else { 1.0 }));
-        assert_eq!(worst_s(&found, Channel::TipX, (0.0, 1.0)), Some((0.4, 0.415)));
-        assert_eq!(worst_s(&found, Channel::TipX, (0.5, 0.6)), Some((0.5, 0.515)));
-        assert_eq!(worst_s(&found, Channel::TipX, (0.5, 0.51)), Some((0.5, 0.51)));
+        let frames = |first: usize, last: usize| Some((found.time_s[first], found.time_s[last]));
+        assert_eq!(worst_s(&found, Channel::TipX, (0.0, 1.0)), frames(400, 415));
+        assert_eq!(worst_s(&found, Channel::TipX, (0.5, 0.6)), frames(500, 515));
+        assert_eq!(worst_s(&found, Channel::TipX, (0.5, 0.51)), frames(500, 510));
         assert_eq!(worst_s(&found, Channel::HeadX, (0.0, 1.0)), None);
     }
 
@@ -434,6 +435,6 @@ mod tests {
             600..616 => Some(2.0),
             _ => Some(1.0).filter(|_| !gap(i)),
         });
-        assert_eq!(worst_s(&found, Channel::TipX, (0.0, 1.0)), Some((0.6, 0.615)));
+        assert_eq!(worst_s(&found, Channel::TipX, (0.0, 1.0)), Some((found.time_s[600], found.time_s[615])));
     }
 }
