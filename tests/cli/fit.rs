@@ -257,7 +257,6 @@ fn bad_jobs_are_refused_with_place_and_remedy_and_leave_journal_and_result() {
         project.write("fits/x/job.toml", &JOB.replacen(from, to, 1));
         project.refused(&["fit", "fits/x/job.toml"], parts);
     }
-    project.refused(&["fit", "fits/x"], &["fits/x: a folder, expected a file"]);
     project.refused(&["fit", "fits/y/job.toml"], &["fits/y/job.toml: no such file"]);
     // a recording given a target of its own needs none, a component without either does
     let targetless = JOB.replace(
