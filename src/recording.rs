@@ -1,7 +1,7 @@
 //! Recordings: where the lip tip and the head were in every frame, in SI units, on the frame grid.
 //!
 //! x runs along the sweep, y upwards (`tip_x = v3`, `head_x = v`, `head_y = -u`). A frame in which a point
-//! was not tracked holds `None`; nothing is interpolated and no frame is closed up.
+//! was not tracked holds `None`: nothing is interpolated, and no frame is dropped.
 
 pub mod alignment;
 pub mod channel;
@@ -56,65 +56,17 @@ pub struct Traces {
     pub head_confidence: Option<Vec<Option<f64>>>,
 }
 
-/// Why traces do not make a recording.
+/// Why traces do not make a recording: the column, the frame and the value at fault.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum RecordingError {
-    /// The frame rate or the start is not a usable number.
-    #[error("{quantity}: found {found}, expected a finite number{}; give the rate at which the camera \
-        recorded, not the playback rate", if *.quantity == "frame_rate_hz" { " above 0" } else { "" })]
-    Grid {
-        /// Which of them.
-        quantity: &'static str,
-        /// Its value.
-        found: f64,
-    },
-    /// Too few frames to be a recording.
-    #[error("found {found} frames, expected at least 2")]
-    TooShort {
-        /// Number of frames.
-        found: usize,
-    },
-    /// A column is not as long as the grid.
-    #[error("column {column}: found {found} cells, expected {expected}, one a frame")]
-    Length {
-        /// Name of the column.
-        column: &'static str,
-        /// Its length.
-        found: usize,
-        /// Number of frames.
-        expected: usize,
-    },
-    /// A position is infinite or not a number; a missing one is `None`.
-    #[error("column {column}, frame {frame}: found {found}, expected a finite number or an empty cell")]
-    NotFinite {
-        /// Name of the column.
-        column: &'static str,
-        /// 0-based frame.
-        frame: usize,
-        /// The value.
-        found: f64,
-    },
-    /// A position is beyond [`LARGEST_M`].
-    #[error(
-        "column {column}, frame {frame}: found {found:e}, expected at most {LARGEST_M:e} from the origin; \
-         correct the value, or the scale of the import"
-    )]
-    TooFar {
-        /// Name of the column.
-        column: &'static str,
-        /// 0-based frame.
-        frame: usize,
-        /// The value, m.
-        found: f64,
-    },
-}
+#[error("{0}")]
+pub struct RecordingError(String);
 
-/// Largest distance from the origin, m: no wiper's recording reaches a thousandth of it, and squares of it
-/// are far from overflow.
+/// Largest distance from the origin, m. No wiper's recording reaches a thousandth of it, and its square is far
+/// from overflow.
 pub(crate) const LARGEST_M: f64 = 1e6;
 
-/// Traces on their frame grid, with a name for messages; its invariants (equal lengths, finite values) hold
-/// by construction.
+/// Traces on their frame grid, with a name for messages. All columns have the length of the grid, and all
+/// values are finite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Recording {
     name: String,
@@ -134,17 +86,21 @@ impl Recording {
         traces: Traces,
         synthetic: bool,
     ) -> Result<Self, RecordingError> {
-        if !(grid.frame_rate_hz.is_finite() && grid.frame_rate_hz > 0.0) {
-            return Err(RecordingError::Grid { quantity: "frame_rate_hz", found: grid.frame_rate_hz });
+        let FrameGrid { start_s, frame_rate_hz, frames } = grid;
+        let advice = "give the rate at which the camera recorded, not the playback rate";
+        if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
+            let found = format!("frame_rate_hz: found {frame_rate_hz}, expected a finite number above 0");
+            return Err(RecordingError(format!("{found}; {advice}")));
         }
-        if !grid.start_s.is_finite() {
-            return Err(RecordingError::Grid { quantity: "start_s", found: grid.start_s });
+        if !start_s.is_finite() {
+            let found = format!("start_s: found {start_s}, expected a finite number");
+            return Err(RecordingError(format!("{found}; {advice}")));
         }
-        if grid.frames < 2 {
-            return Err(RecordingError::TooShort { found: grid.frames });
+        if frames < 2 {
+            return Err(RecordingError(format!("found {frames} frames, expected at least 2")));
         }
         for (column, values) in traces.columns() {
-            check_column(column, values, grid.frames)?;
+            check_column(column, values, frames)?;
         }
         Ok(Self { name: name.into(), grid, traces, synthetic })
     }
@@ -189,31 +145,36 @@ impl Traces {
     }
 }
 
-fn check_column(column: &'static str, values: &[Option<f64>], expected: usize) -> Result<(), RecordingError> {
-    if values.len() != expected {
-        return Err(RecordingError::Length { column, found: values.len(), expected });
+fn check_column(column: &str, values: &[Option<f64>], expected: usize) -> Result<(), RecordingError> {
+    let cells = values.len();
+    if cells != expected {
+        let found = format!("column {column}: found {cells} cells, expected {expected}, one a frame");
+        return Err(RecordingError(found));
     }
     let unusable = |v: &f64| v.is_nan() || v.abs() > LARGEST_M;
-    match values.iter().enumerate().find_map(|(frame, v)| v.filter(unusable).map(|found| (frame, found))) {
-        Some((frame, found)) if found.is_finite() => Err(RecordingError::TooFar { column, frame, found }),
-        Some((frame, found)) => Err(RecordingError::NotFinite { column, frame, found }),
-        None => Ok(()),
-    }
+    let first = values.iter().enumerate().find_map(|(frame, v)| Some((frame, v.filter(unusable)?)));
+    let Some((frame, found)) = first else { return Ok(()) };
+    Err(RecordingError(if found.is_finite() {
+        format!(
+            "column {column}, frame {frame}: found {found:e}, expected at most {LARGEST_M:e} from the origin; \
+             correct the value, or the scale of the import"
+        )
+    } else {
+        format!("column {column}, frame {frame}: found {found}, expected a finite number or an empty cell")
+    }))
 }
 
-// A column between its frames: on the polynomial through six of them, which is low by 0.8 % half way between
-// frames of 5,000/s that show 900 Hz, where a straight line is low by 16 %.
-
-/// Frames that the polynomial runs through.
+/// Frames of the interpolating polynomial. For 900 Hz at 5,000 frames/s, six frames are low by 0.8 % half way
+/// between two frames; a straight line is low by 16 %.
 pub(crate) const STENCIL: usize = 6;
-/// A place this close to a frame, in frames, is the frame: well above the rounding of times near 1 s at 1e5
-/// frames/s.
+/// A time this close to a frame, in frames, is that of the frame. Times near 1 s at 1e5 frames/s are rounded far
+/// less.
 pub(crate) const ON_FRAME_TOLERANCE: f64 = 1e-6;
 
 impl Recording {
-    /// A column of this recording at a time, s: on the polynomial through three frames before and three
-    /// after, and on a straight line where one of the outer four is missing. `None` beyond the frames and
-    /// next to a missing one.
+    /// Value of a column of this recording at a time, s. The polynomial runs through three frames before and
+    /// three after; where one of the outer four is missing, a straight line takes its place. `None` outside
+    /// the recording and next to a missing frame.
     pub(crate) fn interpolate_column(&self, column: &[Option<f64>], time_s: f64) -> Option<f64> {
         let place = (time_s - self.grid.start_s) * self.grid.frame_rate_hz;
         if let Some(frame) = frame_at(place) {
@@ -221,23 +182,22 @@ impl Recording {
         }
         let before = (place >= 0.0).then_some(place.floor() as usize)?;
         let (low, high) = ((*column.get(before)?)?, (*column.get(before + 1)?)?);
-        let straight = || low + (place - before as f64) * (high - low);
-        let curved =
-            before.checked_sub(STENCIL / 2 - 1).and_then(|first| lagrange_through_six(column, first, place));
-        Some(curved.unwrap_or_else(straight))
+        let first = before.checked_sub(STENCIL / 2 - 1);
+        let curved = first.and_then(|first| lagrange_through_six(column, first, place));
+        Some(curved.unwrap_or_else(|| low + (place - before as f64) * (high - low)))
     }
 }
 
-/// The frame on which a place, in frames, falls, if it does; the column may be shorter.
+/// Index of the frame at `place`, a real number of frames; `None` between frames. It may exceed the column.
 pub(crate) fn frame_at(place: f64) -> Option<usize> {
     let nearest = place.round();
     (nearest >= 0.0 && (place - nearest).abs() < ON_FRAME_TOLERANCE).then_some(nearest as usize)
 }
 
-/// Lagrange's polynomial through the six frames from `first` on, at a place in frames; `None` where one of
-/// them is missing.
+/// Lagrange polynomial through the six frames from `first` on, at `place`, a real number of frames; `None`
+/// where a frame is missing.
 pub(crate) fn lagrange_through_six(column: &[Option<f64>], first: usize, place: f64) -> Option<f64> {
-    /// Products of the distances of each frame from the others.
+    /// Denominators: products of the distances of a frame from the other five.
     const APART: [f64; STENCIL] = [-120.0, 24.0, -12.0, 12.0, -24.0, 120.0];
     let place = place - first as f64;
     let mut sum = 0.0;
@@ -248,8 +208,6 @@ pub(crate) fn lagrange_through_six(column: &[Option<f64>], first: usize, place: 
     Some(sum)
 }
 
-// Traces turned about a point, as if the camera had been level.
-
 /// Why traces cannot be turned.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
@@ -259,43 +217,33 @@ pub(crate) fn lagrange_through_six(column: &[Option<f64>], first: usize, place: 
 pub struct RotationError {
     /// `tip` or `head`.
     pub point: &'static str,
-    /// Frames with one coordinate alone.
+    /// Number of frames with only one coordinate.
     pub frames: usize,
-    /// The first of them.
+    /// Index of the first such frame.
     pub first: usize,
 }
 
-/// Both points turned clockwise by `angle_rad` about `centre_m` (x and y, m), so that a line that rises by
-/// this angle along x becomes level.
+/// Turns both points clockwise by `angle_rad` about `centre_m` (x and y, m): a line that rises by this angle
+/// along x becomes level.
 ///
 /// # Errors
-/// [`RotationError`] where a point has one coordinate alone.
+/// [`RotationError`] where a point has only one coordinate in a frame.
 pub fn rotate_traces(traces: &Traces, angle_rad: f64, centre_m: [f64; 2]) -> Result<Traces, RotationError> {
+    let ((sin, cos), [cx, cy]) = (math::sin_cos(angle_rad), centre_m);
     let turn = |point, x: &[Option<f64>], y: &[Option<f64>]| {
-        check_coordinate_pairs(point, x, y)?;
-        let places = x.iter().zip(y).map(|(x, y)| Some(rotate_point([(*x)?, (*y)?], angle_rad, centre_m)));
-        Ok::<(Vec<_>, Vec<_>), RotationError>(places.map(|p| (p.map(|p| p[0]), p.map(|p| p[1]))).unzip())
+        let mut alone = x.iter().zip(y).enumerate().filter(|(_, (x, y))| x.is_some() != y.is_some());
+        if let Some((first, _)) = alone.next() {
+            return Err(RotationError { point, frames: 1 + alone.count(), first });
+        }
+        let places = x.iter().zip(y).map(|(x, y)| {
+            let (dx, dy) = (x.as_ref()? - cx, y.as_ref()? - cy);
+            Some((cx + cos * dx + sin * dy, cy - sin * dx + cos * dy))
+        });
+        Ok::<(Vec<_>, Vec<_>), _>(places.map(Option::unzip).unzip())
     };
     let (tip_x_m, tip_y_m) = turn("tip", &traces.tip_x_m, &traces.tip_y_m)?;
     let (head_x_m, head_y_m) = turn("head", &traces.head_x_m, &traces.head_y_m)?;
     Ok(Traces { tip_x_m, tip_y_m, head_x_m, head_y_m, ..traces.clone() })
-}
-
-fn rotate_point([x, y]: [f64; 2], angle_rad: f64, centre_m: [f64; 2]) -> [f64; 2] {
-    let ((sin, cos), [from_x, from_y]) = (math::sin_cos(angle_rad), [x - centre_m[0], y - centre_m[1]]);
-    [centre_m[0] + cos * from_x + sin * from_y, centre_m[1] - sin * from_x + cos * from_y]
-}
-
-fn check_coordinate_pairs(
-    point: &'static str,
-    x: &[Option<f64>],
-    y: &[Option<f64>],
-) -> Result<(), RotationError> {
-    let mut alone = x.iter().zip(y).enumerate().filter(|(_, (x, y))| x.is_some() != y.is_some());
-    match alone.next() {
-        Some((first, _)) => Err(RotationError { point, frames: 1 + alone.count(), first }),
-        None => Ok(()),
-    }
 }
 
 #[cfg(test)]

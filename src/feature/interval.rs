@@ -43,9 +43,8 @@ impl ReversalInterval {
             Self::FlipAfterReversal => at(InstantKind::Flip)? - at(InstantKind::Reversal)?,
             Self::FlipDuration => {
                 let start_s = at(InstantKind::Flip)?;
-                let reversals = &reader.instants().reversals;
-                let found = reversal.checked_sub(1).and_then(|index| reversals.get(index));
-                found.and_then(|r| r.flip).map_or(start_s, |flip| flip.end_s) - start_s
+                let flip = reader.instants().numbered(reversal).and_then(|found| found.flip);
+                flip.map_or(start_s, |flip| flip.end_s) - start_s
             }
         };
         Ok(FeatureValue::new(length_s, None))

@@ -1,45 +1,40 @@
-//! The model's clock and origin on those of a recording.
+//! Alignment of the model's clock and origin with those of a recording.
 
 use crate::math;
 use crate::recording::Recording;
-use crate::recording::channel::{Channel, ReversalInstants};
+use crate::recording::channel::{Channel, ReversalInstants, central_moments};
 use serde::Serialize;
 
-/// What is added to the model's times and positions so that its head runs with the recorded one.
+/// Offsets of the model's times and positions at which its head follows the recorded one.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
 pub struct Alignment {
-    /// Of its times, s.
+    /// Added to the model's times, s.
     pub shift_s: f64,
-    /// Of head and tip along the sweep, m.
+    /// Added to the model's head and tip along the sweep, m.
     pub along_m: f64,
-    /// Of the head drop, m.
+    /// Added to the model's head drop, m.
     pub drop_m: f64,
-    /// The point whose path was followed.
+    /// The point whose paths are compared.
     pub followed: AlignmentPoint,
-    /// Standard deviation of the time, s: infinite where the path does not fix it; `None` where there is no
-    /// path to follow.
+    /// Standard deviation of the time shift, s: infinite where the path does not determine it, `None` where no
+    /// path is fitted.
     pub shift_sd_s: Option<f64>,
-    /// Whether the recorded head turns the other way than the model's: then they are together at the turn
-    /// alone.
+    /// Whether the recorded head turns in the opposite direction: then the paths meet only at the turn.
     pub opposite_turn: bool,
 }
 
-/// The point whose path brings a model to a recording.
+/// The point whose path aligns a model with a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum AlignmentPoint {
     /// The head.
     #[default]
     Head,
-    /// Where no head was tracked.
+    /// The tip, where no head was tracked.
     Tip,
 }
 
 impl AlignmentPoint {
-    fn choose_for(measured: &Recording) -> Self {
-        if is_tracked(&measured.traces().head_x_m) { Self::Head } else { Self::Tip }
-    }
-
     /// Its name in a sentence and in files.
     pub(crate) fn name(self) -> &'static str {
         match self {
@@ -61,42 +56,32 @@ pub(crate) fn is_tracked(column: &[Option<f64>]) -> bool {
     column.iter().any(Option::is_some)
 }
 
-/// Steps of the least squares: the head's path is smooth, and three bring it to a nanosecond.
+/// Most steps of the least squares. The head's path is smooth, and three steps reach a nanosecond.
 const MAX_STEPS: usize = 8;
-/// A shorter step ends them, s.
+/// Step below which the iteration ends, s.
 const MIN_STEP_S: f64 = 1e-9;
-/// Most frames that are used: more would not move the clock by a microsecond.
+/// Most frames that are used; more would change the time shift by less than a microsecond.
 const MAX_FRAMES: usize = 20_000;
 
 impl Alignment {
-    /// Starts from the first turn of the head in both, then least squares over the frames that both show, of
-    /// the head or, where none was tracked, of the tip: neither a camera's origin nor its clock is the
-    /// model's.
+    /// Estimates shift and offsets, because a camera has a clock and an origin of its own. It starts from the
+    /// first turn of the head in both, then minimises the squared distance of the head's paths, or of the
+    /// tip's where no head was tracked.
     pub(crate) fn estimate(measured: &Recording, model: &Recording) -> Self {
         let turns = ReversalInstants::first_turn_s(measured).zip(ReversalInstants::first_turn_s(model));
-        let by = AlignmentPoint::choose_for(measured);
-        let opposite = |(of_measured, of_model): &(f64, f64)| {
-            head_turn_m(measured, *of_measured) * head_turn_m(model, *of_model) < 0.0
-        };
-        if let Some((of_measured, of_model)) = turns.filter(opposite) {
-            let at = |recording: &Recording, t: f64| {
-                recording.interpolate_column(&recording.traces().head_x_m, t).unwrap_or_default()
-            };
-            let (shift_s, along_m) =
-                (of_measured - of_model, at(measured, of_measured) - at(model, of_model));
-            return Self {
-                shift_s,
-                along_m,
-                drop_m: mean_drop_offset_m(measured, model, shift_s),
-                followed: by,
-                shift_sd_s: None,
-                opposite_turn: true,
-            };
-        }
+        let head_tracked = is_tracked(&measured.traces().head_x_m);
+        let by = if head_tracked { AlignmentPoint::Head } else { AlignmentPoint::Tip };
         let mut shift_s = turns
             .map_or_else(|| best_overlap_shift_s(measured, model, by), |(measured, model)| measured - model);
         let (mut along_m, mut shift_sd_s) = (0.0, None);
-        for _ in 0..MAX_STEPS {
+        let opposite = turns.filter(|(of_measured, of_model)| {
+            head_turn_m(measured, *of_measured) * head_turn_m(model, *of_model) < 0.0
+        });
+        if let Some((of_measured, of_model)) = opposite {
+            let at = |recording, t| head_at(recording, t).unwrap_or_default();
+            along_m = at(measured, of_measured) - at(model, of_model);
+        }
+        for _ in 0..if opposite.is_some() { 0 } else { MAX_STEPS } {
             let Some(step) = AlignmentStep::least_squares(measured, model, by, shift_s) else { break };
             shift_s += step.time_s;
             (along_m, shift_sd_s) = (step.mean_m, Some(step.time_sd_s));
@@ -105,12 +90,10 @@ impl Alignment {
             }
         }
         let drop_m = mean_drop_offset_m(measured, model, shift_s);
-        Self { shift_s, along_m, drop_m, followed: by, shift_sd_s, opposite_turn: false }
+        Self { shift_s, along_m, drop_m, followed: by, shift_sd_s, opposite_turn: opposite.is_some() }
     }
-}
 
-impl Alignment {
-    /// What is added to a channel of the model, m.
+    /// Offset that is added to a channel of the model, m.
     pub(crate) fn offset_m(&self, channel: Channel) -> f64 {
         match channel {
             Channel::TipX | Channel::HeadX => self.along_m,
@@ -120,16 +103,20 @@ impl Alignment {
     }
 }
 
-/// How far the head has moved a while after a time, m: its sign says which way it turns. The longest of a few
-/// whiles that was tracked.
-fn head_turn_m(recording: &Recording, at_s: f64) -> f64 {
-    const WHILES_S: [f64; 4] = [0.04, 0.02, 0.01, 0.005];
-    let head = |t: f64| recording.interpolate_column(&recording.traces().head_x_m, t);
-    WHILES_S.iter().find_map(|while_s| Some(head(at_s + while_s)? - head(at_s)?)).unwrap_or_default()
+fn head_at(recording: &Recording, t: f64) -> Option<f64> {
+    recording.interpolate_column(&recording.traces().head_x_m, t)
 }
 
-/// Of the places of the recording along the model's run, the one where the path is most like the model's: for
-/// a recording without a turn.
+/// Travel of the head in a short time after a turn, m; its sign is the direction after the turn. The longest of
+/// a few times whose end is tracked.
+fn head_turn_m(recording: &Recording, turn_s: f64) -> f64 {
+    const TIMES_S: [f64; 4] = [0.04, 0.02, 0.01, 0.005];
+    let travel = |time_s: &f64| Some(head_at(recording, turn_s + time_s)? - head_at(recording, turn_s)?);
+    TIMES_S.iter().find_map(travel).unwrap_or_default()
+}
+
+/// Time shift, out of evenly spaced ones, at which the recorded path differs least from the model's: for a
+/// recording without a turn.
 fn best_overlap_shift_s(measured: &Recording, model: &Recording, by: AlignmentPoint) -> f64 {
     const PLACES: u32 = 200;
     const FRAMES: usize = 100;
@@ -153,16 +140,16 @@ fn best_overlap_shift_s(measured: &Recording, model: &Recording, by: AlignmentPo
     best.map_or(0.0, |(shift_s, _)| shift_s)
 }
 
-/// The frames that are used.
+/// At most [`MAX_FRAMES`] frames, evenly spaced.
 fn used_frames(recording: &Recording) -> impl Iterator<Item = usize> {
     let frames = recording.grid().frames;
     (0..frames).step_by(frames.div_ceil(MAX_FRAMES).max(1))
 }
 
-/// One step of Gauss and Newton for a time and a mean distance of the paths.
+/// One Gauss-Newton step for the time shift and the mean distance of the paths.
 struct AlignmentStep {
     time_s: f64,
-    /// Standard deviation of the time by what is left, s.
+    /// Standard deviation of the time from the residuals, s.
     time_sd_s: f64,
     mean_m: f64,
 }
@@ -183,27 +170,22 @@ impl AlignmentStep {
         };
         let points: Vec<(f64, f64)> = used_frames(measured).filter_map(point).collect();
         let count = points.len() as f64;
-        let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
-        let (spread, both) = points.iter().fold((0.0, 0.0), |sum, p| {
-            (sum.0 + math::powi(p.0 - mean.0, 2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1))
-        });
-        // a later model is a path that lags by its speed times the time
+        let ([mean_speed, mean_m], [spread, both]) = central_moments(&points);
+        // a model that is late by a time lags by its speed times that time
         let time_s = if spread > 0.0 { -both / spread } else { 0.0 };
-        let left: f64 = points.iter().map(|p| math::powi(p.1 - mean.1 + time_s * (p.0 - mean.0), 2)).sum();
+        let residual = |p: &(f64, f64)| p.1 - mean_m + time_s * (p.0 - mean_speed);
+        let left: f64 = points.iter().map(|p| math::powi(residual(p), 2)).sum();
         let time_sd_s =
             if spread > 0.0 && count > 2.0 { (left / (count - 2.0) / spread).sqrt() } else { f64::INFINITY };
-        (count > 0.0).then_some(Self { time_s, time_sd_s, mean_m: mean.1 + time_s * mean.0 })
+        (count > 0.0).then_some(Self { time_s, time_sd_s, mean_m: mean_m + time_s * mean_speed })
     }
 }
 
 fn mean_drop_offset_m(measured: &Recording, model: &Recording, shift_s: f64) -> f64 {
     let grid = measured.grid();
-    let difference = |i: usize| {
-        Some(
-            model.interpolate_column(&model.traces().head_y_m, grid.time_s(i) - shift_s)?
-                - (*measured.traces().head_y_m.get(i)?)?,
-        )
-    };
+    let (column, measured_m) = (&model.traces().head_y_m, &measured.traces().head_y_m);
+    let difference =
+        |i: usize| Some(model.interpolate_column(column, grid.time_s(i) - shift_s)? - (*measured_m.get(i)?)?);
     let all: Vec<f64> = used_frames(measured).filter_map(difference).collect();
     if all.is_empty() { 0.0 } else { all.iter().sum::<f64>() / all.len() as f64 }
 }

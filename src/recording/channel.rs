@@ -14,8 +14,6 @@ use serde::Serialize;
 use std::ops::Range;
 pub use window::{Window, WindowEnd, WindowError};
 
-// Channels: what of a recording is followed over the frames.
-
 /// A quantity followed over the frames, m.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize)]
 pub enum Channel {
@@ -53,7 +51,7 @@ impl Channel {
         }
     }
 
-    /// The same in a sentence.
+    /// Name in a sentence: `head drop`.
     pub(crate) fn label(self) -> String {
         self.name().replace('-', " ")
     }
@@ -76,12 +74,10 @@ impl Channel {
     pub fn samples(self, recording: &Recording) -> Vec<Option<f64>> {
         let traces = recording.traces();
         match self {
-            Self::Deflection => traces
-                .tip_x_m
-                .iter()
-                .zip(&traces.head_x_m)
-                .map(|(tip, head)| Some((*tip)? - (*head)?))
-                .collect(),
+            Self::Deflection => {
+                let both = traces.tip_x_m.iter().zip(&traces.head_x_m);
+                both.map(|(tip, head)| Some((*tip)? - (*head)?)).collect()
+            }
             Self::HeadDrop => traces.head_y_m.iter().map(|y| y.map(|y| -y)).collect(),
             Self::TipX => traces.tip_x_m.clone(),
             Self::HeadX => traces.head_x_m.clone(),
@@ -103,33 +99,31 @@ impl std::fmt::Display for Channel {
     }
 }
 
-// Mean speed over a few frames.
-
-/// Slope of a channel over the frames present in `frames`, m/s, by least squares; `None` for fewer than two,
-/// or outside the recording.
+/// Least-squares slope of a channel over the frames present in `frames`, m/s; `None` for fewer than two, or
+/// outside the recording.
 pub(crate) fn mean_speed_m_per_s(
     samples: &[Option<f64>],
     frame_rate_hz: f64,
     frames: Range<usize>,
 ) -> Option<f64> {
-    let first = frames.start;
-    let points: Vec<(f64, f64)> = samples
-        .get(frames)?
-        .iter()
-        .enumerate()
-        .filter_map(|(i, x)| Some(((first + i) as f64 / frame_rate_hz, (*x)?)))
-        .collect();
-    let count = points.len() as f64;
-    let mean = points.iter().fold((0.0, 0.0), |sum, p| (sum.0 + p.0 / count, sum.1 + p.1 / count));
-    let (spread, both) = points.iter().fold((0.0, 0.0), |sum, p| {
-        (sum.0 + math::powi(p.0 - mean.0, 2), sum.1 + (p.0 - mean.0) * (p.1 - mean.1))
-    });
+    let present = frames.clone().zip(samples.get(frames)?);
+    let points: Vec<(f64, f64)> =
+        present.filter_map(|(frame, x)| Some((frame as f64 / frame_rate_hz, (*x)?))).collect();
+    let (_, [spread, both]) = central_moments(&points);
     (spread > 0.0).then(|| both / spread)
 }
 
-// The tracked frames of a channel, their noise and their medians.
+/// Means of x and y; sums of the squared distances of x from its mean and of their products with those of y.
+pub(super) fn central_moments(points: &[(f64, f64)]) -> ([f64; 2], [f64; 2]) {
+    let count = points.len() as f64;
+    let [x, y] = points.iter().fold([0.0; 2], |sum, p| [sum[0] + p.0 / count, sum[1] + p.1 / count]);
+    let sums = points
+        .iter()
+        .fold([0.0; 2], |sum, p| [sum[0] + math::powi(p.0 - x, 2), sum[1] + (p.0 - x) * (p.1 - y)]);
+    ([x, y], sums)
+}
 
-/// The tracked frames of a channel and what their noise is.
+/// The tracked frames of a channel with their noise, m, and their smallest step, m (0 without one).
 pub(super) struct TrackPoints {
     /// Frame and position, m.
     pub points: Vec<(usize, f64)>,
@@ -154,23 +148,23 @@ impl TrackPoints {
 
 /// Frame and position, m, of the tracked frames.
 pub(super) fn present_points(samples: &[Option<f64>]) -> Vec<(usize, f64)> {
-    // (growing it would take a fifth of the search for instants)
+    // (growing the vector would cost a fifth of the search for instants)
     let mut points = Vec::with_capacity(samples.len());
     points.extend(samples.iter().enumerate().filter_map(|(frame, x)| x.map(|x| (frame, x))));
     points
 }
 
-/// Standard deviation of white noise on a smooth path, from fourth differences over frames in a row:
-/// polynomials up to the third degree drop out.
+/// Standard deviation of white noise on a smooth path, m, from fourth differences over consecutive frames: a
+/// motion up to the third degree drops out.
 pub(super) fn noise_sd_m(points: &[(usize, f64)]) -> f64 {
     /// Fourth differences of white noise have 1 + 16 + 36 + 16 + 1 times its variance.
     const GAIN: f64 = 70.0;
     /// Median of |x| of a standard normal variable.
     const NORMAL_MEDIAN: f64 = 0.674_489_75;
     let in_a_row = points.windows(5).filter(|w| w[4].0 - w[0].0 == 4);
+    let fourth = |w: &[(usize, f64)]| w[0].1 - 4.0 * w[1].1 + 6.0 * w[2].1 - 4.0 * w[3].1 + w[4].1;
     let mut differences = Vec::with_capacity(points.len());
-    differences
-        .extend(in_a_row.map(|w| (w[0].1 - 4.0 * w[1].1 + 6.0 * w[2].1 - 4.0 * w[3].1 + w[4].1).abs()));
+    differences.extend(in_a_row.map(|w| fourth(w).abs()));
     median_in_place(&mut differences).map_or(0.0, |m| m / (NORMAL_MEDIAN * GAIN.sqrt()))
 }
 
@@ -184,24 +178,24 @@ pub(super) fn index_at_frame(points: &[(usize, f64)], frame: f64) -> usize {
     points.partition_point(|p| (p.0 as f64) < frame)
 }
 
-/// Median position, m; `None` of no points.
+/// Median position, m; `None` without points.
 pub(super) fn median_position(points: &[(usize, f64)]) -> Option<f64> {
     median_in_place(&mut points.iter().map(|p| p.1).collect::<Vec<_>>())
 }
 
-/// Median of a point and its neighbours: an outlier of a single frame makes no extremum and reaches no level.
+/// Median of a point and its two neighbours: it removes an outlier of a single frame.
 pub(super) fn median_of_three(points: &[(usize, f64)], index: usize) -> f64 {
     let last = points.len().saturating_sub(1);
     let [a, b, c] = [index.saturating_sub(1), index, (index + 1).min(last)].map(|i| points[i].1);
     a.max(b).min(a.min(b).max(c))
 }
 
-/// Smallest and largest; the wrong way round when there is none.
+/// Smallest and largest value; infinity and minus infinity for none.
 pub(super) fn value_range(values: &[f64]) -> (f64, f64) {
     values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(*x), high.max(*x)))
 }
 
-/// Medians of three points: an outlier of a single frame cannot make an extremum, and a turn is far longer.
+/// Median of three at every point: it removes outliers of a single frame, and a turn is far longer.
 pub(super) fn median_filter(points: &[(usize, f64)]) -> Vec<f64> {
     (0..points.len()).map(|index| median_of_three(points, index)).collect()
 }

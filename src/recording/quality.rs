@@ -1,8 +1,7 @@
-//! What a recording can show: its rates, gaps and noise, measured on the traces themselves, and what looks
-//! wrong with it.
+//! Quality of a recording: its rate, gaps and noise, measured on the traces, and findings on them.
 //!
-//! [`measure_quality`] measures, [`collect_findings`] judges (each finding with a severity, a number and advice), [`verdict_lines`]
-//! puts both into lines for reading, and [`Quality::shows`] answers for a single frequency.
+//! [`measure_quality`] measures; [`collect_findings`] judges, each finding with a severity, a number and advice;
+//! `verdict_lines` writes both as text; [`Quality::component_visibility`] judges a single frequency.
 
 mod checks;
 mod finding;
@@ -13,8 +12,7 @@ mod outliers;
 mod prefilter;
 mod tilt;
 
-use super::FrameGrid;
-use crate::recording::Recording;
+use super::{FrameGrid, Recording};
 use crate::recording::channel::ReversalInstants;
 use crate::text::{format_decimals, format_or_dash, to_ascii};
 pub(crate) use checks::check_position_steps;
@@ -29,10 +27,10 @@ pub use outliers::outlier_frames;
 use serde::Serialize;
 pub use tilt::{CameraTilt, Curvature, TiltNotFound, measure_tilt};
 
-/// Every finding on a recording, the gravest first: what its traces show, and what only its
-/// export could show (`import`).
+/// Everything that looks wrong with a recording, gravest first, together with the findings of its import.
 ///
-/// `measured` is the [`measure_quality`] of the same recording, `instants` what [`ReversalInstants::find`] finds in it.
+/// `measured` is the [`measure_quality`] of the same recording, `instants` are its
+/// [`ReversalInstants::find_instants`].
 #[must_use]
 pub fn collect_findings(
     recording: &Recording,
@@ -44,7 +42,7 @@ pub fn collect_findings(
     let columns = measurement::measured_columns(recording.traces(), measured);
     let mut found = import.to_vec();
     found.extend(checks::check_grid(measured));
-    found.extend(checks::check_exposure(measured));
+    found.push(checks::check_exposure(measured));
     found.extend(motion::check_motion(recording, measured));
     found.extend(tilt::check_tilt(recording, measured, instants));
     found.extend(motion::check_turns(instants));
@@ -59,12 +57,10 @@ pub fn collect_findings(
     found
 }
 
-// Quality as text: the grade, the verdict with the worst finding first, and the table of measurements.
-
-/// Times the noise that an oscillation must reach to be seen frame by frame.
+/// Amplitude of an oscillation that is visible in single frames, in standard deviations of the noise.
 const VISIBLE_COMPONENTS: f64 = 3.0;
 
-/// A recording in one word.
+/// Overall grade of a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Grade {
@@ -76,7 +72,7 @@ pub enum Grade {
     NotUsable,
 }
 
-/// The grade: the gravest finding decides.
+/// Grade of the gravest finding.
 pub fn grade_findings(findings: &[QualityFinding]) -> Grade {
     match findings.iter().map(|finding| finding.severity).max() {
         None | Some(Severity::Note) => Grade::Good,
@@ -85,14 +81,13 @@ pub fn grade_findings(findings: &[QualityFinding]) -> Grade {
     }
 }
 
-/// The verdict, one statement a line: the grade with what the recording can show, then the findings, worst
-/// first. A finding on several channels is one line with its largest number; notes without advice are left to
-/// the table.
+/// The verdict, one statement a line: the grade with the visible frequencies, then the findings, gravest first. A
+/// finding on several channels is one line with its largest number. Notes without advice are left out.
 pub fn verdict_lines(measured: &Quality, findings: &[QualityFinding]) -> Vec<String> {
     let mut lines = vec![grade_line(measured, findings)];
     let mut stated: Vec<(Check, Severity)> = vec![];
-    let mut ordered: Vec<&QualityFinding> =
-        findings.iter().filter(|f| f.severity > Severity::Note || !f.advice.is_empty()).collect();
+    let shown = |f: &&QualityFinding| f.severity > Severity::Note || !f.advice.is_empty();
+    let mut ordered: Vec<&QualityFinding> = findings.iter().filter(shown).collect();
     ordered.sort_by_key(|finding| std::cmp::Reverse(finding.severity));
     for finding in &ordered {
         let key = (finding.check, finding.severity);
@@ -103,7 +98,13 @@ pub fn verdict_lines(measured: &Quality, findings: &[QualityFinding]) -> Vec<Str
             lines.extend(join_channel_findings(&ordered, key));
         }
     }
-    lines.extend(describe_visible_band(measured));
+    lines.extend(measured.deflection_floor_m().map(|floor_m| {
+        format!(
+            "note: a deflection above about {:.3} um stands out from the noise in single frames \
+             ({VISIBLE_COMPONENTS} standard deviations)",
+            VISIBLE_COMPONENTS * floor_m * 1e6
+        )
+    }));
     lines
 }
 
@@ -115,10 +116,10 @@ fn grade_line(measured: &Quality, findings: &[QualityFinding]) -> String {
     }
     let (low_hz, high_hz) = measured.band_hz();
     if low_hz >= high_hz {
-        let (frames, rate) = (measured.frames, measured.frame_rate_hz);
+        let Quality { frames, frame_rate_hz, .. } = measured;
         return format!(
-            "too short for a spectrum: {frames} frames at {rate} frames/s hold fewer than {FEWEST_CYCLES} cycles of \
-             anything they can show"
+            "too short for a spectrum: {frames} frames at {frame_rate_hz} frames/s hold fewer than {FEWEST_CYCLES} \
+             cycles of anything they can show"
         );
     }
     let grade = match grade_findings(findings) {
@@ -126,49 +127,31 @@ fn grade_line(measured: &Quality, findings: &[QualityFinding]) -> String {
         Grade::UsableWithCare => "usable with care: shows",
         Grade::NotUsable => "not usable until the serious findings are resolved: would show",
     };
-    let (cycles, nyquist) = (
-        format!("{FEWEST_CYCLES} cycles in the recording"),
-        format!("{NYQUIST_SHARE} of the Nyquist frequency"),
-    );
-    format!("{grade} oscillations from about {low_hz:.3} Hz ({cycles}) to {high_hz:.0} Hz ({nyquist})")
+    format!(
+        "{grade} oscillations from about {low_hz:.3} Hz ({FEWEST_CYCLES} cycles in the recording) to {high_hz:.0} Hz \
+         ({NYQUIST_SHARE} of the Nyquist frequency)"
+    )
 }
 
-fn describe_visible_band(measured: &Quality) -> Option<String> {
-    let floor_m = VISIBLE_COMPONENTS * measured.deflection_floor_m()?;
-    Some(format!(
-        "note: a deflection above about {:.3} um stands out from the noise in single frames \
-         ({VISIBLE_COMPONENTS} standard deviations)",
-        floor_m * 1e6
-    ))
-}
-
-/// The findings of one check and severity on single channels as one line.
+/// Joins the findings of one check and severity on single channels in one line.
 fn join_channel_findings(findings: &[&QualityFinding], key: (Check, Severity)) -> Option<String> {
-    let alike = || {
-        findings
-            .iter()
-            .filter(|finding| finding.channel.is_some() && (finding.check, finding.severity) == key)
-    };
+    let alike = || findings.iter().filter(|f| f.channel.is_some() && (f.check, f.severity) == key);
     let channels: Vec<&str> = alike().filter_map(|finding| finding.channel.as_deref()).collect();
-    let worst = alike()
-        .copied()
-        .reduce(|worst, finding| if finding.value > worst.value { finding } else { worst })?;
-    let Some((_, [_, ..])) = channels.split_first() else { return Some(worst.to_line()) };
+    let worst = alike().copied().reduce(|worst, f| if f.value > worst.value { f } else { worst })?;
+    if channels.len() < 2 {
+        return Some(worst.to_line());
+    }
     let named = format!("{} (most in {})", channels.join(", "), worst.channel.as_deref().unwrap_or_default());
     Some(worst.clone().on_channel(&named).to_line())
 }
 
-/// The measurements as a table for reading, display units, one fact a line.
+/// The measurements as a text table in display units, one a line.
 pub(crate) fn measurement_table(quality: &Quality, start_s: f64) -> String {
     let grid = FrameGrid { start_s, frame_rate_hz: quality.frame_rate_hz, frames: quality.frames };
     let share = 100.0 * quality.missing_deflection_frames as f64 / quality.frames as f64;
+    let end_s = grid.time_s(quality.frames.saturating_sub(1));
     let mut lines = vec![
-        format!(
-            "frames            {} ({} s to {} s)",
-            quality.frames,
-            start_s,
-            grid.time_s(quality.frames.saturating_sub(1))
-        ),
+        format!("frames            {} ({start_s} s to {end_s} s)", quality.frames),
         format!("duration          {:.6} s", quality.duration_s),
         format!("recording rate    {} frames/s (Nyquist {} Hz)", quality.frame_rate_hz, quality.nyquist_hz),
         format!(
@@ -179,9 +162,8 @@ pub(crate) fn measurement_table(quality: &Quality, start_s: f64) -> String {
     if let Some(at_s) = quality.longest_gap_at_s {
         lines.push(format!("longest gap       {} frames from {at_s:.6} s", quality.longest_gap_frames));
     }
-    if let (Some(half_hz), Some(passes)) =
-        (quality.exposure_half_power_hz, quality.exposure_passes_at_nyquist)
-    {
+    let exposure = quality.exposure_half_power_hz.zip(quality.exposure_passes_at_nyquist);
+    if let Some((half_hz, passes)) = exposure {
         lines.push(format!(
             "exposure          passes half the power at {half_hz:.0} Hz, {:.0} % of an amplitude at the \
              Nyquist frequency",

@@ -4,35 +4,32 @@
 use super::{index_at_frame, median_of_three, median_position};
 use std::ops::Range;
 
-/// Share of the change at which the deflection has left its level before: that of rise times, far above
-/// tracking noise.
+/// Share of the change at which the flip starts: usual for rise times, and far above tracking noise.
 const START_SHARE: f64 = 0.05;
-/// Share of the change at which it has reached its level after.
+/// Share of the change at which the flip ends.
 const END_SHARE: f64 = 0.95;
-/// Tracked frames on either side of the turn that belong to the level before whenever the tip came to rest.
+/// Tracked frames on either side of the turn that always count for the level before.
 const NEAR_TURN: usize = 5;
-/// Fewest tracked frames of the level after; a median of fewer is one of noise.
+/// Fewest tracked frames of the level after: noise dominates a median of fewer.
 const FEWEST_POINTS: usize = 8;
-/// Least change in units of the deflection's noise: two extremes of white noise in 1e5 frames are about 9
-/// apart.
+/// Least change in units of the deflection's noise. The extremes of white noise in 1e5 frames are about 9 apart.
 const CHANGE_NOISES: f64 = 12.0;
 
 /// Passage of the deflection from its level before a turn to its level after, in s of the recording.
 ///
-/// The level before is the median deflection between the instant at which the tip stops and the turn of the
-/// head. The level after is the median over as long a time after the tip slips again as it took from there to
-/// the release; what swings about it averages out. The flip ends when the deflection first comes within 5 %
-/// of the change to the level after; it starts when the deflection last left the 5 % next to the level
-/// before. Zero is no mark: it depends on which points were tracked.
+/// The level before is the median deflection from the stop of the tip to the turn of the head. The level after
+/// is the median over a time after the release that is as long as the tip's rest: oscillation about it averages
+/// out. The flip starts when the deflection last leaves the first 5 % of the change, and ends when it first
+/// reaches 95 %. A zero crossing would not do, because zero depends on which points are tracked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flip {
-    /// The deflection has left its level before, s.
+    /// The deflection leaves its level before, s.
     pub start_s: f64,
-    /// The deflection has reached its level after, s.
+    /// The deflection reaches its level after, s.
     pub end_s: f64,
 }
 
-/// A turn and its hold, in frames (real numbers).
+/// A turn, the tip's rest around it and the next turn, in frames (real numbers).
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TurnNeighbourhood {
     pub turn: f64,
@@ -42,8 +39,8 @@ pub(super) struct TurnNeighbourhood {
     pub next_turn: f64,
 }
 
-/// Start and end of the flip, frames; `points` are the tracked frames of the deflection. `None` where the
-/// deflection is tracked too little or changes by no more than its noise does.
+/// Start and end of the flip, frames; `points` are the tracked frames of the deflection. `None` where too few
+/// frames are tracked or the change is within the noise.
 pub(super) fn find_flip(
     points: &[(usize, f64)],
     noise_m: f64,
@@ -63,15 +60,15 @@ pub(super) fn find_flip(
     Some((start, interpolate_crossing(points, &share, end.checked_sub(1)?, END_SHARE)))
 }
 
-/// From rest to the turn, in either order, and a few points about the turn.
+/// Points between the stop of the tip and the turn, whichever comes first, and a few about the turn.
 fn level_before(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<usize> {
-    let (turn, hold) =
-        (index_at_frame(points, around.turn), index_at_frame(points, around.hold.unwrap_or(around.turn)));
+    let frames = [around.turn, around.hold.unwrap_or(around.turn)];
+    let [turn, hold] = frames.map(|frame| index_at_frame(points, frame));
     turn.min(hold).min(turn.saturating_sub(NEAR_TURN))
         ..turn.max(hold).max((turn + NEAR_TURN).min(points.len()))
 }
 
-/// As long after the release as the tip rested before it, but not beyond the next turn.
+/// Points after the release, for as long as the tip rested and not beyond the next turn.
 fn level_after(points: &[(usize, f64)], around: &TurnNeighbourhood) -> Range<usize> {
     let rested = around.release - around.hold.unwrap_or(around.turn).min(around.turn);
     let from = index_at_frame(points, around.release);

@@ -3,8 +3,7 @@
 
 use super::Channel;
 use super::flip::{self, Flip, TurnNeighbourhood};
-use super::turns::find_turns;
-use super::turns::longest_hold;
+use super::turns::{find_turns, longest_hold};
 use super::{TrackPoints, present_points};
 use crate::math;
 use crate::recording::Recording;
@@ -42,17 +41,17 @@ impl InstantKind {
 pub struct Reversal {
     /// The head turns.
     pub reversal_s: f64,
-    /// The tip has stopped; `None` if it did so before the recording, or not at all.
+    /// The tip stops; `None` if it stops before the recording starts, or not at all.
     pub hold_s: Option<f64>,
-    /// The tip slips again; `None` if it does so after the recording, or did not hold.
+    /// The tip slips again; `None` if that is after the end of the recording, or the tip does not stop.
     pub release_s: Option<f64>,
-    /// The deflection changes sides; `None` where the tip is not seen to slip again or the deflection changes
-    /// by no more than noise.
+    /// The deflection changes sides; `None` without a release, or where the deflection changes by no more than
+    /// its noise.
     pub flip: Option<Flip>,
 }
 
 impl Reversal {
-    /// End of the flip and of the tip's rest, whichever is later, s: from then on the blade trails on its new
+    /// End of the flip, s, or the tip's release where that is later: from then on the blade trails on its new
     /// side.
     pub(crate) fn settling_time_s(&self) -> Option<f64> {
         Some(self.flip?.end_s.max(self.release_s?))
@@ -68,7 +67,7 @@ pub enum InstantNotFound {
     /// No turn at all.
     #[error("the head does not turn in it")]
     NoTurn,
-    /// Fewer turns than asked for: how many there are, at least 1.
+    /// Fewer turns than asked for, at least 1.
     #[error("{turns} reversal{} found", if *turns == 1 { " was" } else { "s were" })]
     FewerTurns {
         /// Number of turns that were found.
@@ -104,26 +103,19 @@ impl ReversalInstants {
         let tip = TrackPoints::from_samples(&recording.traces().tip_x_m);
         let time_s = |frame: f64| recording.grid().start_s + frame / rate;
         let turns = find_turns(&head);
-        let next_turn = |i: usize| turns.get(i + 1).map_or(f64::INFINITY, |next| next.frame);
         let deflection = present_points(&Channel::Deflection.samples(recording));
         let noise_m = math::hypot(head.noise_m, tip.noise_m);
         let reversals = turns.iter().enumerate().map(|(i, turn)| {
             let hold = longest_hold(&head, &tip, turn);
             let (start, end) = hold.map_or((None, None), |hold| (hold.start, hold.end));
-            let around = end.map(|release| TurnNeighbourhood {
-                turn: turn.frame,
-                hold: start,
-                release,
-                next_turn: next_turn(i),
+            let next_turn = turns.get(i + 1).map_or(f64::INFINITY, |next| next.frame);
+            let flip = end.and_then(|release| {
+                let around = TurnNeighbourhood { turn: turn.frame, hold: start, release, next_turn };
+                let (start, end) = flip::find_flip(&deflection, noise_m, &around)?;
+                Some(Flip { start_s: time_s(start), end_s: time_s(end) })
             });
-            let flip = around.and_then(|around| flip::find_flip(&deflection, noise_m, &around));
-            let flip = flip.map(|(start, end)| Flip { start_s: time_s(start), end_s: time_s(end) });
-            Reversal {
-                reversal_s: time_s(turn.frame),
-                hold_s: start.map(time_s),
-                release_s: end.map(time_s),
-                flip,
-            }
+            let [hold_s, release_s] = [start, end].map(|frame| frame.map(time_s));
+            Reversal { reversal_s: time_s(turn.frame), hold_s, release_s, flip }
         });
         Self { reversals: reversals.collect() }
     }
@@ -138,12 +130,10 @@ impl ReversalInstants {
     /// # Errors
     /// [`InstantNotFound`] with what was found instead.
     pub fn time_s(&self, anchor: InstantKind, reversal: usize) -> Result<f64, InstantNotFound> {
-        let Some(found) = reversal.checked_sub(1).and_then(|index| self.reversals.get(index)) else {
-            return Err(match self.reversals.len() {
-                0 => InstantNotFound::NoTurn,
-                turns => InstantNotFound::FewerTurns { turns },
-            });
-        };
+        let found = self.numbered(reversal).ok_or(match self.reversals.len() {
+            0 => InstantNotFound::NoTurn,
+            turns => InstantNotFound::FewerTurns { turns },
+        })?;
         match anchor {
             InstantKind::Reversal => Ok(found.reversal_s),
             InstantKind::Hold => found.hold_s.ok_or(InstantNotFound::NoHold),
@@ -155,15 +145,18 @@ impl ReversalInstants {
         }
     }
 
-    /// End of the flip of the `reversal`-th turn (counted from 1) and of the tip's rest there, whichever is
-    /// later, s.
+    /// End of the flip at the `reversal`-th turn (counted from 1), s; the tip's release where that is later.
     ///
     /// # Errors
     /// As [`Self::time_s`] of [`InstantKind::Flip`].
     pub(crate) fn settling_time_s(&self, reversal: usize) -> Result<f64, InstantNotFound> {
         self.time_s(InstantKind::Flip, reversal)?;
-        let found = reversal.checked_sub(1).and_then(|index| self.reversals.get(index));
-        found.and_then(Reversal::settling_time_s).ok_or(InstantNotFound::NoRelease)
+        self.numbered(reversal).and_then(Reversal::settling_time_s).ok_or(InstantNotFound::NoRelease)
+    }
+
+    /// The `reversal`-th turn, counted from 1.
+    pub(crate) fn numbered(&self, reversal: usize) -> Option<&Reversal> {
+        self.reversals.get(reversal.checked_sub(1)?)
     }
 }
 

@@ -1,7 +1,7 @@
 //! The phases of a reversal: before, stick, flip, after.
 
-use super::instants::{InstantKind, InstantNotFound, ReversalInstants};
-use super::window::{Window, WindowEnd, WindowError};
+use super::instants::{InstantKind, ReversalInstants};
+use super::window::{AbsentInstant, Window, WindowEnd};
 use crate::recording::Recording;
 use serde::Serialize;
 use std::ops::Range;
@@ -16,9 +16,9 @@ use std::ops::Range;
 /// | `flip` | the deflection leaves its level (`flip`) | it has reached its level on the other side and the tip has slipped again (settled) |
 /// | `after` | settled | the tip stops at the next reversal (`hold`), or the end of the recording |
 ///
-/// The tip still sticks during most of `flip`: the head passes over it. `stick` is the part in which the
-/// blade rests, so that what rings there rides on no flip. `before` of a later reversal is `after` of the one
-/// before it. How the flip is found says [`super::Flip`].
+/// The tip still sticks during most of `flip`, while the head passes over it. During `stick` the blade rests,
+/// so a ring-down there does not overlap with the flip. `before` of a later reversal is `after` of the previous
+/// one. `Flip` describes how the flip is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum ReversalPhase {
     /// The blade trails on its old side.
@@ -45,58 +45,29 @@ impl ReversalPhase {
         }
     }
 
-    /// Start at the `reversal`-th turn (counted from 1): a time, s, or the start of the recording (`None`).
-    ///
-    /// # Errors
-    /// The instant that was not found, as it is written in a window, and what was found instead.
-    pub(super) fn start_s(
+    /// End or start at the `reversal`-th turn (counted from 1), s; `None` for the end or the start of the
+    /// recording.
+    pub(super) fn boundary_s(
         self,
+        at_end: bool,
         reversal: usize,
         instants: &ReversalInstants,
-    ) -> Result<Option<f64>, (String, InstantNotFound)> {
-        match self {
-            Self::Before if reversal == 1 => Ok(None),
-            Self::Before => settling_time_s(reversal.saturating_sub(1), instants).map(Some),
-            Self::Stick => instant_time_s(InstantKind::Hold, reversal, instants).map(Some),
-            Self::Flip => instant_time_s(InstantKind::Flip, reversal, instants).map(Some),
-            Self::After => settling_time_s(reversal, instants).map(Some),
-        }
-    }
-
-    /// End at the `reversal`-th turn (counted from 1): a time, s, or the end of the recording (`None`).
-    ///
-    /// # Errors
-    /// As [`Self::start_s`].
-    pub(super) fn end_s(
-        self,
-        reversal: usize,
-        instants: &ReversalInstants,
-    ) -> Result<Option<f64>, (String, InstantNotFound)> {
-        match self {
-            Self::Before => instant_time_s(InstantKind::Hold, reversal, instants).map(Some),
-            Self::Stick => instant_time_s(InstantKind::Flip, reversal, instants).map(Some),
-            Self::Flip => settling_time_s(reversal, instants).map(Some),
-            Self::After if reversal >= instants.reversals.len() => Ok(None),
-            Self::After => instant_time_s(InstantKind::Hold, reversal + 1, instants).map(Some),
-        }
+    ) -> Result<Option<f64>, AbsentInstant> {
+        let at = |kind: InstantKind, turn| instants.time_s(kind, turn).map_err(|reason| (kind, turn, reason));
+        let settled =
+            |turn| instants.settling_time_s(turn).map_err(|reason| (InstantKind::Flip, turn, reason));
+        let found = match (self, at_end) {
+            (Self::Before, false) if reversal == 1 => return Ok(None),
+            (Self::Before, false) => settled(reversal.saturating_sub(1)),
+            (Self::Before, true) | (Self::Stick, false) => at(InstantKind::Hold, reversal),
+            (Self::Stick, true) | (Self::Flip, false) => at(InstantKind::Flip, reversal),
+            (Self::Flip, true) | (Self::After, false) => settled(reversal),
+            (Self::After, true) if reversal >= instants.reversals.len() => return Ok(None),
+            (Self::After, true) => at(InstantKind::Hold, reversal + 1),
+        };
+        found.map(Some).map_err(|(kind, turn, reason)| (format!("{}[{turn}]", kind.name()), reason))
     }
 }
-
-fn instant_time_s(
-    anchor: InstantKind,
-    reversal: usize,
-    instants: &ReversalInstants,
-) -> Result<f64, (String, InstantNotFound)> {
-    instants.time_s(anchor, reversal).map_err(|reason| (format!("{}[{reversal}]", anchor.name()), reason))
-}
-
-fn settling_time_s(reversal: usize, instants: &ReversalInstants) -> Result<f64, (String, InstantNotFound)> {
-    instants
-        .settling_time_s(reversal)
-        .map_err(|reason| (format!("{}[{reversal}]", InstantKind::Flip.name()), reason))
-}
-
-// The phases of every reversal as windows of a recording.
 
 /// A phase of a reversal as a recording shows it.
 #[derive(Debug, Clone, PartialEq)]
@@ -115,35 +86,25 @@ pub struct PhaseWindow {
     pub to_s: f64,
 }
 
-/// The phases of every reversal that a recording shows, in order of time; none overlaps another. What lies
-/// between two reversals is listed once, as `after` of the first. A phase of which an instant was not found
-/// is left out.
+/// The phases of every reversal that a recording shows, in order of time and without overlap. The motion
+/// between two reversals is listed once, as `after` of the first. A phase without one of its instants is left
+/// out.
 #[must_use]
 pub fn phase_windows(recording: &Recording, instants: &ReversalInstants) -> Vec<PhaseWindow> {
     let mut windows: Vec<PhaseWindow> = Vec::new();
     for reversal in 1..=instants.reversals.len() {
         for phase in ReversalPhase::ALL.into_iter().skip(usize::from(reversal > 1)) {
-            let named = phase_window(phase, reversal, recording, instants)
-                .ok()
-                .filter(|named| !named.frames.is_empty());
-            let follows =
-                |named: &PhaseWindow| windows.last().is_none_or(|last| last.frames.end <= named.frames.start);
-            windows.extend(named.filter(follows));
+            let end = WindowEnd::Phase { phase, reversal };
+            let window = Window { from: end, to: end };
+            let Ok((frames, from_s, to_s)) = window.locate_span(recording, instants) else { continue };
+            let follows = windows.last().is_none_or(|last| last.frames.end <= frames.start);
+            if follows && !frames.is_empty() {
+                let name = window.to_string();
+                windows.push(PhaseWindow { name, phase, reversal, frames, from_s, to_s });
+            }
         }
     }
     windows
-}
-
-fn phase_window(
-    phase: ReversalPhase,
-    reversal: usize,
-    recording: &Recording,
-    instants: &ReversalInstants,
-) -> Result<PhaseWindow, WindowError> {
-    let end = WindowEnd::Phase { phase, reversal };
-    let window = Window { from: end, to: end };
-    let (frames, from_s, to_s) = window.locate_span(recording, instants)?;
-    Ok(PhaseWindow { name: window.to_string(), phase, reversal, frames, from_s, to_s })
 }
 
 #[cfg(test)]

@@ -3,12 +3,12 @@
 use super::{TrackPoints, median_filter, median_position, noise_sd_m, value_range};
 use crate::math;
 
-/// Least return of the head after a turn, m: one pixel of the usual 20 um, so that jitter of a resting head
-/// is none.
+/// Least return of the head after a turn, m: one pixel of the usual 20 um. Jitter of a resting head stays below
+/// it.
 pub(super) const LEAST_RETURN_M: f64 = 20e-6;
 /// Least return in units of the tracking noise: two extremes of white noise in 1e5 frames are about 9 apart.
 const RETURN_NOISES: f64 = 12.0;
-/// Least return as a share of the head's whole travel, so that vibration of the drive is no turn.
+/// Least return as a share of the head's whole travel. Vibration of the drive stays below it.
 const RETURN_TRAVEL: f64 = 0.005;
 /// Turns are timed by a parabola through the frames within this many returns of the extremum.
 const FIT_RETURNS: f64 = 4.0;
@@ -20,19 +20,17 @@ pub(super) struct HeadTurn {
     pub last: usize,
 }
 
-/// Extrema from which the head returns by more than noise, jitter and vibration do.
+/// Extrema from which the head returns by more than noise, jitter and vibration.
 pub(super) fn find_turns(head: &TrackPoints) -> Vec<HeadTurn> {
     let smooth = median_filter(&head.points);
     let (low, high) = value_range(&smooth);
     let least = LEAST_RETURN_M.max(RETURN_NOISES * head.noise_m).max(RETURN_TRAVEL * (high - low));
-    alternating_extrema(&smooth, least)
-        .into_iter()
-        .map(|index| time_extremum(head, &smooth, index, FIT_RETURNS * least))
-        .collect()
+    let extrema = alternating_extrema(&smooth, least).into_iter();
+    extrema.map(|index| time_extremum(head, &smooth, index, FIT_RETURNS * least)).collect()
 }
 
-/// Indices of alternating maxima and minima, each followed by a return of at least `least` and preceded by an
-/// approach of as much.
+/// Indices of alternating maxima and minima. The values before and after each differ from it by at least
+/// `least`.
 fn alternating_extrema(values: &[f64], least: f64) -> Vec<usize> {
     let Some(first) = values.first() else { return Vec::new() };
     let (mut top, mut bottom) = ((0, *first), (0, *first));
@@ -94,34 +92,30 @@ fn parabola_vertex(points: &[(usize, f64)]) -> Option<f64> {
     s.is_finite().then_some(centre + half * s)
 }
 
-// Where the tip keeps its place while the head turns.
-
-/// The tip holds while it stays this many noises near its place: one frame in 2 million of white noise lies
-/// outside.
+/// Tolerance of a hold, in standard deviations of the noise: one frame in 2 million of white noise lies outside.
 const HOLD_NOISES: f64 = 5.0;
-/// Smallest tolerance of a hold, m: a hundredth of a pixel of 20 um, which no tracker resolves.
+/// Smallest tolerance of a hold, m: a hundredth of a pixel of 20 um, finer than any tracker.
 const LEAST_TOLERANCE_M: f64 = 0.2e-6;
-/// Whole-pixel tracking flickers between neighbours: this many steps still count as the same place.
+/// Tolerance of a hold, in steps of the tracker: whole-pixel tracking flickers between two neighbours.
 const HOLD_STEPS: f64 = 1.1;
-/// Frames in a row, on one side, that end a hold; fewer are outliers of the tracker.
+/// Consecutive frames outside, on one side, that end a hold; fewer are outliers of the tracker.
 const LEFT_FRAMES: usize = 3;
-/// Seeds of a hold on either side of a turn, spread over the parabola's frames.
+/// Seeds of the search for a hold on either side of a turn, spread over the frames of the parabola.
 const SEEDS: isize = 4;
 /// Half the number of frames whose median seeds the place of a hold.
 const SEED_HALF: usize = 5;
-/// The head covers at least this many tolerances during a hold: a tip that follows a slow head stays within
-/// two, and noise adds less than two.
+/// Least travel of the head during a hold, in tolerances. A tip that follows a slow head stays within two, and
+/// noise adds less than two.
 const HEAD_TOLERANCES: f64 = 6.0;
 /// Bound on the extrapolation back to the start or end of a hold, frames.
 const MOST_EXTRAPOLATED: f64 = 5.0;
-/// After release the tip's speed grows as the square of time (its acceleration starts at zero), so its path
-/// as the cube.
+/// Exponent of the tip's path after release: its acceleration starts at zero, so the path grows as the cube of
+/// time.
 const RELEASE_POWER: f64 = 3.0;
-/// Before a hold the tip decelerates to rest, so its path is a parabola.
+/// Exponent of the tip's path before a hold: it decelerates to rest along a parabola.
 const HOLD_POWER: f64 = 2.0;
 
-/// An interval in which the tip keeps its place, in frames (real numbers); an end outside the recording is
-/// `None`.
+/// An interval in which the tip rests, in frames (real numbers); an end outside the recording is `None`.
 pub(super) struct TipHold {
     pub start: Option<f64>,
     pub end: Option<f64>,
@@ -136,35 +130,31 @@ pub(super) fn longest_hold(head: &TrackPoints, tip: &TrackPoints, turn: &HeadTur
     holds.reduce(|best, hold| if hold.points > best.points { hold } else { best })
 }
 
-/// How far the tip may stray from its place: by the noise in the middle third about the turn, where the drive
-/// is slow and the tip calm.
+/// Tolerance of a hold, m, from the noise in the middle third about the turn, where the drive is slow.
 fn hold_tolerance_m(tip: &TrackPoints, turn: &HeadTurn) -> f64 {
     let sixth = (turn.last - turn.first) as f64 / 6.0;
     let near = &tip.points[tip.index_at_frame(turn.frame - sixth)..tip.index_at_frame(turn.frame + sixth)];
     let local = Some(noise_sd_m(near)).filter(|_| near.len() >= 4 * SEED_HALF);
     let noise_m = local.map_or(tip.noise_m, |local| local.min(tip.noise_m));
-    LEAST_TOLERANCE_M.max(HOLD_NOISES * noise_m).max(if noise_m == 0.0 {
-        HOLD_STEPS * tip.step_m.min(LEAST_RETURN_M * 2.0)
-    } else {
-        0.0
-    })
+    let by_step = if noise_m == 0.0 { HOLD_STEPS * tip.step_m.min(LEAST_RETURN_M * 2.0) } else { 0.0 };
+    LEAST_TOLERANCE_M.max(HOLD_NOISES * noise_m).max(by_step)
 }
 
 fn hold_around(head: &TrackPoints, tip: &TrackPoints, seed: usize, tolerance_m: f64) -> Option<TipHold> {
-    let nearby =
-        tip.points.get(seed.saturating_sub(SEED_HALF)..(seed + SEED_HALF + 1).min(tip.points.len()))?;
-    let place = median_position(nearby)?;
+    let nearby = seed.saturating_sub(SEED_HALF)..(seed + SEED_HALF + 1).min(tip.points.len());
+    let place = median_position(tip.points.get(nearby)?)?;
     let (first, last) = hold_extent(tip, seed.min(tip.points.len() - 1), place, tolerance_m);
     let place = median_position(&tip.points[first..=last])?;
     let (first, last) = hold_extent(tip, first + (last - first) / 2, place, tolerance_m);
-    if !head_covers(head, tip.points[first].0, tip.points[last].0, HEAD_TOLERANCES * tolerance_m) {
-        return None;
-    }
+    let [from, to] = [tip.points[first].0 as f64, tip.points[last].0 as f64 + 1.0];
+    let (low, high) =
+        value_range(&median_filter(&head.points[head.index_at_frame(from)..head.index_at_frame(to)]));
+    let head_moves = high - low >= HEAD_TOLERANCES * tolerance_m;
     let (before, after) = (first.checked_sub(1), Some(last + 1).filter(|i| *i < tip.points.len()));
-    let start =
-        before.map(|outside| departure_frame(tip, outside, outside.checked_sub(1), place, HOLD_POWER));
-    let end = after.map(|outside| departure_frame(tip, outside, Some(outside + 1), place, RELEASE_POWER));
-    Some(TipHold { start, end, points: last - first + 1 })
+    let departure = |outside, next, power| departure_frame(tip, outside, next, place, power);
+    let start = before.map(|outside| departure(outside, outside.checked_sub(1), HOLD_POWER));
+    let end = after.map(|outside| departure(outside, Some(outside + 1), RELEASE_POWER));
+    head_moves.then_some(TipHold { start, end, points: last - first + 1 })
 }
 
 /// First and last point of the interval around `seed` in which the tip stays near `place`.
@@ -184,21 +174,12 @@ fn hold_extent(tip: &TrackPoints, seed: usize, place: f64, tolerance_m: f64) -> 
     (first, last)
 }
 
-fn head_covers(head: &TrackPoints, first: usize, last: usize, least_m: f64) -> bool {
-    let during = median_filter(
-        &head.points[head.index_at_frame(first as f64)..head.index_at_frame(last as f64 + 1.0)],
-    );
-    let (low, high) = value_range(&during);
-    high - low >= least_m
-}
-
-/// Where the path `distance = c |t - t0|^power` through two points outside the hold starts, frames.
+/// Start `t0`, in frames, of the path `distance = c |t - t0|^power` through two points outside the hold.
 fn departure_frame(tip: &TrackPoints, outside: usize, next: Option<usize>, place: f64, power: f64) -> f64 {
     let (frame, x) = tip.points[outside];
     let frame = frame as f64;
     let Some((next_frame, next_x)) = next.and_then(|i| tip.points.get(i)) else { return frame };
-    let (root, next_root) =
-        (math::powf((x - place).abs(), 1.0 / power), math::powf((next_x - place).abs(), 1.0 / power));
+    let [root, next_root] = [x, *next_x].map(|x| math::powf((x - place).abs(), 1.0 / power));
     let towards_hold = if *next_frame as f64 > frame { -1.0 } else { 1.0 };
     let frames_back = root / (next_root - root) * (*next_frame as f64 - frame).abs();
     let frames_back =

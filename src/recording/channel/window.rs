@@ -3,21 +3,18 @@
 
 use super::instants::{InstantKind, InstantNotFound, ReversalInstants};
 use super::phase::ReversalPhase;
-use crate::recording::{FrameGrid, Recording};
+use crate::recording::{FrameGrid, ON_FRAME_TOLERANCE, Recording};
 use serde::Serialize;
 use std::fmt;
 use std::ops::Range;
 
-/// Fewest frames of a window: a cubic takes four, and as many again are left to look at.
+/// Fewest frames of a window: a cubic trend takes four, and four are left.
 pub(crate) const MIN_FRAMES: usize = 8;
-
-/// Slack when an instant falls on a frame, in frames: well above rounding of times near 1 s at 1e5 frames/s.
-const ON_FRAME: f64 = 1e-6;
 
 /// One end of a window.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum WindowEnd {
-    /// Nothing written: where the recording starts or ends.
+    /// The start or end of the recording.
     Open,
     /// A time of the recording, s.
     Time(f64),
@@ -30,7 +27,7 @@ pub enum WindowEnd {
         /// Time from the instant, s.
         offset_s: f64,
     },
-    /// Where a phase of a reversal starts, or ends where it stands at the end of a window.
+    /// A phase of a reversal: its start at the start of a window, its end at the end.
     Phase {
         /// Which phase.
         phase: ReversalPhase,
@@ -48,75 +45,16 @@ pub struct Window {
     pub to: WindowEnd,
 }
 
-/// Why a window was refused.
+/// Why a window was refused: the window as written, what was found, what was expected and what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum WindowError {
-    /// The text is not a window.
-    #[error(
-        "window `{window}`: found `{found}`, expected {expected}; write it like `0.10..0.25`, \
-         `release+0.02..release[2]-0.1` or `after[2]`"
-    )]
-    Syntax {
-        /// The whole text.
-        window: String,
-        /// The part at fault.
-        found: String,
-        /// What belongs there.
-        expected: &'static str,
-    },
-    /// The recording does not show the instant.
-    #[error(
-        "window `{window}`: {recording} shows no `{instant}`: {reason}; give the window in seconds of the \
-         recording's time"
-    )]
-    NotFound {
-        /// The window.
-        window: String,
-        /// Name of the recording.
-        recording: String,
-        /// The instant as written.
-        instant: String,
-        /// What was found instead.
-        reason: InstantNotFound,
-    },
-    /// The window leaves the recording.
-    #[error(
-        "window `{window}` is {from_s:.6} s to {to_s:.6} s, but {recording} runs from {start_s:.6} s to \
-         {end_s:.6} s; choose a window inside it"
-    )]
-    Outside {
-        /// The window.
-        window: String,
-        /// Name of the recording.
-        recording: String,
-        /// Start of the window, s.
-        from_s: f64,
-        /// End of the window, s.
-        to_s: f64,
-        /// First frame, s.
-        start_s: f64,
-        /// Last frame, s.
-        end_s: f64,
-    },
-    /// The window ends before it starts.
-    #[error("window `{window}`: it starts at {from_s:.6} s and ends at {to_s:.6} s; exchange its ends")]
-    Reversed {
-        /// The window.
-        window: String,
-        /// Start, s.
-        from_s: f64,
-        /// End, s.
-        to_s: f64,
-    },
-    /// The window holds too few frames.
-    #[error("window `{window}`: found {frames} frames, expected at least {MIN_FRAMES}; widen it")]
-    TooShort {
-        /// The window.
-        window: String,
-        /// Frames in it.
-        frames: usize,
-    },
+#[error("window `{window}`{problem}")]
+pub struct WindowError {
+    window: String,
+    problem: String,
 }
+
+/// An instant as written in a window, and why the recording does not show it.
+pub(super) type AbsentInstant = (String, InstantNotFound);
 
 impl Window {
     /// The whole recording.
@@ -133,10 +71,14 @@ impl Window {
         instants: &ReversalInstants,
     ) -> Result<Range<usize>, WindowError> {
         let (frames, _, _) = self.locate_span(recording, instants)?;
-        if frames.len() < MIN_FRAMES {
-            return Err(WindowError::TooShort { window: self.to_string(), frames: frames.len() });
+        if frames.len() >= MIN_FRAMES {
+            return Ok(frames);
         }
-        Ok(frames)
+        Err(self.refuse(format!(": found {} frames, expected at least {MIN_FRAMES}; widen it", frames.len())))
+    }
+
+    fn refuse(&self, problem: String) -> WindowError {
+        WindowError { window: self.to_string(), problem }
     }
 
     /// Frames, however few, start and end, s.
@@ -146,75 +88,42 @@ impl Window {
         instants: &ReversalInstants,
     ) -> Result<(Range<usize>, f64, f64), WindowError> {
         let grid = recording.grid();
-        let from_s = self
-            .from
-            .start_s(instants)
-            .map_err(|missing| self.not_found(missing, recording, instants))?
-            .unwrap_or(grid.start_s);
-        let after_last_s = grid.time_s(grid.frames);
-        let to_s = self
-            .to
-            .end_s(instants)
-            .map_err(|missing| self.not_found(missing, recording, instants))?
-            .unwrap_or(after_last_s);
+        let (name, after_last_s) = (recording.name(), grid.time_s(grid.frames));
+        let absent = |(instant, reason)| {
+            let tracked = recording.traces().head_x_m.iter().any(Option::is_some);
+            let turns = tracked || !instants.reversals.is_empty();
+            let reason = if turns { reason } else { InstantNotFound::HeadNotTracked };
+            self.refuse(format!(
+                ": {name} shows no `{instant}`: {reason}; give the window in seconds of the recording's time"
+            ))
+        };
+        let from_s = self.from.time_s(false, instants).map_err(absent)?.unwrap_or(grid.start_s);
+        let to_s = self.to.time_s(true, instants).map_err(absent)?.unwrap_or(after_last_s);
         if to_s < from_s {
-            return Err(WindowError::Reversed { window: self.to_string(), from_s, to_s });
+            let problem = format!(": it starts at {from_s:.6} s and ends at {to_s:.6} s; exchange its ends");
+            return Err(self.refuse(problem));
         }
         let (from, to) = (frame_at_or_after(&grid, from_s), frame_at_or_after(&grid, to_s));
         if from < 0.0 || to > grid.frames as f64 {
-            let (start_s, end_s) = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
-            return Err(WindowError::Outside {
-                window: self.to_string(),
-                recording: recording.name().to_owned(),
-                from_s,
-                to_s,
-                start_s,
-                end_s,
-            });
+            let end_s = grid.time_s(grid.frames.saturating_sub(1));
+            return Err(self.refuse(format!(
+                " is {from_s:.6} s to {to_s:.6} s, but {name} runs from {:.6} s to {end_s:.6} s; choose a window \
+                 inside it",
+                grid.start_s
+            )));
         }
         // (both are whole numbers between 0 and the number of frames)
         Ok((from as usize..to as usize, from_s, to_s))
     }
-
-    fn not_found(
-        &self,
-        (instant, reason): (String, InstantNotFound),
-        recording: &Recording,
-        instants: &ReversalInstants,
-    ) -> WindowError {
-        let untracked =
-            instants.reversals.is_empty() && recording.traces().head_x_m.iter().all(Option::is_none);
-        let reason = if untracked { InstantNotFound::HeadNotTracked } else { reason };
-        WindowError::NotFound {
-            window: self.to_string(),
-            recording: recording.name().to_owned(),
-            instant,
-            reason,
-        }
-    }
 }
 
 impl WindowEnd {
-    /// Its time at the start of a window, s; `None` for that of the recording. Else the instant that was not
-    /// found, and why.
-    fn start_s(&self, instants: &ReversalInstants) -> Result<Option<f64>, (String, InstantNotFound)> {
-        match *self {
-            Self::Phase { phase, reversal } => phase.start_s(reversal, instants),
-            _ => self.time_s(instants),
-        }
-    }
-
-    fn end_s(&self, instants: &ReversalInstants) -> Result<Option<f64>, (String, InstantNotFound)> {
-        match *self {
-            Self::Phase { phase, reversal } => phase.end_s(reversal, instants),
-            _ => self.time_s(instants),
-        }
-    }
-
-    fn time_s(&self, instants: &ReversalInstants) -> Result<Option<f64>, (String, InstantNotFound)> {
-        match *self {
-            Self::Open | Self::Phase { .. } => Ok(None),
+    /// Its time, s, at the end of a window or at its start; `None` for that of the recording.
+    fn time_s(self, at_end: bool, instants: &ReversalInstants) -> Result<Option<f64>, AbsentInstant> {
+        match self {
+            Self::Open => Ok(None),
             Self::Time(time_s) => Ok(Some(time_s)),
+            Self::Phase { phase, reversal } => phase.boundary_s(at_end, reversal, instants),
             Self::Found { anchor, reversal, offset_s } => {
                 let found = instants.time_s(anchor, reversal).map(|time_s| Some(time_s + offset_s));
                 found.map_err(|reason| (format!("{}[{reversal}]", anchor.name()), reason))
@@ -223,12 +132,10 @@ impl WindowEnd {
     }
 }
 
-/// Number of the first frame at or after a time, as a real number that may lie outside the recording.
+/// Index of the first frame at or after a time; it may lie outside the recording.
 fn frame_at_or_after(grid: &FrameGrid, time_s: f64) -> f64 {
-    ((time_s - grid.start_s) * grid.frame_rate_hz - ON_FRAME).ceil()
+    ((time_s - grid.start_s) * grid.frame_rate_hz - ON_FRAME_TOLERANCE).ceil()
 }
-
-// Windows as text: `A..B`, or the name of a phase.
 
 const EXPECTED_END: &str = "seconds or one of `hold`, `reversal`, `flip`, `release` (`before`, `stick` and \
     `after` stand alone, without `..`)";
@@ -240,12 +147,14 @@ impl Window {
     /// `before|stick|flip|after`, then `[k]`: see [`ReversalPhase`].
     ///
     /// # Errors
-    /// [`WindowError::Syntax`] naming the part at fault.
+    /// [`WindowError`] with the part at fault.
     pub fn parse(text: &str) -> Result<Self, WindowError> {
-        let refuse = |found: &str, expected| WindowError::Syntax {
-            window: text.to_owned(),
-            found: found.to_owned(),
-            expected,
+        let refuse = |found: &str, expected: &str| {
+            let problem = format!(
+                ": found `{found}`, expected {expected}; write it like `0.10..0.25`, \
+                 `release+0.02..release[2]-0.1` or `after[2]`"
+            );
+            WindowError { window: text.to_owned(), problem }
         };
         let Some((from, to)) = text.split_once("..") else {
             return parse_phase(text.trim()).map_err(|expected| refuse(text, expected));
@@ -278,20 +187,16 @@ impl fmt::Display for WindowEnd {
             Self::Open => Ok(()),
             Self::Time(time_s) => write!(f, "{time_s}"),
             Self::Found { anchor, reversal, offset_s } => {
-                f.write_str(anchor.name())?;
-                write_reversal(f, reversal)?;
-                if offset_s == 0.0 { Ok(()) } else { write!(f, "{offset_s:+}") }
+                let offset = if offset_s == 0.0 { String::new() } else { format!("{offset_s:+}") };
+                write!(f, "{}{}{offset}", anchor.name(), numbered(reversal))
             }
-            Self::Phase { phase, reversal } => {
-                f.write_str(phase.name())?;
-                write_reversal(f, reversal)
-            }
+            Self::Phase { phase, reversal } => write!(f, "{}{}", phase.name(), numbered(reversal)),
         }
     }
 }
 
-fn write_reversal(f: &mut fmt::Formatter<'_>, reversal: usize) -> fmt::Result {
-    if reversal == 1 { Ok(()) } else { write!(f, "[{reversal}]") }
+fn numbered(reversal: usize) -> String {
+    if reversal == 1 { String::new() } else { format!("[{reversal}]") }
 }
 
 fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
@@ -301,10 +206,8 @@ fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
     if !part.starts_with(|c: char| c.is_alphabetic()) {
         return parse_seconds(part).map(WindowEnd::Time).ok_or("seconds");
     }
-    let (anchor, rest) = InstantKind::ALL
-        .into_iter()
-        .find_map(|anchor| part.strip_prefix(anchor.name()).map(|rest| (anchor, rest)))
-        .ok_or(EXPECTED_END)?;
+    let named = |anchor: InstantKind| Some((anchor, part.strip_prefix(anchor.name())?));
+    let (anchor, rest) = InstantKind::ALL.into_iter().find_map(named).ok_or(EXPECTED_END)?;
     let (reversal, rest) = parse_reversal(rest)?;
     let offset_s = match rest.trim() {
         "" => 0.0,
@@ -316,25 +219,21 @@ fn parse_end(part: &str) -> Result<WindowEnd, &'static str> {
     Ok(WindowEnd::Found { anchor, reversal, offset_s })
 }
 
-/// A phase of a reversal as a window of its own.
+/// A whole phase of a reversal: `after`, `after[2]`.
 fn parse_phase(text: &str) -> Result<Window, &'static str> {
-    let named = ReversalPhase::ALL
-        .into_iter()
-        .find_map(|phase| text.strip_prefix(phase.name()).map(|rest| (phase, rest)));
-    let (phase, rest) = named.ok_or(EXPECTED_PHASE)?;
+    let named = |phase: ReversalPhase| Some((phase, text.strip_prefix(phase.name())?));
+    let (phase, rest) = ReversalPhase::ALL.into_iter().find_map(named).ok_or(EXPECTED_PHASE)?;
     let (reversal, rest) = parse_reversal(rest)?;
     let end = WindowEnd::Phase { phase, reversal };
     if rest.trim().is_empty() { Ok(Window { from: end, to: end }) } else { Err(EXPECTED_PHASE) }
 }
 
-/// `[k]`, 1 where it is left out, and what follows it.
+/// The number in `[k]`, by default 1, and the text after it.
 fn parse_reversal(text: &str) -> Result<(usize, &str), &'static str> {
     let Some(rest) = text.strip_prefix('[') else { return Ok((1, text)) };
     let (number, rest) = rest.split_once(']').ok_or("`]` after the number of the reversal")?;
-    Ok((
-        number.parse().ok().filter(|n| *n >= 1).ok_or("the number of a reversal, counted from 1, in `[]`")?,
-        rest,
-    ))
+    let number = number.parse().ok().filter(|n| *n >= 1);
+    Ok((number.ok_or("the number of a reversal, counted from 1, in `[]`")?, rest))
 }
 
 /// A finite number; words such as `inf` are not seconds.

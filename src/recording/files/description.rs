@@ -1,14 +1,11 @@
 //! `recording.toml`: where a recording comes from, how it was taken and what was measured on it.
 
-use super::{FilesError, VideoEntry};
+use super::{DESCRIPTION_FILE, FilesError, VideoEntry};
 use crate::recording::quality::{Optics, Quality, QualityFinding};
 use crate::text::{format_degrees, text_sha256};
 use crate::toml_file::{self, FORMAT};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-/// Digits of a hash in a refusal.
-const SHORT_HASH: usize = 12;
 
 /// Where a recording comes from, how it was taken, and what was measured on it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -158,12 +155,8 @@ impl LevelEntry {
     }
 
     fn named_numbers(&self) -> [(&'static str, f64); 4] {
-        [
-            ("angle_rad", self.angle_rad),
-            ("sd_rad", self.sd_rad),
-            ("centre_x_m", self.centre_x_m),
-            ("centre_y_m", self.centre_y_m),
-        ]
+        let centre = [("centre_x_m", self.centre_x_m), ("centre_y_m", self.centre_y_m)];
+        [("angle_rad", self.angle_rad), ("sd_rad", self.sd_rad), centre[0], centre[1]]
     }
 }
 
@@ -215,7 +208,9 @@ impl RecordingFile {
         ];
         for (key, value) in lengths {
             if let Some(found) = value.filter(|v| !(v.is_finite() && *v > 0.0)) {
-                return Err(FilesError::Description { file: file.to_owned(), key, found });
+                let problem =
+                    format!(": key `camera.{key}`: found {found}, expected a finite number above 0");
+                return Err(FilesError::refuse(file, problem));
             }
         }
         if let Some(video) = &parsed.video {
@@ -223,31 +218,43 @@ impl RecordingFile {
         }
         let mut level = parsed.level.iter().flat_map(LevelEntry::named_numbers);
         match level.find(|(_, value)| !value.is_finite()) {
-            Some((key, found)) => Err(FilesError::Level { file: file.to_owned(), key, found }),
             None => Ok(parsed),
+            Some((key, found)) => {
+                let expected = "expected a finite number; import the recording again";
+                let problem = format!(": key `level.{key}`: found {found}, {expected}");
+                Err(FilesError::refuse(file, problem))
+            }
         }
     }
 
-    /// Refuses a trace that is not the one that the description was written for; `file` is the trace's name
-    /// in the refusal. A description without the hash says nothing of it.
+    /// Refuses a trace whose hash differs from that in the description; `file` is the trace's name in the
+    /// refusal. A description without a hash accepts any trace.
     ///
     /// # Errors
-    /// [`FilesError::OtherTrace`].
+    /// [`FilesError`] with the first digits of both hashes.
     pub(crate) fn check_trace(&self, file: &str, trace: &str) -> Result<(), FilesError> {
         let Some(expected) = &self.trace_sha256 else { return Ok(()) };
         let found = text_sha256(trace);
         if found == *expected {
             return Ok(());
         }
-        let short = |hash: &str| hash.chars().take(SHORT_HASH).collect();
-        Err(FilesError::OtherTrace { file: file.to_owned(), found: short(&found), expected: short(expected) })
+        let [found, expected] = [&found, expected].map(|hash| hash.chars().take(12).collect::<String>());
+        let problem = format!(
+            ": found SHA-256 {found}..., expected {expected}... as the {DESCRIPTION_FILE} next to it says: one \
+             of the two was changed or replaced; import the export again with --force or, where the change of \
+             the trace is intended, copy it alone into a folder of its own"
+        );
+        Err(FilesError::refuse(file, problem))
     }
 
     /// The text of the file.
     ///
     /// # Errors
-    /// [`FilesError::Unwritable`] when a value has no TOML form.
+    /// [`FilesError`] when a value has no TOML form.
     pub fn to_toml(&self) -> Result<String, FilesError> {
-        toml::to_string(self).map_err(|error| FilesError::Unwritable { problem: error.to_string() })
+        let advice = "shorten or remove the value under [conditions] or [twin]";
+        let refuse =
+            |error| FilesError::refuse(DESCRIPTION_FILE, format!(" cannot be written: {error}; {advice}"));
+        toml::to_string(self).map_err(refuse)
     }
 }

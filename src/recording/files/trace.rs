@@ -6,15 +6,19 @@ use crate::recording::{FrameGrid, Recording, Traces};
 use rayon::prelude::*;
 use std::fmt::Write;
 
+const NO_ROWS: &str = ": found no rows of numbers, expected the header `time_s,tip_x_m,tip_y_m,head_x_m,head_y_m` \
+     and a row a frame; import the recording again";
+
 /// Header of every `trace.csv`; the confidences may follow.
 pub const HEADER: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m";
 const CONFIDENCES: [&str; 2] = ["tip_confidence", "head_confidence"];
 const POSITIONS: usize = 4;
-/// Rows of text that are made at a time, and how many such blocks are made in parallel: half a megabyte each.
+/// Rows of a block of text, about half a megabyte, and number of blocks that are made in parallel.
 const BLOCK_ROWS: usize = 4096;
 const BLOCKS: usize = 8;
 
-/// Agreement of times with a rounded rate, frames: printed times carry 16 digits, so this is generous.
+/// Largest distance of a time from the grid of a rounded rate, frames. Printed times carry 16 digits and lie far
+/// closer.
 const SNAP_FRAMES: f64 = 1e-6;
 
 /// The recording as `trace.csv`: times from the grid, shortest numbers that read back to the same value.
@@ -23,22 +27,18 @@ pub fn trace_csv(recording: &Recording) -> String {
     trace_blocks(recording).collect()
 }
 
-/// The text of [`trace_csv`] piece by piece, so that a long recording never stands in memory as text.
+/// The text of [`trace_csv`] piece by piece: a long recording never lies in memory as text.
 pub fn trace_blocks(recording: &Recording) -> impl Iterator<Item = String> {
     let columns: Vec<_> = recording.traces().columns().collect();
     let optional = columns.iter().skip(POSITIONS).map(|(name, _)| format!(",{name}"));
-    let header: String =
-        std::iter::once(HEADER.to_owned()).chain(optional).chain(["\n".to_owned()]).collect();
+    let header = HEADER.to_owned() + &optional.collect::<String>() + "\n";
     let frames = recording.grid().frames;
     let rows = (0..frames).step_by(BLOCK_ROWS * BLOCKS).flat_map(move |start| {
         let block = |index: usize| {
             let mut text = String::new();
             for frame in start + index * BLOCK_ROWS..frames.min(start + (index + 1) * BLOCK_ROWS) {
-                push_trace_row(
-                    &mut text,
-                    recording.grid().time_s(frame),
-                    columns.iter().map(|(_, column)| column.get(frame).copied().flatten()),
-                );
+                let cells = columns.iter().map(|(_, column)| column.get(frame).copied().flatten());
+                push_trace_row(&mut text, recording.grid().time_s(frame), cells);
             }
             text
         };
@@ -76,8 +76,7 @@ fn push_number(text: &mut String, value: f64) {
 /// [`FilesError`] with file, line and column.
 pub fn parse_trace_csv(file: &str, text: &str) -> Result<(FrameGrid, Traces), FilesError> {
     let table = TraceTable::parse(file, text)?;
-    let seed_s =
-        clock::median_step_s(&table.times_s).ok_or_else(|| FilesError::Empty { file: file.to_owned() })?;
+    let seed_s = clock::median_step_s(&table.times_s).ok_or_else(|| FilesError::refuse(file, NO_ROWS))?;
     let fit = table.number_rows(file, seed_s)?;
     let frame_rate_hz = simplest_frame_rate_hz(&table.times_s, &fit);
     Ok(table.place_on_grid(&fit, frame_rate_hz))
@@ -101,8 +100,8 @@ pub fn parse_trace_csv_at(
     Ok(table.place_on_grid(&fit, frame_rate_hz))
 }
 
-/// Frames that a table may have without rows: this many, and this many for each row. Beyond them it is no
-/// recording with gaps, and a small file would fill memory.
+/// Most frames without a row: a fixed number, and a number per row. The limit keeps a small file with a jump
+/// in its times from filling memory.
 const FRAMES_WITHOUT_ROWS: (usize, usize) = (250_000, 4);
 
 /// The rows as written, before they have frames.
@@ -121,40 +120,45 @@ impl<'a> TraceTable<'a> {
         let expected =
             HEADER.split(',').chain(CONFIDENCES.into_iter().zip(confidences).filter(|c| c.1).map(|c| c.0));
         if text.trim().is_empty() {
-            return Err(FilesError::Empty { file: file.to_owned() });
+            return Err(FilesError::refuse(file, NO_ROWS));
         }
         if !expected.eq(header.split(',')) {
-            return Err(FilesError::Header {
-                file: file.to_owned(),
-                found: header.chars().take(80).collect(),
-            });
+            let found: String = header.chars().take(80).collect();
+            let problem = format!(
+                ":1:1: found the header `{found}`, expected `{HEADER}` and optionally \
+                 `,tip_confidence,head_confidence`; any other table is read by `wiperlab import --columns`"
+            );
+            return Err(FilesError::refuse(file, problem));
         }
         let names: Vec<&str> = header.split(',').collect();
         let rows = numbered_rows(text).count();
         if rows as f64 > clock::MAX_FRAMES {
-            return Err(FilesError::TooLong { file: file.to_owned() });
+            return Err(too_long_error(file));
         }
-        let column = || Vec::with_capacity(rows);
-        let columns = names.iter().skip(1).map(|_| Vec::with_capacity(rows)).collect();
-        let mut table = Self { text, confidences, times_s: column(), columns };
-        for (line, row) in self::numbered_rows(text) {
+        let columns = names[1..].iter().map(|_| Vec::with_capacity(rows)).collect();
+        let mut table = Self { text, confidences, times_s: Vec::with_capacity(rows), columns };
+        for (line, row) in numbered_rows(text) {
             table.add_row(file, line, row, &names)?;
         }
-        if table.times_s.len() < 2 { Err(FilesError::Empty { file: file.to_owned() }) } else { Ok(table) }
+        if table.times_s.len() < 2 { Err(FilesError::refuse(file, NO_ROWS)) } else { Ok(table) }
     }
 
     fn add_row(&mut self, file: &str, line: u64, row: &str, names: &[&str]) -> Result<(), FilesError> {
         let (found, expected) = (row.split(',').count(), names.len());
         if found != expected {
-            return Err(FilesError::Cells { file: file.to_owned(), line, found, expected });
+            let problem = format!(
+                ":{line}:1: found {found} cells, expected {expected} as in the header; complete the row (a \
+                 missing value is an empty cell)"
+            );
+            return Err(FilesError::refuse(file, problem));
         }
         let mut cells = row.split(',').map(str::trim);
-        let refuse = |column: &str, found: &str, expected| FilesError::Cell {
-            file: file.to_owned(),
-            line,
-            column: column.to_owned(),
-            found: found.to_owned(),
-            expected,
+        let refuse = |column: &str, found: &str, expected: &str| {
+            let problem = format!(
+                ":{line}: column {column}: found `{found}`, expected {expected}; correct the cell or import the \
+                 recording again"
+            );
+            FilesError::refuse(file, problem)
         };
         let finite = |cell: &str| cell.parse::<f64>().ok().filter(|v| v.is_finite());
         let first = cells.next().unwrap_or_default();
@@ -163,11 +167,10 @@ impl<'a> TraceTable<'a> {
             return Err(refuse(names[0], first, "a time after that of the row above"));
         }
         for ((cell, name), column) in cells.zip(&names[1..]).zip(&mut self.columns) {
-            let value = if cell.is_empty() {
-                None
-            } else {
-                Some(finite(cell).ok_or_else(|| refuse(name, cell, "a finite number or an empty cell"))?)
-            };
+            let value = finite(cell);
+            if value.is_none() && !cell.is_empty() {
+                return Err(refuse(name, cell, "a finite number or an empty cell"));
+            }
             column.push(value);
         }
         self.times_s.push(time);
@@ -175,26 +178,30 @@ impl<'a> TraceTable<'a> {
     }
 
     fn number_rows(&self, file: &str, seed_s: f64) -> Result<FrameFit, FilesError> {
-        let fit = clock::number_frames(&self.times_s, seed_s)
-            .ok_or_else(|| FilesError::TooLong { file: file.to_owned() })?;
+        let fit = clock::number_frames(&self.times_s, seed_s).ok_or_else(|| too_long_error(file))?;
         let (rows, frames) = (self.times_s.len(), frame_count(&fit));
         if !fit.is_on_grid() {
             return Err(self.off_grid_error(file, fit.worst_row, fit.worst_frames, 1.0 / fit.frame_s));
         }
         if frames > FRAMES_WITHOUT_ROWS.0 + (1 + FRAMES_WITHOUT_ROWS.1) * rows {
-            return Err(FilesError::Sparse { file: file.to_owned(), rows, frames });
+            let problem = format!(
+                ": column time_s: the times span {frames} frames, and only {rows} of them have a row; expected one \
+                 continuous recording: correct the times, or the rate in recording.toml"
+            );
+            return Err(FilesError::refuse(file, problem));
         }
         Ok(fit)
     }
 
     fn off_grid_error(&self, file: &str, row: usize, off_frames: f64, frame_rate_hz: f64) -> FilesError {
-        FilesError::OffGrid {
-            file: file.to_owned(),
-            line: numbered_rows(self.text).nth(row).map_or(1, |(line, _)| line),
-            found_s: self.times_s[row],
-            off_frames,
-            frame_rate_hz,
-        }
+        let line = numbered_rows(self.text).nth(row).map_or(1, |(line, _)| line);
+        let problem = format!(
+            ":{line}: column time_s: found {} s, {off_frames:.2} frames off the grid of {frame_rate_hz} frames/s, \
+             expected at most {} frames; check the rate in recording.toml or import the recording again",
+            self.times_s[row],
+            clock::OFF_GRID_LIMIT_FRAMES
+        );
+        FilesError::refuse(file, problem)
     }
 
     fn place_on_grid(self, fit: &FrameFit, frame_rate_hz: f64) -> (FrameGrid, Traces) {
@@ -222,6 +229,15 @@ impl<'a> TraceTable<'a> {
         };
         (FrameGrid { start_s: self.times_s[0], frame_rate_hz, frames }, traces)
     }
+}
+
+fn too_long_error(file: &str) -> FilesError {
+    let problem = format!(
+        ": column time_s: the times span more than {} frames; expected one continuous recording: correct the \
+         times or import it again",
+        clock::MAX_FRAMES
+    );
+    FilesError::refuse(file, problem)
 }
 
 /// The rows of numbers with their 1-based lines.

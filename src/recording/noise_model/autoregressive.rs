@@ -1,6 +1,7 @@
 //! Stationary autoregressive noise, `n_t = sum phi_i n_(t-i) + e_t` with white `e`.
 
 use crate::math;
+use std::array::from_fn;
 
 /// Most coefficients of a process.
 pub(crate) const MOST_COEFFICIENTS: usize = 8;
@@ -12,7 +13,7 @@ pub struct AutoregressiveNoise {
     coefficients: Vec<f64>,
 }
 
-/// Coefficients of which no stationary noise comes.
+/// Coefficients that describe no stationary process.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[error(
     "found a standard deviation of {sd} and the coefficients {coefficients:?} of noise, expected a positive number and at most {MOST_COEFFICIENTS} coefficients of a stationary process"
@@ -24,7 +25,7 @@ pub(crate) struct NotStationary {
 
 impl AutoregressiveNoise {
     /// Noise with this standard deviation, in the unit of its channel, and these coefficients, that of the
-    /// frame before first.
+    /// previous frame first.
     ///
     /// # Errors
     /// [`NotStationary`] unless the standard deviation is positive and the noise stays finite.
@@ -50,12 +51,12 @@ impl AutoregressiveNoise {
         self.sd
     }
 
-    /// Coefficients, that of the frame before first; none for white noise.
+    /// Coefficients, that of the previous frame first; none for white noise.
     pub(crate) fn coefficients(&self) -> &[f64] {
         &self.coefficients
     }
 
-    /// Standard deviation of what the frames before do not tell of a frame.
+    /// Standard deviation of the innovation: the part of a frame that the previous ones do not predict.
     pub(crate) fn innovation_sd(&self) -> f64 {
         let unexplained: f64 =
             reflection_coefficients(&self.coefficients).iter().map(|kappa| 1.0 - kappa * kappa).product();
@@ -79,13 +80,13 @@ impl AutoregressiveNoise {
     }
 }
 
-/// Sum of coefficients times the latest of a row of values, the last first.
+/// One-step prediction: the sum of the coefficients times the latest values, the last value first.
 fn predict_value(coefficients: &[f64], values: &[f64]) -> f64 {
     coefficients.iter().zip(values.iter().rev()).map(|(a, b)| a * b).sum()
 }
 
-/// Coefficients of one order more by its reflection coefficient (Levinson's recursion; Percival and Walden
-/// 1993, section 9.4).
+/// Coefficients of the next higher order from its reflection coefficient (Levinson's recursion; Percival and
+/// Walden 1993, section 9.4).
 pub(super) fn raise_order(coefficients: &[f64], kappa: f64) -> Vec<f64> {
     let turned = coefficients.iter().rev();
     let mut longer: Vec<f64> = coefficients.iter().zip(turned).map(|(a, b)| a - kappa * b).collect();
@@ -93,7 +94,7 @@ pub(super) fn raise_order(coefficients: &[f64], kappa: f64) -> Vec<f64> {
     longer
 }
 
-/// Reflection coefficients, that of the lowest order first: the recursion backwards.
+/// Reflection coefficients, that of the lowest order first (Levinson's recursion in reverse).
 fn reflection_coefficients(coefficients: &[f64]) -> Vec<f64> {
     let mut left = coefficients.to_vec();
     let mut found = Vec::with_capacity(left.len());
@@ -106,33 +107,30 @@ fn reflection_coefficients(coefficients: &[f64]) -> Vec<f64> {
     found
 }
 
-// The linear map that makes autoregressive noise white, whichever frames are lost.
-//
-// It is the inverse of the lower Cholesky factor of the covariance of the frames that are present, computed
-// as the innovations of a Kalman filter over the last few frames (Jones 1980, *Technometrics* 22). Its gains
-// do not depend on the data, so they are computed once and a column costs a few products a frame; there is
-// no cut-off, and a gap is a prediction over several frames.
+// Whitening with missing frames: the inverse of the lower Cholesky factor of the covariance of the frames that are
+// present, computed as the innovations of a Kalman filter over the last few frames (Jones 1980, *Technometrics*
+// 22). Its gains do not depend on the data, so they are computed once. A gap is a prediction over several frames.
 
 /// The last frames of the noise, the latest first.
 type NoiseMemory = [f64; MOST_COEFFICIENTS];
 
-/// Makes noise white on a pattern of frames.
+/// Linear map that makes the noise white for a given pattern of present frames.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Whitener {
     coefficients: NoiseMemory,
-    /// Frames that the noise remembers, at least one.
+    /// Order of the process, at least 1.
     order: usize,
     steps: Vec<WhiteningStep>,
 }
 
-/// From one frame that is present to the next.
+/// Step from one present frame to the next.
 #[derive(Debug, Clone, PartialEq)]
 struct WhiteningStep {
-    /// Frames on from the one before.
+    /// Frames since the previous present one.
     ahead: usize,
-    /// Standard deviation of what those before do not tell.
+    /// Standard deviation of the innovation.
     sd: f64,
-    /// What a unit of it says of the last frames.
+    /// Kalman gain: change of the estimate of the last frames per unit of the innovation.
     gain: NoiseMemory,
 }
 
@@ -155,8 +153,8 @@ impl Whitener {
         whitener
     }
 
-    /// Replaces a column, one value a frame in the unit of the noise, by its whitened values: of the noise
-    /// itself they are independent with unit variance.
+    /// Whitens a column in place; it has one value a frame, in the unit of the noise. Whitened noise is
+    /// independent with unit variance.
     pub(crate) fn whiten_column(&self, column: &mut [f64]) {
         let mut memory = [0.0; MOST_COEFFICIENTS];
         for (value, step) in column.iter_mut().zip(&self.steps) {
@@ -180,7 +178,7 @@ impl Whitener {
     }
 }
 
-/// Covariance of the last frames given those that were present.
+/// Covariance of the last frames, given the present ones.
 struct PredictionCovariance {
     order: usize,
     covariance: [NoiseMemory; MOST_COEFFICIENTS],
@@ -189,13 +187,11 @@ struct PredictionCovariance {
 impl PredictionCovariance {
     fn from_stationary(noise: &AutoregressiveNoise, order: usize) -> Self {
         let (correlations, variance) = (noise.correlations(order), noise.sd() * noise.sd());
-        let mut covariance = [[0.0; MOST_COEFFICIENTS]; MOST_COEFFICIENTS];
-        for i in 0..order {
-            for j in 0..order {
-                covariance[i][j] = variance * correlations[i.abs_diff(j)];
-            }
-        }
-        Self { order, covariance }
+        let within = |i: usize, j: usize| i < order && j < order;
+        let entry = |i: usize, j: usize| {
+            if within(i, j) { variance * correlations[i.abs_diff(j)] } else { 0.0 }
+        };
+        Self { order, covariance: from_fn(|i| from_fn(|j| entry(i, j))) }
     }
 
     fn advance_frame(&mut self, coefficients: &NoiseMemory, innovation: f64) {
@@ -217,10 +213,10 @@ impl PredictionCovariance {
         self.covariance[0][0] = next;
     }
 
-    /// The latest frame becomes known: its standard deviation until then, and what a unit of it says of all.
+    /// Measurement update with the latest frame: returns the standard deviation of its innovation and the gain.
     fn observe_latest(&mut self) -> (f64, NoiseMemory) {
         let variance = self.covariance[0][0];
-        let gain = std::array::from_fn(|i| if i == 0 { 1.0 } else { self.covariance[i][0] / variance });
+        let gain = from_fn(|i| if i == 0 { 1.0 } else { self.covariance[i][0] / variance });
         for i in 1..self.order {
             for j in 1..self.order {
                 self.covariance[i][j] -= gain[i] * gain[j] * variance;

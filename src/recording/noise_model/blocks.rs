@@ -1,12 +1,14 @@
-//! A channel in short blocks, in each of which its motion is a polynomial: what is left is noise.
+//! A channel in short blocks. A polynomial in time describes the motion in each; its residuals are noise.
 
 use crate::math;
+use crate::recording::channel::median_in_place;
 
 /// Fewest frames of a block, as a share of its length.
 const LEAST_SHARE: f64 = 0.5;
-/// Fewest frames that a block has beyond its freedoms.
+/// Fewest degrees of freedom of a block.
 const LEAST_LEFT: usize = 4;
-/// Times the median scatter from which on a block holds more than noise: an outlier, or a tip off the glass.
+/// Largest scatter of a block, in units of the median: beyond it the block has an outlier, or the tip is off the
+/// glass.
 const OUTLYING_SCATTER: f64 = 3.0;
 
 /// How a channel is cut.
@@ -16,11 +18,11 @@ pub(super) struct BlockCut<'a> {
     pub length: usize,
     /// Degree of the polynomial of time.
     pub degree: usize,
-    /// A channel that enters linearly too.
+    /// A channel that is a further linear term of the fit.
     pub covariate: Option<&'a [Option<f64>]>,
 }
 
-/// Frames in which the motion is a sum of a few columns.
+/// Frames in which the motion is a linear combination of a few columns.
 #[derive(Debug, Clone)]
 pub(super) struct NoiseBlock {
     /// Numbers of the frames that are present.
@@ -30,17 +32,12 @@ pub(super) struct NoiseBlock {
 }
 
 impl NoiseBlock {
-    /// Data beyond the freedoms of the motion.
+    /// Number of values minus number of columns.
     pub(crate) fn degrees_of_freedom(&self) -> usize {
         self.values.len() - self.columns.len()
     }
 
-    /// Sum of squares that the columns leave of the values.
-    pub(crate) fn residual_sum_of_squares(&self) -> f64 {
-        self.residuals().iter().map(|x| x * x).sum()
-    }
-
-    /// What the columns leave of the values.
+    /// Residuals of the values from their least-squares fit by the columns.
     pub(crate) fn residuals(&self) -> Vec<f64> {
         let mut values = self.values.clone();
         project_out(&mut self.columns.clone(), &mut values);
@@ -48,7 +45,7 @@ impl NoiseBlock {
     }
 }
 
-/// Takes the columns out of the values; the logarithm of the determinant of the columns' products.
+/// Projects the columns out of the values; returns the logarithm of the determinant of the columns' Gram matrix.
 pub(super) fn project_out(columns: &mut [Vec<f64>], values: &mut [f64]) -> f64 {
     let mut log = 0.0;
     for j in 0..columns.len() {
@@ -101,15 +98,13 @@ fn cut_block(channel: &[Option<f64>], cut: &BlockCut<'_>, first: usize) -> Optio
     Some(NoiseBlock { values: centred(&|i| channel[i])?, columns, frames })
 }
 
-/// The blocks that hold noise alone: those that scatter much more than most are left out.
+/// Leaves out the blocks whose scatter is far above the median: they hold more than noise.
 pub(super) fn keep_quiet_blocks(blocks: Vec<NoiseBlock>) -> Vec<NoiseBlock> {
-    let scatter =
-        |block: &NoiseBlock| (block.residual_sum_of_squares() / block.degrees_of_freedom() as f64).sqrt();
+    let scatter = |block: &NoiseBlock| {
+        let squares: f64 = block.residuals().iter().map(|x| x * x).sum();
+        (squares / block.degrees_of_freedom() as f64).sqrt()
+    };
     let mut sizes: Vec<f64> = blocks.iter().map(scatter).collect();
-    if sizes.is_empty() {
-        return blocks;
-    }
-    let middle = sizes.len() / 2;
-    let median = *sizes.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let Some(median) = median_in_place(&mut sizes) else { return blocks };
     blocks.into_iter().filter(|block| scatter(block) <= OUTLYING_SCATTER * median).collect()
 }

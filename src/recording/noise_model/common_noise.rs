@@ -1,63 +1,59 @@
-//! What both points have in common: a camera that shakes moves them alike.
+//! Noise that both points share: a camera that shakes moves them alike.
 //!
-//! The noise of one point is regressed on that of the other within short blocks, in which the motion is a
-//! parabola; a block counts by how still it is, so that a blade that rings says little and one that sticks
-//! much.
+//! The noise of one point is regressed on that of the other within short blocks, in which a parabola describes the
+//! motion. Blocks are weighted by the inverse of their residual variance: a blade that rings counts little, one
+//! that sticks counts much.
 
 use super::block_length;
-use super::blocks::{BlockCut, NoiseBlock, cut_blocks, dot_product};
+use super::blocks::{BlockCut, NoiseBlock, cut_blocks, dot_product, keep_quiet_blocks};
 use crate::math;
 use crate::recording::Recording;
 
 /// Fewest frames of a short block: a parabola leaves three quarters of them.
 const SHORT_BLOCK: usize = 12;
-/// Standard deviations from which on a share is one: chance reaches them in one recording of 370.
+/// Least share, in its standard deviations: chance reaches it in one recording of 370.
 const CLEAR_DEVIATIONS: f64 = 3.0;
-/// Fewest blocks: with fewer their scatter is not known.
+/// Fewest blocks: the scatter over fewer is not known.
 const FEWEST_BLOCKS: usize = 30;
 
 /// The part of a channel's noise that the other point shows.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SharedNoise {
-    /// Noise of the channel for a unit of the other point's.
+    /// Noise of the channel per noise of the other point.
     pub share: f64,
     pub sd: f64,
-    /// What to take from the channel in every frame, m; empty where the other point is lost, or its noise is
-    /// not known.
+    /// Shared noise in every frame, m, to be subtracted from the channel; `None` where the noise of the other
+    /// point is not known.
     pub noise_m: Vec<Option<f64>>,
 }
 
 /// Common noise of a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CommonNoise {
-    /// In the tip along the sweep, as the head shows it; `None` where nothing clear is shared.
+    /// Noise of the tip along the sweep that the head shows too; `None` where the share is not clear.
     pub tip_x: Option<SharedNoise>,
-    /// In the head upwards, as the tip on the glass shows it.
+    /// Noise of the head upwards that the tip on the glass shows too.
     pub head_y: Option<SharedNoise>,
 }
 
-/// Measures what the points of a recording have in common.
+/// Measures the noise that both points of a recording share.
 pub(crate) fn measure_common_noise(recording: &Recording) -> CommonNoise {
     let (traces, length) = (recording.traces(), block_length(recording.grid().frame_rate_hz));
     let head = channel_residuals(&traces.head_x_m, &BlockCut { length, degree: 3, covariate: None });
     let glass =
         channel_residuals(&traces.tip_y_m, &BlockCut { length, degree: 1, covariate: Some(&traces.tip_x_m) });
     let short = |beside| BlockCut { length: SHORT_BLOCK, degree: 2, covariate: beside };
+    let (level, along) = (short(None), short(Some(&traces.tip_x_m)));
     CommonNoise {
-        tip_x: regress_on_other_point(&traces.tip_x_m, &traces.head_x_m, head, &short(None)),
-        head_y: regress_on_other_point(
-            &traces.head_y_m,
-            &traces.tip_y_m,
-            glass,
-            &short(Some(&traces.tip_x_m)),
-        ),
+        tip_x: regress_on_other_point(&traces.tip_x_m, &traces.head_x_m, head, &level),
+        head_y: regress_on_other_point(&traces.head_y_m, &traces.tip_y_m, glass, &along),
     }
 }
 
-/// What a channel's motion leaves of it, frame by frame.
+/// Residuals of a channel from its fitted motion in every frame, m.
 fn channel_residuals(channel: &[Option<f64>], cut: &BlockCut<'_>) -> Vec<Option<f64>> {
     let mut left = vec![None; channel.len()];
-    for block in super::blocks::keep_quiet_blocks(cut_blocks(channel, cut)) {
+    for block in keep_quiet_blocks(cut_blocks(channel, cut)) {
         for (frame, residual) in block.frames.iter().zip(block.residuals()) {
             left[*frame] = Some(residual);
         }
@@ -65,7 +61,8 @@ fn channel_residuals(channel: &[Option<f64>], cut: &BlockCut<'_>) -> Vec<Option<
     left
 }
 
-/// Regression of a channel on the other point's where its noise, `channel_residuals`, is known.
+/// Regression of a channel on that of the other point, in the frames in which the noise of that (`residuals`) is
+/// known.
 fn regress_on_other_point(
     channel: &[Option<f64>],
     other: &[Option<f64>],
@@ -92,25 +89,20 @@ fn residual_pair(block: &NoiseBlock, other: &[Option<f64>]) -> Option<[Vec<f64>;
     Some([block.residuals(), NoiseBlock { values, ..block.clone() }.residuals()])
 }
 
-/// Share and its standard deviation by the scatter over blocks, each with the weight of its own variance;
-/// weights follow from what the share before leaves.
+/// Share and its standard deviation from the scatter over blocks, by iteratively reweighted least squares. The
+/// weight of a block is the inverse of its residual variance.
 fn regress_pairs(pairs: &[[Vec<f64>; 2]]) -> Option<(f64, f64)> {
     const ROUNDS: usize = 4;
     let mut share = 0.0;
     let mut sd = f64::INFINITY;
     for _ in 0..ROUNDS {
-        let left = |[own, other]: &[Vec<f64>; 2]| -> Vec<f64> {
-            own.iter().zip(other).map(|(a, b)| a - share * b).collect()
+        let part = |[own, other]: &[Vec<f64>; 2]| {
+            let rest: Vec<f64> = own.iter().zip(other).map(|(a, b)| a - share * b).collect();
+            let variance = dot_product(&rest, &rest) / rest.len() as f64;
+            let weight = if variance > 0.0 { variance.recip() } else { 0.0 };
+            [weight, dot_product(other, other), dot_product(other, &rest)]
         };
-        let parts: Vec<[f64; 3]> = pairs
-            .iter()
-            .map(|pair| {
-                let rest = left(pair);
-                let variance = dot_product(&rest, &rest) / rest.len() as f64;
-                let weight = if variance > 0.0 { variance.recip() } else { 0.0 };
-                [weight, dot_product(&pair[1], &pair[1]), dot_product(&pair[1], &rest)]
-            })
-            .collect();
+        let parts: Vec<[f64; 3]> = pairs.iter().map(part).collect();
         let information: f64 = parts.iter().map(|[weight, squared, _]| weight * squared).sum();
         if information.is_nan() || information <= 0.0 {
             return None;

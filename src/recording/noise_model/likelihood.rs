@@ -1,31 +1,19 @@
-//! The autoregressive noise that blocks of frames show: by residual likelihood, which counts what the motion
-//! takes away (Patterson and Thompson 1971, *Biometrika* 58), its order by Schwarz's criterion.
+//! Estimate of autoregressive noise from blocks of frames. Residual likelihood accounts for the degrees of freedom
+//! of the fitted motion (Patterson and Thompson 1971, *Biometrika* 58); Schwarz's criterion selects the order.
 
-use super::autoregressive::Whitener;
-use super::autoregressive::{AutoregressiveNoise, raise_order};
+use super::autoregressive::{AutoregressiveNoise, Whitener, raise_order};
 use super::blocks::{NoiseBlock, dot_product, project_out};
+use super::{ChannelNoise, NoiseSource};
 use crate::math;
 use nalgebra::{DMatrix, DVector};
 
-/// Highest order that is tried: the noise of trackers is vibration and sub-pixel bias over a few frames.
+/// Highest order: the noise of trackers is vibration and sub-pixel bias, which last a few frames.
 const MOST_ORDER: usize = 6;
-/// Orders in a row that do not pay, after which none is tried.
+/// Number of consecutive orders without a lower criterion that ends the search.
 const ORDERS_WITHOUT_GAIN: usize = 2;
 
-/// Noise as blocks show it.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct NoiseEstimate {
-    pub noise: AutoregressiveNoise,
-    /// Standard deviation of its standard deviation, in the unit of the channel.
-    pub sd_of_sd: f64,
-    /// Standard deviations of its coefficients.
-    pub sd_of_coefficients: Vec<f64>,
-    /// Data beyond the freedoms of the motion.
-    pub freedoms: usize,
-}
-
-/// `None` where the blocks hold too little, or no noise.
-pub(super) fn estimate_noise(blocks: &[NoiseBlock]) -> Option<NoiseEstimate> {
+/// Estimates the noise of blocks; `None` where they hold too few frames, or no noise.
+pub(super) fn estimate_noise(blocks: &[NoiseBlock], source: NoiseSource) -> Option<ChannelNoise> {
     let freedoms: usize = blocks.iter().map(NoiseBlock::degrees_of_freedom).sum();
     let price = math::ln(freedoms as f64);
     let mut turns: Vec<f64> = Vec::new();
@@ -41,11 +29,16 @@ pub(super) fn estimate_noise(blocks: &[NoiseBlock]) -> Option<NoiseEstimate> {
             break;
         }
     }
-    estimate_at_optimum(blocks, &best.1, freedoms)
+    estimate_at_optimum(blocks, &best.1, freedoms, source)
 }
 
-/// The noise at the lowest criterion, with standard deviations by the curvature there.
-fn estimate_at_optimum(blocks: &[NoiseBlock], turns: &[f64], freedoms: usize) -> Option<NoiseEstimate> {
+/// The noise at the optimum, with standard deviations from the curvature of the criterion.
+fn estimate_at_optimum(
+    blocks: &[NoiseBlock],
+    turns: &[f64],
+    frames: usize,
+    source: NoiseSource,
+) -> Option<ChannelNoise> {
     const STEP: f64 = 1e-3;
     let at = |turns: &[f64]| {
         let coefficients = coefficients_from_turns(turns);
@@ -67,29 +60,28 @@ fn estimate_at_optimum(blocks: &[NoiseBlock], turns: &[f64], freedoms: usize) ->
     // the criterion is minus twice the logarithm of the likelihood
     let covariance = 2.0 * &by_turn * curvature.cholesky()?.inverse() * by_turn.transpose();
     let sd = math::exp(0.5 * log_variance);
-    Some(NoiseEstimate {
+    Some(ChannelNoise {
         noise: AutoregressiveNoise::new(sd, coefficients).ok()?,
-        sd_of_sd: 0.5 * sd * (2.0 / freedoms as f64 + covariance[(0, 0)]).sqrt(),
+        sd_of_sd_m: 0.5 * sd * (2.0 / frames as f64 + covariance[(0, 0)]).sqrt(),
         sd_of_coefficients: (1..=turns.len()).map(|i| covariance[(i, i)].sqrt()).collect(),
-        freedoms,
+        frames,
+        source,
     })
 }
 
-/// Coefficients of the reflection coefficients `tanh(turn)`.
+/// Coefficients of the process with the reflection coefficients `tanh(turn)`.
 fn coefficients_from_turns(turns: &[f64]) -> Vec<f64> {
     turns.iter().fold(Vec::new(), |known, turn| raise_order(&known, math::tanh(*turn)))
 }
 
-/// Minus twice the logarithm of the residual likelihood, but for a constant.
+/// Minus twice the logarithm of the residual likelihood, up to a constant.
 fn restricted_deviance(blocks: &[NoiseBlock], turns: &[f64]) -> Option<f64> {
-    Some(
-        deviance_and_variance(blocks, &AutoregressiveNoise::new(1.0, coefficients_from_turns(turns)).ok()?)?
-            .0,
-    )
-    .filter(|x| x.is_finite())
+    let unit = AutoregressiveNoise::new(1.0, coefficients_from_turns(turns)).ok()?;
+    let (deviance, _) = deviance_and_variance(blocks, &unit)?;
+    deviance.is_finite().then_some(deviance)
 }
 
-/// The criterion and the variance of the noise.
+/// Deviance and variance of the noise; a whitener serves all neighbouring blocks with the same frames.
 fn deviance_and_variance(blocks: &[NoiseBlock], noise: &AutoregressiveNoise) -> Option<(f64, f64)> {
     let (mut left, mut logs, mut freedoms) = (0.0, 0.0, 0);
     let mut last: Option<(Vec<usize>, Whitener)> = None;
@@ -113,7 +105,7 @@ fn deviance_and_variance(blocks: &[NoiseBlock], noise: &AutoregressiveNoise) -> 
     (variance > 0.0).then(|| (freedoms as f64 * math::ln(variance) + logs, variance))
 }
 
-/// Moves to the lowest criterion by Newton's steps; its value.
+/// Minimises the deviance by Newton's method and returns it.
 fn minimise_deviance(blocks: &[NoiseBlock], turns: &mut Vec<f64>) -> Option<f64> {
     const ROUNDS: usize = 12;
     const LONGEST: f64 = 0.7;
@@ -143,7 +135,7 @@ fn minimise_deviance(blocks: &[NoiseBlock], turns: &mut Vec<f64>) -> Option<f64>
     Some(here)
 }
 
-/// Slope and curvature by differences.
+/// Gradient and Hessian of the deviance from finite differences.
 fn deviance_derivatives(
     blocks: &[NoiseBlock],
     turns: &[f64],

@@ -1,4 +1,4 @@
-//! A finding on the quality of a recording: how grave it is, a number, and what to do.
+//! A finding on the quality of a recording: its severity, a number and advice.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -160,7 +160,18 @@ impl QualityFinding {
     /// [`Self::with_advice`].
     #[must_use]
     pub fn new(check: Check, severity: Severity, value: f64, unit: &str, found: String) -> Self {
-        Self { check, severity, channel: None, value, unit: unit.to_owned(), found, advice: String::new() }
+        Self::advise((check, severity), (value, unit), found, "")
+    }
+
+    /// A finding on the whole recording with advice, which is empty where there is nothing to do.
+    pub(super) fn advise(
+        (check, severity): (Check, Severity),
+        (value, unit): (f64, &str),
+        found: impl Into<String>,
+        advice: impl Into<String>,
+    ) -> Self {
+        let (unit, found, advice) = (unit.to_owned(), found.into(), advice.into());
+        Self { check, severity, channel: None, value, unit, found, advice }
     }
 
     /// The same on one channel.
