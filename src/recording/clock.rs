@@ -1,19 +1,18 @@
 //! Frame numbers from a column of times: the times of a table may be rounded and rows may be absent.
 
-/// Largest distance of a time from its frame, in frames, that rounding may explain: a quantum of half a frame
-/// moves a time by a quarter of one, and beyond a third the nearest frame is no longer certain.
+/// Largest distance of a time from its frame, frames. Rounding to half a frame moves a time by up to a quarter; beyond
+/// a third the nearest frame is uncertain.
 pub(crate) const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
 
-/// Longest grid that is built, frames: 17 minutes at 10,000 frames/s. A jump beyond it is damage, not a
-/// recording.
+/// Longest grid, frames: 17 minutes at 10,000 frames/s. A longer jump of the times is damage.
 pub(crate) const MAX_FRAMES: f64 = 10_000_000.0;
 
-/// Share of a row's distance from the grid by which the grid's phase follows: a seed 1 % off lags by a tenth
-/// of a frame.
+/// Share of a row's distance from the grid by which the phase of the grid is corrected. With a seed that is 1 % off the
+/// phase lags by a tenth of a frame.
 const PHASE_GAIN: f64 = 0.1;
 /// Most digits that a frame rate read from times can carry.
 const RATE_DIGITS: usize = 16;
-/// Rounds of renumbering; one suffices unless the first slope was far off.
+/// Most rounds of renumbering; one suffices unless the first slope is far off.
 const ROUNDS: usize = 4;
 
 /// Numbered rows and the line that fits their times.
@@ -35,36 +34,29 @@ impl FrameFit {
         self.worst_frames <= OFF_GRID_LIMIT_FRAMES
     }
 
-    /// Fewest frames from one row to the next; above 1 when only every n-th frame has a row.
+    /// Fewest frames from one row to the next: above 1 where only every n-th frame has a row.
     pub(crate) fn smallest_step(&self) -> usize {
         self.frames.windows(2).map(|w| w[1].saturating_sub(w[0])).min().unwrap_or(1)
     }
 }
 
-/// Numbers strictly increasing finite `times_s` on a grid of about `seed_s` from frame to frame. The phase of
-/// the grid follows the times slowly, so that neither rounded times nor a seed that is a percent off
-/// accumulate, and one damaged row does not shift those below it; then a line is fitted and the rows are
-/// numbered again. `None` for fewer than two rows, a useless seed or a grid longer than [`MAX_FRAMES`].
+/// Assigns frames to strictly increasing finite `times_s` on a grid of about `seed_s` per frame. The phase of the grid
+/// follows the times slowly: errors of rounding or of the seed do not accumulate, and a damaged row does not shift the
+/// rows after it. Then a line is fitted and the rows are numbered again. `None` for fewer than two rows, a seed that is
+/// not positive, or a grid longer than [`MAX_FRAMES`].
 pub(crate) fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     let first = *times_s.first()?;
     let span_frames = (times_s.last()? - first) / seed_s;
-    if times_s.len() < 2
-        || seed_s <= 0.0
-        || span_frames.is_nan()
-        || span_frames + times_s.len() as f64 > MAX_FRAMES
-    {
+    let too_long = span_frames.is_nan() || span_frames + times_s.len() as f64 > MAX_FRAMES;
+    if times_s.len() < 2 || seed_s <= 0.0 || too_long {
         return None;
     }
     let mut frames = follow_grid(times_s, first, seed_s);
     let mut line = fit_line(&frames, times_s);
     for _ in 0..ROUNDS {
-        match renumber_frames(times_s, line) {
-            Some(again) if again != frames => {
-                frames = again;
-                line = fit_line(&frames, times_s);
-            }
-            _ => break,
-        }
+        let Some(again) = renumber_frames(times_s, line).filter(|again| *again != frames) else { break };
+        frames = again;
+        line = fit_line(&frames, times_s);
     }
     Some(assess_fit(frames, times_s, line))
 }
@@ -80,16 +72,15 @@ fn follow_grid(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
     times_s.iter().map(&mut number).collect()
 }
 
-/// Median time from row to row, s: the frame time where most rows are neighbours. Of two middle ones the
-/// shorter, because gaps only lengthen.
+/// Median time from row to row, s: the frame time where most rows are neighbours. Of two middle values it is the
+/// shorter, because gaps only lengthen times.
 pub(crate) fn median_step_s(times_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);
     steps.get(steps.len().saturating_sub(1) / 2).copied()
 }
 
-/// The rate with the fewest digits near `fitted`, 1/s, of which `explains` says that it explains the times;
-/// else `fitted` itself.
+/// The rate with the fewest digits near `fitted`, 1/s, for which `explains` is true; `fitted` without one.
 pub(crate) fn simplest_rate(fitted: f64, explains: impl Fn(f64) -> bool) -> f64 {
     let mut rounded = (0..RATE_DIGITS).filter_map(|digits| format!("{fitted:.digits$e}").parse::<f64>().ok());
     rounded.find(|&rate| explains(rate)).unwrap_or(fitted)
@@ -118,12 +109,11 @@ fn renumber_frames(times_s: &[f64], (intercept, slope): (f64, f64)) -> Option<Ve
     usable.then(|| nearest.iter().map(|n| (n - first) as usize).collect())
 }
 
-/// A row that shares its frame with the row above counts as a whole frame off.
+/// Finds the row furthest off the grid. A row in the same frame as the row above counts as one frame further off.
 fn assess_fit(frames: Vec<usize>, times_s: &[f64], (intercept, slope): (f64, f64)) -> FrameFit {
-    let shared = |row: usize| row > 0 && frames[row] <= frames[row - 1];
     let off = |row: usize| {
         let distance = (times_s[row] - intercept - slope * frames[row] as f64).abs() / slope;
-        if shared(row) { distance + 1.0 } else { distance }
+        if row > 0 && frames[row] <= frames[row - 1] { distance + 1.0 } else { distance }
     };
     let worst_row = (0..frames.len()).max_by(|&a, &b| off(a).total_cmp(&off(b))).unwrap_or(0);
     FrameFit { worst_frames: off(worst_row), worst_row, frame_s: slope, frames }

@@ -1,4 +1,4 @@
-//! The four channels of a motion over time, and what is left of a recording without its model.
+//! The four channels of a motion over time, and the residual of a recording from its model.
 
 use super::alignment::Alignment;
 use crate::recording::Recording;
@@ -25,23 +25,22 @@ pub(crate) const MOTION_CHANNELS: [Channel; 4] =
     [Channel::TipX, Channel::HeadX, Channel::Deflection, Channel::HeadDrop];
 
 impl MotionTraces {
-    /// What a recording shows, on its own clock.
+    /// Motion of a recording, on its own clock.
     pub(crate) fn from_recording(recording: &Recording) -> Self {
         Self::from_columns(recording, |channel| channel.samples(recording))
     }
 
-    /// What a model shows, on the clock and from the origin of a recording.
+    /// Motion of a model, on the clock and from the origin of a recording.
     pub(crate) fn from_model(model: &Recording, alignment: &Alignment) -> Self {
-        let mut moved = Self::from_recording(model);
-        moved.time_s.iter_mut().for_each(|t| *t += alignment.shift_s);
-        for channel in MOTION_CHANNELS {
+        let mut moved = Self::from_columns(model, |channel| {
             let by_m = alignment.offset_m(channel);
-            moved.column_mut(channel).iter_mut().flatten().for_each(|x| *x += by_m);
-        }
+            channel.samples(model).into_iter().map(|x| Some(x? + by_m)).collect()
+        });
+        moved.time_s.iter_mut().for_each(|t| *t += alignment.shift_s);
         moved
     }
 
-    /// What a model shows at the frames of a recording, on its clock and from its origin.
+    /// Motion of a model at the frames of a recording, on the clock and from the origin of that.
     pub(crate) fn from_model_at_frames(
         recording: &Recording,
         model: &Recording,
@@ -50,23 +49,20 @@ impl MotionTraces {
         let grid = recording.grid();
         Self::from_columns(recording, |channel| {
             let (of_model, by_m) = (channel.samples(model), alignment.offset_m(channel));
-            let at =
-                |i| Some(model.interpolate_column(&of_model, grid.time_s(i) - alignment.shift_s)? + by_m);
+            let time_s = |i| grid.time_s(i) - alignment.shift_s;
+            let at = |i| Some(model.interpolate_column(&of_model, time_s(i))? + by_m);
             (0..grid.frames).map(at).collect()
         })
     }
 
-    /// Measured minus model, frame by frame of the recording; missing where either is.
+    /// Measured minus model at the frames of the recording; missing where either is missing.
     pub(crate) fn residual(recording: &Recording, model: &Recording, alignment: &Alignment) -> Self {
         let grid = recording.grid();
         Self::from_columns(recording, |channel| {
             let (of_model, by_m) = (channel.samples(model), alignment.offset_m(channel));
+            let time_s = |i| grid.time_s(i) - alignment.shift_s;
             let left = |(i, measured): (usize, Option<f64>)| {
-                Some(
-                    measured?
-                        - model.interpolate_column(&of_model, grid.time_s(i) - alignment.shift_s)?
-                        - by_m,
-                )
+                Some(measured? - model.interpolate_column(&of_model, time_s(i))? - by_m)
             };
             channel.samples(recording).into_iter().enumerate().map(left).collect()
         })
@@ -89,15 +85,6 @@ impl MotionTraces {
             Channel::HeadX => &self.head_x_m,
             Channel::Deflection => &self.deflection_m,
             Channel::HeadDrop => &self.head_drop_m,
-        }
-    }
-
-    fn column_mut(&mut self, channel: Channel) -> &mut Vec<Option<f64>> {
-        match channel {
-            Channel::TipX => &mut self.tip_x_m,
-            Channel::HeadX => &mut self.head_x_m,
-            Channel::Deflection => &mut self.deflection_m,
-            Channel::HeadDrop => &mut self.head_drop_m,
         }
     }
 

@@ -45,7 +45,7 @@ pub fn collect_findings(
     found.push(checks::check_exposure(measured));
     found.extend(motion::check_motion(recording, measured));
     found.extend(tilt::check_tilt(recording, measured, instants));
-    found.extend(motion::check_turns(instants));
+    found.push(motion::check_turns(instants));
     for column in &columns {
         found.extend(checks::check_track_column(column, recording.grid(), optics));
         found.extend(outliers::check_outliers(column, recording.grid(), optics));

@@ -1,5 +1,4 @@
-//! The frames of the video from which a recording was tracked: which picture shows which frame, and where a
-//! tracked point lies in it.
+//! Pictures of the video from which a recording was tracked, and the pixel of a tracked point in them.
 
 use super::files::{CameraEntry, FilesError, LevelEntry};
 use crate::math;
@@ -11,15 +10,15 @@ use std::io::Cursor;
 
 /// Most memory for a picture, bytes: 60 million pixels in four channels.
 const MOST_BYTES: usize = 256 << 20;
-/// Greys of a picture in a figure: as many as fit half a byte, so that four pictures leave room on a page.
+/// Number of greys of a picture in a figure: half a byte a pixel, so that four pictures fit on a page.
 const GREYS: u16 = 16;
-/// Most samples of the picture across a point of a figure, along either axis.
+/// Most samples of the picture along either side of a pixel of a figure.
 const MOST_SAMPLES: f64 = 8.0;
 
 /// Why a picture cannot be read.
 #[derive(Debug, thiserror::Error)]
 pub enum PictureError {
-    /// It is no PNG, or not whole.
+    /// It is no PNG, or it is damaged.
     #[error("found no readable PNG picture ({0}), expected one; save the frames of the video as PNG")]
     Png(#[from] png::DecodingError),
     /// It takes too much memory.
@@ -49,16 +48,14 @@ impl Picture {
     /// Reads a PNG of any kind; transparent pixels lie on white.
     ///
     /// # Errors
-    /// [`PictureError`] where it is none, is not whole or is too large.
+    /// [`PictureError`] where it is no PNG, is damaged or too large.
     pub fn from_png(png: &[u8]) -> Result<Self, PictureError> {
         let mut decoder = Decoder::new_with_limits(Cursor::new(png), Limits { bytes: MOST_BYTES });
         decoder.set_transformations(Transformations::normalize_to_color8());
         let mut reader = decoder.read_info()?;
         let (width, height) = reader.info().size();
-        let large = PictureError::Large { width, height };
-        let Some(bytes) = reader.output_buffer_size().filter(|bytes| *bytes <= MOST_BYTES) else {
-            return Err(large);
-        };
+        let bytes = reader.output_buffer_size().filter(|bytes| *bytes <= MOST_BYTES);
+        let bytes = bytes.ok_or(PictureError::Large { width, height })?;
         let mut values = vec![0; bytes];
         let frame = reader.next_frame(&mut values)?;
         values.truncate(frame.buffer_size());
@@ -66,7 +63,7 @@ impl Picture {
         Ok(Self { width: frame.width as usize, height: frame.height as usize, grey })
     }
 
-    /// The picture as a PNG of a few greys.
+    /// The picture as a PNG with 16 greys.
     ///
     /// # Errors
     /// [`png::EncodingError`] for a picture without pixels.
@@ -78,24 +75,20 @@ impl Picture {
         encoder.set_compression(Compression::High);
         let mut writer = encoder.write_header()?;
         let step = |grey: u8| ((u16::from(grey) * (GREYS - 1) + 127) / 255) as u8;
-        let row = |row: &[u8]| {
-            let pairs =
-                row.chunks(2).map(|pair| step(pair[0]) << 4 | pair.get(1).map_or(0, |grey| step(*grey)));
-            pairs.collect::<Vec<u8>>()
-        };
-        let rows: Vec<u8> = self.grey.chunks(self.width.max(1)).flat_map(row).collect();
+        let pack = |pair: &[u8]| step(pair[0]) << 4 | pair.get(1).map_or(0, |grey| step(*grey));
+        let rows = self.grey.chunks(self.width.max(1));
+        let rows: Vec<u8> = rows.flat_map(|row| row.chunks(2).map(pack)).collect();
         writer.write_image_data(&rows)?;
         writer.finish()?;
         Ok(bytes)
     }
 
-    /// A picture of `width` x `height` points, each the mean of what lies within it; `pixel` gives the place
-    /// in this picture of a place in that one, both in pixels from the upper left corner. White where there
-    /// is nothing.
+    /// Resamples to `width` x `height` pixels, each the mean over its area. `pixel` maps a place in the new picture to
+    /// one in this picture, both in pixels from the upper left corner. The outside of this picture is white.
     pub(crate) fn resample(&self, width: usize, height: usize, pixel: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
         let ([x0, y0], [x1, y1]) = (pixel([0.0, 0.0]), pixel([1.0, 0.0]));
         let samples = math::hypot(x1 - x0, y1 - y0).ceil().clamp(1.0, MOST_SAMPLES) as usize;
-        let samples = samples.max(1); // (of places that are no numbers)
+        let samples = samples.max(1); // (NaN becomes 0)
         let part = |at: usize, k: usize| at as f64 + (k as f64 + 0.5) / samples as f64;
         let point = |at: usize| {
             let (row, column) = (at / width, at % width);
@@ -142,7 +135,7 @@ pub trait PictureSource: Sync {
 /// The frames of a recording's video.
 #[derive(Clone, Copy)]
 pub struct RecordingVideo<'a> {
-    /// Where points lie in them.
+    /// Mapping of points to pixels.
     pub mapping: PixelMapping,
     /// The pictures.
     pub pictures: &'a dyn PictureSource,
@@ -154,11 +147,9 @@ impl std::fmt::Debug for RecordingVideo<'_> {
     }
 }
 
-// `[video]` of `recording.toml`: pictures of the frames.
-
-/// Most pixels between the picture and the origin: an origin a thousand pictures away is a slip.
+/// Largest distance of the origin from the picture, pixels: an origin a thousand pictures away is a mistake.
 const MOST_PIXELS: f64 = 1e7;
-/// Lengths that a pixel may show, m: from those of a microscope to those of no camera on a wiper.
+/// Admissible length of a pixel, m: from a microscope to far beyond a camera on a wiper.
 const LENGTHS_M: std::ops::RangeInclusive<f64> = 1e-9..=1.0;
 
 /// `[video]`: pictures of frames, for figures.
@@ -179,7 +170,7 @@ pub struct VideoEntry {
 }
 
 impl VideoEntry {
-    /// Where points of a recording with this camera, which may have been levelled, lie in the pictures.
+    /// Mapping to the pictures from points of a recording with this camera and this rotation.
     ///
     /// # Errors
     /// [`FilesError::Video`] for a number that no picture has, or without the length of a pixel.
@@ -195,39 +186,31 @@ impl VideoEntry {
             let expected = "two numbers of pixels up to ten million, as in [0.0, 512.0]";
             return refuse("origin_px", format!("found {origin_px:?}, expected {expected}; correct them"));
         }
-        match self.metres_per_pixel.or(camera.metres_per_pixel) {
-            Some(length_m) if LENGTHS_M.contains(&length_m) => {
-                Ok(PixelMapping::new(origin_px, length_m, level))
+        let length = "expected the length that a pixel shows";
+        let problem = match self.metres_per_pixel.or(camera.metres_per_pixel) {
+            Some(found) if LENGTHS_M.contains(&found) => {
+                return Ok(PixelMapping::new(origin_px, found, level));
             }
-            Some(found) => {
-                let expected = "the length that a pixel shows, from 1e-9 to 1 m";
-                refuse(
-                    "metres_per_pixel",
-                    format!("found {found:e}, expected {expected}, as in 2e-5; correct it"),
-                )
-            }
-            None => refuse(
-                "metres_per_pixel",
-                "missing, and [camera] has none; expected the length that a pixel shows, as in 2e-5; add it"
-                    .to_owned(),
-            ),
-        }
+            Some(found) => format!("found {found:e}, {length}, from 1e-9 to 1 m, as in 2e-5; correct it"),
+            None => format!("missing, and [camera] has none; {length}, as in 2e-5; add it"),
+        };
+        refuse("metres_per_pixel", problem)
     }
 }
 
-/// Where a tracked point lies in the pictures.
+/// Mapping of a tracked point to its pixel.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PixelMapping {
     /// Pixel of the export's origin.
     pub origin_px: [f64; 2],
     /// Length that a pixel shows, m.
     pub metres_per_pixel: f64,
-    /// Turn of the tracks since the export: angle, rad, and its centre, m.
+    /// Rotation of the tracks at import: angle, rad, and centre, m.
     rotation: Option<(f64, [f64; 2])>,
 }
 
 impl PixelMapping {
-    /// The place of a recording whose tracks may have been levelled.
+    /// Mapping for a recording; `level` is the rotation that was applied at import.
     #[must_use]
     pub fn new(origin_px: [f64; 2], metres_per_pixel: f64, level: Option<&LevelEntry>) -> Self {
         let turned = level.filter(|level| level.applied);

@@ -7,7 +7,7 @@ use crate::recording::{Recording, Traces};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Cycles of a component that must fit into the recording before its frequency means much.
+/// Fewest cycles in the recording that give a frequency.
 pub(super) const FEWEST_CYCLES: f64 = 3.0;
 /// Share of the Nyquist frequency up to which a component is well clear of its own alias.
 pub(super) const NYQUIST_SHARE: f64 = 0.8;
@@ -77,9 +77,8 @@ pub struct Optics {
 #[must_use]
 pub fn measure_quality(recording: &Recording, exposure_s: Option<f64>) -> Quality {
     let (grid, traces) = (recording.grid(), recording.traces());
-    let gaps = FrameGaps::count_gaps(
-        traces.tip_x_m.iter().zip(&traces.head_x_m).map(|(tip, head)| tip.is_some() && head.is_some()),
-    );
+    let both = traces.tip_x_m.iter().zip(&traces.head_x_m);
+    let gaps = FrameGaps::count_gaps(both.map(|(tip, head)| tip.is_some() && head.is_some()));
     let nyquist_hz = grid.frame_rate_hz / (2 * gaps.stride.max(1)) as f64;
     Quality {
         frames: grid.frames,
@@ -105,8 +104,8 @@ fn measure_channel(samples: &[Option<f64>]) -> ChannelQuality {
 }
 
 impl Quality {
-    /// Lowest and highest frequency that the recording shows well, Hz: three cycles in it, and 0.8 of the
-    /// Nyquist frequency. Where the first is not below the second, it is too short for a spectrum.
+    /// Lowest and highest frequency that the recording shows well, Hz: three cycles in its duration, and 0.8 of
+    /// the Nyquist frequency. A recording without such a band is too short for a spectrum.
     pub(crate) fn band_hz(&self) -> (f64, f64) {
         (FEWEST_CYCLES / self.duration_s, NYQUIST_SHARE * self.nyquist_hz)
     }
@@ -121,7 +120,7 @@ impl Quality {
         [("tip-x", &self.tip_x), ("tip-y", &self.tip_y), ("head-x", &self.head_x), ("head-y", &self.head_y)]
     }
 
-    /// Noise of tip and head together, m, at least what rounding to their steps adds.
+    /// Noise of the deflection, m: that of tip and head together, each at least the rounding to its step.
     pub(super) fn deflection_floor_m(&self) -> Option<f64> {
         let variance = |c: &ChannelQuality| {
             Some(math::powi(c.noise_m?, 2).max(math::powi(c.step_m.unwrap_or(0.0), 2) / 12.0))
@@ -139,26 +138,22 @@ pub(super) struct MeasuredColumn<'a> {
 }
 
 pub(super) fn measured_columns<'a>(traces: &'a Traces, measured: &'a Quality) -> [MeasuredColumn<'a>; 4] {
-    let samples = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
-    let mut samples = samples.into_iter();
-    measured.channels().map(|(name, quality)| MeasuredColumn {
-        name,
-        samples: samples.next().map_or(&[], Vec::as_slice),
-        quality,
+    let mut columns = traces.columns().map(|(_, samples)| samples);
+    measured.channels().map(|(name, quality)| {
+        let samples = columns.next().unwrap_or_default();
+        MeasuredColumn { name, samples, quality }
     })
 }
-
-// Whether a recording can show a component of a given frequency.
 
 /// Title of the paper whose experiment found [`PUBLISHED_COMPONENTS_HZ`].
 pub const PUBLISHED_TITLE: &str = "Investigation of the dynamics of the wiper blade around the reversal";
 /// The two components of the published experiment, with their names, Hz.
 pub const PUBLISHED_COMPONENTS_HZ: [(&str, f64); 2] =
     [("low", 78.4), ("high (printed as about 900 Hz)", 900.0)];
-/// Share of an amplitude that still counts as shown in full: a scale is rarely known better than to a tenth.
+/// Least share of an amplitude that counts as shown in full: a scale is rarely known better than to a tenth.
 const NEARLY_ALL: f64 = 0.9;
 
-/// What a recording makes of a component.
+/// How well a recording shows a component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Visibility {
@@ -190,29 +185,24 @@ pub struct ComponentVisibility {
 }
 
 impl Quality {
-    /// What the recording makes of a component of `frequency_hz`, a positive number.
+    /// How well the recording shows a component of `frequency_hz`, a positive number.
     #[must_use]
     pub fn component_visibility(&self, frequency_hz: f64) -> ComponentVisibility {
         let cycles = frequency_hz * self.duration_s;
-        let passes = self.exposure_s().map(|exposure| exposure_gain(frequency_hz, exposure));
+        let exposure_passes = self.exposure_s().map(|exposure| exposure_gain(frequency_hz, exposure));
         let verdict = if frequency_hz > self.nyquist_hz {
             Visibility::Aliased
         } else if cycles < FEWEST_CYCLES {
             Visibility::TooFewCycles
         } else if frequency_hz > NYQUIST_SHARE * self.nyquist_hz {
             Visibility::NearNyquist
-        } else if passes.is_some_and(|part| part < NEARLY_ALL) {
+        } else if exposure_passes.is_some_and(|part| part < NEARLY_ALL) {
             Visibility::Attenuated
         } else {
             Visibility::Shown
         };
-        ComponentVisibility {
-            frequency_hz,
-            verdict,
-            appears_at_hz: alias_hz(frequency_hz, self.frame_rate_hz),
-            cycles,
-            exposure_passes: passes,
-        }
+        let appears_at_hz = alias_hz(frequency_hz, self.frame_rate_hz);
+        ComponentVisibility { frequency_hz, verdict, appears_at_hz, cycles, exposure_passes }
     }
 }
 
@@ -226,10 +216,8 @@ impl ComponentVisibility {
             Visibility::Aliased => format!("aliased to {:.1} Hz", self.appears_at_hz),
             Visibility::TooFewCycles => format!("too few cycles for a frequency ({FEWEST_CYCLES} needed)"),
         };
-        let exposure = self.exposure_passes.map_or_else(
-            || "exposure unknown".to_owned(),
-            |part| format!("{:.1} % of the amplitude", 100.0 * part),
-        );
+        let of_amplitude = |part| format!("{:.1} % of the amplitude", 100.0 * part);
+        let exposure = self.exposure_passes.map_or_else(|| "exposure unknown".to_owned(), of_amplitude);
         format!("{what}: {:.1} cycles, {exposure}", self.cycles)
     }
 }

@@ -2,42 +2,39 @@
 //! the head.
 
 use super::finding::{Check, QualityFinding, Severity};
-use super::measurement::{ChannelQuality, Quality, measured_columns};
-use crate::recording::channel::ReversalInstants;
+use super::measurement::{ChannelQuality, Quality};
+use crate::recording::channel::{ReversalInstants, median_in_place};
 use crate::recording::{FrameGrid, Recording, Traces};
 use std::f64::consts::PI;
 
-/// Share of repeated frames from which frequencies are wrong rather than a few samples.
+/// Share of repeated frames that is serious: frequencies are wrong, not only a few samples.
 const MANY_REPEATED: f64 = 0.01;
-/// Repeats that rounding alone may bring are beyond this many times their expected number, and this many
-/// more.
+/// Tolerated repeats, in units of one more than the number that rounding is expected to cause.
 const BY_ROUNDING: f64 = 3.0;
-/// Expected number of repeats by rounding that is none.
+/// Expected number of repeats by rounding below which none is tolerated.
 const NO_REPEATS: f64 = 0.01;
-/// Probability of a repeat by rounding from which repeats are not judged: noise below the step then rests for
-/// frames on end.
+/// Probability of a repeat by rounding above which repeats are not judged: with noise below the step, positions
+/// repeat for many frames.
 const LIKELY_REPEAT: f64 = 1e-3;
-/// Noise of a column that noise moves, m: below a picometre is the rounding of arithmetic on a point at rest.
+/// Least noise of a column, m: below a picometre lies the rounding of arithmetic on a point at rest.
 const LEAST_NOISE_M: f64 = 1e-12;
-/// Share of the frames that only one point may have at the ends before it is more than a late start of a
-/// track.
+/// Share of frames at the ends with only one point that is worth a caution: more than a late start of a track.
 const MANY_ALONE: f64 = 0.1;
-/// Travel that no camera's view shows while it still resolves a lip, m: at 1,000 pixels a lip of 5 mm would
-/// be 10 pixels high.
+/// Largest travel in a view that still resolves the lip, m: at 1,000 pixels a lip of 5 mm is 10 pixels high.
 const LARGEST_VIEW_M: f64 = 0.5;
 /// Travel beyond any wiper's sweep, m: the longest blades reach about 1.5 m along their arc.
 const LARGEST_SWEEP_M: f64 = 2.0;
 /// Travel below which nothing moved, m: five pixels of the usual 20 um.
 const LEAST_TRAVEL_M: f64 = 1e-4;
-/// Most positions looked at for a travel; a stroke is smooth on a thousandth of it.
+/// Most positions used for a travel; a stroke is smooth over a thousandth of it.
 const MOST_POSITIONS: usize = 20_000;
-/// Share of positions at either end that do not count for a travel, so that outliers do not.
+/// Share of positions at either end that a travel leaves out, because they may be outliers.
 const TRIMMED: f64 = 0.01;
-/// Distance between tip and head that is a blade's height and not two origins, m: neck and lip of a wiper are
-/// some 5 to 10 mm high.
+/// Least height of tip above head that is worth a caution, m: neck and lip are 5 to 10 mm high, and smaller
+/// heights may come from two origins.
 const LEAST_HEIGHT_M: f64 = 1e-3;
 
-/// Everything that takes both points.
+/// Checks of both points together.
 pub(super) fn check_motion(recording: &Recording, measured: &Quality) -> Vec<QualityFinding> {
     let (traces, grid) = (recording.traces(), recording.grid());
     let found = [
@@ -49,22 +46,23 @@ pub(super) fn check_motion(recording: &Recording, measured: &Quality) -> Vec<Qua
     found.into_iter().flatten().collect()
 }
 
-/// Frames in which nothing has moved since the one before, where noise otherwise moves everything.
+/// Frames that repeat the previous one exactly, although noise should move every position.
 fn check_repeated_frames(traces: &Traces, measured: &Quality) -> Option<QualityFinding> {
-    let by_chance = repeat_probability(traces, measured)?;
-    let axes = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
-    let still = |frame: usize| {
-        let same = |axis: &Vec<Option<f64>>| axis[frame] == axis[frame - 1];
+    let by_chance = repeat_probability(measured)?;
+    let still = |&frame: &usize| {
+        let same = |(_, axis): (_, &[Option<f64>])| axis[frame] == axis[frame - 1];
         let tracked = traces.tip_x_m[frame].is_some() && traces.head_x_m[frame].is_some();
-        tracked && axes.into_iter().all(same)
+        tracked && traces.columns().take(4).all(same)
     };
     let frames = traces.tip_x_m.len();
-    let (count, first) = (1..frames)
-        .filter(|&frame| still(frame))
-        .fold((0_usize, None), |(n, first), frame| (n + 1, first.or(Some(frame))));
+    let mut repeated = (1..frames).filter(still);
+    let first = repeated.next()?;
+    let count = 1 + repeated.count();
     let expected = by_chance * frames as f64;
     let allowed = if expected < NO_REPEATS { 0.0 } else { BY_ROUNDING * (1.0 + expected) };
-    let first = first.filter(|_| count as f64 > allowed)?;
+    if count as f64 <= allowed {
+        return None;
+    }
     let share = count as f64 / frames as f64;
     let severity = if share > MANY_REPEATED { Severity::Serious } else { Severity::Caution };
     let words = format!(
@@ -72,25 +70,20 @@ fn check_repeated_frames(traces: &Traces, measured: &Quality) -> Option<QualityF
         100.0 * share
     );
     let advice = "the video was converted or frames were doubled: track the file that the camera wrote";
-    Some(
-        QualityFinding::new(Check::FrozenFrames, severity, count as f64, "frames", words).with_advice(advice),
-    )
+    let value = (count as f64, "frames");
+    Some(QualityFinding::advise((Check::FrozenFrames, severity), value, words, advice))
 }
 
-/// Probability that noise, rounded to the step of each column, leaves every column in its place: `q/(2
-/// sqrt(pi) s)` each, the density at zero of the difference of two values of standard deviation `s`. `None`
-/// where noise does not move both points, or a step hides it.
-fn repeat_probability(traces: &Traces, measured: &Quality) -> Option<f64> {
+/// Probability that all columns repeat by chance. For a column with step `q` and noise `s` it is
+/// `q/(2 sqrt(pi) s)`: the step times the density at zero of the difference of two values. `None` where noise does
+/// not move both points, or where a step hides it.
+fn repeat_probability(measured: &Quality) -> Option<f64> {
     let moved = |channel: &ChannelQuality| channel.noise_m.is_some_and(|noise| noise > LEAST_NOISE_M);
     let unchanged = |channel: &ChannelQuality| {
-        (channel.step_m.unwrap_or(0.0) / (2.0 * PI.sqrt() * channel.noise_m?)).min(1.0).into()
+        Some((channel.step_m.unwrap_or(0.0) / (2.0 * PI.sqrt() * channel.noise_m?)).min(1.0))
     };
-    let columns = measured_columns(traces, measured);
-    let probability: f64 = columns
-        .iter()
-        .filter(|column| moved(column.quality))
-        .filter_map(|column| unchanged(column.quality))
-        .product();
+    let channels = measured.channels().into_iter().map(|(_, quality)| quality);
+    let probability: f64 = channels.filter(|channel| moved(channel)).filter_map(unchanged).product();
     (probability < LIKELY_REPEAT && moved(&measured.tip_x) && moved(&measured.head_x)).then_some(probability)
 }
 
@@ -99,7 +92,7 @@ fn tracked_span(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     Some((samples.iter().position(Option::is_some)?, samples.iter().rposition(Option::is_some)?))
 }
 
-/// The frames that both tracks reach over.
+/// Range of frames that both tracks cover.
 fn check_overlap(traces: &Traces, grid: FrameGrid) -> Option<QualityFinding> {
     let (tip, head) = (tracked_span(&traces.tip_x_m)?, tracked_span(&traces.head_x_m)?);
     let (first, last) = (tip.0.max(head.0), tip.1.min(head.1));
@@ -110,33 +103,27 @@ fn check_overlap(traces: &Traces, grid: FrameGrid) -> Option<QualityFinding> {
             tip.0, tip.1, head.0, head.1
         );
         let advice = "track both points in the same frames, or check the frame offset of the two files";
-        return Some(
-            QualityFinding::new(Check::Overlap, Severity::Serious, 0.0, "frames", words).with_advice(advice),
-        );
+        let kind = (Check::Overlap, Severity::Serious);
+        return Some(QualityFinding::advise(kind, (0.0, "frames"), words, advice));
     }
     let words = format!(
         "both tracks run from frame {first} to {last} ({:.6} s to {:.6} s)",
         grid.time_s(first),
         grid.time_s(last)
     );
-    let found =
-        |severity| QualityFinding::new(Check::Overlap, severity, both as f64, "frames", words.clone());
     let alone = tip.0.abs_diff(head.0) + tip.1.abs_diff(head.1);
-    let advice = "one point is tracked longer: there is no deflection outside these frames";
-    match alone {
-        0 => Some(found(Severity::Note)),
-        _ if alone as f64 > MANY_ALONE * grid.frames as f64 => {
-            Some(found(Severity::Caution).with_advice(advice))
-        }
-        _ => Some(found(Severity::Note).with_advice(advice)),
-    }
+    let many = alone as f64 > MANY_ALONE * grid.frames as f64;
+    let severity = if many { Severity::Caution } else { Severity::Note };
+    let longer = "one point is tracked longer: there is no deflection outside these frames";
+    let advice = if alone > 0 { longer } else { "" };
+    Some(QualityFinding::advise((Check::Overlap, severity), (both as f64, "frames"), words, advice))
 }
 
 /// Travel of whichever point moves more, m.
 fn largest_travel_m(traces: &Traces) -> Option<f64> {
     let travel = |samples: &[Option<f64>]| {
-        let mut positions: Vec<f64> =
-            samples.iter().step_by(samples.len() / MOST_POSITIONS + 1).flatten().copied().collect();
+        let some = samples.iter().step_by(samples.len() / MOST_POSITIONS + 1);
+        let mut positions: Vec<f64> = some.flatten().copied().collect();
         positions.sort_unstable_by(f64::total_cmp);
         let trimmed = (TRIMMED * positions.len() as f64) as usize;
         Some(positions.get(positions.len().checked_sub(1 + trimmed)?)? - positions.get(trimmed)?)
@@ -145,39 +132,31 @@ fn largest_travel_m(traces: &Traces) -> Option<f64> {
     travels.into_iter().flatten().reduce(f64::max)
 }
 
-/// A travel that is no wiper's: pixels taken for a length, or the reverse.
+/// Travel along the sweep; one that no wiper makes comes from a wrong unit.
 fn check_travel(traces: &Traces) -> Option<QualityFinding> {
     let travel_m = largest_travel_m(traces)?;
-    let found = |severity, words: &str, advice: &str| {
-        let words = format!("tip and head travel {travel_m:.3e} m along the sweep, {words}");
-        Some(QualityFinding::new(Check::Scale, severity, travel_m, "m", words).with_advice(advice))
-    };
     let pixels = "check --scale: pixels may have been taken for millimetres";
-    match travel_m {
-        m if m > LARGEST_SWEEP_M => found(Severity::Serious, "more than any wiper sweeps", pixels),
+    let metres = "check --scale: millimetres may have been taken for pixels (or nothing moves)";
+    let (severity, words, advice) = match travel_m {
+        m if m > LARGEST_SWEEP_M => (Severity::Serious, "more than any wiper sweeps", pixels),
         m if m > LARGEST_VIEW_M => {
-            found(Severity::Caution, "more than a camera's view that still resolves the lip", pixels)
+            (Severity::Caution, "more than a camera's view that still resolves the lip", pixels)
         }
-        m if m < LEAST_TRAVEL_M => {
-            let advice = "check --scale: millimetres may have been taken for pixels (or nothing moves)";
-            found(Severity::Caution, "a few pixels of a usual view", advice)
-        }
-        _ => found(Severity::Note, "as a wiper's stroke in a camera's view may", "")
-            .map(|finding| finding.with_advice("")),
-    }
+        m if m < LEAST_TRAVEL_M => (Severity::Caution, "a few pixels of a usual view", metres),
+        _ => (Severity::Note, "as a wiper's stroke in a camera's view may", ""),
+    };
+    let words = format!("tip and head travel {travel_m:.3e} m along the sweep, {words}");
+    Some(QualityFinding::advise((Check::Scale, severity), (travel_m, "m"), words, advice))
 }
 
 /// Median height of the head above the tip, m, over frames with both heights.
 pub(super) fn head_height_m(traces: &Traces) -> Option<f64> {
-    let apart =
-        traces.tip_y_m.iter().zip(&traces.head_y_m).filter_map(|(tip, head)| Some((*head)? - (*tip)?));
-    let mut apart: Vec<f64> = apart.step_by(traces.tip_y_m.len() / MOST_POSITIONS + 1).collect();
-    let middle = apart.len() / 2;
-    (!apart.is_empty()).then(|| *apart.select_nth_unstable_by(middle, f64::total_cmp).1)
+    let both = traces.tip_y_m.iter().zip(&traces.head_y_m);
+    let apart = both.filter_map(|(tip, head)| Some((*head)? - (*tip)?));
+    median_in_place(&mut apart.step_by(traces.tip_y_m.len() / MOST_POSITIONS + 1).collect::<Vec<_>>())
 }
 
-/// The blade stands on its lip, so the tip is the lower point; a tip above the head means that y points the
-/// other way.
+/// Direction of y: the blade stands on its lip, so a tip above the head means that y points down.
 fn check_head_above_tip(traces: &Traces) -> Option<QualityFinding> {
     let height_m = -head_height_m(traces)?;
     if height_m < LEAST_HEIGHT_M {
@@ -186,25 +165,23 @@ fn check_head_above_tip(traces: &Traces) -> Option<QualityFinding> {
     let words = format!("the tip lies {:.3} mm above the head", 1e3 * height_m);
     let advice = "a blade stands on its lip: check --y-axis (image coordinates point down), and which point \
         is the tip; no matter if the camera stood on its head";
-    Some(QualityFinding::new(Check::YDirection, Severity::Caution, height_m, "m", words).with_advice(advice))
+    Some(QualityFinding::advise((Check::YDirection, Severity::Caution), (height_m, "m"), words, advice))
 }
 
-/// Turns of the head that windows can be named after.
-pub(super) fn check_turns(instants: &ReversalInstants) -> Option<QualityFinding> {
+/// Number of turns of the head, after which windows can be named.
+pub(super) fn check_turns(instants: &ReversalInstants) -> QualityFinding {
     let count = instants.reversals.len();
-    let found =
-        |words: String| QualityFinding::new(Check::Reversals, Severity::Note, count as f64, "", words);
-    if count == 0 {
-        let advice = "windows cannot be named after hold, reversal or release: give them in seconds";
-        return Some(found("the head does not turn in the recording".to_owned()).with_advice(advice));
-    }
     let resting =
         instants.reversals.iter().filter(|turn| turn.hold_s.is_some() || turn.release_s.is_some()).count();
-    Some(found(match (count, resting) {
+    let words = match (count, resting) {
+        (0, _) => "the head does not turn in the recording".to_owned(),
         (1, 0) => "the head turns once; the tip does not visibly stop or slip again there".to_owned(),
         (1, _) => "the head turns once, and the tip visibly stops or slips again there".to_owned(),
         _ => {
             format!("the head turns {count} times; at {resting} of them the tip visibly stops or slips again")
         }
-    }))
+    };
+    let unnamed = "windows cannot be named after hold, reversal or release: give them in seconds";
+    let advice = if count == 0 { unnamed } else { "" };
+    QualityFinding::advise((Check::Reversals, Severity::Note), (count as f64, ""), words, advice)
 }

@@ -1,21 +1,21 @@
 //! Measurements on one column: missing frames, noise, the step in which it is written.
 
+use crate::recording::channel::median_in_place;
+
 /// Median absolute deviation of a normal distribution in units of its standard deviation.
 const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
-/// Variance of a third difference of white noise of unit variance: 1 + 9 + 9 + 1 (squares of the binomial
-/// weights).
+/// Variance of a third difference of white noise of unit variance: 1 + 9 + 9 + 1, the squared binomial weights.
 const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
-/// Fewest third differences for a noise estimate; the median of fewer says little.
+/// Fewest differences of an estimate: the median of fewer is uncertain.
 const FEWEST_DIFFERENCES: usize = 8;
-/// Remainder of two differences, relative to the largest position, that is rounding of decimals and no step.
+/// Remainder that counts as zero, relative to the largest position: the rounding of decimals.
 const ROUNDING: f64 = 1e-10;
-/// Most steps that a difference may span: beyond it a whole multiple is a coincidence of many digits.
+/// Most steps that a difference may span: a larger multiple is a coincidence of many digits.
 const MOST_STEPS: f64 = 20_000.0;
 
-/// Standard deviation of white noise on the samples, in their unit: the median absolute third difference of
-/// four neighbouring present frames over `0.6745 sqrt(20)`. A third difference removes any motion up to a
-/// parabola; what moves faster remains in it, so this is an upper estimate where the signal oscillates within
-/// a few frames, and it sees no error that is slow.
+/// Standard deviation of white noise on the samples, in their unit: the median absolute third difference of four
+/// neighbouring present frames over `0.6745 sqrt(20)`. A third difference removes motion up to a parabola.
+/// Oscillation within a few frames remains, so that the estimate is too high there; slow errors do not show.
 #[must_use]
 pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     let third = |w: &[Option<f64>]| match *w {
@@ -26,20 +26,18 @@ pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     if differences.len() < FEWEST_DIFFERENCES {
         return None;
     }
-    let middle = differences.len() / 2;
-    let median = *differences.select_nth_unstable_by(middle, f64::total_cmp).1;
+    let median = median_in_place(&mut differences)?;
     Some(median / (MAD_OF_NORMAL * THIRD_DIFFERENCE_VARIANCE.sqrt()))
 }
 
-/// The step of which every difference between neighbouring frames is a whole multiple (their greatest common
-/// divisor), in the samples' unit; `None` where there is no such step.
+/// Greatest common divisor of the differences between neighbouring frames, in the samples' unit: the step in
+/// which they are written. `None` where there is no such step.
 #[must_use]
 pub fn quantisation_step(samples: &[Option<f64>]) -> Option<f64> {
     let rounding = ROUNDING * samples.iter().flatten().fold(0.0_f64, |most, v| most.max(v.abs()));
     let moves = || samples.windows(2).filter_map(|w| Some((w[1]? - w[0]?).abs())).filter(|&d| d > rounding);
-    let (count, largest) =
-        moves().fold((0, 0.0_f64), |(count, largest), distance| (count + 1, largest.max(distance)));
-    if count < FEWEST_DIFFERENCES {
+    let largest = moves().fold(0.0, f64::max);
+    if moves().take(FEWEST_DIFFERENCES).count() < FEWEST_DIFFERENCES {
         return None;
     }
     let mut step = moves().next()?;
@@ -69,8 +67,8 @@ pub(super) struct FrameGaps {
     /// Length of the longest run, frames; the first of equal ones.
     pub longest: usize,
     pub longest_from: usize,
-    /// Largest number of which all distances between frames present are multiples; above 1 where only every
-    /// n-th frame was tracked. 0 where fewer than two are present.
+    /// Greatest common divisor of the distances between present frames: n where every n-th frame was tracked,
+    /// 0 where fewer than two frames are present.
     pub stride: usize,
 }
 

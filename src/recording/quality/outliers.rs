@@ -1,13 +1,11 @@
-//! Isolated points far from what their neighbours predict: the tracker has jumped away for one frame and come
-//! back.
+//! Isolated points far from the prediction of their neighbours: the tracker jumps away for one frame and comes back.
 //!
-//! A point counts when all of this holds, so that neither chatter within a few frames of a cycle nor a kink,
-//! a jump or a flip of the blade does:
-//! - it misses the cubic through its four neighbours by more than the noise and the step explain;
-//! - it lies on the same side of the straight lines through the two points before and the two points after it
-//!   (a kink lies on one of them), and these agree about its place (on either side of a jump they do not);
-//! - the points around it do not miss their own neighbours nearly as much (in chatter and where the noise is
-//!   high they do).
+//! A point is an outlier when all three conditions hold. They exclude fast chatter, and kinks, jumps and flips of
+//! the blade:
+//! - its distance from the cubic through its four neighbours exceeds what noise and step explain;
+//! - it lies on the same side of two straight lines, through the two points before and the two points after it (at
+//!   a kink it lies on one of them), and both lines agree on its place (at a jump they do not);
+//! - the points around it are much closer to their own cubics (in chatter or strong noise they are not).
 //!
 //! A point with a missing frame within two frames of it is not judged.
 
@@ -15,31 +13,30 @@ use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, MeasuredColumn, Optics};
 use crate::recording::FrameGrid;
 
-/// Weight of the nearer two neighbours in the cubic through four, of 6; the further two have -1.
+/// Weight of the two nearer neighbours in the cubic through four; the further two have -1.
 const NEARER: f64 = 4.0;
-/// Sum of the weights.
+/// Sum of the four weights.
 const WEIGHTS: f64 = 6.0;
 /// Standard deviation of a miss in white noise of standard deviation 1: `sqrt(1 + (16 + 16 + 1 + 1)/36)`.
 const MISS_SD: f64 = 1.394_433_377_556_792_8;
-/// Misses of white noise beyond this many of their standard deviations: 2 in 1e9 points.
+/// Least miss in its standard deviations for white noise, which exceeds it in 2 of 1e9 points.
 const BEYOND_NOISE: f64 = 6.0;
-/// Steps that rounding may move a point: flicker between neighbouring values is none of an outlier.
+/// Least miss in steps: flicker between neighbouring values is no outlier.
 const BEYOND_STEPS: f64 = 2.0;
-/// Least miss, m: a tenth of a pixel of the usual 20 um, which no tracker holds in every frame.
+/// Least miss, m: a tenth of a pixel of the usual 20 um. No tracker is that accurate in every frame.
 const LEAST_MISS_M: f64 = 2e-6;
 /// Least miss in pixels, where the scale is known.
 const LEAST_MISS_PX: f64 = 0.1;
-/// Part of the miss by which the lines from both sides must be missed, and within which they must agree.
+/// Share of the miss that is the least distance from either line and the largest distance between the lines.
 const BOTH_SIDES: f64 = 0.5;
-/// Standard deviation of the difference of the two lines in white noise: `sqrt(2 (4 + 1))`, taken three
-/// times.
+/// Three standard deviations of the difference of the two lines in white noise: `3 sqrt(2 (4 + 1))`.
 const LINES_SD: f64 = 9.5;
-/// Times by which it must miss more than any point around it: six misses of white noise reach 3 of their
-/// standard deviations once in 60.
+/// Least ratio of its miss to the largest around it. The largest of six misses of white noise reaches 3 standard
+/// deviations once in 60.
 const MORE_THAN_AROUND: f64 = 4.0;
-/// Frames before and after whose own neighbours do not include the point.
+/// Distances, in frames, of the points around: near ones whose own cubic does not use the point.
 const AROUND: std::ops::RangeInclusive<usize> = 3..=5;
-/// Share of outliers that a spectrum does not notice; each is an impulse that lifts all of its noise.
+/// Share of outliers that is worth a caution: each is an impulse that raises the noise of a spectrum.
 const MANY_OUTLIERS: f64 = 1e-3;
 
 /// Frames of the outliers in a column, in order; `metres_per_pixel` where known.
@@ -55,20 +52,19 @@ pub fn outlier_frames(
     let candidates =
         samples.windows(5).enumerate().filter_map(|(before, w)| Some((before + 2, distance_from_cubic(w)?)));
     let far = candidates.filter(|(_, miss)| miss.abs() > least_m);
-    far.filter(|&(frame, miss)| is_isolated(samples, frame, miss, noise_m)).map(|(frame, _)| frame).collect()
+    let isolated = far.filter(|&(frame, miss)| {
+        lies_off_both_lines(samples, frame, miss, noise_m).unwrap_or(false)
+            && is_calm_around(samples, frame, miss)
+    });
+    isolated.map(|(frame, _)| frame).collect()
 }
 
-/// How far the middle of five frames is from the cubic through the others.
+/// Distance of the middle of five frames from the cubic through the others.
 fn distance_from_cubic(five: &[Option<f64>]) -> Option<f64> {
     match *five {
         [Some(a), Some(b), Some(c), Some(d), Some(e)] => Some(c - (NEARER * (b + d) - (a + e)) / WEIGHTS),
         _ => None,
     }
-}
-
-fn is_isolated(samples: &[Option<f64>], frame: usize, miss_m: f64, noise_m: f64) -> bool {
-    lies_off_both_lines(samples, frame, miss_m, noise_m).unwrap_or(false)
-        && is_calm_around(samples, frame, miss_m)
 }
 
 fn lies_off_both_lines(samples: &[Option<f64>], frame: usize, miss_m: f64, noise_m: f64) -> Option<bool> {
@@ -81,13 +77,11 @@ fn lies_off_both_lines(samples: &[Option<f64>], frame: usize, miss_m: f64, noise
     Some(off(before) && off(after) && agree)
 }
 
-/// Whether every point around is well predicted by its own neighbours; false where none can be judged.
+/// Whether the cubics predict all points around well; false where none of them has a cubic.
 fn is_calm_around(samples: &[Option<f64>], frame: usize, miss_m: f64) -> bool {
-    let miss_at =
-        |centre: Option<usize>| distance_from_cubic(samples.get(centre?.checked_sub(2)?..centre? + 3)?);
-    let around =
-        AROUND.flat_map(|apart| [frame.checked_sub(apart), frame.checked_add(apart)]).filter_map(miss_at);
-    let largest = around.map(f64::abs).reduce(f64::max);
+    let miss = |at: Option<usize>| distance_from_cubic(samples.get(at?.checked_sub(2)?..at? + 3)?);
+    let around = AROUND.flat_map(|apart| [frame.checked_sub(apart), frame.checked_add(apart)]);
+    let largest = around.filter_map(miss).map(f64::abs).reduce(f64::max);
     largest.is_some_and(|largest| miss_m.abs() > MORE_THAN_AROUND * largest)
 }
 
@@ -99,17 +93,12 @@ pub(super) fn check_outliers(
 ) -> Option<QualityFinding> {
     let frames = outlier_frames(column.samples, column.quality, optics.metres_per_pixel);
     let first = *frames.first()?;
-    let many = frames.len() as f64 > MANY_OUTLIERS * grid.frames as f64;
+    let (count, first_s) = (frames.len(), grid.time_s(first));
+    let many = count as f64 > MANY_OUTLIERS * grid.frames as f64;
     let severity = if many { Severity::Caution } else { Severity::Note };
-    let words = format!(
-        "{} isolated outliers, the first in frame {first} at {:.6} s",
-        frames.len(),
-        grid.time_s(first)
-    );
+    let words = format!("{count} isolated outliers, the first in frame {first} at {first_s:.6} s");
     let advice = "the tracker jumped away and came back: correct these points in it, or delete them there";
-    Some(
-        QualityFinding::new(Check::Outliers, severity, frames.len() as f64, "frames", words)
-            .with_advice(advice)
-            .on_channel(column.name),
-    )
+    let value = (count as f64, "frames");
+    let finding = QualityFinding::advise((Check::Outliers, severity), value, words, advice);
+    Some(finding.on_channel(column.name))
 }

@@ -17,15 +17,14 @@ use crate::text::{format_degrees, format_with_sd, to_ascii};
 use glass_line::{GlassLine, TipPath};
 use serde::Serialize;
 
-/// Fewest frames with a height: the correlation of the errors of fewer is not known.
+/// Fewest frames with a height: fewer do not show how their errors are correlated.
 const FEWEST_FRAMES: usize = 50;
-/// Least travel of the tip within a stroke, m: about the height of a blade. The tracked point of the lip
-/// moves up and down by some 10 um as the lip bends, which over this travel is 0.1 degrees.
+/// Least travel of the tip within a stroke, m: about the height of a blade. As the lip bends, its tracked point moves
+/// up and down by some 10 um, 0.1 degrees over this travel.
 const LEAST_TRAVEL_M: f64 = 5e-3;
 /// Least share of the frames that lie on one line: with fewer, the line is not the glass.
 const LEAST_ON_GLASS: f64 = 0.5;
-/// Standard deviations from which a slope or a curvature is one: chance reaches them in one level recording
-/// of 370.
+/// Least slope or curvature, in its standard deviations: chance reaches it in one level recording of 370.
 const CLEAR_DEVIATIONS: f64 = 3.0;
 /// Least sag of a curved path, m: below it lies the rounding of a path without noise.
 const LEAST_SAG_M: f64 = 1e-9;
@@ -48,9 +47,9 @@ pub struct CameraTilt {
     pub centre_m: [f64; 2],
     /// Longest travel of the tip within a stroke, m.
     pub travel_m: f64,
-    /// Frames in which the tip lies on the glass, of at most 100,000 that are looked at.
+    /// Frames in which the tip lies on the glass, out of at most 100,000 that are used.
     pub frames: usize,
-    /// Frames in which it does not.
+    /// Frames in which the tip is off the glass.
     pub frames_off_glass: usize,
 }
 
@@ -108,6 +107,10 @@ pub fn measure_tilt(
         return Err(TiltNotFound::TooFewFrames { frames });
     }
     let step_m = height_step_m(measured);
+    let sufficient_travel_m = |path: &TipPath| {
+        let travel_m = path.travel_m();
+        if travel_m < LEAST_TRAVEL_M { Err(TiltNotFound::TooLittleTravel { travel_m }) } else { Ok(travel_m) }
+    };
     let line = glass_line::fit_glass_line(&path, sufficient_travel_m(&path)?, step_m);
     let on_glass = path.select_points(&line.on_glass);
     let on_line = on_glass.points.len();
@@ -117,36 +120,22 @@ pub fn measure_tilt(
     let travel_m = sufficient_travel_m(&on_glass)?;
     let hidden_step_m = if measured.tip_y.noise_m.is_some_and(|noise| noise < step_m) { step_m } else { 0.0 };
     let (angle_rad, sd_rad, curvature) = angle_with_sd(&path, &line, hidden_step_m);
-    let frames_off_glass = frames - on_line;
-    Ok(CameraTilt {
-        angle_rad,
-        sd_rad,
-        curvature,
-        centre_m: line.centre_m,
-        travel_m,
-        frames: on_line,
-        frames_off_glass,
-    })
+    let (centre_m, frames_off_glass) = (line.centre_m, frames - on_line);
+    Ok(CameraTilt { angle_rad, sd_rad, curvature, centre_m, travel_m, frames: on_line, frames_off_glass })
 }
 
-/// Step in which the heights of the tip are written, m. Heights that never change show no step of their own:
-/// then it is the coarsest of the other columns.
+/// Step in which the heights of the tip are written, m. Heights that never change show no step; the coarsest of the
+/// other columns serves instead.
 fn height_step_m(measured: &Quality) -> f64 {
     let tip_y = &measured.tip_y;
     let coarsest = || measured.channels().into_iter().filter_map(|(_, q)| q.step_m).fold(0.0, f64::max);
     tip_y.step_m.unwrap_or_else(|| if tip_y.noise_m == Some(0.0) { coarsest() } else { 0.0 })
 }
 
-/// Longest travel within a stroke, m.
-fn sufficient_travel_m(path: &TipPath) -> Result<f64, TiltNotFound> {
-    let travel_m = path.travel_m();
-    if travel_m < LEAST_TRAVEL_M { Err(TiltNotFound::TooLittleTravel { travel_m }) } else { Ok(travel_m) }
-}
-
-/// The angle of a line with its uncertainty, rad, and its curvature; `hidden_step_m` is a step of the heights
-/// that noise does not blur.
+/// Angle of a line, its standard deviation, both rad, and its curvature; `hidden_step_m` is the step of the heights
+/// where it exceeds their noise, else 0.
 fn angle_with_sd(path: &TipPath, line: &GlassLine, hidden_step_m: f64) -> (f64, f64, Option<Curvature>) {
-    // at worst the rounding to a step is alike in all frames: a whole stroke may lie within one step
+    // in the worst case the rounding error is the same in all frames: a whole stroke may lie within one step
     let rounding_m2 = path.points.len() as f64 * math::powi(hidden_step_m, 2) / 12.0;
     let variance_m2 = glass_line::long_run_variance(path, line) + rounding_m2;
     let curvature = significant_curvature(line, variance_m2);
@@ -164,20 +153,13 @@ fn significant_curvature(line: &GlassLine, variance_m2: f64) -> Option<Curvature
 }
 
 impl CameraTilt {
-    /// Whether the tilt is one: clear of its uncertainty, and large enough to matter.
+    /// Whether the tilt is significant and large enough to matter.
     pub fn is_clear(&self) -> bool {
         self.angle_rad.abs() > (CLEAR_DEVIATIONS * self.sd_rad).max(LEAST_TILT_RAD)
     }
-
-    /// Height by which the glass rises along the travel, m.
-    fn rise_m(&self) -> f64 {
-        self.travel_m * math::tan(self.angle_rad)
-    }
 }
 
-// What a tilt or a curved glass does to the deflection, in words.
-
-/// The tilt and the curvature of a recording, where they are clear; nothing where it shows none.
+/// Findings on the tilt and the curvature of a recording, where they are significant.
 pub(in crate::recording::quality) fn check_tilt(
     recording: &Recording,
     measured: &Quality,
@@ -189,7 +171,7 @@ pub(in crate::recording::quality) fn check_tilt(
     [effect.tilt_finding(&tilt), effect.curvature_finding(&tilt)].into_iter().flatten().collect()
 }
 
-/// What an angle changes: the head stands above the tip, so turning the picture moves it along the sweep.
+/// Effect of a tilt on the deflection: the head is above the tip, so rotation of the picture moves it along the sweep.
 struct TiltEffect {
     /// Height of the head above the tip, m.
     height_m: Option<f64>,
@@ -202,21 +184,18 @@ impl TiltEffect {
         if !tilt.is_clear() {
             return None;
         }
+        let CameraTilt { angle_rad, sd_rad, travel_m, frames, .. } = *tilt;
         let words = format!(
-            "the glass rises by {} along x, over {:.1} mm in {} frames{}",
-            format_degrees(tilt.angle_rad, tilt.sd_rad),
-            1e3 * tilt.travel_m,
-            tilt.frames,
-            self.describe_shift(tilt.angle_rad, "every deflection is shifted by")
+            "the glass rises by {} along x, over {:.1} mm in {frames} frames{}, and the head drop changes by \
+             {:.1} um along the path",
+            format_degrees(angle_rad, sd_rad),
+            1e3 * travel_m,
+            self.describe_shift(angle_rad, "every deflection is shifted by"),
+            1e6 * (travel_m * math::tan(angle_rad)).abs()
         );
-        let rise =
-            format!(", and the head drop changes by {:.1} um along the path", 1e6 * tilt.rise_m().abs());
         let advice = "import again with --level, which turns both tracks by this angle, or level the camera";
-        let severity = self.severity(tilt.angle_rad);
-        Some(
-            QualityFinding::new(Check::Tilt, severity, tilt.angle_rad.to_degrees(), "degrees", words + &rise)
-                .with_advice(advice),
-        )
+        let kind = (Check::Tilt, self.severity(angle_rad));
+        Some(QualityFinding::advise(kind, (angle_rad.to_degrees(), "degrees"), words, advice))
     }
 
     fn curvature_finding(&self, tilt: &CameraTilt) -> Option<QualityFinding> {
@@ -234,10 +213,8 @@ impl TiltEffect {
         );
         let advice = "no rotation levels a curved path: compare windows at the same place, and check the lens \
             for distortion";
-        Some(
-            QualityFinding::new(Check::CurvedGlass, self.severity(slope_sd_rad), per_m, "1/m", words)
-                .with_advice(advice),
-        )
+        let kind = (Check::CurvedGlass, self.severity(slope_sd_rad));
+        Some(QualityFinding::advise(kind, (per_m, "1/m"), words, advice))
     }
 
     /// Shift of a deflection, m.
@@ -245,7 +222,7 @@ impl TiltEffect {
         Some(self.height_m? * math::sin(angle_rad))
     }
 
-    /// A shift that single frames show is more than worth knowing.
+    /// A shift above the noise of a single frame is worth a caution.
     fn severity(&self, angle_rad: f64) -> Severity {
         match (self.shift_m(angle_rad), self.noise_m) {
             (Some(shift), Some(noise)) if shift.abs() > noise => Severity::Caution,
@@ -255,9 +232,12 @@ impl TiltEffect {
 
     fn describe_shift(&self, angle_rad: f64, what: &str) -> String {
         let Some(shift_m) = self.shift_m(angle_rad) else { return String::new() };
-        let noises = self.noise_m.filter(|noise| *noise > 0.0).map_or_else(String::new, |noise| {
-            format!(" ({:.1} standard deviations of its noise)", shift_m.abs() / noise)
-        });
+        let noises = match self.noise_m {
+            Some(noise) if noise > 0.0 => {
+                format!(" ({:.1} standard deviations of its noise)", shift_m.abs() / noise)
+            }
+            _ => String::new(),
+        };
         format!(": {what} {:.1} um{noises}", 1e6 * shift_m)
     }
 }

@@ -2,22 +2,22 @@
 
 use crate::math;
 use crate::recording::Recording;
-use crate::recording::channel::ReversalInstants;
+use crate::recording::channel::{ReversalInstants, median_in_place};
 
-/// Least share that a parabola may differ from a line, in units of the fourth power of the places' spread:
-/// below it the places hold two values and show no curvature.
+/// Least sum of squares of `q`, relative to the fourth power of the spread of the places: below it the places have only
+/// two values and show no curvature.
 const LEAST_BEND: f64 = 1e-6;
 
-/// A line `y = height(stroke) + slope x + bend q(x)`, in which `q` is the parabola `x^2` without its part
-/// along the line, so that `slope` is that of the line alone: the mean slope of a curved path.
+/// A curve `y = height(stroke) + slope x + bend q(x)`. The parabola `q` is `x^2` minus its projection on the line, so
+/// `slope` is the mean slope of a curved path.
 pub(super) struct GlassLine {
     pub slope: f64,
     pub bend_per_m: f64,
     pub centre_m: [f64; 2],
     /// Standard deviation of the places, m.
     pub x_sd_m: f64,
-    /// Sum of the squared places from the mean of their stroke, m^2: the variance of `slope` is that of a
-    /// height over it.
+    /// Sum of the squared distances from the mean place of each stroke, m^2. The variance of `slope` is that of a
+    /// height divided by this sum.
     pub slope_information_m2: f64,
     /// The same of the bend, m^4; zero where no curvature shows.
     pub bend_information_m4: f64,
@@ -25,7 +25,7 @@ pub(super) struct GlassLine {
     pub on_glass: Vec<bool>,
     /// Height above the line, m, of every point; infinite in a stroke without a point on the glass.
     pub residuals_m: Vec<f64>,
-    /// Numbers that were fitted.
+    /// Number of fitted coefficients.
     pub fitted: usize,
 }
 
@@ -50,11 +50,14 @@ impl GlassLine {
     pub(super) fn fit_through(path: &TipPath, on_glass: Vec<bool>) -> Self {
         let used = || path.points.iter().zip(&on_glass).filter(|(_, on)| **on).map(|(point, _)| point);
         let count = used().count() as f64;
-        let centre_m =
-            [used().map(|p| p.x_m).sum::<f64>() / count, used().map(|p| p.y_m).sum::<f64>() / count];
+        let mean = |of: fn(&TipPoint) -> f64| used().map(of).sum::<f64>() / count;
+        let centre_m = [mean(|p| p.x_m), mean(|p| p.y_m)];
         let means = stroke_means(path.strokes, used(), centre_m);
-        let all: Vec<CentredPoint> =
-            path.points.iter().map(|point| centre_point(point, centre_m, &means[point.stroke])).collect();
+        let centred = |point: &TipPoint| {
+            let (mean, x) = (&means[point.stroke], point.x_m - centre_m[0]);
+            CentredPoint { x: x - mean.x, x2: x * x - mean.x2, y: point.y_m - centre_m[1] - mean.y }
+        };
+        let all: Vec<CentredPoint> = path.points.iter().map(centred).collect();
         let fitted = || all.iter().zip(&on_glass).filter(|(_, on)| **on).map(|(point, _)| point);
         let sum = |value: &dyn Fn(&CentredPoint) -> f64| fitted().map(value).sum::<f64>();
         let xx = sum(&|p| p.x * p.x);
@@ -102,34 +105,25 @@ fn stroke_means<'a>(
     sums
 }
 
-fn centre_point(point: &TipPoint, centre_m: [f64; 2], mean: &StrokeSums) -> CentredPoint {
-    let x = point.x_m - centre_m[0];
-    CentredPoint { x: x - mean.x, x2: x * x - mean.x2, y: point.y_m - centre_m[1] - mean.y }
-}
-
-// Which frames have the tip on the glass: those near the line that most frames lie on.
-
-/// Blocks of frames whose medians give the first line: enough for a steady median of slopes, few enough for
-/// all pairs.
+/// Number of blocks of frames for the first line: enough for a robust median slope, few enough for all pairs.
 const SLOPE_BLOCKS: usize = 64;
-/// Least distance of two blocks whose slope counts, as a share of the travel: noise makes the slopes of
-/// nearer ones arbitrary.
+/// Least distance of two blocks whose slope counts, as a share of the travel: noise dominates shorter ones.
 const OUTLYING_PLACES: f64 = 0.25;
-/// Standard deviations from the line within which the tip lies on the glass: 1 frame of 16,000 is lost by
-/// chance.
+/// Largest distance from the line of a tip on the glass, in standard deviations: chance exceeds it in 1 frame of
+/// 16,000.
 const NEAR_DEVIATIONS: f64 = 4.0;
 /// Median of |x| of a standard normal variable.
 const NORMAL_MEDIAN: f64 = 0.674_489_75;
-/// Least distance that is off the glass, m: below it lies the rounding of a trace without noise.
+/// Distance from the line that always counts as on the glass, m: the rounding of a trace without noise.
 const LEAST_DISTANCE_M: f64 = 1e-9;
-/// Share of the travel that a place may lie beyond it: farther ones are outliers.
+/// Largest distance of a place beyond the travel, as a share of it; farther ones are outliers.
 const BEYOND_STEPS: f64 = 0.1;
 /// Most repetitions; the frames on the glass rarely change after five.
 const MOST_REPETITIONS: usize = 30;
 
-/// The line through the frames with the tip on the glass. The first line is the median of the slopes between
-/// blocks of frames, which a quarter of wrong blocks does not move; it is then fitted to the frames near it,
-/// until these stay the same.
+/// Fits a line through the frames with the tip on the glass. The first line has the median slope between blocks of
+/// frames, which tolerates a quarter of wrong blocks. It is then fitted to the frames near it until these no longer
+/// change.
 pub(super) fn fit_glass_line(path: &TipPath, travel_m: f64, step_m: f64) -> GlassLine {
     let within = inliers_along_sweep(path);
     let first = distances_from_line(path, median_slope(path, travel_m));
@@ -154,10 +148,9 @@ fn inliers_along_sweep(path: &TipPath) -> Vec<bool> {
     path.points.iter().map(|p| p.x_m >= low - beyond && p.x_m <= high + beyond).collect()
 }
 
-/// The points whose distance from the line is that of noise or of the step in which heights are written.
+/// Which points are as near the line as noise, or the step of the heights, explains.
 fn points_near_line(distances_m: &[f64], within: &[bool], step_m: f64) -> Vec<bool> {
-    let mut sizes: Vec<f64> = distances_m.iter().map(|distance| distance.abs()).collect();
-    let scale = median_in_place(&mut sizes) / NORMAL_MEDIAN;
+    let scale = median_or_zero(distances_m.iter().map(|distance| distance.abs())) / NORMAL_MEDIAN;
     let limit = (NEAR_DEVIATIONS * scale.max(step_m)).max(LEAST_DISTANCE_M);
     distances_m.iter().zip(within).map(|(distance, within)| *within && distance.abs() <= limit).collect()
 }
@@ -167,7 +160,7 @@ fn distances_from_line(path: &TipPath, slope: f64) -> Vec<f64> {
     path.points_by_stroke()
         .flat_map(|stroke| {
             let height = |point: &TipPoint| point.y_m - slope * point.x_m;
-            let middle = median_in_place(&mut stroke.iter().map(height).collect::<Vec<_>>());
+            let middle = median_or_zero(stroke.iter().map(height));
             stroke.iter().map(move |point| height(point) - middle)
         })
         .collect()
@@ -178,41 +171,33 @@ fn median_slope(path: &TipPath, travel_m: f64) -> f64 {
     let length = path.points.len().div_ceil(SLOPE_BLOCKS);
     let mut slopes = vec![];
     for stroke in path.points_by_stroke() {
-        let blocks: Vec<(f64, f64)> = stroke.chunks(length).map(block_middle).collect();
+        let median = |block: &[TipPoint], of: fn(&TipPoint) -> f64| median_or_zero(block.iter().map(of));
+        let middle = |block: &[TipPoint]| (median(block, |p| p.x_m), median(block, |p| p.y_m));
+        let blocks: Vec<(f64, f64)> = stroke.chunks(length).map(middle).collect();
         for (i, a) in blocks.iter().enumerate() {
             let far = blocks[..i].iter().filter(|b| (a.0 - b.0).abs() > OUTLYING_PLACES * travel_m);
             slopes.extend(far.map(|b| (a.1 - b.1) / (a.0 - b.0)));
         }
     }
-    if slopes.is_empty() { 0.0 } else { median_in_place(&mut slopes) }
+    median_or_zero(slopes.into_iter())
 }
 
-/// Median place and height of a block.
-fn block_middle(block: &[TipPoint]) -> (f64, f64) {
-    let median_of =
-        |value: fn(&TipPoint) -> f64| median_in_place(&mut block.iter().map(value).collect::<Vec<_>>());
-    (median_of(|point| point.x_m), median_of(|point| point.y_m))
+/// Median; 0 without values.
+fn median_or_zero(values: impl Iterator<Item = f64>) -> f64 {
+    median_in_place(&mut values.collect::<Vec<_>>()).unwrap_or(0.0)
 }
 
-/// Median of at least one value.
-fn median_in_place(values: &mut [f64]) -> f64 {
-    let middle = values.len() / 2;
-    *values.select_nth_unstable_by(middle, f64::total_cmp).1
-}
-
-// The path of the tip, stroke by stroke.
-
-/// Most frames looked at, every n-th of a longer recording: they give the angle far better than it matters.
+/// Most frames that are used, every n-th of a longer recording: they give the angle far better than needed.
 const MOST_FRAMES: usize = 100_000;
-/// Share of the places of a stroke at either end that do not count for its travel, so that outliers do not.
+/// Share of the places at either end that the travel of a stroke leaves out, because they may be outliers.
 const TRIMMED: f64 = 0.01;
 
 /// The tip in a frame that has both its coordinates.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct TipPoint {
-    /// Its number among the frames that are looked at.
+    /// Index among the frames that are used.
     pub frame: usize,
-    /// Stroke that it belongs to: the number of turns before it.
+    /// Index of its stroke: the number of turns before it.
     pub stroke: usize,
     pub x_m: f64,
     pub y_m: f64,
@@ -262,26 +247,22 @@ fn stroke_travel_m(stroke: &[TipPoint]) -> f64 {
     let mut places: Vec<f64> = stroke.iter().map(|point| point.x_m).collect();
     places.sort_unstable_by(f64::total_cmp);
     let trimmed = (TRIMMED * places.len() as f64) as usize;
-    match (places.get(trimmed), places.get(places.len().saturating_sub(1 + trimmed))) {
-        (Some(low), Some(high)) => high - low,
-        _ => 0.0,
-    }
+    let ends = places.get(trimmed).zip(places.get(places.len().saturating_sub(1 + trimmed)));
+    ends.map_or(0.0, |(low, high)| high - low)
 }
 
-// How far correlated errors let a fitted line stray.
-
-/// Most values whose correlation is looked at: longer recordings are averaged in groups of frames, which
-/// leaves the slow errors that matter for a slope.
+/// Most values for the correlation of errors. Longer recordings are averaged in groups of frames, which keeps the
+/// slow errors that matter for a slope.
 const MOST_VALUES: usize = 20_000;
-/// Lags that the sum of correlations reaches over, in units of that sum: five correlation times (Sokal 1997).
-/// What lies beyond is noise of the estimate.
+/// Largest lag in the sum of correlations, in units of that sum: five correlation times (Sokal 1997). Longer lags
+/// add noise only.
 const WINDOW: f64 = 2.5;
-/// Least share of the variance of errors that a fit leaves in the residuals; below it their correlation
-/// reaches over the whole recording.
+/// Least share of the variance of the errors that is assumed to remain in the residuals of a fit. It would be lower
+/// for errors that are correlated over the whole recording.
 const LEAST_LEFT: f64 = 0.1;
 
-/// Variance of the heights about the line as a slow line sees it, m^2: that of a frame times the number of
-/// frames over which errors are alike. A sum of `n` errors has `n` times this variance.
+/// Long-run variance of the heights about the line, m^2: the variance of a frame times the number of frames over which
+/// errors are correlated. A sum of `n` errors has `n` times this variance.
 pub(super) fn long_run_variance(path: &TipPath, line: &GlassLine) -> f64 {
     let group = path.points.len().div_ceil(MOST_VALUES);
     let values = group_averages(path, line, group);
@@ -291,7 +272,7 @@ pub(super) fn long_run_variance(path: &TipPath, line: &GlassLine) -> f64 {
         return 0.0;
     }
     let (alike, lags) = correlated_values(&values, variance);
-    // every fitted number takes its share of each covariance
+    // each fitted coefficient reduces every covariance
     let taken = line.fitted as f64 * (1 + 2 * lags) as f64 / present;
     group as f64 * variance * alike / (1.0 - taken).max(LEAST_LEFT)
 }
@@ -311,8 +292,8 @@ fn group_averages(path: &TipPath, line: &GlassLine, group: usize) -> Vec<Option<
     sums.into_iter().map(|(sum, count)| (count > 0).then(|| sum / count as f64)).collect()
 }
 
-/// Number of values over which errors are alike, at least 1: one and twice the sum of the correlations; and
-/// the lags of that sum, [`WINDOW`] times as many.
+/// Number of values over which errors are correlated, at least 1: one plus twice the sum of the correlations. With the
+/// largest lag of that sum, [`WINDOW`] times as many.
 fn correlated_values(values: &[Option<f64>], variance: f64) -> (f64, usize) {
     let (mut alike, mut lags) = (1.0, 0);
     for lag in 1..values.len() / 2 {
