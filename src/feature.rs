@@ -1,9 +1,8 @@
-//! Features: values read by the same code from a recording and from a model's recording, by jobs and studies
-//! alike. Every kind is a row of the table in `feature/reading.rs`; `docs/fits.md` and `docs/sweeps.md` list
-//! them.
+//! Features: values that the same code reads from a recording and from the recording of a model, for jobs and
+//! studies. Every kind is a row of the table in `feature/reading.rs`; `docs/fits.md` and `docs/sweeps.md` list them.
 //!
-//! A window's instants are found in each recording by itself, so model and measurement need not share a
-//! clock. What only a simulated run knows ([`ContactReading`]) is read with its [`RunRecord`].
+//! The instants of a window are found in each recording separately, so model and measurement need not share a clock.
+//! Readings that only a simulated run has are read from its [`RunRecord`].
 
 mod contact;
 mod deflection;
@@ -29,20 +28,18 @@ use serde::Serialize;
 pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH, CycleRangeEnd, FeatureBand};
 pub use value::{FeatureUnit, FeatureValue, LengthCalibration, RunnerUpComponent, ValueComparison};
 
-/// Least relative standard deviation of a measured frequency. Reading a peak of 0.15 s leaves 0.03 Hz at 78
-/// Hz (4e-4) without any noise, and the model is read through another window of the same length.
+/// Least relative standard deviation of a measured frequency. Without noise, a window of 0.15 s gives a peak at 78 Hz to
+/// 0.03 Hz (4e-4), and the model is read through another window of the same length.
 pub(crate) const FREQUENCY_SD_FLOOR: f64 = 1e-3;
 
-// Features of several conditions, each read from the recording of its own.
-
-/// A reading with its name and the condition that it belongs to.
+/// A reading with its name and its condition.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Feature {
     /// Name in the job.
     pub name: String,
     /// What is read.
     pub reading: Reading,
-    /// From which condition of the job, counted from 0.
+    /// Index of the condition of the job, counted from 0.
     pub condition: usize,
 }
 
@@ -59,8 +56,8 @@ impl Feature {
         self.reading.read(None, &FeatureReader::new(recording, instants))
     }
 
-    /// Reads it from a recording that other features are read from too; a frequency is that of the component
-    /// assigned to the `target`, Hz ([`Reading::read`]).
+    /// Reads it through a reader that other features share; a frequency is that of the component assigned to the
+    /// `target`, Hz ([`Reading::read`]).
     ///
     /// # Errors
     /// [`MissingValue`] with the reason.
@@ -73,7 +70,7 @@ impl Feature {
     }
 }
 
-/// Every feature of a set of recordings, one a condition, in order.
+/// Reads every feature from a set of recordings, one for each condition.
 #[must_use]
 pub fn read_features(
     features: &[Feature],
@@ -82,25 +79,22 @@ pub fn read_features(
     read_assigned_features(features, &[], &recordings.iter().collect::<Vec<_>>())
 }
 
-/// The same of a model, whose components are assigned to targets: one a feature, in its unit; none for what
-/// is beyond the end.
+/// Reads every feature from the recordings of a model. `targets` has one value per feature, in its unit, to which
+/// components are assigned; features beyond its end have no target.
 #[must_use]
 pub fn read_assigned_features(
     features: &[Feature],
     targets: &[f64],
     recordings: &[&Recording],
 ) -> Vec<Result<FeatureValue, MissingValue>> {
-    let instants: Vec<ReversalInstants> =
-        recordings.iter().map(|recording| ReversalInstants::find_instants(recording)).collect();
-    let readers: Vec<FeatureReader> = recordings
-        .iter()
-        .zip(&instants)
-        .map(|(recording, instants)| FeatureReader::new(recording, instants))
-        .collect();
+    let find = |recording: &&Recording| ReversalInstants::find_instants(recording);
+    let instants: Vec<ReversalInstants> = recordings.iter().map(find).collect();
+    let both = recordings.iter().zip(&instants);
+    let readers: Vec<FeatureReader> =
+        both.map(|(recording, instants)| FeatureReader::new(recording, instants)).collect();
     let read = |(at, feature): (usize, &Feature)| {
-        let reader = readers
-            .get(feature.condition)
-            .ok_or(MissingValue::NoRecording { number: feature.condition + 1 })?;
+        let absent = MissingValue::NoRecording { number: feature.condition + 1 };
+        let reader = readers.get(feature.condition).ok_or(absent)?;
         feature.read_assigned(targets.get(at).copied(), reader)
     };
     features.iter().enumerate().map(read).collect()

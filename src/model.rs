@@ -13,8 +13,8 @@
 //! n   = ((m_a - M l1) sin theta, (m_b - M l2) sin phi)
 //! ```
 //!
-//! Everything that contact needs follows from two solutions of that 2x2 system ([`FrictionResponse`]): the motion
-//! without friction and the motion per unit of friction force.
+//! Contact needs two solutions of this 2x2 system ([`FrictionResponse`]): the motion without friction and the motion
+//! per unit of friction force.
 
 pub mod flight;
 pub mod friction;
@@ -60,7 +60,7 @@ pub struct Linkage {
     pub preload_displacement_m: f64,
     /// Friction between lip tip and glass.
     pub friction: FrictionLaw,
-    /// The shoulder that the neck may lean on.
+    /// Shoulder of the head; `None` for a blade without one.
     pub shoulder: Option<Shoulder>,
 }
 
@@ -121,8 +121,8 @@ impl LinkDirections {
     }
 }
 
-/// The blade's answer to a friction force `f` at one instant: `qdd = free + f per_force`, `v3dd = a_free +
-/// kappa f`, `N = n_free + nu f`.
+/// Response of the blade to a friction force `f` at one instant: `qdd = free + f per_force`, `v3dd = a_free + kappa f`,
+/// `N = n_free + nu f`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionResponse {
     /// Angular accelerations without friction, rad/s2.
@@ -140,7 +140,7 @@ pub struct FrictionResponse {
 }
 
 impl Linkage {
-    /// Solves equations (1) to (3) for a friction force that is left open.
+    /// Solves equations (1) to (3) as linear functions of the friction force.
     #[inline]
     #[must_use]
     pub fn friction_response(
@@ -158,7 +158,7 @@ impl Linkage {
         let sin_difference = st * cp - ct * sp;
         let (arm1, arm2) = (self.m_a - mass * l1, self.m_b - mass * l2);
 
-        // normal force with the angular accelerations left out, equation (3)
+        // normal force at zero angular acceleration, equation (3)
         let drop = l1 * (1.0 - ct) + l2 * (1.0 - cp);
         let drop_rate = l1 * st * dt + l2 * sp * dp;
         let n0 = arm1 * ct * dt2 + arm2 * cp * dp2
@@ -208,8 +208,7 @@ impl Linkage {
         }
     }
 
-    /// Stiffness and damping that act on the neck while it leans on this side, and the moment they leave at
-    /// zero angle and rate.
+    /// Stiffness and damping of the neck while it leans on this side, and the moment at zero angle and rate.
     fn neck_spring(&self, lean: ShoulderContact) -> [f64; 3] {
         let Spring { stiffness, damping } = self.neck;
         match (lean, &self.shoulder) {
@@ -256,7 +255,7 @@ impl Linkage {
         self.energy_with_drop_j(pose, d, head, (self.head_drop_m(d), self.head_drop_rate_m_per_s(pose, d)))
     }
 
-    /// The same for any drop of the head, m, and its rate, m/s: those of flight too.
+    /// Energy, J, for any drop of the head, m, and its rate, m/s, also in flight.
     #[must_use]
     pub fn energy_with_drop_j(
         &self,
@@ -280,9 +279,8 @@ impl Linkage {
         along + down + turning + springs + self.shoulder.map_or(0.0, |s| s.energy_j(pose.theta))
     }
 
-    /// Power that flows in: the drive's, minus that of dampers and friction, W. `force` is the friction force
-    /// on the tip, `rates` the angular accelerations; the drive's force follows from the momentum along the
-    /// sweep.
+    /// Power that flows in, W: that of the drive and of friction, minus that of the dampers. `force` is the friction
+    /// force on the tip, N; the drive's force follows from the momentum along the sweep.
     #[must_use]
     pub fn power_w(
         &self,
@@ -297,7 +295,7 @@ impl Linkage {
         self.power_with_drop_w(pose, d, head, lean, force, accelerations, drop_rate)
     }
 
-    /// The same for any rate of the head's drop, m/s: that of flight too.
+    /// Power that flows in, W, for any rate of the head's drop, m/s, also in flight.
     #[allow(clippy::too_many_arguments)] // a state with its forces, as the equations name them
     #[must_use]
     pub fn power_with_drop_w(

@@ -1,8 +1,7 @@
-//! What only a simulated run knows of the contact: stick, changes of mode, forces.
+//! Readings of the contact that only a simulated run has: stick, changes of mode, forces.
 
 use super::missing::MissingValue;
-use super::reader::FeatureReader;
-use super::reader::RunRecord;
+use super::reader::{FeatureReader, RunRecord};
 use crate::recording::channel::{Window, WindowEnd};
 use crate::simulate::mode::TipMode;
 use crate::simulate::outputs::EnergyAudit;
@@ -45,31 +44,29 @@ impl ContactReading {
     /// The window that it is read from, where it has one.
     pub(crate) fn window(&self) -> Option<&Window> {
         match self {
-            Self::StickFraction(window) | Self::LongestStick(window) | Self::Transitions(window) => {
-                Some(window)
-            }
-            Self::ContactLoss | Self::LeastNormalForce | Self::Jam | Self::LeastPainleveIndicator => None,
+            Self::StickFraction(w) | Self::LongestStick(w) | Self::Transitions(w) => Some(w),
+            _ => None,
         }
     }
 
-    /// Whether it is known from a run that ended like this. A count or a share is not: what comes after the
-    /// end would belong to it.
+    /// Whether a run that ended early with this status still gives its value. A count or a share would need the rest
+    /// of the run.
     pub(super) fn is_known_after(self, end: RunStatus) -> bool {
         match self {
             Self::ContactLoss | Self::LeastNormalForce => end == RunStatus::ContactLost,
             Self::Jam | Self::LeastPainleveIndicator => end == RunStatus::Jammed,
-            Self::StickFraction(_) | Self::LongestStick(_) | Self::Transitions(_) => false,
+            _ => false,
         }
     }
 
-    /// Whether it takes the extremes over a run, which cost work.
+    /// Whether it needs the extremes over a run, which cost time.
     pub(super) fn needs_audit(self) -> bool {
         matches!(self, Self::LeastNormalForce | Self::LeastPainleveIndicator)
     }
 
     /// Its value, in its unit.
     pub(super) fn value(self, reader: &FeatureReader) -> Result<f64, MissingValue> {
-        let run = reader.run().ok_or(MissingValue::NoRun)?;
+        let run = reader.run.ok_or(MissingValue::NoRun)?;
         match self {
             Self::StickFraction(window) => {
                 let [from, to] = window_ends_s(&window, reader, run)?;
@@ -84,21 +81,16 @@ impl ContactReading {
                 let inside = run.transitions.iter().filter(|t| (from..=to).contains(&t.time_s));
                 Ok(inside.count() as f64)
             }
-            Self::ContactLoss => first_occurrence_s(run, |t| t.to == TipMode::Flight, RunStatus::ContactLost),
-            Self::Jam => {
-                first_occurrence_s(run, |t| t.cause == TransitionCause::JamImpact, RunStatus::Jammed)
-            }
-            // in contact the force is zero or above; where contact is lost, rounding may say otherwise
-            Self::LeastNormalForce => {
-                audit_extreme(run, |audit| audit.min_normal_force_n).map(|force_n| force_n.max(0.0))
-            }
-            Self::LeastPainleveIndicator => audit_extreme(run, |audit| audit.min_painleve_indicator),
+            Self::ContactLoss => first_time_s(run, |t| t.to == TipMode::Flight, RunStatus::ContactLost),
+            Self::Jam => first_time_s(run, |t| t.cause == TransitionCause::JamImpact, RunStatus::Jammed),
+            // rounding may make the force negative where contact is lost
+            Self::LeastNormalForce => extreme(run, |audit| audit.min_normal_force_n).map(|n| n.max(0.0)),
+            Self::LeastPainleveIndicator => extreme(run, |audit| audit.min_painleve_indicator),
         }
     }
 }
 
-/// Start and end of a window, s: exact where it is given in seconds or by an instant, to a frame where it is
-/// a phase.
+/// Start and end of a window, s: exact for seconds and instants, to a frame for a phase.
 fn window_ends_s(window: &Window, reader: &FeatureReader, run: &RunRecord) -> Result<[f64; 2], MissingValue> {
     let frames = reader.window_frames(window)?;
     let end = |end: WindowEnd, open_s: f64, frame: usize| {
@@ -106,9 +98,9 @@ fn window_ends_s(window: &Window, reader: &FeatureReader, run: &RunRecord) -> Re
             WindowEnd::Open => open_s,
             WindowEnd::Time(time_s) => time_s,
             WindowEnd::Found { anchor, reversal, offset_s } => {
-                reader.instants().time_s(anchor, reversal).map_err(MissingValue::Instant)? + offset_s
+                reader.instants.time_s(anchor, reversal).map_err(MissingValue::Instant)? + offset_s
             }
-            WindowEnd::Phase { .. } => reader.time_s(frame),
+            WindowEnd::Phase { .. } => reader.recording.grid().time_s(frame),
         })
     };
     let [start_s, stop_s] = run.span_s;
@@ -120,8 +112,8 @@ fn stick_lengths_s(run: &RunRecord, [from, to]: [f64; 2]) -> impl Iterator<Item 
     run.stick_s.iter().map(move |[start, end]| end.min(to) - start.max(from)).filter(|length| *length > 0.0)
 }
 
-/// When a transition like this first happens, or the run ends like this, s.
-fn first_occurrence_s(
+/// Time of the first transition that `is` selects, or of the end of a run with the status `end`, s.
+fn first_time_s(
     run: &RunRecord,
     is: impl Fn(&Transition) -> bool,
     end: RunStatus,
@@ -131,6 +123,6 @@ fn first_occurrence_s(
     during.or(at_the_end).ok_or(MissingValue::Never)
 }
 
-fn audit_extreme(run: &RunRecord, of: fn(&EnergyAudit) -> Option<f64>) -> Result<f64, MissingValue> {
+fn extreme(run: &RunRecord, of: fn(&EnergyAudit) -> Option<f64>) -> Result<f64, MissingValue> {
     run.audit.as_ref().and_then(of).ok_or(MissingValue::Never)
 }

@@ -36,14 +36,14 @@ impl ReversalInterval {
         reversal: usize,
         reader: &FeatureReader,
     ) -> Result<FeatureValue, MissingValue> {
-        let at = |anchor| reader.instants().time_s(anchor, reversal).map_err(MissingValue::Instant);
+        let at = |anchor| reader.instants.time_s(anchor, reversal).map_err(MissingValue::Instant);
         let length_s = match self {
             Self::ReleaseAfterReversal => at(InstantKind::Release)? - at(InstantKind::Reversal)?,
             Self::StickDuration => at(InstantKind::Release)? - at(InstantKind::Hold)?,
             Self::FlipAfterReversal => at(InstantKind::Flip)? - at(InstantKind::Reversal)?,
             Self::FlipDuration => {
                 let start_s = at(InstantKind::Flip)?;
-                let flip = reader.instants().numbered(reversal).and_then(|found| found.flip);
+                let flip = reader.instants.numbered(reversal).and_then(|found| found.flip);
                 flip.map_or(start_s, |flip| flip.end_s) - start_s
             }
         };

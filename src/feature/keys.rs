@@ -1,17 +1,17 @@
-//! The keys of a job's `[[feature]]` and a study's `[[map]]` that say what is read, and their checks.
+//! The keys of a job's `[[feature]]` and a study's `[[map]]` that select what is read, and their checks.
 
 use super::spectral::FeatureBand;
 use crate::recording::channel::{Channel, Window};
 use crate::spectrum::Detrend;
 use crate::toml_file::{KeyRefusal, NumberPair, check_above_zero, refuse_key};
 
-/// Relative half width of the speeds that count as one, unless the file says otherwise: several cycles of
-/// chatter pass within it, and the friction hardly changes.
+/// Default relative half width of the range of speeds around a given speed: several cycles of chatter pass within it, and
+/// friction hardly changes.
 pub const WIDTH_RELATIVE: f64 = 0.15;
-/// Largest relative half width of the speeds that count as one.
+/// Largest relative half width of that range.
 const WIDEST_RELATIVE: f64 = 0.5;
 
-/// Every key that says what is read: the one list from which [`Keys`] and the tables of TOML are made.
+/// The list of keys from which [`Keys`] and the structs of TOML tables are made.
 macro_rules! with_reading_keys {
     ($define:ident { $($own:tt)* }) => {
         $define! {
@@ -35,23 +35,22 @@ macro_rules! with_reading_keys {
 
 macro_rules! define_keys {
     ({} $(#[doc = $doc:literal] $key:ident: $type:ty),*) => {
-        /// The keys of an entry that say what is read.
+        /// The keys of an entry that select what is read.
         #[derive(Debug, Default)]
         pub struct Keys { $(pub $key: Option<$type>),* }
 
         impl Keys {
             /// Those that are given.
             fn given_keys(&self) -> impl Iterator<Item = &'static str> {
-                [$((stringify!($key), self.$key.is_some())),*]
-                    .into_iter()
-                    .filter_map(|(key, given)| given.then_some(key))
+                let keys = [$(self.$key.is_some().then_some(stringify!($key))),*];
+                keys.into_iter().flatten()
             }
         }
     };
 }
 with_reading_keys!(define_keys {});
 
-/// A table of TOML with a `kind`, keys of its own and those that say what is read.
+/// Defines the struct of a TOML table with a `kind`, keys of its own and the keys of a reading.
 macro_rules! define_entry {
     ({ $meaning:literal $name:ident { $(#[doc = $own_doc:literal] $own:ident: $own_type:ty),* $(,)? } }
      $(#[doc = $doc:literal] $key:ident: $type:ty),*) => {
@@ -74,17 +73,17 @@ macro_rules! define_entry {
 }
 pub(crate) use {define_entry, with_reading_keys};
 
-/// An entry of a file that says what is read.
+/// An entry of a file that selects what is read.
 pub struct ReadingEntry<'a> {
     /// Its name in messages: "feature `x` (rms)".
     pub name: &'a str,
-    /// What an entry of the file is called: `feature` or `map`.
+    /// Name of the table in the file: `feature` or `map`.
     pub noun: &'a str,
     /// Its keys.
     pub keys: &'a Keys,
     /// Half the camera's frame rate, Hz, where it is known.
     pub nyquist_hz: Option<f64>,
-    /// Whether what is read may have noise.
+    /// Whether the recording may have noise.
     pub noisy: bool,
 }
 
@@ -94,17 +93,21 @@ impl ReadingEntry<'_> {
         format!("{}, `{key}`", self.name)
     }
 
+    pub(super) fn refuse<T>(&self, key: &str, problem: impl Into<String>) -> Result<T, KeyRefusal> {
+        refuse_key(self.describe_key(key), problem)
+    }
+
     /// Checks that each key that is given has a meaning.
     pub(crate) fn check_keys(&self, known: &[&str]) -> Result<(), KeyRefusal> {
         let Some(key) = self.keys.given_keys().find(|key| !known.contains(key)) else { return Ok(()) };
         let takes = if known.is_empty() { "none of its own".to_owned() } else { known.join(", ") };
-        refuse_key(
-            self.describe_key(key),
+        self.refuse(
+            key,
             format!("has no meaning for this kind of {}, which takes {takes}; remove it", self.noun),
         )
     }
 
-    /// A number above 0 that has to be there.
+    /// A required number above 0.
     pub(crate) fn require_positive(
         &self,
         key: &str,
@@ -113,17 +116,16 @@ impl ReadingEntry<'_> {
     ) -> Result<f64, KeyRefusal> {
         match found {
             Some(found) => check_above_zero(self.describe_key(key), found),
-            None => refuse_key(self.describe_key(key), format!("missing; expected {expected}")),
+            None => self.refuse(key, format!("missing; expected {expected}")),
         }
     }
 
     pub(crate) fn parse_window(&self) -> Result<Window, KeyRefusal> {
         match self.window_if_given()? {
             Some(window) => Ok(window),
-            None => refuse_key(
-                self.describe_key("window"),
-                "missing; expected a window such as \"release+0.02..release+0.20\"",
-            ),
+            None => {
+                self.refuse("window", "missing; expected a window such as \"release+0.02..release+0.20\"")
+            }
         }
     }
 
@@ -133,17 +135,18 @@ impl ReadingEntry<'_> {
     }
 
     fn window_if_given(&self) -> Result<Option<Window>, KeyRefusal> {
-        let parse = |text: &String| {
-            Window::parse(text).or_else(|error| refuse_key(self.describe_key("window"), error.to_string()))
-        };
+        let parse =
+            |text: &String| Window::parse(text).or_else(|error| self.refuse("window", error.to_string()));
         self.keys.window.as_ref().map(parse).transpose()
     }
 
     pub(crate) fn parse_band(&self) -> Result<FeatureBand, KeyRefusal> {
-        let names = || Channel::ALL.map(Channel::name).join(", ");
         match &self.keys.channel {
             Some(channel) => self.parse_band_of_channel(channel),
-            None => refuse_key(self.describe_key("channel"), format!("missing; expected one of {}", names())),
+            None => self.refuse(
+                "channel",
+                format!("missing; expected one of {}", Channel::ALL.map(Channel::name).join(", ")),
+            ),
         }
     }
 
@@ -153,18 +156,17 @@ impl ReadingEntry<'_> {
     }
 
     fn parse_band_of_channel(&self, channel: &str) -> Result<FeatureBand, KeyRefusal> {
-        let channel = Channel::parse(channel)
-            .or_else(|error| refuse_key(self.describe_key("channel"), error.to_string()))?;
+        let channel = Channel::parse(channel).or_else(|error| self.refuse("channel", error.to_string()))?;
         let band_hz = self.band_hz()?;
         let detrend = self.keys.detrend.as_deref().map_or(Ok(Detrend::default()), Detrend::parse);
-        let detrend = detrend.or_else(|error| refuse_key(self.describe_key("detrend"), error.to_string()))?;
+        let detrend = detrend.or_else(|error| self.refuse("detrend", error.to_string()))?;
         let least_amplitude_m = self.least_amplitude_m()?;
         Ok(FeatureBand { channel, window: self.parse_window()?, band_hz, detrend, least_amplitude_m })
     }
 
     fn band_hz(&self) -> Result<(f64, f64), KeyRefusal> {
         let Some(NumberPair([low, high])) = self.keys.band_hz else {
-            return refuse_key(self.describe_key("band_hz"), "missing; expected [lowest, highest] frequency");
+            return self.refuse("band_hz", "missing; expected [lowest, highest] frequency");
         };
         let expected = match self.nyquist_hz {
             _ if !(low.is_finite() && high.is_finite() && 0.0 <= low && low < high) => {
@@ -176,7 +178,7 @@ impl ReadingEntry<'_> {
             ),
             _ => return Ok((low, high)),
         };
-        refuse_key(self.describe_key("band_hz"), format!("found [{low}, {high}], expected {expected}"))
+        self.refuse("band_hz", format!("found [{low}, {high}], expected {expected}"))
     }
 
     fn least_amplitude_m(&self) -> Result<f64, KeyRefusal> {
@@ -184,8 +186,8 @@ impl ReadingEntry<'_> {
         if least_m.is_finite() && least_m >= 0.0 {
             return Ok(least_m);
         }
-        refuse_key(
-            self.describe_key("least_amplitude_m"),
+        self.refuse(
+            "least_amplitude_m",
             format!("found {least_m}, expected a finite number of 0 or more, in m"),
         )
     }
@@ -193,32 +195,28 @@ impl ReadingEntry<'_> {
     /// Number of a reversal, counted from 1.
     pub(crate) fn reversal_number(&self) -> Result<usize, KeyRefusal> {
         match self.keys.reversal {
-            Some(0) => refuse_key(
-                self.describe_key("reversal"),
-                "found 0, expected 1 or more: the first reversal is 1",
-            ),
+            Some(0) => self.refuse("reversal", "found 0, expected 1 or more: the first reversal is 1"),
             reversal => Ok(reversal.unwrap_or(1)),
         }
     }
 
-    /// The part of a stroke in which a speed is sought: `part` of the reversal, or a window.
+    /// The window in which a speed is sought: the `part` of a reversal, or `window`.
     pub(crate) fn stroke_window(&self) -> Result<Window, KeyRefusal> {
         match (self.keys.part.as_deref(), &self.keys.window) {
             (Some(part @ ("before" | "after")), None) => {
                 Window::parse(&format!("{part}[{}]", self.reversal_number()?))
-                    .or_else(|error| refuse_key(self.describe_key("part"), error.to_string()))
+                    .or_else(|error| self.refuse("part", error.to_string()))
             }
-            (Some(part), None) => refuse_key(
-                self.describe_key("part"),
-                format!("found \"{part}\", expected \"before\" or \"after\" (the flip)"),
-            ),
+            (Some(part), None) => {
+                self.refuse("part", format!("found \"{part}\", expected \"before\" or \"after\" (the flip)"))
+            }
             (None, Some(_)) if self.keys.reversal.is_none() => self.parse_window(),
-            (None, Some(_)) => refuse_key(
-                self.describe_key("reversal"),
+            (None, Some(_)) => self.refuse(
+                "reversal",
                 "has no meaning together with `window`; write it into the window, such as \"after[2]\"",
             ),
-            _ => refuse_key(
-                self.describe_key("part"),
+            _ => self.refuse(
+                "part",
                 "expected either `part` = \"before\" or \"after\" (the flip), or `window`; give one of them",
             ),
         }
@@ -229,8 +227,8 @@ impl ReadingEntry<'_> {
         if width > 0.0 && width <= WIDEST_RELATIVE {
             return Ok(width);
         }
-        refuse_key(
-            self.describe_key("width_relative"),
+        self.refuse(
+            "width_relative",
             format!(
                 "found {width}, expected above 0 and at most {WIDEST_RELATIVE}: 0.15 takes speeds within 15 %"
             ),

@@ -5,9 +5,10 @@ use crate::simulate::RunStatus;
 use crate::spectrum::SpectrumError;
 use serde::{Deserialize, Serialize};
 
-/// Fewest cycles in each half: below, the lobe of the Hann window reaches its own mirror image.
+/// Fewest cycles in each half of a window: with fewer, the main lobe of the Hann window overlaps its mirror image at
+/// negative frequencies.
 pub(crate) const LEAST_CYCLES: f64 = 3.0;
-/// Fewest tracked frames with the speed asked for.
+/// Fewest tracked frames with the requested speed.
 pub(crate) const FEWEST_AT_SPEED: usize = 8;
 
 /// Why a recording or a run does not give a value.
@@ -139,7 +140,7 @@ pub enum MissingValue {
 }
 
 impl MissingValue {
-    /// The same in one word.
+    /// The reason without its numbers, as tables and legends name it.
     #[must_use]
     pub fn reason(&self) -> MissingReason {
         match self {
@@ -160,65 +161,47 @@ impl MissingValue {
     }
 }
 
-// Why there is no value, in one word: the reasons that tables, journals and legends name.
+macro_rules! reasons {
+    ($($reason:ident $name:literal $meaning:literal;)*) => {
+        /// Why there is no value: the run failed, or it does not show the feature.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+        #[allow(missing_docs)] // `meaning` explains each
+        pub enum MissingReason {
+            $(#[serde(rename = $name)] $reason),*
+        }
 
-/// Why there is no value: the run failed, or it does not show the feature.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-#[allow(missing_docs)] // `meaning` says what each is
-pub enum MissingReason {
-    ContactLost,
-    Jammed,
-    Indeterminate,
-    Chattering,
-    Diverged,
-    WorkLimit,
-    Interrupted,
-    NoStart,
-    Panicked,
-    NoComponent,
-    NoSpectrum,
-    NoDecay,
-    Faded,
-    FewCycles,
-    SegmentLength,
-    NoWindow,
-    NoFrames,
-    NoSpeed,
-    NoRecording,
-    NoRun,
-    Never,
-    NotFinite,
+        /// Every reason with its name in files and its meaning in a legend.
+        const REASONS: &[(MissingReason, &str, &str)] = &[$((MissingReason::$reason, $name, $meaning)),*];
+    };
 }
 
-/// Every reason with its name in files and its meaning in a legend.
-const REASONS: [(MissingReason, &str, &str); 22] = [
-    (MissingReason::ContactLost, "contact-lost", "contact lost"),
-    (MissingReason::Jammed, "jammed", "jammed (Painlev\u{e9})"),
-    (MissingReason::Indeterminate, "indeterminate", "indeterminate"),
-    (MissingReason::Chattering, "chattering", "chattering"),
-    (MissingReason::Diverged, "diverged", "diverged"),
-    (MissingReason::WorkLimit, "work-limit", "work limit reached"),
-    (MissingReason::Interrupted, "interrupted", "interrupted"),
-    (MissingReason::NoStart, "no-start", "no steady slide to start from"),
-    (MissingReason::Panicked, "panicked", "program failed"),
-    (MissingReason::NoComponent, "no-component", "no component in the band"),
-    (MissingReason::NoSpectrum, "no-spectrum", "no spectrum of the window"),
-    (MissingReason::NoDecay, "no-decay", "the component does not decay"),
-    (MissingReason::Faded, "faded", "decayed into the noise"),
-    (MissingReason::FewCycles, "few-cycles", "too few cycles in the window"),
-    (MissingReason::SegmentLength, "segment-length", "the segment does not fit the window"),
-    (MissingReason::NoWindow, "no-window", "no such window in the run"),
-    (MissingReason::NoFrames, "no-frames", "not tracked in the window"),
-    (MissingReason::NoSpeed, "no-speed", "the head does not have the speed"),
-    (MissingReason::NoRecording, "no-recording", "no such recording"),
-    (MissingReason::NoRun, "no-run", "no simulated run"),
-    (MissingReason::Never, "never", "does not happen"),
-    (MissingReason::NotFinite, "not-finite", "not a finite number"),
-];
+reasons! {
+    ContactLost "contact-lost" "contact lost";
+    Jammed "jammed" "jammed (Painlev\u{e9})";
+    Indeterminate "indeterminate" "indeterminate";
+    Chattering "chattering" "chattering";
+    Diverged "diverged" "diverged";
+    WorkLimit "work-limit" "work limit reached";
+    Interrupted "interrupted" "interrupted";
+    NoStart "no-start" "no steady slide to start from";
+    Panicked "panicked" "program failed";
+    NoComponent "no-component" "no component in the band";
+    NoSpectrum "no-spectrum" "no spectrum of the window";
+    NoDecay "no-decay" "the component does not decay";
+    Faded "faded" "decayed into the noise";
+    FewCycles "few-cycles" "too few cycles in the window";
+    SegmentLength "segment-length" "the segment does not fit the window";
+    NoWindow "no-window" "no such window in the run";
+    NoFrames "no-frames" "not tracked in the window";
+    NoSpeed "no-speed" "the head does not have the speed";
+    NoRecording "no-recording" "no such recording";
+    NoRun "no-run" "no simulated run";
+    Never "never" "does not happen";
+    NotFinite "not-finite" "not a finite number";
+}
 
 impl MissingReason {
-    /// Why a run has ended before its stop time; `None` if it has not.
+    /// Why a run ended before its stop time; `None` for a complete one.
     pub(crate) fn from_status(status: RunStatus) -> Option<Self> {
         match status {
             RunStatus::Completed => None,
@@ -234,7 +217,7 @@ impl MissingReason {
 
     /// Every reason, in the order of legends.
     pub(crate) fn all() -> impl Iterator<Item = Self> {
-        REASONS.into_iter().map(|(reason, ..)| reason)
+        REASONS.iter().map(|(reason, ..)| *reason)
     }
 
     /// The name used in files.
@@ -243,7 +226,7 @@ impl MissingReason {
         REASONS[self as usize].1
     }
 
-    /// The same in words.
+    /// Meaning in a legend.
     pub(crate) fn meaning(self) -> &'static str {
         REASONS[self as usize].2
     }
@@ -255,7 +238,7 @@ mod tests {
 
     #[test]
     fn the_table_is_in_the_order_of_the_reasons_and_names_them_as_files_do() {
-        for (index, (reason, name, _)) in REASONS.into_iter().enumerate() {
+        for (index, (reason, name, _)) in REASONS.iter().copied().enumerate() {
             assert_eq!((reason as usize, reason.name()), (index, name));
             assert_eq!(serde_json::to_string(&reason).unwrap(), format!("\"{name}\""));
         }

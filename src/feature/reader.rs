@@ -13,31 +13,26 @@ use std::cell::{OnceCell, RefCell};
 use std::ops::Range;
 use std::rc::Rc;
 
-/// What decides a transform.
-type TransformKey = (Channel, Range<usize>, Detrend);
-/// Speeds of the head in some frames, m/s, where they can be found.
-type CachedSpeeds = (Range<usize>, Option<Rc<Vec<f64>>>);
-
-/// A recording, the instants found in it, and what has been computed of it.
+/// A recording with its instants and the channels, transforms and speeds that were computed from it.
 pub struct FeatureReader<'a> {
-    recording: &'a Recording,
-    instants: &'a ReversalInstants,
-    run: Option<&'a RunRecord>,
+    pub(super) recording: &'a Recording,
+    pub(super) instants: &'a ReversalInstants,
+    pub(super) run: Option<&'a RunRecord>,
     channels: [OnceCell<Vec<Option<f64>>>; Channel::ALL.len()],
-    transforms: RefCell<Vec<(TransformKey, Rc<WindowedTransform>)>>,
-    segments: RefCell<Vec<(FeatureBand, f64, Rc<CycleSegments>)>>,
-    speeds: RefCell<Vec<CachedSpeeds>>,
+    transforms: KeyedValues<(Channel, Range<usize>, Detrend), WindowedTransform>,
+    segments: KeyedValues<(FeatureBand, f64), CycleSegments>,
+    speeds: KeyedValues<Range<usize>, Vec<f64>>,
 }
 
 impl<'a> FeatureReader<'a> {
-    /// Of `recording`, in which `instants` were found.
+    /// Reader of `recording`; `instants` are those of the same recording.
     #[must_use]
     pub fn new(recording: &'a Recording, instants: &'a ReversalInstants) -> Self {
         let (transforms, segments, speeds) = (RefCell::default(), RefCell::default(), RefCell::default());
         Self { recording, instants, run: None, channels: Default::default(), transforms, segments, speeds }
     }
 
-    /// Of a simulated run and the recording that a camera took of it.
+    /// Reader of a simulated run and of the recording that a camera took of it.
     pub(crate) fn with_run(
         recording: &'a Recording,
         instants: &'a ReversalInstants,
@@ -46,25 +41,8 @@ impl<'a> FeatureReader<'a> {
         Self { run: Some(run), ..Self::new(recording, instants) }
     }
 
-    pub(super) fn run(&self) -> Option<&RunRecord> {
-        self.run
-    }
-
-    pub(super) fn instants(&self) -> &ReversalInstants {
-        self.instants
-    }
-
     pub(super) fn frame_rate_hz(&self) -> f64 {
         self.recording.grid().frame_rate_hz
-    }
-
-    pub(super) fn time_s(&self, frame: usize) -> f64 {
-        self.recording.grid().time_s(frame)
-    }
-
-    fn channel(&self, channel: Channel) -> &[Option<f64>] {
-        let place = Channel::ALL.iter().position(|c| *c == channel).unwrap_or(0);
-        self.channels[place].get_or_init(|| channel.samples(self.recording))
     }
 
     pub(super) fn window_frames(&self, window: &Window) -> Result<Range<usize>, MissingValue> {
@@ -72,88 +50,69 @@ impl<'a> FeatureReader<'a> {
     }
 
     pub(super) fn channel_frames(&self, channel: Channel, frames: Range<usize>) -> &[Option<f64>] {
-        self.channel(channel).get(frames).unwrap_or_default()
+        let samples = self.channels[channel as usize].get_or_init(|| channel.samples(self.recording));
+        samples.get(frames).unwrap_or_default()
     }
 
     /// The transform of a band's window.
     pub(super) fn band_transform(&self, band: &FeatureBand) -> Result<Rc<WindowedTransform>, MissingValue> {
-        let cut = (band.channel, self.window_frames(&band.window)?, band.detrend);
-        let known = self
-            .transforms
-            .borrow()
-            .iter()
-            .find(|(known, _)| *known == cut)
-            .map(|(_, found)| Rc::clone(found));
-        if let Some(found) = known {
-            return Ok(found);
-        }
-        let found = Rc::new(self.compute_transform(&cut)?);
-        self.transforms.borrow_mut().push((cut, Rc::clone(&found)));
-        Ok(found)
+        let key = (band.channel, self.window_frames(&band.window)?, band.detrend);
+        compute_once(&self.transforms, key, |(channel, frames, detrend)| {
+            let settings = SpectrumSettings { detrend: Some(*detrend), ..SpectrumSettings::default() };
+            let samples = self.channel_frames(*channel, frames.clone());
+            Ok(WindowedTransform::new(samples, self.frame_rate_hz(), &settings)?)
+        })
     }
 
-    fn compute_transform(
-        &self,
-        (channel, frames, detrend): &TransformKey,
-    ) -> Result<WindowedTransform, MissingValue> {
-        let settings = SpectrumSettings { detrend: Some(*detrend), ..SpectrumSettings::default() };
-        Ok(WindowedTransform::new(
-            self.channel_frames(*channel, frames.clone()),
-            self.frame_rate_hz(),
-            &settings,
-        )?)
-    }
-
-    /// The component of a band, segment for segment; both ends of its range are read from it.
+    /// The component of a band in each segment; both ends of its frequency range are read from it.
     pub(super) fn cycle_segments(
         &self,
         band: &FeatureBand,
         segment_s: f64,
     ) -> Result<Rc<CycleSegments>, MissingValue> {
-        let known = self
-            .segments
-            .borrow()
-            .iter()
-            .find(|(b, s, _)| b == band && *s == segment_s)
-            .map(|(_, _, found)| Rc::clone(found));
-        if let Some(found) = known {
-            return Ok(found);
-        }
-        let samples = self.channel_frames(band.channel, self.window_frames(&band.window)?);
-        let found = Rc::new(CycleSegments::from_samples(band, segment_s, samples, self.frame_rate_hz())?);
-        self.segments.borrow_mut().push((band.clone(), segment_s, Rc::clone(&found)));
-        Ok(found)
+        compute_once(&self.segments, (band.clone(), segment_s), |_| {
+            let samples = self.channel_frames(band.channel, self.window_frames(&band.window)?);
+            CycleSegments::from_samples(band, segment_s, samples, self.frame_rate_hz())
+        })
     }
 
     /// The head's speed in every frame of a window, m/s; all points of a friction curve are read from it.
-    pub(super) fn head_speeds_m_per_s(&self, frames: &Range<usize>) -> Option<Rc<Vec<f64>>> {
-        let known =
-            self.speeds.borrow().iter().find(|(known, _)| known == frames).map(|(_, found)| found.clone());
-        known.unwrap_or_else(|| {
-            let found = head_speeds_m_per_s(
-                self.channel_frames(Channel::HeadX, frames.clone()),
-                self.frame_rate_hz(),
-            )
-            .map(Rc::new);
-            self.speeds.borrow_mut().push((frames.clone(), found.clone()));
-            found
+    pub(super) fn head_speeds_m_per_s(&self, frames: &Range<usize>) -> Result<Rc<Vec<f64>>, MissingValue> {
+        compute_once(&self.speeds, frames.clone(), |frames| {
+            let head = self.channel_frames(Channel::HeadX, frames.clone());
+            head_speeds_m_per_s(head, self.frame_rate_hz()).ok_or(MissingValue::NoSpeed)
         })
     }
 }
 
-// What is kept of a simulated run, for what its traces do not show.
+/// Values that were computed, each with its key.
+type KeyedValues<K, V> = RefCell<Vec<(K, Rc<V>)>>;
 
-/// What is kept of a simulated run.
+/// The value of a key, computed when it is first asked for.
+fn compute_once<K: PartialEq, V>(
+    known: &KeyedValues<K, V>,
+    key: K,
+    compute: impl FnOnce(&K) -> Result<V, MissingValue>,
+) -> Result<Rc<V>, MissingValue> {
+    if let Some((_, found)) = known.borrow().iter().find(|(known, _)| *known == key) {
+        return Ok(Rc::clone(found));
+    }
+    let found = Rc::new(compute(&key)?);
+    known.borrow_mut().push((key, Rc::clone(&found)));
+    Ok(found)
+}
+
+/// The part of a simulated run that its recording does not show.
 #[derive(Debug, Clone)]
 pub struct RunRecord {
     /// Start and stop time of its scene, s.
     pub span_s: [f64; 2],
-    /// How it went.
+    /// How the run ended, and when.
     pub run: RunResult,
-    /// When the tip stuck, s.
+    /// Start and end of each stick interval, s.
     pub stick_s: Vec<[f64; 2]>,
-    /// Its changes of mode.
+    /// Changes of the tip's mode, in order of time.
     pub transitions: Vec<Transition>,
-    /// Its extremes, where a reading needs them ([`super::Reading::needs_audit`]).
+    /// Extremes over the run, where a reading needs them.
     pub audit: Option<EnergyAudit>,
 }

@@ -1,27 +1,22 @@
-//! What is read: the readings, and the one table of their kinds that jobs and studies share.
+//! Readings, and the table of their kinds that jobs and studies share.
 
 use super::contact::ContactReading;
 use super::deflection;
 use super::interval::ReversalInterval;
 use super::keys::ReadingEntry;
-use super::missing::MissingReason;
-use super::missing::MissingValue;
+use super::missing::{MissingReason, MissingValue};
 use super::reader::FeatureReader;
-use super::spectral::FeatureBand;
-use super::spectral::{self, CycleRangeEnd};
-use super::value::FeatureValue;
-use super::value::LengthCalibration;
-use super::value::{FeatureUnit, ValueComparison};
+use super::spectral::{self, CycleRangeEnd, FeatureBand};
+use super::value::{FeatureUnit, FeatureValue, LengthCalibration, ValueComparison};
 use crate::math;
 use crate::recording::channel::Window;
-use crate::toml_file::{KeyRefusal, refuse_key, suggest_key};
+use crate::toml_file::{KeyRefusal, suggest_key};
 use serde::Serialize;
 
-/// Scale of a time that may be zero or negative, s: a tenth of the stick after a reversal of half a second, a
-/// few hundred frames.
+/// Scale of a time that may be zero or negative, s: a tenth of a stick of half a second.
 pub(crate) const TIME_SCALE_S: f64 = 0.05;
-/// Bands of a log-spectrum unless the file says otherwise: over a band of an octave as fine as the friction
-/// moves a stick-slip cycle.
+/// Default number of bands of a log-spectrum: over an octave, each is as wide as the change of a stick-slip frequency by
+/// friction.
 const DEFAULT_LINES: usize = 12;
 /// Most bands of a log-spectrum and most speeds of a friction curve: each is a feature of its own.
 const MAX_SERIES_LENGTH: usize = 100;
@@ -85,13 +80,11 @@ pub(crate) struct ReadingKind {
     make: ReadingConstructor,
 }
 
-type SeriesConstructor = fn(&ReadingEntry) -> Result<Vec<(String, Reading)>, KeyRefusal>;
-
 /// Makes readings of an entry.
 enum ReadingConstructor {
     One(fn(&ReadingEntry) -> Result<Reading, KeyRefusal>),
-    /// Each with what follows the name of the entry.
-    Series(SeriesConstructor),
+    /// Several readings, each with a suffix of the name of the entry.
+    Series(fn(&ReadingEntry) -> Result<Vec<(String, Reading)>, KeyRefusal>),
     /// A time of a reversal.
     Interval(ReversalInterval),
     /// Of a run, not of a recording.
@@ -105,70 +98,41 @@ const LEVELS: &[&str] = &["channel", "window", "band_hz", "detrend", "lines", "f
 const STROKE: &[&str] = &["speed_m_per_s", "width_relative", "window", "part", "reversal"];
 const CURVE: &[&str] = &["speeds_m_per_s", "width_relative", "window", "part", "reversal"];
 const WINDOW: &[&str] = &["window"];
+const REVERSAL: &[&str] = &["reversal"];
+const NONE: &[&str] = &[];
 
-/// Every kind. A new one is a variant of [`Reading`], a row here, its word in [`Reading::kind`] and its
-/// value in [`Reading::read`].
-#[rustfmt::skip]
-const KINDS: &[ReadingKind] = &[
-    single_kind("frequency", FeatureUnit::HERTZ, PEAK, |e| Ok(Reading::Frequency(e.parse_band()?))),
-    single_kind("amplitude", FeatureUnit::MICROMETRES, PEAK, |e| Ok(Reading::Amplitude(e.parse_band()?))),
-    single_kind("rms", FeatureUnit::MICROMETRES, BAND, |e| Ok(Reading::Rms(e.parse_band()?))),
-    single_kind("damping-ratio", FeatureUnit::DIMENSIONLESS, BAND, |e| Ok(Reading::DampingRatio(e.parse_band()?))),
-    single_kind("cycle-frequency-low", FeatureUnit::HERTZ, CYCLE, |e| cycle_frequency_reading(e, CycleRangeEnd::Low)),
-    single_kind("cycle-frequency-high", FeatureUnit::HERTZ, CYCLE, |e| cycle_frequency_reading(e, CycleRangeEnd::High)),
-    single_kind("mean-deflection", FeatureUnit::MILLIMETRES, WINDOW, |e| Ok(Reading::MeanDeflection(e.parse_window()?))),
-    single_kind("deflection-at-speed", FeatureUnit::MILLIMETRES, STROKE, deflection_reading),
-    interval_kind(ReversalInterval::ReleaseAfterReversal),
-    interval_kind(ReversalInterval::StickDuration),
-    interval_kind(ReversalInterval::FlipAfterReversal),
-    interval_kind(ReversalInterval::FlipDuration),
-    series_kind("friction-curve", FeatureUnit::MILLIMETRES, CURVE, friction_curve_readings),
-    series_kind("log-spectrum", FeatureUnit::MICROMETRES, LEVELS, log_spectrum_readings),
-    contact_kind("stick-fraction", FeatureUnit::DIMENSIONLESS, WINDOW, |e| Ok(ContactReading::StickFraction(e.window_or_whole()?))),
-    contact_kind("longest-stick", FeatureUnit::MILLISECONDS, WINDOW, |e| Ok(ContactReading::LongestStick(e.window_or_whole()?))),
-    contact_kind("transitions", FeatureUnit::DIMENSIONLESS, WINDOW, |e| Ok(ContactReading::Transitions(e.window_or_whole()?))),
-    contact_kind("contact-loss", FeatureUnit::SECONDS, &[], |_| Ok(ContactReading::ContactLoss)),
-    contact_kind("least-normal-force", FeatureUnit::NEWTONS, &[], |_| Ok(ContactReading::LeastNormalForce)),
-    contact_kind("jam", FeatureUnit::SECONDS, &[], |_| Ok(ContactReading::Jam)),
-    contact_kind("least-painleve-indicator", FeatureUnit::DIMENSIONLESS, &[], |_| Ok(ContactReading::LeastPainleveIndicator)),
-];
-
-type KeyNames = &'static [&'static str];
-
-const fn single_kind(
-    word: &'static str,
-    unit: FeatureUnit,
-    keys: KeyNames,
-    make: fn(&ReadingEntry) -> Result<Reading, KeyRefusal>,
-) -> ReadingKind {
-    ReadingKind { word, unit, keys, make: ReadingConstructor::One(make) }
+macro_rules! kinds {
+    ($($word:literal $unit:ident $keys:ident $make:ident $of:expr;)*) => {
+        /// Every kind. A new one is a variant of [`Reading`], a row here, its word in [`Reading::kind`] and its value
+        /// in [`Reading::read`].
+        const KINDS: &[ReadingKind] = &[$(ReadingKind {
+            word: $word, unit: FeatureUnit::$unit, keys: $keys, make: ReadingConstructor::$make($of),
+        }),*];
+    };
 }
 
-const fn series_kind(
-    word: &'static str,
-    unit: FeatureUnit,
-    keys: KeyNames,
-    make: SeriesConstructor,
-) -> ReadingKind {
-    ReadingKind { word, unit, keys, make: ReadingConstructor::Series(make) }
-}
-
-const fn interval_kind(interval: ReversalInterval) -> ReadingKind {
-    ReadingKind {
-        word: interval.kind(),
-        unit: FeatureUnit::MILLISECONDS,
-        keys: &["reversal"],
-        make: ReadingConstructor::Interval(interval),
-    }
-}
-
-const fn contact_kind(
-    word: &'static str,
-    unit: FeatureUnit,
-    keys: KeyNames,
-    make: fn(&ReadingEntry) -> Result<ContactReading, KeyRefusal>,
-) -> ReadingKind {
-    ReadingKind { word, unit, keys, make: ReadingConstructor::OfRun(make) }
+kinds! {
+    "frequency" HERTZ PEAK One |e| Ok(Reading::Frequency(e.parse_band()?));
+    "amplitude" MICROMETRES PEAK One |e| Ok(Reading::Amplitude(e.parse_band()?));
+    "rms" MICROMETRES BAND One |e| Ok(Reading::Rms(e.parse_band()?));
+    "damping-ratio" DIMENSIONLESS BAND One |e| Ok(Reading::DampingRatio(e.parse_band()?));
+    "cycle-frequency-low" HERTZ CYCLE One |e| cycle_frequency_reading(e, CycleRangeEnd::Low);
+    "cycle-frequency-high" HERTZ CYCLE One |e| cycle_frequency_reading(e, CycleRangeEnd::High);
+    "mean-deflection" MILLIMETRES WINDOW One |e| Ok(Reading::MeanDeflection(e.parse_window()?));
+    "deflection-at-speed" MILLIMETRES STROKE One deflection_reading;
+    "release-after-reversal" MILLISECONDS REVERSAL Interval ReversalInterval::ReleaseAfterReversal;
+    "stick-duration" MILLISECONDS REVERSAL Interval ReversalInterval::StickDuration;
+    "flip-after-reversal" MILLISECONDS REVERSAL Interval ReversalInterval::FlipAfterReversal;
+    "flip-duration" MILLISECONDS REVERSAL Interval ReversalInterval::FlipDuration;
+    "friction-curve" MILLIMETRES CURVE Series friction_curve_readings;
+    "log-spectrum" MICROMETRES LEVELS Series log_spectrum_readings;
+    "stick-fraction" DIMENSIONLESS WINDOW OfRun |e| Ok(ContactReading::StickFraction(e.window_or_whole()?));
+    "longest-stick" MILLISECONDS WINDOW OfRun |e| Ok(ContactReading::LongestStick(e.window_or_whole()?));
+    "transitions" DIMENSIONLESS WINDOW OfRun |e| Ok(ContactReading::Transitions(e.window_or_whole()?));
+    "contact-loss" SECONDS NONE OfRun |_| Ok(ContactReading::ContactLoss);
+    "least-normal-force" NEWTONS NONE OfRun |_| Ok(ContactReading::LeastNormalForce);
+    "jam" SECONDS NONE OfRun |_| Ok(ContactReading::Jam);
+    "least-painleve-indicator" DIMENSIONLESS NONE OfRun |_| Ok(ContactReading::LeastPainleveIndicator);
 }
 
 impl ReadingKind {
@@ -192,8 +156,7 @@ impl ReadingKind {
         matches!(self.make, ReadingConstructor::OfRun(_))
     }
 
-    /// What an entry reads, each with its name: that of the entry, and what follows it where it stands for
-    /// several.
+    /// Readings of an entry with their names: that of the entry, with a suffix where the entry has several readings.
     ///
     /// # Errors
     /// The key at fault, what was found and what was expected.
@@ -220,36 +183,24 @@ impl ReadingKind {
 fn cycle_frequency_reading(entry: &ReadingEntry, end: CycleRangeEnd) -> Result<Reading, KeyRefusal> {
     let band = entry.band_of_deflection()?;
     let expected = "the length of a segment, s, such as 0.02";
-    Ok(Reading::CycleFrequency {
-        band,
-        segment_s: entry.require_positive("segment_s", entry.keys.segment_s, expected)?,
-        end,
-    })
+    let segment_s = entry.require_positive("segment_s", entry.keys.segment_s, expected)?;
+    Ok(Reading::CycleFrequency { band, segment_s, end })
 }
 
 fn deflection_reading(entry: &ReadingEntry) -> Result<Reading, KeyRefusal> {
-    Ok(Reading::DeflectionAtSpeed {
-        speed_m_per_s: entry.require_positive(
-            "speed_m_per_s",
-            entry.keys.speed_m_per_s,
-            "a speed of the head, m/s",
-        )?,
-        window: entry.stroke_window()?,
-        width_relative: entry.width_relative()?,
-    })
+    let (key, expected) = ("speed_m_per_s", "a speed of the head, m/s");
+    let speed_m_per_s = entry.require_positive(key, entry.keys.speed_m_per_s, expected)?;
+    let (window, width_relative) = (entry.stroke_window()?, entry.width_relative()?);
+    Ok(Reading::DeflectionAtSpeed { window, speed_m_per_s, width_relative })
 }
 
 fn friction_curve_readings(entry: &ReadingEntry) -> Result<Vec<(String, Reading)>, KeyRefusal> {
     let key = "speeds_m_per_s";
     let speeds = entry.keys.speeds_m_per_s.as_deref().unwrap_or_default();
-    if speeds.is_empty() || speeds.len() > MAX_SERIES_LENGTH {
-        return refuse_key(
-            entry.describe_key(key),
-            format!(
-                "found {} speeds, expected 1 to {MAX_SERIES_LENGTH} speeds of the head, m/s, such as [0.05, 0.1]",
-                speeds.len()
-            ),
-        );
+    let count = speeds.len();
+    if !(1..=MAX_SERIES_LENGTH).contains(&count) {
+        let expected = format!("1 to {MAX_SERIES_LENGTH} speeds of the head, m/s, such as [0.05, 0.1]");
+        return entry.refuse(key, format!("found {count} speeds, expected {expected}"));
     }
     let (window, width_relative) = (entry.stroke_window()?, entry.width_relative()?);
     let part = |speed: &f64| {
@@ -264,37 +215,28 @@ fn log_spectrum_readings(entry: &ReadingEntry) -> Result<Vec<(String, Reading)>,
     let band = entry.parse_band()?;
     let lines = entry.keys.lines.unwrap_or(DEFAULT_LINES);
     if !(2..=MAX_SERIES_LENGTH).contains(&lines) {
-        return refuse_key(
-            entry.describe_key("lines"),
-            format!("found {lines}, expected 2 to {MAX_SERIES_LENGTH} lines of equal width in the band"),
-        );
+        let expected = format!("2 to {MAX_SERIES_LENGTH} lines of equal width in the band");
+        return entry.refuse("lines", format!("found {lines}, expected {expected}"));
     }
+    let expected = "the rms of the noise in one line, m: the noise of the channel times the square root of \
+        2 x width of a line / frame rate";
     let floor_m = match entry.keys.floor_m {
         None if !entry.noisy => 0.0,
-        floor_m => entry.require_positive(
-            "floor_m",
-            floor_m,
-            "the rms of the noise in one line, m: the noise of the channel times the square root of \
-             2 x width of a line / frame rate",
-        )?,
+        floor_m => entry.require_positive("floor_m", floor_m, expected)?,
     };
     let level = |(low, high): (f64, f64)| {
-        let reading =
-            Reading::BandLevel { band: FeatureBand { band_hz: (low, high), ..band.clone() }, floor_m };
-        (format!("at {:.1} Hz", (low + high) / 2.0), reading)
+        let band = FeatureBand { band_hz: (low, high), ..band.clone() };
+        (format!("at {:.1} Hz", (low + high) / 2.0), Reading::BandLevel { band, floor_m })
     };
     Ok(split_band(band.band_hz, lines).map(level).collect())
 }
 
-/// Bands of equal width: in the logarithm where they span more than an octave together.
+/// Bands of equal width; of equal ratio where together they span more than an octave.
 fn split_band((low, high): (f64, f64), count: usize) -> impl Iterator<Item = (f64, f64)> {
     let share = move |k: usize| k as f64 / count as f64;
     let edge = move |k: usize| {
-        if low > 0.0 && high > 2.0 * low {
-            low * math::powf(high / low, share(k))
-        } else {
-            low + share(k) * (high - low)
-        }
+        let over_octave = low > 0.0 && high > 2.0 * low;
+        if over_octave { low * math::powf(high / low, share(k)) } else { low + share(k) * (high - low) }
     };
     (0..count).map(move |k| (edge(k), edge(k + 1)))
 }
@@ -342,52 +284,39 @@ impl Reading {
             | Self::BandLevel { band, .. }
             | Self::DampingRatio(band)
             | Self::CycleFrequency { band, .. } => Some(band),
-            Self::MeanDeflection(_)
-            | Self::DeflectionAtSpeed { .. }
-            | Self::Interval { .. }
-            | Self::Contact(_) => None,
+            _ => None,
         }
     }
 
     /// The window that it is read from, where it has one.
     pub(crate) fn window(&self) -> Option<&Window> {
         match self {
-            Self::Frequency(band)
-            | Self::Amplitude(band)
-            | Self::Rms(band)
-            | Self::BandLevel { band, .. }
-            | Self::DampingRatio(band)
-            | Self::CycleFrequency { band, .. } => Some(&band.window),
             Self::MeanDeflection(window) | Self::DeflectionAtSpeed { window, .. } => Some(window),
             Self::Contact(contact) => contact.window(),
-            Self::Interval { .. } => None,
+            _ => self.band().map(|band| &band.window),
         }
     }
 
-    /// How it depends on the calibration of a camera; `None` where it is no length in a picture.
+    /// How it depends on the calibration of the camera; `None` for a reading that is no length.
     pub(crate) fn length_calibration(&self) -> Option<LengthCalibration> {
         match self {
             Self::MeanDeflection(_) | Self::DeflectionAtSpeed { .. } => Some(LengthCalibration::Position),
             Self::Amplitude(_) | Self::Rms(_) => Some(LengthCalibration::Size { floor_m: 0.0 }),
             Self::BandLevel { floor_m, .. } => Some(LengthCalibration::Size { floor_m: *floor_m }),
-            Self::Frequency(_)
-            | Self::DampingRatio(_)
-            | Self::CycleFrequency { .. }
-            | Self::Interval { .. }
-            | Self::Contact(_) => None,
+            _ => None,
         }
     }
 
-    /// Whether it takes the extremes over a run ([`crate::simulate::outputs::Audit`]).
+    /// Whether it needs the extremes over a run, [`RunRecord::audit`](super::RunRecord::audit).
     pub(crate) fn needs_audit(&self) -> bool {
         matches!(self, Self::Contact(contact) if contact.needs_audit())
     }
 
-    /// Its value. Of a frequency with a `target`, Hz, it is the component of the band that
-    /// [`super::ASSIGN_WIDTH`] and [`super::ASSIGN_DB`] assign to it; without one, the strongest.
+    /// Its value. A frequency is that of the component assigned to `target`, Hz, by [`super::ASSIGN_WIDTH`] and
+    /// [`super::ASSIGN_DB`], or of the strongest component without a target.
     ///
     /// # Errors
-    /// [`MissingValue`] with the reason. Of a run that ended early nothing is known but what led to its end.
+    /// [`MissingValue`] with the reason. A run that ended early gives only the readings that describe its end.
     pub fn read(&self, target: Option<f64>, reader: &FeatureReader) -> Result<FeatureValue, MissingValue> {
         self.check_end(reader)?;
         match self {
@@ -409,7 +338,7 @@ impl Reading {
     }
 
     fn check_end(&self, reader: &FeatureReader) -> Result<(), MissingValue> {
-        let Some(run) = reader.run().map(|record| record.run) else { return Ok(()) };
+        let Some(run) = reader.run.map(|record| record.run) else { return Ok(()) };
         let known = matches!(self, Self::Contact(contact) if contact.is_known_after(run.status));
         if known || MissingReason::from_status(run.status).is_none() {
             return Ok(());

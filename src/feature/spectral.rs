@@ -1,4 +1,4 @@
-//! What a band of a window's spectrum shows: the component of a target, the size of the strongest, the power.
+//! Readings of a band of a window's spectrum: the component of a target, the size of the strongest, the power.
 
 use super::missing::{LEAST_CYCLES, MissingValue};
 use super::reader::FeatureReader;
@@ -9,13 +9,13 @@ use crate::spectrum::{Component, Detrend, SpectrumError, SpectrumSettings, Windo
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// Distance `ln(f / target)` that weighs as much as [`ASSIGN_DB`]: the model's own peak for a target is
-/// within 10 % of it near the best point.
+/// Distance `ln(f / target)` with the same weight as [`ASSIGN_DB`]: near the best point of a fit, the model's peak is
+/// within 10 % of its target.
 pub const ASSIGN_WIDTH: f64 = 0.1;
-/// Level below the strongest component that weighs as much as [`ASSIGN_WIDTH`], dB: half the amplitude.
+/// Level below the strongest component with the same weight as [`ASSIGN_WIDTH`], dB: half the amplitude.
 pub const ASSIGN_DB: f64 = 6.0;
 
-/// An end of the range over which a drifting component runs.
+/// An end of the frequency range of a drifting component.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum CycleRangeEnd {
     /// The lowest frequency.
@@ -24,7 +24,7 @@ pub enum CycleRangeEnd {
     High,
 }
 
-/// Frequency of the component that is assigned to a target.
+/// Frequency of the component that is assigned to a target, or of the strongest.
 pub(super) fn read_frequency(
     band: &FeatureBand,
     target: Option<f64>,
@@ -32,17 +32,14 @@ pub(super) fn read_frequency(
 ) -> Result<FeatureValue, MissingValue> {
     let (low, high) = band.band_hz;
     let found = reader.band_transform(band)?.components(band.band_hz)?;
-    let inside: Vec<&Component> = resolvable_components(&found).collect();
+    // strongest first, as they are listed
+    let inside: Vec<&Component> = found.iter().filter(|c| c.is_resolvable()).collect();
     let (chosen, runner_up) = assign_component(&inside, target).ok_or(MissingValue::NoPeak { low, high })?;
     check_amplitude(chosen, band)?;
     let below = |component: &Component| level_below_strongest_db(&inside, component);
     let runner_up = runner_up.map(|c| RunnerUpComponent { frequency_hz: c.frequency_hz, below_db: below(c) });
-    Ok(FeatureValue {
-        value: chosen.frequency_hz,
-        sd: Some(chosen.frequency_sd_hz),
-        below_db: below(chosen),
-        runner_up,
-    })
+    let value = FeatureValue::new(chosen.frequency_hz, Some(chosen.frequency_sd_hz));
+    Ok(FeatureValue { below_db: below(chosen), runner_up, ..value })
 }
 
 pub(super) fn read_amplitude(
@@ -58,7 +55,7 @@ pub(super) fn read_rms(band: &FeatureBand, reader: &FeatureReader) -> Result<Fea
     read_band_level(band, 0.0, reader)
 }
 
-/// Root mean square of a band and of a floor, so that what lies below the floor is not fitted.
+/// Root mean square of a band plus a floor, in quadrature: differences far below the floor have no weight in a fit.
 pub(super) fn read_band_level(
     band: &FeatureBand,
     floor_m: f64,
@@ -70,7 +67,7 @@ pub(super) fn read_band_level(
     Ok(FeatureValue::new(math::hypot(transformed.rms_in_band_m(low, high), floor_m), None))
 }
 
-/// The lowest or the highest frequency over which the component of a band runs.
+/// Lowest or highest frequency of the component of a band over the segments.
 pub(super) fn read_cycle_frequency(
     band: &FeatureBand,
     segment_s: f64,
@@ -84,9 +81,8 @@ pub(super) fn read_cycle_frequency(
         CycleRangeEnd::High => segments.frequencies.iter().max_by(by_frequency),
     };
     let (low, high) = band.band_hz;
-    extreme
-        .map(|(frequency_hz, sd_hz)| FeatureValue::new(*frequency_hz, Some(*sd_hz)))
-        .ok_or(MissingValue::NoPeak { low, high })
+    let (frequency_hz, sd_hz) = extreme.ok_or(MissingValue::NoPeak { low, high })?;
+    Ok(FeatureValue::new(*frequency_hz, Some(*sd_hz)))
 }
 
 /// The strongest component of a band.
@@ -96,7 +92,7 @@ pub(super) fn strongest_component(
 ) -> Result<Component, MissingValue> {
     let (low, high) = band.band_hz;
     let found = reader.band_transform(band)?.components(band.band_hz)?;
-    resolvable_components(&found).next().cloned().ok_or(MissingValue::NoPeak { low, high })
+    found.into_iter().find(Component::is_resolvable).ok_or(MissingValue::NoPeak { low, high })
 }
 
 fn check_amplitude(component: &Component, band: &FeatureBand) -> Result<(), MissingValue> {
@@ -107,19 +103,13 @@ fn check_amplitude(component: &Component, band: &FeatureBand) -> Result<(), Miss
     Ok(())
 }
 
-/// Strongest first, as they are listed.
-fn resolvable_components(found: &[Component]) -> impl Iterator<Item = &Component> {
-    found.iter().filter(|c| c.is_resolvable())
-}
-
 fn level_below_strongest_db(inside: &[&Component], component: &Component) -> f64 {
     let strongest_m = inside.first().map_or(component.amplitude_m, |c| c.amplitude_m);
     20.0 * math::log10(strongest_m / component.amplitude_m)
 }
 
-/// The best and the second best component for a target: those for which `(ln(f / target) / ASSIGN_WIDTH)^2 +
-/// (dB below the strongest / ASSIGN_DB)^2` is least. It is a hysteresis without memory: a weaker peak is
-/// taken only where it is much nearer.
+/// The best and the second best component for a target: those with the least `(ln(f / target) / ASSIGN_WIDTH)^2 +
+/// (dB below the strongest / ASSIGN_DB)^2`. A weaker peak is chosen only where it is much nearer.
 fn assign_component<'a>(
     inside: &[&'a Component],
     target: Option<f64>,
@@ -133,43 +123,38 @@ fn assign_component<'a>(
     Some((ranked.first()?.1, ranked.get(1).map(|(_, second)| *second)))
 }
 
-// A band of the spectrum of a window of a channel.
-
 /// A band of the spectrum of a window of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FeatureBand {
-    /// Which channel.
+    /// Channel that is transformed.
     pub channel: Channel,
-    /// Which frames.
+    /// Window of frames.
     pub window: Window,
     /// Lower and upper end, Hz.
     pub band_hz: (f64, f64),
-    /// What is removed before the transform.
+    /// Trend that is removed before the transform.
     pub detrend: Detrend,
-    /// Least amplitude of the strongest component, m: below it there is none. A trace without noise shows
-    /// remains of the trend and of a long dead ring-down, which no camera resolves.
+    /// Least amplitude of the strongest component, m. In a trace without noise, remains of the trend and of an old
+    /// ring-down would count otherwise, although no camera resolves them.
     pub least_amplitude_m: f64,
 }
 
-// The range over which a stick-slip cycle runs: it drifts with the speed of the tip, so it is followed in
-// short segments.
-//
-// A segment shows the mean frequency of its own time, weighted by its window, so the range reads narrower
-// than the drift by what the cycle drifts in half a segment at either end; model and measurement alike.
+// The frequency of a stick-slip cycle drifts with the speed of the tip, so it is measured in short segments. A segment
+// gives the mean over its own time. Therefore the range is narrower than the drift, by the drift of half a segment at
+// either end, for model and measurement alike.
 
-/// Least share of the largest segment's amplitude that a segment has to hold: below, the cycle has not
-/// started or has died down.
+/// Least amplitude of a segment as a share of the largest: below it the cycle has not started or has decayed.
 pub(crate) const LEAST_SEGMENT_AMPLITUDE: f64 = 0.2;
 
-/// The component of each segment that shows one and holds.
+/// The component of every segment with a sufficient amplitude.
 pub(super) struct CycleSegments {
     /// Frequency and its standard deviation, Hz.
     pub frequencies: Vec<(f64, f64)>,
 }
 
 impl CycleSegments {
-    /// Of the samples of a band's window, in segments that overlap by half or a little more, so that the
-    /// first and the last reach the ends of the window.
+    /// Measures the samples of a band's window. Segments overlap by at least half; the first and the last reach the
+    /// ends of the window.
     pub(super) fn from_samples(
         band: &FeatureBand,
         segment_s: f64,
@@ -177,11 +162,8 @@ impl CycleSegments {
         frame_rate_hz: f64,
     ) -> Result<Self, MissingValue> {
         let frames = (segment_s * frame_rate_hz).round() as usize;
-        let starts = segment_starts(samples.len(), frames).ok_or(MissingValue::Segment {
-            segment_s,
-            frames,
-            window: samples.len(),
-        })?;
+        let refused = MissingValue::Segment { segment_s, frames, window: samples.len() };
+        let starts = segment_starts(samples.len(), frames).ok_or(refused)?;
         let mut found = Vec::new();
         for start in starts {
             let segment = samples.get(start..start + frames).unwrap_or_default();
@@ -193,7 +175,7 @@ impl CycleSegments {
     }
 }
 
-/// The strongest component of a segment; `None` where it shows none, or falls into a gap of the recording.
+/// The strongest component of a segment; `None` without one, or where too few frames are tracked.
 fn strongest_in_segment(
     band: &FeatureBand,
     segment: &[Option<f64>],
@@ -217,16 +199,13 @@ fn segment_starts(window: usize, frames: usize) -> Option<impl Iterator<Item = u
     Some((0..=steps).map(move |k| (k * room).checked_div(steps).unwrap_or(0)))
 }
 
-// Damping of a ring-down by its logarithmic decrement between the halves of a window.
-//
-// In the second half a decaying sinusoid is what it was in the first, `exp(-d T/2)` times as large and
-// turned. So the amplitudes that the same Hann window reads in both halves, at any frequency near its
-// own, have exactly that ratio: `d = 2 ln(a1 / a2) / T`, and `zeta = d / sqrt(d^2 + (2 pi f)^2)`. What is
-// not exact is the rest: the trend that takes a little of the oscillation with it, a neighbour, the noise.
-// It takes two sums over the window besides the spectrum that gives the frequency.
+// Damping from the logarithmic decrement between the halves of a window. In the second half a decaying sinusoid is
+// `exp(-d T/2)` times that of the first, with another phase. The amplitudes through the same Hann window, at any
+// frequency near its own, have exactly this ratio: `d = 2 ln(a1 / a2) / T` and `zeta = d / sqrt(d^2 + (2 pi f)^2)`.
+// Errors come from the trend, neighbouring components and noise.
 
-/// Least amplitude left in the second half, in deviations of the noise: at 3 it is known to a third, and
-/// noise alone seldom shows it.
+/// Least amplitude in the second half, in standard deviations of the noise: at 3 its error is a third, and noise alone
+/// seldom reaches it.
 pub(crate) const LEAST_FINAL_AMPLITUDE: f64 = 3.0;
 
 /// Damping ratio of the strongest component of a band.
@@ -243,8 +222,8 @@ pub(super) fn read_damping_ratio(
         return Err(MissingValue::FewCycles { frequency_hz, cycles });
     }
     let [first_m, second_m] = transformed.half_amplitudes_m(frequency_hz);
-    // a half has half the frames, so twice the power of noise in a bin: as a deviation of an amplitude just
-    // the floor of the whole
+    // a half has twice the noise power in a bin, so the standard deviation of an amplitude in it equals the noise
+    // floor of the whole window
     let noise_m = component.amplitude_m / math::powf(10.0, component.snr_db / 20.0);
     if second_m < LEAST_FINAL_AMPLITUDE * noise_m {
         return Err(MissingValue::Faded { frequency_hz, second_m });

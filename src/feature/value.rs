@@ -1,4 +1,4 @@
-//! A value that was read.
+//! Values of readings, their units and their comparison.
 
 /// A value read from a recording or a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -7,10 +7,9 @@ pub struct FeatureValue {
     pub value: f64,
     /// Its standard deviation where the reading itself gives one.
     pub sd: Option<f64>,
-    /// How far the component is below the strongest of its band, dB; 0 for the strongest, and where there is
-    /// nothing to choose from.
+    /// Level below the strongest component of the band, dB; 0 for the strongest and for readings without a choice.
     pub below_db: f64,
-    /// The component that would have been next, where there is a choice.
+    /// The second best component, where there is a choice.
     pub runner_up: Option<RunnerUpComponent>,
 }
 
@@ -24,38 +23,34 @@ pub struct RunnerUpComponent {
 }
 
 impl FeatureValue {
-    /// A value among which there is no choice.
+    /// A value of a reading without a choice of components.
     pub(super) fn new(value: f64, sd: Option<f64>) -> Self {
         Self { value, sd, below_db: 0.0, runner_up: None }
     }
 }
 
-// What the calibration of a camera does to a value that is a length.
-
-/// A value that is read from lengths in a picture, by what its camera does to it.
+/// Effect of the camera's calibration on a value that is a length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LengthCalibration {
-    /// A mean place of the tip against the head: it has the offset of the markers and the scale.
+    /// A mean position of the tip relative to the head: it depends on the offset of the markers and on the scale.
     Position,
-    /// The size of a motion: it has the scale, but for what was added in quadrature.
+    /// The size of a motion: it depends on the scale, except for a floor that was added in quadrature.
     Size {
-        /// That root mean square, m.
+        /// Root mean square of the floor, m.
         floor_m: f64,
     },
 }
-
-// Units of readings, in files and in figures, and how two values are compared.
 
 /// A unit in files and in figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeatureUnit {
     /// In files; `1` for a plain number.
     pub name: &'static str,
-    /// What it adds to the name of a column.
+    /// Suffix of a column's name.
     pub suffix: &'static str,
     /// In figures; empty for a plain number.
     pub shown: &'static str,
-    /// What a value is multiplied by in figures.
+    /// Factor from the unit in files to that in figures.
     pub factor: f64,
 }
 
@@ -74,7 +69,7 @@ impl FeatureUnit {
 pub enum ValueComparison {
     /// By the logarithm of their ratio.
     Log,
-    /// By their difference, because zero and a change of sign are nothing special.
+    /// By their difference: values may be zero or change sign.
     Linear {
         /// Size of a large difference, in the reading's unit.
         scale: f64,

@@ -31,7 +31,7 @@ pub struct NaturalMode {
     pub lip_over_neck: f64,
 }
 
-/// The three single-body natural frequencies that the paper names, Hz.
+/// The three natural frequencies of single bodies in the paper, Hz.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct BodyFrequencies {
     pub head_hz: f64,
@@ -39,7 +39,7 @@ pub(crate) struct BodyFrequencies {
     pub lip_hz: f64,
 }
 
-/// Which end of the lip may move along the glass.
+/// Constraint on the tip along the glass.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TipConstraint {
     /// The tip slides without friction: two modes.
@@ -48,7 +48,7 @@ pub enum TipConstraint {
     Held,
 }
 
-/// The named frequencies of a blade.
+/// Natural frequencies of the single bodies of a blade.
 pub(crate) fn body_frequencies(blade: &Linkage) -> BodyFrequencies {
     BodyFrequencies {
         head_hz: natural_frequency_hz(blade.head.stiffness, blade.mass_kg),
@@ -57,8 +57,8 @@ pub(crate) fn body_frequencies(blade: &Linkage) -> BodyFrequencies {
     }
 }
 
-/// Modes in rising frequency; `on_shoulder` adds the shoulder's stiffness and damping to the neck's (about
-/// the upright position).
+/// Modes about the upright position in rising frequency; `on_shoulder` adds stiffness and damping of the shoulder to
+/// those of the neck.
 #[must_use]
 pub fn natural_modes(blade: &Linkage, tip: TipConstraint, on_shoulder: bool) -> Vec<NaturalMode> {
     let (m, c, k) = linearised_matrices(blade, on_shoulder);
@@ -73,8 +73,8 @@ pub fn natural_modes(blade: &Linkage, tip: TipConstraint, on_shoulder: bool) -> 
     }
 }
 
-/// Places of the tip along the glass over a force that acts on it there, m/N, at a frequency, Hz: what the
-/// blade answers where it slides without friction, as amplitude and phase.
+/// Compliance of the tip along the glass, m/N, at a frequency, Hz: displacement over force on a tip that slides without
+/// friction, as amplitude and phase.
 ///
 /// `H = b^T (k + i w c - w^2 m)^-1 b` with `b = (l1, l2)`, the head at rest.
 #[must_use]
@@ -87,7 +87,7 @@ pub fn tip_compliance(blade: &Linkage, on_shoulder: bool, frequency_hz: f64) -> 
     (d * (l1 * l1) - b * (2.0 * l1 * l2) + a * (l2 * l2)) / (a * d - b * b)
 }
 
-/// Lowest and highest angular frequency of the links without preload, rad/s: the time scales of a blade.
+/// Lowest and highest angular frequency of the links without preload, rad/s.
 #[must_use]
 pub fn time_scales_rad_per_s(blade: &Linkage) -> (f64, f64) {
     let unloaded = Linkage { preload_displacement_m: 0.0, ..*blade };
@@ -110,7 +110,7 @@ fn linearised_matrices(blade: &Linkage, on_shoulder: bool) -> (Matrix2<f64>, Mat
     (m, c, k)
 }
 
-/// Roots of `det(k - lambda m)`, lower first; both are real because `m` is positive definite.
+/// Roots of `det(k - lambda m)`, the lower first. Both are real, because `m` is positive definite.
 fn squared_frequencies(m: &Matrix2<f64>, k: &Matrix2<f64>) -> (f64, f64) {
     let a = m.determinant();
     let b = -(m[(0, 0)] * k[(1, 1)] + m[(1, 1)] * k[(0, 0)] - 2.0 * m[(0, 1)] * k[(0, 1)]);
@@ -124,35 +124,29 @@ fn squared_frequencies(m: &Matrix2<f64>, k: &Matrix2<f64>) -> (f64, f64) {
 fn free_modes(m: &Matrix2<f64>, c: &Matrix2<f64>, k: &Matrix2<f64>) -> Vec<NaturalMode> {
     let (low, high) = squared_frequencies(m, k);
     let damped = damped_pairs(m, c, k);
-    [low, high]
-        .into_iter()
-        .enumerate()
-        .map(|(i, squared)| {
-            let (row_1, row_2) = (k[(0, 0)] - squared * m[(0, 0)], k[(0, 1)] - squared * m[(0, 1)]);
-            NaturalMode {
-                frequency_hz: (squared > 0.0).then(|| squared.sqrt() / TAU),
-                damped_frequency_hz: damped.get(i).map(|d| d.0),
-                damping_ratio: damped.get(i).map(|d| d.1),
-                lip_over_neck: -row_1 / row_2,
-            }
-        })
-        .collect()
+    let mode = |(i, squared): (usize, f64)| {
+        let (row_1, row_2) = (k[(0, 0)] - squared * m[(0, 0)], k[(0, 1)] - squared * m[(0, 1)]);
+        NaturalMode {
+            frequency_hz: (squared > 0.0).then(|| squared.sqrt() / TAU),
+            damped_frequency_hz: damped.get(i).map(|d| d.0),
+            damping_ratio: damped.get(i).map(|d| d.1),
+            lip_over_neck: -row_1 / row_2,
+        }
+    };
+    [low, high].into_iter().enumerate().map(mode).collect()
 }
 
-/// Damped frequency, Hz, and damping ratio of each oscillating pair of eigenvalues, in rising frequency.
-/// Empty unless both pairs oscillate, so that they cannot be matched to the wrong mode.
+/// Damped frequency, Hz, and damping ratio of each conjugate pair of eigenvalues, in rising frequency. Empty unless both
+/// pairs oscillate: a single pair could be assigned to the wrong mode.
 fn damped_pairs(m: &Matrix2<f64>, c: &Matrix2<f64>, k: &Matrix2<f64>) -> Vec<(f64, f64)> {
     let Some(inverse) = m.try_inverse() else { return Vec::new() };
     let mut state = Matrix4::zeros();
     state.fixed_view_mut::<2, 2>(0, 2).copy_from(&Matrix2::identity());
     state.fixed_view_mut::<2, 2>(2, 0).copy_from(&(-inverse * k));
     state.fixed_view_mut::<2, 2>(2, 2).copy_from(&(-inverse * c));
-    let mut pairs: Vec<(f64, f64)> = state
-        .complex_eigenvalues()
-        .iter()
-        .filter(|e| e.im > 0.0)
-        .map(|e| (e.im / TAU, -e.re / math::hypot(e.re, e.im)))
-        .collect();
+    let eigenvalues = state.complex_eigenvalues();
+    let upper = eigenvalues.iter().filter(|e| e.im > 0.0);
+    let mut pairs: Vec<(f64, f64)> = upper.map(|e| (e.im / TAU, -e.re / math::hypot(e.re, e.im))).collect();
     pairs.sort_by(|a, b| a.0.total_cmp(&b.0));
     if pairs.len() == 2 { pairs } else { Vec::new() }
 }

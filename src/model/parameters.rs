@@ -1,15 +1,15 @@
-//! The one table of a scene's numbers: name, symbol, unit, admissible range, scale and meaning.
+//! The table of a scene's numbers: name, symbol, unit, admissible range, scale and meaning.
 //!
-//! Files, refusals, fits and reports all read this table. Where a quantity can be written in two ways (a
-//! stiffness or a natural frequency), both rows carry the same [`ParameterQuantity`] and a scene gives exactly one of
-//! them.
+//! Files, messages, fits and reports read this table. Where a quantity can be written in two ways (a stiffness or a
+//! natural frequency), both rows have the same [`ParameterQuantity`], and a scene gives exactly one of them.
 
+use super::shoulder::Shoulder;
 use super::{Linkage, Spring};
 use crate::math;
 use ParameterRange::{NotNegative, Positive, Within};
 use std::f64::consts::TAU;
 
-/// Which values of a parameter make sense.
+/// Admissible values of a parameter.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum ParameterRange {
     /// Above zero.
@@ -42,7 +42,7 @@ impl ParameterRange {
     }
 }
 
-/// How a search should move along a parameter.
+/// Scale of the steps of a search along a parameter.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ParameterScale {
     /// By factors.
@@ -51,7 +51,7 @@ pub enum ParameterScale {
     Linear,
 }
 
-/// What a parameter says, whichever way it is written.
+/// The physical quantity of a parameter, whichever way it is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)] // the rows of the table say what each is
 pub enum ParameterQuantity {
@@ -91,15 +91,15 @@ pub struct ModelParameter {
     pub symbol: &'static str,
     /// Unit as shown.
     pub unit: &'static str,
-    /// What it says.
+    /// The physical quantity; two rows share one that can be written in two ways.
     pub quantity: ParameterQuantity,
     /// Value of the quantity when a scene leaves it out; `None` if it must be given.
     pub default: Option<f64>,
     /// Admissible values.
     pub range: ParameterRange,
-    /// How a search should move along it.
+    /// Scale of the steps of a search.
     pub scale: ParameterScale,
-    /// What it is, in words.
+    /// Meaning in words.
     pub meaning: &'static str,
 }
 
@@ -183,51 +183,37 @@ pub(crate) fn damping_from_ratio(ratio: f64, stiffness: f64, inertia: f64) -> f6
     2.0 * ratio * (stiffness * inertia).sqrt()
 }
 
-/// The value of a parameter that a blade was given in the other way; `None` where a name has no second way or
-/// the blade no such part.
+/// Value of the parameter `name` from a blade that may have been given by an equivalent one, such as a stiffness by a
+/// natural frequency. `None` for a name without an equivalent, or a blade without that part.
 pub(crate) fn convert_value(name: &str, blade: &Linkage) -> Option<f64> {
-    let ratio =
-        |spring: &Spring, inertia: f64| spring.damping / damping_from_ratio(1.0, spring.stiffness, inertia);
     let (mass, theta, phi) = (blade.mass_kg, blade.m_theta, blade.m_phi);
-    let (_, key) = name.split_once('.')?;
-    if name.starts_with("shoulder.") {
-        let shoulder = blade.shoulder?;
-        return match key {
-            "stiffness_n_m_per_rad" => Some(shoulder.stiffness_n_m_per_rad),
-            "stiffness_ratio" => Some(shoulder.stiffness_n_m_per_rad / blade.neck.stiffness),
-            "damping_n_m_s_per_rad" => Some(shoulder.damping_n_m_s_per_rad),
-            "damping_ratio" => Some(
-                shoulder.damping_n_m_s_per_rad
-                    / damping_from_ratio(1.0, shoulder.stiffness_n_m_per_rad, theta),
-            ),
-            _ => None,
-        };
-    }
-    match key {
-        "head_stiffness_n_per_m" => Some(blade.head.stiffness),
-        "head_natural_frequency_hz" => Some(natural_frequency_hz(blade.head.stiffness, mass)),
-        "neck_stiffness_n_m_per_rad" => Some(blade.neck.stiffness),
-        "neck_natural_frequency_hz" => Some(natural_frequency_hz(blade.neck.stiffness, theta)),
-        "lip_stiffness_n_m_per_rad" => Some(blade.lip.stiffness),
-        "lip_natural_frequency_hz" => Some(natural_frequency_hz(blade.lip.stiffness, phi)),
-        "head_damping_n_s_per_m" => Some(blade.head.damping),
-        "head_damping_ratio" => Some(ratio(&blade.head, mass)),
-        "neck_damping_n_m_s_per_rad" => Some(blade.neck.damping),
-        "neck_damping_ratio" => Some(ratio(&blade.neck, theta)),
-        "lip_damping_n_m_s_per_rad" => Some(blade.lip.damping),
-        "lip_damping_ratio" => Some(ratio(&blade.lip, phi)),
-        "preload_displacement_m" => Some(blade.preload_displacement_m),
-        "preload_force_n" => Some(blade.preload_displacement_m * blade.head.stiffness),
+    let (table, key) = name.split_once('.')?;
+    let (part, kind) = if table == "shoulder" { (table, key) } else { key.split_once('_')? };
+    let (Spring { stiffness, damping }, inertia) = match part {
+        "head" | "preload" => (blade.head, mass),
+        "neck" => (blade.neck, theta),
+        "lip" => (blade.lip, phi),
+        "shoulder" => {
+            let Shoulder { stiffness_n_m_per_rad: stiffness, damping_n_m_s_per_rad: damping, .. } =
+                blade.shoulder?;
+            (Spring { stiffness, damping }, theta)
+        }
+        _ => return None,
+    };
+    match kind {
+        "stiffness_n_per_m" | "stiffness_n_m_per_rad" => Some(stiffness),
+        "stiffness_ratio" => Some(stiffness / blade.neck.stiffness),
+        "natural_frequency_hz" => Some(natural_frequency_hz(stiffness, inertia)),
+        "damping_n_s_per_m" | "damping_n_m_s_per_rad" => Some(damping),
+        "damping_ratio" => Some(damping / damping_from_ratio(1.0, stiffness, inertia)),
+        "displacement_m" => Some(blade.preload_displacement_m),
+        "force_n" => Some(blade.preload_displacement_m * stiffness),
         _ => None,
     }
 }
 
-// How each number of a scene is measured on a blade.
-
-/// What the masses, inertias, stiffnesses, dampings and the preload of a scene are for.
-///
-/// The equations of motion keep their solution if all of these are multiplied by one factor, so that any
-/// length of blade will do.
+/// Advice on the length of blade that the numbers of a scene are for. The solution of the equations of motion does not
+/// change if all of these are multiplied by one factor, so any length of blade will do.
 pub(crate) const SAME_LENGTH_ADVICE: &str = "Masses, inertias, stiffnesses, dampings and the preload are all for one and \
                                the same length of blade: the whole blade, the piece on the rig, or one metre.";
 

@@ -1,7 +1,7 @@
-//! Whether the numbers of a blade are believable: a table of quantities with the range in which each is
-//! expected and the slips that usually lead out of it.
+//! Plausibility of the numbers of a blade: a table of quantities, each with its expected range and the usual
+//! mistakes of its unit.
 //!
-//! A value out of its range is a finding and no refusal: a blade may be unlike all others.
+//! A value outside its range gives a finding, not an error: an unusual blade may have it.
 
 use super::parameters;
 use crate::text::{format_plain, round_to_digits};
@@ -11,7 +11,7 @@ use std::f64::consts::{PI, TAU};
 /// Digits of a number in a finding.
 const DIGITS: usize = 6;
 
-/// A value that is hard to believe.
+/// A value outside the range of its quantity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct PlausibilityFinding {
     /// Table and key.
@@ -20,7 +20,7 @@ pub struct PlausibilityFinding {
     pub found: String,
     /// The range and its reason.
     pub expected: String,
-    /// What it probably is, and what to do.
+    /// The likeliest mistake and its correction.
     pub advice: String,
 }
 
@@ -31,30 +31,30 @@ impl std::fmt::Display for PlausibilityFinding {
     }
 }
 
-/// A usual slip: the factor by which it is undone, and its name.
+/// A usual mistake of a unit.
 #[derive(Debug, Clone, Copy)]
 pub struct UnitSlip {
-    /// What the value has to be multiplied by.
+    /// Factor that corrects the value.
     pub factor: f64,
-    /// What was written as what.
+    /// The mistake in words: "millimetres written as metres".
     pub words: &'static str,
 }
 
-/// Values by key; `None` for what is not there.
+/// Values by key; `None` for a key without one.
 pub(crate) type ValueLookup<'a> = dyn Fn(&str) -> Option<f64> + 'a;
 
-/// What is held against a range.
+/// The number that is compared with a range.
 #[derive(Debug, Clone, Copy)]
 pub enum PlausibilitySubject {
     /// The value of the key.
     Value,
-    /// A number that is computed from it and from others; not judged where one of those has a finding.
+    /// A number computed from several keys; skipped where one of them has a finding.
     Derived {
-        /// What it is.
+        /// Its name: "the static friction A + C".
         name: &'static str,
         /// The keys that it depends on, its own first.
         keys: &'static [&'static str],
-        /// How it is computed.
+        /// Its equation.
         of: fn(&ValueLookup<'_>) -> Option<f64>,
     },
 }
@@ -64,22 +64,22 @@ pub enum PlausibilitySubject {
 pub struct PlausibleRange {
     /// Table and key.
     pub key: &'static str,
-    /// What is judged.
+    /// The number that is compared with the range.
     pub judged: PlausibilitySubject,
-    /// Unit of what is judged.
+    /// Unit of that number.
     pub unit: &'static str,
     /// Least and greatest value without a finding.
     pub range: [f64; 2],
-    /// Why these limits.
+    /// Reason of these limits.
     pub reason: &'static str,
-    /// Slips to look for, the likeliest first.
+    /// Possible mistakes, the likeliest first.
     pub slips: &'static [UnitSlip],
 }
 
-/// What is hard to believe among the values of a file, in the order of the table.
+/// Findings on the values of a file, in the order of the table.
 ///
-/// `written` gives the key under which a file has the quantity of another key; a quantity that is written
-/// another way is judged like a derived one.
+/// `written` gives the key under which a file has the quantity of a row. A quantity that is written under another key
+/// is computed, so it is judged like a derived number.
 pub(crate) fn find_implausible(
     table: &[PlausibleRange],
     value: &ValueLookup<'_>,
@@ -90,7 +90,7 @@ pub(crate) fn find_implausible(
         let doubted = |key: &&str| found.iter().any(|finding| finding.key == *key);
         let (judged, rests_on_doubt) = match row.judged {
             PlausibilitySubject::Derived { keys, of, .. } => (of(value), keys.iter().any(doubted)),
-            // a frequency from a stiffness rests on masses and lengths, and the other way round
+            // a frequency depends on masses and lengths besides the stiffness, and the reverse
             PlausibilitySubject::Value => (value(row.key), written(row.key) != row.key && !found.is_empty()),
         };
         let judged = judged.filter(|judged| !rests_on_doubt && !row.admits(*judged));
@@ -124,13 +124,13 @@ impl PlausibleRange {
             key: key.to_owned(),
             found: format!("{}{unit}{name}", format_value(judged)),
             expected: format!("{least} to {greatest}{unit} ({})", self.reason),
-            // a slip is one of the row's own unit
+            // a mistake concerns the unit of the row's own key
             advice: self.advise_correction(judged, value(key).filter(|_| key == self.key)),
         }
     }
 
-    /// The likeliest slip that leads back into the range, or else what to check. All that is judged by slips
-    /// is proportional to the value of its own key.
+    /// The likeliest mistake whose correction leads into the range, or general advice. Numbers with mistakes are
+    /// proportional to the value of their own key.
     fn advise_correction(&self, judged: f64, written: Option<f64>) -> String {
         let slip = self.slips.iter().find(|slip| self.admits(judged * slip.factor));
         match slip.zip(written) {
@@ -146,10 +146,9 @@ fn format_value(value: f64) -> String {
     format_plain(round_to_digits(value, DIGITS))
 }
 
-// The ranges, each with its reason. They are wide: no blade that is in use lies outside.
+// Ranges of several rows. They are wide: no blade in use lies outside.
 
-/// Height of a link, m: the whole rubber of a wiper is 5 to 20 mm high, and no part that bends on its own is
-/// much lower than half a millimetre.
+/// Height of a link, m: the rubber of a wiper is 5 to 20 mm high, and a part that bends on its own at least 0.5 mm.
 const LINK_M: [f64; 2] = [5e-4, 2e-2];
 /// Thickness of a link, m: from the edge of a lip to the widest body of a profile.
 const THICKNESS_M: [f64; 2] = [1e-4, 1e-2];
@@ -161,11 +160,6 @@ const HINGE_M: [f64; 2] = [1e-4, 5e-3];
 const PIECE_M: [f64; 2] = [5e-3, 1.5];
 /// Density of rubber, kg/m3: from pure natural rubber and EPDM (860 to 930) to highly filled chloroprene.
 const DENSITY_KG_PER_M3: [f64; 2] = [850.0, 1600.0];
-/// Young's modulus of rubber, Pa: from 30 Shore A (about 1 MPa) to 90 Shore A (about 20 MPa), and twice that
-/// at the frequencies of chatter.
-const MODULUS_PA: [f64; 2] = [5e5, 5e7];
-/// Loss factor of rubber: resilient natural rubber to damping compounds near their glass transition.
-const LOSS_FACTOR: [f64; 2] = [0.01, 1.0];
 /// Mass of a link, kg: the smallest section and piece, and the largest.
 const LINK_MASS_KG: [f64; 2] = [
     DENSITY_KG_PER_M3[0] * THICKNESS_M[0] * LINK_M[0] * PIECE_M[0],
@@ -174,11 +168,6 @@ const LINK_MASS_KG: [f64; 2] = [
 /// Mass of a link over its height, kg/m: density, thickness and length of blade.
 const MASS_OVER_HEIGHT_KG_PER_M: [f64; 2] =
     [DENSITY_KG_PER_M3[0] * THICKNESS_M[0] * PIECE_M[0], DENSITY_KG_PER_M3[1] * THICKNESS_M[1] * PIECE_M[1]];
-/// Mass per metre of what moves with a head, kg/m: spring strips and upper profile alone (12 g for a strip of
-/// 2 mm x 0.8 mm) to a carriage on a rig.
-const HEAD_KG_PER_M: [f64; 2] = [0.01, 20.0];
-/// Mass of a head, kg: 10 mm of the lightest, and a whole blade with arm or a carriage.
-const HEAD_MASS_KG: [f64; 2] = [1e-4, 5.0];
 /// Centre of mass over length: a third is that of a triangle on its base, two thirds on its edge; with room
 /// for a bead at either end.
 const CENTRE_OVER_LENGTH: [f64; 2] = [0.2, 0.8];
@@ -187,34 +176,14 @@ const CENTRE_OVER_LENGTH: [f64; 2] = [0.2, 0.8];
 const INERTIA_OVER_ROD: [f64; 2] = [0.02, 0.6];
 /// Natural frequency of the head, Hz; 8.88 and 20 are published.
 const HEAD_HZ: [f64; 2] = [0.5, 200.0];
-/// Natural frequency of the neck, Hz; 195 and 519 are published: a tenth and ten times of these.
-const NECK_HZ: [f64; 2] = [20.0, 5e3];
-/// Natural frequency of the lip, Hz: a tongue of rubber of 1 to 10 mm with the thickness of a lip rings at
-/// 100 to 10,000 Hz.
-const LIP_HZ: [f64; 2] = [50.0, 5e4];
 /// Damping ratio of a rubber link: half the loss factor.
 const RUBBER_RATIO: [f64; 2] = [0.0, 0.5];
-/// Damping ratio of the head: beyond 1 it does not ring.
-const HEAD_RATIO: [f64; 2] = [0.0, 1.0];
 /// Force on the glass per metre, N/m: arms press with 10 to 20 N/m.
 const PRESS_N_PER_M: [f64; 2] = [1.0, 60.0];
 /// Force on the glass, N: the shortest piece and a whole blade.
 const PRESS_N: [f64; 2] = [PRESS_N_PER_M[0] * PIECE_M[0], PRESS_N_PER_M[1] * PIECE_M[1]];
-/// Neck angle at the shoulder, rad: below 0.3 degrees the shoulder touches always, beyond 57 degrees never.
-const SHOULDER_RAD: [f64; 2] = [5e-3, 1.0];
-/// Stiffness of a shoulder over that of the neck: less is no shoulder, more is a wall.
-const SHOULDER_OVER_NECK: [f64; 2] = [0.1, 1e3];
 /// Friction coefficient of rubber on glass: 0.1 to 0.6 wet, up to 2 dry.
 const FRICTION: [f64; 2] = [0.0, 2.0];
-/// Decay of friction with speed, s/m: beyond it friction falls within 1 mm/s, and a wiper moves at 0.1 to 2
-/// m/s.
-const DECAY_S_PER_M: [f64; 2] = [0.0, 1e3];
-/// Half the stroke of a head, m: a rig's to that of a bus.
-const AMPLITUDE_M: [f64; 2] = [1e-3, 1.0];
-/// Strokes there and back a second: a slow rig to a wiper on its fastest (about 1.2).
-const STROKES_HZ: [f64; 2] = [0.01, 5.0];
-/// Top speed of the head, m/s: a wiper's tip reaches 2 to 3.
-const TOP_SPEED_M_PER_S: [f64; 2] = [1e-4, 5.0];
 
 const MILLIMETRES: UnitSlip = UnitSlip { factor: 1e-3, words: "millimetres written as metres" };
 const CENTIMETRES: UnitSlip = UnitSlip { factor: 1e-2, words: "centimetres written as metres" };
@@ -241,23 +210,29 @@ const LENGTHS: &[UnitSlip] = &[MILLIMETRES, CENTIMETRES, METRES_TWICE];
 const MASSES: &[UnitSlip] = &[GRAMS, MILLIGRAMS];
 const INERTIAS: &[UnitSlip] = &[THOUSAND_TOO_LARGE, KG_MM2, G_CM2, G_MM2, THOUSAND_TOO_SMALL];
 
-const fn value_range(
-    key: &'static str,
-    unit: &'static str,
-    range: [f64; 2],
-    reason: &'static str,
-    slips: &'static [UnitSlip],
-) -> PlausibleRange {
-    PlausibleRange { key, judged: PlausibilitySubject::Value, unit, range, reason, slips }
+/// Rows of a table: key, unit, range, reason and slips; of a derived number also its name, the other keys that it
+/// depends on and its equation.
+macro_rules! ranges {
+    (@judged) => { PlausibilitySubject::Value };
+    (@judged $name:literal, [$($key:literal)*], $of:expr) => {
+        PlausibilitySubject::Derived { name: $name, keys: &[$($key),*], of: $of }
+    };
+    ($(
+        $key:literal $unit:literal $range:expr, $reason:expr, $slips:expr
+        $(, $name:literal, [$($other:literal)*], $of:expr)?;
+    )*) => {
+        &[$(PlausibleRange {
+            key: $key, unit: $unit, range: $range, reason: $reason, slips: $slips,
+            judged: ranges!(@judged $($name, [$key $($other)*], $of)?),
+        }),*]
+    };
 }
 
-const fn derived_range(
-    row: PlausibleRange,
-    name: &'static str,
-    keys: &'static [&'static str],
-    of: fn(&ValueLookup<'_>) -> Option<f64>,
-) -> PlausibleRange {
-    PlausibleRange { judged: PlausibilitySubject::Derived { name, keys, of }, ..row }
+/// Inertia of a link over its mass times its length squared.
+fn inertia_over_rod(value: &ValueLookup<'_>, link: &str) -> Option<f64> {
+    let of = |key: &str| value(&format!("blade.{link}_{key}"));
+    let length = of("length_m")?;
+    Some(of("inertia_kg_m2")? / (of("mass_kg")? * length * length))
 }
 
 const LINK_WHY: &str = "the rubber of a wiper is 5 to 20 mm high, a part of it at least 0.5 mm";
@@ -271,195 +246,83 @@ const RUBBER_WHY: &str = "half the loss factor of rubber, which is at most about
 const FRICTION_WHY: &str = "rubber on glass has 0.1 to 0.6 wet and up to 2 dry";
 
 /// The numbers of a scene.
-pub const SCENE_RANGES: &[PlausibleRange] = &[
-    value_range("blade.neck_length_m", "m", LINK_M, LINK_WHY, LENGTHS),
-    value_range("blade.lip_length_m", "m", LINK_M, LINK_WHY, LENGTHS),
-    value_range("blade.head_mass_kg", "kg", HEAD_MASS_KG, HEAD_WHY, MASSES),
-    value_range("blade.neck_mass_kg", "kg", LINK_MASS_KG, MASS_WHY, MASSES),
-    value_range("blade.lip_mass_kg", "kg", LINK_MASS_KG, MASS_WHY, MASSES),
-    derived_range(
-        value_range("blade.neck_mass_kg", "kg/m", MASS_OVER_HEIGHT_KG_PER_M, MASS_WHY, MASSES),
-        "the mass over the height of the neck",
-        &["blade.neck_mass_kg", "blade.neck_length_m"],
-        |value| Some(value("blade.neck_mass_kg")? / value("blade.neck_length_m")?),
-    ),
-    derived_range(
-        value_range("blade.lip_mass_kg", "kg/m", MASS_OVER_HEIGHT_KG_PER_M, MASS_WHY, MASSES),
-        "the mass over the height of the lip",
-        &["blade.lip_mass_kg", "blade.lip_length_m"],
-        |value| Some(value("blade.lip_mass_kg")? / value("blade.lip_length_m")?),
-    ),
-    derived_range(
-        value_range("blade.neck_centre_m", "1", CENTRE_OVER_LENGTH, CENTRE_WHY, LENGTHS),
-        "the centre of the neck over its length",
-        &["blade.neck_centre_m", "blade.neck_length_m"],
-        |value| Some(value("blade.neck_centre_m")? / value("blade.neck_length_m")?),
-    ),
-    derived_range(
-        value_range("blade.lip_centre_m", "1", CENTRE_OVER_LENGTH, CENTRE_WHY, LENGTHS),
-        "the centre of the lip over its length",
-        &["blade.lip_centre_m", "blade.lip_length_m"],
-        |value| Some(value("blade.lip_centre_m")? / value("blade.lip_length_m")?),
-    ),
-    derived_range(
-        value_range("blade.neck_inertia_kg_m2", "1", INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS),
-        "the inertia of the neck over mass times length squared",
-        &["blade.neck_inertia_kg_m2", "blade.neck_mass_kg", "blade.neck_length_m"],
-        |value| {
-            let length = value("blade.neck_length_m")?;
-            Some(value("blade.neck_inertia_kg_m2")? / (value("blade.neck_mass_kg")? * length * length))
-        },
-    ),
-    derived_range(
-        value_range("blade.lip_inertia_kg_m2", "1", INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS),
-        "the inertia of the lip over mass times length squared",
-        &["blade.lip_inertia_kg_m2", "blade.lip_mass_kg", "blade.lip_length_m"],
-        |value| {
-            let length = value("blade.lip_length_m")?;
-            Some(value("blade.lip_inertia_kg_m2")? / (value("blade.lip_mass_kg")? * length * length))
-        },
-    ),
-    value_range(
-        "blade.head_natural_frequency_hz",
-        "Hz",
-        HEAD_HZ,
-        "arms and rigs spring slowly; 8.88 and 20 Hz are published",
-        &[],
-    ),
-    value_range(
-        "blade.neck_natural_frequency_hz",
-        "Hz",
-        NECK_HZ,
-        "195 and 519 Hz are published; a tenth to ten times of these",
-        &[KILOHERTZ],
-    ),
-    value_range(
-        "blade.lip_natural_frequency_hz",
-        "Hz",
-        LIP_HZ,
-        "a tongue of rubber of 1 to 10 mm rings at 100 Hz to 10 kHz",
-        &[KILOHERTZ],
-    ),
-    value_range("blade.head_damping_ratio", "1", HEAD_RATIO, "beyond 1 a head does not ring", &[PERCENT]),
-    value_range("blade.neck_damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
-    value_range("blade.lip_damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
-    value_range(
-        "blade.preload_force_n",
-        "N",
-        PRESS_N,
-        "arms press with 10 to 20 N per metre, here 1 to 60, on 5 mm to 1.5 m of blade",
-        &[GRAM_FORCE],
-    ),
-    value_range(
-        "shoulder.contact_angle_rad",
-        "rad",
-        SHOULDER_RAD,
-        "a neck that leans on its shoulder has turned by 0.3 to 57 degrees",
-        &[DEGREES],
-    ),
-    value_range(
-        "shoulder.stiffness_ratio",
-        "1",
-        SHOULDER_OVER_NECK,
-        "less is no shoulder, more is a wall",
-        &[PERCENT],
-    ),
-    value_range("shoulder.damping_ratio", "1", RUBBER_RATIO, RUBBER_WHY, &[PERCENT]),
-    value_range("friction.a", "1", FRICTION, FRICTION_WHY, &[POINT, PERCENT]),
-    value_range("friction.c", "1", FRICTION, FRICTION_WHY, &[POINT, PERCENT]),
-    derived_range(
-        value_range("friction.a", "1", FRICTION, FRICTION_WHY, &[]),
-        "the static friction A + C",
-        &["friction.a", "friction.c"],
-        |value| Some(value("friction.a")? + value("friction.c")?),
-    ),
-    value_range(
-        "friction.b_s_per_m",
-        "s/m",
-        DECAY_S_PER_M,
-        "above 1000 friction falls within 1 mm/s, and a wiper moves at 0.1 to 2 m/s",
-        &[THOUSAND_TOO_LARGE],
-    ),
-    value_range("drive.amplitude_m", "m", AMPLITUDE_M, "half a stroke, on a rig or a bus", LENGTHS),
-    value_range(
-        "drive.frequency_hz",
-        "Hz",
-        STROKES_HZ,
-        "a wiper makes at most about 1.2 strokes a second",
-        &[],
-    ),
-    derived_range(
-        value_range(
-            "drive.amplitude_m",
-            "m/s",
-            TOP_SPEED_M_PER_S,
-            "a wiper's tip reaches 2 to 3 m/s",
-            LENGTHS,
-        ),
-        "the top speed of the head",
-        &["drive.amplitude_m", "drive.frequency_hz"],
-        |value| Some(TAU * value("drive.amplitude_m")? * value("drive.frequency_hz")?),
-    ),
-];
+pub const SCENE_RANGES: &[PlausibleRange] = ranges! {
+    "blade.neck_length_m" "m" LINK_M, LINK_WHY, LENGTHS;
+    "blade.lip_length_m" "m" LINK_M, LINK_WHY, LENGTHS;
+    "blade.head_mass_kg" "kg" [1e-4, 5.0], HEAD_WHY, MASSES;
+    "blade.neck_mass_kg" "kg" LINK_MASS_KG, MASS_WHY, MASSES;
+    "blade.lip_mass_kg" "kg" LINK_MASS_KG, MASS_WHY, MASSES;
+    "blade.neck_mass_kg" "kg/m" MASS_OVER_HEIGHT_KG_PER_M, MASS_WHY, MASSES,
+        "the mass over the height of the neck", ["blade.neck_length_m"],
+        |value| Some(value("blade.neck_mass_kg")? / value("blade.neck_length_m")?);
+    "blade.lip_mass_kg" "kg/m" MASS_OVER_HEIGHT_KG_PER_M, MASS_WHY, MASSES,
+        "the mass over the height of the lip", ["blade.lip_length_m"],
+        |value| Some(value("blade.lip_mass_kg")? / value("blade.lip_length_m")?);
+    "blade.neck_centre_m" "1" CENTRE_OVER_LENGTH, CENTRE_WHY, LENGTHS,
+        "the centre of the neck over its length", ["blade.neck_length_m"],
+        |value| Some(value("blade.neck_centre_m")? / value("blade.neck_length_m")?);
+    "blade.lip_centre_m" "1" CENTRE_OVER_LENGTH, CENTRE_WHY, LENGTHS,
+        "the centre of the lip over its length", ["blade.lip_length_m"],
+        |value| Some(value("blade.lip_centre_m")? / value("blade.lip_length_m")?);
+    "blade.neck_inertia_kg_m2" "1" INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS,
+        "the inertia of the neck over mass times length squared", ["blade.neck_mass_kg" "blade.neck_length_m"],
+        |value| inertia_over_rod(value, "neck");
+    "blade.lip_inertia_kg_m2" "1" INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS,
+        "the inertia of the lip over mass times length squared", ["blade.lip_mass_kg" "blade.lip_length_m"],
+        |value| inertia_over_rod(value, "lip");
+    "blade.head_natural_frequency_hz" "Hz" HEAD_HZ,
+        "arms and rigs spring slowly; 8.88 and 20 Hz are published", &[];
+    "blade.neck_natural_frequency_hz" "Hz" [20.0, 5e3],
+        "195 and 519 Hz are published; a tenth to ten times of these", &[KILOHERTZ];
+    "blade.lip_natural_frequency_hz" "Hz" [50.0, 5e4],
+        "a tongue of rubber of 1 to 10 mm rings at 100 Hz to 10 kHz", &[KILOHERTZ];
+    "blade.head_damping_ratio" "1" [0.0, 1.0], "beyond 1 a head does not ring", &[PERCENT];
+    "blade.neck_damping_ratio" "1" RUBBER_RATIO, RUBBER_WHY, &[PERCENT];
+    "blade.lip_damping_ratio" "1" RUBBER_RATIO, RUBBER_WHY, &[PERCENT];
+    "blade.preload_force_n" "N" PRESS_N,
+        "arms press with 10 to 20 N per metre, here 1 to 60, on 5 mm to 1.5 m of blade", &[GRAM_FORCE];
+    "shoulder.contact_angle_rad" "rad" [5e-3, 1.0],
+        "a neck that leans on its shoulder has turned by 0.3 to 57 degrees", &[DEGREES];
+    "shoulder.stiffness_ratio" "1" [0.1, 1e3], "less is no shoulder, more is a wall", &[PERCENT];
+    "shoulder.damping_ratio" "1" RUBBER_RATIO, RUBBER_WHY, &[PERCENT];
+    "friction.a" "1" FRICTION, FRICTION_WHY, &[POINT, PERCENT];
+    "friction.c" "1" FRICTION, FRICTION_WHY, &[POINT, PERCENT];
+    "friction.a" "1" FRICTION, FRICTION_WHY, &[],
+        "the static friction A + C", ["friction.c"],
+        |value| Some(value("friction.a")? + value("friction.c")?);
+    "friction.b_s_per_m" "s/m" [0.0, 1e3],
+        "above 1000 friction falls within 1 mm/s, and a wiper moves at 0.1 to 2 m/s", &[THOUSAND_TOO_LARGE];
+    "drive.amplitude_m" "m" [1e-3, 1.0], "half a stroke, on a rig or a bus", LENGTHS;
+    "drive.frequency_hz" "Hz" [0.01, 5.0], "a wiper makes at most about 1.2 strokes a second", &[];
+    "drive.amplitude_m" "m/s" [1e-4, 5.0], "a wiper's tip reaches 2 to 3 m/s", LENGTHS,
+        "the top speed of the head", ["drive.frequency_hz"],
+        |value| Some(TAU * value("drive.amplitude_m")? * value("drive.frequency_hz")?);
+};
 
 /// The numbers of a blade's section.
-pub const SECTION_RANGES: &[PlausibleRange] = &[
-    value_range("length_m", "m", PIECE_M, "a slice on a rig to the longest blade of a bus", LENGTHS),
-    value_range(
-        "rubber.density_kg_per_m3",
-        "kg/m3",
-        DENSITY_KG_PER_M3,
-        "pure rubber has 860 to 930, highly filled rubber 1600",
-        &[G_PER_CM3],
-    ),
-    value_range(
-        "rubber.youngs_modulus_pa",
-        "Pa",
-        MODULUS_PA,
+pub const SECTION_RANGES: &[PlausibleRange] = ranges! {
+    "length_m" "m" PIECE_M, "a slice on a rig to the longest blade of a bus", LENGTHS;
+    "rubber.density_kg_per_m3" "kg/m3" DENSITY_KG_PER_M3,
+        "pure rubber has 860 to 930, highly filled rubber 1600", &[G_PER_CM3];
+    "rubber.youngs_modulus_pa" "Pa" [5e5, 5e7],
         "30 to 90 Shore A are about 1 to 20 MPa, and twice that at the frequencies of chatter",
-        &[MEGAPASCALS, KILOPASCALS],
-    ),
-    value_range(
-        "rubber.loss_factor",
-        "1",
-        LOSS_FACTOR,
-        "0.05 to 0.5 is usual for rubber, 1 the peak of a damping one",
-        &[PERCENT],
-    ),
-    value_range(
-        "head.mass_kg_per_m",
-        "kg/m",
-        HEAD_KG_PER_M,
-        "a strip and its profile, to a carriage",
-        &[G_PER_M],
-    ),
-    derived_range(
-        value_range(
-            "head.stiffness_n_per_m2",
-            "Hz",
-            HEAD_HZ,
-            "arms and rigs spring slowly; 8.88 and 20 Hz are published",
-            &[],
-        ),
-        "the natural frequency of the head",
-        &["head.stiffness_n_per_m2", "head.mass_kg_per_m"],
-        |value| Some((value("head.stiffness_n_per_m2")? / value("head.mass_kg_per_m")?).sqrt() / TAU),
-    ),
-    value_range(
-        "head.press_force_n_per_m",
-        "N/m",
-        PRESS_N_PER_M,
-        "arms press with 10 to 20 N per metre of blade",
-        &[GRAM_FORCE, PER_MILLIMETRE],
-    ),
-    value_range("neck.height_m", "m", LINK_M, LINK_WHY, LENGTHS),
-    value_range("neck.top_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
-    value_range("neck.bottom_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
-    value_range("neck.hinge_thickness_m", "m", HINGE_THICKNESS_M, HINGE_WHY, LENGTHS),
-    value_range("neck.hinge_height_m", "m", HINGE_M, HINGE_WHY, LENGTHS),
-    value_range("lip.height_m", "m", LINK_M, LINK_WHY, LENGTHS),
-    value_range("lip.top_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
-    value_range("lip.bottom_thickness_m", "m", THICKNESS_M, THICKNESS_WHY, LENGTHS),
-    value_range("lip.hinge_thickness_m", "m", HINGE_THICKNESS_M, HINGE_WHY, LENGTHS),
-    value_range("lip.hinge_height_m", "m", HINGE_M, HINGE_WHY, LENGTHS),
-];
+        &[MEGAPASCALS, KILOPASCALS];
+    "rubber.loss_factor" "1" [0.01, 1.0],
+        "0.05 to 0.5 is usual for rubber, 1 the peak of a damping one", &[PERCENT];
+    "head.mass_kg_per_m" "kg/m" [0.01, 20.0], "a strip and its profile, to a carriage", &[G_PER_M];
+    "head.stiffness_n_per_m2" "Hz" HEAD_HZ, "arms and rigs spring slowly; 8.88 and 20 Hz are published", &[],
+        "the natural frequency of the head", ["head.mass_kg_per_m"],
+        |value| Some((value("head.stiffness_n_per_m2")? / value("head.mass_kg_per_m")?).sqrt() / TAU);
+    "head.press_force_n_per_m" "N/m" PRESS_N_PER_M,
+        "arms press with 10 to 20 N per metre of blade", &[GRAM_FORCE, PER_MILLIMETRE];
+    "neck.height_m" "m" LINK_M, LINK_WHY, LENGTHS;
+    "neck.top_thickness_m" "m" THICKNESS_M, THICKNESS_WHY, LENGTHS;
+    "neck.bottom_thickness_m" "m" THICKNESS_M, THICKNESS_WHY, LENGTHS;
+    "neck.hinge_thickness_m" "m" HINGE_THICKNESS_M, HINGE_WHY, LENGTHS;
+    "neck.hinge_height_m" "m" HINGE_M, HINGE_WHY, LENGTHS;
+    "lip.height_m" "m" LINK_M, LINK_WHY, LENGTHS;
+    "lip.top_thickness_m" "m" THICKNESS_M, THICKNESS_WHY, LENGTHS;
+    "lip.bottom_thickness_m" "m" THICKNESS_M, THICKNESS_WHY, LENGTHS;
+    "lip.hinge_thickness_m" "m" HINGE_THICKNESS_M, HINGE_WHY, LENGTHS;
+    "lip.hinge_height_m" "m" HINGE_M, HINGE_WHY, LENGTHS;
+};

@@ -1,5 +1,4 @@
-//! From the cross section of a rubber blade to the `[blade]` table of a scene, and from a scene back to what
-//! ruler and scale show.
+//! The `[blade]` table of a scene from the cross section of a rubber blade.
 //!
 //! Neck and lip are trapezoids of rubber of density `rho` over a length `b` of blade: height `h`, thickness
 //! `t1` at the top and `t2` at the bottom.
@@ -10,10 +9,10 @@
 //! inertia    J = rho b (h^3 (t1^2 + 4 t1 t2 + t2^2)/(36 (t1 + t2)) + h (t1 + t2) (t1^2 + t2^2)/48)
 //! ```
 //!
-//! For a rectangle that is `g = h/2` and `J = m (h^2 + t^2)/12`. A blade is long compared with its thickness
-//! and bends as a plate, with `E' = E/(1 - nu^2)` in place of Young's modulus; rubber keeps its volume, `nu =
-//! 1/2`. A link turns on a hinge of thickness `t` and height `L`, or where it has none bends over its own
-//! height, `s` from the bottom, so that a force at its bottom moves that as far as the spring does:
+//! For a rectangle this is `g = h/2` and `J = m (h^2 + t^2)/12`. A blade is long compared with its thickness and bends
+//! as a plate, with `E' = E/(1 - nu^2)` in place of Young's modulus; rubber keeps its volume, so `nu = 1/2`. A link
+//! turns on a hinge of thickness `t` and height `L`. Without a hinge it bends over its own height, with `s` from the
+//! bottom; its spring has the same deflection under a force at the bottom:
 //!
 //! ```text
 //! with a hinge     k = E' b t^3/(12 L)
@@ -32,14 +31,12 @@ use input::{InputDeviation, SectionKey};
 use serde::Serialize;
 use std::fmt::Write;
 
-// The `[blade]` table that follows from a section, with the equation and the uncertainty of each number.
-
-/// Significant digits of a number in the table: more than any of them is known to.
+/// Significant digits of a number in the table: more than its uncertainty needs.
 const DIGITS: usize = 4;
 /// Numbers of the table.
 const COUNT: usize = 15;
-/// A dimension that may be wrong by more than itself is varied down to this share of it, as it stays above
-/// zero.
+/// Least value in a difference, as a share of the number itself: a dimension whose standard deviation exceeds it stays
+/// above zero.
 const LEAST_SHARE: f64 = 0.1;
 
 /// A number of the `[blade]` table.
@@ -51,7 +48,7 @@ pub struct BladeTableEntry {
     pub value: f64,
     /// Standard deviation over the value: from those of the inputs alone.
     pub relative_uncertainty: f64,
-    /// How it follows from the section; letters of [`super::section`], `b` is `length_m`.
+    /// Its equation, in the letters of [`super::section`].
     pub equation: &'static str,
 }
 
@@ -74,16 +71,16 @@ const BENDING: &str = "E/(1 - nu^2) b h^2/(12 int s^2/t(s)^3 ds), nu = 1/2, of t
 const RATIO: &str = "eta/2";
 
 impl BladeEstimate {
-    /// Of a section.
+    /// Computes the table of a section.
     #[must_use]
     pub fn from_section(section: &BladeSection) -> Self {
-        let numbers = compute_entries(section);
-        let blade = numbers.iter().enumerate().map(|(at, &(key, value, equation))| {
-            let variance: f64 =
-                section.present_keys().map(|input| entry_change(section, input, at)).map(|d| d * d).sum();
+        let entry = |(at, (key, value, equation))| {
+            let changes = section.present_keys().map(|input| entry_change(section, input, at));
+            let variance: f64 = changes.map(|d| d * d).sum();
             BladeTableEntry { key, value, equation, relative_uncertainty: variance.sqrt() / value }
-        });
-        Self { title: section.title().to_owned(), length_m: section.length_m(), blade: blade.collect() }
+        };
+        let blade = compute_entries(section).into_iter().enumerate().map(entry).collect();
+        Self { title: section.title.clone(), length_m: section.number("length_m"), blade }
     }
 
     /// The value of a key of the table.
@@ -107,8 +104,8 @@ impl BladeEstimate {
             round_to_digits(1e3 * self.length_m, DIGITS)
         );
         for BladeTableEntry { key, value, relative_uncertainty, equation } in &self.blade {
-            let (value, percent) =
-                (round_to_digits(*value, DIGITS), round_to_digits(100.0 * relative_uncertainty, 2));
+            let value = round_to_digits(*value, DIGITS);
+            let percent = round_to_digits(100.0 * relative_uncertainty, 2);
             let _ = writeln!(text, "{key} = {value:?} # +-{percent} %: {equation}"); // cannot fail
         }
         text
@@ -117,11 +114,11 @@ impl BladeEstimate {
 
 /// Key, value and equation of every number.
 fn compute_entries(section: &BladeSection) -> [(&'static str, f64, &'static str); COUNT] {
-    let b = section.length_m();
+    let b = section.number("length_m");
     let rho = section.number("rubber.density_kg_per_m3");
     let modulus = plate_modulus_pa(section.number("rubber.youngs_modulus_pa"));
     let ratio = 0.5 * section.number("rubber.loss_factor");
-    let (neck, lip) = (section.neck(), section.lip());
+    let [neck, lip] = ["neck", "lip"].map(|link| section.link_section(link));
     let bending = |link: &LinkSection| if link.hinge.is_some() { HINGE } else { BENDING };
     let stiffness = |link: &LinkSection| b * link.stiffness_n_per_rad(modulus);
     let of_head = |key: &str| b * section.number(key);
@@ -144,7 +141,7 @@ fn compute_entries(section: &BladeSection) -> [(&'static str, f64, &'static str)
     ]
 }
 
-/// How far a standard deviation of an input moves the number `at`, from a central difference over it.
+/// Change of the number `at` by one standard deviation of an input, from a central difference.
 fn entry_change(section: &BladeSection, input: &SectionKey, at: usize) -> f64 {
     let value = section.number(input.name);
     let deviation = match input.deviation {
@@ -155,8 +152,6 @@ fn entry_change(section: &BladeSection, input: &SectionKey, at: usize) -> f64 {
     let moved = |value: f64| compute_entries(&section.with_value(input.name, value))[at].1;
     (moved(high) - moved(low)) / (high - low) * deviation
 }
-
-// Closed forms of a link's section (equations in [`super::section`]).
 
 /// Poisson's ratio of rubber: its volume hardly changes.
 const POISSON_RATIO: f64 = 0.5;
@@ -218,9 +213,8 @@ impl LinkSection {
     #[must_use]
     pub fn polar_moment_m4(&self) -> f64 {
         let (h, t1, t2) = (self.height_m, self.top_thickness_m, self.bottom_thickness_m);
-        let along = powi(h, 3) * (t1 * t1 + 4.0 * t1 * t2 + t2 * t2) / (36.0 * (t1 + t2));
-        let across = h * (t1 + t2) * (t1 * t1 + t2 * t2) / 48.0;
-        along + across
+        powi(h, 3) * (t1 * t1 + 4.0 * t1 * t2 + t2 * t2) / (36.0 * (t1 + t2))
+            + h * (t1 + t2) * (t1 * t1 + t2 * t2) / 48.0
     }
 
     /// Stiffness at the top per length of blade, N m/rad/m: that of the hinge, or of the link's own bending
@@ -236,9 +230,8 @@ impl LinkSection {
     /// `int_0^h s^2/t(s)^3 ds` with `s` from the bottom.
     fn bending_integral(&self) -> f64 {
         let part = self.height_m / f64::from(PARTS);
-        let thickness = |s: f64| {
-            self.bottom_thickness_m + (self.top_thickness_m - self.bottom_thickness_m) * s / self.height_m
-        };
+        let (top, bottom) = (self.top_thickness_m, self.bottom_thickness_m);
+        let thickness = |s: f64| bottom + (top - bottom) * s / self.height_m;
         (0..PARTS)
             .flat_map(|i| gauss_legendre::nodes_and_weights(part * f64::from(i), part * f64::from(i + 1)))
             .map(|(s, weight)| weight * s * s / powi(thickness(s), 3))

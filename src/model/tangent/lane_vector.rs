@@ -1,17 +1,17 @@
-//! A few numbers that are computed side by side: one a direction, or one an instant.
+//! A short vector of numbers for parallel arithmetic: one lane per direction, or per instant.
 
 use std::array::from_fn;
 use std::ops::{Add, AddAssign, Index, IndexMut, Mul, Neg, Sub, SubAssign};
 
-/// Numbers in a row: as many as a vector register of most processors holds.
+/// Number of lanes: the width of a vector register of most processors.
 pub(crate) const LANES: usize = 4;
 
-/// One number a direction, or one an instant.
+/// One number per direction, or per instant.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LaneVector(pub [f64; LANES]);
 
 impl LaneVector {
-    /// Nothing in every lane.
+    /// Zero in every lane.
     pub(crate) const ZERO: Self = Self([0.0; LANES]);
 
     /// The same number in every lane.
@@ -52,20 +52,28 @@ impl LaneVector {
     }
 }
 
-impl Add for LaneVector {
-    type Output = Self;
-    #[inline(always)]
-    fn add(self, other: Self) -> Self {
-        Self(from_fn(|lane| self.0[lane] + other.0[lane]))
-    }
+macro_rules! operators {
+    ($($binary:ident $method:ident, $assign:ident $assign_method:ident;)*) => {$(
+        impl $binary for LaneVector {
+            type Output = Self;
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self(from_fn(|lane| self.0[lane].$method(other.0[lane])))
+            }
+        }
+
+        impl $assign for LaneVector {
+            #[inline(always)]
+            fn $assign_method(&mut self, other: Self) {
+                *self = self.$method(other);
+            }
+        }
+    )*};
 }
 
-impl Sub for LaneVector {
-    type Output = Self;
-    #[inline(always)]
-    fn sub(self, other: Self) -> Self {
-        Self(from_fn(|lane| self.0[lane] - other.0[lane]))
-    }
+operators! {
+    Add add, AddAssign add_assign;
+    Sub sub, SubAssign sub_assign;
 }
 
 impl Neg for LaneVector {
@@ -73,20 +81,6 @@ impl Neg for LaneVector {
     #[inline(always)]
     fn neg(self) -> Self {
         Self(from_fn(|lane| -self.0[lane]))
-    }
-}
-
-impl AddAssign for LaneVector {
-    #[inline(always)]
-    fn add_assign(&mut self, other: Self) {
-        *self = *self + other;
-    }
-}
-
-impl SubAssign for LaneVector {
-    #[inline(always)]
-    fn sub_assign(&mut self, other: Self) {
-        *self = *self - other;
     }
 }
 
