@@ -1,8 +1,9 @@
 //! Features: values that the same code reads from a recording and from the recording of a model, for jobs and
-//! studies. Every kind is a row of the table in `feature/reading.rs`; `docs/fits.md` and `docs/sweeps.md` list them.
+//! studies. Every kind is a row of the table in `feature/reading.rs`; `docs/fits.md` and `docs/sweeps.md`
+//! list them.
 //!
-//! The instants of a window are found in each recording separately, so model and measurement need not share a clock.
-//! Readings that only a simulated run has are read from its [`RunRecord`].
+//! The instants of a window are found in each recording separately, so model and measurement need not share a
+//! clock. Readings that only a simulated run has are read from its [`RunRecord`].
 
 mod contact;
 mod deflection;
@@ -28,8 +29,8 @@ use serde::Serialize;
 pub use spectral::{ASSIGN_DB, ASSIGN_WIDTH, CycleRangeEnd, FeatureBand};
 pub use value::{FeatureUnit, FeatureValue, LengthCalibration, RunnerUpComponent, ValueComparison};
 
-/// Least relative standard deviation of a measured frequency. Without noise, a window of 0.15 s gives a peak at 78 Hz to
-/// 0.03 Hz (4e-4), and the model is read through another window of the same length.
+/// Least relative standard deviation of a measured frequency. Without noise, a window of 0.15 s gives a peak
+/// at 78 Hz to 0.03 Hz (4e-4), and the model is read through another window of the same length.
 pub(crate) const FREQUENCY_SD_FLOOR: f64 = 1e-3;
 
 /// A reading with its name and its condition.
@@ -56,8 +57,8 @@ impl Feature {
         self.reading.read(None, &FeatureReader::new(recording, instants))
     }
 
-    /// Reads it through a reader that other features share; a frequency is that of the component assigned to the
-    /// `target`, Hz ([`Reading::read`]).
+    /// Reads it through a reader that other features share; a frequency is that of the component assigned to
+    /// the `target`, Hz ([`Reading::read`]).
     ///
     /// # Errors
     /// [`MissingValue`] with the reason.
@@ -79,8 +80,8 @@ pub fn read_features(
     read_assigned_features(features, &[], &recordings.iter().collect::<Vec<_>>())
 }
 
-/// Reads every feature from the recordings of a model. `targets` has one value per feature, in its unit, to which
-/// components are assigned; features beyond its end have no target.
+/// Reads every feature from the recordings of a model. `targets` has one value per feature, in its unit, to
+/// which components are assigned; features beyond its end have no target.
 #[must_use]
 pub fn read_assigned_features(
     features: &[Feature],

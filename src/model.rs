@@ -13,8 +13,8 @@
 //! n   = ((m_a - M l1) sin theta, (m_b - M l2) sin phi)
 //! ```
 //!
-//! Contact needs two solutions of this 2x2 system ([`FrictionResponse`]): the motion without friction and the motion
-//! per unit of friction force.
+//! Contact needs two solutions of this 2x2 system ([`FrictionResponse`]): the motion without friction and the
+//! motion per unit of friction force.
 
 pub mod flight;
 pub mod friction;
@@ -121,8 +121,8 @@ impl LinkDirections {
     }
 }
 
-/// Response of the blade to a friction force `f` at one instant: `qdd = free + f per_force`, `v3dd = a_free + kappa f`,
-/// `N = n_free + nu f`.
+/// Response of the blade to a friction force `f` at one instant: `qdd = free + f per_force`, `v3dd = a_free +
+/// kappa f`, `N = n_free + nu f`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrictionResponse {
     /// Angular accelerations without friction, rad/s2.
@@ -279,8 +279,8 @@ impl Linkage {
         along + down + turning + springs + self.shoulder.map_or(0.0, |s| s.energy_j(pose.theta))
     }
 
-    /// Power that flows in, W: that of the drive and of friction, minus that of the dampers. `force` is the friction
-    /// force on the tip, N; the drive's force follows from the momentum along the sweep.
+    /// Power that flows in, W: that of the drive and of friction, minus that of the dampers. `force` is the
+    /// friction force on the tip, N; the drive's force follows from the momentum along the sweep.
     #[must_use]
     pub fn power_w(
         &self,

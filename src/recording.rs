@@ -61,8 +61,8 @@ pub struct Traces {
 #[error("{0}")]
 pub struct RecordingError(String);
 
-/// Largest distance from the origin, m. No wiper's recording reaches a thousandth of it, and its square is far
-/// from overflow.
+/// Largest distance from the origin, m. No wiper's recording reaches a thousandth of it, and its square is
+/// far from overflow.
 pub(crate) const LARGEST_M: f64 = 1e6;
 
 /// Traces on their frame grid, with a name for messages. All columns have the length of the grid, and all
@@ -156,8 +156,8 @@ fn check_column(column: &str, values: &[Option<f64>], expected: usize) -> Result
     let Some((frame, found)) = first else { return Ok(()) };
     Err(RecordingError(if found.is_finite() {
         format!(
-            "column {column}, frame {frame}: found {found:e}, expected at most {LARGEST_M:e} from the origin; \
-             correct the value, or the scale of the import"
+            "column {column}, frame {frame}: found {found:e}, expected at most {LARGEST_M:e} from the \
+             origin; correct the value, or the scale of the import"
         )
     } else {
         format!("column {column}, frame {frame}: found {found}, expected a finite number or an empty cell")
@@ -167,8 +167,8 @@ fn check_column(column: &str, values: &[Option<f64>], expected: usize) -> Result
 /// Frames of the interpolating polynomial. For 900 Hz at 5,000 frames/s, six frames are low by 0.8 % half way
 /// between two frames; a straight line is low by 16 %.
 pub(crate) const STENCIL: usize = 6;
-/// A time this close to a frame, in frames, is that of the frame. Times near 1 s at 1e5 frames/s are rounded far
-/// less.
+/// A time this close to a frame, in frames, is that of the frame. Times near 1 s at 1e5 frames/s are rounded
+/// far less.
 pub(crate) const ON_FRAME_TOLERANCE: f64 = 1e-6;
 
 impl Recording {

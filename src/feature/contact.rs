@@ -49,8 +49,8 @@ impl ContactReading {
         }
     }
 
-    /// Whether a run that ended early with this status still gives its value. A count or a share would need the rest
-    /// of the run.
+    /// Whether a run that ended early with this status still gives its value. A count or a share would need
+    /// the rest of the run.
     pub(super) fn is_known_after(self, end: RunStatus) -> bool {
         match self {
             Self::ContactLoss | Self::LeastNormalForce => end == RunStatus::ContactLost,

@@ -1,5 +1,5 @@
-//! Mean deflections: over a window, and over the frames with a given speed of the head. Over a stroke the latter is
-//! the friction curve.
+//! Mean deflections: over a window, and over the frames with a given speed of the head. Over a stroke the
+//! latter is the friction curve.
 
 use super::missing::{FEWEST_AT_SPEED, MissingValue};
 use super::reader::FeatureReader;
@@ -45,16 +45,16 @@ pub(super) fn read_deflection_at_speed(
     Err(MissingValue::Speed { found: count, low_m_per_s, high_m_per_s, least_m_per_s, most_m_per_s })
 }
 
-/// Length of the blocks over which the head's speed is measured, s. At 5,000 frames/s a tenth of a pixel of 20 um is an
-/// error of 4e-5 m/s. Between two blocks the speed of a stroke at 1 Hz deviates from a line by less than a thousandth of
-/// its maximum.
+/// Length of the blocks over which the head's speed is measured, s. At 5,000 frames/s a tenth of a pixel of
+/// 20 um is an error of 4e-5 m/s. Between two blocks the speed of a stroke at 1 Hz deviates from a line by
+/// less than a thousandth of its maximum.
 pub(crate) const SPEED_BLOCK_S: f64 = 0.02;
 /// Fewest tracked frames of a block.
 const FEWEST_IN_BLOCK: usize = 5;
 
-/// The head's speed in every frame, m/s; `None` with fewer than two blocks. It is interpolated linearly between the
-/// slopes of blocks that overlap by half, and extrapolated beyond the first and the last. Exact where the head's path
-/// is a parabola.
+/// The head's speed in every frame, m/s; `None` with fewer than two blocks. It is interpolated linearly
+/// between the slopes of blocks that overlap by half, and extrapolated beyond the first and the last. Exact
+/// where the head's path is a parabola.
 pub(super) fn head_speeds_m_per_s(head: &[Option<f64>], frame_rate_hz: f64) -> Option<Vec<f64>> {
     let half = ((SPEED_BLOCK_S * frame_rate_hz / 2.0).round() as usize).max(FEWEST_IN_BLOCK.div_ceil(2));
     let block = |k: usize| block_slope(head, k * half..((k + 2) * half).min(head.len()), frame_rate_hz);

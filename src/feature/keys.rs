@@ -5,8 +5,8 @@ use crate::recording::channel::{Channel, Window};
 use crate::spectrum::Detrend;
 use crate::toml_file::{KeyRefusal, NumberPair, check_above_zero, refuse_key};
 
-/// Default relative half width of the range of speeds around a given speed: several cycles of chatter pass within it, and
-/// friction hardly changes.
+/// Default relative half width of the range of speeds around a given speed: several cycles of chatter pass
+/// within it, and friction hardly changes.
 pub const WIDTH_RELATIVE: f64 = 0.15;
 /// Largest relative half width of that range.
 const WIDEST_RELATIVE: f64 = 0.5;

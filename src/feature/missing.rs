@@ -5,8 +5,8 @@ use crate::simulate::RunStatus;
 use crate::spectrum::SpectrumError;
 use serde::{Deserialize, Serialize};
 
-/// Fewest cycles in each half of a window: with fewer, the main lobe of the Hann window overlaps its mirror image at
-/// negative frequencies.
+/// Fewest cycles in each half of a window: with fewer, the main lobe of the Hann window overlaps its mirror
+/// image at negative frequencies.
 pub(crate) const LEAST_CYCLES: f64 = 3.0;
 /// Fewest tracked frames with the requested speed.
 pub(crate) const FEWEST_AT_SPEED: usize = 8;

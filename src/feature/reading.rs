@@ -15,8 +15,8 @@ use serde::Serialize;
 
 /// Scale of a time that may be zero or negative, s: a tenth of a stick of half a second.
 pub(crate) const TIME_SCALE_S: f64 = 0.05;
-/// Default number of bands of a log-spectrum: over an octave, each is as wide as the change of a stick-slip frequency by
-/// friction.
+/// Default number of bands of a log-spectrum: over an octave, each is as wide as the change of a stick-slip
+/// frequency by friction.
 const DEFAULT_LINES: usize = 12;
 /// Most bands of a log-spectrum and most speeds of a friction curve: each is a feature of its own.
 const MAX_SERIES_LENGTH: usize = 100;
@@ -103,8 +103,8 @@ const NONE: &[&str] = &[];
 
 macro_rules! kinds {
     ($($word:literal $unit:ident $keys:ident $make:ident $of:expr;)*) => {
-        /// Every kind. A new one is a variant of [`Reading`], a row here, its word in [`Reading::kind`] and its value
-        /// in [`Reading::read`].
+        /// Every kind. A new one is a variant of [`Reading`], a row here, its word in [`Reading::kind`] and
+        /// its value in [`Reading::read`].
         const KINDS: &[ReadingKind] = &[$(ReadingKind {
             word: $word, unit: FeatureUnit::$unit, keys: $keys, make: ReadingConstructor::$make($of),
         }),*];
@@ -156,7 +156,8 @@ impl ReadingKind {
         matches!(self.make, ReadingConstructor::OfRun(_))
     }
 
-    /// Readings of an entry with their names: that of the entry, with a suffix where the entry has several readings.
+    /// Readings of an entry with their names: that of the entry, with a suffix where the entry has several
+    /// readings.
     ///
     /// # Errors
     /// The key at fault, what was found and what was expected.
@@ -312,11 +313,12 @@ impl Reading {
         matches!(self, Self::Contact(contact) if contact.needs_audit())
     }
 
-    /// Its value. A frequency is that of the component assigned to `target`, Hz, by [`super::ASSIGN_WIDTH`] and
-    /// [`super::ASSIGN_DB`], or of the strongest component without a target.
+    /// Its value. A frequency is that of the component assigned to `target`, Hz, by [`super::ASSIGN_WIDTH`]
+    /// and [`super::ASSIGN_DB`], or of the strongest component without a target.
     ///
     /// # Errors
-    /// [`MissingValue`] with the reason. A run that ended early gives only the readings that describe its end.
+    /// [`MissingValue`] with the reason. A run that ended early gives only the readings that describe its
+    /// end.
     pub fn read(&self, target: Option<f64>, reader: &FeatureReader) -> Result<FeatureValue, MissingValue> {
         self.check_end(reader)?;
         match self {

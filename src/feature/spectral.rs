@@ -1,4 +1,5 @@
-//! Readings of a band of a window's spectrum: the component of a target, the size of the strongest, the power.
+//! Readings of a band of a window's spectrum: the component of a target, the size of the strongest, the
+//! power.
 
 use super::missing::{LEAST_CYCLES, MissingValue};
 use super::reader::FeatureReader;
@@ -9,8 +10,8 @@ use crate::spectrum::{Component, Detrend, SpectrumError, SpectrumSettings, Windo
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// Distance `ln(f / target)` with the same weight as [`ASSIGN_DB`]: near the best point of a fit, the model's peak is
-/// within 10 % of its target.
+/// Distance `ln(f / target)` with the same weight as [`ASSIGN_DB`]: near the best point of a fit, the model's
+/// peak is within 10 % of its target.
 pub const ASSIGN_WIDTH: f64 = 0.1;
 /// Level below the strongest component with the same weight as [`ASSIGN_WIDTH`], dB: half the amplitude.
 pub const ASSIGN_DB: f64 = 6.0;
@@ -55,7 +56,8 @@ pub(super) fn read_rms(band: &FeatureBand, reader: &FeatureReader) -> Result<Fea
     read_band_level(band, 0.0, reader)
 }
 
-/// Root mean square of a band plus a floor, in quadrature: differences far below the floor have no weight in a fit.
+/// Root mean square of a band plus a floor, in quadrature: differences far below the floor have no weight in
+/// a fit.
 pub(super) fn read_band_level(
     band: &FeatureBand,
     floor_m: f64,
@@ -108,8 +110,9 @@ fn level_below_strongest_db(inside: &[&Component], component: &Component) -> f64
     20.0 * math::log10(strongest_m / component.amplitude_m)
 }
 
-/// The best and the second best component for a target: those with the least `(ln(f / target) / ASSIGN_WIDTH)^2 +
-/// (dB below the strongest / ASSIGN_DB)^2`. A weaker peak is chosen only where it is much nearer.
+/// The best and the second best component for a target: those with the least `(ln(f / target) /
+/// ASSIGN_WIDTH)^2 + (dB below the strongest / ASSIGN_DB)^2`. A weaker peak is chosen only where it is much
+/// nearer.
 fn assign_component<'a>(
     inside: &[&'a Component],
     target: Option<f64>,
@@ -134,14 +137,14 @@ pub struct FeatureBand {
     pub band_hz: (f64, f64),
     /// Trend that is removed before the transform.
     pub detrend: Detrend,
-    /// Least amplitude of the strongest component, m. In a trace without noise, remains of the trend and of an old
-    /// ring-down would count otherwise, although no camera resolves them.
+    /// Least amplitude of the strongest component, m. In a trace without noise, remains of the trend and of
+    /// an old ring-down would count otherwise, although no camera resolves them.
     pub least_amplitude_m: f64,
 }
 
-// The frequency of a stick-slip cycle drifts with the speed of the tip, so it is measured in short segments. A segment
-// gives the mean over its own time. Therefore the range is narrower than the drift, by the drift of half a segment at
-// either end, for model and measurement alike.
+// The frequency of a stick-slip cycle drifts with the speed of the tip, so it is measured in short segments.
+// A segment gives the mean over its own time. Therefore the range is narrower than the drift, by the drift of
+// half a segment at either end, for model and measurement alike.
 
 /// Least amplitude of a segment as a share of the largest: below it the cycle has not started or has decayed.
 pub(crate) const LEAST_SEGMENT_AMPLITUDE: f64 = 0.2;
@@ -153,8 +156,8 @@ pub(super) struct CycleSegments {
 }
 
 impl CycleSegments {
-    /// Measures the samples of a band's window. Segments overlap by at least half; the first and the last reach the
-    /// ends of the window.
+    /// Measures the samples of a band's window. Segments overlap by at least half; the first and the last
+    /// reach the ends of the window.
     pub(super) fn from_samples(
         band: &FeatureBand,
         segment_s: f64,
@@ -199,13 +202,13 @@ fn segment_starts(window: usize, frames: usize) -> Option<impl Iterator<Item = u
     Some((0..=steps).map(move |k| (k * room).checked_div(steps).unwrap_or(0)))
 }
 
-// Damping from the logarithmic decrement between the halves of a window. In the second half a decaying sinusoid is
-// `exp(-d T/2)` times that of the first, with another phase. The amplitudes through the same Hann window, at any
-// frequency near its own, have exactly this ratio: `d = 2 ln(a1 / a2) / T` and `zeta = d / sqrt(d^2 + (2 pi f)^2)`.
-// Errors come from the trend, neighbouring components and noise.
+// Damping from the logarithmic decrement between the halves of a window. In the second half a decaying
+// sinusoid is `exp(-d T/2)` times that of the first, with another phase. The amplitudes through the same Hann
+// window, at any frequency near its own, have exactly this ratio: `d = 2 ln(a1 / a2) / T` and `zeta = d /
+// sqrt(d^2 + (2 pi f)^2)`. Errors come from the trend, neighbouring components and noise.
 
-/// Least amplitude in the second half, in standard deviations of the noise: at 3 its error is a third, and noise alone
-/// seldom reaches it.
+/// Least amplitude in the second half, in standard deviations of the noise: at 3 its error is a third, and
+/// noise alone seldom reaches it.
 pub(crate) const LEAST_FINAL_AMPLITUDE: f64 = 3.0;
 
 /// Damping ratio of the strongest component of a band.
@@ -222,8 +225,8 @@ pub(super) fn read_damping_ratio(
         return Err(MissingValue::FewCycles { frequency_hz, cycles });
     }
     let [first_m, second_m] = transformed.half_amplitudes_m(frequency_hz);
-    // a half has twice the noise power in a bin, so the standard deviation of an amplitude in it equals the noise
-    // floor of the whole window
+    // a half has twice the noise power in a bin, so the standard deviation of an amplitude in it equals the
+    // noise floor of the whole window
     let noise_m = component.amplitude_m / math::powf(10.0, component.snr_db / 20.0);
     if second_m < LEAST_FINAL_AMPLITUDE * noise_m {
         return Err(MissingValue::Faded { frequency_hz, second_m });

@@ -7,7 +7,8 @@ pub struct FeatureValue {
     pub value: f64,
     /// Its standard deviation where the reading itself gives one.
     pub sd: Option<f64>,
-    /// Level below the strongest component of the band, dB; 0 for the strongest and for readings without a choice.
+    /// Level below the strongest component of the band, dB; 0 for the strongest and for readings without a
+    /// choice.
     pub below_db: f64,
     /// The second best component, where there is a choice.
     pub runner_up: Option<RunnerUpComponent>,
@@ -32,7 +33,8 @@ impl FeatureValue {
 /// Effect of the camera's calibration on a value that is a length.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LengthCalibration {
-    /// A mean position of the tip relative to the head: it depends on the offset of the markers and on the scale.
+    /// A mean position of the tip relative to the head: it depends on the offset of the markers and on the
+    /// scale.
     Position,
     /// The size of a motion: it depends on the scale, except for a floor that was added in quadrature.
     Size {

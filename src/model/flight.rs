@@ -1,4 +1,5 @@
-//! The blade off the glass: three degrees of freedom without contact forces, and the effect of an impulse on the tip.
+//! The blade off the glass: three degrees of freedom without contact forces, and the effect of an impulse on
+//! the tip.
 //!
 //! With `u` free, Lagrange's equations of the linkage for `(u, theta, phi)` under an upward force `N` and a
 //! friction force `f` on the tip are
@@ -13,8 +14,8 @@
 //! r2 =  m_c sin(theta - phi) thetad^2 - m_b vdd cos phi - k2 (phi - theta) - c2 (phid - thetad)
 //! ```
 //!
-//! The state has the gap between tip and glass, `l1 (1 - cos theta) + l2 (1 - cos phi) - u`, in place of `u`: it starts
-//! at exactly zero, and its relative accuracy does not depend on the height of the tip.
+//! The state has the gap between tip and glass, `l1 (1 - cos theta) + l2 (1 - cos phi) - u`, in place of `u`:
+//! it starts at exactly zero, and its relative accuracy does not depend on the height of the tip.
 
 use super::shoulder::ShoulderContact;
 use super::{HeadMotion, LinkDirections, Linkage, Pose};
@@ -40,8 +41,8 @@ pub struct FlightAccelerations {
     pub gap_m_per_s2: f64,
 }
 
-/// Change of the motion by a unit impulse on the tip: a column of the inverse mass matrix of the linkage and of its
-/// inverse contact mass.
+/// Change of the motion by a unit impulse on the tip: a column of the inverse mass matrix of the linkage and
+/// of its inverse contact mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImpulseResponse {
     /// Rates of neck and lip, rad/s for 1 N s.
@@ -55,7 +56,8 @@ pub struct ImpulseResponse {
 /// Inverse of the mass matrix without the head's drop, and the coupling of the links to the drop.
 struct ReducedInertia {
     inverse: [[f64; 2]; 2],
-    /// Rate of the drop per rate of each link at zero vertical momentum: `m_a sin theta / M`, `m_b sin phi / M`.
+    /// Rate of the drop per rate of each link at zero vertical momentum: `m_a sin theta / M`, `m_b sin phi /
+    /// M`.
     carried: [f64; 2],
 }
 
@@ -131,8 +133,8 @@ impl Linkage {
         [response(normal, -1.0), response(along, 0.0)]
     }
 
-    /// Impulse of the drive along the sweep, N s, that keeps the velocity of the head while the rates of the links change
-    /// by `rates`, rad/s, under a tangential impulse on the tip, N s.
+    /// Impulse of the drive along the sweep, N s, that keeps the velocity of the head while the rates of the
+    /// links change by `rates`, rad/s, under a tangential impulse on the tip, N s.
     pub(crate) fn drive_impulse_n_s(&self, d: &LinkDirections, rates: [f64; 2], tangential_n_s: f64) -> f64 {
         self.m_a * d.cos_theta * rates[0] + self.m_b * d.cos_phi * rates[1] - tangential_n_s
     }

@@ -57,8 +57,8 @@ pub(crate) fn body_frequencies(blade: &Linkage) -> BodyFrequencies {
     }
 }
 
-/// Modes about the upright position in rising frequency; `on_shoulder` adds stiffness and damping of the shoulder to
-/// those of the neck.
+/// Modes about the upright position in rising frequency; `on_shoulder` adds stiffness and damping of the
+/// shoulder to those of the neck.
 #[must_use]
 pub fn natural_modes(blade: &Linkage, tip: TipConstraint, on_shoulder: bool) -> Vec<NaturalMode> {
     let (m, c, k) = linearised_matrices(blade, on_shoulder);
@@ -73,8 +73,8 @@ pub fn natural_modes(blade: &Linkage, tip: TipConstraint, on_shoulder: bool) -> 
     }
 }
 
-/// Compliance of the tip along the glass, m/N, at a frequency, Hz: displacement over force on a tip that slides without
-/// friction, as amplitude and phase.
+/// Compliance of the tip along the glass, m/N, at a frequency, Hz: displacement over force on a tip that
+/// slides without friction, as amplitude and phase.
 ///
 /// `H = b^T (k + i w c - w^2 m)^-1 b` with `b = (l1, l2)`, the head at rest.
 #[must_use]
@@ -136,8 +136,8 @@ fn free_modes(m: &Matrix2<f64>, c: &Matrix2<f64>, k: &Matrix2<f64>) -> Vec<Natur
     [low, high].into_iter().enumerate().map(mode).collect()
 }
 
-/// Damped frequency, Hz, and damping ratio of each conjugate pair of eigenvalues, in rising frequency. Empty unless both
-/// pairs oscillate: a single pair could be assigned to the wrong mode.
+/// Damped frequency, Hz, and damping ratio of each conjugate pair of eigenvalues, in rising frequency. Empty
+/// unless both pairs oscillate: a single pair could be assigned to the wrong mode.
 fn damped_pairs(m: &Matrix2<f64>, c: &Matrix2<f64>, k: &Matrix2<f64>) -> Vec<(f64, f64)> {
     let Some(inverse) = m.try_inverse() else { return Vec::new() };
     let mut state = Matrix4::zeros();

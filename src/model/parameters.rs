@@ -1,7 +1,8 @@
 //! The table of a scene's numbers: name, symbol, unit, admissible range, scale and meaning.
 //!
-//! Files, messages, fits and reports read this table. Where a quantity can be written in two ways (a stiffness or a
-//! natural frequency), both rows have the same [`ParameterQuantity`], and a scene gives exactly one of them.
+//! Files, messages, fits and reports read this table. Where a quantity can be written in two ways (a
+//! stiffness or a natural frequency), both rows have the same [`ParameterQuantity`], and a scene gives
+//! exactly one of them.
 
 use super::shoulder::Shoulder;
 use super::{Linkage, Spring};
@@ -183,8 +184,8 @@ pub(crate) fn damping_from_ratio(ratio: f64, stiffness: f64, inertia: f64) -> f6
     2.0 * ratio * (stiffness * inertia).sqrt()
 }
 
-/// Value of the parameter `name` from a blade that may have been given by an equivalent one, such as a stiffness by a
-/// natural frequency. `None` for a name without an equivalent, or a blade without that part.
+/// Value of the parameter `name` from a blade that may have been given by an equivalent one, such as a
+/// stiffness by a natural frequency. `None` for a name without an equivalent, or a blade without that part.
 pub(crate) fn convert_value(name: &str, blade: &Linkage) -> Option<f64> {
     let (mass, theta, phi) = (blade.mass_kg, blade.m_theta, blade.m_phi);
     let (table, key) = name.split_once('.')?;
@@ -212,8 +213,8 @@ pub(crate) fn convert_value(name: &str, blade: &Linkage) -> Option<f64> {
     }
 }
 
-/// Advice on the length of blade that the numbers of a scene are for. The solution of the equations of motion does not
-/// change if all of these are multiplied by one factor, so any length of blade will do.
+/// Advice on the length of blade that the numbers of a scene are for. The solution of the equations of motion
+/// does not change if all of these are multiplied by one factor, so any length of blade will do.
 pub(crate) const SAME_LENGTH_ADVICE: &str = "Masses, inertias, stiffnesses, dampings and the preload are all for one and \
                                the same length of blade: the whole blade, the piece on the rig, or one metre.";
 

@@ -78,8 +78,8 @@ pub struct PlausibleRange {
 
 /// Findings on the values of a file, in the order of the table.
 ///
-/// `written` gives the key under which a file has the quantity of a row. A quantity that is written under another key
-/// is computed, so it is judged like a derived number.
+/// `written` gives the key under which a file has the quantity of a row. A quantity that is written under
+/// another key is computed, so it is judged like a derived number.
 pub(crate) fn find_implausible(
     table: &[PlausibleRange],
     value: &ValueLookup<'_>,
@@ -129,8 +129,8 @@ impl PlausibleRange {
         }
     }
 
-    /// The likeliest mistake whose correction leads into the range, or general advice. Numbers with mistakes are
-    /// proportional to the value of their own key.
+    /// The likeliest mistake whose correction leads into the range, or general advice. Numbers with mistakes
+    /// are proportional to the value of their own key.
     fn advise_correction(&self, judged: f64, written: Option<f64>) -> String {
         let slip = self.slips.iter().find(|slip| self.admits(judged * slip.factor));
         match slip.zip(written) {
@@ -148,7 +148,8 @@ fn format_value(value: f64) -> String {
 
 // Ranges of several rows. They are wide: no blade in use lies outside.
 
-/// Height of a link, m: the rubber of a wiper is 5 to 20 mm high, and a part that bends on its own at least 0.5 mm.
+/// Height of a link, m: the rubber of a wiper is 5 to 20 mm high, and a part that bends on its own at least
+/// 0.5 mm.
 const LINK_M: [f64; 2] = [5e-4, 2e-2];
 /// Thickness of a link, m: from the edge of a lip to the widest body of a profile.
 const THICKNESS_M: [f64; 2] = [1e-4, 1e-2];
@@ -210,8 +211,8 @@ const LENGTHS: &[UnitSlip] = &[MILLIMETRES, CENTIMETRES, METRES_TWICE];
 const MASSES: &[UnitSlip] = &[GRAMS, MILLIGRAMS];
 const INERTIAS: &[UnitSlip] = &[THOUSAND_TOO_LARGE, KG_MM2, G_CM2, G_MM2, THOUSAND_TOO_SMALL];
 
-/// Rows of a table: key, unit, range, reason and slips; of a derived number also its name, the other keys that it
-/// depends on and its equation.
+/// Rows of a table: key, unit, range, reason and slips; of a derived number also its name, the other keys
+/// that it depends on and its equation.
 macro_rules! ranges {
     (@judged) => { PlausibilitySubject::Value };
     (@judged $name:literal, [$($key:literal)*], $of:expr) => {
@@ -265,11 +266,11 @@ pub const SCENE_RANGES: &[PlausibleRange] = ranges! {
         "the centre of the lip over its length", ["blade.lip_length_m"],
         |value| Some(value("blade.lip_centre_m")? / value("blade.lip_length_m")?);
     "blade.neck_inertia_kg_m2" "1" INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS,
-        "the inertia of the neck over mass times length squared", ["blade.neck_mass_kg" "blade.neck_length_m"],
-        |value| inertia_over_rod(value, "neck");
+        "the inertia of the neck over mass times length squared",
+        ["blade.neck_mass_kg" "blade.neck_length_m"], |value| inertia_over_rod(value, "neck");
     "blade.lip_inertia_kg_m2" "1" INERTIA_OVER_ROD, INERTIA_WHY, INERTIAS,
-        "the inertia of the lip over mass times length squared", ["blade.lip_mass_kg" "blade.lip_length_m"],
-        |value| inertia_over_rod(value, "lip");
+        "the inertia of the lip over mass times length squared",
+        ["blade.lip_mass_kg" "blade.lip_length_m"], |value| inertia_over_rod(value, "lip");
     "blade.head_natural_frequency_hz" "Hz" HEAD_HZ,
         "arms and rigs spring slowly; 8.88 and 20 Hz are published", &[];
     "blade.neck_natural_frequency_hz" "Hz" [20.0, 5e3],

@@ -9,10 +9,10 @@
 //! inertia    J = rho b (h^3 (t1^2 + 4 t1 t2 + t2^2)/(36 (t1 + t2)) + h (t1 + t2) (t1^2 + t2^2)/48)
 //! ```
 //!
-//! For a rectangle this is `g = h/2` and `J = m (h^2 + t^2)/12`. A blade is long compared with its thickness and bends
-//! as a plate, with `E' = E/(1 - nu^2)` in place of Young's modulus; rubber keeps its volume, so `nu = 1/2`. A link
-//! turns on a hinge of thickness `t` and height `L`. Without a hinge it bends over its own height, with `s` from the
-//! bottom; its spring has the same deflection under a force at the bottom:
+//! For a rectangle this is `g = h/2` and `J = m (h^2 + t^2)/12`. A blade is long compared with its thickness
+//! and bends as a plate, with `E' = E/(1 - nu^2)` in place of Young's modulus; rubber keeps its volume, so
+//! `nu = 1/2`. A link turns on a hinge of thickness `t` and height `L`. Without a hinge it bends over its own
+//! height, with `s` from the bottom; its spring has the same deflection under a force at the bottom:
 //!
 //! ```text
 //! with a hinge     k = E' b t^3/(12 L)
@@ -35,8 +35,8 @@ use std::fmt::Write;
 const DIGITS: usize = 4;
 /// Numbers of the table.
 const COUNT: usize = 15;
-/// Least value in a difference, as a share of the number itself: a dimension whose standard deviation exceeds it stays
-/// above zero.
+/// Least value in a difference, as a share of the number itself: a dimension whose standard deviation exceeds
+/// it stays above zero.
 const LEAST_SHARE: f64 = 0.1;
 
 /// A number of the `[blade]` table.

@@ -13,20 +13,20 @@
 //! flight:   N = f = 0,   M u'' = m_a q1' + m_b q2' + k0 (h_d - u) - c0 u'
 //! ```
 //!
-//! so that eight products of series, and two more for friction, are all that a coefficient costs. The highest
-//! coefficients enter linearly with the matrix of the instant itself, which is inverted once.
+//! A coefficient costs eight products of series, and two more for friction. The highest coefficients enter
+//! linearly with the matrix at the instant itself, which is inverted once.
 
 use super::{LinkDirections, Linkage, Pose, ShoulderContact};
 
-/// A quantity of neck and lip.
+/// One value for the neck and one for the lip.
 pub(super) type LinkPair = [f64; 2];
 
-/// How the tip touches the glass while the motion is expanded.
+/// Contact between tip and glass during the expansion.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ContactMode {
     /// It slides in this direction, +1 or -1.
     Slip(f64),
-    /// It is held at its place.
+    /// It sticks.
     Stick,
     /// It is off the glass: drop of the head, m, and its rate, m/s.
     Flight(f64, f64),
@@ -43,7 +43,7 @@ impl ContactMode {
     }
 }
 
-/// Factors of the products that a coefficient of index `j` enters from the left.
+/// Left factors, of index `j`, of the products in the recurrence.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct LeftFactors {
     pub cos: LinkPair,
@@ -52,8 +52,8 @@ pub(super) struct LeftFactors {
     pub slip: LinkPair,
 }
 
-/// Factors that an index `m` enters from the right; those that are known later by one order carry the next
-/// index.
+/// Right factors, of index `m`, of the products in the recurrence. Those that are known one order later have
+/// the index `m + 1`.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct RightFactors {
     /// Angular rates of index `m + 1`.
@@ -81,17 +81,16 @@ pub struct MotionSeries<const K: usize> {
     pub drop_m: [f64; K],
     /// Friction force on the tip, N.
     pub friction_n: [f64; K],
-    /// In flight: velocity of the tip away from the glass, m/s; the first coefficient is the start's and left
-    /// to the caller.
+    /// In flight: velocity of the tip away from the glass, m/s. The caller sets the first coefficient.
     pub gap_rate: [f64; K],
     /// Painlevé indicator of slip at the instant; 1 in stick and in flight.
     pub indicator: f64,
-    /// Order to which the motion was expanded last.
+    /// Order of the last expansion.
     pub order: usize,
     pub(super) drop_rate: [f64; K],
     pub(super) left: [LeftFactors; K],
     pub(super) right: [RightFactors; K],
-    /// `p` and `q` of the highest order.
+    /// `p` and `q` of the highest order so far.
     pub(super) p: LinkPair,
     pub(super) q: LinkPair,
 }
@@ -127,13 +126,12 @@ struct ProductSums {
     slip: LinkPair,
 }
 
-/// The part of the recurrence that does not change with the order: everything that contains the angles of the
-/// instant alone.
+/// Constants of the recurrence, which depend only on the angles at the instant.
 #[derive(Debug, Clone)]
 pub(super) struct RecurrenceConstants {
     pub l: LinkPair,
     pub m: LinkPair,
-    /// `m_a - M l1`, `m_b - M l2`: what the normal force takes of `q'`.
+    /// `m_a - M l1`, `m_b - M l2`: coefficients of `q'` in the normal force.
     pub arm: LinkPair,
     /// Inverse of the matrix of the accelerations, friction included.
     pub inverse: [LinkPair; 2],
@@ -141,13 +139,11 @@ pub(super) struct RecurrenceConstants {
     pub w: LinkPair,
     pub per_force: LinkPair,
     pub mobility: f64,
-    /// How `u''` depends on the accelerations and on the rest of `q'`, and how `N` depends on the
-    /// accelerations.
+    /// Coefficients of the accelerations and of the rest of `q'` in `u''`, and of the accelerations in `N`.
     pub drop: LinkPair,
     pub drop_rest: LinkPair,
     pub normal: LinkPair,
-    /// What a newton of normal force and one of the friction's lower orders do to the moments of neck and
-    /// lip.
+    /// Moments of neck and lip per newton of normal force, and per newton of the lower orders of friction.
     pub per_normal: LinkPair,
     pub per_slip: LinkPair,
     /// `cos` and `sin` of the instant times `m_c` and times `m`.
@@ -157,8 +153,7 @@ pub(super) struct RecurrenceConstants {
     pub sin_m: LinkPair,
     /// Friction coefficient with the sign of its force.
     pub mu: f64,
-    /// Stiffness of the neck, the shoulder's included where it leans, its damping, and the moment at zero
-    /// angle.
+    /// Stiffness and damping of the neck, with the shoulder's where it leans, and the moment at zero angle.
     pub neck: [f64; 3],
     /// Painlevé indicator of slip; 1 in stick and in flight.
     pub indicator: f64,
@@ -235,7 +230,7 @@ impl<const K: usize> MotionSeries<K> {
         self.head_velocity[k] + linkage.l1_m * self.p[0] + linkage.l2_m * self.p[1]
     }
 
-    /// What the first coefficients alone determine.
+    /// Constants from the first coefficients.
     pub(super) fn recurrence_constants(
         &self,
         linkage: &Linkage,
@@ -246,7 +241,7 @@ impl<const K: usize> MotionSeries<K> {
         let LeftFactors { cos: c, sin: s, slip: [mu, _] } = self.left[0];
         let (l, m) = ([l1, l2], [m_a, m_b]);
         let arm = [m_a - mass * l1, m_b - mass * l2];
-        // in flight `u''` follows from its own equation and nothing presses
+        // in flight `u''` has an equation of its own, and there is no normal force
         let flies = matches!(touch, ContactMode::Flight(..));
         let drop_rest = if flies { m.map(|m| m / mass) } else { l };
         let drop = per_link(|i| drop_rest[i] * s[i]);
@@ -290,8 +285,8 @@ impl<const K: usize> MotionSeries<K> {
         }
     }
 
-    /// From the coefficients of angles and rates up to `x^k` to those of `x^(k + 1)`; `FALLING` is slip under
-    /// friction that falls with speed.
+    /// Advances from the coefficients of angles and rates up to `x^k` to those of `x^(k + 1)`. `FALLING`
+    /// means slip with friction that falls with speed.
     #[inline(always)]
     fn advance_order<const FALLING: bool>(
         &mut self,
@@ -307,7 +302,7 @@ impl<const K: usize> MotionSeries<K> {
         self.angle[k + 1] = per_link(|i| self.rate[k][i] * share);
         let (cos, sin) = (per_link(|i| -self.q[i] * share), per_link(|i| self.p[i] * share));
         let sums = self.sum_products::<FALLING>(k);
-        // p and q of the next order but for the part of the rate that is solved for
+        // p and q of the next order without the unknown part of the rate
         let rest_p = per_link(|i| sums.p[i] + cos[i] * self.rate[0][i]);
         let rest_q = per_link(|i| sums.q[i] + sin[i] * self.rate[0][i]);
         let (tp, tq) = (per_link(|i| next * rest_p[i]), per_link(|i| next * rest_q[i]));
@@ -369,8 +364,8 @@ impl<const K: usize> MotionSeries<K> {
         self.right[k] = RightFactors { next_rate: rate, x, y, slip: [normal, falling] };
     }
 
-    /// Products of known coefficients, the newest factors last: their computation may still be under way when
-    /// the sum starts.
+    /// Products of known coefficients. The newest factors come last, because the processor may still compute
+    /// them when the sum starts.
     #[inline(always)]
     fn sum_products<const FALLING: bool>(&self, k: usize) -> ProductSums {
         let mut sums = ProductSums::default();
@@ -405,7 +400,7 @@ impl<const K: usize> MotionSeries<K> {
     }
 }
 
-/// One value a link.
+/// One value per link.
 #[inline(always)]
 pub(super) fn per_link(f: impl Fn(usize) -> f64) -> LinkPair {
     [f(0), f(1)]

@@ -1,22 +1,22 @@
-//! The first variation of the motion: linear equations for the derivatives of the blade's angles, along a
-//! motion whose Taylor series are known.
+//! The first variation of the motion: linear equations for the derivatives of the blade's angles along a
+//! motion with known Taylor series.
 //!
-//! The unknowns are the derivatives `y_i = cos(angle_i) d angle_i` of the sines of both angles: those of the
-//! tip's place are `l1 y1 + l2 y2`, whatever the angles are. With `t` for the tangent of an angle,
-//! `S_i = t_i y_i` for the derivative of minus its cosine, and in the notation of
-//! [`series`](super::series), the equation of each link over its cosine becomes
+//! The unknowns are the derivatives `y_i = cos(angle_i) d angle_i` of the sines of both angles, so that the
+//! derivative of the tip's position is `l1 y1 + l2 y2` at all angles. Let `t` be the tangent of an angle and
+//! `S_i = t_i y_i` the derivative of minus its cosine. In the notation of [`series`](super::series), the
+//! equation of each link, divided by the cosine of its angle, becomes
 //!
 //! ```text
 //! (I_i d angle_i'' + d moment_i + Z_i d angle_i) / cos_i + dX_i + t_i dY_i + (d I_i angle_i'') / cos_i = 0
 //! dX_1 = m_c y2'' + m_a d v'' - l1 df + (d m_c p2' + d m_a v'' - d l1 f)       Z_i = cos_i Y_i - sin_i X_i
 //! dY_1 = m_c S2'' - m_a du'' - l1 dN + (d m_c q2' - d m_a u'' - d l1 N)        likewise for the lip
 //! slip:   df = -sigma mu dN + b N E d v3' - sigma N (d a e + d c) + d b v3' N E,   E = a e
-//! stick:  l1 y1 + l2 y2 + d v + d l1 sin theta + d l2 sin phi stays, and df is what holds it
+//! stick:  l1 y1 + l2 y2 + d v + d l1 sin theta + d l2 sin phi is constant, which determines df
 //! flight: dN = df = 0, and the gap between tip and glass is a third unknown
 //! ```
 //!
-//! Everything that multiplies an unknown is the same for all directions, and so is what a change of one
-//! constant adds.
+//! The coefficients of the unknowns, and the terms from a change of one constant, are the same for all
+//! directions.
 
 mod forcing;
 mod lane_vector;
@@ -36,29 +36,27 @@ pub(crate) use motion_samples::{LinkAttitudes, MotionSamples, fill_lanes};
 /// Derivatives of the state at the start of a step.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct StateTangent {
-    /// Of the angles of neck and lip, rad over the unit of the direction, and so on.
+    /// Of the angles of neck and lip, rad over the unit of the direction.
     pub angle: [LaneVector; 2],
     /// Of the angular rates, rad/s.
     pub rate: [LaneVector; 2],
-    /// Of the gap between tip and glass, m: nothing in contact.
+    /// Of the gap between tip and glass, m: zero in contact.
     pub gap_m: LaneVector,
     /// Of its rate, m/s.
     pub gap_rate: LaneVector,
 }
 
-// A motion whose variation is asked for.
-
-/// A quantity of neck and lip.
+/// One vector for the neck and one for the lip.
 pub(super) type LaneVectorPair = [LaneVector; 2];
 
-/// A motion whose variation is asked for; `K` is that of its series.
+/// The motion about which the variation is computed; `K` is the size of its series.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ReferenceMotion<'a, const K: usize> {
     /// The linkage that moves.
     pub linkage: &'a Linkage,
-    /// How its tip touches the glass.
+    /// Contact between its tip and the glass.
     pub touch: ContactMode,
-    /// On which side its neck leans.
+    /// Side on which its neck leans.
     pub lean: ShoulderContact,
     pub motion: &'a MotionSeries<K>,
 }
@@ -76,14 +74,14 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         [self.linkage.m_a, self.linkage.m_b]
     }
 
-    /// `m_a - M l1`, `m_b - M l2`: what the normal force takes of `q'`.
+    /// `m_a - M l1`, `m_b - M l2`: coefficients of `q'` in the normal force.
     pub(super) fn arms(&self) -> [f64; 2] {
         let (l, m) = (self.lengths(), self.moments());
         [m[0] - self.linkage.mass_kg * l[0], m[1] - self.linkage.mass_kg * l[1]]
     }
 }
 
-/// One row a link.
+/// One vector per link.
 #[inline(always)]
 pub(super) fn lanes_per_link(f: impl Fn(usize) -> LaneVector) -> LaneVectorPair {
     [f(0), f(1)]
@@ -95,29 +93,26 @@ pub(super) fn sum_over_links(weights: [f64; 2], rows: &LaneVectorPair) -> LaneVe
     weights[0] * rows[0] + weights[1] * rows[1]
 }
 
-// What multiplies the derivatives in their equations.
-
-/// Matrices of the derivatives' second, first and own values at a few instants: equations by unknowns, the
-/// third of both in flight alone.
+/// Mass, damping and stiffness matrices of the variation at a few instants: equations by unknowns. The third
+/// of both, the gap, matters only in flight.
 #[derive(Debug, Clone)]
 pub(crate) struct TangentMatrices {
-    /// Of the second derivatives in time.
     pub mass: [[LaneVector; 3]; 3],
     pub damping: [[LaneVector; 3]; 3],
     pub stiffness: [[LaneVector; 3]; 3],
 }
 
-/// The one equation of a tip that sticks, without the force that holds it: `y2` follows from `y1`.
+/// The equation for `y1` in stick, with the friction force eliminated; `y2` follows from `y1`.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StickEquation {
-    /// Factors of `y1''`, `y1'` and `y1`.
+    /// Coefficients of `y1''`, `y1'` and `y1`, with `y2` eliminated.
     pub first: [LaneVector; 3],
-    /// What the same of `y2` would be multiplied by.
+    /// Coefficients of `y2''`, `y2'` and `y2` before the elimination.
     pub second: [LaneVector; 3],
 }
 
 impl<const K: usize> ReferenceMotion<'_, K> {
-    /// What a newton of normal force does to each link's equation; nothing presses in flight.
+    /// Coefficient of the normal force in each link's equation; zero in flight.
     #[inline(always)]
     pub(super) fn normal_force_arms(&self, at: &MotionSamples) -> [LaneVector; 2] {
         let l = self.lengths();
@@ -128,13 +123,13 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// What friction gains with the tip's speed, N s/m.
+    /// Derivative of the friction force by the tip's speed, N s/m.
     #[inline(always)]
     pub(super) fn friction_per_speed(&self, at: &MotionSamples) -> LaneVector {
         self.linkage.friction.b_s_per_m * at.falling
     }
 
-    /// The matrices at these instants; in stick without the force that holds the tip.
+    /// The matrices at these instants; in stick without the friction force.
     pub(crate) fn tangent_matrices(&self, at: &MotionSamples) -> TangentMatrices {
         let linkage = self.linkage;
         let (l, m, arms, m_c) = (self.lengths(), self.moments(), self.arms(), linkage.m_c);
@@ -156,8 +151,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
             for j in 0..2 {
                 let coupled = if i == j { -m[i] * l[j] } else { m_c - m[i] * l[j] };
                 let pushed = coupled * at.tangent[0][i] + arms[j] * n[i];
-                let held = l[j] * n[i];
-                self.add_support(&mut out, at, (i, j), pushed, held);
+                self.add_support(&mut out, at, (i, j), (pushed, l[j] * n[i]));
             }
         }
         self.add_springs(&mut out, secant, secant_1);
@@ -176,16 +170,15 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         out
     }
 
-    /// What `S_j = t_j y_j` does in equation `i`: by its second derivative, and by the support, which its
-    /// first and itself take from the normal force.
+    /// Adds the terms of `S_j = t_j y_j` to equation `i`: `pushed` multiplies its second derivative, and
+    /// `held` the force of the support, which depends on its first derivative and its value.
     #[inline(always)]
     fn add_support(
         &self,
         out: &mut TangentMatrices,
         at: &MotionSamples,
         (i, j): (usize, usize),
-        pushed: LaneVector,
-        held: LaneVector,
+        (pushed, held): (LaneVector, LaneVector),
     ) {
         let head = self.linkage.head;
         let [t, t_1, t_2] = [at.tangent[0][j], at.tangent[1][j], at.tangent[2][j]];
@@ -195,7 +188,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         out.stiffness[i][j] += pushed * t_2 + by_rate * t_1 + by_value * t;
     }
 
-    /// The springs of both links, by their angles `y / cos`.
+    /// Adds the springs of both links, which act on the angles `y / cos`.
     #[inline(always)]
     fn add_springs(&self, out: &mut TangentMatrices, secant: &[LaneVector; 2], secant_1: &[LaneVector; 2]) {
         let lip = self.linkage.lip;
@@ -210,25 +203,25 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// Flight: the gap lifts the head, whose own equation is the third.
+    /// Adds the gap in flight: it lifts the head, and the equation of the head is the third.
     #[inline(always)]
     fn add_gap(&self, out: &mut TangentMatrices, at: &MotionSamples) {
         const GAP: usize = 2;
         let (m, l, arms, linkage) = (self.moments(), self.lengths(), self.arms(), self.linkage);
+        let head = linkage.head;
         for i in 0..2 {
             out.mass[i][GAP] = m[i] * at.tangent[0][i];
-            let head = linkage.head;
             let [t, t_1, t_2] = [at.tangent[0][i], at.tangent[1][i], at.tangent[2][i]];
             out.mass[GAP][i] = -arms[i] * t;
             out.damping[GAP][i] = -2.0 * arms[i] * t_1 + head.damping * l[i] * t;
             out.stiffness[GAP][i] = -arms[i] * t_2 + head.damping * l[i] * t_1 + head.stiffness * l[i] * t;
         }
         out.mass[GAP][GAP] = LaneVector::splat(-linkage.mass_kg);
-        out.damping[GAP][GAP] = LaneVector::splat(-linkage.head.damping);
-        out.stiffness[GAP][GAP] = LaneVector::splat(-linkage.head.stiffness);
+        out.damping[GAP][GAP] = LaneVector::splat(-head.damping);
+        out.stiffness[GAP][GAP] = LaneVector::splat(-head.stiffness);
     }
 
-    /// The one equation of stick.
+    /// The equation in stick.
     pub(crate) fn stick_equation(&self, matrices: &TangentMatrices) -> StickEquation {
         let l = self.lengths();
         let ratio = l[0] / l[1];

@@ -16,8 +16,8 @@ pub struct Alignment {
     pub drop_m: f64,
     /// The point whose paths are compared.
     pub followed: AlignmentPoint,
-    /// Standard deviation of the time shift, s: infinite where the path does not determine it, `None` where no
-    /// path is fitted.
+    /// Standard deviation of the time shift, s: infinite where the path does not determine it, `None` where
+    /// no path is fitted.
     pub shift_sd_s: Option<f64>,
     /// Whether the recorded head turns in the opposite direction: then the paths meet only at the turn.
     pub opposite_turn: bool,
@@ -107,8 +107,8 @@ fn head_at(recording: &Recording, t: f64) -> Option<f64> {
     recording.interpolate_column(&recording.traces().head_x_m, t)
 }
 
-/// Travel of the head in a short time after a turn, m; its sign is the direction after the turn. The longest of
-/// a few times whose end is tracked.
+/// Travel of the head in a short time after a turn, m; its sign is the direction after the turn. The longest
+/// of a few times whose end is tracked.
 fn head_turn_m(recording: &Recording, turn_s: f64) -> f64 {
     const TIMES_S: [f64; 4] = [0.04, 0.02, 0.01, 0.005];
     let travel = |time_s: &f64| Some(head_at(recording, turn_s + time_s)? - head_at(recording, turn_s)?);

@@ -1,14 +1,14 @@
 //! Frame numbers from a column of times: the times of a table may be rounded and rows may be absent.
 
-/// Largest distance of a time from its frame, frames. Rounding to half a frame moves a time by up to a quarter; beyond
-/// a third the nearest frame is uncertain.
+/// Largest distance of a time from its frame, frames. Rounding to half a frame moves a time by up to a
+/// quarter; beyond a third the nearest frame is uncertain.
 pub(crate) const OFF_GRID_LIMIT_FRAMES: f64 = 0.3;
 
 /// Longest grid, frames: 17 minutes at 10,000 frames/s. A longer jump of the times is damage.
 pub(crate) const MAX_FRAMES: f64 = 10_000_000.0;
 
-/// Share of a row's distance from the grid by which the phase of the grid is corrected. With a seed that is 1 % off the
-/// phase lags by a tenth of a frame.
+/// Share of a row's distance from the grid by which the phase of the grid is corrected. With a seed that is 1
+/// % off the phase lags by a tenth of a frame.
 const PHASE_GAIN: f64 = 0.1;
 /// Most digits that a frame rate read from times can carry.
 const RATE_DIGITS: usize = 16;
@@ -40,10 +40,10 @@ impl FrameFit {
     }
 }
 
-/// Assigns frames to strictly increasing finite `times_s` on a grid of about `seed_s` per frame. The phase of the grid
-/// follows the times slowly: errors of rounding or of the seed do not accumulate, and a damaged row does not shift the
-/// rows after it. Then a line is fitted and the rows are numbered again. `None` for fewer than two rows, a seed that is
-/// not positive, or a grid longer than [`MAX_FRAMES`].
+/// Assigns frames to strictly increasing finite `times_s` on a grid of about `seed_s` per frame. The phase of
+/// the grid follows the times slowly: errors of rounding or of the seed do not accumulate, and a damaged row
+/// does not shift the rows after it. Then a line is fitted and the rows are numbered again. `None` for fewer
+/// than two rows, a seed that is not positive, or a grid longer than [`MAX_FRAMES`].
 pub(crate) fn number_frames(times_s: &[f64], seed_s: f64) -> Option<FrameFit> {
     let first = *times_s.first()?;
     let span_frames = (times_s.last()? - first) / seed_s;
@@ -72,8 +72,8 @@ fn follow_grid(times_s: &[f64], first: f64, seed_s: f64) -> Vec<usize> {
     times_s.iter().map(&mut number).collect()
 }
 
-/// Median time from row to row, s: the frame time where most rows are neighbours. Of two middle values it is the
-/// shorter, because gaps only lengthen times.
+/// Median time from row to row, s: the frame time where most rows are neighbours. Of two middle values it is
+/// the shorter, because gaps only lengthen times.
 pub(crate) fn median_step_s(times_s: &[f64]) -> Option<f64> {
     let mut steps: Vec<f64> = times_s.windows(2).map(|w| w[1] - w[0]).collect();
     steps.sort_by(f64::total_cmp);
@@ -109,7 +109,8 @@ fn renumber_frames(times_s: &[f64], (intercept, slope): (f64, f64)) -> Option<Ve
     usable.then(|| nearest.iter().map(|n| (n - first) as usize).collect())
 }
 
-/// Finds the row furthest off the grid. A row in the same frame as the row above counts as one frame further off.
+/// Finds the row furthest off the grid. A row in the same frame as the row above counts as one frame further
+/// off.
 fn assess_fit(frames: Vec<usize>, times_s: &[f64], (intercept, slope): (f64, f64)) -> FrameFit {
     let off = |row: usize| {
         let distance = (times_s[row] - intercept - slope * frames[row] as f64).abs() / slope;

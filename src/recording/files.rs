@@ -48,8 +48,8 @@ impl FilesError {
 }
 
 /// Reads a recording from the text of its `trace.csv` and its description. Without a description the frame
-/// rate is estimated from the times, and the recording counts as taken by a camera. A trace whose hash differs
-/// from that in the description is refused.
+/// rate is estimated from the times, and the recording counts as taken by a camera. A trace whose hash
+/// differs from that in the description is refused.
 ///
 /// # Errors
 /// [`FilesError`] naming `file` (that of the traces) and the place at fault.

@@ -1,5 +1,5 @@
-//! Tracking noise that is correlated between neighbouring frames: an autoregressive process, its estimate from a
-//! recording, the part that both points share, and the map that makes it white.
+//! Tracking noise that is correlated between neighbouring frames: an autoregressive process, its estimate
+//! from a recording, the part that both points share, and the map that makes it white.
 
 mod autoregressive;
 mod blocks;
@@ -12,11 +12,12 @@ use blocks::{BlockCut, NoiseBlock, cut_blocks, keep_quiet_blocks};
 pub(crate) use common_noise::{SharedNoise, measure_common_noise};
 
 // The head along the sweep is compared with its smooth motion; the tip upwards with the glass, which in the
-// picture is a line along the sweep. In the other two channels the blade itself moves as fast as frames follow,
-// so their noise cannot be separated. One tracker is assumed to treat both points alike: the tip along the
-// sweep gets the noise of the head, and the head upwards that of the tip.
+// picture is a line along the sweep. In the other two channels the blade itself moves as fast as frames
+// follow, so their noise cannot be separated. One tracker is assumed to treat both points alike: the tip
+// along the sweep gets the noise of the head, and the head upwards that of the tip.
 
-/// Length of a block, s, in which the motion is fitted by a cubic: at 50 Hz a hundredth of the amplitude is left.
+/// Length of a block, s, in which the motion is fitted by a cubic: at 50 Hz a hundredth of the amplitude is
+/// left.
 const BLOCK_S: f64 = 8e-3;
 /// Fewest frames of a block: in fewer, a cubic removes most of the correlation between neighbours.
 const LEAST_BLOCK: usize = 24;
@@ -63,8 +64,8 @@ pub(super) fn block_length(frame_rate_hz: f64) -> usize {
     ((BLOCK_S * frame_rate_hz).round() as usize).max(LEAST_BLOCK)
 }
 
-/// Measures the noise of a recording along the sweep and upwards, each on its own channel or, where that gives
-/// none, on the other.
+/// Measures the noise of a recording along the sweep and upwards, each on its own channel or, where that
+/// gives none, on the other.
 pub(crate) fn measure_noise(recording: &Recording) -> RecordingNoise {
     let (traces, length) = (recording.traces(), block_length(recording.grid().frame_rate_hz));
     let head = BlockCut { length, degree: 3, covariate: None };

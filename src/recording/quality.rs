@@ -1,7 +1,7 @@
 //! Quality of a recording: its rate, gaps and noise, measured on the traces, and findings on them.
 //!
-//! [`measure_quality`] measures; [`collect_findings`] judges, each finding with a severity, a number and advice;
-//! `verdict_lines` writes both as text; [`Quality::component_visibility`] judges a single frequency.
+//! [`measure_quality`] measures; [`collect_findings`] judges, each finding with a severity, a number and
+//! advice; `verdict_lines` writes both as text; [`Quality::component_visibility`] judges a single frequency.
 
 mod checks;
 mod finding;
@@ -81,8 +81,9 @@ pub fn grade_findings(findings: &[QualityFinding]) -> Grade {
     }
 }
 
-/// The verdict, one statement a line: the grade with the visible frequencies, then the findings, gravest first. A
-/// finding on several channels is one line with its largest number. Notes without advice are left out.
+/// The verdict, one statement a line: the grade with the visible frequencies, then the findings, gravest
+/// first. A finding on several channels is one line with its largest number. Notes without advice are left
+/// out.
 pub fn verdict_lines(measured: &Quality, findings: &[QualityFinding]) -> Vec<String> {
     let mut lines = vec![grade_line(measured, findings)];
     let mut stated: Vec<(Check, Severity)> = vec![];
@@ -118,8 +119,8 @@ fn grade_line(measured: &Quality, findings: &[QualityFinding]) -> String {
     if low_hz >= high_hz {
         let Quality { frames, frame_rate_hz, .. } = measured;
         return format!(
-            "too short for a spectrum: {frames} frames at {frame_rate_hz} frames/s hold fewer than {FEWEST_CYCLES} \
-             cycles of anything they can show"
+            "too short for a spectrum: {frames} frames at {frame_rate_hz} frames/s hold fewer than \
+             {FEWEST_CYCLES} cycles of anything they can show"
         );
     }
     let grade = match grade_findings(findings) {
@@ -128,8 +129,8 @@ fn grade_line(measured: &Quality, findings: &[QualityFinding]) -> String {
         Grade::NotUsable => "not usable until the serious findings are resolved: would show",
     };
     format!(
-        "{grade} oscillations from about {low_hz:.3} Hz ({FEWEST_CYCLES} cycles in the recording) to {high_hz:.0} Hz \
-         ({NYQUIST_SHARE} of the Nyquist frequency)"
+        "{grade} oscillations from about {low_hz:.3} Hz ({FEWEST_CYCLES} cycles in the recording) to \
+         {high_hz:.0} Hz ({NYQUIST_SHARE} of the Nyquist frequency)"
     )
 }
 

@@ -83,8 +83,9 @@ impl Picture {
         Ok(bytes)
     }
 
-    /// Resamples to `width` x `height` pixels, each the mean over its area. `pixel` maps a place in the new picture to
-    /// one in this picture, both in pixels from the upper left corner. The outside of this picture is white.
+    /// Resamples to `width` x `height` pixels, each the mean over its area. `pixel` maps a place in the new
+    /// picture to one in this picture, both in pixels from the upper left corner. The outside of this picture
+    /// is white.
     pub(crate) fn resample(&self, width: usize, height: usize, pixel: impl Fn([f64; 2]) -> [f64; 2]) -> Self {
         let ([x0, y0], [x1, y1]) = (pixel([0.0, 0.0]), pixel([1.0, 0.0]));
         let samples = math::hypot(x1 - x0, y1 - y0).ceil().clamp(1.0, MOST_SAMPLES) as usize;

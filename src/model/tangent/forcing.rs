@@ -1,4 +1,5 @@
-//! What a change of a constant, or of the head's motion, adds to the equations of the derivatives.
+//! Forcing terms: contributions of a change of a constant, or of the head's motion, to the equations of the
+//! variation.
 
 #![allow(clippy::needless_range_loop)] // indices are those of the equations
 
@@ -9,49 +10,50 @@ use super::{ReferenceMotion, lanes_per_link};
 use crate::model::series::ContactMode;
 use crate::model::shoulder::ShoulderContact;
 
-/// What one change does at a few instants, over the unit of the change; or the factors of the same in a sum.
+/// Terms of a change at a few instants, per unit of the change; in a [`super::LinearForm`], the factors of
+/// these terms.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct ForcingTerms {
-    /// Moves the head along the sweep, m.
+    /// Displacement of the head along the sweep, m.
     pub head: LaneVector,
-    /// Moves the tip where the angles stay, m, with the first two derivatives in time.
+    /// Displacement of the tip along the sweep at constant angles, m, with its first two derivatives in time.
     pub tip: [LaneVector; 3],
-    /// Lowers the head likewise, m.
+    /// Drop of the head at constant angles, m.
     pub drop: LaneVector,
+    /// Normal force at constant angles, N.
     pub normal: LaneVector,
-    /// Friction force in slip, N, at the same normal force and speed of the blade's own.
+    /// Friction force in slip at constant angles and normal force, N.
     pub force: LaneVector,
-    /// What is added to each equation.
+    /// Term of each equation.
     pub equations: [LaneVector; 3],
 }
 
 /// A change of the head's motion along the sweep at a few instants, m, with the first two derivatives.
 pub(crate) type HeadMotionChange = [LaneVector; 3];
 
-/// What a constant does directly.
+/// Terms of a change before their effects on each other.
 #[derive(Default)]
 struct DirectForcing {
     effect: ForcingTerms,
-    /// To the equation of each link over its cosine.
+    /// Term of the equation of each link, divided by the cosine of its angle.
     links: [LaneVector; 2],
     drop_acceleration: LaneVector,
 }
 
 impl ForcingTerms {
-    /// Sum of the products with the factors of another.
+    /// Sum of the products with the factors of a form.
     pub(crate) fn dot(&self, factors: &Self) -> LaneVector {
         let numbers = |e: &Self| {
             let ([t_0, t_1, t_2], [e_0, e_1, e_2]) = (e.tip, e.equations);
             [e.head, t_0, t_1, t_2, e.drop, e.normal, e.force, e_0, e_1, e_2]
         };
-        let mut sum = LaneVector::ZERO;
-        numbers(self).into_iter().zip(numbers(factors)).for_each(|(a, b)| sum += a * b);
-        sum
+        let products = numbers(self).into_iter().zip(numbers(factors));
+        products.fold(LaneVector::ZERO, |sum, (a, b)| sum + a * b)
     }
 }
 
 impl<const K: usize> ReferenceMotion<'_, K> {
-    /// Whether a constant matters in this course.
+    /// Whether a constant matters in this mode of contact.
     pub(crate) fn depends_on(&self, constant: LinkageConstant) -> bool {
         match constant {
             LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC => {
@@ -64,13 +66,13 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// What a unit of a constant does.
+    /// Terms of a unit change of a constant.
     #[inline(always)]
     pub(crate) fn constant_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> ForcingTerms {
         let mut direct = DirectForcing::default();
         if let LinkageConstant::FrictionA | LinkageConstant::FrictionB | LinkageConstant::FrictionC = constant
         {
-            // (nothing but a force, and there are often three of them)
+            // (a shortcut: these change only a force, and fits often free all three)
             direct.effect.force = self.friction_law_forcing(at, constant);
             let l = self.lengths();
             direct.effect.equations[0] = -l[0] * direct.effect.force;
@@ -81,12 +83,13 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         self.complete_forcing(at, direct)
     }
 
-    /// Whether a constant moves tip or head where the angles stay; only then there is [`Self::displacement_terms`].
+    /// Whether a constant displaces tip or head at constant angles, so that [`Self::displacement_terms`] are
+    /// not zero.
     pub(crate) fn displaces_points(&self, constant: LinkageConstant) -> bool {
         matches!(constant, LinkageConstant::Length(_))
     }
 
-    /// Where a unit of a constant moves tip and head; no forces.
+    /// Displacements of tip and head by a unit change of a constant, without forces.
     pub(crate) fn displacement_terms(&self, at: &LinkAttitudes, constant: LinkageConstant) -> ForcingTerms {
         let mut effect = ForcingTerms::default();
         if let LinkageConstant::Length(j) = constant {
@@ -96,15 +99,13 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         effect
     }
 
-    /// What a change of the head's motion does.
+    /// Terms of a change of the head's motion.
     #[inline(always)]
     pub(crate) fn head_motion_forcing(&self, at: &MotionSamples, shift: &HeadMotionChange) -> ForcingTerms {
         let m = self.moments();
         let effect = ForcingTerms { head: shift[0], tip: *shift, ..ForcingTerms::default() };
-        self.complete_forcing(
-            at,
-            DirectForcing { effect, links: lanes_per_link(|i| m[i] * shift[2]), ..DirectForcing::default() },
-        )
+        let links = lanes_per_link(|i| m[i] * shift[2]);
+        self.complete_forcing(at, DirectForcing { effect, links, ..DirectForcing::default() })
     }
 
     #[inline(always)]
@@ -141,7 +142,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// What the springs and dampers of the links do.
+    /// Adds the terms of the springs and dampers of the links.
     #[inline(always)]
     fn add_spring_forcing(&self, links: &mut [LaneVector; 2], at: &MotionSamples, constant: LinkageConstant) {
         let secant = &at.secant[0];
@@ -166,7 +167,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         }
     }
 
-    /// What the law of friction does to its force in slip.
+    /// Derivative of the friction force in slip by a coefficient of the friction law.
     #[inline(always)]
     fn friction_law_forcing(&self, at: &MotionSamples, constant: LinkageConstant) -> LaneVector {
         let direction = self.touch.slip_direction();

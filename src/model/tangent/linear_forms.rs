@@ -1,15 +1,11 @@
-//! Quantities of the blade by the derivatives of its angles.
+//! Derivatives of the blade's quantities as linear forms of the derivatives of its angles.
 
 #![allow(clippy::needless_range_loop)] // indices are those of the equations
 
-use super::ReferenceMotion;
-use super::TangentMatrices;
-use super::forcing::ForcingTerms;
-use super::lane_vector::LaneVector;
-use super::motion_samples::{LinkAttitudes, MotionSamples};
+use super::{ForcingTerms, LaneVector, LinkAttitudes, MotionSamples, ReferenceMotion, TangentMatrices};
 use crate::model::series::ContactMode;
 
-/// A quantity whose derivatives follow from those of the angles.
+/// A quantity of the blade with derivatives.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ModelChannel {
     /// Position of the tip along the sweep, m.
@@ -36,26 +32,25 @@ pub enum ModelChannel {
     FrictionForce,
 }
 
-/// A quantity's derivative as a sum: factors at a few instants.
+/// Derivative of a quantity as a linear form: its coefficients at a few instants.
 #[derive(Debug, Clone, Default)]
 pub struct LinearForm {
-    /// Of `y1`, `y2` and the gap.
+    /// Coefficients of `y1`, `y2` and the gap.
     pub value: [LaneVector; 3],
-    /// Of their rates.
+    /// Coefficients of their rates.
     pub rate: [LaneVector; 3],
-    /// Of their second derivatives; nothing once they are resolved.
+    /// Coefficients of their second derivatives; zero after the elimination.
     second: [LaneVector; 3],
-    /// Of the place where the tip sticks.
+    /// Coefficient of the position where the tip sticks.
     pub place: LaneVector,
-    /// Of what a change adds.
+    /// Coefficients of the forcing terms.
     pub forcing: ForcingTerms,
 }
 
 impl<const K: usize> ReferenceMotion<'_, K> {
-    /// The place of the tip, at any instants, as [`Self::channel_form`] has it.
+    /// Form of the tip's position along the sweep; it is the same at all instants.
     pub(crate) fn tip_position_form(&self) -> LinearForm {
-        let (mut form, l) = (LinearForm::default(), self.lengths());
-        let one = LaneVector::splat(1.0);
+        let (mut form, l, one) = (LinearForm::default(), self.lengths(), LaneVector::splat(1.0));
         if self.touch == ContactMode::Stick {
             form.place = one;
         } else {
@@ -65,19 +60,17 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// The place of the head along the sweep, likewise.
+    /// Form of the head's position along the sweep; it is the same at all instants.
     pub(crate) fn head_position_form(&self) -> LinearForm {
         let mut form = LinearForm::default();
         form.forcing.head = LaneVector::splat(1.0);
         form
     }
 
-    /// A quantity at these instants; in stick without `y2`, which follows. A force needs all of them:
-    /// [`Self::force_form`].
+    /// Form of a quantity at these instants, in stick with `y2` eliminated; zero for forces, which
+    /// [`Self::force_form`] gives.
     pub(crate) fn channel_form(&self, at: &LinkAttitudes, quantity: ModelChannel) -> LinearForm {
-        let mut form = LinearForm::default();
-        let l = self.lengths();
-        let one = LaneVector::splat(1.0);
+        let (mut form, l, one) = (LinearForm::default(), self.lengths(), LaneVector::splat(1.0));
         let gap = if self.is_in_flight() { one } else { LaneVector::ZERO };
         let secant = |i: usize| at.cos[i].inverse();
         match quantity {
@@ -88,9 +81,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
             }
             ModelChannel::HeadX => return self.head_position_form(),
             ModelChannel::HeadDrop => {
-                for i in 0..2 {
-                    form.value[i] = l[i] * (at.sin[i] * secant(i));
-                }
+                (0..2).for_each(|i| form.value[i] = l[i] * (at.sin[i] * secant(i)));
                 (form.value[2], form.forcing.drop) = (-gap, one);
             }
             ModelChannel::TipHeight => form.value[2] = gap,
@@ -110,7 +101,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// A force at these instants, likewise; there is none in flight.
+    /// Form of a force at these instants, with second derivatives eliminated; zero in flight.
     pub(crate) fn force_form(&self, at: &MotionSamples, quantity: ModelChannel) -> LinearForm {
         let mut form = match (quantity, self.touch) {
             (_, ContactMode::Flight(..)) => return LinearForm::default(),
@@ -150,7 +141,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// What the neck's equation leaves for the force that holds the tip.
+    /// Friction force in stick, from the equation of the neck.
     fn stick_friction_form(&self, matrices: &TangentMatrices) -> LinearForm {
         let mut form = LinearForm::default();
         let share = 1.0 / self.linkage.l1_m;
@@ -163,7 +154,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form
     }
 
-    /// Puts what the equations say in place of the second derivatives.
+    /// Eliminates the second derivatives by the equations of the variation.
     fn eliminate_accelerations(&self, form: &mut LinearForm, matrices: &TangentMatrices) {
         if self.touch == ContactMode::Stick {
             self.eliminate_lip(form);
@@ -183,7 +174,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form.second = [LaneVector::ZERO; 3];
     }
 
-    /// The same where the tip sticks: `y1''` follows from the one equation.
+    /// Eliminates `y1''` by the equation in stick.
     fn eliminate_in_stick(&self, form: &mut LinearForm, matrices: &TangentMatrices) {
         let (single, l) = (self.stick_equation(matrices), self.lengths());
         let factor = form.second[0] * single.first[0].inverse();
@@ -200,7 +191,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         form.second = [LaneVector::ZERO; 3];
     }
 
-    /// Puts `y2 = (place - tip - l1 y1) / l2` and its derivatives in place of `y2`.
+    /// Eliminates `y2` in stick by `y2 = (place - tip - l1 y1) / l2` and its derivatives.
     fn eliminate_lip(&self, form: &mut LinearForm) {
         let l = self.lengths();
         let (ratio, share) = (l[0] / l[1], 1.0 / l[1]);

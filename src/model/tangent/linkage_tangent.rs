@@ -3,8 +3,8 @@
 use super::lane_vector::LaneVector;
 use crate::model::Linkage;
 
-/// Derivatives of every constant of a [`Linkage`], one lane per direction, in the unit of the constant over that of
-/// the direction.
+/// Derivatives of every constant of a [`Linkage`], one lane per direction, in the unit of the constant over
+/// that of the direction.
 #[derive(Debug, Clone, Default)]
 #[allow(missing_docs)] // the fields are those of the linkage
 pub struct LinkageTangent {
@@ -56,13 +56,16 @@ pub enum LinkageConstant {
     ShoulderDamping,
 }
 
-/// A constant with its row of a [`LinkageTangent`] and its place in a [`Linkage`], which a linkage without shoulder
-/// may lack.
+/// A constant with its row of a [`LinkageTangent`] and its place in a [`Linkage`], which a linkage without
+/// shoulder may lack.
 type ConstantRow =
     (LinkageConstant, fn(&mut LinkageTangent) -> &mut LaneVector, fn(&mut Linkage) -> Option<&mut f64>);
 
 macro_rules! constants {
-    ($($constant:ident $(($index:literal))? $($row:ident).+ $([$at:literal])?, $($field:ident).+ $(?$of:ident)?;)*) => {
+    ($(
+        $constant:ident $(($index:literal))? $($row:ident).+ $([$at:literal])?,
+        $($field:ident).+ $(?$of:ident)?;
+    )*) => {
         &[$((
             LinkageConstant::$constant $(($index))?,
             |tangent| &mut tangent.$($row).+ $([$at])?,
@@ -70,7 +73,7 @@ macro_rules! constants {
         )),*]
     };
     (@field $linkage:ident, $($field:ident).+) => { Some(&mut $linkage.$($field).+) };
-    (@field $linkage:ident, $shoulder:ident?$field:ident) => { $linkage.$shoulder.as_mut().map(|s| &mut s.$field) };
+    (@field $linkage:ident, $part:ident?$field:ident) => { $linkage.$part.as_mut().map(|s| &mut s.$field) };
 }
 
 const CONSTANTS: &[ConstantRow] = constants! {
@@ -104,7 +107,8 @@ impl LinkageTangent {
         for (_, row, place) in CONSTANTS {
             let (row, mut sum) = (row(self), 0.0);
             for (weight, mut linkage) in terms.iter().copied() {
-                // (a constant that is the same in all of them has a derivative of exactly zero, and costs nothing)
+                // (a constant that is the same in all of them has a derivative of exactly zero, and costs
+                // nothing)
                 if let (Some(constant), Some(first)) = (place(&mut linkage), first.as_mut().and_then(place)) {
                     sum += weight * (*constant - *first);
                 }

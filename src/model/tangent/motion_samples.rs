@@ -1,4 +1,4 @@
-//! A motion at a few instants of a step, by its series.
+//! Samples of a motion at a few instants of a step, from its series.
 
 use super::lane_vector::{LANES, LaneVector};
 use super::{LaneVectorPair, ReferenceMotion, lanes_per_link, sum_over_links};
@@ -7,7 +7,7 @@ use crate::model::series::ContactMode;
 use std::cell::OnceCell;
 use std::ops::Deref;
 
-/// Where the links point at a few instants, one a lane.
+/// Attitude of the links at a few instants, one per lane.
 #[derive(Debug, Clone)]
 pub(crate) struct LinkAttitudes {
     /// Times since the start of the series, s.
@@ -19,15 +19,14 @@ pub(crate) struct LinkAttitudes {
     pub rate: [LaneVector; 2],
 }
 
-/// A motion at a few instants, one a lane.
+/// Motion and forces at a few instants, one per lane.
 #[derive(Debug, Clone)]
 pub(crate) struct MotionSamples {
-    /// Where the links point.
     pub attitude: LinkAttitudes,
     pub(super) acceleration: LaneVectorPair,
     /// `1 / cos` with its first two derivatives in time.
     pub(super) secant: [LaneVectorPair; 3],
-    /// `sin / cos` likewise.
+    /// `sin / cos` with its first two derivatives in time.
     pub(super) tangent: [LaneVectorPair; 3],
     pub(super) along: LaneVectorPair,
     pub(super) across: LaneVectorPair,
@@ -37,13 +36,13 @@ pub(crate) struct MotionSamples {
     pub(super) friction: LaneVector,
     /// `sigma mu` in slip, 0 otherwise.
     pub(super) mu: LaneVector,
-    /// `N E` in slip, 0 otherwise: what friction loses with speed, over its decay.
+    /// `N E` in slip, 0 otherwise: the normal force times the falling part of the friction coefficient.
     pub(super) falling: LaneVector,
-    /// Both angles, rad, once they are asked for.
+    /// Both angles, rad, computed on demand.
     angles: OnceCell<LaneVectorPair>,
 }
 
-/// Sums of series by Horner's rule, side by side.
+/// Sums of `Q` series by Horner's rule, up to `order`.
 #[inline(always)]
 pub(super) fn sum_horner<const Q: usize>(
     x: LaneVector,
@@ -68,7 +67,7 @@ impl Deref for MotionSamples {
 }
 
 impl<const K: usize> ReferenceMotion<'_, K> {
-    /// Where the links point at these times after the start of the series.
+    /// Attitude of the links at these times after the start of the series, s.
     #[inline]
     pub(crate) fn sample_attitudes(&self, x: LaneVector) -> LinkAttitudes {
         let motion = self.motion;
@@ -80,11 +79,10 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         LinkAttitudes { x, cos: [cos_0, cos_1], sin: [sin_0, sin_1], rate }
     }
 
-    /// The motion at these times after the start of its series.
+    /// The motion at these times after the start of its series, s.
     #[inline]
     pub(crate) fn sample_motion(&self, x: LaneVector) -> MotionSamples {
-        let motion = self.motion;
-        let order = motion.order;
+        let (motion, order) = (self.motion, self.motion.order);
         let attitude = self.sample_attitudes(x);
         let LinkAttitudes { cos, sin, rate, .. } = attitude;
         let [a_0, a_1, head_acceleration, normal] = sum_horner(x, order - 1, |k| {
@@ -132,8 +130,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     /// The forces on the tip.
     #[inline(always)]
     fn sample_tip_forces(&self, at: &mut MotionSamples) {
-        let motion = self.motion;
-        let order = motion.order;
+        let (motion, order) = (self.motion, self.motion.order);
         match self.touch {
             ContactMode::Flight(..) => {
                 at.normal = LaneVector::ZERO;
@@ -143,9 +140,9 @@ impl<const K: usize> ReferenceMotion<'_, K> {
             ContactMode::Stick => [at.friction] = sum_horner(at.x, order - 1, |k| [motion.friction_n[k]]),
             ContactMode::Slip(direction) => {
                 let law = &self.linkage.friction;
-                let [mu] = match law.a == 0.0 {
-                    true => [LaneVector::splat(law.c)],
-                    false => sum_horner(at.x, order, |k| [motion.left[k].slip[0]]),
+                let [mu] = match law.a {
+                    0.0 => [LaneVector::splat(law.c)],
+                    _ => sum_horner(at.x, order, |k| [motion.left[k].slip[0]]),
                 };
                 at.mu = direction * mu;
                 at.friction = -at.mu * at.normal;
@@ -171,15 +168,14 @@ impl<const K: usize> ReferenceMotion<'_, K> {
         if self.is_in_flight() {
             return sum_horner(at.x, motion.order, |k| [motion.drop_m[k], motion.drop_rate[k]]);
         }
-        let l = self.lengths();
-        let one = LaneVector::splat(1.0);
+        let (l, one) = (self.lengths(), LaneVector::splat(1.0));
         [
             sum_over_links(l, &lanes_per_link(|i| one - at.cos[i])),
             sum_over_links(l, &lanes_per_link(|i| at.sin[i] * at.rate[i])),
         ]
     }
 
-    /// `e`, the decay of friction with speed: of which the falling part of the coefficient is the `a`-fold.
+    /// `e = exp(-b |v3'|)`: the falling part of the friction coefficient is `a e`.
     pub(super) fn friction_decay(&self, at: &MotionSamples, direction: f64) -> LaneVector {
         let law = &self.linkage.friction;
         if law.a == 0.0 {
@@ -190,7 +186,7 @@ impl<const K: usize> ReferenceMotion<'_, K> {
     }
 }
 
-/// Times that fill a row: the last one fills what is left.
+/// Times as a vector; the last one also fills the remaining lanes.
 pub(crate) fn fill_lanes(times: impl IntoIterator<Item = f64>) -> LaneVector {
     let mut row = LaneVector::ZERO;
     for (lane, time) in times.into_iter().take(LANES).enumerate() {

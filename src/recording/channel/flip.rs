@@ -12,15 +12,16 @@ const END_SHARE: f64 = 0.95;
 const NEAR_TURN: usize = 5;
 /// Fewest tracked frames of the level after: noise dominates a median of fewer.
 const FEWEST_POINTS: usize = 8;
-/// Least change in units of the deflection's noise. The extremes of white noise in 1e5 frames are about 9 apart.
+/// Least change in units of the deflection's noise. The extremes of white noise in 1e5 frames are about 9
+/// apart.
 const CHANGE_NOISES: f64 = 12.0;
 
 /// Passage of the deflection from its level before a turn to its level after, in s of the recording.
 ///
-/// The level before is the median deflection from the stop of the tip to the turn of the head. The level after
-/// is the median over a time after the release that is as long as the tip's rest: oscillation about it averages
-/// out. The flip starts when the deflection last leaves the first 5 % of the change, and ends when it first
-/// reaches 95 %. A zero crossing would not do, because zero depends on which points are tracked.
+/// The level before is the median deflection from the stop of the tip to the turn of the head. The level
+/// after is the median over a time after the release that is as long as the tip's rest: oscillation about it
+/// averages out. The flip starts when the deflection last leaves the first 5 % of the change, and ends when
+/// it first reaches 95 %. A zero crossing would not do, because zero depends on which points are tracked.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Flip {
     /// The deflection leaves its level before, s.

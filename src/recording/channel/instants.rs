@@ -45,8 +45,8 @@ pub struct Reversal {
     pub hold_s: Option<f64>,
     /// The tip slips again; `None` if that is after the end of the recording, or the tip does not stop.
     pub release_s: Option<f64>,
-    /// The deflection changes sides; `None` without a release, or where the deflection changes by no more than
-    /// its noise.
+    /// The deflection changes sides; `None` without a release, or where the deflection changes by no more
+    /// than its noise.
     pub flip: Option<Flip>,
 }
 

@@ -17,8 +17,8 @@ use std::ops::Range;
 /// | `after` | settled | the tip stops at the next reversal (`hold`), or the end of the recording |
 ///
 /// The tip still sticks during most of `flip`, while the head passes over it. During `stick` the blade rests,
-/// so a ring-down there does not overlap with the flip. `before` of a later reversal is `after` of the previous
-/// one. `Flip` describes how the flip is found.
+/// so a ring-down there does not overlap with the flip. `before` of a later reversal is `after` of the
+/// previous one. `Flip` describes how the flip is found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum ReversalPhase {
     /// The blade trails on its old side.

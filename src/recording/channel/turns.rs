@@ -3,8 +3,8 @@
 use super::{TrackPoints, median_filter, median_position, noise_sd_m, value_range};
 use crate::math;
 
-/// Least return of the head after a turn, m: one pixel of the usual 20 um. Jitter of a resting head stays below
-/// it.
+/// Least return of the head after a turn, m: one pixel of the usual 20 um. Jitter of a resting head stays
+/// below it.
 pub(super) const LEAST_RETURN_M: f64 = 20e-6;
 /// Least return in units of the tracking noise: two extremes of white noise in 1e5 frames are about 9 apart.
 const RETURN_NOISES: f64 = 12.0;
@@ -92,7 +92,8 @@ fn parabola_vertex(points: &[(usize, f64)]) -> Option<f64> {
     s.is_finite().then_some(centre + half * s)
 }
 
-/// Tolerance of a hold, in standard deviations of the noise: one frame in 2 million of white noise lies outside.
+/// Tolerance of a hold, in standard deviations of the noise: one frame in 2 million of white noise lies
+/// outside.
 const HOLD_NOISES: f64 = 5.0;
 /// Smallest tolerance of a hold, m: a hundredth of a pixel of 20 um, finer than any tracker.
 const LEAST_TOLERANCE_M: f64 = 0.2e-6;
@@ -104,13 +105,13 @@ const LEFT_FRAMES: usize = 3;
 const SEEDS: isize = 4;
 /// Half the number of frames whose median seeds the place of a hold.
 const SEED_HALF: usize = 5;
-/// Least travel of the head during a hold, in tolerances. A tip that follows a slow head stays within two, and
-/// noise adds less than two.
+/// Least travel of the head during a hold, in tolerances. A tip that follows a slow head stays within two,
+/// and noise adds less than two.
 const HEAD_TOLERANCES: f64 = 6.0;
 /// Bound on the extrapolation back to the start or end of a hold, frames.
 const MOST_EXTRAPOLATED: f64 = 5.0;
-/// Exponent of the tip's path after release: its acceleration starts at zero, so the path grows as the cube of
-/// time.
+/// Exponent of the tip's path after release: its acceleration starts at zero, so the path grows as the cube
+/// of time.
 const RELEASE_POWER: f64 = 3.0;
 /// Exponent of the tip's path before a hold: it decelerates to rest along a parabola.
 const HOLD_POWER: f64 = 2.0;

@@ -107,8 +107,8 @@ impl Window {
         if from < 0.0 || to > grid.frames as f64 {
             let end_s = grid.time_s(grid.frames.saturating_sub(1));
             return Err(self.refuse(format!(
-                " is {from_s:.6} s to {to_s:.6} s, but {name} runs from {:.6} s to {end_s:.6} s; choose a window \
-                 inside it",
+                " is {from_s:.6} s to {to_s:.6} s, but {name} runs from {:.6} s to {end_s:.6} s; choose a \
+                 window inside it",
                 grid.start_s
             )));
         }

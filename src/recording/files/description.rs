@@ -240,9 +240,9 @@ impl RecordingFile {
         }
         let [found, expected] = [&found, expected].map(|hash| hash.chars().take(12).collect::<String>());
         let problem = format!(
-            ": found SHA-256 {found}..., expected {expected}... as the {DESCRIPTION_FILE} next to it says: one \
-             of the two was changed or replaced; import the export again with --force or, where the change of \
-             the trace is intended, copy it alone into a folder of its own"
+            ": found SHA-256 {found}..., expected {expected}... as the {DESCRIPTION_FILE} next to it says: \
+             one of the two was changed or replaced; import the export again with --force or, where the \
+             change of the trace is intended, copy it alone into a folder of its own"
         );
         Err(FilesError::refuse(file, problem))
     }

@@ -6,8 +6,8 @@ use crate::recording::{FrameGrid, Recording, Traces};
 use rayon::prelude::*;
 use std::fmt::Write;
 
-const NO_ROWS: &str = ": found no rows of numbers, expected the header `time_s,tip_x_m,tip_y_m,head_x_m,head_y_m` \
-     and a row a frame; import the recording again";
+const NO_ROWS: &str = ": found no rows of numbers, expected the header \
+    `time_s,tip_x_m,tip_y_m,head_x_m,head_y_m` and a row a frame; import the recording again";
 
 /// Header of every `trace.csv`; the confidences may follow.
 pub const HEADER: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m";
@@ -17,8 +17,8 @@ const POSITIONS: usize = 4;
 const BLOCK_ROWS: usize = 4096;
 const BLOCKS: usize = 8;
 
-/// Largest distance of a time from the grid of a rounded rate, frames. Printed times carry 16 digits and lie far
-/// closer.
+/// Largest distance of a time from the grid of a rounded rate, frames. Printed times carry 16 digits and lie
+/// far closer.
 const SNAP_FRAMES: f64 = 1e-6;
 
 /// The recording as `trace.csv`: times from the grid, shortest numbers that read back to the same value.
@@ -155,8 +155,8 @@ impl<'a> TraceTable<'a> {
         let mut cells = row.split(',').map(str::trim);
         let refuse = |column: &str, found: &str, expected: &str| {
             let problem = format!(
-                ":{line}: column {column}: found `{found}`, expected {expected}; correct the cell or import the \
-                 recording again"
+                ":{line}: column {column}: found `{found}`, expected {expected}; correct the cell or import \
+                 the recording again"
             );
             FilesError::refuse(file, problem)
         };
@@ -185,8 +185,8 @@ impl<'a> TraceTable<'a> {
         }
         if frames > FRAMES_WITHOUT_ROWS.0 + (1 + FRAMES_WITHOUT_ROWS.1) * rows {
             let problem = format!(
-                ": column time_s: the times span {frames} frames, and only {rows} of them have a row; expected one \
-                 continuous recording: correct the times, or the rate in recording.toml"
+                ": column time_s: the times span {frames} frames, and only {rows} of them have a row; \
+                 expected one continuous recording: correct the times, or the rate in recording.toml"
             );
             return Err(FilesError::refuse(file, problem));
         }
@@ -196,8 +196,8 @@ impl<'a> TraceTable<'a> {
     fn off_grid_error(&self, file: &str, row: usize, off_frames: f64, frame_rate_hz: f64) -> FilesError {
         let line = numbered_rows(self.text).nth(row).map_or(1, |(line, _)| line);
         let problem = format!(
-            ":{line}: column time_s: found {} s, {off_frames:.2} frames off the grid of {frame_rate_hz} frames/s, \
-             expected at most {} frames; check the rate in recording.toml or import the recording again",
+            ":{line}: column time_s: found {} s, {off_frames:.2} frames off the grid of {frame_rate_hz} \
+             frames/s, expected at most {} frames; check the rate in recording.toml or import the recording again",
             self.times_s[row],
             clock::OFF_GRID_LIMIT_FRAMES
         );

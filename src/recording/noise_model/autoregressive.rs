@@ -107,9 +107,10 @@ fn reflection_coefficients(coefficients: &[f64]) -> Vec<f64> {
     found
 }
 
-// Whitening with missing frames: the inverse of the lower Cholesky factor of the covariance of the frames that are
-// present, computed as the innovations of a Kalman filter over the last few frames (Jones 1980, *Technometrics*
-// 22). Its gains do not depend on the data, so they are computed once. A gap is a prediction over several frames.
+// Whitening with missing frames: the inverse of the lower Cholesky factor of the covariance of the frames
+// that are present, computed as the innovations of a Kalman filter over the last few frames (Jones 1980,
+// *Technometrics* 22). Its gains do not depend on the data, so they are computed once. A gap is a prediction
+// over several frames.
 
 /// The last frames of the noise, the latest first.
 type NoiseMemory = [f64; MOST_COEFFICIENTS];
@@ -213,7 +214,8 @@ impl PredictionCovariance {
         self.covariance[0][0] = next;
     }
 
-    /// Measurement update with the latest frame: returns the standard deviation of its innovation and the gain.
+    /// Measurement update with the latest frame: returns the standard deviation of its innovation and the
+    /// gain.
     fn observe_latest(&mut self) -> (f64, NoiseMemory) {
         let variance = self.covariance[0][0];
         let gain = from_fn(|i| if i == 0 { 1.0 } else { self.covariance[i][0] / variance });

@@ -7,8 +7,8 @@ use crate::recording::channel::median_in_place;
 const LEAST_SHARE: f64 = 0.5;
 /// Fewest degrees of freedom of a block.
 const LEAST_LEFT: usize = 4;
-/// Largest scatter of a block, in units of the median: beyond it the block has an outlier, or the tip is off the
-/// glass.
+/// Largest scatter of a block, in units of the median: beyond it the block has an outlier, or the tip is off
+/// the glass.
 const OUTLYING_SCATTER: f64 = 3.0;
 
 /// How a channel is cut.
@@ -45,7 +45,8 @@ impl NoiseBlock {
     }
 }
 
-/// Projects the columns out of the values; returns the logarithm of the determinant of the columns' Gram matrix.
+/// Projects the columns out of the values; returns the logarithm of the determinant of the columns' Gram
+/// matrix.
 pub(super) fn project_out(columns: &mut [Vec<f64>], values: &mut [f64]) -> f64 {
     let mut log = 0.0;
     for j in 0..columns.len() {

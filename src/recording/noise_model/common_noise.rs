@@ -1,8 +1,8 @@
 //! Noise that both points share: a camera that shakes moves them alike.
 //!
-//! The noise of one point is regressed on that of the other within short blocks, in which a parabola describes the
-//! motion. Blocks are weighted by the inverse of their residual variance: a blade that rings counts little, one
-//! that sticks counts much.
+//! The noise of one point is regressed on that of the other within short blocks, in which a parabola
+//! describes the motion. Blocks are weighted by the inverse of their residual variance: a blade that rings
+//! counts little, one that sticks counts much.
 
 use super::block_length;
 use super::blocks::{BlockCut, NoiseBlock, cut_blocks, dot_product, keep_quiet_blocks};
@@ -61,8 +61,8 @@ fn channel_residuals(channel: &[Option<f64>], cut: &BlockCut<'_>) -> Vec<Option<
     left
 }
 
-/// Regression of a channel on that of the other point, in the frames in which the noise of that (`residuals`) is
-/// known.
+/// Regression of a channel on that of the other point, in the frames in which the noise of that (`residuals`)
+/// is known.
 fn regress_on_other_point(
     channel: &[Option<f64>],
     other: &[Option<f64>],
@@ -89,8 +89,8 @@ fn residual_pair(block: &NoiseBlock, other: &[Option<f64>]) -> Option<[Vec<f64>;
     Some([block.residuals(), NoiseBlock { values, ..block.clone() }.residuals()])
 }
 
-/// Share and its standard deviation from the scatter over blocks, by iteratively reweighted least squares. The
-/// weight of a block is the inverse of its residual variance.
+/// Share and its standard deviation from the scatter over blocks, by iteratively reweighted least squares.
+/// The weight of a block is the inverse of its residual variance.
 fn regress_pairs(pairs: &[[Vec<f64>; 2]]) -> Option<(f64, f64)> {
     const ROUNDS: usize = 4;
     let mut share = 0.0;

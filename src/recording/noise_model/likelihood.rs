@@ -1,5 +1,6 @@
-//! Estimate of autoregressive noise from blocks of frames. Residual likelihood accounts for the degrees of freedom
-//! of the fitted motion (Patterson and Thompson 1971, *Biometrika* 58); Schwarz's criterion selects the order.
+//! Estimate of autoregressive noise from blocks of frames. Residual likelihood accounts for the degrees of
+//! freedom of the fitted motion (Patterson and Thompson 1971, *Biometrika* 58); Schwarz's criterion selects
+//! the order.
 
 use super::autoregressive::{AutoregressiveNoise, Whitener, raise_order};
 use super::blocks::{NoiseBlock, dot_product, project_out};

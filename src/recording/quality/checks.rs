@@ -6,14 +6,14 @@ use super::noise::FrameGaps;
 use crate::camera::exposure_gain;
 use crate::recording::{FrameGrid, Traces};
 
-/// Share of missing frames that is worth a caution. Least-squares spectra on true frame times stay accurate up to
-/// 40 %, but weak components are lost much earlier.
+/// Share of missing frames that is worth a caution. Least-squares spectra on true frame times stay accurate
+/// up to 40 %, but weak components are lost much earlier.
 const MANY_MISSING: f64 = 0.2;
 /// Share of the recording that a single gap may take: a longer one may hold the whole stick phase of a
 /// stroke.
 const LONG_GAP: f64 = 0.05;
-/// Share of an amplitude that the exposure should pass at the highest usable frequency. A loss of a tenth exceeds
-/// the uncertainty of the scale.
+/// Share of an amplitude that the exposure should pass at the highest usable frequency. A loss of a tenth
+/// exceeds the uncertainty of the scale.
 const EXPOSURE_PASSES: f64 = 0.9;
 /// Largest relative distance of a step from a whole pixel: scales are given to three digits.
 const PIXEL_NEARNESS: f64 = 0.01;
@@ -30,7 +30,8 @@ const PLAYBACK_RATES_HZ: [f64; 8] =
 /// Largest relative distance from such a rate: it covers rounded times and still separates 29.97 from 30.
 const PLAYBACK_NEARNESS: f64 = 1e-3;
 
-/// Whether `rate_hz` is a rate of playback: a time column of the video file has it instead of the recording rate.
+/// Whether `rate_hz` is a rate of playback: a time column of the video file has it instead of the recording
+/// rate.
 pub(crate) fn is_playback_rate(rate_hz: f64) -> bool {
     PLAYBACK_RATES_HZ.iter().any(|playback| (rate_hz / playback - 1.0).abs() <= PLAYBACK_NEARNESS)
 }

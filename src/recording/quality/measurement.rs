@@ -104,8 +104,8 @@ fn measure_channel(samples: &[Option<f64>]) -> ChannelQuality {
 }
 
 impl Quality {
-    /// Lowest and highest frequency that the recording shows well, Hz: three cycles in its duration, and 0.8 of
-    /// the Nyquist frequency. A recording without such a band is too short for a spectrum.
+    /// Lowest and highest frequency that the recording shows well, Hz: three cycles in its duration, and 0.8
+    /// of the Nyquist frequency. A recording without such a band is too short for a spectrum.
     pub(crate) fn band_hz(&self) -> (f64, f64) {
         (FEWEST_CYCLES / self.duration_s, NYQUIST_SHARE * self.nyquist_hz)
     }

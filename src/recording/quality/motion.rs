@@ -13,12 +13,13 @@ const MANY_REPEATED: f64 = 0.01;
 const BY_ROUNDING: f64 = 3.0;
 /// Expected number of repeats by rounding below which none is tolerated.
 const NO_REPEATS: f64 = 0.01;
-/// Probability of a repeat by rounding above which repeats are not judged: with noise below the step, positions
-/// repeat for many frames.
+/// Probability of a repeat by rounding above which repeats are not judged: with noise below the step,
+/// positions repeat for many frames.
 const LIKELY_REPEAT: f64 = 1e-3;
 /// Least noise of a column, m: below a picometre lies the rounding of arithmetic on a point at rest.
 const LEAST_NOISE_M: f64 = 1e-12;
-/// Share of frames at the ends with only one point that is worth a caution: more than a late start of a track.
+/// Share of frames at the ends with only one point that is worth a caution: more than a late start of a
+/// track.
 const MANY_ALONE: f64 = 0.1;
 /// Largest travel in a view that still resolves the lip, m: at 1,000 pixels a lip of 5 mm is 10 pixels high.
 const LARGEST_VIEW_M: f64 = 0.5;
@@ -74,8 +75,8 @@ fn check_repeated_frames(traces: &Traces, measured: &Quality) -> Option<QualityF
     Some(QualityFinding::advise((Check::FrozenFrames, severity), value, words, advice))
 }
 
-/// Probability that all columns repeat by chance. For a column with step `q` and noise `s` it is
-/// `q/(2 sqrt(pi) s)`: the step times the density at zero of the difference of two values. `None` where noise does
+/// Probability that all columns repeat by chance. For a column with step `q` and noise `s` it is `q/(2
+/// sqrt(pi) s)`: the step times the density at zero of the difference of two values. `None` where noise does
 /// not move both points, or where a step hides it.
 fn repeat_probability(measured: &Quality) -> Option<f64> {
     let moved = |channel: &ChannelQuality| channel.noise_m.is_some_and(|noise| noise > LEAST_NOISE_M);

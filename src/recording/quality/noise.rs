@@ -4,7 +4,8 @@ use crate::recording::channel::median_in_place;
 
 /// Median absolute deviation of a normal distribution in units of its standard deviation.
 const MAD_OF_NORMAL: f64 = 0.674_489_750_196_081_7;
-/// Variance of a third difference of white noise of unit variance: 1 + 9 + 9 + 1, the squared binomial weights.
+/// Variance of a third difference of white noise of unit variance: 1 + 9 + 9 + 1, the squared binomial
+/// weights.
 const THIRD_DIFFERENCE_VARIANCE: f64 = 20.0;
 /// Fewest differences of an estimate: the median of fewer is uncertain.
 const FEWEST_DIFFERENCES: usize = 8;
@@ -13,9 +14,10 @@ const ROUNDING: f64 = 1e-10;
 /// Most steps that a difference may span: a larger multiple is a coincidence of many digits.
 const MOST_STEPS: f64 = 20_000.0;
 
-/// Standard deviation of white noise on the samples, in their unit: the median absolute third difference of four
-/// neighbouring present frames over `0.6745 sqrt(20)`. A third difference removes motion up to a parabola.
-/// Oscillation within a few frames remains, so that the estimate is too high there; slow errors do not show.
+/// Standard deviation of white noise on the samples, in their unit: the median absolute third difference of
+/// four neighbouring present frames over `0.6745 sqrt(20)`. A third difference removes motion up to a
+/// parabola. Oscillation within a few frames remains, so that the estimate is too high there; slow errors do
+/// not show.
 #[must_use]
 pub fn noise_floor(samples: &[Option<f64>]) -> Option<f64> {
     let third = |w: &[Option<f64>]| match *w {

@@ -1,10 +1,11 @@
-//! Isolated points far from the prediction of their neighbours: the tracker jumps away for one frame and comes back.
+//! Isolated points far from the prediction of their neighbours: the tracker jumps away for one frame and
+//! comes back.
 //!
-//! A point is an outlier when all three conditions hold. They exclude fast chatter, and kinks, jumps and flips of
-//! the blade:
+//! A point is an outlier when all three conditions hold. They exclude fast chatter, and kinks, jumps and
+//! flips of the blade:
 //! - its distance from the cubic through its four neighbours exceeds what noise and step explain;
-//! - it lies on the same side of two straight lines, through the two points before and the two points after it (at
-//!   a kink it lies on one of them), and both lines agree on its place (at a jump they do not);
+//! - it lies on the same side of two straight lines, through the two points before and the two points after
+//!   it (at a kink it lies on one of them), and both lines agree on its place (at a jump they do not);
 //! - the points around it are much closer to their own cubics (in chatter or strong noise they are not).
 //!
 //! A point with a missing frame within two frames of it is not judged.
@@ -31,8 +32,8 @@ const LEAST_MISS_PX: f64 = 0.1;
 const BOTH_SIDES: f64 = 0.5;
 /// Three standard deviations of the difference of the two lines in white noise: `3 sqrt(2 (4 + 1))`.
 const LINES_SD: f64 = 9.5;
-/// Least ratio of its miss to the largest around it. The largest of six misses of white noise reaches 3 standard
-/// deviations once in 60.
+/// Least ratio of its miss to the largest around it. The largest of six misses of white noise reaches 3
+/// standard deviations once in 60.
 const MORE_THAN_AROUND: f64 = 4.0;
 /// Distances, in frames, of the points around: near ones whose own cubic does not use the point.
 const AROUND: std::ops::RangeInclusive<usize> = 3..=5;

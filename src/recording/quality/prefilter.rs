@@ -1,41 +1,45 @@
 //! Whether a trace was low-passed before it was exported: the spectrum of its noise then falls towards the
 //! Nyquist frequency.
 //!
-//! The power of short segments is averaged in bands of a third of an octave. Low-passed noise has a plateau of three
-//! bands with nearly equal power, which scatters over the segments as noise does. Above the plateau the power falls
-//! more steeply than that of a random walk and stays low up to the Nyquist frequency. White noise does not fall.
-//! Motion without noise has no plateau, or one with another scatter. A trace whose step is coarser than its noise is
-//! not judged.
+//! The power of short segments is averaged in bands of a third of an octave. Low-passed noise has a plateau
+//! of three bands with nearly equal power, which scatters over the segments as noise does. Above the plateau
+//! the power falls more steeply than that of a random walk and stays low up to the Nyquist frequency. White
+//! noise does not fall. Motion without noise has no plateau, or one with another scatter. A trace whose step
+//! is coarser than its noise is not judged.
 
 use super::finding::{Check, QualityFinding, Severity};
 use super::measurement::{ChannelQuality, MeasuredColumn};
 use crate::math;
 use std::f64::consts::TAU;
 
-/// Frames of a segment: it resolves a plateau up to a sixth of the Nyquist frequency, and 32 segments fit into 2,112
-/// frames.
+/// Frames of a segment: it resolves a plateau up to a sixth of the Nyquist frequency, and 32 segments fit
+/// into 2,112 frames.
 const SEGMENT: usize = 128;
-/// Most missing frames of a segment, bridged by straight lines: 5 % change the power of a band by less than 0.5 dB.
+/// Most missing frames of a segment, bridged by straight lines: 5 % change the power of a band by less than
+/// 0.5 dB.
 const MOST_BRIDGED: usize = 6;
 /// Fewest segments: they give the median power of a band to a fifth, enough to exclude a random walk.
 const FEWEST_SEGMENTS: usize = 32;
 /// Most segments, spread over the recording: they give the median to 7 %.
 const MOST_SEGMENTS: usize = 256;
-/// Edges of the bands, bins: about a third of an octave and at least two bins wide. Motion and trend lie below the
-/// first.
+/// Edges of the bands, bins: about a third of an octave and at least two bins wide. Motion and trend lie
+/// below the first.
 const EDGES: [usize; 12] = [3, 5, 7, 10, 13, 16, 20, 25, 32, 40, 50, 64];
 /// Bands of a plateau.
 const PLATEAU: usize = 3;
-/// Largest power ratio within a plateau, 3 dB; over as many bands a random walk, 1/f^2, falls by 4 dB or more.
+/// Largest power ratio within a plateau, 3 dB; over as many bands a random walk, 1/f^2, falls by 4 dB or
+/// more.
 const FLAT: f64 = 2.0;
 /// Least ratio to the cut-off of the bands whose power must be low.
 const ABOVE: f64 = 1.6;
-/// Largest power of those bands, as a share of the plateau's: 8 dB less, which a mean of three frames just reaches.
+/// Largest power of those bands, as a share of the plateau's: 8 dB less, which a mean of three frames just
+/// reaches.
 const FALLEN: f64 = 0.16;
-/// Least fall over the steepest octave, 10 dB: a random walk falls by 6 dB, a filter of second order by 12 dB.
+/// Least fall over the steepest octave, 10 dB: a random walk falls by 6 dB, a filter of second order by 12
+/// dB.
 const STEEP: f64 = 10.0;
-/// Ratio of median to lower quartile of the power of noise in a bin. It is ln 2/ln(4/3) = 2.41; 32 segments give it
-/// within this range.
+/// Ratio of median to lower quartile of the power of noise in a bin. It is ln 2/ln(4/3) = 2.41; 32 segments
+/// give it within this range.
 const NOISE_SCATTER: std::ops::RangeInclusive<f64> = 1.6..=3.8;
 /// Least power of a plateau relative to the largest squared position; below lie rounding errors.
 const ROUNDING: f64 = 1e-26;
@@ -60,7 +64,8 @@ fn first_band_from(bin: f64) -> usize {
     EDGES.iter().position(|&edge| edge as f64 >= bin).unwrap_or(EDGES.len()).min(EDGES.len() - 2)
 }
 
-/// Whether the power falls steeply from band `end` on, the first below half the plateau's level, and stays low.
+/// Whether the power falls steeply from band `end` on, the first below half the plateau's level, and stays
+/// low.
 fn falls_steeply(bands: &[PrefilterBand], end: usize, level: f64) -> bool {
     let stays =
         bands[first_band_from(ABOVE * EDGES[end] as f64)..].iter().all(|band| band.power <= FALLEN * level);

@@ -19,8 +19,8 @@ use serde::Serialize;
 
 /// Fewest frames with a height: fewer do not show how their errors are correlated.
 const FEWEST_FRAMES: usize = 50;
-/// Least travel of the tip within a stroke, m: about the height of a blade. As the lip bends, its tracked point moves
-/// up and down by some 10 um, 0.1 degrees over this travel.
+/// Least travel of the tip within a stroke, m: about the height of a blade. As the lip bends, its tracked
+/// point moves up and down by some 10 um, 0.1 degrees over this travel.
 const LEAST_TRAVEL_M: f64 = 5e-3;
 /// Least share of the frames that lie on one line: with fewer, the line is not the glass.
 const LEAST_ON_GLASS: f64 = 0.5;
@@ -124,16 +124,16 @@ pub fn measure_tilt(
     Ok(CameraTilt { angle_rad, sd_rad, curvature, centre_m, travel_m, frames: on_line, frames_off_glass })
 }
 
-/// Step in which the heights of the tip are written, m. Heights that never change show no step; the coarsest of the
-/// other columns serves instead.
+/// Step in which the heights of the tip are written, m. Heights that never change show no step; the coarsest
+/// of the other columns serves instead.
 fn height_step_m(measured: &Quality) -> f64 {
     let tip_y = &measured.tip_y;
     let coarsest = || measured.channels().into_iter().filter_map(|(_, q)| q.step_m).fold(0.0, f64::max);
     tip_y.step_m.unwrap_or_else(|| if tip_y.noise_m == Some(0.0) { coarsest() } else { 0.0 })
 }
 
-/// Angle of a line, its standard deviation, both rad, and its curvature; `hidden_step_m` is the step of the heights
-/// where it exceeds their noise, else 0.
+/// Angle of a line, its standard deviation, both rad, and its curvature; `hidden_step_m` is the step of the
+/// heights where it exceeds their noise, else 0.
 fn angle_with_sd(path: &TipPath, line: &GlassLine, hidden_step_m: f64) -> (f64, f64, Option<Curvature>) {
     // in the worst case the rounding error is the same in all frames: a whole stroke may lie within one step
     let rounding_m2 = path.points.len() as f64 * math::powi(hidden_step_m, 2) / 12.0;
@@ -171,7 +171,8 @@ pub(in crate::recording::quality) fn check_tilt(
     [effect.tilt_finding(&tilt), effect.curvature_finding(&tilt)].into_iter().flatten().collect()
 }
 
-/// Effect of a tilt on the deflection: the head is above the tip, so rotation of the picture moves it along the sweep.
+/// Effect of a tilt on the deflection: the head is above the tip, so rotation of the picture moves it along
+/// the sweep.
 struct TiltEffect {
     /// Height of the head above the tip, m.
     height_m: Option<f64>,

@@ -4,20 +4,20 @@ use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::{ReversalInstants, median_in_place};
 
-/// Least sum of squares of `q`, relative to the fourth power of the spread of the places: below it the places have only
-/// two values and show no curvature.
+/// Least sum of squares of `q`, relative to the fourth power of the spread of the places: below it the places
+/// have only two values and show no curvature.
 const LEAST_BEND: f64 = 1e-6;
 
-/// A curve `y = height(stroke) + slope x + bend q(x)`. The parabola `q` is `x^2` minus its projection on the line, so
-/// `slope` is the mean slope of a curved path.
+/// A curve `y = height(stroke) + slope x + bend q(x)`. The parabola `q` is `x^2` minus its projection on the
+/// line, so `slope` is the mean slope of a curved path.
 pub(super) struct GlassLine {
     pub slope: f64,
     pub bend_per_m: f64,
     pub centre_m: [f64; 2],
     /// Standard deviation of the places, m.
     pub x_sd_m: f64,
-    /// Sum of the squared distances from the mean place of each stroke, m^2. The variance of `slope` is that of a
-    /// height divided by this sum.
+    /// Sum of the squared distances from the mean place of each stroke, m^2. The variance of `slope` is that
+    /// of a height divided by this sum.
     pub slope_information_m2: f64,
     /// The same of the bend, m^4; zero where no curvature shows.
     pub bend_information_m4: f64,
@@ -109,8 +109,8 @@ fn stroke_means<'a>(
 const SLOPE_BLOCKS: usize = 64;
 /// Least distance of two blocks whose slope counts, as a share of the travel: noise dominates shorter ones.
 const OUTLYING_PLACES: f64 = 0.25;
-/// Largest distance from the line of a tip on the glass, in standard deviations: chance exceeds it in 1 frame of
-/// 16,000.
+/// Largest distance from the line of a tip on the glass, in standard deviations: chance exceeds it in 1 frame
+/// of 16,000.
 const NEAR_DEVIATIONS: f64 = 4.0;
 /// Median of |x| of a standard normal variable.
 const NORMAL_MEDIAN: f64 = 0.674_489_75;
@@ -121,9 +121,9 @@ const BEYOND_STEPS: f64 = 0.1;
 /// Most repetitions; the frames on the glass rarely change after five.
 const MOST_REPETITIONS: usize = 30;
 
-/// Fits a line through the frames with the tip on the glass. The first line has the median slope between blocks of
-/// frames, which tolerates a quarter of wrong blocks. It is then fitted to the frames near it until these no longer
-/// change.
+/// Fits a line through the frames with the tip on the glass. The first line has the median slope between
+/// blocks of frames, which tolerates a quarter of wrong blocks. It is then fitted to the frames near it until
+/// these no longer change.
 pub(super) fn fit_glass_line(path: &TipPath, travel_m: f64, step_m: f64) -> GlassLine {
     let within = inliers_along_sweep(path);
     let first = distances_from_line(path, median_slope(path, travel_m));
@@ -251,18 +251,18 @@ fn stroke_travel_m(stroke: &[TipPoint]) -> f64 {
     ends.map_or(0.0, |(low, high)| high - low)
 }
 
-/// Most values for the correlation of errors. Longer recordings are averaged in groups of frames, which keeps the
-/// slow errors that matter for a slope.
+/// Most values for the correlation of errors. Longer recordings are averaged in groups of frames, which keeps
+/// the slow errors that matter for a slope.
 const MOST_VALUES: usize = 20_000;
-/// Largest lag in the sum of correlations, in units of that sum: five correlation times (Sokal 1997). Longer lags
-/// add noise only.
+/// Largest lag in the sum of correlations, in units of that sum: five correlation times (Sokal 1997). Longer
+/// lags add noise only.
 const WINDOW: f64 = 2.5;
-/// Least share of the variance of the errors that is assumed to remain in the residuals of a fit. It would be lower
-/// for errors that are correlated over the whole recording.
+/// Least share of the variance of the errors that is assumed to remain in the residuals of a fit. It would be
+/// lower for errors that are correlated over the whole recording.
 const LEAST_LEFT: f64 = 0.1;
 
-/// Long-run variance of the heights about the line, m^2: the variance of a frame times the number of frames over which
-/// errors are correlated. A sum of `n` errors has `n` times this variance.
+/// Long-run variance of the heights about the line, m^2: the variance of a frame times the number of frames
+/// over which errors are correlated. A sum of `n` errors has `n` times this variance.
 pub(super) fn long_run_variance(path: &TipPath, line: &GlassLine) -> f64 {
     let group = path.points.len().div_ceil(MOST_VALUES);
     let values = group_averages(path, line, group);
@@ -292,8 +292,8 @@ fn group_averages(path: &TipPath, line: &GlassLine, group: usize) -> Vec<Option<
     sums.into_iter().map(|(sum, count)| (count > 0).then(|| sum / count as f64)).collect()
 }
 
-/// Number of values over which errors are correlated, at least 1: one plus twice the sum of the correlations. With the
-/// largest lag of that sum, [`WINDOW`] times as many.
+/// Number of values over which errors are correlated, at least 1: one plus twice the sum of the correlations.
+/// With the largest lag of that sum, [`WINDOW`] times as many.
 fn correlated_values(values: &[Option<f64>], variance: f64) -> (f64, usize) {
     let (mut alike, mut lags) = (1.0, 0);
     for lag in 1..values.len() / 2 {
