@@ -28,7 +28,7 @@ pub enum ContactReading {
 }
 
 impl ContactReading {
-    /// Its kind in a study.
+    /// Name of its kind in a study.
     pub(crate) fn kind(self) -> &'static str {
         match self {
             Self::StickFraction(_) => "stick-fraction",
@@ -107,7 +107,7 @@ fn window_ends_s(window: &Window, reader: &FeatureReader, run: &RunRecord) -> Re
     Ok([end(window.from, start_s, frames.start)?, end(window.to, stop_s, frames.end)?])
 }
 
-/// Lengths of the stick intervals, cut at the ends of a window, s.
+/// Lengths of the stick intervals within a window, s.
 fn stick_lengths_s(run: &RunRecord, [from, to]: [f64; 2]) -> impl Iterator<Item = f64> {
     run.stick_s.iter().map(move |[start, end]| end.min(to) - start.max(from)).filter(|length| *length > 0.0)
 }

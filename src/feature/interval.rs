@@ -20,7 +20,7 @@ pub enum ReversalInterval {
 }
 
 impl ReversalInterval {
-    /// Its kind in a job or a study.
+    /// Name of its kind in a job or a study.
     pub(crate) const fn kind(self) -> &'static str {
         match self {
             Self::ReleaseAfterReversal => "release-after-reversal",

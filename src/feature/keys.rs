@@ -40,7 +40,7 @@ macro_rules! define_keys {
         pub struct Keys { $(pub $key: Option<$type>),* }
 
         impl Keys {
-            /// Those that are given.
+            /// Names of the keys that are given.
             fn given_keys(&self) -> impl Iterator<Item = &'static str> {
                 let keys = [$(self.$key.is_some().then_some(stringify!($key))),*];
                 keys.into_iter().flatten()
@@ -88,7 +88,7 @@ pub struct ReadingEntry<'a> {
 }
 
 impl ReadingEntry<'_> {
-    /// A key as messages name it.
+    /// Name of a key in messages: "feature `x` (rms), `window`".
     pub(crate) fn describe_key(&self, key: &str) -> String {
         format!("{}, `{key}`", self.name)
     }

@@ -28,7 +28,7 @@ pub enum MissingValue {
         /// Upper end of the band, Hz.
         high: f64,
     },
-    /// The band has no component as large as asked for.
+    /// The largest component of the band is below the requested amplitude.
     #[error(
         "the largest component has {amplitude_m:.3e} m at {frequency_hz:.3} Hz, expected at least \
          {least_m:e} m"
@@ -54,7 +54,7 @@ pub enum MissingValue {
         /// Amplitude in the second half, m.
         second_m: f64,
     },
-    /// Too little of the component is left.
+    /// The component decays into the noise.
     #[error(
         "the component at {frequency_hz:.1} Hz has decayed to {second_m:.2e} m, into the noise, in the \
          second half of the window; shorten it"
@@ -85,7 +85,7 @@ pub enum MissingValue {
     Segment {
         /// Length of the segment, s.
         segment_s: f64,
-        /// Its frames.
+        /// Frames of the segment.
         frames: usize,
         /// Frames of the window.
         window: usize,
@@ -120,7 +120,7 @@ pub enum MissingValue {
     /// There is no such recording.
     #[error("there is no recording number {number}")]
     NoRecording {
-        /// Counted from 1.
+        /// Number of the recording, counted from 1.
         number: usize,
     },
     /// Only a simulated run shows it.
@@ -131,7 +131,7 @@ pub enum MissingValue {
     Ended {
         /// How it ended.
         status: RunStatus,
-        /// When, s.
+        /// Time of its end, s.
         stopped_at_s: f64,
     },
     /// The run does not show it.

@@ -1,5 +1,4 @@
-//! A recording from which many features are read: each channel is computed once, and each window
-//! transformed once.
+//! A reader of many features of one recording: it computes each channel, transform and speed once.
 
 use super::deflection::head_speeds_m_per_s;
 use super::missing::MissingValue;

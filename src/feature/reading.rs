@@ -21,16 +21,16 @@ const DEFAULT_LINES: usize = 12;
 /// Most bands of a log-spectrum and most speeds of a friction curve: each is a feature of its own.
 const MAX_SERIES_LENGTH: usize = 100;
 
-/// What is read from a recording or a simulated run.
+/// A value that can be read from a recording or a simulated run.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Reading {
-    /// Frequency of a component in a band, Hz: the largest, or the one that is assigned to a target.
+    /// Frequency of a component in a band, Hz: the largest, or the one assigned to a target.
     Frequency(FeatureBand),
     /// Amplitude of the largest component in a band, m.
     Amplitude(FeatureBand),
     /// Root mean square of a band, m.
     Rms(FeatureBand),
-    /// Level of one band of a log-spectrum: root mean square of the band and of a floor, m.
+    /// Level of one band of a log-spectrum: root mean square of the band with a floor, m.
     BandLevel {
         /// The band.
         band: FeatureBand,
@@ -41,32 +41,32 @@ pub enum Reading {
     DampingRatio(FeatureBand),
     /// Lowest or highest frequency over which a drifting component runs, Hz.
     CycleFrequency {
-        /// Where it runs.
+        /// Band of the component.
         band: FeatureBand,
         /// Length of the segments in which it is followed, s.
         segment_s: f64,
-        /// Which end of its range.
+        /// End of its frequency range.
         end: CycleRangeEnd,
     },
     /// Mean of the deflection `tip_x - head_x` over a window, m.
     MeanDeflection(Window),
     /// Mean of the deflection over the frames of a window in which the head has a speed, m.
     DeflectionAtSpeed {
-        /// Which frames.
+        /// Window of frames.
         window: Window,
         /// The speed, m/s, above 0, in either direction.
         speed_m_per_s: f64,
-        /// Speeds within this share of it count.
+        /// Relative half width of the range of speeds that counts.
         width_relative: f64,
     },
     /// Time between two instants of a reversal, s.
     Interval {
-        /// Between which.
+        /// The two instants.
         interval: ReversalInterval,
-        /// Of which reversal, counted from 1.
+        /// Number of the reversal, counted from 1.
         reversal: usize,
     },
-    /// What only a simulated run knows.
+    /// A reading of the contact, which only a simulated run has.
     Contact(ContactReading),
 }
 
@@ -146,7 +146,7 @@ impl ReadingKind {
         KINDS.iter().find(|kind| kind.word == word).ok_or_else(unknown)
     }
 
-    /// Whether an entry stands for several readings.
+    /// Whether an entry has several readings.
     pub(crate) fn is_series(&self) -> bool {
         matches!(self.make, ReadingConstructor::Series(_))
     }
@@ -243,7 +243,7 @@ fn split_band((low, high): (f64, f64), count: usize) -> impl Iterator<Item = (f6
 }
 
 impl Reading {
-    /// Its kind in a job or a study.
+    /// Name of its kind in a job or a study.
     pub(crate) fn kind(&self) -> &'static str {
         match self {
             Self::Frequency(_) => "frequency",
@@ -266,7 +266,7 @@ impl Reading {
         row.map_or(FeatureUnit::DIMENSIONLESS, |kind| kind.unit)
     }
 
-    /// How two of its values are compared.
+    /// Comparison of two of its values.
     pub(crate) fn comparison(&self) -> ValueComparison {
         match self {
             Self::Interval { interval: ReversalInterval::FlipAfterReversal, .. } => {

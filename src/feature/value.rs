@@ -5,7 +5,7 @@
 pub struct FeatureValue {
     /// The value, in the reading's unit.
     pub value: f64,
-    /// Its standard deviation where the reading itself gives one.
+    /// Its standard deviation, where the reading gives one.
     pub sd: Option<f64>,
     /// Level below the strongest component of the band, dB; 0 for the strongest and for readings without a
     /// choice.
@@ -19,7 +19,7 @@ pub struct FeatureValue {
 pub struct RunnerUpComponent {
     /// Its frequency, Hz.
     pub frequency_hz: f64,
-    /// How far it is below the strongest of the band, dB.
+    /// Level below the strongest component of the band, dB.
     pub below_db: f64,
 }
 
@@ -46,11 +46,11 @@ pub enum LengthCalibration {
 /// A unit in files and in figures.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FeatureUnit {
-    /// In files; `1` for a plain number.
+    /// Name in files; `1` for a plain number.
     pub name: &'static str,
     /// Suffix of a column's name.
     pub suffix: &'static str,
-    /// In figures; empty for a plain number.
+    /// Name in figures; empty for a plain number.
     pub shown: &'static str,
     /// Factor from the unit in files to that in figures.
     pub factor: f64,
@@ -73,7 +73,7 @@ pub enum ValueComparison {
     Log,
     /// By their difference: values may be zero or change sign.
     Linear {
-        /// Size of a large difference, in the reading's unit.
+        /// Difference that counts as large, in the unit of the reading.
         scale: f64,
     },
 }

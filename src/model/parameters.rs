@@ -22,7 +22,7 @@ pub enum ParameterRange {
 }
 
 impl ParameterRange {
-    /// Whether a value is admissible; infinities and NaN never are.
+    /// Whether a value is admissible; infinities and NaN are not.
     #[must_use]
     pub fn admits(self, value: f64) -> bool {
         value.is_finite()

@@ -46,7 +46,7 @@ pub struct BladeTableEntry {
     pub key: &'static str,
     /// Value, in the unit of the key.
     pub value: f64,
-    /// Standard deviation over the value: from those of the inputs alone.
+    /// Relative standard deviation, from those of the inputs alone.
     pub relative_uncertainty: f64,
     /// Its equation, in the letters of [`super::section`].
     pub equation: &'static str,
@@ -57,7 +57,7 @@ pub struct BladeTableEntry {
 pub struct BladeEstimate {
     /// Title of the section.
     pub title: String,
-    /// Length of blade that every number is for, m.
+    /// Length of blade to which the numbers apply, m.
     pub length_m: f64,
     /// The numbers, in the order of the table.
     pub blade: Vec<BladeTableEntry>,
@@ -155,8 +155,8 @@ fn entry_change(section: &BladeSection, input: &SectionKey, at: usize) -> f64 {
 
 /// Poisson's ratio of rubber: its volume hardly changes.
 const POISSON_RATIO: f64 = 0.5;
-/// Parts over which the bending of a link is integrated by the five-point rule. A link that is 20 times
-/// thinner at its edge is still integrated to 1e-12.
+/// Parts of the integral over the bending of a link, each by the five-point rule. The error is 1e-12 for a
+/// link that is 20 times thinner at its edge.
 const PARTS: u32 = 256;
 
 /// Modulus of a wide plate `E/(1 - nu^2)`, Pa, from Young's modulus, Pa.

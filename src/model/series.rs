@@ -69,7 +69,7 @@ pub(super) struct RightFactors {
 /// After [`Self::expand`] to the order `n` the motion is known up to `x^n`, forces up to `x^(n-1)`.
 #[derive(Debug, Clone)]
 pub struct MotionSeries<const K: usize> {
-    /// Velocity of the head along the sweep, m/s: given.
+    /// Velocity of the head along the sweep, m/s; the caller sets it.
     pub head_velocity: [f64; K],
     /// Angles of neck and lip, rad.
     pub angle: [LinkPair; K],
@@ -133,7 +133,7 @@ pub(super) struct RecurrenceConstants {
     pub m: LinkPair,
     /// `m_a - M l1`, `m_b - M l2`: coefficients of `q'` in the normal force.
     pub arm: LinkPair,
-    /// Inverse of the matrix of the accelerations, friction included.
+    /// Inverse of the coefficient matrix of the accelerations, with friction.
     pub inverse: [LinkPair; 2],
     /// `A^-1 w` and `1 / (w.A^-1 w)` with `w = (l1 cos theta, l2 cos phi)`, for stick.
     pub w: LinkPair,

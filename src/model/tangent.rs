@@ -42,7 +42,7 @@ pub(crate) struct StateTangent {
     pub rate: [LaneVector; 2],
     /// Of the gap between tip and glass, m: zero in contact.
     pub gap_m: LaneVector,
-    /// Of its rate, m/s.
+    /// Of the rate of the gap, m/s.
     pub gap_rate: LaneVector,
 }
 

@@ -56,7 +56,7 @@ impl Channel {
         self.name().replace('-', " ")
     }
 
-    /// The channel of that [`Self::name`].
+    /// Parses a [`Self::name`].
     ///
     /// # Errors
     /// [`UnknownChannel`] with the nearest known name.

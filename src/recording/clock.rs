@@ -1,4 +1,4 @@
-//! Frame numbers from a column of times: the times of a table may be rounded and rows may be absent.
+//! Frame numbers from a column of times, which may be rounded or lack rows.
 
 /// Largest distance of a time from its frame, frames. Rounding to half a frame moves a time by up to a
 /// quarter; beyond a third the nearest frame is uncertain.
@@ -20,11 +20,11 @@ const ROUNDS: usize = 4;
 pub(crate) struct FrameFit {
     /// Frame of every row, counted from the first row.
     pub frames: Vec<usize>,
-    /// Time from frame to frame by least squares, s.
+    /// Frame time from the least-squares line, s.
     pub frame_s: f64,
     /// Row that lies furthest off the grid.
     pub worst_row: usize,
-    /// Its distance from its frame, frames.
+    /// Distance of that row from its frame, frames.
     pub worst_frames: f64,
 }
 
@@ -101,7 +101,8 @@ fn fit_line(frames: &[usize], times_s: &[f64]) -> (f64, f64) {
     (mean_time - slope * mean_frame, slope)
 }
 
-/// Nearest frame of every row on the fitted line; `None` when the line is useless.
+/// Nearest frame of every row on the fitted line; `None` for a line that does not rise or a grid that is too
+/// long.
 fn renumber_frames(times_s: &[f64], (intercept, slope): (f64, f64)) -> Option<Vec<usize>> {
     let nearest: Vec<f64> = times_s.iter().map(|t| ((t - intercept) / slope).round()).collect();
     let first = *nearest.first()?;

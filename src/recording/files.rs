@@ -1,4 +1,4 @@
-//! `trace.csv` and `recording.toml`: a recording as its folder keeps it.
+//! `trace.csv` and `recording.toml`, the files of a recording in its folder.
 
 mod description;
 mod trace;

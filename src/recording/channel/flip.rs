@@ -1,5 +1,4 @@
-//! The flip: the passage of the deflection from the side on which the tip trails before a turn of the head to
-//! the other side.
+//! The flip: at a turn of the head, the deflection passes from one side to the other.
 
 use super::{index_at_frame, median_of_three, median_position};
 use std::ops::Range;

@@ -90,12 +90,12 @@ pub enum InstantNotFound {
 /// Every turn of the head that a recording shows, in order of time.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ReversalInstants {
-    /// The turns.
+    /// One entry per turn.
     pub reversals: Vec<Reversal>,
 }
 
 impl ReversalInstants {
-    /// Finds the turns of the head and, around each, the interval in which the tip stays in its place.
+    /// Finds the turns of the head and, around each, the interval in which the tip rests.
     #[must_use]
     pub fn find_instants(recording: &Recording) -> Self {
         let rate = recording.grid().frame_rate_hz;
@@ -120,7 +120,7 @@ impl ReversalInstants {
         Self { reversals: reversals.collect() }
     }
 
-    /// When the head of a recording turns first, s; `None` where it does not.
+    /// Time of the first turn of the head, s; `None` without a turn.
     pub(crate) fn first_turn_s(recording: &Recording) -> Option<f64> {
         Self::find_instants(recording).time_s(InstantKind::Reversal, 1).ok()
     }

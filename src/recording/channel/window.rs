@@ -81,7 +81,7 @@ impl Window {
         WindowError { window: self.to_string(), problem }
     }
 
-    /// Frames, however few, start and end, s.
+    /// Frames, without a least number, and start and end, s.
     pub(super) fn locate_span(
         &self,
         recording: &Recording,

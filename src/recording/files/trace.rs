@@ -1,4 +1,4 @@
-//! `trace.csv`: a row a frame, an empty cell where a point was not tracked.
+//! `trace.csv`: one row per frame, an empty cell where a point was not tracked.
 
 use super::FilesError;
 use crate::recording::clock::{self, FrameFit};
@@ -104,7 +104,7 @@ pub fn parse_trace_csv_at(
 /// in its times from filling memory.
 const FRAMES_WITHOUT_ROWS: (usize, usize) = (250_000, 4);
 
-/// The rows as written, before they have frames.
+/// The rows as written, before frames are assigned.
 struct TraceTable<'a> {
     text: &'a str,
     confidences: [bool; 2],
@@ -250,7 +250,7 @@ fn frame_count(fit: &FrameFit) -> usize {
     fit.frames.last().map_or(0, |last| last + 1)
 }
 
-/// Row furthest from its frame on a grid that starts at the first row, and how far, frames.
+/// Row furthest from its frame on a grid that starts at the first row, and its distance, frames.
 fn farthest_off_grid(times_s: &[f64], frames: &[usize], frame_rate_hz: f64) -> (usize, f64) {
     let off = times_s.iter().zip(frames).map(|(t, &n)| ((t - times_s[0]) * frame_rate_hz - n as f64).abs());
     off.enumerate().max_by(|a, b| a.1.total_cmp(&b.1)).unwrap_or((0, 0.0))

@@ -136,7 +136,7 @@ struct WhiteningStep {
 }
 
 impl Whitener {
-    /// The map for `frames`, the rising numbers of the frames that are present.
+    /// The map for `frames`, the indices of the present frames in rising order.
     pub(crate) fn new(noise: &AutoregressiveNoise, frames: &[usize]) -> Self {
         let mut coefficients = [0.0; MOST_COEFFICIENTS];
         coefficients[..noise.coefficients().len()].copy_from_slice(noise.coefficients());

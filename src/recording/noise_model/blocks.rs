@@ -91,7 +91,7 @@ fn cut_block(channel: &[Option<f64>], cut: &BlockCut<'_>, first: usize) -> Optio
     let mut columns: Vec<Vec<f64>> = powers.collect();
     if cut.covariate.is_some() {
         let moved = centred(&beside)?;
-        // (a channel that does not move adds nothing to the constant)
+        // (a channel that does not move is no independent column)
         if dot_product(&moved, &moved) > 0.0 {
             columns.push(moved);
         }

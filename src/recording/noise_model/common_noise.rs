@@ -9,14 +9,14 @@ use super::blocks::{BlockCut, NoiseBlock, cut_blocks, dot_product, keep_quiet_bl
 use crate::math;
 use crate::recording::Recording;
 
-/// Fewest frames of a short block: a parabola leaves three quarters of them.
+/// Frames of a short block: a parabola leaves three quarters of the degrees of freedom.
 const SHORT_BLOCK: usize = 12;
 /// Least share, in its standard deviations: chance reaches it in one recording of 370.
 const CLEAR_DEVIATIONS: f64 = 3.0;
 /// Fewest blocks: the scatter over fewer is not known.
 const FEWEST_BLOCKS: usize = 30;
 
-/// The part of a channel's noise that the other point shows.
+/// The part of a channel's noise that it shares with the other point.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SharedNoise {
     /// Noise of the channel per noise of the other point.

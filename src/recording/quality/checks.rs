@@ -91,7 +91,7 @@ fn gaps_finding(gaps: &FrameGaps, frames: usize, longest_at_s: f64, what: &str) 
     QualityFinding::advise((Check::Gaps, severity), (*missing as f64, "frames"), words, advice)
 }
 
-/// Missing frames, noise and step of one column; a column that was never tracked is only named.
+/// Missing frames, noise and step of one column; only the name of a column that was never tracked.
 pub(super) fn check_track_column(
     column: &MeasuredColumn,
     grid: FrameGrid,

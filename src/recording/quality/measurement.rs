@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 /// Fewest cycles in the recording that give a frequency.
 pub(super) const FEWEST_CYCLES: f64 = 3.0;
-/// Share of the Nyquist frequency up to which a component is well clear of its own alias.
+/// Share of the Nyquist frequency up to which a component is well separated from its alias.
 pub(super) const NYQUIST_SHARE: f64 = 0.8;
 
 /// A recording as measured.
@@ -64,7 +64,7 @@ pub struct ChannelQuality {
     pub step_m: Option<f64>,
 }
 
-/// The camera beyond its rate; empty for a trace without a `recording.toml`.
+/// Data of the camera other than its rate; empty for a trace without a `recording.toml`.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Optics {
     /// Exposure of a frame, s.
@@ -129,7 +129,7 @@ impl Quality {
     }
 }
 
-/// A column with its name and what was measured on it.
+/// A column with its name and its quality.
 #[derive(Clone, Copy)]
 pub(super) struct MeasuredColumn<'a> {
     pub name: &'static str,

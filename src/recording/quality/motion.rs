@@ -120,7 +120,7 @@ fn check_overlap(traces: &Traces, grid: FrameGrid) -> Option<QualityFinding> {
     Some(QualityFinding::advise((Check::Overlap, severity), (both as f64, "frames"), words, advice))
 }
 
-/// Travel of whichever point moves more, m.
+/// Travel of the point that moves more, m.
 fn largest_travel_m(traces: &Traces) -> Option<f64> {
     let travel = |samples: &[Option<f64>]| {
         let some = samples.iter().step_by(samples.len() / MOST_POSITIONS + 1);

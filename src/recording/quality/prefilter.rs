@@ -59,7 +59,7 @@ pub(crate) fn cutoff_hz(samples: &[Option<f64>], frame_rate_hz: f64) -> Option<f
     (0..=bands.len() - PLATEAU).find_map(ends_at)
 }
 
-/// First band that starts at or above `bin`; the last where there is none.
+/// First band that starts at or above `bin`, or the last band.
 fn first_band_from(bin: f64) -> usize {
     EDGES.iter().position(|&edge| edge as f64 >= bin).unwrap_or(EDGES.len()).min(EDGES.len() - 2)
 }

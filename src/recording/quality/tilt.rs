@@ -22,7 +22,7 @@ const FEWEST_FRAMES: usize = 50;
 /// Least travel of the tip within a stroke, m: about the height of a blade. As the lip bends, its tracked
 /// point moves up and down by some 10 um, 0.1 degrees over this travel.
 const LEAST_TRAVEL_M: f64 = 5e-3;
-/// Least share of the frames that lie on one line: with fewer, the line is not the glass.
+/// Least share of the frames on one line: with fewer, the line is not the glass.
 const LEAST_ON_GLASS: f64 = 0.5;
 /// Least slope or curvature, in its standard deviations: chance reaches it in one level recording of 370.
 const CLEAR_DEVIATIONS: f64 = 3.0;

@@ -1,4 +1,4 @@
-//! Least squares of a line and a parabola through the path, each stroke at its own height.
+//! Least-squares fit of a line and a parabola to the path of the tip; each stroke has a height of its own.
 
 use crate::math;
 use crate::recording::Recording;
@@ -19,7 +19,8 @@ pub(super) struct GlassLine {
     /// Sum of the squared distances from the mean place of each stroke, m^2. The variance of `slope` is that
     /// of a height divided by this sum.
     pub slope_information_m2: f64,
-    /// The same of the bend, m^4; zero where no curvature shows.
+    /// Sum of the squares of `q`, m^4, which likewise gives the variance of `bend`; zero where no curvature
+    /// shows.
     pub bend_information_m4: f64,
     /// Which points the line is fitted through.
     pub on_glass: Vec<bool>,
@@ -46,7 +47,7 @@ struct StrokeSums {
 }
 
 impl GlassLine {
-    /// The line through the points for which `on_glass` holds; at least one.
+    /// Fits the points for which `on_glass` is true; at least one.
     pub(super) fn fit_through(path: &TipPath, on_glass: Vec<bool>) -> Self {
         let used = || path.points.iter().zip(&on_glass).filter(|(_, on)| **on).map(|(point, _)| point);
         let count = used().count() as f64;
@@ -118,7 +119,7 @@ const NORMAL_MEDIAN: f64 = 0.674_489_75;
 const LEAST_DISTANCE_M: f64 = 1e-9;
 /// Largest distance of a place beyond the travel, as a share of it; farther ones are outliers.
 const BEYOND_STEPS: f64 = 0.1;
-/// Most repetitions; the frames on the glass rarely change after five.
+/// Most iterations; the frames on the glass rarely change after five.
 const MOST_REPETITIONS: usize = 30;
 
 /// Fits a line through the frames with the tip on the glass. The first line has the median slope between
@@ -138,7 +139,7 @@ pub(super) fn fit_glass_line(path: &TipPath, travel_m: f64, step_m: f64) -> Glas
     line
 }
 
-/// Which points are no outliers along the sweep.
+/// Marks the points that are no outliers along the sweep.
 fn inliers_along_sweep(path: &TipPath) -> Vec<bool> {
     let mut sorted: Vec<f64> = path.points.iter().map(|point| point.x_m).collect();
     sorted.sort_unstable_by(f64::total_cmp);
@@ -155,7 +156,7 @@ fn points_near_line(distances_m: &[f64], within: &[bool], step_m: f64) -> Vec<bo
     distances_m.iter().zip(within).map(|(distance, within)| *within && distance.abs() <= limit).collect()
 }
 
-/// Distance of every point from the line of a slope through the median of its stroke, m.
+/// Height of every point above a line of the given slope through the median of its stroke, m.
 fn distances_from_line(path: &TipPath, slope: f64) -> Vec<f64> {
     path.points_by_stroke()
         .flat_map(|stroke| {
@@ -306,7 +307,7 @@ fn correlated_values(values: &[Option<f64>], variance: f64) -> (f64, usize) {
     (alike.max(1.0), lags)
 }
 
-/// Mean product of the values a lag apart; zero where there is no such pair.
+/// Mean product of the values a lag apart; zero without such a pair.
 fn lag_covariance(values: &[Option<f64>], lag: usize) -> f64 {
     let products = values.iter().zip(&values[lag..]).filter_map(|(a, b)| Some((*a)? * (*b)?));
     let (sum, pairs) = products.fold((0.0, 0_usize), |(sum, pairs), product| (sum + product, pairs + 1));
