@@ -1,8 +1,8 @@
-//! Tracking exports: text in, a [`Recording`](crate::recording::Recording) and a report out. Nothing that a
-//! file does not say is assumed: the rate, the scale and the direction of y have no defaults.
+//! Reads the exports of tracking programs into a [`Recording`](crate::recording::Recording) with a report. Rate, scale
+//! and direction of y have no defaults: what the file does not say the user has to.
 //!
-//! Coordinates keep the file's origin: they are only scaled and, where y points down, mirrored (`y` becomes
-//! `-y`). A new format is one file with one `Format` and one row in `FORMATS`.
+//! Coordinates keep the file's origin. They are only scaled and, where y points down, mirrored (`y` becomes `-y`). A
+//! new format is one file with one `FileFormat` and one row in `FORMATS`.
 
 mod assemble;
 mod error;
@@ -30,7 +30,7 @@ use reader::{Document, encoding};
 pub fn import(sources: &[ImportSource], options: &ImportOptions) -> Result<Import, ImportError> {
     options::check_options(options)?;
     check_file_names(sources)?;
-    // (hashing takes as long as a third of the reading)
+    // (in parallel, because hashing takes a third of the time of reading)
     let (hashes, imported) = rayon::join(|| hash_sources(sources), || read_exports(sources, options));
     let mut imported = imported?;
     imported.file.source =
@@ -56,34 +56,32 @@ fn read_exports(sources: &[ImportSource], options: &ImportOptions) -> Result<Imp
     assemble_recording(sources, &decoded, exports, options, report)
 }
 
-// What an import gives back: the recording, its description, and a report for the user.
-
-/// An import that succeeded.
+/// Result of an import.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Import {
     /// The recording.
     pub recording: Recording,
-    /// Its `recording.toml`.
+    /// The content of its `recording.toml`.
     pub file: RecordingFile,
     /// What was found and decided.
     pub report: ImportReport,
 }
 
-/// What was found and decided, for the user to check.
+/// Decisions and findings of an import, for the user to check.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ImportReport {
-    /// Format that the files were read as.
+    /// Name of the format that was used.
     pub format: String,
-    /// Why that one.
+    /// Reason for that format.
     pub reason: String,
-    /// Facts worth knowing.
+    /// Notes on what was read and assumed.
     pub notes: Vec<String>,
-    /// What only the export could show: it is kept in `recording.toml`.
+    /// Findings on quality that only the export shows; they are stored in `recording.toml`.
     pub findings: Vec<QualityFinding>,
 }
 
 impl ImportReport {
-    /// The report as lines for reading.
+    /// The report as lines of text.
     #[must_use]
     pub fn lines(&self) -> Vec<String> {
         let first = format!("format: {} ({})", self.format, self.reason);
@@ -91,7 +89,7 @@ impl ImportReport {
         std::iter::once(first).chain(notes).chain(self.findings.iter().map(QualityFinding::to_line)).collect()
     }
 
-    /// What may be wrong, in words.
+    /// Findings graver than a note, with their advice.
     pub fn warnings(&self) -> impl Iterator<Item = String> {
         let graver = self.findings.iter().filter(|finding| finding.severity > Severity::Note);
         graver.map(|finding| {
@@ -104,24 +102,21 @@ impl ImportReport {
     }
 }
 
-// The files of an import as bytes: exports, the companions that belong to them, and the copies that the
-// recording keeps.
-
 /// A file to import.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImportSource {
-    /// Path or name as given by the user; its last part names the copy in the recording.
+    /// Path or name as given by the user; the copy in the recording has its last part as name.
     pub name: String,
     /// Its bytes.
     pub bytes: Vec<u8>,
-    /// Its companion files: see [`companion_names`](companion_names).
+    /// Its companion files, such as a camera's record.
     pub companions: Vec<CompanionFile>,
 }
 
-/// A file in the folder of an export that belongs to it, such as a camera's record.
+/// A file that belongs to an export and is in its folder.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CompanionFile {
-    /// Its path or name.
+    /// Path or name as given by the user.
     pub name: String,
     /// Its bytes.
     pub bytes: Vec<u8>,
@@ -135,7 +130,7 @@ impl ImportSource {
     }
 }
 
-/// Every copy in the recording's folder needs a name of its own.
+/// Refuses file names that occur twice: every copy in the recording's folder needs its own.
 pub(crate) fn check_file_names(sources: &[ImportSource]) -> Result<(), ImportError> {
     if sources.is_empty() {
         return Err(ImportError::NoSource);
@@ -151,13 +146,13 @@ pub(crate) fn check_file_names(sources: &[ImportSource]) -> Result<(), ImportErr
     Ok(())
 }
 
-/// Last part of a path, whichever way its slashes lean.
+/// Last part of a path with slashes or backslashes.
 pub(crate) fn base_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// Names and bytes of the files that are kept with the recording, in the order of `[source]`; a companion of
-/// several is kept once.
+/// Names and bytes of the files that are stored with the recording, in the order of `[source]`. A companion of several
+/// exports is stored once.
 pub(crate) fn preserved_files(sources: &[ImportSource]) -> Vec<(&str, &[u8])> {
     let mut kept: Vec<(&str, &[u8])> =
         sources.iter().map(|source| (base_name(&source.name), source.bytes.as_slice())).collect();

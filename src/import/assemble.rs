@@ -1,10 +1,10 @@
-//! Tracks to a recording: points, frames, scale, direction, and what deserves a warning.
+//! Makes a recording of the tracks: calibration, choice of points, frame grid, findings and description.
 
-use super::error::ImportError;
+use super::error::{ImportError, ImportResult};
 use super::options::ImportOptions;
 use super::{Import, ImportReport, ImportSource, base_name, preserved_files};
 use crate::import::options::CoordinateScale;
-use crate::import::reader::calibration::{ImportCalibration, calibrate};
+use crate::import::reader::calibration::calibrate;
 use crate::import::reader::encoding::DecodedText;
 use crate::import::reader::findings::new_finding;
 use crate::import::reader::grid::{ClockGrid, GridPositions};
@@ -14,12 +14,12 @@ use crate::import::reader::{companion, findings, track_choice};
 use crate::recording::channel::ReversalInstants;
 use crate::recording::files::{CameraEntry, LevelEntry, OneOrMany, RecordingFile, SourceEntry};
 use crate::recording::quality::{
-    CameraTilt, Check, Optics, Severity, TiltNotFound, check_position_steps, measure_quality, measure_tilt,
+    Check, Optics, Severity, check_position_steps, measure_quality, measure_tilt,
 };
-use crate::recording::{Recording, RotationError, Traces, rotate_traces};
+use crate::recording::{Recording, Traces, rotate_traces};
 use crate::toml_file;
 
-/// Word in a track's name or a header that marks data no camera took.
+/// Word in a track's name or a header that marks simulated data.
 const SYNTHETIC: &str = "synthetic";
 
 pub(crate) fn assemble_recording(
@@ -28,7 +28,7 @@ pub(crate) fn assemble_recording(
     mut exports: Vec<TrackFile>,
     options: &ImportOptions,
     mut report: ImportReport,
-) -> Result<Import, ImportError> {
+) -> ImportResult<Import> {
     companion::read_camera_records(sources, &mut exports, options)?;
     track_choice::number_repeated_names(&mut exports);
     let calibration = calibrate(&mut exports, options, &mut report)?;
@@ -52,39 +52,56 @@ pub(crate) fn assemble_recording(
     }
     drop(exports);
     for source in sources {
-        // what is kept does not depend on where the files lay
+        // (what is stored must not depend on the folder of the files)
+        let name = base_name(&source.name);
         report
             .findings
             .iter_mut()
-            .for_each(|finding| finding.found = finding.found.replace(&source.name, base_name(&source.name)));
+            .for_each(|finding| finding.found = finding.found.replace(&source.name, name));
     }
-    let file_name = || sources.first().map_or_else(String::new, |source| source.name.clone());
-    let recording = Recording::new(options.name.clone(), clocks.grid, to_traces(points), synthetic)
-        .map_err(|problem| ImportError::Recording { file: file_name(), problem })?;
-    let camera = camera_entry(&calibration);
-    let optics = Optics::from(&camera);
-    let (recording, level) = level_recording(recording, &file_name(), (options, &optics), &mut report)?;
-    let file = RecordingFile {
-        level,
-        ..describe_recording(sources, decoded, options, camera, &recording, &report)?
+    let file_name = sources.first().map_or("", |source| source.name.as_str());
+    let [tip, head] = points;
+    let traces = Traces {
+        tip_x_m: tip.x,
+        tip_y_m: tip.y,
+        head_x_m: head.x,
+        head_y_m: head.y,
+        tip_confidence: tip.confidence,
+        head_confidence: head.confidence,
     };
+    let recording = Recording::new(options.name.clone(), clocks.grid, traces, synthetic)
+        .map_err(|problem| ImportError::unusable(file_name, problem))?;
+    let metres_per_pixel =
+        if let CoordinateScale::MetresPerPixel(metres) = calibration.scale { Some(metres) } else { None };
+    let camera = CameraEntry {
+        frame_rate_hz: calibration.rate_hz,
+        exposure_s: calibration.exposure_s,
+        metres_per_pixel,
+        y_axis: Some(calibration.y_axis),
+    };
+    let optics = Optics::from(&camera);
+    let (recording, level) = level_recording(recording, file_name, (options, &optics), &mut report)?;
+    let described = describe_recording(sources, decoded, options, camera, &recording, &report)?;
+    let file = RecordingFile { level, ..described };
     Ok(Import { recording, file, report })
 }
 
-/// A table without a single position is the wrong table.
+/// Refuses tracks without a single position.
 fn refuse_no_position(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
     points: &[GridPositions; 2],
-) -> Result<(), ImportError> {
+) -> ImportResult<()> {
     if points.iter().any(|point| point.tracked_frames().is_some()) {
         return Ok(());
     }
-    let used: Vec<TrackIndex> = chosen.iter().flatten().copied().collect();
+    let used = || chosen.iter().flatten();
     let names: Vec<String> =
-        used.iter().map(|(file, track)| format!("`{}`", exports[*file].tracks[*track].name)).collect();
-    let file = used.first().map_or_else(String::new, |(file, _)| exports[*file].file.to_owned());
-    Err(ImportError::NoPosition { file, points: names.join(" or ") })
+        used().map(|(file, track)| format!("`{}`", exports[*file].tracks[*track].name)).collect();
+    let file = used().next().map_or("", |(file, _)| exports[*file].file);
+    let found = format!("no position of {} in any row", names.join(" or "));
+    let advice = "export the table of the tracked points, or name other columns";
+    Err(ImportError::format(file, found, "some", advice))
 }
 
 fn note_points(
@@ -103,23 +120,20 @@ fn note_points(
                     exports[*file].tracks[*track].name, exports[*file].file
                 ));
                 if on_grid.tracked_frames().is_none() {
-                    report.findings.push(lacks(
-                        format!(
-                            "{point}: its track has no position in any row; its columns stay \
-                            empty and there is no deflection"
-                        ),
-                        "",
-                    ));
+                    let found = format!(
+                        "{point}: its track has no position in any row; its columns stay empty and there is no \
+                         deflection"
+                    );
+                    report.findings.push(lacks(found, ""));
                 } else if on_grid.y.iter().all(Option::is_none) {
                     report.notes.push(format!("{point}: the export has no y; that column stays empty"));
                 }
             }
             None => {
                 let advice = track_choice::unchosen_advice(exports, chosen, point).unwrap_or_default();
-                report.findings.push(lacks(
-                    format!("no track for the {point}: its columns stay empty and there is no deflection"),
-                    &advice,
-                ));
+                let found =
+                    format!("no track for the {point}: its columns stay empty and there is no deflection");
+                report.findings.push(lacks(found, &advice));
             }
         }
     }
@@ -139,28 +153,6 @@ fn is_synthetic(export: &TrackFile) -> bool {
     names.into_iter().any(|name| name.to_lowercase().contains(SYNTHETIC))
 }
 
-fn to_traces([tip, head]: [GridPositions; 2]) -> Traces {
-    Traces {
-        tip_x_m: tip.x,
-        tip_y_m: tip.y,
-        head_x_m: head.x,
-        head_y_m: head.y,
-        tip_confidence: tip.confidence,
-        head_confidence: head.confidence,
-    }
-}
-
-fn camera_entry(calibration: &ImportCalibration) -> CameraEntry {
-    let metres_per_pixel =
-        if let CoordinateScale::MetresPerPixel(metres) = calibration.scale { Some(metres) } else { None };
-    CameraEntry {
-        frame_rate_hz: calibration.rate_hz,
-        exposure_s: calibration.exposure_s,
-        metres_per_pixel,
-        y_axis: Some(calibration.y_axis),
-    }
-}
-
 fn describe_recording(
     sources: &[ImportSource],
     decoded: &[DecodedText],
@@ -168,7 +160,7 @@ fn describe_recording(
     camera: CameraEntry,
     recording: &Recording,
     report: &ImportReport,
-) -> Result<RecordingFile, ImportError> {
+) -> ImportResult<RecordingFile> {
     let mut encodings: Vec<&str> = decoded.iter().map(|d| d.encoding).collect();
     encodings.dedup();
     let names: Vec<String> = preserved_files(sources).into_iter().map(|(name, _)| name.to_owned()).collect();
@@ -187,54 +179,28 @@ fn describe_recording(
     Ok(file)
 }
 
-// The tilt of the camera, measured on the imported path and taken out of both tracks on request.
-
-/// Why a recording cannot be levelled.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum LevelError {
-    /// It shows no tilt.
-    #[error(transparent)]
-    NoTilt(#[from] TiltNotFound),
-    /// A point has one coordinate alone.
-    #[error(transparent)]
-    NotTurnable(#[from] RotationError),
-}
-
-/// The recording as a level camera would have seen it, and what was done; `file` is the name used in
-/// refusals. A tilt that is not clear is left alone.
+/// Turns the recording as a level camera would have seen it, and gives what was done. An unclear tilt is left as it
+/// is. Refusals name `file`.
 ///
 /// # Errors
-/// [`ImportError::Level`] where the path shows no tilt, or a point has one coordinate alone.
-pub(crate) fn level_recording(
+/// [`ImportError::Unusable`] where the path shows no tilt, or a point has only one coordinate.
+fn level_recording(
     recording: Recording,
     file: &str,
     (options, optics): (&ImportOptions, &Optics),
     report: &mut ImportReport,
-) -> Result<(Recording, Option<LevelEntry>), ImportError> {
+) -> ImportResult<(Recording, Option<LevelEntry>)> {
     if !options.level {
         return Ok((recording, None));
     }
-    let refuse = |problem| ImportError::Level { file: file.to_owned(), problem };
+    let refuse = |problem: &dyn std::fmt::Display| {
+        let advice = "import without --level, or track the tip and the head with x and y over a whole stroke";
+        ImportError::unusable(file, format!("--level: {problem}; {advice}"))
+    };
     let measured = measure_quality(&recording, optics.exposure_s);
-    let tilt = measure_tilt(&recording, &ReversalInstants::find_instants(&recording), &measured)
-        .map_err(|e| refuse(e.into()))?;
-    let entry = level_entry(&tilt);
-    report.notes.push(format!("level: {}", entry.describe()));
-    if !entry.applied {
-        return Ok((recording, Some(entry)));
-    }
-    let traces =
-        rotate_traces(recording.traces(), tilt.angle_rad, tilt.centre_m).map_err(|e| refuse(e.into()))?;
-    // turned coordinates no longer show the step of the export
-    report.findings.extend(check_position_steps(&measured, optics));
-    let (name, grid) = (recording.name().to_owned(), recording.grid());
-    let level = Recording::new(name, grid, traces, recording.is_synthetic())
-        .map_err(|problem| ImportError::Recording { file: file.to_owned(), problem })?;
-    Ok((level, Some(entry)))
-}
-
-fn level_entry(tilt: &CameraTilt) -> LevelEntry {
-    LevelEntry {
+    let instants = ReversalInstants::find_instants(&recording);
+    let tilt = measure_tilt(&recording, &instants, &measured).map_err(|e| refuse(&e))?;
+    let entry = LevelEntry {
         applied: tilt.is_clear(),
         angle_rad: tilt.angle_rad,
         sd_rad: tilt.sd_rad,
@@ -242,5 +208,16 @@ fn level_entry(tilt: &CameraTilt) -> LevelEntry {
         centre_y_m: tilt.centre_m[1],
         frames: tilt.frames,
         curvature_per_m: tilt.curvature.map(|curvature| curvature.per_m),
+    };
+    report.notes.push(format!("level: {}", entry.describe()));
+    if !entry.applied {
+        return Ok((recording, Some(entry)));
     }
+    let traces = rotate_traces(recording.traces(), tilt.angle_rad, tilt.centre_m).map_err(|e| refuse(&e))?;
+    // (the turned coordinates no longer show the step of the export)
+    report.findings.extend(check_position_steps(&measured, optics));
+    let (name, grid) = (recording.name().to_owned(), recording.grid());
+    let level = Recording::new(name, grid, traces, recording.is_synthetic())
+        .map_err(|problem| ImportError::unusable(file, problem))?;
+    Ok((level, Some(entry)))
 }

@@ -1,10 +1,8 @@
 //! Why an export was refused: the place, what was found, what was expected, what to do.
 
-use super::assemble::LevelError;
-use crate::recording::RecordingError;
 use crate::recording::files::FilesError;
 use crate::toml_file::TomlError;
-use std::fmt;
+use std::fmt::{self, Display};
 
 /// A place in a text file.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -17,7 +15,7 @@ pub struct TextLocation {
     pub column: usize,
 }
 
-impl fmt::Display for TextLocation {
+impl Display for TextLocation {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}:{}:{}", self.file, self.line, self.column)
     }
@@ -30,15 +28,15 @@ pub enum CellProblem {
     NotANumber,
     /// A row without its time or frame number.
     NoTime,
-    /// A frame number with a fraction or outside any recording.
+    /// A frame number with a fraction, or larger than any recording has.
     NotAFrame,
-    /// The time of the row above once more.
+    /// The time of the row above, repeated.
     Duplicate,
     /// A time before that of the row above.
     Backwards,
     /// A time between two frames.
     OffGrid,
-    /// A frame or time so far from the others that nearly all frames between would be empty.
+    /// A frame or time so far from the others that nearly all frames between them have no row.
     FarAway,
 }
 
@@ -48,7 +46,7 @@ pub enum ImportError {
     /// No file was given.
     #[error("no file to import: name the exported table")]
     NoSource,
-    /// Two files of one name, or a name that the recording itself needs.
+    /// A file name that occurs twice or that the recording itself needs.
     #[error(
         "{file}: found the file name `{name}`, expected one that no other file of the recording has; rename \
          the export"
@@ -58,148 +56,6 @@ pub enum ImportError {
         file: String,
         /// Its name without folders.
         name: String,
-    },
-    /// Not a table of text at all.
-    #[error("{file}:{line}:1: found {found}, expected a table exported as text; {advice}")]
-    WrongKind {
-        /// File as named by the user.
-        file: String,
-        /// Line that shows it.
-        line: usize,
-        /// What it is.
-        found: &'static str,
-        /// What to export instead.
-        advice: &'static str,
-    },
-    /// The bytes are not text in the encoding.
-    #[error(
-        "{file}: found bytes that are not {encoding}, expected text; name another encoding with --encoding, \
-         e.g. utf-8, utf-16le, windows-1252, shift_jis"
-    )]
-    Encoding {
-        /// File as named by the user.
-        file: String,
-        /// The encoding that was tried.
-        encoding: String,
-    },
-    /// An encoding that does not exist.
-    #[error(
-        "--encoding: found `{found}`, expected a name such as utf-8, utf-16le, windows-1252 or shift_jis"
-    )]
-    UnknownEncoding {
-        /// The name as given.
-        found: String,
-    },
-    /// The file holds nothing.
-    #[error("{file}:1:1: the file is empty, expected a table; export the track data again")]
-    Empty {
-        /// File as named by the user.
-        file: String,
-    },
-    /// Names, but no numbers.
-    #[error(
-        "{file}:{line}:1: found no rows of numbers after the header, expected one a frame; export again with \
-         the data rows selected"
-    )]
-    HeaderOnly {
-        /// File as named by the user.
-        file: String,
-        /// Last line with anything in it.
-        line: usize,
-    },
-    /// A single row of numbers.
-    #[error(
-        "{file}:{line}:1: found a single row of numbers, expected one a frame and at least two; export again \
-         with all data rows selected"
-    )]
-    OneRow {
-        /// File as named by the user.
-        file: String,
-        /// Its line.
-        line: usize,
-    },
-    /// Rows, but not one position.
-    #[error(
-        "{file}: found no position of {points} in any row, expected some; export the table of the tracked \
-         points, or name other columns"
-    )]
-    NoPosition {
-        /// File as named by the user.
-        file: String,
-        /// Names of the tracks.
-        points: String,
-    },
-    /// Times that are rounded too coarsely to tell the frames apart.
-    #[error(
-        "{file}: the times are rounded to {quantum_s} s, too coarsely to number the frames at {declared_hz} \
-         frames/s; expected less than {limit_s:.3e} s: name a column that counts frames instead (--columns \
-         frame=...), or export the times with more digits"
-    )]
-    CoarseTimes {
-        /// File as named by the user.
-        file: String,
-        /// What they are multiples of, s.
-        quantum_s: f64,
-        /// Rate as declared, 1/s.
-        declared_hz: f64,
-        /// Coarsest rounding that tells the frames apart, s.
-        limit_s: f64,
-    },
-    /// Numbers in quotes with a comma in them, between commas.
-    #[error(
-        "{place}: found `{found}` in quotes, expected a decimal point where commas stand between the cells: \
-         the comma within may be a decimal mark or separate thousands; export again with decimal points and \
-         without separators of thousands, or with semicolons or tabs between the cells"
-    )]
-    QuotedComma {
-        /// The first row of them.
-        place: TextLocation,
-        /// The number.
-        found: String,
-    },
-    /// No delimiter makes columns.
-    #[error(
-        "{place}: found `{found}`, expected columns separated by tabs, semicolons, commas or spaces; export \
-         again with one of these delimiters, and without units or brackets next to the numbers"
-    )]
-    Delimiter {
-        /// The first row that looks like data.
-        place: TextLocation,
-        /// The row.
-        found: String,
-    },
-    /// Comma both between and within numbers.
-    #[error(
-        "{place}: found {found} cells {instead}: the comma is both delimiter and decimal mark, expected one \
-         use of it; export again with a tab or semicolon as delimiter, or with decimal points"
-    )]
-    DecimalComma {
-        /// The first such row.
-        place: TextLocation,
-        /// Its cells.
-        found: usize,
-        /// What they should be, in words.
-        instead: String,
-    },
-    /// A quoted cell without its closing quote.
-    #[error(
-        "{place}: found a quoted cell that runs over {lines} lines, expected it to end in its own; close \
-         the quotation mark, or export again"
-    )]
-    OpenQuote {
-        /// The row.
-        place: TextLocation,
-        /// Lines until the next quotation mark or the end of the file.
-        lines: usize,
-    },
-    /// A line with nothing in it where every row is a frame.
-    #[error(
-        "{place}: found an empty line, expected one row a frame: the table does not number its frames; write \
-         NaN for a lost point; if no frame is missing here, import a copy without the empty line"
-    )]
-    BlankLine {
-        /// The line.
-        place: TextLocation,
     },
     /// Two rows of one track in one frame.
     #[error(
@@ -219,19 +75,19 @@ pub enum ImportError {
         /// Line of the first row.
         first: usize,
     },
-    /// A table or a file of the same program that holds no positions over time.
+    /// A table or a file that its own program does not mean as positions over time.
     #[error("{place}: found {found}, expected {expected}; {advice}")]
     WrongTable {
         /// The file, or the place that shows it.
         place: String,
-        /// What it is.
+        /// What the file holds.
         found: String,
-        /// What it should be.
+        /// What is read instead.
         expected: String,
-        /// Which menu writes the right one.
+        /// Which menu of the program writes that.
         advice: String,
     },
-    /// A row with another number of cells.
+    /// A row with more or fewer cells than the others.
     #[error(
         "{place}: found {found} cells, expected {expected} as in the rest of the table; complete \
          the row from what the tracking program shows (a missing value is an empty cell), or export again"
@@ -260,22 +116,10 @@ pub enum ImportError {
         /// What to do.
         advice: &'static str,
     },
-    /// The table lacks a column.
-    #[error("{file}:{line}:1: {problem}; {advice}")]
-    Columns {
-        /// File as named by the user.
-        file: String,
-        /// Line of the header.
-        line: usize,
-        /// What was found and expected.
-        problem: String,
-        /// What to do.
-        advice: String,
-    },
-    /// A format that this version does not read, or that the content does not show.
+    /// A file or a value that cannot be used.
     #[error("{place}: found {found}, expected {expected}; {advice}")]
     Format {
-        /// The file or the option.
+        /// The file with line and column where one shows it, or the option.
         place: String,
         /// What was found.
         found: String,
@@ -283,6 +127,14 @@ pub enum ImportError {
         expected: String,
         /// What to do.
         advice: String,
+    },
+    /// A file that cannot be used, where a sentence says more than "found" and "expected".
+    #[error("{place}: {problem}")]
+    Unusable {
+        /// The file, with line and column where one shows it.
+        place: String,
+        /// What was found and expected, and what to do.
+        problem: String,
     },
     /// A point was not named, or not found.
     #[error("--point {point}: found {found}, expected {expected}; {advice}")]
@@ -296,7 +148,7 @@ pub enum ImportError {
         /// The tracks there are, and the nearest.
         advice: String,
     },
-    /// Options without which no number has a meaning.
+    /// Options that neither the file nor its format makes up for, such as the frame rate.
     #[error("{files}: read as {format}, which does not say all of how it was recorded, and no default is \
         safe; give\n  {}", .missing.join("\n  "))]
     MissingOptions {
@@ -304,19 +156,8 @@ pub enum ImportError {
         files: String,
         /// Format that they are in.
         format: String,
-        /// Each with its reason and what the file suggests.
+        /// Each option with its reason and what the file suggests.
         missing: Vec<String>,
-    },
-    /// The tilt of the camera cannot be taken out.
-    #[error(
-        "{file}: --level: {problem}; import without --level, or track the tip and the head with x and y over \
-         a whole stroke"
-    )]
-    Level {
-        /// File as named by the user.
-        file: String,
-        /// Why not.
-        problem: LevelError,
     },
     /// An option with an unusable value.
     #[error("{option}: found `{found}`, expected {expected}")]
@@ -359,33 +200,10 @@ pub enum ImportError {
     RecordedRateMismatch {
         /// Rate as declared, 1/s.
         declared_hz: f64,
-        /// The record that says otherwise.
+        /// The camera's record that says otherwise.
         record: String,
         /// Its rate, 1/s.
         recorded_hz: f64,
-    },
-    /// Several files that do not share a frame grid.
-    #[error(
-        "{file}: found {found}, expected {expected} as in {other}; export both tracks from one clip with the \
-         same time settings"
-    )]
-    GridMismatch {
-        /// File as named by the user.
-        file: String,
-        /// What was found.
-        found: String,
-        /// What was expected.
-        expected: String,
-        /// The other file.
-        other: String,
-    },
-    /// The traces are not a recording.
-    #[error("{file}: {problem}")]
-    Recording {
-        /// File as named by the user.
-        file: String,
-        /// Why not.
-        problem: RecordingError,
     },
     /// The specification of the twin is not TOML.
     #[error(transparent)]
@@ -395,10 +213,16 @@ pub enum ImportError {
     Files(#[from] FilesError),
 }
 
+/// What a step of the import gives, or its refusal.
+pub(crate) type ImportResult<T> = Result<T, ImportError>;
+
+/// Most characters of a cell that a refusal shows.
+const LONGEST_CELL: usize = 60;
+
 impl ImportError {
-    /// A table or file of the program that holds no positions over time.
+    /// A table or file that its own program does not mean as positions over time.
     pub(crate) fn wrong_table(
-        place: impl fmt::Display,
+        place: impl Display,
         found: impl Into<String>,
         expected: impl Into<String>,
         advice: impl Into<String>,
@@ -407,19 +231,9 @@ impl ImportError {
         Self::WrongTable { place: place.to_string(), found, expected, advice }
     }
 
-    /// Something wrong with the columns, shown by a line of the table.
-    pub(crate) fn columns(
-        file: &str,
-        line: usize,
-        problem: impl Into<String>,
-        advice: impl Into<String>,
-    ) -> Self {
-        Self::Columns { file: file.to_owned(), line, problem: problem.into(), advice: advice.into() }
-    }
-
     /// A file that is not what its format, or a camera's record, should be.
     pub(crate) fn format(
-        place: impl fmt::Display,
+        place: impl Display,
         found: impl Into<String>,
         expected: impl Into<String>,
         advice: impl Into<String>,
@@ -428,12 +242,52 @@ impl ImportError {
         Self::Format { place: place.to_string(), found, expected, advice }
     }
 
-    /// An option with a value that cannot be.
-    pub(crate) fn option(
-        option: &'static str,
-        found: impl fmt::Display,
-        expected: impl Into<String>,
+    /// A problem that is one sentence with its advice.
+    pub(crate) fn unusable(place: impl Display, problem: impl Display) -> Self {
+        Self::Unusable { place: place.to_string(), problem: problem.to_string() }
+    }
+
+    /// Something wrong with the columns, shown by a line of the table.
+    pub(crate) fn columns(file: &str, line: usize, problem: impl Display, advice: impl Display) -> Self {
+        Self::unusable(format!("{file}:{line}:1"), format!("{problem}; {advice}"))
+    }
+
+    /// A file that holds nothing.
+    pub(crate) fn empty(file: &str) -> Self {
+        let problem = "the file is empty, expected a table; export the track data again";
+        Self::unusable(format!("{file}:1:1"), problem)
+    }
+
+    /// Names, but no numbers; `line` is the last one with anything in it.
+    pub(crate) fn header_only(file: &str, line: usize) -> Self {
+        let (found, expected) = ("no rows of numbers after the header", "one a frame");
+        Self::format(format!("{file}:{line}:1"), found, expected, "export again with the data rows selected")
+    }
+
+    /// Files or tracks that do not share a frame grid.
+    pub(crate) fn grid_mismatch(file: &str, found: &str, expected: &str, other: &str) -> Self {
+        let advice = "export both tracks from one clip with the same time settings";
+        Self::format(file, found, format!("{expected} as in {other}"), advice)
+    }
+
+    /// A cell that cannot be used, with what belongs there and what to do.
+    pub(crate) fn cell(
+        place: TextLocation,
+        problem: CellProblem,
+        (name, found): (&str, &str),
+        (expected, advice): (&'static str, &'static str),
     ) -> Self {
+        let found = found.chars().take(LONGEST_CELL).collect::<String>().into();
+        Self::Cell { place, problem, name: name.to_owned(), found, expected, advice }
+    }
+
+    /// A point that was not named, or not found.
+    pub(crate) fn point(point: &'static str, found: String, expected: &str, advice: String) -> Self {
+        Self::Point { point, found, expected: expected.to_owned(), advice }
+    }
+
+    /// An option with an unusable value.
+    pub(crate) fn option(option: &'static str, found: impl Display, expected: impl Into<String>) -> Self {
         Self::Option { option, found: found.to_string(), expected: expected.into() }
     }
 }

@@ -1,5 +1,5 @@
-//! The formats that are read, and which of them a file is in. A new format is one file in this folder and its
-//! line in [`FORMATS`].
+//! The supported formats, and the choice among them. A new format is one file in this folder and its line in
+//! [`FORMATS`].
 
 mod deeplabcut;
 mod dice;
@@ -18,15 +18,14 @@ mod trackpy;
 mod trc;
 mod wiperlab;
 
-use super::error::ImportError;
+use super::error::{ImportError, ImportResult};
 use super::options::ImportOptions;
-use super::reader::Document;
 use super::reader::track_file::TrackFile;
-use crate::import::reader::new_finding;
+use super::reader::{Document, new_finding};
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::toml_file;
 
-/// Formats that are read, in the order in which the content is asked.
+/// The supported formats, in the order of detection.
 static FORMATS: &[&dyn FileFormat] = &[
     &wiperlab::Wiperlab,
     &dippmotion::DippMotion,
@@ -46,112 +45,89 @@ static FORMATS: &[&dyn FileFormat] = &[
     &generic::GenericFormat,
 ];
 
-/// Programs whose layout is not published: their tables are read as plain ones.
+/// Programs whose layout is not published; their tables need `--columns`.
 const UNDOCUMENTED: [&str; 5] = ["movias", "movias-neo", "tema", "proanalyst", "xcitex"];
+
+/// A format, and what in the content shows it.
+type RecognisedFormat = (&'static dyn FileFormat, String);
 
 pub(crate) fn choose_format(
     documents: &[Document],
     options: &ImportOptions,
-) -> Result<(&'static dyn FileFormat, String), ImportError> {
-    match options.format.as_deref() {
-        None | Some("auto") => detect_format(documents, options),
-        Some(name) => match FORMATS.iter().copied().find(|format| format.name() == name) {
-            Some(format) => {
-                refuse_other_programs(format, documents, options)?;
-                Ok((format, "as given with --format".to_owned()))
-            }
-            None => Err(unknown_format_error(name)),
-        },
+) -> ImportResult<(&'static dyn FileFormat, String)> {
+    let Some(name) = options.format.as_deref().filter(|name| *name != "auto") else {
+        return detect_format(documents, options);
+    };
+    let format = FORMATS.iter().copied().find(|format| format.name() == name);
+    let format = format.ok_or_else(|| unknown_format_error(name))?;
+    // a table that its own program does not mean as positions is not read as another format's; whoever names the
+    // columns answers for them
+    let mut checked = documents.iter().filter(|_| options.columns.is_none());
+    match checked.find_map(|document| refusal_by_others(format, document, options)) {
+        Some(refusal) => Err(refusal),
+        None => Ok((format, "as given with --format".to_owned())),
     }
 }
 
 fn detect_format(
     documents: &[Document],
     options: &ImportOptions,
-) -> Result<(&'static dyn FileFormat, String), ImportError> {
+) -> ImportResult<(&'static dyn FileFormat, String)> {
     if options.columns.is_some() {
-        // (these lose samples and are filtered, whoever names their columns)
-        let format: &'static dyn FileFormat = if documents.iter().all(kinovea::is_window) {
-            &kinovea::Kinovea
-        } else {
-            &generic::GenericFormat
-        };
+        // (Kinovea's windows are filtered and lose samples even where their columns are named)
+        let windows = documents.iter().all(kinovea::is_window);
+        let format: &dyn FileFormat = if windows { &kinovea::Kinovea } else { &generic::GenericFormat };
         return Ok((format, "--columns names the columns".to_owned()));
     }
-    let mut found: Option<(&'static dyn FileFormat, String)> = None;
+    let mut found: Option<RecognisedFormat> = None;
     for document in documents {
-        let Some((format, reason)) = recognise_document(document, options)? else {
-            return Err(unrecognised_error(document));
-        };
-        match &found {
-            Some((first, _)) if first.name() != format.name() => {
-                return Err(mixed_formats_error(document, format, *first));
-            }
-            Some(_) => {}
-            None => found = Some((format, reason)),
+        let (format, reason) = recognise_document(document, options)?;
+        let (first, _) = found.get_or_insert((format, reason));
+        if first.name() != format.name() {
+            let (name, first) =
+                (format!("the format {}", format.name()), format!("{} as in the first file", first.name()));
+            let advice = "export both tracks in one format, or name it with --format";
+            return Err(ImportError::format(document.file, name, first, advice));
         }
     }
     found.ok_or(ImportError::NoSource)
 }
 
-/// The format of a document and what shows it: the first that recognises it. Where several do, one that says
-/// that its program wrote no positions here is believed.
-fn recognise_document(
-    document: &Document,
-    options: &ImportOptions,
-) -> Result<Option<(&'static dyn FileFormat, String)>, ImportError> {
+/// The first format that recognises a document. If another one does too and says that its program wrote no
+/// positions here, the document is refused.
+fn recognise_document(document: &Document, options: &ImportOptions) -> ImportResult<RecognisedFormat> {
     let mut found = recognising_formats(document);
     let Some(first) = found.next() else {
-        return Ok(plain::PlainFormat
-            .recognises(document)
-            .map(|reason| (&plain::PlainFormat as &dyn FileFormat, reason)));
+        let plain: &dyn FileFormat = &plain::PlainFormat;
+        // (the refusal is the table's own problem, or asks for the names of its columns)
+        let refusal = || document.table().map_or_else(|error| error, generic::unnamed_columns_error);
+        return plain.recognises(document).map(|reason| (plain, reason)).ok_or_else(refusal);
     };
-    match found.find_map(|(other, _)| refusal_by(other, document, options)) {
-        Some(refusal) => Err(refusal),
-        None => Ok(Some(first)),
-    }
+    found.find_map(|(other, _)| refusal_by(other, document, options)).map_or(Ok(first), Err)
 }
 
-/// The formats of programs that recognise a document, with what shows it; a plain table is nobody's.
-fn recognising_formats<'d>(
-    document: &'d Document,
-) -> impl Iterator<Item = (&'static dyn FileFormat, String)> + 'd {
-    FORMATS
-        .iter()
-        .copied()
-        .filter(|format| format.name() != plain::PLAIN_NAME)
-        .filter_map(|format| format.recognises(document).map(|reason| (format, reason)))
+/// The formats of programs that recognise a document. A plain table belongs to no program.
+fn recognising_formats<'d>(document: &'d Document) -> impl Iterator<Item = RecognisedFormat> + 'd {
+    let of_programs = FORMATS.iter().copied().filter(|format| format.name() != plain::PLAIN_NAME);
+    of_programs.filter_map(|format| format.recognises(document).map(|reason| (format, reason)))
 }
 
-/// Why `format`, which recognises a document, says that it holds no positions over time, if it does.
+/// The refusal of `format`, which recognises a document, if the document holds no positions over time.
 fn refusal_by(format: &dyn FileFormat, document: &Document, options: &ImportOptions) -> Option<ImportError> {
     format.read(document, options).err().filter(|error| matches!(error, ImportError::WrongTable { .. }))
 }
 
-/// A document that the program which wrote it calls no positions over time is not read as another format's,
-/// whatever --format says.
-fn refuse_other_programs(
-    chosen: &'static dyn FileFormat,
-    documents: &[Document],
-    options: &ImportOptions,
-) -> Result<(), ImportError> {
-    if options.columns.is_some() {
-        return Ok(()); // (who names the columns answers for them, and reads what the program says)
-    }
-    documents.iter().find_map(|document| refusal_by_others(chosen, document, options)).map_or(Ok(()), Err)
-}
-
+/// The refusal of a format other than `chosen` that recognises the document.
 fn refusal_by_others(
     chosen: &dyn FileFormat,
     document: &Document,
     options: &ImportOptions,
 ) -> Option<ImportError> {
-    recognising_formats(document)
-        .filter(|(format, _)| format.name() != chosen.name())
-        .find_map(|(format, _)| refusal_by(format, document, options))
+    let others = recognising_formats(document).filter(|(format, _)| format.name() != chosen.name());
+    others.into_iter().find_map(|(format, _)| refusal_by(format, document, options))
 }
 
-/// Named columns of tables that their own program calls no positions over time.
+/// Findings on named columns of tables that would be refused without `--columns`.
 pub(crate) fn find_doubtful_columns(
     chosen: &dyn FileFormat,
     documents: &[Document],
@@ -166,15 +142,6 @@ pub(crate) fn find_doubtful_columns(
     options.columns.iter().flat_map(|_| documents.iter().filter_map(doubt)).collect()
 }
 
-fn mixed_formats_error(document: &Document, found: &dyn FileFormat, first: &dyn FileFormat) -> ImportError {
-    ImportError::format(
-        document.file,
-        format!("the format {}", found.name()),
-        format!("{} as in the first file", first.name()),
-        "export both tracks in one format, or name it with --format",
-    )
-}
-
 /// The names of all formats, in the order of detection.
 pub fn format_names() -> Vec<&'static str> {
     FORMATS.iter().map(|format| format.name()).collect()
@@ -184,37 +151,24 @@ fn unknown_format_error(name: &str) -> ImportError {
     let mut names = format_names();
     names.push("auto");
     let undocumented = UNDOCUMENTED.contains(&name.to_lowercase().replace([' ', '_'], "-").as_str());
-    ImportError::format(
-        "--format",
-        format!("the format {name}"),
-        format!("one of {}", names.join(", ")),
-        if undocumented {
-            "its layout is not published: export the points as text and say what its columns are, e.g. \
-             --columns time=1,tip-x=2,tip-y=3,head-x=4,head-y=5"
-                .to_owned()
-        } else {
-            format!("{}; any other table is read with --columns", toml_file::suggest_key(name, &names))
-        },
-    )
+    let advice = if undocumented {
+        "its layout is not published: export the points as text and say what its columns are, e.g. --columns \
+         time=1,tip-x=2,tip-y=3,head-x=4,head-y=5"
+            .to_owned()
+    } else {
+        format!("{}; any other table is read with --columns", toml_file::suggest_key(name, &names))
+    };
+    let expected = format!("one of {}", names.join(", "));
+    ImportError::format("--format", format!("the format {name}"), expected, advice)
 }
 
-/// A file that no format recognises: its own problem, or a plain table whose columns have no names yet.
-fn unrecognised_error(document: &Document) -> ImportError {
-    document.table().map_or_else(|error| error, generic::unnamed_columns_error)
-}
-
-// What a file format has to say: one implementation a file in `formats/`.
-
+/// A file format; every file in `formats/` has one.
 pub(crate) trait FileFormat: Sync {
-    /// Its name on the command line.
+    /// Name on the command line.
     fn name(&self) -> &'static str;
-    /// What in the content shows it, if anything does; also for tables of the same program that hold no
-    /// positions, which [`FileFormat::read`] then refuses.
+    /// What in the content shows the format, if anything does. Tables of the same program without positions are
+    /// recognised too, and refused by [`FileFormat::read`].
     fn recognises(&self, document: &Document) -> Option<String>;
-    /// Its rows and tracks, in the file's own units.
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError>;
+    /// Reads the clocks and tracks, in the file's own units.
+    fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>>;
 }

@@ -1,9 +1,11 @@
-//! What the user says about an export, because the export itself does not.
+//! Options of an import: facts that the export itself does not have.
 
 use crate::import::error::ImportError;
 use crate::recording::files::YAxis;
+use toml::Value;
 
-/// What the user says about an export. `None` is refused where no default is safe.
+/// Options of an import. Where neither an option nor the file has a fact and no default is safe, the import is
+/// refused.
 #[derive(Debug, Clone, Default)]
 pub struct ImportOptions {
     /// Name of the recording, for messages and figures.
@@ -14,20 +16,19 @@ pub struct ImportOptions {
     pub encoding: Option<String>,
     /// Rate at which the camera recorded, 1/s.
     pub frame_rate_hz: Option<f64>,
-    /// Length that a unit of the file's coordinates stands for.
+    /// Length of one unit of the file's coordinates.
     pub scale: Option<CoordinateScale>,
     /// Direction of y in the file.
     pub y_axis: Option<YAxis>,
     /// Exposure of a frame, s.
     pub exposure_s: Option<f64>,
-    /// What the time column means; `None` takes it for what the format says, seconds of the recording in
-    /// nearly all.
+    /// Meaning of the time column; `None` takes that of the format, which is mostly seconds of the recording.
     pub time: Option<TimeColumn>,
     /// Frames from one row to the next where only every n-th frame was tracked; `None` is 1.
     pub frame_step: Option<usize>,
-    /// Track that is the lip tip.
+    /// Name of the track of the lip tip.
     pub tip: Option<String>,
-    /// Track that is the head.
+    /// Name of the track of the head.
     pub head: Option<String>,
     /// Columns of a plain table.
     pub columns: Option<ColumnMap>,
@@ -41,17 +42,17 @@ pub struct ImportOptions {
     pub twin: Option<(String, String)>,
 }
 
-/// Most frames from row to row: nobody tracks every thousandth frame to see vibration.
+/// Largest frame step: at larger ones no vibration is seen.
 const LARGEST_STEP: usize = 1000;
 
-/// What a time column means.
+/// Meaning of a time column.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TimeColumn {
     /// Seconds of the recording itself: the rate may be taken from them.
     Real,
     /// Milliseconds of the recording itself.
     Milliseconds,
-    /// Numbers of frames.
+    /// Frame numbers.
     Frames,
     /// Times of playback: they only count frames.
     Playback,
@@ -60,13 +61,13 @@ pub enum TimeColumn {
 /// Length of one unit of the file's coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CoordinateScale {
-    /// Coordinates are pixels, each showing this length, m.
+    /// Coordinates are pixels; the length that a pixel shows, m.
     MetresPerPixel(f64),
-    /// Coordinates are lengths in a unit of this many metres.
+    /// Coordinates are lengths; their unit, m.
     Unit(f64),
 }
 
-/// Length units by their sign; `u`, the micro sign and the Greek mu all mean micro.
+/// Length units by their symbol, m; `u`, the micro sign and the Greek mu all mean micro.
 const LENGTH_UNITS: [(&str, f64); 6] =
     [("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("um", 1e-6), ("\u{b5}m", 1e-6), ("\u{3bc}m", 1e-6)];
 
@@ -76,27 +77,18 @@ impl CoordinateScale {
     /// # Errors
     /// [`ImportError::Option`] for anything else.
     pub fn parse(text: &str) -> Result<Self, ImportError> {
-        let refuse = || {
-            ImportError::option(
-                "--scale",
-                text,
-                "a length a pixel such as 21.5um/px, or the unit of the file's coordinates: m, cm, mm or um",
-            )
-        };
+        let expected =
+            "a length a pixel such as 21.5um/px, or the unit of the file's coordinates: m, cm, mm or um";
+        let refuse = || ImportError::option("--scale", text, expected);
         let unit = |name: &str| LENGTH_UNITS.iter().find(|unit| unit.0 == name).map(|unit| unit.1);
         let Some(length) = text.trim().strip_suffix("/px") else {
             return unit(text.trim()).map(Self::Unit).ok_or_else(refuse);
         };
-        let digits = length
-            .find(|c: char| !(c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '-' | '+')))
-            .ok_or_else(refuse)?;
-        let number = length
-            .get(..digits)
-            .and_then(|n| n.parse::<f64>().ok())
-            .filter(|n| n.is_finite() && *n > 0.0)
-            .ok_or_else(refuse)?;
-        let unit = length.get(digits..).and_then(|name| unit(name.trim())).ok_or_else(refuse)?;
-        // the product of a decimal number and 1e-6 is off by a rounding; the quotient by 1e6 is not
+        let is_digit = |c: char| c.is_ascii_digit() || matches!(c, '.' | 'e' | 'E' | '-' | '+');
+        let (number, name) = length.split_at(length.find(|c| !is_digit(c)).ok_or_else(refuse)?);
+        let number = number.parse::<f64>().ok().filter(|n| n.is_finite() && *n > 0.0).ok_or_else(refuse)?;
+        let unit = unit(name.trim()).ok_or_else(refuse)?;
+        // 1e-6 is no double: a product with it rounds twice, a quotient by 1e6 once
         Ok(Self::MetresPerPixel(number / (1.0 / unit).round()))
     }
 
@@ -145,7 +137,7 @@ pub(crate) const COLUMN_KEYS: [&str; 13] = [
     "y",
     "confidence",
 ];
-/// `frame=row`: the table has no column of frames or times, every row is a frame.
+/// Value of `frame=row`: the table has neither frames nor times, and every row is a frame.
 pub(crate) const ROW_COLUMN: &str = "row";
 
 impl ColumnMap {
@@ -155,24 +147,20 @@ impl ColumnMap {
     /// # Errors
     /// [`ImportError::Option`] naming the part at fault.
     pub fn parse(text: &str) -> Result<Self, ImportError> {
-        let refuse = |found: &str, expected: String| ImportError::option("--columns", found, expected);
+        let refuse = |found: &str, expected: &str| ImportError::option("--columns", found, expected);
         let mut columns: Vec<(&'static str, ColumnName)> = vec![];
         for part in text.split(',').map(str::trim).filter(|part| !part.is_empty()) {
             let pair = part.split_once('=').filter(|(_, column)| !column.trim().is_empty());
-            let (key, column) = pair
-                .ok_or_else(|| refuse(part, "KEY=COLUMN pairs such as time=1,tip-x=2,head-x=4".to_owned()))?;
+            let (key, column) =
+                pair.ok_or_else(|| refuse(part, "KEY=COLUMN pairs such as time=1,tip-x=2,head-x=4"))?;
             let known = COLUMN_KEYS.into_iter().find(|known| *known == key.trim());
-            let key = known.ok_or_else(|| {
-                refuse(
-                    key,
-                    format!("a known key; {}", crate::toml_file::suggest_key(key.trim(), &COLUMN_KEYS)),
-                )
-            })?;
+            let nearest = || crate::toml_file::suggest_key(key.trim(), &COLUMN_KEYS);
+            let key = known.ok_or_else(|| refuse(key, &format!("a known key; {}", nearest())))?;
             if columns.iter().any(|(seen, _)| *seen == key) {
-                return Err(refuse(part, format!("the key `{key}` only once")));
+                return Err(refuse(part, &format!("the key `{key}` only once")));
             }
             let column = match column.trim().parse::<usize>() {
-                Ok(0) => return Err(refuse(part, "column numbers from 1".to_owned())),
+                Ok(0) => return Err(refuse(part, "column numbers from 1")),
                 Ok(number) => ColumnName::Number(number),
                 Err(_) => ColumnName::Name(column.trim().to_owned()),
             };
@@ -183,23 +171,22 @@ impl ColumnMap {
             return Err(refuse(
                 text,
                 "the column that numbers or times the rows: frame=, time= (seconds) or time-ms=; frame=row \
-                 if every row is a frame"
-                    .to_owned(),
+                 if every row is a frame",
             ));
         }
         if columns.get("time").is_some() && columns.get("time-ms").is_some() {
-            return Err(refuse(text, "one of time= (seconds) and time-ms=".to_owned()));
+            return Err(refuse(text, "one of time= (seconds) and time-ms="));
         }
         let (named, listed) = (columns.get("tip-x").or(columns.get("head-x")), columns.get("x"));
         if named.is_none() && listed.is_none() {
             return Err(refuse(
                 text,
                 "the column of at least one point along the sweep: tip-x= or head-x= (or x= and track= where \
-                 the rows name their point)".to_owned(),
+                 the rows name their point)",
             ));
         }
         if named.is_some() && listed.is_some() {
-            return Err(refuse(text, "either tip-x= and head-x=, or x= with track=".to_owned()));
+            return Err(refuse(text, "either tip-x= and head-x=, or x= with track="));
         }
         Ok(columns)
     }
@@ -214,22 +201,16 @@ impl ImportOptions {
     /// Reads `KEY=VALUE` into `[conditions]`; numbers and true/false keep their type.
     ///
     /// # Errors
-    /// [`ImportError::Option`] when there is no key, or it came before.
+    /// [`ImportError::Option`] where the key is missing or was given before.
     pub fn add_condition(&mut self, text: &str) -> Result<(), ImportError> {
         let refuse = |expected: &str| ImportError::option("--condition", text, expected);
-        let (key, value) = text
-            .split_once('=')
-            .filter(|pair| !pair.0.trim().is_empty())
-            .ok_or_else(|| refuse("KEY=VALUE such as glass=wet"))?;
+        let pair = text.split_once('=').filter(|pair| !pair.0.trim().is_empty());
+        let (key, value) = pair.ok_or_else(|| refuse("KEY=VALUE such as glass=wet"))?;
         let value = value.trim();
-        let number = || value.parse::<f64>().ok().filter(|v| v.is_finite()).map(toml::Value::Float);
-        let typed = value
-            .parse::<i64>()
-            .ok()
-            .map(toml::Value::Integer)
-            .or_else(number)
-            .or_else(|| value.parse::<bool>().ok().map(toml::Value::Boolean));
-        let typed = typed.unwrap_or_else(|| toml::Value::String(value.to_owned()));
+        let number = || value.parse::<f64>().ok().filter(|v| v.is_finite()).map(Value::Float);
+        let truth = || value.parse::<bool>().ok().map(Value::Boolean);
+        let whole = value.parse::<i64>().ok().map(Value::Integer);
+        let typed = whole.or_else(number).or_else(truth).unwrap_or_else(|| Value::String(value.to_owned()));
         match self.conditions.insert(key.trim().to_owned(), typed) {
             Some(_) => Err(refuse("every key only once")),
             None => Ok(()),
@@ -239,20 +220,18 @@ impl ImportOptions {
     /// Reads `tip=NAME` or `head=NAME`.
     ///
     /// # Errors
-    /// [`ImportError::Option`] for another point, or one given before.
+    /// [`ImportError::Option`] for another point or one that was given before.
     pub(crate) fn add_point(&mut self, text: &str) -> Result<(), ImportError> {
         let refuse = |expected: &str| ImportError::option("--point", text, expected);
-        let (point, track) = text
-            .split_once('=')
-            .filter(|pair| !pair.1.trim().is_empty())
-            .ok_or_else(|| refuse("tip=NAME or head=NAME"))?;
+        let pair = text.split_once('=').filter(|pair| !pair.1.trim().is_empty());
+        let (point, track) = pair.ok_or_else(|| refuse("tip=NAME or head=NAME"))?;
         let slot = match point.trim() {
             "tip" => &mut self.tip,
             "head" => &mut self.head,
             _ => {
-                return Err(refuse(
-                    "tip=NAME or head=NAME: the points of a recording are the lip tip and the head",
-                ));
+                let expected =
+                    "tip=NAME or head=NAME: the points of a recording are the lip tip and the head";
+                return Err(refuse(expected));
             }
         };
         match slot.replace(track.trim().to_owned()) {
@@ -262,10 +241,10 @@ impl ImportOptions {
     }
 }
 
-/// Rates of any camera, frames/s: from time lapse to well beyond the fastest.
+/// Range of frame rates, frames/s: from time lapse to well beyond the fastest camera.
 const RATES_HZ: std::ops::RangeInclusive<f64> = 1e-3..=1e9;
 
-/// Refuses numbers that no camera has.
+/// Refuses numbers outside their range.
 ///
 /// # Errors
 /// [`ImportError::Option`] naming the option.
@@ -290,11 +269,8 @@ pub(crate) fn check_options(options: &ImportOptions) -> Result<(), ImportError> 
         return Err(ImportError::option("--min-likelihood", found, "a number from 0 to 1"));
     }
     if let Some(found) = options.frame_step.filter(|step| !(1..=LARGEST_STEP).contains(step)) {
-        return Err(ImportError::option(
-            "--frame-step",
-            found,
-            format!("1 to {LARGEST_STEP} frames from row to row"),
-        ));
+        let expected = format!("1 to {LARGEST_STEP} frames from row to row");
+        return Err(ImportError::option("--frame-step", found, expected));
     }
     Ok(())
 }

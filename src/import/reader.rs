@@ -1,4 +1,4 @@
-//! From text to tracks on a frame grid, the same for every format: encoding, dialect, table, layout, timing.
+//! The steps from bytes to tracks on a frame grid that all formats share: encoding, dialect, table, layout, timing.
 
 pub(crate) mod calibration;
 pub(crate) mod companion;
@@ -17,7 +17,7 @@ pub(crate) mod timing;
 pub(crate) mod track_choice;
 pub(crate) mod track_file;
 
-use super::error::ImportError;
+use super::error::ImportResult;
 use super::{ImportSource, base_name};
 use encoding::DecodedText;
 pub(crate) use findings::new_finding;
@@ -26,11 +26,11 @@ pub(crate) use layout::{LostRule, PointCells, TableLayout};
 pub(crate) use number::{CellNumber, parse_number};
 pub(crate) use rows::{RowView, TextRow};
 pub(crate) use table::DelimitedTable;
-pub(crate) use track_file::{Clock, Column, CoordinateUnit, Fact, Facts, TimeUnit, Track, TrackFile};
+pub(crate) use track_file::{
+    Clock, Column, CoordinateUnit, Fact, Facts, TimeUnit, Track, TrackFile, clock_lines,
+};
 
-// A decoded file, with its table and the texts of its companions.
-
-/// A decoded file as the formats see it.
+/// A decoded file with its table and the texts of its companions.
 pub(crate) struct Document<'a> {
     /// File as named by the user.
     pub file: &'a str,
@@ -38,8 +38,8 @@ pub(crate) struct Document<'a> {
     pub stem: &'a str,
     /// Its text, without a byte-order mark.
     pub text: &'a str,
-    /// The text as a table, or why it is not one.
-    pub table: Result<DelimitedTable<'a>, ImportError>,
+    /// The text as a table, or the refusal if it is not one.
+    pub table: ImportResult<DelimitedTable<'a>>,
     /// The texts of the companions, with their names.
     pub companions: Vec<(&'a str, String)>,
 }
@@ -49,21 +49,19 @@ impl<'a> Document<'a> {
         let base = base_name(&source.name);
         let stem = base.rsplit_once('.').map_or(base, |(stem, _)| stem);
         let companions = source.companions.iter().filter_map(|file| {
-            Some((
-                file.name.as_str(),
-                encoding::decode_text(&file.name, &file.bytes, None).ok()?.text.into_owned(),
-            ))
+            let decoded = encoding::decode_text(&file.name, &file.bytes, None).ok()?;
+            Some((file.name.as_str(), decoded.text.into_owned()))
         });
         let table = file_type::refuse_text(&source.name, &decoded.text)
             .map_or_else(|| DelimitedTable::parse(&source.name, &decoded.text), Err);
         Self { file: &source.name, stem, text: &decoded.text, table, companions: companions.collect() }
     }
 
-    pub(crate) fn table(&self) -> Result<&DelimitedTable<'_>, ImportError> {
+    pub(crate) fn table(&self) -> ImportResult<&DelimitedTable<'_>> {
         self.table.as_ref().map_err(Clone::clone)
     }
 
-    /// Its encoding, delimiter and decimal mark, for the report.
+    /// Note on encoding, delimiter and decimal mark.
     pub(crate) fn encoding_note(&self, decoded: &DecodedText) -> String {
         let dialect = self.table.as_ref().map_or_else(|_| String::new(), |table| table.dialect.describe());
         format!("{}: {}{dialect}", self.file, decoded.encoding)

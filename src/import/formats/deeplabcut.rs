@@ -2,22 +2,21 @@
 //! labels set by hand.
 
 use super::FileFormat;
-use crate::import::error::{CellProblem, ImportError};
+use crate::import::error::{CellProblem, ImportError, ImportResult};
 use crate::import::options::ImportOptions;
 use crate::import::reader::findings::picked_frames_finding;
 use crate::import::reader::{
-    CellNumber, DelimitedTable, Document, Facts, InstanceFields, PointCells, PointFields, RowOrder,
-    RowPosition, RowStamp, RowView, TableLayout, TextRow, TrackCollector, TrackFile, new_finding,
+    CellNumber, DelimitedTable, Document, Facts, InstanceFields, PointCells, RowOrder, RowPosition, RowStamp,
+    RowView, TableLayout, TextRow, TrackCollector, TrackFile, new_finding,
 };
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
-/// Parts of a file's name or of a scorer's that tell of smoothed positions: DeepLabCut's filtered predictions
-/// and the ensemble Kalman smoother of Lightning Pose.
+/// Parts of the names of files or scorers of smoothed positions: DeepLabCut's filtered predictions and the ensemble
+/// Kalman smoother of Lightning Pose.
 const SMOOTHED: [&str; 3] = ["filtered", "smoother", "smoothed"];
-/// Columns of the lengths and angles between body parts.
+/// Columns of the table of lengths and angles between body parts.
 const SKELETON: [&str; 3] = ["length", "orientation", "likelihood"];
 
-/// Tables of DeepLabCut and of programs that write its layout.
 pub(crate) struct DeepLabCut;
 
 impl FileFormat for DeepLabCut {
@@ -28,28 +27,18 @@ impl FileFormat for DeepLabCut {
     fn recognises(&self, document: &Document) -> Option<String> {
         let table = document.table.as_ref().ok()?;
         if let Some(row) = find_skeleton_row(table) {
-            return Some(format!(
-                "line {} names lengths and orientations as DeepLabCut's skeleton does",
-                row.line
-            ));
+            let line = row.line;
+            return Some(format!("line {line} names lengths and orientations as DeepLabCut's skeleton does"));
         }
-        let rows: Vec<&TextRow> = table
-            .head
-            .iter()
-            .take(ROW_NAMES.len())
-            .filter(|row| ROW_NAMES.contains(&row.first_cell()))
-            .collect();
+        let rows = table.head.iter().take(ROW_NAMES.len());
+        let rows: Vec<&TextRow> = rows.filter(|row| ROW_NAMES.contains(&row.first_cell())).collect();
         let described: Vec<String> =
             rows.iter().map(|row| format!("line {} starts with `{}`", row.line, row.first_cell())).collect();
         (rows.len() > 1 || rows.first().is_some_and(|row| row.first_cell() == ROW_NAMES[0]))
             .then(|| described.join(", "))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
         if let Some(row) = find_skeleton_row(table) {
             return Err(skeleton_table_error(table, row));
@@ -58,20 +47,14 @@ impl FileFormat for DeepLabCut {
         let mut export = if header.index_cells > 1 || names_images(table, &header) {
             read_labels(document, table, &header, facts())?
         } else {
-            let layout = TableLayout {
-                start: header.start,
-                width: header.cells,
-                most: header.cells,
-                frame: Some(0),
-                points: header.points.clone(),
-                ..TableLayout::default()
-            };
+            let layout = TableLayout::new(header.start, header.cells, header.points.clone());
+            let layout = TableLayout { frame: Some(0), ..layout };
             let mut export = layout.read_tracks(document, table, facts())?;
             if header.points.iter().all(|point| point.confidence.is_none()) {
-                // (predictions have a likelihood; what has none may be labels)
-                export.findings.extend(
-                    export.clocks.iter().filter_map(|clock| picked_frames_finding(document.file, clock)),
-                );
+                // (predictions have a likelihood; positions without one may be labels)
+                let picked =
+                    export.clocks.iter().filter_map(|clock| picked_frames_finding(document.file, clock));
+                export.findings.extend(picked);
             }
             export
         };
@@ -93,22 +76,19 @@ fn names_images(table: &DelimitedTable, header: &DeepLabCutHeader) -> bool {
 }
 
 fn find_skeleton_row<'t>(table: &'t DelimitedTable) -> Option<&'t TextRow> {
-    let names = |row: &&TextRow| SKELETON.iter().all(|name| row.cells.iter().any(|cell| cell == name));
-    table.head.iter().take(ROW_NAMES.len()).find(names)
+    table.head.iter().take(ROW_NAMES.len()).find(|row| SKELETON.iter().all(|name| row.has(name)))
 }
 
 fn skeleton_table_error(table: &DelimitedTable, row: &TextRow) -> ImportError {
-    let cell = row.cells.iter().position(|cell| cell == SKELETON[0]).unwrap_or(0);
     ImportError::wrong_table(
-        table.location(row.line, table.text_column(row.line, cell)),
+        table.cell_location(row.line, row.position(SKELETON[0]).unwrap_or(0)),
         "lengths and orientations of a skeleton",
         "a table of body parts with the columns x, y and likelihood",
-        "import the CSV that analyze_videos writes with save_as_csv=True, the one without \
-            `_skeleton` in its name",
+        "import the CSV that analyze_videos writes with save_as_csv=True, the one without `_skeleton` in its name",
     )
 }
 
-/// Positions that went through a low-pass filter have lost part of what a spectrum is to show.
+/// The finding on positions that went through a low-pass filter, which weakens the high frequencies.
 fn filtering_finding(document: &Document, header: &DeepLabCutHeader) -> Option<QualityFinding> {
     let tells = |name: &str| SMOOTHED.iter().any(|word| name.to_lowercase().contains(word));
     let who = if tells(document.stem) {
@@ -121,30 +101,28 @@ fn filtering_finding(document: &Document, header: &DeepLabCutHeader) -> Option<Q
          than it is",
         document.file
     );
-    Some(new_finding(
-        Check::Filtered,
-        Severity::Caution,
-        (1.0, ""),
-        found,
-        "import the unfiltered table (without `_filtered` in its name) if chatter or noise matters",
-    ))
+    let advice = "import the unfiltered table (without `_filtered` in its name) if chatter or noise matters";
+    Some(new_finding(Check::Filtered, Severity::Caution, (1.0, ""), found, advice))
 }
 
-// The rows above the numbers: who predicted, which individual, which body part, which coordinate.
+// The header rows: scorer, individual, body part, coordinate.
 
-/// First cells of the header rows; a table of one animal has no `individuals`.
-pub(crate) const ROW_NAMES: [&str; 4] = ["scorer", "individuals", "bodyparts", "coords"];
-/// Individual to which DeepLabCut counts the body parts that exist once.
+/// First cells of the header rows; a table of one animal has no row `individuals`.
+const ROW_NAMES: [&str; 4] = ["scorer", "individuals", "bodyparts", "coords"];
+/// Individual of the body parts that are in the picture once.
 const UNIQUE_INDIVIDUAL: &str = "single";
-/// Cells in front of the coordinates: a frame number or the path of a picture, or that path in three parts.
+/// Number of cells in front of the coordinates: a frame number or the path of a picture is one, a path in parts is
+/// three.
 const INDEX_CELLS: [usize; 2] = [1, 3];
 const HEADER_ADVICE: &str = "the rows above the numbers are scorer, bodyparts, coords, with individuals in \
     second place if there are several; restore them as DeepLabCut wrote them, or have it write the table \
     again";
 
-/// What the header says.
+const PART_EXPECTED: &str = "x and y of every body part";
+
+/// Content of the header rows.
 pub(crate) struct DeepLabCutHeader {
-    /// Row of the head in which the numbers start.
+    /// Row of the head with the first numbers.
     pub start: usize,
     /// Cells in front of the coordinates.
     pub index_cells: usize,
@@ -171,7 +149,7 @@ struct BodyPartCells([Option<usize>; 3]);
 const COORDINATES: [&str; 3] = ["x", "y", "likelihood"];
 
 impl DeepLabCutHeader {
-    pub(crate) fn find(table: &DelimitedTable) -> Result<Self, ImportError> {
+    pub(crate) fn find(table: &DelimitedTable) -> ImportResult<Self> {
         let rows = header_rows(table)?;
         let coordinates = rows[rows.len() - 1];
         let cells = coordinates.used_width();
@@ -197,32 +175,26 @@ impl DeepLabCutHeader {
             }
         }
         if header.points.is_empty() {
-            Err(header_error(
-                table,
-                coordinates,
-                "no column named x or y".to_owned(),
-                "x and y of every body part",
-            ))
-        } else {
-            Ok(header)
+            return Err(header_error(table, coordinates, "no column named x or y", PART_EXPECTED));
         }
+        Ok(header)
     }
 
-    /// Takes a column to its body part.
+    /// Adds a column to its body part.
     fn add_column<'t>(
         &mut self,
         table: &DelimitedTable,
         rows: &[&'t TextRow],
         cell: usize,
         parts: &mut Vec<(BodyPart<'t>, BodyPartCells)>,
-    ) -> Result<(), ImportError> {
-        let text = |row: usize| rows.get(row).and_then(|row| row.cells.get(cell)).map_or("", String::as_str);
+    ) -> ImportResult<()> {
+        let text = |row: usize| rows.get(row).map_or("", |row| row.cell(cell));
         let last = rows.len() - 1;
         let coordinate = text(last);
         let line = rows[last].line;
         if coordinate == "z" {
             return Err(ImportError::wrong_table(
-                table.location(line, table.text_column(line, cell)),
+                table.cell_location(line, cell),
                 "a z: positions in space from several cameras",
                 "x and y of one camera's picture",
                 "import the table of one camera as analyze_videos writes it",
@@ -240,13 +212,9 @@ impl DeepLabCutHeader {
             name: text(last - 1),
         };
         if part.name.is_empty() {
-            let row = rows[last - 1];
-            return Err(header_error(
-                table,
-                row,
-                format!("no name in cell {}", cell + 1),
-                "the name of a body part above each coordinate",
-            ));
+            let found = format!("no name in cell {}", cell + 1);
+            let expected = "the name of a body part above each coordinate";
+            return Err(header_error(table, rows[last - 1], &found, expected));
         }
         let at = parts.iter().position(|(known, _)| *known == part).unwrap_or(parts.len());
         if at == parts.len() {
@@ -254,62 +222,41 @@ impl DeepLabCutHeader {
         }
         if parts[at].1.0[kind].replace(cell).is_some() {
             let found = format!("a second {coordinate} of `{}` in cell {}", parts[at].0.name, cell + 1);
-            return Err(header_error(
-                table,
-                rows[last],
-                found,
-                "each coordinate of a body part once (of several animals: a row `individuals`)",
-            ));
+            let expected = "each coordinate of a body part once (of several animals: a row `individuals`)";
+            return Err(header_error(table, rows[last], &found, expected));
         }
         Ok(())
     }
 
-    /// What is left out.
     pub(crate) fn ignored_columns_note(&self) -> Option<String> {
         (!self.ignored.is_empty()).then(|| format!("columns that are not read: {}", self.ignored.join(", ")))
     }
 }
 
 /// The header rows in their order.
-fn header_rows<'t>(table: &'t DelimitedTable) -> Result<Vec<&'t TextRow>, ImportError> {
+fn header_rows<'t>(table: &'t DelimitedTable) -> ImportResult<Vec<&'t TextRow>> {
     let several = table.head.get(1).is_some_and(|row| row.first_cell() == ROW_NAMES[1]);
     let expected = ROW_NAMES.iter().filter(|name| several || **name != ROW_NAMES[1]);
     let row = |(index, name): (usize, &&str)| {
-        let row = table
-            .head
-            .get(index)
-            .or(table.head.last())
-            .ok_or_else(|| ImportError::Empty { file: table.file.to_owned() })?;
-        if row.first_cell() == *name {
-            Ok(row)
-        } else {
-            Err(header_error(
-                table,
-                row,
-                format!("a row that starts with `{}`", row.first_cell()),
-                &format!("the row `{name}`"),
-            ))
-        }
+        let row =
+            table.head.get(index).or(table.head.last()).ok_or_else(|| ImportError::empty(table.file))?;
+        let found = format!("a row that starts with `{}`", row.first_cell());
+        let refuse = || header_error(table, row, &found, &format!("the row `{name}`"));
+        Some(row).filter(|row| row.first_cell() == *name).ok_or_else(refuse)
     };
     expected.enumerate().map(row).collect()
 }
 
-fn count_index_cells(table: &DelimitedTable, coordinates: &TextRow) -> Result<usize, ImportError> {
+fn count_index_cells(table: &DelimitedTable, coordinates: &TextRow) -> ImportResult<usize> {
     let count =
         coordinates.cells.iter().skip(1).position(|cell| !cell.is_empty()).map_or(0, |ahead| ahead + 1);
-    let found = || {
-        if count == 0 {
-            "no coordinates".to_owned()
-        } else {
-            format!("{count} cells in front of the coordinates")
-        }
-    };
-    let expected = "x and y after one cell (frame number or picture) or after three (folder, video, picture)";
     if INDEX_CELLS.contains(&count) {
-        Ok(count)
-    } else {
-        Err(header_error(table, coordinates, found(), expected))
+        return Ok(count);
     }
+    let expected = "x and y after one cell (frame number or picture) or after three (folder, video, picture)";
+    let found =
+        if count == 0 { "no coordinates" } else { &format!("{count} cells in front of the coordinates") };
+    Err(header_error(table, coordinates, found, expected))
 }
 
 fn point_cells(
@@ -317,44 +264,40 @@ fn point_cells(
     coordinates: &TextRow,
     name: String,
     BodyPartCells([x, y, confidence]): &BodyPartCells,
-) -> Result<PointCells, ImportError> {
+) -> ImportResult<PointCells> {
     let (Some(x), Some(y)) = (*x, *y) else {
-        let found = if x.is_some() { "x" } else { "y" };
-        return Err(header_error(
-            table,
-            coordinates,
-            format!("`{name}` with {found} alone"),
-            "x and y of every body part",
-        ));
+        let found = format!("`{name}` with {} alone", if x.is_some() { "x" } else { "y" });
+        return Err(header_error(table, coordinates, &found, PART_EXPECTED));
     };
     Ok(PointCells { confidence: *confidence, ..PointCells::new(name, x, Some(y)) })
 }
 
-fn header_error(table: &DelimitedTable, row: &TextRow, found: String, expected: &str) -> ImportError {
+fn header_error(table: &DelimitedTable, row: &TextRow, found: &str, expected: &str) -> ImportError {
     ImportError::columns(table.file, row.line, format!("found {found}, expected {expected}"), HEADER_ADVICE)
 }
 
-// Labels set by hand: rows are named by the pictures taken from a video, whose names end in the frame
-// number.
+// Labels set by hand: a row names a picture of a video, and the picture's name ends in the frame number.
 
-/// Reads every picture's row; a video's pictures come in any order and leave most frames out.
+/// What belongs in the cell of a picture, and what to do about another one.
+const PICTURE_REMEDY: (&str, &str) = (
+    "a picture whose name ends in its frame number, such as img0042.png",
+    "rename the pictures by their frames in the table, or import the table of analyze_videos, which numbers the \
+     frames",
+);
+
+/// Reads the row of every picture. The rows may be in any order, and most frames have none.
 pub(crate) fn read_labels<'a>(
     document: &'a Document,
     table: &'a DelimitedTable,
     header: &DeepLabCutHeader,
     facts: Facts,
-) -> Result<TrackFile<'a>, ImportError> {
-    let point = |p: &PointCells| PointFields {
-        name: p.name.clone(),
-        has_y: true,
-        has_confidence: p.confidence.is_some(),
-    };
+) -> ImportResult<TrackFile<'a>> {
     let image_cell = header.index_cells - 1;
     let shape = InstanceFields {
         has_frame: true,
         has_time: false,
         clock_cell: image_cell,
-        points: header.points.iter().map(point).collect(),
+        points: header.points.iter().map(PointCells::fields).collect(),
     };
     let mut collector = TrackCollector::new(shape);
     let (mut video, mut count): (Option<String>, usize) = (None, 0);
@@ -366,9 +309,21 @@ pub(crate) fn read_labels<'a>(
         }
         table.check_row_length(&record, header.cells, header.cells)?;
         let (folder, image) = split_picture_path(&record, header.index_cells);
-        check_same_video(table, &record, video.get_or_insert_with(|| folder.clone()), &folder)?;
-        let frame =
-            frame_number(image).ok_or_else(|| unnumbered_picture_error(table, &record, image_cell))?;
+        let video = video.get_or_insert_with(|| folder.clone());
+        if *video != folder {
+            return Err(ImportError::wrong_table(
+                table.location(record.line, 1),
+                format!("a picture of the video `{folder}` after those of `{video}`"),
+                "the labels of one video",
+                "import the CollectedData file in the folder of one video, not the merged data set",
+            ));
+        }
+        let unnumbered = || {
+            let place = table.cell_location(record.line, image_cell);
+            let picture = ("picture", record.cell(image_cell));
+            ImportError::cell(place, CellProblem::NotAFrame, picture, PICTURE_REMEDY)
+        };
+        let frame = frame_number(image).ok_or_else(unnumbered)?;
         for (position, cells) in positions.iter_mut().zip(&header.points) {
             *position = read_label(table, &record, cells)?;
         }
@@ -376,8 +331,14 @@ pub(crate) fn read_labels<'a>(
         count += 1;
     }
     let video = video.unwrap_or_default();
-    let (clocks, tracks) =
-        collector.finish(document.file, RowOrder::Any).map_err(|error| name_video_in_error(error, &video))?;
+    // (the collected instance has no name: a refusal names the video)
+    let name_video = |error| match error {
+        ImportError::DuplicateRow { place, what, found, first, .. } => {
+            ImportError::DuplicateRow { place, what, found, first, track: video.clone() }
+        }
+        other => other,
+    };
+    let (clocks, tracks) = collector.finish(document.file, RowOrder::Any).map_err(name_video)?;
     let findings = clocks.iter().filter_map(|clock| picked_frames_finding(document.file, clock)).collect();
     Ok(TrackFile {
         table: Some(table),
@@ -393,11 +354,7 @@ pub(crate) fn read_labels<'a>(
     })
 }
 
-fn read_label(
-    table: &DelimitedTable,
-    record: &RowView,
-    cells: &PointCells,
-) -> Result<RowPosition, ImportError> {
+fn read_label(table: &DelimitedTable, record: &RowView, cells: &PointCells) -> ImportResult<RowPosition> {
     let value = |cell: Option<usize>, axis: &str| {
         table.optional_number_at(record, cell, &format!("{axis} of {}", cells.name))
     };
@@ -409,7 +366,7 @@ fn read_label(
     })
 }
 
-/// The folder of a row's picture (its video's name) and the picture's name.
+/// The folder of a row's picture, which has the name of the video, and the name of the picture.
 fn split_picture_path<'r>(record: &RowView<'r>, index_cells: usize) -> (String, &'r str) {
     if index_cells > 1 {
         return (record.cell(index_cells - 2).to_owned(), record.cell(index_cells - 1));
@@ -424,45 +381,6 @@ fn frame_number(image: &str) -> Option<f64> {
     let stem = image.rsplit_once('.').map_or(image, |(stem, _)| stem);
     let digits = stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();
     stem.get(digits..)?.parse::<u32>().ok().map(f64::from)
-}
-
-fn check_same_video(
-    table: &DelimitedTable,
-    record: &RowView,
-    video: &str,
-    folder: &str,
-) -> Result<(), ImportError> {
-    if video == folder {
-        return Ok(());
-    }
-    Err(ImportError::wrong_table(
-        table.location(record.line, 1),
-        format!("a picture of the video `{folder}` after those of `{video}`"),
-        "the labels of one video",
-        "import the CollectedData file in the folder of one video, not the merged data set",
-    ))
-}
-
-fn unnumbered_picture_error(table: &DelimitedTable, record: &RowView, cell: usize) -> ImportError {
-    ImportError::Cell {
-        place: table.location(record.line, table.text_column(record.line, cell)),
-        problem: CellProblem::NotAFrame,
-        name: "picture".to_owned(),
-        found: record.cell(cell).chars().take(60).collect::<String>().into(),
-        expected: "a picture whose name ends in its frame number, such as img0042.png",
-        advice: "rename the pictures by their frames in the table, or import the table of analyze_videos, \
-            which numbers the frames",
-    }
-}
-
-/// The track of all points of a picture has no name: a refusal names the video.
-fn name_video_in_error(error: ImportError, video: &str) -> ImportError {
-    match error {
-        ImportError::DuplicateRow { place, what, found, first, .. } => {
-            ImportError::DuplicateRow { place, what, found, first, track: video.to_owned() }
-        }
-        other => other,
-    }
 }
 
 #[cfg(test)]

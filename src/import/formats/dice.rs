@@ -1,7 +1,7 @@
 //! DICe (Digital Image Correlation Engine) in tracking mode: a file a subset, a row a frame.
 
 use super::FileFormat;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     CoordinateUnit, DelimitedTable, Document, Facts, LostRule, PointCells, TableLayout, TextRow, TrackFile,
@@ -9,18 +9,17 @@ use crate::import::reader::{
 use crate::recording::files::YAxis;
 
 const FRAME: &str = "FRAME";
-/// Where the centre of the subset was in the reference picture, and how far it has moved since.
+/// Centre of the subset in the reference picture, and its displacement since.
 const REFERENCE: [&str; 2] = ["COORDINATE_X", "COORDINATE_Y"];
 const DISPLACEMENT: [&str; 2] = ["DISPLACEMENT_X", "DISPLACEMENT_Y"];
 const SIGMA: &str = "SIGMA";
 const STATUS: &str = "STATUS_FLAG";
-/// Values of [`STATUS`] with which a frame was correlated: `CORRELATION_SUCCESSFUL`, the
-/// `INITIALIZE_..._SUCCESSFUL` and `SEARCH_..._SUCCESSFUL` of DICe's `Status_Flag`. All others are failures,
-/// or positions averaged from other subsets.
+/// Values of [`STATUS`] for a correlated frame: `CORRELATION_SUCCESSFUL`, `INITIALIZE_..._SUCCESSFUL` and
+/// `SEARCH_..._SUCCESSFUL` of DICe's `Status_Flag`. The others are failures or averages of other subsets.
 const SUCCESSFUL: [f64; 7] = [0.0, 1.0, 2.0, 3.0, 4.0, 6.0, 18.0];
-/// Line of the comment block that says whether displacements start again in every frame.
+/// Start of the comment that says whether displacements are from frame to frame.
 const INCREMENTAL: &str = "Incremental correlation:";
-/// Lines in which the comment block ends.
+/// Most lines of the comment block.
 const PREAMBLE_LINES: usize = 64;
 
 pub(crate) struct Dice;
@@ -35,23 +34,17 @@ impl FileFormat for Dice {
         Some(format!("line {} names {} and {} as DICe does", row.line, REFERENCE[0], REFERENCE[1]))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
         let (index, row) = find_header(table).ok_or_else(|| no_header_error(table))?;
         refuse_incremental(document)?;
-        let at = |name: &str| row.cells.iter().position(|cell| cell == name);
+        let at = |name: &str| row.position(name);
         let [Some(dx), Some(dy)] = DISPLACEMENT.map(at) else {
             return Err(no_displacements_error(table, row));
         };
         let (Some(frame), [Some(x), Some(y)]) = (at(FRAME), REFERENCE.map(at)) else {
-            return Err(full_field_error(
-                table.location(row.line, 1).to_string(),
-                format!("the columns {}", row.texts().join(", ")),
-            ));
+            let found = format!("the columns {}", row.texts().join(", "));
+            return Err(full_field_error(table.location(row.line, 1), found));
         };
         refuse_full_field(table, index + 1, frame, [x, y])?;
         let sigma = at(SIGMA).map(|cell| LostRule {
@@ -64,20 +57,10 @@ impl FileFormat for Dice {
             is: |flag, _| !SUCCESSFUL.contains(&flag),
             words: "whose STATUS_FLAG is a failure",
         });
-        let layout = TableLayout {
-            start: index + 1,
-            width: row.used_width(),
-            most: row.used_width(),
-            frame: Some(frame),
-            points: vec![PointCells {
-                name: document.stem.to_owned(),
-                x: vec![x, dx],
-                y: vec![y, dy],
-                confidence: None,
-            }],
-            lost: sigma.into_iter().chain(status).collect(),
-            ..TableLayout::default()
-        };
+        let (name, lost) = (document.stem.to_owned(), sigma.into_iter().chain(status).collect());
+        let points = vec![PointCells { name, x: vec![x, dx], y: vec![y, dy], confidence: None }];
+        let layout = TableLayout::new(index + 1, row.used_width(), points);
+        let layout = TableLayout { frame: Some(frame), lost, ..layout };
         let mut export = layout.read_tracks(document, table, facts())?;
         export.notes.push(format!(
             "positions are {} + {}, and so for y; the track is called like its file",
@@ -95,35 +78,26 @@ fn facts() -> Facts {
 
 /// Index of the row of column names, and the row.
 fn find_header<'t>(table: &'t DelimitedTable) -> Option<(usize, &'t TextRow)> {
-    let is_header = |row: &TextRow| REFERENCE.iter().all(|name| row.cells.iter().any(|cell| cell == name));
-    table.head.iter().enumerate().find(|(_, row)| is_header(row))
+    table.find_row(usize::MAX, |row| REFERENCE.iter().all(|name| row.has(name)))
 }
 
 fn no_header_error(table: &DelimitedTable) -> ImportError {
-    let found = table.head.first().map(TextRow::texts).unwrap_or_default();
-    ImportError::columns(
-        table.file,
-        table.head.first().map_or(1, |row| row.line),
-        format!(
-            "found `{}` and no row that names the columns, expected {FRAME}, {}, {}, {} and {}",
-            found.join(" "),
-            REFERENCE[0],
-            REFERENCE[1],
-            DISPLACEMENT[0],
-            DISPLACEMENT[1]
-        ),
-        "give the solution file of a subset, DICe_solution_N.txt, as DICe wrote it",
-    )
+    let ([x, y], [dx, dy], first) = (REFERENCE, DISPLACEMENT, table.first_texts().join(" "));
+    let problem = format!(
+        "found `{first}` and no row that names the columns, expected {FRAME}, {x}, {y}, {dx} and {dy}"
+    );
+    let advice = "give the solution file of a subset, DICe_solution_N.txt, as DICe wrote it";
+    ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-/// In tracking mode the reference stays where it is while the frames count up; a field has many references in
-/// one frame.
+/// Refuses a field of points: there a frame has many references. In tracking mode the frames count up and the reference
+/// is constant.
 fn refuse_full_field(
     table: &DelimitedTable,
     start: usize,
     frame: usize,
     reference: [usize; 2],
-) -> Result<(), ImportError> {
+) -> ImportResult<()> {
     let cells = [frame, reference[0], reference[1]];
     let mut rows = table.rows(start);
     let mut first: Option<[String; 3]> = None;
@@ -136,27 +110,24 @@ fn refuse_full_field(
         let line = record.line;
         if texts[0] == first[0] && !texts[0].is_empty() {
             return Err(full_field_error(
-                table.location(line, table.text_column(line, frame)).to_string(),
+                table.cell_location(line, frame),
                 format!("frame {} again", texts[0]),
             ));
         }
-        if let Some(axis) = (1..3).find(|&axis| {
+        let differs = |&axis: &usize| {
             texts[axis] != first[axis] && table.parse_cell(texts[axis]) != table.parse_cell(&first[axis])
-        }) {
-            let place = table.location(line, table.text_column(line, cells[axis]));
-            return Err(full_field_error(
-                place.to_string(),
-                format!("{} {} after {}", REFERENCE[axis - 1], texts[axis], first[axis]),
-            ));
+        };
+        if let Some(axis) = (1..3).find(differs) {
+            let found = format!("{} {} after {}", REFERENCE[axis - 1], texts[axis], first[axis]);
+            return Err(full_field_error(table.cell_location(line, cells[axis]), found));
         }
     }
     Ok(())
 }
 
-/// Without displacements there is only the place of the subset in the reference picture.
 fn no_displacements_error(table: &DelimitedTable, row: &TextRow) -> ImportError {
     ImportError::wrong_table(
-        table.location(row.line, 1).to_string(),
+        table.location(row.line, 1),
         format!("{} and {} without {} and {}", REFERENCE[0], REFERENCE[1], DISPLACEMENT[0], DISPLACEMENT[1]),
         "the displacements too: the coordinates alone are where the subset was in the reference picture, the \
             same in every frame",
@@ -164,7 +135,7 @@ fn no_displacements_error(table: &DelimitedTable, row: &TextRow) -> ImportError 
     )
 }
 
-fn full_field_error(place: String, found: String) -> ImportError {
+fn full_field_error(place: TextLocation, found: String) -> ImportError {
     ImportError::wrong_table(
         place,
         found,
@@ -175,8 +146,8 @@ fn full_field_error(place: String, found: String) -> ImportError {
     )
 }
 
-/// Displacements from frame to frame are no positions.
-fn refuse_incremental(document: &Document) -> Result<(), ImportError> {
+/// Refuses displacements from frame to frame, which are not positions.
+fn refuse_incremental(document: &Document) -> ImportResult<()> {
     let lines =
         document.text.lines().take(PREAMBLE_LINES).enumerate().filter(|(_, line)| line.starts_with("***"));
     let stated = lines.filter_map(|(at, line)| Some((at + 1, line.split_once(INCREMENTAL)?.1.trim())));

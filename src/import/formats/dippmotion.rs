@@ -1,11 +1,11 @@
 //! DIPP-MOTION (DITECT): the table behind an X-Y graph, in CP932, under a header of varying length.
 
 use super::FileFormat;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     Column, CoordinateUnit, DelimitedTable, Document, Fact, Facts, PointCells, TableLayout, TextRow,
-    TimeUnit, TrackFile, new_finding,
+    TimeUnit, TrackFile, layout, new_finding,
 };
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
@@ -21,8 +21,7 @@ const COORDINATE: &str = "\u{5ea7}\u{6a19}\u{5024}";
 const AXES: [&str; 2] = ["(X)", "(Y)"];
 /// Units of time by their sign in a column's name.
 const TIME_UNITS: [(&str, f64); 4] = [("s", 1.0), ("sec", 1.0), ("ms", 1e-3), ("\u{79d2}", 1.0)];
-/// Largest distance of a point from (0, 0), in units of the file, that is the rounding of a local origin:
-/// some 1e-11 are seen.
+/// Largest rounding error of a point at a local origin, in units of the file; values of 1e-11 occur.
 const AT_ORIGIN: f64 = 1e-6;
 /// The table that has the positions.
 const MENU: &str = "save the data of the graph of X coordinate against Y coordinate of the points as CSV";
@@ -35,19 +34,11 @@ impl FileFormat for DippMotion {
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
-        document
-            .text
-            .trim_start()
-            .trim_start_matches('"')
-            .starts_with(MARK)
-            .then(|| format!("line 1 starts with `{MARK}`"))
+        let start = document.text.trim_start().trim_start_matches('"');
+        start.starts_with(MARK).then(|| format!("line 1 starts with `{MARK}`"))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
         refuse_other_graph(table)?;
         let header = find_header(table)?;
@@ -55,14 +46,7 @@ impl FileFormat for DippMotion {
         let points = point_columns(table, row)?;
         let facts = Facts { unit: coordinate_unit(table)?, time: time_unit(table, row)?, ..Facts::default() };
         let width = points.iter().flat_map(|point| &point.y).max().map_or(0, |last| last + 1);
-        let layout = TableLayout {
-            start: header + 1,
-            width,
-            most: width,
-            time: Some(0),
-            points,
-            ..TableLayout::default()
-        };
+        let layout = TableLayout { time: Some(0), ..TableLayout::new(header + 1, width, points) };
         let mut export = layout.read_tracks(document, table, facts)?;
         let origin = local_origin_finding(&export);
         export.findings.extend(origin);
@@ -70,86 +54,63 @@ impl FileFormat for DippMotion {
     }
 }
 
-/// A bracketed line names the graph: one of speeds or of one coordinate over time has no positions.
-fn refuse_other_graph(table: &DelimitedTable) -> Result<(), ImportError> {
-    let named = table
-        .head
-        .iter()
-        .filter_map(|row| Some((row, row.cells.first()?)))
-        .find(|(_, cell)| cell.starts_with('[') && cell.contains("] - ["));
-    match named {
-        Some((row, graph)) if graph.matches(COORDINATE).count() != 2 => {
-            Err(graph_error(table.location(row.line, 1).to_string(), format!("the graph {graph}")))
+/// Refuses other graphs than of X against Y, such as of speeds. A line in brackets names the graph.
+fn refuse_other_graph(table: &DelimitedTable) -> ImportResult<()> {
+    let mut rows = table.head.iter().map(|row| (row.line, row.first_cell()));
+    match rows.find(|(_, cell)| cell.starts_with('[') && cell.contains("] - [")) {
+        Some((line, graph)) if graph.matches(COORDINATE).count() != 2 => {
+            Err(graph_error(table.location(line, 1), format!("the graph {graph}")))
         }
         _ => Ok(()),
     }
 }
 
-fn graph_error(place: String, found: String) -> ImportError {
+fn graph_error(place: TextLocation, found: String) -> ImportError {
     ImportError::wrong_table(place, found, "the X and Y coordinates of points over time", MENU)
 }
 
-/// The row that names the columns is the one that starts with the time.
-fn find_header(table: &DelimitedTable) -> Result<usize, ImportError> {
+/// Index of the row of column names, which starts with the time.
+fn find_header(table: &DelimitedTable) -> ImportResult<usize> {
     let names_time = |row: &TextRow| {
-        row.cells.first().is_some_and(|cell| cell.starts_with(TIME))
-            && row.cells.iter().skip(1).any(|cell| !cell.is_empty())
+        row.first_cell().starts_with(TIME) && row.cells.iter().skip(1).any(|cell| !cell.is_empty())
     };
     table.head.iter().position(names_time).ok_or_else(|| {
-        ImportError::columns(
-            table.file,
-            table.head.first().map_or(1, |row| row.line),
-            format!("found no row that starts with `{TIME}` and names the points as NAME(X) and NAME(Y)"),
-            format!("{MENU}; if the Japanese characters are damaged, add --encoding shift_jis"),
-        )
+        let problem =
+            format!("found no row that starts with `{TIME}` and names the points as NAME(X) and NAME(Y)");
+        let advice = format!("{MENU}; if the Japanese characters are damaged, add --encoding shift_jis");
+        ImportError::columns(table.file, table.first_line(), problem, advice)
     })
 }
 
-fn point_columns(table: &DelimitedTable, row: &TextRow) -> Result<Vec<PointCells>, ImportError> {
+fn point_columns(table: &DelimitedTable, row: &TextRow) -> ImportResult<Vec<PointCells>> {
     let names: Vec<&str> = row.texts().into_iter().take(row.used_width()).collect();
-    let mut points = vec![];
-    let mut rest = names.iter().enumerate().skip(1);
-    while let Some((column, name)) = rest.next() {
-        let track = name.strip_suffix(AXES[0]);
-        let pair = rest.next().and_then(|(_, name)| name.strip_suffix(AXES[1]));
-        let Some(track) = track.filter(|track| pair == Some(*track)) else {
-            return Err(graph_error(
-                table.location(row.line, table.text_column(row.line, column)).to_string(),
-                format!("the column `{name}` without a pair NAME(X), NAME(Y)"),
-            ));
-        };
-        points.push(PointCells::new(track.trim(), column, Some(column + 1)));
-    }
-    Ok(points)
+    layout::read_point_pairs(&names, 1, AXES, str::trim).map_err(|column| {
+        let found = format!("the column `{}` without a pair NAME(X), NAME(Y)", names[column]);
+        graph_error(table.cell_location(row.line, column), found)
+    })
 }
 
-/// The unit of both axes, where the header has it.
-fn coordinate_unit(table: &DelimitedTable) -> Result<Fact<CoordinateUnit>, ImportError> {
-    let named = |name: &str| table.head.iter().find(|row| row.cells.first().is_some_and(|cell| cell == name));
+/// The unit of both axes, if the header has it.
+fn coordinate_unit(table: &DelimitedTable) -> ImportResult<Fact<CoordinateUnit>> {
+    let named = |name: &str| table.head.iter().find(|row| row.first_cell() == name);
     let [Some(x), Some(y)] = UNITS.map(named) else { return Ok(None) };
-    let of = |row: &TextRow| row.cells.get(1).cloned().unwrap_or_default();
-    let (unit, other) = (of(x), of(y));
+    let (unit, other) = (x.cell(1), y.cell(1));
     let refuse = |row: &TextRow, found: String, expected: &str| {
-        ImportError::wrong_table(
-            table.location(row.line, table.text_column(row.line, 1)),
-            found,
-            expected,
-            MENU,
-        )
+        ImportError::wrong_table(table.cell_location(row.line, 1), found, expected, MENU)
     };
     if unit != other {
         return Err(refuse(y, format!("the unit `{other}` for y and `{unit}` for x"), "one unit for both"));
     }
-    match CoordinateUnit::parse(&unit) {
+    match CoordinateUnit::parse(unit) {
         Some(named) => Ok(Some((named, format!("line {} names the unit {unit}", x.line)))),
         None if unit.is_empty() => Ok(None),
         None => Err(refuse(x, format!("the unit `{unit}`"), "a unit of length or pixels")),
     }
 }
 
-/// Seconds, unless the column names another unit.
-fn time_unit(table: &DelimitedTable, row: &TextRow) -> Result<TimeUnit, ImportError> {
-    let name = row.cells.first().map_or("", |cell| cell.trim_start_matches(TIME));
+/// The unit in the name of the time column; seconds without one.
+fn time_unit(table: &DelimitedTable, row: &TextRow) -> ImportResult<TimeUnit> {
+    let name = row.first_cell().trim_start_matches(TIME);
     let sign = name.trim_matches(|c: char| {
         c.is_whitespace() || matches!(c, '(' | ')' | '[' | ']' | '\u{ff08}' | '\u{ff09}')
     });
@@ -165,25 +126,20 @@ fn time_unit(table: &DelimitedTable, row: &TextRow) -> Result<TimeUnit, ImportEr
     }
 }
 
-/// A point that never leaves (0, 0) is the origin of a local system, and all others are measured from it.
+/// The finding on a point that is always at (0, 0): it is the origin of a local system of coordinates.
 fn local_origin_finding(export: &TrackFile) -> Option<QualityFinding> {
     let near = |column: &Column| {
         column.has_values() && column.iter().flatten().all(|value| value.abs() <= AT_ORIGIN)
     };
     let origin = export.tracks.iter().find(|track| near(&track.x) && track.y.as_ref().is_some_and(near))?;
-    let name = &origin.name;
-    Some(new_finding(
-        Check::RelativePositions,
-        Severity::Caution,
-        (AT_ORIGIN, ""),
-        format!(
-            "{}: `{name}` stays at (0, 0): all positions are relative to it, in a local system that may also \
-             turn with the object",
-            export.file
-        ),
-        "tip minus head is right as long as both points are of this file; the head's own motion needs an \
-         export in fixed coordinates",
-    ))
+    let found = format!(
+        "{}: `{}` stays at (0, 0): all positions are relative to it, in a local system that may also turn with the \
+         object",
+        export.file, origin.name
+    );
+    let advice = "tip minus head is right as long as both points are of this file; the head's own motion needs an \
+        export in fixed coordinates";
+    Some(new_finding(Check::RelativePositions, Severity::Caution, (AT_ORIGIN, ""), found, advice))
 }
 
 #[cfg(test)]

@@ -1,17 +1,17 @@
-//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts, with a companion `.set` that names
-//! points and camera rate.
+//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts. A companion `.set` has the names of the points
+//! and the rate of the camera.
 
 use super::FileFormat;
 use crate::import::base_name;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::{ImportOptions, TimeColumn};
 use crate::import::reader::timing::RATE_AGREEMENT;
 use crate::import::reader::{
-    CellNumber, DelimitedTable, Document, Fact, Facts, LostRule, PointCells, TableLayout, TextRow, TimeUnit,
+    CellNumber, Clock, DelimitedTable, Document, Fact, Facts, LostRule, PointCells, TableLayout, TimeUnit,
     TrackFile,
 };
 
-/// Cells of the first line: frames, points, time from frame to frame.
+/// Number of cells in the first line: frames, points, time from frame to frame.
 const COUNTS: usize = 3;
 /// Extension of the table.
 const EXTENSION: &str = ".rd";
@@ -19,7 +19,7 @@ const EXTENSION: &str = ".rd";
 const RATE: &str = "CameraSpeed";
 const NAMES: &str = "PointName";
 const INTERVAL: &str = "RecInterval";
-/// Longest time from frame to frame of any camera, s: beyond it the third number is something else.
+/// Longest time from frame to frame, s; a larger third number has another meaning.
 const LONGEST_STEP_S: f64 = 10.0;
 
 pub(crate) struct FrameDias;
@@ -29,8 +29,7 @@ impl FileFormat for FrameDias {
         "framedias"
     }
 
-    /// The file names nothing: its first line has to fit the rows below, or its name has to be that of the
-    /// program.
+    /// The file has no names: its first line has to fit the rows below, or its extension has to be `.rd`.
     fn recognises(&self, document: &Document) -> Option<String> {
         let table = document.table.as_ref().ok()?;
         let counts = FrameDiasCounts::find(table)?;
@@ -38,39 +37,29 @@ impl FileFormat for FrameDias {
         let fits = cells != COUNTS && cells.is_multiple_of(2) && counts.points == (cells / 2) as f64;
         let named = document.file.to_lowercase().ends_with(EXTENSION);
         let line = table.head.first()?.line;
-        (fits || named).then(|| {
-            format!(
-                "line {line} counts {} frames of {} points, {} s apart",
-                counts.frames, counts.points, counts.step_s
-            )
-        })
+        let FrameDiasCounts { frames, points, step_s } = counts;
+        (fits || named)
+            .then(|| format!("line {line} counts {frames} frames of {points} points, {step_s} s apart"))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
-        let counts = FrameDiasCounts::find(table).ok_or_else(|| no_counts_error(table))?;
+        let Some(counts) = FrameDiasCounts::find(table) else {
+            let problem = format!(
+                "found `{}`, expected the numbers of frames and points and the seconds from frame to frame, such \
+                 as 3000,2,0.0005",
+                table.first_texts().join(",")
+            );
+            return refuse_row(table, 0, &problem, "save the two-dimensional coordinates (.rd) again");
+        };
         let points = count_points(table, counts)?;
         let settings = FrameDiasSettings::from_companion(document);
         let names = settings.names(table, points)?;
         let cells = 2 * points;
         let lost = LostRule { cell: None, is: |x, y| x == 0.0 && y == 0.0, words: "at exactly (0, 0)" };
-        let points = names
-            .iter()
-            .enumerate()
-            .map(|(index, name)| PointCells::new(name.as_str(), 2 * index, Some(2 * index + 1)))
-            .collect();
-        let layout = TableLayout {
-            start: 1,
-            width: cells,
-            most: cells,
-            points,
-            lost: vec![lost],
-            ..TableLayout::default()
-        };
+        let point = |(index, name): (usize, String)| PointCells::new(name, 2 * index, Some(2 * index + 1));
+        let points = names.into_iter().enumerate().map(point).collect();
+        let layout = TableLayout { lost: vec![lost], ..TableLayout::new(1, cells, points) };
         let facts = Facts {
             frame_rate_hz: settings.frame_rate(table, counts, options)?,
             time: TimeUnit::Seconds(1.0),
@@ -80,9 +69,8 @@ impl FileFormat for FrameDias {
         check_frame_count(table, counts, &export)?;
         if counts.step_s > 0.0 {
             for clock in &mut export.clocks {
-                clock.time = clock.frame.as_ref().map(|frames| {
-                    frames.iter().map(|frame| frame.map(|frame| frame * counts.step_s)).collect()
-                });
+                let time_s = |frame: Option<f64>| frame.map(|frame| frame * counts.step_s);
+                clock.time = clock.frame.as_ref().map(|frames| frames.iter().map(time_s).collect());
             }
         }
         export.notes.extend(settings.notes());
@@ -114,30 +102,15 @@ impl FrameDiasCounts {
     }
 }
 
-fn columns_error(
-    table: &DelimitedTable,
-    row: Option<&TextRow>,
-    problem: String,
-    advice: &str,
-) -> ImportError {
-    ImportError::columns(table.file, row.map_or(1, |row| row.line), problem, advice)
+/// A problem that a row shows.
+fn refuse_row<T>(table: &DelimitedTable, row: usize, problem: &str, advice: &str) -> ImportResult<T> {
+    let line = table.head.get(row).map_or(1, |row| row.line);
+    Err(ImportError::columns(table.file, line, problem, advice))
 }
 
-fn no_counts_error(table: &DelimitedTable) -> ImportError {
-    let first = table.head.first();
-    let found = first.map(TextRow::texts).unwrap_or_default().join(",");
-    let problem = format!(
-        "found `{found}`, expected the numbers of frames and points and the seconds from frame to frame, \
-         such as 3000,2,0.0005"
-    );
-    columns_error(table, first, problem, "save the two-dimensional coordinates (.rd) again")
-}
-
-/// Points of a row, where the first line counts as many.
-fn count_points(table: &DelimitedTable, counts: FrameDiasCounts) -> Result<usize, ImportError> {
-    let Some(row) = table.head.get(1) else {
-        return Err(ImportError::HeaderOnly { file: table.file.to_owned(), line: 1 });
-    };
+/// Number of points in a row, which must be that of the first line.
+fn count_points(table: &DelimitedTable, counts: FrameDiasCounts) -> ImportResult<usize> {
+    let row = table.head.get(1).ok_or_else(|| ImportError::header_only(table.file, 1))?;
     let cells = row.used_width();
     if cells.is_multiple_of(2) && (cells / 2) as f64 == counts.points {
         return Ok(cells / 2);
@@ -146,20 +119,17 @@ fn count_points(table: &DelimitedTable, counts: FrameDiasCounts) -> Result<usize
         "found {cells} coordinates in the row, expected x and y of the {} points that the first line counts",
         counts.points
     );
-    Err(columns_error(
-        table,
-        Some(row),
-        problem,
-        "save the two-dimensional coordinates (.rd) again: three-dimensional ones (.3d) are another file",
-    ))
+    let advice =
+        "save the two-dimensional coordinates (.rd) again: three-dimensional ones (.3d) are another file";
+    refuse_row(table, 1, &problem, advice)
 }
 
 fn check_frame_count(
     table: &DelimitedTable,
     counts: FrameDiasCounts,
     export: &TrackFile,
-) -> Result<(), ImportError> {
-    let rows = export.clocks.first().map_or(0, crate::import::reader::track_file::Clock::len);
+) -> ImportResult<()> {
+    let rows = export.clocks.first().map_or(0, Clock::len);
     if rows as f64 == counts.frames {
         return Ok(());
     }
@@ -167,15 +137,10 @@ fn check_frame_count(
         "found {rows} rows of coordinates, expected the {} frames that the first line counts",
         counts.frames
     );
-    Err(columns_error(
-        table,
-        table.head.first(),
-        problem,
-        "the file is cut short or was edited: save it again",
-    ))
+    refuse_row(table, 0, &problem, "the file is cut short or was edited: save it again")
 }
 
-/// What the `.set` says.
+/// Content of the `.set`.
 #[derive(Debug, Clone, Default, PartialEq)]
 struct FrameDiasSettings {
     file: Option<String>,
@@ -192,16 +157,11 @@ impl FrameDiasSettings {
     }
 
     fn parse(file: &str, text: &str) -> Self {
-        let value = |key: &str| {
-            text.lines()
-                .filter_map(|line| line.split_once('='))
-                .find(|(name, _)| name.trim() == key)
-                .map(|(_, value)| value.trim())
-        };
+        let entries = || text.lines().filter_map(|line| line.split_once('='));
+        let value = |key: &str| entries().find(|(name, _)| name.trim() == key).map(|(_, value)| value.trim());
         let number = |key: &str| {
-            value(key)
-                .and_then(|text| text.trim_matches('"').parse::<f64>().ok())
-                .filter(|value| value.is_finite())
+            let number = value(key)?.trim_matches('"').parse::<f64>().ok();
+            number.filter(|value| value.is_finite())
         };
         Self {
             file: Some(base_name(file).to_owned()),
@@ -215,8 +175,8 @@ impl FrameDiasSettings {
         self.file.as_deref().unwrap_or_default()
     }
 
-    /// A list of another length belongs to another file, and would give the points wrong names.
-    fn names(&self, table: &DelimitedTable, points: usize) -> Result<Vec<String>, ImportError> {
+    /// Names of the points; a list of another length is refused, because it belongs to another file.
+    fn names(&self, table: &DelimitedTable, points: usize) -> ImportResult<Vec<String>> {
         if self.names.is_empty() {
             return Ok((1..=points).map(|point| format!("point{point}")).collect());
         }
@@ -228,21 +188,17 @@ impl FrameDiasSettings {
             "found {points} points, expected the {names} that {NAMES} in {file} names ({})",
             self.names.join(", ")
         );
-        Err(columns_error(
-            table,
-            table.head.first(),
-            problem,
-            "the two files belong to different measurements: keep the right .set in the folder of the table, or none",
-        ))
+        let advice = "the two files belong to different measurements: keep the right .set in the folder of the table, or none";
+        refuse_row(table, 0, &problem, advice)
     }
 
-    /// The camera's rate, where nothing contradicts it.
+    /// Rate of the camera; refuses one that contradicts the times, unless they are those of playback.
     fn frame_rate(
         &self,
         table: &DelimitedTable,
         counts: FrameDiasCounts,
         options: &ImportOptions,
-    ) -> Result<Fact<f64>, ImportError> {
+    ) -> ImportResult<Fact<f64>> {
         let Some(rate) = self.rate_hz.filter(|_| !self.interval) else { return Ok(None) };
         let agrees = counts.step_s == 0.0 || (rate * counts.step_s - 1.0).abs() <= RATE_AGREEMENT;
         if agrees || options.time == Some(TimeColumn::Playback) {
@@ -255,7 +211,7 @@ impl FrameDiasSettings {
         );
         let advice = "if the camera recorded at the rate of the .set and the seconds only count frames, add \
             --time playback; else move the .set to another folder and give --frame-rate-hz";
-        Err(columns_error(table, table.head.first(), problem, advice))
+        refuse_row(table, 0, &problem, advice)
     }
 
     fn notes(&self) -> Vec<String> {
@@ -263,13 +219,9 @@ impl FrameDiasSettings {
         let points = self.names.is_empty().then(|| {
             format!("{unnamed}: the points are called `point1`, `point2`, ... in the order of the columns")
         });
-        let interval = self.interval.then(|| {
-            format!(
-                "{INTERVAL} in {} is above 1: not every frame was recorded, so \
-                {RATE} is not taken for the rate",
-                self.file_name()
-            )
-        });
+        let reason = "not every frame was recorded, so CameraSpeed is not taken for the rate";
+        let interval =
+            self.interval.then(|| format!("{INTERVAL} in {} is above 1: {reason}", self.file_name()));
         points.into_iter().chain(interval).collect()
     }
 }

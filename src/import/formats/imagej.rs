@@ -1,8 +1,7 @@
-//! ImageJ and Fiji: the Results table, the table of the plugin Manual Tracking, and MTrackJ's table of
-//! points.
+//! ImageJ and Fiji: the Results table, the table of the plugin Manual Tracking, and MTrackJ's table of points.
 
 use super::FileFormat;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     CoordinateUnit, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow, TimeUnit,
@@ -34,15 +33,10 @@ impl FileFormat for ImageJ {
         Some(format!("line {} is the header of {what}", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
-        let Some((row, kind)) = table.head.first().and_then(|row| Some((row, table_kind(row)?))) else {
-            return Err(no_header_error(table));
-        };
+        let found = table.head.first().and_then(|row| Some((row, table_kind(row)?)));
+        let (row, kind) = found.ok_or_else(|| no_header_error(table))?;
         match kind {
             ImageJTableKind::Results => read_results(document, table, row),
             ImageJTableKind::ManualTracking => read_manual_tracking(document, table, row),
@@ -63,22 +57,16 @@ fn table_kind(row: &TextRow) -> Option<ImageJTableKind> {
 }
 
 fn no_header_error(table: &DelimitedTable) -> ImportError {
-    let row = table.head.first();
-    ImportError::columns(
-        table.file,
-        row.map_or(1, |row| row.line),
-        format!(
-            "found `{}`, expected the header of a table of ImageJ, with X, Y and Slice",
-            row.map(TextRow::texts).unwrap_or_default().join(" ")
-        ),
-        "switch on Edit > Options > Input/Output > Save column headers and save the table again, or \
-            number the columns: --format generic --columns frame=4,tip-x=2,tip-y=3",
-    )
+    let first = table.first_texts().join(" ");
+    let problem = format!("found `{first}`, expected the header of a table of ImageJ, with X, Y and Slice");
+    let advice = "switch on Edit > Options > Input/Output > Save column headers and save the table again, or number \
+        the columns: --format generic --columns frame=4,tip-x=2,tip-y=3";
+    ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-// What all tables of ImageJ share: the direction of y, and a refusal at the header.
+// Common to all tables of ImageJ: the direction of y, and a refusal at the header.
 
-/// What the documentation fixes of all three tables.
+/// Facts from the documentation, for all three tables.
 pub(crate) fn imagej_facts() -> Facts {
     let why = "ImageJ counts y from the top of the picture, unless `Invert Y coordinates` was ticked in \
         Analyze > Set Measurements"
@@ -87,22 +75,22 @@ pub(crate) fn imagej_facts() -> Facts {
 }
 
 /// The refusal of a table at its header.
-pub(crate) fn header_error(
+fn refuse_header<T>(
     table: &DelimitedTable,
     row: &TextRow,
-    found: String,
+    found: &str,
     expected: &str,
     advice: &str,
-) -> ImportError {
-    ImportError::wrong_table(table.location(row.line, 1), found, expected, advice)
+) -> ImportResult<T> {
+    Err(ImportError::wrong_table(table.location(row.line, 1), found, expected, advice))
 }
 
 // The table of the plugin Manual Tracking: whole pixels, a row a click.
 
-/// Starts of the two columns that are named with a degree sign, which comes in any encoding or is lost.
+/// Starts of two names that end in a degree sign, which may be in any encoding or lost.
 const MANUAL_TRACK: &str = "Track n";
 const MANUAL_SLICE: &str = "Slice n";
-/// Characters that such a name has at most: the degree sign may have become two.
+/// Most characters of such a name, because the degree sign may have become two.
 const MANUAL_NAME_LENGTH: usize = MANUAL_TRACK.len() + 3;
 
 fn find_numbered_column(names: &[&str], start: &str) -> Option<usize> {
@@ -117,7 +105,7 @@ pub(crate) fn read_manual_tracking<'a>(
     document: &'a Document,
     table: &'a DelimitedTable,
     row: &TextRow,
-) -> Result<TrackFile<'a>, ImportError> {
+) -> ImportResult<TrackFile<'a>> {
     let names = row.texts();
     let named = |name: &str| names.iter().position(|other| *other == name);
     let (Some(track), Some(slice), Some(x), Some(y)) = (
@@ -127,13 +115,13 @@ pub(crate) fn read_manual_tracking<'a>(
         named("Y"),
     ) else {
         let advice = "save the plugin's results table as it is, with all its columns";
-        return Err(header_error(
+        return refuse_header(
             table,
             row,
-            format!("the columns {}", names.join(", ")),
+            &format!("the columns {}", names.join(", ")),
             "also X and Y",
             advice,
-        ));
+        );
     };
     let layout = TableLayout {
         start: 1,
@@ -153,7 +141,7 @@ pub(crate) fn read_manual_tracking<'a>(
 
 // MTrackJ's table of points: coordinates and times with their units in the header.
 
-/// Columns that number clusters, tracks and points; a point's number starts again in each track and is no
+/// Columns that number clusters, tracks and points. The number of a point starts again in each track and is not a
 /// frame.
 const MTRACKJ_CLUSTER: &str = "CID";
 const MTRACKJ_TRACK: &str = "TID";
@@ -179,7 +167,7 @@ pub(crate) fn read_mtrackj<'a>(
     document: &'a Document,
     table: &'a DelimitedTable,
     row: &TextRow,
-) -> Result<TrackFile<'a>, ImportError> {
+) -> ImportResult<TrackFile<'a>> {
     let names = row.texts();
     let number = |name: &str| names.iter().position(|other| *other == name);
     let quantities = (find_quantity(&names, "x"), find_quantity(&names, "y"), find_quantity(&names, "t"));
@@ -187,52 +175,45 @@ pub(crate) fn read_mtrackj<'a>(
         (number(MTRACKJ_TRACK), number(MTRACKJ_POINT), quantities)
     else {
         let advice = "in MTrackJ press Measure with `Display point measurements` ticked and save that table";
-        return Err(header_error(
+        return refuse_header(
             table,
             row,
-            "a table of MTrackJ without the x, y and t of points".to_owned(),
+            "a table of MTrackJ without the x, y and t of points",
             "its table of point measurements",
             advice,
-        ));
+        );
     };
     if x_unit != y_unit {
         let advice = "give the picture one unit of length in Image > Properties and measure again";
-        return Err(header_error(
+        return refuse_header(
             table,
             row,
-            format!("x in `{x_unit}` and y in `{y_unit}`"),
+            &format!("x in `{x_unit}` and y in `{y_unit}`"),
             "one unit of length",
             advice,
-        ));
+        );
     }
     let counts = FRAME_UNITS.contains(&t_unit);
     let layout = TableLayout {
-        start: 1,
-        width: row.used_width(),
-        most: row.used_width(),
         frame: counts.then_some(t),
         time: (!counts).then_some(t),
         key: number(MTRACKJ_CLUSTER).into_iter().chain([track]).collect(),
         order: RowOrder::Any,
-        points: vec![PointCells::new("", x, Some(y))],
-        ..TableLayout::default()
+        ..TableLayout::new(1, row.used_width(), vec![PointCells::new("", x, Some(y))])
     };
     let unit = CoordinateUnit::parse(x_unit).map(|unit| (unit, format!("MTrackJ's header says [{x_unit}]")));
     let time = TimeUnit::parse(t_unit).unwrap_or(TimeUnit::Unknown);
-    let mut export = layout
-        .read_tracks(document, table, Facts { unit, time, ..imagej_facts() })
-        .map_err(no_interval_error)?;
+    let facts = Facts { unit, time, ..imagej_facts() };
+    let mut export = layout.read_tracks(document, table, facts).map_err(no_interval_error)?;
     if !counts {
-        export.notes.push(
-            "MTrackJ's times are slices times the frame interval of Image > Properties, which \
-            may be that of playback or unset"
-                .to_owned(),
-        );
+        let note = "MTrackJ's times are slices times the frame interval of Image > Properties, which may be that of \
+            playback or unset";
+        export.notes.push(note.to_owned());
     }
     Ok(export)
 }
 
-/// Without a frame interval every time is 0.
+/// Advises to set the frame interval, without which every time is 0.
 fn no_interval_error(error: ImportError) -> ImportError {
     match error {
         ImportError::DuplicateRow { place, what: "time", found, track, first } => ImportError::wrong_table(
@@ -247,13 +228,13 @@ fn no_interval_error(error: ImportError) -> ImportError {
 
 // ImageJ's Results table: a row a measurement.
 
-/// Columns that name a point: its centroid, or else its centre of mass. `BX` and `BY` are a corner.
+/// Columns of a point: its centroid, or else its centre of mass. `BX` and `BY` are a corner.
 const POSITIONS: [[&str; 2]; 2] = [["X", "Y"], ["XM", "YM"]];
 const SLICE: &str = "Slice";
 const FRAME: &str = "Frame";
-/// Number of the counter of the multi-point tool that a point belongs to.
+/// Column with the counter of the multi-point tool to which a point belongs.
 const COUNTER: &str = "Counter";
-/// Measurements that tables of other programs hardly have together with a nameless first column.
+/// Measurements that mark an ImageJ table if its first column has no name.
 const MEASUREMENTS: [&str; 13] = [
     "Area",
     "Mean",
@@ -270,7 +251,7 @@ const MEASUREMENTS: [&str; 13] = [
     "Label",
 ];
 
-/// A nameless column of row numbers and ImageJ's measurements, or positions with a slice.
+/// Whether a header has positions with a slice, or a first column without a name and ImageJ's measurements.
 pub(crate) fn is_results_header(names: &[&str]) -> bool {
     let has = |name: &str| names.contains(&name);
     let measured = MEASUREMENTS.iter().any(|name| has(name));
@@ -283,18 +264,18 @@ pub(crate) fn read_results<'a>(
     document: &'a Document,
     table: &'a DelimitedTable,
     row: &TextRow,
-) -> Result<TrackFile<'a>, ImportError> {
-    let at = |name: &str| row.cells.iter().position(|cell| cell == name);
+) -> ImportResult<TrackFile<'a>> {
+    let at = |name: &str| row.position(name);
     let frame = clock_column(table, row)?;
     let Some([x, y]) = POSITIONS.iter().find_map(|[x, y]| Some([at(x)?, at(y)?])) else {
         let advice = "tick `Centroid` and `Stack position` in Analyze > Set Measurements and measure again";
-        return Err(header_error(
+        return refuse_header(
             table,
             row,
-            "a Results table without X and Y".to_owned(),
+            "a Results table without X and Y",
             "the columns X, Y and Slice",
             advice,
-        ));
+        );
     };
     let key = match at(COUNTER) {
         Some(counter) if column_varies(table, counter)? => vec![counter],
@@ -312,37 +293,34 @@ pub(crate) fn read_results<'a>(
         ..TableLayout::default()
     };
     if at("Label") == Some(0) {
-        table.refuse_comment_names(
-            row.line,
-            "a label",
-            "rename the image, or untick `Display label` in Analyze > Set Measurements, and measure again",
-        )?;
+        let advice =
+            "rename the image, or untick `Display label` in Analyze > Set Measurements, and measure again";
+        table.refuse_comment_names(row.line, "a label", advice)?;
     }
     let counted = !layout.key.is_empty();
-    let mut export = layout
-        .read_tracks(document, table, imagej_facts())
-        .map_err(|error| several_points_error(error, counted))?;
+    let export = layout.read_tracks(document, table, imagej_facts());
+    let mut export = export.map_err(|error| several_points_error(error, counted))?;
     if counted {
         export.notes.push("the tracks are the counters of the multi-point tool".to_owned());
     }
     Ok(export)
 }
 
-/// The slice, or the frame of a hyperstack: of two the one that counts up.
-fn clock_column(table: &DelimitedTable, row: &TextRow) -> Result<usize, ImportError> {
-    let at = |name: &str| row.cells.iter().position(|cell| cell == name);
+/// The column of the slice, or of the frame in a hyperstack. Of both, the one that changes.
+fn clock_column(table: &DelimitedTable, row: &TextRow) -> ImportResult<usize> {
+    let at = |name: &str| row.position(name);
     match (at(SLICE), at(FRAME)) {
         (Some(slice), Some(frame)) => match (column_varies(table, slice)?, column_varies(table, frame)?) {
             (true, true) => {
                 let advice = "the table mixes depths and times: keep the rows of one depth, or say which \
                     column counts: --columns frame=Frame,tip-x=X,tip-y=Y";
-                Err(header_error(
+                refuse_header(
                     table,
                     row,
-                    "a table in which both Slice and Frame change".to_owned(),
+                    "a table in which both Slice and Frame change",
                     "one of them to count the frames",
                     advice,
-                ))
+                )
             }
             (true, false) => Ok(slice),
             _ => Ok(frame),
@@ -350,19 +328,19 @@ fn clock_column(table: &DelimitedTable, row: &TextRow) -> Result<usize, ImportEr
         (Some(one), None) | (None, Some(one)) => Ok(one),
         (None, None) => {
             let advice = "tick `Stack position` in Analyze > Set Measurements and measure again";
-            Err(header_error(
+            refuse_header(
                 table,
                 row,
-                "a Results table without Slice".to_owned(),
+                "a Results table without Slice",
                 "a column that says in which slice a point was measured",
                 advice,
-            ))
+            )
         }
     }
 }
 
-/// Whether a column has more than one text in it.
-fn column_varies(table: &DelimitedTable, cell: usize) -> Result<bool, ImportError> {
+/// Whether a column has different texts.
+fn column_varies(table: &DelimitedTable, cell: usize) -> ImportResult<bool> {
     let mut rows = table.rows(1);
     let mut first: Option<String> = None;
     while let Some(record) = rows.next_row()? {
@@ -376,7 +354,7 @@ fn column_varies(table: &DelimitedTable, cell: usize) -> Result<bool, ImportErro
     Ok(false)
 }
 
-/// Several points in a slice: the table does not say which of them is which.
+/// Explains several points in a slice, which the table does not tell apart.
 fn several_points_error(error: ImportError, counted: bool) -> ImportError {
     let ImportError::DuplicateRow { place, found, first, .. } = error else { return error };
     let of = if counted { " and counter" } else { "" };

@@ -1,28 +1,28 @@
-//! Kinovea: trajectories as CSV and as TXT, and the tables of its kinematics windows. Its own files (`.kva`)
-//! and its chronometers are refused with the export that has the positions.
+//! Kinovea: trajectories as CSV and as TXT, and the tables of its kinematics windows. Projects (`.kva`) and tables of
+//! chronometers are refused with advice on the export that has the positions.
 
 mod text;
 
 use super::FileFormat;
 use super::generic::GenericFormat;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
-    CellNumber, Column, DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow, TimeUnit,
-    TrackFile, new_finding,
+    CellNumber, DelimitedTable, Document, Facts, TableLayout, TextRow, TimeUnit, TrackFile, layout,
+    new_finding,
 };
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use text::TITLE;
 
 /// Root of a project.
 const PROJECT: &str = "<KinoveaVideoAnalysis";
-/// Characters at the start of a file in which the root of a project stands.
+/// Characters at the start of a file in which the root of a project is searched.
 const PROJECT_START_CHARACTERS: usize = 1000;
 /// First column of the trajectories, in every language of the program.
 const TIME: &str = "Time";
 /// Ends of the column names of a point.
 const AXES: [&str; 2] = ["/X", "/Y"];
-/// Key of the only point of a plain track.
+/// Name of the only point of a plain track.
 const PLAIN_TRACK_KEY: &str = "0";
 /// Ends of the row names of chronometers.
 const CHRONOMETER: [&str; 2] = ["(Cumulative)", "(Duration)"];
@@ -42,8 +42,7 @@ impl FileFormat for Kinovea {
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
-        let line =
-            document.table.as_ref().ok().and_then(|table| table.head.first()).map_or(1, |row| row.line);
+        let line = document.table.as_ref().map_or(1, DelimitedTable::first_line);
         Some(match file_kind(document)? {
             KinoveaFileKind::Project => format!("it starts with `{PROJECT}`"),
             KinoveaFileKind::Text => format!("line 1 starts with `{TITLE}`"),
@@ -58,28 +57,24 @@ impl FileFormat for Kinovea {
         })
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         match file_kind(document) {
             Some(KinoveaFileKind::Project) => {
-                Err(no_positions_error(document.file.to_owned(), "a Kinovea project (.kva)", EXPORT_MENU))
+                Err(no_positions_error(document.file, "a Kinovea project (.kva)"))
             }
             Some(KinoveaFileKind::Text) => text::read_text_export(document),
             Some(KinoveaFileKind::Trajectories) => read_trajectories(document, document.table()?),
             Some(KinoveaFileKind::Window) => read_window(document, document.table()?, options),
             Some(KinoveaFileKind::Chronometer) => {
-                let place = document.table()?.location(1, 1).to_string();
-                Err(no_positions_error(place, "the durations of Kinovea's chronometers", EXPORT_MENU))
+                let place = document.table()?.location(1, 1);
+                Err(no_positions_error(place, "the durations of Kinovea's chronometers"))
             }
             None => Err(unknown_table_error(document.table()?)),
         }
     }
 }
 
-/// Whether a file is a table of the kinematics windows, which is read with `--columns`.
+/// Whether a file is a table of the kinematics windows, which needs `--columns`.
 pub(crate) fn is_window(document: &Document) -> bool {
     matches!(file_kind(document), Some(KinoveaFileKind::Window))
 }
@@ -98,69 +93,49 @@ fn file_kind(document: &Document) -> Option<KinoveaFileKind> {
     if names.first() == Some(&TIME) && names.windows(2).any(pair) {
         return Some(KinoveaFileKind::Trajectories);
     }
-    let chronometer = |row: &TextRow| {
-        row.cells.first().is_some_and(|cell| CHRONOMETER.iter().any(|end| cell.ends_with(end)))
-    };
+    let chronometer = |row: &TextRow| CHRONOMETER.iter().any(|end| row.first_cell().ends_with(end));
     if names.first() == Some(&"") && table.head.get(1).is_some_and(chronometer) {
         return Some(KinoveaFileKind::Chronometer);
     }
     is_window_header(table, &names).then_some(KinoveaFileKind::Window)
 }
 
-fn no_positions_error(place: String, found: &str, advice: &str) -> ImportError {
-    let expected = "the positions of tracked points over time".to_owned();
-    ImportError::wrong_table(place, found, expected, advice)
+fn no_positions_error(place: impl std::fmt::Display, found: &str) -> ImportError {
+    ImportError::wrong_table(place, found, "the positions of tracked points over time", EXPORT_MENU)
 }
 
 fn unknown_table_error(table: &DelimitedTable) -> ImportError {
-    let first = table.head.first().map(TextRow::texts).unwrap_or_default();
-    ImportError::columns(
-        table.file,
-        table.head.first().map_or(1, |row| row.line),
-        format!(
-            "found `{}`, expected `{TIME}` and pairs of columns called NAME/POINT/X and NAME/POINT/Y",
-            first.join(" | ")
-        ),
-        format!("{EXPORT_MENU}, or leave --format out"),
-    )
+    let problem = format!(
+        "found `{}`, expected `{TIME}` and pairs of columns called NAME/POINT/X and NAME/POINT/Y",
+        table.first_texts().join(" | ")
+    );
+    let advice = format!("{EXPORT_MENU}, or leave --format out");
+    ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-/// Rows are frames of all tracks; a track without a position in one has empty cells there.
-fn read_trajectories<'a>(
-    document: &'a Document,
-    table: &'a DelimitedTable,
-) -> Result<TrackFile<'a>, ImportError> {
+/// Reads the CSV of the trajectories: a row a frame, with empty cells where a track has no position.
+fn read_trajectories<'a>(document: &'a Document, table: &'a DelimitedTable) -> ImportResult<TrackFile<'a>> {
     let Some(header) = table.head.first() else { return Err(unknown_table_error(table)) };
     let names: Vec<&str> = header.texts().into_iter().take(header.used_width()).collect();
-    let mut points = vec![];
-    let mut rest = names.iter().enumerate().skip(1);
-    while let Some((column, name)) = rest.next() {
-        let track = name.strip_suffix(AXES[0]);
-        let pair = rest.next().and_then(|(_, name)| name.strip_suffix(AXES[1]));
-        let Some(track) = track.filter(|track| pair == Some(*track)) else {
-            return Err(unpaired_column_error(table, header, column, name));
-        };
-        points.push(PointCells::new(track_name(track), column, Some(column + 1)));
-    }
+    let points = layout::read_point_pairs(&names, 1, AXES, track_name).map_err(|column| {
+        ImportError::wrong_table(
+            table.cell_location(header.line, column),
+            format!("the column `{}`", names[column]),
+            "columns in pairs called NAME/POINT/X and NAME/POINT/Y",
+            "export again without changing the columns, or name them with --columns",
+        )
+    })?;
     let start = table.first_numeric_row(1, &[0]).unwrap_or(1);
     if let Some(row) = table.head.get(1).filter(|_| start > 1) {
-        let cell = row.cells.first().map_or("", String::as_str);
-        return Err(table.not_a_number_error(row.line, 0, cell, "time"));
+        return Err(table.not_a_number_error(row.line, 0, row.first_cell(), "time"));
     }
-    let layout = TableLayout {
-        start,
-        width: names.len(),
-        most: names.len(),
-        time: Some(0),
-        points,
-        ..TableLayout::default()
-    };
+    let layout = TableLayout { time: Some(0), ..TableLayout::new(start, names.len(), points) };
     let mut export = layout.read_tracks(document, table, kinovea_facts())?;
     export.notes.push(PREFERENCES_NOTE.to_owned());
     Ok(export)
 }
 
-/// A plain track is called by its name, a point of an object by both.
+/// The name of a plain track, or of an object and its point.
 fn track_name(path: &str) -> &str {
     match path.rsplit_once('/') {
         Some((name, PLAIN_TRACK_KEY)) if !name.is_empty() => name,
@@ -168,22 +143,11 @@ fn track_name(path: &str) -> &str {
     }
 }
 
-fn unpaired_column_error(table: &DelimitedTable, header: &TextRow, column: usize, name: &str) -> ImportError {
-    ImportError::wrong_table(
-        table.location(header.line, table.text_column(header.line, column)),
-        format!("the column `{name}`"),
-        "columns in pairs called NAME/POINT/X and NAME/POINT/Y",
-        "export again without changing the columns, or name them with --columns",
-    )
-}
+/// The export that has the positions.
+const EXPORT_MENU: &str = "in Kinovea use File > Export and there the CSV of the trajectories";
 
-// What Kinovea's files leave to its preferences, and the export that has everything.
-
-/// The export that has everything.
-pub(crate) const EXPORT_MENU: &str = "in Kinovea use File > Export and there the CSV of the trajectories";
-
-/// What Kinovea's preferences decide and none of its tables says.
-pub(crate) const PREFERENCES_NOTE: &str = "Kinovea writes times in the unit of its preferences, and positions \
+/// Note on what Kinovea's preferences decide and its tables do not say.
+const PREFERENCES_NOTE: &str = "Kinovea writes times in the unit of its preferences, and positions \
     with y up in the calibrated unit or, if its preferences say so, in image pixels with y down; the file \
     does not say which";
 
@@ -191,27 +155,21 @@ pub(crate) fn kinovea_facts() -> Facts {
     Facts { time: TimeUnit::Unknown, ..Facts::default() }
 }
 
-// Tables of Kinovea's kinematics windows: filtered, one column a series, times rounded to whole
-// milliseconds.
+// Tables of Kinovea's kinematics windows: one filtered series a column, times in whole milliseconds.
 
-/// End of the first column's name, in every language of the program.
+/// End of the first column's name in every language of the program.
 const MILLISECONDS: &str = "(ms)";
-/// Seconds in a millisecond.
-const MILLI: f64 = 1e-3;
-/// Rate above which samples share a millisecond, and the later one replaces the earlier, frames/s.
+/// Rate, frames/s, above which samples share a millisecond, so that only the last of them is written.
 const HIGHEST_RATE_HZ: f64 = 1000.0;
-/// Short names of a time that other programs use.
+/// Names of times of other programs.
 const OTHER_TIME_NAMES: [&str; 2] = ["t", "T"];
 
-/// Whether a table has a time in whole milliseconds and series that are called like tracks, not like
-/// coordinates.
+/// Whether a table has times in whole milliseconds, and series whose names are not those of coordinates.
 pub(crate) fn is_window_header(table: &DelimitedTable, names: &[&str]) -> bool {
     let Some((time, series)) = names.split_first() else { return false };
-    let of_time = time
-        .strip_suffix(MILLISECONDS)
-        .map(str::trim)
-        .is_some_and(|word| !word.is_empty() && !OTHER_TIME_NAMES.contains(&word));
-    let text = |name: &&str| matches!(table.parse_cell(name), CellNumber::Text);
+    let word = time.strip_suffix(MILLISECONDS).map(str::trim);
+    let of_time = word.is_some_and(|word| !word.is_empty() && !OTHER_TIME_NAMES.contains(&word));
+    let text = |name: &&str| table.parse_cell(name) == CellNumber::Text;
     of_time
         && !series.is_empty()
         && series.iter().all(|name| text(name) && !is_coordinate(name))
@@ -219,7 +177,7 @@ pub(crate) fn is_window_header(table: &DelimitedTable, names: &[&str]) -> bool {
         && is_whole_column(table, 0)
 }
 
-/// `tipX` next to `tipY`: coordinates, with any other text in the names.
+/// Whether two names differ only in x and y, as `tipX` and `tipY`.
 fn has_coordinate_pair(series: &[&str]) -> bool {
     let names: Vec<String> = series.iter().map(|name| name.to_lowercase()).collect();
     names.iter().any(|name| name.contains('x') && names.contains(&name.replace('x', "y")))
@@ -231,12 +189,12 @@ fn is_coordinate(name: &str) -> bool {
         .any(|word| matches!(word, "x" | "y" | "z" | "px" | "py" | "frame"))
 }
 
-/// The file does not say what its series are, so the user has to.
+/// Reads a table of the kinematics windows with `--columns`, because it does not say what its series are.
 pub(crate) fn read_window<'a>(
     document: &'a Document<'a>,
     table: &DelimitedTable,
     options: &ImportOptions,
-) -> Result<TrackFile<'a>, ImportError> {
+) -> ImportResult<TrackFile<'a>> {
     if options.columns.is_none() {
         return Err(unnamed_window_error(table));
     }
@@ -244,43 +202,36 @@ pub(crate) fn read_window<'a>(
         return Err(samples_lost_error(table, rate));
     }
     let mut export = GenericFormat.read(document, options)?;
-    export.facts.time = TimeUnit::Seconds(MILLI);
-    export.findings.push(new_finding(
-        Check::Filtered,
-        Severity::Caution,
-        (0.0, ""),
-        format!(
-            "{}: Kinovea's kinematics windows write positions after a low-pass filter of its own choice",
-            document.file
-        ),
-        "components near and above its cut-off are weakened; export the trajectories instead (File > Export)",
-    ));
+    export.facts.time = TimeUnit::Seconds(1e-3);
+    let found = format!(
+        "{}: Kinovea's kinematics windows write positions after a low-pass filter of its own choice",
+        document.file
+    );
+    let advice =
+        "components near and above its cut-off are weakened; export the trajectories instead (File > Export)";
+    export.findings.push(new_finding(Check::Filtered, Severity::Caution, (0.0, ""), found, advice));
     let lost = lost_samples_finding(&export).filter(|_| options.frame_rate_hz.is_none());
     export.findings.extend(lost);
     Ok(export)
 }
 
 fn unnamed_window_error(table: &DelimitedTable) -> ImportError {
-    let header = table.head.first();
-    let names = header.map(TextRow::texts).unwrap_or_default();
-    ImportError::wrong_table(
-        table.location(header.map_or(1, |row| row.line), 1),
-        format!(
-            "a table of Kinovea's kinematics windows ({}): filtered, and without a word on whether its \
-             series are x, y or speeds",
-            names.join(", ")
-        ),
-        "positions as x and y",
-        format!(
-            "{EXPORT_MENU}; if these are positions along the sweep and nothing else is left, say so: --columns \
-             time-ms=1,tip-x=2,..."
-        ),
-    )
+    let found = format!(
+        "a table of Kinovea's kinematics windows ({}): filtered, and without a word on whether its series are x, y \
+         or speeds",
+        table.first_texts().join(", ")
+    );
+    let advice = format!(
+        "{EXPORT_MENU}; if these are positions along the sweep and nothing else is left, say so: --columns \
+         time-ms=1,tip-x=2,..."
+    );
+    let place = table.location(table.first_line(), 1);
+    ImportError::wrong_table(place, found, "positions as x and y", advice)
 }
 
 fn samples_lost_error(table: &DelimitedTable, rate_hz: f64) -> ImportError {
     ImportError::wrong_table(
-        table.location(table.head.first().map_or(1, |row| row.line), 1),
+        table.location(table.first_line(), 1),
         format!(
             "times in whole milliseconds for {rate_hz} frames/s: Kinovea's kinematics windows keep one \
              sample a millisecond and drop the others"
@@ -290,23 +241,18 @@ fn samples_lost_error(table: &DelimitedTable, rate_hz: f64) -> ImportError {
     )
 }
 
-/// Rows at every millisecond are those of 1000 frames/s, or of a faster camera with samples dropped.
+/// The finding on a row every millisecond: the camera ran at 1000 frames/s, or faster and samples are lost.
 fn lost_samples_finding(export: &TrackFile) -> Option<QualityFinding> {
-    let times: Vec<f64> = export.clocks.first()?.time.iter().flat_map(Column::iter).flatten().collect();
+    let times = export.clocks.first()?.times();
     let every = times.len() > 1 && times.windows(2).all(|pair| pair[1] - pair[0] == 1.0);
-    every.then(|| {
-        new_finding(
-            Check::SamplesLost,
-            Severity::Serious,
-            (HIGHEST_RATE_HZ, "1/s"),
-            format!(
-                "{}: a row every millisecond: a camera faster than 1000 frames/s has lost samples in \
-                this table",
-                export.file
-            ),
-            "export the trajectories instead (File > Export), unless the camera recorded at 1000 frames/s",
-        )
-    })
+    let found = format!(
+        "{}: a row every millisecond: a camera faster than 1000 frames/s has lost samples in this table",
+        export.file
+    );
+    let advice =
+        "export the trajectories instead (File > Export), unless the camera recorded at 1000 frames/s";
+    let value = (HIGHEST_RATE_HZ, "1/s");
+    every.then(|| new_finding(Check::SamplesLost, Severity::Serious, value, found, advice))
 }
 
 /// Whether every cell is a whole number.

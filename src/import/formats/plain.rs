@@ -1,30 +1,27 @@
-//! Plain tables whose header names everything: a clock and the coordinates of points, as scripts write them.
+//! Plain tables, as scripts write them, whose header names a clock and the coordinates of points.
 
 mod header;
 
 use super::FileFormat;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::ImportOptions;
 use crate::import::reader::layout;
 use crate::import::reader::layout::ClockCell;
 use crate::import::reader::{
-    CellNumber, CoordinateUnit, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow,
-    TimeUnit, TrackFile,
+    CoordinateUnit, DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow, TimeUnit,
+    TrackFile,
 };
 use header::ColumnMeaning;
 
-/// Its name on the command line.
 pub(crate) const PLAIN_NAME: &str = "plain";
 /// Rows above the data that may hold the names.
 const HEADER_ROWS: usize = 6;
-/// What a table with doubtful names needs.
 const ADVICE: &str = "say which columns are meant by their numbers (from 1): --columns frame=A,tip-x=B,tip-y=C,head-x=D,head-y=E \
      with numbers for A to E";
 
-/// Columns of the frames' numbers, and of their times with the unit.
+/// Column of the frame numbers, and column and unit of the times.
 type ClockColumns = (Option<usize>, Option<(usize, TimeUnit)>);
 
-/// Plain tables with a telling header.
 pub(crate) struct PlainFormat;
 
 impl FileFormat for PlainFormat {
@@ -37,11 +34,7 @@ impl FileFormat for PlainFormat {
         Some(format!("line {} names a clock and coordinates", header.row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
         let header = PlainHeader::find(table).ok_or_else(|| no_header_error(table))?;
         let (frame, time) = header.clock_columns()?;
@@ -56,11 +49,8 @@ impl FileFormat for PlainFormat {
         };
         let key: Vec<usize> = key.into_iter().collect();
         if key == [0] {
-            table.refuse_comment_names(
-                header.row.line,
-                "the name of an object",
-                "rename it; if the line is a comment, move it above the header",
-            )?;
+            let advice = "rename it; if the line is a comment, move it above the header";
+            table.refuse_comment_names(header.row.line, "the name of an object", advice)?;
         }
         let name = |mut point: PointCells| {
             if point.name.is_empty() && key.is_empty() {
@@ -68,9 +58,12 @@ impl FileFormat for PlainFormat {
             }
             point
         };
+        let of_points =
+            points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied().chain(point.confidence));
+        let last = of_points.chain(frame).chain(time.map(|time| time.0)).max();
         let layout = TableLayout {
             start,
-            width: header.min_row_width(&points, [frame, time.map(|time| time.0)]),
+            width: last.map_or(0, |last| last + 1),
             most: header.row.used_width(),
             frame,
             time: time.map(|time| time.0),
@@ -102,60 +95,49 @@ impl<'t> PlainHeader<'t> {
     /// The first row that names a clock and a coordinate.
     fn find(table: &'t DelimitedTable) -> Option<Self> {
         table.head.iter().take(HEADER_ROWS).enumerate().find_map(|(index, row)| {
-            let meanings: Vec<ColumnMeaning> =
-                row.cells.iter().map(|cell| ColumnMeaning::parse(cell)).collect();
-            let clock = meanings
-                .iter()
-                .any(|meaning| matches!(meaning, ColumnMeaning::Frame | ColumnMeaning::Time(_)));
-            let coordinate =
-                meanings.iter().any(|meaning| matches!(meaning, ColumnMeaning::Coordinate { .. }));
+            let meanings: Vec<_> = row.cells.iter().map(|cell| ColumnMeaning::parse(cell)).collect();
+            let clock = meanings.iter().any(|m| matches!(m, ColumnMeaning::Frame | ColumnMeaning::Time(_)));
+            let coordinate = meanings.iter().any(|m| matches!(m, ColumnMeaning::Coordinate { .. }));
             (clock && coordinate)
                 .then_some(Self { file: table.file, index, row, meanings, units: None }.with_units(table))
         })
     }
 
-    /// Units that stand in a row of their own below the names.
+    /// Takes the units from a row of their own below the names, if there is one.
     fn with_units(mut self, table: &'t DelimitedTable) -> Self {
-        let words = |row: &&TextRow| {
-            row.cells.iter().all(|cell| !matches!(table.parse_cell(cell), CellNumber::Value(_)))
-        };
+        let words = |row: &&TextRow| !row.cells.iter().any(|cell| table.is_value(cell));
         let Some(row) = table.head.get(self.index + 1).filter(words) else { return self };
-        let taken = self
-            .meanings
-            .iter_mut()
-            .zip(&row.cells)
-            .filter_map(|(meaning, cell)| meaning.take_unit(cell).then_some(()))
-            .count();
-        self.units = Some(row).filter(|_| taken > 0);
+        for (meaning, cell) in self.meanings.iter_mut().zip(&row.cells) {
+            if meaning.take_unit(cell) {
+                self.units = Some(row);
+            }
+        }
         self
     }
 
-    /// The columns that mean what is wanted.
+    /// The columns of the wanted meaning.
     fn columns_where(&self, wanted: impl Fn(&ColumnMeaning) -> bool) -> Vec<usize> {
         self.meanings.iter().enumerate().filter(|(_, meaning)| wanted(meaning)).map(|(at, _)| at).collect()
     }
 
-    /// The only column that means what is wanted, if any does.
+    /// The only column of the wanted meaning, if there is one; refuses several.
     fn only_column(
         &self,
         wanted: impl Fn(&ColumnMeaning) -> bool,
         what: &str,
-    ) -> Result<Option<usize>, ImportError> {
+    ) -> ImportResult<Option<usize>> {
         let found = self.columns_where(wanted);
         if found.len() > 1 { Err(self.ambiguous_error(&found, what)) } else { Ok(found.first().copied()) }
     }
 
-    /// The columns of frames and of times. Times in several units are the same times, which
-    /// [`Self::compare_times`] makes sure of: the first column counts.
-    fn clock_columns(&self) -> Result<ClockColumns, ImportError> {
+    /// The columns of frames and of times. The first of several columns of times counts: [`Self::compare_times`]
+    /// refuses columns that differ.
+    fn clock_columns(&self) -> ImportResult<ClockColumns> {
         let frame = self.only_column(|meaning| *meaning == ColumnMeaning::Frame, "numbers of the frames")?;
         let times = self.columns_where(|meaning| matches!(meaning, ColumnMeaning::Time(_)));
-        let unit = |at: usize| {
-            if let Some(ColumnMeaning::Time(unit)) = self.meanings.get(at) {
-                *unit
-            } else {
-                TimeUnit::AssumedSeconds
-            }
+        let unit = |at: usize| match self.meanings.get(at) {
+            Some(ColumnMeaning::Time(unit)) => *unit,
+            _ => TimeUnit::AssumedSeconds,
         };
         let doubtful = |at: &usize| {
             times.iter().any(|other| {
@@ -168,8 +150,8 @@ impl<'t> PlainHeader<'t> {
         Ok((frame, times.first().map(|&at| (at, unit(at)))))
     }
 
-    /// Refuses times in several units that are not the same times.
-    fn compare_times(&self, table: &DelimitedTable, start: usize) -> Result<(), ImportError> {
+    /// Refuses columns of times that differ in a row.
+    fn compare_times(&self, table: &DelimitedTable, start: usize) -> ImportResult<()> {
         let clock = |(cell, meaning): (usize, &ColumnMeaning)| match meaning {
             ColumnMeaning::Time(TimeUnit::Seconds(unit)) => Some(ClockCell { cell, unit: *unit }),
             ColumnMeaning::Time(_) => Some(ClockCell { cell, unit: 1.0 }),
@@ -179,22 +161,18 @@ impl<'t> PlainHeader<'t> {
         let [first, others @ ..] = clocks.as_slice() else { return Ok(()) };
         for other in others {
             if let Some(found) = layout::find_clock_difference(table, start, *first, *other)? {
-                let place = table.location(found.line, table.text_column(found.line, found.cell));
+                let place = table.cell_location(found.line, found.cell);
                 let [one, two] = &found.texts;
                 let (first, other) = (self.column_name(first.cell), self.column_name(other.cell));
-                return Err(ImportError::format(
-                    place,
-                    format!("`{two}` in `{other}` where `{first}` says `{one}`"),
-                    "one time of a row in both",
-                    ADVICE,
-                ));
+                let found = format!("`{two}` in `{other}` where `{first}` says `{one}`");
+                return Err(ImportError::format(place, found, "one time of a row in both", ADVICE));
             }
         }
         Ok(())
     }
 
-    /// Every named point with its cells.
-    fn all_point_cells(&self) -> Result<Vec<PointCells>, ImportError> {
+    /// The cells of every point that the columns name.
+    fn all_point_cells(&self) -> ImportResult<Vec<PointCells>> {
         let mut names: Vec<&str> = vec![];
         for meaning in &self.meanings {
             if let ColumnMeaning::Coordinate { point, .. } = meaning
@@ -206,7 +184,7 @@ impl<'t> PlainHeader<'t> {
         names.into_iter().map(|name| self.point_cells(name)).collect()
     }
 
-    fn point_cells(&self, name: &str) -> Result<PointCells, ImportError> {
+    fn point_cells(&self, name: &str) -> ImportResult<PointCells> {
         let called = if name.is_empty() { String::new() } else { format!(" of `{name}`") };
         let axis = |wanted: usize, letter: &str| {
             let is = |meaning: &ColumnMeaning| match meaning {
@@ -227,70 +205,44 @@ impl<'t> PlainHeader<'t> {
     }
 
     /// The unit that all coordinates name.
-    fn coordinate_unit(&self) -> Result<Option<(CoordinateUnit, String)>, ImportError> {
-        let units: Vec<(usize, Option<CoordinateUnit>)> = self
-            .meanings
-            .iter()
-            .enumerate()
-            .filter_map(|(at, meaning)| {
-                if let ColumnMeaning::Coordinate { unit, .. } = meaning { Some((at, *unit)) } else { None }
-            })
-            .collect();
-        let Some((first, unit)) = units.first().copied() else { return Ok(None) };
-        match units.iter().find(|(_, other)| *other != unit) {
-            Some((other, _)) => {
-                Err(self.ambiguous_error(&[first, *other], "coordinates, in different units"))
-            }
+    fn coordinate_unit(&self) -> ImportResult<Option<(CoordinateUnit, String)>> {
+        let mut units = self.meanings.iter().enumerate().filter_map(|(at, meaning)| match meaning {
+            ColumnMeaning::Coordinate { unit, .. } => Some((at, *unit)),
+            _ => None,
+        });
+        let Some((first, unit)) = units.next() else { return Ok(None) };
+        match units.find(|(_, other)| *other != unit) {
+            Some((other, _)) => Err(self.ambiguous_error(&[first, other], "coordinates, in different units")),
             None => Ok(unit.map(|unit| (unit, self.unit_source(first)))),
         }
     }
 
-    /// Where the unit of a column stands.
+    /// Source of a column's unit, in words.
     fn unit_source(&self, at: usize) -> String {
-        match self
-            .units
-            .and_then(|row| Some((row.line, row.cells.get(at)?)))
-            .filter(|_| ColumnMeaning::parse(self.column_name(at)) != self.meanings[at])
-        {
-            Some((line, unit)) => {
-                format!("line {line} gives `{unit}` for column {} (`{}`)", at + 1, self.column_name(at))
-            }
-            None => format!("column {} is called `{}`", at + 1, self.column_name(at)),
+        let (number, name) = (at + 1, self.column_name(at));
+        let below = self.units.and_then(|row| Some((row.line, row.cells.get(at)?)));
+        match below.filter(|_| ColumnMeaning::parse(name) != self.meanings[at]) {
+            Some((line, unit)) => format!("line {line} gives `{unit}` for column {number} (`{name}`)"),
+            None => format!("column {number} is called `{name}`"),
         }
     }
 
     fn column_name(&self, at: usize) -> &str {
-        self.row.cells.get(at).map_or("", String::as_str)
+        self.row.cell(at)
     }
 
-    /// The first row of numbers; a row of units may stand above it.
-    fn first_data_row(&self, table: &DelimitedTable) -> Result<usize, ImportError> {
+    /// Index of the first row of numbers: a row without any below the names is skipped.
+    fn first_data_row(&self, table: &DelimitedTable) -> ImportResult<usize> {
         let below = self.index + 1;
-        let words = |row: &TextRow| {
-            row.cells.iter().all(|cell| !matches!(table.parse_cell(cell), CellNumber::Value(_)))
-        };
-        match table.head.get(below) {
-            None => Err(ImportError::HeaderOnly { file: table.file.to_owned(), line: self.row.line }),
-            Some(row) if words(row) && table.head.len() > below + 1 => Ok(below + 1),
-            Some(_) => Ok(below),
-        }
+        let row = table.head.get(below).ok_or_else(|| ImportError::header_only(table.file, self.row.line))?;
+        let words = !row.cells.iter().any(|cell| table.is_value(cell));
+        Ok(if words && table.head.len() > below + 1 { below + 1 } else { below })
     }
 
-    /// Cells that every row must have.
-    fn min_row_width(&self, points: &[PointCells], clock: [Option<usize>; 2]) -> usize {
-        let of_points =
-            points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied().chain(point.confidence));
-        of_points.chain(clock.into_iter().flatten()).max().map_or(0, |last| last + 1)
-    }
-
-    /// Which columns were read, and which were not.
+    /// Note on the columns that were read and those that were not.
     fn column_notes(&self, layout: &TableLayout) -> Vec<String> {
-        let clock: Vec<String> = layout
-            .frame
-            .iter()
-            .chain(&layout.time)
-            .map(|&at| format!("`{}`", self.column_name(at)))
-            .collect();
+        let clock = layout.frame.iter().chain(&layout.time);
+        let clock: Vec<String> = clock.map(|&at| format!("`{}`", self.column_name(at))).collect();
         let units = match self.units {
             Some(row) => format!("; line {} names the units", row.line),
             None if layout.start > self.index + 1 => {
@@ -298,12 +250,8 @@ impl<'t> PlainHeader<'t> {
             }
             None => String::new(),
         };
-        let other: Vec<&str> = self
-            .columns_where(|meaning| *meaning == ColumnMeaning::Other)
-            .into_iter()
-            .map(|at| self.column_name(at))
-            .filter(|name| !name.is_empty())
-            .collect();
+        let other = self.columns_where(|meaning| *meaning == ColumnMeaning::Other).into_iter();
+        let other: Vec<&str> = other.map(|at| self.column_name(at)).filter(|name| !name.is_empty()).collect();
         let other =
             if other.is_empty() { String::new() } else { format!("; not read: {}", other.join(", ")) };
         vec![format!("the rows are placed by {}{units}{other}", clock.join(" and "))]
@@ -321,15 +269,10 @@ impl<'t> PlainHeader<'t> {
 }
 
 fn no_header_error(table: &DelimitedTable) -> ImportError {
-    let row = table.head.first();
-    ImportError::columns(
-        table.file,
-        row.map_or(1, |row| row.line),
-        format!(
-            "found `{}` and no row that names the columns, expected a clock such as frame or time_s, and \
-             coordinates such as tip_x, tip_y",
-            row.map(TextRow::texts).unwrap_or_default().join(" ")
-        ),
-        ADVICE,
-    )
+    let problem = format!(
+        "found `{}` and no row that names the columns, expected a clock such as frame or time_s, and coordinates \
+         such as tip_x, tip_y",
+        table.first_texts().join(" ")
+    );
+    ImportError::columns(table.file, table.first_line(), problem, ADVICE)
 }

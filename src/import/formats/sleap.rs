@@ -1,7 +1,7 @@
 //! SLEAP: the analysis CSV and the tables of sleap-io with a row a point, an instance or a frame.
 
 use super::FileFormat;
-use crate::import::error::{ImportError, TextLocation};
+use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::options::ImportOptions;
 use crate::import::reader::findings::picked_frames_finding;
 use crate::import::reader::{
@@ -9,12 +9,12 @@ use crate::import::reader::{
     TextRow, Track, TrackCollector, TrackFile,
 };
 
-/// Between track and node in the key of a row of one point: no name has it.
+/// Separates track and node in the key of a row of one point; no name contains it.
 const SEPARATOR: char = '\u{1f}';
 const TRACK_FIRST: &str = "give every instance a track of its own in SLEAP (run the inference with a \
     tracker, or at most one instance), and export again";
 
-/// Tables of SLEAP and sleap-io; sleap-io's table in DeepLabCut's layout is DeepLabCut's.
+/// Tables of SLEAP and sleap-io, except those in DeepLabCut's layout.
 pub(crate) struct Sleap;
 
 impl FileFormat for Sleap {
@@ -31,14 +31,9 @@ impl FileFormat for Sleap {
             .then(|| format!("line {} names `{FRAME}` and coordinates of nodes as SLEAP does", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
-        let header =
-            table.head.first().ok_or_else(|| ImportError::Empty { file: document.file.to_owned() })?;
+        let header = table.head.first().ok_or_else(|| ImportError::empty(document.file))?;
         let columns = SleapColumns::find(table, header)?;
         table.refuse_comment_names(header.line, "a track or video", "rename it in SLEAP and export again")?;
         let mut collector = TrackCollector::new(columns.instance_shape());
@@ -56,19 +51,17 @@ impl FileFormat for Sleap {
             collector.finish(document.file, RowOrder::Any).map_err(duplicate_instance_error)?;
         match (columns.node, columns.slots.as_slice(), tracks.as_mut_slice()) {
             (Some(_), ..) => name_by_node(&mut tracks),
-            // the only node of the only instance is called by what it is
+            // (the only node of the only instance gives the name)
             (None, [InstanceColumns { nodes, .. }], [track]) if nodes.len() == 1 => {
                 track.name.clone_from(&nodes[0].name)
             }
             _ => {}
         }
-        // (a table of labels looks like one of predictions)
+        // (a table of labels has the same columns as one of predictions)
         let longest = clocks.iter().max_by_key(|clock| clock.len());
+        let finding = longest.and_then(|clock| picked_frames_finding(document.file, clock));
         Ok(TrackFile {
-            findings: longest
-                .and_then(|clock| picked_frames_finding(document.file, clock))
-                .into_iter()
-                .collect(),
+            findings: finding.into_iter().collect(),
             clocks,
             tracks,
             texts: header.cells.clone(),
@@ -83,33 +76,26 @@ fn facts() -> Facts {
     Facts::pixels_down("SLEAP writes image pixels, y downwards")
 }
 
-/// An instance of a row; one that has neither a track nor a position only fills the row.
+/// Reads an instance of a row. One with neither a track nor a position is skipped.
 fn read_instance(
     table: &DelimitedTable,
     record: &RowView,
     columns: &SleapColumns,
     slot: &InstanceColumns,
     collector: &mut TrackCollector,
-) -> Result<(), ImportError> {
-    let number =
-        |cell: Option<usize>, name: &str| cell.map_or(Ok(None), |cell| table.number_at(record, cell, name));
+) -> ImportResult<()> {
     let coordinate = |cell: usize, axis: &str, cells: &NodeCells| {
         // (its name is put together only for a refusal)
-        let named = |_| {
-            table.not_a_number_error(
-                record.line,
-                cell,
-                record.cell(cell),
-                format!("{}.{axis}", cells.name).trim_start_matches('.'),
-            )
-        };
-        table.number_at(record, cell, axis).map_err(named)
+        table.number_at(record, cell, axis).map_err(|_| {
+            let name = format!("{}.{axis}", cells.name);
+            table.not_a_number_error(record.line, cell, record.cell(cell), name.trim_start_matches('.'))
+        })
     };
-    let position = |cells: &NodeCells| -> Result<RowPosition, ImportError> {
+    let position = |cells: &NodeCells| -> ImportResult<RowPosition> {
         Ok(RowPosition {
             x: coordinate(cells.x, "x", cells)?,
             y: coordinate(cells.y, "y", cells)?,
-            confidence: number(cells.score, "score")?,
+            confidence: table.optional_number_at(record, cells.score, "score")?,
         })
     };
     let positions = slot.nodes.iter().map(position).collect::<Result<Vec<_>, _>>()?;
@@ -122,30 +108,21 @@ fn read_instance(
         return Ok(());
     }
     if track.is_empty() && columns.slots.len() > 1 {
-        return Err(untracked_error(
-            table.location(record.line, 1).to_string(),
-            "an instance without a track in a frame with others".to_owned(),
-        ));
+        let found = "an instance without a track in a frame with others";
+        return Err(untracked_error(table.location(record.line, 1), found));
     }
-    let key = columns
-        .node
-        .map_or_else(|| track.to_owned(), |node| format!("{track}{SEPARATOR}{}", record.cell(node)));
-    collector.add_row(
-        &key,
-        RowStamp { line: record.line, frame: number(Some(columns.frame), FRAME)?, time: None },
-        &positions,
-    );
+    let with_node = |node| format!("{track}{SEPARATOR}{}", record.cell(node));
+    let key = columns.node.map_or_else(|| track.to_owned(), with_node);
+    let frame = table.number_at(record, columns.frame, FRAME)?;
+    collector.add_row(&key, RowStamp { line: record.line, frame, time: None }, &positions);
     Ok(())
 }
 
-/// Tracks of a table with a row a point are called as those of the others: by their node, by their instance
-/// where that has one node only, or by both.
+/// Names the tracks of a table with a row a point: by their node, by their instance if it has only one node, or by
+/// both.
 fn name_by_node(tracks: &mut [Track]) {
-    let parts: Vec<(String, String)> = tracks
-        .iter()
-        .filter_map(|track| track.name.split_once(SEPARATOR))
-        .map(|(a, b)| (a.to_owned(), b.to_owned()))
-        .collect();
+    let parts = tracks.iter().filter_map(|track| track.name.split_once(SEPARATOR));
+    let parts: Vec<(String, String)> = parts.map(|(a, b)| (a.to_owned(), b.to_owned())).collect();
     let instances = parts.windows(2).any(|pair| pair[0].0 != pair[1].0);
     let nodes = parts.windows(2).any(|pair| pair[0].1 != pair[1].1);
     for (track, (instance, node)) in tracks.iter_mut().zip(&parts) {
@@ -157,30 +134,21 @@ fn name_by_node(tracks: &mut [Track]) {
     }
 }
 
-/// Two instances of one track, or of none, in one frame: which of them is which nobody can tell.
+/// Explains two instances of one track, or of none, in one frame, which cannot be told apart.
 fn duplicate_instance_error(error: ImportError) -> ImportError {
-    let ImportError::DuplicateRow { place: TextLocation { file, line, column }, found, track, first, .. } =
-        error
-    else {
-        return error;
-    };
+    let ImportError::DuplicateRow { place, found, track, first, .. } = error else { return error };
     let name = track.trim_matches(SEPARATOR).replace(SEPARATOR, ":");
     let whose = if track.is_empty() || track.starts_with(SEPARATOR) {
         "an instance without a track".to_owned()
     } else {
         format!("`{name}`")
     };
-    untracked_error(
-        TextLocation { file, line, column }.to_string(),
-        format!("frame {found} of {whose} a second time (first in line {first})"),
-    )
+    untracked_error(place, &format!("frame {found} of {whose} a second time (first in line {first})"))
 }
 
-fn untracked_error(place: String, found: String) -> ImportError {
+fn untracked_error(place: TextLocation, found: &str) -> ImportError {
     ImportError::wrong_table(place, found, "one instance of a track in a frame", TRACK_FIRST)
 }
-
-// Which columns of a table of SLEAP are what.
 
 /// Column of the frame numbers, from 0.
 pub(crate) const FRAME: &str = "frame_idx";
@@ -200,11 +168,11 @@ pub(crate) struct NodeCells {
     pub score: Option<usize>,
 }
 
-/// What says to which track an instance belongs.
+/// Source of the track of an instance.
 pub(crate) enum TrackSource {
     /// A cell of its row.
     Cell(usize),
-    /// The names of its columns.
+    /// The name in its columns.
     Name(String),
     Nobody,
 }
@@ -226,23 +194,25 @@ pub(crate) struct SleapColumns {
 }
 
 impl SleapColumns {
-    pub(crate) fn find(table: &DelimitedTable, header: &TextRow) -> Result<Self, ImportError> {
+    pub(crate) fn find(table: &DelimitedTable, header: &TextRow) -> ImportResult<Self> {
         let names = header.texts();
         let at = |name: &str| names.iter().position(|known| *known == name);
-        let refuse = |found: String, expected: &str| {
-            columns_error(table, header, format!("found {found}, expected {expected}"))
+        let refuse = |found: &str, expected: &str| {
+            let problem = format!("found {found}, expected {expected}");
+            ImportError::columns(table.file, header.line.max(1), problem, ADVICE)
         };
-        let frame = at(FRAME).ok_or_else(|| {
-            refuse(format!("the columns {}", join_names(&names)), "frame_idx and the coordinates of nodes")
-        })?;
+        let columns = format!("the columns {}", names[..names.len().min(12)].join(", "));
+        let frame = at(FRAME).ok_or_else(|| refuse(&columns, "frame_idx and the coordinates of nodes"))?;
         let (node, track) = (at(NODE), at(TRACK));
         let nodes = match (node, at("x"), at("y")) {
             (Some(_), Some(x), Some(y)) => vec![NodeCells { name: String::new(), x, y, score: at("score") }],
-            (Some(_), ..) => {
-                return Err(refuse(format!("the columns {}", join_names(&names)), "x and y of every node"));
-            }
-            _ => find_nodes(&names).map_err(|(found, expected)| refuse(found, &expected))?,
+            (Some(_), ..) => return Err(refuse(&columns, "x and y of every node")),
+            _ => find_nodes(&names)
+                .map_err(|name| refuse(&format!("the column {name}.x"), &format!("also {name}.y")))?,
         };
+        if nodes.is_empty() {
+            return Err(refuse(&columns, "NODE.x and NODE.y of every node"));
+        }
         let whose = |track: Option<usize>| track.map_or(TrackSource::Nobody, TrackSource::Cell);
         let slots = if node.is_some() || track.is_some() {
             vec![InstanceColumns { whose: whose(track), nodes }]
@@ -250,23 +220,15 @@ impl SleapColumns {
             find_instances(nodes, at)
         };
         if slots.len() > 1 && slots.iter().any(|slot| matches!(slot.whose, TrackSource::Nobody)) {
-            return Err(refuse(
-                "instances that are numbered again in every frame".to_owned(),
-                "the track of each",
-            ));
+            return Err(refuse("instances that are numbered again in every frame", "the track of each"));
         }
-        if slots.iter().any(|slot| {
-            slot.nodes.iter().map(|node| &node.name).ne(slots[0].nodes.iter().map(|node| &node.name))
-        }) {
-            return Err(refuse("instances with different nodes".to_owned(), "the same nodes in each"));
+        let node_names = |slot: &InstanceColumns| slot.nodes.iter().map(|node| node.name.clone()).collect();
+        let expected: Vec<String> = slots.first().map_or(vec![], node_names);
+        if slots.iter().any(|slot| node_names(slot) != expected) {
+            return Err(refuse("instances with different nodes", "the same nodes in each"));
         }
-        Ok(Self {
-            frame,
-            node,
-            slots,
-            video: VIDEO.iter().find_map(|name| at(name)),
-            cells: header.used_width(),
-        })
+        let (video, cells) = (VIDEO.iter().find_map(|name| at(name)), header.used_width());
+        Ok(Self { frame, node, slots, video, cells })
     }
 
     pub(crate) fn instance_shape(&self) -> InstanceFields {
@@ -285,13 +247,9 @@ impl SleapColumns {
         table: &DelimitedTable,
         record: &RowView,
         video: &mut Option<String>,
-    ) -> Result<(), ImportError> {
+    ) -> ImportResult<()> {
         if record.len() < self.cells || record.used_width() > self.cells {
-            return Err(ImportError::Ragged {
-                place: table.location(record.line, 1),
-                found: record.len(),
-                expected: self.cells,
-            });
+            return Err(table.ragged_error(record.line, record.len(), self.cells));
         }
         let Some(cell) = self.video else { return Ok(()) };
         let (known, found) = (video.get_or_insert_with(|| record.cell(cell).to_owned()), record.cell(cell));
@@ -299,7 +257,7 @@ impl SleapColumns {
             return Ok(());
         }
         Err(ImportError::wrong_table(
-            table.location(record.line, table.text_column(record.line, cell)),
+            table.cell_location(record.line, cell),
             format!("a row of the video `{found}` after those of `{known}`"),
             "the rows of one video",
             "export each video to a file of its own",
@@ -307,35 +265,26 @@ impl SleapColumns {
     }
 }
 
-/// A column `NAME.x` and what belongs to it.
-fn find_nodes(names: &[&str]) -> Result<Vec<NodeCells>, (String, String)> {
+/// The nodes: columns `NAME.x` with `NAME.y` and `NAME.score`.
+///
+/// # Errors
+/// Name of a node without y.
+fn find_nodes(names: &[&str]) -> Result<Vec<NodeCells>, String> {
     let at = |name: String| names.iter().position(|known| *known == name);
-    let node = |(x, name): (usize, &str)| -> Result<NodeCells, (String, String)> {
-        let y = at(format!("{name}.y"))
-            .ok_or_else(|| (format!("the column {name}.x"), format!("also {name}.y")))?;
+    let node = |(x, name): (usize, &str)| {
+        let y = at(format!("{name}.y")).ok_or_else(|| name.to_owned())?;
         Ok(NodeCells { name: name.to_owned(), x, y, score: at(format!("{name}.score")) })
     };
-    let nodes: Vec<NodeCells> = names
-        .iter()
-        .enumerate()
-        .filter_map(|(x, name)| Some((x, name.strip_suffix(".x")?)))
-        .map(node)
-        .collect::<Result<_, (String, String)>>()?;
-    if nodes.is_empty() {
-        Err((format!("the columns {}", join_names(names)), "NODE.x and NODE.y of every node".to_owned()))
-    } else {
-        Ok(nodes)
-    }
+    let columns = names.iter().enumerate().filter_map(|(x, name)| Some((x, name.strip_suffix(".x")?)));
+    columns.map(node).collect()
 }
 
-/// The instances of a table with a row a frame, whose columns are `INSTANCE.NODE.x`.
+/// Sorts the nodes of a table with a row a frame into instances: their columns are `INSTANCE.NODE.x`.
 fn find_instances(nodes: Vec<NodeCells>, at: impl Fn(&str) -> Option<usize>) -> Vec<InstanceColumns> {
     let mut slots: Vec<(String, InstanceColumns)> = vec![];
     for mut node in nodes {
-        let (instance, name) = node
-            .name
-            .split_once('.')
-            .map_or((String::new(), node.name.clone()), |(i, n)| (i.to_owned(), n.to_owned()));
+        let (instance, name) = node.name.split_once('.').unwrap_or(("", &node.name));
+        let (instance, name) = (instance.to_owned(), name.to_owned());
         node.name = name;
         let numbered = instance.is_empty()
             || instance.strip_prefix(NUMBERED).is_some_and(|number| number.parse::<u32>().is_ok());
@@ -350,12 +299,4 @@ fn find_instances(nodes: Vec<NodeCells>, at: impl Fn(&str) -> Option<usize>) -> 
         }
     }
     slots.into_iter().map(|(_, slot)| slot).collect()
-}
-
-fn join_names(names: &[&str]) -> String {
-    names.iter().take(12).copied().collect::<Vec<_>>().join(", ")
-}
-
-fn columns_error(table: &DelimitedTable, header: &TextRow, problem: String) -> ImportError {
-    ImportError::columns(table.file, header.line.max(1), problem, ADVICE)
 }

@@ -1,19 +1,18 @@
-//! Tracker (Open Source Physics): tables written by File > Export > Data, and tables copied from its data
-//! view.
+//! Tracker (Open Source Physics): tables from File > Export > Data or copied from the data view.
 
 use super::FileFormat;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::ImportOptions;
 use crate::import::reader::layout::{ClockCell, find_clock_difference};
 use crate::import::reader::{
     DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow, TrackFile, layout,
 };
 
-/// Rows above the data that may hold names.
+/// Rows at the top in which the names are searched.
 const HEADER_ROWS: usize = 6;
 /// Positions in world coordinates, y upwards unless the axes were turned.
 const WORLD: [&str; 2] = ["x", "y"];
-/// Positions in image pixels, y downwards. `px` and `py` are momentum in Tracker and never positions.
+/// Positions in image pixels, y downwards. Tracker's `px` and `py` are momentum.
 const IMAGE: [&str; 2] = ["pixelx", "pixely"];
 const MOMENTUM: [&str; 2] = ["px", "py"];
 const TIME: &str = "t";
@@ -43,20 +42,13 @@ impl FileFormat for TrackerFormat {
         names.contains(&TIME).then(|| format!("line {} names {names_of}", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
         let header = find_header(table).ok_or_else(|| no_header_error(table))?;
         let row = &table.head[header];
         let columns = row.texts();
-        let titles = header
-            .checked_sub(1)
-            .and_then(|above| table.head.get(above))
-            .map(TextRow::texts)
-            .unwrap_or_default();
+        let above = header.checked_sub(1).and_then(|above| table.head.get(above));
+        let titles = above.map(TextRow::texts).unwrap_or_default();
         let pair = if columns.contains(&WORLD[0]) { WORLD } else { IMAGE };
         let mut points = find_points(&columns, &titles, pair);
         if points.is_empty() {
@@ -68,15 +60,8 @@ impl FileFormat for TrackerFormat {
         let layout = |time: Option<usize>, frame: Option<usize>, points: Vec<PointCells>| {
             let cells = points.iter().flat_map(|point| point.x.iter().chain(&point.y).copied());
             let width = cells.chain(time).chain(frame).max().map_or(0, |last| last + 1);
-            TableLayout {
-                start: header + 1,
-                width,
-                most: row.used_width(),
-                frame,
-                time,
-                points,
-                ..TableLayout::default()
-            }
+            let most = row.used_width();
+            TableLayout { most, frame, time, ..TableLayout::new(header + 1, width, points) }
         };
         let mut export = if clocks_agree(table, header + 1, &columns)? {
             layout(at(TIME), at(FRAME), points).read_tracks(document, table, facts(pair))?
@@ -91,16 +76,12 @@ impl FileFormat for TrackerFormat {
     }
 }
 
-/// World coordinates have the unit of the user's calibration, which no export names, and axes that may have
-/// been turned.
+/// Facts of pixels. The unit and the axes of world coordinates are those of the user's calibration, which no export
+/// has.
 fn facts(pair: [&str; 2]) -> Facts {
     if pair == WORLD {
-        return Facts {
-            y_axis_open: Some(
-                "Tracker's x and y point up unless its axes were turned; image pixels point down",
-            ),
-            ..Facts::default()
-        };
+        let open = "Tracker's x and y point up unless its axes were turned; image pixels point down";
+        return Facts { y_axis_open: Some(open), ..Facts::default() };
     }
     Facts::pixels_down("Tracker's pixelx and pixely are image pixels, y downwards")
 }
@@ -115,34 +96,30 @@ fn find_header(table: &DelimitedTable) -> Option<usize> {
     table.head.iter().take(HEADER_ROWS).position(is_header)
 }
 
-/// Whether the first row is the name of a track and nothing else.
+/// Whether the first row is only the name of a track.
 fn has_title(table: &DelimitedTable) -> bool {
-    let names =
-        |row: &TextRow| row.cells.len() > 1 && row.cells.iter().filter(|cell| !cell.is_empty()).count() == 1;
-    find_header(table) == Some(1) && table.head.first().is_some_and(names)
+    let names = table.first_texts();
+    find_header(table) == Some(1)
+        && names.len() > 1
+        && names.iter().filter(|name| !name.is_empty()).count() == 1
 }
 
 fn no_header_error(table: &DelimitedTable) -> ImportError {
-    let found = table.head.first().map(TextRow::texts).unwrap_or_default();
-    ImportError::columns(
-        table.file,
-        table.head.first().map_or(1, |row| row.line),
-        format!(
-            "found `{}` and no row that names the columns, expected one with `t` or `frame`, \
-            `x` and `y`",
-            found.join(" ")
-        ),
-        "export with column names, or name the columns by number: --format generic --columns \
-            time=1,tip-x=2,tip-y=3,...",
-    )
+    let problem = format!(
+        "found `{}` and no row that names the columns, expected one with `t` or `frame`, `x` and `y`",
+        table.first_texts().join(" ")
+    );
+    let advice = "export with column names, or name the columns by number: --format generic --columns \
+        time=1,tip-x=2,tip-y=3,...";
+    ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-/// The title of a column: above it or to its left, with where it stands.
+/// Index and text of a column's title: above the column, or else the nearest to the left.
 fn find_title<'t>(titles: &[&'t str], column: usize) -> Option<(usize, &'t str)> {
     titles.iter().take(column + 1).rposition(|title| !title.is_empty()).map(|at| (at, titles[at]))
 }
 
-/// A track is an x and the next y before another x; its title stands above it or to its left.
+/// The points: an x, and the next y under the same title before another x.
 fn find_points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -> Vec<PointCells> {
     let title_of = |column: usize| find_title(titles, column);
     let (mut points, mut seen) = (vec![], vec![]);
@@ -150,15 +127,11 @@ fn find_points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -
         let title = title_of(x);
         if let Some((at, _)) = title {
             if seen.contains(&at) {
-                continue; // a second x under one title is a user's own column
+                continue; // (a second x under one title is a user's own column)
             }
             seen.push(at);
         }
-        let next_x = columns
-            .iter()
-            .skip(x + 1)
-            .position(|name| *name == x_name)
-            .map_or(columns.len(), |ahead| x + 1 + ahead);
+        let next_x = (x + 1..columns.len()).find(|at| columns[*at] == x_name).unwrap_or(columns.len());
         let same_track = |y: &usize| title_of(*y).map(|t| t.0) == title.map(|t| t.0);
         let y = (0..next_x).filter(|&y| columns[y] == y_name && (y > x || title.is_some())).find(same_track);
         points.push(PointCells::new(title.map_or("", |t| t.1), x, y));
@@ -166,7 +139,7 @@ fn find_points(columns: &[&str], titles: &[&str], [x_name, y_name]: [&str; 2]) -
     points
 }
 
-/// Without a row of titles a single track takes the name of its file, several are numbered; says so.
+/// Names the points that have no title: a single one like its file, several by numbers. Gives notes on it.
 fn name_unnamed_points(points: &mut [PointCells], stem: &str) -> Vec<String> {
     let several = points.len() > 1;
     let unnamed = points.iter_mut().enumerate().filter(|(_, point)| point.name.is_empty());
@@ -182,22 +155,20 @@ fn no_positions_error(table: &DelimitedTable, row: &TextRow, columns: &[&str]) -
     let remedy = "export again with the columns t, x and y selected";
     let other =
         "if another program wrote them as pixels, number the columns: --columns time=1,tip-x=2,tip-y=3";
-    ImportError::columns(
-        table.file,
-        row.line,
-        format!("found the columns {}, expected x and y (or pixelx and pixely)", columns.join(", ")),
-        if momentum {
-            format!("px and py are momentum in Tracker, not pixels: {remedy}; {other}")
-        } else {
-            remedy.to_owned()
-        },
-    )
+    let problem =
+        format!("found the columns {}, expected x and y (or pixelx and pixely)", columns.join(", "));
+    let advice = if momentum {
+        format!("px and py are momentum in Tracker, not pixels: {remedy}; {other}")
+    } else {
+        remedy.to_owned()
+    };
+    ImportError::columns(table.file, row.line, problem, advice)
 }
 
-// Tables of several tracks that were put next to each other, each with its own clock.
+// Tables of several tracks side by side, each with its own clock.
 
-/// A clock with its tracks.
-pub(crate) struct ClockGroup {
+/// A clock with its points.
+struct ClockGroup {
     pub time: Option<usize>,
     pub frame: Option<usize>,
     pub points: Vec<PointCells>,
@@ -207,12 +178,8 @@ fn find_columns(columns: &[&str], name: &str) -> Vec<usize> {
     columns.iter().enumerate().filter(|(_, column)| **column == name).map(|(at, _)| at).collect()
 }
 
-/// Whether all columns of times, and all of frame numbers, say the same in every row.
-pub(crate) fn clocks_agree(
-    table: &DelimitedTable,
-    start: usize,
-    columns: &[&str],
-) -> Result<bool, ImportError> {
+/// Whether all columns of times are equal in every row, and all of frame numbers.
+fn clocks_agree(table: &DelimitedTable, start: usize, columns: &[&str]) -> ImportResult<bool> {
     for clocks in [find_columns(columns, TIME), find_columns(columns, FRAME)] {
         let [first, others @ ..] = clocks.as_slice() else { continue };
         for other in others {
@@ -225,14 +192,14 @@ pub(crate) fn clocks_agree(
     Ok(true)
 }
 
-/// The tracks of each clock: those under its title, or those to its right.
-pub(crate) fn group_by_clock(
+/// Groups the points by their clock.
+fn group_by_clock(
     table: &DelimitedTable,
     row: &TextRow,
     columns: &[&str],
     titles: &[&str],
     points: Vec<PointCells>,
-) -> Result<Vec<ClockGroup>, ImportError> {
+) -> ImportResult<Vec<ClockGroup>> {
     let (times, frames) = (find_columns(columns, TIME), find_columns(columns, FRAME));
     let mut groups: Vec<ClockGroup> = vec![];
     for point in points {
@@ -261,15 +228,12 @@ fn clock_of_column(clocks: &[usize], titles: &[&str], x: usize) -> Option<usize>
 }
 
 fn no_clock_error(table: &DelimitedTable, row: &TextRow, point: &PointCells, x: usize) -> ImportError {
-    ImportError::columns(
-        table.file,
-        row.line,
-        format!(
-            "found several clocks that differ, and none for the track `{}` in column {}, expected `t` or `frame` to \
-             the left of every track",
-            point.name,
-            x + 1
-        ),
-        "export again from Tracker, or each track to a file of its own",
-    )
+    let problem = format!(
+        "found several clocks that differ, and none for the track `{}` in column {}, expected `t` or `frame` to the \
+         left of every track",
+        point.name,
+        x + 1
+    );
+    let advice = "export again from Tracker, or each track to a file of its own";
+    ImportError::columns(table.file, row.line, problem, advice)
 }

@@ -5,16 +5,16 @@ mod spots;
 mod xml;
 
 use super::FileFormat;
-use crate::import::error::{ImportError, TextLocation};
+use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
-    Clock, CoordinateUnit, DelimitedTable, Document, Facts, TimeUnit, Track, TrackFile, new_finding,
+    Clock, CoordinateUnit, DelimitedTable, Document, Facts, TimeUnit, Track, TrackFile, clock_lines,
+    new_finding,
 };
 use crate::recording::files::YAxis;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use xml::{XmlElement, XmlReader, XmlTag};
 
-/// TrackMate's tables and files.
 pub(crate) struct TrackMate;
 
 impl FileFormat for TrackMate {
@@ -29,11 +29,7 @@ impl FileFormat for TrackMate {
         }
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let found = match root_element(document) {
             Some(SIMPLE_ROOT) => read_simple_tracks(document)?,
             Some(_) => project::read_project(document)?,
@@ -45,7 +41,7 @@ impl FileFormat for TrackMate {
 
 /// The name of the root element, where it is one of TrackMate's.
 fn root_element(document: &Document) -> Option<&'static str> {
-    let element = xml::XmlReader::root_name(document)?;
+    let element = XmlReader::root_name(document)?;
     [SIMPLE_ROOT, project::PROJECT_ROOT].into_iter().find(|known| element == *known)
 }
 
@@ -55,22 +51,19 @@ pub(crate) const SIMPLE_ROOT: &str = "Tracks";
 const SIMPLE_TRACK: &str = "particle";
 const SIMPLE_SPOT: &str = "detection";
 
-pub(crate) fn read_simple_tracks<'a>(document: &'a Document<'a>) -> Result<TrackMateFile<'a>, ImportError> {
+pub(crate) fn read_simple_tracks<'a>(document: &'a Document<'a>) -> ImportResult<TrackMateFile<'a>> {
     let mut xml = XmlReader::new(document);
     let mut found = TrackMateFile::default();
-    let mut interval = None;
+    let mut interval: Option<f64> = None;
     let mut track: Option<Vec<Spot>> = None;
     while let Some(node) = xml.next_tag()? {
         match node {
             XmlTag::Open(element) if element.has_name(SIMPLE_ROOT) => {
-                found.space_unit = xml
-                    .attribute(&element, "spaceUnits")?
-                    .map(|unit| (unit, "its attribute spaceUnits".to_owned()));
+                let unit = xml.attribute(&element, "spaceUnits")?;
+                found.space_unit = unit.map(|unit| (unit, "its attribute spaceUnits".to_owned()));
                 found.time_unit = xml.attribute(&element, "timeUnits")?;
-                interval = xml
-                    .attribute(&element, "frameInterval")?
-                    .and_then(|text| text.trim().parse::<f64>().ok())
-                    .filter(|interval| *interval > 0.0);
+                let text = xml.attribute(&element, "frameInterval")?;
+                interval = text.and_then(|text| text.trim().parse().ok()).filter(|interval| *interval > 0.0);
             }
             XmlTag::Open(element) if element.has_name(SIMPLE_TRACK) => track = Some(vec![]),
             XmlTag::Open(element) if element.has_name(SIMPLE_SPOT) => {
@@ -78,7 +71,7 @@ pub(crate) fn read_simple_tracks<'a>(document: &'a Document<'a>) -> Result<Track
                     spots.push(read_simple_spot(&xml, &element, interval)?);
                 }
             }
-            XmlTag::Close(end) if end.has_name(SIMPLE_TRACK) => {
+            node if node.closes(SIMPLE_TRACK) => {
                 let name = format!("track{}", found.trajectories.len() + 1);
                 found.trajectories.push(Trajectory { name, spots: track.take().unwrap_or_default() });
             }
@@ -92,25 +85,16 @@ pub(crate) fn read_simple_tracks<'a>(document: &'a Document<'a>) -> Result<Track
     Ok(found)
 }
 
-fn read_simple_spot(
-    xml: &XmlReader,
-    element: &XmlElement,
-    interval: Option<f64>,
-) -> Result<Spot, ImportError> {
+fn read_simple_spot(xml: &XmlReader, element: &XmlElement, interval: Option<f64>) -> ImportResult<Spot> {
     let frame = xml.number_attribute(element, "t")?;
     let time = frame.zip(interval).map(|(frame, interval)| frame * interval).filter(|time| time.is_finite());
-    Ok(Spot {
-        line: element.line,
-        frame,
-        time,
-        x: xml.number_attribute(element, "x")?,
-        y: xml.number_attribute(element, "y")?,
-    })
+    let [x, y] = [xml.number_attribute(element, "x")?, xml.number_attribute(element, "y")?];
+    Ok(Spot { line: element.line, frame, time, x, y })
 }
 
-// Spots to tracks: order, branches, and what the units of the file mean.
+// From spots to tracks.
 
-/// What to export instead of a table or file without positions.
+/// The exports that have positions.
 pub(crate) const EXPORT_ADVICE: &str = "in TrackMate's display panel press Tracks, choose the tab Spots and then \
     Export to CSV; or run the action Export tracks to XML file";
 
@@ -119,23 +103,23 @@ pub(crate) const EXPORT_ADVICE: &str = "in TrackMate's display panel press Track
 pub(crate) struct Spot {
     pub line: usize,
     pub frame: Option<f64>,
-    /// In the file's unit of time.
+    /// Time in the unit of the file.
     pub time: Option<f64>,
     pub x: Option<f64>,
     pub y: Option<f64>,
 }
 
-/// A track with its spots in any order.
+/// A track; its spots may be in any order.
 pub(crate) struct Trajectory {
     pub name: String,
     pub spots: Vec<Spot>,
 }
 
-/// What a file of TrackMate holds.
+/// Content of a file of TrackMate.
 #[derive(Default)]
 pub(crate) struct TrackMateFile<'a> {
     pub trajectories: Vec<Trajectory>,
-    /// Unit of the coordinates, and where it stands.
+    /// Unit of the coordinates, and its source in words.
     pub space_unit: Option<(String, String)>,
     pub time_unit: Option<String>,
     pub table: Option<&'a DelimitedTable<'a>>,
@@ -144,25 +128,25 @@ pub(crate) struct TrackMateFile<'a> {
     pub notes: Vec<String>,
 }
 
-/// What the times of the file are worth.
+/// Use of the times of a file.
 struct SpotTimes {
-    /// Their unit; `None` where they only repeat the frames.
+    /// Unit of the times; `None` where they only repeat the frames.
     unit: Option<TimeUnit>,
     note: Option<String>,
     finding: Option<QualityFinding>,
 }
 
 impl<'a> TrackMateFile<'a> {
-    /// Puts every track in order.
+    /// Sorts the spots and makes the clocks and tracks.
     ///
     /// # Errors
-    /// [`ImportError::DuplicateRow`] where a track that is asked for has two spots in one frame, and a refusal of
-    /// files without tracks.
+    /// [`ImportError::DuplicateRow`] where a requested track has two spots in one frame, [`ImportError::WrongTable`]
+    /// where there are no tracks.
     pub(crate) fn into_track_file(
         mut self,
         document: &'a Document<'a>,
         options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    ) -> ImportResult<TrackFile<'a>> {
         if self.trajectories.is_empty() {
             return Err(no_tracks_error(document));
         }
@@ -173,50 +157,35 @@ impl<'a> TrackMateFile<'a> {
         if self.has_quality {
             notes.push("TrackMate's quality is no probability and is not taken as confidence".to_owned());
         }
-        let (clocks, tracks) = self
-            .trajectories
-            .iter()
-            .enumerate()
-            .map(|(index, track)| track.to_clock_and_track(index, self.clock_cell, times.unit.is_some()))
-            .unzip();
+        let timed = times.unit.is_some();
+        let tracks = self.trajectories.iter().enumerate();
+        let (clocks, tracks) =
+            tracks.map(|(index, track)| track.to_clock_and_track(index, self.clock_cell, timed)).unzip();
+        let why = "TrackMate measures from the upper left corner of the image".to_owned();
         let facts = Facts {
-            y_axis: Some((
-                YAxis::Down,
-                "TrackMate measures from the upper left corner of the image".to_owned(),
-            )),
+            y_axis: Some((YAxis::Down, why)),
             unit: self.space_unit.as_ref().and_then(|(unit, place)| length_unit(unit, place, &mut notes)),
             time: times.unit.unwrap_or_default(),
             ..Facts::default()
         };
         let findings = branching.into_iter().chain(times.finding).collect();
-        let texts = self
-            .table
-            .iter()
-            .flat_map(|table| table.head.first())
-            .flat_map(|row| row.cells.iter().cloned())
-            .collect();
-        Ok(TrackFile {
-            table: self.table,
-            clocks,
-            tracks,
-            facts,
-            notes,
-            findings,
-            texts,
-            ..TrackFile::for_document(document)
-        })
+        let header = self.table.and_then(|table| table.head.first());
+        let texts = header.map_or(vec![], |row| row.cells.clone());
+        let file = TrackFile { facts, notes, findings, texts, ..TrackFile::for_document(document) };
+        Ok(TrackFile { table: self.table, clocks, tracks, ..file })
     }
 
-    /// A track that splits or merges has no one position in a frame.
+    /// Leaves out tracks that split or merge, because they have several positions in a frame.
     fn leave_out_branching(
         &mut self,
         document: &Document,
         options: &ImportOptions,
-    ) -> Result<Option<QualityFinding>, ImportError> {
+    ) -> ImportResult<Option<QualityFinding>> {
         let all = self.trajectories.len();
         let (mut left_out, mut first) = (vec![], None);
-        for track in std::mem::take(&mut self.trajectories) {
-            let track = track.sort_by_frame();
+        let frame = |spot: &Spot| spot.frame.unwrap_or(f64::INFINITY);
+        for mut track in std::mem::take(&mut self.trajectories) {
+            track.spots.sort_by(|a, b| frame(a).total_cmp(&frame(b)));
             match track.duplicate_spot_error(document.file) {
                 None => self.trajectories.push(track),
                 Some(error) if is_requested(options, &track.name) => return Err(error),
@@ -230,37 +199,26 @@ impl<'a> TrackMateFile<'a> {
             return Err(error);
         }
         let named = left_out.iter().take(10).map(String::as_str).collect::<Vec<_>>().join(", ");
-        let found = format!(
-            "{}: {} of {all} tracks split or merge and are left out: {named}",
-            document.file,
-            left_out.len()
-        );
-        let advice = "forbid splitting and merging in TrackMate's tracker, or cut the links in TrackScheme, \
-            if one of them is needed";
-        Ok((!left_out.is_empty()).then(|| {
-            new_finding(Check::BranchingTracks, Severity::Caution, (left_out.len() as f64, ""), found, advice)
-        }))
+        let (file, count) = (document.file, left_out.len());
+        let found = format!("{file}: {count} of {all} tracks split or merge and are left out: {named}");
+        let advice = "forbid splitting and merging in TrackMate's tracker, or cut the links in TrackScheme, if one \
+            of them is needed";
+        let value = (count as f64, "");
+        Ok((count > 0).then(|| new_finding(Check::BranchingTracks, Severity::Caution, value, found, advice)))
     }
 
-    /// Whether the times say more than the frames do.
+    /// Decides whether the times say more than the frames do.
     fn spot_times(&self, file: &str) -> SpotTimes {
         let mut spots = self.trajectories.iter().flat_map(|track| &track.spots);
         let none = SpotTimes { unit: None, note: None, finding: None };
-        let unit = self
-            .time_unit
-            .as_deref()
-            .map(|unit| unit.trim().trim_matches(['(', ')']).to_lowercase())
-            .unwrap_or_default();
+        let unit = self.time_unit.as_deref().unwrap_or_default();
+        let unit = unit.trim().trim_matches(['(', ')']).to_lowercase();
         if spots.clone().all(|spot| spot.time.is_none()) {
             return none;
         }
         if matches!(unit.as_str(), "frame" | "frames") {
-            return SpotTimes {
-                note: Some(
-                    "the times are numbers of frames: the interval was not set in TrackMate".to_owned(),
-                ),
-                ..none
-            };
+            let note = "the times are numbers of frames: the interval was not set in TrackMate".to_owned();
+            return SpotTimes { note: Some(note), ..none };
         }
         if spots.all(|spot| spot.time == spot.frame) {
             let step = if unit.is_empty() { "unit" } else { &unit };
@@ -270,80 +228,49 @@ impl<'a> TrackMateFile<'a> {
             );
             let advice = "the times are left out and cannot check --frame-rate-hz; set the frame interval in \
                 Image > Properties before tracking";
-            return SpotTimes {
-                finding: Some(new_finding(Check::FrameInterval, Severity::Caution, (1.0, ""), found, advice)),
-                ..none
-            };
+            let finding = new_finding(Check::FrameInterval, Severity::Caution, (1.0, ""), found, advice);
+            return SpotTimes { finding: Some(finding), ..none };
         }
-        match unit_seconds(&unit) {
-            Some(seconds) => SpotTimes { unit: Some(TimeUnit::Seconds(seconds)), ..none },
-            None => {
-                let note = format!(
-                    "the times have {}",
-                    if unit.is_empty() {
-                        "no unit in the file".to_owned()
-                    } else {
-                        format!("the unknown unit `{unit}`")
-                    }
-                );
-                SpotTimes { unit: Some(TimeUnit::Unknown), note: Some(note), ..none }
-            }
+        if let Some(seconds) = unit_seconds(&unit) {
+            return SpotTimes { unit: Some(TimeUnit::Seconds(seconds)), ..none };
         }
+        let note = if unit.is_empty() {
+            "the times have no unit in the file".to_owned()
+        } else {
+            format!("the times have the unknown unit `{unit}`")
+        };
+        SpotTimes { unit: Some(TimeUnit::Unknown), note: Some(note), ..none }
     }
 }
 
 impl Trajectory {
-    fn sort_by_frame(mut self) -> Self {
-        let key = |spot: &Spot| spot.frame.unwrap_or(f64::INFINITY);
-        self.spots.sort_by(|a, b| key(a).total_cmp(&key(b)));
-        self
-    }
-
     /// The refusal of a second spot in one frame.
     fn duplicate_spot_error(&self, file: &str) -> Option<ImportError> {
-        let pair =
-            self.spots.windows(2).find(|pair| pair[0].frame.is_some() && pair[0].frame == pair[1].frame)?;
+        let same = |pair: &&[Spot]| pair[0].frame.is_some() && pair[0].frame == pair[1].frame;
+        let pair = self.spots.windows(2).find(same)?;
         let place = TextLocation { file: file.to_owned(), line: pair[1].line, column: 1 };
-        Some(ImportError::DuplicateRow {
-            place,
-            what: "frame",
-            found: pair[1].frame?,
-            track: self.name.clone(),
-            first: pair[0].line,
-        })
+        let (found, track, first) = (pair[1].frame?, self.name.clone(), pair[0].line);
+        Some(ImportError::DuplicateRow { place, what: "frame", found, track, first })
     }
 
     fn to_clock_and_track(&self, clock: usize, cell: usize, timed: bool) -> (Clock, Track) {
-        let lines = self.spots.iter().map(|spot| u32::try_from(spot.line).unwrap_or(u32::MAX)).collect();
+        let lines = clock_lines(self.spots.iter().map(|spot| spot.line));
         let column = |value: fn(&Spot) -> Option<f64>| self.spots.iter().map(value).collect();
-        let clock_columns = Clock {
-            lines,
-            cell,
-            frame: Some(column(|spot| spot.frame)),
-            time: timed.then(|| column(|spot| spot.time)),
-        };
-        (
-            clock_columns,
-            Track {
-                name: self.name.clone(),
-                clock,
-                x: column(|spot| spot.x),
-                y: Some(column(|spot| spot.y)),
-                confidence: None,
-            },
-        )
+        let (frame, time) = (Some(column(|spot| spot.frame)), timed.then(|| column(|spot| spot.time)));
+        let (x, y) = (column(|spot| spot.x), Some(column(|spot| spot.y)));
+        let track = Track { name: self.name.clone(), clock, x, y, confidence: None };
+        (Clock { lines, cell, frame, time }, track)
     }
 }
 
-/// Whether the user means the track of that name, or would get it for its name.
+/// Whether the track is named by `--point`, or is called tip or head where no `--point` is given.
 fn is_requested(options: &ImportOptions, name: &str) -> bool {
     let named = [options.tip.as_deref(), options.head.as_deref()];
     if named.iter().all(Option::is_none) {
         return ["tip", "head"].contains(&name);
     }
-    named.into_iter().flatten().any(|name_given| {
-        name_given.strip_suffix(name).is_some_and(|file| file.is_empty() || file.ends_with(':'))
-    })
+    let mut files = named.into_iter().flatten().filter_map(|given| given.strip_suffix(name));
+    files.any(|file| file.is_empty() || file.ends_with(':'))
 }
 
 fn no_tracks_error(document: &Document) -> ImportError {
@@ -355,7 +282,7 @@ fn no_tracks_error(document: &Document) -> ImportError {
     )
 }
 
-/// Seconds of a unit of time by its name.
+/// A unit of time by its name, s.
 fn unit_seconds(unit: &str) -> Option<f64> {
     match unit {
         "s" | "sec" | "secs" | "second" | "seconds" => Some(1.0),
@@ -367,24 +294,22 @@ fn unit_seconds(unit: &str) -> Option<f64> {
     }
 }
 
-/// The unit that the file names; one that is not known is asked for.
+/// The unit of length that the file names; an unknown one gives a note.
 fn length_unit(text: &str, place: &str, notes: &mut Vec<String>) -> Option<(CoordinateUnit, String)> {
     let name = text.trim().trim_matches(['(', ')']).trim();
-    // the only unit with a sign beyond ASCII is the micrometre: its sign is lost where the character set was
-    let lost = name
-        .strip_suffix('m')
-        .is_some_and(|sign| !sign.is_empty() && sign.chars().all(|c| c == '?' || !c.is_ascii()));
+    // (only the micrometre has a sign beyond ASCII, which a wrong encoding damages)
+    let sign = name.strip_suffix('m').unwrap_or_default();
+    let lost = !sign.is_empty() && sign.chars().all(|c| c == '?' || !c.is_ascii());
     let unit = match name {
         "nm" => Some(CoordinateUnit::Metres(1e-9)),
         _ if lost => Some(CoordinateUnit::Metres(1e-6)),
         _ => CoordinateUnit::parse(name),
     };
-    if unit.is_none() {
+    let Some(unit) = unit else {
         notes.push(format!("the unit of length `{name}` ({place}) is not known"));
-    }
+        return None;
+    };
     let shown = if lost { "micrometres" } else { name };
-    unit.map(|unit| match unit {
-        CoordinateUnit::Pixel => (unit, format!("{place} says `{shown}`: TrackMate was not calibrated")),
-        CoordinateUnit::Metres(_) => (unit, format!("{place} says `{shown}`")),
-    })
+    let uncalibrated = if unit == CoordinateUnit::Pixel { ": TrackMate was not calibrated" } else { "" };
+    Some((unit, format!("{place} says `{shown}`{uncalibrated}")))
 }

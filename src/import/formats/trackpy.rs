@@ -1,8 +1,8 @@
-//! trackpy: its table of linked features, saved with `to_csv`. y stands before x, and the unnamed index may
-//! come first.
+//! trackpy: its table of linked features, saved with `to_csv`. y is in front of x, and an index without a name may be
+//! in front of both.
 
 use super::FileFormat;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::ImportOptions;
 use crate::import::reader::{
     DelimitedTable, Document, Facts, PointCells, RowOrder, TableLayout, TextRow, TrackFile,
@@ -10,25 +10,17 @@ use crate::import::reader::{
 
 const PARTICLE: &str = "particle";
 const FRAME: &str = "frame";
-/// Properties of a feature that nothing else calls so all together.
+/// Properties of a feature by trackpy's names.
 const FEATURE_PROPERTIES: [&str; 6] = ["mass", "ecc", "signal", "raw_mass", "ep", "size"];
-/// Features that a table of one's own may not have by chance.
+/// Number of these names that mark a table without particles as trackpy's.
 const MIN_FEATURE_PROPERTIES: usize = 3;
 
-/// Rows at the top that may hold the names: the first, unless a line of somebody's own was put above it.
+/// Rows at the top in which the names are searched: a user may have added lines above them.
 const HEADER_ROWS: usize = 3;
 
 pub(crate) struct Trackpy;
 
-/// The first row whose cells `names` accepts, with its index.
-fn find_header<'t>(
-    table: &'t DelimitedTable,
-    names: impl Fn(&[&str]) -> bool,
-) -> Option<(usize, &'t TextRow)> {
-    table.head.iter().enumerate().take(HEADER_ROWS).find(|(_, row)| names(&row.texts()))
-}
-
-/// Whether a row names a table of features, linked or not.
+/// Whether a row is the header of a table of features, linked or not.
 fn is_feature_header(names: &[&str]) -> bool {
     let at = |name: &str| names.iter().position(|known| *known == name);
     let (Some(x), Some(y), Some(_)) = (at("x"), at("y"), at(FRAME)) else { return false };
@@ -42,21 +34,17 @@ impl FileFormat for Trackpy {
     }
 
     fn recognises(&self, document: &Document) -> Option<String> {
-        let (_, row) = find_header(document.table.as_ref().ok()?, is_feature_header)?;
+        let table = document.table.as_ref().ok()?;
+        let (_, row) = table.find_row(HEADER_ROWS, |row| is_feature_header(&row.texts()))?;
         Some(format!("line {} names frame, x, y and the properties of features as trackpy does", row.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
-        let plain = |names: &[&str]| names.contains(&"x") && names.contains(&"y");
-        let (header, row) = find_header(table, plain).ok_or_else(|| {
-            no_column_error(table, table.head.first(), "save the table with its column names")
-        })?;
-        let at = |name: &str| row.cells.iter().position(|cell| cell == name);
+        let refuse = || no_column_error(table, table.head.first(), "save the table with its column names");
+        let found = table.find_row(HEADER_ROWS, |row| row.has("x") && row.has("y"));
+        let (header, row) = found.ok_or_else(refuse)?;
+        let at = |name: &str| row.position(name);
         let particle = at(PARTICLE).ok_or_else(|| unlinked_error(table, row.line))?;
         let frame = find_frame_column(table, header, row)?;
         let (Some(frame), Some(x), Some(y)) = (frame, at("x"), at("y")) else {
@@ -78,12 +66,17 @@ impl FileFormat for Trackpy {
         if export.tracks.is_empty() {
             return Err(unlinked_error(table, row.line));
         }
-        strip_zero_fraction(&mut export);
+        // (pandas writes the numbers of particles as `0.0` where one is missing)
+        for track in &mut export.tracks {
+            if let Some(whole) = track.name.strip_suffix(".0") {
+                track.name = whole.to_owned();
+            }
+        }
         Ok(export)
     }
 }
 
-/// The refusal of a table without a column that trackpy always writes.
+/// The refusal of a table that lacks a column of trackpy's.
 fn no_column_error(table: &DelimitedTable, row: Option<&TextRow>, advice: &str) -> ImportError {
     let names = row.map(TextRow::texts).unwrap_or_default();
     let found = names.into_iter().take(12).collect::<Vec<_>>().join(", ");
@@ -91,41 +84,29 @@ fn no_column_error(table: &DelimitedTable, row: Option<&TextRow>, advice: &str) 
     ImportError::columns(table.file, row.map_or(1, |row| row.line), problem, advice)
 }
 
-/// The column of the frames. Where it is the index too it stands twice, and both have to say the same in every
-/// row.
+/// The column of the frames. It is written twice where it is the index too.
 ///
 /// # Errors
-/// [`ImportError::Columns`] for two such columns that differ, with the first such line.
-fn find_frame_column(
-    table: &DelimitedTable,
-    header: usize,
-    names: &TextRow,
-) -> Result<Option<usize>, ImportError> {
+/// [`ImportError::Unusable`] for two such columns that differ in a row.
+fn find_frame_column(table: &DelimitedTable, header: usize, names: &TextRow) -> ImportResult<Option<usize>> {
     let mut at = names.cells.iter().enumerate().filter(|(_, cell)| *cell == FRAME).map(|(index, _)| index);
     let Some(first) = at.next() else { return Ok(None) };
     for other in at {
         if let Some(line) = first_difference(table, header + 1, [first, other])? {
-            return Err(ImportError::columns(
-                table.file,
-                line,
-                format!(
-                    "found two columns `{FRAME}` (numbers {} and {}) that differ, expected the same in both",
-                    first + 1,
-                    other + 1
-                ),
-                "export again with one of them, or give the number of the right one with --columns",
-            ));
+            let problem = format!(
+                "found two columns `{FRAME}` (numbers {} and {}) that differ, expected the same in both",
+                first + 1,
+                other + 1
+            );
+            let advice = "export again with one of them, or give the number of the right one with --columns";
+            return Err(ImportError::columns(table.file, line, problem, advice));
         }
     }
     Ok(Some(first))
 }
 
-/// Line of the first row in which two cells do not say the same.
-fn first_difference(
-    table: &DelimitedTable,
-    start: usize,
-    cells: [usize; 2],
-) -> Result<Option<usize>, ImportError> {
+/// Line of the first row in which two cells differ.
+fn first_difference(table: &DelimitedTable, start: usize, cells: [usize; 2]) -> ImportResult<Option<usize>> {
     let mut rows = table.rows(start);
     while let Some(record) = rows.next_row()? {
         let [first, other] = cells.map(|cell| table.parse_cell(record.cell(cell)));
@@ -136,7 +117,7 @@ fn first_difference(
     Ok(None)
 }
 
-/// The refusal of features that belong to no particle.
+/// The refusal of features without particles.
 fn unlinked_error(table: &DelimitedTable, line: usize) -> ImportError {
     ImportError::wrong_table(
         table.location(line, 1),
@@ -144,13 +125,4 @@ fn unlinked_error(table: &DelimitedTable, line: usize) -> ImportError {
         "linked features with the columns frame, particle, y and x",
         "link them with trackpy.link(features, ...) and save its result with to_csv",
     )
-}
-
-/// Particles are numbers, which pandas writes as `0.0` where one was missing.
-fn strip_zero_fraction(export: &mut TrackFile) {
-    for track in &mut export.tracks {
-        if let Some(whole) = track.name.strip_suffix(".0") {
-            track.name = whole.to_owned();
-        }
-    }
 }

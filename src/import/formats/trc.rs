@@ -1,23 +1,23 @@
-//! TRC, the table of marker positions of motion-capture programs: two lines of settings, names over three
-//! columns each.
+//! TRC, the table of markers of motion-capture programs: lines of settings, then names of markers over three columns
+//! each.
 
 use super::FileFormat;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::options::ImportOptions;
 use crate::import::reader::timing::RATE_AGREEMENT;
 use crate::import::reader::{
     CellNumber, Column, CoordinateUnit, DelimitedTable, Document, Facts, PointCells, TableLayout, TextRow,
     TimeUnit, TrackFile, new_finding,
 };
-use crate::recording::quality::{Check, Severity};
+use crate::recording::quality::{Check, QualityFinding, Severity};
 
 /// First word of the file.
 const MAGIC: &str = "PathFileType";
-/// Names of the first two columns: the frame's number and its time, s.
+/// Number of columns of the clock: frame number and time, s.
 const CLOCK_CELLS: usize = 2;
-/// Columns of a marker: X, Y and Z.
+/// Number of columns of a marker: X, Y and Z.
 const AXES: usize = 3;
-/// Units as written out by programs that do not abbreviate them.
+/// Units in full, with their symbols.
 const LONG_UNITS: [(&str, &str); 4] =
     [("millimeters", "mm"), ("centimeters", "cm"), ("meters", "m"), ("metres", "m")];
 
@@ -30,31 +30,16 @@ impl FileFormat for Trc {
 
     fn recognises(&self, document: &Document) -> Option<String> {
         let first = document.table.as_ref().ok()?.head.first()?;
-        first
-            .cells
-            .first()
-            .is_some_and(|cell| cell == MAGIC)
-            .then(|| format!("line {} starts with {MAGIC}", first.line))
+        (first.first_cell() == MAGIC).then(|| format!("line {} starts with {MAGIC}", first.line))
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let table = document.table()?;
         let settings = TrcSettings::read(table)?;
         let (start, points) = settings.marker_columns(table)?;
         let width = CLOCK_CELLS + AXES * points.len();
-        let layout = TableLayout {
-            start,
-            width,
-            most: width,
-            frame: Some(0),
-            time: Some(1),
-            points,
-            ..TableLayout::default()
-        };
+        let layout = TableLayout::new(start, width, points);
+        let layout = TableLayout { frame: Some(0), time: Some(1), ..layout };
         let mut export = layout.read_tracks(document, table, settings.facts())?;
         settings.check_rows(&export)?;
         export.notes.push(
@@ -77,84 +62,61 @@ struct TrcSettings<'t> {
 }
 
 impl<'t> TrcSettings<'t> {
-    fn read(table: &'t DelimitedTable<'t>) -> Result<Self, ImportError> {
-        let at = table.head.iter().position(|row| row.cells.iter().any(|cell| cell == "DataRate"));
-        let found = at.and_then(|at| Some((at + 2, table.head.get(at)?, table.head.get(at + 1)?)));
+    fn read(table: &'t DelimitedTable<'t>) -> ImportResult<Self> {
+        let found = table.find_row(usize::MAX, |row| row.has("DataRate"));
+        let found = found.and_then(|(at, names)| Some((at + 2, names, table.head.get(at + 1)?)));
         let Some((markers, names, values)) = found else {
-            let found = "no line of settings with DataRate".to_owned();
-            return Err(settings_error(
-                table.location(2, 1).to_string(),
-                found,
-                "DataRate, CameraRate, NumFrames, NumMarkers and Units in line 2",
-            ));
+            let expected = "DataRate, CameraRate, NumFrames, NumMarkers and Units in line 2";
+            return Err(settings_error(table.location(2, 1), "no line of settings with DataRate", expected));
         };
         Ok(Self { table, names, values, markers })
     }
 
     /// Text and place of a setting.
-    fn setting(&self, name: &str) -> Option<(&'t str, String)> {
-        let at = self.names.cells.iter().position(|cell| cell == name)?;
+    fn setting(&self, name: &str) -> Option<(&'t str, TextLocation)> {
+        let at = self.names.position(name)?;
         let text = self.values.cells.get(at).filter(|text| !text.is_empty())?;
-        Some((
-            text,
-            self.table.location(self.values.line, self.table.text_column(self.values.line, at)).to_string(),
-        ))
+        Some((text, self.table.cell_location(self.values.line, at)))
     }
 
     /// A number above 0.
-    fn positive_setting(&self, name: &str) -> Result<(f64, String), ImportError> {
+    fn positive_setting(&self, name: &str) -> ImportResult<(f64, TextLocation)> {
         let (text, place) =
-            self.setting(name).unwrap_or_else(|| ("", self.table.location(self.values.line, 1).to_string()));
-        match self.table.parse_cell(text) {
-            CellNumber::Value(value) if value > 0.0 => Ok((value, place)),
-            _ => Err(settings_error(
-                place,
-                format!("{name} `{}`", text.chars().take(40).collect::<String>()),
-                "a number above 0",
-            )),
+            self.setting(name).unwrap_or_else(|| ("", self.table.location(self.values.line, 1)));
+        if let CellNumber::Value(value) = self.table.parse_cell(text)
+            && value > 0.0
+        {
+            return Ok((value, place));
         }
+        let found = format!("{name} `{}`", text.chars().take(40).collect::<String>());
+        Err(settings_error(place, &found, "a number above 0"))
     }
 
     /// First row of data, and the cells of every marker.
-    fn marker_columns(&self, table: &DelimitedTable) -> Result<(usize, Vec<PointCells>), ImportError> {
+    fn marker_columns(&self, table: &DelimitedTable) -> ImportResult<(usize, Vec<PointCells>)> {
         let row = table.head.get(self.markers);
         let line = row.map_or(self.values.line, |row| row.line);
         let texts = row.map(TextRow::texts).unwrap_or_default();
         if !texts.first().is_some_and(|name| name.to_lowercase().starts_with("frame")) {
             let found = format!("`{}`", texts.join(" ").chars().take(60).collect::<String>());
-            return Err(settings_error(
-                table.location(line, 1).to_string(),
-                found,
-                "Frame#, Time and the names of the markers",
-            ));
+            let expected = "Frame#, Time and the names of the markers";
+            return Err(settings_error(table.location(line, 1), &found, expected));
         }
         let names: Vec<(usize, &str)> =
             texts.into_iter().enumerate().skip(CLOCK_CELLS).filter(|(_, name)| !name.is_empty()).collect();
-        if let Some((at, name)) = names
-            .iter()
-            .enumerate()
-            .find(|(index, (at, _))| *at != CLOCK_CELLS + AXES * index)
-            .map(|(_, marker)| marker)
-        {
-            let place = table.location(line, table.text_column(line, *at)).to_string();
-            return Err(settings_error(
-                place,
-                format!("the marker `{name}` in column {}", at + 1),
-                "a marker over every third column from the third on",
-            ));
+        let misplaced = |(index, (at, _)): &(usize, &(usize, &str))| *at != CLOCK_CELLS + AXES * index;
+        if let Some((_, (at, name))) = names.iter().enumerate().find(misplaced) {
+            let found = format!("the marker `{name}` in column {}", at + 1);
+            let expected = "a marker over every third column from the third on";
+            return Err(settings_error(table.cell_location(line, *at), &found, expected));
         }
         let (count, place) = self.positive_setting("NumMarkers")?;
         if count != names.len() as f64 {
-            return Err(settings_error(
-                place,
-                format!("NumMarkers {count}, but {} names in line {line}", names.len()),
-                "as many as there are markers",
-            ));
+            let found = format!("NumMarkers {count}, but {} names in line {line}", names.len());
+            return Err(settings_error(place, &found, "as many as there are markers"));
         }
         let start = table.first_numeric_row(self.markers + 1, &[0]);
-        let Some(start) = start else {
-            return Err(ImportError::HeaderOnly { file: table.file.to_owned(), line });
-        };
+        let start = start.ok_or_else(|| ImportError::header_only(table.file, line))?;
         Ok((start, names.into_iter().map(|(at, name)| PointCells::new(name, at, Some(at + 1))).collect()))
     }
 
@@ -165,43 +127,36 @@ impl<'t> TrcSettings<'t> {
             Some((CoordinateUnit::parse(short)?, format!("{place} says Units {text}")))
         });
         let camera = self.positive_setting("CameraRate").or_else(|_| self.positive_setting("DataRate")).ok();
-        // a camera's rate is that of the rows only where nothing was resampled
+        // (the rate of the rows counts: it differs from the camera's if they were resampled)
         let rows = self.positive_setting("DataRate").ok();
         let frame_rate_hz = rows.or(camera).map(|(rate, place)| (rate, format!("the settings in {place}")));
         Facts { unit, frame_rate_hz, time: TimeUnit::Seconds(1.0), ..Facts::default() }
     }
 
-    /// What the settings say of the rows must be true of them.
-    fn check_rows(&self, export: &TrackFile) -> Result<(), ImportError> {
+    /// Refuses settings that the rows contradict.
+    fn check_rows(&self, export: &TrackFile) -> ImportResult<()> {
         let Some(clock) = export.clocks.first() else { return Ok(()) };
         let (frames, place) = self.positive_setting("NumFrames")?;
         if frames != clock.len() as f64 {
-            return Err(settings_error(
-                place,
-                format!("NumFrames {frames}, but {} rows", clock.len()),
-                "as many rows as frames: the file was cut or joined",
-            ));
+            let found = format!("NumFrames {frames}, but {} rows", clock.len());
+            let expected = "as many rows as frames: the file was cut or joined";
+            return Err(settings_error(place, &found, expected));
         }
         let (rate_hz, place) = self.positive_setting("DataRate")?;
         let span = |column: &Column| Some(column.get(clock.len().checked_sub(1)?)? - column.get(0)?);
-        let implied_hz = clock
-            .frame
-            .as_ref()
-            .and_then(span)
-            .zip(clock.time.as_ref().and_then(span))
-            .map(|(frames, seconds)| frames / seconds);
+        let spans = clock.frame.as_ref().and_then(span).zip(clock.time.as_ref().and_then(span));
+        let implied_hz = spans.map(|(frames, seconds)| frames / seconds);
         match implied_hz.filter(|rate| rate.is_finite() && (rate / rate_hz - 1.0).abs() > RATE_AGREEMENT) {
-            Some(implied) => Err(settings_error(
-                place,
-                format!("DataRate {rate_hz}, but times that imply {implied:.6} frames/s"),
-                "one rate",
-            )),
+            Some(implied) => {
+                let found = format!("DataRate {rate_hz}, but times that imply {implied:.6} frames/s");
+                Err(settings_error(place, &found, "one rate"))
+            }
             None => Ok(()),
         }
     }
 
-    /// Rows at another rate than the camera's.
-    fn resampling_finding(&self) -> Option<crate::recording::quality::QualityFinding> {
+    /// The finding on rows at another rate than the camera's.
+    fn resampling_finding(&self) -> Option<QualityFinding> {
         let (camera_hz, place) = self.positive_setting("CameraRate").ok()?;
         let (rate_hz, _) = self.positive_setting("DataRate").ok()?;
         let found = format!(
@@ -215,10 +170,8 @@ impl<'t> TrcSettings<'t> {
     }
 }
 
-fn settings_error(place: String, found: String, expected: &str) -> ImportError {
-    let advice =
-        "export the TRC file again from the program that tracked the markers, or number the columns \
-        with --columns"
-            .to_owned();
+fn settings_error(place: TextLocation, found: &str, expected: &str) -> ImportError {
+    let advice = "export the TRC file again from the program that tracked the markers, or number the columns with \
+        --columns";
     ImportError::wrong_table(place, found, expected, advice)
 }

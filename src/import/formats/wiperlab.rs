@@ -1,12 +1,13 @@
-//! This program's own `trace.csv`: metres, seconds, y upwards; read back to the bit.
+//! This program's own `trace.csv`: metres, seconds, y upwards. It is read back bit for bit.
 
 use super::FileFormat;
-use crate::import::error::ImportError;
+use crate::import::error::ImportResult;
 use crate::import::options::ImportOptions;
-use crate::import::reader::{Clock, Column, CoordinateUnit, Document, Facts, TimeUnit, Track, TrackFile};
+use crate::import::reader::{
+    Clock, Column, CoordinateUnit, Document, Facts, TimeUnit, Track, TrackFile, clock_lines,
+};
 use crate::recording::files::{HEADER, YAxis, parse_trace_csv};
 
-/// The format of recordings.
 pub(crate) struct Wiperlab;
 
 impl FileFormat for Wiperlab {
@@ -19,11 +20,7 @@ impl FileFormat for Wiperlab {
         first.starts_with(HEADER).then(|| "line 1 is the header of a trace.csv".to_owned())
     }
 
-    fn read<'a>(
-        &self,
-        document: &'a Document<'a>,
-        _options: &ImportOptions,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    fn read<'a>(&self, document: &'a Document<'a>, _options: &ImportOptions) -> ImportResult<TrackFile<'a>> {
         let (grid, traces) = parse_trace_csv(document.file, document.text)?;
         let column = |values: Vec<Option<f64>>| values.into_iter().collect::<Column>();
         let track = |name: &str, x, y, confidence: Option<Vec<Option<f64>>>| Track {
@@ -34,12 +31,14 @@ impl FileFormat for Wiperlab {
             confidence: confidence.map(column),
         };
         let clock = Clock {
-            lines: (0..grid.frames).map(|frame| u32::try_from(frame + 2).unwrap_or(u32::MAX)).collect(),
+            lines: clock_lines((0..grid.frames).map(|frame| frame + 2)),
             cell: 0,
             frame: Some((0..grid.frames).map(|frame| Some(frame as f64)).collect()),
             time: Some((0..grid.frames).map(|frame| Some(grid.time_s(frame))).collect()),
         };
         let why = || "a trace.csv is in metres, seconds of the recording itself, and y upwards".to_owned();
+        let source = "the column time_s of a trace.csv, which holds times of the recording itself";
+        let note = "whether a camera took it stands in its recording.toml, not here: give --twin if none did";
         Ok(TrackFile {
             clocks: vec![clock],
             tracks: vec![
@@ -49,17 +48,11 @@ impl FileFormat for Wiperlab {
             facts: Facts {
                 y_axis: Some((YAxis::Up, why())),
                 unit: Some((CoordinateUnit::Metres(1.0), why())),
-                frame_rate_hz: Some((
-                    grid.frame_rate_hz,
-                    "the column time_s of a trace.csv, which holds times of the recording itself".to_owned(),
-                )),
+                frame_rate_hz: Some((grid.frame_rate_hz, source.to_owned())),
                 time: TimeUnit::Seconds(1.0),
                 ..Facts::default()
             },
-            notes: vec![
-                "whether a camera took it stands in its recording.toml, not here: give --twin if none did"
-                    .to_owned(),
-            ],
+            notes: vec![note.to_owned()],
             ..TrackFile::for_document(document)
         })
     }

@@ -1,24 +1,23 @@
-//! What an import cannot do without: rate, scale, direction of y and the unit of the times. The user says it,
-//! or the file does, or the documentation of its format; otherwise it is asked for.
+//! Rate, scale, direction of y and unit of the times. They come from the user, the file or the documentation of its
+//! format; an import that lacks one is refused with a question for it.
 
 use super::timing::{RATE_AGREEMENT, times_fit_rate};
 use super::track_file::{CoordinateUnit, TimeUnit};
 use crate::import::ImportReport;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
 use crate::import::reader::track_file::TrackFile;
 use crate::import::reader::{findings, track_choice};
 use crate::recording::clock;
 use crate::recording::files::YAxis;
 
-/// Rate at or below which times are taken to be frame numbers, frames/s: no camera that shows a wiper's
-/// motion is as slow.
+/// Implied rate, frames/s, at or below which times look like frame numbers: no camera that films a wiper is as slow.
 const SLOWEST_HZ: f64 = 1.0;
 
-/// The question for y where the format has none of its own.
+/// What the direction of y depends on, where the format has no words of its own.
 const Y_AXIS_OPEN: &str = "world coordinates point up unless their axes were turned; image pixels point down";
 
-/// What an import cannot do without.
+/// Facts that every import needs.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ImportCalibration {
     pub rate_hz: f64,
@@ -28,13 +27,13 @@ pub(crate) struct ImportCalibration {
     pub exposure_s: Option<f64>,
 }
 
-/// Puts the times of every export into seconds (or frames) and gathers the rest; refuses all that is missing
-/// at once, with what the files suggest.
+/// Converts the times of every export to seconds or frames, and collects the other facts. The refusal names all that
+/// is missing at once, with what the files suggest.
 pub(crate) fn calibrate(
     exports: &mut [TrackFile],
     options: &ImportOptions,
     report: &mut ImportReport,
-) -> Result<ImportCalibration, ImportError> {
+) -> ImportResult<ImportCalibration> {
     let mut missing = vec![];
     if !exports.iter_mut().all(|export| convert_times(export, options.time)) {
         missing.push(ASK_TIME.to_owned());
@@ -63,7 +62,6 @@ pub(crate) fn calibrate(
     Err(ImportError::MissingOptions { files, format: report.format.clone(), missing })
 }
 
-/// What is asked for where the unit of the times is not known.
 const ASK_TIME: &str = "--time UNIT         the times have the unit of the program's preferences, or another \
     that the file does not name: real (seconds), ms, frames, or playback";
 
@@ -95,47 +93,40 @@ fn ask_scale(exports: &[TrackFile]) -> String {
     format!("--scale S           {hint}")
 }
 
-/// Times into seconds, or into frames where `declared` says that they count them; false where their unit is
-/// not known.
+/// Converts times to seconds, or to frames where `declared` says so. Gives false where their unit is unknown.
 fn convert_times(export: &mut TrackFile, declared: Option<TimeColumn>) -> bool {
     let numbered = export.clocks.iter().all(|clock| clock.frame.is_some());
     let factor = match (declared, export.facts.time) {
         (Some(TimeColumn::Frames), _) => {
-            export
-                .clocks
-                .iter_mut()
-                .filter(|clock| clock.frame.is_none())
-                .for_each(|clock| clock.frame = clock.time.take());
+            for clock in export.clocks.iter_mut().filter(|clock| clock.frame.is_none()) {
+                clock.frame = clock.time.take();
+            }
             return true;
         }
         (Some(TimeColumn::Milliseconds), _) => 1e-3,
         (_, TimeUnit::Seconds(seconds)) => seconds,
         (Some(TimeColumn::Real | TimeColumn::Playback), _) | (None, TimeUnit::AssumedSeconds) => 1.0,
         (None, TimeUnit::Unknown) => {
-            export
-                .clocks
-                .iter_mut()
-                .filter(|clock| clock.frame.is_some())
-                .for_each(|clock| clock.time = None);
+            for clock in export.clocks.iter_mut().filter(|clock| clock.frame.is_some()) {
+                clock.time = None;
+            }
             return numbered;
         }
     };
-    // (1e-3 is no double, and neither is a product with it: a quotient of two exact numbers rounds once)
+    // (1e-3 is no double: a product with it rounds twice, a quotient by 1000 once)
     let divide = if factor < 1.0 { (1.0 / factor).round() } else { 1.0 };
-    export
-        .clocks
-        .iter_mut()
-        .filter_map(|clock| clock.time.as_mut())
-        .for_each(|time| if factor < 1.0 { time.divide(divide) } else { time.scale(factor) });
+    for time in export.clocks.iter_mut().filter_map(|clock| clock.time.as_mut()) {
+        if factor < 1.0 { time.divide(divide) } else { time.scale(factor) }
+    }
     true
 }
 
-/// The declared rate, or that of the camera's record, or that of times which are declared to be real.
+/// The declared rate, or else that of the camera's record, or else that of times declared to be real.
 fn frame_rate_hz(
     exports: &[TrackFile],
     options: &ImportOptions,
     report: &mut ImportReport,
-) -> Result<Option<f64>, ImportError> {
+) -> ImportResult<Option<f64>> {
     let records: Vec<&(f64, String)> =
         exports.iter().filter_map(|export| export.facts.frame_rate_hz.as_ref()).collect();
     let declared = options.frame_rate_hz.or(records.first().map(|first| first.0));
@@ -156,20 +147,17 @@ fn frame_rate_hz(
     }
     let implied = exports.iter().find_map(implied_hz);
     report.findings.extend(implied.filter(|hz| *hz <= SLOWEST_HZ).map(findings::counted_frames_finding));
-    report.notes.extend(implied.map(|hz| {
-        format!(
-            "recording rate {hz} frames/s: from the times, which --time declares to be the recording's own"
-        )
-    }));
+    let source = "from the times, which --time declares to be the recording's own";
+    report.notes.extend(implied.map(|hz| format!("recording rate {hz} frames/s: {source}")));
     Ok(implied)
 }
 
-/// The declared exposure, which those of the cameras' records have to agree with, or theirs.
+/// The declared exposure, or else that of the cameras' records; they have to agree.
 fn exposure_s(
     exports: &[TrackFile],
     options: &ImportOptions,
     report: &mut ImportReport,
-) -> Result<Option<f64>, ImportError> {
+) -> ImportResult<Option<f64>> {
     let recorded = || exports.iter().filter_map(|export| export.facts.exposure_s.as_ref());
     let exposure_s = options.exposure_s.or(recorded().next().map(|first| first.0));
     let Some(exposure_s) = exposure_s else { return Ok(None) };
@@ -186,13 +174,12 @@ fn exposure_s(
     Ok(Some(exposure_s))
 }
 
-/// Rate that the times of an export suggest before anything is declared.
+/// Rate that the times of an export imply, frames/s.
 fn implied_hz(export: &TrackFile) -> Option<f64> {
-    let longest =
-        export.clocks.iter().filter(|clock| clock.time.is_some()).max_by_key(|clock| clock.len())?;
-    let times: Vec<f64> = longest.time.as_ref()?.iter().flatten().collect();
-    if let Some(frames) = &longest.frame {
-        let column = longest.time.as_ref()?;
+    let timed = export.clocks.iter().filter(|clock| clock.time.is_some());
+    let longest = timed.max_by_key(|clock| clock.len())?;
+    let times = longest.times();
+    if let (Some(frames), Some(column)) = (&longest.frame, &longest.time) {
         let (frames, times): (Vec<f64>, Vec<f64>) =
             frames.iter().zip(column.iter()).filter_map(|(frame, time)| frame.zip(time)).unzip();
         let rate = (frames.last()? - frames.first()?) / (times.last()? - times.first()?);
@@ -205,7 +192,7 @@ fn implied_hz(export: &TrackFile) -> Option<f64> {
     Some(clock::simplest_rate(1.0 / fit.frame_s, |rate| times_fit_rate(&times, &frames, rate)))
 }
 
-/// The user's scale counts; a file or format that contradicts it gives a finding.
+/// The declared scale, or else a length unit of the file; a contradiction between them is a finding.
 fn coordinate_scale(
     exports: &[TrackFile],
     options: &ImportOptions,
@@ -218,8 +205,8 @@ fn coordinate_scale(
             Some(scale)
         }
         (Some(scale), None) => Some(scale),
-        (None, Some((CoordinateUnit::Metres(metres), why))) => {
-            report.notes.push(format!("lengths in {}: {why}", CoordinateUnit::Metres(*metres).describe()));
+        (None, Some((unit @ CoordinateUnit::Metres(metres), why))) => {
+            report.notes.push(format!("lengths in {}: {why}", unit.describe()));
             Some(CoordinateScale::Unit(*metres))
         }
         (None, _) => None,
@@ -227,21 +214,15 @@ fn coordinate_scale(
 }
 
 fn y_direction(exports: &[TrackFile], options: &ImportOptions, report: &mut ImportReport) -> Option<YAxis> {
-    let (stated, why) = exports
-        .iter()
-        .find_map(|export| export.facts.y_axis.as_ref())
-        .map_or((None, ""), |(axis, why)| (Some(*axis), why.as_str()));
+    let fact = exports.iter().find_map(|export| export.facts.y_axis.as_ref());
+    let Some((stated, why)) = fact else { return options.y_axis };
     let word = |axis: YAxis| if axis == YAxis::Up { "up" } else { "down" };
-    match (options.y_axis, stated) {
-        (Some(declared), Some(stated)) if declared != stated => {
-            report.findings.push(findings::y_axis_mismatch_finding(word(declared), word(stated), why));
-            Some(declared)
+    match options.y_axis {
+        Some(declared) if declared != *stated => {
+            report.findings.push(findings::y_axis_mismatch_finding(word(declared), word(*stated), why));
         }
-        (Some(declared), _) => Some(declared),
-        (None, Some(stated)) => {
-            report.notes.push(format!("y points {}: {why}", word(stated)));
-            Some(stated)
-        }
-        (None, None) => None,
+        Some(_) => {}
+        None => report.notes.push(format!("y points {}: {why}", word(*stated))),
     }
+    options.y_axis.or(Some(*stated))
 }

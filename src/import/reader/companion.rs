@@ -1,16 +1,15 @@
-//! Companions of an export: the record of a Photron camera (`.cih`, `.cihx`) has the recording rate, the
-//! saved step and the exposure. A record that contradicts the options or the table is of another video.
+//! Companion files of an export. The record of a Photron camera (`.cih`, `.cihx`) has the recording rate, the
+//! saved step and the exposure; one that contradicts the options or the table belongs to another video.
 
 use super::timing::RATE_AGREEMENT;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::ImportOptions;
 use crate::import::reader::findings::new_finding;
 use crate::import::reader::track_file::{Clock, Fact, TrackFile};
 use crate::import::{CompanionFile, ImportSource, base_name};
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
-/// Names of files that may belong to the export `file` and lie in its folder, in the order in which they are
-/// read.
+/// Names that companions of the export `file` may have in its folder, in the order in which they are read.
 pub(crate) fn companion_names(file: &str) -> Vec<String> {
     let stem = file.rsplit_once('.').map_or(file, |(stem, _)| stem);
     let by_extension =
@@ -18,7 +17,7 @@ pub(crate) fn companion_names(file: &str) -> Vec<String> {
     by_extension.chain(point_names_file(file)).collect()
 }
 
-/// DLTdv's list of point names, which belongs to a sparse table of positions.
+/// Name of DLTdv's list of point names, the companion of a sparse table.
 fn point_names_file(file: &str) -> Option<String> {
     let (folder, base) = file.split_at(file.len() - base_name(file).len());
     base.rsplit_once("xypts")
@@ -29,66 +28,74 @@ fn point_names_file(file: &str) -> Option<String> {
 /// Takes rate and exposure from the camera's record of each file, where there is one.
 ///
 /// # Errors
-/// [`ImportError::Format`] for a record that cannot be used or contradicts the options or the table; one that
-/// says no rate, or is of fewer frames than the table, is a finding where the rate is declared.
+/// [`ImportError::Format`] for a record that cannot be used or contradicts the options or the table. Where the rate
+/// is declared, a record without a rate or with fewer frames than the table is only a finding.
 pub(crate) fn read_camera_records(
     sources: &[ImportSource],
     exports: &mut [TrackFile],
     options: &ImportOptions,
-) -> Result<(), ImportError> {
+) -> ImportResult<()> {
     for (source, export) in sources.iter().zip(exports) {
         for record in source.companions.iter().filter_map(CameraRecord::parse) {
-            match (take_record(&record, export, options), options.frame_rate_hz) {
-                (Ok(()), _) => {}
-                (Err(RecordRefusal::Unusable(error)), Some(_)) => {
-                    export.findings.push(unused_record_finding(&error))
+            match CameraSettings::read(&record, export) {
+                Ok(settings) => take_settings(&record, settings, export, options)?,
+                Err(error) if options.frame_rate_hz.is_some() => {
+                    let found = format!("the camera's record is not used: {error}");
+                    export.findings.push(record_finding(Severity::Caution, (0.0, ""), found));
                 }
-                (Err(RecordRefusal::Unusable(error) | RecordRefusal::Contradiction(error)), _) => {
-                    return Err(error);
-                }
+                Err(error) => return Err(error),
             }
         }
     }
     Ok(())
 }
 
-/// Why a record is not taken.
-enum RecordRefusal {
-    /// It does not say what it should: a declared rate does without it.
-    Unusable(ImportError),
-    /// It says something else than the options, the table or another record.
-    Contradiction(ImportError),
+fn record_finding(severity: Severity, value: (f64, &str), found: String) -> QualityFinding {
+    new_finding(Check::CameraRecord, severity, value, found, "--frame-rate-hz counts")
 }
 
-fn unused_record_finding(error: &ImportError) -> QualityFinding {
-    let found = format!("the camera's record is not used: {error}");
-    new_finding(Check::CameraRecord, Severity::Caution, (0.0, ""), found, "--frame-rate-hz counts")
+/// Settings in a camera's record; rate and exposure with their lines.
+struct CameraSettings {
+    rate_hz: (f64, usize),
+    step: SavedStep,
+    exposure_s: Option<(f64, usize)>,
 }
 
-fn take_record(
+impl CameraSettings {
+    /// Reads what a declared rate can do without; a record of fewer frames than the table is of another video.
+    fn read(record: &CameraRecord, export: &TrackFile) -> ImportResult<Self> {
+        let rows = export.clocks.iter().map(Clock::len).max().unwrap_or(0);
+        if let Some(frames) = record.frame_count().filter(|frames| rows > *frames) {
+            let found =
+                format!("a record of {frames} frames, but a track of {} with {rows} rows", export.file);
+            return Err(record.refusal(1, found, "the record of the video that was tracked"));
+        }
+        let rate_hz = record.rate_hz()?;
+        Ok(Self { rate_hz, step: record.saved_step()?, exposure_s: record.exposure_s(rate_hz.0)? })
+    }
+}
+
+/// Takes the settings as facts of the export; refuses those that contradict the options, the table or another
+/// record.
+fn take_settings(
     record: &CameraRecord,
+    settings: CameraSettings,
     export: &mut TrackFile,
     options: &ImportOptions,
-) -> Result<(), RecordRefusal> {
-    refuse_too_few_frames(record, export)?;
-    let (rate_hz, line) = record.rate_hz().map_err(RecordRefusal::Unusable)?;
-    let step = record.saved_step().map_err(RecordRefusal::Unusable)?;
-    let exposure_s = record.exposure_s(rate_hz).map_err(RecordRefusal::Unusable)?;
+) -> ImportResult<()> {
     let name = || format!("the camera's record {}", base_name(record.name));
-    if step.frames > 1 {
-        let finding = saved_step_finding(record, export, options, rate_hz, &step)
-            .map_err(RecordRefusal::Contradiction)?;
+    let (rate_hz, _) = settings.rate_hz;
+    if settings.step.frames > 1 {
+        let finding = saved_step_finding(record, export, options, rate_hz, &settings.step)?;
         export.findings.push(finding);
     } else {
         let fact = &mut export.facts.frame_rate_hz;
-        check_agreement(record, fact, (rate_hz, line), "a recording rate", "frames/s")
-            .map_err(RecordRefusal::Contradiction)?;
+        check_agreement(record, fact, settings.rate_hz, "a recording rate", "frames/s")?;
         *fact = Some((rate_hz, name()));
     }
-    if let Some((exposure_s, line)) = exposure_s {
+    if let Some((exposure_s, line)) = settings.exposure_s {
         let fact = &mut export.facts.exposure_s;
-        check_agreement(record, fact, (exposure_s, line), "an exposure", "s")
-            .map_err(RecordRefusal::Contradiction)?;
+        check_agreement(record, fact, (exposure_s, line), "an exposure", "s")?;
         *fact = Some((exposure_s, name()));
     }
     Ok(())
@@ -101,7 +108,7 @@ fn check_agreement(
     (value, line): (f64, usize),
     what: &str,
     unit: &str,
-) -> Result<(), ImportError> {
+) -> ImportResult<()> {
     match known.as_ref().filter(|(known, _)| !is_near(*known, value)) {
         Some((known, place)) => {
             Err(record.refusal(line, format!("{what} of {value} {unit}"), &format!("{known} as in {place}")))
@@ -114,21 +121,21 @@ fn is_near(one: f64, other: f64) -> bool {
     (one / other - 1.0).abs() <= RATE_AGREEMENT
 }
 
-/// Where not every frame was saved, the rate of the table is that of the pictures, or that of the camera if
-/// the table counts the camera's frames: nobody can say which but the user.
+/// The finding of a record that saved only every n-th frame. The table may count the saved pictures or the camera's
+/// frames, so the user has to declare the rate.
 fn saved_step_finding(
     record: &CameraRecord,
     export: &TrackFile,
     options: &ImportOptions,
     rate_hz: f64,
     step: &SavedStep,
-) -> Result<QualityFinding, ImportError> {
+) -> ImportResult<QualityFinding> {
     let pictures_hz = rate_hz / step.frames as f64;
     let found = format!("`{}`: not every frame of the {rate_hz} a second was saved", step.written);
     let choice = format!(
         "--frame-rate-hz {pictures_hz} where the table counts the saved pictures, or {rate_hz} where its numbers are \
-         those of the camera's frames, {} from row to row (or --frame-step {})",
-        step.frames, step.frames
+         those of the camera's frames, {0} from row to row (or --frame-step {0})",
+        step.frames
     );
     let declared = options.frame_rate_hz;
     let counts_all =
@@ -139,39 +146,19 @@ fn saved_step_finding(
         return Err(record.refusal(step.line, found, &choice));
     }
     let found = format!("{}: {found}", base_name(record.name));
-    Ok(new_finding(
-        Check::CameraRecord,
-        Severity::Note,
-        (step.frames as f64, "frames"),
-        found,
-        "--frame-rate-hz counts",
-    ))
+    Ok(record_finding(Severity::Note, (step.frames as f64, "frames"), found))
 }
 
-/// Whether the frame numbers of a clock are whole steps apart.
+/// Whether the differences of a clock's frame numbers are multiples of `step`.
 fn steps_by(clock: &Clock, step: usize) -> bool {
     let Some(frames) = &clock.frame else { return false };
     let numbers: Vec<f64> = frames.iter().flatten().collect();
     numbers.len() > 1 && numbers.windows(2).all(|pair| (pair[1] - pair[0]) % step as f64 == 0.0)
 }
 
-/// A record of fewer frames than the table has belongs to another video.
-fn refuse_too_few_frames(record: &CameraRecord, export: &TrackFile) -> Result<(), RecordRefusal> {
-    let rows = export.clocks.iter().map(Clock::len).max().unwrap_or(0);
-    match record.frame_count().filter(|frames| rows > *frames) {
-        Some(frames) => Err(RecordRefusal::Unusable(record.refusal(
-            1,
-            format!("a record of {frames} frames, but a track of {} with {rows} rows", export.file),
-            "the record of the video that was tracked",
-        ))),
-        None => Ok(()),
-    }
-}
+// The record of a Photron camera: `.cih` has lines `Key : value`, `.cihx` has XML between binary data.
 
-// The record of a Photron camera: `.cih`, which is text of `Key : value` lines, and `.cihx`, which is XML
-// between bytes of other kinds.
-
-/// An entry: the start of its key in a `.cih`, in lower case, and its element in a `.cihx`.
+/// An entry of a record: the start of its key in a `.cih`, in lower case, and its element in a `.cihx`.
 #[derive(Clone, Copy)]
 struct CameraRecordKey {
     key: &'static str,
@@ -180,18 +167,17 @@ struct CameraRecordKey {
 
 const RATE: CameraRecordKey = CameraRecordKey { key: "record rate", element: "recordRate" };
 const FRAMES: CameraRecordKey = CameraRecordKey { key: "total frame", element: "totalFrame" };
-/// Every n-th frame of the recording was saved in the pictures.
+/// n, where every n-th frame of the recording was saved.
 const STEP: CameraRecordKey = CameraRecordKey { key: "save step", element: "skipFrame" };
 const SHUTTER_NS: CameraRecordKey =
     CameraRecordKey { key: "shutter type2(nsec)", element: "shutterSpeedNsec" };
-/// Exposure, s, as `1/10000` or as `0.0001`; a `.cihx` has the 10000 alone.
+/// Exposure, s, as `1/10000` or `0.0001`; a `.cihx` has only the 10000.
 const SHUTTER: CameraRecordKey = CameraRecordKey { key: "shutter speed", element: "shutterSpeed" };
-/// Start of the element that all of a `.cihx` stands in.
+/// Root element of a `.cihx`.
 const CIHX: &str = "<cih>";
 /// Most characters of a value that a refusal shows.
 const LONGEST_SHOWN: usize = 40;
 
-/// What a refusal of a record says to do.
 const RECORD_ADVICE: &str = "give the rate at which the pictures that were tracked follow each other, --frame-rate-hz N, or \
     move the record to another folder if it belongs to another video";
 
@@ -199,7 +185,7 @@ pub(crate) struct CameraRecord<'a> {
     /// File as named by the user.
     pub name: &'a str,
     text: String,
-    /// Lines of the file before the text.
+    /// Lines of the file above the text.
     skipped: usize,
 }
 
@@ -210,7 +196,7 @@ struct CameraRecordValue<'r> {
     key: &'r str,
 }
 
-/// Which frames the pictures of a record are, with the line that says so.
+/// Step from one saved frame to the next, with its line.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct SavedStep {
     /// 1 where every frame was saved.
@@ -221,7 +207,7 @@ pub(crate) struct SavedStep {
 }
 
 impl<'a> CameraRecord<'a> {
-    /// The record in a companion; bytes that are no text in it do not matter.
+    /// The record in a companion file, if its extension is that of a record. Invalid bytes are replaced.
     pub(crate) fn parse(file: &'a CompanionFile) -> Option<Self> {
         let extension = file.name.rsplit_once('.').map(|(_, extension)| extension.to_lowercase())?;
         let text = String::from_utf8_lossy(&file.bytes);
@@ -234,7 +220,7 @@ impl<'a> CameraRecord<'a> {
         Some(Self { name: &file.name, text: text.to_owned(), skipped: before.matches('\n').count() })
     }
 
-    /// Every value of an entry, in the order of the file; a record that was saved again has its own first.
+    /// The values of an entry in the order of the file. A record that was saved again has its own value first.
     fn values(&self, entry: CameraRecordKey) -> Vec<CameraRecordValue<'_>> {
         if self.text.starts_with(CIHX) { self.xml_values(entry.element) } else { self.text_values(entry.key) }
     }
@@ -243,11 +229,8 @@ impl<'a> CameraRecord<'a> {
         let lines = self.text.lines().enumerate().filter_map(|(at, line)| {
             let (key, value) = line.split_once(':')?;
             let known = key.trim().to_lowercase().starts_with(wanted);
-            known.then(|| CameraRecordValue {
-                text: value.trim(),
-                line: self.skipped + at + 1,
-                key: key.trim(),
-            })
+            let (text, line, key) = (value.trim(), self.skipped + at + 1, key.trim());
+            known.then_some(CameraRecordValue { text, line, key })
         });
         lines.collect()
     }
@@ -264,22 +247,17 @@ impl<'a> CameraRecord<'a> {
     }
 
     /// The rate at which the camera recorded, frames/s, with its line.
-    pub(crate) fn rate_hz(&self) -> Result<(f64, usize), ImportError> {
+    pub(crate) fn rate_hz(&self) -> ImportResult<(f64, usize)> {
         let Some(value) = self.values(RATE).into_iter().next() else {
             return Err(self.refusal(1, "no recording rate".to_owned(), "the entry `Record Rate(fps)`"));
         };
-        match parse_positive(value.text) {
-            Some(rate) => Ok((rate, value.line)),
-            None => Err(self.refusal(
-                value.line,
-                format!("the recording rate `{}`", shorten_value(value.text)),
-                "a number above 0",
-            )),
-        }
+        let found = || format!("the recording rate `{}`", shorten_value(value.text));
+        let rate = parse_positive(value.text).map(|rate| (rate, value.line));
+        rate.ok_or_else(|| self.refusal(value.line, found(), "a number above 0"))
     }
 
-    /// Which frames were saved. A `.cihx` says it in several places: the largest step counts.
-    pub(crate) fn saved_step(&self) -> Result<SavedStep, ImportError> {
+    /// The saved step. A `.cihx` has it in several places, and the largest counts.
+    pub(crate) fn saved_step(&self) -> ImportResult<SavedStep> {
         let mut values = self.values(STEP);
         if !self.text.starts_with(CIHX) {
             values.truncate(1);
@@ -287,15 +265,11 @@ impl<'a> CameraRecord<'a> {
         let mut found = SavedStep { frames: 1, line: 1, written: String::new() };
         for value in values {
             let written = format!("{} : {}", value.key, shorten_value(value.text));
+            let expected = "a whole number of frames from picture to picture";
+            let refuse = |_| self.refusal(value.line, format!("`{written}`"), expected);
             let frames = match value.text {
                 "" | "0" => 1,
-                text => text.parse::<usize>().map_err(|_| {
-                    self.refusal(
-                        value.line,
-                        format!("`{written}`"),
-                        "a whole number of frames from picture to picture",
-                    )
-                })?,
+                text => text.parse::<usize>().map_err(refuse)?,
             };
             if frames > found.frames {
                 found = SavedStep { frames, line: value.line, written };
@@ -304,7 +278,6 @@ impl<'a> CameraRecord<'a> {
         Ok(found)
     }
 
-    /// Pictures of the record.
     pub(crate) fn frame_count(&self) -> Option<usize> {
         self.values(FRAMES).first()?.text.parse().ok()
     }
@@ -313,22 +286,20 @@ impl<'a> CameraRecord<'a> {
     ///
     /// # Errors
     /// [`ImportError::Format`] for an exposure longer than the time of a frame.
-    pub(crate) fn exposure_s(&self, rate_hz: f64) -> Result<Option<(f64, usize)>, ImportError> {
+    pub(crate) fn exposure_s(&self, rate_hz: f64) -> ImportResult<Option<(f64, usize)>> {
         let (nanoseconds, seconds) = (self.values(SHUTTER_NS), self.values(SHUTTER));
         let found = nanoseconds.first().and_then(|value| Some((parse_positive(value.text)? * 1e-9, value)));
         let found =
             found.or_else(|| seconds.first().and_then(|value| Some((parse_exposure(value.text)?, value))));
-        match found {
-            Some((exposure_s, value)) if exposure_s * rate_hz > 1.0 + RATE_AGREEMENT => Err(self.refusal(
-                value.line,
-                format!("`{} : {}`, an exposure of {exposure_s} s", value.key, shorten_value(value.text)),
-                &format!("at most the time of a frame, {} s at {rate_hz} frames/s", 1.0 / rate_hz),
-            )),
-            found => Ok(found.map(|(exposure_s, value)| (exposure_s, value.line))),
+        let Some((exposure_s, CameraRecordValue { text, line, key })) = found else { return Ok(None) };
+        if exposure_s * rate_hz > 1.0 + RATE_AGREEMENT {
+            let found = format!("`{key} : {}`, an exposure of {exposure_s} s", shorten_value(text));
+            let expected = format!("at most the time of a frame, {} s at {rate_hz} frames/s", 1.0 / rate_hz);
+            return Err(self.refusal(*line, found, &expected));
         }
+        Ok(Some((exposure_s, *line)))
     }
 
-    /// The refusal of what line `line` says.
     pub(crate) fn refusal(&self, line: usize, found: String, expected: &str) -> ImportError {
         ImportError::format(format!("{}:{line}:1", self.name), found, expected, RECORD_ADVICE)
     }
@@ -342,8 +313,8 @@ fn parse_positive(text: &str) -> Option<f64> {
     text.parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0)
 }
 
-/// `1/10000`, `0.0001` or `10000`, with or without a unit behind: no exposure of such a camera is a second
-/// long.
+/// Reads `1/10000`, `0.0001` or `10000`, with or without a unit, as seconds. Exposures are shorter than a second, so
+/// a number above 1 is a reciprocal.
 fn parse_exposure(text: &str) -> Option<f64> {
     let number = text.trim_end_matches(|c: char| c.is_alphabetic() || c.is_whitespace() || c == '.');
     match number.split_once('/') {

@@ -1,26 +1,25 @@
-//! How a table is written: which delimiter and which decimal mark explain the whole file best.
+//! The delimiter and the decimal mark of a table: those that explain the whole file best.
 
 use super::spreadsheet;
-use crate::import::error::{ImportError, TextLocation};
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::number::{CellNumber, parse_number};
 use crate::import::reader::rows::{TextRow, parse_rows};
 
-/// Lines at the start of a file that decide the dialect, and as many spread over the rest of
-/// it.
+/// Lines that decide the dialect: this number from the start of a file, and again from the rest of it.
 const SAMPLE_LINES: usize = 1000;
-/// Bytes of either part of the sample: a cell of one digit takes thirty times its size while it is looked at.
+/// Largest size of either part of the sample, bytes: a cell of one digit takes thirty times its size in memory.
 const SAMPLE_BYTES: usize = 1 << 20;
-/// Most columns of a table: ten thousand points, of which an import takes two.
+/// Most columns of a table, enough for ten thousand points.
 const MOST_COLUMNS: usize = 20_000;
-/// One row in ten shows the leading zeros of a fraction if every second cell is one: a tenth do in each,
-/// by chance alone.
+/// If every second cell is the fraction of a number, more than one row in this number has a leading zero in one:
+/// a tenth of all fractions begin with a zero.
 const ROWS_PER_FRACTION: usize = 10;
-/// Share of numbers that a row of data has at least.
+/// A row of data has more than this share of numbers.
 const MOSTLY_NUMBERS: f64 = 0.5;
-/// The same where no row has it: three cells that name a picture and one labelled point are two numbers of
-/// five.
+/// Share where no row has [`MOSTLY_NUMBERS`]: three cells that name a picture and the two coordinates of a
+/// labelled point.
 const FEW_NUMBERS: f64 = 1.0 / 3.0;
-/// Cells of such a row at least; fewer with a number among them are any sentence.
+/// Fewest cells of such a row: a sentence with a number in it splits into fewer.
 const FEWEST_CELLS: usize = 5;
 /// Delimiter and decimal mark of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -36,11 +35,11 @@ impl Dialect {
         format!(", delimiter {}, decimal mark `{}`", self.delimiter.word(), self.decimal)
     }
 
-    /// Finds the dialect by which delimiter makes the most rows of numbers of one length.
+    /// Finds the delimiter that makes the most rows of numbers of one length, and then the decimal mark.
     ///
     /// # Errors
     /// [`ImportError`] when no delimiter makes columns, when there are no numbers, or when commas are both.
-    pub(crate) fn find(file: &str, text: &str) -> Result<Self, ImportError> {
+    pub(crate) fn find(file: &str, text: &str) -> ImportResult<Self> {
         let declared = declared_delimiter(text);
         let of_the_table = |line: &NumberedLine| !(is_comment(line.1) || (declared.is_some() && line.0 == 1));
         let lines: Vec<NumberedLine> = sample_lines(text).into_iter().filter(of_the_table).collect();
@@ -50,9 +49,8 @@ impl Dialect {
             let scored = candidates.iter().map(|&delimiter| {
                 (delimiter_score(&parse_rows(&lines, delimiter), delimiter, (least, cells)), delimiter)
             });
-            scored
-                .reduce(|best, next| if next.0 > best.0 + 1e-9 { next } else { best })
-                .filter(|best| best.0 > 0.0)
+            let best = scored.reduce(|best, next| if next.0 > best.0 + 1e-9 { next } else { best });
+            best.filter(|best| best.0 > 0.0)
         };
         let found = best(MOSTLY_NUMBERS, 2)
             .or_else(|| best(FEW_NUMBERS, FEWEST_CELLS).filter(|(_, delimiter)| delimiter.separates_words()));
@@ -65,7 +63,7 @@ impl Dialect {
     }
 }
 
-/// The first lines with anything in them, and some from all over the rest.
+/// The first lines that are not blank, and lines at even distances from the rest.
 fn sample_lines(text: &str) -> Vec<NumberedLine<'_>> {
     let mut lines: Vec<NumberedLine> = vec![];
     let (mut number, mut at) = (0, 0);
@@ -96,25 +94,29 @@ fn sample_lines(text: &str) -> Vec<NumberedLine<'_>> {
     lines
 }
 
-/// Refuses rows of more columns than any table has, before their cells fill memory.
-fn refuse_too_many_columns(file: &str, lines: &[NumberedLine]) -> Result<(), ImportError> {
+/// Refuses rows of too many columns before their cells fill memory.
+fn refuse_too_many_columns(file: &str, lines: &[NumberedLine]) -> ImportResult<()> {
     let columns = |text: &str, mark: u8| text.bytes().filter(|byte| *byte == mark).count() + 1;
     let most = |text: &str| {
         DELIMITERS.iter().filter_map(|delimiter| Some(columns(text, delimiter.byte()?))).max().unwrap_or(0)
     };
     match lines.iter().find(|(_, text)| text.len() >= MOST_COLUMNS && most(text) > MOST_COLUMNS) {
-        Some((line, text)) => Err(ImportError::format(
-            TextLocation { file: file.to_owned(), line: *line, column: 1 },
-            format!("a row of {} columns", most(text)),
-            format!("at most {MOST_COLUMNS}"),
-            "export the tracks of tip and head alone, with a row a frame",
-        )),
+        Some((line, text)) => {
+            let found = format!("a row of {} columns", most(text));
+            let advice = "export the tracks of tip and head alone, with a row a frame";
+            Err(ImportError::format(
+                format!("{file}:{line}:1"),
+                found,
+                format!("at most {MOST_COLUMNS}"),
+                advice,
+            ))
+        }
         None => Ok(()),
     }
 }
 
-/// How well `delimiter` explains the rows: the share of numbers, summed over rows of the usual length that
-/// have more than the share `least` of them in at least `cells` cells.
+/// How well `delimiter` explains the rows: the sum of the shares of numbers over rows of the median length. Rows
+/// count that have at least `cells` cells and more than the share `least` of numbers.
 fn delimiter_score(rows: &[TextRow], delimiter: Delimiter, (least, cells): (f64, usize)) -> f64 {
     let measured = rows.iter().map(|row| (row.cells.len(), numeric_share(&row.cells, delimiter)));
     let numeric: Vec<(usize, f64)> =
@@ -124,7 +126,7 @@ fn delimiter_score(rows: &[TextRow], delimiter: Delimiter, (least, cells): (f64,
     let usual = counts.get(counts.len() / 2).copied().unwrap_or(0);
     let always_empty = |i: usize| rows.iter().all(|row| row.cells.get(i).is_none_or(String::is_empty));
     if delimiter == Delimiter::Space && (1..usual.saturating_sub(1)).any(always_empty) {
-        return 0.0; // spaces that pad
+        return 0.0; // (spaces that align the columns)
     }
     numeric.iter().filter(|(count, _)| *count == usual).map(|(_, share)| share).sum()
 }
@@ -146,17 +148,13 @@ fn is_value(text: &str, decimal: char) -> bool {
     matches!(parse_number(text, decimal), CellNumber::Value(_))
 }
 
-/// The mark that more of the numbers need; a comma that delimits cannot be one.
+/// The mark that more of the numbers contain. With a comma as delimiter it is the point.
 fn decimal_mark(rows: &[TextRow], delimiter: Delimiter) -> char {
     if delimiter == Delimiter::Comma {
         return '.';
     }
-    let numbers = |mark: char| {
-        rows.iter()
-            .flat_map(|row| &row.cells)
-            .filter(|cell| cell.contains(mark) && is_value(cell, mark))
-            .count()
-    };
+    let cells = || rows.iter().flat_map(|row| &row.cells);
+    let numbers = |mark: char| cells().filter(|cell| cell.contains(mark) && is_value(cell, mark)).count();
     if numbers(',') > numbers('.') { ',' } else { '.' }
 }
 
@@ -164,16 +162,12 @@ fn is_numeric(row: &&TextRow) -> bool {
     row.cells.first().is_some_and(|cell| is_value(cell, '.'))
 }
 
-/// `1,5,2,5` under a header of two: digits on both sides of every second comma.
-fn refuse_double_comma(file: &str, rows: &[TextRow]) -> Result<(), ImportError> {
+/// Refuses rows such as `1,5,2,5` under a header of two names: the comma is the decimal mark too.
+fn refuse_double_comma(file: &str, rows: &[TextRow]) -> ImportResult<()> {
     let text = |cell: &String| cell.is_empty() || parse_number(cell, '.') != CellNumber::Missing;
-    // (the column of row numbers has no name in several programs)
-    let first = |row: &TextRow| {
-        row.cells
-            .iter()
-            .find(|cell| !cell.is_empty())
-            .is_some_and(|cell| parse_number(cell, '.') == CellNumber::Text)
-    };
+    // (several programs leave the column of row numbers without a name)
+    let is_word = |cell: &String| parse_number(cell, '.') == CellNumber::Text;
+    let first = |row: &TextRow| row.cells.iter().find(|cell| !cell.is_empty()).is_some_and(is_word);
     let named = |row: &&TextRow| row.cells.iter().all(text) && first(row);
     let numeric: Vec<&TextRow> = rows.iter().filter(is_numeric).collect();
     let Some(header) = rows.iter().take_while(|row| !is_numeric(row)).filter(named).last() else {
@@ -191,9 +185,9 @@ fn refuse_double_comma(file: &str, rows: &[TextRow]) -> Result<(), ImportError> 
     }
 }
 
-/// `0,000,10,050` without a header: every second cell has the leading zeros of a fraction, as no whole number
-/// does.
-fn refuse_split_numbers(file: &str, rows: &[&TextRow]) -> Result<(), ImportError> {
+/// Refuses rows such as `0,000,10,050` without a header: no whole number has the leading zeros of every second
+/// cell.
+fn refuse_split_numbers(file: &str, rows: &[&TextRow]) -> ImportResult<()> {
     let fraction = |cell: &String| {
         cell.strip_prefix('0').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
     };
@@ -204,23 +198,29 @@ fn refuse_split_numbers(file: &str, rows: &[&TextRow]) -> Result<(), ImportError
     let shown = rows.iter().filter(|row| row.cells.iter().skip(1).step_by(2).any(fraction)).count();
     match rows.first() {
         Some(row) if ROWS_PER_FRACTION * shown > rows.len() && rows.iter().all(|row| fits(&row)) => {
-            Err(double_comma_error(
-                file,
-                row,
-                format!("that look like {} numbers cut in two", row.cells.len() / 2),
-            ))
+            let instead = format!("that look like {} numbers cut in two", row.cells.len() / 2);
+            Err(double_comma_error(file, row, instead))
         }
         _ => Ok(()),
     }
 }
 
 fn double_comma_error(file: &str, row: &TextRow, instead: String) -> ImportError {
-    ImportError::DecimalComma {
-        place: TextLocation { file: file.to_owned(), line: row.line, column: 1 },
-        found: row.cells.len(),
-        instead,
-    }
+    ImportError::format(
+        format!("{file}:{}:1", row.line),
+        format!("{} cells {instead}: the comma is both delimiter and decimal mark", row.cells.len()),
+        "one use of it",
+        "export again with a tab or semicolon as delimiter, or with decimal points",
+    )
 }
+
+const POINT_EXPECTED: &str = "a decimal point where commas stand between the cells: the comma within may be a \
+    decimal mark or separate thousands";
+const POINT_ADVICE: &str = "export again with decimal points and without separators of thousands, or with semicolons \
+    or tabs between the cells";
+const COLUMNS_EXPECTED: &str = "columns separated by tabs, semicolons, commas or spaces";
+const COLUMNS_ADVICE: &str = "export again with one of these delimiters, and without units or brackets next to the \
+    numbers";
 
 /// The refusal where no delimiter makes rows of numbers.
 fn no_columns_error(file: &str, lines: &[NumberedLine]) -> ImportError {
@@ -229,35 +229,37 @@ fn no_columns_error(file: &str, lines: &[NumberedLine]) -> ImportError {
     };
     match (lines.iter().find(starts_like_data), lines.last()) {
         (Some((line, text)), _) => {
-            let place = TextLocation { file: file.to_owned(), line: *line, column: 1 };
+            let place = format!("{file}:{line}:1");
             if let Some(cell) = find_quoted_comma(text) {
-                return ImportError::QuotedComma { place, found: cell };
+                return ImportError::format(
+                    place,
+                    format!("`{cell}` in quotes"),
+                    POINT_EXPECTED,
+                    POINT_ADVICE,
+                );
             }
-            ImportError::Delimiter { place, found: text.trim().chars().take(60).collect() }
+            let found: String = text.trim().chars().take(60).collect();
+            ImportError::format(place, format!("`{found}`"), COLUMNS_EXPECTED, COLUMNS_ADVICE)
         }
-        (None, Some((line, _))) => ImportError::HeaderOnly { file: file.to_owned(), line: *line },
-        (None, None) => ImportError::Empty { file: file.to_owned() },
+        (None, Some((line, _))) => ImportError::header_only(file, *line),
+        (None, None) => ImportError::empty(file),
     }
 }
 
-/// A number in quotes that holds a comma, in a line of commas: a decimal mark or a separator of thousands.
+/// A quoted number with a comma, which is a decimal mark or separates thousands.
 fn find_quoted_comma(line: &str) -> Option<String> {
     let is_number = |part: &&str| {
         part.contains(',')
             && (is_value(part, ',')
                 || part.chars().all(|c| c.is_ascii_digit() || matches!(c, ',' | '.' | '-')))
     };
-    line.split('"')
-        .skip(1)
-        .step_by(2)
-        .find(is_number)
-        .filter(|part| part.starts_with(|c: char| c.is_ascii_digit() || c == '-'))
-        .map(str::to_owned)
+    let starts_number = |part: &&str| part.starts_with(|c: char| c.is_ascii_digit() || c == '-');
+    line.split('"').skip(1).step_by(2).find(is_number).filter(starts_number).map(str::to_owned)
 }
 
-// What stands between cells, and which lines are no rows.
+// Delimiters and comments.
 
-/// What stands between cells.
+/// The character between cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Delimiter {
     Tab,
@@ -269,24 +271,24 @@ pub(crate) enum Delimiter {
     Blanks,
 }
 
-/// In order of preference where several explain a file equally well: a comma may be a decimal mark, a space
-/// may pad.
+/// In order of preference where several explain a file equally well: a comma may also be a decimal mark, a space
+/// may align columns.
 pub(crate) const DELIMITERS: [Delimiter; 5] =
     [Delimiter::Tab, Delimiter::Semicolon, Delimiter::Comma, Delimiter::Space, Delimiter::Blanks];
-/// First line with which spreadsheets declare their delimiter.
+/// Start of the first line in which spreadsheets declare their delimiter.
 const DELIMITER_DECLARATION: &str = "sep=";
 /// A word for "missing" that starts like a comment.
 const NOT_COMMENT: &str = "#n/a";
-/// What ends the first cell of a row that starts like a comment.
+/// Ends of the first cell of a row that starts like a comment.
 const CELL_ENDS: [char; 3] = [',', ';', '\t'];
-/// Marks of lines for people.
+/// Marks of comments.
 const COMMENTS: [&str; 4] = ["#", "//", "***", "%"];
 
 /// A line with its 1-based number.
 pub(crate) type NumberedLine<'a> = (usize, &'a str);
 
 impl Delimiter {
-    /// Its byte, where it is one.
+    /// The byte, unless it is a run of blanks.
     pub(crate) fn byte(self) -> Option<u8> {
         match self {
             Self::Tab => Some(b'\t'),
@@ -297,12 +299,11 @@ impl Delimiter {
         }
     }
 
-    /// Whether it never stands between the words of a sentence as often as between cells.
+    /// Whether it is not the blank between the words of a sentence.
     pub(crate) fn separates_words(self) -> bool {
         matches!(self, Self::Tab | Self::Semicolon | Self::Comma)
     }
 
-    /// The word for it.
     pub(crate) fn word(self) -> &'static str {
         match self {
             Self::Tab => "tab",
@@ -314,11 +315,11 @@ impl Delimiter {
     }
 }
 
-/// Whether a line is for people: `#`, `//`, `***` or `%` in front, but not the word `#N/A`, and no cell of a
-/// spreadsheet such as `#####` or `#REF!` before numbers.
+/// Whether a line is a comment: it starts with `#`, `//`, `***` or `%`. The word `#N/A` is none, nor is a cell of
+/// a spreadsheet such as `#####` or `#REF!` before numbers.
 pub(crate) fn is_comment(line: &str) -> bool {
     if line.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
-        return false; // nearly every line there is
+        return false; // (nearly every line)
     }
     let start = line.trim_start_matches([' ', '"']);
     let missing =
@@ -326,7 +327,7 @@ pub(crate) fn is_comment(line: &str) -> bool {
     COMMENTS.iter().any(|mark| start.starts_with(mark)) && !missing() && !starts_with_damage(start)
 }
 
-/// Whether a spreadsheet wrote the first cell of a row of numbers.
+/// Whether the line is a row of numbers whose first cell a spreadsheet has damaged.
 fn starts_with_damage(line: &str) -> bool {
     line.split_once(CELL_ENDS).is_some_and(|(cell, rest)| {
         let cell = cell.trim_matches(['"', ' ']);

@@ -1,6 +1,6 @@
 //! Bytes to text: the only file that names `encoding_rs`.
 
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::file_type;
 use encoding_rs::{Encoding, SHIFT_JIS, UTF_8, UTF_16BE, UTF_16LE, WINDOWS_1252};
 use std::borrow::Cow;
@@ -14,17 +14,16 @@ pub(crate) struct DecodedText<'a> {
     pub encoding: &'static str,
 }
 
-/// Decodes `bytes`: byte-order mark, then strict UTF-8, then CP932 where the bytes look like Japanese, then
-/// Windows-1252, unless an encoding is `wanted`.
+/// Decodes `bytes` in the encoding `wanted`. Without one, a byte-order mark decides; then strict UTF-8 is tried,
+/// then CP932 where the bytes look Japanese, then Windows-1252.
 ///
 /// # Errors
-/// [`ImportError`] for files that are not text, unknown encodings and bytes that the wanted one does not
-/// have.
+/// [`ImportError`] for files that are not text, unknown encodings and bytes that are not valid in the encoding.
 pub(crate) fn decode_text<'a>(
     file: &str,
     bytes: &'a [u8],
     wanted: Option<&str>,
-) -> Result<DecodedText<'a>, ImportError> {
+) -> ImportResult<DecodedText<'a>> {
     if let Some(error) = file_type::refuse_bytes(file, bytes) {
         return Err(error);
     }
@@ -40,12 +39,12 @@ pub(crate) fn decode_text<'a>(
         return Err(file_type::refuse_zero_bytes(file, &text[..offset]));
     }
     if text.trim().is_empty() {
-        return Err(ImportError::Empty { file: file.to_owned() });
+        return Err(ImportError::empty(file));
     }
     Ok(DecodedText { text: normalise_line_ends(text), encoding })
 }
 
-/// A carriage return alone ends a line too, in files from old Macintosh programs.
+/// In files of old Macintosh programs a single carriage return ends a line.
 fn normalise_line_ends(text: Cow<str>) -> Cow<str> {
     if !text.contains('\r') {
         return text;
@@ -59,30 +58,25 @@ fn normalise_line_ends(text: Cow<str>) -> Cow<str> {
     }
 }
 
-fn encoding_by_name(name: &str) -> Result<&'static Encoding, ImportError> {
+fn encoding_by_name(name: &str) -> ImportResult<&'static Encoding> {
     let label = if name.eq_ignore_ascii_case("cp932") { "shift_jis" } else { name };
-    Encoding::for_label(label.as_bytes())
-        .ok_or_else(|| ImportError::UnknownEncoding { found: name.to_owned() })
+    let expected = "a name such as utf-8, utf-16le, windows-1252 or shift_jis";
+    let refuse = || ImportError::option("--encoding", name, expected);
+    Encoding::for_label(label.as_bytes()).ok_or_else(refuse)
 }
 
 fn has_utf16_mark(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\xff\xfe") || bytes.starts_with(b"\xfe\xff")
 }
 
-fn detect_encoding<'a>(file: &str, bytes: &'a [u8]) -> Result<(Cow<'a, str>, &'static str), ImportError> {
-    let utf_8 = decode_as(file, bytes, UTF_8);
-    if utf_8.is_ok() {
-        return utf_8;
-    }
-    if looks_japanese(bytes) {
-        return decode_as(file, bytes, SHIFT_JIS);
-    }
-    decode_as(file, bytes, WINDOWS_1252)
+fn detect_encoding<'a>(file: &str, bytes: &'a [u8]) -> ImportResult<(Cow<'a, str>, &'static str)> {
+    let other = if looks_japanese(bytes) { SHIFT_JIS } else { WINDOWS_1252 };
+    decode_as(file, bytes, UTF_8).or_else(|_| decode_as(file, bytes, other))
 }
 
-/// Whether bytes that are no UTF-8 are CP932: nearly any bytes are valid in it, but kana and the common kanji
-/// have a first byte of 0x81 to 0x9f, where Windows-1252 has quotation marks and dashes. Half of what is not
-/// ASCII must be such pairs.
+/// Whether bytes that are not UTF-8 are CP932. Nearly any bytes are valid in it, but kana and the common kanji
+/// start with a byte from 0x81 to 0x9f, where Windows-1252 has quotation marks and dashes. At least half of the
+/// characters beyond ASCII must be such pairs.
 fn looks_japanese(bytes: &[u8]) -> bool {
     let (mut pairs, mut others, mut at) = (0, 0, 0);
     while let Some(&byte) = bytes.get(at) {
@@ -104,10 +98,12 @@ fn decode_as<'a>(
     file: &str,
     bytes: &'a [u8],
     encoding: &'static Encoding,
-) -> Result<(Cow<'a, str>, &'static str), ImportError> {
+) -> ImportResult<(Cow<'a, str>, &'static str)> {
     let (text, malformed) = encoding.decode_with_bom_removal(bytes);
     if malformed {
-        return Err(ImportError::Encoding { file: file.to_owned(), encoding: encoding.name().to_owned() });
+        let found = format!("bytes that are not {}", encoding.name());
+        let advice = "name another encoding with --encoding, e.g. utf-8, utf-16le, windows-1252, shift_jis";
+        return Err(ImportError::format(file, found, "text", advice));
     }
     Ok((text, encoding.name()))
 }

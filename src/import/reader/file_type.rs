@@ -1,20 +1,24 @@
-//! Files that are no table of points over time: projects, workbooks, archives, pages. Each is refused with
-//! what to export instead.
+//! Files that are not tables of points over time, such as projects, workbooks and archives. Each is refused with
+//! advice on what to export instead.
 
 use crate::import::error::ImportError;
 
-const PICTURE: (&str, &str) =
-    ("a picture", "track the points in the tracking program and export their table");
-const VIDEO: (&str, &str) =
+/// A kind of file, and the advice to its user.
+type FileKind = (&'static str, &'static str);
+
+const PICTURE: FileKind = ("a picture", "track the points in the tracking program and export their table");
+const VIDEO: FileKind =
     ("a video", "track the points first, e.g. with Tracker or Kinovea, then export their table");
+const PICKLE: FileKind =
+    ("a Python pickle (.pkl, .pickle)", "save the array as CSV (numpy.savetxt, or pandas: to_csv)");
 const SHEET: &str = "save the sheet as CSV (File > Save As) and import that";
-const CAMERA_RECORD: (&str, &str) = (
+const CAMERA_RECORD: FileKind = (
     "a Photron camera's record, not a table",
     "import the tracked points and keep this file in their folder under the same name (run7.csv, run7.cih): the \
      recording rate is read from it",
 );
 
-/// First bytes, what such a file is, and what to do instead.
+/// Kinds by their first bytes.
 const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
     (b"PK\x05\x06", ("an empty zip archive", "export the tracks as CSV")),
     (b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1", ("an old Excel workbook (.xls)", SHEET)),
@@ -61,7 +65,7 @@ const BY_BYTES: [(&[u8], (&str, &str)); 27] = [
     (b"\x00\x00\x01\xb3", VIDEO),
 ];
 
-/// Names inside a zip archive that show what it is; the first that occurs counts.
+/// Kinds of zip archives by names inside them; the first name that occurs counts.
 const IN_ZIP: [(&[u8], (&str, &str)); 6] = [
     (b"opendocument.spreadsheet", ("an OpenDocument workbook (.ods)", SHEET)),
     (b"xl/", ("an Excel workbook (.xlsx)", SHEET)),
@@ -76,19 +80,19 @@ const IN_ZIP: [(&[u8], (&str, &str)); 6] = [
         ),
     ),
 ];
-/// Bytes at either end of a file in which names are looked for: a zip archive has its first entries there,
-/// and its directory.
+/// Bytes at either end of a file in which names are searched: a zip archive has its first entries at the start
+/// and its directory at the end.
 const SEARCHED_BYTES: usize = 65_536;
-/// Kinds of boxes that an MP4 or QuickTime file starts with.
+/// Types of the first box of an MP4 or QuickTime file.
 const MP4_BOXES: [&[u8]; 5] = [b"ftyp", b"moov", b"mdat", b"wide", b"free"];
-/// Protocols of Python's pickle that start with their number.
+/// Versions of Python's pickle that start with their number.
 const PICKLES: std::ops::RangeInclusive<u8> = 2..=5;
 /// Second byte of a C3D file, length of its blocks, and processor types of its parameter section.
 const C3D: u8 = 0x50;
 const C3D_BLOCK: usize = 512;
 const C3D_PROCESSORS: std::ops::RangeInclusive<u8> = 84..=86;
 
-/// What the text of a file that no format recognises starts with, what it is, and what to do instead.
+/// Kinds by the start of the text, in lower case.
 const BY_TEXT: [(&str, (&str, &str)); 5] = [
     ("<!doctype html", ("a web page", "save the table itself, not the page around it")),
     ("<html", ("a web page", "save the table itself, not the page around it")),
@@ -102,8 +106,8 @@ const BY_TEXT: [(&str, (&str, &str)); 5] = [
     ),
     ("%!ps", ("a PostScript document", "export the numbers from the tracking program")),
 ];
-/// What XML, JSON and other marked-up text holds in its first part; the first that occurs counts, and the
-/// last says what is left.
+/// Kinds of XML by a text in the first part, in lower case; the first that occurs counts, and the last fits
+/// all.
 const IN_MARKUP: [(&str, (&str, &str)); 6] = [
     ("<cih>", CAMERA_RECORD),
     (
@@ -138,33 +142,30 @@ const IN_MARKUP: [(&str, (&str, &str)); 6] = [
         ),
     ),
 ];
+/// The same for JSON.
 const IN_JSON: [(&str, (&str, &str)); 3] = [
     ("captureframerate", ("Kinovea's JSON", "in Kinovea use File > Export > CSV trajectories instead")),
     ("videoframerate", ("Kinovea's JSON", "in Kinovea use File > Export > CSV trajectories instead")),
     ("", ("JSON", "export the tracks as CSV")),
 ];
-/// Characters at the start of a file in which its kind shows.
+/// Characters at the start of a file in which these are searched.
 const SEARCHED_CHARACTERS: usize = 4000;
 
-/// The refusal of a file whose bytes show that it is no text.
+/// The refusal of a file whose bytes show that it is not text.
 pub(crate) fn refuse_bytes(file: &str, bytes: &[u8]) -> Option<ImportError> {
     let found = BY_BYTES.iter().find(|kind| bytes.starts_with(kind.0)).map(|kind| kind.1);
     let found = found.or_else(|| kind_of_zip(bytes)).or_else(|| kind_by_layout(bytes));
-    let found = found.or_else(|| {
-        contains_bytes(bytes.get(..SEARCHED_BYTES).unwrap_or(bytes), b"<cih>").then_some(CAMERA_RECORD)
-    });
-    found.map(|kind| wrong_kind_error(file, kind))
+    let start = bytes.get(..SEARCHED_BYTES).unwrap_or(bytes);
+    let found = found.or_else(|| contains_bytes(start, b"<cih>").then_some(CAMERA_RECORD));
+    found.map(|kind| wrong_kind_error(file, 1, kind))
 }
 
-/// A zip archive shows what it is by the names in it.
-fn kind_of_zip(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
+fn kind_of_zip(bytes: &[u8]) -> Option<FileKind> {
     if !bytes.starts_with(b"PK\x03\x04") {
         return None;
     }
-    let ends = [
-        bytes.get(..SEARCHED_BYTES).unwrap_or(bytes),
-        bytes.get(bytes.len().saturating_sub(SEARCHED_BYTES)..).unwrap_or(bytes),
-    ];
+    let last = &bytes[bytes.len().saturating_sub(SEARCHED_BYTES)..];
+    let ends = [bytes.get(..SEARCHED_BYTES).unwrap_or(bytes), last];
     IN_ZIP.iter().find(|kind| ends.iter().any(|end| contains_bytes(end, kind.0))).map(|kind| kind.1)
 }
 
@@ -172,23 +173,18 @@ fn contains_bytes(bytes: &[u8], name: &[u8]) -> bool {
     name.is_empty() || bytes.windows(name.len()).any(|part| part == name)
 }
 
-/// Kinds that show in more than their first bytes.
-fn kind_by_layout(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
+/// Kinds that need more than the first bytes.
+fn kind_by_layout(bytes: &[u8]) -> Option<FileKind> {
     let at = |index: usize| bytes.get(index).copied();
     if at(0) == Some(0) && bytes.get(4..8).is_some_and(|kind| MP4_BOXES.contains(&kind)) {
         return Some(VIDEO);
     }
     if at(0) == Some(0x80) && at(1).is_some_and(|protocol| PICKLES.contains(&protocol)) {
-        return Some((
-            "a Python pickle (.pkl, .pickle)",
-            "save the array as CSV (numpy.savetxt, or pandas: to_csv)",
-        ));
+        return Some(PICKLE);
     }
     let control = |byte: &u8| *byte > 0 && *byte < b' ' && !matches!(byte, b'\t' | b'\n' | b'\r');
-    let block = at(0)
-        .filter(control)
-        .filter(|_| at(1) == Some(C3D))
-        .map(|block| (usize::from(block) - 1) * C3D_BLOCK);
+    let block = at(0).filter(|byte| control(byte) && at(1) == Some(C3D));
+    let block = block.map(|block| (usize::from(block) - 1) * C3D_BLOCK);
     if block.and_then(|start| at(start + 3)).is_some_and(|processor| C3D_PROCESSORS.contains(&processor)) {
         return Some(("a C3D file", "export the markers as TRC or CSV from the program that reads it"));
     }
@@ -197,36 +193,31 @@ fn kind_by_layout(bytes: &[u8]) -> Option<(&'static str, &'static str)> {
         .then_some(PICTURE)
 }
 
-/// The refusal of a text that shows itself to be no table.
+/// The refusal of a text that is not a table.
 pub(crate) fn refuse_text(file: &str, text: &str) -> Option<ImportError> {
     // a tab in front is an empty cell: what follows is the name of a track
-    let start = text
-        .trim_start_matches([' ', '\r', '\n'])
-        .chars()
-        .take(SEARCHED_CHARACTERS)
-        .collect::<String>()
-        .to_lowercase();
-    let inside = |kinds: &[(&str, (&'static str, &'static str))]| {
-        kinds.iter().find(|kind| start.contains(kind.0)).map(|kind| kind.1)
-    };
+    let start = text.trim_start_matches([' ', '\r', '\n']).chars();
+    let start = start.take(SEARCHED_CHARACTERS).collect::<String>().to_lowercase();
+    let inside =
+        |kinds: &[(&str, FileKind)]| kinds.iter().find(|kind| start.contains(kind.0)).map(|kind| kind.1);
     let found = BY_TEXT.iter().find(|kind| start.starts_with(kind.0)).map(|kind| kind.1);
     let found = found.or_else(|| if start.starts_with('<') { inside(&IN_MARKUP) } else { None });
     let json = start.starts_with('{')
         || start.strip_prefix('[').is_some_and(|rest| rest.trim_start().starts_with(['{', '[']));
     let found = found.or_else(|| if json { inside(&IN_JSON) } else { None });
-    found.map(|kind| wrong_kind_error(file, kind))
+    found.map(|kind| wrong_kind_error(file, 1, kind))
 }
 
-/// The refusal of a text with zero bytes in it, which stand behind `before`.
+/// The refusal of a text with a zero byte; `before` is the text in front of it.
 pub(crate) fn refuse_zero_bytes(file: &str, before: &str) -> ImportError {
     let line = before.matches('\n').count() + 1;
     let advice =
         "export the tracks as text, e.g. CSV; for UTF-16 without a byte-order mark add --encoding utf-16le";
-    ImportError::WrongKind { file: file.to_owned(), line, found: "binary data (zero bytes)", advice }
+    wrong_kind_error(file, line, ("binary data (zero bytes)", advice))
 }
 
-fn wrong_kind_error(file: &str, (found, advice): (&'static str, &'static str)) -> ImportError {
-    ImportError::WrongKind { file: file.to_owned(), line: 1, found, advice }
+fn wrong_kind_error(file: &str, line: usize, (found, advice): FileKind) -> ImportError {
+    ImportError::format(format!("{file}:{line}:1"), found, "a table exported as text", advice)
 }
 
 #[cfg(test)]

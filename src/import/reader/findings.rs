@@ -1,32 +1,30 @@
-//! What only the export can show of a recording's quality: its times, lost points, units that do not look
-//! like the declared one.
+//! Findings on the quality of a recording that only its export shows: rounded times, lost points, doubtful units.
 
-use super::timing::{QUANTA_S, are_multiples};
+use super::timing::find_quantum_s;
 use super::track_file::{Clock, CoordinateUnit};
 use crate::import::options::CoordinateScale;
 use crate::recording::clock::OFF_GRID_LIMIT_FRAMES;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use std::collections::BTreeMap;
 
-/// Exact (0, 0) positions in a row that look like a lost point: one may be a point on the origin.
+/// Fewest frames in a row at exactly (0, 0) that look like a lost point: a single one may be on the origin.
 const ZERO_RUN: usize = 3;
-/// A lost point as scripts around OpenCV write it: no pixel is there, so that one of them shows it.
+/// Both coordinates of a lost point as scripts around OpenCV write it. It is outside the picture, so one frame is
+/// enough.
 const OUTSIDE_PICTURE: f64 = -1.0;
-/// Coordinates beyond which a length in millimetres or more looks like pixels: views in which a lip is
-/// resolved are rarely wider than this many millimetres, pictures are hardly ever narrower than this many
-/// pixels.
+/// Coordinates above this number look like pixels if their unit is a millimetre or larger: a view that resolves a
+/// lip is rarely wider than this in millimetres, and a picture hardly ever narrower in pixels.
 const PIXEL_LIKE_LIMIT: f64 = 100.0;
-/// Smallest unit of which that holds, m: in micrometres every view has such numbers.
+/// Smallest unit to which [`PIXEL_LIKE_LIMIT`] applies, m: in micrometres every view has larger numbers.
 const MILLIMETRE_M: f64 = 1e-3;
 /// Fewest values from which "all are whole numbers" means pixels.
 const FEWEST_WHOLE: usize = 8;
 /// Rounding of times, in frames, from which it is worth a caution: a tenth of a frame shifts the phase of a
 /// component at a fifth of the frame rate by 7 degrees.
 const COARSE_FRAMES: f64 = 0.1;
-/// Largest difference of two units that are meant to be one.
+/// Largest relative difference of two equal units.
 const SAME_UNIT: f64 = 1e-9;
 
-/// A finding of the check `check` in the unit `unit`.
 pub(crate) fn new_finding(
     check: Check,
     severity: Severity,
@@ -39,90 +37,65 @@ pub(crate) fn new_finding(
 
 /// Times that are rounded to a noticeable part of a frame.
 pub(crate) fn rounded_times_finding(file: &str, times: &[f64], rate_hz: f64) -> Option<QualityFinding> {
-    let quantum_s =
-        QUANTA_S.into_iter().find(|quantum| !times.is_empty() && are_multiples(times, *quantum))?;
+    let quantum_s = find_quantum_s(times).filter(|_| !times.is_empty())?;
     let frames = quantum_s * rate_hz;
-    // evenly spaced times lose nothing by it
+    // the rounding changes nothing where a frame lasts a whole number of quanta
     let even =
         (1.0 / rate_hz / quantum_s - (1.0 / rate_hz / quantum_s).round()).abs() <= 1e-6 && frames <= 1.0;
     let severity = if frames > COARSE_FRAMES { Severity::Caution } else { Severity::Note };
     let found = format!("{file}: the times are rounded to {quantum_s} s, {frames:.2} of a frame");
-    (!even && frames > OFF_GRID_LIMIT_FRAMES / 100.0).then(|| {
-        new_finding(
-            Check::RoundedTimes,
-            severity,
-            (quantum_s, "s"),
-            found,
-            "the frames are taken from the grid of the rate, so nothing is lost; export frame numbers or \
-             more digits if the rate is in doubt",
-        )
-    })
+    let advice = "the frames are taken from the grid of the rate, so nothing is lost; export frame numbers or \
+        more digits if the rate is in doubt";
+    (!even && frames > OFF_GRID_LIMIT_FRAMES / 100.0)
+        .then(|| new_finding(Check::RoundedTimes, severity, (quantum_s, "s"), found, advice))
 }
 
-/// Rate that the times imply, next to the declared one.
+/// The rate that the times imply.
 pub(crate) fn implied_rate_finding(file: &str, implied_hz: f64, playback: bool) -> QualityFinding {
     let meaning = if playback { "taken as playback: the times only count frames" } else { "as declared" };
-    new_finding(
-        Check::ImpliedRate,
-        Severity::Note,
-        (implied_hz, "1/s"),
-        format!("{file}: the times imply {implied_hz:.6} rows/s ({meaning})"),
-        "",
-    )
+    let found = format!("{file}: the times imply {implied_hz:.6} rows/s ({meaning})");
+    new_finding(Check::ImpliedRate, Severity::Note, (implied_hz, "1/s"), found, "")
 }
 
-/// Times that are declared as seconds and count like frame numbers.
+/// Times that are declared as seconds and look like frame numbers.
 pub(crate) fn counted_frames_finding(implied_hz: f64) -> QualityFinding {
     let found = format!("the times imply {implied_hz} frames/s: they look like frame numbers, not seconds");
-    new_finding(
-        Check::ImpliedRate,
-        Severity::Serious,
-        (implied_hz, "1/s"),
-        found,
-        "if they are, say --time frames and give --frame-rate-hz",
-    )
+    let advice = "if they are, say --time frames and give --frame-rate-hz";
+    new_finding(Check::ImpliedRate, Severity::Serious, (implied_hz, "1/s"), found, advice)
 }
 
-/// A unit that the file names otherwise than the user.
+/// A unit of the file that differs from that of `--scale`.
 pub(crate) fn unit_mismatch_finding(
     scale: CoordinateScale,
     unit: CoordinateUnit,
     why: &str,
 ) -> Option<QualityFinding> {
-    let (stated, agrees) = match (scale, unit) {
-        (CoordinateScale::MetresPerPixel(_), CoordinateUnit::Pixel) => return None,
+    let agrees = match (scale, unit) {
         (CoordinateScale::Unit(metres), CoordinateUnit::Metres(stated)) => {
-            (format!("units of {metres} m"), (metres / stated - 1.0).abs() <= SAME_UNIT)
+            (metres / stated - 1.0).abs() <= SAME_UNIT
         }
-        (CoordinateScale::Unit(metres), CoordinateUnit::Pixel) => (format!("units of {metres} m"), false),
-        (CoordinateScale::MetresPerPixel(_), CoordinateUnit::Metres(_)) => ("pixels".to_owned(), false),
+        (scale, unit) => {
+            matches!(scale, CoordinateScale::MetresPerPixel(_)) && matches!(unit, CoordinateUnit::Pixel)
+        }
     };
-    let found =
-        format!("--scale takes the coordinates for {stated}, but they are {} ({why})", unit.describe());
-    (!agrees).then(|| {
-        new_finding(
-            Check::Unit,
-            Severity::Caution,
-            (scale.metres(), "m"),
-            found,
-            "--scale counts; leave it out or correct it unless the coordinates were converted since",
-        )
-    })
+    let declared = match scale {
+        CoordinateScale::Unit(metres) => CoordinateUnit::Metres(metres),
+        CoordinateScale::MetresPerPixel(_) => CoordinateUnit::Pixel,
+    };
+    let (declared, stated) = (declared.describe(), unit.describe());
+    let found = format!("--scale takes the coordinates for {declared}, but they are {stated} ({why})");
+    let advice = "--scale counts; leave it out or correct it unless the coordinates were converted since";
+    (!agrees).then(|| new_finding(Check::Unit, Severity::Caution, (scale.metres(), "m"), found, advice))
 }
 
-/// A direction of y that is another one than the format's.
+/// A direction of y that differs from that of the format.
 pub(crate) fn y_axis_mismatch_finding(declared: &str, stated: &str, why: &str) -> QualityFinding {
     let found = format!("--y-axis says {declared}, but y points {stated} ({why})");
-    new_finding(
-        Check::YAxis,
-        Severity::Caution,
-        (0.0, ""),
-        found,
-        "--y-axis counts; leave it out unless the picture or the coordinates were turned over",
-    )
+    let advice = "--y-axis counts; leave it out unless the picture or the coordinates were turned over";
+    new_finding(Check::YAxis, Severity::Caution, (0.0, ""), found, advice)
 }
 
-/// Runs of exact (0, 0) or (-1, -1), and numbers that do not look like their declared unit.
+/// Runs of exactly (0, 0) or (-1, -1), and coordinates that look like pixels but are declared as lengths.
 pub(crate) fn position_findings(
     name: &str,
     x: &[Option<f64>],
@@ -141,13 +114,8 @@ pub(crate) fn position_findings(
                 "{name}: {run} frames in a row from frame {frame} at exactly ({value}, {value}), which often \
                  means a lost point"
             );
-            findings.push(new_finding(
-                check,
-                Severity::Caution,
-                (run as f64, "frames"),
-                found,
-                "if so, have the program export lost points as empty cells",
-            ));
+            let advice = "if so, have the program export lost points as empty cells";
+            findings.push(new_finding(check, Severity::Caution, (run as f64, "frames"), found, advice));
         }
     }
     let (mut count, mut whole, mut largest) = (0, true, 0.0_f64);
@@ -163,18 +131,13 @@ pub(crate) fn position_findings(
             "are larger than lengths in a camera's view usually are"
         };
         let found = format!("{name}: the coordinates {sign} (largest {largest:.6e})");
-        findings.push(new_finding(
-            Check::UnitSuspicion,
-            Severity::Caution,
-            (largest, ""),
-            found,
-            "they look like pixels; if so, give --scale as a length a pixel",
-        ));
+        let advice = "they look like pixels; if so, give --scale as a length a pixel";
+        findings.push(new_finding(Check::UnitSuspicion, Severity::Caution, (largest, ""), found, advice));
     }
     findings
 }
 
-/// First frame and length of the longest run of exact (`value`, `value`).
+/// First frame and length of the longest run of exactly (`value`, `value`).
 fn longest_run(x: &[Option<f64>], y: &[Option<f64>], value: f64) -> (usize, usize) {
     let (mut longest, mut run) = ((0, 0), 0);
     for (frame, (x, y)) in x.iter().zip(y).enumerate() {
@@ -186,7 +149,7 @@ fn longest_run(x: &[Option<f64>], y: &[Option<f64>], value: f64) -> (usize, usiz
     longest
 }
 
-/// Positions that were rejected for their confidence.
+/// Positions that were dropped for their low confidence.
 pub(crate) fn rejected_finding(name: &str, count: usize, tracked: usize, limit: f64) -> QualityFinding {
     let share = count as f64 / tracked.max(1) as f64;
     let found = format!(
@@ -196,36 +159,30 @@ pub(crate) fn rejected_finding(name: &str, count: usize, tracked: usize, limit: 
     new_finding(Check::ConfidenceRejected, Severity::Note, (share, ""), found, "")
 }
 
-// Labels of single pictures: somebody picked frames of a video, and the rows are no motion.
+// Labels of single pictures that were picked from a video.
 
 const PICKED_FRAMES_ADVICE: &str = "import the positions that the program finds in every frame of the video, not the labels \
     it is trained with";
 
-/// What to say of rows whose frames follow each other in no common step.
+/// Rows whose frame numbers have no common step.
 pub(crate) fn picked_frames_finding(file: &str, clock: &Clock) -> Option<QualityFinding> {
     let frames: Vec<f64> = clock.frame.as_ref()?.iter().flatten().collect();
     let (first, last) = (*frames.first()?, *frames.last()?);
     let mut steps: BTreeMap<i64, usize> = BTreeMap::new();
     frames.windows(2).for_each(|pair| *steps.entry((pair[1] - pair[0]) as i64).or_default() += 1);
-    // (of several as common the smallest: a gap among consecutive frames is a gap)
+    // (of equally common steps the smallest: the others are gaps)
     let (usual, count) =
         steps.iter().rev().max_by_key(|step| *step.1).map(|(step, count)| (*step, *count))?;
     let of_all = 2 * count;
     let is_series = of_all > frames.len() - 1 || (usual == 1 && of_all == frames.len() - 1);
+    let count = frames.len();
     let found = format!(
-        "{file}: the rows are {} pictures picked from the frames {first} to {last} in no common step: they are \
-         no time series, and no spectrum, transition or fit of them has a meaning",
-        frames.len()
+        "{file}: the rows are {count} pictures picked from the frames {first} to {last} in no common step: they \
+         are no time series, and no spectrum, transition or fit of them has a meaning"
     );
-    (!is_series).then(|| {
-        new_finding(
-            Check::PickedFrames,
-            Severity::Serious,
-            (frames.len() as f64, "frames"),
-            found,
-            PICKED_FRAMES_ADVICE,
-        )
-    })
+    let value = (count as f64, "frames");
+    (!is_series)
+        .then(|| new_finding(Check::PickedFrames, Severity::Serious, value, found, PICKED_FRAMES_ADVICE))
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
-//! Chosen tracks on one frame grid: which frames they share, and their points frame by frame.
+//! Puts the chosen tracks on one frame grid.
 
 use super::track_file::Column;
 use crate::import::ImportReport;
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::{CoordinateScale, ImportOptions, TimeColumn};
 use crate::import::reader::calibration::ImportCalibration;
 use crate::import::reader::timing::{ClockRows, DeclaredTiming, RowFrames};
@@ -12,7 +12,6 @@ use crate::import::reader::{findings, timing};
 use crate::recording::FrameGrid;
 use crate::recording::clock::MAX_FRAMES;
 use crate::recording::files::YAxis;
-use crate::recording::quality::QualityFinding;
 
 /// The clocks of the chosen tracks on one frame grid.
 pub(crate) struct ClockGrid {
@@ -20,14 +19,13 @@ pub(crate) struct ClockGrid {
     used: Vec<PlacedClock>,
 }
 
-/// A clock with the frames of its rows.
 struct PlacedClock {
     /// Index of its file.
     file: usize,
     /// Its index in the file.
     clock: usize,
     placed: RowFrames,
-    /// What to add to its frames to count from the start of the grid.
+    /// Added to its frames so that they count from the start of the grid.
     shift: i64,
 }
 
@@ -47,7 +45,7 @@ impl ClockGrid {
         chosen: &[Option<TrackIndex>; 2],
         calibration: &ImportCalibration,
         options: &ImportOptions,
-    ) -> Result<Self, ImportError> {
+    ) -> ImportResult<Self> {
         let mut used = place_clocks(exports, chosen, calibration, options)?;
         let Some(earliest) = used.iter().min_by_key(|clock| clock.first_frame()) else {
             return Err(ImportError::NoSource);
@@ -58,21 +56,14 @@ impl ClockGrid {
         let rows: usize = used.iter().map(|clock| clock.placed.frames.len()).sum();
         let most = (MAX_FRAMES as i64).min(timing::MOST_SPREAD * rows as i64);
         if frames > most {
-            return Err(ImportError::GridMismatch {
-                file: exports[earliest.file].file.to_owned(),
-                found: format!("frames from {from} to {to}"),
-                expected: format!("at most {most} frames for {rows} rows"),
-                other: "any one recording".to_owned(),
-            });
+            let (file, found) = (exports[earliest.file].file, format!("frames from {from} to {to}"));
+            let expected = format!("at most {most} frames for {rows} rows");
+            return Err(ImportError::grid_mismatch(file, &found, &expected, "any one recording"));
         }
         let (start_s, frame_rate_hz) = (earliest.placed.start_s, calibration.rate_hz);
         let grid = FrameGrid { start_s, frame_rate_hz, frames: frames as usize };
         used.iter_mut().for_each(|clock| clock.shift -= from);
         Ok(Self { grid, used })
-    }
-
-    fn placed_clock(&self, file: usize, clock: usize) -> Option<&PlacedClock> {
-        self.used.iter().find(|used| (used.file, used.clock) == (file, clock))
     }
 
     pub(crate) fn report_findings(
@@ -82,33 +73,32 @@ impl ClockGrid {
         options: &ImportOptions,
         report: &mut ImportReport,
     ) {
+        let playback = options.time == Some(TimeColumn::Playback);
         for PlacedClock { file, clock, placed, .. } in &self.used {
             let export = &exports[*file];
-            let implied = placed.implied_hz.map(|hz| {
-                findings::implied_rate_finding(export.file, hz, options.time == Some(TimeColumn::Playback))
-            });
-            let times: Vec<f64> =
-                export.clocks[*clock].time.iter().flat_map(Column::iter).flatten().collect();
-            let rounded = (options.time != Some(TimeColumn::Playback))
+            let implied =
+                placed.implied_hz.map(|hz| findings::implied_rate_finding(export.file, hz, playback));
+            let times = export.clocks[*clock].times();
+            let rounded = (!playback)
                 .then(|| findings::rounded_times_finding(export.file, &times, calibration.rate_hz))
                 .flatten();
-            let new: Vec<QualityFinding> = implied
-                .into_iter()
-                .chain(rounded)
-                .filter(|finding| !report.findings.contains(finding))
-                .collect();
-            report.findings.extend(new); // (clocks of one file often say the same)
+            for finding in implied.into_iter().chain(rounded) {
+                // (clocks of one file often give the same findings)
+                if !report.findings.contains(&finding) {
+                    report.findings.push(finding);
+                }
+            }
         }
     }
 }
 
-/// Every clock of a chosen track once, shifted to count as the first one does.
+/// Every clock of a chosen track once, with the shift to the frame numbers of the first.
 fn place_clocks(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
     calibration: &ImportCalibration,
     options: &ImportOptions,
-) -> Result<Vec<PlacedClock>, ImportError> {
+) -> ImportResult<Vec<PlacedClock>> {
     let rate_hz = calibration.rate_hz;
     let playback = options.time == Some(TimeColumn::Playback);
     let declared = DeclaredTiming { rate_hz, playback, step: options.frame_step.unwrap_or(1) };
@@ -118,13 +108,10 @@ fn place_clocks(
         if used.iter().any(|used| (used.file, used.clock) == (file, clock)) {
             continue;
         }
-        let placed = timing::place_rows(ClockRows { export, clock: &export.clocks[clock] }, declared)?;
+        let rows = ClockRows { export, clock: &export.clocks[clock] };
+        let placed = timing::place_rows(rows, declared)?;
         if let Some(first) = used.iter().find(|used| used.file == file && !playback) {
-            timing::refuse_clock_mismatch(
-                ClockRows { export, clock: &export.clocks[clock] },
-                [&first.placed, &placed],
-                rate_hz,
-            )?;
+            timing::refuse_clock_mismatch(rows, [&first.placed, &placed], rate_hz)?;
         }
         let shift = match used.first() {
             Some(first) => {
@@ -146,7 +133,7 @@ pub(crate) struct GridPositions {
 }
 
 impl GridPositions {
-    /// Absent rows stay missing. The track's columns are used up.
+    /// Frames without a row are missing. The track's columns are moved out of it.
     pub(crate) fn from_track(
         exports: &mut [TrackFile],
         clocks: &ClockGrid,
@@ -156,15 +143,15 @@ impl GridPositions {
         let none = || Self { x: empty(), y: empty(), confidence: None };
         let Some((file, track)) = choice else { return none() };
         let track = &mut exports[file].tracks[track];
-        let Some(PlacedClock { placed, shift, .. }) = clocks.placed_clock(file, track.clock) else {
+        let is_clock = |used: &&PlacedClock| (used.file, used.clock) == (file, track.clock);
+        let Some(PlacedClock { placed, shift, .. }) = clocks.used.iter().find(is_clock) else {
             return none();
         };
         let column = |values: Column| {
             let mut on_grid = empty();
             for (value, frame) in values.iter().zip(&placed.frames) {
-                if let Some(cell) =
-                    usize::try_from(frame + shift).ok().and_then(|frame| on_grid.get_mut(frame))
-                {
+                let frame = usize::try_from(frame + shift).ok();
+                if let Some(cell) = frame.and_then(|frame| on_grid.get_mut(frame)) {
                     *cell = value;
                 }
             }
@@ -178,24 +165,20 @@ impl GridPositions {
         }
     }
 
-    /// Positions in which the tracker had too little confidence become missing.
+    /// Drops positions whose confidence is below `limit`.
     pub(crate) fn reject_unlikely(
         &mut self,
         name: &str,
         limit: Option<f64>,
         report: &mut ImportReport,
-    ) -> Result<(), ImportError> {
-        let (Some(limit), Some(confidence)) = (limit, &self.confidence) else {
-            return match limit {
-                None => Ok(()),
-                Some(limit) => {
-                    let expected = format!(
-                        "a confidence for {name}, which this export has not: leave the option out, or name \
-                         its column (--columns ...,tip-confidence=N)"
-                    );
-                    Err(ImportError::option("--min-likelihood", limit, expected))
-                }
-            };
+    ) -> ImportResult<()> {
+        let Some(limit) = limit else { return Ok(()) };
+        let Some(confidence) = &self.confidence else {
+            let expected = format!(
+                "a confidence for {name}, which this export has not: leave the option out, or name its column \
+                 (--columns ...,tip-confidence=N)"
+            );
+            return Err(ImportError::option("--min-likelihood", limit, expected));
         };
         let tracked = self.x.iter().flatten().count();
         let mut count = 0;
@@ -209,16 +192,12 @@ impl GridPositions {
 
     pub(crate) fn convert_to_metres(&mut self, calibration: &ImportCalibration) {
         let metres = calibration.scale.metres();
-        // a quotient by a whole number is the nearest double to the decimal that was written; a product with
-        // 1e-3 is not
+        // 1e-3 is no double: a product with it rounds twice, a quotient by 1000 once
         let parts = (1.0 / metres).round();
+        let is_fraction =
+            matches!(calibration.scale, CoordinateScale::Unit(_)) && metres < 1.0 && metres == 1.0 / parts;
         let length = |value: f64| {
-            if matches!(calibration.scale, CoordinateScale::Unit(_)) && metres < 1.0 && metres == 1.0 / parts
-            {
-                value / parts
-            } else {
-                value * metres
-            }
+            if is_fraction { value / parts } else { value * metres }
         };
         for x in self.x.iter_mut().flatten() {
             *x = length(*x);

@@ -1,14 +1,13 @@
-//! Rows of one or of many instances (tracks, blocks), gathered into clocks and tracks.
+//! Collects the rows of instances (tracks, blocks) into clocks and tracks.
 
 use super::track_file::Column;
-use crate::import::error::{ImportError, TextLocation};
+use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::reader::track_file::{Clock, Track};
 use std::collections::HashMap;
 
-/// Most tracks of a file: detections of thousands of objects are more than an import chooses from.
+/// Most tracks of a file: more are detections that were not linked.
 const MOST_TRACKS: usize = 20_000;
 
-/// A position as it is read.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct RowPosition {
     pub x: Option<f64>,
@@ -16,7 +15,7 @@ pub(crate) struct RowPosition {
     pub confidence: Option<f64>,
 }
 
-/// When a row was taken, and its line.
+/// Frame or time of a row, and its line.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct RowStamp {
     pub line: usize,
@@ -24,7 +23,7 @@ pub(crate) struct RowStamp {
     pub time: Option<f64>,
 }
 
-/// A point of every instance.
+/// A point that every instance has.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct PointFields {
     pub name: String,
@@ -32,7 +31,7 @@ pub(crate) struct PointFields {
     pub has_confidence: bool,
 }
 
-/// Which columns there are.
+/// Columns of every instance.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct InstanceFields {
     pub has_frame: bool,
@@ -42,23 +41,23 @@ pub(crate) struct InstanceFields {
     pub points: Vec<PointFields>,
 }
 
-/// Whether the rows of an instance have to be in order of time as they stand.
+/// Order of the rows of an instance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RowOrder {
-    /// They do: disorder is damage.
+    /// By time: anything else is damage.
     AsWritten,
-    /// They need not: the program writes them in any order.
+    /// Any: they are sorted.
     Any,
 }
 
-/// Gathers rows by instance, in the order in which the instances appear.
+/// Collects rows by instance, in the order in which the instances appear.
 pub(crate) struct TrackCollector {
     shape: InstanceFields,
     known: HashMap<String, usize>,
     instances: Vec<CollectedInstance>,
-    /// The instance of the row before: most rows follow one of the same.
+    /// Index of the instance of the last row: the next row is mostly of the same.
     last: usize,
-    /// Line of the first row of a track too many; no row is gathered from there on.
+    /// Line of the first row beyond [`MOST_TRACKS`]; later rows are not collected.
     too_many: Option<usize>,
 }
 
@@ -120,16 +119,16 @@ impl TrackCollector {
         self.instances.len() - 1
     }
 
-    /// The clocks and tracks. A track is called by its point, by its instance where that has one point only,
-    /// or by both.
+    /// The clocks and tracks. A track has the name of its point, of its instance if that has only one point, or
+    /// both.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] for more tracks than anybody chooses from, [`ImportError::DuplicateRow`] where
-    /// rows come in any order and an instance has two of one frame.
-    pub(crate) fn finish(self, file: &str, order: RowOrder) -> Result<(Vec<Clock>, Vec<Track>), ImportError> {
+    /// [`ImportError::WrongTable`] for too many tracks, [`ImportError::DuplicateRow`] where an instance has two rows
+    /// of one frame and the rows may be in any order.
+    pub(crate) fn finish(self, file: &str, order: RowOrder) -> ImportResult<(Vec<Clock>, Vec<Track>)> {
         if let Some(line) = self.too_many {
             return Err(ImportError::wrong_table(
-                TextLocation { file: file.to_owned(), line, column: 1 },
+                format!("{file}:{line}:1"),
                 format!("more than {MOST_TRACKS} tracks"),
                 "the tracks of a few points",
                 "link the detections to tracks in the tracking program, and export those of tip and head",
@@ -159,8 +158,8 @@ impl TrackCollector {
 }
 
 impl CollectedInstance {
-    /// Puts the rows into the order of their frames, or of their times where there are no frames.
-    fn sort_rows(&mut self, file: &str) -> Result<(), ImportError> {
+    /// Sorts the rows by frame, or by time where there are no frames.
+    fn sort_rows(&mut self, file: &str) -> ImportResult<()> {
         let clock = &self.clock;
         let Some(column) = clock.frame.as_ref().or(clock.time.as_ref()) else { return Ok(()) };
         let key = |row: usize| column.get(row).unwrap_or(f64::INFINITY);

@@ -1,19 +1,19 @@
-//! Which cells of a table are what: a format says so, and its rows are read the same way as those of all
-//! others.
+//! The meaning of the cells of a table. A format fills in a [`TableLayout`]; the rows of all formats are then
+//! read by the same code.
 
 use super::number::CellNumber;
 use super::rows::RowView;
 use super::table::DelimitedTable;
 use super::track_file::{Facts, TrackFile};
 use super::{Document, spreadsheet};
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::instances::{
     InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TrackCollector,
 };
 use crate::math;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
-/// Cells of a point. Coordinates are sums of cells: most have one, a displacement from a reference has two.
+/// Cells of a point. A coordinate is the sum of its cells: a reference and a displacement are two.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct PointCells {
     /// Name of the track; empty where the instance has the name.
@@ -25,6 +25,15 @@ pub(crate) struct PointCells {
 }
 
 impl PointCells {
+    /// The cells as fields of an instance.
+    pub(crate) fn fields(&self) -> PointFields {
+        PointFields {
+            name: self.name.clone(),
+            has_y: !self.y.is_empty(),
+            has_confidence: self.confidence.is_some(),
+        }
+    }
+
     pub(crate) fn new(name: impl Into<String>, x: usize, y: Option<usize>) -> Self {
         Self { name: name.into(), x: vec![x], y: y.into_iter().collect(), confidence: None }
     }
@@ -33,7 +42,7 @@ impl PointCells {
 /// A rule by which a format marks a lost point with numbers.
 #[derive(Clone, Copy)]
 pub(crate) struct LostRule {
-    /// Cell that is asked; `None` asks the position.
+    /// Cell that the rule looks at; `None` means the position.
     pub cell: Option<usize>,
     /// Whether these numbers (x and y, or the cell twice) mean a lost point.
     pub is: fn(f64, f64) -> bool,
@@ -47,29 +56,21 @@ pub(crate) struct TableLayout {
     pub start: usize,
     /// Cells that every row must have.
     pub width: usize,
-    /// Cells beyond which nothing may stand.
+    /// Cells that a row may have at most; empty ones may follow.
     pub most: usize,
     pub frame: Option<usize>,
     pub time: Option<usize>,
-    /// Where neither is written every row is a frame: the number of the first.
+    /// Number of the first row where the table has neither frames nor times and every row is a frame.
     pub first_frame: f64,
-    /// Cells that name the instance; none where the table has one.
+    /// Cells that name the instance; empty where the table has only one.
     pub key: Vec<usize>,
-    /// Whether rows without a name of their instance are left out.
+    /// Whether rows that do not name their instance are left out.
     pub skip_nameless: bool,
     pub order: RowOrder,
-    /// Whether rows without a clock and without positions are those of other clocks in the same table.
+    /// Whether the table has several clocks: rows without this clock and its positions are skipped.
     pub of_others: bool,
     pub points: Vec<PointCells>,
     pub lost: Vec<LostRule>,
-}
-
-/// What is not read as a position.
-struct SkippedRows {
-    /// Positions that each rule marks as lost.
-    lost: Vec<usize>,
-    /// Rows without a name of their instance.
-    nameless: usize,
 }
 
 impl Default for TableLayout {
@@ -91,7 +92,31 @@ impl Default for TableLayout {
     }
 }
 
+/// Points whose columns come in pairs, x before y, from column `first` on. The names end in `ends`, and `rename` makes
+/// the name of the track of their common part.
+///
+/// # Errors
+/// Index of the first column without a partner.
+pub(crate) fn read_point_pairs(
+    names: &[&str],
+    first: usize,
+    ends: [&str; 2],
+    rename: impl Fn(&str) -> &str,
+) -> Result<Vec<PointCells>, usize> {
+    let pair = |at: usize| {
+        let y = names.get(at + 1).and_then(|name| name.strip_suffix(ends[1]));
+        let name = names[at].strip_suffix(ends[0]).filter(|name| y == Some(*name)).ok_or(at)?;
+        Ok(PointCells::new(rename(name), at, Some(at + 1)))
+    };
+    (first..names.len()).step_by(2).map(pair).collect()
+}
+
 impl TableLayout {
+    /// Points from row `start` of the head on, in rows of exactly `width` cells.
+    pub(crate) fn new(start: usize, width: usize, points: Vec<PointCells>) -> Self {
+        Self { start, width, most: width, points, ..Self::default() }
+    }
+
     /// Reads every row.
     ///
     /// # Errors
@@ -101,56 +126,60 @@ impl TableLayout {
         document: &'a Document,
         table: &'a DelimitedTable,
         facts: Facts,
-    ) -> Result<TrackFile<'a>, ImportError> {
+    ) -> ImportResult<TrackFile<'a>> {
         let mut collector = TrackCollector::new(self.instance_fields());
-        let left_out = self.collect_rows(table, &mut collector)?;
+        let (lost, nameless) = self.collect_rows(table, &mut collector)?;
         let (clocks, tracks) = collector.finish(document.file, self.order)?;
         let mut export = TrackFile {
             table: Some(table),
             clocks,
             tracks,
             facts,
-            findings: self.lost_point_findings(&left_out.lost),
+            findings: self.lost_point_findings(&lost),
             texts: table.head.iter().take(self.start).flat_map(|row| row.cells.iter().cloned()).collect(),
             ..TrackFile::for_document(document)
         };
         export.findings.extend(spreadsheet::cut_numbers_finding(table, self.start, &self.number_cells())?);
-        if left_out.nameless > 0 {
-            export.notes.push(format!("{} rows belong to no track and are left out", left_out.nameless));
+        if nameless > 0 {
+            export.notes.push(format!("{nameless} rows belong to no track and are left out"));
         }
         Ok(export)
     }
 
-    /// Whether every row is a frame, as nothing numbers or times it.
+    /// Whether the table has neither frames nor times, so that every row is a frame.
     fn counts_rows(&self) -> bool {
         self.frame.is_none() && self.time.is_none()
     }
 
+    /// Collects the rows; gives how many positions each rule marks as lost, and how many rows are nameless.
     fn collect_rows(
         &self,
         table: &DelimitedTable,
         collector: &mut TrackCollector,
-    ) -> Result<SkippedRows, ImportError> {
-        let mut left_out = SkippedRows { lost: vec![0; self.lost.len()], nameless: 0 };
+    ) -> ImportResult<(Vec<usize>, usize)> {
+        let (mut lost, mut nameless) = (vec![0; self.lost.len()], 0);
         let (mut counted, mut last_line, mut key) = (0.0, 0, String::new());
         let mut positions = vec![RowPosition::default(); self.points.len()];
         let mut rows = table.rows(self.start);
         while let Some(record) = rows.next_row()? {
             if self.counts_rows() && last_line > 0 && record.line > last_line + 1 {
-                return Err(ImportError::BlankLine { place: table.location(last_line + 1, 1) });
+                return Err(blank_line_error(table, last_line + 1));
             }
             last_line = record.line;
-            if (record.is_empty() && !self.counts_rows()) || (self.of_others && self.is_blank_row(&record)) {
+            if (record.is_empty() && !self.counts_rows())
+                || (self.of_others
+                    && self.number_cells().into_iter().all(|cell| record.cell(cell).is_empty()))
+            {
                 continue;
             }
             table.check_row_length(&record, self.width, self.most)?;
             self.write_key(&record, &mut key);
             if self.skip_nameless && key.is_empty() && !self.key.is_empty() {
-                left_out.nameless += 1;
+                nameless += 1;
                 continue;
             }
             for (position, cells) in positions.iter_mut().zip(&self.points) {
-                *position = self.read_position(table, &record, cells, &mut left_out.lost)?;
+                *position = self.read_position(table, &record, cells, &mut lost)?;
             }
             let frame = if self.counts_rows() {
                 Some(self.first_frame + counted)
@@ -161,11 +190,7 @@ impl TableLayout {
             counted += 1.0;
             collector.add_row(&key, RowStamp { line: record.line, frame, time }, &positions);
         }
-        Ok(left_out)
-    }
-
-    fn is_blank_row(&self, record: &RowView) -> bool {
-        self.number_cells().into_iter().all(|cell| record.cell(cell).is_empty())
+        Ok((lost, nameless))
     }
 
     /// Every cell that is read as a number, each once.
@@ -178,16 +203,11 @@ impl TableLayout {
     }
 
     fn instance_fields(&self) -> InstanceFields {
-        let point = |p: &PointCells| PointFields {
-            name: p.name.clone(),
-            has_y: !p.y.is_empty(),
-            has_confidence: p.confidence.is_some(),
-        };
         InstanceFields {
             has_frame: self.frame.is_some() || self.counts_rows(),
             has_time: self.time.is_some(),
             clock_cell: self.frame.or(self.time).unwrap_or(0),
-            points: self.points.iter().map(point).collect(),
+            points: self.points.iter().map(PointCells::fields).collect(),
         }
     }
 
@@ -207,20 +227,17 @@ impl TableLayout {
         record: &RowView,
         cells: &PointCells,
         lost: &mut [usize],
-    ) -> Result<RowPosition, ImportError> {
-        let sum = |parts: &[usize], axis: &str| -> Result<Option<f64>, ImportError> {
+    ) -> ImportResult<RowPosition> {
+        let sum = |parts: &[usize], axis: &str| -> ImportResult<Option<f64>> {
             let mut total = 0.0;
             for &part in parts {
                 match table.parse_cell(record.cell(part)) {
                     CellNumber::Value(value) => total += value,
                     CellNumber::Missing => return Ok(None),
                     CellNumber::Text => {
-                        return Err(table.not_a_number_error(
-                            record.line,
-                            part,
-                            record.cell(part),
-                            &axis_name(axis, &cells.name),
-                        ));
+                        // (its name is put together only for a refusal)
+                        let name = axis_name(axis, &cells.name);
+                        return Err(table.not_a_number_error(record.line, part, record.cell(part), &name));
                     }
                 }
             }
@@ -244,14 +261,20 @@ impl TableLayout {
     fn lost_point_findings(&self, lost: &[usize]) -> Vec<QualityFinding> {
         let counted = self.lost.iter().zip(lost).filter(|(_, count)| **count > 0);
         let finding = |(rule, count): (&LostRule, &usize)| {
-            let found = format!(
-                "{count} positions {} count as missing, as this format writes lost points",
-                rule.words
-            );
+            let words = rule.words;
+            let found =
+                format!("{count} positions {words} count as missing, as this format writes lost points");
             QualityFinding::new(Check::LostPoints, Severity::Note, *count as f64, "", found)
         };
         counted.map(finding).collect()
     }
+}
+
+fn blank_line_error(table: &DelimitedTable, line: usize) -> ImportError {
+    let expected = "one row a frame: the table does not number its frames";
+    let advice =
+        "write NaN for a lost point; if no frame is missing here, import a copy without the empty line";
+    ImportError::format(table.location(line, 1), "an empty line", expected, advice)
 }
 
 /// `x of tip`, or `x` where the track is named by its rows.
@@ -259,9 +282,9 @@ fn axis_name(axis: &str, point: &str) -> String {
     if point.is_empty() { axis.to_owned() } else { format!("{axis} of {point}") }
 }
 
-// Tables with a clock for each track: whether the clocks are one, and the tracks of each where they are not.
+// Tables with a clock for each track: comparison of the clocks, and the tracks of each where they differ.
 
-/// A column of times or frame numbers, and how much one of its numbers is in the unit that is compared.
+/// A column of times or frame numbers, and its unit in the unit of the comparison.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct ClockCell {
     pub cell: usize,
@@ -273,12 +296,11 @@ pub(crate) struct ClockDifference {
     pub line: usize,
     /// Cell of the second clock.
     pub cell: usize,
-    /// What the two say, in the table's own words; empty where a row has only one of them.
+    /// Texts of the two cells; empty where a row has only one of them.
     pub texts: [String; 2],
 }
 
-/// The first row from row `start` of the head on in which `other` says another time than `first`, as far as
-/// their digits show.
+/// The first row, from row `start` of the head on, in which two clocks differ by more than their rounding.
 ///
 /// # Errors
 /// [`ImportError`] for rows that cannot be read, and for clocks that are no numbers.
@@ -287,7 +309,7 @@ pub(crate) fn find_clock_difference(
     start: usize,
     first: ClockCell,
     other: ClockCell,
-) -> Result<Option<ClockDifference>, ImportError> {
+) -> ImportResult<Option<ClockDifference>> {
     let mut rows = table.rows(start);
     while let Some(record) = rows.next_row()? {
         let [one, two] = [first, other].map(|clock| read_clock(table, &record, clock));
@@ -305,12 +327,12 @@ pub(crate) fn find_clock_difference(
     Ok(None)
 }
 
-/// What a clock says in a row, and what its last digit is worth.
+/// The value of a clock in a row, and the worth of its last digit.
 fn read_clock(
     table: &DelimitedTable,
     record: &RowView,
     clock: ClockCell,
-) -> Result<Option<(f64, f64)>, ImportError> {
+) -> ImportResult<Option<(f64, f64)>> {
     let text = record.cell(clock.cell);
     match table.parse_cell(text) {
         CellNumber::Value(value) => {
@@ -321,7 +343,7 @@ fn read_clock(
     }
 }
 
-/// What the last digit of a written number is worth.
+/// The worth of the last digit of a written number.
 fn last_digit_value(text: &str, decimal: char) -> f64 {
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let decimals = mantissa.split_once(decimal).map_or(0, |(_, decimals)| decimals.len());
@@ -329,7 +351,7 @@ fn last_digit_value(text: &str, decimal: char) -> f64 {
     math::powi(10.0, exponent - i32::try_from(decimals).unwrap_or(0))
 }
 
-/// The tracks of each clock of a table in one file: rows that hold nothing of a clock are not its own.
+/// The tracks of a table with several clocks, one layout a clock. A clock skips the rows that are empty for it.
 ///
 /// # Errors
 /// As [`TableLayout::read_tracks`].
@@ -338,7 +360,7 @@ pub(crate) fn read_clocks_apart<'a>(
     document: &'a Document,
     table: &'a DelimitedTable,
     facts: Facts,
-) -> Result<TrackFile<'a>, ImportError> {
+) -> ImportResult<TrackFile<'a>> {
     let mut all = TrackFile { table: Some(table), facts: facts.clone(), ..TrackFile::for_document(document) };
     for layout in layouts {
         let mut part =

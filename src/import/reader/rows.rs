@@ -1,7 +1,7 @@
 //! The rows of a table, one after the other: the only file that names `csv`.
 
 use super::dialect::{Delimiter, NumberedLine, is_comment};
-use crate::import::error::{ImportError, TextLocation};
+use crate::import::error::{ImportError, ImportResult};
 use csv::{ReaderBuilder, StringRecord};
 
 /// A row with its cells, trimmed and without their quotes.
@@ -9,7 +9,7 @@ use csv::{ReaderBuilder, StringRecord};
 pub(crate) struct TextRow {
     pub line: usize,
     pub cells: Vec<String>,
-    /// Where it starts in the text, bytes.
+    /// Byte of the text at which it starts.
     pub(crate) start: usize,
 }
 
@@ -19,12 +19,26 @@ impl TextRow {
         self.cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1)
     }
 
-    /// The first cell; empty where there is none.
-    pub(crate) fn first_cell(&self) -> &str {
-        self.cells.first().map_or("", String::as_str)
+    /// A cell; empty beyond the end of the row.
+    pub(crate) fn cell(&self, index: usize) -> &str {
+        self.cells.get(index).map_or("", String::as_str)
     }
 
-    /// The cells as plain slices.
+    /// The first cell; empty where there is none.
+    pub(crate) fn first_cell(&self) -> &str {
+        self.cell(0)
+    }
+
+    /// Index of the first cell with this text.
+    pub(crate) fn position(&self, text: &str) -> Option<usize> {
+        self.cells.iter().position(|cell| cell == text)
+    }
+
+    /// Whether a cell has this text.
+    pub(crate) fn has(&self, text: &str) -> bool {
+        self.position(text).is_some()
+    }
+
     pub(crate) fn texts(&self) -> Vec<&str> {
         self.cells.iter().map(String::as_str).collect()
     }
@@ -63,7 +77,7 @@ impl<'r> RowView<'r> {
     }
 }
 
-/// Line ends in `bytes`.
+/// Number of line ends in `bytes`.
 pub(crate) fn count_lines(bytes: &[u8]) -> usize {
     bytes.iter().filter(|byte| **byte == b'\n').count()
 }
@@ -84,13 +98,13 @@ pub(crate) struct RowReader<'t> {
     text: &'t str,
     delimiter: Delimiter,
     source: RecordReader<'t>,
-    /// Where the source starts in the text of the table, bytes.
+    /// Byte of the text at which the source starts.
     base: usize,
-    /// Up to where lines are counted, bytes; `line` is the line there.
+    /// Byte up to which lines are counted; `line` is the line there.
     counted: usize,
     line: usize,
-    /// Where the present row starts, bytes.
-    start: usize,
+    /// Byte at which the current row starts.
+    pub start: usize,
     record: StringRecord,
 }
 
@@ -113,7 +127,7 @@ impl<'t> RecordReader<'t> {
         }
     }
 
-    /// Reads a row and gives the bytes that it spans, line ends before it included.
+    /// Reads a row and gives its first and last byte; line ends before the row are part of it.
     fn read_record(&mut self, record: &mut StringRecord) -> Option<(usize, usize)> {
         match self {
             Self::Csv(reader) => {
@@ -135,7 +149,7 @@ impl<'t> RecordReader<'t> {
 }
 
 impl<'t> RowReader<'t> {
-    /// The rows from byte `start` of `text` on; `file` is its name, for messages.
+    /// The rows from byte `start` of `text` on; messages name `file`.
     pub(crate) fn new(file: &'t str, text: &'t str, delimiter: Delimiter, start: usize) -> Self {
         Self {
             file,
@@ -150,17 +164,12 @@ impl<'t> RowReader<'t> {
         }
     }
 
-    /// Where the present row starts in the text, bytes.
-    pub(crate) fn row_start(&self) -> usize {
-        self.start
-    }
-
-    /// The next row that is no comment, rows of empty cells included, lines without anything in them not.
+    /// The next row. Comments and empty lines are skipped; rows of empty cells are not.
     ///
     /// # Errors
-    /// [`ImportError::OpenQuote`] for a quoted cell that does not end in its line.
+    /// [`ImportError::Format`] for a quoted cell that does not end in its line.
     #[allow(clippy::should_implement_trait)] // (a row lives until the next is read)
-    pub(crate) fn next_row(&mut self) -> Result<Option<RowView<'_>>, ImportError> {
+    pub(crate) fn next_row(&mut self) -> ImportResult<Option<RowView<'_>>> {
         let text = self.text;
         while let Some((from, to)) = self.source.read_record(&mut self.record) {
             let span = text.get(self.base + from..self.base + to).unwrap_or_default();
@@ -168,7 +177,7 @@ impl<'t> RowReader<'t> {
             let before = span.as_bytes().iter().take_while(is_end).count();
             let after = span.as_bytes()[before..].iter().rev().take_while(is_end).count();
             self.start = self.base + from + before;
-            // (what lies between is the row itself, which has no line end unless it is refused)
+            // (the row itself has no line end unless it is refused)
             self.line += count_lines(&text.as_bytes()[self.counted..self.start]);
             self.counted = self.start + span.len() - before - after;
             let row = &span[before..span.len() - after];
@@ -182,10 +191,13 @@ impl<'t> RowReader<'t> {
                 continue;
             }
             if row.as_bytes().contains(&b'\n') {
-                return Err(ImportError::OpenQuote {
-                    place: TextLocation { file: self.file.to_owned(), line: self.line, column: 1 },
-                    lines: count_lines(row.as_bytes()) + 1,
-                });
+                let lines = count_lines(row.as_bytes()) + 1;
+                return Err(ImportError::format(
+                    format!("{}:{}:1", self.file, self.line),
+                    format!("a quoted cell that runs over {lines} lines"),
+                    "it to end in its own",
+                    "close the quotation mark, or export again",
+                ));
             }
             return Ok(Some(RowView { line: self.line, cells: &self.record }));
         }
@@ -199,7 +211,7 @@ impl<'t> RowReader<'t> {
     }
 }
 
-/// Cells of single lines; a line with an open quote takes the next ones in.
+/// The lines as rows; a row with an open quotation mark goes on in the next line.
 pub(crate) fn parse_rows(lines: &[NumberedLine], delimiter: Delimiter) -> Vec<TextRow> {
     let text: String = lines.iter().flat_map(|(_, line)| [*line, "\n"]).collect();
     let mut source = RecordReader::new(&text, delimiter);

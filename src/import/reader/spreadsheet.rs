@@ -1,10 +1,10 @@
-//! What a spreadsheet does to numbers when it opens a table and saves it again: dates, separators of
-//! thousands, marks of narrow columns, errors of formulas.
+//! Damage to numbers in a table that a spreadsheet opened and saved: dates, separators of thousands, marks of
+//! narrow columns, errors of formulas.
 
 use super::findings::new_finding;
 use super::number::CellNumber;
 use super::table::DelimitedTable;
-use crate::import::error::ImportError;
+use crate::import::error::ImportResult;
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
 const DATE: &str = "a spreadsheet has made a date of the number, and the number is lost: import the tracking \
@@ -16,7 +16,7 @@ const HIDDEN: &str = "a spreadsheet wrote the marks of a column that is too narr
 const FAILED: &str = "a spreadsheet wrote the error of a formula: import the tracking program's own export, or save \
     a copy with the values";
 
-/// Starts of the names of months in the languages of programs that are read here, in lower case.
+/// Starts of the names of months in the languages of the supported programs, in lower case.
 const MONTHS: [&str; 36] = [
     "jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec", // English
     "m\u{e4}r", "mai", "okt", "dez", // German
@@ -25,17 +25,20 @@ const MONTHS: [&str; 36] = [
     "gen", "mag", "giu", "lug", "set", "ott", // Italian
     "mrt", "mei", "out", // Dutch, Portuguese
 ];
-/// Longest name of a month as spreadsheets shorten it, letters.
+/// Longest abbreviated name of a month, letters.
 const LONGEST_MONTH: usize = 4;
-/// What stands between the parts of a date.
+/// Separators in a date.
 const DATE_MARKS: [char; 6] = ['.', '-', '/', ' ', '\'', ','];
 
-/// What a spreadsheet did to the number that belongs into a cell, and what to do about it.
+/// The damage of a spreadsheet to the number in a cell, with advice.
 pub(crate) fn describe_damage(text: &str) -> Option<&'static str> {
-    type Sign = fn(&str) -> bool;
-    let signs: [(Sign, &str); 4] =
-        [(is_hidden, HIDDEN), (is_error, FAILED), (is_date, DATE), (is_grouped, GROUPED)];
-    signs.into_iter().find(|(is, _)| is(text)).map(|(_, words)| words)
+    let signs: [(bool, &str); 4] = [
+        (is_hidden(text), HIDDEN),
+        (is_error(text), FAILED),
+        (names_month(text) || is_numeric_date(text), DATE),
+        (is_grouped(text), GROUPED),
+    ];
+    signs.into_iter().find_map(|(shown, words)| shown.then_some(words))
 }
 
 pub(crate) fn is_hidden(text: &str) -> bool {
@@ -44,10 +47,6 @@ pub(crate) fn is_hidden(text: &str) -> bool {
 
 pub(crate) fn is_error(text: &str) -> bool {
     text.starts_with('#') && text.ends_with(['!', '?']) && !text.contains(char::is_whitespace)
-}
-
-fn is_date(text: &str) -> bool {
-    names_month(text) || is_numeric_date(text)
 }
 
 /// `01.jan`, `Jan 01`, `12.Mai`, `1-Feb-2024`.
@@ -61,7 +60,8 @@ fn names_month(text: &str) -> bool {
         && MONTHS.iter().any(|month| word.starts_with(month))
 }
 
-/// `01/05`, `1.5.2024`, `2024-05-01`: a day and a month, and a year where the mark is also one of numbers.
+/// `01/05`, `1.5.2024`, `2024-05-01`: a day and a month. With a point or a hyphen, which numbers have too, a year
+/// is needed.
 fn is_numeric_date(text: &str) -> bool {
     let by = |mark: char| -> Option<Vec<u32>> { text.split(mark).map(|part| part.parse().ok()).collect() };
     let day_and_month = |a: u32, b: u32| (1..=31).contains(&a.max(b)) && (1..=12).contains(&a.min(b));
@@ -75,8 +75,7 @@ fn is_numeric_date(text: &str) -> bool {
     })
 }
 
-/// `1'234.5`, `1,234.5`, `1.234,5`, `12,34,567`, `1.234.567`: digits with marks between them of which one at
-/// most is the decimal mark.
+/// `1'234.5`, `1,234.5`, `1.234,5`, `12,34,567`, `1.234.567`: digits with separators of thousands.
 fn is_grouped(text: &str) -> bool {
     let marks = |c: char| text.chars().filter(|other| *other == c).count();
     let digits = text.chars().all(|c| {
@@ -88,32 +87,32 @@ fn is_grouped(text: &str) -> bool {
     digits && (several || text.contains([' ', '\'', '\u{a0}', '\u{202f}', '\u{2019}']))
 }
 
-// Numbers that a spreadsheet cut to three digits when it saved a table as it showed it.
+// Numbers that a spreadsheet cut to three digits, because it saves what it shows.
 
 const CUT_NUMBER_ADVICE: &str = "a spreadsheet shows numbers so and saves what it shows: import the tracking program's own \
     export, which no spreadsheet has saved";
 
-/// `1.23E+05`: the form in which spreadsheets show a number that does not fit its cell.
+/// `1.23E+05`: the form of a number that does not fit its cell.
 fn is_cut_number(text: &str) -> bool {
     let digits = text.strip_prefix('-').unwrap_or(text).as_bytes();
     matches!(digits, [a, b'.' | b',', b, c, b'E', b'+' | b'-', d, e]
         if [a, b, c, d, e].iter().all(|byte| byte.is_ascii_digit()))
 }
 
-/// Numbers of the columns `cells` that were cut to three digits, among others of the same column that were
-/// not; `start` is the first row of data as an index of the table's head.
+/// Numbers in the columns `cells` that were cut to three digits, where others of the same column were not.
+/// `start` is the index of the first row of data in the table's head.
 ///
 /// # Errors
-/// [`ImportError`] for rows that cannot be read.
+/// A refusal of rows that cannot be read.
 pub(crate) fn cut_numbers_finding(
     table: &DelimitedTable,
     start: usize,
     cells: &[usize],
-) -> Result<Option<QualityFinding>, ImportError> {
+) -> ImportResult<Option<QualityFinding>> {
     if !table.may_have_cut_numbers() {
         return Ok(None);
     }
-    // for each column: cut numbers with the place of the first, and whether others are written out
+    // for each column: number of cut numbers, the first of them, and whether others are written out
     let mut found = vec![(0_usize, None, false); cells.len()];
     let mut rows = table.rows(start);
     while let Some(record) = rows.next_row()? {
@@ -134,7 +133,7 @@ pub(crate) fn cut_numbers_finding(
         let found = format!(
             "{}: `{text}` has three digits where others of its column are written out ({count} such numbers in \
              column {})",
-            table.location(line, table.text_column(line, cell)),
+            table.cell_location(line, cell),
             cell + 1
         );
         new_finding(Check::SpreadsheetRounding, Severity::Caution, (count as f64, ""), found, CUT_NUMBER_ADVICE)

@@ -1,20 +1,20 @@
-//! A delimited file: its first rows as a whole, all of them one by one, and where a cell stands.
+//! A delimited file: its first rows in memory, all rows one by one, and the place of a cell.
 
 use super::dialect::{declared_delimiter, is_comment};
-use crate::import::error::{CellProblem, ImportError, TextLocation};
+use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
 use crate::import::reader::dialect::Dialect;
 use crate::import::reader::number::{CellNumber, parse_number};
 use crate::import::reader::rows::{RowReader, RowView, TextRow, count_lines, parse_rows};
 use crate::import::reader::spreadsheet;
 
-/// Rows at the start that formats look at as a whole: the longest header known has a dozen.
+/// Rows that are kept for the search of headers; the longest known header has a dozen.
 const HEAD_ROWS: usize = 64;
-/// Start of a typographic minus sign whose UTF-8 was taken for Windows-1252.
+/// Start of a typographic minus sign in UTF-8 that was read as Windows-1252.
 const BROKEN_MINUS: &str = "\u{e2}\u{2c6}";
-/// Rows of a header behind comment marks: names and units.
+/// Most rows of a header behind comment marks: names and units.
 const COMMENTED_ROWS: usize = 2;
-/// Tracker's mark of a file with several tracks; other lines that start so are comments.
-pub(crate) const MULTI_TRACK_MARK: &str = "#multi:";
+/// Tracker's mark of a file with several tracks.
+const MULTI_TRACK_MARK: &str = "#multi:";
 /// What belongs in a cell, by the decimal mark of the file.
 const POINT_NUMBER: &str = "a number with a decimal point as in the rest of the file, or an empty cell";
 const COMMA_NUMBER: &str = "a number with a decimal comma as in the rest of the file, or an empty cell";
@@ -24,7 +24,6 @@ const COMMA_NUMBER: &str = "a number with a decimal comma as in the rest of the 
 pub(crate) struct DelimitedTable<'a> {
     /// File as named by the user.
     pub file: &'a str,
-    /// How it is written.
     pub dialect: Dialect,
     /// Whether it starts with [`MULTI_TRACK_MARK`].
     pub multi: bool,
@@ -38,7 +37,7 @@ impl<'a> DelimitedTable<'a> {
     ///
     /// # Errors
     /// [`ImportError`] when no delimiter makes columns, when there are no numbers, or when commas are both.
-    pub(crate) fn parse(file: &'a str, text: &'a str) -> Result<Self, ImportError> {
+    pub(crate) fn parse(file: &'a str, text: &'a str) -> ImportResult<Self> {
         let dialect = Dialect::find(file, text)?;
         let multi = text.lines().next().is_some_and(|line| line.trim() == MULTI_TRACK_MARK);
         let mut table = Self { file, dialect, multi, head: vec![], text };
@@ -49,7 +48,7 @@ impl<'a> DelimitedTable<'a> {
         {
             if !record.is_empty() {
                 let (line, cells) = (record.line, record.cells());
-                head.push(TextRow { line, cells, start: rows.row_start() });
+                head.push(TextRow { line, cells, start: rows.start });
             }
         }
         let names = head.first().map(|first| table.names_in_comments(first)).unwrap_or_default();
@@ -62,7 +61,7 @@ impl<'a> DelimitedTable<'a> {
     /// numbers: what numpy's `savetxt` and scripts for gnuplot and MATLAB write.
     fn names_in_comments(&self, first: &TextRow) -> Vec<TextRow> {
         let kind = |cell: &String| self.parse_cell(cell);
-        let numbers = first.cells.iter().any(|cell| matches!(kind(cell), CellNumber::Value(_)))
+        let numbers = first.cells.iter().any(|cell| self.is_value(cell))
             && !first.cells.iter().any(|cell| kind(cell) == CellNumber::Text);
         let mut rows: Vec<TextRow> = vec![];
         while numbers && rows.len() < COMMENTED_ROWS {
@@ -80,8 +79,7 @@ impl<'a> DelimitedTable<'a> {
         rows
     }
 
-    /// The line that ends where `end` starts, bytes, as cells without the comment mark; none where it has
-    /// none.
+    /// The cells of the line that ends before byte `end`, where it starts with a comment mark.
     fn comment_above(&self, end: usize) -> Option<TextRow> {
         let above = self.text.get(..end)?.strip_suffix('\n')?.trim_end_matches('\r');
         let start = above.rfind('\n').map_or(0, |end| end + 1);
@@ -101,9 +99,33 @@ impl<'a> DelimitedTable<'a> {
         RowReader::new(self.file, self.text, self.dialect.delimiter, start)
     }
 
-    /// Whether some number has an exponent as spreadsheets write it: nothing else is worth a second reading.
+    /// Whether some number has an exponent as spreadsheets write it, so that a search for them is worth it.
     pub(crate) fn may_have_cut_numbers(&self) -> bool {
         self.text.contains("E+") || self.text.contains("E-")
+    }
+
+    /// Line of the first row.
+    pub(crate) fn first_line(&self) -> usize {
+        self.head.first().map_or(1, |row| row.line)
+    }
+
+    /// Cells of the first row.
+    pub(crate) fn first_texts(&self) -> Vec<&str> {
+        self.head.first().map(TextRow::texts).unwrap_or_default()
+    }
+
+    /// The first of the `most` first rows that `accepts` takes, with its index.
+    pub(crate) fn find_row(
+        &self,
+        most: usize,
+        accepts: impl Fn(&TextRow) -> bool,
+    ) -> Option<(usize, &TextRow)> {
+        self.head.iter().enumerate().take(most).find(|(_, row)| accepts(row))
+    }
+
+    /// Whether a cell holds a number.
+    pub(crate) fn is_value(&self, cell: &str) -> bool {
+        matches!(self.parse_cell(cell), CellNumber::Value(_))
     }
 
     /// What `cell` says in the table's decimal mark.
@@ -111,25 +133,17 @@ impl<'a> DelimitedTable<'a> {
         parse_number(cell, self.dialect.decimal)
     }
 
-    /// Whether the first row of the head with a number in each of `cells` is row `from` or a later one; its
-    /// index.
+    /// Index of the first row of the head, from row `from` on, with a number in each of `cells`.
     pub(crate) fn first_numeric_row(&self, from: usize, cells: &[usize]) -> Option<usize> {
-        let is_value = |row: &TextRow, cell: usize| {
-            row.cells.get(cell).is_some_and(|text| matches!(self.parse_cell(text), CellNumber::Value(_)))
-        };
-        (from..self.head.len()).find(|&row| cells.iter().all(|cell| is_value(&self.head[row], *cell)))
+        let numbers = |row: &TextRow| cells.iter().all(|cell| self.is_value(row.cell(*cell)));
+        (from..self.head.len()).find(|&row| numbers(&self.head[row]))
     }
 
     /// A number or `None` for a missing one; `name` is that of the column.
     ///
     /// # Errors
     /// [`ImportError::Cell`] for anything else.
-    pub(crate) fn number_at(
-        &self,
-        record: &RowView,
-        cell: usize,
-        name: &str,
-    ) -> Result<Option<f64>, ImportError> {
+    pub(crate) fn number_at(&self, record: &RowView, cell: usize, name: &str) -> ImportResult<Option<f64>> {
         match self.parse_cell(record.cell(cell)) {
             CellNumber::Value(value) => Ok(Some(value)),
             CellNumber::Missing => Ok(None),
@@ -137,28 +151,27 @@ impl<'a> DelimitedTable<'a> {
         }
     }
 
-    /// The same of a cell that the table may not have.
+    /// As [`Self::number_at`], for a column that the table may not have.
     pub(crate) fn optional_number_at(
         &self,
         record: &RowView,
         cell: Option<usize>,
         name: &str,
-    ) -> Result<Option<f64>, ImportError> {
+    ) -> ImportResult<Option<f64>> {
         cell.map_or(Ok(None), |cell| self.number_at(record, cell, name))
     }
 
-    /// Cells may not be left off below `width`, and nothing may follow cell `most`.
-    pub(crate) fn check_row_length(
-        &self,
-        record: &RowView,
-        width: usize,
-        most: usize,
-    ) -> Result<(), ImportError> {
+    /// Refuses a row of fewer than `width` cells, or with text beyond cell `most`.
+    pub(crate) fn check_row_length(&self, record: &RowView, width: usize, most: usize) -> ImportResult<()> {
         if record.len() >= width && (record.len() <= most || record.used_width() <= most) {
             return Ok(());
         }
-        let place = self.location(record.line, 1);
-        Err(ImportError::Ragged { place, found: record.len(), expected: width.max(1) })
+        Err(self.ragged_error(record.line, record.len(), width.max(1)))
+    }
+
+    /// The refusal of a row with another number of cells than the table.
+    pub(crate) fn ragged_error(&self, line: usize, found: usize, expected: usize) -> ImportError {
+        ImportError::Ragged { place: self.location(line, 1), found, expected }
     }
 
     /// The refusal of a cell that is no number.
@@ -182,39 +195,28 @@ impl<'a> DelimitedTable<'a> {
                  empty cell",
             ),
         };
-        ImportError::Cell {
-            place: self.location(line, self.text_column(line, cell)),
-            problem: CellProblem::NotANumber,
-            name: name.to_owned(),
-            found: text.chars().take(60).collect::<String>().into(),
-            expected: if self.dialect.decimal == ',' { COMMA_NUMBER } else { POINT_NUMBER },
-            advice,
-        }
+        let expected = if self.dialect.decimal == ',' { COMMA_NUMBER } else { POINT_NUMBER };
+        let place = self.cell_location(line, cell);
+        ImportError::cell(place, CellProblem::NotANumber, (name, text), (expected, advice))
     }
 
-    /// Where the first cell of a row is a name it may start like a comment, and the row would disappear.
+    /// Refuses rows that start like a comment, where the first cell is a name: they would be skipped.
     ///
     /// # Errors
-    /// [`ImportError::Columns`] for the first such line below line `header`.
-    pub(crate) fn refuse_comment_names(
-        &self,
-        header: usize,
-        named: &str,
-        advice: &str,
-    ) -> Result<(), ImportError> {
+    /// [`ImportError`] for the first such line below line `header`.
+    pub(crate) fn refuse_comment_names(&self, header: usize, named: &str, advice: &str) -> ImportResult<()> {
         let Some(above) = self.text.lines().skip(header).position(is_comment) else { return Ok(()) };
-        Err(ImportError::columns(
-            self.file,
-            header + above + 1,
-            format!(
-                "found {named} that starts like a comment, expected a name that starts with a letter or a \
-                 number"
-            ),
-            advice,
-        ))
+        let problem = format!(
+            "found {named} that starts like a comment, expected a name that starts with a letter or a number"
+        );
+        Err(ImportError::columns(self.file, header + above + 1, problem, advice))
     }
 
-    /// A place in this file.
+    /// The place of a cell; `cell` is its index.
+    pub(crate) fn cell_location(&self, line: usize, cell: usize) -> TextLocation {
+        self.location(line, self.text_column(line, cell))
+    }
+
     pub(crate) fn location(&self, line: usize, column: usize) -> TextLocation {
         TextLocation { file: self.file.to_owned(), line, column }
     }

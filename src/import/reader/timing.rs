@@ -1,29 +1,27 @@
-//! Rows to frames: the frame column where there is one, else the time column on the grid that fits it.
+//! Frame numbers of the rows: from the frame column, or else from the times on the grid that fits them.
 
-use super::track_file::Column;
-use crate::import::error::{CellProblem, ImportError};
+use crate::import::error::{CellProblem, ImportError, ImportResult};
 use crate::import::reader::track_file::{Clock, TrackFile};
-use crate::recording::clock;
-use crate::recording::clock::{FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
+use crate::recording::clock::{self, FrameFit, MAX_FRAMES, OFF_GRID_LIMIT_FRAMES};
 
-/// Largest step between tracked frames that is suggested where the rates are an integer apart.
+/// Largest `--frame-step` that a refusal suggests where the two rates have a whole ratio.
 const LARGEST_STEP: f64 = 10.0;
-/// Largest frame number: beyond it a double no longer counts one by one, and no camera counts so far.
+/// Largest frame number; no camera counts as far.
 const LARGEST_FRAME: f64 = 1e12;
 
-/// Frames for each row of a recording, on average, beyond which a number is damaged rather than frames lost.
+/// Most frames a row, on average. Beyond, a number is damaged rather than frames lost.
 pub(crate) const MOST_SPREAD: i64 = 1000;
 
-/// What the user declares about time.
+/// Timing as the user declares it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct DeclaredTiming {
     pub rate_hz: f64,
-    /// Whether times are those of playback, which only count frames.
+    /// Whether the times are those of playback and only count frames.
     pub playback: bool,
     pub step: usize,
 }
 
-/// Rows of a clock with their frames.
+/// Frames of the rows of a clock.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct RowFrames {
     /// Frame of every row: the file's own numbers, or counted from its first row.
@@ -44,120 +42,108 @@ pub(crate) struct ClockRows<'e> {
 }
 
 /// Gives every row its frame.
-pub(crate) fn place_rows(rows: ClockRows, declared: DeclaredTiming) -> Result<RowFrames, ImportError> {
-    let file = || rows.export.file.to_owned();
-    match rows.clock.len() {
-        0 => return Err(ImportError::HeaderOnly { file: file(), line: 1 }),
-        // (a point may be digitized once where others are tracked: its frame has a number)
-        1 if rows.clock.frame.is_none() || rows.export.clocks.iter().all(|clock| clock.len() < 2) => {
-            return Err(ImportError::OneRow { file: file(), line: rows.clock.line_number(0) });
+pub(crate) fn place_rows(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
+    let (file, clock) = (rows.export.file, rows.clock);
+    match clock.len() {
+        0 => return Err(ImportError::header_only(file, 1)),
+        // (a numbered frame is enough for a point that was digitized once where others are tracked)
+        1 if clock.frame.is_none() || rows.export.clocks.iter().all(|clock| clock.len() < 2) => {
+            let place = format!("{file}:{}:1", clock.line_number(0));
+            let (found, expected) = ("a single row of numbers", "one a frame and at least two");
+            return Err(ImportError::format(
+                place,
+                found,
+                expected,
+                "export again with all data rows selected",
+            ));
         }
         _ => {}
     }
-    let placed = if rows.clock.frame.is_some() {
-        place_by_number(rows, declared)
-    } else {
-        place_by_time(rows, declared)
-    }?;
+    let placed =
+        if clock.frame.is_some() { place_by_number(rows, declared) } else { place_by_time(rows, declared) }?;
     refuse_sparse(rows, &placed)?;
     Ok(placed)
 }
 
-/// Rows spread so thin that one of their numbers is damaged; this also bounds memory by the size of the file.
-fn refuse_sparse(rows: ClockRows, placed: &RowFrames) -> Result<(), ImportError> {
+/// Refuses rows so far apart that a number must be damaged. This also bounds memory by the size of the file.
+fn refuse_sparse(rows: ClockRows, placed: &RowFrames) -> ImportResult<()> {
     let jump = |row: usize| placed.frames[row] - placed.frames[row - 1];
     let span = placed.frames.last().zip(placed.frames.first()).map_or(0, |(last, first)| last - first);
     if span <= MOST_SPREAD * placed.frames.len() as i64 {
         return Ok(());
     }
     let row = (1..placed.frames.len()).max_by_key(|&row| jump(row)).unwrap_or(0);
-    let clock = rows.clock;
-    let found = clock
-        .frame
-        .as_ref()
-        .or(clock.time.as_ref())
-        .and_then(|column| column.get(row))
-        .map_or_else(String::new, format_number);
+    let column = rows.clock.frame.as_ref().or(rows.clock.time.as_ref());
+    let found = column.and_then(|column| column.get(row));
     Err(cell_error(rows, row, CellProblem::FarAway, found))
 }
 
-/// Refuses two clocks of a file that number the same frames at other times.
+/// Refuses two clocks of a file whose frame numbers start at different times.
 pub(crate) fn refuse_clock_mismatch(
     rows: ClockRows,
     placed: [&RowFrames; 2],
     rate_hz: f64,
-) -> Result<(), ImportError> {
+) -> ImportResult<()> {
     let zero_s = |placed: &RowFrames| {
         let timed = placed.numbered && placed.implied_hz.is_some();
         placed.frames.first().filter(|_| timed).map(|first| placed.start_s - *first as f64 / rate_hz)
     };
     let [Some(first_s), Some(other_s)] = placed.map(zero_s) else { return Ok(()) };
-    let times: Vec<f64> = rows.clock.time.iter().flat_map(Column::iter).flatten().collect();
-    let rounding_s = QUANTA_S.into_iter().find(|quantum| are_multiples(&times, *quantum)).unwrap_or(0.0);
-    // (rates that agree within their tolerance part over many frames)
+    let rounding_s = find_quantum_s(&rows.clock.times()).unwrap_or(0.0);
+    // (rates that differ by their tolerance drift apart over many frames)
     let [first, other] = placed.map(|placed| placed.frames.first().copied().unwrap_or(0));
     let drift_s = RATE_AGREEMENT * (other - first).abs() as f64 / rate_hz;
     if (first_s - other_s).abs() <= 0.5 / rate_hz + rounding_s + drift_s {
         return Ok(());
     }
-    Err(ImportError::GridMismatch {
-        file: rows.export.file.to_owned(),
-        found: format!("a clock whose frame 0 is at {} s", format_number(other_s)),
-        expected: format!("{} s", format_number(first_s)),
-        other: "the other track".to_owned(),
-    })
+    let found = format!("a clock whose frame 0 is at {} s", format_number(other_s));
+    let expected = format!("{} s", format_number(first_s));
+    Err(ImportError::grid_mismatch(rows.export.file, &found, &expected, "the other track"))
 }
 
-/// Frames between the first rows of two clocks; a refusal when it is no whole number.
+/// Frames from the first row of one clock to that of another; refuses a fraction of a frame.
 pub(crate) fn frame_offset(
     first: (&TrackFile, &RowFrames),
     other: (&TrackFile, &RowFrames),
     rate_hz: f64,
-) -> Result<i64, ImportError> {
-    let refuse = |found: String, expected: String| ImportError::GridMismatch {
-        file: other.0.file.to_owned(),
-        found,
-        expected,
-        other: first.0.file.to_owned(),
+) -> ImportResult<i64> {
+    let refuse = |found: &str, expected: &str| {
+        Err(ImportError::grid_mismatch(other.0.file, found, expected, first.0.file))
     };
     match (first.1.numbered, other.1.numbered) {
         (true, true) => Ok(0),
         (false, false) => {
             let apart = (other.1.start_s - first.1.start_s) * rate_hz;
             if (apart - apart.round()).abs() > OFF_GRID_LIMIT_FRAMES || apart.abs() > MAX_FRAMES {
-                return Err(refuse(
-                    format!("a first row {apart:.3} frames after the other's"),
-                    format!("a whole number of frames (at most {MAX_FRAMES})"),
-                ));
+                let found = format!("a first row {apart:.3} frames after the other's");
+                return refuse(&found, &format!("a whole number of frames (at most {MAX_FRAMES})"));
             }
             Ok(apart.round() as i64)
         }
         (numbered, _) => {
             let word = |numbered| if numbered { "rows with frame numbers" } else { "rows with times only" };
-            Err(refuse(word(!numbered).to_owned(), word(numbered).to_owned()))
+            refuse(word(!numbered), word(numbered))
         }
     }
 }
 
-/// The file counts its frames; its times only serve to check the rate and to place the start.
-fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> Result<RowFrames, ImportError> {
+/// Takes the frame numbers of the file; the times only check the rate and give the start.
+fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
     let clock = rows.clock;
     let mut frames: Vec<i64> = Vec::with_capacity(clock.len());
     let numbers = clock.frame.iter().flat_map(|column| column.iter());
     for (row, number) in numbers.enumerate() {
-        let Some(number) = number else {
-            return Err(cell_error(rows, row, CellProblem::NoTime, String::new()));
-        };
+        let Some(number) = number else { return Err(cell_error(rows, row, CellProblem::NoTime, None)) };
         let too_far = frames.first().is_some_and(|&first| number - first as f64 > MAX_FRAMES);
         if number.fract().abs() > 0.0 || number.abs() > LARGEST_FRAME || too_far {
-            return Err(cell_error(rows, row, CellProblem::NotAFrame, format_number(number)));
+            return Err(cell_error(rows, row, CellProblem::NotAFrame, Some(number)));
         }
         refuse_disorder(rows, row, frames.last().map(|&last| last as f64), number)?;
         frames.push(number as i64);
     }
     apply_frame_step(&mut frames, declared.step)?;
     let (Some(first), Some(last)) = (frames.first().copied(), frames.last().copied()) else {
-        return Err(ImportError::HeaderOnly { file: rows.export.file.to_owned(), line: 1 });
+        return Err(ImportError::header_only(rows.export.file, 1));
     };
     let time_s = |row: usize| clock.time.as_ref().and_then(|column| column.get(row));
     let span_s = time_s(0).zip(time_s(clock.len() - 1)).map(|(from, to)| to - from);
@@ -165,8 +151,7 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> Result<RowFrame
         span_s.map(|span| (last - first) as f64 / span).filter(|rate| rate.is_finite() && *rate > 0.0);
     if let Some(implied) = implied_hz.filter(|_| !declared.playback) {
         // rounded ends of a short record move the rate without contradicting it
-        let times: Vec<f64> = clock.time.iter().flat_map(Column::iter).flatten().collect();
-        let rounding_s = QUANTA_S.into_iter().find(|quantum| are_multiples(&times, *quantum)).unwrap_or(0.0);
+        let rounding_s = find_quantum_s(&clock.times()).unwrap_or(0.0);
         let expected_s = (last - first) as f64 / declared.rate_hz;
         if span_s.is_none_or(|span| (span - expected_s).abs() > rounding_s) {
             check_rate(rows, implied, declared.rate_hz, None)?;
@@ -177,22 +162,21 @@ fn place_by_number(rows: ClockRows, declared: DeclaredTiming) -> Result<RowFrame
     Ok(RowFrames { frames, numbered: true, start_s, implied_hz })
 }
 
-/// Numbers that count the tracked frames alone, where only every n-th was tracked.
-fn apply_frame_step(frames: &mut [i64], step: usize) -> Result<(), ImportError> {
+/// Multiplies numbers that count only the tracked frames by `--frame-step`.
+fn apply_frame_step(frames: &mut [i64], step: usize) -> ImportResult<()> {
     if step == 1 {
         return Ok(());
     }
     if frames.windows(2).any(|pair| pair[1] - pair[0] != 1) {
         let expected = "1, because the file's own frame numbers do not count row by row: they show which \
-            frames were tracked"
-            .to_owned();
+            frames were tracked";
         return Err(ImportError::option("--frame-step", step, expected));
     }
     frames.iter_mut().for_each(|frame| *frame *= step as i64);
     Ok(())
 }
 
-fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> Result<RowFrames, ImportError> {
+fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> ImportResult<RowFrames> {
     let times = read_times(rows)?;
     let row_s = declared.step as f64 / declared.rate_hz;
     let fit = if declared.playback {
@@ -205,13 +189,13 @@ fn place_by_time(rows: ClockRows, declared: DeclaredTiming) -> Result<RowFrames,
     Ok(RowFrames { frames, numbered: false, start_s, implied_hz: Some(1.0 / fit.frame_s) })
 }
 
-/// The declared grid first: it explains times that are rounded too coarsely to show their own.
+/// Fits the declared grid first, because coarsely rounded times do not show their own.
 fn fit_declared_grid(
     rows: ClockRows,
     times: &[f64],
     row_s: f64,
     declared: DeclaredTiming,
-) -> Result<FrameFit, ImportError> {
+) -> ImportResult<FrameFit> {
     let agrees = |fit: &FrameFit| (fit.frame_s / row_s - 1.0).abs() <= RATE_AGREEMENT;
     if let Some(fit) = clock::number_frames(times, row_s)
         .filter(|fit| fit.is_on_grid() && agrees(fit) && fit.smallest_step() == 1)
@@ -230,64 +214,59 @@ fn fit_declared_grid(
     Ok(fit)
 }
 
-/// Times that follow the declared rate, but are rounded so coarsely that they show another one, or none.
+/// Refuses times that follow the declared rate but are rounded too coarsely to number the frames.
 fn refuse_coarse_times(
     rows: ClockRows,
     times: &[f64],
     row_s: f64,
     declared: DeclaredTiming,
-) -> Result<(), ImportError> {
+) -> ImportResult<()> {
     let limit_s = 2.0 * OFF_GRID_LIMIT_FRAMES * row_s; // rounding moves a time by half a quantum
-    let Some(quantum_s) = QUANTA_S
-        .into_iter()
-        .find(|quantum| are_multiples(times, *quantum))
-        .filter(|quantum| *quantum > limit_s)
-    else {
-        return Ok(());
-    };
+    let quantum_s = find_quantum_s(times).filter(|quantum| *quantum > limit_s);
+    let Some(quantum_s) = quantum_s else { return Ok(()) };
     let steps = times.windows(2).map(|w| w[1] - w[0]);
     let (least, most) =
         steps.fold((f64::INFINITY, 0.0_f64), |(least, most), step| (least.min(step), most.max(step)));
     let span_s = times[times.len() - 1] - times[0];
     let mean_agrees =
         ((times.len() - 1) as f64 * row_s / span_s - 1.0).abs() <= RATE_AGREEMENT + quantum_s / span_s;
-    // even steps are a grid of their own: another rate, not rounding
+    // (even steps mean another rate, not rounding)
     if most - least > quantum_s / 2.0 && mean_agrees {
-        return Err(ImportError::CoarseTimes {
-            file: rows.export.file.to_owned(),
-            quantum_s,
-            declared_hz: declared.rate_hz,
-            limit_s,
-        });
+        let problem = format!(
+            "the times are rounded to {quantum_s} s, too coarsely to number the frames at {} frames/s; expected \
+             less than {limit_s:.3e} s: name a column that counts frames instead (--columns frame=...), or \
+             export the times with more digits",
+            declared.rate_hz
+        );
+        return Err(ImportError::unusable(rows.export.file, problem));
     }
     Ok(())
 }
 
-/// The grid that the times themselves show.
-fn fit_shown_grid(rows: ClockRows, times: &[f64]) -> Result<FrameFit, ImportError> {
+/// Fits the grid that the times themselves show.
+fn fit_shown_grid(rows: ClockRows, times: &[f64]) -> ImportResult<FrameFit> {
     let fit = clock::median_step_s(times).and_then(|seed_s| clock::number_frames(times, seed_s));
-    let found = |row: usize| format_number(times[row]);
-    match fit {
-        Some(fit) if fit.is_on_grid() => Ok(fit),
-        Some(fit) => Err(cell_error(rows, fit.worst_row, CellProblem::OffGrid, found(fit.worst_row))),
+    let row = match fit {
+        Some(fit) if fit.is_on_grid() => return Ok(fit),
+        Some(fit) => fit.worst_row,
         None => {
             let jump = |row: usize| times[row] - times[row - 1];
-            let row = (1..times.len()).max_by(|&a, &b| jump(a).total_cmp(&jump(b))).unwrap_or(0);
-            Err(cell_error(rows, row, CellProblem::OffGrid, found(row)))
+            (1..times.len()).max_by(|&a, &b| jump(a).total_cmp(&jump(b))).unwrap_or(0)
         }
-    }
+    };
+    Err(cell_error(rows, row, CellProblem::OffGrid, Some(times[row])))
 }
 
-/// A number for a message: as written where that is short.
+/// A number for a message, without an exponent where that is short.
 fn format_number(value: f64) -> String {
     if value == 0.0 || (1e-9..1e15).contains(&value.abs()) { value.to_string() } else { format!("{value:e}") }
 }
 
-fn read_times(rows: ClockRows) -> Result<Vec<f64>, ImportError> {
+fn read_times(rows: ClockRows) -> ImportResult<Vec<f64>> {
     let mut times: Vec<f64> = Vec::with_capacity(rows.clock.len());
     for row in 0..rows.clock.len() {
         let Some(time) = rows.clock.time.as_ref().and_then(|column| column.get(row)) else {
-            return Err(cell_error(rows, row, CellProblem::NoTime, String::new()));
+            return Err(cell_error(rows, row, CellProblem::NoTime, None));
         };
         refuse_disorder(rows, row, times.last().copied(), time)?;
         times.push(time);
@@ -295,28 +274,23 @@ fn read_times(rows: ClockRows) -> Result<Vec<f64>, ImportError> {
     Ok(times)
 }
 
-fn refuse_disorder(rows: ClockRows, row: usize, last: Option<f64>, next: f64) -> Result<(), ImportError> {
+fn refuse_disorder(rows: ClockRows, row: usize, last: Option<f64>, next: f64) -> ImportResult<()> {
     match last {
-        Some(last) if next == last => Err(cell_error(rows, row, CellProblem::Duplicate, format_number(next))),
-        Some(last) if next < last => Err(cell_error(rows, row, CellProblem::Backwards, format_number(next))),
+        Some(last) if next == last => Err(cell_error(rows, row, CellProblem::Duplicate, Some(next))),
+        Some(last) if next < last => Err(cell_error(rows, row, CellProblem::Backwards, Some(next))),
         _ => Ok(()),
     }
 }
 
-fn check_rate(
-    rows: ClockRows,
-    implied_hz: f64,
-    declared_hz: f64,
-    step: Option<usize>,
-) -> Result<(), ImportError> {
+fn check_rate(rows: ClockRows, implied_hz: f64, declared_hz: f64, step: Option<usize>) -> ImportResult<()> {
     if (implied_hz / declared_hz - 1.0).abs() <= RATE_AGREEMENT {
         return Ok(());
     }
     Err(ImportError::RateMismatch { file: rows.export.file.to_owned(), implied_hz, declared_hz, step })
 }
 
-fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: String) -> ImportError {
-    let (expected, advice) = match problem {
+fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: Option<f64>) -> ImportError {
+    let remedy = match problem {
         CellProblem::NotANumber | CellProblem::NoTime => (
             "a number in every row",
             "complete the row from what the tracking program shows, or export again; a gap needs no row",
@@ -345,39 +319,35 @@ fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: String) 
              frame=...)",
         ),
     };
-    ImportError::Cell {
-        place: rows.export.row_location(rows.clock, row),
-        problem,
-        name: if rows.clock.frame.is_some() { "frame" } else { "time" }.to_owned(),
-        found: found.into(),
-        expected,
-        advice,
-    }
+    let name = if rows.clock.frame.is_some() { "frame" } else { "time" };
+    let found = found.map_or_else(String::new, format_number);
+    ImportError::cell(rows.export.row_location(rows.clock, row), problem, (name, &found), remedy)
 }
 
-// Whether times and rates agree within their digits.
-
-/// Largest difference between two rates that are meant to be one: cameras hold theirs to parts in ten
-/// thousand, and wrong rates are wrong by far more.
+/// Largest relative difference of two equal rates. Cameras hold theirs to parts in ten thousand; wrong rates differ
+/// by far more.
 pub(crate) const RATE_AGREEMENT: f64 = 0.01;
 
 /// Decimal places to which programs round times, s.
-pub(crate) const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
+const QUANTA_S: [f64; 8] = [1.0, 0.1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7];
 
-/// Whether times lie on the grid of `rate_hz` from the first one on, as near as their last digit.
+/// Whether times lie on the grid of `rate_hz` that starts at the first one, within the rounding of both.
 pub(crate) fn times_fit_rate(times: &[f64], frames: &[f64], rate_hz: f64) -> bool {
     let (Some(start), Some(first)) = (times.first(), frames.first()) else { return false };
-    let half_quantum =
-        QUANTA_S.into_iter().find(|q| are_multiples(times, *q)).map_or(1e-9, |q| q / 2.0 * (1.0 + 1e-6));
-    // the first time is rounded too
-    times
-        .iter()
-        .zip(frames)
-        .all(|(time, frame)| (start + (frame - first) / rate_hz - time).abs() <= 2.0 * half_quantum)
+    let half_quantum = find_quantum_s(times).map_or(1e-9, |q| q / 2.0 * (1.0 + 1e-6));
+    // (twice: the first time is rounded too)
+    let fits =
+        |(time, frame): (&f64, &f64)| (start + (frame - first) / rate_hz - time).abs() <= 2.0 * half_quantum;
+    times.iter().zip(frames).all(fits)
+}
+
+/// The coarsest decimal place to which all times are rounded, s.
+pub(crate) fn find_quantum_s(times: &[f64]) -> Option<f64> {
+    QUANTA_S.into_iter().find(|quantum| are_multiples(times, *quantum))
 }
 
 /// Whether every time is a multiple of `quantum_s`.
-pub(crate) fn are_multiples(times: &[f64], quantum_s: f64) -> bool {
+fn are_multiples(times: &[f64], quantum_s: f64) -> bool {
     times.iter().all(|t| (t / quantum_s - (t / quantum_s).round()).abs() <= 1e-6)
 }
 

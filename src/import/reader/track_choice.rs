@@ -1,6 +1,6 @@
-//! Which track is the lip tip and which the head: as the user says, or as they are called.
+//! Chooses the tracks of the lip tip and of the head, by `--point` or by their names.
 
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::options::ImportOptions;
 use crate::import::reader::findings::new_finding;
 use crate::import::reader::track_file::TrackFile;
@@ -8,13 +8,13 @@ use crate::recording::quality::{Check, Severity};
 use crate::toml_file::suggest_key;
 use std::collections::HashMap;
 
-/// Most names of tracks in a refusal: a file of detections has thousands.
+/// Most track names in a refusal: a file of detections has thousands.
 const MOST_NAMES: usize = 30;
 
-/// A track by the index of its export and its own.
+/// Index of a track's export, and its index there.
 pub(crate) type TrackIndex = (usize, usize);
 
-/// Tracks of one file that share a name get numbers, so that each can be chosen and none is by chance.
+/// Numbers the tracks of a file that share a name, so that each can be chosen.
 pub(crate) fn number_repeated_names(exports: &mut [TrackFile]) {
     for export in exports {
         let mut count: HashMap<String, usize> = HashMap::new();
@@ -37,23 +37,17 @@ pub(crate) fn number_repeated_names(exports: &mut [TrackFile]) {
                 "{}: {times} tracks are called `{name}`: here they are `{name}#1` to `{name}#{times}`",
                 export.file
             );
-            new_finding(
-                Check::TrackNames,
-                Severity::Caution,
-                (times as f64, ""),
-                found,
-                "choose one with --point, or give each track a name of its own and export again",
-            )
+            let advice = "choose one with --point, or give each track a name of its own and export again";
+            new_finding(Check::TrackNames, Severity::Caution, (times as f64, ""), found, advice)
         }));
     }
 }
 
-/// The tracks of tip and head: those that `--point` names, and for a point that it does not name the track of
-/// that name, if there is one.
+/// The tracks of tip and head: those that `--point` names, or else those called `tip` and `head`.
 pub(crate) fn choose_tracks(
     exports: &[TrackFile],
     options: &ImportOptions,
-) -> Result<[Option<TrackIndex>; 2], ImportError> {
+) -> ImportResult<[Option<TrackIndex>; 2]> {
     let named = [("tip", &options.tip), ("head", &options.head)];
     if named.iter().all(|(_, name)| name.is_none()) {
         return choose_by_default(exports);
@@ -64,76 +58,60 @@ pub(crate) fn choose_tracks(
     let [tip, head] = named;
     let chosen = [find_named(tip)?, find_named(head)?];
     if chosen[0].is_some() && chosen[0] == chosen[1] {
-        let expected = "another track than for the tip".to_owned();
-        return Err(ImportError::Point {
-            point: "head",
-            found: options.head.clone().unwrap_or_default(),
-            expected,
-            advice: list_tracks(exports),
-        });
+        let (found, expected) = (options.head.clone().unwrap_or_default(), "another track than for the tip");
+        return Err(ImportError::point("head", found, expected, list_tracks(exports)));
     }
     let [tip, head] = chosen;
-    // (of several none is taken by chance)
+    // (of several tracks of that name none is taken)
     let only =
         |point: &str| Some(tracks_called(exports, point)).filter(|found| found.len() == 1)?.first().copied();
     let left = |point, other: Option<TrackIndex>| only(point).filter(|track| Some(*track) != other);
     Ok([tip.or_else(|| left("tip", head)), head.or_else(|| left("head", tip))])
 }
 
-/// Tracks of a point's own name, in any case of letters where none has it exactly.
+/// Tracks of that name; where there are none, those whose name differs in case only.
 fn tracks_called(exports: &[TrackFile], name: &str) -> Vec<TrackIndex> {
     let exact = matching_tracks(exports, |_, track| track == name);
-    if exact.is_empty() {
-        matching_tracks(exports, |_, track| track.eq_ignore_ascii_case(name))
-    } else {
-        exact
+    if !exact.is_empty() {
+        return exact;
     }
+    matching_tracks(exports, |_, track| track.eq_ignore_ascii_case(name))
 }
 
-/// Tracks that are called what they are need no `--point`.
-fn choose_by_default(exports: &[TrackFile]) -> Result<[Option<TrackIndex>; 2], ImportError> {
+/// The tracks called `tip` and `head`, where no `--point` is given.
+fn choose_by_default(exports: &[TrackFile]) -> ImportResult<[Option<TrackIndex>; 2]> {
     let [tip, head] = [tracks_called(exports, "tip"), tracks_called(exports, "head")];
     if tip.len() > 1 || head.len() > 1 || (tip.is_empty() && head.is_empty()) {
-        let expected = "--point tip=NAME and --point head=NAME, or tracks called tip and head".to_owned();
-        return Err(ImportError::Point {
-            point: "tip",
-            found: "no track named for it".to_owned(),
-            expected,
-            advice: list_tracks(exports),
-        });
+        let expected = "--point tip=NAME and --point head=NAME, or tracks called tip and head";
+        let found = "no track named for it".to_owned();
+        return Err(ImportError::point("tip", found, expected, list_tracks(exports)));
     }
     Ok([tip.first().copied(), head.first().copied()])
 }
 
 /// A track by its name, by `FILE:NAME`, or by `FILE` when the file holds one track.
-fn find_track(exports: &[TrackFile], point: &'static str, name: &str) -> Result<TrackIndex, ImportError> {
+fn find_track(exports: &[TrackFile], point: &'static str, name: &str) -> ImportResult<TrackIndex> {
     let file_is = |export: &TrackFile, file: &str| {
         export.file == file || export.file_name() == file || export.stem == file
     };
     let by_name = matching_tracks(exports, |_, track| track == name);
     let by_both = matching_tracks(exports, |export, track| {
-        name.strip_suffix(track)
-            .and_then(|file| file.strip_suffix(':'))
-            .is_some_and(|file| file_is(export, file))
+        let file = name.strip_suffix(track).and_then(|file| file.strip_suffix(':'));
+        file.is_some_and(|file| file_is(export, file))
     });
     let by_file = matching_tracks(exports, |export, _| export.tracks.len() == 1 && file_is(export, name));
     let found = [by_name, by_both, by_file].into_iter().find(|found| !found.is_empty()).unwrap_or_default();
     match found.as_slice() {
         [one] => Ok(*one),
-        [] => Err(ImportError::Point {
-            point,
-            found: format!("`{name}`"),
-            expected: "the name of a track".to_owned(),
-            advice: unknown_track_advice(exports, name),
-        }),
+        [] => {
+            let names: Vec<&str> =
+                exports.iter().flat_map(|export| export.tracks.iter().map(|t| t.name.as_str())).collect();
+            let advice = suggest_track(name, &names) + &list_tracks(exports);
+            Err(ImportError::point(point, format!("`{name}`"), "the name of a track", advice))
+        }
         _ => {
             let found = format!("`{name}` {} times", found.len());
-            Err(ImportError::Point {
-                point,
-                found,
-                expected: "one track; write FILE:NAME".to_owned(),
-                advice: list_tracks(exports),
-            })
+            Err(ImportError::point(point, found, "one track; write FILE:NAME", list_tracks(exports)))
         }
     }
 }
@@ -142,23 +120,17 @@ fn matching_tracks(exports: &[TrackFile], accept: impl Fn(&TrackFile, &str) -> b
     let all = exports.iter().enumerate().flat_map(|(file, export)| {
         export.tracks.iter().enumerate().map(move |(track, t)| (file, track, export, t))
     });
-    all.filter(|(_, _, export, track)| accept(export, &track.name))
-        .map(|(file, track, _, _)| (file, track))
-        .collect()
+    let accepted = all.filter(|(_, _, export, track)| accept(export, &track.name));
+    accepted.map(|(file, track, _, _)| (file, track)).collect()
 }
 
-fn unknown_track_advice(exports: &[TrackFile], name: &str) -> String {
-    let names: Vec<&str> =
-        exports.iter().flat_map(|export| export.tracks.iter().map(|track| track.name.as_str())).collect();
-    let suggestion = suggest_key(name, &names);
-    if suggestion.starts_with("did") {
-        format!("{suggestion} {}", list_tracks(exports))
-    } else {
-        list_tracks(exports)
-    }
+/// The name nearest to `name` as a question with a blank behind it, if one is near.
+fn suggest_track(name: &str, names: &[&str]) -> String {
+    let suggestion = suggest_key(name, names);
+    if suggestion.starts_with("did") { suggestion + " " } else { String::new() }
 }
 
-/// What to say where no track was found for `point` and others are left over.
+/// Advice where no track was found for `point` and others are left over.
 pub(crate) fn unchosen_advice(
     exports: &[TrackFile],
     chosen: &[Option<TrackIndex>; 2],
@@ -169,8 +141,7 @@ pub(crate) fn unchosen_advice(
         .filter(|track| !chosen.contains(&Some(*track)))
         .map(|(file, track)| exports[file].tracks[track].name.as_str())
         .collect();
-    let suggestion = suggest_key(point, &free);
-    let hint = if suggestion.starts_with("did") { format!("{suggestion} ") } else { String::new() };
+    let hint = suggest_track(point, &free);
     (!free.is_empty()).then(|| format!("{hint}{}: name it with --point {point}=NAME", list_tracks(exports)))
 }
 
@@ -183,13 +154,8 @@ fn list_tracks(exports: &[TrackFile]) -> String {
         .iter()
         .flat_map(|export| export.tracks.iter().map(|track| full(export, &track.name)))
         .collect();
-    let more = names
-        .len()
-        .checked_sub(MOST_NAMES)
-        .filter(|more| *more > 0)
-        .map_or_else(String::new, |more| format!(" and {more} more"));
-    format!(
-        "tracks found: {}{more}",
-        names.iter().take(MOST_NAMES).map(String::as_str).collect::<Vec<_>>().join(", ")
-    )
+    let shown = names[..names.len().min(MOST_NAMES)].join(", ");
+    let left_out = names.len().saturating_sub(MOST_NAMES);
+    let more = if left_out > 0 { format!(" and {left_out} more") } else { String::new() };
+    format!("tracks found: {shown}{more}")
 }

@@ -1,4 +1,4 @@
-//! What a format makes of a file: clocks, tracks, and what the file itself says of its units.
+//! The content of a file as its format reads it: clocks, tracks, and facts such as units.
 
 use super::Document;
 use crate::import::base_name;
@@ -8,7 +8,7 @@ use crate::import::reader::table::DelimitedTable;
 use crate::recording::files::YAxis;
 use crate::recording::quality::QualityFinding;
 
-/// When the rows of some tracks were taken, and where they say so.
+/// Frames and times of the rows of one or more tracks.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Clock {
     /// 1-based line of every row.
@@ -21,7 +21,17 @@ pub(crate) struct Clock {
     pub time: Option<Column>,
 }
 
+/// Line numbers as a clock keeps them.
+pub(crate) fn clock_lines(lines: impl IntoIterator<Item = usize>) -> Vec<u32> {
+    lines.into_iter().map(|line| u32::try_from(line).unwrap_or(u32::MAX)).collect()
+}
+
 impl Clock {
+    /// The times that are not missing.
+    pub(crate) fn times(&self) -> Vec<f64> {
+        self.time.iter().flat_map(Column::iter).flatten().collect()
+    }
+
     pub(crate) fn len(&self) -> usize {
         self.lines.len()
     }
@@ -42,18 +52,18 @@ pub(crate) struct Track {
     pub confidence: Option<Column>,
 }
 
-/// A fact and where it stands, in words.
+/// A fact and its source, in words.
 pub(crate) type Fact<T> = Option<(T, String)>;
 
-/// What the file, or the documentation of its format, fixes. What is missing here the user must give.
+/// Facts that the file or the documentation of its format gives. The user has to give the others.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Facts {
     pub y_axis: Fact<YAxis>,
-    /// What decides the direction of y where the format leaves it open, for the question.
+    /// What the direction of y depends on where the format leaves it open; part of the question to the user.
     pub y_axis_open: Option<&'static str>,
     /// Length unit of the coordinates.
     pub unit: Fact<CoordinateUnit>,
-    /// Rate at which the camera recorded, frames/s; never a rate that may be that of playback.
+    /// Rate at which the camera recorded, frames/s; never one that may be that of playback.
     pub frame_rate_hz: Fact<f64>,
     /// Exposure of a frame, s.
     pub exposure_s: Fact<f64>,
@@ -62,42 +72,39 @@ pub(crate) struct Facts {
 }
 
 impl Facts {
-    /// Image pixels with y downwards, and where that stands.
+    /// Image pixels with y downwards, with the source of both facts.
     pub(crate) fn pixels_down(why: &str) -> Self {
-        let (y_axis, unit) =
-            (Some((YAxis::Down, why.to_owned())), Some((CoordinateUnit::Pixel, why.to_owned())));
-        Self { y_axis, unit, ..Self::default() }
+        let unit = Some((CoordinateUnit::Pixel, why.to_owned()));
+        Self { y_axis: Some((YAxis::Down, why.to_owned())), unit, ..Self::default() }
     }
 }
 
-/// Rows and tracks of a file, in its own units.
+/// Clocks and tracks of a file, in its own units.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct TrackFile<'a> {
     pub file: &'a str,
     pub stem: &'a str,
-    /// The table that the lines of the clocks belong to, where it is one.
+    /// The table that the clocks were read from, unless the file is XML or blocks.
     pub table: Option<&'a DelimitedTable<'a>>,
     pub clocks: Vec<Clock>,
     pub tracks: Vec<Track>,
     pub facts: Facts,
     pub notes: Vec<String>,
     pub findings: Vec<QualityFinding>,
-    /// Names and titles, searched for the mark of synthetic data.
+    /// Names and titles, which are searched for the mark of synthetic data.
     pub texts: Vec<String>,
 }
 
 impl<'a> TrackFile<'a> {
-    /// Of a document, without anything in it yet.
     pub(crate) fn for_document(document: &Document<'a>) -> Self {
         Self { file: document.file, stem: document.stem, ..Self::default() }
     }
 
-    /// Last part of the file's path.
     pub(crate) fn file_name(&self) -> &str {
         base_name(self.file)
     }
 
-    /// Where a row says its frame or time.
+    /// Place of the frame or time of a row.
     pub(crate) fn row_location(&self, clock: &Clock, row: usize) -> TextLocation {
         let line = clock.line_number(row);
         let column = self.table.map_or(1, |table| table.text_column(line, clock.cell));
@@ -105,9 +112,7 @@ impl<'a> TrackFile<'a> {
     }
 }
 
-// The numbers of one column, with its missing cells.
-
-/// Numbers of a column; a missing one is kept as NaN inside and is `None` outside.
+/// Numbers of a column. A missing one is stored as NaN and given out as `None`.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Column(Vec<f64>);
 
@@ -136,7 +141,7 @@ impl Column {
         self.0.iter().any(|value| !value.is_nan())
     }
 
-    /// The rows in the order of `order`.
+    /// The numbers in another order: `order` lists the rows.
     pub(crate) fn reorder(&self, order: &[usize]) -> Self {
         Self(order.iter().filter_map(|row| self.0.get(*row).copied()).collect())
     }
@@ -148,22 +153,20 @@ impl FromIterator<Option<f64>> for Column {
     }
 }
 
-// Units of times and coordinates, by the names that files give them.
-
 /// Unit of a file's times.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) enum TimeUnit {
-    /// Lengths of this many seconds.
+    /// One unit in seconds.
     Seconds(f64),
-    /// Seconds, as in nearly every table.
+    /// Seconds, because nearly every table has them.
     #[default]
     AssumedSeconds,
-    /// The format has several and the file does not say which.
+    /// The format has several units and the file does not say which.
     Unknown,
 }
 
 impl TimeUnit {
-    /// The unit of that name in a file: `s`, `sec`, `ms`, ...; `None` for any other.
+    /// Reads `s`, `sec`, `ms`, ...; `None` for any other name.
     pub(crate) fn parse(name: &str) -> Option<Self> {
         let seconds = match name.trim().trim_matches(['(', ')', '[', ']']).to_lowercase().as_str() {
             "s" | "sec" | "secs" | "second" | "seconds" => 1.0,
@@ -177,16 +180,17 @@ impl TimeUnit {
     }
 }
 
-/// What one unit of the file's coordinates is.
+/// Unit of a file's coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum CoordinateUnit {
     /// A pixel of unknown size.
     Pixel,
+    /// A length, m.
     Metres(f64),
 }
 
 impl CoordinateUnit {
-    /// The unit of that name in a file: `px`, `pixel`, `mm`, `micron`, ...; `None` for any other.
+    /// Reads `px`, `pixel`, `mm`, `micron`, ...; `None` for any other name.
     pub(crate) fn parse(name: &str) -> Option<Self> {
         let name = name.trim().trim_matches(['(', ')', '[', ']']).to_lowercase();
         match name.as_str() {

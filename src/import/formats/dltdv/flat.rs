@@ -1,13 +1,13 @@
-//! The flat table: one row a frame, without its number; columns `NAME_cam1_X`, `NAME_cam1_Y`, ...
+//! The flat table of DLTdv and Argus: one row a frame, without its number; columns `NAME_cam1_X`, `NAME_cam1_Y`, ...
 
 use super::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::{DelimitedTable, Document, Fact, PointCells, TableLayout, TextRow, TrackFile};
 use crate::recording::files::YAxis;
 
-/// Mark between the name of a point and its camera.
+/// Text between the name of a point and its camera.
 const CAMERA: &str = "_cam";
-/// Ends of x and y columns, and which program writes them so.
+/// Ends of x and y columns, and the program that writes them.
 const AXES: [(&str, &str, DltdvWriter); 4] = [
     ("_U", "_V", DltdvWriter::Version8),
     ("_X", "_Y", DltdvWriter::Unknown),
@@ -25,8 +25,8 @@ enum DltdvWriter {
     Unknown,
 }
 
-/// What a column's name says.
-#[derive(Clone, Copy)]
+/// Parts of a column's name.
+#[derive(Clone, Copy, PartialEq)]
 struct DltdvColumn<'t> {
     point: &'t str,
     camera: &'t str,
@@ -35,7 +35,7 @@ struct DltdvColumn<'t> {
 }
 
 impl<'t> DltdvColumn<'t> {
-    /// Names may hold underscores: the last `_cam` counts.
+    /// Splits a name at its last `_cam`.
     fn parse(name: &'t str) -> Option<Self> {
         let ends =
             AXES.iter().enumerate().flat_map(|(axes, (x, y, _))| [(axes, *x, true), (axes, *y, false)]);
@@ -49,12 +49,7 @@ impl<'t> DltdvColumn<'t> {
 }
 
 fn find_header<'t>(table: &'t DelimitedTable) -> Option<(usize, &'t TextRow)> {
-    table
-        .head
-        .iter()
-        .enumerate()
-        .take(2)
-        .find(|(_, row)| row.cells.iter().any(|cell| DltdvColumn::parse(cell).is_some()))
+    table.find_row(2, |row| row.cells.iter().any(|cell| DltdvColumn::parse(cell).is_some()))
 }
 
 pub(crate) fn recognise_flat_table(table: &DelimitedTable) -> Option<String> {
@@ -66,38 +61,22 @@ pub(crate) fn recognise_flat_table(table: &DelimitedTable) -> Option<String> {
 pub(crate) fn read_flat_table<'a>(
     document: &'a Document,
     table: &'a DelimitedTable,
-) -> Result<TrackFile<'a>, ImportError> {
+) -> ImportResult<TrackFile<'a>> {
     let Some((index, row)) = find_header(table) else {
-        let first = table.head.first();
-        let shown = first
-            .map(|row| row.texts().into_iter().take(8).collect::<Vec<_>>().join(", "))
-            .unwrap_or_default();
-        return Err(columns_error(table, first.map_or(1, |row| row.line), format!("`{shown}`")));
+        let shown = table.first_texts().into_iter().take(8).collect::<Vec<_>>().join(", ");
+        return Err(columns_error(table, table.first_line(), &format!("`{shown}`")));
     };
     let columns: Vec<Option<DltdvColumn>> = row.cells.iter().map(|cell| DltdvColumn::parse(cell)).collect();
-    let several = columns
-        .iter()
-        .flatten()
-        .any(|column| columns.iter().flatten().any(|other| other.camera != column.camera));
+    let mut cameras = columns.iter().flatten().map(|column| column.camera);
+    let first = cameras.next();
+    let several = cameras.any(|camera| Some(camera) != first);
     let points = point_columns(table, row, &columns, several)?;
-    let cells = row.used_width();
-    let layout = TableLayout {
-        start: index + 1,
-        width: cells,
-        most: cells,
-        first_frame: count_empty_rows(table, index)?,
-        points,
-        ..TableLayout::default()
-    };
+    let first_frame = count_empty_rows(table, index)?;
+    let layout = TableLayout { first_frame, ..TableLayout::new(index + 1, row.used_width(), points) };
     let mut export = layout.read_tracks(document, table, pixel_facts(y_axis_of_writer(&columns)))?;
     export.notes.push(format!("rows are frames, the first one frame 0; {FIRST_PIXEL}"));
-    let ignored: Vec<&str> = row
-        .texts()
-        .into_iter()
-        .zip(&columns)
-        .filter(|(name, column)| column.is_none() && !name.is_empty())
-        .map(|(name, _)| name)
-        .collect();
+    let unread = row.texts().into_iter().zip(&columns).filter(|(_, column)| column.is_none());
+    let ignored: Vec<&str> = unread.map(|(name, _)| name).filter(|name| !name.is_empty()).collect();
     if !ignored.is_empty() {
         export.notes.push(format!("columns that are not read: {}", ignored.join(", ")));
     }
@@ -107,13 +86,13 @@ pub(crate) fn read_flat_table<'a>(
     Ok(export)
 }
 
-/// Every x has its y to the right.
+/// The points: every x has its y to the right.
 fn point_columns(
     table: &DelimitedTable,
     row: &TextRow,
     columns: &[Option<DltdvColumn>],
     several: bool,
-) -> Result<Vec<PointCells>, ImportError> {
+) -> ImportResult<Vec<PointCells>> {
     let mut points = vec![];
     let mut at = 0;
     while let Some(column) = columns.get(at) {
@@ -122,14 +101,10 @@ fn point_columns(
             continue;
         };
         let y = columns.get(at + 1).copied().flatten();
-        let pairs = y
-            .is_some_and(|y| !y.is_x && x.is_x && (x.point, x.camera, x.axes) == (y.point, y.camera, y.axes));
-        if !pairs {
-            return Err(columns_error(
-                table,
-                row.line,
-                format!("`{}` in cell {} without its partner", row.cells[at], at + 1),
-            ));
+        let partner = DltdvColumn { is_x: false, ..*x };
+        if !x.is_x || y != Some(partner) {
+            let found = format!("`{}` in cell {} without its partner", row.cells[at], at + 1);
+            return Err(columns_error(table, row.line, &found));
         }
         points.push(PointCells::new(camera_track_name(x.point, x.camera, several), at, Some(at + 1)));
         at += 2;
@@ -137,13 +112,13 @@ fn point_columns(
     Ok(points)
 }
 
-/// Rows of empty cells between the header and the first row with anything in it: they are frames too.
-fn count_empty_rows(table: &DelimitedTable, header: usize) -> Result<f64, ImportError> {
+/// Number of empty rows below the header: they are frames too.
+fn count_empty_rows(table: &DelimitedTable, header: usize) -> ImportResult<f64> {
     let mut rows = table.rows(header);
     let (mut count, mut in_data) = (0.0, false);
     while let Some(record) = rows.next_row()? {
         match (in_data, record.is_empty()) {
-            (false, _) => in_data = true, // the header itself
+            (false, _) => in_data = true, // (the header)
             (true, true) => count += 1.0,
             (true, false) => break,
         }
@@ -151,35 +126,28 @@ fn count_empty_rows(table: &DelimitedTable, header: usize) -> Result<f64, Import
     Ok(count)
 }
 
+const VERSION_8_PIXELS: &str =
+    "columns that end in _U and _V are those of DLTdv 8, which counts pixels from the top of the picture";
+const ARGUS_PIXELS: &str =
+    "columns that end in _x and _y are those of Argus, which counts pixels from the bottom of the picture";
+
 fn y_axis_of_writer(columns: &[Option<DltdvColumn>]) -> Fact<YAxis> {
     let mut writers = columns.iter().flatten().map(|column| AXES[column.axes].2);
     let first = writers.next()?;
-    match first {
+    let (axis, why) = match first {
         _ if writers.any(|writer| writer != first) => None,
-        DltdvWriter::Version8 => Some((
-            YAxis::Down,
-            "columns that end in _U and _V are those of DLTdv 8, which counts pixels from \
-                the top of the picture"
-                .to_owned(),
-        )),
-        DltdvWriter::Argus => Some((
-            YAxis::Up,
-            "columns that end in _x and _y are those of Argus, which counts \
-            pixels from the bottom of the picture"
-                .to_owned(),
-        )),
+        DltdvWriter::Version8 => Some((YAxis::Down, VERSION_8_PIXELS)),
+        DltdvWriter::Argus => Some((YAxis::Up, ARGUS_PIXELS)),
         DltdvWriter::Unknown => None,
-    }
+    }?;
+    Some((axis, why.to_owned()))
 }
 
-fn columns_error(table: &DelimitedTable, line: usize, found: String) -> ImportError {
-    ImportError::columns(
-        table.file,
-        line,
-        format!("found {found}, expected pairs of columns such as tip_cam1_X and tip_cam1_Y"),
-        "import the file that ends in xypts.csv (TrackFile points in DLTdv), with its header \
-            row as it was written",
-    )
+fn columns_error(table: &DelimitedTable, line: usize, found: &str) -> ImportError {
+    let problem = format!("found {found}, expected pairs of columns such as tip_cam1_X and tip_cam1_Y");
+    let advice = "import the file that ends in xypts.csv (TrackFile points in DLTdv), with its header row as it was \
+        written";
+    ImportError::columns(table.file, line, problem, advice)
 }
 
 #[cfg(test)]

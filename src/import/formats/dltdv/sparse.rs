@@ -1,17 +1,18 @@
-//! The sparse table of DLTdv 8: rows of frame, column and value. Names of the points stand in a file of their
-//! own.
+//! The sparse table of DLTdv 8: rows of frame, column and value. The names of the points are in a companion file.
 
 use super::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
-use crate::import::error::{CellProblem, ImportError};
-use crate::import::reader::{Clock, DelimitedTable, Document, Fact, RowView, TextRow, Track, TrackFile};
+use crate::import::error::{CellProblem, ImportError, ImportResult};
+use crate::import::reader::{
+    Clock, DelimitedTable, Document, Fact, RowView, TextRow, Track, TrackFile, clock_lines,
+};
 use crate::recording::files::YAxis;
 use std::collections::BTreeMap;
 
-/// First line; its other kinds are positions in space and their residuals.
+/// First line of positions in pictures; tables of positions in space and of residuals have others.
 const TITLE: &str = "sparse format camera coordinates";
 const EXPORT_AGAIN: &str = "the file was cut short or edited: export it again";
 
-/// Frames of a pair of columns, in order.
+/// Positions of a pair of columns by row.
 type SparseFrames = BTreeMap<u64, SparsePosition>;
 
 #[derive(Default)]
@@ -21,7 +22,7 @@ struct SparsePosition {
     y: Option<f64>,
 }
 
-/// The second line: rows and columns of the whole table, and how many of its values follow.
+/// The second line: rows and columns of the full table, and the number of values that follow.
 struct SparseTableSize {
     line: usize,
     rows: u64,
@@ -30,18 +31,15 @@ struct SparseTableSize {
 }
 
 pub(crate) fn recognise_sparse_table(table: &DelimitedTable) -> Option<String> {
-    let row = table.head.first()?;
-    row.texts()
-        .join(" ")
-        .to_lowercase()
-        .starts_with(TITLE)
-        .then(|| format!("line {} is `{}`", row.line, row.texts().join(" ").trim_end()))
+    let title = table.first_texts().join(" ");
+    let is_title = title.to_lowercase().starts_with(TITLE);
+    is_title.then(|| format!("line {} is `{}`", table.first_line(), title.trim_end()))
 }
 
 pub(crate) fn read_sparse_table<'a>(
     document: &'a Document,
     table: &'a DelimitedTable,
-) -> Result<TrackFile<'a>, ImportError> {
+) -> ImportResult<TrackFile<'a>> {
     let size = read_size(table)?;
     let names = SparsePointNames::find(document, &size)?;
     let mut pairs: BTreeMap<u64, SparseFrames> = BTreeMap::new();
@@ -51,26 +49,28 @@ pub(crate) fn read_sparse_table<'a>(
         if !record.is_empty() {
             let (row, column, value) = read_triplet(table, &record, &size)?;
             let entry = pairs.entry((column - 1) / 2).or_default().entry(row).or_default();
-            entry
-                .set_coordinate(column % 2 == 1, value)
-                .map_err(|()| duplicate_value_error(table, &record, row, column, entry.line))?;
+            let coordinate = if column % 2 == 1 { &mut entry.x } else { &mut entry.y };
+            if coordinate.is_some() {
+                return Err(ImportError::DuplicateRow {
+                    place: table.location(record.line, 1),
+                    what: "row",
+                    found: row as f64,
+                    track: format!("column {column}"),
+                    first: entry.line,
+                });
+            }
+            // (zero means missing)
+            *coordinate = value.filter(|value| *value != 0.0);
             entry.line = record.line;
             count += 1;
         }
     }
     if count != size.values {
-        return Err(sparse_table_error(
-            table,
-            size.line,
-            format!("{} values announced and {count} below", size.values),
-            "as many as announced",
-        ));
+        let found = format!("{} values announced and {count} below", size.values);
+        return Err(sparse_table_error(table, size.line, found, "as many as announced"));
     }
-    let mut export = TrackFile {
-        table: Some(table),
-        facts: pixel_facts(names.y_axis()),
-        ..TrackFile::for_document(document)
-    };
+    let facts = pixel_facts(names.y_axis());
+    let mut export = TrackFile { table: Some(table), facts, ..TrackFile::for_document(document) };
     for (pair, frames) in pairs {
         let name = names.name_of_pair(pair);
         add_track(&mut export, name, &frames);
@@ -80,9 +80,9 @@ pub(crate) fn read_sparse_table<'a>(
     Ok(export)
 }
 
-/// The track of a pair of columns; every track has its own frames.
+/// Adds the track of a pair of columns; every track has its own clock.
 fn add_track(export: &mut TrackFile, name: String, frames: &SparseFrames) {
-    let lines = frames.values().map(|entry| u32::try_from(entry.line).unwrap_or(u32::MAX)).collect();
+    let lines = clock_lines(frames.values().map(|entry| entry.line));
     let numbers = frames.keys().map(|row| Some((row - 1) as f64)).collect();
     let x = frames.values().map(|entry| entry.x).collect();
     let y = Some(frames.values().map(|entry| entry.y).collect());
@@ -90,32 +90,14 @@ fn add_track(export: &mut TrackFile, name: String, frames: &SparseFrames) {
     export.clocks.push(Clock { lines, cell: 0, frame: Some(numbers), time: None });
 }
 
-impl SparsePosition {
-    /// A value of zero is one that is missing.
-    fn set_coordinate(&mut self, is_x: bool, value: Option<f64>) -> Result<(), ()> {
-        let place = if is_x { &mut self.x } else { &mut self.y };
-        if place.is_some() {
-            return Err(());
-        }
-        *place = value.filter(|value| *value != 0.0);
-        Ok(())
-    }
-}
-
-fn read_size(table: &DelimitedTable) -> Result<SparseTableSize, ImportError> {
+fn read_size(table: &DelimitedTable) -> ImportResult<SparseTableSize> {
     let row = table.head.get(1);
     let line = row.map_or(1, |row| row.line);
     let cells = row.map(TextRow::texts).unwrap_or_default();
     let whole = |cell: usize| cells.get(cell).and_then(|text| text.parse::<u64>().ok());
-    let refuse = |found: String| {
-        sparse_table_error(
-            table,
-            line,
-            found,
-            "rows, columns and values of the table as three whole numbers, with two columns a point and \
-             camera",
-        )
-    };
+    let expected = "rows, columns and values of the table as three whole numbers, with two columns a point and \
+        camera";
+    let refuse = |found: String| sparse_table_error(table, line, found, expected);
     let (Some(rows), Some(columns), Some(values)) = (whole(0), whole(1), whole(2)) else {
         return Err(refuse(format!("`{}`", cells.join(" "))));
     };
@@ -129,25 +111,18 @@ fn read_triplet(
     table: &DelimitedTable,
     record: &RowView,
     size: &SparseTableSize,
-) -> Result<(u64, u64, Option<f64>), ImportError> {
+) -> ImportResult<(u64, u64, Option<f64>)> {
     if record.used_width() != 3 {
-        return Err(ImportError::Ragged {
-            place: table.location(record.line, 1),
-            found: record.used_width(),
-            expected: 3,
-        });
+        return Err(table.ragged_error(record.line, record.used_width(), 3));
     }
     let index =
         |cell: usize, name: &str, most: u64, expected: &'static str| match record.cell(cell).parse::<u64>() {
             Ok(index) if (1..=most).contains(&index) => Ok(index),
-            _ => Err(ImportError::Cell {
-                place: table.location(record.line, table.text_column(record.line, cell)),
-                problem: CellProblem::NotAFrame,
-                name: name.to_owned(),
-                found: record.cell(cell).chars().take(60).collect::<String>().into(),
-                expected,
-                advice: EXPORT_AGAIN,
-            }),
+            _ => {
+                let found = (name, record.cell(cell));
+                let place = table.cell_location(record.line, cell);
+                Err(ImportError::cell(place, CellProblem::NotAFrame, found, (expected, EXPORT_AGAIN)))
+            }
         };
     let row = index(0, "row", size.rows, "a whole number from 1 to the rows that line 2 announces")?;
     let column =
@@ -155,22 +130,22 @@ fn read_triplet(
     Ok((row, column, table.number_at(record, 2, "value")?))
 }
 
-/// Who the pairs of columns are.
+/// Names for the pairs of columns.
 struct SparsePointNames {
     points: Vec<String>,
-    /// Cameras of a point; `None` where no list of names tells it.
+    /// Cameras of a point; `None` without a list of names.
     cameras: Option<u64>,
-    /// Whether the list says that version 8 wrote it.
+    /// Whether the list is one of version 8.
     version_8: bool,
     pairs: u64,
 }
 
 impl SparsePointNames {
-    fn find(document: &Document, size: &SparseTableSize) -> Result<Self, ImportError> {
+    fn find(document: &Document, size: &SparseTableSize) -> ImportResult<Self> {
         let pairs = size.columns / 2;
-        let Some((file, text)) =
-            document.companions.iter().find(|(_, text)| text.to_lowercase().starts_with("pointnames"))
-        else {
+        let mut companions = document.companions.iter();
+        let list = companions.find(|(_, text)| text.to_lowercase().starts_with("pointnames"));
+        let Some((file, text)) = list else {
             return Ok(Self { points: vec![], cameras: None, version_8: false, pairs });
         };
         let mut lines = text.trim_end().lines();
@@ -189,42 +164,30 @@ impl SparsePointNames {
         Ok(Self { points, cameras: Some(pairs / count), version_8: title.contains("DLTdv8"), pairs })
     }
 
-    /// Of a pair of columns, counted from 0: all cameras of the first point come first.
+    /// Name of a pair of columns, counted from 0: first all cameras of the first point, then those of the second.
     fn name_of_pair(&self, pair: u64) -> String {
         let Some(cameras) = self.cameras else {
-            return if self.pairs == 1 {
-                "pt1".to_owned()
-            } else {
-                format!("columns{}-{}", 2 * pair + 1, 2 * pair + 2)
-            };
+            let columns = format!("columns{}-{}", 2 * pair + 1, 2 * pair + 2);
+            return if self.pairs == 1 { "pt1".to_owned() } else { columns };
         };
-        let name = usize::try_from(pair / cameras)
-            .ok()
-            .and_then(|point| self.points.get(point))
-            .filter(|name| !name.is_empty());
+        let point = usize::try_from(pair / cameras).ok().and_then(|point| self.points.get(point));
+        let name = point.filter(|name| !name.is_empty());
         let name = name.cloned().unwrap_or_else(|| format!("pt{}", pair / cameras + 1));
         camera_track_name(&name, &(pair % cameras + 1).to_string(), cameras > 1)
     }
 
     fn y_axis(&self) -> Fact<YAxis> {
-        self.version_8.then(|| {
-            (
-                YAxis::Down,
-                "the list of names in its folder is one of DLTdv 8, which counts \
-            pixels from the top of the picture"
-                    .to_owned(),
-            )
-        })
+        let why = "the list of names in its folder is one of DLTdv 8, which counts pixels from the top of the \
+            picture";
+        self.version_8.then(|| (YAxis::Down, why.to_owned()))
     }
 
     fn notes(&self) -> Option<String> {
+        let no_list = "no list of names (the file whose name has pointNames in place of xypts) lies in its folder: \
+            tracks are called by their columns, which are x and y of the first point in every camera, then of the \
+            second";
         match self.cameras {
-            None => Some(
-                "no list of names (the file whose name has pointNames in place of xypts) lies in its folder: \
-                 tracks are called by their columns, which are x and y of the first point in every camera, \
-                 then of the second"
-                    .to_owned(),
-            ),
+            None => Some(no_list.to_owned()),
             Some(1) => None,
             Some(_) => Some(SEVERAL_CAMERAS.to_owned()),
         }
@@ -233,20 +196,4 @@ impl SparsePointNames {
 
 fn sparse_table_error(table: &DelimitedTable, line: usize, found: String, expected: &str) -> ImportError {
     ImportError::wrong_table(table.location(line, 1), found, expected, EXPORT_AGAIN)
-}
-
-fn duplicate_value_error(
-    table: &DelimitedTable,
-    record: &RowView,
-    row: u64,
-    column: u64,
-    first: usize,
-) -> ImportError {
-    ImportError::DuplicateRow {
-        place: table.location(record.line, 1),
-        what: "row",
-        found: row as f64,
-        track: format!("column {column}"),
-        first,
-    }
 }

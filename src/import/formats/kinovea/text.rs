@@ -1,7 +1,7 @@
-//! Kinovea's text export, made for gnuplot: a block of rows a track, each with its own times.
+//! Kinovea's text export, made for gnuplot: a block of rows for each track, with times of its own.
 
 use super::{PREFERENCES_NOTE, kinovea_facts};
-use crate::import::error::{CellProblem, ImportError, TextLocation};
+use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
 use crate::import::reader::table::column_of_word;
 use crate::import::reader::{
     CellNumber, Clock, Document, InstanceFields, PointFields, RowOrder, RowPosition, RowStamp, TimeUnit,
@@ -10,26 +10,20 @@ use crate::import::reader::{
 use crate::math;
 
 /// First line of the text export.
-pub(crate) const TITLE: &str = "#Kinovea";
+pub(super) const TITLE: &str = "#Kinovea";
 /// Line that names the columns.
 const COLUMNS: &str = "#T X Y";
 /// Cells of a row with one point.
 const CELLS: usize = 3;
-/// Parts of a time code, hours to fractions of a second.
+/// Parts of a time code, from hours to fractions of a second.
 const CODE_PARTS: usize = 4;
-/// Longest part of a time code, digits: more are no time.
+/// Longest part of a time code, digits.
 const CODE_DIGITS: usize = 9;
 
-pub(crate) fn read_text_export<'a>(document: &'a Document<'a>) -> Result<TrackFile<'a>, ImportError> {
+pub(crate) fn read_text_export<'a>(document: &'a Document<'a>) -> ImportResult<TrackFile<'a>> {
     let style = NumberStyle::detect(document.text);
-    let mut reader = KinoveaTextReader {
-        file: document.file,
-        style,
-        block: None,
-        clocks: vec![],
-        tracks: vec![],
-        unnamed: 0,
-    };
+    let (file, clocks, tracks) = (document.file, vec![], vec![]);
+    let mut reader = KinoveaTextReader { file, style, block: None, clocks, tracks, unnamed: 0 };
     let mut last = 1;
     for (index, line) in document.text.lines().enumerate() {
         reader.read_line(index + 1, line)?;
@@ -37,7 +31,7 @@ pub(crate) fn read_text_export<'a>(document: &'a Document<'a>) -> Result<TrackFi
     }
     reader.end_track()?;
     if reader.clocks.is_empty() {
-        return Err(ImportError::HeaderOnly { file: document.file.to_owned(), line: last });
+        return Err(ImportError::header_only(file, last));
     }
     let mut facts = kinovea_facts();
     facts.time = if style.code { TimeUnit::Seconds(1.0) } else { TimeUnit::Unknown };
@@ -46,8 +40,7 @@ pub(crate) fn read_text_export<'a>(document: &'a Document<'a>) -> Result<TrackFi
     Ok(TrackFile { clocks, tracks, facts, notes, ..TrackFile::for_document(document) })
 }
 
-/// How the numbers of a file are written. Old versions take the decimal mark of the times from elsewhere than
-/// that of the positions.
+/// The form of a file's numbers. In old versions the decimal marks of times and positions may differ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct NumberStyle {
     /// Whether times are `h:mm:ss:cc`.
@@ -93,7 +86,7 @@ impl NumberStyle {
     }
 }
 
-/// Seconds of `h:mm:ss:cc`; the last part has as many digits as the fraction.
+/// Seconds of `h:mm:ss:cc`; the last part is a decimal fraction.
 fn time_code_s(cell: &str) -> Option<f64> {
     let (sign, digits) = cell.strip_prefix('-').map_or((1.0, cell), |rest| (-1.0, rest));
     let parts: Vec<&str> = digits.split(':').collect();
@@ -122,20 +115,17 @@ struct KinoveaTextReader<'f> {
 /// Rows of one track.
 struct TrackBlock {
     name: String,
-    /// Cells of its rows, once there is one, and the rows.
+    /// Cells of a row and the rows; `None` before the first row.
     rows: Option<(usize, TrackCollector)>,
 }
 
 impl KinoveaTextReader<'_> {
-    fn read_line(&mut self, line: usize, text: &str) -> Result<(), ImportError> {
+    fn read_line(&mut self, line: usize, text: &str) -> ImportResult<()> {
         let trimmed = text.trim();
         if trimmed.is_empty() {
-            // a blank line ends a track; some stand before its first row
-            return if self.block.as_ref().is_some_and(|block| block.rows.is_some()) {
-                self.end_track()
-            } else {
-                Ok(())
-            };
+            // (a blank line ends a track, unless it is above the first row)
+            let begun = self.block.as_ref().is_some_and(|block| block.rows.is_some());
+            return if begun { self.end_track() } else { Ok(()) };
         }
         let Some(name) = trimmed.strip_prefix('#') else { return self.read_row(line, text) };
         if trimmed.starts_with(TITLE) || trimmed == COLUMNS {
@@ -146,40 +136,29 @@ impl KinoveaTextReader<'_> {
         Ok(())
     }
 
-    fn read_row(&mut self, line: usize, text: &str) -> Result<(), ImportError> {
+    fn read_row(&mut self, line: usize, text: &str) -> ImportResult<()> {
         let style = self.style;
         let block = self.block.get_or_insert_with(|| TrackBlock { name: String::new(), rows: None });
         let cells: Vec<&str> = text.split_whitespace().collect();
+        let len = cells.len();
         let expected = block.rows.as_ref().map_or(CELLS, |rows| rows.0);
-        let right = if block.rows.is_some() {
-            cells.len() == expected
-        } else {
-            cells.len() >= CELLS && cells.len() % 2 == 1
-        };
-        if !right {
-            return Err(ImportError::Ragged { place: self.location(line, 1), found: cells.len(), expected });
+        let fits = if block.rows.is_some() { len == expected } else { len >= CELLS && len % 2 == 1 };
+        if !fits {
+            let place = TextLocation { file: self.file.to_owned(), line, column: 1 };
+            return Err(ImportError::Ragged { place, found: cells.len(), expected });
         }
-        let (_, collector) = block.rows.get_or_insert_with(|| {
-            (cells.len(), TrackCollector::new(block_shape(&block.name, cells.len() / 2)))
-        });
-        let refuse = |cell: usize| {
-            not_a_number_error(
-                self.file,
-                (line, text),
-                cell,
-                cells.get(cell).copied().unwrap_or_default(),
-                style,
-            )
+        let (_, collector) =
+            block.rows.get_or_insert_with(|| (len, TrackCollector::new(block_shape(&block.name, len / 2))));
+        let number = |(at, cell): (usize, &&str)| {
+            let found =
+                if at == 0 { style.parse_time(cell) } else { parse_number(cell, style.position_mark) };
+            match found {
+                CellNumber::Value(value) => Ok(Some(value)),
+                CellNumber::Missing => Ok(None),
+                CellNumber::Text => Err(not_a_number_error(self.file, (line, text), at, cell, style)),
+            }
         };
-        let value = |cell: usize, found: CellNumber| match found {
-            CellNumber::Value(value) => Ok(Some(value)),
-            CellNumber::Missing => Ok(None),
-            CellNumber::Text => Err(refuse(cell)),
-        };
-        let numbers = cells.iter().enumerate().map(|(at, cell)| {
-            value(at, if at == 0 { style.parse_time(cell) } else { parse_number(cell, style.position_mark) })
-        });
-        let numbers = numbers.collect::<Result<Vec<_>, _>>()?;
+        let numbers = cells.iter().enumerate().map(number).collect::<Result<Vec<_>, _>>()?;
         let Some((time, positions)) = numbers.split_first() else { return Ok(()) };
         let positions: Vec<RowPosition> = positions
             .chunks(2)
@@ -189,8 +168,8 @@ impl KinoveaTextReader<'_> {
         Ok(())
     }
 
-    /// Ends the track that is being read.
-    fn end_track(&mut self) -> Result<(), ImportError> {
+    /// Ends the current track.
+    fn end_track(&mut self) -> ImportResult<()> {
         let Some(TrackBlock { name, rows: Some((_, collector)) }) = self.block.take() else { return Ok(()) };
         let (clocks, mut tracks) = collector.finish(self.file, RowOrder::AsWritten)?;
         let number = self.clocks.len() + 1;
@@ -205,14 +184,9 @@ impl KinoveaTextReader<'_> {
         self.tracks.extend(tracks);
         Ok(())
     }
-
-    fn location(&self, line: usize, column: usize) -> TextLocation {
-        TextLocation { file: self.file.to_owned(), line, column }
-    }
 }
 
-/// A track is called by its name; the points of an object are numbered, because this export does not name
-/// them.
+/// Fields of a block. The points of an object are numbered, because this export does not name them.
 fn block_shape(name: &str, points: usize) -> InstanceFields {
     let called = |index: usize| if points == 1 { name.to_owned() } else { format!("{name}/{}", index + 1) };
     let points = (0..points)
@@ -230,7 +204,7 @@ fn not_a_number_error(
 ) -> ImportError {
     let mark = if cell == 0 { style.time_mark } else { style.position_mark };
     let other = if mark == '.' { ',' } else { '.' };
-    let (expected, advice) = match parse_number(found, other) {
+    let remedy = match parse_number(found, other) {
         CellNumber::Value(_) => (
             "the decimal mark of the column's other numbers",
             "the decimal mark changes within the column, or a mark separates thousands: export again with one \
@@ -241,21 +215,9 @@ fn not_a_number_error(
         }
         _ => ("a number", "export again, or write NaN if the point was lost"),
     };
-    let name = if cell == 0 {
-        "T"
-    } else if cell % 2 == 1 {
-        "X"
-    } else {
-        "Y"
-    };
-    ImportError::Cell {
-        place: TextLocation { file: file.to_owned(), line, column: column_of_word(text, cell) },
-        problem: CellProblem::NotANumber,
-        name: name.to_owned(),
-        found: found.chars().take(60).collect::<String>().into(),
-        expected,
-        advice,
-    }
+    let name = if cell == 0 { "T" } else { ["Y", "X"][cell % 2] };
+    let place = TextLocation { file: file.to_owned(), line, column: column_of_word(text, cell) };
+    ImportError::cell(place, CellProblem::NotANumber, (name, found), remedy)
 }
 
 #[cfg(test)]

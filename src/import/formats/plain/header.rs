@@ -1,8 +1,8 @@
-//! What the names of a plain table's columns say: which is the clock, which are coordinates, in which units.
+//! The meaning of the column names of a plain table: clock, coordinates and their units.
 
 use crate::import::reader::{CoordinateUnit, TimeUnit};
 
-/// Names of columns that number the frames, without blanks, underscores and the like.
+/// Names of columns of frame numbers, in small letters and without separators.
 const FRAMES: [&str; 16] = [
     "frame",
     "frames",
@@ -21,32 +21,18 @@ const FRAMES: [&str; 16] = [
     "\u{30d5}\u{30ec}\u{30fc}\u{30e0}\u{756a}\u{53f7}", // furemu bango: frame number
     "\u{30b3}\u{30de}",                                 // koma: picture of a film
 ];
-/// Names of columns of times; those that name a unit themselves have it next to them.
-const TIMES: [(&str, Option<TimeUnit>); 18] = [
-    ("t", None),
-    ("time", None),
-    ("timestamp", Some(TimeUnit::Unknown)), // (seconds, milliseconds, or since 1970)
-    ("seconds", Some(TimeUnit::Seconds(1.0))),
-    ("second", Some(TimeUnit::Seconds(1.0))),
-    ("sec", Some(TimeUnit::Seconds(1.0))),
-    ("milliseconds", Some(TimeUnit::Seconds(1e-3))),
-    ("millisecond", Some(TimeUnit::Seconds(1e-3))),
-    ("msec", Some(TimeUnit::Seconds(1e-3))),
-    ("ms", Some(TimeUnit::Seconds(1e-3))),
-    ("timesec", Some(TimeUnit::Seconds(1.0))),
-    ("timems", Some(TimeUnit::Seconds(1e-3))),
-    ("timemsec", Some(TimeUnit::Seconds(1e-3))),
-    ("zeit", None),
-    ("temps", None),
-    ("tempo", None),
-    ("tiempo", None),
-    ("\u{6642}\u{9593}", None), // jikan: time
+/// Names of columns of times, with the unit that a name implies.
+const TIMES: [(&[&str], Option<TimeUnit>); 4] = [
+    (&["t", "time", "zeit", "temps", "tempo", "tiempo", "\u{6642}\u{9593}"], None), // (the last is jikan: time)
+    (&["timestamp"], Some(TimeUnit::Unknown)), // (seconds, milliseconds, or since 1970)
+    (&["seconds", "second", "sec", "timesec"], Some(TimeUnit::Seconds(1.0))),
+    (&["milliseconds", "millisecond", "msec", "ms", "timems", "timemsec"], Some(TimeUnit::Seconds(1e-3))),
 ];
-/// Names of columns that say which object a row is about.
+/// Names of columns that name the object of a row.
 const KEYS: [&str; 10] =
     ["id", "track", "trackid", "objectid", "object", "particle", "marker", "point", "label", "name"];
 const CONFIDENCES: [&str; 4] = ["confidence", "likelihood", "score", "conf"];
-/// Parts of names that mark other quantities with a direction than positions.
+/// Parts of names that mark speeds, forces and other vectors that are not positions.
 const NOT_POSITIONS: [&str; 18] = [
     "v",
     "vel",
@@ -67,16 +53,16 @@ const NOT_POSITIONS: [&str; 18] = [
     "err",
     "error",
 ];
-/// What stands between the parts of a name.
+/// Separators between the parts of a name.
 const SEPARATORS: [char; 5] = ['_', '.', '-', ' ', ':'];
 
-/// What a column is.
+/// Meaning of a column.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) enum ColumnMeaning {
     Frame,
     Time(TimeUnit),
     Key,
-    /// A coordinate of a point (0 is x, 1 is y); the point has no name where the table has one only.
+    /// A coordinate of a point (axis 0 is x, 1 is y). The name is empty if the table has only one point.
     Coordinate {
         point: String,
         axis: usize,
@@ -101,20 +87,18 @@ impl ColumnMeaning {
         if unit.is_none() && CONFIDENCES.contains(&plain.as_str()) {
             return Self::Confidence { point: String::new() };
         }
-        if let Some(point) = split_last_part(base)
-            .filter(|(_, last)| CONFIDENCES.contains(&last.to_lowercase().as_str()))
-            .map(|(point, _)| point)
+        if let Some((point, last)) = split_last_part(base)
+            && CONFIDENCES.contains(&last.to_lowercase().as_str())
         {
             return Self::Confidence { point: point.to_owned() };
         }
         match (parse_coordinate(base), unit.map(CoordinateUnit::parse)) {
-            (Some((point, axis)), None) => Self::Coordinate { point, axis, unit: None },
-            (Some((point, axis)), Some(Some(unit))) => Self::Coordinate { point, axis, unit: Some(unit) },
-            _ => Self::Other,
+            (None, _) | (_, Some(None)) => Self::Other,
+            (Some((point, axis)), unit) => Self::Coordinate { point, axis, unit: unit.flatten() },
         }
     }
 
-    /// Takes the unit that a row below the names gives, where the name has none; whether it did.
+    /// Takes a unit from the row below, if the name has none. Gives whether it did.
     pub(crate) fn take_unit(&mut self, text: &str) -> bool {
         match self {
             Self::Coordinate { unit: unit @ None, .. } => {
@@ -139,7 +123,7 @@ fn split_unit(name: &str) -> (&str, Option<&str>) {
         }
     }
     match name.rsplit_once(['_', ' ']) {
-        // (`in` and `min` are words too: inches and minutes need brackets)
+        // (`in` and `min` are also words, so inches and minutes need brackets)
         Some((base, unit))
             if !base.is_empty()
                 && !["in", "min"].contains(&unit)
@@ -156,7 +140,7 @@ fn parse_clock(base: &str, unit: Option<&str>) -> Option<ColumnMeaning> {
     if FRAMES.contains(&plain.as_str()) {
         return unit.is_none().then_some(ColumnMeaning::Frame);
     }
-    let (_, own) = TIMES.iter().find(|(name, _)| *name == plain)?;
+    let (_, own) = TIMES.iter().find(|(names, _)| names.contains(&plain.as_str()))?;
     Some(match (unit, own) {
         (Some(unit), _) if squeeze_name(unit).starts_with("frame") => ColumnMeaning::Frame,
         (Some(unit), _) => ColumnMeaning::Time(TimeUnit::parse(unit).unwrap_or(TimeUnit::Unknown)),
@@ -180,18 +164,15 @@ fn parse_coordinate(base: &str) -> Option<(String, usize)> {
 
 /// The point and the axis of `TipX`, of a word in another script with `X` behind it, and of `x1`.
 fn parse_joined_coordinate(base: &str) -> Option<(&str, usize)> {
-    if let Some(number) = base
-        .strip_prefix(['x', 'X', 'y', 'Y'])
-        .filter(|rest| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit()))
-    {
+    let is_number = |rest: &&str| !rest.is_empty() && rest.chars().all(|c| c.is_ascii_digit());
+    if let Some(number) = base.strip_prefix(['x', 'X', 'y', 'Y']).filter(is_number) {
         return Some((number, usize::from(base.starts_with(['y', 'Y']))));
     }
     let axis = ['X', 'Y'].iter().position(|axis| base.ends_with(*axis))?;
     let point = &base[..base.len() - 1];
     // (`MAX` and `vx` are words of their own)
-    point
-        .ends_with(|c: char| c.is_lowercase() || c.is_ascii_digit() || !c.is_ascii())
-        .then_some((point, axis))
+    let ends_word = point.ends_with(|c: char| c.is_lowercase() || c.is_ascii_digit() || !c.is_ascii());
+    ends_word.then_some((point, axis))
 }
 
 /// A name and its last part.
@@ -199,7 +180,7 @@ fn split_last_part(name: &str) -> Option<(&str, &str)> {
     name.rsplit_once(SEPARATORS).map(|(point, last)| (point.trim_end_matches(SEPARATORS), last))
 }
 
-/// A name in small letters without what separates its parts.
+/// A name in small letters without separators.
 fn squeeze_name(name: &str) -> String {
     name.chars().filter(|c| !SEPARATORS.contains(c)).flat_map(char::to_lowercase).collect()
 }

@@ -1,21 +1,22 @@
-//! A whole project: spots, the edges that link them, and the tracks that passed the filters.
+//! A project of TrackMate: spots, the edges that link them, and the tracks that passed the filters.
 
 use super::{EXPORT_ADVICE, Spot, TrackMateFile, Trajectory};
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::formats::trackmate::xml::{XmlElement, XmlReader, XmlTag};
 use crate::import::reader::Document;
 use std::collections::{HashMap, HashSet};
 
-pub(crate) const PROJECT_ROOT: &str = "TrackMate";
+pub(super) const PROJECT_ROOT: &str = "TrackMate";
+const SAVE_AGAIN: &str = "save the project again in TrackMate";
 
-/// What the elements say, before spots and edges are put together.
+/// Content of the elements, before the spots are sorted into tracks.
 #[derive(Default)]
 struct ProjectElements {
     space_unit: Option<String>,
     time_unit: Option<String>,
     spots: HashMap<String, Spot>,
     tracks: Vec<ProjectTrack>,
-    /// Tracks that passed the filters, where the project lists them.
+    /// Identifiers of the tracks that passed the filters, where the project lists them.
     kept: Option<HashSet<String>>,
     has_quality: bool,
 }
@@ -28,7 +29,7 @@ struct ProjectTrack {
     seen: HashSet<String>,
 }
 
-pub(crate) fn read_project<'a>(document: &'a Document<'a>) -> Result<TrackMateFile<'a>, ImportError> {
+pub(crate) fn read_project<'a>(document: &'a Document<'a>) -> ImportResult<TrackMateFile<'a>> {
     let mut xml = XmlReader::new(document);
     let mut parts = ProjectElements::default();
     let mut current: Option<ProjectTrack> = None;
@@ -41,17 +42,17 @@ pub(crate) fn read_project<'a>(document: &'a Document<'a>) -> Result<TrackMateFi
                 }
             }
             XmlTag::Open(element) => parts.take_element(&xml, &element)?,
-            XmlTag::Close(end) if end.has_name("Track") => parts.tracks.extend(current.take()),
+            node if node.closes("Track") => parts.tracks.extend(current.take()),
             XmlTag::Close(_) => {}
         }
     }
     parts.into_file(document)
 }
 
-fn read_track(xml: &XmlReader, element: &XmlElement) -> Result<ProjectTrack, ImportError> {
+fn read_track(xml: &XmlReader, element: &XmlElement) -> ImportResult<ProjectTrack> {
     let id = xml.required_attribute(element, "TRACK_ID")?;
-    let name =
-        xml.attribute(element, "name")?.filter(|name| !name.trim().is_empty()).unwrap_or_else(|| id.clone());
+    let name = xml.attribute(element, "name")?.filter(|name| !name.trim().is_empty());
+    let name = name.unwrap_or_else(|| id.clone());
     Ok(ProjectTrack { id, name, spots: vec![], seen: HashSet::new() })
 }
 
@@ -62,19 +63,16 @@ impl ProjectTrack {
         xml: &XmlReader,
         element: &XmlElement,
         spots: &HashMap<String, Spot>,
-    ) -> Result<(), ImportError> {
+    ) -> ImportResult<()> {
         for end in ["SPOT_SOURCE_ID", "SPOT_TARGET_ID"] {
             let id = xml.required_attribute(element, end)?;
             if !spots.contains_key(&id) {
-                return Err(ImportError::wrong_table(
-                    xml.element_location(element),
-                    format!(
-                        "an edge of track `{}` to the spot {id}, which the file does not have",
-                        self.name
-                    ),
-                    "every spot of a track under <AllSpots>",
-                    "save the project again in TrackMate",
-                ));
+                let name = &self.name;
+                let found =
+                    format!("an edge of track `{name}` to the spot {id}, which the file does not have");
+                let (place, expected) =
+                    (xml.element_location(element), "every spot of a track under <AllSpots>");
+                return Err(ImportError::wrong_table(place, found, expected, SAVE_AGAIN));
             }
             if self.seen.insert(id.clone()) {
                 self.spots.push(id);
@@ -85,8 +83,8 @@ impl ProjectTrack {
 }
 
 impl ProjectElements {
-    /// Takes in an element that is no track.
-    fn take_element(&mut self, xml: &XmlReader, element: &XmlElement) -> Result<(), ImportError> {
+    /// Takes an element that is neither a track nor an edge.
+    fn take_element(&mut self, xml: &XmlReader, element: &XmlElement) -> ImportResult<()> {
         if element.has_name("Model") {
             self.space_unit = xml.attribute(element, "spatialunits")?;
             self.time_unit = xml.attribute(element, "timeunits")?;
@@ -101,13 +99,10 @@ impl ProjectElements {
         Ok(())
     }
 
-    fn add_spot(&mut self, xml: &XmlReader, element: &XmlElement) -> Result<(), ImportError> {
+    fn add_spot(&mut self, xml: &XmlReader, element: &XmlElement) -> ImportResult<()> {
         let id = xml.required_attribute(element, "ID")?;
-        let time = if xml.attribute(element, "POSITION_T")?.is_some() {
-            xml.number_attribute(element, "POSITION_T")?
-        } else {
-            None
-        };
+        let timed = xml.attribute(element, "POSITION_T")?.is_some();
+        let time = if timed { xml.number_attribute(element, "POSITION_T")? } else { None };
         let spot = Spot {
             line: element.line,
             frame: xml.number_attribute(element, "FRAME")?,
@@ -115,18 +110,12 @@ impl ProjectElements {
             x: xml.number_attribute(element, "POSITION_X")?,
             y: xml.number_attribute(element, "POSITION_Y")?,
         };
-        match self.spots.insert(id.clone(), spot) {
-            None => Ok(()),
-            Some(first) => Err(ImportError::wrong_table(
-                xml.element_location(element),
-                format!("the spot {id} a second time (first in line {})", first.line),
-                "every spot once",
-                "save the project again in TrackMate",
-            )),
-        }
+        let Some(first) = self.spots.insert(id.clone(), spot) else { return Ok(()) };
+        let found = format!("the spot {id} a second time (first in line {})", first.line);
+        Err(ImportError::wrong_table(xml.element_location(element), found, "every spot once", SAVE_AGAIN))
     }
 
-    fn into_file<'a>(self, document: &Document) -> Result<TrackMateFile<'a>, ImportError> {
+    fn into_file<'a>(self, document: &Document) -> ImportResult<TrackMateFile<'a>> {
         let all = self.tracks.len();
         let kept = |track: &ProjectTrack| self.kept.as_ref().is_none_or(|kept| kept.contains(&track.id));
         let trajectory = |track: ProjectTrack| Trajectory {
@@ -135,23 +124,20 @@ impl ProjectElements {
         };
         let trajectories: Vec<Trajectory> = self.tracks.into_iter().filter(kept).map(trajectory).collect();
         if trajectories.is_empty() {
-            return Err(ImportError::wrong_table(
-                document.file,
-                format!(
-                    "a TrackMate project of {} spots with {all} tracks, none of which passes its filters",
-                    self.spots.len()
-                ),
-                "at least one track",
-                format!(
-                    "run the tracking, loosen the filters of the tracks and save again; or {EXPORT_ADVICE}"
-                ),
-            ));
+            let spots = self.spots.len();
+            let found = format!(
+                "a TrackMate project of {spots} spots with {all} tracks, none of which passes its filters"
+            );
+            let advice = format!(
+                "run the tracking, loosen the filters of the tracks and save again; or {EXPORT_ADVICE}"
+            );
+            return Err(ImportError::wrong_table(document.file, found, "at least one track", advice));
         }
         let mut notes = vec![];
-        if trajectories.len() < all {
+        let left_out = all - trajectories.len();
+        if left_out > 0 {
             notes.push(format!(
-                "{} of {all} tracks do not pass the project's filters and are left out",
-                all - trajectories.len()
+                "{left_out} of {all} tracks do not pass the project's filters and are left out"
             ));
         }
         let space_unit =

@@ -1,13 +1,13 @@
-//! The table of spots: one to four header rows, rows in any order, nothing quoted.
+//! TrackMate's table of spots: one to four header rows, rows in any order, no quotation marks.
 
 use super::{EXPORT_ADVICE, Spot, TrackMateFile, Trajectory};
-use crate::import::error::ImportError;
+use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::{CellNumber, DelimitedTable, Document, RowView, TextRow};
 use std::collections::HashMap;
 
-/// Rows above the data that may name the columns; a table of results has one, later versions up to four.
+/// Rows at the top in which the names are searched: old versions have one header row, later ones up to four.
 const HEADER_ROWS: usize = 4;
-/// What only the tables of edges, tracks and branches name.
+/// Columns that only the tables of edges and tracks have, and the name of the table.
 const OTHER_TABLES: [(&str, &str); 5] = [
     ("SPOT_SOURCE_ID", "edges"),
     ("EDGE_TIME", "edges"),
@@ -19,7 +19,7 @@ const POSITION: [&str; 2] = ["POSITION_X", "POSITION_Y"];
 const FRAME: &str = "FRAME";
 const TRACK: &str = "TRACK_ID";
 
-/// What in a table shows that TrackMate wrote it, whichever of its tables it is.
+/// What shows that a table is one of TrackMate's.
 pub(crate) fn recognise_spots(table: &DelimitedTable) -> Option<String> {
     if let Some(row) = find_header(table) {
         return Some(format!("line {} names POSITION_X and FRAME as TrackMate does", row.1.line));
@@ -30,21 +30,18 @@ pub(crate) fn recognise_spots(table: &DelimitedTable) -> Option<String> {
 }
 
 fn find_header<'t>(table: &'t DelimitedTable) -> Option<(usize, &'t TextRow)> {
-    let named = |row: &TextRow| {
-        row.cells.iter().any(|cell| cell == POSITION[0])
-            && row.cells.iter().any(|cell| cell == FRAME || cell == TRACK)
-    };
-    table.head.iter().enumerate().take(HEADER_ROWS).find(|(_, row)| named(row))
+    let named = |row: &TextRow| row.has(POSITION[0]) && (row.has(FRAME) || row.has(TRACK));
+    table.find_row(HEADER_ROWS, named)
 }
 
-/// The row and the cell that only another of TrackMate's tables has, and what that is a table of.
+/// Row and cell of a column that only another table of TrackMate's has, and the name of that table.
 fn find_other_table<'t>(table: &'t DelimitedTable) -> Option<(&'t TextRow, usize, &'static str)> {
     let shows = |row: &'t TextRow| {
-        let tracks = row.cells.iter().any(|cell| cell == TRACK);
+        let tracks = row.has(TRACK);
         OTHER_TABLES
             .iter()
             .filter(|_| tracks)
-            .find_map(|(name, what)| Some((row, row.cells.iter().position(|cell| cell == name)?, *what)))
+            .find_map(|(name, what)| Some((row, row.position(name)?, *what)))
     };
     table.head.iter().take(HEADER_ROWS).find_map(shows)
 }
@@ -52,15 +49,12 @@ fn find_other_table<'t>(table: &'t DelimitedTable) -> Option<(&'t TextRow, usize
 fn wrong_table_error(table: &DelimitedTable) -> ImportError {
     let (place, found) = match find_other_table(table) {
         Some((row, cell, what)) => (
-            table.location(row.line, table.text_column(row.line, cell)),
+            table.cell_location(row.line, cell),
             format!("TrackMate's table of {what} (column {})", row.cells[cell]),
         ),
-        None => (
-            table.location(table.head.first().map_or(1, |row| row.line), 1),
-            "a table without POSITION_X and FRAME".to_owned(),
-        ),
+        None => (table.location(table.first_line(), 1), "a table without POSITION_X and FRAME".to_owned()),
     };
-    let expected = "its table of spots with POSITION_X, POSITION_Y, FRAME and TRACK_ID".to_owned();
+    let expected = "its table of spots with POSITION_X, POSITION_Y, FRAME and TRACK_ID";
     ImportError::wrong_table(place, found, expected, EXPORT_ADVICE)
 }
 
@@ -78,8 +72,8 @@ struct SpotCells {
 }
 
 impl SpotCells {
-    fn find(table: &DelimitedTable, row: &TextRow) -> Result<Self, ImportError> {
-        let at = |name: &str| row.cells.iter().position(|cell| cell == name);
+    fn find(table: &DelimitedTable, row: &TextRow) -> ImportResult<Self> {
+        let at = |name: &str| row.position(name);
         let needed = |name: &str| at(name).ok_or_else(|| no_column_error(table, row, name));
         Ok(Self {
             id: at("ID"),
@@ -95,38 +89,28 @@ impl SpotCells {
 }
 
 fn no_column_error(table: &DelimitedTable, row: &TextRow, name: &str) -> ImportError {
-    ImportError::columns(
-        table.file,
-        row.line,
-        format!(
-            "found TrackMate's spots without the column {name}, expected POSITION_X, POSITION_Y, FRAME and \
-             TRACK_ID"
-        ),
-        if name == TRACK {
-            format!("spots that are not linked have no tracks: run the tracking, then {EXPORT_ADVICE}")
-        } else {
-            EXPORT_ADVICE.to_owned()
-        },
-    )
+    let problem = format!(
+        "found TrackMate's spots without the column {name}, expected POSITION_X, POSITION_Y, FRAME and TRACK_ID"
+    );
+    let unlinked = "spots that are not linked have no tracks: run the tracking, then ";
+    let advice = format!("{}{EXPORT_ADVICE}", if name == TRACK { unlinked } else { "" });
+    ImportError::columns(table.file, row.line, problem, advice)
 }
 
-pub(crate) fn read_spot_table<'a>(document: &'a Document<'a>) -> Result<TrackMateFile<'a>, ImportError> {
+pub(crate) fn read_spot_table<'a>(document: &'a Document<'a>) -> ImportResult<TrackMateFile<'a>> {
     let table = document.table()?;
     let (above, row) = find_header(table).ok_or_else(|| wrong_table_error(table))?;
     let cells = SpotCells::find(table, row)?;
     let start = table.first_numeric_row(above + 1, &[cells.id.unwrap_or(cells.frame), cells.position[0]]);
-    let start = start.ok_or_else(|| ImportError::HeaderOnly {
-        file: table.file.to_owned(),
-        line: table.head.last().map_or(1, |row| row.line),
-    })?;
+    let last_line = table.head.last().map_or(1, |row| row.line);
+    let start = start.ok_or_else(|| ImportError::header_only(table.file, last_line))?;
     let mut found = TrackMateFile {
         table: Some(table),
         clock_cell: cells.frame,
         has_quality: cells.quality,
         ..TrackMateFile::default()
     };
-    let bracketed =
-        |row: &&TextRow| row.cells.get(cells.position[0]).is_some_and(|unit| unit.starts_with('('));
+    let bracketed = |row: &&TextRow| row.cell(cells.position[0]).starts_with('(');
     if let Some(units) = table.head.get(start - 1).filter(bracketed) {
         let unit = |cell: usize| units.cells.get(cell).filter(|unit| !unit.is_empty()).cloned();
         found.space_unit =
@@ -143,7 +127,7 @@ fn read_rows(
     start: usize,
     cells: &SpotCells,
     found: &mut TrackMateFile,
-) -> Result<(), ImportError> {
+) -> ImportResult<()> {
     let mut known: HashMap<String, usize> = HashMap::new();
     let mut unlinked = 0_usize;
     let mut rows = table.rows(start);
@@ -158,12 +142,12 @@ fn read_rows(
             continue;
         }
         let value = |cell: usize, name: &str| table.number_at(&record, cell, name);
-        let time = cells.time.map_or(Ok(None), |cell| value(cell, "POSITION_T"))?;
+        let time = table.optional_number_at(&record, cells.time, "POSITION_T")?;
         let [x, y] = [value(cells.position[0], POSITION[0])?, value(cells.position[1], POSITION[1])?];
         let spot = Spot { line: record.line, frame: value(cells.frame, FRAME)?, time, x, y };
         let index = *known.entry(track.to_owned()).or_insert_with(|| {
-            let name =
-                cells.name.map(|cell| record.cell(cell)).filter(|name| !name.is_empty()).unwrap_or(track);
+            let name = cells.name.map(|cell| record.cell(cell)).filter(|name| !name.is_empty());
+            let name = name.unwrap_or(track);
             found.trajectories.push(Trajectory { name: name.to_owned(), spots: vec![] });
             found.trajectories.len() - 1
         });
@@ -177,24 +161,20 @@ fn read_rows(
     Ok(())
 }
 
-/// TrackMate quotes nothing: a comma in a name moves every cell after it.
-fn check_shift(table: &DelimitedTable, record: &RowView, cells: &SpotCells) -> Result<(), ImportError> {
+/// Refuses rows whose cells are shifted: TrackMate does not quote names with commas.
+fn check_shift(table: &DelimitedTable, record: &RowView, cells: &SpotCells) -> ImportResult<()> {
     let whole = |cell: usize| record.cell(cell).parse::<i64>().is_ok();
     if record.len() == cells.width && cells.id.is_none_or(whole) {
         return Ok(());
     }
-    let advice = match record.len().cmp(&cells.width) {
-        std::cmp::Ordering::Less => "complete the row or export again",
-        _ => {
-            "a comma in a name moves the cells after it, as TrackMate quotes nothing: rename the spot or \
-             track without commas and export again"
-        }
+    let advice = if record.len() < cells.width {
+        "complete the row or export again"
+    } else {
+        "a comma in a name moves the cells after it, as TrackMate quotes nothing: rename the spot or track without \
+         commas and export again"
     };
     let id = cells.id.map_or(String::new(), |cell| format!(" and `{}` as ID", record.cell(cell)));
-    Err(ImportError::columns(
-        table.file,
-        record.line,
-        format!("found {} cells{id}, expected {} and a whole number", record.len(), cells.width),
-        advice,
-    ))
+    let (found, expected) = (record.len(), cells.width);
+    let problem = format!("found {found} cells{id}, expected {expected} and a whole number");
+    Err(ImportError::columns(table.file, record.line, problem, advice))
 }

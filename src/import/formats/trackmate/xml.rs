@@ -1,15 +1,15 @@
-//! XML as opening and closing elements with their places: the only file that names `quick_xml`.
+//! XML as opening and closing tags with their places: the only file that uses `quick_xml`.
 //!
-//! Elements are read one after the other, so that no depth of nesting costs stack. Only the five predefined
-//! entities and character references are resolved; a document type, which could define others, is refused.
+//! Tags are read one by one, so that deep nesting takes no stack. Only the five predefined entities and character
+//! references are resolved; a document type, which could define others, is refused.
 
-use crate::import::error::{CellProblem, ImportError, TextLocation};
+use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
+use crate::import::reader::rows::count_lines;
 use crate::import::reader::{CellNumber, Document, parse_number};
 use quick_xml::XmlVersion;
 use quick_xml::events::{BytesEnd, BytesStart, Event};
 use quick_xml::reader::Reader;
 
-/// What to do with a file that is no whole XML.
 const REMEDY: &str = "save or export it again from TrackMate";
 
 /// The elements of a document in their order.
@@ -17,27 +17,24 @@ pub(crate) struct XmlReader<'a> {
     file: &'a str,
     text: &'a str,
     reader: Reader<&'a [u8]>,
-    /// Elements that are open.
+    /// Number of open elements.
     depth: usize,
-    /// Up to where lines are counted, bytes, and the line there.
+    /// Byte up to which lines are counted, and the line there.
     counted: (usize, usize),
 }
 
-/// An element's begin or end; an element without content has both.
+/// Start or end of an element; an element without content has both.
 pub(crate) enum XmlTag<'a> {
     Open(XmlElement<'a>),
-    Close(XmlElementEnd<'a>),
+    Close(BytesEnd<'a>),
 }
 
-/// The begin of an element.
+/// Start of an element.
 pub(crate) struct XmlElement<'a> {
     bytes: BytesStart<'a>,
     start: usize,
     pub line: usize,
 }
-
-/// The end of an element.
-pub(crate) struct XmlElementEnd<'a>(BytesEnd<'a>);
 
 impl XmlElement<'_> {
     pub(crate) fn has_name(&self, name: &str) -> bool {
@@ -45,9 +42,10 @@ impl XmlElement<'_> {
     }
 }
 
-impl XmlElementEnd<'_> {
-    pub(crate) fn has_name(&self, name: &str) -> bool {
-        self.0.name().as_ref() == name
+impl XmlTag<'_> {
+    /// Whether this is the end of an element of that name.
+    pub(crate) fn closes(&self, name: &str) -> bool {
+        matches!(self, Self::Close(end) if end.name().as_ref() == name)
     }
 }
 
@@ -69,12 +67,12 @@ impl<'a> XmlReader<'a> {
         }
     }
 
-    /// The next begin or end of an element; `None` after the last one.
+    /// The next tag; `None` after the last one.
     ///
     /// # Errors
     /// [`ImportError::WrongTable`] for text that is not well-formed, that ends within an element, or that has
     /// a document type.
-    pub(crate) fn next_tag(&mut self) -> Result<Option<XmlTag<'a>>, ImportError> {
+    pub(crate) fn next_tag(&mut self) -> ImportResult<Option<XmlTag<'a>>> {
         loop {
             let start = self.clamp_offset(self.reader.buffer_position());
             match self.reader.read_event() {
@@ -85,7 +83,7 @@ impl<'a> XmlReader<'a> {
                 }
                 Ok(Event::End(bytes)) => {
                     self.depth = self.depth.saturating_sub(1);
-                    return Ok(Some(XmlTag::Close(XmlElementEnd(bytes))));
+                    return Ok(Some(XmlTag::Close(bytes)));
                 }
                 Ok(Event::DocType(_)) => {
                     return Err(self.damaged_error(start, "a document type definition".to_owned()));
@@ -98,9 +96,8 @@ impl<'a> XmlReader<'a> {
                 Ok(_) => {}
                 Err(error) => {
                     let at = self.clamp_offset(self.reader.error_position());
-                    return Err(
-                        self.damaged_error(at, format!("XML that is damaged or broken off ({error})"))
-                    );
+                    let found = format!("XML that is damaged or broken off ({error})");
+                    return Err(self.damaged_error(at, found));
                 }
             }
         }
@@ -111,17 +108,15 @@ impl<'a> XmlReader<'a> {
     /// # Errors
     /// [`ImportError::WrongTable`] for attributes that are not well-formed and for entities that are not
     /// predefined.
-    pub(crate) fn attribute(&self, element: &XmlElement, name: &str) -> Result<Option<String>, ImportError> {
+    pub(crate) fn attribute(&self, element: &XmlElement, name: &str) -> ImportResult<Option<String>> {
         let damaged = |error: String| {
             self.damaged_error(element.start, format!("an attribute that cannot be read ({error})"))
         };
         for attribute in element.bytes.attributes().with_checks(false) {
             let attribute = attribute.map_err(|error| damaged(error.to_string()))?;
             if attribute.key.as_ref() == name {
-                let value = attribute
-                    .normalized_value(XmlVersion::Explicit1_0)
-                    .map_err(|error| damaged(error.to_string()))?;
-                return Ok(Some(value.into_owned()));
+                let value = attribute.normalized_value(XmlVersion::Explicit1_0);
+                return Ok(Some(value.map_err(|error| damaged(error.to_string()))?.into_owned()));
             }
         }
         Ok(None)
@@ -131,15 +126,11 @@ impl<'a> XmlReader<'a> {
     ///
     /// # Errors
     /// [`ImportError::WrongTable`] where it is missing.
-    pub(crate) fn required_attribute(&self, element: &XmlElement, name: &str) -> Result<String, ImportError> {
+    pub(crate) fn required_attribute(&self, element: &XmlElement, name: &str) -> ImportResult<String> {
         self.attribute(element, name)?.ok_or_else(|| {
             let found = format!("<{}> without {name}", element.bytes.name().as_ref());
-            ImportError::wrong_table(
-                self.location_at(element.start),
-                found,
-                format!("the attribute {name}"),
-                REMEDY,
-            )
+            let place = self.location_at(element.start);
+            ImportError::wrong_table(place, found, format!("the attribute {name}"), REMEDY)
         })
     }
 
@@ -147,23 +138,16 @@ impl<'a> XmlReader<'a> {
     ///
     /// # Errors
     /// [`ImportError::Cell`] for anything else.
-    pub(crate) fn number_attribute(
-        &self,
-        element: &XmlElement,
-        name: &str,
-    ) -> Result<Option<f64>, ImportError> {
+    pub(crate) fn number_attribute(&self, element: &XmlElement, name: &str) -> ImportResult<Option<f64>> {
         let text = self.required_attribute(element, name)?;
         match parse_number(text.trim(), '.') {
             CellNumber::Value(value) => Ok(Some(value)),
             CellNumber::Missing => Ok(None),
-            CellNumber::Text => Err(ImportError::Cell {
-                place: self.location_at(element.start),
-                problem: CellProblem::NotANumber,
-                name: name.to_owned(),
-                found: text.chars().take(60).collect::<String>().into(),
-                expected: "a number with a decimal point",
-                advice: REMEDY,
-            }),
+            CellNumber::Text => {
+                let remedy = ("a number with a decimal point", REMEDY);
+                let place = self.location_at(element.start);
+                Err(ImportError::cell(place, CellProblem::NotANumber, (name, &text), remedy))
+            }
         }
     }
 
@@ -173,32 +157,24 @@ impl<'a> XmlReader<'a> {
     }
 
     fn damaged_error(&self, at: usize, found: String) -> ImportError {
-        let expected = "a whole file as TrackMate writes it".to_owned();
-        ImportError::wrong_table(self.location_at(at), found, expected, REMEDY)
+        ImportError::wrong_table(self.location_at(at), found, "a whole file as TrackMate writes it", REMEDY)
     }
 
     fn clamp_offset(&self, offset: u64) -> usize {
         usize::try_from(offset).unwrap_or(usize::MAX).min(self.text.len())
     }
 
-    /// Line of a position that is not before the last one asked for.
+    /// Line of a byte that is not before that of the last call.
     fn line_at(&mut self, at: usize) -> usize {
         let (from, line) = self.counted;
-        let passed = self
-            .text
-            .as_bytes()
-            .get(from..at)
-            .unwrap_or_default()
-            .iter()
-            .filter(|byte| **byte == b'\n')
-            .count();
-        self.counted = (at, line + passed);
-        self.counted.1
+        let line = line + count_lines(self.text.as_bytes().get(from..at).unwrap_or_default());
+        self.counted = (at, line);
+        line
     }
 
     fn location_at(&self, at: usize) -> TextLocation {
         let before = self.text.as_bytes().get(..at).unwrap_or_default();
-        let line = before.iter().filter(|byte| **byte == b'\n').count() + 1;
+        let line = count_lines(before) + 1;
         let start = before.iter().rposition(|byte| *byte == b'\n').map_or(0, |end| end + 1);
         let column = self.text.get(start..at).map_or(1, |text| text.chars().count() + 1);
         TextLocation { file: self.file.to_owned(), line, column }
