@@ -1,8 +1,8 @@
-//! Reads the exports of tracking programs into a [`Recording`](crate::recording::Recording) with a report. Rate, scale
-//! and direction of y have no defaults: what the file does not say the user has to.
+//! Reads the exports of tracking programs into a [`Recording`](crate::recording::Recording) with a report.
+//! Rate, scale and direction of y have no defaults: what the file does not say the user has to.
 //!
-//! Coordinates keep the file's origin. They are only scaled and, where y points down, mirrored (`y` becomes `-y`). A
-//! new format is one file with one `FileFormat` and one row in `FORMATS`.
+//! Coordinates keep the file's origin. They are only scaled and, where y points down, mirrored (`y` becomes
+//! `-y`). A new format is one file with one `FileFormat` and one row in `FORMATS`.
 
 mod assemble;
 mod error;
@@ -151,8 +151,8 @@ pub(crate) fn base_name(path: &str) -> &str {
     path.rsplit(['/', '\\']).next().unwrap_or(path)
 }
 
-/// Names and bytes of the files that are stored with the recording, in the order of `[source]`. A companion of several
-/// exports is stored once.
+/// Names and bytes of the files that are stored with the recording, in the order of `[source]`. A companion
+/// of several exports is stored once.
 pub(crate) fn preserved_files(sources: &[ImportSource]) -> Vec<(&str, &[u8])> {
     let mut kept: Vec<(&str, &[u8])> =
         sources.iter().map(|source| (base_name(&source.name), source.bytes.as_slice())).collect();
@@ -165,7 +165,7 @@ pub(crate) fn preserved_files(sources: &[ImportSource]) -> Vec<(&str, &[u8])> {
     kept
 }
 
-/// SHA-256 of every kept file, in their order.
+/// SHA-256 of the stored files, in their order.
 pub(crate) fn hash_sources(sources: &[ImportSource]) -> Vec<String> {
     preserved_files(sources).into_iter().map(|(_, bytes)| sha256(bytes)).collect()
 }

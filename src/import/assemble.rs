@@ -179,8 +179,8 @@ fn describe_recording(
     Ok(file)
 }
 
-/// Turns the recording as a level camera would have seen it, and gives what was done. An unclear tilt is left as it
-/// is. Refusals name `file`.
+/// Turns the recording as a level camera would have seen it, and gives what was done. An unclear tilt is left
+/// as it is. Refusals name `file`.
 ///
 /// # Errors
 /// [`ImportError::Unusable`] where the path shows no tilt, or a point has only one coordinate.

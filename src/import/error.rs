@@ -75,14 +75,14 @@ pub enum ImportError {
         /// Line of the first row.
         first: usize,
     },
-    /// A table or a file that its own program does not mean as positions over time.
+    /// A table or a file without positions over time, such as another table of the same program.
     #[error("{place}: found {found}, expected {expected}; {advice}")]
     WrongTable {
         /// The file, or the place that shows it.
         place: String,
         /// What the file holds.
         found: String,
-        /// What is read instead.
+        /// What is expected instead.
         expected: String,
         /// Which menu of the program writes that.
         advice: String,
@@ -128,7 +128,7 @@ pub enum ImportError {
         /// What to do.
         advice: String,
     },
-    /// A file that cannot be used, where a sentence says more than "found" and "expected".
+    /// A file that cannot be used, with the reason as one sentence.
     #[error("{place}: {problem}")]
     Unusable {
         /// The file, with line and column where one shows it.
@@ -148,7 +148,7 @@ pub enum ImportError {
         /// The tracks there are, and the nearest.
         advice: String,
     },
-    /// Options that neither the file nor its format makes up for, such as the frame rate.
+    /// Missing options for facts that the file does not have, such as the frame rate.
     #[error("{files}: read as {format}, which does not say all of how it was recorded, and no default is \
         safe; give\n  {}", .missing.join("\n  "))]
     MissingOptions {
@@ -213,14 +213,13 @@ pub enum ImportError {
     Files(#[from] FilesError),
 }
 
-/// What a step of the import gives, or its refusal.
+/// Result of a step of an import.
 pub(crate) type ImportResult<T> = Result<T, ImportError>;
 
 /// Most characters of a cell that a refusal shows.
 const LONGEST_CELL: usize = 60;
 
 impl ImportError {
-    /// A table or file that its own program does not mean as positions over time.
     pub(crate) fn wrong_table(
         place: impl Display,
         found: impl Into<String>,
@@ -231,7 +230,6 @@ impl ImportError {
         Self::WrongTable { place: place.to_string(), found, expected, advice }
     }
 
-    /// A file that is not what its format, or a camera's record, should be.
     pub(crate) fn format(
         place: impl Display,
         found: impl Into<String>,
@@ -242,7 +240,6 @@ impl ImportError {
         Self::Format { place: place.to_string(), found, expected, advice }
     }
 
-    /// A problem that is one sentence with its advice.
     pub(crate) fn unusable(place: impl Display, problem: impl Display) -> Self {
         Self::Unusable { place: place.to_string(), problem: problem.to_string() }
     }
@@ -281,12 +278,10 @@ impl ImportError {
         Self::Cell { place, problem, name: name.to_owned(), found, expected, advice }
     }
 
-    /// A point that was not named, or not found.
     pub(crate) fn point(point: &'static str, found: String, expected: &str, advice: String) -> Self {
         Self::Point { point, found, expected: expected.to_owned(), advice }
     }
 
-    /// An option with an unusable value.
     pub(crate) fn option(option: &'static str, found: impl Display, expected: impl Into<String>) -> Self {
         Self::Option { option, found: found.to_string(), expected: expected.into() }
     }

@@ -60,8 +60,8 @@ pub(crate) fn choose_format(
     };
     let format = FORMATS.iter().copied().find(|format| format.name() == name);
     let format = format.ok_or_else(|| unknown_format_error(name))?;
-    // a table that its own program does not mean as positions is not read as another format's; whoever names the
-    // columns answers for them
+    // (--format does not override a program's refusal of its own table; --columns does, because the user then
+    // says which columns are positions)
     let mut checked = documents.iter().filter(|_| options.columns.is_none());
     match checked.find_map(|document| refusal_by_others(format, document, options)) {
         Some(refusal) => Err(refusal),
@@ -166,8 +166,8 @@ fn unknown_format_error(name: &str) -> ImportError {
 pub(crate) trait FileFormat: Sync {
     /// Name on the command line.
     fn name(&self) -> &'static str;
-    /// What in the content shows the format, if anything does. Tables of the same program without positions are
-    /// recognised too, and refused by [`FileFormat::read`].
+    /// What in the content shows the format, if anything does. Tables of the same program without positions
+    /// are recognised too, and refused by [`FileFormat::read`].
     fn recognises(&self, document: &Document) -> Option<String>;
     /// Reads the clocks and tracks, in the file's own units.
     fn read<'a>(&self, document: &'a Document<'a>, options: &ImportOptions) -> ImportResult<TrackFile<'a>>;

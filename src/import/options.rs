@@ -4,8 +4,8 @@ use crate::import::error::ImportError;
 use crate::recording::files::YAxis;
 use toml::Value;
 
-/// Options of an import. Where neither an option nor the file has a fact and no default is safe, the import is
-/// refused.
+/// Options of an import. Where neither an option nor the file has a fact and no default is safe, the import
+/// is refused.
 #[derive(Debug, Clone, Default)]
 pub struct ImportOptions {
     /// Name of the recording, for messages and figures.

@@ -1,4 +1,5 @@
-//! The steps from bytes to tracks on a frame grid that all formats share: encoding, dialect, table, layout, timing.
+//! The steps from bytes to tracks on a frame grid that all formats share: encoding, dialect, table, layout,
+//! timing.
 
 pub(crate) mod calibration;
 pub(crate) mod companion;

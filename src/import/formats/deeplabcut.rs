@@ -11,8 +11,8 @@ use crate::import::reader::{
 };
 use crate::recording::quality::{Check, QualityFinding, Severity};
 
-/// Parts of the names of files or scorers of smoothed positions: DeepLabCut's filtered predictions and the ensemble
-/// Kalman smoother of Lightning Pose.
+/// Parts of the names of files or scorers of smoothed positions: DeepLabCut's filtered predictions and the
+/// ensemble Kalman smoother of Lightning Pose.
 const SMOOTHED: [&str; 3] = ["filtered", "smoother", "smoothed"];
 /// Columns of the table of lengths and angles between body parts.
 const SKELETON: [&str; 3] = ["length", "orientation", "likelihood"];
@@ -109,10 +109,10 @@ fn filtering_finding(document: &Document, header: &DeepLabCutHeader) -> Option<Q
 
 /// First cells of the header rows; a table of one animal has no row `individuals`.
 const ROW_NAMES: [&str; 4] = ["scorer", "individuals", "bodyparts", "coords"];
-/// Individual of the body parts that are in the picture once.
+/// Individual to which body parts belong that occur once in a picture.
 const UNIQUE_INDIVIDUAL: &str = "single";
-/// Number of cells in front of the coordinates: a frame number or the path of a picture is one, a path in parts is
-/// three.
+/// Number of cells in front of the coordinates: a frame number or the path of a picture is one, a path in
+/// parts is three.
 const INDEX_CELLS: [usize; 2] = [1, 3];
 const HEADER_ADVICE: &str = "the rows above the numbers are scorer, bodyparts, coords, with individuals in \
     second place if there are several; restore them as DeepLabCut wrote them, or have it write the table \

@@ -90,8 +90,8 @@ fn no_header_error(table: &DelimitedTable) -> ImportError {
     ImportError::columns(table.file, table.first_line(), problem, advice)
 }
 
-/// Refuses a field of points: there a frame has many references. In tracking mode the frames count up and the reference
-/// is constant.
+/// Refuses a field of points: there a frame has many references. In tracking mode the frames count up and the
+/// reference is constant.
 fn refuse_full_field(
     table: &DelimitedTable,
     start: usize,

@@ -1,4 +1,5 @@
-//! DLTdv (versions 5 to 8) and Argus: positions in pixels, in two columns for each point and camera, or as triplets.
+//! DLTdv (versions 5 to 8) and Argus: positions in pixels, in two columns for each point and camera, or as
+//! triplets.
 
 mod flat;
 mod sparse;

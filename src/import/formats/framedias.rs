@@ -1,5 +1,5 @@
-//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts. A companion `.set` has the names of the points
-//! and the rate of the camera.
+//! Frame-DIAS (DKH): `.rd`, rows of coordinates under a line of counts. A companion `.set` has the names of
+//! the points and the rate of the camera.
 
 use super::FileFormat;
 use crate::import::base_name;
@@ -102,7 +102,7 @@ impl FrameDiasCounts {
     }
 }
 
-/// A problem that a row shows.
+/// Refuses the table with the line of a row.
 fn refuse_row<T>(table: &DelimitedTable, row: usize, problem: &str, advice: &str) -> ImportResult<T> {
     let line = table.head.get(row).map_or(1, |row| row.line);
     Err(ImportError::columns(table.file, line, problem, advice))

@@ -162,8 +162,8 @@ impl ColumnPositions {
         CLOCKS.iter().chain(&positions).find_map(|key| self.column_of(key)).unwrap_or(0)
     }
 
-    /// Index of the first row below the header whose clock is a number. A row above it that holds positions is damaged,
-    /// and refused.
+    /// Index of the first row below the header whose clock is a number. A row above it that holds positions
+    /// is damaged, and refused.
     fn first_data_row(&self, table: &DelimitedTable) -> ImportResult<usize> {
         let from = self.header.map_or(0, |header| header + 1);
         let number = |row: &TextRow, at: usize| {
@@ -184,8 +184,8 @@ impl ColumnPositions {
         Err(ImportError::header_only(table.file, table.head.last().map_or(1, |row| row.line)))
     }
 
-    /// Whether all used cells except the clock are numbers or empty. Lines of settings above a table have other cells
-    /// too.
+    /// Whether all used cells except the clock are numbers or empty. Lines of settings above a table have
+    /// other cells too.
     fn is_row_of_numbers(&self, number: impl Fn(&TextRow, usize) -> CellNumber, row: &TextRow) -> bool {
         let others = self.columns.iter().filter(|(key, at)| *key != "track" && *at != self.clock_column());
         let found: Vec<CellNumber> = others.map(|(_, at)| number(row, *at)).collect();
@@ -224,7 +224,7 @@ impl ColumnPositions {
 /// The refusal of names that no row has together. It shows the row that has most of them.
 fn no_such_column_error(table: &DelimitedTable, names: &[&str]) -> ImportError {
     let hits = |row: &TextRow| names.iter().filter(|name| row.has(name)).count();
-    // (of several the first: `max_by_key` takes the last)
+    // (reversed, because `max_by_key` takes the last of equal rows)
     let best = table.head.iter().rev().max_by_key(|row| hits(row));
     let header: Vec<&str> =
         best.map(|row| row.texts().into_iter().filter(|text| !text.is_empty()).collect()).unwrap_or_default();
@@ -252,8 +252,8 @@ enum ClockKind {
     Times(f64),
 }
 
-/// Refuses a position whose column is named like a clock. Also refuses an unused clock in front of a point's columns if
-/// it differs from the named one.
+/// Refuses a position whose column is named like a clock. Also refuses an unused clock in front of a point's
+/// columns if it differs from the named one.
 ///
 /// # Errors
 /// [`ImportError`] naming the column and the row.

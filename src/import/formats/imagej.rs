@@ -1,4 +1,5 @@
-//! ImageJ and Fiji: the Results table, the table of the plugin Manual Tracking, and MTrackJ's table of points.
+//! ImageJ and Fiji: the Results table, the table of the plugin Manual Tracking, and MTrackJ's table of
+//! points.
 
 use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult};
@@ -74,7 +75,7 @@ pub(crate) fn imagej_facts() -> Facts {
     Facts { y_axis: Some((YAxis::Down, why)), ..Facts::default() }
 }
 
-/// The refusal of a table at its header.
+/// Refuses the table with the line of its header.
 fn refuse_header<T>(
     table: &DelimitedTable,
     row: &TextRow,
@@ -141,8 +142,8 @@ pub(crate) fn read_manual_tracking<'a>(
 
 // MTrackJ's table of points: coordinates and times with their units in the header.
 
-/// Columns that number clusters, tracks and points. The number of a point starts again in each track and is not a
-/// frame.
+/// Columns that number clusters, tracks and points. The number of a point starts again in each track and is
+/// not a frame.
 const MTRACKJ_CLUSTER: &str = "CID";
 const MTRACKJ_TRACK: &str = "TID";
 const MTRACKJ_POINT: &str = "PID";

@@ -1,5 +1,5 @@
-//! Kinovea: trajectories as CSV and as TXT, and the tables of its kinematics windows. Projects (`.kva`) and tables of
-//! chronometers are refused with advice on the export that has the positions.
+//! Kinovea: trajectories as CSV and as TXT, and the tables of its kinematics windows. Projects (`.kva`) and
+//! tables of chronometers are refused with advice on the export that has the positions.
 
 mod text;
 

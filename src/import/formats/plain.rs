@@ -14,7 +14,7 @@ use crate::import::reader::{
 use header::ColumnMeaning;
 
 pub(crate) const PLAIN_NAME: &str = "plain";
-/// Rows above the data that may hold the names.
+/// Rows at the top in which the names are searched.
 const HEADER_ROWS: usize = 6;
 const ADVICE: &str = "say which columns are meant by their numbers (from 1): --columns frame=A,tip-x=B,tip-y=C,head-x=D,head-y=E \
      with numbers for A to E";
@@ -130,8 +130,8 @@ impl<'t> PlainHeader<'t> {
         if found.len() > 1 { Err(self.ambiguous_error(&found, what)) } else { Ok(found.first().copied()) }
     }
 
-    /// The columns of frames and of times. The first of several columns of times counts: [`Self::compare_times`]
-    /// refuses columns that differ.
+    /// The columns of frames and of times. The first of several columns of times counts:
+    /// [`Self::compare_times`] refuses columns that differ.
     fn clock_columns(&self) -> ImportResult<ClockColumns> {
         let frame = self.only_column(|meaning| *meaning == ColumnMeaning::Frame, "numbers of the frames")?;
         let times = self.columns_where(|meaning| matches!(meaning, ColumnMeaning::Time(_)));

@@ -118,8 +118,8 @@ fn read_instance(
     Ok(())
 }
 
-/// Names the tracks of a table with a row a point: by their node, by their instance if it has only one node, or by
-/// both.
+/// Names the tracks of a table with a row a point: by their node, by their instance if it has only one node,
+/// or by both.
 fn name_by_node(tracks: &mut [Track]) {
     let parts = tracks.iter().filter_map(|track| track.name.split_once(SEPARATOR));
     let parts: Vec<(String, String)> = parts.map(|(a, b)| (a.to_owned(), b.to_owned())).collect();

@@ -76,8 +76,8 @@ impl FileFormat for TrackerFormat {
     }
 }
 
-/// Facts of pixels. The unit and the axes of world coordinates are those of the user's calibration, which no export
-/// has.
+/// Facts of image pixels. World coordinates have the unit and the axes of the user's calibration, which the
+/// export does not name.
 fn facts(pair: [&str; 2]) -> Facts {
     if pair == WORLD {
         let open = "Tracker's x and y point up unless its axes were turned; image pixels point down";

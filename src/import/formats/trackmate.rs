@@ -140,8 +140,8 @@ impl<'a> TrackMateFile<'a> {
     /// Sorts the spots and makes the clocks and tracks.
     ///
     /// # Errors
-    /// [`ImportError::DuplicateRow`] where a requested track has two spots in one frame, [`ImportError::WrongTable`]
-    /// where there are no tracks.
+    /// [`ImportError::DuplicateRow`] where a requested track has two spots in one frame,
+    /// [`ImportError::WrongTable`] where there are no tracks.
     pub(crate) fn into_track_file(
         mut self,
         document: &'a Document<'a>,

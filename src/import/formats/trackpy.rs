@@ -1,5 +1,5 @@
-//! trackpy: its table of linked features, saved with `to_csv`. y is in front of x, and an index without a name may be
-//! in front of both.
+//! trackpy: its table of linked features, saved with `to_csv`. y is in front of x, and an index without a
+//! name may be in front of both.
 
 use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult};

@@ -1,5 +1,5 @@
-//! TRC, the table of markers of motion-capture programs: lines of settings, then names of markers over three columns
-//! each.
+//! TRC, the table of markers of motion-capture programs: lines of settings, then names of markers over three
+//! columns each.
 
 use super::FileFormat;
 use crate::import::error::{ImportError, ImportResult, TextLocation};

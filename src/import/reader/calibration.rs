@@ -1,5 +1,5 @@
-//! Rate, scale, direction of y and unit of the times. They come from the user, the file or the documentation of its
-//! format; an import that lacks one is refused with a question for it.
+//! Rate, scale, direction of y and unit of the times. They come from the user, the file or the documentation
+//! of its format; an import that lacks one is refused with a question for it.
 
 use super::timing::{RATE_AGREEMENT, times_fit_rate};
 use super::track_file::{CoordinateUnit, TimeUnit};
@@ -11,7 +11,8 @@ use crate::import::reader::{findings, track_choice};
 use crate::recording::clock;
 use crate::recording::files::YAxis;
 
-/// Implied rate, frames/s, at or below which times look like frame numbers: no camera that films a wiper is as slow.
+/// Implied rate, frames/s, at or below which times look like frame numbers: no camera that films a wiper is
+/// as slow.
 const SLOWEST_HZ: f64 = 1.0;
 
 /// What the direction of y depends on, where the format has no words of its own.
@@ -27,8 +28,8 @@ pub(crate) struct ImportCalibration {
     pub exposure_s: Option<f64>,
 }
 
-/// Converts the times of every export to seconds or frames, and collects the other facts. The refusal names all that
-/// is missing at once, with what the files suggest.
+/// Converts the times of every export to seconds or frames, and collects the other facts. The refusal names
+/// all that is missing at once, with what the files suggest.
 pub(crate) fn calibrate(
     exports: &mut [TrackFile],
     options: &ImportOptions,
@@ -152,7 +153,7 @@ fn frame_rate_hz(
     Ok(implied)
 }
 
-/// The declared exposure, or else that of the cameras' records; they have to agree.
+/// The declared exposure, or else that of the cameras' records. Refuses a record that differs.
 fn exposure_s(
     exports: &[TrackFile],
     options: &ImportOptions,

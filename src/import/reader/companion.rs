@@ -28,8 +28,8 @@ fn point_names_file(file: &str) -> Option<String> {
 /// Takes rate and exposure from the camera's record of each file, where there is one.
 ///
 /// # Errors
-/// [`ImportError::Format`] for a record that cannot be used or contradicts the options or the table. Where the rate
-/// is declared, a record without a rate or with fewer frames than the table is only a finding.
+/// [`ImportError::Format`] for a record that cannot be used or contradicts the options or the table. Where
+/// the rate is declared, a record without a rate or with fewer frames than the table is only a finding.
 pub(crate) fn read_camera_records(
     sources: &[ImportSource],
     exports: &mut [TrackFile],
@@ -62,7 +62,8 @@ struct CameraSettings {
 }
 
 impl CameraSettings {
-    /// Reads what a declared rate can do without; a record of fewer frames than the table is of another video.
+    /// Reads the settings. A record of fewer frames than the table has rows belongs to another video and is
+    /// refused.
     fn read(record: &CameraRecord, export: &TrackFile) -> ImportResult<Self> {
         let rows = export.clocks.iter().map(Clock::len).max().unwrap_or(0);
         if let Some(frames) = record.frame_count().filter(|frames| rows > *frames) {
@@ -121,8 +122,8 @@ fn is_near(one: f64, other: f64) -> bool {
     (one / other - 1.0).abs() <= RATE_AGREEMENT
 }
 
-/// The finding of a record that saved only every n-th frame. The table may count the saved pictures or the camera's
-/// frames, so the user has to declare the rate.
+/// The finding of a record that saved only every n-th frame. The table may count the saved pictures or the
+/// camera's frames, so the user has to declare the rate.
 fn saved_step_finding(
     record: &CameraRecord,
     export: &TrackFile,
@@ -220,7 +221,8 @@ impl<'a> CameraRecord<'a> {
         Some(Self { name: &file.name, text: text.to_owned(), skipped: before.matches('\n').count() })
     }
 
-    /// The values of an entry in the order of the file. A record that was saved again has its own value first.
+    /// The values of an entry in the order of the file. A record that was saved again has its own value
+    /// first.
     fn values(&self, entry: CameraRecordKey) -> Vec<CameraRecordValue<'_>> {
         if self.text.starts_with(CIHX) { self.xml_values(entry.element) } else { self.text_values(entry.key) }
     }
@@ -313,8 +315,8 @@ fn parse_positive(text: &str) -> Option<f64> {
     text.parse::<f64>().ok().filter(|value| value.is_finite() && *value > 0.0)
 }
 
-/// Reads `1/10000`, `0.0001` or `10000`, with or without a unit, as seconds. Exposures are shorter than a second, so
-/// a number above 1 is a reciprocal.
+/// Reads `1/10000`, `0.0001` or `10000`, with or without a unit, as seconds. Exposures are shorter than a
+/// second, so a number above 1 is a reciprocal.
 fn parse_exposure(text: &str) -> Option<f64> {
     let number = text.trim_end_matches(|c: char| c.is_alphabetic() || c.is_whitespace() || c == '.');
     match number.split_once('/') {

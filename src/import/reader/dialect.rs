@@ -7,12 +7,13 @@ use crate::import::reader::rows::{TextRow, parse_rows};
 
 /// Lines that decide the dialect: this number from the start of a file, and again from the rest of it.
 const SAMPLE_LINES: usize = 1000;
-/// Largest size of either part of the sample, bytes: a cell of one digit takes thirty times its size in memory.
+/// Largest size of either part of the sample, bytes: a cell of one digit takes thirty times its size in
+/// memory.
 const SAMPLE_BYTES: usize = 1 << 20;
 /// Most columns of a table, enough for ten thousand points.
 const MOST_COLUMNS: usize = 20_000;
-/// If every second cell is the fraction of a number, more than one row in this number has a leading zero in one:
-/// a tenth of all fractions begin with a zero.
+/// Numbers count as cut in two if more than one row in this number has a fraction with a leading zero. By
+/// chance a tenth of all fractions have one.
 const ROWS_PER_FRACTION: usize = 10;
 /// A row of data has more than this share of numbers.
 const MOSTLY_NUMBERS: f64 = 0.5;
@@ -115,8 +116,8 @@ fn refuse_too_many_columns(file: &str, lines: &[NumberedLine]) -> ImportResult<(
     }
 }
 
-/// How well `delimiter` explains the rows: the sum of the shares of numbers over rows of the median length. Rows
-/// count that have at least `cells` cells and more than the share `least` of numbers.
+/// How well `delimiter` explains the rows: the sum of the shares of numbers over rows of the median length.
+/// Rows count that have at least `cells` cells and more than the share `least` of numbers.
 fn delimiter_score(rows: &[TextRow], delimiter: Delimiter, (least, cells): (f64, usize)) -> f64 {
     let measured = rows.iter().map(|row| (row.cells.len(), numeric_share(&row.cells, delimiter)));
     let numeric: Vec<(usize, f64)> =
@@ -185,8 +186,8 @@ fn refuse_double_comma(file: &str, rows: &[TextRow]) -> ImportResult<()> {
     }
 }
 
-/// Refuses rows such as `0,000,10,050` without a header: no whole number has the leading zeros of every second
-/// cell.
+/// Refuses rows such as `0,000,10,050` without a header: no whole number has the leading zeros of every
+/// second cell.
 fn refuse_split_numbers(file: &str, rows: &[&TextRow]) -> ImportResult<()> {
     let fraction = |cell: &String| {
         cell.strip_prefix('0').is_some_and(|rest| rest.starts_with(|c: char| c.is_ascii_digit()))
@@ -271,8 +272,8 @@ pub(crate) enum Delimiter {
     Blanks,
 }
 
-/// In order of preference where several explain a file equally well: a comma may also be a decimal mark, a space
-/// may align columns.
+/// In order of preference where several explain a file equally well: a comma may also be a decimal mark, a
+/// space may align columns.
 pub(crate) const DELIMITERS: [Delimiter; 5] =
     [Delimiter::Tab, Delimiter::Semicolon, Delimiter::Comma, Delimiter::Space, Delimiter::Blanks];
 /// Start of the first line in which spreadsheets declare their delimiter.
@@ -315,8 +316,8 @@ impl Delimiter {
     }
 }
 
-/// Whether a line is a comment: it starts with `#`, `//`, `***` or `%`. The word `#N/A` is none, nor is a cell of
-/// a spreadsheet such as `#####` or `#REF!` before numbers.
+/// Whether a line is a comment: it starts with `#`, `//`, `***` or `%`. The word `#N/A` does not start a
+/// comment, nor does a damaged cell of a spreadsheet, such as `#####` or `#REF!`, in front of numbers.
 pub(crate) fn is_comment(line: &str) -> bool {
     if line.starts_with(|c: char| c.is_ascii_digit() || c == '-') {
         return false; // (nearly every line)

@@ -1,4 +1,4 @@
-//! Bytes to text: the only file that names `encoding_rs`.
+//! Decodes bytes to text: the only file that uses `encoding_rs`.
 
 use crate::import::error::{ImportError, ImportResult};
 use crate::import::reader::file_type;
@@ -14,11 +14,12 @@ pub(crate) struct DecodedText<'a> {
     pub encoding: &'static str,
 }
 
-/// Decodes `bytes` in the encoding `wanted`. Without one, a byte-order mark decides; then strict UTF-8 is tried,
-/// then CP932 where the bytes look Japanese, then Windows-1252.
+/// Decodes `bytes` in the encoding `wanted`. Without one, a byte-order mark decides; then strict UTF-8 is
+/// tried, then CP932 where the bytes look Japanese, then Windows-1252.
 ///
 /// # Errors
-/// [`ImportError`] for files that are not text, unknown encodings and bytes that are not valid in the encoding.
+/// [`ImportError`] for files that are not text, unknown encodings and bytes that are not valid in the
+/// encoding.
 pub(crate) fn decode_text<'a>(
     file: &str,
     bytes: &'a [u8],
@@ -74,9 +75,9 @@ fn detect_encoding<'a>(file: &str, bytes: &'a [u8]) -> ImportResult<(Cow<'a, str
     decode_as(file, bytes, UTF_8).or_else(|_| decode_as(file, bytes, other))
 }
 
-/// Whether bytes that are not UTF-8 are CP932. Nearly any bytes are valid in it, but kana and the common kanji
-/// start with a byte from 0x81 to 0x9f, where Windows-1252 has quotation marks and dashes. At least half of the
-/// characters beyond ASCII must be such pairs.
+/// Whether bytes that are not UTF-8 are CP932. Nearly any bytes are valid in it, but kana and the common
+/// kanji start with a byte from 0x81 to 0x9f, where Windows-1252 has quotation marks and dashes. At least
+/// half of the characters beyond ASCII must be such pairs.
 fn looks_japanese(bytes: &[u8]) -> bool {
     let (mut pairs, mut others, mut at) = (0, 0, 0);
     while let Some(&byte) = bytes.get(at) {
@@ -132,8 +133,13 @@ mod tests {
 
     #[test]
     fn an_encoding_that_does_not_fit_is_refused() {
-        assert!(matches!(decode_text("a", b"n\xb0", Some("utf-8")), Err(ImportError::Encoding { .. })));
-        assert!(matches!(decode_text("a", b"n", Some("utf-99")), Err(ImportError::UnknownEncoding { .. })));
+        let says = |bytes: &[u8], name| decode_text("a", bytes, Some(name)).unwrap_err().to_string();
+        assert!(
+            says(b"n\xb0", "utf-8").starts_with("a: found bytes that are not UTF-8, expected text; name")
+        );
+        assert!(
+            says(b"n", "utf-99").starts_with("--encoding: found `utf-99`, expected a name such as utf-8, ")
+        );
         assert_eq!(decode_text("a", b"\x8e\x9e\x8a\xd4", Some("cp932")).unwrap().text, "\u{6642}\u{9593}");
     }
 

@@ -1,5 +1,5 @@
-//! Files that are not tables of points over time, such as projects, workbooks and archives. Each is refused with
-//! advice on what to export instead.
+//! Files that are not tables of points over time, such as projects, workbooks and archives. Each is refused
+//! with advice on what to export instead.
 
 use crate::import::error::ImportError;
 
@@ -80,8 +80,8 @@ const IN_ZIP: [(&[u8], (&str, &str)); 6] = [
         ),
     ),
 ];
-/// Bytes at either end of a file in which names are searched: a zip archive has its first entries at the start
-/// and its directory at the end.
+/// Bytes at either end of a file in which names are searched: a zip archive has its first entries at the
+/// start and its directory at the end.
 const SEARCHED_BYTES: usize = 65_536;
 /// Types of the first box of an MP4 or QuickTime file.
 const MP4_BOXES: [&[u8]; 5] = [b"ftyp", b"moov", b"mdat", b"wide", b"free"];
@@ -195,7 +195,7 @@ fn kind_by_layout(bytes: &[u8]) -> Option<FileKind> {
 
 /// The refusal of a text that is not a table.
 pub(crate) fn refuse_text(file: &str, text: &str) -> Option<ImportError> {
-    // a tab in front is an empty cell: what follows is the name of a track
+    // (tabs are kept: behind an empty first cell, `<` starts the name of a track)
     let start = text.trim_start_matches([' ', '\r', '\n']).chars();
     let start = start.take(SEARCHED_CHARACTERS).collect::<String>().to_lowercase();
     let inside =

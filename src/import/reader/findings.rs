@@ -1,4 +1,5 @@
-//! Findings on the quality of a recording that only its export shows: rounded times, lost points, doubtful units.
+//! Findings on the quality of a recording that only its export shows: rounded times, lost points, doubtful
+//! units.
 
 use super::timing::find_quantum_s;
 use super::track_file::{Clock, CoordinateUnit};
@@ -9,11 +10,11 @@ use std::collections::BTreeMap;
 
 /// Fewest frames in a row at exactly (0, 0) that look like a lost point: a single one may be on the origin.
 const ZERO_RUN: usize = 3;
-/// Both coordinates of a lost point as scripts around OpenCV write it. It is outside the picture, so one frame is
-/// enough.
+/// Both coordinates of a lost point as scripts around OpenCV write it. It is outside the picture, so one
+/// frame is enough.
 const OUTSIDE_PICTURE: f64 = -1.0;
-/// Coordinates above this number look like pixels if their unit is a millimetre or larger: a view that resolves a
-/// lip is rarely wider than this in millimetres, and a picture hardly ever narrower in pixels.
+/// Coordinates above this number look like pixels if their unit is a millimetre or larger: a view that
+/// resolves a lip is rarely wider than this in millimetres, and a picture hardly ever narrower in pixels.
 const PIXEL_LIKE_LIMIT: f64 = 100.0;
 /// Smallest unit to which [`PIXEL_LIKE_LIMIT`] applies, m: in micrometres every view has larger numbers.
 const MILLIMETRE_M: f64 = 1e-3;

@@ -5,7 +5,7 @@ use crate::import::error::{ImportError, ImportResult, TextLocation};
 use crate::import::reader::track_file::{Clock, Track};
 use std::collections::HashMap;
 
-/// Most tracks of a file: more are detections that were not linked.
+/// Most tracks of a file; files with more hold unlinked detections.
 const MOST_TRACKS: usize = 20_000;
 
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -119,12 +119,12 @@ impl TrackCollector {
         self.instances.len() - 1
     }
 
-    /// The clocks and tracks. A track has the name of its point, of its instance if that has only one point, or
-    /// both.
+    /// The clocks and tracks. A track has the name of its point, of its instance if that has only one point,
+    /// or both.
     ///
     /// # Errors
-    /// [`ImportError::WrongTable`] for too many tracks, [`ImportError::DuplicateRow`] where an instance has two rows
-    /// of one frame and the rows may be in any order.
+    /// [`ImportError::WrongTable`] for too many tracks, [`ImportError::DuplicateRow`] where an instance has
+    /// two rows of one frame and the rows may be in any order.
     pub(crate) fn finish(self, file: &str, order: RowOrder) -> ImportResult<(Vec<Clock>, Vec<Track>)> {
         if let Some(line) = self.too_many {
             return Err(ImportError::wrong_table(

@@ -92,8 +92,8 @@ impl Default for TableLayout {
     }
 }
 
-/// Points whose columns come in pairs, x before y, from column `first` on. The names end in `ends`, and `rename` makes
-/// the name of the track of their common part.
+/// Points whose columns come in pairs, x before y, from column `first` on. The names end in `ends`, and
+/// `rename` makes the name of the track of their common part.
 ///
 /// # Errors
 /// Index of the first column without a partner.
@@ -327,7 +327,7 @@ pub(crate) fn find_clock_difference(
     Ok(None)
 }
 
-/// The value of a clock in a row, and the worth of its last digit.
+/// The value of a clock in a row, and the value of one unit in its last digit.
 fn read_clock(
     table: &DelimitedTable,
     record: &RowView,
@@ -343,7 +343,7 @@ fn read_clock(
     }
 }
 
-/// The worth of the last digit of a written number.
+/// The value of one unit in the last digit of a written number.
 fn last_digit_value(text: &str, decimal: char) -> f64 {
     let (mantissa, exponent) = text.split_once(['e', 'E']).unwrap_or((text, "0"));
     let decimals = mantissa.split_once(decimal).map_or(0, |(_, decimals)| decimals.len());
@@ -351,7 +351,8 @@ fn last_digit_value(text: &str, decimal: char) -> f64 {
     math::powi(10.0, exponent - i32::try_from(decimals).unwrap_or(0))
 }
 
-/// The tracks of a table with several clocks, one layout a clock. A clock skips the rows that are empty for it.
+/// The tracks of a table with several clocks, one layout a clock. A clock skips the rows that are empty for
+/// it.
 ///
 /// # Errors
 /// As [`TableLayout::read_tracks`].

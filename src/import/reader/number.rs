@@ -6,7 +6,7 @@ const MISSING_WORDS: [&str; 9] = ["", "nan", "na", "none", "-", "*", "null", "#n
 /// spare.
 const MAX_NUMBER_BYTES: usize = 64;
 
-/// What a cell says.
+/// Content of a cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum CellNumber {
     /// One of the words for a missing value.
@@ -25,8 +25,7 @@ pub(crate) fn parse_number(text: &str, decimal: char) -> CellNumber {
     if is_missing(text) { CellNumber::Missing } else { parse_spelled(text, decimal) }
 }
 
-/// Rust also reads `inf`, `nan` and `infinity` as numbers: no cell of digits holds any other letter than an
-/// exponent's.
+/// Parses a number. Rust also reads `inf`, `nan` and `infinity`, which are not numbers in a table.
 fn parse_finite(text: &str) -> Option<f64> {
     text.parse::<f64>().ok().filter(|value| value.is_finite())
 }
@@ -56,7 +55,7 @@ fn parse_spelled(text: &str, decimal: char) -> CellNumber {
         length += 1;
     }
     let text = std::str::from_utf8(&plain[..length]).unwrap_or_default(); // (all of it is ASCII)
-    // `12,` is a number before a delimiter that went astray
+    // (`12,` is a number with a stray delimiter)
     if decimal == ',' && text.ends_with('.') {
         return CellNumber::Text;
     }

@@ -1,4 +1,4 @@
-//! The rows of a table, one after the other: the only file that names `csv`.
+//! Reads the rows of a table one by one: the only file that uses `csv`.
 
 use super::dialect::{Delimiter, NumberedLine, is_comment};
 use crate::import::error::{ImportError, ImportResult};
@@ -14,7 +14,7 @@ pub(crate) struct TextRow {
 }
 
 impl TextRow {
-    /// Cells up to the last one with anything in it.
+    /// Number of cells up to the last one that is not empty.
     pub(crate) fn used_width(&self) -> usize {
         self.cells.iter().rposition(|cell| !cell.is_empty()).map_or(0, |last| last + 1)
     }
@@ -66,12 +66,12 @@ impl<'r> RowView<'r> {
         self.cells.len()
     }
 
-    /// Whether there is nothing in any cell.
+    /// Whether all cells are empty.
     pub(crate) fn is_empty(&self) -> bool {
         self.cells.iter().all(|cell| trim_cell(cell).is_empty())
     }
 
-    /// Cells up to the last one with anything in it.
+    /// Number of cells up to the last one that is not empty.
     pub(crate) fn used_width(&self) -> usize {
         (0..self.len()).rev().find(|&index| !self.cell(index).is_empty()).map_or(0, |last| last + 1)
     }
@@ -86,13 +86,13 @@ pub(crate) fn count_lines(bytes: &[u8]) -> usize {
 fn trim_cell(cell: &str) -> &str {
     let plain = |byte: Option<&u8>| byte.is_some_and(|b| b.is_ascii_graphic() && *b != b'"');
     if plain(cell.as_bytes().first()) && plain(cell.as_bytes().last()) {
-        return cell; // nearly every cell there is
+        return cell; // (nearly every cell)
     }
     let trimmed = cell.trim();
     trimmed.strip_prefix('"').and_then(|rest| rest.strip_suffix('"')).map_or(trimmed, str::trim)
 }
 
-/// The rows of a table, one after the other in the same memory.
+/// Reads the rows of a table one by one.
 pub(crate) struct RowReader<'t> {
     file: &'t str,
     text: &'t str,
@@ -127,12 +127,12 @@ impl<'t> RecordReader<'t> {
         }
     }
 
-    /// Reads a row and gives its first and last byte; line ends before the row are part of it.
+    /// Reads a row and gives its range of bytes, which includes the line ends in front of it.
     fn read_record(&mut self, record: &mut StringRecord) -> Option<(usize, usize)> {
         match self {
             Self::Csv(reader) => {
                 let from = reader.position().byte() as usize;
-                // (the text is UTF-8 and lengths may differ: there is nothing left that can fail)
+                // (this cannot fail: the text is UTF-8, and rows may differ in length)
                 reader.read_record(record).unwrap_or(false).then(|| (from, reader.position().byte() as usize))
             }
             Self::Blanks(text, at) => {

@@ -60,8 +60,8 @@ fn names_month(text: &str) -> bool {
         && MONTHS.iter().any(|month| word.starts_with(month))
 }
 
-/// `01/05`, `1.5.2024`, `2024-05-01`: a day and a month. With a point or a hyphen, which numbers have too, a year
-/// is needed.
+/// `01/05`, `1.5.2024`, `2024-05-01`: a day and a month. With a point or a hyphen, which numbers have too, a
+/// year is needed.
 fn is_numeric_date(text: &str) -> bool {
     let by = |mark: char| -> Option<Vec<u32>> { text.split(mark).map(|part| part.parse().ok()).collect() };
     let day_and_month = |a: u32, b: u32| (1..=31).contains(&a.max(b)) && (1..=12).contains(&a.min(b));

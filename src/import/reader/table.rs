@@ -27,7 +27,7 @@ pub(crate) struct DelimitedTable<'a> {
     pub dialect: Dialect,
     /// Whether it starts with [`MULTI_TRACK_MARK`].
     pub multi: bool,
-    /// Its first rows with anything in them, header rows included.
+    /// Its first rows that are not empty, with the header.
     pub head: Vec<TextRow>,
     text: &'a str,
 }
@@ -128,7 +128,7 @@ impl<'a> DelimitedTable<'a> {
         matches!(self.parse_cell(cell), CellNumber::Value(_))
     }
 
-    /// What `cell` says in the table's decimal mark.
+    /// Reads a cell with the table's decimal mark.
     pub(crate) fn parse_cell(&self, cell: &str) -> CellNumber {
         parse_number(cell, self.dialect.decimal)
     }

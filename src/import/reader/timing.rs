@@ -324,8 +324,8 @@ fn cell_error(rows: ClockRows, row: usize, problem: CellProblem, found: Option<f
     ImportError::cell(rows.export.row_location(rows.clock, row), problem, (name, &found), remedy)
 }
 
-/// Largest relative difference of two equal rates. Cameras hold theirs to parts in ten thousand; wrong rates differ
-/// by far more.
+/// Largest relative difference of two equal rates. Cameras hold theirs to parts in ten thousand; wrong rates
+/// differ by far more.
 pub(crate) const RATE_AGREEMENT: f64 = 0.01;
 
 /// Decimal places to which programs round times, s.

@@ -124,7 +124,7 @@ fn matching_tracks(exports: &[TrackFile], accept: impl Fn(&TrackFile, &str) -> b
     accepted.map(|(file, track, _, _)| (file, track)).collect()
 }
 
-/// The name nearest to `name` as a question with a blank behind it, if one is near.
+/// The question for the most similar name, with a blank behind it; empty if no name is similar.
 fn suggest_track(name: &str, names: &[&str]) -> String {
     let suggestion = suggest_key(name, names);
     if suggestion.starts_with("did") { suggestion + " " } else { String::new() }

@@ -1,4 +1,5 @@
-//! The flat table of DLTdv and Argus: one row a frame, without its number; columns `NAME_cam1_X`, `NAME_cam1_Y`, ...
+//! The flat table of DLTdv and Argus: one row a frame, without its number; columns `NAME_cam1_X`,
+//! `NAME_cam1_Y`, ...
 
 use super::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
 use crate::import::error::{ImportError, ImportResult};

@@ -1,4 +1,5 @@
-//! The sparse table of DLTdv 8: rows of frame, column and value. The names of the points are in a companion file.
+//! The sparse table of DLTdv 8: rows of frame, column and value. The names of the points are in a companion
+//! file.
 
 use super::{FIRST_PIXEL, SEVERAL_CAMERAS, camera_track_name, pixel_facts};
 use crate::import::error::{CellProblem, ImportError, ImportResult};
@@ -164,7 +165,8 @@ impl SparsePointNames {
         Ok(Self { points, cameras: Some(pairs / count), version_8: title.contains("DLTdv8"), pairs })
     }
 
-    /// Name of a pair of columns, counted from 0: first all cameras of the first point, then those of the second.
+    /// Name of a pair of columns, counted from 0: first all cameras of the first point, then those of the
+    /// second.
     fn name_of_pair(&self, pair: u64) -> String {
         let Some(cameras) = self.cameras else {
             let columns = format!("columns{}-{}", 2 * pair + 1, 2 * pair + 2);

@@ -23,8 +23,10 @@ const FRAMES: [&str; 16] = [
 ];
 /// Names of columns of times, with the unit that a name implies.
 const TIMES: [(&[&str], Option<TimeUnit>); 4] = [
-    (&["t", "time", "zeit", "temps", "tempo", "tiempo", "\u{6642}\u{9593}"], None), // (the last is jikan: time)
-    (&["timestamp"], Some(TimeUnit::Unknown)), // (seconds, milliseconds, or since 1970)
+    // (the last one is jikan: time)
+    (&["t", "time", "zeit", "temps", "tempo", "tiempo", "\u{6642}\u{9593}"], None),
+    // (seconds, milliseconds, or since 1970)
+    (&["timestamp"], Some(TimeUnit::Unknown)),
     (&["seconds", "second", "sec", "timesec"], Some(TimeUnit::Seconds(1.0))),
     (&["milliseconds", "millisecond", "msec", "ms", "timems", "timemsec"], Some(TimeUnit::Seconds(1e-3))),
 ];

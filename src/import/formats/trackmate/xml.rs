@@ -1,7 +1,7 @@
 //! XML as opening and closing tags with their places: the only file that uses `quick_xml`.
 //!
-//! Tags are read one by one, so that deep nesting takes no stack. Only the five predefined entities and character
-//! references are resolved; a document type, which could define others, is refused.
+//! Tags are read one by one, so that deep nesting takes no stack. Only the five predefined entities and
+//! character references are resolved; a document type, which could define others, is refused.
 
 use crate::import::error::{CellProblem, ImportError, ImportResult, TextLocation};
 use crate::import::reader::rows::count_lines;
@@ -164,7 +164,7 @@ impl<'a> XmlReader<'a> {
         usize::try_from(offset).unwrap_or(usize::MAX).min(self.text.len())
     }
 
-    /// Line of a byte that is not before that of the last call.
+    /// Line of byte `at`, which must not be before that of the last call.
     fn line_at(&mut self, at: usize) -> usize {
         let (from, line) = self.counted;
         let line = line + count_lines(self.text.as_bytes().get(from..at).unwrap_or_default());
