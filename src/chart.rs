@@ -25,7 +25,7 @@ mod series;
 mod style;
 mod text;
 
-pub(crate) use axis::{AxisScale, ChartAxis};
+pub(crate) use axis::{AxisScale, ChartAxis, value_span};
 pub use elements::{
     ErrorBar, Hatch, HatchPattern, Panel, Raster, Ribbon, SampledSeries, Series, ShadedSpan, TextAnnotation,
     TopLabel, VerticalLine,

@@ -46,7 +46,8 @@ pub struct FigureBlock {
     pub drawing: Drawing,
 }
 
-/// The two parts of what is said of a figure.
+/// The text of a figure.
+#[derive(Default)]
 pub(crate) struct Words {
     /// One sentence: what the reader sees and what follows from it.
     pub caption: String,
@@ -93,9 +94,24 @@ pub(crate) const NO_TRACES: &str = "model alone: no traces are published";
 
 /// The line under a heading; a figure of synthetic data always says so there.
 pub(crate) fn subtitle(synthetic: bool, text: &str) -> String {
-    match (synthetic, text.is_empty()) {
-        (true, true) => "synthetic recording: no camera took it".to_owned(),
-        (true, false) => format!("synthetic recording: no camera took it; {text}"),
-        (false, _) => text.to_owned(),
+    about(if synthetic { "synthetic recording: no camera took it" } else { "" }, text)
+}
+
+/// A figure over two columns of a journal, one panel below the other.
+pub(crate) fn full_figure(
+    title: &str,
+    synthetic: bool,
+    note: &str,
+    description: impl Into<String>,
+    panels: impl IntoIterator<Item = chart::Panel>,
+) -> chart::Figure {
+    chart::Figure {
+        title: title.to_owned(),
+        subtitle: subtitle(synthetic, note),
+        watermarked: synthetic,
+        description: description.into(),
+        width_mm: chart::FULL_WIDTH_MM,
+        panels: panels.into_iter().collect(),
+        ..chart::Figure::default()
     }
 }

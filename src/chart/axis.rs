@@ -59,7 +59,12 @@ impl ChartAxis {
 
     /// The same axis with fixed ends.
     pub(crate) fn with_range(self, low: f64, high: f64) -> Self {
-        Self { range: Some((low, high)), ..self }
+        self.with_ends(Some((low, high)))
+    }
+
+    /// The same axis with fixed ends; `None` fits the data.
+    pub(crate) fn with_ends(self, range: Option<(f64, f64)>) -> Self {
+        Self { range, ..self }
     }
 }
 
@@ -112,20 +117,22 @@ pub(super) fn axis_limits(axis: &ChartAxis, values: impl Iterator<Item = f64>) -
     if let Some((low, high)) = axis.range.filter(|(low, high)| usable(low) && usable(high) && low < high) {
         return (low, high);
     }
-    let (low, high) =
-        values.filter(usable).fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    let (low, high) = value_span(values.filter(usable));
     if low > high {
         return if log { (0.1, 10.0) } else { (0.0, 1.0) };
     }
     if log {
-        return (
-            (low.max(high * math::powi(10.0, -MOST_DECADES)) / LOG_ROOM).max(f64::MIN_POSITIVE),
-            high * LOG_ROOM,
-        );
+        let low = low.max(high * math::powi(10.0, -MOST_DECADES)) / LOG_ROOM;
+        return (low.max(f64::MIN_POSITIVE), high * LOG_ROOM);
     }
     let room = ((high - low) * LINEAR_ROOM).max(low.abs().max(high.abs()) * MIN_RELATIVE_SPAN);
     let room = if room > 0.0 { room } else { SINGLE_VALUE_ROOM };
     (low - room, high + room)
+}
+
+/// Least and greatest value; `(inf, -inf)` without any.
+pub(crate) fn value_span(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)))
 }
 
 impl CanvasAxis {
@@ -136,18 +143,14 @@ impl CanvasAxis {
             AxisScale::Log if value > 0.0 => math::ln(value / self.low) / math::ln(self.high / self.low),
             AxisScale::Log => return None,
         };
-        share
-            .is_finite()
-            .then_some(self.from + share.clamp(-FARTHEST_POSITION, FARTHEST_POSITION) * (self.to - self.from))
+        let near = share.clamp(-FARTHEST_POSITION, FARTHEST_POSITION);
+        share.is_finite().then_some(self.from + near * (self.to - self.from))
     }
 
     /// The same; on a logarithmic axis the low end for what has no place there.
     pub(crate) fn canvas_position_or_low(&self, value: f64) -> Option<f64> {
-        if self.scale == AxisScale::Log && value <= 0.0 {
-            Some(self.from)
-        } else {
-            self.canvas_position(value)
-        }
+        let low = self.scale == AxisScale::Log && value <= 0.0;
+        if low { Some(self.from) } else { self.canvas_position(value) }
     }
 
     /// The value at a canvas coordinate.
@@ -207,19 +210,16 @@ const TICK_SPACING_SLACK: f64 = 0.8;
 fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let rough = (high - low) / most as f64;
     let mut exponent = math::log10(rough).floor() as i32;
-    let leading = [1_i32, 2, 5]
-        .into_iter()
-        .find(|m| f64::from(*m) * math::powi(10.0, exponent) >= rough * TICK_SPACING_SLACK);
+    let wide = |m: &i32| f64::from(*m) * math::powi(10.0, exponent) >= rough * TICK_SPACING_SLACK;
+    let leading = [1, 2, 5].into_iter().find(wide);
     let leading = leading.unwrap_or_else(|| {
         exponent += 1;
         1
     });
     let value = |k: i64| {
-        if exponent < 0 {
-            (k * i64::from(leading)) as f64 / math::powi(10.0, -exponent)
-        } else {
-            (k * i64::from(leading)) as f64 * math::powi(10.0, exponent)
-        }
+        let multiple = (k * i64::from(leading)) as f64;
+        let power = math::powi(10.0, exponent.abs());
+        if exponent < 0 { multiple / power } else { multiple * power }
     };
     let step = value(1);
     let (first, last) = ((low / step - 1e-9).ceil(), (high / step + 1e-9).floor());
@@ -230,9 +230,8 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let decimals = usize::try_from(-exponent).unwrap_or(0);
     // as many digits as tell a tick from the next
     let digits = |v: f64| {
-        usize::try_from((math::log10(v.abs()).floor() as i32).saturating_sub(exponent))
-            .unwrap_or(0)
-            .clamp(2, 15)
+        let decades = (math::log10(v.abs()).floor() as i32).saturating_sub(exponent);
+        decades.clamp(2, 15) as usize
     };
     let label =
         |v: f64| if plain { text::format_decimals(v, decimals) } else { format_scientific(v, digits(v)) };
@@ -251,11 +250,8 @@ fn log_ticks(low: f64, high: f64, most: usize, room: f64) -> Vec<Tick> {
     let inside = |v: &f64| *v >= low * (1.0 - 1e-9) && *v <= high * (1.0 + 1e-9);
     let power = |e: i32| if e < 0 { 1.0 / math::powi(10.0, -e) } else { math::powi(10.0_f64, e) };
     let count = |leading: &[i32]| {
-        decades
-            .clone()
-            .flat_map(|e| leading.iter().map(move |m| f64::from(*m) * power(e)))
-            .filter(inside)
-            .count()
+        let all = decades.clone().flat_map(|e| leading.iter().map(move |m| f64::from(*m) * power(e)));
+        all.filter(inside).count()
     };
     let (labelled, every): (&[i32], i32) = match (count(&[1]), count(&[1, 2, 5])) {
         (0 | 1, 0 | 1) => return linear_ticks(low, high, most.min(5)),

@@ -66,7 +66,7 @@ impl Canvas {
     }
 
     pub(crate) fn draw_line(&mut self, points: &[CanvasPoint], colour: Rgb, width: u32) {
-        let mut whole = round_points(points);
+        let mut whole: Vec<_> = points.iter().map(round_point).collect();
         whole.dedup();
         if whole.len() == 1 {
             whole.push(whole[0]);
@@ -81,21 +81,19 @@ impl Canvas {
 
     pub(crate) fn fill_rectangle(&mut self, area: &CanvasArea, colour: Rgb, opacity: f64) {
         let style = ShapeStyle { color: plotters_colour(colour).mix(opacity), filled: true, stroke_width: 0 };
-        let _ = self.back.draw_rect(
-            (area.left as i32, area.top as i32),
-            (area.right as i32, area.bottom as i32),
-            &style,
-            true,
-        );
+        let (upper, lower) = ((area.left as i32, area.top as i32), (area.right as i32, area.bottom as i32));
+        let _ = self.back.draw_rect(upper, lower, &style, true);
     }
 
     pub(crate) fn fill_polygon(&mut self, corners: &[CanvasPoint], colour: Rgb, opacity: f64) {
-        let _ = self.back.fill_polygon(round_points(corners), &plotters_colour(colour).mix(opacity).filled());
+        let _ = self
+            .back
+            .fill_polygon(corners.iter().map(round_point), &plotters_colour(colour).mix(opacity).filled());
     }
 
     pub(crate) fn draw_circle(&mut self, at: CanvasPoint, radius: u32, colour: Rgb, filled: bool) {
         let style = ShapeStyle { color: plotters_colour(colour).to_rgba(), filled, stroke_width: 4 };
-        let _ = self.back.draw_circle((at.0.round() as i32, at.1.round() as i32), radius, &style, filled);
+        let _ = self.back.draw_circle(round_point(&at), radius, &style, filled);
     }
 
     pub(crate) fn draw_text(&mut self, text: &str, at: CanvasPoint, look: Lettering) {
@@ -107,26 +105,22 @@ impl Canvas {
         let font = if look.bold { font.style(FontStyle::Bold) } else { font };
         let font = if look.upwards { font.transform(FontTransform::Rotate270) } else { font };
         let colour = plotters_colour(colour);
-        let style = TextStyle::from(font).pos(text_position(look.anchor)).color(&colour);
-        let _ =
-            self.back.draw_text(&make_printable(text), &style, (at.0.round() as i32, at.1.round() as i32));
+        let (h, v) = match look.anchor {
+            TextAnchor::Left => (HPos::Left, VPos::Center),
+            TextAnchor::Right => (HPos::Right, VPos::Center),
+            TextAnchor::Top => (HPos::Center, VPos::Top),
+            TextAnchor::Bottom => (HPos::Center, VPos::Bottom),
+            TextAnchor::Centre => (HPos::Center, VPos::Center),
+        };
+        let style = TextStyle::from(font).pos(Pos::new(h, v)).color(&colour);
+        let _ = self.back.draw_text(&make_printable(text), &style, round_point(&at));
     }
 }
 
-fn round_points(points: &[CanvasPoint]) -> Vec<(i32, i32)> {
-    points.iter().map(|p| (p.0.round() as i32, p.1.round() as i32)).collect()
+fn round_point(at: &CanvasPoint) -> (i32, i32) {
+    (at.0.round() as i32, at.1.round() as i32)
 }
 
 fn plotters_colour((red, green, blue): Rgb) -> RGBColor {
     RGBColor(red, green, blue)
-}
-
-fn text_position(anchor: TextAnchor) -> Pos {
-    match anchor {
-        TextAnchor::Left => Pos::new(HPos::Left, VPos::Center),
-        TextAnchor::Right => Pos::new(HPos::Right, VPos::Center),
-        TextAnchor::Top => Pos::new(HPos::Center, VPos::Top),
-        TextAnchor::Bottom => Pos::new(HPos::Center, VPos::Bottom),
-        TextAnchor::Centre => Pos::new(HPos::Center, VPos::Center),
-    }
 }

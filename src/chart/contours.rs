@@ -1,6 +1,6 @@
 //! Lines of equal value over a heat map, at round values, each with its value.
 
-use super::axis::{AxisScale, CanvasAxis};
+use super::axis::{AxisScale, CanvasAxis, value_span};
 use super::canvas::{Canvas, Lettering, TextAnchor};
 use super::heat_map::{HeatMap, colour_fraction};
 use super::layout::PanelLayout;
@@ -34,16 +34,11 @@ type GridEdge = (usize, usize, bool);
 
 /// The contours of a heat map that asks for them.
 pub(super) fn draw_contours(canvas: &mut Canvas, placed: &PanelLayout) {
-    let Some((heat, ends)) =
-        placed.panel.heat_map.as_ref().filter(|h| h.contours).and_then(|h| Some((h, h.value_range()?)))
-    else {
-        return;
-    };
+    let Some(heat) = placed.panel.heat_map.as_ref().filter(|h| h.contours) else { return };
+    let Some(ends) = heat.value_range() else { return };
     let Some(grid) = ContourGrid::new(heat, placed, ends) else { return };
     let symbols = placed.panel.series.iter().flat_map(|series| series.points.iter().flatten());
-    let symbols: Vec<CanvasPoint> = symbols
-        .filter_map(|(x, y)| Some((placed.x.canvas_position(*x)?, placed.y.canvas_position(*y)?)))
-        .collect();
+    let symbols: Vec<CanvasPoint> = symbols.filter_map(|p| placed.canvas_point(*p)).collect();
     let scale =
         CanvasAxis { scale: AxisScale::Linear, low: ends.0, high: ends.1, from: 0.0, to: MOST_LEVELS };
     let mut labels: Vec<CanvasPoint> = Vec::new();
@@ -59,12 +54,8 @@ pub(super) fn draw_contours(canvas: &mut Canvas, placed: &PanelLayout) {
         let half = (text_width(&label, SMALL_MM) / 2.0 * UNITS_PER_MM, SMALL_MM / 2.0 * UNITS_PER_MM);
         if let Some(at) = find_label_position(&lines, &placed.area, half, &labels, &symbols) {
             let (width, height) = (half.0 + 0.3 * UNITS_PER_MM, half.1);
-            let behind = CanvasArea {
-                left: at.0 - width,
-                right: at.0 + width,
-                top: at.1 - height,
-                bottom: at.1 + height,
-            };
+            let (left, right, top, bottom) = (at.0 - width, at.0 + width, at.1 - height, at.1 + height);
+            let behind = CanvasArea { left, right, top, bottom };
             canvas.fill_rectangle(&behind, ground, 1.0);
             canvas.draw_coloured_text(&label, at, Lettering::plain(SMALL_MM, TextAnchor::Centre), ink);
             labels.push(at);
@@ -131,8 +122,7 @@ impl<'a> ContourGrid<'a> {
         let (mut jumps, within) = (0, |v: f64| v.clamp(ends.0, ends.1));
         for (i, j) in (1..grid.x.len()).flat_map(|i| (1..grid.y.len()).map(move |j| (i - 1, j - 1))) {
             let Some(corners) = grid.corner_values(i, j) else { continue };
-            let low = corners.into_iter().map(within).fold(f64::INFINITY, f64::min);
-            let high = corners.into_iter().map(within).fold(f64::NEG_INFINITY, f64::max);
+            let (low, high) = value_span(corners.into_iter().map(within));
             if high - low > MAX_CELL_SPREAD * (ends.1 - ends.0) {
                 jumps += 1;
             } else {
@@ -160,14 +150,9 @@ impl<'a> ContourGrid<'a> {
             let above = [a, b, c, d].map(|value| value >= level);
             let [bottom, top, left, right] =
                 [(i, j, false), (i, j + 1, false), (i, j, true), (i + 1, j, true)];
-            let crossed = [
-                (bottom, above[0] != above[1]),
-                (top, above[2] != above[3]),
-                (left, above[0] != above[2]),
-                (right, above[1] != above[3]),
-            ];
-            let crossed: Vec<GridEdge> =
-                crossed.into_iter().filter(|(_, is)| *is).map(|(side, _)| side).collect();
+            let sides = [(bottom, 0, 1), (top, 2, 3), (left, 0, 2), (right, 1, 3)];
+            let crossed = sides.into_iter().filter(|(_, k, l)| above[*k] != above[*l]);
+            let crossed: Vec<GridEdge> = crossed.map(|(side, ..)| side).collect();
             let pairs = match crossed.as_slice() {
                 [from, to] => vec![(*from, *to)],
                 [_, _, _, _] if ((a + b + c + d) / 4.0 >= level) == above[0] => {
@@ -181,10 +166,9 @@ impl<'a> ContourGrid<'a> {
                 next.entry(to).or_default().push(from);
             }
         }
-        join_edges(next)
-            .into_iter()
-            .map(|line| line.into_iter().filter_map(|s| self.edge_crossing(s, level)).collect())
-            .collect()
+        let crossings =
+            |line: Vec<GridEdge>| line.into_iter().filter_map(|s| self.edge_crossing(s, level)).collect();
+        join_edges(next).into_iter().map(crossings).collect()
     }
 
     /// Where a side has the value.

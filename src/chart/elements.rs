@@ -19,6 +19,19 @@ pub struct Series {
     pub error_bars: Vec<ErrorBar>,
 }
 
+impl Series {
+    /// A series without error bars.
+    pub(crate) fn new(
+        label: impl Into<String>,
+        colour: Colour,
+        mark: Mark,
+        points: impl IntoIterator<Item = impl Into<Option<(f64, f64)>>>,
+    ) -> Self {
+        let points = points.into_iter().map(Into::into).collect();
+        Self { label: label.into(), colour, mark, points, error_bars: Vec::new() }
+    }
+}
+
 /// A series at equal steps of a linear axis; values in the units of the other, `None` where one is missing.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SampledSeries {
@@ -62,6 +75,16 @@ pub struct Ribbon {
     pub points: Vec<Option<(f64, f64, f64)>>,
 }
 
+impl Ribbon {
+    pub(crate) fn new(
+        label: impl Into<String>,
+        colour: Colour,
+        points: impl IntoIterator<Item = impl Into<Option<(f64, f64, f64)>>>,
+    ) -> Self {
+        Self { label: label.into(), colour, points: points.into_iter().map(Into::into).collect() }
+    }
+}
+
 /// A shaded interval of the x axis.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ShadedSpan {
@@ -77,6 +100,17 @@ pub struct ShadedSpan {
     pub outlined: bool,
 }
 
+impl ShadedSpan {
+    pub(crate) fn new(label: impl Into<String>, colour: Colour, from: f64, to: f64) -> Self {
+        Self { label: label.into(), colour, from, to, outlined: false }
+    }
+
+    /// A span framed with a line.
+    pub(crate) fn outline(label: impl Into<String>, colour: Colour, from: f64, to: f64) -> Self {
+        Self { outlined: true, ..Self::new(label, colour, from, to) }
+    }
+}
+
 /// A vertical line with a label over the panel.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct VerticalLine {
@@ -90,6 +124,13 @@ pub struct VerticalLine {
     pub at: f64,
     /// Height from which it runs to the top, in units of the y axis; `None` from the bottom.
     pub above: Option<f64>,
+}
+
+impl VerticalLine {
+    /// A line over the full height of the axes.
+    pub(crate) fn new(label: impl Into<String>, colour: Colour, mark: Mark, at: f64) -> Self {
+        Self { label: label.into(), colour, mark, at, above: None }
+    }
 }
 
 /// A label over the panel, without a line.
@@ -110,6 +151,12 @@ pub struct TextAnnotation {
     pub colour: Colour,
     /// Its middle, in the units of the axes.
     pub at: (f64, f64),
+}
+
+impl TextAnnotation {
+    pub(crate) fn new(text: impl Into<String>, colour: Colour, at: (f64, f64)) -> Self {
+        Self { text: text.into(), colour, at }
+    }
 }
 
 /// Cells with one pattern and one entry in the legend.
@@ -178,4 +225,16 @@ pub struct Panel {
     pub equal_aspect: bool,
     /// Neither frame nor grid nor ticks: a drawing, not a diagram.
     pub bare: bool,
+}
+
+impl Panel {
+    /// A panel with axes and series alone.
+    pub(crate) fn new(
+        x: ChartAxis,
+        y: ChartAxis,
+        height_mm: f64,
+        series: impl IntoIterator<Item = Series>,
+    ) -> Self {
+        Self { x, y, height_mm, series: series.into_iter().collect(), ..Self::default() }
+    }
 }

@@ -3,7 +3,7 @@
 use super::axis::CanvasAxis;
 use super::canvas::Canvas;
 use super::elements::Panel;
-use super::layout::{FigureLayout, limit_height};
+use super::layout::{FigureLayout, PanelLayout, limit_height};
 use super::path::CanvasArea;
 use super::style::{COLUMN_WIDTH_MM, FULL_WIDTH_MM, MAX_HEIGHT_MM, UNITS_PER_MM, WHITE};
 use super::{heat_map, panel, style};
@@ -70,11 +70,9 @@ impl PanelPlacement {
 impl Figure {
     /// The figure for a screen with the SVG elements over it that `over` makes for the places of its panels.
     pub(crate) fn svg_with_overlay(&self, over: impl FnOnce(&[PanelPlacement]) -> String) -> String {
-        let plots: Vec<PanelPlacement> = FigureLayout::new(self)
-            .panels
-            .iter()
-            .map(|p| PanelPlacement { x: p.x, y: p.y, area: p.area })
-            .collect();
+        let layout = FigureLayout::new(self);
+        let place = |p: &PanelLayout| PanelPlacement { x: p.x, y: p.y, area: p.area };
+        let plots: Vec<PanelPlacement> = layout.panels.iter().map(place).collect();
         let drawn = self.to_svg(Medium::Screen);
         let below = drawn.trim_end().trim_end_matches("</svg>");
         format!("{below}{}</svg>\n", over(&plots))
@@ -114,8 +112,8 @@ impl Figure {
 
     /// The figure as it is laid out for a medium, under its own name.
     fn render_layout(&self, laid_out: &Self, style: &str, marked: bool) -> String {
-        let name: Vec<&str> =
-            [&self.title, &self.subtitle].into_iter().map(String::as_str).filter(|s| !s.is_empty()).collect();
+        let parts = [self.title.as_str(), &self.subtitle].into_iter();
+        let name: Vec<&str> = parts.filter(|s| !s.is_empty()).collect();
         render_svg(laid_out, [&self.title, &name.join(". ")], style, marked)
     }
 }
@@ -128,19 +126,12 @@ fn render_svg(figure: &Figure, [title, name]: [&str; 2], style: &str, marked: bo
         ((figure.width_mm * UNITS_PER_MM).round() as u32, (layout.height * UNITS_PER_MM).round() as u32);
     let whole = CanvasArea { left: 0.0, top: 0.0, right: f64::from(size.0), bottom: f64::from(size.1) };
     let ground = Canvas::render_elements(size, |canvas| canvas.fill_rectangle(&whole, WHITE, 1.0));
-    let maps: String = layout
-        .panels
-        .iter()
-        .filter_map(|placed| {
-            let cells = heat_map::heat_cells_svg(
-                placed.panel.heat_map.as_ref()?,
-                &placed.x,
-                &placed.y,
-                &placed.area,
-            )?;
-            Some(format!("<g class=\"cells\">\n{cells}</g>\n"))
-        })
-        .collect();
+    let cells = |placed: &PanelLayout| {
+        let heat = placed.panel.heat_map.as_ref()?;
+        let cells = heat_map::heat_cells_svg(heat, &placed.x, &placed.y, &placed.area)?;
+        Some(format!("<g class=\"cells\">\n{cells}</g>\n"))
+    };
+    let maps: String = layout.panels.iter().filter_map(cells).collect();
     let drawn = Canvas::render_elements(size, |canvas| {
         panel::draw_heading(canvas, figure, &layout);
         for placed in &layout.panels {

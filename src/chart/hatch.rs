@@ -1,5 +1,6 @@
 //! Hatched cells: where a map has no value, with a pattern that says why, so that no colour has to.
 
+use super::axis::value_span;
 use super::canvas::Canvas;
 use super::elements::{Hatch, HatchPattern};
 use super::layout::PanelLayout;
@@ -44,16 +45,15 @@ impl HatchPattern {
 /// The cells of a hatch on the axes.
 pub(super) fn draw_hatch(canvas: &mut Canvas, placed: &PanelLayout, hatch: &Hatch) {
     let inside = |[x_from, x_to, y_from, y_to]: &[f64; 4]| {
-        let (left, right) =
-            (placed.x.canvas_position_or_low(*x_from)?, placed.x.canvas_position_or_low(*x_to)?);
+        let [left, right] = [x_from, x_to].map(|x| placed.x.canvas_position_or_low(*x));
         let frame = &placed.area;
         let end = |y: f64, beyond: f64| {
             if y.is_finite() { placed.y.canvas_position_or_low(y) } else { Some(beyond) }
         };
         let (bottom, top) = (end(*y_from, frame.bottom)?, end(*y_to, frame.top)?);
         let area = CanvasArea {
-            left: left.max(frame.left),
-            right: right.min(frame.right),
+            left: left?.max(frame.left),
+            right: right?.min(frame.right),
             top: top.max(frame.top),
             bottom: bottom.min(frame.bottom),
         };
@@ -69,7 +69,7 @@ pub(super) fn draw_hatch(canvas: &mut Canvas, placed: &PanelLayout, hatch: &Hatc
 
 /// Areas of one height that touch, as one.
 fn merge_areas(areas: &[CanvasArea]) -> Vec<CanvasArea> {
-    let mut sorted: Vec<CanvasArea> = areas.iter().map(|area| CanvasArea { ..*area }).collect();
+    let mut sorted = areas.to_vec();
     sorted.sort_by(|a, b| {
         a.top.total_cmp(&b.top).then(a.bottom.total_cmp(&b.bottom)).then(a.left.total_cmp(&b.left))
     });
@@ -81,7 +81,7 @@ fn merge_areas(areas: &[CanvasArea]) -> Vec<CanvasArea> {
 /// What stands in the legend.
 pub(super) fn draw_hatch_sample(canvas: &mut Canvas, area: &CanvasArea, pattern: HatchPattern) {
     canvas.fill_rectangle(area, NO_VALUE, 1.0);
-    draw_strokes(canvas, &[CanvasArea { ..*area }], pattern);
+    draw_strokes(canvas, &[*area], pattern);
     canvas.draw_line(&area.outline(), FRAME, 2);
 }
 
@@ -108,19 +108,9 @@ fn hatch_lines(areas: &[CanvasArea], (dx, dy): CanvasPoint, spacing: f64) -> Vec
     let along = |(x, y): CanvasPoint| x * dx + y * dy;
     let mut pieces: Vec<(i64, f64, f64)> = Vec::new();
     for area in areas {
-        let corners = [
-            (area.left, area.top),
-            (area.right, area.top),
-            (area.left, area.bottom),
-            (area.right, area.bottom),
-        ];
-        let ends = |of: &dyn Fn(CanvasPoint) -> f64| {
-            corners
-                .map(of)
-                .into_iter()
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
-        };
-        let ((low, high), (start, end)) = (ends(&across), ends(&along));
+        let corners = area.outline();
+        let (low, high) = value_span(corners.map(across).into_iter());
+        let (start, end) = value_span(corners.map(along).into_iter());
         for number in (low / spacing).ceil() as i64..=(high / spacing).floor() as i64 {
             let offset = number as f64 * spacing;
             let at = |s: f64| (s * dx - offset * dy, s * dy + offset * dx);
@@ -133,11 +123,9 @@ fn hatch_lines(areas: &[CanvasArea], (dx, dy): CanvasPoint, spacing: f64) -> Vec
     let joined = pieces.chunk_by(|a, b| a.0 == b.0 && b.1 <= a.2 + TOUCHING_DISTANCE);
     let piece = |run: &[(i64, f64, f64)]| {
         let (number, start, _) = *run.first()?;
-        let (end, offset) = (run.iter().map(|piece| piece.2).fold(start, f64::max), number as f64 * spacing);
-        Some((
-            (start * dx - offset * dy, start * dy + offset * dx),
-            (end * dx - offset * dy, end * dy + offset * dx),
-        ))
+        let offset = number as f64 * spacing;
+        let at = |s: f64| (s * dx - offset * dy, s * dy + offset * dx);
+        Some((at(start), at(run.iter().map(|piece| piece.2).fold(start, f64::max))))
     };
     joined.filter_map(piece).collect()
 }

@@ -48,9 +48,7 @@ impl HeatMap {
     /// Values of the first and the last colour.
     pub(super) fn value_range(&self) -> Option<(f64, f64)> {
         let given = self.range.filter(|(low, high)| low.is_finite() && high.is_finite() && low < high);
-        let (low, high) = given.unwrap_or_else(|| {
-            self.finite_values().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)))
-        });
+        let (low, high) = given.unwrap_or_else(|| axis::value_span(self.finite_values()));
         match (low < high, low.is_finite()) {
             (true, _) => Some((low, high)),
             (false, true) => Some(axis::axis_limits(&ChartAxis::default(), [low].into_iter())), // a constant
@@ -81,10 +79,8 @@ pub fn cell_edges(middles: &[f64], scale: AxisScale) -> Vec<f64> {
     let between = |a: f64, b: f64| if by_factors { (a * b).sqrt() } else { (a + b) / 2.0 };
     let beyond = |a: f64, b: f64| if by_factors { a * (a / b).sqrt() } else { a + (a - b) / 2.0 };
     let inner = middles.windows(2).map(|pair| between(pair[0], pair[1]));
-    std::iter::once(beyond(*first, *second))
-        .chain(inner)
-        .chain(std::iter::once(beyond(middles[last], middles[last - 1])))
-        .collect()
+    let end = beyond(middles[last], middles[last - 1]);
+    std::iter::once(beyond(*first, *second)).chain(inner).chain([end]).collect()
 }
 
 /// Share of the colours between two ends at which a value lies.
@@ -127,24 +123,15 @@ pub(super) fn heat_cells_svg(
     area: &CanvasArea,
 ) -> Option<String> {
     let ends = heat.value_range()?;
-    let drawn = CELL_RESOLUTIONS.iter().map(|(columns, rows, colours)| {
-        cell_rows_svg(
-            (heat, ends),
-            &cell_blocks(&heat.x, x, *columns),
-            &cell_blocks(&heat.y, y, *rows),
-            *colours,
-            area,
-        )
-    });
-    let mut last = None;
-    for text in drawn {
-        let done = text.len() <= MAX_CELL_BYTES;
-        last = Some(text);
-        if done {
+    let mut svg = None;
+    for (columns, rows, colours) in CELL_RESOLUTIONS {
+        let (columns, rows) = (cell_blocks(&heat.x, x, columns), cell_blocks(&heat.y, y, rows));
+        let drawn = svg.insert(cell_rows_svg((heat, ends), &columns, &rows, colours, area));
+        if drawn.len() <= MAX_CELL_BYTES {
             break;
         }
     }
-    last
+    svg
 }
 
 /// The cells along an axis where there are no more than `most`, otherwise `most` equal steps.
@@ -158,19 +145,14 @@ fn cell_blocks(middles: &[f64], axis: &CanvasAxis, most: usize) -> Vec<CellBlock
     };
     let ordered = |a: i64, b: i64| (a.min(b), a.max(b));
     let cells = edges.windows(2).enumerate().map(|(at, ends)| (ordered(place(ends[0]), place(ends[1])), at));
-    let shown: Vec<CellBlock> = cells
-        .filter(|((low, high), _)| low < high)
-        .map(|((low, high), at)| (low, high, Some(at..at + 1)))
-        .collect();
-    if (1..=most).contains(&shown.len()) && shown.len() == count_visible_cells(&edges, axis) {
+    let shown = cells.filter(|((low, high), _)| low < high);
+    let shown: Vec<CellBlock> = shown.map(|((low, high), at)| (low, high, Some(at..at + 1))).collect();
+    // cells between the ends of the axis, in part or whole
+    let visible = edges.windows(2).filter(|ends| ends[1] > axis.low && ends[0] < axis.high).count();
+    if (1..=most).contains(&shown.len()) && shown.len() == visible {
         return shown;
     }
     resample_cells(middles, &edges, axis, most)
-}
-
-/// Number of cells that lie between the ends of an axis, in part or whole.
-fn count_visible_cells(edges: &[f64], axis: &CanvasAxis) -> usize {
-    edges.windows(2).filter(|ends| ends[1] > axis.low && ends[0] < axis.high).count()
 }
 
 /// The cells under every one of `count` equal steps along an axis: those whose middle is in the step, else
@@ -184,8 +166,7 @@ fn resample_cells(middles: &[f64], edges: &[f64], axis: &CanvasAxis, count: usiz
             return None;
         }
         let at = k as f64;
-        let (first, end) =
-            (middles.partition_point(|m| *m < value(at)), middles.partition_point(|m| *m < value(at + 1.0)));
+        let [first, end] = [at, at + 1.0].map(|at| middles.partition_point(|m| *m < value(at)));
         if first < end {
             return Some(first..end);
         }
@@ -229,11 +210,8 @@ fn cell_rows_svg(
                 let (from, to) = (columns[start].0, (columns[end - 1].1 + CELL_OVERLAP).min(right));
                 // twice the height of the middle is whole
                 let middle = format_half(top + bottom);
-                let _ = write!(
-                    lines.entry((run[0], bottom - top)).or_default(),
-                    "M{from} {middle}h{}",
-                    to - from
-                ); // (a string takes everything)
+                let line = lines.entry((run[0], bottom - top)).or_default();
+                let _ = write!(line, "M{from} {middle}h{}", to - from); // (a string takes everything)
             }
             start = end;
         }
@@ -285,24 +263,16 @@ fn colour_bar_axis(ends: (f64, f64), from: f64, to: f64) -> CanvasAxis {
 /// Room that the bar takes next to the axes, mm.
 pub(super) fn colour_bar_width_mm(heat: &HeatMap, height_mm: f64) -> f64 {
     let Some(ends) = heat.value_range().filter(|_| !heat.without_bar) else { return 0.0 };
-    BAR_GAP_MM
-        + BAR_MM
-        + TICK_MM
-        + 0.6
-        + widest_bar_label_mm(&colour_bar_axis(ends, 0.0, height_mm), Y_TICKS_MM)
-        + LINE_MM
+    let label_mm = widest_bar_label_mm(&colour_bar_axis(ends, 0.0, height_mm), Y_TICKS_MM);
+    BAR_GAP_MM + BAR_MM + TICK_MM + 0.6 + label_mm + LINE_MM
 }
 
 /// Width of the widest label of a bar whose ticks are that far apart.
 fn widest_bar_label_mm(scale: &CanvasAxis, apart: f64) -> f64 {
     /// Digits and signs are wider than the mean letter.
     const DIGITS: f64 = 1.2;
-    scale
-        .ticks(apart)
-        .iter()
-        .filter_map(|t| t.label.as_deref())
-        .map(|l| DIGITS * text_width(l, TEXT_MM))
-        .fold(0.0, f64::max)
+    let labels = scale.ticks(apart).into_iter().filter_map(|t| t.label);
+    labels.map(|l| DIGITS * text_width(&l, TEXT_MM)).fold(0.0, f64::max)
 }
 
 /// The bar of colours next to the axes, with ticks and label; pointed where values lie beyond its end.
@@ -316,48 +286,26 @@ pub(super) fn draw_colour_bar(canvas: &mut Canvas, heat: &HeatMap, axes: &Canvas
     let (top, bottom) = (axes.top + over, axes.bottom - under);
     let middle = (left + right) / 2.0;
     draw_gradient(canvas, &CanvasArea { left, right, top, bottom }, heat.colour_map);
-    if over > 0.0 {
-        canvas.fill_polygon(
-            &[(left, top), (middle, axes.top), (right, top)],
-            sample_colour_map(heat.colour_map, 1.0),
-            1.0,
-        );
+    for (room, from, to, share) in [(over, top, axes.top, 1.0), (under, bottom, axes.bottom, 0.0)] {
+        if room > 0.0 {
+            let colour = sample_colour_map(heat.colour_map, share);
+            canvas.fill_polygon(&[(left, from), (middle, to), (right, from)], colour, 1.0);
+        }
     }
-    if under > 0.0 {
-        canvas.fill_polygon(
-            &[(left, bottom), (middle, axes.bottom), (right, bottom)],
-            sample_colour_map(heat.colour_map, 0.0),
-            1.0,
-        );
-    }
-    canvas.draw_line(
-        &[
-            (left, bottom),
-            (left, top),
-            (middle, axes.top),
-            (right, top),
-            (right, bottom),
-            (middle, axes.bottom),
-            (left, bottom),
-        ],
-        FRAME,
-        3,
-    );
+    let upper = [(left, bottom), (left, top), (middle, axes.top), (right, top)];
+    let lower = [(right, bottom), (middle, axes.bottom), (left, bottom)];
+    canvas.draw_line(&[&upper[..], &lower].concat(), FRAME, 3);
     let scale = colour_bar_axis((low, high), bottom, top);
     for tick in scale.ticks(Y_TICKS_MM * UNITS_PER_MM) {
         let Some(y) = scale.canvas_position(tick.value) else { continue };
         canvas.draw_line(&[(right, y), (right + tick.length(), y)], FRAME, 3);
         if let Some(label) = &tick.label {
-            canvas.draw_text(
-                label,
-                (right + (TICK_MM + 0.6) * UNITS_PER_MM, y),
-                Lettering::plain(TEXT_MM, TextAnchor::Left),
-            );
+            let x = right + (TICK_MM + 0.6) * UNITS_PER_MM;
+            canvas.draw_text(label, (x, y), Lettering::plain(TEXT_MM, TextAnchor::Left));
         }
     }
-    let label_x = right
-        + (TICK_MM + 0.6 + widest_bar_label_mm(&scale, Y_TICKS_MM * UNITS_PER_MM) + LINE_MM / 2.0)
-            * UNITS_PER_MM;
+    let widest_mm = widest_bar_label_mm(&scale, Y_TICKS_MM * UNITS_PER_MM);
+    let label_x = right + (TICK_MM + 0.6 + widest_mm + LINE_MM / 2.0) * UNITS_PER_MM;
     let upwards = Lettering { upwards: true, ..Lettering::plain(TEXT_MM, TextAnchor::Centre) };
     let label = truncate_text(&heat.label, TEXT_MM, (axes.bottom - axes.top) / UNITS_PER_MM);
     canvas.draw_text(&label, (label_x, (axes.top + axes.bottom) / 2.0), upwards);
@@ -369,11 +317,8 @@ fn draw_gradient(canvas: &mut Canvas, area: &CanvasArea, map: ColourMap) {
     for stripe in 0..STRIPES {
         let share = f64::from(stripe) / f64::from(STRIPES);
         let bottom = (area.bottom - share * (area.bottom - area.top)).round();
-        canvas.fill_rectangle(
-            &CanvasArea { bottom, ..*area },
-            sample_colour_map(map, f64::from(stripe) / f64::from(STRIPES - 1)),
-            1.0,
-        );
+        let colour = sample_colour_map(map, f64::from(stripe) / f64::from(STRIPES - 1));
+        canvas.fill_rectangle(&CanvasArea { bottom, ..*area }, colour, 1.0);
     }
 }
 

@@ -121,11 +121,8 @@ impl PanelColumns {
             if figure.panels.iter().all(|panel| panel.bare) { MIN_BARE_WIDTH_MM } else { MIN_PANEL_WIDTH_MM };
         let fits =
             |columns: &Self| (0..columns.count).all(|column| columns.width_mm(figure, column) >= least);
-        (1..=most)
-            .rev()
-            .map(|count| Self::with_count(figure, count))
-            .find(fits)
-            .unwrap_or_else(|| Self::with_count(figure, 1))
+        let mut choices = (1..=most).rev().map(|count| Self::with_count(figure, count));
+        choices.find(fits).unwrap_or_else(|| Self::with_count(figure, 1))
     }
 
     fn with_count(figure: &Figure, count: usize) -> Self {
@@ -184,12 +181,8 @@ fn right_margin(panel: &Panel) -> f64 {
     if panel.bare {
         return EDGE_MM / 2.0;
     }
-    EDGE_MM
-        + panel
-            .heat_map
-            .as_ref()
-            .map_or(0.0, |heat| heat_map::colour_bar_width_mm(heat, panel.height_mm))
-            .max(HALF_LABEL_MM)
+    let bar_mm = |heat| heat_map::colour_bar_width_mm(heat, panel.height_mm);
+    EDGE_MM + panel.heat_map.as_ref().map_or(0.0, bar_mm).max(HALF_LABEL_MM)
 }
 
 // Headings and labels in lines that fit.
@@ -197,31 +190,24 @@ fn right_margin(panel: &Panel) -> f64 {
 /// Room between panels one below the other, mm.
 pub(super) const PANEL_GAP_MM: f64 = 2.5;
 
-/// The heading in lines that fit the figure; none for none.
+/// The heading in lines that fit the figure.
 pub(in crate::chart) fn title_lines(figure: &Figure) -> Vec<String> {
-    if figure.title.is_empty() {
-        Vec::new()
-    } else {
-        wrap_lines(&figure.title, WIDE_BOLD_LETTER * TITLE_MM, figure.width_mm - 2.0 * EDGE_MM)
-    }
+    lines_of_text(&figure.title, WIDE_BOLD_LETTER * TITLE_MM, figure.width_mm - 2.0 * EDGE_MM)
 }
 
-/// The line under the heading in lines that fit; none for none.
+/// The subtitle in lines that fit the figure.
 pub(in crate::chart) fn subtitle_lines(figure: &Figure) -> Vec<String> {
-    if figure.subtitle.is_empty() {
-        Vec::new()
-    } else {
-        wrap_lines(&figure.subtitle, WIDE_LETTER * TEXT_MM, figure.width_mm - 2.0 * EDGE_MM)
-    }
+    lines_of_text(&figure.subtitle, WIDE_LETTER * TEXT_MM, figure.width_mm - 2.0 * EDGE_MM)
 }
 
 /// The label of a y axis in lines that fit next to it.
 pub(in crate::chart) fn y_label_lines(panel: &Panel) -> Vec<String> {
-    if panel.y.label.is_empty() {
-        Vec::new()
-    } else {
-        wrap_lines(&panel.y.label, WIDE_LETTER * TEXT_MM, panel.height_mm + PANEL_GAP_MM)
-    }
+    lines_of_text(&panel.y.label, WIDE_LETTER * TEXT_MM, panel.height_mm + PANEL_GAP_MM)
+}
+
+/// Empty text takes no line.
+fn lines_of_text(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
+    if text.is_empty() { Vec::new() } else { wrap_lines(text, letter_mm, width_mm) }
 }
 
 // What of the data decides the ends of axes.
@@ -233,15 +219,11 @@ pub(super) fn visible_y_values(panel: &Panel, low: f64, high: f64) -> impl Itera
         ErrorBar::Vertical { x, from, to } => [(*x, *from), (*x, *to)],
         ErrorBar::Horizontal { y, from, to } => [(*from, *y), (*to, *y)],
     });
-    let ribbons = panel
-        .ribbons
-        .iter()
-        .flat_map(|r| r.points.iter().flatten())
-        .flat_map(|(x, low, high)| [(*x, *low), (*x, *high)]);
+    let ribbons = panel.ribbons.iter().flat_map(|r| r.points.iter().flatten());
+    let ribbons = ribbons.flat_map(|(x, low, high)| [(*x, *low), (*x, *high)]);
     let all = points.copied().chain(bars).chain(ribbons);
-    all.filter(move |(x, _)| *x >= low && *x <= high)
-        .map(|(_, y)| y)
-        .chain(panel.heat_map.iter().flat_map(|h| h.y.iter().copied()))
+    let shown = all.filter(move |(x, _)| *x >= low && *x <= high).map(|(_, y)| y);
+    shown.chain(panel.heat_map.iter().flat_map(|h| h.y.iter().copied()))
 }
 
 /// Ends of the x axis of every panel, common to those one below the other that share it.

@@ -22,17 +22,12 @@ use std::fmt::Write;
 
 pub(super) fn draw_heading(canvas: &mut Canvas, figure: &Figure, layout: &FigureLayout) {
     let plain = Lettering::plain(TEXT_MM, TextAnchor::Left);
-    let title = title_lines(figure)
-        .into_iter()
-        .map(|line| (line, Lettering { size_mm: TITLE_MM, bold: true, ..plain }));
-    for (row, (line, look)) in
-        title.chain(subtitle_lines(figure).into_iter().map(|line| (line, plain))).enumerate()
-    {
-        canvas.draw_text(
-            &line,
-            (EDGE_MM * UNITS_PER_MM, (EDGE_MM + (row as f64 + 0.5) * LINE_MM) * UNITS_PER_MM),
-            look,
-        );
+    let heading = Lettering { size_mm: TITLE_MM, bold: true, ..plain };
+    let title = title_lines(figure).into_iter().map(|line| (line, heading));
+    let subtitle = subtitle_lines(figure).into_iter().map(|line| (line, plain));
+    for (row, (line, look)) in title.chain(subtitle).enumerate() {
+        let y = (EDGE_MM + (row as f64 + 0.5) * LINE_MM) * UNITS_PER_MM;
+        canvas.draw_text(&line, (EDGE_MM * UNITS_PER_MM, y), look);
     }
     for (entry, x, y) in &layout.legend {
         let (x, y) = (x * UNITS_PER_MM, y * UNITS_PER_MM);
@@ -141,14 +136,7 @@ fn draw_over_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
 
 /// Text inside the axes; over a heat map dark or light, whichever is read better there.
 fn draw_annotation(canvas: &mut Canvas, placed: &PanelLayout, text: &TextAnnotation) {
-    let Some(at) = placed
-        .x
-        .canvas_position(text.at.0)
-        .zip(placed.y.canvas_position(text.at.1))
-        .filter(|at| placed.area.contains(*at))
-    else {
-        return;
-    };
+    let Some(at) = placed.canvas_point(text.at).filter(|at| placed.area.contains(*at)) else { return };
     let colour = mean_heat_colour(placed, text, at.0).map_or(text.colour.rgb(), readable_on);
     canvas.draw_coloured_text(&text.text, at, Lettering::plain(SMALL_MM, TextAnchor::Centre), colour);
 }
@@ -208,11 +196,9 @@ fn draw_top_label(
 ) {
     let Some(row) = row else { return };
     let (left, right) = label_span(text, at, &placed.x);
-    canvas.draw_text(
-        &shorten_to_panel(text, &placed.x),
-        ((left + right) / 2.0, label_row_y(placed, row)),
-        Lettering { bold, ..Lettering::plain(SMALL_MM, TextAnchor::Bottom) },
-    );
+    let look = Lettering { bold, ..Lettering::plain(SMALL_MM, TextAnchor::Bottom) };
+    let at = ((left + right) / 2.0, label_row_y(placed, row));
+    canvas.draw_text(&shorten_to_panel(text, &placed.x), at, look);
 }
 
 /// Height of a row over the panel.
@@ -248,11 +234,8 @@ fn draw_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
     if placed.has_x_labels && !panel.x.label.is_empty() {
         let names_mm = placed.x_names_mm().map_or(LINE_MM, |names| names + 1.0);
         let y = area.bottom + (TICK_MM + 0.6 + names_mm) * UNITS_PER_MM;
-        canvas.draw_text(
-            &panel.x.label,
-            ((area.left + area.right) / 2.0, y),
-            Lettering::plain(TEXT_MM, TextAnchor::Top),
-        );
+        let at = ((area.left + area.right) / 2.0, y);
+        canvas.draw_text(&panel.x.label, at, Lettering::plain(TEXT_MM, TextAnchor::Top));
     }
     if let Some(heat) = panel.heat_map.as_ref().filter(|heat| !heat.without_bar) {
         heat_map::draw_colour_bar(canvas, heat, area);
@@ -365,15 +348,10 @@ pub(super) fn draw_watermark(canvas: &mut Canvas, placed: &PanelLayout) {
     canvas.draw_coloured_text(WATERMARK, at, Lettering::plain(SMALL_MM, TextAnchor::Centre), ink);
 }
 
-/// Canvas coordinates of a point of a panel.
-fn canvas_point(placed: &PanelLayout, (x, y): (f64, f64)) -> Option<CanvasPoint> {
-    Some((placed.x.canvas_position(x)?, placed.y.canvas_position(y)?))
-}
-
 /// How many texts of a panel reach into an area.
 fn count_texts_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
     let reaches = |text: &TextAnnotation| {
-        let Some((x, y)) = canvas_point(placed, text.at) else { return false };
+        let Some((x, y)) = placed.canvas_point(text.at) else { return false };
         let (wide, high) =
             (text_width(&text.text, SMALL_MM) / 2.0 * UNITS_PER_MM, SMALL_MM / 2.0 * UNITS_PER_MM);
         x + wide > area.left && x - wide < area.right && y + high > area.top && y - high < area.bottom
@@ -385,7 +363,7 @@ fn count_texts_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
 fn count_lines_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
     let of_series = placed.panel.series.iter().map(|series| {
         let points: Vec<Option<CanvasPoint>> =
-            series.points.iter().map(|p| p.and_then(|p| canvas_point(placed, p))).collect();
+            series.points.iter().map(|p| p.and_then(|p| placed.canvas_point(p))).collect();
         let inside = points.iter().flatten().filter(|p| area.contains(**p)).count();
         let between = points.windows(2).filter(|pair| {
             let [Some(a), Some(b)] = pair else { return false };

@@ -108,12 +108,8 @@ pub(super) fn clip_polygon(corners: &[CanvasPoint], area: &CanvasArea) -> Vec<Ca
         [&|p| p.0 - area.left, &|p| area.right - p.0, &|p| p.1 - area.top, &|p| area.bottom - p.1];
     depths.iter().fold(corners.to_vec(), |corners, depth| {
         let next = corners.iter().cycle().skip(1);
-        corners
-            .iter()
-            .zip(next)
-            .flat_map(|(a, b)| clip_polygon_side(*a, *b, depth(*a), depth(*b)))
-            .flatten()
-            .collect()
+        let sides = corners.iter().zip(next);
+        sides.flat_map(|(a, b)| clip_polygon_side(*a, *b, depth(*a), depth(*b))).flatten().collect()
     })
 }
 

@@ -25,11 +25,8 @@ pub(super) fn draw_series(canvas: &mut Canvas, placed: &PanelLayout, series: &Se
     for bar in &series.error_bars {
         draw_error_bar(canvas, placed, *bar, series.colour.rgb());
     }
-    let points: Vec<Option<CanvasPoint>> = series
-        .points
-        .iter()
-        .map(|p| p.and_then(|(x, y)| Some((placed.x.canvas_position(x)?, placed.y.canvas_position(y)?))))
-        .collect();
+    let points: Vec<Option<CanvasPoint>> =
+        series.points.iter().map(|p| p.and_then(|p| placed.canvas_point(p))).collect();
     draw_marks(canvas, &points, series.colour, series.mark, &placed.area);
 }
 
@@ -51,13 +48,7 @@ pub(super) fn draw_marks(
                 }
             }
             Mark::Edged => draw_edged_line(canvas, &run, rgb, area),
-            Mark::Line
-            | Mark::Thin
-            | Mark::Thick
-            | Mark::Dashed
-            | Mark::Dotted
-            | Mark::ThinDashed
-            | Mark::Joined(_) => {
+            _ => {
                 // (a point between two gaps is no line, and must be seen)
                 if let [alone] = run.as_slice()
                     && area.contains(*alone)
@@ -102,46 +93,26 @@ fn draw_symbol(canvas: &mut Canvas, (x, y): CanvasPoint, mark: Mark, colour: Rgb
     match mark {
         Mark::Circles => canvas.draw_circle((x, y), SYMBOL_HALF_WIDTH as u32, colour, false),
         Mark::Crosses => {
-            canvas.draw_line(
-                &[
-                    (x - SYMBOL_HALF_WIDTH, y - SYMBOL_HALF_WIDTH),
-                    (x + SYMBOL_HALF_WIDTH, y + SYMBOL_HALF_WIDTH),
-                ],
-                colour,
-                4,
-            );
-            canvas.draw_line(
-                &[
-                    (x - SYMBOL_HALF_WIDTH, y + SYMBOL_HALF_WIDTH),
-                    (x + SYMBOL_HALF_WIDTH, y - SYMBOL_HALF_WIDTH),
-                ],
-                colour,
-                4,
-            );
+            for (dx, dy) in [SYMBOL_HALF_WIDTH, -SYMBOL_HALF_WIDTH].map(|dy| (SYMBOL_HALF_WIDTH, dy)) {
+                canvas.draw_line(&[(x - dx, y - dy), (x + dx, y + dy)], colour, 4);
+            }
         }
-        Mark::Joined(shape) => draw_shape(canvas, (x, y), SYMBOL_HALF_WIDTH, shape, colour, true),
-        Mark::Hollow(shape) => draw_shape(canvas, (x, y), SYMBOL_HALF_WIDTH, shape, colour, false),
+        Mark::Joined(shape) => draw_shape(canvas, (x, y), shape, colour, colour),
+        Mark::Hollow(shape) => draw_shape(canvas, (x, y), shape, colour, WHITE),
         _ => canvas.draw_circle((x, y), 4, colour, true),
     }
 }
 
-/// A symbol, hollow ones white inside.
-fn draw_shape(
-    canvas: &mut Canvas,
-    (x, y): CanvasPoint,
-    half_width: f64,
-    shape: MarkerShape,
-    colour: Rgb,
-    full: bool,
-) {
-    let mut outline: Vec<CanvasPoint> =
-        shape.corners().iter().map(|(a, b)| (x + a * half_width, y + b * half_width)).collect();
+/// A symbol and its inside.
+fn draw_shape(canvas: &mut Canvas, (x, y): CanvasPoint, shape: MarkerShape, colour: Rgb, inside: Rgb) {
+    let corner = |(a, b): &CanvasPoint| (x + a * SYMBOL_HALF_WIDTH, y + b * SYMBOL_HALF_WIDTH);
+    let mut outline: Vec<CanvasPoint> = shape.corners().iter().map(corner).collect();
     let Some(first) = outline.first().copied() else {
-        canvas.draw_circle((x, y), half_width as u32, if full { colour } else { WHITE }, true);
-        canvas.draw_circle((x, y), half_width as u32, colour, false);
+        canvas.draw_circle((x, y), SYMBOL_HALF_WIDTH as u32, inside, true);
+        canvas.draw_circle((x, y), SYMBOL_HALF_WIDTH as u32, colour, false);
         return;
     };
-    canvas.fill_polygon(&outline, if full { colour } else { WHITE }, 1.0);
+    canvas.fill_polygon(&outline, inside, 1.0);
     outline.push(first);
     canvas.draw_line(&outline, colour, 4);
 }
@@ -150,34 +121,25 @@ fn draw_shape(
 /// cap.
 fn draw_error_bar(canvas: &mut Canvas, placed: &PanelLayout, bar: ErrorBar, colour: Rgb) {
     let (x, y) = (&placed.x, &placed.y);
-    let (ends, across) = match bar {
+    let (from, to, across) = match bar {
         ErrorBar::Horizontal { y: at, from, to } => {
             let Some(at) = y.canvas_position(at) else { return };
-            (
-                [x.canvas_position_or_low(from), x.canvas_position_or_low(to)]
-                    .map(|end| end.map(|end| (end, at))),
-                (0.0, CAP_HALF_WIDTH),
-            )
+            let end = |end| Some((x.canvas_position_or_low(end)?, at));
+            (end(from), end(to), (0.0, CAP_HALF_WIDTH))
         }
         ErrorBar::Vertical { x: at, from, to } => {
             let Some(at) = x.canvas_position(at) else { return };
-            (
-                [y.canvas_position_or_low(from), y.canvas_position_or_low(to)]
-                    .map(|end| end.map(|end| (at, end))),
-                (CAP_HALF_WIDTH, 0.0),
-            )
+            let end = |end| Some((at, y.canvas_position_or_low(end)?));
+            (end(from), end(to), (CAP_HALF_WIDTH, 0.0))
         }
     };
-    let [Some(from), Some(to)] = ends else { return };
+    let (Some(from), Some(to)) = (from, to) else { return };
     let Some((a, b)) = placed.area.clip(from, to) else { return };
     canvas.draw_line(&[a, b], colour, ERROR_BAR_WIDTH);
     for (cut, end) in [(a, from), (b, to)] {
         if cut == end && is_strictly_inside(&placed.area, end) {
-            canvas.draw_line(
-                &[(end.0 - across.0, end.1 - across.1), (end.0 + across.0, end.1 + across.1)],
-                colour,
-                ERROR_BAR_WIDTH,
-            );
+            let cap = [(end.0 - across.0, end.1 - across.1), (end.0 + across.0, end.1 + across.1)];
+            canvas.draw_line(&cap, colour, ERROR_BAR_WIDTH);
         }
     }
 }
@@ -189,11 +151,8 @@ fn is_strictly_inside(area: &CanvasArea, (x, y): CanvasPoint) -> bool {
 /// The surface between two curves.
 pub(super) fn draw_ribbon(canvas: &mut Canvas, placed: &PanelLayout, ribbon: &Ribbon) {
     let corners = |(x, low, high): (f64, f64, f64)| {
-        Some((
-            placed.x.canvas_position(x)?,
-            placed.y.canvas_position_or_low(low)?,
-            placed.y.canvas_position_or_low(high)?,
-        ))
+        let [low, high] = [low, high].map(|end| placed.y.canvas_position_or_low(end));
+        Some((placed.x.canvas_position(x)?, low?, high?))
     };
     let placed_points: Vec<_> = ribbon.points.iter().map(|p| p.and_then(corners)).collect();
     let edge = |take: fn((f64, f64, f64)) -> f64| {

@@ -58,13 +58,11 @@ pub(super) fn truncate_text(text: &str, size_mm: f64, width_mm: f64) -> String {
     }
     let most = (width_mm / letter_mm).max(2.0) as usize - 1;
     let mut used = 0;
-    let kept: String = text
-        .chars()
-        .take_while(|letter| {
-            used += letter_count(*letter);
-            used <= most
-        })
-        .collect();
+    let kept = text.chars().take_while(|letter| {
+        used += letter_count(*letter);
+        used <= most
+    });
+    let kept: String = kept.collect();
     format!("{}{ELLIPSIS}", kept.trim_end())
 }
 
@@ -77,11 +75,8 @@ pub(super) fn wrap_in_two_lines(text: &str, width_mm: f64) -> String {
     }
     // what small letters would bring into one line is broken near its middle
     let own_mm = text.width() as f64 * WIDE_LETTER * SMALL_MM;
-    let broken = wrap_lines(
-        &text,
-        WIDE_LETTER * SMALL_MM,
-        if own_mm <= width_mm { NEAR_MIDDLE * own_mm } else { width_mm },
-    );
+    let line_mm = if own_mm <= width_mm { NEAR_MIDDLE * own_mm } else { width_mm };
+    let broken = wrap_lines(&text, WIDE_LETTER * SMALL_MM, line_mm);
     match broken.split_first() {
         Some((first, rest)) if !rest.is_empty() => {
             format!("{}\n{}", first.trim_end(), truncate_text(rest.concat().trim_end(), SMALL_MM, width_mm))

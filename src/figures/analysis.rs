@@ -1,7 +1,7 @@
 //! The complete analysis of a window of a recording: its parts as data, a file each, and their figures.
 
 use super::ring_down::{ComponentDecay, RingDown, RingDownTrace, figure_title};
-use super::spectrogram::{SpectrogramRidgePoint, SpeedPoint};
+use super::spectrogram::{SpectrogramPlot, SpeedPoint};
 use super::spectrum::{
     AmplitudeInterval, LabelledComponent, SpectraPlot, SpectrumCurve, SpectrumLevel, strongest_claim,
 };
@@ -10,7 +10,7 @@ use super::{about, ring_down, spectrogram, spectrum, windows};
 use crate::chart::Figure;
 use crate::recording::channel::{Channel, InstantKind, ReversalInstants, mean_speed_m_per_s, phase_windows};
 use crate::recording::{Recording, channel};
-use crate::spectrum::time_frequency::{RidgePoint as Followed, Spectrogram, SpectrogramSettings, course};
+use crate::spectrum::time_frequency::{RidgePoint, Spectrogram, SpectrogramSettings, course};
 use crate::spectrum::{Component, ComponentVerdict, Estimator, Oscillation, SpectralAnalysis, Spectrum};
 use crate::text::{format_digits, format_short, format_with_sd};
 use std::ops::Range;
@@ -41,13 +41,8 @@ const LEAST_OF_MODEL: f64 = 1e-3;
 #[must_use]
 pub fn compare_spectra(measured: Option<&SpectralAnalysis>, model: Option<&SpectralAnalysis>) -> SpectraPlot {
     let components = |analysis: &SpectralAnalysis| -> Vec<LabelledComponent> {
-        analysis
-            .spectrum
-            .components
-            .iter()
-            .filter(|c| c.is_resolvable())
-            .map(|c| label_component(c, &analysis.spectrum))
-            .collect()
+        let found = analysis.spectrum.components.iter().filter(|c| c.is_resolvable());
+        found.map(|c| label_component(c, &analysis.spectrum)).collect()
     };
     let noise_floor_m = measured.map(|m| m.spectrum.noise_floor_m);
     let mut model_components = model.map_or_else(Vec::new, components);
@@ -78,19 +73,14 @@ impl AnalysedWindow<'_> {
             measured: Some(spectrum_curve(analysis)),
             noise_floor_m: Some(spectrum.noise_floor_m),
             noise_floor: spectrum_level(analysis, &analysis.noise_floor_m),
-            interval_95: self.noise_interval(),
+            interval_95: spectrum_level(analysis, &analysis.noise_floor_m)
+                .map(|floor| AmplitudeInterval::from_noise_floor(&spectrum_curve(analysis), &floor)),
             leakage: spectrum_level(analysis, &analysis.leakage_m),
             components: spectrum.components.iter().map(|c| label_component(c, spectrum)).collect(),
             lowest_hz: spectrum.resolution_hz,
             ..SpectraPlot::default()
         };
         SpectraPlot { title: strongest_claim(&shown), ..shown }
-    }
-
-    /// What the noise leaves open of every amplitude of the curve that is drawn.
-    fn noise_interval(&self) -> Option<AmplitudeInterval> {
-        let floor = spectrum_level(self.analysis, &self.analysis.noise_floor_m)?;
-        Some(AmplitudeInterval::from_noise_floor(&spectrum_curve(self.analysis), &floor))
     }
 }
 
@@ -121,11 +111,7 @@ pub(super) fn label_component(c: &Component, spectrum: &Spectrum) -> LabelledCom
         range_hz: c.range_hz.map(|range| (range.low_hz, range.high_hz)),
         amplitude_m: shown_m,
         amplitude_sd_m: shown_m * share,
-        remark: if c.verdict == ComponentVerdict::Clear {
-            String::new()
-        } else {
-            c.verdict.name().to_owned()
-        },
+        remark: if c.verdict == ComponentVerdict::Clear { "" } else { c.verdict.name() }.to_owned(),
     }
 }
 
@@ -154,7 +140,7 @@ impl AnalysedWindow<'_> {
         })
     }
 
-    fn course_point(&self, p: &Followed, segment_s: f64) -> CoursePoint {
+    fn course_point(&self, p: &RidgePoint, segment_s: f64) -> CoursePoint {
         let (grid, traces) = (self.recording.grid(), self.recording.traces());
         let half = (0.5 * segment_s * grid.frame_rate_hz).ceil() as usize;
         let centre = self.frames.start + (p.time_s * grid.frame_rate_hz).round() as usize;
@@ -171,82 +157,51 @@ impl AnalysedWindow<'_> {
         }
     }
 
-    pub(super) fn spectrogram(&self) -> spectrogram::SpectrogramPlot {
-        let grid = self.recording.grid();
+    pub(super) fn spectrogram(&self) -> SpectrogramPlot {
+        let (grid, note) = (self.recording.grid(), self.figure_note("spectrogram"));
         let start_s = grid.time_s(self.frames.start);
-        let settings = SpectrogramSettings {
-            segment_s: self.analysis.ridge.as_ref().map(|r| r.segment_s),
-            band_hz: None,
-        };
-        let cut = Spectrogram::new(&self.analysis.detrended_m(), grid.frame_rate_hz, &settings).ok();
-        let column = |bins: usize, column: &Option<Vec<f64>>| {
-            column.as_ref().map_or_else(|| vec![None; bins], |c| c.iter().copied().map(Some).collect())
-        };
-        let instants = named_instants(self.recording, (start_s, grid.time_s(self.frames.end)));
-        let (ridge, over_speed, drawn) = cut.as_ref().map(|cut| self.drawn_ridge(cut)).unwrap_or_default();
-        let ends_hz = ridge.iter().filter_map(|p| p.frequency_hz);
-        let range_hz = ends_hz.clone().reduce(f64::min).zip(ends_hz.reduce(f64::max));
-        spectrogram::SpectrogramPlot {
-            title: range_hz.map_or_else(
-                || "Nothing stands out long enough to be followed".to_owned(),
-                |(low, high)| {
-                    format!("The ridge runs from {} to {} Hz", format_digits(low, 3), format_digits(high, 3))
-                },
-            ),
+        let plot = SpectrogramPlot {
+            title: "Nothing stands out long enough to be followed".to_owned(),
             quantity: self.channel.to_string(),
-            note: cut.as_ref().map_or_else(
-                || format!("{}; too short to be cut into segments", self.figure_note("spectrogram")),
-                |c| {
-                    format!(
-                        "{}; segments of {:.1} ms{drawn}",
-                        self.figure_note("spectrogram"),
-                        c.segment_s * 1e3
-                    )
-                },
-            ),
+            note: format!("{note}; too short to be cut into segments"),
             synthetic: self.recording.is_synthetic(),
-            time_s: cut.as_ref().map_or_else(Vec::new, |c| c.time_s.iter().map(|t| start_s + t).collect()),
-            frequency_hz: cut.as_ref().map_or_else(Vec::new, |c| c.frequency_hz.clone()),
-            amplitude_m: cut.as_ref().map_or_else(Vec::new, |c| {
-                c.amplitude_m.iter().map(|a| column(c.frequency_hz.len(), a)).collect()
-            }),
-            log_frequency: false,
-            shown_hz: None,
-            ridge,
-            instants,
-            targets: Vec::new(),
+            instants: named_instants(self.recording, (start_s, grid.time_s(self.frames.end))),
+            ..SpectrogramPlot::default()
+        };
+        let segment_s = self.analysis.ridge.as_ref().map(|r| r.segment_s);
+        let settings = SpectrogramSettings { segment_s, band_hz: None };
+        let Ok(cut) = Spectrogram::new(&self.analysis.detrended_m(), grid.frame_rate_hz, &settings) else {
+            return plot;
+        };
+        let (ridge, over_speed, drawn) = self.drawn_ridge(&cut);
+        let ends_hz = ridge.iter().flatten().map(|p| p.frequency_hz);
+        let range_hz = ends_hz.clone().reduce(f64::min).zip(ends_hz.reduce(f64::max));
+        let run = |(low, high)| {
+            format!("The ridge runs from {} to {} Hz", format_digits(low, 3), format_digits(high, 3))
+        };
+        SpectrogramPlot {
+            title: range_hz.map_or(plot.title.clone(), run),
+            note: format!("{note}; segments of {:.1} ms{drawn}", cut.segment_s * 1e3),
             over_speed,
+            ..spectrogram::fill_map(plot, &cut, &ridge, start_s, cut.frequency_hz.len())
         }
     }
 
-    /// The ridge over time and over the speed of the tip, as far as it is drawn, and in how many segments
-    /// that is.
-    fn drawn_ridge(&self, of: &Spectrogram) -> (Vec<SpectrogramRidgePoint>, Vec<SpeedPoint>, String) {
+    /// The parts of the ridge that are drawn, the same over the speed of the tip, and a note of how many
+    /// segments that is.
+    fn drawn_ridge(&self, of: &Spectrogram) -> (Vec<Vec<RidgePoint>>, Vec<SpeedPoint>, String) {
         let Some(ridge) = &self.analysis.ridge else { return Default::default() };
         let drawn = course::coherent_parts(ridge, of);
-        let start_s = self.recording.grid().time_s(self.frames.start);
-        let gap = SpectrogramRidgePoint { time_s: start_s, frequency_hz: None };
-        let over_time = |part: &Vec<Followed>| {
-            let points = part.iter().map(|p| SpectrogramRidgePoint {
-                time_s: start_s + p.time_s,
-                frequency_hz: Some(p.frequency_hz),
-            });
-            std::iter::once(gap).chain(points).collect::<Vec<_>>()
-        };
-        let over_speed = |p: CoursePoint| {
+        let over_speed = |p: &RidgePoint| {
             Some(SpeedPoint {
-                tip_speed_m_per_s: p.tip_speed_m_per_s?.abs(),
+                tip_speed_m_per_s: self.course_point(p, ridge.segment_s).tip_speed_m_per_s?.abs(),
                 frequency_hz: p.frequency_hz,
                 frequency_sd_hz: Some(p.frequency_sd_hz),
             })
         };
-        let speeds = drawn
-            .iter()
-            .flatten()
-            .filter_map(|p| over_speed(self.course_point(p, ridge.segment_s)))
-            .collect();
-        let said = format!("; ridge {}", spectrogram::describe_ridge_segments(&drawn, ridge, of));
-        (drawn.iter().flat_map(over_time).collect(), speeds, said)
+        let speeds = drawn.iter().flatten().filter_map(over_speed).collect();
+        let note = format!("; ridge {}", spectrogram::describe_ridge_segments(&drawn, ridge, of));
+        (drawn, speeds, note)
     }
 }
 
@@ -256,6 +211,7 @@ impl AnalysedWindow<'_> {
     pub(super) fn window_overview(&self) -> WindowOverview {
         let (grid, found) = (self.recording.grid(), ReversalInstants::find_instants(self.recording));
         let window = |w: channel::PhaseWindow| WindowSpan { name: w.name, from_s: w.from_s, to_s: w.to_s };
+        let head = Some(Channel::HeadX).filter(|head| *head != self.channel);
         WindowOverview {
             title: format!(
                 "Analysed: {} s of {} s, {} frames",
@@ -268,11 +224,7 @@ impl AnalysedWindow<'_> {
             synthetic: self.recording.is_synthetic(),
             time_s: (0..grid.frames).map(|i| grid.time_s(i)).collect(),
             channel_m: self.channel.samples(self.recording),
-            head_x_m: if self.channel == Channel::HeadX {
-                Vec::new()
-            } else {
-                Channel::HeadX.samples(self.recording)
-            },
+            head_x_m: head.map_or_else(Vec::new, |head| head.samples(self.recording)),
             windows: phase_windows(self.recording, &found).into_iter().map(window).collect(),
             analysed_s: Some((grid.time_s(self.frames.start), grid.time_s(self.frames.end))),
             instants: named_instants(self.recording, (grid.start_s, grid.time_s(grid.frames))),
@@ -297,12 +249,8 @@ impl AnalysedWindow<'_> {
         let trace =
             |values: Vec<Option<f64>>| RingDownTrace { time_s: time_s.clone(), displacement_m: values };
         let analysis = self.analysis;
-        let samples = analysis
-            .residual_m
-            .iter()
-            .zip(&analysis.model_m)
-            .zip(&analysis.removed_m)
-            .map(|((left, m), removed)| left.map(|left| left + m + removed));
+        let samples = analysis.residual_m.iter().zip(&analysis.model_m).zip(&analysis.removed_m);
+        let samples = samples.map(|((left, m), removed)| left.map(|left| left + m + removed));
         // white noise of density 2 s^2 / rate has this root mean square in a bin
         let noise_m = analysis.spectrum.noise_floor_m
             * (grid.frame_rate_hz / (4.0 * analysis.spectrum.noise_bandwidth_hz)).sqrt();
@@ -332,34 +280,18 @@ impl AnalysedWindow<'_> {
         let decays = |c: &&Component| {
             c.damping_ratio.zip(c.damping_ratio_sd).is_some_and(|(ratio, sd)| ratio > DECAYS * sd)
         };
-        let component = analysis
-            .spectrum
-            .components
-            .iter()
-            .filter(|c| c.estimator == Estimator::LeastSquares)
-            .find(decays)?;
-        let near = |a: &&Oscillation, b: &&Oscillation| {
-            (a.frequency_hz - component.frequency_hz)
-                .abs()
-                .total_cmp(&(b.frequency_hz - component.frequency_hz).abs())
-        };
-        let own = analysis.oscillations.iter().min_by(near)?;
+        let mut fitted =
+            analysis.spectrum.components.iter().filter(|c| c.estimator == Estimator::LeastSquares);
+        let component = fitted.find(decays)?;
+        let off = |o: &&Oscillation| (o.frequency_hz - component.frequency_hz).abs();
+        let own = analysis.oscillations.iter().min_by(|a, b| off(a).total_cmp(&off(b)))?;
         let start_s = time_s.first().copied()?;
-        let data = analysis
-            .residual_m
-            .iter()
-            .zip(time_s)
-            .map(|(left, t)| left.map(|left| left + own.displacement_m(t - start_s)))
-            .collect();
-        let ratio = component
-            .damping_ratio
-            .zip(component.damping_ratio_sd)
-            .map(|(ratio, sd)| format_with_sd(ratio, sd))?;
+        let data = analysis.residual_m.iter().zip(time_s);
+        let data = data.map(|(left, t)| left.map(|left| left + own.displacement_m(t - start_s))).collect();
+        let frequency = format_with_sd(component.frequency_hz, component.frequency_sd_hz);
+        let ratio = format_with_sd(component.damping_ratio?, component.damping_ratio_sd?);
         Some(ComponentDecay {
-            name: format!(
-                "{} Hz, damping ratio {ratio}",
-                format_with_sd(component.frequency_hz, component.frequency_sd_hz)
-            ),
+            name: format!("{frequency} Hz, damping ratio {ratio}"),
             fitted: self.fine_trace(|t| own.displacement_m(t)),
             envelope: self.fine_trace(|t| own.envelope_m(t)),
             data: RingDownTrace { time_s: time_s.to_vec(), displacement_m: data },

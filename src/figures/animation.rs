@@ -96,15 +96,13 @@ impl Animation {
 
 /// Everything that does not move.
 fn draw_still(animation: &Animation) -> Figure {
-    let source = if animation.measured.is_none() { format!("{NO_TRACES}; ") } else { String::new() };
+    let source = if animation.measured.is_none() { NO_TRACES } else { "" };
+    let note = about(source, &describe_pace(&animation.pace));
     let drawing = drawing::draw_linkage_panel(animation);
     let enlarged = drawing::draw_tip_panel(animation, drawing.height_mm);
     Figure {
         title: animation.claim_sentence(),
-        subtitle: about(
-            &animation.title,
-            &subtitle(animation.synthetic, &format!("{source}{}", describe_pace(&animation.pace))),
-        ),
+        subtitle: about(&animation.title, &subtitle(animation.synthetic, &note)),
         watermarked: animation.synthetic,
         description: format!(
             "Animation of the linkage of head, neck and lip through {}, with deflection and velocity of the \
@@ -120,13 +118,9 @@ fn draw_still(animation: &Animation) -> Figure {
 /// "100 times slower than the motion, then 500 times".
 pub(crate) fn describe_pace(pace: &PlaybackPace) -> String {
     let factors: Vec<String> = pace.parts.iter().map(|p| format!("{} times", p.slower)).collect();
-    match factors.as_slice() {
-        [] => String::new(),
-        [first, rest @ ..] => format!(
-            "{first} slower than the motion{}",
-            rest.iter().map(|f| format!(", then {f}")).collect::<String>()
-        ),
-    }
+    let [first, rest @ ..] = factors.as_slice() else { return String::new() };
+    let rest: String = rest.iter().map(|f| format!(", then {f}")).collect();
+    format!("{first} slower than the motion{rest}")
 }
 
 // The animation of a condition: the model's reversal in fine steps, with what was measured on the same
@@ -146,8 +140,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
 fn build_animation(case: &ConditionComparison) -> Option<Animation> {
     let (motion, shift) = (&case.model.motion, case.alignment.shift_s);
     let hold = motion.longest_stick_s()?;
-    let pace =
-        PlaybackPace::around_hold(hold, [motion.samples.first()?.time_s, motion.samples.last()?.time_s])?;
+    let run = [motion.samples.first()?.time_s, motion.samples.last()?.time_s];
+    let pace = PlaybackPace::around_hold(hold, run)?;
     let span = pace.span_s();
     let interval = |[from, to]: [f64; 2]| [from + shift, to + shift];
     let stick = motion.stick_s.iter().filter(|[from, to]| *to > span[0] && *from < span[1]);
@@ -160,9 +154,7 @@ fn build_animation(case: &ConditionComparison) -> Option<Animation> {
         modes: contact_modes(motion, span).into_iter().map(|(since, mode)| (since + shift, mode)).collect(),
         stick_s: stick.map(|s| interval(*s)).collect(),
         hold_s: interval(hold),
-        measured: case
-            .recording()
-            .map(|recording| tracked_motion(recording, &case.alignment, span.map(|t| t + shift))),
+        measured: case.recording().map(|r| tracked_motion(r, &case.alignment, span.map(|t| t + shift))),
         pace: pace.shift_by(shift),
     })
 }
@@ -203,17 +195,16 @@ fn contact_modes(motion: &RunMotion, [from_s, to_s]: [f64; 2]) -> Vec<(f64, TipM
 /// Which points of a recording are drawn, and how they came to their places.
 fn describe_crosses(recording: &Recording, case: &ConditionComparison) -> String {
     let traces = recording.traces();
-    let points =
-        match (is_tracked(&traces.tip_x_m), is_tracked(&traces.head_x_m) && is_tracked(&traces.head_y_m)) {
-            (true, false) => "tip",
-            (false, true) => "head",
-            _ => "tip and head",
-        };
-    let how = match case.alignment {
-        Alignment { opposite_turn: true, .. } => {
-            "brought together at the turn of the head, which turns the other way in the model".to_owned()
-        }
-        Alignment { followed, .. } => format!("aligned by the path of the {}", followed.name()),
+    let head = is_tracked(&traces.head_x_m) && is_tracked(&traces.head_y_m);
+    let points = match (is_tracked(&traces.tip_x_m), head) {
+        (true, false) => "tip",
+        (false, true) => "head",
+        _ => "tip and head",
+    };
+    let how = if case.alignment.opposite_turn {
+        "brought together at the turn of the head, which turns the other way in the model".to_owned()
+    } else {
+        format!("aligned by the path of the {}", case.alignment.followed.name())
     };
     format!(
         " Crosses: {points} of {}, clock and origin {how}; the tip's height is that of the glass.",
@@ -228,23 +219,14 @@ fn figure_text(shown: &Animation, case: &ConditionComparison) -> Words {
     let mm = |x: f64| format_decimals(1e3 * x, 2);
     let deflection = |s: &ModelSample| mm(s.tip_x_m - s.head_x_m);
     let held = at(from_s).zip(at(to_s)).map(|(from, to)| {
-        let stuck = format!(
-            "tip sticks for {:.1} ms while its head moves by {} mm",
-            1e3 * (to_s - from_s),
-            mm(to.head_x_m - from.head_x_m)
-        );
+        let (stick_ms, way) = (1e3 * (to_s - from_s), mm(to.head_x_m - from.head_x_m));
+        let stuck = format!("tip sticks for {stick_ms:.1} ms while its head moves by {way} mm");
         (stuck, format!(" and its deflection goes from {} to {} mm.", deflection(from), deflection(to)))
     });
-    let points = case.recording().map_or_else(
-        || " The model alone: no traces are published.".to_owned(),
-        |r| describe_crosses(r, case),
-    );
-    let caption = match &held {
-        Some((stuck, _)) => {
-            format!("The fitted model in motion through {}, slowed down: the {stuck}.", shown.part_name())
-        }
-        None => format!("The fitted model in motion through {}, slowed down.", shown.part_name()),
-    };
+    let alone = || " The model alone: no traces are published.".to_owned();
+    let points = case.recording().map_or_else(alone, |r| describe_crosses(r, case));
+    let claim = held.as_ref().map_or_else(String::new, |(stuck, _)| format!(": the {stuck}"));
+    let caption = format!("The fitted model in motion through {}, slowed down{claim}.", shown.part_name());
     let held = held.map_or_else(String::new, |(stuck, bends)| format!(" The model's {stuck}{bends}"));
     let details = format!(
         "Animation: the linkage of the fitted model through {}, its links to scale, {}; the size of the \
@@ -270,13 +252,9 @@ pub struct PlaybackPart {
 }
 
 impl PlaybackPart {
-    /// The part, as many times slower (a round number) as makes it last about `wanted_s`.
+    /// The part, slowed down by a round factor so that it lasts about `wanted_s`.
     fn with_duration(from_s: f64, to_s: f64, wanted_s: f64) -> Self {
         Self { from_s, to_s, slower: round_to_125(wanted_s / (to_s - from_s)).max(1.0) }
-    }
-
-    fn duration_s(&self) -> f64 {
-        (self.to_s - self.from_s) * self.slower
     }
 }
 
@@ -308,13 +286,10 @@ impl PlaybackPace {
         let instants =
             [hold_s - LEAD_IN * length, release_s - RELEASE_LEAD * length, release_s + FOLLOW_UP * length]
                 .map(|t| t.max(within[0]).min(within[1]));
-        let wanted = [HOLD_SHOWN_S, RELEASE_SHOWN_S];
-        let parts: Vec<PlaybackPart> = instants
-            .windows(2)
-            .zip(wanted)
-            .filter(|(pair, _)| pair[0] < pair[1])
-            .map(|(pair, s)| PlaybackPart::with_duration(pair[0], pair[1], s))
-            .collect();
+        let pairs = instants.windows(2).zip([HOLD_SHOWN_S, RELEASE_SHOWN_S]);
+        let moving = pairs.filter(|(pair, _)| pair[0] < pair[1]);
+        let parts: Vec<PlaybackPart> =
+            moving.map(|(pair, s)| PlaybackPart::with_duration(pair[0], pair[1], s)).collect();
         (!parts.is_empty()).then_some(Self { parts })
     }
 
@@ -338,7 +313,7 @@ impl PlaybackPace {
 
     /// How long the animation lasts, s.
     pub(crate) fn duration_s(&self) -> f64 {
-        self.parts.iter().map(PlaybackPart::duration_s).sum::<f64>() + REST_S
+        self.parts.iter().map(|p| (p.to_s - p.from_s) * p.slower).sum::<f64>() + REST_S
     }
 
     /// When an instant of the motion is shown, as a share of the animation.
@@ -394,13 +369,8 @@ pub(super) fn draw_strips(animation: &Animation) -> Vec<Panel> {
     if let (Some(first), Some(measured)) = (panels.first_mut(), &animation.measured) {
         let deflection =
             measured.tip_x_m.iter().zip(&measured.head_x_m).map(|(tip, head)| Some((*tip)? - (*head)?));
-        let points = measured.time_s.iter().zip(deflection).map(|(t, x)| x.map(|x| (*t, MM * x))).collect();
-        first.series.push(Series {
-            label: "measured".to_owned(),
-            mark: Mark::Thin,
-            points,
-            ..Series::default()
-        });
+        let points = measured.time_s.iter().zip(deflection).map(|(t, x)| x.map(|x| (*t, MM * x)));
+        first.series.push(Series::new("measured", Colour::Black, Mark::Thin, points));
     }
     panels
 }
@@ -413,34 +383,16 @@ pub(super) fn strip_spans_s(animation: &Animation) -> [[f64; 2]; 2] {
 fn draw_strip(animation: &Animation, strip: &StripChart) -> Panel {
     let [from_s, to_s] = (strip.span_s)(&animation.pace);
     let whole = [from_s, to_s] == animation.pace.span_s();
-    let points = animation.samples.iter().map(|s| Some((s.time_s, (strip.of)(s)))).collect();
-    let stick = |[from, to]: &[f64; 2]| ShadedSpan {
-        label: "tip sticks (model)".to_owned(),
-        colour: Colour::SkyBlue,
-        from: *from,
-        to: *to,
-        ..ShadedSpan::default()
-    };
-    let slower = animation.pace.parts.iter().skip(1).filter(|_| whole).map(|p| ShadedSpan {
-        label: format!("shown {} times slower", p.slower),
-        colour: Colour::Grey,
-        from: p.from_s,
-        to: p.to_s,
-        outlined: true,
+    let points = animation.samples.iter().map(|s| (s.time_s, (strip.of)(s)));
+    let stick = |[from, to]: &[f64; 2]| ShadedSpan::new("tip sticks (model)", Colour::SkyBlue, *from, *to);
+    let slower = animation.pace.parts.iter().skip(1).filter(|_| whole).map(|p| {
+        ShadedSpan::outline(format!("shown {} times slower", p.slower), Colour::Grey, p.from_s, p.to_s)
     });
+    let (x, y) = (ChartAxis::time().with_range(from_s, to_s), ChartAxis::linear(strip.label));
+    let series = Series::new(strip.line.0, Colour::Vermilion, strip.line.1, points);
     Panel {
-        x: ChartAxis::time().with_range(from_s, to_s),
-        y: ChartAxis::linear(strip.label),
-        height_mm: HEIGHT_MM,
-        series: vec![Series {
-            label: strip.line.0.to_owned(),
-            colour: Colour::Vermilion,
-            mark: strip.line.1,
-            points,
-            ..Series::default()
-        }],
         shaded_spans: animation.stick_s.iter().map(stick).chain(slower).collect(),
-        ..Panel::default()
+        ..Panel::new(x, y, HEIGHT_MM, [series])
     }
 }
 

@@ -2,9 +2,9 @@
 //! profile, its bounds, its prior, the truth of a twin and the interval that the page states.
 
 use super::figure_text::parameter_symbol;
-use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
+use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series};
 use crate::compare::ParameterLine;
-use crate::figures::{Drawing, FigureBlock, about, subtitle};
+use crate::figures::{Drawing, FigureBlock, about, full_figure, subtitle};
 use crate::fit::bounds::Bounds;
 use crate::fit::bounds::Prior;
 use crate::fit::job::{FreeParameter, Job};
@@ -170,36 +170,32 @@ fn cell_position(value: f64, (low, high): (f64, f64)) -> f64 {
 pub fn draw_figure(shown: &CornerPlot) -> Figure {
     let count = shown.parameters.len();
     let title = match shown.strongest_correlation() {
-        Some((i, j, r)) => format!(
-            "{} and {} move together most: correlation {}",
-            shown.parameters.get(j).map_or("", |p| p.symbol.as_str()),
-            shown.parameters.get(i).map_or("", |p| p.symbol.as_str()),
-            crate::text::format_decimals(r, 2)
-        ),
+        Some((i, j, r)) => {
+            let [i, j] = [i, j].map(|at| shown.parameters.get(at).map_or("", |p| p.symbol.as_str()));
+            format!("{j} and {i} move together most: correlation {}", crate::text::format_decimals(r, 2))
+        }
         None => {
             let bounded = shown.parameters.iter().filter(|p| p.stated.iter().all(Option::is_some)).count();
             format!("{bounded} of {count} parameters have an interval with two ends")
         }
     };
     let names = shown.parameters.iter().map(|p| format!("{}: {}", p.symbol, p.words));
+    let x = ChartAxis::categorical("", shown.parameters.iter().map(|p| p.symbol.clone()));
+    let y = ChartAxis::categorical("", names.rev().collect::<Vec<_>>());
     let panel = Panel {
-        x: ChartAxis::categorical("", shown.parameters.iter().map(|p| p.symbol.clone())),
-        y: ChartAxis::categorical("", names.rev().collect::<Vec<_>>()),
-        height_mm: ROW_MM * count as f64,
-        series: draw_cells(shown),
         ribbons: out_of_bounds_ribbons(shown),
-        ..Panel::default()
+        ..Panel::new(x, y, ROW_MM * count as f64, draw_cells(shown))
     };
     Figure {
-        title,
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
-        watermarked: shown.synthetic,
-        description:
+        ..full_figure(
+            &title,
+            shown.synthetic,
+            "",
             "Regions of every pair of parameters, and the likelihood along each with its 95 % interval."
                 .to_owned(),
-        width_mm: FULL_WIDTH_MM,
-        panels: vec![panel],
-        ..Figure::default()
+            [panel],
+        )
     }
 }
 
@@ -210,130 +206,84 @@ fn cell_centre(shown: &CornerPlot, row: usize, column: usize) -> (f64, f64) {
 
 fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
     let spans: Vec<(f64, f64)> = shown.parameters.iter().map(shown_range).collect();
-    let cells = || {
-        let rows = shown.parameters.iter().zip(&spans).enumerate();
-        rows.flat_map(|(i, row)| {
-            let columns = shown.parameters.iter().zip(&spans).enumerate().take(i);
-            columns.map(move |(j, column)| ((i, row), (j, column)))
-        })
+    let count = shown.parameters.len();
+    let pairs = || (0..count).flat_map(|i| (0..i).map(move |j| (i, j)));
+    let pair = |(i, j): (usize, usize)| (&shown.parameters[i], &shown.parameters[j]);
+    let diagonal = || shown.parameters.iter().enumerate();
+    // a point by the values of the parameters of its column and row, and one of a diagonal cell by its likelihood
+    let point = |(i, j): (usize, usize), x: f64, y: f64| {
+        clip_to_cell((cell_position(x, spans[j]), cell_position(y, spans[i])), cell_centre(shown, i, j))
     };
-    let diagonal = || shown.parameters.iter().zip(&spans).enumerate();
-    let line = |label: &str, colour, mark, points| Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points,
-        ..Series::default()
+    let upright = |i: usize, value: f64, y: f64| {
+        clip_to_cell((cell_position(value, spans[i]), y), cell_centre(shown, i, i))
     };
-    // frames of the cells
     let frame = |(x, y): (f64, f64)| {
         let corners = [(-HALF, -HALF), (HALF, -HALF), (HALF, HALF), (-HALF, HALF), (-HALF, -HALF)];
-        corners.map(|(a, b)| Some((x + a, y + b))).into_iter().chain([None]).collect::<Vec<_>>()
+        corners.map(|(a, b)| Some((x + a, y + b))).into_iter().chain([None])
     };
-    let lower = (0..shown.parameters.len()).flat_map(|i| (0..=i).map(move |j| (i, j)));
-    let mut all = vec![line(
-        "",
-        Colour::Grey,
-        Mark::Thin,
-        lower.flat_map(|(i, j)| frame(cell_centre(shown, i, j))).collect(),
-    )];
+    let lower = (0..count).flat_map(|i| (0..=i).map(move |j| cell_centre(shown, i, j)));
+    let mut all = vec![Series::new("", Colour::Grey, Mark::Thin, lower.flat_map(frame))];
     for (label, colour, mark, radius) in REGIONS {
-        let region = |((i, (a, of_a)), (j, (b, of_b))): CornerCell<'_>| {
-            let r = shown.correlations.get(i).and_then(|row| row.get(j).copied().flatten())?;
+        let region = |at: (usize, usize)| {
+            let (a, b) = pair(at);
+            let r = shown.correlations.get(at.0).and_then(|row| row.get(at.1).copied().flatten())?;
             let (sd_a, sd_b) = (a.sd?, b.sd?);
-            let at = cell_centre(shown, i, j);
             let rest = (1.0 - r * r).max(0.0).sqrt();
-            let point = |k: u32| {
+            let edge = |k: u32| {
                 let (sin, cos) = math::sin_cos(std::f64::consts::TAU * f64::from(k) / f64::from(POINTS));
-                let along = b.estimate + radius * sd_b * cos;
                 let up = a.estimate + radius * sd_a * (r * cos + rest * sin);
-                clip_to_cell((cell_position(along, *of_b), cell_position(up, *of_a)), at)
+                point(at, b.estimate + radius * sd_b * cos, up)
             };
-            Some((0..=POINTS).map(point).chain([None]).collect::<Vec<_>>())
+            Some((0..=POINTS).map(edge).chain([None]).collect::<Vec<_>>())
         };
-        all.push(line(label, colour, mark, cells().filter_map(region).flatten().collect()));
+        all.push(Series::new(label, colour, mark, pairs().filter_map(region).flatten()));
     }
-    let optima = cells().flat_map(|((i, (a, of_a)), (j, (b, of_b)))| {
-        let at = cell_centre(shown, i, j);
-        b.optima
-            .iter()
-            .zip(&a.optima)
-            .filter_map(move |(x, y)| clip_to_cell((cell_position(*x, *of_b), cell_position(*y, *of_a)), at))
+    let optima = pairs().flat_map(|at| {
+        let (a, b) = pair(at);
+        b.optima.iter().zip(&a.optima).filter_map(move |(x, y)| point(at, *x, *y))
     });
-    all.push(line("searches within the threshold", Colour::Grey, Mark::Dots, optima.map(Some).collect()));
-    let estimates = cells().map(|((i, (a, of_a)), (j, (b, of_b)))| {
-        clip_to_cell(
-            (cell_position(b.estimate, *of_b), cell_position(a.estimate, *of_a)),
-            cell_centre(shown, i, j),
-        )
-    });
-    all.push(line("estimate", Colour::Black, Mark::Circles, estimates.collect()));
-    let truths = cells().map(|((i, (a, of_a)), (j, (b, of_b)))| {
-        clip_to_cell(
-            (cell_position(b.truth?, *of_b), cell_position(a.truth?, *of_a)),
-            cell_centre(shown, i, j),
-        )
-    });
-    all.push(line(TRUTH, Colour::Vermilion, Mark::Crosses, truths.collect()));
+    all.push(Series::new("searches within the threshold", Colour::Grey, Mark::Dots, optima));
+    let estimates = pairs().map(|at| point(at, pair(at).1.estimate, pair(at).0.estimate));
+    all.push(Series::new("estimate", Colour::Black, Mark::Circles, estimates));
+    let truths = pairs().map(|at| point(at, pair(at).1.truth?, pair(at).0.truth?));
+    all.push(Series::new("synthetic truth", Colour::Vermilion, Mark::Crosses, truths));
     let curve = |of: fn(&CornerParameter) -> Option<(f64, f64)>| {
-        diagonal()
-            .filter_map(|(i, (known, span))| {
-                let ((mean, sd), at) = (of(known)?, cell_centre(shown, i, i));
-                let point = |k: u32| {
-                    let value = span.0 + (span.1 - span.0) * f64::from(k) / f64::from(POINTS);
-                    let off = (value - mean) / sd;
-                    clip_to_cell(
-                        (cell_position(value, *span), likelihood_height(math::exp(-0.5 * off * off))),
-                        at,
-                    )
-                };
-                Some((0..=POINTS).map(point).chain([None]).collect::<Vec<_>>())
-            })
-            .flatten()
-            .collect::<Vec<_>>()
+        let curves = diagonal().filter_map(|(i, known)| {
+            let ((mean, sd), span) = (of(known)?, spans[i]);
+            let bell = |k: u32| {
+                let value = span.0 + (span.1 - span.0) * f64::from(k) / f64::from(POINTS);
+                let off = (value - mean) / sd;
+                upright(i, value, likelihood_height(math::exp(-0.5 * off * off)))
+            };
+            Some((0..=POINTS).map(bell).chain([None]).collect::<Vec<_>>())
+        });
+        curves.flatten().collect::<Vec<_>>()
     };
-    all.push(line("prior", Colour::Green, Mark::ThinDashed, curve(|known| known.prior)));
-    all.push(line(
-        "likelihood, linear",
-        Colour::Orange,
-        Mark::ThinDashed,
-        curve(|known| Some((known.estimate, known.sd?))),
-    ));
-    let profiles = diagonal().flat_map(|(i, (known, span))| {
-        let at = cell_centre(shown, i, i);
-        let points = known
-            .profile
-            .iter()
-            .map(move |(v, rise)| clip_to_cell((cell_position(*v, *span), likelihood_height(*rise)), at));
-        points.chain([None]).collect::<Vec<_>>()
+    all.push(Series::new("prior", Colour::Green, Mark::ThinDashed, curve(|known| known.prior)));
+    let linear = curve(|known| Some((known.estimate, known.sd?)));
+    all.push(Series::new("likelihood, linear", Colour::Orange, Mark::ThinDashed, linear));
+    let profiles = diagonal().flat_map(|(i, known)| {
+        let points = known.profile.iter().map(move |(v, rise)| upright(i, *v, likelihood_height(*rise)));
+        points.chain([None])
     });
-    all.push(line("likelihood, profile", Colour::Blue, Mark::Thin, profiles.collect()));
-    let upright = diagonal().flat_map(|(i, (known, span))| {
-        let at = cell_centre(shown, i, i);
-        let end = |y: f64| clip_to_cell((cell_position(known.truth?, *span), y), at);
+    all.push(Series::new("likelihood, profile", Colour::Blue, Mark::Thin, profiles));
+    let truths = diagonal().flat_map(|(i, known)| {
+        let end = |y: f64| upright(i, known.truth?, y);
         [end(-INSIDE), end(likelihood_height(1.0)), None]
     });
-    all.push(line("", Colour::Vermilion, Mark::Line, upright.collect()));
-    let stated = diagonal().flat_map(|(i, (known, span))| {
-        let at = cell_centre(shown, i, i);
-        let [low, high] = known.stated;
-        let closed = low.is_some() || high.is_some();
+    all.push(Series::new("", Colour::Vermilion, Mark::Line, truths));
+    let stated = diagonal().flat_map(|(i, known)| {
+        let (at, [low, high]) = (cell_centre(shown, i, i), known.stated);
         let end = |value: Option<f64>, open: f64| {
-            let x = value.map_or(open, |v| cell_position(v, *span)).clamp(-HALF, HALF);
-            closed.then_some((at.0 + x, at.1 - INSIDE))
+            let x = value.map_or(open, |v| cell_position(v, spans[i])).clamp(-HALF, HALF);
+            low.or(high).map(|_| (at.0 + x, at.1 - INSIDE))
         };
         [end(low, -HALF), end(high, HALF), None]
     });
-    all.push(line("95 % interval, as stated", Colour::Black, Mark::Thick, stated.collect()));
+    all.push(Series::new("95 % interval, as stated", Colour::Black, Mark::Thick, stated));
     all.retain(|series| series.points.iter().any(Option::is_some));
     all
 }
-
-const TRUTH: &str = "synthetic truth";
-
-/// Row and column of a cell, each with its parameter and the span that it shows.
-type CornerCell<'a> =
-    ((usize, (&'a CornerParameter, &'a (f64, f64))), (usize, (&'a CornerParameter, &'a (f64, f64))));
 
 /// Height of a share of the greatest likelihood in a cell.
 fn likelihood_height(share: f64) -> f64 {
@@ -351,10 +301,12 @@ fn out_of_bounds_ribbons(shown: &CornerPlot) -> Vec<Ribbon> {
         let (span, at) = (shown_range(known), cell_centre(shown, i, i));
         let [low, high] = [0.0, 1.0].map(|bound| cell_position(bound, span));
         let ends = [(-HALF, low.min(HALF)), (high.max(-HALF), HALF)];
-        ends.into_iter().filter(|(from, to)| from < to).map(move |(from, to)| Ribbon {
-            label: "out of bounds".to_owned(),
-            colour: Colour::Grey,
-            points: [from, to].map(|x| Some((at.0 + x, at.1 - HALF, at.1 + HALF))).to_vec(),
+        ends.into_iter().filter(|(from, to)| from < to).map(move |(from, to)| {
+            Ribbon::new(
+                "out of bounds",
+                Colour::Grey,
+                [from, to].map(|x| Some((at.0 + x, at.1 - HALF, at.1 + HALF))),
+            )
         })
     };
     shown.parameters.iter().enumerate().flat_map(strip).collect()

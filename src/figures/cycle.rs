@@ -1,13 +1,11 @@
 //! The stick-slip cycle over the speed of the tip, measured and of the model, with natural frequencies and
 //! targets as lines.
 
+use super::spectrogram::speed_series;
 use super::{FigureBlock, Words};
-use crate::chart::{
-    ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Ribbon, Series,
-    TextAnnotation,
-};
+use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, TextAnnotation};
 use crate::compare::{ConditionComparison, TrackedRidge};
-use crate::figures::subtitle;
+use crate::figures::full_figure;
 use crate::model::modes::body_frequencies;
 pub use crate::spectrum::Target;
 pub use crate::spectrum::time_frequency::SpeedPoint;
@@ -34,7 +32,6 @@ pub struct CycleOverSpeed {
 
 /// Height of the panel, mm.
 const HEIGHT_MM: f64 = 72.0;
-const MILLIMETRES: f64 = 1e3;
 /// The axes end this far beyond what is shown.
 const AXIS_MARGIN: f64 = 1.12;
 /// Places of the names along the lines, shares of the width: one after the other where lines are close.
@@ -50,77 +47,56 @@ const LABEL_OFFSET: f64 = 0.022;
 #[must_use]
 pub fn draw_figure(shown: &CycleOverSpeed) -> Figure {
     let points = || shown.measured.iter().chain(&shown.model);
-    let fastest = points().map(|p| p.tip_speed_m_per_s * MILLIMETRES).fold(0.0, f64::max);
-    let highest = points()
-        .map(|p| p.frequency_hz)
-        .chain(shown.targets.iter().map(|t| t.frequency_hz))
-        .fold(0.0, f64::max);
-    let (right, top) = if fastest > 0.0 && highest > 0.0 {
-        (AXIS_MARGIN * fastest, AXIS_MARGIN * highest)
-    } else {
-        (1.0, 1.0)
-    };
-    let mut lines: Vec<(String, f64, Colour)> = shown
-        .natural_hz
-        .iter()
-        .map(|(name, hz)| (format!("{name} {} Hz", format_digits(*hz, 3)), *hz, Colour::Green))
-        .chain(shown.targets.iter().map(|t| {
-            (
-                format!(
-                    "{} {} Hz",
-                    truncate_text(&t.name, MAX_LABEL_LETTERS),
-                    format_digits(t.frequency_hz, 3)
-                ),
-                t.frequency_hz,
-                Colour::Blue,
-            )
-        }))
-        .filter(|(_, hz, _)| *hz > 0.0 && *hz < top)
-        .collect();
+    let fastest = points().map(|p| p.tip_speed_m_per_s * 1e3).fold(0.0, f64::max);
+    let sought_hz = shown.targets.iter().map(|t| t.frequency_hz);
+    let highest = points().map(|p| p.frequency_hz).chain(sought_hz).fold(0.0, f64::max);
+    let empty = !(fastest > 0.0 && highest > 0.0);
+    let (right, top) = if empty { (1.0, 1.0) } else { (AXIS_MARGIN * fastest, AXIS_MARGIN * highest) };
+    let line = |name: &str, hz: f64, colour| (format!("{name} {} Hz", format_digits(hz, 3)), hz, colour);
+    let natural = shown.natural_hz.iter().map(|(name, hz)| line(name, *hz, Colour::Green));
+    let name = |t: &Target| truncate_text(&t.name, MAX_LABEL_LETTERS);
+    let targets = shown.targets.iter().map(|t| line(&name(t), t.frequency_hz, Colour::Blue));
+    let mut lines: Vec<(String, f64, Colour)> =
+        natural.chain(targets).filter(|(_, hz, _)| *hz > 0.0 && *hz < top).collect();
     lines.sort_by(|a, b| a.1.total_cmp(&b.1));
+    let (x, y) = (ChartAxis::linear("tip speed, mm/s"), ChartAxis::linear("frequency, Hz"));
     let panel = Panel {
-        x: ChartAxis::linear("tip speed, mm/s").with_range(0.0, right),
-        y: ChartAxis::linear("frequency, Hz").with_range(0.0, top),
-        height_mm: HEIGHT_MM,
-        series: level_lines(&lines, right).into_iter().chain(cycle_series(shown)).collect(),
         ribbons: shown.targets.iter().filter_map(|t| deviation_ribbon(t, right)).collect(),
         annotations: level_names(&lines, (right, top)),
-        ..Panel::default()
+        ..Panel::new(
+            x.with_range(0.0, right),
+            y.with_range(0.0, top),
+            HEIGHT_MM,
+            level_lines(&lines, right).chain(cycle_series(shown)),
+        )
     };
-    Figure {
-        title: shown.title.clone(),
-        subtitle: subtitle(shown.synthetic, &shown.note),
-        watermarked: shown.synthetic,
-        description: "Frequency of the stick-slip cycle over the speed of the tip, with natural frequencies \
+    full_figure(
+        &shown.title,
+        shown.synthetic,
+        &shown.note,
+        "Frequency of the stick-slip cycle over the speed of the tip, with natural frequencies \
                       and targets as lines."
             .to_owned(),
-        width_mm: FULL_WIDTH_MM,
-        panels: vec![panel],
-        ..Figure::default()
-    }
+        [panel],
+    )
 }
 
 /// Lines across the axes.
-fn level_lines(lines: &[(String, f64, Colour)], right: f64) -> Vec<Series> {
-    let line = |(_, hz, colour): &(String, f64, Colour)| Series {
-        label: if *colour == Colour::Blue { "target" } else { "natural frequency" }.to_owned(),
-        colour: *colour,
-        mark: if *colour == Colour::Blue { Mark::Dashed } else { Mark::Dotted },
-        points: vec![Some((0.0, *hz)), Some((right, *hz))],
-        ..Series::default()
-    };
-    lines.iter().map(line).collect()
+fn level_lines(lines: &[(String, f64, Colour)], right: f64) -> impl Iterator<Item = Series> {
+    lines.iter().map(move |(_, hz, colour)| {
+        let (label, mark) = match colour {
+            Colour::Blue => ("target", Mark::Dashed),
+            _ => ("natural frequency", Mark::Dotted),
+        };
+        Series::new(label, *colour, mark, [(0.0, *hz), (right, *hz)])
+    })
 }
 
 /// Two deviations either side of a target.
 fn deviation_ribbon(target: &Target, right: f64) -> Option<Ribbon> {
     let sd_hz = target.frequency_sd_hz?;
     let (low, high) = (target.frequency_hz - 2.0 * sd_hz, target.frequency_hz + 2.0 * sd_hz);
-    Some(Ribbon {
-        label: "target \u{b1} 2 sd".to_owned(),
-        colour: Colour::Blue,
-        points: vec![Some((0.0, low, high)), Some((right, low, high))],
-    })
+    Some(Ribbon::new("target \u{b1} 2 sd", Colour::Blue, [(0.0, low, high), (right, low, high)]))
 }
 
 /// The names over their lines, those of close lines next to each other.
@@ -131,33 +107,16 @@ fn level_names(lines: &[(String, f64, Colour)], (right, top): (f64, f64)) -> Vec
         place = if hz - before < CLOSE_LEVELS * top { (place + 1) % LABEL_POSITIONS.len() } else { 0 };
         before = *hz;
         let at = (LABEL_POSITIONS[place] * right, hz + LABEL_OFFSET * top);
-        named.push(TextAnnotation { text: name.clone(), colour: *colour, at });
+        named.push(TextAnnotation::new(name.clone(), *colour, at));
     }
     named
 }
 
 /// Both cycles, the recording's on top.
-fn cycle_series(shown: &CycleOverSpeed) -> Vec<Series> {
-    let place = |p: &SpeedPoint| (p.tip_speed_m_per_s * MILLIMETRES, p.frequency_hz);
-    let bar = |p: &SpeedPoint| {
-        let ((x, f), sd) = (place(p), p.frequency_sd_hz?);
-        Some(ErrorBar::Vertical { x, from: f - 2.0 * sd, to: f + 2.0 * sd })
-    };
-    let series = |(label, colour, shape, points): (&str, Colour, MarkerShape, &Vec<SpeedPoint>)| Series {
-        label: format!("{label} \u{b1} 2 sd"),
-        colour,
-        mark: Mark::Hollow(shape),
-        points: points.iter().map(|p| Some(place(p))).collect(),
-        error_bars: points.iter().filter_map(bar).collect(),
-    };
-    [
-        ("model", Colour::Vermilion, MarkerShape::Square, &shown.model),
-        ("measured", Colour::Black, MarkerShape::Disc, &shown.measured),
-    ]
-    .into_iter()
-    .map(series)
-    .filter(|s| !s.points.is_empty())
-    .collect()
+fn cycle_series(shown: &CycleOverSpeed) -> impl Iterator<Item = Series> {
+    let model = speed_series("model", Colour::Vermilion, MarkerShape::Square, &shown.model);
+    let measured = speed_series("measured", Colour::Black, MarkerShape::Disc, &shown.measured);
+    [model, measured].into_iter().filter(|s| !s.points.is_empty())
 }
 
 // The cycle of a condition over the speed of the tip.
@@ -219,20 +178,25 @@ fn claim_sentence(shown: &CycleOverSpeed, (low, high): (f64, f64)) -> String {
     let neck_hz = shown.natural_hz.iter().find(|(name, _)| name == "neck").map_or(0.0, |(_, hz)| *hz);
     let what = if high < neck_hz { "strongest component" } else { "cycle" };
     let whose = if shown.measured.is_empty() { format!("The model's {what}") } else { format!("The {what}") };
-    let points = if shown.measured.is_empty() { &shown.model } else { &shown.measured };
+    let points = cycle_points(shown);
     let [low_hz, high_hz] = [low, high].map(|hz| format_digits(hz, 3));
     if high - low < CONSTANT_TOLERANCE * (high + low) / 2.0 {
         return format!("{whose} stays between {low_hz} and {high_hz} Hz whatever the speed of the tip");
     }
     match frequency_rise_hz(points) / (high - low) {
-        rise if rise > MIN_SPEED_TREND => {
+        r if r > MIN_SPEED_TREND => {
             format!("{whose} rises from {low_hz} to {high_hz} Hz as the tip speeds up")
         }
-        rise if rise < -MIN_SPEED_TREND => {
+        r if r < -MIN_SPEED_TREND => {
             format!("{whose} falls from {high_hz} to {low_hz} Hz as the tip speeds up")
         }
         _ => format!("{whose} runs from {low_hz} to {high_hz} Hz"),
     }
+}
+
+/// The measured cycle, without one the model's.
+fn cycle_points(shown: &CycleOverSpeed) -> &[SpeedPoint] {
+    if shown.measured.is_empty() { &shown.model } else { &shown.measured }
 }
 
 /// Mean frequency of the faster half less that of the slower half, Hz.
@@ -245,7 +209,7 @@ fn frequency_rise_hz(points: &[SpeedPoint]) -> f64 {
 }
 
 fn figure_text(case: &ConditionComparison, shown: &CycleOverSpeed, claim: &str) -> Words {
-    let points = if shown.measured.is_empty() { &shown.model } else { &shown.measured };
+    let points = cycle_points(shown);
     let speeds = || points.iter().map(|p| p.tip_speed_m_per_s);
     let span = speeds().reduce(f64::min).zip(speeds().reduce(f64::max));
     let span = span.map_or_else(String::new, |(from, to)| {

@@ -3,11 +3,9 @@
 
 use super::history::{length_unit, symmetric_axis, thin_points};
 use super::{FigureBlock, Words, history};
-use crate::chart::{
-    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, SampledSeries, Series, ShadedSpan,
-};
+use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, SampledSeries, Series, ShadedSpan};
 use crate::compare::ConditionComparison;
-use crate::figures::subtitle;
+use crate::figures::full_figure;
 use crate::fit::misfit::ChannelMisfit;
 use crate::recording::channel::{Channel, InstantKind};
 use crate::recording::motion_traces::MotionTraces;
@@ -58,37 +56,31 @@ const HEIGHT_MM: f64 = 30.0;
 const RESIDUAL_HEIGHT_MM: f64 = 15.0;
 /// Deviations within which 95 % of the noise lies.
 const NOISE_95: f64 = 1.96;
-const RESIDUAL_LABEL: &str = "measured \u{2212} model";
 
 /// The figure.
 #[must_use]
 pub fn draw_figure(shown: &EvidencePlot) -> Figure {
     let panels = shown.parts.iter().enumerate().flat_map(|(i, part)| draw_panels(shown, i, part));
-    Figure {
-        title: shown.title.clone(),
-        subtitle: subtitle(shown.synthetic, &shown.note),
-        watermarked: shown.synthetic,
-        description: format!(
+    full_figure(
+        &shown.title,
+        shown.synthetic,
+        &shown.note,
+        format!(
             "{} measured and of the model over time, with what lies between them in units of the noise: {}.",
-            crate::text::capitalise(&shown.quantity),
+            capitalise(&shown.quantity),
             shown.parts.iter().map(|part| part.name.as_str()).collect::<Vec<_>>().join(", ")
         ),
-        width_mm: FULL_WIDTH_MM,
-        panels: panels.collect(),
-        ..Figure::default()
-    }
+        panels,
+    )
 }
 
 fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> [Panel; 2] {
     let values = || part.model.iter().chain(&part.measured).flatten().map(|(_, x)| *x);
     let (unit, factor) = length_unit(values());
-    let whole = index == 0;
-    let series = |label: &str, colour, mark, (course, factor): (&TimeCurve, f64)| Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points: thin_points(&scale_curve(course, factor), part.span_s),
-        ..Series::default()
+    let (whole, (from, to)) = (index == 0, part.span_s);
+    let series = |label: &str, colour, mark, course: &TimeCurve, factor: f64| {
+        let scaled: TimeCurve = course.iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect();
+        Series::new(label, colour, mark, thin_points(&scaled, part.span_s))
     };
     // (frames that stand apart are points; all of them together are a line)
     let (frames, measured) =
@@ -97,42 +89,33 @@ fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> [Pane
         let all = of.iter().map(|(course, factor)| sample_curve(course, *factor));
         if whole { all.collect() } else { Vec::new() }
     };
-    let time = ChartAxis::time().with_range(part.span_s.0, part.span_s.1);
+    let enlarged = |part: &EvidencePart| {
+        ShadedSpan::outline("enlarged below", Colour::Black, part.span_s.0, part.span_s.1)
+    };
+    let enlarged: Vec<ShadedSpan> = shown.parts.iter().skip(1).filter(|_| whole).map(enlarged).collect();
+    let time = ChartAxis::time().with_range(from, to);
+    let quantity = ChartAxis::linear(format!("{}, {unit}", shown.quantity));
+    let curves = [
+        series("model", Colour::Vermilion, Mark::Line, &part.model, factor),
+        series(measured, Colour::Black, frames, &part.measured, factor),
+    ];
     let upper = Panel {
-        title: format!("{}: {} times the noise", part.name, format_noise_ratio(part.rms)),
-        x: time.clone(),
-        y: ChartAxis::linear(format!("{}, {unit}", shown.quantity)),
-        height_mm: HEIGHT_MM,
-        series: vec![
-            series("model", Colour::Vermilion, Mark::Line, (&part.model, factor)),
-            series(measured, Colour::Black, frames, (&part.measured, factor)),
-        ],
+        title: format!("{}: {} times the noise", part.name, format_digits(part.rms, 2)),
         sampled_series: details(&[(&part.model, factor), (&part.measured, factor)]),
-        shaded_spans: if whole { enlarged_part_spans(shown) } else { part.sticks.clone() },
-        ..Panel::default()
+        shaded_spans: if whole { enlarged.clone() } else { part.sticks.clone() },
+        ..Panel::new(time.clone(), quantity, HEIGHT_MM, curves)
     };
     let points = thin_points(&part.residual, part.span_s);
-    let noise = [Some((0.0, NOISE_95))];
-    let all: TimeCurve = points.iter().copied().chain(noise).collect();
-    let (from, to) = part.span_s;
+    let all: TimeCurve = points.into_iter().chain([Some((0.0, NOISE_95))]).collect();
+    let label = if whole { "measured \u{2212} model" } else { "" };
+    let residual = series(label, Colour::Green, frames, &part.residual, 1.0);
+    let noise = [from, to].map(|t| (t, -NOISE_95, NOISE_95));
+    let y = symmetric_axis(ChartAxis::linear("residual / noise"), &all);
     let lower = Panel {
-        x: time,
-        y: symmetric_axis(ChartAxis::linear("residual / noise"), &all),
-        height_mm: RESIDUAL_HEIGHT_MM,
-        series: vec![series(
-            if whole { RESIDUAL_LABEL } else { "" },
-            Colour::Green,
-            frames,
-            (&part.residual, 1.0),
-        )],
         sampled_series: details(&[(&part.residual, 1.0)]),
-        shaded_spans: if whole { enlarged_part_spans(shown) } else { Vec::new() },
-        ribbons: vec![Ribbon {
-            label: "95 % of the noise".to_owned(),
-            colour: Colour::SkyBlue,
-            points: [from, to].map(|t| Some((t, -NOISE_95, NOISE_95))).to_vec(),
-        }],
-        ..Panel::default()
+        shaded_spans: enlarged,
+        ribbons: vec![Ribbon::new("95 % of the noise", Colour::SkyBlue, noise)],
+        ..Panel::new(time, y, RESIDUAL_HEIGHT_MM, [residual])
     };
     [upper, lower]
 }
@@ -151,27 +134,6 @@ fn sample_curve(course: &TimeCurve, factor: f64) -> Option<SampledSeries> {
         step,
         values,
     })
-}
-
-/// The parts that are enlarged, framed.
-fn enlarged_part_spans(shown: &EvidencePlot) -> Vec<ShadedSpan> {
-    let band = |part: &EvidencePart| ShadedSpan {
-        label: "enlarged below".to_owned(),
-        colour: Colour::Black,
-        from: part.span_s.0,
-        to: part.span_s.1,
-        outlined: true,
-    };
-    shown.parts.iter().skip(1).map(band).collect()
-}
-
-fn scale_curve(course: &TimeCurve, factor: f64) -> TimeCurve {
-    course.iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect()
-}
-
-/// A ratio to the noise in words.
-fn format_noise_ratio(rms: f64) -> String {
-    crate::text::format_digits(rms, 2)
 }
 
 // The evidence of a condition: whole, at the release, and where it fits worst after it.
@@ -193,40 +155,28 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let whole_s = (*residual.time_s.first()?, *residual.time_s.last()?);
     let part = |name: String, span_s: (f64, f64)| {
         let rms = residual.rms_m(channel, Some(span_s))? / noise_m;
-        let own = channel_between(&model, channel, span_s);
+        let fine = Some(span_s).filter(|span_s| *span_s != whole_s);
+        let fine = fine.and_then(|span_s| model_states_curve(case, channel, span_s));
         let left = channel_between(residual, channel, span_s).into_iter();
-        let sticks = case.model.view.stick_s.iter();
-        let shift_s = case.alignment.shift_s;
-        let sticks: Vec<(f64, f64)> = sticks.map(|[from, to]| (from + shift_s, to + shift_s)).collect();
         Some(EvidencePart {
             name,
             span_s,
             measured: channel_between(&measured, channel, span_s),
-            model: if span_s == whole_s {
-                own
-            } else {
-                model_states_curve(case, channel, span_s).unwrap_or(own)
-            },
+            model: fine.unwrap_or_else(|| channel_between(&model, channel, span_s)),
             residual: left.map(|p| p.map(|(t, x)| (t, x / noise_m))).collect(),
             rms,
-            sticks: history::stick_spans(&sticks, span_s),
+            sticks: history::stick_spans(&history::sticks_on_clock(case), span_s),
         })
     };
     let release_s = case.measured_or_model().instant_s(InstantKind::Release);
-    let around_s = release_s
-        .map(|t| ((t - AROUND_RELEASE_S.0).max(whole_s.0), (t + AROUND_RELEASE_S.1).min(whole_s.1)))
-        .filter(|(from, to)| from < to);
+    let around = |t: f64| ((t - AROUND_RELEASE_S.0).max(whole_s.0), (t + AROUND_RELEASE_S.1).min(whole_s.1));
+    let around_s = release_s.map(around).filter(|(from, to)| from < to);
     let later_s = (around_s.map_or(whole_s.0, |(_, to)| to), whole_s.1);
     let worst_s = worst_s(residual, channel, later_s).filter(|(from, to)| from < to);
     let later = if around_s.is_some() { "worst later" } else { "worst part" };
-    let parts: Vec<EvidencePart> = [
-        part("recording".to_owned(), whole_s),
-        around_s.and_then(|span_s| part("release".to_owned(), span_s)),
-        worst_s.and_then(|span_s| part(later.to_owned(), span_s)),
-    ]
-    .into_iter()
-    .flatten()
-    .collect();
+    let spans = [("recording", Some(whole_s)), ("release", around_s), (later, worst_s)];
+    let parts: Vec<EvidencePart> =
+        spans.into_iter().filter_map(|(name, span_s)| part(name.to_owned(), span_s?)).collect();
     let whole = parts.first()?.rms;
     let shown = EvidencePlot {
         title: figure_title(channel, whole, noise_m),
@@ -294,14 +244,11 @@ fn model_states_curve(
 
 /// The claim with its number.
 fn figure_title(channel: Channel, rms: f64, noise_m: f64) -> String {
-    let (label, left) = (channel.label(), format_length(rms * noise_m));
+    let (label, left, noise) = (channel.label(), format_length(rms * noise_m), format_length(noise_m));
     if rms <= NOTHING_LEFT {
-        return format!(
-            "One run of the model explains the {label} to within its noise of {}",
-            format_length(noise_m)
-        );
+        return format!("One run of the model explains the {label} to within its noise of {noise}");
     }
-    format!("One run of the model misses the {label} by {left}, {} times the noise", format_noise_ratio(rms))
+    format!("One run of the model misses the {label} by {left}, {} times the noise", format_digits(rms, 2))
 }
 
 fn figure_text(case: &ConditionComparison, shown: &EvidencePlot, channel: Channel, noise_m: f64) -> Words {
@@ -311,11 +258,9 @@ fn figure_text(case: &ConditionComparison, shown: &EvidencePlot, channel: Channe
             "worst part" => "where it fits worst",
             _ => "at the release of the tip",
         };
-        format!("{} {at}", format_noise_ratio(part.rms))
+        format!("{} {at}", format_digits(part.rms, 2))
     };
-    let [whole, parts @ ..] = shown.parts.as_slice() else {
-        return Words { caption: String::new(), details: String::new() };
-    };
+    let [whole, parts @ ..] = shown.parts.as_slice() else { return Words::default() };
     let enlarged: Vec<String> = parts.iter().map(rms).collect();
     let enlarged = if enlarged.is_empty() { String::new() } else { format!(": {}", enlarged.join(", ")) };
     let caption = format!(
@@ -324,16 +269,13 @@ fn figure_text(case: &ConditionComparison, shown: &EvidencePlot, channel: Channe
         channel.label(),
         case.source_kind(),
         format_length(whole.rms * noise_m),
-        format_noise_ratio(whole.rms),
+        format_digits(whole.rms, 2),
     );
-    let spans: Vec<String> = shown
-        .parts
-        .iter()
-        .map(|part| {
-            let (from_s, to_s) = part.span_s;
-            format!("{} from {} to {} s", part.name, format_decimals(from_s, 4), format_decimals(to_s, 4))
-        })
-        .collect();
+    let span = |part: &EvidencePart| {
+        let (from_s, to_s) = part.span_s;
+        format!("{} from {} to {} s", part.name, format_decimals(from_s, 4), format_decimals(to_s, 4))
+    };
+    let spans: Vec<String> = shown.parts.iter().map(span).collect();
     let details = format!(
         "Shown: {}. The noise of the {} is {}, measured on the recording where nothing but noise moves it \
          from frame to frame; the shaded strip holds 95 % of such noise. The model runs once from its start \
@@ -343,8 +285,8 @@ fn figure_text(case: &ConditionComparison, shown: &EvidencePlot, channel: Channe
         channel.label(),
         format_length(noise_m),
     );
-    let details =
-        describe_segments(case).map_or(details.clone(), |said| format!("{details} {}", capitalise(&said)));
+    let segments = describe_segments(case).map_or_else(String::new, |said| format!(" {}", capitalise(&said)));
+    let details = details + &segments;
     Words { caption, details }
 }
 

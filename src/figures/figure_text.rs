@@ -4,7 +4,6 @@ use super::{Drawing, FigureBlock, NO_TRACES, Words, about};
 use crate::chart::Figure;
 use crate::compare::ConditionComparison;
 use crate::model::parameters;
-use crate::recording::Recording;
 use crate::text::{join_with_and, truncate_text};
 
 /// Letters of a title and of a name in a heading, which has to leave room for the figure: the longest titles
@@ -20,32 +19,29 @@ impl ConditionComparison<'_> {
 
     /// What a figure is about: the job, and the condition where there are several.
     pub(crate) fn figure_title(&self) -> String {
-        let of = self
-            .distinct_name()
-            .map_or_else(String::new, |name| format!(", {}", truncate_text(name, NAME_LETTERS)));
+        let name = |name| format!(", {}", truncate_text(name, NAME_LETTERS));
+        let of = self.distinct_name().map_or_else(String::new, name);
         format!("{}{of}", truncate_text(&self.job.title, TITLE_LETTERS))
     }
 
     /// What is said under a heading.
     pub(crate) fn heading_note(&self, text: &str) -> String {
-        match (self.recording(), text.is_empty()) {
-            (None, true) => NO_TRACES.to_owned(),
-            (None, false) => format!("{NO_TRACES}; {text}"),
-            (Some(_), _) => text.to_owned(),
-        }
+        about(if self.recording().is_none() { NO_TRACES } else { "" }, text)
     }
 
     /// "the synthetic recording `twin`", or "the model alone".
     pub(crate) fn source_name(&self) -> String {
-        match self.recording() {
-            Some(r) => format!("{} {}", recording_kind(r), r.name()),
-            None => "the fitted model alone, as no traces are published".to_owned(),
-        }
+        let kind = self.source_kind();
+        self.recording().map_or_else(|| kind.to_owned(), |r| format!("{kind} {}", r.name()))
     }
 
     /// The same without its name.
     pub(crate) fn source_kind(&self) -> &'static str {
-        self.recording().map_or("the fitted model alone, as no traces are published", recording_kind)
+        match self.recording() {
+            Some(r) if r.is_synthetic() => "the synthetic recording",
+            Some(_) => "the recording",
+            None => "the fitted model alone, as no traces are published",
+        }
     }
 
     /// A figure of both sides.
@@ -67,13 +63,8 @@ impl ConditionComparison<'_> {
             Drawing::Chart(figure) => Drawing::Chart(Figure { watermarked: self.is_synthetic(), ..figure }),
             moving @ Drawing::Moving(_) => moving,
         };
-        FigureBlock {
-            file: format!("{name}{number}.svg"),
-            caption,
-            details,
-            drawing,
-            condition: Some(self.condition),
-        }
+        let file = format!("{name}{number}.svg");
+        FigureBlock { file, caption, details, drawing, condition: Some(self.condition) }
     }
 
     /// What is said of later conditions with the same run.
@@ -83,15 +74,9 @@ impl ConditionComparison<'_> {
         if names.is_empty() {
             return String::new();
         }
-        format!(
-            " The model's run is the same in {}, but for the clock of the recording.",
-            join_with_and(&names)
-        )
+        let names = join_with_and(&names);
+        format!(" The model's run is the same in {names}, but for the clock of the recording.")
     }
-}
-
-fn recording_kind(recording: &Recording) -> &'static str {
-    if recording.is_synthetic() { "the synthetic recording" } else { "the recording" }
 }
 
 /// Names that differ in signs alone are one as file names: later ones get a number.
@@ -114,11 +99,8 @@ const LONGEST_WORD: usize = 60;
 /// A name from a job as part of a file name: letters and digits, everything else a hyphen, no longer than a
 /// file system takes.
 pub(crate) fn file_name_part(name: &str) -> String {
-    let word: String = name
-        .chars()
-        .map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' })
-        .take(LONGEST_WORD)
-        .collect();
+    let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
+    let word: String = name.chars().map(letter).take(LONGEST_WORD).collect();
     // (a name in another script leaves no letter)
     if word.chars().all(|c| c == '-') { "window".to_owned() } else { word }
 }

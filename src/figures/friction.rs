@@ -2,12 +2,10 @@
 //! and how long the tip moved at each speed.
 
 use super::{FigureBlock, Words};
-use crate::chart::{
-    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Ribbon, Series, VerticalLine,
-};
+use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, VerticalLine};
 use crate::compare::friction::{COEFFICIENTS, LawCoefficient, friction_half_95, is_fitted};
 use crate::compare::{ConditionComparison, FrictionPoint, MeasuredFriction};
-use crate::figures::subtitle;
+use crate::figures::full_figure;
 use crate::model::friction::FrictionLaw;
 use crate::simulate::ModelSample;
 use crate::simulate::mode::TipMode;
@@ -64,88 +62,60 @@ const PERCENT: f64 = 100.0;
 #[must_use]
 pub fn draw_figure(law: &FrictionPlot) -> Figure {
     let end = |take: fn(f64, f64) -> f64| law.curve.iter().map(|p| p.0 * MILLIMETRES).reduce(take);
-    let speed = ChartAxis::linear("tip speed, mm/s");
-    let speed =
-        end(f64::min).zip(end(f64::max)).map_or(speed.clone(), |(low, high)| speed.with_range(low, high));
+    let speed = ChartAxis::linear("tip speed, mm/s").with_ends(end(f64::min).zip(end(f64::max)));
     let rule = |label: &str| {
-        let of = |at: f64| VerticalLine {
-            label: label.to_owned(),
-            colour: Colour::Blue,
-            mark: Mark::Dashed,
-            at: at * MILLIMETRES,
-            above: None,
-        };
+        let of = |at: f64| VerticalLine::new(label, Colour::Blue, Mark::Dashed, at * MILLIMETRES);
         law.head.map(of).into_iter().collect()
     };
+    let band = law.interval_95.iter().map(|(v, low, high)| (v * MILLIMETRES, *low, *high));
+    let band = Ribbon::new("95 %, linear", Colour::Vermilion, band);
     let coefficient = Panel {
-        x: speed.clone(),
-        y: coefficient_axis(law),
-        height_mm: HEIGHT_MM,
-        series: law_series(law),
-        ribbons: interval_ribbon(law).into_iter().collect(),
+        ribbons: Some(band).filter(|band| !band.points.is_empty()).into_iter().collect(),
         vertical_lines: rule("mean speed of the head"),
-        ..Panel::default()
+        ..Panel::new(speed.clone(), coefficient_axis(law), HEIGHT_MM, law_series(law))
     };
+    let corners = law
+        .shares
+        .iter()
+        .flat_map(|(from, to, share)| [from, to].map(|v| (v * MILLIMETRES, share * PERCENT)));
+    let outline = Series::new("", Colour::Blue, Mark::Thin, corners.clone());
     let shares = Panel {
-        x: speed,
-        y: ChartAxis::linear("slip time, %"),
-        height_mm: SHARES_HEIGHT_MM,
-        series: vec![histogram_outline(law)],
-        ribbons: vec![histogram_ribbon(law)],
+        ribbons: vec![Ribbon::new("", Colour::Blue, corners.map(|(v, share)| (v, 0.0, share)))],
         vertical_lines: rule(""),
-        ..Panel::default()
+        ..Panel::new(speed, ChartAxis::linear("slip time, %"), SHARES_HEIGHT_MM, [outline])
     };
-    Figure {
-        title: law.title.clone(),
-        subtitle: subtitle(law.synthetic, &law.note),
-        watermarked: law.synthetic,
-        description:
-            "Friction coefficient over the speed of the tip, and the share of the time of slip at each speed."
-                .to_owned(),
-        width_mm: FULL_WIDTH_MM,
-        panels: vec![coefficient, shares],
-        ..Figure::default()
-    }
+    full_figure(
+        &law.title,
+        law.synthetic,
+        &law.note,
+        "Friction coefficient over the speed of the tip, and the share of the time of slip at each speed."
+            .to_owned(),
+        [coefficient, shares],
+    )
 }
 
-/// The law where the tip did not move at all, where it did, the truth, and what was measured.
+/// The law over all speeds and over those of the run, the truth, and what was measured.
 fn law_series(law: &FrictionPlot) -> Vec<Series> {
-    let place = |(v, coefficient): &(f64, f64)| Some((v * MILLIMETRES, *coefficient));
-    let line = |label: &str, colour, mark, points: Vec<Option<(f64, f64)>>| Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points,
-        ..Series::default()
+    let series = |label: &str, colour, mark, points: &[(f64, f64)]| {
+        Series::new(
+            label,
+            colour,
+            mark,
+            points.iter().map(|(v, coefficient)| (v * MILLIMETRES, *coefficient)),
+        )
     };
     let inside = |p: &&(f64, f64)| law.visited.is_some_and(|(low, high)| p.0 >= low && p.0 <= high);
+    let visited: Vec<_> = law.curve.iter().filter(inside).copied().collect();
+    let even =
+        series("measured, tip slides evenly", Colour::Black, Mark::Joined(MarkerShape::Disc), &law.even);
+    let apart = even.points.iter().flat_map(|p| [*p, None]).collect();
     let drawn = [
-        line("law", Colour::Grey, Mark::ThinDashed, law.curve.iter().map(place).collect()),
-        line(
-            "law at speeds of the run",
-            Colour::Vermilion,
-            Mark::Thick,
-            law.curve.iter().filter(inside).map(place).collect(),
-        ),
-        line("synthetic truth", Colour::Green, Mark::Dashed, law.truth.iter().map(place).collect()),
-        line(
-            "model, mean over cycles",
-            Colour::Vermilion,
-            Mark::Crosses,
-            law.of_model.iter().map(place).collect(),
-        ),
-        line(
-            "measured, mean over cycles",
-            Colour::Black,
-            Mark::Circles,
-            law.over_cycles.iter().map(place).collect(),
-        ),
-        line(
-            "measured, tip slides evenly",
-            Colour::Black,
-            Mark::Joined(MarkerShape::Disc),
-            law.even.iter().flat_map(|p| [place(p), None]).collect(),
-        ),
+        series("law", Colour::Grey, Mark::ThinDashed, &law.curve),
+        series("law at speeds of the run", Colour::Vermilion, Mark::Thick, &visited),
+        series("synthetic truth", Colour::Green, Mark::Dashed, &law.truth),
+        series("model, mean over cycles", Colour::Vermilion, Mark::Crosses, &law.of_model),
+        series("measured, mean over cycles", Colour::Black, Mark::Circles, &law.over_cycles),
+        Series { points: apart, ..even },
     ];
     drawn.into_iter().filter(|s| !s.points.is_empty()).collect()
 }
@@ -168,40 +138,6 @@ fn coefficient_axis(law: &FrictionPlot) -> ChartAxis {
     axis.with_range(low - room, high + room)
 }
 
-fn interval_ribbon(law: &FrictionPlot) -> Option<Ribbon> {
-    let points = law.interval_95.iter().map(|(v, low, high)| Some((v * MILLIMETRES, *low, *high))).collect();
-    (!law.interval_95.is_empty()).then(|| Ribbon {
-        label: "95 %, linear".to_owned(),
-        colour: Colour::Vermilion,
-        points,
-    })
-}
-
-/// Corners of the histogram from the left.
-fn histogram_corners(law: &FrictionPlot) -> impl Iterator<Item = (f64, f64)> {
-    law.shares.iter().flat_map(|(from, to, share)| {
-        [(from * MILLIMETRES, share * PERCENT), (to * MILLIMETRES, share * PERCENT)]
-    })
-}
-
-fn histogram_ribbon(law: &FrictionPlot) -> Ribbon {
-    Ribbon {
-        label: String::new(),
-        colour: Colour::Blue,
-        points: histogram_corners(law).map(|(v, share)| Some((v, 0.0, share))).collect(),
-    }
-}
-
-fn histogram_outline(law: &FrictionPlot) -> Series {
-    Series {
-        label: String::new(),
-        colour: Colour::Blue,
-        mark: Mark::Thin,
-        points: histogram_corners(law).map(Some).collect(),
-        ..Series::default()
-    }
-}
-
 // The friction law of the fitted model, with the speeds at which the tip moved and what is known of it.
 
 /// Points of the curve, bins of speed.
@@ -218,22 +154,24 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let (visited, top) = ((slowest.0, fastest.0), SPEED_MARGIN * fastest.0);
     let speeds: Vec<f64> = (0..=CURVE_POINTS).map(|i| top * i as f64 / CURVE_POINTS as f64).collect();
     let half = friction_half_95(case.job, case.result, &law);
+    let curve =
+        |law: FrictionLaw| speeds.iter().map(|v| (*v, law.dynamic_coefficient(*v))).collect::<Vec<_>>();
+    let band = |half: &dyn Fn(f64) -> f64| {
+        curve(law)
+            .into_iter()
+            .map(|(v, coefficient)| (v, coefficient - half(v), coefficient + half(v)))
+            .collect()
+    };
     let measured = MeasuredFriction::measure(case);
     let points = |of: &[FrictionPoint]| of.iter().map(|p| (p.speed_m_per_s, p.coefficient)).collect();
     let shown = FrictionPlot {
         title: claim_sentence(&law, fastest.0),
         note: case.heading_note("model at the estimates"),
         synthetic: case.is_synthetic(),
-        curve: speeds.iter().map(|v| (*v, law.dynamic_coefficient(*v))).collect(),
+        curve: curve(law),
         visited: Some(visited),
-        interval_95: half.as_ref().map_or_else(Vec::new, |half| {
-            speeds
-                .iter()
-                .map(|v| (*v, law.dynamic_coefficient(*v) - half(*v), law.dynamic_coefficient(*v) + half(*v)))
-                .collect()
-        }),
-        truth: true_law(case)
-            .map_or_else(Vec::new, |law| speeds.iter().map(|v| (*v, law.dynamic_coefficient(*v))).collect()),
+        interval_95: half.as_deref().map_or_else(Vec::new, band),
+        truth: true_law(case).map_or_else(Vec::new, curve),
         even: points(&measured.steady_sliding),
         over_cycles: points(&measured.over_cycles),
         of_model: points(&measured.model_over_cycles),
@@ -248,12 +186,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
 fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
     let (rest, moving) = (law.static_coefficient(), law.dynamic_coefficient(fastest));
     let how = if moving < rest { "falls" } else { "goes" };
-    format!(
-        "Friction {how} from {} at rest to {} at {}",
-        format_digits(rest, 3),
-        format_digits(moving, 3),
-        format_speed(fastest)
-    )
+    let [rest, moving] = [rest, moving].map(|coefficient| format_digits(coefficient, 3));
+    format!("Friction {how} from {rest} at rest to {moving} at {}", format_speed(fastest))
 }
 
 /// The law of a synthetic blade; `None` where the recording does not say it.
@@ -266,9 +200,10 @@ fn true_law(case: &ConditionComparison) -> Option<FrictionLaw> {
 
 /// Speeds of the tip where it slips, with the coefficients there, the slowest first.
 fn slip_speeds(case: &ConditionComparison) -> Vec<(f64, f64)> {
-    let samples = case.model.motion.samples.iter().filter(|s| is_slip(s));
-    let mut slips: Vec<(f64, f64)> =
-        samples.map(|s| (s.tip_velocity_m_per_s.abs(), friction_coefficient(s))).collect();
+    let slip =
+        |s: &&ModelSample| matches!(s.mode, TipMode::SlipForward | TipMode::SlipBackward) && s.normal_n > 0.0;
+    let place = |s: &ModelSample| (s.tip_velocity_m_per_s.abs(), s.friction_n.abs() / s.normal_n);
+    let mut slips: Vec<(f64, f64)> = case.model.motion.samples.iter().filter(slip).map(place).collect();
     slips.sort_by(|a, b| a.0.total_cmp(&b.0));
     slips
 }
@@ -286,14 +221,6 @@ pub(crate) fn friction_lines(case: &ConditionComparison) -> Vec<FrictionLine> {
     speeds.map(line).collect()
 }
 
-fn is_slip(sample: &ModelSample) -> bool {
-    matches!(sample.mode, TipMode::SlipForward | TipMode::SlipBackward) && sample.normal_n > 0.0
-}
-
-fn friction_coefficient(sample: &ModelSample) -> f64 {
-    sample.friction_n.abs() / sample.normal_n
-}
-
 /// Share of the time of slip in each bin; the states are equally far apart in time.
 fn slip_time_shares(slips: &[(f64, f64)], top: f64) -> Vec<(f64, f64, f64)> {
     let below = |v: f64| slips.partition_point(|s| s.0 < v) as f64;
@@ -306,8 +233,8 @@ fn slip_time_shares(slips: &[(f64, f64)], top: f64) -> Vec<(f64, f64, f64)> {
 /// Mean of `|v|` of the head over the run, m/s.
 fn mean_head_speed(case: &ConditionComparison) -> f64 {
     let samples = &case.model.motion.samples;
-    samples.iter().map(|s| case.model.scene.drive.motion_at(s.time_s).velocity_m_per_s.abs()).sum::<f64>()
-        / samples.len().max(1) as f64
+    let speed = |s: &ModelSample| case.model.scene.drive.motion_at(s.time_s).velocity_m_per_s.abs();
+    samples.iter().map(speed).sum::<f64>() / samples.len().max(1) as f64
 }
 
 fn figure_text(
@@ -341,10 +268,8 @@ fn figure_text(
     ));
     said.push(describe_uncertainty(case, median, half));
     let even = largest_deviation(law, &measured.steady_sliding).map_or_else(String::new, |(count, off)| {
-        format!(
-            "; {count} points measured where the tip slides evenly lie within {} of it",
-            format_digits(off, 2)
-        )
+        let off = format_digits(off, 2);
+        format!("; {count} points measured where the tip slides evenly lie within {off} of it")
     });
     let caption = format!("{} in the law of the fitted model{even}.", claim_sentence(law, fastest));
     Words { caption, details: said.join(" ") + &case.sharing_note() }
@@ -392,10 +317,10 @@ fn describe_uncertainty(
     let (free, held): (Vec<_>, Vec<_>) = COEFFICIENTS.iter().partition(|c| is_fitted(case.job, c));
     let symbols =
         |of: &[&LawCoefficient]| join_with_and(&of.iter().map(|c| c.symbol.to_owned()).collect::<Vec<_>>());
-    let taken = if held.is_empty() {
-        String::new()
-    } else {
-        format!(" {} taken as known.", is_or_are(&symbols(&held), held.len()))
+    let taken = match held.len() {
+        0 => String::new(),
+        1 => format!(" {} is taken as known.", symbols(&held)),
+        _ => format!(" {} are taken as known.", symbols(&held)),
     };
     match half {
         _ if free.is_empty() => "A, B and C were not fitted.".to_owned(),
@@ -408,11 +333,9 @@ fn describe_uncertainty(
             format_speed(at)
         ),
         None => {
-            let open: Vec<_> = free
-                .iter()
-                .filter(|c| case.result.parameters.get(c.name).is_none_or(|p| !p.has_interval()))
-                .copied()
-                .collect();
+            let is_open =
+                |c: &LawCoefficient| case.result.parameters.get(c.name).is_none_or(|p| !p.has_interval());
+            let open: Vec<_> = free.iter().copied().filter(|c| is_open(c)).collect();
             // the linear model may know each of them, and yet not how they go together
             let which = if open.is_empty() { symbols(&free) } else { symbols(&open) };
             let separately = if open.is_empty() { "" } else { " separately" };
@@ -422,10 +345,6 @@ fn describe_uncertainty(
             )
         }
     }
-}
-
-fn is_or_are(symbols: &str, count: usize) -> String {
-    format!("{symbols} {}", if count == 1 { "is" } else { "are" })
 }
 
 #[cfg(test)]

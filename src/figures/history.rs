@@ -3,8 +3,9 @@
 
 pub(crate) mod caption;
 
-use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, ShadedSpan, VerticalLine};
-use crate::figures::{NO_TRACES, subtitle};
+use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, ShadedSpan, VerticalLine, value_span};
+use crate::compare::ConditionComparison;
+use crate::figures::{NO_TRACES, full_figure};
 use crate::math;
 use crate::recording::channel::Channel;
 use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
@@ -53,8 +54,7 @@ pub fn draw_figure(history: &TimeHistory) -> Figure {
     let mut panels = stack_panels(history, &MOTION_CHANNELS, motion_span_s(history), HEIGHT_MM);
     if let Some((from, to)) = history.zoom_s.filter(|(from, to)| from < to) {
         // (outlined: a third shade would be one of the other two without colours)
-        let marked =
-            ShadedSpan { label: "enlarged".to_owned(), colour: Colour::Black, from, to, outlined: true };
+        let marked = ShadedSpan::outline("enlarged", Colour::Black, from, to);
         panels.iter_mut().for_each(|panel| panel.shaded_spans.push(marked.clone()));
     }
     panels.extend(draw_window_panel(history));
@@ -76,15 +76,13 @@ fn compose_figure(history: &TimeHistory, panels: Vec<Panel>, part: &str) -> Figu
         (Some(_), None) => "recording alone",
         (None, None) => "nothing to show",
     };
-    Figure {
-        title: history.title.clone(),
-        subtitle: subtitle(history.synthetic, source),
-        watermarked: history.synthetic,
-        description: format!("Time histories of tip, head, deflection and head drop {part}."),
-        width_mm: FULL_WIDTH_MM,
+    full_figure(
+        &history.title,
+        history.synthetic,
+        source,
+        format!("Time histories of tip, head, deflection and head drop {part}."),
         panels,
-        ..Figure::default()
-    }
+    )
 }
 
 /// First and last instant of the measured motion, else of the model's.
@@ -114,13 +112,8 @@ fn stack_panels(
 /// Points within a span, no more than it can show; the lowest and highest decide the unit.
 fn points_within(motion: &MotionTraces, channel: Channel, (from, to): (f64, f64)) -> Vec<Option<(f64, f64)>> {
     let inside = |t: &f64| *t >= from && *t <= to;
-    let all: Vec<_> = motion
-        .time_s
-        .iter()
-        .zip(motion.column(channel))
-        .filter(|(t, _)| inside(t))
-        .map(|(t, x)| x.map(|x| (*t, x)))
-        .collect();
+    let all = motion.time_s.iter().zip(motion.column(channel)).filter(|(t, _)| inside(t));
+    let all: Vec<_> = all.map(|(t, x)| x.map(|x| (*t, x))).collect();
     thin_points(&all, (from, to))
 }
 
@@ -140,30 +133,18 @@ fn draw_channel_panel(
     let (unit, factor) = length_unit(lines.iter().flatten().flatten().flatten().map(|(_, x)| *x));
     let styles = [("model", Colour::Vermilion, Mark::Thick), ("measured", Colour::Black, Mark::Thin)];
     let series = lines.into_iter().zip(styles).filter_map(|(points, (label, colour, mark))| {
-        points.map(|points| Series {
-            label: label.to_owned(),
-            colour,
-            mark,
-            points: scale_points(points, factor),
-            ..Series::default()
-        })
+        points.map(|points| Series::new(label, colour, mark, scale_points(points, factor)))
     });
     // the labels stand over the topmost panel, their lines run through all
-    let rule = |(label, at): &(String, f64)| VerticalLine {
-        label: if labelled { label.clone() } else { String::new() },
-        colour: Colour::Blue,
-        mark: Mark::Dashed,
-        at: *at,
-        above: None,
+    let rule = |(label, at): &(String, f64)| {
+        VerticalLine::new(if labelled { label } else { "" }, Colour::Blue, Mark::Dashed, *at)
     };
+    let x = ChartAxis::time().with_ends(Some(shown_s));
+    let y = ChartAxis::linear(format!("{}, {unit}", channel.label()));
     Panel {
-        x: ChartAxis::time().with_range(shown_s.0, shown_s.1),
-        y: ChartAxis::linear(format!("{}, {unit}", channel.label())),
-        height_mm,
-        series: series.collect(),
         shaded_spans: stick_spans(&history.stick_s, shown_s),
         vertical_lines: history.instants.iter().map(rule).collect(),
-        ..Panel::default()
+        ..Panel::new(x, y, height_mm, series)
     }
 }
 
@@ -173,19 +154,10 @@ fn draw_residual_panel(history: &TimeHistory, channel: Channel, shown_s: (f64, f
     points.iter().flatten().next()?; // (empty axes say nothing)
     let (unit, factor) = length_unit(points.iter().flatten().map(|(_, x)| *x));
     let points = scale_points(points, factor);
-    Some(Panel {
-        x: ChartAxis::time().with_range(shown_s.0, shown_s.1),
-        y: symmetric_axis(ChartAxis::linear(format!("\u{394}, {unit}")), &points),
-        height_mm: RESIDUAL_HEIGHT_MM,
-        series: vec![Series {
-            label: "measured \u{2212} model".to_owned(),
-            colour: Colour::Green,
-            mark: Mark::Thin,
-            points,
-            ..Series::default()
-        }],
-        ..Panel::default()
-    })
+    let x = ChartAxis::time().with_ends(Some(shown_s));
+    let y = symmetric_axis(ChartAxis::linear(format!("\u{394}, {unit}")), &points);
+    let series = Series::new("measured \u{2212} model", Colour::Green, Mark::Thin, points);
+    Some(Panel::new(x, y, RESIDUAL_HEIGHT_MM, [series]))
 }
 
 /// As far to either side of zero, to just beyond one of 1, 2, 5, 10, ..., so that the low panel has a tick on
@@ -196,38 +168,26 @@ pub(super) fn symmetric_axis(axis: ChartAxis, points: &[Option<(f64, f64)>]) -> 
     let most = points.iter().flatten().map(|(_, x)| x.abs()).filter(|x| x.is_finite()).fold(0.0, f64::max);
     let decade = math::powf(10.0, math::log10(most).floor());
     let end = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * decade).find(|end| MOST * end >= most);
-    match end.filter(|end| end.is_normal()) {
-        Some(end) => axis.with_range(-BEYOND * end, BEYOND * end),
-        None => axis,
-    }
+    axis.with_ends(end.filter(|end| end.is_normal()).map(|end| (-BEYOND * end, BEYOND * end)))
 }
 
 /// The windows as bars, the first on top.
 fn draw_window_panel(history: &TimeHistory) -> Option<Panel> {
-    let (from, to) = motion_span_s(history);
+    let rows = || history.windows.iter().rev();
     let bar = |(row, (_, start, end)): (usize, &(String, f64, f64))| {
         [Some((*start, row as f64)), Some((*end, row as f64)), None]
     };
-    let points = history.windows.iter().rev().enumerate().flat_map(bar).collect();
-    let series = Series {
-        label: "window of the fit".to_owned(),
-        colour: Colour::Blue,
-        mark: Mark::Thick,
-        points,
-        ..Series::default()
-    };
-    (!history.windows.is_empty()).then(|| Panel {
-        x: ChartAxis::time().with_range(from, to),
-        y: ChartAxis::categorical("windows", history.windows.iter().rev().map(|(name, ..)| name.clone())),
-        height_mm: (history.windows.len() as f64 * ROW_MM).max(LEAST_ROWS_MM),
-        series: vec![series],
-        ..Panel::default()
-    })
+    let points = rows().enumerate().flat_map(bar);
+    let series = Series::new("window of the fit", Colour::Blue, Mark::Thick, points);
+    let x = ChartAxis::time().with_ends(Some(motion_span_s(history)));
+    let y = ChartAxis::categorical("windows", rows().map(|(name, ..)| name.clone()));
+    let height_mm = (history.windows.len() as f64 * ROW_MM).max(LEAST_ROWS_MM);
+    (!history.windows.is_empty()).then(|| Panel::new(x, y, height_mm, [series]))
 }
 
 /// Unit in which values of that span read best, and how many of it a metre has.
 pub(super) fn length_unit(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(x), h.max(x)));
+    let (low, high) = value_span(values);
     if high - low < MICROMETRES_BELOW_M && high.abs().max(low.abs()) < 10.0 * MICROMETRES_BELOW_M {
         ("\u{b5}m", 1e6)
     } else {
@@ -244,6 +204,12 @@ const MIN_STICK_GAP: f64 = 0.005;
 const STICKS_LABEL: &str = "tip sticks (model)";
 const CYCLES_LABEL: &str = "stick-slip cycles (model)";
 
+/// Intervals in which the model's tip sticks, s, on the clock of the recording.
+pub(super) fn sticks_on_clock(case: &ConditionComparison) -> Vec<(f64, f64)> {
+    let shift_s = case.alignment.shift_s;
+    case.model.view.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect()
+}
+
 /// Sticks that stand alone, and cycles of sticks too close to stand apart, within a span.
 pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec<ShadedSpan> {
     let shown: Vec<(f64, f64)> =
@@ -257,13 +223,7 @@ pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec
         // (black is darker than orange in grey too)
         let (label, colour) =
             if group.len() > 1 { (CYCLES_LABEL, Colour::Orange) } else { (STICKS_LABEL, Colour::Black) };
-        Some(ShadedSpan {
-            label: label.to_owned(),
-            colour,
-            from: first.0,
-            to: last.1,
-            ..ShadedSpan::default()
-        })
+        Some(ShadedSpan::new(label, colour, first.0, last.1))
     };
     groups.filter_map(band).collect()
 }

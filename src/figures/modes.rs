@@ -41,33 +41,22 @@ pub(crate) fn draw_figures(title: &str, blade: &Linkage) -> [Figure; 2] {
         columns: 2,
         panels,
     };
+    let frequencies = found.iter().map(|hz| format_digits(*hz, 3)).collect();
+    let resonance = claim_sentence(frequencies, "The tip answers most at", "Hz");
+    let stable = of(false).into_iter().filter(|mode| mode.frequency_hz.is_some());
+    let ratios = stable.map(|mode| format_digits(mode.lip_over_neck.abs(), 2)).collect();
+    let swing = claim_sentence(ratios, "The lip swings", "times as far as the neck");
     let answer = vec![draw_receptance_panel(blade, sides, range)];
-    [
-        Figure {
-            columns: 1,
-            ..figure(resonance_claim(&found), "How far a force on the tip moves it", answer)
-        },
-        figure(swing_claim(&of(false)), "The links at both ends of a swing", shapes.collect()),
-    ]
+    let answer = figure(resonance, "How far a force on the tip moves it", answer);
+    [Figure { columns: 1, ..answer }, figure(swing, "The links at both ends of a swing", shapes.collect())]
 }
 
-/// The claim with its numbers: where a force moves the tip farthest.
-fn resonance_claim(found_hz: &[f64]) -> String {
-    let found: Vec<String> = found_hz.iter().map(|hz| format_digits(*hz, 3)).collect();
-    if found.is_empty() {
+/// The claim with its numbers; the same of both figures where there are none.
+fn claim_sentence(numbers: Vec<String>, before: &str, after: &str) -> String {
+    if numbers.is_empty() {
         return "The blade has no stable mode".to_owned();
     }
-    format!("The tip answers most at {} Hz", join_with_and(&found))
-}
-
-/// The claim with its numbers: how far the lip swings with the neck free.
-fn swing_claim(found: &[NaturalMode]) -> String {
-    let stable = found.iter().filter(|mode| mode.frequency_hz.is_some());
-    let ratios: Vec<String> = stable.map(|mode| format_digits(mode.lip_over_neck.abs(), 2)).collect();
-    if ratios.is_empty() {
-        return "The blade has no stable mode".to_owned();
-    }
-    format!("The lip swings {} times as far as the neck", join_with_and(&ratios))
+    format!("{before} {} {after}", join_with_and(&numbers))
 }
 
 fn side_name(on_shoulder: bool) -> &'static str {
@@ -82,27 +71,18 @@ fn draw_receptance_panel(blade: &Linkage, sides: &[bool], (low, high): (f64, f64
         1e3 * math::hypot(found.re, found.im)
     };
     let styles = [(Colour::Blue, Mark::Line), (Colour::Vermilion, Mark::Dashed)];
-    let series = sides.iter().zip(styles).map(|(&on, (colour, mark))| Series {
-        label: side_name(on).to_owned(),
-        colour,
-        mark,
-        points: (0..POINTS).map(at).map(|hz| Some((hz, mm_per_n(on, hz)))).collect(),
-        ..Series::default()
+    let series = sides.iter().zip(styles).map(|(&on, (colour, mark))| {
+        Series::new(side_name(on), colour, mark, (0..POINTS).map(at).map(|hz| (hz, mm_per_n(on, hz))))
     });
+    let (x, y) =
+        (ChartAxis::log("frequency, Hz").with_range(low, high), ChartAxis::log("tip over force, mm/N"));
     let rules = sides.iter().zip(styles).flat_map(|(&on, (colour, _))| {
         natural_modes(blade, TipConstraint::Free, on).into_iter().filter_map(move |mode| {
             let at = mode.frequency_hz?;
-            Some(VerticalLine { label: format!("{at:.0} Hz"), colour, mark: Mark::Dotted, at, above: None })
+            Some(VerticalLine::new(format!("{at:.0} Hz"), colour, Mark::Dotted, at))
         })
     });
-    Panel {
-        x: ChartAxis::log("frequency, Hz").with_range(low, high),
-        y: ChartAxis::log("tip over force, mm/N"),
-        height_mm: ANSWER_MM,
-        series: series.collect(),
-        vertical_lines: rules.collect(),
-        ..Panel::default()
-    }
+    Panel { vertical_lines: rules.collect(), ..Panel::new(x, y, ANSWER_MM, series) }
 }
 
 /// The links at both ends of a swing, over the upright blade, to scale.
@@ -115,28 +95,20 @@ fn draw_mode_shape(blade: &Linkage, on_shoulder: bool, number: usize, mode: &Nat
         let head = (0.0, l1 + l2);
         let hinge = (l1 * math::sin(sign * neck), head.1 - l1 * math::cos(sign * neck));
         let tip = (hinge.0 + l2 * math::sin(sign * lip), hinge.1 - l2 * math::cos(sign * lip));
-        vec![Some(head), Some(hinge), Some(tip)]
-    };
-    let drawn = |label: &str, colour, mark, points| Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points,
-        ..Series::default()
+        [head, hinge, tip]
     };
     let frequency = mode.frequency_hz.map_or_else(|| "unstable".to_owned(), |hz| format!("{hz:.1} Hz"));
+    let x = ChartAxis::linear("along the glass, mm").with_range(-half_mm, half_mm);
+    let joined = Mark::Joined(MarkerShape::Disc);
+    let series = [
+        Series::new("upright", Colour::Grey, Mark::Dashed, line(0.0)),
+        Series::new("one end of the swing", Colour::Blue, joined, line(1.0)),
+        Series::new("the other", Colour::Orange, joined, line(-1.0)),
+    ];
     Panel {
         title: format!("{}, mode {}: {frequency}", side_name(on_shoulder), number + 1),
-        x: ChartAxis::linear("along the glass, mm").with_range(-half_mm, half_mm),
-        y: ChartAxis::linear("over the glass, mm"),
-        height_mm: SHAPE_MM,
-        series: vec![
-            drawn("upright", Colour::Grey, Mark::Dashed, line(0.0)),
-            drawn("one end of the swing", Colour::Blue, Mark::Joined(MarkerShape::Disc), line(1.0)),
-            drawn("the other", Colour::Orange, Mark::Joined(MarkerShape::Disc), line(-1.0)),
-        ],
         equal_aspect: true,
-        ..Panel::default()
+        ..Panel::new(x, ChartAxis::linear("over the glass, mm"), SHAPE_MM, series)
     }
 }
 

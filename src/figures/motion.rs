@@ -13,11 +13,11 @@ use crate::text::{format_short, pluralise};
 const FORCE_MM: f64 = 24.0;
 
 pub(crate) fn draw_figure(title: &str, motion: &RunMotion) -> Figure {
-    let history = TimeHistory { model: Some(motion_traces(motion)), ..TimeHistory::default() };
     let history = TimeHistory {
+        model: Some(motion_traces(motion)),
         stick_s: motion.stick_s.iter().map(|[from, to]| (*from, *to)).collect(),
         instants: motion.turn_s().map(|at| ("head turns".to_owned(), at)).into_iter().collect(),
-        ..history
+        ..TimeHistory::default()
     };
     let mut figure = history::draw_figure(&history);
     figure.watermarked = true;
@@ -59,21 +59,13 @@ fn draw_force_panel(motion: &RunMotion, history: &TimeHistory) -> Option<Panel> 
     let points: Vec<_> = motion.samples.iter().map(|s| Some((s.time_s, s.normal_n))).collect();
     let most = points.iter().flatten().map(|(_, force)| *force).fold(0.0, f64::max);
     let flights = motion.impacts.iter().map(|impact| impact.time_s);
-    let rule =
-        |at| VerticalLine { at, colour: Colour::Purple, mark: Mark::Dotted, ..VerticalLine::default() };
+    let rule = |at| VerticalLine::new("", Colour::Purple, Mark::Dotted, at);
+    let (x, y) = (ChartAxis::time().with_ends(Some(span_s)), ChartAxis::linear("normal force, N"));
+    let series = Series::new("model", Colour::Vermilion, Mark::Line, thin_points(&points, span_s));
     (most > 0.0 && span_s.0 < span_s.1).then(|| Panel {
-        x: ChartAxis::time().with_range(span_s.0, span_s.1),
-        y: ChartAxis::linear("normal force, N").with_range(0.0, 1.05 * most),
-        height_mm: FORCE_MM,
-        series: vec![Series {
-            label: "model".to_owned(),
-            colour: Colour::Vermilion,
-            points: thin_points(&points, span_s),
-            ..Series::default()
-        }],
         shaded_spans: history::stick_spans(&history.stick_s, span_s),
         vertical_lines: flights.map(rule).collect(),
-        ..Panel::default()
+        ..Panel::new(x, y.with_range(0.0, 1.05 * most), FORCE_MM, [series])
     })
 }
 

@@ -1,9 +1,9 @@
 //! Phase portraits: deflection against the velocity of the tip, measured against model.
 
 use super::{FigureBlock, Words};
-use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series};
+use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, value_span};
 use crate::compare::{ConditionComparison, TimedRecording};
-use crate::figures::subtitle;
+use crate::figures::full_figure;
 use crate::math;
 use crate::recording::channel::{Channel, InstantKind};
 use crate::recording::quality::noise_floor;
@@ -39,19 +39,19 @@ pub struct PhasePortrait {
 
 /// Height of a panel, mm: as high as it is wide where two stand side by side.
 const HEIGHT_MM: f64 = 62.0;
-const MILLIMETRES: f64 = 1e3;
 
 /// The figure.
 #[must_use]
 pub fn draw_figure(shown: &PhasePortrait) -> Figure {
     Figure {
-        title: shown.title.clone(),
-        subtitle: subtitle(shown.synthetic, &shown.note),
-        watermarked: shown.synthetic,
-        description: "Phase portrait: velocity of the tip over deflection.".to_owned(),
-        width_mm: FULL_WIDTH_MM,
         columns: 2,
-        panels: shown.parts.iter().map(|part| draw_panel(part, frame_mark(&shown.parts))).collect(),
+        ..full_figure(
+            &shown.title,
+            shown.synthetic,
+            &shown.note,
+            "Phase portrait: velocity of the tip over deflection.",
+            shown.parts.iter().map(|part| draw_panel(part, frame_mark(&shown.parts))),
+        )
     }
 }
 
@@ -66,30 +66,15 @@ fn frame_mark(parts: &[PortraitPart]) -> Mark {
 }
 
 fn draw_panel(part: &PortraitPart, frames: Mark) -> Panel {
-    let styles = [
-        ("model", Colour::Vermilion, Mark::Line, &part.model),
-        ("measured", Colour::Black, frames, &part.measured),
-    ];
-    let scaled = |points: &[PhasePoint]| {
-        points.iter().map(|p| p.map(|(x, v)| (x * MILLIMETRES, v * MILLIMETRES))).collect()
+    let series = |label, colour, mark, points: &[PhasePoint]| {
+        Series::new(label, colour, mark, points.iter().map(|p| p.map(|(x, v)| (x * 1e3, v * 1e3))))
     };
-    let drawn = styles.into_iter().filter(|(.., points)| !points.is_empty());
-    let series = drawn.map(|(label, colour, mark, points)| Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points: scaled(points),
-        ..Series::default()
-    });
-    let (low, high) = deflection_limits_mm(part);
-    Panel {
-        title: part.name.clone(),
-        x: ChartAxis::linear("deflection, mm").with_range(low, high),
-        y: ChartAxis::linear("tip velocity, mm/s"),
-        height_mm: HEIGHT_MM,
-        series: series.collect(),
-        ..Panel::default()
-    }
+    let model = series("model", Colour::Vermilion, Mark::Line, &part.model);
+    let measured = series("measured", Colour::Black, frames, &part.measured);
+    let drawn = [model, measured].into_iter().filter(|s| !s.points.is_empty());
+    let x = ChartAxis::linear("deflection, mm").with_ends(Some(deflection_limits_mm(part)));
+    let y = ChartAxis::linear("tip velocity, mm/s");
+    Panel { title: part.name.clone(), ..Panel::new(x, y, HEIGHT_MM, drawn) }
 }
 
 /// Ends of the axis of the deflection, mm: every part has its own, also where the parts stand one below the
@@ -97,15 +82,8 @@ fn draw_panel(part: &PortraitPart, frames: Mark) -> Panel {
 fn deflection_limits_mm(part: &PortraitPart) -> (f64, f64) {
     const AXIS_MARGIN: f64 = 0.05;
     const LEAST_SPAN: f64 = 1e-4; // of the values: less is rounding, and labels would have no digits for it
-    let all = part
-        .measured
-        .iter()
-        .chain(&part.model)
-        .flatten()
-        .map(|(x, _)| x * MILLIMETRES)
-        .filter(|x| x.is_finite());
-    let (low, high) =
-        all.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), x| (low.min(x), high.max(x)));
+    let all = part.measured.iter().chain(&part.model).flatten().map(|(x, _)| x * 1e3);
+    let (low, high) = value_span(all.filter(|x| x.is_finite()));
     let room = (AXIS_MARGIN * (high - low)).max(LEAST_SPAN * low.abs().max(high.abs()));
     (low - room, high + room)
 }
@@ -136,20 +114,11 @@ impl CentralDifference {
     /// The shortest in which white noise of the place of a standard deviation, m, leaves `MAX_VELOCITY_NOISE` of
     /// the swing of the velocity, m/s; no longer than a fifth of the period of the fastest component, Hz, and
     /// the shortest there is where none is known.
-    pub(crate) fn for_noise(
-        frame_rate_hz: f64,
-        noise_m: f64,
-        swing_m_per_s: f64,
-        fastest_hz: Option<f64>,
-    ) -> Self {
-        let shortest = Self::of_neighbouring_frames(frame_rate_hz);
-        let quiet = if noise_m > 0.0 {
-            (shortest.noise_m_per_s(noise_m) / (MAX_VELOCITY_NOISE * swing_m_per_s)).ceil()
-        } else {
-            1.0
-        };
-        let longest =
-            fastest_hz.map_or(1.0, |hz| (MAX_DIFFERENCE_PERIODS * frame_rate_hz / hz / 2.0).floor());
+    pub(crate) fn for_noise(rate_hz: f64, noise_m: f64, swing_m_per_s: f64, fastest_hz: Option<f64>) -> Self {
+        let shortest = Self::of_neighbouring_frames(rate_hz);
+        let least = (shortest.noise_m_per_s(noise_m) / (MAX_VELOCITY_NOISE * swing_m_per_s)).ceil();
+        let quiet = if noise_m > 0.0 { least } else { 1.0 };
+        let longest = fastest_hz.map_or(1.0, |hz| (MAX_DIFFERENCE_PERIODS * rate_hz / hz / 2.0).floor());
         Self { half_frames: quiet.min(longest).max(1.0) as usize, ..shortest }
     }
 
@@ -252,17 +221,9 @@ pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
 /// The claim with its number: how far the velocity swings in the last part.
 fn figure_title(parts: &[PortraitPart]) -> String {
     let last = parts.last().and_then(|part| Some((&part.name, swing_m_per_s(&part.model)?)));
-    last.map_or_else(
-        || "The model shows no velocity".to_owned(),
-        |(name, swing)| {
-            let name = if name.starts_with(|c: char| c.is_ascii_digit()) {
-                format!("in {name}")
-            } else {
-                name.clone()
-            };
-            format!("The tip swings through {} {name}", format_speed(swing))
-        },
-    )
+    let Some((name, swing)) = last else { return "The model shows no velocity".to_owned() };
+    let within = if name.starts_with(|c: char| c.is_ascii_digit()) { "in " } else { "" };
+    format!("The tip swings through {} {within}{name}", format_speed(swing))
 }
 
 fn portrait_spans(case: &ConditionComparison) -> Vec<PortraitSpan> {
@@ -271,8 +232,8 @@ fn portrait_spans(case: &ConditionComparison) -> Vec<PortraitSpan> {
     let start_s = shown.instant_s(InstantKind::Release).unwrap_or(grid.start_s);
     let last_s = grid.time_s(grid.frames.saturating_sub(1));
     let end_s = shown.instants.time_s(InstantKind::Hold, 2).unwrap_or(last_s);
-    let low_hz = case.frequency_comparisons().map(|m| m.target.frequency_hz).reduce(f64::min);
-    let high_hz = case.frequency_comparisons().map(|m| m.target.frequency_hz).reduce(f64::max);
+    let sought_hz = || case.frequency_comparisons().map(|m| m.target.frequency_hz);
+    let (low_hz, high_hz) = (sought_hz().reduce(f64::min), sought_hz().reduce(f64::max));
     let first_s = low_hz.map_or(LONGEST_S, |hz| LOW_CYCLES / hz).min(LONGEST_S).min(end_s - start_s);
     let after =
         if shown.instant_s(InstantKind::Release).is_some() { "after the release" } else { "from the start" };
@@ -286,10 +247,8 @@ fn portrait_spans(case: &ConditionComparison) -> Vec<PortraitSpan> {
         to_s: start_s + first_s,
         cycles_hz: low_hz,
     };
-    let late = high_hz
-        .map(|hz| (hz, (HIGH_CYCLES / hz).min(LONGEST_S)))
-        .filter(|(_, length_s)| end_s - length_s > start_s + first_s);
-    let late = late.and_then(|(hz, length_s)| {
+    let late = high_hz.map(|hz| (hz, (HIGH_CYCLES / hz).min(LONGEST_S)));
+    let late = late.filter(|(_, length_s)| end_s - length_s > start_s + first_s).and_then(|(hz, length_s)| {
         let rest_s = (start_s + first_s, end_s);
         let starts = |at_s: f64| (at_s - length_s / 2.0).clamp(rest_s.0, rest_s.1 - length_s);
         let of_head =
@@ -334,12 +293,8 @@ fn peak_velocity(
 /// For how long the model's tip sticks from a time of what is shown on, s.
 fn stick_duration_s(case: &ConditionComparison, from_s: f64, length_s: f64) -> f64 {
     let from_s = from_s - case.alignment.shift_s;
-    case.model
-        .motion
-        .stick_s
-        .iter()
-        .map(|[start, end]| (end.min(from_s + length_s) - start.max(from_s)).max(0.0))
-        .sum()
+    let inside_s = |[start, end]: &[f64; 2]| (end.min(from_s + length_s) - start.max(from_s)).max(0.0);
+    case.model.motion.stick_s.iter().map(inside_s).sum()
 }
 
 /// How the velocities of both sides are taken, and what that rests on.
@@ -354,21 +309,16 @@ struct VelocityEstimate {
 
 fn estimate_velocities(case: &ConditionComparison, spans: &[PortraitSpan]) -> VelocityEstimate {
     let rate_hz = case.measured_or_model().recording.grid().frame_rate_hz;
-    let noise_m = case
-        .recording()
-        .and_then(|recording| noise_floor(&recording.traces().tip_x_m))
-        .filter(|noise_m| *noise_m > ROUNDING_M);
-    let swing = |span: &PortraitSpan| {
-        swing_m_per_s(&recorded_states(
-            &case.model_side(),
-            model_clock_span(case, span),
-            CentralDifference::of_neighbouring_frames(rate_hz),
-        ))
-    };
+    let shortest = CentralDifference::of_neighbouring_frames(rate_hz);
+    let noise_m = case.recording().and_then(|r| noise_floor(&r.traces().tip_x_m));
+    let noise_m = noise_m.filter(|noise_m| *noise_m > ROUNDING_M);
+    let model = case.model_side();
+    let swing =
+        |span: &PortraitSpan| swing_m_per_s(&recorded_states(&model, model_clock_span(case, span), shortest));
     let swing_m_per_s = spans.iter().filter_map(swing).reduce(f64::min);
     let fastest_hz = spans.iter().filter_map(|span| span.cycles_hz).reduce(f64::max);
     let known = noise_m.zip(swing_m_per_s);
-    let difference = known.map_or(CentralDifference::of_neighbouring_frames(rate_hz), |(noise_m, swing)| {
+    let difference = known.map_or(shortest, |(noise_m, swing)| {
         CentralDifference::for_noise(rate_hz, noise_m, swing, fastest_hz)
     });
     VelocityEstimate { difference, noise_m, swing_m_per_s, fastest_hz }
@@ -387,10 +337,12 @@ fn build_part(
     let measured =
         case.measured_side().map(|side| recorded_states(&side, (span.from_s, span.to_s), difference));
     let measured = measured.filter(|states| states.iter().any(Option::is_some));
+    let model_s = model_clock_span(case, span);
+    let state = |s: &ModelSample| Some((s.tip_x_m - s.head_x_m, s.tip_velocity_m_per_s));
     let model = match &measured {
-        Some(_) => differenced_states(case, model_clock_span(case, span), difference)
-            .unwrap_or_else(|| recorded_states(&case.model_side(), model_clock_span(case, span), difference)),
-        None => model_states(case, model_clock_span(case, span)),
+        Some(_) => differenced_states(case, model_s, difference)
+            .unwrap_or_else(|| recorded_states(&case.model_side(), model_s, difference)),
+        None => case.model.motion.fine_samples_between(model_s.into()).iter().map(state).collect(),
     };
     PortraitPart { name: span.name.clone(), measured: measured.unwrap_or_default(), model }
 }
@@ -421,12 +373,6 @@ fn differenced_states(
     Some(case.model.motion.fine_samples_between([from_s, to_s]).iter().map(state).collect())
 }
 
-/// States of the model itself.
-fn model_states(case: &ConditionComparison, (from_s, to_s): (f64, f64)) -> Vec<PhasePoint> {
-    let state = |s: &ModelSample| Some((s.tip_x_m - s.head_x_m, s.tip_velocity_m_per_s));
-    case.model.motion.fine_samples_between([from_s, to_s]).iter().map(state).collect()
-}
-
 /// States as the frames of a camera give them.
 fn recorded_states(
     side: &TimedRecording,
@@ -446,23 +392,17 @@ fn figure_text(
     measured: bool,
 ) -> Words {
     let said: Vec<String> = spans.iter().map(|span| span.said.clone()).collect();
-    let source = match case.recording() {
-        Some(_) if !measured => format!(
-            "the fitted model alone, as {} shows no velocity with its deflection there",
-            case.source_name()
-        ),
-        _ => case.source_name(),
-    };
+    let mut source = case.source_name();
+    if case.recording().is_some() && !measured {
+        source = format!("the fitted model alone, as {source} shows no velocity with its deflection there");
+    }
     let details = format!("Velocity of the tip over deflection in {}: {source}", join_with_and(&said));
     let details = match case.recording().filter(|_| measured) {
         Some(_) => format!("{details} and the fitted model through the same camera. {}", taken.describe()),
         None => format!("{details}; its own states, with no camera between."),
     };
-    let whose = if measured {
-        format!("{} over the fitted model", case.source_kind())
-    } else {
-        "the fitted model alone".to_owned()
-    };
+    let alone = || "the fitted model alone".to_owned();
+    let whose = if measured { format!("{} over the fitted model", case.source_kind()) } else { alone() };
     let caption = format!(
         "Velocity of the tip over deflection, {whose}: every loop is a cycle, and loops that lie over each \
          other repeat."
@@ -498,17 +438,15 @@ impl VelocityEstimate {
         let noise = self.difference.noise_m_per_s(noise_m);
         let of_swing = self.swing_m_per_s.map_or_else(String::new, |swing| {
             let share = format!(", {} of the least of the model's swings", format_percent(noise / swing));
-            let why = match self.fastest_hz {
-                Some(_) => "a longer difference would be quieter, but not follow the fastest component",
-                None => {
-                    "a longer difference would be quieter, but no frequency is known that it has to follow"
-                }
-            };
-            if noise > MAX_VELOCITY_NOISE * swing {
-                format!("{share}, which is more than {}: {why}", format_percent(MAX_VELOCITY_NOISE))
-            } else {
-                share
+            if noise <= MAX_VELOCITY_NOISE * swing {
+                return share;
             }
+            let why = match self.fastest_hz {
+                Some(_) => "not follow the fastest component",
+                None => "no frequency is known that it has to follow",
+            };
+            let most = format_percent(MAX_VELOCITY_NOISE);
+            format!("{share}, which is more than {most}: a longer difference would be quieter, but {why}")
         });
         format!(
             "; the tracking noise of the recorded tip makes that uncertain by {} (one standard \

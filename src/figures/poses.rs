@@ -88,11 +88,8 @@ fn head_over_tip_index(samples: &[ModelSample], from: usize, share: f64) -> Opti
 fn first_slip(motion: &RunMotion, released: usize) -> Option<usize> {
     let samples = &motion.samples;
     let slips = |at: &usize| matches!(samples[*at].mode, TipMode::SlipForward | TipMode::SlipBackward);
-    let again = motion
-        .stick_s
-        .iter()
-        .map(|[start, _]| samples.partition_point(|s| s.time_s < *start))
-        .find(|start| *start > released);
+    let starts = motion.stick_s.iter().map(|[start, _]| samples.partition_point(|s| s.time_s < *start));
+    let again = starts.into_iter().find(|start| *start > released);
     let speed = |at: &usize| samples[*at].tip_velocity_m_per_s.abs();
     (released..again.unwrap_or(samples.len())).take_while(slips).max_by(|a, b| speed(a).total_cmp(&speed(b)))
 }
@@ -129,14 +126,12 @@ impl PoseSequence {
     /// The poses of a motion; `None` where its head does not turn.
     #[must_use]
     pub fn from_motion(motion: &RunMotion, title: &str, subtitle: String) -> Option<Self> {
-        let turn_s = motion.turn_s()?;
-        let poses = reversal_poses(motion);
         Some(Self {
             title: title.to_owned(),
             subtitle,
             linkage: motion.linkage,
-            poses,
-            rest_s: rest_span_s(motion, turn_s),
+            poses: reversal_poses(motion),
+            rest_s: rest_span_s(motion, motion.turn_s()?),
             released_after_s: None,
         })
     }
@@ -170,8 +165,8 @@ fn claim_sentence(shown: &PoseSequence) -> String {
 /// One sentence on the figure.
 pub(crate) fn figure_caption(shown: &PoseSequence) -> String {
     let at = |name: &str| shown.poses.iter().find(|p| p.name == name);
-    let rests = describe_rest(shown)
-        .map(|(time, way)| format!(": its tip rests for {time} while the head moves by {way}"));
+    let rest = |(time, way)| format!(": its tip rests for {time} while the head moves by {way}");
+    let rests = describe_rest(shown).map(rest);
     let leans = at("before").zip(at("after")).map(|(before, after)| {
         let lean = |p: &ReversalPose| format_short(p.sample.pose.theta.to_degrees());
         let joint = if rests.is_some() { ", and the" } else { ": its" };
@@ -190,10 +185,8 @@ fn describe_rest(shown: &PoseSequence) -> Option<(String, String)> {
     let ([from, to], (stops, leaves)) = shown.rest_s.zip(at("tip stops").zip(at("stick ends")))?;
     let way_m = (leaves.sample.head_x_m - stops.sample.head_x_m).abs();
     let (unit, factor) = text::choose_prefix("m", [way_m]);
-    Some((
-        format!("{} ms", format_short(1e3 * (to - from))),
-        format!("{} {unit}", format_short(way_m * factor)),
-    ))
+    let way = format!("{} {unit}", format_short(way_m * factor));
+    Some((format!("{} ms", format_short(1e3 * (to - from))), way))
 }
 
 /// The rest of what is said of the figure.
@@ -214,15 +207,11 @@ pub(crate) fn figure_details(shown: &PoseSequence) -> String {
             format_milliseconds(release_s)
         )
     }));
-    let flights: Vec<String> = shown
-        .poses
-        .iter()
-        .filter(|p| p.sample.tip_height_m > 0.0)
-        .map(|p| format!("\u{201c}{}\u{201d}", p.name))
-        .collect();
-    sentences.extend(
-        (!flights.is_empty()).then(|| format!("The tip is off the glass in {}.", join_with_and(&flights))),
-    );
+    let flights = shown.poses.iter().filter(|p| p.sample.tip_height_m > 0.0);
+    let flights: Vec<String> = flights.map(|p| format!("\u{201c}{}\u{201d}", p.name)).collect();
+    if !flights.is_empty() {
+        sentences.push(format!("The tip is off the glass in {}.", join_with_and(&flights)));
+    }
     sentences.join(" ")
 }
 
@@ -262,6 +251,8 @@ const LEAST_ARROW: f64 = 0.25;
 #[must_use]
 pub fn draw_figure(shown: &PoseSequence) -> Figure {
     let longest = ArrowScale::from_poses(&shown.poses);
+    let poses = shown.poses.iter().enumerate();
+    let panels = poses.map(|(i, pose)| draw_panel(shown, &longest, pose, i == 0));
     Figure {
         title: claim_sentence(shown),
         subtitle: about(&shown.title, &shown.subtitle),
@@ -271,12 +262,7 @@ pub fn draw_figure(shown: &PoseSequence) -> Figure {
                 .to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 4,
-        panels: shown
-            .poses
-            .iter()
-            .enumerate()
-            .map(|(i, pose)| draw_panel(shown, &longest, pose, i == 0))
-            .collect(),
+        panels: panels.collect(),
     }
 }
 
@@ -300,18 +286,12 @@ fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, f
     // the head stays in the middle; lengths of the blade upright until the axes
     let [head, hinge, tip] = joint_positions(&shown.linkage, &pose.sample)
         .map(|(x, y)| ((x - pose.sample.head_x_m) / length_m, y / length_m));
-    let farthest = shown
-        .poses
-        .iter()
-        .map(|p| (p.sample.tip_x_m - p.sample.head_x_m).abs() / length_m)
-        .fold(0.0, f64::max);
+    let lean = |p: &ReversalPose| (p.sample.tip_x_m - p.sample.head_x_m).abs() / length_m;
+    let farthest = shown.poses.iter().map(lean).fold(0.0, f64::max);
     let half = HALF_WIDTH.max(farthest + BESIDE_TIP);
-    let line = |label: &str, colour, mark, points: Vec<Option<(f64, f64)>>| Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points: points.into_iter().map(|p| p.map(|(x, y)| (x * unit_mm, y * unit_mm))).collect(),
-        ..Series::default()
+    let line = |label: &str, colour, mark, points: Vec<Option<(f64, f64)>>| {
+        let in_mm = points.into_iter().map(|p| p.map(|(x, y)| (x * unit_mm, y * unit_mm)));
+        Series::new(label, colour, mark, in_mm)
     };
     let along = |value: f64, most: f64| if most > 0.0 { ARROW * value / most } else { 0.0 };
     let velocity = arrow_points((0.0, VELOCITY_AT), along(pose.head_m_per_s, longest.speed_m_per_s));
@@ -327,16 +307,15 @@ fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, f
         line("velocity of the head", Colour::Green, Mark::Line, velocity),
         line("friction on the tip", Colour::Vermilion, Mark::Line, friction),
     ];
-    let text = |text: String, (x, y): (f64, f64)| TextAnnotation {
-        text,
-        colour: Colour::Black,
-        at: (x * unit_mm, y * unit_mm),
+    let text = |text: String, (x, y): (f64, f64)| {
+        TextAnnotation::new(text, Colour::Black, (x * unit_mm, y * unit_mm))
     };
     // the wider the drawing, the smaller its scale, but letters keep their size
     let apart = TEXT_APART * half / HALF_WIDTH;
     let state = pose.sample.mode.name().replace('-', "\u{2212}");
-    let mut texts =
-        vec![text(format_tenths_ms(pose.after_turn_s), (0.0, TEXT_AT)), text(state, (0.0, TEXT_AT - apart))];
+    // samples are about a tenth of a millisecond apart
+    let time = format!("{} ms", format_decimals(1e3 * pose.after_turn_s, 1));
+    let mut texts = vec![text(time, (0.0, TEXT_AT)), text(state, (0.0, TEXT_AT - apart))];
     if first {
         let (most, height, over) = SCALE_BAR;
         let bar_mm = scale_bar_mm(most * unit_mm);
@@ -345,22 +324,15 @@ fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, f
         series.push(line("", Colour::Black, Mark::Thick, vec![Some((bar.0, height)), Some((bar.1, height))]));
         texts.push(text(format!("{} mm", format_short(bar_mm)), ((bar.0 + bar.1) / 2.0, height + over)));
     }
+    let [x, y] = [(-half, half), (FOOT, TOP)]
+        .map(|(low, high)| ChartAxis::linear("").with_range(low * unit_mm, high * unit_mm));
     Panel {
         title: pose.name.to_owned(),
-        x: ChartAxis::linear("").with_range(-half * unit_mm, half * unit_mm),
-        y: ChartAxis::linear("").with_range(FOOT * unit_mm, TOP * unit_mm),
-        height_mm: HEIGHT_MM,
-        series,
         annotations: texts,
         equal_aspect: true,
         bare: true,
-        ..Panel::default()
+        ..Panel::new(x, y, HEIGHT_MM, series)
     }
-}
-
-/// A time in tenths of a millisecond: the samples of a motion are about as far apart.
-fn format_tenths_ms(time_s: f64) -> String {
-    format!("{} ms", format_decimals(1e3 * time_s, 1))
 }
 
 /// The largest of 1, 2 and 5 times a power of ten that is not longer.

@@ -3,11 +3,11 @@
 
 use super::figure_text::parameter_symbol;
 use crate::chart::{
-    ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan,
-    VerticalLine,
+    ChartAxis, Colour, ErrorBar, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan, VerticalLine,
+    value_span,
 };
 use crate::compare::ParameterLine;
-use crate::figures::{Drawing, FigureBlock, about, subtitle};
+use crate::figures::{Drawing, FigureBlock, about, full_figure, subtitle};
 use crate::fit::job::{FreeParameter, Job};
 use crate::fit::profile::AT_BOUND;
 use crate::fit::result::{FitResult, ParameterResult};
@@ -73,16 +73,13 @@ const ROOM: f64 = 0.06;
 impl ProfilePlot {
     /// The profiles of a fit; `lines` bring units and true values.
     pub(crate) fn from_fit(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
+        let parameters = job.parameters.iter().filter_map(|free| parameter_profile(free, result, lines));
         Self {
             title: job.title.clone(),
             synthetic: result.synthetic,
             least_cost: result.cost,
             threshold: result.threshold,
-            parameters: job
-                .parameters
-                .iter()
-                .filter_map(|free| parameter_profile(free, result, lines))
-                .collect(),
+            parameters: parameters.collect(),
         }
     }
 
@@ -145,11 +142,8 @@ fn linear_model_parabola(
     threshold: f64,
 ) -> Vec<(f64, f64)> {
     let bounds = &parameter.bounds;
-    let Some(ends) =
-        found.linear_95.filter(|[lower, upper]| *lower > bounds.lower() || *upper < bounds.upper())
-    else {
-        return Vec::new();
-    };
+    let within = |ends: &[f64; 2]| ends[0] > bounds.lower() || ends[1] < bounds.upper();
+    let Some(ends) = found.linear_95.filter(within) else { return Vec::new() };
     let centre = bounds.to_unit(found.estimate);
     let half = ends.map(|end| (bounds.to_unit(end) - centre).abs()).into_iter().fold(0.0, f64::max);
     if half <= 0.0 {
@@ -164,20 +158,16 @@ fn linear_model_parabola(
 #[must_use]
 pub fn draw_figure(shown: &ProfilePlot) -> Figure {
     Figure {
-        title: claim_sentence(shown),
+        columns: 2,
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
-        watermarked: shown.synthetic,
-        description:
+        ..full_figure(
+            &claim_sentence(shown),
+            shown.synthetic,
+            "",
             "Rise of the cost along each parameter with the others refitted, against the 95 % threshold."
                 .to_owned(),
-        width_mm: FULL_WIDTH_MM,
-        columns: 2,
-        panels: shown
-            .parameters
-            .iter()
-            .filter(|p| !p.points.is_empty())
-            .map(|p| draw_panel(shown, p))
-            .collect(),
+            drawn_profiles(shown).into_iter().map(|p| draw_panel(shown, p)),
+        )
     }
 }
 
@@ -186,12 +176,8 @@ fn draw_panel(shown: &ProfilePlot, profile: &ParameterProfile) -> Panel {
     let (low, high) = x_limits(profile, top);
     let (unit, factor) = choose_prefix(&profile.unit, [low, high]);
     let (low, high) = (low * factor, high * factor);
-    let line = |label: &str, colour, mark, points: &[(f64, f64)]| Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points: points.iter().map(|(x, y)| Some((x * factor, *y))).collect(),
-        ..Series::default()
+    let line = |label: &str, colour, mark, points: &[(f64, f64)]| {
+        Series::new(label, colour, mark, points.iter().map(|(x, y)| Some((x * factor, *y))))
     };
     let level = [(low / factor, shown.threshold), (high / factor, shown.threshold)];
     let mut series = vec![
@@ -201,28 +187,19 @@ fn draw_panel(shown: &ProfilePlot, profile: &ParameterProfile) -> Panel {
     ];
     series.retain(|s| !s.points.is_empty());
     let bars = INTERVALS.iter().zip(profile.intervals);
-    series.extend(
-        bars.filter_map(|(look, ends)| {
-            interval_bar(shown, look, ends?, profile.estimate, factor, (low, high))
-        }),
-    );
+    let bar = |(look, ends): (_, Option<_>)| {
+        interval_bar(shown, look, ends?, profile.estimate, factor, (low, high))
+    };
+    series.extend(bars.filter_map(bar));
     series.extend(stated_interval_line(shown, profile, factor, (low, high)));
-    let truth = profile.truth.map(|at| VerticalLine {
-        label: "synthetic truth".to_owned(),
-        colour: Colour::Vermilion,
-        mark: Mark::Line,
-        at: at * factor,
-        above: None,
-    });
+    let truth = |at| VerticalLine::new("synthetic truth", Colour::Vermilion, Mark::Line, at * factor);
+    let x = ChartAxis::linear(label_with_unit(&profile.symbol, &unit)).with_range(low, high);
+    let y = ChartAxis::linear("rise of the cost").with_range(-0.04 * top, top);
     Panel {
         title: title_word(profile.verdict),
-        x: ChartAxis::linear(label_with_unit(&profile.symbol, &unit)).with_range(low, high),
-        y: ChartAxis::linear("rise of the cost").with_range(-0.04 * top, top),
-        height_mm: HEIGHT_MM,
-        series,
         shaded_spans: out_of_bounds_spans(profile, factor, (low, high)),
-        vertical_lines: truth.into_iter().collect(),
-        ..Panel::default()
+        vertical_lines: profile.truth.map(truth).into_iter().collect(),
+        ..Panel::new(x, y, HEIGHT_MM, series)
     }
 }
 
@@ -236,19 +213,10 @@ fn stated_interval_line(
 ) -> Option<Series> {
     let (label, height) = STATED;
     let ([lower, upper], beyond) = (profile.stated, high - low);
-    (lower.is_some() || upper.is_some()).then(|| {
-        let ends = [
-            lower.map_or(low - beyond, |value| value * factor),
-            upper.map_or(high + beyond, |value| value * factor),
-        ];
-        Series {
-            label: label.to_owned(),
-            colour: Colour::Black,
-            mark: Mark::Thick,
-            points: ends.map(|end| Some((end, height * shown.threshold))).to_vec(),
-            ..Series::default()
-        }
-    })
+    let end = |end: Option<f64>, open: f64| end.map_or(open, |value| value * factor);
+    lower.or(upper)?;
+    let ends = [end(lower, low - beyond), end(upper, high + beyond)];
+    Some(Series::new(label, Colour::Black, Mark::Thick, ends.map(|end| (end, height * shown.threshold))))
 }
 
 /// An interval as a bar with a symbol at the estimate; an open end runs out of the axes.
@@ -260,39 +228,30 @@ fn interval_bar(
     factor: f64,
     (low, high): (f64, f64),
 ) -> Option<Series> {
-    if lower.is_none() && upper.is_none() {
-        return None;
-    }
+    lower.or(upper)?;
     let (y, beyond) = (height * shown.threshold, high - low);
     let end = |end: Option<f64>, open: f64| end.map_or(open, |value| value * factor);
     Some(Series {
-        label: format!("95 % by {name}"),
-        colour: *colour,
-        mark: Mark::Hollow(*shape),
-        points: vec![Some((estimate * factor, y))],
         error_bars: vec![ErrorBar::Horizontal {
             y,
             from: end(lower, low - beyond),
             to: end(upper, high + beyond),
         }],
+        ..Series::new(
+            format!("95 % by {name}"),
+            *colour,
+            Mark::Hollow(*shape),
+            [Some((estimate * factor, y))],
+        )
     })
 }
 
 /// Where the search could not go, as far as that is shown.
 fn out_of_bounds_spans(profile: &ParameterProfile, factor: f64, (low, high): (f64, f64)) -> Vec<ShadedSpan> {
     let (lower, upper) = (profile.bounds.0 * factor, profile.bounds.1 * factor);
-    let band = |from, to| ShadedSpan {
-        label: "out of bounds".to_owned(),
-        colour: Colour::Grey,
-        from,
-        to,
-        outlined: false,
-    };
-    [(low, lower), (upper, high)]
-        .into_iter()
-        .filter(|(from, to)| from < to)
-        .map(|(from, to)| band(from, to))
-        .collect()
+    let band = |from, to| ShadedSpan::new("out of bounds", Colour::Grey, from, to);
+    let outside = [(low, lower), (upper, high)].into_iter().filter(|(from, to)| from < to);
+    outside.map(|(from, to)| band(from, to)).collect()
 }
 
 /// Ends of the x axis: of the profile as far as it is shown, of the intervals and the truth, with some room.
@@ -300,16 +259,13 @@ fn x_limits(profile: &ParameterProfile, top: f64) -> (f64, f64) {
     let rises = |at: usize| profile.points.get(at).is_some_and(|(_, rise)| *rise <= top);
     // a place beyond the top belongs to the figure where the line to it starts inside
     let reached = |at: usize| rises(at) || at.checked_sub(1).is_some_and(rises) || rises(at + 1);
-    let inside = profile.points.iter().enumerate().filter(|(at, _)| reached(*at)).map(
-        |(at, (value, rise))| match rises(at) {
-            true => *value,
-            false => crossing_at_top(profile, at, (*value, *rise), top),
-        },
-    );
+    let inside = profile.points.iter().enumerate().filter(|(at, _)| reached(*at));
+    let inside =
+        inside.map(|(at, point)| if rises(at) { point.0 } else { crossing_at_top(profile, at, *point, top) });
     let intervals = profile.intervals.iter().flatten().flatten().chain(&profile.stated).flatten().copied();
     let all =
         inside.chain(intervals).chain(profile.truth).chain([profile.estimate]).filter(|v| v.is_finite());
-    let (low, high) = all.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let (low, high) = value_span(all);
     let room = if high > low { ROOM * (high - low) } else { (ROOM * high.abs()).max(f64::MIN_POSITIVE) };
     (low - room, high + room)
 }
@@ -333,9 +289,7 @@ pub(crate) fn figure_caption(shown: &ProfilePlot) -> String {
 /// The claim with its numbers.
 fn claim_sentence(shown: &ProfilePlot) -> String {
     let drawn = drawn_profiles(shown);
-    let crosses =
-        |p: &&&ParameterProfile| p.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some));
-    let (count, all) = (drawn.iter().filter(crosses).count(), drawn.len());
+    let (count, all) = (drawn.iter().filter(|p| is_closed(p)).count(), drawn.len());
     format!("{count} of {all} profiles cross the 95 % threshold on both sides")
 }
 
@@ -359,7 +313,8 @@ pub(crate) fn figure_details(shown: &ProfilePlot) -> String {
          reached a bound of the search."
             .to_owned()
     }));
-    sentences.extend(drawn.iter().any(|p| is_closed_but_unidentified(p)).then(|| {
+    let unidentified = |p: &&ParameterProfile| p.verdict == ParameterVerdict::NotIdentified && is_closed(p);
+    sentences.extend(drawn.iter().any(unidentified).then(|| {
         format!(
             "A parameter whose line crosses the threshold on both sides is \u{201c}{}\u{201d} if the \
              features \
@@ -385,9 +340,9 @@ fn title_word(verdict: ParameterVerdict) -> String {
     verdict.name().replace('-', " ")
 }
 
-fn is_closed_but_unidentified(profile: &ParameterProfile) -> bool {
-    profile.verdict == ParameterVerdict::NotIdentified
-        && profile.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some))
+/// Whether the interval by the profile has two ends.
+fn is_closed(profile: &ParameterProfile) -> bool {
+    profile.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some))
 }
 
 /// "A from 0.1 to 0.2", or which end is open.

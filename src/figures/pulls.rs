@@ -1,10 +1,8 @@
 //! Every feature of a fit on one axis: how many deviations of its target the model is off.
 
-use crate::chart::{
-    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan, VerticalLine,
-};
+use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan, VerticalLine};
 use crate::compare::Comparison;
-use crate::figures::{Drawing, FigureBlock, about, subtitle};
+use crate::figures::{Drawing, FigureBlock, about, full_figure, subtitle};
 use crate::text::{format_digits, pluralise, truncate_text};
 
 /// A feature and how far off it is.
@@ -53,15 +51,12 @@ impl PullPlot {
         let pull = |(row, held_out): &(&Comparison, bool)| {
             deviations(row).map(|deviations| Pull { name: row.name.clone(), deviations, held_out: *held_out })
         };
+        let without = rows.iter().filter(|(row, _)| deviations(row).is_none());
         Self {
             title: title.to_owned(),
             synthetic: rows.iter().any(|(row, _)| row.synthetic),
             pulls: rows.iter().filter_map(pull).collect(),
-            without: rows
-                .iter()
-                .filter(|(row, _)| deviations(row).is_none())
-                .map(|(row, _)| row.name.clone())
-                .collect(),
+            without: without.map(|(row, _)| row.name.clone()).collect(),
         }
     }
 
@@ -92,49 +87,30 @@ pub fn draw_figure(shown: &PullPlot) -> Figure {
     let end = LEAST_END.max(1.1 * most);
     let of = |held_out: bool| {
         let places = shown.pulls.iter().enumerate().filter(move |(_, pull)| pull.held_out == held_out);
-        places.map(|(i, pull)| Some((pull.deviations, (count - 1 - i) as f64))).collect::<Vec<_>>()
+        places.map(|(i, pull)| (pull.deviations, (count - 1 - i) as f64))
     };
+    let predicted = Mark::Hollow(MarkerShape::Diamond);
     let series = [
-        ("fitted", Colour::Blue, Mark::Hollow(MarkerShape::Disc), of(false)),
-        ("predicted, not fitted", Colour::Vermilion, Mark::Hollow(MarkerShape::Diamond), of(true)),
+        Series::new("fitted", Colour::Blue, Mark::Hollow(MarkerShape::Disc), of(false)),
+        Series::new("predicted, not fitted", Colour::Vermilion, predicted, of(true)),
     ];
-    let drawn = series.into_iter().filter(|(.., points)| !points.is_empty());
+    let drawn = series.into_iter().filter(|s| !s.points.is_empty());
+    let x = ChartAxis::linear("deviations from the target").with_range(-end, end);
+    let y = ChartAxis::categorical("", shown.pulls.iter().rev().map(|pull| pull.name.clone()));
     let panel = Panel {
-        x: ChartAxis::linear("deviations from the target").with_range(-end, end),
-        y: ChartAxis::categorical("", shown.pulls.iter().rev().map(|pull| pull.name.clone())),
-        height_mm: LEAST_MM.max(ROW_MM * count as f64),
-        series: drawn
-            .map(|(label, colour, mark, points)| Series {
-                label: label.to_owned(),
-                colour,
-                mark,
-                points,
-                ..Series::default()
-            })
-            .collect(),
-        shaded_spans: vec![ShadedSpan {
-            label: "95 % of a right model".to_owned(),
-            colour: Colour::SkyBlue,
-            from: -WITHIN_95,
-            to: WITHIN_95,
-            outlined: false,
-        }],
-        vertical_lines: vec![VerticalLine {
-            colour: Colour::Grey,
-            mark: Mark::Thin,
-            at: 0.0,
-            ..VerticalLine::default()
-        }],
-        ..Panel::default()
+        shaded_spans: vec![ShadedSpan::new("95 % of a right model", Colour::SkyBlue, -WITHIN_95, WITHIN_95)],
+        vertical_lines: vec![VerticalLine::new("", Colour::Grey, Mark::Thin, 0.0)],
+        ..Panel::new(x, y, LEAST_MM.max(ROW_MM * count as f64), drawn)
     };
     Figure {
-        title: claim_sentence(shown),
         subtitle: about(&shown.title, &subtitle(shown.synthetic, "")),
-        watermarked: shown.synthetic,
-        description: "Model minus target of every feature, in deviations of the target.".to_owned(),
-        width_mm: FULL_WIDTH_MM,
-        panels: vec![panel],
-        ..Figure::default()
+        ..full_figure(
+            &claim_sentence(shown),
+            shown.synthetic,
+            "",
+            "Model minus target of every feature, in deviations of the target.",
+            [panel],
+        )
     }
 }
 
@@ -157,10 +133,9 @@ fn claim_sentence(shown: &PullPlot) -> String {
 
 /// What the figure shows, with its number.
 pub(crate) fn figure_caption(shown: &PullPlot) -> String {
-    let without = if shown.without.is_empty() {
-        String::new()
-    } else {
-        format!("; {} not drawn, as model or deviation is missing", shown.without.len())
+    let without = match shown.without.len() {
+        0 => String::new(),
+        count => format!("; {count} not drawn, as model or deviation is missing"),
     };
     format!("{}{without}.", claim_sentence(shown))
 }

@@ -40,11 +40,8 @@ pub(crate) fn draw_figure(recording: &Recording, reversals: &[f64], said: &str) 
 fn claim_sentence(recording: &Recording, reversals: usize) -> String {
     let (lost, grid) = (lost_frames(recording), recording.grid());
     let share = lost.iter().filter(|lost| **lost).count() as f64 / lost.len().max(1) as f64;
-    let tracked = if share > 0.0 {
-        format!("{} of the frames", format_percent(1.0 - share))
-    } else {
-        "every frame".to_owned()
-    };
+    let part = || format!("{} of the frames", format_percent(1.0 - share));
+    let tracked = if share > 0.0 { part() } else { "every frame".to_owned() };
     let turns = match reversals {
         0 => "no reversal".to_owned(),
         n => format!("{n} {}", pluralise("reversal", n)),
@@ -72,12 +69,8 @@ fn gap_spans(recording: &Recording) -> Vec<ShadedSpan> {
     }
     runs.sort_by_key(|(first, last)| std::cmp::Reverse(last - first));
     runs.truncate(MOST_GAPS);
-    let band = |(first, last): &(usize, usize)| ShadedSpan {
-        label: "head or tip not tracked".to_owned(),
-        colour: Colour::Grey,
-        from: grid.time_s(*first),
-        to: grid.time_s(*last),
-        outlined: false,
+    let band = |(first, last): &(usize, usize)| {
+        ShadedSpan::new("head or tip not tracked", Colour::Grey, grid.time_s(*first), grid.time_s(*last))
     };
     runs.iter().map(band).collect()
 }

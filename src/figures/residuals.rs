@@ -2,9 +2,9 @@
 //! frequencies, and how it grows with the length of a run.
 
 use super::{FigureBlock, Words};
-use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Ribbon, Series};
+use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series};
 use crate::compare::ConditionComparison;
-use crate::figures::subtitle;
+use crate::figures::full_figure;
 use crate::math;
 use crate::spectrum::Multitaper;
 use crate::text::{format_decimals, format_digits};
@@ -41,103 +41,77 @@ const POINTS: u32 = 60;
 pub fn draw_figure(shown: &ResidualDiagnostics) -> Figure {
     let panels = [draw_histogram(shown), draw_correlation(shown), draw_spectrum(shown), draw_growth(shown)];
     Figure {
-        title: shown.title.clone(),
-        subtitle: subtitle(shown.synthetic, &shown.note),
-        watermarked: shown.synthetic,
-        description: "Residual in units of the noise: histogram, autocorrelation and spectrum against white \
-                      noise, and chi2 over the length of the segments."
-            .to_owned(),
-        width_mm: FULL_WIDTH_MM,
         columns: 2,
-        panels: panels.into_iter().flatten().collect(),
+        ..full_figure(
+            &shown.title,
+            shown.synthetic,
+            &shown.note,
+            "Residual in units of the noise: histogram, autocorrelation and spectrum against white \
+                      noise, and chi2 over the length of the segments."
+                .to_owned(),
+            panels.into_iter().flatten(),
+        )
     }
 }
 
-fn residual_line(label: &str, colour: Colour, mark: Mark, points: Vec<Option<(f64, f64)>>) -> Series {
-    Series { label: label.to_owned(), colour, mark, points, ..Series::default() }
-}
-
-const RESIDUAL: &str = "residual";
 const WHITE: &str = "white noise";
 
 fn draw_histogram(shown: &ResidualDiagnostics) -> Option<Panel> {
     let (first, last) = (shown.histogram.first()?, shown.histogram.last()?);
-    let steps =
-        shown.histogram.iter().flat_map(|(from, to, share)| [Some((*from, *share)), Some((*to, *share))]);
-    let bars = shown
-        .histogram
-        .iter()
-        .flat_map(|(from, to, share)| [Some((*from, 0.0, *share)), Some((*to, 0.0, *share))]);
+    let steps = shown.histogram.iter().flat_map(|(from, to, share)| [(*from, *share), (*to, *share)]);
+    let bars = steps.clone().map(|(x, share)| (x, 0.0, share));
     let at = |k: u32| first.0 + (last.1 - first.0) * f64::from(k) / f64::from(POINTS);
     let normal = |x: f64| math::exp(-0.5 * x * x) / std::f64::consts::TAU.sqrt();
+    let white = (0..=POINTS).map(|k| (at(k), normal(at(k))));
+    let series = [
+        Series::new("residual", Colour::Green, Mark::Line, steps),
+        Series::new(WHITE, Colour::Black, Mark::Dashed, white),
+    ];
+    let x = ChartAxis::linear("residual / noise").with_range(first.0, last.1);
     Some(Panel {
         title: "size".to_owned(),
-        x: ChartAxis::linear("residual / noise").with_range(first.0, last.1),
-        y: ChartAxis::linear("density"),
-        height_mm: HEIGHT_MM,
-        series: vec![
-            residual_line(RESIDUAL, Colour::Green, Mark::Line, steps.collect()),
-            residual_line(
-                WHITE,
-                Colour::Black,
-                Mark::Dashed,
-                (0..=POINTS).map(|k| Some((at(k), normal(at(k))))).collect(),
-            ),
-        ],
-        ribbons: vec![Ribbon { label: String::new(), colour: Colour::Green, points: bars.collect() }],
-        ..Panel::default()
+        ribbons: vec![Ribbon::new("", Colour::Green, bars)],
+        ..Panel::new(x, ChartAxis::linear("density"), HEIGHT_MM, series)
     })
 }
 
 fn draw_correlation(shown: &ResidualDiagnostics) -> Option<Panel> {
-    let (first, last) =
-        (shown.correlation.first()?.0 * MILLISECONDS, shown.correlation.last()?.0 * MILLISECONDS);
-    let points = shown.correlation.iter().map(|(lag, r)| Some((lag * MILLISECONDS, *r)));
+    let lag_ms = |(lag_s, _): &(f64, f64)| lag_s * MILLISECONDS;
+    let (first, last) = (lag_ms(shown.correlation.first()?), lag_ms(shown.correlation.last()?));
+    let points = shown.correlation.iter().map(|p| (lag_ms(p), p.1));
+    let white = [0.0, last].map(|t| (t, -shown.white_95, shown.white_95));
+    let x = ChartAxis::linear("lag, ms").with_range(0.0, last.max(first + f64::MIN_POSITIVE));
+    let y = ChartAxis::linear("autocorrelation").with_range(-1.0, 1.0);
+    let series = Series::new("", Colour::Green, Mark::Joined(MarkerShape::Disc), points);
     Some(Panel {
         title: "memory".to_owned(),
-        x: ChartAxis::linear("lag, ms").with_range(0.0, last.max(first + f64::MIN_POSITIVE)),
-        y: ChartAxis::linear("autocorrelation").with_range(-1.0, 1.0),
-        height_mm: HEIGHT_MM,
-        series: vec![residual_line("", Colour::Green, Mark::Joined(MarkerShape::Disc), points.collect())],
-        ribbons: vec![Ribbon {
-            label: "95 % of white noise".to_owned(),
-            colour: Colour::SkyBlue,
-            points: [0.0, last].map(|t| Some((t, -shown.white_95, shown.white_95))).to_vec(),
-        }],
-        ..Panel::default()
+        ribbons: vec![Ribbon::new("95 % of white noise", Colour::SkyBlue, white)],
+        ..Panel::new(x, y, HEIGHT_MM, [series])
     })
 }
 
 fn draw_spectrum(shown: &ResidualDiagnostics) -> Option<Panel> {
     let (first, last) = (shown.spectrum.first()?.0, shown.spectrum.last()?.0);
-    Some(Panel {
-        title: "frequencies".to_owned(),
-        x: ChartAxis::linear("frequency, Hz").with_range(0.0, last),
-        y: ChartAxis::log("power / that of the noise"),
-        height_mm: HEIGHT_MM,
-        series: vec![
-            residual_line("", Colour::Green, Mark::Thin, shown.spectrum.iter().copied().map(Some).collect()),
-            residual_line(WHITE, Colour::Black, Mark::Dashed, vec![Some((first, 1.0)), Some((last, 1.0))]),
-        ],
-        ..Panel::default()
-    })
+    let series = [
+        Series::new("", Colour::Green, Mark::Thin, shown.spectrum.iter().copied()),
+        Series::new(WHITE, Colour::Black, Mark::Dashed, [(first, 1.0), (last, 1.0)]),
+    ];
+    let x = ChartAxis::linear("frequency, Hz").with_range(0.0, last);
+    let panel = Panel::new(x, ChartAxis::log("power / that of the noise"), HEIGHT_MM, series);
+    Some(Panel { title: "frequencies".to_owned(), ..panel })
 }
 
 fn draw_growth(shown: &ResidualDiagnostics) -> Option<Panel> {
-    let points: Vec<_> = shown.growth.iter().map(|(s, chi2)| Some((s * MILLISECONDS, *chi2))).collect();
+    let points = shown.growth.iter().map(|(s, chi2)| (s * MILLISECONDS, *chi2));
     let ends = shown.growth.first().zip(shown.growth.last())?;
     let ends = [ends.0.0 * MILLISECONDS / 1.2, ends.1.0 * MILLISECONDS * 1.2];
-    Some(Panel {
-        title: "growth".to_owned(),
-        x: ChartAxis::log("length of a segment, ms").with_range(ends[0], ends[1]),
-        y: ChartAxis::log("chi2 per degree of freedom"),
-        height_mm: HEIGHT_MM,
-        series: vec![
-            residual_line("segments of the fit", Colour::Blue, Mark::Joined(MarkerShape::Square), points),
-            residual_line(WHITE, Colour::Black, Mark::Dashed, ends.map(|x| Some((x, 1.0))).to_vec()),
-        ],
-        ..Panel::default()
-    })
+    let series = [
+        Series::new("segments of the fit", Colour::Blue, Mark::Joined(MarkerShape::Square), points),
+        Series::new(WHITE, Colour::Black, Mark::Dashed, ends.map(|x| (x, 1.0))),
+    ];
+    let x = ChartAxis::log("length of a segment, ms").with_range(ends[0], ends[1]);
+    let panel = Panel::new(x, ChartAxis::log("chi2 per degree of freedom"), HEIGHT_MM, series);
+    Some(Panel { title: "growth".to_owned(), ..panel })
 }
 
 // The residual of a condition against white noise.
@@ -173,6 +147,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let correlation = autocorrelation(&left, rate_hz);
     let neighbours = correlation.first()?.1;
     let stages = case.result.misfit.iter().flat_map(|misfit| &misfit.stages);
+    let growth = stages.map(|stage| (stage.segment_s, stage.chi2_per_dof));
     let shown = ResidualDiagnostics {
         title: claim_sentence(rms, neighbours),
         note: format!("residual of the {} in one run of the model", channel.label()),
@@ -181,16 +156,10 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
         correlation,
         white_95: Z_95 / (values.len() as f64).sqrt(),
         spectrum: power_density(&left, rate_hz),
-        growth: stages
-            .map(|stage| (stage.segment_s, stage.chi2_per_dof))
-            .filter(|(_, chi2)| chi2.is_finite())
-            .collect(),
+        growth: growth.filter(|(_, chi2)| chi2.is_finite()).collect(),
     };
-    let caption = format!(
-        "{}; that of white noise lies within \u{b1}{}.",
-        shown.title,
-        format_decimals(shown.white_95, 2)
-    );
+    let white_95 = format_decimals(shown.white_95, 2);
+    let caption = format!("{}; that of white noise lies within \u{b1}{white_95}.", shown.title);
     let growth = match (shown.growth.first(), shown.growth.last()) {
         (Some(first), Some(last)) => format!(
             " Restarted in segments, as it is fitted, the model has a chi2 per degree of freedom of {} at {} ms \
@@ -213,11 +182,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
 
 /// The claim with its numbers.
 fn claim_sentence(rms: f64, neighbours: f64) -> String {
-    let is = if rms < 1.0 + WHITE_NOISE_TOLERANCE && neighbours.abs() < WHITE_NOISE_TOLERANCE {
-        "like white"
-    } else {
-        "more than"
-    };
+    let white = rms < 1.0 + WHITE_NOISE_TOLERANCE && neighbours.abs() < WHITE_NOISE_TOLERANCE;
+    let is = if white { "like white" } else { "more than" };
     let (size, r) = (format_digits(rms, 2), format_decimals(neighbours, 2));
     format!("The residual is {is} noise: {size} times its size, correlation {r}")
 }
@@ -229,9 +195,7 @@ fn histogram_bins(values: &[f64]) -> Vec<(f64, f64, f64)> {
     let mut counts = vec![0usize; HISTOGRAM_BINS];
     for value in values.iter().filter(|x| x.is_finite()) {
         let bin = (((value + end) / width) as usize).min(HISTOGRAM_BINS - 1);
-        if let Some(count) = counts.get_mut(bin) {
-            *count += 1;
-        }
+        counts[bin] += 1;
     }
     let bin = |(i, count): (usize, usize)| {
         let from = -end + i as f64 * width;
@@ -260,13 +224,8 @@ fn autocorrelation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
 fn power_density(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     let Ok(found) = Multitaper::new(left, rate_hz, left.len(), TAPERS) else { return Vec::new() };
     let white = 2.0 / rate_hz;
-    let bins: Vec<(f64, f64)> = found
-        .frequency_hz
-        .iter()
-        .zip(&found.density_m2_per_hz)
-        .skip(1)
-        .map(|(f, d)| (*f, d / white))
-        .collect();
+    let bins = found.frequency_hz.iter().zip(&found.density_m2_per_hz).skip(1);
+    let bins: Vec<(f64, f64)> = bins.map(|(f, d)| (*f, d / white)).collect();
     let mean = |group: &[(f64, f64)]| {
         let count = group.len() as f64;
         (group.iter().map(|p| p.0).sum::<f64>() / count, group.iter().map(|p| p.1).sum::<f64>() / count)

@@ -2,8 +2,8 @@
 
 use super::analysis::AnalysedWindow;
 use super::history::{length_unit, thin_points};
-use super::{FigureBlock, Words, subtitle};
-use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series};
+use super::{FigureBlock, Words, full_figure, subtitle};
+use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series};
 use crate::compare::ConditionComparison;
 use crate::compare::condition::{FitWindow, compare_frequency};
 use crate::feature::Reading;
@@ -61,8 +61,6 @@ pub struct RingDown {
 const HEIGHT_MM: f64 = 48.0;
 const RESIDUAL_HEIGHT_MM: f64 = 24.0;
 const DECAY_HEIGHT_MM: f64 = 42.0;
-/// Name of what the oscillations and the trend add up to: no model of the blade, which would be called a fit.
-const SUM: &str = "trend + oscillations";
 
 /// The figure.
 #[must_use]
@@ -70,30 +68,25 @@ pub fn draw_figure(shown: &RingDown) -> Figure {
     let mut panels = vec![draw_whole_panel(shown), draw_residual_panel(shown)];
     panels.extend(shown.decay.as_ref().map(draw_decay_panel));
     let ends = time_span(shown);
-    for panel in &mut panels {
-        panel.x = ends.map_or(ChartAxis::time(), |(first, last)| ChartAxis::time().with_range(first, last));
-    }
-    Figure {
-        title: shown.title.clone(),
-        subtitle: subtitle(shown.synthetic, &shown.note),
-        watermarked: shown.synthetic,
-        description: format!(
+    panels.iter_mut().for_each(|panel| panel.x = ChartAxis::time().with_ends(ends));
+    full_figure(
+        &shown.title,
+        shown.synthetic,
+        &shown.note,
+        format!(
             "Ring-down of {}: data, the sum of trend and decaying sinusoids, and the rest.",
             shown.quantity
         ),
-        width_mm: FULL_WIDTH_MM,
         panels,
-        ..Figure::default()
-    }
+    )
 }
 
 /// The claim with its numbers: frequency and damping of a component.
 pub(crate) fn figure_title(quantity: &str, component: &Component) -> String {
     let frequency = format_with_sd(component.frequency_hz, component.frequency_sd_hz);
-    let damping =
-        component.damping_ratio.zip(component.damping_ratio_sd).map_or_else(String::new, |(ratio, sd)| {
-            format!(" with a damping ratio of {}", format_with_sd(ratio, sd))
-        });
+    let damping = component.damping_ratio.zip(component.damping_ratio_sd);
+    let words = |(ratio, sd)| format!(" with a damping ratio of {}", format_with_sd(ratio, sd));
+    let damping = damping.map_or_else(String::new, words);
     format!("The {quantity} rings at {frequency} Hz{damping}")
 }
 
@@ -104,37 +97,22 @@ fn time_span(shown: &RingDown) -> Option<(f64, f64)> {
     (first < last).then_some((first, last))
 }
 
-/// A panel of traces in the unit in which they read best; its series come with the factor to that unit.
+/// A panel of traces in the unit in which they read best, with the factor from metres to that unit.
 fn draw_traces(name: &str, height_mm: f64, traces: &[(&str, Colour, Mark, &RingDownTrace)]) -> (Panel, f64) {
-    let (unit, factor) = length_unit(
-        traces
-            .iter()
-            .flat_map(|(.., t)| t.displacement_m.iter().flatten().copied())
-            .filter(|x| x.is_finite()),
-    );
-    let series = |(label, colour, mark, trace): &(&str, Colour, Mark, &RingDownTrace)| Series {
-        label: (*label).to_owned(),
-        colour: *colour,
-        mark: *mark,
-        points: thin_trace(trace, factor),
-        error_bars: Vec::new(),
+    let values = traces.iter().flat_map(|(.., t)| t.displacement_m.iter().flatten().copied());
+    let (unit, factor) = length_unit(values.filter(|x| x.is_finite()));
+    let series = |(label, colour, mark, trace): &(&str, Colour, Mark, &RingDownTrace)| {
+        Series::new(*label, *colour, *mark, thin_trace(trace, factor))
     };
-    let drawn = traces.iter().filter(|(.., t)| !t.time_s.is_empty()).map(series).collect();
-    (
-        Panel {
-            y: ChartAxis::linear(format!("{name}, {unit}")),
-            height_mm,
-            series: drawn,
-            ..Panel::default()
-        },
-        factor,
-    )
+    let drawn = traces.iter().filter(|(.., t)| !t.time_s.is_empty()).map(series);
+    let y = ChartAxis::linear(format!("{name}, {unit}"));
+    (Panel::new(ChartAxis::default(), y, height_mm, drawn), factor)
 }
 
 /// The points in the unit of the axis, no more than a figure can show.
 fn thin_trace(trace: &RingDownTrace, factor: f64) -> Vec<Option<(f64, f64)>> {
-    let points: Vec<_> =
-        trace.time_s.iter().zip(&trace.displacement_m).map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
+    let points = trace.time_s.iter().zip(&trace.displacement_m);
+    let points: Vec<_> = points.map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
     match (trace.time_s.first(), trace.time_s.last()) {
         (Some(first), Some(last)) => thin_points(&points, (*first, *last)),
         _ => points,
@@ -148,27 +126,23 @@ fn frame_mark(trace: &RingDownTrace) -> Mark {
 }
 
 fn draw_whole_panel(shown: &RingDown) -> Panel {
-    let data = ("data", Colour::Grey, frame_mark(&shown.data), &shown.data);
-    let trend = ("trend", Colour::Blue, Mark::ThinDashed, &shown.trend);
-    draw_traces(
-        &shown.quantity,
-        HEIGHT_MM,
-        &[data, (SUM, Colour::Vermilion, Mark::Line, &shown.fitted), trend],
-    )
-    .0
+    let traces = [
+        ("data", Colour::Grey, frame_mark(&shown.data), &shown.data),
+        // (not a fit: the sum is no model of the blade)
+        ("trend + oscillations", Colour::Vermilion, Mark::Line, &shown.fitted),
+        ("trend", Colour::Blue, Mark::ThinDashed, &shown.trend),
+    ];
+    draw_traces(&shown.quantity, HEIGHT_MM, &traces).0
 }
 
 /// Data minus fit over the noise that is expected there.
 fn draw_residual_panel(shown: &RingDown) -> Panel {
-    let (mut panel, factor) = draw_traces(
-        "rest",
-        RESIDUAL_HEIGHT_MM,
-        &[("", Colour::Grey, frame_mark(&shown.residual), &shown.residual)],
-    );
+    let trace = ("", Colour::Grey, frame_mark(&shown.residual), &shown.residual);
+    let (mut panel, factor) = draw_traces("rest", RESIDUAL_HEIGHT_MM, &[trace]);
     let width = shown.noise_sd_m.filter(|sd| sd.is_finite() && *sd > 0.0).map(|sd| 2.0 * sd * factor);
     if let Some((width, (first, last))) = width.zip(time_span(shown)) {
-        let points = [first, last].map(|t| Some((t, -width, width))).to_vec();
-        panel.ribbons.push(Ribbon { label: "noise \u{b1} 2 sd".to_owned(), colour: Colour::SkyBlue, points });
+        let points = [first, last].map(|t| (t, -width, width));
+        panel.ribbons.push(Ribbon::new("noise \u{b1} 2 sd", Colour::SkyBlue, points));
     }
     panel
 }
@@ -194,21 +168,14 @@ fn draw_decay_panel(shown: &ComponentDecay) -> Panel {
 /// job seeks no frequency.
 pub(crate) fn lowest_window(case: &ConditionComparison, all: &[FitWindow]) -> Option<(usize, f64)> {
     let frequency = |l: &FitWindow| {
-        let aims = l
-            .targets
-            .iter()
+        let aims = l.targets.iter();
+        let aims = aims
             .filter(|aim| matches!(aim.feature.reading, Reading::Frequency(_) | Reading::DampingRatio(_)));
-        let lowest = |hz: Vec<f64>| hz.into_iter().reduce(f64::min);
-        lowest(
-            aims.filter_map(|aim| compare_frequency(aim, case.result))
-                .map(|m| m.target.frequency_hz)
-                .collect(),
-        )
+        let sought = aims.filter_map(|aim| compare_frequency(aim, case.result));
+        sought.map(|m| m.target.frequency_hz).reduce(f64::min)
     };
-    all.iter()
-        .enumerate()
-        .filter_map(|(i, window)| Some((i, frequency(window)?)))
-        .min_by(|a, b| a.1.total_cmp(&b.1))
+    let lowest = all.iter().enumerate().filter_map(|(i, window)| Some((i, frequency(window)?)));
+    lowest.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// Noise that the component nearest to the target exceeds where it is drawn, standard deviations.
@@ -241,13 +208,11 @@ pub(crate) fn figure_block(
     if case.recording().is_none() {
         figure.subtitle = case.heading_note(&note);
         // what is taken apart is no recording and has no noise
-        figure.panels.iter_mut().for_each(|panel| panel.ribbons.clear());
-        figure
-            .panels
-            .iter_mut()
-            .flat_map(|panel| &mut panel.series)
-            .filter(|s| s.label == "data")
-            .for_each(|s| s.label = "model".to_owned());
+        for panel in &mut figure.panels {
+            panel.ribbons.clear();
+            let data = panel.series.iter_mut().filter(|s| s.label == "data");
+            data.for_each(|s| s.label = "model".to_owned());
+        }
     }
     Some(case.figure_block("ring-down", figure_text(case, window, analysis, component), figure))
 }
@@ -258,17 +223,18 @@ fn figure_text(
     analysis: &SpectralAnalysis,
     component: &Component,
 ) -> Words {
+    let (label, source) = (window.channel.label(), case.source_name());
+    let fitted = match analysis.oscillations.len() {
+        0 => "no oscillation".to_owned(),
+        1 => "one oscillation".to_owned(),
+        n => format!("{n} oscillations"),
+    };
     let mut said = vec![format!(
-        "The {} in the window {} of {}: trend ({}) and {} fitted by least squares, and what they leave.",
-        window.channel.label(),
-        window.window,
-        case.source_name(),
-        analysis.removed,
-        count_oscillations(analysis.oscillations.len()),
+        "The {label} in the window {} of {source}: trend ({}) and {fitted} fitted by least squares, and what they leave.",
+        window.window, analysis.removed
     )];
     said.push(describe_component(component));
-    let fitted = count_oscillations(analysis.oscillations.len());
-    let mut caption = format!("The {} taken apart into a trend and {fitted}", window.channel.label());
+    let mut caption = format!("The {label} taken apart into a trend and {fitted}");
     let left: Vec<f64> = analysis.residual_m.iter().flatten().map(|x| x * x).collect();
     if !left.is_empty() {
         let rms_m = (left.iter().sum::<f64>() / left.len() as f64).sqrt();
@@ -288,31 +254,23 @@ fn nearest_component(analysis: &SpectralAnalysis, target_hz: f64) -> Option<&Com
     analysis.spectrum.components.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
-fn count_oscillations(oscillations: usize) -> String {
-    match oscillations {
-        0 => "no oscillation".to_owned(),
-        1 => "one oscillation".to_owned(),
-        n => format!("{n} oscillations"),
-    }
-}
-
 /// Frequency, damping and what is said against them.
 fn describe_component(component: &Component) -> String {
     let frequency = format_with_sd(component.frequency_hz, component.frequency_sd_hz);
     const KNOWN: f64 = 2.0;
-    let damping = match component.damping_ratio.zip(component.damping_ratio_sd) {
-        Some((ratio, sd)) if ratio.abs() < KNOWN * sd => {
-            format!(", whose damping ratio, {}, may be zero", format_with_sd(ratio, sd))
+    let damping = component.damping_ratio.zip(component.damping_ratio_sd).map(|(ratio, sd)| {
+        let words = format_with_sd(ratio, sd);
+        match ratio {
+            ratio if ratio.abs() < KNOWN * sd => format!(", whose damping ratio, {words}, may be zero"),
+            ratio if ratio > 0.0 => format!(", which decays with a damping ratio of {words}"),
+            _ => format!(", which grows with a damping ratio of {words}"),
         }
-        Some((ratio, sd)) if ratio > 0.0 => {
-            format!(", which decays with a damping ratio of {}", format_with_sd(ratio, sd))
-        }
-        Some((ratio, sd)) => format!(", which grows with a damping ratio of {}", format_with_sd(ratio, sd)),
-        None => String::new(),
-    };
-    let against: Vec<&str> = component.reasons.iter().map(|r| r.words.as_str()).collect();
-    let against =
-        if against.is_empty() { String::new() } else { format!("; against it: {}", against.join("; ")) };
+    });
+    let damping = damping.unwrap_or_default();
+    let mut against = component.reasons.iter().map(|r| r.words.as_str()).collect::<Vec<_>>().join("; ");
+    if !component.reasons.is_empty() {
+        against = format!("; against it: {against}");
+    }
     format!("The component nearest to the target has {frequency} Hz{damping}{against}.")
 }
 

@@ -5,16 +5,16 @@ mod comparison;
 
 use super::{FigureBlock, Words};
 use crate::chart::{
-    ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, HeatMap, Mark, MarkerShape, Panel, Series,
-    TextAnnotation, VerticalLine,
+    ChartAxis, Colour, ErrorBar, Figure, HeatMap, Mark, MarkerShape, Panel, Series, TextAnnotation,
+    VerticalLine,
 };
 use crate::compare::condition::{FrequencyComparison, group_fit_windows};
 use crate::compare::{ConditionComparison, TrackedRidge};
-use crate::figures::subtitle;
+use crate::figures::full_figure;
 use crate::math;
 use crate::recording::channel::{Channel, InstantKind};
 use crate::spectrum::time_frequency;
-use crate::spectrum::time_frequency::RidgePoint as Point;
+use crate::spectrum::time_frequency::RidgePoint;
 pub use crate::spectrum::time_frequency::SpeedPoint;
 use crate::spectrum::time_frequency::course::DYNAMIC_RANGE_DB;
 use crate::text::{format_digits, format_milliseconds, truncate_text};
@@ -93,23 +93,23 @@ const MILLIMETRES: f64 = 1e3;
 pub fn draw_figure(shown: &SpectrogramPlot) -> Figure {
     let mut panels = vec![draw_map(shown)];
     if !shown.over_speed.is_empty() {
-        panels.push(draw_over_speed(&shown.over_speed));
+        let series = speed_series("ridge over speed", Colour::Blue, MarkerShape::Disc, &shown.over_speed);
+        let (x, y) = (ChartAxis::linear("speed of the tip, mm/s"), ChartAxis::linear("ridge, Hz"));
+        panels.push(Panel::new(x, y, SPEED_HEIGHT_MM, [series]));
     }
-    Figure {
-        title: shown.title.clone(),
-        subtitle: subtitle(shown.synthetic, &shown.note),
-        watermarked: shown.synthetic,
-        description: format!(
+    full_figure(
+        &shown.title,
+        shown.synthetic,
+        &shown.note,
+        format!(
             "Spectrogram of {}: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m; light grey \
              where there is no value. \
              The line is the ridge that was followed; it has gaps where nothing stands out, and where \
              segments do not agree on a frequency.",
             shown.quantity
         ),
-        width_mm: FULL_WIDTH_MM,
         panels,
-        ..Figure::default()
-    }
+    )
 }
 
 /// Every amplitude in dB.
@@ -128,27 +128,18 @@ fn draw_map(shown: &SpectrogramPlot) -> Panel {
         values,
         ..HeatMap::default()
     };
-    let y = if shown.log_frequency {
-        ChartAxis::log("frequency, Hz")
-    } else {
-        ChartAxis::linear("frequency, Hz")
-    };
-    let rule = |(label, at): &(String, f64)| VerticalLine {
-        label: label.clone(),
-        colour: Colour::White,
-        mark: Mark::Dashed,
-        at: *at,
-        above: None,
-    };
+    let y = if shown.log_frequency { ChartAxis::log } else { ChartAxis::linear }("frequency, Hz");
+    let y = y.with_ends(shown.shown_hz.or_else(|| frequency_range(shown)));
+    let rule = |(label, at): &(String, f64)| VerticalLine::new(label, Colour::White, Mark::Dashed, *at);
+    // edged lines are seen on every colour
+    let targets = target_lines(&shown.targets, "target \u{b1} 2 sd", Colour::Black, Mark::Edged);
+    let ridge = Series::new("ridge", Colour::Vermilion, Mark::Edged, ridge_points(&shown.ridge));
+    let lines = [targets, ridge].into_iter().filter(|s| s.points.iter().any(Option::is_some));
     Panel {
-        x: limit_axis(ChartAxis::time(), time_span(&shown.time_s)),
-        y: limit_axis(y, shown.shown_hz.or_else(|| frequency_range(shown))),
-        height_mm: HEIGHT_MM,
-        series: target_lines_over_map(&shown.targets).into_iter().chain(ridge_series(&shown.ridge)).collect(),
         vertical_lines: shown.instants.iter().map(rule).collect(),
         annotations: target_names(shown),
         heat_map: Some(heat),
-        ..Panel::default()
+        ..Panel::new(ChartAxis::time().with_ends(time_span(&shown.time_s)), y, HEIGHT_MM, lines)
     }
 }
 
@@ -169,13 +160,6 @@ fn colour_range_db(values: &[Vec<Option<f64>>]) -> Option<(f64, f64)> {
     Some((low, high.max(low + STEP_DB)))
 }
 
-fn limit_axis(axis: ChartAxis, ends: Option<(f64, f64)>) -> ChartAxis {
-    match ends {
-        Some((low, high)) => axis.with_range(low, high),
-        None => axis,
-    }
-}
-
 /// From the start of the first column to the end of the last; of a single one, around it.
 fn time_span(middles: &[f64]) -> Option<(f64, f64)> {
     let ([first, second, ..], [.., before, last]) = (middles, middles) else { return None };
@@ -188,54 +172,33 @@ fn frequency_range(shown: &SpectrogramPlot) -> Option<(f64, f64)> {
     Some((*lowest, *shown.frequency_hz.last()?))
 }
 
-/// The line of the ridge; nothing where it has no point at all.
-fn ridge_series(points: &[SpectrogramRidgePoint]) -> Option<Series> {
-    let drawn: Vec<Option<(f64, f64)>> =
-        points.iter().map(|p| p.frequency_hz.map(|f| (p.time_s, f))).collect();
-    drawn.iter().any(Option::is_some).then(|| Series {
-        label: "ridge".to_owned(),
-        colour: Colour::Vermilion,
-        mark: Mark::Edged,
-        points: drawn,
-        error_bars: Vec::new(),
-    })
+fn ridge_points(ridge: &[SpectrogramRidgePoint]) -> impl Iterator<Item = Option<(f64, f64)>> {
+    ridge.iter().map(|p| p.frequency_hz.map(|f| (p.time_s, f)))
 }
 
-/// Frequency of the ridge over the speed of the tip.
-fn draw_over_speed(points: &[SpeedPoint]) -> Panel {
+/// Frequencies over the speed of the tip, mm/s, as symbols with two standard deviations either side.
+pub(super) fn speed_series(label: &str, colour: Colour, shape: MarkerShape, points: &[SpeedPoint]) -> Series {
     let place = |p: &SpeedPoint| (p.tip_speed_m_per_s * MILLIMETRES, p.frequency_hz);
     let bar = |p: &SpeedPoint| {
-        let (x, f) = place(p);
-        p.frequency_sd_hz.map(|sd| ErrorBar::Vertical { x, from: f - 2.0 * sd, to: f + 2.0 * sd })
+        let ((x, f), sd) = (place(p), p.frequency_sd_hz?);
+        Some(ErrorBar::Vertical { x, from: f - 2.0 * sd, to: f + 2.0 * sd })
     };
-    let series = Series {
-        label: "ridge over speed \u{b1} 2 sd".to_owned(),
-        colour: Colour::Blue,
-        mark: Mark::Hollow(MarkerShape::Disc),
-        points: points.iter().map(|p| Some(place(p))).collect(),
+    Series {
         error_bars: points.iter().filter_map(bar).collect(),
-    };
-    Panel {
-        x: ChartAxis::linear("speed of the tip, mm/s"),
-        y: ChartAxis::linear("ridge, Hz"),
-        height_mm: SPEED_HEIGHT_MM,
-        series: vec![series],
-        ..Panel::default()
+        ..Series::new(format!("{label} \u{b1} 2 sd"), colour, Mark::Hollow(shape), points.iter().map(place))
     }
 }
 
 /// In how many of how many segments a ridge is drawn, and why not in others where it stands out of the noise.
 pub(crate) fn describe_ridge_segments(
-    drawn: &[Vec<time_frequency::RidgePoint>],
+    drawn: &[Vec<RidgePoint>],
     ridge: &time_frequency::Ridge,
     of: &time_frequency::Spectrogram,
 ) -> String {
     let (drawn, followed) = (drawn.iter().map(Vec::len).sum::<usize>(), ridge.points.len());
     let without = match followed - drawn {
         0 => String::new(),
-        without => {
-            format!(" (in {without} more it stands out of the noise, but jumps, or lies below the colours)")
-        }
+        n => format!(" (in {n} more it stands out of the noise, but jumps, or lies below the colours)"),
     };
     format!("in {drawn} of {} segments{without}", of.time_s.len())
 }
@@ -261,10 +224,8 @@ pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     let top_hz = tops.map(|(_, high)| high).fold(0.0, f64::max);
     let nyquist_hz = case.model.view.recording.grid().frame_rate_hz / 2.0;
     let shown_hz = (0.0, if top_hz > 0.0 { (RIDGE_MARGIN * top_hz).min(nyquist_hz) } else { nyquist_hz });
-    let note = format!(
-        "spectrogram of the deflection in segments of {}",
-        format_milliseconds(first.spectrogram.segment_s)
-    );
+    let segment = format_milliseconds(first.spectrogram.segment_s);
+    let note = format!("spectrogram of the deflection in segments of {segment}");
     let figure = draw_comparison(&SpectrogramComparison {
         title: figure_title(&sides),
         note: case.heading_note(&note),
@@ -272,8 +233,18 @@ pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
         sides: sides
             .iter()
             .map(|side| {
-                let targets = target_frequencies(case, side);
-                (side.0, SpectrogramPlot { targets, ..spectrogram_plot(side.1, side.2, shown_hz) })
+                let (of, followed, shift_s) = *side;
+                let plot = SpectrogramPlot {
+                    quantity: Channel::Deflection.to_string(),
+                    shown_hz: Some(shown_hz),
+                    over_speed: followed.over_speed.clone(),
+                    targets: target_frequencies(case, side),
+                    ..SpectrogramPlot::default()
+                };
+                // (of a fast camera most bins lie beyond what is shown)
+                let bins = followed.spectrogram.frequency_hz.partition_point(|f| *f <= shown_hz.1);
+                let start_s = followed.start_s + shift_s;
+                (of, fill_map(plot, &followed.spectrogram, &followed.courses, start_s, bins))
             })
             .collect(),
     });
@@ -292,10 +263,8 @@ fn target_frequencies(case: &ConditionComparison, (of, _, shift_s): &ShiftedRidg
     let own = windows.iter().filter(|window| window.channel == Channel::Deflection);
     let found = own.flat_map(|window| {
         let frames = side.window_frames(&window.window);
-        window
-            .frequency_comparisons(case.result)
-            .into_iter()
-            .filter_map(move |sought| Some((frames.clone()?, sought)))
+        let sought = window.frequency_comparisons(case.result).into_iter();
+        sought.filter_map(move |sought| Some((frames.clone()?, sought)))
     });
     let target = |(frames, sought): (Range<usize>, FrequencyComparison)| TargetFrequency {
         name: sought.target.name,
@@ -307,48 +276,47 @@ fn target_frequencies(case: &ConditionComparison, (of, _, shift_s): &ShiftedRidg
     found.map(target).collect()
 }
 
-fn spectrogram_plot(of: &TrackedRidge, shift_s: f64, shown_hz: (f64, f64)) -> SpectrogramPlot {
-    let (start_s, spectrogram) = (of.start_s + shift_s, &of.spectrogram);
-    // (of a fast camera most lie beyond what is shown)
-    let bins = spectrogram.frequency_hz.partition_point(|f| *f <= shown_hz.1);
+/// A plot with the times, frequencies and amplitudes of a spectrogram up to a number of bins, and with its
+/// ridge, part by part with gaps between.
+pub(super) fn fill_map(
+    plot: SpectrogramPlot,
+    spectrogram: &time_frequency::Spectrogram,
+    ridge: &[Vec<RidgePoint>],
+    start_s: f64,
+    bins: usize,
+) -> SpectrogramPlot {
     let column = |column: &Option<Vec<f64>>| match column {
         Some(column) => column.iter().take(bins).copied().map(Some).collect(),
         None => vec![None; bins],
     };
     let gap = SpectrogramRidgePoint { time_s: start_s, frequency_hz: None };
-    let place =
-        |p: &Point| SpectrogramRidgePoint { time_s: start_s + p.time_s, frequency_hz: Some(p.frequency_hz) };
-    let part = |part: &Vec<Point>| std::iter::once(gap).chain(part.iter().map(place)).collect::<Vec<_>>();
+    let place = |p: &RidgePoint| SpectrogramRidgePoint {
+        time_s: start_s + p.time_s,
+        frequency_hz: Some(p.frequency_hz),
+    };
     SpectrogramPlot {
-        quantity: Channel::Deflection.to_string(),
         time_s: spectrogram.time_s.iter().map(|t| start_s + t).collect(),
         frequency_hz: spectrogram.frequency_hz.iter().take(bins).copied().collect(),
         amplitude_m: spectrogram.amplitude_m.iter().map(column).collect(),
-        shown_hz: Some(shown_hz),
-        ridge: of.courses.iter().flat_map(part).collect(),
-        over_speed: of.over_speed.clone(),
-        ..SpectrogramPlot::default()
+        ridge: ridge.iter().flat_map(|part| std::iter::once(gap).chain(part.iter().map(place))).collect(),
+        ..plot
     }
 }
 
 fn figure_text(case: &ConditionComparison, sides: &[ShiftedRidge]) -> Words {
     let Some((first_of, first, _)) = sides.first() else {
-        return Words { caption: String::new(), details: String::new() };
+        return Words::default();
     };
+    let source = case.source_name();
     let both = match (sides.len() > 1, first_of, case.recording()) {
-        (true, ..) => {
-            format!("{} and the fitted model, in the same segments and colours", case.source_name())
+        (true, ..) => format!("{source} and the fitted model, in the same segments and colours"),
+        (false, SpectrogramSide::Model, Some(_)) => {
+            format!("the fitted model alone, as no segment of {source} has frames enough with a deflection")
         }
-        (false, SpectrogramSide::Model, Some(_)) => format!(
-            "the fitted model alone, as no segment of {} has frames enough with a deflection",
-            case.source_name()
-        ),
-        _ => case.source_name(),
+        _ => source,
     };
-    let released = case
-        .measured_or_model()
-        .instant_s(InstantKind::Release)
-        .map_or("", |_| " from the release of the tip on");
+    let release_s = case.measured_or_model().instant_s(InstantKind::Release);
+    let released = release_s.map_or("", |_| " from the release of the tip on");
     let mut said = vec![format!(
         "Amplitude of the deflection over time and frequency{released} (segments of {}, trend removed): \
          {both}.",
@@ -356,30 +324,22 @@ fn figure_text(case: &ConditionComparison, sides: &[ShiftedRidge]) -> Words {
     )];
     for (of, ridge, _) in sides {
         let name = if *of == SpectrogramSide::Measured { "the recording" } else { "the model" };
+        let drawn = describe_ridge_segments(&ridge.courses, &ridge.ridge, &ridge.spectrogram);
         said.push(match ridge.frequency_range_hz() {
-            Some((low, high)) => format!(
-                "The ridge of {name}, the strongest component between {} and {} Hz, is drawn {} and runs \
-                 from {} to {} Hz.",
-                format_digits(ridge.band_hz.0, 3),
-                format_digits(ridge.band_hz.1, 3),
-                describe_ridge_segments(&ridge.courses, &ridge.ridge, &ridge.spectrogram),
-                format_digits(low, 3),
-                format_digits(high, 3)
-            ),
-            None if !ridge.ridge.points.is_empty() => {
+            Some((low, high)) => {
+                let [low, high, from, to] =
+                    [low, high, ridge.band_hz.0, ridge.band_hz.1].map(|hz| format_digits(hz, 3));
                 format!(
-                    "The ridge of {name} is drawn \
-                {}.",
-                    describe_ridge_segments(&ridge.courses, &ridge.ridge, &ridge.spectrogram)
+                    "The ridge of {name}, the strongest component between {from} and {to} Hz, is drawn {drawn} and \
+                     runs from {low} to {high} Hz."
                 )
             }
+            None if !ridge.ridge.points.is_empty() => format!("The ridge of {name} is drawn {drawn}."),
             None => format!("Nothing in {name} stands out long enough to be followed."),
         });
     }
     if sides.iter().any(|(_, ridge, _)| ridge.frequency_range_hz().is_some()) {
-        said.push(
-            "Below: the ridges over time and over the mean speed of the tip in each segment.".to_owned(),
-        );
+        said.push("Below: the ridges over time and over the mean speed of the tip in each segment.".into());
     }
     Words { caption: claim_sentence(case, sides), details: said.join(" ") }
 }
@@ -407,9 +367,7 @@ fn claim_sentence(case: &ConditionComparison, sides: &[ShiftedRidge]) -> String 
         if *of == SpectrogramSide::Measured { case.source_kind() } else { "the fitted model" }
     };
     let one = |(of, ridge, _): &ShiftedRidge| match ridge.frequency_range_hz() {
-        Some((low, high)) => {
-            format!("{} from {} to {} Hz", name(of), format_digits(low, 3), format_digits(high, 3))
-        }
+        Some((l, h)) => format!("{} from {} to {} Hz", name(of), format_digits(l, 3), format_digits(h, 3)),
         None => format!("{} nowhere", name(of)),
     };
     let ridges: Vec<String> = sides.iter().map(one).collect();
@@ -435,11 +393,6 @@ const CLOSE_TARGETS: f64 = 0.1;
 /// Where the middle of a name stays, shares of the width: its ends lie within the axes.
 const LABEL_LIMITS: (f64, f64) = (0.3, 0.7);
 
-/// The lines over a map, edged so that they are seen on every colour.
-pub(super) fn target_lines_over_map(targets: &[TargetFrequency]) -> Option<Series> {
-    (!targets.is_empty()).then(|| target_lines(targets, "target \u{b1} 2 sd", Colour::Black, Mark::Edged))
-}
-
 /// The same over the ridges, those that are met apart from the others.
 pub(super) fn target_lines_over_ridges(targets: &[TargetFrequency]) -> impl Iterator<Item = Series> {
     let looks = [
@@ -462,11 +415,8 @@ fn target_lines(targets: &[TargetFrequency], label: &str, colour: Colour, mark: 
         [t.span_s.0, t.span_s.1].map(|x| ErrorBar::Vertical { x, from: f - half, to: f + half })
     };
     Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points: targets.iter().flat_map(line).collect(),
         error_bars: targets.iter().filter(|t| t.frequency_sd_hz.is_some()).flat_map(ends).collect(),
+        ..Series::new(label, colour, mark, targets.iter().flat_map(line))
     }
 }
 
@@ -482,19 +432,19 @@ pub(super) fn target_names(shown: &SpectrogramPlot) -> Vec<TextAnnotation> {
         };
         let side = if shown.targets.iter().any(above) { -1.0 } else { 1.0 };
         let middle = (t.span_s.0.max(first) + t.span_s.1.min(last)) / 2.0;
-        TextAnnotation {
-            text: format!(
+        TextAnnotation::new(
+            format!(
                 "{} {} Hz, {}",
                 truncate_text(&t.name, MAX_LABEL_LETTERS),
                 format_digits(t.frequency_hz, 3),
                 if t.met { "met" } else { "missed" }
             ),
-            colour: Colour::Black,
-            at: (
+            Colour::Black,
+            (
                 middle.clamp(place(LABEL_LIMITS.0), place(LABEL_LIMITS.1)),
                 t.frequency_hz + side * LABEL_OFFSET * (top - bottom),
             ),
-        }
+        )
     };
     shown.targets.iter().map(text).collect()
 }

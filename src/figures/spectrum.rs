@@ -7,12 +7,12 @@ use super::analysis::compare_spectra;
 use super::figure_text::file_name_part;
 use super::{FigureBlock, Words, ring_down};
 use crate::chart::{
-    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Ribbon, Series, ShadedSpan, TopLabel, VerticalLine,
+    ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series, ShadedSpan, TopLabel, VerticalLine,
 };
 use crate::compare::condition::{FitWindow, FrequencyComparison, group_fit_windows};
 use crate::compare::{ConditionComparison, TimedRecording};
 use crate::feature::{FeatureBand, Reading};
-use crate::figures::{NO_TRACES, subtitle};
+use crate::figures::{NO_TRACES, about, full_figure};
 pub use crate::spectrum::Target;
 use crate::spectrum::{SampledRecord, SpectralAnalysis, SpectrumSettings};
 use crate::text::{
@@ -75,46 +75,26 @@ pub fn draw_figure(spectra: &SpectraPlot) -> Figure {
         .flatten()
         .filter_map(|c| c.frequency_hz.last())
         .fold(0.0, |m: f64, f| m.max(*f));
-    let x = ChartAxis::log("frequency, Hz");
-    let x = if spectra.lowest_hz > 0.0 && highest > spectra.lowest_hz {
-        x.with_range(spectra.lowest_hz, highest)
-    } else {
-        x
-    };
-    let y = ChartAxis::log(format!("amplitude of {}, \u{b5}m", spectra.quantity));
-    let y = amplitude_limits(spectra)
-        .map_or(y.clone(), |(low, high)| y.with_range(low * MICROMETRES, high * MICROMETRES));
+    let shown_hz = Some((spectra.lowest_hz, highest)).filter(|(low, high)| *low > 0.0 && high > low);
+    let x = ChartAxis::log("frequency, Hz").with_ends(shown_hz);
+    let shown_um = amplitude_limits(spectra).map(|(low, high)| (low * MICROMETRES, high * MICROMETRES));
+    let y = ChartAxis::log(format!("amplitude of {}, \u{b5}m", spectra.quantity)).with_ends(shown_um);
     let panel = Panel {
-        x,
-        y,
-        height_mm: HEIGHT_MM,
-        series: spectrum_series(spectra, highest),
         shaded_spans: target_spans(&spectra.targets),
         vertical_lines: target_lines(spectra),
         top_labels: target_labels(spectra),
         ribbons: spectra.interval_95.iter().map(AmplitudeInterval::ribbon).collect(),
-        ..Panel::default()
+        ..Panel::new(x, y, HEIGHT_MM, spectrum_series(spectra, highest))
     };
-    let mut source = if spectra.measured.is_none() && spectra.model.is_some() {
-        NO_TRACES.to_owned()
-    } else {
-        String::new()
-    };
-    if !spectra.note.is_empty() {
-        source = if source.is_empty() { spectra.note.clone() } else { format!("{source}; {}", spectra.note) };
-    }
-    Figure {
-        title: spectra.title.clone(),
-        subtitle: subtitle(spectra.synthetic, &source),
-        watermarked: spectra.synthetic,
-        description: format!(
-            "Amplitude spectrum of {}; a sine of amplitude A reads A at its peak.",
-            spectra.quantity
-        ),
-        width_mm: FULL_WIDTH_MM,
-        panels: vec![panel],
-        ..Figure::default()
-    }
+    let alone = spectra.measured.is_none() && spectra.model.is_some();
+    let source = about(if alone { NO_TRACES } else { "" }, &spectra.note);
+    full_figure(
+        &spectra.title,
+        spectra.synthetic,
+        &source,
+        format!("Amplitude spectrum of {}; a sine of amplitude A reads A at its peak.", spectra.quantity),
+        [panel],
+    )
 }
 
 /// The claim of a spectrum that nothing is sought in: its largest component.
@@ -122,11 +102,10 @@ pub(crate) fn strongest_claim(spectra: &SpectraPlot) -> String {
     let largest = |all: &[LabelledComponent]| {
         all.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m)).cloned()
     };
+    let quantity = &spectra.quantity;
     match largest(&spectra.components).or_else(|| largest(&spectra.model_components)) {
-        Some(found) => {
-            format!("The largest component of the {} has {}", spectra.quantity, found.label_text())
-        }
-        None => format!("No component stands out in the {}", spectra.quantity),
+        Some(found) => format!("The largest component of the {quantity} has {}", found.label_text()),
+        None => format!("No component stands out in the {quantity}"),
     }
 }
 
@@ -137,9 +116,8 @@ fn amplitude_limits(spectra: &SpectraPlot) -> Option<(f64, f64)> {
     const MODEL_RANGE: f64 = 1e-4;
     const OVER_PEAK: f64 = 2.0;
     let curves = [&spectra.measured, &spectra.model].into_iter().flatten();
-    let shown = curves
-        .flat_map(|c| c.frequency_hz.iter().zip(&c.amplitude_m))
-        .filter(|(f, _)| **f >= spectra.lowest_hz);
+    let all = curves.flat_map(|c| c.frequency_hz.iter().zip(&c.amplitude_m));
+    let shown = all.filter(|(f, _)| **f >= spectra.lowest_hz);
     let peaks = spectra.components.iter().chain(&spectra.model_components).map(LabelledComponent::top_m);
     let highest = shown.map(|(_, a)| *a).chain(peaks).filter(|a| a.is_finite()).fold(0.0, f64::max);
     let range_foot = highest * MODEL_RANGE;
@@ -152,12 +130,8 @@ fn amplitude_limits(spectra: &SpectraPlot) -> Option<(f64, f64)> {
 }
 
 fn spectrum_series(spectra: &SpectraPlot, highest: f64) -> Vec<Series> {
-    let curve = |label: &str, colour, mark, curve: &SpectrumCurve| Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points: axis_points(&curve.frequency_hz, &curve.amplitude_m),
-        error_bars: Vec::new(),
+    let curve = |label: &str, colour, mark, curve: &SpectrumCurve| {
+        Series::new(label, colour, mark, axis_points(&curve.frequency_hz, &curve.amplitude_m))
     };
     let mut drawn = level_series(spectra, highest);
     drawn.extend(spectra.measured.as_ref().map(|c| curve("measured", Colour::Black, Mark::Thin, c)));
@@ -170,15 +144,9 @@ fn spectrum_series(spectra: &SpectraPlot, highest: f64) -> Vec<Series> {
 fn target_spans(targets: &[Target]) -> Vec<ShadedSpan> {
     let band = |t: &Target| {
         let sd_hz = t.frequency_sd_hz.filter(|sd| *sd > 0.0)?;
-        let (from, to) =
-            ((t.frequency_hz - 2.0 * sd_hz).max(f64::MIN_POSITIVE), t.frequency_hz + 2.0 * sd_hz);
-        Some(ShadedSpan {
-            label: "target \u{b1} 2 sd".to_owned(),
-            colour: Colour::Blue,
-            from,
-            to,
-            ..ShadedSpan::default()
-        })
+        let from = (t.frequency_hz - 2.0 * sd_hz).max(f64::MIN_POSITIVE);
+        let to = t.frequency_hz + 2.0 * sd_hz;
+        Some(ShadedSpan::new("target \u{b1} 2 sd", Colour::Blue, from, to))
     };
     targets.iter().filter_map(band).collect()
 }
@@ -196,19 +164,10 @@ fn labelled_components(spectra: &SpectraPlot) -> &[LabelledComponent] {
 fn target_lines(spectra: &SpectraPlot) -> Vec<VerticalLine> {
     let named = labelled_components(spectra);
     // where components are named, the names of the targets are captions
-    let label = |t: &Target| {
-        if named.is_empty() {
-            format!("{}: {} Hz", t.name, format_trimmed(t.frequency_hz, 4))
-        } else {
-            String::new()
-        }
-    };
-    let target = |t: &Target| VerticalLine {
-        label: label(t),
-        colour: Colour::Blue,
-        mark: Mark::Dashed,
-        at: t.frequency_hz,
-        above: None,
+    let label = |t: &Target| format!("{}: {} Hz", t.name, format_trimmed(t.frequency_hz, 4));
+    let target = |t: &Target| {
+        let label = if named.is_empty() { label(t) } else { String::new() };
+        VerticalLine::new(label, Colour::Blue, Mark::Dashed, t.frequency_hz)
     };
     let most = if spectra.targets.is_empty() { usize::MAX } else { MOST_NAMES };
     spectra.targets.iter().map(target).chain(components::component_labels(named, most)).collect()
@@ -217,11 +176,8 @@ fn target_lines(spectra: &SpectraPlot) -> Vec<VerticalLine> {
 /// Names of the targets, where components are named over them.
 fn target_labels(spectra: &SpectraPlot) -> Vec<TopLabel> {
     let caption = |t: &Target| TopLabel { label: t.name.clone(), at: t.frequency_hz };
-    if labelled_components(spectra).is_empty() {
-        Vec::new()
-    } else {
-        spectra.targets.iter().map(caption).collect()
-    }
+    let named = !labelled_components(spectra).is_empty();
+    spectra.targets.iter().filter(|_| named).map(caption).collect()
 }
 
 // Amplitude spectra, one for each window of a channel that the fit reads, and the one of the low
@@ -244,9 +200,7 @@ pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
         let model = analyse_window(case, &case.model_side(), band);
         if let Some((_, target_hz)) = lowest.filter(|(of, _)| *of == i) {
             let shown = if case.recording().is_some() { &measured } else { &model };
-            ring_down = shown
-                .as_ref()
-                .and_then(|analysis| ring_down::figure_block(case, window, analysis, target_hz));
+            ring_down = shown.as_ref().and_then(|a| ring_down::figure_block(case, window, a, target_hz));
         }
         spectra.extend(window_block(case, window, band, measured.as_ref(), model.as_ref()));
     }
@@ -272,11 +226,8 @@ fn window_block(
     let name = |aim: &&&crate::fit::job::FitTarget| matches!(aim.feature.reading, Reading::Frequency(_));
     let first = window.targets.iter().find(name).or(window.targets.first())?;
     let words = figure_text(case, window, band, &spectra, &met);
-    Some(case.figure_block(
-        &format!("spectrum-{}", file_name_part(&first.feature.name)),
-        words,
-        draw_figure(&spectra),
-    ))
+    let file = format!("spectrum-{}", file_name_part(&first.feature.name));
+    Some(case.figure_block(&file, words, draw_figure(&spectra)))
 }
 
 /// Spectra up to the highest frequency that is shown.
@@ -287,10 +238,8 @@ fn limit_frequencies(mut spectra: SpectraPlot, band: &FeatureBand) -> SpectraPlo
         frequency_hz.truncate(frequency_hz.partition_point(|f| *f <= top_hz));
         amplitude_m.truncate(frequency_hz.len());
     };
-    [&mut spectra.measured, &mut spectra.model]
-        .into_iter()
-        .flatten()
-        .for_each(|curve| cut(&mut curve.frequency_hz, &mut curve.amplitude_m));
+    let curves = [&mut spectra.measured, &mut spectra.model].into_iter().flatten();
+    curves.for_each(|curve| cut(&mut curve.frequency_hz, &mut curve.amplitude_m));
     spectra.noise_floor.iter_mut().for_each(|level| cut(&mut level.frequency_hz, &mut level.amplitude_m));
     spectra
 }
@@ -307,11 +256,8 @@ fn analyse_window(
         frame_rate_hz: side.recording.grid().frame_rate_hz,
         exposure_s: case.exposure_s(),
     };
-    SpectralAnalysis::from_record(
-        &record,
-        &SpectrumSettings { detrend: Some(band.detrend), ..SpectrumSettings::default() },
-    )
-    .ok()
+    let settings = SpectrumSettings { detrend: Some(band.detrend), ..SpectrumSettings::default() };
+    SpectralAnalysis::from_record(&record, &settings).ok()
 }
 
 fn figure_text(
@@ -321,23 +267,16 @@ fn figure_text(
     spectra: &SpectraPlot,
     met: &[FrequencyComparison],
 ) -> Words {
-    let both = if spectra.measured.is_some() {
-        format!("{} and the fitted model, read alike", case.source_name())
-    } else {
-        case.source_name()
-    };
+    let alike = if spectra.measured.is_some() { " and the fitted model, read alike" } else { "" };
+    let (channel, source) = (window.channel.label(), case.source_name());
     let mut said = vec![format!(
-        "Amplitude spectrum of the {} in the window {} ({} removed, Hann window): {both}.",
-        window.channel.label(),
-        window.window,
-        band.detrend
+        "Amplitude spectrum of the {channel} in the window {} ({} removed, Hann window): {source}{alike}.",
+        window.window, band.detrend
     )];
     let kind = if case.recording().is_some() { "target" } else { "published" };
     said.extend(met.iter().map(|met| describe_target(met, kind)));
-    for (of, components) in [("recording", &spectra.components), ("model", &spectra.model_components)]
-        .into_iter()
-        .filter(|(_, c)| !c.is_empty())
-    {
+    let sides = [("recording", &spectra.components), ("model", &spectra.model_components)];
+    for (of, components) in sides.into_iter().filter(|(_, c)| !c.is_empty()) {
         let names: Vec<String> = components.iter().map(LabelledComponent::label_text).collect();
         said.push(format!("Components of the {of}, the largest first: {}.", names.join("; ")));
     }
@@ -348,40 +287,27 @@ fn figure_text(
              noise, its components above that floor."
         ));
     }
-    let channel = window.channel.label();
-    let caption = format!(
-        "Amplitude spectrum of the {channel}, {}: {}.",
-        whose_spectra(case, spectra),
-        claim_sentence(met)
-    );
-    Words { caption, details: said.join(" ") }
-}
-
-/// Whose spectra are drawn.
-fn whose_spectra(case: &ConditionComparison, spectra: &SpectraPlot) -> String {
-    match (&spectra.measured, &spectra.model) {
+    let whose = match (&spectra.measured, &spectra.model) {
         (Some(_), Some(_)) => format!("{} over the fitted model", case.source_kind()),
         (None, Some(_)) => "the fitted model alone".to_owned(),
         _ => format!("{} alone", case.source_kind()),
-    }
+    };
+    let caption = format!("Amplitude spectrum of the {channel}, {whose}: {}.", claim_sentence(met));
+    Words { caption, details: said.join(" ") }
 }
 
 /// The claim with its number.
 fn figure_title(spectra: &SpectraPlot, met: &[FrequencyComparison]) -> String {
     match met {
         [] => strongest_claim(spectra),
-        [one] => match one.model_hz {
-            Some(hz) => format!(
-                "The model has {} Hz, {} from the target of {} Hz",
-                format_digits(hz, 4),
-                format_percent((hz / one.target.frequency_hz - 1.0).abs()),
-                format_with_sd(one.target.frequency_hz, one.target.frequency_sd_hz)
-            ),
-            None => format!(
-                "The model has no component at the target of {} Hz",
-                format_with_sd(one.target.frequency_hz, one.target.frequency_sd_hz)
-            ),
-        },
+        [one] => {
+            let target = format_with_sd(one.target.frequency_hz, one.target.frequency_sd_hz);
+            let Some(hz) = one.model_hz else {
+                return format!("The model has no component at the target of {target} Hz");
+            };
+            let off = format_percent((hz / one.target.frequency_hz - 1.0).abs());
+            format!("The model has {} Hz, {off} from the target of {target} Hz", format_digits(hz, 4))
+        }
         _ => capitalise(&claim_sentence(met).replace(" that are sought", "")),
     }
 }
@@ -390,43 +316,28 @@ fn figure_title(spectra: &SpectraPlot, met: &[FrequencyComparison]) -> String {
 fn claim_sentence(met: &[FrequencyComparison]) -> String {
     let error = |met: &FrequencyComparison| met.model_hz.map(|hz| (hz / met.target.frequency_hz - 1.0).abs());
     let errors: Vec<f64> = met.iter().filter_map(error).collect();
-    let largest = errors.iter().copied().fold(0.0, f64::max);
-    let (found, all) = (errors.len(), met.len());
-    match (found, all) {
+    let largest = format_percent(errors.iter().copied().fold(0.0, f64::max));
+    match (errors.len(), met.len()) {
         (_, 0) => "no frequency is sought in it".to_owned(),
-        (0, _) => format!("the model has none of the {all} frequencies that are sought"),
-        (1, 1) => format!("the model meets the frequency that is sought within {}", format_percent(largest)),
-        _ if found == all => {
-            format!(
-                "the model meets all {all} frequencies that are sought within {}",
-                format_percent(largest)
-            )
+        (0, all) => format!("the model has none of the {all} frequencies that are sought"),
+        (1, 1) => format!("the model meets the frequency that is sought within {largest}"),
+        (found, all) if found == all => {
+            format!("the model meets all {all} frequencies that are sought within {largest}")
         }
-        _ => format!(
-            "the model has {found} of the {all} frequencies that are sought, within {}",
-            format_percent(largest)
-        ),
+        (found, all) => {
+            format!("the model has {found} of the {all} frequencies that are sought, within {largest}")
+        }
     }
 }
 
 /// "high: target 908(4) Hz, model 908.0 Hz (+0.04 %)."
 fn describe_target(met: &FrequencyComparison, kind: &str) -> String {
     let target = &met.target;
-    let model = met.model_hz.map_or_else(
-        || "the model shows none".to_owned(),
-        |hz| {
-            format!(
-                "model {} Hz ({})",
-                format_digits(hz, 4),
-                format_signed_percent(hz / target.frequency_hz - 1.0)
-            )
-        },
-    );
-    format!(
-        "{}: {kind} {} Hz, {model}.",
-        target.name,
-        format_with_sd(target.frequency_hz, target.frequency_sd_hz)
-    )
+    let off = |hz: f64| format_signed_percent(hz / target.frequency_hz - 1.0);
+    let model = met.model_hz.map(|hz| format!("model {} Hz ({})", format_digits(hz, 4), off(hz)));
+    let model = model.unwrap_or_else(|| "the model shows none".to_owned());
+    let sought = format_with_sd(target.frequency_hz, target.frequency_sd_hz);
+    format!("{}: {kind} {sought} Hz, {model}.", target.name)
 }
 
 // Noise floor, leakage and interval of a spectrum.
@@ -454,11 +365,8 @@ pub struct AmplitudeInterval {
 impl SpectrumLevel {
     /// The lowest positive level from a frequency on, m.
     pub(super) fn lowest_m(&self, lowest_hz: f64) -> Option<f64> {
-        let shown = self
-            .frequency_hz
-            .iter()
-            .zip(&self.amplitude_m)
-            .filter(|(f, a)| **f >= lowest_hz && **a > 0.0 && a.is_finite());
+        let all = self.frequency_hz.iter().zip(&self.amplitude_m);
+        let shown = all.filter(|(f, a)| **f >= lowest_hz && **a > 0.0 && a.is_finite());
         shown.map(|(_, a)| *a).reduce(f64::min)
     }
 }
@@ -479,17 +387,9 @@ impl AmplitudeInterval {
     }
 
     pub(super) fn ribbon(&self) -> Ribbon {
-        let ends = self.lower_m.iter().zip(&self.upper_m);
-        let points = self
-            .frequency_hz
-            .iter()
-            .zip(ends)
-            .map(|(f, (low, high))| Some((*f, low * MICROMETRES, high * MICROMETRES)));
-        Ribbon {
-            label: "95 % interval by the noise floor".to_owned(),
-            colour: Colour::Black,
-            points: points.collect(),
-        }
+        let ends = self.frequency_hz.iter().zip(self.lower_m.iter().zip(&self.upper_m));
+        let points = ends.map(|(f, (low, high))| (*f, low * MICROMETRES, high * MICROMETRES));
+        Ribbon::new("95 % interval by the noise floor", Colour::Black, points)
     }
 }
 
@@ -500,26 +400,16 @@ pub(super) fn axis_points(frequency_hz: &[f64], amplitude_m: &[f64]) -> Vec<Opti
 
 /// Noise floor and leakage, which lie under the spectra.
 pub(super) fn level_series(spectra: &SpectraPlot, highest: f64) -> Vec<Series> {
-    let constant = spectra
-        .noise_floor_m
-        .filter(|f| *f > 0.0)
-        .map(|floor_m| [spectra.lowest_hz, highest].map(|f| Some((f, floor_m * MICROMETRES))).to_vec());
-    let floor =
-        spectra.noise_floor.as_ref().map(|l| axis_points(&l.frequency_hz, &l.amplitude_m)).or(constant);
-    let floor = floor.map(|points| ("noise floor of the recording", Colour::Grey, Mark::Dotted, points));
-    let leakage = spectra.leakage.as_ref().map(|l| axis_points(&l.frequency_hz, &l.amplitude_m));
+    let constant =
+        |floor_m: f64| [spectra.lowest_hz, highest].map(|f| Some((f, floor_m * MICROMETRES))).to_vec();
+    let level = |l: &SpectrumLevel| axis_points(&l.frequency_hz, &l.amplitude_m);
+    let floor = spectra.noise_floor.as_ref().map(level);
+    let floor = floor.or_else(|| spectra.noise_floor_m.filter(|f| *f > 0.0).map(constant));
+    let floor = floor.map(|p| Series::new("noise floor of the recording", Colour::Grey, Mark::Dotted, p));
+    let leakage = spectra.leakage.as_ref().map(level);
     let leakage =
-        leakage.map(|points| ("leakage of the removed flip", Colour::Orange, Mark::ThinDashed, points));
-    let drawn = floor.into_iter().chain(leakage);
-    drawn
-        .map(|(label, colour, mark, points)| Series {
-            label: label.to_owned(),
-            colour,
-            mark,
-            points,
-            error_bars: Vec::new(),
-        })
-        .collect()
+        leakage.map(|p| Series::new("leakage of the removed flip", Colour::Orange, Mark::ThinDashed, p));
+    floor.into_iter().chain(leakage).collect()
 }
 
 #[cfg(test)]

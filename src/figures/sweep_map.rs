@@ -93,66 +93,40 @@ impl<'a> SweepMapValues<'a> {
         };
         let cell = |index: usize| {
             let (column, row) = (index / rows, index % rows);
-            Some([
-                *across.edges.get(column)?,
-                *across.edges.get(column + 1)?,
-                *up.edges.get(row)?,
-                *up.edges.get(row + 1)?,
-            ])
+            let (left, right) = (across.edges.get(column)?, across.edges.get(column + 1)?);
+            Some([*left, *right, *up.edges.get(row)?, *up.edges.get(row + 1)?])
         };
+        let marker = across
+            .scene_value(scene)
+            .zip(up.scene_value(scene))
+            .map(|at| Series::new(SCENE_LABEL, Colour::Vermilion, Mark::Hollow(MarkerShape::Diamond), [at]));
         Panel {
-            x: across.chart_axis(),
-            y: up.chart_axis(),
-            height_mm: MAP_MM,
-            series: scene_marker(across.scene_value(scene).zip(up.scene_value(scene))).into_iter().collect(),
             heat_map: Some(heat),
             hatches: patterns.reason_hatches(&self.reasons, cell),
-            ..Panel::default()
+            ..Panel::new(across.chart_axis(), up.chart_axis(), MAP_MM, marker)
         }
     }
 
     fn draw_curve(&self, x: &SweepAxis, scene: &Scene, patterns: &ReasonPatterns) -> Panel {
         let across = DisplayAxis::new(x);
-        let points: Vec<Option<(f64, f64)>> =
-            across.middles.iter().zip(&self.values).map(|(x, value)| value.map(|y| (*x, y))).collect();
-        let mark = Mark::Joined(MarkerShape::Disc);
-        let line = Series { colour: Colour::Blue, mark, points, ..Series::default() };
+        let points = across.middles.iter().zip(&self.values).map(|(x, value)| value.map(|y| (*x, y)));
+        let line = Series::new("", Colour::Blue, Mark::Joined(MarkerShape::Disc), points);
         let cell = |index: usize| {
             let (from, to) = (*across.edges.get(index)?, *across.edges.get(index + 1)?);
             Some([from, to, f64::NEG_INFINITY, f64::INFINITY])
         };
-        let rule = |at| VerticalLine {
-            label: SCENE_LABEL.to_owned(),
-            colour: Colour::Grey,
-            mark: Mark::Dashed,
-            at,
-            above: None,
-        };
-        let y = ChartAxis::linear(map_label(self.map));
+        let rule = |at| VerticalLine::new(SCENE_LABEL, Colour::Grey, Mark::Dashed, at);
+        let y = ChartAxis::linear(map_label(self.map)).with_ends(map_range(self.map));
         Panel {
-            x: across.chart_axis(),
-            y: map_range(self.map).map_or(y.clone(), |(low, high)| y.with_range(low, high)),
-            height_mm: CURVE_MM,
-            series: vec![line],
             vertical_lines: across.scene_value(scene).map(rule).into_iter().collect(),
             hatches: patterns.reason_hatches(&self.reasons, cell),
-            ..Panel::default()
+            ..Panel::new(across.chart_axis(), y, CURVE_MM, [line])
         }
     }
 }
 
 /// What marks the scene from which the study starts.
 const SCENE_LABEL: &str = "the scene as written";
-
-fn scene_marker(at: Option<(f64, f64)>) -> Option<Series> {
-    at.map(|at| Series {
-        label: SCENE_LABEL.to_owned(),
-        colour: Colour::Vermilion,
-        mark: Mark::Hollow(MarkerShape::Diamond),
-        points: vec![Some(at)],
-        ..Series::default()
-    })
-}
 
 /// An axis in the unit of figures.
 struct DisplayAxis<'a> {
@@ -171,12 +145,9 @@ impl<'a> DisplayAxis<'a> {
 
     /// From the start of the first cell to the end of the last.
     fn chart_axis(&self) -> ChartAxis {
-        let axis =
-            ChartAxis { label: axis_label(self.axis), scale: axis_scale(self.axis), ..ChartAxis::default() };
-        match (self.edges.first(), self.edges.last()) {
-            (Some(low), Some(high)) => axis.with_range(*low, *high),
-            _ => axis,
-        }
+        let range = self.edges.first().copied().zip(self.edges.last().copied());
+        let (label, scale) = (axis_label(self.axis), axis_scale(self.axis));
+        ChartAxis { label, scale, range, ..ChartAxis::default() }
     }
 
     /// Where the scene itself lies, if it does.
@@ -208,8 +179,8 @@ pub(in crate::figures) struct ReasonPatterns(BTreeMap<MissingReason, HatchPatter
 
 impl ReasonPatterns {
     pub(crate) fn from_outcomes(outcomes: &[PointOutcome]) -> Self {
-        let mut found: Vec<MissingReason> =
-            outcomes.iter().flat_map(|outcome| &outcome.values).filter_map(|value| value.err()).collect();
+        let values = outcomes.iter().flat_map(|outcome| &outcome.values);
+        let mut found: Vec<MissingReason> = values.filter_map(|value| value.err()).collect();
         found.sort_unstable();
         found.dedup();
         Self::for_reasons(&found)

@@ -23,8 +23,8 @@ const MOST: usize = 12;
 #[must_use]
 pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome]) -> Figure {
     let patterns = ReasonPatterns::from_outcomes(outcomes);
-    let drawn =
-        study.maps.iter().enumerate().map(|(at, map)| (map, SweepMapValues::new(study, map, outcomes, at)));
+    let maps = study.maps.iter().enumerate();
+    let drawn = maps.map(|(at, map)| (map, SweepMapValues::new(study, map, outcomes, at)));
     let (shown, empty): (Vec<_>, Vec<_>) =
         drawn.partition(|(_, drawn)| drawn.values.iter().any(Option::is_some));
     let panel = |(map, drawn): &(&SweepMap, SweepMapValues)| {
@@ -48,8 +48,9 @@ pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome]) -> F
     if left_out > 0 {
         notes.push(format!("{left_out} more maps have only their own figures"));
     }
+    let count = if panels.len() == 1 { "One map".to_owned() } else { format!("{} maps", panels.len()) };
     Figure {
-        title: capitalise(&format!("{} over {}", count_maps(panels.len()), describe_axes(study))),
+        title: format!("{count} over {}", describe_axes(study)),
         subtitle: notes.join("; "),
         watermarked: true,
         description: format!(
@@ -61,10 +62,6 @@ pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome]) -> F
         columns: 2,
         panels,
     }
-}
-
-fn count_maps(maps: usize) -> String {
-    if maps == 1 { "one map".to_owned() } else { format!("{maps} maps") }
 }
 
 /// The sheet of a study that is not drawn as maps: rank correlations as numbers over colours.
@@ -84,18 +81,11 @@ pub(crate) fn draw_correlations(study: &Study, found: &RankCorrelations) -> Figu
     let strongest = cells().reduce(|best, next| if next.2.abs() > best.2.abs() { next } else { best });
     let claim = strongest.and_then(|(map, axis, r)| {
         let (map, axis) = (study.maps.get(map)?, axes.get(axis)?);
-        Some(format!(
-            "{} follows {} most: {}",
-            capitalise(&map.name),
-            parameter_words(axis),
-            format_decimals(r, 2)
-        ))
+        let (name, parameter) = (capitalise(&map.name), parameter_words(axis));
+        Some(format!("{name} follows {parameter} most: {}", format_decimals(r, 2)))
     });
-    let text = |(x, y, r)| TextAnnotation {
-        text: format_decimals(r, 2),
-        colour: Colour::Black,
-        at: (x as f64, y as f64),
-    };
+    let text = |(x, y, r)| TextAnnotation::new(format_decimals(r, 2), Colour::Black, (x as f64, y as f64));
+    let count = study.point_count();
     let places = |count: usize| (0..count).map(|at| at as f64).collect();
     let panel = Panel {
         x: ChartAxis::categorical("", study.maps.iter().map(|map| capitalise(&map.name))),
@@ -114,17 +104,13 @@ pub(crate) fn draw_correlations(study: &Study, found: &RankCorrelations) -> Figu
         ..Panel::default()
     };
     Figure {
-        title: claim.clone().unwrap_or_else(|| "No rank correlation".to_owned()),
-        subtitle: format!(
-            "{}; synthetic: {} simulations, no camera took them",
-            study.title,
-            study.point_count()
-        ),
+        panels: claim.iter().map(|_| panel.clone()).collect(),
+        title: claim.unwrap_or_else(|| "No rank correlation".to_owned()),
+        subtitle: format!("{}; synthetic: {count} simulations, no camera took them", study.title),
         watermarked: true,
         description: "Rank correlation of every map with every parameter, as numbers over colours."
             .to_owned(),
         width_mm: FULL_WIDTH_MM,
-        panels: if claim.is_some() { vec![panel] } else { Vec::new() },
         ..Figure::default()
     }
 }

@@ -55,7 +55,11 @@ pub(crate) fn draw_figure(twin: &TwinPlot) -> Figure {
 fn figure_text(twin: &TwinPlot) -> Words {
     let grid = twin.tracked.grid();
     let lost = lost_points(twin).len();
-    let blur_m = blur_points(twin).into_iter().flatten().map(|(_, blur_m)| blur_m.abs()).fold(0.0, f64::max);
+    let blur_m = difference_points(twin, twin.seen)
+        .into_iter()
+        .flatten()
+        .map(|(_, blur_m)| blur_m.abs())
+        .fold(0.0, f64::max);
     Words {
         caption: format!(
             "{} frames at {} frames/s: noise of {} on the deflection, {} of the frames lost",
@@ -93,19 +97,11 @@ fn deflection_points(recording: &Recording) -> Vec<Option<(f64, f64)>> {
 /// Frames without head or without tip, where the camera would have seen them.
 fn lost_points(twin: &TwinPlot) -> Vec<Option<(f64, f64)>> {
     let tracked = deflection_points(twin.tracked);
-    deflection_points(twin.seen)
-        .into_iter()
-        .zip(tracked)
-        .filter(|(_, found)| found.is_none())
-        .map(|(seen, _)| seen)
-        .collect()
+    let seen = deflection_points(twin.seen).into_iter().zip(tracked);
+    seen.filter(|(_, found)| found.is_none()).map(|(seen, _)| seen).collect()
 }
 
-/// The deflection that the camera sees minus that of the motion at the instant of the frame, m.
-fn blur_points(twin: &TwinPlot) -> Vec<Option<(f64, f64)>> {
-    difference_points(twin, twin.seen)
-}
-
+/// The deflection that a recording shows minus that of the motion at the instant of the frame, m.
 fn difference_points(twin: &TwinPlot, of: &Recording) -> Vec<Option<(f64, f64)>> {
     let (grid, traces) = (of.grid(), twin.motion.traces());
     let difference = |at: usize| {
@@ -118,21 +114,12 @@ fn difference_points(twin: &TwinPlot, of: &Recording) -> Vec<Option<(f64, f64)>>
 }
 
 fn draw_run_panel(twin: &TwinPlot) -> Panel {
-    let rule = |(name, at): (&str, f64)| VerticalLine {
-        label: name.to_owned(),
-        colour: Colour::Grey,
-        mark: Mark::Dashed,
-        at,
-        above: None,
-    };
+    let rule = |(name, at): (&str, f64)| VerticalLine::new(name, Colour::Grey, Mark::Dashed, at);
+    let y = ChartAxis::linear("deflection, mm");
     Panel {
         title: "whole run".to_owned(),
-        x: ChartAxis::time(),
-        y: ChartAxis::linear("deflection, mm"),
-        height_mm: PANEL_MM,
-        series: part_series(twin, None),
         vertical_lines: release_instants(twin).into_iter().map(rule).collect(),
-        ..Panel::default()
+        ..Panel::new(ChartAxis::time(), y, PANEL_MM, part_series(twin, None))
     }
 }
 
@@ -140,14 +127,9 @@ fn draw_run_panel(twin: &TwinPlot) -> Panel {
 fn draw_enlarged_panel(twin: &TwinPlot, name: &str, at_s: f64) -> Panel {
     let frame_s = 1.0 / twin.tracked.grid().frame_rate_hz;
     let (from, to) = (at_s - BEFORE * frame_s, at_s + (ENLARGED - BEFORE) * frame_s);
-    Panel {
-        title: format!("{name}, {} frames", ENLARGED as usize),
-        x: ChartAxis::time().with_range(from, to),
-        y: ChartAxis::linear("deflection, mm"),
-        height_mm: PANEL_MM,
-        series: part_series(twin, Some((from, to))),
-        ..Panel::default()
-    }
+    let (x, y) = (ChartAxis::time().with_range(from, to), ChartAxis::linear("deflection, mm"));
+    let panel = Panel::new(x, y, PANEL_MM, part_series(twin, Some((from, to))));
+    Panel { title: format!("{name}, {} frames", ENLARGED as usize), ..panel }
 }
 
 /// The motion, the frames, and the lost ones; with bars in a part.
@@ -166,43 +148,26 @@ fn part_series(twin: &TwinPlot, part: Option<(f64, f64)>) -> Vec<Series> {
         ErrorBar::Horizontal { from, to, .. } | ErrorBar::Vertical { from, to, .. } => to > from,
     };
     let bars = bars.filter(is_seen).collect();
-    let of = |label: &str, colour, mark, points| Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points,
-        ..Series::default()
-    };
     vec![
-        of("simulated motion", Colour::Blue, Mark::Thin, deflection_points(twin.motion)),
-        Series { error_bars: bars, ..of("frame as tracked", Colour::Black, Mark::Dots, tracked) },
-        of("lost frame", Colour::Vermilion, Mark::Crosses, lost_points(twin)),
+        Series::new("simulated motion", Colour::Blue, Mark::Thin, deflection_points(twin.motion)),
+        Series { error_bars: bars, ..Series::new("frame as tracked", Colour::Black, Mark::Dots, tracked) },
+        Series::new("lost frame", Colour::Vermilion, Mark::Crosses, lost_points(twin)),
     ]
 }
 
 /// What the camera adds: blur alone, and blur with noise.
 fn draw_camera_panel(twin: &TwinPlot) -> Panel {
-    let micrometres = |points: Vec<Option<(f64, f64)>>| {
-        points.into_iter().map(|point| point.map(|(time_s, y)| (time_s, 1e6 * y))).collect()
+    let series = |label: &str, colour, mark, of: &Recording| {
+        let points = difference_points(twin, of).into_iter();
+        Series::new(label, colour, mark, points.map(|p| p.map(|(time_s, y)| (time_s, 1e6 * y))))
     };
-    let of = |label: &str, colour, mark, points| Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points: micrometres(points),
-        ..Series::default()
-    };
-    Panel {
-        title: format!("frame minus motion, noise {}", format_length(deflection_noise_m(twin))),
-        x: ChartAxis::time(),
-        y: ChartAxis::linear("difference, \u{b5}m"),
-        height_mm: 0.8 * PANEL_MM,
-        series: vec![
-            of("with noise", Colour::Grey, Mark::Dots, difference_points(twin, twin.tracked)),
-            of("exposure alone", Colour::Orange, Mark::Thin, blur_points(twin)),
-        ],
-        ..Panel::default()
-    }
+    let series = [
+        series("with noise", Colour::Grey, Mark::Dots, twin.tracked),
+        series("exposure alone", Colour::Orange, Mark::Thin, twin.seen),
+    ];
+    let title = format!("frame minus motion, noise {}", format_length(deflection_noise_m(twin)));
+    let y = ChartAxis::linear("difference, \u{b5}m");
+    Panel { title, ..Panel::new(ChartAxis::time(), y, 0.8 * PANEL_MM, series) }
 }
 
 /// The end of the longest stick, and of the last one of the late part of the run that is followed by enough

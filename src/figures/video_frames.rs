@@ -130,12 +130,11 @@ fn instant(
     let head_up_m = apart_m(&traces.head_y_m, &seen.head_y_m, -drop_m);
     let tip_up_m = apart_m(&traces.tip_y_m, &seen.tip_y_m, -drop_m);
     let [head, _, tip] = joints_m;
+    let head_on_m = apart_m(&traces.head_x_m, &seen.head_x_m, along_m)?;
+    let tip_on_m = apart_m(&traces.tip_x_m, &seen.tip_x_m, along_m)?;
     let tracked_m = [
-        (
-            head.0 + apart_m(&traces.head_x_m, &seen.head_x_m, along_m)?,
-            head.1 + head_up_m.unwrap_or_default(),
-        ),
-        (tip.0 + apart_m(&traces.tip_x_m, &seen.tip_x_m, along_m)?, tip.1 + tip_up_m.unwrap_or_default()),
+        (head.0 + head_on_m, head.1 + head_up_m.unwrap_or_default()),
+        (tip.0 + tip_on_m, tip.1 + tip_up_m.unwrap_or_default()),
     ];
     // from the place of the tracked points in the figure to that in the recording
     let from = |column: &[Option<f64>], at_m: f64| Some((*column.get(at)?)? - at_m);
@@ -208,9 +207,8 @@ pub fn details(shown: &VideoFrames) -> String {
 
 /// Which instants have a frame of the video.
 fn frames_in_words(shown: &VideoFrames) -> String {
-    let of = |is: fn(&Frame) -> bool| {
-        let names = shown.instants.iter().filter(|i| is(&i.frame)).map(|i| i.name.to_owned());
-        names.collect::<Vec<String>>()
+    let of = |is: fn(&Frame) -> bool| -> Vec<String> {
+        shown.instants.iter().filter(|i| is(&i.frame)).map(|i| i.name.to_owned()).collect()
     };
     let with = of(|frame| frame.shown().is_some());
     let (without, elsewhere) = (of(|frame| *frame == Frame::Missing), of(|frame| *frame == Frame::Elsewhere));
@@ -222,10 +220,8 @@ fn frames_in_words(shown: &VideoFrames) -> String {
         ),
         (false, true) => " Behind them the frames of the video.".to_owned(),
         (false, false) => {
-            format!(
-                " Behind them the frames of the video, of which there is none {}.",
-                join_with_and(&without)
-            )
+            let without = join_with_and(&without);
+            format!(" Behind them the frames of the video, of which there is none {without}.")
         }
     };
     if !elsewhere.is_empty() {
@@ -257,13 +253,6 @@ pub fn figure(shown: &VideoFrames) -> Figure {
 /// The two links with the tracked points, mm.
 fn drawing(shown: &VideoFrames, instant: &Instant) -> Panel {
     let place = |(x, y): (f64, f64)| Some((1e3 * x, 1e3 * y));
-    let of = |label: &str, colour, mark, points| Series {
-        label: label.to_owned(),
-        colour,
-        mark,
-        points,
-        ..Series::default()
-    };
     let [head, hinge, tip] = instant.joints_m;
     let [(_, head_m), (_, tip_m)] = instant.distances_m();
     // the same length for all instants
@@ -275,20 +264,20 @@ fn drawing(shown: &VideoFrames, instant: &Instant) -> Panel {
     let look = |plain: Mark| if filmed { Mark::Edged } else { plain };
     let [tracked_head, tracked_tip] = instant.tracked_m.map(place);
     let tracked = [tracked_head, None, tracked_tip].into_iter().filter(|point| filmed || point.is_some());
+    let series = [
+        Series::new("glass", Colour::Grey, Mark::Thin, [(-1e6, 0.0), (1e6, 0.0)]),
+        Series::new("neck", Colour::Blue, look(Mark::Thick), [place(head), place(hinge)]),
+        Series::new("lip", Colour::Orange, look(Mark::Thick), [place(hinge), place(tip)]),
+        Series::new("tracked head and tip", Colour::Black, look(Mark::Circles), tracked),
+    ];
+    let x = ChartAxis::linear("from the head, mm").with_range(-1e3 * half, 1e3 * half);
+    let y = ChartAxis::linear("over the glass, mm");
+    let y = y.with_range(-1e3 * ROOM * size, 1e3 * (1.0 + ROOM) * size);
     Panel {
         title: format!("{}\ntip {}, head {}", instant.name, format_length(tip_m), format_length(head_m)),
-        x: ChartAxis::linear("from the head, mm").with_range(-1e3 * half, 1e3 * half),
-        y: ChartAxis::linear("over the glass, mm").with_range(-1e3 * ROOM * size, 1e3 * (1.0 + ROOM) * size),
-        height_mm: DRAWING_MM,
-        series: vec![
-            of("glass", Colour::Grey, Mark::Thin, vec![Some((-1e6, 0.0)), Some((1e6, 0.0))]),
-            of("neck", Colour::Blue, look(Mark::Thick), vec![place(head), place(hinge)]),
-            of("lip", Colour::Orange, look(Mark::Thick), vec![place(hinge), place(tip)]),
-            of("tracked head and tip", Colour::Black, look(Mark::Circles), tracked.collect()),
-        ],
         equal_aspect: true,
         raster: instant.frame.shown().cloned(),
-        ..Panel::default()
+        ..Panel::new(x, y, DRAWING_MM, series)
     }
 }
 

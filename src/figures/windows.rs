@@ -1,10 +1,8 @@
 //! The whole recording with its named windows, and the one that was analysed.
 
 use super::history::length_unit;
-use crate::chart::{
-    ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, ShadedSpan, TopLabel, VerticalLine,
-};
-use crate::figures::subtitle;
+use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, ShadedSpan, TopLabel, VerticalLine};
+use crate::figures::full_figure;
 
 /// A named part of a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -54,77 +52,40 @@ const COLOURS: [Colour; 6] =
 pub fn draw_figure(shown: &WindowOverview) -> Figure {
     let mut panels = vec![draw_panel(shown, &shown.quantity, &shown.channel_m, HEIGHT_MM)];
     // names stand over the topmost panel, their shades run through both
-    panels[0].top_labels = shown
-        .windows
-        .iter()
-        .map(|w| TopLabel { label: w.name.clone(), at: (w.from_s + w.to_s) / 2.0 })
-        .collect();
+    let label = |w: &WindowSpan| TopLabel { label: w.name.clone(), at: (w.from_s + w.to_s) / 2.0 };
+    panels[0].top_labels = shown.windows.iter().map(label).collect();
     if !shown.head_x_m.is_empty() {
         let mut head = draw_panel(shown, "head x", &shown.head_x_m, HEAD_HEIGHT_MM);
         head.vertical_lines.iter_mut().for_each(|r| r.label.clear());
         panels.push(head);
     }
-    Figure {
-        title: shown.title.clone(),
-        subtitle: subtitle(shown.synthetic, &shown.note),
-        watermarked: shown.synthetic,
-        description: format!(
-            "Time history of {} over the whole recording with its named windows shaded.",
-            shown.quantity
-        ),
-        width_mm: FULL_WIDTH_MM,
+    full_figure(
+        &shown.title,
+        shown.synthetic,
+        &shown.note,
+        format!("Time history of {} over the whole recording with its named windows shaded.", shown.quantity),
         panels,
-        ..Figure::default()
-    }
+    )
 }
 
 fn draw_panel(shown: &WindowOverview, name: &str, values_m: &[Option<f64>], height_mm: f64) -> Panel {
     let (unit, factor) = length_unit(values_m.iter().flatten().copied().filter(|x| x.is_finite()));
-    let points = shown.time_s.iter().zip(values_m).map(|(t, x)| x.map(|x| (*t, x * factor))).collect();
-    let rule = |(label, at): &(String, f64)| VerticalLine {
-        label: label.clone(),
-        colour: Colour::Blue,
-        mark: Mark::Dashed,
-        at: *at,
-        above: None,
-    };
-    let time = ChartAxis::time();
+    let points = shown.time_s.iter().zip(values_m).map(|(t, x)| x.map(|x| (*t, x * factor)));
+    let rule = |(label, at): &(String, f64)| VerticalLine::new(label, Colour::Blue, Mark::Dashed, *at);
+    let x = ChartAxis::time().with_ends(shown.time_s.first().copied().zip(shown.time_s.last().copied()));
+    let y = ChartAxis::linear(format!("{name}, {unit}"));
     Panel {
-        x: match (shown.time_s.first(), shown.time_s.last()) {
-            (Some(first), Some(last)) => time.with_range(*first, *last),
-            _ => time,
-        },
-        y: ChartAxis::linear(format!("{name}, {unit}")),
-        height_mm,
-        series: vec![Series {
-            label: String::new(),
-            colour: Colour::Black,
-            mark: Mark::Thin,
-            points,
-            error_bars: Vec::new(),
-        }],
         shaded_spans: window_spans(shown),
         vertical_lines: shown.instants.iter().map(rule).collect(),
-        ..Panel::default()
+        ..Panel::new(x, y, height_mm, [Series::new("", Colour::Black, Mark::Thin, points)])
     }
 }
 
 /// The windows shaded, the analysed one framed.
 fn window_spans(shown: &WindowOverview) -> Vec<ShadedSpan> {
-    let shaded = |(w, colour): (&WindowSpan, &Colour)| ShadedSpan {
-        label: w.name.clone(),
-        colour: *colour,
-        from: w.from_s,
-        to: w.to_s,
-        outlined: false,
-    };
-    let framed = shown.analysed_s.map(|(from, to)| ShadedSpan {
-        label: "analysed".to_owned(),
-        colour: Colour::Black,
-        from,
-        to,
-        outlined: true,
-    });
+    let shaded =
+        |(w, colour): (&WindowSpan, &Colour)| ShadedSpan::new(w.name.clone(), *colour, w.from_s, w.to_s);
+    let framed = shown.analysed_s.map(|(from, to)| ShadedSpan::outline("analysed", Colour::Black, from, to));
     shown.windows.iter().zip(COLOURS.iter().cycle()).map(shaded).chain(framed).collect()
 }
 

@@ -53,31 +53,36 @@ pub fn draw_figure(shown: &WorkPrecision) -> Figure {
             methods.push(&point.method);
         }
     }
-    let of = |method: &str| shown.points.iter().filter(move |p| p.method == method).collect::<Vec<_>>();
-    let looks = methods.iter().zip(LOOKS.iter().cycle());
-    let lines = looks
-        .clone()
-        .map(|(method, (colour, shape))| method_line(method, &of(method), shown.floor, *colour, *shape));
-    let strays: Vec<Series> = looks
-        .map(|(method, (colour, shape))| stray_runs(&of(method), *colour, *shape))
-        .filter(|s| !s.points.is_empty())
-        .collect();
-    let x = ChartAxis::log("wall time of a run, s").with_range(x_limits(shown).0, x_limits(shown).1);
-    let panel = |y: ChartAxis, height_mm: f64, series: Vec<Series>| Panel {
-        x: x.clone(),
-        y,
-        height_mm,
-        series,
-        ..Panel::default()
-    };
-    let mut errors = panel(error_axis(shown), HEIGHTS_MM.0, lines.chain(floor_line(shown)).collect());
-    let mut panels = Vec::new();
-    if strays.is_empty() {
-        panels.push(errors);
-    } else {
-        errors.height_mm -= HEIGHTS_MM.1;
-        panels.push(errors);
-        panels.push(panel(stray_axis(shown), HEIGHTS_MM.1, strays));
+    let looks = || methods.iter().zip(LOOKS.iter().cycle());
+    let runs = |method| shown.points.iter().filter(move |p| p.method == method);
+    let at_least_floor = |error: f64| shown.floor.map_or(error, |floor| error.max(floor));
+    let lines = looks().map(|(method, (colour, shape))| {
+        let points = runs(*method).map(|p| Some((p.wall_s, at_least_floor(p.error?))));
+        Series::new(*method, *colour, Mark::Joined(*shape), points)
+    });
+    // runs with a wrong list, over the number of wrong transitions
+    let strays = looks().map(|(method, (colour, shape))| {
+        let wrong = runs(*method).filter(|p| p.wrong_transitions > 0);
+        let points = wrong.map(|p| (p.wall_s, p.wrong_transitions as f64));
+        Series::new("", *colour, Mark::Hollow(*shape), points)
+    });
+    let strays: Vec<Series> = strays.filter(|s| !s.points.is_empty()).collect();
+    let (low, high) = value_range(shown.points.iter().map(|p| p.wall_s)).unwrap_or((1e-3, 1.0));
+    let x = ChartAxis::log("wall time of a run, s").with_range(low, high);
+    let floor = shown.floor.map(|floor| {
+        Series::new("limit of the reference", Colour::Grey, Mark::Dashed, [(low, floor), (high, floor)])
+    });
+    // the axis reaches over all errors, however many decades these are
+    let errors = shown.points.iter().filter_map(|p| p.error).map(|e| e.max(shown.floor.unwrap_or(0.0)));
+    let error_range = value_range(errors.chain(shown.floor)).unwrap_or((1e-12, 1.0));
+    let y = ChartAxis::log(shown.error_label.clone()).with_ends(Some(error_range));
+    let mut panels = vec![Panel::new(x.clone(), y, HEIGHTS_MM.0, lines.chain(floor))];
+    if !strays.is_empty() {
+        panels[0].height_mm -= HEIGHTS_MM.1;
+        let wrong = shown.points.iter().map(|p| p.wrong_transitions as f64);
+        let (low, high) = value_range(wrong).unwrap_or((1.0, 10.0));
+        let y = ChartAxis::log("missed + invented").with_range(low, high.max(10.0 * low));
+        panels.push(Panel::new(x, y, HEIGHTS_MM.1, strays));
     }
     Figure {
         title: shown.title.clone(),
@@ -91,64 +96,8 @@ pub fn draw_figure(shown: &WorkPrecision) -> Figure {
     }
 }
 
-fn method_line(
-    method: &str,
-    points: &[&WorkPrecisionRun],
-    floor: Option<f64>,
-    colour: Colour,
-    shape: MarkerShape,
-) -> Series {
-    let at = |p: &&WorkPrecisionRun| {
-        p.error.map(|error| (p.wall_s, floor.map_or(error, |floor| error.max(floor))))
-    };
-    Series {
-        label: method.to_owned(),
-        colour,
-        mark: Mark::Joined(shape),
-        points: points.iter().map(at).collect(),
-        ..Series::default()
-    }
-}
-
-/// Runs with a wrong list, over the number of wrong transitions.
-fn stray_runs(points: &[&WorkPrecisionRun], colour: Colour, shape: MarkerShape) -> Series {
-    let wrong = points.iter().filter(|p| p.wrong_transitions > 0);
-    let points = wrong.map(|p| Some((p.wall_s, p.wrong_transitions as f64))).collect();
-    Series { label: String::new(), colour, mark: Mark::Hollow(shape), points, ..Series::default() }
-}
-
-fn floor_line(shown: &WorkPrecision) -> Option<Series> {
-    let (low, high) = x_limits(shown);
-    let points = vec![Some((low, shown.floor?)), Some((high, shown.floor?))];
-    Some(Series {
-        label: "limit of the reference".to_owned(),
-        colour: Colour::Grey,
-        mark: Mark::Dashed,
-        points,
-        ..Series::default()
-    })
-}
-
 /// Room beyond the data on a logarithmic axis, as a factor.
 const ROOM: f64 = 1.5;
-
-fn x_limits(shown: &WorkPrecision) -> (f64, f64) {
-    value_range(shown.points.iter().map(|p| p.wall_s)).unwrap_or((1e-3, 1.0))
-}
-
-/// The axis reaches over all errors, however many decades these are.
-fn error_axis(shown: &WorkPrecision) -> ChartAxis {
-    let errors =
-        shown.points.iter().filter_map(|p| p.error.map(|error| error.max(shown.floor.unwrap_or(0.0))));
-    let (low, high) = value_range(errors.chain(shown.floor)).unwrap_or((1e-12, 1.0));
-    ChartAxis::log(shown.error_label.clone()).with_range(low, high)
-}
-
-fn stray_axis(shown: &WorkPrecision) -> ChartAxis {
-    let (low, high) =
-        value_range(shown.points.iter().map(|p| p.wrong_transitions as f64)).unwrap_or((1.0, 10.0));
-    ChartAxis::log("missed + invented").with_range(low, high.max(10.0 * low))
-}
 
 fn value_range(values: impl Iterator<Item = f64>) -> Option<(f64, f64)> {
     let usable = values.filter(|v| v.is_finite() && *v > 0.0);

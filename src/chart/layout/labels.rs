@@ -17,18 +17,12 @@ const BOLD_WIDTH_RATIO: f64 = WIDE_BOLD_LETTER / WIDE_LETTER;
 pub(super) fn assign_label_rows(panel: &Panel, x: &CanvasAxis) -> Vec<Option<usize>> {
     let end = |line: &str| x.from + (text_width(line, SMALL_MM) * BOLD_WIDTH_RATIO + 1.0) * UNITS_PER_MM;
     let title_ends: Vec<f64> = panel.title.lines().rev().map(end).collect();
-    let captions = stack_labels(
-        &panel.top_labels.iter().map(|c| (c.label.as_str(), c.at)).collect::<Vec<_>>(),
-        x,
-        &title_ends,
-    );
+    let captions: Vec<_> = panel.top_labels.iter().map(|c| (c.label.as_str(), c.at)).collect();
+    let captions = stack_labels(&captions, x, &title_ends);
     let taken = captions.iter().flatten().max().map_or(0, |row| row + 1);
     let free: &[f64] = if taken == 0 { &title_ends } else { &[] };
-    let rules = stack_labels(
-        &panel.vertical_lines.iter().map(|r| (r.label.as_str(), r.at)).collect::<Vec<_>>(),
-        x,
-        free,
-    );
+    let rules: Vec<_> = panel.vertical_lines.iter().map(|r| (r.label.as_str(), r.at)).collect();
+    let rules = stack_labels(&rules, x, free);
     rules.into_iter().map(|row| row.map(|row| row + taken)).chain(captions).collect()
 }
 

@@ -4,7 +4,7 @@ use super::visible_y_values;
 use crate::chart::axis;
 use crate::chart::axis::{AxisScale, CanvasAxis, Tick};
 use crate::chart::elements::Panel;
-use crate::chart::path::CanvasArea;
+use crate::chart::path::{CanvasArea, CanvasPoint};
 use crate::chart::style::{
     EDGE_MM, LINE_MM, SMALL_MM, TEXT_MM, UNITS_PER_MM, X_LOG_TICKS_MM, X_TICKS_MM, Y_LOG_TICKS_MM, Y_TICKS_MM,
 };
@@ -70,6 +70,11 @@ impl<'a> PanelLayout<'a> {
         placed
     }
 
+    /// Canvas coordinates of a point in the units of the axes; `None` where it has none.
+    pub(in crate::chart) fn canvas_point(&self, (x, y): (f64, f64)) -> Option<CanvasPoint> {
+        Some((self.x.canvas_position(x)?, self.y.canvas_position(y)?))
+    }
+
     /// Widens the shorter of the axes about its middle until both have one length for a unit.
     fn equalise_scales(&mut self) {
         let unit = |axis: &CanvasAxis| (axis.high - axis.low) / (axis.to - axis.from).abs();
@@ -104,10 +109,8 @@ impl<'a> PanelLayout<'a> {
 
     /// Ends of the label of a tick of the x axis.
     fn tick_label_span(&self, tick: &Tick) -> Option<(f64, f64)> {
-        let (at, half) = (
-            self.x.canvas_position(tick.value)?,
-            text_width(tick.label.as_ref()?, TEXT_MM) * UNITS_PER_MM / 2.0,
-        );
+        let at = self.x.canvas_position(tick.value)?;
+        let half = text_width(tick.label.as_ref()?, TEXT_MM) * UNITS_PER_MM / 2.0;
         Some((at - half, at + half))
     }
 

@@ -2,7 +2,7 @@
 //! the glass.
 
 use super::Animation;
-use crate::chart::{ChartAxis, Colour, Mark, Panel, Series, TextAnnotation};
+use crate::chart::{ChartAxis, Colour, Mark, Panel, Series, TextAnnotation, value_span};
 use crate::figures::poses::joint_positions;
 use crate::model::Linkage;
 use crate::simulate::ModelSample;
@@ -43,68 +43,39 @@ pub(super) fn draw_linkage_panel(animation: &Animation) -> Panel {
     let (low, high) = (-BELOW * length, (1.0 + ABOVE) * length);
     let ends = animation.samples.iter().flat_map(|s| [MM * s.head_x_m, MM * s.tip_x_m]);
     let room = 1.2 * HEAD_HALF_WIDTH * length;
-    let (left, right) =
-        ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, r), x| (l.min(x - room), r.max(x + room)));
+    let (left, right) = value_span(ends.flat_map(|x| [x - room, x + room]));
     let height_mm = (AXES_MM * (high - low) / (right - left)).clamp(HEIGHT_MM.0, HEIGHT_MM.1);
     let poses = key_poses(animation);
     let unit_mm = (AXES_MM / (right - left)).min(height_mm / (high - low));
     let (bar, foot) = (left + (MARGIN_MM / unit_mm - 0.5).max(0.0), 0.8 * low);
-    let mut panel = Panel {
-        x: ChartAxis::linear("").with_range(left, right),
-        y: ChartAxis::linear("").with_range(low, high),
-        height_mm,
-        equal_aspect: true,
-        bare: true,
-        series: vec![glass_line(left, right), scale_bar((bar, low / 2.0))],
-        annotations: vec![
-            text_at("glass", (right - MARGIN_MM / unit_mm, foot)),
-            text_at("1 mm", (bar + 0.5, foot - 0.5 / unit_mm)),
-        ],
-        ..Panel::default()
-    };
-    panel.annotations.extend(pose_labels(
-        &poses,
-        (1.0 + 1.4 * HEAD_HEIGHT) * length,
-        ROW_MM / unit_mm,
-        LABEL_MM / unit_mm,
-    ));
-    let points = poses.iter().flat_map(|(_, [a, b, c])| [Some(*a), Some(*b), Some(*c), None]).collect();
-    panel.series.push(Series {
-        label: "model at the instants named".to_owned(),
-        colour: Colour::Grey,
-        mark: Mark::Thin,
-        points,
-        ..Series::default()
-    });
+    let mut annotations = vec![
+        text_at("glass", (right - MARGIN_MM / unit_mm, foot)),
+        text_at("1 mm", (bar + 0.5, foot - 0.5 / unit_mm)),
+    ];
+    let label_height = (1.0 + 1.4 * HEAD_HEIGHT) * length;
+    annotations.extend(pose_labels(&poses, label_height, ROW_MM / unit_mm, LABEL_MM / unit_mm));
+    let points = poses.iter().flat_map(|(_, [a, b, c])| [Some(*a), Some(*b), Some(*c), None]);
+    let mut series = vec![
+        glass_line(left, right),
+        Series::new("", Colour::Black, Mark::Line, [(bar, low / 2.0), (bar + 1.0, low / 2.0)]),
+        Series::new("model at the instants named", Colour::Grey, Mark::Thin, points),
+    ];
     if animation.measured.is_some() {
-        panel.series.push(Series {
-            label: "measured tip and head".to_owned(),
-            mark: Mark::Crosses,
-            ..Series::default()
-        });
+        series.push(Series::new("measured tip and head", Colour::Black, Mark::Crosses, [None; 0]));
     }
-    panel
+    let [x, y] = [(left, right), (low, high)].map(|ends| ChartAxis::linear("").with_ends(Some(ends)));
+    Panel { equal_aspect: true, bare: true, annotations, ..Panel::new(x, y, height_mm, series) }
 }
 
 /// The glass, as wide as the panel turns out to be.
 fn glass_line(left: f64, right: f64) -> Series {
     const FAR: f64 = 100.0;
     let ends = [left - FAR * (right - left), right + FAR * (right - left)];
-    Series {
-        colour: Colour::Grey,
-        mark: Mark::Thick,
-        points: ends.map(|x| Some((x, 0.0))).to_vec(),
-        ..Series::default()
-    }
-}
-
-/// A millimetre from there.
-fn scale_bar((x, y): (f64, f64)) -> Series {
-    Series { points: vec![Some((x, y)), Some((x + 1.0, y))], ..Series::default() }
+    Series::new("", Colour::Grey, Mark::Thick, ends.map(|x| (x, 0.0)))
 }
 
 fn text_at(text: &str, at: (f64, f64)) -> TextAnnotation {
-    TextAnnotation { text: text.to_owned(), at, ..TextAnnotation::default() }
+    TextAnnotation::new(text, Colour::Black, at)
 }
 
 /// The tip enlarged over the last part of what is shown, where it slips.
@@ -115,19 +86,14 @@ pub(super) fn draw_tip_panel(animation: &Animation, height_mm: f64) -> Panel {
     let [from_s, to_s] = animation.pace.last_part_s();
     let tips =
         animation.samples.iter().filter(|s| s.time_s >= from_s && s.time_s <= to_s).map(|s| MM * s.tip_x_m);
-    let (left, right) = tips.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, r), x| (l.min(x), r.max(x)));
+    let (left, right) = value_span(tips);
     let way = (right - left).max(0.01 * blade_length_mm(&animation.linkage));
     let (left, right) = (left - ROOM * way, right + ROOM * way);
     let low = -UNDER * way;
-    Panel {
-        title: "the tip, enlarged".to_owned(),
-        x: ChartAxis::linear("along the sweep, mm").with_range(left, right),
-        y: ChartAxis::linear("height, mm").with_range(low, low + (right - left) * height_mm / AXES_MM),
-        height_mm,
-        equal_aspect: true,
-        series: vec![glass_line(left, right)],
-        ..Panel::default()
-    }
+    let x = ChartAxis::linear("along the sweep, mm").with_range(left, right);
+    let y = ChartAxis::linear("height, mm").with_range(low, low + (right - left) * height_mm / AXES_MM);
+    let title = "the tip, enlarged".to_owned();
+    Panel { title, equal_aspect: true, ..Panel::new(x, y, height_mm, [glass_line(left, right)]) }
 }
 
 /// The names of poses over their heads, each in the lowest row where it does not run into one before.

@@ -26,50 +26,24 @@ const TEXT_SIZE: f64 = 44.0;
 /// one.
 const MIN_CROSS_FRACTION: f64 = 1.0 / 2000.0;
 
-/// A mode of contact: what it is called and how the tip is drawn in it.
-struct ContactModeSymbol {
-    mode: TipMode,
-    word: &'static str,
-    colour: Colour,
-    /// Outline of the tip's symbol in units of its half width.
-    outline: &'static str,
-}
+/// A mode of contact, its name, and colour and outline of the tip's symbol in it; the outline is in units of
+/// the symbol's half width.
+type ContactModeSymbol = (TipMode, &'static str, Colour, &'static str);
 
 const CONTACT_MODE_SYMBOLS: [ContactModeSymbol; 4] = [
-    ContactModeSymbol {
-        mode: TipMode::Stick,
-        word: "stick",
-        colour: Colour::Blue,
-        outline: "M-1 -1H1V1H-1Z",
-    },
-    ContactModeSymbol {
-        mode: TipMode::SlipForward,
-        word: "slip+ (to the right)",
-        colour: Colour::Green,
-        outline: "M1.4 0L-0.9 1.2V-1.2Z",
-    },
-    ContactModeSymbol {
-        mode: TipMode::SlipBackward,
-        word: "slip\u{2212} (to the left)",
-        colour: Colour::Green,
-        outline: "M-1.4 0L0.9 1.2V-1.2Z",
-    },
-    ContactModeSymbol {
-        mode: TipMode::Flight,
-        word: "flight",
-        colour: Colour::Purple,
-        outline: "M0 -1.3L1.3 0L0 1.3L-1.3 0Z",
-    },
+    (TipMode::Stick, "stick", Colour::Blue, "M-1 -1H1V1H-1Z"),
+    (TipMode::SlipForward, "slip+ (to the right)", Colour::Green, "M1.4 0L-0.9 1.2V-1.2Z"),
+    (TipMode::SlipBackward, "slip\u{2212} (to the left)", Colour::Green, "M-1.4 0L0.9 1.2V-1.2Z"),
+    (TipMode::Flight, "flight", Colour::Purple, "M0 -1.3L1.3 0L0 1.3L-1.3 0Z"),
 ];
 
 /// The elements; none without the panels of the figure.
 pub(super) fn moving_elements(animation: &Animation, plots: &[PanelPlacement]) -> String {
     let [plot, close, strips @ ..] = plots else { return String::new() };
-    let drawing =
-        [moving_linkage(animation, plot), tip_symbol(animation, plot), measured_crosses(animation, plot)]
-            .concat();
     [
-        drawing,
+        moving_linkage(animation, plot),
+        tip_symbol(animation, plot),
+        measured_crosses(animation, plot),
         enlarged_tip(animation, close),
         mode_and_pace_text(animation, plot, close),
         time_cursors(animation, strips),
@@ -81,9 +55,9 @@ pub(super) fn moving_elements(animation: &Animation, plots: &[PanelPlacement]) -
 /// y, x, y.
 fn pose_key_frames(animation: &Animation, plot: &PanelPlacement) -> KeyFrames<6> {
     let point = |sample: &ModelSample| {
-        let [a, b, c] = drawing::linkage_points_mm(&animation.linkage, sample);
-        let (a, b, c) =
-            (plot.canvas_point(a.0, a.1)?, plot.canvas_point(b.0, b.1)?, plot.canvas_point(c.0, c.1)?);
+        let points = drawing::linkage_points_mm(&animation.linkage, sample);
+        let [a, b, c] = points.map(|(x, y)| plot.canvas_point(x, y));
+        let (a, b, c) = (a?, b?, c?);
         Some((animation.pace.playback_fraction(sample.time_s), [a.0, a.1, b.0, b.1, c.0, c.1]))
     };
     animation.samples.iter().filter_map(point).collect()
@@ -232,12 +206,11 @@ fn visible_in_mode(animation: &Animation, mode: TipMode, contents: &str) -> Stri
     }
 }
 
-fn mode_symbol(sign: &ContactModeSymbol, at: (f64, f64)) -> String {
+fn mode_symbol((_, _, colour, outline): &ContactModeSymbol, at: (f64, f64)) -> String {
     let [x, y, size] = format_numbers(&[at.0, at.1, TIP_HALF_WIDTH]);
     format!(
-        "<path d=\"{}\" transform=\"translate({x} {y}) scale({size})\" fill=\"{}\"/>",
-        sign.outline,
-        sign.colour.hex()
+        "<path d=\"{outline}\" transform=\"translate({x} {y}) scale({size})\" fill=\"{}\"/>",
+        colour.hex()
     )
 }
 
@@ -245,7 +218,7 @@ fn mode_symbol(sign: &ContactModeSymbol, at: (f64, f64)) -> String {
 fn tip_symbol(animation: &Animation, plot: &PanelPlacement) -> String {
     let symbols: String = CONTACT_MODE_SYMBOLS
         .iter()
-        .map(|sign| visible_in_mode(animation, sign.mode, &mode_symbol(sign, (0.0, SYMBOL_OFFSET))))
+        .map(|sign| visible_in_mode(animation, sign.0, &mode_symbol(sign, (0.0, SYMBOL_OFFSET))))
         .collect();
     moving_group(
         animation,
@@ -268,8 +241,8 @@ fn mode_and_pace_text(animation: &Animation, plot: &PanelPlacement, close: &Pane
     let [[(left, top), _], [(_, frame), (right, _)]] = [plot.corners(), close.corners()];
     let y = top + TEXT_SIZE / 2.0;
     let modes = CONTACT_MODE_SYMBOLS.iter().map(|sign| {
-        let word = text_element(left + 4.0 * TIP_HALF_WIDTH, y, "start", &format!("tip: {}", sign.word));
-        visible_in_mode(animation, sign.mode, &(mode_symbol(sign, (left + 1.5 * TIP_HALF_WIDTH, y)) + &word))
+        let word = text_element(left + 4.0 * TIP_HALF_WIDTH, y, "start", &format!("tip: {}", sign.1));
+        visible_in_mode(animation, sign.0, &(mode_symbol(sign, (left + 1.5 * TIP_HALF_WIDTH, y)) + &word))
     });
     let over = frame - 0.8 * TEXT_SIZE;
     let pace = |part: &PlaybackPart| {

@@ -1,7 +1,7 @@
 //! Time histories: the whole and the release of the tip, with what lies between measurement and model.
 
-use super::thin_frames;
 use super::{TimeHistory, draw_enlarged, draw_figure};
+use super::{sticks_on_clock, thin_frames};
 use crate::compare::condition::{FitWindow, group_fit_windows};
 use crate::compare::{ConditionComparison, TimedRecording};
 use crate::feature::{Reading, ReversalInterval};
@@ -36,7 +36,7 @@ pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
 }
 
 fn build_history(case: &ConditionComparison) -> TimeHistory {
-    let (shift_s, shown) = (case.alignment.shift_s, case.measured_or_model());
+    let shown = case.measured_or_model();
     let grid = shown.recording.grid();
     let whole_s = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
     let zoom_s = release_s(&shown);
@@ -44,10 +44,8 @@ fn build_history(case: &ConditionComparison) -> TimeHistory {
     // one after the other: each is lighter before the next is made
     let measured = case.recording().map(MotionTraces::from_recording).map(light);
     let model = light(MotionTraces::from_model(&case.model.view.recording, &case.alignment));
-    let windows = fit_window_spans(case)
-        .into_iter()
-        .enumerate()
-        .map(|(i, (_, from, to))| ((i + 1).to_string(), from, to));
+    let windows = fit_window_spans(case).into_iter().enumerate();
+    let windows = windows.map(|(i, (_, from, to))| ((i + 1).to_string(), from, to));
     TimeHistory {
         title: motion_title(case),
         enlarged_title: enlarged_title(&shown),
@@ -55,7 +53,7 @@ fn build_history(case: &ConditionComparison) -> TimeHistory {
         measured,
         model: Some(model),
         residual: case.residual.clone().map(light),
-        stick_s: case.model.view.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect(),
+        stick_s: sticks_on_clock(case),
         instants: turn_instants(&shown),
         windows: windows.collect(),
         zoom_s,
@@ -65,10 +63,8 @@ fn build_history(case: &ConditionComparison) -> TimeHistory {
 /// The release of the tip, as far as there are frames.
 fn release_s(shown: &TimedRecording) -> Option<(f64, f64)> {
     let (grid, release_s) = (shown.recording.grid(), shown.instant_s(InstantKind::Release)?);
-    Some((
-        (release_s - ZOOM_S.0).max(grid.start_s),
-        (release_s + ZOOM_S.1).min(grid.time_s(grid.frames.saturating_sub(1))),
-    ))
+    let last_s = grid.time_s(grid.frames.saturating_sub(1));
+    Some(((release_s - ZOOM_S.0).max(grid.start_s), (release_s + ZOOM_S.1).min(last_s)))
 }
 
 /// Instants of the first turns, or of the first alone where there are many.
@@ -95,11 +91,8 @@ fn fit_window_spans(case: &ConditionComparison) -> Vec<(String, f64, f64)> {
             [first, _, _, ..] => format!("{} and {} more", first.feature.name, l.targets.len() - 1),
             _ => join_with_and(&l.feature_names()),
         };
-        Some((
-            format!("{served} ({})", l.channel.label()),
-            grid.time_s(frames.start),
-            grid.time_s(frames.end),
-        ))
+        let name = format!("{served} ({})", l.channel.label());
+        Some((name, grid.time_s(frames.start), grid.time_s(frames.end)))
     };
     let mut found: Vec<_> = group_fit_windows(case.job, case.condition).iter().filter_map(place).collect();
     found.sort_by(|a, b| a.1.total_cmp(&b.1).then(a.2.total_cmp(&b.2)));
@@ -118,30 +111,22 @@ fn whole_text(case: &ConditionComparison, history: &TimeHistory) -> Words {
         describe_release(case),
     ];
     let mut details: Vec<String> = said.into_iter().flatten().chain(describe_residuals(case, None)).collect();
-    let windows: Vec<String> = fit_window_spans(case)
-        .iter()
-        .enumerate()
-        .map(|(i, (name, ..))| format!("{} {name}", i + 1))
-        .collect();
+    let windows = fit_window_spans(case);
+    let windows: Vec<String> =
+        windows.iter().enumerate().map(|(i, (name, ..))| format!("{} {name}", i + 1)).collect();
     if !windows.is_empty() {
         details.push(format!("Bars: windows that the fit read, {}.", windows.join("; ")));
     }
-    let caption = format!(
-        "Motion of tip and head over time, {}{}.",
-        whose_motion(case),
-        describe_agreement(case, None)
-    );
+    let agreement = describe_agreement(case, None);
+    let caption = format!("Motion of tip and head over time, {}{agreement}.", whose_motion(case));
     Words { caption, details: details.join(" ") }
 }
 
 fn enlarged_text(case: &ConditionComparison, history: &TimeHistory) -> Words {
     let release_s = case.measured_or_model().instant_s(InstantKind::Release);
     let span = release_s.zip(history.zoom_s).map_or_else(String::new, |(at_s, (from_s, to_s))| {
-        format!(
-            ", from {} before it to {} after it",
-            format_milliseconds(at_s - from_s),
-            format_milliseconds(to_s - at_s)
-        )
+        let [before, after] = [at_s - from_s, to_s - at_s].map(format_milliseconds);
+        format!(", from {before} before it to {after} after it")
     });
     let mut details = vec![format!("The release of the tip{span}: {}", describe_overlay(case))];
     details.extend(history.zoom_s.map(|(from_s, to_s)| {
@@ -189,7 +174,7 @@ fn motion_title(case: &ConditionComparison) -> String {
     match rms_difference(case, None) {
         Some(found) => capitalise(&describe_miss(found)),
         None if case.alignment.opposite_turn => {
-            "The recorded head turns the other way than the model's".to_owned()
+            "The recorded head turns the other way than the model's".into()
         }
         None => {
             let (stick_s, samples) = (&case.model.motion.stick_s, &case.model.motion.samples);
@@ -204,12 +189,8 @@ fn motion_title(case: &ConditionComparison) -> String {
 /// The claim of the enlarged part.
 fn enlarged_title(shown: &TimedRecording) -> String {
     let after_s = shown.instant_s(InstantKind::Release).zip(shown.instant_s(InstantKind::Reversal));
-    after_s.map_or_else(
-        || "The tip is released".to_owned(),
-        |(release_s, turn_s)| {
-            format!("The tip is released {} the head turns", format_turn_offset(release_s - turn_s))
-        },
-    )
+    let when = after_s.map(|(release_s, turn_s)| format_turn_offset(release_s - turn_s));
+    when.map_or("The tip is released".to_owned(), |when| format!("The tip is released {when} the head turns"))
 }
 
 /// How near the deflection of the model is to the measured one.
@@ -228,36 +209,21 @@ fn describe_agreement(case: &ConditionComparison, within_s: Option<(f64, f64)>) 
 
 /// What is drawn over what, and how it was brought there.
 fn describe_overlay(case: &ConditionComparison) -> String {
-    if case.recording().is_none() {
-        return format!("{}.", case.source_name());
-    }
-    let alignment = case.alignment;
+    let (source, alignment) = (case.source_name(), case.alignment);
+    let Some(recording) = case.recording() else { return format!("{source}.") };
+    let both = format!("{source} against the fitted model through the same camera");
     if alignment.opposite_turn {
-        return format!(
-            "{} against the fitted model through the same camera, together at the turn of the head. \
-             {OPPOSED}.",
-            case.source_name()
-        );
+        return format!("{both}, together at the turn of the head. {OPPOSED}.");
     }
     let Some(shift_sd_s) = alignment.shift_sd_s else {
-        return format!(
-            "{} against the fitted model through the same camera, each on its own clock: they show no path \
-             in common.",
-            case.source_name()
-        );
+        return format!("{both}, each on its own clock: they show no path in common.");
     };
     let headless = if alignment.followed == AlignmentPoint::Tip { ", as no head was tracked" } else { "" };
-    let has_drop = case.recording().is_some_and(|r| is_tracked(&r.traces().head_y_m));
-    let drop = if has_drop {
-        format!(", the head drop by {}", format_length(alignment.drop_m))
-    } else {
-        String::new()
-    };
+    let drop = Some(alignment.drop_m).filter(|_| is_tracked(&recording.traces().head_y_m));
+    let drop = drop.map_or_else(String::new, |m| format!(", the head drop by {}", format_length(m)));
     format!(
-        "{} against the fitted model through the same camera. The model's clock and origin are those that \
-         bring its {} closest to the recorded one \
+        "{both}. The model's clock and origin are those that bring its {} closest to the recorded one \
          (least squares{headless}): its clock is moved by {}{}, head and tip by {} along the sweep{drop}.",
-        case.source_name(),
         alignment.followed.name(),
         format_milliseconds(alignment.shift_s),
         describe_clock_uncertainty(case, shift_sd_s),
@@ -280,26 +246,16 @@ fn describe_clock_uncertainty(case: &ConditionComparison, shift_sd_s: f64) -> St
 
 /// How often and how long the model's tip sticks in what is shown.
 fn describe_sticks(history: &TimeHistory) -> String {
-    let shown = history
-        .measured
-        .as_ref()
-        .or(history.model.as_ref())
-        .and_then(|m| Some((*m.time_s.first()?, *m.time_s.last()?)));
+    let shown = history.measured.as_ref().or(history.model.as_ref());
+    let shown = shown.and_then(|m| Some((*m.time_s.first()?, *m.time_s.last()?)));
     let (from_s, to_s) = shown.unwrap_or_default();
-    let stuck_s: Vec<f64> = history
-        .stick_s
-        .iter()
-        .map(|(from, to)| to.min(to_s) - from.max(from_s))
-        .filter(|s| *s > 0.0)
-        .collect();
+    let stuck_s = history.stick_s.iter().map(|(from, to)| to.min(to_s) - from.max(from_s));
+    let stuck_s: Vec<f64> = stuck_s.filter(|s| *s > 0.0).collect();
+    if history.stick_s.is_empty() {
+        return "The model's tip never sticks.".to_owned();
+    }
     if stuck_s.is_empty() {
-        let never = history.stick_s.is_empty();
-        return if never {
-            "The model's tip never sticks."
-        } else {
-            "The model's tip does not stick in what is shown."
-        }
-        .to_owned();
+        return "The model's tip does not stick in what is shown.".to_owned();
     }
     let share = stuck_s.iter().sum::<f64>() / (to_s - from_s).max(f64::MIN_POSITIVE);
     format!(
@@ -311,13 +267,8 @@ fn describe_sticks(history: &TimeHistory) -> String {
 
 /// How often the model's tip leaves the glass in its run, where it does.
 fn describe_flights(case: &ConditionComparison) -> Option<String> {
-    let count = case
-        .model
-        .motion
-        .transitions
-        .iter()
-        .filter(|t| t.from != TipMode::Flight && t.to == TipMode::Flight)
-        .count();
+    let takes_off = |from: TipMode, to: TipMode| from != TipMode::Flight && to == TipMode::Flight;
+    let count = case.model.motion.transitions.iter().filter(|t| takes_off(t.from, t.to)).count();
     (count > 0).then(|| format!("In its whole run it leaves the glass {}.", format_times(count)))
 }
 
@@ -365,9 +316,8 @@ fn describe_residuals(case: &ConditionComparison, within_s: Option<(f64, f64)>) 
         Some(format!("{} ({})", format_length(residual.rms_m(channel, within_s)?), channel.label()))
     };
     let rms: Vec<String> = MOTION_CHANNELS.into_iter().filter_map(one).collect();
-    let noise = case
-        .noise_m(Channel::HeadX)
-        .map_or_else(String::new, |m| format!("; the tracking noise of the head is {}", format_length(m)));
+    let noise = |m: f64| format!("; the tracking noise of the head is {}", format_length(m));
+    let noise = case.noise_m(Channel::HeadX).map_or_else(String::new, noise);
     (!rms.is_empty())
         .then(|| format!("Root mean square of measured minus model: {}{noise}.", join_with_and(&rms)))
 }

@@ -2,10 +2,9 @@
 //! over speed.
 
 use super::{
-    FULL_WIDTH_MM, Figure, SpectrogramPlot, SpectrogramRidgePoint, SpeedPoint, colour_range_db, decibel_map,
-    draw_map, limit_axis, subtitle, time_span,
+    Figure, SpectrogramPlot, colour_range_db, decibel_map, draw_map, full_figure, ridge_points, time_span,
 };
-use crate::chart::{ChartAxis, Colour, ErrorBar, Mark, MarkerShape, Panel, Series};
+use crate::chart::{ChartAxis, Colour, HeatMap, Mark, MarkerShape, Panel, Series};
 use crate::figures::spectrogram;
 
 /// Whose spectrogram it is.
@@ -36,27 +35,13 @@ const RIDGE_HEIGHT_MM: f64 = 40.0;
 /// Most columns and rows of a map: two of them stay small, and a cell is no wider than a millimetre.
 const MOST_COLUMNS: usize = 64;
 const MOST_ROWS: usize = 48;
-const MILLIMETRES: f64 = 1e3;
 
 impl SpectrogramSide {
-    fn name(self) -> &'static str {
+    /// Name, colour, symbol of its points and line of its ridge.
+    fn look(self) -> (&'static str, Colour, MarkerShape, Mark) {
         match self {
-            Self::Measured => "measured",
-            Self::Model => "model",
-        }
-    }
-
-    fn colour(self) -> Colour {
-        match self {
-            Self::Measured => Colour::Black,
-            Self::Model => Colour::Vermilion,
-        }
-    }
-
-    fn shape(self) -> MarkerShape {
-        match self {
-            Self::Measured => MarkerShape::Disc,
-            Self::Model => MarkerShape::Square,
+            Self::Measured => ("measured", Colour::Black, MarkerShape::Disc, Mark::Thin),
+            Self::Model => ("model", Colour::Vermilion, MarkerShape::Square, Mark::Thick),
         }
     }
 }
@@ -67,46 +52,37 @@ pub fn draw_comparison(shown: &SpectrogramComparison) -> Figure {
     let sides: Vec<(SpectrogramSide, SpectrogramPlot)> =
         shown.sides.iter().map(|(of, s)| (*of, coarsen_spectrogram(s))).collect();
     let range = sides.first().and_then(|(_, s)| colour_range_db(&decibel_map(&s.amplitude_m)));
-    let time = limit_axis(ChartAxis::time(), common_span_s(&sides));
+    // with one axis of time for both sides, panels one below the other are numbered once
+    let spans = sides.iter().filter_map(|(_, s)| time_span(&s.time_s));
+    let span_s = spans.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
+    let time = ChartAxis::time().with_ends(span_s);
     let mut panels: Vec<Panel> = sides
         .iter()
         .map(|(of, s)| {
-            title_panel(draw_map(s), *of, range, shown.sides.len() > 1 && *of == SpectrogramSide::Measured)
+            let panel = draw_map(s);
+            let heat_map = panel.heat_map.map(|heat| HeatMap {
+                range,
+                without_bar: shown.sides.len() > 1 && *of == SpectrogramSide::Measured,
+                label: "amplitude, dB re 1 \u{b5}m".to_owned(),
+                ..heat
+            });
+            Panel { title: of.look().0.to_owned(), heat_map, height_mm: HEIGHT_MM, x: time.clone(), ..panel }
         })
         .collect();
-    panels.iter_mut().for_each(|panel| panel.x = time.clone());
-    panels.extend(
-        [draw_ridges_over_time(&shown.sides, time), draw_ridges_over_speed(&shown.sides)]
-            .into_iter()
-            .flatten(),
-    );
+    panels.extend(draw_ridges_over_time(&shown.sides, time));
+    panels.extend(draw_ridges_over_speed(&shown.sides));
     Figure {
-        title: shown.title.clone(),
-        subtitle: subtitle(shown.synthetic, &shown.note),
-        watermarked: shown.synthetic,
-        description: "Spectrograms: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m, with \
-        the ridges that were followed."
-            .to_owned(),
-        width_mm: FULL_WIDTH_MM,
         columns: sides.len(),
-        panels,
+        ..full_figure(
+            &shown.title,
+            shown.synthetic,
+            &shown.note,
+            "Spectrograms: amplitude of a sine over time and frequency, in dB re 1 \u{b5}m, with \
+        the ridges that were followed."
+                .to_owned(),
+            panels,
+        )
     }
-}
-
-/// From the first column of either side to the last: with one axis of time, panels one below the other are
-/// numbered once.
-fn common_span_s(sides: &[(SpectrogramSide, SpectrogramPlot)]) -> Option<(f64, f64)> {
-    sides.iter().filter_map(|(_, s)| time_span(&s.time_s)).reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)))
-}
-
-fn title_panel(panel: Panel, of: SpectrogramSide, range: Option<(f64, f64)>, without_bar: bool) -> Panel {
-    let heat = panel.heat_map.map(|heat| super::HeatMap {
-        range,
-        without_bar,
-        label: "amplitude, dB re 1 \u{b5}m".to_owned(),
-        ..heat
-    });
-    Panel { title: of.name().to_owned(), heat_map: heat, height_mm: HEIGHT_MM, ..panel }
 }
 
 /// Neighbouring columns and rows as one, with the largest of their amplitudes, so that a thin line stays; the
@@ -117,6 +93,9 @@ fn coarsen_spectrogram(shown: &SpectrogramPlot) -> SpectrogramPlot {
     let to = shown.frequency_hz.partition_point(|f| *f <= high).max(from);
     let (columns, rows) =
         (shown.time_s.len().div_ceil(MOST_COLUMNS).max(1), (to - from).div_ceil(MOST_ROWS).max(1));
+    // points of the ridge that stand apart on a map, with its gaps
+    let every = shown.ridge.len().div_ceil(MOST_COLUMNS).max(1);
+    let ridge = shown.ridge.iter().enumerate().filter(|(i, p)| p.frequency_hz.is_none() || i % every == 0);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
     let block = |columns: &[Vec<Option<f64>>]| -> Vec<Option<f64>> {
         let row = |start: usize| {
@@ -131,68 +110,39 @@ fn coarsen_spectrogram(shown: &SpectrogramPlot) -> SpectrogramPlot {
         time_s: shown.time_s.chunks(columns).map(mean).collect(),
         frequency_hz: shown.frequency_hz.get(from..to).unwrap_or_default().chunks(rows).map(mean).collect(),
         amplitude_m: shown.amplitude_m.chunks(columns).map(block).collect(),
-        ridge: thin_ridge(&shown.ridge),
+        ridge: ridge.map(|(_, p)| *p).collect(),
         ..shown.clone()
     }
 }
 
-/// Points of a ridge that stand apart on a map, with its interruptions.
-fn thin_ridge(ridge: &[SpectrogramRidgePoint]) -> Vec<SpectrogramRidgePoint> {
-    let every = ridge.len().div_ceil(MOST_COLUMNS).max(1);
-    ridge
-        .iter()
-        .enumerate()
-        .filter(|(i, p)| p.frequency_hz.is_none() || i % every == 0)
-        .map(|(_, p)| *p)
-        .collect()
-}
-
 /// Both ridges over time.
 fn draw_ridges_over_time(sides: &[(SpectrogramSide, SpectrogramPlot)], time: ChartAxis) -> Option<Panel> {
-    let place = |p: &SpectrogramRidgePoint| p.frequency_hz.map(|f| (p.time_s, f));
-    let line = |(of, shown): &(SpectrogramSide, SpectrogramPlot)| Series {
-        label: format!("ridge, {}", of.name()),
-        colour: of.colour(),
-        mark: if *of == SpectrogramSide::Measured { Mark::Thin } else { Mark::Thick },
-        points: shown.ridge.iter().map(place).collect(),
-        ..Series::default()
+    let line = |(of, shown): &(SpectrogramSide, SpectrogramPlot)| {
+        let (name, colour, _, mark) = of.look();
+        Series::new(format!("ridge, {name}"), colour, mark, ridge_points(&shown.ridge))
     };
     // the model lies under the recording
     let ridges: Vec<Series> =
         sides.iter().rev().map(line).filter(|s| s.points.iter().any(Option::is_some)).collect();
     let targets = sides.first().map_or(&[][..], |(_, first)| &first.targets);
+    let series = spectrogram::target_lines_over_ridges(targets).chain(ridges.iter().cloned());
     (!ridges.is_empty()).then(|| Panel {
         title: "ridge over time".to_owned(),
-        x: time,
-        y: ChartAxis::linear("frequency, Hz"),
-        height_mm: RIDGE_HEIGHT_MM,
-        series: spectrogram::target_lines_over_ridges(targets).chain(ridges).collect(),
-        ..Panel::default()
+        ..Panel::new(time, ChartAxis::linear("frequency, Hz"), RIDGE_HEIGHT_MM, series)
     })
 }
 
 /// Both ridges over the speed of the tip.
 fn draw_ridges_over_speed(sides: &[(SpectrogramSide, SpectrogramPlot)]) -> Option<Panel> {
-    let place = |p: &SpeedPoint| (p.tip_speed_m_per_s * MILLIMETRES, p.frequency_hz);
-    let bar = |p: &SpeedPoint| {
-        let ((x, f), sd) = (place(p), p.frequency_sd_hz?);
-        Some(ErrorBar::Vertical { x, from: f - 2.0 * sd, to: f + 2.0 * sd })
-    };
-    let symbols = |(of, shown): &(SpectrogramSide, SpectrogramPlot)| Series {
-        label: format!("{} \u{b1} 2 sd", of.name()),
-        colour: of.colour(),
-        mark: Mark::Hollow(of.shape()),
-        points: shown.over_speed.iter().map(|p| Some(place(p))).collect(),
-        error_bars: shown.over_speed.iter().filter_map(bar).collect(),
+    let symbols = |(of, shown): &(SpectrogramSide, SpectrogramPlot)| {
+        let (name, colour, shape, _) = of.look();
+        spectrogram::speed_series(name, colour, shape, &shown.over_speed)
     };
     let series: Vec<Series> = sides.iter().rev().map(symbols).filter(|s| !s.points.is_empty()).collect();
+    let (x, y) = (ChartAxis::linear("tip speed, mm/s"), ChartAxis::linear("frequency, Hz"));
     (!series.is_empty()).then(|| Panel {
         title: "ridge over tip speed".to_owned(),
-        x: ChartAxis::linear("tip speed, mm/s"),
-        y: ChartAxis::linear("frequency, Hz"),
-        height_mm: RIDGE_HEIGHT_MM,
-        series,
-        ..Panel::default()
+        ..Panel::new(x, y, RIDGE_HEIGHT_MM, series)
     })
 }
 

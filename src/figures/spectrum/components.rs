@@ -75,10 +75,7 @@ const MODEL: [ComponentLook; 2] = [
 /// The components of a recording and of a model as symbols with error bars.
 pub(super) fn component_series(measured: &[LabelledComponent], model: &[LabelledComponent]) -> Vec<Series> {
     let styles = if model.is_empty() { ALONE } else { MEASURED };
-    [(model, MODEL), (measured, styles)]
-        .into_iter()
-        .flat_map(|(components, styles)| source_series(components, styles))
-        .collect()
+    source_series(model, MODEL).chain(source_series(measured, styles)).collect()
 }
 
 fn source_series(
@@ -88,11 +85,8 @@ fn source_series(
     let of = |((label, colour, shape), is_clear): (ComponentLook, bool)| {
         let shown = || components.iter().filter(move |c| c.is_clear() == is_clear);
         Series {
-            label: label.to_owned(),
-            colour,
-            mark: Mark::Hollow(shape),
-            points: shown().map(|c| Some(c.axis_point())).collect(),
             error_bars: shown().flat_map(LabelledComponent::error_bars).collect(),
+            ..Series::new(label, colour, Mark::Hollow(shape), shown().map(|c| Some(c.axis_point())))
         }
     };
     [(clear, true), (not_clear, false)].map(of).into_iter().filter(|s| !s.points.is_empty())
@@ -107,10 +101,7 @@ pub(super) fn component_labels(
     let mut order: Vec<&LabelledComponent> = components.iter().collect();
     order.sort_by_key(|c| !c.is_clear()); // (stable: the order of the list otherwise)
     order.into_iter().take(most).map(|c| VerticalLine {
-        label: c.label_text(),
-        colour: Colour::Grey,
-        mark: Mark::Dotted,
-        at: c.frequency_hz,
         above: Some(c.axis_point().1),
+        ..VerticalLine::new(c.label_text(), Colour::Grey, Mark::Dotted, c.frequency_hz)
     })
 }
