@@ -1,4 +1,4 @@
-//! The complete analysis of a window of a recording: its parts as data, a file each, and their figures.
+//! Figures of the analysis of one window of a recording: spectrum, spectrogram, ring-down and overview.
 
 use super::ring_down::{ComponentDecay, RingDown, RingDownTrace, figure_title};
 use super::spectrogram::{SpectrogramPlot, SpeedPoint};
@@ -16,7 +16,7 @@ use crate::text::{format_digits, format_short, format_with_sd};
 use std::ops::Range;
 
 impl AnalysedWindow<'_> {
-    /// Every figure, with its name.
+    /// All four figures, each with its file name.
     pub(crate) fn figures(&self) -> [(&'static str, Figure); 4] {
         let figures = [
             ("spectrum", spectrum::draw_figure(&self.spectra())),
@@ -30,14 +30,14 @@ impl AnalysedWindow<'_> {
     }
 }
 
-// What a recording and a model show in the same window, side by side.
+// Spectra of a recording and of a model in the same window.
 
-/// Components of a model under this share of its largest are of no account.
+/// Components of the model below this fraction of its largest are dropped.
 const LEAST_OF_MODEL: f64 = 1e-3;
 
-/// The spectra of a recording and of a model that were read alike, with their components; of the model's,
-/// without those that no recording could show: under the noise floor of this one, or of no account. Heading,
-/// note and targets are left to the caller.
+/// The spectra and components of a recording and of a model in the same window. Components of the model that
+/// no recording could show are dropped: those below the noise floor of the recording, or below 0.1 % of the
+/// largest. The caller sets heading, note and targets.
 #[must_use]
 pub fn compare_spectra(measured: Option<&SpectralAnalysis>, model: Option<&SpectralAnalysis>) -> SpectraPlot {
     let components = |analysis: &SpectralAnalysis| -> Vec<LabelledComponent> {
@@ -61,7 +61,7 @@ pub fn compare_spectra(measured: Option<&SpectralAnalysis>, model: Option<&Spect
     }
 }
 
-// The spectrum of a window as curves, levels and named components.
+// Spectrum of a window: curves, levels and named components.
 
 impl AnalysedWindow<'_> {
     pub(super) fn spectra(&self) -> SpectraPlot {
@@ -91,15 +91,15 @@ pub(super) fn spectrum_curve(analysis: &SpectralAnalysis) -> SpectrumCurve {
     }
 }
 
-/// Amplitudes at the frequencies of the spectrum; none where there are not as many.
+/// Amplitudes over the frequencies of the spectrum; `None` where the lengths differ.
 pub(super) fn spectrum_level(analysis: &SpectralAnalysis, amplitude_m: &[f64]) -> Option<SpectrumLevel> {
     let frequency_hz = &analysis.spectrum.frequency_hz;
     (amplitude_m.len() == frequency_hz.len())
         .then(|| SpectrumLevel { frequency_hz: frequency_hz.clone(), amplitude_m: amplitude_m.to_vec() })
 }
 
-/// A component at its height in the spectrum, as its amplitude may be that of a start, or the mean of one
-/// that drifts, which lies above its wide peak.
+/// A component with the amplitude that the spectrum has at its frequency. Its own amplitude may be that at
+/// the start of a decay, or the mean of a drifting component, and then lies above the peak.
 pub(super) fn label_component(c: &Component, spectrum: &Spectrum) -> LabelledComponent {
     let bin_hz = spectrum.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
     let height_m = spectrum.amplitude_m.get((c.frequency_hz / bin_hz).round() as usize).copied();
@@ -115,15 +115,15 @@ pub(super) fn label_component(c: &Component, spectrum: &Spectrum) -> LabelledCom
     }
 }
 
-// The course of the strongest component: over time, and over the speed of the tip.
+// The ridge of the strongest component over time and over tip speed.
 
-/// The frequency of a ridge at one time, with how fast the tip and the head moved then.
+/// A point of a ridge, with the mean speeds of tip and head in its segment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CoursePoint {
     /// Time of the recording, s.
     pub time_s: f64,
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz.
+    /// Standard deviation of the frequency, Hz.
     pub frequency_sd_hz: f64,
     pub amplitude_m: f64,
     /// Mean speed of the tip over the segment, m/s.
@@ -133,7 +133,7 @@ pub(crate) struct CoursePoint {
 }
 
 impl AnalysedWindow<'_> {
-    /// The course of the frequency, point by point.
+    /// The points of the ridge; empty without a ridge.
     pub(crate) fn frequency_course(&self) -> Vec<CoursePoint> {
         self.analysis.ridge.as_ref().map_or_else(Vec::new, |ridge| {
             ridge.points.iter().map(|p| self.course_point(p, ridge.segment_s)).collect()
@@ -187,8 +187,8 @@ impl AnalysedWindow<'_> {
         }
     }
 
-    /// The parts of the ridge that are drawn, the same over the speed of the tip, and a note of how many
-    /// segments that is.
+    /// The parts of the ridge that are drawn, their points over tip speed, and a note on the number of
+    /// segments.
     fn drawn_ridge(&self, of: &Spectrogram) -> (Vec<Vec<RidgePoint>>, Vec<SpeedPoint>, String) {
         let Some(ridge) = &self.analysis.ridge else { return Default::default() };
         let drawn = course::coherent_parts(ridge, of);
@@ -232,17 +232,17 @@ impl AnalysedWindow<'_> {
     }
 }
 
-// A window as the sum of its trend and its components, and what is left.
+// A window as the sum of trend, components and residual.
 
-/// Points a cycle of the fastest oscillation for a smooth line.
+/// Points per cycle of the fastest oscillation, for a smooth line.
 const POINTS_A_CYCLE: f64 = 12.0;
-/// Most points of a fitted line: beyond, they are closer than the pixels of the figure.
+/// Upper limit of the points of a fitted line: more would be closer than pixels.
 const MOST_POINTS: f64 = 40_000.0;
-/// Deviations from zero from which a decay is drawn as one.
+/// A damping ratio counts as a decay from this many standard deviations on.
 const DECAYS: f64 = 3.0;
 
 impl AnalysedWindow<'_> {
-    /// The window as the sum of its trend and its components, and what is left.
+    /// The window as the sum of trend, components and residual.
     pub(crate) fn ring_down(&self) -> RingDown {
         let grid = self.recording.grid();
         let time_s: Vec<f64> = self.frames.clone().map(|i| grid.time_s(i)).collect();
@@ -274,7 +274,7 @@ impl AnalysedWindow<'_> {
         }
     }
 
-    /// The largest component that decays, with what is left of the record added.
+    /// The largest component that decays, with the residual added to its data.
     fn largest_decay(&self, time_s: &[f64]) -> Option<ComponentDecay> {
         let analysis = self.analysis;
         let decays = |c: &&Component| {
@@ -298,7 +298,7 @@ impl AnalysedWindow<'_> {
         })
     }
 
-    /// What was removed, between the frames on a straight line, m.
+    /// The removed trend at a time from the first frame, m; linear between frames.
     fn removed_trend_m(&self, time_s: f64) -> f64 {
         let place = time_s * self.recording.grid().frame_rate_hz;
         let before = (place.max(0.0) as usize).min(self.analysis.removed_m.len().saturating_sub(1));
@@ -308,7 +308,7 @@ impl AnalysedWindow<'_> {
         value(before) + (place - before as f64) * (value(before + 1) - value(before))
     }
 
-    /// A function of the time from the first frame, drawn finer than the frames.
+    /// A function of the time from the first frame, sampled more finely than the frames.
     fn fine_trace(&self, value: impl Fn(f64) -> f64) -> RingDownTrace {
         let grid = self.recording.grid();
         let (start_s, length_s) =
@@ -326,24 +326,24 @@ impl AnalysedWindow<'_> {
 
 // A window of a recording's channel with its analysis.
 
-/// A window of a channel, taken apart.
+/// A window of a channel and its analysis.
 pub(crate) struct AnalysedWindow<'a> {
     pub recording: &'a Recording,
     pub channel: Channel,
     pub frames: Range<usize>,
     pub analysis: &'a SpectralAnalysis,
-    /// What was done to them, in words.
+    /// How the window was analysed, for the line under the heading.
     pub note: String,
 }
 
 impl AnalysedWindow<'_> {
-    /// What a figure shows, for the line under its heading.
+    /// The line under the heading of a figure.
     pub(super) fn figure_note(&self, what: &str) -> String {
         about(&format!("{what} of {}", self.channel), &self.note)
     }
 }
 
-/// Instants between two times, by name.
+/// Named instants between two times, s.
 pub(super) fn named_instants(recording: &Recording, (from_s, to_s): (f64, f64)) -> Vec<(String, f64)> {
     let found = ReversalInstants::find_instants(recording);
     let all = (1..=found.reversals.len()).flat_map(|k| InstantKind::ALL.map(|anchor| (anchor, k)));

@@ -21,33 +21,33 @@ use crate::simulate::mode::TipMode;
 use crate::simulate::{ModelSample, RunMotion};
 use crate::text::format_decimals;
 
-/// What an animation shows; all on one clock.
+/// Data of an animation; all times are on one clock.
 #[derive(Debug, Clone)]
 pub struct Animation {
-    /// What it is about, under the heading.
+    /// Subject, such as the name of the job; part of the line under the heading.
     pub title: String,
-    /// Whether the measured motion is one that no camera took.
+    /// Whether the measured motion is synthetic.
     pub synthetic: bool,
-    /// Whether the head turns in what is shown.
+    /// Whether the shown part contains a reversal of the head.
     pub turns: bool,
     /// The links of the model.
     pub linkage: Linkage,
-    /// Its states over what is shown, close enough for straight lines between them.
+    /// States of the model over the shown part, close enough for linear interpolation.
     pub samples: Vec<ModelSample>,
-    /// Its modes of contact: from when on, s, and which; the first one from the first instant shown.
+    /// Contact modes of the model, each with its start, s; the first starts at the first shown instant.
     pub modes: Vec<(f64, TipMode)>,
-    /// When its tip sticks, s.
+    /// Intervals in which the model's tip sticks, s.
     pub stick_s: Vec<[f64; 2]>,
-    /// Its hold around the reversal, or its longest one where the head does not turn: first and last instant
-    /// of stick, s.
+    /// First and last instant of the stick around the reversal, s; of the longest stick where the head does
+    /// not turn.
     pub hold_s: [f64; 2],
     /// Measured motion; `None` where there is no recording.
     pub measured: Option<TrackedMotion>,
-    /// What is shown, and how much slower.
+    /// The shown parts and their slow-down factors.
     pub pace: PlaybackPace,
 }
 
-/// What was measured, frame by frame; `None` where a point was not tracked.
+/// Measured motion, one value per frame; `None` where a point was not tracked.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TrackedMotion {
     /// Instants of the frames, s.
@@ -60,12 +60,11 @@ pub struct TrackedMotion {
     pub head_drop_m: Vec<Option<f64>>,
 }
 
-/// For readers who asked for less motion: what moves is not shown to them, and the poses of the instants
-/// named stay.
+/// Hides the moving elements from readers who prefer reduced motion; the poses of the named instants stay.
 const LESS_MOTION: &str = "<style>@media (prefers-reduced-motion:reduce){svg .moves{display:none}}</style>\n";
 
-/// The animation as SVG; the same always gives the same bytes. It starts at the hold, with the poses of other
-/// instants next to it, which is what print shows.
+/// The animation as SVG; the same data always give the same bytes. It starts at the hold. Print shows that
+/// state with the poses of other instants.
 #[must_use]
 pub fn render_svg(animation: &Animation) -> String {
     draw_still(animation).svg_with_overlay(|plots| {
@@ -81,12 +80,12 @@ pub fn render_svg(animation: &Animation) -> String {
 }
 
 impl Animation {
-    /// Which part of the motion is shown.
+    /// Name of the shown part, for captions.
     pub(crate) fn part_name(&self) -> &'static str {
         if self.turns { "the reversal" } else { "its longest stick" }
     }
 
-    /// What is seen, with its number.
+    /// The main result in one sentence, with its number.
     fn claim_sentence(&self) -> String {
         let rest_ms = 1e3 * (self.hold_s[1] - self.hold_s[0]);
         let when = if self.turns { " while the head turns" } else { "" };
@@ -126,11 +125,10 @@ pub(crate) fn describe_pace(pace: &PlaybackPace) -> String {
 // The animation of a condition: the model's reversal in fine steps, with what was measured on the same
 // clock.
 
-/// Most states over what is shown: some twenty-five in a cycle of 1 kHz over the tenth of a second that a
-/// reversal and its release take.
+/// Most states of an animation: a reversal with its release takes about 0.1 s, so a cycle of 1 kHz has 25.
 const MOST_SAMPLES: usize = 2500;
 
-/// The animation; none of a model whose tip never sticks.
+/// The animation of a condition; `None` where the model's tip never sticks.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let shown = build_animation(case)?;
     let drawing = Drawing::Moving(render_svg(&shown));
@@ -159,7 +157,7 @@ fn build_animation(case: &ConditionComparison) -> Option<Animation> {
     })
 }
 
-/// The states of a span from its first to its last, on a clock that is this far ahead.
+/// At most [`MOST_SAMPLES`] states of a span, with their times shifted by `shift_s`.
 fn thin_samples(motion: &RunMotion, span_s: [f64; 2], shift_s: f64) -> Vec<ModelSample> {
     let fine = motion.fine_samples_between(span_s);
     let every = fine.len().div_ceil(MOST_SAMPLES).max(1);
@@ -168,7 +166,7 @@ fn thin_samples(motion: &RunMotion, span_s: [f64; 2], shift_s: f64) -> Vec<Model
     chosen.map(|s| ModelSample { time_s: s.time_s + shift_s, ..*s }).collect()
 }
 
-/// The frames of a span, with one more on either side, from the origin of the model.
+/// The frames of a span and one more on either side, in the coordinates of the model.
 fn tracked_motion(recording: &Recording, alignment: &Alignment, [from_s, to_s]: [f64; 2]) -> TrackedMotion {
     let grid = recording.grid();
     let place = |t: f64| ((t - grid.start_s) * grid.frame_rate_hz).clamp(0.0, grid.frames as f64);
@@ -185,14 +183,14 @@ fn tracked_motion(recording: &Recording, alignment: &Alignment, [from_s, to_s]: 
     }
 }
 
-/// The mode at the start of a span, and every later one of it with its first instant.
+/// The contact modes in a span, each with its first instant, s.
 fn contact_modes(motion: &RunMotion, [from_s, to_s]: [f64; 2]) -> Vec<(f64, TipMode)> {
     let first = motion.samples.iter().rfind(|s| s.time_s <= from_s).map(|s| (from_s, s.mode));
     let inside = motion.transitions.iter().filter(|t| t.time_s > from_s && t.time_s <= to_s);
     first.into_iter().chain(inside.map(|t| (t.time_s, t.to))).collect()
 }
 
-/// Which points of a recording are drawn, and how they came to their places.
+/// Sentence on the tracked points that are drawn and on their alignment.
 fn describe_crosses(recording: &Recording, case: &ConditionComparison) -> String {
     let traces = recording.traces();
     let head = is_tracked(&traces.head_x_m) && is_tracked(&traces.head_y_m);
@@ -212,7 +210,7 @@ fn describe_crosses(recording: &Recording, case: &ConditionComparison) -> String
     )
 }
 
-/// What is shown, with the numbers of the hold.
+/// Caption and details, with the numbers of the hold.
 fn figure_text(shown: &Animation, case: &ConditionComparison) -> Words {
     let [from_s, to_s] = shown.hold_s;
     let at = |time_s: f64| shown.samples.iter().rfind(|s| s.time_s <= time_s).or(shown.samples.first());
@@ -238,16 +236,16 @@ fn figure_text(shown: &Animation, case: &ConditionComparison) -> Words {
     Words { caption, details }
 }
 
-// How much slower than the motion an animation runs, part by part.
+// Playback pace: the parts of the motion and their slow-down factors.
 
-/// A part of the motion that is shown at one pace.
+/// A part of the motion with one slow-down factor.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlaybackPart {
     /// First instant of the motion, s.
     pub from_s: f64,
     /// Last instant of the motion, s.
     pub to_s: f64,
-    /// How many times slower than the motion.
+    /// Slow-down factor.
     pub slower: f64,
 }
 
@@ -258,7 +256,7 @@ impl PlaybackPart {
     }
 }
 
-/// Parts that follow each other without gaps, then a rest on the last picture.
+/// Consecutive parts without gaps; the last picture then rests for a second.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlaybackPace {
     /// The parts, in order of time.
@@ -267,19 +265,19 @@ pub struct PlaybackPace {
 
 /// How long the last picture stays before the animation starts again, s.
 const REST_S: f64 = 1.0;
-/// How long a viewer should watch the tip at rest and what comes before, s.
+/// Playback time of the hold and its lead-in, s.
 const HOLD_SHOWN_S: f64 = 7.0;
-/// The same of the release and what follows.
+/// Playback time of the release and the motion after it, s.
 const RELEASE_SHOWN_S: f64 = 10.0;
-/// How much is shown before the hold, at the end of it as part of the release, and after it, as shares of its
-/// length.
+/// Parts of the motion in units of the length of the hold: shown before it, counted as release at its end,
+/// and shown after it.
 const LEAD_IN: f64 = 0.06;
 const RELEASE_LEAD: f64 = 0.02;
 const FOLLOW_UP: f64 = 0.3;
 
 impl PlaybackPace {
-    /// The hold of the tip, then its release and some cycles after it slower still; within what was run.
-    /// `None` where nothing moves between.
+    /// The hold of the tip, then its release with some cycles, slower still; limited to `within`. `None`
+    /// where no time is left.
     #[must_use]
     pub fn around_hold([hold_s, release_s]: [f64; 2], within: [f64; 2]) -> Option<Self> {
         let length = release_s - hold_s;
@@ -304,19 +302,19 @@ impl PlaybackPace {
         self.parts.last().map_or(self.span_s(), |p| [p.from_s, p.to_s])
     }
 
-    /// The pace of the same motion on a clock that is this far ahead.
+    /// The same pace with all instants shifted by `shift_s`.
     pub(crate) fn shift_by(self, shift_s: f64) -> Self {
         let later =
             |p: PlaybackPart| PlaybackPart { from_s: p.from_s + shift_s, to_s: p.to_s + shift_s, ..p };
         Self { parts: self.parts.into_iter().map(later).collect() }
     }
 
-    /// How long the animation lasts, s.
+    /// Playback time with the rest at the end, s.
     pub(crate) fn duration_s(&self) -> f64 {
         self.parts.iter().map(|p| (p.to_s - p.from_s) * p.slower).sum::<f64>() + REST_S
     }
 
-    /// When an instant of the motion is shown, as a share of the animation.
+    /// When an instant of the motion is shown, as a fraction of the playback time.
     pub(crate) fn playback_fraction(&self, time_s: f64) -> f64 {
         let shown_s: f64 =
             self.parts.iter().map(|p| (time_s.clamp(p.from_s, p.to_s) - p.from_s) * p.slower).sum();
@@ -324,7 +322,7 @@ impl PlaybackPace {
     }
 }
 
-/// The nearest of 1, 2 and 5 times a power of ten, by ratio.
+/// The nearest of 1, 2 and 5 times a power of ten on a logarithmic scale.
 pub(super) fn round_to_125(value: f64) -> f64 {
     let power = math::powf(10.0, math::log10(value).floor());
     let apart = |candidate: &f64| math::ln(candidate / value).abs();
@@ -333,7 +331,7 @@ pub(super) fn round_to_125(value: f64) -> f64 {
     nearest.unwrap_or(value)
 }
 
-// Deflection over all that is shown and velocity of the tip over the last part, under the drawings.
+// Strip charts under the drawings: deflection over the shown part, tip velocity over its last part.
 
 const HEIGHT_MM: f64 = 27.0;
 const MM: f64 = 1e3;
@@ -341,10 +339,10 @@ const MM: f64 = 1e3;
 /// A quantity of the model's states over time.
 struct StripChart {
     label: &'static str,
-    /// What the model's line is called in the legend, and how it is drawn.
+    /// Legend entry and line style of the model.
     line: (&'static str, Mark),
     of: fn(&ModelSample) -> f64,
-    /// The instants that it covers, s.
+    /// First and last instant of the strip, s.
     span_s: fn(&PlaybackPace) -> [f64; 2],
 }
 
@@ -363,7 +361,7 @@ const STRIPS: [StripChart; 2] = [
     },
 ];
 
-/// The panels; the first one holds the measured deflection too.
+/// The strip charts; the first also holds the measured deflection.
 pub(super) fn draw_strips(animation: &Animation) -> Vec<Panel> {
     let mut panels: Vec<Panel> = STRIPS.iter().map(|strip| draw_strip(animation, strip)).collect();
     if let (Some(first), Some(measured)) = (panels.first_mut(), &animation.measured) {
@@ -375,7 +373,7 @@ pub(super) fn draw_strips(animation: &Animation) -> Vec<Panel> {
     panels
 }
 
-/// The instants that every strip covers, s.
+/// First and last instant of each strip, s.
 pub(super) fn strip_spans_s(animation: &Animation) -> [[f64; 2]; 2] {
     STRIPS.map(|strip| (strip.span_s)(&animation.pace))
 }

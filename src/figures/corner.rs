@@ -1,5 +1,5 @@
-//! What the data know of the parameters together: every pair with its regions, every parameter with its
-//! profile, its bounds, its prior, the truth of a twin and the interval that the page states.
+//! Corner plot: joint regions of every pair of parameters, and the likelihood of each parameter with profile,
+//! bounds, prior, true value and stated interval.
 
 use super::figure_text::parameter_symbol;
 use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Ribbon, Series};
@@ -12,67 +12,68 @@ use crate::fit::result::FitResult;
 use crate::math;
 use crate::text::{choose_prefix, format_digits, format_interval, join_with_and};
 
-/// What is known of one parameter; places are those of the search, 0 and 1 at its bounds.
+/// One parameter; values are in the unit scale of the search, 0 and 1 at the bounds.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CornerParameter {
     /// Symbol in the equations.
     pub symbol: String,
-    /// The stated interval in words.
+    /// The stated interval with its unit, as text.
     pub words: String,
     /// Estimate.
     pub estimate: f64,
     /// The 95 % interval that the page states; `None` for an open end.
     pub stated: [Option<f64>; 2],
-    /// Standard deviation by the linear model.
+    /// Standard deviation from the linear model.
     pub sd: Option<f64>,
-    /// Mean and standard deviation of what was known beforehand.
+    /// Mean and standard deviation of the prior.
     pub prior: Option<(f64, f64)>,
     /// True value, where the data are synthetic.
     pub truth: Option<f64>,
-    /// Places along the parameter and the likelihood there over the greatest.
+    /// Values of the parameter, and the likelihood over its greatest value.
     pub profile: Vec<(f64, f64)>,
-    /// Where local searches ended that fit as well within the threshold.
+    /// Ends of local searches with a cost within the threshold.
     pub optima: Vec<f64>,
 }
 
-/// What the figure shows.
+/// Data of the figure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CornerPlot {
-    /// What was fitted.
+    /// Title of the fit.
     pub title: String,
     /// Whether the data are synthetic.
     pub synthetic: bool,
     /// The parameters.
     pub parameters: Vec<CornerParameter>,
-    /// Correlations of their estimates, a row and a column a parameter.
+    /// Correlation matrix of the estimates; `None` where unknown.
     pub correlations: Vec<Vec<Option<f64>>>,
 }
 
 /// Height of a row, mm.
 const ROW_MM: f64 = 24.0;
-/// Most parameters that have room: of more the first are drawn.
+/// Most parameters that are drawn; of more the first.
 const MOST: usize = 8;
-/// Half widths of the regions of a pair, deviations: the chi-square of two freedoms at 68.3 and 95.4 %.
+/// Half widths of the joint regions, standard deviations: roots of chi-square with two degrees of freedom at
+/// 68.3 and 95.4 %.
 const REGIONS: [(&str, Colour, Mark, f64); 2] = [
     ("95 % of a pair", Colour::Blue, Mark::Thin, 2.486),
     ("68 % of a pair", Colour::Blue, Mark::Line, 1.515),
 ];
-/// Points of a region and of a curve.
+/// Points of a region's outline and of a curve.
 const POINTS: u32 = 48;
-/// Half width of a cell, of what is drawn in it, and how high its curve is.
+/// Half width of a cell, half width of its contents, and height of its curve.
 const HALF: f64 = 0.5;
 const INSIDE: f64 = 0.44;
 const CURVE: f64 = 0.72;
-/// Deviations to either side that a cell shows at least, and room beyond what it holds, as a share.
+/// Least range of a cell to either side, standard deviations, and its margin as a fraction of the range.
 const SHOWN_SD: f64 = 2.8;
 const ROOM: f64 = 0.06;
-/// Narrowest cell in units of the search: what is known better is rounding.
+/// Least margin of a cell in units of the search: smaller ranges are rounding.
 const LEAST: f64 = 1e-9;
-/// Deviations of a two-sided 95 % interval.
+/// Standard deviations of a two-sided 95 % interval.
 const Z_95: f64 = 1.96;
 
 impl CornerPlot {
-    /// The parameters of a fit; `lines` bring units and true values.
+    /// The parameters of a fit; `lines` hold units and true values.
     pub(crate) fn from_fit(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
         let free: Vec<&FreeParameter> =
             job.parameters.iter().filter(|p| result.parameters.contains_key(&p.name)).take(MOST).collect();
@@ -87,7 +88,7 @@ impl CornerPlot {
         }
     }
 
-    /// The figure with its caption; nothing without a parameter.
+    /// The figure with its caption; `None` without a parameter.
     pub(crate) fn figure_block(&self) -> Option<FigureBlock> {
         (!self.parameters.is_empty()).then(|| FigureBlock {
             condition: None,
@@ -98,7 +99,7 @@ impl CornerPlot {
         })
     }
 
-    /// The pair whose estimates move most as one.
+    /// The pair with the largest absolute correlation: row, column, correlation.
     fn strongest_correlation(&self) -> Option<(usize, usize, f64)> {
         let rows = self.correlations.iter().enumerate();
         let pairs = rows.flat_map(|(i, row)| row.iter().take(i).enumerate().map(move |(j, r)| (i, j, *r)));
@@ -136,7 +137,7 @@ fn corner_parameter(
     })
 }
 
-/// A prior in the places of the search, by its slope at its mean.
+/// Mean and standard deviation of a prior in the search scale, linearised at the mean.
 fn prior_in_search_scale(prior: &Prior, bounds: &Bounds) -> Option<(f64, f64)> {
     let (mean, sd) = match *prior {
         Prior::Linear { mean, sd } => (mean, sd),
@@ -146,7 +147,7 @@ fn prior_in_search_scale(prior: &Prior, bounds: &Bounds) -> Option<(f64, f64)> {
     Some((at, sd / bounds.slope(at))).filter(|(at, sd)| at.is_finite() && sd.is_finite() && *sd > 0.0)
 }
 
-/// From where to where a cell shows a parameter.
+/// The range of a parameter that its cells show.
 fn shown_range(known: &CornerParameter) -> (f64, f64) {
     let by_sd = known.sd.map(|sd| [known.estimate - SHOWN_SD * sd, known.estimate + SHOWN_SD * sd]);
     let open =
@@ -160,12 +161,12 @@ fn shown_range(known: &CornerParameter) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// Place in a cell about its middle.
+/// Position of a value relative to the middle of a cell.
 fn cell_position(value: f64, (low, high): (f64, f64)) -> f64 {
     INSIDE * (2.0 * (value - low) / (high - low) - 1.0)
 }
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &CornerPlot) -> Figure {
     let count = shown.parameters.len();
@@ -199,7 +200,7 @@ pub fn draw_figure(shown: &CornerPlot) -> Figure {
     }
 }
 
-/// Cells from the upper left: the middle of one by row and column.
+/// Centre of a cell; rows count from the top.
 fn cell_centre(shown: &CornerPlot, row: usize, column: usize) -> (f64, f64) {
     (column as f64, (shown.parameters.len() - 1 - row) as f64)
 }
@@ -210,7 +211,7 @@ fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
     let pairs = || (0..count).flat_map(|i| (0..i).map(move |j| (i, j)));
     let pair = |(i, j): (usize, usize)| (&shown.parameters[i], &shown.parameters[j]);
     let diagonal = || shown.parameters.iter().enumerate();
-    // a point by the values of the parameters of its column and row, and one of a diagonal cell by its likelihood
+    // `point` takes the values of column and row, `upright` a value and a height in a diagonal cell
     let point = |(i, j): (usize, usize), x: f64, y: f64| {
         clip_to_cell((cell_position(x, spans[j]), cell_position(y, spans[i])), cell_centre(shown, i, j))
     };
@@ -285,17 +286,17 @@ fn draw_cells(shown: &CornerPlot) -> Vec<Series> {
     all
 }
 
-/// Height of a share of the greatest likelihood in a cell.
+/// Height of a relative likelihood in a cell.
 fn likelihood_height(share: f64) -> f64 {
     -INSIDE + CURVE * share
 }
 
-/// A point of a cell on the axes; `None` outside the cell.
+/// A point relative to a cell's centre, in axis coordinates; `None` outside the cell.
 fn clip_to_cell((x, y): (f64, f64), at: (f64, f64)) -> Option<(f64, f64)> {
     (x.abs() <= HALF && y.abs() <= HALF).then_some((at.0 + x, at.1 + y))
 }
 
-/// Where the search could not go, as far as a cell of the diagonal shows that.
+/// The ranges outside the bounds that the diagonal cells show.
 fn out_of_bounds_ribbons(shown: &CornerPlot) -> Vec<Ribbon> {
     let strip = |(i, known): (usize, &CornerParameter)| {
         let (span, at) = (shown_range(known), cell_centre(shown, i, i));
@@ -317,7 +318,7 @@ const DETAILS: &str = "Below the diagonal: every pair of estimates with the regi
     likelihood over its greatest value, by the linear model and, where it was made, by the profile, with the \
     interval that the table states. Every cell is as wide as what is known; scales are those of the search.";
 
-/// What the figure shows, with its number.
+/// Caption: what the figure shows, with its number.
 pub(crate) fn figure_caption(shown: &CornerPlot) -> String {
     let all = shown.parameters.len();
     let bounded = shown.parameters.iter().filter(|p| p.stated.iter().all(Option::is_some)).count();

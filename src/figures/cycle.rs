@@ -1,4 +1,4 @@
-//! The stick-slip cycle over the speed of the tip, measured and of the model, with natural frequencies and
+//! Frequency of the stick-slip cycle over tip speed, measured and of the model, with natural frequencies and
 //! targets as lines.
 
 use super::spectrogram::speed_series;
@@ -11,39 +11,39 @@ pub use crate::spectrum::Target;
 pub use crate::spectrum::time_frequency::SpeedPoint;
 use crate::text::{format_digits, format_speed, join_with_and, truncate_text};
 
-/// What the figure shows.
+/// Data of the figure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct CycleOverSpeed {
-    /// Heading: the claim with its number.
+    /// Heading: the main result with its number.
     pub title: String,
-    /// More to say; empty for none.
+    /// Further text for the line under the heading; empty for none.
     pub note: String,
-    /// Whether the measured motion is one that no camera took.
+    /// Whether the measured motion is synthetic.
     pub synthetic: bool,
     /// The measured cycle; empty without a recording.
     pub measured: Vec<SpeedPoint>,
-    /// That of the model.
+    /// The cycle of the model.
     pub model: Vec<SpeedPoint>,
-    /// Natural frequencies of the model by their names, Hz.
+    /// Names and natural frequencies of the model, Hz.
     pub natural_hz: Vec<(String, f64)>,
-    /// Measured or published frequencies that are to be met.
+    /// Measured or published target frequencies.
     pub targets: Vec<Target>,
 }
 
 /// Height of the panel, mm.
 const HEIGHT_MM: f64 = 72.0;
-/// The axes end this far beyond what is shown.
+/// Ends of the axes over the largest shown value.
 const AXIS_MARGIN: f64 = 1.12;
-/// Places of the names along the lines, shares of the width: one after the other where lines are close.
+/// Positions of names along their lines, fractions of the width; close lines use them in turn.
 const LABEL_POSITIONS: [f64; 3] = [0.24, 0.52, 0.79];
-/// Letters of a name that have room there.
+/// Letters after which the name of a target is cut.
 const MAX_LABEL_LETTERS: usize = 12;
-/// Lines this close have their names at different places, share of the height.
+/// Lines closer than this have their names at different positions, fraction of the height.
 const CLOSE_LEVELS: f64 = 0.09;
-/// Distance of a name from its line, share of the height.
+/// Distance of a name from its line, fraction of the height.
 const LABEL_OFFSET: f64 = 0.022;
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &CycleOverSpeed) -> Figure {
     let points = || shown.measured.iter().chain(&shown.model);
@@ -92,14 +92,14 @@ fn level_lines(lines: &[(String, f64, Colour)], right: f64) -> impl Iterator<Ite
     })
 }
 
-/// Two deviations either side of a target.
+/// Two standard deviations either side of a target.
 fn deviation_ribbon(target: &Target, right: f64) -> Option<Ribbon> {
     let sd_hz = target.frequency_sd_hz?;
     let (low, high) = (target.frequency_hz - 2.0 * sd_hz, target.frequency_hz + 2.0 * sd_hz);
     Some(Ribbon::new("target \u{b1} 2 sd", Colour::Blue, [(0.0, low, high), (right, low, high)]))
 }
 
-/// The names over their lines, those of close lines next to each other.
+/// The names above their lines; those of close lines stand side by side.
 fn level_names(lines: &[(String, f64, Colour)], (right, top): (f64, f64)) -> Vec<TextAnnotation> {
     let (mut place, mut before) = (0, f64::NEG_INFINITY);
     let mut named = Vec::new();
@@ -121,16 +121,15 @@ fn cycle_series(shown: &CycleOverSpeed) -> impl Iterator<Item = Series> {
 
 // The cycle of a condition over the speed of the tip.
 
-/// Ratio of neighbouring frequencies that two different components have: a cycle changes by less than that at
-/// once.
+/// Neighbouring frequencies with a larger ratio belong to different components.
 const COMPONENT_RATIO: f64 = 2.5;
-/// Share of its mean by which a cycle that stays the same may change.
+/// A cycle is called constant when its range is below this fraction of its mean.
 const CONSTANT_TOLERANCE: f64 = 0.03;
-/// Share of the range by which the cycles of the faster half differ from those of the slower one where the
-/// cycle follows the speed.
+/// The cycle follows the speed when the means of the faster and the slower half differ by more than this
+/// fraction of the range.
 const MIN_SPEED_TREND: f64 = 0.2;
 
-/// The figure of a condition; none where neither shows a cycle.
+/// The figure of a condition; `None` where neither side shows a cycle.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let (measured, model) = (&case.ridges.measured, &case.ridges.model);
     let all = [measured, model].into_iter().flatten().flat_map(|ridge| ridge.courses.iter().flatten());
@@ -164,16 +163,16 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("cycle", words, draw_figure(&shown)))
 }
 
-/// From which frequency on a component is the stick-slip cycle, Hz: a ridge that jumps between it and the
-/// slow swing of the head has a wide gap between the two.
+/// Lowest frequency of the stick-slip cycle, Hz. A ridge that jumps between the cycle and the slow swing of
+/// the head leaves a wide gap between the two.
 fn cycle_threshold_hz(mut all: Vec<f64>) -> f64 {
     all.sort_by(f64::total_cmp);
     let gap = all.windows(2).rev().find(|pair| pair[1] > COMPONENT_RATIO * pair[0]);
     gap.map_or(0.0, |pair| pair[1])
 }
 
-/// The claim with its numbers, of the recording where it shows a cycle. What is slower than the neck swings
-/// may be the head, and is called no cycle.
+/// The main result, from the recording where it shows a cycle. A component below the neck's natural frequency
+/// may be the swing of the head, so it is not called a cycle.
 fn claim_sentence(shown: &CycleOverSpeed, (low, high): (f64, f64)) -> String {
     let neck_hz = shown.natural_hz.iter().find(|(name, _)| name == "neck").map_or(0.0, |(_, hz)| *hz);
     let what = if high < neck_hz { "strongest component" } else { "cycle" };
@@ -194,7 +193,7 @@ fn claim_sentence(shown: &CycleOverSpeed, (low, high): (f64, f64)) -> String {
     }
 }
 
-/// The measured cycle, without one the model's.
+/// The measured cycle; the model's where there is none.
 fn cycle_points(shown: &CycleOverSpeed) -> &[SpeedPoint] {
     if shown.measured.is_empty() { &shown.model } else { &shown.measured }
 }

@@ -1,5 +1,5 @@
-//! The evidence of a fit: measured and model on one axis of time, what lies between them in units of the
-//! noise, and the same enlarged at the release and where it fits worst.
+//! Evidence of a fit: measured and model over time with the residual in units of the noise, whole and
+//! enlarged at the release and at the worst part.
 
 use super::history::{length_unit, symmetric_axis, thin_points};
 use super::{FigureBlock, Words, history};
@@ -12,7 +12,7 @@ use crate::recording::motion_traces::MotionTraces;
 use crate::simulate::ModelSample;
 use crate::text::{capitalise, format_decimals, format_digits, format_length, format_trimmed};
 
-/// A course over time, `None` where it is interrupted: times, s, and values.
+/// Times, s, and values; `None` interrupts the curve.
 pub(crate) type TimeCurve = Vec<Option<(f64, f64)>>;
 
 /// A part of the recording.
@@ -20,7 +20,7 @@ pub(crate) type TimeCurve = Vec<Option<(f64, f64)>>;
 pub struct EvidencePart {
     /// What it shows, such as "release".
     pub name: String,
-    /// From when to when, s.
+    /// Start and end, s.
     pub span_s: (f64, f64),
     /// Measured values, m.
     pub measured: TimeCurve,
@@ -28,36 +28,36 @@ pub struct EvidencePart {
     pub model: TimeCurve,
     /// Measured minus model, in standard deviations of the noise.
     pub residual: TimeCurve,
-    /// Its root mean square.
+    /// Root mean square of `residual`.
     pub rms: f64,
-    /// Where the model's tip sticks, as bands.
+    /// Shaded spans in which the model's tip sticks.
     pub sticks: Vec<ShadedSpan>,
 }
 
-/// What the figure shows.
+/// Data of the figure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct EvidencePlot {
-    /// Heading: the claim with its number.
+    /// Heading: the main result with its number.
     pub title: String,
-    /// More to say; empty for none.
+    /// Further text for the line under the heading; empty for none.
     pub note: String,
-    /// Whether the recording is one that no camera took.
+    /// Whether the recording is synthetic.
     pub synthetic: bool,
     /// Quantity, such as "deflection".
     pub quantity: String,
-    /// The whole recording first, then what is enlarged.
+    /// The whole recording, then the enlarged parts.
     pub parts: Vec<EvidencePart>,
 }
 
-/// Residual over noise up to which nothing but noise is left: of its size a few per cent are not known.
+/// Residual over noise up to which only noise is left: the noise is known to a few per cent.
 pub(crate) const NOTHING_LEFT: f64 = 1.1;
 /// Heights of the panels, mm.
 const HEIGHT_MM: f64 = 30.0;
 const RESIDUAL_HEIGHT_MM: f64 = 15.0;
-/// Deviations within which 95 % of the noise lies.
+/// Standard deviations within which 95 % of the noise lies.
 const NOISE_95: f64 = 1.96;
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &EvidencePlot) -> Figure {
     let panels = shown.parts.iter().enumerate().flat_map(|(i, part)| draw_panels(shown, i, part));
@@ -82,7 +82,7 @@ fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> [Pane
         let scaled: TimeCurve = course.iter().map(|p| p.map(|(t, x)| (t, x * factor))).collect();
         Series::new(label, colour, mark, thin_points(&scaled, part.span_s))
     };
-    // (frames that stand apart are points; all of them together are a line)
+    // single frames are dots when enlarged, and a line over the whole recording
     let (frames, measured) =
         if whole { (Mark::Thin, "measured") } else { (Mark::Dots, "measured, frame by frame") };
     let details = |of: &[(&TimeCurve, f64)]| {
@@ -120,10 +120,10 @@ fn draw_panels(shown: &EvidencePlot, index: usize, part: &EvidencePart) -> [Pane
     [upper, lower]
 }
 
-/// Most frames of a course that a page carries in full: longer ones would fill its megabyte.
+/// Most frames of a curve that a page holds in full; longer curves would exceed its size limit of 1 MB.
 const MOST_FRAMES: usize = 15_000;
 
-/// Every frame of a course, which has one entry a frame; `None` for fewer than two known ones, or too many.
+/// All frames of a curve; `None` for fewer than two known values or more than [`MOST_FRAMES`].
 fn sample_curve(course: &TimeCurve, factor: f64) -> Option<SampledSeries> {
     let known = || course.iter().enumerate().filter_map(|(i, p)| p.map(|(t, _)| (i, t)));
     let ((i, from), (j, to)) = (known().next()?, known().next_back()?);
@@ -136,17 +136,16 @@ fn sample_curve(course: &TimeCurve, factor: f64) -> Option<SampledSeries> {
     })
 }
 
-// The evidence of a condition: whole, at the release, and where it fits worst after it.
+// Evidence of a condition: whole recording, release, and worst part after the release.
 
-/// How long before and after the tip's release the enlarged part lasts, s.
+/// The enlarged part starts and ends this long before and after the release, s.
 const AROUND_RELEASE_S: (f64, f64) = (0.005, 0.03);
-/// Length of the part in which the later motion fits worst, s: a dozen cycles of the high component.
+/// Length of the worst part, s: a dozen cycles of the high component.
 const LATE_S: f64 = 0.015;
-/// Least share of the frames of a part that hold a value: fewer frames scatter more, and would be the worst
-/// by chance.
+/// Least fraction of frames with a value: a part with fewer scatters more and could be the worst by chance.
 const LEAST_PRESENT: f64 = 0.5;
 
-/// The figure of a condition; none without a recording, or where the two cannot agree.
+/// The figure of a condition; `None` without a recording, or where the signs of the two motions differ.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let residual = case.residual.as_ref()?;
     let (channel, noise_m) = case.judged_channel()?;
@@ -188,8 +187,8 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("evidence", figure_text(case, &shown, channel, noise_m), draw_figure(&shown)))
 }
 
-/// The part of [`LATE_S`] with the greatest mean square of a channel between two instants, s: from when to
-/// when. All between the two where that is shorter; `None` without a value.
+/// Start and end of the part of length [`LATE_S`] with the largest mean square residual between two instants,
+/// s. A shorter interval is returned whole; `None` without a value.
 fn worst_s(residual: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)) -> Option<(f64, f64)> {
     let first = residual.time_s.partition_point(|t| *t < from_s);
     let end = residual.time_s.partition_point(|t| *t <= to_s);
@@ -201,7 +200,7 @@ fn worst_s(residual: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)
     if frames >= times.len() || frames < 2 {
         return Some((start_s, last_s));
     }
-    // squares and numbers of values before each frame
+    // sums of squares and counts of the values before each frame
     let mut sums = vec![(0.0, 0usize)];
     for value in column {
         let (square, count) = sums.last().copied().unwrap_or_default();
@@ -217,13 +216,13 @@ fn worst_s(residual: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)
     worst.map_or(Some((start_s, last_s)), |(at, _)| Some((times[at], times[at + frames - 1])))
 }
 
-/// A channel between two instants.
+/// Values of a channel between two instants.
 fn channel_between(motion: &MotionTraces, channel: Channel, (from_s, to_s): (f64, f64)) -> TimeCurve {
     let all = motion.time_s.iter().zip(motion.column(channel));
     all.filter(|(t, _)| **t >= from_s && **t <= to_s).map(|(t, x)| x.map(|x| (*t, x))).collect()
 }
 
-/// The model's own states, for a line as smooth as its motion; `None` where its frames are closer.
+/// A smooth line from the states of the model; `None` where its frames are as close.
 fn model_states_curve(
     case: &ConditionComparison,
     channel: Channel,
@@ -242,7 +241,7 @@ fn model_states_curve(
     samples.iter().map(point).collect::<Option<TimeCurve>>().filter(|_| samples.len() as f64 > frames)
 }
 
-/// The claim with its number.
+/// The main result in one sentence, with its number.
 fn figure_title(channel: Channel, rms: f64, noise_m: f64) -> String {
     let (label, left, noise) = (channel.label(), format_length(rms * noise_m), format_length(noise_m));
     if rms <= NOTHING_LEFT {
@@ -290,7 +289,7 @@ fn figure_text(case: &ConditionComparison, shown: &EvidencePlot, channel: Channe
     Words { caption, details }
 }
 
-/// What a fit to traces says: how far its restarted segments are from the recording.
+/// For a fit to traces: the misfit of its longest restarted segments.
 fn describe_segments(case: &ConditionComparison) -> Option<String> {
     let misfit = case.result.misfit.as_ref()?;
     let own = |found: &&ChannelMisfit| found.recording == case.name();

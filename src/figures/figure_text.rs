@@ -1,4 +1,4 @@
-//! What the figures of a condition say of it: its name, its files, where its motion comes from.
+//! Texts and file names of the figures of a condition.
 
 use super::{Drawing, FigureBlock, NO_TRACES, Words, about};
 use crate::chart::Figure;
@@ -6,25 +6,24 @@ use crate::compare::ConditionComparison;
 use crate::model::parameters;
 use crate::text::{join_with_and, truncate_text};
 
-/// Letters of a title and of a name in a heading, which has to leave room for the figure: the longest titles
-/// in use fit.
+/// Letters after which a title and a name are cut in a heading, so that room for the figure is left.
 const TITLE_LETTERS: usize = 120;
 const NAME_LETTERS: usize = 50;
 
 impl ConditionComparison<'_> {
-    /// Name of the condition where there are several.
+    /// Name of the condition; `None` where the job has only one.
     fn distinct_name(&self) -> Option<&str> {
         Some(self.name()).filter(|_| self.job.conditions.len() > 1)
     }
 
-    /// What a figure is about: the job, and the condition where there are several.
+    /// Title of the job, with the condition where there are several.
     pub(crate) fn figure_title(&self) -> String {
         let name = |name| format!(", {}", truncate_text(name, NAME_LETTERS));
         let of = self.distinct_name().map_or_else(String::new, name);
         format!("{}{of}", truncate_text(&self.job.title, TITLE_LETTERS))
     }
 
-    /// What is said under a heading.
+    /// The line under a heading; it says where no traces are published.
     pub(crate) fn heading_note(&self, text: &str) -> String {
         about(if self.recording().is_none() { NO_TRACES } else { "" }, text)
     }
@@ -35,7 +34,7 @@ impl ConditionComparison<'_> {
         self.recording().map_or_else(|| kind.to_owned(), |r| format!("{kind} {}", r.name()))
     }
 
-    /// The same without its name.
+    /// As [`Self::source_name`], without the name of the recording.
     pub(crate) fn source_kind(&self) -> &'static str {
         match self.recording() {
             Some(r) if r.is_synthetic() => "the synthetic recording",
@@ -44,13 +43,13 @@ impl ConditionComparison<'_> {
         }
     }
 
-    /// A figure of both sides.
+    /// A figure of recording and model.
     pub(crate) fn figure_block(&self, name: &str, words: Words, figure: Figure) -> FigureBlock {
         let figure = Figure { subtitle: about(&self.figure_title(), &figure.subtitle), ..figure };
         self.drawing_block(name, words, Drawing::Chart(figure))
     }
 
-    /// A figure of the model alone, which conditions with the same run share; its details name the condition.
+    /// A figure of the model alone. Conditions with the same run share it, so its details name the condition.
     pub(crate) fn model_figure_block(&self, name: &str, words: Words, drawing: Drawing) -> FigureBlock {
         let of = self.distinct_name().map_or_else(String::new, |name| format!("{name}: "));
         let details = format!("{of}{}{}", words.details, self.sharing_note());
@@ -67,7 +66,7 @@ impl ConditionComparison<'_> {
         FigureBlock { file, caption, details, drawing, condition: Some(self.condition) }
     }
 
-    /// What is said of later conditions with the same run.
+    /// Sentence on other conditions with the same run; empty for none.
     pub(crate) fn sharing_note(&self) -> String {
         let same = self.same_run.iter().flatten().filter_map(|i| self.job.conditions.get(*i));
         let names: Vec<String> = same.map(|c| truncate_text(&c.name, NAME_LETTERS)).collect();
@@ -79,7 +78,7 @@ impl ConditionComparison<'_> {
     }
 }
 
-/// Names that differ in signs alone are one as file names: later ones get a number.
+/// Numbers repeated file names: names that differ only in punctuation give the same file.
 pub(crate) fn make_file_names_unique(mut blocks: Vec<FigureBlock>) -> Vec<FigureBlock> {
     for i in 1..blocks.len() {
         let (before, rest) = blocks.split_at_mut(i);
@@ -92,25 +91,22 @@ pub(crate) fn make_file_names_unique(mut blocks: Vec<FigureBlock>) -> Vec<Figure
     blocks
 }
 
-/// Longest part of a file name that a name from a job makes: file systems take some 255 bytes of a whole
-/// name.
+/// Most letters of a name in a file name: file systems take about 255 bytes in all.
 const LONGEST_WORD: usize = 60;
 
-/// A name from a job as part of a file name: letters and digits, everything else a hyphen, no longer than a
-/// file system takes.
+/// A name as part of a file name: letters and digits in lower case, hyphens for the rest, cut at
+/// [`LONGEST_WORD`].
 pub(crate) fn file_name_part(name: &str) -> String {
     let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' };
     let word: String = name.chars().map(letter).take(LONGEST_WORD).collect();
-    // (a name in another script leaves no letter)
+    // a name in another script leaves only hyphens
     if word.chars().all(|c| c == '-') { "window".to_owned() } else { word }
 }
 
-// What stands for a parameter in figures.
-
-/// Letters of a name that stand in for a symbol.
+/// Letters of a name that replace a missing symbol.
 const LETTERS: usize = 10;
 
-/// Symbol of a parameter in the equations; a short form of its name where it has none.
+/// Symbol of a parameter in the equations; the start of its name where it has none.
 pub(super) fn parameter_symbol(name: &str) -> String {
     parameters::find_parameter(name).map_or_else(|| truncate_text(name, LETTERS), |row| row.symbol.to_owned())
 }

@@ -1,5 +1,5 @@
-//! The Stribeck curve: the fitted law over the speed of the tip, what the recording itself shows of friction,
-//! and how long the tip moved at each speed.
+//! Stribeck curve: the fitted friction law over tip speed, friction measured on the recording, and the time
+//! spent at each speed.
 
 use super::{FigureBlock, Words};
 use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series, VerticalLine};
@@ -12,41 +12,41 @@ use crate::simulate::mode::TipMode;
 use crate::text::{format_digits, format_percent, format_speed, join_with_and};
 use serde::Serialize;
 
-/// Friction of the law of the best model.
+/// Friction coefficient of the fitted law at one speed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrictionLine {
     /// Speed of the tip, m/s; zero is rest.
     pub speed_m_per_s: f64,
     /// Coefficient of friction.
     pub coefficient: f64,
-    /// Half of its 95 % interval; `None` where the fit does not know it.
+    /// Half width of its 95 % interval; `None` where the fit does not determine it.
     pub half_95: Option<f64>,
 }
 
-/// What the figure shows; speeds in m/s.
+/// Data of the figure; speeds in m/s.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FrictionPlot {
     /// Heading.
     pub title: String,
-    /// More to say; empty for none.
+    /// Further text for the line under the heading; empty for none.
     pub note: String,
-    /// Whether a recording behind the fit is one that no camera took.
+    /// Whether a recording behind the fit is synthetic.
     pub synthetic: bool,
-    /// Speed and coefficient, rising.
+    /// Speeds, ascending, and coefficients of the fitted law.
     pub curve: Vec<(f64, f64)>,
     /// Least and greatest speed of the tip in slip.
     pub visited: Option<(f64, f64)>,
-    /// Speed with the ends of the 95 % interval of the coefficient; empty for none.
+    /// Speeds with the ends of the 95 % interval of the coefficient; empty for none.
     pub interval_95: Vec<(f64, f64, f64)>,
-    /// The law of the synthetic blade, rising; empty where none is known.
+    /// The true law of a synthetic blade; empty where unknown.
     pub truth: Vec<(f64, f64)>,
-    /// Speed and coefficient where the recorded tip moves evenly.
+    /// Speeds and coefficients where the recorded tip slides steadily.
     pub even: Vec<(f64, f64)>,
-    /// Means over cycles of the recording.
+    /// Speeds and coefficients as means over stick-slip cycles of the recording.
     pub over_cycles: Vec<(f64, f64)>,
     /// The same means of the model.
     pub of_model: Vec<(f64, f64)>,
-    /// Bins of speed, from and to, with the share of the time of slip in them.
+    /// Speed bins, from and to, with the fraction of slip time in each.
     pub shares: Vec<(f64, f64, f64)>,
     /// Mean speed of the head.
     pub head: Option<f64>,
@@ -58,7 +58,7 @@ const SHARES_HEIGHT_MM: f64 = 26.0;
 const MILLIMETRES: f64 = 1e3;
 const PERCENT: f64 = 100.0;
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(law: &FrictionPlot) -> Figure {
     let end = |take: fn(f64, f64) -> f64| law.curve.iter().map(|p| p.0 * MILLIMETRES).reduce(take);
@@ -120,7 +120,7 @@ fn law_series(law: &FrictionPlot) -> Vec<Series> {
     drawn.into_iter().filter(|s| !s.points.is_empty()).collect()
 }
 
-/// The axis of the coefficients: what is drawn, without points that lie far off the law.
+/// The axis of the coefficients; points far off the law do not widen it.
 fn coefficient_axis(law: &FrictionPlot) -> ChartAxis {
     const FAR: f64 = 0.5;
     const ROOM: f64 = 0.06;
@@ -138,15 +138,15 @@ fn coefficient_axis(law: &FrictionPlot) -> ChartAxis {
     axis.with_range(low - room, high + room)
 }
 
-// The friction law of the fitted model, with the speeds at which the tip moved and what is known of it.
+// The friction law of a condition.
 
-/// Points of the curve, bins of speed.
+/// Points of the curve and number of speed bins.
 const CURVE_POINTS: usize = 200;
 const SPEED_BINS: usize = 30;
-/// The curve goes on this far beyond the greatest speed.
+/// End of the curve over the greatest speed.
 const SPEED_MARGIN: f64 = 1.15;
 
-/// The figure; none for a model that never slips.
+/// The figure of a condition; `None` for a model that never slips.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let law = case.model.scene.linkage.friction;
     let slips = slip_speeds(case);
@@ -182,7 +182,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("friction", words, draw_figure(&shown)))
 }
 
-/// The claim with its numbers.
+/// The main result in one sentence, with its numbers.
 fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
     let (rest, moving) = (law.static_coefficient(), law.dynamic_coefficient(fastest));
     let how = if moving < rest { "falls" } else { "goes" };
@@ -190,7 +190,7 @@ fn claim_sentence(law: &FrictionLaw, fastest: f64) -> String {
     format!("Friction {how} from {rest} at rest to {moving} at {}", format_speed(fastest))
 }
 
-/// The law of a synthetic blade; `None` where the recording does not say it.
+/// The true law of a synthetic blade; `None` where its file holds none.
 fn true_law(case: &ConditionComparison) -> Option<FrictionLaw> {
     let twin = case.measured.and_then(|m| m.file).and_then(|file| file.twin.as_ref())?;
     let known = twin.get("truth").and_then(toml::Value::as_table)?;
@@ -198,7 +198,7 @@ fn true_law(case: &ConditionComparison) -> Option<FrictionLaw> {
     Some(FrictionLaw { a: a?, b_s_per_m: b_s_per_m?, c: c? })
 }
 
-/// Speeds of the tip where it slips, with the coefficients there, the slowest first.
+/// Speeds, ascending, and friction coefficients of the slip states.
 fn slip_speeds(case: &ConditionComparison) -> Vec<(f64, f64)> {
     let slip =
         |s: &&ModelSample| matches!(s.mode, TipMode::SlipForward | TipMode::SlipBackward) && s.normal_n > 0.0;
@@ -221,7 +221,7 @@ pub(crate) fn friction_lines(case: &ConditionComparison) -> Vec<FrictionLine> {
     speeds.map(line).collect()
 }
 
-/// Share of the time of slip in each bin; the states are equally far apart in time.
+/// Fraction of slip time in each bin; the states are equally spaced in time.
 fn slip_time_shares(slips: &[(f64, f64)], top: f64) -> Vec<(f64, f64, f64)> {
     let below = |v: f64| slips.partition_point(|s| s.0 < v) as f64;
     let edge = |i: usize| top * i as f64 / SPEED_BINS as f64;
@@ -275,13 +275,13 @@ fn figure_text(
     Words { caption, details: said.join(" ") + &case.sharing_note() }
 }
 
-/// How many points there are, and by how much the one farthest from the law is off.
+/// Number of points and their largest deviation from the law; `None` without points.
 fn largest_deviation(law: &FrictionLaw, points: &[FrictionPoint]) -> Option<(usize, f64)> {
     let off = |p: &FrictionPoint| (p.coefficient - law.dynamic_coefficient(p.speed_m_per_s)).abs();
     points.iter().map(off).reduce(f64::max).map(|most| (points.len(), most))
 }
 
-/// What the points are, and why some of them are not on the law.
+/// Sentence on the measured points and on their distance from the law.
 fn describe_points(
     case: &ConditionComparison,
     law: &FrictionLaw,
@@ -308,7 +308,7 @@ fn describe_points(
     Some(format!("{even}{cycles}"))
 }
 
-/// What the fit knows of the law.
+/// Sentence on the uncertainty of the law.
 fn describe_uncertainty(
     case: &ConditionComparison,
     at: f64,
@@ -336,7 +336,7 @@ fn describe_uncertainty(
             let is_open =
                 |c: &LawCoefficient| case.result.parameters.get(c.name).is_none_or(|p| !p.has_interval());
             let open: Vec<_> = free.iter().copied().filter(|c| is_open(c)).collect();
-            // the linear model may know each of them, and yet not how they go together
+            // the linear model may determine each of them but not their correlation
             let which = if open.is_empty() { symbols(&free) } else { symbols(&open) };
             let separately = if open.is_empty() { "" } else { " separately" };
             format!(

@@ -13,11 +13,11 @@ use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
 /// What a time history shows.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TimeHistory {
-    /// Heading: the claim with its number.
+    /// Heading: the main result with its number.
     pub title: String,
     /// Heading of the enlarged figure.
     pub enlarged_title: String,
-    /// Whether the measured motion is one that no camera took.
+    /// Whether the measured motion is synthetic.
     pub synthetic: bool,
     /// Measured motion; `None` where only published numbers are known.
     pub measured: Option<MotionTraces>,

@@ -29,9 +29,9 @@ pub struct PortraitPart {
 pub struct PhasePortrait {
     /// Heading.
     pub title: String,
-    /// More to say; empty for none.
+    /// Further text for the line under the heading; empty for none.
     pub note: String,
-    /// Whether the measured motion is one that no camera took.
+    /// Whether the measured motion is synthetic.
     pub synthetic: bool,
     /// The parts, side by side.
     pub parts: Vec<PortraitPart>,
@@ -40,7 +40,7 @@ pub struct PhasePortrait {
 /// Height of a panel, mm: as high as it is wide where two stand side by side.
 const HEIGHT_MM: f64 = 62.0;
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &PhasePortrait) -> Figure {
     Figure {

@@ -16,7 +16,7 @@ use crate::{math, text};
 /// The blade at an instant.
 #[derive(Debug, Clone, Copy)]
 pub struct ReversalPose {
-    /// What happens then.
+    /// Name of the event, such as `upright`.
     pub name: &'static str,
     /// Time after the head turned, s.
     pub after_turn_s: f64,
@@ -104,7 +104,7 @@ pub(crate) fn joint_positions(linkage: &Linkage, sample: &ModelSample) -> [(f64,
     [head, hinge, below(hinge, sample.pose.phi, linkage.l2_m)]
 }
 
-/// What the figure shows.
+/// Data of the figure.
 #[derive(Debug, Clone)]
 pub struct PoseSequence {
     /// Heading.
@@ -113,7 +113,7 @@ pub struct PoseSequence {
     pub subtitle: String,
     /// Links of the blade.
     pub linkage: Linkage,
-    /// The instants, in their order.
+    /// The instants, in order of time.
     pub poses: Vec<ReversalPose>,
     /// From when to when the tip rests while the head turns, s.
     pub rest_s: Option<[f64; 2]>,
@@ -153,7 +153,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.model_figure_block("poses", words, Drawing::Chart(draw_figure(&shown))))
 }
 
-/// The claim with its numbers.
+/// The main result in one sentence, with its numbers.
 fn claim_sentence(shown: &PoseSequence) -> String {
     match describe_rest(shown) {
         Some((time, way)) => format!("The tip rests for {time} while the head moves by {way}"),
@@ -247,7 +247,7 @@ const HATCHING: (f64, f64) = (0.08, 0.06);
 /// Arrows shorter than this share of the longest are not drawn: only barbs would show.
 const LEAST_ARROW: f64 = 0.25;
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &PoseSequence) -> Figure {
     let longest = ArrowScale::from_poses(&shown.poses);

@@ -40,7 +40,7 @@ pub struct ParameterProfile {
     pub intervals: [Option<[Option<f64>; 2]>; 3],
 }
 
-/// What the figure shows.
+/// Data of the figure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ProfilePlot {
     /// Heading.
@@ -281,12 +281,12 @@ fn crossing_at_top(profile: &ParameterProfile, at: usize, (value, rise): (f64, f
         .unwrap_or(value)
 }
 
-/// What the figure shows, with its number.
+/// Caption: what the figure shows, with its number.
 pub(crate) fn figure_caption(shown: &ProfilePlot) -> String {
     format!("Rise of the cost along each parameter while the others are refitted: {}.", claim_sentence(shown))
 }
 
-/// The claim with its numbers.
+/// The main result in one sentence, with its numbers.
 fn claim_sentence(shown: &ProfilePlot) -> String {
     let drawn = drawn_profiles(shown);
     let (count, all) = (drawn.iter().filter(|p| is_closed(p)).count(), drawn.len());

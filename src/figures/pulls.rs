@@ -16,12 +16,12 @@ pub struct Pull {
     pub held_out: bool,
 }
 
-/// What the figure shows.
+/// Data of the figure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PullPlot {
-    /// What was fitted.
+    /// Title of the fit.
     pub title: String,
-    /// Whether a target was measured on a recording that no camera took.
+    /// Whether a target was measured on a synthetic recording.
     pub synthetic: bool,
     /// The features in the order of the job.
     pub pulls: Vec<Pull>,
@@ -79,7 +79,7 @@ impl PullPlot {
     }
 }
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &PullPlot) -> Figure {
     let count = shown.pulls.len();
@@ -114,7 +114,7 @@ pub fn draw_figure(shown: &PullPlot) -> Figure {
     }
 }
 
-/// The claim with its number.
+/// The main result in one sentence, with its number.
 fn claim_sentence(shown: &PullPlot) -> String {
     let Some(worst) = shown.largest_pull() else { return "No feature has a deviation".to_owned() };
     let most = format_digits(worst.deviations.abs(), 2);
@@ -131,7 +131,7 @@ fn claim_sentence(shown: &PullPlot) -> String {
     }
 }
 
-/// What the figure shows, with its number.
+/// Caption: what the figure shows, with its number.
 pub(crate) fn figure_caption(shown: &PullPlot) -> String {
     let without = match shown.without.len() {
         0 => String::new(),

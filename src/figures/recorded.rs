@@ -36,7 +36,7 @@ pub(crate) fn draw_figure(recording: &Recording, reversals: &[f64], said: &str) 
     figure
 }
 
-/// The claim with its numbers.
+/// The main result in one sentence, with its numbers.
 fn claim_sentence(recording: &Recording, reversals: usize) -> String {
     let (lost, grid) = (lost_frames(recording), recording.grid());
     let share = lost.iter().filter(|lost| **lost).count() as f64 / lost.len().max(1) as f64;

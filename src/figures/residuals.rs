@@ -9,14 +9,14 @@ use crate::math;
 use crate::spectrum::Multitaper;
 use crate::text::{format_decimals, format_digits};
 
-/// What the figure shows.
+/// Data of the figure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ResidualDiagnostics {
-    /// Heading: the claim with its number.
+    /// Heading: the main result with its number.
     pub title: String,
-    /// More to say; empty for none.
+    /// Further text for the line under the heading; empty for none.
     pub note: String,
-    /// Whether the recording is one that no camera took.
+    /// Whether the recording is synthetic.
     pub synthetic: bool,
     /// Bins of the residual in deviations of the noise, from and to, with the density of the frames in each.
     pub histogram: Vec<(f64, f64, f64)>,
@@ -36,7 +36,7 @@ const MILLISECONDS: f64 = 1e3;
 /// Points of the curve of the noise.
 const POINTS: u32 = 60;
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &ResidualDiagnostics) -> Figure {
     let panels = [draw_histogram(shown), draw_correlation(shown), draw_spectrum(shown), draw_growth(shown)];
@@ -180,7 +180,7 @@ pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     Some(case.figure_block("residuals", Words { caption, details }, draw_figure(&shown)))
 }
 
-/// The claim with its numbers.
+/// The main result in one sentence, with its numbers.
 fn claim_sentence(rms: f64, neighbours: f64) -> String {
     let white = rms < 1.0 + WHITE_NOISE_TOLERANCE && neighbours.abs() < WHITE_NOISE_TOLERANCE;
     let is = if white { "like white" } else { "more than" };

@@ -41,7 +41,7 @@ pub struct RingDown {
     pub quantity: String,
     /// Window and what was fitted; empty for none.
     pub note: String,
-    /// Whether the motion is one that no camera took.
+    /// Whether the motion is synthetic.
     pub synthetic: bool,
     /// The data.
     pub data: RingDownTrace,
@@ -62,7 +62,7 @@ const HEIGHT_MM: f64 = 48.0;
 const RESIDUAL_HEIGHT_MM: f64 = 24.0;
 const DECAY_HEIGHT_MM: f64 = 42.0;
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &RingDown) -> Figure {
     let mut panels = vec![draw_whole_panel(shown), draw_residual_panel(shown)];

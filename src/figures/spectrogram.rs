@@ -54,7 +54,7 @@ pub struct SpectrogramPlot {
     pub quantity: String,
     /// How it was made, such as the length of the sliding window; empty for none.
     pub note: String,
-    /// Whether the motion is one that no camera took.
+    /// Whether the motion is synthetic.
     pub synthetic: bool,
     /// Middles of the sliding window, ascending, s.
     pub time_s: Vec<f64>,
@@ -88,7 +88,7 @@ const STEP_DB: f64 = 5.0;
 const REFERENCE_M: f64 = 1e-6;
 const MILLIMETRES: f64 = 1e3;
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &SpectrogramPlot) -> Figure {
     let mut panels = vec![draw_map(shown)];
@@ -534,7 +534,7 @@ mod tests {
             targets: vec![aimed("lowest", 359.0, true), aimed("highest", 400.0, false)],
             ..SpectrogramPlot::default()
         };
-        let line = target_lines_over_map(&shown.targets).unwrap();
+        let line = target_lines(&shown.targets, "target", Colour::Black, Mark::Edged);
         assert_eq!(line.points[..3], [Some((0.2, 359.0)), Some((0.6, 359.0)), None]);
         assert_eq!(line.error_bars[0], ErrorBar::Vertical { x: 0.2, from: 345.0, to: 373.0 });
         let texts: Vec<(String, f64)> = target_names(&shown).into_iter().map(|t| (t.text, t.at.1)).collect();
@@ -544,6 +544,6 @@ mod tests {
         );
         let labels: Vec<String> = target_lines_over_ridges(&shown.targets).map(|s| s.label).collect();
         assert_eq!(labels, ["target, met", "target, missed"]);
-        assert!(target_lines_over_map(&[]).is_none() && target_lines_over_ridges(&[]).next().is_none());
+        assert!(target_lines_over_ridges(&[]).next().is_none());
     }
 }

@@ -39,7 +39,7 @@ pub struct SpectraPlot {
     pub quantity: String,
     /// Where the record comes from, such as its window; empty for none.
     pub note: String,
-    /// Whether the measured motion is one that no camera took.
+    /// Whether the measured motion is synthetic.
     pub synthetic: bool,
     /// Measured spectrum; `None` where only published numbers are known.
     pub measured: Option<SpectrumCurve>,
@@ -67,7 +67,7 @@ pub struct SpectraPlot {
 const HEIGHT_MM: f64 = 75.0;
 const MICROMETRES: f64 = 1e6;
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(spectra: &SpectraPlot) -> Figure {
     let highest = [&spectra.measured, &spectra.model]
@@ -296,7 +296,7 @@ fn figure_text(
     Words { caption, details: said.join(" ") }
 }
 
-/// The claim with its number.
+/// The main result in one sentence, with its number.
 fn figure_title(spectra: &SpectraPlot, met: &[FrequencyComparison]) -> String {
     match met {
         [] => strongest_claim(spectra),

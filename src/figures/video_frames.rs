@@ -54,7 +54,7 @@ impl Frame {
 /// the glass, m.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instant {
-    /// What happens then.
+    /// Name of the event, such as `upright`.
     pub name: &'static str,
     /// Time of the frame, s of the recording.
     pub time_s: f64,
@@ -75,12 +75,12 @@ impl Instant {
     }
 }
 
-/// What the figure shows.
+/// Data of the figure.
 #[derive(Debug, Clone, PartialEq)]
 pub struct VideoFrames {
     /// Line under the heading.
     pub subtitle: String,
-    /// The instants, in their order.
+    /// The instants, in order of time.
     pub instants: Vec<Instant>,
 }
 

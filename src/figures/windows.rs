@@ -15,16 +15,16 @@ pub struct WindowSpan {
     pub to_s: f64,
 }
 
-/// What the figure shows; all columns have the length of `time_s`.
+/// Data of the figure; all columns have the length of `time_s`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WindowOverview {
     /// Heading.
     pub title: String,
     /// Quantity that was analysed, such as "deflection".
     pub quantity: String,
-    /// More to say; empty for none.
+    /// Further text for the line under the heading; empty for none.
     pub note: String,
-    /// Whether the motion is one that no camera took.
+    /// Whether the motion is synthetic.
     pub synthetic: bool,
     /// Instants, s.
     pub time_s: Vec<f64>,
@@ -47,7 +47,7 @@ const HEAD_HEIGHT_MM: f64 = 26.0;
 const COLOURS: [Colour; 6] =
     [Colour::SkyBlue, Colour::Orange, Colour::Vermilion, Colour::Green, Colour::Purple, Colour::Grey];
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &WindowOverview) -> Figure {
     let mut panels = vec![draw_panel(shown, &shown.quantity, &shown.channel_m, HEIGHT_MM)];

@@ -44,7 +44,7 @@ const LOOKS: [(Colour, MarkerShape); 7] = [
     (Colour::Black, MarkerShape::Diamond),
 ];
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_figure(shown: &WorkPrecision) -> Figure {
     let mut methods: Vec<&str> = Vec::new();

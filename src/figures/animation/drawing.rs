@@ -1,5 +1,4 @@
-//! The linkage to scale: where its points are, and the panel that it moves in. Lengths in mm, heights over
-//! the glass.
+//! The linkage to scale: its joints and the panels in which it moves. Lengths in mm, heights above the glass.
 
 use super::Animation;
 use crate::chart::{ChartAxis, Colour, Mark, Panel, Series, TextAnnotation, value_span};
@@ -8,19 +7,19 @@ use crate::model::Linkage;
 use crate::simulate::ModelSample;
 
 const MM: f64 = 1e3;
-/// Estimated width of the axes of a panel in half a page, mm: the scale of the drawing follows from it.
+/// Estimated width of the axes in half a page, mm; it sets the scale of the drawing.
 const AXES_MM: f64 = 70.0;
-/// Ends of the height of the drawing, mm.
+/// Least and greatest height of the drawing, mm.
 const HEIGHT_MM: (f64, f64) = (50.0, 80.0);
-/// Room over the blade for head, labels and words, and under the glass, in lengths of the blade.
+/// Margins above the blade (head and labels) and below the glass, in lengths of the blade.
 const ABOVE: f64 = 0.42;
 const BELOW: f64 = 0.13;
-/// Least distance of the names of two poses in a row, and that of the rows, mm.
+/// Least distance of two pose names in a row, and distance of rows, mm.
 const LABEL_MM: f64 = 10.0;
 const ROW_MM: f64 = 3.2;
-/// Distance of words from the ends of the drawing to their middles, mm.
+/// Distance of the middle of a text from the end of the drawing, mm.
 const MARGIN_MM: f64 = 5.0;
-/// Half width and height of the head, in lengths of the blade; they are no dimensions of a real one.
+/// Half width and height of the drawn head, in lengths of the blade; not the size of a real head.
 pub(super) const HEAD_HALF_WIDTH: f64 = 0.22;
 pub(super) const HEAD_HEIGHT: f64 = 0.14;
 
@@ -37,7 +36,7 @@ pub(super) fn blade_length_mm(linkage: &Linkage) -> f64 {
     MM * (linkage.l1_m + linkage.l2_m)
 }
 
-/// The panel: glass, a length for scale, and the poses at the ends of the hold and half way of the flip.
+/// The panel with glass, scale bar, and the poses at the ends of the hold and halfway through the flip.
 pub(super) fn draw_linkage_panel(animation: &Animation) -> Panel {
     let length = blade_length_mm(&animation.linkage);
     let (low, high) = (-BELOW * length, (1.0 + ABOVE) * length);
@@ -67,7 +66,7 @@ pub(super) fn draw_linkage_panel(animation: &Animation) -> Panel {
     Panel { equal_aspect: true, bare: true, annotations, ..Panel::new(x, y, height_mm, series) }
 }
 
-/// The glass, as wide as the panel turns out to be.
+/// The glass, wider than any panel.
 fn glass_line(left: f64, right: f64) -> Series {
     const FAR: f64 = 100.0;
     let ends = [left - FAR * (right - left), right + FAR * (right - left)];
@@ -78,9 +77,9 @@ fn text_at(text: &str, at: (f64, f64)) -> TextAnnotation {
     TextAnnotation::new(text, Colour::Black, at)
 }
 
-/// The tip enlarged over the last part of what is shown, where it slips.
+/// The tip enlarged over the last shown part, where it slips.
 pub(super) fn draw_tip_panel(animation: &Animation, height_mm: f64) -> Panel {
-    /// Room on either side of the tip's way, and the depth under the glass, in lengths of that way.
+    /// Margins beside the path of the tip and below the glass, in lengths of that path.
     const ROOM: f64 = 0.12;
     const UNDER: f64 = 0.3;
     let [from_s, to_s] = animation.pace.last_part_s();
@@ -96,7 +95,7 @@ pub(super) fn draw_tip_panel(animation: &Animation, height_mm: f64) -> Panel {
     Panel { title, equal_aspect: true, ..Panel::new(x, y, height_mm, [glass_line(left, right)]) }
 }
 
-/// The names of poses over their heads, each in the lowest row where it does not run into one before.
+/// The pose names above the heads, each in the lowest row in which it overlaps no earlier name.
 fn pose_labels(poses: &[LabelledPose], height: f64, row: f64, apart: f64) -> Vec<TextAnnotation> {
     let mut labels: Vec<TextAnnotation> = Vec::new();
     for (name, [(x, _), ..]) in poses {
@@ -109,8 +108,7 @@ fn pose_labels(poses: &[LabelledPose], height: f64, row: f64, apart: f64) -> Vec
     labels
 }
 
-/// The poses worth keeping: at both ends of the hold and, where the tip passes the head, half way of the
-/// flip.
+/// The drawn poses: both ends of the hold and, where the tip passes the head, the middle of the flip.
 fn key_poses(animation: &Animation) -> Vec<LabelledPose> {
     let [from_s, to_s] = animation.hold_s;
     let at = |time_s: f64| animation.samples.iter().find(|s| s.time_s >= time_s);

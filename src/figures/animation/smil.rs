@@ -1,4 +1,4 @@
-//! What moves, drawn over the still figure in its canvas: one SVG element a part, with its key frames inside.
+//! The moving elements over the still figure: one SVG element per part, with its key frames inside.
 
 use super::drawing::{HEAD_HALF_WIDTH, HEAD_HEIGHT};
 use super::{Animation, PlaybackPace, PlaybackPart, drawing};
@@ -8,26 +8,25 @@ use crate::simulate::ModelSample;
 use crate::simulate::mode::TipMode;
 use std::fmt::Write;
 
-/// How far a drawn point may be from where it belongs, canvas units: a fiftieth of a millimetre, less than a
-/// line is wide.
+/// Largest position error of a drawn point, canvas units: a fiftieth of a millimetre, less than a line width.
 const TOLERANCE: f64 = 0.3;
 /// Half width of the tip's symbol, and of the cross of a measured point, canvas units.
 const TIP_HALF_WIDTH: f64 = 20.0;
 const CROSS_HALF_WIDTH: f64 = 15.0;
-/// How far the symbol is under the tip, canvas units.
+/// Distance of the symbol below the tip, canvas units.
 const SYMBOL_OFFSET: f64 = 40.0;
-/// How far the name of a link is from its middle, canvas units.
+/// Distance of the name of a link from its middle, canvas units.
 const NAME_OFFSET: f64 = 52.0;
-/// The colour of the figure's ground.
+/// Background colour of the figure.
 const BACKGROUND: &str = "#FFFFFF";
-/// Size of words, canvas units.
+/// Font size, canvas units.
 const TEXT_SIZE: f64 = 44.0;
-/// Shortest time for which a measured point stands, as a share of the animation: a screen shows no shorter
-/// one.
+/// Shortest time for which a measured point is shown, as a fraction of the playback time: screens show no
+/// shorter one.
 const MIN_CROSS_FRACTION: f64 = 1.0 / 2000.0;
 
-/// A mode of contact, its name, and colour and outline of the tip's symbol in it; the outline is in units of
-/// the symbol's half width.
+/// A contact mode, its name, and the colour and outline of the tip's symbol; the outline is in units of the
+/// half width.
 type ContactModeSymbol = (TipMode, &'static str, Colour, &'static str);
 
 const CONTACT_MODE_SYMBOLS: [ContactModeSymbol; 4] = [
@@ -37,7 +36,7 @@ const CONTACT_MODE_SYMBOLS: [ContactModeSymbol; 4] = [
     (TipMode::Flight, "flight", Colour::Purple, "M0 -1.3L1.3 0L0 1.3L-1.3 0Z"),
 ];
 
-/// The elements; none without the panels of the figure.
+/// The moving elements; empty without the two drawings.
 pub(super) fn moving_elements(animation: &Animation, plots: &[PanelPlacement]) -> String {
     let [plot, close, strips @ ..] = plots else { return String::new() };
     [
@@ -51,8 +50,7 @@ pub(super) fn moving_elements(animation: &Animation, plots: &[PanelPlacement]) -
     .concat()
 }
 
-/// The states with their shares of the animation and their points on the canvas: head, hinge, tip as x, y, x,
-/// y, x, y.
+/// Key frames with the canvas points of head, hinge and tip as x, y, x, y, x, y.
 fn pose_key_frames(animation: &Animation, plot: &PanelPlacement) -> KeyFrames<6> {
     let point = |sample: &ModelSample| {
         let points = drawing::linkage_points_mm(&animation.linkage, sample);
@@ -63,7 +61,7 @@ fn pose_key_frames(animation: &Animation, plot: &PanelPlacement) -> KeyFrames<6>
     animation.samples.iter().filter_map(point).collect()
 }
 
-/// Key frames of some of the numbers.
+/// Simplified key frames of `N` of the numbers from index `from` on.
 fn select_numbers<const N: usize>(poses: &KeyFrames<6>, from: usize) -> KeyFrames<N> {
     let some: KeyFrames<N> =
         poses.iter().map(|(share, all)| (*share, std::array::from_fn(|k| all[from + k]))).collect();
@@ -83,7 +81,7 @@ fn line_path(values: &[f64; 4]) -> String {
     format!("M{x1} {y1}L{x2} {y2}")
 }
 
-/// A group that moves; it stands at its first place where nothing can move.
+/// A moving group; without SMIL it stays at its first place.
 fn moving_group(
     animation: &Animation,
     changed: AnimatedAttribute,
@@ -95,7 +93,7 @@ fn moving_group(
     format!("<g transform=\"translate({})\">{motion}{contents}</g>\n", format_translation(first))
 }
 
-/// A link between two of the points.
+/// A link from the point at index `from` to the next.
 fn moving_link(animation: &Animation, poses: &KeyFrames<6>, from: usize, width: u32) -> String {
     let keys: KeyFrames<4> = select_numbers(poses, from);
     let Some((_, first)) = keys.first() else { return String::new() };
@@ -143,7 +141,7 @@ fn link_name(animation: &Animation, poses: &KeyFrames<6>, from: usize, word: &st
     )
 }
 
-/// The lip near its tip, cut at the frame of its panel.
+/// The lip near its tip, clipped to its panel.
 fn enlarged_tip(animation: &Animation, plot: &PanelPlacement) -> String {
     let [(left, top), (right, bottom)] = plot.corners();
     let [x, y, width, height] = format_numbers(&[left, top, right - left, bottom - top]);
@@ -153,7 +151,7 @@ fn enlarged_tip(animation: &Animation, plot: &PanelPlacement) -> String {
         measured_crosses(animation, plot),
     ]
     .concat();
-    // named for its place: where two animations of a page have the same name, they have the same frame
+    // the id follows from the place: animations of one page with the same id have the same frame
     let name = format!("frame-{x}-{y}-{width}-{height}").replace('.', "_");
     let frame = format!(
         "<clipPath id=\"{name}\"><rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\"/></clipPath>"
@@ -161,7 +159,7 @@ fn enlarged_tip(animation: &Animation, plot: &PanelPlacement) -> String {
     format!("{frame}\n<g clip-path=\"url(#{name})\">\n{contents}</g>\n")
 }
 
-/// The head around its hinge.
+/// The head, drawn around its hinge.
 fn moving_head(animation: &Animation, plot: &PanelPlacement) -> String {
     let length = drawing::blade_length_mm(&animation.linkage);
     let corner = |x: f64, y: f64| plot.canvas_point(x * length, y * length);
@@ -177,7 +175,7 @@ fn moving_head(animation: &Animation, plot: &PanelPlacement) -> String {
     )
 }
 
-/// Whether the tip is in a mode, from when on: shares of the animation.
+/// When the tip enters and leaves a mode, as fractions of the playback time.
 fn mode_intervals(animation: &Animation, mode: TipMode) -> Vec<(f64, bool)> {
     let mut spells: Vec<(f64, bool)> = animation
         .modes
@@ -188,7 +186,7 @@ fn mode_intervals(animation: &Animation, mode: TipMode) -> Vec<(f64, bool)> {
     spells
 }
 
-/// Something that is visible at times.
+/// A group with switched visibility.
 fn visible_at_times(animation: &Animation, spells: &[(f64, bool)], contents: &str) -> String {
     let opacity = |on: &bool| u8::from(*on).to_string();
     let Some((_, first)) = spells.first() else { return String::new() };
@@ -196,7 +194,7 @@ fn visible_at_times(animation: &Animation, spells: &[(f64, bool)], contents: &st
     format!("<g opacity=\"{}\">{change}{contents}</g>\n", opacity(first))
 }
 
-/// Something that is visible in one mode alone; nothing for a mode that never comes.
+/// A group that is visible in one contact mode; empty where the mode never occurs.
 fn visible_in_mode(animation: &Animation, mode: TipMode, contents: &str) -> String {
     let spells = mode_intervals(animation, mode);
     if spells.iter().any(|(_, on)| *on) {
@@ -214,7 +212,7 @@ fn mode_symbol((_, _, colour, outline): &ContactModeSymbol, at: (f64, f64)) -> S
     )
 }
 
-/// The tip's symbol under the glass, which shows the mode of contact and leaves the tip itself free.
+/// The symbol of the contact mode, below the glass so that it does not cover the tip.
 fn tip_symbol(animation: &Animation, plot: &PanelPlacement) -> String {
     let symbols: String = CONTACT_MODE_SYMBOLS
         .iter()
@@ -236,7 +234,7 @@ fn text_element(x: f64, y: f64, anchor: &str, words: &str) -> String {
     )
 }
 
-/// Mode in words, at the upper corner of the drawing, and pace, over the enlarged tip.
+/// Name of the contact mode at the upper corner of the drawing, and pace above the enlarged tip.
 fn mode_and_pace_text(animation: &Animation, plot: &PanelPlacement, close: &PanelPlacement) -> String {
     let [[(left, top), _], [(_, frame), (right, _)]] = [plot.corners(), close.corners()];
     let y = top + TEXT_SIZE / 2.0;
@@ -256,7 +254,7 @@ fn mode_and_pace_text(animation: &Animation, plot: &PanelPlacement, close: &Pane
     modes.chain(paces).collect()
 }
 
-/// When a part is shown; the last one stays for the rest.
+/// When a part is shown; the last stays visible to the end.
 fn part_visibility(animation: &Animation, part: &PlaybackPart) -> Vec<(f64, bool)> {
     let [from_s, to_s] = animation.pace.span_s();
     let mut spells = vec![(0.0, part.from_s <= from_s)];
@@ -269,8 +267,8 @@ fn part_visibility(animation: &Animation, part: &PlaybackPart) -> Vec<(f64, bool
     spells
 }
 
-/// The measured tip on the glass and the measured head at its drop, in the frame nearest to the instant
-/// shown; a missing one is hidden.
+/// The measured tip on the glass and the measured head at its drop, at the nearest frame; hidden where not
+/// tracked.
 fn measured_crosses(animation: &Animation, plot: &PanelPlacement) -> String {
     let Some(measured) = &animation.measured else { return String::new() };
     let length = drawing::blade_length_mm(&animation.linkage);
@@ -321,7 +319,7 @@ fn jumping_cross(animation: &Animation, time_s: &[f64], frames: &[Option<(f64, f
     )
 }
 
-/// The line that runs through the strips with the time; it waits at the ends of one that covers a part.
+/// The time cursor of each strip; it waits at the ends of a strip that covers only a part.
 fn time_cursors(animation: &Animation, strips: &[PanelPlacement]) -> String {
     let turns: Vec<f64> = animation.pace.parts.iter().flat_map(|p| [p.from_s, p.to_s]).collect();
     let cursor = |(plot, [from_s, to_s]): (&PanelPlacement, [f64; 2])| {
@@ -337,13 +335,13 @@ fn time_cursors(animation: &Animation, strips: &[PanelPlacement]) -> String {
     strips.iter().zip(animation::strip_spans_s(animation)).map(cursor).collect()
 }
 
-// What changes over an animation, as the few key frames that show it: SMIL's attributes, no script.
+// Key frames and SMIL elements.
 
-/// Values over the animation: when, as a share of it, and what.
+/// Pairs of a fraction of the playback time and values.
 pub(super) type KeyFrames<const N: usize> = Vec<(f64, [f64; N])>;
 
-/// The key frames between which straight lines are nowhere farther from the values than `tolerance` (Douglas
-/// and Peucker, over time).
+/// The key frames between which linear interpolation stays within `tolerance` (Douglas and Peucker, over
+/// time).
 pub(super) fn simplify_key_frames<const N: usize>(
     values: &[(f64, [f64; N])],
     tolerance: f64,
@@ -364,7 +362,7 @@ pub(super) fn simplify_key_frames<const N: usize>(
     values.iter().zip(kept).filter(|(_, kept)| *kept).map(|(value, _)| *value).collect()
 }
 
-/// How far a value is from the straight line between two others.
+/// Largest distance of a key frame from linear interpolation between two others.
 fn deviation_from_line<const N: usize>(
     from: &(f64, [f64; N]),
     to: &(f64, [f64; N]),
@@ -374,14 +372,14 @@ fn deviation_from_line<const N: usize>(
     (0..N).map(|k| (from.1[k] + share * (to.1[k] - from.1[k]) - value.1[k]).abs()).fold(0.0, f64::max)
 }
 
-/// How an element changes: which element does it, and the attributes that say what.
+/// What of an element is animated.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum AnimatedAttribute {
     /// The path of a line.
     Path,
     /// The place of a group.
     Place,
-    /// The same from one place to the next without what lies between.
+    /// The place of a group, in jumps.
     Jumping,
     /// Whether it is visible.
     Visible,
@@ -401,8 +399,8 @@ impl AnimatedAttribute {
     }
 }
 
-/// The animating element of an element that changes so. The first value is shown from the start, as SMIL
-/// requires, and the last one to the end. Nothing for something that stays as it is.
+/// The SMIL element that animates an attribute; empty for fewer than two key frames. The first value holds
+/// from the start, as SMIL requires, and the last one to the end.
 pub(super) fn animate_element<T>(
     changed: AnimatedAttribute,
     pace: &PlaybackPace,
@@ -432,7 +430,7 @@ fn push_item(list: &mut String, item: &str) {
     let _ = write!(list, "{separator}{item}"); // writing to a string cannot fail
 }
 
-/// A number with at most this many decimals.
+/// A number with at most `decimals` decimals.
 pub(super) fn format_short(value: f64, decimals: usize) -> String {
     let written = format!("{value:.decimals$}");
     let trimmed =

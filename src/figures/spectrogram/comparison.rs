@@ -16,14 +16,14 @@ pub enum SpectrogramSide {
     Model,
 }
 
-/// What the figure shows.
+/// Data of the figure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SpectrogramComparison {
     /// Heading.
     pub title: String,
     /// How they were made; empty for none.
     pub note: String,
-    /// Whether the measured motion is one that no camera took.
+    /// Whether the measured motion is synthetic.
     pub synthetic: bool,
     /// One or both, over the same frequencies; the first sets the colours.
     pub sides: Vec<(SpectrogramSide, SpectrogramPlot)>,
@@ -46,7 +46,7 @@ impl SpectrogramSide {
     }
 }
 
-/// The figure.
+/// Draws the figure.
 #[must_use]
 pub fn draw_comparison(shown: &SpectrogramComparison) -> Figure {
     let sides: Vec<(SpectrogramSide, SpectrogramPlot)> =
@@ -150,6 +150,7 @@ fn draw_ridges_over_speed(sides: &[(SpectrogramSide, SpectrogramPlot)]) -> Optio
 mod tests {
     use super::*;
     use crate::chart::Medium;
+    use crate::figures::spectrogram::{SpectrogramRidgePoint, SpeedPoint};
 
     fn shown(columns: usize, scale: f64) -> SpectrogramPlot {
         let column = |i: usize| {
