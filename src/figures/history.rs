@@ -1,5 +1,5 @@
-//! Time histories around a reversal: tip, head, deflection and head drop, measured against model, with what
-//! lies between them.
+//! Time histories around a reversal: tip, head, deflection and head drop, measured and of the model, with
+//! residuals.
 
 pub(crate) mod caption;
 
@@ -10,7 +10,7 @@ use crate::math;
 use crate::recording::channel::Channel;
 use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
 
-/// What a time history shows.
+/// Data of a time history.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TimeHistory {
     /// Heading: the main result with its number.
@@ -35,25 +35,25 @@ pub struct TimeHistory {
     pub zoom_s: Option<(f64, f64)>,
 }
 
-/// Heights of the panels, mm: four quantities with what is left of them and a few windows fit on a page.
+/// Heights of the panels, mm: four quantities with their residuals and a few windows fit on a page.
 const HEIGHT_MM: f64 = 24.0;
 const ENLARGED_HEIGHT_MM: f64 = 32.0;
 const RESIDUAL_HEIGHT_MM: f64 = 13.0;
-/// Height of a window, mm, and least height of all of them: that of their label.
+/// Height of a window's row, and least height of the panel (its label), mm.
 const ROW_MM: f64 = 3.0;
 const LEAST_ROWS_MM: f64 = 12.0;
 /// Below this span, m, a quantity is drawn in micrometres.
 const MICROMETRES_BELOW_M: f64 = 2e-4;
 
-/// Those that are enlarged: the head's path is a parabola there.
+/// Channels of the enlarged figure; the head's path is only a parabola there.
 const ENLARGED: [Channel; 3] = [Channel::TipX, Channel::Deflection, Channel::HeadDrop];
 
-/// The whole motion.
+/// Draws the whole motion.
 #[must_use]
 pub fn draw_figure(history: &TimeHistory) -> Figure {
     let mut panels = stack_panels(history, &MOTION_CHANNELS, motion_span_s(history), HEIGHT_MM);
     if let Some((from, to)) = history.zoom_s.filter(|(from, to)| from < to) {
-        // (outlined: a third shade would be one of the other two without colours)
+        // outlined, as a third shade could not be told from the other two in grey
         let marked = ShadedSpan::outline("enlarged", Colour::Black, from, to);
         panels.iter_mut().for_each(|panel| panel.shaded_spans.push(marked.clone()));
     }
@@ -61,7 +61,7 @@ pub fn draw_figure(history: &TimeHistory) -> Figure {
     compose_figure(history, panels, "around the reversal of the head")
 }
 
-/// A part of the motion enlarged; `None` where there is no such part.
+/// Draws the enlarged part; `None` without one.
 pub(crate) fn draw_enlarged(history: &TimeHistory) -> Option<Figure> {
     let zoom_s = history.zoom_s.filter(|(from, to)| from < to)?;
     let panels = stack_panels(history, &ENLARGED, zoom_s, ENLARGED_HEIGHT_MM);
@@ -85,7 +85,7 @@ fn compose_figure(history: &TimeHistory, panels: Vec<Panel>, part: &str) -> Figu
     )
 }
 
-/// First and last instant of the measured motion, else of the model's.
+/// First and last instant of the measured motion, or of the model's where nothing is measured, s.
 fn motion_span_s(history: &TimeHistory) -> (f64, f64) {
     let times = history.measured.as_ref().or(history.model.as_ref()).map_or(&[][..], |m| &m.time_s);
     match (times.first(), times.last()) {
@@ -94,7 +94,7 @@ fn motion_span_s(history: &TimeHistory) -> (f64, f64) {
     }
 }
 
-/// Every quantity over what is left of it.
+/// One panel per quantity, each with its residual below.
 fn stack_panels(
     history: &TimeHistory,
     channels: &[Channel],
@@ -109,7 +109,7 @@ fn stack_panels(
     channels.iter().flat_map(pair).collect()
 }
 
-/// Points within a span, no more than it can show; the lowest and highest decide the unit.
+/// The values within a span, thinned to what a figure can show.
 fn points_within(motion: &MotionTraces, channel: Channel, (from, to): (f64, f64)) -> Vec<Option<(f64, f64)>> {
     let inside = |t: &f64| *t >= from && *t <= to;
     let all = motion.time_s.iter().zip(motion.column(channel)).filter(|(t, _)| inside(t));
@@ -135,7 +135,7 @@ fn draw_channel_panel(
     let series = lines.into_iter().zip(styles).filter_map(|(points, (label, colour, mark))| {
         points.map(|points| Series::new(label, colour, mark, scale_points(points, factor)))
     });
-    // the labels stand over the topmost panel, their lines run through all
+    // only the topmost panel has labels; the lines run through all panels
     let rule = |(label, at): &(String, f64)| {
         VerticalLine::new(if labelled { label } else { "" }, Colour::Blue, Mark::Dashed, *at)
     };
@@ -148,7 +148,7 @@ fn draw_channel_panel(
     }
 }
 
-/// What lies between the measured quantity and that of the model.
+/// The panel of measured minus model; `None` without a value.
 fn draw_residual_panel(history: &TimeHistory, channel: Channel, shown_s: (f64, f64)) -> Option<Panel> {
     let points = points_within(history.residual.as_ref()?, channel, shown_s);
     points.iter().flatten().next()?; // (empty axes say nothing)
@@ -160,8 +160,8 @@ fn draw_residual_panel(history: &TimeHistory, channel: Channel, shown_s: (f64, f
     Some(Panel::new(x, y, RESIDUAL_HEIGHT_MM, [series]))
 }
 
-/// As far to either side of zero, to just beyond one of 1, 2, 5, 10, ..., so that the low panel has a tick on
-/// each side.
+/// An axis symmetric about zero that ends just beyond 1, 2 or 5 times a power of ten, so that a low panel has
+/// a tick on each side.
 pub(super) fn symmetric_axis(axis: ChartAxis, points: &[Option<(f64, f64)>]) -> ChartAxis {
     const BEYOND: f64 = 1.2;
     const MOST: f64 = 1.15;
@@ -171,7 +171,7 @@ pub(super) fn symmetric_axis(axis: ChartAxis, points: &[Option<(f64, f64)>]) -> 
     axis.with_ends(end.filter(|end| end.is_normal()).map(|end| (-BEYOND * end, BEYOND * end)))
 }
 
-/// The windows as bars, the first on top.
+/// The windows of the fit as bars, the first on top.
 fn draw_window_panel(history: &TimeHistory) -> Option<Panel> {
     let rows = || history.windows.iter().rev();
     let bar = |(row, (_, start, end)): (usize, &(String, f64, f64))| {
@@ -185,7 +185,7 @@ fn draw_window_panel(history: &TimeHistory) -> Option<Panel> {
     (!history.windows.is_empty()).then(|| Panel::new(x, y, height_mm, [series]))
 }
 
-/// Unit in which values of that span read best, and how many of it a metre has.
+/// Display unit for lengths of this range, and the factor from metres.
 pub(super) fn length_unit(values: impl Iterator<Item = f64>) -> (&'static str, f64) {
     let (low, high) = value_span(values);
     if high - low < MICROMETRES_BELOW_M && high.abs().max(low.abs()) < 10.0 * MICROMETRES_BELOW_M {
@@ -195,10 +195,9 @@ pub(super) fn length_unit(values: impl Iterator<Item = f64>) -> (&'static str, f
     }
 }
 
-// Where the tip sticks, as bands that a figure can show.
+// Shaded spans of sticks.
 
-/// Share of the span below which two sticks are shown as one band of cycles: less than a millimetre on a
-/// page.
+/// Sticks with a shorter gap are drawn as one band, fraction of the span: less than a millimetre on a page.
 const MIN_STICK_GAP: f64 = 0.005;
 
 const STICKS_LABEL: &str = "tip sticks (model)";
@@ -210,17 +209,17 @@ pub(super) fn sticks_on_clock(case: &ConditionComparison) -> Vec<(f64, f64)> {
     case.model.view.stick_s.iter().map(|[from, to]| (from + shift_s, to + shift_s)).collect()
 }
 
-/// Sticks that stand alone, and cycles of sticks too close to stand apart, within a span.
+/// Shaded spans of long sticks, and of groups of short ones that are too close to be told apart.
 pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec<ShadedSpan> {
     let shown: Vec<(f64, f64)> =
         stick_s.iter().filter(|s| s.1 > from && s.0 < to).map(|s| (s.0.max(from), s.1.min(to))).collect();
     let apart = MIN_STICK_GAP * (to - from);
     let long = |s: &(f64, f64)| s.1 - s.0 > apart;
-    // a stick that is long enough to be visible is a band of its own, however close the next one is
+    // a stick that is long enough to be seen has its own band
     let groups = shown.chunk_by(|a, b| b.0 - a.1 < apart && !long(a) && !long(b));
     let band = |group: &[(f64, f64)]| {
         let (first, last) = (group.first()?, group.last()?);
-        // (black is darker than orange in grey too)
+        // black is darker than orange in grey too
         let (label, colour) =
             if group.len() > 1 { (CYCLES_LABEL, Colour::Orange) } else { (STICKS_LABEL, Colour::Black) };
         Some(ShadedSpan::new(label, colour, first.0, last.1))
@@ -228,14 +227,14 @@ pub(crate) fn stick_spans(stick_s: &[(f64, f64)], (from, to): (f64, f64)) -> Vec
     groups.filter_map(band).collect()
 }
 
-// Long lines in few points.
+// Thinning of long lines.
 
-/// Parts of a span that a line is thinned to: a printed part is a third of a millimetre over a page, and no
-/// wider than the line.
+/// Number of parts of a span in a thinned line: on a page each is a third of a millimetre wide, about a line
+/// width.
 const THINNING_PARTS: usize = 400;
 
-/// Lowest and highest point of each of [`THINNING_PARTS`] parts of a span, in order; lines of no more than two points
-/// a part are left as they are. A gap narrower than a part is none, wider ones stay.
+/// The lowest and highest point of each of [`THINNING_PARTS`] parts of a span, in order. Lines with at most
+/// two points per part stay as they are. Gaps narrower than a part are closed, wider ones stay.
 pub(crate) fn thin_points(points: &[Option<(f64, f64)>], (from, to): (f64, f64)) -> Vec<Option<(f64, f64)>> {
     if points.len() <= 2 * THINNING_PARTS || from >= to {
         return points.to_vec();
@@ -261,12 +260,12 @@ pub(crate) fn thin_points(points: &[Option<(f64, f64)>], (from, to): (f64, f64))
     kept
 }
 
-/// Frames up to which a motion is light.
+/// Motions with at most this many frames are not thinned.
 const MAX_FULL_FRAMES: usize = 20_000;
 
-/// The frames of a long motion that figures of a span and of a part of it show: all of that part, and of each
-/// of [`THINNING_PARTS`] parts of the span those in which a column is lowest or highest. Three motions of a million
-/// frames would take more memory than all else that a report needs.
+/// The frames of a long motion that its figures show: all frames of the enlarged part, and of each of
+/// [`THINNING_PARTS`] parts of the span those with the extremes of each column. Three full motions of a
+/// million frames would take more memory than the rest of a report.
 pub(super) fn thin_frames(
     motion: MotionTraces,
     (from, to): (f64, f64),

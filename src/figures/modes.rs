@@ -1,4 +1,4 @@
-//! Natural modes of a blade: how its tip answers a force, and how the links swing.
+//! Natural modes of a blade: compliance of the tip over frequency, and mode shapes.
 
 use crate::chart::{
     ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series, VerticalLine,
@@ -8,11 +8,11 @@ use crate::model::Linkage;
 use crate::model::modes::{NaturalMode, TipConstraint, natural_modes, tip_compliance};
 use crate::text::{format_digits, join_with_and};
 
-/// Frequencies of the answer.
+/// Number of frequencies of the compliance.
 const POINTS: usize = 600;
-/// The axis goes this far beyond the lowest and the highest mode.
+/// Factor by which the axis extends beyond the lowest and the highest mode.
 const BEYOND: f64 = 4.0;
-/// Height of the answer, mm, and of a shape.
+/// Heights of the compliance and of a mode shape, mm.
 const ANSWER_MM: f64 = 52.0;
 const SHAPE_MM: f64 = 44.0;
 /// Largest angle of a drawn shape, rad.
@@ -20,7 +20,7 @@ const SWING: f64 = 0.35;
 /// Half the width of a shape, in lengths of the blade.
 const HALF_WIDTH: f64 = 0.5;
 
-/// What the tip answers, and the shapes of the modes.
+/// The compliance of the tip, and the mode shapes.
 pub(crate) fn draw_figures(title: &str, blade: &Linkage) -> [Figure; 2] {
     let sides: &[bool] = if blade.shoulder.is_some() { &[false, true] } else { &[false] };
     let of = |on: bool| natural_modes(blade, TipConstraint::Free, on);
@@ -51,7 +51,7 @@ pub(crate) fn draw_figures(title: &str, blade: &Linkage) -> [Figure; 2] {
     [Figure { columns: 1, ..answer }, figure(swing, "The links at both ends of a swing", shapes.collect())]
 }
 
-/// The claim with its numbers; the same of both figures where there are none.
+/// The main result with its numbers; without a stable mode the same for both figures.
 fn claim_sentence(numbers: Vec<String>, before: &str, after: &str) -> String {
     if numbers.is_empty() {
         return "The blade has no stable mode".to_owned();
@@ -63,7 +63,7 @@ fn side_name(on_shoulder: bool) -> &'static str {
     if on_shoulder { "neck on the shoulder" } else { "neck free" }
 }
 
-/// Displacement of the tip over the force on it.
+/// Tip compliance (displacement over force) over frequency.
 fn draw_receptance_panel(blade: &Linkage, sides: &[bool], (low, high): (f64, f64)) -> Panel {
     let at = |i: usize| low * math::powf(high / low, i as f64 / (POINTS - 1) as f64);
     let mm_per_n = |on: bool, hz: f64| {

@@ -1,4 +1,4 @@
-//! A run of a scene: where head and tip go, how the blade bends, and how it stands on the glass.
+//! A simulated run: motion of head and tip, deflection, and normal force.
 
 use super::history;
 use super::history::TimeHistory;
@@ -25,7 +25,7 @@ pub(crate) fn draw_figure(title: &str, motion: &RunMotion) -> Figure {
     figure.subtitle = format!("simulation; {title}");
     figure.description = format!("A simulated run: {}.", figure.title);
     figure.panels.extend(draw_force_panel(motion, &history));
-    // (thick lines are for what lies under a measurement)
+    // thick lines are only for what lies under a measurement
     figure.panels.iter_mut().flat_map(|panel| &mut panel.series).for_each(|series| series.mark = Mark::Thin);
     figure
 }
@@ -41,7 +41,7 @@ fn motion_traces(motion: &RunMotion) -> MotionTraces {
     }
 }
 
-/// Such as `218 sticks in 12.3 % of the time, least normal force 3.21 N`.
+/// Heading, such as `218 sticks in 12.3 % of the time, least normal force 3.21 N`.
 fn summarise_motion(motion: &RunMotion) -> String {
     let span_s = motion.samples.last().zip(motion.samples.first()).map_or(0.0, |(b, a)| b.time_s - a.time_s);
     let stuck_s: f64 = motion.stick_s.iter().map(|[from, to]| to - from).sum();
@@ -53,7 +53,7 @@ fn summarise_motion(motion: &RunMotion) -> String {
     format!("{sticks} in {} % of the time{force}", format_short(share))
 }
 
-/// The normal force over time, down to zero, where the tip leaves the glass.
+/// The normal force over time, with impacts as lines.
 fn draw_force_panel(motion: &RunMotion, history: &TimeHistory) -> Option<Panel> {
     let span_s = (motion.samples.first()?.time_s, motion.samples.last()?.time_s);
     let points: Vec<_> = motion.samples.iter().map(|s| Some((s.time_s, s.normal_n))).collect();

@@ -1,4 +1,4 @@
-//! Phase portraits: deflection against the velocity of the tip, measured against model.
+//! Phase portraits: tip velocity over deflection, measured and of the model.
 
 use super::{FigureBlock, Words};
 use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, value_span};
@@ -10,13 +10,13 @@ use crate::recording::quality::noise_floor;
 use crate::simulate::ModelSample;
 use crate::text::{format_digits, format_milliseconds, format_percent, format_speed, join_with_and};
 
-/// A point of the motion: deflection, m, and velocity of the tip, m/s; `None` interrupts it.
+/// Deflection, m, and tip velocity, m/s; `None` interrupts the line.
 pub(crate) type PhasePoint = Option<(f64, f64)>;
 
 /// A part of the motion.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PortraitPart {
-    /// What tells it from the others.
+    /// Title of the panel.
     pub name: String,
     /// Measured states in order of time; empty for none.
     pub measured: Vec<PhasePoint>,
@@ -24,7 +24,7 @@ pub struct PortraitPart {
     pub model: Vec<PhasePoint>,
 }
 
-/// What a portrait shows.
+/// Data of a phase portrait.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PhasePortrait {
     /// Heading.
@@ -37,7 +37,7 @@ pub struct PhasePortrait {
     pub parts: Vec<PortraitPart>,
 }
 
-/// Height of a panel, mm: as high as it is wide where two stand side by side.
+/// Height of a panel, mm: two panels side by side are square.
 const HEIGHT_MM: f64 = 62.0;
 
 /// Draws the figure.
@@ -55,11 +55,11 @@ pub fn draw_figure(shown: &PhasePortrait) -> Figure {
     }
 }
 
-/// Measured states up to which each is a circle: more are dots, which stand apart in a column of a journal.
+/// Up to this many measured states are circles; more are dots, which do not overlap in a narrow figure.
 const MOST_CIRCLES: usize = 80;
 
-/// How measured states are drawn, the same in all parts: a line from frame to frame would show the noise of
-/// the differences, and corners that no tip makes.
+/// Symbol of the measured states, the same in all parts. A line from frame to frame would show the noise of
+/// the differences.
 fn frame_mark(parts: &[PortraitPart]) -> Mark {
     let most = parts.iter().map(|part| part.measured.iter().flatten().count()).max();
     if most.is_none_or(|most| most <= MOST_CIRCLES) { Mark::Circles } else { Mark::Dots }
@@ -77,8 +77,7 @@ fn draw_panel(part: &PortraitPart, frames: Mark) -> Panel {
     Panel { title: part.name.clone(), ..Panel::new(x, y, HEIGHT_MM, drawn) }
 }
 
-/// Ends of the axis of the deflection, mm: every part has its own, also where the parts stand one below the
-/// other.
+/// Ends of the deflection axis of a part, mm. Each part has its own, so that stacked panels share no axis.
 fn deflection_limits_mm(part: &PortraitPart) -> (f64, f64) {
     const AXIS_MARGIN: f64 = 0.05;
     const LEAST_SPAN: f64 = 1e-4; // of the values: less is rounding, and labels would have no digits for it
@@ -88,15 +87,15 @@ fn deflection_limits_mm(part: &PortraitPart) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// Most noise of the velocity over its swing in a part, as standard deviation over peak to peak: cycles side
-/// by side still stand apart.
+/// Upper limit of the velocity noise (standard deviation) over the velocity range of a part: neighbouring
+/// cycles stay distinct.
 pub(crate) const MAX_VELOCITY_NOISE: f64 = 0.1;
-/// Longest difference that is chosen, periods of the fastest component. A fifth takes 6 % of its velocity, of
-/// recording and model alike, and at a component of 900 Hz and noise of 2 um it leaves 13 mm/s; a twentieth
-/// would take 0.4 % and leave 51 mm/s, a quarter of a usual swing, at any rate.
+/// Longest time between the two frames of a difference, periods of the fastest component. A fifth reduces the
+/// amplitude by 6 % in recording and model alike. At 900 Hz and 2 um of noise it leaves 13 mm/s of velocity
+/// noise; a twentieth would reduce it by 0.4 % and leave 51 mm/s, a quarter of a usual range.
 const MAX_DIFFERENCE_PERIODS: f64 = 0.2;
 
-/// How velocities are taken: as the difference of the places in two frames, as many frames before as after.
+/// Central difference: velocity from the positions in two frames at equal distance before and after.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CentralDifference {
     /// Frames to either side.
@@ -106,14 +105,14 @@ pub(crate) struct CentralDifference {
 }
 
 impl CentralDifference {
-    /// Of the neighbouring frames.
+    /// The difference of the neighbouring frames.
     pub(crate) fn of_neighbouring_frames(frame_rate_hz: f64) -> Self {
         Self { half_frames: 1, frame_rate_hz }
     }
 
-    /// The shortest in which white noise of the place of a standard deviation, m, leaves `MAX_VELOCITY_NOISE` of
-    /// the swing of the velocity, m/s; no longer than a fifth of the period of the fastest component, Hz, and
-    /// the shortest there is where none is known.
+    /// The shortest difference that keeps the velocity noise below [`MAX_VELOCITY_NOISE`] of the velocity
+    /// range, m/s, given white noise of the position, m. At most a fifth of a period of the fastest
+    /// component, Hz; the shortest of all where that is unknown.
     pub(crate) fn for_noise(rate_hz: f64, noise_m: f64, swing_m_per_s: f64, fastest_hz: Option<f64>) -> Self {
         let shortest = Self::of_neighbouring_frames(rate_hz);
         let least = (shortest.noise_m_per_s(noise_m) / (MAX_VELOCITY_NOISE * swing_m_per_s)).ceil();
@@ -127,26 +126,26 @@ impl CentralDifference {
         2.0 * self.half_frames as f64 / self.frame_rate_hz
     }
 
-    /// Standard deviation of the velocity, m/s, that white noise of the place leaves, m: `sqrt(2)` times it
-    /// over the time between the frames.
+    /// Standard deviation of the velocity, m/s, for white position noise, m: `sqrt(2)` times the noise over
+    /// the time between the frames.
     pub(crate) fn noise_m_per_s(&self, noise_m: f64) -> f64 {
         noise_m * std::f64::consts::SQRT_2 / self.frame_gap_s()
     }
 
-    /// Share that is left of a velocity that swings at a frequency, Hz: `sin(x)/x` of pi times the frequency
-    /// and the time between the frames.
+    /// Gain at a frequency, Hz: `sin(x)/x`, where `x` is pi times the frequency and the time between the
+    /// frames.
     pub(crate) fn velocity_gain(&self, frequency_hz: f64) -> f64 {
         let x = std::f64::consts::PI * frequency_hz * self.frame_gap_s();
         if x > 0.0 { math::sin(x) / x } else { 1.0 }
     }
 
-    /// Time from the frame to either of the two, s.
+    /// Time from the middle to either frame, s.
     pub(crate) fn half_width_s(&self) -> f64 {
         self.half_frames as f64 / self.frame_rate_hz
     }
 
-    /// Deflection and velocity of the tip in every frame that has one so far before and after it; `None`
-    /// where one of the three is missing.
+    /// Deflection and tip velocity of each frame with a frame at the half width before and after; `None`
+    /// where a value is missing.
     pub(crate) fn phase_points(
         &self,
         deflection_m: &[Option<f64>],
@@ -161,32 +160,30 @@ impl CentralDifference {
     }
 }
 
-/// From the least to the greatest velocity, m/s; `None` without a state.
+/// Velocity range (peak to peak), m/s; `None` without a state.
 pub(crate) fn swing_m_per_s(states: &[PhasePoint]) -> Option<f64> {
     let velocities = || states.iter().flatten().map(|(_, v)| *v).filter(|v| v.is_finite());
     velocities().reduce(f64::max).zip(velocities().reduce(f64::min)).map(|(high, low)| high - low)
 }
 
-// Phase portraits: after the release of the tip, and where the head is fastest, or the tip, if it rests
+// Parts of the portrait: after the release, and at the top speed of the head, or of the tip where it rests
 // there.
 
-/// Cycles that stay readable over each other: of the low component, which move on, and of the high one, which
-/// repeat.
+/// Number of cycles that stay readable: few of the low component, whose loops shift, more of the high one,
+/// whose loops repeat.
 const LOW_CYCLES: f64 = 3.0;
 const HIGH_CYCLES: f64 = 12.0;
-/// Longest part, s, and its length where no frequency is known: some tens of cycles of the high component at
-/// most.
+/// Longest part, and its length where no frequency is known, s: some tens of cycles of the high component.
 const LONGEST_S: f64 = 0.06;
-/// Fewest samples of the model between a place and the one that its velocity is taken from, so that a
-/// straight line from sample to sample is its path.
+/// Fewest samples of the model in half a difference, so that linear interpolation follows its path.
 const SAMPLES_APART: f64 = 2.0;
-/// Share of a part in which the tip may stick.
+/// Largest fraction of a part in which the tip may stick.
 const MOST_STUCK: f64 = 0.8;
 
-/// Less noise than this is the rounding of numbers, m: far below what any camera tells apart.
+/// Smaller noise is rounding, m: far below the resolution of a camera.
 const ROUNDING_M: f64 = 1e-12;
 
-/// A part of the shown motion: its name for the panel and for the caption, from when to when, s.
+/// A part of the motion: its name in the panel and in the caption, start and end, s.
 struct PortraitSpan {
     name: String,
     said: String,
@@ -196,7 +193,7 @@ struct PortraitSpan {
     cycles_hz: Option<f64>,
 }
 
-/// The figure; none where the motion is too short.
+/// The figure of a condition; empty where the motion is too short.
 pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     let spans = portrait_spans(case);
     let taken = estimate_velocities(case, &spans);
@@ -218,7 +215,7 @@ pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     vec![case.figure_block("phase-portrait", figure_text(case, &spans, &taken, measured), figure)]
 }
 
-/// The claim with its number: how far the velocity swings in the last part.
+/// Heading: the velocity range of the last part.
 fn figure_title(parts: &[PortraitPart]) -> String {
     let last = parts.last().and_then(|part| Some((&part.name, swing_m_per_s(&part.model)?)));
     let Some((name, swing)) = last else { return "The model shows no velocity".to_owned() };
@@ -279,7 +276,7 @@ fn portrait_spans(case: &ConditionComparison) -> Vec<PortraitSpan> {
     std::iter::once(first).chain(late).filter(|span| span.to_s > span.from_s).collect()
 }
 
-/// When a velocity of the model is greatest between two times of what is shown, s, and how great, m/s.
+/// Instant, s, and value, m/s, of the greatest velocity of the model between two instants.
 fn peak_velocity(
     case: &ConditionComparison,
     (from_s, to_s): (f64, f64),
@@ -290,19 +287,19 @@ fn peak_velocity(
     inside.max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// For how long the model's tip sticks from a time of what is shown on, s.
+/// Duration of sticking within `length_s` from an instant on, s.
 fn stick_duration_s(case: &ConditionComparison, from_s: f64, length_s: f64) -> f64 {
     let from_s = from_s - case.alignment.shift_s;
     let inside_s = |[start, end]: &[f64; 2]| (end.min(from_s + length_s) - start.max(from_s)).max(0.0);
     case.model.motion.stick_s.iter().map(inside_s).sum()
 }
 
-/// How the velocities of both sides are taken, and what that rests on.
+/// The chosen difference and the values that it follows from.
 struct VelocityEstimate {
     difference: CentralDifference,
     /// Noise of the recorded tip, m.
     noise_m: Option<f64>,
-    /// Least swing of the model's velocity in a part, m/s: that of a recording holds its noise.
+    /// Least velocity range of the model in a part, m/s; that of a recording would include noise.
     swing_m_per_s: Option<f64>,
     fastest_hz: Option<f64>,
 }
@@ -324,7 +321,7 @@ fn estimate_velocities(case: &ConditionComparison, spans: &[PortraitSpan]) -> Ve
     VelocityEstimate { difference, noise_m, swing_m_per_s, fastest_hz }
 }
 
-/// When a part is on the model's clock, s.
+/// Start and end of a part on the model's clock, s.
 fn model_clock_span(case: &ConditionComparison, span: &PortraitSpan) -> (f64, f64) {
     (span.from_s - case.alignment.shift_s, span.to_s - case.alignment.shift_s)
 }
@@ -347,8 +344,8 @@ fn build_part(
     PortraitPart { name: span.name.clone(), measured: measured.unwrap_or_default(), model }
 }
 
-/// States of the model with velocities that are the same difference of its path as those of the recording, at
-/// every sample instead of every frame; `None` where its samples are too far apart for that.
+/// States of the model at every sample, with velocities from the same difference as for the recording; `None`
+/// where the samples are too far apart.
 fn differenced_states(
     case: &ConditionComparison,
     (from_s, to_s): (f64, f64),
@@ -373,7 +370,7 @@ fn differenced_states(
     Some(case.model.motion.fine_samples_between([from_s, to_s]).iter().map(state).collect())
 }
 
-/// States as the frames of a camera give them.
+/// States from the frames of a recording.
 fn recorded_states(
     side: &TimedRecording,
     span_s: (f64, f64),
@@ -411,7 +408,7 @@ fn figure_text(
 }
 
 impl VelocityEstimate {
-    /// How the velocities were taken, and how far the noise moves them.
+    /// Sentences on the difference and on the velocity noise.
     fn describe(&self) -> String {
         let CentralDifference { half_frames, .. } = self.difference;
         let frames = if half_frames == 1 {

@@ -13,25 +13,25 @@ use crate::simulate::{ModelSample, RunMotion};
 use crate::text::{format_decimals, format_milliseconds, format_short, join_with_and};
 use crate::{math, text};
 
-/// The blade at an instant.
+/// Pose of the blade at an instant.
 #[derive(Debug, Clone, Copy)]
 pub struct ReversalPose {
     /// Name of the event, such as `upright`.
     pub name: &'static str,
-    /// Time after the head turned, s.
+    /// Time from the reversal of the head, s.
     pub after_turn_s: f64,
-    /// The state.
+    /// State of the model.
     pub sample: ModelSample,
     /// Velocity of the head, m/s.
     pub head_m_per_s: f64,
 }
 
-/// A hold begins or ends no farther than this from the turn, as a share of the run.
+/// Largest distance of a hold from the reversal, fraction of the run.
 const NEAR_TURN: f64 = 0.05;
-/// Share of the lean of a resting tip that is drawn on the way to upright.
+/// Fraction of the initial deflection at the pose between hold and upright.
 const HALF_WAY: f64 = 0.5;
 
-/// The blade before, during and after the first turn of the head; empty where the head does not turn.
+/// Poses before, during and after the first reversal; empty where the head does not turn.
 pub(crate) fn reversal_poses(motion: &RunMotion) -> Vec<ReversalPose> {
     let samples = &motion.samples;
     let Some(turn) = motion.turn() else { return Vec::new() };
@@ -68,7 +68,7 @@ fn build_pose(samples: &[ModelSample], name: &'static str, at: usize, turn_s: f6
     }
 }
 
-/// The longest stick at the turn or close to it: the tip rests while the head turns.
+/// The longest stick at or near the reversal, s.
 fn rest_span_s(motion: &RunMotion, turn_s: f64) -> Option<[f64; 2]> {
     let span = motion.samples.last()?.time_s - motion.samples.first()?.time_s;
     let near =
@@ -76,7 +76,7 @@ fn rest_span_s(motion: &RunMotion, turn_s: f64) -> Option<[f64; 2]> {
     motion.stick_s.iter().filter(near).max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0]))).copied()
 }
 
-/// Where the head has come so near to standing over the tip, as a share of its distance at `from`.
+/// Index of the first sample with a deflection of at most `share` times that at `from`.
 fn head_over_tip_index(samples: &[ModelSample], from: usize, share: f64) -> Option<usize> {
     let deflection = |s: &ModelSample| s.tip_x_m - s.head_x_m;
     let after = samples.get(from..)?;
@@ -84,7 +84,7 @@ fn head_over_tip_index(samples: &[ModelSample], from: usize, share: f64) -> Opti
     after.iter().position(|s| deflection(s) * first <= share * first * first).map(|at| from + at)
 }
 
-/// The sample in which the tip is fastest between its release and where it sticks again or leaves the glass.
+/// Index of the fastest sample between the release and the next stick or flight.
 fn first_slip(motion: &RunMotion, released: usize) -> Option<usize> {
     let samples = &motion.samples;
     let slips = |at: &usize| matches!(samples[*at].mode, TipMode::SlipForward | TipMode::SlipBackward);
@@ -94,7 +94,7 @@ fn first_slip(motion: &RunMotion, released: usize) -> Option<usize> {
     (released..again.unwrap_or(samples.len())).take_while(slips).max_by(|a, b| speed(a).total_cmp(&speed(b)))
 }
 
-/// Head, hinge and tip as places along the sweep and over the glass, m.
+/// Head, hinge and tip: position along the sweep and height above the glass, m.
 pub(crate) fn joint_positions(linkage: &Linkage, sample: &ModelSample) -> [(f64, f64); 3] {
     let head = (sample.head_x_m, linkage.l1_m + linkage.l2_m - sample.head_drop_m);
     let below = |(x, y): (f64, f64), angle: f64, length: f64| {
@@ -109,16 +109,16 @@ pub(crate) fn joint_positions(linkage: &Linkage, sample: &ModelSample) -> [(f64,
 pub struct PoseSequence {
     /// Heading.
     pub title: String,
-    /// Line under it.
+    /// Line under the heading.
     pub subtitle: String,
     /// Links of the blade.
     pub linkage: Linkage,
     /// The instants, in order of time.
     pub poses: Vec<ReversalPose>,
-    /// From when to when the tip rests while the head turns, s.
+    /// Start and end of the stick around the reversal, s.
     pub rest_s: Option<[f64; 2]>,
-    /// Time after the head turned at which the tip counts as released, s, as a fit reads it: it has left its
-    /// place by more than the noise. `None` where that is not read.
+    /// Release time after the reversal, s, as a fit reads it: the tip has left its place by more than the
+    /// noise. `None` where that is not read.
     pub released_after_s: Option<f64>,
 }
 
@@ -179,7 +179,7 @@ pub(crate) fn figure_caption(shown: &PoseSequence) -> String {
     )
 }
 
-/// For how long the tip rests, and how far the head moves meanwhile.
+/// Duration of the rest, and path of the head in it.
 fn describe_rest(shown: &PoseSequence) -> Option<(String, String)> {
     let at = |name: &str| shown.poses.iter().find(|p| p.name == name);
     let ([from, to], (stops, leaves)) = shown.rest_s.zip(at("tip stops").zip(at("stick ends")))?;
@@ -189,7 +189,7 @@ fn describe_rest(shown: &PoseSequence) -> Option<(String, String)> {
     Some((format!("{} ms", format_short(1e3 * (to - from))), way))
 }
 
-/// The rest of what is said of the figure.
+/// Details under the caption.
 pub(crate) fn figure_details(shown: &PoseSequence) -> String {
     let longest = ArrowScale::from_poses(&shown.poses);
     let mut sentences = vec![format!(
@@ -215,36 +215,35 @@ pub(crate) fn figure_details(shown: &PoseSequence) -> String {
     sentences.join(" ")
 }
 
-// One drawing a pose: head, links, glass and arrows.
+// One drawing per pose: head, links, glass and arrows.
 
 /// Height of a drawing, mm.
 const HEIGHT_MM: f64 = 40.0;
 
-// What follows is in lengths of the upright blade, so that every blade fits its drawing.
+// The next constants are in lengths of the upright blade, so that every blade fits its drawing.
 
-/// Half the width that a drawing needs, and the room next to the tip of a blade that leans farther; half the
-/// glass, as far as there is room.
+/// Half width of a drawing; margin beside the tip of a blade that leans farther; half width of the glass.
 const HALF_WIDTH: f64 = 0.5;
 const BESIDE_TIP: f64 = 0.1;
 const GLASS: f64 = 0.85;
-/// Foot below the glass and top.
+/// Lower and upper end of a drawing.
 const FOOT: f64 = -0.5;
 const TOP: f64 = 1.34;
-/// Half the width and the height of the head, which hangs in guides that are not drawn.
+/// Half width and height of the head.
 const HEAD: (f64, f64) = (0.16, 0.14);
-/// Longest arrow, its barbs, and the heights of those of velocity and friction.
+/// Length of the longest arrow, size of its barbs, and heights of the arrows of velocity and friction.
 const ARROW: f64 = 0.36;
 const BARB: f64 = 0.06;
 const VELOCITY_AT: f64 = 1.24;
 const FRICTION_AT: f64 = -0.13;
-/// Height of the time, and how far the state stands under it in a drawing of the least width.
+/// Height of the time label, and distance of the state label below it at the least width.
 const TEXT_AT: f64 = -0.28;
 const TEXT_APART: f64 = 0.13;
-/// Longest scale bar, its height, and that of its length over it.
+/// Greatest length of the scale bar, its height, and the distance of its label above it.
 const SCALE_BAR: (f64, f64, f64) = (0.4, 0.55, 0.09);
-/// Distance and depth of the hatching of the glass.
+/// Spacing and depth of the hatching of the glass.
 const HATCHING: (f64, f64) = (0.08, 0.06);
-/// Arrows shorter than this share of the longest are not drawn: only barbs would show.
+/// Arrows shorter than this fraction of the longest are not drawn: only their barbs would show.
 const LEAST_ARROW: f64 = 0.25;
 
 /// Draws the figure.
@@ -266,7 +265,7 @@ pub fn draw_figure(shown: &PoseSequence) -> Figure {
     }
 }
 
-/// What the longest arrows stand for.
+/// Values of the longest arrows.
 pub(super) struct ArrowScale {
     pub speed_m_per_s: f64,
     pub force_n: f64,
@@ -283,7 +282,7 @@ impl ArrowScale {
 fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, first: bool) -> Panel {
     let length_m = shown.linkage.l1_m + shown.linkage.l2_m;
     let unit_mm = 1e3 * length_m;
-    // the head stays in the middle; lengths of the blade upright until the axes
+    // relative to the head, in lengths of the upright blade
     let [head, hinge, tip] = joint_positions(&shown.linkage, &pose.sample)
         .map(|(x, y)| ((x - pose.sample.head_x_m) / length_m, y / length_m));
     let lean = |p: &ReversalPose| (p.sample.tip_x_m - p.sample.head_x_m).abs() / length_m;
@@ -310,7 +309,7 @@ fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, f
     let text = |text: String, (x, y): (f64, f64)| {
         TextAnnotation::new(text, Colour::Black, (x * unit_mm, y * unit_mm))
     };
-    // the wider the drawing, the smaller its scale, but letters keep their size
+    // a wider drawing has a smaller scale, but letters keep their size
     let apart = TEXT_APART * half / HALF_WIDTH;
     let state = pose.sample.mode.name().replace('-', "\u{2212}");
     // samples are about a tenth of a millisecond apart
@@ -335,13 +334,13 @@ fn draw_panel(shown: &PoseSequence, longest: &ArrowScale, pose: &ReversalPose, f
     }
 }
 
-/// The largest of 1, 2 and 5 times a power of ten that is not longer.
+/// The largest length of 1, 2 or 5 times a power of ten up to `most_mm`.
 fn scale_bar_mm(most_mm: f64) -> f64 {
     let power = math::powi(10.0, math::log10(most_mm).floor() as i32);
     [5.0, 2.0, 1.0].into_iter().map(|m| m * power).find(|bar| *bar <= most_mm).unwrap_or(power)
 }
 
-/// A level arrow of this length; none where it would be all barbs.
+/// A horizontal arrow; empty where it would be too short.
 fn arrow_points((x, y): (f64, f64), length: f64) -> Vec<Option<(f64, f64)>> {
     if length.abs() < LEAST_ARROW * ARROW {
         return Vec::new();

@@ -1,5 +1,5 @@
-//! Profile likelihoods: how far the cost rises along each parameter while the others follow, with the
-//! intervals that are read from it.
+//! Profile likelihoods: rise of the cost along each parameter with the others refitted, and the intervals
+//! that follow.
 
 use super::figure_text::parameter_symbol;
 use crate::chart::{
@@ -14,14 +14,14 @@ use crate::fit::result::{FitResult, ParameterResult};
 use crate::fit::uncertainty::ParameterVerdict;
 use crate::text::{choose_prefix, format_short, join_with_and, label_with_unit};
 
-/// What is known of one parameter, in its own SI unit.
+/// Profile and intervals of one parameter, in its SI unit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParameterProfile {
     /// Symbol in the equations, or its name where it has none.
     pub symbol: String,
     /// Unit; empty or `1` for a plain number.
     pub unit: String,
-    /// What is known.
+    /// Verdict on the parameter.
     pub verdict: ParameterVerdict,
     /// Bounds of the search.
     pub bounds: (f64, f64),
@@ -29,14 +29,13 @@ pub struct ParameterProfile {
     pub estimate: f64,
     /// True value, where the data are synthetic.
     pub truth: Option<f64>,
-    /// Values along the parameter, ascending, and the lowest cost that the others reach there, over the
-    /// least.
+    /// Values of the parameter, ascending, and the rise of the least cost there.
     pub points: Vec<(f64, f64)>,
-    /// The same by the linear model at the estimate; empty where it does not determine the parameter.
+    /// The same from the linear model at the estimate; empty where that does not determine the parameter.
     pub linear: Vec<(f64, f64)>,
     /// The 95 % interval that the page states; `None` for an open end.
     pub stated: [Option<f64>; 2],
-    /// 95 % intervals by the profile, the linear model and refitted twins; `None` for an open end.
+    /// 95 % intervals from the profile, the linear model and the bootstrap; `None` for an open end.
     pub intervals: [Option<[Option<f64>; 2]>; 3],
 }
 
@@ -51,27 +50,26 @@ pub struct ProfilePlot {
     pub least_cost: f64,
     /// Rise in cost that bounds a 95 % interval.
     pub threshold: f64,
-    /// One a parameter.
+    /// The parameters, in the order of the job.
     pub parameters: Vec<ParameterProfile>,
 }
 
 /// Height of a panel, mm.
 const HEIGHT_MM: f64 = 29.0;
-/// Thresholds over which the cost is shown: what rises higher is excluded anyway.
+/// Upper end of the cost axis in units of the threshold: higher costs are excluded anyway.
 const SHOWN: f64 = 3.0;
-/// Names and looks of the intervals, and their heights in thresholds: in the cup of the profile, where no
-/// line is.
+/// Names, looks and heights (in thresholds) of the intervals; they lie inside the cup of the profile.
 const STATED: (&str, f64) = ("95 % interval, as stated", 1.2);
 const INTERVALS: [(&str, Colour, MarkerShape, f64); 3] = [
     ("profile", Colour::Blue, MarkerShape::Disc, 1.6),
     ("linear model", Colour::Orange, MarkerShape::Square, 2.05),
     ("bootstrap", Colour::Green, MarkerShape::Diamond, 2.5),
 ];
-/// Room on either side of what is shown, as a share of its width.
+/// Margin on either side of the x axis, fraction of its width.
 const ROOM: f64 = 0.06;
 
 impl ProfilePlot {
-    /// The profiles of a fit; `lines` bring units and true values.
+    /// The profiles of a fit; `lines` hold units and true values.
     pub(crate) fn from_fit(job: &Job, result: &FitResult, lines: &[ParameterLine]) -> Self {
         let parameters = job.parameters.iter().filter_map(|free| parameter_profile(free, result, lines));
         Self {
@@ -83,7 +81,7 @@ impl ProfilePlot {
         }
     }
 
-    /// The figure with its caption; nothing where no parameter has a profile.
+    /// The figure with its caption; `None` where no parameter has a profile.
     pub(crate) fn figure_block(&self) -> Option<FigureBlock> {
         let figure = draw_figure(self);
         (!figure.panels.is_empty()).then(|| FigureBlock {
@@ -121,21 +119,21 @@ fn parameter_profile(
     })
 }
 
-/// Points of a parabola: enough for a smooth line in a panel of 70 mm.
+/// Points of a parabola: a smooth line in a panel of 70 mm.
 const PARABOLA: u32 = 60;
 
-/// Ends of the profile's interval; one at a bound is open, as what lies beyond was not tried.
+/// Ends of the profile's interval; an end at a bound counts as open, as values beyond were not tried.
 fn closed_interval(parameter: &FreeParameter, found: &ParameterResult) -> [Option<f64>; 2] {
     let inside = |end: &f64| (AT_BOUND..=1.0 - AT_BOUND).contains(&parameter.bounds.to_unit(*end));
     found.profile_95.map(|end| end.filter(inside))
 }
 
-/// Half-widths of the linear interval over which the parabola is drawn: beyond the top of the axes.
+/// Half width of the parabola in half widths of the linear interval: it leaves the axes at the top.
 const REACH: f64 = 2.0;
 
-/// The cost by the linear model: a parabola in the scale of the search, through the threshold at the ends of
-/// the linear interval. An end at a bound may have been cut there, so the longer half counts; none where both
-/// are.
+/// The cost of the linear model: a parabola in the search scale through the threshold at the ends of the
+/// linear interval. An end may have been cut at a bound, so the longer half counts; empty where both ends are
+/// at bounds.
 fn linear_model_parabola(
     parameter: &FreeParameter,
     found: &ParameterResult,
@@ -154,7 +152,7 @@ fn linear_model_parabola(
     inside.map(|offset| (bounds.from_unit(centre + offset * half), threshold * offset * offset)).collect()
 }
 
-/// The figure; one without panels where no parameter has a profile.
+/// Draws the figure; without panels where no parameter has a profile.
 #[must_use]
 pub fn draw_figure(shown: &ProfilePlot) -> Figure {
     Figure {
@@ -203,8 +201,7 @@ fn draw_panel(shown: &ProfilePlot, profile: &ParameterProfile) -> Panel {
     }
 }
 
-/// The interval that the page states as a thick line; an open end runs out of the axes. None where both are
-/// open, as nothing is stated then.
+/// The stated interval as a thick line; an open end runs out of the axes. `None` where both ends are open.
 fn stated_interval_line(
     shown: &ProfilePlot,
     profile: &ParameterProfile,
@@ -246,7 +243,7 @@ fn interval_bar(
     })
 }
 
-/// Where the search could not go, as far as that is shown.
+/// The shown ranges outside the bounds.
 fn out_of_bounds_spans(profile: &ParameterProfile, factor: f64, (low, high): (f64, f64)) -> Vec<ShadedSpan> {
     let (lower, upper) = (profile.bounds.0 * factor, profile.bounds.1 * factor);
     let band = |from, to| ShadedSpan::new("out of bounds", Colour::Grey, from, to);
@@ -254,10 +251,10 @@ fn out_of_bounds_spans(profile: &ParameterProfile, factor: f64, (low, high): (f6
     outside.map(|(from, to)| band(from, to)).collect()
 }
 
-/// Ends of the x axis: of the profile as far as it is shown, of the intervals and the truth, with some room.
+/// Ends of the x axis: they enclose the shown profile, the intervals and the true value, with a margin.
 fn x_limits(profile: &ParameterProfile, top: f64) -> (f64, f64) {
     let rises = |at: usize| profile.points.get(at).is_some_and(|(_, rise)| *rise <= top);
-    // a place beyond the top belongs to the figure where the line to it starts inside
+    // a point above the top counts where a neighbour lies inside
     let reached = |at: usize| rises(at) || at.checked_sub(1).is_some_and(rises) || rises(at + 1);
     let inside = profile.points.iter().enumerate().filter(|(at, _)| reached(*at));
     let inside =
@@ -270,7 +267,7 @@ fn x_limits(profile: &ParameterProfile, top: f64) -> (f64, f64) {
     (low - room, high + room)
 }
 
-/// Where the line from the neighbour inside to a point beyond the top leaves it.
+/// Where the line from the inner neighbour to a point above the top crosses the top.
 fn crossing_at_top(profile: &ParameterProfile, at: usize, (value, rise): (f64, f64), top: f64) -> f64 {
     let neighbours =
         [at.checked_sub(1), at.checked_add(1)].into_iter().flatten().filter_map(|i| profile.points.get(i));
@@ -345,7 +342,7 @@ fn is_closed(profile: &ParameterProfile) -> bool {
     profile.intervals[0].is_some_and(|ends| ends.iter().all(Option::is_some))
 }
 
-/// "A from 0.1 to 0.2", or which end is open.
+/// Clause such as "A from 0.1 to 0.2", or which end is open.
 fn describe_interval(profile: &ParameterProfile) -> String {
     let [lower, upper] = profile.intervals[0].unwrap_or_default();
     let (unit, factor) = choose_prefix(&profile.unit, [profile.estimate]);
@@ -376,7 +373,7 @@ fn describe_undetermined(drawn: &[&ParameterProfile]) -> Option<String> {
     })
 }
 
-/// How many truths the profile's intervals hold.
+/// Sentence on the number of true values inside their intervals.
 fn describe_truths(drawn: &[&ParameterProfile]) -> Option<String> {
     let known: Vec<(&&ParameterProfile, f64)> = drawn.iter().filter_map(|p| Some((p, p.truth?))).collect();
     let holds = |(p, truth): &&(&&ParameterProfile, f64)| {

@@ -1,18 +1,18 @@
-//! Every feature of a fit on one axis: how many deviations of its target the model is off.
+//! Pulls: deviation of the model from each feature of a fit, in standard deviations of the target.
 
 use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Series, ShadedSpan, VerticalLine};
 use crate::compare::Comparison;
 use crate::figures::{Drawing, FigureBlock, about, full_figure, subtitle};
 use crate::text::{format_digits, pluralise, truncate_text};
 
-/// A feature and how far off it is.
+/// Deviation of the model from one feature.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Pull {
-    /// Its name.
+    /// Name of the feature.
     pub name: String,
     /// Model minus target, in standard deviations of the target.
     pub deviations: f64,
-    /// Whether it was predicted and not fitted.
+    /// Whether the feature was predicted, not fitted.
     pub held_out: bool,
 }
 
@@ -25,22 +25,22 @@ pub struct PullPlot {
     pub synthetic: bool,
     /// The features in the order of the job.
     pub pulls: Vec<Pull>,
-    /// Names of those that the model does not show, or whose target has no deviation.
+    /// Names of features without a model value, or whose target has no standard deviation.
     pub without: Vec<String>,
 }
 
-/// Height of a row and least height of the axes, mm.
+/// Height of a row, and least height of the axes, mm.
 const ROW_MM: f64 = 5.0;
 const LEAST_MM: f64 = 14.0;
-/// Deviations within which a right model lies in 95 % of all cases.
+/// Standard deviations within which a correct model lies in 95 % of all cases.
 const WITHIN_95: f64 = 1.96;
-/// Letters of a name in the heading.
+/// Letters after which a name is cut in the heading.
 const LETTERS: usize = 16;
-/// Least end of the axis, deviations.
+/// Least end of the axis, standard deviations.
 const LEAST_END: f64 = 3.0;
 
 impl PullPlot {
-    /// Those of a report's rows.
+    /// The pulls of the rows of a report.
     pub(crate) fn from_comparisons(title: &str, fitted: &[&[Comparison]], held_out: &[Comparison]) -> Self {
         let deviations = |row: &Comparison| {
             let sd = row.target_sd.filter(|sd| *sd > 0.0)?;
@@ -60,7 +60,7 @@ impl PullPlot {
         }
     }
 
-    /// The figure with its caption; nothing without a feature.
+    /// The figure with its caption; `None` without a feature.
     pub(crate) fn figure_block(&self) -> Option<FigureBlock> {
         (!self.pulls.is_empty()).then(|| FigureBlock {
             condition: None,

@@ -1,4 +1,4 @@
-//! A recording as it was tracked: its motion, its gaps and its reversals.
+//! A tracked recording: its motion, gaps and reversals.
 
 use super::history::{self, TimeHistory};
 use super::subtitle;
@@ -7,14 +7,14 @@ use crate::recording::Recording;
 use crate::recording::motion_traces::MotionTraces;
 use crate::text::{format_percent, format_short, pluralise};
 
-/// Reversals that are named; a longer recording has more than a figure has room for.
+/// Most reversals that are named in a figure.
 const MOST_NAMED: usize = 6;
-/// Gaps that are marked: the longest.
+/// Most gaps that are marked, the longest first.
 const MOST_GAPS: usize = 20;
-/// A gap as short as this many frames is not seen.
+/// Shortest marked gap, frames: shorter ones would not be seen.
 const LEAST_GAP: usize = 3;
 
-/// The figure; `reversals` are instants, s, and `said` is what a reader has to know.
+/// Draws the figure; `reversals` are instants, s, and `said` ends the line under the heading.
 pub(crate) fn draw_figure(recording: &Recording, reversals: &[f64], said: &str) -> Figure {
     let name = |(number, at): (usize, &f64)| (format!("reversal {}", number + 1), *at);
     let named = reversals.iter().enumerate().take(MOST_NAMED).map(name);
@@ -56,7 +56,7 @@ fn lost_frames(recording: &Recording) -> Vec<bool> {
     traces.tip_x_m.iter().zip(&traces.head_x_m).map(|(tip, head)| tip.is_none() || head.is_none()).collect()
 }
 
-/// Runs of frames without head or without tip, s.
+/// Shaded spans of the longest gaps.
 fn gap_spans(recording: &Recording) -> Vec<ShadedSpan> {
     let (grid, lost) = (recording.grid(), lost_frames(recording));
     let mut runs: Vec<(usize, usize)> = Vec::new();

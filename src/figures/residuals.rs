@@ -1,5 +1,5 @@
-//! What a model leaves of a recording against white noise: how large, how alike from frame to frame, at which
-//! frequencies, and how it grows with the length of a run.
+//! Residual of a model against white noise: size, autocorrelation, spectrum, and growth with the length of a
+//! run.
 
 use super::{FigureBlock, Words};
 use crate::chart::{ChartAxis, Colour, Figure, Mark, MarkerShape, Panel, Ribbon, Series};
@@ -18,13 +18,13 @@ pub struct ResidualDiagnostics {
     pub note: String,
     /// Whether the recording is synthetic.
     pub synthetic: bool,
-    /// Bins of the residual in deviations of the noise, from and to, with the density of the frames in each.
+    /// Bins of residual over noise, from and to, with the density of the frames in each.
     pub histogram: Vec<(f64, f64, f64)>,
-    /// Lags, s, and the correlation of the residual with itself so much later.
+    /// Lags, s, and the autocorrelation of the residual.
     pub correlation: Vec<(f64, f64)>,
-    /// Correlation that white noise stays under in 95 % of the lags.
+    /// Bound of the autocorrelation of white noise in 95 % of the lags.
     pub white_95: f64,
-    /// Frequencies, Hz, and the power density over that of the noise.
+    /// Frequencies, Hz, and power density of the residual over that of the noise.
     pub spectrum: Vec<(f64, f64)>,
     /// Lengths of segments, s, and chi2 per degree of freedom; empty where none were fitted.
     pub growth: Vec<(f64, f64)>,
@@ -116,24 +116,24 @@ fn draw_growth(shown: &ResidualDiagnostics) -> Option<Panel> {
 
 // The residual of a condition against white noise.
 
-/// Bins of the histogram, and deviations to either side that it holds at least.
+/// Number of bins, and least end of the histogram, standard deviations.
 const HISTOGRAM_BINS: usize = 40;
 const MIN_HISTOGRAM_RANGE: f64 = 4.0;
-/// Longest lag, frames, and share of the recording that it may be.
+/// Longest lag, frames, and its largest fraction of the recording.
 const MAX_LAGS: usize = 60;
 const MAX_LAG_FRACTION: f64 = 0.25;
-/// Fewest frames of which anything is said.
+/// Fewest frames of a figure.
 const MIN_FRAMES: usize = 50;
-/// Most points of the spectrum: neighbours are one, by their mean.
+/// Most points of the spectrum; neighbours are averaged.
 const MAX_SPECTRUM_POINTS: usize = 300;
-/// Tapers of the spectrum: its values scatter by a quarter.
+/// Number of tapers: nine leave a relative scatter of about a quarter.
 const TAPERS: usize = 9;
 /// Deviations of a two-sided 95 % interval.
 const Z_95: f64 = 1.96;
-/// Correlation of neighbours and size, over those of white noise, up to which a residual looks like noise.
+/// Largest excess of size and of neighbour correlation with which a residual counts as white noise.
 const WHITE_NOISE_TOLERANCE: f64 = 0.1;
 
-/// The figure of a condition; none without a recording, or where the two cannot agree.
+/// The figure of a condition; `None` without a recording, or where the signs of the two motions differ.
 pub(crate) fn figure_block(case: &ConditionComparison) -> Option<FigureBlock> {
     let residual = case.residual.as_ref()?;
     let (channel, noise_m) = case.judged_channel()?;
@@ -188,7 +188,7 @@ fn claim_sentence(rms: f64, neighbours: f64) -> String {
     format!("The residual is {is} noise: {size} times its size, correlation {r}")
 }
 
-/// Density of the values in bins from the least to the greatest end, the same on both sides.
+/// Histogram density over a range symmetric about zero.
 fn histogram_bins(values: &[f64]) -> Vec<(f64, f64, f64)> {
     let end = values.iter().map(|x| x.abs()).filter(|x| x.is_finite()).fold(MIN_HISTOGRAM_RANGE, f64::max);
     let width = 2.0 * end / HISTOGRAM_BINS as f64;
@@ -204,7 +204,7 @@ fn histogram_bins(values: &[f64]) -> Vec<(f64, f64, f64)> {
     counts.into_iter().enumerate().map(bin).collect()
 }
 
-/// Correlation at every lag from one frame on, over the pairs of frames that were both compared.
+/// Autocorrelation at lags from one frame on, over pairs of frames that both have a value.
 fn autocorrelation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     let values = || left.iter().flatten();
     let count = values().count().max(1) as f64;
@@ -220,7 +220,7 @@ fn autocorrelation(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     (1..=longest).filter_map(at).collect()
 }
 
-/// Power density over that of white noise of unit size, in few points.
+/// Power density relative to white noise of unit variance, averaged to few points.
 fn power_density(left: &[Option<f64>], rate_hz: f64) -> Vec<(f64, f64)> {
     let Ok(found) = Multitaper::new(left, rate_hz, left.len(), TAPERS) else { return Vec::new() };
     let white = 2.0 / rate_hz;

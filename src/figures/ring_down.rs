@@ -1,4 +1,4 @@
-//! Ring-down: what was fitted over the data, the residual, and the decaying component alone.
+//! Ring-down: data with fit, residual, and the decaying component alone.
 
 use super::analysis::AnalysedWindow;
 use super::history::{length_unit, thin_points};
@@ -10,7 +10,7 @@ use crate::feature::Reading;
 use crate::spectrum::{Component, LONGEST_DECOMPOSED, SpectralAnalysis};
 use crate::text::{format_digits, format_length, format_with_sd};
 
-/// A curve over time; both columns have the same length.
+/// Displacement over time; both columns have the same length.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RingDownTrace {
     /// Instants, s, in the time of the recording.
@@ -26,26 +26,26 @@ pub struct ComponentDecay {
     pub name: String,
     /// The fitted component.
     pub fitted: RingDownTrace,
-    /// Its envelope, the upper half.
+    /// Upper envelope of the component.
     pub envelope: RingDownTrace,
     /// The data without trend and other components.
     pub data: RingDownTrace,
 }
 
-/// What a figure of a ring-down shows.
+/// Data of a ring-down figure.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct RingDown {
     /// Heading.
     pub title: String,
     /// Quantity, such as "deflection".
     pub quantity: String,
-    /// Window and what was fitted; empty for none.
+    /// Window and fitted terms; empty for none.
     pub note: String,
     /// Whether the motion is synthetic.
     pub synthetic: bool,
     /// The data.
     pub data: RingDownTrace,
-    /// Sum of trend and decaying sinusoids, as finely as the line is to be drawn.
+    /// Sum of trend and decaying sinusoids, sampled for drawing.
     pub fitted: RingDownTrace,
     /// The trend alone; empty for none.
     pub trend: RingDownTrace,
@@ -53,7 +53,7 @@ pub struct RingDown {
     pub residual: RingDownTrace,
     /// Standard deviation of the noise, m.
     pub noise_sd_m: Option<f64>,
-    /// The component of interest.
+    /// The component that is drawn alone.
     pub decay: Option<ComponentDecay>,
 }
 
@@ -81,7 +81,7 @@ pub fn draw_figure(shown: &RingDown) -> Figure {
     )
 }
 
-/// The claim with its numbers: frequency and damping of a component.
+/// Heading: frequency and damping of a component.
 pub(crate) fn figure_title(quantity: &str, component: &Component) -> String {
     let frequency = format_with_sd(component.frequency_hz, component.frequency_sd_hz);
     let damping = component.damping_ratio.zip(component.damping_ratio_sd);
@@ -119,7 +119,7 @@ fn thin_trace(trace: &RingDownTrace, factor: f64) -> Vec<Option<(f64, f64)>> {
     }
 }
 
-/// Dots, as long as they stand apart in a column of a journal; a line beyond, which also takes fewer bytes.
+/// Dots where they stay apart in a journal column, otherwise a line, which also takes fewer bytes.
 fn frame_mark(trace: &RingDownTrace) -> Mark {
     const MOST_DOTS: usize = 400;
     if trace.time_s.len() > MOST_DOTS { Mark::Thin } else { Mark::Dots }
@@ -128,14 +128,14 @@ fn frame_mark(trace: &RingDownTrace) -> Mark {
 fn draw_whole_panel(shown: &RingDown) -> Panel {
     let traces = [
         ("data", Colour::Grey, frame_mark(&shown.data), &shown.data),
-        // (not a fit: the sum is no model of the blade)
+        // not called a fit: the sum is no model of the blade
         ("trend + oscillations", Colour::Vermilion, Mark::Line, &shown.fitted),
         ("trend", Colour::Blue, Mark::ThinDashed, &shown.trend),
     ];
     draw_traces(&shown.quantity, HEIGHT_MM, &traces).0
 }
 
-/// Data minus fit over the noise that is expected there.
+/// Data minus fit, with the band of the noise.
 fn draw_residual_panel(shown: &RingDown) -> Panel {
     let trace = ("", Colour::Grey, frame_mark(&shown.residual), &shown.residual);
     let (mut panel, factor) = draw_traces("rest", RESIDUAL_HEIGHT_MM, &[trace]);
@@ -162,10 +162,10 @@ fn draw_decay_panel(shown: &ComponentDecay) -> Panel {
     draw_traces("component", DECAY_HEIGHT_MM, &traces).0
 }
 
-// The window of the low component taken apart: what is fitted to it, what is left, and the component alone.
+// Decomposition of the window with the lowest sought frequency.
 
-/// The window that is taken apart, by its place among all, and the lowest frequency in it, Hz; none where the
-/// job seeks no frequency.
+/// Index of the window with the lowest sought frequency, and that frequency, Hz; `None` where the job seeks
+/// none.
 pub(crate) fn lowest_window(case: &ConditionComparison, all: &[FitWindow]) -> Option<(usize, f64)> {
     let frequency = |l: &FitWindow| {
         let aims = l.targets.iter();
@@ -178,11 +178,11 @@ pub(crate) fn lowest_window(case: &ConditionComparison, all: &[FitWindow]) -> Op
     lowest.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Noise that the component nearest to the target exceeds where it is drawn, standard deviations.
+/// Least amplitude of the component nearest to the target, standard deviations of the noise.
 const LEAST_OVER_NOISE: f64 = 2.0;
 
-/// The figure of the window's analysis; none for a record too long to be taken apart, or where the component
-/// nearest to the target does not exceed twice the noise.
+/// The figure of the window's analysis. `None` for a record too long to be decomposed, or where the component
+/// nearest to the target is below twice the noise.
 pub(crate) fn figure_block(
     case: &ConditionComparison,
     window: &FitWindow,
@@ -207,7 +207,7 @@ pub(crate) fn figure_block(
     figure.subtitle = subtitle(figure.watermarked, &note);
     if case.recording().is_none() {
         figure.subtitle = case.heading_note(&note);
-        // what is taken apart is no recording and has no noise
+        // the model's motion has no noise
         for panel in &mut figure.panels {
             panel.ribbons.clear();
             let data = panel.series.iter_mut().filter(|s| s.label == "data");
@@ -254,7 +254,7 @@ fn nearest_component(analysis: &SpectralAnalysis, target_hz: f64) -> Option<&Com
     analysis.spectrum.components.iter().min_by(|a, b| off(a).total_cmp(&off(b)))
 }
 
-/// Frequency, damping and what is said against them.
+/// Sentence on frequency, damping and doubts.
 fn describe_component(component: &Component) -> String {
     let frequency = format_with_sd(component.frequency_hz, component.frequency_sd_hz);
     const KNOWN: f64 = 2.0;

@@ -1,4 +1,4 @@
-//! Time histories: the whole and the release of the tip, with what lies between measurement and model.
+//! Time histories of a condition, whole and at the release, with their captions.
 
 use super::{TimeHistory, draw_enlarged, draw_figure};
 use super::{sticks_on_clock, thin_frames};
@@ -18,15 +18,15 @@ use crate::text::{
     format_times, join_with_and,
 };
 
-/// How long before and after the tip's release the enlarged part lasts, s: a few cycles of the high
+/// The enlarged part starts and ends this long before and after the release, s: a few cycles of the high
 /// component.
 const ZOOM_S: (f64, f64) = (0.005, 0.03);
-/// Most turns of the head whose instants are marked: their labels stand side by side.
+/// Most reversals whose instants are marked; of more only the first, as labels need room.
 const MOST_TURNS: usize = 4;
 /// Most windows that are drawn.
 const MOST_WINDOWS: usize = 10;
 
-/// The figures of the motion over time.
+/// The figures of a condition: whole motion and, where there is one, the release.
 pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     let history = build_history(case);
     let whole = case.figure_block("history", whole_text(case, &history), draw_figure(&history));
@@ -41,7 +41,7 @@ fn build_history(case: &ConditionComparison) -> TimeHistory {
     let whole_s = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));
     let zoom_s = release_s(&shown);
     let light = |traces: MotionTraces| thin_frames(traces, whole_s, zoom_s);
-    // one after the other: each is lighter before the next is made
+    // one after the other, so that only one full motion is in memory
     let measured = case.recording().map(MotionTraces::from_recording).map(light);
     let model = light(MotionTraces::from_model(&case.model.view.recording, &case.alignment));
     let windows = fit_window_spans(case).into_iter().enumerate();
@@ -60,14 +60,14 @@ fn build_history(case: &ConditionComparison) -> TimeHistory {
     }
 }
 
-/// The release of the tip, as far as there are frames.
+/// The span around the release of the tip, limited to the recording, s.
 fn release_s(shown: &TimedRecording) -> Option<(f64, f64)> {
     let (grid, release_s) = (shown.recording.grid(), shown.instant_s(InstantKind::Release)?);
     let last_s = grid.time_s(grid.frames.saturating_sub(1));
     Some(((release_s - ZOOM_S.0).max(grid.start_s), (release_s + ZOOM_S.1).min(last_s)))
 }
 
-/// Instants of the first turns, or of the first alone where there are many.
+/// Named instants of the reversals; of the first alone where there are more than [`MOST_TURNS`].
 fn turn_instants(shown: &TimedRecording) -> Vec<(String, f64)> {
     let turns = shown.instants.reversals.len();
     let marked = if turns > MOST_TURNS { 1 } else { turns };
@@ -81,8 +81,7 @@ fn turn_instants(shown: &TimedRecording) -> Vec<(String, f64)> {
     all.filter_map(named).collect()
 }
 
-/// The windows of the fit on what is shown, in order of time, with what they serve; those that it does not
-/// show are left out.
+/// The windows of the fit that the recording contains, in order of time: features, start and end, s.
 fn fit_window_spans(case: &ConditionComparison) -> Vec<(String, f64, f64)> {
     let (shown, grid) = (case.measured_or_model(), case.measured_or_model().recording.grid());
     let place = |l: &FitWindow| {
@@ -142,7 +141,7 @@ fn enlarged_text(case: &ConditionComparison, history: &TimeHistory) -> Words {
     Words { caption, details: details.join(" ") }
 }
 
-/// Whose motion is drawn.
+/// Sources of the drawn motions.
 fn whose_motion(case: &ConditionComparison) -> String {
     match case.recording() {
         Some(_) => format!("{} over the fitted model", case.source_kind()),
@@ -150,8 +149,7 @@ fn whose_motion(case: &ConditionComparison) -> String {
     }
 }
 
-/// The channel in which model and recording are compared, how far they lie apart there (root mean square), m,
-/// and that in units of the noise.
+/// The compared channel, the root mean square of its residual, m, and the same in units of the noise.
 fn rms_difference(
     case: &ConditionComparison,
     within_s: Option<(f64, f64)>,
@@ -169,7 +167,7 @@ fn describe_miss((of, rms_m, over_noise): (Channel, f64, Option<f64>)) -> String
     format!("the model misses the {} by {}{noise}", of.label(), format_length(rms_m))
 }
 
-/// The claim of the whole motion.
+/// Heading of the whole motion.
 fn motion_title(case: &ConditionComparison) -> String {
     match rms_difference(case, None) {
         Some(found) => capitalise(&describe_miss(found)),
@@ -186,14 +184,14 @@ fn motion_title(case: &ConditionComparison) -> String {
     }
 }
 
-/// The claim of the enlarged part.
+/// Heading of the enlarged part.
 fn enlarged_title(shown: &TimedRecording) -> String {
     let after_s = shown.instant_s(InstantKind::Release).zip(shown.instant_s(InstantKind::Reversal));
     let when = after_s.map(|(release_s, turn_s)| format_turn_offset(release_s - turn_s));
     when.map_or("The tip is released".to_owned(), |when| format!("The tip is released {when} the head turns"))
 }
 
-/// How near the deflection of the model is to the measured one.
+/// Clause on the agreement of model and recording.
 fn describe_agreement(case: &ConditionComparison, within_s: Option<(f64, f64)>) -> String {
     if case.residual.is_none() {
         return format!(": its tip sticks {}", format_times(case.model.motion.stick_s.len()));
@@ -207,7 +205,7 @@ fn describe_agreement(case: &ConditionComparison, within_s: Option<(f64, f64)>) 
     format!(": they differ by {} in the {} (root mean square){noise}", format_length(rms_m), of.label())
 }
 
-/// What is drawn over what, and how it was brought there.
+/// Sentence on the drawn motions and their alignment.
 fn describe_overlay(case: &ConditionComparison) -> String {
     let (source, alignment) = (case.source_name(), case.alignment);
     let Some(recording) = case.recording() else { return format!("{source}.") };
@@ -231,7 +229,7 @@ fn describe_overlay(case: &ConditionComparison) -> String {
     )
 }
 
-/// What is said of a clock that the path does not fix to half a frame.
+/// Clause on the uncertainty of the clock; empty where it is below half a frame.
 fn describe_clock_uncertainty(case: &ConditionComparison, shift_sd_s: f64) -> String {
     let frame_s = 1.0 / case.measured_or_model().recording.grid().frame_rate_hz;
     match shift_sd_s {
@@ -244,7 +242,7 @@ fn describe_clock_uncertainty(case: &ConditionComparison, shift_sd_s: f64) -> St
     }
 }
 
-/// How often and how long the model's tip sticks in what is shown.
+/// Sentence on the number and the duration of the sticks that are shown.
 fn describe_sticks(history: &TimeHistory) -> String {
     let shown = history.measured.as_ref().or(history.model.as_ref());
     let shown = shown.and_then(|m| Some((*m.time_s.first()?, *m.time_s.last()?)));
@@ -265,14 +263,14 @@ fn describe_sticks(history: &TimeHistory) -> String {
     )
 }
 
-/// How often the model's tip leaves the glass in its run, where it does.
+/// Sentence on the number of flights; `None` without one.
 fn describe_flights(case: &ConditionComparison) -> Option<String> {
     let takes_off = |from: TipMode, to: TipMode| from != TipMode::Flight && to == TipMode::Flight;
     let count = case.model.motion.transitions.iter().filter(|t| takes_off(t.from, t.to)).count();
     (count > 0).then(|| format!("In its whole run it leaves the glass {}.", format_times(count)))
 }
 
-/// How the model's run ended, where that was before its time.
+/// Sentence on a run that ended early.
 fn describe_early_end(case: &ConditionComparison) -> Option<String> {
     let run = &case.model.motion.run;
     let at = format_decimals(run.stopped_at_s + case.alignment.shift_s, 4);
@@ -280,8 +278,8 @@ fn describe_early_end(case: &ConditionComparison) -> Option<String> {
         .then(|| format!("The model's run ended early, at {at} s: {}.", run.status.meaning()))
 }
 
-/// When the tip is released, in both as the fit reads them, so that every place says the same of it; where it
-/// does not read them, of the recording or of the model alone.
+/// Sentence on the release. It uses the values of the fit, so that all pages agree; without such a feature it
+/// reads the recording or the model.
 fn describe_release(case: &ConditionComparison) -> Option<String> {
     const RELEASE: Reading =
         Reading::Interval { interval: ReversalInterval::ReleaseAfterReversal, reversal: 1 };
@@ -309,7 +307,7 @@ fn format_turn_offset(after_s: f64) -> String {
     format!("{} {}", format_milliseconds(after_s.abs()), if after_s < 0.0 { "before" } else { "after" })
 }
 
-/// Root mean square of what is left of every channel, and the noise of the tracking.
+/// Sentence on the residual of each channel and on the tracking noise.
 fn describe_residuals(case: &ConditionComparison, within_s: Option<(f64, f64)>) -> Option<String> {
     let residual = case.residual.as_ref()?;
     let one = |channel: Channel| {
