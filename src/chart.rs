@@ -1,14 +1,13 @@
-//! Figures: stacked panels with axes, lines, symbols, shaded intervals, heat maps and marks, as SVG; no
-//! physics.
 //!
-//! Places are whole units of a canvas, about four for a pixel of 1/96 inch, and a `viewBox` scales it to
-//! millimetres. Axes, layout, gaps, clipping and thinning are made here, as plotters clamps points to its
-//! range and turns a NaN into a spike. plotters is the interface between drawing and format: a canvas draws
-//! with its shapes and letterings on one of its back ends, `compact_svg`.
+//! Charts as SVG: stacked panels with axes, lines, symbols, shaded intervals and heat maps; no physics.
 //!
-//! From the bottom up: `sizes`, `colours`, `path`, `axis`, `text`; what a figure is made of (`style`, `heat`,
-//! `elements`, `figure`); `layout`; `canvas` on `compact_svg`; the drawing of heat maps, hatches, series and
-//! panels; `svg`.
+//! Positions are whole canvas units, four per pixel of 1/96 inch; a `viewBox` scales them to millimetres.
+//! Axes, layout, gaps, clipping and thinning are made here, because plotters clamps points to its range and
+//! draws a NaN as a spike. A canvas draws with the shapes and fonts of plotters on the back end
+//! `compact_svg`.
+//!
+//! From the bottom up: `style`, `path`, `axis`, `text`; the parts of a figure (`elements`, `heat_map`,
+//! `figure`); `layout`; `canvas` on `compact_svg`; the drawing of contours, hatches, series and panels.
 
 mod axis;
 mod canvas;

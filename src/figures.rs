@@ -1,4 +1,5 @@
-//! One file a figure: its data, its drawing and its caption; named as the SVG that it makes.
+//! Figures of the reports. Each file holds the data, drawing and caption of one figure and has the name of
+//! its SVG.
 
 pub mod analysis;
 pub mod animation;
@@ -29,19 +30,19 @@ pub mod work_precision;
 use crate::chart;
 use serde::Serialize;
 
-/// A figure of the page.
+/// A figure of a page with its texts.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct FigureBlock {
-    /// Name of its file, in the folder of the page.
+    /// File name in the folder of the page.
     pub file: String,
-    /// What it shows and what follows from it: one sentence.
+    /// Caption: one sentence with the result.
     pub caption: String,
-    /// How it was made and what else it holds, sentence by sentence; empty for none.
+    /// Further sentences on method and contents; empty for none.
     pub details: String,
-    /// The condition whose clock its times are on, by its place in the job; `None` where it has none.
+    /// Index of the condition in the job; `None` for a figure of the whole job.
     #[serde(skip)]
     pub condition: Option<usize>,
-    /// The figure itself.
+    /// The drawing.
     #[serde(skip)]
     pub drawing: Drawing,
 }
@@ -49,17 +50,17 @@ pub struct FigureBlock {
 /// The text of a figure.
 #[derive(Default)]
 pub(crate) struct Words {
-    /// One sentence: what the reader sees and what follows from it.
+    /// One sentence with the result.
     pub caption: String,
     pub details: String,
 }
 
-/// What is drawn.
+/// The drawing of a figure.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Drawing {
-    /// A figure for every [`chart::Medium`].
+    /// A chart, drawn for every [`chart::Medium`].
     Chart(chart::Figure),
-    /// An SVG for the screen alone: what moves has no place in print.
+    /// An animated SVG, for screens only.
     Moving(String),
 }
 
@@ -70,7 +71,7 @@ impl Default for Drawing {
 }
 
 impl Drawing {
-    /// As SVG for a screen.
+    /// The SVG for a screen.
     #[must_use]
     pub fn on_screen(&self) -> String {
         match self {
@@ -80,19 +81,19 @@ impl Drawing {
     }
 }
 
-/// The line under a heading that says what kind of figure it is: what it is about, then what is said of it.
+/// Two parts of a line joined with a semicolon; empty parts are dropped.
 pub(crate) fn about(name: &str, said: &str) -> String {
     [name, said].into_iter().filter(|part| !part.is_empty()).collect::<Vec<_>>().join("; ")
 }
 
-/// What is said of a recording whose head turns the other way than the model's.
+/// Sentence on a recording whose head turns the other way than the model's.
 pub(crate) const OPPOSED: &str = "The recorded head turns the other way than the model's, so that nothing with a sign can \
      agree: start the scene half a period of its drive later";
 
-/// What is said of the model where only numbers are published.
+/// Clause where only numbers are published and no traces.
 pub(crate) const NO_TRACES: &str = "model alone: no traces are published";
 
-/// The line under a heading; a figure of synthetic data always says so there.
+/// The line under a heading; for synthetic data it starts with a note.
 pub(crate) fn subtitle(synthetic: bool, text: &str) -> String {
     about(if synthetic { "synthetic recording: no camera took it" } else { "" }, text)
 }

@@ -1,15 +1,15 @@
-//! Axes: ranges, the map from values to the canvas, ticks and their labels.
+//! Axes: ranges, mapping of values to the canvas, ticks and labels.
 
 use super::style::{TICK_MM, UNITS_PER_MM};
 use crate::math;
 use crate::text::{self, format_scientific, to_superscript};
 
-/// How values are spread along an axis.
+/// Scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AxisScale {
     #[default]
     Linear,
-    /// By their logarithm; values of zero or less are not drawn.
+    /// Logarithmic; values of zero or less are not drawn.
     Log,
 }
 
@@ -20,11 +20,11 @@ pub struct ChartAxis {
     pub scale: AxisScale,
     /// Ends; `None` to take them from the data.
     pub range: Option<(f64, f64)>,
-    /// Names at places of the axis, which stand there instead of numbers; empty for numbers.
+    /// Positions and names of the ticks of a categorical axis; empty for numbers.
     pub categories: Vec<(f64, String)>,
 }
 
-/// Label of the axes that share a clock.
+/// Label of every time axis; panels are recognised by it.
 const TIME_LABEL: &str = "time, s";
 
 impl ChartAxis {
@@ -33,12 +33,12 @@ impl ChartAxis {
         Self { label: label.into(), scale: AxisScale::Linear, ..Self::default() }
     }
 
-    /// A linear axis of time, s: the panels of a page that have one share a cursor.
+    /// A linear time axis, s; panels with one share a cursor on a page.
     pub(crate) fn time() -> Self {
         Self::linear(TIME_LABEL)
     }
 
-    /// Whether it is one.
+    /// Whether this is a time axis.
     pub(super) fn is_time(&self) -> bool {
         self.label == TIME_LABEL && self.scale == AxisScale::Linear
     }
@@ -48,8 +48,7 @@ impl ChartAxis {
         Self { label: label.into(), scale: AxisScale::Log, ..Self::default() }
     }
 
-    /// An axis of things, one at every whole number from 0, with half a place before the first and after the
-    /// last.
+    /// A categorical axis with one name at every whole number from 0 and a margin of half a step.
     pub(crate) fn categorical(label: impl Into<String>, names: impl IntoIterator<Item = String>) -> Self {
         let categories: Vec<(f64, String)> =
             names.into_iter().enumerate().map(|(i, name)| (i as f64, name)).collect();
@@ -68,7 +67,7 @@ impl ChartAxis {
     }
 }
 
-/// A tick: where it is and what stands there (nothing at a minor tick).
+/// A tick and its label; minor ticks have none.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Tick {
     pub value: f64,
@@ -76,7 +75,7 @@ pub(super) struct Tick {
 }
 
 impl Tick {
-    /// Length, canvas units: minor ones are half as long.
+    /// Length, canvas units; minor ticks are half as long.
     pub(crate) fn length(&self) -> f64 {
         if self.label.is_some() { TICK_MM * UNITS_PER_MM } else { TICK_MM / 2.0 * UNITS_PER_MM }
     }
@@ -93,24 +92,23 @@ pub(super) struct CanvasAxis {
     pub to: f64,
 }
 
-/// Room beyond the data on a linear axis, as a share of their range.
+/// Margin beyond the data on a linear axis, fraction of their range.
 const LINEAR_ROOM: f64 = 0.05;
-/// Least room, as a share of the values: what varies by less is rounding, and a label would have no digits
-/// for it.
+/// Least margin relative to the values: a smaller variation is rounding, and tick labels could not show it.
 const MIN_RELATIVE_SPAN: f64 = 1e-4;
-/// Room about zero alone.
+/// Margin of an axis that holds only zero.
 const SINGLE_VALUE_ROOM: f64 = 1.0;
-/// The same on a logarithmic axis, as a factor.
+/// Margin on a logarithmic axis, as a factor.
 const LOG_ROOM: f64 = 1.4;
-/// Most decades that a logarithmic axis takes from the data: more would show only rounding.
+/// Most decades of a logarithmic axis that fits the data: more would show only rounding.
 const MOST_DECADES: i32 = 6;
 
-/// Farthest place from the low end, in lengths of the axis: what lies beyond is drawn as from there, so that
-/// cutting a line at the axes cannot overflow.
+/// Largest distance from the low end, in lengths of the axis. Farther points are moved there, so that
+/// clipping a line cannot overflow.
 const FARTHEST_POSITION: f64 = 1e6;
 
-/// Ends of an axis: those given, or those of the data with some room; always finite, ordered and apart, above
-/// zero on a logarithmic axis.
+/// Ends of an axis: the given ones, or those of the data with a margin. They are finite, ordered and
+/// distinct, and above zero on a logarithmic axis.
 pub(super) fn axis_limits(axis: &ChartAxis, values: impl Iterator<Item = f64>) -> (f64, f64) {
     let log = axis.scale == AxisScale::Log;
     let usable = |x: &f64| x.is_finite() && (!log || *x > 0.0);
@@ -147,7 +145,7 @@ impl CanvasAxis {
         share.is_finite().then_some(self.from + near * (self.to - self.from))
     }
 
-    /// The same; on a logarithmic axis the low end for what has no place there.
+    /// As `canvas_position`, but values of zero or less map to the low end of a logarithmic axis.
     pub(crate) fn canvas_position_or_low(&self, value: f64) -> Option<f64> {
         let low = self.scale == AxisScale::Log && value <= 0.0;
         if low { Some(self.from) } else { self.canvas_position(value) }
@@ -162,7 +160,7 @@ impl CanvasAxis {
         }
     }
 
-    /// Ticks about `apart` canvas units from each other or more.
+    /// Ticks that are about `apart` canvas units or more from each other.
     pub(crate) fn ticks(&self, apart: f64) -> Vec<Tick> {
         let most = ((self.to - self.from).abs() / apart).clamp(2.0, 12.0) as usize;
         let length = (self.to - self.from).abs();
@@ -176,11 +174,11 @@ impl CanvasAxis {
     }
 }
 
-/// Shortest distance of ticks without a label, canvas units: they stay apart in print.
+/// Least distance of minor ticks, canvas units: they stay distinct in print.
 const MIN_MINOR_TICK_SPACING: f64 = 1.0 * UNITS_PER_MM;
 
-/// The ticks of a linear axis with four more between neighbours, three where those are 2 apart, as far as
-/// there is room; these follow the others.
+/// Appends minor ticks to those of a linear axis where there is room: four between neighbours, three where
+/// the step is 2.
 fn add_minor_ticks(mut ticks: Vec<Tick>, axis: &CanvasAxis, length: f64) -> Vec<Tick> {
     let [first, second, ..] = ticks.as_slice() else { return ticks };
     let (start, step) = (first.value, second.value - first.value);
@@ -203,7 +201,7 @@ pub(super) fn category_ticks(axis: &ChartAxis, shown: impl Fn(&str) -> String) -
     axis.categories.iter().map(|(value, name)| Tick { value: *value, label: Some(shown(name)) }).collect()
 }
 
-/// Ticks may stand this much closer than asked for, rather than at the next coarser step.
+/// Ticks may be closer than asked for by this factor before the next coarser step is taken.
 const TICK_SPACING_SLACK: f64 = 0.8;
 
 /// Multiples of 1, 2 or 5 times a power of ten.
@@ -228,7 +226,7 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     }
     let plain = (-5..6).contains(&exponent);
     let decimals = usize::try_from(-exponent).unwrap_or(0);
-    // as many digits as tell a tick from the next
+    // enough digits to distinguish neighbouring ticks
     let digits = |v: f64| {
         let decades = (math::log10(v.abs()).floor() as i32).saturating_sub(exponent);
         decades.clamp(2, 15) as usize
@@ -238,13 +236,13 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     (first as i64..=last as i64).map(|k| Tick { value: value(k), label: Some(label(value(k))) }).collect()
 }
 
-/// Multiples of a decade that are labelled, and the least distance of two of them in decades: the first for
-/// which there is room.
+/// Labelled multiples in a decade, with the least distance of two of them in decades; the first that fits is
+/// taken.
 const LOG_LABEL_MULTIPLES: [(&[i32], f64); 2] = [(&[1, 2, 3, 5, 7], 0.154), (&[1, 2, 5], 0.301)];
 
-/// Decades with their multiples as minor ticks, some of which are labelled where there is room; a decade
-/// takes `room` times the least distance of labels. Under two decades the 2 and 5 always are, and under that
-/// the ticks are those of a linear axis.
+/// Decades with their multiples as minor ticks, some of them labelled. `room` is the length of a decade over
+/// the least distance of labels. Axes under two decades always label 2 and 5; shorter ones have the ticks of
+/// a linear axis.
 fn log_ticks(low: f64, high: f64, most: usize, room: f64) -> Vec<Tick> {
     let decades = (math::log10(low).floor() as i32)..=(math::log10(high).ceil() as i32);
     let inside = |v: &f64| *v >= low * (1.0 - 1e-9) && *v <= high * (1.0 + 1e-9);
@@ -269,7 +267,7 @@ fn log_ticks(low: f64, high: f64, most: usize, room: f64) -> Vec<Tick> {
     decades.clone().flat_map(|e| (1..10).filter_map(move |m| tick(m, e))).collect()
 }
 
-/// `m 10^e` in plain digits where that is short, otherwise as a power.
+/// The label of `m 10^e`: plain digits where short, otherwise a power.
 fn log_label(m: i32, e: i32) -> String {
     match e {
         0..=4 => format!("{m}{}", "0".repeat(e as usize)),

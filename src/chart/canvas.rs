@@ -1,5 +1,4 @@
-//! Lines, rectangles, polygons, circles and text on a canvas in whole units, with the shapes and letterings
-//! of plotters.
+//! Canvas in whole units: lines, rectangles, polygons, circles and text, drawn with plotters.
 
 use super::compact_svg::CompactSvg;
 use super::path::{CanvasArea, CanvasPoint};
@@ -10,7 +9,7 @@ use plotters::prelude::{DrawingBackend, IntoFont, RGBColor};
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 use plotters::style::{Color as _, FontStyle, FontTransform, ShapeStyle, TextStyle};
 
-/// Which point of a text stands at its place.
+/// Point of a text that lies at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TextAnchor {
     /// Middle of the left edge.
@@ -39,21 +38,21 @@ impl Lettering {
     }
 }
 
-/// The canvas; places in its units, y downwards.
+/// The canvas; positions are in its units, y downwards.
 pub(super) struct Canvas {
     back: CompactSvg,
 }
 
 // Drawing into a string cannot fail, so the results of the back end are dropped below.
 impl Canvas {
-    /// The elements that `draw` leaves on a canvas of that size.
+    /// The SVG elements that `draw` makes on a canvas of this size.
     pub(crate) fn render_elements(size: (u32, u32), draw: impl FnOnce(&mut Canvas)) -> String {
         let mut canvas = Canvas { back: CompactSvg::new(size) };
         draw(&mut canvas);
         canvas.back.into_elements()
     }
 
-    /// What `draw` leaves, as a group with attributes; `None` for no group.
+    /// Draws inside a group with attributes; `None` for no group.
     pub(crate) fn draw_group(&mut self, attributes: Option<&str>, draw: impl FnOnce(&mut Canvas)) {
         match attributes {
             None => draw(self),
@@ -74,7 +73,7 @@ impl Canvas {
         let _ = self.back.draw_path(whole, &plotters_colour(colour).stroke_width(width));
     }
 
-    /// A PNG in an area, as far as it lies within another.
+    /// A PNG in an area, clipped to another.
     pub(crate) fn draw_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
         self.back.append_png(area, within, png);
     }

@@ -1,5 +1,5 @@
-//! A back end of plotters that writes SVG in few bytes: neighbouring lines, rectangles or dots of one look
-//! become one path. plotters' own writes an element for each.
+//! A plotters back end that writes compact SVG: neighbouring lines, rectangles or dots of one look become one
+//! path, where plotters' own back end writes one element each.
 
 use super::path::CanvasArea;
 use super::style::format_hex;
@@ -20,7 +20,7 @@ type DrawResult = Result<(), DrawingErrorKind<Infallible>>;
 pub(super) struct CompactSvg {
     size: (u32, u32),
     elements: String,
-    /// Look of the path that the next shape of the same look continues.
+    /// Look of the open path, which the next shape of the same look continues.
     open: Option<String>,
 }
 
@@ -29,7 +29,7 @@ impl CompactSvg {
         Self { size, elements: String::new(), open: None }
     }
 
-    /// The elements, one a line.
+    /// The elements, one per line.
     pub(crate) fn into_elements(mut self) -> String {
         self.close_path();
         self.elements
@@ -51,19 +51,19 @@ impl CompactSvg {
         Ok(())
     }
 
-    /// Begins a group with attributes; what is drawn until its end belongs to it.
+    /// Opens a group with attributes.
     pub(crate) fn open_group(&mut self, attributes: &str) {
         self.close_path();
         self.elements.push_str(&format!("<g {attributes}>\n"));
     }
 
-    /// Ends the last group that was begun.
+    /// Closes the last open group.
     pub(crate) fn close_group(&mut self) {
         self.close_path();
         self.elements.push_str("</g>\n");
     }
 
-    /// A PNG, cut at the edges of `within`, the text of the file in the element.
+    /// A PNG as base64 data in its element, clipped to `within`.
     pub(crate) fn append_png(&mut self, area: &CanvasArea, within: &CanvasArea, png: &[u8]) {
         let (x, y) = (area.left - within.left, area.top - within.top);
         let _ = self.append_element(&format!(
@@ -87,13 +87,13 @@ impl CompactSvg {
     }
 }
 
-/// Colour and, where it is not full, opacity of a surface.
+/// Fill colour and, where it is not 1, opacity.
 fn fill_attributes(colour: BackendColor) -> String {
     let opacity = if colour.alpha < 1.0 { format!("opacity=\"{}\" ", colour.alpha) } else { String::new() };
     format!("{opacity}fill=\"{}\"", format_hex(colour.rgb))
 }
 
-/// Start in the units of the canvas, then steps.
+/// Path data: the start in canvas units, then relative steps.
 fn relative_path_data(points: impl IntoIterator<Item = BackendCoord>) -> String {
     let mut points = points.into_iter();
     let Some(mut last) = points.next() else { return String::new() };
@@ -161,7 +161,7 @@ impl DrawingBackend for CompactSvg {
         self.append_element(&format!("<polygon {} points=\"{corners}\"/>\n", fill_attributes(style.color())))
     }
 
-    /// A full circle is a line without length and with round ends.
+    /// A filled circle is a line of zero length with round caps.
     fn draw_circle<S: BackendStyle>(
         &mut self,
         (x, y): BackendCoord,

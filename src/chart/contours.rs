@@ -1,4 +1,4 @@
-//! Lines of equal value over a heat map, at round values, each with its value.
+//! Labelled contour lines of a heat map at round values.
 
 use super::axis::{AxisScale, CanvasAxis, value_span};
 use super::canvas::{Canvas, Lettering, TextAnchor};
@@ -15,24 +15,24 @@ use std::collections::BTreeMap;
 const MIN_GRID_SIZE: usize = 4;
 /// Most contours of a map.
 const MOST_LEVELS: f64 = 6.0;
-/// Share of the colours over which the corners of a cell may spread; more is a jump, which no line follows. A
-/// plane over the coarsest map, four by four, has a third.
+/// Largest range of the corner values of a cell, fraction of the colour range; more is a jump, which contours
+/// do not cross. A plane over the coarsest map, four by four, has a third.
 const MAX_CELL_SPREAD: f64 = 0.35;
-/// Share of the cells that may be jumps; a map with more is not smooth.
+/// Largest ratio of jumps to other cells; a map with more is not smooth.
 const MOST_JUMPS: f64 = 0.15;
 /// Width of a line, canvas units.
 const CONTOUR_WIDTH: u32 = 3;
-/// Shortest line that is drawn, and that has a label, mm.
+/// Shortest line that is drawn, and shortest that is labelled, mm.
 const MIN_CONTOUR_MM: f64 = 2.5;
 const MIN_LABELLED_MM: f64 = 10.0;
 /// Least distance of a label from another and from a symbol, mm.
 const LABELS_APART_MM: f64 = 8.0;
 const SYMBOL_APART_MM: f64 = 4.0;
 
-/// A side of a cell: the column and row where it starts, and whether it goes upwards.
+/// A side of a cell: column and row of its start, and whether it is vertical.
 type GridEdge = (usize, usize, bool);
 
-/// The contours of a heat map that asks for them.
+/// Draws the contours of a heat map where it asks for them.
 pub(super) fn draw_contours(canvas: &mut Canvas, placed: &PanelLayout) {
     let Some(heat) = placed.panel.heat_map.as_ref().filter(|h| h.contours) else { return };
     let Some(ends) = heat.value_range() else { return };
@@ -81,7 +81,7 @@ fn find_label_position(
         of.iter().map(|q| math::hypot(p.0 - q.0, p.1 - q.1)).fold(f64::INFINITY, f64::min)
     };
     let long = lines.iter().filter(|line| polyline_length(line) >= MIN_LABELLED_MM * UNITS_PER_MM);
-    // from the middle of each line outwards, so that the first of equals is a middle
+    // from the middle of each line outwards, so that of equal points the middle comes first
     let points = long.flat_map(|line| {
         let (before, after) = line.split_at(line.len() / 2);
         after.iter().chain(before.iter().rev()).copied()
@@ -99,8 +99,7 @@ fn polyline_length(line: &[CanvasPoint]) -> f64 {
     line.windows(2).map(|pair| math::hypot(pair[1].0 - pair[0].0, pair[1].1 - pair[0].1)).sum()
 }
 
-/// The middles of the cells on the canvas with their values, and the cells between them through which lines
-/// go.
+/// Canvas positions of the cell centres, and the squares between four centres that contours may cross.
 struct ContourGrid<'a> {
     heat: &'a HeatMap,
     x: Vec<f64>,
@@ -136,13 +135,13 @@ impl<'a> ContourGrid<'a> {
         self.heat.values.get(i)?.get(j).copied().flatten().filter(|v| v.is_finite())
     }
 
-    /// Values at the corners of a cell between four middles: left and right below, left and right above.
+    /// Values at the corners of a square: lower left, lower right, upper left, upper right.
     fn corner_values(&self, i: usize, j: usize) -> Option<[f64; 4]> {
         Some([self.value(i, j)?, self.value(i + 1, j)?, self.value(i, j + 1)?, self.value(i + 1, j + 1)?])
     }
 
-    /// The lines on which the values are `level`, linear between the middles of cells (marching squares: W.
-    /// Lorensen and H. Cline, 1987, in two dimensions; a saddle is cut as the mean of its corners says).
+    /// The contour lines of a level, with linear interpolation between cell centres (marching squares, the
+    /// two-dimensional case of Lorensen and Cline, 1987). The mean of the corners decides a saddle.
     fn contour_lines(&self, level: f64) -> Vec<Vec<CanvasPoint>> {
         let mut next: BTreeMap<GridEdge, Vec<GridEdge>> = BTreeMap::new();
         for (i, j) in self.smooth.iter().copied() {
@@ -171,7 +170,7 @@ impl<'a> ContourGrid<'a> {
         join_edges(next).into_iter().map(crossings).collect()
     }
 
-    /// Where a side has the value.
+    /// The point of a side that has the level.
     fn edge_crossing(&self, (i, j, upwards): GridEdge, level: f64) -> Option<CanvasPoint> {
         let (k, l) = if upwards { (i, j + 1) } else { (i + 1, j) };
         let (from, to) = (self.value(i, j)?, self.value(k, l)?);
@@ -181,7 +180,7 @@ impl<'a> ContourGrid<'a> {
     }
 }
 
-/// Lines through sides that are next to each other: the open ones from an end, then the closed ones.
+/// Joins connected sides to lines: open lines from an end, then closed ones.
 fn join_edges(mut next: BTreeMap<GridEdge, Vec<GridEdge>>) -> Vec<Vec<GridEdge>> {
     let mut lines = Vec::new();
     let ends: Vec<GridEdge> =

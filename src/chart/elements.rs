@@ -1,4 +1,4 @@
-//! What a figure is made of: a panel with its axes, and what is drawn in it.
+//! Elements of a figure: panels, axes, series, spans and labels.
 
 use super::axis::ChartAxis;
 use super::heat_map::HeatMap;
@@ -7,7 +7,7 @@ use super::style::{Colour, Mark};
 /// Points with one style and one entry in the legend.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
-    /// Entry in the legend; equal ones of several panels share one. Empty for none.
+    /// Entry in the legend; equal entries of several panels appear once. Empty for none.
     pub label: String,
     /// Colour.
     pub colour: Colour,
@@ -32,14 +32,14 @@ impl Series {
     }
 }
 
-/// A series at equal steps of a linear axis; values in the units of the other, `None` where one is missing.
+/// Values at equal steps of a linear x axis, in the units of the y axis.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SampledSeries {
-    /// Place of the first value.
+    /// Position of the first value, in units of the x axis.
     pub start: f64,
-    /// Distance of two.
+    /// Distance of two values, in units of the x axis.
     pub step: f64,
-    /// The values.
+    /// Values in units of the y axis; `None` where one is missing.
     pub values: Vec<Option<f64>>,
 }
 
@@ -56,7 +56,7 @@ pub enum ErrorBar {
 /// A picture, to scale.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Raster {
-    /// As a PNG.
+    /// The picture as PNG bytes.
     pub png: Vec<u8>,
     /// Its left and right edge, in units of the x axis.
     pub x: [f64; 2],
@@ -71,7 +71,8 @@ pub struct Ribbon {
     pub label: String,
     /// Colour, drawn pale.
     pub colour: Colour,
-    /// Place on the x axis with lower and upper end there, in the units of the axes; `None` interrupts it.
+    /// Position on the x axis with the lower and upper end there, in axis units; `None` interrupts the
+    /// ribbon.
     pub points: Vec<Option<(f64, f64, f64)>>,
 }
 
@@ -96,7 +97,7 @@ pub struct ShadedSpan {
     pub from: f64,
     /// End, in units of the x axis.
     pub to: f64,
-    /// Framed with a line, over everything else, instead of shaded.
+    /// Whether the span is framed, on top of everything else, instead of shaded.
     pub outlined: bool,
 }
 
@@ -122,7 +123,7 @@ pub struct VerticalLine {
     pub mark: Mark,
     /// Place, in units of the x axis.
     pub at: f64,
-    /// Height from which it runs to the top, in units of the y axis; `None` from the bottom.
+    /// Lower end in units of the y axis; `None` for the bottom of the axes.
     pub above: Option<f64>,
 }
 
@@ -138,18 +139,18 @@ impl VerticalLine {
 pub struct TopLabel {
     /// Label.
     pub label: String,
-    /// Its middle, in units of the x axis.
+    /// Position of its middle, in units of the x axis.
     pub at: f64,
 }
 
 /// Text inside the axes.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TextAnnotation {
-    /// What it says.
+    /// The text.
     pub text: String,
     /// Colour.
     pub colour: Colour,
-    /// Its middle, in the units of the axes.
+    /// Position of its middle, in the units of the axes.
     pub at: (f64, f64),
 }
 
@@ -164,14 +165,14 @@ impl TextAnnotation {
 pub struct Hatch {
     /// Entry in the legend; empty for none.
     pub label: String,
-    /// How they are drawn.
+    /// Pattern of the cells.
     pub pattern: HatchPattern,
-    /// Each from and to a place on the x axis, then on the y axis, in the units of the axes; cut at the axes.
-    /// Infinite places on the y axis are its ends.
+    /// Start and end on the x axis, then on the y axis, in axis units; clipped to the axes. Infinite values
+    /// on the y axis stand for its ends.
     pub cells: Vec<[f64; 4]>,
 }
 
-/// A pattern of thin lines, over the grey of cells without a value.
+/// A pattern of thin lines over the grey of cells without a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(missing_docs)]
 pub enum HatchPattern {
@@ -188,10 +189,10 @@ pub enum HatchPattern {
     DashedUpright,
 }
 
-/// One pair of axes. Neighbours one below the other with the same x axis share it.
+/// One pair of axes. Stacked panels with equal x axes share tick labels.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Panel {
-    /// Title over its left corner, in one line or more; empty for none.
+    /// Title above the left corner, of one or more lines; empty for none.
     pub title: String,
     /// Horizontal axis.
     pub x: ChartAxis,
@@ -201,7 +202,7 @@ pub struct Panel {
     pub height_mm: f64,
     /// Lines and symbols, later ones on top.
     pub series: Vec<Series>,
-    /// All of the first series, where their points are fewer: what a reader sees who enlarges a part on a
+    /// Full data of the first series where their points are thinned; shown when a reader enlarges a part on a
     /// screen.
     pub sampled_series: Vec<Option<SampledSeries>>,
     /// Shaded intervals, under the lines.
@@ -220,15 +221,14 @@ pub struct Panel {
     pub hatches: Vec<Hatch>,
     /// Text inside, over everything else.
     pub annotations: Vec<TextAnnotation>,
-    /// One length for a unit of either axis, as a drawing to scale has; the y axis reaches as far as that
-    /// takes.
+    /// Whether both axes have one scale, as in a drawing; the shorter range is widened.
     pub equal_aspect: bool,
-    /// Neither frame nor grid nor ticks: a drawing, not a diagram.
+    /// Whether frame, grid and ticks are left out, as in a drawing.
     pub bare: bool,
 }
 
 impl Panel {
-    /// A panel with axes and series alone.
+    /// A panel that holds only series.
     pub(crate) fn new(
         x: ChartAxis,
         y: ChartAxis,

@@ -1,4 +1,4 @@
-//! A figure, and what it is drawn for.
+//! A figure, its media, and its rendering as SVG.
 
 use super::axis::CanvasAxis;
 use super::canvas::Canvas;
@@ -9,40 +9,40 @@ use super::style::{COLUMN_WIDTH_MM, FULL_WIDTH_MM, MAX_HEIGHT_MM, UNITS_PER_MM, 
 use super::{heat_map, panel, style};
 use crate::text::make_printable;
 
-/// A figure.
+/// A figure of one or more panels.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Figure {
-    /// Heading on a screen: the claim with its number. With the subtitle, the name for screen readers. In
-    /// print both belong in the caption.
+    /// Heading on a screen: the main result with its number. Title and subtitle are the name for screen
+    /// readers; in print both belong in the caption.
     pub title: String,
-    /// Line under the heading: what is drawn, and whether it is synthetic; empty for none.
+    /// Line under the heading: contents, and whether the data are synthetic; empty for none.
     pub subtitle: String,
-    /// Whether it shows data that no camera took: print says so inside the axes, a screen in the subtitle.
+    /// Whether the data are synthetic: print marks that inside the axes, screens in the subtitle.
     pub watermarked: bool,
-    /// What the figure shows, for screen readers.
+    /// Description for screen readers.
     pub description: String,
     /// Width on a screen, mm.
     pub width_mm: f64,
-    /// Panels side by side where the width allows; 0 and 1 are one below the other.
+    /// Number of panels side by side where the width allows; 0 and 1 stack them.
     pub columns: usize,
     /// Panels in the order of reading.
     pub panels: Vec<Panel>,
 }
 
-/// What a figure is drawn for.
+/// Medium of a figure.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Medium {
-    /// A screen, light or dark as its reader has it, in the figure's own width.
+    /// A screen with a light or dark theme, in the figure's own width.
     Screen,
     /// A column of a journal, `COLUMN_WIDTH_MM` wide, in fixed colours and without heading or style sheet.
     Column,
-    /// A page of a journal, `FULL_WIDTH_MM` wide, in the same way.
+    /// A page of a journal, `FULL_WIDTH_MM` wide, styled as [`Self::Column`].
     Page,
 }
 
-// What a figure cannot hold, such as something that moves, drawn over it where its panels lie.
+// Overlays, such as moving elements, at the positions of the panels.
 
-/// Where a panel lies on the canvas of its figure.
+/// Position of a panel on the canvas of its figure.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct PanelPlacement {
     x: CanvasAxis,
@@ -56,7 +56,7 @@ impl PanelPlacement {
         self.canvas_point(x, y).filter(|point| self.area.contains(*point))
     }
 
-    /// The same wherever it lies.
+    /// Canvas coordinates of a point, inside or outside the axes.
     pub(crate) fn canvas_point(&self, x: f64, y: f64) -> Option<(f64, f64)> {
         Some((self.x.canvas_position(x)?, self.y.canvas_position(y)?))
     }
@@ -68,7 +68,7 @@ impl PanelPlacement {
 }
 
 impl Figure {
-    /// The figure for a screen with the SVG elements over it that `over` makes for the places of its panels.
+    /// The figure for a screen, with the SVG elements on top that `over` makes from the panel positions.
     pub(crate) fn svg_with_overlay(&self, over: impl FnOnce(&[PanelPlacement]) -> String) -> String {
         let layout = FigureLayout::new(self);
         let place = |p: &PanelLayout| PanelPlacement { x: p.x, y: p.y, area: p.area };
@@ -79,10 +79,10 @@ impl Figure {
     }
 }
 
-// A figure as SVG.
+// Rendering as SVG.
 
 impl Figure {
-    /// The figure as SVG, vectors alone; the same figure always gives the same bytes.
+    /// The figure as SVG; the same figure always gives the same bytes.
     #[must_use]
     pub fn to_svg(&self, medium: Medium) -> String {
         match medium {
@@ -93,8 +93,8 @@ impl Figure {
         }
     }
 
-    /// Its height in a medium, mm. In print, panels are lowered as far as they stay legible until it is at
-    /// most [`MAX_HEIGHT_MM`](super::MOST_HEIGHT_MM).
+    /// Height in a medium, mm. In print, panels are lowered to at most
+    /// [`MAX_HEIGHT_MM`](super::MAX_HEIGHT_MM) as far as they stay legible.
     #[must_use]
     pub fn height_mm(&self, medium: Medium) -> f64 {
         FigureLayout::new(&self.resize_for_medium(medium)).height
@@ -110,7 +110,7 @@ impl Figure {
         limit_height(bare, MAX_HEIGHT_MM)
     }
 
-    /// The figure as it is laid out for a medium, under its own name.
+    /// Renders a figure as laid out for a medium, with the title and name of `self`.
     fn render_layout(&self, laid_out: &Self, style: &str, marked: bool) -> String {
         let parts = [self.title.as_str(), &self.subtitle].into_iter();
         let name: Vec<&str> = parts.filter(|s| !s.is_empty()).collect();
@@ -120,7 +120,7 @@ impl Figure {
 
 fn render_svg(figure: &Figure, [title, name]: [&str; 2], style: &str, marked: bool) -> String {
     let layout = FigureLayout::new(figure);
-    // (what is printed has no style and no script)
+    // print has neither style nor script
     let live = !style.is_empty();
     let size =
         ((figure.width_mm * UNITS_PER_MM).round() as u32, (layout.height * UNITS_PER_MM).round() as u32);

@@ -1,4 +1,4 @@
-//! Hatched cells: where a map has no value, with a pattern that says why, so that no colour has to.
+//! Hatched cells of a map; the pattern tells why a value is missing.
 
 use super::axis::value_span;
 use super::canvas::Canvas;
@@ -9,16 +9,16 @@ use super::style::UNITS_PER_MM;
 use super::style::{FRAME, NO_VALUE, Rgb};
 
 const HATCH_GREY: Rgb = (0x66, 0x66, 0x66);
-/// Distance of the lines, canvas units; doubled until there are no more than [`MOST_STROKES`], so that a
-/// figure stays small.
+/// Spacing of the lines, canvas units; doubled until there are at most [`MOST_STROKES`], which limits the
+/// file size.
 const HATCH_SPACING: f64 = 1.3 * UNITS_PER_MM;
 const MOST_STROKES: usize = 1200;
-/// Strokes closer than this along a line are one, canvas units: cells that touch.
+/// Strokes closer than this along a line are joined, canvas units.
 const TOUCHING_DISTANCE: f64 = 1.5;
 const STROKE_WIDTH: u32 = 3;
 
 impl HatchPattern {
-    /// Directions of its lines, canvas units (y downwards).
+    /// Directions of the lines, y downwards.
     fn directions(self) -> &'static [CanvasPoint] {
         const D: f64 = std::f64::consts::FRAC_1_SQRT_2;
         match self {
@@ -32,7 +32,7 @@ impl HatchPattern {
         }
     }
 
-    /// Lengths of its lines that are drawn and left out in turn, canvas units; none for whole lines.
+    /// Lengths of dashes and gaps in turn, canvas units; empty for full lines.
     fn dashes(self) -> &'static [f64] {
         match self {
             Self::Dotted => &[0.25 * UNITS_PER_MM, 1.55 * UNITS_PER_MM],
@@ -42,7 +42,7 @@ impl HatchPattern {
     }
 }
 
-/// The cells of a hatch on the axes.
+/// Draws the cells of a hatch.
 pub(super) fn draw_hatch(canvas: &mut Canvas, placed: &PanelLayout, hatch: &Hatch) {
     let inside = |[x_from, x_to, y_from, y_to]: &[f64; 4]| {
         let [left, right] = [x_from, x_to].map(|x| placed.x.canvas_position_or_low(*x));
@@ -61,13 +61,13 @@ pub(super) fn draw_hatch(canvas: &mut Canvas, placed: &PanelLayout, hatch: &Hatc
     };
     let areas: Vec<CanvasArea> = hatch.cells.iter().filter_map(inside).collect();
     if placed.panel.heat_map.as_ref().is_none_or(|heat| !heat.has_values()) {
-        // a heat map with values has the grey already
+        // a heat map with values already fills missing cells with grey
         merge_areas(&areas).iter().for_each(|area| canvas.fill_rectangle(area, NO_VALUE, 1.0));
     }
     draw_strokes(canvas, &areas, hatch.pattern);
 }
 
-/// Areas of one height that touch, as one.
+/// Joins touching areas of one height.
 fn merge_areas(areas: &[CanvasArea]) -> Vec<CanvasArea> {
     let mut sorted = areas.to_vec();
     sorted.sort_by(|a, b| {
@@ -78,14 +78,14 @@ fn merge_areas(areas: &[CanvasArea]) -> Vec<CanvasArea> {
     rows.filter_map(|row| Some(CanvasArea { right: row.last()?.right, ..*row.first()? })).collect()
 }
 
-/// What stands in the legend.
+/// Draws the sample of the legend.
 pub(super) fn draw_hatch_sample(canvas: &mut Canvas, area: &CanvasArea, pattern: HatchPattern) {
     canvas.fill_rectangle(area, NO_VALUE, 1.0);
     draw_strokes(canvas, &[*area], pattern);
     canvas.draw_line(&area.outline(), FRAME, 2);
 }
 
-/// The lines of a pattern where they lie in any of the areas; they continue from one area into the next.
+/// Draws the lines of a pattern inside the areas; lines continue from one area into the next.
 fn draw_strokes(canvas: &mut Canvas, areas: &[CanvasArea], pattern: HatchPattern) {
     for direction in pattern.directions() {
         let mut spacing = HATCH_SPACING;
@@ -102,7 +102,7 @@ fn draw_strokes(canvas: &mut Canvas, areas: &[CanvasArea], pattern: HatchPattern
     }
 }
 
-/// Pieces of equidistant lines of one direction inside the areas, touching ones joined.
+/// Segments of equidistant parallel lines inside the areas; touching segments are joined.
 fn hatch_lines(areas: &[CanvasArea], (dx, dy): CanvasPoint, spacing: f64) -> Vec<(CanvasPoint, CanvasPoint)> {
     let across = |(x, y): CanvasPoint| x * -dy + y * dx;
     let along = |(x, y): CanvasPoint| x * dx + y * dy;

@@ -18,20 +18,20 @@ use std::ops::Range;
 pub struct HeatMap {
     /// Quantity and unit of the values.
     pub label: String,
-    /// Middles of the columns, ascending, in units of the x axis.
+    /// Centres of the columns, ascending, in units of the x axis.
     pub x: Vec<f64>,
-    /// Middles of the rows, ascending, in units of the y axis.
+    /// Centres of the rows, ascending, in units of the y axis.
     pub y: Vec<f64>,
-    /// One list a column, one value a row; `None` where there is none.
+    /// One list per column, one value per row; `None` where missing.
     pub values: Vec<Vec<Option<f64>>>,
-    /// Values of the first and the last colour; `None` to take them from the data. Values beyond have the
-    /// colour of the nearer end.
+    /// Values of the first and the last colour; `None` takes them from the data. Values beyond have the
+    /// nearer of the two colours.
     pub range: Option<(f64, f64)>,
     /// Colours.
     pub colour_map: ColourMap,
-    /// With lines of equal value at round values, where the map is fine and smooth enough for them.
+    /// Whether contours at round values are drawn; only on fine and smooth maps.
     pub contours: bool,
-    /// Without the bar that says what the colours mean: a neighbour on the same scale has it.
+    /// Whether the colour bar is left out, as beside a map on the same scale.
     pub without_bar: bool,
 }
 
@@ -40,7 +40,7 @@ impl HeatMap {
         self.values.iter().flatten().flatten().copied().filter(|v| v.is_finite())
     }
 
-    /// Whether there is anything to colour.
+    /// Whether the map has a finite value.
     pub(super) fn has_values(&self) -> bool {
         self.value_range().is_some()
     }
@@ -64,8 +64,8 @@ impl HeatMap {
     }
 }
 
-/// Edges of cells with these middles along an axis: half way between them as the axis counts, and as far out
-/// at the ends. A single cell is everywhere; middles that do not rise have no edges.
+/// Edges of cells from their centres: halfway between neighbours on the axis scale, and equally far beyond
+/// the ends. A single cell is unbounded; centres that do not ascend have no edges.
 #[must_use]
 pub fn cell_edges(middles: &[f64], scale: AxisScale) -> Vec<f64> {
     let [first, second, ..] = middles else {
@@ -83,13 +83,12 @@ pub fn cell_edges(middles: &[f64], scale: AxisScale) -> Vec<f64> {
     std::iter::once(beyond(*first, *second)).chain(inner).chain([end]).collect()
 }
 
-/// Share of the colours between two ends at which a value lies.
+/// Position of a value between the first and the last colour, 0 to 1.
 pub(super) fn colour_fraction((low, high): (f64, f64), value: f64) -> f64 {
     ((value - low) / (high - low)).clamp(0.0, 1.0)
 }
 
-/// The colour at a place, in the units of the axes with these scales; `None` outside the map or without a
-/// value.
+/// The colour at a point in axis units; `None` outside the map or without a value.
 pub(super) fn colour_at(heat: &HeatMap, (x, y): (AxisScale, AxisScale), at: (f64, f64)) -> Option<Rgb> {
     let holder = |middles: &[f64], scale: AxisScale, at: f64| {
         cell_edges(middles, scale).partition_point(|edge| *edge <= at).checked_sub(1)
@@ -99,20 +98,18 @@ pub(super) fn colour_at(heat: &HeatMap, (x, y): (AxisScale, AxisScale), at: (f64
     Some(sample_colour_map(heat.colour_map, colour_fraction(heat.value_range()?, value)))
 }
 
-// The cells of a heat map as vectors: runs of one colour along a row, as thick lines over a ground of the
-// commonest colour.
+// Cells as vectors: runs of one colour along a row are thick lines over a background of the commonest colour.
 
-/// Most columns and rows drawn, and how many colours: finer cells are shown by the largest that a block
-/// covers, so that a thin line stays. Where a map takes more bytes than [`MAX_CELL_BYTES`], the next step is
-/// taken.
+/// Most columns, rows and colours that are drawn, in steps; the next step is taken while a map takes more
+/// bytes than [`MAX_CELL_BYTES`]. Finer cells are merged by their largest value, which keeps thin lines.
 const CELL_RESOLUTIONS: [(usize, usize, u32); 6] =
     [(480, 240, 96), (320, 180, 64), (240, 135, 48), (200, 110, 32), (160, 90, 24), (120, 68, 16)];
 const MAX_CELL_BYTES: usize = 150_000;
-/// Lines are drawn so much longer and thicker than their cells, canvas units: no seam of the ground shows
-/// between them.
+/// Lines exceed their cells by this length and thickness, canvas units, so that no background shows between
+/// them.
 const CELL_OVERLAP: i64 = 2;
 
-/// A row or column of blocks: its ends on the canvas, ascending, and the cells that it covers.
+/// A row or column of cells: its ends on the canvas, ascending, and the covered cells.
 type CellBlock = (i64, i64, Option<Range<usize>>);
 
 /// The cells of a heat map over the axes, as SVG; `None` without values.
@@ -134,12 +131,12 @@ pub(super) fn heat_cells_svg(
     svg
 }
 
-/// The cells along an axis where there are no more than `most`, otherwise `most` equal steps.
+/// The cells along an axis; `most` equal steps where there are more.
 fn cell_blocks(middles: &[f64], axis: &CanvasAxis, most: usize) -> Vec<CellBlock> {
     let edges = cell_edges(middles, axis.scale);
     let (from, to) = (axis.from.min(axis.to), axis.from.max(axis.to));
     let place = |value: f64| {
-        // a single cell reaches without end
+        // a single cell has infinite edges
         let beyond = if value > axis.low { axis.to } else { axis.from };
         axis.canvas_position(value).unwrap_or(beyond).clamp(from, to).round() as i64
     };
@@ -147,7 +144,7 @@ fn cell_blocks(middles: &[f64], axis: &CanvasAxis, most: usize) -> Vec<CellBlock
     let cells = edges.windows(2).enumerate().map(|(at, ends)| (ordered(place(ends[0]), place(ends[1])), at));
     let shown = cells.filter(|((low, high), _)| low < high);
     let shown: Vec<CellBlock> = shown.map(|((low, high), at)| (low, high, Some(at..at + 1))).collect();
-    // cells between the ends of the axis, in part or whole
+    // cells that overlap the axis
     let visible = edges.windows(2).filter(|ends| ends[1] > axis.low && ends[0] < axis.high).count();
     if (1..=most).contains(&shown.len()) && shown.len() == visible {
         return shown;
@@ -155,8 +152,8 @@ fn cell_blocks(middles: &[f64], axis: &CanvasAxis, most: usize) -> Vec<CellBlock
     resample_cells(middles, &edges, axis, most)
 }
 
-/// The cells under every one of `count` equal steps along an axis: those whose middle is in the step, else
-/// the one that holds the step's middle.
+/// The cells under each of `count` equal steps along an axis: those with centres in the step, or the cell at
+/// its middle.
 fn resample_cells(middles: &[f64], edges: &[f64], axis: &CanvasAxis, count: usize) -> Vec<CellBlock> {
     let step = (axis.to - axis.from) / count as f64;
     let place = |k: usize| axis.from + k as f64 * step;
@@ -180,7 +177,7 @@ fn resample_cells(middles: &[f64], edges: &[f64], axis: &CanvasAxis, count: usiz
     (0..count).map(|k| (ends(k).0, ends(k).1, of(k))).collect()
 }
 
-/// Every row in runs of one colour; lines of one thickness and colour are one path.
+/// The rows as runs of one colour; all lines of one colour and thickness are one path.
 fn cell_rows_svg(
     (heat, ends): (&HeatMap, (f64, f64)),
     columns: &[CellBlock],
@@ -208,7 +205,7 @@ fn cell_rows_svg(
             let end = start + run.len();
             if run[0] != ground {
                 let (from, to) = (columns[start].0, (columns[end - 1].1 + CELL_OVERLAP).min(right));
-                // twice the height of the middle is whole
+                // the middle may lie at half a unit
                 let middle = format_half(top + bottom);
                 let line = lines.entry((run[0], bottom - top)).or_default();
                 let _ = write!(line, "M{from} {middle}h{}", to - from); // (a string takes everything)
@@ -233,7 +230,7 @@ fn format_half(twice: i64) -> String {
     if twice % 2 == 0 { (twice / 2).to_string() } else { format!("{}.5", twice / 2) }
 }
 
-/// The level that most blocks have, the lowest of several.
+/// The commonest level, the lowest of equally common ones.
 fn most_common_level(levels: impl Iterator<Item = Option<u32>>) -> Option<u32> {
     let mut counts: BTreeMap<Option<u32>, usize> = BTreeMap::new();
     levels.for_each(|level| *counts.entry(level).or_default() += 1);
@@ -247,35 +244,34 @@ fn blocks_extent(columns: &[CellBlock], rows: &[CellBlock]) -> (i64, i64, i64, i
     (least(columns), least(rows), most(columns), most(rows))
 }
 
-// The bar that says what the colours of a heat map mean.
+// Colour bar.
 
-/// Distance of the bar from the axes, its width, and the height of the point at an end beyond which there are
-/// values, mm.
+/// Distance of the bar from the axes, its width, and the height of a pointed end, mm.
 const BAR_GAP_MM: f64 = 2.5;
 const BAR_MM: f64 = 3.0;
 const POINT_MM: f64 = 2.0;
 
-/// The bar's axis between two places.
+/// The axis of the bar between two positions.
 fn colour_bar_axis(ends: (f64, f64), from: f64, to: f64) -> CanvasAxis {
     CanvasAxis { scale: AxisScale::Linear, low: ends.0, high: ends.1, from, to }
 }
 
-/// Room that the bar takes next to the axes, mm.
+/// Width that the bar takes beside the axes, mm.
 pub(super) fn colour_bar_width_mm(heat: &HeatMap, height_mm: f64) -> f64 {
     let Some(ends) = heat.value_range().filter(|_| !heat.without_bar) else { return 0.0 };
     let label_mm = widest_bar_label_mm(&colour_bar_axis(ends, 0.0, height_mm), Y_TICKS_MM);
     BAR_GAP_MM + BAR_MM + TICK_MM + 0.6 + label_mm + LINE_MM
 }
 
-/// Width of the widest label of a bar whose ticks are that far apart.
+/// Width of the widest label of a bar with this tick distance, mm.
 fn widest_bar_label_mm(scale: &CanvasAxis, apart: f64) -> f64 {
-    /// Digits and signs are wider than the mean letter.
+    /// Width of digits and signs over that of the mean letter.
     const DIGITS: f64 = 1.2;
     let labels = scale.ticks(apart).into_iter().filter_map(|t| t.label);
     labels.map(|l| DIGITS * text_width(&l, TEXT_MM)).fold(0.0, f64::max)
 }
 
-/// The bar of colours next to the axes, with ticks and label; pointed where values lie beyond its end.
+/// Draws the colour bar with ticks and label; an end is pointed where values lie beyond it.
 pub(super) fn draw_colour_bar(canvas: &mut Canvas, heat: &HeatMap, axes: &CanvasArea) {
     let Some((low, high)) = heat.value_range() else { return };
     let left = axes.right + BAR_GAP_MM * UNITS_PER_MM;
@@ -311,7 +307,7 @@ pub(super) fn draw_colour_bar(canvas: &mut Canvas, heat: &HeatMap, axes: &Canvas
     canvas.draw_text(&label, (label_x, (axes.top + axes.bottom) / 2.0), upwards);
 }
 
-/// The colours from bottom to top; every stripe reaches to the top, so that no gap shows between them.
+/// Draws the colours from bottom to top; every stripe reaches to the top, so that there are no gaps.
 fn draw_gradient(canvas: &mut Canvas, area: &CanvasArea, map: ColourMap) {
     const STRIPES: u32 = 64;
     for stripe in 0..STRIPES {

@@ -1,5 +1,5 @@
-//! Where everything of a figure stands: heading, legend, panels and the labels over them. Lengths in mm until
-//! the panels.
+//! Layout of a figure: heading, legend, panels and the labels above them. Lengths in mm; panels in canvas
+//! units.
 
 mod labels;
 mod panel_layout;
@@ -18,11 +18,11 @@ pub(super) use panel_layout::{PanelLayout, SMALL_LINE_MM, widest_label_mm};
 /// Height of a row of labels over a panel, mm.
 const LABEL_ROW_MM: f64 = SMALL_MM + 0.6;
 
-/// Letters of the panels; a figure of more panels has none, as has one of a single panel.
+/// Panel letters; figures with a single panel or with more than these have none.
 const PANEL_LETTERS: &str = "abcdefghijklmnopqrstuvwxyz";
 const MAX_LETTERED_PANELS: usize = PANEL_LETTERS.len();
 
-/// Everything of a figure in its place.
+/// A figure with the positions of its parts.
 pub(super) struct FigureLayout<'a> {
     pub height: f64,
     pub legend: Vec<(LegendEntry<'a>, f64, f64)>,
@@ -44,7 +44,7 @@ impl<'a> FigureLayout<'a> {
                 .collect();
             let rows: Vec<_> =
                 row.iter().zip(&mapped).map(|(panel, x)| assign_label_rows(panel, x)).collect();
-            // (under another panel there is room for a letter next to its ticks)
+            // below another panel, a letter has room beside the ticks
             let alone = lettered && index == 0;
             let over = |(panel, rows): (&Panel, &Vec<Option<usize>>)| {
                 let title = panel.title.lines().count().max(usize::from(alone));
@@ -68,18 +68,17 @@ impl<'a> FigureLayout<'a> {
     }
 }
 
-// Panels so low that a figure fits on a page.
+// Lowering of panels so that a figure fits on a page.
 
-/// Height below which axes are not shrunk, mm: two labelled ticks, at the least distance of such ticks, with
-/// as much again beyond either.
+/// Least height of axes, mm: room for two labelled ticks with the same margin beyond each.
 const MIN_AXES_HEIGHT_MM: f64 = 16.0;
-/// The same for each of the names along a y axis, mm: a line of letters and the gap to the next.
+/// Least height per name along a y axis, mm: a line of text and a gap.
 const MIN_CATEGORY_HEIGHT_MM: f64 = 3.0;
-/// Rounds after which nothing moves any more: in lower panels labels take more lines, and those take room.
+/// Rounds until the heights settle: labels of lower panels wrap to more lines, which take height again.
 const MAX_HEIGHT_ROUNDS: usize = 4;
 
-/// The figure with its panels lowered, all by the same share of what they can spare, until it is no higher
-/// than that, mm. Letters keep their size, so that a figure of very many panels or words stays higher.
+/// Lowers all panels by the same fraction of their spare height until the figure is at most `most_mm` high.
+/// Letters keep their size, so a figure with very many panels may stay higher.
 pub(super) fn limit_height(mut figure: Figure, most_mm: f64) -> Figure {
     for _ in 0..MAX_HEIGHT_ROUNDS {
         let over_mm = FigureLayout::new(&figure).height - most_mm;
@@ -94,27 +93,27 @@ pub(super) fn limit_height(mut figure: Figure, most_mm: f64) -> Figure {
     figure
 }
 
-/// By how much a panel can be lowered, mm.
+/// Height that a panel can spare, mm.
 fn spare_height_mm(panel: &Panel) -> f64 {
     let least_mm = MIN_AXES_HEIGHT_MM.max(panel.y.categories.len() as f64 * MIN_CATEGORY_HEIGHT_MM);
     (panel.height_mm - least_mm).max(0.0)
 }
 
-// Panels side by side, and the room that each leaves next to its axes.
+// Panels side by side.
 
-/// Least width of the axes of a panel with neighbours at its side, and of one without axes, mm.
+/// Least width of axes in a row of panels, and of a panel without axes, mm.
 const MIN_PANEL_WIDTH_MM: f64 = 30.0;
 const MIN_BARE_WIDTH_MM: f64 = 18.0;
 
-/// How many panels stand side by side, and the room that each leaves next to its axes.
+/// Number of panels side by side, and their margins.
 pub(in crate::chart) struct PanelColumns {
     pub count: usize,
-    /// Room on the left and on the right of the axes of a column, mm.
+    /// Left and right margins of the axes of each column, mm.
     margins: Vec<(f64, f64)>,
 }
 
 impl PanelColumns {
-    /// As many as the figure asks for and its width has room for.
+    /// As many columns as the figure asks for and its width allows.
     pub(crate) fn new(figure: &Figure) -> Self {
         let most = figure.columns.clamp(1, figure.panels.len().max(1));
         let least =
@@ -161,7 +160,7 @@ impl PanelColumns {
     }
 }
 
-/// Room for the widest label of a y axis and its title, mm.
+/// Left margin: tick labels and title of the y axis, mm.
 fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
     if panel.bare {
         return EDGE_MM / 2.0;
@@ -175,8 +174,7 @@ fn left_margin(panel: &Panel, column_mm: f64) -> f64 {
         + 1.0
 }
 
-/// Room on the right of a panel, mm: for the half of the last label of its x axis, or for the colour bar of a
-/// heat map.
+/// Right margin, mm: half of the last x label, or the colour bar.
 fn right_margin(panel: &Panel) -> f64 {
     if panel.bare {
         return EDGE_MM / 2.0;
@@ -185,22 +183,22 @@ fn right_margin(panel: &Panel) -> f64 {
     EDGE_MM + panel.heat_map.as_ref().map_or(0.0, bar_mm).max(HALF_LABEL_MM)
 }
 
-// Headings and labels in lines that fit.
+// Wrapped headings and labels.
 
-/// Room between panels one below the other, mm.
+/// Vertical gap between panels, mm.
 pub(super) const PANEL_GAP_MM: f64 = 2.5;
 
-/// The heading in lines that fit the figure.
+/// The heading, wrapped to the width of the figure.
 pub(in crate::chart) fn title_lines(figure: &Figure) -> Vec<String> {
     lines_of_text(&figure.title, WIDE_BOLD_LETTER * TITLE_MM, figure.width_mm - 2.0 * EDGE_MM)
 }
 
-/// The subtitle in lines that fit the figure.
+/// The subtitle, wrapped to the width of the figure.
 pub(in crate::chart) fn subtitle_lines(figure: &Figure) -> Vec<String> {
     lines_of_text(&figure.subtitle, WIDE_LETTER * TEXT_MM, figure.width_mm - 2.0 * EDGE_MM)
 }
 
-/// The label of a y axis in lines that fit next to it.
+/// The label of the y axis, wrapped to the height of the panel.
 pub(in crate::chart) fn y_label_lines(panel: &Panel) -> Vec<String> {
     lines_of_text(&panel.y.label, WIDE_LETTER * TEXT_MM, panel.height_mm + PANEL_GAP_MM)
 }
@@ -210,7 +208,7 @@ fn lines_of_text(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
     if text.is_empty() { Vec::new() } else { wrap_lines(text, letter_mm, width_mm) }
 }
 
-// What of the data decides the ends of axes.
+// Data that set the ends of axes.
 
 /// Values of y within the ends of x.
 pub(super) fn visible_y_values(panel: &Panel, low: f64, high: f64) -> impl Iterator<Item = f64> {
@@ -226,7 +224,7 @@ pub(super) fn visible_y_values(panel: &Panel, low: f64, high: f64) -> impl Itera
     shown.chain(panel.heat_map.iter().flat_map(|h| h.y.iter().copied()))
 }
 
-/// Ends of the x axis of every panel, common to those one below the other that share it.
+/// Ends of the x axis of every panel; stacked panels with equal axes share them.
 pub(super) fn x_ranges(panels: &[Panel], columns: usize) -> Vec<(f64, f64)> {
     let values = |p: &'_ Panel| {
         let points = p.series.iter().flat_map(|s| s.points.iter().flatten().map(|(x, _)| *x));

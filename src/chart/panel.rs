@@ -1,4 +1,4 @@
-//! Heading, legend, and panels with their axes, on the canvas.
+//! Drawing of heading, legend, and panels with axes.
 
 use super::axis::{AxisScale, CanvasAxis, Tick};
 use super::canvas::{Canvas, Lettering, TextAnchor};
@@ -36,7 +36,7 @@ pub(super) fn draw_heading(canvas: &mut Canvas, figure: &Figure, layout: &Figure
     }
 }
 
-/// What stands before the name of an entry of the legend.
+/// Draws the sample of a legend entry.
 fn draw_legend_sample(canvas: &mut Canvas, entry: LegendEntry, x: f64, y: f64) {
     let right = x + 6.0 * UNITS_PER_MM;
     let patch = CanvasArea { left: x, right, top: y - UNITS_PER_MM, bottom: y + UNITS_PER_MM };
@@ -58,14 +58,14 @@ fn draw_legend_sample(canvas: &mut Canvas, entry: LegendEntry, x: f64, y: f64) {
     }
 }
 
-/// Width of the line round an outlined interval, canvas units.
+/// Line width of an outlined span, canvas units.
 const OUTLINE: u32 = 5;
 
 fn draw_outline(canvas: &mut Canvas, area: &CanvasArea, colour: Rgb) {
     canvas.draw_line(&area.outline(), colour, OUTLINE);
 }
 
-/// A panel; a `live` one with groups that a page's script can move.
+/// Draws a panel; a `live` one has groups that the script of a page can move.
 pub(super) fn draw_panel(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
     let plot = panel_attributes(placed).filter(|_| live);
     let is_live = plot.is_some();
@@ -82,7 +82,7 @@ pub(super) fn draw_panel(canvas: &mut Canvas, placed: &PanelLayout, live: bool) 
     });
 }
 
-/// Where an interval lies on the canvas.
+/// Canvas area of a span; `None` outside the axes.
 fn shaded_span_area(placed: &PanelLayout, band: &ShadedSpan) -> Option<CanvasArea> {
     let (area, from, to) =
         (&placed.area, placed.x.canvas_position(band.from)?, placed.x.canvas_position(band.to)?);
@@ -105,7 +105,7 @@ fn draw_under_axes(canvas: &mut Canvas, placed: &PanelLayout) {
     contours::draw_contours(canvas, placed);
 }
 
-/// A picture, as far as it lies within the axes.
+/// Draws a picture, clipped to the axes.
 fn draw_raster(canvas: &mut Canvas, placed: &PanelLayout, raster: &Raster) {
     let edges =
         |axis: &CanvasAxis, [from, to]: [f64; 2]| axis.canvas_position(from).zip(axis.canvas_position(to));
@@ -134,16 +134,16 @@ fn draw_over_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
     panel.annotations.iter().for_each(|text| draw_annotation(canvas, placed, text));
 }
 
-/// Text inside the axes; over a heat map dark or light, whichever is read better there.
+/// Draws text inside the axes; over a heat map in dark or light, whichever has more contrast.
 fn draw_annotation(canvas: &mut Canvas, placed: &PanelLayout, text: &TextAnnotation) {
     let Some(at) = placed.canvas_point(text.at).filter(|at| placed.area.contains(*at)) else { return };
     let colour = mean_heat_colour(placed, text, at.0).map_or(text.colour.rgb(), readable_on);
     canvas.draw_coloured_text(&text.text, at, Lettering::plain(SMALL_MM, TextAnchor::Centre), colour);
 }
 
-/// Mean colour of the heat map under a text whose middle lies there along the x axis; `None` without one.
+/// Mean colour of the heat map under a text with its centre at `middle`; `None` without a heat map.
 fn mean_heat_colour(placed: &PanelLayout, text: &TextAnnotation, middle: f64) -> Option<Rgb> {
-    /// Places to either side of the middle, and how much of the half width they cover.
+    /// Sampled points to either side of the centre, and the fraction of the half width that they cover.
     const PLACES: i32 = 3;
     const COVERED: f64 = 0.8;
     let heat = placed.panel.heat_map.as_ref()?;
@@ -168,12 +168,12 @@ fn draw_vertical_lines(canvas: &mut Canvas, placed: &PanelLayout) {
     }
 }
 
-/// Where a rule stands, if within the axes.
+/// Canvas position of a vertical line; `None` outside the axes.
 fn visible_position(placed: &PanelLayout, rule: &VerticalLine) -> Option<f64> {
     placed.x.canvas_position(rule.at).filter(|x| *x >= placed.area.left && *x <= placed.area.right)
 }
 
-/// Every label that stands over the panel.
+/// Draws all labels above the panel.
 fn draw_top_labels(canvas: &mut Canvas, placed: &PanelLayout) {
     let (of_rules, of_captions) =
         placed.label_rows.split_at(placed.panel.vertical_lines.len().min(placed.label_rows.len()));
@@ -186,7 +186,7 @@ fn draw_top_labels(canvas: &mut Canvas, placed: &PanelLayout) {
     }
 }
 
-/// A label over the panel, where it has a row.
+/// Draws a label above the panel where it has a row.
 fn draw_top_label(
     canvas: &mut Canvas,
     placed: &PanelLayout,
@@ -201,12 +201,12 @@ fn draw_top_label(
     canvas.draw_text(&shorten_to_panel(text, &placed.x), at, look);
 }
 
-/// Height of a row over the panel.
+/// Canvas height of a row of labels above the panel.
 fn label_row_y(placed: &PanelLayout, row: usize) -> f64 {
     placed.area.top - (0.6 + row as f64 * (SMALL_MM + 0.6)) * UNITS_PER_MM
 }
 
-/// The lines of the panel's title, the last one lowest.
+/// Draws the lines of the panel's title, the last one lowest.
 fn draw_title(canvas: &mut Canvas, placed: &PanelLayout) {
     let look = Lettering { bold: true, ..Lettering::plain(SMALL_MM, TextAnchor::Left) };
     let beside = if placed.panel.bare && placed.letter.is_some() { LETTER_WIDTH } else { 0.0 };
@@ -217,7 +217,7 @@ fn draw_title(canvas: &mut Canvas, placed: &PanelLayout) {
     }
 }
 
-/// Grid, frame, ticks, labels; no grid over a heat map, which has its colour bar instead.
+/// Draws grid, frame, ticks and labels; a heat map has a colour bar instead of the grid.
 fn draw_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
     let (area, panel) = (&placed.area, placed.panel);
     let grid = panel.heat_map.is_none();
@@ -242,7 +242,7 @@ fn draw_axes(canvas: &mut Canvas, placed: &PanelLayout, live: bool) {
     }
 }
 
-/// The label of a y axis, the first line outermost.
+/// Draws the label of a y axis, the first line outermost.
 fn draw_y_label(canvas: &mut Canvas, placed: &PanelLayout) {
     let (area, lines) = (&placed.area, y_label_lines(placed.panel));
     let widest = widest_label_mm(&placed.y_ticks());
@@ -292,20 +292,20 @@ fn draw_y_tick(canvas: &mut Canvas, placed: &PanelLayout, tick: &Tick, grid: boo
     }
 }
 
-// Letters of panels, and what print says inside the axes.
+// Panel letters and watermark.
 
-/// What print says of data that no camera took; the rest belongs in the caption.
+/// Watermark of synthetic data in print.
 const WATERMARK: &str = "synthetic";
-/// Its grey, with a contrast of 5.7 to 1 on white.
+/// Grey of the watermark, with a contrast of 5.7 to 1 on white.
 const WATERMARK_GREY: Rgb = (0x66, 0x66, 0x66);
-/// Distance of a letter from the axes under it, and of the word from the frame, mm.
+/// Distance of a letter from the axes below it, and of the watermark from the frame, mm.
 const LETTER_GAP_MM: f64 = 0.6;
 const WATERMARK_INSET_MM: f64 = 0.8;
 
-/// Width that the letter of a drawing without axes takes before its title, canvas units.
+/// Width of the letter before the title of a panel without axes, canvas units.
 pub(super) const LETTER_WIDTH: f64 = 4.4 * UNITS_PER_MM;
 
-/// The letters of all panels, each over the upper left corner of its panel with its labels.
+/// Draws the letter of each panel above its upper left corner.
 pub(super) fn draw_panel_letters(canvas: &mut Canvas, panels: &[PanelLayout]) {
     let look = Lettering { bold: true, ..Lettering::plain(SMALL_MM, TextAnchor::Left) };
     for placed in panels {
@@ -319,7 +319,7 @@ pub(super) fn draw_panel_letters(canvas: &mut Canvas, panels: &[PanelLayout]) {
     }
 }
 
-/// The word in the corner of a panel over which the fewest lines run.
+/// Draws the watermark in the corner of a panel with the fewest lines.
 pub(super) fn draw_watermark(canvas: &mut Canvas, placed: &PanelLayout) {
     let width = text_width(WATERMARK, SMALL_MM) * WIDE_LETTER / super::text::LETTER * UNITS_PER_MM;
     let (height, inside) = (SMALL_MM * 1.2 * UNITS_PER_MM, WATERMARK_INSET_MM * UNITS_PER_MM);
@@ -330,7 +330,7 @@ pub(super) fn draw_watermark(canvas: &mut Canvas, placed: &PanelLayout) {
         CanvasArea { left, top, right: left + width, bottom: top + height }
     };
     let corners = [(true, false), (false, false), (true, true), (false, true)].map(|(r, b)| corner(r, b));
-    // over the axes where every corner is a cell with its number
+    // above the axes where every corner holds a number
     let over = CanvasArea { top: area.top - inside - height, bottom: area.top - inside, ..corners[0] };
     let full = |corner: &CanvasArea| count_texts_in(placed, corner) > 0;
     let free =
@@ -348,7 +348,7 @@ pub(super) fn draw_watermark(canvas: &mut Canvas, placed: &PanelLayout) {
     canvas.draw_coloured_text(WATERMARK, at, Lettering::plain(SMALL_MM, TextAnchor::Centre), ink);
 }
 
-/// How many texts of a panel reach into an area.
+/// Number of texts of a panel that overlap an area.
 fn count_texts_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
     let reaches = |text: &TextAnnotation| {
         let Some((x, y)) = placed.canvas_point(text.at) else { return false };
@@ -359,7 +359,7 @@ fn count_texts_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
     placed.panel.annotations.iter().filter(|text| reaches(text)).count()
 }
 
-/// How many pieces of lines and symbols of a panel lie in an area.
+/// Number of line segments and symbols of a panel in an area.
 fn count_lines_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
     let of_series = placed.panel.series.iter().map(|series| {
         let points: Vec<Option<CanvasPoint>> =
@@ -374,17 +374,17 @@ fn count_lines_in(placed: &PanelLayout, area: &CanvasArea) -> usize {
     of_series.sum()
 }
 
-// What the script of a page has to know of a panel over time: where its axes are, and what belongs to what.
+// Attributes for the script of a page: axes and series of time panels.
 
-/// What lies inside the axes and moves with their ends.
+/// Group of everything inside the axes, which moves with their ends.
 pub(super) const WITHIN_AXES_CLASS: &str = "class=\"within\"";
-/// The ticks of the axis of time.
+/// Group of the ticks of the time axis.
 pub(super) const TICKS_CLASS: &str = "class=\"ticks\"";
-/// What stands over the axes at an instant, and does not move.
+/// Group of the labels above the axes, which belong to instants.
 pub(super) const OVER_AXES_CLASS: &str = "class=\"over\"";
 
-/// Attributes of the group of a panel over time: the edges of its axes on the canvas, their ends, and the
-/// name of the other quantity; `None` for any other panel.
+/// Attributes of the group of a time panel: edges and ends of its axes, and the label of the y axis; `None`
+/// for other panels.
 pub(super) fn panel_attributes(placed: &PanelLayout) -> Option<String> {
     let (panel, area, x, y) = (placed.panel, &placed.area, &placed.x, &placed.y);
     let timed =
@@ -408,7 +408,7 @@ pub(super) fn panel_attributes(placed: &PanelLayout) -> Option<String> {
     })
 }
 
-/// Attributes of the group of a series, with all of its values where it has more than are drawn.
+/// Attributes of the group of a series, with its full data where the drawn points are thinned.
 pub(super) fn series_attributes(index: usize, series: &Series, placed: &PanelLayout) -> String {
     let label = encode_safe(&make_printable(&series.label)).into_owned();
     let detail = placed.panel.sampled_series.get(index).and_then(Option::as_ref);
@@ -416,11 +416,11 @@ pub(super) fn series_attributes(index: usize, series: &Series, placed: &PanelLay
     format!("class=\"series\" data-label=\"{label}\"{detail}")
 }
 
-/// Steps of a value between the ends of an axis: an enlarged curve is as fine as a screen.
+/// Resolution of values over the y axis: an enlarged curve is as fine as a screen.
 const VALUE_STEPS: f64 = 1e4;
 
-/// Start, step, the value of zero and of one; then every value as a difference to the one before, a dash for
-/// a missing one.
+/// Start and step of the grid, offset and unit of the values, then each value as the difference to the one
+/// before; a dash where missing.
 fn sample_attributes(detail: &SampledSeries, placed: &PanelLayout) -> String {
     let (low, one) = (placed.y.low, (placed.y.high - placed.y.low) / VALUE_STEPS);
     let mut before = 0_i64;

@@ -1,4 +1,4 @@
-//! Lines on the canvas: split at gaps, thinned to what a pixel shows, clipped to the axes, cut into dashes.
+//! Lines on the canvas: splitting at gaps, thinning to pixels, clipping and dashes.
 
 use crate::math;
 
@@ -20,7 +20,7 @@ impl CanvasArea {
         x >= self.left && x <= self.right && y >= self.top && y <= self.bottom
     }
 
-    /// Its corners, the first one again at the end.
+    /// The corners, with the first repeated at the end.
     pub(crate) fn outline(&self) -> [CanvasPoint; 5] {
         [
             (self.left, self.top),
@@ -31,7 +31,7 @@ impl CanvasArea {
         ]
     }
 
-    /// The part of a segment inside (Liang and Barsky); slopes are kept.
+    /// The part of a segment inside (Liang and Barsky).
     pub(crate) fn clip(&self, a: CanvasPoint, b: CanvasPoint) -> Option<(CanvasPoint, CanvasPoint)> {
         let (dx, dy) = (b.0 - a.0, b.1 - a.1);
         let (mut enter, mut leave) = (0.0_f64, 1.0_f64);
@@ -67,8 +67,8 @@ pub(super) fn split_at_gaps(points: impl Iterator<Item = Option<CanvasPoint>>) -
     runs
 }
 
-/// First, lowest, highest and last point of every column of `width` that holds more than four: looks the same
-/// and is no longer than the canvas is wide.
+/// Thins every column of `width` with more than four points to the first, lowest, highest and last. The line
+/// looks the same, and its length is bounded by the width of the canvas.
 pub(super) fn thin_points(run: &[CanvasPoint], width: f64) -> Vec<CanvasPoint> {
     let column = |p: &CanvasPoint| (p.0 / width).floor();
     let mut kept = Vec::new();
@@ -113,8 +113,8 @@ pub(super) fn clip_polygon(corners: &[CanvasPoint], area: &CanvasArea) -> Vec<Ca
     })
 }
 
-/// What the side from `a` to `b` leaves of a polygon where depths of zero or more are kept: its start, and
-/// the point where it crosses.
+/// The corners that the side from `a` to `b` adds to the clipped polygon: its start where inside (depth of
+/// zero or more), and its crossing.
 fn clip_polygon_side(a: CanvasPoint, b: CanvasPoint, depth_a: f64, depth_b: f64) -> [Option<CanvasPoint>; 2] {
     let crosses = (depth_a < 0.0) != (depth_b < 0.0);
     let share = depth_a / (depth_a - depth_b);
@@ -122,7 +122,8 @@ fn clip_polygon_side(a: CanvasPoint, b: CanvasPoint, depth_a: f64, depth_b: f64)
     [(depth_a >= 0.0).then_some(a), crossing]
 }
 
-/// Dashes of a line: lengths drawn and left out in turn; an empty pattern is a full line.
+/// Cuts a line into dashes; the pattern holds lengths of dashes and gaps in turn, and is empty for a full
+/// line.
 pub(super) fn split_into_dashes(line: &[CanvasPoint], pattern: &[f64]) -> Vec<Vec<CanvasPoint>> {
     let Some(first) = line.first().filter(|_| pattern.iter().sum::<f64>() > 0.0) else {
         return vec![line.to_vec()];

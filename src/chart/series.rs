@@ -1,4 +1,4 @@
-//! Lines, symbols, error bars and ribbons of a panel, on the canvas.
+//! Drawing of lines, symbols, error bars and ribbons.
 
 use super::canvas::Canvas;
 use super::elements::{ErrorBar, Ribbon, Series};
@@ -9,18 +9,18 @@ use super::style::{Rgb, WHITE};
 use super::style::{SHADING_OPACITY, UNITS_PER_MM};
 use crate::math;
 
-/// Width of a column in which a line keeps four points, canvas units: one pixel.
+/// Width of a column for thinning, canvas units: one pixel.
 const THINNING_COLUMN: f64 = 4.0;
 /// Half width of a symbol, canvas units.
 const SYMBOL_HALF_WIDTH: f64 = 0.8 * UNITS_PER_MM;
-/// Least half width of a point that stands alone in a line, canvas units.
+/// Least radius of a single point of a line, canvas units.
 const MIN_DOT_HALF_WIDTH: u32 = 4;
 /// Half width of the cap at the end of an error bar, canvas units.
 const CAP_HALF_WIDTH: f64 = 0.7 * UNITS_PER_MM;
 /// Width of the line of an error bar, canvas units.
 const ERROR_BAR_WIDTH: u32 = 3;
 
-/// A series with its error bars, which lie under its symbols.
+/// Draws a series over its error bars.
 pub(super) fn draw_series(canvas: &mut Canvas, placed: &PanelLayout, series: &Series) {
     for bar in &series.error_bars {
         draw_error_bar(canvas, placed, *bar, series.colour.rgb());
@@ -30,7 +30,7 @@ pub(super) fn draw_series(canvas: &mut Canvas, placed: &PanelLayout, series: &Se
     draw_marks(canvas, &points, series.colour, series.mark, &placed.area);
 }
 
-/// Points of the canvas as line or symbols, inside an area.
+/// Draws canvas points as line or symbols, clipped to an area.
 pub(super) fn draw_marks(
     canvas: &mut Canvas,
     points: &[Option<CanvasPoint>],
@@ -49,7 +49,7 @@ pub(super) fn draw_marks(
             }
             Mark::Edged => draw_edged_line(canvas, &run, rgb, area),
             _ => {
-                // (a point between two gaps is no line, and must be seen)
+                // a single point between two gaps is drawn as a dot
                 if let [alone] = run.as_slice()
                     && area.contains(*alone)
                 {
@@ -70,7 +70,7 @@ pub(super) fn draw_marks(
     }
 }
 
-/// A line over a wider white one, with its points where they stand apart or alone.
+/// Draws a line over a wider white one, with dots where the points are far apart or single.
 fn draw_edged_line(canvas: &mut Canvas, run: &[CanvasPoint], colour: Rgb, area: &CanvasArea) {
     const DOT: u32 = 5;
     const EDGE: u32 = 3;
@@ -103,7 +103,7 @@ fn draw_symbol(canvas: &mut Canvas, (x, y): CanvasPoint, mark: Mark, colour: Rgb
     }
 }
 
-/// A symbol and its inside.
+/// Draws a symbol with its outline and inside.
 fn draw_shape(canvas: &mut Canvas, (x, y): CanvasPoint, shape: MarkerShape, colour: Rgb, inside: Rgb) {
     let corner = |(a, b): &CanvasPoint| (x + a * SYMBOL_HALF_WIDTH, y + b * SYMBOL_HALF_WIDTH);
     let mut outline: Vec<CanvasPoint> = shape.corners().iter().map(corner).collect();
@@ -117,8 +117,8 @@ fn draw_shape(canvas: &mut Canvas, (x, y): CanvasPoint, shape: MarkerShape, colo
     canvas.draw_line(&outline, colour, 4);
 }
 
-/// An error bar; an end beyond the axes, or at or below zero on a logarithmic one, is cut there and has no
-/// cap.
+/// Draws an error bar. An end outside the axes, or at or below zero on a logarithmic axis, is clipped and has
+/// no cap.
 fn draw_error_bar(canvas: &mut Canvas, placed: &PanelLayout, bar: ErrorBar, colour: Rgb) {
     let (x, y) = (&placed.x, &placed.y);
     let (from, to, across) = match bar {

@@ -1,11 +1,11 @@
-//! Looks of lines and symbols.
+//! Styles: colours, marks, colour maps, lengths and the dark theme.
 
 use super::path::CanvasPoint;
 use crate::math;
 use std::fmt::Write;
 
-/// Colours that colour-blind readers can tell apart: those of Okabe and Ito without the yellow that vanishes
-/// on white, orange and sky blue darker, so that thin lines have a contrast of 3 to 1.
+/// Colours for colour-blind readers (Okabe and Ito). The yellow is left out, as it vanishes on white; orange
+/// and sky blue are darker for a contrast of 3 to 1 of thin lines.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 #[allow(missing_docs)]
 pub enum Colour {
@@ -18,12 +18,12 @@ pub enum Colour {
     Vermilion,
     Purple,
     Grey,
-    /// For lines over a heat map.
+    /// Near white, for lines over a heat map.
     White,
 }
 
 impl Colour {
-    /// Those of lines on the ground of a figure.
+    /// Colours of lines on the background of a figure.
     #[cfg(test)]
     pub(super) const LINES: [Self; 8] = [
         Self::Black,
@@ -36,7 +36,7 @@ impl Colour {
         Self::Grey,
     ];
 
-    /// As SVG writes it.
+    /// Hexadecimal colour of SVG.
     pub(crate) fn hex(self) -> String {
         format_hex(self.rgb())
     }
@@ -63,13 +63,13 @@ pub enum Mark {
     Line,
     /// A thin full line.
     Thin,
-    /// A thick full line, to lie under a thin one.
+    /// A thick full line, for use below a thin one.
     Thick,
     Dashed,
     Dotted,
     /// A thin dashed line.
     ThinDashed,
-    /// A line with its points, edged with white so that it is seen on any ground.
+    /// A line with its points, edged with white to be visible on any background.
     Edged,
     /// Small dots, not joined.
     Dots,
@@ -127,7 +127,7 @@ impl Mark {
     }
 }
 
-// Colours as numbers: those that figures share, and those of heat maps.
+// Colours as numbers, and colour maps.
 
 /// Red, green and blue, 0 to 255.
 pub(super) type Rgb = (u8, u8, u8);
@@ -135,11 +135,11 @@ pub(super) const WHITE: Rgb = (255, 255, 255);
 pub(super) const BLACK: Rgb = (0, 0, 0);
 pub(super) const GRID: Rgb = (0xDD, 0xDD, 0xDD);
 pub(super) const FRAME: Rgb = (0x33, 0x33, 0x33);
-/// Near white and near black, which are the same in the light and the dark.
+/// Near white and near black, which do not change with the theme.
 pub(super) const NEAR_WHITE: Rgb = (0xFE, 0xFE, 0xFE);
 const NEAR_BLACK: Rgb = (0x01, 0x01, 0x01);
 
-/// As SVG writes it.
+/// Hexadecimal colour of SVG.
 pub(super) fn format_hex((red, green, blue): Rgb) -> String {
     format!("#{red:02X}{green:02X}{blue:02X}")
 }
@@ -147,14 +147,14 @@ pub(super) fn format_hex((red, green, blue): Rgb) -> String {
 /// Colours of a heat map.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum ColourMap {
-    /// Viridis: from little to much.
+    /// Viridis: sequential, from low to high.
     #[default]
     Viridis,
-    /// From blue over white to vermilion: below and above a middle.
+    /// Diverging: blue below and vermilion above the middle, which is near white.
     Diverging,
 }
 
-/// Every tenth of viridis (S. van der Walt and N. Smith, matplotlib 2.0, CC0): even steps to the eye,
+/// Viridis in steps of 0.1 (S. van der Walt and N. Smith, matplotlib 2.0, CC0): perceptually uniform,
 /// readable for the colour-blind and in grey.
 const VIRIDIS: [Rgb; 11] = [
     (0x44, 0x01, 0x54),
@@ -169,14 +169,14 @@ const VIRIDIS: [Rgb; 11] = [
     (0xBB, 0xDF, 0x27),
     (0xFD, 0xE7, 0x25),
 ];
-/// Blue over near white to vermilion: distinct for the colour-blind, the middle by its lightness. The ends
-/// lie next to the colours of lines, which are others on a dark ground.
+/// Blue, near white, vermilion: distinct for the colour-blind. The ends differ by one from the line colours,
+/// which change in the dark theme.
 const DIVERGING: [Rgb; 5] =
     [(0x00, 0x72, 0xB1), (0x80, 0xB8, 0xD8), (0xF7, 0xF7, 0xF5), (0xEA, 0xAE, 0x80), (0xD5, 0x5E, 0x01)];
-/// Where there is no value: a grey that neither map holds.
+/// Colour of missing values: a grey that neither map contains.
 pub(super) const NO_VALUE: Rgb = (0xE4, 0xE4, 0xE4);
 
-/// Colour of a share from 0 to 1; beyond, that of the nearer end.
+/// Colour at a fraction from 0 to 1; beyond, that of the nearer end.
 pub(super) fn sample_colour_map(map: ColourMap, share: f64) -> Rgb {
     let stops: &[Rgb] = match map {
         ColourMap::Viridis => &VIRIDIS,
@@ -202,21 +202,20 @@ pub(super) fn contrast(a: Rgb, b: Rgb) -> f64 {
     a.max(b) / a.min(b)
 }
 
-/// Near white or near black: the one with the higher contrast on a colour; the two meet at 0.18.
+/// Near white or near black, whichever has more contrast on a colour; they are equal at a luminance of 0.18.
 pub(super) fn readable_on(colour: Rgb) -> Rgb {
     if luminance(colour) > 0.18 { NEAR_BLACK } else { NEAR_WHITE }
 }
 
-// Lengths that every figure has in common: mm, and units of the canvas.
+// Lengths in mm and canvas units.
 
-/// Canvas units for a millimetre: four for a pixel of 1/96 inch.
+/// Canvas units per millimetre: about four per pixel of 1/96 inch.
 pub(super) const UNITS_PER_MM: f64 = 15.0;
 /// Width of a figure over two columns of a journal, mm.
 pub const FULL_WIDTH_MM: f64 = 170.0;
 /// Width of a figure in one column, mm.
 pub const COLUMN_WIDTH_MM: f64 = 85.0;
-/// Most height of a figure in print, mm: Springer's journals, among the strictest, take figures up to 234 mm
-/// high, about the text of an A4 page.
+/// Greatest height of a figure in print, mm: Springer's journals, among the strictest, allow 234 mm.
 pub const MAX_HEIGHT_MM: f64 = 230.0;
 /// Size of labels, mm (7.5 pt, readable at print size).
 pub(super) const TEXT_MM: f64 = 2.6;
@@ -228,18 +227,16 @@ pub(super) const TICK_MM: f64 = 1.0;
 /// Least distance of labelled ticks, mm.
 pub(super) const X_TICKS_MM: f64 = 18.0;
 pub(super) const Y_TICKS_MM: f64 = 5.5;
-/// The same on a logarithmic axis, where every one is asked for that has room.
+/// Least distance of labelled ticks on a logarithmic axis, mm.
 pub(super) const X_LOG_TICKS_MM: f64 = 7.0;
 pub(super) const Y_LOG_TICKS_MM: f64 = 3.6;
 /// Opacity of shaded surfaces: pale enough for lines and grid to stay readable.
 pub(super) const SHADING_OPACITY: f64 = 0.22;
 
-// Light and dark: the style that a figure carries for screens. Without it, as in print, a figure has its
-// light colours.
+// Dark theme: the style sheet of figures on screens. Print has none and keeps the light colours.
 
-/// Colours on a light ground, and what stands for them on a dark one; every other colour (heat maps, what
-/// lies over them) is the same on both. The palette is Okabe and Ito's, lighter on the dark ground in the
-/// same order of hues.
+/// Colours in the light theme and their replacements in the dark theme; all others (heat maps and lines over
+/// them) stay. The dark palette is Okabe and Ito's in lighter shades, with hues in the same order.
 const DARK_COLOURS: [(Rgb, Rgb); 13] = [
     ((0xFF, 0xFF, 0xFF), (0x16, 0x16, 0x16)), // ground
     ((0x00, 0x00, 0x00), (0xF0, 0xF0, 0xEE)), // text and black lines
@@ -256,8 +253,7 @@ const DARK_COLOURS: [(Rgb, Rgb); 13] = [
     ((0x80, 0x80, 0x80), (0xA6, 0xA6, 0xA6)),
 ];
 
-/// A style element that gives every figure on its page the colours of a dark ground where the reader has
-/// asked for them.
+/// A style element that gives all figures of a page their dark colours where the reader prefers a dark theme.
 pub(crate) fn dark_theme_style() -> String {
     let mut rules = String::new();
     for (light, dark) in DARK_COLOURS {

@@ -1,22 +1,19 @@
-//! Text: how wide it is, about, and how it is broken or cut to fit. Widths can only be estimated, as the
-//! reader's fonts are not known here.
+//! Text: estimated widths, wrapping and truncation. Widths are estimates, as the reader's fonts are unknown.
 
 use super::style::{SMALL_MM, TEXT_MM};
 use crate::text::make_printable;
 use unicode_width::{UnicodeWidthChar, UnicodeWidthStr};
 
-/// Mean width of a letter of a sans-serif face over its size.
+/// Mean width of a sans-serif letter over the font size.
 pub(super) const LETTER: f64 = 0.58;
-/// The same of the widest face that browsers fall back on (DejaVu Sans), and of its bold letters: lines of
-/// text must fit in it.
+/// The same for the widest fallback font of browsers (DejaVu Sans), plain and bold; lines must fit in it.
 pub(super) const WIDE_LETTER: f64 = 0.63;
 pub(super) const WIDE_BOLD_LETTER: f64 = 0.7;
 const ELLIPSIS: char = '\u{2026}';
-/// Share of a text that the first of two lines may hold.
+/// Largest fraction of a text in the first of two lines.
 const NEAR_MIDDLE: f64 = 0.65;
 
-/// Estimated width of text, mm; ideographs and emoji count twice, marks that stand on another letter not at
-/// all.
+/// Estimated width of text, mm; ideographs and emoji count twice, combining marks not at all.
 pub(super) fn text_width(text: &str, size_mm: f64) -> f64 {
     text.width() as f64 * LETTER * size_mm
 }
@@ -25,8 +22,7 @@ fn letter_count(letter: char) -> usize {
     letter.width().unwrap_or(0)
 }
 
-/// Text broken at spaces into lines of at most that width, mm; a word that is wider than a line is broken in
-/// itself.
+/// Wraps text at spaces to lines of at most `width_mm`; words wider than a line are broken.
 pub(super) fn wrap_lines(text: &str, letter_mm: f64, width_mm: f64) -> Vec<String> {
     let most = (width_mm / letter_mm).max(2.0) as usize;
     let mut lines = vec![String::new()];
@@ -50,7 +46,7 @@ pub(super) fn wrap_lines(text: &str, letter_mm: f64, width_mm: f64) -> Vec<Strin
     lines
 }
 
-/// Text of at most that width, mm, in the widest face, its end cut off with an ellipsis where it is longer.
+/// Text cut with an ellipsis to at most `width_mm` in the widest font.
 pub(super) fn truncate_text(text: &str, size_mm: f64, width_mm: f64) -> String {
     let letter_mm = WIDE_LETTER * size_mm;
     if text.width() as f64 * letter_mm <= width_mm {
@@ -66,14 +62,13 @@ pub(super) fn truncate_text(text: &str, size_mm: f64, width_mm: f64) -> String {
     format!("{}{ELLIPSIS}", kept.trim_end())
 }
 
-/// Text of at most that width, mm: in one line, otherwise in two of small letters, the second cut off where
-/// that is not enough either.
+/// Text in one line of at most `width_mm`, or in two lines of small letters, the second cut where needed.
 pub(super) fn wrap_in_two_lines(text: &str, width_mm: f64) -> String {
     let text = make_printable(text);
     if text.width() as f64 * WIDE_LETTER * TEXT_MM <= width_mm {
         return text;
     }
-    // what small letters would bring into one line is broken near its middle
+    // text that fits one line of small letters is broken near its middle
     let own_mm = text.width() as f64 * WIDE_LETTER * SMALL_MM;
     let line_mm = if own_mm <= width_mm { NEAR_MIDDLE * own_mm } else { width_mm };
     let broken = wrap_lines(&text, WIDE_LETTER * SMALL_MM, line_mm);

@@ -126,7 +126,7 @@ const MAX_LAG_FRACTION: f64 = 0.25;
 const MIN_FRAMES: usize = 50;
 /// Most points of the spectrum; neighbours are averaged.
 const MAX_SPECTRUM_POINTS: usize = 300;
-/// Number of tapers: nine leave a relative scatter of about a quarter.
+/// Number of tapers of the spectrum.
 const TAPERS: usize = 9;
 /// Deviations of a two-sided 95 % interval.
 const Z_95: f64 = 1.96;

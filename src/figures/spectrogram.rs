@@ -1,5 +1,4 @@
-//! Spectrogram: amplitude over time and frequency as colours, with the ridge that was followed, and the ridge
-//! over the speed of the tip.
+//! Spectrogram: amplitude over time and frequency as colours, with the ridge over time and over tip speed.
 
 mod comparison;
 
@@ -21,7 +20,7 @@ use crate::text::{format_digits, format_milliseconds, truncate_text};
 pub use comparison::{SpectrogramComparison, SpectrogramSide, draw_comparison};
 use std::ops::Range;
 
-/// A frequency followed over time.
+/// A point of a ridge.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpectrogramRidgePoint {
     /// Instant, s.
@@ -30,10 +29,10 @@ pub struct SpectrogramRidgePoint {
     pub frequency_hz: Option<f64>,
 }
 
-/// A frequency that is sought in a window.
+/// A target frequency and its window.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TargetFrequency {
-    /// What it is.
+    /// Name of the feature.
     pub name: String,
     /// Frequency, Hz.
     pub frequency_hz: f64,
@@ -41,11 +40,11 @@ pub struct TargetFrequency {
     pub frequency_sd_hz: Option<f64>,
     /// Start and end of the window, s.
     pub span_s: (f64, f64),
-    /// Whether the model has it.
+    /// Whether the model meets the target.
     pub met: bool,
 }
 
-/// What a spectrogram shows.
+/// Data of a spectrogram.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SpectrogramPlot {
     /// Heading.
@@ -60,8 +59,8 @@ pub struct SpectrogramPlot {
     pub time_s: Vec<f64>,
     /// Frequencies, ascending, Hz.
     pub frequency_hz: Vec<f64>,
-    /// Amplitude of a sine, m: one list an instant, one value a frequency; `None` where the record has too
-    /// little to say.
+    /// Amplitude of a sine, m: one list per instant, one value per frequency; `None` where too few frames are
+    /// tracked.
     pub amplitude_m: Vec<Vec<Option<f64>>>,
     /// Whether the frequency axis is logarithmic.
     pub log_frequency: bool,
@@ -71,7 +70,7 @@ pub struct SpectrogramPlot {
     pub ridge: Vec<SpectrogramRidgePoint>,
     /// Named instants, s.
     pub instants: Vec<(String, f64)>,
-    /// The frequencies that are sought, each in its window.
+    /// The target frequencies, each with its window.
     pub targets: Vec<TargetFrequency>,
     /// The ridge over the speed of the tip; empty for no such panel.
     pub over_speed: Vec<SpeedPoint>,
@@ -80,7 +79,7 @@ pub struct SpectrogramPlot {
 /// Heights of the two panels, mm.
 const HEIGHT_MM: f64 = 72.0;
 const SPEED_HEIGHT_MM: f64 = 38.0;
-/// Share of the cells that lie under the first colour: what noise alone leaves there is not worth a colour.
+/// Fraction of the cells below the first colour: they hold only noise.
 const UNDER_COLOURS: f64 = 0.1;
 /// The colours start and end at multiples of this, dB.
 const STEP_DB: f64 = 5.0;
@@ -112,12 +111,12 @@ pub fn draw_figure(shown: &SpectrogramPlot) -> Figure {
     )
 }
 
-/// Every amplitude in dB.
+/// All amplitudes in dB.
 fn decibel_map(amplitude_m: &[Vec<Option<f64>>]) -> Vec<Vec<Option<f64>>> {
     amplitude_m.iter().map(|column| column.iter().map(|a| a.and_then(amplitude_decibels)).collect()).collect()
 }
 
-/// The colours, with ridge and instants over them.
+/// The map with targets, ridge and instants.
 fn draw_map(shown: &SpectrogramPlot) -> Panel {
     let values = decibel_map(&shown.amplitude_m);
     let heat = HeatMap {
@@ -131,7 +130,7 @@ fn draw_map(shown: &SpectrogramPlot) -> Panel {
     let y = if shown.log_frequency { ChartAxis::log } else { ChartAxis::linear }("frequency, Hz");
     let y = y.with_ends(shown.shown_hz.or_else(|| frequency_range(shown)));
     let rule = |(label, at): &(String, f64)| VerticalLine::new(label, Colour::White, Mark::Dashed, *at);
-    // edged lines are seen on every colour
+    // edged lines are visible on every colour
     let targets = target_lines(&shown.targets, "target \u{b1} 2 sd", Colour::Black, Mark::Edged);
     let ridge = Series::new("ridge", Colour::Vermilion, Mark::Edged, ridge_points(&shown.ridge));
     let lines = [targets, ridge].into_iter().filter(|s| s.points.iter().any(Option::is_some));
@@ -143,7 +142,7 @@ fn draw_map(shown: &SpectrogramPlot) -> Panel {
     }
 }
 
-/// Amplitude, m, in dB; an amplitude of zero lies under every colour.
+/// An amplitude, m, in dB re 1 um; zero lies below every colour.
 fn amplitude_decibels(amplitude_m: f64) -> Option<f64> {
     (amplitude_m.is_finite() && amplitude_m >= 0.0)
         .then(|| 20.0 * math::log10((amplitude_m / REFERENCE_M).max(f64::MIN_POSITIVE)))
@@ -160,13 +159,13 @@ fn colour_range_db(values: &[Vec<Option<f64>>]) -> Option<(f64, f64)> {
     Some((low, high.max(low + STEP_DB)))
 }
 
-/// From the start of the first column to the end of the last; of a single one, around it.
+/// Start of the first column and end of the last, s; `None` for fewer than two columns.
 fn time_span(middles: &[f64]) -> Option<(f64, f64)> {
     let ([first, second, ..], [.., before, last]) = (middles, middles) else { return None };
     Some((first - (second - first) / 2.0, last + (last - before) / 2.0))
 }
 
-/// All frequencies; on a logarithmic axis those above zero.
+/// Least and greatest frequency, above zero on a logarithmic axis.
 fn frequency_range(shown: &SpectrogramPlot) -> Option<(f64, f64)> {
     let lowest = shown.frequency_hz.iter().find(|f| **f > 0.0 || !shown.log_frequency)?;
     Some((*lowest, *shown.frequency_hz.last()?))
@@ -189,7 +188,7 @@ pub(super) fn speed_series(label: &str, colour: Colour, shape: MarkerShape, poin
     }
 }
 
-/// In how many of how many segments a ridge is drawn, and why not in others where it stands out of the noise.
+/// Clause on the number of segments in which a ridge is drawn, and on the segments in which it is left out.
 pub(crate) fn describe_ridge_segments(
     drawn: &[Vec<RidgePoint>],
     ridge: &time_frequency::Ridge,
@@ -203,16 +202,15 @@ pub(crate) fn describe_ridge_segments(
     format!("in {drawn} of {} segments{without}", of.time_s.len())
 }
 
-// Spectrograms of the deflection after the release, of both sides alike, with the ridges that follow the
-// stick-slip cycle.
+// Spectrograms of the deflection after the release, for recording and model.
 
-/// The frequencies shown reach this far beyond the ridges.
+/// Highest shown frequency over the highest of the ridges.
 const RIDGE_MARGIN: f64 = 1.6;
 
-/// A side, and what is added to its times, s.
+/// A side with its ridge and the shift of its clock, s.
 type ShiftedRidge<'a> = (SpectrogramSide, &'a TrackedRidge, f64);
 
-/// The figure; none where nothing can be cut into segments.
+/// The figure of a condition; empty where no side is long enough for a segment.
 pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     let (measured, model) = (case.ridges.measured.as_ref(), case.ridges.model.as_ref());
     let of =
@@ -241,7 +239,7 @@ pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
                     targets: target_frequencies(case, side),
                     ..SpectrogramPlot::default()
                 };
-                // (of a fast camera most bins lie beyond what is shown)
+                // with a fast camera most bins lie above the shown frequencies
                 let bins = followed.spectrogram.frequency_hz.partition_point(|f| *f <= shown_hz.1);
                 let start_s = followed.start_s + shift_s;
                 (of, fill_map(plot, &followed.spectrogram, &followed.courses, start_s, bins))
@@ -251,7 +249,7 @@ pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     vec![case.figure_block("spectrogram", figure_text(case, &sides), figure)]
 }
 
-/// The frequencies of the deflection that the job seeks, in their windows on a side's recording.
+/// The target frequencies of the deflection with their windows on one side.
 fn target_frequencies(case: &ConditionComparison, (of, _, shift_s): &ShiftedRidge) -> Vec<TargetFrequency> {
     let side = match of {
         SpectrogramSide::Measured => case.measured_side(),
@@ -344,7 +342,7 @@ fn figure_text(case: &ConditionComparison, sides: &[ShiftedRidge]) -> Words {
     Words { caption: claim_sentence(case, sides), details: said.join(" ") }
 }
 
-/// The claim with its numbers: where the ridges run.
+/// Heading: the frequency ranges of the ridges.
 fn figure_title(sides: &[ShiftedRidge]) -> String {
     let found = |wanted: SpectrogramSide| {
         let range_hz = sides.iter().find(|(of, ..)| *of == wanted)?.1.frequency_range_hz()?;
@@ -361,7 +359,7 @@ fn figure_title(sides: &[ShiftedRidge]) -> String {
     }
 }
 
-/// Where the ridges run.
+/// Caption with the frequency ranges of the ridges.
 fn claim_sentence(case: &ConditionComparison, sides: &[ShiftedRidge]) -> String {
     let name = |of: &SpectrogramSide| {
         if *of == SpectrogramSide::Measured { case.source_kind() } else { "the fitted model" }
@@ -383,17 +381,18 @@ fn claim_sentence(case: &ConditionComparison, sides: &[ShiftedRidge]) -> String 
     )
 }
 
-// The frequencies that are sought, as lines over their windows with two deviations either side.
+// Target frequencies as lines over their windows, with two standard deviations either side.
 
-/// Letters of a name that have room in a map.
+/// Letters after which a name is cut in a map.
 const MAX_LABEL_LETTERS: usize = 14;
-/// Distance of a name from its line, and distance of lines whose names would meet, shares of the height.
+/// Distance of a name from its line, and least distance of lines whose names stand on one side, fractions of
+/// the height.
 const LABEL_OFFSET: f64 = 0.05;
 const CLOSE_TARGETS: f64 = 0.1;
-/// Where the middle of a name stays, shares of the width: its ends lie within the axes.
+/// Range of the middle of a name, fractions of the width, so that the name stays inside the axes.
 const LABEL_LIMITS: (f64, f64) = (0.3, 0.7);
 
-/// The same over the ridges, those that are met apart from the others.
+/// Target lines over the ridges; met and missed targets have different styles.
 pub(super) fn target_lines_over_ridges(targets: &[TargetFrequency]) -> impl Iterator<Item = Series> {
     let looks = [
         (true, "target, met", Colour::Blue, Mark::Dashed),
@@ -420,7 +419,7 @@ fn target_lines(targets: &[TargetFrequency], label: &str, colour: Colour, mark: 
     }
 }
 
-/// "high 908 Hz, met" over every line; under it where the next one is close.
+/// Labels such as "high 908 Hz, met" above the lines; below a line where the next one is close.
 pub(super) fn target_names(shown: &SpectrogramPlot) -> Vec<TextAnnotation> {
     let Some((bottom, top)) = shown.shown_hz.or_else(|| frequency_range(shown)) else { return Vec::new() };
     let Some((first, last)) = time_span(&shown.time_s) else { return Vec::new() };

@@ -1,5 +1,4 @@
-//! Spectra: measured against model in physical units, with components, published frequencies and the noise
-//! floor.
+//! Amplitude spectra, measured and of the model, with components, target frequencies and noise floor.
 
 mod components;
 
@@ -30,14 +29,14 @@ pub struct SpectrumCurve {
     pub amplitude_m: Vec<f64>,
 }
 
-/// What a figure of spectra shows.
+/// Data of a figure of spectra.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SpectraPlot {
     /// Heading.
     pub title: String,
-    /// Quantity whose spectrum it is, such as "deflection".
+    /// Quantity, such as "deflection".
     pub quantity: String,
-    /// Where the record comes from, such as its window; empty for none.
+    /// Origin of the record, such as its window; empty for none.
     pub note: String,
     /// Whether the measured motion is synthetic.
     pub synthetic: bool,
@@ -45,19 +44,19 @@ pub struct SpectraPlot {
     pub measured: Option<SpectrumCurve>,
     /// Spectrum of the model, of the same length, window and detrending.
     pub model: Option<SpectrumCurve>,
-    /// Published or measured frequencies.
+    /// Published or measured target frequencies.
     pub targets: Vec<Target>,
     /// Noise floor of the measured spectrum, m.
     pub noise_floor_m: Option<f64>,
     /// Noise floor over frequency; drawn instead of the constant one.
     pub noise_floor: Option<SpectrumLevel>,
-    /// What the noise leaves open of the measured spectrum, 95 %.
+    /// 95 % interval of the measured spectrum from its noise.
     pub interval_95: Option<AmplitudeInterval>,
-    /// What the removed flip leaves in the spectrum.
+    /// Leakage of the removed flip into the spectrum.
     pub leakage: Option<SpectrumLevel>,
     /// Components of the measured spectrum with their uncertainty.
     pub components: Vec<LabelledComponent>,
-    /// Those of the model, likewise.
+    /// Components of the model with their uncertainty.
     pub model_components: Vec<LabelledComponent>,
     /// Lowest frequency that the record resolves, Hz; the axis starts there.
     pub lowest_hz: f64,
@@ -97,7 +96,7 @@ pub fn draw_figure(spectra: &SpectraPlot) -> Figure {
     )
 }
 
-/// The claim of a spectrum that nothing is sought in: its largest component.
+/// Heading of a spectrum without targets: its largest component.
 pub(crate) fn strongest_claim(spectra: &SpectraPlot) -> String {
     let largest = |all: &[LabelledComponent]| {
         all.iter().max_by(|a, b| a.amplitude_m.total_cmp(&b.amplitude_m)).cloned()
@@ -109,8 +108,8 @@ pub(crate) fn strongest_claim(spectra: &SpectraPlot) -> String {
     }
 }
 
-/// Ends of the amplitude axis, m: from well under the noise floor, or the foot of the model's range, to over
-/// the highest peak.
+/// Ends of the amplitude axis, m: from below the noise floor, or from 1e-4 of the highest peak without one,
+/// to above that peak.
 fn amplitude_limits(spectra: &SpectraPlot) -> Option<(f64, f64)> {
     const UNDER_FLOOR: f64 = 0.1;
     const MODEL_RANGE: f64 = 1e-4;
@@ -151,11 +150,10 @@ fn target_spans(targets: &[Target]) -> Vec<ShadedSpan> {
     targets.iter().filter_map(band).collect()
 }
 
-/// Names of components that stand over a panel next to those of targets: more would stand over each other in
-/// one column.
+/// Most component names above a panel that also names targets.
 const MOST_NAMES: usize = 4;
 
-/// The components that are named: the measured ones, without a recording the model's.
+/// The components that are named: the measured ones, or the model's without a recording.
 fn labelled_components(spectra: &SpectraPlot) -> &[LabelledComponent] {
     if spectra.components.is_empty() { &spectra.model_components } else { &spectra.components }
 }
@@ -163,7 +161,7 @@ fn labelled_components(spectra: &SpectraPlot) -> &[LabelledComponent] {
 /// Lines at the targets, and labels over the components.
 fn target_lines(spectra: &SpectraPlot) -> Vec<VerticalLine> {
     let named = labelled_components(spectra);
-    // where components are named, the names of the targets are captions
+    // where components are named, the targets are named by top labels instead
     let label = |t: &Target| format!("{}: {} Hz", t.name, format_trimmed(t.frequency_hz, 4));
     let target = |t: &Target| {
         let label = if named.is_empty() { label(t) } else { String::new() };
@@ -173,23 +171,22 @@ fn target_lines(spectra: &SpectraPlot) -> Vec<VerticalLine> {
     spectra.targets.iter().map(target).chain(components::component_labels(named, most)).collect()
 }
 
-/// Names of the targets, where components are named over them.
+/// Names of the targets where components are named too.
 fn target_labels(spectra: &SpectraPlot) -> Vec<TopLabel> {
     let caption = |t: &Target| TopLabel { label: t.name.clone(), at: t.frequency_hz };
     let named = !labelled_components(spectra).is_empty();
     spectra.targets.iter().filter(|_| named).map(caption).collect()
 }
 
-// Amplitude spectra, one for each window of a channel that the fit reads, and the one of the low
-// component taken apart.
+// Spectra of a condition: one per window that the fit reads, and the ring-down.
 
-/// Frequencies are shown up to this many times the band that the fit reads, and to this one, Hz, at least:
-/// what a fast camera has beyond is noise.
+/// Highest shown frequency: this many times the upper end of the fit's band, and at least this, Hz. Above it
+/// a fast camera records only noise.
 const BAND_MARGIN: f64 = 10.0;
 const MIN_TOP_HZ: f64 = 5e3;
 
-/// The spectra in the order of the job, then the ring-down. Every window is analysed once; one after the
-/// other, because long ones are large.
+/// The spectra in the order of the job, then the ring-down. Long windows take much memory, so each is
+/// analysed once, one after the other.
 pub(crate) fn figure_blocks(case: &ConditionComparison) -> Vec<FigureBlock> {
     let all = group_fit_windows(case.job, case.condition);
     let lowest = ring_down::lowest_window(case, &all);
@@ -230,7 +227,7 @@ fn window_block(
     Some(case.figure_block(&file, words, draw_figure(&spectra)))
 }
 
-/// Spectra up to the highest frequency that is shown.
+/// Cuts the spectra at the highest shown frequency.
 fn limit_frequencies(mut spectra: SpectraPlot, band: &FeatureBand) -> SpectraPlot {
     let components = spectra.components.iter().chain(&spectra.model_components).map(|c| c.frequency_hz);
     let top_hz = components.fold(MIN_TOP_HZ, f64::max).max(BAND_MARGIN * band.band_hz.1);
@@ -244,7 +241,7 @@ fn limit_frequencies(mut spectra: SpectraPlot, band: &FeatureBand) -> SpectraPlo
     spectra
 }
 
-/// A window of one side, taken apart.
+/// The spectral analysis of a window on one side.
 fn analyse_window(
     case: &ConditionComparison,
     side: &TimedRecording,
@@ -312,7 +309,7 @@ fn figure_title(spectra: &SpectraPlot, met: &[FrequencyComparison]) -> String {
     }
 }
 
-/// How many of the frequencies that are sought the model has, and how near they are.
+/// Clause on the number of target frequencies that the model meets, and on the largest error.
 fn claim_sentence(met: &[FrequencyComparison]) -> String {
     let error = |met: &FrequencyComparison| met.model_hz.map(|hz| (hz / met.target.frequency_hz - 1.0).abs());
     let errors: Vec<f64> = met.iter().filter_map(error).collect();
@@ -330,7 +327,7 @@ fn claim_sentence(met: &[FrequencyComparison]) -> String {
     }
 }
 
-/// "high: target 908(4) Hz, model 908.0 Hz (+0.04 %)."
+/// Sentence such as "high: target 908(4) Hz, model 908.0 Hz (+0.04 %)."
 fn describe_target(met: &FrequencyComparison, kind: &str) -> String {
     let target = &met.target;
     let off = |hz: f64| format_signed_percent(hz / target.frequency_hz - 1.0);
@@ -342,7 +339,7 @@ fn describe_target(met: &FrequencyComparison, kind: &str) -> String {
 
 // Noise floor, leakage and interval of a spectrum.
 
-/// A level over frequency.
+/// A level, such as the noise floor, over frequency.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct SpectrumLevel {
     /// Frequencies, Hz.
@@ -363,7 +360,7 @@ pub struct AmplitudeInterval {
 }
 
 impl SpectrumLevel {
-    /// The lowest positive level from a frequency on, m.
+    /// The lowest positive level at or above a frequency, m.
     pub(super) fn lowest_m(&self, lowest_hz: f64) -> Option<f64> {
         let all = self.frequency_hz.iter().zip(&self.amplitude_m);
         let shown = all.filter(|(f, a)| **f >= lowest_hz && **a > 0.0 && a.is_finite());
@@ -371,13 +368,13 @@ impl SpectrumLevel {
     }
 }
 
-/// Radius of the circle about a bin's complex amplitude that holds 95 % of the noise there, over the root
-/// mean square of the noise: `sqrt(-ln 0.05)`, as its magnitude follows Rayleigh's law.
+/// Radius of the circle around a bin's complex amplitude that holds 95 % of the noise, in units of its root
+/// mean square: `sqrt(-ln 0.05)` (Rayleigh distribution of the magnitude).
 const CIRCLE_95: f64 = 1.730_818_382_602_285_7;
 
 impl AmplitudeInterval {
-    /// What noise of a level leaves open of every amplitude of a curve: the true one lies in it in 95 % of
-    /// the bins at least, and where it reaches down to zero the bin may hold noise alone.
+    /// The 95 % interval of each amplitude for a noise floor. An interval that reaches zero means that the
+    /// bin may hold only noise.
     pub(crate) fn from_noise_floor(curve: &SpectrumCurve, floor: &SpectrumLevel) -> Self {
         let ends = |sign: f64| {
             let end = |(a, noise_m): (&f64, &f64)| (a + sign * CIRCLE_95 * noise_m).max(0.0);
@@ -393,12 +390,12 @@ impl AmplitudeInterval {
     }
 }
 
-/// Points in the units of the axes.
+/// Points in Hz and micrometres.
 pub(super) fn axis_points(frequency_hz: &[f64], amplitude_m: &[f64]) -> Vec<Option<(f64, f64)>> {
     frequency_hz.iter().zip(amplitude_m).map(|(f, a)| Some((*f, a * MICROMETRES))).collect()
 }
 
-/// Noise floor and leakage, which lie under the spectra.
+/// Noise floor and leakage, drawn below the spectra.
 pub(super) fn level_series(spectra: &SpectraPlot, highest: f64) -> Vec<Series> {
     let constant =
         |floor_m: f64| [spectra.lowest_hz, highest].map(|f| Some((f, floor_m * MICROMETRES))).to_vec();

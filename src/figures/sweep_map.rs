@@ -1,5 +1,5 @@
-//! Maps of a parameter study: a quantity over two parameters as colours, or over one as a curve; hatched
-//! where there is no value.
+//! Maps of a parameter study: a quantity over two parameters as colours, or over one as a curve. Points
+//! without a value are hatched.
 
 mod claim;
 
@@ -18,7 +18,7 @@ use std::collections::BTreeMap;
 const MAP_MM: f64 = 56.0;
 const CURVE_MM: f64 = 46.0;
 
-/// The figure of map number `at` (counted from 0); one without panels where there is no such map.
+/// Draws map number `at`, counted from 0; without panels where there is no such map.
 #[must_use]
 pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome], at: usize) -> Figure {
     let Some(map) = study.maps.get(at) else { return Figure::default() };
@@ -45,12 +45,12 @@ pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome], at: 
     }
 }
 
-/// The axes of a study.
+/// Labels of the axes of a study.
 pub(super) fn describe_axes(study: &Study) -> String {
     study.axes.iter().map(axis_label).collect::<Vec<_>>().join(" and ")
 }
 
-/// What is shown of a map at every point of the grid, in the unit of the figure.
+/// Values of a map at all points of the grid, in the unit of the figure, and reasons for missing ones.
 pub(super) struct SweepMapValues<'a> {
     map: &'a SweepMap,
     pub values: Vec<Option<f64>>,
@@ -65,7 +65,7 @@ impl<'a> SweepMapValues<'a> {
         Self { map, values: map_values(study, outcomes, at), reasons }
     }
 
-    /// The panel of the map; `None` of a study without axes.
+    /// The panel of the map; `None` for a study without axes.
     pub(crate) fn draw_panel(
         &self,
         study: &Study,
@@ -125,7 +125,7 @@ impl<'a> SweepMapValues<'a> {
     }
 }
 
-/// What marks the scene from which the study starts.
+/// Label of the scene from which the study starts.
 const SCENE_LABEL: &str = "the scene as written";
 
 /// An axis in the unit of figures.
@@ -143,14 +143,14 @@ impl<'a> DisplayAxis<'a> {
         Self { axis, middles, edges }
     }
 
-    /// From the start of the first cell to the end of the last.
+    /// The axis from the start of the first cell to the end of the last.
     fn chart_axis(&self) -> ChartAxis {
         let range = self.edges.first().copied().zip(self.edges.last().copied());
         let (label, scale) = (axis_label(self.axis), axis_scale(self.axis));
         ChartAxis { label, scale, range, ..ChartAxis::default() }
     }
 
-    /// Where the scene itself lies, if it does.
+    /// Value of the scene itself; `None` outside the axis.
     fn scene_value(&self, scene: &Scene) -> Option<f64> {
         let value = scene.value(self.axis.parameter.name)? * display_unit(self.axis.parameter).1;
         let within = value >= *self.edges.first()? && value <= *self.edges.last()?;
@@ -158,9 +158,9 @@ impl<'a> DisplayAxis<'a> {
     }
 }
 
-// Why cells have no value, as patterns.
+// Hatch patterns for missing values.
 
-/// Patterns in the order in which they are given to reasons whose own is taken.
+/// Replacement patterns, in order, for reasons whose own pattern is taken.
 const FALLBACK_PATTERNS: [HatchPattern; 9] = [
     HatchPattern::Dotted,
     HatchPattern::DashedUpright,
@@ -173,7 +173,7 @@ const FALLBACK_PATTERNS: [HatchPattern; 9] = [
     HatchPattern::Crossed,
 ];
 
-/// The pattern of every reason of a study: two reasons in one study never share one while there are any left.
+/// The pattern of each reason in a study; two reasons share one only when no pattern is left.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(in crate::figures) struct ReasonPatterns(BTreeMap<MissingReason, HatchPattern>);
 
@@ -205,8 +205,7 @@ impl ReasonPatterns {
         Self(given)
     }
 
-    /// One hatch for each reason of a map that occurs, in the order of the table of reasons; `cell` gives the
-    /// place of a point.
+    /// One hatch per reason in a map, in the order of the table of reasons; `cell` gives the area of a point.
     pub(crate) fn reason_hatches(
         &self,
         reasons: &[Option<MissingReason>],
@@ -222,8 +221,8 @@ impl ReasonPatterns {
     }
 }
 
-/// The pattern of a reason where no other of the study has it. None is plain grey: printed without colours it
-/// would look like a value.
+/// The pattern of a reason unless another reason of the study has it. None is plain grey, which would look
+/// like a value in print without colours.
 fn default_pattern(reason: MissingReason) -> HatchPattern {
     match reason {
         MissingReason::ContactLost => HatchPattern::Rising,
@@ -251,7 +250,7 @@ pub(in crate::figures) fn axis_scale(axis: &SweepAxis) -> AxisScale {
     }
 }
 
-/// The colours or the y axis that a study asks for, in the unit of figures.
+/// The range of colours or y axis that a study sets, in the display unit.
 pub(in crate::figures) fn map_range(map: &SweepMap) -> Option<(f64, f64)> {
     let factor = map.reading.unit().factor;
     map.range.map(|(low, high)| (low * factor, high * factor))
@@ -263,7 +262,7 @@ pub(in crate::figures) fn map_label(map: &SweepMap) -> String {
     if shown.is_empty() { map.name.clone() } else { format!("{}, {shown}", map.name) }
 }
 
-/// Unit of a parameter in figures, and what its SI value is multiplied by.
+/// Display unit of a parameter, and the factor from its SI value.
 pub(in crate::figures) fn display_unit(parameter: &ModelParameter) -> (&'static str, f64) {
     match parameter.unit {
         "m" => ("mm", 1e3),
@@ -279,12 +278,12 @@ pub(in crate::figures) fn parameter_words(axis: &SweepAxis) -> String {
     let (table, key) = name.split_once('.').unwrap_or(("", name));
     let suffix = format!("_{}", unit.to_lowercase().replace('/', " per ").replace(' ', "_"));
     let key = key.strip_suffix(&suffix).unwrap_or(key).replace('_', " ");
-    // (a key that is the symbol itself stands as the symbol)
+    // a key that equals the symbol is written as the symbol
     let key = if key.eq_ignore_ascii_case(symbol) { (*symbol).to_owned() } else { key };
     if table == "blade" { key } else { format!("{table} {key}") }
 }
 
-/// What an axis shows: `drive.amplitude_m` is the "drive amplitude a, mm".
+/// Label of an axis: `drive.amplitude_m` is the "drive amplitude a, mm".
 pub(in crate::figures) fn axis_label(axis: &SweepAxis) -> String {
     let (words, symbol) = (parameter_words(axis), axis.parameter.symbol);
     let named = if words.ends_with(&format!(" {symbol}")) { words } else { format!("{words} {symbol}") };
@@ -294,18 +293,18 @@ pub(in crate::figures) fn axis_label(axis: &SweepAxis) -> String {
     }
 }
 
-// The values of the first and the last colour of a map.
+// Colour limits of a map.
 
-/// Shares of the sorted values at the first and the last colour, where values beyond lie far away.
+/// Quantiles at the first and the last colour where values beyond them are outliers.
 const COLOUR_QUANTILES: [f64; 2] = [0.02, 0.98];
-/// How far the extreme value may lie beyond such a share, over what lies between the two, before the colours
-/// end at the share: a smooth map keeps its extremes, one outlier does not stretch its colours.
+/// Largest distance of an extreme value from its quantile, in units of the range between the quantiles,
+/// before it counts as an outlier.
 const OUTLIER_DISTANCE: f64 = 0.25;
-/// Fewest values of which some can be called outliers.
+/// Fewest values for which outliers are sought.
 const MIN_OUTLIER_SAMPLES: usize = 8;
 
-/// The first and last colour of finite values; `None` where they are too few, or nearly all equal: colours
-/// then go from the least to the greatest.
+/// Values of the first and the last colour. `None`, for the full range, where there are too few values or
+/// nearly all are equal.
 pub(super) fn colour_limits(values: &[Option<f64>]) -> Option<(f64, f64)> {
     let mut sorted: Vec<f64> = values.iter().flatten().copied().filter(|v| v.is_finite()).collect();
     if sorted.len() < MIN_OUTLIER_SAMPLES {
@@ -314,7 +313,7 @@ pub(super) fn colour_limits(values: &[Option<f64>]) -> Option<(f64, f64)> {
     sorted.sort_by(f64::total_cmp);
     let last = sorted.len() - 1;
     let [low, high] = COLOUR_QUANTILES.map(|share| share * last as f64);
-    // inwards to a value, so that of few values the extreme one can be left out too
+    // rounded inwards, so that the extreme of a few values can be an outlier too
     let (low, high) = (sorted[low.ceil() as usize], sorted[high.floor() as usize]);
     let between = high - low;
     let end = |share: f64, extreme: f64| {

@@ -1,5 +1,5 @@
-//! Every map of a parameter study on one sheet, as small panels of one design: maps or curves over the same
-//! axes, or, of a study with many parameters, the rank correlation of every map with every parameter.
+//! All maps of a parameter study on one sheet: small maps or curves over the same axes or, for many
+//! parameters, the rank correlations of maps and parameters.
 
 use super::sweep_map::{MapClaim, ReasonPatterns, SweepMapValues, describe_axes};
 use super::sweep_map::{axis_label, parameter_words};
@@ -13,13 +13,13 @@ use crate::text::{capitalise, format_decimals, join_with_and, make_printable};
 /// Heights of a panel and of a row of the table of correlations, mm.
 const PANEL_MM: f64 = 42.0;
 const ROW_MM: f64 = 7.0;
-/// Letters for which a panel has room over it.
+/// Letters that fit above a panel.
 const CLAIM_LETTERS: usize = 34;
-/// Most panels; of a study with more maps the first are shown.
+/// Most panels; further maps are left out.
 const MOST: usize = 12;
 
-/// The sheet of a study whose points are on a grid over one or two parameters. A map without any value has no
-/// panel and is named under the heading. One without panels where no map has a value.
+/// Draws the sheet of a study over a grid of one or two parameters. Maps without any value have no panel and
+/// are named under the heading; without any panel the figure is empty.
 #[must_use]
 pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome]) -> Figure {
     let patterns = ReasonPatterns::from_outcomes(outcomes);
@@ -30,7 +30,7 @@ pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome]) -> F
     let panel = |(map, drawn): &(&SweepMap, SweepMapValues)| {
         let claim = MapClaim::new(study, map, &drawn.values);
         let mut panel = drawn.draw_panel(study, scene, &patterns)?;
-        // the name of the quantity stands in the title
+        // the title of the panel names the quantity
         let unit = map.reading.unit().shown;
         if let Some(heat) = panel.heat_map.as_mut().filter(|_| !unit.is_empty()) {
             unit.clone_into(&mut heat.label);
@@ -64,7 +64,7 @@ pub fn draw_figure(study: &Study, scene: &Scene, outcomes: &[PointOutcome]) -> F
     }
 }
 
-/// The sheet of a study that is not drawn as maps: rank correlations as numbers over colours.
+/// The sheet of a study without maps: rank correlations as numbers over colours.
 pub(crate) fn draw_correlations(study: &Study, found: &RankCorrelations) -> Figure {
     let of = |at: usize| -> Vec<Option<f64>> {
         found.of_map(study, at).into_iter().rev().map(|one| one.rank_correlation).collect()

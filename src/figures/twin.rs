@@ -1,40 +1,39 @@
-//! What a synthetic camera sees of a motion: the motion itself, the frames with their exposure and noise, and
-//! the frames that are lost.
+//! A synthetic recording: the simulated motion, the frames with exposure and noise, and the lost frames.
 
 use super::Words;
 use crate::chart::{ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, Mark, Panel, Series, VerticalLine};
 use crate::recording::Recording;
 use crate::text::{format_length, format_milliseconds, format_percent, format_short};
 
-/// Samples of the motion in the time of a frame.
+/// Samples of the motion per frame.
 pub(crate) const MOTION_SAMPLES: f64 = 8.0;
-/// Frames of an enlarged part, and how many of them lie before its instant.
+/// Frames of an enlarged part, and frames of it before its instant.
 const ENLARGED: f64 = 40.0;
 const BEFORE: f64 = 10.0;
-/// Share of the run after which a stick is a late one.
+/// Fraction of the run after which a stick counts as late.
 const LATE: f64 = 0.75;
 /// Height of a panel, mm.
 const PANEL_MM: f64 = 40.0;
 
-/// A twin with the motion behind it; all on one clock.
+/// A synthetic recording with its motion; all times are on one clock.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TwinPlot<'a> {
     pub title: &'a str,
     /// The motion without exposure and noise, about [`MOTION_SAMPLES`] times as many samples as frames.
     pub motion: &'a Recording,
-    /// What the camera sees of it, without noise.
+    /// The motion as the camera sees it, without noise.
     pub seen: &'a Recording,
     pub tracked: &'a Recording,
     /// Exposure of a frame, s.
     pub exposure_s: f64,
     /// Standard deviation of a tracked coordinate, m.
     pub noise_m: f64,
-    /// When the tip stuck, s.
+    /// Intervals in which the tip sticks, s.
     pub stick_s: &'a [[f64; 2]],
 }
 
-/// The deflection of the whole run, of the frames about the release of the longest stick and about that of a
-/// late one, and what the camera adds to it.
+/// Draws the deflection over the whole run and around two releases (longest stick, late stick), and the
+/// errors of the camera.
 pub(crate) fn draw_figure(twin: &TwinPlot) -> Figure {
     let words = figure_text(twin);
     let mut panels = vec![draw_run_panel(twin)];
@@ -51,7 +50,7 @@ pub(crate) fn draw_figure(twin: &TwinPlot) -> Figure {
     }
 }
 
-/// The claim with its numbers, and what the figure shows.
+/// Caption with the main numbers, and description.
 fn figure_text(twin: &TwinPlot) -> Words {
     let grid = twin.tracked.grid();
     let lost = lost_points(twin).len();
@@ -78,7 +77,7 @@ fn figure_text(twin: &TwinPlot) -> Words {
     }
 }
 
-/// Tip and head have noise of their own.
+/// Noise of the deflection, m: tip and head have independent noise.
 fn deflection_noise_m(twin: &TwinPlot) -> f64 {
     std::f64::consts::SQRT_2 * twin.noise_m
 }
@@ -94,14 +93,14 @@ fn deflection_points(recording: &Recording) -> Vec<Option<(f64, f64)>> {
     (0..grid.frames).map(|at| Some((grid.time_s(at), 1e3 * deflection_m(recording, at)?))).collect()
 }
 
-/// Frames without head or without tip, where the camera would have seen them.
+/// Noise-free points of the frames in which head or tip is lost.
 fn lost_points(twin: &TwinPlot) -> Vec<Option<(f64, f64)>> {
     let tracked = deflection_points(twin.tracked);
     let seen = deflection_points(twin.seen).into_iter().zip(tracked);
     seen.filter(|(_, found)| found.is_none()).map(|(seen, _)| seen).collect()
 }
 
-/// The deflection that a recording shows minus that of the motion at the instant of the frame, m.
+/// Deflection in a recording minus that of the motion at the instant of the frame, m.
 fn difference_points(twin: &TwinPlot, of: &Recording) -> Vec<Option<(f64, f64)>> {
     let (grid, traces) = (of.grid(), twin.motion.traces());
     let difference = |at: usize| {
@@ -132,7 +131,7 @@ fn draw_enlarged_panel(twin: &TwinPlot, name: &str, at_s: f64) -> Panel {
     Panel { title: format!("{name}, {} frames", ENLARGED as usize), ..panel }
 }
 
-/// The motion, the frames, and the lost ones; with bars in a part.
+/// Motion, tracked frames and lost frames; error bars only in an enlarged part.
 fn part_series(twin: &TwinPlot, part: Option<(f64, f64)>) -> Vec<Series> {
     let tracked = deflection_points(twin.tracked);
     let sd_mm = 1e3 * deflection_noise_m(twin);
@@ -155,7 +154,7 @@ fn part_series(twin: &TwinPlot, part: Option<(f64, f64)>) -> Vec<Series> {
     ]
 }
 
-/// What the camera adds: blur alone, and blur with noise.
+/// Errors of the camera: blur alone, and blur with noise.
 fn draw_camera_panel(twin: &TwinPlot) -> Panel {
     let series = |label: &str, colour, mark, of: &Recording| {
         let points = difference_points(twin, of).into_iter();
@@ -170,8 +169,7 @@ fn draw_camera_panel(twin: &TwinPlot) -> Panel {
     Panel { title, ..Panel::new(ChartAxis::time(), y, 0.8 * PANEL_MM, series) }
 }
 
-/// The end of the longest stick, and of the last one of the late part of the run that is followed by enough
-/// frames.
+/// Ends of the longest stick and of the last late stick that enough frames follow, s.
 fn release_instants(twin: &TwinPlot) -> Vec<(&'static str, f64)> {
     let grid = twin.tracked.grid();
     let (start_s, end_s) = (grid.start_s, grid.time_s(grid.frames.saturating_sub(1)));

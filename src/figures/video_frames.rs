@@ -9,7 +9,7 @@ use crate::math;
 use crate::recording::video::RecordingVideo;
 use crate::text::{format_length, join_with_and};
 
-/// The instants that are shown: the pose of the model, and what it is called over a recording.
+/// The shown instants: name of the model's pose, and its name in the figure.
 const SHOWN: [(&str, &str); 4] = [
     ("before", "before the reversal"),
     ("upright", "in the flip"),
@@ -20,27 +20,27 @@ const SHOWN: [(&str, &str); 4] = [
 const NEAR: usize = 5;
 /// Height of a panel, mm.
 const DRAWING_MM: f64 = 42.0;
-/// Points of a frame of the video across a panel, and the part of it that is shown, in lengths of the blade:
-/// to either side of the head, and over the glass. A panel of any width lies within it.
+/// Pixels across a panel, and the shown part of the video frame in lengths of the blade: half width about the
+/// head, and heights above the glass. It is larger than any panel.
 const FRAME_POINTS: usize = 256;
 const FRAME_HALF: f64 = 1.5;
 const FRAME_HEIGHTS: [f64; 2] = [-0.3, 1.3];
-/// Room round the links, in lengths of the blade.
+/// Margin around the links, in lengths of the blade.
 const ROOM: f64 = 0.12;
 
-/// What there is of the video at an instant.
+/// The video frame of an instant.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Frame {
-    /// No picture of the instant.
+    /// The video has no picture of the instant.
     Missing,
-    /// A picture that shows neither the tracked head nor the tip.
+    /// The picture shows neither the tracked head nor the tip.
     Elsewhere,
-    /// The part round the links, in mm of the figure.
+    /// The picture around the links, in mm of the figure.
     Shown(Raster),
 }
 
 impl Frame {
-    /// The picture, where it shows the links.
+    /// The picture; `None` where it does not show the links.
     #[must_use]
     pub fn shown(&self) -> Option<&Raster> {
         match self {
@@ -50,17 +50,17 @@ impl Frame {
     }
 }
 
-/// A frame of the recording with the model in it. Places are along the sweep from the model's head and over
-/// the glass, m.
+/// A frame of the recording with the pose of the model. Positions are along the sweep from the model's head
+/// and above the glass, m.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instant {
     /// Name of the event, such as `upright`.
     pub name: &'static str,
-    /// Time of the frame, s of the recording.
+    /// Time of the frame on the clock of the recording, s.
     pub time_s: f64,
     /// Head, hinge and tip of the model.
     pub joints_m: [(f64, f64); 3],
-    /// The tracked head and tip; at the model's height where only the sweep was tracked.
+    /// The tracked head and tip; at the model's height where no height was tracked.
     pub tracked_m: [(f64, f64); 2],
     /// The frame of the video.
     pub frame: Frame,
@@ -85,7 +85,7 @@ pub struct VideoFrames {
 }
 
 impl VideoFrames {
-    /// The instants of a condition that its recording shows; `None` without any, or without a video.
+    /// The instants of a condition that its recording contains; `None` without an instant or a video.
     #[must_use]
     pub fn of(case: &ConditionComparison) -> Option<Self> {
         let film = case.measured?.film.filter(|_| !case.alignment.opposite_turn)?;
@@ -99,8 +99,8 @@ impl VideoFrames {
     }
 }
 
-/// The frame with head and tip that is nearest to a time of the recording, s; `None` where no height was
-/// tracked, so that the place of the picture is not known.
+/// The tracked frame nearest to a time of the recording, s. `None` where no height was tracked, as the
+/// picture then has no known position.
 fn instant(
     case: &ConditionComparison,
     film: &RecordingVideo<'_>,
@@ -118,7 +118,7 @@ fn instant(
     let at = frames.filter(|at| (0.0..grid.frames as f64).contains(at)).map(|at| at as usize).find(has)?;
     let time_s = grid.time_s(at);
     let model_s = time_s - case.alignment.shift_s;
-    // (measured, model, what is added to the model)
+    // measured minus model at the instant, less an offset
     let apart_m = |measured: &[Option<f64>], model: &[Option<f64>], added_m: f64| {
         Some((*measured.get(at)?)? - view.interpolate_column(model, model_s)? - added_m)
     };
@@ -136,7 +136,7 @@ fn instant(
         (head.0 + head_on_m, head.1 + head_up_m.unwrap_or_default()),
         (tip.0 + tip_on_m, tip.1 + tip_up_m.unwrap_or_default()),
     ];
-    // from the place of the tracked points in the figure to that in the recording
+    // shift from the figure's coordinates to those of the recording
     let from = |column: &[Option<f64>], at_m: f64| Some((*column.get(at)?)? - at_m);
     let by_head = head_up_m.and_then(|_| from(&traces.head_y_m, tracked_m[0].1));
     let by_tip = tip_up_m.and_then(|_| from(&traces.tip_y_m, tracked_m[1].1));
@@ -145,7 +145,7 @@ fn instant(
     Some(Instant { name, time_s, joints_m, tracked_m, frame })
 }
 
-/// The frame `at` round the links, turned and scaled as the figure.
+/// Frame `at` around the links, resampled to the axes of the figure.
 fn photograph(
     film: &RecordingVideo<'_>,
     at: usize,
@@ -196,7 +196,7 @@ pub(crate) fn caption(shown: &VideoFrames) -> String {
     )
 }
 
-/// The rest of what is said of the figure.
+/// Details under the caption.
 #[must_use]
 pub fn details(shown: &VideoFrames) -> String {
     format!(
@@ -205,7 +205,7 @@ pub fn details(shown: &VideoFrames) -> String {
     )
 }
 
-/// Which instants have a frame of the video.
+/// Sentences on the instants with and without a video frame.
 fn frames_in_words(shown: &VideoFrames) -> String {
     let of = |is: fn(&Frame) -> bool| -> Vec<String> {
         shown.instants.iter().filter(|i| is(&i.frame)).map(|i| i.name.to_owned()).collect()
@@ -234,7 +234,7 @@ fn frames_in_words(shown: &VideoFrames) -> String {
     words
 }
 
-/// The figure: the links at every instant.
+/// Draws the links at every instant.
 #[must_use]
 pub fn figure(shown: &VideoFrames) -> Figure {
     Figure {
@@ -255,11 +255,11 @@ fn drawing(shown: &VideoFrames, instant: &Instant) -> Panel {
     let place = |(x, y): (f64, f64)| Some((1e3 * x, 1e3 * y));
     let [head, hinge, tip] = instant.joints_m;
     let [(_, head_m), (_, tip_m)] = instant.distances_m();
-    // the same length for all instants
+    // one scale for all instants
     let all = || shown.instants.iter().flat_map(|i| i.joints_m);
     let size = all().map(|(_, y)| y).fold(0.0, f64::max);
     let half = all().map(|(x, _)| x.abs()).fold(0.0, f64::max) + ROOM * size;
-    // (edged with white, lines and points are seen on any picture)
+    // white edges make lines and points visible on any picture
     let filmed = instant.frame.shown().is_some();
     let look = |plain: Mark| if filmed { Mark::Edged } else { plain };
     let [tracked_head, tracked_tip] = instant.tracked_m.map(place);

@@ -1,4 +1,4 @@
-//! The whole recording with its named windows, and the one that was analysed.
+//! Overview of a recording: its named windows and the analysed part.
 
 use super::history::length_unit;
 use crate::chart::{ChartAxis, Colour, Figure, Mark, Panel, Series, ShadedSpan, TopLabel, VerticalLine};
@@ -30,11 +30,11 @@ pub struct WindowOverview {
     pub time_s: Vec<f64>,
     /// The quantity, m.
     pub channel_m: Vec<Option<f64>>,
-    /// Head along the sweep, m; empty for no such panel.
+    /// Head along the sweep, m; empty for no panel of it.
     pub head_x_m: Vec<Option<f64>>,
     /// The named windows.
     pub windows: Vec<WindowSpan>,
-    /// Start and end of what was analysed, s.
+    /// Start and end of the analysed part, s.
     pub analysed_s: Option<(f64, f64)>,
     /// Named instants, s.
     pub instants: Vec<(String, f64)>,
@@ -51,7 +51,7 @@ const COLOURS: [Colour; 6] =
 #[must_use]
 pub fn draw_figure(shown: &WindowOverview) -> Figure {
     let mut panels = vec![draw_panel(shown, &shown.quantity, &shown.channel_m, HEIGHT_MM)];
-    // names stand over the topmost panel, their shades run through both
+    // only the topmost panel has names; the shades run through both
     let label = |w: &WindowSpan| TopLabel { label: w.name.clone(), at: (w.from_s + w.to_s) / 2.0 };
     panels[0].top_labels = shown.windows.iter().map(label).collect();
     if !shown.head_x_m.is_empty() {

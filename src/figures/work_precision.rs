@@ -1,22 +1,22 @@
-//! Work-precision diagram: error against time, one line a method; runs whose list of transitions is not the
-//! reference's stand apart.
+//! Work-precision diagram: error over wall time, one line per method. Runs with missed or invented
+//! transitions have their own panel.
 
 use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, MarkerShape, Panel, Series};
 
 /// A run in the diagram.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WorkPrecisionRun {
-    /// Name of the method; runs of one name make one line, in their order.
+    /// Name of the method; its runs make one line, in their order.
     pub method: String,
-    /// Time that it took, s.
+    /// Wall time, s.
     pub wall_s: f64,
-    /// Its error, in the unit of the diagram; `None` where it has none to show.
+    /// Error in the unit of the diagram; `None` where it is not defined.
     pub error: Option<f64>,
-    /// Number of transitions that it missed or invented.
+    /// Number of missed or invented transitions.
     pub wrong_transitions: usize,
 }
 
-/// What the diagram shows.
+/// Data of the diagram.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct WorkPrecision {
     /// Heading.
@@ -27,11 +27,11 @@ pub struct WorkPrecision {
     pub error_label: String,
     /// The runs.
     pub points: Vec<WorkPrecisionRun>,
-    /// Error below which the reference is not sure: smaller ones are drawn at it.
+    /// Accuracy of the reference; smaller errors are drawn at this value.
     pub floor: Option<f64>,
 }
 
-/// Height of the panel of errors and of that of wrong lists, mm.
+/// Heights of the panels of errors and of wrong transitions, mm.
 const HEIGHTS_MM: (f64, f64) = (88.0, 24.0);
 /// Looks of the methods, in order of appearance.
 const LOOKS: [(Colour, MarkerShape); 7] = [
@@ -60,7 +60,7 @@ pub fn draw_figure(shown: &WorkPrecision) -> Figure {
         let points = runs(*method).map(|p| Some((p.wall_s, at_least_floor(p.error?))));
         Series::new(*method, *colour, Mark::Joined(*shape), points)
     });
-    // runs with a wrong list, over the number of wrong transitions
+    // runs with wrong transitions, over their number
     let strays = looks().map(|(method, (colour, shape))| {
         let wrong = runs(*method).filter(|p| p.wrong_transitions > 0);
         let points = wrong.map(|p| (p.wall_s, p.wrong_transitions as f64));

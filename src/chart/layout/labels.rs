@@ -1,4 +1,4 @@
-//! Labels over a panel, in rows such that none overlaps another.
+//! Labels above a panel, in rows without overlap, and the legend.
 
 use super::{subtitle_lines, title_lines};
 use crate::chart::axis::CanvasAxis;
@@ -7,13 +7,13 @@ use crate::chart::figure::Figure;
 use crate::chart::style::{Colour, EDGE_MM, LINE_MM, Mark, SMALL_MM, TEXT_MM, UNITS_PER_MM};
 use crate::chart::text::{WIDE_BOLD_LETTER, WIDE_LETTER, text_width, truncate_text};
 
-/// Rows of labels over a panel; further labels are left out, their lines stay.
+/// Most rows of labels above a panel; further labels are left out, but their lines stay.
 const MAX_LABEL_ROWS: usize = 4;
-/// Width of bold letters over that of others.
+/// Width of bold letters over that of plain ones.
 const BOLD_WIDTH_RATIO: f64 = WIDE_BOLD_LETTER / WIDE_LETTER;
 
-/// Row of every label over the panel such that none overlaps another: those of the rules, then the captions,
-/// which stand next to the panel.
+/// Rows of the labels of vertical lines, then of the top labels, without overlap. Top labels are next to the
+/// panel.
 pub(super) fn assign_label_rows(panel: &Panel, x: &CanvasAxis) -> Vec<Option<usize>> {
     let end = |line: &str| x.from + (text_width(line, SMALL_MM) * BOLD_WIDTH_RATIO + 1.0) * UNITS_PER_MM;
     let title_ends: Vec<f64> = panel.title.lines().rev().map(end).collect();
@@ -26,8 +26,8 @@ pub(super) fn assign_label_rows(panel: &Panel, x: &CanvasAxis) -> Vec<Option<usi
     rules.into_iter().map(|row| row.map(|row| row + taken)).chain(captions).collect()
 }
 
-/// The lowest row for every label with its place such that none overlaps another, nor the lines of a title,
-/// of which the lowest comes first and ends at the first of `title_ends`.
+/// The lowest free row for every label. `title_ends` are the ends of the title's lines, the lowest first,
+/// which labels do not overlap.
 fn stack_labels(labels: &[(&str, f64)], x: &CanvasAxis, title_ends: &[f64]) -> Vec<Option<usize>> {
     let place = |at: f64| x.canvas_position(at).filter(|at| *at >= x.from && *at <= x.to);
     let mut order: Vec<(usize, f64)> =
@@ -50,19 +50,19 @@ fn stack_labels(labels: &[(&str, f64)], x: &CanvasAxis, title_ends: &[f64]) -> V
     rows
 }
 
-/// Left and right end of a label over the panel: centred on its place, moved inside the axes.
+/// Left and right end of a label above the panel: centred on its position, moved inside the axes.
 pub(in crate::chart) fn label_span(label: &str, at: f64, x: &CanvasAxis) -> (f64, f64) {
     let width = text_width(&shorten_to_panel(label, x), SMALL_MM) * UNITS_PER_MM;
     let left = (x.canvas_position(at).unwrap_or(x.from) - width / 2.0).min(x.to - width).max(x.from);
     (left, left + width)
 }
 
-/// A label over the panel, as far as the panel is wide.
+/// A label, cut at the width of the panel.
 pub(in crate::chart) fn shorten_to_panel(label: &str, x: &CanvasAxis) -> String {
     truncate_text(label, SMALL_MM, (x.to - x.from) / UNITS_PER_MM)
 }
 
-// The legend: its entries, and where they stand.
+// Legend.
 
 /// An entry of the legend.
 #[derive(Clone, Copy, PartialEq)]
@@ -72,8 +72,8 @@ pub(in crate::chart) enum LegendEntry<'a> {
     Hatch(&'a str, HatchPattern),
 }
 
-/// The entries of the legend with their places, and where the first panel may start; the legend stands over
-/// the panels and covers nothing.
+/// The entries of the legend with their positions, and the top of the first panel, mm. The legend stands
+/// above the panels.
 pub(super) fn place_legend(figure: &Figure) -> (Vec<(LegendEntry<'_>, f64, f64)>, f64) {
     let mut entries: Vec<LegendEntry<'_>> = Vec::new();
     for panel in &figure.panels {
@@ -102,10 +102,10 @@ pub(super) fn place_legend(figure: &Figure) -> (Vec<(LegendEntry<'_>, f64, f64)>
     (placed, end + 1.0)
 }
 
-/// Room for the sample before an entry of the legend, mm.
+/// Width of the sample before an entry of the legend, mm.
 const LEGEND_SAMPLE_MM: f64 = 8.0;
 
-/// What stands in the legend: the label, as far as one line has room for it.
+/// The text of a legend entry, cut at one line.
 pub(in crate::chart) fn legend_text(label: &str, figure: &Figure) -> String {
     truncate_text(label, TEXT_MM, figure.width_mm - 2.0 * EDGE_MM - LEGEND_SAMPLE_MM)
 }

@@ -1,4 +1,4 @@
-//! A panel in its place, and the ticks that fit there.
+//! Position of a panel, and the ticks that fit.
 
 use super::visible_y_values;
 use crate::chart::axis;
@@ -10,10 +10,10 @@ use crate::chart::style::{
 };
 use crate::chart::text::{LETTER, WIDE_LETTER, text_width, truncate_text, wrap_in_two_lines};
 
-/// Ticks for which a narrow x axis has room, however close they come.
+/// Least number of ticks on a narrow x axis, however close they are.
 const LEAST_X_TICKS: f64 = 4.0;
 
-/// A panel with its place; lengths in mm.
+/// A panel with its position; areas in canvas units, lengths in mm.
 pub(in crate::chart) struct PanelLayout<'a> {
     pub panel: &'a Panel,
     pub x: CanvasAxis,
@@ -21,15 +21,15 @@ pub(in crate::chart) struct PanelLayout<'a> {
     pub area: CanvasArea,
     /// Whether the ticks of the x axis are labelled here.
     pub has_x_labels: bool,
-    /// Row over the panel of the label of every rule, then of every caption.
+    /// Rows of the labels of vertical lines, then of the top labels.
     pub label_rows: Vec<Option<usize>>,
-    /// Letter by which a text names it, where there are several.
+    /// Letter of the panel; `None` for a single panel.
     pub letter: Option<char>,
     /// Left end of its column, mm.
     pub column_mm: f64,
-    /// Height of what stands under the axes, mm.
+    /// Height of the labels below the axes, mm.
     pub(super) under_mm: f64,
-    /// Width that names along the y axis may take, mm.
+    /// Largest width of names along the y axis, mm.
     pub(super) names_mm: f64,
 }
 
@@ -75,7 +75,7 @@ impl<'a> PanelLayout<'a> {
         Some((self.x.canvas_position(x)?, self.y.canvas_position(y)?))
     }
 
-    /// Widens the shorter of the axes about its middle until both have one length for a unit.
+    /// Widens one axis about its middle until both have the same scale.
     fn equalise_scales(&mut self) {
         let unit = |axis: &CanvasAxis| (axis.high - axis.low) / (axis.to - axis.from).abs();
         let most = unit(&self.x).max(unit(&self.y));
@@ -85,7 +85,7 @@ impl<'a> PanelLayout<'a> {
         }
     }
 
-    /// Ticks of the x axis: names, or numbers that do not run into each other.
+    /// Ticks of the x axis: names, or numbers without overlap.
     pub(crate) fn x_ticks(&self) -> Vec<Tick> {
         if !self.panel.x.categories.is_empty() {
             let most_mm = self.x_names_mm().map_or(f64::INFINITY, |_| MOST_NAMES * self.panel.height_mm);
@@ -119,7 +119,7 @@ impl<'a> PanelLayout<'a> {
         spans.windows(2).all(|pair| pair[0].1 + UNITS_PER_MM < pair[1].0)
     }
 
-    /// Takes the labels away that would run into the one before, or out of the figure.
+    /// Removes labels that would overlap the one before or leave the figure.
     fn drop_crowded_labels(&self, ticks: &mut [Tick]) {
         let mut end = f64::NEG_INFINITY;
         let edge = self.area.right + (EDGE_MM + HALF_LABEL_MM) * UNITS_PER_MM;
@@ -139,8 +139,7 @@ impl<'a> PanelLayout<'a> {
         y_axis_ticks(self.panel, &self.y, self.names_mm)
     }
 
-    /// Height that the names under an x axis take where they have to stand upright, mm; `None` where they
-    /// lie, or are none.
+    /// Height of vertical names below an x axis, mm; `None` where they are horizontal or there are none.
     pub(crate) fn x_names_mm(&self) -> Option<f64> {
         let names = &self.panel.x.categories;
         let step_mm = (self.area.right - self.area.left) / UNITS_PER_MM / (self.x.high - self.x.low).max(1.0);
@@ -149,28 +148,27 @@ impl<'a> PanelLayout<'a> {
     }
 }
 
-// Ticks of a y axis, and how wide their labels are.
+// Ticks of a y axis and the width of their labels.
 
-/// Largest share of a column that the names along a y axis, or of the height of the axes that those under an
-/// x axis may take.
+/// Largest fraction of a column for names along a y axis, and of the axes' height for vertical names below an
+/// x axis.
 pub(super) const MOST_NAMES: f64 = 0.4;
-/// Room for a label of five digits, whose middle stands at the end of the axis.
+/// Half the width of a label of five digits, mm, which is centred on the end of the axis.
 pub(super) const HALF_LABEL_MM: f64 = 2.0;
-/// Least distance of labelled ticks on a low y axis that has only one of them otherwise, mm: that of lines of
-/// text.
+/// Least distance of labelled ticks on a y axis that would otherwise have only one, mm: a line of text.
 const CROWDED_Y_TICKS_MM: f64 = LINE_MM;
-/// Height of a line of small letters that has another one over or under it, mm.
+/// Height of a line of small letters in two lines, mm.
 pub(in crate::chart) const SMALL_LINE_MM: f64 = SMALL_MM + 0.1;
-/// Room between names of two lines: what belongs together stands closer.
+/// Gap between names of two lines, mm.
 const BETWEEN_NAMES_MM: f64 = 0.6;
 
-/// Whether two ticks have numbers at least: one alone says nothing of the scale.
+/// Whether at least two ticks have labels: one alone shows no scale.
 pub(super) fn shows_scale(ticks: &[Tick]) -> bool {
     ticks.iter().filter(|tick| tick.label.is_some()).nth(1).is_some()
 }
 
-/// Ticks of a y axis, whose names may be so wide; longer ones stand in two lines of small letters where the
-/// places are that far apart.
+/// Ticks of a y axis. Names wider than `names_mm` wrap to two lines of small letters where the ticks are far
+/// enough apart.
 pub(super) fn y_axis_ticks(panel: &Panel, y: &CanvasAxis, names_mm: f64) -> Vec<Tick> {
     if panel.y.categories.is_empty() {
         let usual_mm = if y.scale == AxisScale::Log { Y_LOG_TICKS_MM } else { Y_TICKS_MM };

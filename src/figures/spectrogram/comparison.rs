@@ -1,5 +1,4 @@
-//! Spectrograms of a recording and of the model side by side on one scale, with both ridges over time and
-//! over speed.
+//! Spectrograms of recording and model on one colour scale, with both ridges over time and over tip speed.
 
 use super::{
     Figure, SpectrogramPlot, colour_range_db, decibel_map, draw_map, full_figure, ridge_points, time_span,
@@ -7,12 +6,12 @@ use super::{
 use crate::chart::{ChartAxis, Colour, HeatMap, Mark, MarkerShape, Panel, Series};
 use crate::figures::spectrogram;
 
-/// Whose spectrogram it is.
+/// Source of a spectrogram.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SpectrogramSide {
-    /// Of the recording.
+    /// The recording.
     Measured,
-    /// Of the model.
+    /// The model.
     Model,
 }
 
@@ -25,19 +24,19 @@ pub struct SpectrogramComparison {
     pub note: String,
     /// Whether the measured motion is synthetic.
     pub synthetic: bool,
-    /// One or both, over the same frequencies; the first sets the colours.
+    /// One or both sides over the same frequencies; the first sets the colour scale.
     pub sides: Vec<(SpectrogramSide, SpectrogramPlot)>,
 }
 
 /// Heights of the maps and of the ridges under them, mm.
 const HEIGHT_MM: f64 = 56.0;
 const RIDGE_HEIGHT_MM: f64 = 40.0;
-/// Most columns and rows of a map: two of them stay small, and a cell is no wider than a millimetre.
+/// Most columns and rows of a map, for small files; a cell stays narrower than a millimetre.
 const MOST_COLUMNS: usize = 64;
 const MOST_ROWS: usize = 48;
 
 impl SpectrogramSide {
-    /// Name, colour, symbol of its points and line of its ridge.
+    /// Name, colour, symbol of the points and line style of the ridge.
     fn look(self) -> (&'static str, Colour, MarkerShape, Mark) {
         match self {
             Self::Measured => ("measured", Colour::Black, MarkerShape::Disc, Mark::Thin),
@@ -52,7 +51,7 @@ pub fn draw_comparison(shown: &SpectrogramComparison) -> Figure {
     let sides: Vec<(SpectrogramSide, SpectrogramPlot)> =
         shown.sides.iter().map(|(of, s)| (*of, coarsen_spectrogram(s))).collect();
     let range = sides.first().and_then(|(_, s)| colour_range_db(&decibel_map(&s.amplitude_m)));
-    // with one axis of time for both sides, panels one below the other are numbered once
+    // stacked panels with equal time axes share their tick labels
     let spans = sides.iter().filter_map(|(_, s)| time_span(&s.time_s));
     let span_s = spans.reduce(|a, b| (a.0.min(b.0), a.1.max(b.1)));
     let time = ChartAxis::time().with_ends(span_s);
@@ -85,15 +84,15 @@ pub fn draw_comparison(shown: &SpectrogramComparison) -> Figure {
     }
 }
 
-/// Neighbouring columns and rows as one, with the largest of their amplitudes, so that a thin line stays; the
-/// frequencies outside what is shown are left out.
+/// Merges neighbouring columns and rows by their largest amplitude, which keeps thin lines, and drops
+/// frequencies that are not shown.
 fn coarsen_spectrogram(shown: &SpectrogramPlot) -> SpectrogramPlot {
     let (low, high) = shown.shown_hz.unwrap_or((f64::NEG_INFINITY, f64::INFINITY));
     let from = shown.frequency_hz.partition_point(|f| *f < low);
     let to = shown.frequency_hz.partition_point(|f| *f <= high).max(from);
     let (columns, rows) =
         (shown.time_s.len().div_ceil(MOST_COLUMNS).max(1), (to - from).div_ceil(MOST_ROWS).max(1));
-    // points of the ridge that stand apart on a map, with its gaps
+    // every so many points of the ridge, and all its gaps
     let every = shown.ridge.len().div_ceil(MOST_COLUMNS).max(1);
     let ridge = shown.ridge.iter().enumerate().filter(|(i, p)| p.frequency_hz.is_none() || i % every == 0);
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;

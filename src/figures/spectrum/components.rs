@@ -1,29 +1,29 @@
-//! Components with their uncertainty as symbols with error bars, and their names.
+//! Components as symbols with error bars, and their labels.
 
 use super::MICROMETRES;
 use crate::chart::{Colour, ErrorBar, Mark, MarkerShape, Series, VerticalLine};
 use crate::text::{format_trimmed, format_with_sd};
 
-/// A component as it is shown: frequency and amplitude with two standard deviations either side, or the range
-/// of one that drifts.
+/// A component for display: frequency and amplitude with two standard deviations, or the range of a drifting
+/// frequency.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LabelledComponent {
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz.
+    /// Standard deviation of the frequency, Hz.
     pub frequency_sd_hz: f64,
-    /// Least and greatest frequency of one that drifts, Hz.
+    /// Least and greatest frequency of a drifting component, Hz.
     pub range_hz: Option<(f64, f64)>,
     /// Amplitude, m.
     pub amplitude_m: f64,
-    /// Its standard deviation, m.
+    /// Standard deviation of the amplitude, m.
     pub amplitude_sd_m: f64,
-    /// What stands after the frequency, such as `alias?`; empty for a component that is clear.
+    /// Remark after the frequency, such as `alias?`; empty for a clear component.
     pub remark: String,
 }
 
 impl LabelledComponent {
-    /// Its frequency with the deviation in units of the last digit, and what is wrong with it.
+    /// Label: the frequency with its standard deviation in units of the last digit, and the remark.
     pub(crate) fn label_text(&self) -> String {
         let frequency = match self.range_hz {
             Some((low, high)) => format!("{} to {} Hz", format_trimmed(low, 4), format_trimmed(high, 4)),
@@ -57,12 +57,12 @@ impl LabelledComponent {
 
 /// Look of the components of one source: entry in the legend, colour, shape.
 type ComponentLook = (&'static str, Colour, MarkerShape);
-/// One without a remark, and one with, where there is but one source.
+/// Looks without and with a remark, for a single source.
 const ALONE: [ComponentLook; 2] = [
     ("component \u{b1} 2 sd", Colour::Blue, MarkerShape::Disc),
     ("component that is not clear", Colour::Vermilion, MarkerShape::Diamond),
 ];
-/// The same of a recording next to a model, whose line is vermilion.
+/// Looks for recording and model in one panel; the model's line is vermilion.
 const MEASURED: [ComponentLook; 2] = [
     ("measured \u{b1} 2 sd", Colour::Black, MarkerShape::Disc),
     ("measured, not clear", Colour::Black, MarkerShape::Diamond),
@@ -92,8 +92,7 @@ fn source_series(
     [(clear, true), (not_clear, false)].map(of).into_iter().filter(|s| !s.points.is_empty())
 }
 
-/// Names over the panel, each with a line up from its symbol: of a limited number, those without a remark
-/// first.
+/// Labels above the panel with lines from their symbols; at most `most`, clear components first.
 pub(super) fn component_labels(
     components: &[LabelledComponent],
     most: usize,

@@ -1,4 +1,4 @@
-//! What a map says in words: from where to where its values go, and with which parameter they rise or fall.
+//! Result of a map in words: its range, and the parameters with which it rises or falls.
 
 use super::parameter_words;
 use crate::feature::FeatureUnit;
@@ -7,16 +7,16 @@ use crate::sweep::rank_correlation::spearman_correlation;
 use crate::sweep::{PointOutcome, Study, SweepAxis, SweepMap};
 use crate::text::{capitalise, format_decimals, format_trimmed};
 
-/// Rank correlation from which on a map is said to rise or fall with a parameter.
+/// Least absolute rank correlation of a trend.
 const CLEAR: f64 = 0.5;
-/// Least share of the points that have a value, for what is said of a trend.
+/// Least fraction of points with a value for a statement on trends.
 const MOSTLY_KNOWN: f64 = 0.5;
 /// Significant digits of the larger end.
 const DIGITS: i32 = 3;
-/// Powers of ten of the larger end for which both are written with the same decimals.
+/// Powers of ten of the larger end for which both ends have the same number of decimals.
 const PLAIN: std::ops::RangeInclusive<i32> = -3..=4;
 
-/// What the values of a map show.
+/// Range and trends of a map.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::figures) struct MapClaim {
     /// The quantity, such as "High component".
@@ -49,12 +49,12 @@ impl MapClaim {
         }
     }
 
-    /// All in one line.
+    /// Name, range and trend in one line.
     pub(crate) fn title(&self) -> String {
         format!("{}: {}", self.name, join_trend(&self.range, &self.trend))
     }
 
-    /// Range and trend in that many letters: in words, by symbols, or the strongest trend alone.
+    /// Range and trend within a number of letters: trends in words, by symbols, or only the strongest.
     pub(crate) fn fit_in_letters(&self, letters: usize) -> String {
         let ways =
             [&self.trend, &self.short_trend, &self.strongest].map(|trend| join_trend(&self.range, trend));
