@@ -1,9 +1,8 @@
-//! A parameter study: a scene run at every point of a grid over its parameters, or of a sample of them, and
-//! what is read from each run.
+//! A parameter study: a scene is run at every point of a grid or a sample, and readings are taken of each run.
 //!
-//! A point whose run ends early, or does not show what is read, has a reason instead of a value
-//! ([`MissingReason`]); nothing is filled in. Points do not know each other, so a study gives the same numbers for
-//! any number of threads, and goes on from a [`journal`] of the points that are done.
+//! A point whose run ends early or lacks a reading has a reason instead of a value ([`MissingReason`]); nothing
+//! is filled in. Points are independent of each other, so the numbers do not depend on the number of threads,
+//! and a study resumes from a [`journal`] of finished points.
 
 pub mod collect;
 pub mod grid;
@@ -15,8 +14,7 @@ pub mod study;
 
 pub use crate::feature::MissingReason;
 pub use collect::{CollectError, PointCollection};
-pub(crate) use grid::SamplePlan;
-pub(crate) use grid::{AxisSpacing, SweepAxis};
+pub(crate) use grid::{AxisSpacing, SamplePlan, SweepAxis};
 pub(crate) use journal::PointRecheck;
 pub use point::{EarlyEnd, PointOutcome};
 pub use rank_correlation::RankCorrelations;
@@ -29,7 +27,7 @@ use rayon::prelude::*;
 use std::ops::ControlFlow;
 use std::sync::mpsc::{Receiver, sync_channel};
 
-/// Points that may wait for the disk: a disk that is slower than the model does not fill the memory.
+/// Most points that wait for the disk, so that a slow disk does not fill the memory.
 const WAITING: usize = 4096;
 
 /// Why a study stopped.
@@ -41,14 +39,15 @@ pub enum SweepError {
         /// Why.
         problem: String,
     },
-    /// It was asked to stop; the points that were done are in the journal.
+    /// The caller asked for the end; the journal holds the finished points.
     #[error("the study was asked to stop")]
     Interrupted,
 }
 
-/// Runs every point of a shard of a checked study that is `due`, in parallel; each goes to `sink`, in any
-/// order, and `done` is called once for each that is written. `flow` is asked before each of them. Nothing is
-/// kept in memory: what the points gave is read from their [`journal`], such as by a [`PointCollection`].
+/// Runs the points of a shard for which `due` holds, in parallel.
+///
+/// `flow` is asked before each point. Finished points go to `sink` in any order; `done` is called after each
+/// write. No outcome stays in memory: a [`PointCollection`] reads them from the [`journal`].
 ///
 /// # Errors
 /// [`SweepError`] when the journal cannot be written, or when `flow` breaks before the last point.
@@ -62,31 +61,28 @@ pub fn run_sweep(
     flow: &(dyn Fn() -> ControlFlow<()> + Sync),
 ) -> Result<(), SweepError> {
     std::thread::scope(|scope| {
-        // the disk is waited for on a thread of its own, while others compute
+        // one thread waits for the disk while the others compute
         let (to_disk, lines) = sync_channel::<String>(WAITING);
         let writer = scope.spawn(move || write_lines(&lines, sink, done));
         let point = |index: usize| {
             if flow().is_break() {
                 return Err(SweepError::Interrupted);
             }
-            let line = format_record_line(
-                &SweepPoint { index, outcome: PointOutcome::run_point(study, scene, index) },
-                index,
-            );
-            // nobody receives it after a failure, which the writer reports
+            let outcome = PointOutcome::run_point(study, scene, index);
+            let line = format_record_line(&SweepPoint { index, outcome }, index);
+            // the channel closes only after a failure, which the writer reports
             to_disk.send(line).map_err(|_| SweepError::Interrupted)
         };
         let places = (0..shard.count_points(study.point_count())).into_par_iter();
         let ran =
             places.map(|place| shard.point_index(place)).filter(|index| due(*index)).try_for_each(point);
         drop(to_disk);
-        let panicked = |_| Err("the thread that writes it failed".to_owned());
-        let written = writer.join().unwrap_or_else(panicked);
+        let written = writer.join().unwrap_or_else(|_| Err("the thread that writes it failed".to_owned()));
         written.map_err(|problem| SweepError::JournalWrite { problem }).and(ran)
     })
 }
 
-/// What every point of a small study gives, in the order of the study, without a journal.
+/// Runs every point of a small study without a journal; outcomes are in the order of the points.
 #[must_use]
 pub fn run_all_points(study: &Study, scene: &Scene) -> Vec<PointOutcome> {
     (0..study.point_count())
@@ -95,7 +91,7 @@ pub fn run_all_points(study: &Study, scene: &Scene) -> Vec<PointOutcome> {
         .collect()
 }
 
-/// Writes lines as they come; those that came while the disk was busy go together.
+/// Writes lines as they arrive; lines that arrived during a write share the next one.
 fn write_lines(
     lines: &Receiver<String>,
     sink: &mut dyn CheckpointSink,

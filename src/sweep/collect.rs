@@ -1,6 +1,6 @@
-//! The points of a study from any number of journals, each counted once.
+//! Points of a study, collected from any number of journals without repetition.
 //!
-//! Points are kept in a temporary file; the memory holds eight bytes a point.
+//! The points lie in a temporary file; memory holds eight bytes per point.
 
 use super::journal::{SweepHeader, SweepPoint};
 use super::point::PointOutcome;
@@ -18,22 +18,22 @@ pub enum CollectError {
     Spool(#[from] io::Error),
 }
 
-/// What a journal added.
+/// Points that a journal added.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct AddedPoints {
-    /// Its points.
+    /// Number of points in the journal.
     pub points: usize,
-    /// Those of them that no journal before it had.
+    /// Number of points that no earlier journal had.
     pub new: usize,
-    /// How it ends.
+    /// Whether the journal ends in a torn line.
     pub end: CheckpointEnd,
 }
 
-/// Points of a study, with a temporary file for them.
+/// Points of a study in a temporary file.
 #[derive(Debug)]
 pub struct PointCollection<F: Write> {
     header: SweepHeader,
-    /// Where each point starts in the temporary file, plus one; 0 for one that is missing.
+    /// Offset of each point in the temporary file plus one; 0 for a missing point.
     places: Vec<u64>,
     files: Vec<String>,
     spool: BufWriter<F>,
@@ -41,21 +41,20 @@ pub struct PointCollection<F: Write> {
     known: usize,
 }
 
-/// A point in the temporary file: the numbers of its journal and line, and the length of its text.
+/// Bytes before the text of a point: number of its journal (4), its line (8), length of the text (4).
 const HEAD_BYTES: usize = 16;
 
 impl<F: Read + Write + Seek> PointCollection<F> {
-    /// No point yet; `header` is that of every journal of the study, and `spool` an empty file.
+    /// An empty collection; every journal has this `header`, and `spool` is an empty file.
     pub fn new(header: SweepHeader, spool: F) -> Self {
         let places = vec![0; header.body.points];
         Self { header, places, files: Vec::new(), spool: BufWriter::new(spool), end: 0, known: 0 }
     }
 
-    /// Adds the points of a journal, `None` where it has no complete header; `file` is its name in refusals.
+    /// Adds the points of a journal; `None` without a complete header. Error texts call the journal `file`.
     ///
     /// # Errors
-    /// [`CollectError`] when it is of another study or version, is damaged, or a point in it is not what
-    /// another journal has.
+    /// [`CollectError`] for another study or version, for damage, or when two journals disagree on a point.
     pub fn add_journal(
         &mut self,
         file: &str,
@@ -63,8 +62,7 @@ impl<F: Read + Write + Seek> PointCollection<F> {
     ) -> Result<Option<AddedPoints>, CollectError> {
         let Some(mut journal) = CheckpointReader::<SweepPoint, _>::open(file, from)? else { return Ok(None) };
         journal.header().check_matches::<SweepPoint>(file, &self.header)?;
-        let before = self.known;
-        let mut points = 0;
+        let (before, mut points) = (self.known, 0);
         self.files.push(file.to_owned());
         while let Some(found) = journal.next_record()? {
             points += 1;
@@ -76,52 +74,41 @@ impl<F: Read + Write + Seek> PointCollection<F> {
         Ok(Some(AddedPoints { points, new: self.known - before, end: journal.end() }))
     }
 
-    /// Number of points that are known.
+    /// Number of collected points.
     pub(crate) fn known_count(&self) -> usize {
         self.known
     }
 
-    /// Indices of the points that are missing.
+    /// Indices of the missing points.
     pub(crate) fn missing_indices(&self) -> impl Iterator<Item = usize> + '_ {
         self.places.iter().enumerate().filter(|(_, place)| **place == 0).map(|(index, _)| index)
-    }
-
-    /// What a point gave; `None` where it is missing.
-    ///
-    /// # Errors
-    /// [`CollectError::Spool`].
-    pub(crate) fn read_outcome(&mut self, index: usize) -> Result<Option<PointOutcome>, CollectError> {
-        Ok(self.read_point(index)?.map(|there| there.point.outcome))
     }
 
     /// Calls `each` with every point in order.
     ///
     /// # Errors
-    /// [`CollectError::Spool`], also where a point is missing.
+    /// [`CollectError::Spool`], also for a missing point.
     pub fn for_each_point(&mut self, mut each: impl FnMut(usize, PointOutcome)) -> Result<(), CollectError> {
         for index in 0..self.places.len() {
             let missing = || io::Error::other(format!("point {index} is missing"));
-            each(index, self.read_outcome(index)?.ok_or_else(missing)?);
+            each(index, self.read_point(index)?.ok_or_else(missing)?.point.outcome);
         }
         Ok(())
     }
 
     fn spool_point(&mut self, found: &StoredRecord<SweepPoint>) -> Result<(), CollectError> {
         let text = serde_json::to_vec(&found.record.to_row(0)).map_err(io::Error::from)?;
-        let file = (self.files.len() - 1) as u32;
-        self.spool.write_all(&file.to_le_bytes())?;
-        self.spool.write_all(&(found.line as u64).to_le_bytes())?;
-        self.spool.write_all(&(text.len() as u32).to_le_bytes())?;
-        self.spool.write_all(&text)?;
+        let (file, line, length) = ((self.files.len() - 1) as u32, found.line as u64, text.len() as u32);
+        let bytes = [&file.to_le_bytes()[..], &line.to_le_bytes(), &length.to_le_bytes(), &text].concat();
+        self.spool.write_all(&bytes)?;
         if let Some(place) = self.places.get_mut(found.record.index) {
             *place = self.end + 1;
         }
-        self.end += (HEAD_BYTES + text.len()) as u64;
+        self.end += bytes.len() as u64;
         self.known += 1;
         Ok(())
     }
 
-    /// A point that is known.
     fn read_point(&mut self, index: usize) -> Result<Option<SpooledPoint>, CollectError> {
         let Some(place) = self.places.get(index).filter(|place| **place > 0) else { return Ok(None) };
         self.spool.seek(SeekFrom::Start(place - 1))?;
@@ -129,8 +116,7 @@ impl<F: Read + Write + Seek> PointCollection<F> {
         let mut head = [0; HEAD_BYTES];
         file.read_exact(&mut head)?;
         let [a, b, c, d, line @ .., e, f, g, h] = head;
-        let length = u32::from_le_bytes([e, f, g, h]) as usize;
-        let mut text = vec![0; length];
+        let mut text = vec![0; u32::from_le_bytes([e, f, g, h]) as usize];
         file.read_exact(&mut text)?;
         self.spool.seek(SeekFrom::Start(self.end))?;
         let row = serde_json::from_slice(&text).map_err(io::Error::from)?;
@@ -157,7 +143,7 @@ impl<F: Read + Write + Seek> PointCollection<F> {
     }
 }
 
-/// A point and where its line stands.
+/// A point and its line in a journal.
 struct SpooledPoint {
     point: SweepPoint,
     file: usize,

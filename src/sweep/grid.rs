@@ -1,5 +1,4 @@
-//! Where the points of a study lie: on a grid, every value of a parameter with every value of the others, or
-//! in the box of a sample.
+//! Points of a study: a grid of all combinations of the axes' values, or a sample of their box.
 
 use crate::math;
 use crate::model::parameters::ModelParameter;
@@ -11,10 +10,10 @@ use sobol::Sobol;
 use sobol::params::JoeKuoD6;
 use std::sync::OnceLock;
 
-/// Significant digits of a value between two ends: a grid is the same on every machine, and reads like one.
+/// Significant digits of a value between two ends: it is then the same on every machine, and short.
 const DIGITS: usize = 12;
 
-/// How values lie along an axis.
+/// Spacing of values along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AxisSpacing {
@@ -25,48 +24,43 @@ pub enum AxisSpacing {
     Log,
 }
 
-/// A parameter and the values that it takes, rising, in its own SI unit.
+/// A parameter and its rising values in SI.
 #[derive(Debug, Clone)]
 pub struct SweepAxis {
-    /// Its row in the table of parameters.
+    /// Row in the table of parameters.
     pub parameter: &'static ModelParameter,
-    /// At least two, rising; the ends of the range where points are sampled.
+    /// At least two rising values; for a sample, the ends of the range.
     pub values: Vec<f64>,
-    /// How they are drawn, and how they were spread if they were.
+    /// Spacing of the values, also on the axis of a figure.
     pub spacing: AxisSpacing,
 }
 
 impl AxisSpacing {
-    /// The value at a share of the way from one end to the other.
+    /// The value at a fraction of the range.
     pub(crate) fn interpolate_value(self, from: f64, to: f64, share: f64) -> f64 {
-        round_value(match self {
+        let value = match self {
             Self::Linear => from + share * (to - from),
             Self::Log => from * math::exp(share * math::ln(to / from)),
-        })
+        };
+        format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
     }
 
-    /// `points` values (two or more) from one end to the other, both included and exact.
+    /// `points` values (two or more) over the range; both ends are exact.
     pub(crate) fn spread_values(self, from: f64, to: f64, points: usize) -> Vec<f64> {
         let last = points.saturating_sub(1);
-        let inner = |i: usize| self.interpolate_value(from, to, i as f64 / last as f64);
-        let ends = |i: usize| {
-            if i == 0 {
-                from
-            } else if i == last {
-                to
-            } else {
-                inner(i)
-            }
+        let value = |i: usize| match i {
+            0 => from,
+            _ if i == last => to,
+            _ => self.interpolate_value(from, to, i as f64 / last as f64),
         };
-        (0..points).map(ends).collect()
+        (0..points).map(value).collect()
     }
 }
 
-/// A range that is walked in one way.
+/// Values of an axis and their spacing.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct AxisValues<'a> {
     pub of: &'a [f64],
-    /// How they are spread.
     pub spacing: AxisSpacing,
 }
 
@@ -87,31 +81,21 @@ pub(crate) fn point_values(axes: &[AxisValues], sample: Option<&SamplePlan>, ind
     }
 }
 
-fn round_value(value: f64) -> f64 {
-    format!("{value:.*e}", DIGITS - 1).parse().unwrap_or(value)
-}
-
-/// Places of point `index` along axes of these lengths; the first axis is the slowest.
+/// Indices of point `index` along axes of these lengths; the first axis is the slowest.
 pub(crate) fn grid_indices(lengths: &[usize], index: usize) -> Vec<usize> {
     let mut rest = index;
-    let mut places: Vec<usize> = lengths
-        .iter()
-        .rev()
-        .map(|length| {
-            let place = rest % length.max(&1);
-            rest /= length.max(&1);
-            place
-        })
-        .collect();
-    places.reverse();
+    let mut places = vec![0; lengths.len()];
+    for (place, length) in places.iter_mut().zip(lengths).rev() {
+        (*place, rest) = (rest % length.max(&1), rest / length.max(&1));
+    }
     places
 }
 
-// Points of a study that are drawn from a box instead of a grid.
+// Sampled points.
 
-/// Most dimensions: more than a scene has parameters.
+/// Most dimensions of a sample: more than a scene has parameters.
 const MOST_DIMENSIONS: usize = 64;
-/// Bits of a coordinate, and so of the number of a point.
+/// Bits of a coordinate and of a point's index.
 const BITS: usize = 32;
 
 /// How the points of a sampled study are chosen.
@@ -139,8 +123,8 @@ pub enum SampleSequence {
 }
 
 impl SamplePlan {
-    /// Coordinates of point `index` in a unit box, each above 0 and below 1; any point by itself, without
-    /// those before it.
+    /// Coordinates of point `index` in the unit box, each above 0 and below 1. The Gray code of the index gives
+    /// a point without its predecessors.
     pub(crate) fn unit_coordinates(&self, index: usize) -> impl Iterator<Item = f64> {
         let SampleSequence::Sobol = self.method;
         let mut shifts = Xoshiro256PlusPlus::seed_from_u64(self.seed);
@@ -153,7 +137,7 @@ impl SamplePlan {
     }
 }
 
-/// Direction numbers, a row a dimension and the first for the lowest bit of a point's number.
+/// Direction numbers: a row per dimension, the first number for the lowest bit of an index.
 fn direction_numbers() -> &'static [Vec<u32>] {
     static DIRECTIONS: OnceLock<Vec<Vec<u32>>> = OnceLock::new();
     DIRECTIONS.get_or_init(|| Sobol::<u32>::init_direction_vals(MOST_DIMENSIONS, BITS, &JoeKuoD6::minimal()))
@@ -186,7 +170,7 @@ mod tests {
         sample(index).zip(sample(0)).take(dimensions).map(|(a, b)| digits(a) ^ digits(b)).collect()
     }
 
-    /// Every point is that of the crate's sequence, which makes one from the one before.
+    /// The crate computes each point from its predecessor.
     #[test]
     fn a_point_by_itself_is_that_of_the_sequence() {
         let sequence = Sobol::<u32>::new(12, &JoeKuoD6::minimal());
@@ -210,8 +194,7 @@ mod tests {
         }
     }
 
-    /// The integral of a product whose value is known, by 4,096 points in six dimensions: a plain random
-    /// sample is off by 0.01.
+    /// The integral of a product of known value by 4,096 points in six dimensions; a random sample errs by 0.01.
     #[test]
     fn a_sample_integrates_better_than_random_numbers() {
         let sample = SamplePlan { method: SampleSequence::Sobol, points: 4096, seed: 3 };

@@ -1,14 +1,10 @@
-//! Points of a study in a journal, in the order in which they were done.
+//! Journal of a study: its points in the order in which they finished.
 
-use super::grid::AxisSpacing;
+use super::grid::{AxisSpacing, SweepAxis};
 use super::point::{EarlyEnd, PointOutcome};
 use super::study::Study;
 use super::{MissingReason, SamplePlan, SweepMap};
-use crate::checkpoint;
-use crate::checkpoint::{
-    CheckpointError, CheckpointKind, CheckpointRecord, ExactNumber, RECHECKED_RECORDS, StoredRecord,
-    check_recomputed,
-};
+use crate::checkpoint::{self, CheckpointError, CheckpointKind, CheckpointRecord, ExactNumber, StoredRecord};
 use crate::simulate::scene::Scene;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -19,33 +15,33 @@ use serde::{Deserialize, Serialize};
 pub type SweepJournal = checkpoint::CheckpointFile<SweepPoint>;
 pub(crate) type SweepHeader = checkpoint::CheckpointHeader<SweepHeaderBody>;
 
-/// What the header of a study says besides.
+/// Part of the header that only studies have.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SweepHeaderBody {
     /// Number of points.
     pub points: usize,
-    /// What is varied, the slowest first.
+    /// Axes, the slowest first.
     pub axes: Vec<AxisRecord>,
-    /// How points are drawn instead of lying on a grid.
+    /// Plan of a sampled study; `None` for a grid.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample: Option<SamplePlan>,
     /// Columns of the maps, in the order of the values.
     pub maps: Vec<String>,
 }
 
-/// A parameter and the values that it takes.
+/// A parameter and its values.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct AxisRecord {
     /// Name of the parameter.
     pub name: String,
-    /// Its unit as shown; `1` for a plain number.
+    /// Unit for display; `1` for a plain number.
     pub unit: String,
-    /// How they are spread.
+    /// Spacing of the values.
     #[serde(default, skip_serializing_if = "is_linear")]
     pub scale: AxisSpacing,
-    /// Its values, rising.
+    /// Rising values.
     pub values: Vec<ExactNumber>,
 }
 
@@ -56,24 +52,27 @@ fn is_linear(spacing: &AxisSpacing) -> bool {
 /// One point in a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SweepPoint {
-    /// Its place in the study, counted from 0.
+    /// Index in the study, from 0.
     pub index: usize,
-    /// What it gave.
+    /// Readings, or why the run ended early.
     pub outcome: PointOutcome,
 }
 
 /// The header of a study with this fingerprint.
 #[must_use]
 pub fn study_header(study: &Study, fingerprint: &str) -> SweepHeader {
-    let axes = study.axes.iter().map(|axis| AxisRecord {
+    let axis = |axis: &SweepAxis| AxisRecord {
         name: axis.parameter.name.to_owned(),
         unit: axis.parameter.unit.to_owned(),
         scale: if study.sample.is_some() { axis.spacing } else { AxisSpacing::Linear },
         values: axis.values.iter().copied().map(ExactNumber).collect(),
-    });
-    let maps = study.maps.iter().map(SweepMap::column).collect();
-    let body =
-        SweepHeaderBody { points: study.point_count(), axes: axes.collect(), sample: study.sample, maps };
+    };
+    let body = SweepHeaderBody {
+        points: study.point_count(),
+        axes: study.axes.iter().map(axis).collect(),
+        sample: study.sample,
+        maps: study.maps.iter().map(SweepMap::column).collect(),
+    };
     SweepHeader::new::<SweepPoint>(fingerprint, env!("CARGO_PKG_VERSION"), body)
 }
 
@@ -91,7 +90,7 @@ impl CheckpointRecord for SweepPoint {
         let PointOutcome { ended, stopped_at_s, values } = &self.outcome;
         let cell = |value: &Result<f64, MissingReason>| match value {
             Ok(value) => ValueCell::Value(ExactNumber(*value)),
-            Err(reason) => ValueCell::Missing(MissingCell { reason: *reason }),
+            Err(reason) => ValueCell::Missing { reason: *reason },
         };
         Row {
             index: self.index,
@@ -101,7 +100,7 @@ impl CheckpointRecord for SweepPoint {
         }
     }
 
-    /// Points stand in the order in which they were done.
+    /// Points are not ordered by index.
     fn line_index(_: &Row) -> Option<usize> {
         None
     }
@@ -113,13 +112,18 @@ impl CheckpointRecord for SweepPoint {
         if row.index >= body.points {
             return Err(format!("`index`: found {}, expected less than {}", row.index, body.points));
         }
-        Ok(Self { index: row.index, outcome: row.into_outcome() })
+        let value = |cell: ValueCell| match cell {
+            ValueCell::Value(value) => Ok(value.0),
+            ValueCell::Missing { reason } => Err(reason),
+        };
+        let (ended, stopped_at_s) = (row.ended, row.stopped_at_s.map(|at| at.0));
+        let values = row.values.into_iter().map(value).collect();
+        Ok(Self { index: row.index, outcome: PointOutcome { ended, stopped_at_s, values } })
     }
 
     fn difference(&self, other: &Self) -> Option<[String; 2]> {
         let PointOutcome { ended, stopped_at_s, values } = &self.outcome;
-        let (one, two) = (self, other);
-        let shown = |of: fn(&PointOutcome) -> String| Some([one, two].map(|point| of(&point.outcome)));
+        let shown = |of: fn(&PointOutcome) -> String| Some([self, other].map(|point| of(&point.outcome)));
         if *ended != other.outcome.ended {
             return shown(|outcome| match &outcome.ended {
                 Some(EarlyEnd { reason, why }) => format!("the run ended as {} ({why})", reason.name()),
@@ -142,7 +146,7 @@ impl CheckpointRecord for SweepPoint {
     }
 }
 
-/// An outcome as it stands in a line.
+/// A point as written in a line.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
@@ -154,36 +158,16 @@ pub struct Row {
     values: Vec<ValueCell>,
 }
 
-impl Row {
-    fn into_outcome(self) -> PointOutcome {
-        let value = |cell: ValueCell| match cell {
-            ValueCell::Value(value) => Ok(value.0),
-            ValueCell::Missing(gap) => Err(gap.reason),
-        };
-        PointOutcome {
-            ended: self.ended,
-            stopped_at_s: self.stopped_at_s.map(|at| at.0),
-            values: self.values.into_iter().map(value).collect(),
-        }
-    }
-}
-
 #[derive(Serialize, Deserialize)]
-#[serde(untagged)]
+#[serde(untagged, deny_unknown_fields)]
 enum ValueCell {
     Value(ExactNumber),
-    Missing(MissingCell),
+    Missing { reason: MissingReason },
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct MissingCell {
-    reason: MissingReason,
-}
+// Check of a resumed study: some points of its journal are computed again.
 
-// Points of a journal once more: a resumed study believes none that the model does not give.
-
-/// Points drawn from a journal while it is read, each as likely as every other.
+/// A random selection of a journal's points (reservoir sampling); all points are equally likely.
 #[derive(Debug)]
 pub(crate) struct PointRecheck {
     drawn: Vec<StoredRecord<SweepPoint>>,
@@ -192,26 +176,25 @@ pub(crate) struct PointRecheck {
 }
 
 impl PointRecheck {
-    /// None drawn yet; others are drawn for every `seed`.
+    /// An empty selection; each `seed` selects other points.
     pub(crate) fn new(seed: u64) -> Self {
         Self { drawn: Vec::new(), offered: 0, generator: Xoshiro256PlusPlus::seed_from_u64(seed) }
     }
 
-    /// The next point of the journal.
+    /// Takes the next point of the journal into the selection, or leaves it out.
     pub(crate) fn offer_point(&mut self, found: StoredRecord<SweepPoint>) {
         self.offered += 1;
-        if self.drawn.len() < RECHECKED_RECORDS {
+        if self.drawn.len() < checkpoint::RECHECKED_RECORDS {
             self.drawn.push(found);
         } else if let Some(place) = self.drawn.get_mut(self.generator.random_range(0..self.offered)) {
             *place = found;
         }
     }
 
-    /// Runs the points that were drawn again, and compares them to the last bit; `file` is the name of the
-    /// journal in refusals.
+    /// Computes the selected points again and compares every bit. Error texts call the journal `file`.
     ///
     /// # Errors
-    /// [`CheckpointError::Recomputed`] at the first that differs.
+    /// [`CheckpointError::Recomputed`] at the first difference.
     pub(crate) fn check_points(
         &self,
         study: &Study,
@@ -220,11 +203,8 @@ impl PointRecheck {
     ) -> Result<(), CheckpointError> {
         let check = |found: &StoredRecord<SweepPoint>| {
             let index = found.record.index;
-            check_recomputed(
-                file,
-                found,
-                &SweepPoint { index, outcome: PointOutcome::run_point(study, scene, index) },
-            )
+            let outcome = PointOutcome::run_point(study, scene, index);
+            checkpoint::check_recomputed(file, found, &SweepPoint { index, outcome })
         };
         let checked: Vec<Result<(), CheckpointError>> = self.drawn.par_iter().map(check).collect();
         checked.into_iter().collect()

@@ -1,7 +1,6 @@
-//! What a study writes: the table of all points and its summary.
+//! Output of a study: the table of all points and its summary.
 
-use super::grid::SamplePlan;
-use super::grid::{AxisSpacing, SweepAxis};
+use super::grid::{AxisSpacing, SamplePlan, SweepAxis};
 use super::point::PointOutcome;
 use super::rank_correlation::{RankCorrelation, RankCorrelations};
 use super::study::{SHEET_NAME, Study, SweepMap};
@@ -10,10 +9,10 @@ use crate::simulate::twin::Camera;
 use serde::Serialize;
 use std::collections::BTreeMap;
 
-/// What every row of the table and the summary say of where the numbers come from.
+/// Source of the numbers, in every row of the table and in the summary.
 const SOURCE: &str = "simulation";
 
-/// First row of `sweep.csv`.
+/// Header of `sweep.csv`.
 pub(crate) fn csv_header(study: &Study) -> String {
     let mut cells: Vec<String> = study.axes.iter().map(|axis| axis.parameter.name.to_owned()).collect();
     cells.extend(["status", "stopped_at_s"].map(str::to_owned));
@@ -22,8 +21,7 @@ pub(crate) fn csv_header(study: &Study) -> String {
     cells.join(",") + "\n"
 }
 
-/// Row of a point in `sweep.csv`, in which the first axis is the slowest; a cell without a value is empty,
-/// and `status` or `describe_missing` says why.
+/// Row of a point in `sweep.csv`. A missing value is an empty cell; the columns `status` and `missing` say why.
 pub(crate) fn csv_row(study: &Study, index: usize, outcome: &PointOutcome) -> String {
     let number = |value: Option<f64>| value.map_or_else(String::new, |value| value.to_string());
     let mut cells: Vec<String> = study.point_values(index).iter().map(|value| value.to_string()).collect();
@@ -33,7 +31,7 @@ pub(crate) fn csv_row(study: &Study, index: usize, outcome: &PointOutcome) -> St
     cells.join(",") + "\n"
 }
 
-/// Which maps have no value for a reason of their own, and which: `column: reason; column: reason`.
+/// Maps that lack a value for another reason than the end of the run: `column: reason; column: reason`.
 fn describe_missing(study: &Study, outcome: &PointOutcome) -> String {
     let ended = outcome.ended.as_ref().map(|ended| ended.reason);
     let of = |(map, value): (&SweepMap, &Result<f64, MissingReason>)| {
@@ -49,7 +47,7 @@ pub(crate) struct SweepSummary {
     pub title: String,
     pub scene: String,
     pub scene_title: String,
-    /// A simulation is no measurement, and its files say so.
+    /// Always true: the numbers are simulated, not measured.
     pub synthetic: bool,
     pub source: &'static str,
     pub fingerprint: String,
@@ -60,7 +58,7 @@ pub(crate) struct SweepSummary {
     pub sample: Option<SamplePlan>,
     pub status: BTreeMap<&'static str, usize>,
     pub axes: Vec<AxisSummary>,
-    /// The figure with every map, where there are several, or with the rank correlations.
+    /// Figure with all maps, or with the rank correlations.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub sheet: Option<String>,
     pub maps: Vec<MapSummary>,
@@ -72,7 +70,7 @@ pub(crate) struct AxisSummary {
     pub name: &'static str,
     pub unit: &'static str,
     pub scale: AxisSpacing,
-    /// Values on the axis of a grid.
+    /// Number of values on the axis of a grid.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub points: Option<usize>,
     pub from: Option<f64>,
@@ -86,21 +84,41 @@ pub(crate) struct MapSummary {
     pub kind: &'static str,
     pub unit: &'static str,
     pub column: String,
-    /// Of a study that is drawn as maps.
+    /// Figure of the map, if the study is drawn as maps.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub figure: Option<String>,
     pub values: usize,
     pub least: Option<f64>,
     pub greatest: Option<f64>,
     pub missing: BTreeMap<&'static str, usize>,
-    /// With every parameter of a study that is not drawn as maps.
+    /// Rank correlation with each parameter, if the study is not drawn as maps.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub rank_correlations: Vec<RankCorrelation>,
 }
 
 impl SweepSummary {
-    /// That of a study of which no point is counted yet.
+    /// The summary before any point is counted.
     pub(crate) fn new(study: &Study, scene_title: &str, fingerprint: &str) -> Self {
+        let axis = |axis: &SweepAxis| AxisSummary {
+            name: axis.parameter.name,
+            unit: axis.parameter.unit,
+            scale: axis.spacing,
+            points: study.sample.is_none().then_some(axis.values.len()),
+            from: axis.values.first().copied(),
+            to: axis.values.last().copied(),
+        };
+        let map = |map: &SweepMap| MapSummary {
+            name: map.name.clone(),
+            kind: map.reading.kind(),
+            unit: map.reading.unit().name,
+            column: map.column(),
+            figure: study.is_mapped().then(|| format!("{}.svg", map.slug)),
+            values: 0,
+            least: None,
+            greatest: None,
+            missing: BTreeMap::new(),
+            rank_correlations: Vec::new(),
+        };
         Self {
             title: study.title.clone(),
             scene: study.scene.clone(),
@@ -113,13 +131,9 @@ impl SweepSummary {
             points: 0,
             sample: study.sample,
             status: BTreeMap::new(),
-            axes: study
-                .axes
-                .iter()
-                .map(|axis| AxisSummary::from_axis(axis, study.sample.is_some()))
-                .collect(),
+            axes: study.axes.iter().map(axis).collect(),
             sheet: study.has_sheet().then(|| format!("{SHEET_NAME}.svg")),
-            maps: study.maps.iter().map(|map| MapSummary::from_map(study, map)).collect(),
+            maps: study.maps.iter().map(map).collect(),
         }
     }
 
@@ -127,7 +141,14 @@ impl SweepSummary {
         self.points += 1;
         *self.status.entry(outcome.status()).or_default() += 1;
         for (map, value) in self.maps.iter_mut().zip(&outcome.values) {
-            map.count_value(*value);
+            match *value {
+                Ok(value) => {
+                    map.values += 1;
+                    map.least = Some(map.least.map_or(value, |least| least.min(value)));
+                    map.greatest = Some(map.greatest.map_or(value, |greatest| greatest.max(value)));
+                }
+                Err(reason) => *map.missing.entry(reason.name()).or_default() += 1,
+            }
         }
     }
 
@@ -143,53 +164,11 @@ impl SweepSummary {
         self.maps.iter().any(|map| map.values > 0)
     }
 
-    /// The file.
+    /// Text of the summary file.
     ///
     /// # Errors
-    /// None for what [`Self::new`] makes.
+    /// None in practice: every field has a JSON form.
     pub(crate) fn to_json(&self) -> Result<String, serde_json::Error> {
         Ok(serde_json::to_string_pretty(self)? + "\n")
-    }
-}
-
-impl AxisSummary {
-    fn from_axis(axis: &SweepAxis, sampled: bool) -> Self {
-        let (from, to) = (axis.values.first().copied(), axis.values.last().copied());
-        Self {
-            name: axis.parameter.name,
-            unit: axis.parameter.unit,
-            scale: axis.spacing,
-            points: (!sampled).then_some(axis.values.len()),
-            from,
-            to,
-        }
-    }
-}
-
-impl MapSummary {
-    fn from_map(study: &Study, map: &SweepMap) -> Self {
-        Self {
-            name: map.name.clone(),
-            kind: map.reading.kind(),
-            unit: map.reading.unit().name,
-            column: map.column(),
-            figure: study.is_mapped().then(|| format!("{}.svg", map.slug)),
-            values: 0,
-            least: None,
-            greatest: None,
-            missing: BTreeMap::new(),
-            rank_correlations: Vec::new(),
-        }
-    }
-
-    fn count_value(&mut self, value: Result<f64, MissingReason>) {
-        match value {
-            Ok(value) => {
-                self.values += 1;
-                self.least = Some(self.least.map_or(value, |least| least.min(value)));
-                self.greatest = Some(self.greatest.map_or(value, |greatest| greatest.max(value)));
-            }
-            Err(reason) => *self.missing.entry(reason.name()).or_default() += 1,
-        }
     }
 }

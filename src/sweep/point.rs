@@ -1,29 +1,29 @@
-//! One point of a study: its run, as far as it went, and what every map reads from it.
+//! One point of a study: its run and the readings for every map.
 
-use super::study::Study;
-use crate::feature::{FeatureReader, MissingReason, Reading, RunRecord};
+use super::study::{Study, SweepMap};
+use crate::feature::{FeatureReader, MissingReason, RunRecord};
 use crate::recording::channel::ReversalInstants;
+use crate::simulate::equilibrium::steady_slip_pose;
 use crate::simulate::outputs::{EnergyAudit, Transitions};
 use crate::simulate::scene::{Scene, SceneError, StartKind};
 use crate::simulate::twin::{TwinView, TwinViewError, film_scene_with_observer};
-use crate::simulate::{Impact, Observer, SolutionSegment, SolverOptions, Transition, equilibrium};
+use crate::simulate::{Impact, Observer, SolutionSegment, SolverOptions, Transition};
 use crate::text::panic_message;
 use serde::{Deserialize, Serialize};
 use std::ops::ControlFlow;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Right-hand sides after which a run is given up: some hundred times what a reversal costs, a
-/// few seconds.
+/// Right-hand sides after which a run ends: some hundred times those of a reversal, a few seconds.
 const MOST_EVALUATIONS: u64 = 20_000_000;
 
-/// What a point gave.
+/// Outcome of a point.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PointOutcome {
     /// Why the run ended before its stop time, if it did.
     pub ended: Option<EarlyEnd>,
-    /// When it ended, s; `None` where it never ran.
+    /// Time of the end, s; `None` for a run that never started.
     pub stopped_at_s: Option<f64>,
-    /// One value a map, in its unit, or why there is none.
+    /// One value per map, in the unit of the reading, or the reason why it is missing.
     pub values: Vec<Result<f64, MissingReason>>,
 }
 
@@ -31,9 +31,9 @@ pub struct PointOutcome {
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct EarlyEnd {
-    /// In one word.
+    /// The reason in one word.
     pub reason: MissingReason,
-    /// What happened, where the reason does not say all.
+    /// Details that the reason does not give; often empty.
     #[serde(default, skip_serializing_if = "String::is_empty")]
     pub why: String,
 }
@@ -45,108 +45,82 @@ impl EarlyEnd {
 }
 
 impl PointOutcome {
-    /// The name of a run that reached its stop time.
-    pub(crate) const COMPLETED: &'static str = "completed";
-
-    /// Runs point `index` of a checked study; a panic is a reason like any other.
+    /// Runs point `index` of a checked study; a panic becomes a reason.
     pub(crate) fn run_point(study: &Study, scene: &Scene, index: usize) -> Self {
         Self::run_point_scene(study, || study.scene_of_point(scene, index), || ControlFlow::Continue(()))
     }
 
-    /// Runs a scene that a study did not choose; `flow` is asked during the run and may end it.
+    /// Runs any scene as a point; `flow` is asked during the run and may end it.
     #[must_use]
     pub fn run_point_scene(
         study: &Study,
         scene: impl FnOnce() -> Result<Scene, SceneError>,
         flow: impl Fn() -> ControlFlow<()>,
     ) -> Self {
-        let attempt = || {
-            Self::try_run(study, scene, flow)
-                .unwrap_or_else(|(ended, stopped_at_s)| Self::without_values(study, ended, stopped_at_s))
-        };
-        catch_unwind(AssertUnwindSafe(attempt)).unwrap_or_else(|payload| {
-            Self::without_values(
-                study,
-                EarlyEnd::new(MissingReason::Panicked, panic_message(payload.as_ref()).unwrap_or_default()),
-                None,
-            )
+        let run = catch_unwind(AssertUnwindSafe(|| Self::try_run(study, scene, flow)));
+        let panicked = run.unwrap_or_else(|payload| {
+            let why = panic_message(payload.as_ref()).unwrap_or_default();
+            Err((EarlyEnd::new(MissingReason::Panicked, why), None))
+        });
+        panicked.unwrap_or_else(|(ended, stopped_at_s)| {
+            let values = vec![Err(ended.reason); study.maps.len()];
+            Self { ended: Some(ended), stopped_at_s, values }
         })
     }
 
-    /// How the run ended, in the word of files.
+    /// Name of the end in files: `completed`, or the reason of an early end.
     #[must_use]
     pub fn status(&self) -> &'static str {
-        self.ended.as_ref().map_or(Self::COMPLETED, |ended| ended.reason.name())
+        self.ended.as_ref().map_or("completed", |ended| ended.reason.name())
     }
 
-    /// What the point gives; or why nothing can be read, and when the run ended, s.
+    /// The outcome, or why nothing can be read and when the run ended, s.
     fn try_run(
         study: &Study,
         scene: impl FnOnce() -> Result<Scene, SceneError>,
         flow: impl Fn() -> ControlFlow<()>,
     ) -> Result<Self, (EarlyEnd, Option<f64>)> {
         let scene = scene().map_err(|error| (EarlyEnd::new(MissingReason::NoStart, error), None))?;
-        if !can_start(&scene) {
+        // a study may set a preload or friction without a steady equilibrium to start in
+        let speed = scene.drive.motion_at(scene.start_s).velocity_m_per_s;
+        if scene.start == StartKind::SteadySlide && steady_slip_pose(&scene.linkage, speed).is_none() {
             return Err((EarlyEnd::new(MissingReason::NoStart, ""), None));
         }
         let most_evaluations = scene.run.most_evaluations.unwrap_or(MOST_EVALUATIONS);
         let effort = SolverOptions { most_evaluations, ..SolverOptions::from_scene(&scene) };
-        let mut watch = PointObserver::from_study(study, flow);
+        let audited = study.maps.iter().any(|map| map.reading.needs_audit());
+        let audit = audited.then(EnergyAudit::default);
+        let mut watch = PointObserver { transitions: Transitions::default(), audit, flow };
         let span_s = [scene.start_s, scene.run.stop_s];
-        let view = film_scene_with_observer(&scene, &study.camera, span_s, effort, &mut watch)
-            .map_err(end_without_view)?;
-        let TwinView { recording, run, stick_s } = view;
+        let view = film_scene_with_observer(&scene, &study.camera, span_s, effort, &mut watch);
+        let TwinView { recording, run, stick_s } = view.map_err(|error| match error {
+            TwinViewError::Early { status, stopped_at_s } => {
+                let reason = MissingReason::from_status(status).unwrap_or(MissingReason::NoWindow);
+                (EarlyEnd::new(reason, "before two frames were taken"), Some(stopped_at_s))
+            }
+            TwinViewError::Recording(error) => (EarlyEnd::new(MissingReason::Diverged, error), None),
+        })?;
         let PointObserver { transitions: Transitions(transitions), audit, .. } = watch;
         let record = RunRecord { span_s, run, stick_s, transitions, audit };
         let instants = ReversalInstants::find_instants(&recording);
         let reader = FeatureReader::with_run(&recording, &instants, &record);
+        let read = |map: &SweepMap| {
+            let found = map.reading.read(None, &reader).map_err(|missing| missing.reason())?;
+            if found.value.is_finite() { Ok(found.value) } else { Err(MissingReason::NotFinite) }
+        };
         Ok(Self {
             ended: MissingReason::from_status(run.status).map(|reason| EarlyEnd::new(reason, "")),
             stopped_at_s: Some(run.stopped_at_s),
-            values: study.maps.iter().map(|map| read_value(&map.reading, &reader)).collect(),
+            values: study.maps.iter().map(read).collect(),
         })
     }
-
-    fn without_values(study: &Study, ended: EarlyEnd, stopped_at_s: Option<f64>) -> Self {
-        let values = study.maps.iter().map(|_| Err(ended.reason)).collect();
-        Self { ended: Some(ended), stopped_at_s, values }
-    }
 }
 
-fn read_value(reading: &Reading, reader: &FeatureReader) -> Result<f64, MissingReason> {
-    let found = reading.read(None, reader).map_err(|missing| missing.reason())?;
-    if found.value.is_finite() { Ok(found.value) } else { Err(MissingReason::NotFinite) }
-}
-
-fn end_without_view(error: TwinViewError) -> (EarlyEnd, Option<f64>) {
-    match error {
-        TwinViewError::Early { status, stopped_at_s } => {
-            let reason = MissingReason::from_status(status).unwrap_or(MissingReason::NoWindow);
-            (EarlyEnd::new(reason, "before two frames were taken"), Some(stopped_at_s))
-        }
-        TwinViewError::Recording(error) => (EarlyEnd::new(MissingReason::Diverged, error), None),
-    }
-}
-
-/// A scene that starts in steady slip needs such an equilibrium, which another preload or friction may not
-/// have.
-fn can_start(scene: &Scene) -> bool {
-    let speed = scene.drive.motion_at(scene.start_s).velocity_m_per_s;
-    scene.start != StartKind::SteadySlide || equilibrium::steady_slip_pose(&scene.linkage, speed).is_some()
-}
-
-/// What is noted of a run besides its traces: the transitions, and its extremes where a map needs them.
+/// Notes the transitions of a run, and its extremes if a map reads them.
 struct PointObserver<F> {
     transitions: Transitions,
     audit: Option<EnergyAudit>,
     flow: F,
-}
-
-impl<F> PointObserver<F> {
-    fn from_study(study: &Study, flow: F) -> Self {
-        let audited = study.maps.iter().any(|map| map.reading.needs_audit());
-        Self { transitions: Transitions::default(), audit: audited.then(EnergyAudit::default), flow }
-    }
 }
 
 impl<F: Fn() -> ControlFlow<()>> Observer for PointObserver<F> {

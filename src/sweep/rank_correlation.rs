@@ -1,28 +1,27 @@
-//! How far the values of a map rise or fall with each parameter of a study: rank correlations.
+//! Rank correlation of the maps of a study with its parameters.
 //!
-//! Of a large study a subset of the points is looked at, spread evenly over all, so that the memory does not
-//! grow with their number.
+//! A large study is reduced to an even selection of its points, so that memory does not grow with their number.
 
 use super::grid::SweepAxis;
 use super::point::PointOutcome;
 use super::study::Study;
 use serde::Serialize;
 
-/// Most numbers that are kept, values and their places together.
+/// Most numbers in memory, values and coordinates together.
 const MOST_NUMBERS: usize = 2_000_000;
-/// Most points that are looked at: correlations are known to less than a hundredth then.
+/// Most points: they give a correlation to better than 0.01.
 const MOST_POINTS: usize = 200_000;
-/// Fewest values from which a correlation is computed.
+/// Fewest pairs of a correlation.
 const FEWEST_PAIRS: usize = 20;
 
-/// Values of every map at a subset of the points.
+/// Values of every map at a selection of the points.
 #[derive(Debug, Clone)]
 pub struct RankCorrelations {
-    /// Share of the points that are looked at.
+    /// Fraction of the points that is selected.
     share: f64,
-    /// Where they lie, a list an axis.
+    /// Coordinates of the points, a list per axis.
     places: Vec<Vec<f64>>,
-    /// Their values, a list a map.
+    /// Values at the points, a list per map.
     values: Vec<Vec<Option<f64>>>,
 }
 
@@ -31,7 +30,7 @@ pub struct RankCorrelations {
 pub(crate) struct RankCorrelation {
     /// Name of the parameter.
     pub parameter: &'static str,
-    /// From -1 to 1; `None` where too few points have a value, or all have the same.
+    /// From -1 to 1; `None` for too few values or a constant.
     pub rank_correlation: Option<f64>,
 }
 
@@ -43,9 +42,9 @@ impl RankCorrelations {
         Self { share, places: vec![Vec::new(); axes], values: vec![Vec::new(); maps] }
     }
 
-    /// Looks at a point, or leaves it out.
+    /// Takes a point into the selection, or leaves it out.
     pub(crate) fn look(&mut self, study: &Study, index: usize, outcome: &PointOutcome) {
-        // multiples of the golden ratio are spread evenly over every regular part of a grid
+        // multiples of the golden ratio cover every regular part of a grid evenly
         if (index as f64 * 0.618_033_988_749_894_9).fract() >= self.share {
             return;
         }
@@ -57,22 +56,15 @@ impl RankCorrelations {
     /// Rank correlation of map `map` with every parameter.
     pub(crate) fn of_map(&self, study: &Study, map: usize) -> Vec<RankCorrelation> {
         let of = |(at, axis): (usize, &SweepAxis)| {
-            let (x, y): (Vec<f64>, Vec<f64>) = self.pairs(map, at).unzip();
+            let pairs = self.places[at].iter().zip(&self.values[map]);
+            let (x, y): (Vec<f64>, Vec<f64>) = pairs.filter_map(|(x, y)| Some((*x, (*y)?))).unzip();
             RankCorrelation { parameter: axis.parameter.name, rank_correlation: spearman_correlation(&x, &y) }
         };
         study.axes.iter().enumerate().map(of).collect()
     }
-
-    /// Value of an axis and of a map at every point that has one.
-    fn pairs(&self, map: usize, axis: usize) -> impl Iterator<Item = (f64, f64)> + '_ {
-        let (places, values) = (self.places.get(axis), self.values.get(map));
-        let pairs = places.into_iter().flatten().zip(values.into_iter().flatten());
-        pairs.filter_map(|(place, value)| Some((*place, (*value)?)))
-    }
 }
 
-/// Rank correlation (Spearman's) of two lists, pair by pair; `None` where they are too short, or one is
-/// constant.
+/// Spearman's rank correlation of paired lists; `None` for short or constant lists.
 pub(crate) fn spearman_correlation(x: &[f64], y: &[f64]) -> Option<f64> {
     if x.len() < FEWEST_PAIRS {
         return None;
@@ -84,7 +76,7 @@ pub(crate) fn spearman_correlation(x: &[f64], y: &[f64]) -> Option<f64> {
     (scale > 0.0).then(|| product(&x, &y) / scale)
 }
 
-/// Ranks from 0; equal values share the mean of theirs.
+/// Ranks from 0; equal values share their mean rank.
 fn rank_values(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));

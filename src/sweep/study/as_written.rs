@@ -1,9 +1,8 @@
-//! sweep.toml as people write it: types and keys only, nothing checked against anything else.
+//! A study file as written: types and keys; values are checked later.
 
 use crate::feature::{define_entry, with_reading_keys};
 use crate::simulate::twin::Camera;
-use crate::sweep::grid::AxisSpacing;
-use crate::sweep::grid::SamplePlan;
+use crate::sweep::grid::{AxisSpacing, SamplePlan};
 use crate::toml_file::NumberPair;
 use schemars::JsonSchema;
 use serde::Deserialize;
