@@ -1,4 +1,4 @@
-//! How the head moves along the sweep: the paper's cosine, a uniform motion, or a recording's head.
+//! Motion of the head along the sweep: the paper's cosine, uniform motion, or a recorded head.
 
 mod head_spline;
 mod smoothing_spline;
@@ -11,7 +11,7 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-/// How the head moves along the sweep.
+/// Motion of the head along the sweep, `v(t)`.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub enum Drive {
     /// `v = a (1 - cos 2 pi f (t - t0))`, the paper's drive; its `t0` is 0.
@@ -20,16 +20,16 @@ pub enum Drive {
         amplitude_m: f64,
         /// `f`, Hz.
         frequency_hz: f64,
-        /// `t0`, s. (left out where it is 0, so that hashes of such scenes stay)
+        /// `t0`, s; 0 is not serialised, which keeps the hashes of scenes without delay.
         #[serde(skip_serializing_if = "is_zero")]
         delay_s: f64,
     },
-    /// `v = speed t`; not reachable from a scene file, it serves the exact cases.
+    /// `v = speed t`; scene files cannot ask for it, tests with exact solutions do.
     Uniform {
         /// Speed of the head, m/s.
         speed_m_per_s: f64,
     },
-    /// As a recording's head moved; scenes that differ in other values share it.
+    /// The head of a recording; copies of a scene share it.
     Recorded(Arc<HeadSpline>),
 }
 
@@ -57,8 +57,8 @@ impl Drive {
         }
     }
 
-    /// Taylor coefficients of the head's velocity about `t`, as many as `out` holds; they are those of the
-    /// motion after `t` and hold up to the [next break](Self::next_break).
+    /// Fills `out` with Taylor coefficients of the head's velocity about `t`, m/s^k, lowest first. They hold
+    /// from `t` to the [next break](Self::next_break).
     #[inline]
     pub(crate) fn velocity_series(&self, t: f64, out: &mut [f64]) {
         match *self {
@@ -78,9 +78,7 @@ impl Drive {
             }
             Self::Recorded(ref spline) => {
                 out.fill(0.0);
-                out.iter_mut()
-                    .zip(spline.velocity_series(t))
-                    .for_each(|(out, coefficient)| *out = coefficient);
+                out.iter_mut().zip(spline.velocity_series(t)).for_each(|(out, c)| *out = c);
             }
         }
     }
@@ -97,13 +95,13 @@ impl Drive {
         }
     }
 
-    /// Time of the scene at which the cosine starts, s; 0 for any other motion.
+    /// Start of the cosine, s; 0 for other motions.
     pub(crate) fn delay_s(&self) -> f64 {
         if let Self::Cosine { delay_s, .. } = *self { delay_s } else { 0.0 }
     }
 
-    /// The next instant after `t`, s, at which a derivative of the head's motion jumps: no step of
-    /// integration may lead across it.
+    /// The next instant after `t`, s, at which a derivative of the motion jumps; integration steps must not
+    /// cross it.
     #[inline]
     #[must_use]
     pub fn next_break(&self, t: f64) -> Option<f64> {
@@ -113,35 +111,32 @@ impl Drive {
         }
     }
 
-    /// How far integration may go from `t`, s: to the next break, and no further than `stop`.
+    /// End of an integration from `t`, s: the next break or `stop`.
     #[inline]
     pub(crate) fn horizon(&self, t: f64, stop: f64) -> f64 {
         self.next_break(t).map_or(stop, |next| next.min(stop))
     }
 }
 
-#[allow(clippy::trivially_copy_pass_by_ref)] // (as serde calls it)
+#[allow(clippy::trivially_copy_pass_by_ref)] // serde passes a reference
 fn is_zero(value: &f64) -> bool {
     *value == 0.0
 }
 
-// The head's motion from a recording.
+// Motion of a recorded head.
 
-/// Time over which frames are averaged before they are smoothed, and between knots of the spline, s. The
-/// noise of a tracker is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would
-/// take what is common to neighbours for motion. A head moves smoothly over it.
+/// Time over which frames are averaged before smoothing, and between knots of the spline, s. Tracking noise is
+/// correlated over a few frames (vibration, sub-pixel bias), and cross-validation would take it for motion. A
+/// head moves smoothly within this time.
 const BLOCK_S: f64 = 4e-3;
-/// Fewest frames with the head: cross-validation needs a few times as many points as a curve has freedoms.
+/// Fewest frames with the head: cross-validation needs several points per degree of freedom.
 const FEWEST_FRAMES: usize = 10;
 
-/// Time at either end of a recording in which the acceleration of its head is less certain by a factor of
-/// ten, s: a run keeps away from it.
+/// Time at either end of a recording in which the acceleration of the head is ten times less certain, s. A run
+/// avoids it.
 pub(crate) const UNCERTAIN_END_S: f64 = 0.01;
-/// Share of the greatest speed of a head from which a tip slides evenly enough for a run to start there.
+/// Fraction of the head's top speed above which a run may start in steady slip.
 pub(crate) const EVEN_SPEED_SHARE: f64 = 0.2;
-
-/// Steps in which an even motion is looked for, s.
-const EVEN_SEARCH_STEP_S: f64 = 1e-3;
 
 /// Why a recording does not give the head's motion.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -160,28 +155,19 @@ pub enum HeadMotionError {
     },
 }
 
-/// The head's `x` as a smooth curve through the frames in which it was tracked.
+/// A smooth curve through the tracked positions of the head, `x`.
 ///
-/// [`HeadSpline::covariance_times`] says how well it is known; less so within [`UNCERTAIN_END_S`] of either end.
+/// [`HeadSpline::multiply_covariance`] gives its uncertainty, which grows within [`UNCERTAIN_END_S`] of the ends.
 ///
 /// # Errors
-/// [`HeadMotionError`] when the head is tracked in too few frames.
+/// [`HeadMotionError`] if too few frames show the head.
 pub fn smooth_head_motion(recording: &Recording) -> Result<HeadSpline, HeadMotionError> {
-    let points: Vec<(usize, f64)> = recording
-        .traces()
-        .head_x_m
-        .iter()
-        .enumerate()
-        .filter_map(|(frame, x)| Some((frame, (*x)?)))
-        .collect();
+    let (grid, frames) = (recording.grid(), recording.traces().head_x_m.iter().enumerate());
+    let points: Vec<(usize, f64)> = frames.filter_map(|(frame, x)| Some((frame, (*x)?))).collect();
     if points.len() < FEWEST_FRAMES {
-        return Err(HeadMotionError::Few {
-            recording: recording.name().to_owned(),
-            found: points.len(),
-            frames: recording.grid().frames,
-        });
+        let (recording, found) = (recording.name().to_owned(), points.len());
+        return Err(HeadMotionError::Few { recording, found, frames: grid.frames });
     }
-    let grid = recording.grid();
     let block = (BLOCK_S * grid.frame_rate_hz).round() as usize;
     let (first, last) = (points[0].0, points[points.len() - 1].0);
     let block = if block < 3 || (last - first) / block < FEWEST_FRAMES { 1 } else { block };
@@ -190,12 +176,12 @@ pub fn smooth_head_motion(recording: &Recording) -> Result<HeadSpline, HeadMotio
     Ok(HeadSpline::from_points(&grid, &points, block, &knots))
 }
 
-/// The first time at which a head moves fast enough for a run to start in steady slip, s, behind the
-/// uncertain start of its motion.
+/// First time at which the head is fast enough for a start in steady slip, s, after its uncertain start.
 pub(crate) fn even_motion_start_s(motion: &HeadSpline) -> f64 {
+    const STEP_S: f64 = 1e-3;
     let [first_s, last_s] = motion.span_s();
-    let count = ((last_s - first_s) / EVEN_SEARCH_STEP_S) as usize;
-    let times = || (0..=count).map(|step| first_s + UNCERTAIN_END_S + step as f64 * EVEN_SEARCH_STEP_S);
+    let count = ((last_s - first_s) / STEP_S) as usize;
+    let times = || (0..=count).map(|step| first_s + UNCERTAIN_END_S + step as f64 * STEP_S);
     let times = || times().take_while(|time_s| *time_s < last_s - UNCERTAIN_END_S);
     let speed = |time_s: f64| motion.motion_at(time_s).velocity_m_per_s.abs();
     let greatest = times().map(speed).fold(0.0, f64::max);
@@ -207,7 +193,7 @@ mod tests {
     use super::*;
     use crate::recording::FrameGrid;
 
-    /// The coefficients sum to the velocity itself a while later.
+    /// The series about `t` gives the velocity a little later.
     #[test]
     fn the_series_is_that_of_the_velocity() {
         let grid = FrameGrid { start_s: 0.1, frame_rate_hz: 20.0, frames: 40 };

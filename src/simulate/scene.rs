@@ -1,5 +1,4 @@
-//! Scenes: a blade, its friction, its drive and what is to be computed; `scene.toml` as written and as
-//! validated.
+//! Scenes: a blade, its friction, its drive and the settings of a run, read from `scene.toml` and validated.
 
 mod as_written;
 mod linkage;
@@ -8,13 +7,12 @@ mod run;
 
 pub use super::drive::Drive;
 use super::drive::{HeadSpline, UNCERTAIN_END_S, even_motion_start_s, smooth_head_motion};
+use crate::model::Linkage;
 use crate::model::modes::time_scales_rad_per_s;
-use crate::model::parameters::{ModelParameter, PARAMETERS};
-use crate::model::plausibility::PlausibilityFinding;
-use crate::model::{Linkage, parameters, plausibility};
+use crate::model::parameters::{self, ModelParameter, PARAMETERS};
+use crate::model::plausibility::{self, PlausibilityFinding};
 use crate::recording::Recording;
-use crate::toml_file;
-use crate::toml_file::TomlError;
+use crate::toml_file::{self, TomlError};
 use as_written::SceneFile;
 use linkage::{build_linkage, linkage_constants};
 use numbers::{SceneReader, check_complete, check_parameter_range, find_known_parameter};
@@ -24,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// A validated scene; it is serialised as what decides a run.
+/// A validated scene. Its serialised form holds all that decides a run and nothing else.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
     #[serde(skip)]
@@ -33,28 +31,28 @@ pub struct Scene {
     title: String,
     values: BTreeMap<&'static str, f64>,
     has_shoulder: bool,
-    /// What a loss of contact does.
+    /// Response to a loss of contact.
     pub loss: ContactLossRule,
-    /// What the Painlevé paradox does.
+    /// Response to the Painlevé paradox.
     pub jam: JamRule,
-    /// How the head moves.
+    /// Motion of the head.
     pub drive: Drive,
     /// Start of the run, s.
     pub start_s: f64,
-    /// State at the start.
+    /// State at the start of the run.
     pub start: StartKind,
-    /// What is computed.
+    /// End, tolerance and outputs of the run.
     pub run: RunSettings,
-    /// The blade, its friction and its shoulder.
+    /// Blade, friction and shoulder.
     pub linkage: Linkage,
 }
 
 impl Scene {
-    /// Reads and validates a scene that needs no other file; `file` is the name used in refusals.
+    /// Reads and validates a scene that needs no other file; error texts call it `file`.
     ///
     /// # Errors
-    /// [`SceneError`] with file, line, key, what was found and what to do; also for a scene with
-    /// `drive.recording`, which [`Self::parse_with_recording`] reads.
+    /// [`SceneError`] with file, line, key, finding and advice; also for a scene with `drive.recording`, which
+    /// needs [`Self::parse_with_recording`].
     pub fn parse(file: &str, text: &str) -> Result<Self, SceneError> {
         Self::parse_with_recording(file, text, |path| {
             Err(format!(
@@ -63,11 +61,10 @@ impl Scene {
         })
     }
 
-    /// Reads and validates a scene; `recording` reads the recording that `drive.recording` names, or says why
-    /// it cannot.
+    /// Reads and validates a scene; `recording` loads the file that `drive.recording` names, or says why not.
     ///
     /// # Errors
-    /// [`SceneError`] with file, line, key, what was found and what to do.
+    /// [`SceneError`] with file, line, key, finding and advice.
     pub fn parse_with_recording(
         file: &str,
         text: &str,
@@ -90,18 +87,17 @@ impl Scene {
         let linkage = build_linkage(file, &values, has_shoulder)?;
         run::check_work_limit(file, &run, start_s, time_scales_rad_per_s(&linkage).1)?;
         let drive = match recorded {
-            Some((place, path)) => recorded_drive(&place, &recording(&path), [start_s, run.stop_s])?,
+            Some((place, path)) => recorded_drive(&place, recording(&path), [start_s, run.stop_s])?,
             None => cosine_drive(&values, delay_s),
         };
         run::check_steady_start(file, start_s, start, &linkage, &drive)?;
-        let (loss, jam) = (written.contact.loss, written.contact.jam);
         Ok(Self {
             file: file.to_owned(),
             title: written.title,
             values,
             has_shoulder,
-            loss,
-            jam,
+            loss: written.contact.loss,
+            jam: written.contact.jam,
             drive,
             start_s,
             start,
@@ -110,7 +106,7 @@ impl Scene {
         })
     }
 
-    /// The JSON Schema of scene.toml: for editors, and for messages.
+    /// JSON Schema of scene.toml, for editors and messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
         toml_file::schema_of::<SceneFile>()
@@ -122,13 +118,12 @@ impl Scene {
         &self.title
     }
 
-    /// Energetic coefficient of restitution of the tip's impacts on the glass.
+    /// Energetic coefficient of restitution of the tip on the glass, 0 to 1.
     pub(crate) fn restitution(&self) -> f64 {
         self.values.get("contact.restitution").copied().unwrap_or(0.0)
     }
 
-    /// The same scene with one parameter set; a quantity that was written another way is then written this
-    /// way.
+    /// The same scene with one parameter set; it replaces any other way to write the quantity.
     ///
     /// # Errors
     /// [`SceneError::Key`] for an unknown name or a value out of range.
@@ -144,11 +139,11 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The same scene with its head moved as in a recording: over the time in which it tracks the head, less
-    /// its uncertain ends; a start in steady slip waits until the head moves.
+    /// The same scene driven by the head of a recording. The run covers the tracked time without its uncertain
+    /// ends; a start in steady slip waits until the head moves.
     ///
     /// # Errors
-    /// [`SceneError`] where the head is not tracked for long enough, or no steady slip is possible.
+    /// [`SceneError`] if the head is tracked too briefly or steady slip is impossible.
     pub fn drive_by_recording(&self, recording: &Recording) -> Result<Self, SceneError> {
         let motion = read_head_motion(&self.file, recording)?;
         let [first_s, last_s] = motion.span_s();
@@ -173,16 +168,15 @@ impl Scene {
         Ok(scene)
     }
 
-    /// The linkage with one parameter set to any value, admissible or not: for differences.
+    /// The linkage with one parameter set to any value, admissible or not, for finite differences.
     pub(super) fn linkage_with(&self, parameter: &ModelParameter, value: f64) -> Linkage {
         linkage_constants(&self.values_with(parameter, value), self.has_shoulder)
     }
 
     fn values_with(&self, parameter: &ModelParameter, value: f64) -> BTreeMap<&'static str, f64> {
         let mut values = self.values.clone();
-        for other in PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity) {
-            values.remove(other.name);
-        }
+        let same = PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity);
+        same.for_each(|other| _ = values.remove(other.name));
         values.insert(parameter.name, value);
         values
     }
@@ -190,51 +184,40 @@ impl Scene {
     /// A parameter that this scene has.
     ///
     /// # Errors
-    /// [`SceneError::Key`] for an unknown name or one of a part that the scene does not have.
+    /// [`SceneError::Key`] for an unknown name or a parameter of an absent part.
     pub(super) fn find_own_parameter(&self, name: &str) -> Result<&'static ModelParameter, SceneError> {
         let parameter = find_known_parameter(&self.file, name)?;
-        if parameter.name.starts_with("shoulder.") && !self.has_shoulder {
-            return Err(key_error(
-                &self.file,
-                name,
-                "no [shoulder]",
-                "a scene with a shoulder",
-                "add a [shoulder] table to the scene",
-            ));
-        }
-        if matches!(self.drive, Drive::Recorded(_)) && name.starts_with("drive.") {
-            return Err(key_error(
-                &self.file,
-                name,
-                "a recorded drive",
-                "a scene whose head moves as a cosine",
-                "leave the parameter out",
-            ));
-        }
-        Ok(parameter)
+        let (found, expected, advice) = if name.starts_with("shoulder.") && !self.has_shoulder {
+            ("no [shoulder]", "a scene with a shoulder", "add a [shoulder] table to the scene")
+        } else if matches!(self.drive, Drive::Recorded(_)) && name.starts_with("drive.") {
+            ("a recorded drive", "a scene whose head moves as a cosine", "leave the parameter out")
+        } else {
+            return Ok(parameter);
+        };
+        Err(key_error(&self.file, name, found, expected, advice))
     }
 
-    /// Every number of the scene as it is written, by name.
+    /// Names and values of all numbers as written.
     pub fn written_values(&self) -> impl Iterator<Item = (&'static str, f64)> {
         self.values.iter().map(|(name, value)| (*name, *value))
     }
 
-    /// What is hard to believe in its numbers.
+    /// Implausible numbers of the scene.
     #[must_use]
     pub fn find_implausible(&self) -> Vec<PlausibilityFinding> {
         let written = |name| find_written_key(&self.values, name);
         plausibility::find_implausible(plausibility::SCENE_RANGES, &|name| self.value(name), &written)
     }
 
-    /// Value of a parameter in SI, converted where the scene writes the quantity another way; `None` where
-    /// the scene has no such part.
+    /// Value of a parameter in SI, converted if the scene writes its quantity another way; `None` for a part
+    /// that the scene lacks.
     #[must_use]
     pub fn value(&self, name: &str) -> Option<f64> {
         self.values.get(name).copied().or_else(|| parameters::convert_value(name, &self.linkage))
     }
 }
 
-/// The key under which a scene has the quantity of `name`.
+/// The key with which a scene writes the quantity of `name`.
 fn find_written_key(values: &BTreeMap<&'static str, f64>, name: &'static str) -> &'static str {
     let quantity = parameters::find_parameter(name).map(|p| p.quantity);
     let mut ways = PARAMETERS.iter().filter(|p| Some(p.quantity) == quantity).map(|p| p.name);
@@ -247,17 +230,16 @@ fn cosine_drive(values: &BTreeMap<&'static str, f64>, delay_s: f64) -> Drive {
     Drive::Cosine { amplitude_m, frequency_hz, delay_s }
 }
 
-/// The head's recorded motion; the run lies within the time in which it was tracked.
+/// The head's recorded motion; refuses a run outside the tracked time.
 fn recorded_drive(
     place: &str,
-    recording: &Result<Recording, String>,
-    run_s: [f64; 2],
+    recording: Result<Recording, String>,
+    [start_s, stop_s]: [f64; 2],
 ) -> Result<Drive, SceneError> {
-    let unread =
-        |problem: &String| SceneError::Recording { place: place.to_owned(), problem: problem.clone() };
-    let recording = recording.as_ref().map_err(unread)?;
-    let motion = read_head_motion(place, recording)?;
-    let ([start_s, stop_s], [first_s, last_s]) = (run_s, motion.span_s());
+    let unread = |problem| SceneError::Recording { place: place.to_owned(), problem };
+    let recording = recording.map_err(unread)?;
+    let motion = read_head_motion(place, &recording)?;
+    let [first_s, last_s] = motion.span_s();
     if motion.covers(start_s, stop_s) {
         return Ok(Drive::Recorded(Arc::new(motion)));
     }
@@ -265,15 +247,13 @@ fn recorded_drive(
     let expected =
         format!("one within the {first_s} s to {last_s} s in which `{}` tracks the head", recording.name());
     let advice = "change start.time_s and run.stop_s, or take another recording";
-    Err(key_error(place, "drive.recording", &found, &expected, advice))
+    Err(key_error(place, "drive.recording", found, &expected, advice))
 }
 
 fn read_head_motion(place: &str, recording: &Recording) -> Result<HeadSpline, SceneError> {
     smooth_head_motion(recording)
         .map_err(|problem| SceneError::Recording { place: place.to_owned(), problem: problem.to_string() })
 }
-
-// What a scene says of contact that is lost or jammed.
 
 /// What happens when the normal force reaches zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, Serialize, JsonSchema)]
@@ -296,8 +276,6 @@ pub enum JamRule {
     /// An impact without collision.
     Impact,
 }
-
-// Why a scene is refused.
 
 /// Why a scene was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -329,12 +307,16 @@ pub enum SceneError {
     },
 }
 
-pub(super) fn key_error(place: &str, key: &str, found: &str, expected: &str, advice: &str) -> SceneError {
-    let [place, key, found, expected, advice] = [place, key, found, expected, advice].map(str::to_owned);
-    SceneError::Key { place, key, found, expected, advice }
+pub(super) fn key_error(
+    place: &str,
+    key: &str,
+    found: impl ToString,
+    expected: &str,
+    advice: &str,
+) -> SceneError {
+    let [place, key, expected, advice] = [place, key, expected, advice].map(str::to_owned);
+    SceneError::Key { place, key, found: found.to_string(), expected, advice }
 }
-
-// The tables of a run.
 
 /// What `simulate` writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Deserialize, Serialize, JsonSchema)]

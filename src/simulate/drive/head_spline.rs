@@ -1,4 +1,4 @@
-//! A C2 piecewise cubic over the frames of a recording.
+//! Motion of a recorded head as a cubic spline with continuous acceleration.
 
 use super::smoothing_spline::{SmoothingSpline, fit_smoothing_spline};
 use crate::math;
@@ -7,30 +7,31 @@ use crate::recording::FrameGrid;
 use serde::Serialize;
 use std::sync::Arc;
 
-/// An instant this close before a knot, in frames, counts as the knot: no sliver of a piece is left over. The
-/// third derivative's jump over so short a time moves the position by 1e-18 of what it does over a frame.
-pub(super) const NEAR_FRAMES: f64 = 1e-6;
+/// Distance before a knot, in frames, at which an instant counts as the knot, so that no tiny piece remains. The
+/// jump of the third derivative moves the position in this time by 1e-18 of its effect over a frame.
+const NEAR_FRAMES: f64 = 1e-6;
 
-/// Position of the head as cubics between knots; position, velocity and acceleration are continuous, the
-/// third derivative jumps at knots. Before the first and after the last knot the outermost cubics go on.
+/// Position of the head as cubics between knots, where only the third derivative jumps. The outermost cubics
+/// extend beyond the first and the last knot.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct HeadSpline {
     grid: FrameGrid,
     first_frame: usize,
     knots_s: Vec<f64>,
-    /// Coefficients of the position about the knot where a piece starts, m/s^k, lowest first.
+    /// Coefficients of the position about the first knot of each piece, m/s^k, lowest first.
     pieces: Vec<[f64; 4]>,
-    /// Piece that starts at or before each frame, from the first knot on.
+    /// Piece of each frame from the first knot on.
     piece_of_frame: Vec<usize>,
-    /// The curve that the cubics follow, where they were smoothed.
+    /// The smooth curve that the cubics follow, if any.
     #[serde(skip)]
     curve: Option<Arc<SmoothingSpline>>,
 }
 
 impl HeadSpline {
-    /// The smooth curve through points given as frame of `grid` and position, m, the frames rising, at least
-    /// three of them, each `block` frames counting by their mean: a cubic spline through its places at the
-    /// frames `knots`.
+    /// A cubic spline through the values of a smooth curve at the frames `knots`.
+    ///
+    /// The curve fits `points`, at least three rising frames of `grid` with positions in m, averaged in blocks of
+    /// `block` frames.
     pub(super) fn from_points(
         grid: &FrameGrid,
         points: &[(usize, f64)],
@@ -44,7 +45,7 @@ impl HeadSpline {
         Self { curve: Some(Arc::new(curve)), ..Self::interpolate_positions(grid, knots, &places, ends) }
     }
 
-    /// The cubic spline through positions, m, with given second derivatives at the ends, m/frame2.
+    /// The cubic spline through positions, m, with second derivatives at the ends, m/frame^2.
     fn interpolate_positions(grid: &FrameGrid, frames: &[usize], positions: &[f64], ends: [f64; 2]) -> Self {
         let curvatures = solve_curvatures(frames, positions, ends);
         let knots_s: Vec<f64> = frames.iter().map(|&frame| grid.time_s(frame)).collect();
@@ -70,31 +71,31 @@ impl HeadSpline {
         Self { pieces, ..self.clone() }
     }
 
-    /// Number of coefficients of the smooth curve; 0 where nothing was smoothed.
+    /// Number of coefficients of the smooth curve; 0 without one.
     pub(crate) fn coefficient_count(&self) -> usize {
-        self.curve.as_ref().map_or(0, |curve| curve.coefficient_count())
+        self.curve.as_ref().map_or(0, |curve| curve.coefficients.len())
     }
 
-    /// How the position at a frame depends on the coefficients: the first that counts, and its weight and
-    /// those of the next.
+    /// Derivatives of the position at a frame by the coefficients: index of the first nonzero one, and the values
+    /// from there.
     pub(crate) fn position_weights(&self, frame: usize) -> (usize, [f64; 6]) {
         self.curve.as_ref().map_or((0, [0.0; 6]), |curve| curve.position_weights(frame as f64))
     }
 
-    /// Puts the covariance of the coefficients, m2, times a row of them in place of the row.
+    /// Multiplies a row of coefficients by their covariance, m^2, in place.
     pub(crate) fn multiply_covariance(&self, row: &mut [f64]) {
         if let Some(curve) = &self.curve {
             curve.multiply_covariance(row);
         }
     }
 
-    /// The time that the knots span, s.
+    /// Times of the first and the last knot, s.
     #[must_use]
     pub fn span_s(&self) -> [f64; 2] {
         [self.knots_s[0], self.knots_s[self.knots_s.len() - 1]]
     }
 
-    /// Whether a run over this time stays within the knots.
+    /// Whether the knots span a run.
     pub(crate) fn covers(&self, start_s: f64, stop_s: f64) -> bool {
         let ([first, last], near_s) = (self.span_s(), NEAR_FRAMES / self.grid.frame_rate_hz);
         first - near_s <= start_s && stop_s <= last + near_s
@@ -112,21 +113,21 @@ impl HeadSpline {
         }
     }
 
-    /// Taylor coefficients of the velocity about `t` within its piece; higher ones are zero.
+    /// Taylor coefficients of the velocity about `t` in its piece, m/s^k; higher ones are zero.
     #[inline]
     pub(super) fn velocity_series(&self, t: f64) -> [f64; 3] {
         let ([_, b, c, d], x) = self.piece_at(t);
         [b + x * (2.0 * c + x * 3.0 * d), 2.0 * c + 6.0 * d * x, 3.0 * d]
     }
 
-    /// The first knot after `t`, s; `None` from the last piece's end on.
+    /// The first knot after `t`, s; `None` after the last.
     #[inline]
     pub(super) fn next_knot_s(&self, t: f64) -> Option<f64> {
         let next = self.knots_s[self.piece_index(t) + 1];
         (next > t).then_some(next)
     }
 
-    /// Coefficients of the piece at `t` and the time since it started.
+    /// Coefficients of the piece at `t`, and the time since its first knot, s.
     #[inline]
     fn piece_at(&self, t: f64) -> (&[f64; 4], f64) {
         let index = self.piece_index(t);
@@ -136,19 +137,19 @@ impl HeadSpline {
     #[inline]
     fn piece_index(&self, t: f64) -> usize {
         let frame = (t - self.grid.start_s) * self.grid.frame_rate_hz + NEAR_FRAMES - self.first_frame as f64;
-        // (a negative number becomes 0)
+        // the cast turns negative numbers into 0
         self.piece_of_frame[(frame as usize).min(self.piece_of_frame.len() - 1)]
     }
 }
 
-/// Second derivatives of the cubic spline through positions, those at the ends given.
+/// Second derivatives of the cubic spline through positions, from those at the ends.
 fn solve_curvatures(frames: &[usize], positions: &[f64], [first, last]: [f64; 2]) -> Vec<f64> {
     let h = |i: usize| (frames[i + 1] - frames[i]) as f64;
     let slope = |i: usize| (positions[i + 1] - positions[i]) / h(i);
     let count = frames.len();
     let mut found = vec![first; count];
     found[count - 1] = last;
-    // elimination downwards: of each row the factor of the next curvature, and the right-hand side
+    // forward elimination: each row keeps the factor of the next curvature and the right-hand side
     let mut above = [0.0, first];
     let mut rows = Vec::with_capacity(count);
     for i in 1..count - 1 {
@@ -199,12 +200,11 @@ mod tests {
             let found = [found.position_m, found.velocity_m_per_s, found.acceleration_m_per_s2];
             worst = std::array::from_fn(|k| worst[k].max((found[k] - exact[k]).abs()));
         }
-        let bounds = [1e-13, 1e-10, 1e-7]; // rounding of half a metre, of it by frame and by frame squared
+        let bounds = [1e-13, 1e-10, 1e-7]; // rounding of 0.5 m, over a frame and over its square
         assert!(worst.iter().zip(bounds).all(|(worst, bound)| *worst < bound), "{worst:?}");
     }
 
-    /// A cubic B-spline whose knots are frames, straight beyond them, is the only natural spline through its
-    /// points.
+    /// A cubic B-spline with knots at frames and straight ends is the unique natural spline through its points.
     #[test]
     fn unsmoothed_a_spline_on_the_frames_is_reproduced() {
         let bump = |t: f64| {

@@ -1,45 +1,45 @@
 //! A smooth curve through noisy points on a frame grid: a least-squares spline of degree 5.
 //!
-//! How many pieces it has is chosen by cross-validation (Craven and Wahba 1979, *Numerische Mathematik* 31,
-//! 377), with freedoms counted 1.4-fold so that chance does not add pieces (Kim and Gu 2004, *Journal of the
-//! Royal Statistical Society* B 66, 337). A head that a crank moves is smooth over tenths of a second, so a
-//! few pieces describe it and thousands of frames share its noise; one that a hand moves gets more pieces.
-//! (A cubic smoothing spline, whose one parameter also follows from cross-validation, left two to three times
-//! the error of position on noisy cosines: it spends freedoms on what is smooth to a higher order.)
+//! Generalised cross-validation chooses the number of pieces (Craven and Wahba 1979, *Numerische Mathematik*
+//! 31, 377). Degrees of freedom count 1.4-fold, so that noise does not add pieces (Kim and Gu 2004, *Journal of
+//! the Royal Statistical Society* B 66, 337). A crank moves the head smoothly over tenths of a second, so a few
+//! pieces average the noise of thousands of frames; a hand needs more pieces. A cubic smoothing spline left two
+//! to three times the position error on noisy cosines.
 //!
-//! The noise of a tracker is correlated over a few frames (vibration, sub-pixel bias), which cross-validation
-//! would take for motion: points are averaged in blocks first, and each block is compared with the same
-//! average of the curve. Times are in frames here.
+//! Tracking noise is correlated over a few frames (vibration, sub-pixel bias), and cross-validation would take it
+//! for motion. Points are therefore averaged in blocks, and each block is compared with the same average of the
+//! curve. Times are in frames.
 
 use crate::math;
 use nalgebra::{DMatrix, DVector};
 
 /// Degree of the pieces.
 const DEGREE: usize = 5;
-/// Values of B-splines that are not zero in a piece.
+/// Number of B-splines that are nonzero in a piece.
 const SUPPORT: usize = DEGREE + 1;
-/// The same over two pieces: a block may lie across a knot.
+/// Number of B-splines that are nonzero in two pieces: a block may contain a knot.
 const BLOCK_WIDTH: usize = SUPPORT + 1;
-/// Weight of the third differences of the coefficients against that of a block: it decides where a gap
-/// leaves a piece without points, and nothing else.
+/// Weight of the third differences of the coefficients relative to a block. It matters only in gaps that leave a
+/// piece without points.
 const BRIDGE: f64 = 1e-7;
-/// How often a freedom counts in the choice of the number of pieces.
+/// Factor on the degrees of freedom in cross-validation.
 const CAUTION: f64 = 1.4;
-/// Blocks a piece, at least.
+/// Fewest blocks per piece.
 const BLOCKS_A_PIECE: f64 = 2.0;
-/// Factor between numbers of pieces that are tried.
+/// Ratio of successive trial numbers of pieces.
 const PIECE_RATIO: f64 = 1.25;
 
+/// A trend plus a spline with uniform knots over the span.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct SmoothingSpline {
     span: FrameSpan,
-    /// Polynomial over the whole span, lowest coefficient first, to which the spline adds.
+    /// Polynomial over the whole span, lowest coefficient first; the spline is added to it.
     trend: [f64; SUPPORT],
     pieces: usize,
-    coefficients: Vec<f64>,
-    /// Factor of the information of the coefficients, a frame's noise being 1.
+    pub(super) coefficients: Vec<f64>,
+    /// Cholesky factor of the coefficients' information matrix for unit noise per frame.
     information: CholeskyFactor,
-    /// Variance of a frame's noise by the scatter of the blocks, m2.
+    /// Noise variance of a frame from the scatter of the blocks, m^2.
     variance_m2: f64,
 }
 
@@ -47,14 +47,14 @@ pub(super) struct SmoothingSpline {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct FrameSpan(f64, f64);
 
-/// Frames whose mean is one datum.
+/// Consecutive frames that are averaged.
 struct FrameBlock<'a> {
     frames: &'a [usize],
     /// Mean position above the trend, m.
     mean: f64,
 }
 
-/// The curve through positions, m, at rising frames, at least three, in blocks of `length` frames.
+/// Fits positions, m, at three or more rising frames, averaged in blocks of `length` frames.
 pub(super) fn fit_smoothing_spline(frames: &[usize], positions: &[f64], length: usize) -> SmoothingSpline {
     let span = FrameSpan(frames[0] as f64, frames[frames.len() - 1] as f64);
     let trend = fit_trend(frames, positions, span);
@@ -67,7 +67,7 @@ pub(super) fn fit_smoothing_spline(frames: &[usize], positions: &[f64], length: 
         .take_while(|pieces| *pieces <= most)
         .map(|pieces| SmoothingSpline::fit_pieces(span, trend, pieces, &blocks));
     let best = tried.min_by(|a, b| a.0.total_cmp(&b.0));
-    // (one piece is always tried)
+    // the ladder always holds one piece
     best.map_or_else(|| unreachable!("no curve"), |(_, curve)| curve)
 }
 
@@ -91,7 +91,7 @@ fn average_blocks<'a>(
 }
 
 impl FrameSpan {
-    /// Place of a frame on [-1, 1].
+    /// Maps the span to [-1, 1].
     fn to_unit_interval(self, frame: f64) -> f64 {
         2.0 * (frame - self.0) / (self.1 - self.0) - 1.0
     }
@@ -101,7 +101,7 @@ fn evaluate_polynomial(coefficients: &[f64], x: f64) -> f64 {
     coefficients.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
-/// The polynomial through all points that is nearest to them; of lower degree where they are few.
+/// Least-squares polynomial through all points; few points lower its degree.
 fn fit_trend(frames: &[usize], positions: &[f64], span: FrameSpan) -> [f64; SUPPORT] {
     let terms = SUPPORT.min(frames.len());
     let powers = DMatrix::from_fn(frames.len(), terms, |row, k| {
@@ -140,14 +140,14 @@ impl SmoothingSpline {
         self.pieces as f64 / (self.span.1 - self.span.0)
     }
 
-    /// The piece in which a frame lies, and where in it.
+    /// Piece of a frame, and the position in it from 0 to 1.
     fn piece_at(&self, frame: f64) -> (usize, f64) {
         let x = (frame - self.span.0) * self.per_frame();
         let piece = (x as usize).min(self.pieces - 1);
         (piece, x - piece as f64)
     }
 
-    /// The curve of least squares with its score.
+    /// Least-squares curve of this many pieces, and its cross-validation score.
     fn fit_pieces(
         span: FrameSpan,
         trend: [f64; SUPPORT],
@@ -155,12 +155,11 @@ impl SmoothingSpline {
         blocks: &[FrameBlock<'_>],
     ) -> (f64, Self) {
         let count = pieces + DEGREE;
-        let information = CholeskyFactor(Vec::new());
-        let coefficients = Vec::new();
+        let (coefficients, information) = (Vec::new(), CholeskyFactor(Vec::new()));
         let mut curve = Self { span, trend, pieces, coefficients, information, variance_m2: 0.0 };
         let rows: Vec<(usize, [f64; BLOCK_WIDTH])> =
             blocks.iter().map(|block| curve.block_row(block)).collect();
-        let mut normal = BandedMatrix::new(count);
+        let mut normal = BandedMatrix(vec![[0.0; BLOCK_WIDTH]; count]);
         let mut right = vec![0.0; count];
         for ((from, row), block) in rows.iter().zip(blocks) {
             let weight = block.frames.len() as f64;
@@ -173,38 +172,31 @@ impl SmoothingSpline {
         curve.information = normal.factorise();
         curve.information.solve_in_place(&mut right);
         curve.coefficients = right;
-        let squares: f64 = rows
-            .iter()
-            .zip(blocks)
-            .map(|((from, row), block)| {
-                let off = block.mean - dot(row, &curve.coefficients[*from..]);
-                block.frames.len() as f64 * off * off
-            })
-            .sum();
+        let weighted_square = |((from, row), block): (&(usize, [f64; BLOCK_WIDTH]), &FrameBlock<'_>)| {
+            let off = block.mean - dot(row, &curve.coefficients[*from..]);
+            block.frames.len() as f64 * off * off
+        };
+        let squares: f64 = rows.iter().zip(blocks).map(weighted_square).sum();
         let (n, freedoms) = (blocks.len() as f64, count.min(blocks.len()) as f64);
         curve.variance_m2 = squares / (n - freedoms).max(1.0);
         let left = n - CAUTION * freedoms;
         (if left > 0.0 { squares / (left * left) } else { f64::INFINITY }, curve)
     }
 
-    pub(crate) fn coefficient_count(&self) -> usize {
-        self.coefficients.len()
-    }
-
-    /// How the position at a frame depends on the coefficients: the first that counts, and its weight and
-    /// those of the next.
+    /// Derivatives of the position at a frame by the coefficients: index of the first nonzero one, and the values
+    /// from there.
     pub(crate) fn position_weights(&self, frame: f64) -> (usize, [f64; SUPPORT]) {
         let (piece, x) = self.piece_at(frame);
         (piece, b_splines(x))
     }
 
-    /// The covariance of the coefficients, m2, times a row of them.
+    /// Multiplies a row of coefficients by their covariance, m^2, in place.
     pub(crate) fn multiply_covariance(&self, row: &mut [f64]) {
         self.information.solve_in_place(row);
         row.iter_mut().for_each(|x| *x *= self.variance_m2);
     }
 
-    /// Mean of the B-splines over a block: the first that is not zero, and the values from there.
+    /// Mean of the B-splines over a block: index of the first nonzero one, and the values from there.
     fn block_row(&self, block: &FrameBlock<'_>) -> (usize, [f64; BLOCK_WIDTH]) {
         let (from, _) = self.piece_at(block.frames[0] as f64);
         let mut row = [0.0; BLOCK_WIDTH];
@@ -217,13 +209,13 @@ impl SmoothingSpline {
     }
 }
 
-/// Sum of products over the shorter of both.
+/// Scalar product over the shorter length.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(a, b)| a * b).sum()
 }
 
-/// The `N` B-splines of degree `N - 1` on whole numbers that are not zero at `x` between 0 and 1 (de Boor
-/// 1978, *A Practical Guide to Splines*, chapter X).
+/// The `N` nonzero B-splines of degree `N - 1` with integer knots at `x` from 0 to 1 (de Boor 1978, *A Practical
+/// Guide to Splines*, chapter X).
 fn b_splines<const N: usize>(x: f64) -> [f64; N] {
     let mut values = [0.0; N];
     values[0] = 1.0;
@@ -239,15 +231,11 @@ fn b_splines<const N: usize>(x: f64) -> [f64; N] {
     values
 }
 
-/// A symmetric positive matrix with few diagonals: of each column the elements from the main diagonal down.
+/// A symmetric positive definite band matrix: each column from the main diagonal down.
 struct BandedMatrix(Vec<[f64; BLOCK_WIDTH]>);
 
 impl BandedMatrix {
-    fn new(count: usize) -> Self {
-        Self(vec![[0.0; BLOCK_WIDTH]; count])
-    }
-
-    /// Adds `weight row row^T`, the row's first element at column `from`.
+    /// Adds `weight row^T row` with the first element of the row in column `from`.
     fn add_outer_product(&mut self, from: usize, row: &[f64], weight: f64) {
         for (a, left) in row.iter().enumerate().filter(|(_, left)| **left != 0.0) {
             for (b, right) in row[a..].iter().enumerate() {
@@ -256,7 +244,6 @@ impl BandedMatrix {
         }
     }
 
-    /// The factor of Cholesky.
     fn factorise(mut self) -> CholeskyFactor {
         let count = self.0.len();
         for j in 0..count {
@@ -273,12 +260,12 @@ impl BandedMatrix {
     }
 }
 
-/// The lower factor of a matrix with few diagonals, likewise by columns.
+/// Lower Cholesky factor of a band matrix, stored like it.
 #[derive(Debug, Clone, PartialEq)]
 struct CholeskyFactor(Vec<[f64; BLOCK_WIDTH]>);
 
 impl CholeskyFactor {
-    /// Puts the solution in place of the right-hand side.
+    /// Replaces the right-hand side by the solution.
     fn solve_in_place(&self, right: &mut [f64]) {
         for (j, column) in self.0.iter().enumerate() {
             right[j] /= column[0];

@@ -1,7 +1,6 @@
-//! scene.toml as people write it: tables and types only, nothing checked against anything else.
+//! scene.toml as written: tables and types; values are checked later.
 
-use super::OutputTable;
-use super::{ContactLossRule, JamRule};
+use super::{ContactLossRule, JamRule, OutputTable};
 use crate::model::parameters::{PARAMETERS, ParameterRange};
 use crate::toml_file::table_schema;
 use schemars::{JsonSchema, Schema, SchemaGenerator};
@@ -137,8 +136,7 @@ fn friction(_: &mut SchemaGenerator) -> Schema {
     number_table_schema("friction")
 }
 
-/// The keys of a table of numbers, from the table of parameters. What can be written in two ways is not
-/// required in either.
+/// Schema of a table of numbers, from the table of parameters. A quantity with two keys requires neither.
 fn number_table_schema(table: &str) -> Schema {
     let rows = || PARAMETERS.iter().filter_map(|row| Some((row.name.split_once('.')?, row)));
     let rows = || rows().filter(|((of, _), _)| *of == table);

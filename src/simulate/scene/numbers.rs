@@ -1,9 +1,8 @@
-//! The numbers of a scene under the names of the parameter table.
+//! Numbers of a scene under the names of the parameter table.
 
 use super::as_written::{DriveFile, SceneNumbers};
 use super::{SceneError, key_error};
-use crate::model::parameters;
-use crate::model::parameters::{ModelParameter, PARAMETERS};
+use crate::model::parameters::{self, ModelParameter, PARAMETERS};
 use crate::toml_file;
 use std::collections::BTreeMap;
 use toml::Spanned;
@@ -16,66 +15,55 @@ pub(super) struct SceneReader<'a> {
 }
 
 impl SceneReader<'_> {
-    pub(crate) fn read_table(&mut self, table: &str, numbers: SceneNumbers) -> Result<(), SceneError> {
-        numbers
-            .into_iter()
-            .try_for_each(|(key, value)| self.read_number(&format!("{table}.{key}"), Some(value)))
+    /// File and line of a value.
+    fn place_of<T>(&self, value: &Spanned<T>) -> String {
+        let (line, _) = toml_file::line_and_column(self.text, value.span().start);
+        format!("{}:{line}", self.file)
     }
 
-    /// Place and path of the recording that drives the head, where there is one instead of numbers.
+    pub(crate) fn read_table(&mut self, table: &str, numbers: SceneNumbers) -> Result<(), SceneError> {
+        let mut numbers = numbers.into_iter();
+        numbers.try_for_each(|(key, value)| self.read_number(&format!("{table}.{key}"), Some(value)))
+    }
+
+    /// Place and path of the recording that drives the head; `None` after reading the numbers of a cosine.
     pub(crate) fn read_drive(&mut self, written: &DriveFile) -> Result<Option<(String, String)>, SceneError> {
         let numbers = [("amplitude_m", &written.amplitude_m), ("frequency_hz", &written.frequency_hz)];
-        let all = numbers.into_iter().chain([("delay_s", &written.delay_s)]);
         let Some(recording) = &written.recording else {
-            numbers
-                .into_iter()
-                .try_for_each(|(key, value)| self.read_number(&format!("drive.{key}"), value.clone()))?;
-            return Ok(None);
+            let read =
+                |(key, value): (_, &Option<_>)| self.read_number(&format!("drive.{key}"), value.clone());
+            return numbers.into_iter().try_for_each(read).map(|()| None);
         };
-        let (line, _) = toml_file::line_and_column(self.text, recording.span().start);
-        let place = format!("{}:{line}", self.file);
-        if let Some((key, _)) = all.into_iter().find(|(_, value)| value.is_some()) {
+        let place = self.place_of(recording);
+        let mut all = numbers.into_iter().chain([("delay_s", &written.delay_s)]);
+        if let Some((key, _)) = all.find(|(_, value)| value.is_some()) {
+            let (found, advice) = (format!("also `drive.{key}`"), "remove one: both say how the head moves");
             let expected = "a recording, or amplitude_m and frequency_hz";
-            return Err(key_error(
-                &place,
-                "drive.recording",
-                &format!("also `drive.{key}`"),
-                expected,
-                "remove one: both say how the head moves",
-            ));
+            return Err(key_error(&place, "drive.recording", found, expected, advice));
         }
         Ok(Some((place, recording.get_ref().clone())))
     }
 
-    /// When the cosine starts, s.
+    /// Start of the cosine, s.
     pub(crate) fn read_delay_s(&self, written: &DriveFile) -> Result<f64, SceneError> {
         let Some(delay) = &written.delay_s else { return Ok(0.0) };
         let found = *delay.get_ref();
         if found.is_finite() {
             return Ok(found);
         }
-        let (line, _) = toml_file::line_and_column(self.text, delay.span().start);
-        let place = format!("{}:{line}", self.file);
         let expected = "the time in seconds at which the head starts from one end of its stroke";
-        Err(key_error(&place, "drive.delay_s", &found.to_string(), expected, "correct the value"))
+        Err(key_error(&self.place_of(delay), "drive.delay_s", found, expected, "correct the value"))
     }
 
     pub(crate) fn read_number(&mut self, name: &str, value: Option<Spanned<f64>>) -> Result<(), SceneError> {
         let Some(value) = value else { return Ok(()) };
-        let (line, _) = toml_file::line_and_column(self.text, value.span().start);
-        let place = format!("{}:{line}", self.file);
+        let place = self.place_of(&value);
         let parameter = find_known_parameter(&place, name)?;
         check_parameter_range(&place, parameter, *value.get_ref())?;
-        if let Some(twin) =
-            PARAMETERS.iter().find(|p| p.quantity == parameter.quantity && self.values.contains_key(p.name))
-        {
-            return Err(key_error(
-                &place,
-                name,
-                &format!("also `{}`", twin.name),
-                "one of the two",
-                "remove one: both set the same quantity",
-            ));
+        let mut same = PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity);
+        if let Some(twin) = same.find(|p| self.values.contains_key(p.name)) {
+            let (found, advice) = (format!("also `{}`", twin.name), "remove one: both set the same quantity");
+            return Err(key_error(&place, name, found, "one of the two", advice));
         }
         self.values.insert(parameter.name, *value.get_ref());
         Ok(())
@@ -85,18 +73,12 @@ impl SceneReader<'_> {
 pub(super) fn find_known_parameter(place: &str, name: &str) -> Result<&'static ModelParameter, SceneError> {
     parameters::find_parameter(name).ok_or_else(|| {
         let table = name.split_once('.').map_or("", |(table, _)| table);
-        let known: Vec<&str> = parameters::parameter_names()
-            .into_iter()
-            .filter(|n| table.is_empty() || n.split('.').next() == Some(table))
-            .collect();
-        let known = if known.is_empty() { parameters::parameter_names() } else { known };
-        key_error(
-            place,
-            name,
-            "an unknown key",
-            "a key of the scene format",
-            &toml_file::suggest_key(name, &known),
-        )
+        let mut known = parameters::parameter_names();
+        if known.iter().any(|n| n.split('.').next() == Some(table)) {
+            known.retain(|n| n.split('.').next() == Some(table));
+        }
+        let advice = toml_file::suggest_key(name, &known);
+        key_error(place, name, "an unknown key", "a key of the scene format", &advice)
     })
 }
 
@@ -109,11 +91,11 @@ pub(super) fn check_parameter_range(
         return Ok(());
     }
     let expected = format!("{} ({}, {})", parameter.range.describe(), parameter.meaning, parameter.unit);
-    Err(key_error(place, parameter.name, &value.to_string(), &expected, "correct the value"))
+    Err(key_error(place, parameter.name, value, &expected, "correct the value"))
 }
 
-/// Every quantity is given once or has a default; the shoulder's only where there is a shoulder, the drive's
-/// where it is not recorded.
+/// Refuses a scene that lacks a quantity without a default. Quantities of an absent shoulder or of a recorded
+/// drive are not needed.
 pub(super) fn check_complete(
     file: &str,
     values: &BTreeMap<&'static str, f64>,
@@ -128,13 +110,8 @@ pub(super) fn check_complete(
         let ways: Vec<&str> =
             PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity).map(|p| p.name).collect();
         if !ways.iter().any(|name| values.contains_key(name)) {
-            return Err(key_error(
-                file,
-                parameter.name,
-                "nothing",
-                &ways.join(" or "),
-                &format!("add it: {}, {}", parameter.meaning, parameter.unit),
-            ));
+            let advice = format!("add it: {}, {}", parameter.meaning, parameter.unit);
+            return Err(key_error(file, parameter.name, "nothing", &ways.join(" or "), &advice));
         }
     }
     Ok(())
