@@ -1,8 +1,8 @@
 //! The stick-slip model run event by event: step, locate, decide, accept.
 //!
-//! Each mode of contact is a smooth phase ([`phases`]) integrated until one of its guards falls to zero; the
-//! decision what follows is a pure function of the forces ([`mode`]). Observers see every accepted piece of
-//! the solution, so nothing is stored and what is not asked for is not computed.
+//! Each mode of contact is a smooth phase ([`phases`]), integrated until one of its guards falls to zero. The
+//! next mode is a pure function of the forces ([`mode`]). Observers see every accepted piece of the solution;
+//! nothing else is stored or computed.
 
 pub mod accuracy;
 pub mod bench_checks;
@@ -25,7 +25,7 @@ use crate::model::Pose;
 use crate::model::flight::FlightState;
 use crate::model::modes::time_scales_rad_per_s;
 use crate::ode::WorkCounters;
-use event_loop::{ContactRules, EventLoop, ObserverWatcher};
+use event_loop::{EventLoop, ObserverWatcher};
 use fixed_step_scheme::FixedStepScheme;
 use impact::TipVelocity;
 use mode::TipMode;
@@ -49,18 +49,18 @@ pub enum RunStatus {
     Jammed,
     /// More than one mode was consistent with the forces.
     Indeterminate,
-    /// Transitions accumulated in no time.
+    /// Transitions accumulated at one instant.
     Chattering,
-    /// The state left what the model describes, or no step met the tolerance.
+    /// The state left the range of the model, or no step met the tolerance.
     Diverged,
-    /// The right-hand sides allowed were used up.
+    /// The limit of right-hand sides was reached.
     WorkLimit,
     /// An observer asked for the end.
     Interrupted,
 }
 
 impl RunStatus {
-    /// The name used in files.
+    /// Name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -75,7 +75,7 @@ impl RunStatus {
         }
     }
 
-    /// What it means, in a sentence.
+    /// Meaning in a sentence.
     pub(crate) fn meaning(self) -> &'static str {
         match self {
             Self::Completed => "the stop time was reached",
@@ -92,23 +92,23 @@ impl RunStatus {
     }
 }
 
-/// One change of mode.
+/// A change of mode.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Transition {
-    /// When, s.
+    /// Time of the change, s.
     pub time_s: f64,
     /// Mode before.
     pub from: TipMode,
     /// Mode after.
     pub to: TipMode,
-    /// Why.
+    /// Event that causes the change.
     pub cause: TransitionCause,
 }
 
-/// An impact of the tip on the glass: velocities jump in no time.
+/// An impact of the tip on the glass: velocities jump at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Impact {
-    /// When, s.
+    /// Time of the impact, s.
     pub time_s: f64,
     /// Velocity of the tip before.
     pub before: TipVelocity,
@@ -116,22 +116,21 @@ pub struct Impact {
     pub after: TipVelocity,
     /// Normal and tangential impulse on the tip, N s.
     pub impulse_n_s: [f64; 2],
-    /// Energy that the contact took, J; never negative beyond rounding.
+    /// Energy lost in the contact, J; not negative except for rounding.
     pub lost_j: f64,
-    /// Energy that the drive brought in by its own impulse, which keeps the head at its prescribed velocity,
-    /// J.
+    /// Energy that the drive supplies by the impulse that keeps the head at its prescribed velocity, J.
     pub driven_j: f64,
 }
 
-/// Sees the solution as it is accepted.
+/// Receives the solution as it is accepted.
 pub trait Observer {
-    /// A piece of the solution, in order of time.
+    /// Receives a piece of the solution, in order of time.
     fn observe_segment(&mut self, piece: &SolutionSegment<'_>);
-    /// A change of mode, between the pieces it separates.
+    /// Receives a change of mode, between the pieces that it separates.
     fn observe_transition(&mut self, _transition: &Transition) {}
-    /// An impact, before the transition that it causes.
+    /// Receives an impact, before the transition that it causes.
     fn observe_impact(&mut self, _impact: &Impact) {}
-    /// Asked after every piece: `Break` ends the run as [`RunStatus::Interrupted`].
+    /// Is asked after every piece; `Break` ends the run as [`RunStatus::Interrupted`].
     fn control_flow(&self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
@@ -141,35 +140,34 @@ impl Observer for () {
     fn observe_segment(&mut self, _: &SolutionSegment<'_>) {}
 }
 
-/// How exact a run is and how much work it may cost.
+/// Accuracy, work limit and method of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SolverOptions {
-    /// Tolerance, relative. Runge-Kutta may err by it in a step; Taylor series by a share of it, such that
-    /// the times of transitions err by about as many seconds. Nothing to steps of fixed length.
+    /// Relative tolerance: the error of a Runge-Kutta step. Taylor series err by a fraction of it, such that
+    /// transition times err by about this number of seconds. Fixed steps ignore it.
     pub relative_tolerance: f64,
-    /// Right-hand sides after which the run gives up ([`RunStatus::WorkLimit`]).
+    /// Right-hand sides after which the run ends ([`RunStatus::WorkLimit`]).
     pub most_evaluations: u64,
-    /// How it is integrated.
+    /// Method of integration.
     pub method: IntegrationMethod,
 }
 
-/// How a run is integrated and its transitions are located.
+/// Method of integration and of locating transitions.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum IntegrationMethod {
-    /// Taylor series of the order that the tolerance asks for; transitions are roots of the guards' own
-    /// series.
+    /// Taylor series with an order set by the tolerance; transitions are roots of the guards' series.
     #[default]
     Taylor,
-    /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on its dense output.
+    /// Runge-Kutta of order 8(5,3) with error control; transitions are bracketed on the dense output.
     RungeKutta,
-    /// The same with transitions located by the slack variable method.
+    /// Runge-Kutta of order 8(5,3); transitions are located by the slack variable method.
     Slack,
     /// The paper's scheme; the tolerance does not apply.
     FixedStep(FixedStepScheme),
 }
 
 impl IntegrationMethod {
-    /// The name on the command line and in files.
+    /// Name on the command line and in files.
     pub(crate) fn name(&self) -> &'static str {
         match self {
             Self::Taylor => "taylor",
@@ -179,23 +177,20 @@ impl IntegrationMethod {
         }
     }
 
-    /// The length of its steps, s, where that is fixed.
+    /// Length of a fixed step, s.
     pub(crate) fn step_s(&self) -> Option<f64> {
-        match self {
-            Self::FixedStep(scheme) => Some(scheme.step_s),
-            Self::Taylor | Self::RungeKutta | Self::Slack => None,
-        }
+        if let Self::FixedStep(scheme) = self { Some(scheme.step_s) } else { None }
     }
 }
 
 impl SolverOptions {
-    /// A tolerance with a bound on work that no ordinary scene reaches ([`MOST_EVALUATIONS`]).
+    /// This tolerance with the default method and work limit ([`MOST_EVALUATIONS`]).
     #[must_use]
     pub fn new(relative_tolerance: f64) -> Self {
         Self { relative_tolerance, most_evaluations: MOST_EVALUATIONS, method: IntegrationMethod::default() }
     }
 
-    /// What a scene says of both, by the default method.
+    /// Tolerance and work limit of a scene with the default method.
     #[must_use]
     pub fn from_scene(scene: &Scene) -> Self {
         let most_evaluations = scene.run.most_evaluations.unwrap_or(MOST_EVALUATIONS);
@@ -203,20 +198,20 @@ impl SolverOptions {
     }
 }
 
-/// How a run went.
+/// Summary of a run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RunResult {
-    /// How it ended.
+    /// Status at the end.
     pub status: RunStatus,
-    /// When, s.
+    /// Time of the end, s.
     pub stopped_at_s: f64,
     /// Number of changes of mode.
     pub transitions: u64,
-    /// What it cost.
+    /// Counts of steps and evaluations.
     pub work: WorkCounters,
 }
 
-/// Runs a scene from its start to its stop time at the scene's own tolerance.
+/// Runs a scene from its start to its stop time with its own tolerance and work limit.
 pub fn run_scene(scene: &Scene, observer: &mut impl Observer) -> RunResult {
     run_scene_with(scene, SolverOptions::from_scene(scene), observer)
 }
@@ -227,25 +222,19 @@ thread_local! {
     pub(crate) static RUNS: std::cell::Cell<usize> = const { std::cell::Cell::new(0) };
 }
 
-/// Runs a scene with another effort than its own.
+/// Runs a scene with other solver options.
 pub fn run_scene_with(scene: &Scene, effort: SolverOptions, observer: &mut impl Observer) -> RunResult {
     #[cfg(test)]
     RUNS.set(RUNS.get() + 1);
     let system = build_system(scene);
     let mut watch = ObserverWatcher(observer);
-    let mut machine =
-        EventLoop::new(&system, ContactRules::from_scene(scene), scene.start_s, effort, &mut watch);
-    match (scene.start, initial_pose(scene)) {
-        (StartKind::Airborne(state), _) => machine.run_from_flight(&state, scene.run.stop_s),
-        (_, Some(pose)) => machine.run_from_pose(&pose, scene.run.stop_s),
-        (_, None) => machine.finish_run(RunStatus::Diverged),
-    }
+    EventLoop::new(&system, scene, effort, &mut watch).run()
 }
 
-/// The system of a scene, with the magnitudes below which errors count as absolute.
+/// The driven blade of a scene, with the scales below which errors are absolute.
 #[must_use]
 pub fn build_system(scene: &Scene) -> DrivenBlade {
-    /// A tenth of a radian: angles of a wiper blade in use are 0.1 to 1 rad.
+    /// Angles of a wiper blade in use are 0.1 to 1 rad.
     const ANGLE_SCALE: f64 = 0.1;
     let (slowest, _) = time_scales_rad_per_s(&scene.linkage);
     DrivenBlade {
@@ -260,23 +249,21 @@ fn initial_pose(scene: &Scene) -> Option<Pose> {
     match scene.start {
         StartKind::Upright => Some(Pose { theta: 0.0, phi: 0.0, theta_rate: 0.0, phi_rate: 0.0 }),
         StartKind::State(pose) | StartKind::Airborne(FlightState { pose, .. }) => Some(pose),
-        StartKind::SteadySlide => equilibrium::steady_slip_pose(
-            &scene.linkage,
-            scene.drive.motion_at(scene.start_s).velocity_m_per_s,
-        ),
+        StartKind::SteadySlide => {
+            let speed = scene.drive.motion_at(scene.start_s).velocity_m_per_s;
+            equilibrium::steady_slip_pose(&scene.linkage, speed)
+        }
     }
 }
 
-// Why a mode of contact gives way to another.
-
-/// Why contact changes.
+/// Cause of a change of mode.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum TransitionCause {
     /// The tip comes to rest and sticks.
     TipStops,
     /// The holding force reaches the static limit.
     FrictionLimit,
-    /// The tip's velocity changes sign and nothing holds it at rest.
+    /// The tip's velocity changes sign and friction cannot hold it.
     DirectReversal,
     /// The shoulder's damping makes the holding force jump as the neck meets it.
     ShoulderCorner,
@@ -289,7 +276,7 @@ pub enum TransitionCause {
 }
 
 impl TransitionCause {
-    /// The name used in files.
+    /// Name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {

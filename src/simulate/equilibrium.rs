@@ -1,18 +1,17 @@
-//! Steady slip: the algebraic equilibrium of a blade that is dragged at constant speed.
+//! Steady slip: the static equilibrium of a blade that moves at constant speed.
 
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
 use nalgebra::{Matrix2, Vector2};
 
-/// Steps in which friction is brought from nothing to its value: each Newton iteration starts near its
-/// solution.
+/// Steps in which friction rises from zero to its value, so that each Newton iteration starts near its solution.
 const LOAD_STEPS: u32 = 64;
 const MOST_ITERATIONS: u32 = 50;
-/// Residual moment relative to the neck's stiffness times a radian at which the equilibrium is found.
+/// Convergence limit of the residual moment relative to the stiffness of neck and lip times a radian.
 const RESIDUAL: f64 = 1e-14;
 
-/// Pose in which `A qdd = 0` under the friction of the head's speed; `None` when the head rests, when there
-/// is no such pose short of a level link, or when the tip would be pulled.
+/// Pose with `A qdd = 0` under the friction at the head's speed, m/s; `None` if the head rests, if no such pose
+/// exists with both links above level, or if the glass would have to pull the tip.
 #[must_use]
 pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
     if speed_m_per_s == 0.0 {
@@ -25,22 +24,20 @@ pub fn steady_slip_pose(linkage: &Linkage, speed_m_per_s: f64) -> Option<Pose> {
         angles = solve_for_load(linkage, mu * f64::from(step) / f64::from(LOAD_STEPS), angles)?;
     }
     let pose = pose_at_rest(&angles);
-    let pressed = linkage
-        .friction_response(&pose, &LinkDirections::from_pose(&pose), &head, shoulder_contact(linkage, &pose))
-        .n_free
-        > 0.0;
-    let upright = angles.iter().all(|a| a.abs() < std::f64::consts::FRAC_PI_2);
-    (pressed && upright).then_some(pose)
+    let (d, lean) = (LinkDirections::from_pose(&pose), shoulder_contact(linkage, pose.theta));
+    let is_pressed = linkage.friction_response(&pose, &d, &head, lean).n_free > 0.0;
+    let is_upright = angles.iter().all(|a| a.abs() < std::f64::consts::FRAC_PI_2);
+    (is_pressed && is_upright).then_some(pose)
 }
 
-/// Greatest coefficient of friction whose equilibrium is looked for, and how many are.
+/// Largest trial coefficient of friction, and number of steps up to it.
 const MOST_FRICTION: f64 = 1.5;
 const FRICTIONS: u32 = 300;
 
-/// Equilibria of a blade that is dragged slowly: coefficients of friction, with the sign of the tip's
-/// velocity, and the deflection `tip_x - head_x`, m, of each, both rising in size; as far as there are
-/// equilibria, and as long as a larger coefficient bends the blade farther. Their order is that of the
-/// deflection.
+/// Equilibria in slow slip, in order of deflection: the coefficient of friction with the sign of the tip's
+/// velocity, and the deflection `tip_x - head_x`, m.
+///
+/// Each direction ends where no equilibrium exists or a larger coefficient no longer bends the blade farther.
 pub(crate) fn static_deflections(linkage: &Linkage) -> Vec<(f64, f64)> {
     let one_way = |sign: f64| {
         let mut angles = Vector2::zeros();
@@ -68,18 +65,18 @@ fn pose_at_rest(angles: &Vector2<f64>) -> Pose {
     Pose { theta: angles[0], phi: angles[1], theta_rate: 0.0, phi_rate: 0.0 }
 }
 
-fn shoulder_contact(linkage: &Linkage, pose: &Pose) -> ShoulderContact {
-    linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(pose.theta))
+/// Side of the shoulder at a neck angle, rad.
+pub(super) fn shoulder_contact(linkage: &Linkage, theta: f64) -> ShoulderContact {
+    linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(theta))
 }
 
-/// The equilibrium at one load, on the side of the shoulder where it lies: across the corner, a kink,
-/// Newton's steps could cycle.
+/// The equilibrium at one load. The side of the shoulder is fixed in each iteration, because Newton's steps could
+/// cycle across the kink at its corner.
 fn solve_for_load(linkage: &Linkage, mu: f64, angles: Vector2<f64>) -> Option<Vector2<f64>> {
-    let here = shoulder_contact(linkage, &pose_at_rest(&angles));
+    let here = shoulder_contact(linkage, angles[0]);
     let sides = [here, ShoulderContact::Off, ShoulderContact::Forward, ShoulderContact::Backward];
     sides.into_iter().find_map(|side| {
-        solve_newton(linkage, mu, angles, side)
-            .filter(|found| shoulder_contact(linkage, &pose_at_rest(found)) == side)
+        solve_newton(linkage, mu, angles, side).filter(|found| shoulder_contact(linkage, found[0]) == side)
     })
 }
 
@@ -107,8 +104,8 @@ fn solve_newton(
     None
 }
 
-/// Moments that springs, normal force and friction leave on neck and lip at rest, N m: equations (1) and (2)
-/// without rates.
+/// Residual moments of springs, normal force and friction on neck and lip at rest, N m: equations (1) and (2) of
+/// [`crate::model`] without rates.
 pub(super) fn residual_moments(
     linkage: &Linkage,
     mu: f64,
@@ -133,11 +130,10 @@ pub(super) fn residual_moments(
 }
 
 fn moment_jacobian(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: ShoulderContact) -> Matrix2<f64> {
-    /// Step of the central difference, rad: the cube root of the rounding error.
+    /// Step of the central difference, rad: the cube root of machine precision.
     const STEP: f64 = 6e-6;
     let column = |i: usize| {
-        let mut ahead = *angles;
-        let mut behind = *angles;
+        let (mut ahead, mut behind) = (*angles, *angles);
         ahead[i] += STEP;
         behind[i] -= STEP;
         (residual_moments(linkage, mu, &ahead, side) - residual_moments(linkage, mu, &behind, side))
@@ -151,7 +147,7 @@ mod tests {
     use super::*;
     use crate::simulate::scene::Scene;
 
-    /// With these values Newton's steps across the shoulder's corner cycle.
+    /// These values make Newton's steps cycle across the shoulder's corner.
     #[test]
     fn an_equilibrium_next_to_the_shoulders_corner_is_found() {
         let scene =
@@ -167,7 +163,7 @@ mod tests {
             &scene.linkage,
             mu,
             &Vector2::new(pose.theta, pose.phi),
-            shoulder_contact(&scene.linkage, &pose),
+            shoulder_contact(&scene.linkage, pose.theta),
         )
         .amax();
         assert!(left < 1e-12 * scene.linkage.neck.stiffness, "{left:e} N m left");

@@ -2,62 +2,48 @@
 
 mod flight_events;
 
+use super::equilibrium::shoulder_contact;
 use super::fixed_step_scheme::{FixedStepScheme, StabilisedStickPhase};
+use super::flight::LANDING;
 pub(super) use super::impact::TipStrike;
 use super::mode::{RestDecision, TipMode, decide_mode_at_rest, holding_force};
 use super::phases::{
     DrivenBlade, GUARDS, JAMS, LEVEL_GUARDS, SHOULDER_GUARDS, SLIP_CONTACT_LOST, STICK_CONTACT_LOST,
     SlipPhase, StickPhase, TIP_STOPS, TaylorMotion, mode_after_release, pose_from_states,
 };
-use super::scene::{ContactLossRule, JamRule, Scene};
+use super::scene::{Scene, StartKind};
 use super::solution_segment::{SegmentSolution, SolutionSegment};
-use super::{
-    Impact, IntegrationMethod, Observer, RunResult, RunStatus, SolverOptions, Transition, TransitionCause,
-};
+use super::{Impact, IntegrationMethod, Observer, RunResult, RunStatus, SolverOptions, Transition};
+use super::{TransitionCause, initial_pose};
 use crate::model::flight::FlightState;
 use crate::model::modes::time_scales_rad_per_s;
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{FrictionResponse, Pose};
-use crate::ode;
 use crate::ode::taylor::{TaylorPhase, TaylorWorkspace};
 use crate::ode::{
-    AcceptedStep, EventLocator, PhaseEnd, PhaseEndCause as Ended, PhaseStart, WorkCounters, fixed_step,
-    taylor,
+    self, AcceptedStep, EventLocator, PhaseEnd, PhaseEndCause as Ended, PhaseStart, WorkCounters,
 };
+use crate::ode::{fixed_step, taylor};
 use std::ops::ControlFlow;
 
-/// What a scene says of contact that is lost, jammed or made.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct ContactRules {
-    loss: ContactLossRule,
-    jam: JamRule,
-    restitution: f64,
-}
-
-impl ContactRules {
-    pub(super) fn from_scene(scene: &Scene) -> Self {
-        Self { loss: scene.loss, jam: scene.jam, restitution: scene.restitution() }
-    }
-}
-
-/// The state between phases.
+/// A run: its settings, and its state between phases.
 pub(super) struct EventLoop<'a, W> {
     system: &'a DrivenBlade,
-    rules: ContactRules,
+    scene: &'a Scene,
     effort: SolverOptions,
     watch: &'a mut W,
     t: f64,
     work: WorkCounters,
     transitions: u64,
     lean: ShoulderContact,
-    /// First steps that suited the last stick, slip and flight phase.
+    /// First trial steps of the next stick, slip and flight phase, s.
     steps: [Option<f64>; 3],
     recent: ChatterDetector,
     /// Shortest period of the links, s.
     shortest_period_s: f64,
-    /// Rebounds in a row that were short.
+    /// Number of consecutive short rebounds.
     short_rebounds: u32,
-    /// Where steps of stick, of slip and of flight are expanded.
+    /// Workspaces for the series of stick, slip and flight.
     rooms: (
         TaylorWorkspace<TaylorMotion, 2, GUARDS>,
         TaylorWorkspace<TaylorMotion, 4, GUARDS>,
@@ -65,57 +51,51 @@ pub(super) struct EventLoop<'a, W> {
     ),
 }
 
-/// What follows a phase.
+/// Continuation after a phase.
 enum NextPhase {
-    /// Another phase in this mode, with the guards that start at zero.
+    /// A phase of contact, with the order of the zero of each guard at its start (0 for none).
     Phase(TipMode, Pose, [u8; GUARDS]),
-    /// Flight from this state, likewise.
+    /// Flight, with the same orders.
     Flight(FlightState, [u8; GUARDS]),
     /// The end of the run.
     End(RunStatus),
 }
 
-/// The transition that a decision may write: the mode before it and, where the forces do not tell, the cause.
+/// A transition to record once the next mode is known: the mode before, and the cause unless the forces decide it.
 type PendingTransition = Option<(TipMode, Option<TransitionCause>)>;
 
 impl<'a, W: RunWatcher> EventLoop<'a, W> {
     pub(super) fn new(
         system: &'a DrivenBlade,
-        rules: ContactRules,
-        t: f64,
+        scene: &'a Scene,
         effort: SolverOptions,
         watch: &'a mut W,
     ) -> Self {
         let (_, fastest) = time_scales_rad_per_s(&system.linkage);
         let shortest_period_s = std::f64::consts::TAU / fastest;
-        let recent = ChatterDetector::new(shortest_period_s);
-        let work =
-            WorkCounters { most_rhs_evaluations: Some(effort.most_evaluations), ..WorkCounters::default() };
-        let (lean, steps) = (ShoulderContact::Off, [None; 3]);
+        let most_rhs_evaluations = Some(effort.most_evaluations);
         Self {
             system,
-            rules,
+            scene,
             effort,
             watch,
-            t,
-            work,
+            t: scene.start_s,
+            work: WorkCounters { most_rhs_evaluations, ..WorkCounters::default() },
             transitions: 0,
-            lean,
-            steps,
-            recent,
+            lean: ShoulderContact::Off,
+            steps: [None; 3],
+            recent: ChatterDetector::new(shortest_period_s),
             shortest_period_s,
             short_rebounds: 0,
             rooms: Default::default(),
         }
     }
 
-    pub(super) fn run_from_pose(&mut self, pose: &Pose, stop: f64) -> RunResult {
-        self.lean = self.system.linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(pose.theta));
-        let first = self.first_phase(pose);
-        self.run_phases(first, stop)
-    }
-
-    fn run_phases(&mut self, mut next: NextPhase, stop: f64) -> RunResult {
+    /// Runs the scene from its start to its end.
+    pub(super) fn run(&mut self) -> RunResult {
+        let Some(pose) = initial_pose(self.scene) else { return self.finish_run(RunStatus::Diverged) };
+        self.lean = shoulder_contact(&self.system.linkage, pose.theta);
+        let (stop, mut next) = (self.scene.run.stop_s, self.first_phase(&pose));
         loop {
             next = match next {
                 NextPhase::End(status) => return self.finish_run(status),
@@ -132,17 +112,22 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         }
     }
 
-    /// Why a phase found no further step.
+    /// Status after a step that became too small.
     fn failure_status(&self) -> RunStatus {
         if self.work.is_spent() { RunStatus::WorkLimit } else { RunStatus::Diverged }
     }
 
-    pub(super) fn finish_run(&self, status: RunStatus) -> RunResult {
+    fn finish_run(&self, status: RunStatus) -> RunResult {
         RunResult { status, stopped_at_s: self.t, transitions: self.transitions, work: self.work }
     }
 
-    /// The first mode: by the tip's velocity, or by the forces when it is at rest.
+    /// The first mode: by the tip's velocity, or by the forces if it is at rest.
     fn first_phase(&mut self, pose: &Pose) -> NextPhase {
+        if let StartKind::Airborne(state) = self.scene.start {
+            let mut zero_order = [0; GUARDS];
+            zero_order[LANDING] = if state.gap_m > 0.0 { 0 } else { self.gap_order(&state) };
+            return NextPhase::Flight(state, zero_order);
+        }
         let at = self.system.contact_instant(self.t, pose, self.lean);
         if at.directions.cos_theta <= 0.0 || at.directions.cos_phi <= 0.0 {
             return NextPhase::End(RunStatus::Diverged);
@@ -154,7 +139,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         self.decide_in_motion(pose, velocity, None)
     }
 
-    /// Decides what follows with the tip moving along the glass.
+    /// Decides the next mode of a tip that moves along the glass.
     fn decide_in_motion(&mut self, pose: &Pose, velocity: f64, before: PendingTransition) -> NextPhase {
         let at = self.system.contact_instant(self.t, pose, self.lean);
         let mode = TipMode::slip_towards(velocity);
@@ -173,7 +158,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         }
     }
 
-    /// Decides what follows with the tip at rest.
+    /// Decides the next mode of a tip at rest.
     fn decide_at_rest(&mut self, pose: &Pose, before: PendingTransition) -> NextPhase {
         let at = self.system.contact_instant(self.t, pose, self.lean);
         match decide_mode_at_rest(&at.contact, self.system.linkage.friction.static_coefficient()) {
@@ -185,22 +170,20 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
                     self.record_transition(from, mode, given.unwrap_or_else(|| cause_of_change(from, mode)));
                 }
                 let mut zero_order = [0; GUARDS];
-                zero_order[TIP_STOPS] = if mode == TipMode::Stick {
-                    0
-                } else {
-                    release_order(&at.contact, self.system.linkage.friction.static_coefficient())
-                };
+                if mode != TipMode::Stick {
+                    let mu = self.system.linkage.friction.static_coefficient();
+                    zero_order[TIP_STOPS] = release_order(&at.contact, mu);
+                }
                 NextPhase::Phase(mode, *pose, zero_order)
             }
         }
     }
 
-    /// Takes what event location leaves of the tip's velocity (rounding, or the tolerance where the tip only
-    /// grazes rest) out of the rates, by the impulse on the tip that does so: the state that is decided on is
-    /// exactly at rest.
+    /// Removes the residual tip velocity of event location by an impulse on the tip, so that the decision sees a
+    /// tip exactly at rest. The residual is rounding, or the tolerance if the tip only grazes rest.
     fn remove_tip_velocity(&self, mut pose: Pose) -> Pose {
         if matches!(self.effort.method, IntegrationMethod::FixedStep(scheme) if scheme.gain_per_s > 0.0) {
-            return pose; // the stabilisation does it
+            return pose; // the stabilisation removes it
         }
         let at = self.system.contact_instant(self.t, &pose, self.lean);
         let impulse =
@@ -248,7 +231,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         self.decide_after_stick(end.cause, pose)
     }
 
-    /// Stick as the fixed-step scheme has it.
+    /// Stick of the fixed-step scheme.
     fn integrate_stabilised_stick(
         &mut self,
         scheme: &FixedStepScheme,
@@ -299,7 +282,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         }
     }
 
-    /// Leaves stick at the static limit: the tip's velocity starts at a double zero.
+    /// Leaves stick at the static limit. The tip's velocity then has a double zero at the start of slip.
     fn release_tip(&mut self, mode: TipMode, pose: Pose) -> NextPhase {
         let at = self.system.contact_instant(self.t, &pose, self.lean);
         let (_, forces) = SlipPhase { system: self.system, direction: mode.direction(), lean: self.lean }
@@ -314,7 +297,7 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         NextPhase::Phase(mode, pose, zero_order)
     }
 
-    /// The shoulder's damping makes the holding force jump at its corner, so stick is decided again there.
+    /// Decides again at a corner of the shoulder, where its damping makes the holding force jump.
     fn decide_at_corner(&mut self, guard: usize, pose: &Pose) -> NextPhase {
         let corner = self.cross_corner(guard);
         let mut next = self.decide_at_rest(pose, Some((TipMode::Stick, None)));
@@ -368,8 +351,8 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
             }
             Ended::StepTooSmall => NextPhase::End(RunStatus::Diverged),
             Ended::Guard(JAMS) if self.is_at_pole(&phase, &pose) => self.resolve_jam(&pose, mode),
-            // beyond the tip's rest friction that falls steeply grows without bound, and an interpolant
-            // through that may dip where the indicator does not: the state stands, and the phase goes on
+            // extrapolated past rest, steeply falling friction grows without bound, and the interpolant of the
+            // indicator may dip below zero although the indicator does not: the phase goes on from this state
             Ended::Guard(JAMS) => {
                 self.recent.note_event(self.t);
                 self.shorten_slip_step();
@@ -381,14 +364,14 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
                 self.recent.note_event(self.t);
                 let next = self.decide_at_rest(&self.remove_tip_velocity(pose), Some((mode, None)));
                 if matches!(next, NextPhase::Phase(same, ..) if same == mode) {
-                    // the tip has not stopped: its first step was too long to tell a release from its error
+                    // the tip has not stopped: the first step was too long to resolve the release
                     self.shorten_slip_step();
                 }
                 next
             }
             Ended::Guard(guard) => {
                 let corner = self.cross_corner(guard);
-                // (at the instant of a release the tip's velocity still starts at its zero)
+                // at the instant of a release the tip's velocity still has its zero
                 let mut next_order = if end.t == started { zero_order } else { [0; GUARDS] };
                 next_order[corner] = 1;
                 NextPhase::Phase(mode, pose, next_order)
@@ -397,24 +380,23 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
     }
 
     fn shorten_slip_step(&mut self) {
-        /// What the next first step of slip is multiplied by.
+        /// Factor on the next first step of slip.
         const SHORTER: f64 = 0.1;
         self.steps[1] = self.steps[1].map(|step| SHORTER * step);
     }
 
-    /// Whether the tip is about to jam. Towards the paradox the indicator vanishes as the square root of the
-    /// time that is left and the normal force grows without bound: no step resolves the last instant, and one
-    /// that rounding takes across it finds the force pulling.
+    /// Whether the tip is about to jam. Near the paradox the indicator vanishes as the square root of the
+    /// remaining time and the normal force grows without bound. No step resolves the last instant; a step beyond
+    /// it, by rounding, finds a force that pulls.
     fn is_at_pole(&self, phase: &SlipPhase<'_>, pose: &Pose) -> bool {
-        /// Chosen by looking, not derived: over 300 random heavy-headed blades the runs that ended at the
-        /// paradox were left with an indicator of at most 5e-6 in size, those that ended otherwise with 0.5
-        /// or more. Anything between tells the two apart.
+        /// An empirical limit: of 300 random blades with heavy heads, runs that ended at the paradox had an
+        /// indicator of at most 5e-6 in size, all others 0.5 or more.
         const VANISHED: f64 = 1e-4;
         let (_, forces) = phase.slip_forces(pose, &self.system.contact_instant(self.t, pose, self.lean));
         forces.indicator < VANISHED
     }
 
-    /// Moves the neck onto or off the shoulder; returns the guard of the corner it has just passed.
+    /// Moves the neck onto or off the shoulder; returns the guard of the corner that it passed.
     fn cross_corner(&mut self, guard: usize) -> usize {
         self.recent.note_event(self.t);
         let [forward, backward] = SHOULDER_GUARDS;
@@ -427,20 +409,18 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
     }
 }
 
-/// Order of the zero with which the tip's velocity opens from rest: 1 where friction falls short of what
-/// would hold the tip, 2 where the two are equal, as at the end of stick, and the acceleration is what
-/// rounding leaves.
+/// Order of the zero of the tip's velocity as slip starts from rest: 1 if friction is less than the holding
+/// force, 2 if both are equal up to rounding, as at the end of stick.
 fn release_order(contact: &FrictionResponse, mu: f64) -> u8 {
-    /// Excess, as a share of the limit, up to which the forces count as equal: far above rounding, far below
-    /// what a step resolves.
+    /// Relative excess over the limit up to which the forces count as equal: far above rounding, far below the
+    /// resolution of a step.
     const EQUAL: f64 = 1e-11;
     let force = holding_force(contact);
     let limit = mu * (contact.n_free + contact.nu * force);
     if force.abs() > limit * (1.0 + EQUAL) { 1 } else { 2 }
 }
 
-/// Why the tip at rest leaves one mode for another; stick that is decided again ends at the shoulder's
-/// corner.
+/// Cause of a transition at rest; stick is decided again only at a corner of the shoulder.
 fn cause_of_change(from: TipMode, to: TipMode) -> TransitionCause {
     match (from, to) {
         (_, TipMode::Stick) => TransitionCause::TipStops,
@@ -449,10 +429,10 @@ fn cause_of_change(from: TipMode, to: TipMode) -> TransitionCause {
     }
 }
 
-// One phase by the method of a run.
-
-/// Integrates a phase by the method of the run up to where `horizon` leaves a time as it is, never across
-/// what it gives for one.
+/// Integrates a phase by the method of the run, horizon by horizon.
+///
+/// `horizon` maps a time to the latest end of a step from there; the phase stops at a time that it maps to
+/// itself.
 pub(super) fn integrate_phase<const N: usize, P: TaylorPhase<N, GUARDS>>(
     phase: &P,
     mut start: PhaseStart<N, GUARDS>,
@@ -491,9 +471,7 @@ pub(super) fn integrate_phase<const N: usize, P: TaylorPhase<N, GUARDS>>(
     }
 }
 
-// Whether events accumulate in no time.
-
-/// The last events, to tell chattering from motion.
+/// Detects events that accumulate at one instant.
 pub(super) struct ChatterDetector {
     times: [f64; Self::WINDOW],
     next: usize,
@@ -501,10 +479,10 @@ pub(super) struct ChatterDetector {
 }
 
 impl ChatterDetector {
-    /// Events compared with each other.
+    /// Number of recent events.
     const WINDOW: usize = 64;
-    /// Share of the blade's shortest period that as many events must take together: real cycles take about a
-    /// period each.
+    /// Fraction of the blade's shortest period in which this many events count as chattering; real cycles take
+    /// about a period each.
     const SHARE: f64 = 1e-6;
 
     pub(super) fn new(period_s: f64) -> Self {
@@ -521,25 +499,23 @@ impl ChatterDetector {
     }
 }
 
-// Who looks on while a run goes on: an observer alone, or one with derivatives.
-
-/// What the machine says of a run as it goes on.
+/// Receives the events of a run, for an observer or for the propagation of derivatives.
 pub(in crate::simulate) trait RunWatcher {
-    /// A piece of the solution, in order of time.
+    /// Receives a piece of the solution, in order of time.
     fn watch_segment(&mut self, piece: &SolutionSegment<'_>);
-    /// A guard has fallen at the end of the last piece, whose series this is.
+    /// Receives the guard that falls to zero at the end of the last piece, and the series of that piece.
     fn watch_guard(&mut self, _guard: usize, _motion: &TaylorMotion) {}
-    /// The tip strikes the glass there.
+    /// Receives a strike of the tip on the glass at the end of the last piece.
     fn watch_strike(&mut self, _strike: &TipStrike) {}
-    /// A change of mode, between the pieces it separates.
+    /// Receives a change of mode, between the pieces that it separates.
     fn watch_transition(&mut self, transition: &Transition);
-    /// An impact, before the transition that it causes.
+    /// Receives an impact, before the transition that it causes.
     fn watch_impact(&mut self, impact: &Impact);
     /// `Break` ends the run.
     fn control_flow(&self) -> ControlFlow<()>;
 }
 
-/// An observer and nothing else.
+/// Passes a run on to an observer.
 pub(in crate::simulate) struct ObserverWatcher<'a, O>(pub &'a mut O);
 
 impl<O: Observer> RunWatcher for ObserverWatcher<'_, O> {
@@ -561,8 +537,8 @@ impl<O: Observer> RunWatcher for ObserverWatcher<'_, O> {
 mod tests {
     use super::*;
 
-    /// A window full of events within a millionth of the shortest period is chattering; one event a period is
-    /// not, however long it lasts.
+    /// A full window of events within a millionth of the shortest period is chattering; one event per period is
+    /// not.
     #[test]
     fn events_that_accumulate_differ_from_cycles() {
         let period_s = 2e-3;

@@ -26,21 +26,21 @@ use crate::model::{LinkDirections, Linkage, Pose};
 use crate::ode::{HybridPhase, PhaseEndCause, PhaseStart, WorkCounters};
 use crate::{math, ode};
 
-/// Inverse mass that the tip shows to impulses, 1/kg.
+/// Inverse contact mass `W` of the tip, 1/kg.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct InverseMass {
-    /// Normal velocity per normal impulse.
+    /// `W_nn`: normal velocity per normal impulse.
     pub nn: f64,
-    /// Normal velocity per tangential impulse and the reverse.
+    /// `W_nt`: normal velocity per tangential impulse, and the reverse.
     pub nt: f64,
-    /// Tangential velocity per tangential impulse.
+    /// `W_tt`: tangential velocity per tangential impulse.
     pub tt: f64,
 }
 
-/// How hard and how rough a contact is.
+/// Restitution and friction of a contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ContactSurface {
-    /// Friction, as in slip.
+    /// Law of friction, the same as in slip.
     pub friction: FrictionLaw,
     /// Stronge's energetic coefficient of restitution, 0 to 1.
     pub restitution: f64,
@@ -49,24 +49,24 @@ pub struct ContactSurface {
 /// Velocity of the tip, m/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TipVelocity {
-    /// Away from the glass.
+    /// Component away from the glass.
     pub normal: f64,
-    /// Along the sweep.
+    /// Component along the sweep.
     pub tangential: f64,
 }
 
-/// What an impact did.
+/// Result of an impact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ImpactOutcome {
-    /// Velocity after it; exactly zero where the tip came to rest.
+    /// Velocity of the tip after the impact; exactly zero at rest.
     pub velocity: TipVelocity,
     /// Normal and tangential impulse on the tip, N s.
     pub impulse_n_s: [f64; 2],
-    /// Energy that the contact took, J.
+    /// Energy lost in the contact, J.
     pub lost_j: f64,
 }
 
-/// What begins an impact.
+/// Cause of an impact.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ImpactOrigin {
     /// The tip meets the glass at `v_n <= 0`.
@@ -75,7 +75,9 @@ pub enum ImpactOrigin {
     Jam,
 }
 
-/// The impact that `before` begins; `None` where the integration meets numbers that are not finite.
+/// Solves an impact from the velocity `before`; `None` if the integration meets numbers that are not finite.
+///
+/// `relative` is the tolerance of the integration.
 #[must_use]
 pub fn solve_impact(
     mass: &InverseMass,
@@ -85,22 +87,18 @@ pub fn solve_impact(
     relative: f64,
     work: &mut WorkCounters,
 ) -> Option<ImpactOutcome> {
-    /// A tangential velocity this many times the normal one sets the unit of velocity by itself: the quotient
-    /// stays a number.
+    /// Ratio of tangential to normal velocity above which the tangential one sets the unit of velocity, so that
+    /// the quotient stays finite.
     const FLATTEST: f64 = 1e12;
     let unit = before.normal.abs().max(before.tangential.abs() / FLATTEST);
     let unit = if origin == ImpactOrigin::Jam { before.tangential.abs() } else { unit };
     if unit == 0.0 || (origin == ImpactOrigin::Collision && before.normal >= 0.0) {
         return Some(ImpactOutcome { velocity: before, impulse_n_s: [0.0; 2], lost_j: 0.0 });
     }
-    let FrictionLaw { a, b_s_per_m, c } = surface.friction;
-    let friction = FrictionLaw { a, b_s_per_m: b_s_per_m * unit, c };
-    let blow = ScaledImpact {
-        cross: mass.nt / mass.nn,
-        along: mass.tt / mass.nn,
-        friction,
-        restitution: surface.restitution,
-    };
+    let ContactSurface { friction, restitution } = *surface;
+    let friction = FrictionLaw { b_s_per_m: friction.b_s_per_m * unit, ..friction };
+    let (cross, along) = (mass.nt / mass.nn, mass.tt / mass.nn);
+    let blow = ScaledImpact { cross, along, friction, restitution, relative };
     let mut state = ImpactState {
         impulse: 0.0,
         normal: before.normal / unit,
@@ -110,21 +108,17 @@ pub fn solve_impact(
         stage: ImpactStage::Compression,
     };
     if origin == ImpactOrigin::Jam {
-        state = blow.integrate_jam(state, relative, work)?;
+        state = blow.integrate_jam(state, work)?;
     }
-    let end = blow.integrate_impact(state, relative, work)?;
+    let end = blow.integrate_impact(state, work)?;
     let velocity = TipVelocity { normal: unit * end.normal, tangential: unit * end.tangential };
     let normal = end.impulse * unit / mass.nn;
     let tangential = (velocity.tangential - before.tangential - mass.nt * normal) / mass.tt;
-    let lost = -0.5
-        * (normal * (before.normal + velocity.normal)
-            + tangential * (before.tangential + velocity.tangential));
-    let all = [velocity.normal, velocity.tangential, normal, tangential, lost];
-    all.iter().all(|x| x.is_finite()).then_some(ImpactOutcome {
-        velocity,
-        impulse_n_s: [normal, tangential],
-        lost_j: lost,
-    })
+    let sums = [before.normal + velocity.normal, before.tangential + velocity.tangential];
+    let lost_j = -0.5 * (normal * sums[0] + tangential * sums[1]);
+    let all = [velocity.normal, velocity.tangential, normal, tangential, lost_j];
+    let outcome = ImpactOutcome { velocity, impulse_n_s: [normal, tangential], lost_j };
+    all.iter().all(|x| x.is_finite()).then_some(outcome)
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -134,35 +128,33 @@ enum ImpactStage {
     Ended,
 }
 
-/// State of an impact in units of one velocity, `unit`, and of `unit / W_nn`.
+/// State of an impact: velocities in units of one velocity, `unit`, impulses in units of `unit / W_nn`.
 #[derive(Debug, Clone, Copy)]
 struct ImpactState {
     impulse: f64,
     normal: f64,
     tangential: f64,
-    /// Work that compression has taken and that restitution has given, both positive.
+    /// Work taken by compression and given back by restitution, both positive.
     taken: f64,
     given: f64,
     stage: ImpactStage,
 }
 
-/// An impact without units.
+/// A dimensionless impact.
 struct ScaledImpact {
+    /// `W_nt / W_nn` and `W_tt / W_nn`.
     cross: f64,
     along: f64,
     friction: FrictionLaw,
     restitution: f64,
+    /// Relative tolerance of the integration.
+    relative: f64,
 }
 
 impl ScaledImpact {
-    /// Carries an impact to its end. A tip slides at most twice, before and after it has been at rest, and
-    /// each slide opens and closes compression and restitution a few times at most.
-    fn integrate_impact(
-        &self,
-        mut state: ImpactState,
-        relative: f64,
-        work: &mut WorkCounters,
-    ) -> Option<ImpactState> {
+    /// Integrates an impact to its end.
+    fn integrate_impact(&self, mut state: ImpactState, work: &mut WorkCounters) -> Option<ImpactState> {
+        /// The tip slips at most twice, before and after rest, and each slip has a few stages at most.
         const MOST_PARTS: usize = 32;
         for _ in 0..MOST_PARTS {
             if state.stage == ImpactStage::Ended {
@@ -170,71 +162,53 @@ impl ScaledImpact {
             }
             state = match self.slip_direction(state.tangential) {
                 None => self.finish_in_stick(state),
-                Some(direction) => self.integrate_slip(state, direction, relative, work)?,
+                Some(direction) => self.slip(state, direction, work)?,
             };
         }
         None
     }
 
-    /// Direction of slip; `None` where the tip at rest sticks.
+    /// Direction of slip; `None` for a tip that sticks.
     fn slip_direction(&self, tangential: f64) -> Option<f64> {
         let holds = self.cross.abs() <= self.friction.static_coefficient() * self.along;
         let leading = if tangential == 0.0 { self.cross } else { tangential };
         (tangential != 0.0 || !holds).then(|| leading.signum())
     }
 
-    /// What follows compression that has ended in slip.
+    /// The state after compression that ends in slip.
     fn end_compression(&self, state: ImpactState) -> ImpactState {
-        let stage = if self.remaining_restitution(&state) > 0.0 {
-            ImpactStage::Restitution
-        } else {
-            ImpactStage::Ended
-        };
+        let restores = self.remaining_work(&state) > 0.0;
+        let stage = if restores { ImpactStage::Restitution } else { ImpactStage::Ended };
         ImpactState { normal: 0.0, stage, ..state }
     }
 
-    /// Work that restitution may still give.
-    fn remaining_restitution(&self, state: &ImpactState) -> f64 {
+    /// Work that restitution may still give back.
+    fn remaining_work(&self, state: &ImpactState) -> f64 {
         self.restitution * self.restitution * state.taken - state.given
     }
 
-    /// The end in stick, in closed form: the normal velocity grows in proportion to the impulse.
+    /// The end in stick, in closed form: the normal velocity is linear in the impulse.
     fn finish_in_stick(&self, state: ImpactState) -> ImpactState {
         let growth = 1.0 - self.cross * self.cross / self.along;
-        let at_zero = if state.stage == ImpactStage::Compression {
-            ImpactState {
-                taken: state.taken + 0.5 * math::powi(state.normal, 2) / growth,
-                normal: 0.0,
-                ..state
-            }
-        } else {
-            state
-        };
-        let normal = (math::powi(at_zero.normal, 2)
-            + 2.0 * growth * self.remaining_restitution(&at_zero).max(0.0))
-        .sqrt();
-        ImpactState {
-            impulse: state.impulse + (normal - state.normal) / growth,
-            normal,
-            stage: ImpactStage::Ended,
-            ..at_zero
+        let mut at_zero = state;
+        if state.stage == ImpactStage::Compression {
+            at_zero.taken += 0.5 * math::powi(state.normal, 2) / growth;
+            at_zero.normal = 0.0;
         }
+        let gained = 2.0 * growth * self.remaining_work(&at_zero).max(0.0);
+        let normal = (math::powi(at_zero.normal, 2) + gained).sqrt();
+        let impulse = state.impulse + (normal - state.normal) / growth;
+        ImpactState { impulse, normal, stage: ImpactStage::Ended, ..at_zero }
     }
 
-    /// Slides until the tip is at rest or the stage ends.
-    fn integrate_slip(
-        &self,
-        state: ImpactState,
-        direction: f64,
-        relative: f64,
-        work: &mut WorkCounters,
-    ) -> Option<ImpactState> {
+    /// Slips until the tip is at rest or the stage ends.
+    fn slip(&self, state: ImpactState, direction: f64, work: &mut WorkCounters) -> Option<ImpactState> {
         let restores = state.stage == ImpactStage::Restitution;
         let slide = ImpactSlip { blow: self, direction, from: state, open: false };
         let mut zero_order = [0; 3];
         zero_order[RESTS] = u8::from(state.tangential == 0.0);
         zero_order[if restores { REOPENS } else { CLOSES }] = u8::from(state.normal == 0.0);
-        let (mut next, cause) = slide.integrate_to_guard(zero_order, relative, work);
+        let (mut next, cause) = slide.integrate_to_guard(zero_order, work);
         match cause {
             PhaseEndCause::Guard(RESTS) => next.tangential = 0.0,
             PhaseEndCause::Guard(CLOSES) if restores => next.stage = ImpactStage::Ended,
@@ -245,38 +219,31 @@ impl ScaledImpact {
         Some(next)
     }
 
-    /// The part of a jam that slides: down to rest, for any first instant, because the normal
-    /// velocity there starts at a zero whose order depends on how the indicator came to vanish.
-    fn integrate_jam(
-        &self,
-        state: ImpactState,
-        relative: f64,
-        work: &mut WorkCounters,
-    ) -> Option<ImpactState> {
+    /// The slip of a jam, down to rest. No stage ends it: the normal velocity starts at a zero of unknown order,
+    /// which depends on how the indicator vanished.
+    fn integrate_jam(&self, state: ImpactState, work: &mut WorkCounters) -> Option<ImpactState> {
         let slide = ImpactSlip { blow: self, direction: state.tangential.signum(), from: state, open: true };
-        let (next, cause) = slide.integrate_to_guard([0; 3], relative, work);
-        let normal = next.normal.min(0.0);
-        (cause == PhaseEndCause::Guard(RESTS)).then_some(ImpactState {
-            tangential: 0.0,
-            normal,
-            taken: next.taken.max(0.0),
-            ..next
-        })
+        let (next, cause) = slide.integrate_to_guard([0; 3], work);
+        let (normal, taken) = (next.normal.min(0.0), next.taken.max(0.0));
+        let end = ImpactState { tangential: 0.0, normal, taken, ..next };
+        (cause == PhaseEndCause::Guard(RESTS)).then_some(end)
     }
 }
 
-/// Guards of a slide: the tip comes to rest; the stage ends; in restitution the tip is pressed on again.
+/// Guards of slip: the tip comes to rest; the stage ends; in restitution the tip approaches the glass again.
 const RESTS: usize = 0;
 const CLOSES: usize = 1;
 const REOPENS: usize = 2;
 
-/// Slip in one direction, over the normal impulse; states: growth of the tangential speed in that direction,
-/// which a glancing blow changes by far less than the speed, and work of the normal force.
+/// Slip in one direction as a function of the normal impulse.
+///
+/// States: change of the tangential speed in that direction, which is far smaller than the speed in a glancing
+/// impact, and work of the normal force.
 struct ImpactSlip<'a> {
     blow: &'a ScaledImpact,
     direction: f64,
     from: ImpactState,
-    /// No stage ends it, only rest.
+    /// Whether only rest ends it.
     open: bool,
 }
 
@@ -285,7 +252,7 @@ impl ImpactSlip<'_> {
         self.direction * self.from.tangential + growth
     }
 
-    /// Normal velocity, which both impulses determine: integrated on its own it would drift from them.
+    /// Normal velocity from both impulses; integrated as a state of its own it would drift from them.
     fn normal_velocity(&self, impulse: f64, growth: f64) -> f64 {
         let ScaledImpact { cross, along, .. } = *self.blow;
         let grown = impulse - self.from.impulse;
@@ -296,15 +263,14 @@ impl ImpactSlip<'_> {
     fn integrate_to_guard(
         &self,
         zero_order: [u8; 3],
-        relative: f64,
         work: &mut WorkCounters,
     ) -> (ImpactState, PhaseEndCause) {
-        /// Impulse, in units of what stops the tip alone, at which a slide counts as endless.
+        /// Impulse at which slip counts as endless, in units of the impulse that stops the tip alone.
         const MOST: f64 = 1e15;
-        /// First step to try, in the same unit: most slides end within it.
+        /// First trial step in the same unit: slip usually ends within it.
         const FIRST: f64 = 1.0;
         let start = PhaseStart { t: self.from.impulse, y: [0.0; 2], zero_order, step: Some(FIRST) };
-        let end = ode::integrate(self, start, MOST, relative, work, |_| ());
+        let end = ode::integrate(self, start, MOST, self.blow.relative, work, |_| ());
         let done = end.y[1];
         let (taken, given) =
             if self.from.stage == ImpactStage::Compression { (-done, 0.0) } else { (0.0, done) };
@@ -335,7 +301,7 @@ impl HybridPhase<2, 3> for ImpactSlip<'_> {
             _ if self.open => [speed, f64::INFINITY, f64::INFINITY],
             ImpactStage::Compression => [speed, -normal, f64::INFINITY],
             ImpactStage::Restitution | ImpactStage::Ended => {
-                [speed, self.blow.remaining_restitution(&self.from) - y[1], normal]
+                [speed, self.blow.remaining_work(&self.from) - y[1], normal]
             }
         }
     }
@@ -345,21 +311,19 @@ impl HybridPhase<2, 3> for ImpactSlip<'_> {
     }
 }
 
-// What a strike of the tip on the glass makes of the blade.
-
-/// How the tip strikes the glass.
+/// A strike of the tip on the glass.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TipStrike {
     pub pose: Pose,
     /// Velocity of the tip before.
     pub before: TipVelocity,
     pub origin: ImpactOrigin,
-    /// The restitution that counts.
+    /// Energetic coefficient of restitution.
     pub restitution: f64,
 }
 
 impl TipStrike {
-    /// State and impact behind it; `None` where the integration meets numbers that are not finite.
+    /// State after the impact, and its outcome; `None` if the integration meets numbers that are not finite.
     pub(crate) fn solve_on_blade(
         &self,
         linkage: &Linkage,
@@ -368,11 +332,8 @@ impl TipStrike {
     ) -> Option<(FlightState, ImpactOutcome)> {
         let Self { pose, before, origin, restitution } = *self;
         let [normal, along] = linkage.impulse_responses(&LinkDirections::from_pose(&pose));
-        let mass = InverseMass {
-            nn: normal.normal_per_kg,
-            nt: normal.tangential_per_kg,
-            tt: along.tangential_per_kg,
-        };
+        let (nn, nt, tt) = (normal.normal_per_kg, normal.tangential_per_kg, along.tangential_per_kg);
+        let mass = InverseMass { nn, nt, tt };
         let surface = ContactSurface { friction: linkage.friction, restitution };
         let outcome = solve_impact(&mass, &surface, before, origin, relative, work)?;
         let [p_n, p_t] = outcome.impulse_n_s;

@@ -22,9 +22,9 @@ mod stretch;
 mod tangent_blocks;
 mod tangent_segment;
 
-use super::event_loop::{ContactRules, EventLoop};
-use super::scene::{Scene, StartKind};
-use super::{IntegrationMethod, RunResult, RunStatus, SolverOptions, Transition, build_system, initial_pose};
+use super::event_loop::EventLoop;
+use super::scene::Scene;
+use super::{IntegrationMethod, RunResult, SolverOptions, Transition, build_system};
 use propagation::{TangentPropagator, TangentWorkspace};
 pub use seeds::{TangentDirection, TangentSeeds};
 use std::ops::ControlFlow;
@@ -70,20 +70,14 @@ impl TangentRunner {
         seeds: &TangentSeeds,
         observer: &mut impl TangentObserver,
     ) -> RunResult {
-        let (system, start_s) = (build_system(scene), scene.start_s);
+        let system = build_system(scene);
         let effort = SolverOptions { method: IntegrationMethod::Taylor, ..effort };
         let tolerance = effort.relative_tolerance;
         let accuracy = self.accuracy.unwrap_or(tolerance).max(tolerance);
         let mut carrier =
             TangentPropagator::new(observer, &system, seeds, &mut self.room, [tolerance, accuracy]);
         carrier.set_start(scene);
-        let mut machine =
-            EventLoop::new(&system, ContactRules::from_scene(scene), start_s, effort, &mut carrier);
-        match (scene.start, initial_pose(scene)) {
-            (StartKind::Airborne(state), _) => machine.run_from_flight(&state, scene.run.stop_s),
-            (_, Some(pose)) => machine.run_from_pose(&pose, scene.run.stop_s),
-            (_, None) => machine.finish_run(RunStatus::Diverged),
-        }
+        EventLoop::new(&system, scene, effort, &mut carrier).run()
     }
 }
 

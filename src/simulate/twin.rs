@@ -1,5 +1,5 @@
-//! A scene seen by a camera: frame rate, exposure, pixel size, tracking noise and dropouts. What comes out is
-//! synthetic and says so.
+//! Twins: synthetic recordings of a scene by a camera with frame rate, exposure, pixel size, tracking noise and
+//! dropouts. They are marked as synthetic.
 
 pub mod film;
 pub mod spec;
@@ -15,31 +15,31 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::fmt::Write;
 
-/// What tracking adds.
+/// Errors of a tracking program.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TrackingModel {
-    /// Length that a pixel shows, m.
+    /// Scale of the image, m per pixel.
     pub metres_per_pixel: f64,
     /// Standard deviation of a tracked coordinate, pixels.
     pub noise_px: f64,
-    /// Probability that a point is lost in a frame.
+    /// Probability that a point is lost in a frame, 0 to 1.
     pub dropout_fraction: f64,
     /// Seed of noise and dropouts.
     pub seed: u64,
 }
 
-/// What the camera saw of a scene, before tracking.
+/// Recording of a scene before tracking.
 #[derive(Debug, Clone)]
 pub struct TwinView {
-    /// The traces, without noise.
+    /// Traces without noise.
     pub recording: Recording,
-    /// How the simulation went.
+    /// Status, end and work of the simulation.
     pub run: RunResult,
-    /// When the tip stuck, s of the scene's time.
+    /// Intervals of stick, s, in the scene's time.
     pub stick_s: Vec<[f64; 2]>,
 }
 
-/// Why a view cannot be made.
+/// Why a scene cannot be filmed.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum TwinViewError {
     /// The simulation stopped before two frames were taken.
@@ -50,18 +50,18 @@ pub enum TwinViewError {
         /// When, s.
         stopped_at_s: f64,
     },
-    /// The traces do not make a recording.
+    /// The traces are not a valid recording.
     #[error(transparent)]
     Recording(#[from] RecordingError),
 }
 
-/// Runs the scene and records it from `start_s` to `stop_s` of its own time, without noise.
+/// Runs a scene and records it without noise from `start_s` to `stop_s`, in the scene's time.
 ///
-/// The glass lies at `y = -(l1 + l2)`: the origin is the head of the upright blade. A frame is the mean over
-/// its exposure, which is cut to the time from `start_s` to `stop_s`.
+/// The origin is the head of the upright blade; the glass lies at `y = -(l1 + l2)`. A frame averages over its
+/// exposure, cut off at `start_s` and `stop_s`.
 ///
 /// # Errors
-/// [`TwinViewError`]; a run that stops after some frames is a view of those frames.
+/// [`TwinViewError`]; a run that stops early after two frames gives a shorter recording.
 pub fn film_scene(
     scene: &Scene,
     camera: &Camera,
@@ -72,7 +72,7 @@ pub fn film_scene(
     film_scene_with_observer(scene, camera, [start_s, stop_s], effort, &mut ())
 }
 
-/// As [`film_scene`], from the first to the second of two instants; `observer` sees the run too.
+/// [`film_scene`] with a further observer of the run.
 ///
 /// # Errors
 /// As [`film_scene`].
@@ -107,10 +107,10 @@ pub fn film_scene_with_observer(
     Ok(TwinView { recording, run, stick_s })
 }
 
-/// What a tracking program makes of a view: white noise on every coordinate and lost points.
+/// Adds white noise to every coordinate and drops points, as a tracking program does.
 ///
 /// # Errors
-/// [`RecordingError`] when noise leaves the finite numbers.
+/// [`RecordingError`] if noise makes a coordinate infinite.
 pub fn add_tracking_noise(
     view: &Recording,
     name: &str,
@@ -122,7 +122,7 @@ pub fn add_tracking_noise(
     let seen = view.traces();
     for i in 0..view.grid().frames {
         let mut point = |x: Option<f64>, y: Option<f64>| {
-            // three draws a point even where it is lost, so that one setting does not reshuffle the others
+            // three draws per point, lost or not: dropouts do not change the noise of other points
             let lost = generator.random::<f64>() < tracking.dropout_fraction;
             let (dx, dy): (f64, f64) = (generator.sample(StandardNormal), generator.sample(StandardNormal));
             let place = |value: Option<f64>, noise: f64| value.filter(|_| !lost).map(|v| v + noise_m * noise);
@@ -138,43 +138,34 @@ pub fn add_tracking_noise(
     Recording::new(name, view.grid(), traces, true)
 }
 
-/// Every parameter of the scene behind a twin, by name, in SI: the truth that a fit is held against.
+/// All parameters of a twin's scene by name, SI: the truth for a fit.
 pub(crate) fn true_parameters(scene: &Scene) -> toml::Table {
-    PARAMETERS
-        .iter()
-        .filter_map(|p| scene.value(p.name).map(|value| (p.name.to_owned(), toml::Value::Float(value))))
-        .collect()
+    let row = |name: &str| Some((name.to_owned(), toml::Value::Float(scene.value(name)?)));
+    PARAMETERS.iter().filter_map(|p| row(p.name)).collect()
 }
 
-// A twin in the layout that Tracker's export dialog writes, so that the real importer can be tried on it.
+// Export in the layout of Tracker, to test the importer.
 
-/// Names of the tracks: the mark that the data are synthetic travels in the file itself.
+/// Track names that mark the data as synthetic inside the file.
 pub(crate) const SYNTHETIC_TRACK_NAMES: [&str; 2] = ["synthetic tip", "synthetic head"];
 
-/// The recording as a tab-separated table of two tracks in pixels, y upwards, time from the first frame; an
-/// empty cell where a point was lost. Numbers carry seven digits, as Tracker's do.
+/// The recording as Tracker exports it: two tracks in pixels, y upwards, time from the first frame, empty cells
+/// for lost points, seven digits in Java's notation (`1.234567E-1`).
 pub(crate) fn write_tracker_table(recording: &Recording, metres_per_pixel: f64) -> String {
     let [tip, head] = SYNTHETIC_TRACK_NAMES;
     let mut text = format!("#multi:\n\t{tip}\t\t{head}\t\t\nt\tx\ty\tx\ty\t\n");
     let traces = recording.traces();
     let columns = [&traces.tip_x_m, &traces.tip_y_m, &traces.head_x_m, &traces.head_y_m];
     for i in 0..recording.grid().frames {
-        // writing to a String cannot fail
-        let _ = write!(text, "{}", format_java_number(i as f64 / recording.grid().frame_rate_hz));
+        let _ = write!(text, "{:.6E}", i as f64 / recording.grid().frame_rate_hz); // a String takes all writes
         for column in columns {
+            let cell = column[i].map(|value| format!("{:.6E}", value / metres_per_pixel));
             text.push('\t');
-            if let Some(value) = column[i] {
-                text.push_str(&format_java_number(value / metres_per_pixel));
-            }
+            text.push_str(&cell.unwrap_or_default());
         }
         text.push('\n');
     }
     text
-}
-
-/// `1.234567E-1`: Java's scientific notation without a sign in front of a positive exponent.
-fn format_java_number(value: f64) -> String {
-    format!("{value:.6E}")
 }
 
 #[cfg(test)]

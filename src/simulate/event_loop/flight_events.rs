@@ -1,9 +1,7 @@
-//! Off the glass and back: lift-off, flight, landing, and the impact without collision that resolves the
-//! Painlevé paradox.
+//! Lift-off, flight, landing, and the impact without collision that resolves the Painlevé paradox.
 
 use super::{EventLoop, NextPhase, PendingTransition, RunWatcher, TipStrike, integrate_phase};
 use crate::model::flight::FlightState;
-use crate::model::shoulder::ShoulderContact;
 use crate::model::{LinkDirections, Pose};
 use crate::ode::{self, PhaseEndCause as Ended, PhaseStart};
 use crate::simulate::flight::{FlightPhase, LANDING, flight_state_from, flight_state_vector};
@@ -12,30 +10,21 @@ use crate::simulate::mode::TipMode;
 use crate::simulate::phases::{GUARDS, LEVEL_GUARDS};
 use crate::simulate::scene::{ContactLossRule, JamRule};
 use crate::simulate::solution_segment::{SegmentSolution, SolutionSegment};
-use crate::simulate::{Impact, RunResult, RunStatus, TransitionCause};
+use crate::simulate::{Impact, RunStatus, TransitionCause};
 
 impl<W: RunWatcher> EventLoop<'_, W> {
-    /// A run that starts off the glass.
-    pub(in crate::simulate) fn run_from_flight(&mut self, state: &FlightState, stop: f64) -> RunResult {
-        self.lean =
-            self.system.linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(state.pose.theta));
-        let mut zero_order = [0; GUARDS];
-        zero_order[LANDING] = if state.gap_m > 0.0 { 0 } else { self.gap_order(state) };
-        self.run_phases(NextPhase::Flight(*state, zero_order), stop)
-    }
-
-    /// The normal force has reached zero.
+    /// Handles a normal force of zero.
     pub(super) fn lose_contact(&mut self, pose: &Pose, before: PendingTransition) -> NextPhase {
         self.lift_off(FlightState { pose: *pose, gap_m: 0.0, gap_rate_m_per_s: 0.0 }, before)
     }
 
     fn lift_off(&mut self, state: FlightState, before: PendingTransition) -> NextPhase {
-        if self.rules.loss == ContactLossRule::Stop {
+        if self.scene.loss == ContactLossRule::Stop {
             return NextPhase::End(RunStatus::ContactLost);
         }
         if let Some((from, cause)) = before {
             if cause.is_none() {
-                self.recent.note_event(self.t); // impacts have noted themselves
+                self.recent.note_event(self.t); // impacts are noted before
             }
             self.record_transition(from, TipMode::Flight, cause.unwrap_or(TransitionCause::LiftOff));
         }
@@ -45,20 +34,16 @@ impl<W: RunWatcher> EventLoop<'_, W> {
     }
 
     fn gap_acceleration(&self, t: f64, state: &FlightState) -> f64 {
-        let d = LinkDirections::from_pose(&state.pose);
-        self.system
-            .linkage
-            .flight_accelerations(state, &d, &self.system.drive.motion_at(t), self.lean)
-            .gap_m_per_s2
+        let (d, head) = (LinkDirections::from_pose(&state.pose), self.system.drive.motion_at(t));
+        self.system.linkage.flight_accelerations(state, &d, &head, self.lean).gap_m_per_s2
     }
 
-    /// Order of the gap's zero at lift-off: 1 after a rebound, 2 where forces have jumped, 3 where the normal
-    /// force has fallen through zero, so that the gap's acceleration starts there but for the error of the
-    /// solution: the order of the term that counts most over a short time. Only a rebound that falls back
-    /// needs its order independent of the others; a term of lower order that is left over and positive makes
-    /// the gap clearer, not less clear.
-    fn gap_order(&self, state: &FlightState) -> u8 {
-        /// The short time, as a share of the shortest period.
+    /// Order of the zero of the gap at lift-off: that of the largest term of its series over a short time. It is
+    /// 1 after a rebound, 2 after a jump of the forces, and 3 after the normal force passes zero, where the gap's
+    /// acceleration is zero except for errors. A rebound that falls back needs order 1 whatever the other terms;
+    /// else a smaller positive term of lower order only widens the gap.
+    pub(super) fn gap_order(&self, state: &FlightState) -> u8 {
+        /// The short time as a fraction of the shortest period.
         const SHARE: f64 = 1e-3;
         let time = SHARE * self.shortest_period_s;
         let rates = ode::HybridPhase::derivative(
@@ -72,7 +57,7 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         let [first, second, third] = [state.gap_rate_m_per_s, 0.5 * now * time, change * time / 6.0];
         match () {
             () if first > 0.0 && (now < 0.0 || first > second.max(third)) => 1,
-            // with a third that falls too: to divide by it would take a tip that rises for one that lands
+            // also for a negative third term: division by it would take a rising tip for a landing one
             () if second.abs() > third => 2,
             () => 3,
         }
@@ -85,16 +70,12 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         stop: f64,
     ) -> NextPhase {
         let phase = FlightPhase { system: self.system, lean: self.lean };
-        /// A little more than a rebound lasts, so that one step holds its end.
+        /// Factor on the duration of a rebound, so that one step includes its end.
         const MARGIN: f64 = 1.25;
         let (started, rebound) = (self.t, self.rebound_s(state).map(|time| MARGIN * time));
-        // (the steps of rebounds are no measure for a flight that begins with the gap's acceleration at zero)
-        let start = PhaseStart {
-            t: self.t,
-            y: flight_state_vector(state),
-            zero_order,
-            step: rebound.or(self.steps[2]),
-        };
+        // the step of a rebound is no guide for a flight that begins at zero acceleration of the gap
+        let (y, step) = (flight_state_vector(state), rebound.or(self.steps[2]));
+        let start = PhaseStart { t: self.t, y, zero_order, step };
         let (watch, drive) = (&mut *self.watch, &self.system.drive);
         let end = integrate_phase(
             &phase,
@@ -137,18 +118,17 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         }
     }
 
-    /// How long a tip that leaves the glass at a velocity stays off it if the gap's acceleration stays, `2
-    /// v_n / |gap''|`, s.
+    /// Duration of a rebound at constant acceleration of the gap, `2 v_n / |gap''|`, s.
     fn rebound_s(&self, state: &FlightState) -> Option<f64> {
         let acceleration = self.gap_acceleration(self.t, state);
         (state.gap_m == 0.0 && state.gap_rate_m_per_s > 0.0 && acceleration < 0.0)
             .then(|| -2.0 * state.gap_rate_m_per_s / acceleration)
     }
 
-    /// The gap has fallen to zero.
+    /// Handles a gap that falls to zero.
     fn land_tip(&mut self, state: &FlightState) -> NextPhase {
         self.recent.note_event(self.t);
-        // a tip that only grazes the glass may be found to leave it, within the tolerance
+        // within the tolerance, a tip that grazes the glass may seem to leave it
         self.strike_glass(
             &state.pose,
             state.gap_rate_m_per_s.min(0.0),
@@ -157,10 +137,10 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         )
     }
 
-    /// No finite force is admissible in slip, or leaving stick into it. Where the tip would rise without
-    /// contact it does; otherwise the paradox is an impact without collision.
+    /// Handles slip, or release into slip, without an admissible finite force: lift-off if the tip rises without
+    /// contact, otherwise an impact without collision.
     pub(super) fn resolve_jam(&mut self, pose: &Pose, from: TipMode) -> NextPhase {
-        if self.rules.jam == JamRule::Stop {
+        if self.scene.jam == JamRule::Stop {
             return NextPhase::End(RunStatus::Jammed);
         }
         let at = self.system.contact_instant(self.t, pose, self.lean);
@@ -168,13 +148,13 @@ impl<W: RunWatcher> EventLoop<'_, W> {
             return self.lose_contact(pose, Some((from, None)));
         }
         if from == TipMode::Stick {
-            return NextPhase::End(RunStatus::Jammed); // at rest there is nothing that an impact could brake
+            return NextPhase::End(RunStatus::Jammed); // an impact cannot brake a tip at rest
         }
         self.recent.note_event(self.t);
         self.strike_glass(pose, 0.0, ImpactOrigin::Jam, (from, TransitionCause::JamImpact))
     }
 
-    /// An impact and what follows it.
+    /// Solves an impact and decides the next mode.
     fn strike_glass(
         &mut self,
         pose: &Pose,
@@ -186,7 +166,7 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         let tangential =
             self.system.linkage.tip_velocity_m_per_s(pose, &d, &self.system.drive.motion_at(self.t));
         let before = TipVelocity { normal, tangential };
-        let strike = TipStrike { pose: *pose, before, origin, restitution: self.rules.restitution };
+        let strike = TipStrike { pose: *pose, before, origin, restitution: self.scene.restitution() };
         let Some((after, outcome)) = self.rebound_or_close(strike) else {
             return NextPhase::End(RunStatus::Diverged);
         };
@@ -201,16 +181,16 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         }
     }
 
-    /// The impact with the scene's restitution, or without any where the train of rebounds that it belongs to
-    /// counts as over: the rest of a train, `T (1 + e + e^2 + ...)`, passes on the same impulse as contact
-    /// does in the same time, so that closing it early moves the tip by no more than the height of a rebound.
+    /// The impact with the scene's restitution, or with none once its train of rebounds counts as over. The rest
+    /// of a train, of duration `T (1 + e + e^2 + ...)`, transmits the same impulse as contact in that time, so
+    /// closing it early moves the tip by at most the height of a rebound.
     fn rebound_or_close(&mut self, strike: TipStrike) -> Option<(FlightState, ImpactOutcome)> {
-        /// Share of the shortest period that a rebound must last to be followed: ten times the share within
-        /// which a whole window of events counts as chattering, so that a train closes before it does.
+        /// Fraction of the shortest period below which a rebound closes its train: ten times the limit of
+        /// chattering, so that the train closes first.
         const RESOLUTION: f64 = 1e-5;
-        /// Share below which a rebound counts as short, and short rebounds in a row after which a train is
-        /// closed for any restitution: with one near 1 it might last for ever. A restitution of 0.99
-        /// comes from one share to the other in 690.
+        /// Fraction below which a rebound counts as short, and the number of consecutive short rebounds that
+        /// closes a train: near restitution 1 it might last for ever. A restitution of 0.99 needs 690 rebounds
+        /// from `SHORT` to `RESOLUTION`.
         const SHORT: f64 = 1e-2;
         const MOST_SHORT: u32 = 1000;
         let rebound = self.solve_strike(&strike)?;

@@ -1,12 +1,10 @@
-//! A finely sampled trace seen by a camera, so that a simulated trace can be held against a measured one like
-//! with like.
+//! Films a finely sampled trace with a camera, for a fair comparison of simulated and measured traces.
 //!
-//! Between its samples the trace is a polynomial of the fifth degree through the six samples around, of which
-//! the mean over the open shutter is exact. At [`LEAST_OVERSAMPLING`] samples a frame a sine of half the
-//! frame rate is passed with an error of 0.12 % of its amplitude next to the sinc of its exposure, one of a
-//! quarter of the frame rate with 0.002 %; what is faster than half the frame rate (and appears folded) takes
-//! 8 samples a cycle for 0.12 %. A stick-slip cycle jumps in its acceleration: there the error falls with the
-//! square of the time between samples, and on the bundled blade it is 2 nm at 20,000 samples/s.
+//! Between samples the trace is a quintic through the six nearest samples; its mean over the open shutter is
+//! exact. With [`LEAST_OVERSAMPLING`] samples per frame, a sine of half the frame rate errs by 0.12 % of its
+//! amplitude relative to the exact exposure sinc, one of a quarter of the frame rate by 0.002 %. Faster, aliased
+//! sines need 8 samples per cycle for 0.12 %. At the jumps of acceleration of stick-slip the error falls with
+//! the square of the sampling interval: 2 nm on the bundled blade at 20,000 samples/s.
 
 use super::Camera;
 use crate::math::StandardNormal;
@@ -18,10 +16,10 @@ use crate::recording::{
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Samples of the fine trace in the time of a frame, at least, so that the error above holds.
+/// Fewest samples of the fine trace per frame for the errors above.
 pub const LEAST_OVERSAMPLING: f64 = 4.0;
-/// Nodes and weights of the three-point Gauss-Legendre rule on [0, 1] (Abramowitz and Stegun, table 25.4):
-/// exact to the fifth degree.
+/// Nodes and weights of the three-point Gauss-Legendre rule on [0, 1], exact to degree 5 (Abramowitz and Stegun,
+/// table 25.4).
 const GAUSS: [(f64, f64); 3] =
     [(0.112_701_665_379_258_3, 5.0 / 18.0), (0.5, 8.0 / 18.0), (0.887_298_334_620_741_7, 5.0 / 18.0)];
 
@@ -52,7 +50,7 @@ pub enum FilmError {
         /// Rate of the camera, 1/s.
         frame_rate_hz: f64,
     },
-    /// The trace has fewer samples than a piece of the path runs through.
+    /// The trace has fewer samples than the interpolation needs.
     #[error(
         "{trace}: found {found} samples, expected at least {STENCIL}; raise [run] stop_s in the scene and simulate again"
     )]
@@ -76,7 +74,7 @@ pub enum FilmError {
         /// Last sample, s.
         end_s: f64,
     },
-    /// The frames do not make a recording.
+    /// The frames are not a valid recording.
     #[error("{trace}: {error}")]
     Recording {
         /// Name of the trace.
@@ -86,12 +84,11 @@ pub enum FilmError {
     },
 }
 
-/// What `camera` sees of the trace `fine` from `start_s`, s of its time, to its end, without noise; marked
-/// synthetic, with the trace's clock and name. Every frame is the mean over the exposure centred on its
-/// instant; what the shutter shows beyond the ends of the trace is its outermost sample, as in
-/// [`super::view`]. A frame that rests on a missing sample is missing.
+/// Films the trace `fine` without noise from `start_s`, s on its clock, to its end.
 ///
-/// A camera without exposure whose every frame falls on a sample takes those samples, at any rate.
+/// The result is synthetic and keeps clock and name of the trace. A frame averages over the exposure around its
+/// instant; beyond the ends of the trace the shutter sees the outermost sample. A frame that needs a missing
+/// sample is missing. Without exposure, frames that fall on samples take them at any frame rate.
 ///
 /// # Errors
 /// [`FilmError`].
@@ -103,56 +100,50 @@ pub fn film_trace(fine: &Recording, camera: &Camera, start_s: f64) -> Result<Rec
     let seen = |column: &[Option<f64>]| -> Vec<Option<f64>> {
         (0..grid.frames).map(|frame| shutter.frame_mean(column, frame)).collect()
     };
-    let traces = fine.traces();
-    let traces = Traces {
-        tip_x_m: seen(&traces.tip_x_m),
-        tip_y_m: seen(&traces.tip_y_m),
-        head_x_m: seen(&traces.head_x_m),
-        head_y_m: seen(&traces.head_y_m),
-        ..Traces::default()
-    };
+    synthetic_recording(fine, grid, coordinate_columns(fine).map(|(_, column)| seen(column)))
+}
+
+/// A synthetic recording with the name of `fine`; columns are tip x, tip y, head x, head y, m.
+fn synthetic_recording(
+    fine: &Recording,
+    grid: FrameGrid,
+    [tip_x_m, tip_y_m, head_x_m, head_y_m]: [Vec<Option<f64>>; COORDINATES],
+) -> Result<Recording, FilmError> {
+    let traces = Traces { tip_x_m, tip_y_m, head_x_m, head_y_m, ..Traces::default() };
     Recording::new(fine.name(), grid, traces, true)
         .map_err(|error| FilmError::Recording { trace: fine.name().to_owned(), error })
 }
 
 fn check_film_camera(camera: &Camera) -> Result<(), FilmError> {
     let Camera { frame_rate_hz, exposure_s } = *camera;
-    if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
-        return Err(FilmError::Camera {
-            key: "frame_rate_hz",
-            found: frame_rate_hz,
-            expected: "a number above 0",
-        });
-    }
-    if !(0.0..=1.0 / frame_rate_hz).contains(&exposure_s) {
-        return Err(FilmError::Camera {
-            key: "exposure_s",
-            found: exposure_s,
-            expected: "0 to the time between frames",
-        });
-    }
-    Ok(())
+    let (key, found, expected) = if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
+        ("frame_rate_hz", frame_rate_hz, "a number above 0")
+    } else if !(0.0..=1.0 / frame_rate_hz).contains(&exposure_s) {
+        ("exposure_s", exposure_s, "0 to the time between frames")
+    } else {
+        return Ok(());
+    };
+    Err(FilmError::Camera { key, found, expected })
 }
 
-/// The camera's frames from `start_s` to the last sample; never more than samples.
+/// The camera's frames from `start_s` to the last sample; at most as many as samples.
 fn plan_frames(fine: &Recording, camera: &Camera, start_s: f64) -> Result<FrameGrid, FilmError> {
     let (trace, grid) = (fine.name().to_owned(), fine.grid());
     let (fine_hz, end_s) = (grid.frame_rate_hz, grid.time_s(grid.frames - 1));
-    let least_hz = LEAST_OVERSAMPLING * camera.frame_rate_hz;
-    if fine_hz < camera.frame_rate_hz * (1.0 - ON_FRAME_TOLERANCE) {
-        return Err(FilmError::TooCoarse { trace, fine_hz, least_hz, frame_rate_hz: camera.frame_rate_hz });
+    let frame_rate_hz = camera.frame_rate_hz;
+    if fine_hz < frame_rate_hz * (1.0 - ON_FRAME_TOLERANCE) {
+        let least_hz = LEAST_OVERSAMPLING * frame_rate_hz;
+        return Err(FilmError::TooCoarse { trace, fine_hz, least_hz, frame_rate_hz });
     }
     let slack_s = ON_FRAME_TOLERANCE / fine_hz;
     if !(grid.start_s - slack_s..=end_s + slack_s).contains(&start_s) {
         return Err(FilmError::Outside { trace, found_s: start_s, start_s: grid.start_s, end_s });
     }
-    // bounded by the samples
-    let frames =
-        ((end_s - start_s) * camera.frame_rate_hz + ON_FRAME_TOLERANCE).floor().max(0.0) as usize + 1;
-    Ok(FrameGrid { start_s, frame_rate_hz: camera.frame_rate_hz, frames })
+    let frames = ((end_s - start_s) * frame_rate_hz + ON_FRAME_TOLERANCE).floor().max(0.0) as usize + 1;
+    Ok(FrameGrid { start_s, frame_rate_hz, frames })
 }
 
-/// Where the open shutter lies on the samples, in samples (real numbers).
+/// Position of the shutter on the fine trace, in samples.
 struct FrameShutter {
     first: f64,
     samples_per_frame: f64,
@@ -171,7 +162,7 @@ impl FrameShutter {
         }
     }
 
-    /// Whether the path between samples is known well enough, or not needed.
+    /// Refuses a trace too coarse or too short to interpolate, unless every frame falls on a sample.
     fn check_sampling(&self, fine: &Recording, camera: &Camera, grid: &FrameGrid) -> Result<(), FilmError> {
         let trace = || fine.name().to_owned();
         if self.open == 0.0 && (0..grid.frames).all(|frame| frame_at(self.frame_centre(frame)).is_some()) {
@@ -190,8 +181,7 @@ impl FrameShutter {
         (self.first + frame as f64 * self.samples_per_frame).clamp(0.0, self.last)
     }
 
-    /// Mean of a column over the shutter of a frame: its pieces between samples, each by a rule that is exact
-    /// for it.
+    /// Mean of a column over the open shutter of a frame, by a rule that is exact between samples.
     fn frame_mean(&self, column: &[Option<f64>], frame: usize) -> Option<f64> {
         let centre = self.first + frame as f64 * self.samples_per_frame;
         if self.open == 0.0 {
@@ -218,8 +208,7 @@ impl FrameShutter {
     }
 }
 
-/// The path at `at`, counted in samples, inside the column: the sample itself, or the polynomial through the
-/// six samples around, which near the ends lie more to one side.
+/// A column at position `at`, in samples: the sample itself, or the quintic through the six nearest ones.
 fn interpolate_column(column: &[Option<f64>], at: f64) -> Option<f64> {
     if let Some(sample) = frame_at(at) {
         return *column.get(sample)?;
@@ -228,18 +217,17 @@ fn interpolate_column(column: &[Option<f64>], at: f64) -> Option<f64> {
     lagrange_through_six(column, first, at)
 }
 
-// A fine trace as the tracking of a given recording would show it: its frames, its noise, its lost points.
+// A film with the frames, noise and lost points of a given recording.
 
-/// Columns of a recording: tip x, tip y, head x, head y.
+/// Coordinates of a recording: tip x, tip y, head x, head y.
 const COORDINATES: usize = 4;
 
-/// Which frames were dropped.
+/// Choice of the dropped frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum DropoutPattern {
-    /// Those that the recording misses: both clocks were aligned at the first turn of the head that each
-    /// shows.
+    /// The frames that the recording misses. Both clocks are aligned at the first turn of the head.
     SameFrames,
-    /// As large a share, at random: one of them shows no turn of the head, so that their clocks cannot be
+    /// The same fraction, at random. One of the traces shows no turn of the head, so their clocks cannot be
     /// aligned.
     AtRandom,
 }
@@ -247,12 +235,12 @@ pub enum DropoutPattern {
 /// A trace filmed like a recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MatchedFilm {
-    /// What was seen, on the clock of the fine trace; marked synthetic.
+    /// The film on the clock of the fine trace; marked synthetic.
     pub recording: Recording,
-    /// Standard deviation of the white noise added to tip x, tip y, head x, head y, m; 0 where the recording
-    /// has no such column.
+    /// Standard deviations of the white noise added to tip x, tip y, head x, head y, m; 0 for a column that the
+    /// recording lacks.
     pub noise_m: [f64; COORDINATES],
-    /// Which frames were dropped.
+    /// Choice of the dropped frames.
     pub dropouts: DropoutPattern,
 }
 
@@ -262,7 +250,7 @@ pub enum MatchedFilmError {
     /// The trace cannot be filmed.
     #[error(transparent)]
     Film(#[from] FilmError),
-    /// A column has too few frames in a row for its noise.
+    /// A column has too few consecutive frames for an estimate of its noise.
     #[error(
         "{recording}, column {column}: found too few frames in a row to measure its noise, expected 11; track the lost frames again"
     )]
@@ -274,11 +262,12 @@ pub enum MatchedFilmError {
     },
 }
 
-/// Films `fine` at the rate of `like` with `exposure_s`, adds white noise of the size that [`noise_floor`]
-/// measures on each column of `like` (an upper estimate where that oscillates within a few frames), and drops
-/// frames: the same ones where the first turn of the head shows in both, else as many at random. Frames that
-/// the aligned recording does not have are not taken. `seed` settles noise and random dropouts; dropouts do
-/// not reshuffle the noise.
+/// Films `fine` at the frame rate of `like`, with its noise and its lost frames.
+///
+/// [`noise_floor`] measures the white noise of each column of `like`; it overestimates noise if the column
+/// oscillates within a few frames. If both traces show a turn of the head, their clocks are aligned there, the
+/// film covers the frames of `like`, and it drops the same frames; otherwise it drops the same fraction at
+/// random. `seed` sets noise and random dropouts; dropouts do not change the noise.
 ///
 /// # Errors
 /// [`MatchedFilmError`].
@@ -299,11 +288,8 @@ pub fn film_like_recording(
         noise_m,
         seed,
     };
-    let [tip_x_m, tip_y_m, head_x_m, head_y_m] = tracker.track_frames(&seen, frames);
-    let traces = Traces { tip_x_m, tip_y_m, head_x_m, head_y_m, ..Traces::default() };
-    let refused = |error: RecordingError| FilmError::Recording { trace: fine.name().to_owned(), error };
-    let recording =
-        Recording::new(fine.name(), FrameGrid { frames, ..seen.grid() }, traces, true).map_err(refused)?;
+    let columns = tracker.track_frames(&seen, frames);
+    let recording = synthetic_recording(fine, FrameGrid { frames, ..seen.grid() }, columns)?;
     let dropouts = if shown.is_some() { DropoutPattern::SameFrames } else { DropoutPattern::AtRandom };
     Ok(MatchedFilm { recording, noise_m, dropouts })
 }
@@ -329,20 +315,16 @@ fn measure_noises(like: &Recording) -> Result<[f64; COORDINATES], MatchedFilmErr
     Ok(noises)
 }
 
-fn missing_share(column: &[Option<f64>]) -> f64 {
-    column.iter().filter(|x| x.is_none()).count() as f64 / column.len() as f64
-}
-
-/// The part of a recording whose frames lie in the fine trace.
+/// Frames of a recording within the fine trace.
 struct SharedFrames {
-    /// Its first frame in the recording.
+    /// Index of the first frame in the recording.
     first: usize,
-    /// The same on the clock of the fine trace, s.
+    /// Time of the first frame on the clock of the fine trace, s.
     start_s: f64,
     frames: usize,
 }
 
-/// Lays the first turn of the head of both on the same instant.
+/// Aligns both clocks at the first turn of the head.
 fn align_recordings(fine: &Recording, like: &Recording) -> Option<SharedFrames> {
     let shift_s = ReversalInstants::first_turn_s(fine)? - ReversalInstants::first_turn_s(like)?;
     let (grid, on) = (like.grid(), fine.grid());
@@ -353,25 +335,27 @@ fn align_recordings(fine: &Recording, like: &Recording) -> Option<SharedFrames> 
     Some(SharedFrames { first, start_s: grid.time_s(first) + shift_s, frames })
 }
 
-/// What tracking does to a film.
+/// Adds noise and lost points to a film.
 struct MatchedTracker<'a> {
-    /// Columns of the recording that is followed.
+    /// Columns of the recording to imitate.
     like: [&'a [Option<f64>]; COORDINATES],
-    /// Its frame that is the film's first; `None` where points are lost at random.
+    /// Index of the film's first frame in the recording; `None` for random dropouts.
     first: Option<usize>,
     noise_m: [f64; COORDINATES],
     seed: u64,
 }
 
 impl MatchedTracker<'_> {
-    /// The first `frames` frames with noise and lost points.
+    /// The first `frames` frames of a film with noise and lost points.
     fn track_frames(&self, seen: &Recording, frames: usize) -> [Vec<Option<f64>>; COORDINATES] {
         let mut generator = Xoshiro256PlusPlus::seed_from_u64(self.seed);
         let clean = coordinate_columns(seen).map(|(_, column)| column);
-        let shares = self.like.map(missing_share);
+        let shares = self
+            .like
+            .map(|column| column.iter().filter(|x| x.is_none()).count() as f64 / column.len() as f64);
         let mut tracked = [const { Vec::new() }; COORDINATES];
         (0..frames).for_each(|frame| {
-            let points: [f64; COORDINATES / 2] = generator.random(); // (one for both coordinates of a point)
+            let points: [f64; COORDINATES / 2] = generator.random(); // one draw for both coordinates
             for (c, column) in tracked.iter_mut().enumerate() {
                 let lost = self
                     .first

@@ -1,4 +1,4 @@
-//! The specification of a twin, as written and as validated.
+//! Specification of a twin, as written and as validated.
 
 use super::{Camera, TrackingModel};
 use crate::simulate::scene::Scene;
@@ -19,7 +19,7 @@ pub enum TwinSpecError {
         file: String,
         /// Table and key.
         key: &'static str,
-        /// What the file says.
+        /// Value in the file.
         found: String,
         /// What the key takes.
         expected: String,
@@ -29,17 +29,17 @@ pub enum TwinSpecError {
 /// A validated specification.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TwinSpec {
-    /// Title for pages and figures.
+    /// Title of pages and figures.
     pub title: String,
     /// Path of the scene, relative to the specification.
     pub scene: String,
-    /// The camera.
+    /// Frame rate and exposure.
     pub camera: Camera,
-    /// What tracking adds.
+    /// Scale, noise and dropouts.
     pub tracking: TrackingModel,
-    /// Part of the scene's time that is recorded, s; the whole run where `None`.
+    /// Recorded part of the scene's time, s; `None` for the whole run.
     pub window_s: Option<[f64; 2]>,
-    /// Whether a table in Tracker's export layout is written next to the traces.
+    /// Whether a table in Tracker's layout is written too.
     pub tracker_export: bool,
 }
 
@@ -111,82 +111,49 @@ enum ExportLayout {
     Tracker,
 }
 
-/// Most frames of a twin: 200 s at 10,000 frames/s, which take about half a gigabyte. A mistyped rate is
-/// refused instead of filling memory.
+/// Most frames of a twin: 200 s at 10,000 frames/s, half a gigabyte. A mistyped rate must not fill the memory.
 const MOST_FRAMES: f64 = 2e6;
 
 impl TwinSpec {
-    /// The JSON Schema of twin.toml: for editors, and for messages.
+    /// JSON Schema of twin.toml, for editors and messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
         toml_file::schema_of::<TwinFile>()
     }
 
-    /// Reads and validates a specification; `file` is the name used in refusals.
+    /// Reads and validates a specification; error texts call it `file`.
     ///
     /// # Errors
-    /// [`TwinSpecError`] with file, key, what was found and what was expected.
+    /// [`TwinSpecError`] with file, key, finding and admissible values.
     pub fn parse(file: &str, text: &str) -> Result<Self, TwinSpecError> {
         let written: TwinFile = toml_file::parse_toml(file, text)?;
         toml_file::check_format(file, written.format)?;
-        let camera = &written.camera;
+        let TwinCameraFile { frame_rate_hz, exposure_s, metres_per_pixel, noise_px, dropout_fraction } =
+            written.camera;
         let positive = |v: f64| v.is_finite() && v > 0.0;
+        let is_shutter = (0.0..=1.0 / frame_rate_hz).contains(&exposure_s);
+        let is_noise = noise_px.is_finite() && noise_px >= 0.0;
+        let is_fraction = (0.0..1.0).contains(&dropout_fraction);
         let rules = [
-            (
-                "camera.frame_rate_hz",
-                camera.frame_rate_hz,
-                positive(camera.frame_rate_hz),
-                "a number above 0",
-            ),
-            (
-                "camera.exposure_s",
-                camera.exposure_s,
-                (0.0..=1.0 / camera.frame_rate_hz).contains(&camera.exposure_s),
-                "0 to the time between frames",
-            ),
-            (
-                "camera.metres_per_pixel",
-                camera.metres_per_pixel,
-                positive(camera.metres_per_pixel),
-                "a number above 0",
-            ),
-            (
-                "camera.noise_px",
-                camera.noise_px,
-                camera.noise_px.is_finite() && camera.noise_px >= 0.0,
-                "a number of 0 or more",
-            ),
-            (
-                "camera.dropout_fraction",
-                camera.dropout_fraction,
-                (0.0..1.0).contains(&camera.dropout_fraction),
-                "a number from 0 to below 1",
-            ),
+            ("camera.frame_rate_hz", frame_rate_hz, positive(frame_rate_hz), "a number above 0"),
+            ("camera.exposure_s", exposure_s, is_shutter, "0 to the time between frames"),
+            ("camera.metres_per_pixel", metres_per_pixel, positive(metres_per_pixel), "a number above 0"),
+            ("camera.noise_px", noise_px, is_noise, "a number of 0 or more"),
+            ("camera.dropout_fraction", dropout_fraction, is_fraction, "a number from 0 to below 1"),
         ];
         if let Some((key, found, _, expected)) = rules.into_iter().find(|(_, _, holds, _)| !holds) {
-            return Err(value_error(file, key, &found.to_string(), expected));
+            return Err(value_error(file, key, found, expected));
         }
-        let window_s = written.window.as_ref().map(|w| [w.start_s, w.stop_s]);
-        if let Some([start, stop]) =
-            window_s.filter(|[start, stop]| !(start.is_finite() && stop.is_finite() && start < stop))
-        {
-            return Err(value_error(
-                file,
-                "window",
-                &format!("{start} to {stop}"),
-                "a start before the stop",
-            ));
+        let window_s = written.window.map(|w| [w.start_s, w.stop_s]);
+        let refused = |&[start, stop]: &[f64; 2]| !(start.is_finite() && stop.is_finite() && start < stop);
+        if let Some([start, stop]) = window_s.filter(refused) {
+            return Err(value_error(file, "window", format!("{start} to {stop}"), "a start before the stop"));
         }
         Ok(Self {
             title: written.title,
             scene: written.scene,
-            camera: Camera { frame_rate_hz: camera.frame_rate_hz, exposure_s: camera.exposure_s },
-            tracking: TrackingModel {
-                metres_per_pixel: camera.metres_per_pixel,
-                noise_px: camera.noise_px,
-                dropout_fraction: camera.dropout_fraction,
-                seed: written.seed,
-            },
+            camera: Camera { frame_rate_hz, exposure_s },
+            tracking: TrackingModel { metres_per_pixel, noise_px, dropout_fraction, seed: written.seed },
             window_s,
             tracker_export: written.export.is_some(),
         })
@@ -195,31 +162,24 @@ impl TwinSpec {
     /// The recorded part of a scene's time, s.
     ///
     /// # Errors
-    /// [`TwinSpecError::Value`] when the window is outside the scene's run or holds too few or too many frames.
+    /// [`TwinSpecError::Value`] if the window leaves the scene's run or holds too few or too many frames.
     pub(crate) fn window_within(&self, file: &str, scene: &Scene) -> Result<[f64; 2], TwinSpecError> {
         let [start, stop] = self.window_s.unwrap_or([scene.start_s, scene.run.stop_s]);
         if start < scene.start_s || stop > scene.run.stop_s {
             let expected = format!("a window within the scene's {} to {} s", scene.start_s, scene.run.stop_s);
-            return Err(value_error(file, "window", &format!("{start} to {stop}"), &expected));
+            return Err(value_error(file, "window", format!("{start} to {stop}"), &expected));
         }
         let frames = (stop - start) * self.camera.frame_rate_hz;
         if !(1.0..=MOST_FRAMES).contains(&frames) {
-            return Err(value_error(
-                file,
-                "camera.frame_rate_hz",
-                &format!("{frames:e} frames in the window"),
-                &format!("2 to {MOST_FRAMES:e}"),
-            ));
+            let (found, expected) =
+                (format!("{frames:e} frames in the window"), format!("2 to {MOST_FRAMES:e}"));
+            return Err(value_error(file, "camera.frame_rate_hz", found, &expected));
         }
         Ok([start, stop])
     }
 }
 
-fn value_error(file: &str, key: &'static str, found: &str, expected: &str) -> TwinSpecError {
-    TwinSpecError::Value {
-        file: file.to_owned(),
-        key,
-        found: found.to_owned(),
-        expected: expected.to_owned(),
-    }
+fn value_error(file: &str, key: &'static str, found: impl ToString, expected: &str) -> TwinSpecError {
+    let [file, expected] = [file, expected].map(str::to_owned);
+    TwinSpecError::Value { file, key, found: found.to_string(), expected }
 }
