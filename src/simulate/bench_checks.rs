@@ -1,54 +1,51 @@
-//! What ruler, scale and a spectrum show of a scene's blade: numbers to hold against the real one.
+//! Properties of a scene's blade that ruler, scale and spectrum can check on the real one.
 
 use super::equilibrium::steady_slip_pose;
 use super::scene::{Drive, Scene};
-use crate::model::modes::{
-    BodyFrequencies, NaturalMode, TipConstraint, body_frequencies, natural_modes, tip_compliance,
-};
+use crate::model::modes::{BodyFrequencies, TipConstraint, body_frequencies, natural_modes, tip_compliance};
 use crate::model::{LinkDirections, Linkage};
 use serde::Serialize;
 use std::f64::consts::TAU;
 
-/// Standard acceleration of free fall, m/s2 (CGPM 1901): what turns a mass into a weight.
+/// Standard acceleration of free fall, m/s^2 (CGPM 1901).
 pub(crate) const FREE_FALL_M_PER_S2: f64 = 9.806_65;
 
-/// Numbers to check with simple means; lengths in m, forces in N, masses in kg.
+/// Properties of a blade that simple means can check.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct BenchChecks {
-    /// Mass of neck and lip: the rubber that is cut off below the head.
+    /// Mass of neck and lip, the rubber below the head, kg.
     pub rubber_mass_kg: f64,
-    /// Mass of head, neck and lip.
+    /// Mass of head, neck and lip, kg.
     pub mass_kg: f64,
-    /// Their weight.
+    /// Weight of head, neck and lip, N.
     pub weight_n: f64,
-    /// Masses and preload over the length of blade, where that is known.
+    /// Masses and preload per length of blade; `None` for an unknown length.
     pub per_metre: Option<ChecksPerMetre>,
-    /// Force on the tip for which the displacements are.
+    /// Force on the tip for the displacements, N.
     pub tip_force_n: f64,
-    /// How far such a force along the glass moves the tip of a blade in free air, its head held: `F ((l1 +
+    /// Displacement of the tip along the glass by this force in free air with the head held, m: `F ((l1 +
     /// l2)^2/k1 + l2^2/k2)`.
     pub tip_displacement_m: f64,
-    /// The same with the neck held: `F l2^2/k2`.
+    /// Displacement of the tip with the neck held too, m: `F l2^2/k2`.
     pub lip_displacement_m: f64,
-    /// How far the support gives under the preload: `N0/k0`.
+    /// Displacement of the support by the preload, m: `N0/k0`.
     pub preload_displacement_m: f64,
-    /// The preload.
+    /// Preload `N0`, N.
     pub preload_force_n: f64,
     /// Natural frequencies of the single parts.
     pub parts: PartFrequencies,
     /// Coupled modes in free air, the head held, Hz.
     pub free_air_hz: Vec<Option<f64>>,
-    /// The same on the glass under the preload, the tip sliding without friction; `None` for a mode that the
-    /// preload has made unstable.
+    /// Coupled modes on the glass under the preload with a frictionless tip, Hz; `None` for a mode that the
+    /// preload makes unstable.
     pub sliding_tip_hz: Vec<Option<f64>>,
-    /// The same with the tip held by the glass.
+    /// Coupled modes on the glass with a held tip, Hz; `None` likewise.
     pub held_tip_hz: Vec<Option<f64>>,
-    /// The blade in steady slip at the head's top speed; `None` for a recorded drive or a blade without such
-    /// an equilibrium.
+    /// Steady slip at the head's top speed; `None` for a recorded drive or without such an equilibrium.
     pub slide: Option<SteadySlipCheck>,
 }
 
-/// What does not depend on the length of blade.
+/// Masses and preload per metre of blade.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 #[allow(missing_docs)] // named with their units
 pub struct ChecksPerMetre {
@@ -71,18 +68,18 @@ pub struct PartFrequencies {
 pub struct SteadySlipCheck {
     /// Speed of the head, m/s.
     pub speed_m_per_s: f64,
-    /// How far the tip trails, m.
+    /// Distance by which the tip trails the head, m.
     pub deflection_m: f64,
-    /// How far the head has dropped, m.
+    /// Drop of the head, m.
     pub head_drop_m: f64,
-    /// How far the neck leans, rad.
+    /// Angle of the neck from the vertical, rad.
     pub neck_angle_rad: f64,
-    /// How far the lip leans, rad.
+    /// Angle of the lip from the vertical, rad.
     pub lip_angle_rad: f64,
 }
 
 impl BenchChecks {
-    /// Of a scene's blade, for a force on its tip, N, and the length of blade that its masses are for, m.
+    /// Computes the checks for a force on the tip, N, and the length of blade that the masses belong to, m.
     #[must_use]
     pub fn from_scene(scene: &Scene, tip_force_n: f64, length_m: Option<f64>) -> Self {
         let blade = &scene.linkage;
@@ -94,6 +91,9 @@ impl BenchChecks {
             mass_kg_per_m: blade.mass_kg / length_m,
             press_force_n_per_m: preload_force_n / length_m,
         });
+        let modes = |blade: &Linkage, tip: TipConstraint| {
+            natural_modes(blade, tip, false).iter().map(|mode| mode.frequency_hz).collect()
+        };
         let BodyFrequencies { head_hz, neck_hz, lip_hz } = body_frequencies(blade);
         Self {
             rubber_mass_kg,
@@ -106,16 +106,12 @@ impl BenchChecks {
             preload_displacement_m: blade.preload_displacement_m,
             preload_force_n,
             parts: PartFrequencies { head_hz, neck_hz, lip_hz },
-            free_air_hz: mode_frequencies(&natural_modes(&in_air, TipConstraint::Free, false)),
-            sliding_tip_hz: mode_frequencies(&natural_modes(blade, TipConstraint::Free, false)),
-            held_tip_hz: mode_frequencies(&natural_modes(blade, TipConstraint::Held, false)),
+            free_air_hz: modes(&in_air, TipConstraint::Free),
+            sliding_tip_hz: modes(blade, TipConstraint::Free),
+            held_tip_hz: modes(blade, TipConstraint::Held),
             slide: steady_slip_check(scene),
         }
     }
-}
-
-fn mode_frequencies(modes: &[NaturalMode]) -> Vec<Option<f64>> {
-    modes.iter().map(|mode| mode.frequency_hz).collect()
 }
 
 fn steady_slip_check(scene: &Scene) -> Option<SteadySlipCheck> {

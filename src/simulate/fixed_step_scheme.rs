@@ -1,12 +1,12 @@
-//! The paper's own scheme, for comparison: the classical Runge-Kutta method in fixed steps on all four
-//! states, stick as the constraint `Phi = v3 - alpha = 0` imposed at the level of accelerations and
-//! stabilised (Baumgarte, Comp. Meth. Appl. Mech. Eng. 1, 1972),
+//! The paper's scheme, for comparison: classical Runge-Kutta with fixed steps on all four states. Stick is the
+//! constraint `Phi = v3 - alpha = 0` on accelerations, stabilised after Baumgarte (Comp. Meth. Appl. Mech. Eng.
+//! 1, 1972),
 //!
 //! ```text
 //! Phi'' + 2 a Phi' + b^2 Phi = 0,   a = b
 //! ```
 //!
-//! and transitions taken at a step's end or located by the slack variable method. The paper prints neither
+//! Transitions happen at the end of a step or are located by the slack variable method. The paper gives neither
 //! step nor gain.
 
 use super::phases::{ContactInstant, DrivenBlade, GUARDS, TipForces, apply_friction, pose_from_states};
@@ -16,39 +16,38 @@ use crate::ode::HybridPhase;
 pub(crate) use crate::ode::fixed_step::FixedStepLocator;
 use crate::ode::fixed_step::FixedStepOptions;
 
-/// Gain of the stabilisation unless asked for otherwise, 1/s: what the tip has drifted decays within 0.1 ms,
-/// a tenth of a stick-slip cycle.
+/// Default gain of the stabilisation, 1/s: drift of the tip decays within 0.1 ms, a tenth of a stick-slip cycle.
 pub(crate) const DEFAULT_GAIN_PER_S: f64 = 1e4;
-/// Largest product of gain and step: beyond it the classical Runge-Kutta method is unstable for the double
-/// pole at `-a` (Hairer and Wanner, "Solving Ordinary Differential Equations II", section IV.2).
+/// Largest stable product of gain and step for the double pole at `-a` (Hairer and Wanner, "Solving Ordinary
+/// Differential Equations II", section IV.2).
 pub(crate) const LARGEST_GAIN_TIMES_STEP: f64 = 2.785;
 
-/// The scheme's settings.
+/// Settings of the scheme.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedStepScheme {
     /// Length of a step, s.
     pub step_s: f64,
-    /// Where a transition takes place.
+    /// Method of locating transitions.
     pub locate: FixedStepLocator,
-    /// Gains `a = b` of the stabilisation, 1/s. Without gain the tip's velocity is taken out at the
-    /// transition, or it would never decay.
+    /// Gains `a = b` of the stabilisation, 1/s. With zero gain the tip's velocity is removed at the transition,
+    /// because it would not decay.
     pub gain_per_s: f64,
 }
 
 impl FixedStepScheme {
-    /// What the integrator takes of it.
+    /// Options of the integrator.
     pub(crate) fn integrator_options(&self) -> FixedStepOptions {
         FixedStepOptions { step_s: self.step_s, locate: self.locate }
     }
 }
 
-/// The tip is drawn to `place_m`; states `(theta, phi, theta_rate, phi_rate)`. The guards are those of
-/// [`super::phases::Stick`].
+/// Stick that draws the tip to `place_m`; states `(theta, phi, theta_rate, phi_rate)`, guards as in
+/// [`super::phases::StickPhase`].
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct StabilisedStickPhase<'a> {
     /// The blade on its drive.
     pub system: &'a DrivenBlade,
-    /// Where the tip is held, `alpha`, m.
+    /// Target position of the tip, `alpha`, m.
     pub place_m: f64,
     /// Side of the shoulder.
     pub lean: ShoulderContact,
@@ -57,7 +56,7 @@ pub(crate) struct StabilisedStickPhase<'a> {
 }
 
 impl<'a> StabilisedStickPhase<'a> {
-    /// Holds the tip where it is in this pose.
+    /// Holds the tip at its position in a pose.
     pub(crate) fn from_pose(
         system: &'a DrivenBlade,
         t: f64,
@@ -65,12 +64,12 @@ impl<'a> StabilisedStickPhase<'a> {
         lean: ShoulderContact,
         gain_per_s: f64,
     ) -> Self {
-        let place_m =
-            system.linkage.tip_position_m(&LinkDirections::from_pose(pose), &system.drive.motion_at(t));
+        let (d, head) = (LinkDirections::from_pose(pose), system.drive.motion_at(t));
+        let place_m = system.linkage.tip_position_m(&d, &head);
         Self { system, place_m, lean, gain_per_s }
     }
 
-    /// The forces that draw the tip to its place: `v3dd = a_free + kappa f = -2 a Phi' - a^2 Phi`.
+    /// The forces that draw the tip to its target: `v3dd = a_free + kappa f = -2 a Phi' - a^2 Phi`.
     #[inline]
     pub(super) fn stabilised_forces(&self, pose: &Pose, at: &ContactInstant) -> TipForces {
         let ContactInstant { head, directions, contact } = at;
@@ -98,15 +97,8 @@ impl HybridPhase<4, GUARDS> for StabilisedStickPhase<'_> {
         let limit = self.system.linkage.friction.static_coefficient() * forces.normal_n;
         let [forward, backward] = self.system.corner_distances(y[0], self.lean);
         let LinkDirections { cos_theta, cos_phi, .. } = at.directions;
-        [
-            limit + forces.friction_n,
-            limit - forces.friction_n,
-            forces.normal_n,
-            forward,
-            backward,
-            cos_theta,
-            cos_phi,
-        ]
+        let TipForces { friction_n: force, normal_n: normal, .. } = forces;
+        [limit + force, limit - force, normal, forward, backward, cos_theta, cos_phi]
     }
 
     fn scale(&self) -> [f64; 4] {

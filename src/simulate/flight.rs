@@ -1,4 +1,4 @@
-//! Flight of the blade as a smooth phase with guards: no contact forces, ended by the tip's landing.
+//! Flight as a smooth phase with guards: no contact force acts until the tip lands.
 
 use super::phases::{DrivenBlade, GUARDS, LEVEL_GUARDS, SHOULDER_GUARDS, TaylorMotion};
 use crate::math;
@@ -9,11 +9,10 @@ use crate::model::{LinkDirections, Pose};
 use crate::ode::HybridPhase;
 use crate::ode::taylor::{TaylorExpansion, TaylorPhase};
 
-/// The gap falls to zero. The guards of shoulder and level are those of the phases of contact; the rest do
-/// not apply.
+/// The gap falls to zero. Guards of shoulder and level are as in contact; the others do not apply.
 pub(crate) const LANDING: usize = 0;
 
-/// The tip is off the glass; states `(theta, phi, gap, theta_rate, phi_rate, gap_rate)`.
+/// Flight; states `(theta, phi, gap, theta_rate, phi_rate, gap_rate)`.
 #[derive(Debug, Clone, Copy)]
 pub struct FlightPhase<'a> {
     /// The blade on its drive.
@@ -22,7 +21,7 @@ pub struct FlightPhase<'a> {
     pub lean: ShoulderContact,
 }
 
-/// The state behind the six numbers.
+/// State of flight from its six numbers.
 #[inline]
 pub(crate) fn flight_state_from(y: &[f64; 6]) -> FlightState {
     FlightState {
@@ -32,7 +31,7 @@ pub(crate) fn flight_state_from(y: &[f64; 6]) -> FlightState {
     }
 }
 
-/// The six numbers of a state.
+/// Six numbers of a state of flight.
 #[must_use]
 pub fn flight_state_vector(state: &FlightState) -> [f64; 6] {
     let FlightState { pose, gap_m, gap_rate_m_per_s } = *state;
@@ -43,12 +42,8 @@ impl HybridPhase<6, GUARDS> for FlightPhase<'_> {
     #[inline]
     fn derivative(&self, t: f64, y: &[f64; 6]) -> [f64; 6] {
         let state = flight_state_from(y);
-        let accelerations = self.system.linkage.flight_accelerations(
-            &state,
-            &LinkDirections::from_pose(&state.pose),
-            &self.system.drive.motion_at(t),
-            self.lean,
-        );
+        let (d, head) = (LinkDirections::from_pose(&state.pose), self.system.drive.motion_at(t));
+        let accelerations = self.system.linkage.flight_accelerations(&state, &d, &head, self.lean);
         [y[3], y[4], y[5], accelerations.links[0], accelerations.links[1], accelerations.gap_m_per_s2]
     }
 
@@ -76,16 +71,10 @@ impl TaylorPhase<6, GUARDS> for FlightPhase<'_> {
         out: &mut TaylorExpansion<6, GUARDS>,
     ) {
         let state = flight_state_from(y);
-        let (drop, drop_rate) =
-            self.system.linkage.drop_in_flight(&state, &LinkDirections::from_pose(&state.pose));
-        self.system.expand_motion(
-            t,
-            &state.pose,
-            ContactMode::Flight(drop, drop_rate),
-            self.lean,
-            out.order,
-            motion,
-        );
+        let directions = LinkDirections::from_pose(&state.pose);
+        let (drop, drop_rate) = self.system.linkage.drop_in_flight(&state, &directions);
+        let touch = ContactMode::Flight(drop, drop_rate);
+        self.system.expand_motion(t, &state.pose, touch, self.lean, out.order, motion);
         motion.gap_rate[0] = state.gap_rate_m_per_s;
         let corners = self.system.corner_signs(self.lean);
         let ([forward, backward], [neck, lip]) = (SHOULDER_GUARDS, LEVEL_GUARDS);
@@ -100,7 +89,6 @@ impl TaylorPhase<6, GUARDS> for FlightPhase<'_> {
             guards[LANDING] = gap;
             gap = gap_rate / (k + 1) as f64;
         }
-        let start = self.guards(t, y);
-        out.guards[0] = start;
+        out.guards[0] = self.guards(t, y);
     }
 }

@@ -1,13 +1,13 @@
-//! The states of contact and which of them follows when the tip is at rest on the glass: a pure function of
-//! the forces.
+//! Modes of contact, and the mode that follows when the tip is at rest on the glass: a pure function of the
+//! forces.
 
 use crate::model::FrictionResponse;
 use serde::Serialize;
 
-/// How the tip touches the glass.
+/// Mode of contact of the tip.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum TipMode {
-    /// The tip is held at its place.
+    /// The tip is held at its position.
     #[serde(rename = "stick")]
     Stick,
     /// The tip slides towards +v.
@@ -22,7 +22,7 @@ pub enum TipMode {
 }
 
 impl TipMode {
-    /// The name used in files.
+    /// Name in files.
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
@@ -49,14 +49,14 @@ impl TipMode {
     }
 }
 
-/// What contact does next with the tip at rest.
+/// Next mode of a tip at rest.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum RestDecision {
-    /// Contact goes on in this mode.
+    /// The only consistent mode.
     Becomes(TipMode),
     /// More than one mode is consistent with the forces.
     Indeterminate,
-    /// No mode is: the tip jams.
+    /// No mode is consistent: the tip jams.
     Jammed,
 }
 
@@ -66,11 +66,11 @@ pub fn holding_force(contact: &FrictionResponse) -> f64 {
     -contact.a_free / contact.kappa
 }
 
-/// Decides what follows when the tip's velocity is zero; `mu` is the static friction coefficient `A + C`.
+/// Decides the next mode of a tip at rest; `mu` is the static friction coefficient `A + C`.
 ///
-/// Where `1 + sigma mu nu` is positive in both directions exactly one mode is consistent: stick if the
-/// holding force is within the static limit and the tip is pressed on, lift-off if the glass would have to
-/// pull, otherwise slip against the holding force. Where it is not (the Painlevé region) every mode is tried.
+/// If `1 + sigma mu nu` is positive in both directions, exactly one mode is consistent: stick if the holding
+/// force is within the static limit and the normal force presses, lift-off if the glass would have to pull,
+/// otherwise slip against the holding force. Elsewhere (the Painlevé region) every mode is tried.
 pub(crate) fn decide_mode_at_rest(contact: &FrictionResponse, mu: f64) -> RestDecision {
     let force = holding_force(contact);
     let normal = contact.n_free + contact.nu * force;
@@ -96,7 +96,7 @@ pub(crate) fn decide_mode_at_rest(contact: &FrictionResponse, mu: f64) -> RestDe
     }
 }
 
-/// Whether slip in this direction has a normal force that presses and an acceleration that leads into it.
+/// Whether slip in a direction has a normal force that presses and an acceleration in that direction.
 fn is_slip_consistent(contact: &FrictionResponse, mu: f64, direction: f64) -> bool {
     let indicator = 1.0 + direction * mu * contact.nu;
     let normal = contact.n_free / indicator;
@@ -140,7 +140,7 @@ mod tests {
     }
 
     proptest! {
-        /// Outside the Painlevé region exactly one mode is consistent, and it is the one that is returned.
+        /// Outside the Painlevé region exactly one mode is consistent, and the decision returns it.
         #[test]
         fn one_mode_is_consistent_outside_the_painleve_region(
             a in -5.0..5.0f64,

@@ -1,43 +1,43 @@
-//! The motion of a blade, state by state, with everything that one run shows of it.
+//! The motion of a blade: samples, transitions, impacts and extremes of one run.
 
 use crate::model::Linkage;
 use crate::simulate::outputs::{EnergyAudit, Impacts, StickIntervals, Transitions};
 use crate::simulate::scene::Scene;
 use crate::simulate::{Impact, ModelSample, Observer, RunResult, SolutionSegment, Transition, run_scene};
 
-/// Samples of a run: enough for twenty points in a cycle of 1 kHz over the quarter of a second that a
-/// reversal takes.
+/// Samples of a run: twenty per cycle of 1 kHz over the 0.25 s of a reversal.
 pub(crate) const MOTION_SAMPLES: usize = 6000;
-/// Time between fine samples, s: fifty in a cycle of 1 kHz. Of a long run there are [`MAX_FINE_SAMPLES`] (14 MB).
+/// Time between fine samples, s: fifty per cycle of 1 kHz.
 const FINE_STEP_S: f64 = 2e-5;
+/// Most fine samples of a run (14 MB); a longer run has wider steps.
 const MAX_FINE_SAMPLES: usize = 100_000;
 
-/// Return of the head after a turn, as a share of its travel: less is a vibration of the drive.
+/// Least return of the head after a turn as a fraction of its travel; less is vibration of the drive.
 const RETURN: f64 = 0.005;
 
-/// A run of a scene.
+/// Samples and events of a run.
 #[derive(Debug, Clone)]
 pub struct RunMotion {
-    /// Links and springs.
+    /// Links, springs and friction of the blade.
     pub linkage: Linkage,
-    /// States at equal steps of time, until the run ended.
+    /// States at equal steps of time until the end of the run.
     pub samples: Vec<ModelSample>,
-    /// The same in the finest steps that a figure of a part needs.
+    /// States at finer steps, for figures of a part of the run.
     pub fine: Vec<ModelSample>,
     /// Every change of mode.
     pub transitions: Vec<Transition>,
-    /// When the tip stuck, s.
+    /// Intervals of stick, s.
     pub stick_s: Vec<[f64; 2]>,
     /// Every impact of the tip on the glass.
     pub impacts: Vec<Impact>,
-    /// Least normal force and Painlevé indicator over the whole run, not over the samples alone.
+    /// Extremes over the whole run, not only over the samples.
     pub extremes: EnergyAudit,
-    /// How it ended.
+    /// Status and work of the run.
     pub run: RunResult,
 }
 
 impl RunMotion {
-    /// The scene, run from its start to its stop.
+    /// Runs a scene and records its motion.
     #[must_use]
     pub fn simulate(scene: &Scene) -> Self {
         let mut recorder = MotionRecorder::new(scene);
@@ -52,7 +52,7 @@ impl RunMotion {
         self.fine.get(first..end).unwrap_or_default()
     }
 
-    /// The sample at the first extremum of the head's path from which it comes back, and to which it had come.
+    /// Index of the sample at the first turn of the head: an extremum well away from its start and end.
     pub(crate) fn turn(&self) -> Option<usize> {
         let x = |at: usize| self.samples[at].head_x_m;
         let (least, most) = self
@@ -72,18 +72,18 @@ impl RunMotion {
         None
     }
 
-    /// When the head turns, s; `None` where it does not.
+    /// Time of the first turn of the head, s; `None` without a turn.
     pub(crate) fn turn_s(&self) -> Option<f64> {
         self.samples.get(self.turn()?).map(|sample| sample.time_s)
     }
 
-    /// The longest stick, s; the last of several as long.
+    /// The longest interval of stick, s; the last of equal ones.
     pub(crate) fn longest_stick_s(&self) -> Option<[f64; 2]> {
         self.stick_s.iter().copied().max_by(|a, b| (a[1] - a[0]).total_cmp(&(b[1] - b[0])))
     }
 }
 
-/// What takes a [`RunMotion`] down while a scene runs.
+/// Observer that records a [`RunMotion`].
 pub(crate) struct MotionRecorder {
     states: (EvenSamples, EvenSamples),
     events: (StickIntervals, (Transitions, (Impacts, EnergyAudit))),
@@ -92,11 +92,8 @@ pub(crate) struct MotionRecorder {
 impl MotionRecorder {
     pub(crate) fn new(scene: &Scene) -> Self {
         let fine = ((scene.run.stop_s - scene.start_s) / FINE_STEP_S).ceil() as usize + 1;
-        let states = (
-            EvenSamples::new(scene, MOTION_SAMPLES),
-            EvenSamples::new(scene, fine.clamp(2, MAX_FINE_SAMPLES)),
-        );
-        Self { states, events: Default::default() }
+        let fine = EvenSamples::new(scene, fine.clamp(2, MAX_FINE_SAMPLES));
+        Self { states: (EvenSamples::new(scene, MOTION_SAMPLES), fine), events: Default::default() }
     }
 
     pub(crate) fn into_motion(self, scene: &Scene, run: RunResult) -> RunMotion {

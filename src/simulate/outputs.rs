@@ -1,5 +1,4 @@
-//! What observers make of a run: samples at given times, the list of transitions, extremes and the energy
-//! balance.
+//! Observers of a run: samples, transitions, impacts, extremes and the energy balance.
 
 use super::mode::TipMode;
 use super::scene::{ContactLossRule, Drive, JamRule, Scene, StartKind};
@@ -16,14 +15,14 @@ use std::fmt::Write;
 use std::iter::Peekable;
 use std::ops::ControlFlow;
 
-/// Hands every sample at the given rising times to `sink`.
+/// Passes samples at given rising times to `sink`.
 pub struct SampleObserver<I: Iterator<Item = f64>, F: FnMut(&ModelSample)> {
-    times: std::iter::Peekable<I>,
+    times: Peekable<I>,
     sink: F,
 }
 
 impl<I: Iterator<Item = f64>, F: FnMut(&ModelSample)> SampleObserver<I, F> {
-    /// A sampler of these times, s; they must rise.
+    /// Samples at these rising times, s.
     pub fn new(times: I, sink: F) -> Self {
         Self { times: times.peekable(), sink }
     }
@@ -37,7 +36,7 @@ impl<I: Iterator<Item = f64>, F: FnMut(&ModelSample)> Observer for SampleObserve
     }
 }
 
-/// The list of transitions.
+/// Collects the transitions.
 #[derive(Debug, Clone, Default)]
 pub struct Transitions(pub Vec<Transition>);
 
@@ -48,7 +47,7 @@ impl Observer for Transitions {
     }
 }
 
-/// The list of impacts.
+/// Collects the impacts.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Impacts(pub Vec<Impact>);
 
@@ -59,7 +58,7 @@ impl Observer for Impacts {
     }
 }
 
-/// Intervals of stick, s.
+/// Collects the intervals of stick, s.
 #[derive(Debug, Clone, Default)]
 pub struct StickIntervals(pub Vec<[f64; 2]>);
 
@@ -75,12 +74,12 @@ impl Observer for StickIntervals {
     }
 }
 
-/// Largest angle of a link from the vertical, and when it was.
+/// Largest angle of a link from the vertical.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct LargestTilt {
-    /// The angle, rad; seen at the ends of the pieces, of which a swing has many.
+    /// The angle, rad, at the ends of pieces; a swing has many pieces.
     pub largest_rad: f64,
-    /// When, s.
+    /// Time of the angle, s.
     pub at_s: f64,
 }
 
@@ -94,7 +93,7 @@ impl Observer for LargestTilt {
     }
 }
 
-/// Two observers at once.
+/// Both observers see the run.
 impl<A: Observer, B: Observer> Observer for (A, B) {
     fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
         self.0.observe_segment(piece);
@@ -114,7 +113,7 @@ impl<A: Observer, B: Observer> Observer for (A, B) {
     }
 }
 
-/// An observer that is borrowed.
+/// A borrowed observer.
 impl<A: Observer> Observer for &mut A {
     fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
         (**self).observe_segment(piece);
@@ -130,8 +129,7 @@ impl<A: Observer> Observer for &mut A {
     }
 }
 
-/// Extremes of a run and its energy balance: drive power = storage + damping + friction work + losses of
-/// impacts.
+/// Extremes and energy balance of a run: drive power = storage + damping + friction work + losses of impacts.
 #[derive(Debug, Clone, Default)]
 pub struct EnergyAudit {
     start_energy_j: Option<f64>,
@@ -139,17 +137,16 @@ pub struct EnergyAudit {
     exchanged_j: f64,
     largest_energy_j: f64,
     largest_residual_j: f64,
-    /// Largest distance of the tip from where stick holds it, m.
+    /// Largest drift of the tip in stick, m.
     pub max_constraint_drift_m: f64,
-    /// Least normal force seen in contact, N.
+    /// Least normal force in contact, N.
     pub min_normal_force_n: Option<f64>,
-    /// Least Painlevé indicator seen in slip.
+    /// Least Painlevé indicator in slip.
     pub min_painleve_indicator: Option<f64>,
 }
 
 impl EnergyAudit {
-    /// Largest error of the energy balance over the run, relative to the energy that was stored or exchanged;
-    /// 0 for a run without energy.
+    /// Largest error of the energy balance relative to the stored or exchanged energy; 0 without energy.
     #[must_use]
     pub fn energy_residual_relative(&self) -> f64 {
         let scale = self.largest_energy_j.max(self.exchanged_j);
@@ -191,7 +188,7 @@ impl Observer for EnergyAudit {
 
     fn observe_impact(&mut self, impact: &Impact) {
         if self.start_energy_j.is_none() {
-            return; // an impact at the very start: the balance begins with the first piece, behind it
+            return; // the balance begins with the first piece, after an impact at the start
         }
         self.supplied_j += impact.driven_j - impact.lost_j;
         self.exchanged_j += impact.driven_j.abs() + impact.lost_j.abs();
@@ -211,23 +208,23 @@ pub struct SimulationSummary {
     pub rejected_steps: u64,
     pub wall_s: f64,
     pub method: &'static str,
-    /// `None` where the step is fixed.
+    /// `None` for fixed steps.
     pub relative_tolerance: Option<f64>,
-    /// `None` where the tolerance sets it.
+    /// `None` for adaptive steps.
     pub step_s: Option<f64>,
     pub max_constraint_drift_m: f64,
     pub energy_residual_relative: f64,
     pub min_normal_force_n: Option<f64>,
     pub min_painleve_indicator: Option<f64>,
     pub model_parts: Vec<&'static str>,
-    /// Numbers of the scene that are hard to believe.
+    /// Implausible numbers of the scene.
     pub findings: Vec<PlausibilityFinding>,
-    /// A simulation is no measurement, and its files say so.
+    /// Always true: the numbers are simulated, not measured.
     pub synthetic: bool,
 }
 
 impl SimulationSummary {
-    /// Gathers a run, its audit and its duration (of the run alone).
+    /// Summary of a run with its audit; `wall_s` is the duration of the run alone.
     #[must_use]
     pub fn new(
         scene: &Scene,
@@ -260,7 +257,7 @@ impl SimulationSummary {
     }
 }
 
-/// What the scene makes active.
+/// Names of the active parts of the model.
 pub(crate) fn model_parts(scene: &Scene) -> Vec<&'static str> {
     let Linkage { head, neck, lip, friction, shoulder, .. } = &scene.linkage;
     let parts = [
@@ -284,7 +281,7 @@ pub(crate) fn model_parts(scene: &Scene) -> Vec<&'static str> {
 pub(crate) const STATE_HEADER: &str = "time_s,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n,mode";
 pub(crate) const EVENTS_HEADER: &str = "time_s,from,to,cause";
 
-/// The instants of the sampled outputs of a scene, s.
+/// Times of the sampled outputs of a scene, s.
 pub fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> + use<> {
     let (start_s, stop_s, rate) = (scene.start_s, scene.run.stop_s, scene.run.sample_rate_hz);
     let frames = ((stop_s - start_s) * rate * (1.0 + 1e-12)).floor() as usize + 1;
@@ -292,16 +289,16 @@ pub fn sample_times(scene: &Scene) -> impl Iterator<Item = f64> + use<> {
     (0..frames).map(move |i| grid.time_s(i).min(stop_s))
 }
 
-/// Tip and head of a sample as a recording has them, m: tip x, tip y, head x, head y.
+/// Coordinates of a sample as in a recording, m: tip x, tip y, head x, head y.
 ///
-/// The glass lies at `y = -(l1 + l2)`: the origin is the head of the upright blade.
+/// The origin is the head of the upright blade; the glass lies at `y = -(l1 + l2)`.
 #[must_use]
 pub fn recorded_points_m(linkage: &Linkage, sample: &ModelSample) -> [f64; 4] {
     let glass_y_m = -(linkage.l1_m + linkage.l2_m);
     [sample.tip_x_m, glass_y_m + sample.tip_height_m, sample.head_x_m, -sample.head_drop_m]
 }
 
-/// Adds the row of a sample in `state.csv` to `text`.
+/// Appends the row of a sample in `state.csv`.
 pub fn push_state_row(text: &mut String, sample: &ModelSample) {
     let ModelSample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, mode, .. } =
         sample;
@@ -313,15 +310,14 @@ pub fn push_state_row(text: &mut String, sample: &ModelSample) {
     );
 }
 
-/// Adds the row of a transition in `events.csv` to `text`: the time with 17 significant digits.
+/// Appends the row of a transition in `events.csv`; the time has 17 significant digits.
 pub fn push_event_row(text: &mut String, Transition { time_s, from, to, cause }: &Transition) {
     let [from, to] = [from, to].map(|mode| mode.name());
     let _ = writeln!(text, "{time_s:.16e},{from},{to},{}", cause.name()); // writing to a String cannot fail
 }
 
-// What an open shutter sees of a run: the mean of the places over its interval.
-
-/// Hands the mean place over every interval to `sink`; that of an interval of no length is the place then.
+/// Averages head and tip over the intervals of an open shutter and passes the means to `sink`; an interval of
+/// zero length gives the positions at that time.
 pub(crate) struct ShutterObserver<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> {
     intervals: Peekable<I>,
     sink: F,
@@ -330,13 +326,13 @@ pub(crate) struct ShutterObserver<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladeP
 }
 
 impl<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> ShutterObserver<I, F> {
-    /// Shutters that open at the first and close at the second of each two times, s. They follow one another
-    /// without overlap and lie within the run; one that the run does not see closed gives nothing.
+    /// `intervals` are rising times of opening and closing, s, without overlap. An interval that is still open at
+    /// the end of the run gives no mean.
     pub(crate) fn new(intervals: I, sink: F) -> Self {
         Self { intervals: intervals.peekable(), sink, sum: [0.0; 4], open_s: 0.0 }
     }
 
-    /// Adds what lies within a piece.
+    /// Adds the exposure between two times of a piece.
     fn add_exposure(&mut self, path: &SegmentPath<'_>, from_s: f64, to_s: f64) {
         if to_s > from_s {
             let integral = path.integrate_points(from_s, to_s).to_array();
@@ -345,7 +341,7 @@ impl<I: Iterator<Item = [f64; 2]>, F: FnMut(&BladePoints)> ShutterObserver<I, F>
         }
     }
 
-    /// The mean of the interval that ends at `close_s`; the next one begins with nothing.
+    /// Mean over the interval that closes at `close_s`; resets the sums for the next one.
     fn take_mean(&mut self, path: &SegmentPath<'_>, close_s: f64) -> BladePoints {
         let (sum, open_s) = (std::mem::take(&mut self.sum), std::mem::take(&mut self.open_s));
         if open_s > 0.0 {

@@ -1,4 +1,4 @@
-//! Slip and stick of the blade as smooth phases with guards.
+//! Slip and stick as smooth phases with guards.
 
 use super::drive::Drive;
 use super::mode::TipMode;
@@ -10,42 +10,40 @@ use crate::ode::HybridPhase;
 use crate::ode::polynomial::TERMS;
 use crate::ode::taylor::{TaylorExpansion, TaylorPhase};
 
-/// Number of guards of either phase.
+/// Number of guards of a phase.
 pub const GUARDS: usize = 7;
-/// Guards at the neck's angle, the same in both phases: the shoulder's forward and backward corner.
+/// Guards of the neck's angle in all phases: forward and backward corner of the shoulder.
 pub(crate) const SHOULDER_GUARDS: [usize; 2] = [3, 4];
-/// Guards that neck and lip stay short of level, the same in both phases: beyond it the hinge would be below
-/// the glass.
+/// Guards of the level of neck and lip in all phases: past level the hinge would lie below the glass.
 pub(crate) const LEVEL_GUARDS: [usize; 2] = [5, 6];
 
-/// Slip: the tip's velocity, the normal force and the Painlevé indicator stay positive in the direction of
-/// slip.
+/// Slip: the tip's speed in the direction of slip reaches zero.
 pub(crate) const TIP_STOPS: usize = 0;
-/// The normal force of slip reaches zero.
+/// Slip: the normal force reaches zero.
 pub const SLIP_CONTACT_LOST: usize = 1;
-/// The Painlevé indicator reaches zero.
+/// Slip: the Painlevé indicator reaches zero.
 pub const JAMS: usize = 2;
 /// Stick: the holding force reaches the static limit towards +v.
 pub(crate) const FORWARD_LIMIT: usize = 0;
 /// Stick: the holding force reaches the static limit towards -v.
 pub(crate) const BACKWARD_LIMIT: usize = 1;
-/// The normal force of stick reaches zero.
+/// Stick: the normal force reaches zero.
 pub(crate) const STICK_CONTACT_LOST: usize = 2;
 
-/// A blade on its drive, with the magnitudes below which errors are absolute.
+/// A blade, its drive, and the scales below which errors are absolute.
 #[derive(Debug, Clone)]
 pub struct DrivenBlade {
     /// The blade.
     pub linkage: Linkage,
     /// The head's motion.
     pub drive: Drive,
-    /// Angle below which its error is absolute, rad.
+    /// Angle below which errors are absolute, rad.
     pub angle_scale: f64,
-    /// Angular rate below which its error is absolute, rad/s.
+    /// Angular rate below which errors are absolute, rad/s.
     pub rate_scale: f64,
 }
 
-/// Everything about one instant that forces need.
+/// Head, directions and contact response at one instant.
 pub(super) struct ContactInstant {
     pub head: HeadMotion,
     pub directions: LinkDirections,
@@ -55,23 +53,12 @@ pub(super) struct ContactInstant {
 impl DrivenBlade {
     #[inline]
     pub(super) fn contact_instant(&self, t: f64, pose: &Pose, lean: ShoulderContact) -> ContactInstant {
-        self.contact_instant_with(t, pose, LinkDirections::from_pose(pose), lean)
-    }
-
-    #[inline]
-    fn contact_instant_with(
-        &self,
-        t: f64,
-        pose: &Pose,
-        directions: LinkDirections,
-        lean: ShoulderContact,
-    ) -> ContactInstant {
-        let head = self.drive.motion_at(t);
+        let (directions, head) = (LinkDirections::from_pose(pose), self.drive.motion_at(t));
         let contact = self.linkage.friction_response(pose, &directions, &head, lean);
         ContactInstant { head, directions, contact }
     }
 
-    /// Distances to the shoulder's corners that keep the neck on its side, rad.
+    /// Guards of the shoulder's corners, rad: positive while the neck stays on its side.
     #[inline]
     pub(super) fn corner_distances(&self, theta: f64, lean: ShoulderContact) -> [f64; 2] {
         match (&self.linkage.shoulder, lean) {
@@ -81,10 +68,8 @@ impl DrivenBlade {
             (Some(s), ShoulderContact::Backward) => [f64::INFINITY, -theta - s.contact_angle_rad],
         }
     }
-}
 
-impl DrivenBlade {
-    /// Taylor coefficients of the blade's motion about `t`.
+    /// Computes Taylor coefficients of the blade's motion about `t`.
     #[inline]
     pub(super) fn expand_motion(
         &self,
@@ -99,7 +84,7 @@ impl DrivenBlade {
         motion.expand(&self.linkage, touch, lean, pose, order);
     }
 
-    /// Signs of the neck's angle in the guards of the two corners, 0 for one that does not apply.
+    /// Signs of the neck's angle in the guards of both corners; 0 for a corner that does not apply.
     pub(super) fn corner_signs(&self, lean: ShoulderContact) -> [f64; 2] {
         match (&self.linkage.shoulder, lean) {
             (None, _) => [0.0, 0.0],
@@ -110,24 +95,23 @@ impl DrivenBlade {
     }
 }
 
-/// Taylor coefficients of the blade's motion, one order more than is used of the states: forces are known to
-/// one less.
+/// Taylor coefficients of the blade's motion, one order more than the states use: forces lose one order.
 pub(crate) type TaylorMotion = MotionSeries<{ TERMS + 2 }>;
 
-/// Friction and normal force at one instant, N, with the angular accelerations they cause, rad/s2.
+/// Forces on the tip and the angular accelerations that they cause.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct TipForces {
     /// Friction force on the tip, N.
     pub friction_n: f64,
     /// Normal force on the tip, N.
     pub normal_n: f64,
-    /// Painlevé indicator `1 + sigma mu nu` of slip; 1 in stick, where it has no part.
+    /// Painlevé indicator `1 + sigma mu nu` of slip; 1 in stick.
     pub indicator: f64,
-    /// Angular accelerations of neck and lip, rad/s2.
+    /// Angular accelerations of neck and lip, rad/s^2.
     pub accelerations: [f64; 2],
 }
 
-/// The tip slides in one direction; states `(theta, phi, theta_rate, phi_rate)`.
+/// Slip in one direction; states `(theta, phi, theta_rate, phi_rate)`.
 #[derive(Debug, Clone, Copy)]
 pub struct SlipPhase<'a> {
     /// The blade on its drive.
@@ -138,15 +122,15 @@ pub struct SlipPhase<'a> {
     pub lean: ShoulderContact,
 }
 
-/// The pose of the four slip states.
+/// Pose from the four states of slip.
 #[inline]
 pub(crate) fn pose_from_states(y: &[f64; 4]) -> Pose {
     Pose { theta: y[0], phi: y[1], theta_rate: y[2], phi_rate: y[3] }
 }
 
 impl SlipPhase<'_> {
-    /// Speed of the tip in the direction of slip, m/s, and the forces there: `f = -sigma mu N` with `N =
-    /// n_free / (1 + sigma mu nu)`.
+    /// Speed of the tip in the direction of slip, m/s, and the forces `f = -sigma mu N`, `N = n_free / (1 + sigma mu
+    /// nu)`.
     #[inline]
     pub(super) fn slip_forces(&self, pose: &Pose, at: &ContactInstant) -> (f64, TipForces) {
         let speed = self.direction * self.system.linkage.tip_velocity_m_per_s(pose, &at.directions, &at.head);
@@ -182,17 +166,9 @@ impl HybridPhase<4, GUARDS> for SlipPhase<'_> {
         let at = self.system.contact_instant(t, &pose, self.lean);
         let (speed, forces) = self.slip_forces(&pose, &at);
         let [forward, backward] = self.system.corner_distances(y[0], self.lean);
-        // the force without friction has the sign of the normal force and no pole where the indicator
-        // vanishes
-        [
-            speed,
-            at.contact.n_free,
-            forces.indicator,
-            forward,
-            backward,
-            at.directions.cos_theta,
-            at.directions.cos_phi,
-        ]
+        let LinkDirections { cos_theta, cos_phi, .. } = at.directions;
+        // `n_free` has the sign of the normal force, but no pole at a zero of the indicator
+        [speed, at.contact.n_free, forces.indicator, forward, backward, cos_theta, cos_phi]
     }
 
     fn scale(&self) -> [f64; 4] {
@@ -211,21 +187,14 @@ impl TaylorPhase<4, GUARDS> for SlipPhase<'_> {
         motion: &mut TaylorMotion,
         out: &mut TaylorExpansion<4, GUARDS>,
     ) {
-        self.system.expand_motion(
-            t,
-            &pose_from_states(y),
-            ContactMode::Slip(self.direction),
-            self.lean,
-            out.order,
-            motion,
-        );
+        let (pose, touch) = (pose_from_states(y), ContactMode::Slip(self.direction));
+        self.system.expand_motion(t, &pose, touch, self.lean, out.order, motion);
         let corners = self.system.corner_signs(self.lean);
         for k in 0..=out.order {
             let ([theta, phi], [theta_rate, phi_rate]) = (motion.angle[k], motion.rate[k]);
             let [cos_theta, cos_phi] = motion.cosines(k);
             out.states[k] = [theta, phi, theta_rate, phi_rate];
-            // the indicator has no series here: towards its zero the accelerations have a pole, which no step
-            // crosses
+            // the indicator needs no series: the accelerations have a pole at its zero, which no step crosses
             let speed = self.direction * motion.tip_velocity[k];
             out.guards[k] =
                 [speed, motion.normal_n(k), 0.0, corners[0] * theta, corners[1] * theta, cos_theta, cos_phi];
@@ -233,24 +202,24 @@ impl TaylorPhase<4, GUARDS> for SlipPhase<'_> {
         out.guards[0][JAMS] = motion.indicator;
         let friction = &self.system.linkage.friction;
         let falls = friction.a > 0.0 && friction.b_s_per_m > 0.0;
-        out.exponent = falls
-            .then(|| std::array::from_fn(|k| friction.b_s_per_m * self.direction * motion.tip_velocity[k]));
+        let exponent = |k: usize| friction.b_s_per_m * self.direction * motion.tip_velocity[k];
+        out.exponent = falls.then(|| std::array::from_fn(exponent));
         let [forward, backward] = SHOULDER_GUARDS;
         [out.guards[0][forward], out.guards[0][backward]] = self.system.corner_distances(y[0], self.lean);
     }
 }
 
-/// The tip is held at `place_m`; the states are angle and rate of the free link, the other link follows from
-/// the place of the tip: `l1 sin theta + l2 sin phi = place - v(t)`, so the tip cannot drift.
+/// Stick: the tip is held at `place_m`. The states are angle and rate of the free link; the other link follows
+/// from `l1 sin theta + l2 sin phi = place - v(t)`, so the tip cannot drift.
 #[derive(Debug, Clone, Copy)]
 pub struct StickPhase<'a> {
     /// The blade on its drive.
     pub system: &'a DrivenBlade,
-    /// Where the tip is held, `alpha`, m.
+    /// Position of the tip, `alpha`, m.
     pub place_m: f64,
     /// Side of the shoulder.
     pub lean: ShoulderContact,
-    /// The link whose angle follows: the one that moves the tip more.
+    /// Link whose angle follows: the one that moves the tip more.
     follower: Link,
 }
 
@@ -261,23 +230,22 @@ enum Link {
 }
 
 impl<'a> StickPhase<'a> {
-    /// Cosine of the follower at which stick counts as level, 1e-3 rad short of it. The place of the tip
-    /// turns back at level, so the follower's rate is 0/0 there and its cosine keeps its sign; a thousandth
-    /// of a radian costs about nine bits of the state, not all.
+    /// Cosine of the follower at which it counts as level, 1e-3 rad early. At level the follower's rate is 0/0 and
+    /// its cosine does not change sign; 1e-3 rad before, the state loses about nine bits.
     const LEAST_COSINE: f64 = 1e-3;
 
-    /// Holds the tip where it is in this pose, both links short of level.
+    /// Holds the tip at its position in a pose with both links above level.
     #[must_use]
     pub fn from_pose(system: &'a DrivenBlade, t: f64, pose: &Pose, lean: ShoulderContact) -> Self {
         let directions = LinkDirections::from_pose(pose);
-        let (neck, lip) =
-            (system.linkage.l1_m * directions.cos_theta, system.linkage.l2_m * directions.cos_phi);
+        let Linkage { l1_m, l2_m, .. } = system.linkage;
+        let (neck, lip) = (l1_m * directions.cos_theta, l2_m * directions.cos_phi);
         let follower = if lip >= neck { Link::Lip } else { Link::Neck };
         let place_m = system.linkage.tip_position_m(&directions, &system.drive.motion_at(t));
         Self { system, place_m, lean, follower }
     }
 
-    /// The two states of a pose.
+    /// States of a pose: angle and rate of the free link.
     #[must_use]
     pub fn free_states(&self, pose: &Pose) -> [f64; 2] {
         match self.follower {
@@ -286,8 +254,8 @@ impl<'a> StickPhase<'a> {
         }
     }
 
-    /// Pose and directions of the two states: the follower from the tip's place, its rate from the tip's
-    /// rest.
+    /// Pose and directions from the two states: the follower's angle from the tip's position, its rate from the
+    /// tip's rest.
     #[inline]
     pub(super) fn full_pose(&self, head: &HeadMotion, y: &[f64; 2]) -> (Pose, LinkDirections) {
         let (l1, l2) = (self.system.linkage.l1_m, self.system.linkage.l2_m);
@@ -296,28 +264,18 @@ impl<'a> StickPhase<'a> {
             Link::Neck => (l2, l1),
         };
         let (sin, cos) = math::sin_cos(y[0]);
-        let follower_sin = (self.place_m - head.position_m - own * sin) / other;
-        let follower_cos = (1.0 - follower_sin * follower_sin).sqrt();
-        let angle = math::asin(follower_sin);
-        let rate = -(head.velocity_m_per_s + own * cos * y[1]) / (other * follower_cos);
+        let other_sin = (self.place_m - head.position_m - own * sin) / other;
+        let other_cos = (1.0 - other_sin * other_sin).sqrt();
+        let angle = math::asin(other_sin);
+        let rate = -(head.velocity_m_per_s + own * cos * y[1]) / (other * other_cos);
         match self.follower {
             Link::Lip => (
                 Pose { theta: y[0], phi: angle, theta_rate: y[1], phi_rate: rate },
-                LinkDirections {
-                    sin_theta: sin,
-                    cos_theta: cos,
-                    sin_phi: follower_sin,
-                    cos_phi: follower_cos,
-                },
+                LinkDirections { sin_theta: sin, cos_theta: cos, sin_phi: other_sin, cos_phi: other_cos },
             ),
             Link::Neck => (
                 Pose { theta: angle, phi: y[0], theta_rate: rate, phi_rate: y[1] },
-                LinkDirections {
-                    sin_theta: follower_sin,
-                    cos_theta: follower_cos,
-                    sin_phi: sin,
-                    cos_phi: cos,
-                },
+                LinkDirections { sin_theta: other_sin, cos_theta: other_cos, sin_phi: sin, cos_phi: cos },
             ),
         }
     }
@@ -357,7 +315,7 @@ impl HybridPhase<2, GUARDS> for StickPhase<'_> {
             Link::Lip => [cos_theta, cos_phi - Self::LEAST_COSINE],
             Link::Neck => [cos_theta - Self::LEAST_COSINE, cos_phi],
         };
-        // friction that holds the tip from sliding forward points backward
+        // the force that prevents forward slip points backward
         [limit + forces.friction_n, limit - forces.friction_n, forces.normal_n, forward, backward, neck, lip]
     }
 
@@ -384,32 +342,23 @@ impl TaylorPhase<2, GUARDS> for StickPhase<'_> {
         for k in 0..=out.order {
             let (theta, [cos_theta, cos_phi]) = (motion.angle[k][0], motion.cosines(k));
             let (normal, force) = (motion.normal_n(k), motion.friction_n[k]);
+            let ([forward, backward], limit) = (corners.map(|sign| sign * theta), mu * normal);
             out.states[k] = [motion.angle[k][leader], motion.rate[k][leader]];
-            out.guards[k] = [
-                mu * normal + force,
-                mu * normal - force,
-                normal,
-                corners[0] * theta,
-                corners[1] * theta,
-                cos_theta,
-                cos_phi,
-            ];
+            out.guards[k] = [limit + force, limit - force, normal, forward, backward, cos_theta, cos_phi];
         }
         let [forward, backward] = SHOULDER_GUARDS;
         [out.guards[0][forward], out.guards[0][backward]] =
             self.system.corner_distances(pose.theta, self.lean);
         out.guards[0][LEVEL_GUARDS[follower]] -= Self::LEAST_COSINE;
         let DrivenBlade { angle_scale, rate_scale, .. } = *self.system;
-        let (angle, rate) = (
-            angle_scale.max(motion.angle[0][follower].abs()),
-            rate_scale.max(motion.rate[0][follower].abs()),
-        );
+        let angle = angle_scale.max(motion.angle[0][follower].abs());
+        let rate = rate_scale.max(motion.rate[0][follower].abs());
         out.followers = [out.order - 1, out.order]
             .map(|k| (motion.angle[k][follower].abs() / angle).max(motion.rate[k][follower].abs() / rate));
     }
 }
 
-/// Mode that follows when a guard of stick falls to the friction limit.
+/// Mode after a guard of stick; `None` unless it is a friction limit.
 pub(crate) fn mode_after_release(guard: usize) -> Option<TipMode> {
     match guard {
         FORWARD_LIMIT => Some(TipMode::SlipForward),

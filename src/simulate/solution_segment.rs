@@ -1,17 +1,16 @@
-//! What observers see: pieces of the solution, and the model at an instant.
+//! Pieces of the solution, and the model at an instant within them.
 
 use super::fixed_step_scheme::StabilisedStickPhase;
 use super::flight::{FlightPhase, flight_state_from};
 use super::mode::TipMode;
-use super::phases;
-use super::phases::{DrivenBlade, SlipPhase, StickPhase, TaylorMotion, pose_from_states};
+use super::phases::{self, DrivenBlade, SlipPhase, StickPhase, TaylorMotion, pose_from_states};
 use crate::math::gauss_legendre;
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{HeadMotion, LinkDirections, Pose};
 use crate::ode;
 use crate::ode::polynomial::TERMS;
 
-/// A piece of the solution in one mode, as observers see it.
+/// A piece of the solution in one mode of contact.
 pub struct SolutionSegment<'a> {
     /// Start of the piece, s.
     pub start_s: f64,
@@ -19,7 +18,7 @@ pub struct SolutionSegment<'a> {
     pub end_s: f64,
     /// Mode of contact.
     pub mode: TipMode,
-    /// Taylor coefficients of the motion about the start, where it was computed by them.
+    /// Taylor coefficients of the motion about the start; `None` for other methods.
     pub(super) motion: Option<&'a TaylorMotion>,
     pub(super) solution: SegmentSolution<'a>,
 }
@@ -48,7 +47,7 @@ pub struct ModelSample {
     pub tip_height_m: f64,
     /// Position of the tip along the sweep, `v3`, m.
     pub tip_x_m: f64,
-    /// Velocity of the tip, m/s; exactly zero in stick, except where the fixed-step scheme holds it.
+    /// Velocity of the tip, m/s; exactly zero in stick, except with the fixed-step scheme.
     pub tip_velocity_m_per_s: f64,
     /// Normal force, N.
     pub normal_n: f64,
@@ -56,15 +55,15 @@ pub struct ModelSample {
     pub friction_n: f64,
     /// Painlevé indicator of slip, 1 in stick and in flight.
     pub indicator: f64,
-    /// How far the tip is from where stick holds it, m; zero in slip and in flight.
+    /// Drift of the tip from its position in stick, m; zero in slip and in flight.
     pub constraint_drift_m: f64,
     /// Energy of the blade, J.
     pub energy_j: f64,
-    /// Power that flows into it, W.
+    /// Power supplied to the blade minus losses, W.
     pub power_w: f64,
 }
 
-/// Where a camera sees the blade.
+/// Positions of head and tip, the points that a camera tracks.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BladePoints {
     /// Position of the head along the sweep, `v`, m.
@@ -88,14 +87,14 @@ impl BladePoints {
 }
 
 impl SolutionSegment<'_> {
-    /// Where the blade is at any time within the piece, and the integral of it: by the polynomials of the
-    /// step where the motion was computed by them.
+    /// Positions of head and tip over the piece and their integrals; from Taylor polynomials if the method has
+    /// them.
     #[must_use]
     pub fn path(&self) -> SegmentPath<'_> {
         SegmentPath::new(self)
     }
 
-    /// Angles and rates at a time within the piece: what [`Self::sample_at`] says, to the bit.
+    /// Angles and rates at a time within the piece; the same bits as in [`Self::sample_at`].
     #[must_use]
     pub fn pose_at(&self, t: f64) -> Pose {
         match &self.solution {
@@ -108,8 +107,8 @@ impl SolutionSegment<'_> {
         }
     }
 
-    /// Where the blade is at a time within the piece: what [`Self::sample_at`] says, to the bit, without forces
-    /// and energies.
+    /// Positions of head and tip at a time within the piece; the same bits as in [`Self::sample_at`], without the
+    /// cost of forces and energies.
     #[must_use]
     pub fn points_at(&self, t: f64) -> BladePoints {
         let on_glass = |system: &DrivenBlade, d: &LinkDirections, head: &HeadMotion| BladePoints {
@@ -137,10 +136,9 @@ impl SolutionSegment<'_> {
             SegmentSolution::Flight(flight, step) => {
                 let (linkage, state) = (&flight.system.linkage, flight_state_from(&state_in_step(step, t)));
                 let (d, head) = (LinkDirections::from_pose(&state.pose), flight.system.drive.motion_at(t));
-                let head_drop_m = linkage.drop_in_flight(&state, &d).0;
                 BladePoints {
                     head_x_m: head.position_m,
-                    head_drop_m,
+                    head_drop_m: linkage.drop_in_flight(&state, &d).0,
                     tip_x_m: linkage.tip_position_m(&d, &head),
                     tip_height_m: state.gap_m,
                 }
@@ -153,33 +151,21 @@ impl SolutionSegment<'_> {
     pub fn sample_at(&self, t: f64) -> ModelSample {
         match &self.solution {
             SegmentSolution::Slip(slip, step) => {
-                let y = state_in_step(step, t);
-                let pose = pose_from_states(&y);
+                let pose = pose_from_states(&state_in_step(step, t));
                 let at = slip.system.contact_instant(t, &pose, slip.lean);
                 let (speed, forces) = slip.slip_forces(&pose, &at);
-                self.assemble_sample(
-                    t,
-                    slip.system,
-                    slip.lean,
-                    pose,
-                    &at,
-                    &forces,
-                    slip.direction * speed,
-                    0.0,
-                )
+                let velocity = slip.direction * speed;
+                self.assemble_sample(t, slip.system, slip.lean, pose, &at, &forces, velocity, 0.0)
             }
             SegmentSolution::Stick(stick, step) => {
-                let y = state_in_step(step, t);
-                let (pose, at) = stick.contact_instant(t, &y);
-                let forces = stick.holding_forces(&at);
-                let drift = stick.system.linkage.tip_position_m(&LinkDirections::from_pose(&pose), &at.head)
-                    - stick.place_m;
+                let (pose, at) = stick.contact_instant(t, &state_in_step(step, t));
+                let (forces, d) = (stick.holding_forces(&at), LinkDirections::from_pose(&pose));
+                let drift = stick.system.linkage.tip_position_m(&d, &at.head) - stick.place_m;
                 self.assemble_sample(t, stick.system, stick.lean, pose, &at, &forces, 0.0, drift)
             }
             SegmentSolution::Flight(flight, step) => sample_in_flight(t, flight, &state_in_step(step, t)),
             SegmentSolution::Held(held, step) => {
-                let y = state_in_step(step, t);
-                let pose = pose_from_states(&y);
+                let pose = pose_from_states(&state_in_step(step, t));
                 let at = held.system.contact_instant(t, &pose, held.lean);
                 let forces = held.stabilised_forces(&pose, &at);
                 let linkage = &held.system.linkage;
@@ -190,7 +176,7 @@ impl SolutionSegment<'_> {
         }
     }
 
-    #[allow(clippy::too_many_arguments)] // one private place gathers what both modes computed
+    #[allow(clippy::too_many_arguments)] // the quantities that all modes of contact compute
     fn assemble_sample(
         &self,
         t: f64,
@@ -227,7 +213,7 @@ fn state_in_step<const N: usize>(step: &ode::AcceptedStep<'_, N>, t: f64) -> [f6
     if t == step.end { *step.y_end } else { step.solution.state_at(t) }
 }
 
-/// The model off the glass, where no force acts on the tip.
+/// The model in flight, without forces on the tip.
 fn sample_in_flight(t: f64, flight: &FlightPhase<'_>, y: &[f64; 6]) -> ModelSample {
     let (linkage, state) = (&flight.system.linkage, flight_state_from(y));
     let (d, head) = (LinkDirections::from_pose(&state.pose), flight.system.drive.motion_at(t));
@@ -251,17 +237,16 @@ fn sample_in_flight(t: f64, flight: &FlightPhase<'_>, y: &[f64; 6]) -> ModelSamp
     }
 }
 
-// Where the blade is over a piece of the solution, and the integral of it.
+// Positions over a piece and their integrals.
 //
-// The Taylor coefficients of a step hold the velocities of head and tip and the drop, so that places are
-// polynomials of the time since the start and their integrals over an open shutter are exact:
+// Taylor coefficients of a step include the velocities of head and tip and the drop. Positions are therefore
+// polynomials of the time `x` since the start, and their integrals over an open shutter are exact:
 //
 // ```text
 // v3(x) = v3(0) + sum v3'_(j-1) x^j / j        int v3 = v3(0) x + sum v3'_(j-1) x^(j+1) / (j (j+1))
 // ```
 //
-// Other methods of integration keep no such coefficients: there a place follows from the angles, and an
-// integral from five of them.
+// Other methods have no such coefficients: positions follow from the angles, and an integral from five of them.
 
 /// `1 / j`, and 0 for `j = 0`.
 const RECIPROCALS: [f64; TERMS + 4] = {
@@ -274,29 +259,27 @@ const RECIPROCALS: [f64; TERMS + 4] = {
     share
 };
 
-/// Where the blade is over a piece; made once for all that is asked of the piece.
+/// Positions of head and tip over a piece; one path serves all queries of the piece.
 pub struct SegmentPath<'a> {
     piece: &'a SolutionSegment<'a>,
     polynomials: Option<PathPolynomials<'a>>,
 }
 
-/// Places as polynomials of the time since the start of a piece.
+/// Positions as polynomials of the time since the start of a piece.
 struct PathPolynomials<'a> {
     motion: &'a TaylorMotion,
     start: [f64; 4],
-    /// Whether the tip is held.
+    /// Whether the tip sticks.
     sticks: bool,
 }
 
 impl<'a> SegmentPath<'a> {
-    pub(super) fn new(piece: &'a SolutionSegment<'a>) -> Self {
-        Self {
-            piece,
-            polynomials: piece.motion.and_then(|motion| PathPolynomials::from_segment(piece, motion)),
-        }
+    fn new(piece: &'a SolutionSegment<'a>) -> Self {
+        let polynomials = piece.motion.and_then(|motion| PathPolynomials::from_segment(piece, motion));
+        Self { piece, polynomials }
     }
 
-    /// Where the blade is at a time within the piece.
+    /// Positions of head and tip at a time within the piece.
     #[inline]
     #[must_use]
     pub fn points_at(&self, t: f64) -> BladePoints {
@@ -306,7 +289,7 @@ impl<'a> SegmentPath<'a> {
         )
     }
 
-    /// Integral of the place from one time within the piece to another, m s.
+    /// Integral of the positions between two times within the piece, m s.
     #[inline]
     #[must_use]
     pub fn integrate_points(&self, from_s: f64, to_s: f64) -> BladePoints {
@@ -322,7 +305,7 @@ impl<'a> SegmentPath<'a> {
 }
 
 impl<'a> PathPolynomials<'a> {
-    /// `None` where the piece was not computed by Taylor series.
+    /// `None` for stick of the fixed-step scheme.
     fn from_segment(piece: &SolutionSegment<'a>, motion: &'a TaylorMotion) -> Option<Self> {
         let (system, height, held): (&DrivenBlade, f64, Option<f64>) = match &piece.solution {
             SegmentSolution::Slip(slip, _) => (slip.system, 0.0, None),
@@ -367,7 +350,7 @@ impl<'a> PathPolynomials<'a> {
         self.add_start(to - from, four_values(|i| high[i] * to * to - low[i] * from * from))
     }
 
-    /// The start's places times a weight, and what has changed since; a tip that is held does not move.
+    /// Positions at the start times a weight, plus the change since then; a tip in stick does not move.
     #[inline]
     fn add_start(&self, weight: f64, mut change: [f64; 4]) -> [f64; 4] {
         const TIP: usize = 2;

@@ -13,7 +13,7 @@ use std::sync::OnceLock;
 /// Significant digits of a value between two ends: it is then the same on every machine, and short.
 const DIGITS: usize = 12;
 
-/// Spacing of values along an axis.
+/// How values lie along an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum AxisSpacing {

@@ -1,4 +1,4 @@
-//! The run that the others are held against, and what each of them errs by.
+//! Reference run, and errors of other runs against it.
 
 use super::sampled_run::{SampledRun, comparison_grid};
 use super::transition_lists::TransitionDifference;
@@ -11,39 +11,39 @@ use crate::simulate::{IntegrationMethod, RunResult, SolverOptions, run_scene_wit
 use crate::spectrum::{SpectrumSettings, analyse_spectrum};
 use std::ops::Range;
 
-/// The run that the others are held against.
+/// Reference run of a scene.
 pub(crate) struct ReferenceRun<'a> {
     scene: &'a Scene,
     motion: SampledRun,
     spectral: ComponentReader,
     pub components: ComponentPair,
-    /// The method that it is checked against, at the same tolerance.
+    /// Second method at the same tolerance, to check the reference.
     pub checked_by: IntegrationMethod,
-    /// Worst difference of the two methods' transition times, s; `None` when their lists differ or are empty.
+    /// Worst difference of the transition times of both methods, s; `None` if their lists differ or are empty.
     pub apart_s: Option<f64>,
-    /// Whether the two lists of transitions agree.
+    /// Whether both methods have the same transitions.
     pub lists_agree: bool,
-    /// Worst difference of their deflections relative to its range.
+    /// Worst difference of the deflections of both methods, relative to the range of the deflection.
     pub state_apart: f64,
 }
 
-/// What a setting errs by and costs.
+/// Errors and cost of a setting.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct AccuracyRow {
     pub setting: SolverSetting,
-    /// How the run went.
+    /// Summary of the run.
     pub run: RunResult,
-    /// Time that it took, s; infinite until the caller has taken it.
+    /// Duration of the run, s; infinite until the caller sets it.
     pub wall_s: f64,
-    /// Its list of transitions against the reference's.
+    /// Difference of its transitions from the reference's.
     pub lists: TransitionDifference,
-    /// Time of its end against the reference's, s.
+    /// Error of the time of its end, s.
     pub stop_error_s: f64,
     /// Root mean square error of the deflection, relative to its range.
     pub state_rms: f64,
     /// Worst error of the deflection, relative to its range.
     pub state_worst: f64,
-    /// Errors of the components, Hz, where both runs show them.
+    /// Errors of the low and the high component, Hz; `None` unless both runs show it.
     pub components_hz: [Option<f64>; 2],
 }
 
@@ -71,22 +71,22 @@ impl<'a> ReferenceRun<'a> {
         }
     }
 
-    /// How the reference itself went.
+    /// Summary of the reference run.
     pub(crate) fn run_result(&self) -> &RunResult {
         &self.motion.run
     }
 
-    /// Whether an error of transition times is larger than what the reference is sure of.
+    /// Whether an error of transition times exceeds the uncertainty of the reference.
     pub(crate) fn resolves_error(&self, error_s: f64) -> bool {
         self.lists_agree && self.apart_s.is_none_or(|apart| error_s > apart)
     }
 
-    /// Runs a setting and nothing else, to be timed.
+    /// Runs a setting without observers, for timing.
     pub(crate) fn run_untracked(&self, setting: &SolverSetting) -> RunResult {
         run_scene_with(self.scene, setting.solver_options(), &mut ())
     }
 
-    /// Runs a setting and holds it against the reference.
+    /// Runs a setting and compares it with the reference.
     pub(crate) fn measure_setting(&self, setting: SolverSetting) -> AccuracyRow {
         let motion = SampledRun::run_scene(self.scene, setting.solver_options());
         let (state_rms, state_worst) = SampledRun::deflection_differences(&self.motion, &motion);
@@ -105,27 +105,27 @@ impl<'a> ReferenceRun<'a> {
     }
 }
 
-// The two spectral components that fits are held against, read by the same code.
+// Low and high spectral component of a run, as in fits.
 
-/// Place of the low component: the head on its spring, read from the head's drop.
+/// Index of the low component: the head on its spring, read from the head's drop.
 pub(crate) const LOW_COMPONENT: usize = 0;
-/// Place of the high component: the stick-slip cycle, read from the deflection.
+/// Index of the high component: the stick-slip cycle, read from the deflection.
 pub(crate) const HIGH_COMPONENT: usize = 1;
 
-/// Frequencies between which each component is sought, in units of the head's natural frequency: the low one
-/// was published at 1.5 and 3.9 times that frequency, the high one at 40 to 80 times it.
+/// Search bands of both components over the head's natural frequency. The low one was published at 1.5 and 3.9
+/// times that frequency, the high one at 40 to 80 times.
 const BANDS_OVER_HEAD: [(f64, f64); 2] = [(1.0, 6.0), (6.0, 600.0)];
-/// Time after the release before a window starts, s: what the flip leaves dies out.
+/// Time from the release to the start of the window, s: vibration of the flip decays.
 const AFTER_RELEASE_S: f64 = 0.01;
 
 /// The components of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct ComponentPair {
-    /// Frequency of the low and the high component, Hz; `None` where there is none.
+    /// Frequency of the low and the high component, Hz; `None` without a component.
     pub hz: [Option<f64>; 2],
 }
 
-/// What is read from every run: the same frames, whenever its own tip was released.
+/// Reads the components of every run from the same frames, whatever the time of its own release.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ComponentReader {
     frames: Range<usize>,
@@ -134,7 +134,7 @@ pub(crate) struct ComponentReader {
 }
 
 impl ComponentReader {
-    /// From the release that the reference shows to its end; all of it where it shows none.
+    /// The frames from the reference's release to its end; all frames without a release.
     pub(crate) fn from_reference(scene: &Scene, reference: Option<&Recording>) -> Self {
         let from = WindowEnd::Found { anchor: InstantKind::Release, reversal: 1, offset_s: AFTER_RELEASE_S };
         let window = Window { from, to: WindowEnd::Open };
@@ -149,20 +149,16 @@ impl ComponentReader {
         Self { frames, frame_rate_hz, bands_hz }
     }
 
-    /// The components of a run, of which each column has one sample a frame, m.
+    /// Components of a run from its deflection and head drop, one sample per frame, m.
     pub(crate) fn read_components(&self, deflection_m: &[f64], head_drop_m: &[f64]) -> ComponentPair {
         let strongest = |column: &[f64], (low, high): (f64, f64)| {
-            let inside: Vec<Option<f64>> =
-                column.get(self.frames.clone())?.iter().map(|x| Some(*x)).collect();
+            let inside = column.get(self.frames.clone())?.iter().map(|x| Some(*x));
             let settings = SpectrumSettings { band_hz: Some((low, high)), ..SpectrumSettings::default() };
-            let spectrum = analyse_spectrum(&inside, self.frame_rate_hz, &settings).ok()?;
+            let spectrum =
+                analyse_spectrum(&inside.collect::<Vec<_>>(), self.frame_rate_hz, &settings).ok()?;
             spectrum.component_in_band(low, high).map(|c| c.frequency_hz)
         };
-        ComponentPair {
-            hz: [
-                strongest(head_drop_m, self.bands_hz[LOW_COMPONENT]),
-                strongest(deflection_m, self.bands_hz[HIGH_COMPONENT]),
-            ],
-        }
+        let [low, high] = self.bands_hz;
+        ComponentPair { hz: [strongest(head_drop_m, low), strongest(deflection_m, high)] }
     }
 }

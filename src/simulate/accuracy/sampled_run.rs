@@ -1,14 +1,14 @@
-//! What is kept of a run, at the instants at which runs are compared.
+//! A run, sampled at the times at which runs are compared.
 
 use crate::recording::{FrameGrid, Recording, Traces};
 use crate::simulate::outputs::{SampleObserver, Transitions};
 use crate::simulate::scene::Scene;
 use crate::simulate::{RunResult, SolverOptions, Transition, run_scene_with};
 
-/// Most samples that the deflection is compared at: longer runs are sampled at a lower rate.
+/// Most samples of a comparison: longer runs have a lower sampling rate.
 const MOST_SAMPLES: f64 = 1e5;
 
-/// What is kept of a run.
+/// Transitions and samples of a run.
 pub(super) struct SampledRun {
     pub run: RunResult,
     pub transitions: Vec<Transition>,
@@ -16,22 +16,19 @@ pub(super) struct SampledRun {
     pub head_drop_m: Vec<f64>,
 }
 
-/// Instants at which runs are compared.
+/// Times at which runs are compared.
 pub(super) fn comparison_grid(scene: &Scene) -> FrameGrid {
     let length = scene.run.stop_s - scene.start_s;
     let frame_rate_hz = scene.run.sample_rate_hz.min(MOST_SAMPLES / length);
-    FrameGrid {
-        start_s: scene.start_s,
-        frame_rate_hz,
-        frames: (length * frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1,
-    }
+    let frames = (length * frame_rate_hz * (1.0 + 1e-12)).floor() as usize + 1;
+    FrameGrid { start_s: scene.start_s, frame_rate_hz, frames }
 }
 
 impl SampledRun {
     pub(crate) fn run_scene(scene: &Scene, effort: SolverOptions) -> Self {
         let grid = comparison_grid(scene);
-        let (mut deflection_m, mut head_drop_m, mut transitions) =
-            (Vec::new(), Vec::new(), Transitions::default());
+        let (mut deflection_m, mut head_drop_m) = (Vec::new(), Vec::new());
+        let mut transitions = Transitions::default();
         let times = (0..grid.frames).map(|i| grid.time_s(i).min(scene.run.stop_s));
         let sampler = SampleObserver::new(times, |sample| {
             deflection_m.push(sample.tip_x_m - sample.head_x_m);
@@ -41,16 +38,14 @@ impl SampledRun {
         Self { run, transitions: transitions.0, deflection_m, head_drop_m }
     }
 
-    /// Root mean square and worst difference of the deflection over the samples that both runs reached,
-    /// relative to its range.
+    /// Root mean square and worst difference of the deflection over the common samples of two runs, relative to
+    /// the range of the reference.
     pub(crate) fn deflection_differences(reference: &Self, other: &Self) -> (f64, f64) {
-        let (low, high) = reference
-            .deflection_m
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
+        let deflections = reference.deflection_m.iter();
+        let low = deflections.clone().copied().fold(f64::INFINITY, f64::min);
+        let high = deflections.clone().copied().fold(f64::NEG_INFINITY, f64::max);
         let range = if high > low { high - low } else { 1.0 };
-        let errors =
-            reference.deflection_m.iter().zip(&other.deflection_m).map(|(a, b)| ((a - b) / range).abs());
+        let errors = deflections.zip(&other.deflection_m).map(|(a, b)| ((a - b) / range).abs());
         let (mut squares, mut worst, mut count) = (0.0, 0.0f64, 0);
         for error in errors {
             (squares, worst, count) = (squares + error * error, worst.max(error), count + 1);
@@ -58,8 +53,7 @@ impl SampledRun {
         ((squares / f64::from(count.max(1))).sqrt(), worst)
     }
 
-    /// The run as a camera without fault would record it; `None` for a run that ended before its second
-    /// sample.
+    /// The run as an ideal camera records it; `None` if the run ends before its second sample.
     pub(crate) fn to_recording(&self, scene: &Scene) -> Option<Recording> {
         let grid = comparison_grid(scene);
         let frames = self.deflection_m.len();

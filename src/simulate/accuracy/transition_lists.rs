@@ -1,22 +1,22 @@
-//! A list of transitions against the reference's.
+//! Comparison of two lists of transitions.
 
 use crate::simulate::Transition;
 
-/// How a list differs from the reference's.
+/// Difference of a list from the reference's.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct TransitionDifference {
     /// Transitions of the reference that the list lacks.
     pub missed: usize,
     /// Transitions that the reference lacks.
     pub invented: usize,
-    /// Worst difference of times, s; `None` when the lists differ or are empty.
+    /// Worst difference of times, s; `None` if the lists differ or are empty.
     pub worst_s: Option<f64>,
 }
 
 impl TransitionDifference {
-    /// Two lists agree when they have the same changes of mode in the same order. When they do not,
-    /// transitions are paired that are of one kind and less than half of the reference's median gap apart;
-    /// the others are missed or invented.
+    /// Compares two lists. They agree if they have the same changes of mode in the same order. Otherwise
+    /// transitions between the same modes pair if they are closer than half of the reference's median gap; the
+    /// others are missed or invented.
     pub(crate) fn from_lists(reference: &[Transition], found: &[Transition]) -> Self {
         let same =
             reference.len() == found.len() && reference.iter().zip(found).all(|(a, b)| is_of_one_kind(a, b));
@@ -26,17 +26,14 @@ impl TransitionDifference {
             return Self { missed: 0, invented: 0, worst_s };
         }
         let pairs = count_pairs(reference, found, 0.5 * median_gap(reference));
-        // lists of one length whose every transition has a partner differ in order alone, which counts as one
-        // of each
-        let (missed, invented) = (reference.len() - pairs, found.len() - pairs);
-        if missed + invented == 0 {
-            Self { missed: 1, invented: 1, worst_s: None }
-        } else {
-            Self { missed, invented, worst_s: None }
-        }
+        let (missed, invented) = match (reference.len() - pairs, found.len() - pairs) {
+            (0, 0) => (1, 1), // the lists differ only in order, which counts as one of each
+            unpaired => unpaired,
+        };
+        Self { missed, invented, worst_s: None }
     }
 
-    /// Whether the list has the reference's transitions and no others.
+    /// Whether the lists agree.
     pub(crate) fn is_empty(&self) -> bool {
         self.missed + self.invented == 0
     }
@@ -46,7 +43,7 @@ fn is_of_one_kind(a: &Transition, b: &Transition) -> bool {
     (a.from, a.to) == (b.from, b.to)
 }
 
-/// Number of transitions that have a partner, both lists read in order of time.
+/// Number of pairs, with both lists in order of time.
 fn count_pairs(reference: &[Transition], found: &[Transition], apart_s: f64) -> usize {
     let (mut i, mut j, mut count) = (0, 0, 0);
     while let (Some(a), Some(b)) = (reference.get(i), found.get(j)) {
