@@ -1,18 +1,18 @@
-//! Derivatives of a run by parameters, starting state and drive: exact but for the tolerance, along the same
-//! steps as the run itself and through its transitions.
+//! Derivatives of a run by parameters, initial state and drive, within the tolerance, along the steps of the run
+//! and through its transitions.
 //!
-//! Between transitions the derivatives obey the linear equations of [`crate::model::tangent`] along the
-//! series of each step, and are found by collocation ([`crate::ode::collocation`]); one factoring a step
-//! serves all directions. Where a guard
-//! `G` falls, the time of the transition changes by `d tau = -dG / G'` and the derivative of the state jumps
-//! (saltation; Leine and Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems", chapter 7),
+//! Between transitions the derivatives obey the linear equations of [`crate::model::tangent`] along the series of
+//! each step. Collocation ([`crate::ode::collocation`]) solves them; all directions share one factorisation per
+//! step. At the zero of a guard `G` the transition time changes by `d tau = -dG / G'` and the derivative of the
+//! state jumps (saltation; Leine and Nijmeijer, "Dynamics and Bifurcations of Non-Smooth Mechanical Systems",
+//! chapter 7),
 //!
 //! ```text
 //! d y+ = R_y (d y- + f- d tau) + R_p - f+ d tau
 //! ```
 //!
-//! with `f` the right-hand sides before and after and `R` the map of an impact, the identity elsewhere. Where
-//! a guard only grazes zero the derivative is infinite: from there on there is none.
+//! with the right-hand sides `f` before and after and the map `R` of an impact, elsewhere the identity. A guard
+//! that only grazes zero makes the derivative infinite; from there on derivatives are unknown.
 
 mod propagation;
 mod saltation;
@@ -30,20 +30,20 @@ pub use seeds::{TangentDirection, TangentSeeds};
 use std::ops::ControlFlow;
 pub use tangent_segment::{Channel, ChannelWeights, TangentSegment};
 
-/// Sees a run and its derivatives as they are accepted.
+/// Receives a run and its derivatives as they are accepted.
 pub trait TangentObserver {
-    /// A piece of the solution, in order of time.
+    /// Receives a piece of the solution, in order of time.
     fn observe_segment(&mut self, piece: &TangentSegment<'_>);
-    /// A change of mode, between the pieces it separates; `d_time_s` are the derivatives of its time, s over
-    /// the unit of each direction, `None` where they do not exist.
+    /// Receives a change of mode, between the pieces that it separates. `d_time_s` are the derivatives of its time,
+    /// s per unit of each direction; `None` if they do not exist.
     fn observe_transition(&mut self, _transition: &Transition, _d_time_s: Option<&[f64]>) {}
-    /// Asked after every piece: `Break` ends the run as [`RunStatus::Interrupted`].
+    /// Is asked after every piece; `Break` ends the run as [`RunStatus::Interrupted`].
     fn control_flow(&self) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 }
 
-/// Runs scenes with derivatives; keeps its room from run to run.
+/// Runs scenes with derivatives; keeps its workspace from run to run.
 #[derive(Debug, Default)]
 pub struct TangentRunner {
     room: TangentWorkspace,
@@ -51,18 +51,18 @@ pub struct TangentRunner {
 }
 
 impl TangentRunner {
-    /// A runner whose derivatives within a step are good to `relative` of what they swing by, for a search
-    /// that needs no more; at the ends of steps they are far better. Without this they are good to the
-    /// tolerance of the run, which stays what it is.
+    /// A runner with derivatives to the relative accuracy `relative` within a step, for searches that need no
+    /// more; at the ends of steps they are far more accurate. The default accuracy is the tolerance of the run,
+    /// which this does not change.
     #[must_use]
     pub fn with_accuracy(relative: f64) -> Self {
         Self { room: TangentWorkspace::default(), accuracy: Some(relative) }
     }
 
-    /// Runs a scene with its derivatives. It is integrated by Taylor series, whatever the effort's method is:
-    /// solution and transitions are to the bit those of [`run_with`](super::run_with).
+    /// Runs a scene with its derivatives, always by Taylor series. Solution and transitions have the same bits as
+    /// with [`run_scene_with`](super::run_scene_with).
     ///
-    /// `seeds` are those of a scene with the same parameters and drive; start and stop may differ.
+    /// `seeds` belong to a scene with the same parameters and drive; start and stop may differ.
     pub fn run_scene(
         &mut self,
         scene: &Scene,
@@ -81,7 +81,7 @@ impl TangentRunner {
     }
 }
 
-/// Runs a scene with its derivatives, once: see [`TangentRunner::run_scene`].
+/// Runs one scene with its derivatives; see [`TangentRunner::run_scene`].
 pub fn run_with_tangents(
     scene: &Scene,
     effort: SolverOptions,
@@ -91,10 +91,9 @@ pub fn run_with_tangents(
     TangentRunner::default().run_scene(scene, effort, seeds, observer)
 }
 
-// Central differences of functions that are cheap and smooth.
+// Central differences of cheap, smooth functions.
 
-/// Steps of the six-point central difference with their weights (Fornberg, Math. Comp. 51, 1988, table 1):
-/// order 6.
+/// Steps and weights of the six-point central difference of order 6 (Fornberg, Math. Comp. 51, 1988, table 1).
 pub(super) const SIX_POINTS: [(f64, f64); 6] = [
     (-3.0, -1.0 / 60.0),
     (-2.0, 9.0 / 60.0),
@@ -104,11 +103,11 @@ pub(super) const SIX_POINTS: [(f64, f64); 6] = [
     (3.0, 1.0 / 60.0),
 ];
 
-/// Step relative to the scale on which a function changes: its sixth power, the truncation, is below
-/// rounding, and rounding over it leaves 1e-13.
+/// Step relative to the scale of the function: truncation, its sixth power, is below rounding, and rounding over
+/// the step is 1e-13.
 pub(super) const DIFFERENCE_STEP: f64 = 1e-3;
 
-/// Derivative of `f` at 0 along its argument; `None` where `f` has no value.
+/// Derivative of `f` at 0; `None` if `f` has no value at a step.
 pub(super) fn central_difference<const N: usize>(
     step: f64,
     mut f: impl FnMut(f64) -> Option<[f64; N]>,
@@ -125,7 +124,7 @@ pub(super) fn central_difference<const N: usize>(
 mod tests {
     use super::*;
 
-    /// Derivatives of the tip's place and of its rate at the ends of all pieces.
+    /// Bits of the derivatives at the ends of all pieces.
     #[derive(Default)]
     struct Ends(Vec<u64>);
 
@@ -158,12 +157,8 @@ mod tests {
         let seeds = TangentSeeds::new(&scene, &directions).unwrap();
         let run = |room: TangentWorkspace| {
             let mut ends = Ends::default();
-            TangentRunner { room, accuracy: Some(1e-5) }.run_scene(
-                &scene,
-                SolverOptions::new(1e-8),
-                &seeds,
-                &mut ends,
-            );
+            let mut runner = TangentRunner { room, accuracy: Some(1e-5) };
+            runner.run_scene(&scene, SolverOptions::new(1e-8), &seeds, &mut ends);
             ends.0
         };
         let fresh = run(TangentWorkspace::default());

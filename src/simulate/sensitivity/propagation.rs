@@ -1,10 +1,8 @@
-//! Carries derivatives along a run, from piece to piece and through its transitions.
+//! Propagates derivatives along a run, from piece to piece and through its transitions.
 
 use super::TangentObserver;
-use super::saltation;
-use super::saltation::StrikeTangent;
-use super::seeds::TangentSeeds;
-use super::seeds::steady_slip_tangent;
+use super::saltation::{FallingGuard, StrikeTangent};
+use super::seeds::{TangentSeeds, steady_slip_tangent};
 use super::stretch::{SeriesReference, StretchPlace, StretchPlanner, TangentStretch};
 use super::tangent_blocks::{StretchWorkspace, TangentBlock, TangentBlocks, rates_after};
 use super::tangent_segment::TangentSegment;
@@ -12,6 +10,7 @@ use crate::model::modes::time_scales_rad_per_s;
 use crate::model::series::ContactMode;
 use crate::model::shoulder::ShoulderContact;
 use crate::model::tangent::LaneVector;
+use crate::simulate::equilibrium::shoulder_contact;
 use crate::simulate::event_loop::{RunWatcher, TipStrike};
 use crate::simulate::impact::ImpactOrigin;
 use crate::simulate::mode::TipMode;
@@ -21,34 +20,34 @@ use crate::simulate::solution_segment::{SegmentSolution, SolutionSegment};
 use crate::simulate::{Impact, Transition, initial_pose};
 use std::ops::ControlFlow;
 
-/// A guard that has fallen, before what follows is known.
+/// A guard that has fallen to zero, before the next piece is known.
 #[derive(Debug, Clone, Copy)]
 struct TriggeredGuard {
-    /// Its rate; `None` where derivatives are infinite or unknown.
+    /// Rate of the guard; `None` if derivatives are infinite or unknown.
     rate: Option<f64>,
-    /// Rates of the state there: `theta'`, `phi'`, `theta''`, `phi''`, those of the gap and of its rate.
+    /// Rates of the state there: `theta'`, `phi'`, `theta''`, `phi''`, `gap'`, `gap''`.
     rates: [f64; 6],
 }
 
-/// Where the derivatives stand.
+/// Position of the derivatives in the run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum TangentStatus {
     /// At the end of the last piece.
     Current,
-    /// Moved with a transition: what follows has not begun.
+    /// At a transition time, before the next piece.
     AtTransition,
-    /// There are none from here on.
+    /// Unknown from here on.
     Lost,
 }
 
-/// Where derivatives are computed, kept from run to run.
+/// Workspace of the derivatives, kept from run to run.
 #[derive(Debug, Default)]
 pub(super) struct TangentWorkspace {
     blocks: Vec<TangentBlock>,
     works: StretchWorkspace,
 }
 
-/// Watches a run and carries derivatives along.
+/// Watches a run and propagates derivatives.
 pub(super) struct TangentPropagator<'a, O> {
     observer: &'a mut O,
     blocks: TangentBlocks<'a>,
@@ -59,7 +58,7 @@ pub(super) struct TangentPropagator<'a, O> {
     place: Option<StretchPlace>,
     /// End of the last piece, s.
     end_s: f64,
-    /// Share of its terms below which a guard's rate counts as that of a touch.
+    /// Fraction of its terms below which the rate of a guard counts as grazing.
     grazing: f64,
     d_time_s: Vec<f64>,
 }
@@ -72,22 +71,16 @@ impl<'a, O> TangentPropagator<'a, O> {
         room: &'a mut TangentWorkspace,
         [tolerance, accuracy]: [f64; 2],
     ) -> Self {
-        /// A guard's rate carries the error of the solution: above this share of its terms, and this many
-        /// tolerances, the time of its fall has derivatives good to about a thousandth.
+        /// The rate of a guard has the error of the solution. Above this fraction of its terms, and this multiple
+        /// of the tolerance, derivatives of the transition time err by about a thousandth.
         const GRAZING: f64 = 1e-6;
         const TOLERANCES: f64 = 1e3;
         let TangentWorkspace { blocks, works } = room;
         blocks.resize_with(seeds.blocks.len(), TangentBlock::default);
-        let fastest = time_scales_rad_per_s(&system.linkage).1;
+        let pace = StretchPlanner::new(accuracy, time_scales_rad_per_s(&system.linkage).1);
         Self {
             observer,
-            blocks: TangentBlocks {
-                system,
-                seeds,
-                all: blocks,
-                works,
-                pace: StretchPlanner::new(accuracy, fastest),
-            },
+            blocks: TangentBlocks { system, seeds, all: blocks, works, pace },
             stand: TangentStatus::Current,
             fallen: None,
             last: None,
@@ -98,17 +91,17 @@ impl<'a, O> TangentPropagator<'a, O> {
         }
     }
 
-    /// Sets the derivatives of the state that a scene starts in.
+    /// Sets the derivatives of the initial state.
     pub(super) fn set_start(&mut self, scene: &Scene) {
         let system = self.blocks.system;
         let head = system.drive.motion_at(scene.start_s);
         let slides = scene.start == StartKind::SteadySlide;
         let pose = initial_pose(scene).filter(|_| slides);
         for (block, seed) in self.blocks.iter_with_seeds() {
-            // (what a run before left there may be no number, and nought times that is none either)
+            // reset: a value of an earlier run may be NaN, and zero times NaN is NaN
             *block = TangentBlock { state: seed.start, ..TangentBlock::default() };
             let Some(pose) = pose else { continue };
-            let lean = scene.linkage.shoulder.map_or(ShoulderContact::Off, |s| s.contact_at(pose.theta));
+            let lean = shoulder_contact(&scene.linkage, pose.theta);
             let d_speed = seed.head_velocity(system, scene.start_s);
             match steady_slip_tangent(system, seed, lean, &pose, head.velocity_m_per_s, d_speed) {
                 Some(moved) => {
@@ -120,11 +113,11 @@ impl<'a, O> TangentPropagator<'a, O> {
         }
     }
 
-    /// Moves the derivatives with the transition at the guard that has fallen.
+    /// Moves the derivatives to the transition time of the guard that has fallen.
     fn apply_transition(&mut self) {
         let Some(fallen) = self.fallen.take() else { return };
         if self.stand == TangentStatus::Lost {
-            return; // what is lost does not come back
+            return; // lost derivatives stay lost
         }
         let Some(rate) = fallen.rate else {
             self.stand = TangentStatus::Lost;
@@ -137,7 +130,7 @@ impl<'a, O> TangentPropagator<'a, O> {
         self.stand = TangentStatus::AtTransition;
     }
 
-    /// What the derivatives of the next piece start from: the transition before it is over.
+    /// Moves the derivatives from a transition time to the start of the next piece.
     fn begin_segment(&mut self, mode: TipMode, motion: &TaylorMotion) {
         let moved = self.stand == TangentStatus::AtTransition;
         let rates = moved.then(|| rates_after(motion, mode, 0.0));
@@ -155,7 +148,7 @@ impl<'a, O> TangentPropagator<'a, O> {
     }
 }
 
-/// Touch and lean of a piece.
+/// Contact and side of the shoulder of a piece.
 fn contact_of(piece: &SolutionSegment<'_>, motion: &TaylorMotion) -> (ContactMode, ShoulderContact) {
     match &piece.solution {
         SegmentSolution::Slip(slip, _) => (ContactMode::Slip(slip.direction), slip.lean),
@@ -168,7 +161,7 @@ fn contact_of(piece: &SolutionSegment<'_>, motion: &TaylorMotion) -> (ContactMod
 impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
     fn watch_segment(&mut self, piece: &SolutionSegment<'_>) {
         let Some(motion) = piece.motion else {
-            self.stand = TangentStatus::Lost; // only Taylor series carry derivatives
+            self.stand = TangentStatus::Lost; // derivatives need Taylor series
             return;
         };
         let (touch, lean) = contact_of(piece, motion);
@@ -176,7 +169,7 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
         if is_fresh {
             self.apply_transition();
         }
-        // (a guard after which the same goes on was only touched)
+        // a guard only grazed zero if the mode goes on
         self.fallen = None;
         self.last = Some((piece.mode, lean));
         if self.stand != TangentStatus::Lost {
@@ -188,12 +181,8 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
         loop {
             let TangentBlocks { system, seeds, .. } = self.blocks;
             let span = if self.stand != TangentStatus::Lost && !self.blocks.all.is_empty() {
-                let span = self.blocks.propagate_stretch(
-                    &course,
-                    piece.start_s,
-                    [from, end],
-                    is_fresh && from == 0.0,
-                );
+                let fresh = is_fresh && from == 0.0;
+                let span = self.blocks.propagate_stretch(&course, piece.start_s, [from, end], fresh);
                 if !self.blocks.are_finite() {
                     self.stand = TangentStatus::Lost;
                 }
@@ -229,21 +218,19 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
         let course = SeriesReference { linkage: &system.linkage, touch, lean, motion };
         let span = TangentStretch::new(system, &seeds.sources, course, place);
         let x = place.from + place.length;
-        let fall = saltation::FallingGuard { mode: contact.0, guard, x, span: &span };
+        let fall = FallingGuard { mode: contact.0, guard, x, span: &span };
         let rate = fall.guard_slope().filter(|slope| slope.rate.abs() > self.grazing * slope.size);
         if self.stand != TangentStatus::Lost {
             fall.set_guard_derivatives(&mut self.blocks);
         }
-        self.fallen = Some(TriggeredGuard {
-            rate: rate.map(|slope| slope.rate),
-            rates: rates_after(motion, contact.0, x),
-        });
+        let rates = rates_after(motion, contact.0, x);
+        self.fallen = Some(TriggeredGuard { rate: rate.map(|slope| slope.rate), rates });
     }
 
     fn watch_strike(&mut self, strike: &TipStrike) {
         let is_fall = self.fallen.is_some();
         self.apply_transition();
-        // (a tip jams where its force has a pole, or where a run begins: neither has a guard)
+        // a tip jams at a pole of its force or at the start of a run, both without a guard
         if !is_fall || strike.origin == ImpactOrigin::Jam || self.stand == TangentStatus::Lost {
             self.stand = TangentStatus::Lost;
             return;
@@ -262,7 +249,7 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
 
     fn watch_transition(&mut self, transition: &Transition) {
         if self.fallen.is_none() && self.stand == TangentStatus::Current {
-            self.stand = TangentStatus::Lost; // a transition without a guard: the tip jams
+            self.stand = TangentStatus::Lost; // only a jam is a transition without a guard
         }
         self.apply_transition();
         for (time, &(block, lane)) in self.d_time_s.iter_mut().zip(&self.blocks.seeds.places) {
@@ -281,7 +268,7 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
 
 #[cfg(test)]
 impl TangentWorkspace {
-    /// A room as a run whose derivatives are lost may leave it.
+    /// A workspace as after a run with lost derivatives.
     pub(super) fn of_no_numbers(blocks: usize) -> Self {
         let blocks = std::iter::repeat_with(TangentBlock::of_no_numbers).take(blocks).collect();
         Self { blocks, works: StretchWorkspace::of_no_numbers() }

@@ -1,4 +1,4 @@
-//! How guards and impacts change with the state before them.
+//! Derivatives of guards, and of impacts by the state before them.
 
 use super::seeds::BlockSeed;
 use super::stretch::{SeriesReference, TangentStretch};
@@ -17,28 +17,28 @@ use crate::simulate::phases::{
     TIP_STOPS,
 };
 
-/// A guard that falls at the end of a stretch.
+/// A guard that falls to zero at the end of a stretch.
 pub(super) struct FallingGuard<'a> {
     pub mode: TipMode,
     pub guard: usize,
-    /// Time of its fall, s after the start of the motion's series.
+    /// Time of its zero, s after the start of the motion's series.
     pub x: f64,
     pub span: &'a TangentStretch<'a>,
 }
 
-/// How a guard falls.
+/// Slope of a guard at its zero.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct GuardSlope {
     pub rate: f64,
-    /// What the rate's terms are in size: a rate far below is that of a guard that grazes zero.
+    /// Sum of the absolute terms of the rate; a far smaller rate means that the guard grazes zero.
     pub size: f64,
 }
 
-/// A quantity of which a guard consists, with its factor.
+/// A term of a guard: quantity and factor.
 type GuardTerm = (Channel, f64);
 
 impl FallingGuard<'_> {
-    /// The guard as a sum; empty for one that has no derivative here.
+    /// Terms of the guard; none for a guard without derivative.
     fn guard_terms(&self) -> [Option<GuardTerm>; 2] {
         let TangentStretch { system, course, .. } = self.span;
         let limit = Some((Channel::NormalForce, system.linkage.friction.static_coefficient()));
@@ -58,7 +58,7 @@ impl FallingGuard<'_> {
         }
     }
 
-    /// Rate of the guard; `None` for one that has no derivative.
+    /// Rate of the guard; `None` for a guard without derivative.
     pub(crate) fn guard_slope(&self) -> Option<GuardSlope> {
         let (terms, motion) = (self.guard_terms(), self.span.course.motion);
         terms[0]?;
@@ -82,7 +82,7 @@ impl FallingGuard<'_> {
         Some(slope)
     }
 
-    /// Sets the derivatives of the guard in all directions.
+    /// Sets the derivatives of the guard by all directions.
     pub(crate) fn set_guard_derivatives(&self, blocks: &mut TangentBlocks<'_>) {
         let SeriesReference { motion, lean, .. } = self.span.course;
         let weights = ChannelWeights::at_time(self.x, motion.order);
@@ -99,7 +99,7 @@ impl FallingGuard<'_> {
             }
             let Some(own) = &seed.linkage else { continue };
             match terms[0] {
-                // the corners lie at the contact angle, whose sign in both is that of the free neck's guards
+                // off the shoulder both guards contain plus the contact angle, on it minus
                 Some((Channel::NeckAngle, _)) if lean == ShoulderContact::Off => {
                     block.guard += own.contact_angle_rad
                 }
@@ -113,7 +113,7 @@ impl FallingGuard<'_> {
     }
 }
 
-/// The state at a strike.
+/// Derivatives of a strike.
 pub(super) struct StrikeTangent<'a> {
     pub system: &'a DrivenBlade,
     pub head: HeadMotion,
@@ -121,8 +121,8 @@ pub(super) struct StrikeTangent<'a> {
 }
 
 impl StrikeTangent<'_> {
-    /// Derivatives of the state behind an impact from those before it, at the instant that moves with the
-    /// strike; `d_velocity` are those of the head's velocity there. `None` where they do not exist.
+    /// Derivatives of the state after an impact from those before it, at the varied time of the strike.
+    /// `d_velocity` are those of the head's velocity there, m/s. `None` if they do not exist.
     pub(super) fn state_after(
         &self,
         seed: &BlockSeed,
@@ -144,11 +144,11 @@ impl StrikeTangent<'_> {
         d_velocity: f64,
         lane: usize,
     ) -> Option<[f64; 3]> {
-        /// Tolerance of the impacts that are compared: far below what the differences show.
+        /// Tolerance of the compared impacts: far below their differences.
         const TOLERANCE: f64 = 1e-14;
         let TipStrike { pose, restitution, .. } = self.strike;
         let d = [before.angle[0], before.angle[1], before.rate[0], before.rate[1]].map(|row| row[lane]);
-        // (a train of rebounds that is closed has none)
+        // a closed train of rebounds has no restitution
         let d_restitution = if restitution == 0.0 { 0.0 } else { seed.restitution[lane] };
         let d_normal = before.gap_rate[lane];
         let relative =
@@ -157,34 +157,31 @@ impl StrikeTangent<'_> {
             return Some([d[2], d[3], 0.0]);
         }
         central_difference(DIFFERENCE_STEP / relative, |x| {
-            let linkage: Linkage = seed
-                .linkage
-                .as_ref()
-                .map_or(self.system.linkage, |own| own.displace_linkage(&self.system.linkage, lane, x));
+            let (own, linkage) = (seed.linkage.as_ref(), self.system.linkage);
+            let linkage = own.map_or(linkage, |own| own.displace_linkage(&linkage, lane, x));
             let pose = Pose {
                 theta: pose.theta + x * d[0],
                 phi: pose.phi + x * d[1],
                 theta_rate: pose.theta_rate + x * d[2],
                 phi_rate: pose.phi_rate + x * d[3],
             };
-            let head =
-                HeadMotion { velocity_m_per_s: self.head.velocity_m_per_s + x * d_velocity, ..self.head };
+            let velocity_m_per_s = self.head.velocity_m_per_s + x * d_velocity;
+            let (d, head) = (LinkDirections::from_pose(&pose), HeadMotion { velocity_m_per_s, ..self.head });
             let mut strike = TipStrike { pose, restitution: restitution + x * d_restitution, ..self.strike };
             strike.before.normal += x * d_normal;
-            strike.before.tangential =
-                linkage.tip_velocity_m_per_s(&pose, &LinkDirections::from_pose(&pose), &head);
+            strike.before.tangential = linkage.tip_velocity_m_per_s(&pose, &d, &head);
             let (after, _) = strike.solve_on_blade(&linkage, TOLERANCE, &mut WorkCounters::default())?;
             Some([after.pose.theta_rate, after.pose.phi_rate, after.gap_rate_m_per_s])
         })
     }
 
-    /// Largest change of what decides an impact, relative to its scale, over the unit of the direction.
+    /// Largest relative change of the inputs of an impact per unit of the direction.
     fn relative_change(&self, d: [f64; 4], d_normal: f64, d_velocity: f64) -> f64 {
         let TipStrike { before, .. } = self.strike;
         let Linkage { l1_m: l1, l2_m: l2, friction, .. } = self.system.linkage;
         let speed = before.normal.abs().max(before.tangential.abs());
         let along = l1 * d[2].abs() + l2 * d[3].abs() + d_velocity.abs();
-        // speeds change friction on the scale of its decay
+        // friction varies on the scale of its decay with speed
         let scale = if friction.b_s_per_m > 0.0 { speed.min(1.0 / friction.b_s_per_m) } else { speed };
         let normal = if d_normal == 0.0 { 0.0 } else { (d_normal / before.normal).abs() };
         d[0].abs().max(d[1].abs()).max(along / scale).max(normal)

@@ -1,4 +1,4 @@
-//! What each direction changes directly: constants, the head's motion, the state at the start.
+//! Direct changes by each direction: constants of the linkage, motion of the head, initial state.
 
 use super::source::TangentSource;
 use super::{DIFFERENCE_STEP, SIX_POINTS, central_difference};
@@ -11,8 +11,7 @@ use crate::simulate::phases::DrivenBlade;
 use crate::simulate::scene::{Scene, SceneError};
 use nalgebra::{Matrix2, Vector2};
 
-/// How the head's motion `x(t)` changes, `dx = scale x + (stretch t - delay) x'`, and its velocity
-/// accordingly.
+/// Change of the head's motion `x(t)`: `dx = scale x + (stretch t - delay) x'`.
 #[derive(Debug, Clone, Default)]
 pub(super) struct DriveTangent {
     pub scale: LaneVector,
@@ -20,49 +19,49 @@ pub(super) struct DriveTangent {
     pub stretch: LaneVector,
 }
 
-/// A few directions that are carried side by side.
+/// Directions that share a block of lanes.
 #[derive(Debug, Clone, Default)]
 pub(super) struct BlockSeed {
-    /// What the directions change, one by one.
+    /// Sources of the directions with their factors.
     pub changes: Vec<SourceFactor>,
-    /// Of the linkage's constants, where any changes.
+    /// Derivatives of the linkage's constants, if any changes.
     pub linkage: Option<Box<LinkageTangent>>,
-    /// Of the head's motion, where it changes.
+    /// Derivatives of the head's motion, if it changes.
     pub drive: Option<DriveTangent>,
-    /// Of the state at the start.
+    /// Derivatives of the initial state.
     pub start: StateTangent,
-    /// Of the coefficient of restitution.
+    /// Derivatives of the coefficient of restitution.
     pub restitution: LaneVector,
-    /// Relative change of what changes, over the unit of the direction: 0 where no constant does.
+    /// Relative change of the parameter per unit of the direction; 0 if no constant changes.
     pub relative: LaneVector,
 }
 
-/// How much of a source a direction is made of.
+/// Share of a source in a direction.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SourceFactor {
-    /// Place in the list of the seeds' sources.
+    /// Index in [`TangentSeeds::sources`].
     pub source: usize,
     pub lane: usize,
     pub factor: f64,
 }
 
-/// A list of directions, resolved for a scene.
+/// Directions of derivatives, resolved for a scene.
 #[derive(Debug, Clone)]
 pub struct TangentSeeds {
     pub(super) blocks: Vec<BlockSeed>,
     /// Block and lane of each direction.
     pub(super) places: Vec<(usize, usize)>,
-    /// All that any direction changes.
+    /// Sources of all directions.
     pub(super) sources: Vec<TangentSource>,
 }
 
 impl TangentSeeds {
-    /// Resolves directions for a scene; any number of them, four cost as much as one.
+    /// Resolves directions for a scene. Four directions cost as much as one.
     ///
     /// # Errors
-    /// [`SceneError::Key`] for a parameter that is unknown or that the scene does not have.
+    /// [`SceneError::Key`] for an unknown parameter or one of an absent part.
     pub fn new(scene: &Scene, directions: &[TangentDirection]) -> Result<Self, SceneError> {
-        // directions of the same kind lie side by side: a block in which no constant changes costs less
+        // a block without changes of constants costs less, so directions are sorted by kind
         let mut order: Vec<usize> = (0..directions.len()).collect();
         order.sort_by_key(|&i| direction_group(&directions[i]));
         let mut seeds = Self {
@@ -111,7 +110,7 @@ impl TangentSeeds {
     }
 }
 
-/// What stands side by side: parameters of the blade, those of the drive, states.
+/// Kind of a direction: parameter of the blade, of the drive, or initial state.
 fn direction_group(direction: &TangentDirection) -> u8 {
     match direction {
         TangentDirection::Parameter(name) if !name.starts_with("drive.") => 0,
@@ -136,15 +135,14 @@ impl BlockSeed {
         self.drive.get_or_insert_default()
     }
 
-    /// Lists what the directions are made of; `sources` are those known so far.
+    /// Lists the sources of the directions and adds new ones to `sources`.
     fn list_changes(&mut self, sources: &mut Vec<TangentSource>) {
         let Self { changes, linkage, drive, .. } = self;
         for lane in 0..LANES {
             let constants = linkage.iter().flat_map(|linkage| linkage.nonzero_changes(lane));
             let head = drive.iter().flat_map(|drive| drive.list_changes(lane));
-            let all =
-                constants.map(|(constant, factor)| (TangentSource::Constant(constant), factor)).chain(head);
-            for (source, factor) in all {
+            let constants = constants.map(|(constant, factor)| (TangentSource::Constant(constant), factor));
+            for (source, factor) in constants.chain(head) {
                 let place = sources.iter().position(|known| *known == source).unwrap_or_else(|| {
                     sources.push(source);
                     sources.len() - 1
@@ -159,7 +157,7 @@ impl BlockSeed {
         match parameter.quantity {
             ParameterQuantity::DriveAmplitude => self.drive_mut().scale[lane] = 1.0 / value,
             ParameterQuantity::DriveFrequency => {
-                // (the cosine is stretched about its own start)
+                // the cosine stretches about its own start
                 self.drive_mut().stretch[lane] = 1.0 / value;
                 self.drive_mut().delay[lane] = scene.drive.delay_s() / value;
             }
@@ -177,23 +175,21 @@ impl BlockSeed {
     }
 }
 
-/// The scale of a parameter that is zero: what others of its kind are.
+/// Scale of a parameter that is zero, from others of its kind.
 fn scale_at_zero(parameter: &ModelParameter, linkage: &Linkage) -> f64 {
     match parameter.unit {
         "m" => linkage.l1_m.min(linkage.l2_m),
         "kg" => linkage.m_phi / (linkage.l2_m * linkage.l2_m),
         "kg m2" => linkage.m_phi.min(linkage.m_theta),
-        _ => 1.0, // the others enter linearly
+        _ => 1.0, // other parameters enter linearly
     }
 }
 
-// What a derivative is taken by.
-
-/// What a derivative is taken by.
+/// Direction of a derivative.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum TangentDirection {
-    /// A parameter of the scene by its name; quantities that the scene writes by others (a stiffness by a
-    /// natural frequency) follow them.
+    /// A parameter of the scene by name. Quantities that the scene derives from it (a stiffness from a natural
+    /// frequency) follow.
     Parameter(String),
     /// Angle of the neck at the start, rad.
     NeckAngle,
@@ -203,13 +199,13 @@ pub enum TangentDirection {
     NeckRate,
     /// Angular rate of the lip at the start, rad/s.
     LipRate,
-    /// A factor on the head's motion, 1 at the scene's own.
+    /// Factor on the head's motion, 1 in the scene.
     DriveScale,
-    /// A delay of the head's motion, s, 0 at the scene's own.
+    /// Delay of the head's motion, s, 0 in the scene.
     DriveDelay,
 }
 
-/// Names of the directions that are no parameters, with their units.
+/// Names and units of the directions other than parameters.
 const NAMED_DIRECTIONS: [(TangentDirection, &str, &str); 6] = [
     (TangentDirection::NeckAngle, "start.neck_angle_rad", "rad"),
     (TangentDirection::LipAngle, "start.lip_angle_rad", "rad"),
@@ -220,22 +216,22 @@ const NAMED_DIRECTIONS: [(TangentDirection, &str, &str); 6] = [
 ];
 
 impl TangentDirection {
-    /// The direction of a name: one of [`Self::other_names`], otherwise a parameter.
+    /// Direction with a name of [`Self::other_names`], otherwise the parameter of that name.
     pub(crate) fn from_name(name: &str) -> Self {
         let other = NAMED_DIRECTIONS.iter().find(|(_, other, _)| *other == name);
         other.map_or_else(|| Self::Parameter(name.to_owned()), |(direction, ..)| direction.clone())
     }
 
-    /// Names of the directions that are no parameters.
+    /// Names of the directions other than parameters.
     pub(crate) fn other_names() -> impl Iterator<Item = &'static str> {
         NAMED_DIRECTIONS.iter().map(|(_, name, _)| *name)
     }
 }
 
-// How the equilibrium of steady slip moves with the parameters.
+// Derivatives of steady slip.
 
-/// Derivatives of both angles of steady slip: `J d q + dR = 0` for the moments `R(q, p)`; `None` where the
-/// equilibrium turns back.
+/// Derivatives of both angles of steady slip from `J dq + dR = 0` with the moments `R(q, p)`; `None` at a fold of
+/// the equilibrium.
 ///
 /// `d_speed` are the derivatives of the head's velocity, m/s.
 pub(super) fn steady_slip_tangent(
@@ -260,8 +256,8 @@ pub(super) fn steady_slip_tangent(
     let mut moved = [LaneVector::ZERO; 2];
     for lane in 0..LANES {
         let at = |x: f64| {
-            let linkage =
-                seed.linkage.as_ref().map_or(*linkage, |own| own.displace_linkage(linkage, lane, x));
+            let own = seed.linkage.as_ref();
+            let linkage = own.map_or(*linkage, |own| own.displace_linkage(linkage, lane, x));
             Some(residual_moments(&linkage, mu(&linkage, speed + x * d_speed[lane]), &angles, lean).into())
         };
         let step = DIFFERENCE_STEP / seed.relative[lane].max((d_speed[lane] / speed).abs());
@@ -279,8 +275,7 @@ mod tests {
     use super::*;
     use crate::model::tangent::LinkageConstant;
 
-    /// A difference quotient leaves rounding in constants that stay, and each would cost as much as one that
-    /// moves.
+    /// Rounding of a difference quotient must not count as a change of a constant, because each change costs time.
     #[test]
     fn a_parameter_changes_only_the_constants_that_it_enters() {
         let text = include_str!("../../../data/scenes/actual-blade.toml");

@@ -1,4 +1,4 @@
-//! What the directions change: constants of the linkage and the head's motion.
+//! Sources of the directions: constants of the linkage and motions of the head.
 
 use super::stretch::SeriesReference;
 use crate::model::tangent::{
@@ -6,31 +6,30 @@ use crate::model::tangent::{
 };
 use crate::simulate::drive::Drive;
 
-/// A change that directions are made of.
+/// An elementary change; directions are sums of these.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum TangentSource {
     Constant(LinkageConstant),
-    /// The head's motion `x(t)` changes by `x`, by `-x'` or by `t x'`.
+    /// Changes of the head's motion `x(t)` by `x`, `-x'` and `t x'`.
     HeadScale,
     HeadDelay,
     HeadStretch,
 }
 
-/// Number of sources at most: the linkage's constants, and the head's.
+/// Most sources: the constants of the linkage and the changes of the head's motion.
 pub(super) const MOST_SOURCES: usize = 24;
 
-/// The head's motion about the start of a piece.
+/// Taylor polynomial of the head's motion about the start of a piece.
 #[derive(Debug, Clone)]
 pub(super) struct HeadPolynomial<'a> {
     start_s: f64,
     position_m: f64,
-    /// Taylor coefficients of the velocity, m/s, up to the last that is not zero: between its knots a
-    /// recorded head is a short polynomial.
+    /// Coefficients of the velocity, m/s^(k+1), up to the last nonzero one: a recorded head has few.
     velocity: &'a [f64],
 }
 
 impl<'a> HeadPolynomial<'a> {
-    /// What the sources need of it; `None` where they leave the head alone.
+    /// The polynomial for these sources; `None` if they do not move the head.
     pub(crate) fn from_drive(
         sources: &[TangentSource],
         drive: &Drive,
@@ -44,7 +43,7 @@ impl<'a> HeadPolynomial<'a> {
         Some(Self { start_s, position_m, velocity: &velocity[..used] })
     }
 
-    /// The head's place, m.
+    /// Position of the head, m.
     fn position(&self, x: LaneVector) -> LaneVector {
         let mut sum = LaneVector::ZERO;
         for (k, v) in self.velocity.iter().enumerate().rev() {
@@ -70,14 +69,10 @@ impl<'a> HeadPolynomial<'a> {
         sums
     }
 
-    /// How the head's place moves with a source, m.
+    /// Change of the head's position by a source, m.
     pub(crate) fn position_change(&self, source: TangentSource, x: LaneVector) -> LaneVector {
-        let velocity = || {
-            self.velocity
-                .iter()
-                .rev()
-                .fold(LaneVector::ZERO, |sum, &coefficient| sum * x + LaneVector::splat(coefficient))
-        };
+        let coefficients = self.velocity.iter().rev();
+        let velocity = || coefficients.fold(LaneVector::ZERO, |sum, &c| sum * x + LaneVector::splat(c));
         match source {
             TangentSource::Constant(_) => LaneVector::ZERO,
             TangentSource::HeadScale => self.position(x),
@@ -86,7 +81,7 @@ impl<'a> HeadPolynomial<'a> {
         }
     }
 
-    /// The same with two derivatives in time.
+    /// Change of the head's position, velocity and acceleration by a source; `None` for a constant.
     fn motion_change(&self, source: TangentSource, x: LaneVector) -> Option<HeadMotionChange> {
         if let TangentSource::Constant(_) = source {
             return None;
@@ -101,7 +96,7 @@ impl<'a> HeadPolynomial<'a> {
 }
 
 impl TangentSource {
-    /// Whether it matters in this course.
+    /// Whether the source affects this motion.
     pub(crate) fn affects_motion(self, course: &SeriesReference<'_>) -> bool {
         match self {
             Self::Constant(constant) => course.depends_on(constant),
@@ -109,7 +104,7 @@ impl TangentSource {
         }
     }
 
-    /// Whether it moves head or tip where the angles stay.
+    /// Whether the source moves head or tip at fixed angles.
     pub(crate) fn displaces_points(self, course: &SeriesReference<'_>) -> bool {
         match self {
             Self::Constant(constant) => course.displaces_points(constant),
@@ -117,7 +112,7 @@ impl TangentSource {
         }
     }
 
-    /// All that a unit of it does.
+    /// Forcing of the tangent equations by a unit of the source.
     #[inline(always)]
     pub(crate) fn forcing_terms(
         self,
@@ -133,7 +128,7 @@ impl TangentSource {
         }
     }
 
-    /// Where a unit of it moves head and tip.
+    /// Displacement of head and tip by a unit of the source.
     pub(crate) fn displacement_terms(
         self,
         course: &SeriesReference<'_>,

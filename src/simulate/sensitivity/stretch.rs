@@ -1,21 +1,20 @@
-//! A stretch of a piece over which derivatives are collocated, and how long it may be.
+//! Stretches of a piece over which derivatives are collocated, and their length.
 
 use super::source::{HeadPolynomial, TangentSource};
 use crate::math;
 use crate::model::series::ContactMode;
 use crate::model::shoulder::ShoulderContact;
-use crate::model::tangent;
-use crate::model::tangent::LaneVector;
+use crate::model::tangent::{self, LaneVector};
 use crate::ode::collocation::{
     CollocationRule, LEAST_NODES, LaneNumber, MOST_NODES, SquareMatrix, collocation_rule, invert_square,
     multiply_row,
 };
 use crate::simulate::phases::DrivenBlade;
 
-/// Number of coefficients of a motion's series.
+/// Number of coefficients of the series of a motion.
 pub(super) const SERIES_TERMS: usize = crate::ode::polynomial::TERMS + 2;
 
-/// The motion that is varied.
+/// The motion whose derivatives are computed.
 pub(super) type SeriesReference<'a> = tangent::ReferenceMotion<'a, SERIES_TERMS>;
 
 impl LaneNumber for LaneVector {
@@ -30,15 +29,15 @@ impl LaneNumber for LaneVector {
     }
 }
 
-/// Where a stretch lies in the motion of its piece.
+/// Position and collocation rule of a stretch.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct StretchPlace {
-    /// How the tip touches the glass, and on which side the neck leans.
+    /// Mode of contact and side of the shoulder.
     pub touch: ContactMode,
     pub lean: ShoulderContact,
-    /// Start of the motion's series, s.
+    /// Start of the piece's series, s.
     pub start_s: f64,
-    /// Start of the stretch after it, s, and its length, s.
+    /// Start of the stretch relative to it, s, and its length, s.
     pub from: f64,
     pub length: f64,
     pub rule: &'static CollocationRule,
@@ -47,7 +46,7 @@ pub(super) struct StretchPlace {
 }
 
 impl StretchPlace {
-    /// A piece as one stretch, without derivatives.
+    /// A whole piece, without derivatives.
     pub(crate) fn whole_segment(
         touch: ContactMode,
         lean: ShoulderContact,
@@ -58,7 +57,7 @@ impl StretchPlace {
     }
 }
 
-/// A stretch and what moves along it.
+/// A stretch with its motion and the sources of derivatives.
 pub(super) struct TangentStretch<'a> {
     pub system: &'a DrivenBlade,
     pub course: SeriesReference<'a>,
@@ -87,7 +86,7 @@ impl<'a> TangentStretch<'a> {
         }
     }
 
-    /// Times of nodes four by four, s after the start of the motion.
+    /// Times of the nodes in groups of four, s after the start of the motion.
     pub(crate) fn node_chunks(&self) -> impl Iterator<Item = LaneVector> {
         let StretchPlace { from, length, rule, .. } = self.place;
         let chunks = rule.positions.as_chunks().0;
@@ -97,20 +96,20 @@ impl<'a> TangentStretch<'a> {
     }
 }
 
-/// How many nodes a stretch takes.
+/// Plans length and nodes of stretches.
 #[derive(Debug, Clone)]
 pub(super) struct StretchPlanner {
-    /// Radians, or decays, of the fastest derivative that each number of nodes resolves.
+    /// Phase or decay of the fastest derivative that each number of nodes resolves, rad.
     limits: [f64; MOST_NODES + 1],
-    /// Rates that were found last in stick, slip and flight off the shoulder, and on it, 1/s.
+    /// Last rates in stick, slip and flight off the shoulder, then on it, 1/s.
     rapid: [f64; 6],
 }
 
 impl StretchPlanner {
-    /// At this tolerance, relative; `fastest` is a first guess of the fastest rate, 1/s.
+    /// A planner for this relative tolerance; `fastest` is a first guess of the fastest rate, 1/s.
     ///
-    /// Within a step of `z` radians `s` nodes leave of a sine `z^(s + 2) s! / (4 s^2 (2 s)!)`: the first
-    /// Legendre polynomial that is missing in its second derivative, integrated twice.
+    /// For a sine over `z` radians, `s` nodes err by `z^(s + 2) s! / (4 s^2 (2 s)!)`: the first Legendre
+    /// polynomial missing in its second derivative, integrated twice.
     pub(crate) fn new(relative: f64, fastest: f64) -> Self {
         let mut limits = [0.0; MOST_NODES + 1];
         let mut ratio = 1.0; // (2 s)! / s!
@@ -121,15 +120,15 @@ impl StretchPlanner {
         Self { limits, rapid: [fastest; 6] }
     }
 
-    /// Nodes and length of the next stretch, at most `rest`.
+    /// Rule and length of the next stretch, s, at most `rest`.
     pub(crate) fn plan_stretch(
         &self,
         course: &SeriesReference<'_>,
         rest: f64,
     ) -> (&'static CollocationRule, f64) {
-        /// Parts of a step at most: numbers that are none make no end.
+        /// Most stretches of a step, also for rates that are not finite.
         const MOST_PARTS: f64 = 1e3;
-        /// Share by which the rate may have risen since.
+        /// Factor on the last rate, which may have risen.
         const MARGIN: f64 = 1.1;
         let rapid = MARGIN * self.rapid[rate_index(course)];
         let parts = (rapid * rest / self.limits[MOST_NODES]).ceil().clamp(1.0, MOST_PARTS);
@@ -139,7 +138,7 @@ impl StretchPlanner {
         (collocation_rule(nodes), length)
     }
 
-    /// Learns the rate that was found on a stretch; whether its nodes resolve it.
+    /// Records the rate of a stretch; returns whether its nodes resolve it.
     pub(crate) fn record_rate(
         &mut self,
         course: &SeriesReference<'_>,
@@ -155,7 +154,7 @@ impl StretchPlanner {
     }
 }
 
-/// Place of a course among the rates.
+/// Index of a motion in [`StretchPlanner::rapid`].
 fn rate_index(course: &SeriesReference<'_>) -> usize {
     let touch = match course.touch {
         ContactMode::Stick => 0,
@@ -165,8 +164,8 @@ fn rate_index(course: &SeriesReference<'_>) -> usize {
     touch + if course.lean == ShoulderContact::Off { 0 } else { 3 }
 }
 
-/// A bound of the rates of `m y'' + d y' + k y = 0`, 1/s: the root of `x^2 = x |m^-1 d| + |m^-1 k|` with the
-/// sizes of the matrices' eigenvalues.
+/// Bound of the rates of `m y'' + d y' + k y = 0`, 1/s: the root of `x^2 = x |m^-1 d| + |m^-1 k|`, with the largest
+/// eigenvalues in size as norms.
 pub(super) fn bound_rate<const D: usize>(
     mass: &SquareMatrix<D>,
     damping: &SquareMatrix<D>,
@@ -179,7 +178,7 @@ pub(super) fn bound_rate<const D: usize>(
         if D == 1 {
             return columns[0][0].abs();
         }
-        // (the gap in flight is slower than the links)
+        // the gap in flight is slower than the links
         let half = 0.5 * (columns[0][0] + columns[1][1]);
         let determinant = columns[0][0] * columns[1][1] - columns[1][0] * columns[0][1];
         half.abs() + (half * half - determinant).abs().sqrt()
