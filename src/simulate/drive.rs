@@ -157,7 +157,7 @@ pub enum HeadMotionError {
 
 /// A smooth curve through the tracked positions of the head, `x`.
 ///
-/// [`HeadSpline::multiply_covariance`] gives its uncertainty, which grows within [`UNCERTAIN_END_S`] of the ends.
+/// Its uncertainty grows towards the first and the last frame.
 ///
 /// # Errors
 /// [`HeadMotionError`] if too few frames show the head.

@@ -4,6 +4,9 @@ use crate::model::shoulder::ShoulderContact;
 use crate::model::{HeadMotion, LinkDirections, Linkage, Pose};
 use nalgebra::{Matrix2, Vector2};
 
+/// Angles of neck and lip, rad, or moments on them, N m.
+type Pair = Vector2<f64>;
+
 /// Steps in which friction rises from zero to its value, so that each Newton iteration starts near its solution.
 const LOAD_STEPS: u32 = 64;
 const MOST_ITERATIONS: u32 = 50;
@@ -61,7 +64,7 @@ pub(crate) fn static_deflections(linkage: &Linkage) -> Vec<(f64, f64)> {
     all
 }
 
-fn pose_at_rest(angles: &Vector2<f64>) -> Pose {
+fn pose_at_rest(angles: &Pair) -> Pose {
     Pose { theta: angles[0], phi: angles[1], theta_rate: 0.0, phi_rate: 0.0 }
 }
 
@@ -72,7 +75,7 @@ pub(super) fn shoulder_contact(linkage: &Linkage, theta: f64) -> ShoulderContact
 
 /// The equilibrium at one load. The side of the shoulder is fixed in each iteration, because Newton's steps could
 /// cycle across the kink at its corner.
-fn solve_for_load(linkage: &Linkage, mu: f64, angles: Vector2<f64>) -> Option<Vector2<f64>> {
+fn solve_for_load(linkage: &Linkage, mu: f64, angles: Pair) -> Option<Pair> {
     let here = shoulder_contact(linkage, angles[0]);
     let sides = [here, ShoulderContact::Off, ShoulderContact::Forward, ShoulderContact::Backward];
     sides.into_iter().find_map(|side| {
@@ -80,12 +83,7 @@ fn solve_for_load(linkage: &Linkage, mu: f64, angles: Vector2<f64>) -> Option<Ve
     })
 }
 
-fn solve_newton(
-    linkage: &Linkage,
-    mu: f64,
-    mut angles: Vector2<f64>,
-    side: ShoulderContact,
-) -> Option<Vector2<f64>> {
+fn solve_newton(linkage: &Linkage, mu: f64, mut angles: Pair, side: ShoulderContact) -> Option<Pair> {
     let scale = linkage.neck.stiffness + linkage.lip.stiffness;
     for _ in 0..MOST_ITERATIONS {
         let residual = residual_moments(linkage, mu, &angles, side);
@@ -106,12 +104,7 @@ fn solve_newton(
 
 /// Residual moments of springs, normal force and friction on neck and lip at rest, N m: equations (1) and (2) of
 /// [`crate::model`] without rates.
-pub(super) fn residual_moments(
-    linkage: &Linkage,
-    mu: f64,
-    angles: &Vector2<f64>,
-    side: ShoulderContact,
-) -> Vector2<f64> {
+pub(super) fn residual_moments(linkage: &Linkage, mu: f64, angles: &Pair, side: ShoulderContact) -> Pair {
     let pose = pose_at_rest(angles);
     let d = LinkDirections::from_pose(&pose);
     let normal = linkage.head.stiffness * (linkage.preload_displacement_m - linkage.head_drop_m(&d));
@@ -129,7 +122,7 @@ pub(super) fn residual_moments(
     )
 }
 
-fn moment_jacobian(linkage: &Linkage, mu: f64, angles: &Vector2<f64>, side: ShoulderContact) -> Matrix2<f64> {
+fn moment_jacobian(linkage: &Linkage, mu: f64, angles: &Pair, side: ShoulderContact) -> Matrix2<f64> {
     /// Step of the central difference, rad: the cube root of machine precision.
     const STEP: f64 = 6e-6;
     let column = |i: usize| {

@@ -95,19 +95,15 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
     pub(super) fn run(&mut self) -> RunResult {
         let Some(pose) = initial_pose(self.scene) else { return self.finish_run(RunStatus::Diverged) };
         self.lean = shoulder_contact(&self.system.linkage, pose.theta);
-        let (stop, mut next) = (self.scene.run.stop_s, self.first_phase(&pose));
+        let mut next = self.first_phase(&pose);
         loop {
             next = match next {
                 NextPhase::End(status) => return self.finish_run(status),
                 _ if self.work.is_spent() => NextPhase::End(RunStatus::WorkLimit),
                 _ if self.recent.is_chattering(self.t) => NextPhase::End(RunStatus::Chattering),
-                NextPhase::Flight(state, zero_order) => self.integrate_flight(&state, zero_order, stop),
-                NextPhase::Phase(TipMode::Stick, pose, zero_order) => {
-                    self.integrate_stick(&pose, zero_order, stop)
-                }
-                NextPhase::Phase(mode, pose, zero_order) => {
-                    self.integrate_slip(mode, &pose, zero_order, stop)
-                }
+                NextPhase::Flight(state, zero_order) => self.integrate_flight(&state, zero_order),
+                NextPhase::Phase(TipMode::Stick, pose, zero_order) => self.integrate_stick(&pose, zero_order),
+                NextPhase::Phase(mode, pose, zero_order) => self.integrate_slip(mode, &pose, zero_order),
             };
         }
     }
@@ -198,13 +194,13 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         self.watch.watch_transition(&Transition { time_s: self.t, from, to, cause });
     }
 
-    fn integrate_stick(&mut self, pose: &Pose, zero_order: [u8; GUARDS], stop: f64) -> NextPhase {
+    fn integrate_stick(&mut self, pose: &Pose, zero_order: [u8; GUARDS]) -> NextPhase {
         if let IntegrationMethod::FixedStep(scheme) = self.effort.method {
-            return self.integrate_stabilised_stick(&scheme, pose, zero_order, stop);
+            return self.hold_tip(&scheme, pose, zero_order);
         }
         let phase = StickPhase::from_pose(self.system, self.t, pose, self.lean);
         let start = PhaseStart { t: self.t, y: phase.free_states(pose), zero_order, step: self.steps[0] };
-        let (watch, drive) = (&mut *self.watch, &self.system.drive);
+        let (watch, drive, stop) = (&mut *self.watch, &self.system.drive, self.scene.run.stop_s);
         let end = integrate_phase(
             &phase,
             start,
@@ -213,13 +209,8 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
             &mut self.rooms.0,
             &mut self.work,
             |step, motion| {
-                watch.watch_segment(&SolutionSegment {
-                    start_s: step.start,
-                    end_s: step.end,
-                    mode: TipMode::Stick,
-                    motion,
-                    solution: SegmentSolution::Stick(&phase, step),
-                });
+                let solution = SegmentSolution::Stick(&phase, step);
+                watch.watch_segment(&SolutionSegment::from_step(step, TipMode::Stick, motion, solution));
                 watch.control_flow()
             },
         );
@@ -232,21 +223,11 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
     }
 
     /// Stick of the fixed-step scheme.
-    fn integrate_stabilised_stick(
-        &mut self,
-        scheme: &FixedStepScheme,
-        pose: &Pose,
-        zero_order: [u8; GUARDS],
-        stop: f64,
-    ) -> NextPhase {
+    fn hold_tip(&mut self, scheme: &FixedStepScheme, pose: &Pose, zero_order: [u8; GUARDS]) -> NextPhase {
         let phase = StabilisedStickPhase::from_pose(self.system, self.t, pose, self.lean, scheme.gain_per_s);
-        let start = PhaseStart {
-            t: self.t,
-            y: [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate],
-            zero_order,
-            step: None,
-        };
-        let watch = &mut *self.watch;
+        let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
+        let start = PhaseStart { t: self.t, y, zero_order, step: None };
+        let (watch, stop) = (&mut *self.watch, self.scene.run.stop_s);
         let end = fixed_step::integrate_fixed(
             &phase,
             start,
@@ -254,13 +235,8 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
             &scheme.integrator_options(),
             &mut self.work,
             |step| {
-                watch.watch_segment(&SolutionSegment {
-                    start_s: step.start,
-                    end_s: step.end,
-                    mode: TipMode::Stick,
-                    motion: None,
-                    solution: SegmentSolution::Held(&phase, step),
-                });
+                let solution = SegmentSolution::Held(&phase, step);
+                watch.watch_segment(&SolutionSegment::from_step(step, TipMode::Stick, None, solution));
                 watch.control_flow()
             },
         );
@@ -307,18 +283,12 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
         next
     }
 
-    fn integrate_slip(
-        &mut self,
-        mode: TipMode,
-        pose: &Pose,
-        zero_order: [u8; GUARDS],
-        stop: f64,
-    ) -> NextPhase {
+    fn integrate_slip(&mut self, mode: TipMode, pose: &Pose, zero_order: [u8; GUARDS]) -> NextPhase {
         let phase = SlipPhase { system: self.system, direction: mode.direction(), lean: self.lean };
         let y = [pose.theta, pose.phi, pose.theta_rate, pose.phi_rate];
         let started = self.t;
         let start = PhaseStart { t: started, y, zero_order, step: self.steps[1] };
-        let (watch, drive) = (&mut *self.watch, &self.system.drive);
+        let (watch, drive, stop) = (&mut *self.watch, &self.system.drive, self.scene.run.stop_s);
         let end = integrate_phase(
             &phase,
             start,
@@ -327,13 +297,8 @@ impl<'a, W: RunWatcher> EventLoop<'a, W> {
             &mut self.rooms.1,
             &mut self.work,
             |step, motion| {
-                watch.watch_segment(&SolutionSegment {
-                    start_s: step.start,
-                    end_s: step.end,
-                    mode,
-                    motion,
-                    solution: SegmentSolution::Slip(&phase, step),
-                });
+                let solution = SegmentSolution::Slip(&phase, step);
+                watch.watch_segment(&SolutionSegment::from_step(step, mode, motion, solution));
                 watch.control_flow()
             },
         );

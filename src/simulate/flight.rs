@@ -1,13 +1,13 @@
 //! Flight as a smooth phase with guards: no contact force acts until the tip lands.
 
-use super::phases::{DrivenBlade, GUARDS, LEVEL_GUARDS, SHOULDER_GUARDS, TaylorMotion};
+use super::phases::{DrivenBlade, GUARDS, GuardedExpansion, LEVEL_GUARDS, SHOULDER_GUARDS, TaylorMotion};
 use crate::math;
 use crate::model::flight::FlightState;
 use crate::model::series::ContactMode;
 use crate::model::shoulder::ShoulderContact;
 use crate::model::{LinkDirections, Pose};
 use crate::ode::HybridPhase;
-use crate::ode::taylor::{TaylorExpansion, TaylorPhase};
+use crate::ode::taylor::TaylorPhase;
 
 /// The gap falls to zero. Guards of shoulder and level are as in contact; the others do not apply.
 pub(crate) const LANDING: usize = 0;
@@ -63,13 +63,7 @@ impl HybridPhase<6, GUARDS> for FlightPhase<'_> {
 impl TaylorPhase<6, GUARDS> for FlightPhase<'_> {
     type Tape = TaylorMotion;
 
-    fn expand_series(
-        &self,
-        t: f64,
-        y: &[f64; 6],
-        motion: &mut TaylorMotion,
-        out: &mut TaylorExpansion<6, GUARDS>,
-    ) {
+    fn expand_series(&self, t: f64, y: &[f64; 6], motion: &mut TaylorMotion, out: &mut GuardedExpansion<6>) {
         let state = flight_state_from(y);
         let directions = LinkDirections::from_pose(&state.pose);
         let (drop, drop_rate) = self.system.linkage.drop_in_flight(&state, &directions);

@@ -208,7 +208,7 @@ impl ScaledImpact {
         let mut zero_order = [0; 3];
         zero_order[RESTS] = u8::from(state.tangential == 0.0);
         zero_order[if restores { REOPENS } else { CLOSES }] = u8::from(state.normal == 0.0);
-        let (mut next, cause) = slide.integrate_to_guard(zero_order, work);
+        let (mut next, cause) = slide.integrate(zero_order, work);
         match cause {
             PhaseEndCause::Guard(RESTS) => next.tangential = 0.0,
             PhaseEndCause::Guard(CLOSES) if restores => next.stage = ImpactStage::Ended,
@@ -223,7 +223,7 @@ impl ScaledImpact {
     /// which depends on how the indicator vanished.
     fn integrate_jam(&self, state: ImpactState, work: &mut WorkCounters) -> Option<ImpactState> {
         let slide = ImpactSlip { blow: self, direction: state.tangential.signum(), from: state, open: true };
-        let (next, cause) = slide.integrate_to_guard([0; 3], work);
+        let (next, cause) = slide.integrate([0; 3], work);
         let (normal, taken) = (next.normal.min(0.0), next.taken.max(0.0));
         let end = ImpactState { tangential: 0.0, normal, taken, ..next };
         (cause == PhaseEndCause::Guard(RESTS)).then_some(end)
@@ -260,11 +260,7 @@ impl ImpactSlip<'_> {
         self.from.normal + grown + cross * tangential
     }
 
-    fn integrate_to_guard(
-        &self,
-        zero_order: [u8; 3],
-        work: &mut WorkCounters,
-    ) -> (ImpactState, PhaseEndCause) {
+    fn integrate(&self, zero_order: [u8; 3], work: &mut WorkCounters) -> (ImpactState, PhaseEndCause) {
         /// Impulse at which slip counts as endless, in units of the impulse that stops the tip alone.
         const MOST: f64 = 1e15;
         /// First trial step in the same unit: slip usually ends within it.

@@ -1,9 +1,10 @@
 //! The motion of a blade: samples, transitions, impacts and extremes of one run.
 
 use crate::model::Linkage;
-use crate::simulate::outputs::{EnergyAudit, Impacts, StickIntervals, Transitions};
+use crate::simulate::outputs::{EnergyAudit, Impacts, StickIntervals, Transitions, forward_to_observers};
 use crate::simulate::scene::Scene;
 use crate::simulate::{Impact, ModelSample, Observer, RunResult, SolutionSegment, Transition, run_scene};
+use std::ops::ControlFlow;
 
 /// Samples of a run: twenty per cycle of 1 kHz over the 0.25 s of a reversal.
 pub(crate) const MOTION_SAMPLES: usize = 6000;
@@ -112,16 +113,7 @@ impl MotionRecorder {
 }
 
 impl Observer for MotionRecorder {
-    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
-        self.states.observe_segment(piece);
-        self.events.observe_segment(piece);
-    }
-    fn observe_transition(&mut self, transition: &Transition) {
-        self.events.observe_transition(transition);
-    }
-    fn observe_impact(&mut self, impact: &Impact) {
-        self.events.observe_impact(impact);
-    }
+    forward_to_observers!(self: self.states, self.events);
 }
 
 /// States at equal steps of time from the start of a scene to its stop.

@@ -93,40 +93,38 @@ impl Observer for LargestTilt {
     }
 }
 
+/// Methods of an [`Observer`] that pass everything on to one or more observers.
+macro_rules! forward_to_observers {
+    ($self:ident: $first:expr $(, $other:expr)?) => {
+        fn observe_segment(&mut $self, piece: &SolutionSegment<'_>) {
+            $first.observe_segment(piece);
+            $($other.observe_segment(piece);)?
+        }
+        fn observe_transition(&mut $self, transition: &Transition) {
+            $first.observe_transition(transition);
+            $($other.observe_transition(transition);)?
+        }
+        fn observe_impact(&mut $self, impact: &Impact) {
+            $first.observe_impact(impact);
+            $($other.observe_impact(impact);)?
+        }
+        fn control_flow(&$self) -> ControlFlow<()> {
+            $first.control_flow()?;
+            $($other.control_flow()?;)?
+            ControlFlow::Continue(())
+        }
+    };
+}
+pub(super) use forward_to_observers;
+
 /// Both observers see the run.
 impl<A: Observer, B: Observer> Observer for (A, B) {
-    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
-        self.0.observe_segment(piece);
-        self.1.observe_segment(piece);
-    }
-    fn observe_transition(&mut self, transition: &Transition) {
-        self.0.observe_transition(transition);
-        self.1.observe_transition(transition);
-    }
-    fn observe_impact(&mut self, impact: &Impact) {
-        self.0.observe_impact(impact);
-        self.1.observe_impact(impact);
-    }
-    fn control_flow(&self) -> ControlFlow<()> {
-        self.0.control_flow()?;
-        self.1.control_flow()
-    }
+    forward_to_observers!(self: self.0, self.1);
 }
 
 /// A borrowed observer.
 impl<A: Observer> Observer for &mut A {
-    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
-        (**self).observe_segment(piece);
-    }
-    fn observe_transition(&mut self, transition: &Transition) {
-        (**self).observe_transition(transition);
-    }
-    fn observe_impact(&mut self, impact: &Impact) {
-        (**self).observe_impact(impact);
-    }
-    fn control_flow(&self) -> ControlFlow<()> {
-        (**self).control_flow()
-    }
+    forward_to_observers!(self: (**self));
 }
 
 /// Extremes and energy balance of a run: drive power = storage + damping + friction work + losses of impacts.

@@ -97,6 +97,8 @@ impl DrivenBlade {
 
 /// Taylor coefficients of the blade's motion, one order more than the states use: forces lose one order.
 pub(crate) type TaylorMotion = MotionSeries<{ TERMS + 2 }>;
+/// Taylor coefficients of `N` states and the guards.
+pub(super) type GuardedExpansion<const N: usize> = TaylorExpansion<N, GUARDS>;
 
 /// Forces on the tip and the angular accelerations that they cause.
 #[derive(Debug, Clone, Copy)]
@@ -180,13 +182,7 @@ impl HybridPhase<4, GUARDS> for SlipPhase<'_> {
 impl TaylorPhase<4, GUARDS> for SlipPhase<'_> {
     type Tape = TaylorMotion;
 
-    fn expand_series(
-        &self,
-        t: f64,
-        y: &[f64; 4],
-        motion: &mut TaylorMotion,
-        out: &mut TaylorExpansion<4, GUARDS>,
-    ) {
+    fn expand_series(&self, t: f64, y: &[f64; 4], motion: &mut TaylorMotion, out: &mut GuardedExpansion<4>) {
         let (pose, touch) = (pose_from_states(y), ContactMode::Slip(self.direction));
         self.system.expand_motion(t, &pose, touch, self.lean, out.order, motion);
         let corners = self.system.corner_signs(self.lean);
@@ -327,13 +323,7 @@ impl HybridPhase<2, GUARDS> for StickPhase<'_> {
 impl TaylorPhase<2, GUARDS> for StickPhase<'_> {
     type Tape = TaylorMotion;
 
-    fn expand_series(
-        &self,
-        t: f64,
-        y: &[f64; 2],
-        motion: &mut TaylorMotion,
-        out: &mut TaylorExpansion<2, GUARDS>,
-    ) {
+    fn expand_series(&self, t: f64, y: &[f64; 2], motion: &mut TaylorMotion, out: &mut GuardedExpansion<2>) {
         let (pose, _) = self.full_pose(&self.system.drive.motion_at(t), y);
         self.system.expand_motion(t, &pose, ContactMode::Stick, self.lean, out.order + 1, motion);
         let (leader, follower) = if self.follower == Link::Lip { (0, 1) } else { (1, 0) };

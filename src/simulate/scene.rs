@@ -15,7 +15,7 @@ use crate::recording::Recording;
 use crate::toml_file::{self, TomlError};
 use as_written::SceneFile;
 use linkage::{build_linkage, linkage_constants};
-use numbers::{SceneReader, check_complete, check_parameter_range, find_known_parameter};
+use numbers::{SceneReader, check_complete, check_range, find_known_parameter};
 pub use run::{MOST_EVALUATIONS, RunSettings, StartKind, check_tolerance};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -83,7 +83,7 @@ impl Scene {
         let values = reader.values;
         check_complete(file, &values, has_shoulder, recorded.is_some())?;
         let (start_s, start) = run::check_start(file, &written.start)?;
-        let run = run::check_run_settings(file, &written.run, start_s)?;
+        let run = run::check_run(file, &written.run, start_s)?;
         let linkage = build_linkage(file, &values, has_shoulder)?;
         run::check_work_limit(file, &run, start_s, time_scales_rad_per_s(&linkage).1)?;
         let drive = match recorded {
@@ -129,7 +129,7 @@ impl Scene {
     /// [`SceneError::Key`] for an unknown name or a value out of range.
     pub fn with_parameter(&self, name: &str, value: f64) -> Result<Self, SceneError> {
         let parameter = self.find_own_parameter(name)?;
-        check_parameter_range(&self.file, parameter, value)?;
+        check_range(&self.file, parameter, value)?;
         let mut scene = self.clone();
         scene.values = self.values_with(parameter, value);
         scene.linkage = build_linkage(&self.file, &scene.values, self.has_shoulder)?;
@@ -307,13 +307,7 @@ pub enum SceneError {
     },
 }
 
-pub(super) fn key_error(
-    place: &str,
-    key: &str,
-    found: impl ToString,
-    expected: &str,
-    advice: &str,
-) -> SceneError {
+fn key_error(place: &str, key: &str, found: impl ToString, expected: &str, advice: &str) -> SceneError {
     let [place, key, expected, advice] = [place, key, expected, advice].map(str::to_owned);
     SceneError::Key { place, key, found: found.to_string(), expected, advice }
 }

@@ -86,12 +86,23 @@ impl BladePoints {
     }
 }
 
-impl SolutionSegment<'_> {
+impl<'a> SolutionSegment<'a> {
+    #[inline]
+    pub(super) fn from_step<const N: usize>(
+        step: &ode::AcceptedStep<'_, N>,
+        mode: TipMode,
+        motion: Option<&'a TaylorMotion>,
+        solution: SegmentSolution<'a>,
+    ) -> Self {
+        Self { start_s: step.start, end_s: step.end, mode, motion, solution }
+    }
+
     /// Positions of head and tip over the piece and their integrals; from Taylor polynomials if the method has
     /// them.
     #[must_use]
     pub fn path(&self) -> SegmentPath<'_> {
-        SegmentPath::new(self)
+        let polynomials = self.motion.and_then(|motion| PathPolynomials::from_segment(self, motion));
+        SegmentPath { piece: self, polynomials }
     }
 
     /// Angles and rates at a time within the piece; the same bits as in [`Self::sample_at`].
@@ -273,12 +284,7 @@ struct PathPolynomials<'a> {
     sticks: bool,
 }
 
-impl<'a> SegmentPath<'a> {
-    fn new(piece: &'a SolutionSegment<'a>) -> Self {
-        let polynomials = piece.motion.and_then(|motion| PathPolynomials::from_segment(piece, motion));
-        Self { piece, polynomials }
-    }
-
+impl SegmentPath<'_> {
     /// Positions of head and tip at a time within the piece.
     #[inline]
     #[must_use]

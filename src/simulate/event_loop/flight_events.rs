@@ -3,7 +3,7 @@
 use super::{EventLoop, NextPhase, PendingTransition, RunWatcher, TipStrike, integrate_phase};
 use crate::model::flight::FlightState;
 use crate::model::{LinkDirections, Pose};
-use crate::ode::{self, PhaseEndCause as Ended, PhaseStart};
+use crate::ode::{HybridPhase, PhaseEndCause as Ended, PhaseStart};
 use crate::simulate::flight::{FlightPhase, LANDING, flight_state_from, flight_state_vector};
 use crate::simulate::impact::{ImpactOrigin, ImpactOutcome, TipVelocity};
 use crate::simulate::mode::TipMode;
@@ -46,12 +46,10 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         /// The short time as a fraction of the shortest period.
         const SHARE: f64 = 1e-3;
         let time = SHARE * self.shortest_period_s;
-        let rates = ode::HybridPhase::derivative(
-            &FlightPhase { system: self.system, lean: self.lean },
-            self.t,
-            &flight_state_vector(state),
-        );
-        let (mut ahead, now) = (flight_state_vector(state), rates[5]);
+        let phase = FlightPhase { system: self.system, lean: self.lean };
+        let mut ahead = flight_state_vector(state);
+        let rates = phase.derivative(self.t, &ahead);
+        let now = rates[5];
         ahead.iter_mut().zip(rates).for_each(|(y, rate)| *y += time * rate);
         let change = self.gap_acceleration(self.t + time, &flight_state_from(&ahead)) - now;
         let [first, second, third] = [state.gap_rate_m_per_s, 0.5 * now * time, change * time / 6.0];
@@ -63,12 +61,7 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         }
     }
 
-    pub(super) fn integrate_flight(
-        &mut self,
-        state: &FlightState,
-        zero_order: [u8; GUARDS],
-        stop: f64,
-    ) -> NextPhase {
+    pub(super) fn integrate_flight(&mut self, state: &FlightState, zero_order: [u8; GUARDS]) -> NextPhase {
         let phase = FlightPhase { system: self.system, lean: self.lean };
         /// Factor on the duration of a rebound, so that one step includes its end.
         const MARGIN: f64 = 1.25;
@@ -76,7 +69,7 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         // the step of a rebound is no guide for a flight that begins at zero acceleration of the gap
         let (y, step) = (flight_state_vector(state), rebound.or(self.steps[2]));
         let start = PhaseStart { t: self.t, y, zero_order, step };
-        let (watch, drive) = (&mut *self.watch, &self.system.drive);
+        let (watch, drive, stop) = (&mut *self.watch, &self.system.drive, self.scene.run.stop_s);
         let end = integrate_phase(
             &phase,
             start,
@@ -85,13 +78,8 @@ impl<W: RunWatcher> EventLoop<'_, W> {
             &mut self.rooms.2,
             &mut self.work,
             |step, motion| {
-                watch.watch_segment(&SolutionSegment {
-                    start_s: step.start,
-                    end_s: step.end,
-                    mode: TipMode::Flight,
-                    motion,
-                    solution: SegmentSolution::Flight(&phase, step),
-                });
+                let solution = SegmentSolution::Flight(&phase, step);
+                watch.watch_segment(&SolutionSegment::from_step(step, TipMode::Flight, motion, solution));
                 watch.control_flow()
             },
         );
@@ -129,12 +117,8 @@ impl<W: RunWatcher> EventLoop<'_, W> {
     fn land_tip(&mut self, state: &FlightState) -> NextPhase {
         self.recent.note_event(self.t);
         // within the tolerance, a tip that grazes the glass may seem to leave it
-        self.strike_glass(
-            &state.pose,
-            state.gap_rate_m_per_s.min(0.0),
-            ImpactOrigin::Collision,
-            (TipMode::Flight, TransitionCause::Landing),
-        )
+        let (normal, cause) = (state.gap_rate_m_per_s.min(0.0), TransitionCause::Landing);
+        self.strike_glass(&state.pose, normal, ImpactOrigin::Collision, (TipMode::Flight, cause))
     }
 
     /// Handles slip, or release into slip, without an admissible finite force: lift-off if the tip rises without
@@ -162,15 +146,23 @@ impl<W: RunWatcher> EventLoop<'_, W> {
         origin: ImpactOrigin,
         (from, cause): (TipMode, TransitionCause),
     ) -> NextPhase {
-        let d = LinkDirections::from_pose(pose);
-        let tangential =
-            self.system.linkage.tip_velocity_m_per_s(pose, &d, &self.system.drive.motion_at(self.t));
+        let (d, head) = (LinkDirections::from_pose(pose), self.system.drive.motion_at(self.t));
+        let tangential = self.system.linkage.tip_velocity_m_per_s(pose, &d, &head);
         let before = TipVelocity { normal, tangential };
         let strike = TipStrike { pose: *pose, before, origin, restitution: self.scene.restitution() };
         let Some((after, outcome)) = self.rebound_or_close(strike) else {
             return NextPhase::End(RunStatus::Diverged);
         };
-        self.report_impact(&d, pose, &after.pose, before, &outcome);
+        let changes = [after.pose.theta_rate - pose.theta_rate, after.pose.phi_rate - pose.phi_rate];
+        let drive_n_s = self.system.linkage.drive_impulse_n_s(&d, changes, outcome.impulse_n_s[1]);
+        self.watch.watch_impact(&Impact {
+            time_s: self.t,
+            before,
+            after: outcome.velocity,
+            impulse_n_s: outcome.impulse_n_s,
+            lost_j: outcome.lost_j,
+            driven_j: drive_n_s * head.velocity_m_per_s,
+        });
         let before = Some((from, Some(cause)));
         match outcome.velocity {
             TipVelocity { normal, .. } if normal > 0.0 => self.lift_off(after, before),
@@ -208,25 +200,5 @@ impl<W: RunWatcher> EventLoop<'_, W> {
 
     fn solve_strike(&mut self, strike: &TipStrike) -> Option<(FlightState, ImpactOutcome)> {
         strike.solve_on_blade(&self.system.linkage, self.effort.relative_tolerance, &mut self.work)
-    }
-
-    fn report_impact(
-        &mut self,
-        d: &LinkDirections,
-        before: &Pose,
-        after: &Pose,
-        velocity: TipVelocity,
-        outcome: &ImpactOutcome,
-    ) {
-        let changes = [after.theta_rate - before.theta_rate, after.phi_rate - before.phi_rate];
-        let drive = self.system.linkage.drive_impulse_n_s(d, changes, outcome.impulse_n_s[1]);
-        self.watch.watch_impact(&Impact {
-            time_s: self.t,
-            before: velocity,
-            after: outcome.velocity,
-            impulse_n_s: outcome.impulse_n_s,
-            lost_j: outcome.lost_j,
-            driven_j: drive * self.system.drive.motion_at(self.t).velocity_m_per_s,
-        });
     }
 }

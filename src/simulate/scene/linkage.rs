@@ -11,11 +11,7 @@ use std::collections::BTreeMap;
 type SceneValues = BTreeMap<&'static str, f64>;
 
 /// Builds the linkage from the numbers of a complete scene.
-pub(super) fn build_linkage(
-    file: &str,
-    values: &SceneValues,
-    has_shoulder: bool,
-) -> Result<Linkage, SceneError> {
+pub(super) fn build_linkage(file: &str, values: &SceneValues, shoulder: bool) -> Result<Linkage, SceneError> {
     let number = |name: &str| values.get(name).copied().unwrap_or(0.0); // completeness was checked
     for (centre, length) in
         [("blade.neck_centre_m", "blade.neck_length_m"), ("blade.lip_centre_m", "blade.lip_length_m")]
@@ -26,7 +22,7 @@ pub(super) fn build_linkage(
             return Err(key_error(file, centre, number(centre), &expected, advice));
         }
     }
-    let linkage = linkage_constants(values, has_shoulder);
+    let linkage = linkage_constants(values, shoulder);
     let Linkage { m_theta, m_phi, m_c, .. } = linkage;
     if !(m_theta * m_phi - m_c * m_c > 0.0 && (m_theta * m_phi).is_finite()) {
         let found = "links whose inertia matrix is singular";

@@ -59,7 +59,7 @@ impl SceneReader<'_> {
         let Some(value) = value else { return Ok(()) };
         let place = self.place_of(&value);
         let parameter = find_known_parameter(&place, name)?;
-        check_parameter_range(&place, parameter, *value.get_ref())?;
+        check_range(&place, parameter, *value.get_ref())?;
         let mut same = PARAMETERS.iter().filter(|p| p.quantity == parameter.quantity);
         if let Some(twin) = same.find(|p| self.values.contains_key(p.name)) {
             let (found, advice) = (format!("also `{}`", twin.name), "remove one: both set the same quantity");
@@ -82,11 +82,7 @@ pub(super) fn find_known_parameter(place: &str, name: &str) -> Result<&'static M
     })
 }
 
-pub(super) fn check_parameter_range(
-    place: &str,
-    parameter: &ModelParameter,
-    value: f64,
-) -> Result<(), SceneError> {
+pub(super) fn check_range(place: &str, parameter: &ModelParameter, value: f64) -> Result<(), SceneError> {
     if parameter.range.admits(value) {
         return Ok(());
     }

@@ -36,11 +36,7 @@ const LARGEST_EVALUATIONS: u64 = 10_000_000_000_000;
 const TOLERANCE_RANGE: (f64, f64) = (1e-13, 1e-2);
 const DEFAULT_TOLERANCE: f64 = 1e-8;
 
-pub(super) fn check_run_settings(
-    file: &str,
-    written: &RunFile,
-    start_s: f64,
-) -> Result<RunSettings, SceneError> {
+pub(super) fn check_run(file: &str, written: &RunFile, start_s: f64) -> Result<RunSettings, SceneError> {
     let &RunFile { stop_s, sample_rate_hz, most_evaluations, .. } = written;
     let refuse = |key: &str, value: f64, expected: &str| {
         Err(key_error(file, key, value, expected, "correct the value"))

@@ -188,7 +188,7 @@ impl<O: TangentObserver> RunWatcher for TangentPropagator<'_, O> {
                 }
                 span
             } else {
-                let place = StretchPlace::whole_segment(touch, lean, piece.start_s, end);
+                let place = StretchPlace::whole_piece(touch, lean, piece.start_s, end);
                 TangentStretch::new(system, &seeds.sources, course, place)
             };
             let to = span.place.from + span.place.length;

@@ -88,7 +88,7 @@ impl FallingGuard<'_> {
         let weights = ChannelWeights::at_time(self.x, motion.order);
         let terms = self.guard_terms();
         let sums = terms.map(|term| {
-            term.map(|(channel, factor)| (DerivativeSum::from_weights(self.span, channel, &weights), factor))
+            term.map(|(channel, factor)| (DerivativeSum::new(self.span, channel, &weights), factor))
         });
         let normal: f64 = (0..=motion.order).rev().fold(0.0, |sum, k| sum * self.x + motion.normal_n(k));
         for (block, seed) in blocks.iter_with_seeds() {

@@ -70,8 +70,9 @@ impl TangentSeeds {
             sources: Vec::new(),
         };
         for (place, i) in order.into_iter().enumerate() {
-            seeds.places[i] = (place / LANES, place % LANES);
-            seeds.set_direction(scene, &directions[i], seeds.places[i])?;
+            let (block, lane) = (place / LANES, place % LANES);
+            seeds.places[i] = (block, lane);
+            seeds.blocks[block].set_direction(scene, &directions[i], lane)?;
         }
         let Self { blocks, sources, .. } = &mut seeds;
         blocks.iter_mut().for_each(|block| block.list_changes(sources));
@@ -85,28 +86,6 @@ impl TangentSeeds {
     /// Whether there is no direction.
     pub(crate) fn is_empty(&self) -> bool {
         self.places.is_empty()
-    }
-
-    fn set_direction(
-        &mut self,
-        scene: &Scene,
-        direction: &TangentDirection,
-        (block, lane): (usize, usize),
-    ) -> Result<(), SceneError> {
-        let block = &mut self.blocks[block];
-        match direction {
-            TangentDirection::NeckAngle => block.start.angle[0][lane] = 1.0,
-            TangentDirection::LipAngle => block.start.angle[1][lane] = 1.0,
-            TangentDirection::NeckRate => block.start.rate[0][lane] = 1.0,
-            TangentDirection::LipRate => block.start.rate[1][lane] = 1.0,
-            TangentDirection::DriveScale => block.drive_mut().scale[lane] = 1.0,
-            TangentDirection::DriveDelay => block.drive_mut().delay[lane] = 1.0,
-            TangentDirection::Parameter(name) => {
-                let parameter = scene.find_own_parameter(name)?;
-                block.set_parameter(scene, parameter, lane);
-            }
-        }
-        Ok(())
     }
 }
 
@@ -133,6 +112,21 @@ impl DriveTangent {
 impl BlockSeed {
     fn drive_mut(&mut self) -> &mut DriveTangent {
         self.drive.get_or_insert_default()
+    }
+
+    fn set_direction(&mut self, scene: &Scene, by: &TangentDirection, lane: usize) -> Result<(), SceneError> {
+        match by {
+            TangentDirection::NeckAngle => self.start.angle[0][lane] = 1.0,
+            TangentDirection::LipAngle => self.start.angle[1][lane] = 1.0,
+            TangentDirection::NeckRate => self.start.rate[0][lane] = 1.0,
+            TangentDirection::LipRate => self.start.rate[1][lane] = 1.0,
+            TangentDirection::DriveScale => self.drive_mut().scale[lane] = 1.0,
+            TangentDirection::DriveDelay => self.drive_mut().delay[lane] = 1.0,
+            TangentDirection::Parameter(name) => {
+                self.set_parameter(scene, scene.find_own_parameter(name)?, lane);
+            }
+        }
+        Ok(())
     }
 
     /// Lists the sources of the directions and adds new ones to `sources`.

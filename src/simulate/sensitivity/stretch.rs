@@ -47,12 +47,7 @@ pub(super) struct StretchPlace {
 
 impl StretchPlace {
     /// A whole piece, without derivatives.
-    pub(crate) fn whole_segment(
-        touch: ContactMode,
-        lean: ShoulderContact,
-        start_s: f64,
-        length: f64,
-    ) -> Self {
+    pub(crate) fn whole_piece(touch: ContactMode, lean: ShoulderContact, start_s: f64, length: f64) -> Self {
         Self { touch, lean, start_s, from: 0.0, length, rule: collocation_rule(LEAST_NODES), rapid: 0.0 }
     }
 }
@@ -121,11 +116,7 @@ impl StretchPlanner {
     }
 
     /// Rule and length of the next stretch, s, at most `rest`.
-    pub(crate) fn plan_stretch(
-        &self,
-        course: &SeriesReference<'_>,
-        rest: f64,
-    ) -> (&'static CollocationRule, f64) {
+    pub(crate) fn plan(&self, course: &SeriesReference<'_>, rest: f64) -> (&'static CollocationRule, f64) {
         /// Most stretches of a step, also for rates that are not finite.
         const MOST_PARTS: f64 = 1e3;
         /// Factor on the last rate, which may have risen.

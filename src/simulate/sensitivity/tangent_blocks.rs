@@ -1,6 +1,6 @@
-//! Derivatives in several directions over one piece.
+//! Propagation of derivatives in blocks of directions over the stretches of a piece.
 
-#![allow(clippy::needless_range_loop)] // indices are those of the equations
+#![allow(clippy::needless_range_loop)] // indices as in the equations
 
 use super::seeds::{BlockSeed, TangentSeeds};
 use super::stretch::{SeriesReference, StretchPlace, StretchPlanner, TangentStretch, bound_rate};
@@ -12,46 +12,46 @@ use crate::ode::collocation::{CollocationEquations, CollocationStep, MOST_NODES,
 use crate::simulate::mode::TipMode;
 use crate::simulate::phases::{DrivenBlade, TaylorMotion};
 
-/// Directions that are carried side by side.
+/// Derivatives by the directions of a block.
 #[derive(Debug, Default)]
 pub(super) struct TangentBlock {
-    /// Derivatives of both sines and of the gap at the start of the last stretch, and their rates.
+    /// Unknowns (sines of both angles, gap) at the start of the last stretch, and their rates.
     pub value: [LaneVector; 3],
     pub rate: [LaneVector; 3],
-    /// Of the place where the tip sticks, m.
+    /// Position of the tip in stick, m.
     pub place: LaneVector,
-    /// Second derivatives of the unknowns at the nodes.
+    /// Second time derivatives of the unknowns at the nodes.
     pub second: NodeArray<[LaneVector; 3]>,
-    /// Of the state at the end of the last piece, or moved with the transition there.
+    /// State at the end of the last stretch, or at the transition time there.
     pub state: StateTangent,
-    /// Of the guard that has fallen, and of the time of the transition.
+    /// The guard that has fallen, and the transition time.
     pub guard: LaneVector,
     pub time: LaneVector,
 }
 
-/// The equations of a stretch.
+/// Equations of a stretch with `D` unknowns.
 #[derive(Debug, Default)]
 struct StretchEquations<const D: usize> {
     equations: CollocationEquations<D>,
     step: CollocationStep<D>,
 }
 
-/// Where the equations of stretches are set up, kept from run to run.
+/// Workspace of the equations, kept from run to run.
 #[derive(Debug, Default)]
 pub(super) struct StretchWorkspace {
     stick: Box<StretchEquations<1>>,
     slip: Box<StretchEquations<2>>,
     flight: Box<StretchEquations<3>>,
     instants: Vec<MotionSamples>,
-    /// What each source adds to the equations, by node.
+    /// Forcing by each source at the nodes.
     loads: Vec<NodeArray<[f64; 3]>>,
-    /// In stick: the factors of `y2`, four nodes a time.
+    /// In stick: factors of the follower `y2`, in groups of four nodes.
     held: Vec<[LaneVector; 3]>,
-    /// In stick: what the place of the tip adds to its equation.
+    /// In stick: forcing by the position of the tip.
     per_place: NodeArray<f64>,
 }
 
-/// All directions of a run, and what they move with.
+/// All directions of a run with their workspace.
 pub(super) struct TangentBlocks<'a> {
     pub system: &'a DrivenBlade,
     pub seeds: &'a TangentSeeds,
@@ -60,20 +60,20 @@ pub(super) struct TangentBlocks<'a> {
     pub pace: StretchPlanner,
 }
 
-/// Ends of a stretch: where the links point, and how sources move the tip, with the rate.
+/// Both ends of a stretch: attitudes of the links, and displacement and velocity of the tip by each source.
 struct StretchEnds {
     attitude: LinkAttitudes,
     tip: Vec<[LaneVector; 2]>,
 }
 
 impl<'a> TangentBlocks<'a> {
-    /// Blocks with what their directions change.
+    /// Blocks with their seeds.
     pub(crate) fn iter_with_seeds(&mut self) -> impl Iterator<Item = (&mut TangentBlock, &BlockSeed)> {
         self.all.iter_mut().zip(&self.seeds.blocks)
     }
 
-    /// Carries the derivatives over a stretch of a motion that starts at `start_s`, from `from` after it
-    /// towards `to`; `is_fresh` where the tip may not yet be at rest in stick.
+    /// Propagates the derivatives over the next stretch from `from` towards `to`, s after `start_s`. With `is_fresh`,
+    /// the derivative of the tip's velocity may be nonzero at the start of stick.
     pub(crate) fn propagate_stretch<'c>(
         &mut self,
         course: &SeriesReference<'c>,
@@ -102,11 +102,11 @@ impl<'a> TangentBlocks<'a> {
         StretchWorkspace: SelectEquations<D>,
         'a: 'c,
     {
-        /// Looks at the rates of a stretch before it is taken as it is.
+        /// Most plans of a stretch before its rates are accepted.
         const MOST_LOOKS: usize = 4;
         let mut looks = 0;
         let span = loop {
-            let (rule, length) = self.pace.plan_stretch(course, to - from);
+            let (rule, length) = self.pace.plan(course, to - from);
             let SeriesReference { touch, lean, .. } = *course;
             let place = StretchPlace { touch, lean, start_s, from, length, rule, rapid: 0.0 };
             let mut span = TangentStretch::new(self.system, &self.seeds.sources, *course, place);
@@ -126,43 +126,36 @@ impl<'a> TangentBlocks<'a> {
         let hold = (is_fresh && D == 1).then(|| StickImpulse::from_stretch(&span));
         for (block, seed) in self.all.iter_mut().zip(&self.seeds.blocks) {
             block.start_stretch(&span, &ends, seed, hold.as_ref());
-            self.works.solve_block::<D>(&span, block, seed);
-            block.finish_stretch::<D>(&span, &ends, seed);
+            self.works.solve::<D>(&span, block, seed);
+            block.finish::<D>(&span, &ends, seed);
         }
         span
     }
 
-    /// Whether all derivatives are numbers.
+    /// Whether all derivatives are finite.
     pub(crate) fn are_finite(&self) -> bool {
         self.all.iter().all(|block| block.state.is_finite())
     }
 }
 
-/// The equations of `D` unknowns among those of all.
+/// Selects the equations with `D` unknowns.
 trait SelectEquations<const D: usize> {
     fn equations_mut(&mut self) -> &mut StretchEquations<D>;
 }
 
-impl SelectEquations<1> for StretchWorkspace {
-    fn equations_mut(&mut self) -> &mut StretchEquations<1> {
-        &mut self.stick
-    }
+macro_rules! select_equations {
+    ($($unknowns:literal $field:ident),*) => {
+        $(impl SelectEquations<$unknowns> for StretchWorkspace {
+            fn equations_mut(&mut self) -> &mut StretchEquations<$unknowns> {
+                &mut self.$field
+            }
+        })*
+    };
 }
-
-impl SelectEquations<2> for StretchWorkspace {
-    fn equations_mut(&mut self) -> &mut StretchEquations<2> {
-        &mut self.slip
-    }
-}
-
-impl SelectEquations<3> for StretchWorkspace {
-    fn equations_mut(&mut self) -> &mut StretchEquations<3> {
-        &mut self.flight
-    }
-}
+select_equations!(1 stick, 2 slip, 3 flight);
 
 impl StretchWorkspace {
-    /// Sets up the equations at the nodes of a stretch; the rate of the fastest derivative, 1/s.
+    /// Sets up the equations at the nodes of a stretch; returns the rate of the fastest derivative, 1/s.
     fn set_up_equations<const D: usize>(&mut self, span: &TangentStretch<'_>) -> f64
     where
         Self: SelectEquations<D>,
@@ -191,17 +184,14 @@ impl StretchWorkspace {
             self.instants.push(at);
         }
         let CollocationEquations { mass, damping, stiffness } = &self.equations_mut().equations;
-        [0, nodes - 1]
-            .map(|i| bound_rate(&mass[i], &damping[i], &stiffness[i]))
-            .into_iter()
-            .fold(0.0, f64::max)
+        let rates = [0, nodes - 1].map(|i| bound_rate(&mass[i], &damping[i], &stiffness[i]));
+        rates.into_iter().fold(0.0, f64::max)
     }
 
-    /// What each source adds to the equations at the nodes.
+    /// Computes the forcing by each source at the nodes.
     fn compute_loads<const D: usize>(&mut self, span: &TangentStretch<'_>) {
         let (course, nodes) = (&span.course, span.place.rule.nodes);
-        let linkage = &span.system.linkage;
-        let (l1, l2) = (linkage.l1_m, linkage.l2_m);
+        let (l1, l2) = (span.system.linkage.l1_m, span.system.linkage.l2_m);
         self.loads.resize(span.sources.len(), [[0.0; 3]; MOST_NODES]);
         for (chunk, at) in self.instants.iter().enumerate() {
             for (source, load) in span.sources.iter().zip(&mut self.loads) {
@@ -223,14 +213,10 @@ impl StretchWorkspace {
         }
     }
 
-    /// Second derivatives of a block at the nodes.
+    /// Solves for the second derivatives of a block at the nodes.
     #[inline(always)]
-    fn solve_block<const D: usize>(
-        &mut self,
-        span: &TangentStretch<'_>,
-        block: &mut TangentBlock,
-        seed: &BlockSeed,
-    ) where
+    fn solve<const D: usize>(&mut self, span: &TangentStretch<'_>, block: &mut TangentBlock, seed: &BlockSeed)
+    where
         Self: SelectEquations<D>,
     {
         let StretchPlace { rule, length, .. } = span.place;
@@ -289,7 +275,7 @@ impl StretchEnds {
         Self { attitude, tip }
     }
 
-    /// How the tip's place and velocity move with the directions of a block, at the start or at the end.
+    /// Derivatives of the tip's position and velocity at fixed angles, at the start (0) or the end (1).
     fn tip_change(&self, seed: &BlockSeed, end: usize) -> [LaneVector; 2] {
         let mut rows = [LaneVector::ZERO; 2];
         if !self.tip.is_empty() {
@@ -303,7 +289,7 @@ impl StretchEnds {
     }
 }
 
-/// What an impulse on the tip does to the sines' rates, over the tip's velocity.
+/// Change of the sines' rates by an impulse on the tip, per change of the tip's velocity.
 struct StickImpulse([f64; 2]);
 
 impl StickImpulse {
@@ -318,8 +304,8 @@ impl StickImpulse {
     }
 }
 
-/// Rates of the state at `x` after the start of a motion in this mode: of angles, angular rates, gap and its
-/// rate; on the glass the gap stays.
+/// Rates of angles, angular rates, gap and gap rate, at `x` s after the start of a motion; on the glass the gap
+/// is constant.
 pub(super) fn rates_after(motion: &TaylorMotion, mode: TipMode, x: f64) -> [f64; 6] {
     let mut rates = [0.0; 6];
     for k in (1..=motion.order).rev() {
@@ -341,7 +327,7 @@ pub(super) fn rates_after(motion: &TaylorMotion, mode: TipMode, x: f64) -> [f64;
 }
 
 impl StateTangent {
-    /// Adds what passes in a time that depends on the direction.
+    /// Adds the change of the state within the varied time.
     pub(super) fn shift_in_time(&mut self, rates: &[f64; 6], time: LaneVector) {
         let ([theta, phi], [theta_rate, phi_rate]) = (&mut self.angle, &mut self.rate);
         let rows = [theta, phi, theta_rate, phi_rate, &mut self.gap_m, &mut self.gap_rate];
@@ -355,7 +341,7 @@ impl StateTangent {
 }
 
 impl TangentBlock {
-    /// The unknowns at the start of a stretch, from the state there.
+    /// Sets the unknowns at the start of a stretch from the state.
     fn start_stretch(
         &mut self,
         span: &TangentStretch<'_>,
@@ -381,14 +367,9 @@ impl TangentBlock {
         }
     }
 
-    /// The state at the end of a stretch.
+    /// Sets the state at the end of a stretch from the unknowns.
     #[inline(always)]
-    fn finish_stretch<const D: usize>(
-        &mut self,
-        span: &TangentStretch<'_>,
-        ends: &StretchEnds,
-        seed: &BlockSeed,
-    ) {
+    fn finish<const D: usize>(&mut self, span: &TangentStretch<'_>, ends: &StretchEnds, seed: &BlockSeed) {
         const END: usize = 1;
         let StretchPlace { touch, length, rule, .. } = span.place;
         let (mut value, mut rate) = (self.value, self.rate);
@@ -423,7 +404,7 @@ impl TangentBlock {
 }
 
 impl BlockSeed {
-    /// Derivatives of the head's velocity at `t`, m/s.
+    /// Derivatives of the head's velocity at `t`, m/s per unit of each direction.
     pub(super) fn head_velocity(&self, system: &DrivenBlade, t: f64) -> LaneVector {
         let Some(drive) = &self.drive else { return LaneVector::ZERO };
         let head = system.drive.motion_at(t);

@@ -1,4 +1,4 @@
-//! What observers of derivatives see.
+//! Pieces of the solution with derivatives, for observers.
 
 use super::seeds::{BlockSeed, TangentSeeds};
 use super::source::{MOST_SOURCES, TangentSource};
@@ -18,7 +18,7 @@ pub struct TangentSegment<'a> {
     pub end_s: f64,
     /// Mode of contact.
     pub mode: TipMode,
-    /// Whether there are derivatives: not behind a guard that grazes zero, nor behind a tip that has jammed.
+    /// Whether derivatives are known: not after a guard that grazes zero or a tip that jams.
     pub is_known: bool,
     pub(super) piece: &'a SolutionSegment<'a>,
     pub(super) span: TangentStretch<'a>,
@@ -33,29 +33,25 @@ impl TangentSegment<'_> {
         self.piece.sample_at(t)
     }
 
-    /// Weights of the value at a time within the piece.
+    /// Weights for the value of a channel at a time within the piece.
     #[must_use]
     pub fn weights_at(&self, t: f64) -> ChannelWeights {
         ChannelWeights::at_time(t - self.span.place.start_s, self.span.course.motion.order)
     }
 
-    /// Weights of the integral over a time within the piece, s: a camera's mean is the sum over the pieces
-    /// that its shutter sees, over the time that it is open.
+    /// Weights for the integral of a channel between two times within the piece, s. A camera's mean is the sum of
+    /// these over the pieces in its exposure, divided by the exposure.
     #[must_use]
     pub fn weights_over(&self, from: f64, to: f64) -> ChannelWeights {
-        let start_s = self.span.place.start_s;
-        ChannelWeights::over_interval(
-            &self.span.place,
-            [from - start_s, to - start_s],
-            self.span.course.motion.order,
-        )
+        let TangentStretch { place, course, .. } = &self.span;
+        let interval = [from - place.start_s, to - place.start_s];
+        ChannelWeights::over_interval(place, interval, course.motion.order)
     }
 
-    /// A channel's value, or its integral, by the series of the piece.
+    /// Value or integral of a channel from the series of the piece.
     #[must_use]
     pub fn channel_value(&self, channel: Channel, weights: &ChannelWeights) -> f64 {
-        let motion = self.span.course.motion;
-        let start_s = self.span.place.start_s;
+        let (motion, start_s) = (self.span.course.motion, self.span.place.start_s);
         let first = match channel {
             Channel::TipX => self.start_tip_x_m(),
             Channel::HeadX => self.span.system.drive.motion_at(start_s).position_m,
@@ -66,10 +62,8 @@ impl TangentSegment<'_> {
         let sum = match channel {
             Channel::TipX => sum_integrated(weights, &motion.tip_velocity[..order]),
             Channel::HeadX => sum_integrated(weights, &motion.head_velocity[..order]),
-            Channel::TipHeight if self.mode == TipMode::Flight => {
-                sum_integrated(weights, &motion.gap_rate[..order])
-            }
-            Channel::TipHeight => 0.0,
+            Channel::TipHeight if self.mode != TipMode::Flight => 0.0,
+            Channel::TipHeight => sum_integrated(weights, &motion.gap_rate[..order]),
             Channel::HeadDrop => weights.sum_series(order, |k| motion.drop_m[k]),
             Channel::NeckAngle => weights.sum_series(order, |k| motion.angle[k][0]),
             Channel::LipAngle => weights.sum_series(order, |k| motion.angle[k][1]),
@@ -82,9 +76,9 @@ impl TangentSegment<'_> {
         sum + weights.powers[0] * first
     }
 
-    /// The derivatives of the same by each direction, in the order of the seeds: as many as `out` holds.
+    /// Fills `out` with derivatives of the value or integral by each direction, in the order of the seeds.
     pub fn channel_derivatives(&self, channel: Channel, weights: &ChannelWeights, out: &mut [f64]) {
-        let sum = DerivativeSum::from_weights(&self.span, channel, weights);
+        let sum = DerivativeSum::new(&self.span, channel, weights);
         let mut rows = [LaneVector::ZERO; MOST_BLOCKS];
         let mut done = 0;
         for (blocks, seeds) in self.blocks.chunks(MOST_BLOCKS).zip(self.seeds.blocks.chunks(MOST_BLOCKS)) {
@@ -109,18 +103,18 @@ impl TangentSegment<'_> {
     }
 }
 
-/// The sum for what has these coefficients as its rate, and is zero at first.
+/// Weighted series of the integral with this rate, from zero.
 fn sum_integrated(weights: &ChannelWeights, rate: &[f64]) -> f64 {
     let terms = weights.powers[1..].iter().zip(rate).zip(&RECIPROCALS[1..]);
     terms.rev().fold(0.0, |sum, ((factor, rate), share)| sum + factor * (rate * share))
 }
 
-/// Blocks whose sums are gathered at a time.
+/// Blocks that are summed at a time.
 const MOST_BLOCKS: usize = 64 / LANES;
 
-// Values and integrals of quantities as sums of what a stretch knows.
+// Values and integrals as weighted sums over series and nodes.
 
-/// Parts of an integral at most, each by the rule of four nodes.
+/// Most parts of an integral; each uses the rule of four nodes.
 const MOST_PARTS: usize = 3;
 
 pub(super) const RECIPROCALS: [f64; SERIES_TERMS + 1] = {
@@ -133,17 +127,17 @@ pub(super) const RECIPROCALS: [f64; SERIES_TERMS + 1] = {
     shares
 };
 
-/// A few instants, s after the start of the motion, with their weights.
+/// Four times, s after the start of the motion, with their weights.
 #[derive(Debug, Clone, Copy, Default)]
 struct QuadraturePart {
     x: LaneVector,
     weights: LaneVector,
 }
 
-/// Factors in the sum for a value at a time, or for its integral over one.
+/// Weights for a value at a time or for an integral over an interval.
 #[derive(Debug, Clone)]
 pub struct ChannelWeights {
-    /// Of the coefficients of the motion's series.
+    /// Weights of the coefficients of the motion's series.
     pub(super) powers: [f64; SERIES_TERMS],
     parts: [QuadraturePart; MOST_PARTS],
     used: usize,
@@ -168,7 +162,7 @@ impl ChannelWeights {
     }
 
     pub(super) fn over_interval(place: &StretchPlace, [from, to]: [f64; 2], order: usize) -> Self {
-        /// Radians of the fastest derivative over which four nodes are good to 1e-11.
+        /// Phase of the fastest derivative over which four nodes err by 1e-11, rad.
         const RESOLVED: f64 = 0.6;
         let mut out = Self::empty();
         let mut powers = [from, to];
@@ -187,7 +181,7 @@ impl ChannelWeights {
         out
     }
 
-    /// The sum over the terms of a series.
+    /// Weighted sum of the terms of a series.
     #[inline(always)]
     pub(super) fn sum_series(&self, order: usize, coefficient: impl Fn(usize) -> f64) -> f64 {
         let factors = self.powers[..=order].iter().enumerate().rev();
@@ -200,14 +194,14 @@ impl ChannelWeights {
     }
 }
 
-/// A quantity's derivative, or its integral, as a sum over what the blocks know.
+/// Derivative of a value or integral as a weighted sum over the unknowns of a block.
 pub(super) struct DerivativeSum {
     value: [f64; 3],
     rate: [f64; 3],
     second: [NodeArray<f64>; 3],
     place: f64,
     own: [f64; MOST_SOURCES],
-    /// Unknowns and nodes in use, whether any change acts by itself, and whether any unknown counts.
+    /// Numbers of unknowns and nodes, whether any source acts directly, and whether any unknown has a weight.
     unknowns: usize,
     nodes: usize,
     has_own: bool,
@@ -215,11 +209,7 @@ pub(super) struct DerivativeSum {
 }
 
 impl DerivativeSum {
-    pub(crate) fn from_weights(
-        span: &TangentStretch<'_>,
-        channel: Channel,
-        weights: &ChannelWeights,
-    ) -> Self {
+    pub(crate) fn new(span: &TangentStretch<'_>, channel: Channel, weights: &ChannelWeights) -> Self {
         let mut sum = Self {
             value: [0.0; 3],
             rate: [0.0; 3],
@@ -240,7 +230,7 @@ impl DerivativeSum {
             }
         }
         if sum.has_second {
-            // (by degree so far)
+            // so far the weights are by polynomial degree
             for second in &mut sum.second[..sum.unknowns] {
                 *second = span.place.rule.to_nodal(second);
             }
@@ -254,7 +244,7 @@ impl DerivativeSum {
             matches!(source, TangentSource::Constant(_)) && source.displaces_points(course)
         };
         let form = match channel {
-            // (no angle is needed)
+            // these forms need no attitude of the links
             Channel::TipX => course.tip_position_form(),
             Channel::HeadX => course.head_position_form(),
             _ => {
@@ -267,8 +257,7 @@ impl DerivativeSum {
         self.add_displaced(span, part, &form, at.as_ref());
     }
 
-    /// Adds a form, and what the sources that move head or tip do to it; `at` where one of them is a
-    /// constant, or where rates count.
+    /// Adds a form and its direct change by sources that move head or tip. Constants and rates need `at`.
     fn add_displaced(
         &mut self,
         span: &TangentStretch<'_>,
@@ -342,7 +331,7 @@ impl DerivativeSum {
         }
     }
 
-    /// The derivatives in the directions of a block.
+    /// Derivatives by the directions of a block.
     pub(crate) fn block_derivatives(&self, block: &TangentBlock, seed: &BlockSeed) -> LaneVector {
         let mut row = self.place * block.place;
         if self.has_second {

@@ -95,7 +95,13 @@ pub enum FilmError {
 pub fn film_trace(fine: &Recording, camera: &Camera, start_s: f64) -> Result<Recording, FilmError> {
     check_film_camera(camera)?;
     let grid = plan_frames(fine, camera, start_s)?;
-    let shutter = FrameShutter::new(fine, camera, &grid);
+    let FrameGrid { start_s: first_s, frame_rate_hz: rate_hz, frames } = fine.grid();
+    let shutter = FrameShutter {
+        first: (start_s - first_s) * rate_hz,
+        samples_per_frame: rate_hz / camera.frame_rate_hz,
+        open: camera.exposure_s * rate_hz,
+        last: (frames - 1) as f64,
+    };
     shutter.check_sampling(fine, camera, &grid)?;
     let seen = |column: &[Option<f64>]| -> Vec<Option<f64>> {
         (0..grid.frames).map(|frame| shutter.frame_mean(column, frame)).collect()
@@ -152,16 +158,6 @@ struct FrameShutter {
 }
 
 impl FrameShutter {
-    fn new(fine: &Recording, camera: &Camera, grid: &FrameGrid) -> Self {
-        let (start_s, rate_hz, frames) = (fine.grid().start_s, fine.grid().frame_rate_hz, fine.grid().frames);
-        Self {
-            first: (grid.start_s - start_s) * rate_hz,
-            samples_per_frame: rate_hz / camera.frame_rate_hz,
-            open: camera.exposure_s * rate_hz,
-            last: (frames - 1) as f64,
-        }
-    }
-
     /// Refuses a trace too coarse or too short to interpolate, unless every frame falls on a sample.
     fn check_sampling(&self, fine: &Recording, camera: &Camera, grid: &FrameGrid) -> Result<(), FilmError> {
         let trace = || fine.name().to_owned();
@@ -282,13 +278,9 @@ pub fn film_like_recording(
     let shown = align_recordings(fine, like).filter(|shown| shown.frames >= 2);
     let seen = film_trace(fine, &camera, shown.as_ref().map_or(fine.grid().start_s, |shown| shown.start_s))?;
     let frames = shown.as_ref().map_or(seen.grid().frames, |shown| shown.frames.min(seen.grid().frames));
-    let tracker = MatchedTracker {
-        like: coordinate_columns(like).map(|(_, column)| column),
-        first: shown.as_ref().map(|shown| shown.first),
-        noise_m,
-        seed,
-    };
-    let columns = tracker.track_frames(&seen, frames);
+    let like_columns = coordinate_columns(like).map(|(_, column)| column);
+    let first = shown.as_ref().map(|shown| shown.first);
+    let columns = track_frames(&seen, frames, like_columns, first, noise_m, seed);
     let recording = synthetic_recording(fine, FrameGrid { frames, ..seen.grid() }, columns)?;
     let dropouts = if shown.is_some() { DropoutPattern::SameFrames } else { DropoutPattern::AtRandom };
     Ok(MatchedFilm { recording, noise_m, dropouts })
@@ -335,35 +327,28 @@ fn align_recordings(fine: &Recording, like: &Recording) -> Option<SharedFrames> 
     Some(SharedFrames { first, start_s: grid.time_s(first) + shift_s, frames })
 }
 
-/// Adds noise and lost points to a film.
-struct MatchedTracker<'a> {
-    /// Columns of the recording to imitate.
-    like: [&'a [Option<f64>]; COORDINATES],
-    /// Index of the film's first frame in the recording; `None` for random dropouts.
+/// The first `frames` frames of a film with noise and lost points. `first` is the index of the film's first frame
+/// in the columns `like`; `None` for random dropouts.
+fn track_frames(
+    seen: &Recording,
+    frames: usize,
+    like: [&[Option<f64>]; COORDINATES],
     first: Option<usize>,
     noise_m: [f64; COORDINATES],
     seed: u64,
-}
-
-impl MatchedTracker<'_> {
-    /// The first `frames` frames of a film with noise and lost points.
-    fn track_frames(&self, seen: &Recording, frames: usize) -> [Vec<Option<f64>>; COORDINATES] {
-        let mut generator = Xoshiro256PlusPlus::seed_from_u64(self.seed);
-        let clean = coordinate_columns(seen).map(|(_, column)| column);
-        let shares = self
-            .like
-            .map(|column| column.iter().filter(|x| x.is_none()).count() as f64 / column.len() as f64);
-        let mut tracked = [const { Vec::new() }; COORDINATES];
-        (0..frames).for_each(|frame| {
-            let points: [f64; COORDINATES / 2] = generator.random(); // one draw for both coordinates
-            for (c, column) in tracked.iter_mut().enumerate() {
-                let lost = self
-                    .first
-                    .map_or(points[c / 2] < shares[c], |first| self.like[c][first + frame].is_none());
-                let noise: f64 = generator.sample(StandardNormal);
-                column.push(clean[c][frame].filter(|_| !lost).map(|x| x + self.noise_m[c] * noise));
-            }
-        });
-        tracked
+) -> [Vec<Option<f64>>; COORDINATES] {
+    let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
+    let clean = coordinate_columns(seen).map(|(_, column)| column);
+    let missing = |column: &[Option<f64>]| column.iter().filter(|x| x.is_none()).count() as f64;
+    let shares = like.map(|column| missing(column) / column.len() as f64);
+    let mut tracked = [const { Vec::new() }; COORDINATES];
+    for frame in 0..frames {
+        let points: [f64; COORDINATES / 2] = generator.random(); // one draw for both coordinates
+        for (c, column) in tracked.iter_mut().enumerate() {
+            let lost = first.map_or(points[c / 2] < shares[c], |first| like[c][first + frame].is_none());
+            let noise: f64 = generator.sample(StandardNormal);
+            column.push(clean[c][frame].filter(|_| !lost).map(|x| x + noise_m[c] * noise));
+        }
     }
+    tracked
 }
