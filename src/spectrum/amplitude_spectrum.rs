@@ -18,12 +18,12 @@ pub struct WindowedTransform {
     /// Amplitude of rounding, m.
     rounding_m: f64,
     /// Whether the bins are too far apart for a parabola.
-    has_coarse_bins: bool,
+    coarse: bool,
 }
 
 impl WindowedTransform {
-    /// Of samples, m, one a frame (`None` where there is none); the number of components in the settings does
-    /// not count.
+    /// Transforms samples, m, one a frame (`None` where a frame has no value). The number of components in the
+    /// settings has no effect here.
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate or the settings' band cannot give one.
@@ -43,18 +43,10 @@ impl WindowedTransform {
             rayon::join(of_record, || periodogram.sidelobe_envelope()).0
         };
         let largest = bridged.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
-        let least_m = (ROUNDING * largest).max(f64::MIN_POSITIVE);
+        let rounding_m = (ROUNDING * largest).max(f64::MIN_POSITIVE);
         let coarse = padded < settings.zero_padding.saturating_mul(samples.len());
-        Ok(Self {
-            samples: samples.to_vec(),
-            residual,
-            periodogram,
-            amplitude_m,
-            frame_rate_hz,
-            trend,
-            rounding_m: least_m,
-            has_coarse_bins: coarse,
-        })
+        let samples = samples.to_vec();
+        Ok(Self { samples, residual, periodogram, amplitude_m, frame_rate_hz, trend, rounding_m, coarse })
     }
 
     /// Length of the record, s.
@@ -79,29 +71,20 @@ impl WindowedTransform {
         check_band(Some(band_hz), self.frame_rate_hz)
     }
 
-    /// Root mean square of what lies between two frequencies, m, as [`Spectrum::rms_in_band_m`].
+    /// Root mean square of the motion between two frequencies, m, as [`Spectrum::rms_in_band_m`].
     pub(crate) fn rms_in_band_m(&self, low_hz: f64, high_hz: f64) -> f64 {
-        let bandwidth_hz = self.periodogram.noise_bandwidth_hz(self.frame_rate_hz);
-        rms_in_band_m(
-            &self.amplitude_m,
-            self.periodogram.bin_hz(self.frame_rate_hz),
-            bandwidth_hz,
-            (low_hz, high_hz),
-        )
+        let (p, rate_hz) = (&self.periodogram, self.frame_rate_hz);
+        rms_in_band_m(&self.amplitude_m, p.bin_hz(rate_hz), p.noise_bandwidth_hz(rate_hz), (low_hz, high_hz))
     }
 
     /// Amplitude at a frequency in the first and the second half of the record, m, each by a Hann window of
     /// its own over the frames present.
     pub(crate) fn half_amplitudes_m(&self, frequency_hz: f64) -> [f64; 2] {
         let half = self.samples.len() / 2;
+        let cycles = frequency_hz * half as f64 / self.frame_rate_hz;
         let of = |from: usize| {
-            let pattern = &self.samples[from..from + half];
-            let values = &self.residual[from..from + half];
-            Periodogram::amplitude_with_weights(
-                &periodogram::hann_weights(pattern),
-                values,
-                frequency_hz * half as f64 / self.frame_rate_hz,
-            )
+            let weights = periodogram::hann_weights(&self.samples[from..from + half]);
+            Periodogram::amplitude_with_weights(&weights, &self.residual[from..from + half], cycles)
         };
         [of(0), of(self.samples.len() - half)]
     }
@@ -133,29 +116,16 @@ impl WindowedTransform {
             ..self.periodogram.windowed_spectrum(&self.amplitude_m, self.frame_rate_hz, self.rounding_m)
         };
         let mut found = peaks::find_peaks(&spectrum, band_hz, most);
-        if self.has_coarse_bins {
-            let record = peak_zoom::WeightedRecord {
-                residual: &self.residual,
-                weights: &self.periodogram.weights,
-                amplitude_scale: self.periodogram.amplitude_scale(),
-            };
-            found.zoom_peaks(&spectrum, &record);
+        if self.coarse {
+            let (residual, weights) = (&self.residual, &self.periodogram.weights);
+            let amplitude_scale = self.periodogram.amplitude_scale();
+            found.zoom_peaks(&spectrum, &peak_zoom::WeightedRecord { residual, weights, amplitude_scale });
         }
-        (
-            found.floor_m,
-            found.list_components(
-                &spectrum,
-                &gap_refinement::refine_components(
-                    &self.samples,
-                    self.trend,
-                    &found.refinement_starts(&spectrum),
-                ),
-            ),
-        )
+        let starts = found.refinement_starts(&spectrum);
+        let refined = gap_refinement::refine_components(&self.samples, self.trend, &starts);
+        (found.floor_m, found.list_components(&spectrum, &refined))
     }
 }
-
-// An amplitude spectrum and what is read from it.
 
 /// An amplitude spectrum and its components.
 #[derive(Debug, Clone, PartialEq)]
@@ -186,28 +156,17 @@ impl Spectrum {
         resolvable.find(|c| c.frequency_hz >= low_hz && c.frequency_hz <= high_hz)
     }
 
-    /// Root mean square of what lies between two frequencies, m (Parseval's sum over the bins, each counted
-    /// once for its noise bandwidth).
+    /// Root mean square of the motion between two frequencies, m: Parseval's sum over the bins, each counted
+    /// once for its noise bandwidth.
     #[must_use]
     pub fn rms_in_band_m(&self, low_hz: f64, high_hz: f64) -> f64 {
-        rms_in_band_m(
-            &self.amplitude_m,
-            self.frequency_hz.get(1).copied().unwrap_or(0.0),
-            self.noise_bandwidth_hz,
-            (low_hz, high_hz),
-        )
+        let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(0.0);
+        rms_in_band_m(&self.amplitude_m, bin_hz, self.noise_bandwidth_hz, (low_hz, high_hz))
     }
 }
 
-/// Parseval's sum over the bins of a band, each counted once for its noise bandwidth.
-pub(super) fn rms_in_band_m(
-    amplitude_m: &[f64],
-    bin_hz: f64,
-    noise_bandwidth_hz: f64,
-    (low_hz, high_hz): (f64, f64),
-) -> f64 {
-    let inside =
-        amplitude_m.iter().enumerate().filter(|(k, _)| (low_hz..=high_hz).contains(&(*k as f64 * bin_hz)));
-    let power: f64 = inside.map(|(_, a)| a * a / 2.0).sum();
-    (power * bin_hz / noise_bandwidth_hz).sqrt()
+fn rms_in_band_m(amplitude_m: &[f64], bin_hz: f64, width_hz: f64, (low_hz, high_hz): (f64, f64)) -> f64 {
+    let inside = |(k, _): &(usize, &f64)| (low_hz..=high_hz).contains(&(*k as f64 * bin_hz));
+    let power: f64 = amplitude_m.iter().enumerate().filter(inside).map(|(_, a)| a * a / 2.0).sum();
+    (power * bin_hz / width_hz).sqrt()
 }

@@ -1,26 +1,23 @@
-//! The complete analysis of a record: what it is made of, how well each part is known, and what its frequency
-//! is worth.
+//! The complete analysis of a record: its parts, how well each is known, and how far its frequency can be
+//! trusted.
 
 mod component_estimates;
 mod long_record;
 
 use super::error::check_record;
-use super::frequency_drift;
-use super::frequency_drift::DriftCourse;
-use super::model_selection::{FRAMES_PER_COLUMN, ModelSelector};
+use super::frequency_drift::{self, DriftCourse};
+use super::model_selection::{Decomposition, FRAMES_PER_COLUMN, ModelSelector};
 use super::multitaper::{Multitaper, TAPERS};
 use super::periodogram::Periodogram;
 use super::settings::ROUNDING;
-use super::step_detection;
 use super::time_frequency::Ridge;
-use super::trend::Trend;
-use super::{Detrend, MIN_SAMPLES, Spectrum, SpectrumError, SpectrumSettings, decimation};
+use super::{Detrend, MIN_SAMPLES, Spectrum, SpectrumError, SpectrumSettings, decimation, step_detection};
 use crate::math;
 use component_estimates::FittedDecomposition;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Longest record that is taken apart, frames: three seconds at 5,000 frames/s, which take about one. The
+/// Longest record that is fitted, frames: three seconds at 5,000 frames/s, which take about one second. The
 /// time grows faster than the record; longer ones are read by their windowed periodogram.
 pub const LONGEST_DECOMPOSED: usize = 1 << 14;
 /// A record and the camera that took it.
@@ -39,13 +36,12 @@ pub struct SampledRecord<'a> {
 pub struct SpectralAnalysis {
     /// Amplitude spectrum of the record less what was removed, with the components.
     pub spectrum: Spectrum,
-    /// Frames at the start that were left out, because they hold a flip that nothing describes; everything
-    /// below is of the frames behind.
+    /// Frames left out at the start because they hold a flip that no model describes. All fields below are of
+    /// the frames after them.
     pub skipped_frames: usize,
-    /// Frames from one that may have a value to the next: 1, or more where only every second, third ... has
-    /// one.
+    /// Distance between frames that may have a value: 1, or more where only every second, third ... has one.
     pub stride: usize,
-    /// What was removed.
+    /// Trend and relaxations removed before the components were read.
     pub removed: RemovedTrend,
     /// Trend and relaxations in every frame, m.
     pub removed_m: Vec<f64>,
@@ -63,8 +59,8 @@ pub struct SpectralAnalysis {
     /// Power density of the record less what was removed; `None` where gaps leave no room for tapers, and for
     /// a long record.
     pub multitaper: Option<Multitaper>,
-    /// Noise floor in each bin of the spectrum, m: of what is left, by its multitaper density; empty where
-    /// there is none.
+    /// Noise floor in each bin of the spectrum, m, from the multitaper density of the residual; empty without
+    /// one.
     pub noise_floor_m: Vec<f64>,
 }
 
@@ -99,7 +95,7 @@ impl Oscillation {
     }
 }
 
-/// What was taken away before components were read.
+/// What was removed before the components were read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RemovedTrend {
     /// The trend.
@@ -119,7 +115,7 @@ impl std::fmt::Display for RemovedTrend {
     }
 }
 
-/// Columns of a polynomial from which one is tried that needs fewer behind a step.
+/// Polynomials with more columns bend as fast as a component, so the frames after a step are tried instead.
 const MAX_SMOOTH_TREND_COLUMNS: usize = 20;
 
 impl SpectralAnalysis {
@@ -128,8 +124,8 @@ impl SpectralAnalysis {
         self.residual_m.iter().zip(&self.model_m).map(|(left, m)| left.map(|left| left + m)).collect()
     }
 
-    /// Takes a record apart; with `settings.detrend` `None` the trend is chosen from the record. One of which
-    /// only every second, third ... frame has a value is read as one of that rate.
+    /// Analyses a record. With `settings.detrend` `None` the trend is chosen from the record. Where only every
+    /// second, third ... frame has a value, the record is read at that lower rate.
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate or the band cannot give one.
@@ -144,8 +140,8 @@ impl SpectralAnalysis {
         Ok(analysis.interpolate_to_record(record, kept))
     }
 
-    /// The analysis of the kept frames as one of the whole record. Between kept frames what was removed and
-    /// the components are drawn straight.
+    /// The analysis of the kept frames as one of the whole record; removed trend and components are
+    /// interpolated linearly between kept frames.
     fn interpolate_to_record(self, record: &SampledRecord, (first, stride): (usize, usize)) -> Self {
         let left_out = first + stride * self.skipped_frames;
         let frames = record.samples.len() - left_out;
@@ -157,69 +153,73 @@ impl SpectralAnalysis {
             };
             (0..frames).map(at).collect()
         };
-        let left_m = (0..frames)
-            .map(|frame| {
-                self.residual_m.get(frame / stride).copied().flatten().filter(|_| frame % stride == 0)
-            })
-            .collect();
+        let left = |frame: usize| {
+            self.residual_m.get(frame / stride).copied().flatten().filter(|_| frame % stride == 0)
+        };
+        let left_m = (0..frames).map(left).collect();
         let (removed_m, model_m) = (between(&self.removed_m), between(&self.model_m));
         Self { skipped_frames: left_out, stride, removed_m, model_m, residual_m: left_m, ..self }
     }
 
     fn analyse_frames(record: &SampledRecord, settings: &SpectrumSettings) -> Result<Self, SpectrumError> {
-        let (padded, trend) = check_record(record.samples, record.frame_rate_hz, settings)?;
         if record.samples.len() > LONGEST_DECOMPOSED {
+            let (_, trend) = check_record(record.samples, record.frame_rate_hz, settings)?;
             return long_record::analyse_long_record(record, settings, trend);
         }
-        let whole = Self::decompose(record, settings, padded, trend)?;
+        let whole = Self::decompose(record, settings)?;
         if whole.leaves_only_noise && !whole.trend_competes || settings.detrend.is_some() {
             return Ok(whole.analysis.with_densities(record.frame_rate_hz));
         }
-        let behind = step_detection::starts_after_step(record.samples).into_iter().filter_map(|start| {
-            let rest = SampledRecord { samples: &record.samples[start..], ..*record };
-            let (padded, trend) = check_record(rest.samples, rest.frame_rate_hz, settings).ok()?;
-            Some((start, Self::decompose(&rest, settings, padded, trend).ok()?))
-        });
+        let starts = step_detection::starts_after_step(record.samples).into_iter();
+        let behind =
+            starts.filter_map(|start| Self::decompose_part(record, settings, start..record.samples.len()));
         let mut plain = None;
-        for (start, part) in behind.filter(|(_, part)| !part.trend_competes) {
-            let explains = part.leaves_only_noise;
-            let part = Self { skipped_frames: start, ..part.analysis };
-            if explains {
-                return Ok(part.with_densities(record.frame_rate_hz));
+        for part in behind {
+            if part.leaves_only_noise {
+                return Ok(part.analysis.with_densities(record.frame_rate_hz));
             }
-            plain.get_or_insert(part);
+            plain.get_or_insert(part.analysis);
         }
-        // what a plain trend leaves behind a step says more than waves through it
+        // a low-order trend after a step is better than a high-order one that oscillates through it
         let best = plain.filter(|_| whole.trend_competes).unwrap_or(whole.analysis);
         Ok(best.with_densities(record.frame_rate_hz))
     }
 
-    /// What lies between the flips of a piece of a longer record: of each stretch the first frames that leave
-    /// noise, or the first whose trend has no fast waves. A trend through a flip takes many times as long as
-    /// what the flip starts.
+    /// Analyses each stretch between the flips of a piece: the first frames that leave noise only, or else the
+    /// first whose trend has no fast waves. A trend through a flip takes many times as long as the oscillation
+    /// that the flip starts.
     fn analyse_between_steps(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Self> {
-        let part = |frames: &Range<usize>| {
-            let rest = SampledRecord { samples: &record.samples[frames.clone()], ..*record };
-            let (padded, trend) = check_record(rest.samples, rest.frame_rate_hz, settings).ok()?;
-            let part = Self::decompose(&rest, settings, padded, trend).ok()?;
-            (!part.trend_competes)
-                .then_some((part.leaves_only_noise, Self { skipped_frames: frames.start, ..part.analysis }))
-        };
         let of_stretch = |tries: &Vec<Range<usize>>| {
-            let mut parts = tries.iter().filter_map(part);
+            let mut parts =
+                tries.iter().filter_map(|frames| Self::decompose_part(record, settings, frames.clone()));
             let first = parts.next()?;
-            let best = if first.0 { first } else { parts.find(|part| part.0).unwrap_or(first) };
-            Some(best.1.with_densities(record.frame_rate_hz))
+            let best = if first.leaves_only_noise {
+                first
+            } else {
+                parts.find(|part| part.leaves_only_noise).unwrap_or(first)
+            };
+            Some(best.analysis.with_densities(record.frame_rate_hz))
         };
         step_detection::stretches_between_steps(record.samples).iter().filter_map(of_stretch).collect()
     }
 
+    /// Some frames of a record, if they can be analysed and their trend has no fast waves.
+    fn decompose_part(
+        record: &SampledRecord,
+        settings: &SpectrumSettings,
+        frames: Range<usize>,
+    ) -> Option<DecompositionCandidate> {
+        let skipped_frames = frames.start;
+        let part =
+            Self::decompose(&SampledRecord { samples: &record.samples[frames], ..*record }, settings).ok()?;
+        let analysis = Self { skipped_frames, ..part.analysis };
+        (!part.trend_competes).then_some(DecompositionCandidate { analysis, ..part })
+    }
     fn decompose(
         record: &SampledRecord,
         settings: &SpectrumSettings,
-        padded: usize,
-        trend: Trend,
     ) -> Result<DecompositionCandidate, SpectrumError> {
+        let (padded, trend) = check_record(record.samples, record.frame_rate_hz, settings)?;
         let periodogram = Periodogram::new(record.samples, padded);
         let largest = record.samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
         let least_m = (ROUNDING * largest).max(f64::MIN_POSITIVE);
@@ -231,9 +231,10 @@ impl SpectralAnalysis {
         let mut explained = search.select_model(trend).ok_or_else(too_few)?;
         let mut course = frequency_drift::find_drift_course(&search, &explained, settings.band_hz);
         search.noise_is_coloured = true;
-        if let Some((drifting, range)) =
-            course.as_ref().and_then(|course| Some((course.drift_region()?, course.range?)))
-        {
+        let drift = course.as_ref().and_then(|course| Some((course.drift_region()?, course.range?)));
+        let smooth =
+            |explained: &Decomposition| explained.model.trend().column_count() <= MAX_SMOOTH_TREND_COLUMNS;
+        if let Some((drifting, range)) = drift {
             if let Some(pair) = search.split_into_pair(&explained, &range) {
                 // two that beat look like one that drifts
                 course = course.map(|course| DriftCourse { range: None, ..course });
@@ -242,45 +243,26 @@ impl SpectralAnalysis {
                 search.drift_region = Some(drifting);
                 explained = search.select_without_drift(&explained).ok_or_else(too_few)?;
             }
-        } else {
-            // where no trend describes a flip, everything would be taken to pieces
-            let described =
-                !search.trend_grows || explained.model.trend().column_count() <= MAX_SMOOTH_TREND_COLUMNS;
-            if described {
-                explained = search.run_second_pass(explained).ok_or_else(too_few)?;
-            }
+        } else if !search.trend_grows || smooth(&explained) {
+            // where no trend describes a flip, a second pass would split everything into pieces
+            explained = search.run_second_pass(explained).ok_or_else(too_few)?;
         }
         let exhausted = search.trend_grows && explained.model.trend().next_richer().is_none();
-        let bent = explained.model.trend().column_count() > MAX_SMOOTH_TREND_COLUMNS;
-        let strained = search.trend_grows && (bent || search.trend_competes(&explained));
-        let explains = !exhausted
+        let trend_competes = search.trend_grows && (!smooth(&explained) || search.trend_competes(&explained));
+        let leaves_only_noise = !exhausted
             && !search.contains_step(&explained)
             && (search.drift_region.is_some() || search.leaves_only_noise(&explained));
-        let reading = FittedDecomposition::new(&search, explained).ok_or_else(too_few)?;
-        Ok(DecompositionCandidate {
-            leaves_only_noise: explains,
-            trend_competes: strained,
-            analysis: reading.to_analysis(record, settings, course),
-        })
+        let fitted = FittedDecomposition::new(&search, explained).ok_or_else(too_few)?;
+        let analysis = fitted.to_analysis(record, settings, course);
+        Ok(DecompositionCandidate { leaves_only_noise, trend_competes, analysis })
     }
-}
 
-/// An analysis, whether it leaves nothing but noise, and whether its trend has waves as fast as a
-/// component: then the two swing against each other, also where the record is flat.
-struct DecompositionCandidate {
-    leaves_only_noise: bool,
-    trend_competes: bool,
-    analysis: SpectralAnalysis,
-}
-
-impl SpectralAnalysis {
     /// With the power density, the noise floor and each component's chance of being a steady line.
     fn with_densities(mut self, frame_rate_hz: f64) -> Self {
         let padded = 2 * (self.spectrum.amplitude_m.len() - 1);
         let density = |samples: &[Option<f64>]| {
-            Multitaper::new(samples, frame_rate_hz, padded, TAPERS)
-                .ok()
-                .filter(|m| m.frequency_hz.len() == padded / 2 + 1)
+            let found = Multitaper::new(samples, frame_rate_hz, padded, TAPERS).ok();
+            found.filter(|m| m.frequency_hz.len() == padded / 2 + 1)
         };
         let (multitaper, left) = rayon::join(|| density(&self.detrended_m()), || density(&self.residual_m));
         self.multitaper = multitaper;
@@ -297,6 +279,14 @@ impl SpectralAnalysis {
         }
         self
     }
+}
+
+/// An analysis, whether it leaves nothing but noise, and whether its trend has waves as fast as a component:
+/// trend and component then oscillate against each other, also where the record is flat.
+struct DecompositionCandidate {
+    leaves_only_noise: bool,
+    trend_competes: bool,
+    analysis: SpectralAnalysis,
 }
 
 #[cfg(test)]

@@ -1,6 +1,6 @@
-//! What else may leave a peak around an oscillation: its frequency drifts evenly, or its amplitude falls in a
-//! line. Neither is a term of the fit; but where one explains as much as a second oscillation does, there is
-//! no second.
+//! Alternatives to a second oscillation near a first one: a frequency that drifts evenly, or an amplitude that
+//! falls linearly. Neither is a term of the fit. Where one explains as much as a second oscillation does, the
+//! second is dropped.
 
 use super::least_squares::SinusoidTerm;
 use super::model_selection::{Decomposition, ModelSelector};
@@ -12,14 +12,14 @@ use std::f64::consts::{PI, TAU};
 const MOST_STEPS: usize = 40;
 /// First steps of frequency and of its change over the record, cycles, and of nepers.
 const FIRST_STEPS: [f64; 3] = [0.3, 1.0, 1.0];
-/// Numbers of a term, and of a shape more than those.
+/// Parameters of a term, and extra parameters of an alternative.
 const TERM_PARAMETERS: f64 = 4.0;
 const EXTRA_PARAMETERS: f64 = 1.0;
-/// Distance of terms that may be pieces of one, resolutions.
+/// Distance of terms that may be pieces of one oscillation, resolutions.
 const NEARBY_RESOLUTIONS: f64 = 5.0;
-/// Blocks that stand for the record: a few cycles more or less turn by little within one.
+/// Blocks that represent the record: a difference of a few cycles turns little within one block.
 const BLOCKS: usize = 128;
-/// Shares of the record in which an amplitude may fall to nothing.
+/// Limits of the time, in records, in which an amplitude may fall to zero.
 const LINEAR_DECAY_ENDS: (f64, f64) = (0.1, 4.0);
 
 /// An oscillation whose frequency or amplitude changes evenly.
@@ -29,7 +29,7 @@ struct UnsteadyOscillation {
     cycles: f64,
     /// Its change over the record, cycles.
     change: f64,
-    /// Nepers over the record, or the share of it in which the amplitude falls to zero.
+    /// Nepers over the record, or the time, in records, in which the amplitude falls to zero.
     decay: EnvelopeDecay,
 }
 
@@ -49,7 +49,7 @@ impl UnsteadyOscillation {
         Self { cycles: start.cycles + cycles, change, decay }
     }
 
-    /// Envelope and phase at a share of the record, rad.
+    /// Envelope and phase, rad, at a time `s` in records.
     fn envelope_and_phase(&self, s: f64) -> (f64, f64) {
         let envelope = match self.decay {
             EnvelopeDecay::Exponential(nepers) => math::exp(-nepers * s),
@@ -62,62 +62,50 @@ impl UnsteadyOscillation {
 impl ModelSelector<'_> {
     /// Terms that leave more than noise around them.
     pub(super) fn terms_with_residual(&self, explained: &Decomposition) -> Vec<usize> {
-        let terms = &explained.model.solution.terms;
+        let terms = explained.model.terms();
         let leaves = |k: &usize| terms[*k].cycles > 0.0 && self.leaves_peak(explained, &terms[*k]);
         (0..terms.len()).filter(leaves).collect()
     }
 
-    /// These, with the criterion that what takes their place must fall below.
+    /// The same terms, each with the criterion that its replacement must fall below.
     pub(super) fn doubtful_terms(&self, explained: &Decomposition) -> Vec<DoubtfulTerm> {
         let least = self.information_criterion(&explained.model);
         let criterion = |k: usize| self.alternatives_criterion(explained, k).min(least);
-        self.terms_with_residual(explained)
-            .into_iter()
-            .map(|k| DoubtfulTerm { index: k, criterion: criterion(k) })
-            .collect()
+        let terms = self.terms_with_residual(explained).into_iter();
+        terms.map(|k| DoubtfulTerm { index: k, criterion: criterion(k) }).collect()
     }
 
-    /// Terms that may be the pieces of one: an even drift or fall in their place explains more.
+    /// Terms that may be pieces of one: an even drift or fall in their place explains more.
     pub(super) fn unsteady_terms(&self, explained: &Decomposition) -> Vec<usize> {
-        let parts = &explained.model;
-        let terms = &parts.solution.terms;
-        let steady = self.information_criterion(parts);
-        // alone, it is one line whatever it does; with others it may be in pieces
+        let terms = explained.model.terms();
+        let steady = self.information_criterion(&explained.model);
+        // a term without neighbours is one line in any case
         let in_pieces = |k: &usize| {
             nearby_terms(terms, *k).len() > 1 && self.alternatives_criterion(explained, *k) < steady
         };
         let whole: Vec<usize> = self.terms_with_residual(explained).into_iter().filter(in_pieces).collect();
-        let piece = |k: &usize| {
-            whole.iter().any(|one| (terms[*one].cycles - terms[*k].cycles).abs() < NEARBY_RESOLUTIONS)
-        };
-        (0..terms.len()).filter(|k| terms[*k].cycles > 0.0).filter(piece).collect()
+        let is_piece = |k: &usize| whole.iter().any(|one| are_near(&terms[*one], &terms[*k]));
+        explained.model.oscillations().into_iter().filter(is_piece).collect()
     }
 
-    /// The criterion that an oscillation which drifts or fades evenly reaches in the place of term `k`, or of
-    /// that and what lies in its lobe.
+    /// The criterion with an evenly drifting or fading oscillation in the place of term `k`, or of `k` and its
+    /// neighbours.
     pub(super) fn alternatives_criterion(&self, explained: &Decomposition, k: usize) -> f64 {
-        let terms = &explained.model.solution.terms;
-        let group = nearby_terms(terms, k);
+        let group = nearby_terms(explained.model.terms(), k);
         let alone = self.replacement_criterion(explained, k, &[k]);
         if group.len() > 1 { alone.min(self.replacement_criterion(explained, k, &group)) } else { alone }
     }
 
     fn replacement_criterion(&self, explained: &Decomposition, k: usize, of: &[usize]) -> f64 {
         let parts = &explained.model;
-        let start = parts.solution.terms[k];
+        let start = parts.terms()[k];
         let left: Vec<f64> = explained.residual_m.iter().map(|x| x.unwrap_or(0.0)).collect();
         let with = self.add_terms_back(parts, &left, of);
         let blocks = self.demodulate_blocks(&with, start.cycles);
         let square: f64 = with.iter().map(|x| x * x).sum();
         let alone = |line: bool| {
-            let left = |values: [f64; 3]| {
-                square
-                    - power_from_blocks(
-                        &blocks,
-                        &start,
-                        &UnsteadyOscillation::from_term(&start, values, line),
-                    )
-            };
+            let shape = |values: [f64; 3]| UnsteadyOscillation::from_term(&start, values, line);
+            let left = |values: [f64; 3]| square - power_from_blocks(&blocks, &start, &shape(values));
             let mut best = ([0.0; 3], left([0.0; 3]));
             let mut steps = FIRST_STEPS;
             for _ in 0..MOST_STEPS {
@@ -133,13 +121,13 @@ impl ModelSelector<'_> {
                     None => steps = steps.map(|step| step / 2.0),
                 }
             }
-            square - self.power_of_alternative(&with, &UnsteadyOscillation::from_term(&start, best.0, line))
+            square - self.power_of_alternative(&with, &shape(best.0))
         };
         let less = (of.len() - 1) as f64 * TERM_PARAMETERS;
         self.information_criterion_of(parts, alone(false).min(alone(true)), EXTRA_PARAMETERS - less)
     }
 
-    /// What a shape with the best amplitude and phase lowers the sum of squares by, m^2.
+    /// Reduction of the sum of squares by a shape with the best amplitude and phase, m^2.
     fn power_of_alternative(&self, values: &[f64], shape: &UnsteadyOscillation) -> f64 {
         let add = |[cc, cs, ss, xc, xs]: [f64; 5], (i, x): (usize, &f64)| {
             let (envelope, phase) = shape.envelope_and_phase((i as f64 + 0.5) / values.len() as f64);
@@ -152,7 +140,7 @@ impl ModelSelector<'_> {
         if determinant > 0.0 { (ss * xc * xc - 2.0 * cs * xc * xs + cc * xs * xs) / determinant } else { 0.0 }
     }
 
-    /// The record turned back by a frequency and summed over blocks.
+    /// The record demodulated by a frequency and summed over blocks.
     fn demodulate_blocks(&self, values: &[f64], cycles: f64) -> Vec<DemodulatedBlock> {
         let frames = values.len();
         let size = frames.div_ceil(BLOCKS);
@@ -173,22 +161,26 @@ impl ModelSelector<'_> {
 
 /// The oscillations that may be pieces of one with term `k`.
 pub(super) fn nearby_terms(terms: &[SinusoidTerm], k: usize) -> Vec<usize> {
-    let near =
-        |j: &usize| terms[*j].cycles > 0.0 && (terms[*j].cycles - terms[k].cycles).abs() < NEARBY_RESOLUTIONS;
+    let near = |j: &usize| terms[*j].cycles > 0.0 && are_near(&terms[*j], &terms[k]);
     (0..terms.len()).filter(near).collect()
+}
+
+fn are_near(a: &SinusoidTerm, b: &SinusoidTerm) -> bool {
+    (a.cycles - b.cycles).abs() < NEARBY_RESOLUTIONS
 }
 
 /// A block of frames.
 struct DemodulatedBlock {
-    /// The share of the record in its middle.
+    /// Time of its middle, in records.
     middle: f64,
-    /// The sum of its frames, turned back, m.
+    /// Sum of its demodulated frames, m.
     phasor: [f64; 2],
-    /// The sum of their weights.
+    /// Sum of their weights.
     weight: f64,
 }
 
-/// The same from blocks, but for a share of it that is about one over the cycles in the record.
+/// Approximates `power_of_alternative` from blocks; the relative error is about one over the cycles in the
+/// record.
 fn power_from_blocks(blocks: &[DemodulatedBlock], start: &SinusoidTerm, shape: &UnsteadyOscillation) -> f64 {
     let add = |[re, im, power]: [f64; 3], block: &DemodulatedBlock| {
         let (envelope, phase) = shape.envelope_and_phase(block.middle);

@@ -6,21 +6,21 @@ use serde::Serialize;
 use std::f64::consts::TAU;
 
 /// One component of a spectrum.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Component {
     /// Frequency, Hz.
     pub frequency_hz: f64,
-    /// Standard deviation of the frequency, Hz. Of least squares: what the rest around the component gives
-    /// it, and what it moves by with a richer trend. Of a periodogram: 1.6 times the Cramér-Rao bound, and
-    /// what a removed trend leaves.
+    /// Standard deviation of the frequency, Hz. Least squares: from the residual around the component, and
+    /// from the shift with a richer trend. Periodogram: 1.6 times the Cramér-Rao bound, and the effect of a
+    /// removed trend.
     pub frequency_sd_hz: f64,
-    /// Least and greatest frequency of a component that drifts; its frequency is the number of its cycles
-    /// over the time in which it was followed.
+    /// Least and greatest frequency of a component that drifts; `frequency_hz` is then its mean while it was
+    /// followed, by counting cycles.
     pub range_hz: Option<FrequencyRange>,
-    /// Where it begins, s from the first frame that was analysed; `None` for one that is there from the
-    /// start. Of a piece of a long record: where the piece starts, if it is there by then.
+    /// Start, s from the first frame analysed; `None` for a component present from the first frame. In a piece
+    /// of a long record: the start of the piece, if the component is present by then.
     pub begins_s: Option<f64>,
-    /// Amplitude of a steady oscillation; of a decaying one, where it begins or the record starts, m.
+    /// Amplitude, m; of a decaying component where it begins or the record starts.
     pub amplitude_m: f64,
     /// Standard deviation of the amplitude, m.
     pub amplitude_sd_m: f64,
@@ -38,13 +38,13 @@ pub struct Component {
     pub line_probability: Option<f64>,
     /// How it was read.
     pub estimator: Estimator,
-    /// What the frequency moves by when the trend takes two columns more, Hz.
+    /// Shift of the frequency when the trend takes two columns more, Hz.
     pub trend_shift_hz: Option<f64>,
-    /// Amplitude that the removed trend would have shown at this frequency, m.
+    /// Amplitude of the removed trend at this frequency, m.
     pub leakage_m: Option<f64>,
-    /// Part of the amplitude that the exposure has passed; `None` where the exposure is not known.
+    /// Exposure gain at this frequency, 0 to 1; `None` where the exposure is not known.
     pub exposure_passes: Option<f64>,
-    /// What else the frequency may be.
+    /// Faster frequencies that would appear at this one.
     pub folded_from: Vec<AliasSource>,
     /// The component of which this is a harmonic.
     pub harmonic_of: Option<Harmonic>,
@@ -52,19 +52,20 @@ pub struct Component {
     pub subharmonic_of: Option<Subharmonic>,
     /// The component of which this is a sideband.
     pub sideband_of: Option<Sideband>,
-    /// The multiple of the mains frequency that it is within its deviation of.
+    /// The multiple of the mains frequency that lies within its deviation.
     pub mains: Option<MainsMultiple>,
-    /// What the frequency is worth: the gravest of the reasons, or clear.
+    /// The gravest of the reasons, or clear.
     pub verdict: ComponentVerdict,
     /// All that was found against it, gravest first.
     pub reasons: Vec<ComponentReason>,
 }
 
 /// How a component was read.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Estimator {
     /// The top of a Hann-windowed periodogram.
+    #[default]
     Periodogram,
     /// Least squares of the trend and all components on the frames present.
     LeastSquares,
@@ -77,38 +78,9 @@ impl Component {
     pub(crate) fn is_resolvable(&self) -> bool {
         self.verdict != ComponentVerdict::NotResolvable
     }
-
-    /// With nothing known but how it is read.
-    pub(super) fn from_estimator(estimator: Estimator) -> Self {
-        Self {
-            frequency_hz: 0.0,
-            frequency_sd_hz: 0.0,
-            range_hz: None,
-            begins_s: None,
-            amplitude_m: 0.0,
-            amplitude_sd_m: 0.0,
-            damping_ratio: None,
-            damping_ratio_sd: None,
-            snr_db: 0.0,
-            cramer_rao_hz: 0.0,
-            line_probability: None,
-            estimator,
-            trend_shift_hz: None,
-            leakage_m: None,
-            exposure_passes: None,
-            folded_from: Vec::new(),
-            harmonic_of: None,
-            subharmonic_of: None,
-            sideband_of: None,
-            mains: None,
-            verdict: ComponentVerdict::Clear,
-            reasons: Vec::new(),
-        }
-    }
 }
 
-// The least variance that any unbiased reading of a frequency can have (Rife and Boorstyn 1974, for a
-// decaying tone summed frame by frame).
+// The Cramér-Rao bound of a frequency (Rife and Boorstyn 1974, for a decaying tone summed frame by frame).
 
 /// A decaying tone in white noise.
 #[derive(Debug, Clone, Copy)]
@@ -124,7 +96,7 @@ pub(super) struct DecayingTone {
 impl DecayingTone {
     /// Bound on the standard deviation of the frequency, Hz, with amplitude, phase and decay unknown.
     ///
-    /// Amplitude and decay say nothing of phase and frequency, so with weights `p = exp(-2 d t / T)` the
+    /// Amplitude and decay are uncorrelated with phase and frequency, so with weights `p = exp(-2 d t / T)` the
     /// information on the frequency is `(2 pi A)^2 / (2 sigma^2)` times the spread `sum p t^2 - (sum p t)^2 /
     /// sum p`. For a steady tone that is the closed form `fs / (2 pi) sqrt(12 / (eta N (N^2 - 1)))`, `eta =
     /// A^2 / (2 sigma^2)`.
@@ -141,24 +113,21 @@ impl DecayingTone {
     }
 }
 
-// What a component's frequency is worth.
-
-/// What a component's frequency is worth, gravest reason first.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+/// How far a component's frequency can be trusted, gravest reason first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum ComponentVerdict {
     /// Fewer than `MIN_CYCLES` in the record: the frequency depends on the trend and the window.
     NotResolvable,
     /// A faster oscillation that the motion may hold would appear at the same frequency.
     AliasSuspected,
-    /// No trend describes what it rides on, or a richer one moves it by more than three deviations, its
-    /// amplitude is within three of zero, a quarter of it is left around it, or no oscillation that keeps its
-    /// frequency and decays steadily explains it.
+    /// No trend describes the motion under it, or a richer trend moves it by more than three deviations; its
+    /// amplitude is within three deviations of zero; a quarter of it is left around it; or no oscillation of
+    /// constant frequency and steady decay explains it.
     Ambiguous,
     /// A multiple of a stronger component, to within four deviations.
     Harmonic,
-    /// A half or a third of a stronger component, or a multiple of these: not every beat is like the one
-    /// before.
+    /// A half or a third of a stronger component, or a multiple of these: beats alternate.
     Subharmonic,
     /// A stronger component, modulated by another.
     Sideband,
@@ -166,47 +135,50 @@ pub enum ComponentVerdict {
     Mains,
     /// The exposure has passed less than nine tenths of the amplitude.
     Attenuated,
-    /// Above what noise alone reaches once in a hundred spectra, but less than `CLEAR_DB` above the
-    /// noise floor.
+    /// Above the level that noise reaches once in a hundred spectra, but less than `CLEAR_DB` above the noise
+    /// floor.
     Weak,
-    /// Nothing of the above.
+    /// No reason against it.
+    #[default]
     Clear,
 }
 
 impl ComponentVerdict {
+    const NAMES: [&str; 10] = [
+        "not-resolvable",
+        "alias-suspected",
+        "ambiguous",
+        "harmonic",
+        "subharmonic",
+        "sideband",
+        "mains",
+        "attenuated",
+        "weak",
+        "clear",
+    ];
+
     /// The word in files and tables.
     #[must_use]
     pub fn name(self) -> &'static str {
-        match self {
-            Self::NotResolvable => "not-resolvable",
-            Self::AliasSuspected => "alias-suspected",
-            Self::Ambiguous => "ambiguous",
-            Self::Harmonic => "harmonic",
-            Self::Subharmonic => "subharmonic",
-            Self::Sideband => "sideband",
-            Self::Mains => "mains",
-            Self::Attenuated => "attenuated",
-            Self::Weak => "weak",
-            Self::Clear => "clear",
-        }
+        Self::NAMES[self as usize]
     }
 }
 
-/// A verdict with what it rests on.
+/// A verdict with the numbers behind it.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComponentReason {
     /// The verdict.
     pub verdict: ComponentVerdict,
-    /// The numbers behind it, in words.
+    /// The numbers, in a sentence.
     pub words: String,
 }
 
-/// A frequency that would appear at a component's.
+/// A faster frequency that would appear at that of a component.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct AliasSource {
     /// The faster frequency, Hz.
     pub frequency_hz: f64,
-    /// Part of its amplitude that the exposure would have passed, where that is known.
+    /// Exposure gain at the faster frequency, 0 to 1; `None` where the exposure is not known.
     pub exposure_passes: Option<f64>,
 }
 
@@ -217,16 +189,16 @@ pub struct Subharmonic {
     pub frequency_hz: f64,
     /// The fraction's numerator.
     pub numerator: usize,
-    /// Its denominator: so many beats pass until one is like the first.
+    /// Its denominator: beats until one is like the first.
     pub denominator: usize,
 }
 
-/// A component that another is modulated from.
+/// A carrier of which another component is a sideband.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Sideband {
-    /// Frequency of the component, Hz.
+    /// Frequency of the carrier, Hz.
     pub frequency_hz: f64,
-    /// Frequency that it is modulated with, Hz.
+    /// Modulation frequency, Hz.
     pub modulation_hz: f64,
 }
 

@@ -93,21 +93,23 @@ pub(super) fn check_band(band_hz: Option<(f64, f64)>, frame_rate_hz: f64) -> Res
     }
 }
 
-/// The padded length and the trend, after every check of record and band.
+/// Frame and value of the first sample that is no number or whose square overflows.
+pub(super) fn find_unusable(samples: &[Option<f64>]) -> Option<(usize, f64)> {
+    const LARGEST: f64 = 1e100;
+    let unusable = |x: &f64| x.is_nan() || x.abs() > LARGEST;
+    samples.iter().enumerate().find_map(|(i, x)| Some((i, x.filter(unusable)?)))
+}
+
+/// Checks record and band; returns the padded length and the trend.
 pub(super) fn check_record(
     samples: &[Option<f64>],
     frame_rate_hz: f64,
     settings: &SpectrumSettings,
 ) -> Result<(usize, Trend), SpectrumError> {
-    /// Squares of larger values overflow.
-    const LARGEST: f64 = 1e100;
     if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
         return Err(SpectrumError::FrameRate { found: frame_rate_hz });
     }
-    let unusable = |x: &f64| x.is_nan() || x.abs() > LARGEST;
-    if let Some((frame, found)) =
-        samples.iter().enumerate().find_map(|(i, x)| x.filter(unusable).map(|x| (i, x)))
-    {
+    if let Some((frame, found)) = find_unusable(samples) {
         return Err(SpectrumError::NotFinite { frame, found });
     }
     let found = samples.iter().flatten().count();

@@ -1,26 +1,25 @@
-//! Short gaps in a record, bridged for the transform alone.
+//! Short gaps in a record, filled for the transform alone.
 //!
 //! A frame of weight zero leaks a little of every component over the whole spectrum: with one frame in forty
-//! missing, a ring-down of 180 um buries a cycle of 6 um. Short gaps are therefore filled with the values
-//! that make the sum of squared fourth differences least, which reproduces cubics exactly and a component of
-//! frequency f to `(2 sin(pi f/fs))^8/70` for a single frame: 2.5 % at 900 Hz and 5,000 frames/s, 1e-12 at 78
-//! Hz. Longer gaps stay gaps of weight zero. The recording itself is never filled.
+//! missing, a ring-down of 180 um buries a cycle of 6 um. Short gaps are therefore filled with the values that
+//! minimise the sum of squared fourth differences. That reproduces cubics exactly, and a component of frequency
+//! f to `(2 sin(pi f/fs))^8/70` for a single frame: 2.5 % at 900 Hz and 5,000 frames/s, 1e-12 at 78 Hz. Longer
+//! gaps stay gaps of weight zero. The recording itself is never filled.
 //!
 //! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um, a reversal, frames lost at random;
-//! rms error of the frequencies, with bridging | without): 20 % lost 0.014 and 0.022 Hz | 0.077 and 0.31 Hz;
-//! 40 % lost 0.083 and 0.093 Hz | 0.11 and 0.42 Hz. At 3 um and 40 % the fast component is always found with
-//! bridging and missed in two of three records without. The price is its amplitude, which reads 2 % low with
-//! 20 % lost and 9 % low with 40 %. The components of such records are therefore refined without
-//! (`spectrum/refine.rs`); the curve is not.
+//! rms error of the frequencies, with filling | without): 20 % lost 0.014 and 0.022 Hz | 0.077 and 0.31 Hz; 40 %
+//! lost 0.083 and 0.093 Hz | 0.11 and 0.42 Hz. At 3 um and 40 % the fast component is always found with filling
+//! and missed in two of three records without. The cost is its amplitude, which reads 2 % low with 20 % lost and
+//! 9 % low with 40 %. The components of such records are therefore refined without filling
+//! (`gap_refinement.rs`); the curve is not.
 
 use rayon::prelude::*;
 
-/// Longest gap that is bridged, frames: beyond it the fill amplifies noise more than a gap of weight zero
-/// costs.
+/// Longest gap that is filled, frames: a longer fill amplifies noise more than a gap of weight zero costs.
 pub(crate) const LONGEST_FILLED_GAP: usize = 4;
 const DIFFERENCE: [f64; 5] = [1.0, -4.0, 6.0, -4.0, 1.0];
 const ORDER: usize = DIFFERENCE.len() - 1;
-/// Most frames solved for together; a record with so dense gaps keeps the rest as gaps.
+/// Most frames solved for together; the rest of a denser cluster is solved apart.
 const MOST_UNKNOWNS: usize = 64;
 
 /// Frames from which clusters are solved in parallel: below, all of them take a few milliseconds.
@@ -28,27 +27,18 @@ const PARALLEL_FROM: usize = 1 << 17;
 /// Clusters that a thread takes at a time.
 const CLUSTERS_AT_ONCE: usize = 256;
 
-/// The record with its short gaps filled; what cannot be filled stays `None`.
+/// The record with its short gaps filled; frames that cannot be filled stay `None`.
 pub(crate) fn fill_short_gaps(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     let mut filled = samples.to_vec();
-    let short: Vec<usize> = missing_runs(samples)
-        .into_iter()
-        .filter(|(from, to)| to - from <= LONGEST_FILLED_GAP)
-        .flat_map(|(from, to)| from..to)
-        .collect();
+    let runs = missing_runs(samples).into_iter().filter(|(from, to)| to - from <= LONGEST_FILLED_GAP);
+    let short: Vec<usize> = runs.flat_map(|(from, to)| from..to).collect();
     let near = |a: &usize, b: &usize| b - a <= ORDER;
     let clusters: Vec<&[usize]> =
         short.chunk_by(near).flat_map(|cluster| cluster.chunks(MOST_UNKNOWNS)).collect();
     let solved = |clusters: &[&[usize]]| -> Vec<(usize, f64)> {
-        let mut filled = Vec::new();
-        for cluster in clusters {
-            filled.extend(
-                solve_cluster(samples, cluster)
-                    .into_iter()
-                    .flat_map(|values| cluster.iter().copied().zip(values)),
-            );
-        }
-        filled
+        let solved =
+            |cluster: &&[usize]| Some(cluster.to_vec().into_iter().zip(solve_cluster(samples, cluster)?));
+        clusters.iter().filter_map(solved).flatten().collect()
     };
     let values = if samples.len() < PARALLEL_FROM {
         vec![solved(&clusters)]
@@ -74,21 +64,15 @@ fn missing_runs(samples: &[Option<f64>]) -> Vec<(usize, usize)> {
 /// Least squares over every fourth difference that touches the cluster and no other missing frame.
 fn solve_cluster(samples: &[Option<f64>], cluster: &[usize]) -> Option<[f64; MOST_UNKNOWNS]> {
     let (first, last) = (*cluster.first()?, *cluster.last()?);
-    let mut normal = BandedNormalEquations {
-        band: [[0.0; ORDER + 1]; MOST_UNKNOWNS],
-        right_hand_side: [0.0; MOST_UNKNOWNS],
-    };
+    let mut normal =
+        BandedNormalEquations { band: [[0.0; ORDER + 1]; MOST_UNKNOWNS], right: [0.0; MOST_UNKNOWNS] };
     let (mut differences, mut next) = (0, 0);
     for start in first.saturating_sub(ORDER)..=last.min(samples.len().checked_sub(ORDER + 1)?) {
         next += cluster[next..].iter().take_while(|frame| **frame < start).count();
-        differences += usize::from(normal.add_difference(
-            &samples[start..=start + ORDER],
-            start,
-            next,
-            &cluster[next..],
-        ));
+        let difference = &samples[start..=start + ORDER];
+        differences += usize::from(normal.add_difference(difference, start, next, &cluster[next..]));
     }
-    // as many differences again as unknowns: a fill that leans on one side alone would extrapolate
+    // as many differences again as unknowns: a fill supported from one side only would extrapolate
     if differences < cluster.len() + ORDER { None } else { normal.cholesky_solve(cluster.len()) }
 }
 
@@ -96,12 +80,12 @@ fn solve_cluster(samples: &[Option<f64>], cluster: &[usize]) -> Option<[f64; MOS
 struct BandedNormalEquations {
     /// The diagonal and what is under it, column by column.
     band: [[f64; ORDER + 1]; MOST_UNKNOWNS],
-    right_hand_side: [f64; MOST_UNKNOWNS],
+    right: [f64; MOST_UNKNOWNS],
 }
 
 impl BandedNormalEquations {
-    /// Adds the difference over the frames from `start` on, if none but those `missing` from there on, of
-    /// which the first has the place `place`, is without a value; says whether.
+    /// Adds the difference over the frames from `start` on and returns true, unless one of them is missing that
+    /// is not in `missing`. The first of `missing` has the index `place` among the unknowns.
     fn add_difference(
         &mut self,
         samples: &[Option<f64>],
@@ -121,24 +105,20 @@ impl BandedNormalEquations {
             }
         }
         for (i, weight) in weights[..unknowns].iter().enumerate() {
-            self.right_hand_side[place + i] -= weight * known;
-            self.band[place + i]
-                .iter_mut()
-                .zip(&weights[i..unknowns])
-                .for_each(|(entry, other)| *entry += weight * other);
+            self.right[place + i] -= weight * known;
+            let row = self.band[place + i].iter_mut().zip(&weights[i..unknowns]);
+            row.for_each(|(entry, other)| *entry += weight * other);
         }
         unknowns > 0
     }
 
-    /// The first `count` unknowns, by Cholesky's factors; `None` where the equations do not fix them.
+    /// The first `count` unknowns, by Cholesky's factors; `None` where the equations do not determine them.
     fn cholesky_solve(mut self, count: usize) -> Option<[f64; MOST_UNKNOWNS]> {
         for j in 0..count {
             for k in j.saturating_sub(ORDER)..j {
                 let (above, factor) = (self.band[k], self.band[k][j - k]);
-                self.band[j]
-                    .iter_mut()
-                    .zip(&above[j - k..])
-                    .for_each(|(entry, other)| *entry -= factor * other);
+                let row = self.band[j].iter_mut().zip(&above[j - k..]);
+                row.for_each(|(entry, other)| *entry -= factor * other);
             }
             let [diagonal, under @ ..] = &mut self.band[j];
             if diagonal.is_nan() || *diagonal <= 0.0 {
@@ -147,22 +127,18 @@ impl BandedNormalEquations {
             *diagonal = diagonal.sqrt();
             under.iter_mut().for_each(|entry| *entry /= *diagonal);
         }
-        self.substitute_triangular(count);
-        Some(self.right_hand_side)
-    }
-
-    fn substitute_triangular(&mut self, count: usize) {
+        let (band, mut right) = (self.band, self.right);
         for j in 0..count {
-            self.right_hand_side[j] /= self.band[j][0];
+            right[j] /= band[j][0];
             for i in 1..=ORDER.min(count - 1 - j) {
-                self.right_hand_side[j + i] -= self.band[j][i] * self.right_hand_side[j];
+                right[j + i] -= band[j][i] * right[j];
             }
         }
         for j in (0..count).rev() {
-            let below: f64 =
-                (1..=ORDER.min(count - 1 - j)).map(|i| self.band[j][i] * self.right_hand_side[j + i]).sum();
-            self.right_hand_side[j] = (self.right_hand_side[j] - below) / self.band[j][0];
+            let below: f64 = (1..=ORDER.min(count - 1 - j)).map(|i| band[j][i] * right[j + i]).sum();
+            right[j] = (right[j] - below) / band[j][0];
         }
+        Some(right)
     }
 }
 

@@ -1,18 +1,18 @@
-//! Components refined on the true frame times, where too many frames are missing for a bridge alone.
+//! Components refined on the true frame times, where too many frames are missing for gap filling alone.
 //!
-//! With more than [`REFINED_MISSING`] of the frames missing, trend and steady sinusoids are fitted together
-//! to the frames present (`least_squares.rs`). What the fit leaves, its rest, decides what follows:
-//! - it is white: the sinusoids are all there is, so every frame present counts the same, which is the most
-//!   exact, and what the bridge had put between them is found to be absent;
-//! - it is not (the cycle decays or drifts, the flip is no cubic): only this rest is bridged, the model is
-//!   put back, and the fit is repeated with the Hann weights of the transform. Without gaps that is the
-//!   maximum of the windowed periodogram, so that such a cycle reads the same with and without gaps.
+//! With more than [`REFINED_MISSING`] of the frames missing, trend and steady sinusoids are fitted together to
+//! the frames present (`least_squares.rs`). The residual of the fit decides what follows:
+//! - It is white: the sinusoids are the whole signal. Every frame present then counts the same, which is most
+//!   accurate, and components that the filling created are found to be absent.
+//! - It is not (the cycle decays or drifts, the flip is no cubic): only the residual is filled, the model is
+//!   added back, and the fit is repeated with the Hann weights of the transform. Without gaps that is the
+//!   maximum of the windowed periodogram, so such a cycle reads the same with and without gaps.
 //!
-//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um with 20 dB of noise, a reversal, 40
-//! % of the frames missing at random, 50 records; rms error of the frequencies, bridged alone | refined):
-//! 0.10 and 0.11 Hz | 0.007 and 0.019 Hz, 1.1 times the Cramér-Rao bound; the amplitude of the fast one reads
-//! 9 % | 0.04 % low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a damping ratio of 0.05: 0.11
-//! and 0.13 Hz | 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
+//! Measured on 0.15 s at 5,000 frames/s (78.4 Hz at 20 um, 900 Hz at 8 um with 20 dB of noise, a reversal, 40 %
+//! of the frames missing at random, 50 records; rms error of the frequencies, filled alone | refined): 0.10 and
+//! 0.11 Hz | 0.007 and 0.019 Hz, 1.1 times the Cramér-Rao bound; the amplitude of the fast one reads 9 % | 0.04 %
+//! low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a damping ratio of 0.05: 0.11 and 0.13 Hz |
+//! 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
 
 use super::least_squares::{FreeParameters, SinusoidProblem, SinusoidSolution, SinusoidTerm, Tolerance};
 use super::settings::MAX_COMPONENTS;
@@ -20,42 +20,41 @@ use super::trend::Trend;
 use super::{gap_filling, periodogram};
 use crate::math;
 
-/// Share of missing frames above which components are refined; below, bridged gaps move 900 Hz by hundredths
-/// of a hertz only.
+/// Share of missing frames above which components are refined; below, filled gaps move 900 Hz by hundredths of a
+/// hertz only.
 pub(crate) const REFINED_MISSING: f64 = 0.10;
 /// Most components fitted together, largest first; smaller ones keep their start.
 pub(super) const MOST_REFINED: usize = MAX_COMPONENTS;
 /// Frames for each unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 4;
-/// What is left is white while its mean square stays below this many times that of noise: of sixty fourth
-/// differences one in a thousand says otherwise, and a misfit as large as the noise leaks no more than the
-/// noise does.
+/// The residual is white while its mean square is below this many times that of noise: of sixty fourth
+/// differences one in a thousand exceeds it, and a misfit as large as the noise leaks no more than the noise.
 const WHITE_RATIO: f64 = 2.0;
 /// Fewest fourth differences that tell noise from a cycle.
 const FEWEST_DIFFERENCES: usize = 20;
-/// Times what is left is bridged: the second moves what the first did by a tenth.
+/// Times the residual is filled: the second moves the result of the first by a tenth.
 const FILL_ROUNDS: usize = 2;
 
-/// Where the transform saw a component.
+/// A component as the transform shows it.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RefinementStart {
     /// Frequency, cycles in the record.
     pub cycles: f64,
-    /// Whether the frequency may move; that of a remainder of the trend may not.
+    /// Whether the frequency may move; that of a residue of the trend may not.
     pub moves: bool,
 }
 
-/// What the frames present say of a component.
+/// A component as the frames present show it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RefinedComponent {
     /// Frequency, cycles in the record.
     pub cycles: f64,
     pub amplitude_m: f64,
-    /// How well they are known; `None` where the rest is no noise, and tells nothing of it.
+    /// `None` where the residual is not white and so does not determine them.
     pub deviations: Option<RefinedDeviations>,
 }
 
-/// Standard deviations from the normal matrix and the size of a white rest.
+/// Standard deviations from the normal matrix and the size of a white residual.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct RefinedDeviations {
     /// Of the frequency, cycles in the record.
@@ -64,13 +63,12 @@ pub(super) struct RefinedDeviations {
     pub amplitude_m: f64,
 }
 
-/// What became of a start.
+/// Result of a refinement.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum RefinementOutcome {
-    /// It stands as the transform saw it.
+    /// The component stays as the transform shows it.
     Unchanged,
-    /// It stands as the transform saw it, though at that frequency the frames present leave it this
-    /// amplitude, m.
+    /// It stays as the transform shows it, though the frames present have this amplitude, m, at its frequency.
     FixedFrequency(f64),
     Refined(RefinedComponent),
 }
@@ -85,10 +83,12 @@ pub(super) fn refine_components(
     let present = samples.iter().flatten().count();
     let unknowns = trend.column_count() + 3 * fitted.len();
     let gappy = (samples.len() - present) as f64 > REFINED_MISSING * samples.len() as f64;
-    let mut outcomes = Vec::new();
-    if gappy && present >= FRAMES_PER_UNKNOWN * unknowns && fitted.iter().any(|s| s.moves) {
-        outcomes = fit_components(samples, trend, fitted).unwrap_or_default();
-    }
+    let mut outcomes = if gappy && present >= FRAMES_PER_UNKNOWN * unknowns && fitted.iter().any(|s| s.moves)
+    {
+        fit_components(samples, trend, fitted).unwrap_or_default()
+    } else {
+        Vec::new()
+    };
     outcomes.resize(starts.len(), RefinementOutcome::Unchanged);
     outcomes
 }
@@ -132,8 +132,8 @@ fn fit_components(
     outcome
 }
 
-/// What became of each start; `white` says that the weights are one and the rest is noise, so that deviations
-/// follow from it.
+/// Result for each start. `white` says that all weights are one and the residual is noise, which determines the
+/// deviations.
 fn refinement_outcomes(
     problem: &SinusoidProblem,
     solved: &SinusoidSolution,
@@ -153,23 +153,18 @@ fn refinement_outcomes(
             (false, _) => RefinementOutcome::Unchanged,
             (true, false) => RefinementOutcome::FixedFrequency(amplitude_m),
             (true, true) => {
-                let deviations = covariance.as_ref().map(|c| c.deviations(k, pair));
-                let deviations = deviations.map(|sd| RefinedDeviations {
-                    cycles: sd.cycles * noise_m,
-                    amplitude_m: sd.amplitude * noise_m,
+                let deviations = covariance.as_ref().map(|c| c.deviations(k, pair)).map(|sd| {
+                    RefinedDeviations { cycles: sd.cycles * noise_m, amplitude_m: sd.amplitude * noise_m }
                 });
-                RefinementOutcome::Refined(RefinedComponent {
-                    cycles: solved.terms[k].cycles,
-                    amplitude_m,
-                    deviations,
-                })
+                let cycles = solved.terms[k].cycles;
+                RefinementOutcome::Refined(RefinedComponent { cycles, amplitude_m, deviations })
             }
         }
     };
     Some(starts.iter().enumerate().map(outcome).collect())
 }
 
-/// Whether the values scatter from frame to frame as much as they do at all: fourth differences of white
+/// Whether the values scatter from frame to frame as much as over the whole record: fourth differences of white
 /// noise have 70 times its variance.
 fn is_white(left: &[Option<f64>]) -> bool {
     const GAIN: f64 = 70.0;

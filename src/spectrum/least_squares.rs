@@ -1,11 +1,10 @@
-//! A trend and (decaying) sinusoids fitted together to the frames present: the most exact reading where they
-//! are all there is.
+//! Trend and (decaying) sinusoids fitted together to the frames present: the most accurate reading where the
+//! record holds nothing else.
 //!
-//! Model: `x = sum c_p L_p + sum exp(-d_k ((u + 1) / 2 - s_k)) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with
-//! `u` from -1 to 1 over the record, so `n` are cycles and `d` nepers in it; a term is zero before the share
-//! `s`. Amplitudes are solved for at every step (they are linear), cycles and nepers move by Gauss-Newton
-//! steps that are halved until the misfit falls. All of it works on inner products of columns, which are
-//! summed once a step.
+//! Model: `x = sum c_p L_p + sum exp(-d_k ((u + 1) / 2 - s_k)) (a_k cos(pi n_k u) + b_k sin(pi n_k u))` with `u`
+//! from -1 to 1 over the record, so `n` are cycles and `d` nepers in it; a term is zero before its start `s`.
+//! Amplitudes are linear and solved for at every step. Cycles and nepers move by Gauss-Newton steps, halved until
+//! the misfit falls. All of it works on inner products of columns, which are summed once a step.
 
 mod columns;
 
@@ -23,23 +22,23 @@ const MOST_FREQUENCY_SHIFT: f64 = 1.0;
 const MOST_HALVINGS: i32 = 8;
 /// A step below this many cycles or nepers is the last.
 const SMALLEST_STEP: f64 = 1e-6;
-/// Directions of the normal matrix, scaled to a diagonal of ones, below this share of the largest are not in
-/// the data.
+/// Directions of the normal matrix, scaled to a unit diagonal, below this share of the largest are not determined
+/// by the data.
 const SINGULAR_DIRECTION: f64 = 1e-10;
-/// Pivots of that matrix from which on all directions are in the data: what is left of a column without those
-/// before it is a thousandth of it at least.
+/// Pivots of that matrix from which all directions are determined: each column then keeps a thousandth of its
+/// length next to those before it.
 const WELL_POSED_PIVOT: f64 = 1e-6;
 /// Most nepers gained over the record: a growth by a factor of 400 is a transient at its end.
 const MOST_GROWTH: f64 = 6.0;
-/// Largest damping ratio of an oscillation: beyond a half nothing is left of it after one cycle.
+/// Largest damping ratio of an oscillation: above a half, nothing is left of it after one cycle.
 const MOST_DAMPING: f64 = 0.5;
-/// Most nepers of a relaxation over the record: it is over within a hundredth of it.
+/// Most nepers of a relaxation over the record: it is over within a hundredth of the record.
 const MOST_RELAXED: f64 = 500.0;
-/// The same for one at the end of the record: it is counted from the start, and the squares of greater growth
+/// The same for a relaxation at the end of the record. It grows from the start, and the squares of greater growth
 /// would come near the largest number.
 const MOST_RELAXED_AT_END: f64 = 330.0;
 
-/// What of a term moves.
+/// Parameters of a term that a fit moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum FreeParameters {
     Amplitude,
@@ -58,32 +57,32 @@ impl FreeParameters {
         matches!(self, Self::Nepers | Self::CyclesAndNepers)
     }
 
-    /// How many numbers move, amplitudes apart.
+    /// Number of moving parameters besides the amplitudes.
     pub(super) fn count(self) -> usize {
         usize::from(self.moves_cycles()) + usize::from(self.moves_nepers())
     }
 }
 
-/// A sinusoid, decaying or not, or with no cycles a relaxation.
+/// A sinusoid, decaying or not; a relaxation if it has no cycles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct SinusoidTerm {
     /// Cycles in the record.
     pub cycles: f64,
     /// Nepers by which it decays over the record.
     pub nepers: f64,
-    /// The first frame that it is in.
+    /// First frame in which it is present.
     pub first: usize,
-    /// What of it moves.
+    /// Parameters that a fit moves.
     pub free: FreeParameters,
 }
 
 impl SinusoidTerm {
-    /// One that is there from the first frame on.
+    /// A term that is present from the first frame on.
     pub(super) fn from_start(cycles: f64, nepers: f64, free: FreeParameters) -> Self {
         Self { cycles, nepers, first: 0, free }
     }
 
-    /// How far the nepers may go.
+    /// Least and most nepers that a fit may reach.
     pub(super) fn nepers_bounds(&self) -> (f64, f64) {
         if self.cycles == 0.0 {
             (-MOST_RELAXED_AT_END, MOST_RELAXED)
@@ -101,40 +100,33 @@ pub(super) fn nepers_from_damping_ratio(cycles: f64, damping_ratio: f64) -> f64 
 /// How closely a minimum is approached.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Tolerance {
-    /// To a few hundredths of a deviation: there is more to come.
+    /// To a few hundredths of a deviation: more terms follow.
     Coarse,
     /// To the last step that lowers the misfit.
     Fine,
 }
 
 impl Tolerance {
-    /// A step that lowers the misfit by a smaller share is the last: of 450 frames [`Self::Fine`] is a
-    /// thousandth of a deviation, of a million a hundredth.
-    fn least_misfit_decrease(self) -> f64 {
+    /// Relative decrease of the misfit below which a step is the last, and most steps. [`Self::Fine`] is a
+    /// thousandth of a deviation for 450 frames, a hundredth for a million. A steady tone takes four steps, a
+    /// drifting one a dozen; a signal that is no sinusoid may never converge.
+    fn least_decrease_and_most_steps(self) -> (f64, usize) {
         match self {
-            Self::Coarse => 1e-6,
-            Self::Fine => 1e-10,
-        }
-    }
-
-    /// Steps: a steady tone takes four, a drifting one a dozen, what no sinusoid describes never ends.
-    fn most_steps(self) -> usize {
-        match self {
-            Self::Coarse => 8,
-            Self::Fine => 30,
+            Self::Coarse => (1e-6, 8),
+            Self::Fine => (1e-10, 30),
         }
     }
 }
 
-/// A record, how its frames count, and the trend, which is fitted again: sinusoids and trend are not
-/// orthogonal.
+/// A record with the weights of its frames, and its trend, which is fitted together with the sinusoids because
+/// they are not orthogonal.
 #[derive(Debug, Clone)]
 pub(super) struct SinusoidProblem {
     pub trend: Trend,
     /// Sum of the weights.
     pub weight: f64,
     frames: usize,
-    fixed_columns: Rc<FixedColumns>,
+    columns: Rc<FixedColumns>,
 }
 
 #[derive(Debug, Clone)]
@@ -150,31 +142,27 @@ pub(super) struct SinusoidSolution {
 impl SinusoidProblem {
     /// A record, m, with the weight of each frame, zero where there is none.
     pub(super) fn new(data: &[f64], weights: &[f64], trend: Trend) -> Self {
-        Self {
-            trend,
-            weight: weights.iter().sum(),
-            frames: data.len(),
-            fixed_columns: Rc::new(FixedColumns::new(trend, data, weights)),
-        }
+        let columns = Rc::new(FixedColumns::new(trend, data, weights));
+        Self { trend, weight: weights.iter().sum(), frames: data.len(), columns }
     }
 
-    /// Moves what is free to where the misfit is least; `None` where the normal matrix is no finite one. A
-    /// term that wants to leave its peak goes back and keeps its frequency; one that wants to decay or grow
-    /// beyond bounds becomes steady.
+    /// Minimises the misfit over the free parameters; `None` where the normal matrix is not finite. A term whose
+    /// step would leave its peak returns to it and keeps its frequency; one that would decay or grow beyond
+    /// bounds becomes steady.
     pub(super) fn gauss_newton(&self, terms: &[SinusoidTerm], care: Tolerance) -> Option<SinusoidSolution> {
+        let (least_decrease, most_steps) = care.least_decrease_and_most_steps();
         let mut solved = self.solve_amplitudes(terms.to_vec())?;
-        for _ in 0..care.most_steps() {
+        for _ in 0..most_steps {
             let step = self.gauss_newton_step(&solved)?;
-            let left: Vec<_> =
-                (0..terms.len()).map(|k| constrain_step(&terms[k], &solved.terms[k], step[k])).collect();
-            if let Some(k) = left.iter().position(Option::is_some) {
+            let constrain = |k: usize| Some((k, constrain_step(&terms[k], &solved.terms[k], step[k])?));
+            if let Some((k, constrained)) = (0..terms.len()).find_map(constrain) {
                 let mut held = solved.terms;
-                held[k] = left[k].unwrap_or(held[k]);
+                held[k] = constrained;
                 solved = self.solve_amplitudes(held)?;
                 continue;
             }
             let Some(next) = self.halve_until_descent(&solved, &step) else { break };
-            let settled = next.misfit > (1.0 - care.least_misfit_decrease()) * solved.misfit
+            let settled = next.misfit > (1.0 - least_decrease) * solved.misfit
                 || step.iter().flatten().all(|s| s.abs() < SMALLEST_STEP);
             solved = next;
             if settled {
@@ -208,15 +196,15 @@ impl SinusoidProblem {
         [0, 1].map(|part| solved.amplitudes[self.trend.column_count() + 2 * k + part])
     }
 
-    /// Numbers that were fitted.
+    /// Number of fitted parameters.
     pub(super) fn unknown_count(&self, terms: &[SinusoidTerm]) -> usize {
         let amplitudes = |t: &SinusoidTerm| if t.cycles == 0.0 { 1 } else { 2 };
         self.trend.column_count() + terms.iter().map(|t| amplitudes(t) + t.free.count()).sum::<usize>()
     }
 
-    /// The amplitudes that leave least at given terms.
+    /// The amplitudes of least misfit at given terms.
     pub(super) fn solve_amplitudes(&self, terms: Vec<SinusoidTerm>) -> Option<SinusoidSolution> {
-        let gram = self.fixed_columns.gram_matrix::<QUADRATURE_COLUMNS>(&terms);
+        let gram = self.columns.gram_matrix::<QUADRATURE_COLUMNS>(&terms);
         let last = gram.ncols() - 1;
         let right = gram.column(last).rows(0, last).into_owned();
         let amplitudes = pseudo_inverse(&gram.view((0, 0), (last, last)).into_owned())? * &right;
@@ -238,16 +226,12 @@ impl SinusoidProblem {
         })
     }
 
-    fn linear_column_indices(&self, terms: usize) -> Vec<usize> {
-        let trend = self.trend.column_count();
-        let of = |k| [TermColumn::Cosine.column_index(trend, k), TermColumn::Sine.column_index(trend, k)];
-        (0..trend).chain((0..terms).flat_map(of)).collect()
-    }
-
-    /// The unknowns as combinations of the columns: the linear ones, then cycles and nepers of each term
-    /// where they are free.
+    /// The unknowns as combinations of the columns: the linear ones, then cycles and nepers of each term where
+    /// they are free.
     fn unknowns_matrix(&self, solved: &SinusoidSolution) -> DMatrix<f64> {
-        let (trend, linear) = (self.trend.column_count(), self.linear_column_indices(solved.terms.len()));
+        let trend = self.trend.column_count();
+        let pair = |k| [TermColumn::Cosine, TermColumn::Sine].map(|column| column.column_index(trend, k));
+        let linear: Vec<usize> = (0..trend).chain((0..solved.terms.len()).flat_map(pair)).collect();
         let moving: usize = solved.terms.iter().map(|t| t.free.count()).sum();
         let columns = trend + COLUMNS_WITH_SLOPES * solved.terms.len() + 1;
         let mut map = DMatrix::zeros(columns, linear.len() + moving);
@@ -265,8 +249,8 @@ impl SinusoidProblem {
                 place += 1;
             }
             if term.free.moves_nepers() {
-                // of exp(-d ((u + 1) / 2 - s)): s - (u + 1) / 2 times the term; the slopes are -pi u sin and
-                // pi u cos
+                // derivative of exp(-d ((u + 1) / 2 - s)): s - (u + 1) / 2 times the term; the slopes are
+                // -pi u sin and pi u cos
                 let since = term.first as f64 / self.frames as f64 - 0.5;
                 add(TermColumn::Cosine, place, since * cosine);
                 add(TermColumn::Sine, place, since * sine);
@@ -278,30 +262,25 @@ impl SinusoidProblem {
         map
     }
 
-    /// The Gauss-Newton step of cycles and nepers of each term; zero for what is held.
+    /// The Gauss-Newton step of cycles and nepers of each term; zero for held parameters.
     fn gauss_newton_step(&self, solved: &SinusoidSolution) -> Option<Vec<[f64; 2]>> {
-        let (map, gram) = (
-            self.unknowns_matrix(solved),
-            self.fixed_columns.gram_matrix::<COLUMNS_WITH_SLOPES>(&solved.terms),
-        );
+        let map = self.unknowns_matrix(solved);
+        let gram = self.columns.gram_matrix::<COLUMNS_WITH_SLOPES>(&solved.terms);
         let linear = solved.amplitudes.len();
         let mut left = -(map.columns(0, linear) * &solved.amplitudes);
-        left[map.nrows() - 1] = 1.0; // what is left, as a combination of the columns: the data less the model
+        left[map.nrows() - 1] = 1.0; // the residual as a combination of the columns: the data less the model
         let towards = map.tr_mul(&(&gram * left));
         let change = pseudo_inverse(&map.tr_mul(&(&gram * &map)))? * towards;
         let mut moves = change.iter().skip(linear).copied();
         let mut take = |free: bool| if free { moves.next().unwrap_or(0.0) } else { 0.0 };
-        Some(
-            solved.terms.iter().map(|t| [take(t.free.moves_cycles()), take(t.free.moves_nepers())]).collect(),
-        )
+        let mut step = |t: &SinusoidTerm| [take(t.free.moves_cycles()), take(t.free.moves_nepers())];
+        Some(solved.terms.iter().map(&mut step).collect())
     }
 
-    /// Covariance of the unknowns for a rest of white noise of variance one, and each term's place in it.
+    /// Covariance of the unknowns for a residual of unit white noise, and the indices of each term in it.
     pub(super) fn covariance(&self, solved: &SinusoidSolution) -> Option<SinusoidCovariance> {
-        let (map, gram) = (
-            self.unknowns_matrix(solved),
-            self.fixed_columns.gram_matrix::<COLUMNS_WITH_SLOPES>(&solved.terms),
-        );
+        let map = self.unknowns_matrix(solved);
+        let gram = self.columns.gram_matrix::<COLUMNS_WITH_SLOPES>(&solved.terms);
         let matrix = pseudo_inverse(&map.tr_mul(&(gram * &map)))?;
         let mut next = solved.amplitudes.len();
         let mut take = |free: bool| {
@@ -314,8 +293,7 @@ impl SinusoidProblem {
             cycles: take(t.free.moves_cycles()),
             nepers: take(t.free.moves_nepers()),
         };
-        let places = solved.terms.iter().enumerate().map(place).collect();
-        Some(SinusoidCovariance { matrix, places })
+        Some(SinusoidCovariance { matrix, places: solved.terms.iter().enumerate().map(place).collect() })
     }
 }
 
@@ -352,23 +330,17 @@ impl SinusoidCovariance {
             + 2.0 * along[0] * along[1] * variance(0, 1)
             + math::powi(along[1], 2) * variance(1, 1);
         let of = |place: Option<usize>| place.map_or(0.0, |i| self.matrix[(i, i)].max(0.0).sqrt());
-        TermDeviations {
-            cycles: of(place.cycles),
-            nepers: of(place.nepers),
-            amplitude: amplitude.max(0.0).sqrt(),
-        }
+        let amplitude = amplitude.max(0.0).sqrt();
+        TermDeviations { cycles: of(place.cycles), nepers: of(place.nepers), amplitude }
     }
 }
 
-/// What a term becomes whose step leaves its peak or its bounds; `None` for a step that may be taken.
+/// The term that replaces one whose step leaves its peak or its bounds; `None` for a step that may be taken.
 fn constrain_step(start: &SinusoidTerm, now: &SinusoidTerm, step: [f64; 2]) -> Option<SinusoidTerm> {
     let width = now.nepers.abs() / TAU; // a decaying peak is as wide as it decays
     if (now.cycles + step[0] - start.cycles).abs() > MOST_FREQUENCY_SHIFT + width {
-        let free = if now.free == FreeParameters::CyclesAndNepers {
-            FreeParameters::Nepers
-        } else {
-            FreeParameters::Amplitude
-        };
+        let decays = now.free == FreeParameters::CyclesAndNepers;
+        let free = if decays { FreeParameters::Nepers } else { FreeParameters::Amplitude };
         return Some(SinusoidTerm { cycles: start.cycles, free, ..*now });
     }
     let (low, high) = now.nepers_bounds();
@@ -379,10 +351,10 @@ fn constrain_step(start: &SinusoidTerm, now: &SinusoidTerm, step: [f64; 2]) -> O
     })
 }
 
-/// Iterations of an eigenvalue decomposition, which takes a few for each row where it comes to an end.
+/// Iterations of an eigenvalue decomposition; one that converges takes a few for each row.
 const MOST_ITERATIONS: usize = 10_000;
 
-/// Inverse of a symmetric matrix over the directions that are in the data.
+/// Inverse of a symmetric matrix over the directions that the data determine.
 fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     if matrix.is_empty() {
         return Some(matrix.clone()); // neither a trend nor a term
@@ -398,7 +370,7 @@ fn pseudo_inverse(matrix: &DMatrix<f64>) -> Option<DMatrix<f64>> {
     let back = |inverse: &DMatrix<f64>| {
         DMatrix::from_fn(matrix.nrows(), matrix.ncols(), |i, j| inverse[(i, j)] * scale[i] * scale[j])
     };
-    // eigenvalues take ten times as long, and only directions that are not in the data need them
+    // eigenvalues take ten times as long, and only undetermined directions need them
     if let Some(factor) = scaled.clone().cholesky() {
         let pivots = factor.l_dirty().diagonal();
         if pivots.iter().all(|pivot| pivot * pivot > WELL_POSED_PIVOT) {

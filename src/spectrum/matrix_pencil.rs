@@ -1,32 +1,29 @@
 //! Frequency and decay of a ring-down by the matrix pencil, in a band around a peak.
 //!
-//! The record is turned back by the peak's frequency and summed in blocks. A block sum of `z^n` is again an
-//! exponential, `z^(mD)` times a constant, so a decay from the first frame on stays exact where a filter
-//! would blur it, and sixty blocks stand for the record. The Hankel matrix of the sums has as many singular
-//! values above the noise as there are exponentials (their number by the minimum description length); the
-//! shift from its rows to the next gives the poles (Hua and Sarkar 1990; Roy and Kailath 1989).
+//! The record is demodulated by the peak's frequency and summed in blocks. A block sum of `z^n` is again an
+//! exponential, `z^(mD)` times a constant. So sixty blocks represent the record, and a decay from the first frame
+//! on stays exact where a filter would blur it. The number of exponentials is the number of singular values of
+//! the sums' Hankel matrix above the noise, by the minimum description length; the shift from its rows to the
+//! next gives the poles (Hua and Sarkar 1990; Roy and Kailath 1989).
 
 use crate::math;
 use nalgebra::{Complex, DMatrix, DVector};
 use std::f64::consts::TAU;
 
-/// Blocks that stand for the record: a decay within a twentieth of it is still three blocks long, and the
-/// matrix is solved in a millisecond.
+/// Blocks that represent the record: a decay within a twentieth of it is still three blocks long, and the matrix
+/// is solved in a millisecond.
 const BLOCKS: usize = 60;
-/// Most exponentials: the peak, its mirror image, a remainder of the trend and their neighbours.
+/// Most exponentials: the peak, its mirror image, a residue of the trend and their neighbours.
 const MOST_POLES: usize = 8;
-/// Farthest pole from the peak that is still the peak's, cycles in the record.
+/// Farthest distance of a pole from its peak, cycles in the record.
 const FARTHEST_POLE: f64 = 2.0;
-
-/// Precision of a decomposition, that of rounding.
+/// Relative precision of a decomposition.
 const PRECISION: f64 = 5.0 * f64::EPSILON;
-/// Iterations of a decomposition, which takes a few for each row where it comes to an end: among gaps it may
-/// not.
+/// Iterations of a decomposition. One that converges takes a few for each row; among gaps it may not converge.
 const MOST_ITERATIONS: usize = 2000;
-/// Nepers gained over the record from which powers come near the largest number; a record that is mostly gaps
+/// Nepers gained over the record above which powers come near the largest number; a record that is mostly gaps
 /// gives such poles.
 const MOST_NEPERS: f64 = 200.0;
-
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pole {
     /// Cycles in the record.
@@ -41,15 +38,14 @@ pub(super) fn find_pole(record: &[f64], cycles: f64) -> Option<Pole> {
     let sums = block_sums(record, cycles, size);
     let per_record = record.len() as f64 / size as f64; // blocks in the record, not a whole number
     let shifts = block_shifts(&sums)?;
-    let strengths = pole_energies(&sums, &shifts)?;
+    let energies = pole_energies(&sums, &shifts)?;
     let near = |shift: Complex<f64>| {
         let (turn, gain) = (math::atan2(shift.im, shift.re), math::ln(magnitude(&shift)));
         let pole = Pole { cycles: cycles + turn / TAU * per_record, nepers: -gain * per_record };
-        ((pole.cycles - cycles).abs() <= FARTHEST_POLE + pole.nepers.abs() / TAU && pole.cycles > 0.0)
-            .then_some(pole)
+        let width = FARTHEST_POLE + pole.nepers.abs() / TAU;
+        ((pole.cycles - cycles).abs() <= width && pole.cycles > 0.0).then_some(pole)
     };
-    let found =
-        shifts.iter().zip(strengths.iter()).filter_map(|(shift, strength)| Some((near(*shift)?, *strength)));
+    let found = shifts.iter().zip(energies).filter_map(|(shift, energy)| Some((near(*shift)?, energy)));
     found.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(pole, _)| pole)
 }
 
@@ -84,20 +80,11 @@ fn block_shifts(sums: &[Complex<f64>]) -> Option<Vec<Complex<f64>>> {
     let turn = (upper.adjoint() * upper).lu().solve(&(upper.adjoint() * lower))?;
     let last = (sums.len() - 1) as f64;
     let usable = |z: &Complex<f64>| magnitude(z) > 0.0 && math::ln(magnitude(z)) * last < MOST_NEPERS;
-    Some(
-        turn.try_schur(f64::EPSILON, MOST_ITERATIONS)?
-            .unpack()
-            .1
-            .diagonal()
-            .iter()
-            .copied()
-            .filter(usable)
-            .collect(),
-    )
+    let (_, triangular) = turn.try_schur(f64::EPSILON, MOST_ITERATIONS)?.unpack();
+    Some(triangular.diagonal().iter().copied().filter(usable).collect())
 }
 
-/// Number of exponentials by the minimum description length of Wax and Kailath (1985); `None` where it is
-/// none.
+/// Number of exponentials by the minimum description length of Wax and Kailath (1985); `None` for zero.
 fn model_order(singular_values: &[f64], samples: usize) -> Option<usize> {
     let (all, samples) = (singular_values.len(), samples as f64);
     let powers: Vec<f64> = singular_values.iter().map(|s| (s * s).max(f64::MIN_POSITIVE)).collect();
@@ -108,19 +95,15 @@ fn model_order(singular_values: &[f64], samples: usize) -> Option<usize> {
             - count * math::ln(rest.iter().sum::<f64>() / count);
         -samples * likelihood + 0.5 * (order * (2 * all - order)) as f64 * math::ln(samples)
     };
-    (0..=MOST_POLES.min(all.checked_sub(1)?))
-        .min_by(|a, b| length(*a).total_cmp(&length(*b)))
-        .filter(|order| *order > 0)
+    let order = (0..=MOST_POLES.min(all.checked_sub(1)?)).min_by(|a, b| length(*a).total_cmp(&length(*b)));
+    order.filter(|order| *order > 0)
 }
 
 /// Energy of each exponential over the record.
 fn pole_energies(sums: &[Complex<f64>], shifts: &[Complex<f64>]) -> Option<Vec<f64>> {
     let powers = DMatrix::from_fn(sums.len(), shifts.len(), |i, j| shifts[j].powu(i as u32));
-    let amplitudes = powers
-        .clone()
-        .try_svd(true, true, PRECISION, MOST_ITERATIONS)?
-        .solve(&DVector::from_column_slice(sums), f64::EPSILON)
-        .ok()?;
+    let svd = powers.clone().try_svd(true, true, PRECISION, MOST_ITERATIONS)?;
+    let amplitudes = svd.solve(&DVector::from_column_slice(sums), f64::EPSILON).ok()?;
     let energy = |(amplitude, column): (&Complex<f64>, _)| {
         amplitude.norm_sqr() * nalgebra::Matrix::norm_squared(&column)
     };

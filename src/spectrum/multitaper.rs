@@ -1,15 +1,16 @@
-//! Power density of noise-like motion, with its uncertainty and a test for steady lines, from several tapers
-//! of one record.
+//! Power density of noise-like motion, with its uncertainty and a test for steady lines, from several tapers of
+//! one record.
 //!
-//! Each sine taper (`multitaper/tapers.rs`) gives an estimate of its own, nearly independent of the others';
-//! their mean is the density, their scatter its uncertainty (jackknife over the tapers), and how well one
-//! steady sine explains them all is Thomson's harmonic F. A line is spread over `tapers + 1` resolutions, so
-//! the frequency of a component is better read elsewhere.
+//! Each sine taper gives a nearly independent estimate. Their mean is the density, and their scatter its
+//! uncertainty (jackknife over the tapers). Thomson's harmonic F measures how well one steady sine explains them
+//! all. A line is spread over `tapers + 1` resolutions, so other estimators read its frequency better.
 //!
 //! Sources: Riedel and Sidorenko 1995 (IEEE Trans. Signal Process. 43, 188) for the tapers; Thomson 1982
 //! (Proc. IEEE 70, 1055) for F; Thomson and Chave 1991 (in Haykin, Advances in Spectrum Analysis and Array
 //! Processing) for the jackknife.
 
+use super::error::find_unusable;
+use super::periodogram::upper_median;
 use super::transform::{Complex, RealTransform};
 use crate::math;
 use nalgebra::{DMatrix, DVector};
@@ -20,19 +21,15 @@ use std::ops::RangeInclusive;
 /// Tapers unless asked for otherwise: a density of 14 degrees of freedom scatters by 38 %, and a line takes 8
 /// resolutions, 53 Hz in 0.15 s, so that 78 Hz is still apart from zero and from 900 Hz.
 pub const TAPERS: usize = 7;
-/// Numbers of tapers that can be asked for: one has no scatter, and more than fifty hide what a spectrum is
-/// for.
+/// Least and most tapers: one has no scatter, and more than fifty smooth away every feature.
 pub(crate) const TAPER_RANGE: RangeInclusive<usize> = 2..=50;
-/// The window of a noise floor is at least this many times as wide as a line, so that a line does not set its
-/// own floor.
+/// Least width of a noise floor's window, in widths of a line, so that a line does not set its own floor.
 pub(crate) const FLOOR_LINES: f64 = 5.0;
 /// Longest padded record, samples: every taper keeps its transform.
 const MOST_PADDED: usize = 1 << 24;
-/// Values from which work is shared among threads: below, it takes a millisecond or two.
+/// Values from which threads share the work; fewer take a millisecond or two.
 const PARALLEL_FROM: usize = 1 << 17;
-/// Squares of larger samples overflow.
-const LARGEST_M: f64 = 1e100;
-/// Share of the sum of powers below which what one taper leaves is rounding.
+/// Share of the sum of powers below which the residual of one taper is rounding.
 const ROUNDING: f64 = 1e-15;
 
 /// A multitaper estimate; one value a bin, from 0 to half the frame rate.
@@ -131,15 +128,15 @@ impl Multitaper {
     ) -> Result<Self, MultitaperError> {
         check_input(residual_m, frame_rate_hz, tapers)?;
         let samples = trim_missing_ends(residual_m);
-        let padded = padded.max(samples.len()).checked_next_power_of_two().filter(|n| *n <= MOST_PADDED);
-        let padded =
-            padded.ok_or(MultitaperError::TooLong { frames: samples.len(), padded: samples.len() })?;
+        let frames = samples.len();
+        let padded = padded.max(frames).checked_next_power_of_two().filter(|n| *n <= MOST_PADDED);
+        let padded = padded.ok_or(MultitaperError::TooLong { frames, padded: frames })?;
         let made = SineTapers::new(samples, tapers);
-        if made.len() < *TAPER_RANGE.start() {
+        if made.rows.nrows() < *TAPER_RANGE.start() {
             return Err(MultitaperError::Clumped { found: samples.iter().flatten().count() });
         }
         let bins = estimate_bins(&made, samples, padded, frame_rate_hz);
-        let resolution_hz = frame_rate_hz / samples.len() as f64;
+        let (tapers_used, resolution_hz) = (made.rows.nrows(), frame_rate_hz / frames as f64);
         let column = |of: fn(&MultitaperBin) -> f64| bins.iter().map(of).collect();
         Ok(Self {
             frequency_hz: (0..bins.len()).map(|k| k as f64 * (frame_rate_hz / padded as f64)).collect(),
@@ -147,10 +144,10 @@ impl Multitaper {
             log_density_sd: column(|b| b.log_density_sd),
             line_f: column(|b| b.line_f),
             line_amplitude_m: column(|b| b.line_amplitude_m),
-            tapers: made.len(),
+            tapers: tapers_used,
             resolution_hz,
             half_bandwidth_hz: (tapers + 1) as f64 / 2.0 * resolution_hz,
-            student_t: student_t_quantile(0.95, made.len() - 1),
+            student_t: student_t_quantile(0.95, tapers_used - 1),
         })
     }
 
@@ -160,8 +157,8 @@ impl Multitaper {
         2 * self.tapers
     }
 
-    /// The 95 % interval of the density in a bin, m^2/Hz, from the jackknife with Student's t of one degree
-    /// of freedom less than tapers; `None` for a bin that is not there.
+    /// The 95 % interval of the density in a bin, m^2/Hz, from the jackknife with Student's t of one degree of
+    /// freedom less than tapers; `None` for a bin outside the spectrum.
     #[must_use]
     pub fn interval_95(&self, bin: usize) -> Option<(f64, f64)> {
         let (density, sd) = (self.density_m2_per_hz.get(bin)?, self.log_density_sd.get(bin)?);
@@ -169,9 +166,9 @@ impl Multitaper {
         Some((density / factor, density * factor))
     }
 
-    /// The chance that noise alone, level within a line's width, gives so large an F as in a bin (`(1 +
-    /// F/(K-1))^-(K-1)` for `K` tapers); a search over a record of `n` frames takes less than `1/n` for a
-    /// line (Thomson's rule). `None` for a bin that is not there.
+    /// Probability that noise alone, level within a line's width, gives an F as large as in a bin: `(1 +
+    /// F/(K-1))^-(K-1)` for `K` tapers. In a record of `n` frames, less than `1/n` counts as a line (Thomson's
+    /// rule). `None` for a bin outside the spectrum.
     #[must_use]
     pub fn line_probability(&self, bin: usize) -> Option<f64> {
         let others = (self.tapers - 1) as f64;
@@ -179,8 +176,8 @@ impl Multitaper {
     }
 
     /// Mean density of the noise in every bin, m^2/Hz: the running median of the density over `width_hz`, at
-    /// least `FLOOR_LINES` lines wide, without bins that stand out of it. It follows a density that falls
-    /// or rises steadily, and is level over half its width at both ends.
+    /// least `FLOOR_LINES` lines wide, without bins that stand out of it. It follows a steady slope of the
+    /// density, and is level over half its width at both ends.
     #[must_use]
     pub fn noise_density(&self, width_hz: f64) -> Vec<f64> {
         let bin_hz = self.frequency_hz.get(1).copied().unwrap_or(f64::INFINITY);
@@ -197,24 +194,21 @@ fn check_input(samples: &[Option<f64>], frame_rate_hz: f64, tapers: usize) -> Re
     if !(frame_rate_hz.is_finite() && frame_rate_hz > 0.0) {
         return Err(MultitaperError::FrameRate { found: frame_rate_hz });
     }
-    let unusable = |x: &f64| x.is_nan() || x.abs() > LARGEST_M;
-    if let Some((frame, found)) =
-        samples.iter().enumerate().find_map(|(i, x)| x.filter(unusable).map(|x| (i, x)))
-    {
+    if let Some((frame, found)) = find_unusable(samples) {
         return Err(MultitaperError::NotFinite { frame, found });
     }
     let (found, expected) = (samples.iter().flatten().count(), 2 * tapers);
     if found < expected { Err(MultitaperError::TooFew { found, expected }) } else { Ok(()) }
 }
 
-/// From the first to the last frame present: what is missing at the ends is no gap.
+/// The samples from the first to the last frame present: missing frames at the ends are no gap.
 fn trim_missing_ends(samples: &[Option<f64>]) -> &[Option<f64>] {
     let first = samples.iter().position(Option::is_some).unwrap_or(0);
     let end = samples.iter().rposition(Option::is_some).map_or(first, |last| last + 1);
     samples.get(first..end).unwrap_or_default()
 }
 
-/// The values of `of` in order, made in parallel where `work` is long.
+/// The values of `of` in order, computed in parallel where `work` is large.
 fn map_parallel_above<T: Send>(count: usize, work: usize, of: impl Fn(usize) -> T + Sync) -> Vec<T> {
     if work < PARALLEL_FROM {
         (0..count).map(&of).collect()
@@ -223,7 +217,7 @@ fn map_parallel_above<T: Send>(count: usize, work: usize, of: impl Fn(usize) -> 
     }
 }
 
-/// What the tapers say of one frequency.
+/// Estimates at one frequency.
 struct MultitaperBin {
     density_m2_per_hz: f64,
     log_density_sd: f64,
@@ -231,7 +225,7 @@ struct MultitaperBin {
     line_amplitude_m: f64,
 }
 
-/// A taper's transform of the record, and the taper's own at zero.
+/// A taper's transform of the record, and the sum of the taper's weights.
 struct TaperTransform {
     values: Vec<Complex>,
     sum: f64,
@@ -255,7 +249,7 @@ fn estimate_bins(
         });
         TaperTransform { values: transform.spectrum_values(values), sum }
     };
-    let tapered = map_parallel_above(tapers.len(), padded, tapered);
+    let tapered = map_parallel_above(tapers.rows.nrows(), padded, tapered);
     let half = padded / 2;
     let sided = |bin: usize| if bin == 0 || bin == half { 1.0 } else { 2.0 };
     map_parallel_above(half + 1, padded, |bin| estimate_bin(&tapered, bin, sided(bin) / frame_rate_hz))
@@ -276,8 +270,8 @@ fn estimate_bin(tapered: &[TaperTransform], bin: usize, scale: f64) -> Multitape
     }
 }
 
-/// Standard deviation of the logarithm of the mean of `powers`, whose sum is `total`, from the means that
-/// lack one of them.
+/// Standard deviation of the logarithm of the mean of `powers`, whose sum is `total`, from the means that omit
+/// one of them.
 fn jackknife_log_sd<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I) -> f64 {
     if total <= 0.0 {
         return 0.0;
@@ -289,16 +283,14 @@ fn jackknife_log_sd<I: Iterator<Item = f64>>(total: f64, powers: impl Fn() -> I)
     ((count - 1.0) / count * scatter.max(0.0)).sqrt()
 }
 
-// The noise under the lines of a density: a running median, freed from the lines.
+// The noise under the lines of a density: a running median without the lines.
 
-/// Knots of the curve in the width of its window; between them it is a line through the logarithms.
+/// Knots of the curve in the width of its window; the logarithms are linear between knots.
 const KNOTS_PER_WINDOW: usize = 4;
-/// A bin this many times above the curve is taken for a line and not for noise: of 14 degrees of freedom one
-/// bin in seventy is.
+/// Ratio to the curve from which a bin counts as a line: of 14 degrees of freedom one bin of noise in seventy
+/// does.
 const LINE_RATIO: f64 = 2.0;
-
-/// Times the curve is drawn again without the lines found; the skirts of a line 60 dB above the noise are
-/// gone after three.
+/// Passes without the lines found before; the skirts of a line 60 dB above the noise are gone after three.
 const FLOOR_PASSES: usize = 3;
 
 /// Mean of the noise in every bin; `window` is the width of the median, bins, and `degrees` are those of
@@ -311,8 +303,8 @@ pub(super) fn noise_floor_curve(density: &[f64], window: usize, degrees: f64) ->
     (0..FLOOR_PASSES).fold(all, without_lines).into_iter().map(|m| m * mean_over_median).collect()
 }
 
-/// Running median over the bins that count; a window that holds fewer of them than half its width grows until
-/// it does not, and at the ends it is cut.
+/// Running median over the bins that count. A window with fewer of them than half its width grows until it has
+/// enough; at the ends it is cut.
 fn running_median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool + Sync) -> Vec<f64> {
     let Some(last) = density.len().checked_sub(1) else { return Vec::new() };
     let (half, step) = ((window / 2).max(1), (window / KNOTS_PER_WINDOW).max(1));
@@ -328,12 +320,7 @@ fn running_median(density: &[f64], window: usize, counts: impl Fn(usize) -> bool
             reach *= 2;
             values = within(centre, reach);
         }
-        let middle = values.len() / 2;
-        let median = if values.is_empty() {
-            density[centre]
-        } else {
-            *values.select_nth_unstable_by(middle, f64::total_cmp).1
-        };
+        let median = upper_median(values).unwrap_or(density[centre]);
         math::ln(median.max(f64::MIN_POSITIVE))
     };
     let logs = map_parallel_above(knots, density.len(), of_knot);
@@ -386,22 +373,22 @@ fn student_t_probability(angle: f64, degrees: usize) -> f64 {
 // products `G` over the frames present, `G^(-1/2)` times the tapers are, and of all such sets these are the
 // nearest to the tapers themselves.
 
-/// Frames whose inner products are summed at a time: the sum is the same for any number of threads.
+/// Frames whose inner products are summed at a time, so that the sum does not depend on the number of threads.
 const PRODUCT_BLOCK: usize = 1 << 15;
-/// Combinations of tapers with less than this share of the largest's energy on the frames present are left
-/// out: they lie in the gaps, and brought to unit energy they would leak over the whole spectrum.
+/// Energy on the frames present, relative to the largest, below which a combination of tapers is dropped: it
+/// lies in the gaps, and scaled to unit energy it would leak over the whole spectrum.
 const LEAST_ENERGY_SHARE: f64 = 0.1;
 
 /// Combinations of sine tapers.
 pub(super) struct SineTapers {
-    /// Angle from frame to frame of the first taper.
+    /// Angle of the first taper from frame to frame.
     turn: f64,
-    /// A row for each taper: its combination of the sines.
+    /// One row of sine coefficients for each taper.
     rows: DMatrix<f64>,
 }
 
 impl SineTapers {
-    /// At most `count` tapers for a record; fewer where its gaps leave room for fewer only.
+    /// At most `count` tapers for a record; fewer where its gaps leave no room.
     pub(super) fn new(samples: &[Option<f64>], count: usize) -> Self {
         let turn = PI / (samples.len() + 1) as f64;
         let sines = DMatrix::identity(count, count) * (2.0 / (samples.len() + 1) as f64).sqrt();
@@ -413,10 +400,6 @@ impl SineTapers {
         Self { turn, rows }
     }
 
-    pub(super) fn len(&self) -> usize {
-        self.rows.nrows()
-    }
-
     /// The taper of a row in a frame, by Clenshaw's recurrence.
     pub(super) fn value(&self, row: &[f64], frame: usize) -> f64 {
         let (sine, cosine) = math::sin_cos(self.turn * (frame + 1) as f64);
@@ -424,7 +407,7 @@ impl SineTapers {
         sine * row.iter().rev().fold((0.0, 0.0), next).0
     }
 
-    /// What the sines are multiplied with to give a taper.
+    /// Coefficients of the sines in a taper.
     pub(super) fn coefficients(&self, taper: usize) -> Vec<f64> {
         self.rows.row(taper).iter().copied().collect()
     }
@@ -435,9 +418,8 @@ fn taper_inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMa
     let block = |index: usize| {
         let mut sum = DMatrix::zeros(count, count);
         let mut sines = DVector::zeros(count);
-        for frame in (index * PRODUCT_BLOCK..samples.len().min((index + 1) * PRODUCT_BLOCK))
-            .filter(|frame| samples[*frame].is_some())
-        {
+        let frames = index * PRODUCT_BLOCK..samples.len().min((index + 1) * PRODUCT_BLOCK);
+        for frame in frames.filter(|frame| samples[*frame].is_some()) {
             let (sine, cosine) = math::sin_cos(turn * (frame + 1) as f64);
             let (mut before, mut now) = (0.0, sine);
             for value in &mut sines {
@@ -451,16 +433,14 @@ fn taper_inner_products(samples: &[Option<f64>], turn: f64, count: usize) -> DMa
     map_parallel_above(samples.len().div_ceil(PRODUCT_BLOCK), samples.len(), block).into_iter().sum()
 }
 
-/// `G^(-1/2)`, or where some combinations lie in the gaps, the combinations that do not, each of unit energy.
+/// `G^(-1/2)`; where some combinations lie in the gaps, the others, each of unit energy.
 fn orthonormal_combinations(products: &DMatrix<f64>) -> DMatrix<f64> {
     let eigen = products.clone().symmetric_eigen();
     let least = LEAST_ENERGY_SHARE * eigen.eigenvalues.max();
     let kept: Vec<usize> = (0..eigen.eigenvalues.len()).filter(|i| eigen.eigenvalues[*i] > least).collect();
     let directions = eigen.eigenvectors.select_columns(&kept);
-    let scale = DMatrix::from_diagonal(&DVector::from_iterator(
-        kept.len(),
-        kept.iter().map(|i| eigen.eigenvalues[*i].sqrt().recip()),
-    ));
+    let scales = kept.iter().map(|i| eigen.eigenvalues[*i].sqrt().recip());
+    let scale = DMatrix::from_diagonal(&DVector::from_iterator(kept.len(), scales));
     if kept.len() == eigen.eigenvalues.len() {
         &directions * scale * directions.transpose()
     } else {

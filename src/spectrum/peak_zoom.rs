@@ -1,8 +1,8 @@
 //! The peak of a long record between bins that are far apart: the transform itself is summed around it.
 //!
-//! The record is turned back by the frequency of the bin once, and summed over a thousandth of it at a time;
-//! around that frequency these sums stand for the record, as a fraction of a cycle in all of it turns by
-//! nothing within one of them.
+//! The record is demodulated once by the frequency of the bin and summed over a thousandth of it at a time.
+//! Around that frequency these sums represent the record: a fraction of a cycle over the record hardly turns
+//! within one of them.
 
 use crate::math;
 use std::f64::consts::TAU;
@@ -10,16 +10,15 @@ use std::f64::consts::TAU;
 /// Pieces of the record that are summed: half a cycle over all of it turns by 0.003 within one, which lowers
 /// the amplitude by 4e-7.
 const DEMODULATED_BLOCKS: usize = 1024;
-/// Frames after which a turning pointer starts afresh, so that rounding does not add up.
+/// Frames after which a rotated phasor starts afresh, so that rounding does not accumulate.
 const FRAMES_PER_RESTART: usize = 256;
-/// Distance of the three amplitudes that a parabola goes through, cycles: that of bins eight times as dense
-/// as a resolution.
+/// Distance of the three amplitudes of a parabola, cycles: an eighth of a resolution.
 const PARABOLA_SPACING: f64 = 0.125;
-/// Parabolas: each starts at the vertex of the one before, at most half their distance away, and about its
-/// own middle one has no error.
+/// Parabolas: each starts at the vertex of the one before, at most half a spacing away, and a parabola is exact
+/// about its own middle.
 const PARABOLAS: usize = 6;
 
-/// A record as it is transformed.
+/// A weighted record.
 pub(super) struct WeightedRecord<'a> {
     /// The record less its trend, m.
     pub residual: &'a [f64],
@@ -33,35 +32,32 @@ impl WeightedRecord<'_> {
     /// Cycles in the record and amplitude, m, of the peak within a resolution of `cycles`.
     pub(super) fn zoom_peak(&self, cycles: f64) -> (f64, f64) {
         let (length, pieces) = self.demodulate_blocks(cycles);
-        let turn_per_cycle =
-            |piece: usize| TAU * (piece as f64 + 0.5) * length as f64 / self.residual.len() as f64;
+        let frames = self.residual.len() as f64;
+        let turn_per_cycle = |piece: usize| TAU * (piece as f64 + 0.5) * length as f64 / frames;
         let amplitude_m = |shift: f64| {
             let turned = |(piece, [real, imaginary]): (usize, &[f64; 2])| {
                 let (sine, cosine) = math::sin_cos(shift * turn_per_cycle(piece));
                 [real * cosine + imaginary * sine, imaginary * cosine - real * sine]
             };
-            let sum = pieces
-                .iter()
-                .enumerate()
-                .map(turned)
-                .fold([0.0, 0.0], |sum, z| [sum[0] + z[0], sum[1] + z[1]]);
+            let sum = pieces.iter().enumerate().map(turned);
+            let sum = sum.fold([0.0, 0.0], |sum, z| [sum[0] + z[0], sum[1] + z[1]]);
             self.amplitude_scale * math::hypot(sum[0], sum[1])
         };
         let next = |(shift, _): (f64, f64), _| {
-            let (by, height_m) =
-                log_parabola_vertex([-1.0, 0.0, 1.0].map(|k| amplitude_m(shift + k * PARABOLA_SPACING)));
+            let around = [-1.0, 0.0, 1.0].map(|k| amplitude_m(shift + k * PARABOLA_SPACING));
+            let (by, height_m) = log_parabola_vertex(around);
             (shift + by * PARABOLA_SPACING, height_m)
         };
         let (shift, height_m) = (0..PARABOLAS).fold((0.0, 0.0), next);
         (cycles + shift, height_m)
     }
 
-    /// Frames of a piece, and the sums over the pieces of the record turned back by `cycles`.
+    /// Frames of a block, and the sums over the blocks of the record demodulated by `cycles`.
     fn demodulate_blocks(&self, cycles: f64) -> (usize, Vec<[f64; 2]>) {
         let frames = self.residual.len();
         let length = frames.div_ceil(DEMODULATED_BLOCKS).max(1);
         let turn = -TAU * cycles / frames as f64;
-        let (sine_of_turn, cosine_of_turn) = math::sin_cos(turn);
+        let (sine_by, cosine_by) = math::sin_cos(turn);
         let piece = |start: usize| {
             let mut sum = [0.0, 0.0];
             for first in (start..frames.min(start + length)).step_by(FRAMES_PER_RESTART) {
@@ -69,10 +65,8 @@ impl WeightedRecord<'_> {
                 let inside = first..frames.min(start + length).min(first + FRAMES_PER_RESTART);
                 for (x, w) in self.residual[inside.clone()].iter().zip(&self.weights[inside]) {
                     sum = [sum[0] + x * w * cosine, sum[1] + x * w * sine];
-                    (cosine, sine) = (
-                        cosine * cosine_of_turn - sine * sine_of_turn,
-                        sine * cosine_of_turn + cosine * sine_of_turn,
-                    );
+                    (cosine, sine) =
+                        (cosine * cosine_by - sine * sine_by, sine * cosine_by + cosine * sine_by);
                 }
             }
             sum
@@ -81,10 +75,8 @@ impl WeightedRecord<'_> {
     }
 }
 
-// The top of a peak between three amplitudes.
-
-/// Vertex of the parabola through the logarithms of three amplitudes at equal distances: where, in distances
-/// from the middle one, and how high.
+/// Vertex of the parabola through the logarithms of three equidistant amplitudes: its distance from the middle
+/// one, in spacings, and its height.
 pub(super) fn log_parabola_vertex(around: [f64; 3]) -> (f64, f64) {
     let [left, top, right] = around.map(|a| math::ln(a.max(f64::MIN_POSITIVE)));
     let curvature = left - 2.0 * top + right;

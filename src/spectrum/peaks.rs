@@ -1,42 +1,35 @@
-//! Components: local maxima that are no sidelobe, no ripple of a larger one, and not noise.
+//! Components: local maxima that are no sidelobe, no ripple of a larger peak, and not noise.
 
-use super::component::ComponentVerdict;
-use super::component::{Component, Estimator};
+use super::component::{Component, ComponentVerdict, Estimator};
 use super::gap_refinement::{MOST_REFINED, RefinementOutcome, RefinementStart};
-use super::peak_zoom::WeightedRecord;
-use super::peak_zoom::log_parabola_vertex;
-use super::periodogram::WindowSums;
-use super::periodogram::WindowedSpectrum;
+use super::peak_zoom::{WeightedRecord, log_parabola_vertex};
+use super::periodogram::{WindowSums, WindowedSpectrum, upper_median};
 use super::settings::{CLEAR_DB, MIN_CYCLES};
 use crate::math;
 use rayon::prelude::*;
-use std::f64::consts::TAU;
+use std::f64::consts::{FRAC_1_SQRT_2, LN_2, SQRT_2, TAU};
 
 /// Chance that noise alone puts one component into a spectrum.
 const FALSE_ALARM: f64 = 0.01;
-/// Independent trials for each resolution: the maxima of a Hann spectrum are more than its independent
-/// values.
+/// Independent trials for each resolution: a Hann spectrum has more maxima than independent values.
 const TRIALS_PER_RESOLUTION: f64 = 3.0;
 /// Half width of the main lobe of a Hann window, resolutions.
 const LOBE: f64 = 2.0;
-/// Sidelobes are taken as this much higher than the window's own, since a real component is neither steady
-/// nor alone.
+/// Assumed height of sidelobes over the window's own, because a real component is neither steady nor alone.
 const SIDELOBE_MARGIN: f64 = 1.5;
-/// The same for what lies below [`MIN_CYCLES`]: a remainder of the trend is no sine, and its sidelobes fall
-/// more slowly.
+/// The same below [`MIN_CYCLES`]: a residue of the trend is no sine, and its sidelobes fall more slowly.
 const TREND_MARGIN: f64 = 4.0;
-/// Amplitude below the largest resolvable component at which nothing is listed: 50 dB. A cubic takes a little
-/// of a tone with it, and of twelve cycles that comes back 56 dB below.
+/// Least amplitude listed, over the largest resolvable component: 50 dB. A cubic absorbs a little of a tone, and
+/// of twelve cycles that comes back 56 dB below.
 const DYNAMIC_RANGE: f64 = 3.2e-3;
 /// A second maximum counts if the spectrum falls this far below it towards every larger one: 3 dB, half its
 /// power.
-const VALLEY_RATIO: f64 = std::f64::consts::FRAC_1_SQRT_2;
-/// The noise floor is a median over at least this many resolutions, so that a component does not set its own
-/// floor.
+const VALLEY_RATIO: f64 = FRAC_1_SQRT_2;
+/// Least width of the noise floor's median, resolutions, so that a component does not set its own floor.
 const FLOOR_RESOLUTIONS: f64 = 40.0;
 /// Scatter of this estimator over the Cramér-Rao bound, as measured at 20 dB (1.5 to 1.8).
 const OVER_BOUND: f64 = 1.6;
-/// What a removed cubic leaves at 78 Hz in 0.15 s, 0.03 Hz, as a share of the resolution there.
+/// Error after removal of a cubic at 78 Hz in 0.15 s, 0.03 Hz, as a share of the resolution there.
 const TREND_SHARE: f64 = 0.005;
 
 impl WindowedSpectrum<'_> {
@@ -48,27 +41,25 @@ impl WindowedSpectrum<'_> {
 /// The peaks that are components of their own.
 pub(super) struct PeakList {
     pub floor_m: f64,
-    /// Level over the noise from which there is a component.
+    /// Level over the noise from which a peak is a component.
     pub detection: f64,
-    /// Every peak accepted, largest first: what lies outside the band leaks into it too.
+    /// Every peak accepted, largest first; peaks outside the band leak into it too.
     pub accepted: Vec<Peak>,
     /// Which of them are listed.
     listed: Vec<usize>,
 }
 
 impl PeakList {
-    /// Where a refinement starts.
+    /// The peaks as starts of a refinement.
     pub(super) fn refinement_starts(&self, spectrum: &WindowedSpectrum) -> Vec<RefinementStart> {
-        self.accepted
-            .iter()
-            .map(|peak| RefinementStart {
-                cycles: peak.frequency_hz / spectrum.resolution_hz,
-                moves: spectrum.resolves(peak),
-            })
-            .collect()
+        let start = |peak: &Peak| RefinementStart {
+            cycles: peak.frequency_hz / spectrum.resolution_hz,
+            moves: spectrum.resolves(peak),
+        };
+        self.accepted.iter().map(start).collect()
     }
 
-    /// Moves the peaks to where the transform of the samples has them, for bins too far apart for a parabola.
+    /// Moves the peaks to the maxima of the samples' transform, for bins too far apart for a parabola.
     pub(super) fn zoom_peaks(&mut self, spectrum: &WindowedSpectrum, record: &WeightedRecord) {
         self.accepted.par_iter_mut().for_each(|peak| {
             let (cycles, amplitude_m) = record.zoom_peak(peak.frequency_hz / spectrum.resolution_hz);
@@ -82,27 +73,24 @@ impl PeakList {
         spectrum: &WindowedSpectrum,
         outcomes: &[RefinementOutcome],
     ) -> Vec<Component> {
-        let amplitudes = outcomes
-            .iter()
-            .filter_map(|o| if let RefinementOutcome::Refined(r) = o { Some(r.amplitude_m) } else { None });
-        let least_m = DYNAMIC_RANGE * amplitudes.fold(0.0, f64::max);
+        let refined = |o: &RefinementOutcome| {
+            if let RefinementOutcome::Refined(r) = o { Some(r.amplitude_m) } else { None }
+        };
+        let least_m = DYNAMIC_RANGE * outcomes.iter().filter_map(refined).fold(0.0, f64::max);
         let absent = |index: usize| match outcomes[index] {
             RefinementOutcome::Unchanged => false,
             RefinementOutcome::FixedFrequency(amplitude_m) => amplitude_m < least_m,
-            // noise of a bin is both parts of an amplitude, so it is the square root of two larger than the
+            // the noise of a bin holds both parts of an amplitude, so it is the square root of two times the
             // deviation
             RefinementOutcome::Refined(r) => {
-                r.amplitude_m
-                    < least_m.max(
-                        r.deviations
-                            .map_or(0.0, |sd| self.detection * std::f64::consts::SQRT_2 * sd.amplitude_m),
-                    )
+                let noise_m = r.deviations.map_or(0.0, |sd| self.detection * SQRT_2 * sd.amplitude_m);
+                r.amplitude_m < least_m.max(noise_m)
             }
         };
-        let there = self.listed.iter().filter(|index| !absent(**index));
-        let mut components: Vec<Component> = there
-            .map(|index| component_of_peak(spectrum, self.floor_m, &self.accepted[*index], outcomes[*index]))
-            .collect();
+        let component =
+            |k: &usize| component_of_peak(spectrum, self.floor_m, &self.accepted[*k], outcomes[*k]);
+        let listed = self.listed.iter().filter(|index| !absent(**index));
+        let mut components: Vec<Component> = listed.map(component).collect();
         components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
         components
     }
@@ -151,16 +139,11 @@ fn noise_floor(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> f64 {
     let widen = (FLOOR_RESOLUTIONS * spectrum.resolution_hz - (high - low)).max(0.0) / 2.0;
     let bins = spectrum.amplitude_m.len();
     let bin = |f: f64| ((f / spectrum.bin_hz).max(0.0) as usize).min(bins);
-    let lowest = bin(LOBE * spectrum.resolution_hz).min(bins / 2); // below lies what the trend took with it
+    let lowest = bin(LOBE * spectrum.resolution_hz).min(bins / 2); // the trend has absorbed the motion below
     let from = bin(low - widen).clamp(lowest, bins.saturating_sub(1));
     let to = (bin(high + widen) + 1).clamp(from + 1, bins.max(from + 1));
-    let mut inside: Vec<f64> = spectrum.amplitude_m.get(from..to).unwrap_or(spectrum.amplitude_m).to_vec();
-    let middle = inside.len() / 2;
-    if inside.is_empty() {
-        0.0
-    } else {
-        *inside.select_nth_unstable_by(middle, f64::total_cmp).1 / std::f64::consts::LN_2.sqrt()
-    }
+    let inside = spectrum.amplitude_m.get(from..to).unwrap_or(spectrum.amplitude_m).to_vec();
+    upper_median(inside).map_or(0.0, |median| median / LN_2.sqrt())
 }
 
 /// Level over the floor that noise reaches anywhere in the band with the chance [`FALSE_ALARM`]: a bin
@@ -170,7 +153,7 @@ fn detection_threshold(spectrum: &WindowedSpectrum, (low, high): (f64, f64)) -> 
     math::ln(trials / FALSE_ALARM).sqrt()
 }
 
-/// Local maxima, those left out that cannot reach `least_m`.
+/// Local maxima, except those that cannot reach `least_m`.
 fn local_maxima(spectrum: &WindowedSpectrum, least_m: f64) -> Vec<Peak> {
     /// A parabola through logarithms rises above its middle point by at most the eighth root of that point
     /// over its lower neighbour: by 9 % where the neighbour is half as high.
@@ -181,15 +164,11 @@ fn local_maxima(spectrum: &WindowedSpectrum, least_m: f64) -> Vec<Peak> {
             && a[*k] >= a[k + 1]
             && (a[*k] * RISE >= least_m || a[k - 1].min(a[k + 1]) < a[*k] / 2.0)
     };
-    (1..a.len().saturating_sub(1))
-        .filter(is_top)
-        .map(|k| interpolate_peak(k, [a[k - 1], a[k], a[k + 1]], spectrum.bin_hz))
-        .collect()
-}
-
-fn interpolate_peak(bin: usize, around: [f64; 3], bin_hz: f64) -> Peak {
-    let (shift, amplitude_m) = log_parabola_vertex(around);
-    Peak { bin, frequency_hz: (bin as f64 + shift) * bin_hz, amplitude_m }
+    let peak = |k: usize| {
+        let (shift, amplitude_m) = log_parabola_vertex([a[k - 1], a[k], a[k + 1]]);
+        Peak { bin: k, frequency_hz: (k as f64 + shift) * spectrum.bin_hz, amplitude_m }
+    };
+    (1..a.len().saturating_sub(1)).filter(is_top).map(peak).collect()
 }
 
 fn is_separate_peak(spectrum: &WindowedSpectrum, larger: &Peak, peak: &Peak) -> bool {
@@ -212,38 +191,30 @@ fn component_of_peak(
     outcome: RefinementOutcome,
 ) -> Component {
     let trend_hz = TREND_SHARE * spectrum.resolution_hz;
-    let by_floor = (
-        OVER_BOUND * cramer_rao_bound_hz(spectrum, floor_m, peak),
-        floor_m * std::f64::consts::FRAC_1_SQRT_2,
-    );
-    let (frequency_hz, amplitude_m, deviations) = match outcome {
-        RefinementOutcome::Refined(r) => (r.cycles * spectrum.resolution_hz, r.amplitude_m, r.deviations),
-        RefinementOutcome::Unchanged | RefinementOutcome::FixedFrequency(_) => {
-            (peak.frequency_hz, peak.amplitude_m, None)
-        }
-    };
-    let (sd_hz, amplitude_sd_m) =
-        deviations.map_or(by_floor, |sd| (sd.cycles * spectrum.resolution_hz, sd.amplitude_m));
+    let bound_sd_hz = OVER_BOUND * cramer_rao_bound_hz(spectrum, floor_m, peak);
+    let (mut estimator, mut sds) = (Estimator::Periodogram, (bound_sd_hz, floor_m * FRAC_1_SQRT_2));
+    let (mut frequency_hz, mut amplitude_m) = (peak.frequency_hz, peak.amplitude_m);
+    if let RefinementOutcome::Refined(r) = outcome {
+        estimator = Estimator::LeastSquares;
+        (frequency_hz, amplitude_m) = (r.cycles * spectrum.resolution_hz, r.amplitude_m);
+        sds = r.deviations.map_or(sds, |sd| (sd.cycles * spectrum.resolution_hz, sd.amplitude_m));
+    }
     let snr_db = 20.0 * math::log10(amplitude_m / floor_m);
-    let reason = match () {
-        () if !spectrum.resolves(peak) => Some(ComponentVerdict::NotResolvable),
-        () if snr_db < CLEAR_DB => Some(ComponentVerdict::Weak),
-        () => None,
-    };
-    let estimator = if let RefinementOutcome::Refined(_) = outcome {
-        Estimator::LeastSquares
-    } else {
-        Estimator::Periodogram
+    let verdict = match () {
+        () if !spectrum.resolves(peak) => ComponentVerdict::NotResolvable,
+        () if snr_db < CLEAR_DB => ComponentVerdict::Weak,
+        () => ComponentVerdict::Clear,
     };
     Component {
         frequency_hz,
-        frequency_sd_hz: math::hypot(sd_hz, trend_hz),
+        frequency_sd_hz: math::hypot(sds.0, trend_hz),
         amplitude_m,
-        amplitude_sd_m,
+        amplitude_sd_m: sds.1,
         snr_db,
-        cramer_rao_hz: by_floor.0 / OVER_BOUND,
-        verdict: reason.unwrap_or(ComponentVerdict::Clear),
-        ..Component::from_estimator(estimator)
+        cramer_rao_hz: bound_sd_hz / OVER_BOUND,
+        verdict,
+        estimator,
+        ..Component::default()
     }
 }
 

@@ -1,12 +1,11 @@
-//! The Hann-windowed amplitude spectrum of one pattern of frames, for record after record of it.
+//! The Hann-windowed amplitude spectrum of one pattern of frames, reused for every record of that pattern.
 
 use super::transform::RealTransform;
 use crate::math;
 use std::cell::RefCell;
 use std::sync::{Arc, OnceLock};
 
-/// Windows without gaps that a thread keeps: a fit reads a few, of the same lengths in every run of its
-/// model.
+/// Windows without gaps that a thread keeps: a fit reads a few, of the same lengths in every run of its model.
 const CACHED_WINDOWS: usize = 16;
 /// Longest padded length of a window that is kept: together they take a few megabytes.
 const LONGEST_CACHED: usize = 1 << 16;
@@ -16,7 +15,7 @@ thread_local! {
     static WINDOWS: RefCell<Vec<HannWindow>> = const { RefCell::new(Vec::new()) };
 }
 
-/// Weights of a record's frames, and the sidelobes of their transform.
+/// A window over the frames present: weights, and the sidelobes of their transform.
 #[derive(Clone)]
 struct HannWindow {
     weights: Arc<Vec<f64>>,
@@ -28,23 +27,18 @@ struct HannWindow {
 impl HannWindow {
     fn new(pattern: &[Option<f64>], padded: usize) -> Self {
         let weights = hann_weights(pattern);
-        Self {
-            sums: WindowSums::from_weights(&weights),
-            weights: Arc::new(weights),
-            envelope: Arc::default(),
-            padded,
-        }
+        let sums = WindowSums::from_weights(&weights);
+        Self { weights: Arc::new(weights), envelope: Arc::default(), sums, padded }
     }
 
-    /// The same, from those that are kept where it has no gaps.
+    /// A window from the cache if the pattern has no gaps, else a new one.
     fn from_cache(pattern: &[Option<f64>], padded: usize) -> Self {
         if padded > LONGEST_CACHED || pattern.iter().any(Option::is_none) {
             return Self::new(pattern, padded);
         }
         WINDOWS.with_borrow_mut(|kept| {
-            if let Some(known) =
-                kept.iter().find(|known| known.padded == padded && known.weights.len() == pattern.len())
-            {
+            let same = |known: &&HannWindow| known.padded == padded && known.weights.len() == pattern.len();
+            if let Some(known) = kept.iter().find(same) {
                 return known.clone();
             }
             if kept.len() == CACHED_WINDOWS {
@@ -68,13 +62,13 @@ pub(super) struct Periodogram {
 }
 
 impl Periodogram {
-    /// For records with values where `pattern` has them, padded to `padded` values.
+    /// A window for records with values where `pattern` has them, padded to `padded` values.
     pub(super) fn new(pattern: &[Option<f64>], padded: usize) -> Self {
         let HannWindow { weights, envelope, sums, padded } = HannWindow::from_cache(pattern, padded);
         Self { transform: RealTransform::new(padded), weights, envelope, sums, padded }
     }
 
-    /// The sidelobes of the weights' transform; made when they are first asked for.
+    /// The sidelobes of the weights' transform; computed on first use.
     pub(super) fn sidelobe_envelope(&self) -> &[f64] {
         let lobe = || self.transform.magnitudes(self.weights.iter().map(|w| w / self.sums.first));
         self.envelope.get_or_init(|| sidelobe_maxima(lobe(), self.weights.len(), self.padded))
@@ -91,7 +85,7 @@ impl Periodogram {
         self.transform.magnitudes(residual.iter().zip(self.weights.iter()).map(|(x, w)| x * w * scaled))
     }
 
-    /// Amplitudes as the search for peaks takes them; `least_m` is the amplitude of rounding.
+    /// The spectrum in which peaks are sought; `least_m` is the amplitude of rounding.
     pub(super) fn windowed_spectrum<'a>(
         &'a self,
         amplitude_m: &'a [f64],
@@ -116,8 +110,7 @@ impl Periodogram {
         frame_rate_hz / self.padded as f64
     }
 
-    /// Amplitude that an oscillation of `cycles` cycles shows in the spectrum, m: `2 |sum w x exp(-2 pi i n
-    /// t)| / sum w`.
+    /// Amplitude of an oscillation of `cycles` cycles in the spectrum, m: `2 |sum w x exp(-2 pi i n t)| / sum w`.
     pub(super) fn amplitude_at(&self, values: &[f64], cycles: f64) -> f64 {
         Self::amplitude_with_weights(&self.weights, values, cycles)
     }
@@ -138,13 +131,11 @@ impl Periodogram {
         frame_rate_hz * self.sums.second / (self.sums.first * self.sums.first)
     }
 
-    /// Standard deviation of white noise that shows this root mean square in a bin, m.
+    /// Standard deviation of white noise that has this root mean square in a bin, m.
     pub(super) fn noise_sd_m(&self, rms_m: f64) -> f64 {
         rms_m * self.sums.first / (2.0 * self.sums.second.sqrt())
     }
 }
-
-// The Hann window over the frames present.
 
 /// Sums over the weights of a record.
 #[derive(Debug, Clone, Copy)]
@@ -166,23 +157,26 @@ impl WindowSums {
     }
 }
 
-/// Weights `sin^2(pi (i + 1/2) / n)`: symmetric, nowhere zero on a frame that holds a value, zero on one that
-/// does not.
+/// Weights `sin^2(pi (i + 1/2) / n)`, symmetric and positive; zero for a frame without a value.
 pub(super) fn hann_weights(samples: &[Option<f64>]) -> Vec<f64> {
     let n = samples.len() as f64;
     let weight = |i: usize| math::powi(math::sin(std::f64::consts::PI * (i as f64 + 0.5) / n), 2);
     samples.iter().enumerate().map(|(i, x)| if x.is_some() { weight(i) } else { 0.0 }).collect()
 }
 
-// A spectrum and what its window does to a sine.
+/// The upper median; `None` for an empty list.
+pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
+    let middle = values.len() / 2;
+    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+}
 
-/// Bins wider than this share of a resolution miss the top of a sidelobe, which is one resolution wide.
+/// Bin width, resolutions, above which bins miss the top of a sidelobe, which is one resolution wide.
 const COARSE_BINS: f64 = 0.25;
-/// Bins by which the distance of two peaks then counts as nearer: half a bin for each, and one to have the
-/// sidelobe's top between two bins.
+/// Bins by which the distance of two peaks is then reduced: half a bin for each peak, and one for a sidelobe's
+/// top between two bins.
 const ROUNDED_BINS: usize = 2;
 
-/// A spectrum and what its window does to a sine.
+/// An amplitude spectrum with the sidelobes of its window.
 pub(super) struct WindowedSpectrum<'a> {
     pub amplitude_m: &'a [f64],
     pub envelope: &'a [f64],
@@ -195,15 +189,15 @@ pub(super) struct WindowedSpectrum<'a> {
     pub least_m: f64,
 }
 
-/// Largest value of the transform of a window, which is 1 at zero, at or beyond each distance, in bins; gaps
-/// in the record raise it.
+/// Largest value of a window's transform, relative to that at zero, at or beyond each distance, in bins. Gaps in
+/// the record raise it.
 pub(super) fn sidelobe_maxima(lobe: Vec<f64>, frames: usize, padded: usize) -> Vec<f64> {
     let mut envelope = lobe;
     for k in (0..envelope.len().saturating_sub(1)).rev() {
         envelope[k] = envelope[k].max(envelope[k + 1]);
     }
     if frames as f64 > COARSE_BINS * padded as f64 {
-        // both peaks are half a bin off their own: of a sidelobe's width that is too much
+        // both peaks are up to half a bin off, which is too much of a sidelobe's width
         let rounded = ROUNDED_BINS.min(envelope.len());
         envelope.rotate_right(rounded);
         envelope.iter_mut().take(rounded).for_each(|value| *value = 1.0);

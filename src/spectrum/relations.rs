@@ -1,32 +1,31 @@
-//! What one component is to another: a multiple, a fraction, a sideband; or to the mains.
+//! Relations of a component to another, as a multiple, a fraction or a sideband, or to the mains.
 //!
-//! A relation is met within four deviations. Multiples and fractions of anything lie near everything if they
-//! are many or the deviations large, so no more of them are tried than meet a frequency by chance once in
-//! twenty.
+//! A relation is met within four deviations. Many multiples, or wide deviations, would match every frequency, so
+//! multiples are tried only up to a chance of one in twenty of a random match.
 
 use super::classification::RecordContext;
-use super::component::Component;
-use super::component::{ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic};
+use super::component::{Component, ComponentVerdict, Harmonic, MainsMultiple, Sideband, Subharmonic};
 use super::settings::MIN_CYCLES;
 use crate::camera::alias_hz;
 use crate::math;
 
 /// Highest multiple tried: an edge as sharp as a tenth of its period has no more.
 const MOST_MULTIPLE: usize = 20;
-/// Highest multiple tried that folds: the exposure passes little of what lies higher.
+/// Highest multiple tried above half the frame rate: the exposure passes little of higher ones.
 const MOST_FOLDED: usize = 8;
 /// Multiples that are tried whatever the deviations are.
 const ALWAYS_TRIED_MULTIPLES: usize = 5;
-/// Beats after which one is like the first: more have never been seen.
+/// Periods of a subharmonic, beats: longer ones have never been observed.
 const SUBHARMONIC_DENOMINATORS: [usize; 2] = [2, 3];
 const MOST_FRACTION: usize = 5;
 /// Sidebands on each side of a component.
 const SIDEBANDS: usize = 2;
-/// Deviations within which a relation is met: of three in a record, one record in five thousand misses one.
+/// Deviations within which a relation is met: three relations in a record are all met in all but one record of
+/// five thousand.
 const MATCH_DEVIATIONS: f64 = 4.0;
-/// Most that it may be off, resolutions: a wider net would catch what is there by chance.
+/// Most distance from a relation, resolutions: a wider tolerance would match by chance.
 const MATCH_RESOLUTIONS: f64 = 0.5;
-/// Chance of meeting a frequency up to which more multiples are tried.
+/// Chance of a random match up to which more multiples are tried.
 const CHANCE_MATCHES: f64 = 0.05;
 /// Least ratio of the amplitudes of two sidebands without a component at their distance.
 const SIDEBAND_RATIO: f64 = 0.5;
@@ -35,7 +34,7 @@ const MAINS_DEVIATIONS: f64 = 3.0;
 const MAINS_HZ: [usize; 2] = [50, 60];
 /// Highest multiple of the mains that a lamp shows: it flickers at the second.
 const MOST_MAINS: usize = 12;
-/// Distance to a multiple of the mains that a frequency must be known to, Hz: they are ten apart.
+/// Accuracy with which a frequency must be known to be compared with the mains, Hz: multiples are ten apart.
 const MAINS_WITHIN_HZ: f64 = 0.5;
 
 /// Finds the relations of components, largest first.
@@ -43,12 +42,16 @@ pub(super) fn find_relations(components: &mut [Component], at: &RecordContext) {
     for k in 0..components.len() {
         let (larger, rest) = components.split_at_mut(k);
         let Some(c) = rest.first_mut() else { continue };
-        // a multiple of a multiple is one of what both are multiples of
+        let amplitude_m = c.amplitude_m;
+        // a multiple of a multiple is related to the base of both
         let own = |base: &&Component| {
-            base.harmonic_of.is_none() && base.subharmonic_of.is_none() && base.sideband_of.is_none()
+            base.harmonic_of.is_none()
+                && base.subharmonic_of.is_none()
+                && base.sideband_of.is_none()
+                && base.amplitude_m > amplitude_m
+                && base.frequency_hz >= MIN_CYCLES * at.resolution_hz
         };
-        let bases =
-            || larger.iter().filter(own).filter(|base| base.frequency_hz >= MIN_CYCLES * at.resolution_hz);
+        let bases = || larger.iter().filter(own);
         c.harmonic_of = bases().find_map(|base| find_harmonic(base, c, at));
         if c.harmonic_of.is_none() {
             c.subharmonic_of = bases().find_map(|base| find_subharmonic(base, c, at));
@@ -87,30 +90,34 @@ pub(super) fn describe_relations(c: &Component) -> [(ComponentVerdict, Option<St
     ]
 }
 
-/// Distance within which a relation is met, Hz, from the deviations of its sides.
+/// Tolerance of a relation, Hz, from the deviations of its sides.
 fn tolerance_hz(sd_hz: f64, at: &RecordContext) -> f64 {
     (MATCH_DEVIATIONS * sd_hz).min(MATCH_RESOLUTIONS * at.resolution_hz)
 }
 
+/// Whether `other` is `times` a frequency, also a folded one; adds the chance of a random match.
+fn matches_multiple(
+    base: &Component,
+    other: &Component,
+    times: f64,
+    at: &RecordContext,
+    chance: &mut f64,
+) -> bool {
+    let within_hz = tolerance_hz(math::hypot(other.frequency_sd_hz, times * base.frequency_sd_hz), at);
+    *chance += 2.0 * within_hz / base.frequency_hz;
+    (alias_hz(times * base.frequency_hz, at.frame_rate_hz) - other.frequency_hz).abs() <= within_hz
+}
+
 /// `other` as a multiple of `base`, also a folded one.
 fn find_harmonic(base: &Component, other: &Component, at: &RecordContext) -> Option<Harmonic> {
-    if base.amplitude_m <= other.amplitude_m {
-        return None;
-    }
     let mut chance = 0.0;
     for multiple in 2..=MOST_MULTIPLE {
-        let times = multiple as f64;
-        let within_hz = tolerance_hz(math::hypot(other.frequency_sd_hz, times * base.frequency_sd_hz), at);
-        chance += 2.0 * within_hz / base.frequency_hz;
-        if multiple > ALWAYS_TRIED_MULTIPLES && chance > CHANCE_MATCHES {
+        let matches = matches_multiple(base, other, multiple as f64, at, &mut chance);
+        let folds = multiple as f64 * base.frequency_hz > at.frame_rate_hz / 2.0;
+        if multiple > ALWAYS_TRIED_MULTIPLES && chance > CHANCE_MATCHES || folds && multiple > MOST_FOLDED {
             return None;
         }
-        let folds = times * base.frequency_hz > at.frame_rate_hz / 2.0;
-        if folds && multiple > MOST_FOLDED {
-            return None;
-        }
-        let seen_hz = alias_hz(times * base.frequency_hz, at.frame_rate_hz);
-        if (seen_hz - other.frequency_hz).abs() <= within_hz {
+        if matches {
             return Some(Harmonic { frequency_hz: base.frequency_hz, multiple });
         }
     }
@@ -119,21 +126,15 @@ fn find_harmonic(base: &Component, other: &Component, at: &RecordContext) -> Opt
 
 /// `other` as a fraction of `base`.
 fn find_subharmonic(base: &Component, other: &Component, at: &RecordContext) -> Option<Subharmonic> {
-    if base.amplitude_m <= other.amplitude_m {
-        return None;
-    }
     let mut chance = 0.0;
     for denominator in SUBHARMONIC_DENOMINATORS {
         for numerator in (1..=MOST_FRACTION * denominator).filter(|n| n % denominator != 0) {
             let times = numerator as f64 / denominator as f64;
-            let within_hz =
-                tolerance_hz(math::hypot(other.frequency_sd_hz, times * base.frequency_sd_hz), at);
-            chance += 2.0 * within_hz / base.frequency_hz;
+            let matches = matches_multiple(base, other, times, at, &mut chance);
             if chance > CHANCE_MATCHES {
                 return None;
             }
-            let seen_hz = alias_hz(times * base.frequency_hz, at.frame_rate_hz);
-            if (seen_hz - other.frequency_hz).abs() <= within_hz {
+            if matches {
                 return Some(Subharmonic { frequency_hz: base.frequency_hz, numerator, denominator });
             }
         }
@@ -141,8 +142,8 @@ fn find_subharmonic(base: &Component, other: &Component, at: &RecordContext) -> 
     None
 }
 
-/// Component `k` as a sideband of a larger one: at the distance of another component, or with a like one on
-/// the other side.
+/// Component `k` as a sideband of a larger one: at the distance of another component, or with a mirror image of
+/// similar amplitude on the other side.
 fn find_sideband(components: &[Component], k: usize, at: &RecordContext) -> Option<Sideband> {
     let c = &components[k];
     let carriers = components.iter().filter(|carrier| carrier.amplitude_m > c.amplitude_m);
@@ -160,10 +161,8 @@ fn find_sideband(components: &[Component], k: usize, at: &RecordContext) -> Opti
                 })
         };
         let mirrors = |other: &&Component| {
-            let sd_hz = math::hypot(
-                math::hypot(c.frequency_sd_hz, other.frequency_sd_hz),
-                2.0 * carrier.frequency_sd_hz,
-            );
+            let pair_sd_hz = math::hypot(c.frequency_sd_hz, other.frequency_sd_hz);
+            let sd_hz = math::hypot(pair_sd_hz, 2.0 * carrier.frequency_sd_hz);
             let (less, more) = (c.amplitude_m.min(other.amplitude_m), c.amplitude_m.max(other.amplitude_m));
             (c.frequency_hz + other.frequency_hz - 2.0 * carrier.frequency_hz).abs()
                 <= tolerance_hz(sd_hz, at)
@@ -172,23 +171,19 @@ fn find_sideband(components: &[Component], k: usize, at: &RecordContext) -> Opti
                 && apart_hz < carrier.frequency_hz / 2.0
         };
         let by = |modulation_hz: f64| Sideband { frequency_hz: carrier.frequency_hz, modulation_hz };
-        others()
-            .find(modulates)
-            .map(|other| by(other.frequency_hz))
-            .or_else(|| others().find(mirrors).map(|_| by(apart_hz)))
+        let modulation = others().find(modulates).map(|other| by(other.frequency_hz));
+        modulation.or_else(|| others().find(mirrors).map(|_| by(apart_hz)))
     })
 }
 
-/// The multiple of the mains that a steady component cannot be told from.
+/// The multiple of the mains whose frequency a steady component has.
 fn find_mains_multiple(c: &Component) -> Option<MainsMultiple> {
     let within_hz = MAINS_DEVIATIONS * c.frequency_sd_hz;
     if within_hz > MAINS_WITHIN_HZ || c.range_hz.is_some() {
         return None;
     }
-    let decays = c
-        .damping_ratio
-        .zip(c.damping_ratio_sd)
-        .is_some_and(|(ratio, sd)| ratio.abs() > MAINS_DEVIATIONS * sd);
+    let damping = c.damping_ratio.zip(c.damping_ratio_sd);
+    let decays = damping.is_some_and(|(ratio, sd)| ratio.abs() > MAINS_DEVIATIONS * sd);
     let meets = |frequency_hz: usize| {
         let multiple = (c.frequency_hz / frequency_hz as f64).round() as usize;
         let off_hz = (c.frequency_hz - (multiple * frequency_hz) as f64).abs();

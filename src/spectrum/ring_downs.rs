@@ -1,12 +1,13 @@
-//! Oscillations that are over soon or begin inside the record: a window that starts at zero hides them.
+//! Oscillations that end soon or begin inside the record: a window that starts at zero hides them.
 //!
-//! What is left is held against decaying oscillations that begin at any frame: `z = sum x exp(-d s - 2 pi i n
-//! s)` over the frames since. A term of this frequency, decay and beginning lowers the sum of squares by `2
-//! |z|^2 / sum exp(-2 d s)`; in white noise of variance one half of that exceeds `q` with the chance
-//! `exp(-q)`.
+//! The residual is matched with decaying oscillations that begin at any frame: `z = sum x exp(-d s - 2 pi i n s)`
+//! over the frames since. A term of this frequency, decay and beginning lowers the sum of squares by `2 |z|^2 /
+//! sum exp(-2 d s)`. In white noise of variance one, half of that exceeds `q` with the chance `exp(-q)`.
 
 use super::least_squares::{FreeParameters, SinusoidTerm, Tolerance};
-use super::model_selection::{Decomposition, ModelSelector, STEP_CYCLES, SinusoidModel, lobe_half_width};
+use super::model_selection::{
+    Decomposition, ModelSelector, STEP_CYCLES, SinusoidModel, is_in_lobe, lobe_half_width,
+};
 use super::second_pass::DoubtfulTerm;
 use super::settings::MIN_CYCLES;
 use super::transform::RealTransform;
@@ -14,43 +15,43 @@ use crate::math;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
-/// Nepers over the record of the decays that are tried: of one between two, nine tenths of the energy are
-/// met.
+/// Nepers over the record of the decays tried; a decay between two of them matches nine tenths of its energy.
 const DECAYS: [f64; 6] = [6.0, 12.0, 24.0, 48.0, 96.0, 192.0];
 /// Nepers after which a decay is over.
 const NEPERS_UNTIL_OVER: f64 = 3.5;
 /// Fewest frames in which an amplitude falls by a neper.
 const FRAMES_PER_NEPER: f64 = 4.0;
-/// Beginnings that are tried in a neper of the decay.
+/// Beginnings tried within a neper of the decay.
 const STARTS_PER_NEPER: f64 = 3.0;
-/// Chance that noise alone begins an oscillation anywhere.
+/// Chance that noise alone begins an oscillation anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
 /// Nepers over the record from which a window that starts at zero shows too little of a decay.
 const TRANSIENT_NEPERS: f64 = 8.0;
 /// Least width of an octave, cycles in the record: its floor is a median.
 const OCTAVE: f64 = 20.0;
-/// Moves of a term that is placed; each halving of the steps is one.
+/// Steps of the search for a term's placement; each halving of the step counts too.
 const MOST_MOVES: usize = 30;
-/// Cycles in the record up to which what explains most may be what a flip leaves: twice those of its peaks.
+/// Cycles in the record up to which a decay may be the residue of a flip: twice those of its peaks.
 const SLOW_CYCLES: f64 = 2.0 * STEP_CYCLES;
-/// Nepers of a decay that are lost where it is seen to begin late because others hide its start.
+/// Nepers lost before its apparent beginning up to which a decay may have begun with the record, its start
+/// hidden by other terms.
 const MOST_NEPERS_LOST: f64 = 2.0;
-/// Share of a record's sum of squares that is rounding: a misfit is a difference of such sums.
+/// Share of a record's sum of squares below which a misfit is rounding: it is a difference of such sums.
 const ROUNDING_SHARE: f64 = 1e-12;
 /// Rounds in which terms are placed again; each changes one.
 const MOST_ROUNDS: usize = 6;
-/// Determinant of cosine and sine, over the product of their squares, below which they are one.
+/// Determinant of cosine and sine, over the product of their squares, below which they are not independent.
 const SINGULAR: f64 = 1e-3;
 /// Values of the transform in the length of a decay: bins a seventh of its width apart.
 const PADDING: usize = 4;
 
 impl SinusoidTerm {
-    /// Whether it is over soon or begins inside the record.
+    /// Whether it ends soon or begins inside the record.
     pub(super) fn is_transient(&self) -> bool {
         self.cycles > 0.0 && (self.first > 0 || self.nepers > TRANSIENT_NEPERS)
     }
 
-    /// Its envelope from its first frame on, as far as it is not over.
+    /// Frames and envelope from its first frame until it has decayed.
     fn envelope_values(&self, frames: usize) -> impl Iterator<Item = (usize, f64)> + Clone + use<> {
         let (first, decay) = (self.first, self.nepers / frames as f64);
         let lasts = if decay > 0.0 { (NEPERS_UNTIL_OVER / decay).ceil() as usize } else { frames };
@@ -59,19 +60,19 @@ impl SinusoidTerm {
     }
 }
 
-/// A decay that is tried everywhere in what is left.
+/// A decay tried everywhere in the residual.
 struct DecayTrial {
     nepers: f64,
-    /// Values of its transform.
+    /// Length of its transform, values.
     padded: usize,
     /// Frames from one beginning to the next.
     step: usize,
-    /// Bins of the transform where it may be, with the deviation of the noise there, m.
+    /// Bins of the transform to try, with the standard deviation of the noise there, m.
     bins: Vec<(usize, f64)>,
 }
 
-/// The decays that were found in what is left: the one that stands out most of the noise around it, and the
-/// one that lowers the sum of squares most, if it is no slow one. A large one raises the noise around itself.
+/// The best decays in the residual: the one that stands out most from the noise around it, and the one that
+/// lowers the sum of squares most, unless it is slow. A large decay raises the noise around itself.
 #[derive(Default)]
 struct DecayMatches {
     stands_out: Option<(f64, SinusoidTerm)>,
@@ -79,19 +80,18 @@ struct DecayMatches {
 }
 
 impl DecayMatches {
-    /// Takes a decay that lowers the sum of squares by twice `square`, which is `half` variances of noise.
+    /// Keeps a decay that lowers the sum of squares by twice `square`, which is `half` variances of noise, if it
+    /// is larger than those before.
     fn keep_larger(&mut self, term: SinusoidTerm, half: f64, square: f64) {
-        let larger =
-            |value: f64, than: &Option<(f64, SinusoidTerm)>| than.is_none_or(|(least, _)| value > least);
-        if larger(half, &self.stands_out) {
+        if self.stands_out.is_none_or(|(least, _)| half > least) {
             self.stands_out = Some((half, term));
         }
-        if term.cycles > SLOW_CYCLES && larger(square, &self.explains) {
+        if term.cycles > SLOW_CYCLES && self.explains.is_none_or(|(least, _)| square > least) {
             self.explains = Some((square, term));
         }
     }
 
-    /// The first, and with `both` the second, if that is another.
+    /// The one that stands out, and with `both` the one that explains most, if it differs.
     fn terms(self, both: bool) -> impl Iterator<Item = SinusoidTerm> {
         let (first, second) = (self.stands_out.map(|met| met.1), self.explains.map(|met| met.1));
         first.into_iter().chain(second.filter(|second| both && Some(*second) != first))
@@ -99,48 +99,46 @@ impl DecayMatches {
 }
 
 impl ModelSelector<'_> {
-    /// The parts with a decaying oscillation more, or with one in the place of a doubtful term or of
-    /// relaxations: the first half-wave of a ring-down looks like one.
+    /// Models with one more decaying oscillation, or with one in the place of a doubtful term or of relaxations:
+    /// the first half-wave of a ring-down looks like a relaxation.
     pub(super) fn with_ring_downs(
         &self,
         explained: &Decomposition,
         doubtful: &[DoubtfulTerm],
     ) -> Vec<SinusoidModel> {
         let parts = &explained.model;
-        let terms = &parts.solution.terms;
-        let left: Vec<f64> = explained.residual_m.iter().map(|x| x.unwrap_or(0.0)).collect();
+        let terms = parts.terms();
+        let left = explained.residual_or_zero();
         let noise = NoiseCurve::from_residual(self, explained);
-        let relaxations: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].cycles == 0.0).collect();
+        let relaxations = parts.relaxations();
         let mut places: Vec<Vec<usize>> = vec![vec![]];
         places.extend(doubtful.iter().filter(|d| terms[d.index].first == 0).map(|d| vec![d.index]));
         places.extend(relaxations.iter().map(|k| vec![*k]));
         places.extend((relaxations.len() > 1).then_some(relaxations));
-        // what begins late and is large raises the noise around itself: no line in its place is doubtful
+        // a large oscillation that begins late raises the noise around itself, so that no line is doubtful
         if doubtful.is_empty() && !self.leaves_only_noise(explained) {
-            let steady = |k: &usize| terms[*k].cycles > 0.0 && !terms[*k].is_transient();
-            places.extend((0..terms.len()).filter(steady).map(|k| vec![k]));
+            let steady = parts.oscillations().into_iter().filter(|k| !terms[*k].is_transient());
+            places.extend(steady.map(|k| vec![k]));
         }
         let least = self.information_criterion(parts);
         let placed = |out: &Vec<usize>| {
             let left = self.add_terms_back(parts, &left, out);
             let fitted = |met: SinusoidTerm| {
-                let kept = (0..terms.len()).filter(|k| !out.contains(k)).map(|k| terms[k]);
-                let terms: Vec<SinusoidTerm> = kept.chain([self.optimise_placement(&left, met)]).collect();
+                let terms = parts.replace_terms(out, [self.optimise_placement(&left, met)]);
                 let fitted = self.fit_model(parts.problem.clone(), &terms, Tolerance::Coarse)?;
-                let new = fitted.solution.terms.last()?;
-                (new.free == FreeParameters::CyclesAndNepers && self.information_criterion(&fitted) < least)
-                    .then_some(fitted)
+                let free = fitted.terms().last()?.free == FreeParameters::CyclesAndNepers;
+                (free && self.information_criterion(&fitted) < least).then_some(fitted)
             };
             let met = self.match_decays(explained, &left, &noise, replacement_range(terms, out));
-            // of a doubtful term, what explains most may be a piece
+            // the one that explains most may be a piece of a doubtful term
             met.terms(doubtful.is_empty()).filter_map(fitted).collect::<Vec<SinusoidModel>>()
         };
         places.iter().flat_map(placed).collect()
     }
 
-    /// The parts with brief terms placed anew and without relaxations that explain nothing, as long as that
-    /// explains more with less: what was found first was placed while the others were missing, and no fit
-    /// moves a first frame. Where only rounding is left, no criterion tells anything.
+    /// Places brief terms anew and drops relaxations that explain nothing, while the criterion falls. The first
+    /// terms were placed while others were missing, and no fit moves a first frame. Where only rounding is left,
+    /// the criterion decides nothing.
     pub(super) fn relocate_transients(&self, mut parts: SinusoidModel) -> SinusoidModel {
         let power: f64 = self.data.iter().zip(&self.weights).map(|(x, weight)| weight * x * x).sum();
         for _ in 0..MOST_ROUNDS {
@@ -152,82 +150,71 @@ impl ModelSelector<'_> {
                 let fitted = self.fit_model(parts.problem.clone(), &terms, Tolerance::Coarse)?;
                 (self.information_criterion(&fitted) < least).then_some(fitted)
             });
-            match better
-                .min_by(|a, b| self.information_criterion(a).total_cmp(&self.information_criterion(b)))
-            {
-                Some(better) => parts = better,
-                None => break,
-            }
+            let Some(better) = self.select_best(better) else { break };
+            parts = better;
         }
         parts
     }
 
-    /// The terms with a brief one in another place, with two for those in its lobe, with all from the start
-    /// on, or with a relaxation less.
+    /// The terms with a brief one in another place, with two in the place of those in its lobe, with all brief
+    /// ones from the start of the record on, or with one relaxation less.
     fn transient_variants(&self, parts: &SinusoidModel) -> Vec<Vec<SinusoidTerm>> {
-        let terms = &parts.solution.terms;
+        let terms = parts.terms();
         let brief: Vec<usize> = (0..terms.len()).filter(|k| terms[*k].is_transient()).collect();
         if brief.is_empty() {
             return Vec::new();
         }
-        let left: Vec<f64> =
-            self.decompose(parts.clone()).residual_m.iter().map(|x| x.unwrap_or(0.0)).collect();
-        let with = |out: &[usize], new: &[SinusoidTerm]| {
-            let kept = (0..terms.len()).filter(|k| !out.contains(k)).map(|k| terms[k]);
-            kept.chain(new.iter().copied()).collect::<Vec<SinusoidTerm>>()
-        };
+        let left = self.decompose(parts.clone()).residual_or_zero();
         let again = brief.iter().map(|k| {
             let term = self.optimise_placement(&self.add_terms_back(parts, &left, &[*k]), terms[*k]);
-            with(&[*k], &[term])
+            parts.replace_terms(&[*k], [term])
         });
         let split = brief.iter().map(|k| {
             let term = terms[*k];
-            let near = |j: &usize| (terms[*j].cycles - term.cycles).abs() < lobe_half_width(&term);
+            let near = |j: &usize| is_in_lobe(terms[*j].cycles, &term);
             let together: Vec<usize> = brief.iter().copied().filter(near).collect();
             let (by, nepers) = (term.nepers / TAU / 2.0, term.nepers / 2.0);
-            with(&together, &[-by, by].map(|by| SinusoidTerm { cycles: term.cycles + by, nepers, ..term }))
+            let half = |by: f64| SinusoidTerm { cycles: term.cycles + by, nepers, ..term };
+            parts.replace_terms(&together, [-by, by].map(half))
         });
-        let from_start =
-            [with(&brief, &brief.iter().map(|k| self.extend_to_start(&terms[*k])).collect::<Vec<_>>())];
-        let relaxed = (0..terms.len()).filter(|k| terms[*k].cycles == 0.0).map(|k| with(&[k], &[]));
+        let extended = brief.iter().map(|k| self.extend_to_start(&terms[*k]));
+        let from_start = [parts.replace_terms(&brief, extended)];
+        let relaxed = parts.relaxations().into_iter().map(|k| parts.replace_terms(&[k], []));
         again.chain(split).chain(from_start).chain(relaxed).collect()
     }
 
-    /// The term from the start on, if it has lost little by then.
+    /// The term from the start of the record on, if it has lost little before its first frame.
     fn extend_to_start(&self, term: &SinusoidTerm) -> SinusoidTerm {
         let lost = term.nepers * term.first as f64 / self.samples.len() as f64;
         if lost < MOST_NEPERS_LOST { SinusoidTerm { first: 0, ..*term } } else { *term }
     }
 
-    /// What is left with some terms put back, m.
+    /// The residual with some terms added back, m.
     pub(super) fn add_terms_back(&self, parts: &SinusoidModel, left: &[f64], back: &[usize]) -> Vec<f64> {
         let mut with = left.to_vec();
         for k in back {
-            let of_term = parts.problem.term_values(&parts.solution, *k);
+            let of_term = parts.term_values(*k);
             let present = of_term.iter().zip(&self.weights).map(|(value, weight)| value * weight);
             with.iter_mut().zip(present).for_each(|(x, value)| *x += value);
         }
         with
     }
 
-    /// The largest amplitude left under the envelope of a term around its frequency, m; 0 where noise alone
-    /// may have made it.
+    /// Largest residual amplitude under the envelope of a term around its frequency, m; 0 where noise alone may
+    /// have made it.
     pub(super) fn residual_in_envelope(&self, explained: &Decomposition, term: &SinusoidTerm) -> f64 {
         let frames = self.samples.len();
         let values = term.envelope_values(frames).map(|(i, e)| e * explained.residual_m[i].unwrap_or(0.0));
         let (length, energy) = self.envelope_energy(term);
-        let transform = RealTransform::new((PADDING * length).next_power_of_two().max(2));
-        let spectrum = transform.magnitudes(values);
-        let bin = frames as f64 / (PADDING * length).next_power_of_two().max(2) as f64;
+        let padded = (PADDING * length).next_power_of_two().max(2);
+        let spectrum = RealTransform::new(padded).magnitudes(values);
+        let bin = frames as f64 / padded as f64;
         let width = lobe_half_width(term) + 1.0;
         let near = |k: &usize| (*k as f64 * bin - term.cycles).abs() < width;
         let most = (0..spectrum.len()).filter(near).fold(0.0, |most: f64, k| most.max(spectrum[k]));
         let noise = self.noise_sd_of_octaves(explained, term.cycles);
-        if most * most > math::powi(explained.peaks.detection, 2) * energy * noise * noise {
-            2.0 * most / energy
-        } else {
-            0.0
-        }
+        let least = math::powi(explained.peaks.detection, 2) * energy * noise * noise;
+        if most * most > least { 2.0 * most / energy } else { 0.0 }
     }
 
     /// Amplitude of a term over the noise of its estimate under its own envelope.
@@ -237,8 +224,8 @@ impl ModelSelector<'_> {
         term: &SinusoidTerm,
         amplitude_m: f64,
     ) -> f64 {
-        amplitude_m * self.envelope_energy(term).1.sqrt()
-            / (2.0 * self.noise_sd_of_octaves(explained, term.cycles))
+        let noise_m = self.noise_sd_of_octaves(explained, term.cycles);
+        amplitude_m * self.envelope_energy(term).1.sqrt() / (2.0 * noise_m)
     }
 
     /// Frames of a term's envelope, and the sum of its squares over the frames present.
@@ -248,7 +235,7 @@ impl ModelSelector<'_> {
         term.envelope_values(self.samples.len()).fold((0, 0.0), add)
     }
 
-    /// The decays that noise alone would make once in a hundred records and that stand out or explain most.
+    /// The best decays among those that noise alone would make once in a hundred records.
     fn match_decays(
         &self,
         explained: &Decomposition,
@@ -263,8 +250,13 @@ impl ModelSelector<'_> {
         let mut met = DecayMatches::default();
         for DecayTrial { nepers, padded, step, bins } in tried {
             let transform = RealTransform::new(padded);
-            let alone = SinusoidTerm { cycles: 1.0, nepers, first: 0, free: FreeParameters::CyclesAndNepers };
-            let envelope: Vec<f64> = alone.envelope_values(frames).map(|(_, e)| e).collect();
+            let from = |cycles: f64, first: usize| SinusoidTerm {
+                cycles,
+                nepers,
+                first,
+                free: FreeParameters::CyclesAndNepers,
+            };
+            let envelope: Vec<f64> = from(1.0, 0).envelope_values(frames).map(|(_, e)| e).collect();
             // a decay of which less than one neper is in the record is an impulse at its end
             for first in (0..frames.saturating_sub(envelope.len() / 3)).step_by(step) {
                 let present = envelope.iter().zip(&self.weights[first..]);
@@ -272,18 +264,14 @@ impl ModelSelector<'_> {
                 if energy <= 0.0 {
                     continue;
                 }
-                let squares =
-                    transform.squared_magnitudes(envelope.iter().zip(&left[first..]).map(|(e, x)| e * x));
+                let weighted = envelope.iter().zip(&left[first..]).map(|(e, x)| e * x);
+                let squares = transform.squared_magnitudes(weighted);
                 for (bin, noise) in &bins {
                     let square = squares[*bin] / energy;
                     let half = square / (noise * noise);
                     if half > least {
                         let cycles = *bin as f64 * frames as f64 / padded as f64;
-                        met.keep_larger(
-                            SinusoidTerm { cycles, nepers, first, free: FreeParameters::CyclesAndNepers },
-                            half,
-                            square,
-                        );
+                        met.keep_larger(from(cycles, first), half, square);
                     }
                 }
             }
@@ -291,7 +279,7 @@ impl ModelSelector<'_> {
         met
     }
 
-    /// The decays that are tried, and where.
+    /// The decays to try, and their bins.
     fn plan_trials(
         &self,
         explained: &Decomposition,
@@ -301,8 +289,8 @@ impl ModelSelector<'_> {
         let frames = self.samples.len() as f64;
         let lowest = MIN_CYCLES.max(explained.model.trend().fastest_waves() + 1.0);
         let of = |nepers: f64| {
-            let padded =
-                (PADDING * (NEPERS_UNTIL_OVER * frames / nepers).ceil() as usize).next_power_of_two();
+            let lasts = (NEPERS_UNTIL_OVER * frames / nepers).ceil() as usize;
+            let padded = (PADDING * lasts).next_power_of_two();
             let cycles = |bin: usize| bin as f64 * frames / padded as f64;
             let usable = |bin: &usize| {
                 let term = SinusoidTerm::from_start(cycles(*bin), nepers, FreeParameters::CyclesAndNepers);
@@ -319,7 +307,7 @@ impl ModelSelector<'_> {
         DECAYS.into_iter().filter(|nepers| FRAMES_PER_NEPER * nepers <= frames).map(of).collect()
     }
 
-    /// Frequency, decay and first frame that explain most, by steps that are halved where none helps.
+    /// Moves a term to the frequency, decay and first frame that explain most; steps are halved where none helps.
     fn optimise_placement(&self, left: &[f64], start: SinusoidTerm) -> SinusoidTerm {
         let frames = self.samples.len() as f64;
         let mut best = (self.power_of_term(left, &start), start);
@@ -327,22 +315,17 @@ impl ModelSelector<'_> {
         for _ in 0..MOST_MOVES {
             let term = best.1;
             let by = share * term.nepers / TAU;
-            // one that keeps its amplitude lasts as long as the record
+            // a term that keeps its amplitude lasts as long as the record
             let frame = ((share * frames / term.nepers.max(1.0) / STARTS_PER_NEPER) as usize).max(1);
-            let with = |cycles: f64, nepers: f64, first: usize| SinusoidTerm {
-                cycles,
-                nepers,
-                first,
-                free: FreeParameters::CyclesAndNepers,
-            };
-            let stretched = 1.0 + share;
+            let (free, stretched) = (FreeParameters::CyclesAndNepers, 1.0 + share);
+            let term = SinusoidTerm { free, ..term };
             let moves = [
-                with(term.cycles + by, term.nepers, term.first),
-                with(term.cycles - by, term.nepers, term.first),
-                with(term.cycles, term.nepers * stretched, term.first),
-                with(term.cycles, term.nepers / stretched, term.first),
-                with(term.cycles, term.nepers, term.first + frame),
-                with(term.cycles, term.nepers, term.first.saturating_sub(frame)),
+                SinusoidTerm { cycles: term.cycles + by, ..term },
+                SinusoidTerm { cycles: term.cycles - by, ..term },
+                SinusoidTerm { nepers: term.nepers * stretched, ..term },
+                SinusoidTerm { nepers: term.nepers / stretched, ..term },
+                SinusoidTerm { first: term.first + frame, ..term },
+                SinusoidTerm { first: term.first.saturating_sub(frame), ..term },
             ];
             let usable = |term: &SinusoidTerm| term.is_oscillation() && term.first < self.samples.len();
             let tried = moves.into_iter().filter(usable).map(|term| (self.power_of_term(left, &term), term));
@@ -354,7 +337,7 @@ impl ModelSelector<'_> {
         best.1
     }
 
-    /// What a term with the best amplitude and phase lowers the sum of squares by, m^2.
+    /// Reduction of the sum of squares by a term with the best amplitude and phase, m^2.
     fn power_of_term(&self, left: &[f64], term: &SinusoidTerm) -> f64 {
         let turn = TAU * term.cycles / left.len() as f64;
         let add = |[cc, cs, ss, xc, xs]: [f64; 5], (i, e): (usize, f64)| {
@@ -364,24 +347,18 @@ impl ModelSelector<'_> {
         };
         let [cc, cs, ss, xc, xs] = term.envelope_values(left.len()).fold([0.0; 5], add);
         let determinant = cc * ss - cs * cs;
-        if determinant > SINGULAR * cc * ss {
-            (ss * xc * xc - 2.0 * cs * xc * xs + cc * xs * xs) / determinant
-        } else {
-            0.0
-        }
+        let power = || (ss * xc * xc - 2.0 * cs * xc * xs + cc * xs * xs) / determinant;
+        if determinant > SINGULAR * cc * ss { power() } else { 0.0 }
     }
 
     /// Whether more than noise is left in the lobe of a term.
     pub(super) fn leaves_peak(&self, explained: &Decomposition, term: &SinusoidTerm) -> bool {
-        let width = lobe_half_width(term) + 1.0;
-        let around = self.residual_spectrum_between(explained, term.cycles - width, term.cycles + width);
-        let most = around.iter().fold(0.0, |most: f64, a| most.max(*a));
-        self.periodogram.noise_sd_m(most)
-            > explained.peaks.detection * self.noise_sd_of_octaves(explained, term.cycles)
+        let left_m = self.periodogram.noise_sd_m(self.largest_residual_near(explained, term));
+        left_m > explained.peaks.detection * self.noise_sd_of_octaves(explained, term.cycles)
     }
 
-    /// Deviation of the noise around a frequency, m: what decays within the record is wider than the
-    /// neighbourhood of a line, so the floor is that of the octave below or above, whichever is higher.
+    /// Standard deviation of the noise around a frequency, m: that of the octave below or above, whichever is
+    /// larger. An oscillation that decays within the record is wider than the neighbourhood of a line.
     pub(super) fn noise_sd_of_octaves(&self, explained: &Decomposition, cycles: f64) -> f64 {
         let octaves = [(cycles / 2.0).min(cycles - OCTAVE), cycles, (2.0 * cycles).max(cycles + OCTAVE)];
         let floors = octaves.windows(2).map(|side| self.noise_floor_between(explained, side[0], side[1]));
@@ -389,7 +366,7 @@ impl ModelSelector<'_> {
     }
 }
 
-/// Where what takes the place of terms may lie, cycles in the record.
+/// Range in which the replacement of terms may lie, cycles in the record.
 fn replacement_range(terms: &[SinusoidTerm], out: &[usize]) -> Range<f64> {
     match out.first().map(|k| &terms[*k]).filter(|term| term.cycles > 0.0) {
         Some(term) => term.cycles - lobe_half_width(term)..term.cycles + lobe_half_width(term),
@@ -397,24 +374,20 @@ fn replacement_range(terms: &[SinusoidTerm], out: &[usize]) -> Range<f64> {
     }
 }
 
-/// Deviation of the noise as a function of frequency.
-struct NoiseCurve {
-    /// Distance of the knots, cycles in the record.
-    apart: f64,
-    deviation_m: Vec<f64>,
-}
+/// Standard deviation of the noise, m, at multiples of `APART` cycles in the record.
+struct NoiseCurve(Vec<f64>);
 
 impl NoiseCurve {
+    const APART: f64 = 16.0;
+
     fn from_residual(search: &ModelSelector, explained: &Decomposition) -> Self {
-        const APART: f64 = 16.0;
-        let knots = (search.samples.len() as f64 / 2.0 / APART).ceil() as usize + 1;
-        let deviation_m =
-            (0..knots).map(|knot| search.noise_sd_of_octaves(explained, knot as f64 * APART)).collect();
-        Self { apart: APART, deviation_m }
+        let knots = (search.samples.len() as f64 / 2.0 / Self::APART).ceil() as usize + 1;
+        Self(
+            (0..knots).map(|knot| search.noise_sd_of_octaves(explained, knot as f64 * Self::APART)).collect(),
+        )
     }
 
     fn sd_at(&self, cycles: f64) -> f64 {
-        let knot = ((cycles / self.apart).round() as usize).min(self.deviation_m.len() - 1);
-        self.deviation_m[knot]
+        self.0[((cycles / Self::APART).round() as usize).min(self.0.len() - 1)]
     }
 }

@@ -1,5 +1,5 @@
-//! What a first look at a record does not show: what begins late or is over soon, and two lines where one was
-//! seen.
+//! A second pass over a decomposed record, for oscillations that begin late or end soon, and for two lines where
+//! one was found.
 
 use super::chirp_alternatives::nearby_terms;
 use super::classification::SINGLE_CYCLE_DAMPING;
@@ -9,34 +9,32 @@ use super::model_selection::{
 };
 use super::time_frequency::FrequencyRange;
 
-/// Range over which two lines that beat may seem to drift, resolutions: they lie at most four apart, and
-/// where they nearly cancel the frequency swings beyond both.
+/// Most range of a drift that may be two lines that beat, resolutions. They lie at most four apart, and where they
+/// nearly cancel the frequency swings beyond both.
 const WIDEST_BEAT: f64 = 10.0;
-
-/// Steps by which a trend may grow to explain what a slow ring-down does: together they have as many
-/// unknowns.
+/// Steps by which a trend may grow in the place of a slow ring-down: together they have as many unknowns.
 const MOST_TREND_GROWTH: usize = 3;
-/// What a criterion must differ by to decide: odds of a hundred to one.
+/// Decisive difference of two criteria: odds of a hundred to one.
 const DECISIVE_DIFFERENCE: f64 = 10.0;
 
 /// A term that leaves more than noise around it.
 pub(super) struct DoubtfulTerm {
     pub index: usize,
-    /// The criterion that what takes its place must fall below.
+    /// The criterion that its replacement must fall below.
     pub criterion: f64,
 }
 
 impl ModelSelector<'_> {
-    /// What explains most with least: parts that are improved otherwise, with a ring-down more, or with two
-    /// lines for one. Next to a doubtful term they must explain more than a drift or an even fall of that
-    /// one.
+    /// The candidate of the least criterion: a model improved otherwise, with one more ring-down, or with two
+    /// lines in the place of one. Near a doubtful term it must explain more than a drift or an even fall of that
+    /// term.
     pub(super) fn refine_candidates(
         &self,
         explained: &Decomposition,
         improved: Option<SinusoidModel>,
     ) -> Option<SinusoidModel> {
         let parts = &explained.model;
-        let terms = &parts.solution.terms;
+        let terms = parts.terms();
         let doubtful = self.doubtful_terms(explained);
         let ring_downs = self.with_ring_downs(explained, &doubtful);
         let leaving: Vec<usize> = doubtful.iter().map(|d| d.index).collect();
@@ -46,46 +44,37 @@ impl ModelSelector<'_> {
             |new: &SinusoidTerm| terms.iter().any(|t| t.cycles == new.cycles && t.nepers == new.nepers);
         let explains = |candidate: &SinusoidModel| {
             let criterion = self.information_criterion(candidate);
-            let doubted = |d: &DoubtfulTerm| {
-                let near = |t: &&SinusoidTerm| {
-                    t.cycles > 0.0 && (t.cycles - terms[d.index].cycles).abs() < LOBE + lobe_half_width(t)
-                };
-                let pieces = candidate.solution.terms.iter().filter(near).filter(|t| !known(t)).count();
+            let doubted = |d: &&DoubtfulTerm| {
+                let near = |t: &&SinusoidTerm| t.cycles > 0.0 && are_adjacent(t, &terms[d.index]);
+                let new = || candidate.terms().iter().filter(near);
                 let were = terms.iter().filter(near).count();
-                pieces > were.min(1) || candidate.solution.terms.iter().filter(near).any(|t| t.first > 0)
+                new().filter(|t| !known(t)).count() > were.min(1) || new().any(|t| t.first > 0)
             };
-            let changed: Vec<&DoubtfulTerm> = doubtful.iter().filter(|d| doubted(d)).collect();
+            let changed: Vec<&DoubtfulTerm> = doubtful.iter().filter(doubted).collect();
             changed.iter().all(|d| criterion < d.criterion)
                 && (changed.is_empty() || self.leaves_noise_near_terms(candidate, &changed, terms))
         };
-        let best = candidates
-            .filter(explains)
-            .min_by(|a, b| self.information_criterion(a).total_cmp(&self.information_criterion(b)))?;
+        let best = self.select_best(candidates.filter(explains))?;
         let slow = |t: &SinusoidTerm| t.is_transient() && t.cycles < STEP_CYCLES && !known(t);
-        let doubted = self.trend_grows && best.solution.terms.iter().any(slow);
-        Some(
-            doubted
-                .then(|| self.with_grown_trend(parts, self.information_criterion(&best)))
-                .flatten()
-                .unwrap_or(best),
-        )
+        let doubted = self.trend_grows && best.terms().iter().any(slow);
+        let grown =
+            doubted.then(|| self.with_grown_trend(parts, self.information_criterion(&best))).flatten();
+        Some(grown.unwrap_or(best))
     }
 
-    /// The parts with a trend of a few columns more, where that explains about as much as a criterion says: a
-    /// slow ring-down may be what a trend does not describe yet.
+    /// The model with a trend of a few more columns, if that explains about as much as the criterion: a slow
+    /// ring-down may be a part of the trend not described yet.
     fn with_grown_trend(&self, parts: &SinusoidModel, criterion: f64) -> Option<SinusoidModel> {
-        let richer = std::iter::successors(parts.trend().next_richer(), |trend| trend.next_richer())
-            .take(MOST_TREND_GROWTH);
-        let grown = richer.filter_map(|trend| {
-            self.fit_model(self.problem_with_trend(trend), &parts.solution.terms, Tolerance::Coarse)
+        let richer = std::iter::successors(parts.trend().next_richer(), |trend| trend.next_richer());
+        let grown = richer.take(MOST_TREND_GROWTH).filter_map(|trend| {
+            self.fit_model(self.problem_with_trend(trend), parts.terms(), Tolerance::Coarse)
         });
-        grown
-            .min_by(|a, b| self.information_criterion(a).total_cmp(&self.information_criterion(b)))
+        self.select_best(grown)
             .filter(|grown| self.information_criterion(grown) < criterion + DECISIVE_DIFFERENCE)
     }
 
-    /// With two steady lines where one was seen that drifts over a range, if nothing but noise is left then.
-    /// What drifts farther than the two may lie apart is no pair.
+    /// Two steady lines in the place of one that drifts over a range, if only noise is left then. A range wider
+    /// than the distance of two such lines is no pair.
     pub(super) fn split_into_pair(
         &self,
         explained: &Decomposition,
@@ -94,15 +83,12 @@ impl ModelSelector<'_> {
         if range.high_hz - range.low_hz > WIDEST_BEAT * self.resolution_hz() {
             return None;
         }
-        let pairs = self.with_pairs(explained, &self.terms_with_residual(explained));
-        let best = pairs
-            .into_iter()
-            .min_by(|a, b| self.information_criterion(a).total_cmp(&self.information_criterion(b)))?;
+        let best = self.select_best(self.with_pairs(explained, &self.terms_with_residual(explained)))?;
         Some(self.decompose(best)).filter(|paired| self.leaves_only_noise(paired))
     }
 
-    /// Whether nothing more than noise is left around doubtful terms once a candidate takes their place: what
-    /// a sum of oscillations does not describe, more of them only take to pieces.
+    /// Whether only noise is left around doubtful terms once a candidate replaces them. More oscillations would
+    /// split into pieces what a sum of oscillations does not describe.
     fn leaves_noise_near_terms(
         &self,
         candidate: &SinusoidModel,
@@ -110,38 +96,40 @@ impl ModelSelector<'_> {
         terms: &[SinusoidTerm],
     ) -> bool {
         let explained = self.decompose(candidate.clone());
-        let near = |t: &&SinusoidTerm| {
-            doubtful.iter().any(|d| (t.cycles - terms[d.index].cycles).abs() < LOBE + lobe_half_width(t))
-                && t.cycles > 0.0
-        };
-        !explained.model.solution.terms.iter().filter(near).any(|t| self.leaves_peak(&explained, t))
+        let near =
+            |t: &&SinusoidTerm| t.cycles > 0.0 && doubtful.iter().any(|d| are_adjacent(t, &terms[d.index]));
+        !explained.model.terms().iter().filter(near).any(|t| self.leaves_peak(&explained, t))
     }
 
-    /// Whether something that begins inside the record is over within a cycle, as a step is.
+    /// Whether a term that begins inside the record ends within a cycle, as a step does.
     pub(super) fn contains_step(&self, explained: &Decomposition) -> bool {
         let damped = |t: &SinusoidTerm| {
             t.first > 0 && t.nepers > nepers_from_damping_ratio(t.cycles, SINGLE_CYCLE_DAMPING)
         };
-        self.trend_grows && explained.model.solution.terms.iter().any(|t| t.cycles > 0.0 && damped(t))
+        self.trend_grows && explained.model.terms().iter().any(|t| t.cycles > 0.0 && damped(t))
     }
 }
 
-// Two steady oscillations where one was seen: closer than a window that starts at zero tells apart.
-//
-// A frequency that drifts, or an amplitude that falls in a line, can be taken to pieces too. So two are
-// taken for one only if they leave nothing around them, and if neither explains more by growing or decaying.
+/// Whether the lobe of a term reaches that of another.
+fn are_adjacent(term: &SinusoidTerm, other: &SinusoidTerm) -> bool {
+    (term.cycles - other.cycles).abs() < LOBE + lobe_half_width(term)
+}
 
-/// Where a fit of two starts, resolutions from the one: it lies between them, or has settled on either.
+// Two steady oscillations in the place of one, closer than the lobe of a window that starts at zero. A frequency
+// that drifts, or an amplitude that falls linearly, can be split into two as well. So a pair is accepted only if
+// it leaves only noise around it, and if neither line explains more by growing or decaying.
+
+/// Starts of a pair, resolutions from the one term, which lies between the two or has settled on either.
 const PAIR_STARTS: [[f64; 2]; 5] = [[-0.35, 0.35], [-0.6, 0.6], [-0.9, 0.9], [0.0, 1.6], [-1.6, 0.0]];
-/// Resolutions from the one within which the two must lie.
+/// Farthest distance of a line of the pair from the one term, resolutions.
 const PAIR_REACH: f64 = 2.0;
 
 impl ModelSelector<'_> {
-    /// The parts with two steady terms in the place of one that is doubtful.
+    /// Models with two steady terms in the place of a doubtful one.
     pub(super) fn with_pairs(&self, explained: &Decomposition, doubtful: &[usize]) -> Vec<SinusoidModel> {
         let parts = &explained.model;
         let tried = |one: &usize| {
-            let (alone, group) = (vec![*one], nearby_terms(&parts.solution.terms, *one));
+            let (alone, group) = (vec![*one], nearby_terms(parts.terms(), *one));
             let groups = if group.len() > 1 { vec![alone, group] } else { vec![alone] };
             let pairs = groups.into_iter().flat_map(|out| PAIR_STARTS.map(|starts| (out.clone(), starts)));
             pairs.filter_map(|(out, starts)| self.fit_pair(parts, *one, &out, starts)).collect::<Vec<_>>()
@@ -149,7 +137,7 @@ impl ModelSelector<'_> {
         doubtful.iter().flat_map(tried).collect()
     }
 
-    /// Two terms that start this far from term `k`, in the place of some.
+    /// The model with two terms that start at some distances from term `k`, in the place of the terms `out`.
     fn fit_pair(
         &self,
         parts: &SinusoidModel,
@@ -157,31 +145,25 @@ impl ModelSelector<'_> {
         out: &[usize],
         starts: [f64; 2],
     ) -> Option<SinusoidModel> {
-        let one = parts.solution.terms[k];
-        let all = &parts.solution.terms;
-        let mut terms: Vec<SinusoidTerm> =
-            (0..all.len()).filter(|k| !out.contains(k)).map(|k| all[k]).collect();
-        terms.extend(
-            starts.map(|apart| SinusoidTerm::from_start(one.cycles + apart, 0.0, FreeParameters::Cycles)),
-        );
+        let one = parts.terms()[k];
+        let start = |apart: f64| SinusoidTerm::from_start(one.cycles + apart, 0.0, FreeParameters::Cycles);
+        let terms = parts.replace_terms(out, starts.map(start));
         if !self.has_frames_for(&parts.problem, &terms) {
             return None;
         }
-        let solved = parts.problem.gauss_newton(&terms, Tolerance::Fine)?;
-        let steady = SinusoidModel { problem: parts.problem.clone(), solution: solved };
-        let two = &steady.solution.terms[terms.len() - 2..];
+        let solution = parts.problem.gauss_newton(&terms, Tolerance::Fine)?;
+        let steady = SinusoidModel { problem: parts.problem.clone(), solution };
         let stays =
             |t: &SinusoidTerm| t.free == FreeParameters::Cycles && (t.cycles - one.cycles).abs() < PAIR_REACH;
-        if !two.iter().all(stays) {
+        if !steady.terms()[terms.len() - 2..].iter().all(stays) {
             return None;
         }
-        let released = self.fit_model(steady.problem.clone(), &steady.solution.terms, Tolerance::Coarse)?;
+        let released = self.fit_model(steady.problem.clone(), steady.terms(), Tolerance::Coarse)?;
         if self.information_criterion(&released) < self.information_criterion(&steady) {
             return None;
         }
         let explained = self.decompose(steady);
-        let leaves =
-            explained.model.solution.terms.iter().rev().take(2).any(|t| self.leaves_peak(&explained, t));
+        let leaves = explained.model.terms().iter().rev().take(2).any(|t| self.leaves_peak(&explained, t));
         (!leaves).then_some(explained.model)
     }
 }

@@ -1,18 +1,19 @@
-//! A step inside the record: where a window that no sum of trend and oscillations describes may be cut.
+//! Steps inside a record, at which a window may be cut if no sum of trend and oscillations describes it.
 
+use super::periodogram::upper_median;
 use std::ops::Range;
 
-/// Shares of the whole change between which a record is on neither side.
+/// Fractions of the step height that bound the transition.
 const TRANSITION_BOUNDS: (f64, f64) = (0.25, 0.75);
-/// Places behind the step that are tried, in times from a quarter to three quarters of the change: a step
-/// that dies away exponentially has tails there which a relaxation or two describe.
+/// Starts tried after a step, in widths of its transition: the tail of an exponential step can be described by
+/// relaxations.
 const STEP_WIDTHS_AFTER: [f64; 5] = [1.0, 2.0, 3.0, 5.0, 8.0];
-
-/// Times by which a record is at least as long as its way back from a dip: the drop of a head is near its
-/// level before and after a flip, and comes back in a jump, which no slow wave does.
+/// Least length of a record over the return from a dip. The drop of a head is near its level before and after a
+/// flip and returns in a jump, faster than any slow wave.
 const DIP_FRACTION: usize = 20;
 
-/// First frames of the parts behind the step that are worth a try, earliest first; none where the record
+/// First frames to try after a step, earliest first. None where the record changes sides repeatedly, as an
+/// oscillation does, or takes more than a third of its length for the step, as a trend does.
 /// changes sides to and fro, as an oscillation does, or not within a third of its length, as a trend does.
 pub(super) fn starts_after_step(samples: &[Option<f64>]) -> Vec<usize> {
     let Some((leaves, arrives)) = find_single_step(samples) else { return Vec::new() };
@@ -24,19 +25,18 @@ pub(super) fn starts_after_step(samples: &[Option<f64>]) -> Vec<usize> {
     starts.filter(|start| *start < samples.len()).collect()
 }
 
-/// Distances from a flip at which a stretch beside it may begin, in the same times; fewer, since a long
-/// record has many.
+/// Starts and ends tried next to a flip, in widths of its transition; few, because a long record has many flips.
 const STEP_WIDTHS_BESIDE: [f64; 2] = [1.0, 5.0];
-/// Most flips of a piece of a record: what changes sides more often is an oscillation.
+/// Most flips of a piece of a record; more changes of side are an oscillation.
 const MAX_STEPS: usize = 4;
-/// Part of a record over which its slope is taken, and which a flip takes at most, its inverse: a slower
-/// change is one that a trend describes.
+/// Length of a record over the distance of the frames that give its slope, and over the longest flip: a trend
+/// describes slower changes.
 const SLOPE_FRACTION: usize = 16;
-/// Share of a record's frames in a stretch that is worth a try, its inverse.
+/// Length of a record over the shortest stretch to try.
 const LEAST_STRETCH_FRACTION: usize = 8;
 
-/// What lies between the flips of a record, in order, each with the frames to try: near the flips, and
-/// farther away; all of a record without a flip.
+/// The stretches between the flips of a record, in order, each with the frames to try: first from near the flips,
+/// then from farther away. Without a flip, the whole record.
 pub(super) fn stretches_between_steps(samples: &[Option<f64>]) -> Vec<Vec<Range<usize>>> {
     let frames = samples.len();
     let sided = classify_sides(&remove_median_slope(samples));
@@ -53,40 +53,31 @@ pub(super) fn stretches_between_steps(samples: &[Option<f64>]) -> Vec<Vec<Range<
         start.1 + by(start)..end.0.saturating_sub(by(end))
     };
     let tried = |ends| {
-        let frames_of = |times: &f64| shrunk(ends, *times);
-        STEP_WIDTHS_BESIDE
-            .iter()
-            .map(frames_of)
-            .filter(|stretch| LEAST_STRETCH_FRACTION * stretch.len() >= frames)
-            .collect()
+        let stretches = STEP_WIDTHS_BESIDE.iter().map(|times| shrunk(ends, *times));
+        stretches.filter(|stretch| LEAST_STRETCH_FRACTION * stretch.len() >= frames).collect()
     };
     starts.zip(ends).map(tried).collect()
 }
 
-/// A record less the slope that most of it has: what moves evenly is on no side.
+/// The record less its median slope: a steady movement is not a change of side.
 fn remove_median_slope(samples: &[Option<f64>]) -> Vec<Option<f64>> {
     let apart = (samples.len() / SLOPE_FRACTION).max(1);
     let rise = |(a, b): (&Option<f64>, &Option<f64>)| a.zip(*b).map(|(a, b)| (b - a) / apart as f64);
-    let mut slopes: Vec<f64> = samples.iter().zip(samples.iter().skip(apart)).filter_map(rise).collect();
-    let middle = slopes.len() / 2;
-    let slope =
-        if slopes.is_empty() { 0.0 } else { *slopes.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let slopes = samples.iter().zip(samples.iter().skip(apart)).filter_map(rise).collect();
+    let slope = upper_median(slopes).unwrap_or(0.0);
     samples.iter().enumerate().map(|(i, x)| x.map(|x| x - slope * i as f64)).collect()
 }
 
-/// The last frame on the old side and the first on the new one, if the record changes sides once, or comes
-/// back from a dip.
+/// Last frame on the old side and first on the new one, if the record changes sides once or returns from a dip.
 fn find_single_step(samples: &[Option<f64>]) -> Option<(usize, usize)> {
     match find_side_changes(&classify_sides(samples))[..] {
         [change] => Some(change),
-        [_, (leaves, arrives)] if DIP_FRACTION * (arrives - leaves) <= samples.len() => {
-            Some((leaves, arrives))
-        }
+        [_, change] if DIP_FRACTION * (change.1 - change.0) <= samples.len() => Some(change),
         _ => None,
     }
 }
 
-/// The frames that are on a side, with whether it is the upper one.
+/// The frames outside the transition, with whether they are on the upper side.
 fn classify_sides(samples: &[Option<f64>]) -> Vec<(usize, bool)> {
     let (low, high) =
         samples.iter().flatten().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), x| (l.min(*x), h.max(*x)));
@@ -98,7 +89,7 @@ fn classify_sides(samples: &[Option<f64>]) -> Vec<(usize, bool)> {
     samples.iter().enumerate().filter_map(|(i, x)| Some((i, side((*x)?)?))).collect()
 }
 
-/// The last frame on the old side and the first on the new one, for each change.
+/// Last frame on the old side and first on the new one, for each change.
 fn find_side_changes(sided: &[(usize, bool)]) -> Vec<(usize, usize)> {
     sided.windows(2).filter(|w| w[0].1 != w[1].1).map(|w| (w[0].0, w[1].0)).collect()
 }

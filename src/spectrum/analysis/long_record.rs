@@ -1,8 +1,8 @@
-//! Records too long to be taken apart: components from the windowed periodogram, judged by the same criteria.
+//! Records too long for a fit: components from the windowed periodogram, judged by the same criteria.
 //!
-//! Decay and drift are not tried. Instead each component is read in pieces of the record: one that keeps its
-//! amplitude and phase is a steady line, any other is not known to be one, and its frequency only to the
-//! width of its peak. What is there for a short time only is read from the pieces that hold it.
+//! Decay and drift are not tried. Instead each component is read in pieces of the record. One that keeps its
+//! amplitude and phase is a steady line; the frequency of any other is known to the width of its peak only.
+//! What lasts for a short time is read from the pieces that hold it.
 
 mod transients;
 
@@ -16,17 +16,18 @@ use rayon::prelude::*;
 use std::f64::consts::{LN_2, TAU};
 use transients::TransientComponent;
 
-/// Pieces of the record, and the part of them that is independent where each overlaps half of the next.
+/// Pieces of the record; half-overlapping, they hold this many independent values.
 const PHASE_SEGMENTS: usize = 31;
 const INDEPENDENT_SEGMENTS: f64 = 16.0;
-/// Scatter of a steady line over its pieces, as a share of its amplitude, or in that of the noise.
+/// Most scatter of a steady line over its pieces, as a share of its amplitude or of the noise.
 const STEADY_SCATTER: f64 = 0.25;
 const STEADY_SCATTER_IN_NOISE: f64 = 1.7;
 /// Width of an even distribution over its deviation, the root of twelve.
 const UNIFORM_WIDTH_IN_SD: f64 = 3.464_101_615_137_754_6;
-/// Half width of the neighbourhood of which the noise is the median, resolutions.
+/// Half width of the neighbourhood whose median is the noise, resolutions.
 const NEIGHBOURHOOD: f64 = 40.0;
-/// Level over the noise there from which there is a component: once in a hundred spectra of a million frames.
+/// Level over that noise from which a peak is a component: noise reaches it in one of a hundred spectra of a
+/// million frames.
 const DETECTION: f64 = 4.5;
 
 pub(super) fn analyse_long_record(
@@ -35,21 +36,15 @@ pub(super) fn analyse_long_record(
     trend: Trend,
 ) -> Result<SpectralAnalysis, SpectrumError> {
     let mut spectrum = analyse_spectrum(record.samples, record.frame_rate_hz, settings)?;
-    let circumstances = RecordContext {
-        frame_rate_hz: record.frame_rate_hz,
-        exposure_s: record.exposure_s,
-        resolution_hz: spectrum.resolution_hz,
-        fastest_hz: settings.fastest_hz,
-    };
+    let context = RecordContext::new(record, spectrum.resolution_hz, settings);
     let removed_m = trend.fit_values(record.samples);
     let left_m: Vec<Option<f64>> =
         record.samples.iter().zip(&removed_m).map(|(x, removed)| x.map(|x| x - removed)).collect();
-    let read =
-        LongRecordSpectrum { spectrum: &spectrum, left_m: &left_m, frame_rate_hz: record.frame_rate_hz };
+    let assess = |c: &Component| assess_component(&spectrum, &left_m, record.frame_rate_hz, c);
     let lines: Vec<(Component, ComponentEvidence)> =
-        spectrum.components.par_iter().filter_map(|c| read.assess_component(c)).collect();
+        spectrum.components.par_iter().filter_map(assess).collect();
     let brief = transients::find_transients(record, settings);
-    spectrum.components = merge_components(lines, brief, &circumstances, settings.max_components);
+    spectrum.components = merge_components(lines, brief, &context, settings.max_components);
     Ok(SpectralAnalysis {
         spectrum,
         skipped_frames: 0,
@@ -66,11 +61,11 @@ pub(super) fn analyse_long_record(
     })
 }
 
-/// The lines, largest first, and what is there for a short time only, each once and largest first.
+/// Lines and short-lived components in one list, each once, largest first.
 fn merge_components(
     mut lines: Vec<(Component, ComponentEvidence)>,
     mut brief: Vec<TransientComponent>,
-    circumstances: &RecordContext,
+    context: &RecordContext,
     most: usize,
 ) -> Vec<Component> {
     let known = |b: &TransientComponent| {
@@ -78,42 +73,37 @@ fn merge_components(
     };
     brief.retain(|b| !known(b));
     lines.retain(|(c, line)| !(line.changes && brief.iter().any(|b| b.explains_component(c))));
-    // what a flip shows would fill the list: what is known better has its place first
+    // the peaks of a flip would fill the list: better known components come first
     let better = brief.len() + lines.iter().filter(|(_, line)| !line.changes).count();
     let mut room = 0..most.saturating_sub(better);
     lines.retain(|(_, line)| !line.changes || room.next().is_some());
     let (mut components, evidence): (Vec<Component>, Vec<ComponentEvidence>) = lines.into_iter().unzip();
-    classify_components(&mut components, &evidence, circumstances);
+    classify_components(&mut components, &evidence, context);
     components.extend(brief.into_iter().map(|b| b.component));
     components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
     components.truncate(most);
     components
 }
 
-/// A long record and its spectrum.
-struct LongRecordSpectrum<'a> {
-    spectrum: &'a Spectrum,
-    left_m: &'a [Option<f64>],
+/// A component that stands out of the noise around it, with the evidence of the whole record.
+fn assess_component(
+    spectrum: &Spectrum,
+    left_m: &[Option<f64>],
     frame_rate_hz: f64,
-}
-
-impl LongRecordSpectrum<'_> {
-    /// A component that stands out of the noise around it, with what the whole record says of it.
-    fn assess_component(&self, c: &Component) -> Option<(Component, ComponentEvidence)> {
-        let floor_m = local_noise_floor_m(self.spectrum, c.frequency_hz);
-        if c.amplitude_m <= DETECTION * floor_m {
-            return None;
-        }
-        let changes = !is_steady(self.left_m, self.frame_rate_hz, c, floor_m);
-        let width_hz = if changes { half_maximum_width_hz(self.spectrum, c) } else { 0.0 };
-        let frequency_sd_hz = math::hypot(c.frequency_sd_hz, width_hz / UNIFORM_WIDTH_IN_SD);
-        let evidence = ComponentEvidence { keeps_peak: true, changes, ..ComponentEvidence::default() };
-        Some((Component { frequency_sd_hz, ..c.clone() }, evidence))
+    c: &Component,
+) -> Option<(Component, ComponentEvidence)> {
+    let floor_m = local_noise_floor_m(spectrum, c.frequency_hz);
+    if c.amplitude_m <= DETECTION * floor_m {
+        return None;
     }
+    let changes = !is_steady(left_m, frame_rate_hz, c, floor_m);
+    let width_hz = if changes { half_maximum_width_hz(spectrum, c) } else { 0.0 };
+    let frequency_sd_hz = math::hypot(c.frequency_sd_hz, width_hz / UNIFORM_WIDTH_IN_SD);
+    let evidence = ComponentEvidence { keeps_peak: true, changes, ..ComponentEvidence::default() };
+    Some((Component { frequency_sd_hz, ..c.clone() }, evidence))
 }
 
-/// Distance between the places where a peak has fallen to half of its top, Hz: the frequency of what changes
-/// lies somewhere between them.
+/// Full width of a peak at half its amplitude, Hz; the frequency of a changing oscillation lies within it.
 fn half_maximum_width_hz(spectrum: &Spectrum, c: &Component) -> f64 {
     let top = spectrum.frequency_hz.partition_point(|hz| *hz < c.frequency_hz);
     let (before, behind) = spectrum.amplitude_m.split_at(top.min(spectrum.amplitude_m.len()));
@@ -128,12 +118,9 @@ fn local_noise_floor_m(spectrum: &Spectrum, frequency_hz: f64) -> f64 {
     let bin = |hz: f64| ((hz / bin_hz).max(0.0) as usize).min(spectrum.amplitude_m.len());
     let reach_hz = NEIGHBOURHOOD * spectrum.resolution_hz;
     let inside = bin(frequency_hz - reach_hz)..bin(frequency_hz + reach_hz);
-    let mut around = spectrum.amplitude_m.get(inside).unwrap_or_default().to_vec();
-    let middle = around.len() / 2;
-    if around.is_empty() {
-        return spectrum.noise_floor_m;
-    }
-    spectrum.noise_floor_m.max(*around.select_nth_unstable_by(middle, f64::total_cmp).1 / LN_2.sqrt())
+    let around = spectrum.amplitude_m.get(inside).unwrap_or_default().to_vec();
+    periodogram::upper_median(around)
+        .map_or(spectrum.noise_floor_m, |m| spectrum.noise_floor_m.max(m / LN_2.sqrt()))
 }
 
 /// Whether a component keeps amplitude and phase over the pieces of the record, each seen through a Hann

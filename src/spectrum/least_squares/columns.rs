@@ -8,11 +8,10 @@ use rayon::prelude::*;
 use std::f64::consts::PI;
 use std::ops::Range;
 
-/// Frames gathered before they are multiplied out: a block stays in cache, and sinusoids advanced by rotation
-/// start afresh in each.
+/// Frames gathered before they are multiplied: a block stays in cache, and rotated sinusoids start afresh in
+/// each.
 const BLOCK: usize = 256;
-/// Blocks that one thread sums; the sums are added in order, so that every number of threads gives the same
-/// bits.
+/// Blocks that one thread sums; the sums are added in order, so the number of threads does not change a bit.
 const BLOCKS_A_TASK: usize = 64;
 
 /// The columns of one term of `n` cycles and `d` nepers in the record: `u` runs over it from -1 to 1, the
@@ -34,13 +33,13 @@ pub(super) const QUADRATURE_COLUMNS: usize = 2;
 pub(super) const COLUMNS_WITH_SLOPES: usize = 4;
 
 impl TermColumn {
-    /// Where the column stands after those of the trend, among all four of each term.
+    /// Index of the column after those of the trend, among all four of each term.
     pub(super) fn column_index(self, trend: usize, term: usize) -> usize {
         trend + COLUMNS_WITH_SLOPES * term + self as usize
     }
 }
 
-/// A record's frames, weighted, and a trend's columns over them: what no step of a fit changes.
+/// A record's weighted frames and a trend's columns over them: constant during a fit.
 #[derive(Debug)]
 pub(super) struct FixedColumns {
     frames: usize,
@@ -67,18 +66,16 @@ impl FixedColumns {
         let mut basis = [0.0; MOST_COLUMNS];
         for (row, &(frame, root)) in rows.iter().enumerate() {
             trend.fill_row(abscissa(frame, data.len()), &mut basis);
-            basis
-                .iter()
-                .take(trend.column_count())
-                .enumerate()
-                .for_each(|(column, value)| columns[(row, column)] = root * value);
+            for (column, value) in basis.iter().take(trend.column_count()).enumerate() {
+                columns[(row, column)] = root * value;
+            }
             columns[(row, trend.column_count())] = root * data[frame];
         }
         let gram = columns.tr_mul(&columns);
         Self { frames: data.len(), rows, blocks, columns, gram }
     }
 
-    /// Inner products of the trend's columns, the first `EACH` of every term and the data, in this order.
+    /// Inner products of the trend's columns, the first `EACH` columns of every term and the data, in this order.
     pub(super) fn gram_matrix<const EACH: usize>(&self, terms: &[SinusoidTerm]) -> DMatrix<f64> {
         let (trend, width) = (self.columns.ncols() - 1, EACH * terms.len());
         let tasks: Vec<&[Range<usize>]> = self.blocks.chunks(BLOCKS_A_TASK).collect();
@@ -115,18 +112,15 @@ impl FixedColumns {
         blocks: &[Range<usize>],
     ) -> (DMatrix<f64>, DMatrix<f64>) {
         let width = EACH * terms.len();
-        let (mut mixed, mut own) =
-            (DMatrix::zeros(self.columns.ncols(), width), DMatrix::zeros(width, width));
+        let mut mixed = DMatrix::zeros(self.columns.ncols(), width);
+        let mut own = DMatrix::zeros(width, width);
         let mut block = DMatrix::zeros(BLOCK, width);
         for (b, range) in blocks.iter().enumerate() {
             let rows = &self.rows[range.clone()];
             for (place, term) in terms.iter().enumerate() {
                 let mut columns = block.columns_mut(EACH * place, EACH);
-                fill_term_columns::<EACH>(
-                    &mut columns,
-                    rows,
-                    &rotate_phasors(term, (first + b) * BLOCK, self.frames),
-                );
+                let turning = rotate_phasors(term, (first + b) * BLOCK, self.frames);
+                fill_term_columns::<EACH>(&mut columns, rows, &turning);
             }
             let of_terms = block.rows(0, rows.len());
             mixed.gemm_tr(1.0, &self.columns.rows(range.start, rows.len()), &of_terms, 1.0);
@@ -145,11 +139,9 @@ fn fill_term_columns<const EACH: usize>(
     turning: &PhasorBlock,
 ) {
     let mut column = |of: TermColumn, value: fn(f64, [f64; 3]) -> f64| {
-        let mut column = columns.column_mut(of as usize);
-        column
-            .iter_mut()
-            .zip(rows)
-            .for_each(|(entry, (frame, root))| *entry = value(*root, turning[frame % BLOCK]));
+        for (entry, (frame, root)) in columns.column_mut(of as usize).iter_mut().zip(rows) {
+            *entry = value(*root, turning[frame % BLOCK]);
+        }
     };
     column(TermColumn::Cosine, |root, [cosine, _, _]| root * cosine);
     column(TermColumn::Sine, |root, [_, sine, _]| root * sine);
@@ -164,9 +156,8 @@ pub(super) fn term_values(term: &SinusoidTerm, [cosine_m, sine_m]: [f64; 2], fra
     let mut values = Vec::with_capacity(frames);
     for first in (0..frames).step_by(BLOCK) {
         let turning = rotate_phasors(term, first, frames);
-        values.extend(
-            turning.iter().take(frames - first).map(|[cosine, sine, _]| cosine_m * cosine + sine_m * sine),
-        );
+        let inside = turning.iter().take(frames - first);
+        values.extend(inside.map(|[cosine, sine, _]| cosine_m * cosine + sine_m * sine));
     }
     values
 }

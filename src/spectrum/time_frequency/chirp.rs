@@ -6,18 +6,19 @@
 //! slope and the frequency are distinct because both parts of the amplitude share one slope.
 
 use crate::math;
-use crate::spectrum::periodogram;
+use crate::spectrum::periodogram::{self, upper_median};
 use crate::spectrum::transform::RealTransform;
 use nalgebra::{SMatrix, SVector};
 use std::f64::consts::PI;
 
 /// Unknowns with a frequency that changes linearly: p, q, s, a, b.
 pub(super) const LINEAR_UNKNOWNS: usize = 5;
-/// And c, with a rate that changes too.
+/// Unknowns with a rate that changes too: c is the sixth.
 pub(super) const CURVED_UNKNOWNS: usize = 6;
 /// Most steps; five are usual.
 const MOST_STEPS: usize = 20;
-/// A step that turns the phase at the ends of the segment by less, rad, is the last: the next is its square.
+/// A step that turns the phase at the ends of the segment by less, rad, is the last: the error of the next is
+/// its square.
 const SMALLEST_PHASE_STEP: f64 = 1e-3;
 /// First damping of a step that does not descend, as a share of the diagonal.
 const FIRST_DAMPING: f64 = 1e-2;
@@ -26,7 +27,7 @@ const LARGEST_DAMPING: f64 = 1e4;
 /// Frames for each unknown below which the fit would follow the noise.
 const FRAMES_PER_UNKNOWN: usize = 3;
 
-/// Frames of a segment and what they weigh.
+/// Frames of a segment and their weights.
 pub(super) struct ChirpSegment<'a> {
     pub samples: &'a [Option<f64>],
     /// One weight a frame; a frame without value takes no part.
@@ -45,7 +46,7 @@ pub(super) struct ChirpFit<const N: usize> {
 }
 
 impl ChirpParameters {
-    /// A start from a frequency, cycles in the segment, and its change over the segment, cycles.
+    /// Start of a fit, from a frequency, cycles in the segment, and its change over the segment, cycles.
     pub(super) fn from_cycles(cycles: f64, change: f64) -> Self {
         Self([0.0, 0.0, 0.0, PI * cycles, PI * change / 4.0, 0.0])
     }
@@ -61,7 +62,7 @@ impl ChirpParameters {
         4.0 * self.0[4] / PI
     }
 
-    /// The same shape with a rate that changes by given cycles a segment from one segment to the next.
+    /// The same parameters with a rate that changes by some cycles a segment from one segment to the next.
     pub(super) fn with_curvature(mut self, cycles: f64) -> Self {
         self.0[5] = PI * cycles / 24.0;
         self
@@ -77,8 +78,8 @@ impl ChirpParameters {
         -math::atan2(self.0[1], self.0[0])
     }
 
-    /// `x`, cosine and sine of the phase in each frame, each turned from the one before: third differences of
-    /// a cubic are constant.
+    /// `x`, cosine and sine of the phase in each frame, each rotated from the one before: third differences of a
+    /// cubic are constant.
     fn phases(&self, frames: usize) -> impl Iterator<Item = (f64, f64, f64)> + use<> {
         let [.., a, b, c] = self.0;
         let h = 2.0 / frames as f64;
@@ -103,8 +104,7 @@ impl ChirpParameters {
         (1.0 + self.0[2] * x) * (self.0[0] * cosine + self.0[1] * sine)
     }
 
-    /// Whether the amplitude falls to nothing within the segment: the component begins or ends near its
-    /// middle.
+    /// Whether the amplitude falls to zero within the segment: the component begins or ends near its middle.
     pub(super) fn vanishes(&self) -> bool {
         self.0[2].abs() >= 1.0
     }
@@ -123,15 +123,15 @@ impl ChirpParameters {
     }
 }
 
-/// Normal equations at a shape.
+/// Normal equations at some parameters.
 struct ChirpNormalEquations<const N: usize> {
     matrix: SMatrix<f64, N, N>,
-    right_hand_side: SVector<f64, N>,
+    right: SVector<f64, N>,
     misfit: f64,
 }
 
 impl ChirpSegment<'_> {
-    /// The frequency at which the misfit is least, from a start; `None` where the frames do not fix it.
+    /// Fits the first `N` unknowns from a start; `None` where the frames do not determine them.
     pub(super) fn fit_chirp<const N: usize>(&self, start: ChirpParameters) -> Option<ChirpFit<N>> {
         if self.samples.iter().flatten().count() < FRAMES_PER_UNKNOWN * N {
             return None;
@@ -140,13 +140,15 @@ impl ChirpSegment<'_> {
         let mut normal = self.normal_equations::<N>(&shape, |w| w);
         let mut damping = 0.0;
         for _ in 0..MOST_STEPS {
-            let step = damp_diagonal(&normal.matrix, damping).cholesky()?.solve(&normal.right_hand_side);
+            let mut damped = normal.matrix;
+            (0..N).for_each(|i| damped[(i, i)] *= 1.0 + damping);
+            let step = damped.cholesky()?.solve(&normal.right);
             let next = apply_step(shape, &step);
             let found = self.normal_equations::<N>(&next, |w| w);
             let settled = step.iter().skip(3).all(|s| s.abs() < SMALLEST_PHASE_STEP);
             if found.misfit <= normal.misfit {
-                (shape, normal, damping) =
-                    (next, found, if damping > FIRST_DAMPING { damping / 10.0 } else { 0.0 });
+                damping = if damping > FIRST_DAMPING { damping / 10.0 } else { 0.0 };
+                (shape, normal) = (next, found);
             } else {
                 damping = (10.0 * damping).max(FIRST_DAMPING);
             }
@@ -159,11 +161,11 @@ impl ChirpSegment<'_> {
         Some(ChirpFit { parameters: shape, covariance: inverse * spread * inverse })
     }
 
-    /// The start with the amplitude that fits it, and no slope of it.
+    /// The start with its best amplitude, and no slope of the amplitude.
     fn with_fitted_amplitude(&self, start: ChirpParameters) -> Option<ChirpParameters> {
         let [.., a, b, c] = start.0;
         let normal = self.normal_equations::<2>(&ChirpParameters([0.0, 0.0, 0.0, a, b, c]), |w| w);
-        let [p, q] = normal.matrix.cholesky()?.solve(&normal.right_hand_side).into();
+        let [p, q] = normal.matrix.cholesky()?.solve(&normal.right).into();
         Some(ChirpParameters([p, q, 0.0, a, b, c]))
     }
 
@@ -184,17 +186,11 @@ impl ChirpSegment<'_> {
             misfit += w * rest * rest;
         }
         let matrix = SMatrix::from_fn(|i, j| matrix[i.max(j)][i.min(j)]);
-        ChirpNormalEquations { matrix, right_hand_side: SVector::from(towards), misfit }
+        ChirpNormalEquations { matrix, right: SVector::from(towards), misfit }
     }
 }
 
-fn damp_diagonal<const N: usize>(matrix: &SMatrix<f64, N, N>, damping: f64) -> SMatrix<f64, N, N> {
-    let mut damped = *matrix;
-    (0..N).for_each(|i| damped[(i, i)] *= 1.0 + damping);
-    damped
-}
-
-/// The shape after a step; an amplitude falls at most to nothing at one end of the segment.
+/// The parameters after a step; an amplitude falls at most to zero at one end of the segment.
 fn apply_step<const N: usize>(shape: ChirpParameters, step: &SVector<f64, N>) -> ChirpParameters {
     let mut next = shape.0;
     next.iter_mut().zip(step.iter()).for_each(|(value, step)| *value += step);
@@ -203,8 +199,7 @@ fn apply_step<const N: usize>(shape: ChirpParameters, step: &SVector<f64, N>) ->
 }
 
 impl<const N: usize> ChirpFit<N> {
-    /// Variance of the frequency at `x`, square cycles in the segment, for a noise of deviation 1 in each
-    /// frame.
+    /// Variance of the frequency at `x`, square cycles in the segment, for a noise of deviation 1 in each frame.
     pub(super) fn cycles_variance(&self, x: f64) -> f64 {
         let along = [1.0, 2.0 * x, 3.0 * x * x];
         let mut gradient = SVector::<f64, N>::zeros();
@@ -213,18 +208,18 @@ impl<const N: usize> ChirpFit<N> {
     }
 }
 
-// Noise of a segment once its component is taken out.
+// Noise of a segment without its component.
 
 /// Half width of the lobe of a Hann window, resolutions.
 const LOBE: f64 = 2.0;
-/// Multiples of the component that are left out: the cycle of stick and slip is no sine.
+/// Multiples of the component that are left out, because the stick-slip cycle is no sine.
 const HARMONICS: usize = 3;
 /// The noise is a median over at least this many resolutions.
 const FEWEST_RESOLUTIONS: f64 = 20.0;
 /// Fewest bins of a median; with fewer left, harmonics are not left out.
 const FEWEST_BINS: usize = 8;
-/// Neighbours to either side of which a column takes the median: one segment's length, so that a column's own
-/// few bins do not decide.
+/// Neighbours on either side in the median of a column: one segment's length, so that a column's own few bins do
+/// not decide.
 const NEIGHBOURS: usize = 4;
 
 /// Measures the noise of segments of one length.
@@ -239,25 +234,18 @@ pub(super) struct SegmentNoise {
 impl SegmentNoise {
     pub(super) fn new(frames: usize, band: (f64, f64)) -> Self {
         let padded = (frames + 1).next_power_of_two();
-        Self {
-            transform: RealTransform::new(padded),
-            window: periodogram::hann_weights(&vec![Some(0.0); frames]),
-            padded,
-            band,
-        }
+        let (transform, window) =
+            (RealTransform::new(padded), periodogram::hann_weights(&vec![Some(0.0); frames]));
+        Self { transform, window, padded, band }
     }
 
-    /// What is left of a segment less a shape.
+    /// Noise of a segment less the fitted component.
     pub(super) fn measure_residual(&self, segment: &[Option<f64>], shape: &ChirpParameters) -> ResidualNoise {
-        let weighted = segment.iter().zip(shape.values(segment.len())).zip(&self.window);
-        let powers = self.transform.squared_magnitudes(
-            weighted.map(|((sample, value), w)| sample.map_or(0.0, |sample| w * (sample - value))),
-        );
-        let squares: f64 = segment
-            .iter()
-            .zip(&self.window)
-            .map(|(sample, w)| if sample.is_some() { w * w } else { 0.0 })
-            .sum();
+        let values = segment.iter().zip(shape.values(segment.len())).zip(&self.window);
+        let weighted = values.map(|((sample, value), w)| sample.map_or(0.0, |sample| w * (sample - value)));
+        let powers = self.transform.squared_magnitudes(weighted);
+        let square = |(sample, w): (&Option<f64>, &f64)| if sample.is_some() { w * w } else { 0.0 };
+        let squares: f64 = segment.iter().zip(&self.window).map(square).sum();
         let cycles = |bin: usize| bin as f64 * self.window.len() as f64 / self.padded as f64;
         let top = self.band.1.max(self.band.0 + FEWEST_RESOLUTIONS);
         let band: Vec<usize> =
@@ -265,26 +253,25 @@ impl SegmentNoise {
         let of = |chosen: &dyn Fn(f64) -> bool| {
             band.iter().filter(|bin| chosen(cycles(**bin))).map(|bin| powers[*bin]).collect::<Vec<f64>>()
         };
-        let apart = Some(of(&|cycles| is_outside_harmonics(cycles, shape)))
-            .filter(|apart| apart.len() >= FEWEST_BINS)
-            .unwrap_or_else(|| of(&|_| true));
+        let mut apart = of(&|cycles| !(1..=HARMONICS).any(|k| is_in_harmonic_lobe(cycles, shape, k)));
+        if apart.len() < FEWEST_BINS {
+            apart = of(&|_| true);
+        }
         let under = of(&|cycles| is_in_harmonic_lobe(cycles, shape, 1));
         let mean = under.iter().sum::<f64>() / under.len().max(1) as f64;
         let deviation = |power: f64| if squares > 0.0 { (power / squares).sqrt() } else { 0.0 };
         // powers of noise are distributed exponentially: their median is the mean times ln 2
-        ResidualNoise {
-            around_m: deviation(upper_median(apart).unwrap_or(0.0) / std::f64::consts::LN_2),
-            under_m: deviation(mean),
-        }
+        let around_m = deviation(upper_median(apart).unwrap_or(0.0) / std::f64::consts::LN_2);
+        ResidualNoise { around_m, under_m: deviation(mean) }
     }
 }
 
-/// Standard deviations in a frame of the white noise that would leave as much, m.
+/// Standard deviations in a frame of the white noise with the same power, m.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct ResidualNoise {
     /// In the band, at least 20 resolutions of it, next to the component and its multiples: the noise.
     pub around_m: f64,
-    /// Where the component was: more than the noise where it is no such sinusoid.
+    /// At the component's own frequency: more than the noise where it is no such sinusoid.
     pub under_m: f64,
 }
 
@@ -293,23 +280,13 @@ fn is_in_harmonic_lobe(cycles: f64, shape: &ChirpParameters, multiple: usize) ->
     (cycles - k * shape.cycles_at(0.0)).abs() <= LOBE + k * shape.change().abs() / 2.0
 }
 
-fn is_outside_harmonics(cycles: f64, shape: &ChirpParameters) -> bool {
-    !(1..=HARMONICS).any(|k| is_in_harmonic_lobe(cycles, shape, k))
-}
-
 /// The median of each column and its neighbours.
 pub(super) fn median_filter(deviations: &[Option<f64>]) -> Vec<f64> {
-    let around =
-        |c: usize| &deviations[c.saturating_sub(NEIGHBOURS)..(c + NEIGHBOURS + 1).min(deviations.len())];
-    (0..deviations.len())
-        .map(|c| upper_median(around(c).iter().flatten().copied().collect()).unwrap_or(0.0))
-        .collect()
-}
-
-/// The upper median; `None` of nothing.
-pub(super) fn upper_median(mut values: Vec<f64>) -> Option<f64> {
-    let middle = values.len() / 2;
-    (!values.is_empty()).then(|| *values.select_nth_unstable_by(middle, f64::total_cmp).1)
+    let around = |c: usize| {
+        let near = &deviations[c.saturating_sub(NEIGHBOURS)..(c + NEIGHBOURS + 1).min(deviations.len())];
+        upper_median(near.iter().flatten().copied().collect()).unwrap_or(0.0)
+    };
+    (0..deviations.len()).map(around).collect()
 }
 
 #[cfg(test)]

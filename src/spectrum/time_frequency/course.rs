@@ -1,24 +1,22 @@
-//! What of a ridge is a course: where one component is followed whose frequency the segments agree on.
+//! The parts of a ridge that follow one component whose frequency the segments agree on.
 //!
-//! A ridge has points wherever something exceeds the noise by more than noise alone reaches once in a hundred
-//! records. That leaves two kinds of points that say nothing of a course. Where a model, which has no noise,
-//! is at rest, remainders far below every colour of the map exceed rounding; and where the frequency of a
-//! cycle swings several times within a segment, its sidebands are as high as itself, and the strongest of
-//! them is another one from segment to segment.
+//! A ridge has points wherever the amplitude exceeds the noise by more than noise alone reaches once in a hundred
+//! records. Two kinds of points are no part of a course. In a model, which has no noise, residues at rest far
+//! below every colour of the map exceed rounding. And where the frequency of a cycle swings several times within
+//! a segment, its sidebands are as high as the carrier, and the strongest changes from segment to segment.
 
 use super::{Ridge, RidgePoint, Spectrogram};
 use crate::math;
 
-/// Range of amplitudes that counts, and that the colours of a spectrogram hold, dB.
+/// Range of amplitudes of a course, and of the colours of a spectrogram, dB.
 pub(crate) const DYNAMIC_RANGE_DB: f64 = 60.0;
-/// Largest step from a segment to the next beyond what the fitted rates say, resolutions, where segments
-/// share three quarters of their frames: the quarter within which neighbours of a range agree too. For the
-/// weakest component that a ridge accepts noise makes it less than a tenth, and a single component has no
-/// other reason to jump.
+/// Largest step between segments that share three quarters of their frames, beyond the step of the fitted rates,
+/// resolutions; the neighbours of a range agree to within the same quarter. For the weakest component of a ridge
+/// noise makes less than a tenth of it, and a single component has no other reason to jump.
 const MAX_FREQUENCY_STEP: f64 = 0.25;
 /// Distance of such segments, segments.
 const USUAL_HOP: f64 = 0.25;
-/// Fewest segments of a part where they share few frames with each other.
+/// Fewest segments of a part, where they share few frames with each other.
 const MIN_PART_SEGMENTS: usize = 3;
 
 /// A frequency at a speed of the tip.
@@ -32,27 +30,23 @@ pub struct SpeedPoint {
     pub frequency_sd_hz: Option<f64>,
 }
 
-/// The parts of a ridge, in order of time, with a gap between one and the next.
+/// The coherent parts of a ridge, in order of time, with a gap between one and the next.
 pub(crate) fn coherent_parts(ridge: &Ridge, of: &Spectrogram) -> Vec<Vec<RidgePoint>> {
-    let amplitudes = of.amplitude_m.iter().flatten().flatten();
-    let least_m =
-        math::powf(10.0, -DYNAMIC_RANGE_DB / 20.0) * amplitudes.fold(0.0, |most: f64, a| most.max(*a));
+    let largest_m = of.amplitude_m.iter().flatten().flatten().fold(0.0, |most: f64, a| most.max(*a));
+    let least_m = math::powf(10.0, -DYNAMIC_RANGE_DB / 20.0) * largest_m;
     let strong: Vec<RidgePoint> = ridge.points.iter().filter(|p| p.amplitude_m >= least_m).copied().collect();
-    // from one segment to the next that shares no frame with it: less is hardly more than one segment, and
-    // may agree by chance
+    // up to the next segment that shares no frame: fewer points are hardly more than one segment and may agree
+    // by chance
     let fewest = MIN_PART_SEGMENTS.max((ridge.segment_s / ridge.hop_s).round() as usize + 1);
-    strong
-        .chunk_by(|a, b| is_continuous(ridge, a, b))
-        .filter(|part| part.len() >= fewest)
-        .map(<[RidgePoint]>::to_vec)
-        .collect()
+    let parts = strong.chunk_by(|a, b| is_continuous(ridge, a, b)).filter(|part| part.len() >= fewest);
+    parts.map(<[RidgePoint]>::to_vec).collect()
 }
 
-/// Whether one point is the next of the course that the other is on.
+/// Whether a point continues the course of the one before.
 fn is_continuous(ridge: &Ridge, a: &RidgePoint, b: &RidgePoint) -> bool {
     let apart_s = b.time_s - a.time_s;
     let step_hz = b.frequency_hz - a.frequency_hz - apart_s * (a.rate_hz_per_s + b.rate_hz_per_s) / 2.0;
-    // segments that share fewer frames may differ by as much more
+    // segments that share fewer frames may differ by proportionally more
     let allowed_hz =
         MAX_FREQUENCY_STEP / ridge.segment_s * (ridge.hop_s / (USUAL_HOP * ridge.segment_s)).max(1.0);
     apart_s < 1.5 * ridge.hop_s && step_hz.abs() <= allowed_hz

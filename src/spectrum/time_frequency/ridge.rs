@@ -1,6 +1,7 @@
 //! The ridge: the course of a component through the columns.
 
 use crate::math;
+use crate::spectrum::periodogram::upper_median;
 use serde::Serialize;
 
 /// A point of a ridge: the middle of a segment.
@@ -10,8 +11,8 @@ pub struct RidgePoint {
     pub time_s: f64,
     /// Frequency at that time, Hz.
     pub frequency_hz: f64,
-    /// Its standard deviation, Hz: from the noise next to the component, or from what the fit leaves of it if
-    /// that is more, and a five-hundredth of the resolution for what other components leak into the fit.
+    /// Its standard deviation, Hz: from the noise next to the component or from the residual of the fit, whichever
+    /// is larger, and a five-hundredth of the resolution for leakage of other components.
     pub frequency_sd_hz: f64,
     /// Change of the frequency, Hz/s.
     pub rate_hz_per_s: f64,
@@ -21,11 +22,11 @@ pub struct RidgePoint {
     pub phase_rad: f64,
     /// Amplitude over that of noise in a bin of the column, `20 log10`, dB.
     pub snr_db: f64,
-    /// What the fit leaves where the component is, as a share of its amplitude in a bin of the column.
+    /// Residual of the fit at the component, as a share of its amplitude in a bin of the column.
     pub residual_ratio: f64,
 }
 
-/// A frequency carried to an end of the record.
+/// A frequency extrapolated to an end of the record.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RidgeEnd {
     /// Time from the first frame of the record, s.
@@ -39,13 +40,13 @@ pub struct RidgeEnd {
 /// Course of a component over time.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ridge {
-    /// The points, in order of time. A point is where the fitted amplitude exceeds the noise next to it by
-    /// more than noise alone reaches once in a hundred records and does not fall to nothing within the
-    /// segment, three segments in a row or more; elsewhere the ridge is interrupted.
+    /// The points, in order of time. A point needs a fitted amplitude that exceeds the noise next to it by more
+    /// than noise alone reaches once in a hundred records and does not fall to zero within the segment, three
+    /// segments in a row or more. Elsewhere the ridge is interrupted.
     pub points: Vec<RidgePoint>,
-    /// The frequency at the first frame, if the ridge reaches the first segment and carries that far.
+    /// The frequency at the first frame, if the ridge reaches the first segment and the fit extends that far.
     pub start: Option<RidgeEnd>,
-    /// The frequency at the last frame, if the ridge reaches the last segment and carries that far.
+    /// The frequency at the last frame, if the ridge reaches the last segment and the fit extends that far.
     pub end: Option<RidgeEnd>,
     /// Length of a segment, s.
     pub segment_s: f64,
@@ -53,20 +54,11 @@ pub struct Ridge {
     pub hop_s: f64,
 }
 
-impl Ridge {
-    /// The parts of the ridge between its interruptions.
-    pub fn unbroken_parts(&self) -> impl Iterator<Item = &[RidgePoint]> {
-        self.points.chunk_by(|a, b| b.time_s - a.time_s < 1.5 * self.hop_s)
-    }
-}
-
-// What a ridge says as a whole: its range, and whether it is a course at all.
-
 /// Resolutions within which neighbours agree.
 const AGREEMENT_RESOLUTIONS: f64 = 0.25;
 /// Deviations of their difference within which neighbours agree.
 const AGREEMENT_DEVIATIONS: f64 = 4.0;
-/// Distance of points that share too few frames to follow each other's noise, segments.
+/// Distance of points with nearly independent noise, segments.
 const INDEPENDENT_SEGMENTS: f64 = 0.5;
 /// Deviations of a normal number that are exceeded upwards once in a thousand.
 const ONCE_IN_A_THOUSAND: f64 = 3.09;
@@ -85,17 +77,22 @@ pub struct FrequencyRange {
 }
 
 impl Ridge {
-    /// Least and greatest frequency, the two ends of the record included where they are known to a quarter of
-    /// a resolution. A point counts only if a neighbour's frequency, carried over by its rate, agrees with it
-    /// within a quarter of a resolution or four deviations, so that a single bad point sets neither; `None`
-    /// where no point is so confirmed.
+    /// The parts of the ridge between its interruptions.
+    pub fn unbroken_parts(&self) -> impl Iterator<Item = &[RidgePoint]> {
+        self.points.chunk_by(|a, b| b.time_s - a.time_s < 1.5 * self.hop_s)
+    }
+
+    /// Least and greatest frequency, including the two ends of the record if they are known to a quarter of a
+    /// resolution. A point counts only if the extrapolated frequency of a neighbour agrees with it within a quarter
+    /// of a resolution or four deviations, so that a single bad point sets neither limit. `None` where no point
+    /// is confirmed.
     #[must_use]
     pub fn range_hz(&self) -> Option<FrequencyRange> {
         frequency_range(self)
     }
 
-    /// Whether the frequency changes: the scatter of points half a segment apart about their mean is larger
-    /// than their deviations explain but once in a thousand records.
+    /// Whether the frequency changes: points half a segment apart scatter about their mean by more than their
+    /// deviations explain in all but one of a thousand records.
     #[must_use]
     pub fn is_drifting(&self) -> bool {
         has_significant_drift(self)
@@ -103,40 +100,32 @@ impl Ridge {
 }
 
 fn frequency_range(ridge: &Ridge) -> Option<FrequencyRange> {
-    // an end that was carried there with a wide deviation bounds nothing
+    // an end extrapolated with a wide deviation bounds nothing
     let known = |end: &&RidgeEnd| end.frequency_sd_hz < AGREEMENT_RESOLUTIONS / ridge.segment_s;
     let start = ridge.start.as_ref().filter(known).zip(ridge.points.first());
     let end = ridge.end.as_ref().filter(known).zip(ridge.points.last());
+    let total_sd_hz = |sd_hz: f64, beyond_hz: f64, point: &RidgePoint| {
+        [sd_hz, beyond_hz, change_within_cycle_hz(point)].into_iter().fold(0.0, math::hypot)
+    };
     let ends = start.iter().chain(&end).map(|(end, point)| {
-        (
-            end.frequency_hz,
-            root_sum_of_squares([
-                end.frequency_sd_hz,
-                end_mismatch_hz(end, point),
-                change_within_cycle_hz(point),
-            ]),
-        )
+        (end.frequency_hz, total_sd_hz(end.frequency_sd_hz, end_mismatch_hz(end, point), point))
     });
     let confirmed = ridge.unbroken_parts().flat_map(|part| {
         let outer = |i: usize| {
             let carried = |end: Option<(&RidgeEnd, &RidgePoint)>| end.is_some_and(|(_, p)| p == &part[i]);
             (i == 0 || i + 1 == part.len()) && !carried(start) && !carried(end)
         };
-        let with_sd =
-            move |i: usize| (&part[i], if outer(i) { change_beyond_hz(ridge, &part[i]) } else { 0.0 });
-        (0..part.len()).filter(|i| is_confirmed(ridge, part, *i)).map(with_sd).collect::<Vec<_>>()
+        let beyond_hz = move |i: usize| if outer(i) { change_beyond_hz(ridge, &part[i]) } else { 0.0 };
+        let confirmed = (0..part.len()).filter(|i| is_confirmed(ridge, part, *i));
+        confirmed.map(move |i| (&part[i], beyond_hz(i))).collect::<Vec<_>>()
     });
+    let confirmed = confirmed.map(|(p, beyond)| (p.frequency_hz, total_sd_hz(p.frequency_sd_hz, beyond, p)));
     let bent = curvature_bias_hz(ridge);
-    let all: Vec<(f64, f64)> = confirmed
-        .map(|(p, beyond)| {
-            (p.frequency_hz, root_sum_of_squares([p.frequency_sd_hz, beyond, change_within_cycle_hz(p)]))
-        })
-        .chain(ends)
-        .map(|(hz, sd_hz)| (hz, math::hypot(sd_hz, bent)))
-        .collect();
+    let all: Vec<(f64, f64)> =
+        confirmed.chain(ends).map(|(hz, sd_hz)| (hz, math::hypot(sd_hz, bent))).collect();
     let (low_hz, low_sd_hz) = all.iter().copied().min_by(|a, b| a.0.total_cmp(&b.0))?;
     let (high_hz, high_sd_hz) = all.iter().copied().max_by(|a, b| a.0.total_cmp(&b.0))?;
-    // two deviations of another that is less well known may reach farther
+    // two deviations of a less certain frequency may reach farther
     let beyond =
         |of: &dyn Fn(f64, f64) -> f64| all.iter().map(|(hz, sd_hz)| of(*hz, *sd_hz)).fold(0.0, f64::max);
     Some(FrequencyRange {
@@ -147,46 +136,39 @@ fn frequency_range(ridge: &Ridge) -> Option<FrequencyRange> {
     })
 }
 
-/// What the frequency changes by in the outer half of the segment of a point beyond which the course is not
-/// known, Hz: it may go on.
+/// Change of the frequency in the outer half of a segment next to an interruption, Hz: the course may continue
+/// there.
 fn change_beyond_hz(ridge: &Ridge, point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s * ridge.segment_s / 2.0).abs()
 }
 
-/// A third of the distance between an end and where the rate of the point next to it leads, Hz: a course that
-/// bends there leaves a part of it open.
+/// A third of the distance between an end and the extrapolated rate of the point next to it, Hz, as the
+/// uncertainty of a course that bends there.
 fn end_mismatch_hz(end: &RidgeEnd, point: &RidgePoint) -> f64 {
     let led_hz = point.frequency_hz + point.rate_hz_per_s * (end.time_s - point.time_s);
     (end.frequency_hz - led_hz).abs() / 3.0
 }
 
-/// Half of what the frequency changes by within a cycle, Hz: an instant within it is not defined, since its
-/// form changes with its frequency.
+/// Half of the change of the frequency within a cycle, Hz: the frequency has no meaning at an instant within a
+/// cycle, whose form changes with it.
 fn change_within_cycle_hz(point: &RidgePoint) -> f64 {
     (point.rate_hz_per_s / point.frequency_hz / 2.0).abs()
 }
 
-fn root_sum_of_squares(values: [f64; 3]) -> f64 {
-    values.into_iter().fold(0.0, math::hypot)
-}
-
-/// What a course that bends is read off by where it turns, Hz: a fit of a changing but steady rate to a
-/// segment of length `T` cuts a corner of curvature `c` by up to `c T^2 / 24`, the curvature taken from the
-/// change of the rate half a segment on.
+/// Bias of a bending course at its turning points, Hz: a fit of a steady rate to a segment of length `T` cuts a
+/// corner of curvature `c` by up to `c T^2 / 24`. The curvature is the median change of the rate over half a
+/// segment.
 fn curvature_bias_hz(ridge: &Ridge) -> f64 {
     let apart = (INDEPENDENT_SEGMENTS * ridge.segment_s / ridge.hop_s).round().max(1.0) as usize;
-    let bends = ridge
-        .unbroken_parts()
-        .flat_map(|part| part.windows(apart + 1))
-        .map(|w| (w[apart].rate_hz_per_s - w[0].rate_hz_per_s).abs() / (w[apart].time_s - w[0].time_s));
-    let mut bends: Vec<f64> = bends.collect();
-    let middle = bends.len() / 2;
-    let curvature =
-        if bends.is_empty() { 0.0 } else { *bends.select_nth_unstable_by(middle, f64::total_cmp).1 };
+    let bend = |w: &[RidgePoint]| {
+        (w[apart].rate_hz_per_s - w[0].rate_hz_per_s).abs() / (w[apart].time_s - w[0].time_s)
+    };
+    let bends = ridge.unbroken_parts().flat_map(|part| part.windows(apart + 1)).map(bend);
+    let curvature = upper_median(bends.collect()).unwrap_or(0.0);
     curvature * ridge.segment_s * ridge.segment_s / 24.0
 }
 
-/// Whether a neighbour, carried over by its rate, agrees; the only point of a ridge has none and stands.
+/// Whether the extrapolated frequency of a neighbour agrees; a part with a single point is confirmed.
 fn is_confirmed(ridge: &Ridge, part: &[RidgePoint], index: usize) -> bool {
     let point = &part[index];
     let agrees = |other: &RidgePoint| {
@@ -201,10 +183,9 @@ fn is_confirmed(ridge: &Ridge, part: &[RidgePoint], index: usize) -> bool {
 
 fn has_significant_drift(ridge: &Ridge) -> bool {
     let mut apart: Vec<&RidgePoint> = Vec::new();
+    let least_s = (1.0 - 1e-9) * INDEPENDENT_SEGMENTS * ridge.segment_s;
     for point in &ridge.points {
-        if apart.last().is_none_or(|last| {
-            point.time_s - last.time_s >= (1.0 - 1e-9) * INDEPENDENT_SEGMENTS * ridge.segment_s
-        }) {
+        if apart.last().is_none_or(|last| point.time_s - last.time_s >= least_s) {
             apart.push(point);
         }
     }
@@ -215,7 +196,7 @@ fn has_significant_drift(ridge: &Ridge) -> bool {
     apart.len() > 1 && scatter > chi_square_limit((apart.len() - 1) as f64)
 }
 
-/// The sum of `freedom` squares that is exceeded once in a thousand (Wilson and Hilferty's approximation).
+/// The sum of `freedom` squares exceeded once in a thousand (Wilson and Hilferty's approximation).
 fn chi_square_limit(freedom: f64) -> f64 {
     let spread = 2.0 / (9.0 * freedom);
     freedom * math::powi(1.0 - spread + ONCE_IN_A_THOUSAND * spread.sqrt(), 3)

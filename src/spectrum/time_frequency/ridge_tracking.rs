@@ -1,42 +1,41 @@
-//! The points of a ridge: fits to the segments, and to the ends of the record, from the path through the
+//! The points of a ridge: fits to the segments and to the ends of the record, started from the path through the
 //! columns.
 
 use super::chirp::{
     CURVED_UNKNOWNS, ChirpFit, ChirpParameters, ChirpSegment, LINEAR_UNKNOWNS, ResidualNoise, SegmentNoise,
-    median_filter, upper_median,
+    median_filter,
 };
 use super::ridge::{Ridge, RidgeEnd, RidgePoint};
 use super::{SegmentBins, SegmentLayout, Spectrogram};
 use crate::math;
 use crate::spectrum::error::SpectrumError;
-use crate::spectrum::periodogram;
+use crate::spectrum::periodogram::{self, upper_median};
 use crate::spectrum::settings::ROUNDING;
 
 /// Chance that noise alone puts one point on a ridge.
 const FALSE_ALARM: f64 = 0.01;
-/// Independent trials in each resolution of each segment: the maxima of overlapping columns, fitted, are more
-/// than their independent values.
+/// Independent trials in each resolution of each segment: overlapping columns have more maxima than independent
+/// values.
 const TRIALS: f64 = 10.0;
 /// Farthest a fit moves from the path, resolutions: half way down the lobe of a Hann window.
 const FARTHEST_FROM_PATH: f64 = 1.0;
-/// Deviation of a frequency that noise does not explain, resolutions: what other components leak into a fit.
+/// Deviation of a frequency by leakage of other components into a fit, resolutions.
 const LEAKAGE_SD: f64 = 0.002;
 /// The same at the end of a fit whose rate may change, resolutions of that fit.
 const END_LEAKAGE_SD: f64 = 0.01;
-/// Lengths of the fits at an end of the record, segments: the change of the rate takes a longer stretch than
-/// the rate.
+/// Lengths of the fits at an end of the record, segments: the change of the rate needs a longer stretch than the
+/// rate.
 const END_SEGMENTS: [f64; 6] = [1.75, 1.3, 1.0, 0.75, 0.55, 0.4];
-/// Fewest cycles in a fit there that is shorter than a segment: others leak into short ones.
+/// Fewest cycles in a fit there that is shorter than a segment: others leak into short fits.
 const END_CYCLES: f64 = 8.0;
 /// Deviations of their difference from which a shorter fit contradicts a longer one.
 const CONTRADICTS: f64 = 3.5;
-/// What a changing rate adds to the fitted frequency with the sine weights, over its change from one segment
-/// to the next: `<x^4>/<x^2>/24`.
+/// Bias of the fitted frequency by a changing rate with the sine weights, over the change of the rate from one
+/// segment to the next: `<x^4>/<x^2>/24`.
 const CURVATURE_BIAS: f64 = 0.4154 / 24.0;
-/// Deviations of the frequency from which on the rate of a point may change too.
+/// Deviations of the frequency by this bias from which the rate of a point may change.
 const SIGNIFICANT_CURVATURE: f64 = 0.5;
-/// Farthest that the fit at an end may lie from the ridge in the middle of its outermost segment,
-/// resolutions.
+/// Farthest distance of the fit at an end from the ridge in the middle of its outermost segment, resolutions.
 const END_AGREEMENT: f64 = 0.25;
 
 #[derive(Clone, Copy)]
@@ -44,7 +43,7 @@ pub(super) struct SegmentFit {
     chirp: ChirpParameters,
     /// Deviation of the frequency for a noise of deviation 1 in each frame, cycles in the segment.
     unit_sd: f64,
-    /// What the fit leaves in a frame next to the component and where it was, m.
+    /// Residual in a frame next to the component and at its frequency, m.
     residual: ResidualNoise,
 }
 
@@ -53,20 +52,20 @@ impl SegmentFit {
         Self { chirp: fitted.parameters, unit_sd: fitted.cycles_variance(0.0).sqrt(), residual }
     }
 
-    /// Noise that the deviations of the fit follow from, m.
+    /// Noise that determines the deviations of the fit, m.
     fn noise_m(&self) -> f64 {
         self.residual.around_m.max(self.residual.under_m)
     }
 }
 
-/// What the fits share.
+/// A record and how its segments are fitted.
 pub(super) struct RidgeTracker<'a> {
     samples: &'a [Option<f64>],
     layout: SegmentLayout,
     frame_rate_hz: f64,
     resolution_hz: f64,
     band_hz: (f64, f64),
-    /// Noise below is rounding, m.
+    /// Smaller noise is rounding, m.
     least_m: f64,
 }
 
@@ -83,7 +82,7 @@ impl<'a> RidgeTracker<'a> {
         }
     }
 
-    /// Where the path through the columns has each fit start; `None` where there is no spectrum.
+    /// Start of each fit on the path through the columns; `None` for a column without spectrum.
     pub(super) fn fit_starts(&self, spectrogram: &Spectrogram) -> Vec<Option<ChirpParameters>> {
         let bins = SegmentBins::fine(&self.layout);
         let band = bins.bins_in_band(self.band_hz, self.frame_rate_hz);
@@ -97,21 +96,19 @@ impl<'a> RidgeTracker<'a> {
         let segment = self.layout.frames as f64;
         let bins_per_resolution = bins.padded as f64 / segment;
         let quarters = 4.0 * self.layout.hop as f64 / segment;
-        let path = PathLevels { levels: &levels, bins: band.clone().count(), bins_per_resolution, quarters }
-            .best_path();
+        let bin_count = band.clone().count();
+        let path = PathLevels { levels: &levels, bins: bin_count, bins_per_resolution, quarters }.best_path();
         let cycles = |c: usize| (band.start() + path[c]) as f64 / bins_per_resolution;
         let start = |c: usize| {
             let (before, after) = self.columns_around(c);
             let apart = self.segments_apart(before, after);
-            ChirpParameters::from_cycles(
-                cycles(c),
-                if apart > 0.0 { (cycles(after) - cycles(before)) / apart } else { 0.0 },
-            )
+            let change = if apart > 0.0 { (cycles(after) - cycles(before)) / apart } else { 0.0 };
+            ChirpParameters::from_cycles(cycles(c), change)
         };
         (0..path.len()).map(|c| levels[c].as_ref().map(|_| start(c))).collect()
     }
 
-    /// The columns half a segment before and after one, as far as there are any.
+    /// The columns half a segment before and after one, or the outermost ones.
     fn columns_around(&self, column: usize) -> (usize, usize) {
         let near = (self.layout.frames / (2 * self.layout.hop)).max(1);
         (column.saturating_sub(near), (column + near).min(self.layout.columns - 1))
@@ -122,54 +119,46 @@ impl<'a> RidgeTracker<'a> {
     }
 
     fn segment_samples(&self, column: usize) -> Option<&[Option<f64>]> {
-        self.samples
-            .get(self.layout.first_frame(column)..self.layout.first_frame(column) + self.layout.frames)
+        let first = self.layout.first_frame(column);
+        self.samples.get(first..first + self.layout.frames)
     }
 
     fn segment_noise(&self) -> SegmentNoise {
-        SegmentNoise::new(
-            self.layout.frames,
-            (self.band_hz.0 / self.resolution_hz, self.band_hz.1 / self.resolution_hz),
-        )
+        let band = (self.band_hz.0 / self.resolution_hz, self.band_hz.1 / self.resolution_hz);
+        SegmentNoise::new(self.layout.frames, band)
     }
 
     pub(super) fn fit_segments(&self, starts: &[Option<ChirpParameters>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
         let fit = |(c, start): (usize, &Option<ChirpParameters>)| {
             let samples = self.segment_samples(c)?;
-            let fitted =
-                ChirpSegment { samples, weights: &weights }.fit_chirp::<LINEAR_UNKNOWNS>((*start)?)?;
+            let segment = ChirpSegment { samples, weights: &weights };
+            let fitted = segment.fit_chirp::<LINEAR_UNKNOWNS>((*start)?)?;
             Some(SegmentFit::from_chirp(&fitted, noise.measure_residual(samples, &fitted.parameters)))
         };
         let fits: Vec<Option<SegmentFit>> = starts.iter().enumerate().map(fit).collect();
-        let noise_m =
-            median_filter(&fits.iter().map(|fit| fit.map(|fit| fit.residual.around_m)).collect::<Vec<_>>());
-        let is_near = |fit: &SegmentFit, start: &Option<ChirpParameters>| {
-            start.is_some_and(|start| {
-                (fit.chirp.cycles_at(0.0) - start.cycles_at(0.0)).abs() < FARTHEST_FROM_PATH
-            })
+        let around_m: Vec<Option<f64>> = fits.iter().map(|fit| Some((*fit)?.residual.around_m)).collect();
+        let usable = |((fit, start), noise_m): ((Option<SegmentFit>, &Option<ChirpParameters>), f64)| {
+            let (fit, start) = (fit?, (*start)?);
+            let residual = ResidualNoise { around_m: noise_m.max(self.least_m), ..fit.residual };
+            is_near(&fit.chirp, start.cycles_at(0.0)).then_some(SegmentFit { residual, ..fit })
         };
-        let near = fits.into_iter().zip(starts).map(|(fit, start)| fit.filter(|fit| is_near(fit, start)));
-        let with_noise = |fit: SegmentFit, noise_m: f64| SegmentFit {
-            residual: ResidualNoise { around_m: noise_m.max(self.least_m), ..fit.residual },
-            ..fit
-        };
-        near.zip(noise_m).map(|(fit, noise_m)| fit.map(|fit| with_noise(fit, noise_m))).collect()
+        fits.into_iter().zip(starts).zip(median_filter(&around_m)).map(usable).collect()
     }
 
-    /// The fits, with one from where the next column's would have been a segment's hop earlier, or the last
-    /// one's later, where the path led to none: the spectrum of a fast chirp is flat on top.
+    /// Adds a fit where the path led to none, starting from the neighbouring column's course: the spectrum of a
+    /// fast chirp is flat on top.
     pub(super) fn refit_from_neighbours(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
         let from = |c: usize, near: usize, segments: f64| {
             let (samples, neighbour) = (self.segment_samples(c)?, (*fits.get(near)?)?);
             let cycles = neighbour.chirp.cycles_at(0.0) + segments * neighbour.chirp.change();
-            let found = ChirpSegment { samples, weights: &weights }.fit_chirp::<LINEAR_UNKNOWNS>(
-                ChirpParameters::from_cycles(cycles, neighbour.chirp.change()),
-            )?;
+            let start = ChirpParameters::from_cycles(cycles, neighbour.chirp.change());
+            let segment = ChirpSegment { samples, weights: &weights };
+            let found = segment.fit_chirp::<LINEAR_UNKNOWNS>(start)?;
             let under_m = noise.measure_residual(samples, &found.parameters).under_m;
-            ((found.parameters.cycles_at(0.0) - cycles).abs() < FARTHEST_FROM_PATH)
-                .then(|| SegmentFit::from_chirp(&found, ResidualNoise { under_m, ..neighbour.residual }))
+            let residual = ResidualNoise { under_m, ..neighbour.residual };
+            is_near(&found.parameters, cycles).then(|| SegmentFit::from_chirp(&found, residual))
         };
         let hop = self.segments_apart(0, 1);
         let mend =
@@ -177,8 +166,8 @@ impl<'a> RidgeTracker<'a> {
         (0..fits.len()).map(mend).collect()
     }
 
-    /// The fits with a rate that changes where the rates half a segment before and after say that it moves
-    /// the frequency.
+    /// Repeats fits with a changing rate where the rates half a segment before and after show a significant bias
+    /// of the frequency.
     pub(super) fn refit_with_curvature(&self, fits: &[Option<SegmentFit>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
         let bent = |c: usize| {
@@ -191,21 +180,19 @@ impl<'a> RidgeTracker<'a> {
                 return Some(fit);
             }
             let samples = self.segment_samples(c)?;
-            let found = ChirpSegment { samples, weights: &weights }
-                .fit_chirp::<CURVED_UNKNOWNS>(fit.chirp.with_curvature(bend));
-            let near = found.filter(|found| {
-                (found.parameters.cycles_at(0.0) - fit.chirp.cycles_at(0.0)).abs() < FARTHEST_FROM_PATH
-            });
-            let with_rest = |found: &ChirpFit<CURVED_UNKNOWNS>| ResidualNoise {
-                under_m: noise.measure_residual(samples, &found.parameters).under_m,
-                ..fit.residual
+            let segment = ChirpSegment { samples, weights: &weights };
+            let found = segment.fit_chirp::<CURVED_UNKNOWNS>(fit.chirp.with_curvature(bend));
+            let near = found.filter(|found| is_near(&found.parameters, fit.chirp.cycles_at(0.0)));
+            let with_rest = |found: ChirpFit<CURVED_UNKNOWNS>| {
+                let under_m = noise.measure_residual(samples, &found.parameters).under_m;
+                SegmentFit::from_chirp(&found, ResidualNoise { under_m, ..fit.residual })
             };
-            Some(near.map_or(fit, |found| SegmentFit::from_chirp(&found, with_rest(&found))))
+            Some(near.map_or(fit, with_rest))
         };
         (0..fits.len()).map(bent).collect()
     }
 
-    /// Amplitude over that of noise which noise alone reaches anywhere in band and record with the chance
+    /// Ratio of amplitude to noise that noise alone reaches anywhere in band and record with the chance
     /// [`FALSE_ALARM`].
     fn detection_threshold(&self) -> f64 {
         let resolutions = (self.band_hz.1 - self.band_hz.0) / self.resolution_hz;
@@ -214,19 +201,17 @@ impl<'a> RidgeTracker<'a> {
     }
 
     pub(super) fn ridge_point(&self, column: usize, fit: &SegmentFit) -> Option<RidgePoint> {
-        let window =
-            periodogram::WindowSums::from_weights(&periodogram::hann_weights(self.segment_samples(column)?));
+        let weights = periodogram::hann_weights(self.segment_samples(column)?);
+        let window = periodogram::WindowSums::from_weights(&weights);
         let in_bin_m = 2.0 * fit.residual.around_m * window.second.sqrt() / window.first;
         let level = fit.chirp.amplitude() / in_bin_m;
         let frequency_hz = fit.chirp.cycles_at(0.0) * self.resolution_hz;
         let inside = frequency_hz >= self.band_hz.0 && frequency_hz <= self.band_hz.1;
+        let noise_sd_hz = fit.unit_sd * fit.noise_m() * self.resolution_hz;
         (inside && !fit.chirp.vanishes() && level >= self.detection_threshold()).then(|| RidgePoint {
             time_s: self.layout.centre_frame(column) / self.frame_rate_hz,
             frequency_hz,
-            frequency_sd_hz: math::hypot(
-                fit.unit_sd * fit.noise_m() * self.resolution_hz,
-                LEAKAGE_SD * self.resolution_hz,
-            ),
+            frequency_sd_hz: math::hypot(noise_sd_hz, LEAKAGE_SD * self.resolution_hz),
             rate_hz_per_s: fit.chirp.change() * self.resolution_hz * self.resolution_hz,
             amplitude_m: fit.chirp.amplitude(),
             phase_rad: fit.chirp.phase(),
@@ -235,25 +220,21 @@ impl<'a> RidgeTracker<'a> {
         })
     }
 
-    /// The frequency at the end of the record that a column is next to, by fits of their own whose rate may
-    /// change: half a segment farther out, the deviation of a straight course would be smaller, and wrong. A
-    /// long stretch knows it best, as far as the course is smooth there: the longest is taken with which all
-    /// shorter ones agree. The shortest, which others leak into most, only confirms.
+    /// The frequency at the end of the record next to a column, by separate fits with a changing rate. A straight
+    /// course extrapolated by half a segment would have a smaller deviation, but a wrong frequency. A longer stretch
+    /// is more accurate while the course is smooth, so the longest is taken with which all shorter ones agree. The
+    /// shortest only confirms, because others leak into it most.
     pub(super) fn ridge_end(&self, column: usize, fit: &SegmentFit) -> Option<RidgeEnd> {
-        let ends: Vec<RidgeEnd> = END_SEGMENTS
-            .into_iter()
-            .filter_map(|segments| self.extrapolate_to_end(column, fit, segments))
-            .collect();
+        let end = |segments: f64| self.extrapolate_to_end(column, fit, segments);
+        let ends: Vec<RidgeEnd> = END_SEGMENTS.into_iter().filter_map(end).collect();
         // the noise of the longer one is a part of that of the shorter one
         let agree = |longer: &RidgeEnd, shorter: &RidgeEnd| {
             let variance = math::powi(shorter.frequency_sd_hz, 2) - math::powi(longer.frequency_sd_hz, 2);
             (longer.frequency_hz - shorter.frequency_hz).abs() <= CONTRADICTS * variance.max(0.0).sqrt()
         };
-        let confirmed = ends
-            .iter()
-            .enumerate()
-            .find(|(k, end)| k + 1 < ends.len() && ends[k + 1..].iter().all(|shorter| agree(end, shorter)));
-        confirmed.map(|(_, end)| end).or(ends.first()).copied()
+        let confirmed = |k: &usize| ends[k + 1..].iter().all(|shorter| agree(&ends[*k], shorter));
+        let longest = (0..ends.len().saturating_sub(1)).find(confirmed);
+        longest.map(|k| &ends[k]).or(ends.first()).copied()
     }
 
     fn extrapolate_to_end(&self, column: usize, fit: &SegmentFit, segments: f64) -> Option<RidgeEnd> {
@@ -270,10 +251,10 @@ impl<'a> RidgeTracker<'a> {
         }
         let start = ChirpParameters::from_cycles(led, fit.chirp.change() * longer * longer);
         let samples = self.samples.get(first..first + frames)?;
-        let found =
-            ChirpSegment { samples, weights: &sine_weights(frames) }.fit_chirp::<CURVED_UNKNOWNS>(start)?;
+        let segment = ChirpSegment { samples, weights: &sine_weights(frames) };
+        let found = segment.fit_chirp::<CURVED_UNKNOWNS>(start)?;
         let agrees = if longer < 1.0 {
-            (found.parameters.cycles_at(0.0) - led).abs() < FARTHEST_FROM_PATH
+            is_near(&found.parameters, led)
         } else {
             (found.parameters.cycles_at(-2.0 * away / longer) / longer - middle).abs() < END_AGREEMENT
         };
@@ -282,31 +263,34 @@ impl<'a> RidgeTracker<'a> {
         let band = (self.band_hz.0 / resolution_hz, self.band_hz.1 / resolution_hz);
         let under_m = SegmentNoise::new(frames, band).measure_residual(samples, &found.parameters).under_m;
         let noise_m = fit.noise_m().max(under_m);
+        let noise_sd_hz = found.cycles_variance(x).sqrt() * noise_m * resolution_hz;
         (agrees && !found.parameters.vanishes()).then(|| RidgeEnd {
             time_s: if at_start { 0.0 } else { (self.samples.len() - 1) as f64 / self.frame_rate_hz },
             frequency_hz: found.parameters.cycles_at(x) * resolution_hz,
-            frequency_sd_hz: math::hypot(
-                found.cycles_variance(x).sqrt() * noise_m * resolution_hz,
-                END_LEAKAGE_SD * resolution_hz,
-            ),
+            frequency_sd_hz: math::hypot(noise_sd_hz, END_LEAKAGE_SD * resolution_hz),
         })
     }
 }
 
-/// Weights of a fit: a sine, the root of a Hann window. It keeps components five resolutions away below a
-/// hundredth and costs less of the frames' information than the Hann window does.
+/// Whether a fit stays near a frequency, cycles in the segment.
+fn is_near(chirp: &ChirpParameters, cycles: f64) -> bool {
+    (chirp.cycles_at(0.0) - cycles).abs() < FARTHEST_FROM_PATH
+}
+
+/// Weights of a fit: a sine, the root of a Hann window. It suppresses components five resolutions away below a
+/// hundredth and loses less of the frames' information than the Hann window.
 fn sine_weights(frames: usize) -> Vec<f64> {
     periodogram::hann_weights(&vec![Some(0.0); frames]).into_iter().map(f64::sqrt).collect()
 }
 
-// Follows a component through the columns, where there is one.
+// The ridge through the columns of a spectrogram.
 
-/// Points in a row that make a part of a ridge; fewer span less than half a segment more than one of them.
+/// Fewest consecutive points of a ridge: fewer span less than half a segment more than a single one.
 const FEWEST_POINTS: usize = 3;
 
 impl Spectrogram {
-    /// Course of the strongest component between two frequencies, Hz; `samples` is the record this
-    /// spectrogram is of. Without a component that stands out of the noise, the ridge has no points.
+    /// Course of the strongest component between two frequencies, Hz; `samples` is the record of this spectrogram.
+    /// Without a component that stands out of the noise, the ridge has no points.
     ///
     /// # Errors
     /// [`SpectrumError::Band`] when the band holds no frequency of the spectrogram.
@@ -322,14 +306,10 @@ impl Spectrogram {
 
 fn follow_ridge(spectrogram: &Spectrogram, samples: &[Option<f64>], band_hz: (f64, f64)) -> Ridge {
     let tracker = RidgeTracker::new(spectrogram, samples, band_hz);
-    let fits = tracker.refit_with_curvature(
-        &tracker.refit_from_neighbours(&tracker.fit_segments(&tracker.fit_starts(spectrogram))),
-    );
-    let points: Vec<Option<RidgePoint>> = fits
-        .iter()
-        .enumerate()
-        .map(|(c, fit)| fit.as_ref().and_then(|fit| tracker.ridge_point(c, fit)))
-        .collect();
+    let fits = tracker.fit_segments(&tracker.fit_starts(spectrogram));
+    let fits = tracker.refit_with_curvature(&tracker.refit_from_neighbours(&fits));
+    let point = |(c, fit): (usize, &Option<SegmentFit>)| tracker.ridge_point(c, fit.as_ref()?);
+    let points: Vec<Option<RidgePoint>> = fits.iter().enumerate().map(point).collect();
     let points = remove_short_runs(points);
     let end = |c: usize| points[c].and(fits[c].as_ref()).and_then(|fit| tracker.ridge_end(c, fit));
     Ridge {
@@ -341,7 +321,7 @@ fn follow_ridge(spectrogram: &Spectrogram, samples: &[Option<f64>], band_hz: (f6
     }
 }
 
-/// Takes out points in runs that are too short for a course.
+/// Removes points in runs that are too short for a course.
 fn remove_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoint>> {
     let fewest = FEWEST_POINTS.min(points.len());
     for run in points.chunk_by_mut(|a, b| a.is_some() == b.is_some()).filter(|run| run.len() < fewest) {
@@ -350,16 +330,16 @@ fn remove_short_runs(mut points: Vec<Option<RidgePoint>>) -> Vec<Option<RidgePoi
     points
 }
 
-// The path of greatest sum through the columns (Viterbi): what stands out, less what jumps.
+// The path of greatest sum through the columns (Viterbi): levels less the costs of jumps.
 
 /// Standard deviation of the change of frequency over a quarter of a segment, resolutions. A drift of half a
-/// resolution in a quarter of a segment moves the frequency by two within the segment, about as much as a
-/// segment of the chosen length sees.
+/// resolution in a quarter of a segment moves the frequency by two resolutions within the segment, about the most
+/// for a segment of the chosen length.
 const JUMP_SD: f64 = 0.5;
 /// Farthest jump, in standard deviations: six resolutions within a segment.
 const LONGEST_JUMP: f64 = 3.0;
 
-/// Levels of the bins of the columns, and how far apart both are.
+/// Levels of the bins of the columns, and the distances of bins and columns.
 pub(super) struct PathLevels<'a> {
     /// Amplitudes over noise for each column in the band; `None` where there is no spectrum.
     pub levels: &'a [Option<Vec<f64>>],
@@ -372,9 +352,8 @@ pub(super) struct PathLevels<'a> {
 }
 
 impl PathLevels<'_> {
-    /// The bin of each column on the best path. A level counts by the logarithm of its power, so that the
-    /// path holds on to a component that fades; a jump costs half the square of its size in standard
-    /// deviations.
+    /// The bin of each column on the best path. A level counts by the logarithm of its power, so that the path
+    /// keeps to a component that fades; a jump costs half the square of its size in standard deviations.
     pub(super) fn best_path(&self) -> Vec<usize> {
         let sd = (JUMP_SD * self.quarters * self.bins_per_resolution).max(1.0);
         let reach = ((LONGEST_JUMP * sd) as usize).clamp(1, self.bins);
@@ -389,10 +368,6 @@ impl PathLevels<'_> {
                 sums.iter_mut().zip(levels).for_each(|(sum, level)| *sum += math::ln(1.0 + level * level));
             }
         }
-        self.trace_back(&sums, &from)
-    }
-
-    fn trace_back(&self, sums: &[f64], from: &[Vec<u32>]) -> Vec<usize> {
         let greatest = |best: usize, bin: usize| if sums[bin] > sums[best] { bin } else { best };
         let mut bin = (0..self.bins).fold(0, greatest);
         let mut path: Vec<usize> = Vec::with_capacity(from.len());
@@ -405,7 +380,7 @@ impl PathLevels<'_> {
     }
 }
 
-/// Moves the sums on by one column; returns the bin each came from.
+/// Moves the sums on by one column; returns the bin that each came from.
 fn advance_column(sums: &mut Vec<f64>, costs: &[f64]) -> Vec<u32> {
     let bins = sums.len();
     let reach = costs.len() - 1;

@@ -1,9 +1,9 @@
-//! What a long record holds for a short time only, read from pieces of it that are taken apart.
+//! Oscillations that last for a short time only, read from pieces of a long record.
 
 use crate::math;
 use crate::spectrum::analysis::{SampledRecord, SpectralAnalysis};
 use crate::spectrum::classification::SINGLE_CYCLE_DAMPING;
-use crate::spectrum::periodogram::Periodogram;
+use crate::spectrum::periodogram::{Periodogram, upper_median};
 use crate::spectrum::settings::ROUNDING;
 use crate::spectrum::trend::Trend;
 use crate::spectrum::{Component, ComponentReason, ComponentVerdict, SpectrumSettings};
@@ -29,11 +29,11 @@ const SCALES: [SegmentScale; 3] = [
 ];
 /// Resolutions of a piece within which two components are one.
 const SAME_WITHIN_RESOLUTIONS: f64 = 2.0;
-/// Deviations within which they are.
+/// Deviations within which two components are one.
 const SAME_WITHIN_DEVIATIONS: f64 = 3.0;
 /// Nepers after which an oscillation is over: a twentieth is left.
 const NEPERS_UNTIL_OVER: f64 = 3.0;
-/// Nepers by which one falls that is no steady line whose amplitude wavers, and that soon ends.
+/// Nepers from which an oscillation ends soon and is no steady line of wavering amplitude.
 const NEPERS_OF_DECAY: f64 = 1.0;
 
 /// A component that was read from a piece.
@@ -48,7 +48,7 @@ pub(super) struct TransientComponent {
 }
 
 impl TransientComponent {
-    /// Whether a component cannot be told from this one.
+    /// Whether another component is the same within both deviations.
     pub(super) fn matches_component(&self, other: &Component) -> bool {
         let c = &self.component;
         let sd_hz = math::hypot(c.frequency_sd_hz, other.frequency_sd_hz);
@@ -59,41 +59,40 @@ impl TransientComponent {
         (c.frequency_hz - other.frequency_hz).abs() < within_hz || holds(c, other) || holds(other, c)
     }
 
-    /// Whether a component that changes over the window is what this one shows there: a line as wide as it
-    /// decays.
+    /// Whether another component that changes over the window is what this one looks like there: a line whose
+    /// width grows with the decay.
     pub(super) fn explains_component(&self, other: &Component) -> bool {
         let c = &self.component;
         let width_hz = c.damping_ratio.map_or(0.0, |ratio| 2.0 * ratio * c.frequency_hz);
         self.matches_component(other) || (c.frequency_hz - other.frequency_hz).abs() < width_hz
     }
 
-    /// With a doubt where it does not fall: what goes on outside the stretch may be another frequency.
+    /// Adds a doubt to a component that does not decay: outside the stretch it may have another frequency.
     fn with_persistence_doubt(mut self) -> Self {
         if self.nepers < NEPERS_OF_DECAY {
             let words = "it goes on outside the part of the window in which it was read, and may drift or \
-                         change there"
-                .to_owned();
+                         change there";
             let reasons = &mut self.component.reasons;
-            reasons.push(ComponentReason { verdict: ComponentVerdict::Ambiguous, words });
+            reasons.push(ComponentReason { verdict: ComponentVerdict::Ambiguous, words: words.to_owned() });
             reasons.sort_by_key(|reason| reason.verdict);
             self.component.verdict = reasons[0].verdict;
         }
         self
     }
 
-    /// Whether the piece says more of it than a window over which it changes.
+    /// Whether the piece describes the component better than a window over which it changes.
     pub(super) fn is_more_specific(&self) -> bool {
         self.nepers > NEPERS_OF_DECAY || self.component.range_hz.is_some()
     }
 }
 
-/// Every component that is there for a short time, once.
+/// Every component that lasts for a short time only, once.
 pub(super) fn find_transients(
     record: &SampledRecord,
     settings: &SpectrumSettings,
 ) -> Vec<TransientComponent> {
-    let band_hz = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
-    let band = (band_hz.0 / record.frame_rate_hz, (band_hz.1 / record.frame_rate_hz).min(0.5));
+    let (low_hz, high_hz) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
+    let band = (low_hz / record.frame_rate_hz, (high_hz / record.frame_rate_hz).min(0.5));
     let of_scale = |scale: &SegmentScale| {
         let pieces = cut_segments(record.samples, scale.length, band);
         let chosen = select_most_unusual(&pieces, scale.most);
@@ -102,17 +101,15 @@ pub(super) fn find_transients(
         numbered.filter(|(k, _)| is_read(*k)).map(|(_, piece)| piece).collect::<Vec<_>>()
     };
     let pieces: Vec<UnusualSegment> = SCALES.iter().flat_map(of_scale).collect();
-    let mut found: Vec<TransientComponent> = pieces
-        .par_iter()
-        .flat_map_iter(|piece| {
-            let samples = &record.samples[piece.frames.clone()];
-            read_segment_transients(&SampledRecord { samples, ..*record }, settings, piece)
-        })
-        .collect();
+    let read = |piece: &UnusualSegment| {
+        let samples = &record.samples[piece.frames.clone()];
+        read_segment_transients(&SampledRecord { samples, ..*record }, settings, piece)
+    };
+    let mut found: Vec<TransientComponent> = pieces.par_iter().flat_map_iter(read).collect();
     found.sort_by(|a, b| a.component.frequency_sd_hz.total_cmp(&b.component.frequency_sd_hz));
     let mut once: Vec<TransientComponent> = Vec::new();
     for brief in found {
-        // two of one piece are two
+        // two components of one piece are distinct
         let known = |known: &TransientComponent| {
             (known.first, known.resolution_hz) != (brief.first, brief.resolution_hz)
                 && (known.matches_component(&brief.component) || brief.matches_component(&known.component))
@@ -124,32 +121,25 @@ pub(super) fn find_transients(
     once
 }
 
-/// The components of a piece that are not there all the time: those at whose frequency it exceeds the normal,
-/// and those that are over within it; but none that is over within a cycle, as every step would give one.
+/// The components of a piece that are not there all the time: those whose frequency exceeds the normal power,
+/// and those that end within it. Those that end within a cycle are left out, because every step gives one.
 fn read_segment_transients(
-    of_piece: &SampledRecord,
+    record: &SampledRecord,
     settings: &SpectrumSettings,
     piece: &UnusualSegment,
 ) -> Vec<TransientComponent> {
-    let rate_hz = of_piece.frame_rate_hz;
+    let rate_hz = record.frame_rate_hz;
     let passes = |brief: &TransientComponent| {
         let c = &brief.component;
         let (low_hz, high_hz) =
             c.range_hz.map_or((c.frequency_hz, c.frequency_hz), |range| (range.low_hz, range.high_hz));
-        let step = c.damping_ratio.is_some_and(|ratio| ratio > SINGLE_CYCLE_DAMPING);
-        !step
+        !c.damping_ratio.is_some_and(|ratio| ratio > SINGLE_CYCLE_DAMPING)
             && (brief.nepers > NEPERS_UNTIL_OVER
                 || piece.exceeds_normal_power(low_hz / rate_hz, high_hz / rate_hz))
     };
-    let analyses = SpectralAnalysis::analyse_between_steps(of_piece, settings);
-    let of_stretch =
-        |analysis: SpectralAnalysis| transients_between_steps(analysis, piece.frames.start, rate_hz);
-    analyses
-        .into_iter()
-        .flat_map(of_stretch)
-        .filter(passes)
-        .map(TransientComponent::with_persistence_doubt)
-        .collect()
+    let stretches = SpectralAnalysis::analyse_between_steps(record, settings).into_iter();
+    let found = stretches.flat_map(|stretch| transients_between_steps(stretch, piece.frames.start, rate_hz));
+    found.filter(passes).map(TransientComponent::with_persistence_doubt).collect()
 }
 
 /// The components of a stretch of a piece that begins at a frame.
@@ -169,31 +159,28 @@ fn transients_between_steps(
     })
 }
 
-/// Nepers by which a component decays before the end of a record; 0 where they may be none.
+/// Nepers by which a component decays before the end of a record; 0 where the decay is not significant.
 fn decay_nepers(c: &Component, lasts_s: f64) -> f64 {
-    let decays =
+    let decay =
         c.damping_ratio.zip(c.damping_ratio_sd).filter(|(ratio, sd)| *ratio > SAME_WITHIN_DEVIATIONS * sd);
-    decays.map_or(0.0, |(ratio, _)| {
+    decay.map_or(0.0, |(ratio, _)| {
         TAU * c.frequency_hz * ratio / (1.0 - ratio * ratio).sqrt() * (lasts_s - c.begins_s.unwrap_or(0.0))
     })
 }
 
-// Where a long record holds something for a short time only: the pieces of it whose spectrum exceeds what is
-// normal for the record.
-//
-// The pieces overlap by half. In each bin a quarter of them is below `-ln(3/4)` times the mean power of
-// noise, whatever the rest holds, so steady lines and noise of any colour are normal, and most of the pieces
-// may hold a flip.
+// Pieces whose spectrum exceeds what is normal for the record. The pieces overlap by half. In each bin a
+// quarter of them lies below `-ln(3/4)` times the mean power of noise, whatever the rest holds. So steady lines
+// and noise of any colour are normal, even where most of the pieces hold a flip.
 
-/// Chance that noise alone exceeds what is normal anywhere in a record.
+/// Chance that noise alone exceeds the normal power anywhere in a record.
 const FALSE_ALARM: f64 = 0.01;
-/// Place of the normal power among the pieces' powers in order, and what noise has there over its mean.
+/// The normal power is this quantile of the pieces' powers, divided by the same quantile of noise over its mean.
 const NORMAL_POWER_QUANTILE: usize = 4;
 const QUARTER_OF_NOISE: f64 = 0.287_682_072_451_780_9;
-/// Half width of the neighbourhood whose noise a bin has at least, bins: a quarter of a few pieces is not
-/// well known.
+/// Half width of the neighbourhood whose median is the least noise of a bin, bins: a quarter of a few pieces
+/// is not well known.
 const NEIGHBOURHOOD: usize = 8;
-/// Cycles in a piece below which a flip, not an oscillation, exceeds what is normal.
+/// Cycles in a piece below which a flip, not an oscillation, exceeds the normal power.
 const FEWEST_CYCLES: usize = 8;
 /// Half width of the main lobe of a Hann window, bins.
 const LOBE: usize = 2;
@@ -203,13 +190,14 @@ const CUBIC: Trend = Trend::Polynomial(4);
 /// A piece of a record, and how its spectrum compares with the other pieces'.
 pub(super) struct UnusualSegment {
     pub frames: Range<usize>,
-    /// Power over what is normal in each bin, and the level from which it is not.
+    /// Power over the normal power in each bin.
     excess: Vec<f64>,
+    /// Excess that noise alone hardly reaches.
     level: f64,
 }
 
 impl UnusualSegment {
-    /// Whether more than the normal is between two frequencies, in cycles a frame.
+    /// Whether power between two frequencies, cycles a frame, exceeds the normal.
     pub(super) fn exceeds_normal_power(&self, low: f64, high: f64) -> bool {
         let bin = |cycles: f64| (cycles * self.frames.len() as f64).round() as usize;
         let around = bin(low).saturating_sub(LOBE)..(bin(high) + LOBE + 1).min(self.excess.len());
@@ -217,19 +205,14 @@ impl UnusualSegment {
     }
 }
 
-/// The pieces of a length of which half the frames are there; `band` is in cycles a frame.
+/// The pieces of a length that hold values in half their frames or more; `band` is in cycles a frame.
 pub(super) fn cut_segments(samples: &[Option<f64>], length: usize, band: (f64, f64)) -> Vec<UnusualSegment> {
     let last = samples.len() - length;
     let starts: Vec<usize> = (0..last).step_by(length / 2).chain([last]).collect();
     let piece = |start: &usize| {
-        let frames = *start..start + length;
-        let piece = &samples[frames.clone()];
-        let present = piece.iter().flatten().count();
-        (2 * present >= length).then(|| UnusualSegment {
-            frames,
-            excess: segment_power_spectrum(piece),
-            level: 0.0,
-        })
+        let (frames, piece) = (*start..start + length, &samples[*start..start + length]);
+        let enough = 2 * piece.iter().flatten().count() >= length;
+        enough.then(|| UnusualSegment { frames, excess: segment_power_spectrum(piece), level: 0.0 })
     };
     let mut pieces: Vec<UnusualSegment> = starts.par_iter().filter_map(piece).collect();
     let largest = samples.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
@@ -247,7 +230,7 @@ pub(super) fn cut_segments(samples: &[Option<f64>], length: usize, band: (f64, f
     pieces
 }
 
-/// Those that exceed the normal most, at most so many, each in bins in which none before it does.
+/// The `most` pieces that exceed the normal most, each in bins in which none before it does.
 pub(super) fn select_most_unusual(pieces: &[UnusualSegment], most: usize) -> Vec<usize> {
     let mut chosen = Vec::new();
     let mut open = vec![true; pieces.first().map_or(0, |piece| piece.excess.len())];
@@ -269,28 +252,29 @@ pub(super) fn select_most_unusual(pieces: &[UnusualSegment], most: usize) -> Vec
     chosen
 }
 
-/// Power in each bin, as the variance of white noise with as much.
+/// Power in each bin, as the variance of white noise of that power.
 fn segment_power_spectrum(samples: &[Option<f64>]) -> Vec<f64> {
     let periodogram = Periodogram::new(samples, samples.len());
     let amplitude_m = periodogram.amplitudes(&CUBIC.residual(samples));
     amplitude_m.into_iter().map(|a| math::powi(periodogram.noise_sd_m(a), 2)).collect()
 }
 
-/// The power of the record's noise and steady lines in each bin.
+/// Power of the record's noise and steady lines in each bin.
 fn normal_power_spectrum(pieces: &[UnusualSegment], bins: usize) -> Vec<f64> {
-    let at = |values: &mut [f64], place: usize| *values.select_nth_unstable_by(place, f64::total_cmp).1;
     let of_bin = |bin: usize| {
         let mut powers: Vec<f64> = pieces.iter().map(|piece| piece.excess[bin]).collect();
         let place = powers.len() / NORMAL_POWER_QUANTILE;
-        if powers.is_empty() { 0.0 } else { at(&mut powers, place) / QUARTER_OF_NOISE }
+        if powers.is_empty() {
+            0.0
+        } else {
+            *powers.select_nth_unstable_by(place, f64::total_cmp).1 / QUARTER_OF_NOISE
+        }
     };
     let own: Vec<f64> = (0..bins).into_par_iter().map(of_bin).collect();
     let around = |bin: usize| {
-        let mut near = own[bin.saturating_sub(NEIGHBOURHOOD)..(bin + NEIGHBOURHOOD + 1).min(bins)].to_vec();
-        let middle = near.len() / 2;
-        at(&mut near, middle)
+        upper_median(own[bin.saturating_sub(NEIGHBOURHOOD)..(bin + NEIGHBOURHOOD + 1).min(bins)].to_vec())
     };
-    (0..bins).map(|bin| own[bin].max(around(bin))).collect()
+    (0..bins).map(|bin| own[bin].max(around(bin).unwrap_or(0.0))).collect()
 }
 
 #[cfg(test)]
