@@ -1,5 +1,4 @@
-//! What a camera does to a motion: its exposure averages it, its frames fold what is faster than half their
-//! rate.
+//! Effects of a camera on a motion: its exposure averages the motion, and its frame rate folds faster frequencies.
 
 use crate::math;
 use schemars::JsonSchema;
@@ -16,27 +15,25 @@ pub struct Camera {
     pub exposure_s: f64,
 }
 
-/// Frequency, in units of 1/exposure, at which the mean over the exposure passes half the power: the root of
-/// `sinc^2 = 1/2`.
+/// Frequency of half the power behind an exposure, in units of 1/exposure: the root of `sinc^2 = 1/2`.
 const HALF_POWER_CYCLES: f64 = 0.442_946_47;
-/// Most frequencies listed by [`aliased_frequencies_hz`]: a mistyped rate fills no memory.
+/// Most frequencies listed by [`aliased_frequencies_hz`], so that a mistyped rate does not fill the memory.
 pub(crate) const MOST_ALIASES: usize = 1000;
 
-/// Part of an amplitude at `frequency_hz` that an exposure of `exposure_s` passes: `|sin(pi f T)/(pi f T)|`,
-/// the mean of the motion over the open shutter.
+/// Gain of an exposure of `exposure_s` at `frequency_hz`, 0 to 1: `|sin(pi f T)/(pi f T)|`, from the mean of the motion
+/// while the shutter is open.
 #[must_use]
 pub fn exposure_gain(frequency_hz: f64, exposure_s: f64) -> f64 {
     let half_turns = PI * frequency_hz * exposure_s;
     if half_turns == 0.0 { 1.0 } else { (math::sin(half_turns) / half_turns).abs() }
 }
 
-/// Frequency of which an exposure of `exposure_s` passes half the power, Hz; the same function gives the
-/// exposure back, s.
+/// Frequency at which an exposure of `exposure_s` passes half the power, Hz; the function is its own inverse.
 pub(crate) fn half_power_hz(exposure_s: f64) -> f64 {
     HALF_POWER_CYCLES / exposure_s
 }
 
-/// Where a frequency appears at `frame_rate_hz`, Hz: folded about the multiples of half the rate.
+/// Frequency at which a frequency appears at `frame_rate_hz`, Hz: folded about the multiples of half the rate.
 #[must_use]
 pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
     if frequency_hz <= frame_rate_hz / 2.0 {
@@ -46,18 +43,16 @@ pub fn alias_hz(frequency_hz: f64, frame_rate_hz: f64) -> f64 {
     rest.min(frame_rate_hz - rest)
 }
 
-/// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`, Hz:
-/// `k rate - f` and `k rate + f`, ascending, each once, at most 1000. None for a frequency that
-/// does not lie between 0 and half the rate, where nothing appears.
+/// Every frequency above half of `frame_rate_hz` and up to `up_to_hz` that appears at `frequency_hz`, Hz: `k rate - f`
+/// and `k rate + f`, ascending, each once, at most 1000. Empty for a frequency outside 0 to half the rate.
 pub(crate) fn aliased_frequencies_hz(frequency_hz: f64, frame_rate_hz: f64, up_to_hz: f64) -> Vec<f64> {
     let half_hz = frame_rate_hz / 2.0;
     if !(half_hz.is_finite() && half_hz > 0.0 && (0.0..=half_hz).contains(&frequency_hz)) {
         return vec![];
     }
-    let pairs = (1..=MOST_ALIASES)
-        .flat_map(|k| [k as f64 * frame_rate_hz - frequency_hz, k as f64 * frame_rate_hz + frequency_hz]);
-    let mut folds: Vec<f64> =
-        pairs.take_while(|fold| *fold <= up_to_hz).filter(|fold| *fold > half_hz).collect();
+    let pair = |k: usize| [k as f64 * frame_rate_hz - frequency_hz, k as f64 * frame_rate_hz + frequency_hz];
+    let sources = (1..=MOST_ALIASES).flat_map(pair).take_while(|fold| *fold <= up_to_hz);
+    let mut folds: Vec<f64> = sources.filter(|fold| *fold > half_hz).collect();
     folds.dedup(); // at 0 and at half the rate two of them coincide
     folds.truncate(MOST_ALIASES);
     folds

@@ -1,11 +1,11 @@
-//! Integration of a smooth phase up to the first of its guards, by three methods: Taylor series ([`taylor`]),
-//! Runge-Kutta of order 8 with dense output ([`integrate`]) and steps of fixed length ([`fixed`]). Knows
-//! nothing of friction.
+//! Integration of a smooth phase up to the first zero of its guards, by three methods: Taylor series ([`taylor`]),
+//! Runge-Kutta of order 8 with dense output ([`integrate`]) and steps of fixed length ([`fixed_step`]). This layer
+//! is independent of friction.
 //!
-//! A *phase* is a smooth right-hand side together with inequalities, its *guards*, that hold while it lasts.
-//! Integration ends at the stop time or where the first guard falls to zero. A guard that starts at zero (a
-//! tip that has just been released) is armed by the order of its first nonzero derivative, so that its
-//! trivial root is neither reported nor hides the next one.
+//! A *phase* is a smooth right-hand side with inequalities, its *guards*, that hold while it lasts. Integration
+//! ends at the stop time or where the first guard falls to zero. A guard that starts at zero (a tip that has just
+//! been released) is armed by the order of its first nonzero derivative, so that its trivial root is neither
+//! reported nor hides the next one.
 
 pub mod collocation;
 mod dop853;
@@ -30,15 +30,15 @@ pub trait HybridPhase<const N: usize, const G: usize> {
     fn scale(&self) -> [f64; N];
 }
 
-/// Where and how a phase starts.
+/// Initial time, state and guards of a phase.
 #[derive(Debug, Clone, Copy)]
 pub struct PhaseStart<const N: usize, const G: usize> {
     /// Time, s.
     pub t: f64,
     /// State.
     pub y: [f64; N],
-    /// For each guard the order of its zero at the start: 0 where it is positive, 1 for a simple zero, 2 for
-    /// a double one.
+    /// Order of each guard's zero at the start: 0 where the guard is positive, 1 for a simple zero, 2 for a double
+    /// one.
     pub zero_order: [u8; G],
     /// First step to try, s; `None` estimates one.
     pub step: Option<f64>,
@@ -51,14 +51,13 @@ pub enum PhaseEndCause {
     Guard(usize),
     /// The stop time was reached.
     Stop,
-    /// Whoever observes the steps has asked for the end.
+    /// The observer of the steps ended it.
     Interrupted,
-    /// No step is short enough for the tolerance, the state left the finite numbers, or the work that was
-    /// allowed is spent.
+    /// No step is short enough for the tolerance, the state is not finite, or the work limit is reached.
     StepTooSmall,
 }
 
-/// Where a phase ended.
+/// Final time and state of a phase.
 #[derive(Debug, Clone, Copy)]
 pub struct PhaseEnd<const N: usize> {
     /// Time, s.
@@ -67,8 +66,7 @@ pub struct PhaseEnd<const N: usize> {
     pub y: [f64; N],
     /// Why it ended.
     pub cause: PhaseEndCause,
-    /// The longest first step that error control would have accepted: a good one for the next phase of this
-    /// kind, s.
+    /// The longest first step within the tolerance, s: a good first step for the next phase of this kind.
     pub first_step: f64,
 }
 
@@ -83,12 +81,12 @@ pub struct WorkCounters {
     pub steps: u64,
     /// Rejected steps.
     pub rejected_steps: u64,
-    /// Right-hand sides after which a phase ends wherever it is; `None` for no bound.
+    /// Right-hand sides after which a phase ends; `None` for no limit.
     pub most_rhs_evaluations: Option<u64>,
 }
 
 impl WorkCounters {
-    /// Whether the bound is passed.
+    /// Whether the limit is exceeded.
     #[inline]
     pub(crate) fn is_spent(&self) -> bool {
         self.most_rhs_evaluations.is_some_and(|most| self.rhs_evaluations > most)
@@ -99,15 +97,15 @@ impl WorkCounters {
 pub struct AcceptedStep<'a, const N: usize> {
     /// Start of the step, s.
     pub start: f64,
-    /// End of the step or the event that cut it, s.
+    /// End of the step or of its part before the event, s.
     pub end: f64,
     /// State at `end`.
     pub y_end: &'a [f64; N],
-    /// The solution inside.
+    /// The solution inside the step.
     pub solution: &'a dyn DenseOutput<N>,
 }
 
-/// What an observer of steps answers: nothing, or whether the integration goes on.
+/// Reply of a step observer: nothing, or whether the integration continues.
 pub trait ObserverReply {
     /// `Break` ends the phase with [`PhaseEndCause::Interrupted`].
     fn control_flow(self) -> ControlFlow<()>;

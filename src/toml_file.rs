@@ -1,5 +1,5 @@
-//! TOML that people write, read into typed values; every refusal names file, line, column, key and the
-//! nearest known key, and all problems of a file are named at once.
+//! TOML files read into typed values. Every error names file, line, column, key and the nearest known key, and all
+//! problems of a file are listed together.
 
 mod hint;
 mod key_reference;
@@ -61,10 +61,10 @@ pub enum TomlError {
 /// Version of every TOML format of this program.
 pub const FORMAT: u32 = 1;
 
-/// Reads `text` as `T`; `file` is the name used in refusals.
+/// Reads `text` as `T`; `file` is the name used in errors.
 ///
 /// # Errors
-/// [`TomlError`] with the places of all problems that the schema of `T` shows, or else of the first one.
+/// [`TomlError`] with the places of all problems against the schema of `T`, or else of the first one.
 pub(crate) fn parse_toml<T: DeserializeOwned + JsonSchema>(file: &str, text: &str) -> Result<T, TomlError> {
     let mut problems = schema_check::find_problems(file, text, schema_for!(T).as_value());
     match problems.len() {
@@ -79,7 +79,7 @@ pub(crate) fn schema_of<T: JsonSchema>() -> serde_json::Value {
     schema_for!(T).to_value()
 }
 
-/// The schema of a table: its keys with their schemas, and those that may not be left out.
+/// The schema of a table: its keys with their schemas, and the required ones.
 pub(crate) fn table_schema(
     keys: impl IntoIterator<Item = (String, serde_json::Value)>,
     required: &[&str],
@@ -95,15 +95,14 @@ pub(crate) fn table_schema(
 /// Reads `text` as any table.
 ///
 /// # Errors
-/// [`TomlError`] with the places of what is no TOML.
+/// [`TomlError`] with the place of the first syntax error.
 pub(crate) fn parse_table(file: &str, text: &str) -> Result<toml::Table, TomlError> {
     toml::from_str(text).map_err(|error| error_from_toml(file, text, &error))
 }
 
-/// One problem a line; what is quoted of the file breaks none.
+/// One problem a line; quoted control characters are escaped.
 fn lines(problems: &[TomlError]) -> String {
-    let lines: Vec<String> = problems.iter().map(|problem| escape_controls(&problem.to_string())).collect();
-    lines.join("\n")
+    problems.iter().map(|problem| escape_controls(&problem.to_string())).collect::<Vec<_>>().join("\n")
 }
 
 /// Checks the `format` key that starts every file.
@@ -127,14 +126,12 @@ impl TryFrom<Vec<f64>> for NumberPair {
 
     fn try_from(found: Vec<f64>) -> Result<Self, String> {
         let count = found.len();
-        found
-            .try_into()
-            .map(Self)
-            .map_err(|found| format!("found {found:?} ({count}), expected two numbers, as in [40.0, 140.0]"))
+        let words = |found| format!("found {found:?} ({count}), expected two numbers, as in [40.0, 140.0]");
+        found.try_into().map(Self).map_err(words)
     }
 }
 
-/// A refusal that does not know its file yet: the key, and what was found, what was expected and what to do.
+/// An error without its file: the key, and what was found, what was expected and what to do.
 pub(crate) type KeyRefusal = (String, String);
 
 pub(crate) fn refuse_key<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, KeyRefusal> {
@@ -148,13 +145,12 @@ pub(crate) fn check_above_zero(key: impl Into<String>, found: f64) -> Result<f64
     refuse_key(key, format!("found {found}, expected a finite number above 0"))
 }
 
-/// The nearest of `known` to a mistyped `key`, capitals or not, as advice in words.
+/// Advice for a mistyped key: the nearest of the known ones, ignoring case, or all of them.
 pub(crate) fn suggest_key(key: &str, known: &[&str]) -> String {
-    /// Jaro-Winkler similarity above which a known key is worth suggesting; below it the list is shown
-    /// instead.
+    /// Jaro-Winkler similarity from which a known key is suggested; below it the list is shown.
     const SIMILAR: f64 = 0.75;
-    /// Similarity of a short key with one slip (a letter too many, too few, wrong, or two exchanged), which
-    /// Jaro-Winkler rates far too low.
+    /// Similarity of a short key with one slip (a letter extra, missing, wrong, or two exchanged), which Jaro-Winkler
+    /// rates far too low.
     const ONE_SLIP: f64 = 0.9;
     let key = key.to_lowercase();
     let one_slip = |known: &str| key.chars().count() > 2 && strsim::osa_distance(&key, known) == 1;
@@ -170,8 +166,8 @@ pub(crate) fn suggest_key(key: &str, known: &[&str]) -> String {
     }
 }
 
-/// Advice on a path of a TOML file in which `\t` or the like became a character that no path has; nothing for
-/// any other.
+/// Advice on a path of a TOML file that contains a control character, because `\t` or the like was read as an escape;
+/// empty for any other path.
 pub(crate) fn path_hint(path: &str) -> &'static str {
     if path.chars().any(char::is_control) {
         "; a backslash between double quotes starts an escape: write the path with `/`, or between single quotes"
@@ -193,19 +189,15 @@ fn error_from_toml(file: &str, text: &str, error: &toml::de::Error) -> TomlError
     let file = file.to_owned();
     let message = error.message();
     match split_unknown_field(message) {
-        Some((key, known)) => TomlError::UnknownKey {
-            file,
-            line,
-            column,
-            key: key.to_owned(),
-            advice: suggest_key(key, &known),
-        },
+        Some((key, known)) => {
+            let (key, advice) = (key.to_owned(), suggest_key(key, &known));
+            TomlError::UnknownKey { file, line, column, key, advice }
+        }
         None => TomlError::Syntax { file, line, column, problem: message.trim().replace('\n', "; ") },
     }
 }
 
-/// Splits serde's fixed wording "unknown field `a`, expected one of `b`, `c`" into the key and the known
-/// ones.
+/// Splits serde's fixed wording "unknown field `a`, expected one of `b`, `c`" into the key and the known ones.
 fn split_unknown_field(message: &str) -> Option<(&str, Vec<&str>)> {
     let quoted = message.strip_prefix("unknown field ")?;
     let mut names = quoted.split('`').skip(1).step_by(2);

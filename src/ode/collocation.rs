@@ -1,16 +1,16 @@
 //! Linear equations of second order, `M(t) y'' + D(t) y' + K(t) y = g(t)`, by collocation at the nodes of
 //! Gauss and Legendre (Hairer, Lubich and Wanner, *Geometric Numerical Integration*, section II.1.3).
 //!
-//! On a step of length `h` the accelerations at the nodes `c_i` are the unknowns, and with the integrals of
-//! the polynomials `l_j` that are 1 at one node and 0 at the others
+//! On a step of length `h` the accelerations `a_j` at the nodes `c_j` are the unknowns. With the polynomials `l_j`
+//! that are 1 at one node and 0 at the others
 //!
 //! ```text
 //! y'(x) = y'_0 + h sum a_j int_0^x l_j          y(x) = y_0 + h x y'_0 + h^2 sum a_j int_0^x int l_j
 //! ```
 //!
-//! `s` nodes give the end of the step to the order `2 s` and what lies within to the order `s + 2`. The
-//! equations of the nodes are eliminated in blocks in the order of time, without exchange of rows: what lies
-//! later hardly acts on what was before.
+//! `s` nodes give the end of the step to the order `2 s` and its inside to the order `s + 2`. The equations of the
+//! nodes are eliminated in blocks in the order of time, without exchange of rows: a later node hardly acts on an
+//! earlier one.
 
 #![allow(clippy::needless_range_loop)] // indices are those of the equations
 
@@ -19,19 +19,19 @@ use std::array::from_fn;
 use std::ops::{Add, Mul, Sub};
 use std::sync::LazyLock;
 
-/// Nodes of a step at most.
+/// Most nodes of a step.
 pub(crate) const MOST_NODES: usize = 12;
-/// Nodes of a step at least.
+/// Fewest nodes of a step.
 pub(crate) const LEAST_NODES: usize = 3;
 
 /// One number a node.
 pub(crate) type NodeArray<T> = [T; MOST_NODES];
 
-/// The nodes of a step and what they integrate.
+/// The nodes of a step and the integrals of their polynomials.
 #[derive(Debug, Clone)]
 pub(crate) struct CollocationRule {
     pub nodes: usize,
-    /// Where they lie on [0, 1].
+    /// Nodes on [0, 1].
     pub positions: NodeArray<f64>,
     /// Weights of the integral over [0, 1].
     pub weights: NodeArray<f64>,
@@ -42,23 +42,23 @@ pub(crate) struct CollocationRule {
     twice: NodeArray<NodeArray<f64>>,
 }
 
-/// Rules of every number of nodes.
+/// Rules by number of nodes.
 static RULES: LazyLock<Vec<CollocationRule>> =
     LazyLock::new(|| (0..=MOST_NODES).map(CollocationRule::new).collect());
 
-/// The rule of this many nodes, at most [`MOST_NODES`].
+/// The rule with some number of nodes, at most [`MOST_NODES`].
 pub(crate) fn collocation_rule(nodes: usize) -> &'static CollocationRule {
     &RULES[nodes]
 }
 
-/// Numbers that are computed side by side: one, or one a lane.
+/// One number, or a vector with one number a lane.
 pub(crate) trait LaneNumber:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self>
 {
     /// The same number in every lane.
     fn splat(x: f64) -> Self;
 
-    /// All of them times the same.
+    /// All lanes times one number.
     fn scale_by(self, factor: f64) -> Self;
 }
 
@@ -76,14 +76,9 @@ impl LaneNumber for f64 {
 
 impl CollocationRule {
     fn new(nodes: usize) -> Self {
-        let mut rule = Self {
-            nodes,
-            positions: [0.0; MOST_NODES],
-            weights: [0.0; MOST_NODES],
-            legendre: [[0.0; MOST_NODES]; MOST_NODES],
-            once: [[0.0; MOST_NODES]; MOST_NODES],
-            twice: [[0.0; MOST_NODES]; MOST_NODES],
-        };
+        let (row, square) = ([0.0; MOST_NODES], [[0.0; MOST_NODES]; MOST_NODES]);
+        let mut rule =
+            Self { nodes, positions: row, weights: row, legendre: square, once: square, twice: square };
         for j in 0..nodes {
             let (place, weight) = gauss_node(nodes, j);
             (rule.positions[j], rule.weights[j]) = (place, weight);
@@ -91,8 +86,7 @@ impl CollocationRule {
             rule.legendre[j] = from_fn(|m| (2 * m + 1) as f64 * weight * polynomials[m]);
         }
         for i in 0..nodes {
-            let [once, twice] = rule.integrals(rule.positions[i]);
-            (rule.once[i], rule.twice[i]) = (once, twice);
+            [rule.once[i], rule.twice[i]] = rule.integrals(rule.positions[i]);
         }
         rule
     }
@@ -104,8 +98,8 @@ impl CollocationRule {
         [self.to_nodal(&once), self.to_nodal(&twice)]
     }
 
-    /// Integrals from 0 to `x` of Legendre's polynomials of `2 x - 1`, once and twice, by degree: as many as
-    /// there are nodes. `int P_m = (P_(m+1) - P_(m-1)) / (2 (2 m + 1))`, and likewise again.
+    /// Integrals from 0 to `x` of Legendre's polynomials of `2 x - 1`, once and twice, one for each degree below
+    /// the number of nodes. `int P_m = (P_(m+1) - P_(m-1)) / (2 (2 m + 1))`, and likewise again.
     #[inline(always)]
     pub(crate) fn integrals_by_degree<R: LaneNumber>(
         &self,
@@ -129,7 +123,7 @@ impl CollocationRule {
         }
     }
 
-    /// By nodes what is known by degrees.
+    /// Values by node from coefficients by degree.
     pub(crate) fn to_nodal(&self, by_degree: &NodeArray<f64>) -> NodeArray<f64> {
         let mut sums = [0.0; MOST_NODES];
         for (sum, legendre) in sums.iter_mut().zip(&self.legendre[..self.nodes]) {
@@ -143,7 +137,7 @@ impl CollocationRule {
 
 /// Node `j` of `nodes` on [0, 1] and its weight, by Newton's steps.
 fn gauss_node(nodes: usize, j: usize) -> (f64, f64) {
-    /// More than Newton's steps need from Tricomi's start.
+    /// More than Newton's method needs from Tricomi's start.
     const ROUNDS: usize = 12;
     let mut z = -math::cos(std::f64::consts::PI * (j as f64 + 0.75) / (nodes as f64 + 0.5));
     let mut slope = 1.0;
@@ -172,6 +166,7 @@ fn legendre_polynomials<R: LaneNumber>(x: R, nodes: usize) -> [R; MOST_NODES + 2
     p
 }
 
+/// `1 / m`.
 const RECIPROCALS: [f64; 2 * MOST_NODES + 4] = {
     let mut shares = [0.0; 2 * MOST_NODES + 4];
     let mut m = 1;
@@ -182,7 +177,7 @@ const RECIPROCALS: [f64; 2 * MOST_NODES + 4] = {
     shares
 };
 
-/// A square of the equations of one instant.
+/// A matrix of the equations at one time.
 pub(crate) type SquareMatrix<const D: usize> = [[f64; D]; D];
 
 /// Matrices of `D` equations at the nodes of a step.
@@ -205,7 +200,7 @@ impl<const D: usize> Default for CollocationEquations<D> {
 pub(crate) struct CollocationStep<const D: usize> {
     rule: &'static CollocationRule,
     length: f64,
-    /// Factors: multipliers left of the diagonal, inverses on it, what remains right of it.
+    /// Factors: multipliers left of the diagonal, inverses on it, the eliminated matrix right of it.
     blocks: NodeArray<NodeArray<SquareMatrix<D>>>,
 }
 
@@ -253,7 +248,7 @@ impl<const D: usize> CollocationStep<D> {
         }
     }
 
-    /// Turns right-hand sides at the nodes into accelerations there; what starting values do is part of them.
+    /// Turns right-hand sides at the nodes, starting values included, into accelerations there.
     #[inline(always)]
     pub(crate) fn solve<R: LaneNumber>(&self, rows: &mut [[R; D]]) {
         let nodes = self.rule.nodes;

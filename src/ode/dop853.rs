@@ -4,16 +4,14 @@
 use super::DenseOutput;
 use crate::math;
 
-/// Order of the error estimate that controls the step: the estimate is of order 7 in the step, so `err ~ h^8`
-/// a step.
+/// Exponent of the step control: the error estimate of a step is of order 8, `err ~ h^8`.
 pub(crate) const ERROR_EXPONENT: f64 = 1.0 / 8.0;
-/// Right-hand sides of a step beyond the first, which is the last one of the step before.
+/// Right-hand sides of a step except the first, which is the last one of the step before.
 pub(crate) const EVALUATIONS_PER_STEP: u64 = 12;
-/// Right-hand sides that the dense output needs in addition.
+/// Additional right-hand sides of the dense output.
 pub(crate) const EVALUATIONS_FOR_DENSE: u64 = 3;
 /// Weight of the order 3 estimate against the order 5 one in the combined error (Hairer's code).
 const ORDER_3_WEIGHT: f64 = 0.01;
-
 /// The stages of one step of length `h` from `(t, y)`.
 #[derive(Debug, Clone)]
 pub(crate) struct Dop853Stages<const N: usize> {
@@ -50,8 +48,7 @@ fn combine_stages<const N: usize, const M: usize>(
 }
 
 impl<const N: usize> Dop853Stages<N> {
-    /// Takes the step; `first` is the derivative at its start, `f(t, y)` the right-hand side (12
-    /// evaluations).
+    /// Takes the step; `first` is the derivative at its start, `f(t, y)` the right-hand side (12 evaluations).
     #[inline]
     pub(crate) fn take_step(
         f: impl Fn(f64, &[f64; N]) -> [f64; N],
@@ -62,22 +59,12 @@ impl<const N: usize> Dop853Stages<N> {
     ) -> Self {
         let mut k = [[0.0; N]; 16];
         k[0] = *first;
-        macro_rules! stage {
-            ($i:literal, $row:ident) => {
-                k[$i] = f(t + C[$i] * h, &combine_stages(y, h, &k, &$row))
+        macro_rules! stages {
+            ($($i:literal $row:ident),*) => {
+                $(k[$i] = f(t + C[$i] * h, &combine_stages(y, h, &k, &$row));)*
             };
         }
-        stage!(1, A1);
-        stage!(2, A2);
-        stage!(3, A3);
-        stage!(4, A4);
-        stage!(5, A5);
-        stage!(6, A6);
-        stage!(7, A7);
-        stage!(8, A8);
-        stage!(9, A9);
-        stage!(10, A10);
-        stage!(11, A11);
+        stages!(1 A1, 2 A2, 3 A3, 4 A4, 5 A5, 6 A6, 7 A7, 8 A8, 9 A9, 10 A10, 11 A11);
         let y_end = combine_stages(y, h, &k, &A12);
         k[12] = f(t + h, &y_end);
         Self { t, h, y: *y, y_end, k }
@@ -89,7 +76,7 @@ impl<const N: usize> Dop853Stages<N> {
         &self.k[12]
     }
 
-    /// Combined error estimate in units of the tolerance: at most 1 is accepted. `scale` is the tolerated
+    /// Combined error estimate in units of the tolerance; a step with at most 1 is accepted. `scale` is the tolerated
     /// error of each component.
     #[inline]
     pub(crate) fn error_norm(&self, scale: &[f64; N]) -> f64 {
@@ -160,12 +147,9 @@ impl<const N: usize> DenseOutput<N> for Dop853DenseOutput<N> {
     }
 }
 
-// Coefficients of the Dormand-Prince method of order 8 with embedded orders 5 and 3 and dense output of
-// order 7.
-//
-// Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed.,
-// Springer 1993, section II.5 and the authors' code DOP853. A row lists the nonzero entries as (stage
-// counted from 0, coefficient).
+// Coefficients of the Dormand-Prince method of order 8 with embedded orders 5 and 3 and dense output of order 7.
+// Source: E. Hairer, S. P. Nørsett, G. Wanner, "Solving Ordinary Differential Equations I", 2nd ed., Springer 1993,
+// section II.5, and the authors' code DOP853. Stages count from 0.
 
 /// One row of coefficients: (stage, coefficient) for the nonzero entries.
 pub(crate) type TableauRow<const M: usize> = [(usize, f64); M];

@@ -1,17 +1,17 @@
-//! The classical Runge-Kutta method of order 4 in steps of fixed length: no error control, guards evaluated
-//! where a step ends. Two roots within one step are not seen. It serves comparisons.
+//! The classical Runge-Kutta method of order 4 in steps of fixed length, for comparisons: no error control, guards
+//! evaluated at the end of each step. Two roots within one step are missed.
 
 use super::slack_variable::{SlackVariable, StatePoint};
 use super::{
     AcceptedStep, DenseOutput, HybridPhase, ObserverReply, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters,
 };
 
-/// Where a phase ends whose guard has fallen below zero within a step.
+/// How the end of a phase is located within a step in which a guard has fallen below zero.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum FixedStepLocator {
     /// At the step's end: order 1 in the step, for any order of the method.
     StepEnd,
-    /// At the guard's zero, to which a slack variable leads: order 4.
+    /// At the guard's zero, reached by a step in the guard as a slack variable: order 4.
     #[default]
     Slack,
 }
@@ -21,13 +21,12 @@ pub enum FixedStepLocator {
 pub struct FixedStepOptions {
     /// Length of a step, s.
     pub step_s: f64,
-    /// Where a phase ends.
+    /// How events are located.
     pub locate: FixedStepLocator,
 }
 
-/// Integrates `phase` from `start` until `stop` or a guard in steps of fixed length (the last one is cut),
-/// telling `observe` of every step. The order of a zero at the start is not needed: only a guard that has
-/// fallen over a step ends the phase.
+/// Integrates `phase` from `start` until `stop` or a guard in steps of fixed length (the last one is cut). `observe`
+/// sees every step. The zero orders of the start are ignored: only a guard that falls over a step ends the phase.
 pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
     phase: &P,
     start: PhaseStart<N, G>,
@@ -50,7 +49,7 @@ pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: 
     let mut count = 0.0;
     while run.t < stop {
         count += 1.0;
-        let due = start.t + count * steps.step_s; // (a sum of steps would gather rounding)
+        let due = start.t + count * steps.step_s; // (a sum of steps would accumulate rounding)
         let due = if stop - due > SHORTEST_LAST_STEP * steps.step_s { due } else { stop };
         let Some(ahead) = run.take_step(due) else { return run.phase_end(PhaseEndCause::StepTooSmall) };
         let event = run.find_event(&ahead);
@@ -59,29 +58,24 @@ pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: 
             Some((_, at)) if at.t < ahead.at.t => run.evaluate_at(at),
             _ => ahead,
         };
-        let arc = HermiteDenseOutput {
-            start: run.current_point(),
-            start_flow: run.flow,
-            end: end.at,
-            end_flow: end.flow,
-        };
+        let at = run.current_point();
+        let arc = HermiteDenseOutput { start: at, start_flow: run.flow, end: end.at, end_flow: end.flow };
         let step = AcceptedStep { start: run.t, end: end.at.t, y_end: &end.at.y, solution: &arc };
         let answer = observe(&step).control_flow();
-        run.accept_step(end);
-        if answer.is_break() {
-            return run.phase_end(PhaseEndCause::Interrupted);
-        }
-        if let Some(cause) = cause {
+        run.work.steps += 1;
+        (run.t, run.y, run.flow, run.guards) = (end.at.t, end.at.y, end.flow, end.guards);
+        let interrupted = answer.is_break().then_some(PhaseEndCause::Interrupted);
+        if let Some(cause) = interrupted.or(cause) {
             return run.phase_end(cause);
         }
     }
     run.phase_end(PhaseEndCause::Stop)
 }
 
-/// A last step shorter than this share of a step is taken together with the one before.
+/// A last step shorter than this share of a step is joined to the one before.
 const SHORTEST_LAST_STEP: f64 = 1e-6;
-/// Halvings of a step in search of a place from which a guard falls steadily; 2^-50 of a step is below the
-/// rounding of time.
+/// Halvings of a step in search of a point from which a guard falls steadily; 2^-50 of a step is below the rounding
+/// of time.
 const MOST_HALVINGS: usize = 50;
 
 /// Right-hand sides of [`runge_kutta_4_step`] beyond the first.
@@ -102,7 +96,7 @@ pub(super) fn runge_kutta_4_step<const N: usize>(
     (t + h, std::array::from_fn(|i| y[i] + h / 6.0 * (k1[i] + 2.0 * (k2[i] + k3[i]) + k4[i])))
 }
 
-/// Where a step leads.
+/// The end of a step.
 struct TrialStep<const N: usize, const G: usize> {
     at: StatePoint<N>,
     flow: [f64; N],
@@ -128,7 +122,7 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedStepIntegration<
         PhaseEnd { t: self.t, y: self.y, cause, first_step: self.steps.step_s }
     }
 
-    /// The state a step later; `None` when the time does not move or a number is lost.
+    /// The state a step later; `None` when the time does not advance or a value is not finite.
     fn take_step(&mut self, to: f64) -> Option<TrialStep<N, G>> {
         if to.partial_cmp(&self.t) != Some(std::cmp::Ordering::Greater) {
             return None;
@@ -155,14 +149,9 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedStepIntegration<
         TrialStep { flow: self.phase.derivative(at.t, &at.y), guards: self.phase.guards(at.t, &at.y), at }
     }
 
-    fn accept_step(&mut self, ahead: TrialStep<N, G>) {
-        self.work.steps += 1;
-        (self.t, self.y, self.flow, self.guards) = (ahead.at.t, ahead.at.y, ahead.flow, ahead.guards);
-    }
-
     /// The guard that ends the phase within a step, with the point where it does.
     fn find_event(&mut self, ahead: &TrialStep<N, G>) -> Option<(usize, StatePoint<N>)> {
-        // (a guard that starts below zero, by what its location left, and rises has not fallen)
+        // (a guard that starts slightly below zero, from its location, and rises has not fallen)
         let (before, after) = (self.guards, ahead.guards);
         let fallen = |g: &usize| after[*g] <= 0.0 && (before[*g] > 0.0 || after[*g] <= before[*g]);
         let share = |g: usize| before[g].max(0.0) / (before[g].max(0.0) - after[g]).max(f64::MIN_POSITIVE);
@@ -171,13 +160,11 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedStepIntegration<
             return Some((first, ahead.at));
         }
         self.work.rejected_steps += 1;
-        (0..G)
-            .filter(fallen)
-            .map(|guard| (guard, self.locate_zero(guard, ahead)))
-            .min_by(|a, b| a.1.t.total_cmp(&b.1.t))
+        let zeros = (0..G).filter(fallen).map(|guard| (guard, self.locate_zero(guard, ahead)));
+        zeros.min_by(|a, b| a.1.t.total_cmp(&b.1.t))
     }
 
-    /// Where a guard that is positive at the start of the step and not at its end falls to zero.
+    /// Point where a guard that is positive at the start of the step and not at its end falls to zero.
     fn locate_zero(&mut self, guard: usize, ahead: &TrialStep<N, G>) -> StatePoint<N> {
         let (mut low, mut high) = (self.current_point(), ahead.at);
         for _ in 0..MOST_HALVINGS {
@@ -205,11 +192,8 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedStepIntegration<
         let f = |t: f64, y: &[f64; N]| phase.derivative(t, y);
         self.work.rhs_evaluations += u64::from(own.is_none());
         let flow = own.unwrap_or_else(|| f(from.t, &from.y));
-        self.with_slack(guard, |slack| {
-            slack.land_on_zero(from, RUNGE_KUTTA_4_EVALUATIONS, |t| {
-                runge_kutta_4_step(f, from.t, &from.y, &flow, t - from.t).1
-            })
-        })
+        let step = |t| runge_kutta_4_step(f, from.t, &from.y, &flow, t - from.t).1;
+        self.with_slack(guard, |slack| slack.land_on_zero(from, RUNGE_KUTTA_4_EVALUATIONS, step))
     }
 
     fn with_slack<T>(&mut self, guard: usize, ask: impl FnOnce(&mut SlackVariable<'_, N, G, P>) -> T) -> T {
@@ -217,7 +201,7 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedStepIntegration<
     }
 }
 
-/// The cubic that meets states and slopes at both ends of a step: of order 3.
+/// Cubic through the states and slopes at both ends of a step: of order 3.
 struct HermiteDenseOutput<const N: usize> {
     start: StatePoint<N>,
     start_flow: [f64; N],

@@ -1,44 +1,43 @@
-//! Truncated power series about the start of a step, and the first place where one of them falls to zero.
+//! Truncated power series about the start of a step, and the first zero of one of them.
 //!
-//! On a step of length `h` a series with coefficients `g_k` is the polynomial `sum g_k h^k s^k`, `s` in [0,
-//! 1]. In the Bernstein basis it lies in the convex hull of its coefficients: where all are positive there is
-//! no root, with one change of sign there is exactly one, and otherwise the interval is halved by de
-//! Casteljau's algorithm. No root inside a step is missed, double ones included.
+//! On a step of length `h` a series with coefficients `g_k` is the polynomial `sum g_k h^k s^k`, `s` in [0, 1]. It
+//! lies in the convex hull of its Bernstein coefficients. So it has no root if all are positive, and exactly one if
+//! they change sign once; otherwise the interval is halved by de Casteljau's algorithm. No root inside a step is
+//! missed, double ones included.
 
 /// Highest order of an expansion; beyond it rounding, not truncation, limits double precision.
 pub(crate) const MOST_ORDER: usize = 20;
-/// Coefficients kept, those of `x^0` to `x^MOST_ORDER`.
+/// Coefficients of `x^0` to `x^MOST_ORDER`.
 pub(crate) const TERMS: usize = MOST_ORDER + 1;
 
-/// Taylor coefficients about the start of a step: `g(t + x) = sum g_k x^k`, those beyond the order in use
+/// Taylor coefficients about the start of a step, `g(t + x) = sum g_k x^k`; those beyond the order in use are
 /// unspecified.
 pub(crate) type TaylorSeries = [f64; TERMS];
 
-/// Halvings after which a root that cannot be distinguished from a touch is taken for a touch: 2^-30 of a
-/// step is below every tolerance.
+/// Halvings after which a root that cannot be distinguished from a touch counts as a touch: 2^-30 of a step is below
+/// every tolerance.
 const MOST_HALVINGS: u32 = 30;
-/// Terms this small against the largest one are rounding: they do not decide whether a guard starts at a
-/// zero.
+/// Terms below this share of the sum are rounding: they do not decide whether a guard starts at a zero.
 const NOISE: f64 = 1e-14;
-/// A part of the step on which no Bernstein coefficient is larger than this share of the sum of all terms is
-/// flat at zero: its signs are those of rounding, and to halve it on would take a billion looks.
+/// A part of the step on which no Bernstein coefficient exceeds this share of the sum of all terms is flat at zero:
+/// its signs are rounding, and further halving would take a billion steps.
 const FLAT: f64 = 4.0 * f64::EPSILON;
 
-/// What a guard does on a step.
+/// First fall of a guard on a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum GuardFall {
     Nowhere,
     /// It falls to zero this far after the start, in the units of `h`.
     At(f64),
-    /// It is no number.
+    /// Its series is not finite.
     Undefined,
 }
 
-/// Where a guard first falls to zero on `[0, h]`.
+/// First fall of a guard to zero on `[0, h]`.
 ///
-/// `zero_order` is the multiplicity of the zero at which the guard is known to start, 0 where it is positive.
-/// A zero at the start is armed by the first coefficient that rounding does not explain: if it is positive
-/// that zero is divided out, if it is negative the guard falls at once.
+/// `zero_order` is the multiplicity of the guard's zero at the start, 0 where it is positive. A zero at the start is
+/// armed by the first coefficient above rounding: if it is positive that zero is divided out, if it is negative the
+/// guard falls at once.
 pub(crate) fn first_fall(guard: &TaylorSeries, order: usize, zero_order: usize, h: f64) -> GuardFall {
     if guard[0] == f64::INFINITY {
         return GuardFall::Nowhere;
@@ -68,10 +67,9 @@ pub(crate) fn first_fall(guard: &TaylorSeries, order: usize, zero_order: usize, 
     }
 }
 
-/// A quick look: whether the first few terms, in the Bernstein basis, stay above all that the others can take
-/// away.
+/// Quick test for no root: whether the first few terms, in the Bernstein basis, exceed the sum of all others.
 fn is_root_free(c: &[f64]) -> bool {
-    /// Degree of the part that is evaluated closely; the rest falls with the power of the step.
+    /// Degree of the part evaluated in the Bernstein basis; the rest falls with the power of the step.
     const HEAD: usize = 4;
     /// Reciprocals of the binomial coefficients of that degree.
     const SHARES: [f64; HEAD + 1] = [1.0, 1.0 / 4.0, 1.0 / 6.0, 1.0 / 4.0, 1.0];
@@ -86,7 +84,7 @@ fn is_root_free(c: &[f64]) -> bool {
     b.iter().all(|&b| b > others)
 }
 
-/// First root in (0, 1] of the polynomial with these coefficients, the first of them positive.
+/// First root in (0, 1] of the polynomial with these coefficients, of which the first is positive.
 fn first_root(c: &[f64]) -> Option<f64> {
     let mut b = [0.0; TERMS];
     let degree = c.len() - 1;
@@ -104,20 +102,14 @@ fn first_root(c: &[f64]) -> Option<f64> {
     first_crossing(&RootSearch { c, flat }, &mut b, 0.0, 1.0, 0)
 }
 
-/// The polynomial that is searched and the size below which its values are rounding.
+/// A polynomial and the size below which its values are rounding.
 struct RootSearch<'a> {
     c: &'a [f64],
     flat: f64,
 }
 
-/// First crossing in `[low, high]`; `b` are the Bernstein coefficients there and are used up.
-fn first_crossing(
-    search: &RootSearch<'_>,
-    b: &mut [f64; TERMS],
-    low: f64,
-    high: f64,
-    depth: u32,
-) -> Option<f64> {
+/// First crossing in `[low, high]`; `b` are the Bernstein coefficients there and are overwritten.
+fn first_crossing(search: &RootSearch, b: &mut [f64; TERMS], low: f64, high: f64, depth: u32) -> Option<f64> {
     let degree = search.c.len() - 1;
     if b[0] <= 0.0 {
         return Some(low);
@@ -140,16 +132,16 @@ fn first_crossing(
             b[i] = 0.5 * (b[i] + b[i + 1]);
         }
     }
-    // what is left in `b` is the right half, from its start
+    // `b` now holds the right half, from its start
     let middle = 0.5 * (low + high);
     first_crossing(search, &mut left, low, middle, depth + 1)
         .or_else(|| first_crossing(search, b, middle, high, depth + 1))
 }
 
-/// The one root between `low`, where the polynomial is positive, and `high`, where it is not: Newton's steps,
-/// false position where they leave the bracket, bisection where that stalls.
+/// The single root between `low`, where the polynomial is positive, and `high`, where it is not, by Newton's method.
+/// Steps outside the bracket are replaced by false position, slow ones by bisection.
 fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64) -> f64 {
-    /// More than Newton's steps and bisection together need in double precision.
+    /// More than Newton's method and bisection together need in double precision.
     const ROUNDS: usize = 80;
     let mut x = low + (high - low) * at_low / (at_low - at_high);
     let mut before = high - low;
@@ -167,11 +159,8 @@ fn single_root(c: &[f64], mut low: f64, mut high: f64, at_low: f64, at_high: f64
         let step = -value / slope;
         let newton = x + step;
         // a step that does not halve the one before is not converging
-        let next = if newton > low && newton < high && 2.0 * step.abs() < before {
-            newton
-        } else {
-            0.5 * (low + high)
-        };
+        let converges = newton > low && newton < high && 2.0 * step.abs() < before;
+        let next = if converges { newton } else { 0.5 * (low + high) };
         before = (next - x).abs();
         if before <= 2.0 * f64::EPSILON * x || value == 0.0 {
             return x;

@@ -1,35 +1,32 @@
-//! Where a guard first reaches zero inside a step: certain for the interpolating polynomial, double roots
-//! included.
+//! First zero of a guard inside a step, certain for the interpolating polynomial, double roots included.
 //!
-//! A guard is sampled on the dense output at equispaced fractions of the step and written in the Bernstein
-//! basis. If all coefficients are positive there is no root (the polynomial lies in their convex hull);
-//! otherwise the interval is halved by de Casteljau's algorithm.
+//! A guard is sampled on the dense output at equispaced fractions of the step and written in the Bernstein basis. If
+//! all coefficients are positive there is no root, because the polynomial lies in their convex hull. Otherwise the
+//! interval is halved by de Casteljau's algorithm.
 
 use crate::math;
 
-/// Samples a quick look takes: fractions 0, 1/4, 1/2, 3/4, 1.
+/// Samples of the quick test: fractions 0, 1/4, 1/2, 3/4, 1.
 pub(crate) const COARSE_SAMPLES: usize = 5;
-/// Samples a full look takes: fractions 0, 1/8, ..., 1.
+/// Samples of the full search: fractions 0, 1/8, ..., 1.
 pub(crate) const FINE_SAMPLES: usize = 9;
 
-/// Halvings after which a root that cannot be distinguished from a touch is taken for a touch: 2^-30 of a
-/// step is below every tolerance.
+/// Halvings after which a root that cannot be distinguished from a touch counts as a touch: 2^-30 of a step is below
+/// every tolerance.
 const MOST_HALVINGS: u32 = 30;
-/// A part of the step on which no Bernstein coefficient is larger than this share of the largest is flat at
-/// zero: its signs are those of rounding, and to halve it on would take a billion looks.
+/// A part of the step on which no Bernstein coefficient exceeds this share of the largest is flat at zero: its signs
+/// are rounding, and further halving would take a billion steps.
 const FLAT: f64 = 8.0 * f64::EPSILON;
 
-const COARSE_TO_BERNSTEIN: [[f64; COARSE_SAMPLES]; COARSE_SAMPLES] =
-    bernstein_from_samples::<COARSE_SAMPLES>();
-const FINE_TO_BERNSTEIN: [[f64; FINE_SAMPLES]; FINE_SAMPLES] = bernstein_from_samples::<FINE_SAMPLES>();
-const INNER_TO_BERNSTEIN: [[f64; FINE_SAMPLES - 1]; FINE_SAMPLES - 1] = bernstein_from_inner_samples();
+const COARSE_TO_BERNSTEIN: [[f64; COARSE_SAMPLES]; COARSE_SAMPLES] = bernstein_from_samples(0);
+const FINE_TO_BERNSTEIN: [[f64; FINE_SAMPLES]; FINE_SAMPLES] = bernstein_from_samples(0);
+const INNER_TO_BERNSTEIN: [[f64; FINE_SAMPLES - 1]; FINE_SAMPLES - 1] = bernstein_from_samples(1);
 
-/// Whether a guard with these coarse samples and one check sample (at fraction 7/8) stays clear of zero: the
-/// least Bernstein coefficient must exceed the error of interpolation that the check sample shows, with a
-/// margin.
+/// Whether a guard with these coarse samples and one check sample (at fraction 7/8) stays clear of zero. The least
+/// Bernstein coefficient must exceed the interpolation error at the check sample, with a margin.
 #[inline]
 pub(crate) fn is_root_free(samples: &[f64; COARSE_SAMPLES], check: f64) -> bool {
-    /// The check sample sees the error of interpolation at one place; elsewhere it may be larger.
+    /// The check sample shows the interpolation error at one place; elsewhere it may be larger.
     const MARGIN: f64 = 8.0;
     /// Lagrange weights of the five coarse nodes at fraction 7/8.
     const AT_CHECK: [f64; COARSE_SAMPLES] =
@@ -39,13 +36,13 @@ pub(crate) fn is_root_free(samples: &[f64; COARSE_SAMPLES], check: f64) -> bool 
     multiply_matrix(&COARSE_TO_BERNSTEIN, samples).iter().all(|&b| b > margin)
 }
 
-/// First fraction of the step at which the polynomial through the fine samples falls to zero, if it does.
+/// First fraction of the step at which the polynomial through the fine samples falls to zero.
 pub(crate) fn first_root(samples: &[f64; FINE_SAMPLES]) -> Option<f64> {
     find_first_root(multiply_matrix(&FINE_TO_BERNSTEIN, samples))
 }
 
-/// The same for a guard that starts at a zero of multiplicity `order` and grows: the samples (the first is
-/// not used) are divided by `fraction^order`, which removes that zero, and the quotient is searched.
+/// The same for a guard that starts at a zero of multiplicity `order` and grows. The samples, except the first, are
+/// divided by `fraction^order`, which removes that zero, and the quotient is searched.
 pub(crate) fn first_root_after_zero(samples: &[f64; FINE_SAMPLES], order: i32) -> Option<f64> {
     let mut quotient = [0.0; FINE_SAMPLES - 1];
     for (i, q) in quotient.iter_mut().enumerate() {
@@ -64,8 +61,8 @@ fn multiply_matrix<const M: usize>(matrix: &[[f64; M]; M], x: &[f64; M]) -> [f64
     out
 }
 
-/// A guard that does not apply, infinity or what subtracting it leaves, has no root; nor has one that is zero
-/// throughout.
+/// First root, given Bernstein coefficients. A guard that does not apply (infinity or a difference from it) has no
+/// root, nor has one that is zero throughout.
 fn find_first_root<const M: usize>(b: [f64; M]) -> Option<f64> {
     let largest = b.iter().fold(0.0, |a: f64, c| a.max(c.abs()));
     if largest == 0.0 || !b.iter().all(|c| c.is_finite()) {
@@ -74,8 +71,7 @@ fn find_first_root<const M: usize>(b: [f64; M]) -> Option<f64> {
     first_crossing(b, FLAT * largest, 0.0, 1.0, 0)
 }
 
-/// First place in `[low, high]` where the polynomial with these Bernstein coefficients reaches zero from
-/// above.
+/// First place in `[low, high]` where the polynomial with these Bernstein coefficients falls to zero.
 fn first_crossing<const M: usize>(b: [f64; M], flat: f64, low: f64, high: f64, depth: u32) -> Option<f64> {
     if b[0] <= 0.0 {
         return Some(low);
@@ -96,8 +92,8 @@ fn first_crossing<const M: usize>(b: [f64; M], flat: f64, low: f64, high: f64, d
         .or_else(|| first_crossing(right, flat, middle, high, depth + 1))
 }
 
-/// The one root in [0, 1] of a polynomial that is positive at 0 and not at 1, by the Illinois variant of
-/// false position with bisection as a guard.
+/// The single root in [0, 1] of a polynomial that is positive at 0 and not at 1, by the Illinois variant of false
+/// position, with bisection every third round.
 fn single_root<const M: usize>(b: &[f64; M]) -> f64 {
     let (mut low, mut high) = (0.0, 1.0);
     let (mut at_low, mut at_high) = (b[0], b[M - 1]);
@@ -142,23 +138,13 @@ fn subdivide<const M: usize>(b: [f64; M]) -> ([f64; M], [f64; M]) {
     (left, right)
 }
 
-/// Inverse of the collocation matrix of the Bernstein basis at the nodes `i / (M - 1)`.
-const fn bernstein_from_samples<const M: usize>() -> [[f64; M]; M] {
+/// Inverse of the collocation matrix of the Bernstein basis of degree `M - 1` at the nodes `i / (M - 1 + first)`, `i`
+/// from `first` on. With `first` 1 the quotient of a guard is not sampled at 0.
+const fn bernstein_from_samples<const M: usize>(first: usize) -> [[f64; M]; M] {
     let mut nodes = [0.0; M];
     let mut i = 0;
     while i < M {
-        nodes[i] = i as f64 / (M - 1) as f64;
-        i += 1;
-    }
-    invert_matrix(collocation_matrix(&nodes))
-}
-
-/// The same at the nodes 1/8, ..., 1, for a quotient that is not sampled at 0.
-const fn bernstein_from_inner_samples() -> [[f64; FINE_SAMPLES - 1]; FINE_SAMPLES - 1] {
-    let mut nodes = [0.0; FINE_SAMPLES - 1];
-    let mut i = 0;
-    while i < FINE_SAMPLES - 1 {
-        nodes[i] = (i + 1) as f64 / (FINE_SAMPLES - 1) as f64;
+        nodes[i] = (i + first) as f64 / (M - 1 + first) as f64;
         i += 1;
     }
     invert_matrix(collocation_matrix(&nodes))

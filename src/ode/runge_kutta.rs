@@ -1,5 +1,5 @@
-//! The Dormand-Prince 8(5,3) method with error control, up to the first guard that falls: roots are isolated
-//! on nine samples of the dense output, and the state there is that of a step of the method's own order.
+//! The Dormand-Prince 8(5,3) method with error control, up to the first guard that falls. Roots are isolated on nine
+//! samples of the dense output; a step of the method's own order gives the state there.
 
 use super::dop853::{
     Dop853DenseOutput, Dop853Stages, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP,
@@ -10,20 +10,20 @@ use super::slack_variable::{MOST_HALVINGS, SlackVariable, StatePoint};
 use super::{AcceptedStep, HybridPhase, ObserverReply, PhaseEnd, PhaseEndCause, PhaseStart, WorkCounters};
 use crate::math;
 
-/// How the instant at which a guard falls to zero is located; which guard falls first, double roots included,
-/// is always read off the dense output.
+/// How the time at which a guard falls to zero is located. Which guard falls first, double roots included, always
+/// follows from the dense output.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum EventLocator {
-    /// The root is bracketed on the dense output, the step taken again up to it and the rest closed by
-    /// Newton's iteration.
+    /// The root is bracketed on the dense output, the step repeated up to it and the remainder closed by Newton's
+    /// iteration.
     #[default]
     Bracket,
-    /// The step is rejected and a slack variable brought to zero as the independent variable; a guard that
-    /// turns inside the step is bracketed until it falls.
+    /// The step is rejected and a slack variable, as the independent variable, brought to zero. A guard that turns
+    /// inside the step is bracketed until it falls.
     Slack,
 }
 
-/// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every accepted step.
+/// Integrates `phase` from `start` until `stop` or a guard; `observe` sees every accepted step.
 ///
 /// `relative` is the tolerated error of a step relative to each state, or to its [`HybridPhase::scale`] where that
 /// is larger.
@@ -38,7 +38,7 @@ pub fn integrate<const N: usize, const G: usize, P: HybridPhase<N, G>, A: Observ
     integrate_with_locator(EventLocator::Bracket, phase, start, stop, relative, work, observe)
 }
 
-/// [`integrate`] with a choice of how events are located.
+/// [`integrate`] with a choice of the event location.
 pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, G>, A: ObserverReply>(
     locator: EventLocator,
     phase: &P,
@@ -48,8 +48,8 @@ pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, 
     work: &mut WorkCounters,
     mut observe: impl FnMut(&AcceptedStep<'_, N>) -> A,
 ) -> PhaseEnd<N> {
-    let mut run =
-        Dop853Integration { locator, ..Dop853Integration::from_start(phase, start, relative, work) };
+    let mut run = Dop853Integration::from_start(phase, start, relative, work);
+    run.locator = locator;
     loop {
         if run.t >= stop {
             return run.phase_end(PhaseEndCause::Stop);
@@ -63,7 +63,11 @@ pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, 
         run.work.rhs_evaluations += EVALUATIONS_FOR_DENSE;
         let dense = stages.dense_output(|t, y| phase.derivative(t, y));
         match run.locate_event(&stages, &dense) {
-            EventLocation::Outside => run.reject_step(&stages),
+            EventLocation::Outside => {
+                run.work.steps -= 1;
+                run.work.rejected_steps += 1;
+                run.h = OUT_OF_DOMAIN * stages.h;
+            }
             EventLocation::Nowhere => {
                 let end = run.accept_step(&stages, stop);
                 let step = AcceptedStep { start: stages.t, end, y_end: &stages.y_end, solution: &dense };
@@ -81,36 +85,34 @@ pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, 
     }
 }
 
-/// What the step size is multiplied by at most and at least (Hairer's code), and the share of the predicted
-/// step that is taken.
+/// Largest and least factor of the step size (Hairer's code), and the share of the predicted step that is taken.
 const GROWTH: (f64, f64, f64) = (6.0, 1.0 / 3.0, 0.9);
-/// How much the error of the step before steadies the step size (the beta of Hairer's code, section IV.2).
+/// Influence of the last step's error on the step size (the beta of Hairer's code, section IV.2).
 const STABILISATION: f64 = 0.04;
-/// Errors below this count as this, so that one lucky step does not send the next one too far.
+/// Smaller errors count as this, so that one lucky step does not make the next one too long.
 const NEGLIGIBLE: f64 = 1e-4;
-/// Shortest first step to try, in units of the rounding of time; error control shortens it where it must.
+/// Shortest first step to try, in units of the rounding of time; error control shortens it where necessary.
 const SHORTEST_START: f64 = 1e3;
-/// What a step is multiplied by when it leaves the domain of the right-hand side or of the guards.
+/// Factor of a step that leaves the domain of the right-hand side or of the guards.
 const OUT_OF_DOMAIN: f64 = 0.1;
-/// A step this close to the stop time, relative to its length, ends there: no sliver is left over.
+/// A step this close to the stop time, relative to its length, ends there, so that no tiny step remains.
 const STRETCH: f64 = 1.01;
-/// Length of step, in units of the rounding of time, up to which a guard that starts at zero is not looked
-/// at.
+/// Length of step, in units of the rounding of time, up to which a guard that starts at zero is ignored.
 const SLIVER_STEP: f64 = 64.0;
-/// What a guard may leave at its located zero, as a share of its largest sample: with more, the polynomial
-/// through the samples has a root that the guard has not, and the step is taken again, shorter.
+/// Most remainder of a guard at its located zero, as a share of its largest sample. With more, the polynomial through
+/// the samples has a root that the guard does not have, and a shorter step is taken.
 const MOST_GUARD_REMAINDER: f64 = 1e-3;
-/// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over
-/// it, a double zero at the start opens by less than the rounding of the state.
+/// Length of step, in units of the rounding of time, below which a shorter one shows no more of a guard: over it, a
+/// double zero at the start opens by less than the rounding of the state.
 const SHORTEST_TELLING_STEP: f64 = 1e8;
 
-/// What the guards say of a step.
+/// First event of a step.
 enum EventLocation<const N: usize> {
-    /// None falls to zero.
+    /// No guard falls to zero.
     Nowhere,
-    /// The first to fall to zero, with time and state there.
+    /// The first guard to fall to zero, with time and state there.
     At { guard: usize, t: f64, y: [f64; N] },
-    /// One is no number somewhere: the step leaves the domain of the phase.
+    /// A guard is NaN: the step leaves the domain of the phase.
     Outside,
 }
 
@@ -169,8 +171,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
             (v.iter().zip(&tolerated).map(|(v, s)| math::powi(v / s, 2)).sum::<f64>() / N as f64).sqrt()
         };
         let (d0, d1) = (norm(&self.y), norm(&self.derivative));
-        // a state that happens to be almost zero says nothing of its time scale: the step stays long enough
-        // to advance the time
+        // a state that happens to be almost zero says nothing of its time scale, but the step must advance the time
         let shortest = SHORTEST_START * f64::EPSILON * self.t.abs();
         let h0 = if d0 < 1e-5 || d1 < 1e-5 { 1e-6 } else { 0.01 * d0 / d1 }.max(shortest);
         let euler: [f64; N] = std::array::from_fn(|i| self.y[i] + h0 * self.derivative[i]);
@@ -178,33 +179,25 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
         self.work.rhs_evaluations += 1;
         let d2 = norm(&std::array::from_fn(|i| next[i] - self.derivative[i])) / h0;
         let steepest = d1.max(d2);
-        let h1 = if steepest <= 1e-15 {
-            (h0 * 1e-3).max(1e-6)
-        } else {
-            math::powf(0.01 / steepest, ERROR_EXPONENT)
-        };
+        let estimate = || math::powf(0.01 / steepest, ERROR_EXPONENT);
+        let h1 = if steepest <= 1e-15 { (h0 * 1e-3).max(1e-6) } else { estimate() };
         (100.0 * h0).min(h1).max(shortest)
     }
 
-    /// Tries steps until one meets the tolerance; `None` when even the shortest representable one does not.
+    /// Tries steps until one meets the tolerance; `None` when even the shortest representable step does not.
     fn find_accepted_step(&mut self, stop: f64) -> Option<Dop853Stages<N>> {
         let (most, least, safety) = GROWTH;
         let mut rejected = false;
         loop {
             let remaining = stop - self.t;
             let h = if self.h * STRETCH >= remaining { remaining } else { self.h };
-            // (a step that is no number is not resolved either)
+            // (a NaN step is not resolved either)
             let resolved = self.h > 4.0 * f64::EPSILON * self.t.abs();
             if !resolved || self.t + h <= self.t {
                 return None;
             }
-            let stages = Dop853Stages::take_step(
-                |t, y| self.phase.derivative(t, y),
-                self.t,
-                &self.y,
-                &self.derivative,
-                h,
-            );
+            let f = |t: f64, y: &[f64; N]| self.phase.derivative(t, y);
+            let stages = Dop853Stages::take_step(f, self.t, &self.y, &self.derivative, h);
             self.work.rhs_evaluations += EVALUATIONS_PER_STEP;
             let error = stages.error_norm(&self.tolerated_error(&stages.y_end));
             if error <= 1.0 {
@@ -221,20 +214,10 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
             }
             self.work.rejected_steps += 1;
             rejected = true;
-            // an error that is no number: the stages left the domain of the right-hand side
-            self.h = if error.is_finite() {
-                h * (safety * math::powf(error, -ERROR_EXPONENT)).max(least)
-            } else {
-                OUT_OF_DOMAIN * h
-            };
+            // (an error that is not finite: the stages left the domain of the right-hand side)
+            let shorter = || (safety * math::powf(error, -ERROR_EXPONENT)).max(least);
+            self.h = h * if error.is_finite() { shorter() } else { OUT_OF_DOMAIN };
         }
-    }
-
-    /// Takes back a step that left the domain of the phase.
-    fn reject_step(&mut self, stages: &Dop853Stages<N>) {
-        self.work.steps -= 1;
-        self.work.rejected_steps += 1;
-        self.h = OUT_OF_DOMAIN * stages.h;
     }
 
     fn accept_step(&mut self, stages: &Dop853Stages<N>, stop: f64) -> f64 {
@@ -248,33 +231,27 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
         self.t
     }
 
-    /// Whether a step is so short that a guard which starts at its zero does not leave the rounding of it.
+    /// Whether a step is so short that a guard which starts at its zero stays within rounding.
     fn is_sliver(&self, stages: &Dop853Stages<N>) -> bool {
         stages.h <= SLIVER_STEP * f64::EPSILON * stages.t.abs()
     }
 
     /// The first guard that falls to zero inside the step.
     fn locate_event(&mut self, stages: &Dop853Stages<N>, dense: &Dop853DenseOutput<N>) -> EventLocation<N> {
-        let mut sampled = GuardSamples {
-            phase: self.phase,
-            t: stages.t,
-            h: stages.h,
-            dense,
-            samples: [[0.0; G]; FINE_SAMPLES],
-            count: 0,
-        };
+        let (t, h, samples) = (stages.t, stages.h, [[0.0; G]; FINE_SAMPLES]);
+        let mut sampled = GuardSamples { phase: self.phase, t, h, dense, samples, count: 0 };
         sampled.samples[0] = self.guards;
-        sampled.samples[FINE_SAMPLES - 1] = self.phase.guards(stages.t + stages.h, &stages.y_end);
+        sampled.samples[FINE_SAMPLES - 1] = self.phase.guards(t + h, &stages.y_end);
         let mut suspects = sampled.find_suspects(&self.zero_order);
         if self.is_sliver(stages) {
             (0..G).filter(|&g| self.zero_order[g] > 0).for_each(|g| suspects[g] = false);
         }
         if suspects.iter().any(|&s| s) {
-            sampled.sample_remaining();
+            sampled.sample_at([1, 3, 5]);
         }
         self.work.guard_evaluations += 1 + sampled.count;
-        if sampled.has_nan() {
-            return EventLocation::Outside;
+        if sampled.samples.iter().flatten().any(|s| s.is_nan()) {
+            return EventLocation::Outside; // no search for roots could end on it
         }
         let first = (0..G)
             .filter(|&g| suspects[g])
@@ -282,18 +259,16 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
             .min_by(|a, b| a.1.total_cmp(&b.1));
         let before = std::mem::replace(&mut self.guards, sampled.samples[FINE_SAMPLES - 1]);
         let Some((guard, fraction)) = first else { return EventLocation::Nowhere };
-        let landed = if self.locator == EventLocator::Slack {
-            self.land_by_slack(stages, dense, guard, fraction)
-        } else {
-            None
-        };
+        let by_slack = self.locator == EventLocator::Slack;
+        let landed = by_slack.then(|| self.land_by_slack(stages, dense, guard, fraction)).flatten();
         let (t, y) = landed.unwrap_or_else(|| self.refine_event(stages, guard, fraction));
         let left = self.phase.guards(t, &y)[guard].abs();
         self.work.guard_evaluations += 1;
-        // (a guard that has fallen before its start is taken at its word)
-        if t > stages.t && left > MOST_GUARD_REMAINDER * sampled.largest_sample(guard) {
+        let largest = sampled.samples.iter().fold(0.0, |most: f64, s| most.max(s[guard].abs()));
+        // (a guard that has fallen before the start of the step needs no check)
+        if t > stages.t && left > MOST_GUARD_REMAINDER * largest {
             if stages.h <= SHORTEST_TELLING_STEP * f64::EPSILON * t.abs() {
-                return EventLocation::Nowhere; // a shorter step would tell no more: what is left is rounding
+                return EventLocation::Nowhere; // a shorter step shows no more: the remainder is rounding
             }
             self.guards = before;
             return EventLocation::Outside;
@@ -301,8 +276,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
         EventLocation::At { guard, t, y }
     }
 
-    /// State at the event by the slack variable, from the start of the step or from nearer the zero where the
-    /// guard turns before it falls; `None` for a guard that turns too close to its zero.
+    /// State at the event by the slack variable, from the start of the step, or from nearer the zero if the guard turns
+    /// before it falls; `None` for a guard that turns too close to its zero.
     fn land_by_slack(
         &mut self,
         stages: &Dop853Stages<N>,
@@ -315,15 +290,12 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
         let mut slack = SlackVariable::new(self.phase, guard, stages.h, self.work);
         let (mut after, root) = (0.0, fraction * stages.h);
         for _ in 0..MOST_HALVINGS {
-            if slack.can_descend(
-                &StatePoint { t: stages.t + after, y: dense.state_at_fraction(after / stages.h) },
-                root - after,
-            ) {
+            let at = StatePoint { t: stages.t + after, y: dense.state_at_fraction(after / stages.h) };
+            if slack.can_descend(&at, root - after) {
                 let (mut from, mut flow) = (StatePoint { t: stages.t, y: stages.y }, self.derivative);
                 if after > 0.0 {
                     let lead = Dop853Stages::take_step(f, stages.t, &stages.y, &flow, after);
-                    (from, flow) =
-                        (StatePoint { t: stages.t + after, y: lead.y_end }, *lead.derivative_at_end());
+                    (from, flow) = (StatePoint { t: at.t, y: lead.y_end }, *lead.derivative_at_end());
                     slack.count_evaluations(EVALUATIONS_PER_STEP);
                 }
                 let advance = |t: f64| Dop853Stages::take_step(f, from.t, &from.y, &flow, t - from.t).y_end;
@@ -336,16 +308,14 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
         None
     }
 
-    /// State at the event to the order of the method: the step is taken again up to the root of the dense
-    /// output, then Newton's iteration on the guard closes what is left with short steps.
+    /// State at the event to the order of the method: the step is repeated up to the root of the dense output, then
+    /// Newton's iteration on the guard closes the remainder with short steps.
     fn refine_event(&mut self, stages: &Dop853Stages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
-        /// Corrections at most; one is the rule, because the dense output's root is good to its order.
+        /// Most corrections; one is usual, because the dense output's root is accurate to its order.
         const ROUNDS: usize = 4;
-        /// A correction beyond this share of the step means that the guard only grazes zero: the dense
-        /// output's root stands.
+        /// Share of the step above which a correction is dropped: the guard only grazes zero.
         const GRAZING: f64 = 1e-3;
-        /// Share of the step over which the guard's slope is measured, and with it the relative error of a
-        /// correction.
+        /// Share of the step over which the guard's slope is measured, which is the relative error of a correction.
         const PROBE: f64 = 1e-6;
         if fraction * stages.h <= 4.0 * f64::EPSILON * stages.t.abs() {
             return (stages.t, stages.y);
@@ -389,39 +359,23 @@ struct GuardSamples<'a, const N: usize, const G: usize, P> {
 }
 
 impl<const N: usize, const G: usize, P: HybridPhase<N, G>> GuardSamples<'_, N, G, P> {
-    fn sample_at(&mut self, index: usize) {
-        let fraction = index as f64 / (FINE_SAMPLES - 1) as f64;
-        self.samples[index] =
-            self.phase.guards(self.t + fraction * self.h, &self.dense.state_at_fraction(fraction));
-        self.count += 1;
+    fn sample_at<const K: usize>(&mut self, indices: [usize; K]) {
+        for index in indices {
+            let fraction = index as f64 / (FINE_SAMPLES - 1) as f64;
+            self.samples[index] =
+                self.phase.guards(self.t + fraction * self.h, &self.dense.state_at_fraction(fraction));
+            self.count += 1;
+        }
     }
 
-    /// Which guards may reach zero: those that start there, those that end there and those that the quick
-    /// look cannot clear.
+    /// Guards that may reach zero: those that start or end there and those that the quick test cannot exclude.
     fn find_suspects(&mut self, zero_order: &[u8; G]) -> [bool; G] {
-        for index in [2, 4, 6, 7] {
-            self.sample_at(index);
-        }
+        self.sample_at([2, 4, 6, 7]);
         std::array::from_fn(|g| {
             let at = |i: usize| self.samples[i][g];
             let coarse: [f64; COARSE_SAMPLES] = [at(0), at(2), at(4), at(6), at(8)];
             zero_order[g] > 0 || (at(8) < f64::INFINITY && !roots::is_root_free(&coarse, at(7)))
         })
-    }
-
-    fn sample_remaining(&mut self) {
-        for index in [1, 3, 5] {
-            self.sample_at(index);
-        }
-    }
-
-    fn largest_sample(&self, guard: usize) -> f64 {
-        self.samples.iter().fold(0.0, |most, s| most.max(s[guard].abs()))
-    }
-
-    /// Whether a sample is NaN, which no search for roots could end on.
-    fn has_nan(&self) -> bool {
-        self.samples.iter().flatten().any(|s| s.is_nan())
     }
 
     fn first_root(&self, guard: usize, zero_order: u8) -> Option<f64> {

@@ -1,13 +1,13 @@
-//! Location of a guard's zero by a slack variable: the inequality `G >= 0` is written as the equality `G =
-//! s^2/2`, so that the guard falls to zero where `s` does, and `s` is made the independent variable,
+//! Location of a guard's zero by a slack variable. The inequality `G >= 0` is written as the equality `G = s^2/2`, so
+//! that the guard falls to zero where `s` does, and `s` becomes the independent variable,
 //!
 //! ```text
 //! dt/ds = s/G'      dy/ds = F s/G'      from s = sqrt(2 G) to s = 0
 //! ```
 //!
-//! with `F` the right-hand side and `G'` the guard's rate along the flow (Hénon's device, Physica D 5, 1982,
-//! applied to `sqrt(2 G)`). Both slopes stay finite where the guard falls to a double zero. A state past the
-//! zero has no real `s`; there `G = -s^2/2` leads back.
+//! with `F` the right-hand side and `G'` the guard's rate along the flow (Hénon's method, Physica D 5, 1982, applied
+//! to `sqrt(2 G)`). Both slopes stay finite where the guard falls to a double zero. A state past the zero has no real
+//! `s`; there `G = -s^2/2` leads back.
 
 use super::{HybridPhase, WorkCounters};
 
@@ -18,22 +18,20 @@ pub(super) struct StatePoint<const N: usize> {
     pub y: [f64; N],
 }
 
-/// Steps in `s` of the first descent. A descent only has to tell how far to go: the state is taken there by
-/// the method's own step in time, and what then is left of the guard is closed by further descents.
+/// Steps in `s` of the first descent. A descent only determines the time: the method's own step then gives the state,
+/// and further descents close the remainder of the guard.
 const FIRST_STEPS: u32 = 4;
-/// Further descents at most; two or three are the rule. Close to a double zero a descent leaves up to a sixth
-/// of the way.
+/// Most further descents; two or three are usual. Close to a double zero a descent leaves up to a sixth of the way.
 const MOST_DESCENTS: usize = 40;
 /// A descent shorter than this share of the way to the zero keeps the state to the order of any method.
 const SHORT: f64 = 1e-3;
-/// Share of its way that a short descent leaves at most: when that is below the rounding of time, the zero is
-/// reached.
+/// Most share of its way that a short descent leaves. When that is below the rounding of time, the zero is reached.
 const MOST_REMAINDER: f64 = 1e-4;
-/// Span of the central difference for the guard's rate, as a share of the step: its error, about 1e-10 of the
-/// rate, shifts where one descent ends and is removed by the next.
+/// Span of the central difference for the guard's rate, as a share of the step. Its error, about 1e-10 of the rate,
+/// shifts the end of one descent and is removed by the next.
 const PROBE: f64 = 1e-5;
-/// Least rate of fall at which a descent starts, relative to the mean rate down to the zero: near a maximum
-/// of the guard the slopes in `s` have a pole. A straight fall has 1, the fall to a double zero 2.
+/// Least rate of fall at the start of a descent, relative to the mean rate down to the zero: near a maximum of the
+/// guard the slopes in `s` have a pole. A straight fall has 1, the fall to a double zero 2.
 const LEAST_FALL: f64 = 0.5;
 /// Halvings of the way to the zero after which the guard counts as one that only grazes it.
 pub(super) const MOST_HALVINGS: usize = 30;
@@ -52,7 +50,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         Self { phase, guard, probe_s: PROBE * step_s, work }
     }
 
-    /// Notes right-hand sides that the method's own steps took.
+    /// Counts right-hand sides of the method's own steps.
     pub(super) fn count_evaluations(&mut self, evaluations: u64) {
         self.work.rhs_evaluations += evaluations;
     }
@@ -63,30 +61,27 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
         self.phase.guards(at.t, &at.y)[self.guard]
     }
 
-    /// Rate of the guard along the flow, 1/s times its unit: a central difference along the direction of the
-    /// flow.
+    /// Rate of the guard, 1/s times its unit, by a central difference along the flow.
     fn guard_rate(&mut self, at: &StatePoint<N>, flow: &[f64; N]) -> f64 {
-        let probe = (at.t + self.probe_s) - at.t; // as the time really moves
+        let probe = (at.t + self.probe_s) - at.t; // the rounded change of time
         let mut along = |share: f64| {
-            self.guard_value(&StatePoint {
-                t: at.t + share,
-                y: std::array::from_fn(|i| at.y[i] + share * flow[i]),
-            })
+            let y = std::array::from_fn(|i| at.y[i] + share * flow[i]);
+            self.guard_value(&StatePoint { t: at.t + share, y })
         };
         (along(probe) - along(-probe)) / (2.0 * probe)
     }
 
-    /// Whether a descent may start here, a time `ahead_s` before the zero: the guard falls, and not much
-    /// slower than on the average.
+    /// Whether a descent may start here, a time `ahead_s` before the zero: the guard falls, and not much slower than on
+    /// average.
     pub(super) fn can_descend(&mut self, at: &StatePoint<N>, ahead_s: f64) -> bool {
         let value = self.guard_value(at);
         let flow = self.derivative(at);
         value > 0.0 && -self.guard_rate(at, &flow) * ahead_s >= LEAST_FALL * value
     }
 
-    /// From a point where the guard falls to the point where it is zero; `advance` takes the state from there
-    /// to a given time by the method's own step, at the cost of the right-hand sides given with it. `None`
-    /// when the guard turns before it is zero.
+    /// The point where the guard is zero, from a point where it falls. `advance` takes the state from there to a given
+    /// time by the method's own step, which costs `cost` right-hand sides. `None` when the guard turns before it is
+    /// zero.
     pub(super) fn land_on_zero(
         &mut self,
         from: &StatePoint<N>,
@@ -128,8 +123,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> SlackVariable<'a,
             let mean = |i: fn(&StatePoint<N>, usize) -> f64, j: usize| {
                 (i(&k1, j) + 2.0 * (i(&k2, j) + i(&k3, j)) + i(&k4, j)) / 6.0
             };
-            let slope =
-                StatePoint { t: mean(|k, _| k.t, 0), y: std::array::from_fn(|i| mean(|k, i| k.y[i], i)) };
+            let y = std::array::from_fn(|i| mean(|k, i| k.y[i], i));
+            let slope = StatePoint { t: mean(|k, _| k.t, 0), y };
             at = shift_point(&at, h, &slope);
         }
         Some(at)

@@ -1,10 +1,9 @@
-//! Integration by Taylor series: the coefficients of the solution follow from one another by recurrence,
-//! order by order.
+//! Integration by Taylor series, whose coefficients follow from one another by recurrence, order by order.
 //!
 //! A step needs no trial: its length follows from the last coefficients (Jorba and Zou 2005, *Experimental
-//! Mathematics* 14, section 3.2), nothing is rejected and no step size is carried over a transition. The
-//! polynomials of the guards are as exact as those of the states, so an event is found on them with certainty
-//! and its state needs no further step.
+//! Mathematics* 14, section 3.2). Nothing is rejected, and no step size is carried over a transition. The polynomials
+//! of the guards are as accurate as those of the states, so an event on them is found with certainty, and its state
+//! needs no further step.
 
 use super::polynomial::{GuardFall, MOST_ORDER, TERMS, TaylorSeries, first_fall};
 use super::{
@@ -14,7 +13,7 @@ use crate::math;
 
 /// A phase whose Taylor coefficients follow by recurrence.
 pub trait TaylorPhase<const N: usize, const G: usize>: HybridPhase<N, G> {
-    /// What the recurrences keep; one is used for all steps of a phase.
+    /// Data that the recurrences keep; one tape serves all steps of a phase.
     type Tape: Default;
 
     /// Writes the coefficients of states and guards about `(t, y)` up to `out.order`; equal to the
@@ -31,11 +30,10 @@ pub struct TaylorExpansion<const N: usize, const G: usize> {
     pub order: usize,
     /// Coefficients of the states, one row a power.
     pub states: [[f64; N]; TERMS],
-    /// Coefficients of the guards, one row a power; a first coefficient of infinity for one that does not
-    /// apply.
+    /// Coefficients of the guards, one row a power; a first coefficient of infinity for a guard that does not apply.
     pub guards: [[f64; G]; TERMS],
-    /// The last coefficient but one and the last of what follows from the states and must converge too, as a
-    /// multiple of its scale.
+    /// Last coefficient but one and last of quantities that follow from the states and must converge too, as a
+    /// multiple of their scale.
     pub followers: [f64; 2],
     /// `x` of a term in `exp(-x)`, `x >= 0`, that the equations contain and that may vary much over a step.
     pub exponent: Option<TaylorSeries>,
@@ -43,14 +41,8 @@ pub struct TaylorExpansion<const N: usize, const G: usize> {
 
 impl<const N: usize, const G: usize> Default for TaylorExpansion<N, G> {
     fn default() -> Self {
-        Self {
-            t: 0.0,
-            order: 0,
-            states: [[0.0; N]; TERMS],
-            guards: [[0.0; G]; TERMS],
-            followers: [0.0; 2],
-            exponent: None,
-        }
+        let (states, guards) = ([[0.0; N]; TERMS], [[0.0; G]; TERMS]);
+        Self { t: 0.0, order: 0, states, guards, followers: [0.0; 2], exponent: None }
     }
 }
 
@@ -67,8 +59,8 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
         sum
     }
 
-    /// Length of step at which the last two coefficients of every state reach the tolerance: the error, of
-    /// the next order, is below it.
+    /// Length of step at which the last two coefficients of every state reach the tolerance. The error, of the next
+    /// order, is smaller.
     #[inline]
     fn step_length(&self, scale: &[f64; N], relative: f64) -> f64 {
         let largest = |k: usize, follower: f64| {
@@ -76,20 +68,20 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
             (0..N).map(ratio).fold(follower, |a: f64, b| if b > a || b.is_nan() { b } else { a })
         };
         let length = |k: usize, follower: f64| math::powf(relative / largest(k, follower), 1.0 / k as f64);
-        let (before, last) =
-            (length(self.order - 1, self.followers[0]), length(self.order, self.followers[1]));
+        let before = length(self.order - 1, self.followers[0]);
+        let last = length(self.order, self.followers[1]);
         if last < before { last } else { before }
     }
 
-    /// A length up to `h` over which the terms of the exponential fall. One that is too small to be seen in
-    /// the last coefficients, but grows by many powers of ten within the step, would otherwise be missed: the
-    /// coefficients of `exp(x)` rise up to the order `x`.
+    /// A length up to `h` over which the terms of the exponential fall. An exponential too small to show in the last
+    /// coefficients, but growing by many powers of ten within the step, would otherwise be missed: the coefficients of
+    /// `exp(x)` rise up to the order `x`.
     #[inline]
     fn limit_by_exponential(&self, h: f64) -> f64 {
-        /// Share of the order that the exponent may vary by: each term is then at most this share of the one
-        /// before where the series ends.
+        /// Most change of the exponent, as a share of the order: at the end of the series each term is then at most
+        /// this share of the one before.
         const SHARE: f64 = 0.25;
-        /// Exponent from which on the exponential is below rounding and may do as it likes.
+        /// Exponent from which the exponential is below rounding.
         const NEGLIGIBLE: f64 = 40.0;
         let Some(exponent) = &self.exponent else { return h };
         let varies = h * exponent[1..=self.order].iter().rev().fold(0.0, |sum, c| sum * h + c.abs());
@@ -98,8 +90,8 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
         if varies > most { h * most / varies } else { h }
     }
 
-    /// The first guard that falls within `h`, with its distance from the start; of two that fall at once the
-    /// first in the list.
+    /// The first guard that falls within `h`, with its distance from the start; of two that fall at once the first in
+    /// the list.
     #[inline]
     fn find_event(&self, zero_order: &[u8; G], h: f64) -> Result<Option<(usize, f64)>, UndefinedGuard> {
         let mut rest = [0.0; G];
@@ -127,15 +119,15 @@ impl<const N: usize, const G: usize> TaylorExpansion<N, G> {
     }
 }
 
-/// The room in which steps are expanded, made once for all phases of a kind.
+/// Memory for the expansion of steps, reused for all phases of a kind.
 #[derive(Debug, Clone, Default)]
 pub struct TaylorWorkspace<T, const N: usize, const G: usize> {
-    /// What the recurrences keep of the last step.
+    /// Data of the recurrences in the last step.
     pub tape: T,
     expansion: TaylorExpansion<N, G>,
 }
 
-/// A guard is no number somewhere in the step.
+/// A guard is NaN somewhere in the step.
 struct UndefinedGuard;
 
 impl<const N: usize, const G: usize> DenseOutput<N> for TaylorExpansion<N, G> {
@@ -144,27 +136,27 @@ impl<const N: usize, const G: usize> DenseOutput<N> for TaylorExpansion<N, G> {
     }
 }
 
-/// Order of the series at a tolerance: that of least work for a series that falls geometrically, `1 -
-/// ln(relative)/2` (Jorba and Zou 2005, section 3.1), and a little more, because the coefficients of
-/// oscillations fall faster. The optimum is flat: on the light test blade 2 to 6 more cost the same time.
+/// Order of the series at a tolerance: the order of least work for a series that falls geometrically, `1 -
+/// ln(relative)/2` (Jorba and Zou 2005, section 3.1), and a little more, because the coefficients of oscillations fall
+/// faster. The optimum is flat: on the light test blade 2 to 6 more cost the same time.
 pub(crate) fn order_for_tolerance(relative: f64) -> usize {
     const MORE: f64 = 3.0;
-    /// Below it the step length, taken from two coefficients, would rest on too few.
+    /// A lower order would derive the step length from too few coefficients.
     const LEAST_ORDER: usize = 6;
     ((1.0 + MORE - 0.5 * math::ln(relative)).ceil() as usize).clamp(LEAST_ORDER, MOST_ORDER)
 }
 
-/// Share of the tolerance that a step may spend. Thousands of steps add their errors, and slip under friction
-/// that falls with speed draws them out: over the strokes of the light test blade the worst transition is off
-/// by 10 to 50 times what a step may err. With this share it is off by about the tolerance.
+/// Share of the tolerance that a step may use. The errors of thousands of steps add up, and slip under friction that
+/// falls with speed amplifies them: over the strokes of the light test blade the worst transition is off by 10 to 50
+/// times the error of a step. With this share it is off by about the tolerance.
 const STEP_SHARE: f64 = 0.02;
 
-/// A step this close to the stop time, relative to its length, ends there: no sliver is left over.
+/// A step this close to the stop time, relative to its length, ends there, so that no tiny step remains.
 const STRETCH: f64 = 1.01;
 
-/// Integrates `phase` from `start` until `stop` or a guard, telling `observe` of every step and of what its
-/// recurrences keep; the contract is that of [`integrate_taylor`](super::integrate). A coefficient of all states
-/// counts as one right-hand side.
+/// Integrates `phase` from `start` until `stop` or a guard; `observe` sees every step and the tape of its recurrences.
+/// The contract is that of [`integrate`](super::integrate). The coefficients of all states at one order count as one
+/// right-hand side.
 pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A: ObserverReply>(
     phase: &P,
     start: PhaseStart<N, G>,
@@ -192,12 +184,12 @@ pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A:
         phase.expand_series(t, &y, tape, expansion);
         work.rhs_evaluations += expansion.order as u64;
         let (remaining, wanted) = (stop - t, expansion.step_length(&scale, relative));
-        let h =
-            expansion.limit_by_exponential(if wanted * STRETCH >= remaining { remaining } else { wanted });
-        // (a step that is no number is not resolved either)
+        let limit = if wanted * STRETCH >= remaining { remaining } else { wanted };
+        let h = expansion.limit_by_exponential(limit);
+        // (a NaN step is not resolved either)
         let resolved = wanted > 4.0 * f64::EPSILON * t.abs();
-        let event =
-            if resolved && t + h > t { expansion.find_event(&zero_order, h) } else { Err(UndefinedGuard) };
+        let advances = resolved && t + h > t;
+        let event = if advances { expansion.find_event(&zero_order, h) } else { Err(UndefinedGuard) };
         let Ok(event) = event else { return end(t, y, PhaseEndCause::StepTooSmall) };
         let event = event.map(|(guard, x)| (guard, correct_root(phase, expansion, guard, x, h, work)));
         work.steps += 1;
@@ -205,18 +197,17 @@ pub fn integrate_taylor<const N: usize, const G: usize, P: TaylorPhase<N, G>, A:
         let t_end = event.map_or(if h == remaining { stop } else { t + h }, |(_, x)| t + x);
         let y_end = expansion.states_after(event.map_or(h, |(_, x)| x));
         let step = AcceptedStep { start: t, end: t_end, y_end: &y_end, solution: expansion };
-        if observe(&step, tape).control_flow().is_break() {
-            return PhaseEnd { t: t_end, y: y_end, cause: PhaseEndCause::Interrupted, first_step: last };
-        }
-        if let Some((guard, _)) = event {
-            return PhaseEnd { t: t_end, y: y_end, cause: PhaseEndCause::Guard(guard), first_step: last };
+        let asked = observe(&step, tape).control_flow().is_break();
+        let interrupted = asked.then_some(PhaseEndCause::Interrupted);
+        if let Some(cause) = interrupted.or(event.map(|(guard, _)| PhaseEndCause::Guard(guard))) {
+            return PhaseEnd { t: t_end, y: y_end, cause, first_step: last };
         }
         (t, y, zero_order) = (t_end, y_end, [0; G]);
     }
 }
 
-/// The root of a guard's series moved to that of the guard itself on the states' polynomials: forces follow
-/// from second derivatives, so their series end one order before those of the states.
+/// Moves the root of a guard's series to that of the guard itself on the states' polynomials. Forces follow from
+/// second derivatives, so their series end one order before those of the states.
 fn correct_root<const N: usize, const G: usize, P: TaylorPhase<N, G>>(
     phase: &P,
     expansion: &TaylorExpansion<N, G>,
@@ -225,17 +216,13 @@ fn correct_root<const N: usize, const G: usize, P: TaylorPhase<N, G>>(
     h: f64,
     work: &mut WorkCounters,
 ) -> f64 {
-    /// A correction beyond this share of the step means that the guard only grazes zero: the root of the
-    /// series stands.
+    /// Share of the step above which a correction is dropped: the guard only grazes zero.
     const GRAZING: f64 = 1e-2;
     if x <= 0.0 {
         return x;
     }
-    let slope = expansion.guards[1..=expansion.order]
-        .iter()
-        .enumerate()
-        .rev()
-        .fold(0.0, |sum, (k, row)| sum * x + (k + 1) as f64 * row[guard]);
+    let terms = expansion.guards[1..=expansion.order].iter().enumerate().rev();
+    let slope = terms.fold(0.0, |sum, (k, row)| sum * x + (k + 1) as f64 * row[guard]);
     let value = phase.guards(expansion.t + x, &expansion.states_after(x))[guard];
     work.guard_evaluations += 1;
     let moved = x - value / slope;

@@ -14,7 +14,6 @@ const DIP_FRACTION: usize = 20;
 
 /// First frames to try after a step, earliest first. None where the record changes sides repeatedly, as an
 /// oscillation does, or takes more than a third of its length for the step, as a trend does.
-/// changes sides to and fro, as an oscillation does, or not within a third of its length, as a trend does.
 pub(super) fn starts_after_step(samples: &[Option<f64>]) -> Vec<usize> {
     let Some((leaves, arrives)) = find_single_step(samples) else { return Vec::new() };
     let width = (arrives - leaves).max(1);

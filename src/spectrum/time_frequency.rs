@@ -1,19 +1,18 @@
-//! A component whose frequency drifts: short-time spectra, and the course of the strongest component in a
-//! band.
+//! Short-time spectra, and the course of the strongest component in a band, for a component whose frequency
+//! drifts.
 //!
-//! A stick-slip cycle follows the speed of the tip, so that a spectrum of the whole record smears it over all
-//! the frequencies it passes. [`Spectrogram`] cuts the record into overlapping Hann-weighted segments.
-//! [`Spectrogram::ridge`] follows the strongest component from column to column (`time_frequency/path.rs`)
-//! and then fits to each segment a sinusoid whose frequency and amplitude change linearly
-//! (`time_frequency/chirp.rs`): unlike the place of a maximum between bins, that frequency holds at the
-//! centre of the segment, and with the fitted rate it can be carried to the ends of the record, half a
-//! segment farther out.
+//! A stick-slip cycle follows the speed of the tip, so a spectrum of the whole record smears it over all
+//! frequencies that it passes. [`Spectrogram`] cuts the record into overlapping Hann-weighted segments.
+//! [`Spectrogram::find_ridge`] follows the strongest component from column to column
+//! (`time_frequency/ridge_tracking.rs`) and then fits to each segment a sinusoid whose frequency and amplitude
+//! change linearly (`time_frequency/chirp.rs`). Unlike a maximum between bins, that frequency holds at the centre
+//! of the segment, and the fitted rate extrapolates it to the ends of the record, half a segment farther out.
 //!
-//! What is held in `tests/verify/ridge.rs`: a chirp of 359 to 692 Hz in 0.1 to 0.6 s at 20 dB comes back as
-//! that range within 2 %, also with harmonics, a remainder of a ring-down, or a fifth of the frames missing.
-//! What it cannot do: a frequency that swings within a segment (a cycle that follows a faster ring-down of
-//! the tip) comes back as its mean, and says so by larger deviations; a frequency that turns round at the
-//! very end of a record of a tenth of a second is carried 2 to 3 % too far.
+//! `tests/verify/ridge.rs` checks the accuracy: a chirp of 359 to 692 Hz in 0.1 to 0.6 s at 20 dB is read with
+//! that range within 2 %, also with harmonics, a residue of a ring-down, or a fifth of the frames missing.
+//! Limits: a frequency that swings within a segment (a cycle that follows a faster ring-down of the tip) reads as
+//! its mean, with larger deviations; a frequency that turns round at the very end of a record of a tenth of a
+//! second is extrapolated 2 to 3 % too far.
 
 mod chirp;
 pub mod course;
@@ -29,19 +28,16 @@ pub use course::SpeedPoint;
 pub use ridge::{FrequencyRange, Ridge, RidgeEnd, RidgePoint};
 use std::ops::RangeInclusive;
 
-// How long the segments are.
-
-/// Most frames of a segment that is chosen: bounds the bins of a column.
+/// Most frames of a chosen segment: bounds the bins of a column.
 const LONGEST_SEGMENT_FRAMES: usize = 2048;
-/// Segments that a record holds side by side at least, so that there is a course, also of a component that
-/// lasts half of it.
+/// Fewest segments side by side in a record, so that a component that lasts half of it has a course too.
 const FEWEST_SEGMENTS: usize = 3;
 /// Ratio of the lengths tried.
 const LENGTH_RATIO: f64 = std::f64::consts::SQRT_2;
-/// Share of the best concentration, 1.5 dB, that a shorter segment may lose: it follows the drift more
+/// Share of the best concentration, 1.5 dB, from which a shorter segment is preferred: it follows the drift more
 /// closely.
 const NEARLY_BEST_CONCENTRATION: f64 = 0.7;
-/// Columns that tell how well a length does; more would only cost time.
+/// Columns that judge a length; more would only cost time.
 const TRIED_COLUMNS: usize = 48;
 
 /// Segments of the length that shows the strongest component of the band best.
@@ -57,45 +53,35 @@ pub(super) fn choose_segment_layout(
     // at most seven doublings
     let steps = (math::ln(most as f64 / least) / math::ln(LENGTH_RATIO)).floor().max(0.0) as i32;
     let lengths: Vec<usize> = (0..=steps).map(|k| (least * math::powi(LENGTH_RATIO, k)) as usize).collect();
-    let concentrations: Vec<f64> = lengths
-        .iter()
-        .map(|frames| {
-            peak_concentration(
-                samples,
-                &SegmentLayout::with_overlap(record, *frames, 2, TRIED_COLUMNS),
-                frame_rate_hz,
-                band_hz,
-            )
-        })
-        .collect();
+    let concentration = |frames: &usize| {
+        let layout = SegmentLayout::with_overlap(record, *frames, 2, TRIED_COLUMNS);
+        peak_concentration(samples, &layout, frame_rate_hz, band_hz)
+    };
+    let concentrations: Vec<f64> = lengths.iter().map(concentration).collect();
     let best = concentrations.iter().fold(0.0, |m: f64, c| m.max(*c));
     let shortest = concentrations.iter().position(|c| *c >= NEARLY_BEST_CONCENTRATION * best).unwrap_or(0);
     SegmentLayout::with_overlap(record, lengths[shortest], OVERLAP, MOST_COLUMNS)
 }
 
-/// Geometric mean of the squares of the columns' maxima, over that of noise in a bin, which falls as one over
-/// the length: where the component is large counts no more than where it is small.
+/// Geometric mean of the squares of the columns' maxima, over that of noise in a bin, which falls as one over the
+/// length. The mean weighs columns with a large and a small component alike.
 fn peak_concentration(
     samples: &[Option<f64>],
     layout: &SegmentLayout,
     frame_rate_hz: f64,
     band_hz: (f64, f64),
 ) -> f64 {
-    let bins = SegmentBins::coarse(layout);
+    let bins = SegmentBins::new(layout, COARSE_PADDING);
     let columns = bins.column_amplitudes(samples, layout, bins.bins_in_band(band_hz, frame_rate_hz));
-    let maxima = columns
-        .iter()
-        .flatten()
-        .map(|column| math::ln(column.iter().fold(f64::MIN_POSITIVE, |m: f64, a| m.max(*a))));
-    let (sum, count) = maxima.fold((0.0, 0), |(sum, count), logarithm| (sum + 2.0 * logarithm, count + 1));
+    let maximum = |column: &Vec<f64>| column.iter().fold(f64::MIN_POSITIVE, |m: f64, a| m.max(*a));
+    let logarithms = columns.iter().flatten().map(|column| math::ln(maximum(column)));
+    let (sum, count) = logarithms.fold((0.0, 0), |(sum, count), log| (sum + 2.0 * log, count + 1));
     layout.frames as f64 * math::exp(sum / f64::from(count.max(1)))
 }
 
-// Transforms of the segments.
-
-/// Bins for each resolution at least; the power of two above a segment makes up to twice as many.
-const FINE_PADDING: usize = 4;
-/// The same where only a maximum is sought: a Hann lobe seen at half its resolution is at most 0.4 dB low.
+/// Fewest bins for each resolution of a spectrogram; rounding up to a power of two makes up to twice as many.
+pub(super) const FINE_PADDING: usize = 4;
+/// The same where only a maximum is sought: a Hann lobe sampled at half its resolution is at most 0.4 dB low.
 const COARSE_PADDING: usize = 2;
 /// Share of the window's weight that must be present.
 const LEAST_PRESENT: f64 = 0.5;
@@ -107,14 +93,8 @@ pub(super) struct SegmentBins {
 }
 
 impl SegmentBins {
-    /// Those of a spectrogram.
-    pub(super) fn fine(layout: &SegmentLayout) -> Self {
-        Self { padded: (FINE_PADDING * layout.frames).next_power_of_two() }
-    }
-
-    /// Those that are enough for a maximum.
-    pub(super) fn coarse(layout: &SegmentLayout) -> Self {
-        Self { padded: (COARSE_PADDING * layout.frames).next_power_of_two() }
+    pub(super) fn new(layout: &SegmentLayout, padding: usize) -> Self {
+        Self { padded: (padding * layout.frames).next_power_of_two() }
     }
 
     /// From zero to half the frame rate.
@@ -122,7 +102,7 @@ impl SegmentBins {
         0..=self.padded / 2
     }
 
-    /// Those in a band, at least one.
+    /// Bins in a band, at least one.
     pub(super) fn bins_in_band(&self, (low, high): (f64, f64), frame_rate_hz: f64) -> RangeInclusive<usize> {
         let bin = |hz: f64| hz / frame_rate_hz * self.padded as f64;
         let first = (bin(low).ceil() as usize).min(self.padded / 2);
@@ -141,51 +121,42 @@ impl SegmentBins {
         let whole: f64 = window.iter().sum();
         let column = |c: usize| {
             let segment = samples.get(layout.first_frame(c)..layout.first_frame(c) + layout.frames)?;
-            let present: f64 =
-                segment.iter().zip(&window).map(|(x, w)| if x.is_some() { *w } else { 0.0 }).sum();
+            let weighted = || segment.iter().zip(&window);
+            let present: f64 = weighted().map(|(x, w)| if x.is_some() { *w } else { 0.0 }).sum();
+            if present < LEAST_PRESENT * whole {
+                return None;
+            }
             let scale = 2.0 / present;
-            let weighted = || segment.iter().zip(&window).map(|(x, w)| x.map_or(0.0, |x| x * w * scale));
-            let amplitudes = || {
-                transform
-                    .squared_magnitudes(weighted())
-                    .get(bins.clone())
-                    .unwrap_or_default()
-                    .iter()
-                    .map(|square| square.sqrt())
-                    .collect()
-            };
-            (present >= LEAST_PRESENT * whole).then(amplitudes)
+            let values = weighted().map(|(x, w)| x.map_or(0.0, |x| x * w * scale));
+            let squares = transform.squared_magnitudes(values);
+            Some(squares.get(bins.clone()).unwrap_or_default().iter().map(|square| square.sqrt()).collect())
         };
         (0..layout.columns).map(column).collect()
     }
 }
 
-// Where the segments lie.
-
-/// Most columns of a spectrogram: a figure shows no more, and memory must not follow the length of the
-/// record.
+/// Most columns of a spectrogram: a figure shows no more, and memory must not grow with the record.
 pub const MOST_COLUMNS: usize = 400;
-/// Fewest cycles of the band's lower end in a segment: the lobe of a Hann window is two resolutions wide to
-/// either side, so that with four cycles the component is clear of zero and of its own mirror image.
+/// Fewest cycles of the band's lower end in a segment. The lobe of a Hann window is two resolutions wide on either
+/// side, so with four cycles the component is clear of zero and of its own mirror image.
 pub(crate) const SEGMENT_CYCLES: f64 = 4.0;
 /// Fewest frames of a segment: three for each of the five unknowns of the fit, and one.
 pub(super) const FEWEST_FRAMES: usize = 16;
-/// Columns for each segment length: a Hann window and its neighbour a quarter on share most of their frames,
-/// and nothing falls between.
+/// Columns for each segment length: Hann windows a quarter of their length apart share most of their weight.
 pub(super) const OVERLAP: usize = 4;
 
 /// Segments of a record, in frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct SegmentLayout {
     pub frames: usize,
-    /// From one segment to the next.
+    /// Frames from one segment to the next.
     pub hop: usize,
     pub columns: usize,
     pub record: usize,
 }
 
 impl SegmentLayout {
-    /// Segments a share of their length apart, farther where there would be too many columns.
+    /// Segments a share of their length apart, farther apart where there would be too many columns.
     pub(super) fn with_overlap(record: usize, frames: usize, overlap: usize, most: usize) -> Self {
         let room = record.saturating_sub(frames);
         let hop = (frames / overlap).max(room.div_ceil(most - 1)).max(1);
@@ -217,24 +188,21 @@ impl SegmentLayout {
     }
 }
 
-// Short-time spectra of a record.
-
-/// Upper end of a band that nobody gave, as a share of half the frame rate: above, a component is as likely
-/// to be folded down onto it.
+/// Upper end of the default band, as a share of half the frame rate: a higher component is as likely an alias.
 const DEFAULT_BAND_TOP: f64 = 0.9;
-/// Lower end of such a band over the largest slow component: a ring-down has died away in a Hann spectrum of
-/// four of its cycles there.
+/// Lower end of the default band over the largest slow component: there a ring-down has decayed in a Hann spectrum
+/// of four of its cycles.
 const SLOW_COMPONENT_MARGIN: f64 = 4.0;
-/// Segments of `SEGMENT_CYCLES` that a record should hold at the lower end of such a band.
+/// Segments of `SEGMENT_CYCLES` that a record should hold at the lower end of the default band.
 const SEGMENTS_AT_LOWEST: f64 = 4.0;
 
 /// How a record is cut into short spectra.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SpectrogramSettings {
-    /// Length of a segment, s; `None` chooses it from the data: of lengths a factor of the square root of two
-    /// apart, from `SEGMENT_CYCLES` of the band's lower end to a third of the record (and 2048 frames), the
-    /// shortest whose maxima stand out of noise within
-    /// 1.5 dB of the best. Longer, a drifting component smears; shorter, noise drowns it.
+    /// Length of a segment, s; `None` chooses it from the data. Lengths a factor of the square root of two apart are
+    /// tried, from `SEGMENT_CYCLES` of the band's lower end to a third of the record (and 2048 frames). The shortest
+    /// is taken whose maxima stand out of noise within 1.5 dB of the best: in longer ones a drifting component
+    /// smears, in shorter ones noise hides it.
     pub segment_s: Option<f64>,
     /// Band for which the length is chosen, Hz; `None` takes [`default_band_hz`] with no slow component.
     pub band_hz: Option<(f64, f64)>,
@@ -261,8 +229,8 @@ pub struct Spectrogram {
 }
 
 impl Spectrogram {
-    /// Short-time spectra of a record of displacement, m, one sample a frame (`None` where there is none),
-    /// from which the flip and the ring-down have been taken as far as possible.
+    /// Short-time spectra of a record of displacement, m, one sample a frame (`None` where a frame has no value).
+    /// Flip and ring-down should be removed as far as possible.
     ///
     /// # Errors
     /// [`SpectrumError`] when the record, the rate, the band or the segment cannot give one.
@@ -271,17 +239,14 @@ impl Spectrogram {
         frame_rate_hz: f64,
         settings: &SpectrogramSettings,
     ) -> Result<Self, SpectrumError> {
-        check_record(
-            samples,
-            frame_rate_hz,
-            &SpectrumSettings { zero_padding: 1, band_hz: settings.band_hz, ..Default::default() },
-        )?;
+        let checked = SpectrumSettings { zero_padding: 1, band_hz: settings.band_hz, ..Default::default() };
+        check_record(samples, frame_rate_hz, &checked)?;
         let band_hz = settings.band_hz.unwrap_or_else(|| default_band_hz(samples.len(), frame_rate_hz, None));
         let layout = match settings.segment_s {
             Some(segment_s) => SegmentLayout::from_duration(samples.len(), segment_s, frame_rate_hz)?,
             None => choose_segment_layout(samples, frame_rate_hz, band_hz),
         };
-        let bins = SegmentBins::fine(&layout);
+        let bins = SegmentBins::new(&layout, FINE_PADDING);
         let amplitude_m = bins.column_amplitudes(samples, &layout, bins.all_bins());
         Ok(Self {
             time_s: (0..layout.columns).map(|c| layout.centre_frame(c) / frame_rate_hz).collect(),
@@ -296,9 +261,9 @@ impl Spectrogram {
     }
 }
 
-/// A band for the drifting component when nobody gives one, Hz: from four times the largest slow component,
-/// if there is one, and at least the frequency of which the record holds four segments of `SEGMENT_CYCLES`
-/// cycles, up to nine tenths of half the frame rate.
+/// Default band of the drifting component, Hz: from four times the largest slow component, if there is one, and at
+/// least the frequency of which the record holds four segments of `SEGMENT_CYCLES` cycles, up to nine tenths of
+/// half the frame rate.
 #[must_use]
 pub fn default_band_hz(frames: usize, frame_rate_hz: f64, slow_hz: Option<f64>) -> (f64, f64) {
     let top = DEFAULT_BAND_TOP * frame_rate_hz / 2.0;

@@ -1,8 +1,8 @@
-//! The Fourier transform of real samples; the only files that name the transform library.
+//! The Fourier transform of real samples, and the only file that uses the transform library.
 
 use crate::math;
 use realfft::num_traits::{FromPrimitive, Num, One, Signed, Zero};
-use realfft::{RealFftPlanner, RealToComplex};
+use realfft::{RealFftPlanner, RealToComplex, num_complex};
 use std::cell::Cell;
 use std::f64::consts::TAU;
 use std::num::ParseFloatError;
@@ -12,7 +12,7 @@ use std::sync::{Arc, LazyLock, Mutex, PoisonError};
 /// A value of a transform.
 pub(super) type Complex = nalgebra::Complex<f64>;
 
-/// Plans of the lengths that any thread has met: making one takes longer than using it.
+/// Plans of the lengths used so far, by any thread: a plan takes longer to make than to use.
 static PLANNER: LazyLock<Mutex<RealFftPlanner<PortableReal>>> =
     LazyLock::new(|| Mutex::new(RealFftPlanner::new()));
 
@@ -22,10 +22,10 @@ pub(super) struct RealTransform {
 }
 
 impl RealTransform {
-    /// For records padded with zeros to `padded` values, a power of two from 2 on.
+    /// A transform of records padded with zeros to `padded` values, a power of two from 2 on.
     pub(super) fn new(padded: usize) -> Self {
         debug_assert!(padded.is_power_of_two() && padded >= 2);
-        // (a thread that ended while it planned leaves whole plans behind)
+        // (a thread that panicked while it planned leaves whole plans behind)
         let mut planner = PLANNER.lock().unwrap_or_else(PoisonError::into_inner);
         Self { plan: with_exact_twiddles(padded, || planner.plan_fft_forward(padded)) }
     }
@@ -45,34 +45,29 @@ impl RealTransform {
         self.execute_plan(values).iter().map(|z| z.norm_sqr().0).collect()
     }
 
-    fn execute_plan(
-        &self,
-        values: impl Iterator<Item = f64>,
-    ) -> Vec<realfft::num_complex::Complex<PortableReal>> {
-        let mut input = self.plan.make_input_vec();
-        let mut output = self.plan.make_output_vec();
+    fn execute_plan(&self, values: impl Iterator<Item = f64>) -> Vec<num_complex::Complex<PortableReal>> {
+        let (mut input, mut output) = (self.plan.make_input_vec(), self.plan.make_output_vec());
         for (slot, value) in input.iter_mut().zip(values) {
             *slot = PortableReal(value);
         }
-        // both buffers come from the plan, so their lengths are right and it cannot refuse them
+        // both buffers come from the plan, so their lengths match and it cannot fail
         let _ = self.plan.process(&mut input, &mut output);
         output
     }
 }
 
-// The numbers that the transform library calculates with: those of `f64`, but for its sines and cosines.
+// Numbers of the transform library that equal `f64` except for sines and cosines.
 //
-// The library takes the turns of a plan from the system's sine and cosine, whose last bits depend on the
-// processor from lengths of 4,096 on, and has other orders of additions for the numbers that it knows. A
-// type of our own has neither: it is given every turn as a number, finds which part of a turn that is, and
-// takes its cosine from [`math`].
+// The library takes the twiddle factors of a plan from the system's sine and cosine, whose last bits depend on the
+// processor from lengths of 4,096 on, and orders additions differently for the types it knows. A type of our own
+// avoids both: from each number that it is given it finds the part of a turn, and takes the cosine from [`math`].
 
 thread_local! {
-    /// Parts of a turn in the plan that is being made; zero where none is.
+    /// Parts of a turn in the plan that is being made; zero outside of planning.
     static TWIDDLE_DIVISIONS: Cell<usize> = const { Cell::new(0) };
 }
 
-/// How far the system's cosine may be from ours: many last digits, and much less than two cosines of a plan
+/// Most difference of the system's cosine from ours: many last digits, and much less than two cosines of a plan
 /// differ.
 const COSINE_TOLERANCE: f64 = 1e-14;
 
@@ -80,7 +75,7 @@ const COSINE_TOLERANCE: f64 = 1e-14;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct PortableReal(pub f64);
 
-/// Makes a plan whose turns have so many parts, a power of two.
+/// Makes a plan with twiddle factors of `parts` parts of a turn, a power of two.
 pub(super) fn with_exact_twiddles<T>(parts: usize, plan: impl FnOnce() -> T) -> T {
     TWIDDLE_DIVISIONS.set(parts);
     let made = plan();
@@ -88,16 +83,16 @@ pub(super) fn with_exact_twiddles<T>(parts: usize, plan: impl FnOnce() -> T) -> 
     made
 }
 
-/// The cosine of a part of a turn that is given to all but its last digits; any other number as it is.
+/// The exact cosine of the part of a turn that a number approximates; any other number unchanged.
 fn exact_cosine(number: f64) -> f64 {
     let parts = TWIDDLE_DIVISIONS.get() as f64;
     let (size, quarter) = (number.abs(), parts / 4.0);
-    // a transform itself asks for a half in each of its steps
+    // the transform itself uses one half in each step
     if size > 1.0 || parts == 0.0 {
         return number;
     }
     let part = (math::acos(size) / TAU * parts).round();
-    // the smaller of the angle and of what it lacks of a quarter
+    // from the smaller of the angle and its complement to a quarter turn
     let cosine = match part {
         part if part >= quarter => 0.0,
         part if 2.0 * part <= quarter => math::cos(TAU * (part / parts)),
@@ -163,7 +158,7 @@ impl One for PortableReal {
 impl Num for PortableReal {
     type FromStrRadixErr = ParseFloatError;
 
-    /// (decimal digits only; the library reads no numbers)
+    /// Decimal digits only; the library parses no numbers.
     fn from_str_radix(text: &str, _: u32) -> Result<Self, ParseFloatError> {
         text.parse().map(Self)
     }

@@ -1,24 +1,23 @@
-//! SHA-256 of bytes, and of a text, the same however its lines end.
+//! SHA-256 of bytes and of texts, independent of line endings.
 
 use sha2::{Digest, Sha256};
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// SHA-256 of a text that comes piece by piece. A byte-order mark at its start does not count and CRLF counts
-/// as LF, so that a file has the same hash where a checkout changed its line ends; of a text with neither it
-/// is the plain SHA-256 of its bytes.
+/// SHA-256 of a text in pieces. A byte-order mark at its start is ignored and CRLF counts as LF, so a checkout that
+/// changes line endings does not change the hash. For a text with neither it is the plain SHA-256 of its bytes.
 #[derive(Debug, Clone, Default)]
 pub struct TextHash {
     digest: Sha256,
     /// The first bytes, until they show whether they are a byte-order mark.
     start: Vec<u8>,
     started: bool,
-    /// A CR was last, and what follows it is not known yet.
+    /// The last byte was a CR whose successor is not known yet.
     ends_in_cr: bool,
 }
 
 impl TextHash {
-    /// Takes the next bytes.
+    /// Adds bytes.
     pub(crate) fn update(&mut self, mut bytes: &[u8]) {
         if !self.started {
             let missing = BYTE_ORDER_MARK.len() - self.start.len();
@@ -58,7 +57,7 @@ impl TextHash {
             self.digest.update(b"\r");
         }
         let mut rest = bytes;
-        // (`contains` looks at many bytes at once)
+        // (`contains` compares many bytes at once)
         while rest.contains(&b'\r')
             && let Some(at) = rest.iter().position(|byte| *byte == b'\r')
         {
@@ -80,7 +79,7 @@ pub fn sha256(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
-/// [`TextHash`] of a whole text.
+/// [`TextHash`] of a complete text.
 #[must_use]
 pub fn text_sha256(text: impl AsRef<[u8]>) -> String {
     let mut hash = TextHash::default();

@@ -1,5 +1,4 @@
-//! Numbers with a given number of digits, a true minus sign, and a power of ten where plain digits would be
-//! long.
+//! Numbers with a given number of digits, a true minus sign, and a power of ten instead of many zeros.
 
 use super::DASH;
 use crate::math;
@@ -9,25 +8,25 @@ const PLAIN_POWERS: std::ops::RangeInclusive<i32> = -3..=4;
 const MINUS: &str = "\u{2212}";
 const TIMES_TEN: &str = "\u{b7}10";
 
-/// Four significant digits.
+/// A number with four significant digits.
 #[must_use]
 pub fn format_number(value: f64) -> String {
     format_digits(value, 4)
 }
 
-/// Three significant digits without zeros at the end.
+/// A number with three significant digits, without trailing zeros.
 #[must_use]
 pub fn format_short(value: f64) -> String {
     format_trimmed(value, 3)
 }
 
-/// The value that has `count` significant digits of it.
+/// Rounds to `count` significant digits.
 #[must_use]
 pub fn round_to_digits(value: f64, count: usize) -> f64 {
     format!("{value:.*e}", count.saturating_sub(1)).parse().unwrap_or(value)
 }
 
-/// A number as one types it: all of its digits, with a power of ten where zeros would be many.
+/// A number with all of its digits, as typed; with a power of ten instead of many zeros.
 #[must_use]
 pub fn format_plain(value: f64) -> String {
     const WITHOUT_POWER: std::ops::Range<f64> = 1e-3..1e6;
@@ -38,19 +37,19 @@ pub fn format_plain(value: f64) -> String {
     }
 }
 
-/// A value as it is written, or a dash for a missing one.
+/// A formatted value, or a dash for a missing one.
 pub(crate) fn format_or_dash<T>(value: Option<T>, written: impl FnOnce(T) -> String) -> String {
     value.map_or_else(|| DASH.to_owned(), written)
 }
 
-/// `count` significant digits, zeros at the end included; all of those before the decimal point. A dash for
-/// what is no finite number.
+/// A number with `count` significant digits, trailing zeros included; all digits before the decimal point are shown. A
+/// dash for a number that is not finite.
 #[must_use]
 pub fn format_digits(value: f64, count: usize) -> String {
     format_significant(value, count, |plain| plain)
 }
 
-/// The same without zeros at the end of a fraction.
+/// The same without trailing zeros of a fraction.
 pub(crate) fn format_trimmed(value: f64, count: usize) -> String {
     format_significant(value, count, trim_zeros)
 }
@@ -75,12 +74,12 @@ fn format_significant(value: f64, count: usize, shorten: impl Fn(&str) -> &str) 
     }
 }
 
-/// A fixed number of decimals.
+/// A number with a fixed number of decimals; a dash for a number that is not finite.
 pub(crate) fn format_decimals(value: f64, count: usize) -> String {
     if value.is_finite() { typeset(&format!("{value:.count$}")) } else { DASH.to_owned() }
 }
 
-/// Digits, without zeros at the end, times a power of ten.
+/// Digits without trailing zeros times a power of ten.
 pub(crate) fn format_scientific(value: f64, count: usize) -> String {
     let written = format!("{value:.count$e}");
     match split_exponent(&written) {
@@ -90,8 +89,7 @@ pub(crate) fn format_scientific(value: f64, count: usize) -> String {
     }
 }
 
-/// A number as a program writes it, such as `-1.5e-7`, as it is printed: a true minus sign, none before zero,
-/// and a power of ten.
+/// Typesets a number in program notation such as `-1.5e-7`: a true minus sign, none before zero, and a power of ten.
 pub(crate) fn typeset(written: &str) -> String {
     let (digits, power) = match split_exponent(written) {
         Some((digits, power)) => (digits, format!("{TIMES_TEN}{}", to_superscript(power))),
@@ -114,14 +112,14 @@ const SUPERSCRIPTS: [char; 11] = [
     '\u{2079}', '\u{207b}',
 ];
 
-/// An exponent as it stands behind a ten.
+/// An exponent in superscript.
 pub(crate) fn to_superscript(exponent: i32) -> String {
     let raised =
         |c: char| SUPERSCRIPTS[c.to_digit(10).map_or(SUPERSCRIPTS.len() - 1, |digit| digit as usize)];
     exponent.to_string().chars().map(raised).collect()
 }
 
-/// A printed number in letters that every terminal has: `-1.5e-7`, and `-` for a missing value.
+/// A typeset number in ASCII: `-1.5e-7`, and `-` for a missing value.
 #[must_use]
 pub fn to_ascii(printed: &str) -> String {
     let letter = |c: char| match SUPERSCRIPTS.iter().position(|raised| *raised == c) {
@@ -132,17 +130,16 @@ pub fn to_ascii(printed: &str) -> String {
     printed.replace(TIMES_TEN, "e").chars().map(letter).collect()
 }
 
-// A value with its standard deviation, in one way everywhere.
+// A value with its standard deviation.
 
-/// Most decimals shown: more are beyond any measurement here, and a deviation below them is rounded up to the
-/// last one.
+/// Most decimals shown, beyond the accuracy of any measurement here; a smaller deviation is rounded up to the last one.
 const MOST_DECIMALS: i32 = 6;
 /// Powers of ten of the larger of value and deviation that are written in plain digits.
 const PLAIN_POWERS_WITH_SD: std::ops::RangeInclusive<i32> = -4..=6;
 
-/// A value with its standard deviation in units of the last digit shown, `78.40(3)` for 78.40 with 0.03
-/// (JCGM 100:2008, 7.2.2), one digit of it. Four significant digits without a deviation (none, zero or no
-/// finite number); a dash for a value that is no finite number.
+/// A value with one digit of its standard deviation, in units of the last digit shown: `78.40(3)` for 78.40 with 0.03
+/// (JCGM 100:2008, 7.2.2). Four significant digits without a deviation (missing, zero or not finite); a dash for a
+/// value that is not finite.
 pub(crate) fn format_with_sd(value: f64, sd: impl Into<Option<f64>>) -> String {
     if !value.is_finite() {
         return DASH.to_owned();
@@ -168,7 +165,7 @@ fn format_digits_with_sd(value: f64, sd: f64) -> String {
     format!("{}({last:.0})", typeset(&format!("{value:.*}", decimals as usize)))
 }
 
-/// Power of ten of the first digit once rounded to it: 0.096 is 0.1.
+/// Power of ten of the first digit after rounding to it: 0.096 rounds to 0.1.
 fn power_of_first_digit(sd: f64) -> i32 {
     let power = math::log10(sd).floor() as i32;
     if (sd / math::powi(10.0, power)).round() >= 10.0 { power + 1 } else { power }

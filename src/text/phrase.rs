@@ -11,7 +11,7 @@ pub(crate) fn join_with_and(items: &[String]) -> String {
     }
 }
 
-/// A noun as a count has it.
+/// A noun with a plural `s` unless the count is 1.
 pub(crate) fn pluralise(noun: &str, count: usize) -> String {
     if count == 1 { noun.to_owned() } else { format!("{noun}s") }
 }
@@ -25,7 +25,7 @@ pub(crate) fn format_times(count: usize) -> String {
     }
 }
 
-/// `0.09656 to 0.1355`, or what an open end leaves of it.
+/// An interval such as `0.09656 to 0.1355`, `above 0.09656` or `below 0.1355`.
 pub(crate) fn format_interval(
     lower: Option<f64>,
     upper: Option<f64>,
@@ -39,7 +39,7 @@ pub(crate) fn format_interval(
     }
 }
 
-/// The first letters of a text, with an ellipsis where some are left out.
+/// A text cut to `most` characters, the last of which is then an ellipsis.
 pub(crate) fn truncate_text(text: &str, most: usize) -> String {
     if text.chars().count() <= most {
         return text.to_owned();
@@ -48,19 +48,19 @@ pub(crate) fn truncate_text(text: &str, most: usize) -> String {
     format!("{}\u{2026}", kept.trim_end())
 }
 
-/// The first letter a capital.
+/// The text with a capital first letter.
 pub(crate) fn capitalise(text: &str) -> String {
     let mut letters = text.chars();
     letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
-/// What a panic says; `None` where it says nothing.
+/// Message of a panic; `None` where the payload is no text.
 pub(crate) fn panic_message(payload: &(dyn std::any::Any + Send)) -> Option<String> {
     let text = payload.downcast_ref::<&str>().map(|text| (*text).to_owned());
     text.or_else(|| payload.downcast_ref::<String>().cloned())
 }
 
-/// Words broken into lines of at most so many characters; a longer word has a line of its own.
+/// Words broken into lines of at most `width` characters; a longer word has a line of its own.
 pub(crate) fn wrap_words(words: &str, width: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in words.split_whitespace() {
@@ -75,17 +75,17 @@ pub(crate) fn wrap_words(words: &str, width: usize) -> Vec<String> {
     lines
 }
 
-// The filters that every name and text from a file passes before it is shown.
+// Filters for names and texts from files before they are shown.
 
-/// Text with nothing in it that steers instead of being read. Control characters, line separators and what
-/// XML has no place for become spaces; characters that turn the direction of what follows are left out.
+/// Text without control characters. Control characters, line separators and characters invalid in XML become spaces;
+/// characters that change the direction of text are removed.
 #[must_use]
 pub fn make_printable(text: &str) -> String {
     text.chars().filter(|c| !is_bidi_control(*c)).map(|c| if is_control(c) { ' ' } else { c }).collect()
 }
 
-/// Text for a terminal: every character that steers or turns is written as its escape, such as `\u001b`,
-/// which means the same inside a JSON text. A line end is one of them.
+/// Text for a terminal: every control character, line ends included, is written as its escape, such as `\u001b`, which
+/// means the same in JSON.
 #[must_use]
 pub fn escape_controls(text: &str) -> String {
     let mut shown = String::with_capacity(text.len());
@@ -103,7 +103,7 @@ fn is_bidi_control(c: char) -> bool {
     matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
-/// None of them needs more than four hexadecimal digits.
+/// Whether a character steers a terminal or is invalid in XML. None needs more than four hexadecimal digits.
 fn is_control(c: char) -> bool {
     c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{fffe}' | '\u{ffff}')
 }

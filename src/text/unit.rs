@@ -1,18 +1,17 @@
-//! Units with the prefix that saves zeros, and shares as percentages.
+//! Units with metric prefixes, and shares as percentages.
 
-use super::number::format_with_sd;
-use super::number::{format_decimals, format_digits, format_short, to_ascii, typeset};
+use super::number::{format_decimals, format_digits, format_short, format_with_sd, to_ascii, typeset};
 
 /// Prefixes with their factors, the smallest last.
 const PREFIXES: [(&str, f64); 3] = [("", 1.0), ("m", 1e3), ("\u{b5}", 1e6)];
-/// Units that take no prefix here, or are known better by another name.
+/// Units without prefix or with another name here.
 const UNPREFIXED_UNITS: [(&str, &str, f64); 5] =
     [("1", "", 1.0), ("", "", 1.0), ("kg", "g", 1e3), ("kg m2", "g mm\u{b2}", 1e9), ("s/m", "s/m", 1.0)];
-/// Least value, in the unit as shown, that is still without a prefix: 0.2 N is read as easily as 200 mN.
+/// Least value, in the unit as shown, without a prefix: 0.2 N is as readable as 200 mN.
 const LEAST_UNPREFIXED: f64 = 0.1;
 
-/// A unit with the prefix that makes the largest of some values readable, and the factor to it; nothing for a
-/// plain number.
+/// A unit with the prefix that makes the largest of some values readable, and the factor to it; an empty unit for
+/// a plain number.
 pub(crate) fn choose_prefix(unit: &str, values: impl IntoIterator<Item = f64>) -> (String, f64) {
     if let Some((_, shown, factor)) = UNPREFIXED_UNITS.iter().find(|(name, ..)| *name == unit) {
         return ((*shown).to_owned(), *factor);
@@ -23,7 +22,7 @@ pub(crate) fn choose_prefix(unit: &str, values: impl IntoIterator<Item = f64>) -
     (format!("{prefix}{unit}"), *factor)
 }
 
-/// A name with its unit, as an axis has it.
+/// A name with its unit, as on an axis.
 pub(crate) fn label_with_unit(name: &str, unit: &str) -> String {
     if unit.is_empty() { name.to_owned() } else { format!("{name}, {unit}") }
 }
@@ -42,7 +41,7 @@ pub(crate) fn format_speed(metres_per_s: f64) -> String {
     format!("{} mm/s", format_digits(metres_per_s * 1e3, 3))
 }
 
-/// A time in seconds, as ms to a tenth. One that is a clock's, and no length of a motion, stays in seconds.
+/// A time in seconds, as ms to a tenth. A clock time, too long for a motion, stays in seconds.
 pub(crate) fn format_milliseconds(seconds: f64) -> String {
     const CLOCK_S: f64 = 10.0;
     if seconds.abs() >= CLOCK_S {
@@ -64,11 +63,10 @@ pub(crate) fn format_signed_percent(share: f64) -> String {
     format!("{} %", typeset(written))
 }
 
-/// Least standard deviation of an angle that is shown, degrees: 0.0001 degrees move a point 6 mm away by 0.01
-/// um.
+/// Least standard deviation of an angle shown, degrees: 0.0001 degrees move a point 6 mm away by 0.01 um.
 const LEAST_SHOWN_DEGREES: f64 = 1e-4;
 
-/// An angle with its standard deviation, rad, as degrees in plain letters: `0.300(1) degrees`.
+/// An angle with its standard deviation, rad, as degrees in ASCII: `0.300(1) degrees`.
 pub(crate) fn format_degrees(angle_rad: f64, sd_rad: f64) -> String {
     let sd = sd_rad.to_degrees().max(LEAST_SHOWN_DEGREES);
     format!("{} degrees", to_ascii(&format_with_sd(angle_rad.to_degrees(), sd)))

@@ -1,4 +1,4 @@
-//! What to write instead, where a slip is a common one.
+//! Suggestions for common slips.
 
 use crate::text::round_to_digits;
 use toml::de::DeValue;
@@ -19,7 +19,7 @@ const PREFIXES: [(&str, f64); 9] = [
     ("n", 1e-9),
 ];
 
-/// Units, the ends of keys that take them, and their size in the unit of the key.
+/// Units, the endings of keys in that unit, and their size in the unit of the key.
 const UNITS: [(&str, &str, f64); 15] = [
     ("Hz", "_hz", 1.0),
     ("hz", "_hz", 1.0),
@@ -38,28 +38,28 @@ const UNITS: [(&str, &str, f64); 15] = [
     ("%", "_fraction", 1e-2),
 ];
 
-/// Advice on a value of the wrong type; `kinds` are the types that the key takes.
+/// Advice on a value of the wrong type; `kinds` are the types that the key accepts.
 pub(super) fn suggest_value(key: &str, value: &DeValue<'_>, kinds: &[&str]) -> Option<String> {
     let takes = |kind: &str| kinds.contains(&kind);
     let is_numeric = takes("number") || takes("integer");
-    match value {
-        DeValue::String(text) if is_numeric => suggest_number(key, text),
-        DeValue::String(text) if takes("array") => Some(format!("write [\"{text}\"]")),
+    Some(match value {
+        DeValue::String(text) if is_numeric => return suggest_number(key, text),
+        DeValue::String(text) if takes("array") => format!("write [\"{text}\"]"),
         DeValue::Array(list) if is_numeric && list.len() == 2 => {
-            Some("a decimal number has a point, no comma".to_owned())
+            "a decimal number has a point, no comma".to_owned()
         }
         DeValue::Table(_) if takes("array") => {
-            Some(format!("write `[[{key}]]`: a list of tables has double brackets"))
+            format!("write `[[{key}]]`: a list of tables has double brackets")
         }
-        DeValue::Array(_) if takes("object") => Some(format!("write `[{key}]` with single brackets")),
+        DeValue::Array(_) if takes("object") => format!("write `[{key}]` with single brackets"),
         DeValue::Integer(_) | DeValue::Float(_) | DeValue::Boolean(_) if takes("string") => {
-            Some("a text stands between double quotes".to_owned())
+            "a text stands between double quotes".to_owned()
         }
-        _ => None,
-    }
+        _ => return None,
+    })
 }
 
-/// A number that was written as a text.
+/// Advice on a number written as a text.
 fn suggest_number(key: &str, text: &str) -> Option<String> {
     let text = text.trim();
     if text.parse::<f64>().is_ok() {
@@ -72,35 +72,31 @@ fn suggest_number(key: &str, text: &str) -> Option<String> {
     suggest_without_unit(key, text)
 }
 
-/// A number with a unit behind it.
+/// Advice on a number followed by a unit.
 fn suggest_without_unit(key: &str, text: &str) -> Option<String> {
-    // (the longest number at the start; `1e3Hz` has an exponent, `10e` none)
-    let (value, unit) = (1..=text.len())
-        .rev()
-        .filter_map(|end| {
-            Some((text.get(..end)?.trim().replacen(',', ".", 1).parse::<f64>().ok()?, &text[end..]))
-        })
-        .next()?;
+    // (the longest number at the start; `1e3Hz` has an exponent, `10e` has none)
+    let number = |text: &str| text.trim().replacen(',', ".", 1).parse::<f64>().ok();
+    let (value, unit) =
+        (1..=text.len()).rev().find_map(|end| Some((number(text.get(..end)?)?, &text[end..])))?;
     let unit = unit.trim();
     if unit.is_empty() {
         return None;
     }
     // (`_n_per_m` ends in the unit of a quotient)
-    let prefixes = PREFIXES.iter().filter(|_| !key.contains("_per_"));
-    let size = prefixes.into_iter().find_map(|(prefix, factor)| {
+    let mut prefixes = PREFIXES.iter().filter(|_| !key.contains("_per_"));
+    let size = prefixes.find_map(|(prefix, factor)| {
         let rest = unit.strip_prefix(prefix)?;
         let of_key = |(name, end, _): &&(&str, &str, f64)| *name == rest && key.ends_with(end);
         UNITS.iter().find(of_key).map(|(_, _, size)| factor * size)
     });
-    Some(match size {
-        Some(size) => {
-            format!("write {:?} without a unit: the key says it", round_to_digits(value * size, DIGITS))
-        }
-        None => "write the number alone, in the unit that the key ends in".to_owned(),
-    })
+    let without_unit = |size: f64| {
+        format!("write {:?} without a unit: the key says it", round_to_digits(value * size, DIGITS))
+    };
+    let alone = || "write the number alone, in the unit that the key ends in".to_owned();
+    Some(size.map_or_else(alone, without_unit))
 }
 
-/// What is wrong with a key or table that was there before.
+/// Problem of a key or table that occurred before.
 pub(super) fn describe_duplicate(line: &str) -> String {
     let line = line.split('#').next().unwrap_or_default().trim();
     if let Some(table) = line.strip_prefix('[') {
@@ -114,32 +110,28 @@ pub(super) fn describe_duplicate(line: &str) -> String {
     format!("key `{key}`: found a second time, expected it once; remove one of the two")
 }
 
-/// What is wrong with a line that is no TOML, where the slip is a common one.
+/// Problem of a line that is no TOML, for common slips.
 pub(super) fn describe_bad_line(line: &str) -> Option<String> {
     let line = line.split('#').next().unwrap_or_default().trim();
     let Some((key, value)) = line.split_once('=') else {
         let is_table = line.is_empty() || line.starts_with(['[', ']', '{', '}', '"', '\'']);
         return (!is_table).then(|| format!("found `{line}`, expected `key = value`"));
     };
-    let key = key.trim();
-    let value = value.trim();
+    let (key, value) = (key.trim(), value.trim());
     let said = |hint: String| format!("key `{key}`: found {value}, expected a value as TOML has it; {hint}");
     if value.is_empty() {
         return Some(format!("key `{key}`: found nothing after `=`, expected a value"));
     }
     if value.starts_with('"') && value.contains('\\') {
-        return Some(said(
-            "a backslash between double quotes starts an escape: write the path with `/`, or between single quotes"
-                .to_owned(),
-        ));
+        let hint = "a backslash between double quotes starts an escape: write the path with `/`, or between single quotes";
+        return Some(said(hint.to_owned()));
     }
     if value.starts_with(['"', '\'', '[', '{']) {
         return None;
     }
     let last = key.rsplit('.').next().unwrap_or(key);
     if value.starts_with(|c: char| c.is_ascii_digit() || c == '-' || c == '+' || c == '.' || c == ',') {
-        let pointed = value.replacen(',', ".", 1);
-        let hint = match pointed.parse::<f64>() {
+        let hint = match value.replacen(',', ".", 1).parse::<f64>() {
             Ok(number) => {
                 Some(format!("write {number:?}: a decimal number has a point with digits on both sides"))
             }

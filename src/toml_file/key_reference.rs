@@ -1,16 +1,16 @@
 //! Every key of a kind of file, from its schema.
 
-use super::schema_check;
+use super::schema_check::{self, resolve_reference};
 use serde_json::Value;
 
 /// The keys of a table of a file.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct KeyTable {
-    /// Its name as it stands in a file, such as `[blade]` or `[[trace]]`; empty for the file itself.
+    /// Its name as written in a file, such as `[blade]` or `[[trace]]`; empty for the top level.
     pub name: String,
-    /// What it is.
+    /// Description of the table.
     pub about: String,
-    /// Its keys.
+    /// Its keys, in the order of the schema.
     pub keys: Vec<KeyEntry>,
 }
 
@@ -19,15 +19,15 @@ pub struct KeyTable {
 pub struct KeyEntry {
     /// Its name.
     pub name: String,
-    /// What it takes, with range and default.
+    /// Accepted values, with range and default.
     pub value: String,
-    /// Whether it may not be left out.
+    /// Whether it is required.
     pub required: bool,
-    /// What it means, with its unit.
+    /// Its meaning, with its unit.
     pub meaning: String,
 }
 
-/// The tables of a kind of file: the file itself, then those in it, each followed by those in it.
+/// The tables of a kind of file: the top level, then its tables, each followed by its own tables.
 #[must_use]
 pub fn list_key_tables(schema: &Value) -> Vec<KeyTable> {
     let mut all = Vec::new();
@@ -65,7 +65,7 @@ fn collect_tables(all: &mut Vec<KeyTable>, root: &Value, table: &Value, name: &s
     }
 }
 
-/// What a key takes, with its range and default.
+/// Accepted values of a key, with its range and default.
 fn describe_takes(root: &Value, part: &Value) -> String {
     let mut words = schema_check::describe_expected(root, part);
     let number = |key: &str| part[key].as_f64();
@@ -81,15 +81,10 @@ fn describe_takes(root: &Value, part: &Value) -> String {
     }
 }
 
-/// A schema without its reference, and of several ways the one that is a table or a list.
+/// A schema without its reference; of several alternatives the one that is a table or a list.
 fn resolve_container<'a>(root: &'a Value, part: &'a Value) -> &'a Value {
     let part = resolve_reference(root, part);
-    let ways = part.get("anyOf").and_then(Value::as_array);
-    let ways = ways.into_iter().flatten().map(|way| resolve_container(root, way));
-    ways.into_iter().find(|way| way["type"] == "object" || way["type"] == "array").unwrap_or(part)
-}
-
-fn resolve_reference<'a>(root: &'a Value, part: &'a Value) -> &'a Value {
-    let pointer = part["$ref"].as_str().and_then(|place| place.strip_prefix('#'));
-    pointer.and_then(|pointer| root.pointer(pointer)).unwrap_or(part)
+    let ways = part.get("anyOf").and_then(Value::as_array).into_iter().flatten();
+    let mut ways = ways.map(|way| resolve_container(root, way));
+    ways.find(|way| way["type"] == "object" || way["type"] == "array").unwrap_or(part)
 }

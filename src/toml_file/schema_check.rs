@@ -1,4 +1,4 @@
-//! Every problem of a file at once: its tables and values against the schema of its format.
+//! All problems of a file: its tables and values against the schema of its format.
 
 use super::hint::{describe_bad_line, describe_duplicate, suggest_value};
 use super::{TomlError, line_and_column, suggest_key};
@@ -7,10 +7,10 @@ use serde_json::Value as Schema;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
-/// Most problems that are listed: beyond it the file is most likely of another kind.
+/// Most problems listed: a file with more is most likely of another kind.
 const MOST_PROBLEMS: usize = 20;
 
-/// What is wrong with a file, in the order of its lines; nothing for one that goes with the schema.
+/// The problems of a file, in the order of its lines; empty for a file that matches the schema.
 pub(super) fn find_problems(file: &str, text: &str, schema: &Schema) -> Vec<TomlError> {
     let (table, errors) = DeTable::parse_recoverable(text);
     let mut check = SchemaCheck { file, text, root: schema, found: Vec::new() };
@@ -36,7 +36,7 @@ struct SchemaCheck<'a> {
     file: &'a str,
     text: &'a str,
     root: &'a Schema,
-    /// Byte of the file, and what is wrong there.
+    /// Byte offset and problem.
     found: Vec<(usize, TomlError)>,
 }
 
@@ -61,16 +61,11 @@ impl<'a> SchemaCheck<'a> {
             match (property(name), others) {
                 (Some(schema), _) => self.check_value(&path, value.get_ref(), schema, value.span()),
                 (None, Some(Schema::Bool(false))) => {
-                    let names: Vec<&str> =
-                        known.into_iter().flatten().map(|(name, _)| name.as_str()).collect();
+                    let names: Vec<&str> = known.into_iter().flatten().map(|(name, _)| &name[..]).collect();
                     let (line, column) = line_and_column(self.text, key.span().start);
-                    let unknown = TomlError::UnknownKey {
-                        file: self.file.to_owned(),
-                        line,
-                        column,
-                        key: path.join("."),
-                        advice: suggest_key(name, &names),
-                    };
+                    let (file, key_path) = (self.file.to_owned(), path.join("."));
+                    let advice = suggest_key(name, &names);
+                    let unknown = TomlError::UnknownKey { file, line, column, key: key_path, advice };
                     meant.extend(names.iter().find(|known| suggests_key(&unknown, known)));
                     self.found.push((key.span().start, unknown));
                 }
@@ -82,17 +77,12 @@ impl<'a> SchemaCheck<'a> {
         let absent = required.filter(|name| !table.keys().any(|key| key.get_ref() == name));
         for name in absent.filter(|name| !meant.contains(name)) {
             let Some(of) = property(name) else { continue };
-            let meaning =
-                of["description"].as_str().and_then(|words| words.lines().next()).unwrap_or_default();
-            let path: Vec<&str> = path.iter().copied().chain([name]).collect();
-            let meaning = meaning.trim_end_matches('.');
+            let meaning = of["description"].as_str().and_then(|words| words.lines().next());
+            let meaning = meaning.unwrap_or_default().trim_end_matches('.');
+            let path = path.iter().copied().chain([name]).collect::<Vec<_>>().join(".");
             let add = if meaning.is_empty() { String::new() } else { format!("; add it: {meaning}") };
-            let problem = format!(
-                "key `{}`: found nothing, expected {}{add}",
-                path.join("."),
-                describe_expected(self.root, of)
-            );
-            self.add_problem(span.start, problem);
+            let expected = describe_expected(self.root, of);
+            self.add_problem(span.start, format!("key `{path}`: found nothing, expected {expected}{add}"));
         }
     }
 
@@ -102,13 +92,9 @@ impl<'a> SchemaCheck<'a> {
             let key = path.join(".");
             let name = path.last().copied().unwrap_or_default();
             let kinds: Vec<&str> = ways.iter().flat_map(|way| list_types(way)).collect();
-            let hint =
-                suggest_value(name, value, &kinds).map_or_else(String::new, |hint| format!("; {hint}"));
-            let problem = format!(
-                "key `{key}`: found {}, expected {}{hint}",
-                describe_value(value),
-                describe_expected(self.root, schema)
-            );
+            let hint = suggest_value(name, value, &kinds).map(|hint| format!("; {hint}")).unwrap_or_default();
+            let (found, expected) = (describe_value(value), describe_expected(self.root, schema));
+            let problem = format!("key `{key}`: found {found}, expected {expected}{hint}");
             return self.add_problem(span.start, problem);
         };
         match value {
@@ -128,7 +114,7 @@ impl<'a> SchemaCheck<'a> {
         }
     }
 
-    /// A number against the range of its key.
+    /// Checks a number against the range of its key.
     fn check_range(&mut self, path: &[&str], value: &DeValue<'_>, schema: &Schema, at: usize) {
         let written = describe_value(value);
         let Ok(number) = written.replace('_', "").parse::<f64>() else { return };
@@ -147,22 +133,21 @@ impl<'a> SchemaCheck<'a> {
             _ => return,
         };
         let meaning = schema["description"].as_str().and_then(|words| words.split(". ").next());
-        let meaning = meaning.map_or_else(String::new, |meaning| format!(" ({meaning})"));
+        let meaning = meaning.map(|meaning| format!(" ({meaning})")).unwrap_or_default();
         let key = path.join(".");
-        self.add_problem(
-            at,
-            format!("key `{key}`: found {written}, expected {expected}{meaning}; correct the value"),
-        );
+        let problem =
+            format!("key `{key}`: found {written}, expected {expected}{meaning}; correct the value");
+        self.add_problem(at, problem);
     }
 }
 
 /// A schema without its reference.
-fn resolve_reference<'a>(root: &'a Schema, schema: &'a Schema) -> &'a Schema {
+pub(super) fn resolve_reference<'a>(root: &'a Schema, schema: &'a Schema) -> &'a Schema {
     let pointer = schema["$ref"].as_str().and_then(|place| place.strip_prefix('#'));
     pointer.and_then(|pointer| root.pointer(pointer)).unwrap_or(schema)
 }
 
-/// The ways in which a value may be written.
+/// The alternatives of a schema.
 fn list_alternatives<'a>(root: &'a Schema, schema: &'a Schema) -> Vec<&'a Schema> {
     let schema = resolve_reference(root, schema);
     match schema.get("anyOf").or(schema.get("oneOf")).and_then(Schema::as_array) {
@@ -171,24 +156,23 @@ fn list_alternatives<'a>(root: &'a Schema, schema: &'a Schema) -> Vec<&'a Schema
     }
 }
 
-/// Whether an unknown key is taken for a known one.
+/// Whether the advice on an unknown key suggests a known one.
 fn suggests_key(problem: &TomlError, known: &str) -> bool {
     matches!(problem, TomlError::UnknownKey { advice, .. } if advice.contains(&format!("`{known}`?")))
 }
 
-/// Key of a schema that says in words what it takes, where types alone do not.
+/// Key of a schema with a description of its values, where types alone say too little.
 const IN_WORDS: &str = "x-expected";
 
-/// What a schema takes, in words.
+/// Accepted values of a schema, in words.
 pub(super) fn describe_expected(root: &Schema, schema: &Schema) -> String {
     let schema = resolve_reference(root, schema);
     if let Some(words) = schema.get(IN_WORDS).and_then(Schema::as_str) {
         return words.to_owned();
     }
     if let Some(all) = schema.get("anyOf").and_then(Schema::as_array) {
-        let all: Vec<String> =
-            all.iter().map(|way| describe_expected(root, way)).filter(|w| !w.is_empty()).collect();
-        return all.join(" or ");
+        let all = all.iter().map(|way| describe_expected(root, way)).filter(|w| !w.is_empty());
+        return all.collect::<Vec<_>>().join(" or ");
     }
     let ways = list_alternatives(root, schema);
     let choices: Vec<&str> = ways.iter().filter_map(|way| list_words(way)).flatten().collect();
@@ -200,7 +184,7 @@ pub(super) fn describe_expected(root: &Schema, schema: &Schema) -> String {
     }
 }
 
-/// Types of a schema without `null`: TOML has none.
+/// Types of a schema without `null`, which TOML does not have.
 fn list_types(schema: &Schema) -> Vec<&str> {
     let all: Vec<&str> = match &schema["type"] {
         Schema::String(one) => vec![one.as_str()],
@@ -210,7 +194,7 @@ fn list_types(schema: &Schema) -> Vec<&str> {
     all.into_iter().filter(|kind| *kind != "null").collect()
 }
 
-/// The words that a schema takes, where it takes some words alone.
+/// The words that a schema accepts, if it accepts only some words.
 fn list_words(schema: &Schema) -> Option<Vec<&str>> {
     if let Some(one) = schema.get("const") {
         return one.as_str().map(|word| vec![word]);
@@ -227,26 +211,23 @@ fn matches_schema(schema: &Schema, value: &DeValue<'_>) -> bool {
     if types.is_empty() {
         return schema.get("properties").is_none() && schema["type"].is_null();
     }
-    types.iter().any(|kind| match value {
-        DeValue::String(_) => *kind == "string",
-        DeValue::Integer(number) => match *kind {
-            "number" => true,
-            "integer" => {
-                // a negative count is refused here: the type has no place for it
-                let least = schema.get("minimum").and_then(Schema::as_f64).unwrap_or(f64::NEG_INFINITY);
-                number.as_str().parse::<f64>().map_or(true, |number| number >= least)
-            }
-            _ => false,
-        },
-        DeValue::Float(_) => *kind == "number",
-        DeValue::Boolean(_) => *kind == "boolean",
-        DeValue::Array(_) => *kind == "array",
-        DeValue::Table(_) => *kind == "object",
-        DeValue::Datetime(_) => false,
-    })
+    let is_of = |kind: &&str| match (value, *kind) {
+        (DeValue::String(_), "string")
+        | (DeValue::Integer(_) | DeValue::Float(_), "number")
+        | (DeValue::Boolean(_), "boolean")
+        | (DeValue::Array(_), "array")
+        | (DeValue::Table(_), "object") => true,
+        // a negative count is refused here, because its type cannot hold it
+        (DeValue::Integer(number), "integer") => {
+            let least = schema.get("minimum").and_then(Schema::as_f64).unwrap_or(f64::NEG_INFINITY);
+            number.as_str().parse::<f64>().map_or(true, |number| number >= least)
+        }
+        _ => false,
+    };
+    types.iter().any(is_of)
 }
 
-/// What one way of a schema takes.
+/// Accepted values of one alternative, in words.
 fn describe_type(schema: &Schema) -> String {
     let kinds = list_types(schema);
     let word = |kind: &&str| match *kind {

@@ -6,7 +6,7 @@ use super::chirp::{
     median_filter,
 };
 use super::ridge::{Ridge, RidgeEnd, RidgePoint};
-use super::{SegmentBins, SegmentLayout, Spectrogram};
+use super::{FINE_PADDING, SegmentBins, SegmentLayout, Spectrogram};
 use crate::math;
 use crate::spectrum::error::SpectrumError;
 use crate::spectrum::periodogram::{self, upper_median};
@@ -84,7 +84,7 @@ impl<'a> RidgeTracker<'a> {
 
     /// Start of each fit on the path through the columns; `None` for a column without spectrum.
     pub(super) fn fit_starts(&self, spectrogram: &Spectrogram) -> Vec<Option<ChirpParameters>> {
-        let bins = SegmentBins::fine(&self.layout);
+        let bins = SegmentBins::new(&self.layout, FINE_PADDING);
         let band = bins.bins_in_band(self.band_hz, self.frame_rate_hz);
         let level = |column: &Vec<f64>| {
             let inside = column.get(band.clone()).unwrap_or_default();
