@@ -35,7 +35,7 @@ pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: 
     work: &mut WorkCounters,
     mut observe: impl FnMut(&AcceptedStep<'_, N>) -> A,
 ) -> PhaseEnd<N> {
-    let mut run = FixedStepIntegration {
+    let mut run = FixedRun {
         phase,
         steps,
         t: start.t,
@@ -59,7 +59,7 @@ pub fn integrate_fixed<const N: usize, const G: usize, P: HybridPhase<N, G>, A: 
             _ => ahead,
         };
         let at = run.current_point();
-        let arc = HermiteDenseOutput { start: at, start_flow: run.flow, end: end.at, end_flow: end.flow };
+        let arc = HermiteOutput { start: at, start_flow: run.flow, end: end.at, end_flow: end.flow };
         let step = AcceptedStep { start: run.t, end: end.at.t, y_end: &end.at.y, solution: &arc };
         let answer = observe(&step).control_flow();
         run.work.steps += 1;
@@ -103,7 +103,7 @@ struct TrialStep<const N: usize, const G: usize> {
     guards: [f64; G],
 }
 
-struct FixedStepIntegration<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> {
+struct FixedRun<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> {
     phase: &'a P,
     steps: &'a FixedStepOptions,
     t: f64,
@@ -113,7 +113,7 @@ struct FixedStepIntegration<'a, const N: usize, const G: usize, P: HybridPhase<N
     work: &'a mut WorkCounters,
 }
 
-impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedStepIntegration<'_, N, G, P> {
+impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedRun<'_, N, G, P> {
     fn current_point(&self) -> StatePoint<N> {
         StatePoint { t: self.t, y: self.y }
     }
@@ -202,14 +202,14 @@ impl<const N: usize, const G: usize, P: HybridPhase<N, G>> FixedStepIntegration<
 }
 
 /// Cubic through the states and slopes at both ends of a step: of order 3.
-struct HermiteDenseOutput<const N: usize> {
+struct HermiteOutput<const N: usize> {
     start: StatePoint<N>,
     start_flow: [f64; N],
     end: StatePoint<N>,
     end_flow: [f64; N],
 }
 
-impl<const N: usize> DenseOutput<N> for HermiteDenseOutput<N> {
+impl<const N: usize> DenseOutput<N> for HermiteOutput<N> {
     fn state_at(&self, t: f64) -> [f64; N] {
         let h = self.end.t - self.start.t;
         let x = (t - self.start.t) / h;
@@ -230,7 +230,7 @@ mod tests {
     #[test]
     fn the_interpolant_is_exact_for_a_cubic() {
         let (y, slope) = (|t: f64| t * t * t - 2.0 * t, |t: f64| 3.0 * t * t - 2.0);
-        let arc = HermiteDenseOutput {
+        let arc = HermiteOutput {
             start: StatePoint { t: 0.5, y: [y(0.5)] },
             start_flow: [slope(0.5)],
             end: StatePoint { t: 2.0, y: [y(2.0)] },

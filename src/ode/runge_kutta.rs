@@ -1,9 +1,7 @@
 //! The Dormand-Prince 8(5,3) method with error control, up to the first guard that falls. Roots are isolated on nine
 //! samples of the dense output; a step of the method's own order gives the state there.
 
-use super::dop853::{
-    Dop853DenseOutput, Dop853Stages, ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP,
-};
+use super::dop853::{ERROR_EXPONENT, EVALUATIONS_FOR_DENSE, EVALUATIONS_PER_STEP, StepOutput, StepStages};
 use super::fixed_step::{RUNGE_KUTTA_4_EVALUATIONS, runge_kutta_4_step};
 use super::roots::{self, COARSE_SAMPLES, FINE_SAMPLES};
 use super::slack_variable::{MOST_HALVINGS, SlackVariable, StatePoint};
@@ -48,7 +46,7 @@ pub fn integrate_with_locator<const N: usize, const G: usize, P: HybridPhase<N, 
     work: &mut WorkCounters,
     mut observe: impl FnMut(&AcceptedStep<'_, N>) -> A,
 ) -> PhaseEnd<N> {
-    let mut run = Dop853Integration::from_start(phase, start, relative, work);
+    let mut run = AdaptiveRun::from_start(phase, start, relative, work);
     run.locator = locator;
     loop {
         if run.t >= stop {
@@ -116,7 +114,7 @@ enum EventLocation<const N: usize> {
     Outside,
 }
 
-struct Dop853Integration<'a, const N: usize, const G: usize, P> {
+struct AdaptiveRun<'a, const N: usize, const G: usize, P> {
     phase: &'a P,
     locator: EventLocator,
     work: &'a mut WorkCounters,
@@ -131,7 +129,7 @@ struct Dop853Integration<'a, const N: usize, const G: usize, P> {
     last_error: f64,
 }
 
-impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration<'a, N, G, P> {
+impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> AdaptiveRun<'a, N, G, P> {
     fn from_start(phase: &'a P, start: PhaseStart<N, G>, relative: f64, work: &'a mut WorkCounters) -> Self {
         let derivative = phase.derivative(start.t, &start.y);
         work.rhs_evaluations += 1;
@@ -185,7 +183,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
     }
 
     /// Tries steps until one meets the tolerance; `None` when even the shortest representable step does not.
-    fn find_accepted_step(&mut self, stop: f64) -> Option<Dop853Stages<N>> {
+    fn find_accepted_step(&mut self, stop: f64) -> Option<StepStages<N>> {
         let (most, least, safety) = GROWTH;
         let mut rejected = false;
         loop {
@@ -197,7 +195,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
                 return None;
             }
             let f = |t: f64, y: &[f64; N]| self.phase.derivative(t, y);
-            let stages = Dop853Stages::take_step(f, self.t, &self.y, &self.derivative, h);
+            let stages = StepStages::take_step(f, self.t, &self.y, &self.derivative, h);
             self.work.rhs_evaluations += EVALUATIONS_PER_STEP;
             let error = stages.error_norm(&self.tolerated_error(&stages.y_end));
             if error <= 1.0 {
@@ -220,7 +218,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
         }
     }
 
-    fn accept_step(&mut self, stages: &Dop853Stages<N>, stop: f64) -> f64 {
+    fn accept_step(&mut self, stages: &StepStages<N>, stop: f64) -> f64 {
         let end = stages.t + stages.h;
         self.t = if (stop - end).abs() <= 4.0 * f64::EPSILON * stop.abs() { stop } else { end };
         self.y = stages.y_end;
@@ -232,12 +230,12 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
     }
 
     /// Whether a step is so short that a guard which starts at its zero stays within rounding.
-    fn is_sliver(&self, stages: &Dop853Stages<N>) -> bool {
+    fn is_sliver(&self, stages: &StepStages<N>) -> bool {
         stages.h <= SLIVER_STEP * f64::EPSILON * stages.t.abs()
     }
 
     /// The first guard that falls to zero inside the step.
-    fn locate_event(&mut self, stages: &Dop853Stages<N>, dense: &Dop853DenseOutput<N>) -> EventLocation<N> {
+    fn locate_event(&mut self, stages: &StepStages<N>, dense: &StepOutput<N>) -> EventLocation<N> {
         let (t, h, samples) = (stages.t, stages.h, [[0.0; G]; FINE_SAMPLES]);
         let mut sampled = GuardSamples { phase: self.phase, t, h, dense, samples, count: 0 };
         sampled.samples[0] = self.guards;
@@ -280,8 +278,8 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
     /// before it falls; `None` for a guard that turns too close to its zero.
     fn land_by_slack(
         &mut self,
-        stages: &Dop853Stages<N>,
-        dense: &Dop853DenseOutput<N>,
+        stages: &StepStages<N>,
+        dense: &StepOutput<N>,
         guard: usize,
         fraction: f64,
     ) -> Option<(f64, [f64; N])> {
@@ -294,11 +292,11 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
             if slack.can_descend(&at, root - after) {
                 let (mut from, mut flow) = (StatePoint { t: stages.t, y: stages.y }, self.derivative);
                 if after > 0.0 {
-                    let lead = Dop853Stages::take_step(f, stages.t, &stages.y, &flow, after);
+                    let lead = StepStages::take_step(f, stages.t, &stages.y, &flow, after);
                     (from, flow) = (StatePoint { t: at.t, y: lead.y_end }, *lead.derivative_at_end());
                     slack.count_evaluations(EVALUATIONS_PER_STEP);
                 }
-                let advance = |t: f64| Dop853Stages::take_step(f, from.t, &from.y, &flow, t - from.t).y_end;
+                let advance = |t: f64| StepStages::take_step(f, from.t, &from.y, &flow, t - from.t).y_end;
                 if let Some(landed) = slack.land_on_zero(&from, EVALUATIONS_PER_STEP, advance) {
                     return Some((landed.t, landed.y));
                 }
@@ -310,7 +308,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
 
     /// State at the event to the order of the method: the step is repeated up to the root of the dense output, then
     /// Newton's iteration on the guard closes the remainder with short steps.
-    fn refine_event(&mut self, stages: &Dop853Stages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
+    fn refine_event(&mut self, stages: &StepStages<N>, guard: usize, fraction: f64) -> (f64, [f64; N]) {
         /// Most corrections; one is usual, because the dense output's root is accurate to its order.
         const ROUNDS: usize = 4;
         /// Share of the step above which a correction is dropped: the guard only grazes zero.
@@ -322,7 +320,7 @@ impl<'a, const N: usize, const G: usize, P: HybridPhase<N, G>> Dop853Integration
         }
         let f = |t: f64, y: &[f64; N]| self.phase.derivative(t, y);
         let mut t = stages.t + fraction * stages.h;
-        let retaken = Dop853Stages::take_step(f, stages.t, &stages.y, &self.derivative, t - stages.t);
+        let retaken = StepStages::take_step(f, stages.t, &stages.y, &self.derivative, t - stages.t);
         let (mut y, mut slope_here) = (retaken.y_end, *retaken.derivative_at_end());
         self.work.rhs_evaluations += EVALUATIONS_PER_STEP;
         for _ in 0..ROUNDS {
@@ -353,7 +351,7 @@ struct GuardSamples<'a, const N: usize, const G: usize, P> {
     phase: &'a P,
     t: f64,
     h: f64,
-    dense: &'a Dop853DenseOutput<N>,
+    dense: &'a StepOutput<N>,
     samples: [[f64; G]; FINE_SAMPLES],
     count: u64,
 }

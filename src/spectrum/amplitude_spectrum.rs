@@ -122,7 +122,7 @@ impl WindowedTransform {
             found.zoom_peaks(&spectrum, &peak_zoom::WeightedRecord { residual, weights, amplitude_scale });
         }
         let starts = found.refinement_starts(&spectrum);
-        let refined = gap_refinement::refine_components(&self.samples, self.trend, &starts);
+        let refined = gap_refinement::refine_peaks(&self.samples, self.trend, &starts);
         (found.floor_m, found.list_components(&spectrum, &refined))
     }
 }

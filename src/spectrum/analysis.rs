@@ -6,14 +6,14 @@ mod long_record;
 
 use super::error::check_record;
 use super::frequency_drift::{self, DriftCourse};
-use super::model_selection::{Decomposition, FRAMES_PER_COLUMN, ModelSelector};
+use super::model_selection::{FRAMES_PER_COLUMN, ModelFit, ModelSelector};
 use super::multitaper::{Multitaper, TAPERS};
 use super::periodogram::Periodogram;
 use super::settings::ROUNDING;
 use super::time_frequency::Ridge;
 use super::{Detrend, MIN_SAMPLES, Spectrum, SpectrumError, SpectrumSettings, decimation, step_detection};
 use crate::math;
-use component_estimates::FittedDecomposition;
+use component_estimates::FitReading;
 use std::f64::consts::TAU;
 use std::ops::Range;
 
@@ -172,7 +172,7 @@ impl SpectralAnalysis {
         }
         let starts = step_detection::starts_after_step(record.samples).into_iter();
         let behind =
-            starts.filter_map(|start| Self::decompose_part(record, settings, start..record.samples.len()));
+            starts.filter_map(|start| Self::read_part(record, settings, start..record.samples.len()));
         let mut plain = None;
         for part in behind {
             if part.leaves_only_noise {
@@ -191,7 +191,7 @@ impl SpectralAnalysis {
     fn analyse_between_steps(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Self> {
         let of_stretch = |tries: &Vec<Range<usize>>| {
             let mut parts =
-                tries.iter().filter_map(|frames| Self::decompose_part(record, settings, frames.clone()));
+                tries.iter().filter_map(|frames| Self::read_part(record, settings, frames.clone()));
             let first = parts.next()?;
             let best = if first.leaves_only_noise {
                 first
@@ -204,21 +204,18 @@ impl SpectralAnalysis {
     }
 
     /// Some frames of a record, if they can be analysed and their trend has no fast waves.
-    fn decompose_part(
+    fn read_part(
         record: &SampledRecord,
         settings: &SpectrumSettings,
         frames: Range<usize>,
-    ) -> Option<DecompositionCandidate> {
+    ) -> Option<Attempt> {
         let skipped_frames = frames.start;
         let part =
             Self::decompose(&SampledRecord { samples: &record.samples[frames], ..*record }, settings).ok()?;
         let analysis = Self { skipped_frames, ..part.analysis };
-        (!part.trend_competes).then_some(DecompositionCandidate { analysis, ..part })
+        (!part.trend_competes).then_some(Attempt { analysis, ..part })
     }
-    fn decompose(
-        record: &SampledRecord,
-        settings: &SpectrumSettings,
-    ) -> Result<DecompositionCandidate, SpectrumError> {
+    fn decompose(record: &SampledRecord, settings: &SpectrumSettings) -> Result<Attempt, SpectrumError> {
         let (padded, trend) = check_record(record.samples, record.frame_rate_hz, settings)?;
         let periodogram = Periodogram::new(record.samples, padded);
         let largest = record.samples.iter().flatten().fold(0.0, |m: f64, x| m.max(x.abs()));
@@ -228,33 +225,32 @@ impl SpectralAnalysis {
         search.trend_grows = settings.detrend.is_none();
         let least = MIN_SAMPLES.max(FRAMES_PER_COLUMN * trend.column_count());
         let too_few = || SpectrumError::TooFew { found: record.samples.iter().flatten().count(), least };
-        let mut explained = search.select_model(trend).ok_or_else(too_few)?;
-        let mut course = frequency_drift::find_drift_course(&search, &explained, settings.band_hz);
+        let mut fit = search.select_model(trend).ok_or_else(too_few)?;
+        let mut course = frequency_drift::find_drift_course(&search, &fit, settings.band_hz);
         search.noise_is_coloured = true;
         let drift = course.as_ref().and_then(|course| Some((course.drift_region()?, course.range?)));
-        let smooth =
-            |explained: &Decomposition| explained.model.trend().column_count() <= MAX_SMOOTH_TREND_COLUMNS;
+        let smooth = |fit: &ModelFit| fit.model.trend().column_count() <= MAX_SMOOTH_TREND_COLUMNS;
         if let Some((drifting, range)) = drift {
-            if let Some(pair) = search.split_into_pair(&explained, &range) {
+            if let Some(pair) = search.split_into_pair(&fit, &range) {
                 // two that beat look like one that drifts
                 course = course.map(|course| DriftCourse { range: None, ..course });
-                explained = search.run_second_pass(pair).ok_or_else(too_few)?;
+                fit = search.run_second_pass(pair).ok_or_else(too_few)?;
             } else {
                 search.drift_region = Some(drifting);
-                explained = search.select_without_drift(&explained).ok_or_else(too_few)?;
+                fit = search.select_without_drift(&fit).ok_or_else(too_few)?;
             }
-        } else if !search.trend_grows || smooth(&explained) {
+        } else if !search.trend_grows || smooth(&fit) {
             // where no trend describes a flip, a second pass would split everything into pieces
-            explained = search.run_second_pass(explained).ok_or_else(too_few)?;
+            fit = search.run_second_pass(fit).ok_or_else(too_few)?;
         }
-        let exhausted = search.trend_grows && explained.model.trend().next_richer().is_none();
-        let trend_competes = search.trend_grows && (!smooth(&explained) || search.trend_competes(&explained));
+        let exhausted = search.trend_grows && fit.model.trend().next_richer().is_none();
+        let trend_competes = search.trend_grows && (!smooth(&fit) || search.trend_competes(&fit));
         let leaves_only_noise = !exhausted
-            && !search.contains_step(&explained)
-            && (search.drift_region.is_some() || search.leaves_only_noise(&explained));
-        let fitted = FittedDecomposition::new(&search, explained).ok_or_else(too_few)?;
+            && !search.contains_step(&fit)
+            && (search.drift_region.is_some() || search.leaves_only_noise(&fit));
+        let fitted = FitReading::new(&search, fit).ok_or_else(too_few)?;
         let analysis = fitted.to_analysis(record, settings, course);
-        Ok(DecompositionCandidate { leaves_only_noise, trend_competes, analysis })
+        Ok(Attempt { leaves_only_noise, trend_competes, analysis })
     }
 
     /// With the power density, the noise floor and each component's chance of being a steady line.
@@ -283,7 +279,7 @@ impl SpectralAnalysis {
 
 /// An analysis, whether it leaves nothing but noise, and whether its trend has waves as fast as a component:
 /// trend and component then oscillate against each other, also where the record is flat.
-struct DecompositionCandidate {
+struct Attempt {
     leaves_only_noise: bool,
     trend_competes: bool,
     analysis: SpectralAnalysis,

@@ -2,8 +2,8 @@
 //! falls linearly. Neither is a term of the fit. Where one explains as much as a second oscillation does, the
 //! second is dropped.
 
-use super::least_squares::SinusoidTerm;
-use super::model_selection::{Decomposition, ModelSelector};
+use super::least_squares::SineTerm;
+use super::model_selection::{ModelFit, ModelSelector};
 use super::second_pass::DoubtfulTerm;
 use crate::math;
 use std::f64::consts::{PI, TAU};
@@ -24,7 +24,7 @@ const LINEAR_DECAY_ENDS: (f64, f64) = (0.1, 4.0);
 
 /// An oscillation whose frequency or amplitude changes evenly.
 #[derive(Clone, Copy)]
-struct UnsteadyOscillation {
+struct UnsteadyTone {
     /// Frequency in the middle, cycles in the record.
     cycles: f64,
     /// Its change over the record, cycles.
@@ -39,8 +39,8 @@ enum EnvelopeDecay {
     Linear(f64),
 }
 
-impl UnsteadyOscillation {
-    fn from_term(start: &SinusoidTerm, [cycles, change, fall]: [f64; 3], line: bool) -> Self {
+impl UnsteadyTone {
+    fn from_term(start: &SineTerm, [cycles, change, fall]: [f64; 3], line: bool) -> Self {
         let decay = if line {
             EnvelopeDecay::Linear(math::exp(fall).clamp(LINEAR_DECAY_ENDS.0, LINEAR_DECAY_ENDS.1))
         } else {
@@ -61,50 +61,49 @@ impl UnsteadyOscillation {
 
 impl ModelSelector<'_> {
     /// Terms that leave more than noise around them.
-    pub(super) fn terms_with_residual(&self, explained: &Decomposition) -> Vec<usize> {
-        let terms = explained.model.terms();
-        let leaves = |k: &usize| terms[*k].cycles > 0.0 && self.leaves_peak(explained, &terms[*k]);
+    pub(super) fn terms_with_residual(&self, fit: &ModelFit) -> Vec<usize> {
+        let terms = fit.model.terms();
+        let leaves = |k: &usize| terms[*k].cycles > 0.0 && self.leaves_peak(fit, &terms[*k]);
         (0..terms.len()).filter(leaves).collect()
     }
 
     /// The same terms, each with the criterion that its replacement must fall below.
-    pub(super) fn doubtful_terms(&self, explained: &Decomposition) -> Vec<DoubtfulTerm> {
-        let least = self.information_criterion(&explained.model);
-        let criterion = |k: usize| self.alternatives_criterion(explained, k).min(least);
-        let terms = self.terms_with_residual(explained).into_iter();
+    pub(super) fn doubtful_terms(&self, fit: &ModelFit) -> Vec<DoubtfulTerm> {
+        let least = self.bic_of(&fit.model);
+        let criterion = |k: usize| self.alternatives_criterion(fit, k).min(least);
+        let terms = self.terms_with_residual(fit).into_iter();
         terms.map(|k| DoubtfulTerm { index: k, criterion: criterion(k) }).collect()
     }
 
     /// Terms that may be pieces of one: an even drift or fall in their place explains more.
-    pub(super) fn unsteady_terms(&self, explained: &Decomposition) -> Vec<usize> {
-        let terms = explained.model.terms();
-        let steady = self.information_criterion(&explained.model);
+    pub(super) fn unsteady_terms(&self, fit: &ModelFit) -> Vec<usize> {
+        let terms = fit.model.terms();
+        let steady = self.bic_of(&fit.model);
         // a term without neighbours is one line in any case
-        let in_pieces = |k: &usize| {
-            nearby_terms(terms, *k).len() > 1 && self.alternatives_criterion(explained, *k) < steady
-        };
-        let whole: Vec<usize> = self.terms_with_residual(explained).into_iter().filter(in_pieces).collect();
+        let in_pieces =
+            |k: &usize| nearby_terms(terms, *k).len() > 1 && self.alternatives_criterion(fit, *k) < steady;
+        let whole: Vec<usize> = self.terms_with_residual(fit).into_iter().filter(in_pieces).collect();
         let is_piece = |k: &usize| whole.iter().any(|one| are_near(&terms[*one], &terms[*k]));
-        explained.model.oscillations().into_iter().filter(is_piece).collect()
+        fit.model.oscillations().into_iter().filter(is_piece).collect()
     }
 
     /// The criterion with an evenly drifting or fading oscillation in the place of term `k`, or of `k` and its
     /// neighbours.
-    pub(super) fn alternatives_criterion(&self, explained: &Decomposition, k: usize) -> f64 {
-        let group = nearby_terms(explained.model.terms(), k);
-        let alone = self.replacement_criterion(explained, k, &[k]);
-        if group.len() > 1 { alone.min(self.replacement_criterion(explained, k, &group)) } else { alone }
+    pub(super) fn alternatives_criterion(&self, fit: &ModelFit, k: usize) -> f64 {
+        let group = nearby_terms(fit.model.terms(), k);
+        let alone = self.replacement_criterion(fit, k, &[k]);
+        if group.len() > 1 { alone.min(self.replacement_criterion(fit, k, &group)) } else { alone }
     }
 
-    fn replacement_criterion(&self, explained: &Decomposition, k: usize, of: &[usize]) -> f64 {
-        let parts = &explained.model;
+    fn replacement_criterion(&self, fit: &ModelFit, k: usize, of: &[usize]) -> f64 {
+        let parts = &fit.model;
         let start = parts.terms()[k];
-        let left: Vec<f64> = explained.residual_m.iter().map(|x| x.unwrap_or(0.0)).collect();
+        let left: Vec<f64> = fit.residual_m.iter().map(|x| x.unwrap_or(0.0)).collect();
         let with = self.add_terms_back(parts, &left, of);
         let blocks = self.demodulate_blocks(&with, start.cycles);
         let square: f64 = with.iter().map(|x| x * x).sum();
         let alone = |line: bool| {
-            let shape = |values: [f64; 3]| UnsteadyOscillation::from_term(&start, values, line);
+            let shape = |values: [f64; 3]| UnsteadyTone::from_term(&start, values, line);
             let left = |values: [f64; 3]| square - power_from_blocks(&blocks, &start, &shape(values));
             let mut best = ([0.0; 3], left([0.0; 3]));
             let mut steps = FIRST_STEPS;
@@ -124,11 +123,11 @@ impl ModelSelector<'_> {
             square - self.power_of_alternative(&with, &shape(best.0))
         };
         let less = (of.len() - 1) as f64 * TERM_PARAMETERS;
-        self.information_criterion_of(parts, alone(false).min(alone(true)), EXTRA_PARAMETERS - less)
+        self.bic_with(parts, alone(false).min(alone(true)), EXTRA_PARAMETERS - less)
     }
 
     /// Reduction of the sum of squares by a shape with the best amplitude and phase, m^2.
-    fn power_of_alternative(&self, values: &[f64], shape: &UnsteadyOscillation) -> f64 {
+    fn power_of_alternative(&self, values: &[f64], shape: &UnsteadyTone) -> f64 {
         let add = |[cc, cs, ss, xc, xs]: [f64; 5], (i, x): (usize, &f64)| {
             let (envelope, phase) = shape.envelope_and_phase((i as f64 + 0.5) / values.len() as f64);
             let (sine, cosine) = math::sin_cos(phase);
@@ -160,12 +159,12 @@ impl ModelSelector<'_> {
 }
 
 /// The oscillations that may be pieces of one with term `k`.
-pub(super) fn nearby_terms(terms: &[SinusoidTerm], k: usize) -> Vec<usize> {
+pub(super) fn nearby_terms(terms: &[SineTerm], k: usize) -> Vec<usize> {
     let near = |j: &usize| terms[*j].cycles > 0.0 && are_near(&terms[*j], &terms[k]);
     (0..terms.len()).filter(near).collect()
 }
 
-fn are_near(a: &SinusoidTerm, b: &SinusoidTerm) -> bool {
+fn are_near(a: &SineTerm, b: &SineTerm) -> bool {
     (a.cycles - b.cycles).abs() < NEARBY_RESOLUTIONS
 }
 
@@ -181,7 +180,7 @@ struct DemodulatedBlock {
 
 /// Approximates `power_of_alternative` from blocks; the relative error is about one over the cycles in the
 /// record.
-fn power_from_blocks(blocks: &[DemodulatedBlock], start: &SinusoidTerm, shape: &UnsteadyOscillation) -> f64 {
+fn power_from_blocks(blocks: &[DemodulatedBlock], start: &SineTerm, shape: &UnsteadyTone) -> f64 {
     let add = |[re, im, power]: [f64; 3], block: &DemodulatedBlock| {
         let (envelope, phase) = shape.envelope_and_phase(block.middle);
         let (sine, cosine) = math::sin_cos(phase - TAU * start.cycles * block.middle);

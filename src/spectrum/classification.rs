@@ -26,7 +26,7 @@ pub(super) const SINGLE_CYCLE_DAMPING: f64 = 0.22;
 /// bands of 5 to 40 resolutions strays by 0.35 and more, the cycle of the bundled blade by up to 0.26.
 const MOST_STRAY: f64 = 0.3;
 /// Deviations from zero from which an amplitude is known.
-const LEAST_AMPLITUDE_DEVIATIONS: f64 = 3.0;
+const LEAST_DEVIATIONS: f64 = 3.0;
 /// What the camera and the motion allow.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RecordContext {
@@ -45,7 +45,7 @@ impl RecordContext {
 
 /// Evidence for and against one component.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct ComponentEvidence {
+pub(super) struct Evidence {
     /// Whether the trend could grow no further and the component is slow enough to be a piece of the flip.
     pub trend_exhausted: bool,
     /// Shift of the frequency with a richer trend, in its own deviations.
@@ -76,11 +76,7 @@ pub(super) struct ComponentEvidence {
 }
 
 /// Judges components, largest first, each with its evidence.
-pub(super) fn classify_components(
-    components: &mut [Component],
-    evidence: &[ComponentEvidence],
-    at: &RecordContext,
-) {
+pub(super) fn classify_components(components: &mut [Component], evidence: &[Evidence], at: &RecordContext) {
     find_relations(components, at);
     for (c, evidence) in components.iter_mut().zip(evidence) {
         let passes = |hz: f64| at.exposure_s.map(|exposure_s| exposure_gain(hz, exposure_s));
@@ -94,7 +90,7 @@ pub(super) fn classify_components(
 }
 
 /// Every reason against a component, gravest first.
-fn collect_reasons(c: &Component, evidence: &ComponentEvidence, at: &RecordContext) -> Vec<ComponentReason> {
+fn collect_reasons(c: &Component, evidence: &Evidence, at: &RecordContext) -> Vec<ComponentReason> {
     let mut found = Vec::new();
     let mut add =
         |verdict, words: Option<String>| found.extend(words.map(|words| ComponentReason { verdict, words }));
@@ -112,7 +108,7 @@ fn collect_reasons(c: &Component, evidence: &ComponentEvidence, at: &RecordConte
 }
 
 /// What makes a frequency ambiguous.
-fn describe_ambiguities(c: &Component, evidence: &ComponentEvidence) -> [Option<String>; 15] {
+fn describe_ambiguities(c: &Component, evidence: &Evidence) -> [Option<String>; 15] {
     let shift_hz = c.trend_shift_hz.unwrap_or_default();
     let near = evidence.nearest.filter(|nearest| *nearest < LEAST_SEPARATION);
     let followed = evidence.followed_share.filter(|followed| *followed < FULLY_FOLLOWED);
@@ -120,7 +116,7 @@ fn describe_ambiguities(c: &Component, evidence: &ComponentEvidence) -> [Option<
     let drift = evidence.drift.filter(|drift| *drift < LEAST_CLEAR_DRIFT);
     let single = c.damping_ratio.filter(|ratio| *ratio > SINGLE_CYCLE_DAMPING);
     let (left, unknown) = (100.0 * evidence.residual_ratio, 100.0 * c.amplitude_sd_m / c.amplitude_m);
-    let unsure = c.amplitude_m < LEAST_AMPLITUDE_DEVIATIONS * c.amplitude_sd_m;
+    let unsure = c.amplitude_m < LEAST_DEVIATIONS * c.amplitude_sd_m;
     let fixed = |holds: bool, words: &str| holds.then(|| words.to_owned());
     [
         fixed(!evidence.keeps_peak, "no oscillation that keeps its frequency and decays steadily explains it"),

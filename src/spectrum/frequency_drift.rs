@@ -4,7 +4,7 @@
 //! Sinusoids can only split such a cycle into pieces. If they leave as much as they explain, or if three or more
 //! of them lie within the range of a ridge that drifts, the ridge is the component and the pieces are dropped.
 
-use super::model_selection::{Decomposition, DriftRegion, LOBE, ModelSelector};
+use super::model_selection::{DriftRegion, LOBE, ModelFit, ModelSelector};
 use super::periodogram::upper_median;
 use super::time_frequency::{self, FrequencyRange, Ridge, RidgeEnd, RidgePoint, Spectrogram};
 use crate::math;
@@ -70,18 +70,18 @@ impl DriftCourse {
 /// Follows the strongest component of a record without its trend and slow oscillations.
 pub(super) fn find_drift_course(
     search: &ModelSelector,
-    explained: &Decomposition,
+    fit: &ModelFit,
     band_hz: Option<(f64, f64)>,
 ) -> Option<DriftCourse> {
-    let (lowest, top) = natural_band_hz(search, explained);
+    let (lowest, top) = natural_band_hz(search, fit);
     let band = band_hz.map_or((lowest, top), |(low, high)| (low.max(lowest), high.min(top)));
     if band.0 >= band.1 {
         return None;
     }
-    let record = remove_slow_parts(search, explained, band.0);
+    let record = remove_slow_parts(search, fit, band.0);
     let (followed_share, ridge) = select_best_ridge(&record, search.frame_rate_hz, band)?;
     let range = ridge.range_hz().filter(|range| {
-        followed_share > LEAST_FOLLOWED && ridge.is_drifting() && is_fragmented(search, explained, range)
+        followed_share > LEAST_FOLLOWED && ridge.is_drifting() && is_fragmented(search, fit, range)
     });
     Some(DriftCourse { ridge, followed_share, range })
 }
@@ -106,8 +106,8 @@ fn select_best_ridge(record: &[Option<f64>], frame_rate_hz: f64, band: (f64, f64
 
 /// Band in which the strongest component above the slow ones may run, Hz. The shortest segment holds a few
 /// cycles of the lower end, so the lower end must not lie far below the component.
-fn natural_band_hz(search: &ModelSelector, explained: &Decomposition) -> (f64, f64) {
-    let prominent = prominent_peaks(search, explained);
+fn natural_band_hz(search: &ModelSelector, fit: &ModelFit) -> (f64, f64) {
+    let prominent = prominent_peaks(search, fit);
     let slow_hz = dominant_slow_hz(&prominent);
     let (low, top) = time_frequency::default_band_hz(search.samples.len(), search.frame_rate_hz, slow_hz);
     let above = || prominent.iter().filter(|s| s.hz >= low);
@@ -123,14 +123,14 @@ struct ProminentPeak {
     amplitude_m: f64,
 }
 
-fn prominent_peaks(search: &ModelSelector, explained: &Decomposition) -> Vec<ProminentPeak> {
-    let model = &explained.model;
+fn prominent_peaks(search: &ModelSelector, fit: &ModelFit) -> Vec<ProminentPeak> {
+    let model = &fit.model;
     let sinusoid = |k: usize| ProminentPeak {
         hz: model.terms()[k].cycles * search.resolution_hz(),
         amplitude_m: model.amplitude_m(k),
     };
     let sinusoids = model.oscillations().into_iter().map(sinusoid);
-    let left = explained.peaks.accepted.iter();
+    let left = fit.peaks.accepted.iter();
     let left = left.map(|p| ProminentPeak { hz: p.frequency_hz, amplitude_m: p.amplitude_m });
     sinusoids.chain(left).collect()
 }
@@ -144,9 +144,9 @@ fn dominant_slow_hz(standing: &[ProminentPeak]) -> Option<f64> {
 }
 
 /// The record without trend, relaxations and the sinusoids below a frequency, m.
-fn remove_slow_parts(search: &ModelSelector, explained: &Decomposition, low_hz: f64) -> Vec<Option<f64>> {
-    let (model, low) = (&explained.model, low_hz / search.resolution_hz());
-    let mut record = explained.residual_m.clone();
+fn remove_slow_parts(search: &ModelSelector, fit: &ModelFit, low_hz: f64) -> Vec<Option<f64>> {
+    let (model, low) = (&fit.model, low_hz / search.resolution_hz());
+    let mut record = fit.residual_m.clone();
     for k in (0..model.terms().len()).filter(|k| model.terms()[*k].cycles >= low) {
         let of_term = model.term_values(k);
         record.iter_mut().zip(of_term).for_each(|(x, value)| *x = x.map(|x| x + value));
@@ -155,16 +155,16 @@ fn remove_slow_parts(search: &ModelSelector, explained: &Decomposition, low_hz: 
 }
 
 /// Whether sinusoids only split the cycle into pieces.
-fn is_fragmented(search: &ModelSelector, explained: &Decomposition, range: &FrequencyRange) -> bool {
+fn is_fragmented(search: &ModelSelector, fit: &ModelFit, range: &FrequencyRange) -> bool {
     let resolution_hz = search.resolution_hz();
     if range.high_hz - range.low_hz < LEAST_RANGE * resolution_hz {
         return false;
     }
     let inside = |hz: f64| hz > range.low_hz - resolution_hz && hz < range.high_hz + resolution_hz;
-    let terms = explained.model.terms();
+    let terms = fit.model.terms();
     let pieces = || (0..terms.len()).filter(|k| inside(terms[*k].cycles * resolution_hz));
-    let largest_m = pieces().map(|k| search.windowed_amplitude_m(&explained.model, k)).fold(0.0, f64::max);
-    let left = explained.peaks.accepted.iter().filter(|p| inside(p.frequency_hz));
+    let largest_m = pieces().map(|k| search.windowed_amplitude_m(&fit.model, k)).fold(0.0, f64::max);
+    let left = fit.peaks.accepted.iter().filter(|p| inside(p.frequency_hz));
     let left_m = left.map(|p| p.amplitude_m).fold(0.0, f64::max);
     pieces().count() >= FRAGMENTS || left_m > LARGE_RESIDUAL * largest_m
 }

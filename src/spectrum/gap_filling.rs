@@ -64,8 +64,7 @@ fn missing_runs(samples: &[Option<f64>]) -> Vec<(usize, usize)> {
 /// Least squares over every fourth difference that touches the cluster and no other missing frame.
 fn solve_cluster(samples: &[Option<f64>], cluster: &[usize]) -> Option<[f64; MOST_UNKNOWNS]> {
     let (first, last) = (*cluster.first()?, *cluster.last()?);
-    let mut normal =
-        BandedNormalEquations { band: [[0.0; ORDER + 1]; MOST_UNKNOWNS], right: [0.0; MOST_UNKNOWNS] };
+    let mut normal = BandedEquations { band: [[0.0; ORDER + 1]; MOST_UNKNOWNS], right: [0.0; MOST_UNKNOWNS] };
     let (mut differences, mut next) = (0, 0);
     for start in first.saturating_sub(ORDER)..=last.min(samples.len().checked_sub(ORDER + 1)?) {
         next += cluster[next..].iter().take_while(|frame| **frame < start).count();
@@ -77,27 +76,21 @@ fn solve_cluster(samples: &[Option<f64>], cluster: &[usize]) -> Option<[f64; MOS
 }
 
 /// Normal equations of a cluster: unknowns further apart than a difference reaches are not coupled.
-struct BandedNormalEquations {
+struct BandedEquations {
     /// The diagonal and what is under it, column by column.
     band: [[f64; ORDER + 1]; MOST_UNKNOWNS],
     right: [f64; MOST_UNKNOWNS],
 }
 
-impl BandedNormalEquations {
+impl BandedEquations {
     /// Adds the difference over the frames from `start` on and returns true, unless one of them is missing that
-    /// is not in `missing`. The first of `missing` has the index `place` among the unknowns.
-    fn add_difference(
-        &mut self,
-        samples: &[Option<f64>],
-        start: usize,
-        place: usize,
-        missing: &[usize],
-    ) -> bool {
+    /// is not in `gaps`. The first of `gaps` has the index `at` among the unknowns.
+    fn add_difference(&mut self, samples: &[Option<f64>], start: usize, at: usize, gaps: &[usize]) -> bool {
         let (mut known, mut weights, mut unknowns) = (0.0, [0.0; ORDER + 1], 0);
         for ((frame, sample), weight) in samples.iter().enumerate().zip(DIFFERENCE) {
             match sample {
                 Some(value) => known += weight * value,
-                None if missing.get(unknowns) == Some(&(start + frame)) => {
+                None if gaps.get(unknowns) == Some(&(start + frame)) => {
                     weights[unknowns] = weight;
                     unknowns += 1;
                 }
@@ -105,8 +98,8 @@ impl BandedNormalEquations {
             }
         }
         for (i, weight) in weights[..unknowns].iter().enumerate() {
-            self.right[place + i] -= weight * known;
-            let row = self.band[place + i].iter_mut().zip(&weights[i..unknowns]);
+            self.right[at + i] -= weight * known;
+            let row = self.band[at + i].iter_mut().zip(&weights[i..unknowns]);
             row.for_each(|(entry, other)| *entry += weight * other);
         }
         unknowns > 0

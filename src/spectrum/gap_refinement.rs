@@ -14,7 +14,7 @@
 //! low. With 0.3 um of noise and 100 um at 78.4 Hz that decay with a damping ratio of 0.05: 0.11 and 0.13 Hz |
 //! 0.07 and 0.06 Hz. A chirp from 870 to 930 Hz: its mean is off by 1.7 | 1.4 Hz.
 
-use super::least_squares::{FreeParameters, SinusoidProblem, SinusoidSolution, SinusoidTerm, Tolerance};
+use super::least_squares::{FreeSet, SineProblem, SineSolution, SineTerm, Tolerance};
 use super::settings::MAX_COMPONENTS;
 use super::trend::Trend;
 use super::{gap_filling, periodogram};
@@ -65,7 +65,7 @@ pub(super) struct RefinedDeviations {
 
 /// Result of a refinement.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum RefinementOutcome {
+pub(super) enum Refinement {
     /// The component stays as the transform shows it.
     Unchanged,
     /// It stays as the transform shows it, though the frames present have this amplitude, m, at its frequency.
@@ -74,11 +74,11 @@ pub(super) enum RefinementOutcome {
 }
 
 /// The components refined together, in the order of their starts.
-pub(super) fn refine_components(
+pub(super) fn refine_peaks(
     samples: &[Option<f64>],
     trend: Trend,
     starts: &[RefinementStart],
-) -> Vec<RefinementOutcome> {
+) -> Vec<Refinement> {
     let fitted = &starts[..starts.len().min(MOST_REFINED)];
     let present = samples.iter().flatten().count();
     let unknowns = trend.column_count() + 3 * fitted.len();
@@ -89,7 +89,7 @@ pub(super) fn refine_components(
     } else {
         Vec::new()
     };
-    outcomes.resize(starts.len(), RefinementOutcome::Unchanged);
+    outcomes.resize(starts.len(), Refinement::Unchanged);
     outcomes
 }
 
@@ -97,15 +97,14 @@ fn fit_components(
     samples: &[Option<f64>],
     trend: Trend,
     starts: &[RefinementStart],
-) -> Option<Vec<RefinementOutcome>> {
+) -> Option<Vec<Refinement>> {
     let free = |start: &RefinementStart| {
-        if start.moves { FreeParameters::Cycles } else { FreeParameters::Amplitude }
+        if start.moves { FreeSet::Cycles } else { FreeSet::Amplitude }
     };
-    let terms: Vec<SinusoidTerm> =
-        starts.iter().map(|s| SinusoidTerm::from_start(s.cycles, 0.0, free(s))).collect();
+    let terms: Vec<SineTerm> = starts.iter().map(|s| SineTerm::from_start(s.cycles, 0.0, free(s))).collect();
     let measured = trend.residual(samples);
     let hann = periodogram::hann_weights(samples);
-    let problem = SinusoidProblem::new(&measured, &hann, trend);
+    let problem = SineProblem::new(&measured, &hann, trend);
     let mut solved = problem.gauss_newton(&terms, Tolerance::Fine)?;
     let rest = |model: &[f64]| -> Vec<Option<f64>> {
         samples.iter().zip(measured.iter().zip(model)).map(|(sample, (x, m))| sample.map(|_| x - m)).collect()
@@ -114,7 +113,7 @@ fn fit_components(
     let mut left = rest(&model);
     if is_white(&left) {
         let weights: Vec<f64> = samples.iter().map(|x| f64::from(u8::from(x.is_some()))).collect();
-        let problem = SinusoidProblem::new(&measured, &weights, trend);
+        let problem = SineProblem::new(&measured, &weights, trend);
         let solved = problem.gauss_newton(&solved.terms, Tolerance::Fine)?;
         return refinement_outcomes(&problem, &solved, starts, true);
     }
@@ -123,7 +122,7 @@ fn fit_components(
         let bridged = gap_filling::fill_short_gaps(&left);
         let data: Vec<f64> =
             bridged.iter().zip(&model).map(|(left, m)| left.map_or(0.0, |left| left + m)).collect();
-        let problem = SinusoidProblem::new(&data, &periodogram::hann_weights(&bridged), trend);
+        let problem = SineProblem::new(&data, &periodogram::hann_weights(&bridged), trend);
         solved = problem.gauss_newton(&solved.terms, Tolerance::Fine)?;
         model = problem.model_values(&solved);
         left = rest(&model);
@@ -135,11 +134,11 @@ fn fit_components(
 /// Result for each start. `white` says that all weights are one and the residual is noise, which determines the
 /// deviations.
 fn refinement_outcomes(
-    problem: &SinusoidProblem,
-    solved: &SinusoidSolution,
+    problem: &SineProblem,
+    solved: &SineSolution,
     starts: &[RefinementStart],
     white: bool,
-) -> Option<Vec<RefinementOutcome>> {
+) -> Option<Vec<Refinement>> {
     let freedom = problem.weight - problem.unknown_count(&solved.terms) as f64;
     if white && freedom <= 0.0 {
         return None;
@@ -147,17 +146,17 @@ fn refinement_outcomes(
     let noise_m = (solved.misfit.max(0.0) / freedom).sqrt();
     let covariance = if white { Some(problem.covariance(solved)?) } else { None };
     let outcome = |(k, start): (usize, &RefinementStart)| {
-        let pair = problem.quadrature_amplitudes(solved, k);
+        let pair = problem.amplitude_pair(solved, k);
         let amplitude_m = math::hypot(pair[0], pair[1]);
-        match (start.moves, solved.terms[k].free == FreeParameters::Cycles && amplitude_m > 0.0) {
-            (false, _) => RefinementOutcome::Unchanged,
-            (true, false) => RefinementOutcome::FixedFrequency(amplitude_m),
+        match (start.moves, solved.terms[k].free == FreeSet::Cycles && amplitude_m > 0.0) {
+            (false, _) => Refinement::Unchanged,
+            (true, false) => Refinement::FixedFrequency(amplitude_m),
             (true, true) => {
                 let deviations = covariance.as_ref().map(|c| c.deviations(k, pair)).map(|sd| {
                     RefinedDeviations { cycles: sd.cycles * noise_m, amplitude_m: sd.amplitude * noise_m }
                 });
                 let cycles = solved.terms[k].cycles;
-                RefinementOutcome::Refined(RefinedComponent { cycles, amplitude_m, deviations })
+                Refinement::Refined(RefinedComponent { cycles, amplitude_m, deviations })
             }
         }
     };
@@ -193,15 +192,15 @@ mod tests {
     fn exact_sinusoids_are_found_exactly_and_a_third_is_absent() {
         let samples = gappy(300, |s| 1.0 + s + 2.0 * (TAU * 11.3 * s).cos() + (TAU * 57.8 * s + 1.0).sin());
         let starts = [11.5, 57.5, 90.0].map(|cycles| RefinementStart { cycles, moves: true });
-        let found = refine_components(&samples, Trend::Polynomial(4), &starts);
+        let found = refine_peaks(&samples, Trend::Polynomial(4), &starts);
         for (outcome, (cycles, amplitude)) in found.iter().zip([(11.3, 2.0), (57.8, 1.0)]) {
-            let RefinementOutcome::Refined(r) = outcome else { panic!("{outcome:?}") };
+            let Refinement::Refined(r) = outcome else { panic!("{outcome:?}") };
             assert!((r.cycles - cycles).abs() < 1e-6 && (r.amplitude_m - amplitude).abs() < 1e-6, "{r:?}");
         }
         let left = match found[2] {
-            RefinementOutcome::Refined(r) => r.amplitude_m,
-            RefinementOutcome::FixedFrequency(amplitude_m) => amplitude_m,
-            RefinementOutcome::Unchanged => f64::NAN,
+            Refinement::Refined(r) => r.amplitude_m,
+            Refinement::FixedFrequency(amplitude_m) => amplitude_m,
+            Refinement::Unchanged => f64::NAN,
         };
         assert!(left < 1e-6, "{found:?}");
     }
@@ -212,30 +211,21 @@ mod tests {
         let few_gaps: Vec<_> =
             (0..300).map(|i| (i % 10 != 3).then(|| (TAU * 11.3 * i as f64 / 300.0).cos())).collect();
         assert_eq!(
-            refine_components(&few_gaps, Trend::Polynomial(4), &start),
-            [RefinementOutcome::Unchanged],
+            refine_peaks(&few_gaps, Trend::Polynomial(4), &start),
+            [Refinement::Unchanged],
             "a tenth missing is not more than a tenth"
         );
         let few_frames: Vec<_> = (0..54).map(|i| (i % 2 == 0).then_some(f64::from(i))).collect();
         assert_eq!(few_frames.iter().flatten().count(), 27, "one short of four for each of 4 + 3 unknowns");
-        assert_eq!(
-            refine_components(&few_frames, Trend::Polynomial(4), &start),
-            [RefinementOutcome::Unchanged]
-        );
+        assert_eq!(refine_peaks(&few_frames, Trend::Polynomial(4), &start), [Refinement::Unchanged]);
     }
 
     #[test]
     fn a_frequency_that_wants_to_leave_its_peak_is_kept() {
         let samples = gappy(300, |s| (TAU * 11.3 * s).cos());
-        let found = refine_components(
-            &samples,
-            Trend::Polynomial(4),
-            &[RefinementStart { cycles: 12.9, moves: true }],
-        );
-        assert!(
-            !matches!(found[0], RefinementOutcome::Refined(r) if (r.cycles - 12.9).abs() > 1.0),
-            "{found:?}"
-        );
+        let found =
+            refine_peaks(&samples, Trend::Polynomial(4), &[RefinementStart { cycles: 12.9, moves: true }]);
+        assert!(!matches!(found[0], Refinement::Refined(r) if (r.cycles - 12.9).abs() > 1.0), "{found:?}");
     }
 
     #[test]

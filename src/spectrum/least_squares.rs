@@ -40,21 +40,21 @@ const MOST_RELAXED_AT_END: f64 = 330.0;
 
 /// Parameters of a term that a fit moves.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum FreeParameters {
+pub(super) enum FreeSet {
     Amplitude,
     Cycles,
-    CyclesAndNepers,
+    Both,
     /// The decay alone: with no cycles, a relaxation.
     Nepers,
 }
 
-impl FreeParameters {
+impl FreeSet {
     fn moves_cycles(self) -> bool {
-        matches!(self, Self::Cycles | Self::CyclesAndNepers)
+        matches!(self, Self::Cycles | Self::Both)
     }
 
     fn moves_nepers(self) -> bool {
-        matches!(self, Self::Nepers | Self::CyclesAndNepers)
+        matches!(self, Self::Nepers | Self::Both)
     }
 
     /// Number of moving parameters besides the amplitudes.
@@ -65,7 +65,7 @@ impl FreeParameters {
 
 /// A sinusoid, decaying or not; a relaxation if it has no cycles.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct SinusoidTerm {
+pub(super) struct SineTerm {
     /// Cycles in the record.
     pub cycles: f64,
     /// Nepers by which it decays over the record.
@@ -73,12 +73,12 @@ pub(super) struct SinusoidTerm {
     /// First frame in which it is present.
     pub first: usize,
     /// Parameters that a fit moves.
-    pub free: FreeParameters,
+    pub free: FreeSet,
 }
 
-impl SinusoidTerm {
+impl SineTerm {
     /// A term that is present from the first frame on.
-    pub(super) fn from_start(cycles: f64, nepers: f64, free: FreeParameters) -> Self {
+    pub(super) fn from_start(cycles: f64, nepers: f64, free: FreeSet) -> Self {
         Self { cycles, nepers, first: 0, free }
     }
 
@@ -121,7 +121,7 @@ impl Tolerance {
 /// A record with the weights of its frames, and its trend, which is fitted together with the sinusoids because
 /// they are not orthogonal.
 #[derive(Debug, Clone)]
-pub(super) struct SinusoidProblem {
+pub(super) struct SineProblem {
     pub trend: Trend,
     /// Sum of the weights.
     pub weight: f64,
@@ -130,8 +130,8 @@ pub(super) struct SinusoidProblem {
 }
 
 #[derive(Debug, Clone)]
-pub(super) struct SinusoidSolution {
-    pub terms: Vec<SinusoidTerm>,
+pub(super) struct SineSolution {
+    pub terms: Vec<SineTerm>,
     /// Trend, then cosine and sine amplitude of each term with its phase counted from the middle of the
     /// record and at the start of its envelope, m.
     pub amplitudes: DVector<f64>,
@@ -139,7 +139,7 @@ pub(super) struct SinusoidSolution {
     pub misfit: f64,
 }
 
-impl SinusoidProblem {
+impl SineProblem {
     /// A record, m, with the weight of each frame, zero where there is none.
     pub(super) fn new(data: &[f64], weights: &[f64], trend: Trend) -> Self {
         let columns = Rc::new(FixedColumns::new(trend, data, weights));
@@ -149,7 +149,7 @@ impl SinusoidProblem {
     /// Minimises the misfit over the free parameters; `None` where the normal matrix is not finite. A term whose
     /// step would leave its peak returns to it and keeps its frequency; one that would decay or grow beyond
     /// bounds becomes steady.
-    pub(super) fn gauss_newton(&self, terms: &[SinusoidTerm], care: Tolerance) -> Option<SinusoidSolution> {
+    pub(super) fn gauss_newton(&self, terms: &[SineTerm], care: Tolerance) -> Option<SineSolution> {
         let (least_decrease, most_steps) = care.least_decrease_and_most_steps();
         let mut solved = self.solve_amplitudes(terms.to_vec())?;
         for _ in 0..most_steps {
@@ -173,17 +173,17 @@ impl SinusoidProblem {
     }
 
     /// The trend in every frame, m.
-    pub(super) fn trend_values(&self, solved: &SinusoidSolution) -> Vec<f64> {
+    pub(super) fn trend_values(&self, solved: &SineSolution) -> Vec<f64> {
         self.trend.values(&solved.amplitudes.as_slice()[..self.trend.column_count()], self.frames)
     }
 
     /// A term in every frame, m.
-    pub(super) fn term_values(&self, solved: &SinusoidSolution, k: usize) -> Vec<f64> {
-        columns::term_values(&solved.terms[k], self.quadrature_amplitudes(solved, k), self.frames)
+    pub(super) fn term_values(&self, solved: &SineSolution, k: usize) -> Vec<f64> {
+        columns::term_values(&solved.terms[k], self.amplitude_pair(solved, k), self.frames)
     }
 
     /// Trend and terms in every frame, m.
-    pub(super) fn model_values(&self, solved: &SinusoidSolution) -> Vec<f64> {
+    pub(super) fn model_values(&self, solved: &SineSolution) -> Vec<f64> {
         let mut model = self.trend_values(solved);
         for k in 0..solved.terms.len() {
             model.iter_mut().zip(self.term_values(solved, k)).for_each(|(sum, value)| *sum += value);
@@ -192,31 +192,31 @@ impl SinusoidProblem {
     }
 
     /// Cosine and sine amplitude of a term, m.
-    pub(super) fn quadrature_amplitudes(&self, solved: &SinusoidSolution, k: usize) -> [f64; 2] {
+    pub(super) fn amplitude_pair(&self, solved: &SineSolution, k: usize) -> [f64; 2] {
         [0, 1].map(|part| solved.amplitudes[self.trend.column_count() + 2 * k + part])
     }
 
     /// Number of fitted parameters.
-    pub(super) fn unknown_count(&self, terms: &[SinusoidTerm]) -> usize {
-        let amplitudes = |t: &SinusoidTerm| if t.cycles == 0.0 { 1 } else { 2 };
+    pub(super) fn unknown_count(&self, terms: &[SineTerm]) -> usize {
+        let amplitudes = |t: &SineTerm| if t.cycles == 0.0 { 1 } else { 2 };
         self.trend.column_count() + terms.iter().map(|t| amplitudes(t) + t.free.count()).sum::<usize>()
     }
 
     /// The amplitudes of least misfit at given terms.
-    pub(super) fn solve_amplitudes(&self, terms: Vec<SinusoidTerm>) -> Option<SinusoidSolution> {
+    pub(super) fn solve_amplitudes(&self, terms: Vec<SineTerm>) -> Option<SineSolution> {
         let gram = self.columns.gram_matrix::<QUADRATURE_COLUMNS>(&terms);
         let last = gram.ncols() - 1;
         let right = gram.column(last).rows(0, last).into_owned();
         let amplitudes = pseudo_inverse(&gram.view((0, 0), (last, last)).into_owned())? * &right;
         let misfit = gram[(last, last)] - right.dot(&amplitudes);
-        Some(SinusoidSolution { terms, amplitudes, misfit })
+        Some(SineSolution { terms, amplitudes, misfit })
     }
 
     /// The step, halved until the misfit falls; `None` where it does not.
-    fn halve_until_descent(&self, from: &SinusoidSolution, step: &[[f64; 2]]) -> Option<SinusoidSolution> {
+    fn halve_until_descent(&self, from: &SineSolution, step: &[[f64; 2]]) -> Option<SineSolution> {
         (0..MOST_HALVINGS).find_map(|halvings| {
             let share = math::powi(0.5, halvings);
-            let moved = |(t, s): (&SinusoidTerm, &[f64; 2])| SinusoidTerm {
+            let moved = |(t, s): (&SineTerm, &[f64; 2])| SineTerm {
                 cycles: t.cycles + share * s[0],
                 nepers: t.nepers + share * s[1],
                 ..*t
@@ -228,7 +228,7 @@ impl SinusoidProblem {
 
     /// The unknowns as combinations of the columns: the linear ones, then cycles and nepers of each term where
     /// they are free.
-    fn unknowns_matrix(&self, solved: &SinusoidSolution) -> DMatrix<f64> {
+    fn unknowns_matrix(&self, solved: &SineSolution) -> DMatrix<f64> {
         let trend = self.trend.column_count();
         let pair = |k| [TermColumn::Cosine, TermColumn::Sine].map(|column| column.column_index(trend, k));
         let linear: Vec<usize> = (0..trend).chain((0..solved.terms.len()).flat_map(pair)).collect();
@@ -240,7 +240,7 @@ impl SinusoidProblem {
         }
         let mut place = linear.len();
         for (k, term) in solved.terms.iter().enumerate() {
-            let [cosine, sine] = self.quadrature_amplitudes(solved, k);
+            let [cosine, sine] = self.amplitude_pair(solved, k);
             let mut add =
                 |of: TermColumn, place: usize, value: f64| map[(of.column_index(trend, k), place)] = value;
             if term.free.moves_cycles() {
@@ -263,7 +263,7 @@ impl SinusoidProblem {
     }
 
     /// The Gauss-Newton step of cycles and nepers of each term; zero for held parameters.
-    fn gauss_newton_step(&self, solved: &SinusoidSolution) -> Option<Vec<[f64; 2]>> {
+    fn gauss_newton_step(&self, solved: &SineSolution) -> Option<Vec<[f64; 2]>> {
         let map = self.unknowns_matrix(solved);
         let gram = self.columns.gram_matrix::<COLUMNS_WITH_SLOPES>(&solved.terms);
         let linear = solved.amplitudes.len();
@@ -273,12 +273,12 @@ impl SinusoidProblem {
         let change = pseudo_inverse(&map.tr_mul(&(&gram * &map)))? * towards;
         let mut moves = change.iter().skip(linear).copied();
         let mut take = |free: bool| if free { moves.next().unwrap_or(0.0) } else { 0.0 };
-        let mut step = |t: &SinusoidTerm| [take(t.free.moves_cycles()), take(t.free.moves_nepers())];
+        let mut step = |t: &SineTerm| [take(t.free.moves_cycles()), take(t.free.moves_nepers())];
         Some(solved.terms.iter().map(&mut step).collect())
     }
 
     /// Covariance of the unknowns for a residual of unit white noise, and the indices of each term in it.
-    pub(super) fn covariance(&self, solved: &SinusoidSolution) -> Option<SinusoidCovariance> {
+    pub(super) fn covariance(&self, solved: &SineSolution) -> Option<SineCovariance> {
         let map = self.unknowns_matrix(solved);
         let gram = self.columns.gram_matrix::<COLUMNS_WITH_SLOPES>(&solved.terms);
         let matrix = pseudo_inverse(&map.tr_mul(&(gram * &map)))?;
@@ -288,17 +288,17 @@ impl SinusoidProblem {
             next += usize::from(free);
             place
         };
-        let place = |(k, t): (usize, &SinusoidTerm)| UnknownIndices {
+        let place = |(k, t): (usize, &SineTerm)| UnknownIndices {
             amplitudes: self.trend.column_count() + 2 * k,
             cycles: take(t.free.moves_cycles()),
             nepers: take(t.free.moves_nepers()),
         };
-        Some(SinusoidCovariance { matrix, places: solved.terms.iter().enumerate().map(place).collect() })
+        Some(SineCovariance { matrix, places: solved.terms.iter().enumerate().map(place).collect() })
     }
 }
 
 /// Covariance of everything fitted.
-pub(super) struct SinusoidCovariance {
+pub(super) struct SineCovariance {
     matrix: DMatrix<f64>,
     places: Vec<UnknownIndices>,
 }
@@ -319,7 +319,7 @@ pub(super) struct TermDeviations {
     pub amplitude: f64,
 }
 
-impl SinusoidCovariance {
+impl SineCovariance {
     /// The deviations of term `k`, whose cosine and sine amplitudes are `pair`.
     pub(super) fn deviations(&self, k: usize, pair: [f64; 2]) -> TermDeviations {
         let place = &self.places[k];
@@ -336,18 +336,18 @@ impl SinusoidCovariance {
 }
 
 /// The term that replaces one whose step leaves its peak or its bounds; `None` for a step that may be taken.
-fn constrain_step(start: &SinusoidTerm, now: &SinusoidTerm, step: [f64; 2]) -> Option<SinusoidTerm> {
+fn constrain_step(start: &SineTerm, now: &SineTerm, step: [f64; 2]) -> Option<SineTerm> {
     let width = now.nepers.abs() / TAU; // a decaying peak is as wide as it decays
     if (now.cycles + step[0] - start.cycles).abs() > MOST_FREQUENCY_SHIFT + width {
-        let decays = now.free == FreeParameters::CyclesAndNepers;
-        let free = if decays { FreeParameters::Nepers } else { FreeParameters::Amplitude };
-        return Some(SinusoidTerm { cycles: start.cycles, free, ..*now });
+        let decays = now.free == FreeSet::Both;
+        let free = if decays { FreeSet::Nepers } else { FreeSet::Amplitude };
+        return Some(SineTerm { cycles: start.cycles, free, ..*now });
     }
     let (low, high) = now.nepers_bounds();
     let beyond = !(low..=high).contains(&(now.nepers + step[1]));
     beyond.then_some(match now.free {
-        FreeParameters::CyclesAndNepers => SinusoidTerm { nepers: 0.0, free: FreeParameters::Cycles, ..*now },
-        _ => SinusoidTerm { free: FreeParameters::Amplitude, ..*now },
+        FreeSet::Both => SineTerm { nepers: 0.0, free: FreeSet::Cycles, ..*now },
+        _ => SineTerm { free: FreeSet::Amplitude, ..*now },
     })
 }
 

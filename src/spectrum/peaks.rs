@@ -1,7 +1,7 @@
 //! Components: local maxima that are no sidelobe, no ripple of a larger peak, and not noise.
 
 use super::component::{Component, ComponentVerdict, Estimator};
-use super::gap_refinement::{MOST_REFINED, RefinementOutcome, RefinementStart};
+use super::gap_refinement::{MOST_REFINED, Refinement, RefinementStart};
 use super::peak_zoom::{WeightedRecord, log_parabola_vertex};
 use super::periodogram::{WindowSums, WindowedSpectrum, upper_median};
 use super::settings::{CLEAR_DB, MIN_CYCLES};
@@ -71,24 +71,23 @@ impl PeakList {
     pub(super) fn list_components(
         &self,
         spectrum: &WindowedSpectrum,
-        outcomes: &[RefinementOutcome],
+        outcomes: &[Refinement],
     ) -> Vec<Component> {
-        let refined = |o: &RefinementOutcome| {
-            if let RefinementOutcome::Refined(r) = o { Some(r.amplitude_m) } else { None }
+        let refined = |o: &Refinement| {
+            if let Refinement::Refined(r) = o { Some(r.amplitude_m) } else { None }
         };
         let least_m = DYNAMIC_RANGE * outcomes.iter().filter_map(refined).fold(0.0, f64::max);
         let absent = |index: usize| match outcomes[index] {
-            RefinementOutcome::Unchanged => false,
-            RefinementOutcome::FixedFrequency(amplitude_m) => amplitude_m < least_m,
+            Refinement::Unchanged => false,
+            Refinement::FixedFrequency(amplitude_m) => amplitude_m < least_m,
             // the noise of a bin holds both parts of an amplitude, so it is the square root of two times the
             // deviation
-            RefinementOutcome::Refined(r) => {
+            Refinement::Refined(r) => {
                 let noise_m = r.deviations.map_or(0.0, |sd| self.detection * SQRT_2 * sd.amplitude_m);
                 r.amplitude_m < least_m.max(noise_m)
             }
         };
-        let component =
-            |k: &usize| component_of_peak(spectrum, self.floor_m, &self.accepted[*k], outcomes[*k]);
+        let component = |k: &usize| peak_component(spectrum, self.floor_m, &self.accepted[*k], outcomes[*k]);
         let listed = self.listed.iter().filter(|index| !absent(**index));
         let mut components: Vec<Component> = listed.map(component).collect();
         components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
@@ -184,17 +183,12 @@ fn is_separate_peak(spectrum: &WindowedSpectrum, larger: &Peak, peak: &Peak) -> 
 }
 
 /// The component of a peak, from its refinement where it has one.
-fn component_of_peak(
-    spectrum: &WindowedSpectrum,
-    floor_m: f64,
-    peak: &Peak,
-    outcome: RefinementOutcome,
-) -> Component {
+fn peak_component(spectrum: &WindowedSpectrum, floor_m: f64, peak: &Peak, outcome: Refinement) -> Component {
     let trend_hz = TREND_SHARE * spectrum.resolution_hz;
     let bound_sd_hz = OVER_BOUND * cramer_rao_bound_hz(spectrum, floor_m, peak);
     let (mut estimator, mut sds) = (Estimator::Periodogram, (bound_sd_hz, floor_m * FRAC_1_SQRT_2));
     let (mut frequency_hz, mut amplitude_m) = (peak.frequency_hz, peak.amplitude_m);
-    if let RefinementOutcome::Refined(r) = outcome {
+    if let Refinement::Refined(r) = outcome {
         estimator = Estimator::LeastSquares;
         (frequency_hz, amplitude_m) = (r.cycles * spectrum.resolution_hz, r.amplitude_m);
         sds = r.deviations.map_or(sds, |sd| (sd.cycles * spectrum.resolution_hz, sd.amplitude_m));

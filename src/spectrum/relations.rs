@@ -95,24 +95,18 @@ fn tolerance_hz(sd_hz: f64, at: &RecordContext) -> f64 {
     (MATCH_DEVIATIONS * sd_hz).min(MATCH_RESOLUTIONS * at.resolution_hz)
 }
 
-/// Whether `other` is `times` a frequency, also a folded one; adds the chance of a random match.
-fn matches_multiple(
-    base: &Component,
-    other: &Component,
-    times: f64,
-    at: &RecordContext,
-    chance: &mut f64,
-) -> bool {
-    let within_hz = tolerance_hz(math::hypot(other.frequency_sd_hz, times * base.frequency_sd_hz), at);
+/// Whether `c` is `times` the frequency of `base`, also folded; adds the probability of a random match to `chance`.
+fn is_multiple(base: &Component, c: &Component, times: f64, at: &RecordContext, chance: &mut f64) -> bool {
+    let within_hz = tolerance_hz(math::hypot(c.frequency_sd_hz, times * base.frequency_sd_hz), at);
     *chance += 2.0 * within_hz / base.frequency_hz;
-    (alias_hz(times * base.frequency_hz, at.frame_rate_hz) - other.frequency_hz).abs() <= within_hz
+    (alias_hz(times * base.frequency_hz, at.frame_rate_hz) - c.frequency_hz).abs() <= within_hz
 }
 
 /// `other` as a multiple of `base`, also a folded one.
 fn find_harmonic(base: &Component, other: &Component, at: &RecordContext) -> Option<Harmonic> {
     let mut chance = 0.0;
     for multiple in 2..=MOST_MULTIPLE {
-        let matches = matches_multiple(base, other, multiple as f64, at, &mut chance);
+        let matches = is_multiple(base, other, multiple as f64, at, &mut chance);
         let folds = multiple as f64 * base.frequency_hz > at.frame_rate_hz / 2.0;
         if multiple > ALWAYS_TRIED_MULTIPLES && chance > CHANCE_MATCHES || folds && multiple > MOST_FOLDED {
             return None;
@@ -130,7 +124,7 @@ fn find_subharmonic(base: &Component, other: &Component, at: &RecordContext) -> 
     for denominator in SUBHARMONIC_DENOMINATORS {
         for numerator in (1..=MOST_FRACTION * denominator).filter(|n| n % denominator != 0) {
             let times = numerator as f64 / denominator as f64;
-            let matches = matches_multiple(base, other, times, at, &mut chance);
+            let matches = is_multiple(base, other, times, at, &mut chance);
             if chance > CHANCE_MATCHES {
                 return None;
             }

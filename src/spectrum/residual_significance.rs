@@ -1,7 +1,7 @@
 //! Whether the residual of a fit is noise, or has peaks that no term explains.
 
-use super::least_squares::SinusoidTerm;
-use super::model_selection::{Decomposition, ModelSelector, SinusoidModel, is_in_lobe, lobe_half_width};
+use super::least_squares::SineTerm;
+use super::model_selection::{ModelFit, ModelSelector, SineModel, is_in_lobe, lobe_half_width};
 use super::peaks::Peak;
 use super::periodogram::upper_median;
 use super::settings::MIN_CYCLES;
@@ -20,104 +20,99 @@ const NOISE_RATIO_LIMIT: f64 = 1.5;
 
 impl ModelSelector<'_> {
     /// Whether the residual is no larger than the noise floor.
-    pub(super) fn leaves_only_noise(&self, explained: &Decomposition) -> bool {
-        let parts = &explained.model;
+    pub(super) fn leaves_only_noise(&self, fit: &ModelFit) -> bool {
+        let parts = &fit.model;
         let freedom =
             self.periodogram.sums.present as f64 - parts.problem.unknown_count(parts.terms()) as f64;
-        let floor_m = self.periodogram.noise_sd_m(explained.peaks.floor_m);
+        let floor_m = self.periodogram.noise_sd_m(fit.peaks.floor_m);
         parts.solution.misfit < NOISE_RATIO_LIMIT * freedom.max(1.0) * floor_m * floor_m
     }
 
     /// Amplitude of a term in the spectrum, m.
-    pub(super) fn windowed_amplitude_m(&self, parts: &SinusoidModel, k: usize) -> f64 {
+    pub(super) fn windowed_amplitude_m(&self, parts: &SineModel, k: usize) -> f64 {
         self.periodogram.amplitude_at(&parts.term_values(k), parts.terms()[k].cycles)
     }
 
     /// The largest peak left within the lobe of a term, m; 0 where noise alone may have made it.
-    pub(super) fn largest_peak_near(&self, explained: &Decomposition, term: &SinusoidTerm) -> f64 {
-        let near = explained.peaks.accepted.iter().filter(|p| is_in_lobe(self.cycles_of_peak(p), term));
+    pub(super) fn largest_peak_near(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
+        let near = fit.peaks.accepted.iter().filter(|p| is_in_lobe(self.cycles_of_peak(p), term));
         near.fold(0.0, |largest: f64, peak| largest.max(peak.amplitude_m))
     }
 
     /// Largest residual amplitude near a component, m, at a peak or not; 0 where noise alone may have made it.
     /// A companion too close to be resolved leaves most at the end of the lobe, where it has no peak of its own.
-    pub(super) fn significant_residual_near(&self, explained: &Decomposition, term: &SinusoidTerm) -> f64 {
-        let most = self.largest_residual_near(explained, term);
-        let noise_m = self.noise_floor_near(explained, term.cycles);
-        if most > explained.peaks.detection * noise_m { most } else { 0.0 }
+    pub(super) fn significant_residual(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
+        let most = self.residual_near(fit, term);
+        let noise_m = self.noise_floor_near(fit, term.cycles);
+        if most > fit.peaks.detection * noise_m { most } else { 0.0 }
     }
 
     /// Largest residual amplitude near a component, m, noise included.
-    pub(super) fn largest_residual_near(&self, explained: &Decomposition, term: &SinusoidTerm) -> f64 {
+    pub(super) fn residual_near(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let width = lobe_half_width(term) + 1.0;
-        let next_to = self.residual_spectrum_between(explained, term.cycles - width, term.cycles + width);
+        let next_to = self.residual_between(fit, term.cycles - width, term.cycles + width);
         next_to.iter().fold(0.0, |most: f64, a| most.max(*a))
     }
 
     /// Whether a slow term exceeds the residual near it by the detection level. Few values determine the noise
     /// there, and they include the residuals of other slow terms.
-    pub(super) fn exceeds_slow_residuals(&self, explained: &Decomposition, k: usize) -> bool {
-        let (parts, term) = (&explained.model, &explained.model.terms()[k]);
-        let least_m = explained.peaks.detection * self.largest_residual_near(explained, term);
+    pub(super) fn exceeds_residual(&self, fit: &ModelFit, k: usize) -> bool {
+        let (parts, term) = (&fit.model, &fit.model.terms()[k]);
+        let least_m = fit.peaks.detection * self.residual_near(fit, term);
         term.cycles <= NEIGHBOURHOOD && !term.is_transient() && self.windowed_amplitude_m(parts, k) > least_m
     }
 
     /// The noise floor around a frequency, m, but no less than that of the whole spectrum: noise need not be
     /// white.
-    pub(super) fn noise_floor_near(&self, explained: &Decomposition, cycles: f64) -> f64 {
-        let near = self.noise_floor_between(explained, cycles - NEIGHBOURHOOD, cycles + NEIGHBOURHOOD);
-        explained.peaks.floor_m.max(near)
+    pub(super) fn noise_floor_near(&self, fit: &ModelFit, cycles: f64) -> f64 {
+        let near = self.noise_floor_between(fit, cycles - NEIGHBOURHOOD, cycles + NEIGHBOURHOOD);
+        fit.peaks.floor_m.max(near)
     }
 
     /// The noise floor between two frequencies, cycles in the record, m; 0 where nothing lies between them.
-    pub(super) fn noise_floor_between(&self, explained: &Decomposition, low: f64, high: f64) -> f64 {
-        let around = self.residual_spectrum_between(explained, low, high).to_vec();
+    pub(super) fn noise_floor_between(&self, fit: &ModelFit, low: f64, high: f64) -> f64 {
+        let around = self.residual_between(fit, low, high).to_vec();
         upper_median(around).unwrap_or(0.0) / std::f64::consts::LN_2.sqrt()
     }
 
     /// Spectrum of the residual between two frequencies, cycles in the record.
-    pub(super) fn residual_spectrum_between<'b>(
-        &self,
-        explained: &'b Decomposition,
-        low: f64,
-        high: f64,
-    ) -> &'b [f64] {
-        let amplitude_m = &explained.amplitude_m[..];
+    pub(super) fn residual_between<'b>(&self, fit: &'b ModelFit, low: f64, high: f64) -> &'b [f64] {
+        let amplitude_m = &fit.amplitude_m[..];
         let bins_a_cycle = 2.0 * (amplitude_m.len() as f64 - 1.0) / self.samples.len() as f64;
         let bin = |cycles: f64| ((cycles.max(0.0) * bins_a_cycle) as usize).min(amplitude_m.len());
         amplitude_m.get(bin(low)..bin(high)).unwrap_or_default()
     }
 
     /// Peaks left outside the lobe of every term: no decaying oscillation explains them.
-    pub(super) fn unexplained_peaks(&self, explained: &Decomposition) -> Vec<Peak> {
-        let lowest = MIN_CYCLES.max(explained.model.trend().fastest_waves() + 1.0);
+    pub(super) fn unexplained_peaks(&self, fit: &ModelFit) -> Vec<Peak> {
+        let lowest = MIN_CYCLES.max(fit.model.trend().fastest_waves() + 1.0);
         let is_unexplained = |p: &Peak| {
             self.cycles_of_peak(p) >= lowest
-                && self.is_new_peak(explained.model.terms(), p)
-                && self.stands_out(explained, p)
+                && self.is_new_peak(fit.model.terms(), p)
+                && self.stands_out(fit, p)
         };
-        explained.peaks.accepted.iter().copied().filter(is_unexplained).collect()
+        fit.peaks.accepted.iter().copied().filter(is_unexplained).collect()
     }
 
     /// Whether a peak stands out of the noise around it.
-    pub(super) fn stands_out(&self, explained: &Decomposition, peak: &Peak) -> bool {
-        let noise_m = self.noise_floor_near(explained, self.cycles_of_peak(peak));
-        peak.amplitude_m > explained.peaks.detection * noise_m
+    pub(super) fn stands_out(&self, fit: &ModelFit, peak: &Peak) -> bool {
+        let noise_m = self.noise_floor_near(fit, self.cycles_of_peak(peak));
+        peak.amplitude_m > fit.peaks.detection * noise_m
     }
 
     /// Whether a peak stands out of the octaves around it. An oscillation that begins inside the record raises
     /// its own neighbourhood.
-    pub(super) fn stands_out_widely(&self, explained: &Decomposition, peak: &Peak) -> bool {
-        let noise_m = self.noise_sd_of_octaves(explained, self.cycles_of_peak(peak));
-        self.periodogram.noise_sd_m(peak.amplitude_m) > explained.peaks.detection * noise_m
+    pub(super) fn stands_out_widely(&self, fit: &ModelFit, peak: &Peak) -> bool {
+        let noise_m = self.octave_noise_sd(fit, self.cycles_of_peak(peak));
+        self.periodogram.noise_sd_m(peak.amplitude_m) > fit.peaks.detection * noise_m
     }
 
     /// Deviation of the noise that a term must stand out of, m.
-    pub(super) fn noise_sd_for_term(&self, explained: &Decomposition, term: &SinusoidTerm) -> f64 {
+    pub(super) fn noise_sd_for_term(&self, fit: &ModelFit, term: &SineTerm) -> f64 {
         let wide_m = if term.is_transient() {
-            self.noise_sd_of_octaves(explained, term.cycles)
+            self.octave_noise_sd(fit, term.cycles)
         } else {
-            self.periodogram.noise_sd_m(self.noise_floor_near(explained, term.cycles))
+            self.periodogram.noise_sd_m(self.noise_floor_near(fit, term.cycles))
         };
         if term.cycles > NEIGHBOURHOOD {
             return wide_m;
@@ -125,7 +120,7 @@ impl ModelSelector<'_> {
         // the noise of a shaking camera falls steeply with frequency: a neighbourhood must not reach down to
         // zero, and a few values determine the noise less well
         let near = (term.cycles / 2.0).max(FEWEST_RESOLUTIONS);
-        let few = self.noise_floor_between(explained, term.cycles - near, term.cycles + near);
+        let few = self.noise_floor_between(fit, term.cycles - near, term.cycles + near);
         wide_m.max(FEW_VALUES_FACTOR * self.periodogram.noise_sd_m(few))
     }
 }

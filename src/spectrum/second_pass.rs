@@ -3,10 +3,8 @@
 
 use super::chirp_alternatives::nearby_terms;
 use super::classification::SINGLE_CYCLE_DAMPING;
-use super::least_squares::{FreeParameters, SinusoidTerm, Tolerance, nepers_from_damping_ratio};
-use super::model_selection::{
-    Decomposition, LOBE, ModelSelector, STEP_CYCLES, SinusoidModel, lobe_half_width,
-};
+use super::least_squares::{FreeSet, SineTerm, Tolerance, nepers_from_damping_ratio};
+use super::model_selection::{LOBE, ModelFit, ModelSelector, STEP_CYCLES, SineModel, lobe_half_width};
 use super::time_frequency::FrequencyRange;
 
 /// Most range of a drift that may be two lines that beat, resolutions. They lie at most four apart, and where they
@@ -28,90 +26,79 @@ impl ModelSelector<'_> {
     /// The candidate of the least criterion: a model improved otherwise, with one more ring-down, or with two
     /// lines in the place of one. Near a doubtful term it must explain more than a drift or an even fall of that
     /// term.
-    pub(super) fn refine_candidates(
-        &self,
-        explained: &Decomposition,
-        improved: Option<SinusoidModel>,
-    ) -> Option<SinusoidModel> {
-        let parts = &explained.model;
+    pub(super) fn refine_candidates(&self, fit: &ModelFit, improved: Option<SineModel>) -> Option<SineModel> {
+        let parts = &fit.model;
         let terms = parts.terms();
-        let doubtful = self.doubtful_terms(explained);
-        let ring_downs = self.with_ring_downs(explained, &doubtful);
+        let doubtful = self.doubtful_terms(fit);
+        let ring_downs = self.with_ring_downs(fit, &doubtful);
         let leaving: Vec<usize> = doubtful.iter().map(|d| d.index).collect();
-        let pairs = self.with_pairs(explained, &leaving);
+        let pairs = self.with_pairs(fit, &leaving);
         let candidates = improved.into_iter().chain(ring_downs).chain(pairs);
-        let known =
-            |new: &SinusoidTerm| terms.iter().any(|t| t.cycles == new.cycles && t.nepers == new.nepers);
-        let explains = |candidate: &SinusoidModel| {
-            let criterion = self.information_criterion(candidate);
+        let known = |new: &SineTerm| terms.iter().any(|t| t.cycles == new.cycles && t.nepers == new.nepers);
+        let explains = |candidate: &SineModel| {
+            let criterion = self.bic_of(candidate);
             let doubted = |d: &&DoubtfulTerm| {
-                let near = |t: &&SinusoidTerm| t.cycles > 0.0 && are_adjacent(t, &terms[d.index]);
+                let near = |t: &&SineTerm| t.cycles > 0.0 && are_adjacent(t, &terms[d.index]);
                 let new = || candidate.terms().iter().filter(near);
                 let were = terms.iter().filter(near).count();
                 new().filter(|t| !known(t)).count() > were.min(1) || new().any(|t| t.first > 0)
             };
             let changed: Vec<&DoubtfulTerm> = doubtful.iter().filter(doubted).collect();
             changed.iter().all(|d| criterion < d.criterion)
-                && (changed.is_empty() || self.leaves_noise_near_terms(candidate, &changed, terms))
+                && (changed.is_empty() || self.leaves_noise_near(candidate, &changed, terms))
         };
         let best = self.select_best(candidates.filter(explains))?;
-        let slow = |t: &SinusoidTerm| t.is_transient() && t.cycles < STEP_CYCLES && !known(t);
+        let slow = |t: &SineTerm| t.is_transient() && t.cycles < STEP_CYCLES && !known(t);
         let doubted = self.trend_grows && best.terms().iter().any(slow);
-        let grown =
-            doubted.then(|| self.with_grown_trend(parts, self.information_criterion(&best))).flatten();
+        let grown = doubted.then(|| self.with_grown_trend(parts, self.bic_of(&best))).flatten();
         Some(grown.unwrap_or(best))
     }
 
     /// The model with a trend of a few more columns, if that explains about as much as the criterion: a slow
     /// ring-down may be a part of the trend not described yet.
-    fn with_grown_trend(&self, parts: &SinusoidModel, criterion: f64) -> Option<SinusoidModel> {
+    fn with_grown_trend(&self, parts: &SineModel, criterion: f64) -> Option<SineModel> {
         let richer = std::iter::successors(parts.trend().next_richer(), |trend| trend.next_richer());
         let grown = richer.take(MOST_TREND_GROWTH).filter_map(|trend| {
             self.fit_model(self.problem_with_trend(trend), parts.terms(), Tolerance::Coarse)
         });
-        self.select_best(grown)
-            .filter(|grown| self.information_criterion(grown) < criterion + DECISIVE_DIFFERENCE)
+        self.select_best(grown).filter(|grown| self.bic_of(grown) < criterion + DECISIVE_DIFFERENCE)
     }
 
     /// Two steady lines in the place of one that drifts over a range, if only noise is left then. A range wider
     /// than the distance of two such lines is no pair.
-    pub(super) fn split_into_pair(
-        &self,
-        explained: &Decomposition,
-        range: &FrequencyRange,
-    ) -> Option<Decomposition> {
+    pub(super) fn split_into_pair(&self, fit: &ModelFit, range: &FrequencyRange) -> Option<ModelFit> {
         if range.high_hz - range.low_hz > WIDEST_BEAT * self.resolution_hz() {
             return None;
         }
-        let best = self.select_best(self.with_pairs(explained, &self.terms_with_residual(explained)))?;
+        let best = self.select_best(self.with_pairs(fit, &self.terms_with_residual(fit)))?;
         Some(self.decompose(best)).filter(|paired| self.leaves_only_noise(paired))
     }
 
     /// Whether only noise is left around doubtful terms once a candidate replaces them. More oscillations would
     /// split into pieces what a sum of oscillations does not describe.
-    fn leaves_noise_near_terms(
+    fn leaves_noise_near(
         &self,
-        candidate: &SinusoidModel,
+        candidate: &SineModel,
         doubtful: &[&DoubtfulTerm],
-        terms: &[SinusoidTerm],
+        terms: &[SineTerm],
     ) -> bool {
-        let explained = self.decompose(candidate.clone());
+        let fit = self.decompose(candidate.clone());
         let near =
-            |t: &&SinusoidTerm| t.cycles > 0.0 && doubtful.iter().any(|d| are_adjacent(t, &terms[d.index]));
-        !explained.model.terms().iter().filter(near).any(|t| self.leaves_peak(&explained, t))
+            |t: &&SineTerm| t.cycles > 0.0 && doubtful.iter().any(|d| are_adjacent(t, &terms[d.index]));
+        !fit.model.terms().iter().filter(near).any(|t| self.leaves_peak(&fit, t))
     }
 
     /// Whether a term that begins inside the record ends within a cycle, as a step does.
-    pub(super) fn contains_step(&self, explained: &Decomposition) -> bool {
-        let damped = |t: &SinusoidTerm| {
+    pub(super) fn contains_step(&self, fit: &ModelFit) -> bool {
+        let damped = |t: &SineTerm| {
             t.first > 0 && t.nepers > nepers_from_damping_ratio(t.cycles, SINGLE_CYCLE_DAMPING)
         };
-        self.trend_grows && explained.model.terms().iter().any(|t| t.cycles > 0.0 && damped(t))
+        self.trend_grows && fit.model.terms().iter().any(|t| t.cycles > 0.0 && damped(t))
     }
 }
 
 /// Whether the lobe of a term reaches that of another.
-fn are_adjacent(term: &SinusoidTerm, other: &SinusoidTerm) -> bool {
+fn are_adjacent(term: &SineTerm, other: &SineTerm) -> bool {
     (term.cycles - other.cycles).abs() < LOBE + lobe_half_width(term)
 }
 
@@ -126,8 +113,8 @@ const PAIR_REACH: f64 = 2.0;
 
 impl ModelSelector<'_> {
     /// Models with two steady terms in the place of a doubtful one.
-    pub(super) fn with_pairs(&self, explained: &Decomposition, doubtful: &[usize]) -> Vec<SinusoidModel> {
-        let parts = &explained.model;
+    pub(super) fn with_pairs(&self, fit: &ModelFit, doubtful: &[usize]) -> Vec<SineModel> {
+        let parts = &fit.model;
         let tried = |one: &usize| {
             let (alone, group) = (vec![*one], nearby_terms(parts.terms(), *one));
             let groups = if group.len() > 1 { vec![alone, group] } else { vec![alone] };
@@ -138,32 +125,25 @@ impl ModelSelector<'_> {
     }
 
     /// The model with two terms that start at some distances from term `k`, in the place of the terms `out`.
-    fn fit_pair(
-        &self,
-        parts: &SinusoidModel,
-        k: usize,
-        out: &[usize],
-        starts: [f64; 2],
-    ) -> Option<SinusoidModel> {
+    fn fit_pair(&self, parts: &SineModel, k: usize, out: &[usize], starts: [f64; 2]) -> Option<SineModel> {
         let one = parts.terms()[k];
-        let start = |apart: f64| SinusoidTerm::from_start(one.cycles + apart, 0.0, FreeParameters::Cycles);
-        let terms = parts.replace_terms(out, starts.map(start));
+        let start = |apart: f64| SineTerm::from_start(one.cycles + apart, 0.0, FreeSet::Cycles);
+        let terms = parts.swap_terms(out, starts.map(start));
         if !self.has_frames_for(&parts.problem, &terms) {
             return None;
         }
         let solution = parts.problem.gauss_newton(&terms, Tolerance::Fine)?;
-        let steady = SinusoidModel { problem: parts.problem.clone(), solution };
-        let stays =
-            |t: &SinusoidTerm| t.free == FreeParameters::Cycles && (t.cycles - one.cycles).abs() < PAIR_REACH;
+        let steady = SineModel { problem: parts.problem.clone(), solution };
+        let stays = |t: &SineTerm| t.free == FreeSet::Cycles && (t.cycles - one.cycles).abs() < PAIR_REACH;
         if !steady.terms()[terms.len() - 2..].iter().all(stays) {
             return None;
         }
         let released = self.fit_model(steady.problem.clone(), steady.terms(), Tolerance::Coarse)?;
-        if self.information_criterion(&released) < self.information_criterion(&steady) {
+        if self.bic_of(&released) < self.bic_of(&steady) {
             return None;
         }
-        let explained = self.decompose(steady);
-        let leaves = explained.model.terms().iter().rev().take(2).any(|t| self.leaves_peak(&explained, t));
-        (!leaves).then_some(explained.model)
+        let fit = self.decompose(steady);
+        let leaves = fit.model.terms().iter().rev().take(2).any(|t| self.leaves_peak(&fit, t));
+        (!leaves).then_some(fit.model)
     }
 }

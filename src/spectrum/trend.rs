@@ -1,17 +1,17 @@
-//! What is removed from a record before its transform: a polynomial or slow cosines, by least squares over
-//! the frames present.
+//! Trends removed from a record before its transform: a polynomial or slow cosines, by least squares over the
+//! frames present.
 
 use crate::math;
 use nalgebra::{DMatrix, DVector};
 use serde::Serialize;
 use std::fmt;
 
-/// Highest degree of a polynomial: beyond it the ends of a record are fitted by its last wave alone.
+/// Highest degree of a polynomial: a higher one fits the ends of a record by its last wave alone.
 pub(crate) const HIGHEST_DEGREE: usize = 23;
 /// Most columns of a trend; a high-pass of more cosines belongs to a longer record than a tenth of a second.
 pub(super) const MOST_COLUMNS: usize = 48;
 
-/// What is removed.
+/// A trend to remove.
 ///
 /// The flip of a blade is far larger than the components that ride on it. Removing only its mean or a line
 /// leaves 0.9 to 1 Hz of error at 78 Hz in 0.15 s; a cubic leaves 0.03 Hz.
@@ -34,7 +34,7 @@ pub enum Detrend {
     HighPass(f64),
 }
 
-/// A name of no detrending.
+/// A name that is no detrending.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error(
     "unknown detrending `{found}`; expected `none`, `mean`, `line`, `cubic`, `polynomial:N` (N up to {HIGHEST_DEGREE}) or `high-pass:HZ`"
@@ -45,7 +45,7 @@ pub struct UnknownDetrend {
 }
 
 impl Detrend {
-    /// Those without a number.
+    /// The choices without a number.
     const NAMED: [(&str, Self); 4] =
         [("none", Self::None), ("mean", Self::Mean), ("line", Self::Line), ("cubic", Self::Cubic)];
 
@@ -56,21 +56,14 @@ impl Detrend {
     /// [`UnknownDetrend`] with the known names.
     pub(crate) fn parse(text: &str) -> Result<Self, UnknownDetrend> {
         let named = Self::NAMED.into_iter().find(|(name, _)| *name == text).map(|(_, detrend)| detrend);
-        let polynomial = || {
-            text.strip_prefix("polynomial:")?
-                .parse()
-                .ok()
-                .filter(|degree| *degree <= HIGHEST_DEGREE)
-                .map(Self::Polynomial)
-        };
-        let high_pass = || {
-            text.strip_prefix("high-pass:")?
-                .parse()
-                .ok()
-                .filter(|hz: &f64| hz.is_finite() && *hz > 0.0)
-                .map(Self::HighPass)
-        };
-        named.or_else(polynomial).or_else(high_pass).ok_or_else(|| UnknownDetrend { found: text.to_owned() })
+        let degree = || text.strip_prefix("polynomial:")?.parse().ok().filter(|n| *n <= HIGHEST_DEGREE);
+        let is_usable = |hz: &f64| hz.is_finite() && *hz > 0.0;
+        let hz = || text.strip_prefix("high-pass:")?.parse().ok().filter(is_usable);
+        let polynomial = || degree().map(Self::Polynomial);
+        named
+            .or_else(polynomial)
+            .or_else(|| hz().map(Self::HighPass))
+            .ok_or_else(|| UnknownDetrend { found: text.to_owned() })
     }
 
     /// The trend of a record of this length; `None` where it would take more columns than a fit can hold.
@@ -113,17 +106,17 @@ impl std::str::FromStr for Detrend {
 /// Columns of a line.
 const LINE_COLUMNS: usize = 2;
 
-/// The columns that are removed.
+/// The columns of a trend.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Trend {
-    /// Legendre polynomials, this many: orthogonal over a record without gaps.
+    /// The first Legendre polynomials, their number; they are orthogonal over a record without gaps.
     Polynomial(usize),
     /// A line and this many cosines of one, two, three ... half-waves over the record.
     Cosines(usize),
 }
 
-/// Factors of the recurrence `P_k = ((2k - 1) s P_(k-1) - (k - 1) P_(k-2)) / k`: a division for each of a
-/// million frames would be felt.
+/// Factors of the recurrence `P_k = ((2k - 1) s P_(k-1) - (k - 1) P_(k-2)) / k`: precomputed, because
+/// divisions for each of a million frames take time.
 const LEGENDRE: [[f64; 2]; HIGHEST_DEGREE + 1] = {
     let mut factors = [[0.0; 2]; HIGHEST_DEGREE + 1];
     let mut k = 1;
@@ -145,15 +138,13 @@ impl Trend {
         }
     }
 
-    /// Waves over the record that the trend itself can show: below, nothing is left to be found.
+    /// Fastest waves over the record that the trend itself can show: slower components are absorbed by it.
     pub(super) fn fastest_waves(self) -> f64 {
-        match self {
-            Self::Polynomial(columns) => columns as f64 / 2.0,
-            Self::Cosines(cosines) => cosines as f64 / 2.0,
-        }
+        let (Self::Polynomial(count) | Self::Cosines(count)) = self;
+        count as f64 / 2.0
     }
 
-    /// The columns at `s`, which runs over the record from -1 to 1; the rest stays as it is.
+    /// Fills in the columns at `s`, which runs over the record from -1 to 1; other entries are unchanged.
     pub(super) fn fill_row(self, s: f64, row: &mut TrendBasis) {
         match self {
             Self::Polynomial(columns) => {
@@ -169,7 +160,7 @@ impl Trend {
         }
     }
 
-    /// Its value with these coefficients in every frame.
+    /// The trend with some coefficients in every frame.
     pub(super) fn values(self, coefficients: &[f64], frames: usize) -> Vec<f64> {
         let mut row = [0.0; MOST_COLUMNS];
         let mut value = |i: usize| {
@@ -185,12 +176,12 @@ impl Trend {
             .map_or_else(|| vec![0.0; samples.len()], |c| self.values(c.as_slice(), samples.len()))
     }
 
-    /// The samples less the trend; zero where there is none.
+    /// The samples less the trend; zero for a missing sample.
     pub(super) fn residual(self, samples: &[Option<f64>]) -> Vec<f64> {
         samples.iter().zip(self.fit_values(samples)).map(|(x, trend)| x.map_or(0.0, |x| x - trend)).collect()
     }
 
-    /// The next richer one of its kind; `None` where there is none.
+    /// The next richer trend of its kind; `None` for the richest.
     pub(super) fn next_richer(self) -> Option<Self> {
         let columns = self.column_count() + 2;
         match self {
@@ -199,12 +190,11 @@ impl Trend {
         }
     }
 
-    /// Coefficients by singular values of the normal equations, so that frames in one clump cannot make them
-    /// singular.
+    /// Coefficients by singular values of the normal equations, which clumped frames may make singular.
     fn fit_coefficients(self, samples: &[Option<f64>]) -> Option<DVector<f64>> {
-        /// Directions of the normal matrix below this share of the number of frames are not in the data.
+        /// Directions of the normal matrix below this share of the number of frames are not determined.
         const SINGULAR: f64 = 1e-12;
-        /// Iterations, of which each column takes a few.
+        /// Most iterations; each column takes a few.
         const MOST_ITERATIONS: usize = 10_000;
         let columns = self.column_count();
         if columns == 0 {

@@ -2,13 +2,11 @@
 
 use super::{Oscillation, RemovedTrend, SampledRecord, SpectralAnalysis};
 use crate::math;
-use crate::spectrum::classification::{ComponentEvidence, RecordContext, classify_components};
+use crate::spectrum::classification::{Evidence, RecordContext, classify_components};
 use crate::spectrum::component::DecayingTone;
 use crate::spectrum::frequency_drift::{DriftCourse, RidgeMean};
-use crate::spectrum::least_squares::{
-    FreeParameters, SinusoidCovariance, SinusoidTerm, TermDeviations, Tolerance,
-};
-use crate::spectrum::model_selection::{Decomposition, ModelSelector, SinusoidModel};
+use crate::spectrum::least_squares::{FreeSet, SineCovariance, SineTerm, TermDeviations, Tolerance};
+use crate::spectrum::model_selection::{ModelFit, ModelSelector, SineModel};
 use crate::spectrum::peaks::Peak;
 use crate::spectrum::periodogram::Periodogram;
 use crate::spectrum::residual_significance::NEIGHBOURHOOD;
@@ -38,40 +36,40 @@ const COMPANION_SHIFT: f64 = 2.0;
 const UNEXPLAINED_SD: f64 = 0.577;
 
 /// A fitted record with the covariances of its terms.
-pub(super) struct FittedDecomposition<'a> {
+pub(super) struct FitReading<'a> {
     selector: &'a ModelSelector<'a>,
     /// With every decay free: damping is read from it.
-    free_decay_model: SinusoidModel,
-    free_decay_covariance: SinusoidCovariance,
+    free_decay_model: SineModel,
+    free_decay_covariance: SineCovariance,
     /// The same with a trend of two columns more, to see what depends on it.
-    richer_trend_model: Option<SinusoidModel>,
+    richer_trend_model: Option<SineModel>,
     /// With every decay that is not significant held at zero: frequency and amplitude are read from it.
-    decomposition: Decomposition,
-    covariance: SinusoidCovariance,
+    decomposition: ModelFit,
+    covariance: SineCovariance,
     /// Terms that drift or fade evenly.
     unsteady_terms: Vec<usize>,
 }
 
-impl<'a> FittedDecomposition<'a> {
-    pub(super) fn new(selector: &'a ModelSelector<'a>, explained: Decomposition) -> Option<Self> {
-        let free_decay_model = explained.model.clone();
+impl<'a> FitReading<'a> {
+    pub(super) fn new(selector: &'a ModelSelector<'a>, fit: ModelFit) -> Option<Self> {
+        let free_decay_model = fit.model.clone();
         let problem = &free_decay_model.problem;
         let free_decay_covariance = problem.covariance(&free_decay_model.solution)?;
-        let noise_m = selector.periodogram.noise_sd_m(explained.peaks.floor_m);
-        let steady = |(k, term): (usize, &SinusoidTerm)| {
+        let noise_m = selector.periodogram.noise_sd_m(fit.peaks.floor_m);
+        let steady = |(k, term): (usize, &SineTerm)| {
             let sd = free_decay_covariance.deviations(k, free_decay_model.amplitudes(k)).nepers * noise_m;
-            if term.free == FreeParameters::CyclesAndNepers && term.nepers.abs() < SIGNIFICANT_DECAY * sd {
-                SinusoidTerm { nepers: 0.0, free: FreeParameters::Cycles, ..*term }
+            if term.free == FreeSet::Both && term.nepers.abs() < SIGNIFICANT_DECAY * sd {
+                SineTerm { nepers: 0.0, free: FreeSet::Cycles, ..*term }
             } else {
                 *term
             }
         };
-        let terms: Vec<SinusoidTerm> = free_decay_model.terms().iter().enumerate().map(steady).collect();
+        let terms: Vec<SineTerm> = free_decay_model.terms().iter().enumerate().map(steady).collect();
         let decomposition = if terms == free_decay_model.terms() {
-            explained
+            fit
         } else {
             let solution = problem.gauss_newton(&terms, Tolerance::Fine)?;
-            selector.decompose(SinusoidModel { problem: problem.clone(), solution })
+            selector.decompose(SineModel { problem: problem.clone(), solution })
         };
         Some(Self {
             selector,
@@ -104,11 +102,11 @@ impl<'a> FittedDecomposition<'a> {
         let bin_hz = frame_rate_hz / (2 * (amplitude_m.len() - 1)) as f64;
         let (low, high) = settings.band_hz.unwrap_or((0.0, frame_rate_hz / 2.0));
         let terms = oscillations.iter().zip(&courses);
-        let mut read: Vec<(Component, ComponentEvidence)> =
+        let mut read: Vec<(Component, Evidence)> =
             terms.map(|(k, course)| self.estimate_component(*k, course, &leakage_m)).collect();
         read.extend(course.as_ref().and_then(|course| self.drifting_component(course)));
         let unexplained = self.selector.unexplained_peaks(&self.decomposition);
-        read.extend(unexplained.iter().map(|peak| self.component_of_peak(peak)));
+        read.extend(unexplained.iter().map(|peak| self.peak_component(peak)));
         read.sort_by(|a, b| b.0.amplitude_m.total_cmp(&a.0.amplitude_m));
         let (mut components, evidence): (Vec<_>, Vec<_>) = read.into_iter().unzip();
         let context = RecordContext::new(record, self.selector.resolution_hz(), settings);
@@ -151,12 +149,7 @@ impl<'a> FittedDecomposition<'a> {
         left.map(|(left, m)| m + left.unwrap_or(0.0) / share).collect()
     }
 
-    fn estimate_component(
-        &self,
-        k: usize,
-        course: &[f64],
-        leakage_m: &[f64],
-    ) -> (Component, ComponentEvidence) {
+    fn estimate_component(&self, k: usize, course: &[f64], leakage_m: &[f64]) -> (Component, Evidence) {
         let (selector, fit) = (self.selector, &self.decomposition);
         let (parts, free_model) = (&fit.model, &self.free_decay_model);
         let (term, free) = (&parts.terms()[k], &free_model.terms()[k]);
@@ -164,7 +157,7 @@ impl<'a> FittedDecomposition<'a> {
         let sd = self.covariance.deviations(k, parts.amplitudes(k));
         let sd_free = self.free_decay_covariance.deviations(k, free_model.amplitudes(k));
         let shift = self.shift_by_richer_trend(k);
-        let keeps_peak = term.free == FreeParameters::CyclesAndNepers || term.free == FreeParameters::Cycles;
+        let keeps_peak = term.free == FreeSet::Both || term.free == FreeSet::Cycles;
         let cycles_sd = if keeps_peak { sd.cycles * noise_m } else { UNEXPLAINED_SD };
         let amplitude_m = parts.amplitude_m(k);
         let (left, level) = if term.is_transient() {
@@ -172,13 +165,13 @@ impl<'a> FittedDecomposition<'a> {
             (left_m / amplitude_m, selector.level_in_envelope(fit, term, amplitude_m))
         } else {
             let shown_m = selector.windowed_amplitude_m(parts, k);
-            let left_m = selector.significant_residual_near(fit, term);
+            let left_m = selector.significant_residual(fit, term);
             (left_m / shown_m, shown_m / selector.noise_floor_near(fit, term.cycles))
         };
         let piece = self.nearest_fragment(k);
         let moved = piece.as_ref().map_or(0.0, |piece| piece.distance * piece.amplitude_ratio);
         let companion = math::hypot(COMPANION_SHIFT * left, moved); // resolutions, so cycles
-        let decays = matches!(free.free, FreeParameters::CyclesAndNepers | FreeParameters::Nepers);
+        let decays = matches!(free.free, FreeSet::Both | FreeSet::Nepers);
         let damping = decays.then(|| {
             let nepers_sd = math::hypot(sd_free.nepers * noise_m, shift.nepers);
             damping_ratio_with_sd(free, math::hypot(nepers_sd, TAU * companion))
@@ -186,7 +179,7 @@ impl<'a> FittedDecomposition<'a> {
         let trend_exhausted = selector.trend_grows
             && self.richer_trend_model.is_none()
             && term.cycles < EXHAUSTED_TREND_WAVES * parts.trend().fastest_waves();
-        let evidence = ComponentEvidence {
+        let evidence = Evidence {
             trend_exhausted,
             trend_shift: shift.cycles / cycles_sd,
             residual_ratio: left,
@@ -196,7 +189,7 @@ impl<'a> FittedDecomposition<'a> {
             nearest: self.distance_to_nearest(k),
             fragment_distance: piece.map(|piece| piece.distance),
             keeps_peak,
-            ..ComponentEvidence::default()
+            ..Evidence::default()
         };
         let bins_a_cycle = 2.0 * (leakage_m.len() - 1) as f64 / course.len() as f64;
         let frames = course.len() - term.first;
@@ -231,18 +224,18 @@ impl<'a> FittedDecomposition<'a> {
     /// Whether it and two more near it begin inside the record or are over soon.
     fn is_crowded(&self, k: usize) -> bool {
         let terms = self.decomposition.model.terms();
-        let near = |t: &&SinusoidTerm| t.is_transient() && (t.cycles - terms[k].cycles).abs() < NEIGHBOURHOOD;
+        let near = |t: &&SineTerm| t.is_transient() && (t.cycles - terms[k].cycles).abs() < NEIGHBOURHOOD;
         terms[k].is_transient() && terms.iter().filter(near).count() > CROWD_NEIGHBOURS
     }
 
     /// The nearest other oscillation within two resolutions or the width of the broader peak, where one of
     /// the two decays or begins inside the record. Two steady ones are a pair, not pieces of one.
-    fn nearest_fragment(&self, k: usize) -> Option<PossibleFragment> {
+    fn nearest_fragment(&self, k: usize) -> Option<Fragment> {
         let (parts, terms) = (&self.decomposition.model, self.decomposition.model.terms());
-        let steady = |term: &SinusoidTerm| term.nepers == 0.0 && term.first == 0;
+        let steady = |term: &SineTerm| term.nepers == 0.0 && term.first == 0;
         // a decaying peak is as wide as it decays
         let width = |j: usize| (terms[j].nepers.max(terms[k].nepers) / TAU).max(FRAGMENT_RESOLUTIONS);
-        let piece = |j: usize| PossibleFragment {
+        let piece = |j: usize| Fragment {
             distance: (terms[j].cycles - terms[k].cycles).abs(),
             amplitude_ratio: (parts.amplitude_m(j) / parts.amplitude_m(k)).min(1.0),
         };
@@ -275,7 +268,7 @@ impl<'a> FittedDecomposition<'a> {
     }
 
     /// The component of a course that drifts.
-    fn drifting_component(&self, course: &DriftCourse) -> Option<(Component, ComponentEvidence)> {
+    fn drifting_component(&self, course: &DriftCourse) -> Option<(Component, Evidence)> {
         let range = course.range?;
         let (mean, selector) = (RidgeMean::from_ridge(&course.ridge), self.selector);
         let noise_m = self.noise_sd_near(mean.frequency_hz / selector.resolution_hz());
@@ -290,18 +283,18 @@ impl<'a> FittedDecomposition<'a> {
             estimator: Estimator::Ridge,
             ..Component::default()
         };
-        let evidence = ComponentEvidence {
+        let evidence = Evidence {
             keeps_peak: true,
             followed_share: Some(course.followed_share),
             median_stray: Some(course.median_stray()),
             drift: Some((range.high_hz - range.low_hz) / selector.resolution_hz()),
-            ..ComponentEvidence::default()
+            ..Evidence::default()
         };
         Some((component, evidence))
     }
 
     /// A peak that no decaying oscillation explains, as the windowed spectrum shows it.
-    fn component_of_peak(&self, peak: &Peak) -> (Component, ComponentEvidence) {
+    fn peak_component(&self, peak: &Peak) -> (Component, Evidence) {
         let (selector, cycles) = (self.selector, self.selector.cycles_of_peak(peak));
         let noise_m = self.noise_sd_near(cycles);
         let floor_m = selector.noise_floor_near(&self.decomposition, cycles);
@@ -315,7 +308,7 @@ impl<'a> FittedDecomposition<'a> {
             estimator: Estimator::Periodogram,
             ..Component::default()
         };
-        (component, ComponentEvidence::default())
+        (component, Evidence::default())
     }
 
     fn steady_bound_hz(&self, amplitude_m: f64, noise_m: f64) -> f64 {
@@ -329,8 +322,7 @@ impl<'a> FittedDecomposition<'a> {
         let Some(richer) = &self.richer_trend_model else {
             return TermDeviations { cycles: 0.0, nepers: 0.0, amplitude: 0.0 };
         };
-        let half_way =
-            |parts: &SinusoidModel| parts.amplitude_m(k) * math::exp(-parts.terms()[k].nepers / 2.0);
+        let half_way = |parts: &SineModel| parts.amplitude_m(k) * math::exp(-parts.terms()[k].nepers / 2.0);
         let (now, then) = (&self.free_decay_model.terms()[k], &richer.terms()[k]);
         TermDeviations {
             cycles: (then.cycles - now.cycles).abs(),
@@ -341,7 +333,7 @@ impl<'a> FittedDecomposition<'a> {
 
     /// Standard deviation of white noise that leaves as much around a frequency as the fit does, m.
     fn noise_sd_near(&self, cycles: f64) -> f64 {
-        let Decomposition { model: parts, amplitude_m, .. } = &self.decomposition;
+        let ModelFit { model: parts, amplitude_m, .. } = &self.decomposition;
         let bins_a_cycle = 2.0 * (amplitude_m.len() - 1) as f64 / self.selector.samples.len() as f64;
         let most = self.selector.samples.len() as f64 / 2.0;
         let lowest = parts.trend().fastest_waves().min(most / 2.0);
@@ -360,14 +352,14 @@ impl<'a> FittedDecomposition<'a> {
 }
 
 /// Another oscillation that may be a piece of the same.
-struct PossibleFragment {
+struct Fragment {
     distance: f64,
     /// Its amplitude over that of this one, at most 1.
     amplitude_ratio: f64,
 }
 
 /// Damping ratio `d / sqrt(d^2 + (2 pi n)^2)` of `d` nepers in `n` cycles, and its deviation.
-fn damping_ratio_with_sd(term: &SinusoidTerm, nepers_sd: f64) -> (f64, f64) {
+fn damping_ratio_with_sd(term: &SineTerm, nepers_sd: f64) -> (f64, f64) {
     let angle = TAU * term.cycles;
     let size = math::hypot(term.nepers, angle);
     (term.nepers / size, nepers_sd * math::powi(angle / size, 2) / size)

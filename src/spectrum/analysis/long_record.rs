@@ -8,13 +8,13 @@ mod transients;
 
 use super::{RemovedTrend, SampledRecord, SpectralAnalysis};
 use crate::math;
-use crate::spectrum::classification::{ComponentEvidence, RecordContext, classify_components};
+use crate::spectrum::classification::{Evidence, RecordContext, classify_components};
 use crate::spectrum::periodogram;
 use crate::spectrum::trend::Trend;
 use crate::spectrum::{Component, Detrend, Spectrum, SpectrumError, SpectrumSettings, analyse_spectrum};
 use rayon::prelude::*;
 use std::f64::consts::{LN_2, TAU};
-use transients::TransientComponent;
+use transients::Transient;
 
 /// Pieces of the record; half-overlapping, they hold this many independent values.
 const PHASE_SEGMENTS: usize = 31;
@@ -41,8 +41,7 @@ pub(super) fn analyse_long_record(
     let left_m: Vec<Option<f64>> =
         record.samples.iter().zip(&removed_m).map(|(x, removed)| x.map(|x| x - removed)).collect();
     let assess = |c: &Component| assess_component(&spectrum, &left_m, record.frame_rate_hz, c);
-    let lines: Vec<(Component, ComponentEvidence)> =
-        spectrum.components.par_iter().filter_map(assess).collect();
+    let lines: Vec<(Component, Evidence)> = spectrum.components.par_iter().filter_map(assess).collect();
     let brief = transients::find_transients(record, settings);
     spectrum.components = merge_components(lines, brief, &context, settings.max_components);
     Ok(SpectralAnalysis {
@@ -63,12 +62,12 @@ pub(super) fn analyse_long_record(
 
 /// Lines and short-lived components in one list, each once, largest first.
 fn merge_components(
-    mut lines: Vec<(Component, ComponentEvidence)>,
-    mut brief: Vec<TransientComponent>,
+    mut lines: Vec<(Component, Evidence)>,
+    mut brief: Vec<Transient>,
     context: &RecordContext,
     most: usize,
 ) -> Vec<Component> {
-    let known = |b: &TransientComponent| {
+    let known = |b: &Transient| {
         lines.iter().any(|(c, line)| b.matches_component(c) && !(line.changes && b.is_more_specific()))
     };
     brief.retain(|b| !known(b));
@@ -77,7 +76,7 @@ fn merge_components(
     let better = brief.len() + lines.iter().filter(|(_, line)| !line.changes).count();
     let mut room = 0..most.saturating_sub(better);
     lines.retain(|(_, line)| !line.changes || room.next().is_some());
-    let (mut components, evidence): (Vec<Component>, Vec<ComponentEvidence>) = lines.into_iter().unzip();
+    let (mut components, evidence): (Vec<Component>, Vec<Evidence>) = lines.into_iter().unzip();
     classify_components(&mut components, &evidence, context);
     components.extend(brief.into_iter().map(|b| b.component));
     components.sort_by(|a, b| b.amplitude_m.total_cmp(&a.amplitude_m));
@@ -91,7 +90,7 @@ fn assess_component(
     left_m: &[Option<f64>],
     frame_rate_hz: f64,
     c: &Component,
-) -> Option<(Component, ComponentEvidence)> {
+) -> Option<(Component, Evidence)> {
     let floor_m = local_noise_floor_m(spectrum, c.frequency_hz);
     if c.amplitude_m <= DETECTION * floor_m {
         return None;
@@ -99,7 +98,7 @@ fn assess_component(
     let changes = !is_steady(left_m, frame_rate_hz, c, floor_m);
     let width_hz = if changes { half_maximum_width_hz(spectrum, c) } else { 0.0 };
     let frequency_sd_hz = math::hypot(c.frequency_sd_hz, width_hz / UNIFORM_WIDTH_IN_SD);
-    let evidence = ComponentEvidence { keeps_peak: true, changes, ..ComponentEvidence::default() };
+    let evidence = Evidence { keeps_peak: true, changes, ..Evidence::default() };
     Some((Component { frequency_sd_hz, ..c.clone() }, evidence))
 }
 

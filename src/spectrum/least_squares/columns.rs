@@ -1,6 +1,6 @@
 //! Inner products of a trend, (decaying) sinusoids and the data over the frames present.
 
-use super::SinusoidTerm;
+use super::SineTerm;
 use crate::math;
 use crate::spectrum::trend::{MOST_COLUMNS, Trend, abscissa};
 use nalgebra::{DMatrix, DMatrixViewMut};
@@ -76,7 +76,7 @@ impl FixedColumns {
     }
 
     /// Inner products of the trend's columns, the first `EACH` columns of every term and the data, in this order.
-    pub(super) fn gram_matrix<const EACH: usize>(&self, terms: &[SinusoidTerm]) -> DMatrix<f64> {
+    pub(super) fn gram_matrix<const EACH: usize>(&self, terms: &[SineTerm]) -> DMatrix<f64> {
         let (trend, width) = (self.columns.ncols() - 1, EACH * terms.len());
         let tasks: Vec<&[Range<usize>]> = self.blocks.chunks(BLOCKS_A_TASK).collect();
         let of = |(task, blocks): (usize, &&[Range<usize>])| {
@@ -107,7 +107,7 @@ impl FixedColumns {
     /// from `first` on.
     fn term_products<const EACH: usize>(
         &self,
-        terms: &[SinusoidTerm],
+        terms: &[SineTerm],
         first: usize,
         blocks: &[Range<usize>],
     ) -> (DMatrix<f64>, DMatrix<f64>) {
@@ -152,7 +152,7 @@ fn fill_term_columns<const EACH: usize>(
 }
 
 /// A term with its cosine and sine amplitude in every frame.
-pub(super) fn term_values(term: &SinusoidTerm, [cosine_m, sine_m]: [f64; 2], frames: usize) -> Vec<f64> {
+pub(super) fn term_values(term: &SineTerm, [cosine_m, sine_m]: [f64; 2], frames: usize) -> Vec<f64> {
     let mut values = Vec::with_capacity(frames);
     for first in (0..frames).step_by(BLOCK) {
         let turning = rotate_phasors(term, first, frames);
@@ -163,7 +163,7 @@ pub(super) fn term_values(term: &SinusoidTerm, [cosine_m, sine_m]: [f64; 2], fra
 }
 
 /// The frames of a block, each turned by the same angle and shrunk by the same factor from the one before.
-fn rotate_phasors(term: &SinusoidTerm, first: usize, frames: usize) -> PhasorBlock {
+fn rotate_phasors(term: &SineTerm, first: usize, frames: usize) -> PhasorBlock {
     let angle_per_cycle = |frame: usize| PI * abscissa(frame, frames);
     let mut turning = [[0.0; 3]; BLOCK];
     let before = term.first.saturating_sub(first).min(BLOCK);
@@ -191,15 +191,14 @@ fn rotate_phasors(term: &SinusoidTerm, first: usize, frames: usize) -> PhasorBlo
 
 #[cfg(test)]
 mod tests {
-    use super::super::FreeParameters;
+    use super::super::FreeSet;
     use super::*;
 
     #[test]
     fn inner_products_are_those_summed_frame_by_frame() {
         let frames = 700; // two whole blocks and a part
-        let terms = [(31.3, 0.0), (122.9, 2.5)].map(|(cycles, nepers)| {
-            SinusoidTerm::from_start(cycles, nepers, FreeParameters::CyclesAndNepers)
-        });
+        let terms = [(31.3, 0.0), (122.9, 2.5)]
+            .map(|(cycles, nepers)| SineTerm::from_start(cycles, nepers, FreeSet::Both));
         let weights: Vec<f64> =
             (0..frames).map(|i| if i % 3 == 1 { 0.0 } else { 1.0 + i as f64 / 700.0 }).collect();
         let data: Vec<f64> = (0..frames).map(|i| (i as f64 * 0.37).sin()).collect();

@@ -36,16 +36,16 @@ pub(super) struct ChirpSegment<'a> {
 
 /// The unknowns p, q, s, a, b, c.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct ChirpParameters(pub [f64; CURVED_UNKNOWNS]);
+pub(super) struct Chirp(pub [f64; CURVED_UNKNOWNS]);
 
 /// A fit of the first `N` unknowns.
 pub(super) struct ChirpFit<const N: usize> {
-    pub parameters: ChirpParameters,
+    pub parameters: Chirp,
     /// Covariance of the unknowns for a noise of deviation 1 in each frame.
     pub covariance: SMatrix<f64, N, N>,
 }
 
-impl ChirpParameters {
+impl Chirp {
     /// Start of a fit, from a frequency, cycles in the segment, and its change over the segment, cycles.
     pub(super) fn from_cycles(cycles: f64, change: f64) -> Self {
         Self([0.0, 0.0, 0.0, PI * cycles, PI * change / 4.0, 0.0])
@@ -124,7 +124,7 @@ impl ChirpParameters {
 }
 
 /// Normal equations at some parameters.
-struct ChirpNormalEquations<const N: usize> {
+struct ChirpNormal<const N: usize> {
     matrix: SMatrix<f64, N, N>,
     right: SVector<f64, N>,
     misfit: f64,
@@ -132,7 +132,7 @@ struct ChirpNormalEquations<const N: usize> {
 
 impl ChirpSegment<'_> {
     /// Fits the first `N` unknowns from a start; `None` where the frames do not determine them.
-    pub(super) fn fit_chirp<const N: usize>(&self, start: ChirpParameters) -> Option<ChirpFit<N>> {
+    pub(super) fn fit_chirp<const N: usize>(&self, start: Chirp) -> Option<ChirpFit<N>> {
         if self.samples.iter().flatten().count() < FRAMES_PER_UNKNOWN * N {
             return None;
         }
@@ -162,18 +162,14 @@ impl ChirpSegment<'_> {
     }
 
     /// The start with its best amplitude, and no slope of the amplitude.
-    fn with_fitted_amplitude(&self, start: ChirpParameters) -> Option<ChirpParameters> {
+    fn with_fitted_amplitude(&self, start: Chirp) -> Option<Chirp> {
         let [.., a, b, c] = start.0;
-        let normal = self.normal_equations::<2>(&ChirpParameters([0.0, 0.0, 0.0, a, b, c]), |w| w);
+        let normal = self.normal_equations::<2>(&Chirp([0.0, 0.0, 0.0, a, b, c]), |w| w);
         let [p, q] = normal.matrix.cholesky()?.solve(&normal.right).into();
-        Some(ChirpParameters([p, q, 0.0, a, b, c]))
+        Some(Chirp([p, q, 0.0, a, b, c]))
     }
 
-    fn normal_equations<const N: usize>(
-        &self,
-        shape: &ChirpParameters,
-        weight: impl Fn(f64) -> f64,
-    ) -> ChirpNormalEquations<N> {
+    fn normal_equations<const N: usize>(&self, shape: &Chirp, weight: impl Fn(f64) -> f64) -> ChirpNormal<N> {
         let (mut matrix, mut towards, mut misfit) = ([[0.0; N]; N], [0.0; N], 0.0);
         for ((sample, w), at) in self.samples.iter().zip(self.weights).zip(shape.phases(self.samples.len())) {
             let Some(sample) = sample else { continue };
@@ -186,16 +182,16 @@ impl ChirpSegment<'_> {
             misfit += w * rest * rest;
         }
         let matrix = SMatrix::from_fn(|i, j| matrix[i.max(j)][i.min(j)]);
-        ChirpNormalEquations { matrix, right: SVector::from(towards), misfit }
+        ChirpNormal { matrix, right: SVector::from(towards), misfit }
     }
 }
 
 /// The parameters after a step; an amplitude falls at most to zero at one end of the segment.
-fn apply_step<const N: usize>(shape: ChirpParameters, step: &SVector<f64, N>) -> ChirpParameters {
+fn apply_step<const N: usize>(shape: Chirp, step: &SVector<f64, N>) -> Chirp {
     let mut next = shape.0;
     next.iter_mut().zip(step.iter()).for_each(|(value, step)| *value += step);
     next[2] = next[2].clamp(-1.0, 1.0);
-    ChirpParameters(next)
+    Chirp(next)
 }
 
 impl<const N: usize> ChirpFit<N> {
@@ -240,7 +236,7 @@ impl SegmentNoise {
     }
 
     /// Noise of a segment less the fitted component.
-    pub(super) fn measure_residual(&self, segment: &[Option<f64>], shape: &ChirpParameters) -> ResidualNoise {
+    pub(super) fn measure_residual(&self, segment: &[Option<f64>], shape: &Chirp) -> ResidualNoise {
         let values = segment.iter().zip(shape.values(segment.len())).zip(&self.window);
         let weighted = values.map(|((sample, value), w)| sample.map_or(0.0, |sample| w * (sample - value)));
         let powers = self.transform.squared_magnitudes(weighted);
@@ -275,7 +271,7 @@ pub(super) struct ResidualNoise {
     pub under_m: f64,
 }
 
-fn is_in_harmonic_lobe(cycles: f64, shape: &ChirpParameters, multiple: usize) -> bool {
+fn is_in_harmonic_lobe(cycles: f64, shape: &Chirp, multiple: usize) -> bool {
     let k = multiple as f64;
     (cycles - k * shape.cycles_at(0.0)).abs() <= LOBE + k * shape.change().abs() / 2.0
 }
@@ -295,11 +291,11 @@ mod tests {
 
     #[test]
     fn an_exact_chirp_is_restored_also_with_missing_frames() {
-        let truth = ChirpParameters([3.0, -2.0, 0.3, PI * 9.3, PI * 0.6, 0.2]);
+        let truth = Chirp([3.0, -2.0, 0.3, PI * 9.3, PI * 0.6, 0.2]);
         let samples: Vec<_> = truth.values(90).enumerate().map(|(i, x)| (i % 5 != 3).then_some(x)).collect();
         let weights = vec![1.0; 90];
         let fitted = ChirpSegment { samples: &samples, weights: &weights }
-            .fit_chirp::<CURVED_UNKNOWNS>(ChirpParameters::from_cycles(9.1, 1.0))
+            .fit_chirp::<CURVED_UNKNOWNS>(Chirp::from_cycles(9.1, 1.0))
             .unwrap();
         for (found, expected) in fitted.parameters.0.iter().zip(truth.0) {
             assert!((found - expected).abs() < 1e-5, "{:?}", fitted.parameters);
@@ -310,7 +306,7 @@ mod tests {
 
     #[test]
     fn the_phase_is_that_of_the_polynomial() {
-        let shape = ChirpParameters([1.0, 0.5, -0.4, 400.0, 70.0, -20.0]);
+        let shape = Chirp([1.0, 0.5, -0.4, 400.0, 70.0, -20.0]);
         let frames = 2048;
         for (i, value) in shape.values(frames).enumerate() {
             let x = (2 * i + 1) as f64 / frames as f64 - 1.0;
@@ -324,12 +320,12 @@ mod tests {
         let samples = [Some(1.0); 14];
         assert!(
             ChirpSegment { samples: &samples, weights: &[1.0; 14] }
-                .fit_chirp::<LINEAR_UNKNOWNS>(ChirpParameters::from_cycles(3.0, 0.0))
+                .fit_chirp::<LINEAR_UNKNOWNS>(Chirp::from_cycles(3.0, 0.0))
                 .is_none()
         );
         assert!(
             ChirpSegment { samples: &[Some(0.0); 40], weights: &[1.0; 40] }
-                .fit_chirp::<LINEAR_UNKNOWNS>(ChirpParameters::from_cycles(5.0, 0.0))
+                .fit_chirp::<LINEAR_UNKNOWNS>(Chirp::from_cycles(5.0, 0.0))
                 .is_none()
         );
     }

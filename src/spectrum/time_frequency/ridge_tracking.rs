@@ -2,7 +2,7 @@
 //! columns.
 
 use super::chirp::{
-    CURVED_UNKNOWNS, ChirpFit, ChirpParameters, ChirpSegment, LINEAR_UNKNOWNS, ResidualNoise, SegmentNoise,
+    CURVED_UNKNOWNS, Chirp, ChirpFit, ChirpSegment, LINEAR_UNKNOWNS, ResidualNoise, SegmentNoise,
     median_filter,
 };
 use super::ridge::{Ridge, RidgeEnd, RidgePoint};
@@ -40,7 +40,7 @@ const END_AGREEMENT: f64 = 0.25;
 
 #[derive(Clone, Copy)]
 pub(super) struct SegmentFit {
-    chirp: ChirpParameters,
+    chirp: Chirp,
     /// Deviation of the frequency for a noise of deviation 1 in each frame, cycles in the segment.
     unit_sd: f64,
     /// Residual in a frame next to the component and at its frequency, m.
@@ -83,7 +83,7 @@ impl<'a> RidgeTracker<'a> {
     }
 
     /// Start of each fit on the path through the columns; `None` for a column without spectrum.
-    pub(super) fn fit_starts(&self, spectrogram: &Spectrogram) -> Vec<Option<ChirpParameters>> {
+    pub(super) fn fit_starts(&self, spectrogram: &Spectrogram) -> Vec<Option<Chirp>> {
         let bins = SegmentBins::new(&self.layout, FINE_PADDING);
         let band = bins.bins_in_band(self.band_hz, self.frame_rate_hz);
         let level = |column: &Vec<f64>| {
@@ -103,7 +103,7 @@ impl<'a> RidgeTracker<'a> {
             let (before, after) = self.columns_around(c);
             let apart = self.segments_apart(before, after);
             let change = if apart > 0.0 { (cycles(after) - cycles(before)) / apart } else { 0.0 };
-            ChirpParameters::from_cycles(cycles(c), change)
+            Chirp::from_cycles(cycles(c), change)
         };
         (0..path.len()).map(|c| levels[c].as_ref().map(|_| start(c))).collect()
     }
@@ -128,9 +128,9 @@ impl<'a> RidgeTracker<'a> {
         SegmentNoise::new(self.layout.frames, band)
     }
 
-    pub(super) fn fit_segments(&self, starts: &[Option<ChirpParameters>]) -> Vec<Option<SegmentFit>> {
+    pub(super) fn fit_segments(&self, starts: &[Option<Chirp>]) -> Vec<Option<SegmentFit>> {
         let (weights, noise) = (sine_weights(self.layout.frames), self.segment_noise());
-        let fit = |(c, start): (usize, &Option<ChirpParameters>)| {
+        let fit = |(c, start): (usize, &Option<Chirp>)| {
             let samples = self.segment_samples(c)?;
             let segment = ChirpSegment { samples, weights: &weights };
             let fitted = segment.fit_chirp::<LINEAR_UNKNOWNS>((*start)?)?;
@@ -138,7 +138,7 @@ impl<'a> RidgeTracker<'a> {
         };
         let fits: Vec<Option<SegmentFit>> = starts.iter().enumerate().map(fit).collect();
         let around_m: Vec<Option<f64>> = fits.iter().map(|fit| Some((*fit)?.residual.around_m)).collect();
-        let usable = |((fit, start), noise_m): ((Option<SegmentFit>, &Option<ChirpParameters>), f64)| {
+        let usable = |((fit, start), noise_m): ((Option<SegmentFit>, &Option<Chirp>), f64)| {
             let (fit, start) = (fit?, (*start)?);
             let residual = ResidualNoise { around_m: noise_m.max(self.least_m), ..fit.residual };
             is_near(&fit.chirp, start.cycles_at(0.0)).then_some(SegmentFit { residual, ..fit })
@@ -153,7 +153,7 @@ impl<'a> RidgeTracker<'a> {
         let from = |c: usize, near: usize, segments: f64| {
             let (samples, neighbour) = (self.segment_samples(c)?, (*fits.get(near)?)?);
             let cycles = neighbour.chirp.cycles_at(0.0) + segments * neighbour.chirp.change();
-            let start = ChirpParameters::from_cycles(cycles, neighbour.chirp.change());
+            let start = Chirp::from_cycles(cycles, neighbour.chirp.change());
             let segment = ChirpSegment { samples, weights: &weights };
             let found = segment.fit_chirp::<LINEAR_UNKNOWNS>(start)?;
             let under_m = noise.measure_residual(samples, &found.parameters).under_m;
@@ -249,7 +249,7 @@ impl<'a> RidgeTracker<'a> {
         if segments < 1.0 && led < END_CYCLES {
             return None;
         }
-        let start = ChirpParameters::from_cycles(led, fit.chirp.change() * longer * longer);
+        let start = Chirp::from_cycles(led, fit.chirp.change() * longer * longer);
         let samples = self.samples.get(first..first + frames)?;
         let segment = ChirpSegment { samples, weights: &sine_weights(frames) };
         let found = segment.fit_chirp::<CURVED_UNKNOWNS>(start)?;
@@ -273,7 +273,7 @@ impl<'a> RidgeTracker<'a> {
 }
 
 /// Whether a fit stays near a frequency, cycles in the segment.
-fn is_near(chirp: &ChirpParameters, cycles: f64) -> bool {
+fn is_near(chirp: &Chirp, cycles: f64) -> bool {
     (chirp.cycles_at(0.0) - cycles).abs() < FARTHEST_FROM_PATH
 }
 

@@ -38,7 +38,7 @@ const NEPERS_OF_DECAY: f64 = 1.0;
 
 /// A component that was read from a piece.
 #[derive(Debug)]
-pub(super) struct TransientComponent {
+pub(super) struct Transient {
     pub component: Component,
     /// First frame of the stretch that was taken apart.
     first: usize,
@@ -47,7 +47,7 @@ pub(super) struct TransientComponent {
     nepers: f64,
 }
 
-impl TransientComponent {
+impl Transient {
     /// Whether another component is the same within both deviations.
     pub(super) fn matches_component(&self, other: &Component) -> bool {
         let c = &self.component;
@@ -87,30 +87,27 @@ impl TransientComponent {
 }
 
 /// Every component that lasts for a short time only, once.
-pub(super) fn find_transients(
-    record: &SampledRecord,
-    settings: &SpectrumSettings,
-) -> Vec<TransientComponent> {
+pub(super) fn find_transients(record: &SampledRecord, settings: &SpectrumSettings) -> Vec<Transient> {
     let (low_hz, high_hz) = settings.band_hz.unwrap_or((0.0, record.frame_rate_hz / 2.0));
     let band = (low_hz / record.frame_rate_hz, (high_hz / record.frame_rate_hz).min(0.5));
     let of_scale = |scale: &SegmentScale| {
         let pieces = cut_segments(record.samples, scale.length, band);
-        let chosen = select_most_unusual(&pieces, scale.most);
+        let chosen = select_unusual(&pieces, scale.most);
         let is_read = |k: usize| chosen.contains(&k) || (scale.first && k == 0);
         let numbered = pieces.into_iter().enumerate();
         numbered.filter(|(k, _)| is_read(*k)).map(|(_, piece)| piece).collect::<Vec<_>>()
     };
-    let pieces: Vec<UnusualSegment> = SCALES.iter().flat_map(of_scale).collect();
-    let read = |piece: &UnusualSegment| {
+    let pieces: Vec<UnusualPiece> = SCALES.iter().flat_map(of_scale).collect();
+    let read = |piece: &UnusualPiece| {
         let samples = &record.samples[piece.frames.clone()];
-        read_segment_transients(&SampledRecord { samples, ..*record }, settings, piece)
+        read_piece(&SampledRecord { samples, ..*record }, settings, piece)
     };
-    let mut found: Vec<TransientComponent> = pieces.par_iter().flat_map_iter(read).collect();
+    let mut found: Vec<Transient> = pieces.par_iter().flat_map_iter(read).collect();
     found.sort_by(|a, b| a.component.frequency_sd_hz.total_cmp(&b.component.frequency_sd_hz));
-    let mut once: Vec<TransientComponent> = Vec::new();
+    let mut once: Vec<Transient> = Vec::new();
     for brief in found {
         // two components of one piece are distinct
-        let known = |known: &TransientComponent| {
+        let known = |known: &Transient| {
             (known.first, known.resolution_hz) != (brief.first, brief.resolution_hz)
                 && (known.matches_component(&brief.component) || brief.matches_component(&known.component))
         };
@@ -123,13 +120,9 @@ pub(super) fn find_transients(
 
 /// The components of a piece that are not there all the time: those whose frequency exceeds the normal power,
 /// and those that end within it. Those that end within a cycle are left out, because every step gives one.
-fn read_segment_transients(
-    record: &SampledRecord,
-    settings: &SpectrumSettings,
-    piece: &UnusualSegment,
-) -> Vec<TransientComponent> {
+fn read_piece(record: &SampledRecord, settings: &SpectrumSettings, piece: &UnusualPiece) -> Vec<Transient> {
     let rate_hz = record.frame_rate_hz;
-    let passes = |brief: &TransientComponent| {
+    let passes = |brief: &Transient| {
         let c = &brief.component;
         let (low_hz, high_hz) =
             c.range_hz.map_or((c.frequency_hz, c.frequency_hz), |range| (range.low_hz, range.high_hz));
@@ -138,16 +131,16 @@ fn read_segment_transients(
                 || piece.exceeds_normal_power(low_hz / rate_hz, high_hz / rate_hz))
     };
     let stretches = SpectralAnalysis::analyse_between_steps(record, settings).into_iter();
-    let found = stretches.flat_map(|stretch| transients_between_steps(stretch, piece.frames.start, rate_hz));
-    found.filter(passes).map(TransientComponent::with_persistence_doubt).collect()
+    let found = stretches.flat_map(|stretch| stretch_transients(stretch, piece.frames.start, rate_hz));
+    found.filter(passes).map(Transient::with_persistence_doubt).collect()
 }
 
 /// The components of a stretch of a piece that begins at a frame.
-fn transients_between_steps(
+fn stretch_transients(
     analysis: SpectralAnalysis,
     start: usize,
     rate_hz: f64,
-) -> impl Iterator<Item = TransientComponent> {
+) -> impl Iterator<Item = Transient> {
     let first = start + analysis.skipped_frames;
     let lasts_s = analysis.residual_m.len() as f64 / rate_hz;
     let resolution_hz = analysis.spectrum.resolution_hz;
@@ -155,7 +148,7 @@ fn transients_between_steps(
         let nepers = decay_nepers(&c, lasts_s);
         let begins_s = first as f64 / rate_hz + c.begins_s.unwrap_or(0.0);
         let component = Component { begins_s: (begins_s > 0.0).then_some(begins_s), ..c };
-        TransientComponent { component, first, resolution_hz, nepers }
+        Transient { component, first, resolution_hz, nepers }
     })
 }
 
@@ -188,7 +181,7 @@ const LOBE: usize = 2;
 const CUBIC: Trend = Trend::Polynomial(4);
 
 /// A piece of a record, and how its spectrum compares with the other pieces'.
-pub(super) struct UnusualSegment {
+pub(super) struct UnusualPiece {
     pub frames: Range<usize>,
     /// Power over the normal power in each bin.
     excess: Vec<f64>,
@@ -196,7 +189,7 @@ pub(super) struct UnusualSegment {
     level: f64,
 }
 
-impl UnusualSegment {
+impl UnusualPiece {
     /// Whether power between two frequencies, cycles a frame, exceeds the normal.
     pub(super) fn exceeds_normal_power(&self, low: f64, high: f64) -> bool {
         let bin = |cycles: f64| (cycles * self.frames.len() as f64).round() as usize;
@@ -206,15 +199,15 @@ impl UnusualSegment {
 }
 
 /// The pieces of a length that hold values in half their frames or more; `band` is in cycles a frame.
-pub(super) fn cut_segments(samples: &[Option<f64>], length: usize, band: (f64, f64)) -> Vec<UnusualSegment> {
+pub(super) fn cut_segments(samples: &[Option<f64>], length: usize, band: (f64, f64)) -> Vec<UnusualPiece> {
     let last = samples.len() - length;
     let starts: Vec<usize> = (0..last).step_by(length / 2).chain([last]).collect();
     let piece = |start: &usize| {
         let (frames, piece) = (*start..start + length, &samples[*start..start + length]);
         let enough = 2 * piece.iter().flatten().count() >= length;
-        enough.then(|| UnusualSegment { frames, excess: segment_power_spectrum(piece), level: 0.0 })
+        enough.then(|| UnusualPiece { frames, excess: segment_power_spectrum(piece), level: 0.0 })
     };
-    let mut pieces: Vec<UnusualSegment> = starts.par_iter().filter_map(piece).collect();
+    let mut pieces: Vec<UnusualPiece> = starts.par_iter().filter_map(piece).collect();
     let largest = samples.iter().flatten().fold(0.0, |most: f64, x| most.max(x.abs()));
     let least = math::powi(ROUNDING * largest, 2).max(f64::MIN_POSITIVE);
     let normal = normal_power_spectrum(&pieces, length / 2 + 1);
@@ -231,11 +224,11 @@ pub(super) fn cut_segments(samples: &[Option<f64>], length: usize, band: (f64, f
 }
 
 /// The `most` pieces that exceed the normal most, each in bins in which none before it does.
-pub(super) fn select_most_unusual(pieces: &[UnusualSegment], most: usize) -> Vec<usize> {
+pub(super) fn select_unusual(pieces: &[UnusualPiece], most: usize) -> Vec<usize> {
     let mut chosen = Vec::new();
     let mut open = vec![true; pieces.first().map_or(0, |piece| piece.excess.len())];
     while chosen.len() < most {
-        let largest = |piece: &UnusualSegment| {
+        let largest = |piece: &UnusualPiece| {
             let bins = piece.excess.iter().zip(&open).filter(|(_, open)| **open);
             bins.fold(0.0, |most: f64, (excess, _)| most.max(*excess))
         };
@@ -243,7 +236,7 @@ pub(super) fn select_most_unusual(pieces: &[UnusualSegment], most: usize) -> Vec
         let best = (0..pieces.len()).max_by(|a, b| sizes[*a].total_cmp(&sizes[*b]).then(b.cmp(a)));
         let Some(best) = best.filter(|best| sizes[*best] > pieces[*best].level) else { break };
         chosen.push(best);
-        let UnusualSegment { excess, level, .. } = &pieces[best];
+        let UnusualPiece { excess, level, .. } = &pieces[best];
         for k in (0..open.len()).filter(|k| excess[*k] > *level) {
             let end = (k + LOBE + 1).min(open.len());
             open[k.saturating_sub(LOBE)..end].fill(false);
@@ -260,7 +253,7 @@ fn segment_power_spectrum(samples: &[Option<f64>]) -> Vec<f64> {
 }
 
 /// Power of the record's noise and steady lines in each bin.
-fn normal_power_spectrum(pieces: &[UnusualSegment], bins: usize) -> Vec<f64> {
+fn normal_power_spectrum(pieces: &[UnusualPiece], bins: usize) -> Vec<f64> {
     let of_bin = |bin: usize| {
         let mut powers: Vec<f64> = pieces.iter().map(|piece| piece.excess[bin]).collect();
         let place = powers.len() / NORMAL_POWER_QUANTILE;
@@ -303,7 +296,7 @@ mod tests {
     fn steady_lines_and_noise_exceed_nothing() {
         let alarms = |seed| {
             let pieces = cut_segments(&record(seed, 0.0), LENGTH, (0.0, 0.5));
-            select_most_unusual(&pieces, 4).len()
+            select_unusual(&pieces, 4).len()
         };
         assert!((0..40).map(alarms).sum::<usize>() <= 1);
     }
@@ -313,15 +306,13 @@ mod tests {
         let pieces = cut_segments(&record(1, 1.0), LENGTH, (0.0, 0.5));
         assert_eq!(pieces.len(), FRAMES.div_ceil(LENGTH / 2) - 1);
         assert_eq!(pieces.last().unwrap().frames, FRAMES - LENGTH..FRAMES);
-        let [k] = select_most_unusual(&pieces, 4)[..] else {
-            panic!("{:?}", select_most_unusual(&pieces, 4))
-        };
+        let [k] = select_unusual(&pieces, 4)[..] else { panic!("{:?}", select_unusual(&pieces, 4)) };
         let piece = &pieces[k];
         assert!(piece.frames.start < 7100 && piece.frames.end > 7100, "{:?}", piece.frames);
         assert!(piece.exceeds_normal_power(0.23, 0.23) && piece.exceeds_normal_power(0.2, 0.25));
         assert!(!piece.exceeds_normal_power(0.1, 0.1) && !piece.exceeds_normal_power(0.3, 0.4));
         assert!(
-            select_most_unusual(&cut_segments(&record(1, 1.0), LENGTH, (0.3, 0.5)), 4).is_empty(),
+            select_unusual(&cut_segments(&record(1, 1.0), LENGTH, (0.3, 0.5)), 4).is_empty(),
             "outside the band"
         );
     }
