@@ -497,7 +497,7 @@ mod tests {
                 .map(|i| samples[i].map_or(0.0, |_| tapers.value(&tapers.coefficients(k), i)))
                 .collect()
         };
-        (0..tapers.len()).map(taper).collect()
+        (0..tapers.rows.nrows()).map(taper).collect()
     }
 
     fn worst(tapers: &[Vec<f64>]) -> f64 {
