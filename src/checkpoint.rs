@@ -1,12 +1,9 @@
-//! Append-only journals of long computations: one line of JSON a record, enough to resume and extend what was
-//! computed.
+//! Append-only journals of long computations, from which a run resumes: one line of JSON per record.
 //!
-//! The first line is a [`CheckpointHeader`] with the fingerprint of the problem. Numbers are [`ExactNumber`]: the shortest
-//! decimals that give the same bits back, as strings, because JSON readers round numbers in the last place
-//! and a replay must not. Every line ends with a checksum, and one that does not hold is refused. A last line
-//! that is cut off is dropped when a journal is read. What follows from the rest of a line is not stored.
-//!
-//! What a line holds is a [`CheckpointRecord`]: an evaluation of a fit, a point of a study.
+//! The first line is a [`CheckpointHeader`] with the fingerprint of the problem. Every other line is a
+//! [`CheckpointRecord`]: an evaluation of a fit or a point of a study. Numbers are [`ExactNumber`], strings with
+//! the shortest decimals that keep every bit, because JSON readers may round numbers. Every line ends with a
+//! checksum, and a line with a wrong checksum is refused. An incomplete last line is dropped.
 
 mod checksum;
 mod error;
@@ -19,10 +16,8 @@ pub use checksum::append_checksum;
 pub(crate) use checksum::fingerprint;
 pub use error::CheckpointError;
 pub use header::{CheckpointHeader, CheckpointKind, detect_kind, has_whole_line};
-pub use read::{CheckpointEnd, CheckpointReader, StoredRecord};
-pub use read::{CheckpointFile, check_recomputed, duplicate_record_error, read_checkpoint};
-pub use read::{RECHECKED_RECORDS, sample_records};
-pub use record::ExactNumber;
-pub use record::{CheckpointRecord, format_header_line, format_record_line};
-pub use record::{CheckpointSink, NullSink};
+pub use read::{CheckpointEnd, CheckpointFile, CheckpointReader, RECHECKED_RECORDS, StoredRecord};
+pub use read::{check_recomputed, duplicate_record_error, read_checkpoint, sample_records};
+pub use record::{CheckpointRecord, CheckpointSink, ExactNumber, NullSink};
+pub use record::{format_header_line, format_record_line};
 pub use shard::Shard;

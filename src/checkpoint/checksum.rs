@@ -1,8 +1,7 @@
-//! The checksum at the end of a line.
+//! The checksum at the end of a line, and the fingerprint of a problem.
 //!
-//! A line is a JSON object of which `sha256` is the last key: the first digits of the SHA-256 of every byte
-//! of the line before that key's comma. Whoever edits a line by hand sees that it is guarded, and whoever
-//! wants to check one needs no more than `sha256sum`.
+//! A line is a JSON object with the last key `sha256`: the first digits of the SHA-256 of the bytes before the
+//! comma of that key. `sha256sum` verifies it.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -10,26 +9,24 @@ use sha2::{Digest, Sha256};
 
 const CHECKSUM_KEY: &str = ",\"sha256\":\"";
 const LINE_END: &str = "\"}";
-/// Hexadecimal digits of the checksum: 64 bits, so that an accident is missed once in 2e19.
+/// Hexadecimal digits of the checksum: 64 bits miss one accidental change in 2e19.
 const CHECKSUM_DIGITS: usize = 16;
 
-/// A JSON object with its checksum, as it stands in a line; for whoever writes journals by another program.
+/// Appends the checksum to a JSON object, which then is a line of a journal.
 #[must_use]
 pub fn append_checksum(object: &str) -> String {
     let content = object.strip_suffix('}').unwrap_or(object);
     format!("{content}{CHECKSUM_KEY}{}{LINE_END}", hex_checksum(content.as_bytes()))
 }
 
-/// What the end of a line says of the rest.
+/// Result of the check of a line.
 #[derive(Debug, PartialEq, Eq)]
 pub(super) enum LineChecksum {
-    /// The checksum holds; the object without it.
+    /// The checksum is right; the object without it.
     Valid(Vec<u8>),
-    /// The checksum does not hold: what stands there, and what the line has.
-    Broken {
-        found: String,
-        computed: String,
-    },
+    /// The checksum in the line differs from the computed one.
+    Broken { found: String, computed: String },
+    /// The line has no checksum.
     Absent,
 }
 
@@ -37,14 +34,14 @@ impl LineChecksum {
     pub(super) fn check(line: &[u8]) -> Self {
         let Some((content, found)) = split_checksum(line) else { return Self::Absent };
         let computed = hex_checksum(content);
-        match String::from_utf8_lossy(found).into_owned() {
-            found if found == computed => Self::Valid([content, b"}"].concat()),
-            found => Self::Broken { found, computed },
+        if found == computed.as_bytes() {
+            return Self::Valid([content, b"}"].concat());
         }
+        Self::Broken { found: String::from_utf8_lossy(found).into_owned(), computed }
     }
 }
 
-/// The bytes before the checksum, and the checksum.
+/// Splits a line into the bytes before the checksum and the checksum.
 fn split_checksum(line: &[u8]) -> Option<(&[u8], &[u8])> {
     let line = line.strip_suffix(LINE_END.as_bytes())?;
     let (rest, digits) = line.split_at_checked(line.len().checked_sub(CHECKSUM_DIGITS)?)?;
@@ -55,13 +52,10 @@ fn hex_checksum(content: &[u8]) -> String {
     Sha256::digest(content).iter().take(CHECKSUM_DIGITS / 2).map(|byte| format!("{byte:02x}")).collect()
 }
 
-// What tells two problems apart.
-
-/// SHA-256 over the canonical JSON of a problem, in hexadecimal: keys sorted, numbers as the shortest
-/// decimals that give the same bits back. Equal values have equal fingerprints, however their files are
-/// written.
+/// SHA-256 of the canonical JSON of a problem, in hexadecimal: sorted keys, numbers as the shortest decimals that
+/// keep every bit. Equal values have equal fingerprints, independent of the layout of their files.
 pub(crate) fn fingerprint(problem: &impl Serialize) -> String {
-    // a problem holds finite numbers and keys that are strings: nothing that cannot be written
+    // finite numbers and string keys cannot fail to serialize
     let value = serde_json::to_value(problem).unwrap_or_default();
     let mut text = String::new();
     write_canonical(&value, &mut text);

@@ -5,10 +5,10 @@ use super::header::{CheckpointKind, LAYOUT};
 /// Why a journal was refused.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum CheckpointError {
+    /// The file has another layout.
     #[error(
         "{file}: a journal of layout {found}, expected layout {LAYOUT}; move it away and run the {kind} again"
     )]
-    /// The file has another layout.
     Layout {
         /// File as named by the user.
         file: String,
@@ -17,7 +17,7 @@ pub enum CheckpointError {
         /// Layout of the file.
         found: u32,
     },
-    /// A journal of something else.
+    /// The journal is of another kind of computation.
     #[error(
         "{file}: the journal of a {found}, expected that of a {expected}; choose the right file or folder"
     )]
@@ -29,7 +29,7 @@ pub enum CheckpointError {
         /// What was expected.
         expected: CheckpointKind,
     },
-    /// Another version of the program wrote it.
+    /// Another version of the program wrote the journal.
     #[error(
         "{file}: written by version {found} of the program, this is version {expected}, and two versions need not agree in the last digit; resume with version {found}, or move the journal away to start over"
     )]
@@ -41,7 +41,7 @@ pub enum CheckpointError {
         /// Version of this program.
         expected: String,
     },
-    /// It belongs to another problem.
+    /// The journal belongs to another problem.
     #[error(
         "{file}: fingerprint {found}, expected {expected}: the {}, a scene or a recording has changed since it was written; move it away to start over, or undo the change to resume",
         kind.input()
@@ -56,7 +56,7 @@ pub enum CheckpointError {
         /// Fingerprint of this problem.
         expected: String,
     },
-    /// It cannot be read.
+    /// The file cannot be read.
     #[error("{file}: cannot be read: {problem}")]
     Unreadable {
         /// File as named by the user.
@@ -64,7 +64,7 @@ pub enum CheckpointError {
         /// Why.
         problem: String,
     },
-    /// The first line is not what the program writes.
+    /// The first line is not a valid header.
     #[error(
         "{file}:1: {problem}; the file was damaged or edited, or is not a journal: restore it, or move it away to start over"
     )]
@@ -74,7 +74,7 @@ pub enum CheckpointError {
         /// What was found and what was expected.
         problem: String,
     },
-    /// A line is not what the program writes.
+    /// A line is not a valid record.
     #[error(
         "{file}:{line}: {problem}; the line was damaged or edited: restore the file, or remove this line and all behind it (each {} in them is then made again)",
         kind.record()
@@ -89,7 +89,7 @@ pub enum CheckpointError {
         /// What was found and what was expected.
         problem: String,
     },
-    /// A record is not what its computation gives.
+    /// A record differs from its recomputation.
     #[error(
         "{file}:{line}: found {found}, but computed again the {} gives {computed}; the line was edited, or made on a machine that does not calculate alike to the last digit (another processor, system or build): resume where it was written, or move the journal away to start over",
         kind.record()

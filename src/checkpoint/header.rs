@@ -9,7 +9,7 @@ use std::fmt;
 /// Version of the layout of journals.
 pub(super) const LAYOUT: u32 = 3;
 
-/// What a journal is of.
+/// Kind of the computation of a journal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CheckpointKind {
@@ -22,85 +22,81 @@ pub enum CheckpointKind {
 }
 
 impl CheckpointKind {
-    /// What one of its records is called.
-    pub(crate) fn record(self) -> &'static str {
+    /// Words of messages: the computation, a record, and the input file.
+    fn words(self) -> [&'static str; 3] {
         match self {
-            Self::Fit => "evaluation",
-            Self::Trace => "iterate",
-            Self::Sweep => "point",
+            Self::Fit => ["fit", "evaluation", "job"],
+            Self::Trace => ["trace fit", "iterate", "job"],
+            Self::Sweep => ["sweep", "point", "study"],
         }
     }
 
-    /// The file that says what is computed.
+    /// Word for a record.
+    pub(crate) fn record(self) -> &'static str {
+        self.words()[1]
+    }
+
+    /// Word for the input file.
     pub(crate) fn input(self) -> &'static str {
-        match self {
-            Self::Fit | Self::Trace => "job",
-            Self::Sweep => "study",
-        }
+        self.words()[2]
     }
 }
 
 impl fmt::Display for CheckpointKind {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Fit => "fit",
-            Self::Trace => "trace fit",
-            Self::Sweep => "sweep",
-        })
+        f.write_str(self.words()[0])
     }
 }
 
-/// First line of a journal; `B` is what a journal of its kind says besides.
+/// First line of a journal; `B` is the part that depends on its kind.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CheckpointHeader<B> {
-    /// What it is of.
+    /// Kind of the computation.
     pub journal: CheckpointKind,
-    /// Layout.
+    /// Version of the journal's layout.
     pub layout: u32,
     /// Fingerprint of problem, data and program, from [`super::checksum`].
     pub fingerprint: String,
     /// Version of the program.
     pub version: String,
-    /// What the lines need to be understood.
+    /// What a reader needs to interpret the records.
     pub body: B,
 }
 
 impl<B> CheckpointHeader<B> {
-    /// Refuses the header of another problem, data or program than `expected` is of.
+    /// Checks that the header has the problem, data and program of `expected`.
     ///
     /// # Errors
-    /// [`CheckpointError::OtherVersion`], [`CheckpointError::OtherProblem`], or [`CheckpointError::Header`] when it
-    /// was edited.
+    /// [`CheckpointError::OtherVersion`], [`CheckpointError::OtherProblem`], or [`CheckpointError::Header`] for an
+    /// edited header.
     pub(crate) fn check_matches<R: CheckpointRecord<Body = B>>(
         &self,
         file: &str,
         expected: &Self,
     ) -> Result<(), CheckpointError> {
-        let name = file.to_owned();
+        let file = file.to_owned();
         if self.version != expected.version {
             let (found, expected) = (self.version.clone(), expected.version.clone());
-            return Err(CheckpointError::OtherVersion { file: name, found, expected });
+            return Err(CheckpointError::OtherVersion { file, found, expected });
         }
         if self.fingerprint != expected.fingerprint {
             let (found, expected) = (self.fingerprint.clone(), expected.fingerprint.clone());
-            return Err(CheckpointError::OtherProblem { file: name, kind: R::KIND, found, expected });
+            return Err(CheckpointError::OtherProblem { file, kind: R::KIND, found, expected });
         }
-        match R::problem_difference(&self.body, &expected.body) {
-            Some(problem) => Err(CheckpointError::Header { file: name, problem }),
-            None => Ok(()),
-        }
+        let difference = R::problem_difference(&self.body, &expected.body);
+        difference.map_or(Ok(()), |problem| Err(CheckpointError::Header { file, problem }))
     }
 }
 
-/// What every layout of a header has.
+/// Fields of a header in every layout.
 #[derive(Debug, Deserialize)]
 pub(super) struct HeaderPrefix {
     pub journal: CheckpointKind,
     pub layout: u32,
 }
 
-/// What a file is a journal of, by its first line; `None` where it has no whole line or is no journal.
+/// Kind of a journal by its first line; `None` for a file that has no whole line or is no journal.
 #[must_use]
 pub fn detect_kind(bytes: &[u8]) -> Option<CheckpointKind> {
     let first = split_lines(bytes).next().filter(|line| line.ended)?;

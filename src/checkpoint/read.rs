@@ -1,4 +1,4 @@
-//! A journal as it is read.
+//! Reading of journals.
 
 use super::checksum::LineChecksum;
 use super::error::CheckpointError;
@@ -10,27 +10,27 @@ use serde::de::DeserializeOwned;
 use std::collections::HashMap;
 use std::io::{BufRead, Read};
 
-/// Line on which the first record stands, counted from 1.
-pub(super) const FIRST_LINE: usize = 2;
+/// Line of the first record, counted from 1.
+const FIRST_LINE: usize = 2;
 
-/// A journal as read.
+/// A journal in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CheckpointFile<R: CheckpointRecord> {
     /// Its header.
     pub header: CheckpointHeader<R::Body>,
-    /// Its records, in file order: the first stands in line 2.
+    /// Its records, in file order, from line 2.
     pub records: Vec<R>,
-    /// How it ends.
+    /// Its last lines.
     pub end: CheckpointEnd,
 }
 
-/// Reads a journal; `file` is its name in refusals. A file without a complete header is `None`.
+/// Reads a journal; `file` is its name in messages. A file without a complete header gives `None`.
 ///
-/// What follows the last complete line is dropped: part of a line that was being written when the program was
-/// killed, and the zero bytes that a file system may leave in its place when the power fails.
+/// Everything after the last complete line is dropped: part of a line that was being written when the program
+/// was killed, and zero bytes that a file system may leave after a power failure.
 ///
 /// # Errors
-/// [`CheckpointError`] at the first complete line that the program did not write.
+/// [`CheckpointError`] at the first complete line that is not valid.
 pub fn read_checkpoint<R: CheckpointRecord>(
     file: &str,
     bytes: impl AsRef<[u8]>,
@@ -39,25 +39,24 @@ pub fn read_checkpoint<R: CheckpointRecord>(
 }
 
 impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
-    /// All that follows, in memory.
+    /// Reads all records into memory.
     ///
     /// # Errors
-    /// [`CheckpointError`] at the first complete line that the program did not write, and at a record that
-    /// stands in a line before too.
+    /// [`CheckpointError`] at the first complete line that is not valid, or at a repeated record.
     pub(crate) fn read_all(mut self) -> Result<CheckpointFile<R>, CheckpointError> {
         let (mut records, mut lines) = (Vec::new(), HashMap::new());
         while let Some(StoredRecord { record, line }) = self.next_record()? {
             if let Some(before) = lines.insert(record.identity(), line) {
                 let found = StoredRecord { record, line };
-                return Err(duplicate_record_error(self.file_name(), &found, &format!("of line {before} ")));
+                return Err(duplicate_record_error(&self.file, &found, &format!("of line {before} ")));
             }
             records.push(record);
         }
-        Ok(CheckpointFile { header: self.header().clone(), records, end: self.end() })
+        Ok(CheckpointFile { header: self.header, records, end: self.end })
     }
 }
 
-/// The refusal of a record that stands in a line before too; `before` says in which, if that is known.
+/// The error for a repeated record; `before` is empty or names the earlier line, as in `of line 3 `.
 #[must_use]
 pub fn duplicate_record_error<R: CheckpointRecord>(
     file: &str,
@@ -67,16 +66,16 @@ pub fn duplicate_record_error<R: CheckpointRecord>(
     line_error::<R>(file, found.line, format!("the {} {before}a second time", R::KIND.record()))
 }
 
-/// A line has its end, or a checksum, which is what is written last.
-pub(super) fn is_complete(line: &RawLine) -> bool {
+/// Whether a line is complete: it has its end, or a checksum, which is written last.
+fn is_complete(line: &RawLine) -> bool {
     line.ended || LineChecksum::check(strip_byte_order_mark(line.bytes)) != LineChecksum::Absent
 }
 
 impl<R: CheckpointRecord> CheckpointFile<R> {
-    /// Refuses a record of which a new computation gave something else.
+    /// Compares the record at `place` with its recomputation.
     ///
     /// # Errors
-    /// [`CheckpointError::Recomputed`].
+    /// [`CheckpointError::Recomputed`] where they differ.
     pub(crate) fn check_recomputed(
         &self,
         file: &str,
@@ -88,91 +87,78 @@ impl<R: CheckpointRecord> CheckpointFile<R> {
     }
 }
 
-/// Refuses a record of which a new computation gave something else.
+/// Compares a record with its recomputation.
 ///
 /// # Errors
-/// [`CheckpointError::Recomputed`].
+/// [`CheckpointError::Recomputed`] where they differ.
 pub fn check_recomputed<R: CheckpointRecord>(
     file: &str,
     stored: &StoredRecord<R>,
     again: &R,
 ) -> Result<(), CheckpointError> {
     let Some([found, computed]) = stored.record.difference(again) else { return Ok(()) };
-    Err(CheckpointError::Recomputed {
-        file: file.to_owned(),
-        line: stored.line,
-        kind: R::KIND,
-        found,
-        computed,
-    })
+    let (file, line, kind) = (file.to_owned(), stored.line, R::KIND);
+    Err(CheckpointError::Recomputed { file, line, kind, found, computed })
 }
 
-pub(super) fn parse_header<R: CheckpointRecord>(
+fn parse_header<R: CheckpointRecord>(
     file: &str,
     line: &[u8],
 ) -> Result<CheckpointHeader<R::Body>, CheckpointError> {
-    let at_header = |problem| CheckpointError::Header { file: file.to_owned(), problem };
+    let (file, kind) = (file.to_owned(), R::KIND);
+    let at_header = |problem| CheckpointError::Header { file: file.clone(), problem };
     let line = strip_byte_order_mark(line);
-    let seal = LineChecksum::check(line);
-    let object = match &seal {
-        LineChecksum::Valid(object) => object.as_slice(),
-        LineChecksum::Absent => line,
-        LineChecksum::Broken { .. } => return Err(at_header(checksum_problem(&seal))),
+    let object = check_line(line);
+    // a header without a checksum may be of an older layout, which has its own message
+    let json = match &object {
+        Ok(object) => object.as_slice(),
+        Err(problem) if problem == MISSING_CHECKSUM => line,
+        Err(problem) => return Err(at_header(problem.clone())),
     };
-    let HeaderPrefix { journal, layout } = parse_json(object, "journal header").map_err(at_header)?;
-    if journal != R::KIND {
-        return Err(CheckpointError::OtherKind { file: file.to_owned(), found: journal, expected: R::KIND });
+    let HeaderPrefix { journal, layout } = parse_json(json, "journal header").map_err(at_header)?;
+    if journal != kind {
+        return Err(CheckpointError::OtherKind { file, found: journal, expected: kind });
     }
     if layout != LAYOUT {
-        return Err(CheckpointError::Layout { file: file.to_owned(), kind: R::KIND, found: layout });
+        return Err(CheckpointError::Layout { file, kind, found: layout });
     }
-    if seal == LineChecksum::Absent {
-        return Err(at_header(MISSING_CHECKSUM.to_owned()));
-    }
-    parse_json(object, "journal header").map_err(at_header)
-}
-
-/// A line as its row.
-pub(super) fn parse_row<R: CheckpointRecord>(line: &[u8]) -> Result<R::IterateRow, String> {
-    match LineChecksum::check(line) {
-        LineChecksum::Valid(object) => parse_json(&object, R::KIND.record()),
-        seal => Err(checksum_problem(&seal)),
-    }
+    object.and_then(|object| parse_json(&object, "journal header")).map_err(at_header)
 }
 
 const MISSING_CHECKSUM: &str = "found no checksum at the end of the line, expected `\"sha256\":\"...\"}`";
 
-fn checksum_problem(seal: &LineChecksum) -> String {
-    match seal {
+/// The object of a line without its checksum, or what is wrong with the checksum.
+fn check_line(line: &[u8]) -> Result<Vec<u8>, String> {
+    match LineChecksum::check(line) {
+        LineChecksum::Valid(object) => Ok(object),
         LineChecksum::Broken { found, computed } => {
-            format!("the line has the checksum {computed}, but says {found}: it was changed")
+            Err(format!("the line has the checksum {computed}, but says {found}: it was changed"))
         }
-        _ => MISSING_CHECKSUM.to_owned(),
+        LineChecksum::Absent => Err(MISSING_CHECKSUM.to_owned()),
     }
 }
 
-/// The one place in which a line becomes a value.
 fn parse_json<T: DeserializeOwned>(line: &[u8], what: &str) -> Result<T, String> {
     serde_json::from_slice(line).map_err(|error| format!("no {what}: {error}"))
 }
 
-pub(super) fn line_error<R: CheckpointRecord>(file: &str, line: usize, problem: String) -> CheckpointError {
+fn line_error<R: CheckpointRecord>(file: &str, line: usize, problem: String) -> CheckpointError {
     CheckpointError::Line { file: file.to_owned(), line, problem, kind: R::KIND }
 }
 
-// The lines of a file, whichever system or editor ended them: LF, CR LF or CR.
+// Lines of a file, with any of the ends LF, CR LF or CR.
 
 /// A line without its end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct RawLine<'a> {
     pub bytes: &'a [u8],
-    /// Whether it has an end, which the last one may lack.
+    /// Whether it has an end; the last line may lack it.
     pub ended: bool,
-    /// Bytes of the file before the next line.
+    /// Offset of the next line in the file, bytes.
     pub end_offset: usize,
 }
 
-/// The lines of a file in order; none of an empty one.
+/// The lines of a file, in order.
 pub(super) fn split_lines(bytes: &[u8]) -> impl Iterator<Item = RawLine<'_>> {
     let mut from = 0;
     std::iter::from_fn(move || {
@@ -184,37 +170,31 @@ pub(super) fn split_lines(bytes: &[u8]) -> impl Iterator<Item = RawLine<'_>> {
     })
 }
 
-/// The line without the byte-order mark that an editor may have put before it.
+/// The line without a byte-order mark, which some editors add.
 pub(super) fn strip_byte_order_mark(line: &[u8]) -> &[u8] {
     line.strip_prefix("\u{feff}".as_bytes()).unwrap_or(line)
 }
 
-// Which records of a journal are computed again before it is believed.
-
-/// Records of a journal that are computed again when it is resumed: a machine or a build that calculates
-/// otherwise shows in nearly every record, and few of them cost little.
+/// Number of records that are recomputed when a journal is resumed. A few suffice, because a machine or build
+/// with different arithmetic differs in nearly every record.
 pub const RECHECKED_RECORDS: usize = 8;
 
-/// Places of [`RECHECKED_RECORDS`] records, or of all where there are no more: one of each of as many equal parts,
-/// drawn by the seed.
+/// Indices of at most [`RECHECKED_RECORDS`] records: one from each of as many equal parts of the journal, drawn
+/// with the seed.
 #[must_use]
 pub fn sample_records(records: usize, seed: u64) -> Vec<usize> {
     let parts = RECHECKED_RECORDS.min(records);
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
-    (0..parts)
-        .map(|part| generator.random_range(part * records / parts..(part + 1) * records / parts))
-        .collect()
+    let mut draw = |part| generator.random_range(part * records / parts..(part + 1) * records / parts);
+    (0..parts).map(|part| draw(part)).collect()
 }
 
-// A journal line by line: of one that is larger than memory no more than a line is held.
-
-/// Longest line, bytes: many times what the program writes, so that no file fills the memory as one line.
+/// Longest line that is read, bytes: many times what the program writes, but a limit for other files.
 const LONGEST_LINE: u64 = 1 << 28;
 
-/// A journal that is being read.
+/// Reads a journal line by line, so that it may be larger than memory.
 ///
-/// What follows the last complete line is dropped: part of a line that was being written when the program
-/// was killed, and the zero bytes that a file system may leave in its place when the power fails.
+/// Everything after the last complete line is dropped, as by [`read_checkpoint`].
 #[derive(Debug)]
 pub struct CheckpointReader<R: CheckpointRecord, S> {
     file: String,
@@ -224,18 +204,18 @@ pub struct CheckpointReader<R: CheckpointRecord, S> {
     end: CheckpointEnd,
 }
 
-/// How a journal ends.
+/// The end of a journal.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct CheckpointEnd {
-    /// Bytes up to the end of the last complete line: the file is cut to them before anything is appended.
+    /// Bytes up to the end of the last complete line. The file is truncated to them before it is extended.
     pub intact_bytes: usize,
     /// Whether an incomplete line follows, which is dropped.
     pub torn: bool,
-    /// Whether the last complete line has no end, which is added before anything is appended.
+    /// Whether the last complete line lacks its end, which is added before the file is extended.
     pub unended: bool,
 }
 
-/// A record as it stands in a journal.
+/// A record with its line in a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StoredRecord<R> {
     /// The record.
@@ -245,10 +225,10 @@ pub struct StoredRecord<R> {
 }
 
 impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
-    /// Reads the header; `file` is the name in refusals. A file without a complete header is `None`.
+    /// Reads the header; `file` is the name in messages. A file without a complete header gives `None`.
     ///
     /// # Errors
-    /// [`CheckpointError`] where it cannot be read, or the program did not write its first line.
+    /// [`CheckpointError`] where the file cannot be read or its first line is not valid.
     pub(crate) fn open(file: &str, from: S) -> Result<Option<Self>, CheckpointError> {
         let mut text = LineReader { from, chunk: Vec::new(), start: 0, used: 0 };
         let unreadable = |problem| CheckpointError::Unreadable { file: file.to_owned(), problem };
@@ -258,19 +238,14 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
         Ok(Some(Self { file: file.to_owned(), header, line_reader: text, line: FIRST_LINE, end }))
     }
 
-    /// Its name in refusals.
-    pub(super) fn file_name(&self) -> &str {
-        &self.file
-    }
-
     pub(crate) fn header(&self) -> &CheckpointHeader<R::Body> {
         &self.header
     }
 
-    /// The next record; `None` behind the last complete line.
+    /// The next record; `None` after the last complete line.
     ///
     /// # Errors
-    /// [`CheckpointError`] where it cannot be read, or at a complete line that the program did not write.
+    /// [`CheckpointError`] where the file cannot be read or a complete line is not valid.
     pub(crate) fn next_record(&mut self) -> Result<Option<StoredRecord<R>>, CheckpointError> {
         let Self { file, header, line_reader: text, line, end } = self;
         let unreadable = |problem| CheckpointError::Unreadable { file: file.clone(), problem };
@@ -280,7 +255,8 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
             return Ok(None);
         }
         let refused = |problem| line_error::<R>(file, *line, problem);
-        let row = parse_row::<R>(found.bytes).map_err(refused)?;
+        let row = check_line(found.bytes).and_then(|object| parse_json(&object, R::KIND.record()));
+        let row = row.map_err(refused)?;
         let expected = *line - FIRST_LINE;
         if let Some(index) = R::line_index(&row).filter(|index| *index != expected) {
             let problem = format!("`index`: found {index}, expected {expected}; lines are missing before it");
@@ -292,21 +268,21 @@ impl<R: CheckpointRecord, S: BufRead> CheckpointReader<R, S> {
         Ok(Some(StoredRecord { record, line: *line - 1 }))
     }
 
-    /// How it ends, once there is no further record.
+    /// The end of the journal, once all records are read.
     pub(crate) fn end(&self) -> CheckpointEnd {
         self.end
     }
 }
 
-/// The lines of a file that is read piece by piece.
+/// Reads a file line by line.
 #[derive(Debug)]
 struct LineReader<S> {
     from: S,
-    /// What was read last: up to a line feed, which is a line but where an editor ended lines otherwise.
+    /// The last bytes read, up to a line feed. They are several lines where lines end with CR alone.
     chunk: Vec<u8>,
-    /// Where it starts in the file.
+    /// Offset of the chunk in the file.
     start: usize,
-    /// Bytes of it that were given out.
+    /// Number of its bytes that were returned.
     used: usize,
 }
 

@@ -1,4 +1,4 @@
-//! What a line of a journal holds.
+//! Records of a journal, their lines and numbers, and the sink of the lines.
 
 use super::checksum::append_checksum;
 use super::header::{CheckpointHeader, CheckpointKind, LAYOUT};
@@ -7,24 +7,24 @@ use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::fmt::Debug;
 use std::hash::Hash;
 
-/// A computation with its outcome, as one line of a journal.
+/// A computation with its outcome: one line of a journal.
 pub trait CheckpointRecord: Clone + Debug + PartialEq {
-    /// What its journals are of.
+    /// Kind of its journals.
     const KIND: CheckpointKind;
-    /// What the header of such a journal says for all of its lines.
+    /// Part of the header that is specific to the kind.
     type Body: Serialize + DeserializeOwned + Clone + Debug + PartialEq;
-    /// The record as it stands in a line.
+    /// Serialized form of the record.
     type IterateRow: Serialize + DeserializeOwned;
-    /// Records with the same identity are the same computation, and have the same outcome.
+    /// Identifies the computation: records with equal identity must have equal outcomes.
     type Identity: Eq + Hash;
 
-    /// Which computation it is.
+    /// Identity of the computation.
     fn identity(&self) -> Self::Identity;
 
-    /// The record as it stands in line `at`, counted from 0 behind the header.
+    /// The serialized form in line `at`, counted from 0 after the header.
     fn to_row(&self, at: usize) -> Self::IterateRow;
 
-    /// The number of its line, counted from 0 behind the header, where a row says it.
+    /// The line number that a row contains, if any, counted from 0 after the header.
     fn line_index(row: &Self::IterateRow) -> Option<usize>;
 
     /// The record of a row.
@@ -33,10 +33,10 @@ pub trait CheckpointRecord: Clone + Debug + PartialEq {
     /// What was found and what was expected.
     fn from_row(row: Self::IterateRow, body: &Self::Body) -> Result<Self, String>;
 
-    /// What differs between two outcomes of the same computation: this one's and the other's, in words.
+    /// The first difference between two outcomes of one computation, as words for each; `None` if equal.
     fn difference(&self, other: &Self) -> Option<[String; 2]>;
 
-    /// What differs between the problems of two journals with the same fingerprint, in words.
+    /// A sentence on the difference between two headers with equal fingerprints; `None` if equal.
     fn problem_difference(found: &Self::Body, expected: &Self::Body) -> Option<String>;
 }
 
@@ -48,27 +48,24 @@ impl<B: Serialize> CheckpointHeader<B> {
     }
 }
 
-/// A header as a line.
+/// Formats a header as a line.
 #[must_use]
 pub fn format_header_line<B: Serialize>(header: &CheckpointHeader<B>) -> String {
     format_json_line(header)
 }
 
-/// A record as line `at`, counted from 0 behind the header.
+/// Formats a record as line `at`, counted from 0 after the header.
 #[must_use]
 pub fn format_record_line<R: CheckpointRecord>(record: &R, at: usize) -> String {
     format_json_line(&record.to_row(at))
 }
 
 fn format_json_line<T: Serialize>(value: &T) -> String {
-    // string keys and finite numbers only: the writer has nothing to refuse, and a line that it did refuse
-    // would be refused when it is read
+    // string keys and finite numbers cannot fail; an empty line would be refused on reading
     append_checksum(&serde_json::to_string(value).unwrap_or_default()) + "\n"
 }
 
-// Numbers of which every bit comes back.
-
-/// A finite number as the shortest decimal that gives the same bits back, in quotes.
+/// A finite number, serialized as a string with the shortest decimal that keeps every bit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ExactNumber(pub f64);
 
@@ -88,19 +85,16 @@ impl<'de> Deserialize<'de> for ExactNumber {
     }
 }
 
-// Where the lines of a journal go.
-
-/// Takes lines as they are made. When it returns they are where they stay: the program has written them to a
-/// file, and the disk has them. Only then is a record counted or reported.
+/// Stores lines durably: when `append` returns, they are on disk. Only then is a record counted or reported.
 pub trait CheckpointSink: Send {
     /// Appends one line or several, each with its newline.
     ///
     /// # Errors
-    /// The reason in words; the computation stops.
+    /// The reason; the computation stops.
     fn append(&mut self, lines: &str) -> Result<(), String>;
 }
 
-/// Keeps nothing: for a computation that will not be resumed.
+/// Discards all lines, for a computation that is never resumed.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct NullSink;
 

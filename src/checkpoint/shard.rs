@@ -1,4 +1,4 @@
-//! A part of a study, or of a list of fits, that one machine does: every so many of its parts one.
+//! A part of a study, or of a list of fits, for one machine.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,8 +6,8 @@ use std::str::FromStr;
 /// Most shards: more than a cluster has cores.
 const MAX_SHARDS: usize = 1_000_000;
 
-/// The points of a study, or jobs of a list, whose number is `at` modulo `of`, so that slow corners are
-/// spread over all shards.
+/// The points of a study, or jobs of a list, whose index is `number` modulo `total`. This spreads slow regions
+/// over all shards.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Shard {
     number: usize,
@@ -18,12 +18,12 @@ impl Shard {
     /// All points.
     pub const WHOLE: Self = Self { number: 0, total: 1 };
 
-    /// Shard `at` (counted from 0) of `of`; `None` where there is none.
+    /// Shard `at` (counted from 0) of `of`; `None` where `at` or `of` is too large.
     pub(crate) fn new(at: usize, of: usize) -> Option<Self> {
         (at < of && of <= MAX_SHARDS).then_some(Self { number: at, total: of })
     }
 
-    /// Its number, from 0.
+    /// Number of the shard, from 0.
     pub(crate) fn number(self) -> usize {
         self.number
     }
@@ -32,7 +32,7 @@ impl Shard {
         self.total
     }
 
-    /// How many of `points` it holds.
+    /// Number of points in the shard, of `points` in total.
     pub(crate) fn count_points(self, points: usize) -> usize {
         points.saturating_sub(self.number).div_ceil(self.total)
     }
@@ -42,7 +42,8 @@ impl Shard {
         index % self.total == self.number
     }
 
-    /// Whether both may hold the same point: not where their numbers differ by what divides both counts.
+    /// Whether two shards may share a point: their numbers agree modulo the greatest common divisor of the
+    /// totals.
     pub(crate) fn overlaps(self, other: Self) -> bool {
         let (mut common, mut rest) = (self.total, other.total);
         while rest > 0 {
@@ -51,17 +52,17 @@ impl Shard {
         self.number % common == other.number % common
     }
 
-    /// Index of its point `place`, counted from 0.
+    /// Index of its point number `place`, both counted from 0.
     pub(crate) fn point_index(self, place: usize) -> usize {
         self.number + place * self.total
     }
 
-    /// Name of its journal, without an ending: `3-of-64`.
+    /// Name of its journal without extension, such as `3-of-64`.
     pub(crate) fn file_stem(self) -> String {
         format!("{}-of-{}", self.number, self.total)
     }
 
-    /// The shard whose journal has this name.
+    /// The shard of a journal with this name.
     pub(crate) fn from_file_stem(name: &str) -> Option<Self> {
         let (at, of) = name.split_once("-of-")?;
         Self::new(at.parse().ok()?, of.parse().ok()?).filter(|shard| shard.file_stem() == name)
@@ -79,9 +80,9 @@ impl FromStr for Shard {
 
     fn from_str(text: &str) -> Result<Self, String> {
         let numbers = text.split_once('/').and_then(|(at, of)| Some((at.parse().ok()?, of.parse().ok()?)));
-        numbers.and_then(|(at, of)| Self::new(at, of)).ok_or_else(|| {
-            format!("expected K/N, such as 3/64, with K from 0 to N - 1 and N up to {MAX_SHARDS}")
-        })
+        let expected =
+            || format!("expected K/N, such as 3/64, with K from 0 to N - 1 and N up to {MAX_SHARDS}");
+        numbers.and_then(|(at, of)| Self::new(at, of)).ok_or_else(expected)
     }
 }
 
