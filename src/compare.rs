@@ -1,5 +1,5 @@
-//! A recording against a model, as data: clocks and origins, what is left between the two, ridges, windows,
-//! transitions and runs. Every scene is simulated once; nothing here is prose or a drawing.
+//! Comparison of a recording with the fitted model, as data: alignment, residuals, ridges, windows, transitions
+//! and runs. Every scene is simulated once.
 
 pub mod condition;
 pub mod friction;

@@ -1,9 +1,9 @@
-//! Friction read from a recording itself: where the tip moves evenly, the deflection says how large it is.
+//! Friction measured on a recording, from the deflection of the blade.
 //!
-//! A blade whose links turn slowly is in equilibrium, and of an equilibrium the deflection `tip_x - head_x`
-//! decides everything: both angles, the normal force and the coefficient of friction. Where the tip sticks
-//! and slips, inertia cancels over whole cycles, so that the mean deflection gives a mean of the coefficient;
-//! that is none of the law's, and the model is read in the same way next to it.
+//! A blade whose links turn slowly is in equilibrium, and the deflection `tip_x - head_x` determines both
+//! angles, the normal force and the coefficient of friction. In stick-slip, inertia cancels over whole cycles,
+//! so the mean deflection gives a mean coefficient. That is not a value of the friction law, so it is compared
+//! with the same mean of the model.
 
 use super::condition::{ConditionComparison, TimedRecording};
 use crate::fit::job::Job;
@@ -23,35 +23,36 @@ pub(crate) struct FrictionPoint {
     pub coefficient: f64,
 }
 
-/// What a recording shows of friction.
+/// Coefficients of friction from a recording.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct MeasuredFriction {
-    /// Where the tip moved evenly.
+    /// Values in steady sliding.
     pub steady_sliding: Vec<FrictionPoint>,
-    /// Means over cycles of stick and slip.
+    /// Means over stick-slip cycles.
     pub over_cycles: Vec<FrictionPoint>,
-    /// The same means of the model.
+    /// Means of the model over stick-slip cycles.
     pub model_over_cycles: Vec<FrictionPoint>,
 }
 
-/// Length of a block in which the tip may move evenly, s, and fewest frames of it.
+/// Length of a block for steady sliding, s.
 const STEADY_BLOCK_S: f64 = 5e-3;
+/// Fewest frames of a block.
 const MIN_BLOCK_FRAMES: usize = 8;
-/// Length of a block of cycles, s, where no slow frequency is known: a dozen cycles of the fast one;
-/// otherwise this many cycles of the slow one.
+/// Least length of a block of stick-slip cycles, s: a dozen cycles of the fast frequency.
 const CYCLE_BLOCK_S: f64 = 0.02;
+/// Length of a block of stick-slip cycles, in cycles of the slowest target frequency.
 const SLOW_CYCLES: f64 = 2.0;
-/// Scatter about a parabola, over the noise, up to which a tip moves evenly.
+/// Largest scatter about a parabola, relative to the noise, in steady sliding.
 const MAX_SCATTER_OVER_NOISE: f64 = 1.2;
-/// Share of its mean by which the speed may change within a block.
+/// Largest change of the speed within a block, relative to its mean.
 const MAX_SPEED_CHANGE: f64 = 0.4;
-/// Deviations from rest from which a speed is one.
+/// Least speed of a moving tip, in standard deviations of the speed of a resting tip.
 const MIN_SPEED_SD: f64 = 5.0;
-/// Most points of a kind.
+/// Most points of each of the three kinds.
 const MAX_POINTS: usize = 60;
 
 impl MeasuredFriction {
-    /// What the recording of a condition shows; empty without tip and head.
+    /// Measures the recording of a condition; empty without tip and head.
     pub(crate) fn measure(case: &ConditionComparison) -> Self {
         let Some(side) = case.measured_side() else { return Self::default() };
         let deflections = static_deflections(&case.model.scene.linkage);
@@ -61,22 +62,13 @@ impl MeasuredFriction {
         let noise_m = case.noise_m(Channel::TipX).unwrap_or(0.0);
         let evenly = one_way_blocks(&side, STEADY_BLOCK_S, noise_m);
         let cycles = one_way_blocks(&side, cycles_s, noise_m);
-        let model_side = case.model_side();
-        let shift_s = case.alignment.shift_s;
-        let model: Vec<FrictionBlock> = one_way_blocks(&model_side, cycles_s, noise_m)
-            .into_iter()
-            .map(|b| FrictionBlock { start_s: b.start_s + shift_s, ..b })
-            .collect();
-        let shown = |from_s: f64| {
-            let grid = side.recording.grid();
-            from_s >= grid.start_s && from_s <= grid.time_s(grid.frames)
-        };
+        let mut model = one_way_blocks(&case.model_side(), cycles_s, noise_m);
+        model.iter_mut().for_each(|block| block.start_s += case.alignment.shift_s);
+        let grid = side.recording.grid();
+        let shown = grid.start_s..=grid.time_s(grid.frames);
         let points = |blocks: &[FrictionBlock], even: bool| {
-            let found: Vec<FrictionPoint> = blocks
-                .iter()
-                .filter(|block| block.is_even == even && shown(block.start_s))
-                .filter_map(|block| block.friction_point(&deflections))
-                .collect();
+            let wanted = blocks.iter().filter(|b| b.is_even == even && shown.contains(&b.start_s));
+            let found: Vec<FrictionPoint> = wanted.filter_map(|b| b.friction_point(&deflections)).collect();
             let every = found.len().div_ceil(MAX_POINTS).max(1);
             found.into_iter().step_by(every).collect()
         };
@@ -88,7 +80,7 @@ impl MeasuredFriction {
     }
 }
 
-/// A few frames in which the tip moves one way.
+/// A block of frames in which the tip moves one way.
 #[derive(Debug, Clone, Copy)]
 struct FrictionBlock {
     start_s: f64,
@@ -99,7 +91,8 @@ struct FrictionBlock {
 }
 
 impl FrictionBlock {
-    /// The coefficient at which the blade rests at that deflection.
+    /// The coefficient of friction for which the deflection is in equilibrium. `deflections` are coefficients
+    /// with their static deflections, m, in rising order.
     fn friction_point(&self, deflections: &[(f64, f64)]) -> Option<FrictionPoint> {
         let after = deflections.partition_point(|(_, deflection_m)| *deflection_m < self.deflection_m);
         let (a, b) = (deflections.get(after.checked_sub(1)?)?, deflections.get(after)?);
@@ -109,7 +102,7 @@ impl FrictionBlock {
     }
 }
 
-/// The blocks of one side in which the tip keeps moving one way at nearly one speed.
+/// The blocks in which the tip moves one way at nearly constant speed.
 fn one_way_blocks(side: &TimedRecording, length_s: f64, noise_m: f64) -> Vec<FrictionBlock> {
     let grid = side.recording.grid();
     let frames = ((length_s * grid.frame_rate_hz).round() as usize).max(MIN_BLOCK_FRAMES);
@@ -146,11 +139,9 @@ impl TipParabola {
     /// Least squares; `None` with too few frames.
     fn fit(samples: &[Option<f64>], frame_s: f64) -> Option<Self> {
         let middle = 0.5 * (samples.len() as f64 - 1.0);
-        let points: Vec<(f64, f64)> = samples
-            .iter()
-            .enumerate()
-            .filter_map(|(i, x)| Some(((i as f64 - middle) / middle, (*x)?)))
-            .collect();
+        let samples = samples.iter().enumerate();
+        let points: Vec<(f64, f64)> =
+            samples.filter_map(|(i, x)| Some(((i as f64 - middle) / middle, (*x)?))).collect();
         if points.len() < MIN_BLOCK_FRAMES {
             return None;
         }
@@ -174,15 +165,16 @@ impl TipParabola {
     }
 }
 
-// The friction law of a fit with what is known of it at every speed.
+// Confidence band of the fitted friction law.
 
-/// A coefficient of the law: its name in a scene, its symbol, and how the law changes with it at a speed.
+/// A coefficient of the friction law.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct LawCoefficient {
     /// Name in a scene.
     pub name: &'static str,
     /// Symbol in the law.
     pub symbol: &'static str,
+    /// Derivative of the law by the coefficient, at a speed.
     slope: fn(&FrictionLaw, f64) -> f64,
 }
 
@@ -197,12 +189,12 @@ pub(crate) const COEFFICIENTS: [LawCoefficient; 3] = [
     LawCoefficient { name: "friction.c", symbol: "C", slope: |_, _| 1.0 },
 ];
 
-/// Half of an interval at a tip speed, m/s.
+/// Half width of an interval, as a function of the tip's speed, m/s.
 pub(crate) type HalfInterval = Box<dyn Fn(f64) -> f64>;
 
-/// Half of the 95 % interval of the coefficient of friction at a speed, propagated linearly from the stated
-/// intervals of the fitted coefficients with their correlations; `None` where nothing of the law was fitted,
-/// an interval is open, or the linear model does not determine a coefficient that was fitted.
+/// Half width of the 95 % interval of the coefficient of friction, propagated linearly from the intervals of the
+/// fitted coefficients with their correlations. `None` where no coefficient is fitted, an interval is open, or
+/// the linear model does not determine a fitted coefficient.
 pub(crate) fn friction_half_95(job: &Job, result: &FitResult, law: &FrictionLaw) -> Option<HalfInterval> {
     let half = |coefficient: &LawCoefficient| {
         if !is_fitted(job, coefficient) {
@@ -220,8 +212,7 @@ pub(crate) fn friction_half_95(job: &Job, result: &FitResult, law: &FrictionLaw)
         result.correlations.get(COEFFICIENTS[i].name)?.get(COEFFICIENTS[j].name).copied()
     };
     let row = |i: usize| Some([correlation(i, 0)?, correlation(i, 1)?, correlation(i, 2)?]);
-    let correlations = [row(0)?, row(1)?, row(2)?];
-    let law = *law;
+    let (correlations, law) = ([row(0)?, row(1)?, row(2)?], *law);
     let half = move |v: f64| {
         let moved: [f64; 3] = array::from_fn(|i| (COEFFICIENTS[i].slope)(&law, v) * halves[i]);
         let row = |i: usize| (0..3).map(|j| moved[i] * moved[j] * correlations[i][j]).sum::<f64>();

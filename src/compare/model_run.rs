@@ -1,4 +1,4 @@
-//! The model at the estimates: each condition's scene, run once.
+//! Runs of the model at the estimates, one per condition.
 
 use crate::fit::evaluation::RunFailure;
 use crate::fit::job::Job;
@@ -12,18 +12,18 @@ use crate::simulate::{RunStatus, Transition, TransitionCause};
 use rayon::prelude::*;
 use serde::{Serialize, Serializer};
 
-/// The model at the estimates in one condition of the job.
+/// A run of the model at the estimates in one condition.
 #[derive(Debug, Clone)]
 pub struct ModelRun {
     /// The scene with the estimates in it.
     pub scene: Scene,
-    /// What the condition's camera records of the run.
+    /// The run as the condition's camera records it.
     pub view: TwinView,
-    /// The states of the same run.
+    /// States of the run.
     pub motion: RunMotion,
 }
 
-/// The model at the estimates, condition by condition, each run once at the tolerance of its scene.
+/// Runs the model at the estimates in every condition, at the tolerance of its scene.
 ///
 /// # Errors
 /// [`RunFailure`] when a run ends before its camera took two frames.
@@ -43,14 +43,12 @@ pub fn run_conditions(
     (0..job.conditions.len()).into_par_iter().map(at).collect()
 }
 
-// The best model's run in a condition: how it ended and which hard events it had.
-
-/// The best model's run in a condition, with its hard events.
+/// Summary of the best model's run in a condition: its end and its hard events.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct RunSummary {
     /// Name of the condition.
     pub name: String,
-    /// How it ended; written as `status` and, in a sentence, `meaning`.
+    /// How it ended; serialized as `status` and, as a sentence, `meaning`.
     #[serde(flatten, serialize_with = "with_meaning")]
     pub status: RunStatus,
     /// Start of the run, s.
@@ -59,23 +57,23 @@ pub struct RunSummary {
     pub stopped_at_s: f64,
     /// Changes of mode.
     pub transitions: usize,
-    /// How often the tip stuck.
+    /// Number of sticks.
     pub sticks: usize,
     /// The longest stick, s.
     pub longest_stick_s: Option<f64>,
-    /// Share of the run in which the tip stuck.
+    /// Fraction of the run in stick.
     pub stick_share: Option<f64>,
-    /// How often the tip lost contact with the glass.
+    /// Number of losses of contact.
     pub contact_losses: usize,
-    /// Impacts of the tip on the glass.
+    /// Number of impacts of the tip on the glass.
     pub impacts: usize,
-    /// How often the Painlevé paradox jammed the tip.
+    /// Number of jams of the tip (Painlevé paradox).
     pub jams: usize,
     /// Whether it ended because more than one mode of contact was consistent with the forces.
     pub indeterminate: bool,
     /// Whether it ended because transitions accumulated in no time.
     pub chattering: bool,
-    /// Whether the head of its recording turns the other way than the model's.
+    /// Whether the recorded head turns opposite to the model's.
     #[serde(rename = "opposed")]
     pub opposite_turn: bool,
     /// Least normal force in contact, N.
@@ -93,14 +91,14 @@ fn with_meaning<S: Serializer>(status: &RunStatus, to: S) -> Result<S::Ok, S::Er
     StatusWithMeaning { status: *status, meaning: status.meaning() }.serialize(to)
 }
 
-/// The run of a condition of this name.
+/// Summary of the run of the condition `name`.
 pub(super) fn summarize_run(name: &str, started_at_s: f64, motion: &RunMotion) -> RunSummary {
     let run = &motion.run;
     let lasted_s = run.stopped_at_s - started_at_s;
     let sticks = motion.stick_s.iter().map(|[from, to]| to - from);
-    let stuck_s: f64 = sticks.clone().fold(0.0, |all, one| all + one); // (the sum of none is -0)
+    let stuck_s: f64 = sticks.clone().fold(0.0, |all, one| all + one); // (an empty `sum` is -0)
     let changes = |is: fn(&Transition) -> bool| motion.transitions.iter().filter(|t| is(t)).count();
-    // a run that stops at an event has no transition behind it
+    // an event that stops the run is not among the transitions
     let stopped = |status: RunStatus| usize::from(run.status == status);
     RunSummary {
         name: name.to_owned(),

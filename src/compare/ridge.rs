@@ -1,7 +1,6 @@
-//! The deflection in segments of both sides, with the ridges that follow the stick-slip cycle.
+//! Spectrograms of the deflection of both sides, with the ridges that follow the stick-slip cycle.
 
-use super::condition::spectral_band;
-use super::condition::{ConditionComparison, TimedRecording};
+use super::condition::{ConditionComparison, TimedRecording, spectral_band};
 use crate::feature::{FeatureBand, Reading};
 use crate::recording::channel::{Channel, InstantKind, Window, WindowEnd, mean_speed_m_per_s};
 use crate::spectrum::time_frequency::{
@@ -10,79 +9,75 @@ use crate::spectrum::time_frequency::{
 use crate::spectrum::{Oscillation, SampledRecord, SpectralAnalysis, SpectrumSettings};
 use std::ops::Range;
 
-/// Lengths of segments that are tried, over the one that shows the component best, the shortest first.
+/// Segment lengths that are tried, relative to the default length, in rising order.
 const SEGMENT_LENGTH_FACTORS: [f64; 8] = [0.15, 0.2, 0.3, 0.45, 0.7, 1.0, 1.4, 2.0];
-/// Segments that a record holds side by side at least, so that there is a course.
+/// Fewest adjoining segments of a record, so that there is a course.
 const MIN_SEGMENTS: f64 = 3.0;
-/// Share of the best course that is as good as it.
+/// Fraction of the longest course that counts as equally long.
 const NEARLY_BEST: f64 = 0.95;
-/// Most points of a ridge over speed: more would lie over each other.
+/// Most points of a ridge over speed, so that they do not overlap in a figure.
 const MAX_SPEED_POINTS: usize = 40;
 
 /// The ridges of a condition.
 #[derive(Debug, Clone, Default)]
 pub struct RidgePair {
-    /// That of the recording; `None` where no segment has frames enough.
+    /// Ridge of the recording; `None` where no segment has enough frames.
     pub measured: Option<TrackedRidge>,
-    /// That of the model, in segments as long, on its own clock.
+    /// Ridge of the model with segments of the same length, on the model's clock.
     pub model: Option<TrackedRidge>,
 }
 
-/// The deflection of one side in segments, and its strongest component over time.
+/// Spectrogram of a deflection with its strongest component over time.
 #[derive(Debug, Clone)]
 pub struct TrackedRidge {
-    /// Instant from which times count, s, on the side's own clock.
+    /// Origin of the times of `spectrogram` and `ridge`, s.
     pub start_s: f64,
     /// Amplitudes over time and frequency.
     pub spectrogram: Spectrogram,
     /// The strongest component of each segment.
     pub ridge: Ridge,
-    /// The parts of it that are a course of one component.
+    /// Parts of the ridge that follow one component.
     pub courses: Vec<Vec<RidgePoint>>,
-    /// Where it was sought, Hz.
+    /// Band of the search, Hz.
     pub band_hz: (f64, f64),
-    /// The courses over the speed of the tip, thinned.
+    /// A selection of the points of the courses, with the speed of the tip.
     pub over_speed: Vec<SpeedPoint>,
 }
 
 impl RidgePair {
     pub(super) fn track(case: &ConditionComparison) -> Self {
-        let measured = case
-            .measured_side()
-            .and_then(|side| track_ridge(case, &side, side.window_frames(&release_window(&side))?, None))
-            .filter(TrackedRidge::has_segments);
+        let track = |side: TimedRecording<'_>| {
+            track_ridge(case, &side, side.window_frames(&release_window(&side))?, None)
+        };
+        let has_segments = |ridge: &TrackedRidge| ridge.spectrogram.amplitude_m.iter().any(Option::is_some);
+        let measured = case.measured_side().and_then(track).filter(has_segments);
         let (segment_s, side) = (measured.as_ref().map(|m| m.spectrogram.segment_s), case.model_side());
         let model = model_frames(case, &side).and_then(|frames| track_ridge(case, &side, frames, segment_s));
         Self { measured, model }
     }
 }
 
-/// From the release of the tip to where it stops again, or all of it.
+/// From the release of the tip to its next hold; an end that is not found is open.
 fn release_window(side: &TimedRecording) -> Window {
-    let at = |anchor, reversal| WindowEnd::Found { anchor, reversal, offset_s: 0.0 };
-    let known = |anchor, reversal| side.instants.time_s(anchor, reversal).is_ok();
-    Window {
-        from: if known(InstantKind::Release, 1) { at(InstantKind::Release, 1) } else { WindowEnd::Open },
-        to: if known(InstantKind::Hold, 2) { at(InstantKind::Hold, 2) } else { WindowEnd::Open },
-    }
+    let end = |anchor, reversal| match side.instants.time_s(anchor, reversal) {
+        Ok(_) => WindowEnd::Found { anchor, reversal, offset_s: 0.0 },
+        Err(_) => WindowEnd::Open,
+    };
+    Window { from: end(InstantKind::Release, 1), to: end(InstantKind::Hold, 2) }
 }
 
-/// The model from its own release on; of a recording in which none is found, while the camera ran.
+/// The model from its own release; where the recording has no release, the time of the recording.
 fn model_frames(case: &ConditionComparison, model: &TimedRecording) -> Option<Range<usize>> {
-    match case.measured_side().filter(|side| side.instant_s(InstantKind::Release).is_none()) {
-        Some(side) => {
-            let (grid, shift_s) = (side.recording.grid(), case.alignment.shift_s);
-            let frames = side.window_frames(&release_window(&side))?;
-            Some(
-                model
-                    .frames_between((grid.time_s(frames.start) - shift_s, grid.time_s(frames.end) - shift_s)),
-            )
-        }
-        None => model.window_frames(&release_window(model)),
-    }
+    let Some(side) = case.measured_side().filter(|side| side.instant_s(InstantKind::Release).is_none())
+    else {
+        return model.window_frames(&release_window(model));
+    };
+    let frames = side.window_frames(&release_window(&side))?;
+    let model_s = |frame: usize| side.recording.grid().time_s(frame) - case.alignment.shift_s;
+    Some(model.frames_between((model_s(frames.start), model_s(frames.end))))
 }
 
-/// The band in which the fit seeks the fastest component of the deflection.
+/// The highest band in which the job targets a frequency of the deflection.
 fn fastest_band<'a>(case: &ConditionComparison<'a>) -> Option<&'a FeatureBand> {
     case.targets()
         .filter(|aim| matches!(aim.feature.reading, Reading::Frequency(_) | Reading::CycleFrequency { .. }))
@@ -91,7 +86,7 @@ fn fastest_band<'a>(case: &ConditionComparison<'a>) -> Option<&'a FeatureBand> {
         .max_by(|a, b| a.band_hz.0.total_cmp(&b.band_hz.0))
 }
 
-/// Length of the segments in which the fit itself reads cycles, s.
+/// Length of the segments in which the job reads cycles, s.
 fn job_segment_s(case: &ConditionComparison) -> Option<f64> {
     case.targets().find_map(|aim| match aim.feature.reading {
         Reading::CycleFrequency { segment_s, .. } => Some(segment_s),
@@ -99,8 +94,8 @@ fn job_segment_s(case: &ConditionComparison) -> Option<f64> {
     })
 }
 
-/// Length of two cycles of the slowest component, s: a segment about as long as one would show its swings as
-/// a slower one.
+/// Least length of a segment, s: two cycles of the slowest target frequency, because a segment of about one
+/// cycle shows its swing as a slower component.
 fn min_segment_s(case: &ConditionComparison) -> f64 {
     const CYCLES: f64 = 2.0;
     case.frequency_comparisons().map(|sought| CYCLES / sought.target.frequency_hz).fold(0.0, f64::max)
@@ -124,7 +119,7 @@ fn track_ridge(
     let top_hz = default_band_hz(frames.len(), rate_hz, None);
     let band_hz = fastest_band(case).map_or(top_hz, |band| (band.band_hz.0, band.band_hz.1.min(top_hz.1)));
     let band_hz = if band_hz.0 < band_hz.1 { band_hz } else { top_hz };
-    // the ridge is followed without what is slower than its band
+    // components below the band would disturb the ridge
     let fast = remove_slow_components(&analysis, rate_hz, band_hz.0);
     let ridge =
         choose_ridge(&fast, rate_hz, band_hz, segment_s.or(job_segment_s(case)), min_segment_s(case))?;
@@ -136,8 +131,8 @@ fn track_ridge(
     Some(TrackedRidge { start_s, spectrogram, ridge, courses, band_hz, over_speed })
 }
 
-/// The ridge in segments of a given length; without one, of the shortest of whose ridge nearly as much is a
-/// course as of any: shorter ones show how it changes, until it swings from segment to segment.
+/// The ridge in segments of a given length. Without a length, the shortest segments whose courses are nearly as
+/// long as the longest: short segments resolve changes, but too short ones break the courses.
 fn choose_ridge(
     fast: &[Option<f64>],
     rate_hz: f64,
@@ -164,12 +159,12 @@ fn choose_ridge(
     all.into_iter().find(|(share, _)| *share >= NEARLY_BEST * most).or(Some(first)).map(|(_, ridge)| ridge)
 }
 
-/// Nepers in a cycle of what is over within one: a damping ratio of 0.22.
+/// Decay in nepers per cycle above which an oscillation ends within a cycle: a damping ratio of 0.22.
 const MAX_DECAY_PER_CYCLE: f64 = 1.4;
 
-/// The record without trend and without the oscillations below a frequency, m.
+/// The record without its trend and without oscillations below a frequency, m.
 fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64) -> Vec<Option<f64>> {
-    // what is over within a cycle is a piece of the flip
+    // an oscillation that ends within a cycle belongs to the flip
     let rings =
         |o: &&Oscillation| o.frequency_hz >= low_hz && o.decay_per_s < MAX_DECAY_PER_CYCLE * o.frequency_hz;
     let kept: Vec<_> = analysis.oscillations.iter().filter(rings).collect();
@@ -179,7 +174,7 @@ fn remove_slow_components(analysis: &SpectralAnalysis, rate_hz: f64, low_hz: f64
     analysis.residual_m.iter().enumerate().map(at).collect()
 }
 
-/// The courses over the mean speed of the tip in each segment.
+/// Points of the courses with the mean speed of the tip in each segment.
 fn ridge_over_speed(
     side: &TimedRecording,
     first: usize,
@@ -202,11 +197,6 @@ fn ridge_over_speed(
 }
 
 impl TrackedRidge {
-    /// Whether any segment has frames enough.
-    fn has_segments(&self) -> bool {
-        self.spectrogram.amplitude_m.iter().any(Option::is_some)
-    }
-
     /// Least and greatest frequency of the courses, Hz.
     pub(crate) fn frequency_range_hz(&self) -> Option<(f64, f64)> {
         let all = || self.courses.iter().flatten().map(|p| p.frequency_hz);

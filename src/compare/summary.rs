@@ -1,38 +1,37 @@
-//! What a comparison says in numbers, as `report.json` holds it.
+//! Numbers of a comparison, as in `report.json`.
 
-use super::condition::{ConditionComparison, TimedRecording};
-use super::condition::{FitWindow, group_fit_windows};
+use super::condition::{ConditionComparison, FitWindow, TimedRecording, group_fit_windows};
 use super::ridge::TrackedRidge;
 use crate::recording::alignment::AlignmentPoint;
 use crate::recording::channel::Channel;
 use crate::recording::motion_traces::MOTION_CHANNELS;
 use serde::Serialize;
 
-/// A recording against the model at the estimates; of a condition without a recording, the model alone.
+/// A recording against the model at the estimates; without a recording, the model alone.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct ComparisonSummary {
     /// Name of the condition.
     pub condition: String,
     /// Name of its recording.
     pub recording: Option<String>,
-    /// What is added to the model's times, s.
+    /// Shift added to the model's times, s.
     pub clock_shift_s: Option<f64>,
-    /// Its standard deviation, s; infinite where the path does not fix it, `None` where none was followed.
+    /// Standard deviation of the shift, s; infinite where the path does not determine it, `None` where no path
+    /// was aligned.
     pub clock_shift_sd_s: Option<f64>,
-    /// What is added to the model's head and tip along the sweep, m.
+    /// Offset added to the model's head and tip along the sweep, m.
     pub along_m: Option<f64>,
-    /// What is added to the model's head drop, m.
+    /// Offset added to the model's head drop, m.
     pub drop_m: Option<f64>,
-    /// The point whose path was followed.
+    /// The point whose path was aligned.
     pub followed: Option<AlignmentPoint>,
-    /// Whether the recorded head turns the other way than the model's.
+    /// Whether the recorded head turns opposite to the model's.
     pub opposite_turn: bool,
-    /// What is left, channel by channel.
+    /// Residuals, channel by channel.
     pub residuals: Vec<ResidualSummary>,
-    /// The channel by which the model is judged; `None` where the two cannot agree, or where the noise is
-    /// unknown.
+    /// The channel by which the model is judged; `None` with opposite turns or unknown noise.
     pub judged: Option<&'static str>,
-    /// The windows that the fit reads.
+    /// The windows of the job's targets.
     pub windows: Vec<WindowSummary>,
     /// The ridges of the deflection after the release of the tip.
     pub ridge: RidgeSummaries,
@@ -40,7 +39,7 @@ pub struct ComparisonSummary {
     pub transitions: usize,
 }
 
-/// What is left of a channel.
+/// Residual of a channel.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ResidualSummary {
     /// Name of the channel.
@@ -49,51 +48,51 @@ pub struct ResidualSummary {
     pub rms_m: f64,
     /// Noise of the recorded channel, m.
     pub noise_m: Option<f64>,
-    /// The one over the other.
+    /// `rms_m / noise_m`.
     pub rms_over_noise: Option<f64>,
 }
 
-/// A window of the fit in both clocks, from first frame to behind the last, s of the recording's time.
+/// A window of the job's targets, as start of the first frame and end of the last, s.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct WindowSummary {
-    /// Names of what is read in it.
+    /// Names of its targets.
     pub features: Vec<String>,
     /// Name of the channel.
     pub channel: &'static str,
-    /// Where it lies in the recording.
+    /// The window in the recording.
     pub measured_s: Option<[f64; 2]>,
-    /// Where it lies in the model, on the clock of the recording.
+    /// The window in the model, on the clock of the recording.
     pub model_s: Option<[f64; 2]>,
 }
 
 /// The ridges of both sides.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct RidgeSummaries {
-    /// Of the recording.
+    /// Ridge of the recording.
     pub measured: Option<RidgeSummary>,
-    /// Of the model.
+    /// Ridge of the model.
     pub model: Option<RidgeSummary>,
 }
 
-/// A ridge in short.
+/// Numbers of a ridge.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct RidgeSummary {
     /// Length of a segment, s.
     pub segment_s: f64,
-    /// Where it was sought, Hz.
+    /// Band of the search, Hz.
     pub band_hz: [f64; 2],
     /// Number of segments.
     pub segments: usize,
-    /// Segments in which a component stands out of the noise.
+    /// Number of segments with a component above the noise.
     pub points: usize,
-    /// Those of them that make a course.
+    /// Number of segments whose components form a course.
     pub course_points: usize,
-    /// Least and greatest frequency of the course, Hz.
+    /// Least and greatest frequency of the courses, Hz.
     pub range_hz: Option<[f64; 2]>,
 }
 
 impl ComparisonSummary {
-    /// What is left of the channel by which the model is judged.
+    /// Residual of the channel by which the model is judged.
     pub(crate) fn judged_residual(&self) -> Option<&ResidualSummary> {
         self.residuals.iter().find(|line| Some(line.channel) == self.judged)
     }
@@ -102,6 +101,8 @@ impl ComparisonSummary {
     pub(crate) fn summarize(case: &ConditionComparison) -> Self {
         let alignment = case.recording().map(|_| case.alignment);
         let windows = group_fit_windows(case.job, case.condition);
+        let [measured, model] = [&case.ridges.measured, &case.ridges.model]
+            .map(|ridge| ridge.as_ref().map(RidgeSummary::summarize));
         Self {
             condition: case.name().to_owned(),
             recording: case.recording().map(|r| r.name().to_owned()),
@@ -114,19 +115,14 @@ impl ComparisonSummary {
             residuals: summarize_residuals(case),
             judged: case.judged_channel().map(|(channel, _)| channel.name()),
             windows: windows.iter().map(|window| summarize_window(case, window)).collect(),
-            ridge: RidgeSummaries {
-                measured: case.ridges.measured.as_ref().map(RidgeSummary::summarize),
-                model: case.ridges.model.as_ref().map(RidgeSummary::summarize),
-            },
+            ridge: RidgeSummaries { measured, model },
             transitions: case.model.motion.transitions.len(),
         }
     }
 }
 
 fn summarize_residuals(case: &ConditionComparison) -> Vec<ResidualSummary> {
-    let Some(residual) = case.residual.as_ref() else {
-        return Vec::new();
-    };
+    let Some(residual) = case.residual.as_ref() else { return Vec::new() };
     let line = |channel: Channel| {
         let rms_m = residual.rms_m(channel, None)?;
         let noise_m = case.noise_m(channel);

@@ -1,4 +1,4 @@
-//! The columns of a comparison as CSV, on the clocks of the recordings.
+//! Tables of a comparison as CSV, on the clocks of the recordings.
 
 use super::condition::{ConditionComparison, FittedRecording};
 use super::model_run::ModelRun;
@@ -6,54 +6,43 @@ use super::ridge::TrackedRidge;
 use crate::fit::job::Job;
 use crate::recording::Recording;
 use crate::recording::alignment::Alignment;
+use crate::recording::channel::Channel;
 use crate::recording::motion_traces::{MOTION_CHANNELS, MotionTraces};
 use crate::simulate::Transition;
 use crate::spectrum::time_frequency::RidgePoint;
 
-/// The recordings beside the model.
+/// File of [`comparison_table`].
 pub(crate) const COMPARISON_FILE: &str = "comparison.csv";
 
-/// A file of a comparison.
+/// A CSV file of a comparison.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ComparisonTable {
-    /// Its name.
+    /// Name of the file.
     pub file: &'static str,
-    /// What it holds.
+    /// Contents of the file.
     pub text: String,
 }
 
-/// Residuals, ridges and transitions of every condition, in the order of the job. `reference_kind` says in every
-/// row what the model is compared with.
+/// Residuals, ridges and transitions of every condition, in the order of the job. The first two columns are the
+/// condition and the kind of its recording.
 pub(crate) fn comparison_tables(cases: &[ConditionComparison]) -> Vec<ComparisonTable> {
-    const RESIDUALS: &[&str] =
-        &["condition", "recording", "time_s", "tip_x_m", "head_x_m", "deflection_m", "head_drop_m"];
-    const RIDGE: &[&str] = &[
-        "condition",
-        "recording",
-        "source",
-        "time_s",
-        "frequency_hz",
-        "frequency_sd_hz",
-        "amplitude_m",
-        "course",
-    ];
-    const TRANSITIONS: &[&str] = &["condition", "recording", "time_s", "from", "to", "cause"];
-    let table = |file, header: &[&str], rows: fn(&ConditionComparison) -> Vec<Vec<String>>| {
+    let table = |file, header: &str, rows: fn(&ConditionComparison) -> Vec<Vec<String>>| {
         let rows = cases.iter().flat_map(|case| {
-            let start = [case.name().to_owned(), reference_kind(case).to_owned()];
+            let start = [case.name().to_owned(), recording_kind(case.recording()).to_owned()];
             rows(case).into_iter().map(move |row| start.iter().cloned().chain(row).collect::<Vec<_>>())
         });
-        let header = header.iter().map(|&name| name.to_owned()).collect();
+        let header = ["condition", "recording"].into_iter().chain(header.split(','));
+        let header = header.map(str::to_owned).collect();
         ComparisonTable { file, text: format_csv(std::iter::once(header).chain(rows)) }
     };
     vec![
-        table("residuals.csv", RESIDUALS, residual_rows),
-        table("ridge.csv", RIDGE, ridge_rows),
-        table("transitions.csv", TRANSITIONS, transition_rows),
+        table("residuals.csv", "time_s,tip_x_m,head_x_m,deflection_m,head_drop_m", residual_rows),
+        table("ridge.csv", "source,time_s,frequency_hz,frequency_sd_hz,amplitude_m,course", ridge_rows),
+        table("transitions.csv", "time_s,from,to,cause", transition_rows),
     ]
 }
 
-/// Every recording and the model at its frames, on its clock and from its origin, in the order of the job;
+/// Every recording and the model at its frames, aligned with its clock and origin, in the order of the job;
 /// `None` without a recording.
 pub(crate) fn comparison_table(
     job: &Job,
@@ -70,10 +59,8 @@ pub(crate) fn comparison_table(
         let seen = MotionTraces::from_recording(recording);
         let model = MotionTraces::from_model_at_frames(recording, view, &alignment);
         for (i, time_s) in seen.time_s.iter().enumerate() {
-            let cell = |traces: &MotionTraces, channel| traces.column(channel).get(i).copied().flatten();
-            let cells =
-                MOTION_CHANNELS.iter().flat_map(|&channel| [cell(&seen, channel), cell(&model, channel)]);
-            let cells = cells.map(|m| m.map_or_else(String::new, |m| format!("{m:e}")));
+            let pair = |&channel: &Channel| [&seen, &model].map(|traces| trace_cell(traces, channel, i));
+            let cells = MOTION_CHANNELS.iter().flat_map(pair);
             let start =
                 [condition.name.clone(), recording_kind(Some(recording)).to_owned(), time_s.to_string()];
             rows.push(start.into_iter().chain(cells).collect());
@@ -84,16 +71,12 @@ pub(crate) fn comparison_table(
 
 fn format_csv(rows: impl IntoIterator<Item = Vec<String>>) -> String {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    // (rows of one length written to memory cannot fail)
+    // writing rows of equal length to memory cannot fail
     rows.into_iter().for_each(|row| writer.write_record(row).unwrap_or_default());
     String::from_utf8(writer.into_inner().unwrap_or_default()).unwrap_or_default()
 }
 
-/// What the model is compared with.
-fn reference_kind(case: &ConditionComparison) -> &'static str {
-    recording_kind(case.recording())
-}
-
+/// Kind of the data that the model is compared with.
 fn recording_kind(recording: Option<&Recording>) -> &'static str {
     match recording {
         None => "published",
@@ -102,27 +85,31 @@ fn recording_kind(recording: Option<&Recording>) -> &'static str {
     }
 }
 
-/// Measured minus model; an empty field where either is missing.
+/// Cell of a channel in frame `i`, m; empty where the value is missing.
+fn trace_cell(traces: &MotionTraces, channel: Channel, i: usize) -> String {
+    let value_m = traces.column(channel).get(i).copied().flatten();
+    value_m.map_or_else(String::new, |m| format!("{m:e}"))
+}
+
+/// Measured minus model.
 fn residual_rows(case: &ConditionComparison) -> Vec<Vec<String>> {
     let Some(residual) = &case.residual else { return Vec::new() };
-    let left_m = |channel, i: usize| residual.column(channel).get(i).copied().flatten();
     let row = |(i, time_s): (usize, &f64)| {
-        let cells = MOTION_CHANNELS.iter().map(|&channel| left_m(channel, i).map(|m| format!("{m:e}")));
-        std::iter::once(time_s.to_string()).chain(cells.map(Option::unwrap_or_default)).collect()
+        let cells = MOTION_CHANNELS.iter().map(|&channel| trace_cell(residual, channel, i));
+        std::iter::once(time_s.to_string()).chain(cells).collect()
     };
     residual.time_s.iter().enumerate().map(row).collect()
 }
 
 fn ridge_rows(case: &ConditionComparison) -> Vec<Vec<String>> {
-    let sides =
-        [("measured", &case.ridges.measured, 0.0), ("model", &case.ridges.model, case.alignment.shift_s)];
-    let rows = |(source, followed, shift_s): (&str, &Option<TrackedRidge>, f64)| {
-        followed.iter().flat_map(|followed| tracked_ridge_rows(source, followed, shift_s)).collect::<Vec<_>>()
+    let rows = |source, ridge: &Option<TrackedRidge>, shift_s| {
+        ridge.as_ref().map_or_else(Vec::new, |ridge| tracked_ridge_rows(source, ridge, shift_s))
     };
-    sides.into_iter().flat_map(rows).collect()
+    let measured = rows("measured", &case.ridges.measured, 0.0);
+    [measured, rows("model", &case.ridges.model, case.alignment.shift_s)].concat()
 }
 
-/// Every point of a ridge, with the number of the course that it is on, where it is on one.
+/// Every point of a ridge with the number of its course, from 1; empty outside courses.
 fn tracked_ridge_rows(source: &str, followed: &TrackedRidge, shift_s: f64) -> Vec<Vec<String>> {
     let row = |point: &RidgePoint| {
         let course = followed.courses.iter().position(|course| course.contains(point));
