@@ -1,10 +1,9 @@
-//! The search: clouds of points that adapt to the valley they lie in, one after another over the unit box;
-//! then a local search from each of the best distinct points; then the best of all polished until nothing is
-//! gained.
+//! The search in the unit box: CMA-ES populations, then a local search from each of the best distinct points,
+//! then a polish of the best point until it gains nothing.
 //!
-//! Covariance matrix adaptation and damped Gauss-Newton steps are written here; the simplex is argmin's
-//! (`simplex.rs`). Budgets, stagnation, the best point and every failure are kept in the ledger, so nothing
-//! depends on what a solver does with costs that are not numbers or with errors.
+//! Covariance matrix adaptation and damped Gauss-Newton steps are implemented here; the simplex is argmin's
+//! (`simplex.rs`). The ledger keeps budgets, the best point and every failure, so the solvers never see errors
+//! or costs that are not numbers.
 
 mod excluded_region_search;
 mod gauss_newton;
@@ -23,111 +22,79 @@ use population::search_with_populations;
 pub use termination::{EXACT_COST, MIN_WORTHWHILE_GAIN};
 pub use termination::{LocalDescent, SIMPLEX_COST_SPREAD, SearchOutcome, SearchTermination};
 
-/// Searches within the budgets of `settings` and `limit` evaluations in all.
+/// Searches within the budgets of `settings` and at most `limit` evaluations in total.
 pub fn search_minimum(
     ledger: &mut Ledger,
     dimensions: usize,
     settings: &SearchSettings,
     limit: usize,
 ) -> SearchOutcome {
-    let mut searched =
-        SearchOutcome { termination: SearchTermination::Stopped(StopReason::Budget), descents: Vec::new() };
-    if dimensions == 0 {
-        return searched;
-    }
-    let made = ledger.run_evaluations().len();
-    ledger.set_limit(limit.min(made.saturating_add(settings.global_evaluations)));
-    if let Some(stop @ (StopReason::Interrupted | StopReason::Journal(_))) =
-        search_with_populations(ledger, dimensions, settings)
-    {
-        searched.termination = SearchTermination::Stopped(stop);
-        return searched;
-    }
-    let made = ledger.run_evaluations().len();
-    searched.termination = search_locally(
-        ledger,
-        settings,
-        limit.min(made.saturating_add(settings.local_evaluations)),
-        &mut searched.descents,
-    );
-    searched
+    let mut descents = Vec::new();
+    let termination = if dimensions == 0 {
+        SearchTermination::Stopped(StopReason::Budget)
+    } else {
+        let made = ledger.run_evaluations().len();
+        ledger.set_limit(limit.min(made.saturating_add(settings.global_evaluations)));
+        match search_with_populations(ledger, dimensions, settings) {
+            Some(stop) if stop != StopReason::Budget => SearchTermination::Stopped(stop),
+            _ => search_locally(ledger, settings, limit, &mut descents),
+        }
+    };
+    SearchOutcome { termination, descents }
 }
 
-// Costs of points of the unit box, as the solvers of a stage ask for them.
-//
-// A solver that asks after the ledger has stopped gets [`STOPPED_COST`], and is left before it uses it.
-
-/// Cost of every point after the ledger has stopped.
+/// Cost of every point after the ledger has stopped. A solver that gets it is abandoned before it uses it.
 const STOPPED_COST: f64 = 1e100;
 
-/// Costs of a stage.
-pub(super) struct StageCosts<'l, 'a> {
+/// Costs of points of the unit box for the solvers of a stage.
+struct StageCosts<'l, 'a> {
     ledger: &'l mut Ledger<'a>,
     stage: EvaluationStage,
+    /// Why the ledger makes no more evaluations, once it has stopped.
     stop: Option<StopReason>,
-    /// The part of the box to which every point is moved, where it is not the whole.
+    /// The part of the box onto which the points are mapped; `None` for the whole box.
     slab: Option<Slab>,
 }
 
 impl<'l, 'a> StageCosts<'l, 'a> {
-    pub(super) fn new(ledger: &'l mut Ledger<'a>, stage: EvaluationStage) -> Self {
+    fn new(ledger: &'l mut Ledger<'a>, stage: EvaluationStage) -> Self {
         Self { ledger, stage, stop: None, slab: None }
     }
 
-    /// Costs of the points of a slab, which is asked for as if it were the whole box.
-    pub(super) fn new_within(ledger: &'l mut Ledger<'a>, stage: EvaluationStage, slab: Slab) -> Self {
-        Self { slab: Some(slab), ..Self::new(ledger, stage) }
-    }
-
-    /// One cost a point, in their order; the ledger evaluates them in parallel.
-    pub(super) fn evaluate_points(&mut self, points: &[Vec<f64>]) -> Vec<f64> {
+    /// One cost per point, in order; the ledger evaluates them in parallel.
+    fn evaluate_points(&mut self, points: &[Vec<f64>]) -> Vec<f64> {
         let global = self.stage == EvaluationStage::Global;
         let cost = |e: &Evaluation| if global { e.global_cost } else { e.cost };
         let moved: Option<Vec<Vec<f64>>> =
             self.slab.map(|slab| points.iter().map(|point| slab.map_into(point.clone())).collect());
         match self.ledger.evaluate_points(self.stage, moved.as_deref().unwrap_or(points)) {
-            Ok(found) if found.len() == points.len() => found.into_iter().map(cost).collect(),
-            Ok(_) => vec![STOPPED_COST; points.len()],
-            Err(reason) => {
-                self.stop = Some(reason);
-                vec![STOPPED_COST; points.len()]
-            }
+            Ok(found) if found.len() == points.len() => return found.into_iter().map(cost).collect(),
+            found => self.stop = found.err().or(self.stop.take()),
         }
+        vec![STOPPED_COST; points.len()]
     }
 
-    pub(super) fn evaluate_point(&mut self, point: Vec<f64>) -> f64 {
+    fn evaluate_point(&mut self, point: Vec<f64>) -> f64 {
         self.evaluate_points(&[point]).first().copied().unwrap_or(STOPPED_COST)
-    }
-
-    /// What is known, and how it is priced.
-    pub(super) fn ledger(&self) -> &Ledger<'a> {
-        self.ledger
-    }
-
-    /// Why no more evaluations are made, if none are.
-    pub(super) fn stop_reason(&self) -> Option<StopReason> {
-        self.stop.clone()
     }
 }
 
-// Budgets and rules of a search.
-
-/// Generations without a gain after which a cloud is left, unless the job says otherwise.
+/// Default number of generations without a gain after which a population ends.
 pub const STAGNANT_GENERATIONS: usize = 20;
 
-/// Budgets and rules.
+/// Budgets and rules of a search.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SearchSettings {
-    /// Seed of the clouds.
+    /// Seed of the populations.
     pub seed: u64,
     /// Evaluations of the global stage.
     pub global_evaluations: usize,
     /// Evaluations of the local stage.
     pub local_evaluations: usize,
-    /// Points of a cloud.
+    /// Points of a population.
     pub particles: usize,
-    /// Generations without progress after which a cloud is left.
+    /// Generations without a gain after which a population ends.
     pub stagnation_generations: usize,
-    /// Points from which a local search starts.
+    /// Number of points from which a local search starts.
     pub starts: usize,
 }

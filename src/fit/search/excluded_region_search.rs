@@ -1,26 +1,21 @@
-//! A search away from what was found: what the model can do at other values of one parameter.
+//! A search outside the interval of one parameter: how well the model fits at other values of it.
 
 use super::gauss_newton::descend_gauss_newton;
 use super::local::distinct_best_points;
-use super::population::{CmaEs, WIDE_EXTENT};
-use super::stagnation::StagnationCounter;
+use super::population::{WIDE_EXTENT, evolve_population};
 use super::{SearchSettings, StageCosts};
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
-use rand::SeedableRng;
-use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Relative gain in cost that counts as progress of the cloud.
-const SLAB_STAGNANT_GAIN: f64 = 1e-3;
-/// Share of the evaluations that the cloud may use; the descents have the rest.
-const CLOUD_SHARE: f64 = 0.6;
-/// Points from which it descends.
+/// Fraction of the evaluations for the population; the rest is for the descents.
+const POPULATION_SHARE: f64 = 0.6;
+/// Number of descents.
 const DESCENTS: usize = 3;
 
-/// A cloud over the slab with a seed of its own, and Gauss-Newton steps from the best distinct points that
-/// are then known there; at most `share` evaluations. Why it was stopped before that, if it was.
+/// Searches a slab with a population, then with Gauss-Newton descents from the best distinct points, in at most
+/// `share` evaluations. Returns why it stopped, unless its share was used up.
 ///
-/// The best of them lies next to what was found, and leads back to it; so the others are followed too.
+/// The best point usually lies next to the known minimum and leads back to it, so the others are followed too.
 pub(crate) fn search_excluded_region(
     ledger: &mut Ledger,
     slab: Slab,
@@ -31,11 +26,14 @@ pub(crate) fn search_excluded_region(
     let until = |ledger: &mut Ledger, count: f64| {
         ledger.set_limit(limit.min(made.saturating_add((count * share as f64) as usize)));
     };
-    until(ledger, CLOUD_SHARE);
-    let mut stop = evolve_in_slab(ledger, slab, settings);
+    until(ledger, POPULATION_SHARE);
+    // each slab has its own seed, different from those of the other populations
+    let seed = settings.seed.rotate_left(32) ^ (slab.axis as u64 + 1) ^ slab.lower.to_bits();
+    let middle = vec![0.5; ledger.objective().axes().len()];
+    let costs = StageCosts { slab: Some(slab), ..StageCosts::new(ledger, EvaluationStage::Elsewhere) };
+    let mut stop = evolve_population(costs, middle, WIDE_EXTENT, seed, settings);
     until(ledger, 1.0);
-    let there = ledger.run_evaluations().iter().filter(|e| e.failure.is_none() && slab.contains(&e.unit));
-    for start in distinct_best_points(there, DESCENTS) {
+    for start in distinct_best_points(evaluations_in_slab(ledger, slab), DESCENTS) {
         if !matches!(stop, None | Some(StopReason::Budget)) {
             break;
         }
@@ -46,35 +44,20 @@ pub(crate) fn search_excluded_region(
     stop.filter(|stop| used_up || *stop != StopReason::Budget)
 }
 
-fn evolve_in_slab(ledger: &mut Ledger, slab: Slab, settings: &SearchSettings) -> Option<StopReason> {
-    let middle = vec![0.5; ledger.objective().axes().len()];
-    // no seed of another cloud: each slab has its own
-    let seed = settings.seed.rotate_left(32) ^ (slab.axis as u64 + 1) ^ slab.lower.to_bits();
-    let generator = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut solver = CmaEs::new(middle, settings.particles, WIDE_EXTENT, generator);
-    let mut costs = StageCosts::new_within(ledger, EvaluationStage::Elsewhere, slab);
-    let mut patience = StagnationCounter::new(settings.stagnation_generations, SLAB_STAGNANT_GAIN);
-    while !solver.has_converged() && !patience.is_stagnant(solver.least_cost()) {
-        solver.run_generation(&mut costs);
-        if let stop @ Some(_) = costs.stop_reason() {
-            return stop;
-        }
-    }
-    None
+fn evaluations_in_slab<'l>(ledger: &'l Ledger, slab: Slab) -> impl Iterator<Item = &'l Evaluation> {
+    let all = ledger.run_evaluations().iter();
+    all.filter(move |e| e.failure.is_none() && slab.contains(&e.unit))
 }
 
 /// The best known point of a slab.
 pub(crate) fn best_in_slab<'l>(ledger: &'l Ledger, slab: Slab) -> Option<&'l Evaluation> {
-    let there = ledger.run_evaluations().iter().filter(|e| e.failure.is_none() && slab.contains(&e.unit));
-    there.min_by(|a, b| a.cost.total_cmp(&b.cost))
+    evaluations_in_slab(ledger, slab).min_by(|a, b| a.cost.total_cmp(&b.cost))
 }
 
-// A part of the unit box that is searched as if it were the whole.
-
-/// Part of the unit box in which one coordinate is held within a range.
+/// Part of the unit box in which one coordinate is limited to a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Slab {
-    /// Number of the parameter.
+    /// Index of the parameter.
     pub axis: usize,
     pub lower: f64,
     pub upper: f64,
@@ -86,14 +69,14 @@ impl Slab {
         unit.get(self.axis).is_some_and(|u| (self.lower..=self.upper).contains(u))
     }
 
-    /// The same without what lies within `margin` of its ends that are not ends of the box.
+    /// The slab reduced by `margin` at each end that is not an end of the box.
     pub(crate) fn shrink_by(self, margin: f64) -> Self {
         let lower = if self.lower > 0.0 { self.lower + margin } else { self.lower };
         let upper = if self.upper < 1.0 { self.upper - margin } else { self.upper };
         Self { lower, upper, ..self }
     }
 
-    /// A point of the unit box as one of the slab.
+    /// Maps a point of the unit box into the slab.
     pub(super) fn map_into(&self, mut unit: Vec<f64>) -> Vec<f64> {
         if let Some(u) = unit.get_mut(self.axis) {
             *u = self.lower + (self.upper - self.lower) * *u;

@@ -1,55 +1,52 @@
-//! Damped Gauss-Newton steps: simplices crawl along a valley that is much longer than wide, and such a valley
-//! is what one precise frequency and several imprecise features make.
+//! Damped Gauss-Newton descent. One precise frequency and several imprecise features make a long narrow valley,
+//! in which simplices are slow.
 //!
-//! Levenberg's dampings are tried side by side; the Jacobian is measured by differences, corrected after
-//! every step by Broyden's rule and measured again when a step gains nothing. argmin's Gauss-Newton has no
-//! damping, no bounds and stops at the first failure.
+//! Several Levenberg dampings are tried at once. The Jacobian comes from differences, is updated after every
+//! step by Broyden's rule and measured again when a step gains nothing. argmin's Gauss-Newton has neither
+//! damping nor bounds and stops at the first failure.
 
 use super::StageCosts;
 use super::termination::{EXACT_COST, MIN_WORTHWHILE_GAIN};
-use crate::fit::evaluation::Evaluation;
-use crate::fit::evaluation::EvaluationStage;
+use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
 use crate::fit::linear_model::{
     FeatureSlopes, broyden_update, damped_step, difference_points, jacobian, residuals, step_in_box,
 };
 use nalgebra::DMatrix;
 
-/// Dampings tried at every step. The first is a prior of one length of the box, negligible for any
-/// informative direction; the others turn towards plain descent.
+/// Dampings tried at every step. The first equals a prior as wide as the box, negligible in any informative
+/// direction; the others approach gradient descent.
 const DAMPINGS: [f64; 4] = [1.0, 3e1, 1e3, 3e4];
-/// Most steps from one point: a curved valley a hundred times longer than wide takes about twenty.
+/// Most steps from one point. A curved valley a hundred times longer than wide takes about twenty.
 const MAX_STEPS: usize = 60;
 
-/// Where damped Gauss-Newton steps lead from `start`, and why they were stopped, if they were.
+/// Descends from `start`. Returns the end, and why the ledger stopped, if it did.
 pub(super) fn descend_gauss_newton(ledger: &mut Ledger, start: &[f64]) -> (Vec<f64>, Option<StopReason>) {
     let mut costs = StageCosts::new(ledger, EvaluationStage::Local);
-    let mut steps = GaussNewton::start(&mut costs, start);
+    let (unit, cost) = (start.to_vec(), costs.evaluate_point(start.to_vec()));
+    let mut steps = GaussNewton { unit, cost, model: None, fresh: false, stalled: false };
     for _ in 0..MAX_STEPS {
-        let stop = costs.stop_reason();
-        if stop.is_some() || steps.stalled || steps.cost <= EXACT_COST {
-            return (steps.unit, stop);
+        if costs.stop.is_some() || steps.stalled || steps.cost <= EXACT_COST {
+            return (steps.unit, costs.stop);
         }
         steps.take_step(&mut costs);
     }
     (steps.unit, None)
 }
 
-/// Steps in the unit box until one from a measured Jacobian gains less than [`MIN_WORTHWHILE_GAIN`].
+/// A descent in the unit box. It ends with a step from a measured Jacobian that gains less than
+/// [`MIN_WORTHWHILE_GAIN`].
 struct GaussNewton {
     unit: Vec<f64>,
     cost: f64,
+    /// Jacobian for the next step, where Broyden's rule gives it.
     model: Option<DMatrix<f64>>,
+    /// Whether the Jacobian of the step is measured and not updated.
     fresh: bool,
     stalled: bool,
 }
 
 impl GaussNewton {
-    fn start(costs: &mut StageCosts, start: &[f64]) -> Self {
-        let cost = costs.evaluate_point(start.to_vec());
-        Self { unit: start.to_vec(), cost, model: None, fresh: false, stalled: false }
-    }
-
     fn take_step(&mut self, costs: &mut StageCosts) {
         let before = residuals_at(costs, &self.unit);
         let mut model = self.model.take().unwrap_or_else(|| self.measure_jacobian(costs));
@@ -57,11 +54,8 @@ impl GaussNewton {
             self.stalled = true;
             return;
         }
-        let trials: Vec<Vec<f64>> = DAMPINGS
-            .iter()
-            .filter_map(|damping| damped_step(&model, &before, *damping, None))
-            .map(|step| step_in_box(&self.unit, &step))
-            .collect();
+        let steps = DAMPINGS.iter().filter_map(|damping| damped_step(&model, &before, *damping, None));
+        let trials: Vec<Vec<f64>> = steps.map(|step| step_in_box(&self.unit, &step)).collect();
         let tried = costs.evaluate_points(&trials);
         let best = trials.into_iter().zip(tried).min_by(|a, b| a.1.total_cmp(&b.1));
         let gained = best.filter(|(_, found)| *found < self.cost);
@@ -78,13 +72,14 @@ impl GaussNewton {
         (self.unit, self.cost) = (point, found);
     }
 
-    /// The Jacobian by differences; it stalls where they cannot be evaluated.
+    /// The Jacobian by differences; the descent stalls where they cannot be evaluated.
     fn measure_jacobian(&mut self, costs: &mut StageCosts) -> DMatrix<f64> {
         costs.evaluate_points(&difference_points(&self.unit));
-        let ledger = costs.ledger();
+        let ledger = &*costs.ledger;
         let found = || {
+            let points = difference_points(&self.unit);
             let around: Option<Vec<&Evaluation>> =
-                difference_points(&self.unit).iter().map(|point| ledger.find_evaluation(point)).collect();
+                points.iter().map(|point| ledger.find_evaluation(point)).collect();
             let (centre, objective) = (ledger.find_evaluation(&self.unit)?, ledger.objective());
             let slopes = FeatureSlopes::from_differences(objective.targets(), centre, &around?);
             Some(jacobian(objective, centre, &slopes))
@@ -95,9 +90,9 @@ impl GaussNewton {
     }
 }
 
-/// Residuals at a point; none where it cannot be evaluated.
+/// Residuals at a point; empty where it cannot be evaluated.
 fn residuals_at(costs: &mut StageCosts, unit: &[f64]) -> Vec<Option<f64>> {
     costs.evaluate_points(&[unit.to_vec()]);
-    let ledger = costs.ledger();
+    let ledger = &*costs.ledger;
     ledger.find_evaluation(unit).map_or_else(Vec::new, |found| residuals(ledger.objective(), found))
 }

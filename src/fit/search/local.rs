@@ -1,35 +1,33 @@
-//! The local searches: from each of the best points downhill, clouds about the best ends, and the best of all
-//! polished.
+//! Local searches: descents from the best points, populations about the best ends, and a polish of the best.
 
-use super::SearchSettings;
 use super::gauss_newton::descend_gauss_newton;
-use super::population::NEAR_EXTENT;
-use super::population::evolve_population;
+use super::population::{NEAR_EXTENT, evolve_population};
 use super::simplex::run_simplex;
 use super::termination::{EXACT_COST, MIN_START_DISTANCE, MIN_WORTHWHILE_GAIN, SIMPLEX_EDGES};
 use super::termination::{LocalDescent, SearchTermination};
-use crate::fit::evaluation::Evaluation;
-use crate::fit::evaluation::EvaluationStage;
+use super::{SearchSettings, StageCosts};
+use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::ledger::{Ledger, StopReason};
 
-/// Ends of local searches about which a cloud looks for a better one.
+/// Number of best ends that are refined with a population.
 const REFINED_ENDS: usize = 3;
 
-/// A descent from each of the starts, clouds about the best ends, then the best of all polished.
+/// Descends from each of the starts, refines the best ends with populations, then polishes the best of all.
+/// `limit` is that of the whole search.
 pub(super) fn search_locally(
     ledger: &mut Ledger,
     settings: &SearchSettings,
     limit: usize,
     descents: &mut Vec<LocalDescent>,
 ) -> SearchTermination {
+    let limit = limit.min(ledger.run_evaluations().len().saturating_add(settings.local_evaluations));
     ledger.set_limit(limit);
     let starts = distinct_best_points(ledger.run_evaluations().iter(), settings.starts);
     if starts.len() > 1 {
         let share = settings.local_evaluations / (3 * starts.len());
         for start in starts {
-            if let Some(stop) =
-                search_within_share(ledger, limit, share, descents, |ledger| descend_from(ledger, start))
-            {
+            let descend = |ledger: &mut Ledger| descend_from(ledger, start);
+            if let Some(stop) = search_within_share(ledger, limit, share, descents, descend) {
                 return SearchTermination::Stopped(stop);
             }
         }
@@ -51,16 +49,13 @@ pub(super) fn search_locally(
     let (start, made) = (ledger.best_evaluation().cloned(), ledger.run_evaluations().len());
     let ended = polish_best(ledger);
     let evaluations = ledger.run_evaluations().len() - made;
-    descents.extend(start.zip(ledger.best_evaluation().cloned()).map(|(start, end)| LocalDescent {
-        start,
-        end,
-        evaluations,
-    }));
+    let ends = start.zip(ledger.best_evaluation().cloned());
+    descents.extend(ends.map(|(start, end)| LocalDescent { start, end, evaluations }));
     ended
 }
 
-/// A local search within its share of the evaluations, unless there is nothing left to gain; why everything
-/// has to stop, if it has.
+/// Runs a local search within its share of the evaluations, unless there is nothing left to gain. Returns why
+/// the whole search must stop, if it must.
 fn search_within_share(
     ledger: &mut Ledger,
     limit: usize,
@@ -77,7 +72,7 @@ fn search_within_share(
     stop.filter(|stop| *stop != StopReason::Budget)
 }
 
-/// A local search that goes on with a small cloud about its end, and Gauss-Newton steps from the best of it.
+/// Continues a local search with a small population about its end, then a descent from the best new point.
 fn refine_with_population(
     ledger: &mut Ledger,
     from: LocalDescent,
@@ -85,38 +80,22 @@ fn refine_with_population(
     settings: &SearchSettings,
 ) -> (LocalDescent, Option<StopReason>) {
     let made = ledger.run_evaluations().len();
-    let stop = evolve_population(
-        ledger,
-        EvaluationStage::Local,
-        from.end.unit.clone(),
-        (NEAR_EXTENT, seed),
-        settings,
-    );
-    let better = ledger
-        .run_evaluations()
-        .iter()
-        .skip(made)
-        .filter(|found| found.cost < from.end.cost)
-        .min_by(|a, b| a.cost.total_cmp(&b.cost))
-        .cloned();
-    let (further, stop) = match (stop, better) {
-        (None, Some(better)) => descend_from(ledger, better),
-        (stop, better) => {
-            let end = better.unwrap_or_else(|| from.end.clone());
-            (LocalDescent { start: end.clone(), end, evaluations: 0 }, stop)
+    let costs = StageCosts::new(ledger, EvaluationStage::Local);
+    let stop = evolve_population(costs, from.end.unit.clone(), NEAR_EXTENT, seed, settings);
+    let added = ledger.run_evaluations().iter().skip(made);
+    let better = added.filter(|found| found.cost < from.end.cost).min_by(|a, b| a.cost.total_cmp(&b.cost));
+    let (end, stop) = match (stop, better.cloned()) {
+        (None, Some(better)) => {
+            let (further, stop) = descend_from(ledger, better);
+            (further.end, stop)
         }
+        (stop, better) => (better.unwrap_or(from.end), stop),
     };
-    (
-        LocalDescent {
-            start: from.start,
-            end: further.end,
-            evaluations: from.evaluations + ledger.run_evaluations().len() - made,
-        },
-        stop,
-    )
+    let evaluations = from.evaluations + ledger.run_evaluations().len() - made;
+    (LocalDescent { start: from.start, end, evaluations }, stop)
 }
 
-/// Gauss-Newton steps from a point that was evaluated.
+/// Gauss-Newton descent from an evaluated point.
 fn descend_from(ledger: &mut Ledger, start: Evaluation) -> (LocalDescent, Option<StopReason>) {
     let made = ledger.run_evaluations().len();
     let (unit, stop) = descend_gauss_newton(ledger, &start.unit);
@@ -124,14 +103,12 @@ fn descend_from(ledger: &mut Ledger, start: Evaluation) -> (LocalDescent, Option
     (LocalDescent { start, end, evaluations: ledger.run_evaluations().len() - made }, stop)
 }
 
-/// Descent and simplices from the best point until one simplex of each size in a row has gained nothing.
+/// Polishes the best point by a descent and simplices, until one simplex of each size in a row gains nothing.
 pub(crate) fn polish_best(ledger: &mut Ledger) -> SearchTermination {
     let mut barren = 0;
     while let Some(edge) = SIMPLEX_EDGES.get(barren).filter(|_| !is_exact_fit(ledger)) {
-        let Some((start, before)) = ledger.best_evaluation().map(|best| (best.unit.clone(), best.cost))
-        else {
-            break;
-        };
+        let best = ledger.best_evaluation().map(|best| (best.unit.clone(), best.cost));
+        let Some((start, before)) = best else { break };
         if barren == 0
             && let (_, Some(stop)) = descend_gauss_newton(ledger, &start)
         {
@@ -152,7 +129,7 @@ fn is_exact_fit(ledger: &Ledger) -> bool {
     ledger.best_evaluation().is_some_and(|best| best.cost <= EXACT_COST)
 }
 
-/// The best points of the global stage that lie apart, best first.
+/// The best points by the cost of the global stage that lie apart, best first.
 pub(super) fn distinct_best_points<'e>(
     known: impl IntoIterator<Item = &'e Evaluation>,
     most: usize,
@@ -160,12 +137,10 @@ pub(super) fn distinct_best_points<'e>(
     let mut order: Vec<&Evaluation> = known.into_iter().collect();
     order.sort_by(|a, b| a.global_cost.total_cmp(&b.global_cost));
     let mut chosen: Vec<Evaluation> = Vec::new();
-    for evaluation in order {
-        let apart = |other: &Evaluation| {
-            other.unit.iter().zip(&evaluation.unit).any(|(a, b)| (a - b).abs() > MIN_START_DISTANCE)
-        };
-        if chosen.iter().all(apart) {
-            chosen.push(evaluation.clone());
+    for point in order {
+        let far = |(a, b): (&f64, &f64)| (a - b).abs() > MIN_START_DISTANCE;
+        if chosen.iter().all(|other| other.unit.iter().zip(&point.unit).any(far)) {
+            chosen.push(point.clone());
         }
         if chosen.len() == most {
             break;

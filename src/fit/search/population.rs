@@ -1,22 +1,24 @@
-//! Clouds of points over the unit box, one after another.
+//! Populations of points in the unit box: covariance matrix adaptation (CMA-ES).
+//!
+//! Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults of Hansen, arXiv:1604.00772, without
+//! negative weights. A population learns the shape of a valley and is not caught by ripples on its floor. A
+//! point outside the unit box is evaluated at its mirror image inside. argmin has no such solver.
 
 use super::stagnation::StagnationCounter;
 use super::{SearchSettings, StageCosts};
 use crate::fit::bounds::clamp_unit;
 use crate::fit::evaluation::EvaluationStage;
 use crate::fit::ledger::{Ledger, StopReason};
-use crate::math;
-use crate::math::StandardNormal;
+use crate::math::{self, StandardNormal};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Relative gain in cost that counts as progress of a cloud.
+/// Least relative gain in cost that counts as progress of a population.
 const STAGNANT_GAIN: f64 = 1e-3;
 
-/// Clouds of points, the first about the middle of the box and the others about random places, until the
-/// evaluations of the stage are used up: each ends where it has shrunk or gains nothing any more. `None` when
-/// the ledger was not stopped.
+/// Runs populations until the evaluations of the stage are used up. The first starts in the middle of the box,
+/// the others at random points. Returns why the ledger stopped, if it did.
 pub(super) fn search_with_populations(
     ledger: &mut Ledger,
     dimensions: usize,
@@ -27,13 +29,12 @@ pub(super) fn search_with_populations(
     let mut used = ledger.remaining_evaluations();
     while ledger.remaining_evaluations() > 0 {
         let seed = generator.random();
-        if let stop @ Some(_) =
-            evolve_population(ledger, EvaluationStage::Global, middle, (WIDE_EXTENT, seed), settings)
-        {
+        let costs = StageCosts::new(ledger, EvaluationStage::Global);
+        if let stop @ Some(_) = evolve_population(costs, middle, WIDE_EXTENT, seed, settings) {
             return stop;
         }
         middle = (0..dimensions).map(|_| generator.random()).collect();
-        // a cloud that meets known points alone makes no evaluation
+        // a population that meets only known points makes no evaluation
         if ledger.remaining_evaluations() == used {
             break;
         }
@@ -42,49 +43,38 @@ pub(super) fn search_with_populations(
     None
 }
 
-/// One cloud about a place; why it was stopped, if it was.
+/// Evolves one population until it converges or gains nothing. Returns why the ledger stopped, if it did.
 pub(super) fn evolve_population(
-    ledger: &mut Ledger,
-    stage: EvaluationStage,
+    mut costs: StageCosts,
     middle: Vec<f64>,
-    (reach, seed): (PopulationExtent, u64),
+    extent: PopulationExtent,
+    seed: u64,
     settings: &SearchSettings,
 ) -> Option<StopReason> {
     let generator = Xoshiro256PlusPlus::seed_from_u64(seed);
-    let mut solver = CmaEs::new(middle, settings.particles, reach, generator);
-    let mut costs = StageCosts::new(ledger, stage);
+    let mut solver = CmaEs::new(middle, settings.particles, extent, generator);
     let mut patience = StagnationCounter::new(settings.stagnation_generations, STAGNANT_GAIN);
-    while !solver.has_converged() && !patience.is_stagnant(solver.least_cost()) {
+    while costs.stop.is_none() && !solver.has_converged() && !patience.is_stagnant(solver.least_cost) {
         solver.run_generation(&mut costs);
-        if let stop @ Some(_) = costs.stop_reason() {
-            return stop;
-        }
     }
-    None
+    costs.stop
 }
 
-// Covariance matrix adaptation: a cloud of points that learns the shape of the valley it lies in and is not
-// caught by ripples on its floor (Hansen and Ostermeier, Evol. Comput. 9 (2001) 159; formulas and defaults
-// of Hansen, arXiv:1604.00772, without the negative weights). argmin has no such method, and its frame for
-// solvers of one's own would add nothing here.
-//
-// The cloud moves in the unit box; a point outside is evaluated at its mirror image inside.
-
-/// How far a cloud reaches at first and when it has found its place, as lengths of its longest axis in the
-/// unit box.
+/// Length of a population's longest axis in the unit box, at first and where it has converged.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct PopulationExtent {
     first: f64,
     last: f64,
 }
 
-/// Over the whole box: three lengths reach every corner. Where it ends damped Gauss-Newton steps are better.
+/// For the whole box: three first lengths reach every corner. At the last length damped Gauss-Newton steps are
+/// better.
 pub(super) const WIDE_EXTENT: PopulationExtent = PopulationExtent { first: 0.3, last: 0.01 };
-/// About a place at which such steps are caught by ripples.
+/// For the neighbourhood of a point at which Gauss-Newton steps are caught by ripples.
 pub(super) const NEAR_EXTENT: PopulationExtent = PopulationExtent { first: 0.06, last: 0.003 };
 
-/// A cloud of points.
-pub(super) struct CmaEs {
+/// State of a population between generations.
+struct CmaEs {
     generator: Xoshiro256PlusPlus,
     points: usize,
     weights: Vec<f64>,
@@ -92,7 +82,7 @@ pub(super) struct CmaEs {
     mean: DVector<f64>,
     length: f64,
     shape: DMatrix<f64>,
-    /// Columns are the axes of the shape times their lengths.
+    /// Principal axes of the shape as columns, scaled by their lengths.
     axes: DMatrix<f64>,
     path_length: DVector<f64>,
     path_shape: DVector<f64>,
@@ -104,12 +94,13 @@ pub(super) struct CmaEs {
 /// A step from the mean, in units of the length.
 #[derive(Debug, Clone)]
 struct PopulationStep {
-    /// Along the axes, in units of theirs.
+    /// Standard normal coordinates along the principal axes.
     along: DVector<f64>,
+    /// The same step in coordinates of the box.
     inside: DVector<f64>,
 }
 
-/// How fast what is learnt.
+/// Learning rates.
 struct AdaptationRates {
     effective: f64,
     length: f64,
@@ -136,38 +127,31 @@ impl AdaptationRates {
 }
 
 impl CmaEs {
-    /// A cloud of `points` points (at least 4) about a place in the unit box.
-    pub(super) fn new(
-        mean: Vec<f64>,
-        points: usize,
-        reach: PopulationExtent,
-        generator: Xoshiro256PlusPlus,
-    ) -> Self {
+    /// A population of `points` points (at least 4) about a point of the unit box.
+    fn new(mean: Vec<f64>, points: usize, extent: PopulationExtent, generator: Xoshiro256PlusPlus) -> Self {
         let (n, points) = (mean.len(), points.max(4));
-        let raw: Vec<f64> = (0..points / 2)
-            .map(|rank| math::ln((points as f64 + 1.0) / 2.0) - math::ln(rank as f64 + 1.0))
-            .collect();
-        let sum: f64 = raw.iter().sum();
-        let weights: Vec<f64> = raw.into_iter().map(|w| w / sum).collect();
+        let raw = |rank| math::ln((points as f64 + 1.0) / 2.0) - math::ln(rank as f64 + 1.0);
+        let sum: f64 = (0..points / 2).map(raw).sum();
+        let weights: Vec<f64> = (0..points / 2).map(|rank| raw(rank) / sum).collect();
         Self {
             generator,
             points,
             rates: AdaptationRates::new(n as f64, &weights),
             weights,
             mean: DVector::from_vec(mean),
-            length: reach.first,
+            length: extent.first,
             shape: DMatrix::identity(n, n),
             axes: DMatrix::identity(n, n),
             path_length: DVector::zeros(n),
             path_shape: DVector::zeros(n),
             generation: 0,
-            last: reach.last,
+            last: extent.last,
             least_cost: f64::INFINITY,
         }
     }
 
-    /// One generation: points are drawn, evaluated and learnt from.
-    pub(super) fn run_generation(&mut self, costs: &mut StageCosts) {
+    /// Draws, evaluates and learns from one generation of points.
+    fn run_generation(&mut self, costs: &mut StageCosts) {
         let steps = self.draw_steps();
         let points: Vec<Vec<f64>> = steps.iter().map(|step| self.point_of(step)).collect();
         let costs = costs.evaluate_points(&points);
@@ -175,39 +159,28 @@ impl CmaEs {
         order.sort_by(|a, b| costs[*a].total_cmp(&costs[*b]));
         let ranked: Vec<_> = order.iter().map(|at| steps[*at].clone()).collect();
         self.update_distribution(&ranked);
-        let best = order.first().map_or(f64::INFINITY, |at| costs[*at]);
-        if best < self.least_cost {
-            self.least_cost = best;
-        }
+        self.least_cost = order.first().map_or(self.least_cost, |at| self.least_cost.min(costs[*at]));
     }
 
-    /// Lowest cost of any point so far.
-    pub(super) fn least_cost(&self) -> f64 {
-        self.least_cost
+    /// Whether the longest axis has shrunk to its last length.
+    fn has_converged(&self) -> bool {
+        let longest = self.axes.column_iter().map(|column| column.norm()).fold(0.0, f64::max);
+        self.length * longest < self.last || !self.length.is_finite()
     }
 
-    /// Whether it has shrunk to its last reach.
-    pub(super) fn has_converged(&self) -> bool {
-        self.longest_axis() < self.last || !self.length.is_finite()
-    }
-
-    /// The point of the box to which a step leads.
+    /// The point of the box at the end of a step.
     fn point_of(&self, step: &PopulationStep) -> Vec<f64> {
         (&self.mean + &step.inside * self.length).iter().map(|u| reflect_into_unit(*u)).collect()
     }
 
     /// Steps of a generation.
     fn draw_steps(&mut self) -> Vec<PopulationStep> {
-        let n = self.mean.len();
-        (0..self.points)
-            .map(|_| {
-                let along = DVector::from_iterator(
-                    n,
-                    (0..n).map(|_| self.generator.sample::<f64, _>(StandardNormal)),
-                );
-                PopulationStep { inside: &self.axes * &along, along }
-            })
-            .collect()
+        let mut draw = || {
+            let normal = |_, _| self.generator.sample::<f64, _>(StandardNormal);
+            let along = DVector::from_fn(self.mean.len(), normal);
+            PopulationStep { inside: &self.axes * &along, along }
+        };
+        (0..self.points).map(|_| draw()).collect()
     }
 
     /// Learns from the steps of a generation, best first.
@@ -217,7 +190,7 @@ impl CmaEs {
         let sum = |of: fn(&PopulationStep) -> &DVector<f64>| {
             self.weights.iter().zip(ranked).fold(DVector::zeros(n), |sum, (w, step)| sum + of(step) * *w)
         };
-        // the inverse square root of the shape times the step is the step along the axes, turned back
+        // C^(-1/2) times the mean step equals the mean step along the axes, rotated into the box
         let (along, step) = (sum(|step| &step.along), sum(|step| &step.inside));
         self.mean += &step * self.length;
         let turned = self.rotate_to_box(&along);
@@ -231,10 +204,9 @@ impl CmaEs {
         self.path_shape = &self.path_shape * (1.0 - rates.path)
             + &step * (kept * (rates.path * (2.0 - rates.path) * rates.effective).sqrt());
         let lost = (1.0 - kept) * rates.path * (2.0 - rates.path);
-        let spread =
-            self.weights.iter().zip(ranked).fold(DMatrix::zeros(n, n), |sum, (w, step)| {
-                sum + &step.inside * step.inside.transpose() * *w
-            });
+        let ranked = self.weights.iter().zip(ranked);
+        let spread = ranked
+            .fold(DMatrix::zeros(n, n), |sum, (w, step)| sum + &step.inside * step.inside.transpose() * *w);
         self.shape = &self.shape * (1.0 - rates.rank_one - rates.rank_mu + rates.rank_one * lost)
             + &self.path_shape * self.path_shape.transpose() * rates.rank_one
             + spread * rates.rank_mu;
@@ -244,7 +216,7 @@ impl CmaEs {
         self.decompose_shape();
     }
 
-    /// A vector along the axes as a vector of the box without their lengths.
+    /// Rotates coordinates along the axes into the box, without the lengths of the axes.
     fn rotate_to_box(&self, along: &DVector<f64>) -> DVector<f64> {
         let mut turned = DVector::zeros(along.len());
         for (column, z) in self.axes.column_iter().zip(along.iter()) {
@@ -261,10 +233,6 @@ impl CmaEs {
         let SymmetricEigen { eigenvectors, eigenvalues } = SymmetricEigen::new(symmetric.clone());
         self.shape = symmetric;
         self.axes = eigenvectors * DMatrix::from_diagonal(&eigenvalues.map(|value| value.max(0.0).sqrt()));
-    }
-
-    fn longest_axis(&self) -> f64 {
-        self.length * self.axes.column_iter().map(|column| column.norm()).fold(0.0, f64::max)
     }
 }
 

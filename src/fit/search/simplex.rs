@@ -1,13 +1,12 @@
-//! Nelder-Mead simplices: argmin's, and the only place where this program names argmin.
+//! Nelder-Mead simplices by argmin.
 //!
-//! argmin's own loop is not used: it can neither stop where the ledger does nor count steps without a gain.
-//! Its solver is stepped from here. It has no bounds, so it works on the real line ([`line_to_unit`]), and
-//! it panics on an error of its first costs, so costs are never errors.
+//! argmin's loop can neither stop with the ledger nor count steps without a gain, so its solver is stepped
+//! here. The solver has no bounds, so it works on the real line ([`line_to_unit`]). It panics on an error of its
+//! first costs, so costs are never errors.
 
 use super::StageCosts;
 use super::stagnation::StagnationCounter;
-use super::termination::SearchTermination;
-use super::termination::{EXACT_COST, SIMPLEX_COST_SPREAD};
+use super::termination::{EXACT_COST, SIMPLEX_COST_SPREAD, SearchTermination};
 use crate::fit::bounds::{line_to_unit, unit_to_line};
 use crate::fit::evaluation::EvaluationStage;
 use crate::fit::ledger::{Ledger, StopReason};
@@ -15,12 +14,12 @@ use argmin::core::{CostFunction, Error, IterState, Problem, Solver, State};
 use argmin::solver::neldermead::NelderMead;
 use std::cell::RefCell;
 
-/// Steps of one simplex without a lower cost after which it is left, per vertex.
+/// Steps per vertex without a lower cost after which a simplex ends.
 const STAGNANT_STEPS: usize = 20;
 
 type SimplexState = IterState<Vec<f64>, (), (), (), (), f64>;
 
-/// Costs as a function of places on the real line.
+/// Costs as a function on the real line.
 struct UnboundedCost<'l, 'a>(RefCell<StageCosts<'l, 'a>>);
 
 impl CostFunction for UnboundedCost<'_, '_> {
@@ -32,55 +31,48 @@ impl CostFunction for UnboundedCost<'_, '_> {
     }
 }
 
-/// One simplex from `start` with edges of this length in the unit box, until it has shrunk or gains nothing.
+/// Runs one simplex from `start` with edges of this length in the unit box, until it shrinks or gains nothing.
 pub(super) fn run_simplex(ledger: &mut Ledger, start: &[f64], edge: f64) -> SearchTermination {
     let vertices = initial_simplex(start, edge);
     let steps = ledger.remaining_evaluations().saturating_mul(2).saturating_add(vertices.len());
     if ledger.remaining_evaluations() < vertices.len() {
         return SearchTermination::Stopped(StopReason::Budget);
     }
+    let stop = step_simplex(StageCosts::new(ledger, EvaluationStage::Local), vertices, steps);
+    stop.map_or(SearchTermination::Converged, SearchTermination::Stopped)
+}
+
+/// Steps a simplex until it ends. Returns why the ledger stopped, if it did.
+fn step_simplex(costs: StageCosts, vertices: Vec<Vec<f64>>, steps: usize) -> Option<StopReason> {
     let mut patience = StagnationCounter::new(STAGNANT_STEPS * vertices.len(), 0.0);
-    let Ok(mut solver) = NelderMead::new(vertices).with_sd_tolerance(SIMPLEX_COST_SPREAD) else {
-        return SearchTermination::Converged;
-    };
-    let mut problem =
-        Problem::new(UnboundedCost(RefCell::new(StageCosts::new(ledger, EvaluationStage::Local))));
-    let Ok((mut state, _)) = solver.init(&mut problem, SimplexState::new()) else {
-        return SearchTermination::Converged;
-    };
+    let mut solver = NelderMead::new(vertices).with_sd_tolerance(SIMPLEX_COST_SPREAD).ok()?;
+    let mut problem = Problem::new(UnboundedCost(RefCell::new(costs)));
+    let (mut state, _) = solver.init(&mut problem, SimplexState::new()).ok()?;
     for _ in 0..steps {
-        if let Some(stop) = problem.problem.as_ref().and_then(|costs| costs.0.borrow().stop_reason()) {
-            return SearchTermination::Stopped(stop);
+        let stop = problem.problem.as_ref().and_then(|costs| costs.0.borrow().stop.clone());
+        if stop.is_some() {
+            return stop;
         }
-        if state.get_cost() <= EXACT_COST
-            || has_shrunk(&mut solver, &state)
-            || patience.is_stagnant(state.get_cost())
-        {
-            return SearchTermination::Converged;
+        let cost = state.get_cost();
+        if cost <= EXACT_COST || has_shrunk(&mut solver, &state) || patience.is_stagnant(cost) {
+            return None;
         }
-        match solver.next_iter(&mut problem, state) {
-            Ok((next, _)) => state = next,
-            Err(_) => return SearchTermination::Converged,
-        }
+        (state, _) = solver.next_iter(&mut problem, state).ok()?;
     }
-    SearchTermination::Converged
+    None
 }
 
 fn has_shrunk(solver: &mut NelderMead<Vec<f64>, f64>, state: &SimplexState) -> bool {
     <NelderMead<_, _> as Solver<UnboundedCost, SimplexState>>::terminate(solver, state).terminated()
 }
 
-/// `start` and one step of `edge` inwards along each coordinate of the box, as places on the real line.
+/// `start` and one step of `edge` inwards along each coordinate of the box, mapped to the real line.
 fn initial_simplex(start: &[f64], edge: f64) -> Vec<Vec<f64>> {
-    let moved = (0..start.len()).map(|axis| {
-        let step =
-            |(at, u): (usize, &f64)| if at == axis { u + if *u > 0.5 { -edge } else { edge } } else { *u };
-        start.iter().enumerate().map(step).collect::<Vec<f64>>()
-    });
-    std::iter::once(start.to_vec())
-        .chain(moved)
-        .map(|vertex| vertex.into_iter().map(unit_to_line).collect())
-        .collect()
+    let mut vertices = vec![start.to_vec(); start.len() + 1];
+    for (axis, vertex) in vertices.iter_mut().skip(1).enumerate() {
+        vertex[axis] += if vertex[axis] > 0.5 { -edge } else { edge };
+    }
+    vertices.into_iter().map(|vertex| vertex.into_iter().map(unit_to_line).collect()).collect()
 }
 
 #[cfg(test)]

@@ -1,4 +1,4 @@
-//! When a solver that gains nothing is left.
+//! Detection of a solver that gains nothing.
 
 /// Counts steps without progress.
 pub(super) struct StagnationCounter {
@@ -9,15 +9,15 @@ pub(super) struct StagnationCounter {
 }
 
 impl StagnationCounter {
-    /// So many steps that each gain less than this share of the cost.
+    /// Stagnation after more than `allowed` steps in a row that each lower the cost by less than the fraction
+    /// `gain`.
     pub(super) fn new(allowed: usize, gain: f64) -> Self {
         Self { allowed, gain, mark: f64::MAX, waited: 0 }
     }
 
     pub(super) fn is_stagnant(&mut self, cost: f64) -> bool {
         if cost < self.mark * (1.0 - self.gain) {
-            self.mark = cost;
-            self.waited = 0;
+            (self.mark, self.waited) = (cost, 0);
         } else {
             self.waited += 1;
         }
