@@ -1,10 +1,10 @@
-//! The trace itself, fitted in segments (multiple shooting, Bock 1981).
+//! Fit of whole traces in segments (multiple shooting, Bock 1981).
 //!
-//! One long run of a stick-slip model is so sensitive that the misfit of its trace has tens of minima.
-//! Restarted every few milliseconds from the state that the recording shows, it has one. Each segment's
-//! starting state is eliminated (variable projection, Golub and Pereyra 1973), so that an outer step of
-//! Levenberg and Marquardt moves the parameters and what is not known of the camera alone. Segments grow
-//! from stage to stage; the states of the next are those of the fitted motion.
+//! A long run of a stick-slip model is so sensitive that the misfit of its trace has tens of minima. With a
+//! restart from the recorded state every few milliseconds it has one. The starting state of each segment is
+//! eliminated (variable projection, Golub and Pereyra 1973), so an outer Levenberg-Marquardt step moves only
+//! the parameters and the unknowns of the camera. Segments grow from stage to stage; a new stage starts on the
+//! motion that the previous one fitted.
 
 mod assessment;
 mod camera_observation;
@@ -24,8 +24,7 @@ pub use assessment::{TraceAssessment, UnknownEstimate};
 pub(crate) use checkpoint::Checkpoint;
 pub use checkpoint::{Iterate, SegmentState, TraceSearchSettings, chi2_per_dof};
 pub use levenberg_marquardt::{first_iterate, next_iterate};
-pub(crate) use model::TraceSource;
-pub(crate) use model::{TraceModel, TraceRecording};
+pub(crate) use model::{TraceModel, TraceRecording, TraceSource};
 pub(crate) use search::TraceDescent;
 pub use search::{TraceSearchOutcome, search_trace, start_point, undersampled_mode};
 pub use segment_simulation::{SegmentResiduals, segment_residuals};

@@ -1,4 +1,4 @@
-//! Iterates of a trace fit in a journal: everything from which the next one follows, to the last bit.
+//! Iterates of a trace fit in a journal. A line has every bit that the next iterate depends on.
 
 use super::trace::{CameraUnknown, Iterate, SegmentState, TraceUnknown, UnknownKind};
 use crate::checkpoint::{CheckpointKind, CheckpointRecord, ExactNumber};
@@ -10,12 +10,12 @@ use serde::{Deserialize, Serialize};
 pub(crate) type TraceCheckpoint = checkpoint::CheckpointFile<IterateRecord>;
 pub(crate) type TraceHeader = checkpoint::CheckpointHeader<TraceHeaderBody>;
 
-/// One iterate of one search in a journal.
+/// One iterate of one chain in a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct IterateRecord {
-    /// Number of its chain: that of its start, from 0, or of a [`Branch`](super::trace::Branch).
+    /// Number of its chain: a start, from 0, or a [`UncertaintyRun`](super::trace::UncertaintyRun).
     pub start: usize,
-    /// Which iterate of that search, from 0: each follows from the one before.
+    /// Number of the iterate in its chain, from 0. Each follows from the one before.
     pub step: usize,
     pub iterate: Iterate,
 }
@@ -31,22 +31,26 @@ impl CheckpointRecord for IterateRecord {
     }
 
     fn to_row(&self, at: usize) -> Row {
-        let Iterate { stage, number, cuts, rescues: mended, plain, settled, damping, point, segments, cost } =
-            &self.iterate;
+        let Self { start, step, ref iterate } = *self;
+        let Iterate { stage, number, cuts, rescues: mended, plain, settled, .. } = *iterate;
+        let [damping, cost] = [iterate.damping, iterate.cost].map(ExactNumber);
+        let point = iterate.point.iter().copied().map(ExactNumber).collect();
+        let segments = iterate.segments.iter().map(SegmentRow::from_state).collect();
+        let index = at;
         Row {
-            index: at,
-            start: self.start,
-            step: self.step,
-            stage: *stage,
-            number: *number,
-            cuts: *cuts,
-            mended: *mended,
-            plain: *plain,
-            settled: *settled,
-            damping: ExactNumber(*damping),
-            cost: ExactNumber(*cost),
-            point: point.iter().copied().map(ExactNumber).collect(),
-            segments: segments.iter().map(SegmentRow::from_state).collect(),
+            index,
+            start,
+            step,
+            stage,
+            number,
+            cuts,
+            mended,
+            plain,
+            settled,
+            damping,
+            cost,
+            point,
+            segments,
         }
     }
 
@@ -56,19 +60,13 @@ impl CheckpointRecord for IterateRecord {
 
     fn from_row(row: Row, body: &TraceHeaderBody) -> Result<Self, String> {
         row.check_against(body)?;
-        let iterate = Iterate {
-            stage: row.stage,
-            number: row.number,
-            cuts: row.cuts,
-            rescues: row.mended,
-            plain: row.plain,
-            settled: row.settled,
-            damping: row.damping.0,
-            cost: row.cost.0,
-            point: row.point.into_iter().map(|z| z.0).collect(),
-            segments: row.segments.into_iter().map(SegmentRow::into_state).collect(),
-        };
-        Ok(Self { start: row.start, step: row.step, iterate })
+        let Row { start, step, stage, number, cuts, mended: rescues, plain, settled, .. } = row;
+        let (damping, cost) = (row.damping.0, row.cost.0);
+        let point = row.point.into_iter().map(|z| z.0).collect();
+        let segments = row.segments.into_iter().map(SegmentRow::into_state).collect();
+        let iterate =
+            Iterate { stage, number, cuts, rescues, plain, settled, damping, point, segments, cost };
+        Ok(Self { start, step, iterate })
     }
 
     /// The first number that differs.
@@ -79,34 +77,30 @@ impl CheckpointRecord for IterateRecord {
         }
         let points = one.point.iter().zip(&two.point).position(|(a, b)| a.to_bits() != b.to_bits());
         let segments = one.segments.iter().zip(&two.segments).position(|(a, b)| a != b);
-        let words = |iterate: &Iterate| match (points, segments) {
+        let describe = |iterate: &Iterate| match (points, segments) {
             (Some(at), _) => format!("coordinate {at} of {:?}", iterate.point[at]),
             (None, Some(at)) => format!("segment {at} of {:?}", iterate.segments[at]),
-            (None, None) => format!(
-                "stage {}, number {}, cost {:?}, damping {:?}, {} segments",
-                iterate.stage,
-                iterate.number,
-                iterate.cost,
-                iterate.damping,
-                iterate.segments.len()
-            ),
+            (None, None) => {
+                let (Iterate { stage, number, cost, damping, .. }, count) = (iterate, iterate.segments.len());
+                format!(
+                    "stage {stage}, number {number}, cost {cost:?}, damping {damping:?}, {count} segments"
+                )
+            }
         };
-        Some([words(one), words(two)])
+        Some([one, two].map(describe))
     }
 
     fn problem_difference(found: &TraceHeaderBody, expected: &TraceHeaderBody) -> Option<String> {
-        if found.seed != expected.seed {
-            let (found, expected) = (found.seed, expected.seed);
-            return Some(format!(
-                "`seed`: found {found}, expected {expected}: it decides where searches start"
-            ));
+        let (seed, own) = (found.seed, expected.seed);
+        if seed != own {
+            return Some(format!("`seed`: found {seed}, expected {own}: it decides where searches start"));
         }
         let differ = found != expected;
         differ.then(|| "the header has other unknowns, recordings or segments than the fit".to_owned())
     }
 }
 
-/// An iterate as it stands in a line.
+/// The line of an iterate.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct Row {
@@ -127,29 +121,24 @@ pub(crate) struct Row {
 
 impl Row {
     fn check_against(&self, body: &TraceHeaderBody) -> Result<(), String> {
-        let counts = [("point", self.point.len(), body.unknowns.len())];
-        if let Some((key, found, expected)) =
-            counts.into_iter().find(|(_, found, expected)| found != expected)
-        {
-            return Err(format!("`{key}`: found {found} numbers, expected {expected}"));
+        let (found, expected) = (self.point.len(), body.unknowns.len());
+        if found != expected {
+            return Err(format!("`point`: found {found} numbers, expected {expected}"));
         }
-        if self.stage >= body.segment_s.len() {
-            return Err(format!("`stage`: found {}, expected below {}", self.stage, body.segment_s.len()));
+        let (stage, stages, recordings) = (self.stage, body.segment_s.len(), body.recordings.len());
+        if stage >= stages {
+            return Err(format!("`stage`: found {stage}, expected below {stages}"));
         }
-        let wrong = self.segments.iter().find(|s| s.recording >= body.recordings.len() || s.first >= s.last);
-        wrong.map_or(Ok(()), |s| {
+        let wrong = self.segments.iter().find(|s| s.recording >= recordings || s.first >= s.last);
+        wrong.map_or(Ok(()), |SegmentRow { recording, first, last, .. }| {
             Err(format!(
-                "`segments`: found frames {} to {} of recording {}, expected rising frames of {} recordings",
-                s.first,
-                s.last,
-                s.recording,
-                body.recordings.len()
+                "`segments`: found frames {first} to {last} of recording {recording}, expected rising frames of {recordings} recordings"
             ))
         })
     }
 }
 
-/// A segment as it stands in a line.
+/// A segment in a line.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct SegmentRow {
@@ -166,52 +155,39 @@ struct SegmentRow {
 
 impl SegmentRow {
     fn from_state(state: &SegmentState) -> Self {
-        let SegmentState { recording: film, first, last, start, shown, chi2, data } = state;
-        Self {
-            recording: *film,
-            first: *first,
-            last: *last,
-            start: start.map(ExactNumber),
-            shown: shown.map(ExactNumber),
-            data: *data,
-            chi2: chi2.is_finite().then_some(ExactNumber(*chi2)),
-        }
+        let SegmentState { recording, first, last, start, shown, chi2, data } = *state;
+        let [start, shown] = [start, shown].map(|state| state.map(ExactNumber));
+        let chi2 = chi2.is_finite().then_some(ExactNumber(chi2));
+        Self { recording, first, last, start, shown, data, chi2 }
     }
 
     fn into_state(self) -> SegmentState {
-        SegmentState {
-            recording: self.recording,
-            first: self.first,
-            last: self.last,
-            start: self.start.map(|x| x.0),
-            shown: self.shown.map(|x| x.0),
-            data: self.data,
-            chi2: self.chi2.map_or(f64::INFINITY, |chi2| chi2.0),
-        }
+        let Self { recording, first, last, start, shown, data, chi2 } = self;
+        let [start, shown] = [start, shown].map(|state| state.map(|x| x.0));
+        let chi2 = chi2.map_or(f64::INFINITY, |chi2| chi2.0);
+        SegmentState { recording, first, last, start, shown, chi2, data }
     }
 }
 
-// What the header of a trace fit's journal says.
-
-/// What the header of a trace fit says besides.
+/// Body of the header of a trace fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct TraceHeaderBody {
     /// Seed of the job.
     pub seed: u64,
-    /// Names of the recordings, in the order of their numbers.
+    /// Names of the recordings, in the order of their indices.
     pub recordings: Vec<String>,
     /// Length of the segments in each stage, s.
     pub segment_s: Vec<ExactNumber>,
-    /// What is estimated, in the order of the coordinates.
+    /// The unknowns, in the order of the coordinates.
     pub unknowns: Vec<HeaderCoordinate>,
 }
 
-/// Something that is estimated, and what its coordinate means.
+/// An unknown with the meaning of its coordinate.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct HeaderCoordinate {
-    /// Key of the scene, or the recording and what of its camera.
+    /// Key of the scene, or name of the recording and key of its camera's error.
     pub name: String,
     /// Unit of its value.
     pub unit: String,
@@ -226,24 +202,21 @@ pub(crate) struct HeaderCoordinate {
 }
 
 impl HeaderCoordinate {
-    /// An unknown of a fit to these recordings.
+    /// The header's entry of an unknown; `recordings` are the names of the recordings.
     pub(crate) fn from_unknown(unknown: &TraceUnknown, recordings: &[String]) -> Self {
         let (name, unit) = match &unknown.kind {
             UnknownKind::Parameter { name, .. } => {
-                (name.clone(), parameters::find_parameter(name).map_or("1", |row| row.unit).to_owned())
+                (name.clone(), parameters::find_parameter(name).map_or("1", |row| row.unit))
             }
             UnknownKind::Camera { film, what } => {
-                let recording = recordings.get(*film).map_or("", String::as_str);
-                (
-                    format!("{recording}: {}", camera_unknown_name(*what)),
-                    camera_unknown_unit(*what).to_owned(),
-                )
+                let [name, unit] = camera_unknown_key(*what);
+                (format!("{}: {name}", recordings.get(*film).map_or("", String::as_str)), unit)
             }
         };
         let is_logarithm = matches!(unknown.kind, UnknownKind::Parameter { unit: None, .. });
         Self {
             name,
-            unit,
+            unit: unit.to_owned(),
             per_unit: (!is_logarithm).then(|| ExactNumber(unknown.slope(0.0))),
             range: unknown.range.map(ExactNumber),
             prior: unknown.prior.map(|prior| prior.map(ExactNumber)),
@@ -256,26 +229,16 @@ impl HeaderCoordinate {
     }
 }
 
-/// Key of a number of a camera in files, its unit included.
-pub(crate) fn camera_unknown_name(what: CameraUnknown) -> &'static str {
+/// Key of a camera's unknown in files, and its unit.
+pub(super) fn camera_unknown_key(what: CameraUnknown) -> [&'static str; 2] {
     match what {
-        CameraUnknown::OffsetX => "offset_x_m",
-        CameraUnknown::OffsetDrop => "offset_drop_m",
-        CameraUnknown::DriftX => "drift_x_m_per_s",
-        CameraUnknown::DriftDrop => "drift_drop_m_per_s",
-        CameraUnknown::Scale => "scale_relative",
-        CameraUnknown::Tilt => "tilt_rad",
-        CameraUnknown::Clock => "clock_s",
-    }
-}
-
-fn camera_unknown_unit(what: CameraUnknown) -> &'static str {
-    match what {
-        CameraUnknown::OffsetX | CameraUnknown::OffsetDrop => "m",
-        CameraUnknown::DriftX | CameraUnknown::DriftDrop => "m/s",
-        CameraUnknown::Scale => "1",
-        CameraUnknown::Tilt => "rad",
-        CameraUnknown::Clock => "s",
+        CameraUnknown::OffsetX => ["offset_x_m", "m"],
+        CameraUnknown::OffsetDrop => ["offset_drop_m", "m"],
+        CameraUnknown::DriftX => ["drift_x_m_per_s", "m/s"],
+        CameraUnknown::DriftDrop => ["drift_drop_m_per_s", "m/s"],
+        CameraUnknown::Scale => ["scale_relative", "1"],
+        CameraUnknown::Tilt => ["tilt_rad", "rad"],
+        CameraUnknown::Clock => ["clock_s", "s"],
     }
 }
 

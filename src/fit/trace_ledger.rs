@@ -1,7 +1,7 @@
-//! The ledger of a trace fit: every iterate is made once, and written before it is counted.
+//! The ledger of a trace fit: every iterate is computed once, and written before it is counted.
 //!
-//! An iterate follows from the one before and from nothing else, so that a search that was killed goes on
-//! with the same bits. At most the iterates that were being made are lost.
+//! An iterate depends on nothing but the one before, so a search that was killed continues with the same
+//! bits. It loses at most the iterates that were being computed.
 
 use super::FitError;
 use super::evaluation::EvaluationStage;
@@ -12,25 +12,25 @@ use crate::checkpoint::{CheckpointSink, format_header_line, format_record_line, 
 use std::collections::{BTreeMap, HashMap};
 use std::ops::ControlFlow;
 
-/// How far a trace fit has come.
+/// Progress of a trace fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TraceProgress {
-    /// Number of the chain: that of the start, or of a [`UncertaintyRun`].
+    /// Number of the chain: a start, or a [`UncertaintyRun`].
     pub start: usize,
-    /// Iterates of all searches so far, those of the journal included.
+    /// Iterates of all chains so far, including those from the journal.
     pub iterates: usize,
-    /// Those of them that were taken from the journal.
+    /// Iterates from the journal.
     pub replayed: usize,
-    /// Number of the stage, from 0.
+    /// Index of the stage.
     pub stage: usize,
     /// Cost of the last iterate.
     pub cost: f64,
-    /// Segments that fit worse than noise ever does.
+    /// Segments that fit worse than noise explains.
     pub bad_segments: usize,
     pub segments: usize,
 }
 
-/// The same as of any fit: an iterate counts as an evaluation.
+/// An iterate counts as an evaluation.
 impl From<TraceProgress> for FitProgress {
     fn from(now: TraceProgress) -> Self {
         let stage = match UncertaintyRun::from_chain_number(now.start) {
@@ -42,31 +42,31 @@ impl From<TraceProgress> for FitProgress {
     }
 }
 
-/// Called with every iterate; `Break` ends the fit, and what was found so far is kept.
+/// Called with every iterate; `Break` ends the fit with the result so far.
 pub(crate) type OnIterate<'a> = dyn FnMut(&TraceProgress) -> ControlFlow<()> + Send + 'a;
 
-/// Why no more iterates are made.
+/// Why a search stopped.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(crate) enum TraceStopReason {
-    /// It was asked to stop.
+    /// The callback asked to stop.
     Interrupted,
-    /// As many iterates as were allowed have been made.
+    /// The limit of iterates is reached.
     Budget,
-    /// The journal cannot be written.
+    /// The journal cannot be written, for this reason.
     Journal(String),
 }
 
-/// The iterates of all searches of a trace fit, and where they are written.
+/// Counts and stores the iterates of a trace fit.
 pub(crate) struct TraceLedger<'a> {
     journal: &'a mut dyn CheckpointSink,
     on_iterate: &'a mut OnIterate<'a>,
     /// Iterates of the journal that is resumed.
     known: HashMap<(usize, usize), Iterate>,
-    /// Lines of the journal.
+    /// Number of records in the journal.
     lines: usize,
-    /// The header of a new journal, until it is written.
+    /// The header line of a new journal, until it is written.
     opening: Option<String>,
-    /// Iterates by the number of their start.
+    /// Number of iterates by chain.
     counts: BTreeMap<usize, usize>,
     replayed: usize,
     most: usize,
@@ -74,11 +74,11 @@ pub(crate) struct TraceLedger<'a> {
 }
 
 impl<'a> TraceLedger<'a> {
-    /// Searches that go on from a journal, or begin one with this header; `most` is the number of iterates
-    /// allowed, those of the journal included.
+    /// A ledger that continues a journal, or begins one with this header. `most` is the limit of iterates,
+    /// including those from the journal.
     ///
     /// # Errors
-    /// [`FitError`] when the journal is that of another fit.
+    /// [`FitError`] when the journal belongs to another fit.
     pub(crate) fn new(
         header: &TraceHeader,
         resume: Option<(&str, &TraceCheckpoint)>,
@@ -87,28 +87,30 @@ impl<'a> TraceLedger<'a> {
         on_iterate: &'a mut OnIterate<'a>,
     ) -> Result<Self, FitError> {
         if let Some((file, found)) = resume {
-            check_seed(file, found.header.body.seed, header.body.seed)?;
+            let (expected, seed) = (header.body.seed, found.header.body.seed);
+            if seed != expected {
+                return Err(FitError::OtherSeed { file: file.to_owned(), found: seed, expected });
+            }
             found.header.check_matches::<IterateRecord>(file, header)?;
         }
         let records = resume.map_or(&[][..], |(_, journal)| &journal.records);
-        let known = records.iter();
-        let known = known.map(|step| ((step.start, step.step), step.iterate.clone())).collect();
+        let known = records.iter().map(|step| ((step.start, step.step), step.iterate.clone())).collect();
         let opening = resume.is_none().then(|| format_header_line(header));
         let (lines, counts, replayed, stopped) = (records.len(), BTreeMap::new(), 0, None);
         Ok(Self { journal, on_iterate, known, lines, opening, counts, replayed, most, stopped })
     }
 
-    /// Iterates so far, those of the journal included.
+    /// Number of iterates so far, including those from the journal.
     pub(crate) fn count_iterates(&self) -> usize {
         self.counts.values().sum()
     }
 
-    /// The same of one start, from 0.
+    /// Number of iterates of one start.
     pub(crate) fn count_start_iterates(&self, start: usize) -> usize {
         self.counts.get(&start).copied().unwrap_or(0)
     }
 
-    /// Why nothing more was made.
+    /// Why the search stopped; `None` while it runs.
     pub(crate) fn stop_reason(&self) -> Option<&TraceStopReason> {
         self.stopped.as_ref()
     }
@@ -121,18 +123,10 @@ impl<'a> TraceLedger<'a> {
             replayed: self.replayed,
             stage: iterate.stage,
             cost: iterate.cost,
-            bad_segments: iterate.segments.iter().filter(|segment| segment.is_bad()).count(),
+            bad_segments: iterate.count_bad_segments(),
             segments: iterate.segments.len(),
         };
         (self.on_iterate)(&now)
-    }
-
-    fn write_iterate(&mut self, (start, step): (usize, usize), iterate: &Iterate) -> Result<(), String> {
-        let made = IterateRecord { start, step, iterate: iterate.clone() };
-        let lines = self.opening.take().unwrap_or_default() + &format_record_line(&made, self.lines);
-        self.journal.append(&lines)?;
-        self.lines += 1;
-        Ok(())
     }
 
     fn stop_for(&mut self, why: TraceStopReason) -> ControlFlow<()> {
@@ -141,19 +135,12 @@ impl<'a> TraceLedger<'a> {
     }
 }
 
-fn check_seed(file: &str, found: u64, expected: u64) -> Result<(), FitError> {
-    if found == expected {
-        return Ok(());
-    }
-    Err(FitError::OtherSeed { file: file.to_owned(), found, expected })
-}
-
 impl Checkpoint for TraceLedger<'_> {
     fn find_iterate(&mut self, start: usize, step: usize) -> Option<Iterate> {
         let known = self.known.get(&(start, step))?.clone();
         self.replayed += 1;
         if self.count_iterate(start, &known).is_break() {
-            self.stopped.get_or_insert(TraceStopReason::Interrupted); // (the next new iterate is not made any more)
+            self.stopped.get_or_insert(TraceStopReason::Interrupted); // (the next new iterate is refused)
         }
         Some(known)
     }
@@ -165,19 +152,22 @@ impl Checkpoint for TraceLedger<'_> {
         if self.count_iterates() >= self.most {
             return self.stop_for(TraceStopReason::Budget);
         }
-        if let Err(problem) = self.write_iterate((start, step), iterate) {
+        let made = IterateRecord { start, step, iterate: iterate.clone() };
+        let lines = self.opening.take().unwrap_or_default() + &format_record_line(&made, self.lines);
+        if let Err(problem) = self.journal.append(&lines) {
             return self.stop_for(TraceStopReason::Journal(problem));
         }
-        match self.count_iterate(start, iterate) {
-            ControlFlow::Break(()) => self.stop_for(TraceStopReason::Interrupted),
-            ControlFlow::Continue(()) => ControlFlow::Continue(()),
+        self.lines += 1;
+        if self.count_iterate(start, iterate).is_break() {
+            return self.stop_for(TraceStopReason::Interrupted);
         }
+        ControlFlow::Continue(())
     }
 }
 
-/// Makes some iterates of a journal again, each from the one before, and compares them to the last bit: a
-/// search that is resumed believes none that the model does not give. `next` gives the iterate after one of a
-/// chain, and the first one.
+/// Recomputes some iterates of a journal, each from the one before, and compares every bit, because a resumed
+/// search must not start from iterates that the model does not give. `next` computes the first iterate of a
+/// chain, or the one after another.
 ///
 /// # Errors
 /// [`FitError::Journal`] with the line that differs.
@@ -189,7 +179,7 @@ pub(crate) fn recheck_iterates(
     let records = &journal.records;
     let places: HashMap<(usize, usize), &Iterate> =
         records.iter().map(|step| ((step.start, step.step), &step.iterate)).collect();
-    // others each time, as it grows
+    // a longer journal draws another sample
     let seed = journal.header.body.seed.wrapping_add(records.len() as u64);
     for place in sample_records(records.len(), seed) {
         let stored = &records[place];
@@ -197,7 +187,7 @@ pub(crate) fn recheck_iterates(
         let again = match before {
             None => next(stored.start, None),
             Some(Some(before)) => next(stored.start, Some(before)),
-            Some(None) => continue, // (nothing that it follows from is in the journal)
+            Some(None) => continue, // (the journal lacks the iterate before)
         };
         if let Some(iterate) = again {
             journal.check_recomputed(file, place, &IterateRecord { iterate, ..stored.clone() })?;

@@ -1,4 +1,4 @@
-//! One run of a trace fit, from the journal to the result.
+//! A trace fit from the journal to the result.
 
 use super::FitError;
 use super::identifiability::Identifiability;
@@ -11,27 +11,28 @@ use super::result::{
 };
 use super::targets::measure_targets;
 use super::trace::{
-    CameraUnknown, Iterate, SearchEnd, SegmentResiduals, TraceAssessment, TraceDescent, TraceModel,
-    TraceSearchOutcome, TraceSearchSettings, UncertaintyRun, UnknownKind, chi2_per_dof, first_iterate,
-    next_iterate, search_trace, segment_residuals, start_point, undersampled_mode,
+    Iterate, SearchEnd, SegmentResiduals, SegmentState, TraceAssessment, TraceDescent, TraceModel,
+    TraceRecording, TraceSearchOutcome, TraceSearchSettings, TraceUnknown, UncertaintyRun, UnknownKind,
+    chi2_per_dof, first_iterate, next_iterate, search_trace, segment_residuals, start_point,
+    undersampled_mode,
 };
 use super::trace_checkpoint::{
-    HeaderCoordinate, IterateRecord, TraceCheckpoint, TraceHeader, TraceHeaderBody, camera_unknown_name,
+    HeaderCoordinate, IterateRecord, TraceCheckpoint, TraceHeader, TraceHeaderBody, camera_unknown_key,
 };
 use super::trace_ledger::{OnIterate, TraceLedger, TraceStopReason, recheck_iterates};
 use super::uncertainty::ParameterVerdict;
 use crate::checkpoint::{CheckpointSink, ExactNumber};
 use crate::recording::Recording;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 impl Problem {
-    /// Fits the traces of the job, at most to `most` iterates (`None` for as many as it takes), and tells of
-    /// every one; goes on from a journal, whose file is named in refusals.
+    /// Fits the traces of the job in at most `most` iterates (`None`: no limit), and calls `on_iterate` with
+    /// each. `resume` is a journal to continue from, with its file name for error messages.
     ///
-    /// The result depends on neither threads nor how often the fit was interrupted and resumed.
+    /// The result depends neither on the number of threads nor on interruptions.
     ///
     /// # Errors
-    /// [`FitError`]; a search that stops early or does not converge is a result and says so.
+    /// [`FitError`]. A search that stops early or does not converge is not an error but a status of the result.
     pub(crate) fn fit_traces(
         &self,
         resume: Option<(&str, &TraceCheckpoint)>,
@@ -54,12 +55,11 @@ impl Problem {
         }
         let mut ledger = TraceLedger::new(&header, resume, most, journal, on_iterate)?;
         if let Some((file, found)) = resume {
-            recheck_iterates(file, found, |chain, before| {
-                match (UncertaintyRun::from_chain_number(chain), before) {
-                    (Some(_), _) => None, // (of an end that is not known yet)
-                    (None, None) => first_iterate(&model, &settings, &start_point(&model, seed, chain)),
-                    (None, Some(before)) => next_iterate(&model, &settings, before),
-                }
+            recheck_iterates(file, found, |chain, before| match before {
+                // the end from which this run starts is not known yet
+                _ if UncertaintyRun::from_chain_number(chain).is_some() => None,
+                None => first_iterate(&model, &settings, &start_point(&model, seed, chain)),
+                Some(before) => next_iterate(&model, &settings, before),
             })?;
         }
         let searched = search_trace(&model, &settings, seed, &mut ledger);
@@ -91,12 +91,8 @@ impl Problem {
 
     fn header_for_model(&self, model: &TraceModel) -> TraceHeader {
         let recordings = self.trace_recording_names();
-        let unknowns = model
-            .unknowns
-            .0
-            .iter()
-            .map(|unknown| HeaderCoordinate::from_unknown(unknown, &recordings))
-            .collect();
+        let unknowns = model.unknowns.0.iter();
+        let unknowns = unknowns.map(|unknown| HeaderCoordinate::from_unknown(unknown, &recordings)).collect();
         let segment_s = self.segment_s().iter().copied().map(ExactNumber).collect();
         let body = TraceHeaderBody { seed: self.job().search.seed, recordings, segment_s, unknowns };
         TraceHeader::new::<IterateRecord>(self.fingerprint(), env!("CARGO_PKG_VERSION"), body)
@@ -107,30 +103,30 @@ fn cannot_be_fitted(why: &str) -> FitError {
     FitError::CannotBeFitted { why: why.to_owned() }
 }
 
-/// Why nothing could be fitted at all.
+/// Reason of a fit without any iterate.
 const NO_SEGMENT_STARTED: &str = "no segment of the traces could be started: the model runs nowhere within the bounds, or \
                           the tip slides in too few frames; look at the recording with `wiperlab inspect`";
 
-// From the end of a trace search to its result.
+// The result of a trace search.
 
-/// Segments that a channel names as those that fit worst.
+/// Number of worst segments listed per channel.
 const WORST_SEGMENTS: usize = 5;
 
-/// A bias of short segments shows in nothing but longer ones.
+/// Doubt about a fit with one segment length: only longer segments would reveal a bias.
 const ONE_LENGTH_NOTE: &str = "segments of one length alone were fitted, and whether longer ones agree is not known: give \
                           `segment_s` two lengths at least";
 
-/// Everything that a trace fit found.
-pub(super) struct TraceFindings<'a, 'l> {
-    pub problem: &'a Problem,
-    pub model: &'a TraceModel,
-    pub searched: &'a TraceSearchOutcome,
-    pub ledger: &'a TraceLedger<'l>,
+/// The outcome of a trace search with its problem.
+struct TraceFindings<'a, 'l> {
+    problem: &'a Problem,
+    model: &'a TraceModel,
+    searched: &'a TraceSearchOutcome,
+    ledger: &'a TraceLedger<'l>,
 }
 
 impl TraceFindings<'_, '_> {
-    /// The result, but for what the whole run shows; `None` where no search came anywhere.
-    pub(crate) fn into_result(self) -> Option<FitResult> {
+    /// The result without the comparison of whole runs; `None` where no search made an iterate.
+    fn into_result(self) -> Option<FitResult> {
         let job = self.problem.job();
         let best = self.searched.descents.get(self.searched.best)?;
         let end = best.last_iterate()?;
@@ -159,7 +155,7 @@ impl TraceFindings<'_, '_> {
             threshold: CHI_SQUARED_95,
             twins: assessment.map_or(0, |found| found.twins),
             gate: Identifiability::default(),
-            waterfall: self.sorted_optima(&names),
+            waterfall: self.sorted_optima(),
             sensitivities: BTreeMap::new(),
             evaluations: EvaluationCounts {
                 total: self.ledger.count_iterates(),
@@ -174,22 +170,27 @@ impl TraceFindings<'_, '_> {
     }
 
     fn fit_status(&self, best: &TraceDescent) -> FitStatus {
+        let is_complete =
+            self.searched.assessment.is_some() && best.stages.len() >= self.problem.segment_s().len();
         match self.ledger.stop_reason() {
-            _ if !self.searched.stopped && self.searched.assessment.is_none() => FitStatus::Failed,
-            _ if !self.searched.stopped && best.stages.len() < self.problem.segment_s().len() => {
-                FitStatus::Failed
-            }
-            _ if !self.searched.stopped => FitStatus::Converged,
+            _ if !self.searched.stopped && is_complete => FitStatus::Converged,
+            _ if !self.searched.stopped => FitStatus::Failed,
             Some(TraceStopReason::Budget) => FitStatus::BudgetExhausted,
             _ => FitStatus::Interrupted,
         }
     }
 
-    /// Name of the recording with this number among the traces.
+    /// Name of a recording by its index among the traces.
     fn recording_name(&self, film: usize) -> String {
-        let condition = self.problem.traces().get(film).map(|trace| trace.condition);
-        let name = condition.and_then(|at| self.problem.job().conditions.get(at)).map(|c| c.name.clone());
-        name.unwrap_or_default()
+        let trace = self.problem.traces().get(film);
+        let condition = trace.and_then(|trace| self.problem.job().conditions.get(trace.condition));
+        condition.map(|condition| condition.name.clone()).unwrap_or_default()
+    }
+
+    /// Values of the free parameters at an iterate, by name.
+    fn parameter_values(&self, at: &Iterate) -> BTreeMap<String, f64> {
+        let values = self.model.unknowns.0.iter().zip(&at.point).map(|(unknown, z)| unknown.value(*z));
+        self.problem.job().parameter_names().into_iter().zip(values).collect()
     }
 
     fn parameter_result(
@@ -199,9 +200,10 @@ impl TraceFindings<'_, '_> {
         end: &Iterate,
         misfit: &TraceMisfit,
     ) -> ParameterResult {
-        let estimate = clamp_to_bounds(free, self.model.unknowns.0[at].value(end.point[at]));
+        // the transform of the coordinate may round beyond a bound
+        let estimate = self.model.unknowns.0[at].value(end.point[at]);
         let mut found = ParameterResult {
-            estimate,
+            estimate: estimate.clamp(free.bounds.lower(), free.bounds.upper()),
             lower_95: None,
             upper_95: None,
             verdict: ParameterVerdict::NotIdentified,
@@ -226,7 +228,8 @@ impl TraceFindings<'_, '_> {
         let alone = self.problem.segment_s().len() < 2;
         found.reasons.extend(alone.then(|| ONE_LENGTH_NOTE.to_owned()));
         found.reasons.extend(known.doubts.iter().cloned());
-        remove_duplicates(&mut found.reasons);
+        let mut seen = BTreeSet::new();
+        found.reasons.retain(|reason| seen.insert(reason.clone()));
         found.verdict = trace_verdict(free, &found);
         found
     }
@@ -234,13 +237,13 @@ impl TraceFindings<'_, '_> {
     fn nuisance_results(&self, end: &Iterate) -> Vec<NuisanceResult> {
         let first = self.problem.job().parameters.len();
         let all = self.model.unknowns.0.iter().zip(&end.point).enumerate().skip(first);
-        let nuisance = |(at, (unknown, z)): (usize, (&super::trace::TraceUnknown, &f64))| {
+        let nuisance = |(at, (unknown, z)): (usize, (&TraceUnknown, &f64))| {
             let [mean, sd] = unknown.prior.unwrap_or([unknown.start, f64::INFINITY]);
             let ends = self.searched.assessment.as_ref().map(|known| known.estimates[at].widest_95());
             let (recording, name) = match &unknown.kind {
                 UnknownKind::Parameter { name, .. } => (None, name.clone()),
                 UnknownKind::Camera { film, what } => {
-                    (Some(self.recording_name(*film)), camera_unknown_name(*what).to_owned())
+                    (Some(self.recording_name(*film)), camera_unknown_key(*what)[0].to_owned())
                 }
             };
             NuisanceResult {
@@ -256,18 +259,18 @@ impl TraceFindings<'_, '_> {
         all.map(nuisance).collect()
     }
 
-    /// The state in which the first segment of every recording starts.
+    /// The starting state of the first good segment of every recording.
     fn start_states(&self, end: &Iterate) -> Vec<StartState> {
-        let start = |(film, shoot): (usize, &super::trace::TraceRecording)| {
-            let first =
-                end.segments.iter().find(|s| s.recording == film && s.chi2.is_finite() && !s.is_bad())?;
-            let clock_s = self.camera_value(end, film, CameraUnknown::Clock);
+        let start = |(film, shoot): (usize, &TraceRecording)| {
+            let fits = |s: &&SegmentState| s.recording == film && s.chi2.is_finite() && !s.is_bad();
+            let first = end.segments.iter().find(fits)?;
+            let clock_s = self.model.unknowns.camera_at(film, &end.point).clock_s;
             let [neck_angle_rad, lip_angle_rad, neck_rate_rad_per_s, lip_rate_rad_per_s] = first.start;
+            let (recording, seen) = (self.recording_name(film), &shoot.observation);
+            let time_s = seen.times_s[first.first] - seen.lead_s() - clock_s;
             Some(StartState {
-                recording: self.recording_name(film),
-                time_s: shoot.observation.times_s[first.first]
-                    - 0.5 * shoot.observation.settings.exposure_s
-                    - clock_s,
+                recording,
+                time_s,
                 neck_angle_rad,
                 lip_angle_rad,
                 neck_rate_rad_per_s,
@@ -277,30 +280,22 @@ impl TraceFindings<'_, '_> {
         self.model.recordings.iter().enumerate().filter_map(start).collect()
     }
 
-    /// A number of a recording's camera, in its own unit; 0 where it is held.
-    fn camera_value(&self, end: &Iterate, film: usize, what: CameraUnknown) -> f64 {
-        let kind = UnknownKind::Camera { film, what };
-        let found = self.model.unknowns.0.iter().zip(&end.point).find(|(unknown, _)| unknown.kind == kind);
-        found.map_or(0.0, |(unknown, z)| unknown.value(*z))
-    }
-
     fn trace_misfit(&self, best: &TraceDescent, end: &Iterate, nuisances: &[NuisanceResult]) -> TraceMisfit {
         let found = segment_residuals(self.model, end);
         let mut channels: BTreeMap<(usize, bool), Vec<&SegmentResiduals>> = BTreeMap::new();
-        // a recording of which nothing could be compared has its row too
+        // a recording without residuals has its rows too
         for (film, trace) in self.problem.traces().iter().enumerate() {
             for channel in &trace.channels {
                 channels.insert((film, *channel == TraceChannel::HeadDrop), Vec::new());
             }
         }
         found.iter().for_each(|r| channels.entry((r.recording, r.is_drop)).or_default().push(r));
-        let (chi2, dof) = chi2_per_dof(end);
-        let data: usize = end.segments.iter().map(|segment| segment.data).sum();
-        // every datum pays its share of the unknowns; (a run that fails leaves chi2 without a number)
+        let ((chi2, dof), data) = (chi2_per_dof(end), end.count_data());
+        // the degrees of freedom are spread evenly over the data; chi2 is NaN where a run fails
         let share = if chi2.is_nan() || data == 0 { 1.0 } else { dof as f64 / data as f64 };
-        let rows =
-            channels.iter().map(|(channel, parts)| self.channel_misfit(*channel, parts, share)).collect();
-        // at the end, not on the way to it, where that is known
+        let rows = channels.iter();
+        let rows = rows.map(|(channel, parts)| self.channel_misfit(*channel, parts, share)).collect();
+        // the run with shorter segments from the best end replaces their stage of the search
         let known = self.searched.assessment.as_ref().and_then(|known| known.shorter.as_ref());
         let shorter = |stage: usize| known.filter(|iterate| iterate.stage == stage);
         let stages =
@@ -327,15 +322,13 @@ impl TraceFindings<'_, '_> {
         let squares =
             |values: &dyn Fn(&SegmentResiduals) -> f64| parts.iter().map(|p| values(p)).sum::<f64>();
         let chi2 = |part: &SegmentResiduals| part.whitened.iter().map(|r| r * r).sum::<f64>();
-        let mut worst: Vec<WorstSegment> = parts
-            .iter()
-            .filter_map(|part| {
-                let (first, last) = (*part.frames.first()?, *part.frames.last()?);
-                let end_s = shoot.times_s[last] + 1.0 / shoot.rate_hz;
-                let chi2_per_dof = chi2(part) / (share * part.frames.len() as f64);
-                Some(WorstSegment { start_s: shoot.times_s[first], end_s, chi2_per_dof })
-            })
-            .collect();
+        let segment = |part: &&SegmentResiduals| {
+            let (first, last) = (*part.frames.first()?, *part.frames.last()?);
+            let end_s = shoot.times_s[last] + 1.0 / shoot.rate_hz;
+            let chi2_per_dof = chi2(part) / (share * part.frames.len() as f64);
+            Some(WorstSegment { start_s: shoot.times_s[first], end_s, chi2_per_dof })
+        };
+        let mut worst: Vec<WorstSegment> = parts.iter().filter_map(segment).collect();
         worst.sort_by(|a, b| b.chi2_per_dof.total_cmp(&a.chi2_per_dof));
         worst.truncate(WORST_SEGMENTS);
         let metres = squares(&|part| part.residual_m.iter().map(|r| r * r).sum());
@@ -354,31 +347,28 @@ impl TraceFindings<'_, '_> {
 
     fn stage_misfit(&self, iterate: &Iterate) -> StageMisfit {
         let (chi2_per_dof, dof) = chi2_per_dof(iterate);
-        let names = self.problem.job().parameter_names().into_iter();
-        let values = self.model.unknowns.0.iter().zip(&iterate.point).map(|(unknown, z)| unknown.value(*z));
         StageMisfit {
             segment_s: self.problem.segment_s().get(iterate.stage).copied().unwrap_or_default(),
             segments: iterate.segments.len(),
-            bad_segments: iterate.segments.iter().filter(|segment| segment.is_bad()).count(),
+            bad_segments: iterate.count_bad_segments(),
             dof,
             chi2_per_dof,
-            estimates: names.zip(values).collect(),
+            estimates: self.parameter_values(iterate),
         }
     }
 
-    /// Where every start ended, the best first.
-    fn sorted_optima(&self, names: &[String]) -> Vec<LocalOptimum> {
+    /// The end of every start, the best first.
+    fn sorted_optima(&self) -> Vec<LocalOptimum> {
         let stages = self.problem.segment_s().len();
         let optimum = |descent: &TraceDescent| {
             let (first, end) = (descent.stages.first()?, descent.last_iterate()?);
-            let values = self.model.unknowns.0.iter().zip(&end.point).map(|(unknown, z)| unknown.value(*z));
             let failure = (descent.stages.len() < stages)
                 .then(|| format!("ended at stage {} of {stages}", descent.stages.len()));
             Some(LocalOptimum {
                 start_cost: first.cost,
                 cost: end.cost,
                 evaluations: self.ledger.count_start_iterates(descent.start),
-                values: names.iter().cloned().zip(values).collect(),
+                values: self.parameter_values(end),
                 failure,
             })
         };
@@ -409,14 +399,9 @@ impl TraceFindings<'_, '_> {
     }
 }
 
-/// A value that went through its coordinate, within the bounds to the last bit.
-fn clamp_to_bounds(free: &FreeParameter, value: f64) -> f64 {
-    value.clamp(free.bounds.lower(), free.bounds.upper())
-}
-
-/// What is known of a parameter: of one with a doubt, nothing is called known.
+/// Verdict on a parameter; one with a doubt is not identified.
 pub(super) fn trace_verdict(free: &FreeParameter, found: &ParameterResult) -> ParameterVerdict {
-    /// Part of the bounds within which a value is at their end.
+    /// Distance from a bound, relative to the range, up to which a value counts as at the bound.
     const NEAR: f64 = 1e-6;
     let place = free.bounds.to_unit(found.estimate);
     match (found.lower_95, found.upper_95) {
@@ -429,27 +414,15 @@ pub(super) fn trace_verdict(free: &FreeParameter, found: &ParameterResult) -> Pa
     }
 }
 
-fn remove_duplicates(sentences: &mut Vec<String>) {
-    let mut kept: Vec<String> = Vec::new();
-    for sentence in sentences.drain(..) {
-        if !kept.contains(&sentence) {
-            kept.push(sentence);
-        }
-    }
-    *sentences = kept;
-}
-
 fn correlation_table(names: &[String], known: &TraceAssessment) -> BTreeMap<String, BTreeMap<String, f64>> {
     let row = |i: usize| {
-        let finite = |(j, name): (usize, &String)| {
-            Some((name.clone(), known.correlation[(i, j)])).filter(|(_, r)| r.is_finite())
-        };
-        names.iter().enumerate().filter_map(finite).collect()
+        let cells = names.iter().enumerate().map(|(j, name)| (name.clone(), known.correlation[(i, j)]));
+        cells.filter(|(_, r)| r.is_finite()).collect()
     };
     names.iter().enumerate().map(|(i, name)| (name.clone(), row(i))).collect()
 }
 
-/// Correlation of residuals of neighbouring frames, in units of the noise.
+/// Correlation of the whitened residuals of neighbouring frames.
 fn residual_autocorrelation(parts: &[&SegmentResiduals]) -> Option<f64> {
     let (mut product, mut pairs, mut square, mut count) = (0.0, 0usize, 0.0, 0usize);
     for part in parts {

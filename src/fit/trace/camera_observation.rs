@@ -7,36 +7,37 @@ use crate::simulate::scene::Drive;
 use nalgebra::DMatrix;
 use std::sync::Arc;
 
-/// What of a recording is fitted, and what is known of its camera.
+/// Channels and frames of a recording that are fitted, with exposure and noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ObservationSettings {
-    /// Whether the tip's place along the sweep is data.
+    /// Whether the tip's position along the sweep is data.
     pub tip_x: bool,
     /// Whether the head's drop is data.
     pub head_drop: bool,
-    /// Time for which the shutter is open, s.
+    /// Exposure time of a frame, s.
     pub exposure_s: f64,
     /// Noise of the tip's x and of the head's y, m.
     pub noise: [AutoregressiveNoise; 2],
-    /// Frames that are fitted, from the first to before the second.
+    /// First fitted frame and the frame behind the last one.
     pub frames: [usize; 2],
 }
 
-/// A recording as data: places on its frame grid.
+/// Data of a recording on its frame grid.
 #[derive(Debug, Clone)]
 pub struct CameraObservation {
-    /// Instants of the frames, s.
+    /// Times of the frames, s.
     pub times_s: Vec<f64>,
     pub rate_hz: f64,
-    /// The tip along the sweep, m; empty cells where it is lost or no data.
+    /// Tip along the sweep, m; `None` where it is lost or not fitted.
     pub tip_x_m: Vec<Option<f64>>,
-    /// The head's drop, m, likewise.
+    /// Drop of the head, m; `None` where it is lost or not fitted.
     pub drop_m: Vec<Option<f64>>,
-    /// Where the drive has the head, in the picture, m.
+    /// Head position of the drive in every frame, m.
     pub head_m: Vec<f64>,
-    /// Whether that is the recording's own head; else it is the scene's, in true lengths.
+    /// Whether the recorded head drives the model, in lengths of the picture; otherwise the scene does, in
+    /// true lengths.
     pub own_head: bool,
-    /// The curve behind `head_m` where that is the recording's own.
+    /// The smooth curve behind `head_m` where the recorded head drives the model.
     pub own_curve: Option<Arc<HeadSpline>>,
     /// Mean of `head_m`, about which a tilt turns, m.
     pub centre_m: f64,
@@ -44,8 +45,8 @@ pub struct CameraObservation {
 }
 
 impl CameraObservation {
-    /// The frames of a recording; `drive` is the head's motion on which its model runs, `shared` what the
-    /// other point shows of the noise of the tip's x and of the head's y, m.
+    /// Data of a recording. `drive` moves the head of its model; `shared` is the part of the noise of the
+    /// tip's x and of the head's y, m, that the other point reveals, and it is subtracted.
     pub(crate) fn new(
         recording: &Recording,
         drive: &Drive,
@@ -80,12 +81,12 @@ impl CameraObservation {
         }
     }
 
-    /// First guesses of the offsets along the sweep and of the drop, m: a blade leans as far to one side as
-    /// to the other, and its head is highest where it is upright.
+    /// First guesses of the offsets along the sweep and of the drop, m. A blade leans equally far to both
+    /// sides, and its head is highest where the blade is upright.
     pub(super) fn guess_offsets_m(&self, tilt_rad: f64) -> [f64; 2] {
-        /// Share of the frames left out at the ends of a distribution.
+        /// Fraction of the frames that is ignored at either end of a distribution.
         const TAIL: f64 = 0.1;
-        /// Share of the frames around the upright blade.
+        /// Fraction of the frames with a nearly upright blade.
         const UPRIGHT: f64 = 0.005;
         let [first, last] = self.settings.frames;
         let sorted = |mut values: Vec<f64>| {
@@ -99,7 +100,7 @@ impl CameraObservation {
         let level = |i: usize| Some(self.drop_m[i]? + tilt_rad * (self.head_m[i] - self.centre_m));
         let drops = sorted((first..last).filter_map(level).collect());
         let [low, high] = [at(&leans, TAIL), at(&leans, 1.0 - TAIL)];
-        // (a marker that is farther off than the blade leans shows one side alone)
+        // (an offset that exceeds the lean hides the change of side)
         let both_sides = (low < 0.0 && high > 0.0) || self.reverses();
         let middle = if both_sides { 0.5 * (low + high) } else { 0.0 };
         let upright =
@@ -107,29 +108,28 @@ impl CameraObservation {
         [middle, if both_sides { upright } else { 0.0 }]
     }
 
-    /// Whether the head moves one way in part of the frames and the other way in another part, so that the
-    /// blade has leaned to both sides.
+    /// Whether the head reverses within the fitted frames, so that the blade leans to both sides.
     fn reverses(&self) -> bool {
-        /// Least share of the head's way that counts: a blade follows within a few millimetres of a stroke.
+        /// Least return of the head, relative to its range, that tilts the blade to the other side.
         const LEAST: f64 = 0.05;
         let [first, last] = self.settings.frames;
         let heads = &self.head_m[first..last];
         let (low, high) =
             heads.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(*x), b.max(*x)));
         let [Some(start), Some(end)] = [heads.first(), heads.last()] else { return false };
-        // the way there and back exceeds what lies between the ends by twice the return
+        // how far the head moves beyond its first and last position
         let beyond = (high - start.max(*end)).max(start.min(*end) - low);
         beyond > LEAST * (high - low)
     }
 
-    /// Time of a frame after the middle of those that are fitted, s.
+    /// Time of a frame after the middle of the fitted frames, s.
     pub(super) fn after_middle_s(&self, frame: usize) -> f64 {
         let [first, last] = self.settings.frames;
         self.times_s[frame] - 0.5 * (self.times_s[first] + self.times_s[last - 1])
     }
 
-    /// Half the time for which the shutter is open, s: a run starts this long before its first frame.
-    pub(super) fn lead_s(&self) -> f64 {
+    /// Half the exposure time, s: a run starts this long before its first frame.
+    pub(crate) fn lead_s(&self) -> f64 {
         0.5 * self.settings.exposure_s
     }
 
@@ -139,45 +139,43 @@ impl CameraObservation {
         present(&self.tip_x_m) + present(&self.drop_m)
     }
 
-    /// Frames of a segment with data: of the tip, of the drop.
-    pub(super) fn data_frames(&self, first: usize, last: usize) -> [Vec<usize>; 2] {
+    /// Frames of a segment with data: of the tip, and of the drop.
+    pub(super) fn data_frames(&self, [first, last]: [usize; 2]) -> [Vec<usize>; 2] {
         [&self.tip_x_m, &self.drop_m].map(|column| (first..last).filter(|&i| column[i].is_some()).collect())
     }
 
-    /// What turns residuals of a segment, in metres, into ones of unit variance without correlation.
-    pub(super) fn segment_whitening(&self, first: usize, last: usize) -> SegmentWhitening {
-        let frames = self.data_frames(first, last);
-        let noise = &self.settings.noise;
+    /// The map from a segment's residuals, m, to uncorrelated residuals of unit variance.
+    pub(super) fn segment_whitening(&self, segment: [usize; 2]) -> SegmentWhitening {
+        let frames = self.data_frames(segment);
         let maps = [0, 1].map(|k| {
-            let is_white = noise[k].coefficients().is_empty();
-            if is_white {
-                ChannelWhitening::Scale(1.0 / noise[k].sd())
+            let noise = &self.settings.noise[k];
+            if noise.coefficients().is_empty() {
+                ChannelWhitening::Scale(1.0 / noise.sd())
             } else {
-                ChannelWhitening::Full(Whitener::new(&noise[k], &frames[k]))
+                ChannelWhitening::Full(Whitener::new(noise, &frames[k]))
             }
         });
         SegmentWhitening { tips: frames[0].len(), maps }
     }
 
-    /// How a segment's data, whitened, depend on the coefficients of the head's own curve: the first that
-    /// counts, and a column each; `None` where the head is not the recording's.
-    pub(super) fn head_curve_derivatives(&self, first: usize, last: usize) -> Option<(usize, DMatrix<f64>)> {
+    /// Derivatives of a segment's whitened data by the coefficients of the recorded head's curve: the index
+    /// of the first coefficient that matters, and one column per coefficient. `None` where the scene drives
+    /// the head.
+    pub(super) fn head_curve_derivatives(&self, [first, last]: [usize; 2]) -> Option<(usize, DMatrix<f64>)> {
         let curve = self.own_curve.as_ref()?;
         let from = curve.position_weights(first).0;
         let (to, weights) = curve.position_weights(last - 1);
         let mut columns = DMatrix::zeros(self.count_data(first, last), to + weights.len() - from);
-        for (row, frame) in self.data_frames(first, last)[0].iter().enumerate() {
+        for (row, frame) in self.data_frames([first, last])[0].iter().enumerate() {
             let (at, weights) = curve.position_weights(*frame);
             weights.iter().enumerate().for_each(|(k, weight)| columns[(row, at - from + k)] = *weight);
         }
-        let whitening = self.segment_whitening(first, last);
-        let rows = columns.nrows().max(1);
-        columns.as_mut_slice().chunks_mut(rows).for_each(|column| whitening.whiten_column(column));
+        self.segment_whitening([first, last]).whiten_columns(&mut columns);
         Some((from, columns))
     }
 }
 
-/// The map of a segment's residuals to white ones.
+/// The map of a segment's residuals to white residuals.
 pub(super) struct SegmentWhitening {
     tips: usize,
     maps: [ChannelWhitening; 2],
@@ -190,19 +188,20 @@ enum ChannelWhitening {
 
 impl SegmentWhitening {
     /// Whitens a column: the tip's frames, then the drop's.
-    pub(crate) fn whiten_column(&self, column: &mut [f64]) {
+    pub(super) fn whiten_column(&self, column: &mut [f64]) {
         let (tip, drop) = column.split_at_mut(self.tips);
-        self.maps[0].whiten_column(tip);
-        self.maps[1].whiten_column(drop);
-    }
-}
-
-impl ChannelWhitening {
-    fn whiten_column(&self, part: &mut [f64]) {
-        match self {
-            Self::Scale(per_sd) => part.iter_mut().for_each(|x| *x *= per_sd),
-            Self::Full(whitener) => whitener.whiten_column(part),
+        for (map, part) in self.maps.iter().zip([tip, drop]) {
+            match map {
+                ChannelWhitening::Scale(per_sd) => part.iter_mut().for_each(|x| *x *= per_sd),
+                ChannelWhitening::Full(whitener) => whitener.whiten_column(part),
+            }
         }
+    }
+
+    /// Whitens every column of a matrix.
+    pub(super) fn whiten_columns(&self, matrix: &mut DMatrix<f64>) {
+        let rows = matrix.nrows().max(1);
+        matrix.as_mut_slice().chunks_mut(rows).for_each(|column| self.whiten_column(column));
     }
 }
 

@@ -1,13 +1,13 @@
-//! What keeps the iterates of a search.
+//! Iterates of a search, and the store that keeps them.
 
 use super::segment_simulation::LinkState;
 use std::ops::ControlFlow;
 
-/// What keeps the iterates of a search, in order: a journal, or nothing.
+/// Stores the iterates of a search: a journal, or `()`, which keeps nothing.
 pub trait Checkpoint {
-    /// The iterate that a chain had at a place, where it is known already.
+    /// The stored iterate of a chain at a place, both counted from 0.
     fn find_iterate(&mut self, chain: usize, place: usize) -> Option<Iterate>;
-    /// A new iterate of a chain; `Break` ends the search.
+    /// Stores a new iterate of a chain; `Break` ends the search.
     fn store_iterate(&mut self, chain: usize, place: usize, iterate: &Iterate) -> ControlFlow<()>;
 }
 
@@ -21,34 +21,32 @@ impl Checkpoint for () {
     }
 }
 
-// What a search passes on from step to step.
-
-/// How a trace is searched.
+/// Settings of a trace search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceSearchSettings {
     /// Length of the segments in each stage, s, rising.
     pub segment_s: Vec<f64>,
-    /// Number of twins of the end that are fitted again.
+    /// Number of twins of the best end that are refitted.
     pub twins: usize,
 }
 
-/// A segment: its frames, its starting state and how it fits.
+/// A segment with its starting state and its misfit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SegmentState {
-    /// Number of the recording.
+    /// Index of the recording.
     pub recording: usize,
     /// First frame.
     pub first: usize,
-    /// Frame before which it ends.
+    /// Frame behind the last one.
     pub last: usize,
     /// Angles and rates of neck and lip at its start, rad and rad/s.
     pub start: [f64; 4],
-    /// The same as the recording shows them.
+    /// The same quantities as estimated from the recording alone.
     pub shown: [f64; 4],
-    /// Sum of squared residuals; infinite where the model's run fails.
-    pub chi2: f64,
     /// Number of data.
     pub data: usize,
+    /// Sum of squared residuals; infinite where the model's run fails.
+    pub chi2: f64,
 }
 
 impl SegmentState {
@@ -56,15 +54,12 @@ impl SegmentState {
         LinkState::from(self.start)
     }
 
-    pub(super) fn recorded_state(&self) -> LinkState {
-        LinkState::from(self.shown)
+    /// First frame and the frame behind the last one.
+    pub(super) fn frames(&self) -> [usize; 2] {
+        [self.first, self.last]
     }
 
-    pub(super) fn set_start_state(&mut self, state: &LinkState) {
-        self.start = (*state).into();
-    }
-
-    /// Whether its misfit is beyond anything that noise explains.
+    /// Whether the misfit is larger than noise explains.
     pub(crate) fn is_bad(&self) -> bool {
         self.chi2 >= 2.0 * self.data as f64
     }
@@ -73,33 +68,44 @@ impl SegmentState {
 /// One accepted step of the search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Iterate {
-    /// Number of the stage.
+    /// Index of the stage.
     pub stage: usize,
-    /// Number of the step within the stage.
+    /// Number of the step within the stage, from 0.
     pub number: usize,
-    /// How often the segments of this stage were cut anew.
+    /// Number of times that this stage was repeated with new segment boundaries.
     pub cuts: usize,
-    /// How often segments that did not fit were tried from elsewhere at the end of this stage.
+    /// Number of times that bad segments of this stage were restarted from other states.
     pub rescues: usize,
-    /// Whether segments count plainly, not robustly.
+    /// Whether the cost is plain chi2, without robust weights.
     pub plain: bool,
     /// Whether the stage has converged.
     pub settled: bool,
-    /// Damping of the next step.
+    /// Damping of the next step, relative to the diagonal of the normal equations.
     pub damping: f64,
     /// Coordinates of the unknowns.
     pub point: Vec<f64>,
-    /// The segments.
+    /// Segments of all recordings.
     pub segments: Vec<SegmentState>,
-    /// Cost: that of the segments and the priors.
+    /// Cost of the segments and the priors.
     pub cost: f64,
 }
 
-/// Chi2 over degrees of freedom of an iterate.
+impl Iterate {
+    /// Number of data of all segments.
+    pub(crate) fn count_data(&self) -> usize {
+        self.segments.iter().map(|segment| segment.data).sum()
+    }
+
+    /// Number of segments that fit worse than noise explains.
+    pub(crate) fn count_bad_segments(&self) -> usize {
+        self.segments.iter().filter(|segment| segment.is_bad()).count()
+    }
+}
+
+/// Chi2 per degree of freedom, and the number of degrees of freedom.
 #[must_use]
 pub fn chi2_per_dof(at: &Iterate) -> (f64, usize) {
     let chi2: f64 = at.segments.iter().map(|segment| segment.chi2).sum();
-    let data: usize = at.segments.iter().map(|segment| segment.data).sum();
-    let dof = data.saturating_sub(4 * at.segments.len() + at.point.len()).max(1);
+    let dof = at.count_data().saturating_sub(4 * at.segments.len() + at.point.len()).max(1);
     (chi2 / dof as f64, dof)
 }

@@ -1,28 +1,30 @@
-//! The starting state of a segment, fitted with everything else held.
+//! Fit of a segment's starting state with everything else held.
 
 use super::checkpoint::SegmentState;
 use super::segment_simulation::{LinkState, RecordingModel, STATE_STEPS};
 use nalgebra::{DMatrix, DVector, Matrix4};
 use rayon::prelude::*;
+use std::borrow::Cow;
 
-/// How a segment that does not fit is tried again.
+/// When a bad segment is restarted from other states, and from which.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum RescuePolicy {
     Never,
-    /// From the state that the recording shows and from where the segment before ends, where chi2 exceeds
-    /// this many times the number of data.
+    /// Where chi2 exceeds this multiple of the number of data: from the recorded state and from the end of
+    /// the segment before.
     Beyond(f64),
-    /// Also along the two weakest directions, where chi2 exceeds what noise explains.
+    /// Where chi2 exceeds what noise explains: also along the two least determined directions.
     Thorough,
 }
 
-/// Share of the segments that may have a wrong state.
+/// Largest fraction of bad segments for which [`RescuePolicy::Beyond`] acts. Where more are bad, the unknowns
+/// are wrong and not the states.
 const MAX_RESCUED_SHARE: f64 = 0.4;
 
-/// Gain of chi2 below which a state is fitted, absolute and per datum.
+/// Gain of chi2, absolute and relative, below which the fit of a state ends.
 const MIN_CHI2_GAIN: f64 = 1e-3;
 
-/// A starting state with the residuals from there and, where they were asked for, their derivatives.
+/// A starting state with its residuals and, where needed, their derivatives.
 struct StateTrial {
     state: LinkState,
     residuals: DVector<f64>,
@@ -31,11 +33,11 @@ struct StateTrial {
 
 impl StateTrial {
     fn with_jacobian(point: &RecordingModel<'_>, frames: [usize; 2], state: LinkState) -> Option<Self> {
-        let (residuals, jacobian) = point.residuals_by_state(frames, &state)?;
-        Some(Self { state, residuals, jacobian: Some(jacobian) })
+        let linear = point.linearize_state(frames, &state)?;
+        Some(Self { state, residuals: linear.residuals, jacobian: Some(linear.by_state) })
     }
 
-    /// The same without derivatives, at a third of the cost.
+    /// A trial without derivatives, which takes a third of the time.
     fn without_jacobian(point: &RecordingModel<'_>, frames: [usize; 2], state: LinkState) -> Option<Self> {
         Some(Self { state, residuals: point.differentiable_residuals(frames, &state)?, jacobian: None })
     }
@@ -44,15 +46,15 @@ impl StateTrial {
         self.residuals.norm_squared()
     }
 
-    /// Gain from which on another step is worth its run.
+    /// Least gain that justifies another step.
     fn least_gain(&self) -> f64 {
         MIN_CHI2_GAIN * self.cost().min(self.residuals.len() as f64)
     }
 }
 
-/// Levenberg-Marquardt on the four numbers of a segment's start, at most `most` steps.
+/// Fits the four numbers of a segment's starting state by Levenberg-Marquardt, in at most `most` steps.
 pub(super) fn refine_state(point: &RecordingModel<'_>, segment: &mut SegmentState, most: usize) {
-    let frames = [segment.first, segment.last];
+    let frames = segment.frames();
     let Some(mut at) = StateTrial::with_jacobian(point, frames, segment.start_state()) else {
         segment.chi2 = f64::INFINITY;
         return;
@@ -66,11 +68,10 @@ pub(super) fn refine_state(point: &RecordingModel<'_>, segment: &mut SegmentStat
             break;
         }
     }
-    segment.set_start_state(&at.state);
-    (segment.chi2, segment.data) = (at.cost(), at.residuals.len());
+    (segment.start, segment.chi2, segment.data) = (at.state.into(), at.cost(), at.residuals.len());
 }
 
-/// A step that lowers the cost, its damping tried upwards.
+/// The first step that lowers the cost, with rising damping.
 fn lower_cost_step(
     point: &RecordingModel<'_>,
     frames: [usize; 2],
@@ -79,15 +80,11 @@ fn lower_cost_step(
     damping: &mut f64,
 ) -> Option<StateTrial> {
     const TRIALS: usize = 6;
-    let own;
     let jacobian = match &at.jacobian {
-        Some(jacobian) => jacobian,
-        None => {
-            own = point.residuals_by_state(frames, &at.state)?.1;
-            &own
-        }
+        Some(jacobian) => Cow::Borrowed(jacobian),
+        None => Cow::Owned(point.linearize_state(frames, &at.state)?.by_state),
     };
-    let normal = jacobian.transpose() * jacobian;
+    let normal = jacobian.transpose() * &*jacobian;
     let slope = jacobian.transpose() * &at.residuals;
     for trial in 0..TRIALS {
         let mut damped = normal.clone();
@@ -98,15 +95,11 @@ fn lower_cost_step(
         let tried = damped.cholesky().and_then(|c| {
             let step = c.solve(&slope);
             let state = LinkState::from_fn(|i, _| at.state[i] - step[i]);
-            // derivatives are needed where the step is taken and another follows: not where it is the last
-            // that the model expects, nor where the first trial has failed
             is_small = 2.0 * slope.dot(&step) - step.dot(&(&normal * &step)) < at.least_gain();
+            // derivatives serve the next step, which is unlikely after a last, a small or a repeated one
             let ends = is_last || is_small || trial > 0;
-            if ends {
-                StateTrial::without_jacobian(point, frames, state)
-            } else {
-                StateTrial::with_jacobian(point, frames, state)
-            }
+            let build = if ends { StateTrial::without_jacobian } else { StateTrial::with_jacobian };
+            build(point, frames, state)
         });
         let tried = tried.filter(|tried| tried.cost() < at.cost());
         if tried.is_some() {
@@ -121,13 +114,13 @@ fn lower_cost_step(
     None
 }
 
-/// Segments whose states have followed a step of the unknowns: those that fit worse than before are refined.
+/// Computes chi2 of segments after a step of the unknowns, and refines the states of those that fit worse.
 pub(super) fn update_states(points: &[RecordingModel<'_>], segments: &mut [SegmentState], most: usize) {
-    /// Rise of chi2 from which a state is refined, in its standard deviations.
+    /// Rise of chi2 above which a state is refined, in standard deviations of chi2.
     const RISE_SD: f64 = 0.05;
     segments.par_iter_mut().for_each(|segment| {
         let point = &points[segment.recording];
-        let found = point.whitened_residuals([segment.first, segment.last], &segment.start_state());
+        let found = point.whitened_residuals(segment.frames(), &segment.start_state());
         let chi2 = found.map_or(f64::INFINITY, |residuals| residuals.norm_squared());
         let allowed = segment.chi2 + RISE_SD * (2.0 * segment.data as f64).sqrt();
         segment.chi2 = chi2;
@@ -137,7 +130,7 @@ pub(super) fn update_states(points: &[RecordingModel<'_>], segments: &mut [Segme
     });
 }
 
-/// Fits the states of all segments; those that do not fit are tried from elsewhere.
+/// Fits the starting states of all segments, and rescues bad segments.
 pub(super) fn fit_states(
     points: &[RecordingModel<'_>],
     segments: &mut [SegmentState],
@@ -150,7 +143,7 @@ pub(super) fn fit_states(
     rescue_states(points, segments, most, rescue);
 }
 
-/// Tries segments that do not fit from elsewhere.
+/// Restarts bad segments from other states.
 pub(super) fn rescue_states(
     points: &[RecordingModel<'_>],
     segments: &mut [SegmentState],
@@ -168,7 +161,6 @@ pub(super) fn rescue_states(
         }
     };
     let bad = segments.iter().filter(|segment| segment.chi2 >= enough(segment)).count();
-    // (where many do not fit it is the unknowns, and not their states)
     let few = rescue == RescuePolicy::Thorough || bad as f64 <= MAX_RESCUED_SHARE * segments.len() as f64;
     if bad == 0 || !few {
         return;
@@ -180,12 +172,7 @@ pub(super) fn rescue_states(
             return;
         }
         for state in rescue_candidates(point, segment, follows, rescue) {
-            let mut tried = segment.clone();
-            tried.set_start_state(&state);
-            refine_state(point, &mut tried, most.max(6));
-            if tried.chi2 < segment.chi2 {
-                *segment = tried;
-            }
+            try_state(point, segment, &state, most.max(6));
             if segment.chi2 < enough {
                 return;
             }
@@ -193,14 +180,21 @@ pub(super) fn rescue_states(
     });
 }
 
-/// State in which the segment before each ends.
+/// Refines a segment from another state, and keeps the result where it lowers chi2.
+fn try_state(point: &RecordingModel<'_>, segment: &mut SegmentState, state: &LinkState, most: usize) {
+    let mut tried = SegmentState { start: (*state).into(), ..segment.clone() };
+    refine_state(point, &mut tried, most);
+    if tried.chi2 < segment.chi2 {
+        *segment = tried;
+    }
+}
+
+/// For every segment, the state at the end of the segment before; `None` where the two do not adjoin.
 fn previous_end_states(points: &[RecordingModel<'_>], segments: &[SegmentState]) -> Vec<Option<LinkState>> {
-    let ends: Vec<Option<LinkState>> = segments
-        .par_iter()
-        .map(|s| {
-            s.chi2.is_finite().then(|| points[s.recording].end_state([s.first, s.last], &s.start_state()))?
-        })
-        .collect();
+    let end = |s: &SegmentState| {
+        s.chi2.is_finite().then(|| points[s.recording].end_state(s.frames(), &s.start_state()))?
+    };
+    let ends: Vec<Option<LinkState>> = segments.par_iter().map(end).collect();
     let from = |k: usize| {
         let before = k.checked_sub(1)?;
         let joined =
@@ -210,17 +204,13 @@ fn previous_end_states(points: &[RecordingModel<'_>], segments: &[SegmentState])
     (0..segments.len()).map(from).collect()
 }
 
-/// Tries every segment from where the one before ends: the motion is one, and a state in another valley of a
-/// segment's chi2 is found by that.
+/// Tries every segment from the end of the segment before. The motion is continuous, so this finds states in
+/// another valley of chi2.
 pub(super) fn join_states(points: &[RecordingModel<'_>], segments: &mut [SegmentState], most: usize) {
     let follows = previous_end_states(points, segments);
     segments.par_iter_mut().zip(follows).for_each(|(segment, follows)| {
-        let Some(state) = follows else { return };
-        let mut tried = segment.clone();
-        tried.set_start_state(&state);
-        refine_state(&points[segment.recording], &mut tried, most);
-        if tried.chi2 < segment.chi2 {
-            *segment = tried;
+        if let Some(state) = follows {
+            try_state(&points[segment.recording], segment, &state, most);
         }
     });
 }
@@ -231,9 +221,9 @@ fn rescue_candidates(
     follows: Option<LinkState>,
     rescue: RescuePolicy,
 ) -> Vec<LinkState> {
-    /// Rates by which the first guess may be off, rad/s.
+    /// Errors of the recorded rates that are tried, rad/s.
     const RATES: [[f64; 2]; 4] = [[60.0, 0.0], [-60.0, 0.0], [0.0, 120.0], [0.0, -120.0]];
-    let seen = segment.recorded_state();
+    let seen = LinkState::from(segment.shown);
     let mut states = vec![seen];
     if rescue == RescuePolicy::Thorough {
         states.extend(weakest_direction_states(point, segment).unwrap_or_default());
@@ -243,10 +233,10 @@ fn rescue_candidates(
     states
 }
 
-/// States 3, 10 and 30 standard deviations along the two directions that the segment determines least.
+/// States at 3, 10 and 30 standard deviations along the two least determined directions.
 fn weakest_direction_states(point: &RecordingModel<'_>, segment: &SegmentState) -> Option<Vec<LinkState>> {
-    let (frames, state) = ([segment.first, segment.last], segment.start_state());
-    let (_, jacobian) = point.residuals_by_state(frames, &state)?;
+    let state = segment.start_state();
+    let jacobian = point.linearize_state(segment.frames(), &state)?.by_state;
     let scaled = Matrix4::from_fn(|a, b| {
         jacobian.column(a).dot(&jacobian.column(b)) * STATE_STEPS[a] * STATE_STEPS[b]
     });

@@ -1,26 +1,55 @@
-//! The search as a chain of iterates, each a pure function of the one before: what a journal keeps of one is
-//! all that a resumed search needs, and it goes on bit for bit.
+//! The search as a chain of iterates. Each is a pure function of the one before, so a search that resumes
+//! from a journal continues with the same bits.
 
 use super::checkpoint::{Iterate, SegmentState, TraceSearchSettings};
 use super::initial_states::{RescuePolicy, fit_states, join_states, rescue_states, update_states};
 use super::model::TraceModel;
-use super::normal_equations::{carry_states, damped_step, normal_equations, recording_models, segments_cost};
+use super::normal_equations::{NormalEquations, carry_states, damped_step, normal_equations};
+use super::normal_equations::{recording_models, segments_cost};
 use super::segment_simulation::{LinkState, RecordingModel};
 use super::segmentation::{SegmentBoundary, segment_boundaries};
-use super::unknowns::CameraParameters;
-use nalgebra::DVector;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 /// Most outer steps of a phase.
 pub(super) const MAX_STEPS: usize = 40;
-/// Most steps of a segment's state after one.
+/// Most steps of a segment's starting state after an outer step.
 pub(super) const MAX_STATE_STEPS: usize = 8;
 const FIRST_DAMPING: f64 = 1e-3;
 
 /// The first iterate of a search from a point.
 #[must_use]
 pub fn first_iterate(model: &TraceModel, settings: &TraceSearchSettings, point: &[f64]) -> Option<Iterate> {
-    start_stage(model, settings, 0, point.to_vec(), &[])
+    start_stage(model, settings, 0, point, &[])
+}
+
+/// Cost of segments and priors at a point.
+fn total_cost(model: &TraceModel, point: &[f64], segments: &[SegmentState], plain: bool) -> f64 {
+    segments_cost(segments, plain) + model.unknowns.prior_cost(point)
+}
+
+/// The iterate with its starting states fitted in at most `most` steps; `None` where a scene refuses its point.
+pub(super) fn refit(
+    model: &TraceModel,
+    mut at: Iterate,
+    most: usize,
+    rescue: RescuePolicy,
+) -> Option<Iterate> {
+    let points = recording_models(model, &at.point)?;
+    fit_states(&points, &mut at.segments, most, rescue);
+    at.cost = total_cost(model, &at.point, &at.segments, at.plain);
+    Some(at)
+}
+
+/// The iterate with plain cost and its starting states fitted as well as possible; `None` where a scene
+/// refuses its point.
+pub(super) fn refit_plain(model: &TraceModel, mut at: Iterate) -> Option<Iterate> {
+    let points = recording_models(model, &at.point)?;
+    fit_states(&points, &mut at.segments, MAX_STATE_STEPS, RescuePolicy::Thorough);
+    join_states(&points, &mut at.segments, MAX_STATE_STEPS);
+    at.plain = true;
+    at.cost = total_cost(model, &at.point, &at.segments, true);
+    Some(at)
 }
 
 /// The iterate after one; `None` at the end of the search.
@@ -29,32 +58,26 @@ pub fn next_iterate(model: &TraceModel, settings: &TraceSearchSettings, before: 
     if !before.settled {
         return Some(outer_step(model, before));
     }
-    let bad = before.segments.iter().filter(|segment| segment.is_bad()).count();
-    let is_last = before.stage + 1 == settings.segment_s.len();
-    // (where most of them do not fit it is not their states)
+    let bad = before.count_bad_segments();
+    let stage = before.stage + 1;
+    // (where many segments are bad, the unknowns are wrong and not the states)
     if bad > 0
         && 4 * bad <= before.segments.len()
-        && let Some(mended) = rescue_segments(model, before)
+        && let Some(rescued) = rescue_segments(model, before)
     {
-        return Some(mended);
+        return Some(rescued);
     }
-    if is_last && !before.plain && bad == 0 {
-        let mut next = Iterate { plain: true, settled: false, number: 0, ..before.clone() };
-        next.damping = FIRST_DAMPING;
-        let points = recording_models(model, &next.point)?;
-        fit_states(&points, &mut next.segments, MAX_STATE_STEPS, RescuePolicy::Thorough);
-        join_states(&points, &mut next.segments, MAX_STATE_STEPS);
-        next.cost = segments_cost(&next.segments, true) + model.unknowns.prior_cost(&next.point);
-        return Some(next);
+    if stage == settings.segment_s.len() && !before.plain && bad == 0 {
+        let next = Iterate { settled: false, number: 0, damping: FIRST_DAMPING, ..before.clone() };
+        return refit_plain(model, next);
     }
-    let stage = before.stage + 1;
     if stage < settings.segment_s.len() {
-        return start_stage(model, settings, stage, before.point.clone(), &before.segments);
+        return start_stage(model, settings, stage, &before.point, &before.segments);
     }
     resegment(model, settings, before)
 }
 
-/// The same place with the states of segments that do not fit found elsewhere, where that lowers the cost.
+/// The same point with bad segments restarted from other states, where that lowers the cost.
 fn rescue_segments(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
     const MOST_TIMES: usize = 3;
     /// Fall of the cost for which the stage goes on.
@@ -62,80 +85,68 @@ fn rescue_segments(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
     if before.rescues == MOST_TIMES {
         return None;
     }
-    let points = recording_models(model, &before.point)?;
-    let mut segments = before.segments.clone();
-    fit_states(&points, &mut segments, MAX_STATE_STEPS, RescuePolicy::Thorough);
-    let cost = segments_cost(&segments, before.plain) + model.unknowns.prior_cost(&before.point);
-    let (mended, damping) = (before.rescues + 1, FIRST_DAMPING);
-    let next =
-        Iterate { segments, cost, rescues: mended, damping, number: 0, settled: false, ..before.clone() };
-    (cost < before.cost - LEAST_GAIN).then_some(next)
+    let next = Iterate { number: 0, settled: false, damping: FIRST_DAMPING, ..before.clone() };
+    let next = Iterate { rescues: before.rescues + 1, ..next };
+    refit(model, next, MAX_STATE_STEPS, RescuePolicy::Thorough)
+        .filter(|next| next.cost < before.cost - LEAST_GAIN)
 }
 
-/// The last stage once more where its end puts the boundaries elsewhere than its beginning did: the result
-/// does not depend on the way to it. `None` where they stay.
+/// Repeats the last stage where its end moves the segment boundaries, so that the result does not depend on
+/// the path of the search. `None` where they stay.
 fn resegment(model: &TraceModel, settings: &TraceSearchSettings, before: &Iterate) -> Option<Iterate> {
     const MOST_CUTS: usize = 3;
-    let frames = |segments: &[SegmentState]| {
-        segments.iter().map(|s| (s.recording, s.first, s.last)).collect::<Vec<_>>()
-    };
     let points = recording_models(model, &before.point)?;
-    let same = frames(&cut_recordings(&points, settings.segment_s[before.stage])) == frames(&before.segments);
-    if same || before.cuts == MOST_CUTS {
+    let cut = cut_recordings(&points, settings.segment_s[before.stage]);
+    let frames = |segment: &SegmentState| (segment.recording, segment.frames());
+    if cut.iter().map(frames).eq(before.segments.iter().map(frames)) || before.cuts == MOST_CUTS {
         return None;
     }
-    let again = start_stage(model, settings, before.stage, before.point.clone(), &before.segments)?;
-    if before.plain && again.segments.iter().any(SegmentState::is_bad) {
+    let again = start_stage(model, settings, before.stage, &before.point, &before.segments)?;
+    if before.plain && again.count_bad_segments() > 0 {
         return None;
     }
-    let cost = segments_cost(&again.segments, before.plain) + model.unknowns.prior_cost(&again.point);
+    let cost = total_cost(model, &again.point, &again.segments, before.plain);
     Some(Iterate { cuts: before.cuts + 1, plain: before.plain, cost, ..again })
 }
 
-/// The first iterate of an earlier stage, from the end of a search; `None` where a scene refuses that.
-pub(super) fn restart_stage(
+/// The first iterate of a stage: new segments that start on the fitted motion of the segments `before`.
+/// `None` where a scene refuses the point.
+pub(super) fn start_stage(
     model: &TraceModel,
     settings: &TraceSearchSettings,
     stage: usize,
-    end: &Iterate,
-) -> Option<Iterate> {
-    start_stage(model, settings, stage, end.point.clone(), &end.segments)
-}
-
-/// The first iterate of a stage: new segments, their states those of the fitted motion so far.
-fn start_stage(
-    model: &TraceModel,
-    settings: &TraceSearchSettings,
-    stage: usize,
-    point: Vec<f64>,
+    point: &[f64],
     before: &[SegmentState],
 ) -> Option<Iterate> {
-    let points = recording_models(model, &point)?;
+    let points = recording_models(model, point)?;
     let mut segments = cut_recordings(&points, settings.segment_s[stage]);
     segments.par_iter_mut().for_each(|segment| {
         if let Some(state) = carry_state_over(&points[segment.recording], before, segment) {
-            segment.set_start_state(&state);
+            segment.start = state.into();
         }
     });
-    fit_states(&points, &mut segments, MAX_STATE_STEPS, RescuePolicy::Beyond(3.0));
-    let cost = segments_cost(&segments, false) + model.unknowns.prior_cost(&point);
-    let (number, plain, settled) = (0, false, segments.is_empty());
-    let (damping, cuts, mended) = (FIRST_DAMPING, 0, 0);
-    Some(Iterate { stage, number, cuts, rescues: mended, plain, settled, damping, point, segments, cost })
+    let first = Iterate {
+        stage,
+        number: 0,
+        cuts: 0,
+        rescues: 0,
+        plain: false,
+        settled: segments.is_empty(),
+        damping: FIRST_DAMPING,
+        point: point.to_vec(),
+        segments,
+        cost: f64::INFINITY,
+    };
+    refit(model, first, MAX_STATE_STEPS, RescuePolicy::Beyond(3.0))
 }
 
 /// The segments of all recordings.
 fn cut_recordings(points: &[RecordingModel<'_>], length_s: f64) -> Vec<SegmentState> {
-    points.iter().enumerate().flat_map(|(film, at)| cut_recording(at, film, &at.camera, length_s)).collect()
+    points.iter().enumerate().flat_map(|(film, at)| cut_recording(at, film, length_s)).collect()
 }
 
-fn cut_recording(
-    at: &RecordingModel<'_>,
-    film: usize,
-    view: &CameraParameters,
-    length_s: f64,
-) -> Vec<SegmentState> {
-    let starts = segment_boundaries(&at.scene, at.observation, view, length_s);
+fn cut_recording(at: &RecordingModel<'_>, film: usize, length_s: f64) -> Vec<SegmentState> {
+    let starts = segment_boundaries(&at.scene, at.observation, &at.camera, length_s);
     let end = at.observation.settings.frames[1];
     let lasts = starts.iter().skip(1).map(|next| next.frame).chain([end]);
     let segment = |(start, last): (&SegmentBoundary, usize)| SegmentState {
@@ -150,15 +161,16 @@ fn cut_recording(
     starts.iter().zip(lasts).map(segment).collect()
 }
 
-/// State at the start of a new segment on the fitted motion of an old one, where that fits.
+/// State at the start of a new segment on the fitted motion of an old segment, where the old one fits.
 fn carry_state_over(
     point: &RecordingModel<'_>,
     before: &[SegmentState],
     segment: &SegmentState,
 ) -> Option<LinkState> {
-    let old = before
-        .iter()
-        .find(|old| old.recording == segment.recording && (old.first..old.last).contains(&segment.first))?;
+    let holds = |old: &&SegmentState| {
+        old.recording == segment.recording && (old.first..old.last).contains(&segment.first)
+    };
+    let old = before.iter().find(holds)?;
     if old.chi2 >= 1.5 * old.data as f64 + 20.0 {
         return None;
     }
@@ -168,8 +180,8 @@ fn carry_state_over(
     point.end_state([old.first, segment.first], &old.start_state())
 }
 
-/// One outer step; where none lowers the cost, the states alone are fitted, and where that does not lower it
-/// either, the same iterate, settled.
+/// One outer step. Where no step of the unknowns lowers the cost, the starting states alone are fitted; where
+/// that gains nothing either, the iterate is settled.
 pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
     const TRIALS: usize = 6;
     let number = before.number + 1;
@@ -179,11 +191,11 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
         return stay();
     };
     let mut damping = before.damping;
-    // the plain phase ends where a step is a hundredth of a deviation; the robust one only leads there
+    // The plain phase ends where a step is a hundredth of a standard deviation. The robust phase only
+    // prepares it and may end earlier.
     let (least_gain, least_move) = if before.plain { (1e-4, 1e-2) } else { (1e-2, 0.3) };
-    // (both in units of a cost that no model lowers)
-    let data: usize = before.segments.iter().map(|segment| segment.data).sum();
-    let unit = (before.cost / data.max(1) as f64).max(1.0);
+    // a misfit that no model removes scales both thresholds
+    let unit = (before.cost / before.count_data().max(1) as f64).max(1.0);
     let (least_gain, least_move) = (least_gain * unit, least_move * unit.sqrt());
     for _ in 0..TRIALS {
         let tried = damped_step(model, &before.point, &at, damping)
@@ -196,7 +208,7 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
         }
         damping *= 10.0;
     }
-    match refit_states(model, before) {
+    match refit(model, before.clone(), MAX_STATE_STEPS, RescuePolicy::Beyond(3.0)) {
         Some(found) if before.cost - found.cost > least_gain => {
             Iterate { damping: FIRST_DAMPING, settled: used_up, number, ..found }
         }
@@ -204,17 +216,8 @@ pub(super) fn outer_step(model: &TraceModel, before: &Iterate) -> Iterate {
     }
 }
 
-/// The same place with all states fitted.
-fn refit_states(model: &TraceModel, before: &Iterate) -> Option<Iterate> {
-    let points = recording_models(model, &before.point)?;
-    let mut segments = before.segments.clone();
-    fit_states(&points, &mut segments, MAX_STATE_STEPS, RescuePolicy::Beyond(3.0));
-    let cost = segments_cost(&segments, before.plain) + model.unknowns.prior_cost(&before.point);
-    Some(Iterate { segments, cost, ..before.clone() })
-}
-
-/// Largest move of a coordinate in its conditional standard deviations.
-fn step_in_sds(normal: &nalgebra::DMatrix<f64>, from: &[f64], to: &[f64]) -> f64 {
+/// Largest step of a coordinate, in its standard deviations with all other coordinates held.
+fn step_in_sds(normal: &DMatrix<f64>, from: &[f64], to: &[f64]) -> f64 {
     (0..from.len()).map(|i| ((to[i] - from[i]) * normal[(i, i)].sqrt()).abs()).fold(0.0, f64::max)
 }
 
@@ -222,7 +225,7 @@ fn step_in_sds(normal: &nalgebra::DMatrix<f64>, from: &[f64], to: &[f64]) -> f64
 fn accept_if_lower(
     model: &TraceModel,
     before: &Iterate,
-    at: &super::normal_equations::NormalEquations,
+    at: &NormalEquations,
     point: Vec<f64>,
 ) -> Option<Iterate> {
     let moved = DVector::from_iterator(point.len(), point.iter().zip(&before.point).map(|(a, b)| a - b));
@@ -230,6 +233,6 @@ fn accept_if_lower(
     let points = recording_models(model, &point)?;
     update_states(&points, &mut segments, MAX_STATE_STEPS);
     rescue_states(&points, &mut segments, MAX_STATE_STEPS, RescuePolicy::Beyond(4.0));
-    let cost = segments_cost(&segments, before.plain) + model.unknowns.prior_cost(&point);
+    let cost = total_cost(model, &point, &segments, before.plain);
     (cost < before.cost).then(|| Iterate { point, segments, cost, ..before.clone() })
 }

@@ -1,8 +1,8 @@
-//! What a trace fit works on.
+//! Data and unknowns of a trace fit.
 
 use super::camera_observation::{CameraObservation, ObservationSettings};
 use super::unknowns::{CameraUnknown, TraceUnknown, TraceUnknowns, UnknownKind};
-use crate::fit::bounds::{BoundsSpacing, Prior, SearchAxis};
+use crate::fit::bounds::{BoundsSpacing, Prior};
 use crate::fit::job::{FreeParameter, HeadSource, TraceChannel};
 use crate::fit::nuisance_parameters::FreedConstant;
 use crate::fit::trace_data::TraceData;
@@ -25,32 +25,30 @@ pub struct TraceRecording {
     pub observation: CameraObservation,
 }
 
-/// Everything that decides a trace fit but the search's settings.
+/// Recordings, scenes and unknowns of a trace fit.
 #[derive(Clone)]
 pub struct TraceModel {
     pub recordings: Vec<TraceRecording>,
-    /// What is estimated besides starting states.
+    /// Unknowns besides starting states.
     pub unknowns: TraceUnknowns,
 }
 
-// A trace model from a job's scenes and recordings.
-
-/// Standard deviations of a camera's prior within which it is searched.
+/// Range of a camera's error in the search, in standard deviations of its prior.
 const CAMERA_RANGE_SD: f64 = 20.0;
 
-/// What a recording is fitted with.
+/// A recording with its scene and the settings of its fit.
 pub(crate) struct TraceSource<'a> {
     /// The scene of its condition.
     pub scene: &'a Scene,
     pub recording: &'a Recording,
-    /// Time for which the shutter is open, s.
+    /// Exposure time of a frame, s.
     pub exposure_s: f64,
-    /// What of it is fitted.
+    /// Channels, frames and priors of the fit.
     pub traced: &'a TraceData,
 }
 
 impl TraceModel {
-    /// The model of a job's traces with its free parameters and the constants that are freed.
+    /// The model of a job's traces with its free parameters and its nuisance parameters.
     ///
     /// # Errors
     /// [`HeadMotionError`] where the head that drives a model is not tracked.
@@ -72,7 +70,8 @@ impl TraceModel {
 fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotionError> {
     let TraceSource { recording, traced, exposure_s, .. } = *source;
     let mut scene = source.scene.clone();
-    if traced.head == HeadSource::Recording {
+    let own_head = traced.head == HeadSource::Recording;
+    if own_head {
         scene.drive = Drive::Recorded(Arc::new(smooth_head_motion(recording)?));
     }
     let (shared, found) = (measure_common_noise(recording), measure_noise(recording));
@@ -88,14 +87,13 @@ fn build_recording(source: &TraceSource<'_>) -> Result<TraceRecording, HeadMotio
         noise,
         frames: [traced.frames.start, traced.frames.end],
     };
-    let own_head = traced.head == HeadSource::Recording;
     let shared = [shared.tip_x, shared.head_y].map(|shared| shared.map(|shared| shared.noise_m));
     let film = CameraObservation::new(recording, &scene.drive, own_head, settings, &shared);
     Ok(TraceRecording { scene, observation: film })
 }
 
-/// Noise of a channel: the job's, or the measured one less what the other point shows of it; white noise of
-/// the size that frames differ by where it cannot be measured.
+/// Noise of a channel: the job's, otherwise the measured noise without the part that is common to both points.
+/// Where it cannot be measured, white noise from the differences between frames.
 fn channel_noise(
     traced: &TraceData,
     recording: &Recording,
@@ -103,9 +101,8 @@ fn channel_noise(
     shared: Option<&SharedNoise>,
 ) -> AutoregressiveNoise {
     let white = |sd_m: f64| {
-        // (a positive number is a standard deviation)
-        AutoregressiveNoise::white(sd_m.max(MIN_NOISE_M))
-            .unwrap_or_else(|_| unreachable!("a positive number"))
+        let noise = AutoregressiveNoise::white(sd_m.max(MIN_NOISE_M));
+        noise.unwrap_or_else(|_| unreachable!("a positive number"))
     };
     if let Some(noise_m) = traced.noise_m {
         return white(noise_m);
@@ -114,8 +111,8 @@ fn channel_noise(
         let measured = measure_quality(recording, None);
         return white(measured.head_x.noise_m.or(measured.tip_x.noise_m).unwrap_or(MIN_NOISE_M));
     };
-    // what is left of it where both points have as much noise of their own; a large share says that they
-    // have not, and then nothing is known of what is left
+    // The remaining factor assumes that both points have equal noise of their own. A large common share
+    // contradicts that, and then nothing is subtracted.
     let left = shared
         .filter(|shared| shared.share + 2.0 * shared.sd < MAX_SHARED_NOISE)
         .map_or(1.0, |shared| (1.0 - shared.share * shared.share).sqrt());
@@ -123,19 +120,19 @@ fn channel_noise(
     AutoregressiveNoise::new(sd_m, noise.coefficients().to_vec()).unwrap_or_else(|_| white(sd_m))
 }
 
-/// Share of the noise from which on the points do not have as much of their own.
+/// Common share of the noise above which the two points cannot have equal noise of their own.
 const MAX_SHARED_NOISE: f64 = 0.9;
-/// Least noise, m: simulated traces without any are written with as many digits.
+/// Least noise, m: the rounding of simulated traces without noise.
 const MIN_NOISE_M: f64 = 1e-9;
 
 fn parameter_unknown(free: &FreeParameter) -> TraceUnknown {
-    let SearchAxis { bounds, prior } = SearchAxis { bounds: free.bounds, prior: free.prior };
+    let bounds = &free.bounds;
     let unit = match bounds.spacing() {
         BoundsSpacing::Log => None,
         BoundsSpacing::Linear => Some(bounds.upper() - bounds.lower()),
     };
     let along = |value: f64| unit.map_or_else(|| math::ln(value), |unit| value / unit);
-    let prior = prior.map(|prior| match prior {
+    let prior = free.prior.map(|prior| match prior {
         Prior::Linear { mean, sd } => [along(mean), sd / unit.unwrap_or(mean)],
         Prior::Log { mean_ln, sd_ln } => [mean_ln, sd_ln],
     });
@@ -154,14 +151,14 @@ fn constant_unknown(freed: &FreedConstant) -> TraceUnknown {
     }
 }
 
-/// What is not known of a recording's camera, those of no width left out.
+/// Unknowns of a recording's camera. A quantity with a prior of zero width is not estimated.
 fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservation) -> Vec<TraceUnknown> {
     let (doubt, head) = (&source.traced.camera, source.traced.head);
     let has_drop = data.settings.head_drop;
     let tilt_rad = recorded_tilt_rad(source.recording);
     let [offset_x_m, offset_drop_m] = data.guess_offsets_m(tilt_rad);
     let with_drop = |sd: f64| if has_drop { sd } else { 0.0 };
-    [
+    let rows = [
         (CameraUnknown::OffsetX, doubt.offset_sd_m, offset_x_m),
         (CameraUnknown::OffsetDrop, with_drop(doubt.offset_sd_m), offset_drop_m),
         (CameraUnknown::DriftX, doubt.drift_sd_m_per_s, 0.0),
@@ -169,29 +166,19 @@ fn camera_unknowns(film: usize, source: &TraceSource<'_>, data: &CameraObservati
         (CameraUnknown::Scale, doubt.scale_sd, 0.0),
         (CameraUnknown::Tilt, with_drop(doubt.tilt_sd_rad), tilt_rad),
         (CameraUnknown::Clock, doubt.clock_sd_s(head), 0.0),
-    ]
-    .into_iter()
-    .filter(|(_, sd, _)| *sd > 0.0)
-    .map(|(what, sd, start)| {
-        let unit = what.coordinate_unit();
+    ];
+    let unknown = |(what, sd, start): (CameraUnknown, f64, f64)| {
+        let (kind, unit) = (UnknownKind::Camera { film, what }, what.coordinate_unit());
         let reach = CAMERA_RANGE_SD * sd / unit;
-        let start = (start / unit).clamp(-reach, reach);
-        TraceUnknown {
-            kind: UnknownKind::Camera { film, what },
-            range: [-reach, reach],
-            prior: Some([0.0, sd / unit]),
-            start,
-        }
-    })
-    .collect()
+        let (prior, start) = (Some([0.0, sd / unit]), (start / unit).clamp(-reach, reach));
+        TraceUnknown { kind, range: [-reach, reach], prior, start }
+    };
+    rows.into_iter().filter(|(_, sd, _)| *sd > 0.0).map(unknown).collect()
 }
 
-/// The tilt that the path of the tip on the glass shows, rad; 0 where it shows none.
+/// Tilt of the camera from the path of the tip on the glass, rad; 0 where it is not clear.
 fn recorded_tilt_rad(recording: &Recording) -> f64 {
-    let found = measure_tilt(
-        recording,
-        &ReversalInstants::find_instants(recording),
-        &measure_quality(recording, None),
-    );
+    let instants = ReversalInstants::find_instants(recording);
+    let found = measure_tilt(recording, &instants, &measure_quality(recording, None));
     found.ok().filter(CameraTilt::is_clear).map_or(0.0, |tilt| tilt.angle_rad)
 }

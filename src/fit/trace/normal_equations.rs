@@ -1,6 +1,6 @@
 //! Normal equations of all segments, and a step of the outer search.
 
-use super::checkpoint::SegmentState;
+use super::checkpoint::{Iterate, SegmentState};
 use super::model::TraceModel;
 use super::segment_simulation::{LinkState, RecordingModel};
 use super::variable_projection::{ProjectedSegment, project_out_state};
@@ -8,21 +8,17 @@ use crate::math;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-/// Chi2 per datum at which a segment counts half: robust while some segments may sit in a wrong state.
-pub(super) const ROBUST_CHI2: f64 = 10.0;
+/// Chi2 per datum at which a segment has half its weight, so that segments in a wrong state do not dominate.
+const ROBUST_CHI2: f64 = 10.0;
 
 /// Weight of a segment: the derivative of its robust cost.
 fn segment_weight(segment: &SegmentState, plain: bool) -> f64 {
-    match () {
-        () if !segment.chi2.is_finite() => 0.0,
-        () if plain => 1.0,
-        () => 1.0 / (1.0 + segment.chi2 / (segment.data.max(1) as f64 * ROBUST_CHI2)),
-    }
+    if plain { 1.0 } else { 1.0 / (1.0 + segment.chi2 / (segment.data.max(1) as f64 * ROBUST_CHI2)) }
 }
 
 /// Cost of all segments: `n c ln(1 + chi2/(n c))` each, or chi2 in the plain phase.
 pub(super) fn segments_cost(segments: &[SegmentState], plain: bool) -> f64 {
-    /// Chi2 per datum of a segment whose run fails.
+    /// Chi2 per datum for a segment whose run fails.
     const FAILED: f64 = 1e6;
     let one = |segment: &SegmentState| {
         let data = segment.data.max(segment.last - segment.first) as f64;
@@ -41,10 +37,8 @@ pub(super) struct NormalEquations {
 
 /// The models of all recordings at a point; `None` where a scene refuses it.
 pub(super) fn recording_models<'a>(model: &'a TraceModel, z: &[f64]) -> Option<Vec<RecordingModel<'a>>> {
-    let point = |(number, shoot): (usize, &'a super::model::TraceRecording)| {
-        RecordingModel::new(&shoot.scene, &shoot.observation, number, &model.unknowns, z)
-    };
-    model.recordings.iter().enumerate().map(point).collect()
+    let recordings = model.recordings.iter().enumerate();
+    recordings.map(|(number, shoot)| RecordingModel::new(shoot, number, &model.unknowns, z)).collect()
 }
 
 /// Normal equations at a point.
@@ -55,23 +49,18 @@ pub(super) fn normal_equations(
     plain: bool,
 ) -> Option<NormalEquations> {
     let points = recording_models(model, z)?;
-    let parts: Vec<Option<ProjectedSegment>> = segments
-        .par_iter()
-        .map(|s| {
-            let usable = s.chi2.is_finite();
-            let linear =
-                usable.then(|| points[s.recording].linearize([s.first, s.last], &s.start_state()))?;
-            project_out_state(&linear?)
-        })
-        .collect();
+    let project = |s: &SegmentState| {
+        let fits = s.chi2.is_finite();
+        project_out_state(&fits.then(|| points[s.recording].linearize(s.frames(), &s.start_state()))??)
+    };
+    let parts: Vec<Option<ProjectedSegment>> = segments.par_iter().map(project).collect();
     let n = z.len();
     let (mut total, mut slope) = (DMatrix::zeros(n, n), DVector::zeros(n));
     for (part, segment) in parts.iter().zip(segments) {
-        if let Some(part) = part {
-            let weight = segment_weight(segment, plain);
-            total += &part.matrix * weight;
-            slope += &part.slope * weight;
-        }
+        let Some(part) = part else { continue };
+        let weight = segment_weight(segment, plain);
+        total += &part.matrix * weight;
+        slope += &part.slope * weight;
     }
     for (i, unknown) in model.unknowns.0.iter().enumerate() {
         if let Some([residual, per_unit]) = unknown.prior_residual(z[i]) {
@@ -96,10 +85,7 @@ pub(super) fn damped_step(
         damped[(i, i)] += damping * at.matrix[(i, i)] + 1e-9;
     }
     let mut step = -damped.cholesky()?.solve(&at.slope);
-    let longest = (0..z.len())
-        .filter(|&i| matches!(model.unknowns.0[i].kind, super::unknowns::UnknownKind::Parameter { .. }))
-        .map(|i| step[i].abs())
-        .fold(0.0, f64::max);
+    let longest = model.unknowns.parameters().map(|i| step[i].abs()).fold(0.0, f64::max);
     if longest > LONGEST {
         step *= LONGEST / longest;
     }
@@ -107,7 +93,7 @@ pub(super) fn damped_step(
     Some(model.unknowns.clamp_to_ranges(&moved))
 }
 
-/// Segments with their states moved along with the unknowns, each by a modest step.
+/// Segments with their starting states moved along with the unknowns; the step of each state is limited.
 pub(super) fn carry_states(
     segments: &[SegmentState],
     at: &NormalEquations,
@@ -116,48 +102,40 @@ pub(super) fn carry_states(
     /// Longest move of an angle, rad, and of a rate, rad/s.
     const ANGLE: f64 = 0.05;
     const RATE: f64 = 200.0;
-    let one = |(segment, part): (&SegmentState, &Option<ProjectedSegment>)| {
-        let mut segment = segment.clone();
-        if let Some(part) = part {
-            let follow = &part.move_by_unknown * moved;
-            let step = -LinkState::from_fn(|i, _| part.move_held[i] + follow[i]);
-            let angle = ANGLE / step[0].abs().max(step[1].abs()).max(1e-9);
-            let rate = RATE / step[2].abs().max(step[3].abs()).max(1e-9);
-            let state = segment.start_state() + step * angle.min(rate).min(1.0);
-            segment.set_start_state(&state);
-        }
-        segment
-    };
-    segments.iter().zip(&at.parts).map(one).collect()
+    let mut segments = segments.to_vec();
+    for (segment, part) in segments.iter_mut().zip(&at.parts) {
+        let Some(part) = part else { continue };
+        let follow = &part.move_by_unknown * moved;
+        let step = -LinkState::from_fn(|i, _| part.move_held[i] + follow[i]);
+        let angle = ANGLE / step[0].abs().max(step[1].abs()).max(1e-9);
+        let rate = RATE / step[2].abs().max(step[3].abs()).max(1e-9);
+        segment.start = (segment.start_state() + step * angle.min(rate).min(1.0)).into();
+    }
+    segments
 }
 
-/// Covariance of the unknowns' coordinates: by the curvature of the cost, and the sandwich over segments.
+/// Covariance of the unknowns' coordinates, from the curvature of the cost and as a sandwich estimate over
+/// segments.
 #[derive(Debug, Clone)]
 pub(crate) struct TraceCovariance {
-    /// Information of the recordings and the priors.
+    /// Information matrix of the recordings and the priors.
     pub information: DMatrix<f64>,
-    /// Inverse of the information, with what is not known of the head added.
+    /// Inverse of the information, plus `heads`.
     pub curvature: DMatrix<f64>,
-    /// The same with the scatter of the segments' slopes in place of the information in the middle.
+    /// Sandwich estimate from the scatter of the segments' slopes, plus `heads`.
     pub sandwich: DMatrix<f64>,
-    /// What of both is left by the recorded heads.
+    /// Part due to errors of the recorded heads.
     pub heads: DMatrix<f64>,
 }
 
 /// Covariance at an iterate; `None` where the information is singular.
-pub(crate) fn trace_covariance(
-    model: &TraceModel,
-    at: &super::checkpoint::Iterate,
-) -> Option<TraceCovariance> {
+pub(crate) fn trace_covariance(model: &TraceModel, at: &Iterate) -> Option<TraceCovariance> {
     let found = normal_equations(model, &at.point, &at.segments, true)?;
     let curvature = found.matrix.clone().cholesky()?.inverse();
     let n = at.point.len();
     let mut middle = DMatrix::zeros(n, n);
-    let mut used = 0usize;
-    for part in found.parts.iter().flatten() {
-        middle += &part.slope * part.slope.transpose();
-        used += 1;
-    }
+    found.parts.iter().flatten().for_each(|part| middle += &part.slope * part.slope.transpose());
+    let used = found.parts.iter().flatten().count();
     middle *= used as f64 / (used as f64 - n as f64).max(1.0);
     for (i, unknown) in model.unknowns.0.iter().enumerate() {
         if let Some([_, per_unit]) = unknown.prior_residual(at.point[i]) {
@@ -169,18 +147,17 @@ pub(crate) fn trace_covariance(
     Some(TraceCovariance { information: found.matrix, curvature: curvature + &heads, sandwich, heads })
 }
 
-/// Covariance of the slopes of the cost by what is not known of the recorded heads: their curves are smooth,
-/// so that an error spans many segments and does not average out as their noise does.
-fn head_curve_covariance(model: &TraceModel, at: &super::checkpoint::Iterate) -> Option<DMatrix<f64>> {
+/// Covariance of the slopes of the cost due to errors of the recorded heads. The curves of the heads are
+/// smooth, so an error spans many segments and does not average out as noise does.
+fn head_curve_covariance(model: &TraceModel, at: &Iterate) -> Option<DMatrix<f64>> {
     let points = recording_models(model, &at.point)?;
     let n = at.point.len();
     let mut total = DMatrix::zeros(n, n);
     for (film, shoot) in model.recordings.iter().enumerate() {
         let Some(curve) = &shoot.observation.own_curve else { continue };
-        let mine: Vec<&SegmentState> =
-            at.segments.iter().filter(|s| s.recording == film && s.chi2.is_finite()).collect();
+        let mine = at.segments.par_iter().filter(|s| s.recording == film && s.chi2.is_finite());
         let parts: Vec<Option<(usize, DMatrix<f64>)>> =
-            mine.par_iter().map(|segment| head_curve_slopes(&points[film], segment)).collect();
+            mine.map(|segment| head_curve_slopes(&points[film], segment)).collect();
         let mut slopes = DMatrix::zeros(n, curve.coefficient_count());
         for (from, part) in parts.into_iter().flatten() {
             let mut place = slopes.columns_mut(from, part.ncols());
@@ -197,12 +174,11 @@ fn head_curve_covariance(model: &TraceModel, at: &super::checkpoint::Iterate) ->
     Some(total)
 }
 
-/// Slope of a segment's cost by the unknowns for every coefficient of the head's curve: the first that
-/// counts, and a column each.
+/// Change of the slope of a segment's cost by each coefficient of the head's curve: the index of the first
+/// coefficient that matters, and one column per coefficient.
 fn head_curve_slopes(point: &RecordingModel<'_>, segment: &SegmentState) -> Option<(usize, DMatrix<f64>)> {
-    let frames = [segment.first, segment.last];
-    let (from, columns) = point.observation.head_curve_derivatives(segment.first, segment.last)?;
-    let mut linear = point.linearize(frames, &segment.start_state())?;
+    let (from, columns) = point.observation.head_curve_derivatives(segment.frames())?;
+    let mut linear = point.linearize(segment.frames(), &segment.start_state())?;
     let n = linear.by_unknown.ncols();
     linear.by_unknown = DMatrix::from_fn(columns.nrows(), n + columns.ncols(), |row, k| {
         if k < n { linear.by_unknown[(row, k)] } else { columns[(row, k - n)] }

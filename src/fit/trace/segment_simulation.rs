@@ -1,11 +1,10 @@
-//! One run of the model over a segment as the camera sees it, with its derivatives.
+//! One run of the model over a segment as the camera records it, with its derivatives.
 
 use super::camera_observation::CameraObservation;
 use super::checkpoint::{Iterate, TraceSearchSettings};
-use super::initial_states::{RescuePolicy, fit_states, join_states};
-use super::levenberg_marquardt::{MAX_STATE_STEPS, first_iterate};
-use super::model::TraceModel;
-use super::normal_equations::{recording_models, segments_cost};
+use super::levenberg_marquardt::{first_iterate, refit_plain};
+use super::model::{TraceModel, TraceRecording};
+use super::normal_equations::recording_models;
 use super::unknowns::{CameraParameters, CameraUnknown, TraceUnknowns, UnknownKind};
 use crate::model::Pose;
 use crate::simulate::scene::{Scene, StartKind};
@@ -17,64 +16,58 @@ use nalgebra::{DMatrix, DVector, Vector4};
 use std::cell::RefCell;
 use std::collections::BTreeMap;
 
-/// Angles and rates of neck and lip.
+/// Angles, rad, and rates, rad/s, of neck and lip.
 pub(super) type LinkState = Vector4<f64>;
 
-/// Changes of angles, rad, and rates, rad/s, that are small against what a segment may do.
+/// Changes of angles, rad, and rates, rad/s, that are small for a segment.
 pub(super) const STATE_STEPS: [f64; 4] = [3e-5, 3e-5, 0.1, 0.1];
 /// Numbers of a starting state.
 const STATES: usize = 4;
-/// Tolerance of a segment's runs: their errors stay a thousandth of a pixel's noise.
+/// Tolerance of a segment's run: its error is a thousandth of a pixel's noise.
 const TOLERANCE: f64 = 1e-8;
-/// Accuracy of their derivatives: a step of the search needs no more.
+/// Relative accuracy of the derivatives, which is enough for a step of the search.
 const ACCURACY: f64 = 1e-5;
-/// Right-hand sides after which a segment's run is given up.
+/// Limit of right-hand sides of a segment's run.
 const MOST_EVALUATIONS: u64 = 400_000;
-/// What is added up of every frame: tip, head and drop.
+/// What is averaged over every frame: tip, head and drop.
 const CHANNELS: [Channel; 3] = [Channel::TipX, Channel::HeadX, Channel::HeadDrop];
 
 thread_local! {
-    /// The room in which this thread's runs are expanded.
+    /// Workspace of this thread's runs.
     static RUNNER: RefCell<TangentRunner> = RefCell::new(TangentRunner::with_accuracy(ACCURACY));
 }
 
-pub(super) fn state_to_pose(s: &LinkState) -> Pose {
-    Pose { theta: s[0], phi: s[1], theta_rate: s[2], phi_rate: s[3] }
-}
-
-pub(super) fn pose_to_state(pose: &Pose) -> LinkState {
-    LinkState::new(pose.theta, pose.phi, pose.theta_rate, pose.phi_rate)
-}
-
-/// What the camera sees of a run: means of tip, head and drop over the shutter, m, a row a frame, and their
-/// derivatives by every direction.
+/// A run over a segment as the camera records it.
 struct SegmentObservation {
+    /// First frame.
+    first: usize,
+    /// Number of directions of the derivatives.
+    directions: usize,
+    /// Means of tip, head and drop over the shutter, m, one row per frame.
     means: Vec<[f64; 3]>,
-    /// One row a frame of [tip, head, drop] by direction.
+    /// Derivatives of the means: by frame, then channel, then direction.
     slopes: Vec<f64>,
-    end: LinkState,
-    /// Whether there are derivatives to its end.
+    /// State at the end.
+    end: Option<LinkState>,
+    /// Whether the derivatives are known up to the end.
     is_known: bool,
 }
 
-/// Adds up what the shutter sees.
+/// Averages a run over the shutter of every frame.
 struct ShutterAverage<'a> {
     times_s: &'a [f64],
     clock_s: f64,
     half_s: f64,
     stop_s: f64,
-    directions: usize,
     frame: usize,
-    means: Vec<[f64; 3]>,
-    slopes: Vec<f64>,
     row: Vec<f64>,
-    end: Option<Pose>,
-    is_known: bool,
+    shot: SegmentObservation,
 }
 
 impl TangentObserver for ShutterAverage<'_> {
     fn observe_segment(&mut self, piece: &TangentSegment<'_>) {
-        self.is_known &= piece.is_known;
+        let shot = &mut self.shot;
+        shot.is_known &= piece.is_known;
         while let Some(time) = self.times_s.get(self.frame).map(|t| t - self.clock_s) {
             let (opens, closes) = (time - self.half_s, time + self.half_s);
             if opens > piece.end_s || (self.half_s == 0.0 && time > piece.end_s) {
@@ -87,11 +80,11 @@ impl TangentObserver for ShutterAverage<'_> {
                 (piece.weights_at(time.max(piece.start_s)), 1.0)
             };
             for (k, channel) in CHANNELS.into_iter().enumerate() {
-                self.means[self.frame][k] += share * piece.channel_value(channel, &weights);
-                if self.directions > 0 {
+                shot.means[self.frame][k] += share * piece.channel_value(channel, &weights);
+                if shot.directions > 0 {
                     piece.channel_derivatives(channel, &weights, &mut self.row);
-                    let at = (self.frame * CHANNELS.len() + k) * self.directions;
-                    for (sum, slope) in self.slopes[at..].iter_mut().zip(&self.row) {
+                    let at = (self.frame * CHANNELS.len() + k) * shot.directions;
+                    for (sum, slope) in shot.slopes[at..].iter_mut().zip(&self.row) {
                         *sum += share * slope;
                     }
                 }
@@ -102,7 +95,8 @@ impl TangentObserver for ShutterAverage<'_> {
             self.frame += 1;
         }
         if piece.end_s >= self.stop_s {
-            self.end = Some(piece.sample_at(piece.end_s).pose);
+            let pose = piece.sample_at(piece.end_s).pose;
+            shot.end = Some(LinkState::new(pose.theta, pose.phi, pose.theta_rate, pose.phi_rate));
         }
     }
 }
@@ -122,29 +116,30 @@ pub(super) struct RecordingModel<'a> {
     none: TangentSeeds,
     states: TangentSeeds,
     all: TangentSeeds,
-    /// How each unknown enters.
+    /// Effect of each unknown.
     effects: Vec<UnknownEffect>,
 }
 
-/// How an unknown enters the residuals of a recording.
+/// Effect of an unknown on the residuals of a recording.
 enum UnknownEffect {
-    /// Not at all: it is another recording's.
+    /// No effect: it belongs to another recording.
     Nowhere,
-    /// By the run: number of its direction, and derivative of that by the coordinate.
+    /// On the run: number of its direction, and derivative of the direction by the coordinate.
     Run(usize, f64),
-    /// By the picture, and for the scale by the run too: direction and its derivative by the value.
+    /// On the picture. The scale also changes the run: direction, and its derivative by the value.
     Picture(CameraUnknown, f64, Option<(usize, f64)>),
 }
 
 impl<'a> RecordingModel<'a> {
-    pub(crate) fn new(
-        base: &Scene,
-        film: &'a CameraObservation,
+    /// `None` where the scene refuses the point `z`.
+    pub(super) fn new(
+        shoot: &'a TraceRecording,
         number: usize,
         unknowns: &TraceUnknowns,
         z: &[f64],
     ) -> Option<Self> {
-        let scene = unknowns.scene_at(base, film.own_head, number, z)?;
+        let film = &shoot.observation;
+        let scene = unknowns.scene_at(&shoot.scene, film.own_head, number, z)?;
         let view = unknowns.camera_at(number, z);
         let mut directions = vec![
             TangentDirection::NeckAngle,
@@ -153,14 +148,14 @@ impl<'a> RecordingModel<'a> {
             TangentDirection::LipRate,
         ];
         let states = TangentSeeds::new(&scene, &directions).ok()?;
-        let mut enters = Vec::new();
+        let mut effects = Vec::new();
         for (unknown, z) in unknowns.0.iter().zip(z) {
             let mut direction = |direction: TangentDirection| {
                 directions.push(direction);
                 directions.len() - 1
             };
             let slope = unknown.slope(*z);
-            enters.push(match &unknown.kind {
+            effects.push(match &unknown.kind {
                 UnknownKind::Parameter { name, .. } => {
                     UnknownEffect::Run(direction(TangentDirection::Parameter(name.clone())), slope)
                 }
@@ -168,7 +163,7 @@ impl<'a> RecordingModel<'a> {
                 UnknownKind::Camera { what: CameraUnknown::Clock, .. } => {
                     UnknownEffect::Run(direction(TangentDirection::DriveDelay), slope)
                 }
-                // the picture's lengths drive the model: its own are smaller by the scale
+                // the recorded head drives the model, so true lengths are smaller by the scale
                 UnknownKind::Camera { what: CameraUnknown::Scale, .. } if film.own_head => {
                     let by_scale = -1.0 / (1.0 + view.scale);
                     let own = Some((direction(TangentDirection::DriveScale), by_scale));
@@ -177,15 +172,14 @@ impl<'a> RecordingModel<'a> {
                 UnknownKind::Camera { what, .. } => UnknownEffect::Picture(*what, slope, None),
             });
         }
-        let (none, all) =
-            (TangentSeeds::new(&scene, &[]).ok()?, TangentSeeds::new(&scene, &directions).ok()?);
-        Some(Self { observation: film, camera: view, scene, none, states, all, effects: enters })
+        let none = TangentSeeds::new(&scene, &[]).ok()?;
+        let all = TangentSeeds::new(&scene, &directions).ok()?;
+        Some(Self { observation: film, camera: view, scene, none, states, all, effects })
     }
 
-    /// The state at the end of frames `first` to before `last`: where the next segment starts. `None` where
-    /// the run ends early.
-    pub(crate) fn end_state(&self, frames: [usize; 2], state: &LinkState) -> Option<LinkState> {
-        Some(self.simulate_segment(frames, state, &self.none)?.end)
+    /// The state behind the last of `frames`, where the next segment starts. `None` where the run ends early.
+    pub(super) fn end_state(&self, frames: [usize; 2], state: &LinkState) -> Option<LinkState> {
+        self.simulate_segment(frames, state, &self.none)?.end
     }
 
     fn simulate_segment(
@@ -195,140 +189,100 @@ impl<'a> RecordingModel<'a> {
         seeds: &TangentSeeds,
     ) -> Option<SegmentObservation> {
         let (film, clock_s) = (self.observation, self.camera.clock_s);
-        let (lead, count) = (film.lead_s(), last - first);
+        let (lead, count, directions) = (film.lead_s(), last - first, seeds.len());
         let mut scene = self.scene.clone();
         scene.start_s = film.times_s[first] - clock_s - lead;
-        scene.start = StartKind::State(state_to_pose(state));
+        let [theta, phi, theta_rate, phi_rate] = (*state).into();
+        scene.start = StartKind::State(Pose { theta, phi, theta_rate, phi_rate });
         scene.run.stop_s = match film.times_s.get(last) {
             Some(next) => next - clock_s - lead,
-            // (a little longer than the last shutter)
+            // slightly longer than the last shutter
             None => film.times_s[last - 1] - clock_s + lead + 1e-9,
         };
-        let mut eye = ShutterAverage {
+        let (means, slopes) = (vec![[0.0; 3]; count], vec![0.0; count * CHANNELS.len() * directions]);
+        let mut average = ShutterAverage {
             times_s: &film.times_s[first..last],
             clock_s,
             half_s: lead,
             stop_s: scene.run.stop_s,
-            directions: seeds.len(),
             frame: 0,
-            means: vec![[0.0; 3]; count],
-            slopes: vec![0.0; count * CHANNELS.len() * seeds.len()],
-            row: vec![0.0; seeds.len()],
-            end: None,
-            is_known: true,
+            row: vec![0.0; directions],
+            shot: SegmentObservation { first, directions, means, slopes, end: None, is_known: true },
         };
         let effort = SolverOptions { most_evaluations: MOST_EVALUATIONS, ..SolverOptions::new(TOLERANCE) };
-        let run = RUNNER.with_borrow_mut(|runner| runner.run_scene(&scene, effort, seeds, &mut eye));
-        let whole = run.status == RunStatus::Completed && eye.frame == count;
-        (whole && (eye.is_known || seeds.is_empty())).then_some(())?;
-        let is_known = eye.is_known;
-        Some(SegmentObservation {
-            means: eye.means,
-            slopes: eye.slopes,
-            end: pose_to_state(&eye.end?),
-            is_known,
-        })
+        let run = RUNNER.with_borrow_mut(|runner| runner.run_scene(&scene, effort, seeds, &mut average));
+        let whole = run.status == RunStatus::Completed && average.frame == count;
+        let shot = average.shot;
+        (whole && shot.end.is_some() && (shot.is_known || seeds.is_empty())).then_some(shot)
     }
 
     /// Residuals of unit variance: the tip's frames, then the drop's.
-    pub(crate) fn whitened_residuals(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
-        let mut residuals = self.residuals_m(frames, state)?;
-        self.observation.segment_whitening(frames[0], frames[1]).whiten_column(residuals.as_mut_slice());
-        Some(residuals).filter(|r| r.iter().all(|x| x.is_finite()))
+    pub(super) fn whitened_residuals(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
+        self.whiten_residuals(frames, &self.simulate_segment(frames, state, &self.none)?)
     }
 
-    /// The same where the run has derivatives; `None` where [`Self::residuals_by_state`] has none.
-    pub(crate) fn differentiable_residuals(
+    /// Residuals of unit variance; `None` where [`Self::linearize_state`] has no derivatives.
+    pub(super) fn differentiable_residuals(
         &self,
         frames: [usize; 2],
         state: &LinkState,
     ) -> Option<DVector<f64>> {
         let shot = self.simulate_segment(frames, state, &self.none).filter(|shot| shot.is_known)?;
-        let mut residuals = self.model_minus_measured(frames[0], &shot);
-        self.observation.segment_whitening(frames[0], frames[1]).whiten_column(residuals.as_mut_slice());
+        self.whiten_residuals(frames, &shot)
+    }
+
+    fn whiten_residuals(&self, frames: [usize; 2], shot: &SegmentObservation) -> Option<DVector<f64>> {
+        let mut residuals = self.model_minus_measured(shot);
+        self.observation.segment_whitening(frames).whiten_column(residuals.as_mut_slice());
         Some(residuals).filter(|r| r.iter().all(|x| x.is_finite()))
     }
 
-    /// Model minus measured, m: the tip's frames, then the drop's.
-    pub(crate) fn residuals_m(&self, frames: [usize; 2], state: &LinkState) -> Option<DVector<f64>> {
-        Some(self.model_minus_measured(frames[0], &self.simulate_segment(frames, state, &self.none)?))
-    }
-
-    /// Residuals with their derivatives by the starting state.
-    pub(crate) fn residuals_by_state(
-        &self,
-        frames: [usize; 2],
-        state: &LinkState,
-    ) -> Option<(DVector<f64>, DMatrix<f64>)> {
-        let shot = self.simulate_segment(frames, state, &self.states)?;
-        let mut columns = DMatrix::zeros(self.observation.count_data(frames[0], frames[1]), STATES);
-        (0..STATES).for_each(|i| self.add_run_derivative(frames[0], &shot, STATES, i, 1.0, &mut columns, i));
-        let mut residuals = self.model_minus_measured(frames[0], &shot);
-        self.whiten_columns(frames, &mut residuals, [&mut columns]);
-        let finite = residuals.iter().chain(&columns).all(|x| x.is_finite());
-        finite.then_some((residuals, columns))
+    /// Residuals with their derivatives by the starting state alone; `by_unknown` is empty.
+    pub(super) fn linearize_state(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
+        self.linearize_by(frames, state, &self.states, &[])
     }
 
     /// Residuals with all derivatives.
-    pub(crate) fn linearize(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
-        let shot = self.simulate_segment(frames, state, &self.all)?;
-        let (rows, directions) = (self.observation.count_data(frames[0], frames[1]), self.all.len());
+    pub(super) fn linearize(&self, frames: [usize; 2], state: &LinkState) -> Option<LinearizedSegment> {
+        self.linearize_by(frames, state, &self.all, &self.effects)
+    }
+
+    fn linearize_by(
+        &self,
+        frames: [usize; 2],
+        state: &LinkState,
+        seeds: &TangentSeeds,
+        effects: &[UnknownEffect],
+    ) -> Option<LinearizedSegment> {
+        let shot = self.simulate_segment(frames, state, seeds)?;
+        let mut residuals = self.model_minus_measured(&shot);
+        let rows = residuals.len();
         let mut by_state = DMatrix::zeros(rows, STATES);
-        (0..STATES)
-            .for_each(|i| self.add_run_derivative(frames[0], &shot, directions, i, 1.0, &mut by_state, i));
-        let mut by_unknown = DMatrix::zeros(rows, self.effects.len());
-        for (column, enters) in self.effects.iter().enumerate() {
-            match enters {
+        for (i, column) in by_state.as_mut_slice().chunks_mut(rows.max(1)).enumerate() {
+            self.add_run_derivative(&shot, i, 1.0, column);
+        }
+        let mut by_unknown = DMatrix::zeros(rows, effects.len());
+        for (effect, column) in effects.iter().zip(by_unknown.as_mut_slice().chunks_mut(rows.max(1))) {
+            match effect {
                 UnknownEffect::Nowhere => {}
-                UnknownEffect::Run(i, slope) => {
-                    self.add_run_derivative(
-                        frames[0],
-                        &shot,
-                        directions,
-                        *i,
-                        *slope,
-                        &mut by_unknown,
-                        column,
-                    );
-                }
+                UnknownEffect::Run(i, slope) => self.add_run_derivative(&shot, *i, *slope, column),
                 UnknownEffect::Picture(what, slope, run) => {
                     if let Some((i, by_value)) = run {
-                        let slope = slope * by_value;
-                        self.add_run_derivative(
-                            frames[0],
-                            &shot,
-                            directions,
-                            *i,
-                            slope,
-                            &mut by_unknown,
-                            column,
-                        );
+                        self.add_run_derivative(&shot, *i, slope * by_value, column);
                     }
-                    self.add_picture_derivative(frames[0], &shot, *what, *slope, &mut by_unknown, column);
+                    self.add_picture_derivative(&shot, *what, *slope, column);
                 }
             }
         }
-        let mut residuals = self.model_minus_measured(frames[0], &shot);
-        self.whiten_columns(frames, &mut residuals, [&mut by_state, &mut by_unknown]);
+        let whitening = self.observation.segment_whitening(frames);
+        whitening.whiten_column(residuals.as_mut_slice());
+        whitening.whiten_columns(&mut by_state);
+        whitening.whiten_columns(&mut by_unknown);
         let finite = residuals.iter().chain(&by_state).chain(&by_unknown).all(|x| x.is_finite());
         finite.then_some(LinearizedSegment { residuals, by_state, by_unknown })
     }
 
-    fn whiten_columns<const N: usize>(
-        &self,
-        [first, last]: [usize; 2],
-        residuals: &mut DVector<f64>,
-        jacobians: [&mut DMatrix<f64>; N],
-    ) {
-        let whitening = self.observation.segment_whitening(first, last);
-        whitening.whiten_column(residuals.as_mut_slice());
-        for jacobian in jacobians {
-            let rows = jacobian.nrows().max(1);
-            jacobian.as_mut_slice().chunks_mut(rows).for_each(|column| whitening.whiten_column(column));
-        }
-    }
-
-    /// What the picture shows of a frame, tip and drop, from means of tip, head and drop.
+    /// Tip and drop in the picture, m, from the true means of tip, head and drop.
     fn project_to_picture(&self, frame: usize, [tip, head, drop]: [f64; 3]) -> [f64; 2] {
         let (film, view) = (self.observation, &self.camera);
         let scale = 1.0 + view.scale;
@@ -341,112 +295,97 @@ impl<'a> RecordingModel<'a> {
         ]
     }
 
-    fn model_minus_measured(&self, first: usize, shot: &SegmentObservation) -> DVector<f64> {
-        let mut found = DVector::zeros(self.observation.count_data(first, first + shot.means.len()));
-        self.fill_column(first, shot.means.len(), found.as_mut_slice(), |i, seen| {
-            let shown = self.project_to_picture(first + i, shot.means[i]);
+    /// Model minus measured, m: the tip's frames, then the drop's.
+    fn model_minus_measured(&self, shot: &SegmentObservation) -> DVector<f64> {
+        let mut found =
+            DVector::zeros(self.observation.count_data(shot.first, shot.first + shot.means.len()));
+        self.add_to_column(shot, found.as_mut_slice(), |i, seen| {
+            let shown = self.project_to_picture(shot.first + i, shot.means[i]);
             [shown[0] - seen[0].unwrap_or(0.0), shown[1] - seen[1].unwrap_or(0.0)]
         });
         found
     }
 
-    /// Fills a column, an entry a datum, from values in metres.
-    fn fill_column(
+    /// Adds values of tip and drop, frame by frame, to a column with one entry per datum.
+    fn add_to_column(
         &self,
-        first: usize,
-        count: usize,
+        shot: &SegmentObservation,
         column: &mut [f64],
         of: impl Fn(usize, [Option<f64>; 2]) -> [f64; 2],
     ) {
-        let film = self.observation;
-        let tips = film.tip_x_m[first..first + count].iter().flatten().count();
+        let (film, first) = (self.observation, shot.first);
+        let tips = film.tip_x_m[first..first + shot.means.len()].iter().flatten().count();
         let (tip, drop) = column.split_at_mut(tips);
         let (mut tip, mut drop) = (tip.iter_mut(), drop.iter_mut());
-        for i in 0..count {
+        for i in 0..shot.means.len() {
             let seen = [film.tip_x_m[first + i], film.drop_m[first + i]];
             let values = of(i, seen);
             for (k, column) in [&mut tip, &mut drop].into_iter().enumerate() {
                 if seen[k].is_some()
                     && let Some(entry) = column.next()
                 {
-                    *entry = values[k];
+                    *entry += values[k];
                 }
             }
         }
     }
 
     /// Adds the derivative by a direction of the run, times `slope`, to a column.
-    #[allow(clippy::too_many_arguments)] // one private place
     fn add_run_derivative(
         &self,
-        first: usize,
         shot: &SegmentObservation,
-        directions: usize,
         direction: usize,
         slope: f64,
-        columns: &mut DMatrix<f64>,
-        column: usize,
+        column: &mut [f64],
     ) {
         let (film, view) = (self.observation, &self.camera);
         let scale = 1.0 + view.scale;
-        let mut own = vec![0.0; columns.nrows()];
-        self.fill_column(first, shot.means.len(), &mut own, |i, _| {
-            let of = |k: usize| shot.slopes[(i * CHANNELS.len() + k) * directions + direction];
+        self.add_to_column(shot, column, |i, _| {
+            let of = |k: usize| shot.slopes[(i * CHANNELS.len() + k) * shot.directions + direction];
             let [tip, head, drop] = [of(0), of(1), of(2)];
             let shown = if film.own_head { 0.0 } else { scale * head };
             [slope * (shown + scale * (tip - head - view.tilt_rad * drop)), slope * scale * drop]
         });
-        columns.column_mut(column).iter_mut().zip(&own).for_each(|(sum, own)| *sum += own);
     }
 
-    /// Adds the derivative by something of the picture, times `slope`, to a column.
+    /// Adds the derivative by a quantity of the camera, times `slope`, to a column.
     fn add_picture_derivative(
         &self,
-        first: usize,
         shot: &SegmentObservation,
         what: CameraUnknown,
         slope: f64,
-        columns: &mut DMatrix<f64>,
-        column: usize,
+        column: &mut [f64],
     ) {
         let (film, view) = (self.observation, &self.camera);
         let scale = 1.0 + view.scale;
-        let mut own = vec![0.0; columns.nrows()];
-        self.fill_column(first, shot.means.len(), &mut own, |i, _| {
-            let [tip, head, drop] = shot.means[i];
+        self.add_to_column(shot, column, |i, _| {
+            let (frame, [tip, head, drop]) = (shot.first + i, shot.means[i]);
             let shown = if film.own_head { 0.0 } else { head };
             let by_value = match what {
                 CameraUnknown::OffsetX => [1.0, 0.0],
                 CameraUnknown::OffsetDrop => [0.0, 1.0],
-                CameraUnknown::DriftX => [film.after_middle_s(first + i), 0.0],
-                CameraUnknown::DriftDrop => [0.0, film.after_middle_s(first + i)],
+                CameraUnknown::DriftX => [film.after_middle_s(frame), 0.0],
+                CameraUnknown::DriftDrop => [0.0, film.after_middle_s(frame)],
                 CameraUnknown::Scale => [shown + tip - head - view.tilt_rad * drop, drop],
-                CameraUnknown::Tilt => [-scale * drop, film.centre_m - film.head_m[first + i]],
+                CameraUnknown::Tilt => [-scale * drop, film.centre_m - film.head_m[frame]],
                 CameraUnknown::Clock => [0.0; 2],
             };
             by_value.map(|by_value| slope * by_value)
         });
-        columns.column_mut(column).iter_mut().zip(&own).for_each(|(sum, own)| *sum += own);
     }
 }
 
-// How well traces fit at one point, with the starting states of the segments fitted and nothing else.
+// Misfit at one point, with nothing but the starting states fitted.
 
-/// The segments of the last stage at a point, their states where they fit best; `None` where a scene refuses
-/// the point. A function of the point alone.
+/// The segments of the last stage at a point with their best starting states; `None` where a scene refuses
+/// the point. The result depends on nothing but the point.
 pub(crate) fn fit_states_at(model: &TraceModel, segment_s: &[f64], point: &[f64]) -> Option<Iterate> {
     let last = TraceSearchSettings { segment_s: segment_s.last().copied().into_iter().collect(), twins: 0 };
-    let mut at = first_iterate(model, &last, point)?;
-    let points = recording_models(model, point)?;
-    fit_states(&points, &mut at.segments, MAX_STATE_STEPS, RescuePolicy::Thorough);
-    join_states(&points, &mut at.segments, MAX_STATE_STEPS);
-    at.plain = true;
-    at.cost = segments_cost(&at.segments, true) + model.unknowns.prior_cost(point);
-    Some(at)
+    refit_plain(model, first_iterate(model, &last, point)?)
 }
 
-/// Whitened residuals of every frame that is fitted, recording by recording, tip before head; `None` where
-/// the model has none.
+/// Whitened residuals of every fitted frame, recording by recording, tip before head. A cell is `None` where
+/// the model has no value.
 pub(crate) fn frame_residuals(model: &TraceModel, at: Option<&Iterate>) -> Vec<Option<f64>> {
     let mut known = BTreeMap::new();
     for segment in at.map(|at| segment_residuals(model, at)).unwrap_or_default() {
@@ -454,8 +393,7 @@ pub(crate) fn frame_residuals(model: &TraceModel, at: Option<&Iterate>) -> Vec<O
         known.extend(segment.frames.iter().map(place).zip(segment.whitened.iter().copied()));
     }
     let films = model.recordings.iter().enumerate().flat_map(|(film, shoot)| {
-        let [first, last] = shoot.observation.settings.frames;
-        let [tip, drop] = shoot.observation.data_frames(first, last);
+        let [tip, drop] = shoot.observation.data_frames(shoot.observation.settings.frames);
         let of = move |is_drop: bool| move |frame: usize| (film, is_drop, frame);
         tip.into_iter().map(of(false)).chain(drop.into_iter().map(of(true)))
     });
@@ -467,46 +405,42 @@ pub(crate) fn frame_residuals(model: &TraceModel, at: Option<&Iterate>) -> Vec<O
 /// Residuals of one channel over one segment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SegmentResiduals {
-    /// Number of the recording.
+    /// Index of the recording.
     pub recording: usize,
-    /// Number of the segment in the iterate.
+    /// Index of the segment in the iterate.
     pub segment: usize,
-    /// Whether it is the head's drop, and not the tip's place along the sweep.
+    /// Whether the channel is the head's drop; otherwise it is the tip's position along the sweep.
     pub is_drop: bool,
-    /// Frames with data, rising.
+    /// Frames with data, in rising order.
     pub frames: Vec<usize>,
     /// Model minus measured, m.
     pub residual_m: Vec<f64>,
-    /// The same in standard deviations of the noise, without the correlation of the noise.
+    /// Residuals in standard deviations of the noise, without its correlation.
     pub whitened: Vec<f64>,
 }
 
-/// Residuals of every segment and channel with data at an iterate; those of a segment whose run fails are
-/// left out.
+/// Residuals of every segment and channel with data. A segment whose run fails is left out.
 #[must_use]
 pub fn segment_residuals(model: &TraceModel, at: &Iterate) -> Vec<SegmentResiduals> {
     let Some(points) = recording_models(model, &at.point) else { return Vec::new() };
     let mut found = Vec::new();
     for (number, segment) in at.segments.iter().enumerate() {
-        let film = &model.recordings[segment.recording].observation;
-        let (point, range) = (&points[segment.recording], [segment.first, segment.last]);
-        let Some(all_m) = point.residuals_m(range, &segment.start_state()) else { continue };
+        let (point, range) = (&points[segment.recording], segment.frames());
+        let Some(shot) = point.simulate_segment(range, &segment.start_state(), &point.none) else { continue };
+        let all_m = point.model_minus_measured(&shot);
         let mut all = all_m.clone();
-        film.segment_whitening(segment.first, segment.last).whiten_column(all.as_mut_slice());
-        let [tip, drop] = film.data_frames(segment.first, segment.last);
+        point.observation.segment_whitening(range).whiten_column(all.as_mut_slice());
+        let [tip, drop] = point.observation.data_frames(range);
         let split = tip.len();
         for (is_drop, frames, part) in [(false, tip, 0..split), (true, drop, split..all.len())] {
             if !frames.is_empty() {
-                let (residual_m, whitened) =
-                    (all_m.as_slice()[part.clone()].to_vec(), all.as_slice()[part].to_vec());
-                let (film, segment) = (segment.recording, number);
                 found.push(SegmentResiduals {
-                    recording: film,
-                    segment,
+                    recording: segment.recording,
+                    segment: number,
                     is_drop,
                     frames,
-                    residual_m,
-                    whitened,
+                    residual_m: all_m.as_slice()[part.clone()].to_vec(),
+                    whitened: all.as_slice()[part].to_vec(),
                 });
             }
         }

@@ -1,4 +1,4 @@
-//! Where segments begin, and the states in which a recording shows the blade there.
+//! Boundaries of segments, and the blade's states there as estimated from the recording.
 
 use super::camera_observation::CameraObservation;
 use super::segment_simulation::LinkState;
@@ -8,24 +8,24 @@ use crate::model::Linkage;
 use crate::simulate::scene::Scene;
 use nalgebra::{DMatrix, DVector};
 
-/// Least angle between the links from which the two coordinates of the tip give both angles: a straight
-/// blade hides it.
+/// Least angle between the links at which the tip's two coordinates determine both angles; a nearly straight
+/// blade does not.
 const MIN_BEND_RAD: f64 = 0.15;
-/// Least speed of the tip over the glass at which it counts as sliding, m/s: in stick the state is bound to
-/// three dimensions.
+/// Least speed of the tip over the glass that counts as sliding, m/s. In stick, the state has only three
+/// degrees of freedom.
 const MIN_SPEED_M_PER_S: f64 = 0.05;
-/// Time on either side of a frame from which its rates are taken, s: a third of a stick-slip cycle.
+/// Half width of the window in which rates are fitted, s: a third of a stick-slip cycle.
 const HALF_WIDTH_S: f64 = 3.5e-4;
 
-/// A frame at which a segment may begin, with the state that the recording shows.
+/// A frame at which a segment may begin, with the blade's state there.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SegmentBoundary {
     pub frame: usize,
     pub state: LinkState,
 }
 
-/// Boundaries about `length_s` apart, each the frame nearest to its place at which the tip slides and the
-/// blade is bent. (The fastest frame nearby would be the one with the largest noise.)
+/// Boundaries about `length_s` apart. Each is the nearest frame to its nominal position at which the tip slides
+/// and the blade is bent. (To choose the fastest frame nearby would select for large noise.)
 pub(super) fn segment_boundaries(
     scene: &Scene,
     film: &CameraObservation,
@@ -34,7 +34,7 @@ pub(super) fn segment_boundaries(
 ) -> Vec<SegmentBoundary> {
     let [from, to] = film.settings.frames;
     let step = ((length_s * film.rate_hz).round() as usize).max(4);
-    // (rates from one side alone are far off)
+    // one-sided windows give poor rates
     let inner = half_width_frames(film)..film.times_s.len().saturating_sub(half_width_frames(film));
     let usable = |frame: usize| -> Option<SegmentBoundary> {
         inner.contains(&frame).then_some(())?;
@@ -63,8 +63,8 @@ pub(super) fn segment_boundaries(
     found
 }
 
-/// State at the beginning of a frame's shutter as a parabola through the frames around shows it, and the
-/// tip's speed over the glass, m/s.
+/// State at the opening of a frame's shutter, from parabolas through the neighbouring frames, and the tip's
+/// speed over the glass, m/s.
 fn recorded_state(
     scene: &Scene,
     film: &CameraObservation,
@@ -93,7 +93,7 @@ fn recorded_state(
             LinkState::new(theta, phi, theta_rate, phi_rate)
         }
         None => {
-            /// Relative change of the lean from which the path of static poses is differentiated.
+            /// Relative change of the lean for the numerical derivative along the static poses.
             const NEXT: f64 = 0.02;
             let [theta, phi] = equilibrium_angles(linkage, lean)?;
             let [theta_next, phi_next] = equilibrium_angles(linkage, lean * (1.0 + NEXT))?;
@@ -104,13 +104,13 @@ fn recorded_state(
     Some((state, speed))
 }
 
-/// Frames on either side of one from which its rates are taken.
+/// Half width of the window in which rates are fitted, in frames.
 fn half_width_frames(film: &CameraObservation) -> usize {
     ((HALF_WIDTH_S * film.rate_hz).round() as usize).max(1)
 }
 
-/// Value and slope, per second, at the beginning of a frame's shutter, of the parabola (or line) that fits
-/// the frames around.
+/// Value and slope, per second, at the opening of a frame's shutter, of the parabola (or line) through the
+/// neighbouring frames.
 fn fit_parabola(
     film: &CameraObservation,
     frame: usize,
@@ -131,10 +131,10 @@ fn fit_parabola(
     Some((found[0], found[1] * film.rate_hz))
 }
 
-/// Angles of both links that put the tip `lean` along the sweep from the head and drop the head by `drop`,
-/// the lip trailing; `None` out of reach.
+/// Angles of both links, with trailing lip, for which the tip is `lean` from the head along the sweep and the
+/// head has dropped by `drop`; `None` out of reach.
 fn link_angles(linkage: &Linkage, lean: f64, drop: f64) -> Option<[f64; 2]> {
-    /// A straight blade may look longer than it is by noise.
+    /// Largest cosine that is accepted: noise may make a straight blade look too long.
     const REACH: f64 = 1.02;
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
     let height = l1 + l2 - drop;
@@ -147,7 +147,7 @@ fn link_angles(linkage: &Linkage, lean: f64, drop: f64) -> Option<[f64; 2]> {
     Some([theta, theta + bend])
 }
 
-/// Rates of both links from those of lean and drop.
+/// Rates of both links from the rates of lean and drop.
 fn link_rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_rate: f64) -> [f64; 2] {
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
     let determinant = l1 * l2 * math::sin(phi - theta);
@@ -157,10 +157,10 @@ fn link_rates(linkage: &Linkage, [theta, phi]: [f64; 2], lean_rate: f64, drop_ra
     ]
 }
 
-/// Angles at which springs, preload and whatever friction balance with the tip `lean` from the head: where
-/// the drop is not seen.
+/// Angles of static equilibrium, with whatever friction it needs, for which the tip is `lean` from the head.
+/// They stand in where the drop is not tracked.
 fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
-    /// Angles of the neck that are looked at.
+    /// Range and number of neck angles that are searched.
     const LARGEST_RAD: f64 = 0.7;
     const POINTS: usize = 140;
     let side = 1f64.copysign(lean);
@@ -186,16 +186,18 @@ fn equilibrium_angles(linkage: &Linkage, lean: f64) -> Option<[f64; 2]> {
     Some([low, phi_of(low)?])
 }
 
-/// Moment left on the neck at rest when friction balances the lip.
+/// Residual moment on the neck at rest when friction balances the lip.
 fn neck_moment(linkage: &Linkage, theta: f64, phi: f64) -> f64 {
     let (l1, l2) = (linkage.l1_m, linkage.l2_m);
     let drop = l1 * (1.0 - math::cos(theta)) + l2 * (1.0 - math::cos(phi));
     let normal = linkage.head.stiffness * (linkage.preload_displacement_m - drop);
     let lip = linkage.lip.stiffness * (phi - theta);
     let friction = (lip - normal * l2 * math::sin(phi)) / (l2 * math::cos(phi));
-    let shoulder = linkage.shoulder.map_or(0.0, |s| s.moment(theta, 0.0, s.contact_at(theta).angle_sign()));
-    let leans = linkage.shoulder.is_some_and(|s| s.contact_at(theta).angle_sign() != 0.0);
-    linkage.neck.stiffness * theta + if leans { shoulder } else { 0.0 }
+    let shoulder = linkage.shoulder.map_or(0.0, |s| match s.contact_at(theta).angle_sign() {
+        0.0 => 0.0,
+        sign => s.moment(theta, 0.0, sign),
+    });
+    linkage.neck.stiffness * theta + shoulder
         - lip
         - normal * l1 * math::sin(theta)
         - friction * l1 * math::cos(theta)

@@ -1,11 +1,11 @@
-//! What begins at the best end of a search: where shorter segments lead from there, how far the cost itself
-//! lets each parameter go, and twins.
+//! Runs from the best end of a search that measure uncertainty: one with shorter segments, one to either side
+//! of every parameter (profile), and twins (parametric bootstrap).
 
 use super::checkpoint::{Checkpoint, Iterate, TraceSearchSettings, chi2_per_dof};
-use super::initial_states::{RescuePolicy, fit_states};
-use super::levenberg_marquardt::{outer_step, restart_stage};
-use super::model::TraceModel;
-use super::normal_equations::{TraceCovariance, recording_models, segments_cost, trace_covariance};
+use super::initial_states::RescuePolicy;
+use super::levenberg_marquardt::{outer_step, refit, start_stage};
+use super::model::{TraceModel, TraceRecording};
+use super::normal_equations::{TraceCovariance, trace_covariance};
 use super::segment_simulation::{SegmentResiduals, segment_residuals};
 use crate::math;
 use crate::math::StandardNormal;
@@ -18,29 +18,30 @@ use std::borrow::Cow;
 /// Standard deviations of a two-sided 95 % interval.
 pub(super) const Z_95: f64 = 1.959_963_984_540_054;
 
-/// Starts that are tried, at most, until two of them end at the same place.
+/// Most starts; a search ends sooner where two of them end at the same point.
 pub(crate) const MAX_STARTS: usize = 6;
 
 /// Most twins of a search.
 pub(crate) const MAX_TWINS: usize = 1000;
-/// What a chain is for.
+
+/// Purpose of a run from the best end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum UncertaintyRun {
-    /// A twin of the data, fitted again.
+    /// A fit to twin data.
     Twin(usize),
-    /// The segments of the stage before, from the end.
+    /// A fit with the segments of the previous stage.
     Shorter,
-    /// An unknown away from its estimate, with everything else fitted again.
+    /// A fit with one unknown pinned away from its estimate.
     Side {
-        /// Number of the unknown.
+        /// Index of the unknown.
         unknown: usize,
-        /// Whether it is above the estimate.
+        /// Whether it is pinned above the estimate.
         above: bool,
     },
 }
 
 impl UncertaintyRun {
-    /// Number of its chain, behind those of the starts.
+    /// Number of its chain, behind the chains of the starts.
     pub(crate) fn chain_number(self) -> usize {
         MAX_STARTS
             + match self {
@@ -50,7 +51,7 @@ impl UncertaintyRun {
             }
     }
 
-    /// What the chain with a number is for; `None` for a start.
+    /// The run of the chain with this number; `None` for a start.
     pub(crate) fn from_chain_number(chain: usize) -> Option<Self> {
         let number = chain.checked_sub(MAX_STARTS)?;
         Some(match number.checked_sub(MAX_TWINS) {
@@ -64,38 +65,35 @@ impl UncertaintyRun {
         matches!(self, Self::Twin(_))
     }
 
-    /// Steps of its chain, at most: it begins near its end, where the linear model nearly holds.
-    fn max_steps(self) -> usize {
-        match self {
+    /// Whether its chain ends with an iterate. Few steps suffice, because a run begins near its end, where
+    /// the linear model nearly holds.
+    fn is_complete(self, last: &Iterate) -> bool {
+        let max_steps = match self {
             Self::Twin(_) => 4,
             Self::Shorter => 6,
             Self::Side { .. } => 1,
-        }
-    }
-
-    /// Whether its chain ends with an iterate.
-    pub(super) fn is_complete(self, last: &Iterate) -> bool {
-        last.settled || last.number >= self.max_steps()
+        };
+        last.settled || last.number >= max_steps
     }
 }
 
-/// The end of a search, and what its branches need to know of it.
+/// The best end of a search with its covariance: where uncertainty runs start.
 pub(crate) struct SearchEnd<'a> {
     pub model: &'a TraceModel,
-    /// How it was searched.
+    /// Settings of the search.
     pub settings: &'a TraceSearchSettings,
     /// Seed of the job.
     pub seed: u64,
     pub at: &'a Iterate,
     pub covariance: TraceCovariance,
-    /// Factor on variances: noise that is larger than measured widens everything.
+    /// Factor on variances, at least 1: chi2 per degree of freedom, for noise that is larger than measured.
     pub widening: f64,
-    /// Standard deviation of each coordinate by curvature and segments.
+    /// Standard deviation of each coordinate: the larger of curvature and sandwich.
     pub sd: Vec<f64>,
 }
 
 impl<'a> SearchEnd<'a> {
-    /// `None` where the recordings do not determine the unknowns there.
+    /// `None` where the information is singular.
     pub(crate) fn new(
         model: &'a TraceModel,
         settings: &'a TraceSearchSettings,
@@ -109,119 +107,114 @@ impl<'a> SearchEnd<'a> {
         Some(Self { model, settings, seed, at, covariance, widening, sd })
     }
 
-    /// The branches that it has: none where some segments do not fit.
+    /// The runs from this end; empty where some segments are bad.
     pub(super) fn uncertainty_runs(&self) -> Vec<UncertaintyRun> {
         if !self.at.plain {
             return Vec::new();
         }
         let shorter = (self.at.stage > 0).then_some(UncertaintyRun::Shorter);
-        let parameters = (0..self.at.point.len()).filter(|&i| self.model.unknowns.is_parameter(i));
-        let sides =
-            parameters.flat_map(|unknown| [false, true].map(|above| UncertaintyRun::Side { unknown, above }));
+        let sides = |unknown| [false, true].map(|above| UncertaintyRun::Side { unknown, above });
+        let sides = self.model.unknowns.parameters().flat_map(sides);
         shorter.into_iter().chain(sides).chain((0..self.settings.twins).map(UncertaintyRun::Twin)).collect()
     }
 
-    /// How far an unknown is moved to look at the cost there.
-    pub(super) fn profile_offset(&self, unknown: usize, above: bool) -> f64 {
+    /// Distance from the estimate, in the coordinate, at which an unknown is pinned.
+    fn profile_offset(&self, unknown: usize, above: bool) -> f64 {
         let far = Z_95 * self.sd.get(unknown).copied().unwrap_or_default();
         if above { far } else { -far }
     }
-}
 
-// The chains of iterates behind the best end of a search, which know nothing of each other.
-
-/// Chains that are made together: the order of the iterates does not depend on the number of threads, and no
-/// more of them are lost when the program is killed.
-const RUNS_TOGETHER: usize = 8;
-
-impl<'a> SearchEnd<'a> {
-    /// The iterate of a branch after one, and the first one; `None` at its end.
-    pub(crate) fn next_iterate(&self, branch: UncertaintyRun, before: Option<&Iterate>) -> Option<Iterate> {
-        if before.is_some_and(|before| branch.is_complete(before)) {
+    /// The first iterate of a run, or the one after `before`; `None` at its end.
+    pub(crate) fn next_iterate(&self, run: UncertaintyRun, before: Option<&Iterate>) -> Option<Iterate> {
+        if before.is_some_and(|before| run.is_complete(before)) {
             return None;
         }
-        let root = self.run_start(branch);
-        Some(before.map_or(root.first, |before| outer_step(&root.model, before)))
+        let (model, first) = self.start_run(run);
+        Some(before.map_or(first, |before| outer_step(&model, before)))
     }
 
-    fn run_start(&self, branch: UncertaintyRun) -> RunStart<'a> {
-        let (model, first) = match branch {
+    /// The model of a run and its first iterate.
+    fn start_run(&self, run: UncertaintyRun) -> RunStart<'a> {
+        let at = Iterate { plain: true, settled: false, ..self.at.clone() };
+        let (model, first) = match run {
             UncertaintyRun::Twin(draw) => {
-                let (model, first) = simulate_twin(self, draw);
-                (Cow::Owned(model), first)
+                let twin = simulate_twin(self, draw);
+                let first = refit(&twin, at, TWIN_STATE_STEPS, RescuePolicy::Never);
+                (Cow::Owned(twin), first)
             }
             UncertaintyRun::Shorter => {
-                let first =
-                    restart_stage(self.model, self.settings, self.at.stage.saturating_sub(1), self.at);
-                (Cow::Borrowed(self.model), first)
+                let stage = at.stage.saturating_sub(1);
+                (
+                    Cow::Borrowed(self.model),
+                    start_stage(self.model, self.settings, stage, &at.point, &at.segments),
+                )
             }
             UncertaintyRun::Side { unknown, above } => {
-                let (model, first) = pin_unknown(self, unknown, self.profile_offset(unknown, above));
-                (Cow::Owned(model), first)
+                let (pinned, point) = pin_unknown(self, unknown, self.profile_offset(unknown, above));
+                let first = refit(&pinned, Iterate { point, ..at }, 2, RescuePolicy::Never);
+                (Cow::Owned(pinned), first)
             }
         };
-        // (a place that the scene refuses is an end too, which nothing is read from)
-        let nowhere = || Iterate { cost: f64::MAX, settled: true, ..self.at.clone() };
-        RunStart { model, first: Iterate { number: 0, ..first.unwrap_or_else(nowhere) } }
+        // where the scene refuses the point, the run ends at once and its cost marks it as failed
+        let failed = || Iterate { cost: f64::MAX, settled: true, ..self.at.clone() };
+        (model, Iterate { number: 0, ..first.unwrap_or_else(failed) })
     }
 }
 
-/// Where a branch begins.
-struct RunStart<'a> {
-    model: Cow<'a, TraceModel>,
-    first: Iterate,
-}
+/// Number of runs that are computed together. It is fixed, so the order of the iterates does not depend on
+/// the number of threads.
+const RUNS_TOGETHER: usize = 8;
 
-/// A branch on its way.
+/// Model and first iterate of a run.
+type RunStart<'a> = (Cow<'a, TraceModel>, Iterate);
+
+/// A run with its iterates so far.
 struct RunProgress<'a> {
-    branch: UncertaintyRun,
-    root: Option<RunStart<'a>>,
+    run: UncertaintyRun,
+    start: Option<RunStart<'a>>,
     place: usize,
     last: Option<Iterate>,
 }
 
-impl RunProgress<'_> {
+impl<'a> RunProgress<'a> {
     fn is_open(&self) -> bool {
-        !self.last.as_ref().is_some_and(|last| self.branch.is_complete(last))
+        self.last.as_ref().is_none_or(|last| !self.run.is_complete(last))
     }
 
     fn accept_iterate(&mut self, next: Iterate) {
         (self.last, self.place) = (Some(next), self.place + 1);
     }
-}
 
-impl<'a> RunProgress<'a> {
     fn next_iterate(&mut self, end: &SearchEnd<'a>) -> Iterate {
-        let root = self.root.get_or_insert_with(|| end.run_start(self.branch));
-        self.last.as_ref().map_or_else(|| root.first.clone(), |last| outer_step(&root.model, last))
+        let (model, first) = self.start.get_or_insert_with(|| end.start_run(self.run));
+        self.last.as_ref().map_or_else(|| first.clone(), |last| outer_step(model, last))
     }
 }
 
-/// Follows branches to their ends, several at once: the last iterate of each, in order, where the scene does
-/// not refuse every place of it. `None` where it was asked to stop.
+/// Follows runs to their ends, several at once. Returns the last iterate of each, in order; an entry is `None`
+/// where the scene refuses its first point. Returns `None` where the checkpoint asks to stop.
 pub(super) fn follow_runs(
     end: &SearchEnd<'_>,
-    branches: &[UncertaintyRun],
+    runs: &[UncertaintyRun],
     keep: &mut dyn Checkpoint,
 ) -> Option<Vec<Option<Iterate>>> {
     let mut ends = Vec::new();
-    // (twins are behind the others also where they are wanted later)
-    let kinds = branches.chunk_by(|a, b| a.is_twin() == b.is_twin());
-    for branches in kinds.flat_map(|kind| kind.chunks(RUNS_TOGETHER)) {
-        let begun =
-            |branch: &UncertaintyRun| RunProgress { branch: *branch, root: None, place: 0, last: None };
-        let mut ways: Vec<RunProgress<'_>> = branches.iter().map(begun).collect();
+    // twins form groups of their own, so that adding twins later leaves the order of the other iterates
+    let kinds = runs.chunk_by(|a, b| a.is_twin() == b.is_twin());
+    for runs in kinds.flat_map(|kind| kind.chunks(RUNS_TOGETHER)) {
+        let begin = |run: &UncertaintyRun| RunProgress { run: *run, start: None, place: 0, last: None };
+        let mut ways: Vec<RunProgress<'_>> = runs.iter().map(begin).collect();
         while ways.iter().any(RunProgress::is_open) {
             let mut due: Vec<&mut RunProgress<'_>> = Vec::new();
             for way in ways.iter_mut().filter(|way| way.is_open()) {
-                match keep.find_iterate(way.branch.chain_number(), way.place) {
+                match keep.find_iterate(way.run.chain_number(), way.place) {
                     Some(known) => way.accept_iterate(known),
                     None => due.push(way),
                 }
             }
             let made: Vec<Iterate> = due.par_iter_mut().map(|way| way.next_iterate(end)).collect();
             for (way, made) in due.into_iter().zip(made) {
-                if keep.store_iterate(way.branch.chain_number(), way.place, &made).is_break() {
+                if keep.store_iterate(way.run.chain_number(), way.place, &made).is_break() {
                     return None;
                 }
                 way.accept_iterate(made);
@@ -232,17 +225,16 @@ pub(super) fn follow_runs(
     Some(ends)
 }
 
-// How far the cost itself lets a parameter go: the ends of an interval by curvature, looked at with
-// everything else fitted again.
+// Profile of the cost: one point on either side of every parameter, with everything else refitted.
 
-/// Deviation of the pin, in those of the parameter.
+/// Standard deviation of the pin, relative to that of the parameter.
 const PIN_SD: f64 = 1e-3;
-/// Furthest that an end is moved outwards, in its distance by curvature.
+/// Largest factor by which the profile widens an interval beyond the curvature.
 const MAX_STRETCH: f64 = 3.0;
 
-/// Distances from the estimates at which the cost has risen by what 95 % take, below and above, in the
-/// coordinate; at least those of the curvature, and those for an unknown of which no side was looked at.
-/// `sides` gives the last iterate of each branch.
+/// Distances below and above each estimate, in the coordinate, at which the cost reaches the 95 % threshold.
+/// They are never less than the curvature gives, and equal to it for an unknown without side runs. `sides`
+/// gives the last iterate of a run.
 pub(super) fn profile_distances<'s>(
     end: &SearchEnd<'_>,
     sides: impl Fn(UncertaintyRun) -> Option<&'s Iterate>,
@@ -253,7 +245,6 @@ pub(super) fn profile_distances<'s>(
             let moved = end.profile_offset(unknown, above);
             let found = sides(UncertaintyRun::Side { unknown, above });
             let risen = found.map(|at| cost_rise(end, unknown, moved, at)).filter(|risen| risen.is_finite());
-            // (a run that fails there stands for a rise)
             let stretch = risen.map_or(1.0, |risen| (rise / risen.max(1e-9)).sqrt());
             moved.abs() * stretch.clamp(1.0, MAX_STRETCH)
         })
@@ -261,62 +252,51 @@ pub(super) fn profile_distances<'s>(
     (0..end.at.point.len()).map(one).collect()
 }
 
-/// Where unknown `i` is pinned.
-fn pin_prior(end: &SearchEnd<'_>, i: usize, moved: f64) -> (f64, f64) {
-    (end.at.point[i] + moved, PIN_SD * end.covariance.curvature[(i, i)].sqrt())
+/// Mean and standard deviation of the prior that pins unknown `i`.
+fn pin_prior(end: &SearchEnd<'_>, i: usize, moved: f64) -> [f64; 2] {
+    [end.at.point[i] + moved, PIN_SD * end.covariance.curvature[(i, i)].sqrt()]
 }
 
-/// The model with unknown `i` pinned away from its estimate, and where the valley is thought to lie then.
-pub(super) fn pin_unknown(end: &SearchEnd<'_>, i: usize, moved: f64) -> (TraceModel, Option<Iterate>) {
+/// The model with unknown `i` pinned away from its estimate, and the minimum that the linear model predicts.
+fn pin_unknown(end: &SearchEnd<'_>, i: usize, moved: f64) -> (TraceModel, Vec<f64>) {
     let covariance = &end.covariance.curvature;
     let mut pinned = end.model.clone();
-    let (at, sd) = pin_prior(end, i, moved);
     if let Some(unknown) = pinned.unknowns.0.get_mut(i) {
-        unknown.prior = Some([at, sd]);
+        unknown.prior = Some(pin_prior(end, i, moved));
     }
     let along = |k: usize| end.at.point[k] + covariance[(k, i)] / covariance[(i, i)] * moved;
     let point: Vec<f64> = (0..end.at.point.len()).map(along).collect();
     let point = pinned.unknowns.clamp_to_ranges(&point);
-    let mut segments = end.at.segments.clone();
-    let first = recording_models(&pinned, &point).map(|points| {
-        fit_states(&points, &mut segments, 2, RescuePolicy::Never);
-        let cost = segments_cost(&segments, true) + pinned.unknowns.prior_cost(&point);
-        Iterate { point, segments, cost, plain: true, settled: false, ..end.at.clone() }
-    });
-    (pinned, first)
+    (pinned, point)
 }
 
-/// By how much the cost rises to an iterate with unknown `i` pinned, without what the pin itself costs.
+/// Rise of the cost to an iterate with unknown `i` pinned, without the cost of the pin.
 fn cost_rise(end: &SearchEnd<'_>, i: usize, moved: f64, at: &Iterate) -> f64 {
-    let (pinned_at, sd) = pin_prior(end, i, moved);
+    let [pinned_at, sd] = pin_prior(end, i, moved);
     let prior = end.model.unknowns.0[i].prior;
     let own = prior.map_or(0.0, |[mean, sd]| math::powi((at.point[i] - mean) / sd, 2));
     at.cost - math::powi((at.point[i] - pinned_at) / sd, 2) + own - end.at.cost
 }
 
-// Parametric bootstrap of a trace fit: the data of the best end with other noise, fitted again from there
-// (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6).
+// Parametric bootstrap (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6): the model at
+// the best end with new noise, refitted from there.
 
-/// Steps of a segment's state before the first.
+/// Steps of a segment's starting state before the first outer step.
 const TWIN_STATE_STEPS: usize = 3;
-/// Frames before the first after which correlated noise has forgotten how it began.
+/// Frames after which correlated noise has forgotten its start.
 const NOISE_WARM_UP_FRAMES: usize = 400;
 
-/// Twin number `draw` of the data at the end of a search, and that end with its states fitted to it.
-pub(super) fn simulate_twin(end: &SearchEnd<'_>, draw: usize) -> (TraceModel, Option<Iterate>) {
+/// Twin number `draw` of the data at the end of a search.
+fn simulate_twin(end: &SearchEnd<'_>, draw: usize) -> TraceModel {
     let SearchEnd { model, at, .. } = end;
     let mut generator = Xoshiro256PlusPlus::seed_from_u64(end.seed ^ ((draw as u64 + 1) << 40));
     let mut twin = TraceModel::clone(model);
     let widening = end.widening.sqrt();
-    let noise: Vec<[Vec<f64>; 2]> = model
-        .recordings
-        .iter()
-        .map(|shoot| {
-            let [tip, drop] = &shoot.observation.settings.noise;
-            let frames = shoot.observation.times_s.len();
-            [draw_noise(tip, frames, &mut generator), draw_noise(drop, frames, &mut generator)]
-        })
-        .collect();
+    let draw_recording = |shoot: &TraceRecording| {
+        let frames = shoot.observation.times_s.len();
+        shoot.observation.settings.noise.each_ref().map(|noise| draw_noise(noise, frames, &mut generator))
+    };
+    let noise: Vec<[Vec<f64>; 2]> = model.recordings.iter().map(draw_recording).collect();
     for found in segment_residuals(model, at) {
         let SegmentResiduals { recording: film, is_drop, frames, residual_m, .. } = found;
         let data = &mut twin.recordings[film].observation;
@@ -326,18 +306,11 @@ pub(super) fn simulate_twin(end: &SearchEnd<'_>, draw: usize) -> (TraceModel, Op
             column[frame] = column[frame].map(|measured| measured + residual_m + drawn);
         }
     }
-    // a prior is a measurement too
-    for unknown in &mut twin.unknowns.0 {
-        unknown.prior =
-            unknown.prior.map(|[mean, sd]| [mean + sd * generator.sample::<f64, _>(StandardNormal), sd]);
+    // a prior is a measurement and scatters too
+    for [mean, sd] in twin.unknowns.0.iter_mut().filter_map(|unknown| unknown.prior.as_mut()) {
+        *mean += *sd * generator.sample::<f64, _>(StandardNormal);
     }
-    let mut segments = at.segments.clone();
-    let first = recording_models(&twin, &at.point).map(|points| {
-        fit_states(&points, &mut segments, TWIN_STATE_STEPS, RescuePolicy::Never);
-        let cost = segments_cost(&segments, true) + twin.unknowns.prior_cost(&at.point);
-        Iterate { segments, cost, settled: false, ..Iterate::clone(at) }
-    });
-    (twin, first)
+    twin
 }
 
 /// Noise in every frame, m.

@@ -1,30 +1,30 @@
-//! What a trace fit estimates besides starting states: parameters of the scene and what is not known of the
-//! cameras, each along a coordinate of order one.
+//! Unknowns of a trace fit besides starting states: parameters of the scene and errors of the cameras, each
+//! along a coordinate of order one.
 
 use crate::math;
 use crate::simulate::scene::Scene;
 
-/// What is not known of the camera that took a recording.
+/// An unknown of the camera that took a recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CameraUnknown {
-    /// Place of the tip's marker against the head's along the sweep, m, beyond the blade's own lean.
+    /// Offset of the tip's marker from the head's along the sweep, m, beyond the blade's own lean.
     OffsetX,
-    /// Height of the head's marker: what is read as drop of the upright blade, m.
+    /// Offset of the drop, m: the reading for an upright blade.
     OffsetDrop,
-    /// Speed of the first of these, m/s: it is 0 in the middle of the fitted frames.
+    /// Drift of [`Self::OffsetX`], m/s, about the middle of the fitted frames.
     DriftX,
-    /// Speed of the second, m/s, likewise.
+    /// Drift of [`Self::OffsetDrop`], m/s, about the middle of the fitted frames.
     DriftDrop,
     /// Relative error of the scale: a metre appears as `1 + scale` metres.
     Scale,
     /// Angle from the picture's x axis to the glass, rad.
     Tilt,
-    /// How much later the camera's clock reads than the drive's, s.
+    /// Camera's clock minus drive's clock, s.
     Clock,
 }
 
 impl CameraUnknown {
-    /// Size of a unit of the coordinate: of the order of what is found.
+    /// Length of a unit of the coordinate: the typical size of the error.
     pub(super) fn coordinate_unit(self) -> f64 {
         match self {
             Self::OffsetX | Self::OffsetDrop | Self::DriftX | Self::DriftDrop => 1e-4,
@@ -34,7 +34,7 @@ impl CameraUnknown {
     }
 }
 
-/// What an unknown is.
+/// Kind of an unknown.
 #[derive(Debug, Clone, PartialEq)]
 pub enum UnknownKind {
     /// A parameter of every scene by name; searched in its logarithm or in units of its range.
@@ -44,15 +44,15 @@ pub enum UnknownKind {
         /// Length of a unit of the coordinate; `None` for its logarithm.
         unit: Option<f64>,
     },
-    /// Something of the camera of one recording.
+    /// An error of the camera of one recording.
     Camera {
-        /// Number of the recording.
+        /// Index of the recording.
         film: usize,
         what: CameraUnknown,
     },
 }
 
-/// An unknown with its range and what is known beforehand, in its coordinate.
+/// An unknown with its range and its prior, in its coordinate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TraceUnknown {
     pub kind: UnknownKind,
@@ -65,34 +65,30 @@ pub struct TraceUnknown {
 }
 
 impl TraceUnknown {
+    /// Length of a unit of the coordinate; `None` where the coordinate is the logarithm of the value.
+    fn unit(&self) -> Option<f64> {
+        match self.kind {
+            UnknownKind::Parameter { unit, .. } => unit,
+            UnknownKind::Camera { what, .. } => Some(what.coordinate_unit()),
+        }
+    }
+
     /// The quantity at a coordinate, in its SI unit.
     pub(crate) fn value(&self, coordinate: f64) -> f64 {
-        match &self.kind {
-            UnknownKind::Parameter { unit: None, .. } => math::exp(coordinate),
-            UnknownKind::Parameter { unit: Some(unit), .. } => coordinate * unit,
-            UnknownKind::Camera { what, .. } => coordinate * what.coordinate_unit(),
-        }
+        self.unit().map_or_else(|| math::exp(coordinate), |unit| coordinate * unit)
     }
 
     /// The coordinate of a value in its SI unit.
     pub(crate) fn coordinate(&self, value: f64) -> f64 {
-        match &self.kind {
-            UnknownKind::Parameter { unit: None, .. } => math::ln(value),
-            UnknownKind::Parameter { unit: Some(unit), .. } => value / unit,
-            UnknownKind::Camera { what, .. } => value / what.coordinate_unit(),
-        }
+        self.unit().map_or_else(|| math::ln(value), |unit| value / unit)
     }
 
     /// Derivative of the value by the coordinate.
     pub(crate) fn slope(&self, coordinate: f64) -> f64 {
-        match &self.kind {
-            UnknownKind::Parameter { unit: None, .. } => math::exp(coordinate),
-            UnknownKind::Parameter { unit: Some(unit), .. } => *unit,
-            UnknownKind::Camera { what, .. } => what.coordinate_unit(),
-        }
+        self.unit().unwrap_or_else(|| math::exp(coordinate))
     }
 
-    /// Distance from the prior's mean and its weight, both in standard deviations.
+    /// Distance from the prior's mean in standard deviations, and its derivative by the coordinate.
     pub(super) fn prior_residual(&self, coordinate: f64) -> Option<[f64; 2]> {
         self.prior.map(|[mean, sd]| [(coordinate - mean) / sd, 1.0 / sd])
     }
@@ -102,9 +98,9 @@ impl TraceUnknown {
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct TraceUnknowns(pub Vec<TraceUnknown>);
 
-/// What the camera makes of places, at one point of the search.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub(super) struct CameraParameters {
+/// Errors of a camera at one point of the search.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct CameraParameters {
     pub offset_x_m: f64,
     pub offset_drop_m: f64,
     pub drift_x_m_per_s: f64,
@@ -115,7 +111,7 @@ pub(super) struct CameraParameters {
 }
 
 impl CameraParameters {
-    /// What the markers read too much along the sweep and as drop, m, so long after the middle.
+    /// Offsets along the sweep and of the drop, m, at a time after the middle of the fitted frames.
     pub(crate) fn offsets_m(&self, after_s: f64) -> [f64; 2] {
         [
             self.offset_x_m + self.drift_x_m_per_s * after_s,
@@ -130,26 +126,35 @@ impl TraceUnknowns {
         matches!(self.0[i].kind, UnknownKind::Parameter { .. })
     }
 
-    /// The camera of a recording at a point.
-    pub(super) fn camera_at(&self, film: usize, point: &[f64]) -> CameraParameters {
-        let mut view = CameraParameters::default();
-        for (unknown, z) in self.0.iter().zip(point) {
-            if let UnknownKind::Camera { film: of, what } = unknown.kind
-                && of == film
-            {
-                let value = unknown.value(*z);
-                match what {
-                    CameraUnknown::OffsetX => view.offset_x_m = value,
-                    CameraUnknown::OffsetDrop => view.offset_drop_m = value,
-                    CameraUnknown::DriftX => view.drift_x_m_per_s = value,
-                    CameraUnknown::DriftDrop => view.drift_drop_m_per_s = value,
-                    CameraUnknown::Scale => view.scale = value,
-                    CameraUnknown::Tilt => view.tilt_rad = value,
-                    CameraUnknown::Clock => view.clock_s = value,
-                }
-            }
+    /// Indices of the parameters of the scene.
+    pub(super) fn parameters(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.0.len()).filter(|&i| self.is_parameter(i))
+    }
+
+    /// Name of unknown `i`, where it is a parameter of the scene.
+    pub(super) fn parameter_name(&self, i: usize) -> Option<&str> {
+        match &self.0[i].kind {
+            UnknownKind::Parameter { name, .. } => Some(name),
+            UnknownKind::Camera { .. } => None,
         }
-        view
+    }
+
+    /// The camera of a recording at a point; quantities that are not estimated are 0.
+    pub(crate) fn camera_at(&self, film: usize, point: &[f64]) -> CameraParameters {
+        let value = |what| {
+            let kind = UnknownKind::Camera { film, what };
+            let found = self.0.iter().zip(point).find(|(unknown, _)| unknown.kind == kind);
+            found.map_or(0.0, |(unknown, z)| unknown.value(*z))
+        };
+        CameraParameters {
+            offset_x_m: value(CameraUnknown::OffsetX),
+            offset_drop_m: value(CameraUnknown::OffsetDrop),
+            drift_x_m_per_s: value(CameraUnknown::DriftX),
+            drift_drop_m_per_s: value(CameraUnknown::DriftDrop),
+            scale: value(CameraUnknown::Scale),
+            tilt_rad: value(CameraUnknown::Tilt),
+            clock_s: value(CameraUnknown::Clock),
+        }
     }
 
     /// The scene of a recording at a point; `None` where it refuses a value.
@@ -168,12 +173,8 @@ impl TraceUnknowns {
 
     /// Cost of the priors.
     pub(super) fn prior_cost(&self, point: &[f64]) -> f64 {
-        self.0
-            .iter()
-            .zip(point)
-            .filter_map(|(unknown, z)| unknown.prior_residual(*z))
-            .map(|[residual, _]| residual * residual)
-            .sum()
+        let residuals = self.0.iter().zip(point).filter_map(|(unknown, z)| unknown.prior_residual(*z));
+        residuals.map(|[residual, _]| residual * residual).sum()
     }
 
     /// A point moved into the ranges.

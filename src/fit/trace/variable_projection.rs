@@ -1,25 +1,25 @@
-//! One segment's part of the normal equations with its starting state eliminated.
+//! Normal equations of one segment with its starting state eliminated (variable projection).
 
 use super::segment_simulation::{LinearizedSegment, LinkState};
 use nalgebra::{DMatrix, DVector};
 
-/// Smallest singular value of the scaled state columns, against the largest, that counts.
+/// Smallest singular value of the scaled state columns that is kept, relative to the largest.
 const MIN_SINGULAR: f64 = 1e-4;
 
-/// Normal equations of one segment for the unknowns, and how its state follows them.
+/// Normal equations of one segment for the unknowns, and the response of its starting state.
 #[derive(Debug, Clone)]
 pub(super) struct ProjectedSegment {
-    /// Jacobian's product with itself after the state is projected out.
+    /// `J^T J` of the Jacobian `J` after the state is projected out.
     pub matrix: DMatrix<f64>,
-    /// Its product with the residuals.
+    /// `J^T r` with the residuals `r`.
     pub slope: DVector<f64>,
-    /// Move of the state with the unknowns held (to be subtracted).
+    /// Step of the state at fixed unknowns, with opposite sign.
     pub move_held: LinkState,
-    /// Its derivative by the unknowns (likewise).
+    /// Derivative of the state's step by the unknowns, with opposite sign.
     pub move_by_unknown: DMatrix<f64>,
 }
 
-/// Projects the columns of the state out of residuals and Jacobian.
+/// Projects the columns of the state out of residuals and Jacobian; `None` where no decomposition is found.
 pub(super) fn project_out_state(linear: &LinearizedSegment) -> Option<ProjectedSegment> {
     let LinearizedSegment { residuals, by_state, by_unknown } = linear;
     let scales: [f64; 4] = std::array::from_fn(|i| by_state.column(i).norm().max(1e-12));
