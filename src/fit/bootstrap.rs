@@ -1,14 +1,13 @@
 //! Parametric bootstrap: twins of the best model, measured as the recording was, fitted again from the best
 //! point (Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 6).
 //!
-//! It sees what the stated deviations do not: how noise, lost frames and the starting state move the features
-//! of this very blade together. Each twin has cameras of its own, drawn from their priors. A refit takes
-//! damped Gauss-Newton steps from the best point with the Jacobian there, corrected by Broyden's rule; the
-//! spread is taken about the best point, so that it includes the bias.
+//! In addition to the stated deviations it contains the joint effect of noise, lost frames and starting state
+//! on the features of this blade. The cameras of each twin are drawn from their priors. A refit takes damped
+//! Gauss-Newton steps from the best point with the Jacobian there, corrected by Broyden's rule. The spread is
+//! taken about the best point, so that it includes the bias.
 
 use super::camera_calibration::draw_camera_errors;
-use super::evaluation::EvaluationStage;
-use super::evaluation::{Evaluation, Observed};
+use super::evaluation::{Evaluation, EvaluationStage, Observed};
 use super::ledger::{Ledger, StopReason};
 use super::linear_model::{broyden_update, damped_step, residuals_against, step_in_box};
 use super::objective::Objective;
@@ -21,18 +20,15 @@ use rayon::prelude::*;
 const REFIT_STEPS: usize = 3;
 /// Damping of a refit: a prior of one length of the box, negligible for any informative direction.
 const REFIT_DAMPING: f64 = 1.0;
-/// Fewest twins from which a spread is taken.
+/// Fewest twins that give a spread.
 pub(crate) const MIN_TWINS: usize = 8;
 
-/// What the twins say.
+/// Result of the refits.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct Bootstrap {
-    /// Places in the unit box at which the twins were fitted again, one a twin.
+    /// Best points of the refits in the unit box, one per twin.
     pub refits: Vec<Vec<f64>>,
-    /// Twins that could not be made.
-    pub failed: usize,
-    /// Standard deviation of each feature over the twins, in its own unit; `None` where fewer than two show
-    /// it.
+    /// Standard deviation of each feature over the twins, in its own unit; `None` where fewer than two have it.
     pub feature_sd: Vec<Option<f64>>,
 }
 
@@ -60,29 +56,23 @@ pub(crate) fn bootstrap_refits(
     let draws: Vec<u64> = (1..=twins as u64).collect();
     let made: Vec<Option<Vec<Observed>>> =
         draws.par_iter().map(|draw| objective.simulate_twin(&best.values, *draw).ok()).collect();
-    let failed = made.iter().filter(|twin| twin.is_none()).count();
     let seen: Vec<&Vec<Observed>> = made.iter().flatten().collect();
     let feature_sd = (0..objective.targets().len()).map(|at| standard_deviation(&seen, at)).collect();
-    let filmed = |(twin, draw): (Option<Vec<Observed>>, &u64)| {
-        twin.map(|twin| draw_camera_errors(objective.targets(), &twin, *draw))
+    let refit = |(twin, draw): (&Option<Vec<Observed>>, &u64)| {
+        let filmed = draw_camera_errors(objective.targets(), twin.as_ref()?, *draw);
+        Some(Refit::new(objective, &filmed, best, jacobian))
     };
-    let mut refits: Vec<Refit> = made
-        .into_iter()
-        .zip(&draws)
-        .filter_map(filmed)
-        .map(|twin| Refit::new(objective, &twin, best, jacobian))
-        .collect();
+    let mut refits: Vec<Refit> = made.iter().zip(&draws).filter_map(refit).collect();
     for _ in 0..REFIT_STEPS {
         let points: Vec<Vec<f64>> = refits.iter().filter_map(Refit::next_point).collect();
         ledger.evaluate_points(EvaluationStage::Bootstrap, &points)?;
         for refit in &mut refits {
-            let found = refit.next_point().and_then(|point| ledger.find_evaluation(&point).cloned());
-            if let Some(found) = found {
-                refit.accept_step(found, objective);
+            if let Some(found) = refit.next_point().and_then(|point| ledger.find_evaluation(&point)) {
+                refit.accept_step(found.clone(), objective);
             }
         }
     }
-    Ok(Bootstrap { refits: refits.into_iter().map(|refit| refit.unit).collect(), failed, feature_sd })
+    Ok(Bootstrap { refits: refits.into_iter().map(|refit| refit.unit).collect(), feature_sd })
 }
 
 fn standard_deviation(seen: &[&Vec<Observed>], feature: usize) -> Option<f64> {
@@ -113,8 +103,10 @@ impl Refit {
     }
 
     fn next_point(&self) -> Option<Vec<f64>> {
-        let step =
-            (!self.done).then(|| damped_step(&self.model, &self.residuals, REFIT_DAMPING, None)).flatten()?;
+        if self.done {
+            return None;
+        }
+        let step = damped_step(&self.model, &self.residuals, REFIT_DAMPING, None)?;
         Some(step_in_box(&self.unit, &step))
     }
 

@@ -1,20 +1,24 @@
-//! One evaluation of the cost: a place, what the model shows there, and what it costs.
+//! One evaluation of the cost: a point, the features of the model there, and their cost.
 
+use super::feature_checkpoint::exact;
 use crate::simulate::RunStatus;
 use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use std::cmp::Ordering;
 use std::fmt;
 
-/// A feature as a model shows it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// The value of a feature of the model.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Observation {
     /// Its value, in the feature's own SI unit; finite.
+    #[serde(with = "exact")]
     pub value: f64,
-    /// Standard deviation over the starting states, in the same unit; 0 where there is one.
+    /// Standard deviation over the starting states, in the same unit; 0 for a single state.
+    #[serde(with = "exact")]
     pub spread: f64,
-    /// By how much the assigned peak is weaker than the strongest one in its band, dB; 0 where it is the
-    /// strongest, or no peak.
+    /// Level of the strongest peak of the band above the assigned one, dB; 0 where that is the strongest, and for
+    /// features without peaks.
+    #[serde(with = "exact")]
     pub below_db: f64,
 }
 
@@ -28,7 +32,7 @@ pub enum Observed {
 }
 
 impl Observed {
-    /// A value of one run, the strongest of its kind.
+    /// The value of a single run; a frequency is that of the strongest peak.
     #[must_use]
     pub fn from_value(value: f64) -> Self {
         Self::Value(Observation { value, spread: 0.0, below_db: 0.0 })
@@ -49,15 +53,16 @@ impl Observed {
 }
 
 /// One evaluation of the cost.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Evaluation {
-    /// Place in the unit box, one coordinate a parameter.
+    /// Point in the unit box, one coordinate per parameter.
     pub unit: Vec<f64>,
     /// Parameter values in job order, in their SI units.
     pub values: Vec<f64>,
     /// Cost, finite and not negative.
     pub cost: f64,
-    /// Cost from afar: without the features of the last stage, and with deviations of at least `FROM_AFAR`.
+    /// Cost of the first stage: without the features of the last stage, and with deviations of at least
+    /// `FIRST_STAGE_SD_RELATIVE`.
     pub global_cost: f64,
     /// Features in the order of the targets; empty when the run failed.
     pub features: Vec<Observed>,
@@ -65,7 +70,7 @@ pub struct Evaluation {
     pub failure: Option<RunFailure>,
 }
 
-/// What the model shows at a point: an evaluation but for its costs, which depend on what else a search met.
+/// An evaluation without its costs, which also depend on the scatter that a search estimates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvaluationOutcome {
     /// Place in the unit box, one coordinate a parameter.
@@ -85,9 +90,7 @@ impl From<Evaluation> for EvaluationOutcome {
     }
 }
 
-// Why a model run gave no features.
-
-/// Why a run gave no features, in a word by which failures are counted.
+/// Reason for which a run gave no features; failures are counted by reason.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FailureReason {
     /// The run ended before its stop time.
@@ -143,7 +146,7 @@ impl fmt::Display for FailureReason {
     }
 }
 
-/// By word, so that counts in files are in alphabetic order.
+/// Ordered by word: counts in files are in alphabetical order.
 impl Ord for FailureReason {
     fn cmp(&self, other: &Self) -> Ordering {
         self.as_str().cmp(other.as_str())
@@ -174,14 +177,16 @@ impl<'de> Deserialize<'de> for FailureReason {
 }
 
 /// A model run that gave no features.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, thiserror::Error)]
+#[serde(deny_unknown_fields)]
 #[error("{reason}: {message}")]
 pub struct RunFailure {
     /// Why.
     pub reason: FailureReason,
     /// What happened, in words.
     pub message: String,
-    /// How far the run came, from 0 (not at all) to 1 (to the end).
+    /// Fraction of the run that was completed, 0 to 1.
+    #[serde(with = "exact")]
     pub progress: f64,
 }
 
@@ -194,25 +199,23 @@ impl RunFailure {
     }
 }
 
-// What an evaluation was made for.
-
-/// What an evaluation was made for.
+/// Purpose of an evaluation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum EvaluationStage {
-    /// Probes of what the features can determine, before the search.
+    /// Probes of the identifiability, before the search.
     Gate,
     /// Clouds of points over the whole box.
     Global,
-    /// From one of the best points downhill.
+    /// Local searches from the best points.
     Local,
     /// Differences around the best point.
     Sensitivity,
-    /// Along one parameter, the others following.
+    /// Profiles along a parameter, minimised over the others.
     Profile,
-    /// A twin of the best model fitted again.
+    /// Refits to twins of the best model.
     Bootstrap,
-    /// At other values of a parameter that is about to be called identified.
+    /// Searches outside the interval of an identified parameter.
     Elsewhere,
 }
 

@@ -3,18 +3,16 @@
 use super::FitError;
 use super::bounds::{Bounds, BoundsSpacing, Prior, SearchAxis};
 use super::camera_calibration::TargetCalibration;
-use super::evaluation::{
-    EvaluationOutcome, EvaluationStage, FailureReason, Observation, Observed, RunFailure,
-};
+use super::evaluation::{EvaluationOutcome, EvaluationStage, Observation, Observed, RunFailure};
 use super::objective::Objective;
 use super::run::FitContext;
 use super::targets::TargetValue;
-use crate::checkpoint;
-use crate::checkpoint::{CheckpointError, CheckpointKind, CheckpointRecord, ExactNumber, sample_records};
+use crate::checkpoint::{
+    self, CheckpointError, CheckpointKind, CheckpointRecord, ExactNumber, sample_records,
+};
 use crate::feature::{LengthCalibration, ValueComparison};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use std::fmt::Debug;
 
 /// The journal of a fit.
 pub type FeatureCheckpoint = checkpoint::CheckpointFile<EvaluationRecord>;
@@ -23,13 +21,13 @@ pub(crate) type FeatureHeader = checkpoint::CheckpointHeader<FeatureHeaderBody>;
 /// One evaluation in a journal.
 #[derive(Debug, Clone, PartialEq)]
 pub struct EvaluationRecord {
-    /// What it was made for.
+    /// Purpose of the evaluation.
     pub stage: EvaluationStage,
-    /// What the model showed. Costs are not kept: they depend on the scatter that a search has met.
+    /// Outcome of the model. Costs are not stored: they depend on the scatter that a search estimates.
     pub outcome: EvaluationOutcome,
 }
 
-/// Exact coordinates of a point of the unit box, for look-up.
+/// Bits of the coordinates of a point of the unit box, as a key for look-up.
 pub(crate) fn point_key(unit: &[f64]) -> Vec<u64> {
     unit.iter().map(|u| u.to_bits()).collect()
 }
@@ -44,7 +42,7 @@ impl CheckpointRecord for EvaluationRecord {
         point_key(&self.outcome.unit)
     }
 
-    /// The values follow from the place in the unit box, and are not stored.
+    /// The values are not stored: they follow from the point in the unit box.
     fn to_row(&self, at: usize) -> Row {
         let EvaluationOutcome { unit, features, failure, .. } = &self.outcome;
         Row {
@@ -52,7 +50,7 @@ impl CheckpointRecord for EvaluationRecord {
             stage: self.stage,
             unit: unit.iter().copied().map(ExactNumber).collect(),
             features: features.iter().map(FeatureValueRow::from_observed).collect(),
-            failure: failure.as_ref().map(FailureRow::from_failure),
+            failure: failure.clone(),
         }
     }
 
@@ -65,20 +63,19 @@ impl CheckpointRecord for EvaluationRecord {
         Ok(Self { stage: row.stage, outcome: row.into_outcome(body) })
     }
 
-    /// Everything that the model shows. Stages may differ: another search may have come to a point for
-    /// another reason.
+    /// Compares outcomes only: another search may evaluate a point in another stage.
     fn difference(&self, other: &Self) -> Option<[String; 2]> {
         first_difference(&self.outcome, &other.outcome)
     }
 
     fn problem_difference(found: &FeatureHeaderBody, expected: &FeatureHeaderBody) -> Option<String> {
-        let same = found.parameters == expected.parameters && found.features == expected.features;
-        (!same)
-            .then(|| "the header has other parameters, bounds, features or targets than the fit".to_owned())
+        let differs = found.parameters != expected.parameters || found.features != expected.features;
+        let why = "the header has other parameters, bounds, features or targets than the fit";
+        differs.then(|| why.to_owned())
     }
 }
 
-/// An evaluation as it stands in a line.
+/// An evaluation as a line of the journal.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Row {
@@ -87,7 +84,7 @@ pub struct Row {
     unit: Vec<ExactNumber>,
     features: Vec<FeatureValueRow>,
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    failure: Option<FailureRow>,
+    failure: Option<RunFailure>,
 }
 
 impl Row {
@@ -109,13 +106,12 @@ impl Row {
         }
     }
 
-    /// The values follow from the place in the unit box.
     fn into_outcome(self, body: &FeatureHeaderBody) -> EvaluationOutcome {
         let unit: Vec<f64> = self.unit.into_iter().map(|n| n.0).collect();
         let values = body.parameters.iter().zip(&unit);
         let values = values.map(|(parameter, u)| parameter.axis.bounds.from_unit(*u)).collect();
         let features = self.features.into_iter().map(FeatureValueRow::into_observed).collect();
-        EvaluationOutcome { unit, values, features, failure: self.failure.map(FailureRow::into_failure) }
+        EvaluationOutcome { unit, values, features, failure: self.failure }
     }
 }
 
@@ -123,7 +119,7 @@ impl Row {
 #[serde(untagged)]
 enum FeatureValueRow {
     Value(ExactNumber),
-    Averaged { value: ExactNumber, spread: ExactNumber, below_db: ExactNumber },
+    Averaged(Observation),
     Missing { missing: String },
 }
 
@@ -133,11 +129,7 @@ impl FeatureValueRow {
             Observed::Value(Observation { value, spread: 0.0, below_db: 0.0 }) => {
                 Self::Value(ExactNumber(*value))
             }
-            Observed::Value(Observation { value, spread, below_db }) => Self::Averaged {
-                value: ExactNumber(*value),
-                spread: ExactNumber(*spread),
-                below_db: ExactNumber(*below_db),
-            },
+            Observed::Value(averaged) => Self::Averaged(*averaged),
             Observed::Missing(missing) => Self::Missing { missing: missing.clone() },
         }
     }
@@ -145,36 +137,29 @@ impl FeatureValueRow {
     fn into_observed(self) -> Observed {
         match self {
             Self::Value(value) => Observed::from_value(value.0),
-            Self::Averaged { value, spread, below_db } => {
-                Observed::Value(Observation { value: value.0, spread: spread.0, below_db: below_db.0 })
-            }
+            Self::Averaged(averaged) => Observed::Value(averaged),
             Self::Missing { missing } => Observed::Missing(missing),
         }
     }
 }
 
-#[derive(Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-struct FailureRow {
-    reason: FailureReason,
-    message: String,
-    progress: ExactNumber,
-}
+/// Numbers as [`ExactNumber`] in a journal, for `#[serde(with)]`.
+pub(super) mod exact {
+    use super::{Deserialize, ExactNumber, Serialize};
+    use serde::{Deserializer, Serializer};
 
-impl FailureRow {
-    fn from_failure(failure: &RunFailure) -> Self {
-        let RunFailure { reason, message, progress } = failure.clone();
-        Self { reason, message, progress: ExactNumber(progress) }
+    pub(in crate::fit) fn serialize<S: Serializer>(number: &f64, serializer: S) -> Result<S::Ok, S::Error> {
+        ExactNumber(*number).serialize(serializer)
     }
 
-    fn into_failure(self) -> RunFailure {
-        RunFailure { reason: self.reason, message: self.message, progress: self.progress.0 }
+    pub(in crate::fit) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
+        ExactNumber::deserialize(deserializer).map(|number| number.0)
     }
 }
 
-// What the header of a fit's journal says: what each number of a line means, and what it is held against.
+// The header of the journal: the meaning of the numbers in its lines, and the targets.
 
-/// What the header of a fit says besides.
+/// The part of the header that is specific to a fit of features.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FeatureHeaderBody {
@@ -194,7 +179,7 @@ pub struct HeaderParameter {
     pub name: String,
     /// Unit as shown; `1` for a plain number.
     pub unit: String,
-    /// Its range, from which its values follow, and what is known of it beforehand.
+    /// Its range, which maps coordinates to values, and its prior.
     pub axis: SearchAxis,
 }
 
@@ -206,7 +191,7 @@ pub struct HeaderFeature {
     pub name: String,
     /// Unit in files; `1` for a plain number.
     pub unit: String,
-    /// What it should be.
+    /// Its target and deviation.
     pub target: TargetValue,
 }
 
@@ -222,7 +207,7 @@ struct ParameterRow {
     prior: Option<PriorRow>,
 }
 
-/// Of the parameter, or of its logarithm where its scale is one.
+/// Prior of the parameter, or of its logarithm on a logarithmic scale.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct PriorRow {
@@ -262,17 +247,17 @@ struct FeatureRow {
     unit: String,
     target: ExactNumber,
     sd: ExactNumber,
-    /// Size of a large difference, where it is differences that are compared and not ratios.
+    /// Scale of differences; missing where ratios are compared.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     large_difference: Option<ExactNumber>,
-    /// Whether it counts in the last stage alone.
+    /// Whether it counts in the last stage only.
     last_stage: bool,
-    /// What is not known of its camera, where it depends on it.
+    /// Calibration errors of its camera, where it depends on them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     camera: Option<CameraRow>,
 }
 
-/// Features of one condition have a camera in common.
+/// Calibration errors of the camera of a condition.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct CameraRow {
@@ -280,7 +265,7 @@ struct CameraRow {
     condition: usize,
     scale_sd: ExactNumber,
     offset_sd_m: ExactNumber,
-    /// Of a size, what was added to it in quadrature; none of a place.
+    /// Noise floor that is added to a size in quadrature; missing for a position.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     floor_m: Option<ExactNumber>,
 }
@@ -336,32 +321,22 @@ impl From<FeatureRow> for HeaderFeature {
     }
 }
 
-// What differs between two outcomes at one point, in words.
-
-/// The first difference: what the one has there, and what the other.
+/// Describes the first difference between two outcomes at one point.
 pub(super) fn first_difference(one: &EvaluationOutcome, other: &EvaluationOutcome) -> Option<[String; 2]> {
-    value_difference(one, other)
-        .or_else(|| failure_difference(one, other))
-        .or_else(|| feature_difference(one, other))
-}
-
-fn value_difference(one: &EvaluationOutcome, other: &EvaluationOutcome) -> Option<[String; 2]> {
-    (one.values != other.values).then(|| [one, other].map(|outcome| format!("values {:?}", outcome.values)))
-}
-
-fn failure_difference(one: &EvaluationOutcome, other: &EvaluationOutcome) -> Option<[String; 2]> {
-    let words = |failure: Option<&RunFailure>| match failure {
-        Some(RunFailure { reason, message, progress }) => {
-            format!("failure {reason} ({message}) after {progress} of the run")
-        }
-        None => "no failure".to_owned(),
-    };
-    (one.failure != other.failure).then(|| [one, other].map(|outcome| words(outcome.failure.as_ref())))
-}
-
-fn feature_difference(one: &EvaluationOutcome, other: &EvaluationOutcome) -> Option<[String; 2]> {
+    let both = [one, other];
+    if one.values != other.values {
+        return Some(both.map(|outcome| format!("values {:?}", outcome.values)));
+    }
+    if one.failure != other.failure {
+        return Some(both.map(|outcome| match &outcome.failure {
+            Some(RunFailure { reason, message, progress }) => {
+                format!("failure {reason} ({message}) after {progress} of the run")
+            }
+            None => "no failure".to_owned(),
+        }));
+    }
     if one.features.len() != other.features.len() {
-        return Some([one, other].map(|outcome| format!("{} features", outcome.features.len())));
+        return Some(both.map(|outcome| format!("{} features", outcome.features.len())));
     }
     let mut pairs = one.features.iter().zip(&other.features).enumerate();
     let (at, (a, b)) = pairs.find(|(_, (a, b))| a != b)?;
@@ -369,31 +344,30 @@ fn feature_difference(one: &EvaluationOutcome, other: &EvaluationOutcome) -> Opt
 }
 
 fn describe_observed(observed: &Observed) -> String {
-    let number = |name: &str, number: &dyn Debug| format!(", {name} {number:?}");
     match observed {
         Observed::Value(found) => {
             let apart = [("spread", found.spread), ("below the strongest by (dB)", found.below_db)];
             let apart = apart.iter().filter(|(_, value)| *value != 0.0);
-            let apart: String = apart.map(|(name, value)| number(name, value)).collect();
+            let apart: String = apart.map(|(name, value)| format!(", {name} {value:?}")).collect();
             format!("{:?}{apart}", found.value)
         }
         Observed::Missing(why) => format!("missing ({why})"),
     }
 }
 
-// Evaluations of a journal once more: a resumed fit believes none that the model does not give.
+// A resumed fit repeats some evaluations of its journal and refuses a journal that differs.
 
-/// Makes some evaluations of the journal that is resumed again, and compares them to the last bit.
+/// Repeats a sample of the evaluations of the resumed journal and compares all bits.
 pub(super) fn recheck_sample(objective: &Objective, context: &FitContext, seed: u64) -> Result<(), FitError> {
     let Some((file, journal)) = context.resume else { return Ok(()) };
     let records = journal.records.len();
-    let places = sample_records(records, seed.wrapping_add(records as u64)); // others each time, as it grows
+    let places = sample_records(records, seed.wrapping_add(records as u64)); // changes as the journal grows
     let checked: Vec<Result<(), CheckpointError>> =
         places.into_par_iter().map(|place| recheck_record(objective, file, journal, place)).collect();
     Ok(checked.into_iter().collect::<Result<(), _>>()?)
 }
 
-/// The same for the evaluation at a point, if the journal has it.
+/// Repeats the evaluation at a point, if the resumed journal has it.
 pub(super) fn recheck_at(objective: &Objective, context: &FitContext, unit: &[f64]) -> Result<(), FitError> {
     let Some((file, journal)) = context.resume else { return Ok(()) };
     let place = journal.records.iter().position(|entry| point_key(&entry.outcome.unit) == point_key(unit));

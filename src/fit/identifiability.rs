@@ -1,70 +1,60 @@
-//! The gate before the search: what these features can determine at this noise, probed at a few places of
-//! the box.
+//! Identifiability before the search: which parameters the features can determine at their noise, probed at a
+//! few points of the box.
 //!
-//! At each probe the model is differenced once along every parameter. The gate refuses only what cannot be
-//! fitted: a model that shows nothing anywhere, or features that no parameter moves. Everything else it lets
-//! pass with a sentence.
+//! At each probe the model is differentiated by finite differences along every parameter. A fit is refused only
+//! if the model has no features anywhere, or if no parameter changes any feature. Everything else is a note.
 
-use super::evaluation::EvaluationStage;
-use super::evaluation::{Evaluation, Observed};
-use super::ledger::{Ledger, StopReason};
-use super::linear_model::{FeatureSlopes, difference_points, feature_scatter, jacobian};
-use super::linear_model::{ParameterCombination, SingularDirections};
+use super::FitError;
+use super::evaluation::{Evaluation, EvaluationStage, Observed};
+use super::ledger::Ledger;
+use super::linear_model::{FeatureSlopes, ParameterCombination, SingularDirections};
+use super::linear_model::{difference_points, feature_scatter, jacobian};
+use super::result::map_names;
 use super::targets::TargetValue;
 use crate::text::format_short;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
-/// Places that are probed: the middle of the box and points of a Halton sequence around it.
+/// Number of probes: the middle of the box and points of a Halton sequence around it.
 pub(crate) const PROBE_COUNT: usize = 5;
-/// The share of the box, about its middle, in which the probes lie: corners are rarely blades.
+/// Fraction of the box, about its middle, in which the probes lie: the model rarely runs in the corners.
 const INNER_BOX: f64 = 0.7;
 
-/// What one probe showed.
+/// Result of one probe.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Probe {
     /// Parameter values, in SI.
     pub values: BTreeMap<String, f64>,
-    /// Why the model failed there.
+    /// Failure of the model, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
-    /// Features that were seen.
+    /// Number of features that the model has.
     pub features_seen: usize,
     /// Number of informative directions.
     pub rank: usize,
     /// Largest singular value over the smallest; `None` where one is zero.
     pub condition: Option<f64>,
-    /// Parameters that the features determine there.
+    /// Parameters that the features determine.
     pub determines: Vec<String>,
 }
 
-/// What the gate found.
+/// Identifiability of a job before its search.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Identifiability {
     /// The probes.
     pub probes: Vec<Probe>,
-    /// What the features determine and leave open at the probe that is nearest to the targets.
+    /// Combinations of parameters that are determined or left open at the probe nearest to the targets.
     pub combinations: Vec<ParameterCombination>,
-    /// Scatter of the model's value of each feature between neighbouring parameters, in its unit: the median
-    /// over the probes. It counts with the deviation of the target, because no search can use what it
-    /// drowns.
+    /// Scatter of each modelled feature between neighbouring points, in its unit: the median over the probes. It
+    /// is added to the deviation of the target, because a search cannot resolve less.
     pub scatter: Vec<f64>,
-    /// What a reader has to know, in sentences.
+    /// Sentences for the reader.
     pub notes: Vec<String>,
-    /// What to measure in addition, in sentences.
+    /// Sentences on what to measure in addition.
     pub advice: Vec<String>,
 }
 
-/// Why there is no gate to pass.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) enum IdentifiabilityError {
-    /// Nothing can be learned, and why.
-    CannotBeFitted(String),
-    /// The evaluations are used up or may not go on.
-    Stopped(StopReason),
-}
-
-/// A place that was probed and where the model ran.
+/// A probe with its evaluation and linear model.
 #[derive(Debug, Clone)]
 pub(crate) struct ProbeEvaluation {
     pub centre: Evaluation,
@@ -73,32 +63,32 @@ pub(crate) struct ProbeEvaluation {
     scatter: Vec<Option<f64>>,
 }
 
-/// Probes the box.
+/// Probes the box; `None` if the evaluations are used up or may not go on.
 ///
 /// # Errors
-/// [`IdentifiabilityError`] when the job cannot be fitted, or the ledger has stopped.
+/// [`FitError::CannotBeFitted`].
 pub(crate) fn assess_identifiability(
     ledger: &mut Ledger,
     names: &[String],
-) -> Result<(Identifiability, ProbeEvaluation), IdentifiabilityError> {
+) -> Result<Option<(Identifiability, ProbeEvaluation)>, FitError> {
     let centres: Vec<Vec<f64>> = (0..PROBE_COUNT).map(|at| probe_point(at, names.len())).collect();
-    let all: Vec<Vec<f64>> = centres
-        .iter()
-        .flat_map(|centre| std::iter::once(centre.clone()).chain(difference_points(centre)))
-        .collect();
-    ledger.evaluate_points(EvaluationStage::Gate, &all).map_err(IdentifiabilityError::Stopped)?;
+    let around = |centre: &Vec<f64>| [vec![centre.clone()], difference_points(centre)].concat();
+    let all: Vec<Vec<f64>> = centres.iter().flat_map(around).collect();
+    if ledger.evaluate_points(EvaluationStage::Gate, &all).is_err() {
+        return Ok(None);
+    }
     let probed: Vec<ProbeEvaluation> =
         centres.iter().filter_map(|centre| evaluate_probe(ledger, centre)).collect();
     let probes: Vec<Probe> = probed.iter().map(|p| summarize_probe(p, names)).collect();
     let usable = || probed.iter().filter(|p| p.centre.failure.is_none());
     let Some(nearest) = usable().min_by(|a, b| a.centre.global_cost.total_cmp(&b.centre.global_cost)) else {
-        return Err(IdentifiabilityError::CannotBeFitted(all_probes_failed(&probes)));
+        return Err(FitError::CannotBeFitted { why: all_probes_failed(&probes) });
     };
     if probes.iter().all(|p| p.features_seen == 0) {
-        return Err(IdentifiabilityError::CannotBeFitted(no_features_seen(ledger, nearest)));
+        return Err(FitError::CannotBeFitted { why: no_features_seen(ledger, nearest) });
     }
     if usable().all(|p| p.directions.rank == 0) {
-        return Err(IdentifiabilityError::CannotBeFitted(NOTHING_MOVES.to_owned()));
+        return Err(FitError::CannotBeFitted { why: NOTHING_MOVES.to_owned() });
     }
     let combinations =
         nearest.directions.combinations(names, ledger.objective().axes(), &nearest.centre.unit);
@@ -107,7 +97,8 @@ pub(crate) fn assess_identifiability(
         .map(|at| median(probed.iter().filter_map(|p| p.scatter.get(at).copied().flatten()).collect()))
         .collect();
     let notes = [probe_notes(&probes, names), rough_notes(targets, &scatter)].concat();
-    Ok((Identifiability { probes, combinations, scatter, notes, advice: Vec::new() }, nearest.clone()))
+    let found = Identifiability { probes, combinations, scatter, notes, advice: Vec::new() };
+    Ok(Some((found, nearest.clone())))
 }
 
 fn evaluate_probe(ledger: &Ledger, centre: &[f64]) -> Option<ProbeEvaluation> {
@@ -125,18 +116,14 @@ fn summarize_probe(probed: &ProbeEvaluation, names: &[String]) -> Probe {
     let ProbeEvaluation { centre, directions, .. } = probed;
     let failed = centre.failure.is_some();
     let condition = Some(directions.condition_number()).filter(|condition| condition.is_finite() && !failed);
-    let determines = names
-        .iter()
-        .enumerate()
-        .filter(|(axis, _)| !failed && directions.determines(*axis))
-        .map(|(_, name)| name.clone());
+    let determined = (0..names.len()).filter(|axis| !failed && directions.determines(*axis));
     Probe {
-        values: names.iter().cloned().zip(centre.values.iter().copied()).collect(),
+        values: map_names(names, centre.values.iter().copied()),
         failure: centre.failure.as_ref().map(ToString::to_string),
         features_seen: centre.features.iter().filter(|f| f.observation().is_some()).count(),
         rank: if failed { 0 } else { directions.rank },
         condition,
-        determines: determines.collect(),
+        determines: determined.map(|axis| names[axis].clone()).collect(),
     }
 }
 
@@ -149,7 +136,7 @@ fn probe_point(at: usize, dimensions: usize) -> Vec<f64> {
     (0..dimensions).map(coordinate).collect()
 }
 
-/// The digits of `number` in a base, mirrored behind the point.
+/// Radical inverse (van der Corput).
 fn radical_inverse(number: usize, base: usize) -> f64 {
     let (mut rest, mut weight, mut sum) = (number, 1.0, 0.0);
     while rest > 0 {
@@ -216,20 +203,15 @@ fn probe_notes(probes: &[Probe], names: &[String]) -> Vec<String> {
     let mut notes = Vec::new();
     if usable.len() < probes.len() {
         let reason = probes.iter().find_map(|p| p.failure.as_deref()).unwrap_or_default();
-        notes.push(format!(
-            "the model fails at {} of {} places that were probed ({reason})",
-            probes.len() - usable.len(),
-            probes.len()
-        ));
+        let (failed, all) = (probes.len() - usable.len(), probes.len());
+        notes.push(format!("the model fails at {failed} of {all} places that were probed ({reason})"));
     }
-    let determined = |name: &String| usable.iter().filter(|p| p.determines.contains(name)).count();
     for name in names {
-        let at = determined(name);
+        let at = usable.iter().filter(|p| p.determines.contains(name)).count();
         if 2 * at < usable.len() {
-            let where_at = if at == 0 {
-                "nowhere".to_owned()
-            } else {
-                format!("at {at} of {} places only", usable.len())
+            let where_at = match at {
+                0 => "nowhere".to_owned(),
+                _ => format!("at {at} of {} places only", usable.len()),
             };
             notes.push(format!("before the search: the features determine {name} {where_at}"));
         }

@@ -1,5 +1,10 @@
 //! job.toml: what is fitted to what, checked completely before anything runs. Every key: `docs/fits.md`.
 
+/// Returns from a check because of a key; the problem is formatted as by [`format!`].
+macro_rules! refuse {
+    ($key:expr, $($problem:tt)+) => { return $crate::toml_file::refuse_key($key, std::fmt::format(format_args!($($problem)+))) };
+}
+
 mod as_written;
 mod conditions;
 mod parameters;
@@ -7,15 +12,13 @@ mod settings;
 mod targets;
 mod traces;
 
-use super::bounds::BoundsError;
+use super::bounds::SearchAxis;
 use super::camera_calibration::TargetCalibration;
 use super::search::SearchSettings;
 use crate::feature::Feature;
 use crate::simulate::twin::Camera;
-use crate::toml_file;
-use crate::toml_file::{TomlError, check_format, parse_toml};
-pub(crate) use conditions::is_same_quantity;
-pub(crate) use conditions::{FeatureCamera, HeadSource, JobCondition};
+use crate::toml_file::{self, KeyRefusal, TomlError, check_above_zero, check_format, parse_toml};
+pub(crate) use conditions::{FeatureCamera, HeadSource, JobCondition, is_same_quantity};
 pub(crate) use parameters::{Constants, FreeParameter, NuisanceParameter};
 use serde::Serialize;
 pub(crate) use settings::{Ensemble, IntervalSettings};
@@ -23,21 +26,19 @@ use std::collections::HashSet;
 pub use targets::{FitTarget, TargetSource, TargetStage};
 pub(crate) use traces::{CameraPriorSds, TraceChannel, TraceTarget};
 
-/// Name, what it sets, and whether it is held out.
-type ConditionIdentity<'a> = (&'a str, &'a [(String, f64)], bool);
-
-/// What of a job decides the cost of a point.
+/// The part of a job that decides the cost of a point.
 #[derive(Serialize)]
 pub(super) struct JobIdentity<'a> {
-    conditions: Vec<ConditionIdentity<'a>>,
+    /// Name, what it sets, and whether it is held out.
+    conditions: Vec<(&'a str, &'a [(String, f64)], bool)>,
     camera: Option<Camera>,
     parameters: &'a [FreeParameter],
-    /// Left out where there is none, so that the fingerprints of other jobs stay.
+    /// Left out where constants are exact: the fingerprint of a job without them stays the same.
     #[serde(skip_serializing_if = "Constants::is_none")]
     constants: &'a Constants,
     #[serde(skip_serializing_if = "<[_]>::is_empty")]
     traces: &'a [TraceTarget],
-    /// Those on which a feature depends, with the numbers of their conditions.
+    /// Cameras on which a fitted feature depends, with the numbers of their conditions.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     cameras: Vec<(usize, FeatureCamera)>,
     aims: &'a [FitTarget],
@@ -82,21 +83,28 @@ impl Job {
         Self::parse_with_names(file, text, &crate::model::parameters::parameter_names())
     }
 
-    /// The same for another model, whose parameters have the names `known`.
+    /// As [`Self::parse`], for a model whose parameters have the names `known`.
     ///
     /// # Errors
     /// As [`Self::parse_toml`].
     pub fn parse_with_names(file: &str, text: &str, known: &[&str]) -> Result<Self, JobError> {
         let written: as_written::JobFile = parse_toml(file, text)?;
         check_format(file, written.format)?;
-        let checked = Self::validate(&written, known);
-        checked.map_err(|refusal| refusal.in_file(file))
+        Self::validate(&written, known).map_err(|(key, problem)| {
+            let file = file.to_owned();
+            JobError::Value { file, key, problem }
+        })
     }
 
     /// The JSON Schema of job.toml: for editors, and for messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
-        crate::toml_file::schema_of::<as_written::JobFile>()
+        toml_file::schema_of::<as_written::JobFile>()
+    }
+
+    /// Ranges and priors of the free parameters in order.
+    pub(crate) fn search_axes(&self) -> Vec<SearchAxis> {
+        self.parameters.iter().map(FreeParameter::search_axis).collect()
     }
 
     /// Names of the free parameters in order.
@@ -105,26 +113,22 @@ impl Job {
         self.parameters.iter().map(|p| p.name.clone()).collect()
     }
 
-    /// What is read from each recording, in order.
+    /// Features of the targets, in their order.
     #[must_use]
     pub fn features(&self) -> Vec<Feature> {
         self.targets.iter().map(|aim| aim.feature.clone()).collect()
     }
 
-    /// Paths of the recordings, relative to the job file: those of the first conditions.
+    /// Paths of the recordings, relative to the job file. They belong to the first conditions.
     pub fn recordings(&self) -> impl Iterator<Item = &str> {
         self.conditions.iter().filter_map(|condition| condition.recording.as_deref())
     }
 
-    /// What decides the cost of a point: neither title, seed and budgets of the search nor how intervals are
-    /// found, so that a fit can be given a larger budget; nor the places of its files.
+    /// What decides the cost of a point. Title, seed, budgets, interval settings and file paths do not: a fit
+    /// can continue with a larger budget.
     pub(super) fn identity(&self) -> JobIdentity<'_> {
         JobIdentity {
-            conditions: self
-                .conditions
-                .iter()
-                .map(|c| (c.name.as_str(), c.set.as_slice(), c.held_out))
-                .collect(),
+            conditions: self.conditions.iter().map(|c| (&*c.name, &*c.set, c.held_out)).collect(),
             camera: self.camera,
             parameters: &self.parameters,
             constants: &self.constants,
@@ -136,50 +140,40 @@ impl Job {
         }
     }
 
-    /// Cameras on which a feature depends that is fitted, with the numbers of their conditions.
+    /// Cameras on which a fitted feature depends, with the numbers of their conditions.
     fn used_cameras(&self) -> Vec<(usize, FeatureCamera)> {
         let used = |at: usize| {
-            let aims = self.targets.iter().filter(|aim| aim.feature.condition == at && !aim.held_out);
-            aims.filter_map(|aim| self.target_calibration(aim)).next().is_some()
+            let mut aims = self.targets.iter().filter(|aim| aim.feature.condition == at && !aim.held_out);
+            aims.any(|aim| self.target_calibration(aim).is_some())
         };
         let cameras = self.conditions.iter().enumerate().filter_map(|(at, c)| Some((at, c.camera?)));
         cameras.filter(|(at, _)| used(*at)).collect()
     }
 
-    /// How the target of an aim depends on what is not known of its camera. `None` for what is no length, for
-    /// a number that the job gives, whose deviation is the job's, and in a job with traces.
+    /// How the target of an aim depends on the uncertain calibration of its camera. `None` for a feature that
+    /// is not a length, for a target that the job gives with its own deviation, and in a job with traces.
     pub(crate) fn target_calibration(&self, aim: &FitTarget) -> Option<TargetCalibration> {
         let measured = matches!(aim.source, TargetSource::Measured { .. }) && self.traces.is_empty();
         let condition = aim.feature.condition;
         let camera = self.conditions.get(condition)?.camera.filter(|_| measured)?;
         let FeatureCamera { scale_sd, offset_sd_m } = camera;
-        let found = TargetCalibration {
-            condition,
-            scale_sd,
-            offset_sd_m,
-            length: aim.feature.reading.length_calibration()?,
-        };
+        let length = aim.feature.reading.length_calibration()?;
+        let found = TargetCalibration { condition, scale_sd, offset_sd_m, length };
         (found.standard_deviations() != [0.0; 2]).then_some(found)
     }
 
-    fn validate(written: &as_written::JobFile, known: &[&str]) -> Result<Self, JobRefusal> {
+    fn validate(written: &as_written::JobFile, known: &[&str]) -> Result<Self, KeyRefusal> {
         settings::check_counts(written)?;
         let conditions = conditions::check_conditions(written, known)?;
         let camera = settings::check_camera_table(written)?;
         let parameters = parameters::check_parameters(&written.parameter, known)?;
         parameters.iter().try_for_each(|p| conditions::check_not_set(&conditions, &p.name))?;
-        let context = targets::TargetContext {
-            conditions: &conditions,
-            nyquist_hz: camera.map(|c| c.frame_rate_hz / 2.0),
-        };
         conditions::check_no_camera_with_traces(written)?;
         let traces = traces::check_traces(&written.trace, &conditions)?;
         let constants = parameters::check_constants(written, &parameters, known)?;
         constants.listed_names().try_for_each(|name| conditions::check_not_set(&conditions, name))?;
-        let aims = targets::check_targets(written, &context)?;
-        let (search, ensemble) = (settings::check_search(written)?, settings::check_ensemble(written)?);
-        let (largest_tilt_rad, intervals) =
-            (settings::check_largest_tilt_rad(written)?, settings::check_intervals(written)?);
+        let nyquist_hz = camera.map(|c| c.frame_rate_hz / 2.0);
+        let targets = targets::check_targets(written, &conditions, nyquist_hz)?;
         Ok(Self {
             title: written.title.clone(),
             conditions,
@@ -187,16 +181,14 @@ impl Job {
             parameters,
             constants,
             traces,
-            targets: aims,
-            search,
-            ensemble,
-            largest_tilt_rad,
-            intervals,
+            targets,
+            search: settings::check_search(written)?,
+            ensemble: settings::check_ensemble(written)?,
+            largest_tilt_rad: settings::check_largest_tilt_rad(written)?,
+            intervals: settings::check_intervals(written)?,
         })
     }
 }
-
-// Why a job is refused, and the checks that many keys share.
 
 /// Why a job was refused.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -204,16 +196,6 @@ pub enum JobError {
     /// It is not TOML of the right shape.
     #[error(transparent)]
     Toml(#[from] TomlError),
-    /// The bounds of a parameter are no bounds.
-    #[error("{file}: parameter `{name}`: {problem}")]
-    Bounds {
-        /// File as named by the user.
-        file: String,
-        /// Name of the parameter.
-        name: String,
-        /// What is wrong with them.
-        problem: BoundsError,
-    },
     /// A value that cannot be used.
     #[error("{file}: {key}: {problem}")]
     Value {
@@ -226,41 +208,11 @@ pub enum JobError {
     },
 }
 
-/// A refusal that does not know its file yet.
-pub(super) enum JobRefusal {
-    Value { key: String, problem: String },
-    Bounds { name: String, problem: BoundsError },
-}
-
-impl JobRefusal {
-    pub(super) fn in_file(self, file: &str) -> JobError {
-        let file = file.to_owned();
-        match self {
-            Self::Value { key, problem } => JobError::Value { file, key, problem },
-            Self::Bounds { name, problem } => JobError::Bounds { file, name, problem },
-        }
-    }
-}
-
-impl From<toml_file::KeyRefusal> for JobRefusal {
-    fn from((key, problem): toml_file::KeyRefusal) -> Self {
-        Self::Value { key, problem }
-    }
-}
-
-pub(super) fn refuse<T>(key: impl Into<String>, problem: impl Into<String>) -> Result<T, JobRefusal> {
-    Err(JobRefusal::Value { key: key.into(), problem: problem.into() })
-}
-
-pub(super) fn check_non_empty(key: &str, found: &str, expected: &str) -> Result<String, JobRefusal> {
+pub(super) fn check_non_empty(key: &str, found: &str, expected: &str) -> Result<String, KeyRefusal> {
     if found.trim().is_empty() {
-        return refuse(key, format!("found \"{found}\", expected {expected}"));
+        refuse!(key, "found \"{found}\", expected {expected}");
     }
     Ok(found.to_owned())
-}
-
-pub(super) fn check_above_zero(key: impl Into<String>, found: f64) -> Result<f64, JobRefusal> {
-    Ok(toml_file::check_above_zero(key, found)?)
 }
 
 pub(super) fn find_repeated<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<&'a str> {

@@ -1,9 +1,7 @@
-//! The ledger of a run: every evaluation is made once, in parallel where possible, and entered in an order
+//! The ledger of a run makes every evaluation once, in parallel where possible, and records them in an order
 //! that does not depend on the number of threads.
 
-use super::evaluation::Evaluation;
-use super::evaluation::EvaluationStage;
-use super::evaluation::FailureReason;
+use super::evaluation::{Evaluation, EvaluationStage, FailureReason};
 use super::feature_checkpoint::{EvaluationRecord, point_key};
 use super::objective::Objective;
 use crate::checkpoint::{CheckpointSink, format_record_line};
@@ -11,34 +9,34 @@ use rayon::prelude::*;
 use std::collections::{BTreeMap, HashMap};
 use std::ops::ControlFlow;
 
-/// How far a fit has come.
+/// Progress of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitProgress {
-    /// What the last evaluations were made for.
+    /// Purpose of the last evaluations.
     pub stage: EvaluationStage,
     /// Evaluations so far, replayed ones included.
     pub evaluations: usize,
-    /// Those of them that were taken from the journal.
+    /// Evaluations that were replayed from the journal.
     pub replayed: usize,
     /// Lowest cost so far.
     pub best_cost: f64,
 }
 
-/// Called with every entry; `Break` ends the search, and what was found so far is the result.
+/// Called after every evaluation; `Break` ends the search with the result so far.
 pub(crate) type OnProgress<'a> = dyn FnMut(&FitProgress) -> ControlFlow<()> + Send + 'a;
 
-/// Why no more evaluations are made.
+/// Reason for which no more evaluations are made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum StopReason {
     /// The evaluations allowed are used up.
     Budget,
-    /// It was asked to stop.
+    /// The progress callback asked to stop.
     Interrupted,
     /// The journal cannot be written.
     Journal(String),
 }
 
-/// The evaluations of one run and where they are written.
+/// The evaluations of one run and their journal.
 pub struct Ledger<'a> {
     objective: &'a Objective<'a>,
     journal: &'a mut dyn CheckpointSink,
@@ -51,12 +49,12 @@ pub struct Ledger<'a> {
     best: Option<Evaluation>,
     limit: usize,
     stop: Option<StopReason>,
-    /// Evaluations that are not yet written; `None` when they are written as they come.
+    /// Evaluations that are not yet written; `None` when they are written at once.
     held_lines: Option<Vec<(EvaluationStage, usize)>>,
 }
 
 impl<'a> Ledger<'a> {
-    /// A ledger that takes what `journaled` already holds from there; `limit` is the number of evaluations of
+    /// A ledger that replays the evaluations of `journaled`; `limit` is the largest number of evaluations of
     /// this run.
     #[must_use]
     pub fn new(
@@ -66,20 +64,18 @@ impl<'a> Ledger<'a> {
         on_progress: &'a mut OnProgress<'a>,
         limit: usize,
     ) -> Self {
-        let priced = |entry: &EvaluationRecord| {
-            (point_key(&entry.outcome.unit), objective.add_costs(entry.outcome.clone()))
+        let replay = |EvaluationRecord { outcome, .. }: &EvaluationRecord| {
+            (point_key(&outcome.unit), objective.add_costs(outcome.clone()))
         };
-        let replay = journaled.iter().map(priced).collect();
-        let (evaluations, places, lines) = (Vec::new(), HashMap::new(), journaled.len());
         Self {
             objective,
             journal,
             on_progress,
-            replay,
-            lines,
-            evaluations,
+            replay: journaled.iter().map(replay).collect(),
+            lines: journaled.len(),
+            evaluations: Vec::new(),
             replayed: 0,
-            places,
+            places: HashMap::new(),
             best: None,
             limit,
             stop: None,
@@ -87,11 +83,10 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    /// The evaluations at `points` of the unit box, in their order; a point known from this run is not
-    /// evaluated again.
+    /// The evaluations at `points` of the unit box, in their order. Points of this run are not evaluated again.
     ///
     /// # Errors
-    /// [`StopReason`] when not all of them could be made; what was made is kept.
+    /// [`StopReason`] if some could not be made; the others are kept.
     pub(crate) fn evaluate_points(
         &mut self,
         stage: EvaluationStage,
@@ -101,12 +96,14 @@ impl<'a> Ledger<'a> {
             return Err(stop.clone());
         }
         let (new, complete) = self.new_points(points);
-        // entered chunk by chunk so that little is lost when the program is killed; the order is that of the
-        // points
+        // recorded in chunks, in the order of the points, so that little is lost when the program is killed
         for chunk in new.chunks(2 * rayon::current_num_threads()) {
             let (objective, replay) = (self.objective, &self.replay);
-            let made: Vec<(Evaluation, bool)> =
-                chunk.par_iter().map(|point| make_evaluation(objective, replay, point)).collect();
+            let make = |point: &Vec<f64>| match replay.get(&point_key(point)) {
+                Some(known) => (known.clone(), true),
+                None => (objective.evaluate(point), false),
+            };
+            let made: Vec<(Evaluation, bool)> = chunk.par_iter().map(make).collect();
             self.write_lines(stage, &made)?;
             for (evaluation, replayed) in made {
                 self.count_evaluation(stage, evaluation, replayed);
@@ -121,21 +118,19 @@ impl<'a> Ledger<'a> {
         Ok(points.iter().filter_map(|point| self.find_evaluation(point)).collect())
     }
 
-    /// Holds new lines back until [`Self::release_lines`]: what is refused at the gate leaves no journal.
+    /// Holds new lines back until [`Self::release_lines`], so that a refused job leaves no journal.
     pub(crate) fn hold_lines(&mut self) {
         self.held_lines = Some(Vec::new());
     }
 
-    /// Writes `opening`, then every line that was held back.
+    /// Writes `opening`, then the lines that were held back.
     ///
     /// # Errors
-    /// Why the journal cannot be written.
+    /// The reason for which the journal cannot be written.
     pub(crate) fn release_lines(&mut self, opening: &str) -> Result<(), String> {
         let held = self.held_lines.take().unwrap_or_default();
-        let entries: Vec<_> = held
-            .into_iter()
-            .filter_map(|(stage, at)| Some((stage, self.evaluations.get(at)?.clone())))
-            .collect();
+        let entries: Vec<_> =
+            held.into_iter().map(|(stage, at)| (stage, self.evaluations[at].clone())).collect();
         let lines = opening.to_owned() + &self.format_lines(entries.into_iter());
         if lines.is_empty() { Ok(()) } else { self.journal.append(&lines) }
     }
@@ -150,8 +145,8 @@ impl<'a> Ledger<'a> {
         text
     }
 
-    /// Writes what was newly made, as one: the disk is waited for once, and nothing is counted or reported
-    /// before it has the lines.
+    /// Writes new evaluations in one call, which waits for the disk once. They are counted and reported only
+    /// afterwards.
     fn write_lines(&mut self, stage: EvaluationStage, made: &[(Evaluation, bool)]) -> Result<(), StopReason> {
         if let Some(held) = &mut self.held_lines {
             let places = made.iter().zip(self.evaluations.len()..).filter(|((_, replayed), _)| !replayed);
@@ -163,10 +158,10 @@ impl<'a> Ledger<'a> {
         if lines.is_empty() {
             return Ok(());
         }
-        self.journal.append(&lines).map_err(|problem| self.stop_for(StopReason::Journal(problem)))
+        self.journal.append(&lines).map_err(|problem| self.stop.insert(StopReason::Journal(problem)).clone())
     }
 
-    /// Counts what is known and what will be by another objective of the same model and features.
+    /// Replaces the objective by another one of the same model and features, and updates all costs.
     pub(crate) fn change_objective(&mut self, objective: &'a Objective<'a>) {
         self.objective = objective;
         let known = self.evaluations.iter_mut().chain(self.replay.values_mut());
@@ -209,7 +204,7 @@ impl<'a> Ledger<'a> {
         self.limit = limit;
     }
 
-    /// Why nothing more can be evaluated at all, other than the budget.
+    /// The reason other than the budget for which nothing more can be evaluated.
     pub(crate) fn stop_reason(&self) -> Option<&StopReason> {
         self.stop.as_ref()
     }
@@ -224,8 +219,8 @@ impl<'a> Ledger<'a> {
         counts
     }
 
-    /// The points of which this run knows nothing, each once, as many as the budget allows; and whether those
-    /// are all.
+    /// The points that this run has not evaluated, without repetitions and within the budget, and whether these
+    /// are all of them.
     fn new_points(&self, points: &[Vec<f64>]) -> (Vec<Vec<f64>>, bool) {
         let mut new: Vec<Vec<f64>> = Vec::new();
         for point in points.iter().filter(|point| self.find_evaluation(point).is_none()) {
@@ -238,7 +233,7 @@ impl<'a> Ledger<'a> {
         (new, complete)
     }
 
-    /// Counts and reports what was written; asked to stop, it counts the rest of what was written with it.
+    /// Counts and reports an evaluation that was written.
     fn count_evaluation(&mut self, stage: EvaluationStage, evaluation: Evaluation, replayed: bool) {
         self.replayed += usize::from(replayed);
         self.places.insert(point_key(&evaluation.unit), self.evaluations.len());
@@ -254,25 +249,8 @@ impl<'a> Ledger<'a> {
         }
     }
 
-    fn stop_for(&mut self, stop: StopReason) -> StopReason {
-        self.stop = Some(stop.clone());
-        stop
-    }
-
-    /// What this run knows of a point.
+    /// The evaluation of this run at a point.
     pub(crate) fn find_evaluation(&self, point: &[f64]) -> Option<&Evaluation> {
         self.places.get(&point_key(point)).and_then(|at| self.evaluations.get(*at))
-    }
-}
-
-/// The evaluation at `point`, and whether it came from a journal.
-fn make_evaluation(
-    objective: &Objective,
-    replay: &HashMap<Vec<u64>, Evaluation>,
-    point: &[f64],
-) -> (Evaluation, bool) {
-    match replay.get(&point_key(point)) {
-        Some(known) => (known.clone(), true),
-        None => (objective.evaluate(point), false),
     }
 }

@@ -1,12 +1,14 @@
-//! What a fit needs of a model.
+//! The interface between a fit and a model.
 
 use super::evaluation::{FailureReason, Observation, Observed, RunFailure};
+use super::job::FitTarget;
+use super::targets::TargetValue;
 use crate::feature::{Feature, FeatureValue, MissingValue, ValueComparison, read_assigned_features};
 use crate::math;
 use crate::recording::Recording;
 use rayon::prelude::*;
 
-/// Features of a model at parameter values: what the objective needs, and all that it knows.
+/// Features of a model at parameter values. The objective knows a model by this trait only.
 pub trait FeaturePredictor: Sync {
     /// One entry a target, in their order; `values` are the free parameters in job order, in their SI units.
     ///
@@ -14,20 +16,20 @@ pub trait FeaturePredictor: Sync {
     /// [`RunFailure`] when the run ended before anything could be observed.
     fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure>;
 
-    /// What one measurement of that model would show: noise, lost points and starting state of draw number
-    /// `draw`.
+    /// The features of one simulated measurement of that model, with the noise, lost points and starting state
+    /// of draw number `draw`.
     ///
     /// # Errors
     /// As [`Self::predict_features`].
     fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure>;
 }
 
-/// Which of the many equally likely runs and recordings of a model.
+/// One of the equally likely runs and recordings of a model.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Draw {
     /// Starting state; 0 is the scene's own.
     pub member: u64,
-    /// Noise of the tracking; 0 is the one that every evaluation of a search shares.
+    /// Seed of the tracking noise; every evaluation of a search uses 0.
     pub noise: u64,
     /// Whether frames are lost as in the recording.
     pub dropouts: bool,
@@ -35,7 +37,7 @@ pub struct Draw {
 
 /// A model that is seen through cameras.
 pub trait Model: Sync {
-    /// What the camera of a condition of the job (counted from 0) records; `values` are the free parameters
+    /// The recording of a condition of the job, counted from 0, by its camera; `values` are the free parameters
     /// in job order, in their SI units.
     ///
     /// # Errors
@@ -43,10 +45,10 @@ pub trait Model: Sync {
     fn record_condition(&self, values: &[f64], condition: usize, draw: Draw)
     -> Result<Recording, RunFailure>;
 
-    /// The same of a run that starts otherwise.
+    /// The recording of a run with another start.
     ///
     /// # Errors
-    /// As [`Self::record_condition`]; also where the model knows no other start.
+    /// As [`Self::record_condition`]; also if the model has no other start.
     fn record_restarted(
         &self,
         values: &[f64],
@@ -58,34 +60,32 @@ pub trait Model: Sync {
         Err(RunFailure::new(FailureReason::Refused, "this model knows no other start", 0.0))
     }
 
-    /// The time in which a wrong start decays to a share of 1/e, s; `None` where it is unknown.
+    /// Time constant with which an error of the start decays, s; `None` where it is unknown.
     fn decay_s(&self, values: &[f64], condition: usize) -> Option<f64> {
         let _ = (values, condition);
         None
     }
 
-    /// By how much earlier a run may start, s.
+    /// Longest time by which a run may start earlier, s.
     fn max_lead_s(&self, condition: usize) -> f64 {
         let _ = condition;
         f64::INFINITY
     }
 }
 
-/// How a run starts, other than its scene says.
+/// A start other than that of the scene.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Restart {
-    /// Earlier by this time, s; it is recorded from the same instant.
+    /// Earlier by this time, s; the recording starts at the same instant.
     Earlier(f64),
-    /// With angles that are larger by this share.
+    /// With angles that are larger by this fraction.
     Moved(f64),
 }
 
-// The features of a model's recordings, averaged over its starting states.
-
-/// The features of a model's recordings.
+/// The features of a model's recordings, averaged over its starting states.
 pub(crate) struct ModelFeatures<'a> {
     model: &'a dyn Model,
-    /// With conditions counted among those that are read.
+    /// Their conditions are indices into `conditions`.
     features: Vec<Feature>,
     targets: Vec<f64>,
     conditions: Vec<usize>,
@@ -93,8 +93,8 @@ pub(crate) struct ModelFeatures<'a> {
 }
 
 impl<'a> ModelFeatures<'a> {
-    /// Features with the targets to which peaks are assigned, averaged over `members` starting states (at
-    /// least 1). Conditions of which nothing is read are not simulated.
+    /// Features with the target values to which peaks are assigned, averaged over `members` starting states
+    /// (at least 1). Conditions without features are not simulated.
     pub(crate) fn new(model: &'a dyn Model, features: &[Feature], targets: Vec<f64>, members: usize) -> Self {
         let mut conditions: Vec<usize> = features.iter().map(|feature| feature.condition).collect();
         conditions.sort_unstable();
@@ -112,6 +112,17 @@ impl<'a> ModelFeatures<'a> {
         }
     }
 
+    /// The same for the features of fitted targets.
+    pub(crate) fn for_targets(
+        model: &'a dyn Model,
+        aims: &[FitTarget],
+        targets: &[TargetValue],
+        members: usize,
+    ) -> Self {
+        let features: Vec<Feature> = aims.iter().map(|aim| aim.feature.clone()).collect();
+        Self::new(model, &features, targets.iter().map(|target| target.value).collect(), members)
+    }
+
     /// Every feature of one draw.
     ///
     /// # Errors
@@ -121,22 +132,16 @@ impl<'a> ModelFeatures<'a> {
         values: &[f64],
         draw: Draw,
     ) -> Result<Vec<Result<FeatureValue, MissingValue>>, RunFailure> {
-        let recordings = self
-            .conditions
-            .iter()
-            .map(|condition| self.model.record_condition(values, *condition, draw))
-            .collect::<Result<Vec<Recording>, _>>()?;
+        let record = |condition: &usize| self.model.record_condition(values, *condition, draw);
+        let recordings = self.conditions.iter().map(record).collect::<Result<Vec<Recording>, _>>()?;
         Ok(read_assigned_features(&self.features, &self.targets, &recordings.iter().collect::<Vec<_>>()))
     }
 }
 
 impl FeaturePredictor for ModelFeatures<'_> {
     fn predict_features(&self, values: &[f64]) -> Result<Vec<Observed>, RunFailure> {
-        let members = 0..self.members as u64;
-        let runs: Vec<_> = members
-            .into_par_iter()
-            .map(|member| self.read_features(values, Draw { member, ..Draw::default() }))
-            .collect();
+        let run = |member| self.read_features(values, Draw { member, ..Draw::default() });
+        let runs: Vec<_> = (0..self.members as u64).into_par_iter().map(run).collect();
         let failed = runs.iter().filter(|run| run.is_err()).count();
         if 2 * failed >= runs.len()
             && let Some(Err(failure)) = runs.iter().find(|run| run.is_err())
@@ -148,7 +153,7 @@ impl FeaturePredictor for ModelFeatures<'_> {
     }
 
     fn simulate_twin(&self, values: &[f64], draw: u64) -> Result<Vec<Observed>, RunFailure> {
-        // starting states of twins are none of those that are averaged over
+        // a twin starts in none of the states that the fit averages over
         let member = if self.members > 1 { self.members as u64 + draw } else { 0 };
         let read = self.read_features(values, Draw { member, noise: draw, dropouts: true })?;
         Ok(read.into_iter().map(observe_reading).collect())
@@ -156,14 +161,12 @@ impl FeaturePredictor for ModelFeatures<'_> {
 }
 
 fn observe_reading(read: Result<FeatureValue, MissingValue>) -> Observed {
-    read.map_or_else(
-        |missing| Observed::Missing(missing.to_string()),
-        |read| Observed::Value(make_observation(read.value, 0.0, read.below_db)),
-    )
-}
-
-fn make_observation(value: f64, spread: f64, below_db: f64) -> Observation {
-    Observation { value, spread, below_db }
+    match read {
+        Ok(FeatureValue { value, below_db, .. }) => {
+            Observed::Value(Observation { value, spread: 0.0, below_db })
+        }
+        Err(missing) => Observed::Missing(missing.to_string()),
+    }
 }
 
 /// Mean and spread of a feature over the starting states; missing where at most half of them show it.
@@ -173,13 +176,13 @@ fn average_runs(runs: &[Vec<Result<FeatureValue, MissingValue>>], at: usize, fea
         let why = runs.iter().find_map(|run| run.get(at)?.as_ref().err());
         return Observed::Missing(why.map_or_else(|| "no run shows it".to_owned(), ToString::to_string));
     }
-    if let [only] = shown.as_slice() {
-        return Observed::Value(make_observation(only.value, 0.0, only.below_db));
+    if let [FeatureValue { value, below_db, .. }] = shown[..] {
+        return Observed::Value(Observation { value: *value, spread: 0.0, below_db: *below_db });
     }
     let count = shown.len() as f64;
     let below_db = shown.iter().map(|read| read.below_db).sum::<f64>() / count;
     let values = shown.iter().map(|read| read.value);
-    // a mean of logarithms where residuals are logarithms and nothing changes its sign
+    // average logarithms where residuals are logarithms and all values have one sign
     let log = feature.reading.comparison() == ValueComparison::Log
         && (shown.iter().all(|read| read.value > 0.0) || shown.iter().all(|read| read.value < 0.0));
     let taken: Vec<f64> = if log { values.map(|v| math::ln(v.abs())).collect() } else { values.collect() };
@@ -188,7 +191,7 @@ fn average_runs(runs: &[Vec<Result<FeatureValue, MissingValue>>], at: usize, fea
     let sign = shown.first().map_or(1.0, |read| read.value.signum());
     let (value, spread) =
         if log { (sign * math::exp(mean), spread * math::exp(mean)) } else { (mean, spread) };
-    Observed::Value(make_observation(value, spread, below_db))
+    Observed::Value(Observation { value, spread, below_db })
 }
 
 #[cfg(test)]

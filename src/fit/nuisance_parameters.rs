@@ -1,15 +1,15 @@
-//! Constants of the scenes that a trace fit frees within priors, and the one combination of all parameters
-//! that no motion shows.
+//! Constants of the scenes that a trace fit frees within priors, and the common scale of masses and forces,
+//! which no motion shows.
 
 use super::job::{Constants, FreeParameter, Job, NuisanceParameter, is_same_quantity};
 use crate::math;
 use crate::model::parameters::{ModelParameter, ParameterQuantity, ParameterRange, find_parameter};
 use crate::simulate::scene::Scene;
 
-/// How far a freed constant may move, in standard deviations of its prior.
+/// Range of a freed constant on either side of its value, in standard deviations of its prior.
 const RANGE_SD: f64 = 5.0;
 
-/// A constant that is freed, with what is known of it.
+/// A constant that is freed, with its prior.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FreedConstant {
     /// Key of the scene with its table.
@@ -32,51 +32,15 @@ impl FreedConstant {
     }
 }
 
-/// Why constants or parameters cannot be freed as the job wants it.
+/// Constants or parameters that cannot be freed as the job asks: what was found, what was expected, what to do.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub enum NuisanceError {
-    /// A scene has no such number, or none that a ratio can change.
-    #[error(
-        "nuisance `{name}`: found {found} in the scene of `{condition}`, expected a number above 0, because its prior is one of its logarithm; remove it"
-    )]
-    Absent {
-        /// Key of the scene.
-        name: String,
-        /// Name of the condition.
-        condition: String,
-        /// Its value, in words.
-        found: String,
-    },
-    /// Two scenes have different values of one constant.
-    #[error(
-        "nuisance `{name}`: found {first} in the scene of `{one}` and {second} in that of `{other}`, expected one value for all; correct a scene, or remove it"
-    )]
-    Differs {
-        /// Key of the scene.
-        name: String,
-        /// Name of the first condition.
-        one: String,
-        /// Value there.
-        first: f64,
-        /// Name of another condition.
-        other: String,
-        /// Value there.
-        second: f64,
-    },
-    /// All masses and forces are free.
-    #[error(
-        "parameters: everything of the scene that has a unit of mass or force is free and without a prior ({names}): multiplied by one factor, masses, inertias, stiffnesses, dampings and preload give the same motion, so no recording tells their size; give one of them a `prior`, or leave one out"
-    )]
-    Scaling {
-        /// Names of the parameters.
-        names: String,
-    },
-}
+#[error("{0}")]
+pub struct NuisanceError(String);
 
 /// Constants that a job frees, in the order of its list or of their names.
 ///
 /// # Errors
-/// [`NuisanceError`] for one of a list that a scene does not have, or of which scenes differ.
+/// [`NuisanceError`] for a listed constant that a scene does not have, or whose values differ between scenes.
 pub(crate) fn free_constants(job: &Job, scenes: &[Scene]) -> Result<Vec<FreedConstant>, NuisanceError> {
     match &job.constants {
         Constants::Exact => Ok(Vec::new()),
@@ -96,39 +60,41 @@ fn free_listed_constant(
         let found = scene.value(name);
         let Some(value) = found.filter(|value| *value > 0.0) else {
             let found = found.map_or("nothing".to_owned(), |value| value.to_string());
-            let (name, condition) = (name.clone(), condition.name.clone());
-            return Err(NuisanceError::Absent { name, condition, found });
+            return Err(NuisanceError(format!(
+                "nuisance `{name}`: found {found} in the scene of `{}`, expected a number above 0, because its prior is one of its logarithm; remove it",
+                condition.name
+            )));
         };
         let (before, one) = *first.get_or_insert((value, &condition.name));
         if before.to_bits() != value.to_bits() {
-            let (name, one, other) = (name.clone(), one.to_owned(), condition.name.clone());
-            return Err(NuisanceError::Differs { name, one, first: before, other, second: value });
+            return Err(NuisanceError(format!(
+                "nuisance `{name}`: found {before} in the scene of `{one}` and {value} in that of `{}`, expected one value for all; correct a scene, or remove it",
+                condition.name
+            )));
         }
     }
     let value = first.map_or(0.0, |(value, _)| value);
     Ok(FreedConstant { name: name.clone(), value, sd_relative: *sd_relative })
 }
 
-/// Everything that is measured with an error of percents, as the first scene writes it, where all scenes have
-/// one value.
+/// All constants that are measured to percents, in the form in which the first scene writes them, where all
+/// scenes have the same value.
 fn free_all_constants(sd_relative: f64, job: &Job, scenes: &[Scene]) -> Vec<FreedConstant> {
     let Some((scene, others)) = scenes.split_first() else { return Vec::new() };
     let is_set = |name: &str| {
         job.conditions.iter().flat_map(|c| &c.set).any(|(set, _)| is_same_quantity(set, name))
             || find_free_parameter(job, name).is_some()
     };
-    scene
-        .written_values()
-        .filter(|(name, value)| {
-            *value > 0.0 && find_parameter(name).is_some_and(is_constant) && !is_set(name)
-        })
-        .filter(|(name, value)| others.iter().all(|other| other.value(name) == Some(*value)))
-        .map(|(name, value)| FreedConstant { name: name.to_owned(), value, sd_relative })
-        .collect()
+    let is_freed = |(name, value): &(&str, f64)| {
+        let usable = *value > 0.0 && find_parameter(name).is_some_and(is_constant) && !is_set(name);
+        usable && others.iter().all(|other| other.value(name) == Some(*value))
+    };
+    let freed = |(name, value): (&str, f64)| FreedConstant { name: name.to_owned(), value, sd_relative };
+    scene.written_values().filter(is_freed).map(freed).collect()
 }
 
-/// Lengths and centres of mass are measured with a ruler; friction is what is sought; drive and restitution
-/// belong to the experiment.
+/// Whether a parameter is a constant with an error of percents. Lengths and centres of mass are exact, friction
+/// is sought, and drive and restitution belong to the experiment.
 fn is_constant(parameter: &ModelParameter) -> bool {
     use ParameterQuantity as Q;
     let exact = [Q::NeckLength, Q::LipLength, Q::NeckCentre, Q::LipCentre, Q::Restitution];
@@ -136,14 +102,14 @@ fn is_constant(parameter: &ModelParameter) -> bool {
     !exact.contains(&parameter.quantity) && !sought.contains(&parameter.quantity)
 }
 
-/// Refuses a job in which everything that has a unit of mass is free and nothing holds its size.
+/// Refuses a job in which every parameter with a unit of mass or force is free and has no prior.
 ///
 /// # Errors
-/// [`NuisanceError::Scaling`].
+/// [`NuisanceError`] with the names of the parameters.
 pub(crate) fn check_scaling(job: &Job, scenes: &[Scene]) -> Result<(), NuisanceError> {
-    // a constant that is not free, or free within a prior, has a size of its own
+    // a fixed value or a prior fixes the scale
     let is_held = |(name, _): (&str, f64)| match find_free_parameter(job, name) {
-        // what is free is written as the job writes it: a stiffness as a frequency has no unit of mass
+        // the form of the job decides: a stiffness written as a frequency has no unit of mass
         Some(free) => has_mass(&free.name) && free.prior.is_some(),
         None => has_mass(name),
     };
@@ -153,15 +119,17 @@ pub(crate) fn check_scaling(job: &Job, scenes: &[Scene]) -> Result<(), NuisanceE
     }
     let heavy = job.parameters.iter().filter(|free| has_mass(&free.name));
     let names = heavy.map(|free| format!("`{}`", free.name)).collect::<Vec<_>>().join(", ");
-    Err(NuisanceError::Scaling { names })
+    Err(NuisanceError(format!(
+        "parameters: everything of the scene that has a unit of mass or force is free and without a prior ({names}): multiplied by one factor, masses, inertias, stiffnesses, dampings and preload give the same motion, so no recording tells their size; give one of them a `prior`, or leave one out"
+    )))
 }
 
-/// The parameter that a job frees of this quantity, however it writes it.
+/// The free parameter of this quantity, whatever its form in the job.
 fn find_free_parameter<'a>(job: &'a Job, name: &str) -> Option<&'a FreeParameter> {
     job.parameters.iter().find(|free| is_same_quantity(&free.name, name))
 }
 
-/// Whether the unit of a parameter holds a mass: kg and N do.
+/// Whether the unit of a parameter contains a mass, as kg and N do.
 fn has_mass(name: &str) -> bool {
     find_parameter(name)
         .is_some_and(|parameter| parameter.unit.starts_with("kg") || parameter.unit.starts_with('N'))

@@ -1,23 +1,20 @@
-//! The posterior density of a job's unknowns, for samplers and optimisers of others.
+//! The posterior density of a job's unknowns, for external samplers and optimisers.
 //!
-//! `ln p(x) = ln p(data | x) + ln p(x)`, up to a constant of the data. Every unknown has a range. In it its
-//! prior is flat along its coordinate (its logarithm, or itself), or normal and cut off at the ends. Of a job
-//! on features the likelihood is `-cost / 2` without the share of the priors ([`super::objective`]). Of a job
-//! on traces it is `-chi^2 / 2` with the starting states of the segments where they fit best
+//! `ln p(x) = ln p(data | x) + ln p(x)`, up to a constant of the data. Every unknown has a range. Its prior is
+//! flat along its coordinate (its logarithm, or itself), or normal and truncated to the range. The likelihood
+//! of a job on features is `-cost / 2` without the terms of the priors ([`super::objective`]). That of a job on
+//! traces is `-chi^2 / 2`, minimised over the starting states of the segments
 //! ([`super::trace::fit_states_at`]).
 
 use super::FitError;
-use super::bounds::BoundsSpacing;
-use super::bounds::{Prior, SearchAxis};
+use super::bounds::{BoundsSpacing, Prior, SearchAxis};
+use super::job::FreeParameter;
 use super::model::ModelFeatures;
 use super::objective::{Objective, residual};
 use super::problem::Problem;
-use super::run::search_axis;
-use super::targets::TargetValue;
-use super::targets::measure_targets;
+use super::targets::{TargetValue, measure_targets, split_held_out};
 use super::trace::{TraceModel, fit_states_at, frame_residuals};
 use super::trace_checkpoint::HeaderCoordinate;
-
 use crate::feature::Feature;
 use crate::math;
 use std::f64::consts::{LN_2, SQRT_2, TAU};
@@ -25,7 +22,7 @@ use std::f64::consts::{LN_2, SQRT_2, TAU};
 /// An unknown: its range and its prior along a coordinate, which is its logarithm or itself.
 #[derive(Debug, Clone, PartialEq)]
 pub struct PosteriorParameter {
-    /// Key of the scene with its table; of a camera its recording and the quantity.
+    /// Key of the scene with its table, or recording and quantity of a camera.
     pub name: String,
     /// Least and greatest value, in its SI unit.
     pub bounds: [f64; 2],
@@ -48,7 +45,7 @@ enum PosteriorData {
 }
 
 impl Posterior {
-    /// Of a problem on features or on traces; what is held out is left out.
+    /// The posterior of a problem on features or on traces, without its held-out targets.
     ///
     /// # Errors
     /// [`FitError`] where a target cannot be measured, or a head that drives a model is not tracked.
@@ -64,13 +61,10 @@ impl Posterior {
         }
         let job = problem.job();
         let all = measure_targets(job, problem.recordings())?;
-        let fitted = job.targets.iter().zip(all).filter(|(aim, _)| !aim.held_out);
-        let (features, targets) = fitted.map(|(aim, target)| (aim.feature.clone(), target)).unzip();
-        let unknowns = job
-            .parameters
-            .iter()
-            .map(|free| PosteriorParameter::from_axis(&free.name, &search_axis(free)))
-            .collect();
+        let (aims, targets, _) = split_held_out(job, all);
+        let features = aims.into_iter().map(|aim| aim.feature).collect();
+        let unknown = |p: &FreeParameter| PosteriorParameter::from_axis(&p.name, &p.search_axis());
+        let unknowns = job.parameters.iter().map(unknown).collect();
         Ok(Self { problem, unknowns, data: PosteriorData::Features { features, targets } })
     }
 
@@ -86,7 +80,7 @@ impl Posterior {
         &self.unknowns
     }
 
-    /// The values at a place in the unit box: uniform places have the prior for density.
+    /// The values at a point of the unit box. Uniform points are mapped to samples of the prior.
     #[must_use]
     pub fn prior_transform(&self, unit: &[f64]) -> Vec<f64> {
         self.unknowns.iter().zip(unit).map(|(unknown, u)| unknown.quantile(*u)).collect()
@@ -110,9 +104,8 @@ impl Posterior {
                 if found.failure.is_some() { f64::NEG_INFINITY } else { -found.cost / 2.0 }
             }
             PosteriorData::Traces(model) => {
-                let chi2 =
-                    fit_states_at(model, self.problem.segment_s(), &unknown_coordinates(model, values))
-                        .map(|at| at.segments.iter().map(|segment| segment.chi2).sum::<f64>());
+                let at = fit_states_at(model, self.problem.segment_s(), &unknown_coordinates(model, values));
+                let chi2 = at.map(|at| at.segments.iter().map(|segment| segment.chi2).sum::<f64>());
                 chi2.map_or(f64::NEG_INFINITY, |chi2| -chi2 / 2.0)
             }
         }
@@ -125,9 +118,8 @@ impl Posterior {
         if prior == f64::NEG_INFINITY { prior } else { prior + self.log_likelihood(values) }
     }
 
-    /// Distances of model and data in standard deviations: of the features in the order of the job, or of the
-    /// traces, recording by recording, tip before head, in every frame that is fitted. `None` where the model
-    /// shows none.
+    /// Residuals (model minus data) in standard deviations: one per feature in the order of the job, or one per
+    /// fitted frame of the traces, recording by recording, tip before head. `None` where the model has no value.
     #[must_use]
     pub fn residuals(&self, values: &[f64]) -> Vec<Option<f64>> {
         match &self.data {
@@ -191,7 +183,7 @@ impl PosteriorParameter {
             Some(prior) => {
                 let ends = self.standardized_bounds(prior);
                 let all = normal_probability(ends[0], ends[1]);
-                // from the nearer end, so that neither tail is lost to rounding
+                // integrate from the nearer end: neither tail is lost to rounding
                 let below = |x: f64| match unit < 0.5 {
                     true => normal_probability(ends[0], x) - unit * all,
                     false => (1.0 - unit) * all - normal_probability(x, ends[1]),
@@ -209,32 +201,30 @@ impl PosteriorParameter {
         if !(low..=high).contains(&value) {
             return f64::NEG_INFINITY;
         }
-        // from the coordinate to the value
+        // Jacobian of the coordinate by the value
         let slope = if self.is_log { -math::ln(value) } else { 0.0 };
         let along = match self.prior {
             None => -math::ln(self.coordinate(high) - self.coordinate(low)),
             Some(prior @ [mean, sd]) => {
                 let [low, high] = self.standardized_bounds(prior);
                 let off = (self.coordinate(value) - mean) / sd;
-                -off * off / 2.0
-                    - math::ln(sd)
-                    - math::ln(TAU) / 2.0
-                    - math::ln(normal_probability(low, high))
+                let all = math::ln(normal_probability(low, high));
+                -off * off / 2.0 - math::ln(sd) - math::ln(TAU) / 2.0 - all
             }
         };
         along + slope
     }
 }
 
-/// Share of a standard normal distribution between two places; exact in either tail.
+/// Probability of a standard normal variable between two limits; accurate in both tails.
 fn normal_probability(from: f64, to: f64) -> f64 {
     let above = |x: f64| math::erfc(x / SQRT_2) / 2.0;
     if from > 0.0 { above(from) - above(to) } else { above(-to) - above(-from) }
 }
 
-/// Where a rising function is zero, to the last bit that halving reaches.
+/// Root of a rising function by bisection to rounding.
 fn bisect_root(of: impl Fn(f64) -> f64, [mut low, mut high]: [f64; 2]) -> f64 {
-    // 38 deviations are as far as a normal density is above zero
+    // beyond 38 deviations the normal density underflows to zero
     (low, high) = (low.max(-38.0), high.min(38.0));
     let halvings = (f64::MANTISSA_DIGITS as f64 + math::ln((high - low).max(2.0)) / LN_2) as usize;
     for _ in 0..halvings {

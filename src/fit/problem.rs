@@ -1,16 +1,14 @@
-//! A job with its scenes and recordings: everything that decides a fit.
+//! A job with its scenes and recordings: the complete input of a fit.
 
-use super::job::{FitTarget, FreeParameter, HeadSource, Job};
+use super::job::{FreeParameter, HeadSource, Job};
 use super::ledger::{FitProgress, OnProgress};
 use super::model::ModelFeatures;
 use super::nuisance_parameters::{FreedConstant, NuisanceError, check_scaling, free_constants};
 use super::objective::Objective;
-use super::result::{
-    FeatureResult, FitResult, ModelledTargets, NuisanceResult, StartState, predicted_feature_result,
-};
-use super::run::{FitContext, fit_features, predict_held_out, read_best_model, search_axis};
+use super::result::{FeatureResult, FitResult, ModelledTargets};
+use super::run::{FitContext, fit_features, predict_held_out, read_best_model};
 use super::scene_model::{Instrument, ModelCondition, PlausibilityLimits, SceneModel};
-use super::targets::TargetValue;
+use super::targets::{TargetValue, split_held_out};
 use super::trace::{TraceModel, TraceSource};
 use super::trace_data::{TraceData, TraceError, prepare_traces};
 use super::trace_ledger::TraceProgress;
@@ -26,16 +24,16 @@ use serde::Serialize;
 use std::ops::ControlFlow;
 use std::sync::Arc;
 
-/// Most frames of a run of the model: each thread holds one run, a million frames are a tenth of a gigabyte,
-/// and a mistyped rate is refused instead of filling memory.
+/// Most frames of a run of the model. Each thread holds one run, and a million frames take 0.1 GB; a mistyped
+/// rate must not fill the memory.
 const MOST_FRAMES: f64 = 1e6;
 
-/// A recording with what its frames do not say.
+/// A recording with its exposure, which the frames do not contain.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MeasuredRecording {
     /// The recording.
     pub recording: Recording,
-    /// Time for which the shutter was open, s; `None` where it is unknown, which counts as an instant.
+    /// Exposure time, s; `None` where it is unknown, which is treated as zero.
     pub exposure_s: Option<f64>,
 }
 
@@ -45,7 +43,7 @@ impl From<Recording> for MeasuredRecording {
     }
 }
 
-/// Why a job does not go with its scenes and recordings.
+/// A job that does not match its scenes and recordings.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum ProblemError {
     /// The job has another number of conditions.
@@ -64,37 +62,13 @@ pub enum ProblemError {
         /// Recordings of the job.
         expected: usize,
     },
-    /// A scene cannot be driven by its recording.
-    #[error("`{condition}`, `drive`: {problem}")]
-    Drive {
-        /// Name of the condition.
-        condition: String,
-        /// The scene's refusal.
-        problem: Box<SceneError>,
-    },
-    /// A scene refuses what a condition sets.
-    #[error("`{condition}`, `set`, `{name}`: {problem}")]
-    Set {
-        /// Name of the condition.
-        condition: String,
-        /// Name of the parameter.
-        name: String,
-        /// The scene's refusal.
-        problem: Box<SceneError>,
-    },
-    /// A camera takes too few or too many frames of a run.
-    #[error(
-        "`{condition}`: found {found:.3e} frames in the {length_s} s of its scene's run at {frame_rate_hz} frames/s, expected 1 to {MOST_FRAMES:e}; correct the rate of the camera, or run.stop_s of the scene"
-    )]
-    Frames {
-        /// Name of the condition.
-        condition: String,
-        /// Frames of a run.
-        found: f64,
-        /// Length of the run, s.
-        length_s: f64,
-        /// Rate of the camera, 1/s.
-        frame_rate_hz: f64,
+    /// A scene refuses its drive, a value or a bound, or its run has too few or too many frames.
+    #[error("{place}: {problem}")]
+    Scene {
+        /// The condition or bound.
+        place: String,
+        /// What was found, what was expected, and what to do.
+        problem: String,
     },
     /// A trace does not go with its recording.
     #[error(transparent)]
@@ -102,14 +76,6 @@ pub enum ProblemError {
     /// Constants or parameters cannot be freed as the job wants it.
     #[error(transparent)]
     Constants(#[from] NuisanceError),
-    /// A scene refuses a bound of a free parameter.
-    #[error("bounds of `{name}`: {problem}")]
-    Bounds {
-        /// Name of the parameter.
-        name: String,
-        /// The scene's refusal.
-        problem: Box<SceneError>,
-    },
 }
 
 /// A checked job with its scenes and recordings, ready to be fitted.
@@ -124,13 +90,14 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// Puts a job together with its scenes, one for each of [`Job::conditions`], and its recordings, one for
-    /// each condition that has one, both in the order of the job.
+    /// Combines a job with its scenes, one per condition ([`Job::conditions`]), and its recordings, one per
+    /// condition that has a recording, both in the order of the job.
     ///
-    /// What a condition sets is set in its scene, and both bounds of every free parameter are tried.
+    /// The values that a condition sets replace those of its scene. Both bounds of every free parameter have to
+    /// be valid in every scene.
     ///
     /// # Errors
-    /// [`ProblemError`] at the first that does not fit.
+    /// [`ProblemError`] for the first mismatch.
     pub fn new(job: Job, scenes: Vec<Scene>, measured: Vec<MeasuredRecording>) -> Result<Self, ProblemError> {
         let (found, expected) = (scenes.len(), job.conditions.len());
         if found != expected {
@@ -141,25 +108,27 @@ impl Problem {
             return Err(ProblemError::Recordings { found, expected });
         }
         let mut measured = measured.into_iter();
-        let measured: Vec<Option<MeasuredRecording>> = job
-            .conditions
-            .iter()
-            .map(|condition| condition.recording.as_ref().and_then(|_| measured.next()))
-            .collect();
-        let scenes: Vec<Scene> = (0..scenes.len())
-            .map(|at| check_scene(&job, at, &scenes[at], measured[at].as_ref()))
-            .collect::<Result<_, _>>()?;
-        let mut filmed = scenes.iter().zip(&measured).zip(&job.conditions);
-        filmed.try_for_each(|((scene, measured), condition)| {
-            check_frames(&job, &condition.name, scene, measured.as_ref())
-        })?;
+        let paths = job.conditions.iter().map(|condition| condition.recording.as_ref());
+        let measured: Vec<Option<MeasuredRecording>> =
+            paths.map(|path| path.and_then(|_| measured.next())).collect();
+        let check = |at: usize| check_scene(&job, at, &scenes[at], measured[at].as_ref());
+        let scenes: Vec<Scene> = (0..scenes.len()).map(check).collect::<Result<_, _>>()?;
+        for ((scene, measured), condition) in scenes.iter().zip(&measured).zip(&job.conditions) {
+            check_frames(&job, &condition.name, scene, measured.as_ref())?;
+        }
         let constants = free_constants(&job, &scenes)?;
         check_scaling(&job, &scenes)?;
+        let identities = measured.iter().map(|measured| {
+            let MeasuredRecording { recording, exposure_s } = measured.as_ref()?;
+            let (grid, traces) = (recording.grid(), recording.traces());
+            let synthetic = recording.is_synthetic();
+            Some(RecordingIdentity { grid, traces, exposure_s: *exposure_s, synthetic })
+        });
         let fingerprint = fingerprint(&ProblemIdentity {
             version: env!("CARGO_PKG_VERSION"),
             job: job.identity(),
             scenes: &scenes,
-            recordings: measured.iter().map(|measured| measured.as_ref().map(Into::into)).collect(),
+            recordings: identities.collect(),
         });
         let recordings: Vec<Option<Recording>> =
             measured.iter().map(|measured| Some(measured.as_ref()?.recording.clone())).collect();
@@ -168,8 +137,8 @@ impl Problem {
             scene,
             instrument: recording_instrument(&job, measured.as_ref()),
         });
-        let plausible =
-            PlausibilityLimits { spread: job.ensemble.spread, largest_tilt_rad: job.largest_tilt_rad };
+        let (spread, largest_tilt_rad) = (job.ensemble.spread, job.largest_tilt_rad);
+        let plausible = PlausibilityLimits { spread, largest_tilt_rad };
         let model = SceneModel::new(conditions.collect(), job.parameter_names(), plausible);
         Ok(Self { job, model, recordings, traces, segment_s, constants, fingerprint })
     }
@@ -180,22 +149,22 @@ impl Problem {
         &self.job
     }
 
-    /// Each scene through the camera of its recording, or through the job's own.
+    /// The model: each scene with the camera of its recording, or with the camera of the job.
     pub(crate) fn model(&self) -> &SceneModel {
         &self.model
     }
 
-    /// One for each condition of the job that has one.
+    /// The recordings by condition; `None` where a condition has none.
     pub(crate) fn recordings(&self) -> &[Option<Recording>] {
         &self.recordings
     }
 
-    /// The traces that are fitted; none in a job on features alone.
+    /// The fitted traces; empty in a job on features.
     pub(crate) fn traces(&self) -> &[TraceData] {
         &self.traces
     }
 
-    /// Lengths of the segments in each stage of a trace fit, s, rising.
+    /// Segment length of each stage of a trace fit, s, rising.
     #[must_use]
     pub fn segment_s(&self) -> &[f64] {
         &self.segment_s
@@ -206,7 +175,7 @@ impl Problem {
         &self.constants
     }
 
-    /// The model of the traces that are fitted; `None` in a job on features alone.
+    /// The model of the fitted traces; `None` in a job on features.
     ///
     /// # Errors
     /// [`HeadMotionError`] where the head that drives a model is not tracked.
@@ -214,38 +183,31 @@ impl Problem {
         if self.traces.is_empty() {
             return None;
         }
-        let sources: Vec<TraceSource<'_>> = self
-            .traces
-            .iter()
-            .filter_map(|traced| {
-                let condition = &self.model.conditions()[traced.condition];
-                let recording = self.recordings[traced.condition].as_ref()?;
-                let exposure_s = condition.instrument.camera.exposure_s;
-                Some(TraceSource { scene: &condition.scene, recording, exposure_s, traced })
-            })
-            .collect();
+        let sources = self.traces.iter().filter_map(|traced| {
+            let ModelCondition { scene, instrument } = &self.model.conditions()[traced.condition];
+            let recording = self.recordings[traced.condition].as_ref()?;
+            Some(TraceSource { scene, recording, exposure_s: instrument.camera.exposure_s, traced })
+        });
+        let sources: Vec<TraceSource<'_>> = sources.collect();
         Some(TraceModel::new(&sources, &self.job.parameters, &self.constants))
     }
 
-    /// SHA-256 over everything that decides the cost of a point, from [`fingerprint`]: values of job, scenes
-    /// and recordings, and the version of the program. Title, seed, budgets and intervals are left out, so
-    /// that a fit can be extended.
+    /// SHA-256 of everything that decides the cost of a point, from [`fingerprint`]: the values of job, scenes
+    /// and recordings, and the version of the program. Title, seed, budgets and intervals do not count: a fit
+    /// can continue with a larger budget.
     #[must_use]
     pub fn fingerprint(&self) -> &str {
         &self.fingerprint
     }
 
-    /// A run of the whole job from the start.
+    /// The context of a fit from the start within the budgets of the job.
     #[must_use]
     pub fn new_context(&self) -> FitContext<'_> {
-        FitContext {
-            fingerprint: &self.fingerprint,
-            version: env!("CARGO_PKG_VERSION"),
-            ..FitContext::default()
-        }
+        let version = env!("CARGO_PKG_VERSION");
+        FitContext { fingerprint: &self.fingerprint, version, ..FitContext::default() }
     }
 
-    /// Fits the job within its budgets; keeps no journal.
+    /// Fits the job within its budgets, without a journal.
     ///
     /// # Errors
     /// As [`fit_features`].
@@ -253,7 +215,7 @@ impl Problem {
         self.fit_with(&self.new_context(), &mut NullSink, &mut |_: &FitProgress| ControlFlow::Continue(()))
     }
 
-    /// Fits with at most `evaluations` of the model; keeps no journal.
+    /// Fits with at most `evaluations` of the model, without a journal.
     ///
     /// # Errors
     /// As [`fit_features`].
@@ -262,8 +224,7 @@ impl Problem {
         self.fit_with(&context, &mut NullSink, &mut |_: &FitProgress| ControlFlow::Continue(()))
     }
 
-    /// Fits the job as the context says (start from [`Self::new_context`]), with a journal, and tells of every
-    /// evaluation.
+    /// Fits the job in a context (see [`Self::new_context`]), with a journal and a progress callback.
     ///
     /// # Errors
     /// As [`fit_features`].
@@ -285,8 +246,8 @@ impl Problem {
     }
 }
 
-/// The scene of condition `at` with its drive and what it sets; both bounds of every free parameter are tried
-/// on it.
+/// The scene of condition `at` with its drive and its own values. Both bounds of every free parameter have to
+/// be valid in it.
 fn check_scene(
     job: &Job,
     at: usize,
@@ -294,29 +255,22 @@ fn check_scene(
     measured: Option<&MeasuredRecording>,
 ) -> Result<Scene, ProblemError> {
     let condition = &job.conditions[at];
-    let scene = match (condition.head, measured) {
+    let refused =
+        |place: String| |problem: SceneError| ProblemError::Scene { place, problem: problem.to_string() };
+    let mut scene = match (condition.head, measured) {
         (HeadSource::Recording, Some(measured)) => {
-            let refused = |problem| ProblemError::Drive {
-                condition: condition.name.clone(),
-                problem: Box::new(problem),
-            };
-            scene.drive_by_recording(&measured.recording).map_err(refused)?
+            let driven = scene.drive_by_recording(&measured.recording);
+            driven.map_err(refused(format!("`{}`, `drive`", condition.name)))?
         }
         _ => scene.clone(),
     };
-    let set = |scene: Scene, (name, value): &(String, f64)| {
-        scene.with_parameter(name, *value).map_err(|problem| ProblemError::Set {
-            condition: condition.name.clone(),
-            name: name.clone(),
-            problem: Box::new(problem),
-        })
-    };
-    let scene = condition.set.iter().try_fold(scene, set)?;
+    for (name, value) in &condition.set {
+        let set = scene.with_parameter(name, *value);
+        scene = set.map_err(refused(format!("`{}`, `set`, `{name}`", condition.name)))?;
+    }
     for FreeParameter { name, bounds, .. } in &job.parameters {
         for end in [bounds.lower(), bounds.upper()] {
-            scene
-                .with_parameter(name, end)
-                .map_err(|problem| ProblemError::Bounds { name: name.clone(), problem: Box::new(problem) })?;
+            scene.with_parameter(name, end).map_err(refused(format!("bounds of `{name}`")))?;
         }
     }
     Ok(scene)
@@ -335,7 +289,10 @@ fn check_frames(
     if (1.0..=MOST_FRAMES).contains(&found) {
         return Ok(());
     }
-    Err(ProblemError::Frames { condition: condition.to_owned(), found, length_s, frame_rate_hz })
+    let problem = format!(
+        "found {found:.3e} frames in the {length_s} s of its scene's run at {frame_rate_hz} frames/s, expected 1 to {MOST_FRAMES:e}; correct the rate of the camera, or run.stop_s of the scene"
+    );
+    Err(ProblemError::Scene { place: format!("`{condition}`"), problem })
 }
 
 /// Camera and tracking noise of a recording, or the job's own camera without noise.
@@ -347,9 +304,9 @@ fn recording_instrument(job: &Job, measured: Option<&MeasuredRecording>) -> Inst
     let frame_rate_hz = recording.grid().frame_rate_hz;
     let camera = Camera { frame_rate_hz, exposure_s: exposure_s.unwrap_or(0.0) };
     let quality = measure_quality(recording, *exposure_s);
-    // a point is lost independently of the other: the deflection misses either
+    // the deflection is missing where either point is lost, and points are lost independently
     let dropout_fraction = 0.5 * quality.missing_deflection_frames as f64 / quality.frames.max(1) as f64;
-    // the head moves most smoothly, so its noise is estimated best
+    // the head moves most smoothly: its noise estimate is the best
     Instrument { camera, noise_m: quality.head_x.noise_m.unwrap_or(0.0), dropout_fraction }
 }
 
@@ -370,18 +327,12 @@ struct RecordingIdentity<'a> {
     synthetic: bool,
 }
 
-impl<'a> From<&'a MeasuredRecording> for RecordingIdentity<'a> {
-    fn from(MeasuredRecording { recording, exposure_s }: &'a MeasuredRecording) -> Self {
-        let (grid, traces) = (recording.grid(), recording.traces());
-        Self { grid, traces, exposure_s: *exposure_s, synthetic: recording.is_synthetic() }
-    }
-}
-
-// The model of a fit over whole recordings: with the constants as they were fitted, and for a trace driven
-// by its own head from the state in which the first segment starts.
+// Whole runs with the fitted constants. A trace that drives its own head starts in the fitted state of its
+// first segment.
 
 impl Problem {
-    /// The model whose runs a result is about: that of the problem itself in a fit of features.
+    /// The model with the fitted constants and starting states of a result. In a fit of features it is the model
+    /// of the problem.
     ///
     /// # Errors
     /// [`FitError::CannotBeFitted`] when a scene refuses what was fitted.
@@ -397,13 +348,11 @@ impl Problem {
     /// The scene of condition `at` with the fitted constants, its drive and its start.
     fn whole_scene(&self, at: usize, scene: &Scene, result: &FitResult) -> Result<Scene, FitError> {
         let refused = |why: String| FitError::CannotBeFitted { why };
-        let mut constants = result.nuisances.iter().filter(|nuisance| nuisance.recording.is_none());
-        let set = |scene: Scene, constant: &NuisanceResult| {
-            scene
-                .with_parameter(&constant.name, constant.estimate)
-                .map_err(|error| refused(error.to_string()))
-        };
-        let mut scene = constants.try_fold(scene.clone(), set)?;
+        let mut scene = scene.clone();
+        for constant in result.nuisances.iter().filter(|nuisance| nuisance.recording.is_none()) {
+            let set = scene.with_parameter(&constant.name, constant.estimate);
+            scene = set.map_err(|error| refused(error.to_string()))?;
+        }
         let trace = self.traces().iter().find(|trace| trace.condition == at);
         let name = self.job().conditions.get(at).map(|condition| &condition.name);
         let start = result.starts.iter().find(|start| Some(&start.recording) == name);
@@ -415,48 +364,35 @@ impl Problem {
             scene.run.stop_s = motion.span_s()[1];
             scene.drive = Drive::Recorded(Arc::new(motion));
             scene.start_s = start.time_s;
-            scene.start = StartKind::State(start_pose(start));
+            scene.start = StartKind::State(Pose {
+                theta: start.neck_angle_rad,
+                phi: start.lip_angle_rad,
+                theta_rate: start.neck_rate_rad_per_s,
+                phi_rate: start.lip_rate_rad_per_s,
+            });
         }
         Ok(scene)
     }
 
-    /// What the whole runs of a result's model show of the job's components and features.
+    /// Compares whole runs of the fitted model with the job's components and features.
     pub(super) fn compare_with_targets(
         &self,
         result: &FitResult,
         targets: Vec<TargetValue>,
     ) -> Result<(ModelledTargets, Vec<FeatureResult>), FitError> {
         let (job, model) = (self.job(), self.fitted_model(result)?);
-        let (fitted, held): (Vec<_>, Vec<_>) =
-            job.targets.iter().cloned().zip(targets).partition(|(aim, _)| !aim.held_out);
-        let (aims, targets): (Vec<FitTarget>, Vec<TargetValue>) = fitted.into_iter().unzip();
-        let wanted: Vec<_> = aims.iter().map(|aim| aim.feature.clone()).collect();
-        let goals = targets.iter().map(|target| target.value).collect();
+        let (aims, targets, held) = split_held_out(job, targets);
         let values = result.parameter_estimates(job);
-        let held_out = predict_held_out(held, &model, &values).iter().map(predicted_feature_result).collect();
+        let held_out = predict_held_out(&held, &model, &values);
         if aims.is_empty() {
             return Ok((ModelledTargets { components: Vec::new(), features: Vec::new() }, held_out));
         }
-        let seen = ModelFeatures::new(&model, &wanted, goals, job.ensemble.members);
-        let objective = Objective::new(job.parameters.iter().map(search_axis).collect(), targets, &seen);
+        let seen = ModelFeatures::for_targets(&model, &aims, &targets, job.ensemble.members);
+        let objective = Objective::new(job.search_axes(), targets, &seen);
         let best = objective.evaluate_values(values.clone());
-        let shown = ModelledTargets::compare(
-            &aims,
-            objective.targets(),
-            &[],
-            &best,
-            &read_best_model(&seen, &values),
-        );
+        let reads = read_best_model(&seen, &values);
+        let shown = ModelledTargets::compare(&aims, objective.targets(), &[], &best, &reads);
         Ok((shown, held_out))
-    }
-}
-
-fn start_pose(start: &StartState) -> Pose {
-    Pose {
-        theta: start.neck_angle_rad,
-        phi: start.lip_angle_rad,
-        theta_rate: start.neck_rate_rad_per_s,
-        phi_rate: start.lip_rate_rad_per_s,
     }
 }
 

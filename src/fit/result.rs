@@ -10,7 +10,8 @@ use super::linear_model::ParameterCombination;
 use super::misfit::{TraceMisfit, far_from_priors};
 use super::uncertainty::ParameterVerdict;
 use crate::text::text_sha256;
-pub(super) use assembly::{FitFindings, ModelledTargets, camera_nuisance_results, predicted_feature_result};
+pub(super) use assembly::{FitFindings, ModelledTargets};
+pub(super) use assembly::{camera_nuisance_results, map_names, predicted_feature_result};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 
@@ -41,7 +42,7 @@ impl FitStatus {
 }
 
 /// One parameter, in its own SI unit.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ParameterResult {
     /// Best value.
     pub estimate: f64,
@@ -176,7 +177,7 @@ pub struct ComponentResult {
 }
 
 /// One feature other than the components.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct FeatureResult {
     /// Name in the job.
     pub name: String,

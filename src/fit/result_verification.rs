@@ -1,48 +1,42 @@
-//! A stored result against what its job, recordings and model say now: everything that one evaluation of the
-//! model and arithmetic on the stored numbers can decide.
+//! Checks a stored result against its job, recordings and model with one evaluation of the model.
 //!
-//! What the model shows is computed again from the stored estimates. What follows from the stored numbers is
-//! computed from those: targets, relative errors, what is met, the cost, and each verdict. Intervals,
-//! sensitivities and the record of the search would need the fit again; they are held against each other, and
-//! a changed digit of them is found by the hash that the file carries.
+//! The values of the model are computed again from the stored estimates. Targets, relative errors, passes, the
+//! cost and the verdicts are computed from the stored numbers. Intervals, sensitivities and the record of the
+//! search would need the whole fit: they are only checked for consistency, and the hash of the file reveals a
+//! changed digit.
 
 use super::FitError;
-use super::bounds::SearchAxis;
 use super::evaluation::{Evaluation, Observation, Observed};
-use super::job::{FitTarget, FreeParameter, Job};
-use super::linear_model::CHI_SQUARED_95;
-use super::linear_model::camera_estimates;
+use super::job::FreeParameter;
+use super::linear_model::{CHI_SQUARED_95, camera_estimates};
 use super::misfit::TraceMisfit;
 use super::model::ModelFeatures;
 use super::objective::Objective;
 use super::problem::Problem;
-use super::result::{
-    ComponentResult, FeatureResult, FitResult, FitStatus, ModelledTargets, NuisanceResult, ParameterResult,
-    ResultError, camera_nuisance_results, predicted_feature_result,
-};
+use super::result::{ComponentResult, FeatureResult, FitResult, FitStatus, ModelledTargets};
+use super::result::{NuisanceResult, ParameterResult, ResultError, camera_nuisance_results};
 use super::run::{predict_held_out, read_best_model};
-use super::targets::TargetValue;
-use super::targets::measure_targets;
+use super::targets::{measure_targets, split_held_out};
 use super::trace_run::trace_verdict;
-use super::uncertainty::{ParameterVerdict, stored_verdicts};
+use super::uncertainty::stored_verdicts;
 use crate::recording::Recording;
 use serde_json::Value;
 
-/// Largest relative difference between a stored number and the same computed again. The same program on the
-/// same machine differs in no digit; with other vector instructions (AVX2 and FMA masked) nothing in the
-/// reports of the committed fits moved by more than 4e-11. A feature is measured to 1e-3 at best.
+/// Largest relative difference between a stored and a recomputed number. Without AVX2 and FMA, numbers of the
+/// committed reports change by up to 4e-11; on one machine they are equal. Features are measured to 1e-3 at
+/// best.
 const RELATIVE_TOLERANCE: f64 = 1e-6;
-/// Differences below this are rounding of numbers that are zero but for it.
+/// Absolute differences below this are rounding errors of numbers near zero.
 const ABSOLUTE_TOLERANCE: f64 = 1e-12;
 /// Most differences that a refusal names.
 const MOST_NAMED: usize = 8;
 
 impl Problem {
-    /// Holds a result against what the model shows at its estimates, and its numbers against each other;
-    /// `file` is its name in refusals.
+    /// Checks a result against the model at its estimates, and its numbers against each other; `file` is its
+    /// name in error messages.
     ///
     /// # Errors
-    /// [`ResultError`] with every entry that differs: its key, what is stored, and what was computed.
+    /// [`ResultError`] with the entries that differ: key, stored value and computed value.
     pub fn check_result(&self, result: &FitResult, file: &str) -> Result<(), ResultError> {
         let found = self.result_differences(result).unwrap_or_else(|error| vec![error.to_string()]);
         if found.is_empty() {
@@ -56,13 +50,15 @@ impl Problem {
 
     fn result_differences(&self, stored: &FitResult) -> Result<Vec<String>, FitError> {
         let again = self.recompute_result(stored)?;
+        let [stored_json, again] =
+            [stored, &again].map(|result| serde_json::to_value(result).unwrap_or_default());
         let mut found = Vec::new();
-        collect_differences("", &to_json_value(stored), &to_json_value(&again), &mut found);
+        collect_differences("", &stored_json, &again, &mut found);
         found.extend(self.find_contradictions(stored));
         Ok(found)
     }
 
-    /// The result with everything that can be computed from its estimates and its other numbers computed.
+    /// The result with all values replaced that follow from its estimates and other numbers.
     fn recompute_result(&self, stored: &FitResult) -> Result<FitResult, FitError> {
         let job = self.job();
         let mut again = stored.clone();
@@ -75,53 +71,44 @@ impl Problem {
         again.seed = job.search.seed;
         again.version = env!("CARGO_PKG_VERSION").to_owned();
         again.synthetic = self.recordings().iter().flatten().any(Recording::is_synthetic);
-        let verdicts = match &stored.misfit {
-            Some(_) => trace_verdicts(job, stored),
-            None => stored_verdicts(job, stored),
-        };
-        for (name, verdict) in job.parameter_names().iter().zip(verdicts) {
-            again.parameters.entry(name.clone()).and_modify(|p| p.verdict = verdict);
+        let verdicts = stored_verdicts(job, stored);
+        for (free, of_features) in job.parameters.iter().zip(verdicts) {
+            let Some(p) = again.parameters.get_mut(&free.name) else { continue };
+            p.verdict = stored.misfit.as_ref().map_or(of_features, |_| trace_verdict(free, p));
         }
         Ok(again)
     }
 
-    /// What the whole runs of the stored model show, and the judgement on the stored residuals.
+    /// Recomputes the whole runs of the fitted model, and the judgement on the stored residuals.
     fn recompute_traces(
         &self,
         stored: &FitResult,
         misfit: &TraceMisfit,
         again: &mut FitResult,
     ) -> Result<(), FitError> {
-        let (shown, held_out) =
-            self.compare_with_targets(stored, measure_targets(self.job(), self.recordings())?)?;
+        let targets = measure_targets(self.job(), self.recordings())?;
+        let (shown, held_out) = self.compare_with_targets(stored, targets)?;
         (again.components, again.features, again.held_out) = (shown.components, shown.features, held_out);
         again.misfit =
             Some(TraceMisfit::judge(misfit.channels.clone(), misfit.stages.clone(), &again.nuisances));
         Ok(())
     }
 
-    /// What the model shows at the stored estimates, and what follows from the stored features.
+    /// Recomputes the features at the stored estimates, and the numbers that follow from the stored features.
     fn recompute_features(&self, stored: &FitResult, again: &mut FitResult) -> Result<(), FitError> {
         let job = self.job();
         let all = measure_targets(job, self.recordings())?;
-        let (fitted, held): (Vec<_>, Vec<_>) =
-            job.targets.iter().cloned().zip(all).partition(|(aim, _)| !aim.held_out);
-        let (aims, targets): (Vec<FitTarget>, Vec<TargetValue>) = fitted.into_iter().unzip();
-        let wanted: Vec<_> = aims.iter().map(|aim| aim.feature.clone()).collect();
-        let goals = targets.iter().map(|target| target.value).collect();
-        let seen = ModelFeatures::new(self.model(), &wanted, goals, job.ensemble.members);
-        let axes = job.parameters.iter().map(|p| SearchAxis { bounds: p.bounds, prior: p.prior }).collect();
+        let (aims, targets, held) = split_held_out(job, all);
+        let seen = ModelFeatures::for_targets(self.model(), &aims, &targets, job.ensemble.members);
         let rows: Vec<StoredFeature> =
             targets.iter().map(|target| StoredFeature::find(stored, &target.name)).collect();
         let scatter: Vec<f64> = rows.iter().map(|row| row.scatter.unwrap_or(0.0)).collect();
-        let objective = Objective::new(axes, targets, &seen).with_feature_scatter(&scatter);
-        let estimate = |name: &String| stored.parameters.get(name).map_or(f64::NAN, |p| p.estimate);
-        let values: Vec<f64> = job.parameter_names().iter().map(estimate).collect();
-
+        let objective = Objective::new(job.search_axes(), targets, &seen).with_feature_scatter(&scatter);
+        let values = stored.parameter_estimates(job);
         let model = objective.evaluate_values(values.clone());
         let as_stored = objective.add_costs(evaluation_as_stored(&model, &rows).into());
-        let (twin_sd, reads): (Vec<Option<f64>>, _) =
-            (rows.iter().map(|row| row.twin_sd).collect(), read_best_model(&seen, &values));
+        let twin_sd: Vec<Option<f64>> = rows.iter().map(|row| row.twin_sd).collect();
+        let reads = read_best_model(&seen, &values);
         let shown =
             |best: &Evaluation| ModelledTargets::compare(&aims, objective.targets(), &twin_sd, best, &reads);
         again.replace_model_values(shown(&model), shown(&as_stored));
@@ -129,8 +116,7 @@ impl Problem {
         for (again, stored) in again.nuisances.iter_mut().zip(&stored.nuisances) {
             (again.lower_95, again.upper_95) = (stored.lower_95, stored.upper_95);
         }
-        again.held_out =
-            predict_held_out(held, self.model(), &values).iter().map(predicted_feature_result).collect();
+        again.held_out = predict_held_out(&held, self.model(), &values);
         again.cost = as_stored.cost;
         again.status = match (&model.failure, stored.status) {
             (Some(_), _) => FitStatus::Failed,
@@ -140,7 +126,7 @@ impl Problem {
         Ok(())
     }
 
-    /// Numbers of a result that cannot all be right.
+    /// Numbers of a result that contradict each other.
     fn find_contradictions(&self, stored: &FitResult) -> Vec<String> {
         let job = self.job();
         let mut found: Vec<String> = (job.parameters.iter())
@@ -160,7 +146,7 @@ impl Problem {
 }
 
 impl FitResult {
-    /// The model's values, with errors and verdicts of the stored ones.
+    /// Takes the values of the model, and errors and passes of the stored values.
     fn replace_model_values(&mut self, model: ModelledTargets, stored: ModelledTargets) {
         let component = |(model, stored): (ComponentResult, ComponentResult)| ComponentResult {
             relative_error: stored.relative_error,
@@ -178,18 +164,7 @@ impl FitResult {
     }
 }
 
-/// The verdicts that follow from the stored intervals and reasons.
-fn trace_verdicts(job: &Job, stored: &FitResult) -> Vec<ParameterVerdict> {
-    let of = |free: &FreeParameter| {
-        stored
-            .parameters
-            .get(&free.name)
-            .map_or(ParameterVerdict::NotIdentified, |found| trace_verdict(free, found))
-    };
-    job.parameters.iter().map(of).collect()
-}
-
-/// What a stored result says of one aim.
+/// Stored numbers of one component or feature.
 #[derive(Default)]
 struct StoredFeature {
     value: Option<f64>,
@@ -208,20 +183,18 @@ impl StoredFeature {
             scatter: c.model_scatter_hz,
             twin_sd: c.twin_sd_hz,
         });
-        let feature = || {
-            result.features.iter().find(|f| f.name == name).map(|f| Self {
-                value: f.model,
-                spread: f.model_spread,
-                below_db: None,
-                scatter: f.model_scatter,
-                twin_sd: f.twin_sd,
-            })
-        };
-        component.or_else(feature).unwrap_or_default()
+        let feature = result.features.iter().find(|f| f.name == name).map(|f| Self {
+            value: f.model,
+            spread: f.model_spread,
+            below_db: None,
+            scatter: f.model_scatter,
+            twin_sd: f.twin_sd,
+        });
+        component.or(feature).unwrap_or_default()
     }
 }
 
-/// The evaluation with the stored values in the place of the model's.
+/// The evaluation with the stored values in place of the model's.
 fn evaluation_as_stored(model: &Evaluation, rows: &[StoredFeature]) -> Evaluation {
     let one = |(shown, row): (&Observed, &StoredFeature)| match (row.value, shown) {
         (Some(value), shown) => {
@@ -234,8 +207,8 @@ fn evaluation_as_stored(model: &Evaluation, rows: &[StoredFeature]) -> Evaluatio
     Evaluation { features: model.features.iter().zip(rows).map(one).collect(), ..model.clone() }
 }
 
-/// What an interval cannot be: it holds the estimate, lies within the bounds, and reaches as far as each of
-/// the intervals that it is the widest of. A search that did not come to its end has none.
+/// Contradictions of an interval. It has to contain the estimate and the partial intervals that it is the
+/// widest of, and to lie within the bounds; an unfinished search has no interval.
 fn interval_contradictions(free: &FreeParameter, p: &ParameterResult, status: FitStatus) -> Vec<String> {
     let said = |key: &str, found: f64, expected: String| {
         format!("parameters.{}.{key}: found {found}, expected {expected}", free.name)
@@ -265,39 +238,29 @@ fn interval_contradictions(free: &FreeParameter, p: &ParameterResult, status: Fi
     found
 }
 
-/// An interval that does not hold its estimate.
+/// Describes a nuisance whose interval does not contain its estimate.
 fn outside_own_interval(n: &NuisanceResult) -> Option<String> {
     let ends = [n.lower_95.map(|lower| n.estimate - lower), n.upper_95.map(|upper| upper - n.estimate)];
     let beside = ends.into_iter().flatten().any(|reach| reach < -RELATIVE_TOLERANCE * n.estimate.abs());
     let of = n.recording.as_deref().unwrap_or("all recordings");
     beside.then(|| {
         let ends = [n.lower_95, n.upper_95].map(|end| end.map_or("none".to_owned(), |end| end.to_string()));
-        let (name, [lower, upper]) = (&n.name, ends);
+        let (name, [lower, upper], best) = (&n.name, ends, n.estimate);
         format!(
-            "nuisances, `{name}` of `{of}`: found {lower} to {upper}, expected an interval that holds {}",
-            n.estimate
+            "nuisances, `{name}` of `{of}`: found {lower} to {upper}, expected an interval that holds {best}"
         )
     })
 }
 
-/// As the file has it.
-fn to_json_value(result: &FitResult) -> Value {
-    serde_json::to_value(result).unwrap_or_default()
-}
-
-/// Every leaf that differs, with its key.
+/// Adds every leaf that differs, with its key.
 fn collect_differences(key: &str, stored: &Value, again: &Value, found: &mut Vec<String>) {
     match (stored, again) {
         (Value::Object(a), Value::Object(b)) => {
             let names = a.keys().chain(b.keys().filter(|name| !a.contains_key(*name)));
             for name in names {
                 let inner = if key.is_empty() { name.clone() } else { format!("{key}.{name}") };
-                collect_differences(
-                    &inner,
-                    a.get(name).unwrap_or(&Value::Null),
-                    b.get(name).unwrap_or(&Value::Null),
-                    found,
-                );
+                let [a, b] = [a, b].map(|object| object.get(name).unwrap_or(&Value::Null));
+                collect_differences(&inner, a, b, found);
             }
         }
         (Value::Array(a), Value::Array(b)) if a.len() == b.len() => {

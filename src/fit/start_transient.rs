@@ -1,29 +1,27 @@
-//! Whether the start of a scene shows in the features.
+//! Checks whether the transient of the start affects the features.
 //!
-//! A scene starts from a guess, such as the equilibrium of steady slip. What is wrong about it rings down
-//! with the slowest mode of the blade and its head; a window that begins before that is over reads the guess.
-//! So the best model is run once more from another start, and its features are held against those of the fit.
+//! A scene starts from a guess, such as the equilibrium of steady slip. The error of the guess rings down with
+//! the slowest mode of blade and head, and biases a feature whose window begins too early. The best model is
+//! therefore run again from another start, and its features are compared with those of the fit.
 
-use super::evaluation::Observed;
-use super::evaluation::RunFailure;
+use super::evaluation::{Observed, RunFailure};
 use super::job::FitTarget;
-use super::model::ModelFeatures;
-use super::model::{Draw, FeaturePredictor, Model, Restart};
+use super::model::{Draw, FeaturePredictor, Model, ModelFeatures, Restart};
 use super::targets::TargetValue;
 use crate::feature::Feature;
 use crate::recording::Recording;
 
-/// Standard deviations by which another start may move a feature before it is said: half of what a 95 %
-/// interval allows.
+/// Shift of a feature by another start, in standard deviations, above which a note is written: half of a 95 %
+/// interval.
 const MIN_VISIBLE_SHIFT_SD: f64 = 1.0;
-/// Standard deviations by which it moves no more where the start is forgotten.
+/// Shift of a feature, in standard deviations, below which the start has decayed.
 const MAX_FORGOTTEN_SHIFT_SD: f64 = 0.3;
-/// Decay times by which a start is set earlier, at most: a hundredth is left after five.
+/// Largest lead of a start, in decay times: after five of them 1 % of an error is left.
 const MAX_LEAD_DECAYS: usize = 5;
-/// Share of the angles by which a start is moved where it cannot be earlier.
+/// Relative change of the starting angles where a start cannot be earlier.
 const ANGLE_CHANGE: f64 = 0.05;
 
-/// A model whose runs start otherwise.
+/// A model whose runs have another start.
 struct RestartedModel<'a> {
     model: &'a dyn Model,
     restart: Restart,
@@ -52,17 +50,13 @@ struct ConditionFeatures<'a> {
 impl ConditionFeatures<'_> {
     fn read_features(&self, restart: Option<Restart>) -> Option<Vec<Observed>> {
         let targets = self.targets.iter().map(|target| target.value).collect();
-        let read = |model| {
-            ModelFeatures::new(model, &self.features, targets, self.members).predict_features(self.values)
-        };
-        match restart {
-            None => read(self.model).ok(),
-            Some(restart) => read(&RestartedModel { model: self.model, restart }).ok(),
-        }
+        let restarted = restart.map(|restart| RestartedModel { model: self.model, restart });
+        let model = restarted.as_ref().map_or(self.model, |restarted| restarted);
+        ModelFeatures::new(model, &self.features, targets, self.members).predict_features(self.values).ok()
     }
 
-    /// The feature that differs most between two readings, with the difference in its standard deviations;
-    /// one that is missing from one of them is left out.
+    /// The feature with the largest difference between two readings, and that difference in its standard
+    /// deviations. A feature that is missing from a reading is skipped.
     fn largest_difference(&self, one: &[Observed], other: &[Observed]) -> Option<(&str, f64)> {
         let pairs = self.targets.iter().zip(one).zip(other);
         let differences = pairs.filter_map(|((target, one), other)| {
@@ -73,8 +67,8 @@ impl ConditionFeatures<'_> {
     }
 }
 
-/// A sentence for each condition in whose features the start of its scene shows. `targets` count as much as
-/// at the end of the fit; `names` are those of the conditions.
+/// A sentence for each condition whose features depend on the start of its scene. `targets` have the deviations
+/// of the end of the fit; `names` are those of the conditions.
 pub(super) fn start_notes(
     model: &dyn Model,
     names: &[String],
@@ -85,9 +79,9 @@ pub(super) fn start_notes(
     let note = |(condition, name): (usize, &String)| {
         let here = || aims.iter().zip(targets).filter(|(aim, _)| aim.feature.condition == condition);
         let features: Vec<Feature> = here().map(|(aim, _)| aim.feature.clone()).collect();
-        let shown =
-            ConditionFeatures { model, values, features, targets: here().map(|(_, t)| t).collect(), members };
-        let said = start_sentence(&shown, condition)?;
+        let targets = here().map(|(_, target)| target).collect();
+        let said =
+            start_sentence(&ConditionFeatures { model, values, features, targets, members }, condition)?;
         Some(if names.len() > 1 { format!("`{name}`: {said}") } else { said })
     };
     names.iter().enumerate().filter_map(note).collect()

@@ -10,18 +10,16 @@ use crate::recording::Recording;
 use crate::recording::quality::measure_quality;
 use crate::simulate::twin::{TrackingModel, add_tracking_noise};
 
-/// Copies of a recording with its own noise added once more, from which the deviation of a feature is taken:
-/// the estimate of a standard deviation from 12 values is itself good to a fifth.
+/// Number of copies of a recording with additional noise from which the deviation of a feature is estimated:
+/// a standard deviation of 12 values is good to a fifth.
 const NOISE_COPIES: u64 = 12;
-/// Least deviation relative to a value that was measured: features of sampled traces are not read better, and
-/// the model is no better.
+/// Least relative deviation of a measured value: neither features of sampled traces nor the model are better.
 const MIN_SD_RELATIVE: f64 = 1e-3;
 
-/// Targets of a job in the order of its aims; `measured` has one recording for each of the job's conditions
-/// that has one.
+/// Targets of a job in its order; `measured` has an entry per condition, `None` where it has no recording.
 ///
-/// A deviation that the job does not state is the scatter of the feature over copies of the recording to
-/// which its own tracking noise was added once more.
+/// A deviation that the job does not state is the scatter of the feature over copies of the recording with
+/// additional tracking noise of the same size.
 ///
 /// # Errors
 /// [`FitError::Recordings`], or [`FitError::NotMeasurable`] naming the recording and the feature.
@@ -40,15 +38,22 @@ pub fn measure_targets(job: &Job, measured: &[Option<Recording>]) -> Result<Vec<
     let unstated =
         job.targets.iter().any(|aim| matches!(aim.source, TargetSource::Measured { least_sd: 0.0, .. }));
     let scatter = if unstated { copy_scatter(&features, measured) } else { vec![None; features.len()] };
-    job.targets
-        .iter()
-        .zip(read)
-        .zip(scatter)
-        .map(|((aim, read), scatter)| {
-            let calibration = job.target_calibration(aim);
-            Ok(TargetValue { calibration, ..measure_target(aim, read, scatter, measured)? })
-        })
-        .collect()
+    let target = |((aim, read), scatter)| {
+        let calibration = job.target_calibration(aim);
+        Ok(TargetValue { calibration, ..measure_target(aim, read, scatter, measured)? })
+    };
+    job.targets.iter().zip(read).zip(scatter).map(target).collect()
+}
+
+/// Fitted targets and their values, and the targets that are held out.
+pub(super) fn split_held_out(
+    job: &Job,
+    all: Vec<TargetValue>,
+) -> (Vec<FitTarget>, Vec<TargetValue>, Vec<(FitTarget, TargetValue)>) {
+    let (held, fitted): (Vec<_>, Vec<_>) =
+        job.targets.iter().cloned().zip(all).partition(|(aim, _)| aim.held_out);
+    let (aims, targets) = fitted.into_iter().unzip();
+    (aims, targets, held)
 }
 
 fn measure_target(
@@ -62,18 +67,14 @@ fn measure_target(
     let (value, sd) = match aim.source {
         TargetSource::Given { target, sd } => (target, sd),
         TargetSource::Measured { least_sd, least_sd_relative } => {
-            let usable = |read: FeatureValue| match read.value {
-                value if !value.is_finite() || (value == 0.0 && measure == ValueComparison::Log) => {
-                    Err(format!("its value is {value}"))
-                }
-                _ => Ok(read),
+            let read = read.map_err(|missing| not_measurable_error(aim, measured, missing.to_string()))?;
+            if !read.value.is_finite() || (read.value == 0.0 && measure == ValueComparison::Log) {
+                return Err(not_measurable_error(aim, measured, format!("its value is {}", read.value)));
+            }
+            let scale = match measure {
+                ValueComparison::Log => read.value.abs(),
+                ValueComparison::Linear { scale } => scale,
             };
-            let read = read
-                .map_err(|missing| missing.to_string())
-                .and_then(usable)
-                .map_err(|problem| not_measurable_error(aim, measured, problem))?;
-            let scale =
-                if measure == ValueComparison::Log { read.value.abs() } else { target_scale(measure) };
             let stated = least_sd > 0.0 || least_sd_relative > 0.0;
             let noise = if stated { read.sd } else { scatter.or(read.sd) };
             let least =
@@ -84,20 +85,11 @@ fn measure_target(
     Ok(TargetValue { name, value, sd, scatter: 0.0, measure, last, calibration: None })
 }
 
-fn target_scale(measure: ValueComparison) -> f64 {
-    match measure {
-        ValueComparison::Log => 1.0,
-        ValueComparison::Linear { scale } => scale,
-    }
-}
-
-/// Standard deviation of each feature over noisier copies of the recordings; `None` where fewer than half of
-/// them show it.
+/// Standard deviation of each feature over noisier copies of the recordings; `None` where no more than half of
+/// them have it.
 fn copy_scatter(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Option<f64>> {
-    let noise_m: Vec<f64> = measured
-        .iter()
-        .map(|m| m.as_ref().and_then(|m| measure_quality(m, None).head_x.noise_m).unwrap_or(0.0))
-        .collect();
+    let noise = |m: &Option<Recording>| measure_quality(m.as_ref()?, None).head_x.noise_m;
+    let noise_m: Vec<f64> = measured.iter().map(|m| noise(m).unwrap_or(0.0)).collect();
     let copy = |seed: u64| -> Vec<Option<Recording>> {
         let noisier = |(recording, noise_m): (&Option<Recording>, &f64)| {
             let recording = recording.as_ref()?;
@@ -107,33 +99,21 @@ fn copy_scatter(features: &[Feature], measured: &[Option<Recording>]) -> Vec<Opt
         };
         measured.iter().zip(&noise_m).map(noisier).collect()
     };
-    let values = |seed: u64| {
-        read_recorded_features(features, &copy(seed))
-            .into_iter()
-            .map(|read| read.ok().map(|read| read.value))
-            .collect()
-    };
-    let reads: Vec<Vec<Option<f64>>> = (1..=NOISE_COPIES).map(values).collect();
-    (0..features.len())
-        .map(|at| {
-            standard_deviation(
-                &reads.iter().filter_map(|read| read.get(at).copied().flatten()).collect::<Vec<f64>>(),
-            )
-        })
-        .collect()
+    let reads: Vec<_> =
+        (1..=NOISE_COPIES).map(|seed| read_recorded_features(features, &copy(seed))).collect();
+    let values = |at: usize| reads.iter().filter_map(move |read| Some(read.get(at)?.as_ref().ok()?.value));
+    (0..features.len()).map(|at| standard_deviation(&values(at).collect::<Vec<f64>>())).collect()
 }
 
-/// Every feature of the conditions that were measured; those of the others are missing.
+/// Reads every feature of the conditions with a recording; those of the others are missing.
 fn read_recorded_features(
     features: &[Feature],
     measured: &[Option<Recording>],
 ) -> Vec<Result<FeatureValue, MissingValue>> {
     let present: Vec<usize> = (0..measured.len()).filter(|at| measured[*at].is_some()).collect();
     let place = |condition: usize| present.iter().position(|at| *at == condition).unwrap_or(usize::MAX - 1);
-    let placed: Vec<Feature> = features
-        .iter()
-        .map(|feature| Feature { condition: place(feature.condition), ..feature.clone() })
-        .collect();
+    let moved = |feature: &Feature| Feature { condition: place(feature.condition), ..feature.clone() };
+    let placed: Vec<Feature> = features.iter().map(moved).collect();
     read_assigned_features(&placed, &[], &measured.iter().flatten().collect::<Vec<_>>())
 }
 
@@ -144,25 +124,22 @@ fn standard_deviation(values: &[f64]) -> Option<f64> {
 }
 
 fn not_measurable_error(aim: &FitTarget, measured: &[Option<Recording>], problem: String) -> FitError {
-    let recording = measured
-        .get(aim.feature.condition)
-        .and_then(Option::as_ref)
-        .map_or("the recording", Recording::name)
-        .to_owned();
+    let recording = measured.get(aim.feature.condition).and_then(Option::as_ref);
+    let recording = recording.map_or("the recording", Recording::name).to_owned();
     FitError::NotMeasurable { recording, name: aim.feature.name.clone(), problem }
 }
 
-// What a feature should be, and how far from it a value is.
+// Target values and distances from them.
 
-/// Ratio of model and target beyond which a residual no longer grows: two decades, more than any two bounds
-/// of a physical feature, so that every value found beats a missing one.
+/// Ratio of model and target beyond which a residual no longer grows. Two decades are more than a physical
+/// feature spans, so that any value costs less than a missing one.
 pub(crate) const MAX_RATIO: f64 = 100.0;
 
-/// Least relative standard deviation in the first stage: far from the targets everything is missed by many
-/// deviations, and the most precise features would outvote the others.
+/// Least relative standard deviation in the first stage. Far from the targets all features are many deviations
+/// off, and the most precise ones would dominate the cost.
 pub(crate) const FIRST_STAGE_SD_RELATIVE: f64 = 0.05;
 
-/// What a feature should be.
+/// The target value of a feature, with its standard deviation.
 #[derive(Debug, Clone, PartialEq)]
 pub struct TargetValue {
     /// Name of the component or feature.
@@ -177,18 +154,18 @@ pub struct TargetValue {
     pub measure: ValueComparison,
     /// Whether it counts in the last stage alone.
     pub last: bool,
-    /// What is not known of the camera that measured it, where the value depends on it.
+    /// Calibration errors of the camera that measured it, where the value depends on them.
     pub calibration: Option<TargetCalibration>,
 }
 
 impl TargetValue {
-    /// Standard deviation of the residual's numerator, the model's scatter included, in units of
-    /// [`Self::reference_size`].
+    /// Standard deviation of a distance, including the model's scatter, in units of [`Self::reference_size`].
     pub(crate) fn relative_sd(&self) -> f64 {
         math::hypot(self.sd, self.scatter) / self.reference_size()
     }
 
-    /// Distance of a value from the target in units of [`Self::reference_size`], stopped at the logarithm of [`MAX_RATIO`].
+    /// Distance of a value from the target in units of [`Self::reference_size`], clamped to the logarithm of
+    /// [`MAX_RATIO`].
     pub(crate) fn distance(&self, value: f64) -> f64 {
         let most = math::ln(MAX_RATIO);
         match self.measure {
@@ -200,8 +177,7 @@ impl TargetValue {
         }
     }
 
-    /// Distance of one value from another, as [`Self::distance`] has it; zero where no logarithm can be
-    /// taken.
+    /// Distance between two values, in the units of [`Self::distance`]; zero where the logarithm is undefined.
     pub(crate) fn distance_between(&self, value: f64, from: f64) -> f64 {
         match self.measure {
             ValueComparison::Log => {
@@ -211,15 +187,14 @@ impl TargetValue {
         }
     }
 
-    /// The target of the first stage: known to no better than [`FIRST_STAGE_SD_RELATIVE`], and none where it counts in the
-    /// last stage alone.
+    /// The target of the first stage, with a deviation of at least [`FIRST_STAGE_SD_RELATIVE`]; `None` if it
+    /// counts in the last stage only.
     pub(super) fn first_stage_target(&self) -> Option<Self> {
         let sd = self.sd.max(FIRST_STAGE_SD_RELATIVE * self.reference_size());
         (!self.last).then(|| Self { sd, ..self.clone() })
     }
 
-    /// What a relative change refers to, in the feature's unit: the target's size, or the scale of its
-    /// differences.
+    /// Unit of distances, in the feature's own unit: the size of the target, or the scale of its differences.
     pub(crate) fn reference_size(&self) -> f64 {
         match self.measure {
             ValueComparison::Log => self.value.abs(),

@@ -1,37 +1,33 @@
-//! What is known of the parameters at the best point: intervals, verdicts, correlations, combinations.
+//! Uncertainty of the parameters at the best point: intervals, verdicts, correlations, combinations.
 //!
-//! An interval reaches as far as any of three says: the profile likelihood ([`super::profile`]), twins of the
-//! best model fitted again ([`super::bootstrap_refits`]), and every point of the whole fit that is as good as the
-//! threshold allows. Without a profile the linear model at the best point takes its place.
+//! An interval is the widest of three: the profile likelihood ([`super::profile`]), refits to twins of the best
+//! model ([`super::bootstrap`]), and the range of all evaluated points whose cost is within the threshold.
+//! Without a profile the linear model at the best point takes its place.
 
 mod rivals;
 mod verdicts;
 
 pub(crate) use super::linear_model::CHI_SQUARED_95;
 pub(crate) use rivals::confirm_identified;
-pub(crate) use verdicts::FeatureWeights;
 pub(super) use verdicts::stored_verdicts;
-pub(crate) use verdicts::weigh_features;
+pub(crate) use verdicts::{FeatureWeights, weigh_features};
 
 use super::bootstrap::{Bootstrap, bootstrap_refits};
 use super::camera_calibration::CameraEstimate;
-use super::evaluation::Evaluation;
-use super::evaluation::EvaluationStage;
+use super::evaluation::{Evaluation, EvaluationStage};
 use super::job::IntervalSettings;
 use super::ledger::{Ledger, StopReason};
-use super::linear_model::{
-    DIFFERENCE_STEP, FeatureSlopes, camera_estimates, difference_points, jacobian, residuals,
-};
-use super::linear_model::{MIN_INFORMATIVE, ParameterCombination, SingularDirections, Z_95};
+use super::linear_model::{self, FeatureSlopes, ParameterCombination, SingularDirections, Z_95};
+use super::linear_model::{camera_estimates, difference_points, residuals};
 use super::objective::Objective;
 use super::profile::{AT_BOUND, ProfileLikelihood, profile_parameters};
+use super::result::ParameterResult;
 use super::search::{MIN_WORTHWHILE_GAIN, polish_best};
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
-use verdicts::check_best_point;
-use verdicts::{best_excluded_gain, is_at_bound, withdraw_all, withdraw_correlated};
+use verdicts::{best_excluded_gain, check_best_point, is_at_bound, withdraw_all, withdraw_correlated};
 
-/// How often a better point, met on the way along a profile, is followed and everything begun again.
+/// How often the assessment starts again from a better point that a profile has found.
 const MAX_RESTARTS: usize = 2;
 
 /// What is known of a parameter.
@@ -44,7 +40,7 @@ pub enum ParameterVerdict {
     OpenBelow,
     /// Its interval reaches above the upper bound: only a lower limit is known.
     OpenAbove,
-    /// The features say nothing about it alone.
+    /// The features do not determine it alone.
     #[default]
     NotIdentified,
     /// The best value is a bound: the optimum may lie outside.
@@ -65,29 +61,7 @@ impl ParameterVerdict {
     }
 }
 
-/// Estimate and interval of one parameter, in its own SI unit.
-#[derive(Debug, Clone, PartialEq)]
-pub(crate) struct ParameterInterval {
-    pub estimate: f64,
-    /// Lower end of the 95 % interval; `None` where the features give none.
-    pub lower_95: Option<f64>,
-    /// Upper end of the 95 % interval; `None` where the features give none.
-    pub upper_95: Option<f64>,
-    pub verdict: ParameterVerdict,
-    /// Lower and upper end by the linear model at the best point, where it determines the parameter.
-    pub linear_95: Option<[f64; 2]>,
-    /// Value and lowest cost along the parameter.
-    pub profile: Vec<(f64, f64)>,
-    /// Where the profile crosses the threshold, below and above.
-    pub profile_95: [Option<f64>; 2],
-    /// Lower and upper end by twins fitted again.
-    pub bootstrap_95: Option<[f64; 2]>,
-    /// Why it is not called identified although its interval lies within the bounds and the features
-    /// determine it.
-    pub reasons: Vec<String>,
-}
-
-impl ParameterInterval {
+impl ParameterResult {
     /// Calls it not identified, for a reason.
     fn withdraw_verdict(&mut self, reason: String) {
         self.verdict = ParameterVerdict::NotIdentified;
@@ -96,36 +70,34 @@ impl ParameterInterval {
 }
 
 /// Everything found at the best point.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct FitUncertainty {
     pub best: Evaluation,
-    /// One a parameter, in job order.
-    pub intervals: Vec<ParameterInterval>,
+    /// One per parameter, in job order.
+    pub intervals: Vec<ParameterResult>,
     /// Number of informative directions.
     pub rank: usize,
     /// Largest singular value over the smallest; infinite where one is zero.
     pub condition: f64,
-    /// Features that move by more than their own 95 % interval (`MIN_INFORMATIVE` standard deviations) over the
-    /// box.
+    /// Features that change by more than their own 95 % interval over the box.
     pub informative_features: usize,
-    /// `d ln feature / d ln parameter`, a row a feature, a column a parameter; `None` where either is missing
-    /// or zero.
+    /// `d ln feature / d ln parameter`, features by parameters; `None` where either is missing or zero.
     pub sensitivities: Vec<Vec<Option<f64>>>,
-    /// Correlation of the estimates by the linear model, a row and a column a parameter.
+    /// Correlation matrix of the estimates by the linear model.
     pub correlations: Vec<Vec<Option<f64>>>,
-    /// What is determined and what is left open.
+    /// Combinations that are determined or left open.
     pub combinations: Vec<ParameterCombination>,
-    /// What is estimated of the cameras there.
+    /// Calibration of the cameras at the best point.
     pub cameras: Vec<CameraEstimate>,
     /// Standard deviation of each feature over twins of the best model, in its own unit.
     pub twin_sd: Vec<Option<f64>>,
     /// Twins that were fitted again.
     pub twins: usize,
-    /// What a reader has to know, in sentences.
+    /// Sentences for the reader.
     pub notes: Vec<String>,
 }
 
-/// The warning that fewer informative features than parameters deserve, before a search or after it.
+/// Warns of fewer informative features than parameters, before a search or after it (with its `rank`).
 pub(crate) fn count_warning(features: usize, rank: Option<usize>, parameters: usize) -> Option<String> {
     let known = rank.map_or(features, |rank| rank.min(features));
     if known >= parameters {
@@ -143,8 +115,8 @@ pub(crate) fn count_warning(features: usize, rank: Option<usize>, parameters: us
     ))
 }
 
-/// Assesses the ledger's best point; `None` when the ledger is empty. A better point that is met on the way
-/// is polished with at most `polishing` evaluations and assessed instead.
+/// Assesses the ledger's best point; `None` when the ledger is empty. If a profile finds a better point, that
+/// point is polished with at most `polishing` evaluations and assessed instead.
 pub(crate) fn assess_best(
     ledger: &mut Ledger,
     names: &[String],
@@ -169,17 +141,14 @@ pub(crate) fn assess_best(
 fn assess_once(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings) -> Option<FitUncertainty> {
     let best = ledger.best_evaluation()?.clone();
     if let Some(failure) = &best.failure {
-        return Some(unassessed_point(
-            ledger.objective(),
-            &best,
-            &format!("every evaluation failed, the best one with {failure}"),
-        ));
+        let why = format!("every evaluation failed, the best one with {failure}");
+        return Some(unassessed_point(ledger.objective(), &best, &why));
     }
-    let Ok(around) = ledger.evaluate_points(EvaluationStage::Sensitivity, &difference_points(&best.unit))
-    else {
-        return Some(unassessed_point(ledger.objective(), &best, BUDGET_USED_UP));
+    let points = difference_points(&best.unit);
+    let around: Vec<Evaluation> = match ledger.evaluate_points(EvaluationStage::Sensitivity, &points) {
+        Ok(around) => around.into_iter().cloned().collect(),
+        Err(_) => return Some(unassessed_point(ledger.objective(), &best, BUDGET_USED_UP)),
     };
-    let around: Vec<Evaluation> = around.into_iter().cloned().collect();
     let local = LocalAssessment::new(ledger.objective(), best, &around);
     let profiles =
         settings.profile.then(|| profile_parameters(ledger, &local.best, &local.jacobian, CHI_SQUARED_95));
@@ -204,38 +173,22 @@ fn keep_or_note<T>(found: Option<Result<T, StopReason>>, what: &str, notes: &mut
     found.ok()
 }
 
-/// An assessment of a point around which nothing could be evaluated.
+/// The assessment of a point whose neighbours could not be evaluated.
 pub(crate) fn unassessed_point(objective: &Objective, best: &Evaluation, why: &str) -> FitUncertainty {
-    let open = |estimate: &f64| ParameterInterval {
-        estimate: *estimate,
-        lower_95: None,
-        upper_95: None,
-        verdict: ParameterVerdict::NotIdentified,
-        linear_95: None,
-        profile: Vec::new(),
-        profile_95: [None, None],
-        bootstrap_95: None,
-        reasons: Vec::new(),
-    };
+    let open = |estimate: &f64| ParameterResult { estimate: *estimate, ..ParameterResult::default() };
     FitUncertainty {
         best: best.clone(),
         intervals: best.values.iter().map(open).collect(),
-        rank: 0,
         condition: f64::INFINITY,
-        informative_features: 0,
-        sensitivities: Vec::new(),
-        correlations: Vec::new(),
-        combinations: Vec::new(),
         cameras: camera_estimates(objective, best, None),
-        twin_sd: Vec::new(),
-        twins: 0,
         notes: vec![format!("no intervals: {why}")],
+        ..FitUncertainty::default()
     }
 }
 
 impl FitUncertainty {
-    /// The same, where nothing is called identified if the search had not come to its end, or no other local
-    /// search came to the best point; `ends` are where they ended.
+    /// Withholds all intervals if the search did not converge, or if no other local search reached the best
+    /// point; `ends` are the ends of the other searches.
     pub(crate) fn with_search_doubts(
         self,
         converged: bool,
@@ -252,7 +205,7 @@ impl FitUncertainty {
         }
     }
 
-    /// The same, where nothing is called identified for a reason that speaks against the model.
+    /// Withdraws the verdict of every identified parameter if there is an objection to the model.
     pub(crate) fn with_model_objection(mut self, why: Option<String>) -> Self {
         if let Some(why) = why {
             let known = self.intervals.iter_mut().filter(|i| i.verdict == ParameterVerdict::Identified);
@@ -264,9 +217,8 @@ impl FitUncertainty {
 
     fn withhold_intervals(mut self, why: String) -> Self {
         self.notes.insert(0, why);
-        for interval in &mut self.intervals {
-            (interval.lower_95, interval.upper_95, interval.verdict) =
-                (None, None, ParameterVerdict::NotIdentified);
+        for found in &mut self.intervals {
+            (found.lower_95, found.upper_95, found.verdict) = (None, None, ParameterVerdict::NotIdentified);
         }
         self
     }
@@ -275,7 +227,7 @@ impl FitUncertainty {
 const SEARCH_UNFINISHED: &str = "the search was still gaining when its evaluations were used up, or was interrupted: there is a better point, so nothing is called identified; \
     raise local_evaluations in [search], or --max-evaluations, and go on with --resume";
 
-/// What is known apart from the linear model.
+/// Evidence in addition to the linear model.
 struct IntervalEvidence {
     profiles: Option<Vec<ProfileLikelihood>>,
     twins: Option<Bootstrap>,
@@ -293,9 +245,8 @@ impl LocalAssessment {
     fn new(objective: &Objective, best: Evaluation, around: &[Evaluation]) -> Self {
         let around: Vec<&Evaluation> = around.iter().collect();
         let slopes = FeatureSlopes::from_differences(objective.targets(), &best, &around);
-        let model = jacobian(objective, &best, &slopes);
-        let directions = SingularDirections::from_jacobian(&model);
-        Self { slopes, directions, jacobian: model, best }
+        let jacobian = linear_model::jacobian(objective, &best, &slopes);
+        Self { slopes, directions: SingularDirections::from_jacobian(&jacobian), jacobian, best }
     }
 
     fn assess(
@@ -310,11 +261,10 @@ impl LocalAssessment {
         let mut intervals: Vec<_> =
             (0..names.len()).map(|axis| self.parameter_interval(ledger, axis, evidence)).collect();
         let known = self.jacobian.row_iter().take(self.jacobian.nrows() - objective.count_camera_unknowns());
-        let informative_features = known.filter(|row| row.norm() > MIN_INFORMATIVE).count();
+        let informative_features = known.filter(|row| row.norm() > linear_model::MIN_INFORMATIVE).count();
         let mut notes = withdraw_correlated(&mut intervals, names, &self.best.unit, &self.directions);
-        if let Some(held) =
-            best_excluded_gain(&self.best.unit, &self.jacobian, &residuals(objective, &self.best))
-        {
+        let residuals = residuals(objective, &self.best);
+        if let Some(held) = best_excluded_gain(&self.best.unit, &self.jacobian, &residuals) {
             notes.extend(withdraw_all(&mut intervals, names, held));
         }
         notes.extend(count_warning(informative_features, Some(self.directions.rank), names.len()));
@@ -342,7 +292,7 @@ impl LocalAssessment {
         ledger: &Ledger,
         axis: usize,
         evidence: &IntervalEvidence,
-    ) -> ParameterInterval {
+    ) -> ParameterResult {
         let unit = self.best.unit.get(axis).copied().unwrap_or(0.5);
         let profile = evidence.profiles.as_ref().and_then(|profiles| profiles.get(axis));
         let linear = self.linear_interval(axis, unit);
@@ -352,16 +302,17 @@ impl LocalAssessment {
         let twins = twins.map(|half| [unit - half, unit + half]);
         let lower = profile.map_or(linear.map(|l| l[0]), |p| p.lower);
         let upper = profile.map_or(linear.map(|l| l[1]), |p| p.upper);
-        let (least, most) = self
-            .coordinates_within_threshold(ledger, axis)
-            .fold((unit, unit), |(least, most), u| (least.min(u), most.max(u)));
+        let limit = self.best.cost + CHI_SQUARED_95;
+        let good = ledger.run_evaluations().iter().filter(|e| e.failure.is_none() && e.cost <= limit);
+        let good = good.filter_map(|e| e.unit.get(axis).copied());
+        let (least, most) = good.fold((unit, unit), |(least, most), u| (least.min(u), most.max(u)));
         let [below, above] = twins.unwrap_or([unit, unit]);
         let value = |u: f64| ledger.objective().axes().get(axis).map_or(f64::NAN, |a| a.bounds.from_unit(u));
-        // what reaches a bound is open: what lies beyond was not tried
+        // an interval that reaches a bound is open: nothing beyond the bound was tried
         let inside = |u: f64| (AT_BOUND..=1.0 - AT_BOUND).contains(&u).then(|| value(u));
         let lower_95 = lower.and_then(|u| inside(u.min(least).min(below)));
         let upper_95 = upper.and_then(|u| inside(u.max(most).max(above)));
-        ParameterInterval {
+        ParameterResult {
             estimate: self.best.values.get(axis).copied().unwrap_or(f64::NAN),
             lower_95,
             upper_95,
@@ -379,24 +330,10 @@ impl LocalAssessment {
         let half = CHI_SQUARED_95.sqrt() * self.directions.coordinate_sd(axis).0;
         self.directions.determines(axis).then_some([unit - half, unit + half])
     }
-
-    /// Coordinates of every point of the fit that is as good as the threshold allows.
-    fn coordinates_within_threshold<'a>(
-        &self,
-        ledger: &'a Ledger,
-        axis: usize,
-    ) -> impl Iterator<Item = f64> + 'a {
-        let limit = self.best.cost + CHI_SQUARED_95;
-        ledger
-            .run_evaluations()
-            .iter()
-            .filter(move |e| e.failure.is_none() && e.cost <= limit)
-            .filter_map(move |e| e.unit.get(axis).copied())
-    }
 }
 
-/// What an interval is worth. A parameter that the features do not determine near the best point is not
-/// identified, even where the edge of what the model can do closes its interval.
+/// The verdict on an interval. A parameter that the features do not determine near the best point is not
+/// identified, even where failing runs close its interval.
 fn interval_verdict(unit: f64, lower: Option<f64>, upper: Option<f64>, determined: bool) -> ParameterVerdict {
     match (lower, upper) {
         (None, None) => ParameterVerdict::NotIdentified,
@@ -423,11 +360,8 @@ fn log_sensitivities(
         let unit = best.unit.get(axis)?;
         Some(slope? / objective.axes().get(axis)?.bounds.log_slope(*unit)?)
     };
-    slopes
-        .0
-        .iter()
-        .map(|row| row.iter().enumerate().map(|(axis, slope)| per_log(axis, *slope)).collect())
-        .collect()
+    let row = |row: &Vec<_>| row.iter().enumerate().map(|(axis, slope)| per_log(axis, *slope)).collect();
+    slopes.0.iter().map(row).collect()
 }
 
 /// Steps at which the model failed.
@@ -435,7 +369,7 @@ fn failed_step_notes(names: &[String], around: &[Evaluation]) -> Vec<String> {
     let failed = |axis: usize| around.iter().skip(2 * axis).take(2).find_map(|e| e.failure.as_ref());
     let note = |(axis, name): (usize, &String)| {
         failed(axis).map(|f| {
-            format!("the model fails ({}) one step of {DIFFERENCE_STEP} of its range from the best {name}; its sensitivities are one-sided or unknown", f.reason)
+            format!("the model fails ({}) one step of {} of its range from the best {name}; its sensitivities are one-sided or unknown", f.reason, linear_model::DIFFERENCE_STEP)
         })
     };
     names.iter().enumerate().filter_map(note).collect()

@@ -195,7 +195,7 @@ impl JobComponentTable {
 }
 
 /// Budgets of a search on features.
-#[derive(Debug, Deserialize, JsonSchema)]
+#[derive(Debug, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct JobSearchTable {
     /// Evaluations of the first stage.

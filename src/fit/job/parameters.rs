@@ -1,9 +1,8 @@
 //! Free parameters of a job: bounds, and what is known before any recording is read.
 
-use super::as_written::ListedNuisance;
-use super::conditions::is_same_quantity;
-use super::{JobRefusal, as_written, check_above_zero, find_repeated, refuse};
-use crate::fit::bounds::{Bounds, BoundsSpacing, Prior};
+use super::as_written::{self, ListedNuisance};
+use super::{KeyRefusal, check_above_zero, find_repeated, is_same_quantity};
+use crate::fit::bounds::{Bounds, BoundsSpacing, Prior, SearchAxis};
 use crate::math;
 use crate::model::parameters::find_parameter;
 use crate::toml_file::suggest_key;
@@ -20,26 +19,30 @@ pub struct FreeParameter {
     pub prior: Option<Prior>,
 }
 
+impl FreeParameter {
+    /// Its range and prior, as the search uses them.
+    pub(crate) fn search_axis(&self) -> SearchAxis {
+        SearchAxis { bounds: self.bounds, prior: self.prior }
+    }
+}
+
 pub(super) fn check_parameters(
     written: &[as_written::JobParameterTable],
     known: &[&str],
-) -> Result<Vec<FreeParameter>, JobRefusal> {
+) -> Result<Vec<FreeParameter>, KeyRefusal> {
     if written.is_empty() {
-        return refuse("parameter", "found none, expected at least one [[parameter]] to fit");
+        refuse!("parameter", "found none, expected at least one [[parameter]] to fit");
     }
     if let Some(name) = find_repeated(written.iter().map(|p| p.name.as_str())) {
-        return refuse(format!("parameter `{name}`"), "found twice; remove one of them");
+        refuse!(format!("parameter `{name}`"), "found twice; remove one of them");
     }
     check_quantities(written)?;
     let check = |p: &as_written::JobParameterTable| {
+        let key = format!("parameter `{}`", p.name);
         if !known.contains(&p.name.as_str()) {
-            return refuse(
-                format!("parameter `{}`", p.name),
-                format!("not a parameter of a scene; {}", suggest_key(&p.name, known)),
-            );
+            refuse!(key, "not a parameter of a scene; {}", suggest_key(&p.name, known));
         }
-        let bounds = Bounds::new(p.lower, p.upper, p.scale)
-            .map_err(|problem| JobRefusal::Bounds { name: p.name.clone(), problem })?;
+        let bounds = Bounds::new(p.lower, p.upper, p.scale).or_else(|problem| refuse!(key, "{problem}"))?;
         let prior = p.prior.as_ref().map(|prior| check_prior(&p.name, prior, &bounds)).transpose()?;
         Ok(FreeParameter { name: p.name.clone(), bounds, prior })
     };
@@ -48,13 +51,14 @@ pub(super) fn check_parameters(
 
 /// Two parameters that set one quantity, such as a stiffness and its natural frequency, cannot both be free:
 /// the second would overwrite the first.
-fn check_quantities(written: &[as_written::JobParameterTable]) -> Result<(), JobRefusal> {
+fn check_quantities(written: &[as_written::JobParameterTable]) -> Result<(), KeyRefusal> {
     let known: Vec<_> = written.iter().filter_map(|parameter| find_parameter(&parameter.name)).collect();
     for (at, second) in known.iter().enumerate() {
         if let Some(first) = known[..at].iter().find(|first| first.quantity == second.quantity) {
-            return refuse(
+            refuse!(
                 format!("parameter `{}`", second.name),
-                format!("sets the same quantity as the parameter `{}`; remove one of them", first.name),
+                "sets the same quantity as the parameter `{}`; remove one of them",
+                first.name
             );
         }
     }
@@ -65,32 +69,30 @@ fn check_prior(
     name: &str,
     written: &as_written::JobPriorTable,
     bounds: &Bounds,
-) -> Result<Prior, JobRefusal> {
+) -> Result<Prior, KeyRefusal> {
     let key = |key: &str| format!("parameter `{name}`, `prior.{key}`");
     let (mean, lower, upper) = (written.mean, bounds.lower(), bounds.upper());
     if !(lower..=upper).contains(&mean) {
-        return refuse(
+        refuse!(
             key("mean"),
-            format!(
-                "found {mean}, expected a number within the bounds, {lower} to {upper}; move the bounds or correct it"
-            ),
+            "found {mean}, expected a number within the bounds, {lower} to {upper}; move the bounds or correct it"
         );
     }
     let relative = match (written.sd, written.sd_relative) {
         (Some(sd), None) => check_above_zero(key("sd"), sd)? / mean.abs(),
         (None, Some(relative)) => check_above_zero(key("sd_relative"), relative)?,
         _ => {
-            return refuse(
+            refuse!(
                 key("sd"),
-                "expected either `sd`, in the parameter's unit, or `sd_relative`, a share of the mean; give one of them",
+                "expected either `sd`, in the parameter's unit, or `sd_relative`, a share of the mean; give one of them"
             );
         }
     };
     match bounds.spacing() {
         BoundsSpacing::Log => Ok(Prior::Log { mean_ln: math::ln(mean), sd_ln: relative }),
-        BoundsSpacing::Linear if written.sd.is_none() && mean == 0.0 => refuse(
+        BoundsSpacing::Linear if written.sd.is_none() && mean == 0.0 => refuse!(
             key("sd_relative"),
-            "found a share of a mean of 0; give `sd` in the parameter's unit instead",
+            "found a share of a mean of 0; give `sd` in the parameter's unit instead"
         ),
         BoundsSpacing::Linear => Ok(Prior::Linear { mean, sd: written.sd.unwrap_or(relative * mean.abs()) }),
     }
@@ -148,12 +150,12 @@ pub(super) fn check_constants(
     written: &as_written::JobFile,
     free: &[FreeParameter],
     known: &[&str],
-) -> Result<Constants, JobRefusal> {
+) -> Result<Constants, KeyRefusal> {
     let Some(nuisance) = &written.nuisance else { return Ok(Constants::Exact) };
     if written.trace.is_empty() {
-        return refuse(
+        refuse!(
             "nuisance",
-            "found without a [[trace]], expected one: a dozen features do not hold so many unknowns; add a [[trace]], or free single constants as [[parameter]] with a `prior`",
+            "found without a [[trace]], expected one: a dozen features do not hold so many unknowns; add a [[trace]], or free single constants as [[parameter]] with a `prior`"
         );
     }
     match nuisance {
@@ -170,18 +172,19 @@ fn check_listed_nuisances(
     list: &[ListedNuisance],
     free: &[FreeParameter],
     known: &[&str],
-) -> Result<Vec<NuisanceParameter>, JobRefusal> {
+) -> Result<Vec<NuisanceParameter>, KeyRefusal> {
     if list.is_empty() {
-        return refuse("nuisance", "found an empty list, expected names, or a percentage such as \"3 %\"");
+        refuse!("nuisance", "found an empty list, expected names, or a percentage such as \"3 %\"");
     }
     if let Some(name) = find_repeated(list.iter().map(|one| one.name.as_str())) {
-        return refuse(format!("nuisance `{name}`"), "found twice; remove one of them");
+        refuse!(format!("nuisance `{name}`"), "found twice; remove one of them");
     }
     for (at, second) in list.iter().enumerate() {
         if let Some(first) = list[..at].iter().find(|first| is_same_quantity(&first.name, &second.name)) {
-            return refuse(
+            refuse!(
                 format!("nuisance `{}`", second.name),
-                format!("sets the same quantity as `{}`; remove one of them", first.name),
+                "sets the same quantity as `{}`; remove one of them",
+                first.name
             );
         }
     }
@@ -192,46 +195,42 @@ fn check_nuisance(
     written: &ListedNuisance,
     free: &[FreeParameter],
     known: &[&str],
-) -> Result<NuisanceParameter, JobRefusal> {
+) -> Result<NuisanceParameter, KeyRefusal> {
     let (name, key) = (&written.name, format!("nuisance `{}`", written.name));
     if !known.contains(&name.as_str()) {
-        return refuse(key, format!("not a parameter of a scene; {}", suggest_key(name, known)));
+        refuse!(key, "not a parameter of a scene; {}", suggest_key(name, known));
     }
     if let Some(free) = free.iter().find(|free| is_same_quantity(&free.name, name)) {
-        return refuse(
+        refuse!(
             key,
-            format!(
-                "the [[parameter]] `{}` is free already; give it a `prior`, and remove it here",
-                free.name
-            ),
+            "the [[parameter]] `{}` is free already; give it a `prior`, and remove it here",
+            free.name
         );
     }
     let sd_relative = match (&written.sd, written.sd_relative) {
         (Some(text), None) => parse_percentage(&key, text)?,
         (None, Some(relative)) => check_percentage(&key, 100.0 * relative)?,
-        _ => return refuse(key, "expected either `sd`, such as \"3 %\", or `sd_relative`, such as 0.03"),
+        _ => refuse!(key, "expected either `sd`, such as \"3 %\", or `sd_relative`, such as 0.03"),
     };
     Ok(NuisanceParameter { name: name.clone(), sd_relative })
 }
 
 /// `3 %` as 0.03.
-fn parse_percentage(key: &str, text: &str) -> Result<f64, JobRefusal> {
+fn parse_percentage(key: &str, text: &str) -> Result<f64, KeyRefusal> {
     let number = text.trim().strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok());
     let Some(percent) = number else {
-        return refuse(key, format!("found \"{text}\", expected a percentage such as \"3 %\""));
+        refuse!(key, "found \"{text}\", expected a percentage such as \"3 %\"");
     };
     check_percentage(key, percent)
 }
 
 /// A percentage as a share.
-fn check_percentage(key: &str, percent: f64) -> Result<f64, JobRefusal> {
+fn check_percentage(key: &str, percent: f64) -> Result<f64, KeyRefusal> {
     if (LEAST_PERCENT..=MOST_PERCENT).contains(&percent) {
         return Ok(percent / 100.0);
     }
-    refuse(
+    refuse!(
         key,
-        format!(
-            "found {percent} %, expected {LEAST_PERCENT} % to {MOST_PERCENT} %: what is known no better is a [[parameter]]"
-        ),
+        "found {percent} %, expected {LEAST_PERCENT} % to {MOST_PERCENT} %: what is known no better is a [[parameter]]"
     )
 }

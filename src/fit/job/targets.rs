@@ -2,7 +2,7 @@
 
 use super::as_written::ConditionReference;
 use super::conditions::JobCondition;
-use super::{JobRefusal, as_written, check_above_zero, check_non_empty, find_repeated, refuse};
+use super::{KeyRefusal, as_written, check_above_zero, check_non_empty, find_repeated};
 use crate::feature;
 use crate::feature::{FREQUENCY_SD_FLOOR, Feature, Keys, Reading, ReadingKind, ValueComparison};
 use crate::toml_file::suggest_key;
@@ -16,40 +16,35 @@ const LEVEL_SD_RELATIVE: f64 = 0.3;
 /// program, 2 %.
 pub(super) const TOLERANCE_RELATIVE: f64 = 0.02;
 
-/// What the entries have to agree with.
-pub(super) struct TargetContext<'a> {
-    pub conditions: &'a [JobCondition],
-    /// Half the rate of the job's own camera, Hz.
-    pub nyquist_hz: Option<f64>,
-}
-
-/// Components first, then features, in the order of the file.
+/// Components first, then features, in the order of the file; `nyquist_hz` is half the rate of the job's own
+/// camera.
 pub(super) fn check_targets(
     written: &as_written::JobFile,
-    context: &TargetContext,
-) -> Result<Vec<FitTarget>, JobRefusal> {
-    let mut aims =
-        written.component.iter().map(|c| check_component(c, context)).collect::<Result<Vec<_>, _>>()?;
+    conditions: &[JobCondition],
+    nyquist_hz: Option<f64>,
+) -> Result<Vec<FitTarget>, KeyRefusal> {
+    let component = |c| check_component(c, conditions, nyquist_hz);
+    let mut aims = written.component.iter().map(component).collect::<Result<Vec<_>, _>>()?;
     for entry in &written.feature {
-        aims.extend(check_feature(entry, context)?);
+        aims.extend(check_feature(entry, conditions, nyquist_hz)?);
     }
     let traced = !written.trace.is_empty();
     if aims.is_empty() && !traced {
-        return refuse(
+        refuse!(
             "component",
-            "found none, and no [[feature]] or [[trace]]; expected at least one thing to fit: add a [[trace]]",
+            "found none, and no [[feature]] or [[trace]]; expected at least one thing to fit: add a [[trace]]"
         );
     }
     if aims.iter().all(|aim| aim.held_out) && !traced {
-        return refuse(
+        refuse!(
             "component",
-            "every [[component]] and [[feature]] belongs to something that is held out; expected at least one thing to fit",
+            "every [[component]] and [[feature]] belongs to something that is held out; expected at least one thing to fit"
         );
     }
     match find_repeated(aims.iter().map(|aim| aim.feature.name.as_str())) {
-        Some(name) => refuse(
+        Some(name) => refuse!(
             format!("component or feature `{name}`"),
-            "the name is used twice; give each its own `name`",
+            "the name is used twice; give each its own `name`"
         ),
         None => Ok(aims),
     }
@@ -57,12 +52,13 @@ pub(super) fn check_targets(
 
 fn check_component(
     written: &as_written::JobComponentTable,
-    context: &TargetContext,
-) -> Result<FitTarget, JobRefusal> {
+    conditions: &[JobCondition],
+    nyquist_hz: Option<f64>,
+) -> Result<FitTarget, KeyRefusal> {
     let entry = JobEntry { what: format!("component `{}`", written.name) };
     let name = check_non_empty("component, `name`", &written.name, "a name such as \"low\"")?;
-    let place = entry.find_condition(written.recording.as_ref(), context.conditions, context.nyquist_hz)?;
-    let band = reading_entry(&entry, &written.reading_keys(), &place).parse_band()?;
+    let (index, condition) = entry.find_condition(written.recording.as_ref(), conditions)?;
+    let band = reading_entry(&entry, &written.reading_keys(), condition, nyquist_hz).parse_band()?;
     let sd =
         written.target_sd_hz.map(|sd| check_above_zero(entry.key_path("target_sd_hz"), sd)).transpose()?;
     let source = match (written.target_hz, sd) {
@@ -73,15 +69,15 @@ fn check_component(
             ValueComparison::Log,
         )?,
         (Some(_), None) => {
-            return refuse(
+            refuse!(
                 entry.key_path("target_sd_hz"),
-                "missing; a given `target_hz` needs its standard deviation",
+                "missing; a given `target_hz` needs its standard deviation"
             );
         }
-        (None, _) if !place.measured => {
-            return refuse(
+        (None, _) if condition.recording.is_none() => {
+            refuse!(
                 entry.key_path("target_hz"),
-                "missing; without a [[recording]] expected `target_hz` and `target_sd_hz`",
+                "missing; without a [[recording]] expected `target_hz` and `target_sd_hz`"
             );
         }
         (None, sd) => {
@@ -92,41 +88,39 @@ fn check_component(
         entry.key_path("tolerance_relative"),
         written.tolerance_relative.unwrap_or(TOLERANCE_RELATIVE),
     )?;
-    let feature = Feature { name, reading: Reading::Frequency(band), condition: place.index };
-    Ok(FitTarget {
-        feature,
-        source,
-        tolerance_relative: Some(tolerance),
-        held_out: place.held_out,
-        stage: TargetStage::Always,
-    })
+    let feature = Feature { name, reading: Reading::Frequency(band), condition: index };
+    let (held_out, stage) = (condition.held_out, TargetStage::Always);
+    Ok(FitTarget { feature, source, tolerance_relative: Some(tolerance), held_out, stage })
 }
 
 fn check_feature(
     written: &as_written::Feature,
-    context: &TargetContext,
-) -> Result<Vec<FitTarget>, JobRefusal> {
+    conditions: &[JobCondition],
+    nyquist_hz: Option<f64>,
+) -> Result<Vec<FitTarget>, KeyRefusal> {
     let kind = find_feature_kind(written)?;
     let name = written.name.clone().unwrap_or_else(|| kind.word.to_owned());
     check_non_empty("feature, `name`", &name, "a name, or no such key")?;
     let entry = JobEntry { what: format!("feature `{name}` ({})", kind.word) };
-    let place = entry.find_condition(written.recording.as_ref(), context.conditions, context.nyquist_hz)?;
-    let readings = kind.make_readings(&name, &reading_entry(&entry, &written.keys(), &place))?;
+    let (index, condition) = entry.find_condition(written.recording.as_ref(), conditions)?;
+    let keys = written.keys();
+    let readings = kind.make_readings(&name, &reading_entry(&entry, &keys, condition, nyquist_hz))?;
+    let (held_out, measured) = (condition.held_out, condition.recording.is_some());
     if kind.is_series() {
-        check_several_measured(&entry, written, &place)?;
+        check_series(&entry, written, measured)?;
     }
     let aim = |(name, reading): (String, Reading)| {
-        let source = target_source(&entry, written, &reading, &place)?;
+        let source = target_source(&entry, written, &reading, measured)?;
         let stage =
             if let Reading::BandLevel { .. } = reading { TargetStage::Last } else { TargetStage::Always };
-        let feature = Feature { name, reading, condition: place.index };
-        Ok(FitTarget { feature, source, tolerance_relative: None, held_out: place.held_out, stage })
+        let feature = Feature { name, reading, condition: index };
+        Ok(FitTarget { feature, source, tolerance_relative: None, held_out, stage })
     };
     readings.into_iter().map(aim).collect()
 }
 
 /// The kind of a feature that a recording shows; a frequency is a component of its own.
-fn find_feature_kind(written: &as_written::Feature) -> Result<&'static ReadingKind, JobRefusal> {
+fn find_feature_kind(written: &as_written::Feature) -> Result<&'static ReadingKind, KeyRefusal> {
     let problem = match ReadingKind::find(&written.kind) {
         Ok(kind) if kind.is_of_run() => format!(
             "found \"{}\", which only a simulated run shows; map it in a study, or remove it",
@@ -140,25 +134,21 @@ fn find_feature_kind(written: &as_written::Feature) -> Result<&'static ReadingKi
         Err(problem) => problem,
     };
     let key = written.name.as_ref().map_or_else(String::new, |name| format!(" `{name}`"));
-    refuse(format!("feature{key}, `kind`"), problem)
+    refuse!(format!("feature{key}, `kind`"), "{problem}")
 }
 
-/// Several features have targets of their own, which are measured.
-fn check_several_measured(
-    entry: &JobEntry,
-    written: &as_written::Feature,
-    place: &EntryCondition,
-) -> Result<(), JobRefusal> {
-    if !place.measured {
-        return refuse(
+/// The features of a series have a target each, so that all of them have to be measured.
+fn check_series(entry: &JobEntry, written: &as_written::Feature, measured: bool) -> Result<(), KeyRefusal> {
+    if !measured {
+        refuse!(
             entry.key_path("kind"),
-            "found without a [[recording]], expected one on which its targets are measured; give each as a feature of its own",
+            "found without a [[recording]], expected one on which its targets are measured; give each as a feature of its own"
         );
     }
     if written.target.is_some() || written.target_sd.is_some() {
-        return refuse(
+        refuse!(
             entry.key_path("target"),
-            "one target has no meaning for several features, which are measured on the recording; remove it",
+            "one target has no meaning for several features, which are measured on the recording; remove it"
         );
     }
     Ok(())
@@ -168,37 +158,33 @@ fn check_several_measured(
 fn reading_entry<'a>(
     entry: &'a JobEntry,
     keys: &'a Keys,
-    place: &EntryCondition,
+    condition: &JobCondition,
+    nyquist_hz: Option<f64>,
 ) -> feature::ReadingEntry<'a> {
-    feature::ReadingEntry {
-        name: &entry.what,
-        noun: "feature",
-        keys,
-        nyquist_hz: place.nyquist_hz,
-        noisy: true,
-    }
+    let nyquist_hz = nyquist_hz.filter(|_| condition.recording.is_none());
+    feature::ReadingEntry { name: &entry.what, noun: "feature", keys, nyquist_hz, noisy: true }
 }
 
 fn target_source(
     entry: &JobEntry,
     written: &as_written::Feature,
     reading: &Reading,
-    place: &EntryCondition,
-) -> Result<TargetSource, JobRefusal> {
+    measured: bool,
+) -> Result<TargetSource, KeyRefusal> {
     let measure = reading.comparison();
     match (written.target, written.target_sd, written.sd_relative) {
         (Some(target), Some(sd), None) => entry.given_source(target, sd, "target_sd", measure),
-        (None, None, _) if !place.measured => refuse(
+        (None, None, _) if !measured => refuse!(
             entry.key_path("target"),
-            "missing; without a [[recording]] expected `target` and `target_sd`",
+            "missing; without a [[recording]] expected `target` and `target_sd`"
         ),
         (None, None, relative) => {
             let relative = relative.map(|relative| entry.check_relative_sd(relative)).transpose()?;
             Ok(measured_source(measure, relative.unwrap_or_else(|| default_min_sd_relative(reading))))
         }
-        _ => refuse(
+        _ => refuse!(
             entry.key_path("sd_relative"),
-            "expected either `sd_relative` or nothing (the target is measured on the recording), or `target` and `target_sd` together",
+            "expected either `sd_relative` or nothing (the target is measured on the recording), or `target` and `target_sd` together"
         ),
     }
 }
@@ -280,16 +266,6 @@ pub(super) struct JobEntry {
     pub(super) what: String,
 }
 
-/// The recording or condition that an entry belongs to.
-pub(super) struct EntryCondition {
-    pub index: usize,
-    /// Whether there is a recording on which a target can be measured.
-    pub measured: bool,
-    pub held_out: bool,
-    /// Half the rate of the job's own camera, Hz, where the condition is seen through it.
-    pub nyquist_hz: Option<f64>,
-}
-
 impl JobEntry {
     pub(super) fn key_path(&self, key: &str) -> String {
         format!("{}, `{key}`", self.what)
@@ -301,85 +277,65 @@ impl JobEntry {
         sd: f64,
         sd_key: &str,
         measure: ValueComparison,
-    ) -> Result<TargetSource, JobRefusal> {
+    ) -> Result<TargetSource, KeyRefusal> {
         let least = match measure {
             ValueComparison::Log if !(target.is_finite() && target != 0.0) => {
-                return refuse(
+                refuse!(
                     self.key_path("target"),
-                    format!(
-                        "found {target}, expected a finite number that is not 0 (residuals are logarithms)"
-                    ),
+                    "found {target}, expected a finite number that is not 0 (residuals are logarithms)"
                 );
             }
             ValueComparison::Log => MIN_SD_RELATIVE * target.abs(),
             ValueComparison::Linear { .. } if !target.is_finite() => {
-                return refuse(self.key_path("target"), format!("found {target}, expected a finite number"));
+                refuse!(self.key_path("target"), "found {target}, expected a finite number");
             }
             ValueComparison::Linear { scale } => MIN_SD_RELATIVE * scale,
         };
         if !(sd.is_finite() && sd >= least) {
-            return refuse(
-                self.key_path(sd_key),
-                format!("found {sd}, expected a finite number of at least {least:e}"),
-            );
+            refuse!(self.key_path(sd_key), "found {sd}, expected a finite number of at least {least:e}");
         }
         Ok(TargetSource::Given { target, sd })
     }
 
-    pub(super) fn check_relative_sd(&self, found: f64) -> Result<f64, JobRefusal> {
+    pub(super) fn check_relative_sd(&self, found: f64) -> Result<f64, KeyRefusal> {
         if found.is_finite() && found >= MIN_SD_RELATIVE {
             return Ok(found);
         }
-        refuse(
+        refuse!(
             self.key_path("sd_relative"),
-            format!(
-                "found {found}, expected a finite number of at least {MIN_SD_RELATIVE:e}; 0.05 means 5 % of the measured value"
-            ),
+            "found {found}, expected a finite number of at least {MIN_SD_RELATIVE:e}; 0.05 means 5 % of the measured value"
         )
     }
 
-    /// The recording or condition of that number, counted from 1, or name; the first where there is neither.
-    pub(super) fn find_condition(
+    /// The recording or condition with this number, counted from 1, or name, and its index; the first one
+    /// where the entry gives neither.
+    pub(super) fn find_condition<'a>(
         &self,
         which: Option<&ConditionReference>,
-        conditions: &[JobCondition],
-        nyquist_hz: Option<f64>,
-    ) -> Result<EntryCondition, JobRefusal> {
+        conditions: &'a [JobCondition],
+    ) -> Result<(usize, &'a JobCondition), KeyRefusal> {
         let (key, most) = (self.key_path("recording"), conditions.len());
         let index = match which {
             None => 0,
             Some(ConditionReference::Number(number)) if (1..=most).contains(number) => number - 1,
             Some(ConditionReference::Number(number)) => {
-                return refuse(
+                refuse!(
                     key,
-                    format!(
-                        "found {number}, expected 1 to {most}: recordings, then conditions, are counted from 1 in the order of the file"
-                    ),
+                    "found {number}, expected 1 to {most}: recordings, then conditions, are counted from 1 in the order of the file"
                 );
             }
             Some(ConditionReference::Name(name)) => {
                 let names: Vec<&str> = conditions.iter().map(|c| c.name.as_str()).collect();
-                let unknown = || {
-                    refuse(
+                let Some(at) = conditions.iter().position(|c| c.name == *name) else {
+                    refuse!(
                         key,
-                        format!(
-                            "no recording or condition is called `{name}`; {}",
-                            suggest_key(name, &names)
-                        ),
+                        "no recording or condition is called `{name}`; {}",
+                        suggest_key(name, &names)
                     )
                 };
-                conditions.iter().position(|c| c.name == *name).map_or_else(unknown, Ok)?
+                at
             }
         };
-        let Some(condition) = conditions.get(index) else {
-            return refuse(self.key_path("recording"), "there is no recording and no condition");
-        };
-        let measured = condition.recording.is_some();
-        Ok(EntryCondition {
-            index,
-            measured,
-            held_out: condition.held_out,
-            nyquist_hz: nyquist_hz.filter(|_| !measured),
-        })
+        Ok((index, &conditions[index]))
     }
 }

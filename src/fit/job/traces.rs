@@ -1,30 +1,25 @@
 //! Traces of a job: which recordings are fitted frame by frame, and what is not known of their cameras.
 
-use super::as_written;
-use super::conditions::{
-    DEFAULT_OFFSET_SD_M, DEFAULT_SCALE_SD, MAX_OFFSET_SD_M, MAX_SCALE_SD, check_camera_sd,
-};
-use super::conditions::{HeadSource, JobCondition, parse_head_source};
+use super::conditions::{self, HeadSource, JobCondition, check_camera_sd, parse_head_source};
 use super::targets::JobEntry;
-use super::{JobRefusal, check_above_zero, refuse};
+use super::{KeyRefusal, as_written, check_above_zero};
 use crate::recording::channel::Window;
 use crate::toml_file::suggest_key;
 use serde::Serialize;
 use std::f64::consts::PI;
 
-/// Most lengths of segments: each doubles the one before, so that eight reach from 4 ms to half a second.
+/// Most stages: segment lengths usually double, and eight reach from 4 ms to half a second.
 const MOST_STAGES: usize = 8;
-/// Standard deviation of the camera's tilt unless the job says otherwise, degrees: of a camera that was set
-/// up with a spirit level.
+/// Default standard deviation of the camera's tilt, degrees: a camera that was set up with a spirit level.
 const TILT_SD_DEG: f64 = 0.3;
-/// Largest of it, degrees: beyond it a recording has to be levelled first.
+/// Largest standard deviation of the tilt, degrees: a recording that is tilted more has to be levelled first.
 const MOST_TILT_SD_DEG: f64 = 10.0;
-/// Largest of the drift of a marker, m/s: more is no drift, but a motion that has to be tracked.
+/// Largest standard deviation of a marker's drift, m/s: anything faster is a motion that has to be tracked.
 const MOST_DRIFT_SD_M_PER_S: f64 = 0.01;
-/// Standard deviation of the camera's clock against the drive's where the scene drives the head, s: of a
-/// camera that is started by a trigger. Where the recording's own head drives, one camera took both.
+/// Default standard deviation of the camera's clock against the drive's where the scene drives the head, s: a
+/// camera that is started by a trigger. A recording that drives its own head has one clock.
 const CLOCK_SD_S: f64 = 1e-3;
-/// Largest of it, s: more is an alignment that has to be made first.
+/// Largest standard deviation of the clock, s: a larger shift has to be removed before the fit.
 const MOST_CLOCK_SD_S: f64 = 0.1;
 
 /// A recording whose trace is fitted.
@@ -32,17 +27,17 @@ const MOST_CLOCK_SD_S: f64 = 0.1;
 pub struct TraceTarget {
     /// Number of its condition, from 0.
     pub condition: usize,
-    /// What of it is fitted; `None` for what it has of `tip-x` and `head-drop`.
+    /// Channels that are fitted; `None` for `tip-x` and `head-drop` where the recording has them.
     pub channels: Option<Vec<TraceChannel>>,
-    /// Lengths of the segments of each stage, rising, s; `None` for the usual ones.
+    /// Segment length of each stage, rising, s; `None` for the default lengths.
     pub segment_s: Option<Vec<f64>>,
     /// Frames that are fitted; `None` for all.
     pub window: Option<Window>,
-    /// Standard deviation of a tracked coordinate, m; `None` for the measured one.
+    /// Standard deviation of a tracked coordinate, m; `None` to measure it on the recording.
     pub noise_m: Option<f64>,
-    /// What drives the head of its model; `None` for the recording's own where it tracks the head.
+    /// What drives the head of its model; `None` for the recording where it tracks the head.
     pub head: Option<HeadSource>,
-    /// What is not known of its camera.
+    /// Standard deviations of the unknowns of its camera.
     pub camera: CameraPriorSds,
 }
 
@@ -50,11 +45,11 @@ pub struct TraceTarget {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum TraceChannel {
-    /// Place of the tip along the sweep.
+    /// Position of the tip along the sweep.
     TipX,
-    /// How far the head is below its upright place.
+    /// Height of the head below its upright position.
     HeadDrop,
-    /// Place of the tip against the head, along the sweep.
+    /// Position of the tip relative to the head, along the sweep.
     Deflection,
 }
 
@@ -69,23 +64,23 @@ impl TraceChannel {
     }
 }
 
-/// Standard deviations of what is not known of a camera; one that is 0 is held at its nominal value.
+/// Prior standard deviations of the unknowns of a camera; 0 holds an unknown at its nominal value.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct CameraPriorSds {
     /// Of the angle from the picture's x axis to the glass, rad.
     pub tilt_sd_rad: f64,
     /// Of the scale, relative.
     pub scale_sd: f64,
-    /// Of the place of either marker against the point that it stands for, m.
+    /// Of the position of either marker relative to the point that it marks, m.
     pub offset_sd_m: f64,
-    /// Of the speed at which these places drift, m/s.
+    /// Of the speed at which these positions drift, m/s.
     pub drift_sd_m_per_s: f64,
-    /// Of the camera's clock where it is given, s.
+    /// Of the camera's clock where the job gives it, s.
     clock_sd_s: Option<f64>,
 }
 
 impl CameraPriorSds {
-    /// Of the camera's clock against the drive's, s, with this drive.
+    /// Standard deviation of the camera's clock relative to the drive's, s.
     pub(crate) fn clock_sd_s(&self, head: HeadSource) -> f64 {
         self.clock_sd_s.unwrap_or(match head {
             HeadSource::Recording => 0.0,
@@ -97,145 +92,114 @@ impl CameraPriorSds {
 pub(super) fn check_traces(
     written: &[as_written::JobTraceTable],
     conditions: &[JobCondition],
-) -> Result<Vec<TraceTarget>, JobRefusal> {
+) -> Result<Vec<TraceTarget>, KeyRefusal> {
     let mut traces: Vec<TraceTarget> = Vec::new();
     for (number, written) in (1..).zip(written) {
         let entry = JobEntry { what: format!("trace {number}") };
         let trace = check_trace(&entry, written, conditions)?;
-        check_trace_consistency(&entry, &trace, &traces, conditions)?;
+        if traces.iter().any(|other| other.condition == trace.condition) {
+            let name = &conditions[trace.condition].name;
+            refuse!(
+                entry.key_path("recording"),
+                "`{name}` has a [[trace]] already, and its camera is one; remove one of them"
+            );
+        }
+        if traces.first().is_some_and(|first| first.segment_s != trace.segment_s) {
+            refuse!(
+                entry.key_path("segment_s"),
+                "differs from that of trace 1, expected the same: all recordings go through the stages together"
+            );
+        }
         traces.push(trace);
     }
     Ok(traces)
-}
-
-/// One trace a recording, and the stages of the others.
-fn check_trace_consistency(
-    entry: &JobEntry,
-    trace: &TraceTarget,
-    before: &[TraceTarget],
-    conditions: &[JobCondition],
-) -> Result<(), JobRefusal> {
-    if before.iter().any(|other| other.condition == trace.condition) {
-        let name = &conditions[trace.condition].name;
-        return refuse(
-            entry.key_path("recording"),
-            format!("`{name}` has a [[trace]] already, and its camera is one; remove one of them"),
-        );
-    }
-    match before.first().filter(|first| first.segment_s != trace.segment_s) {
-        Some(_) => refuse(
-            entry.key_path("segment_s"),
-            "differs from that of trace 1, expected the same: all recordings go through the stages together",
-        ),
-        None => Ok(()),
-    }
 }
 
 fn check_trace(
     entry: &JobEntry,
     written: &as_written::JobTraceTable,
     conditions: &[JobCondition],
-) -> Result<TraceTarget, JobRefusal> {
-    let place = entry.find_condition(written.recording.as_ref(), conditions, None)?;
-    let name = &conditions[place.index].name;
-    if !place.measured {
-        return refuse(
+) -> Result<TraceTarget, KeyRefusal> {
+    let (condition, JobCondition { name, recording, held_out, .. }) =
+        entry.find_condition(written.recording.as_ref(), conditions)?;
+    if recording.is_none() {
+        refuse!(entry.key_path("recording"), "`{name}` has no recording; a [[trace]] needs a [[recording]]");
+    }
+    if *held_out {
+        refuse!(
             entry.key_path("recording"),
-            format!("`{name}` has no recording; a [[trace]] needs a [[recording]]"),
+            "`{name}` is held out of the fit; remove `held_out`, or the [[trace]]"
         );
     }
-    if place.held_out {
-        return refuse(
-            entry.key_path("recording"),
-            format!("`{name}` is held out of the fit; remove `held_out`, or the [[trace]]"),
-        );
-    }
-    let window =
-        |text: &String| Window::parse(text).or_else(|e| refuse(entry.key_path("window"), e.to_string()));
+    let lengths = |found: &Vec<f64>| check_segment_lengths(entry, found);
+    let window = |text| Window::parse(text).or_else(|e| refuse!(entry.key_path("window"), "{e}"));
+    let noise = |found| check_above_zero(entry.key_path("noise_m"), found);
     Ok(TraceTarget {
-        condition: place.index,
+        condition,
         channels: written.channels.as_deref().map(|found| check_channels(entry, found)).transpose()?,
-        segment_s: written
-            .segment_s
-            .as_deref()
-            .map(|found| check_segment_lengths(entry, found))
-            .transpose()?,
-        window: written.window.as_ref().map(window).transpose()?,
-        noise_m: written
-            .noise_m
-            .map(|noise| check_above_zero(entry.key_path("noise_m"), noise))
-            .transpose()?,
-        head: written
-            .drive
-            .as_deref()
-            .map(|word| parse_head_source(entry.key_path("drive"), word))
-            .transpose()?,
+        segment_s: written.segment_s.as_ref().map(lengths).transpose()?,
+        window: written.window.as_deref().map(window).transpose()?,
+        noise_m: written.noise_m.map(noise).transpose()?,
+        head: parse_head_source(|| entry.key_path("drive"), written.drive.as_deref())?,
         camera: check_trace_camera(entry, &written.camera)?,
     })
 }
 
-fn check_channels(entry: &JobEntry, words: &[String]) -> Result<Vec<TraceChannel>, JobRefusal> {
+fn check_channels(entry: &JobEntry, words: &[String]) -> Result<Vec<TraceChannel>, KeyRefusal> {
     let key = || entry.key_path("channels");
     let known = TraceChannel::WORDS.map(|(_, word)| word);
-    let one = |word: &String| {
-        let found = TraceChannel::WORDS.iter().find(|(_, known)| known == word);
-        found.map_or_else(
-            || refuse(key(), format!("found \"{word}\"; {}", suggest_key(word, &known))),
-            |(channel, _)| Ok(*channel),
-        )
+    let one = |word: &String| match TraceChannel::WORDS.iter().find(|(_, known)| known == word) {
+        Some((channel, _)) => Ok(*channel),
+        None => refuse!(key(), "found \"{word}\"; {}", suggest_key(word, &known)),
     };
     let found = words.iter().map(one).collect::<Result<Vec<_>, _>>()?;
     if found.is_empty() {
-        return refuse(key(), "found none, expected one at least, such as [\"tip-x\"]; leave it out for all");
+        refuse!(key(), "found none, expected one at least, such as [\"tip-x\"]; leave it out for all");
     }
     if let Some(twice) = (1..found.len()).find(|at| found[..*at].contains(&found[*at])) {
-        return refuse(key(), format!("found \"{}\" twice; remove one of them", words[twice]));
+        refuse!(key(), "found \"{}\" twice; remove one of them", words[twice]);
     }
     if found.contains(&TraceChannel::TipX) && found.contains(&TraceChannel::Deflection) {
-        return refuse(
+        refuse!(
             key(),
-            "found \"tip-x\" and \"deflection\", which both have the noise of the tip; remove one of them",
+            "found \"tip-x\" and \"deflection\", which both have the noise of the tip; remove one of them"
         );
     }
     Ok(found)
 }
 
-fn check_segment_lengths(entry: &JobEntry, found: &[f64]) -> Result<Vec<f64>, JobRefusal> {
+fn check_segment_lengths(entry: &JobEntry, found: &[f64]) -> Result<Vec<f64>, KeyRefusal> {
     let key = || entry.key_path("segment_s");
     if !(1..=MOST_STAGES).contains(&found.len()) {
-        return refuse(
+        let count = found.len();
+        refuse!(key(), "found {count} lengths, expected 1 to {MOST_STAGES}, such as [0.004, 0.008, 0.016]");
+    }
+    for length in found {
+        check_above_zero(key(), *length)?;
+    }
+    if let Some([before, after]) = found.windows(2).find(|pair| pair[0] >= pair[1]) {
+        refuse!(
             key(),
-            format!(
-                "found {} lengths, expected 1 to {MOST_STAGES}, such as [0.004, 0.008, 0.016]",
-                found.len()
-            ),
+            "found {after} after {before}, expected rising lengths: each stage starts from the one before"
         );
     }
-    found.iter().try_for_each(|length| check_above_zero(key(), *length).map(|_| ()))?;
-    match found.windows(2).find(|pair| pair[0] >= pair[1]) {
-        Some(pair) => refuse(
-            key(),
-            format!(
-                "found {} after {}, expected rising lengths: each stage starts from the one before",
-                pair[1], pair[0]
-            ),
-        ),
-        None => Ok(found.to_vec()),
-    }
+    Ok(found.to_vec())
 }
 
 fn check_trace_camera(
     entry: &JobEntry,
     written: &as_written::JobTraceCameraTable,
-) -> Result<CameraPriorSds, JobRefusal> {
+) -> Result<CameraPriorSds, KeyRefusal> {
     let sd = |key: &str, found, most| check_camera_sd(entry.key_path(&format!("camera.{key}")), found, most);
     let tilt_sd_deg = sd("tilt_sd_deg", written.tilt_sd_deg, MOST_TILT_SD_DEG)?;
+    let scale_sd = sd("scale_sd", written.scale_sd, conditions::MAX_SCALE_SD)?;
+    let drift_sd_m_per_s = sd("drift_sd_m_per_s", written.drift_sd_m_per_s, MOST_DRIFT_SD_M_PER_S)?;
+    let offset_sd_m = sd("offset_sd_m", written.offset_sd_m, conditions::MAX_OFFSET_SD_M)?;
     Ok(CameraPriorSds {
         tilt_sd_rad: tilt_sd_deg.unwrap_or(TILT_SD_DEG) * PI / 180.0,
-        scale_sd: sd("scale_sd", written.scale_sd, MAX_SCALE_SD)?.unwrap_or(DEFAULT_SCALE_SD),
-        drift_sd_m_per_s: sd("drift_sd_m_per_s", written.drift_sd_m_per_s, MOST_DRIFT_SD_M_PER_S)?
-            .unwrap_or(0.0),
-        offset_sd_m: sd("offset_sd_m", written.offset_sd_m, MAX_OFFSET_SD_M)?.unwrap_or(DEFAULT_OFFSET_SD_M),
+        scale_sd: scale_sd.unwrap_or(conditions::DEFAULT_SCALE_SD),
+        drift_sd_m_per_s: drift_sd_m_per_s.unwrap_or(0.0),
+        offset_sd_m: offset_sd_m.unwrap_or(conditions::DEFAULT_OFFSET_SD_M),
         clock_sd_s: sd("clock_sd_s", written.clock_sd_s, MOST_CLOCK_SD_S)?,
     })
 }

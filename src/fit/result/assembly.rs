@@ -1,9 +1,7 @@
-//! From what a fit found to its result.
+//! Assembles the result of a fit.
 
-use super::{
-    ComponentResult, EvaluationCounts, FeatureResult, FitResult, FitStatus, LocalOptimum, NuisanceResult,
-    ParameterResult, RunnerUpPeak,
-};
+use super::{ComponentResult, EvaluationCounts, FeatureResult, FitResult, FitStatus};
+use super::{LocalOptimum, NuisanceResult, RunnerUpPeak};
 use crate::feature::FeatureValue;
 use crate::fit::camera_calibration::{CameraEstimate, CameraFit};
 use crate::fit::evaluation::{Evaluation, Observed};
@@ -14,7 +12,7 @@ use crate::fit::linear_model::Z_95;
 use crate::fit::run::FitContext;
 use crate::fit::search::{LocalDescent, SearchOutcome};
 use crate::fit::targets::TargetValue;
-use crate::fit::uncertainty::{CHI_SQUARED_95, FitUncertainty, ParameterInterval};
+use crate::fit::uncertainty::{CHI_SQUARED_95, FitUncertainty};
 use crate::math;
 use crate::text::format_short;
 use std::collections::BTreeMap;
@@ -22,58 +20,45 @@ use std::collections::BTreeMap;
 /// Everything that goes into a result.
 pub(in crate::fit) struct FitFindings<'a> {
     pub job: &'a Job,
-    /// Aims that were fitted, in the order of the targets.
+    /// Fitted aims, in the order of the targets.
     pub aims: &'a [FitTarget],
     pub targets: &'a [TargetValue],
     pub found: &'a FitUncertainty,
     pub searched: &'a SearchOutcome,
     pub gate: Identifiability,
-    /// Aims that were held out, with what the best model shows of them.
-    pub held_out: Vec<(FitTarget, TargetValue, Result<f64, String>)>,
+    pub held_out: Vec<FeatureResult>,
     pub status: FitStatus,
     pub synthetic: bool,
     pub context: &'a FitContext<'a>,
 }
 
 impl FitFindings<'_> {
-    /// The result; `reads` are the features of the best model, read once more.
+    /// The result; `reads` are the features of the best model with their peaks.
     pub(in crate::fit) fn into_result(self, ledger: &Ledger, reads: &[Option<FeatureValue>]) -> FitResult {
-        let names = self.job.parameter_names();
-        let sensitivities = self
-            .targets
-            .iter()
-            .zip(&self.found.sensitivities)
-            .map(|(t, row)| (t.name.clone(), names.iter().cloned().zip(row.iter().copied()).collect()));
+        let (found, names) = (self.found, self.job.parameter_names());
+        let rows = self.targets.iter().zip(&found.sensitivities);
+        let sensitivities = rows.map(|(t, row)| (t.name.clone(), map_names(&names, row.iter().copied())));
         let correlation = |row: &Vec<Option<f64>>| {
-            names.iter().zip(row).filter_map(|(name, r)| Some((name.clone(), (*r)?))).collect()
+            names.iter().cloned().zip(row).filter_map(|(n, r)| Some((n, (*r)?))).collect()
         };
-        let shown =
-            ModelledTargets::compare(self.aims, self.targets, &self.found.twin_sd, &self.found.best, reads);
+        let shown = ModelledTargets::compare(self.aims, self.targets, &found.twin_sd, &found.best, reads);
         FitResult {
             title: self.job.title.clone(),
             status: self.status,
             misfit: None,
-            nuisances: camera_nuisance_results(self.job, &self.found.cameras),
+            nuisances: camera_nuisance_results(self.job, &found.cameras),
             starts: Vec::new(),
-            parameters: names
-                .iter()
-                .cloned()
-                .zip(self.found.intervals.iter().map(parameter_result))
-                .collect(),
+            parameters: map_names(&names, found.intervals.iter().cloned()),
             components: shown.components,
             features: shown.features,
-            held_out: self.held_out.iter().map(predicted_feature_result).collect(),
-            rank: self.found.rank,
-            condition: Some(self.found.condition).filter(|condition| condition.is_finite()),
-            combinations: self.found.combinations.clone(),
-            correlations: names
-                .iter()
-                .cloned()
-                .zip(self.found.correlations.iter().map(correlation))
-                .collect(),
-            cost: self.found.best.cost,
+            held_out: self.held_out.clone(),
+            rank: found.rank,
+            condition: Some(found.condition).filter(|condition| condition.is_finite()),
+            combinations: found.combinations.clone(),
+            correlations: map_names(&names, found.correlations.iter().map(correlation)),
+            cost: found.best.cost,
             threshold: CHI_SQUARED_95,
-            twins: self.found.twins,
+            twins: found.twins,
             waterfall: sorted_optima(&names, &self.searched.descents),
             sensitivities: sensitivities.collect(),
             evaluations: EvaluationCounts {
@@ -92,13 +77,8 @@ impl FitFindings<'_> {
     fn collect_notes(&self) -> Vec<String> {
         let mut notes = self.found.notes.clone();
         notes.extend(self.gate.notes.iter().cloned());
-        notes.extend(
-            self.found
-                .twin_sd
-                .iter()
-                .zip(self.targets)
-                .filter_map(|(sd, target)| twin_noise_note(target, (*sd)?)),
-        );
+        let twins = self.found.twin_sd.iter().zip(self.targets);
+        notes.extend(twins.filter_map(|(sd, target)| twin_noise_note(target, (*sd)?)));
         if self.synthetic {
             notes.push("the recording is synthetic: no camera took it".to_owned());
         }
@@ -106,15 +86,15 @@ impl FitFindings<'_> {
     }
 }
 
-/// What the best model shows of the aims that were fitted, next to their targets.
+/// Values of the best model next to the fitted targets.
 pub(in crate::fit) struct ModelledTargets {
     pub components: Vec<ComponentResult>,
     pub features: Vec<FeatureResult>,
 }
 
 impl ModelledTargets {
-    /// Of aims, their targets and deviations over twins in one order; `reads` are the features of the best
-    /// model, read once more.
+    /// Compares the best model with targets; `twin_sd` are the standard deviations over twins, `reads` the
+    /// features of the best model with their peaks. All are in the order of `aims`.
     pub(in crate::fit) fn compare(
         aims: &[FitTarget],
         targets: &[TargetValue],
@@ -122,24 +102,75 @@ impl ModelledTargets {
         best: &Evaluation,
         reads: &[Option<FeatureValue>],
     ) -> Self {
-        let cameras = &CameraFit::estimate(targets, &best.features);
-        let met = |(at, (aim, target))| {
-            let twin_sd = twin_sd.get(at).copied().flatten();
-            ModelledTarget { at, aim, target, best, cameras, twin_sd }
-        };
-        let met: Vec<ModelledTarget> = aims.iter().zip(targets).enumerate().map(met).collect();
-        Self {
-            components: met.iter().filter_map(|met| met.component_result(reads)).collect(),
-            features: met
-                .iter()
-                .filter(|met| met.aim.tolerance_relative.is_none())
-                .map(ModelledTarget::feature_result)
-                .collect(),
+        let cameras = CameraFit::estimate(targets, &best.features);
+        let mut shown = Self { components: Vec::new(), features: Vec::new() };
+        for (at, (aim, target)) in aims.iter().zip(targets).enumerate() {
+            let observed = best.features.get(at);
+            let found = observed.and_then(Observed::observation);
+            let seen = observed.and_then(|observed| cameras.apply_to_value(target, observed));
+            let feature = FeatureResult {
+                model: found.map(|found| found.value),
+                model_seen: target.calibration.and(seen),
+                relative_error: relative_error(seen, target),
+                pass: seen.is_some_and(|model| (model - target.value).abs() <= Z_95 * target.sd),
+                model_scatter: Some(target.scatter).filter(|scatter| *scatter > 0.0),
+                model_spread: found.map(|found| found.spread).filter(|spread| *spread > 0.0),
+                twin_sd: twin_sd.get(at).copied().flatten(),
+                missing: match observed {
+                    Some(Observed::Missing(why)) => Some(why.clone()),
+                    Some(Observed::Value(_)) => None,
+                    None => best.failure.as_ref().map(ToString::to_string),
+                },
+                ..unread_result(aim, target)
+            };
+            let Some(tolerance_relative) = aim.tolerance_relative else {
+                shown.features.push(feature);
+                continue;
+            };
+            let runner_up = reads.get(at).and_then(|read| read.as_ref()?.runner_up);
+            shown.components.push(ComponentResult {
+                name: feature.name,
+                target_hz: feature.target,
+                target_sd_hz: feature.target_sd,
+                model_hz: feature.model,
+                relative_error: feature.relative_error,
+                tolerance_relative,
+                pass: feature.relative_error.is_some_and(|error| error.abs() <= tolerance_relative),
+                model_scatter_hz: feature.model_scatter,
+                model_spread_hz: feature.model_spread,
+                below_db: found.map(|found| found.below_db),
+                runner_up: runner_up
+                    .map(|peak| RunnerUpPeak { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
+                twin_sd_hz: feature.twin_sd,
+                missing: feature.missing,
+            });
         }
+        shown
     }
 }
 
-/// What was estimated of the cameras of features.
+/// A target without any value of the model.
+fn unread_result(aim: &FitTarget, target: &TargetValue) -> FeatureResult {
+    FeatureResult {
+        name: target.name.clone(),
+        kind: aim.feature.reading.kind().to_owned(),
+        unit: aim.feature.reading.unit().name.to_owned(),
+        target: target.value,
+        target_sd: target.sd,
+        ..FeatureResult::default()
+    }
+}
+
+fn relative_error(model: Option<f64>, target: &TargetValue) -> Option<f64> {
+    model.map(|model| model / target.value - 1.0).filter(|error| error.is_finite())
+}
+
+/// Values by parameter name.
+pub(in crate::fit) fn map_names<T>(names: &[String], values: impl Iterator<Item = T>) -> BTreeMap<String, T> {
+    names.iter().cloned().zip(values).collect()
+}
+
+/// Calibrations of the cameras of features.
 pub(in crate::fit) fn camera_nuisance_results(job: &Job, found: &[CameraEstimate]) -> Vec<NuisanceResult> {
     let nuisance = |found: &CameraEstimate| NuisanceResult {
         recording: job.conditions.get(found.condition).map(|condition| condition.name.clone()),
@@ -153,7 +184,7 @@ pub(in crate::fit) fn camera_nuisance_results(job: &Job, found: &[CameraEstimate
     found.iter().map(nuisance).collect()
 }
 
-/// Twins scatter by more than a target's deviation by this factor before it is said.
+/// Ratio of the scatter over twins to the target's deviation above which a note is written.
 const NOISY_TWIN_FACTOR: f64 = 2.0;
 
 fn twin_noise_note(target: &TargetValue, twin_sd: f64) -> Option<String> {
@@ -167,26 +198,12 @@ fn twin_noise_note(target: &TargetValue, twin_sd: f64) -> Option<String> {
     })
 }
 
-fn parameter_result(i: &ParameterInterval) -> ParameterResult {
-    ParameterResult {
-        estimate: i.estimate,
-        lower_95: i.lower_95,
-        upper_95: i.upper_95,
-        verdict: i.verdict,
-        linear_95: i.linear_95,
-        profile_95: i.profile_95,
-        bootstrap_95: i.bootstrap_95,
-        profile: i.profile.clone(),
-        reasons: i.reasons.clone(),
-    }
-}
-
 fn sorted_optima(names: &[String], descents: &[LocalDescent]) -> Vec<LocalOptimum> {
     let optimum = |descent: &LocalDescent| LocalOptimum {
         start_cost: descent.start.cost,
         cost: descent.end.cost,
         evaluations: descent.evaluations,
-        values: names.iter().cloned().zip(descent.end.values.iter().copied()).collect::<BTreeMap<_, _>>(),
+        values: map_names(names, descent.end.values.iter().copied()),
         failure: descent.end.failure.as_ref().map(ToString::to_string),
     };
     let mut optima: Vec<LocalOptimum> = descents.iter().map(optimum).collect();
@@ -196,7 +213,9 @@ fn sorted_optima(names: &[String], descents: &[LocalDescent]) -> Vec<LocalOptimu
 
 /// A held-out aim, with what the best model predicts.
 pub(in crate::fit) fn predicted_feature_result(
-    (aim, target, found): &(FitTarget, TargetValue, Result<f64, String>),
+    aim: &FitTarget,
+    target: &TargetValue,
+    found: Result<f64, String>,
 ) -> FeatureResult {
     let model = found.as_ref().ok().copied();
     let near = |model: f64| match aim.tolerance_relative {
@@ -207,101 +226,10 @@ pub(in crate::fit) fn predicted_feature_result(
         }
     };
     FeatureResult {
-        name: target.name.clone(),
-        kind: aim.feature.reading.kind().to_owned(),
-        unit: aim.feature.reading.unit().name.to_owned(),
-        target: target.value,
-        target_sd: target.sd,
         model,
-        model_seen: None,
-        relative_error: model.map(|model| model / target.value - 1.0).filter(|error| error.is_finite()),
+        relative_error: relative_error(model, target),
         pass: model.is_some_and(near),
-        model_scatter: None,
-        model_spread: None,
-        twin_sd: None,
-        missing: found.as_ref().err().cloned(),
-    }
-}
-
-/// An aim against the best model.
-struct ModelledTarget<'a> {
-    at: usize,
-    aim: &'a FitTarget,
-    target: &'a TargetValue,
-    best: &'a Evaluation,
-    cameras: &'a CameraFit,
-    twin_sd: Option<f64>,
-}
-
-impl ModelledTarget<'_> {
-    fn model_value(&self) -> Option<f64> {
-        self.best.features.get(self.at).and_then(Observed::value)
-    }
-
-    /// What the camera shows of the model's value.
-    fn value_seen(&self) -> Option<f64> {
-        self.cameras.apply_to_value(self.target, self.best.features.get(self.at)?)
-    }
-
-    fn start_spread(&self) -> Option<f64> {
-        let spread = self.best.features.get(self.at)?.observation()?.spread;
-        (spread > 0.0).then_some(spread)
-    }
-
-    fn model_scatter(&self) -> Option<f64> {
-        (self.target.scatter > 0.0).then_some(self.target.scatter)
-    }
-
-    fn missing_reason(&self) -> Option<String> {
-        match (self.best.features.get(self.at), &self.best.failure) {
-            (Some(Observed::Missing(why)), _) => Some(why.clone()),
-            (Some(Observed::Value(_)), _) => None,
-            (None, failure) => failure.as_ref().map(ToString::to_string),
-        }
-    }
-
-    fn relative_error(&self) -> Option<f64> {
-        self.value_seen().map(|model| model / self.target.value - 1.0).filter(|error| error.is_finite())
-    }
-
-    fn component_result(&self, reads: &[Option<FeatureValue>]) -> Option<ComponentResult> {
-        let tolerance_relative = self.aim.tolerance_relative?;
-        let runner_up = reads.get(self.at).and_then(|read| read.as_ref()?.runner_up);
-        Some(ComponentResult {
-            name: self.target.name.clone(),
-            target_hz: self.target.value,
-            target_sd_hz: self.target.sd,
-            model_hz: self.model_value(),
-            relative_error: self.relative_error(),
-            tolerance_relative,
-            pass: self.relative_error().is_some_and(|error| error.abs() <= tolerance_relative),
-            model_scatter_hz: self.model_scatter(),
-            model_spread_hz: self.start_spread(),
-            below_db: self.best.features.get(self.at).and_then(|f| Some(f.observation()?.below_db)),
-            runner_up: runner_up
-                .map(|peak| RunnerUpPeak { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
-            twin_sd_hz: self.twin_sd,
-            missing: self.missing_reason(),
-        })
-    }
-
-    fn feature_result(&self) -> FeatureResult {
-        FeatureResult {
-            name: self.target.name.clone(),
-            kind: self.aim.feature.reading.kind().to_owned(),
-            unit: self.aim.feature.reading.unit().name.to_owned(),
-            target: self.target.value,
-            target_sd: self.target.sd,
-            model: self.model_value(),
-            model_seen: self.target.calibration.and_then(|_| self.value_seen()),
-            relative_error: self.relative_error(),
-            pass: self
-                .value_seen()
-                .is_some_and(|model| (model - self.target.value).abs() <= Z_95 * self.target.sd),
-            model_scatter: self.model_scatter(),
-            model_spread: self.start_spread(),
-            twin_sd: self.twin_sd,
-            missing: self.missing_reason(),
-        }
+        missing: found.err(),
+        ..unread_result(aim, target)
     }
 }

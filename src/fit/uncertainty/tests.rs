@@ -69,7 +69,7 @@ fn with(features: Features, sds: &[f64], tried: &[[f64; 2]], settings: IntervalS
     assess_best(&mut ledger, &["p".to_owned(), "q".to_owned()], &settings, 500).unwrap()
 }
 
-fn ln_ends(interval: &ParameterInterval) -> [f64; 2] {
+fn ln_ends(interval: &ParameterResult) -> [f64; 2] {
     [interval.lower_95.unwrap().ln(), interval.upper_95.unwrap().ln()]
 }
 

@@ -1,6 +1,6 @@
 //! What a parameter at its bound does to the estimates of the others.
 
-use super::{ParameterInterval, ParameterVerdict, interval_verdict};
+use super::{ParameterResult, ParameterVerdict, interval_verdict};
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
 use crate::fit::job::Job;
 use crate::fit::ledger::Ledger;
@@ -57,7 +57,7 @@ pub(super) fn best_excluded_gain(
 
 /// Calls nothing identified where a bound excludes a better value, and says so.
 pub(super) fn withdraw_all(
-    intervals: &mut [ParameterInterval],
+    intervals: &mut [ParameterResult],
     names: &[String],
     excluding: (usize, f64),
 ) -> Vec<String> {
@@ -83,7 +83,7 @@ pub(super) fn withdraw_all(
 
 /// Calls nothing identified that is correlated with a parameter at its bound, and says so.
 pub(super) fn withdraw_correlated(
-    intervals: &mut [ParameterInterval],
+    intervals: &mut [ParameterResult],
     names: &[String],
     unit: &[f64],
     directions: &SingularDirections,
