@@ -1,9 +1,9 @@
-//! A first scene and a first job for a recording, with comments: what was found in the recording, why each
-//! number was chosen, and which numbers only the user can give.
+//! Writes a first scene and a first job for a recording. Comments in the files give the findings in the
+//! recording, the reason of each number, and the numbers that only the user knows.
 //!
-//! The blade is that of the bundled example. What a job can find in any recording (friction, stiffness,
-//! damping) starts there and is free within wide bounds; what has to be measured on the blade (lengths,
-//! masses, preload) is marked.
+//! The blade is that of the bundled example. Parameters that a fit can find in any recording (friction,
+//! stiffness, damping) are free within wide bounds; those that have to be measured on the blade (lengths,
+//! masses, preload) are marked.
 
 mod findings;
 mod job;
@@ -17,32 +17,29 @@ pub(crate) use scene::{FittedScene, YOURS_MARK, write_fitted_scene, write_scene,
 use serde::Serialize;
 pub(crate) use stroke::KnownStroke;
 
-// TOML with comments.
-
 /// Widest line of a comment, characters.
 const WIDTH: usize = 100;
 
-/// A file of TOML as it grows.
+/// Builder of a TOML file with comments.
 #[derive(Default)]
 pub(super) struct CommentedToml(String);
 
 impl CommentedToml {
-    /// A comment, broken into lines.
-    pub(super) fn add_comment(mut self, words: &str) -> Self {
-        wrap_words(&make_printable(words), WIDTH - 2)
-            .iter()
-            .for_each(|line| self.push_line(&format!("# {line}")));
-        self
+    /// Adds a comment, wrapped to [`WIDTH`].
+    pub(super) fn add_comment(self, words: &str) -> Self {
+        let lines = wrap_words(&make_printable(words), WIDTH - 2);
+        lines.iter().fold(self, |text, line| text.add_line(&format!("# {line}")))
     }
 
-    /// Several comments, each on lines of its own.
+    /// Adds comments, each on lines of its own.
     pub(super) fn add_comments(self, all: impl IntoIterator<Item = impl AsRef<str>>) -> Self {
         all.into_iter().fold(self, |text, words| text.add_comment(words.as_ref()))
     }
 
-    /// Lines as they are.
+    /// Adds a line as it is.
     pub(super) fn add_line(mut self, line: &str) -> Self {
-        self.push_line(line);
+        self.0.push_str(line.trim_end());
+        self.0.push('\n');
         self
     }
 
@@ -50,20 +47,30 @@ impl CommentedToml {
         self.add_line("")
     }
 
-    /// A key with a text.
+    /// Adds an empty line and the head of a table.
+    pub(super) fn add_table(self, name: &str) -> Self {
+        self.add_empty_line().add_line(&format!("[{name}]"))
+    }
+
+    /// Adds a key with a text.
     pub(super) fn add_text(self, key: &str, value: &str) -> Self {
         let value = toml::Value::String(value.to_owned());
         self.add_line(&format!("{key} = {value}"))
     }
 
-    /// A key with a number.
+    /// Adds a key with the shortest decimal number that reads back as the same.
     pub(super) fn add_number(self, key: &str, value: f64) -> Self {
-        self.add_line(&format!("{key} = {}", format_toml_number(value)))
+        self.add_line(&format!("{key} = {value:?}"))
     }
 
-    /// A key with a word of a list, or several.
+    /// Adds a line per key and number.
+    pub(super) fn add_numbers(self, rows: &[(&str, f64)]) -> Self {
+        rows.iter().fold(self, |text, (key, value)| text.add_number(key, *value))
+    }
+
+    /// Adds a key with a word or a list of words.
     pub(super) fn add_word(self, key: &str, value: impl Serialize) -> Self {
-        // (words and lists of them cannot fail)
+        // words and lists of them cannot fail
         let value = toml::Value::try_from(value).unwrap_or_else(|_| toml::Value::Array(Vec::new()));
         self.add_line(&format!("{key} = {value}"))
     }
@@ -71,46 +78,34 @@ impl CommentedToml {
     pub(super) fn into_text(self) -> String {
         self.0
     }
-
-    fn push_line(&mut self, line: &str) {
-        self.0.push_str(line.trim_end());
-        self.0.push('\n');
-    }
 }
 
-/// The shortest decimal number that reads back as the same, with a point or a power of ten, as TOML wants it.
-pub(super) fn format_toml_number(value: f64) -> String {
-    format!("{value:?}")
-}
-
-// What a first job does with each number of a blade.
-
-/// What becomes of a number.
+/// How a first job treats a number of the blade.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) enum ParameterRole {
-    /// The user measures it on the blade, to this relative standard deviation: it is held there, or freed
-    /// within it where it is a constant that a fit may free.
+    /// Measured on the blade by the user: freed with this relative standard deviation, or held where there is
+    /// none.
     Yours(Option<f64>),
-    /// Nobody knows it well before a fit: freed within this relative standard deviation around the example.
+    /// Poorly known before a fit: freed with this relative standard deviation around the example's value.
     Guessed(f64),
-    /// What the fit is for: free between two bounds.
+    /// Fitted between two bounds.
     Fitted([f64; 2]),
-    /// Free between these multiples of one over the greatest speed of the head.
+    /// Fitted between two bounds in units of the inverse of the greatest head speed.
     FittedOverSpeed([f64; 2]),
 }
 
-// Bounds are about a decade wide: wider ones led searches from other places than the middle nowhere.
+// Bounds are about a decade wide. With wider ones, searches that start far from the middle fail.
 
-/// Rubber on wet glass at rest, less what stays at speed.
+/// Bounds of the decaying part of the friction coefficient: rubber on wet glass at rest.
 const FALLING: [f64; 2] = [0.03, 0.6];
-/// What stays at speed.
+/// Bounds of the friction coefficient at high speed.
 const STAYING: [f64; 2] = [0.1, 0.8];
-/// Friction that falls over an eighth of the greatest speed, or over five times as much: what is outside
-/// shows as a constant.
+/// Bounds of the decay rate of the friction: over an eighth of the greatest speed to five times that speed.
+/// Outside of them the friction looks constant.
 const DECAY: [f64; 2] = [0.2, 8.0];
-/// About the 195 Hz of the paper's blade.
+/// Bounds around the 195 Hz of the paper's blade.
 const NECK_HZ: [f64; 2] = [60.0, 600.0];
-/// From a shoulder that is hardly felt to one that is as good as rigid.
+/// Bounds of the stiffness ratio: from a negligible shoulder to a nearly rigid one.
 const SHOULDER: [f64; 2] = [4.0, 60.0];
 /// A part that was weighed or computed from its cross section.
 const WEIGHED: ParameterRole = ParameterRole::Yours(Some(0.05));
@@ -120,10 +115,10 @@ const PRELOAD: ParameterRole = ParameterRole::Yours(Some(0.05));
 const MEASURED: ParameterRole = ParameterRole::Yours(None);
 /// A natural frequency or an angle of a blade of the same kind.
 const SIMILAR: ParameterRole = ParameterRole::Guessed(0.2);
-/// The widest that a constant may be freed: dampings of rubber differ by a factor.
+/// The largest deviation of a freed constant: damping ratios of rubbers differ by factors.
 const UNKNOWN: ParameterRole = ParameterRole::Guessed(0.5);
 
-/// Every number of the example's blade, shoulder and friction in the form in which a draft writes it.
+/// The parameters of the example's blade, shoulder and friction in the form of a draft.
 pub(crate) const PARAMETER_PLAN: [(&str, ParameterRole); 21] = [
     ("blade.head_mass_kg", WEIGHED),
     ("blade.neck_mass_kg", WEIGHED),
@@ -148,7 +143,7 @@ pub(crate) const PARAMETER_PLAN: [(&str, ParameterRole); 21] = [
     ("friction.c", ParameterRole::Fitted(STAYING)),
 ];
 
-/// The numbers of a blade with or without a shoulder.
+/// The parameters of a blade with or without a shoulder.
 pub(super) fn plan_parameters(shoulder: bool) -> impl Iterator<Item = (&'static str, ParameterRole)> {
     PARAMETER_PLAN.into_iter().filter(move |(name, _)| shoulder || !name.starts_with("shoulder."))
 }

@@ -1,11 +1,12 @@
 //! Fitting a scene's parameters to recordings or to published components.
 //!
-//! A [`job::Job`] names free parameters, their bounds and what has to be met: components (frequencies) and
-//! other features, under one or several conditions. Targets are measured on the recordings, or given. A
-//! [`gate`](gate::gate) looks first at what these features can determine; clouds of points and then local
-//! searches from several points seek the lowest cost in the unit box; at the best point profiles and twins
-//! say what is known of each parameter. Every evaluation goes into a journal from which the same fit can be
-//! replayed and continued.
+//! A [`job::Job`] lists free parameters with their bounds, and targets under one or several conditions:
+//! components (frequencies) and other features. Targets are measured on the recordings or given in the job.
+//!
+//! A fit has three steps. It assesses which parameters the features can determine ([`identifiability`]), searches
+//! the unit box for the lowest cost with clouds of points and local searches ([`search`]), and computes intervals
+//! at the best point by profiles and twins ([`uncertainty`]). All evaluations are written to a journal from which
+//! the fit can be resumed.
 
 pub mod advice;
 pub mod bootstrap;
@@ -43,12 +44,10 @@ pub use problem::{MeasuredRecording, Problem, ProblemError};
 pub use run::{FitContext, fit_features, job_warnings};
 pub use targets::measure_targets;
 
-// Why a fit did not run.
-
-/// Why a fit did not run, or could not go on.
+/// A fit that cannot run or continue.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum FitError {
-    /// The job wants another number of recordings.
+    /// The number of recordings differs from that of the job.
     #[error("found {found} recordings, expected the {expected} of the job")]
     Recordings {
         /// Recordings given.
@@ -56,7 +55,7 @@ pub enum FitError {
         /// Recordings in the job.
         expected: usize,
     },
-    /// A recording does not show what the job wants to fit.
+    /// A feature cannot be measured on a recording.
     #[error(
         "{recording}: `{name}` cannot be measured: {problem}; choose another window or band, give its target in the job, or remove it from the job"
     )]
@@ -65,7 +64,7 @@ pub enum FitError {
         recording: String,
         /// Name of the component or feature.
         name: String,
-        /// Why.
+        /// Reason.
         problem: String,
     },
     /// The journal does not belong to this fit.
@@ -86,13 +85,13 @@ pub enum FitError {
     /// The journal cannot be written.
     #[error("the journal cannot be written: {problem}")]
     JournalWrite {
-        /// Why.
+        /// Reason.
         problem: String,
     },
-    /// Nothing could be learned, so nothing was searched.
+    /// The features cannot determine anything, or a scene refuses a value.
     #[error("this job cannot be fitted: {why}")]
     CannotBeFitted {
-        /// Why, and what to do.
+        /// Reason and advice.
         why: String,
     },
     /// No evaluation was allowed.

@@ -1,4 +1,4 @@
-//! What a recording shows that a first scene and a first job need.
+//! Analyses a recording for its first scene and first job.
 
 use super::stroke::{EstimatedStroke, KnownStroke, Stroke, estimate_stroke};
 use crate::recording::channel::{Channel, Reversal, ReversalInstants, Window, mean_speed_m_per_s};
@@ -14,7 +14,7 @@ use crate::text::{
 pub(super) enum DraftHead {
     /// The head of the recording.
     Recorded,
-    /// A cosine in the recording's clock, with the place of the recording's origin in its own, m.
+    /// A cosine in the recording's clock; `origin_m` is the position of the recording's origin on the stroke.
     Cosine { stroke: Stroke, origin_m: f64 },
 }
 
@@ -23,106 +23,76 @@ pub(super) enum DraftHead {
 pub(crate) struct DraftComponent {
     /// Name in the job.
     pub name: &'static str,
-    /// Where it was found.
+    /// Channel in which it was found.
     pub channel: Channel,
-    /// Window as a job has it.
+    /// Window in the words of a job.
     pub window: String,
     pub frequency_hz: f64,
     /// Its standard deviation, Hz.
     pub sd_hz: f64,
     pub amplitude_m: f64,
-    /// Band in which the job looks for it, Hz.
+    /// Band of the component in the job, Hz.
     pub band_hz: [f64; 2],
 }
 
 /// Why nothing can be drafted for a recording.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
-pub(crate) enum DraftError {
-    /// The tip was not tracked.
-    #[error(
-        "found the tip's x in {found} of {frames} frames, expected it in most of them; track the tip of the lip, as a fit follows it"
-    )]
-    NoTip {
-        /// Frames with the tip.
-        found: usize,
-        frames: usize,
-    },
-    /// The head was not tracked, and the tip does not show its stroke.
-    #[error(
-        "found the head's x in {found} of {frames} frames, and a tip that does not slide both ways; expected a head to drive the model: track a point of the head, or film a reversal"
-    )]
-    NoHead {
-        /// Frames with the head.
-        found: usize,
-        frames: usize,
-    },
-    /// The stroke is given, and the head was tracked.
-    #[error(
-        "found a head that was tracked, and --amplitude-m or --frequency-hz beside it; leave them out: the recorded head drives the model"
-    )]
-    TwoHeads,
-    /// The head does not move.
-    #[error(
-        "found a head that moves by {travel_m} m, expected one that moves by more than {LEAST_TRAVEL_M} m; is the scale of the import right?"
-    )]
-    AtRest {
-        /// Way between its ends, m.
-        travel_m: f64,
-    },
-}
+#[error("{0}")]
+pub(crate) struct DraftError(String);
 
+/// Findings in a recording on which a draft is based.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct DraftFindings {
     /// Name of the recording.
     pub name: String,
-    /// Whether no camera took it.
+    /// Whether the recording is synthetic.
     pub synthetic: bool,
     pub frames: usize,
     /// Frames a second, 1/s.
     pub frame_rate_hz: f64,
     /// Whether the head's drop was tracked.
     pub drop: bool,
-    /// The turns of the head.
+    /// Reversals of the head.
     pub reversals: Vec<Reversal>,
     /// Greatest speed of the head, m/s.
     pub greatest_speed_m_per_s: f64,
     /// Start and end of a run, s.
     pub run_s: [f64; 2],
-    /// The part that is fitted, s; `None` for all of it.
+    /// Fitted part of the recording, s; `None` for all of it.
     pub fitted_s: Option<[f64; 2]>,
-    /// Number of the reversal, counted from 1, whose tip is seen to stop and to slip again.
+    /// Number of the first reversal, counted from 1, after which the tip sticks and slips again.
     pub shown: Option<usize>,
-    /// Components behind that reversal.
+    /// Components after that reversal.
     pub components: Vec<DraftComponent>,
     pub(super) head: DraftHead,
 }
 
-/// Share of the frames in which a point has to be tracked to be used.
+/// Least fraction of frames in which a usable point is tracked.
 const LEAST_TRACKED_SHARE: f64 = 0.5;
-/// Least way of the head, m: a pixel or two of the usual 20 um.
+/// Least travel of the head, m: two pixels of the usual 20 um.
 const LEAST_TRAVEL_M: f64 = 5e-5;
-/// Time over which a speed is taken, s: a few cycles of chatter.
+/// Averaging time of a speed, s: a few cycles of chatter.
 const SPEED_S: f64 = 5e-3;
-/// Most frames that a first fit takes: it then ends within minutes.
+/// Most frames of a first fit, so that it ends within minutes.
 const MOST_FITTED: usize = 12_000;
-/// Share of these before the reversal that they are laid around.
+/// Fraction of these frames before the first reversal.
 const SHARE_BEFORE_REVERSAL: f64 = 0.3;
-/// A component is looked for in this many times its frequency.
+/// Band of a component in units of its frequency.
 const BAND_FACTORS: [f64; 2] = [0.6, 1.5];
-/// Share of half the frame rate above which the exposure and the tracker leave little.
+/// Fraction of the Nyquist frequency above which exposure and tracker attenuate too much.
 const HIGHEST_SHARE: f64 = 0.8;
-/// Between the ring-down of the head and the stick-slip cycle, Hz: 78 and about 900 Hz in the paper.
+/// Frequency between the ring-down of the head (78 Hz in the paper) and the stick-slip cycle (about 900 Hz), Hz.
 const BETWEEN_HZ: f64 = 250.0;
-/// Least certain frequency that is asked for, relative standard deviation.
+/// Largest relative standard deviation of a frequency that a job asks for.
 const MOST_RELATIVE_SD: f64 = 0.05;
-/// Slower than this is the stroke itself, Hz.
+/// Lowest frequency of a component, Hz: the stroke is slower.
 const LOWEST_HZ: f64 = 10.0;
 
-/// Reversals that are listed.
+/// Most reversals in a list.
 const MOST_TURNS: usize = 6;
 
-/// What is looked for behind a reversal: name, channel, time from the release to both ends of the window, s,
-/// whether it is below [`BETWEEN_HZ`].
+/// Components to look for after a reversal: name, channel, ends of the window after the release, s, and whether
+/// the frequency is below [`BETWEEN_HZ`].
 const WANTED_COMPONENTS: [(&str, Channel, [&str; 2], bool); 3] = [
     ("low", Channel::HeadDrop, ["+0.01", "+0.2"], true),
     ("high", Channel::Deflection, ["+0.01", "+0.1"], false),
@@ -130,10 +100,10 @@ const WANTED_COMPONENTS: [(&str, Channel, [&str; 2], bool); 3] = [
 ];
 
 impl DraftFindings {
-    /// Looks at a recording; `known` is the stroke of a head that was not tracked.
+    /// Analyses a recording; `known` is the stroke of a head that was not tracked.
     ///
     /// # Errors
-    /// [`DraftError`] if no job could follow it.
+    /// [`DraftError`] if no job could use the recording.
     pub(crate) fn from_recording(
         recording: &Recording,
         exposure_s: Option<f64>,
@@ -145,9 +115,15 @@ impl DraftFindings {
             |column: &[Option<f64>]| tracked(column) as f64 >= LEAST_TRACKED_SHARE * grid.frames as f64;
         let frames = grid.frames;
         if !enough(&traces.tip_x_m) {
-            return Err(DraftError::NoTip { found: tracked(&traces.tip_x_m), frames });
+            return Err(DraftError(format!(
+                "found the tip's x in {} of {frames} frames, expected it in most of them; track the tip of the lip, as a fit follows it",
+                tracked(&traces.tip_x_m)
+            )));
         }
-        let no_head = DraftError::NoHead { found: tracked(&traces.head_x_m), frames };
+        let no_head = DraftError(format!(
+            "found the head's x in {} of {frames} frames, and a tip that does not slide both ways; expected a head to drive the model: track a point of the head, or film a reversal",
+            tracked(&traces.head_x_m)
+        ));
         if !enough(&traces.head_x_m) {
             let EstimatedStroke { stroke, origin_m } = estimate_stroke(recording, known).ok_or(no_head)?;
             let span_s = [grid.start_s, grid.time_s(grid.frames.saturating_sub(1))];
@@ -157,15 +133,16 @@ impl DraftFindings {
             });
         }
         if known != KnownStroke::default() {
-            return Err(DraftError::TwoHeads);
+            let why = "found a head that was tracked, and --amplitude-m or --frequency-hz beside it; leave them out: the recorded head drives the model";
+            return Err(DraftError(why.to_owned()));
         }
-        let ends = traces
-            .head_x_m
-            .iter()
-            .flatten()
-            .fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)]);
-        if ends[1] - ends[0] < LEAST_TRAVEL_M {
-            return Err(DraftError::AtRest { travel_m: ends[1] - ends[0] });
+        let head = traces.head_x_m.iter().flatten();
+        let [low, high] = head.fold([f64::INFINITY, f64::NEG_INFINITY], |[a, b], x| [a.min(*x), b.max(*x)]);
+        if high - low < LEAST_TRAVEL_M {
+            return Err(DraftError(format!(
+                "found a head that moves by {} m, expected one that moves by more than {LEAST_TRAVEL_M} m; is the scale of the import right?",
+                high - low
+            )));
         }
         let span_s = smooth_head_motion(recording).map_err(|_| no_head)?.span_s();
         Ok(Self {
@@ -174,8 +151,8 @@ impl DraftFindings {
         })
     }
 
-    /// What a recording shows whose model is driven between two times, s; `moving` is the head, or the tip
-    /// that follows it.
+    /// Findings for a model that is driven between two times, s; `moving` is the head, or the tip that follows
+    /// it.
     fn from_driving_trace(
         recording: &Recording,
         exposure_s: Option<f64>,
@@ -199,7 +176,7 @@ impl DraftFindings {
         };
         let start_s = speeds.into_iter().find(even).map_or(first_s, |(time_s, _)| time_s);
         let shown = reversals.iter().position(|r| r.hold_s.is_some() && r.release_s.is_some());
-        let shown = shown.or_else(|| reversals.iter().position(|r| r.release_s.is_some()));
+        let shown = shown.or_else(|| reversals.iter().position(|r| r.release_s.is_some())).map(|at| at + 1);
         Self {
             name: recording.name().to_owned(),
             synthetic: recording.is_synthetic(),
@@ -210,14 +187,14 @@ impl DraftFindings {
             run_s: [start_s, last_s - UNCERTAIN_END_S].map(round_time_s),
             fitted_s: choose_fit_window(grid.frames, [grid.start_s, grid.time_s(grid.frames)], reversals),
             components: shown
-                .map_or_else(Vec::new, |at| find_components(recording, exposure_s, &instants, at + 1)),
-            shown: shown.map(|at| at + 1),
+                .map_or_else(Vec::new, |at| find_components(recording, exposure_s, &instants, at)),
+            shown,
             reversals: instants.reversals,
             head: DraftHead::Recorded,
         }
     }
 
-    /// What has to be said of a recording that no camera took.
+    /// The remark on a synthetic recording.
     pub(super) fn synthetic_note(&self) -> Option<&'static str> {
         self.synthetic.then_some("The recording is synthetic: no camera took it.")
     }
@@ -227,15 +204,12 @@ impl DraftFindings {
         self.frames as f64 / self.frame_rate_hz
     }
 
-    /// What was found, in sentences.
+    /// The findings as sentences.
     pub(crate) fn describe(&self) -> Vec<String> {
         let rate = format_digits(self.frame_rate_hz, 4);
-        let mut words = vec![format!(
-            "{} frames at {rate} frames/s; {} moves at up to {}",
-            self.frames,
-            if self.head == DraftHead::Recorded { "the head" } else { "the tip" },
-            format_speed(self.greatest_speed_m_per_s)
-        )];
+        let moving = if self.head == DraftHead::Recorded { "the head" } else { "the tip" };
+        let (frames, speed) = (self.frames, format_speed(self.greatest_speed_m_per_s));
+        let mut words = vec![format!("{frames} frames at {rate} frames/s; {moving} moves at up to {speed}")];
         if let DraftHead::Cosine { stroke, .. } = self.head {
             words.push(format!(
                 "no head; a stroke with an amplitude of {} mm at {} Hz, from the tip",
@@ -247,7 +221,8 @@ impl DraftFindings {
         words.push(match self.reversals.len() {
             0 => "no reversal".to_owned(),
             count => {
-                let mut turns = self.describe_reversals();
+                let mut turns: Vec<String> =
+                    self.reversals.iter().take(MOST_TURNS).map(describe_reversal).collect();
                 turns.extend((count > MOST_TURNS).then(|| format!("{} more", count - MOST_TURNS)));
                 format!("{count} {}: {}", pluralise("reversal", count), join_with_and(&turns))
             }
@@ -255,20 +230,17 @@ impl DraftFindings {
         words.extend(self.components.iter().map(DraftComponent::describe));
         words
     }
+}
 
-    fn describe_reversals(&self) -> Vec<String> {
-        let turn = |r: &Reversal| {
-            let rest = r.release_s.map(|release_s| {
-                format!(", the tip slips {} later", format_milliseconds(release_s - r.reversal_s))
-            });
-            format!("at {:.4} s{}", r.reversal_s, rest.unwrap_or_default())
-        };
-        self.reversals.iter().take(MOST_TURNS).map(turn).collect()
-    }
+fn describe_reversal(r: &Reversal) -> String {
+    let rest = r
+        .release_s
+        .map(|release_s| format!(", the tip slips {} later", format_milliseconds(release_s - r.reversal_s)));
+    format!("at {:.4} s{}", r.reversal_s, rest.unwrap_or_default())
 }
 
 impl DraftComponent {
-    /// What was found, in words.
+    /// The component in words.
     pub(crate) fn describe(&self) -> String {
         format!(
             "{} Hz in the {} ({}), amplitude {}",
@@ -280,12 +252,12 @@ impl DraftComponent {
     }
 }
 
-/// A time with the digits that matter, s.
+/// Rounds a time to 0.1 ms, s.
 fn round_time_s(time_s: f64) -> f64 {
     (1e4 * time_s).round() / 1e4
 }
 
-/// Times and speeds of a point along the recording, m/s.
+/// Times, s, and speeds of a point, m/s, along the recording.
 fn sample_speeds(grid: FrameGrid, moving: &[Option<f64>]) -> Vec<(f64, f64)> {
     let step = ((SPEED_S * grid.frame_rate_hz) as usize).max(2);
     let at = |first: usize| {
@@ -296,7 +268,7 @@ fn sample_speeds(grid: FrameGrid, moving: &[Option<f64>]) -> Vec<(f64, f64)> {
     (0..grid.frames).step_by(step).filter_map(at).collect()
 }
 
-/// The part of a long recording that a first fit takes.
+/// Part of a long recording for a first fit, s.
 fn choose_fit_window(frames: usize, [start_s, end_s]: [f64; 2], reversals: &[Reversal]) -> Option<[f64; 2]> {
     if frames <= MOST_FITTED {
         return None;

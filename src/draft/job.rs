@@ -8,17 +8,19 @@ use crate::fit::measure_targets;
 use crate::recording::Recording;
 use crate::text::{format_digits, format_percent, format_speed, join_with_and, round_to_digits};
 
-/// Standard deviations of the camera that a first fit assumes: a tilt that nobody sees, a scale from a ruler
-/// in the picture, markers that stand within two millimetres of what they are for.
+/// Standard deviation of the camera's tilt in a first fit, degrees: too small to be seen.
 const TILT_SD_DEG: f64 = 0.3;
+/// Relative standard deviation of the scale: a ruler in the picture.
 const SCALE_SD: f64 = 0.005;
+/// Standard deviation of the position of a marker, m.
 const OFFSET_SD_M: f64 = 0.002;
-/// Of a clock that was set by the tip's own turn, and of an origin anywhere in a picture.
+/// Standard deviation of a clock that the reversal of the tip defines, s.
 const CLOCK_SD_S: f64 = 0.005;
+/// Standard deviation of an arbitrary origin in the picture, m.
 const ORIGIN_SD_M: f64 = 0.1;
 
-/// A job for a recording; `paths` are those of recording and scene as seen from the job. Of the components,
-/// those that a fit reads in the recording.
+/// Writes a job for a recording; `paths` are those of recording and scene, relative to the job. The job
+/// contains only components that can be measured on the recording.
 pub(crate) fn write_job(
     found: &DraftFindings,
     measured: &Recording,
@@ -26,13 +28,8 @@ pub(crate) fn write_job(
     shoulder: bool,
 ) -> String {
     let whole = |components: &[DraftComponent], release: bool| {
-        add_features(
-            add_traces(add_parameters(write_head(found, paths, shoulder), found, shoulder), found),
-            found,
-            components,
-            release,
-        )
-        .into_text()
+        let head = add_parameters(write_head(found, paths, shoulder), found, shoulder);
+        add_features(add_traces(head, found), found, components, release).into_text()
     };
     let readable = |components: &[DraftComponent], release: bool| {
         let job = Job::parse("job.toml", &whole(components, release));
@@ -54,8 +51,7 @@ fn write_head(found: &DraftFindings, [recording, scene]: [&str; 2], shoulder: bo
     let text = text
         .add_line("format = 1")
         .add_text("title", &format!("Fit to {}", found.name))
-        .add_text("scene", scene);
-    let text = text
+        .add_text("scene", scene)
         .add_comment("A whole number; the same one gives the same result.")
         .add_line("seed = 1")
         .add_empty_line();
@@ -85,28 +81,22 @@ fn add_parameters(text: CommentedToml, found: &DraftFindings, shoulder: bool) ->
         .add_comment("What is looked for, between two bounds; the search starts in their middle.");
     for (name, role) in plan_parameters(shoulder) {
         let ([lower, upper], why) = match role {
-            ParameterRole::Fitted(bounds) => (bounds, String::new()),
-            ParameterRole::FittedOverSpeed([least, most]) => (
-                [round_to_digits(least * slowness, 2), round_to_digits(most * slowness, 2)],
-                format!(
-                    "{} and {} over the greatest speed of the head, {}",
-                    format_digits(least, 1),
-                    format_digits(most, 2),
-                    format_speed(found.greatest_speed_m_per_s)
-                ),
-            ),
+            ParameterRole::Fitted(bounds) => (bounds, None),
+            ParameterRole::FittedOverSpeed(bounds) => {
+                let (least, most) = (format_digits(bounds[0], 1), format_digits(bounds[1], 2));
+                let speed = format_speed(found.greatest_speed_m_per_s);
+                let why = format!("{least} and {most} over the greatest speed of the head, {speed}");
+                (bounds.map(|bound| round_to_digits(bound * slowness, 2)), Some(why))
+            }
             _ => continue,
         };
-        text = text.add_empty_line();
-        if !why.is_empty() {
-            text = text.add_comment(&why);
-        }
         text = text
+            .add_empty_line()
+            .add_comments(why)
             .add_line("[[parameter]]")
             .add_text("name", name)
-            .add_number("lower", lower)
-            .add_number("upper", upper);
-        text = text.add_text("scale", "log");
+            .add_numbers(&[("lower", lower), ("upper", upper)])
+            .add_text("scale", "log");
     }
     text
 }
@@ -145,30 +135,26 @@ fn add_traces(text: CommentedToml, found: &DraftFindings) -> CommentedToml {
         .add_number("scale_sd", SCALE_SD);
     match found.head {
         DraftHead::Recorded => {
-            text.add_number("tilt_sd_deg", TILT_SD_DEG).add_number("offset_sd_m", OFFSET_SD_M)
+            text.add_numbers(&[("tilt_sd_deg", TILT_SD_DEG), ("offset_sd_m", OFFSET_SD_M)])
         }
-        DraftHead::Cosine { origin_m, .. } => add_stroke_camera(text, origin_m),
+        // the camera has a clock and an origin of its own
+        DraftHead::Cosine { origin_m, .. } => {
+            let is_near = origin_m.abs() < OFFSET_SD_M;
+            let why = (!is_near).then_some("The origin of the picture is not where the stroke starts.");
+            text.add_comment("How far the clock of the camera is from that of the stroke.")
+                .add_number("clock_sd_s", CLOCK_SD_S)
+                .add_comments(why)
+                .add_number("offset_sd_m", if is_near { OFFSET_SD_M } else { ORIGIN_SD_M })
+        }
     }
-}
-
-/// The camera beside a stroke that nobody filmed: its clock and its origin are its own.
-fn add_stroke_camera(text: CommentedToml, origin_m: f64) -> CommentedToml {
-    let text = text.add_comment("How far the clock of the camera is from that of the stroke.");
-    let text = text.add_number("clock_sd_s", CLOCK_SD_S);
-    if origin_m.abs() < OFFSET_SD_M {
-        return text.add_number("offset_sd_m", OFFSET_SD_M);
-    }
-    text.add_comment("The origin of the picture is not where the stroke starts.")
-        .add_number("offset_sd_m", ORIGIN_SD_M)
 }
 
 fn add_features(
-    text: CommentedToml,
+    mut text: CommentedToml,
     found: &DraftFindings,
     components: &[DraftComponent],
     release: bool,
 ) -> CommentedToml {
-    let mut text = text;
     if !components.is_empty() || release {
         text = text.add_empty_line().add_comment(
             "What the whole run of the fitted model is held against; the fit itself does not look at these.",

@@ -12,11 +12,11 @@ use crate::text::{capitalise, format_digits, format_interval, format_percent, ma
 
 /// The blade of every draft.
 const EXAMPLE_SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
-/// How a number is marked that only the user knows.
+/// Mark of a number that only the user knows.
 pub(crate) const YOURS_MARK: &str = "YOURS";
-/// Frames a second of the output of a run where no camera gives a rate, 1/s.
+/// Output rate of a run without a camera, 1/s.
 const SAMPLE_RATE_HZ: f64 = 10_000.0;
-/// The stroke of a scene alone: a head that moves half a metre a second at most, and its first reversal.
+/// Stroke of a scene without a recording: a head speed of up to 0.5 m/s, and its first reversal.
 const DEFAULT_STROKE: Stroke = Stroke { amplitude_m: 0.1, frequency_hz: 0.8, delay_s: 0.0 };
 const DEFAULT_RUN_S: [f64; 2] = [0.4, 1.0];
 
@@ -29,12 +29,9 @@ pub(crate) fn write_scene(
     recording: &str,
     shoulder: bool,
 ) -> Result<String, SceneError> {
-    let head = CommentedToml::default()
-        .add_comment(&format!(
-            "The blade of the recording {}, for `wiperlab simulate` and for job.toml.",
-            found.name
-        ))
-        .add_comments(found.synthetic_note());
+    let title =
+        format!("The blade of the recording {}, for `wiperlab simulate` and for job.toml.", found.name);
+    let head = CommentedToml::default().add_comment(&title).add_comments(found.synthetic_note());
     let example = write_blade(head, shoulder)?.add_empty_line();
     let drive = match found.head {
         DraftHead::Recorded => example
@@ -88,20 +85,12 @@ fn write_blade(head: CommentedToml, shoulder: bool) -> Result<CommentedToml, Sce
             text = text.add_line(&format!("[{of}]"));
         }
         let unit = if row.unit == "1" { String::new() } else { format!(", {}", row.unit) };
-        let how = capitalise(row.quantity.measurement_method());
-        text = text.add_comment(&format!(
-            "{}{}{unit}. {how}. {}.",
-            role_marker(role),
-            capitalise(row.meaning),
-            describe_role(role)
-        ));
+        let (how, what) = (capitalise(row.quantity.measurement_method()), capitalise(row.meaning));
+        let mark = if let ParameterRole::Yours(_) = role { format!("{YOURS_MARK}: ") } else { String::new() };
+        text = text.add_comment(&format!("{mark}{what}{unit}. {how}. {}.", describe_role(role)));
         text = text.add_number(key, example.value(name).unwrap_or_default());
     }
     Ok(text)
-}
-
-fn role_marker(role: ParameterRole) -> String {
-    if let ParameterRole::Yours(_) = role { format!("{YOURS_MARK}: ") } else { String::new() }
 }
 
 fn describe_role(role: ParameterRole) -> String {
@@ -124,8 +113,7 @@ fn add_cosine_drive(text: CommentedToml, stroke: Stroke) -> CommentedToml {
              delay_s and after every half period. A fit needs the numbers of the rig."
         ))
         .add_line("[drive]")
-        .add_number("amplitude_m", stroke.amplitude_m)
-        .add_number("frequency_hz", stroke.frequency_hz);
+        .add_numbers(&[("amplitude_m", stroke.amplitude_m), ("frequency_hz", stroke.frequency_hz)]);
     if stroke.delay_s == 0.0 { text } else { text.add_number("delay_s", stroke.delay_s) }
 }
 
@@ -135,11 +123,8 @@ fn add_run(text: CommentedToml, [start_s, stop_s]: [f64; 2], rate_hz: f64) -> Co
         .add_line("[start]")
         .add_number("time_s", start_s)
         .add_text("kind", "steady-slide")
-        .add_empty_line()
-        .add_line("[run]")
-        .add_number("stop_s", stop_s)
-        .add_number("sample_rate_hz", rate_hz)
-        .add_number("relative_tolerance", 1e-8)
+        .add_table("run")
+        .add_numbers(&[("stop_s", stop_s), ("sample_rate_hz", rate_hz), ("relative_tolerance", 1e-8)])
         .add_line("outputs = [\"trace\", \"events\"]")
 }
 
@@ -150,7 +135,7 @@ const TABLES: [&str; 3] = ["blade", "shoulder", "friction"];
 /// Digits of the ends of an interval.
 const DIGITS: usize = 4;
 
-/// A scene with the estimates in it, and what it is the scene of.
+/// A scene with the estimates of a fit, and its origin.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FittedScene<'a> {
     /// The scene that the fit ran.
@@ -159,14 +144,14 @@ pub(crate) struct FittedScene<'a> {
     pub condition: &'a str,
     /// Whether its recording is synthetic; `None` where only numbers are published.
     pub synthetic: Option<bool>,
-    /// Path of the recording that drives it, where one does, as seen from the scene's file.
+    /// Path of the recording that drives it, relative to the scene's file; `None` without one.
     pub recording: Option<&'a str>,
     /// The result with the estimates.
     pub result: &'a FitResult,
 }
 
-/// The scene of a fit at its estimates, with their intervals as comments; `None` for one that starts in the
-/// air, which no scene file says.
+/// The scene of a fit at its estimates, with their intervals as comments; `None` for a start in the air, which
+/// a scene file cannot express.
 pub(crate) fn write_fitted_scene(fitted: &FittedScene<'_>) -> Option<String> {
     let FittedScene { scene, condition, synthetic, recording, result } = *fitted;
     let of = match synthetic {
@@ -187,7 +172,7 @@ pub(crate) fn write_fitted_scene(fitted: &FittedScene<'_>) -> Option<String> {
     write_scene_toml(head, &title, scene, recording, |name| describe_estimate(result, name))
 }
 
-/// What a fit says of a number.
+/// Describes the estimate of a number with its interval.
 fn describe_estimate(result: &FitResult, name: &str) -> Option<String> {
     let ends = |lower, upper| format_interval(lower, upper, |end| format_digits(end, DIGITS));
     if let Some(found) = result.parameters.get(name) {
@@ -203,7 +188,7 @@ fn describe_estimate(result: &FitResult, name: &str) -> Option<String> {
     ))
 }
 
-/// A scene as a file that reads back as the same; `None` for a start in the air.
+/// Writes a scene as a file that reads back as the same; `None` for a start in the air.
 fn write_scene_toml(
     head: CommentedToml,
     title: &str,
@@ -217,29 +202,24 @@ fn write_scene_toml(
             scene.written_values().filter_map(|(name, value)| Some((name.split_once('.')?, name, value)));
         let rows: Vec<_> = of_table.filter(|((of, _), ..)| *of == table).collect();
         if !rows.is_empty() {
-            text = text.add_empty_line().add_line(&format!("[{table}]"));
+            text = text.add_table(table);
         }
         for ((_, key), name, value) in rows {
             text = text.add_comments(note(name)).add_number(key, value);
         }
     }
-    text = add_drive(text.add_empty_line().add_line("[drive]"), scene, recording, &note)?;
-    text =
-        text.add_empty_line().add_line("[contact]").add_word("loss", scene.loss).add_word("jam", scene.jam);
+    text = add_drive(text.add_table("drive"), scene, recording, &note)?;
+    text = text.add_table("contact").add_word("loss", scene.loss).add_word("jam", scene.jam);
     if let Some((_, restitution)) = scene.written_values().find(|(name, _)| *name == "contact.restitution") {
         text = text.add_number("restitution", restitution);
     }
-    text = add_start(
-        text.add_empty_line().add_line("[start]").add_number("time_s", scene.start_s),
-        scene.start,
-    )?;
+    text = add_start(text.add_table("start").add_number("time_s", scene.start_s), scene.start)?;
     let run = &scene.run;
-    text = text
-        .add_empty_line()
-        .add_line("[run]")
-        .add_number("stop_s", run.stop_s)
-        .add_number("sample_rate_hz", run.sample_rate_hz)
-        .add_number("relative_tolerance", run.relative_tolerance);
+    text = text.add_table("run").add_numbers(&[
+        ("stop_s", run.stop_s),
+        ("sample_rate_hz", run.sample_rate_hz),
+        ("relative_tolerance", run.relative_tolerance),
+    ]);
     if let Some(most) = run.most_evaluations {
         text = text.add_line(&format!("most_evaluations = {most}"));
     }
@@ -270,13 +250,12 @@ fn add_start(text: CommentedToml, start: StartKind) -> Option<CommentedToml> {
     match start {
         StartKind::Upright => Some(text.add_text("kind", "upright")),
         StartKind::SteadySlide => Some(text.add_text("kind", "steady-slide")),
-        StartKind::State(pose) => Some(
-            text.add_text("kind", "state")
-                .add_number("neck_angle_rad", pose.theta)
-                .add_number("lip_angle_rad", pose.phi)
-                .add_number("neck_rate_rad_per_s", pose.theta_rate)
-                .add_number("lip_rate_rad_per_s", pose.phi_rate),
-        ),
+        StartKind::State(pose) => Some(text.add_text("kind", "state").add_numbers(&[
+            ("neck_angle_rad", pose.theta),
+            ("lip_angle_rad", pose.phi),
+            ("neck_rate_rad_per_s", pose.theta_rate),
+            ("lip_rate_rad_per_s", pose.phi_rate),
+        ])),
         StartKind::Airborne(_) => None,
     }
 }

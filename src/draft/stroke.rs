@@ -1,7 +1,7 @@
-//! The stroke of a head that was not tracked, from the tip that follows it.
+//! Estimates the stroke of a head that was not tracked from the motion of the tip.
 //!
-//! A tip that slides trails the head by a nearly constant length `d` on either side, so that `x = c + d s + P
-//! cos(w t) + Q sin(w t)` with the side `s` of its speed. This is linear in all but the frequency.
+//! A sliding tip trails the head by a nearly constant length `d`, so that `x = c + d s + P cos(w t) + Q sin(w t)`
+//! with the sign `s` of its speed. The model is linear in all parameters except the frequency.
 
 use crate::math;
 use crate::recording::Recording;
@@ -17,7 +17,7 @@ pub(crate) struct Stroke {
     pub delay_s: f64,
 }
 
-/// What the user knows of it.
+/// The part of the stroke that the user knows.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(crate) struct KnownStroke {
     /// Amplitude of the head, m.
@@ -25,7 +25,7 @@ pub(crate) struct KnownStroke {
     pub frequency_hz: Option<f64>,
 }
 
-/// A stroke with the place of the recording's origin in its own, m.
+/// A stroke, and the position of the recording's origin on it, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct EstimatedStroke {
     pub stroke: Stroke,
@@ -34,13 +34,16 @@ pub(super) struct EstimatedStroke {
 
 /// Strokes of wipers and rigs, Hz.
 const FREQUENCIES_HZ: [f64; 2] = [0.05, 5.0];
+/// Intervals of the coarse frequency grid.
 const COARSE: usize = 200;
+/// Steps of the ternary search around its best point.
 const REFINED: usize = 60;
-/// Time over which the speed of the tip is taken, s, and the share of the greatest at which it slides.
+/// Averaging time of the speed of the tip, s.
 const SPEED_S: f64 = 0.01;
+/// Fraction of the greatest speed above which the tip slides.
 const SLIDING: f64 = 0.3;
 
-/// The stroke that the tip follows; `None` where it slides too little to show one.
+/// The stroke that the tip follows; `None` if it does not slide enough.
 pub(super) fn estimate_stroke(recording: &Recording, known: KnownStroke) -> Option<EstimatedStroke> {
     let sliding = select_sliding(recording);
     let fit =
@@ -65,7 +68,7 @@ pub(super) fn estimate_stroke(recording: &Recording, known: KnownStroke) -> Opti
     Some(EstimatedStroke { stroke, origin_m: middle_m - amplitude_m })
 }
 
-/// Time, s, place, m, and side of the speed of the tip while it slides, about every [`SPEED_S`].
+/// Time, s, position, m, and sign of the speed of the sliding tip, every [`SPEED_S`].
 fn select_sliding(recording: &Recording) -> Vec<[f64; 3]> {
     let (grid, tip) = (recording.grid(), &recording.traces().tip_x_m);
     let step = ((SPEED_S * grid.frame_rate_hz) as usize).max(2);
@@ -83,8 +86,8 @@ fn select_sliding(recording: &Recording) -> Vec<[f64; 3]> {
     slides.map(|[t, x, speed]| [t, x, speed.signum()]).collect()
 }
 
-/// Mean squared residual, m2, and `c`, `d`, `P`, `Q`, m, at a frequency. Where the blade flips the tip does
-/// not trail: what is far off a first solution is left out of the second.
+/// Mean squared residual, m2, and `c`, `d`, `P`, `Q`, m, at a frequency. The tip does not trail while the blade
+/// flips: points far from a first solution are left out of the second one.
 fn fit_terms(sliding: &[[f64; 3]], frequency_hz: f64) -> Option<(f64, [f64; 4])> {
     /// Residuals beyond this many times their median are left out.
     const FAR: f64 = 4.0;
@@ -98,9 +101,9 @@ fn fit_terms(sliding: &[[f64; 3]], frequency_hz: f64) -> Option<(f64, [f64; 4])>
     Some((left.iter().map(|r| r * r).sum::<f64>() / left.len() as f64, found))
 }
 
-/// Absolute residuals, m, and the solution from some of the places.
+/// Absolute residuals, m, and the least-squares solution for the points `used`.
 fn solve_terms(sliding: &[[f64; 3]], used: &[usize], frequency_hz: f64) -> Option<(Vec<f64>, [f64; 4])> {
-    /// Twice as many places as there are terms.
+    /// Twice the number of terms.
     const FEWEST: usize = 8;
     let both_sides = [1.0, -1.0].iter().all(|side| used.iter().any(|i| sliding[*i][2] == *side));
     if !both_sides || used.len() < FEWEST {

@@ -1,25 +1,22 @@
-//! What to measure in addition: features that would move along the combinations that a job leaves open.
+//! Advice on additional measurements: features that change along the combinations that a job leaves open.
 //!
-//! The candidates are read from the same runs of the model as the gate's own features, at one place of the
-//! box, and held against the open directions there: a feature is worth measuring where it moves by more than
-//! its own 95 % interval across the box.
+//! The candidates are read from runs of the model around one probe. A feature is worth measuring if it changes
+//! by more than its own 95 % interval when a parameter combination crosses the box.
 
 use super::identifiability::ProbeEvaluation;
 use super::job::{FitTarget, Job};
-use super::linear_model::difference_points;
-use super::linear_model::{MIN_INFORMATIVE, ParameterCombination};
-use super::model::ModelFeatures;
-use super::model::{Draw, Model};
+use super::linear_model::{MIN_INFORMATIVE, ParameterCombination, difference_points};
+use super::model::{Draw, Model, ModelFeatures};
 use crate::feature::{CycleRangeEnd, Feature, FeatureBand, Reading, ReversalInterval, WIDTH_RELATIVE};
 use crate::math;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, Window};
 
-/// Standard deviations that a careful measurement reaches, relative: of a mean or an instant, and of an
-/// amplitude or a damping.
+/// Relative standard deviation of a careful measurement of a mean or an instant.
 const CAREFUL_SD_RELATIVE: f64 = 0.01;
+/// Relative standard deviation of a careful measurement of an amplitude or a damping.
 const ROUGH_SD_RELATIVE: f64 = 0.05;
-/// Speeds at which the friction curve is tried, as shares of the largest.
+/// Head speeds at which the mean deflection is tried, as fractions of the largest one.
 const SPEED_SHARES: [f64; 3] = [0.25, 0.5, 0.8];
 /// Frames over which the head's speed is taken.
 const SPEED_FRAMES: usize = 20;
@@ -33,7 +30,7 @@ struct CandidateFeature {
     feature: Feature,
 }
 
-/// Sentences for the directions that are open at a place that was probed; none where nothing is open.
+/// One sentence for each direction that is open at a probe.
 pub(crate) fn advise_measurements(
     job: &Job,
     model: &dyn Model,
@@ -50,12 +47,8 @@ pub(crate) fn advise_measurements(
     let mut sentences: Vec<String> = Vec::new();
     for (direction, name) in open.into_iter().zip(names) {
         let moved = |row: &Vec<f64>| row.iter().zip(direction).map(|(r, d)| r * d).sum::<f64>().abs();
-        let best = candidates
-            .iter()
-            .zip(&rows)
-            .map(|(candidate, row)| (candidate, moved(row)))
-            .max_by(|a, b| a.1.total_cmp(&b.1));
-        let sentence = match best {
+        let moves = candidates.iter().zip(&rows).map(|(candidate, row)| (candidate, moved(row)));
+        sentences.push(match moves.max_by(|a, b| a.1.total_cmp(&b.1)) {
             Some((candidate, moved)) if moved > MIN_INFORMATIVE => format!(
                 "to determine {name}: measure {} to {:.0} %, which moves by {moved:.0} of its standard deviations across the box",
                 candidate.description,
@@ -64,15 +57,14 @@ pub(crate) fn advise_measurements(
             _ => format!(
                 "no feature of these conditions that was tried moves along {name}: measure at another speed or preload, as another [[recording]]"
             ),
-        };
-        sentences.push(sentence);
+        });
     }
     sentences.dedup();
     sentences
 }
 
-/// Change of each candidate across the box along each parameter, in standard deviations; zero where it is not
-/// seen.
+/// Change of each candidate across the box along each parameter, in standard deviations; zero where the model
+/// does not have it.
 fn candidate_sensitivities(
     candidates: &[CandidateFeature],
     job: &Job,
@@ -82,24 +74,22 @@ fn candidate_sensitivities(
     let features: Vec<Feature> = candidates.iter().map(|candidate| candidate.feature.clone()).collect();
     let seen = ModelFeatures::new(model, &features, Vec::new(), 1);
     let read = |unit: &Vec<f64>| -> Vec<Option<f64>> {
-        let values: Vec<f64> =
-            job.parameters.iter().zip(unit).map(|(parameter, u)| parameter.bounds.from_unit(*u)).collect();
+        let units = job.parameters.iter().zip(unit);
+        let values: Vec<f64> = units.map(|(parameter, u)| parameter.bounds.from_unit(*u)).collect();
         let read = seen.read_features(&values, Draw::default()).unwrap_or_default();
         (0..features.len()).map(|at| read.get(at)?.as_ref().ok().map(|read| read.value)).collect()
     };
     let around = difference_points(&probed.centre.unit);
     let reads: Vec<Vec<Option<f64>>> = around.iter().map(read).collect();
     let slope = |at: usize, axis: usize| {
-        let (below, above) =
-            (reads.get(2 * axis)?.get(at).copied()??, reads.get(2 * axis + 1)?.get(at).copied()??);
-        let width = around.get(2 * axis + 1)?.get(axis)? - around.get(2 * axis)?.get(axis)?;
+        let (below, above) = (reads[2 * axis][at]?, reads[2 * axis + 1][at]?);
+        let width = around[2 * axis + 1][axis] - around[2 * axis][axis];
         let ratio = above / below;
         (ratio > 0.0 && ratio.is_finite() && width > 0.0).then(|| math::ln(ratio) / width)
     };
     let row = |(at, candidate): (usize, &CandidateFeature)| {
-        let slopes =
-            (0..job.parameters.len()).map(|axis| slope(at, axis).unwrap_or(0.0) / candidate.sd_relative);
-        slopes.collect::<Vec<f64>>()
+        let axes = 0..job.parameters.len();
+        axes.map(|axis| slope(at, axis).unwrap_or(0.0) / candidate.sd_relative).collect::<Vec<f64>>()
     };
     candidates.iter().enumerate().map(row).collect()
 }
@@ -107,50 +97,32 @@ fn candidate_sensitivities(
 fn candidate_features(job: &Job, model: &dyn Model, values: &[f64]) -> Vec<CandidateFeature> {
     let mut all = Vec::new();
     for (at, condition) in job.conditions.iter().enumerate().filter(|(_, condition)| !condition.held_out) {
-        let fastest = model
-            .record_condition(values, at, Draw::default())
-            .ok()
-            .and_then(|recording| max_head_speed_m_per_s(&recording));
-        let of = |reading: Reading, words: String, sd_relative: f64| {
-            let words =
-                if job.conditions.len() > 1 { format!("{words} in `{}`", condition.name) } else { words };
-            CandidateFeature {
-                description: words,
-                sd_relative,
-                feature: Feature { name: String::new(), reading, condition: at },
-            }
-        };
-        all.extend(
-            quasi_static_readings(fastest)
-                .into_iter()
-                .map(|(reading, words)| of(reading, words, CAREFUL_SD_RELATIVE)),
-        );
-        all.extend(INTERVALS.map(|interval| {
-            of(
-                Reading::Interval { interval, reversal: 1 },
-                format!("the {}", interval.kind().replace('-', " ")),
-                CAREFUL_SD_RELATIVE,
-            )
+        let recording = model.record_condition(values, at, Draw::default()).ok();
+        let fastest = recording.as_ref().and_then(max_head_speed_m_per_s);
+        let intervals = INTERVALS.map(|interval| {
+            let words = format!("the {}", interval.kind().replace('-', " "));
+            (Reading::Interval { interval, reversal: 1 }, words)
+        });
+        let careful = quasi_static_readings(fastest).into_iter().chain(intervals);
+        let careful = careful.map(|(reading, words)| (reading, words, CAREFUL_SD_RELATIVE));
+        let rough = spectral_readings(&job.targets, at).into_iter();
+        let rough = rough.map(|(reading, words)| (reading, words, ROUGH_SD_RELATIVE));
+        all.extend(careful.chain(rough).map(|(reading, words, sd_relative)| {
+            let several = job.conditions.len() > 1;
+            let description = if several { format!("{words} in `{}`", condition.name) } else { words };
+            let feature = Feature { name: String::new(), reading, condition: at };
+            CandidateFeature { description, sd_relative, feature }
         }));
-        all.extend(
-            spectral_readings(&job.targets, at)
-                .into_iter()
-                .map(|(reading, words)| of(reading, words, ROUGH_SD_RELATIVE)),
-        );
     }
-    all.retain(|candidate| {
-        job.targets.iter().all(|aim| {
-            aim.feature.reading != candidate.feature.reading
-                || aim.feature.condition != candidate.feature.condition
-        })
-    });
+    let is_same = |a: &Feature, b: &Feature| a.reading == b.reading && a.condition == b.condition;
+    all.retain(|candidate| !job.targets.iter().any(|aim| is_same(&aim.feature, &candidate.feature)));
     all
 }
 
 const INTERVALS: [ReversalInterval; 3] =
     [ReversalInterval::ReleaseAfterReversal, ReversalInterval::StickDuration, ReversalInterval::FlipDuration];
 
-/// Mean deflections, which say the friction at a speed.
+/// Mean deflections, which measure the friction at a speed.
 fn quasi_static_readings(fastest_m_per_s: Option<f64>) -> Vec<(Reading, String)> {
     let mut found = Vec::new();
     for part in ["before", "after"] {
@@ -182,10 +154,8 @@ fn spectral_readings(aims: &[FitTarget], condition: usize) -> Vec<(Reading, Stri
         ];
         if band.channel == Channel::Deflection {
             let end = |end: CycleRangeEnd, word: &str| {
-                (
-                    Reading::CycleFrequency { band: band.clone(), segment_s: SEGMENT_S, end },
-                    format!("the {word} frequency over which `{name}` runs (cycle-frequency-{word})"),
-                )
+                let reading = Reading::CycleFrequency { band: band.clone(), segment_s: SEGMENT_S, end };
+                (reading, format!("the {word} frequency over which `{name}` runs (cycle-frequency-{word})"))
             };
             found.extend([end(CycleRangeEnd::Low, "low"), end(CycleRangeEnd::High, "high")]);
         }

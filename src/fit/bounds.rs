@@ -1,7 +1,7 @@
 //! Bounds as one invertible transform: physical value, unit box, real line.
 //!
-//! Clouds of points search the unit box. A search without bounds works on the real line instead, through `u =
-//! (1 + sin z) / 2` (the transform of MINUIT, James and Roos, Comput. Phys. Commun. 10 (1975) 343): it
+//! Clouds of points search the unit box. A search without bounds uses the real line with
+//! `u = (1 + sin z) / 2`, the transform of MINUIT (James and Roos, Comput. Phys. Commun. 10 (1975) 343): it
 //! reaches both bounds at finite `z` and cannot leave the box.
 
 use crate::math;
@@ -19,7 +19,7 @@ pub enum BoundsSpacing {
     Linear,
 }
 
-/// Why two numbers are not bounds.
+/// Two numbers that are not valid bounds.
 #[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
 pub enum BoundsError {
     /// A bound is infinite or not a number.
@@ -90,12 +90,12 @@ impl Bounds {
         self.upper
     }
 
-    /// How the range is divided.
+    /// Spacing along the unit interval.
     pub(crate) fn spacing(&self) -> BoundsSpacing {
         self.spacing
     }
 
-    /// Place of `value` in the unit interval; values outside the bounds go to the nearer end.
+    /// Coordinate of `value` in the unit interval; values outside the bounds are clamped.
     pub(crate) fn to_unit(&self, value: f64) -> f64 {
         let value = value.clamp(self.lower, self.upper);
         let along = match self.spacing {
@@ -105,7 +105,7 @@ impl Bounds {
         clamp_unit(along / self.scaled_length())
     }
 
-    /// Value at `unit` (taken into 0 to 1 first); the ends give the bounds exactly.
+    /// Value at `unit`, which is clamped to 0 to 1; the ends give the bounds exactly.
     pub(crate) fn from_unit(&self, unit: f64) -> f64 {
         let unit = clamp_unit(unit);
         if unit == 0.0 {
@@ -148,20 +148,17 @@ impl Bounds {
     }
 }
 
-/// `unit` taken into 0 to 1; minus zero becomes zero, so that equal places have equal bits; not a number
-/// becomes one half.
+/// Clamps `unit` to 0 to 1. Minus zero becomes zero, so that equal points have equal bits; NaN becomes one half.
 pub(crate) fn clamp_unit(unit: f64) -> f64 {
     if unit.is_nan() { 0.5 } else { unit.clamp(0.0, 1.0) + 0.0 }
 }
 
-/// The place on the real line of a place in the unit interval, `z = asin(2 u - 1)`, between minus and plus
-/// pi/2.
+/// Maps the unit interval to the real line, `z = asin(2 u - 1)`, between -pi/2 and pi/2.
 pub(crate) fn unit_to_line(unit: f64) -> f64 {
     math::asin(2.0 * clamp_unit(unit) - 1.0)
 }
 
-/// The place in the unit interval of any real number, `u = (1 + sin z) / 2`; the ends are exact at odd
-/// multiples of pi/2.
+/// Maps a real number to the unit interval, `u = (1 + sin z) / 2`; exact at -pi/2 and pi/2.
 pub(crate) fn line_to_unit(line: f64) -> f64 {
     if line.abs() == FRAC_PI_2 {
         return if line > 0.0 { 1.0 } else { 0.0 };
@@ -169,14 +166,12 @@ pub(crate) fn line_to_unit(line: f64) -> f64 {
     clamp_unit(0.5 * (1.0 + math::sin(line)))
 }
 
-// A free parameter as the search sees it: its range, and what is known of it beforehand.
-
-/// A free parameter as the search sees it.
+/// A free parameter in a search: its range and its prior.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SearchAxis {
     /// Its range.
     pub bounds: Bounds,
-    /// What is known of it beforehand.
+    /// Its prior.
     pub prior: Option<Prior>,
 }
 

@@ -1,11 +1,11 @@
-//! What is not known of a camera, and what it does to features: a camera is not a caliper.
+//! Calibration errors of cameras and their effect on features.
 //!
-//! Of a deflection `d` a camera shows `(1 + scale) d + offset`: its scale is known to half a percent, and a
-//! marker is never on the hinge. Both are unknowns with priors, common to all features of a recording. What
-//! they do is known without a run of the model, so that no search has to look for them: at every point of the
-//! search they take the values at which the cost is lowest ([`CameraFit::estimate`]), and the linear model of the
-//! residuals is projected onto what they cannot explain (variable projection, Golub and
-//! Pereyra, SIAM J. Numer. Anal. 10 (1973) 413, in the form of Kaufman, BIT 15 (1975) 49).
+//! A camera measures a deflection `d` as `(1 + scale) d + offset`: its scale is known to half a percent, and a
+//! marker is never exactly on the hinge. Both numbers are unknowns with priors, common to all features of a
+//! recording. Their effect does not need a run of the model, so they are no search parameters: at every point
+//! of the search they minimise the cost ([`CameraFit::estimate`]), and the Jacobian is projected onto the
+//! complement of their derivatives (variable projection, Golub and Pereyra, SIAM J. Numer. Anal. 10 (1973)
+//! 413, in the form of Kaufman, BIT 15 (1975) 49).
 
 use super::evaluation::{Observation, Observed};
 use super::objective::{LOSS_KNEE, residual, robust_loss, total_sd};
@@ -17,18 +17,18 @@ use nalgebra::{DMatrix, Matrix2, Vector2};
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-/// Steps towards the lowest cost: within a few deviations three are exact, from afar a dozen are made.
+/// Most Gauss-Newton steps: three reach rounding from a few deviations away, and a dozen from afar.
 const MAX_STEPS: usize = 60;
-/// Halvings of a step that raises the cost.
+/// Most halvings of a step that raises the cost.
 const MAX_HALVINGS: usize = 12;
-/// A step that is shorter, in prior deviations, is the last.
+/// Length of the last step, in prior deviations.
 const MIN_STEP: f64 = 1e-12;
-/// So that no camera draws the numbers of another one in the next twin.
+/// Distance between the seeds of two cameras, so that they never share random numbers between twins.
 const CAMERA_SEEDS: u64 = 1 << 40;
-/// Variance of a place in a box about which nothing is known.
+/// Variance of a uniform variable in the unit interval.
 const BOX_VARIANCE: f64 = 1.0 / 12.0;
 
-/// A number of a camera that is estimated.
+/// An estimated number of a camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct CameraEstimate {
     /// Number of the condition whose camera it is, from 0.
@@ -43,7 +43,7 @@ pub(crate) struct CameraEstimate {
     pub half_95: Option<f64>,
 }
 
-/// The camera of a condition.
+/// The camera of a condition: standard deviations of scale and offset, and their values in these units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct ConditionCamera {
     condition: usize,
@@ -60,13 +60,13 @@ impl ConditionCamera {
 /// Names of a camera's numbers.
 const CAMERA_NUMBER_NAMES: [&str; 2] = ["scale_relative", "offset_x_m"];
 
-/// The cameras of the targets, each with the numbers at which the cost of what was observed is lowest.
+/// The cameras of the targets, with the numbers that minimise the cost of the features.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct CameraFit(Vec<ConditionCamera>);
 
 impl CameraFit {
-    /// Those of `targets`, against features in their order. A camera whose features are all missing has the
-    /// numbers of its prior.
+    /// Estimates the cameras of `targets` from features in the same order. A camera without features has the
+    /// means of its priors.
     pub(crate) fn estimate(targets: &[TargetValue], features: &[Observed]) -> Self {
         let mut cameras: Vec<ConditionCamera> = Vec::new();
         for calibration in targets.iter().filter_map(|target| target.calibration) {
@@ -88,43 +88,38 @@ impl CameraFit {
         Self(cameras)
     }
 
-    /// Numbers that are estimated: scales and offsets that are not held.
+    /// Number of estimated scales and offsets.
     pub(crate) fn count_unknowns(&self) -> usize {
         self.free_numbers().count()
     }
 
-    /// Camera, and which of its numbers.
+    /// Estimated numbers, as cameras with the index of the number.
     fn free_numbers(&self) -> impl Iterator<Item = (&ConditionCamera, usize)> {
-        self.0
-            .iter()
-            .flat_map(|camera| [0, 1].map(|k| (camera, k)))
-            .filter(|(camera, k)| camera.sds[*k] > 0.0)
+        let all = self.0.iter().flat_map(|camera| [0, 1].map(|k| (camera, k)));
+        all.filter(|(camera, k)| camera.sds[*k] > 0.0)
     }
 
-    /// Distances from the priors, in their standard deviations, one an unknown.
+    /// Residuals of the priors, one per unknown, in standard deviations.
     pub(crate) fn prior_residuals(&self) -> impl Iterator<Item = f64> {
         self.free_numbers().map(|(camera, k)| camera.place[k])
     }
 
-    /// A feature as its camera shows it.
+    /// A feature with the errors of its camera.
     pub(crate) fn apply(&self, target: &TargetValue, observation: &Observation) -> Observation {
-        let camera = target.calibration.and_then(|calibration| {
-            Some((calibration, self.0.iter().find(|camera| camera.condition == calibration.condition)?))
-        });
-        camera.map_or(*observation, |(calibration, camera)| {
-            let value = calibration.apply(observation.value, camera.scale_and_offset());
-            Observation { value, ..*observation }
-        })
+        let Some(calibration) = target.calibration else { return *observation };
+        let camera = self.0.iter().find(|camera| camera.condition == calibration.condition);
+        let apply =
+            |camera: &ConditionCamera| calibration.apply(observation.value, camera.scale_and_offset());
+        Observation { value: camera.map_or(observation.value, apply), ..*observation }
     }
 
-    /// A feature's value as its camera shows it.
+    /// The value of a feature with the errors of its camera.
     pub(crate) fn apply_to_value(&self, target: &TargetValue, observed: &Observed) -> Option<f64> {
         observed.observation().map(|observation| self.apply(target, observation).value)
     }
 
-    /// The linear model of residuals after the cameras have followed: what of the columns of `jacobian` they
-    /// cannot explain. Rows are the features, then others, and one an unknown of the cameras at the end;
-    /// weights are those of the cost.
+    /// Projects the columns of `jacobian` onto the complement of the derivatives by the camera unknowns, with
+    /// the weights of the cost. The first rows are the features, the last rows the camera unknowns.
     pub(crate) fn project_jacobian(
         &self,
         jacobian: DMatrix<f64>,
@@ -142,8 +137,8 @@ impl CameraFit {
         jacobian - own * followed
     }
 
-    /// The numbers with what the linear model says of them: `jacobian` has the rows that [`Self::project_jacobian`]
-    /// takes and gives.
+    /// The estimated numbers, with intervals by the linear model; `jacobian` has the rows of
+    /// [`Self::project_jacobian`].
     pub(crate) fn estimates(
         &self,
         jacobian: Option<&DMatrix<f64>>,
@@ -161,8 +156,8 @@ impl CameraFit {
         self.free_numbers().enumerate().map(estimate).collect()
     }
 
-    /// Standard deviations of the unknowns in units of their priors, those of the parameters included, of
-    /// which the box is known alone where the features say nothing.
+    /// Standard deviations of the unknowns in units of their priors, marginal over the parameters. These have
+    /// the variance of the unit box as a prior.
     fn standard_deviations(
         &self,
         jacobian: &DMatrix<f64>,
@@ -200,8 +195,8 @@ impl CameraFit {
             let Some(calibration) = target.calibration else { continue };
             for (column, (camera, k)) in free.iter().enumerate() {
                 if camera.condition == calibration.condition {
-                    slopes[(row, column)] =
-                        linearize_residual(target, &calibration, observation, camera.place).1[*k];
+                    let pair = (target, calibration, *observation);
+                    slopes[(row, column)] = linearize_residual(&pair, camera.place).1[*k];
                 }
             }
         }
@@ -213,7 +208,7 @@ impl CameraFit {
     }
 }
 
-/// Features as cameras of the priors show them, another draw for every twin.
+/// Features with camera errors drawn from the priors; `draw` is the number of the twin.
 pub(crate) fn draw_camera_errors(targets: &[TargetValue], features: &[Observed], draw: u64) -> Vec<Observed> {
     let one = |(target, observed): (&TargetValue, &Observed)| match (target.calibration, observed) {
         (Some(calibration), Observed::Value(observation)) => {
@@ -221,10 +216,8 @@ pub(crate) fn draw_camera_errors(targets: &[TargetValue], features: &[Observed],
             let mut generator = Xoshiro256PlusPlus::seed_from_u64(seed);
             let numbers =
                 calibration.standard_deviations().map(|sd| sd * generator.sample::<f64, _>(StandardNormal));
-            Observed::Value(Observation {
-                value: calibration.apply(observation.value, numbers),
-                ..*observation
-            })
+            let value = calibration.apply(observation.value, numbers);
+            Observed::Value(Observation { value, ..*observation })
         }
         _ => observed.clone(),
     };
@@ -237,19 +230,17 @@ fn weight_rows(matrix: &DMatrix<f64>, weights: &[f64]) -> DMatrix<f64> {
     weighted
 }
 
-/// The weight of a squared residual that belongs to the cost ([`robust_loss`]).
+/// Weight of a squared residual that corresponds to [`robust_loss`].
 fn robust_weight(residual: f64) -> f64 {
     math::powi(LOSS_KNEE / residual.abs().max(LOSS_KNEE), 2)
 }
 
-/// A target of one camera with what the model shows of it.
+/// A target with its calibration and the feature of the model.
 type TargetObservation<'a> = (&'a TargetValue, TargetCalibration, Observation);
 
-/// The residual of a feature with the camera at `place`, and its derivatives by it, both in prior deviations.
+/// Residual of a feature with the camera numbers at `place`, and its derivatives by them, in prior deviations.
 fn linearize_residual(
-    target: &TargetValue,
-    calibration: &TargetCalibration,
-    observation: &Observation,
+    (target, calibration, observation): &TargetObservation,
     place: [f64; 2],
 ) -> (f64, [f64; 2]) {
     let sds = calibration.standard_deviations();
@@ -258,7 +249,7 @@ fn linearize_residual(
     let distance = target.distance(value);
     let sd = total_sd(observation, target);
     let per_metre = match target.measure {
-        // where the distance is stopped nothing moves it
+        // a clamped distance is constant
         _ if distance.abs() >= math::ln(MAX_RATIO) => 0.0,
         ValueComparison::Log => 1.0 / value,
         ValueComparison::Linear { scale } => 1.0 / scale,
@@ -267,9 +258,9 @@ fn linearize_residual(
     (distance / sd, [0, 1].map(|k| slopes[k] * sds[k] * per_metre / sd))
 }
 
-/// The place of a camera, in prior deviations, at which the cost of its features is lowest. The cost grows as
-/// a logarithm far off and may have two minima, so that steps start from the prior's mean and from where the
-/// squares are least.
+/// Camera numbers, in prior deviations, that minimise the cost of the features. The cost grows logarithmically
+/// far from the target and may have two minima, so that the descent starts from the prior mean and from the
+/// least-squares solution.
 fn minimize_camera_cost(pairs: &[TargetObservation]) -> [f64; 2] {
     let cost = |place: &[f64; 2]| camera_cost(pairs, *place, robust_loss);
     let squares = gauss_newton_descent(pairs, [0.0; 2], |r| r * r, |_| 1.0);
@@ -280,8 +271,8 @@ fn minimize_camera_cost(pairs: &[TargetObservation]) -> [f64; 2] {
 
 /// Cost of a camera's features and of its priors.
 fn camera_cost(pairs: &[TargetObservation], place: [f64; 2], cost: fn(f64) -> f64) -> f64 {
-    let of = |(target, calibration, observation): &TargetObservation| {
-        let residual = linearize_residual(target, calibration, observation, place).0;
+    let of = |pair| {
+        let residual = linearize_residual(pair, place).0;
         if residual.is_finite() { cost(residual) } else { 0.0 }
     };
     pairs.iter().map(of).sum::<f64>() + place.into_iter().map(cost).sum::<f64>()
@@ -298,8 +289,8 @@ fn gauss_newton_descent(
     for _ in 0..MAX_STEPS {
         let mut normal = Matrix2::from_diagonal(&Vector2::from(place.map(weight)));
         let mut right = Vector2::from(place.map(|z| weight(z) * z));
-        for (target, calibration, observation) in pairs {
-            let (residual, slopes) = linearize_residual(target, calibration, observation, place);
+        for pair in pairs {
+            let (residual, slopes) = linearize_residual(pair, place);
             if residual.is_finite() {
                 let slopes = Vector2::from(slopes);
                 normal += weight(residual) * slopes * slopes.transpose();
@@ -322,9 +313,7 @@ fn gauss_newton_descent(
     place
 }
 
-// What the calibration of a camera does to a value: `(1 + scale) value + offset`.
-
-/// How a value depends on what is not known of its camera.
+/// How a value depends on the calibration errors of its camera: `(1 + scale) value + offset`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TargetCalibration {
     /// Number of the condition whose camera it is, from 0.
@@ -333,12 +322,12 @@ pub struct TargetCalibration {
     pub scale_sd: f64,
     /// Standard deviation of the offset, m; 0 where it is held.
     pub offset_sd_m: f64,
-    /// What of the camera the value depends on.
+    /// Kind of length, which decides how scale and offset act on it.
     pub length: LengthCalibration,
 }
 
 impl TargetCalibration {
-    /// What a camera with this `[scale, offset]` shows of a value, m.
+    /// The value with the errors `[scale, offset]`, m.
     pub(crate) fn apply(&self, value: f64, [scale, offset_m]: [f64; 2]) -> f64 {
         match self.length {
             LengthCalibration::Position => (1.0 + scale) * value + offset_m,
@@ -360,13 +349,13 @@ impl TargetCalibration {
         }
     }
 
-    /// Standard deviation of what is shown of a value, m.
+    /// Standard deviation of a value by the calibration errors, m.
     pub(crate) fn sd_m(&self, value: f64) -> f64 {
         let [by_scale, by_offset] = self.derivatives(value, [0.0; 2]);
         math::hypot(self.scale_sd * by_scale, self.offset_sd_m * by_offset)
     }
 
-    /// Standard deviations of scale and offset; 0 also of an offset on which the value does not depend.
+    /// Standard deviations of scale and offset; the latter is 0 where the value does not depend on an offset.
     pub(crate) fn standard_deviations(&self) -> [f64; 2] {
         match self.length {
             LengthCalibration::Position => [self.scale_sd, self.offset_sd_m],

@@ -51,31 +51,30 @@ pub(super) struct JobIdentity<'a> {
 pub struct Job {
     /// Title for pages and figures.
     pub title: String,
-    /// What is simulated: recordings first, then conditions without one, in the order of the file; at least
-    /// one.
+    /// Conditions with a recording first, then those without one, in the order of the file; at least one.
     pub conditions: Vec<JobCondition>,
-    /// The camera through which the model of a condition without a recording is seen.
+    /// Camera of the conditions without a recording.
     pub camera: Option<Camera>,
     /// Free parameters.
     pub parameters: Vec<FreeParameter>,
-    /// Constants that are freed too, each within its prior.
+    /// Constants that are freed within priors.
     pub constants: Constants,
-    /// Recordings whose traces are fitted, in the order of the file; none in a job on features alone.
+    /// Fitted traces in the order of the file; empty in a job on features.
     pub traces: Vec<TraceTarget>,
     /// Components first, then features, in the order of the file.
     pub targets: Vec<FitTarget>,
     /// Budgets and seed of the search.
     pub search: SearchSettings,
-    /// Starting states that are averaged over.
+    /// Ensemble of starting states over which features are averaged.
     pub ensemble: Ensemble,
-    /// Largest lean of the blade from the vertical that a run may show, rad; `None` for any.
+    /// Largest plausible tilt of the blade from the vertical, rad; `None` for any.
     pub largest_tilt_rad: Option<f64>,
-    /// How intervals are found.
+    /// Settings of the intervals.
     pub intervals: IntervalSettings,
 }
 
 impl Job {
-    /// Reads and checks a job on the parameters of a scene; `file` is its name in refusals.
+    /// Reads and checks a job on the parameters of a scene; `file` is its name in error messages.
     ///
     /// # Errors
     /// [`JobError`] at the first problem.
@@ -96,7 +95,7 @@ impl Job {
         })
     }
 
-    /// The JSON Schema of job.toml: for editors, and for messages.
+    /// The JSON Schema of job.toml, for editors and error messages.
     #[must_use]
     pub fn schema() -> serde_json::Value {
         toml_file::schema_of::<as_written::JobFile>()
@@ -190,18 +189,18 @@ impl Job {
     }
 }
 
-/// Why a job was refused.
+/// An invalid job.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 pub enum JobError {
-    /// It is not TOML of the right shape.
+    /// The file is not TOML of the right structure.
     #[error(transparent)]
     Toml(#[from] TomlError),
-    /// A value that cannot be used.
+    /// An invalid value.
     #[error("{file}: {key}: {problem}")]
     Value {
         /// File as named by the user.
         file: String,
-        /// The key, with the entry that it belongs to.
+        /// The key with its entry.
         key: String,
         /// What was found, what was expected, and what to do.
         problem: String,

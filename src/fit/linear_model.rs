@@ -1,9 +1,8 @@
-//! The model near a point of the unit box, to first order: how its residuals change with the place.
+//! Linear model of the residuals around a point of the unit box.
 //!
-//! Rows are the features in the order of the targets, then the priors, then those of the cameras
-//! ([`CameraFit`]), each in standard deviations; columns are the parameters, which the cameras follow. Slopes
-//! are central differences of [`DIFFERENCE_STEP`], wide enough to average over the scatter of features that are read
-//! from sampled traces.
+//! Rows of the Jacobian are the features in the order of the targets, then the priors, then the camera unknowns
+//! ([`CameraFit`]), each in standard deviations; columns are the parameters. Slopes are central differences
+//! with [`DIFFERENCE_STEP`], which is wide enough to average over the scatter of features of sampled traces.
 
 use super::bounds::{Prior, SearchAxis, clamp_unit};
 use super::camera_calibration::{CameraEstimate, CameraFit};
@@ -18,11 +17,11 @@ use std::collections::BTreeMap;
 
 /// Step of the differences in the unit box: about 2 % of a parameter whose bounds are a decade apart.
 pub(crate) const DIFFERENCE_STEP: f64 = 0.01;
-/// Longest step in the unit box: a linear model does not hold farther.
+/// Longest step in the unit box for which the linear model is trusted.
 const MAX_STEP: f64 = 0.2;
 
-/// The points whose evaluations [`FeatureSlopes::from_differences`] needs: two a parameter, one step below and above `unit` where
-/// the box allows.
+/// The points that [`FeatureSlopes::from_differences`] needs: for each parameter one step below and one above
+/// `unit`, clamped to the box.
 pub(crate) fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
     let moved = |axis: usize, step: f64| {
         unit.iter().enumerate().map(|(at, u)| if at == axis { clamp_unit(u + step) } else { *u }).collect()
@@ -30,13 +29,13 @@ pub(crate) fn difference_points(unit: &[f64]) -> Vec<Vec<f64>> {
     (0..unit.len()).flat_map(|axis| [moved(axis, -DIFFERENCE_STEP), moved(axis, DIFFERENCE_STEP)]).collect()
 }
 
-/// `d distance / d u` of every feature as its camera shows it, a row a feature; `None` where it is missing on
-/// both sides, or at the point and on one.
+/// `d distance / d u` of every feature with its camera errors, one row per feature. `None` where the feature is
+/// missing on both sides, or at the point and on one side.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FeatureSlopes(pub Vec<Vec<Option<f64>>>);
 
 impl FeatureSlopes {
-    /// Of the evaluations `around` a point, in the order of [`difference_points`].
+    /// Slopes from the evaluations `around` a point, in the order of [`difference_points`].
     pub(crate) fn from_differences(
         targets: &[TargetValue],
         centre: &Evaluation,
@@ -49,13 +48,8 @@ impl FeatureSlopes {
             let [centre, below, above] = sides.map(|e| e.and_then(|e| Some((*e.unit.get(axis)?, shown(e)?))));
             feature_slope(target, below.or(centre)?, above.or(centre)?)
         };
-        Self(
-            targets
-                .iter()
-                .enumerate()
-                .map(|row| (0..centre.unit.len()).map(|axis| of(row, axis)).collect())
-                .collect(),
-        )
+        let row = |row| (0..centre.unit.len()).map(|axis| of(row, axis)).collect();
+        Self(targets.iter().enumerate().map(row).collect())
     }
 }
 
@@ -71,9 +65,9 @@ fn feature_slope(target: &TargetValue, below: (f64, f64), above: (f64, f64)) -> 
     (width > 0.0 && change.is_finite()).then(|| change / width)
 }
 
-/// How far each feature departs from a straight line between the points next to a centre, as a standard
-/// deviation in its own unit: `f(+) + f(-) - 2 f(0)` of independent scatter has six times its variance.
-/// `None` where it is missing on the way.
+/// Scatter of each feature about a straight line through the points next to a centre, as a standard deviation in
+/// its own unit: `f(+) + f(-) - 2 f(0)` of independent values has six times their variance. `None` where the
+/// feature is missing at one of the points.
 pub(crate) fn feature_scatter(
     targets: &[TargetValue],
     centre: &Evaluation,
@@ -85,11 +79,8 @@ pub(crate) fn feature_scatter(
         let middle = value(centre)?;
         let bends = around.chunks(2).filter_map(|pair| {
             let [below, above] = pair else { return None };
-            Some(math::powi(
-                target.distance_between(value(below)?, middle)
-                    + target.distance_between(value(above)?, middle),
-                2,
-            ))
+            let [below, above] = [value(below)?, value(above)?].map(|v| target.distance_between(v, middle));
+            Some(math::powi(below + above, 2))
         });
         let bends: Vec<f64> = bends.collect();
         let mean = bends.iter().sum::<f64>() / bends.len() as f64;
@@ -103,7 +94,7 @@ pub(crate) fn residuals(objective: &Objective, evaluation: &Evaluation) -> Vec<O
     residuals_against(objective.axes(), objective.targets(), evaluation)
 }
 
-/// The same against other targets; `None` also where one is not a number.
+/// Residuals against other targets; `None` also where a target is NaN.
 pub(crate) fn residuals_against(
     axes: &[SearchAxis],
     targets: &[TargetValue],
@@ -118,18 +109,15 @@ pub(crate) fn residuals_against(
     features.chain(priors).chain(cameras.prior_residuals().map(Some)).collect()
 }
 
-/// `d r / d u` at a point, where the cameras follow; zero where it is unknown.
+/// `d r / d u` at a point, with the cameras re-estimated at every point; zero where it is unknown.
 pub(crate) fn jacobian(objective: &Objective, centre: &Evaluation, slopes: &FeatureSlopes) -> DMatrix<f64> {
     let (targets, features) = (objective.targets(), &centre.features);
     let cameras = CameraFit::estimate(targets, features);
-    cameras.project_jacobian(
-        jacobian_with_cameras_held(objective, centre, slopes, &cameras),
-        targets,
-        features,
-    )
+    let held = jacobian_with_cameras_held(objective, centre, slopes, &cameras);
+    cameras.project_jacobian(held, targets, features)
 }
 
-/// What is estimated of the cameras at a point, with intervals where its slopes are known.
+/// Camera estimates at a point, with intervals if `slopes` are given.
 pub(crate) fn camera_estimates(
     objective: &Objective,
     centre: &Evaluation,
@@ -141,7 +129,7 @@ pub(crate) fn camera_estimates(
     cameras.estimates(held.as_ref(), targets, features)
 }
 
-/// `d r / d u` with the cameras as they are at the point.
+/// `d r / d u` with the camera numbers of the point.
 fn jacobian_with_cameras_held(
     objective: &Objective,
     centre: &Evaluation,
@@ -150,11 +138,8 @@ fn jacobian_with_cameras_held(
 ) -> DMatrix<f64> {
     let columns = centre.unit.len();
     let features = slopes.0.iter().zip(objective.targets()).enumerate().map(|(at, (row, target))| {
-        let sd = centre
-            .features
-            .get(at)
-            .and_then(|f| f.observation())
-            .map_or(target.relative_sd(), |seen| total_sd(seen, target));
+        let seen = centre.features.get(at).and_then(|f| f.observation());
+        let sd = seen.map_or(target.relative_sd(), |seen| total_sd(seen, target));
         row.iter().map(|slope| slope.map_or(0.0, |slope| slope / sd)).collect::<Vec<f64>>()
     });
     let priors = objective.axes().iter().enumerate().filter_map(|(at, axis)| {
@@ -170,8 +155,8 @@ fn jacobian_with_cameras_held(
     DMatrix::from_fn(rows.len(), columns, |row, column| rows[row][column])
 }
 
-/// The linear model after a step, corrected such that it explains what the step did (Broyden, Math. Comput.
-/// 19 (1965) 577).
+/// Broyden's update of the Jacobian after a step: the model then reproduces the change of the residuals (Math.
+/// Comput. 19 (1965) 577).
 pub(crate) fn broyden_update(
     jacobian: &mut DMatrix<f64>,
     before: &[Option<f64>],
@@ -192,9 +177,9 @@ pub(crate) fn broyden_update(
     }
 }
 
-/// The step that a damped Gauss-Newton model suggests: `(J^T W J + damping) d = -J^T W r` with the weights
-/// `min(1, KNEE / |r|)^2` that belong to the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to
-/// a length at which it may hold. A coordinate that is `held` does not move.
+/// Damped Gauss-Newton step: `(J^T W J + damping) d = -J^T W r` with the weights `min(1, LOSS_KNEE / |r|)^2` of
+/// the cost (Levenberg, Quart. Appl. Math. 2 (1944) 164), shortened to [`MAX_STEP`]. The coordinate `held` does
+/// not change.
 pub(crate) fn damped_step(
     jacobian: &DMatrix<f64>,
     residuals: &[Option<f64>],
@@ -226,50 +211,48 @@ pub(crate) fn step_in_box(unit: &[f64], step: &[f64]) -> Vec<f64> {
     unit.iter().zip(step).map(|(u, d)| clamp_unit(u + d)).collect()
 }
 
-// What a linear model of the residuals can determine: rank, condition, deviations, correlations,
-// combinations.
+// Rank, condition, deviations, correlations and combinations by the linear model.
 //
 // `J = d r / d u` is in standard deviations of the features per length of the unit box. A singular direction
 // is informative if its 95 % interval fits into the box; the information matrix `J^T J` is inverted on those
-// directions alone.
+// directions only.
 
 /// Half-width of a 95 % interval in standard deviations of a normal variable.
 pub(crate) const Z_95: f64 = 1.96;
-/// Gain in cost that a parameter's 95 % interval spans (chi-squared of one degree of freedom).
+/// Rise in cost at the ends of a 95 % interval (chi-squared with one degree of freedom).
 pub(crate) const CHI_SQUARED_95: f64 = 3.84;
 /// Smallest singular value, per length of the box, of an informative direction: its 95 % interval is as wide
 /// as the box.
 pub(crate) const MIN_INFORMATIVE: f64 = 2.0 * Z_95;
-/// Singular values below this share of the largest are rounding.
+/// Singular values below this fraction of the largest one are rounding errors.
 pub(crate) const ROUNDING_SHARE: f64 = 1e-9;
-/// Share (squared cosine) of uninformative directions in a parameter from which on the parameter is not
-/// determined.
+/// Fraction (squared cosine) of uninformative directions in a parameter above which it is not determined.
 pub(crate) const OPEN_SHARE: f64 = 0.01;
-/// Exponents below this share of the largest one of a combination are not named.
+/// Exponents below this fraction of the largest one of a combination are left out.
 const MIN_NAMED_EXPONENT: f64 = 0.05;
 
 /// Singular directions of a Jacobian in the space of the parameters.
 #[derive(Debug, Clone)]
 pub(crate) struct SingularDirections {
-    /// Singular value and direction, the most informative first; all of unit length and at right angles.
+    /// Singular values with their orthonormal directions, the most informative first.
     all: Vec<(f64, Vec<f64>)>,
     /// Number of informative directions.
     pub rank: usize,
 }
 
-/// A product of powers of the parameters that the features determine, or leave open.
+/// A product of powers of the parameters that the features determine or leave open.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ParameterCombination {
     /// Exponents by parameter; the largest is 1, those below 0.05 are left out.
     pub exponents: BTreeMap<String, f64>,
-    /// Standard deviation of its logarithm; for one that is left open, that of which the box allows.
+    /// Standard deviation of its logarithm; for an open combination the one that the box allows.
     pub sd_relative: f64,
     /// Whether the features determine it.
     pub determined: bool,
 }
 
 impl ParameterCombination {
-    /// Such as `friction.c friction.a^0.31`.
+    /// The product in words, such as `friction.c friction.a^0.31`.
     pub(crate) fn describe(&self) -> String {
         let mut factors: Vec<(&String, f64)> = self.exponents.iter().map(|(name, e)| (name, *e)).collect();
         factors.sort_by(|a, b| b.1.abs().total_cmp(&a.1.abs()));
@@ -281,15 +264,14 @@ impl ParameterCombination {
 }
 
 impl SingularDirections {
-    /// Of a Jacobian, a column a parameter.
+    /// Singular directions of a Jacobian with one column per parameter.
     pub(crate) fn from_jacobian(jacobian: &DMatrix<f64>) -> Self {
         let columns = jacobian.ncols();
-        // rows of zeros say nothing and make the decomposition complete
+        // rows of zeros add no information and complete the set of directions
         let padded = jacobian.clone().resize_vertically(jacobian.nrows().max(columns), 0.0);
         let svd = padded.svd(false, true);
-        let rows = svd.v_t.iter().flat_map(|v_t| {
-            v_t.row_iter().map(|row| row.iter().copied().collect::<Vec<f64>>()).collect::<Vec<_>>()
-        });
+        let rows = svd.v_t.iter().flat_map(|v_t| v_t.row_iter());
+        let rows = rows.map(|row| row.iter().copied().collect::<Vec<f64>>());
         let mut all: Vec<(f64, Vec<f64>)> = svd.singular_values.iter().copied().zip(rows).collect();
         all.sort_by(|a, b| b.0.total_cmp(&a.0));
         let threshold =
@@ -308,7 +290,7 @@ impl SingularDirections {
         }
     }
 
-    /// Standard deviation of a coordinate from the informative directions, and its share in the others.
+    /// Standard deviation of a coordinate by the informative directions, and its fraction in the other ones.
     pub(crate) fn coordinate_sd(&self, axis: usize) -> (f64, f64) {
         let component = |direction: &Vec<f64>| math::powi(direction.get(axis).copied().unwrap_or(0.0), 2);
         let (known, open) = self.all.split_at(self.rank);
@@ -333,17 +315,14 @@ impl SingularDirections {
             return None;
         }
         let product = |direction: &[f64]| Some(direction.get(a)? * direction.get(b)?);
-        let covariance: f64 = self
-            .all
-            .iter()
-            .take(self.rank)
-            .filter_map(|(value, direction)| Some(product(direction)? / (value * value)))
-            .sum();
+        let known = self.all.iter().take(self.rank);
+        let terms = known.filter_map(|(value, direction)| Some(product(direction)? / (value * value)));
+        let covariance: f64 = terms.sum();
         Some((covariance / (self.coordinate_sd(a).0 * self.coordinate_sd(b).0)).clamp(-1.0, 1.0))
     }
 
-    /// What is determined (most precise first) and what is left open, as products of powers at the point
-    /// `unit`.
+    /// Products of powers at the point `unit` that are determined, the most precise first, and those that are
+    /// left open.
     pub(crate) fn combinations(
         &self,
         names: &[String],
@@ -354,21 +333,17 @@ impl SingularDirections {
             axes.iter().zip(unit).map(|(axis, u)| axis.bounds.log_slope(*u).unwrap_or(0.0)).collect();
         let one = |(rank, (value, direction)): (usize, &(f64, Vec<f64>))| {
             let determined = rank < self.rank;
-            // a determined sum d_i u_i has exponents d_i / slope_i; along an open direction ln p_i moves by
+            // a determined sum d_i u_i has exponents d_i / slope_i; along an open direction ln p_i changes by
             // d_i slope_i
             let exponent = |(d, slope): (&f64, &f64)| {
                 let determines = if *slope == 0.0 { 0.0 } else { d / slope };
                 if determined { determines } else { d * slope }
             };
             let exponents: Vec<f64> = direction.iter().zip(&slopes).map(exponent).collect();
-            let largest = exponents
-                .iter()
-                .copied()
-                .fold(0.0, |most: f64, e| if e.abs() > most.abs() { e } else { most });
-            let named = names
-                .iter()
-                .zip(&exponents)
-                .filter(|(_, e)| e.abs() >= MIN_NAMED_EXPONENT * largest.abs() && largest != 0.0);
+            let larger = |most: f64, e: &f64| if e.abs() > most.abs() { *e } else { most };
+            let largest = exponents.iter().fold(0.0, larger);
+            let is_named = |e: &f64| e.abs() >= MIN_NAMED_EXPONENT * largest.abs() && largest != 0.0;
+            let named = names.iter().zip(&exponents).filter(|(_, e)| is_named(e));
             let sd = if determined {
                 1.0 / (value * largest.abs())
             } else {

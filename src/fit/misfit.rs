@@ -1,8 +1,8 @@
-//! How well the model explains a recording's trace, which is said before anything that the fit found.
+//! Tests whether the model explains the trace of a recording. The verdict precedes all other results of a fit.
 //!
-//! The parameters of a wrong model have narrow intervals too. What speaks against it is a residual above the
-//! noise, one that grows with the length of the segments, or a segment that fits worse than noise ever does;
-//! and, in a fit of features too, a camera or a constant that is far from where the job has it.
+//! The parameters of a wrong model have narrow intervals too. Evidence against a model is a residual above the
+//! noise, a residual that grows with the length of the segments, or a segment that fits worse than noise
+//! allows; in a fit of features also a camera or a constant that is far from its prior.
 
 use super::result::NuisanceResult;
 use crate::math;
@@ -10,16 +10,16 @@ use crate::text::format_trimmed;
 use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
-/// Relative standard deviation of the measured noise: over clean recordings of another camera model chi2 per
-/// degree of freedom scattered by twice as much about 1.
+/// Relative standard deviation of the measured noise. Over clean recordings of another camera model, chi2 per
+/// degree of freedom has twice this scatter about 1.
 const NOISE_SD_RELATIVE: f64 = 0.04;
-/// Relative growth of chi2 per degree of freedom from the shortest segments to the longest that a right model
-/// may show beyond its own scatter: a wrong damping gave 0.05 to 0.13, right models less than 0.02.
+/// Largest relative growth of chi2 per degree of freedom from the shortest to the longest segments, beyond its
+/// scatter. A wrong damping gives 0.05 to 0.13, a right model less than 0.02.
 const MAX_GROWTH: f64 = 0.03;
 /// Standard deviations of a two-sided 95 % interval.
 const Z_95: f64 = 1.96;
-/// Standard deviations of its prior by which a nuisance may lie from it: with twenty of them, one in a
-/// hundred fits of a right model has one beyond.
+/// Largest distance of a nuisance from its prior, in standard deviations. With twenty nuisances, one of a hundred
+/// fits of a right model exceeds it.
 const MAX_PRIOR_DISTANCE_SD: f64 = 3.5;
 /// Digits of a ratio in a sentence.
 const DIGITS: usize = 3;
@@ -27,11 +27,11 @@ const DIGITS: usize = 3;
 /// How well the model explains the traces.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct TraceMisfit {
-    /// Whether nothing speaks against the model.
+    /// Whether the model explains the traces.
     pub explained: bool,
-    /// What speaks against it, a sentence each.
+    /// Evidence against the model, one sentence each.
     pub reasons: Vec<String>,
-    /// Residuals against noise, a row a recording and channel.
+    /// Residuals and noise, one entry per recording and channel.
     pub channels: Vec<ChannelMisfit>,
     /// The stages, the shortest segments first.
     pub stages: Vec<StageMisfit>,
@@ -46,7 +46,7 @@ pub struct ChannelMisfit {
     pub channel: String,
     /// Frames that were compared.
     pub frames: usize,
-    /// Frames with data that lie in no segment: before the first in which the tip slides.
+    /// Frames with data outside all segments, before the tip slides for the first time.
     pub frames_left_out: usize,
     /// Root mean square of measured minus model, m.
     pub residual_rms_m: f64,
@@ -54,19 +54,18 @@ pub struct ChannelMisfit {
     pub noise_m: f64,
     /// Sum of squared residuals in units of the noise over the degrees of freedom.
     pub chi2_per_dof: f64,
-    /// Correlation of the residuals of neighbouring frames, in units of the noise; `None` where none are
-    /// neighbours.
+    /// Autocorrelation of the residuals at a lag of one frame; `None` without neighbouring frames.
     pub autocorrelation_1: Option<f64>,
-    /// The segments that fit worst, the worst first.
+    /// Segments with the largest misfit, in descending order.
     pub worst: Vec<WorstSegment>,
 }
 
 /// A segment that fits badly.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WorstSegment {
-    /// Its first frame, s.
+    /// Time of its first frame, s.
     pub start_s: f64,
-    /// The frame after its last, s.
+    /// Time of the frame after its last one, s.
     pub end_s: f64,
     /// Sum of squared residuals in units of the noise over the degrees of freedom.
     pub chi2_per_dof: f64,
@@ -79,19 +78,19 @@ pub struct StageMisfit {
     pub segment_s: f64,
     /// Number of segments of all recordings.
     pub segments: usize,
-    /// Those that fit worse than noise ever does.
+    /// Segments with a misfit that noise does not explain.
     pub bad_segments: usize,
-    /// Degrees of freedom: data less unknowns.
+    /// Degrees of freedom: number of data minus number of unknowns.
     pub dof: usize,
-    /// Sum of squared residuals in units of the noise over the degrees of freedom; infinite, in a file
-    /// `null`, where the model's run fails in a segment.
+    /// Sum of squared residuals in units of the noise over the degrees of freedom; infinite (`null` in a file)
+    /// if a run of the model fails.
     #[serde(deserialize_with = "or_infinite")]
     pub chi2_per_dof: f64,
     /// Parameters at the end of the stage, in SI units.
     pub estimates: BTreeMap<String, f64>,
 }
 
-/// A number of a file, which has none for infinity.
+/// Reads `null` as infinity.
 fn or_infinite<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
     Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::INFINITY))
 }
@@ -104,7 +103,7 @@ impl StageMisfit {
 }
 
 impl TraceMisfit {
-    /// The judgement on what was found.
+    /// Judges the model by the residuals of all channels and stages, and by the nuisances.
     pub(crate) fn judge(
         channels: Vec<ChannelMisfit>,
         stages: Vec<StageMisfit>,
@@ -122,7 +121,7 @@ impl TraceMisfit {
         Self { explained: reasons.is_empty(), reasons, channels, stages }
     }
 
-    /// The first sentence of everything that is said of the fit.
+    /// The first sentence on the fit.
     pub(crate) fn headline(&self) -> String {
         let chi2 = self.stages.last().map_or(f64::NAN, |stage| stage.chi2_per_dof);
         if self.explained {
@@ -135,37 +134,37 @@ impl TraceMisfit {
     }
 }
 
-/// The first sentence of a fit of which something speaks against the model.
+/// The first sentence on a fit with evidence against the model.
 pub(crate) fn unexplained_headline(reasons: &[String]) -> String {
     format!("The model does not explain the recording: {}", reasons.join("; "))
 }
 
-/// What is only explained by a camera or a constant that is not where it is thought to be, a sentence each.
+/// A sentence for each camera or constant that is far from its prior.
 pub(crate) fn far_from_priors(nuisances: &[NuisanceResult]) -> Vec<String> {
     nuisances.iter().filter_map(far_from_prior).collect()
 }
 
-/// Nothing was compared at all.
+/// No segment was compared.
 fn no_segment_compared(stages: &[StageMisfit]) -> Option<String> {
     let compared = stages.last().is_some_and(|stage| stage.segments > 0);
     (!compared).then(|| "no segment of it could be started".to_owned())
 }
 
-/// A recording of which nothing was compared.
+/// A channel without compared frames.
 fn unseen_channel(channels: &[ChannelMisfit]) -> Option<String> {
     let unseen = channels.iter().find(|channel| channel.frames == 0)?;
     let (recording, channel) = (&unseen.recording, &unseen.channel);
     Some(format!("no segment of {channel} in `{recording}` could be started"))
 }
 
-/// A segment in a wrong state, or one that the model cannot show.
+/// Segments in a wrong state, or with a motion that the model does not have.
 fn bad_segments(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last().filter(|stage| stage.bad_segments > 0)?;
     let (bad, all) = (last.bad_segments, last.segments);
     Some(format!("{bad} of {all} segments fit worse than noise ever does"))
 }
 
-/// Residuals above what noise of uncertain size explains.
+/// Residuals above the noise, including its uncertainty.
 fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     let last = stages.last()?;
     let most = 1.0 + Z_95 * math::hypot(2.0 * NOISE_SD_RELATIVE, last.chi2_sd());
@@ -176,7 +175,7 @@ fn misfit_above_noise(stages: &[StageMisfit]) -> Option<String> {
     })
 }
 
-/// A misfit that grows with the segments: the longer a run, the farther a wrong model leads away.
+/// A misfit that grows with the segment length: the error of a wrong model accumulates over a run.
 fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     let [first, .., last] = stages else { return None };
     let most = first.chi2_per_dof * (1.0 + MAX_GROWTH + Z_95 * math::hypot(first.chi2_sd(), last.chi2_sd()));
@@ -191,8 +190,7 @@ fn misfit_growth(stages: &[StageMisfit]) -> Option<String> {
     })
 }
 
-/// A constant or a camera that explains the recording only where it is not thought to be: a wrong model bends
-/// whatever is free.
+/// A constant or a camera that is far from its prior: a wrong model distorts all free numbers.
 fn far_from_prior(found: &NuisanceResult) -> Option<String> {
     let apart = (found.estimate - found.prior) / found.prior_sd;
     (apart.abs() > MAX_PRIOR_DISTANCE_SD).then(|| {

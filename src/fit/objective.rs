@@ -1,35 +1,35 @@
-//! The cost of a point of the unit box, through one adapter that turns every failure into a recorded reason
-//! and a finite cost.
+//! The cost of a point of the unit box. Every failure of the model becomes a reason and a finite cost.
 //!
-//! The cost is twice the negative logarithm of a likelihood, up to a constant that makes it zero where
-//! everything is met: `sum [ rho(r) + 2 ln(s / sd) + (d / 6 dB)^2 ] + sum of the priors`. Residual of a
-//! feature: `r = ln(model / target) / s` (or `(model - target) / s` where the sign may change). `s^2 = sd^2 +
-//! scatter^2 + spread^2`: the target's deviation; the scatter of the model's own value between neighbouring
-//! parameters, where it is not smooth; and the spread over its starting states, to which the term `2 ln(s /
-//! sd)` belongs: without it a fit would look for points at which nothing is certain. `robust_loss` is `r^2` up to
-//! `LOSS_KNEE` and grows as a logarithm after that, as errors with heavy tails have it: a peak that is missing
-//! must not outvote all that is shown; it costs as much as a value that is [`MAX_RATIO`] times off. `d` is by how
-//! much the assigned peak is weaker than the strongest one, so that the cost does not jump when another peak
-//! is assigned. A run that fails costs at least as much as one from which every feature is missing, and less
-//! the further it came.
+//! The cost is twice the negative log-likelihood, up to a constant that makes it zero where all targets are met:
+//! `sum [ rho(r) + 2 ln(s / sd) + (d / 6 dB)^2 ] + sum of the priors`.
+//!
+//! - The residual of a feature is `r = ln(model / target) / s`, or `(model - target) / s` where the sign may
+//!   change.
+//! - `s^2 = sd^2 + scatter^2 + spread^2` combines the deviation of the target, the scatter of a rough model value
+//!   between neighbouring parameters, and the spread over the starting states. The term `2 ln(s / sd)`
+//!   penalises the spread; without it a fit would prefer points with uncertain features.
+//! - `rho` ([`robust_loss`]) is `r^2` up to `LOSS_KNEE` and logarithmic beyond it, so that a missing peak does
+//!   not dominate the cost. A missing feature costs as much as one that is wrong by a factor of [`MAX_RATIO`].
+//! - `d` is the level of the strongest peak above the assigned one. With it the cost is continuous when another
+//!   peak is assigned.
+//!
+//! A failing run costs at least as much as a run without any feature, and less the longer it lasts.
 
 use super::bounds::SearchAxis;
 use super::camera_calibration::CameraFit;
-use super::evaluation::{Evaluation, EvaluationOutcome, Observation, Observed};
-use super::evaluation::{FailureReason, RunFailure};
+use super::evaluation::{Evaluation, EvaluationOutcome, FailureReason, Observation, Observed, RunFailure};
 use super::model::FeaturePredictor;
 use super::targets::{MAX_RATIO, TargetValue};
 use crate::feature::ASSIGN_DB;
 use crate::math;
 use crate::text::panic_message;
-use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Residual, in standard deviations, above which the cost grows as a logarithm: errors of measurement stay
-/// below 3, so only a model that is far off feels it.
+/// Residual, in standard deviations, above which the cost grows logarithmically. Measurement errors stay below 3,
+/// so that only a wrong model is affected.
 pub(crate) const LOSS_KNEE: f64 = 3.0;
 
-/// Bounds, targets and the model between them.
+/// The cost function of a fit: bounds, targets and model.
 pub struct Objective<'a> {
     axes: Vec<SearchAxis>,
     targets: Vec<TargetValue>,
@@ -37,8 +37,8 @@ pub struct Objective<'a> {
 }
 
 impl<'a> Objective<'a> {
-    /// One axis a free parameter, one target a feature; targets are finite, not zero where logarithms are
-    /// taken, with a standard deviation above zero (as [`crate::feature`] and [`super::job`] make them).
+    /// One axis per free parameter and one target per feature. Targets are finite, not zero where logarithms are
+    /// compared, and have a standard deviation above zero.
     #[must_use]
     pub fn new(axes: Vec<SearchAxis>, targets: Vec<TargetValue>, model: &'a dyn FeaturePredictor) -> Self {
         Self { axes, targets, model }
@@ -54,34 +54,34 @@ impl<'a> Objective<'a> {
         &self.targets
     }
 
-    /// Parameter values at a place in the unit box.
+    /// Parameter values at a point of the unit box.
     pub(crate) fn values(&self, unit: &[f64]) -> Vec<f64> {
         self.axes.iter().zip(unit).map(|(axis, u)| axis.bounds.from_unit(*u)).collect()
     }
 
-    /// Runs the model at a place in the unit box; never fails and never panics.
+    /// Evaluates the model at a point of the unit box; a panic of the model is a failed run.
     pub(crate) fn evaluate(&self, unit: &[f64]) -> Evaluation {
         self.evaluate_at(unit.to_vec(), self.values(unit))
     }
 
-    /// Runs the model at parameter values, whose place in the unit box is not needed.
+    /// Evaluates the model at parameter values, without their point in the unit box.
     pub(crate) fn evaluate_values(&self, values: Vec<f64>) -> Evaluation {
         self.evaluate_at(Vec::new(), values)
     }
 
     fn evaluate_at(&self, unit: Vec<f64>, values: Vec<f64>) -> Evaluation {
-        let outcome = catch_panic(|| self.model.predict_features(&values))
-            .and_then(|features| self.check_features(features));
-        let (features, failure) = match outcome {
+        let predicted = catch_panic(|| self.model.predict_features(&values));
+        let (features, failure) = match predicted.and_then(|features| self.check_features(features)) {
             Ok(features) => (features, None),
-            Err(failure) => {
-                (Vec::new(), Some(RunFailure::new(failure.reason, failure.message, failure.progress)))
+            // a model may give a progress outside of 0 to 1
+            Err(RunFailure { reason, message, progress }) => {
+                (Vec::new(), Some(RunFailure::new(reason, message, progress)))
             }
         };
         self.add_costs(EvaluationOutcome { unit, values, features, failure })
     }
 
-    /// What a point shows with its costs, which follow from its features or its failure and its values.
+    /// Adds the costs, which follow from features or failure and from the values.
     pub(crate) fn add_costs(&self, outcome: EvaluationOutcome) -> Evaluation {
         let EvaluationOutcome { unit, values, features, failure } = outcome;
         let priors: f64 = prior_residuals(&self.axes, &values)
@@ -98,17 +98,14 @@ impl<'a> Objective<'a> {
         Evaluation { unit, values, cost, global_cost, features, failure }
     }
 
-    /// The same with the scatter of each feature, in its unit.
+    /// The objective with the scatter of each feature, in its unit.
     pub(crate) fn with_feature_scatter(&self, scatter: &[f64]) -> Self {
-        let targets = self
-            .targets
-            .iter()
-            .zip(scatter)
-            .map(|(target, scatter)| TargetValue { scatter: *scatter, ..target.clone() });
+        let targets = self.targets.iter().zip(scatter);
+        let targets = targets.map(|(target, scatter)| TargetValue { scatter: *scatter, ..target.clone() });
         Self { axes: self.axes.clone(), targets: targets.collect(), model: self.model }
     }
 
-    /// What one measurement of the model at `values` would show.
+    /// The features of one simulated measurement of the model at `values`.
     ///
     /// # Errors
     /// [`RunFailure`], also for a panic and for numbers that are not finite.
@@ -117,42 +114,37 @@ impl<'a> Objective<'a> {
             .and_then(|features| self.check_features(features))
     }
 
-    /// Numbers of cameras that are estimated at every point.
+    /// Number of camera unknowns, which are estimated at every point.
     pub(crate) fn count_camera_unknowns(&self) -> usize {
         CameraFit::estimate(&self.targets, &[]).count_unknowns()
     }
 
-    /// Stops numbers that are not finite at the border.
+    /// Refuses a wrong number of features, and numbers that are not finite.
     fn check_features(&self, features: Vec<Observed>) -> Result<Vec<Observed>, RunFailure> {
-        if features.len() != self.targets.len() {
-            let message =
-                format!("the model gave {} features, expected {}", features.len(), self.targets.len());
+        let (found, expected) = (features.len(), self.targets.len());
+        if found != expected {
+            let message = format!("the model gave {found} features, expected {expected}");
             return Err(RunFailure::new(FailureReason::FeatureCount, message, 0.0));
         }
         let odd = |shown: &Observation| {
             [shown.value, shown.spread, shown.below_db].into_iter().find(|number| !number.is_finite())
         };
-        match features
-            .iter()
-            .zip(&self.targets)
-            .find_map(|(feature, target)| Some((feature.observation().and_then(odd)?, target)))
-        {
-            Some((found, target)) => Err(RunFailure::new(
-                FailureReason::NotANumber,
-                format!("feature `{}` is {found}", target.name),
-                0.0,
-            )),
-            None => Ok(features),
+        for (feature, target) in features.iter().zip(&self.targets) {
+            if let Some(found) = feature.observation().and_then(odd) {
+                let message = format!("feature `{}` is {found}", target.name);
+                return Err(RunFailure::new(FailureReason::NotANumber, message, 0.0));
+            }
         }
+        Ok(features)
     }
 }
 
-/// Distances from the priors, in standard deviations, of the parameters that have one.
+/// Residuals of the parameters with a prior, in standard deviations.
 pub(crate) fn prior_residuals(axes: &[SearchAxis], values: &[f64]) -> impl Iterator<Item = f64> {
     axes.iter().zip(values).filter_map(|(axis, value)| Some(axis.prior.as_ref()?.residual(*value)))
 }
 
-/// What features cost with the priors of their cameras, and the most that the features can.
+/// Cost of the features with the priors of their cameras, and the cost if all features were missing.
 fn feature_costs(targets: &[TargetValue], features: &[Observed]) -> (f64, f64) {
     let cameras = CameraFit::estimate(targets, features);
     let one = |(at, target): (usize, &TargetValue)| {
@@ -173,7 +165,7 @@ fn first_stage_targets(targets: &[TargetValue], features: &[Observed]) -> (Vec<T
     (targets, features.into_iter().flatten().collect())
 }
 
-/// Most standard deviations from a prior that are counted, so that costs stay finite.
+/// Largest residual of a prior, so that costs stay finite.
 const MAX_PRIOR_RESIDUAL: f64 = 1e6;
 
 /// Distance over its standard deviation, the spread over starting states included.
@@ -186,7 +178,7 @@ pub(crate) fn total_sd(observation: &Observation, target: &TargetValue) -> f64 {
     math::hypot(target.relative_sd(), observation.spread / target.reference_size())
 }
 
-/// What a feature that was shown costs; never more than one that was not.
+/// Cost of a feature, at most that of a missing one.
 fn feature_cost(observation: &Observation, target: &TargetValue) -> f64 {
     let assigned = math::powi(observation.below_db / ASSIGN_DB, 2);
     let spread = 2.0 * math::ln(total_sd(observation, target) / target.relative_sd());
@@ -197,7 +189,7 @@ fn missing_cost(target: &TargetValue) -> f64 {
     robust_loss(math::ln(MAX_RATIO) / target.relative_sd())
 }
 
-/// A residual's share of the cost: its square, and beyond `LOSS_KNEE` a logarithm with the same slope there.
+/// Loss of a residual: its square up to `LOSS_KNEE`, then a logarithm with a continuous slope.
 pub(crate) fn robust_loss(residual: f64) -> f64 {
     let size = residual.abs();
     if size <= LOSS_KNEE {
@@ -210,13 +202,10 @@ pub(crate) fn robust_loss(residual: f64) -> f64 {
 /// The outcome, or a panic as a failure.
 fn catch_panic<T>(run: impl FnOnce() -> Result<T, RunFailure>) -> Result<T, RunFailure> {
     catch_unwind(AssertUnwindSafe(run)).unwrap_or_else(|payload| {
-        Err(RunFailure::new(FailureReason::Panic, panic_text(payload.as_ref()), 0.0))
+        let message = panic_message(payload.as_ref());
+        let message = message.unwrap_or_else(|| "the model panicked without a message".to_owned());
+        Err(RunFailure::new(FailureReason::Panic, message, 0.0))
     })
-}
-
-/// The message of a panic, if it has one.
-fn panic_text(payload: &(dyn Any + Send)) -> String {
-    panic_message(payload).unwrap_or_else(|| "the model panicked without a message".to_owned())
 }
 
 #[cfg(test)]

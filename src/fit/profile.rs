@@ -1,68 +1,66 @@
 //! Profile likelihood: along each parameter, the lowest cost that the others can still reach.
 //!
-//! From the best point a walker goes up and another down each parameter. At every place it lets the others
-//! follow, by the linear model first and then by damped Gauss-Newton steps corrected by Broyden's rule, until
-//! the cost has risen by more than the threshold or the range ends (Venzon and Moolgavkar, Appl. Stat. 37
-//! (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923). All walkers step together, so that their
-//! evaluations run in parallel and their order does not depend on the number of threads.
+//! From the best point one walker goes up and another down each parameter. At every place it minimises the cost
+//! over the other parameters, first by the linear model and then by damped Gauss-Newton steps corrected by
+//! Broyden's rule, until the cost has risen by more than the threshold or the range ends (Venzon and
+//! Moolgavkar, Appl. Stat. 37 (1988) 87; Raue et al., Bioinformatics 25 (2009) 1923). All walkers step
+//! together: their evaluations run in parallel, in an order that does not depend on the number of threads.
 //!
-//! A cost of features is rough: behind a ridge of it may lie values that are as good. So a walker starts at
-//! each place from the best that the fit already knows near it too, looks on behind the crossing that it has
-//! found, and goes on from the farthest point of the whole fit that is within the threshold.
+//! A cost of features is rough, and values behind a ridge may be as good. A walker therefore also tries the
+//! best known point near each place, probes behind the crossing that it finds, and continues from the farthest
+//! evaluated point within the threshold.
 
 use super::bounds::clamp_unit;
-use super::evaluation::Evaluation;
-use super::evaluation::EvaluationStage;
+use super::evaluation::{Evaluation, EvaluationStage};
 use super::ledger::{Ledger, StopReason};
-use super::linear_model::SingularDirections;
-use super::linear_model::{
-    FeatureSlopes, broyden_update, damped_step, difference_points, jacobian as measured, residuals,
-    step_in_box,
-};
+use super::linear_model::{self, FeatureSlopes, SingularDirections};
+use super::linear_model::{broyden_update, damped_step, difference_points, step_in_box};
+use super::objective::Objective;
 use crate::math;
 use nalgebra::DMatrix;
 
 /// Dampings of the inner steps: nearly undamped, and short.
 const DAMPINGS: [f64; 2] = [1.0, 3e2];
-/// Inner steps at a place: the linear model starts them near the minimum.
+/// Inner steps at a place. A few suffice: the linear model starts them near the minimum.
 const INNER_STEPS: usize = 3;
-/// Gain in cost below which the others have followed: a fiftieth of the threshold.
+/// Gain in cost below which the inner minimisation ends: a fiftieth of the threshold.
 const FOLLOWED_GAIN: f64 = 0.08;
-/// Places of a walker, at most: from a poor linear model a walker takes about eight, and each look behind a
-/// crossing is one.
+/// Most places of a walker: with a poor linear model it takes about eight, and each probe behind a crossing is
+/// one more.
 const MAX_PLACES: usize = 20;
-/// Places behind a crossing, in its distance from the best point, at which the cost has to be above the
-/// threshold too: a ridge as wide as a quarter of an interval is stepped over.
+/// Probes behind a crossing, in units of its distance from the best point. The cost has to exceed the threshold
+/// there too, so that a ridge of a quarter of an interval does not end the walk.
 const PROBE_FACTORS: [f64; 2] = [1.25, 1.6];
-/// A point of the fit this near in the coordinate, in the unit box, starts the others at a place.
+/// Largest distance along the coordinate, in the unit box, of a known point from which a place is started.
 const NEAR_COORDINATE: f64 = 0.01;
-/// How often walkers go on from a point of the fit that lies behind the crossings that they have found.
+/// How often walkers continue from a point behind the crossings that they have found.
 const MAX_RESUMPTIONS: usize = 3;
-/// First place, as a share of where the linear model crosses the threshold.
+/// First step as a fraction of the distance at which the linear model crosses the threshold.
 const FIRST_STEP_SHARE: f64 = 0.6;
 /// Shortest and longest first step in the unit box.
 const FIRST_STEP_RANGE: (f64, f64) = (0.003, 0.25);
-/// Aim beyond the threshold, in the root of the rise, so that the next place is likely to bracket it.
+/// Factor on the root of the threshold at which a step aims, so that the next place brackets the crossing.
 const OVERSHOOT: f64 = 1.1;
-/// A bracket is narrow enough when its outer end costs no more than this many thresholds, in the root.
+/// Ratio of the root of the rise at the outer end of a bracket to that of the threshold below which the
+/// bracket is narrow enough.
 const NARROW_BRACKET: f64 = 1.35;
-/// Nearer than this to a bound, in the unit box, a place lies at it: a search resolves no less.
+/// Distance from a bound, in the unit box, below which a point is at the bound: the resolution of a search.
 pub(crate) const AT_BOUND: f64 = 1e-3;
-/// A step grows by this factor at most.
+/// Largest growth of a step.
 const MAX_STEP_GROWTH: f64 = 3.0;
 
 /// The profile of one parameter.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ProfileLikelihood {
-    /// Place in the unit interval and lowest cost there, from below to above, the best point included.
+    /// Coordinate in the unit interval and lowest cost there, rising, with the best point.
     pub points: Vec<(f64, f64)>,
-    /// Where the cost crosses the threshold below; `None` where it does not within the range, or only because
-    /// another parameter is at its bound there.
+    /// Lower crossing of the threshold; `None` if there is none within the range, or if another parameter is at
+    /// its bound there.
     pub lower: Option<f64>,
     pub upper: Option<f64>,
 }
 
-/// Profiles of all parameters from `best`, the Jacobian there, and the rise in cost that bounds an interval.
+/// Profiles of all parameters from `best` and the Jacobian there; `rise` in cost bounds an interval.
 ///
 /// # Errors
 /// [`StopReason`] when the evaluations are used up or may not go on.
@@ -73,11 +71,10 @@ pub(crate) fn profile_parameters(
     rise: f64,
 ) -> Result<Vec<ProfileLikelihood>, StopReason> {
     let directions = SingularDirections::from_jacobian(jacobian);
-    let start = ProfilePoint { residuals: residuals(ledger.objective(), best), evaluation: best.clone() };
+    let start = ProfilePoint::new(ledger.objective(), best);
     let sides = (0..best.unit.len()).flat_map(|axis| [-1.0, 1.0].map(|sign| (axis, sign)));
-    let mut walkers: Vec<ProfileWalker> = sides
-        .map(|(axis, sign)| ProfileWalker::new(&start, jacobian, &directions, axis, sign, rise))
-        .collect();
+    let walker = |(axis, sign)| ProfileWalker::new(&start, jacobian, &directions, axis, sign, rise);
+    let mut walkers: Vec<ProfileWalker> = sides.map(walker).collect();
     walk_to_ends(ledger, &mut walkers)?;
     for _ in 0..MAX_RESUMPTIONS {
         if !resume_walkers(ledger, &mut walkers)? {
@@ -95,8 +92,8 @@ fn walk_to_ends(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<()
     Ok(())
 }
 
-/// Sends walkers on from the farthest points within the threshold that lie behind their crossings; whether
-/// there are any.
+/// Lets walkers continue from the farthest points within the threshold behind their crossings; returns whether
+/// any of them does.
 fn resume_walkers(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<bool, StopReason> {
     let farther: Vec<Option<Evaluation>> =
         walkers.iter().map(|walker| walker.farthest_within_threshold(ledger)).collect();
@@ -108,17 +105,14 @@ fn resume_walkers(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<
         let Some(from) = from else { continue };
         let around: Vec<&Evaluation> =
             difference_points(&from.unit).iter().filter_map(|point| ledger.find_evaluation(point)).collect();
-        let model =
-            measured(objective, from, &FeatureSlopes::from_differences(objective.targets(), from, &around));
-        walker.resume_from(
-            ProfilePoint { residuals: residuals(objective, from), evaluation: from.clone() },
-            model,
-        );
+        let slopes = FeatureSlopes::from_differences(objective.targets(), from, &around);
+        let jacobian = linear_model::jacobian(objective, from, &slopes);
+        walker.resume_from(ProfilePoint::new(objective, from), jacobian);
     }
     Ok(farther.iter().any(Option::is_some))
 }
 
-/// One place of every walker that still walks.
+/// Moves every active walker to its next place.
 fn advance_walkers(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result<(), StopReason> {
     for walker in walkers.iter_mut() {
         walker.advance();
@@ -132,10 +126,8 @@ fn advance_walkers(ledger: &mut Ledger, walkers: &mut [ProfileWalker]) -> Result
         }
         ledger.evaluate_points(EvaluationStage::Profile, &all)?;
         for (walker, proposed) in walkers.iter_mut().zip(&proposals) {
-            let objective = ledger.objective();
-            let place =
-                |e: &Evaluation| ProfilePoint { residuals: residuals(objective, e), evaluation: e.clone() };
-            walker.keep_best(proposed.iter().filter_map(|point| ledger.find_evaluation(point).map(place)));
+            let known = proposed.iter().filter_map(|point| ledger.find_evaluation(point));
+            walker.keep_best(known.map(|found| ProfilePoint::new(ledger.objective(), found)));
         }
     }
     walkers.iter_mut().for_each(ProfileWalker::finish_place);
@@ -158,34 +150,41 @@ struct ProfilePoint {
     residuals: Vec<Option<f64>>,
 }
 
-/// Walks one way along one parameter.
+impl ProfilePoint {
+    fn new(objective: &Objective, evaluation: &Evaluation) -> Self {
+        let residuals = linear_model::residuals(objective, evaluation);
+        Self { evaluation: evaluation.clone(), residuals }
+    }
+}
+
+/// Walks in one direction along one parameter.
 struct ProfileWalker {
     axis: usize,
     sign: f64,
-    /// Root of the rise that bounds the interval.
+    /// Root of the rise in cost that bounds the interval.
     most_root: f64,
     start: (f64, f64),
     start_unit: Vec<f64>,
-    /// The last place within the threshold; the others start from there.
+    /// Last place within the threshold, from which the next one starts.
     base: ProfilePoint,
     /// Linear model of the residuals.
     model: DMatrix<f64>,
-    /// Coordinate on which it stands, and the best found there.
+    /// Coordinate of the present place, and the best point there.
     at: f64,
     here: Option<ProfilePoint>,
-    /// The best point that the fit knows near that coordinate.
+    /// Best known point near that coordinate.
     near: Option<Vec<f64>>,
+    /// Whether the inner minimisation has ended.
     followed: bool,
     next_step: f64,
-    /// The nearest place beyond the threshold, with the root of its rise.
+    /// Nearest place beyond the threshold, with the root of its rise.
     outside: Option<(f64, f64)>,
-    /// A crossing that was found, and how often it was looked behind.
+    /// Crossing that was found, and the number of probes behind it.
     crossing: Option<(f64, usize)>,
-    /// Whether another parameter lies at its bound there: then the bounds end the interval, and not the
-    /// features.
+    /// Whether another parameter is at its bound at the crossing: the bounds end the interval, not the features.
     pinned: bool,
     places: Vec<(f64, f64)>,
-    /// Places that it may still go to.
+    /// Number of places left.
     left: usize,
     /// The crossing; `Some(None)` when the range ended first.
     end: Option<Option<f64>>,
@@ -201,12 +200,7 @@ impl ProfileWalker {
         rise: f64,
     ) -> Self {
         let at = start.evaluation.unit.get(axis).copied().unwrap_or(0.5);
-        let (sd, _) = directions.coordinate_sd(axis);
-        let first = if directions.determines(axis) {
-            FIRST_STEP_SHARE * sd * rise.sqrt()
-        } else {
-            FIRST_STEP_RANGE.1
-        };
+        let determined = directions.determines(axis);
         Self {
             axis,
             sign,
@@ -219,7 +213,11 @@ impl ProfileWalker {
             here: None,
             near: None,
             followed: false,
-            next_step: first.clamp(FIRST_STEP_RANGE.0, FIRST_STEP_RANGE.1),
+            next_step: if determined {
+                first_step(directions, axis, rise.sqrt())
+            } else {
+                FIRST_STEP_RANGE.1
+            },
             outside: None,
             crossing: None,
             pinned: false,
@@ -246,7 +244,7 @@ impl ProfileWalker {
         self.base.evaluation.unit.get(self.axis).copied().unwrap_or(self.at)
     }
 
-    /// The points that it wants to know, none when it has arrived.
+    /// Points to evaluate next; empty when the place is finished.
     fn proposed_points(&self) -> Vec<Vec<f64>> {
         if self.end.is_some() || self.followed {
             return Vec::new();
@@ -258,7 +256,7 @@ impl ProfileWalker {
         steps.map(|d| step_in_box(&here.evaluation.unit, &d)).collect()
     }
 
-    /// The best point that the fit knows near the coordinate, moved onto it.
+    /// Best known point near the coordinate, moved onto it.
     fn nearest_known_point(&self, ledger: &Ledger) -> Option<Vec<f64>> {
         let near =
             |e: &&Evaluation| e.unit.get(self.axis).is_some_and(|u| (u - self.at).abs() <= NEAR_COORDINATE);
@@ -272,7 +270,7 @@ impl ProfileWalker {
         unit.iter().enumerate().map(|(at, u)| if at == self.axis { self.at } else { *u }).collect()
     }
 
-    /// The farthest point of the fit within the threshold, where it lies behind the crossing.
+    /// Farthest evaluated point within the threshold, if it lies behind the crossing.
     fn farthest_within_threshold(&self, ledger: &Ledger) -> Option<Evaluation> {
         let crossing = self.end.flatten()?;
         let limit = self.start.1 + math::powi(self.most_root, 2);
@@ -282,33 +280,28 @@ impl ProfileWalker {
         (along(farthest) > FIRST_STEP_RANGE.0 / 2.0).then(|| farthest.clone())
     }
 
-    /// Goes on from a place within the threshold.
+    /// Continues from a place within the threshold.
     fn resume_from(&mut self, base: ProfilePoint, model: DMatrix<f64>) {
-        let directions = SingularDirections::from_jacobian(&model);
-        let (sd, _) = directions.coordinate_sd(self.axis);
-        self.next_step =
-            (FIRST_STEP_SHARE * sd * self.most_root).clamp(FIRST_STEP_RANGE.0, FIRST_STEP_RANGE.1);
+        self.next_step = first_step(&SingularDirections::from_jacobian(&model), self.axis, self.most_root);
         (self.base, self.model) = (base, model);
         (self.end, self.outside, self.crossing, self.pinned) = (None, None, None, false);
         self.left = MAX_PLACES;
     }
 
-    /// The others as they were, and as the linear model lets them follow.
+    /// Starting points at a place: the other parameters unchanged, moved by the linear model, and from the best
+    /// known point.
     fn first_points(&self) -> Vec<Vec<f64>> {
         let change = self.at - self.base_coordinate();
         let kept = self.move_onto_coordinate(&self.base.evaluation.unit);
-        let expected = self
-            .base
-            .residuals
-            .iter()
-            .enumerate()
-            .map(|(row, r)| r.map(|r| r + self.model[(row, self.axis)] * change));
-        let followed = damped_step(&self.model, &expected.collect::<Vec<_>>(), DAMPINGS[0], Some(self.axis))
-            .map(|d| step_in_box(&kept, &d));
+        let residuals = self.base.residuals.iter().enumerate();
+        let expected: Vec<Option<f64>> =
+            residuals.map(|(row, r)| r.map(|r| r + self.model[(row, self.axis)] * change)).collect();
+        let step = damped_step(&self.model, &expected, DAMPINGS[0], Some(self.axis));
+        let followed = step.map(|d| step_in_box(&kept, &d));
         [Some(kept), followed, self.near.clone()].into_iter().flatten().collect()
     }
 
-    /// Keeps the best of what was found here.
+    /// Keeps the best point of a place.
     fn keep_best(&mut self, found: impl Iterator<Item = ProfilePoint>) {
         let Some(best) = found.min_by(|a, b| a.evaluation.cost.total_cmp(&b.evaluation.cost)) else { return };
         let known = self.here.as_ref().map_or(f64::INFINITY, |here| here.evaluation.cost);
@@ -325,7 +318,7 @@ impl ProfileWalker {
         self.here = Some(best);
     }
 
-    /// Notes the place and decides where to go next.
+    /// Records the place and chooses the next one.
     fn finish_place(&mut self) {
         let (None, Some(here)) = (self.end, self.here.take()) else { return };
         self.places.push((self.at, here.evaluation.cost));
@@ -346,7 +339,7 @@ impl ProfileWalker {
         }
     }
 
-    /// Goes to the next place behind a crossing, or ends there when all of them were above the threshold.
+    /// Goes to the next probe behind a crossing, or ends at the crossing if all probes exceed the threshold.
     fn probe_behind_crossing(&mut self, crossing: f64, looked: usize) {
         let Some(factor) = PROBE_FACTORS.get(looked) else {
             self.end = Some(Some(crossing));
@@ -356,13 +349,11 @@ impl ProfileWalker {
         self.next_step = (self.start.0 + factor * (crossing - self.start.0) - self.base_coordinate()).abs();
     }
 
-    /// Whether a parameter other than the walker's own lies at a bound at which it was not at the best point.
+    /// Whether another parameter is at a bound at which it is not at the best point.
     fn pins_another_parameter(&self, unit: &[f64]) -> bool {
         let bound = |u: &f64| !(AT_BOUND..=1.0 - AT_BOUND).contains(u);
-        unit.iter()
-            .zip(&self.start_unit)
-            .enumerate()
-            .any(|(at, (u, start))| at != self.axis && bound(u) && !bound(start))
+        let mut pairs = unit.iter().zip(&self.start_unit).enumerate();
+        pairs.any(|(at, (u, start))| at != self.axis && bound(u) && !bound(start))
     }
 
     fn cost_rise_root(&self, place: &ProfilePoint) -> f64 {
@@ -396,8 +387,8 @@ impl ProfileWalker {
         self.refine_bracket(base, self.at, root);
     }
 
-    /// Between the base (within) and `place` (beyond the threshold): the crossing, or the next place to look
-    /// at.
+    /// Interpolates the crossing between the base (within the threshold) and `place` (beyond it), or chooses the
+    /// next place between them.
     fn refine_bracket(&mut self, base_root: f64, place: f64, root: f64) {
         let base = self.base_coordinate();
         let share = ((self.most_root - base_root) / (root - base_root)).clamp(0.0, 1.0);
@@ -411,6 +402,12 @@ impl ProfileWalker {
             self.next_step = width * (OVERSHOOT * share).clamp(0.2, 0.8);
         }
     }
+}
+
+/// First step along a coordinate: a fraction of the distance at which the linear model crosses the threshold.
+fn first_step(directions: &SingularDirections, axis: usize, root: f64) -> f64 {
+    let (least, most) = FIRST_STEP_RANGE;
+    (FIRST_STEP_SHARE * directions.coordinate_sd(axis).0 * root).clamp(least, most)
 }
 
 #[cfg(test)]

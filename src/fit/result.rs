@@ -1,4 +1,4 @@
-//! What a fit found, as `result.json`.
+//! The result of a fit, `result.json`.
 
 mod assembly;
 mod validation;
@@ -19,13 +19,13 @@ use std::collections::BTreeMap;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FitStatus {
-    /// A restarted search gained nothing.
+    /// A restart of the search did not lower the cost.
     Converged,
-    /// The evaluations allowed were used up first.
+    /// The allowed evaluations were used up first.
     BudgetExhausted,
-    /// It was stopped from outside; it can be resumed.
+    /// The fit was stopped from outside and can be resumed.
     Interrupted,
-    /// The model failed at every point that was tried.
+    /// The model failed at every evaluated point.
     Failed,
 }
 
@@ -46,42 +46,41 @@ impl FitStatus {
 pub struct ParameterResult {
     /// Best value.
     pub estimate: f64,
-    /// Lower end of the 95 % interval, the widest of those below; `None` where the features give none.
+    /// Lower end of the 95 % interval, the widest of the intervals below; `None` where it is open.
     pub lower_95: Option<f64>,
-    /// Upper end of the 95 % interval, the widest of those below; `None` where the features give none.
+    /// Upper end of the 95 % interval, the widest of the intervals below; `None` where it is open.
     pub upper_95: Option<f64>,
-    /// What is known of it.
+    /// Verdict on the interval.
     pub verdict: ParameterVerdict,
-    /// Ends by the linear model at the estimates, where it determines the parameter.
+    /// Interval by the linear model at the estimates, if it determines the parameter.
     pub linear_95: Option<[f64; 2]>,
-    /// Where the profile of the cost crosses the threshold, below and above; `None` where it does not within
-    /// the bounds.
+    /// Lower and upper crossing of the threshold by the profile of the cost; `None` where there is none within the
+    /// bounds.
     pub profile_95: [Option<f64>; 2],
-    /// Ends by twins of the best model that were fitted again.
+    /// Interval by refits to twins of the best model.
     pub bootstrap_95: Option<[f64; 2]>,
-    /// Values along the parameter and the lowest cost that the others reach there.
+    /// Values along the parameter, and the cost there minimised over the other parameters.
     pub profile: Vec<(f64, f64)>,
-    /// Why it is not identified, a sentence each; empty where it is. In a fit of features alone only what its
+    /// Reasons for which it is not identified, one sentence each. A fit of features lists only those that its
     /// numbers do not show.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub reasons: Vec<String>,
 }
 
 impl ParameterResult {
-    /// Whether the 95 % interval has both ends, and the linear model knows how it goes with the others.
+    /// Whether the 95 % interval has both ends and the linear model determines the parameter.
     pub(crate) fn has_interval(&self) -> bool {
         self.linear_95.is_some() && self.lower_95.is_some() && self.upper_95.is_some()
     }
 }
 
-/// Something that is estimated besides the parameters: a number of a camera, or a constant of the scene.
+/// A nuisance: a number of a camera or a constant of the scene that is estimated with the parameters.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct NuisanceResult {
     /// The recording whose camera it belongs to; `None` for a constant of the scene.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub recording: Option<String>,
-    /// What it is: a key of the scene, or `tilt_rad`, `scale_relative`, `offset_x_m`, `offset_drop_m`,
-    /// `clock_s` of a camera.
+    /// Key of the scene, or `tilt_rad`, `scale_relative`, `offset_x_m`, `offset_drop_m`, `clock_s` of a camera.
     pub name: String,
     /// Mean of its prior.
     pub prior: f64,
@@ -95,7 +94,7 @@ pub struct NuisanceResult {
     pub upper_95: Option<f64>,
 }
 
-/// The fitted state in which a whole run of a trace's model starts.
+/// Fitted starting state of a whole run of a trace's model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct StartState {
     /// Name of the recording in the job.
@@ -112,32 +111,32 @@ pub struct StartState {
     pub lip_rate_rad_per_s: f64,
 }
 
-/// A peak that a component was not assigned to.
+/// The peak that would be assigned to a component next.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct RunnerUpPeak {
     /// Its frequency, Hz.
     pub frequency_hz: f64,
-    /// By how much it is weaker than the strongest peak of the band, dB.
+    /// Level of the strongest peak of the band above it, dB.
     pub below_db: f64,
 }
 
-/// A local search, as one step of the waterfall of optima.
+/// A local search: one step of the waterfall plot.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct LocalOptimum {
     /// Cost where it started.
     pub start_cost: f64,
     /// Cost where it ended.
     pub cost: f64,
-    /// Evaluations that it took.
+    /// Number of its evaluations.
     pub evaluations: usize,
     /// Parameter values where it ended.
     pub values: BTreeMap<String, f64>,
-    /// Why the model failed there, if it did.
+    /// Failure of the model there, if any.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub failure: Option<String>,
 }
 
-/// One component: a frequency that the model has to meet.
+/// Target and modelled frequency of a component.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ComponentResult {
     /// Name in the job.
@@ -146,23 +145,21 @@ pub struct ComponentResult {
     pub target_hz: f64,
     /// Its standard deviation, Hz.
     pub target_sd_hz: f64,
-    /// Frequency of the model; `None` if it has no such component, Hz.
+    /// Frequency of the model, Hz; `None` if it has no such component.
     pub model_hz: Option<f64>,
     /// `model / target - 1`.
     pub relative_error: Option<f64>,
-    /// Largest relative error that passes.
+    /// Tolerance of the relative error.
     pub tolerance_relative: f64,
     /// Whether the relative error is within the tolerance.
     pub pass: bool,
-    /// Scatter of the model's frequency between neighbouring parameters, which counts with the target's
-    /// deviation, Hz.
+    /// Scatter of the model's frequency between neighbouring points, Hz; it is added to the target's deviation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_scatter_hz: Option<f64>,
     /// Standard deviation of the model's frequency over its starting states, Hz.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_spread_hz: Option<f64>,
-    /// By how much the model's peak is weaker than the strongest one of its band, dB; 0 where it is the
-    /// strongest.
+    /// Level of the strongest peak of the band above the model's peak, dB; 0 where that is the strongest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub below_db: Option<f64>,
     /// The model's peak that would be assigned next.
@@ -176,7 +173,7 @@ pub struct ComponentResult {
     pub missing: Option<String>,
 }
 
-/// One feature other than the components.
+/// Target and modelled value of a feature other than a component.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct FeatureResult {
     /// Name in the job.
@@ -191,16 +188,15 @@ pub struct FeatureResult {
     pub target_sd: f64,
     /// Value of the model; `None` if it has none.
     pub model: Option<f64>,
-    /// What the camera, as it is estimated, shows of that value; `None` where nothing of it is.
+    /// The model's value with the estimated camera errors; `None` where there are none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_seen: Option<f64>,
-    /// `model / target - 1`, with the value that the camera shows.
+    /// `model_seen / target - 1`, or `model / target - 1` without camera errors.
     pub relative_error: Option<f64>,
-    /// Whether that value lies within the 95 % interval of the target, which for a feature that was held out
-    /// includes what is not known of its camera.
+    /// Whether that value is within the 95 % interval of the target. For a held-out feature the interval includes
+    /// the calibration errors of its camera.
     pub pass: bool,
-    /// Scatter of the model's value between neighbouring parameters, which counts with the target's
-    /// deviation.
+    /// Scatter of the model's value between neighbouring points; it is added to the target's deviation.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub model_scatter: Option<f64>,
     /// Standard deviation of the model's value over its starting states.
@@ -215,7 +211,7 @@ pub struct FeatureResult {
 }
 
 impl FeatureResult {
-    /// The model's value, as its camera shows it where that is estimated.
+    /// The model's value, with camera errors where they are estimated.
     pub(crate) fn value_seen(&self) -> Option<f64> {
         self.model_seen.or(self.model)
     }
@@ -224,13 +220,13 @@ impl FeatureResult {
 /// Evaluations of the model.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct EvaluationCounts {
-    /// All of them, replayed ones included.
+    /// Number of evaluations, including replayed ones.
     pub total: usize,
-    /// Those that failed, counted by reason.
+    /// Number of failed evaluations by reason.
     pub failed: BTreeMap<FailureReason, usize>,
 }
 
-/// Everything a fit found.
+/// The result of a fit.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FitResult {
     /// Title of the job.
@@ -240,19 +236,19 @@ pub struct FitResult {
     /// How well the model explains the traces; `None` in a fit of features alone.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub misfit: Option<TraceMisfit>,
-    /// By name, as in the scene with its table.
+    /// Parameters by their key of the scene with its table.
     pub parameters: BTreeMap<String, ParameterResult>,
-    /// What was estimated of the cameras, and the constants that were freed.
+    /// Estimated camera numbers and freed constants.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub nuisances: Vec<NuisanceResult>,
-    /// Where the model of each trace starts when it runs over the whole recording.
+    /// Starting states of whole runs of the traces' models.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub starts: Vec<StartState>,
-    /// In job order.
+    /// Components in job order.
     pub components: Vec<ComponentResult>,
-    /// In job order.
+    /// Other features in job order.
     pub features: Vec<FeatureResult>,
-    /// Components and features that were held out of the fit and predicted by it.
+    /// Predictions for components and features that were held out of the fit.
     pub held_out: Vec<FeatureResult>,
     /// Number of informative directions in the space of the parameters.
     pub rank: usize,
@@ -260,36 +256,35 @@ pub struct FitResult {
     pub condition: Option<f64>,
     /// Products of powers of the parameters that the features determine or leave open.
     pub combinations: Vec<ParameterCombination>,
-    /// Correlations of the estimates by the linear model; none for a parameter that it does not determine.
+    /// Correlations of the estimates by the linear model, for the parameters that it determines.
     pub correlations: BTreeMap<String, BTreeMap<String, f64>>,
-    /// Sum of squared residuals at the estimates, linear beyond `KNEE` (3 standard deviations).
+    /// Cost at the estimates: the sum of the robust losses of all residuals.
     pub cost: f64,
-    /// Rise in cost that bounds a 95 % interval.
+    /// Rise in cost at the ends of a 95 % interval.
     pub threshold: f64,
-    /// Twins of the best model that were fitted again.
+    /// Number of refits to twins of the best model.
     pub twins: usize,
-    /// What was known before the search.
+    /// Identifiability before the search.
     pub gate: Identifiability,
-    /// Where the local searches ended, the lowest cost first.
+    /// Ends of the local searches in ascending order of cost.
     pub waterfall: Vec<LocalOptimum>,
-    /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` where there is
-    /// none.
+    /// `d ln feature / d ln parameter` at the estimates, by feature and parameter; `None` where it is undefined.
     pub sensitivities: BTreeMap<String, BTreeMap<String, Option<f64>>>,
     /// Evaluations of the model.
     pub evaluations: EvaluationCounts,
-    /// Whether a recording that was fitted is synthetic.
+    /// Whether a fitted recording is synthetic.
     pub synthetic: bool,
-    /// What a reader has to know, in sentences.
+    /// Sentences for the reader.
     pub notes: Vec<String>,
     /// Seed of the search.
     pub seed: u64,
-    /// SHA-256 over problem, data and version of the program, in hexadecimal.
+    /// SHA-256 of problem, data and version of the program, in hexadecimal.
     pub fingerprint: String,
     /// Version of the program.
     pub version: String,
 }
 
-/// Why a result was refused.
+/// A file that is not a valid result.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("{file}: not the result of a fit: {problem}; run `wiperlab fit` again")]
 pub struct ResultError {
@@ -300,17 +295,17 @@ pub struct ResultError {
 }
 
 impl FitResult {
-    /// The text of `result.json`; keys in a fixed order, the last one the hash of the text itself.
+    /// The text of `result.json`. Keys have a fixed order; the last one is the hash of the text.
     #[must_use]
     pub fn to_json(&self) -> String {
-        // string keys only and `null` for numbers that are not finite: the writer has nothing to refuse
+        // serialisation cannot fail: keys are strings, and numbers that are not finite become `null`
         append_hash(&serde_json::to_string_pretty(self).unwrap_or_default())
     }
 
-    /// Reads a `result.json`; `file` is its name in refusals.
+    /// Reads a `result.json`; `file` is its name in error messages.
     ///
     /// # Errors
-    /// [`ResultError`] with the place of the problem, or that the text is not what its hash says.
+    /// [`ResultError`] with the place of a syntax error, or if the hash does not match the text.
     pub fn parse(file: &str, text: &str) -> Result<Self, ResultError> {
         let refused = |problem| ResultError { file: file.to_owned(), problem };
         let result = serde_json::from_str(text).map_err(|e| refused(e.to_string()))?;
@@ -330,8 +325,8 @@ impl FitResult {
         self.components.iter().all(|component| component.pass)
     }
 
-    /// Whether the model explains the recordings. Features alone speak against it where they need a camera
-    /// that is far from its prior.
+    /// Whether the model explains the recordings. In a fit of features, a camera far from its prior is evidence
+    /// against the model.
     #[must_use]
     pub fn explains_recordings(&self) -> bool {
         match &self.misfit {
@@ -341,26 +336,26 @@ impl FitResult {
     }
 }
 
-// The hash that a result carries of itself: a digit that changes by accident is found whatever it means.
+// A result carries the hash of its own text, which reveals any accidental change.
 
-/// The key, which is the last one of the file.
+/// Last key of the file.
 const HASH_KEY: &str = "\n  \"sha256\": \"";
 const HASH_DIGITS: usize = 64;
-/// Digits of a hash in a refusal.
+/// Digits of a hash in an error message.
 const SHORT_HASH_DIGITS: usize = 12;
 
-/// A pretty-printed JSON object with the hash of itself as its last key: SHA-256 of the whole text with zeros
-/// for the digits of the hash.
+/// Appends the hash of a pretty-printed JSON object as its last key: the SHA-256 of the whole text with zeros in
+/// place of the digits of the hash.
 pub(super) fn append_hash(object: &str) -> String {
     let open = object.trim_end().trim_end_matches('}').trim_end();
     let with = |digits: &str| format!("{open},{HASH_KEY}{digits}\"\n}}\n");
-    with(&text_sha256(with(&zero_digits())))
+    with(&text_sha256(with(&"0".repeat(HASH_DIGITS))))
 }
 
-/// Holds a text against the hash of itself that it carries.
+/// Checks the hash that a text carries.
 ///
 /// # Errors
-/// What is wrong.
+/// A description of the mismatch.
 pub(super) fn check_hash(text: &str) -> Result<(), String> {
     let line_feeds = text.replace("\r\n", "\n");
     let Some(at) = line_feeds.rfind(HASH_KEY) else {
@@ -368,20 +363,15 @@ pub(super) fn check_hash(text: &str) -> Result<(), String> {
     };
     let (before, rest) = line_feeds.split_at(at + HASH_KEY.len());
     let (carried, after) = rest.split_once('"').unwrap_or((rest, ""));
-    let found = text_sha256(format!("{before}{}\"{after}", zero_digits()));
+    let found = text_sha256(format!("{before}{}\"{after}", "0".repeat(HASH_DIGITS)));
     if found == carried {
         return Ok(());
     }
-    let short = |hash: &str| hash.chars().take(SHORT_HASH_DIGITS).collect::<String>();
+    let [found, carried] =
+        [&found, carried].map(|hash| hash.chars().take(SHORT_HASH_DIGITS).collect::<String>());
     Err(format!(
-        "found SHA-256 {}..., expected {}... as its last key says: the file was changed after the fit wrote it",
-        short(&found),
-        short(carried)
+        "found SHA-256 {found}..., expected {carried}... as its last key says: the file was changed after the fit wrote it"
     ))
-}
-
-fn zero_digits() -> String {
-    "0".repeat(HASH_DIGITS)
 }
 
 #[cfg(test)]

@@ -18,41 +18,40 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use std::f64::consts::TAU;
 
-/// Right-hand sides after which an evaluation is given up: some hundred times what a reversal costs, a few
-/// seconds.
+/// Most evaluations of the right-hand side in a run: a hundred times the cost of a reversal, a few seconds.
 const MAX_EVALUATIONS: u64 = 20_000_000;
 
-/// Tolerance of the model's runs: features are read to about 1e-3, and at 1e-6 the transitions are those of
-/// 1e-8 and finer.
+/// Relative tolerance of the model's runs. Features are measured to 1e-3, and the transitions at 1e-6 are those
+/// at 1e-8.
 const TOLERANCE: f64 = 1e-6;
-/// An angle that a spread of starting states refers to where the blade starts upright, rad: blades in use
-/// lean by 0.1 to 1.
+/// Reference angle of a spread of starting states where the blade starts upright, rad: a blade in use leans by
+/// 0.1 to 1 rad.
 const REFERENCE_LEAN_RAD: f64 = 0.1;
-/// Far apart, so that the noise of one condition is not that of another with the next seed.
+/// Distance between the seeds of two conditions, so that they never share noise.
 const CONDITION_SEEDS: u64 = 1 << 32;
 
-/// How a recording was seen: its camera and the noise of its tracking.
+/// The camera of a recording and the noise of its tracking.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Instrument {
     /// The camera.
     pub camera: Camera,
-    /// Standard deviation of a tracked coordinate, m; the model gets as much, because noise shifts what is
-    /// read (when a tip is seen to leave its place, the power in a band).
+    /// Standard deviation of a tracked coordinate, m. It is added to the model too, because noise biases features
+    /// such as the time of release or the power in a band.
     pub noise_m: f64,
-    /// Share of the frames in which a point was lost; only twins lose as many.
+    /// Fraction of frames in which a point is lost; only twins lose points.
     pub dropout_fraction: f64,
 }
 
-/// A scene and how it was seen.
+/// A scene with its camera.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ModelCondition {
-    /// The scene, with what this condition sets.
+    /// The scene, with the values that the condition sets.
     pub scene: Scene,
-    /// How it was seen.
+    /// Camera and tracking noise.
     pub instrument: Instrument,
 }
 
-/// Which blades count.
+/// Spread of the starting states, and limits of plausible motion.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PlausibilityLimits {
     /// Relative spread of the starting states.
@@ -75,7 +74,7 @@ impl SceneModel {
         Self { conditions, names, plausible }
     }
 
-    /// The same for other conditions.
+    /// A model with other conditions.
     pub(super) fn with_conditions(&self, conditions: Vec<ModelCondition>) -> Self {
         Self { conditions, names: self.names.clone(), plausible: self.plausible }
     }
@@ -87,19 +86,16 @@ impl SceneModel {
     /// The scene of a condition with these values of the free parameters.
     ///
     /// # Errors
-    /// The scene's refusal, as a failure of the run.
+    /// [`RunFailure`] if the scene refuses a value.
     pub(crate) fn scene_at(&self, values: &[f64], condition: usize) -> Result<Scene, RunFailure> {
         let scene = self.condition(condition)?.scene.clone();
         let set = |scene: Scene, (name, value): (&String, &f64)| scene.with_parameter(name, *value);
-        self.names
-            .iter()
-            .zip(values)
-            .try_fold(scene, set)
-            .map_err(|error| RunFailure::new(FailureReason::Refused, error.to_string(), 0.0))
+        let scene = self.names.iter().zip(values).try_fold(scene, set);
+        scene.map_err(|error| RunFailure::new(FailureReason::Refused, error.to_string(), 0.0))
     }
 
-    /// What a condition's camera records of a scene at the tolerance of the scene itself, without tracking
-    /// noise and however the run ends; `observer` follows the same run.
+    /// The recording of a scene by the camera of a condition, at the tolerance of the scene, without tracking
+    /// noise and whatever the end of the run; `observer` follows the run.
     ///
     /// # Errors
     /// [`RunFailure`] when fewer than two frames were taken.
@@ -111,41 +107,36 @@ impl SceneModel {
     ) -> Result<TwinView, RunFailure> {
         let (camera, span) =
             (&self.condition(condition)?.instrument.camera, [scene.start_s, scene.run.stop_s]);
-        film_scene_with_observer(
-            scene,
-            camera,
-            span,
-            SolverOptions::new(scene.run.relative_tolerance),
-            observer,
-        )
-        .map_err(|error| view_failure(scene, &error))
+        let options = SolverOptions::new(scene.run.relative_tolerance);
+        let seen = film_scene_with_observer(scene, camera, span, options, observer);
+        seen.map_err(|error| view_failure(scene, &error))
     }
 
     fn condition(&self, condition: usize) -> Result<&ModelCondition, RunFailure> {
         self.conditions.get(condition).ok_or_else(|| {
-            RunFailure::new(
-                FailureReason::Refused,
-                format!("there is no condition number {}", condition + 1),
-                0.0,
-            )
+            let message = format!("there is no condition number {}", condition + 1);
+            RunFailure::new(FailureReason::Refused, message, 0.0)
         })
     }
 
-    /// A run that ended as it should, recorded from `from_s` on without tracking noise.
+    /// The recording of a completed run from `from_s` on, without tracking noise.
     fn record_completed_run(
         &self,
         scene: &Scene,
         camera: &Camera,
         from_s: f64,
     ) -> Result<Recording, RunFailure> {
-        let span = [from_s, scene.run.stop_s];
+        let options = SolverOptions {
+            most_evaluations: MAX_EVALUATIONS,
+            ..SolverOptions::new(scene.run.relative_tolerance.max(TOLERANCE))
+        };
+        let failure = |error: TwinViewError| view_failure(scene, &error);
         let seen = match self.plausible.largest_tilt_rad {
-            None => film_scene(scene, camera, span[0], span[1], solver_effort(scene))
-                .map_err(|error| view_failure(scene, &error))?,
+            None => film_scene(scene, camera, from_s, scene.run.stop_s, options).map_err(failure)?,
             Some(largest_rad) => {
-                let mut tilt = LargestTilt::default();
-                let seen = film_scene_with_observer(scene, camera, span, solver_effort(scene), &mut tilt)
-                    .map_err(|error| view_failure(scene, &error))?;
+                let (mut tilt, span) = (LargestTilt::default(), [from_s, scene.run.stop_s]);
+                let seen = film_scene_with_observer(scene, camera, span, options, &mut tilt);
+                let seen = seen.map_err(failure)?;
                 check_tilt(scene, &tilt, largest_rad)?;
                 seen
             }
@@ -154,7 +145,7 @@ impl SceneModel {
         Ok(seen.recording)
     }
 
-    /// What a camera and its tracking make of a run.
+    /// The recording of a completed run with tracking noise.
     fn record_with_noise(
         &self,
         scene: &Scene,
@@ -172,7 +163,7 @@ impl SceneModel {
             .map_err(|error| RunFailure::new(FailureReason::NotFinite, error.to_string(), 1.0))
     }
 
-    /// The scene as it starts in a draw.
+    /// The scene with the starting state of ensemble member `member`.
     fn draw_start(&self, mut scene: Scene, member: u64) -> Scene {
         if member == 0 || self.plausible.spread == 0.0 {
             return scene;
@@ -244,7 +235,7 @@ impl Model for SceneModel {
     fn max_lead_s(&self, condition: usize) -> f64 {
         match self.conditions.get(condition).map(|condition| &condition.scene) {
             Some(Scene { drive: Drive::Recorded(head), start_s, .. }) => start_s - head.span_s()[0],
-            // a blade that starts in the air or in a stated pose is there at that time
+            // a start in the air or in a given pose has a fixed time
             Some(Scene { start: StartKind::Airborne(_) | StartKind::State(_), .. }) => 0.0,
             _ => f64::INFINITY,
         }
@@ -263,25 +254,17 @@ fn start_pose(scene: &Scene) -> Option<Pose> {
     }
 }
 
-fn solver_effort(scene: &Scene) -> SolverOptions {
-    SolverOptions {
-        most_evaluations: MAX_EVALUATIONS,
-        ..SolverOptions::new(scene.run.relative_tolerance.max(TOLERANCE))
-    }
-}
-
 fn view_failure(scene: &Scene, error: &TwinViewError) -> RunFailure {
     match error {
-        TwinViewError::Early { status, stopped_at_s } => RunFailure::new(
-            FailureReason::Ended(*status),
-            error.to_string(),
-            run_progress(scene, *stopped_at_s),
-        ),
+        TwinViewError::Early { status, stopped_at_s } => {
+            let progress = run_progress(scene, *stopped_at_s);
+            RunFailure::new(FailureReason::Ended(*status), error.to_string(), progress)
+        }
         TwinViewError::Recording(_) => RunFailure::new(FailureReason::NotFinite, error.to_string(), 0.0),
     }
 }
 
-/// Share of the run that was reached.
+/// Fraction of the run up to a time.
 fn run_progress(scene: &Scene, time_s: f64) -> f64 {
     (time_s - scene.start_s) / (scene.run.stop_s - scene.start_s)
 }
@@ -299,14 +282,11 @@ fn check_tilt(scene: &Scene, tilt: &LargestTilt, largest_rad: f64) -> Result<(),
         return Ok(());
     }
     let (found, allowed) = (tilt.largest_rad.to_degrees(), largest_rad.to_degrees());
+    let at_s = tilt.at_s;
     let message = format!(
-        "a link leans by {found:.1} degrees at {} s, more than the {allowed:.1} that are plausible",
-        tilt.at_s
+        "a link leans by {found:.1} degrees at {at_s} s, more than the {allowed:.1} that are plausible"
     );
-    // the nearer to the limit, the better
-    Err(RunFailure::new(
-        FailureReason::Tilt,
-        message,
-        run_progress(scene, scene.run.stop_s) * largest_rad / tilt.largest_rad,
-    ))
+    // the cost falls towards the limit
+    let progress = run_progress(scene, scene.run.stop_s) * largest_rad / tilt.largest_rad;
+    Err(RunFailure::new(FailureReason::Tilt, message, progress))
 }

@@ -123,7 +123,6 @@ pub(crate) fn assess_best(
     settings: &IntervalSettings,
     polishing: usize,
 ) -> Option<FitUncertainty> {
-    let limit = ledger.evaluation_limit();
     for _ in 0..MAX_RESTARTS {
         let found = assess_once(ledger, names, settings)?;
         let better =
@@ -131,11 +130,17 @@ pub(crate) fn assess_best(
         if !better {
             return Some(found);
         }
-        ledger.set_limit(limit.min(ledger.run_evaluations().len().saturating_add(polishing)));
-        polish_best(ledger);
-        ledger.set_limit(limit);
+        polish_within(ledger, polishing);
     }
     assess_once(ledger, names, settings)
+}
+
+/// Polishes the best point with at most `evaluations` more.
+fn polish_within(ledger: &mut Ledger, evaluations: usize) {
+    let limit = ledger.evaluation_limit();
+    ledger.set_limit(limit.min(ledger.run_evaluations().len().saturating_add(evaluations)));
+    polish_best(ledger);
+    ledger.set_limit(limit);
 }
 
 fn assess_once(ledger: &mut Ledger, names: &[String], settings: &IntervalSettings) -> Option<FitUncertainty> {

@@ -1,10 +1,9 @@
-//! Free parameters of a job: bounds, and what is known before any recording is read.
+//! Free parameters and freed constants of a job: bounds and priors.
 
-use super::as_written::{self, ListedNuisance};
+use super::as_written::{self, JobNuisanceEntry, ListedNuisance};
 use super::{KeyRefusal, check_above_zero, find_repeated, is_same_quantity};
 use crate::fit::bounds::{Bounds, BoundsSpacing, Prior, SearchAxis};
 use crate::math;
-use crate::model::parameters::find_parameter;
 use crate::toml_file::suggest_key;
 use serde::Serialize;
 
@@ -15,7 +14,7 @@ pub struct FreeParameter {
     pub name: String,
     /// Its range, in its own SI unit.
     pub bounds: Bounds,
-    /// What is known of it beforehand.
+    /// Its prior.
     pub prior: Option<Prior>,
 }
 
@@ -33,10 +32,8 @@ pub(super) fn check_parameters(
     if written.is_empty() {
         refuse!("parameter", "found none, expected at least one [[parameter]] to fit");
     }
-    if let Some(name) = find_repeated(written.iter().map(|p| p.name.as_str())) {
-        refuse!(format!("parameter `{name}`"), "found twice; remove one of them");
-    }
-    check_quantities(written)?;
+    let names: Vec<&str> = written.iter().map(|p| p.name.as_str()).collect();
+    check_distinct("parameter", &names, "the parameter ")?;
     let check = |p: &as_written::JobParameterTable| {
         let key = format!("parameter `{}`", p.name);
         if !known.contains(&p.name.as_str()) {
@@ -49,16 +46,17 @@ pub(super) fn check_parameters(
     written.iter().map(check).collect()
 }
 
-/// Two parameters that set one quantity, such as a stiffness and its natural frequency, cannot both be free:
-/// the second would overwrite the first.
-fn check_quantities(written: &[as_written::JobParameterTable]) -> Result<(), KeyRefusal> {
-    let known: Vec<_> = written.iter().filter_map(|parameter| find_parameter(&parameter.name)).collect();
-    for (at, second) in known.iter().enumerate() {
-        if let Some(first) = known[..at].iter().find(|first| first.quantity == second.quantity) {
+/// Refuses entries that set the same quantity, such as a stiffness and its natural frequency: the second one
+/// would overwrite the first.
+fn check_distinct(table: &str, names: &[&str], article: &str) -> Result<(), KeyRefusal> {
+    if let Some(name) = find_repeated(names.iter().copied()) {
+        refuse!(format!("{table} `{name}`"), "found twice; remove one of them");
+    }
+    for (at, second) in names.iter().enumerate() {
+        if let Some(first) = names[..at].iter().find(|first| is_same_quantity(first, second)) {
             refuse!(
-                format!("parameter `{}`", second.name),
-                "sets the same quantity as the parameter `{}`; remove one of them",
-                first.name
+                format!("{table} `{second}`"),
+                "sets the same quantity as {article}`{first}`; remove one of them"
             );
         }
     }
@@ -98,26 +96,26 @@ fn check_prior(
     }
 }
 
-// Constants of the scene that are freed within a prior: nobody knows a mass or a damping exactly.
+// Constants of the scene that are freed within a prior, because a mass or a damping is never known exactly.
 
-/// Least standard deviation, %: below it a constant is better held.
+/// Least standard deviation of a constant, %: a more precise one is held instead.
 const LEAST_PERCENT: f64 = 1e-4;
-/// Largest, %: what is known no better is a parameter.
+/// Largest standard deviation of a constant, %: a less precise one is a parameter.
 const MOST_PERCENT: f64 = 50.0;
 
 /// Constants of the scene that are freed within a prior.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Constants {
-    /// None: they are taken as exact.
+    /// None: all constants are exact.
     Exact,
-    /// Every mass, inertia, stiffness, damping, preload and shoulder angle that a scene has, unlike zero, and
-    /// that is neither a free parameter nor set by a condition.
+    /// All masses, inertias, stiffnesses, dampings, preload and shoulder angle of a scene that are not zero and
+    /// neither free parameters nor set by a condition.
     All {
         /// Relative standard deviation of each.
         sd_relative: f64,
     },
-    /// Those of a list.
+    /// The constants of a list.
     Listed(Vec<NuisanceParameter>),
 }
 
@@ -131,17 +129,14 @@ pub struct NuisanceParameter {
 }
 
 impl Constants {
-    /// Whether all are taken as exact.
+    /// Whether all constants are exact.
     pub(crate) fn is_none(&self) -> bool {
         *self == Self::Exact
     }
 
-    /// Names that the job lists.
+    /// Names of the listed constants.
     pub(super) fn listed_names(&self) -> impl Iterator<Item = &str> {
-        let listed = match self {
-            Self::Listed(listed) => listed.as_slice(),
-            _ => &[],
-        };
+        let listed = if let Self::Listed(listed) = self { &listed[..] } else { &[] };
         listed.iter().map(|nuisance| nuisance.name.as_str())
     }
 }
@@ -158,37 +153,19 @@ pub(super) fn check_constants(
             "found without a [[trace]], expected one: a dozen features do not hold so many unknowns; add a [[trace]], or free single constants as [[parameter]] with a `prior`"
         );
     }
-    match nuisance {
-        as_written::JobNuisanceEntry::All(text) => {
-            Ok(Constants::All { sd_relative: parse_percentage("nuisance", text)? })
+    let list = match nuisance {
+        JobNuisanceEntry::All(text) => {
+            return Ok(Constants::All { sd_relative: parse_percentage("nuisance", text)? });
         }
-        as_written::JobNuisanceEntry::Listed(list) => {
-            Ok(Constants::Listed(check_listed_nuisances(list, free, known)?))
-        }
-    }
-}
-
-fn check_listed_nuisances(
-    list: &[ListedNuisance],
-    free: &[FreeParameter],
-    known: &[&str],
-) -> Result<Vec<NuisanceParameter>, KeyRefusal> {
+        JobNuisanceEntry::Listed(list) => list,
+    };
     if list.is_empty() {
         refuse!("nuisance", "found an empty list, expected names, or a percentage such as \"3 %\"");
     }
-    if let Some(name) = find_repeated(list.iter().map(|one| one.name.as_str())) {
-        refuse!(format!("nuisance `{name}`"), "found twice; remove one of them");
-    }
-    for (at, second) in list.iter().enumerate() {
-        if let Some(first) = list[..at].iter().find(|first| is_same_quantity(&first.name, &second.name)) {
-            refuse!(
-                format!("nuisance `{}`", second.name),
-                "sets the same quantity as `{}`; remove one of them",
-                first.name
-            );
-        }
-    }
-    list.iter().map(|one| check_nuisance(one, free, known)).collect()
+    let names: Vec<&str> = list.iter().map(|one| one.name.as_str()).collect();
+    check_distinct("nuisance", &names, "")?;
+    let listed = list.iter().map(|one| check_nuisance(one, free, known)).collect::<Result<_, _>>()?;
+    Ok(Constants::Listed(listed))
 }
 
 fn check_nuisance(
@@ -201,11 +178,8 @@ fn check_nuisance(
         refuse!(key, "not a parameter of a scene; {}", suggest_key(name, known));
     }
     if let Some(free) = free.iter().find(|free| is_same_quantity(&free.name, name)) {
-        refuse!(
-            key,
-            "the [[parameter]] `{}` is free already; give it a `prior`, and remove it here",
-            free.name
-        );
+        let free = &free.name;
+        refuse!(key, "the [[parameter]] `{free}` is free already; give it a `prior`, and remove it here");
     }
     let sd_relative = match (&written.sd, written.sd_relative) {
         (Some(text), None) => parse_percentage(&key, text)?,
@@ -215,16 +189,15 @@ fn check_nuisance(
     Ok(NuisanceParameter { name: name.clone(), sd_relative })
 }
 
-/// `3 %` as 0.03.
+/// Parses `3 %` as 0.03.
 fn parse_percentage(key: &str, text: &str) -> Result<f64, KeyRefusal> {
-    let number = text.trim().strip_suffix('%').and_then(|number| number.trim().parse::<f64>().ok());
-    let Some(percent) = number else {
-        refuse!(key, "found \"{text}\", expected a percentage such as \"3 %\"");
-    };
-    check_percentage(key, percent)
+    match text.trim().strip_suffix('%').and_then(|number| number.trim().parse().ok()) {
+        Some(percent) => check_percentage(key, percent),
+        None => refuse!(key, "found \"{text}\", expected a percentage such as \"3 %\""),
+    }
 }
 
-/// A percentage as a share.
+/// A percentage as a fraction.
 fn check_percentage(key: &str, percent: f64) -> Result<f64, KeyRefusal> {
     if (LEAST_PERCENT..=MOST_PERCENT).contains(&percent) {
         return Ok(percent / 100.0);

@@ -1,4 +1,4 @@
-//! Components and features of a job: what is read, and where its target comes from.
+//! Components and features of a job: readings and the sources of their targets.
 
 use super::as_written::ConditionReference;
 use super::conditions::JobCondition;
@@ -8,12 +8,11 @@ use crate::feature::{FREQUENCY_SD_FLOOR, Feature, Keys, Reading, ReadingKind, Va
 use crate::toml_file::suggest_key;
 use serde::Serialize;
 
-/// Standard deviation of the logarithm of a level of a log-spectrum unless the job says otherwise: a
-/// periodogram of a few resolutions scatters as much.
+/// Default standard deviation of the logarithm of a spectral level: the scatter of a periodogram over a few
+/// frequency resolutions.
 const LEVEL_SD_RELATIVE: f64 = 0.3;
 
-/// Relative error of a component's frequency that passes, unless the job says otherwise: the aim of this
-/// program, 2 %.
+/// Default tolerance of a component's frequency, relative: 2 % is the accuracy goal of this program.
 pub(super) const TOLERANCE_RELATIVE: f64 = 0.02;
 
 /// Components first, then features, in the order of the file; `nyquist_hz` is half the rate of the job's own
@@ -59,35 +58,26 @@ fn check_component(
     let name = check_non_empty("component, `name`", &written.name, "a name such as \"low\"")?;
     let (index, condition) = entry.find_condition(written.recording.as_ref(), conditions)?;
     let band = reading_entry(&entry, &written.reading_keys(), condition, nyquist_hz).parse_band()?;
-    let sd =
-        written.target_sd_hz.map(|sd| check_above_zero(entry.key_path("target_sd_hz"), sd)).transpose()?;
+    let positive = |key: &str, found| check_above_zero(entry.key_path(key), found);
+    let sd = written.target_sd_hz.map(|sd| positive("target_sd_hz", sd)).transpose()?;
     let source = match (written.target_hz, sd) {
-        (Some(target), Some(sd)) => entry.given_source(
-            check_above_zero(entry.key_path("target_hz"), target)?,
-            sd,
-            "target_sd_hz",
-            ValueComparison::Log,
-        )?,
+        (Some(target), Some(sd)) => {
+            entry.given_source(positive("target_hz", target)?, sd, "target_sd_hz", ValueComparison::Log)?
+        }
         (Some(_), None) => {
-            refuse!(
-                entry.key_path("target_sd_hz"),
-                "missing; a given `target_hz` needs its standard deviation"
-            );
+            let key = entry.key_path("target_sd_hz");
+            refuse!(key, "missing; a given `target_hz` needs its standard deviation")
         }
         (None, _) if condition.recording.is_none() => {
-            refuse!(
-                entry.key_path("target_hz"),
-                "missing; without a [[recording]] expected `target_hz` and `target_sd_hz`"
-            );
+            let key = entry.key_path("target_hz");
+            refuse!(key, "missing; without a [[recording]] expected `target_hz` and `target_sd_hz`")
         }
         (None, sd) => {
             TargetSource::Measured { least_sd: sd.unwrap_or(0.0), least_sd_relative: FREQUENCY_SD_FLOOR }
         }
     };
-    let tolerance = check_above_zero(
-        entry.key_path("tolerance_relative"),
-        written.tolerance_relative.unwrap_or(TOLERANCE_RELATIVE),
-    )?;
+    let tolerance = written.tolerance_relative.unwrap_or(TOLERANCE_RELATIVE);
+    let tolerance = positive("tolerance_relative", tolerance)?;
     let feature = Feature { name, reading: Reading::Frequency(band), condition: index };
     let (held_out, stage) = (condition.held_out, TargetStage::Always);
     Ok(FitTarget { feature, source, tolerance_relative: Some(tolerance), held_out, stage })
@@ -119,25 +109,28 @@ fn check_feature(
     readings.into_iter().map(aim).collect()
 }
 
-/// The kind of a feature that a recording shows; a frequency is a component of its own.
+/// The kind of a feature that a recording has; a frequency has to be a component.
 fn find_feature_kind(written: &as_written::Feature) -> Result<&'static ReadingKind, KeyRefusal> {
-    let problem = match ReadingKind::find(&written.kind) {
-        Ok(kind) if kind.is_of_run() => format!(
-            "found \"{}\", which only a simulated run shows; map it in a study, or remove it",
-            kind.word
-        ),
-        Ok(ReadingKind { word: "frequency", .. }) => {
-            "found \"frequency\", which is a [[component]] with a `tolerance_relative`; write it as one"
-                .to_owned()
+    let name = written.name.as_ref().map_or_else(String::new, |name| format!(" `{name}`"));
+    let key = format!("feature{name}, `kind`");
+    match ReadingKind::find(&written.kind) {
+        Ok(kind) if kind.is_of_run() => {
+            let word = kind.word;
+            refuse!(
+                key,
+                "found \"{word}\", which only a simulated run shows; map it in a study, or remove it"
+            )
         }
-        Ok(kind) => return Ok(kind),
-        Err(problem) => problem,
-    };
-    let key = written.name.as_ref().map_or_else(String::new, |name| format!(" `{name}`"));
-    refuse!(format!("feature{key}, `kind`"), "{problem}")
+        Ok(ReadingKind { word: "frequency", .. }) => refuse!(
+            key,
+            "found \"frequency\", which is a [[component]] with a `tolerance_relative`; write it as one"
+        ),
+        Ok(kind) => Ok(kind),
+        Err(problem) => refuse!(key, "{problem}"),
+    }
 }
 
-/// The features of a series have a target each, so that all of them have to be measured.
+/// Checks a series: each of its features has a target of its own, so that all of them have to be measured.
 fn check_series(entry: &JobEntry, written: &as_written::Feature, measured: bool) -> Result<(), KeyRefusal> {
     if !measured {
         refuse!(
@@ -154,7 +147,7 @@ fn check_series(entry: &JobEntry, written: &as_written::Feature, measured: bool)
     Ok(())
 }
 
-/// The part of an entry that says what is read.
+/// The keys of an entry that define its reading.
 fn reading_entry<'a>(
     entry: &'a JobEntry,
     keys: &'a Keys,
@@ -189,7 +182,7 @@ fn target_source(
     }
 }
 
-/// A share of the target, or of the scale of a value that may be zero.
+/// A least deviation relative to the target, or to the scale of a value that may be zero.
 fn measured_source(measure: ValueComparison, relative: f64) -> TargetSource {
     match measure {
         ValueComparison::Log => TargetSource::Measured { least_sd: 0.0, least_sd_relative: relative },
@@ -199,7 +192,7 @@ fn measured_source(measure: ValueComparison, relative: f64) -> TargetSource {
     }
 }
 
-/// What a reading is known to at best, where the job does not say: the rest is the recording's own noise.
+/// Default least relative deviation of a reading; 0 where only the noise of the recording counts.
 fn default_min_sd_relative(reading: &Reading) -> f64 {
     match reading {
         Reading::Frequency(_) | Reading::CycleFrequency { .. } => FREQUENCY_SD_FLOOR,
@@ -208,34 +201,31 @@ fn default_min_sd_relative(reading: &Reading) -> f64 {
     }
 }
 
-// What is fitted: a feature, and where its target comes from.
-
-/// A feature and where its target comes from.
+/// A feature and the source of its target.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct FitTarget {
-    /// What is read from measurement and model alike.
+    /// Feature that is read from measurement and model.
     pub feature: Feature,
-    /// Where target and standard deviation come from.
+    /// Source of target and standard deviation.
     pub source: TargetSource,
-    /// Relative error that passes, for a component; `None` for any other feature.
+    /// Tolerance of the relative error of a component; `None` for any other feature.
     pub tolerance_relative: Option<f64>,
     /// Whether it is only predicted, never fitted.
     pub held_out: bool,
-    /// From when on it counts.
+    /// Stages of the search in which it counts.
     pub stage: TargetStage,
 }
 
 /// Stages of a search in which an aim counts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum TargetStage {
-    /// In all of them.
+    /// All stages.
     Always,
-    /// In the last stage alone: the lines of a log-spectrum have many minima, and help only near the right
-    /// one.
+    /// The last stage only: the cost of spectral levels has many minima and helps only near the right one.
     Last,
 }
 
-/// Where a target comes from.
+/// Source of a target.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub enum TargetSource {
     /// Given in the job, in the feature's unit.
@@ -245,23 +235,21 @@ pub enum TargetSource {
         /// Its standard deviation.
         sd: f64,
     },
-    /// Measured on the recording; its standard deviation is at least `least_sd` and `least_sd_relative` times
-    /// its size, and where both are 0 that of the recording's own noise.
+    /// Measured on the recording. The standard deviation is at least `least_sd` and `least_sd_relative` times the
+    /// target; where both are 0 it is that of the recording's noise.
     Measured {
-        /// In the feature's unit.
+        /// Least standard deviation in the feature's unit.
         least_sd: f64,
-        /// As a share of the target.
+        /// Least standard deviation as a fraction of the target.
         least_sd_relative: f64,
     },
 }
 
-// One component or feature of a job: its keys, checked one by one.
-
-/// Least standard deviation relative to a target: beyond what any camera gives, and far from overflow of a
-/// squared residual.
+/// Least standard deviation relative to a target: better than any camera, and far from an overflow of squared
+/// residuals.
 const MIN_SD_RELATIVE: f64 = 1e-9;
 
-/// A component or feature, for messages.
+/// An entry of a job, by its name in error messages.
 pub(super) struct JobEntry {
     pub(super) what: String,
 }
@@ -279,15 +267,13 @@ impl JobEntry {
         measure: ValueComparison,
     ) -> Result<TargetSource, KeyRefusal> {
         let least = match measure {
-            ValueComparison::Log if !(target.is_finite() && target != 0.0) => {
-                refuse!(
-                    self.key_path("target"),
-                    "found {target}, expected a finite number that is not 0 (residuals are logarithms)"
-                );
-            }
+            ValueComparison::Log if !(target.is_finite() && target != 0.0) => refuse!(
+                self.key_path("target"),
+                "found {target}, expected a finite number that is not 0 (residuals are logarithms)"
+            ),
             ValueComparison::Log => MIN_SD_RELATIVE * target.abs(),
             ValueComparison::Linear { .. } if !target.is_finite() => {
-                refuse!(self.key_path("target"), "found {target}, expected a finite number");
+                refuse!(self.key_path("target"), "found {target}, expected a finite number")
             }
             ValueComparison::Linear { scale } => MIN_SD_RELATIVE * scale,
         };
@@ -318,22 +304,19 @@ impl JobEntry {
         let index = match which {
             None => 0,
             Some(ConditionReference::Number(number)) if (1..=most).contains(number) => number - 1,
-            Some(ConditionReference::Number(number)) => {
-                refuse!(
-                    key,
-                    "found {number}, expected 1 to {most}: recordings, then conditions, are counted from 1 in the order of the file"
-                );
-            }
+            Some(ConditionReference::Number(number)) => refuse!(
+                key,
+                "found {number}, expected 1 to {most}: recordings, then conditions, are counted from 1 in the order of the file"
+            ),
             Some(ConditionReference::Name(name)) => {
                 let names: Vec<&str> = conditions.iter().map(|c| c.name.as_str()).collect();
-                let Some(at) = conditions.iter().position(|c| c.name == *name) else {
-                    refuse!(
-                        key,
-                        "no recording or condition is called `{name}`; {}",
-                        suggest_key(name, &names)
-                    )
-                };
-                at
+                match names.iter().position(|known| known == name) {
+                    Some(at) => at,
+                    None => {
+                        let nearest = suggest_key(name, &names);
+                        refuse!(key, "no recording or condition is called `{name}`; {nearest}")
+                    }
+                }
             }
         };
         Ok((index, &conditions[index]))

@@ -1,34 +1,26 @@
-//! Whether a result is one of a job: a file that was edited or mixed up would otherwise put numbers to
-//! names that they do not belong to.
+//! Checks that a result belongs to a job: an edited or exchanged file would assign numbers to wrong names.
 
 use super::{FitResult, ParameterResult, ResultError};
 use crate::fit::job::{FreeParameter, Job};
 use std::collections::BTreeSet;
 
-/// An estimate at a bound has been through a logarithm and back, which costs a few units in the last place;
-/// relative.
+/// Relative rounding error of an estimate at a bound, by a logarithm and its inverse.
 const BOUND_ROUNDING: f64 = 1e-12;
 
 impl FitResult {
-    /// Holds the result against the job that it is said to be of: the same parameters within their bounds,
-    /// intervals whose ends are in order, the same components and features, deviations that are not negative.
-    /// `file` is its name in refusals.
+    /// Checks the result against its job: the same parameters within their bounds, intervals with ordered ends,
+    /// the same components and features, no negative deviations. `file` is its name in error messages.
     ///
     /// # Errors
-    /// [`ResultError`] with the first key that does not fit.
+    /// [`ResultError`] with the first key that does not match.
     pub fn check_against_job(&self, job: &Job, file: &str) -> Result<(), ResultError> {
-        let problem = self
-            .name_mismatch(job)
-            .or_else(|| {
-                job.parameters
-                    .iter()
-                    .find_map(|free| parameter_problem(free, self.parameters.get(&free.name)?))
-            })
-            .or_else(|| self.negative_sd());
+        let parameter = |free: &FreeParameter| parameter_problem(free, self.parameters.get(&free.name)?);
+        let parameters = || job.parameters.iter().find_map(parameter);
+        let problem = self.name_mismatch(job).or_else(parameters).or_else(|| self.negative_sd());
         problem.map_or(Ok(()), |problem| Err(ResultError { file: file.to_owned(), problem }))
     }
 
-    /// A name that result or job alone has.
+    /// Describes a name that only the result or only the job has.
     fn name_mismatch(&self, job: &Job) -> Option<String> {
         let parameters: BTreeSet<&str> = job.parameters.iter().map(|p| p.name.as_str()).collect();
         let features = self.features.iter().chain(&self.held_out).map(|f| f.name.as_str());
@@ -39,7 +31,7 @@ impl FitResult {
             .or_else(|| set_difference("components, features and held_out", &read, &asked))
     }
 
-    /// A standard deviation below zero.
+    /// Describes a standard deviation below zero.
     fn negative_sd(&self) -> Option<String> {
         let components = self.components.iter().map(|c| ("components", &c.name, c.target_sd_hz));
         let features = self.features.iter().chain(&self.held_out).map(|f| ("features", &f.name, f.target_sd));
@@ -49,17 +41,14 @@ impl FitResult {
 }
 
 fn set_difference(key: &str, found: &BTreeSet<&str>, expected: &BTreeSet<&str>) -> Option<String> {
-    let missing =
-        expected.difference(found).next().map(|name| format!("{key}: found no `{name}`, which the job has"));
-    missing.or_else(|| {
-        found
-            .difference(expected)
-            .next()
-            .map(|name| format!("{key}: found `{name}`, which the job does not have"))
-    })
+    if let Some(name) = expected.difference(found).next() {
+        return Some(format!("{key}: found no `{name}`, which the job has"));
+    }
+    let name = found.difference(expected).next()?;
+    Some(format!("{key}: found `{name}`, which the job does not have"))
 }
 
-/// What cannot be of a parameter's numbers.
+/// Describes a contradiction between the numbers of a parameter.
 fn parameter_problem(free: &FreeParameter, found: &ParameterResult) -> Option<String> {
     let (name, lower, upper) = (&free.name, free.bounds.lower(), free.bounds.upper());
     let reach = (lower - BOUND_ROUNDING * lower.abs())..=(upper + BOUND_ROUNDING * upper.abs());
@@ -69,17 +58,14 @@ fn parameter_problem(free: &FreeParameter, found: &ParameterResult) -> Option<St
             found.estimate
         ));
     }
-    let ends = [
+    let intervals = [
         ("lower_95 and upper_95", found.lower_95.zip(found.upper_95)),
         ("profile_95", found.profile_95[0].zip(found.profile_95[1])),
+        ("linear_95", found.linear_95.map(Into::into)),
+        ("bootstrap_95", found.bootstrap_95.map(Into::into)),
     ];
-    let pair = |ends: [f64; 2]| (ends[0], ends[1]);
-    let more = [("linear_95", found.linear_95.map(pair)), ("bootstrap_95", found.bootstrap_95.map(pair))];
-    let (key, (low, high)) = ends
-        .into_iter()
-        .chain(more)
-        .filter_map(|(key, ends)| Some((key, ends?)))
-        .find(|(_, (low, high))| low > high)?;
+    let mut known = intervals.into_iter().filter_map(|(key, ends)| Some((key, ends?)));
+    let (key, (low, high)) = known.find(|(_, (low, high))| low > high)?;
     Some(format!("parameters, `{name}`, {key}: found {low} to {high}, expected the lower end first"))
 }
 

@@ -1,34 +1,33 @@
-//! Whether other values of a parameter that is about to be called identified are as good, looked for over its
-//! whole range.
+//! Searches the whole range of every identified parameter for other values that are as good.
 //!
-//! Slopes and profiles say what is known near the best point. A dozen features of one run make a cost with
-//! many minima, and two frequencies may be met as well by a neck twice as stiff. So each parameter has to
-//! stand a search of its own below its interval and another above it, with other seeds than the first search.
+//! Slopes and profiles describe the cost near the best point. The cost of a dozen features of one run has many
+//! minima: a neck of twice the stiffness may give the same two frequencies. Each identified parameter therefore
+//! has a search below its interval and another one above it, with other seeds than the first search.
 
-use super::{FitUncertainty, MAX_RESTARTS, ParameterVerdict, assess_best};
+use super::{FitUncertainty, MAX_RESTARTS, ParameterVerdict, assess_best, polish_within};
 use crate::fit::job::IntervalSettings;
 use crate::fit::ledger::Ledger;
 use crate::fit::linear_model::CHI_SQUARED_95;
-use crate::fit::search::SearchSettings;
-use crate::fit::search::{MIN_WORTHWHILE_GAIN, Slab, best_in_slab, polish_best, search_excluded_region};
+use crate::fit::search::{MIN_WORTHWHILE_GAIN, SearchSettings, Slab};
+use crate::fit::search::{best_in_slab, search_excluded_region};
 use crate::text::format_number;
 
-/// A value this many times as far from the best one as the interval reaches is another one. Where the cost is
-/// a parabola it has risen by 15 there.
+/// Distance of a rival value from the best one, in half-widths of the interval. A parabolic cost has risen by
+/// 15 there.
 const DISTANCE_FACTOR: f64 = 2.0;
-/// Rise in cost, so far away, below which other values are not excluded. Chi-squared of one degree of freedom
-/// that one in a thousand exceeds: 10.8. It is more than the 3.84 of an interval, because a search rarely
-/// comes to the very minimum of another valley of a rough cost.
+/// Rise in cost below which a rival value is not excluded: the 99.9 % point of chi-squared with one degree of
+/// freedom. It exceeds the 3.84 of an interval because a search rarely reaches the exact minimum of another
+/// valley of a rough cost.
 const MIN_RIVAL_RISE: f64 = 10.8;
-/// A range narrower than this, in the unit box, is not searched: profiles have come so near.
+/// Narrowest range that is searched, in the unit box: profiles cover narrower ones.
 const MIN_SLAB_WIDTH: f64 = 0.02;
-/// Share of an interval from which on a gap in it makes it two.
+/// Fraction of an interval from which a gap splits it in two.
 const MIN_GAP_SHARE: f64 = 0.5;
-/// Evaluations of all these searches together, as a share of those of the search itself.
+/// Evaluations of all these searches together as a fraction of the budget of the first search.
 const EVALUATION_SHARE: f64 = 0.5;
 
-/// What was found, where nothing stays identified that a search elsewhere contradicts. A better point that is
-/// met on the way is polished and assessed instead.
+/// Withdraws the verdict of identified parameters that have a rival value. If a search finds a better point,
+/// that point is polished and assessed instead.
 pub(crate) fn confirm_identified(
     ledger: &mut Ledger,
     names: &[String],
@@ -42,12 +41,7 @@ pub(crate) fn confirm_identified(
             return withdraw_rivalled(found, ledger, names, complete);
         }
         if gain > MIN_WORTHWHILE_GAIN {
-            let limit = ledger.evaluation_limit();
-            ledger.set_limit(
-                limit.min(ledger.run_evaluations().len().saturating_add(settings.local_evaluations)),
-            );
-            polish_best(ledger);
-            ledger.set_limit(limit);
+            polish_within(ledger, settings.local_evaluations);
         }
         let Some(again) = assess_best(ledger, names, intervals, settings.local_evaluations) else { break };
         found = again;
@@ -55,7 +49,7 @@ pub(crate) fn confirm_identified(
     withdraw_rivalled(found, ledger, names, false)
 }
 
-/// Whether a point as good as the best lies outside the interval of an identified parameter.
+/// Whether a point within the threshold lies outside the interval of an identified parameter.
 fn has_point_outside(found: &FitUncertainty, ledger: &Ledger) -> bool {
     let limit = found.best.cost + CHI_SQUARED_95;
     excluded_slabs(found, ledger, 1.0).into_iter().any(|slab| {
@@ -63,7 +57,8 @@ fn has_point_outside(found: &FitUncertainty, ledger: &Ledger) -> bool {
     })
 }
 
-/// The ranges below and above each identified parameter, from so many times as far as its interval reaches.
+/// The ranges below and above each identified parameter that are farther from the best point than `times` the
+/// interval.
 fn excluded_slabs(found: &FitUncertainty, ledger: &Ledger, times: f64) -> Vec<Slab> {
     let axes = ledger.objective().axes().iter().zip(&found.best.unit).zip(&found.intervals);
     let sides =
@@ -97,51 +92,39 @@ fn withdraw_rivalled(
         let (Some(rival), Some(name)) = (rival, names.get(slab.axis)) else { continue };
         let Some(interval) = found.intervals.get_mut(slab.axis) else { continue };
         let there = rival.values.get(slab.axis).copied().unwrap_or(f64::NAN);
-        interval.withdraw_verdict(format!(
-            "another search meets the features about as well at {}",
-            format_number(there)
-        ));
+        let (at, best) = (format_number(there), format_number(interval.estimate));
+        interval.withdraw_verdict(format!("another search meets the features about as well at {at}"));
         if rival.cost <= found.best.cost + CHI_SQUARED_95 {
             interval.lower_95 = interval.lower_95.map(|lower| lower.min(there));
             interval.upper_95 = interval.upper_95.map(|upper| upper.max(there));
         }
         found.notes.push(format!(
             "{name} is not called identified: a second search, away from the best point, meets the features \
-             about as well at {} as at {} (cost {:.1} against {:.1}; {MIN_RIVAL_RISE} more would exclude it); \
+             about as well at {at} as at {best} (cost {:.1} against {:.1}; {MIN_RIVAL_RISE} more would exclude it); \
              add features that distinguish the two, such as release-after-reversal, mean-deflection or rms",
-            format_number(there),
-            format_number(interval.estimate),
-            rival.cost,
-            found.best.cost
+            rival.cost, found.best.cost
         ));
     }
     for axis in 0..names.len() {
         withdraw_split_interval(&mut found, ledger, names, axis);
     }
-    if !complete && found.intervals.iter().any(|i| i.verdict == ParameterVerdict::Identified) {
-        for interval in found.intervals.iter_mut().filter(|i| i.verdict == ParameterVerdict::Identified) {
-            interval.withdraw_verdict(
-                "the searches for other values as good had not come to their end".to_owned(),
-            );
+    if !complete {
+        let why = "the searches for other values as good had not come to their end";
+        let identified = found.intervals.iter_mut().filter(|i| i.verdict == ParameterVerdict::Identified);
+        if identified.map(|interval| interval.withdraw_verdict(why.to_owned())).count() > 0 {
+            found.notes.push(UNCONFIRMED.to_owned());
         }
-        found.notes.push(UNCONFIRMED.to_owned());
     }
     found
 }
 
-/// Bars a parameter whose interval is two: values as good as the best on both sides of a wide gap in which
-/// the profile has found none.
+/// Withdraws the verdict of a parameter whose interval is split: good values lie on both sides of a wide gap in
+/// which the profile exceeds the threshold.
 fn withdraw_split_interval(found: &mut FitUncertainty, ledger: &Ledger, names: &[String], axis: usize) {
-    let (Some(interval), Some(bounds)) =
-        (found.intervals.get_mut(axis), ledger.objective().axes().get(axis).map(|a| a.bounds))
-    else {
-        return;
-    };
-    let (Some(lower), Some(upper), ParameterVerdict::Identified) =
-        (interval.lower_95, interval.upper_95, interval.verdict)
-    else {
-        return;
-    };
+    let (interval, bounds) = (&mut found.intervals[axis], ledger.objective().axes()[axis].bounds);
+    let ends = interval.lower_95.zip(interval.upper_95);
+    let identified = interval.verdict == ParameterVerdict::Identified;
+    let Some((lower, upper)) = ends.filter(|_| identified) else { return };
     let limit = found.best.cost + CHI_SQUARED_95;
     let good = ledger.run_evaluations().iter().filter(|e| e.failure.is_none() && e.cost <= limit);
     let mut places: Vec<f64> = good.filter_map(|e| e.unit.get(axis).copied()).collect();
@@ -152,10 +135,8 @@ fn withdraw_split_interval(found: &mut FitUncertainty, ledger: &Ledger, names: &
         above.map(|(value, _)| bounds.to_unit(*value)).any(|u| from < u && u < to)
     };
     let gap = places.windows(2).find(|pair| pair[1] - pair[0] > wide && excluded(pair[0], pair[1]));
-    let Some([below, above]) = gap.map(|pair| [pair[0], pair[1]].map(|u| bounds.from_unit(u))) else {
-        return;
-    };
-    let [below, above] = [below, above].map(format_number);
+    let Some(gap) = gap else { return };
+    let [below, above] = [gap[0], gap[1]].map(|u| format_number(bounds.from_unit(u)));
     interval.withdraw_verdict(format!(
         "values up to {below} and from {above} on meet the features about as well"
     ));

@@ -1,4 +1,4 @@
-//! What a parameter at its bound does to the estimates of the others.
+//! Verdicts: the effect of parameters at their bounds, weights of the features, trust in the best point.
 
 use super::{ParameterResult, ParameterVerdict, interval_verdict};
 use crate::fit::evaluation::{Evaluation, EvaluationStage};
@@ -15,17 +15,17 @@ use crate::fit::targets::TargetValue;
 use crate::math;
 use nalgebra::DMatrix;
 
-/// Correlation from which on an estimate follows a parameter that its bound holds back. If the optimum of
-/// that parameter lies `k` of its deviations beyond the bound, the other estimate is off by `k` times the
-/// correlation in deviations of its own; at this one, ten are as much as half a 95 % interval.
+/// Least correlation at which a parameter at its bound makes another estimate unreliable. If the optimum lies
+/// `k` deviations beyond the bound, the other estimate is off by `k` times the correlation, in its own
+/// deviations; here ten deviations shift it by a half-width of its 95 % interval.
 const MIN_CORRELATION: f64 = 0.2;
 
-/// Whether a coordinate of the unit box is at one of its ends.
+/// Whether a coordinate of the unit box is at an end of the box.
 pub(super) fn is_at_bound(unit: f64) -> bool {
     !(AT_BOUND..=1.0 - AT_BOUND).contains(&unit)
 }
 
-/// The parameter at its bound that an estimate follows most, and their correlation.
+/// The parameter at its bound with the strongest correlation to an estimate, and that correlation.
 pub(super) fn strongest_bound_correlation(
     axis: usize,
     unit: &[f64],
@@ -37,8 +37,8 @@ pub(super) fn strongest_bound_correlation(
         .max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()))
 }
 
-/// The parameter at its bound of which a value beyond would gain most, and that gain in cost by the linear
-/// model; `None` where none gains more than is worth a step.
+/// The parameter at its bound whose optimum beyond the bound lowers the cost most, and that gain by the linear
+/// model; `None` if no gain is worth a step.
 pub(super) fn best_excluded_gain(
     unit: &[f64],
     jacobian: &DMatrix<f64>,
@@ -55,33 +55,28 @@ pub(super) fn best_excluded_gain(
     gains.filter(|(_, gain)| *gain > MIN_WORTHWHILE_GAIN).max_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// Calls nothing identified where a bound excludes a better value, and says so.
+/// Withdraws all verdicts because a bound excludes a better value; returns the note on it.
 pub(super) fn withdraw_all(
     intervals: &mut [ParameterResult],
     names: &[String],
-    excluding: (usize, f64),
-) -> Vec<String> {
-    let (held, gain) = excluding;
-    let mut barred = Vec::new();
+    (held, gain): (usize, f64),
+) -> Option<String> {
+    let (held, mut barred) = (&names[held], Vec::new());
     for (interval, name) in intervals.iter_mut().zip(names) {
         if interval.verdict == ParameterVerdict::Identified {
-            interval
-                .withdraw_verdict(format!("{} is at its bound, which excludes a better value", names[held]));
+            interval.withdraw_verdict(format!("{held} is at its bound, which excludes a better value"));
             barred.push(name.as_str());
         }
     }
-    if barred.is_empty() {
-        return Vec::new();
-    }
-    let (barred, held) = (barred.join(", "), &names[held]);
-    vec![format!(
-        "nothing is called identified ({barred}): {held} is at its bound, and a value beyond the bound would \
+    let names = barred.join(", ");
+    (!barred.is_empty()).then(|| format!(
+        "nothing is called identified ({names}): {held} is at its bound, and a value beyond the bound would \
          meet the features better (the cost falls by about {gain:.2}), where the others are different; widen \
          the bounds of {held}"
-    )]
+    ))
 }
 
-/// Calls nothing identified that is correlated with a parameter at its bound, and says so.
+/// Withdraws the verdicts of parameters that are correlated with one at its bound; returns a note on each.
 pub(super) fn withdraw_correlated(
     intervals: &mut [ParameterResult],
     names: &[String],
@@ -105,33 +100,24 @@ pub(super) fn withdraw_correlated(
     notes
 }
 
-// How much the features count at the best point, and whether that point can be believed.
-
-/// How much each feature counts at the best point.
+/// Weights of the features at the best point.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct FeatureWeights {
-    /// Scatter of each feature, in its unit, that makes its deviation what the misfit and the model's
-    /// roughness there say.
+    /// Scatter of each feature, in its unit, that accounts for the misfit and for the roughness of the model.
     pub scatter: Vec<f64>,
-    /// Factor on all deviations because the features are missed by more than they explain (Birge, Phys. Rev.
-    /// 40 (1932) 207); at least 1.
+    /// Factor on all deviations that accounts for the misfit (Birge, Phys. Rev. 40 (1932) 207); at least 1.
     pub inflation: f64,
     /// The same scatter without that factor.
     pub roughness: Vec<f64>,
 }
 
-/// Weighs the features at the ledger's best point. `None` when the model failed there or its neighbours
-/// cannot be evaluated.
+/// Weighs the features at the ledger's best point; `None` if the model failed there or its neighbours cannot be
+/// evaluated.
 pub(crate) fn weigh_features(ledger: &mut Ledger) -> Option<FeatureWeights> {
     let best = ledger.best_evaluation().filter(|best| best.failure.is_none())?.clone();
-    let around: Vec<Evaluation> = ledger
-        .evaluate_points(EvaluationStage::Sensitivity, &difference_points(&best.unit))
-        .ok()?
-        .into_iter()
-        .cloned()
-        .collect();
     let targets = ledger.objective().targets();
-    let found = feature_scatter(targets, &best, &around.iter().collect::<Vec<_>>());
+    let around = ledger.evaluate_points(EvaluationStage::Sensitivity, &difference_points(&best.unit)).ok()?;
+    let found = feature_scatter(targets, &best, &around);
     let local: Vec<f64> =
         targets.iter().zip(found).map(|(target, found)| target.scatter.max(found.unwrap_or(0.0))).collect();
     let objective = ledger.objective().with_feature_scatter(&local);
@@ -147,9 +133,12 @@ pub(crate) fn weigh_features(ledger: &mut Ledger) -> Option<FeatureWeights> {
     })
 }
 
-/// Whether a best point can be believed: another local search came to it too, or nothing is left to gain
-/// there. Where one search alone was made, it is enough that the features are met within their deviations.
-/// `costs` are those of the local searches but for the last polish.
+/// Checks the best point: another local search has to reach it, unless the cost is zero there. After a single
+/// search it is enough that the features are met within their deviations. `costs` are those of the local
+/// searches without the last polish.
+///
+/// # Errors
+/// The note on a best point that is not confirmed.
 pub(super) fn check_best_point(
     objective: &Objective,
     best: &Evaluation,
@@ -173,8 +162,8 @@ pub(super) fn check_best_point(
     ))
 }
 
-/// Standard deviations of a normal variable that one in a thousand exceeds (for the cube root of chi-squared;
-/// Wilson and Hilferty, Proc. Natl. Acad. Sci. 17 (1931) 684).
+/// The 99.9 % point of the standard normal distribution, for the cube root of chi-squared (Wilson and Hilferty,
+/// Proc. Natl. Acad. Sci. 17 (1931) 684).
 const CHI2_TAIL_SD: f64 = 3.09;
 
 /// Sum of the squares of the residuals and its degrees of freedom.
@@ -184,20 +173,18 @@ fn squared_misfit(objective: &Objective, best: &Evaluation) -> (f64, f64) {
     (squares.iter().sum(), squares.len() as f64 - unknowns as f64)
 }
 
-/// Factor on the deviations of which the misfit would be one; at least 1.
+/// Factor on the deviations that makes the misfit per degree of freedom 1; at least 1.
 fn birge_factor(objective: &Objective, best: &Evaluation) -> f64 {
     let (misfit, freedom) = squared_misfit(objective, best);
     if freedom > 0.0 { (misfit / freedom).sqrt().max(1.0) } else { 1.0 }
 }
 
-// The verdicts that the numbers of a stored result deserve.
-
-/// One a parameter, in job order, by the same rules as in a fit; a parameter that the result does not have is
-/// not identified.
+/// The verdicts that follow from the numbers of a stored result of features, one per parameter in job order. A
+/// parameter that the result does not have is not identified.
 pub(in crate::fit) fn stored_verdicts(job: &Job, result: &FitResult) -> Vec<ParameterVerdict> {
     let names = job.parameter_names();
     let found = |axis: usize| result.parameters.get(&names[axis]);
-    // the linear model gives a correlation to every parameter that it determines, with itself too
+    // a parameter that the linear model determines has a correlation with itself
     let correlation = |a: usize, b: usize| result.correlations.get(&names[a])?.get(&names[b]).copied();
     let unit: Vec<f64> = (job.parameters.iter().enumerate())
         .map(|(axis, free)| found(axis).map_or(0.5, |p| free.bounds.to_unit(p.estimate)))
@@ -205,7 +192,7 @@ pub(in crate::fit) fn stored_verdicts(job: &Job, result: &FitResult) -> Vec<Para
     let of = |axis: usize| {
         let Some(p) = found(axis) else { return ParameterVerdict::NotIdentified };
         match interval_verdict(unit[axis], p.lower_95, p.upper_95, correlation(axis, axis).is_some()) {
-            // a search that had not come to its end identifies nothing
+            // an unfinished search identifies nothing
             _ if matches!(result.status, FitStatus::BudgetExhausted | FitStatus::Failed) => {
                 ParameterVerdict::NotIdentified
             }
