@@ -2,6 +2,7 @@ use super::*;
 use crate::checkpoint::{CheckpointError, format_header_line, format_record_line, read_checkpoint};
 use crate::feature::ValueComparison;
 use crate::fit::bounds::{Bounds, BoundsSpacing};
+use crate::fit::evaluation::FailureReason;
 use crate::fit::targets::TargetValue;
 use crate::simulate::RunStatus;
 
