@@ -9,17 +9,16 @@ pub mod summary;
 pub mod verdict;
 mod view_model;
 
-pub(crate) use summary::{ReportSummary, SummaryQuantity};
-pub(crate) use view_model::{
-    CombinationLine, FailureCount, ProbeLine, Provenance, RecordingLine, SearchLine, SourceFile,
-};
-
 use crate::compare::{Comparison, ComparisonSummary, ComparisonTable, ParameterLine, RunSummary};
 use crate::figures::FigureBlock;
 use crate::figures::friction::FrictionLine;
 use crate::fit::misfit::TraceMisfit;
 use crate::fit::result::NuisanceResult;
 use serde::Serialize;
+pub(crate) use summary::{ReportSummary, SummaryQuantity};
+pub(crate) use view_model::{
+    CombinationLine, FailureCount, ProbeLine, Provenance, RecordingLine, SearchLine, SourceFile,
+};
 
 /// What a report of one fit says. Sections without content are left out of the page.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]

@@ -1,12 +1,8 @@
 //! `wiperlab accuracy`.
 
-use super::args::GlobalArgs;
 use super::failure::describe_early_end;
-use super::failure::{CommandOutcome, Failure};
-use super::files;
-use super::files::{OutputCommand, OutputFolder, Overwrite, WritePolicy};
 use super::load::read_scene;
-use super::progress;
+use super::prelude::*;
 use crate::figures::work_precision::{WorkPrecision, WorkPrecisionRun, draw_figure};
 use crate::simulate::accuracy::{
     AccuracyRow, HIGH_COMPONENT, LOW_COMPONENT, REFERENCE_TOLERANCE, ReferenceRun, TOLERANCES, list_settings,
@@ -15,8 +11,6 @@ use crate::simulate::accuracy::{
 use crate::simulate::scene::Scene;
 use crate::simulate::{IntegrationMethod, RunStatus};
 use crate::text::format_digits;
-use clap::Args;
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 #[derive(Debug, Args)]
@@ -48,10 +42,9 @@ const ROUNDS: u32 = 15;
 const MIN_TIMING: (u32, Duration) = (3, Duration::from_millis(250));
 
 impl AccuracyArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let scene = read_scene(&self.scene)?;
-        let writer =
-            WritePolicy::new(OutputCommand::Accuracy, self.overwrite).with_csv_dialect(global.csv_dialect);
+        let writer = global.write_policy(OutputCommand::Accuracy, self.overwrite);
         OutputFolder::check(&self.out, &writer, &OUTPUTS)?;
         let settings = list_settings(&scene);
         let steps = settings.len() as u64 + u64::from(ROUNDS);
@@ -75,11 +68,7 @@ impl AccuracyArgs {
             print_study(&scene, &reference, &rows);
             print_line!("written to {}", self.out.display());
         }
-        Ok(if reference.run_result().status == RunStatus::Completed {
-            CommandOutcome::Done
-        } else {
-            CommandOutcome::StoppedEarly
-        })
+        Ok(CommandOutcome::done_if(reference.run_result().status == RunStatus::Completed))
     }
 }
 

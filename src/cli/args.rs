@@ -1,132 +1,10 @@
-//! The command line as typed; each command validates its own part in its own file.
+//! Options that several commands have.
 
-use super::failure::{CommandOutcome, Failure};
-use super::files::{CsvDialect, FileSize};
-use super::{
-    accuracy, blade, collect, demo, fit, help, import, init, inspect, modes, report, simulate, spectrum,
-    submit, sweep, twin,
-};
-use clap::{Args, CommandFactory, Parser, Subcommand};
+use super::failure::{Failure, Outcome};
+use super::files::{CsvDialect, FileSize, OutputCommand, Overwrite, WritePolicy};
+use clap::Args;
 use std::str::FromStr;
 use std::time::Duration;
-
-/// How the program was built.
-const LONG_VERSION: &str = concat!(
-    env!("CARGO_PKG_VERSION"),
-    "\nbuilt for ",
-    env!("WIPERLAB_BUILT_FOR"),
-    " at optimisation level ",
-    env!("WIPERLAB_OPT_LEVEL"),
-    "\nwith ",
-    env!("WIPERLAB_BUILT_WITH"),
-    "\ncommit ",
-    env!("WIPERLAB_BUILT_FROM"),
-);
-
-/// Holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
-#[derive(Debug, Parser)]
-#[command(
-    version,
-    long_version = LONG_VERSION,
-    about,
-    long_about = None,
-    propagate_version = true,
-    disable_help_subcommand = true,
-    after_help = help::list_help_pages()
-)]
-pub(crate) struct CommandLine {
-    #[command(flatten)]
-    pub global: GlobalArgs,
-    #[command(subcommand)]
-    pub command: Command,
-}
-
-#[derive(Debug, Subcommand)]
-pub(crate) enum Command {
-    /// Bundled recording -> import -> spectrum -> fit -> report
-    Demo(demo::DemoArgs),
-    /// Read a tracking export into data/NAME
-    Import(import::ImportArgs),
-    /// Write a first scene and a first job for a recording, with comments
-    Init(init::InitArgs),
-    /// Say what a recording holds and what it can show: rates, gaps, noise, doubts
-    Inspect(inspect::InspectArgs),
-    /// Components of a recording's spectrum
-    Spectrum(spectrum::SpectrumArgs),
-    /// Run the model of a scene
-    Simulate(simulate::SimulateArgs),
-    /// A scene's [blade] table from the section of a blade, or what ruler and scale show of a scene
-    ///
-    /// SECTION.toml has the length of the piece, density, modulus and loss factor of the rubber, heights and
-    /// thicknesses of neck and lip, and mass, stiffness and force of the head per metre. Prints the table
-    /// with the equation and the uncertainty of each number: an estimate for the start of a fit. With
-    /// --check, prints the natural frequencies, deflections and weights of a scene's blade.
-    Blade(blade::BladeArgs),
-    /// Natural frequencies and modes of a scene's blade
-    Modes(modes::ModesArgs),
-    /// Speed against error of every method on a scene
-    Accuracy(accuracy::AccuracyArgs),
-    /// A synthetic recording: a scene seen by a camera
-    Twin(twin::TwinArgs),
-    /// A parameter study: quantities over one or two parameters of a scene
-    Sweep(sweep::SweepArgs),
-    /// Divide a parameter study, or a list of fits, among the machines of a cluster
-    ///
-    /// Makes an array of tasks for the scheduler, each of which does a shard, and a job after them that puts
-    /// the shards together (`wiperlab collect`). All files are checked before anything is submitted. What is
-    /// missing in the end is named by that job, in DIR/shards/logs; submit those --tasks again.
-    Submit(submit::SubmitArgs),
-    /// Put the shards of a parameter study together, or see which fits of a list are done
-    ///
-    /// Writes the files that `wiperlab sweep` writes on one machine, byte for byte. Points that several
-    /// shards did count once. Of a list of fits, says which have a result. Exit code 3: something is missing,
-    /// and the tasks that have to be submitted again are named.
-    Collect(collect::CollectArgs),
-    /// Fit a scene's parameters to recordings or published components
-    ///
-    /// Every evaluation goes into journal.jsonl next to the job as it is made, and the result into
-    /// result.json at the end. A fit that was killed, or whose budgets in [search] were raised since, goes on
-    /// with
-    /// --resume and ends with the result that it would have had in one run. A fit without anything to learn
-    /// is refused before the search. Exit code 3: the evaluations allowed were used up before the search had
-    /// converged.
-    Fit(fit::FitArgs),
-    /// Figures and page of a fit
-    Report(report::ReportArgs),
-    /// What a shell completes, to standard output
-    Completions(help::CompletionsArgs),
-    /// The help of every command as manual pages
-    Man(help::ManArgs),
-    /// The help of a command, or a page about files, windows and features
-    Help(help::HelpArgs),
-}
-
-impl Command {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
-        match self {
-            Self::Demo(args) => args.run(global),
-            Self::Import(args) => args.run(global),
-            Self::Init(args) => args.run(global),
-            Self::Inspect(args) => args.run(global),
-            Self::Spectrum(args) => args.run(global),
-            Self::Simulate(args) => args.run(global),
-            Self::Blade(args) => args.run(global),
-            Self::Modes(args) => args.run(global),
-            Self::Accuracy(args) => args.run(global),
-            Self::Twin(args) => args.run(global),
-            Self::Sweep(args) => args.run(global),
-            Self::Submit(args) => args.run(global),
-            Self::Collect(args) => args.run(global),
-            Self::Fit(args) => args.run(global),
-            Self::Report(args) => args.run(global),
-            Self::Completions(args) => args.run(&mut CommandLine::command()),
-            Self::Man(args) => args.run(&mut CommandLine::command(), global),
-            Self::Help(args) => args.run(&mut CommandLine::command()),
-        }
-    }
-}
-
-// Options that count something.
 
 /// A whole number, 1 or more; [`clap`] names the option and what was found.
 pub(crate) fn parse_count(text: &str) -> Result<usize, String> {
@@ -166,10 +44,15 @@ fn parse_threads(text: &str) -> Result<usize, String> {
 
 impl GlobalArgs {
     /// Sets what holds for the whole program, before anything runs.
-    pub(crate) fn apply_settings(&self) -> Result<(), Failure> {
+    pub(crate) fn apply_settings(&self) -> Outcome<()> {
         self.max_file_size.set_read_limit();
         let Some(threads) = self.threads else { return Ok(()) };
         rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::internal)
+    }
+
+    /// What a command may overwrite, with its tables in the dialect that is asked for.
+    pub(crate) fn write_policy(&self, maker: OutputCommand, overwrite: Overwrite) -> WritePolicy {
+        WritePolicy { csv: self.csv_dialect, ..WritePolicy::new(maker, overwrite) }
     }
 }
 

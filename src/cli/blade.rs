@@ -1,17 +1,12 @@
 //! `wiperlab blade`.
 
-use super::args::GlobalArgs;
-use super::failure::{CommandOutcome, Failure};
-use super::files::{OutputCommand, Overwrite, WritePolicy};
 use super::load::{print_warnings, read_scene};
-use super::{files, output};
+use super::prelude::*;
 use crate::model::plausibility::PlausibilityFinding;
 use crate::model::section::{BladeEstimate, BladeSection};
 use crate::simulate::bench_checks::{BenchChecks, ChecksPerMetre, SteadySlipCheck};
 use crate::text::{format_short, to_ascii};
-use clap::Args;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(crate) struct BladeArgs {
@@ -55,7 +50,7 @@ struct BladeJson<T> {
 }
 
 impl BladeArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         match (&self.check, &self.section) {
             (Some(scene), _) => self.check_scene(scene, global)?,
             (None, Some(section)) => self.estimate_from_section(section, global)?,
@@ -64,7 +59,7 @@ impl BladeArgs {
         Ok(CommandOutcome::Done)
     }
 
-    fn estimate_from_section(&self, path: &Path, global: &GlobalArgs) -> Result<(), Failure> {
+    fn estimate_from_section(&self, path: &Path, global: &GlobalArgs) -> Outcome<()> {
         let text = files::read_toml(path)?;
         let section = BladeSection::parse(&path.display().to_string(), &text).map_err(Failure::input)?;
         let (estimate, findings) = (BladeEstimate::from_section(&section), section.find_implausible());
@@ -77,20 +72,20 @@ impl BladeArgs {
     }
 
     /// Writes the files, where a folder is given.
-    fn write_files(&self, answers: &[(&str, Vec<u8>)]) -> Result<(), Failure> {
+    fn write_files(&self, answers: &[(&str, Vec<u8>)]) -> Outcome<()> {
         let writer = WritePolicy::new(OutputCommand::Blade, self.overwrite);
         self.out.as_ref().map_or(Ok(()), |out| files::write_outputs(out, &writer, answers))
     }
 }
 
-fn to_json(computed: impl Serialize, findings: Vec<PlausibilityFinding>) -> Result<Vec<u8>, Failure> {
+fn to_json(computed: impl Serialize, findings: Vec<PlausibilityFinding>) -> Outcome<Vec<u8>> {
     serde_json::to_vec_pretty(&BladeJson { computed, findings }).map_err(Failure::internal)
 }
 
 // `wiperlab blade --check`: what one can check on a blade, as a table.
 
 impl BladeArgs {
-    pub(super) fn check_scene(&self, path: &Path, global: &GlobalArgs) -> Result<(), Failure> {
+    pub(super) fn check_scene(&self, path: &Path, global: &GlobalArgs) -> Outcome<()> {
         let scene = read_scene(path)?;
         let (checks, findings) =
             (BenchChecks::from_scene(&scene, self.force_n, self.length_m), scene.find_implausible());

@@ -3,15 +3,13 @@
 //! Every append waits until the disk has the lines (`fdatasync`), and a new file also until the disk has its
 //! name. What was counted or reported survives a power failure.
 
-use super::failure::Failure;
-use super::files;
+use super::prelude::*;
 use crate::checkpoint::{
     CheckpointEnd, CheckpointError, CheckpointFile, CheckpointHeader, CheckpointKind, CheckpointReader,
     CheckpointRecord, CheckpointSink, StoredRecord, detect_kind, has_whole_line,
 };
 use std::fs::{self, File, OpenOptions, TryLockError};
 use std::io::{self, BufRead, BufReader, ErrorKind, Read, Write};
-use std::path::{Path, PathBuf};
 
 /// Name of a journal in the folder of its fit or study.
 pub(crate) const CHECKPOINT_FILE: &str = "journal.jsonl";
@@ -30,7 +28,7 @@ pub(crate) struct CheckpointWriter {
 }
 
 /// A journal that is written, and what it holds if it is to be resumed.
-type OpenedCheckpoint<T> = Result<(CheckpointWriter, Option<T>), Failure>;
+type OpenedCheckpoint<T> = Outcome<(CheckpointWriter, Option<T>)>;
 
 /// What looks at the records of a journal, one by one.
 type RecordVisitor<'a, R> = dyn FnMut(StoredRecord<R>) -> Result<(), CheckpointError> + 'a;
@@ -79,7 +77,7 @@ impl CheckpointWriter {
     fn open_with<R: CheckpointRecord, T>(
         path: &Path,
         resume: bool,
-        take: impl FnOnce(&File, CheckpointReader<R, BufReader<&File>>) -> Result<(T, CheckpointEnd), Failure>,
+        take: impl FnOnce(&File, CheckpointReader<R, BufReader<&File>>) -> Outcome<(T, CheckpointEnd)>,
     ) -> OpenedCheckpoint<T> {
         let name = path.display().to_string();
         let mut opened = Self::open_locked(path, R::KIND)?;
@@ -107,7 +105,7 @@ impl CheckpointWriter {
         Ok((opened, Some(taken)))
     }
 
-    fn open_locked(path: &Path, kind: CheckpointKind) -> Result<Self, Failure> {
+    fn open_locked(path: &Path, kind: CheckpointKind) -> Outcome<Self> {
         let file = lock_existing(path, kind)?;
         Ok(Self { path: path.to_owned(), file, due: Some(PendingAction::SetAside), kind })
     }
@@ -134,7 +132,7 @@ impl CheckpointWriter {
     }
 
     /// Drops what is torn, also where nothing had to be appended.
-    pub(crate) fn finish(mut self) -> Result<(), Failure> {
+    pub(crate) fn finish(mut self) -> Outcome<()> {
         self.apply_pending()
             .map_err(|problem| Failure::Internal(format!("{}: {problem}", self.path.display())))
     }
@@ -192,8 +190,8 @@ fn sync_folder(folder: &Path) {
 }
 
 /// The file, if there is one.
-fn lock_existing(path: &Path, kind: CheckpointKind) -> Result<Option<File>, Failure> {
-    let refused = |problem: String| Failure::Input(format!("{}: {problem}", path.display()));
+fn lock_existing(path: &Path, kind: CheckpointKind) -> Outcome<Option<File>> {
+    let refused = |problem: String| Failure::at(path.display(), problem);
     let file = match OpenOptions::new().read(true).append(true).open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
@@ -223,7 +221,7 @@ fn lock_file(file: &File, kind: CheckpointKind) -> Result<(), String> {
 
 /// Only a journal of the same kind of input, or what is left of one, gives way to a new one: a job may turn
 /// from features to traces.
-fn check_same_kind(name: &str, bytes: &[u8], kind: CheckpointKind) -> Result<(), Failure> {
+fn check_same_kind(name: &str, bytes: &[u8], kind: CheckpointKind) -> Outcome<()> {
     if !has_whole_line(bytes) || detect_kind(bytes).is_some_and(|found| found.input() == kind.input()) {
         return Ok(());
     }

@@ -1,19 +1,15 @@
 //! `wiperlab collect`.
 
-use super::args::GlobalArgs;
-use super::failure::{CommandOutcome, Failure};
-use super::files::{OutputCommand, Overwrite, WritePolicy};
 use super::fit::{BatchJobState, check_distinct_folders};
-use super::load::LoadedJob as Fit;
+use super::job::LoadedJob as Fit;
 use super::load::is_study;
+use super::prelude::*;
 use super::shards::{SHARDS_FOLDER, shard_files, usual_shard_count};
 use super::submit::TaskList;
 use super::sweep::{LoadedStudy, find_study};
 use crate::checkpoint::Shard;
 use crate::sweep::PointCollection;
-use clap::Args;
 use std::fs::File;
-use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(crate) struct CollectArgs {
@@ -32,7 +28,7 @@ pub(crate) struct CollectArgs {
 }
 
 impl CollectArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         match self.paths.as_slice() {
             [dir] if !dir.is_file() => self.collect_study(dir, global),
             [file] => Err(one_file_failure(file)?),
@@ -41,12 +37,12 @@ impl CollectArgs {
     }
 
     /// Says which jobs of a list have no result.
-    fn report_jobs(&self, jobs: &[PathBuf], global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    fn report_jobs(&self, jobs: &[PathBuf], global: &GlobalArgs) -> Outcome {
         check_distinct_folders(jobs)?;
         let of = self.shards.unwrap_or(jobs.len());
         Shard::new(0, of).ok_or_else(|| too_many_shards(of))?;
         let standings = jobs.iter().map(|job| Ok(BatchJobState::read(&Fit::load(job)?)));
-        let standings = standings.collect::<Result<Vec<_>, Failure>>()?;
+        let standings = standings.collect::<Outcome<Vec<_>>>()?;
         let due: Vec<usize> = (0..jobs.len()).filter(|at| standings[*at] == BatchJobState::Due).collect();
         if !global.quiet {
             for (job, standing) in jobs.iter().zip(&standings) {
@@ -60,10 +56,10 @@ impl CollectArgs {
         }
         let all_explained =
             standings.iter().all(|standing| *standing == BatchJobState::Done(CommandOutcome::Done));
-        Ok(if all_explained { CommandOutcome::Done } else { CommandOutcome::StoppedEarly })
+        Ok(CommandOutcome::done_if(all_explained))
     }
 
-    fn collect_study(&self, dir: &Path, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    fn collect_study(&self, dir: &Path, global: &GlobalArgs) -> Outcome {
         let shards = shard_files(dir)?;
         if shards.is_empty() {
             return Err(Failure::Input(format!(
@@ -75,8 +71,7 @@ impl CollectArgs {
         }
         let study = self.study.clone().map_or_else(|| find_study(dir), Ok)?;
         let problem = LoadedStudy::load(&study)?;
-        let writer =
-            WritePolicy::new(OutputCommand::Sweep, self.overwrite).with_csv_dialect(global.csv_dialect);
+        let writer = global.write_policy(OutputCommand::Sweep, self.overwrite);
         problem.check_outputs(dir, &writer)?;
         let mut points = problem.new_collection(dir)?;
         for (_, path) in &shards {
@@ -97,7 +92,7 @@ impl CollectArgs {
 }
 
 /// Shards of so many that have points to do, rising.
-fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Result<TaskList, Failure> {
+fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Outcome<TaskList> {
     Shard::new(0, of).ok_or_else(|| too_many_shards(of))?;
     let mut due = vec![false; of];
     points.missing_indices().for_each(|index| due[index % of] = true);
@@ -105,7 +100,7 @@ fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Result<TaskLis
 }
 
 /// Why a file alone is not collected.
-fn one_file_failure(file: &Path) -> Result<Failure, Failure> {
+fn one_file_failure(file: &Path) -> Outcome<Failure> {
     let (found, expected) = if is_study(file)? {
         ("a study", "the folder of its shards: `wiperlab collect DIR` with the --out of `wiperlab sweep`")
     } else {
@@ -114,7 +109,7 @@ fn one_file_failure(file: &Path) -> Result<Failure, Failure> {
             "the folder of a study or a list of jobs, as a fit is not divided; run `wiperlab fit` with it",
         )
     };
-    Ok(Failure::Input(format!("{}: found {found}, expected {expected}", file.display())))
+    Ok(Failure::at(file.display(), format!("found {found}, expected {expected}")))
 }
 
 fn too_many_shards(of: usize) -> Failure {

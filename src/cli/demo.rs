@@ -1,13 +1,10 @@
 //! `wiperlab demo`: the whole pipeline on the bundled synthetic recording.
 
-use super::args::GlobalArgs;
 use super::args::parse_count;
-use super::failure::{CommandOutcome, Failure};
-use super::files;
-use super::files::{OutputCommand, OutputFolder, Overwrite, WritePolicy};
 use super::fit::print_summary;
 use super::import::import_into;
-use super::load::LoadedJob;
+use super::job::LoadedJob;
+use super::prelude::*;
 use super::progress::print_progress;
 use super::report;
 use super::spectrum::SpectrumArgs;
@@ -15,8 +12,6 @@ use crate::fit::result::{FitResult, FitStatus};
 use crate::import::{CoordinateScale, ImportOptions, ImportSource};
 use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE, YAxis};
 use crate::simulate::twin::SYNTHETIC_TRACK_NAMES;
-use clap::Args;
-use std::path::{Path, PathBuf};
 
 const NAME: &str = "actual-blade-twin";
 const EXPORT: &str = "synthetic-tracker-export.txt";
@@ -42,7 +37,7 @@ pub(crate) struct DemoArgs {
 }
 
 impl DemoArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         self.check_outputs()?;
         let quiet = GlobalArgs { quiet: true, ..global.clone() };
         let data = self.out.join("data").join(NAME);
@@ -72,7 +67,7 @@ impl DemoArgs {
         let missed = report::write_report(
             &fit,
             &page,
-            &WritePolicy::new(OutputCommand::Report, self.overwrite).with_csv_dialect(global.csv_dialect),
+            &global.write_policy(OutputCommand::Report, self.overwrite),
             &quiet,
         )?;
         if !global.quiet {
@@ -88,7 +83,7 @@ impl DemoArgs {
     }
 
     /// Refuses before anything is written what one of the steps would refuse.
-    fn check_outputs(&self) -> Result<(), Failure> {
+    fn check_outputs(&self) -> Outcome<()> {
         let steps: [(OutputCommand, &str, &[&str]); 4] = [
             (OutputCommand::Import, "data", &[TRACE_FILE, DESCRIPTION_FILE, EXPORT]),
             (OutputCommand::Fit, "fits", &[files::RESULT_FILE]),
@@ -102,7 +97,7 @@ impl DemoArgs {
     }
 
     /// The bundled export, scene and job, laid out as a project has them.
-    fn write_bundled_files(&self) -> Result<(), Failure> {
+    fn write_bundled_files(&self) -> Outcome<()> {
         let write = |folder: PathBuf, name: &str, text: &str| {
             files::write_outputs(
                 &folder,
@@ -116,7 +111,7 @@ impl DemoArgs {
 }
 
 /// What `wiperlab import` does with the export, its scale and rate.
-fn import_export(folder: &Path, overwrite: Overwrite) -> Result<(), Failure> {
+fn import_export(folder: &Path, overwrite: Overwrite) -> Outcome<()> {
     let [tip, head] = SYNTHETIC_TRACK_NAMES;
     let options = ImportOptions {
         name: NAME.to_owned(),
@@ -138,7 +133,7 @@ fn import_export(folder: &Path, overwrite: Overwrite) -> Result<(), Failure> {
 }
 
 /// The truth behind the synthetic recording, next to the estimates.
-fn print_truth(result: &FitResult) -> Result<(), Failure> {
+fn print_truth(result: &FitResult) -> Outcome<()> {
     let twin: toml::Table = TWIN.parse().map_err(Failure::internal)?;
     let truth = twin.get("truth").and_then(toml::Value::as_table);
     print_line!("{:<36} {:>12} {:>12}  in the interval", "parameter", "estimate", "truth");

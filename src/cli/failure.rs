@@ -18,6 +18,10 @@ pub(crate) enum CommandOutcome {
 }
 
 impl CommandOutcome {
+    pub(crate) fn done_if(done: bool) -> Self {
+        if done { Self::Done } else { Self::StoppedEarly }
+    }
+
     pub(crate) fn exit_code(self) -> u8 {
         match self {
             Self::Done => 0,
@@ -25,6 +29,9 @@ impl CommandOutcome {
         }
     }
 }
+
+/// What a step of a command gives, or why the command writes nothing.
+pub(crate) type Outcome<T = CommandOutcome> = Result<T, Failure>;
 
 /// Why a command wrote nothing.
 #[derive(Debug, thiserror::Error)]
@@ -41,6 +48,11 @@ impl Failure {
     /// Any typed refusal of the library is bad input.
     pub(crate) fn input(error: impl std::fmt::Display) -> Self {
         Self::Input(error.to_string())
+    }
+
+    /// Bad input, with the file or option that has it.
+    pub(crate) fn at(place: impl std::fmt::Display, problem: impl std::fmt::Display) -> Self {
+        Self::Input(format!("{place}: {problem}"))
     }
 
     /// What should not happen.

@@ -8,7 +8,7 @@ mod preserved_files;
 mod staging;
 
 use super::args::GlobalArgs;
-use super::failure::Failure;
+use super::failure::{Failure, Outcome};
 use crate::chart::{Figure, Medium};
 use crate::toml_file;
 use clap::{Args, ValueEnum};
@@ -21,8 +21,7 @@ pub(crate) use marker::{FolderMarker, OutputCommand, Overwrite, WritePolicy};
 pub(crate) use preserved_files::{SIMULATION_SUMMARY, is_simulation_summary};
 pub(crate) use staging::{OutputStaging, check_path_free};
 use std::fs::File;
-use std::io;
-use std::io::{BufWriter, Read, Seek, Write};
+use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -63,14 +62,13 @@ pub(crate) fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf,
 }
 
 /// A path as a file in `folder` names it: from there, or in full where no way leads from one to the other.
-pub(crate) fn relative_path(folder: &Path, path: &Path) -> Result<String, Failure> {
+pub(crate) fn relative_path(folder: &Path, path: &Path) -> Outcome<String> {
     let in_full = |path: &Path| {
-        std::path::absolute(path).map_err(|error| {
-            Failure::Input(format!("{}: cannot be found from here: {error}", path.display()))
-        })
+        std::path::absolute(path)
+            .map_err(|error| Failure::at(path.display(), format!("cannot be found from here: {error}")))
     };
     // (links are followed in what there is, as `..` behind a link leads elsewhere)
-    let real = |path: &Path| -> Result<PathBuf, Failure> {
+    let real = |path: &Path| -> Outcome<PathBuf> {
         let full = in_full(path)?;
         let there = full.ancestors().find(|part| part.exists()).unwrap_or(Path::new(""));
         let rest = full.strip_prefix(there).unwrap_or(Path::new(""));
@@ -79,10 +77,10 @@ pub(crate) fn relative_path(folder: &Path, path: &Path) -> Result<String, Failur
     let target = real(path)?;
     let way = pathdiff::diff_paths(&target, real(folder)?).unwrap_or(target);
     way.to_str().map(|text| text.replace(std::path::MAIN_SEPARATOR, "/")).ok_or_else(|| {
-        Failure::Input(format!(
-            "{}: found a path that is no Unicode text, expected one that a TOML file can name; rename the folder",
-            path.display()
-        ))
+        Failure::at(
+            path.display(),
+            "found a path that is no Unicode text, expected one that a TOML file can name; rename the folder",
+        )
     })
 }
 
@@ -92,20 +90,20 @@ pub(crate) fn write_outputs(
     folder: &Path,
     writer: &WritePolicy,
     files: &[(impl AsRef<str>, Vec<u8>)],
-) -> Result<(), Failure> {
+) -> Outcome<()> {
     let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
     OutputFolder::find_writable_ancestor(folder)?;
     commit_files(OutputStaging::new(folder, writer, &names)?, files)
 }
 
 /// The same for files that no marker lists, of which the caller knows that they replace nothing of value.
-pub(crate) fn write_unmarked(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
+pub(crate) fn write_unmarked(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Outcome<()> {
     let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
     OutputFolder::find_writable_ancestor(folder)?;
     commit_files(OutputStaging::new_unmarked(folder, &names)?, files)
 }
 
-fn commit_files(mut staging: OutputStaging, files: &[(impl AsRef<str>, Vec<u8>)]) -> Result<(), Failure> {
+fn commit_files(mut staging: OutputStaging, files: &[(impl AsRef<str>, Vec<u8>)]) -> Outcome<()> {
     for (name, bytes) in files {
         staging.stage_file(name.as_ref(), bytes.as_slice())?;
     }
@@ -162,7 +160,7 @@ pub(crate) struct OutputFolder {
 impl OutputFolder {
     /// Checks that `folder` is one or can be made, can be written to, and holds nothing that the files
     /// `names` must not replace: asked before the work, as it is again when they are placed.
-    pub(crate) fn check(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
+    pub(crate) fn check(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Outcome<Self> {
         let near = Self::find_writable_ancestor(folder)?;
         names.iter().chain([&MARKER_FILE]).try_for_each(|name| check_path_free(&folder.join(name)))?;
         let guard = OutputGuard::new(folder, writer, names)?;
@@ -171,7 +169,7 @@ impl OutputFolder {
     }
 
     /// What there is of the way to a folder, which can be written to.
-    fn find_writable_ancestor(folder: &Path) -> Result<PathBuf, Failure> {
+    fn find_writable_ancestor(folder: &Path) -> Outcome<PathBuf> {
         let near = folder
             .ancestors()
             .find(|path| path.exists() || path.is_symlink())
@@ -180,22 +178,24 @@ impl OutputFolder {
         let near = if near.as_os_str().is_empty() { PathBuf::from(".") } else { near };
         if !near.is_dir() {
             let found = if near.exists() { "a file" } else { "a broken link" };
-            return Err(Failure::Input(format!(
-                "{}: is {found}, expected a folder for the results; choose another one",
-                near.display()
-            )));
+            return Err(Failure::at(
+                near.display(),
+                format!("is {found}, expected a folder for the results; choose another one"),
+            ));
         }
         tempfile::tempfile_in(&near).map_err(|error| {
-            Failure::Input(format!(
-                "{}: cannot be written: {error}; expected a folder for the results, so choose another one",
-                folder.display()
-            ))
+            Failure::at(
+                folder.display(),
+                format!(
+                    "cannot be written: {error}; expected a folder for the results, so choose another one"
+                ),
+            )
         })?;
         Ok(near)
     }
 
     /// A file that is written to as it grows and gets its name when all are [finished](Self::commit).
-    pub(crate) fn create_file(&self, name: &'static str) -> Result<PendingFile, Failure> {
+    pub(crate) fn create_file(&self, name: &'static str) -> Outcome<PendingFile> {
         let path = self.folder.join(name);
         let file =
             tempfile::tempfile_in(&self.temporary_folder).map_err(|error| write_failure(&path, &error))?;
@@ -207,7 +207,7 @@ impl OutputFolder {
         &self,
         files: Vec<PendingFile>,
         others: &[(impl AsRef<str>, Vec<u8>)],
-    ) -> Result<(), Failure> {
+    ) -> Outcome<()> {
         let files = files.into_iter().map(PendingFile::into_rewound_file).collect::<Result<Vec<_>, _>>()?;
         let others = others.iter().map(|(name, bytes)| (name.as_ref(), bytes.as_slice()));
         let names: Vec<&str> =
@@ -224,7 +224,7 @@ impl OutputFolder {
 }
 
 /// A file without a name for what does not fit into memory, in a folder or in what there is of the way to it.
-pub(crate) fn create_scratch_file(folder: &Path) -> Result<File, Failure> {
+pub(crate) fn create_scratch_file(folder: &Path) -> Outcome<File> {
     let near = OutputFolder::find_writable_ancestor(folder)?;
     tempfile::tempfile_in(&near).map_err(|error| write_failure(&near, &error))
 }
@@ -247,7 +247,7 @@ impl PendingFile {
     }
 
     /// The whole file, to be read from its start.
-    fn into_rewound_file(self) -> Result<(&'static str, File), Failure> {
+    fn into_rewound_file(self) -> Outcome<(&'static str, File)> {
         let Self { name, path, to, failed } = self;
         let rewound = || {
             let mut file = to.into_inner().map_err(io::IntoInnerError::into_error)?;
@@ -275,7 +275,7 @@ pub(crate) struct FigureArgs {
 
 impl FigureArgs {
     /// Refuses a folder that figures of these names cannot go to; asked before the work.
-    pub(crate) fn check_folder(&self, names: &[&str], overwrite: Overwrite) -> Result<(), Failure> {
+    pub(crate) fn check_folder(&self, names: &[&str], overwrite: Overwrite) -> Outcome<()> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let files = names.iter().flat_map(|name| figure_files(name, &Figure::default()));
         let names: Vec<String> = files.map(|(name, _)| name).collect();
@@ -289,7 +289,7 @@ impl FigureArgs {
         overwrite: Overwrite,
         global: &GlobalArgs,
         figures: impl FnOnce() -> Vec<(&'static str, Figure)>,
-    ) -> Result<(), Failure> {
+    ) -> Outcome<()> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let figures = figures();
         let files: Vec<_> = figures.iter().flat_map(|(name, figure)| figure_files(name, figure)).collect();

@@ -5,30 +5,22 @@ mod outputs;
 mod summary;
 mod traces;
 
-pub(crate) use batch::{BatchJobState, check_distinct_folders};
-pub(crate) use summary::print_summary;
-
-use super::args::GlobalArgs;
-use super::args::TimeLimit;
-use super::args::parse_count;
+use super::args::{TimeLimit, parse_count};
 use super::checkpoint::{CHECKPOINT_FILE, CheckpointWriter};
-use super::failure::{CommandOutcome, Failure};
-use super::files::{OutputCommand, Overwrite, WritePolicy};
-use super::interrupt;
-use super::load::LoadedJob;
+use super::job::LoadedJob;
 use super::load::print_warnings;
-use super::{files, progress};
+use super::prelude::*;
 use crate::checkpoint::Shard;
 use crate::fit::evaluation::EvaluationStage;
 use crate::fit::ledger::FitProgress;
 use crate::fit::result::{FitResult, FitStatus};
 use crate::fit::{FitContext, FitError};
-use clap::Args;
+pub(crate) use batch::{BatchJobState, check_distinct_folders};
 use indicatif::ProgressBar;
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
+pub(crate) use summary::print_summary;
 
 #[derive(Debug, Args)]
 pub(crate) struct FitArgs {
@@ -64,7 +56,7 @@ pub(crate) struct CompletedFit {
 }
 
 impl FitArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         if let Some(TimeLimit(time)) = self.time_limit {
             interrupt::set_time_limit(time);
         }
@@ -80,12 +72,7 @@ impl FitArgs {
         }
     }
 
-    fn fit_job(
-        &self,
-        problem: &LoadedJob,
-        resume: bool,
-        global: &GlobalArgs,
-    ) -> Result<CommandOutcome, Failure> {
+    fn fit_job(&self, problem: &LoadedJob, resume: bool, global: &GlobalArgs) -> Outcome {
         for warning in crate::fit::job_warnings(problem.job()).iter().filter(|_| !global.quiet) {
             warn_line!("warning: {warning}");
         }
@@ -105,7 +92,7 @@ impl CompletedFit {
             print_line!("written to {}", problem.folder.join(files::RESULT_FILE).display());
         }
         let done = self.result.status == FitStatus::Converged && self.result.explains_recordings();
-        if done { CommandOutcome::Done } else { CommandOutcome::StoppedEarly }
+        CommandOutcome::done_if(done)
     }
 }
 
@@ -117,11 +104,11 @@ impl LoadedJob {
         resume: bool,
         max_evaluations: Option<usize>,
         overwrite: Overwrite,
-    ) -> Result<CompletedFit, Failure> {
+    ) -> Outcome<CompletedFit> {
         if !self.problem.traces().is_empty() {
             return self.solve_traces(global, resume, max_evaluations, overwrite);
         }
-        let writer = WritePolicy::new(OutputCommand::Fit, overwrite).with_csv_dialect(global.csv_dialect);
+        let writer = global.write_policy(OutputCommand::Fit, overwrite);
         self.check_outputs(&writer)?;
         let path = self.folder.join(CHECKPOINT_FILE);
         let name = path.display().to_string();

@@ -2,11 +2,8 @@
 
 mod markdown;
 
-use super::args::GlobalArgs;
-use super::failure::{CommandOutcome, Failure};
-use super::files;
-use super::files::{OutputCommand, Overwrite, WritePolicy};
 use super::output::{escape_lines, write_stdout};
+use super::prelude::*;
 use crate::fit::job::Job;
 use crate::model::section::BladeSection;
 use crate::recording::files::RecordingFile;
@@ -15,12 +12,11 @@ use crate::simulate::twin::spec::TwinSpec;
 use crate::sweep::Study;
 use crate::text::wrap_words;
 use crate::toml_file::{KeyTable, list_key_tables, suggest_key};
-use clap::{Args, Command};
+use clap::Command;
 use clap_complete::{Shell, generate};
 use clap_mangen::Man;
 use markdown::{find_section, render_for_terminal};
 use serde_json::Value;
-use std::path::PathBuf;
 
 /// Widest line of a page, characters.
 const WIDTH: usize = 96;
@@ -74,7 +70,7 @@ pub(crate) fn list_help_pages() -> String {
 }
 
 impl HelpArgs {
-    pub(crate) fn run(&self, program: &mut Command) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, program: &mut Command) -> Outcome {
         let text = match self.word.as_deref().and_then(find_help_page) {
             Some(content) => content.render(),
             None => self.command_help(program)?,
@@ -84,7 +80,7 @@ impl HelpArgs {
     }
 
     /// The help of the command that is named, or of the program.
-    fn command_help(&self, program: &mut Command) -> Result<String, Failure> {
+    fn command_help(&self, program: &mut Command) -> Outcome<String> {
         program.build();
         let Some(word) = &self.word else { return Ok(program.render_long_help().to_string()) };
         let refused = unknown_command_failure(word, program);
@@ -166,7 +162,7 @@ pub(crate) struct CompletionsArgs {
 }
 
 impl CompletionsArgs {
-    pub(crate) fn run(&self, program: &mut Command) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, program: &mut Command) -> Outcome {
         let mut script = Vec::new();
         generate(self.shell, program, "wiperlab", &mut script);
         write_stdout(&escape_lines(&String::from_utf8_lossy(&script)));
@@ -186,7 +182,7 @@ pub(crate) struct ManArgs {
 }
 
 impl ManArgs {
-    pub(crate) fn run(&self, program: &mut Command, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, program: &mut Command, global: &GlobalArgs) -> Outcome {
         program.build();
         let mut pages = Vec::new();
         add_manual_page(&mut pages, program, "wiperlab")?;
@@ -199,7 +195,7 @@ impl ManArgs {
 }
 
 /// The page of a command and those of the commands in it.
-fn add_manual_page(pages: &mut Vec<(String, Vec<u8>)>, command: &Command, name: &str) -> Result<(), Failure> {
+fn add_manual_page(pages: &mut Vec<(String, Vec<u8>)>, command: &Command, name: &str) -> Outcome<()> {
     let mut page = Vec::new();
     Man::new(command.clone()).render(&mut page).map_err(Failure::internal)?;
     pages.push((format!("{name}.1"), page));

@@ -1,20 +1,15 @@
 //! `wiperlab import`.
 
-use super::args::GlobalArgs;
 use super::args::parse_count;
-use super::failure::{CommandOutcome, Failure};
-use super::files;
-use super::files::{OutputCommand, OutputFolder, OutputStaging, Overwrite, WritePolicy};
+use super::files::OutputStaging;
 use super::inspect::Inspection;
-use super::output;
-use super::progress;
+use super::prelude::*;
 use crate::import::{
     self, ColumnMap, CompanionFile, CoordinateScale, Import, ImportOptions, ImportSource, TimeColumn,
 };
 use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_blocks};
-use clap::{Args, ValueEnum};
+use clap::ValueEnum;
 use serde::Serialize;
-use std::path::{Path, PathBuf};
 
 /// Names of formats in a line of the help.
 const NAMES_A_LINE: usize = 8;
@@ -54,7 +49,7 @@ pub(crate) struct ImportArgs {
 }
 
 impl ImportArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         self.typed.run(global)
     }
 }
@@ -136,12 +131,11 @@ pub(crate) enum TimeMeaning {
 }
 
 impl ImportOptionArgs {
-    fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    fn run(&self, global: &GlobalArgs) -> Outcome {
         let options = self.import_options()?;
         let steps = progress::start_steps("import", global.quiet);
         steps.show_step("reading the export");
-        let sources =
-            self.sources.iter().map(|path| read_source(path)).collect::<Result<Vec<_>, Failure>>()?;
+        let sources = self.sources.iter().map(|path| read_source(path)).collect::<Outcome<Vec<_>>>()?;
         let imported = import::import(&sources, &options).map_err(Failure::input)?;
         let writer = self.write_policy(&sources);
         OutputFolder::check(&self.out, &writer, &[TRACE_FILE, DESCRIPTION_FILE])?;
@@ -162,7 +156,7 @@ impl ImportOptionArgs {
     }
 
     /// The options as typed become the library's.
-    fn import_options(&self) -> Result<ImportOptions, Failure> {
+    fn import_options(&self) -> Outcome<ImportOptions> {
         let mut options = ImportOptions {
             name: self
                 .out
@@ -284,23 +278,25 @@ const LONGEST_LINE: usize = 1_000_000;
 const LINE_SHOWN: usize = 40;
 
 /// Bytes of a table; what has no lines is none, and its cells would fill memory. (Markup may be one line.)
-fn read_table(path: &Path) -> Result<Vec<u8>, Failure> {
+fn read_table(path: &Path) -> Outcome<Vec<u8>> {
     let bytes = files::read_data(path)?;
     let is_markup = bytes.iter().take(16).any(|byte| *byte == b'<');
     let mut lines = bytes.split(|byte| matches!(byte, b'\n' | b'\r'));
     match lines.find(|line| line.len() > LONGEST_LINE).filter(|_| !is_markup) {
-        Some(line) => Err(Failure::Input(format!(
-            "{}: found a line of {} bytes, which begins with `{}`, expected at most {LONGEST_LINE} and a row a frame; export the table again, with line ends",
+        Some(line) => Err(Failure::at(
             path.display(),
-            line.len(),
-            String::from_utf8_lossy(&line[..LINE_SHOWN])
-        ))),
+            format!(
+                "found a line of {} bytes, which begins with `{}`, expected at most {LONGEST_LINE} and a row a frame; export the table again, with line ends",
+                line.len(),
+                String::from_utf8_lossy(&line[..LINE_SHOWN])
+            ),
+        )),
         None => Ok(bytes),
     }
 }
 
 /// A file with its companions.
-fn read_source(path: &Path) -> Result<ImportSource, Failure> {
+fn read_source(path: &Path) -> Outcome<ImportSource> {
     if files::is_standard_input(path) {
         return Ok(ImportSource::without_companions(files::display_name(path), read_table(path)?));
     }
@@ -312,7 +308,7 @@ fn read_source(path: &Path) -> Result<ImportSource, Failure> {
     let companions = names
         .into_iter()
         .map(|name| Ok(CompanionFile { bytes: files::read_data(Path::new(&name))?, name }))
-        .collect::<Result<Vec<_>, Failure>>()?;
+        .collect::<Outcome<Vec<_>>>()?;
     Ok(ImportSource { bytes: read_table(path)?, name, companions })
 }
 
@@ -322,7 +318,7 @@ pub(crate) fn import_into(
     sources: &[ImportSource],
     options: &ImportOptions,
     overwrite: Overwrite,
-) -> Result<(), Failure> {
+) -> Outcome<()> {
     let imported = import::import(sources, options).map_err(Failure::input)?;
     write_recording(folder, &WritePolicy::new(OutputCommand::Import, overwrite), sources, &imported)
 }
@@ -345,7 +341,7 @@ fn write_recording(
     writer: &WritePolicy,
     sources: &[ImportSource],
     imported: &Import,
-) -> Result<(), Failure> {
+) -> Outcome<()> {
     let names: Vec<&str> = output_names(sources).collect();
     let mut staging = OutputStaging::new(folder, writer, &names)?;
     for (name, bytes) in import::preserved_files(sources) {

@@ -1,14 +1,9 @@
 //! `wiperlab init`.
 
-use super::args::GlobalArgs;
-use super::failure::{CommandOutcome, Failure};
-use super::files;
-use super::files::{OutputCommand, OutputFolder, Overwrite, WritePolicy};
 use super::load::load_recording;
+use super::prelude::*;
 use crate::draft::{self, KnownStroke};
 use crate::simulate::scene::Scene;
-use clap::Args;
-use std::path::{Path, PathBuf};
 
 const SCENE: &str = "scene.toml";
 const JOB: &str = "job.toml";
@@ -52,7 +47,7 @@ struct DraftFiles {
 }
 
 impl InitArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let writer = WritePolicy::new(OutputCommand::Init, self.overwrite);
         let names: &[&str] = if self.scene { &[SCENE] } else { &[SCENE, JOB] };
         OutputFolder::check(&self.out, &writer, names)?;
@@ -71,7 +66,7 @@ impl InitArgs {
         Ok(CommandOutcome::Done)
     }
 
-    fn draft_for_recording(&self, path: &Path) -> Result<DraftFiles, Failure> {
+    fn draft_for_recording(&self, path: &Path) -> Outcome<DraftFiles> {
         if files::is_standard_input(path) {
             let expected = "a folder or a file, which scene and job can name";
             return Err(Failure::Input(format!(
@@ -81,24 +76,20 @@ impl InitArgs {
         let loaded = load_recording(path)?;
         let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
         let found = draft::DraftFindings::from_recording(&loaded.recording, exposure_s, self.known_stroke()?)
-            .map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
+            .map_err(|error| Failure::at(path.display(), error))?;
         let seen = files::relative_path(&self.out, path)?;
         let scene = draft::write_scene(&found, &seen, !self.no_shoulder).map_err(Failure::internal)?;
         let file = self.out.join(SCENE).display().to_string();
         Scene::parse_with_recording(&file, &scene, |_| Ok(loaded.recording.clone()))
             .map_err(|error| {
-                Failure::Input(format!(
-                    "{}: found {:.4} s, too short or too slow a motion for a run to start in; expected a head that moves by several millimetres; film more of the stroke ({error})",
-                    path.display(),
-                    found.length_s()
-                ))
+                Failure::at(path.display(), format!("found {:.4} s, too short or too slow a motion for a run to start in; expected a head that moves by several millimetres; film more of the stroke ({error})", found.length_s()))
             })?;
         let job = draft::write_job(&found, &loaded.recording, [&seen, SCENE], !self.no_shoulder);
         Ok(DraftFiles { texts: vec![(SCENE, scene), (JOB, job)], words: found.describe() })
     }
 
     /// The stroke as typed.
-    fn known_stroke(&self) -> Result<KnownStroke, Failure> {
+    fn known_stroke(&self) -> Outcome<KnownStroke> {
         let typed = [("--amplitude-m", self.amplitude_m), ("--frequency-hz", self.frequency_hz)];
         for (option, value) in typed {
             if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {

@@ -1,24 +1,19 @@
 //! `wiperlab inspect`.
 
-use super::args::GlobalArgs;
-use super::failure::{CommandOutcome, Failure};
-use super::files::{FigureArgs, Overwrite};
 use super::load::{LoadedRecording, load_recording, read_scene};
-use super::output;
+use super::prelude::*;
 use crate::figures::recorded;
 use crate::model::modes::{TipConstraint, body_frequencies, natural_modes};
+use crate::recording::Recording;
 use crate::recording::channel::{Reversal, ReversalInstants};
 use crate::recording::files::{LevelEntry, RecordingFile};
 use crate::recording::quality::{
-    CameraTilt, ComponentVisibility, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality,
+    self, CameraTilt, ComponentVisibility, Grade, Optics, PUBLISHED_COMPONENTS_HZ, PUBLISHED_TITLE, Quality,
     QualityFinding,
 };
-use crate::recording::{Recording, quality};
 use crate::simulate::scene::Scene;
 use crate::text::format_degrees;
-use clap::Args;
 use serde::Serialize;
-use std::path::PathBuf;
 
 const AFTER_HELP: &str = "\
 The verdict starts with the grade: good, usable with care, or not usable. Every finding follows with a number
@@ -48,7 +43,7 @@ pub(crate) struct InspectArgs {
 
 impl InspectArgs {
     /// What is asked for is the text itself, so `--quiet` leaves the verdict.
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let scene = self.scene.as_deref().map(read_scene).transpose()?;
         self.figures.check_folder(&[FIGURE], self.overwrite)?;
         let loaded = load_recording(&self.recording)?;

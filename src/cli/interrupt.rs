@@ -2,7 +2,7 @@
 //! other, and one that does not stop in time, ends at once. Either way the program says what was computed and ends with the code of an early stop,
 //! and leaves neither half of its files nor a temporary one.
 
-use super::failure::{Failure, STOPPED_EARLY};
+use super::failure::{Failure, Outcome, STOPPED_EARLY};
 use super::progress;
 use std::io;
 use std::ops::ControlFlow;
@@ -35,7 +35,7 @@ struct InterruptState {
 }
 
 /// Answers signals from now on.
-pub(crate) fn install_handler() -> Result<(), Failure> {
+pub(crate) fn install_handler() -> Outcome<()> {
     let mut signals = 0;
     let answer = move || {
         signals += 1;

@@ -1,29 +1,21 @@
 //! Scenes from disk, and recordings: a folder with `trace.csv` and `recording.toml`, or a `trace.csv` alone.
 
-use super::args::GlobalArgs;
-use super::failure::Failure;
-use super::files;
-use super::files::{FolderMarker, OutputCommand, SIMULATION_SUMMARY, is_simulation_summary};
-use crate::fit;
-use crate::fit::MeasuredRecording;
-use crate::fit::job::Job;
-use crate::model::plausibility;
+use super::files::{FolderMarker, SIMULATION_SUMMARY, is_simulation_summary};
+use super::prelude::*;
 use crate::model::plausibility::PlausibilityFinding;
 use crate::recording::Recording;
 use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE, read_recording};
 use crate::recording::quality::{Check, QualityFinding, Severity};
 use crate::simulate::scene::Scene;
 use crate::text::{sha256, text_sha256};
-use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 /// Reads a scene that the user named, with the recording that drives it, if one does.
-pub(crate) fn read_scene(path: &Path) -> Result<Scene, Failure> {
+pub(crate) fn read_scene(path: &Path) -> Outcome<Scene> {
     Ok(read_driven_scene(path)?.0)
 }
 
 /// The same with the place of the recording that drives it, if one does.
-pub(crate) fn read_driven_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
+pub(crate) fn read_driven_scene(path: &Path) -> Outcome<(Scene, Option<PathBuf>)> {
     let mut driver = None;
     let recording = |named: &str| {
         let place = files::resolve_existing_path(path, named)?;
@@ -36,19 +28,15 @@ pub(crate) fn read_driven_scene(path: &Path) -> Result<(Scene, Option<PathBuf>),
 }
 
 /// Says what is hard to believe in a file.
-pub(crate) fn print_warnings(
-    file: &Path,
-    findings: &[plausibility::PlausibilityFinding],
-    global: &GlobalArgs,
-) {
+pub(crate) fn print_warnings(file: &Path, findings: &[PlausibilityFinding], global: &GlobalArgs) {
     for finding in findings.iter().filter(|_| !global.quiet) {
         warn_line!("warning: {}: {finding}", file.display());
     }
 }
 
 /// Reads the scene that another file names with its key `scene`.
-pub(crate) fn read_named_scene(file: &Path, named: &str) -> Result<Scene, Failure> {
-    let refused = |problem| Failure::Input(format!("{}: key `scene`: {problem}", file.display()));
+pub(crate) fn read_named_scene(file: &Path, named: &str) -> Outcome<Scene> {
+    let refused = |problem| Failure::at(file.display(), format!("key `scene`: {problem}"));
     read_scene(&files::resolve_existing_path(file, named).map_err(refused)?)
 }
 
@@ -83,7 +71,7 @@ impl LoadedRecording {
 
 /// Reads the recording at `path`: a folder, or a trace alone; a description next to the trace counts in
 /// either case.
-pub(crate) fn load_recording(path: &Path) -> Result<LoadedRecording, Failure> {
+pub(crate) fn load_recording(path: &Path) -> Outcome<LoadedRecording> {
     let trace = trace_path(path)?;
     let text = files::read_text(&trace)?;
     let description = description_path(path);
@@ -103,7 +91,7 @@ pub(crate) fn load_recording(path: &Path) -> Result<LoadedRecording, Failure> {
 
 /// Whether a command made the trace without a description, as `simulate` does: the marker of its folder says
 /// so, or where there is none the summary of the simulation.
-fn is_simulated(trace: &Path, text: &str) -> Result<bool, Failure> {
+fn is_simulated(trace: &Path, text: &str) -> Outcome<bool> {
     let folder = files::containing_folder(trace);
     let (marker, _) = FolderMarker::load(folder)?;
     let name = trace.file_name().unwrap_or_default().to_string_lossy();
@@ -113,11 +101,13 @@ fn is_simulated(trace: &Path, text: &str) -> Result<bool, Failure> {
     if made.by == OutputCommand::Import || made.matches_hash(&text_sha256(text)) {
         return Ok(made.by != OutputCommand::Import);
     }
-    Err(Failure::Input(format!(
-        "{}: found a trace that was changed or replaced since `wiperlab {by}` wrote it, so that nothing says whether a camera took it; expected what {by} wrote: run it again into another folder or, where the change is intended, copy the trace alone into a folder of its own",
+    Err(Failure::at(
         trace.display(),
-        by = made.by.command_name()
-    )))
+        format!(
+            "found a trace that was changed or replaced since `wiperlab {by}` wrote it, so that nothing says whether a camera took it; expected what {by} wrote: run it again into another folder or, where the change is intended, copy the trace alone into a folder of its own",
+            by = made.by.command_name()
+        ),
+    ))
 }
 
 /// Where the description of the recording at `path` lies, if it has one.
@@ -127,111 +117,25 @@ pub(crate) fn description_path(path: &Path) -> PathBuf {
 }
 
 /// The trace of the recording at `path`.
-fn trace_path(path: &Path) -> Result<PathBuf, Failure> {
+fn trace_path(path: &Path) -> Outcome<PathBuf> {
     if !path.is_dir() {
         return Ok(path.to_owned());
     }
     let trace = path.join(TRACE_FILE);
     if !trace.is_file() {
         let advice = "expected the folder of a recording, with `trace.csv` in it; make one with `wiperlab import`, or name a trace.csv";
-        return Err(Failure::Input(format!("{}: found no {TRACE_FILE}, {advice}", path.display())));
+        return Err(Failure::at(path.display(), format!("found no {TRACE_FILE}, {advice}")));
     }
     Ok(trace)
 }
 
-fn mark_synthetic(recording: Recording) -> Result<Recording, Failure> {
+fn mark_synthetic(recording: Recording) -> Outcome<Recording> {
     Recording::new(recording.name(), recording.grid(), recording.traces().clone(), true)
         .map_err(Failure::internal)
 }
 
 /// Whether a file is written as a study: it has axes or maps, which no job has.
-pub(crate) fn is_study(file: &Path) -> Result<bool, Failure> {
+pub(crate) fn is_study(file: &Path) -> Outcome<bool> {
     let table: Option<toml::Table> = files::read_toml(file)?.parse().ok();
     Ok(table.is_some_and(|table| ["axis", "map"].iter().any(|key| table.contains_key(*key))))
-}
-
-// A job with the scenes and recordings that it names, read from disk.
-
-/// The job of a fit in its folder.
-pub(crate) const JOB_FILE: &str = "job.toml";
-
-/// The file of a job that is named by that file or by its folder.
-pub(crate) fn job_path(named: &Path) -> PathBuf {
-    if named.is_dir() { named.join(JOB_FILE) } else { named.to_owned() }
-}
-
-/// A problem with where it lies on disk.
-pub(crate) struct LoadedJob {
-    pub folder: PathBuf,
-    /// The file of the job, and its name in messages.
-    pub path: PathBuf,
-    pub file: String,
-    pub problem: fit::Problem,
-    /// The file of the scene of each condition.
-    pub scene_files: Vec<PathBuf>,
-    /// What is hard to believe in the scenes, each file once.
-    pub doubts: BTreeMap<PathBuf, Vec<PlausibilityFinding>>,
-    /// Where the recordings lie, one for each condition of the job that has one.
-    pub recording_paths: Vec<PathBuf>,
-    /// The recordings with their descriptions.
-    pub measured: Vec<LoadedRecording>,
-    /// The recording that drives the scene of a condition, where the scene names one.
-    pub drivers: Vec<Option<PathBuf>>,
-}
-
-impl LoadedJob {
-    /// Reads and checks a job, named by its file or its folder, its scenes and its recordings.
-    pub(crate) fn load(named: &Path) -> Result<Self, Failure> {
-        let path = job_path(named);
-        if files::is_standard_input(&path) {
-            let expected = "a file: journal and result of a fit lie next to its job";
-            return Err(Failure::Input(format!(
-                "-: found standard input, expected {expected}; save it as job.toml"
-            )));
-        }
-        let file = path.display().to_string();
-        let job = Job::parse(&file, &files::read_toml(&path)?).map_err(Failure::input)?;
-        let found = |key: &str, named: &str| {
-            files::resolve_existing_path(&path, named)
-                .map_err(|problem| Failure::Input(format!("{file}: key `{key}`: {problem}")))
-        };
-        let scene_files = job.conditions.iter().map(|condition| found("scene", &condition.scene));
-        let scene_files = scene_files.collect::<Result<Vec<_>, _>>()?;
-        let scenes = scene_files.iter().map(|file| read_driven_scene(file));
-        let (scenes, drivers): (Vec<_>, Vec<_>) = scenes.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
-        let doubts = scene_files.iter().zip(&scenes);
-        let doubts = doubts.map(|(file, scene)| (file.clone(), scene.find_implausible())).collect();
-        let measured_at = job.recordings().map(|named| found("recording.path", named));
-        let measured_at = measured_at.collect::<Result<Vec<_>, _>>()?;
-        let measured = measured_at.iter().map(|path| load_recording(path));
-        let measured = measured.collect::<Result<Vec<_>, _>>()?;
-        let problem = fit::Problem::new(job, scenes, measured.iter().map(to_measured).collect());
-        let problem = problem.map_err(|error| Failure::Input(format!("{file}: {error}")))?;
-        let folder = files::containing_folder(&path).to_owned();
-        Ok(Self {
-            folder,
-            path,
-            file,
-            problem,
-            scene_files,
-            doubts,
-            recording_paths: measured_at,
-            measured,
-            drivers,
-        })
-    }
-
-    pub(crate) fn job(&self) -> &Job {
-        self.problem.job()
-    }
-
-    /// Every recording with where it lies.
-    pub(crate) fn recordings(&self) -> impl Iterator<Item = (&Path, &LoadedRecording)> {
-        self.recording_paths.iter().map(PathBuf::as_path).zip(&self.measured)
-    }
-}
-
-fn to_measured(loaded: &LoadedRecording) -> MeasuredRecording {
-    let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
-    MeasuredRecording { recording: loaded.recording.clone(), exposure_s }
 }

@@ -1,12 +1,12 @@
 //! The options that choose how a scene is integrated.
 
-use super::failure::Failure;
+use super::prelude::*;
 use crate::simulate::fixed_step_scheme::{
     DEFAULT_GAIN_PER_S, FixedStepLocator, FixedStepScheme, LARGEST_GAIN_TIMES_STEP,
 };
 use crate::simulate::scene::{ContactLossRule, JamRule, Scene, check_tolerance};
 use crate::simulate::{IntegrationMethod, SolverOptions};
-use clap::{Args, ValueEnum};
+use clap::ValueEnum;
 
 #[derive(Debug, Args)]
 pub(crate) struct MethodArgs {
@@ -53,7 +53,7 @@ const MOST_STEPS: f64 = 1e10;
 
 impl MethodArgs {
     /// How the scene is integrated.
-    pub(crate) fn integration_effort(&self, scene: &Scene) -> Result<SolverOptions, Failure> {
+    pub(crate) fn integration_effort(&self, scene: &Scene) -> Outcome<SolverOptions> {
         let tolerance = self.relative_tolerance.unwrap_or(scene.run.relative_tolerance);
         check_tolerance(tolerance).map_err(|expected| {
             Failure::Input(format!("--relative-tolerance: found {tolerance}, expected {expected}"))
@@ -83,7 +83,7 @@ impl MethodArgs {
         Ok(SolverOptions { method, relative_tolerance: tolerance, ..SolverOptions::from_scene(scene) })
     }
 
-    fn fixed_step_method(&self, scene: &Scene) -> Result<FixedStepScheme, Failure> {
+    fn fixed_step_method(&self, scene: &Scene) -> Outcome<FixedStepScheme> {
         let refuse = |option: &str, found: &str, expected: &str| {
             Err(Failure::Input(format!("{option}: found {found}, expected {expected}")))
         };
@@ -129,7 +129,7 @@ impl MethodArgs {
 }
 
 /// The fixed-step scheme has neither flight nor impacts.
-fn refuse_flight(scene: &Scene) -> Result<(), Failure> {
+fn refuse_flight(scene: &Scene) -> Outcome<()> {
     let [loss, jam] = [
         ("contact.loss", "fly", scene.loss == ContactLossRule::Fly),
         ("contact.jam", "impact", scene.jam == JamRule::Impact),

@@ -1,14 +1,9 @@
 //! `wiperlab modes`.
 
-use super::args::GlobalArgs;
-use super::failure::{CommandOutcome, Failure};
-use super::files::FigureArgs;
-use super::files::Overwrite;
 use super::load::{print_warnings, read_scene};
+use super::prelude::*;
 use crate::figures::modes::draw_figures;
 use crate::model::modes::{NaturalMode, TipConstraint, body_frequencies, natural_modes};
-use clap::Args;
-use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct ModesArgs {
@@ -21,7 +16,7 @@ pub(crate) struct ModesArgs {
 }
 
 impl ModesArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let scene = read_scene(&self.scene)?;
         let blade = &scene.linkage;
         self.figures.check_folder(&FIGURES, self.overwrite)?;

@@ -2,7 +2,7 @@
 //! one filter here. A standard output that fails is reported at the end; one that nobody reads any more
 //! (`| head`) is no failure.
 
-use super::failure::Failure;
+use super::failure::{Failure, Outcome};
 use crate::text::escape_controls;
 use std::ffi::OsString;
 use std::fmt::Arguments;
@@ -51,7 +51,7 @@ pub(crate) fn write_stderr(text: &str) {
 }
 
 /// Whether everything that was said was written.
-pub(crate) fn check_stdout() -> Result<(), Failure> {
+pub(crate) fn check_stdout() -> Outcome<()> {
     let failed = STDOUT_FAILURE.lock().unwrap_or_else(PoisonError::into_inner);
     match failed.as_ref() {
         Some(error) if error.kind() != ErrorKind::BrokenPipe => Err(stdout_failure(error)),
@@ -60,7 +60,7 @@ pub(crate) fn check_stdout() -> Result<(), Failure> {
 }
 
 /// What clap says: help to standard output, a refusal to standard error. A refusal repeats what was typed.
-pub(crate) fn print_usage(error: &clap::Error, arguments: &[OsString]) -> Result<(), Failure> {
+pub(crate) fn print_usage(error: &clap::Error, arguments: &[OsString]) -> Outcome<()> {
     let typed = arguments.iter().any(|word| {
         let word = word.to_string_lossy();
         escape_controls(&word) != word

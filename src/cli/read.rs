@@ -33,7 +33,7 @@ pub fn read_recording(path: &Path) -> Result<(Recording, Option<f64>), Failure> 
 /// # Errors
 /// As [`read_scene`].
 pub fn read_problem(path: &Path) -> Result<Problem, Failure> {
-    Ok(super::load::LoadedJob::load(path)?.problem)
+    Ok(super::job::LoadedJob::load(path)?.problem)
 }
 
 /// Where a path leads that stands in a file: from the folder of that file.

@@ -4,11 +4,10 @@ mod fit_comparison;
 mod provenance;
 mod video;
 
-use super::args::GlobalArgs;
-use super::failure::{CommandOutcome, Failure, describe_early_end};
-use super::files::{OutputCommand, OutputFolder, Overwrite, RESULT_FILE, WritePolicy, figure_files};
-use super::load::{LoadedJob, job_path};
-use super::{files, progress};
+use super::failure::describe_early_end;
+use super::files::{RESULT_FILE, figure_files};
+use super::job::{LoadedJob, job_path};
+use super::prelude::*;
 use crate::compare::{ComparisonTable, FittedRecording, ModelRun, run_conditions};
 use crate::figures::{Drawing, FigureBlock};
 use crate::fit::job::Job;
@@ -17,9 +16,7 @@ use crate::report::json::report_json;
 use crate::report::page::render_page;
 use crate::report::verdict::ReportVerdict;
 use crate::report::{Report, assembly};
-use clap::Args;
-use std::path::{Path, PathBuf};
-use video::VideoFrames;
+use video::FramePictures;
 
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
@@ -37,9 +34,8 @@ pub(crate) struct ReportArgs {
 }
 
 impl ReportArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
-        let writer =
-            WritePolicy::new(OutputCommand::Report, self.overwrite).with_csv_dialect(global.csv_dialect);
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
+        let writer = global.write_policy(OutputCommand::Report, self.overwrite);
         let jobs: Vec<PathBuf> = self.fits.iter().map(|fit| job_path(fit)).collect();
         let missed = match jobs.as_slice() {
             [job] => {
@@ -65,22 +61,21 @@ struct ReportedFit {
     problem: LoadedJob,
     result: FitResult,
     /// Pictures of the frames of every recording that has some.
-    videos: Vec<Option<VideoFrames>>,
+    videos: Vec<Option<FramePictures>>,
 }
 
 /// What makes a report of the model at the estimates.
 type ReportBuilder = fn(&Job, &[FittedRecording], &[ModelRun], &FitResult) -> Report;
 
 impl ReportedFit {
-    fn load(job: &Path) -> Result<Self, Failure> {
+    fn load(job: &Path) -> Outcome<Self> {
         let problem = LoadedJob::load(job)?;
         let path = problem.folder.join(RESULT_FILE);
         if !path.exists() {
-            return Err(Failure::Input(format!(
-                "{}: no such file; run `wiperlab fit {}` first",
+            return Err(Failure::at(
                 path.display(),
-                problem.file
-            )));
+                format!("no such file; run `wiperlab fit {}` first", problem.file),
+            ));
         }
         let file = path.display().to_string();
         let text = files::read_json(&path)?;
@@ -94,7 +89,7 @@ impl ReportedFit {
         }
         result.check_against_job(problem.job(), &file).map_err(Failure::input)?;
         problem.problem.check_result(&result, &file).map_err(Failure::input)?;
-        let videos = problem.recordings().map(|(path, loaded)| VideoFrames::load(path, loaded));
+        let videos = problem.recordings().map(|(path, loaded)| FramePictures::load(path, loaded));
         let videos = videos.collect::<Result<_, _>>()?;
         Ok(Self { name: files::display_name(&problem.folder), problem, result, videos })
     }
@@ -104,12 +99,12 @@ impl ReportedFit {
         let measured = measured.map(|(loaded, video)| FittedRecording {
             recording: &loaded.recording,
             file: loaded.file.as_ref(),
-            film: video.as_ref().map(VideoFrames::as_film),
+            film: video.as_ref().map(FramePictures::as_film),
         });
         measured.collect()
     }
 
-    fn run_best_models(&self) -> Result<Vec<ModelRun>, Failure> {
+    fn run_best_models(&self) -> Outcome<Vec<ModelRun>> {
         let model = self.problem.problem.fitted_model(&self.result).map_err(Failure::input)?;
         let best = run_conditions(self.problem.job(), &model, &self.result);
         let best = best
@@ -122,9 +117,9 @@ impl ReportedFit {
 
     /// The report, made by [`comparison::build_report`] or, where its figures are not asked for, by
     /// [`comparison::in_words`].
-    fn build_report(&self, made: ReportBuilder, best: &[ModelRun]) -> Result<Report, Failure> {
+    fn build_report(&self, made: ReportBuilder, best: &[ModelRun]) -> Outcome<Report> {
         let mut report = made(self.problem.job(), &self.measured_recordings(), best, &self.result);
-        self.videos.iter().flatten().try_for_each(VideoFrames::check_pictures)?;
+        self.videos.iter().flatten().try_for_each(FramePictures::check_pictures)?;
         for (line, (path, loaded)) in report.recordings.iter_mut().zip(self.problem.recordings()) {
             line.add_findings(loaded.changed_sources(path));
         }
@@ -139,7 +134,7 @@ pub(crate) fn write_report(
     out: &Path,
     writer: &WritePolicy,
     global: &GlobalArgs,
-) -> Result<bool, Failure> {
+) -> Outcome<bool> {
     check_report_folder(out, writer)?;
     let steps = progress::start_steps("report", global.quiet);
     let report = {
@@ -186,7 +181,7 @@ impl ReportFiles<'_> {
         folder: &Path,
         writer: &WritePolicy,
         global: &GlobalArgs,
-    ) -> Result<(), Failure> {
+    ) -> Outcome<()> {
         files::write_outputs(folder, writer, &self.to_files())?;
         if !global.quiet {
             self.summary.iter().for_each(|line| print_line!("{line}"));
@@ -210,6 +205,6 @@ impl ReportFiles<'_> {
 }
 
 /// Refuses a folder that a report must not be written into, before the model is run.
-pub(crate) fn check_report_folder(folder: &Path, writer: &WritePolicy) -> Result<(), Failure> {
+pub(crate) fn check_report_folder(folder: &Path, writer: &WritePolicy) -> Outcome<()> {
     OutputFolder::check(folder, writer, &[JSON_FILE, PAGE_FILE]).map(|_| ())
 }

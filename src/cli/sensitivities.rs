@@ -1,9 +1,7 @@
 //! `wiperlab simulate --sensitivities`: derivatives of a run by what the user names.
 
-use super::failure::Failure;
-use super::files::OutputFolder;
 use super::files::StreamedTable;
-use super::interrupt;
+use super::prelude::*;
 use crate::model::parameters;
 use crate::simulate::outputs::{EVENTS_HEADER, push_event_row};
 use crate::simulate::scene::Scene;
@@ -37,11 +35,7 @@ pub(crate) struct SensitivityRequest {
 
 impl SensitivityRequest {
     /// Of these names; `None` where there is none.
-    pub(crate) fn parse(
-        scene: &Scene,
-        names: &[String],
-        effort: &SolverOptions,
-    ) -> Result<Option<Self>, Failure> {
+    pub(crate) fn parse(scene: &Scene, names: &[String], effort: &SolverOptions) -> Outcome<Option<Self>> {
         if names.is_empty() {
             return Ok(None);
         }
@@ -77,7 +71,7 @@ impl SensitivityRequest {
         effort: SolverOptions,
         place: &OutputFolder,
         times: impl Iterator<Item = f64>,
-    ) -> Result<[StreamedTable; 2], Failure> {
+    ) -> Outcome<[StreamedTable; 2]> {
         let by = |column: &str| -> String {
             self.names.iter().fold(String::new(), |row, name| row + &format!(",d_{column}_d_{name}"))
         };

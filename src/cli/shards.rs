@@ -1,13 +1,12 @@
 //! Shards on disk: `FOLDER/shards/K-of-N.jsonl` next to the results of a study, each written by one program.
 
-use super::failure::Failure;
+use super::prelude::*;
 use crate::checkpoint::{
     CheckpointError, CheckpointHeader, CheckpointReader, CheckpointRecord, Shard, StoredRecord,
 };
 use std::collections::BTreeMap;
 use std::fs::{self, File};
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
 
 /// Folder of the shards in that of the results.
 pub(crate) const SHARDS_FOLDER: &str = "shards";
@@ -18,12 +17,12 @@ pub(crate) fn shard_checkpoint(folder: &Path, shard: Shard) -> PathBuf {
 }
 
 /// The shards in a folder of results, by number of shards and number.
-pub(crate) fn shard_files(folder: &Path) -> Result<Vec<(Shard, PathBuf)>, Failure> {
+pub(crate) fn shard_files(folder: &Path) -> Outcome<Vec<(Shard, PathBuf)>> {
     let folder = folder.join(SHARDS_FOLDER);
     if !folder.is_dir() {
         return Ok(Vec::new());
     }
-    let unread = |error| Failure::Input(format!("{}: cannot be read: {error}", folder.display()));
+    let unread = |error| Failure::at(folder.display(), format!("cannot be read: {error}"));
     let mut shards = Vec::new();
     for entry in fs::read_dir(&folder).map_err(unread)? {
         let name = entry.map_err(unread)?.file_name();
@@ -42,7 +41,7 @@ pub(crate) fn scan_shard<R: CheckpointRecord>(
     header: &CheckpointHeader<R::Body>,
     wanted: bool,
     mut each: impl FnMut(StoredRecord<R>),
-) -> Result<(), Failure> {
+) -> Outcome<()> {
     let name = path.display().to_string();
     let Ok(file) = File::open(path) else { return Ok(()) };
     let look = || -> Result<(), CheckpointError> {

@@ -1,29 +1,21 @@
 //! `wiperlab simulate`.
 
-use super::args::GlobalArgs;
-use super::failure::{CommandOutcome, Failure};
-use super::files::FigureArgs;
-use super::files::StreamedTable;
-use super::files::{OutputCommand, OutputFolder, Overwrite, SIMULATION_SUMMARY, WritePolicy};
-use super::interrupt;
+use super::files::{SIMULATION_SUMMARY, StreamedTable};
 use super::load::{print_warnings, read_scene};
 use super::method::MethodArgs;
+use super::prelude::*;
 use super::progress::ProgressObserver;
-use super::sensitivities;
-use super::sensitivities::SensitivityRequest;
+use super::sensitivities::{self, SensitivityRequest};
 use crate::figures::motion;
 use crate::recording::files::{HEADER, push_trace_row};
-use crate::simulate::RunMotion;
 use crate::simulate::outputs::{
     EVENTS_HEADER, EnergyAudit, STATE_HEADER, SampleObserver, SimulationSummary, push_event_row,
     push_state_row, recorded_points_m, sample_times,
 };
 use crate::simulate::scene::{OutputTable, Scene};
 use crate::simulate::{
-    ModelSample, Observer, RunStatus, SolutionSegment, SolverOptions, Transition, run_scene_with,
+    ModelSample, Observer, RunMotion, RunStatus, SolutionSegment, SolverOptions, Transition, run_scene_with,
 };
-use clap::Args;
-use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 #[derive(Debug, Args)]
@@ -46,12 +38,11 @@ pub(crate) struct SimulateArgs {
 }
 
 impl SimulateArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let scene = read_scene(&self.scene)?;
         let effort = self.method.integration_effort(&scene)?;
         let sensitivities = SensitivityRequest::parse(&scene, &self.sensitivities, &effort)?;
-        let writer =
-            WritePolicy::new(OutputCommand::Simulate, self.overwrite).with_csv_dialect(global.csv_dialect);
+        let writer = global.write_policy(OutputCommand::Simulate, self.overwrite);
         let watch = ProgressObserver::new([scene.start_s, scene.run.stop_s], "simulate", global);
         let names = output_names(&scene, sensitivities.is_some());
         let place = OutputFolder::check(&self.out, &writer, &names)?;
@@ -64,11 +55,7 @@ impl SimulateArgs {
         // (a run more than the tables need: they hold no more than a row of it)
         let drawn = || vec![(FIGURE, motion::draw_figure(scene.title(), &RunMotion::simulate(&scene)))];
         self.figures.write_figures(self.overwrite, global, drawn)?;
-        Ok(if summary.status == RunStatus::Completed {
-            CommandOutcome::Done
-        } else {
-            CommandOutcome::StoppedEarly
-        })
+        Ok(CommandOutcome::done_if(summary.status == RunStatus::Completed))
     }
 }
 
@@ -95,7 +82,7 @@ fn run_to_files(
     sensitivities: Option<&SensitivityRequest>,
     place: &OutputFolder,
     mut watch: ProgressObserver,
-) -> Result<SimulationSummary, Failure> {
+) -> Outcome<SimulationSummary> {
     let table = |output: OutputTable, name, header: &str, least_rows| {
         scene
             .run

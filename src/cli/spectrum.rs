@@ -2,12 +2,10 @@
 
 mod tables;
 
-use super::args::GlobalArgs;
 use super::args::parse_count;
-use super::failure::{CommandOutcome, Failure};
-use super::files::{OutputCommand, OutputFolder, Overwrite, WritePolicy, figure_files, write_outputs};
+use super::files::{figure_files, write_outputs};
 use super::load::{LoadedRecording, load_recording};
-use super::progress;
+use super::prelude::*;
 use crate::chart::Figure;
 use crate::figures::analysis::{AnalysedWindow, compare_spectra};
 use crate::figures::spectrum::{self, SpectraPlot};
@@ -17,9 +15,7 @@ use crate::simulate::twin::film::{DropoutPattern, film_like_recording};
 use crate::spectrum::{
     Detrend, FASTEST_HZ, MAX_COMPONENTS, SampledRecord, SpectralAnalysis, SpectrumSettings,
 };
-use clap::Args;
 use std::ops::Range;
-use std::path::{Path, PathBuf};
 
 /// The tables of a spectrum.
 const TABLES: [&str; 4] = ["components.json", "spectrum.json", "spectrum.csv", "ridge.csv"];
@@ -112,13 +108,13 @@ impl SpectrumArgs {
     }
 
     /// The files of a recording at hand.
-    pub(crate) fn output_files(&self, recording: Recording) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+    pub(crate) fn output_files(&self, recording: Recording) -> Outcome<Vec<(String, Vec<u8>)>> {
         let request = self.parse_request()?;
         let exposure_s = self.given_exposure_s()?;
         request.output_files(&request.study_recording(exposure_s, recording)?)
     }
 
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let request = self.parse_request()?;
         OutputFolder::check(&self.out, &self.write_policy(global), &TABLES)?;
         let steps = progress::start_steps("spectrum", global.quiet);
@@ -163,7 +159,7 @@ impl SpectrumArgs {
         request: &SpectrumRequest,
         outputs: &[(String, Vec<u8>)],
         studied: &[&StudiedWindow],
-    ) -> Result<CommandOutcome, Failure> {
+    ) -> Outcome {
         write_outputs(&self.out, &self.write_policy(global), outputs)?;
         if !global.quiet {
             studied.iter().for_each(|studied| tables::print_summary(request.channel, studied));
@@ -172,16 +168,16 @@ impl SpectrumArgs {
     }
 
     fn write_policy(&self, global: &GlobalArgs) -> WritePolicy {
-        WritePolicy::new(OutputCommand::Spectrum, self.overwrite).with_csv_dialect(global.csv_dialect)
+        global.write_policy(OutputCommand::Spectrum, self.overwrite)
     }
 
     /// Exposure as given, or as the recording says.
-    fn exposure_for(&self, loaded: &LoadedRecording) -> Result<Option<f64>, Failure> {
+    fn exposure_for(&self, loaded: &LoadedRecording) -> Outcome<Option<f64>> {
         let recorded = || loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
         Ok(self.given_exposure_s()?.or_else(recorded))
     }
 
-    fn given_exposure_s(&self) -> Result<Option<f64>, Failure> {
+    fn given_exposure_s(&self) -> Outcome<Option<f64>> {
         match self.exposure_s {
             Some(found) if !(found.is_finite() && found > 0.0) => Err(Failure::Input(format!(
                 "--exposure-s: found {found}, expected a time in seconds above 0, like 0.0002"
@@ -190,7 +186,7 @@ impl SpectrumArgs {
         }
     }
 
-    fn parse_request(&self) -> Result<SpectrumRequest, Failure> {
+    fn parse_request(&self) -> Outcome<SpectrumRequest> {
         let named =
             |option: &str, error: &dyn std::fmt::Display| Failure::Input(format!("{option}: {error}"));
         let channel = Channel::parse(&self.channel).map_err(|e| named("--channel", &e))?;
@@ -216,11 +212,7 @@ impl SpectrumArgs {
 }
 
 impl SpectrumRequest {
-    fn study_recording(
-        &self,
-        exposure_s: Option<f64>,
-        recording: Recording,
-    ) -> Result<StudiedWindow, Failure> {
+    fn study_recording(&self, exposure_s: Option<f64>, recording: Recording) -> Outcome<StudiedWindow> {
         let instants = ReversalInstants::find_instants(&recording);
         let frames = self.window.resolve_frames(&recording, &instants).map_err(Failure::input)?;
         let grid = recording.grid();
@@ -253,7 +245,7 @@ impl SpectrumRequest {
         Ok(StudiedWindow { recording, exposure_s, frames, analysis, note, hint })
     }
 
-    fn output_files(&self, studied: &StudiedWindow) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+    fn output_files(&self, studied: &StudiedWindow) -> Outcome<Vec<(String, Vec<u8>)>> {
         let shown = AnalysedWindow {
             recording: &studied.recording,
             channel: self.channel,
@@ -302,7 +294,7 @@ fn flip_hint(instants: &ReversalInstants, (from_s, to_s): (f64, f64)) -> Option<
     ))
 }
 
-fn parse_band(text: &str) -> Result<(f64, f64), Failure> {
+fn parse_band(text: &str) -> Outcome<(f64, f64)> {
     let ends = text
         .split_once("..")
         .and_then(|(low, high)| Some((low.trim().parse().ok()?, high.trim().parse().ok()?)));

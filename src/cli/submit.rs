@@ -5,14 +5,12 @@ mod plan;
 mod slurm;
 mod tasks;
 
-use super::args::{GlobalArgs, TimeLimit};
-use super::failure::{CommandOutcome, Failure};
-use super::files;
-use super::files::{FileSize, OutputCommand, Overwrite, WritePolicy};
+use super::args::TimeLimit;
+use super::files::FileSize;
+use super::prelude::*;
 use crate::cli;
-use clap::{Args, ValueEnum};
+use clap::ValueEnum;
 use plan::{SubmissionPlan, SubmittedWork, absolute_path};
-use std::path::{Path, PathBuf};
 use std::process::Command;
 pub(crate) use tasks::TaskList;
 
@@ -58,7 +56,7 @@ pub(crate) struct SubmitArgs {
 }
 
 impl SubmitArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let plan = self.make_plan(global)?;
         match self.scheduler {
             Scheduler::Slurm => self.submit_scripts(&plan, global),
@@ -66,7 +64,7 @@ impl SubmitArgs {
         }
     }
 
-    fn make_plan(&self, global: &GlobalArgs) -> Result<SubmissionPlan, Failure> {
+    fn make_plan(&self, global: &GlobalArgs) -> Outcome<SubmissionPlan> {
         let tasks = self.tasks.clone().unwrap_or_else(|| TaskList::all(self.shards));
         if let Some(last) = tasks.last().filter(|last| *last >= self.shards) {
             return Err(Failure::Input(format!(
@@ -93,7 +91,7 @@ impl SubmitArgs {
         })
     }
 
-    fn run_locally(&self, plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    fn run_locally(&self, plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
         if !self.directives.is_empty() {
             return Err(Failure::Input(format!(
                 "--directive: found \"{}\" with --scheduler local, expected none, as there is no scheduler; \
@@ -109,7 +107,7 @@ impl SubmitArgs {
     }
 
     /// Writes the scripts and hands them over.
-    fn submit_scripts(&self, plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    fn submit_scripts(&self, plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
         let scripts = slurm::slurm_scripts(plan);
         if self.print {
             print_scripts(&scripts);

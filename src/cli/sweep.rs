@@ -4,21 +4,17 @@ mod results;
 mod shards;
 mod solve;
 
-use super::args::{GlobalArgs, TimeLimit};
+use super::args::TimeLimit;
 use super::checkpoint::CHECKPOINT_FILE;
-use super::failure::{CommandOutcome, Failure};
-use super::files::{OutputCommand, Overwrite, WritePolicy};
 use super::load::read_named_scene;
-use super::{files, interrupt};
+use super::prelude::*;
 use crate::checkpoint::Shard;
 use crate::simulate::scene::Scene;
 use crate::sweep::journal::{SweepHeader, study_header};
 use crate::sweep::{CollectError, PointCollection, Study};
-use clap::Args;
 pub(crate) use shards::find_study;
 use std::fs::File;
 use std::io::BufReader;
-use std::path::{Path, PathBuf};
 
 #[derive(Debug, Args)]
 pub(crate) struct SweepArgs {
@@ -43,7 +39,7 @@ pub(crate) struct SweepArgs {
 }
 
 impl SweepArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let problem = LoadedStudy::load(&self.sweep)?;
         if let Some(TimeLimit(time)) = self.time_limit {
             interrupt::set_time_limit(time);
@@ -53,8 +49,7 @@ impl SweepArgs {
         }
         let journal = self.out.join(CHECKPOINT_FILE);
         files::check_path_free(&journal)?;
-        let writer =
-            WritePolicy::new(OutputCommand::Sweep, self.overwrite).with_csv_dialect(global.csv_dialect);
+        let writer = global.write_policy(OutputCommand::Sweep, self.overwrite);
         problem.check_outputs(&self.out, &writer)?;
         if !problem.solve(&journal, self.resume, global)? {
             return Ok(CommandOutcome::StoppedEarly);
@@ -75,7 +70,7 @@ pub(crate) struct LoadedStudy {
 }
 
 impl LoadedStudy {
-    pub(crate) fn load(path: &Path) -> Result<Self, Failure> {
+    pub(crate) fn load(path: &Path) -> Outcome<Self> {
         let file = path.display().to_string();
         let text = files::read_toml(path)?;
         let study = Study::parse(&file, &text).map_err(Failure::input)?;
@@ -91,16 +86,12 @@ impl LoadedStudy {
     }
 
     /// No point yet; the temporary file lies where `out` will be.
-    pub(crate) fn new_collection(&self, out: &Path) -> Result<PointCollection<File>, Failure> {
+    pub(crate) fn new_collection(&self, out: &Path) -> Outcome<PointCollection<File>> {
         Ok(PointCollection::new(self.header(), files::create_scratch_file(out)?))
     }
 
     /// Adds the points of a journal.
-    pub(crate) fn add_checkpoint(
-        &self,
-        points: &mut PointCollection<File>,
-        journal: &Path,
-    ) -> Result<(), Failure> {
+    pub(crate) fn add_checkpoint(&self, points: &mut PointCollection<File>, journal: &Path) -> Outcome<()> {
         let name = journal.display().to_string();
         let refused = |problem: String| Failure::Input(format!("{name}: {problem}"));
         let file = File::open(journal).map_err(|error| refused(format!("cannot be read: {error}")))?;

@@ -1,12 +1,8 @@
 //! `wiperlab twin`.
 
-use super::args::GlobalArgs;
 use super::failure::describe_early_end;
-use super::failure::{CommandOutcome, Failure};
-use super::files;
-use super::files::FigureArgs;
-use super::files::{OutputCommand, OutputFolder, Overwrite, WritePolicy};
 use super::load::read_named_scene;
+use super::prelude::*;
 use super::progress::ProgressObserver;
 use crate::figures::twin as figure;
 use crate::recording::Recording;
@@ -14,14 +10,11 @@ use crate::recording::files::{CameraEntry, DESCRIPTION_FILE, RecordingFile, TRAC
 use crate::recording::quality::measure_quality;
 use crate::simulate::SolverOptions;
 use crate::simulate::scene::Scene;
-use crate::simulate::twin;
 use crate::simulate::twin::spec::TwinSpec;
 use crate::simulate::twin::{
-    Camera, TwinView, add_tracking_noise, film_scene, film_scene_with_observer, true_parameters,
+    self, Camera, TwinView, add_tracking_noise, film_scene, film_scene_with_observer, true_parameters,
 };
 use crate::text::text_sha256;
-use clap::Args;
-use std::path::PathBuf;
 
 #[derive(Debug, Args)]
 pub(crate) struct TwinArgs {
@@ -37,7 +30,7 @@ pub(crate) struct TwinArgs {
 }
 
 impl TwinArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let file = self.spec.display().to_string();
         let text = files::read_toml(&self.spec)?;
         let spec = TwinSpec::parse(&file, &text).map_err(Failure::input)?;
@@ -97,7 +90,7 @@ impl TwinArgs {
         seen: &TwinView,
         tracked: &Recording,
         global: &GlobalArgs,
-    ) -> Result<(), Failure> {
+    ) -> Outcome<()> {
         if self.figures.folder.is_none() {
             return Ok(());
         }
@@ -137,7 +130,7 @@ fn describe_recording(
     scene: &Scene,
     text: &str,
     recording: &Recording,
-) -> Result<RecordingFile, Failure> {
+) -> Outcome<RecordingFile> {
     let exposure_s = (spec.camera.exposure_s > 0.0).then_some(spec.camera.exposure_s);
     let camera = CameraEntry {
         frame_rate_hz: spec.camera.frame_rate_hz,

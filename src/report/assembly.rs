@@ -2,20 +2,18 @@
 
 mod tables;
 
-use super::summary;
-use super::{CombinationLine, FailureCount, FigureGroup, FigureSubject, ProbeLine, Report, SearchLine};
-use crate::compare::{
-    ComparisonSummary, ConditionComparison, FittedRecording, ModelRun, run_conditions,
-    tables::comparison_tables,
+use super::{
+    CombinationLine, FailureCount, FigureGroup, FigureSubject, ProbeLine, Report, SearchLine, summary,
 };
-use crate::figures::FigureBlock;
+use crate::compare::tables::comparison_tables;
+use crate::compare::{ComparisonSummary, ConditionComparison, FittedRecording, ModelRun, run_conditions};
 use crate::figures::corner::CornerPlot;
 use crate::figures::figure_text::make_file_names_unique;
 use crate::figures::profiles::ProfilePlot;
 use crate::figures::pulls::PullPlot;
 use crate::figures::{
-    animation, cycle, evidence, friction, history, phase_portrait, poses, residuals, spectrogram, spectrum,
-    video_frames,
+    FigureBlock, animation, cycle, evidence, friction, history, phase_portrait, poses, residuals,
+    spectrogram, spectrum, video_frames,
 };
 use crate::fit::Problem;
 use crate::fit::evaluation::{FailureReason, RunFailure};

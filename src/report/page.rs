@@ -11,13 +11,9 @@ use super::verdict::ReportVerdict;
 use super::{
     FigureBlock, FigureSubject, Provenance, Report, ReportSummary, RunSummary, SourceFile, SummaryQuantity,
 };
-use crate::text;
-use crate::text::{DASH, format_interval, format_number, format_percent};
-use html::{
-    CellStyle, HtmlCell, HtmlTable, PageSection, escape_text, facts_list, figures_html, isolate_name,
-    reading_hint, render_document, sentence_html, sentence_list, statements_html, verdict_cell,
-    words_with_keys,
-};
+use crate::text::{self, DASH, format_interval, format_number, format_percent};
+use html::CellStyle::{Bad, Name, Number, Prose, Words};
+use html::*;
 
 impl Report {
     /// The page of the report: one HTML file; the same report always gives the same bytes.
@@ -157,18 +153,8 @@ fn headline_html(said: &Statement) -> String {
 }
 
 fn quantities_html(list: &[SummaryQuantity]) -> String {
-    let head = [
-        ("quantity", CellStyle::Prose),
-        ("value", CellStyle::Number),
-        ("95 % interval", CellStyle::Number),
-        ("", CellStyle::Words),
-    ];
-    HtmlTable {
-        caption: "The blade",
-        head: HtmlTable::column_heads(&head),
-        rows: list.iter().map(quantity_row).collect(),
-    }
-    .render()
+    let head = [(Prose, "quantity"), (Number, "value|95 % interval"), (Words, "")];
+    render_table("The blade", column_heads(&head), list.iter().map(quantity_row).collect())
 }
 
 fn quantity_row(q: &SummaryQuantity) -> Vec<HtmlCell> {
@@ -182,12 +168,12 @@ fn quantity_row(q: &SummaryQuantity) -> Vec<HtmlCell> {
     let sure = if q.fitted {
         verdict_cell(q.identified, ["determined", "not determined"])
     } else {
-        (escape_text("from the scene"), CellStyle::Words)
+        (escape_text("from the scene"), Words)
     };
     vec![
-        (words_with_keys(&q.name, &q.keys), CellStyle::Prose),
-        (format!("{}{unit}", format_number(q.value * factor)), CellStyle::Number),
-        (escape_text(&range), CellStyle::Number),
+        (words_with_keys(&q.name, &q.keys), Prose),
+        (format!("{}{unit}", format_number(q.value * factor)), Number),
+        (escape_text(&range), Number),
         sure,
     ]
 }
@@ -208,30 +194,16 @@ pub(in crate::report) fn provenance_html(p: &Provenance) -> String {
 
 fn files_table(list: &[SourceFile]) -> String {
     let row = |f: &SourceFile| {
-        let synthetic = if f.synthetic {
-            ("synthetic".to_owned(), CellStyle::Bad)
-        } else {
-            (DASH.to_owned(), CellStyle::Words)
-        };
+        let synthetic = if f.synthetic { ("synthetic".to_owned(), Bad) } else { (DASH.to_owned(), Words) };
         vec![
-            (isolate_name(&f.name), CellStyle::Words),
-            (escape_text(&f.kind), CellStyle::Words),
+            (isolate_name(&f.name), Words),
+            (escape_text(&f.kind), Words),
             synthetic,
-            (format!("<code class=\"hash\">{}</code>", escape_text(&f.sha256)), CellStyle::Words),
+            (format!("<code class=\"hash\">{}</code>", escape_text(&f.sha256)), Words),
         ]
     };
-    let head = [
-        ("file", CellStyle::Words),
-        ("what it is", CellStyle::Words),
-        ("data", CellStyle::Words),
-        ("SHA-256", CellStyle::Words),
-    ];
-    HtmlTable {
-        caption: "Files behind this report",
-        head: HtmlTable::column_heads(&head),
-        rows: list.iter().map(row).collect(),
-    }
-    .render()
+    let head = [(Words, "file|what it is|data|SHA-256")];
+    render_table("Files behind this report", column_heads(&head), list.iter().map(row).collect())
 }
 
 fn commands_html(p: &Provenance) -> String {
@@ -265,7 +237,7 @@ const EVENT_ROWS: [EventRow; 12] = [
     ("how it ended", |r| format!("{}: {}", r.status.name(), r.status.meaning()), false),
     (
         "from, to",
-        |r| format!("{} s, {} s", format_number(r.started_at_s), format_number(r.stopped_at_s)),
+        |r| [r.started_at_s, r.stopped_at_s].map(|s| format!("{} s", format_number(s))).join(", "),
         false,
     ),
     ("loss of contact", |r| count_text(r.contact_losses), true),
@@ -273,37 +245,35 @@ const EVENT_ROWS: [EventRow; 12] = [
     ("jam (Painlev\u{e9} paradox)", |r| count_text(r.jams), true),
     ("indeterminate contact", |r| occurrence_text(r.indeterminate), true),
     ("chattering", |r| occurrence_text(r.chattering), true),
-    ("least normal force in contact", |r| r.least_normal_force_n.map_or_else(absent_text, force_text), false),
+    ("least normal force in contact", |r| text_or_none(r.least_normal_force_n, force_text), false),
     (
         "least Painlev\u{e9} indicator in slip",
-        |r| r.least_painleve_indicator.map_or_else(absent_text, format_number),
+        |r| text_or_none(r.least_painleve_indicator, format_number),
         false,
     ),
     ("changes of mode", |r| r.transitions.to_string(), false),
     (
         "sticks, share of the run",
-        |r| {
-            format!(
-                "{}, {}",
-                count_text(r.sticks),
-                r.stick_share.map_or_else(absent_text, |s| format_percent((s * 1e3).round() / 1e3))
-            )
-        },
+        |r| [count_text(r.sticks), text_or_none(r.stick_share, share_text)].join(", "),
         false,
     ),
     (
         "longest stick",
-        |r| r.longest_stick_s.map_or_else(absent_text, |s| format!("{} ms", format_number(1e3 * s))),
+        |r| text_or_none(r.longest_stick_s, |s| format!("{} ms", format_number(1e3 * s))),
         false,
     ),
 ];
 
 const NO_EVENTS: &str = "none";
-/// Less is the rounding of a force that vanishes, N: the blade presses with some 0.1 N.
+/// Smaller forces are rounding errors of zero, N: the blade presses with some 0.1 N.
 const ROUNDING_N: f64 = 1e-9;
 
 fn force_text(newtons: f64) -> String {
     if newtons.abs() < ROUNDING_N { "0 N".to_owned() } else { format!("{} N", format_number(newtons)) }
+}
+
+fn share_text(share: f64) -> String {
+    format_percent((share * 1e3).round() / 1e3)
 }
 
 fn count_text(n: usize) -> String {
@@ -311,11 +281,11 @@ fn count_text(n: usize) -> String {
 }
 
 fn occurrence_text(happened: bool) -> String {
-    if happened { "ended the run".to_owned() } else { NO_EVENTS.to_owned() }
+    if happened { "ended the run" } else { NO_EVENTS }.to_owned()
 }
 
-fn absent_text() -> String {
-    NO_EVENTS.to_owned()
+fn text_or_none(value: Option<f64>, text: impl Fn(f64) -> String) -> String {
+    value.map_or_else(|| NO_EVENTS.to_owned(), text)
 }
 
 /// The table, a column a condition.
@@ -323,24 +293,24 @@ pub(super) fn events_table(runs: &[RunSummary]) -> String {
     let one = |(what, of, hard): &EventRow| -> Vec<HtmlCell> {
         let cell = |run| {
             let value = of(run);
-            let set = if *hard && value != NO_EVENTS { CellStyle::Bad } else { CellStyle::Words };
+            let set = if *hard && value != NO_EVENTS { Bad } else { Words };
             (escape_text(&value), set)
         };
-        std::iter::once((escape_text(what), CellStyle::Words)).chain(runs.iter().map(cell)).collect()
+        std::iter::once((escape_text(what), Words)).chain(runs.iter().map(cell)).collect()
     };
     if runs.is_empty() {
         return String::new();
     }
-    let heads = std::iter::once((escape_text("event"), CellStyle::Words))
-        .chain(runs.iter().map(|run| (isolate_name(&run.name), CellStyle::Name)));
-    let table = HtmlTable {
-        caption: "Hard events of the best model, by condition",
-        head: heads.collect(),
-        rows: EVENT_ROWS.iter().map(one).collect(),
-    };
+    let names = runs.iter().map(|run| (isolate_name(&run.name), Name));
+    let head = column_heads(&[(Words, "event")]).into_iter().chain(names).collect();
     let words = "The normal force falls to zero where contact is lost; a Painlev\u{e9} indicator of zero or \
                  less is a jam.";
-    reading_hint(words) + &table.render()
+    reading_hint(words)
+        + &render_table(
+            "Hard events of the best model, by condition",
+            head,
+            EVENT_ROWS.iter().map(one).collect(),
+        )
 }
 
 #[cfg(test)]

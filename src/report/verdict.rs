@@ -1,8 +1,7 @@
 //! What a report says of a fit, built once for the page, the JSON and the terminal.
 
-use super::Report;
 use super::rich_text::{Sentence, Statement};
-use super::summary;
+use super::{Report, summary};
 use crate::compare::{Comparison, ParameterLine, RunSummary, Truth};
 use crate::figures::OPPOSED;
 use crate::fit::misfit::{ChannelMisfit, TraceMisfit, far_from_priors, unexplained_headline};

@@ -1,16 +1,15 @@
 //! What a command may overwrite: what it made itself and can prove, the rest with `--force`, and never a
 //! measured recording.
 
-use super::marker::{FolderMarker, hash_file};
-use super::marker::{OutputCommand, WritePolicy};
+use super::marker::{FolderMarker, OutputCommand, WritePolicy, hash_file};
 use super::preserved_files::{FolderRecording, SIMULATION_SUMMARY, is_simulation_summary};
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, Outcome};
 use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE};
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
 /// Refuses files that are those of a measured recording: no command replaces them, whatever it knows of them.
-pub(crate) fn refuse_measured(folder: &Path, names: &[&str]) -> Result<(), Failure> {
+pub(crate) fn refuse_measured(folder: &Path, names: &[&str]) -> Outcome<()> {
     let (marker, _) = FolderMarker::load(folder)?;
     let FolderRecording::Measured { why, files, .. } = FolderRecording::detect(folder, &marker)? else {
         return Ok(());
@@ -21,10 +20,12 @@ pub(crate) fn refuse_measured(folder: &Path, names: &[&str]) -> Result<(), Failu
 }
 
 fn other_recording_failure(path: &Path, why: &str, advice: &str) -> Failure {
-    Failure::Input(format!(
-        "{}: found another recording, which {why}; expected none, as no measured recording is overwritten: {advice}",
-        path.display()
-    ))
+    Failure::at(
+        path.display(),
+        format!(
+            "found another recording, which {why}; expected none, as no measured recording is overwritten: {advice}"
+        ),
+    )
 }
 
 /// A folder before a command writes into it.
@@ -40,7 +41,7 @@ pub(crate) struct OutputGuard {
 impl OutputGuard {
     /// Refuses a folder whose recording the command would destroy or contradict; `names` are the files that
     /// it writes.
-    pub(crate) fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
+    pub(crate) fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Outcome<Self> {
         let (marker, unreadable) = FolderMarker::load(folder)?;
         let guard = Self { folder: folder.to_owned(), writer: writer.clone(), marker, unreadable };
         guard.protect_recording(names)?;
@@ -51,11 +52,7 @@ impl OutputGuard {
     /// Refuses to overwrite a file that is not provably the command's own; gives the hash of one that is.
     /// `coming` is the hash of what is to be written, where it is known: writing what is there changes
     /// nothing.
-    pub(crate) fn check_overwrite(
-        &self,
-        name: &str,
-        coming: Option<&str>,
-    ) -> Result<Option<String>, Failure> {
+    pub(crate) fn check_overwrite(&self, name: &str, coming: Option<&str>) -> Outcome<Option<String>> {
         let path = self.folder.join(name);
         let Some(found) = hash_file(&path)? else { return Ok(None) };
         let by = self.marker.maker_if_unchanged(name, &found);
@@ -74,12 +71,14 @@ impl OutputGuard {
         };
         let unreadable = self.unreadable.iter().map(|why| format!(" ({why})")).collect::<String>();
         let maker = self.writer.maker;
-        Err(Failure::Input(format!(
-            "{}: found {what}{unreadable}, expected none or one that `wiperlab {}` made and nobody changed since; {}, or overwrite it with --force",
+        Err(Failure::at(
             path.display(),
-            maker.command_name(),
-            maker.overwrite_advice()
-        )))
+            format!(
+                "found {what}{unreadable}, expected none or one that `wiperlab {}` made and nobody changed since; {}, or overwrite it with --force",
+                maker.command_name(),
+                maker.overwrite_advice()
+            ),
+        ))
     }
 
     /// Files in the folder that go when the command has written `names`, none of which anything else holds:
@@ -109,7 +108,7 @@ impl OutputGuard {
     }
 
     /// A measured recording stays, whatever is asked for; an import of the same exports loses nothing of it.
-    fn protect_recording(&self, names: &[&str]) -> Result<(), Failure> {
+    fn protect_recording(&self, names: &[&str]) -> Outcome<()> {
         let FolderRecording::Measured { why, exports, files } =
             FolderRecording::detect(&self.folder, &self.marker)?
         else {
@@ -140,7 +139,7 @@ impl OutputGuard {
     }
 
     /// The description of one recording must not stand next to the trace of another.
-    fn refuse_contradiction(&self, names: &[&str]) -> Result<(), Failure> {
+    fn refuse_contradiction(&self, names: &[&str]) -> Outcome<()> {
         let other = match self.writer.maker {
             OutputCommand::Simulate => Some(DESCRIPTION_FILE).filter(|name| self.folder.join(name).exists()),
             OutputCommand::Import | OutputCommand::Twin => {

@@ -1,7 +1,7 @@
 //! Reading what the user names: regular files and, as `-`, standard input, up to a stated size. The size is
 //! checked before a byte is read and again while reading: a file may be sparse, grow, or have none.
 
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, Outcome};
 use std::fmt;
 use std::fs::{self, File, Metadata};
 use std::io::{self, ErrorKind, Read};
@@ -75,7 +75,7 @@ impl ReadLimit {
         }
     }
 
-    fn check_open_file(self, path: &Path, file: &File) -> Result<(), Failure> {
+    fn check_open_file(self, path: &Path, file: &File) -> Outcome<()> {
         let found = file.metadata().map_err(|error| read_failure(path, &error))?;
         check_regular_file(path, &found)?;
         if found.len() > self.largest.0 {
@@ -96,37 +96,36 @@ pub(crate) fn is_standard_input(path: &Path) -> bool {
 }
 
 /// Bytes of a file with data.
-pub(crate) fn read_data(path: &Path) -> Result<Vec<u8>, Failure> {
+pub(crate) fn read_data(path: &Path) -> Outcome<Vec<u8>> {
     read_limited(path, ReadLimit::for_data())
 }
 
 /// Refuses a file with data that is open, and larger than what is read into memory.
-pub(crate) fn check_data_size(path: &Path, file: &File) -> Result<(), Failure> {
+pub(crate) fn check_data_size(path: &Path, file: &File) -> Outcome<()> {
     ReadLimit::for_data().check_open_file(path, file)
 }
 
 /// Text of a UTF-8 file with data (a byte-order mark is dropped).
-pub(crate) fn read_text(path: &Path) -> Result<String, Failure> {
+pub(crate) fn read_text(path: &Path) -> Outcome<String> {
     decode_utf8(path, read_data(path)?)
 }
 
 /// Text of a TOML file, which people write.
-pub(crate) fn read_toml(path: &Path) -> Result<String, Failure> {
+pub(crate) fn read_toml(path: &Path) -> Outcome<String> {
     decode_utf8(path, read_limited(path, TOML_LIMIT)?)
 }
 
 /// Text of a JSON file, which this program writes.
-pub(crate) fn read_json(path: &Path) -> Result<String, Failure> {
+pub(crate) fn read_json(path: &Path) -> Outcome<String> {
     decode_utf8(path, read_limited(path, JSON_LIMIT)?)
 }
 
-fn decode_utf8(path: &Path, bytes: Vec<u8>) -> Result<String, Failure> {
+fn decode_utf8(path: &Path, bytes: Vec<u8>) -> Outcome<String> {
     let mut text = String::from_utf8(bytes).map_err(|error| {
-        Failure::Input(format!(
-            "{}: byte {} is not UTF-8; save the file as UTF-8",
+        Failure::at(
             path.display(),
-            error.utf8_error().valid_up_to()
-        ))
+            format!("byte {} is not UTF-8; save the file as UTF-8", error.utf8_error().valid_up_to()),
+        )
     })?;
     if text.starts_with('\u{feff}') {
         text.remove(0);
@@ -134,7 +133,7 @@ fn decode_utf8(path: &Path, bytes: Vec<u8>) -> Result<String, Failure> {
     Ok(text)
 }
 
-fn read_limited(path: &Path, limit: ReadLimit) -> Result<Vec<u8>, Failure> {
+fn read_limited(path: &Path, limit: ReadLimit) -> Outcome<Vec<u8>> {
     if is_standard_input(path) {
         return read_all(path, io::stdin().lock(), limit);
     }
@@ -145,7 +144,7 @@ fn read_limited(path: &Path, limit: ReadLimit) -> Result<Vec<u8>, Failure> {
     read_all(path, &file, limit)
 }
 
-fn read_all(path: &Path, from: impl Read, limit: ReadLimit) -> Result<Vec<u8>, Failure> {
+fn read_all(path: &Path, from: impl Read, limit: ReadLimit) -> Outcome<Vec<u8>> {
     let bytes = read_at_most(from, limit.largest).map_err(|error| read_failure(path, &error))?;
     bytes.ok_or_else(|| limit.too_large_failure(path, &format!("more than {}", limit.largest)))
 }
@@ -158,7 +157,7 @@ fn read_at_most(from: impl Read, largest: FileSize) -> io::Result<Option<Vec<u8>
 }
 
 /// Only a regular file has an end and gives the same twice.
-fn check_regular_file(path: &Path, found: &Metadata) -> Result<(), Failure> {
+fn check_regular_file(path: &Path, found: &Metadata) -> Outcome<()> {
     match found.file_type() {
         kind if kind.is_file() => Ok(()),
         kind if kind.is_dir() => Err(input_failure(path, "a folder, expected a file")),
@@ -181,7 +180,7 @@ fn read_failure(path: &Path, error: &io::Error) -> Failure {
 }
 
 fn input_failure(path: &Path, problem: &str) -> Failure {
-    Failure::Input(format!("{}: {problem}", path.display()))
+    Failure::at(path.display(), problem)
 }
 
 #[cfg(test)]

@@ -1,15 +1,14 @@
 //! The marker of an output folder: which command made which file, and what was in it.
 
 use super::CsvDialect;
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, Outcome};
 use crate::text::TextHash;
 use clap::Args;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs::File;
-use std::io::Read;
+use std::fs::{self, File};
+use std::io::{self, Read};
 use std::path::Path;
-use std::{fs, io};
 
 /// Name of the marker in a folder.
 pub(crate) const MARKER_FILE: &str = ".wiperlab.json";
@@ -53,7 +52,7 @@ impl Default for FolderMarker {
 impl FolderMarker {
     /// The marker of a folder; an empty one where there is none. One that cannot be read proves nothing, and
     /// the reason is given.
-    pub(crate) fn load(folder: &Path) -> Result<(Self, Option<String>), Failure> {
+    pub(crate) fn load(folder: &Path) -> Outcome<(Self, Option<String>)> {
         let path = folder.join(MARKER_FILE);
         if !path.exists() {
             return Ok((Self::default(), None));
@@ -71,7 +70,7 @@ impl FolderMarker {
         })
     }
 
-    pub(crate) fn to_bytes(&self) -> Result<Vec<u8>, Failure> {
+    pub(crate) fn to_bytes(&self) -> Outcome<Vec<u8>> {
         let mut text = serde_json::to_vec_pretty(self).map_err(Failure::internal)?;
         text.push(b'\n');
         Ok(text)
@@ -96,8 +95,8 @@ pub(crate) fn read_small_file(path: &Path) -> Result<Vec<u8>, String> {
 }
 
 /// Hash of a file as markers have it; `None` where there is no file.
-pub(crate) fn hash_file(path: &Path) -> Result<Option<String>, Failure> {
-    let refused = |error: io::Error| Failure::Input(format!("{}: cannot be read: {error}", path.display()));
+pub(crate) fn hash_file(path: &Path) -> Outcome<Option<String>> {
+    let refused = |error: io::Error| Failure::at(path.display(), format!("cannot be read: {error}"));
     if !path.is_file() {
         return Ok(None);
     }
@@ -218,10 +217,5 @@ pub(crate) struct WritePolicy {
 impl WritePolicy {
     pub(crate) fn new(maker: OutputCommand, overwrite: Overwrite) -> Self {
         Self { maker, force: overwrite.force, exports: Vec::new(), csv: CsvDialect::Plain }
-    }
-
-    /// The same with tables in a dialect.
-    pub(crate) fn with_csv_dialect(self, csv: CsvDialect) -> Self {
-        Self { csv, ..self }
     }
 }

@@ -1,8 +1,7 @@
 //! Which recording a folder holds, and what of it no command overwrites.
 
-use super::marker::OutputCommand;
-use super::marker::{FolderMarker, hash_file, read_small_file};
-use crate::cli::failure::Failure;
+use super::marker::{FolderMarker, OutputCommand, hash_file, read_small_file};
+use crate::cli::failure::Outcome;
 use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE};
 use std::path::Path;
 
@@ -36,7 +35,7 @@ pub(crate) enum FolderRecording {
 }
 
 impl FolderRecording {
-    pub(crate) fn detect(folder: &Path, marker: &FolderMarker) -> Result<Self, Failure> {
+    pub(crate) fn detect(folder: &Path, marker: &FolderMarker) -> Outcome<Self> {
         let trace = hash_file(&folder.join(TRACE_FILE))?;
         if folder.join(DESCRIPTION_FILE).exists() {
             return Ok(from_description(folder, marker, trace.as_deref()));

@@ -6,12 +6,10 @@
 //! flushed; at last the marker says what is there. So a reader meets each file old or new and whole, also
 //! after a loss of power, and the next run of the command can prove what it finds.
 
-use super::CsvDialect;
 use super::guard::{OutputGuard, refuse_measured};
-use super::marker::WritePolicy;
-use super::marker::{FolderMarker, HashingReader, MARKER_FILE, MarkedFile};
-use super::write_failure;
-use crate::cli::failure::Failure;
+use super::marker::{FolderMarker, HashingReader, MARKER_FILE, MarkedFile, WritePolicy};
+use super::{CsvDialect, write_failure};
+use crate::cli::failure::{Failure, Outcome};
 use crate::cli::interrupt;
 use crate::recording::files::TRACE_FILE;
 use std::collections::BTreeSet;
@@ -45,18 +43,18 @@ struct StagedFile {
 
 impl OutputStaging {
     /// For the files `names`; refuses what [`OutputGuard`] refuses.
-    pub(crate) fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Result<Self, Failure> {
+    pub(crate) fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Outcome<Self> {
         let guard = OutputGuard::new(folder, writer, names)?;
         Ok(Self { guard: Some((guard, writer.clone())), ..Self::new_unguarded(folder, names)? })
     }
 
     /// For files of which the caller knows that nothing is lost with what they replace.
-    pub(crate) fn new_unmarked(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
+    pub(crate) fn new_unmarked(folder: &Path, names: &[&str]) -> Outcome<Self> {
         refuse_measured(folder, names)?;
         Self::new_unguarded(folder, names)
     }
 
-    fn new_unguarded(folder: &Path, names: &[&str]) -> Result<Self, Failure> {
+    fn new_unguarded(folder: &Path, names: &[&str]) -> Outcome<Self> {
         names.iter().try_for_each(|name| check_path_free(&folder.join(name)))?;
         Ok(Self {
             folder: folder.to_owned(),
@@ -67,7 +65,7 @@ impl OutputStaging {
     }
 
     /// Writes a file next to its place; gives the hash of its contents.
-    pub(crate) fn stage_file(&mut self, name: &str, contents: impl Read) -> Result<String, Failure> {
+    pub(crate) fn stage_file(&mut self, name: &str, contents: impl Read) -> Outcome<String> {
         let path = self.folder.join(name);
         self.made.create(path.parent().unwrap_or(Path::new("")))?;
         let dialect = self.guard.as_ref().map_or(CsvDialect::Plain, |(_, writer)| writer.csv);
@@ -82,7 +80,7 @@ impl OutputStaging {
     }
 
     /// Gives every file its name, or none.
-    pub(crate) fn commit(self) -> Result<(), Failure> {
+    pub(crate) fn commit(self) -> Outcome<()> {
         let (made, files) = (self.made, self.files); // (folders are dropped after what is in them)
         let (folder, guard) = (self.folder, self.guard);
         flush_files(&files)?;
@@ -105,7 +103,7 @@ impl OutputStaging {
     }
 }
 
-fn rename_staged(files: Vec<StagedFile>) -> Result<(), Failure> {
+fn rename_staged(files: Vec<StagedFile>) -> Outcome<()> {
     let whole = interrupt::lock_renames();
     for staged in files {
         staged.file.persist(&staged.path).map_err(|e| write_failure(&staged.path, &e.error))?;
@@ -130,7 +128,7 @@ impl<'a> MarkerUpdate<'a> {
         guard: &'a OutputGuard,
         writer: &WritePolicy,
         files: &[StagedFile],
-    ) -> Result<Self, Failure> {
+    ) -> Outcome<Self> {
         let names: Vec<&str> = files.iter().map(|staged| staged.name.as_str()).collect();
         let outdated = guard.outdated_files(&names);
         let mut meanwhile = guard.marker.clone();
@@ -152,12 +150,12 @@ impl<'a> MarkerUpdate<'a> {
         Ok(Self { folder, before: &guard.marker, pending: meanwhile, after, outdated })
     }
 
-    fn write_pending(&self) -> Result<(), Failure> {
+    fn write_pending(&self) -> Outcome<()> {
         if self.pending == *self.before { Ok(()) } else { self.write_marker(&self.pending) }
     }
 
     /// Removes what is outdated, then says what is there.
-    fn write_final(&self) -> Result<(), Failure> {
+    fn write_final(&self) -> Outcome<()> {
         for path in self.outdated.iter().map(|name| self.folder.join(name)) {
             if let Err(error) = fs::remove_file(&path) {
                 warn_line!(
@@ -169,7 +167,7 @@ impl<'a> MarkerUpdate<'a> {
         if self.after == self.pending { Ok(()) } else { self.write_marker(&self.after) }
     }
 
-    fn write_marker(&self, marker: &FolderMarker) -> Result<(), Failure> {
+    fn write_marker(&self, marker: &FolderMarker) -> Outcome<()> {
         let path = self.folder.join(MARKER_FILE);
         let written = write_temporary(&path, marker.to_bytes()?.as_slice()).and_then(|(file, _)| {
             file.as_file().sync_all()?;
@@ -183,7 +181,7 @@ impl<'a> MarkerUpdate<'a> {
 
 /// Puts the names of files on the disk: a file that was flushed is found again after a loss of power only if
 /// its name was too. A file system that cannot flush folders does it by itself or not at all.
-fn sync_folders(folders: &BTreeSet<PathBuf>) -> Result<(), Failure> {
+fn sync_folders(folders: &BTreeSet<PathBuf>) -> Outcome<()> {
     #[cfg(unix)]
     for folder in folders {
         let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
@@ -203,7 +201,7 @@ struct CreatedFolders(Vec<PathBuf>);
 
 impl CreatedFolders {
     /// Makes a folder and what is missing of the way to it; the outermost is kept first.
-    fn create(&mut self, folder: &Path) -> Result<(), Failure> {
+    fn create(&mut self, folder: &Path) -> Outcome<()> {
         let missing: Vec<&Path> =
             folder.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists()).collect();
         let missing: Vec<PathBuf> = missing.into_iter().rev().map(Path::to_owned).collect();
@@ -213,7 +211,7 @@ impl CreatedFolders {
     }
 
     /// They hold files now.
-    fn keep(mut self) -> Result<(), Failure> {
+    fn keep(mut self) -> Outcome<()> {
         let parents = std::mem::take(&mut self.0);
         sync_folders(&parents.iter().filter_map(|made| made.parent()).map(Path::to_owned).collect())
     }
@@ -230,7 +228,7 @@ impl Drop for CreatedFolders {
 
 /// Refuses a place that something else than a file takes, or that no file can take: asked of all before any
 /// gets its name, so that none is left alone.
-pub(crate) fn check_path_free(path: &Path) -> Result<(), Failure> {
+pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
     let taken = |at: &Path, found: &str, expected: &str| {
         let at = at.display();
         Err(Failure::Input(format!(
@@ -294,7 +292,7 @@ fn is_abandoned(path: &Path) -> bool {
 
 /// Flushes files to the disk side by side: one commit of the file system then serves many, where one after
 /// the other would wait for one each.
-fn flush_files(staged: &[StagedFile]) -> Result<(), Failure> {
+fn flush_files(staged: &[StagedFile]) -> Outcome<()> {
     const AT_ONCE: usize = 64;
     let flushed = |staged: &StagedFile| {
         staged.file.as_file().sync_all().map_err(|error| write_failure(&staged.path, &error))

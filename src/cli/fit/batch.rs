@@ -1,16 +1,12 @@
 //! Several jobs one after the other, or a shard of them: whole fits, none of which is divided.
 
 use super::FitArgs;
-use crate::cli::args::GlobalArgs;
 use crate::cli::checkpoint::CHECKPOINT_FILE;
-use crate::cli::failure::{CommandOutcome, Failure};
-use crate::cli::files;
 use crate::cli::files::RESULT_FILE;
-use crate::cli::interrupt;
-use crate::cli::load::{LoadedJob, job_path};
+use crate::cli::job::{LoadedJob, job_path};
+use crate::cli::prelude::*;
 use crate::fit::result::{FitResult, FitStatus};
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
 
 /// How a job of a list stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -34,9 +30,7 @@ impl BatchJobState {
                 (problem.problem.fingerprint(), env!("CARGO_PKG_VERSION"), problem.job().search.seed);
             result.status == FitStatus::Converged && of == expected
         });
-        let ended = |result: FitResult| {
-            if result.explains_recordings() { CommandOutcome::Done } else { CommandOutcome::StoppedEarly }
-        };
+        let ended = |result: FitResult| CommandOutcome::done_if(result.explains_recordings());
         done.map_or(Self::Due, |result| Self::Done(ended(result)))
     }
 
@@ -52,19 +46,21 @@ impl BatchJobState {
 }
 
 /// Refuses a list in which two jobs would write the same files.
-pub(crate) fn check_distinct_folders(jobs: &[PathBuf]) -> Result<(), Failure> {
+pub(crate) fn check_distinct_folders(jobs: &[PathBuf]) -> Outcome<()> {
     let mut folders: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     for job in jobs {
         let file = job_path(job);
         let folder = files::containing_folder(&file);
         let folder = folder.canonicalize().unwrap_or_else(|_| folder.to_owned());
         if let Some(other) = folders.insert(folder, job) {
-            return Err(Failure::Input(format!(
-                "{}: lies in the folder of {}, where both would write {CHECKPOINT_FILE} and {RESULT_FILE}; expected a folder \
-                 for each job",
+            return Err(Failure::at(
                 job.display(),
-                other.display()
-            )));
+                format!(
+                    "lies in the folder of {}, where both would write {CHECKPOINT_FILE} and {RESULT_FILE}; expected a folder \
+                 for each job",
+                    other.display()
+                ),
+            ));
         }
     }
     Ok(())
@@ -73,7 +69,7 @@ pub(crate) fn check_distinct_folders(jobs: &[PathBuf]) -> Result<(), Failure> {
 impl FitArgs {
     /// Fits the jobs of the list that are in the shard and not done yet. One that is refused does not stop
     /// the others.
-    pub(crate) fn run_batch(&self, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn run_batch(&self, global: &GlobalArgs) -> Outcome {
         check_distinct_folders(&self.jobs)?;
         let (mut refused, mut early) = (None, Vec::new());
         let mine =
@@ -110,7 +106,7 @@ impl FitArgs {
         }
     }
 
-    fn run_batch_job(&self, job: &Path, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+    fn run_batch_job(&self, job: &Path, global: &GlobalArgs) -> Outcome {
         let problem = LoadedJob::load(job)?;
         if let BatchJobState::Done(ended) = BatchJobState::read(&problem)
             && self.shard.is_some()

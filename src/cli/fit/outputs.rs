@@ -1,10 +1,8 @@
 //! What a fit leaves next to its result: the parameters in a row, the recordings beside the model, and the
 //! scenes at the estimates.
 
-use crate::cli::failure::Failure;
-use crate::cli::files;
-use crate::cli::files::{OutputFolder, WritePolicy};
-use crate::cli::load::LoadedJob;
+use crate::cli::job::LoadedJob;
+use crate::cli::prelude::*;
 use crate::compare::{COMPARISON_FILE, FittedRecording, ModelRun, comparison_table, run_conditions};
 use crate::draft::{FittedScene, write_fitted_scene};
 use crate::fit::job::HeadSource;
@@ -15,7 +13,7 @@ const PARAMETERS_FILE: &str = "parameters.csv";
 
 impl LoadedJob {
     /// Refuses a folder in which the files of this fit have no place.
-    pub(crate) fn check_outputs(&self, writer: &WritePolicy) -> Result<(), Failure> {
+    pub(crate) fn check_outputs(&self, writer: &WritePolicy) -> Outcome<()> {
         let names = self.output_names();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         OutputFolder::check(&self.folder, writer, &names)?;
@@ -32,7 +30,7 @@ impl LoadedJob {
     }
 
     /// Writes what was found into the folder of the job.
-    pub(crate) fn write_outputs(&self, result: &FitResult, writer: &WritePolicy) -> Result<(), Failure> {
+    pub(crate) fn write_outputs(&self, result: &FitResult, writer: &WritePolicy) -> Outcome<()> {
         let mut files = vec![(files::RESULT_FILE.to_owned(), result.to_json().into_bytes())];
         if result.status != FitStatus::Failed {
             files.push((PARAMETERS_FILE.to_owned(), self.parameters_csv(result)?));
@@ -50,7 +48,7 @@ impl LoadedJob {
     }
 
     /// Every estimate with its interval in one row, so that rows of many fits make a table.
-    fn parameters_csv(&self, result: &FitResult) -> Result<Vec<u8>, Failure> {
+    fn parameters_csv(&self, result: &FitResult) -> Outcome<Vec<u8>> {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
         let synthetic = self.measured.iter().any(|loaded| loaded.recording.is_synthetic());
         let mut columns = vec![
@@ -82,7 +80,7 @@ impl LoadedJob {
     }
 
     /// The recordings beside the model, and the scenes.
-    fn comparison_files(&self, result: &FitResult) -> Result<Vec<(String, Vec<u8>)>, Failure> {
+    fn comparison_files(&self, result: &FitResult) -> Outcome<Vec<(String, Vec<u8>)>> {
         let model = self.problem.fitted_model(result).map_err(Failure::input)?;
         let runs = match run_conditions(self.job(), &model, result) {
             Ok(runs) => runs,
@@ -111,7 +109,7 @@ impl LoadedJob {
     }
 
     /// The recording that drives the fitted scene of a condition, as that scene names it.
-    fn driver_path(&self, at: usize) -> Result<Option<String>, Failure> {
+    fn driver_path(&self, at: usize) -> Outcome<Option<String>> {
         let condition = &self.job().conditions[at];
         let by_trace =
             self.problem.traces().iter().find(|trace| trace.condition == at).map(|trace| trace.head);
@@ -120,12 +118,7 @@ impl LoadedJob {
         driver.map(|path| files::relative_path(&self.folder, path)).transpose()
     }
 
-    fn fitted_scene_text(
-        &self,
-        at: usize,
-        run: &ModelRun,
-        result: &FitResult,
-    ) -> Result<Option<String>, Failure> {
+    fn fitted_scene_text(&self, at: usize, run: &ModelRun, result: &FitResult) -> Outcome<Option<String>> {
         let condition = &self.job().conditions[at];
         let recording = self.measured.get(at).map(|loaded| &loaded.recording);
         let driver = self.driver_path(at)?;

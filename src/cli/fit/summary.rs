@@ -5,8 +5,7 @@ use super::CompletedFit;
 use crate::fit::linear_model::ParameterCombination;
 use crate::fit::misfit::{ChannelMisfit, TraceMisfit, far_from_priors, unexplained_headline};
 use crate::fit::result::{FeatureResult, FitResult, NuisanceResult, ParameterResult};
-use crate::text;
-use crate::text::{format_digits, to_ascii};
+use crate::text::{self, format_digits, to_ascii};
 
 /// Digits of a number that is shown.
 const DIGITS: usize = 5;

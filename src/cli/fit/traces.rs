@@ -1,13 +1,9 @@
 //! A fit to traces, with its journal of iterates.
 
 use super::CompletedFit;
-use crate::cli::args::GlobalArgs;
 use crate::cli::checkpoint::{CHECKPOINT_FILE, CheckpointWriter};
-use crate::cli::failure::Failure;
-use crate::cli::files::{OutputCommand, Overwrite, WritePolicy};
-use crate::cli::interrupt;
-use crate::cli::load::LoadedJob;
-use crate::cli::progress;
+use crate::cli::job::LoadedJob;
+use crate::cli::prelude::*;
 use crate::fit::result::FitStatus;
 use crate::fit::trace::UncertaintyRun;
 use crate::fit::trace_checkpoint::IterateRecord;
@@ -33,8 +29,8 @@ impl LoadedJob {
         resume: bool,
         most: Option<usize>,
         overwrite: Overwrite,
-    ) -> Result<CompletedFit, Failure> {
-        let writer = WritePolicy::new(OutputCommand::Fit, overwrite).with_csv_dialect(global.csv_dialect);
+    ) -> Outcome<CompletedFit> {
+        let writer = global.write_policy(OutputCommand::Fit, overwrite);
         self.check_outputs(&writer)?;
         let path = self.folder.join(CHECKPOINT_FILE);
         let (mut sink, resumed) = CheckpointWriter::open::<IterateRecord>(&path, resume)?;

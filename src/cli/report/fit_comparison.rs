@@ -1,16 +1,10 @@
 //! Several fits side by side.
 
-use super::ReportFiles;
-use super::{ReportedFit, default_reports_folder};
-use crate::cli::args::GlobalArgs;
-use crate::cli::failure::Failure;
-use crate::cli::files;
-use crate::cli::files::WritePolicy;
-use crate::cli::progress;
+use super::{ReportFiles, ReportedFit, default_reports_folder};
+use crate::cli::prelude::*;
 use crate::cli::report;
 use crate::report::assembly;
 use crate::report::fit_comparison::{ComparisonInput, compare_fits, comparison_json, render_page};
-use std::path::{Path, PathBuf};
 
 /// Longest name of a folder that is made up: far from what file systems take, and still one that a person
 /// types.
@@ -23,7 +17,7 @@ pub(crate) fn write_comparison(
     out: Option<&Path>,
     writer: &WritePolicy,
     global: &GlobalArgs,
-) -> Result<bool, Failure> {
+) -> Outcome<bool> {
     let folders: Vec<&Path> = jobs.iter().map(|job| files::containing_folder(job)).collect();
     check_distinct_fits(&folders)?;
     let out = out.map_or_else(|| default_comparison_folder(&folders), |out| Ok(out.to_owned()))?;
@@ -63,15 +57,15 @@ pub(crate) fn write_comparison(
 }
 
 /// Refuses a fit that is given twice, and two fits that would go by the same name.
-fn check_distinct_fits(fits: &[&Path]) -> Result<(), Failure> {
+fn check_distinct_fits(fits: &[&Path]) -> Outcome<()> {
     let place = |fit: &Path| fit.canonicalize().unwrap_or_else(|_| fit.to_owned());
     for (i, fit) in fits.iter().enumerate() {
         for other in &fits[..i] {
             if place(fit) == place(other) {
-                return Err(Failure::Input(format!(
-                    "{}: given twice, expected different fits; leave one out",
-                    fit.display()
-                )));
+                return Err(Failure::at(
+                    fit.display(),
+                    "given twice, expected different fits; leave one out",
+                ));
             }
             let name = files::display_name(fit);
             if name == files::display_name(other) {
@@ -87,7 +81,7 @@ fn check_distinct_fits(fits: &[&Path]) -> Result<(), Failure> {
 }
 
 /// `reports/A-and-B` next to the first fit's folder `fits`.
-fn default_comparison_folder(fits: &[&Path]) -> Result<PathBuf, Failure> {
+fn default_comparison_folder(fits: &[&Path]) -> Outcome<PathBuf> {
     let name = fits.iter().map(|fit| files::display_name(fit)).collect::<Vec<_>>().join("-and-");
     if name.len() > LONGEST_NAME {
         let found = name.len();

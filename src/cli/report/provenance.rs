@@ -1,17 +1,16 @@
 //! Where the numbers of a fit come from: its files with their hashes, and the commands that make it again.
 
 use super::ReportedFit;
-use crate::cli::failure::Failure;
-use crate::cli::files;
 use crate::cli::files::RESULT_FILE;
-use crate::cli::load::JOB_FILE;
+use crate::cli::job::JOB_FILE;
 use crate::cli::load::{LoadedRecording, description_path, load_recording};
+use crate::cli::prelude::*;
 use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE};
 use crate::report::{Provenance, SourceFile};
 use crate::text::sha256;
-use std::path::{Component, Path};
+use std::path::Component;
 
-pub(crate) fn collect_provenance(fit: &ReportedFit) -> Result<Provenance, Failure> {
+pub(crate) fn collect_provenance(fit: &ReportedFit) -> Outcome<Provenance> {
     let within = format!("fits/{}", fit.name);
     let named = |path: &str| normalise_path(&within, path);
     let job = fit.problem.path.file_name().unwrap_or_default().to_string_lossy();
@@ -44,16 +43,15 @@ pub(crate) fn collect_provenance(fit: &ReportedFit) -> Result<Provenance, Failur
     Ok(Provenance { version, seed, fingerprint, files: once, commands })
 }
 
-fn hash_source_file(kind: &str, name: String, path: &Path, synthetic: bool) -> Result<SourceFile, Failure> {
+fn hash_source_file(kind: &str, name: String, path: &Path, synthetic: bool) -> Outcome<SourceFile> {
     Ok(SourceFile { kind: kind.to_owned(), name, sha256: sha256(&files::read_data(path)?), synthetic })
 }
 
 /// A scene, and the recording that drives it where one does.
-fn scene_files(name: String, path: &Path) -> Result<Vec<SourceFile>, Failure> {
+fn scene_files(name: String, path: &Path) -> Outcome<Vec<SourceFile>> {
     let text = files::read_toml(path)?;
     let mut found = vec![hash_source_file("scene", name.clone(), path, false)?];
-    let written: toml::Table =
-        text.parse().map_err(|error| Failure::Input(format!("{}: {error}", path.display())))?;
+    let written: toml::Table = text.parse().map_err(|error| Failure::at(path.display(), error))?;
     let drive = written.get("drive").and_then(|drive| drive.get("recording")).and_then(toml::Value::as_str);
     if let Some(named) = drive {
         let (at, shown) = (files::resolve_path(path, named), normalise_path(&parent_folder(&name), named));
@@ -68,7 +66,7 @@ fn recording_files(
     name: &str,
     path: &Path,
     loaded: &LoadedRecording,
-) -> Result<Vec<SourceFile>, Failure> {
+) -> Outcome<Vec<SourceFile>> {
     let synthetic = loaded.recording.is_synthetic();
     let (within, trace) = match path.is_dir() {
         true => (name.to_owned(), TRACE_FILE.to_owned()),

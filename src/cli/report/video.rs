@@ -1,16 +1,14 @@
 //! Pictures of a recording's frames, from the folder that its `[video]` names.
 
-use crate::cli::failure::Failure;
-use crate::cli::files;
 use crate::cli::load::{LoadedRecording, description_path};
+use crate::cli::prelude::*;
 use crate::recording::files::{FilesError, PixelMapping};
 use crate::recording::video::{Picture, PictureSource, RecordingVideo};
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
 /// The pictures of a recording.
-pub(crate) struct VideoFrames {
+pub(crate) struct FramePictures {
     place: PixelMapping,
     first_frame: usize,
     files: Vec<PathBuf>,
@@ -18,9 +16,9 @@ pub(crate) struct VideoFrames {
     failed: Mutex<Option<Failure>>,
 }
 
-impl VideoFrames {
+impl FramePictures {
     /// The pictures of the recording at `path`, where its description names some.
-    pub(crate) fn load(path: &Path, loaded: &LoadedRecording) -> Result<Option<Self>, Failure> {
+    pub(crate) fn load(path: &Path, loaded: &LoadedRecording) -> Outcome<Option<Self>> {
         let Some((file, video)) = loaded.file.as_ref().and_then(|file| Some((file, file.video.as_ref()?)))
         else {
             return Ok(None);
@@ -62,15 +60,15 @@ impl VideoFrames {
     }
 
     /// Refuses if a picture could not be read.
-    pub(crate) fn check_pictures(&self) -> Result<(), Failure> {
+    pub(crate) fn check_pictures(&self) -> Outcome<()> {
         self.failed.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
     }
 }
 
-impl PictureSource for VideoFrames {
+impl PictureSource for FramePictures {
     fn frame_picture(&self, frame: usize) -> Option<Picture> {
         let path = self.files.get(frame.checked_sub(self.first_frame)?)?;
-        let refused = |error| Failure::Input(format!("{}: {error}", path.display()));
+        let refused = |error| Failure::at(path.display(), error);
         let read = files::read_data(path).and_then(|bytes| Picture::from_png(&bytes).map_err(refused));
         read.map_err(|failure| {
             self.failed.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(failure);

@@ -1,7 +1,7 @@
 //! What `spectrum_csv` writes and prints in addition to its figures.
 
 use super::{SpectrumRequest, StudiedWindow};
-use crate::cli::failure::Failure;
+use crate::cli::failure::{Failure, Outcome};
 use crate::figures::analysis::CoursePoint;
 use crate::recording::channel::{Channel, ReversalInstants, phase_windows};
 use crate::spectrum::time_frequency::FrequencyRange;
@@ -15,13 +15,13 @@ use std::fmt::Write;
 const BLOCK_ROWS: usize = 4096;
 
 /// `components.json`; what begins inside the window does so at a time of the recording.
-pub(crate) fn components_json(studied: &StudiedWindow) -> Result<Vec<u8>, Failure> {
+pub(crate) fn components_json(studied: &StudiedWindow) -> Outcome<Vec<u8>> {
     let from_s = studied.recording.grid().time_s(studied.frames.start);
     let timed = |c: &Component| Component { begins_s: c.begins_s.map(|s| from_s + s), ..c.clone() };
     to_json(&studied.analysis.spectrum.components.iter().map(timed).collect::<Vec<_>>())
 }
 
-fn to_json(value: &impl Serialize) -> Result<Vec<u8>, Failure> {
+fn to_json(value: &impl Serialize) -> Outcome<Vec<u8>> {
     let mut bytes = serde_json::to_vec_pretty(value).map_err(Failure::internal)?;
     bytes.push(b'\n');
     Ok(bytes)
@@ -59,10 +59,7 @@ struct NamedWindowSpan {
     to_s: f64,
 }
 
-pub(crate) fn description_json(
-    request: &SpectrumRequest,
-    studied: &StudiedWindow,
-) -> Result<Vec<u8>, Failure> {
+pub(crate) fn description_json(request: &SpectrumRequest, studied: &StudiedWindow) -> Outcome<Vec<u8>> {
     let StudiedWindow { recording, analysis, frames, .. } = studied;
     let grid = recording.grid();
     let windows = phase_windows(recording, &ReversalInstants::find_instants(recording));

@@ -2,12 +2,10 @@
 //! together.
 
 use super::plan::SubmissionPlan;
-use crate::cli::args::GlobalArgs;
-use crate::cli::failure::{BAD_INPUT, CommandOutcome, Failure, STOPPED_EARLY};
+use crate::cli::failure::{BAD_INPUT, STOPPED_EARLY};
+use crate::cli::prelude::*;
 use crate::cli::submit;
-use crate::cli::{interrupt, progress};
 use std::fs::{self, File};
-use std::path::PathBuf;
 use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
@@ -35,7 +33,7 @@ pub(crate) fn print_commands(plan: &SubmissionPlan) {
 }
 
 /// Runs the tasks, then puts the shards together.
-pub(crate) fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+pub(crate) fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
     plan.create_logs_folder()?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let at_once = (cores / plan.threads).max(1);
@@ -91,7 +89,7 @@ pub(crate) fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Result<Co
 }
 
 /// The job at the end: it says by itself what is missing.
-fn run_collect(plan: &SubmissionPlan, global: &GlobalArgs) -> Result<CommandOutcome, Failure> {
+fn run_collect(plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
     let mut command = Command::new(&plan.program);
     command.args(plan.collect_command()).args(global.quiet.then_some("--quiet"));
     let status = command.status().map_err(|error| start_failure(plan, &error))?;
@@ -117,7 +115,7 @@ struct LocalTask {
 }
 
 impl LocalTask {
-    fn start(plan: &SubmissionPlan, number: usize) -> Result<Self, Failure> {
+    fn start(plan: &SubmissionPlan, number: usize) -> Outcome<Self> {
         let log = plan.logs_folder().join(format!("{number}-of-{}.log", plan.shards));
         let unmade = |error| Failure::Internal(format!("{}: cannot be written: {error}", log.display()));
         let to = File::create(&log).map_err(unmade)?;
@@ -129,7 +127,7 @@ impl LocalTask {
     }
 
     /// How it has ended, or the task where it still runs.
-    fn try_finish(mut self) -> Result<Result<FinishedTask, Self>, Failure> {
+    fn try_finish(mut self) -> Outcome<Result<FinishedTask, Self>> {
         let status = self.child.try_wait().map_err(Failure::internal)?;
         Ok(match status {
             Some(status) => Ok(FinishedTask { number: self.number, status, log: self.log.clone() }),

@@ -2,12 +2,11 @@
 
 use super::tasks::TaskList;
 use crate::cli::args::TimeLimit;
-use crate::cli::failure::Failure;
-use crate::cli::files::{OutputCommand, Overwrite, WritePolicy};
-use crate::cli::load::{LoadedJob, is_study};
-use crate::cli::{files, fit, sweep};
+use crate::cli::job::LoadedJob;
+use crate::cli::load::is_study;
+use crate::cli::prelude::*;
+use crate::cli::{fit, sweep};
 use std::fs;
-use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 /// Shortest walltime, s: Slurm counts in minutes.
@@ -62,7 +61,7 @@ impl SubmissionPlan {
         self.work.folder().join("logs")
     }
 
-    pub(crate) fn create_logs_folder(&self) -> Result<(), Failure> {
+    pub(crate) fn create_logs_folder(&self) -> Outcome<()> {
         let logs = self.logs_folder();
         fs::create_dir_all(&logs)
             .map_err(|error| Failure::Internal(format!("{}: cannot be made: {error}", logs.display())))
@@ -102,12 +101,12 @@ pub(crate) enum SubmittedWork {
 
 impl SubmittedWork {
     /// A study or jobs that were read and checked as `wiperlab sweep` and `wiperlab fit` do.
-    pub(crate) fn load(files: &[PathBuf], out: Option<&Path>, overwrite: Overwrite) -> Result<Self, Failure> {
+    pub(crate) fn load(files: &[PathBuf], out: Option<&Path>, overwrite: Overwrite) -> Outcome<Self> {
         if let Some(name) = files.iter().find(|file| files::is_standard_input(file)) {
-            return Err(Failure::Input(format!(
-                "{}: found standard input, expected a file, as every task reads it; save it",
-                name.display()
-            )));
+            return Err(Failure::at(
+                name.display(),
+                "found standard input, expected a file, as every task reads it; save it",
+            ));
         }
         let mut studies = Vec::new();
         for file in files {
@@ -115,32 +114,34 @@ impl SubmittedWork {
         }
         match (files, studies.as_slice(), out) {
             ([study], [_], Some(out)) => Self::load_study(study, out, overwrite),
-            ([study], [_], None) => Err(Failure::Input(format!(
-                "{}: found a study without --out, expected the folder for its results; add --out DIR",
-                study.display()
-            ))),
-            ([job], [], _) => Err(Failure::Input(format!(
-                "{}: found one job, expected a study or a list of jobs, as a fit takes seconds and is not divided; \
-                 run `wiperlab fit` with it",
-                job.display()
-            ))),
-            (_, [], out) => Self::load_jobs(files, out),
-            (_, [study, ..], _) => Err(Failure::Input(format!(
-                "{}: found a study among {} files, expected one study alone or jobs of fits; submit it by itself",
+            ([study], [_], None) => Err(Failure::at(
                 study.display(),
-                files.len()
-            ))),
+                "found a study without --out, expected the folder for its results; add --out DIR",
+            )),
+            ([job], [], _) => Err(Failure::at(
+                job.display(),
+                "found one job, expected a study or a list of jobs, as a fit takes seconds and is not divided; \
+                 run `wiperlab fit` with it",
+            )),
+            (_, [], out) => Self::load_jobs(files, out),
+            (_, [study, ..], _) => Err(Failure::at(
+                study.display(),
+                format!(
+                    "found a study among {} files, expected one study alone or jobs of fits; submit it by itself",
+                    files.len()
+                ),
+            )),
         }
     }
 
-    fn load_study(study: &Path, out: &Path, overwrite: Overwrite) -> Result<Self, Failure> {
+    fn load_study(study: &Path, out: &Path, overwrite: Overwrite) -> Outcome<Self> {
         let problem = sweep::LoadedStudy::load(study)?;
         let writer = WritePolicy::new(OutputCommand::Sweep, overwrite);
         problem.check_outputs(out, &writer)?;
         Ok(Self::Study { study: absolute_path(study)?, out: absolute_path(out)? })
     }
 
-    fn load_jobs(jobs: &[PathBuf], out: Option<&Path>) -> Result<Self, Failure> {
+    fn load_jobs(jobs: &[PathBuf], out: Option<&Path>) -> Outcome<Self> {
         fit::check_distinct_folders(jobs)?;
         jobs.iter().try_for_each(|job| LoadedJob::load(job).map(|_| ()))?;
         let jobs = jobs.iter().map(|job| absolute_path(job)).collect::<Result<Vec<_>, _>>()?;
@@ -205,8 +206,8 @@ fn to_strings(words: &[&str]) -> Vec<String> {
 }
 
 /// A path as text that stands in a script and holds in every folder.
-pub(crate) fn absolute_path(path: &Path) -> Result<String, Failure> {
-    let refused = |problem: &str| Failure::Input(format!("{}: {problem}", path.display()));
+pub(crate) fn absolute_path(path: &Path) -> Outcome<String> {
+    let refused = |problem: &str| Failure::at(path.display(), problem);
     let whole = std::path::absolute(path).map_err(|error| refused(&error.to_string()))?;
     let text = whole.to_str().ok_or_else(|| {
         refused("found a name that is not UTF-8, expected one that a script can hold; rename it")

@@ -2,10 +2,7 @@
 
 use super::{LoadedStudy, collection_failure};
 use crate::chart::Figure;
-use crate::cli::args::GlobalArgs;
-use crate::cli::failure::{CommandOutcome, Failure};
-use crate::cli::files;
-use crate::cli::files::{OutputFolder, WritePolicy};
+use crate::cli::prelude::*;
 use crate::figures::{sweep_map, sweep_sheet};
 use crate::sweep::outputs::{SweepSummary, csv_header, csv_row};
 use crate::sweep::{
@@ -13,14 +10,13 @@ use crate::sweep::{
 };
 use std::collections::BTreeMap;
 use std::fs::File;
-use std::path::Path;
 
 const TABLE: &str = "sweep.csv";
 const SUMMARY: &str = "summary.json";
 
 impl LoadedStudy {
     /// Checks that a study can write its files into a folder.
-    pub(crate) fn check_outputs(&self, out: &Path, writer: &WritePolicy) -> Result<OutputFolder, Failure> {
+    pub(crate) fn check_outputs(&self, out: &Path, writer: &WritePolicy) -> Outcome<OutputFolder> {
         let sheet = self.study.has_sheet().then_some(SHEET_NAME);
         let mapped = self.study.maps.iter().filter(|_| self.study.is_mapped());
         let maps = mapped.map(|map| map.slug.as_str()).chain(sheet).map(|name| format!("{name}.svg"));
@@ -35,7 +31,7 @@ impl LoadedStudy {
         out: &Path,
         writer: &WritePolicy,
         global: &GlobalArgs,
-    ) -> Result<CommandOutcome, Failure> {
+    ) -> Outcome {
         let place = self.check_outputs(out, writer)?;
         let mut table = place.create_file(TABLE)?;
         table.write_text(&csv_header(&self.study));
@@ -70,7 +66,7 @@ impl LoadedStudy {
             print_summary(&self.study, &summary);
             print_line!("written to {}", out.display());
         }
-        Ok(if summary.has_values() { CommandOutcome::Done } else { CommandOutcome::StoppedEarly })
+        Ok(CommandOutcome::done_if(summary.has_values()))
     }
 
     /// Every map in one figure.

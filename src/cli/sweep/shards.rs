@@ -3,14 +3,11 @@
 use super::LoadedStudy;
 use super::solve::StudyPart;
 use crate::checkpoint::Shard;
-use crate::cli::args::GlobalArgs;
-use crate::cli::failure::{CommandOutcome, Failure};
-use crate::cli::files;
+use crate::cli::prelude::*;
 use crate::cli::shards::{SHARDS_FOLDER, scan_shard, shard_checkpoint, shard_files};
 use crate::sweep::journal::SweepPoint;
 use serde::{Deserialize, Serialize};
 use std::fs;
-use std::path::{Path, PathBuf};
 
 /// Which study they are of.
 const NOTE: &str = "study.json";
@@ -24,13 +21,7 @@ struct StudyNote {
 
 impl LoadedStudy {
     /// Runs what no shard in the folder holds of a shard.
-    pub(crate) fn solve_shard(
-        &self,
-        study: &Path,
-        out: &Path,
-        shard: Shard,
-        global: &GlobalArgs,
-    ) -> Result<CommandOutcome, Failure> {
+    pub(crate) fn solve_shard(&self, study: &Path, out: &Path, shard: Shard, global: &GlobalArgs) -> Outcome {
         let journal = shard_checkpoint(out, shard);
         files::check_path_free(&journal)?;
         let elsewhere = self.points_in_other_shards(out, shard)?;
@@ -55,7 +46,7 @@ impl LoadedStudy {
     }
 
     /// Which points the other shards hold: they need not be done again when a study is divided anew.
-    fn points_in_other_shards(&self, out: &Path, own: Shard) -> Result<Vec<bool>, Failure> {
+    fn points_in_other_shards(&self, out: &Path, own: Shard) -> Outcome<Vec<bool>> {
         let header = self.header();
         let mut held = vec![false; self.study.point_count()];
         for (shard, path) in shard_files(out)?.into_iter().filter(|(shard, _)| *shard != own) {
@@ -70,7 +61,7 @@ impl LoadedStudy {
 }
 
 /// Says which study the shards are of, for whoever collects them.
-fn write_study_note(study: &Path, out: &Path) -> Result<(), Failure> {
+fn write_study_note(study: &Path, out: &Path) -> Outcome<()> {
     let folder = out.join(SHARDS_FOLDER);
     let made = |error| Failure::Internal(format!("{}: cannot be made: {error}", folder.display()));
     fs::create_dir_all(&folder).map_err(made)?;
@@ -84,13 +75,15 @@ fn write_study_note(study: &Path, out: &Path) -> Result<(), Failure> {
 }
 
 /// The study whose shards are in a folder.
-pub(crate) fn find_study(out: &Path) -> Result<PathBuf, Failure> {
+pub(crate) fn find_study(out: &Path) -> Outcome<PathBuf> {
     let path = out.join(SHARDS_FOLDER).join(NOTE);
     let refused = |found: String| {
-        Failure::Input(format!(
-            "{}: {found}, expected the note that `wiperlab sweep --shard` writes; name the study with --study",
-            path.display()
-        ))
+        Failure::at(
+            path.display(),
+            format!(
+                "{found}, expected the note that `wiperlab sweep --shard` writes; name the study with --study"
+            ),
+        )
     };
     if !path.exists() {
         return Err(refused("found no such file".to_owned()));

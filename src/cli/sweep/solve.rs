@@ -2,14 +2,10 @@
 
 use super::LoadedStudy;
 use crate::checkpoint::{CheckpointSink, Shard, StoredRecord, format_header_line};
-use crate::cli::args::GlobalArgs;
 use crate::cli::checkpoint::CheckpointWriter;
-use crate::cli::failure::Failure;
-use crate::cli::interrupt;
-use crate::cli::progress;
+use crate::cli::prelude::*;
 use crate::sweep::journal::SweepPoint;
 use crate::sweep::{self, PointRecheck, SweepError};
-use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
@@ -29,7 +25,7 @@ pub(crate) struct StudyPart<'a> {
 
 impl LoadedStudy {
     /// Runs what the journal of the whole study does not hold; `false` where it was interrupted.
-    pub(crate) fn solve(&self, journal: &Path, resume: bool, global: &GlobalArgs) -> Result<bool, Failure> {
+    pub(crate) fn solve(&self, journal: &Path, resume: bool, global: &GlobalArgs) -> Outcome<bool> {
         let advice = "go on with --resume".to_owned();
         let part =
             StudyPart { shard: Shard::WHOLE, journal, resume, elsewhere: Vec::new(), advice, reports: false };
@@ -38,7 +34,7 @@ impl LoadedStudy {
 
     /// Runs what no journal holds of a part, and writes its journal as it goes; `false` where it was
     /// interrupted.
-    pub(crate) fn solve_part(&self, part: &StudyPart, global: &GlobalArgs) -> Result<bool, Failure> {
+    pub(crate) fn solve_part(&self, part: &StudyPart, global: &GlobalArgs) -> Outcome<bool> {
         let (header, name) = (self.header(), part.journal.display().to_string());
         let points = self.study.point_count();
         let mut known = part.elsewhere.clone();

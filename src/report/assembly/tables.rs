@@ -1,7 +1,6 @@
 //! The lines of a report's tables from a job, its recordings and its result.
 
-use crate::compare::FittedRecording;
-use crate::compare::{Comparison, NextPeak, ParameterLine, Truth};
+use crate::compare::{Comparison, FittedRecording, NextPeak, ParameterLine, Truth};
 use crate::fit::job::{FitTarget, FreeParameter, Job, TargetSource};
 use crate::fit::result::{ComponentResult, FeatureResult, FitResult, FitStatus, ParameterResult};
 use crate::fit::uncertainty::ParameterVerdict;

@@ -1,8 +1,7 @@
 //! Estimates with their 95 % intervals: a panel for each parameter that at least two fits have, a row for
 //! each of them.
 
-use super::{ComparedFit, shorten_name};
-use super::{IntervalRelation, SharedParameter};
+use super::{ComparedFit, IntervalRelation, SharedParameter, shorten_name};
 use crate::chart::{
     ChartAxis, Colour, ErrorBar, FULL_WIDTH_MM, Figure, MAX_HEIGHT_MM, Mark, MarkerShape, Medium, Panel,
     Series,

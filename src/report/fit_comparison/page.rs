@@ -1,58 +1,34 @@
 //! The page of a comparison of fits.
 
-use super::SharedParameter;
 use super::intervals::estimate_text;
-use super::{ComparedFit, FitComparison};
+use super::{ComparedFit, FitComparison, SharedParameter};
 use crate::compare::{Comparison, ParameterLine};
-use crate::report::page::html::{
-    CellStyle, HtmlCell, HtmlTable, PageSection, breakable_key, escape_text, figures_html, isolate_name,
-    reading_hint, render_document, sentence_list, statements_html,
-};
+use crate::report::page::html::CellStyle::{Bad, Good, Prose, Words};
+use crate::report::page::html::*;
 use crate::report::page::{agreement, data_banner, provenance_html};
 use crate::text::{DASH, format_number, format_or_dash};
 
 /// The page; the same comparison always gives the same bytes.
 pub(crate) fn render_page(several: &FitComparison) -> String {
     let section = |id, heading, html: String| PageSection { id, heading, html, folded: false };
+    let compared = |caption: &str, of: fn(&ComparedFit) -> &Vec<Comparison>| {
+        agreement::fits_table(caption, &merge_comparisons(several, of))
+    };
+    let statements = statements_html(&several.statements);
+    let components = compared("Components: target against model, by fit", |e| &e.report.components);
+    let features = compared("Features: target against model, by fit", |e| &e.report.features);
+    let held_out = compared("Held-out values, by fit", |e| &e.report.held_out);
+    let provenance = section_per_fit(several, |e| provenance_html(&e.report.provenance));
     let sections = [
-        section(
-            "verdict",
-            "Verdict",
-            format!("<div class=\"verdict\">\n{}</div>\n", statements_html(&several.statements)),
-        ),
+        section("verdict", "Verdict", format!("<div class=\"verdict\">\n{statements}</div>\n")),
         section("fits", "Fits", fits_table(&several.fits)),
         section("parameters", "Parameters", parameters_table(several)),
         section("figures", "Figures", figures_html(&several.figures, 0, true)),
-        section(
-            "components",
-            "Components",
-            agreement::fits_table(
-                "Components: target against model, by fit",
-                &merge_comparisons(several, |e| &e.report.components),
-            ),
-        ),
-        section(
-            "features",
-            "Features",
-            agreement::fits_table(
-                "Features: target against model, by fit",
-                &merge_comparisons(several, |e| &e.report.features),
-            ),
-        ),
-        section(
-            "held-out",
-            "Held-out predictions",
-            agreement::fits_table(
-                "Held-out values, by fit",
-                &merge_comparisons(several, |e| &e.report.held_out),
-            ),
-        ),
+        section("components", "Components", components),
+        section("features", "Features", features),
+        section("held-out", "Held-out predictions", held_out),
         section("reservations", "Reservations", section_per_fit(several, |e| sentence_list(&e.report.notes))),
-        section(
-            "provenance",
-            "Provenance",
-            section_per_fit(several, |e| provenance_html(&e.report.provenance)),
-        ),
+        section("provenance", "Provenance", provenance),
     ];
     render_document(&several.title, &several.fits.iter().map(data_lead).collect::<String>(), &sections)
 }
@@ -69,9 +45,7 @@ fn data_lead(entry: &ComparedFit) -> String {
 /// The fits in a table.
 fn fits_table(entries: &[ComparedFit]) -> String {
     let row = |e: &ComparedFit| -> Vec<HtmlCell> {
-        let share = |met: usize, of: usize| {
-            (format!("{met} of {of}"), if met == of { CellStyle::Good } else { CellStyle::Bad })
-        };
+        let share = |met: usize, of: usize| (format!("{met} of {of}"), if met == of { Good } else { Bad });
         let of = |list: &[Comparison]| share(list.iter().filter(|c| c.pass).count(), list.len());
         let known = e.report.parameters.iter().filter(|p| p.is_identified()).count();
         let data: Vec<String> = e
@@ -83,13 +57,13 @@ fn fits_table(entries: &[ComparedFit]) -> String {
         let data = if data.is_empty() { "published numbers".to_owned() } else { data.join(", ") };
         let status = (
             format_or_dash(e.report.search.status, |status| escape_text(status.name())),
-            if e.verdict.search_converged { CellStyle::Good } else { CellStyle::Bad },
+            if e.verdict.search_converged { Good } else { Bad },
         );
-        let title = (isolate_name(&e.report.title), CellStyle::Prose);
+        let title = (isolate_name(&e.report.title), Prose);
         vec![
-            (isolate_name(&e.name), CellStyle::Words),
+            (isolate_name(&e.name), Words),
             title,
-            (data, CellStyle::Words),
+            (data, Words),
             of(&e.report.components),
             of(&e.report.features),
             share(known, e.report.parameters.len()),
@@ -97,26 +71,17 @@ fn fits_table(entries: &[ComparedFit]) -> String {
         ]
     };
     let head = [
-        ("fit", CellStyle::Words),
-        ("title", CellStyle::Prose),
-        ("data", CellStyle::Words),
-        ("components met", CellStyle::Words),
-        ("features met", CellStyle::Words),
+        (Words, "fit"),
+        (Prose, "title"),
+        (Words, "data|components met|features met|parameters determined|search"),
     ];
-    let head =
-        [&head[..], &[("parameters determined", CellStyle::Words), ("search", CellStyle::Words)]].concat();
-    HtmlTable {
-        caption: "The fits",
-        head: HtmlTable::column_heads(&head),
-        rows: entries.iter().map(row).collect(),
-    }
-    .render()
+    render_table("The fits", column_heads(&head), entries.iter().map(row).collect())
 }
 
 /// Estimates side by side.
 fn parameters_table(several: &FitComparison) -> String {
     let cell = |line: &Option<ParameterLine>| -> HtmlCell {
-        let Some(line) = line else { return ("not free".to_owned(), CellStyle::Words) };
+        let Some(line) = line else { return ("not free".to_owned(), Words) };
         let [estimate, interval] = estimate_text(line);
         let place = |inside: bool| if inside { " inside" } else { " outside" };
         let placed = |inside| if line.is_bounded() { place(inside) } else { "" };
@@ -129,7 +94,7 @@ fn parameters_table(several: &FitComparison) -> String {
                 "{estimate}<br>{interval}<br><span class=\"{class}\">{}</span>{truth}",
                 escape_text(line.verdict.name())
             ),
-            CellStyle::Words,
+            Words,
         )
     };
     let pairs = |p: &SharedParameter| -> HtmlCell {
@@ -145,37 +110,26 @@ fn parameters_table(several: &FitComparison) -> String {
                 )
             })
             .collect();
-        (if said.is_empty() { DASH.to_owned() } else { said.join("<br>") }, CellStyle::Prose)
+        (if said.is_empty() { DASH.to_owned() } else { said.join("<br>") }, Prose)
     };
     let row = |p: &SharedParameter| -> Vec<HtmlCell> {
-        let named = [
-            (breakable_key(&p.name), CellStyle::Words),
-            (escape_text(&p.symbol), CellStyle::Words),
-            (escape_text(&p.unit), CellStyle::Words),
-        ];
+        let named =
+            [(breakable_key(&p.name), Words), (escape_text(&p.symbol), Words), (escape_text(&p.unit), Words)];
         named.into_iter().chain(p.lines.iter().map(cell)).chain([pairs(p)]).collect()
     };
     if several.parameters.is_empty() {
         return String::new();
     }
-    let head = [("parameter", CellStyle::Words), ("symbol", CellStyle::Words), ("unit", CellStyle::Words)];
-    let fits = several.fits.iter().map(|fit| (isolate_name(&fit.name), CellStyle::Words));
-    let head = HtmlTable::column_heads(&head)
-        .into_iter()
-        .chain(fits)
-        .chain([("95 % intervals".to_owned(), CellStyle::Prose)])
-        .collect();
+    let head = [(Words, "parameter|symbol|unit")];
+    let fits = several.fits.iter().map(|fit| (isolate_name(&fit.name), Words));
+    let head =
+        column_heads(&head).into_iter().chain(fits).chain([("95 % intervals".to_owned(), Prose)]).collect();
     let words = "Estimate, 95 % interval and verdict of each fit. Intervals that do not overlap differ by \
                  more than their own uncertainty; that they overlap does not show \
                  that the values are equal. A parameter that is not identified, or lies at a bound, is not \
                  compared.";
     reading_hint(words)
-        + &HtmlTable {
-            caption: "Parameters, by fit",
-            head,
-            rows: several.parameters.iter().map(row).collect(),
-        }
-        .render()
+        + &render_table("Parameters, by fit", head, several.parameters.iter().map(row).collect())
 }
 
 /// Lines of all fits, those of the same name together, each with the name of its fit.

@@ -8,8 +8,7 @@ use crate::figures::{Drawing, FigureBlock, NO_TRACES, subtitle};
 use crate::fit::job::FitTarget;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, InstantKind, ReversalInstants, WindowEnd};
-use crate::spectrum;
-use crate::spectrum::{Spectrum, SpectrumSettings};
+use crate::spectrum::{self, Spectrum, SpectrumSettings};
 use crate::text::{format_digits, format_trimmed, join_with_and};
 
 const MICROMETRES: f64 = 1e6;

@@ -1,7 +1,6 @@
 //! What a comparison says, in words.
 
-use super::ComparedFit;
-use super::{IntervalPair, IntervalRelation, SharedParameter};
+use super::{ComparedFit, IntervalPair, IntervalRelation, SharedParameter};
 use crate::report::rich_text::{Sentence, Statement};
 
 pub(super) fn comparison_statements(

@@ -1,15 +1,12 @@
 //! Tables of what was measured and what the model shows.
 
-use super::html::{
-    CellStyle, HtmlCell, HtmlTable, escape_text, isolate_name, parameter_html, prose_html, reading_hint,
-    verdict_cell,
-};
+use super::html::CellStyle::{Name, Number, Prose, Words};
+use super::html::*;
 use crate::compare::Comparison;
 use crate::fit::misfit::{ChannelMisfit, StageMisfit, TraceMisfit};
 use crate::fit::result::NuisanceResult;
-use crate::text;
 use crate::text::{
-    format_decimals, format_digits, format_interval, format_number, format_or_dash, format_percent,
+    self, format_decimals, format_digits, format_interval, format_number, format_or_dash, format_percent,
     format_signed_percent, format_with_sd,
 };
 
@@ -47,22 +44,18 @@ fn comparison_table(caption: &str, words: &str, [kind, condition]: [&str; 2], li
         return String::new();
     }
     let several = list.iter().any(|c| c.condition.is_some());
-    let mut head = vec![(kind, CellStyle::Words)];
-    head.extend(several.then_some((condition, CellStyle::Words)));
+    let mut head = vec![(Words, kind)];
+    head.extend(several.then_some((Words, condition)));
     head.extend([
-        ("unit", CellStyle::Words),
-        ("target", CellStyle::Number),
-        ("from", CellStyle::Words),
-        ("model", CellStyle::Number),
-        ("relative error", CellStyle::Number),
-    ]);
-    head.extend([
-        ("tolerance", CellStyle::Number),
-        ("verdict", CellStyle::Words),
-        ("remarks", CellStyle::Prose),
+        (Words, "unit"),
+        (Number, "target"),
+        (Words, "from"),
+        (Number, "model|relative error|tolerance"),
+        (Words, "verdict"),
+        (Prose, "remarks"),
     ]);
     let rows = list.iter().map(|c| comparison_row(c, several)).collect();
-    HtmlTable { caption, head: HtmlTable::column_heads(&head), rows }.render() + &reading_hint(words)
+    render_table(caption, column_heads(&head), rows) + &reading_hint(words)
 }
 
 fn comparison_row(c: &Comparison, several: bool) -> Vec<HtmlCell> {
@@ -76,21 +69,17 @@ fn comparison_row(c: &Comparison, several: bool) -> Vec<HtmlCell> {
         (_, true) => "synthetic",
         _ => "recording",
     };
-    let mut cells = vec![(isolate_name(&c.name), CellStyle::Words)];
-    cells.extend(
-        several.then(|| (c.condition.as_deref().map(isolate_name).unwrap_or_default(), CellStyle::Name)),
-    );
+    let mut cells = vec![(isolate_name(&c.name), Words)];
+    cells.extend(several.then(|| (c.condition.as_deref().map(isolate_name).unwrap_or_default(), Name)));
     cells.extend([
-        (escape_text(&unit), CellStyle::Words),
-        (target, CellStyle::Number),
-        (from.to_owned(), CellStyle::Words),
-        (model, CellStyle::Number),
-        (error, CellStyle::Number),
-    ]);
-    cells.extend([
-        (tolerance, CellStyle::Number),
+        (escape_text(&unit), Words),
+        (target, Number),
+        (from.to_owned(), Words),
+        (model, Number),
+        (error, Number),
+        (tolerance, Number),
         verdict_cell(c.pass, ["met", "not met"]),
-        (prose_html(&value_remarks(c)), CellStyle::Prose),
+        (prose_html(&value_remarks(c)), Prose),
     ]);
     cells
 }
@@ -148,103 +137,77 @@ pub(super) fn misfit_html(misfit: Option<&TraceMisfit>) -> String {
 
 fn channels_table(list: &[ChannelMisfit]) -> String {
     let head = [
-        ("recording", CellStyle::Words),
-        ("channel", CellStyle::Words),
-        ("frames", CellStyle::Number),
-        ("residual, rms, \u{b5}m", CellStyle::Number),
-        ("noise, \u{b5}m", CellStyle::Number),
-        ("chi2 per degree of freedom", CellStyle::Number),
-        ("correlation of neighbours", CellStyle::Number),
+        (Words, "recording|channel"),
+        (
+            Number,
+            "frames|residual, rms, \u{b5}m|noise, \u{b5}m|chi2 per degree of freedom|correlation of neighbours",
+        ),
     ];
     let row = |c: &ChannelMisfit| -> Vec<HtmlCell> {
         vec![
-            (isolate_name(&c.recording), CellStyle::Name),
-            (escape_text(&c.channel), CellStyle::Words),
-            (c.frames.to_string(), CellStyle::Number),
-            (format_number(1e6 * c.residual_rms_m), CellStyle::Number),
-            (format_number(1e6 * c.noise_m), CellStyle::Number),
-            (format_number(c.chi2_per_dof), CellStyle::Number),
-            (format_or_dash(c.autocorrelation_1, |r| format_decimals(r, DECIMALS)), CellStyle::Number),
+            (isolate_name(&c.recording), Name),
+            (escape_text(&c.channel), Words),
+            (c.frames.to_string(), Number),
+            (format_number(1e6 * c.residual_rms_m), Number),
+            (format_number(1e6 * c.noise_m), Number),
+            (format_number(c.chi2_per_dof), Number),
+            (format_or_dash(c.autocorrelation_1, |r| format_decimals(r, DECIMALS)), Number),
         ]
     };
-    HtmlTable {
-        caption: "Residuals against noise",
-        head: HtmlTable::column_heads(&head),
-        rows: list.iter().map(row).collect(),
-    }
-    .render()
+    render_table("Residuals against noise", column_heads(&head), list.iter().map(row).collect())
 }
 
 fn stages_table(list: &[StageMisfit]) -> String {
-    let head = [
-        ("length of the segments", CellStyle::Number),
-        ("segments", CellStyle::Number),
-        ("bad ones", CellStyle::Number),
-        ("chi2 per degree of freedom", CellStyle::Number),
-    ];
+    let head = [(Number, "length of the segments|segments|bad ones|chi2 per degree of freedom")];
     let row = |s: &StageMisfit| -> Vec<HtmlCell> {
         vec![
-            (format!("{} ms", format_number(1e3 * s.segment_s)), CellStyle::Number),
-            (s.segments.to_string(), CellStyle::Number),
-            (s.bad_segments.to_string(), CellStyle::Number),
-            (format_number(s.chi2_per_dof), CellStyle::Number),
+            (format!("{} ms", format_number(1e3 * s.segment_s)), Number),
+            (s.segments.to_string(), Number),
+            (s.bad_segments.to_string(), Number),
+            (format_number(s.chi2_per_dof), Number),
         ]
     };
-    HtmlTable {
-        caption: "Misfit over the length of the segments",
-        head: HtmlTable::column_heads(&head),
-        rows: list.iter().map(row).collect(),
-    }
-    .render()
+    render_table(
+        "Misfit over the length of the segments",
+        column_heads(&head),
+        list.iter().map(row).collect(),
+    )
 }
 
 fn worst_segments_table(list: &[ChannelMisfit]) -> String {
-    let head = [
-        ("recording", CellStyle::Words),
-        ("channel", CellStyle::Words),
-        ("from", CellStyle::Number),
-        ("to", CellStyle::Number),
-        ("chi2 per degree of freedom", CellStyle::Number),
-    ];
+    let head = [(Words, "recording|channel"), (Number, "from|to|chi2 per degree of freedom")];
     let rows = |c: &ChannelMisfit| -> Vec<Vec<HtmlCell>> {
         let row = |w: &crate::fit::misfit::WorstSegment| -> Vec<HtmlCell> {
             vec![
-                (isolate_name(&c.recording), CellStyle::Name),
-                (escape_text(&c.channel), CellStyle::Words),
-                (format!("{} s", format_number(w.start_s)), CellStyle::Number),
-                (format!("{} s", format_number(w.end_s)), CellStyle::Number),
-                (format_number(w.chi2_per_dof), CellStyle::Number),
+                (isolate_name(&c.recording), Name),
+                (escape_text(&c.channel), Words),
+                (format!("{} s", format_number(w.start_s)), Number),
+                (format!("{} s", format_number(w.end_s)), Number),
+                (format_number(w.chi2_per_dof), Number),
             ]
         };
         c.worst.iter().map(row).collect()
     };
     let rows = list.iter().flat_map(rows).collect();
-    HtmlTable { caption: "Segments that fit worst", head: HtmlTable::column_heads(&head), rows }.render()
+    render_table("Segments that fit worst", column_heads(&head), rows)
 }
 
 pub(super) fn nuisances_table(list: &[NuisanceResult]) -> String {
-    let head = [
-        ("estimated besides", CellStyle::Words),
-        ("recording", CellStyle::Words),
-        ("known beforehand", CellStyle::Number),
-        ("estimate", CellStyle::Number),
-        ("95 % interval", CellStyle::Number),
-    ];
+    let head = [(Words, "estimated besides|recording"), (Number, "known beforehand|estimate|95 % interval")];
     let row = |n: &NuisanceResult| -> Vec<HtmlCell> {
         vec![
-            (parameter_html(&n.name), CellStyle::Words),
-            (n.recording.as_deref().map_or_else(|| escape_text("all"), isolate_name), CellStyle::Name),
-            (format!("{} \u{b1} {}", format_number(n.prior), format_number(n.prior_sd)), CellStyle::Number),
-            (format_number(n.estimate), CellStyle::Number),
-            (format_interval(n.lower_95, n.upper_95, format_number), CellStyle::Number),
+            (parameter_html(&n.name), Words),
+            (n.recording.as_deref().map_or_else(|| escape_text("all"), isolate_name), Name),
+            (format!("{} \u{b1} {}", format_number(n.prior), format_number(n.prior_sd)), Number),
+            (format_number(n.estimate), Number),
+            (format_interval(n.lower_95, n.upper_95, format_number), Number),
         ]
     };
-    let html = HtmlTable {
-        caption: "Cameras, and constants within priors",
-        head: HtmlTable::column_heads(&head),
-        rows: list.iter().map(row).collect(),
-    }
-    .render();
+    let html = render_table(
+        "Cameras, and constants within priors",
+        column_heads(&head),
+        list.iter().map(row).collect(),
+    );
     let words = "The unit stands in the name, as in a scene. An estimate several standard deviations away from \
                  what was known beforehand is a reason to look at the calibration, or at the constant.";
     if html.is_empty() { html } else { reading_hint(words) + &html }

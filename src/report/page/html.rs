@@ -115,51 +115,45 @@ pub(in crate::report) fn verdict_cell(good: bool, words: [&str; 2]) -> HtmlCell 
     if good { (escape_text(words[0]), CellStyle::Good) } else { (escape_text(words[1]), CellStyle::Bad) }
 }
 
-/// A table: what it shows, the heads of its columns with how they are set, and its rows, whose first cell is
-/// their head.
-pub(in crate::report) struct HtmlTable<'a> {
-    pub caption: &'a str,
-    pub head: Vec<(String, CellStyle)>,
-    pub rows: Vec<Vec<HtmlCell>>,
+/// Heads of columns in the program's own words: columns of one style in a group, with `|` between them.
+pub(in crate::report) fn column_heads(groups: &[(CellStyle, &str)]) -> Vec<HtmlCell> {
+    groups
+        .iter()
+        .flat_map(|(style, names)| names.split('|').map(|name| (escape_text(name), *style)))
+        .collect()
 }
 
-impl HtmlTable<'_> {
-    /// Heads of columns in the program's own words.
-    pub(crate) fn column_heads(list: &[(&str, CellStyle)]) -> Vec<(String, CellStyle)> {
-        list.iter().map(|(name, set)| (escape_text(name), *set)).collect()
+/// A table in a box that scrolls by itself where it is wider than the page; nothing when it has no rows. The
+/// first cell of a row is its head.
+pub(in crate::report) fn render_table(
+    caption: &str,
+    head: Vec<HtmlCell>,
+    rows: Vec<Vec<HtmlCell>>,
+) -> String {
+    if rows.is_empty() {
+        return String::new();
     }
-
-    /// The table in a box that scrolls by itself where it is wider than the page; nothing when it has no
-    /// rows.
-    pub(crate) fn render(&self) -> String {
-        if self.rows.is_empty() {
-            return String::new();
-        }
-        let head: String = self
-            .head
-            .iter()
-            .map(|(html, set)| {
-                format!("<th role=\"columnheader\" scope=\"col\" class=\"{}\">{html}</th>", set.css_class())
-            })
-            .collect();
-        // (on a narrow screen every row is a list, in which a cell says whose it is)
-        let cell = |(i, ((html, set), (of, _))): (usize, (&HtmlCell, &(String, CellStyle)))| match i {
-            0 => format!("<th role=\"rowheader\" scope=\"row\" class=\"{}\">{html}</th>", set.css_class()),
-            _ if html.is_empty() => "<td role=\"cell\" class=\"none\"></td>".to_owned(),
-            _ => format!("<td role=\"cell\" class=\"{}\"><i>{of}</i> {html}</td>", set.css_class()),
-        };
-        let row = |cells: &Vec<HtmlCell>| {
-            let cells: String = cells.iter().zip(&self.head).enumerate().map(cell).collect();
-            format!("<tr role=\"row\">{cells}</tr>\n")
-        };
-        let (caption, rows) = (escape_text(self.caption), self.rows.iter().map(row).collect::<String>());
-        format!(
-            "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table: \
-             {caption}\"><table role=\"table\">\n<caption>{caption}</caption>\n\
-             <thead role=\"rowgroup\"><tr role=\"row\">{head}</tr></thead>\n\
-             <tbody role=\"rowgroup\">\n{rows}</tbody>\n</table></div>\n"
-        )
-    }
+    // on a narrow screen every row is a list, in which each cell names its column
+    let cell = |(i, ((html, style), (of, _))): (usize, (&HtmlCell, &HtmlCell))| match i {
+        0 => format!("<th role=\"rowheader\" scope=\"row\" class=\"{}\">{html}</th>", style.css_class()),
+        _ if html.is_empty() => "<td role=\"cell\" class=\"none\"></td>".to_owned(),
+        _ => format!("<td role=\"cell\" class=\"{}\"><i>{of}</i> {html}</td>", style.css_class()),
+    };
+    let row = |cells: &Vec<HtmlCell>| {
+        let cells: String = cells.iter().zip(&head).enumerate().map(cell).collect();
+        format!("<tr role=\"row\">{cells}</tr>\n")
+    };
+    let rows: String = rows.iter().map(row).collect();
+    let column = |(html, style): &HtmlCell| {
+        format!("<th role=\"columnheader\" scope=\"col\" class=\"{}\">{html}</th>", style.css_class())
+    };
+    let (caption, head) = (escape_text(caption), head.iter().map(column).collect::<String>());
+    format!(
+        "<div class=\"scroll\" tabindex=\"0\" role=\"region\" aria-label=\"Table: \
+         {caption}\"><table role=\"table\">\n<caption>{caption}</caption>\n\
+         <thead role=\"rowgroup\"><tr role=\"row\">{head}</tr></thead>\n\
+         <tbody role=\"rowgroup\">\n{rows}</tbody>\n</table></div>\n"
+    )
 }
 
 /// Named values as a list; nothing for none.
@@ -282,12 +276,9 @@ mod tests {
 
     #[test]
     fn a_table_has_a_caption_heads_of_rows_and_columns_and_a_named_box() {
-        let table = HtmlTable {
-            caption: "C",
-            head: HtmlTable::column_heads(&[("a", CellStyle::Words), ("b", CellStyle::Number)]),
-            rows: vec![vec![("x".to_owned(), CellStyle::Words), ("1".to_owned(), CellStyle::Number)]],
-        };
-        let html = table.render();
+        let head = column_heads(&[(CellStyle::Words, "a"), (CellStyle::Number, "b")]);
+        let cells = vec![("x".to_owned(), CellStyle::Words), ("1".to_owned(), CellStyle::Number)];
+        let html = render_table("C", head.clone(), vec![cells]);
         for part in [
             "<caption>C</caption>",
             "<th role=\"columnheader\" scope=\"col\" class=\"n\">b</th>",
@@ -297,6 +288,6 @@ mod tests {
         ] {
             assert!(html.contains(part), "{part}: {html}");
         }
-        assert_eq!(HtmlTable { rows: vec![], ..table }.render(), "");
+        assert_eq!(render_table("C", head, vec![]), "");
     }
 }

@@ -1,11 +1,8 @@
 //! Sections on what is known of the parameters, and on how the search and the gate before it went.
 
-use super::html::{
-    CellStyle, HtmlCell, HtmlTable, breakable_key, escape_text, facts_list, parameter_html, prose_html,
-    reading_hint, sentence_list, verdict_cell,
-};
+use super::html::CellStyle::{Bad, Good, Number, Prose, Words};
+use super::html::*;
 use crate::compare::ParameterLine;
-use crate::fit::result::FitStatus;
 use crate::report::{CombinationLine, ProbeLine, Report};
 use crate::text::{self, DASH, format_interval, format_number, format_or_dash, format_percent};
 
@@ -36,59 +33,45 @@ const OF_TRACES: &str = "The 95 % interval is the widest of those from the curva
 
 fn estimates_table(list: &[ParameterLine]) -> String {
     let with_truth = list.iter().any(|p| p.truth.is_some());
-    let mut head = vec![
-        ("parameter", CellStyle::Words),
-        ("symbol", CellStyle::Words),
-        ("unit", CellStyle::Words),
-        ("estimate", CellStyle::Number),
-        ("95 % interval", CellStyle::Number),
-    ];
-    head.push(("verdict", CellStyle::Words));
-    if with_truth {
-        head.extend([("truth (synthetic)", CellStyle::Number), ("truth inside", CellStyle::Words)]);
-    }
     let with_reason = list.iter().any(|p| p.why.is_some());
-    head.extend(with_reason.then_some(("why not", CellStyle::Prose)));
+    let mut head =
+        vec![(Words, "parameter|symbol|unit"), (Number, "estimate|95 % interval"), (Words, "verdict")];
+    if with_truth {
+        head.extend([(Number, "truth (synthetic)"), (Words, "truth inside")]);
+    }
+    head.extend(with_reason.then_some((Prose, "why not")));
     let row = |p: &ParameterLine| {
         let (unit, factor) = text::choose_prefix(&p.unit, [p.estimate]);
         let number = |value: f64| format_number(value * factor);
         let mut cells = vec![
-            (parameter_html(&p.name), CellStyle::Words),
-            (escape_text(&p.symbol), CellStyle::Words),
-            (escape_text(&unit), CellStyle::Words),
+            (parameter_html(&p.name), Words),
+            (escape_text(&p.symbol), Words),
+            (escape_text(&unit), Words),
         ];
         cells.extend([
-            (number(p.estimate), CellStyle::Number),
-            (format_interval(p.lower_95, p.upper_95, number), CellStyle::Number),
+            (number(p.estimate), Number),
+            (format_interval(p.lower_95, p.upper_95, number), Number),
             verdict_cell(p.is_identified(), [p.verdict.name(); 2]),
         ]);
         if with_truth {
             let inside = p.truth.filter(|_| p.is_bounded()).map_or_else(
-                || (DASH.to_owned(), CellStyle::Words),
+                || (DASH.to_owned(), Words),
                 |truth| verdict_cell(truth.inside_95, ["yes", "no"]),
             );
-            cells.extend([(format_or_dash(p.truth, |truth| number(truth.value)), CellStyle::Number), inside]);
+            cells.extend([(format_or_dash(p.truth, |truth| number(truth.value)), Number), inside]);
         }
-        cells.extend(with_reason.then(|| (format_or_dash(p.why.as_deref(), prose_html), CellStyle::Prose)));
+        cells.extend(with_reason.then(|| (format_or_dash(p.why.as_deref(), prose_html), Prose)));
         cells
     };
-    HtmlTable {
-        caption: "Estimates and verdicts",
-        head: HtmlTable::column_heads(&head),
-        rows: list.iter().map(row).collect(),
-    }
-    .render()
+    render_table("Estimates and verdicts", column_heads(&head), list.iter().map(row).collect())
 }
 
 fn intervals_table(list: &[ParameterLine], twins: usize) -> String {
     let head = [
-        ("parameter", CellStyle::Words),
-        ("profile likelihood", CellStyle::Number),
-        ("twins fitted again", CellStyle::Number),
-        ("linear model", CellStyle::Number),
+        (Words, "parameter"),
+        (Number, "profile likelihood|twins fitted again|linear model|bounds of the search"),
+        (Words, "prior"),
     ];
-    let head =
-        [&head[..], &[("bounds of the search", CellStyle::Number), ("prior", CellStyle::Words)]].concat();
     let row = |p: &ParameterLine| -> Vec<HtmlCell> {
         let [lower, upper] = p.profile_95;
         let prior = if p.prior { "counts" } else { "none" };
@@ -101,23 +84,18 @@ fn intervals_table(list: &[ParameterLine], twins: usize) -> String {
             )
         };
         vec![
-            (parameter_html(&p.name), CellStyle::Words),
-            (format_interval(lower, upper, number), CellStyle::Number),
-            (ends(p.bootstrap_95, if twins == 0 { "no twins" } else { "too few twins" }), CellStyle::Number),
-            (ends(p.linear_95, "not determined"), CellStyle::Number),
-            (ends(Some(p.bounds), ""), CellStyle::Number),
-            (prior.to_owned(), CellStyle::Words),
+            (parameter_html(&p.name), Words),
+            (format_interval(lower, upper, number), Number),
+            (ends(p.bootstrap_95, if twins == 0 { "no twins" } else { "too few twins" }), Number),
+            (ends(p.linear_95, "not determined"), Number),
+            (ends(Some(p.bounds), ""), Number),
+            (prior.to_owned(), Words),
         ]
     };
     let words = "In the units of the table above. Profile: where the lowest cost over all other parameters has risen by the threshold. \
                  Twins: synthetic data from the best model, fitted again. Linear: from the sensitivities at \
                  the estimates alone.";
-    HtmlTable {
-        caption: "The three 95 % intervals",
-        head: HtmlTable::column_heads(&head),
-        rows: list.iter().map(row).collect(),
-    }
-    .render()
+    render_table("The three 95 % intervals", column_heads(&head), list.iter().map(row).collect())
         + &reading_hint(words)
 }
 
@@ -136,110 +114,87 @@ fn combinations_table(list: &[CombinationLine]) -> String {
     let row = |c: &CombinationLine| {
         let sd = if c.determined { format_percent(c.sd_relative) } else { DASH.to_owned() };
         vec![
-            (product_html(&c.words), CellStyle::Prose),
+            (product_html(&c.words), Prose),
             verdict_cell(c.determined, ["determined", "open"]),
-            (sd, CellStyle::Number),
+            (sd, Number),
         ]
     };
     let words = "These products of the parameters are what the features respond to. Those determined are \
                  known to the deviation given; along those left open the parameters can move together without \
                  a change of the features.";
-    let head = [
-        ("combination", CellStyle::Prose),
-        ("verdict", CellStyle::Words),
-        ("standard deviation", CellStyle::Number),
-    ];
-    let table = HtmlTable {
-        caption: "Combinations of the parameters",
-        head: HtmlTable::column_heads(&head),
-        rows: list.iter().map(row).collect(),
-    }
-    .render();
+    let head = [(Prose, "combination"), (Words, "verdict"), (Number, "standard deviation")];
+    let table =
+        render_table("Combinations of the parameters", column_heads(&head), list.iter().map(row).collect());
     if table.is_empty() { table } else { format!("<h3>Combinations</h3>\n{}{table}", reading_hint(words)) }
 }
 
 pub(super) fn search_html(report: &Report) -> String {
     let s = &report.search;
     let Some(status) = s.status else { return String::new() };
+    let determined = format!("{} of {}", s.rank, report.parameters.len());
+    // a fit to traces has iterates and starts in place of evaluations and a gate
     if report.misfit.is_some() {
-        return facts_list(&trace_search_facts(report, status));
+        return search_facts(&[
+            ("status", status.name().to_owned()),
+            ("iterates", s.evaluations.to_string()),
+            ("starts", s.local_searches.to_string()),
+            ("cost at the estimates", format_number(s.cost)),
+            ("combinations determined", determined),
+        ]);
     }
     let failed: Vec<String> = s.failed.iter().map(|f| format!("{} {}", f.count, f.reason)).collect();
     let failed = if failed.is_empty() { "none".to_owned() } else { failed.join(", ") };
-    let mut found =
-        vec![("status", status.name().to_owned()), ("evaluations of the model", s.evaluations.to_string())];
-    found.extend([
+    let twins = if s.twins == 0 { "none".to_owned() } else { s.twins.to_string() };
+    let infinite = || "infinite: no feature responds to one of the combinations".to_owned();
+    let facts = search_facts(&[
+        ("status", status.name().to_owned()),
+        ("evaluations of the model", s.evaluations.to_string()),
         ("failed", failed),
         ("local searches", s.local_searches.to_string()),
         ("cost at the estimates", format_number(s.cost)),
+        ("rise in cost that bounds a 95 % interval", format_number(s.threshold)),
+        ("twins fitted again", twins),
+        ("combinations determined", determined),
+        ("condition number", s.condition.map_or_else(infinite, format_number)),
     ]);
-    found.push(("rise in cost that bounds a 95 % interval", format_number(s.threshold)));
-    found.push(("twins fitted again", if s.twins == 0 { "none".to_owned() } else { s.twins.to_string() }));
-    found.push(("combinations determined", format!("{} of {}", s.rank, report.parameters.len())));
-    found.push((
-        "condition number",
-        s.condition.map_or_else(
-            || "infinite: no feature responds to one of the combinations".to_owned(),
-            format_number,
-        ),
-    ));
-    let found: Vec<(String, String)> =
-        found.into_iter().map(|(name, value)| (escape_text(name), escape_text(&value))).collect();
-    [facts_list(&found), gate_table(&report.gate), sentence_list(&report.gate_notes)].concat()
+    [facts, gate_table(&report.gate), sentence_list(&report.gate_notes)].concat()
 }
 
-/// A fit to traces has iterates and starts in place of evaluations and a gate.
-fn trace_search_facts(report: &Report, status: FitStatus) -> Vec<(String, String)> {
-    let s = &report.search;
-    let found = [
-        ("status", status.name().to_owned()),
-        ("iterates", s.evaluations.to_string()),
-        ("starts", s.local_searches.to_string()),
-        ("cost at the estimates", format_number(s.cost)),
-        ("combinations determined", format!("{} of {}", s.rank, report.parameters.len())),
-    ];
-    found.into_iter().map(|(name, value)| (escape_text(name), escape_text(&value))).collect()
+fn search_facts(facts: &[(&str, String)]) -> String {
+    let escaped = facts.iter().map(|(name, value)| (escape_text(name), escape_text(value)));
+    facts_list(&escaped.collect::<Vec<_>>())
 }
 
 fn gate_table(probes: &[ProbeLine]) -> String {
     let row = |(i, p): (usize, &ProbeLine)| {
-        let ran = p
-            .failure
-            .as_deref()
-            .map_or_else(|| ("ran".to_owned(), CellStyle::Good), |why| (prose_html(why), CellStyle::Bad));
+        let ran = p.failure.as_deref().map_or_else(|| ("ran".to_owned(), Good), |why| (prose_html(why), Bad));
         let condition = format_or_dash(p.condition, format_number);
         let determines = if p.determines.is_empty() {
             "none alone".to_owned()
         } else {
             p.determines.iter().map(|name| breakable_key(name)).collect::<Vec<_>>().join(", ")
         };
-        let number = |count: usize| (count.to_string(), CellStyle::Number);
+        let number = |count: usize| (count.to_string(), Number);
         vec![
             number(i + 1),
             ran,
             number(p.features_seen),
             number(p.rank),
-            (condition, CellStyle::Number),
-            (determines, CellStyle::Prose),
+            (condition, Number),
+            (determines, Prose),
         ]
     };
     let head = [
-        ("place", CellStyle::Number),
-        ("model", CellStyle::Words),
-        ("features found", CellStyle::Number),
-        ("combinations determined", CellStyle::Number),
+        (Number, "place"),
+        (Words, "model"),
+        (Number, "features found|combinations determined|condition number"),
+        (Prose, "parameters determined alone"),
     ];
-    let head = [
-        &head[..],
-        &[("condition number", CellStyle::Number), ("parameters determined alone", CellStyle::Prose)],
-    ]
-    .concat();
     let rows = probes.iter().enumerate().map(row).collect();
-    let table = HtmlTable {
-        caption: "The gate: places of the box that were probed before the search",
-        head: HtmlTable::column_heads(&head),
+    let table = render_table(
+        "The gate: places of the box that were probed before the search",
+        column_heads(&head),
         rows,
-    }
-    .render();
+    );
     if table.is_empty() { table } else { format!("<h3>Gate</h3>\n{table}") }
 }

@@ -1,9 +1,7 @@
 //! What each recording can show and what is wrong with it, as `wiperlab inspect` finds it.
 
-use super::html::{
-    CellStyle, HtmlCell, HtmlTable, escape_text, facts_list, isolate_name, prose_html, reading_hint,
-    sentence_list,
-};
+use super::html::CellStyle::{Bad, Number, Prose, Words};
+use super::html::*;
 use crate::recording::quality::{QualityFinding, Severity};
 use crate::report::RecordingLine;
 use crate::text::{format_number, format_or_dash, format_percent, pluralise};
@@ -23,63 +21,33 @@ fn typeset_text(said: &str) -> String {
 }
 
 fn recording_html(r: &RecordingLine) -> String {
-    let (q, micro) = (&r.measurements, |m: Option<f64>| {
-        format_or_dash(m, |m| format!("{} \u{b5}m", format_number(m * 1e6)))
-    });
+    let q = &r.measurements;
+    let micrometres = |m: Option<f64>| format_or_dash(m, |m| format!("{} \u{b5}m", format_number(m * 1e6)));
     let missing = q.missing_deflection_frames as f64 / q.frames.max(1) as f64;
     let exports: Vec<String> = r.exports.iter().map(|export| isolate_name(export)).collect();
-    let found = vec![
-        (
-            "source".to_owned(),
-            if r.synthetic { "synthetic: no camera took it".to_owned() } else { "camera".to_owned() },
-        ),
-        (
-            "imported from".to_owned(),
-            if exports.is_empty() { "not known".to_owned() } else { exports.join(", ") },
-        ),
-        (
-            "frames".to_owned(),
-            format!(
-                "{} at {} frames/s, {} s",
-                q.frames,
-                format_number(q.frame_rate_hz),
-                format_number(q.duration_s)
-            ),
-        ),
-        (
-            "without a deflection".to_owned(),
-            format!(
-                "{} ({}) in {}, the longest of {}",
-                count_noun(q.missing_deflection_frames, "frame"),
-                format_percent(missing),
-                count_noun(q.gaps, "gap"),
-                count_noun(q.longest_gap_frames, "frame")
-            ),
-        ),
-        (
-            "noise of the tip (x, y)".to_owned(),
-            format!("{}, {}", micro(q.tip_x.noise_m), micro(q.tip_y.noise_m)),
-        ),
-        (
-            "noise of the head (x, y)".to_owned(),
-            format!("{}, {}", micro(q.head_x.noise_m), micro(q.head_y.noise_m)),
-        ),
+    let exports = if exports.is_empty() { "not known".to_owned() } else { exports.join(", ") };
+    let source = if r.synthetic { "synthetic: no camera took it" } else { "camera" };
+    let (rate, duration) = (format_number(q.frame_rate_hz), format_number(q.duration_s));
+    let [gaps, longest] =
+        [(q.gaps, "gap"), (q.longest_gap_frames, "frame")].map(|(n, noun)| count_noun(n, noun));
+    let lost = count_noun(q.missing_deflection_frames, "frame");
+    let lost = format!("{lost} ({}) in {gaps}, the longest of {longest}", format_percent(missing));
+    let noise = |x: Option<f64>, y: Option<f64>| format!("{}, {}", micrometres(x), micrometres(y));
+    let found = [
+        ("source", source.to_owned()),
+        ("imported from", exports),
+        ("frames", format!("{} at {rate} frames/s, {duration} s", q.frames)),
+        ("without a deflection", lost),
+        ("noise of the tip (x, y)", noise(q.tip_x.noise_m, q.tip_y.noise_m)),
+        ("noise of the head (x, y)", noise(q.head_x.noise_m, q.head_y.noise_m)),
     ];
-    let caption = "Findings, the gravest first";
-    let head = [
-        ("severity", CellStyle::Words),
-        ("check", CellStyle::Words),
-        ("channel", CellStyle::Words),
-        ("number", CellStyle::Number),
-        ("found", CellStyle::Prose),
-        ("what to do", CellStyle::Prose),
-    ];
-    let table = HtmlTable {
-        caption,
-        head: HtmlTable::column_heads(&head),
-        rows: r.findings.iter().map(finding_row).collect(),
-    }
-    .render();
+    let found = found.map(|(name, html)| (name.to_owned(), html));
+    let head = [(Words, "severity|check|channel"), (Number, "number"), (Prose, "found|what to do")];
+    let table = render_table(
+        "Findings, the gravest first",
+        column_heads(&head),
+        r.findings.iter().map(finding_row).collect(),
+    );
     let table = if table.is_empty() { reading_hint("No finding.") } else { table };
     let words = "Missing frames stay missing; gaps of up to four frames are bridged for spectra alone. \
                  Noise is a standard deviation.";
@@ -100,17 +68,17 @@ fn format_count_or_number(value: f64) -> String {
 }
 
 fn finding_row(f: &QualityFinding) -> Vec<HtmlCell> {
-    let severity = if f.severity == Severity::Note { CellStyle::Words } else { CellStyle::Bad };
+    let severity = if f.severity == Severity::Note { Words } else { Bad };
     let prose_or_dash = |raw: &str| format_or_dash(Some(raw).filter(|raw| !raw.is_empty()), prose_html);
     vec![
         (escape_text(f.severity.name()), severity),
-        (escape_text(f.check.name()), CellStyle::Words),
-        (prose_or_dash(f.channel.as_deref().unwrap_or_default()), CellStyle::Words),
+        (escape_text(f.check.name()), Words),
+        (prose_or_dash(f.channel.as_deref().unwrap_or_default()), Words),
         (
             format!("{} {}", format_count_or_number(f.value), escape_text(&f.unit)).trim_end().to_owned(),
-            CellStyle::Number,
+            Number,
         ),
-        (prose_html(&typeset_text(&f.found)), CellStyle::Prose),
-        (prose_or_dash(&f.advice), CellStyle::Prose),
+        (prose_html(&typeset_text(&f.found)), Prose),
+        (prose_or_dash(&f.advice), Prose),
     ]
 }

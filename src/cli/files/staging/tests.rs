@@ -5,12 +5,12 @@ use std::time::SystemTime;
 use tempfile::TempDir;
 
 /// Files with their names as contents, unless another text is given.
-fn placed(folder: &Path, names: &[&str]) -> Result<(), Failure> {
+fn placed(folder: &Path, names: &[&str]) -> Outcome<()> {
     let files: Vec<(&str, &str)> = names.iter().map(|name| (*name, *name)).collect();
     staged(folder, OutputCommand::Spectrum, &files)?.commit()
 }
 
-fn staged(folder: &Path, maker: OutputCommand, files: &[(&str, &str)]) -> Result<OutputStaging, Failure> {
+fn staged(folder: &Path, maker: OutputCommand, files: &[(&str, &str)]) -> Outcome<OutputStaging> {
     let names: Vec<&str> = files.iter().map(|(name, _)| *name).collect();
     let mut staging = OutputStaging::new(folder, &WritePolicy::new(maker, Overwrite::default()), &names)?;
     for (name, text) in files {

@@ -1,0 +1,92 @@
+//! A job with the scenes and recordings that it names, read from disk.
+
+use super::load::{LoadedRecording, load_recording, read_driven_scene};
+use super::prelude::*;
+use crate::fit::job::Job;
+use crate::fit::{MeasuredRecording, Problem};
+use crate::model::plausibility::PlausibilityFinding;
+use std::collections::BTreeMap;
+
+/// The job of a fit in its folder.
+pub(crate) const JOB_FILE: &str = "job.toml";
+
+/// The file of a job that is named by that file or by its folder.
+pub(crate) fn job_path(named: &Path) -> PathBuf {
+    if named.is_dir() { named.join(JOB_FILE) } else { named.to_owned() }
+}
+
+/// A problem with where it lies on disk.
+pub(crate) struct LoadedJob {
+    pub folder: PathBuf,
+    /// The file of the job, and its name in messages.
+    pub path: PathBuf,
+    pub file: String,
+    pub problem: Problem,
+    /// The file of the scene of each condition.
+    pub scene_files: Vec<PathBuf>,
+    /// What is hard to believe in the scenes, each file once.
+    pub doubts: BTreeMap<PathBuf, Vec<PlausibilityFinding>>,
+    /// Where the recordings lie, one for each condition of the job that has one.
+    pub recording_paths: Vec<PathBuf>,
+    /// The recordings with their descriptions.
+    pub measured: Vec<LoadedRecording>,
+    /// The recording that drives the scene of a condition, where the scene names one.
+    pub drivers: Vec<Option<PathBuf>>,
+}
+
+impl LoadedJob {
+    /// Reads and checks a job, named by its file or its folder, its scenes and its recordings.
+    pub(crate) fn load(named: &Path) -> Outcome<Self> {
+        let path = job_path(named);
+        if files::is_standard_input(&path) {
+            let expected = "a file: journal and result of a fit lie next to its job";
+            return Err(Failure::Input(format!(
+                "-: found standard input, expected {expected}; save it as job.toml"
+            )));
+        }
+        let file = path.display().to_string();
+        let job = Job::parse(&file, &files::read_toml(&path)?).map_err(Failure::input)?;
+        let found = |key: &str, named: &str| {
+            files::resolve_existing_path(&path, named)
+                .map_err(|problem| Failure::Input(format!("{file}: key `{key}`: {problem}")))
+        };
+        let scene_files = job.conditions.iter().map(|condition| found("scene", &condition.scene));
+        let scene_files = scene_files.collect::<Result<Vec<_>, _>>()?;
+        let scenes = scene_files.iter().map(|file| read_driven_scene(file));
+        let (scenes, drivers): (Vec<_>, Vec<_>) = scenes.collect::<Result<Vec<_>, _>>()?.into_iter().unzip();
+        let doubts = scene_files.iter().zip(&scenes);
+        let doubts = doubts.map(|(file, scene)| (file.clone(), scene.find_implausible())).collect();
+        let measured_at = job.recordings().map(|named| found("recording.path", named));
+        let measured_at = measured_at.collect::<Result<Vec<_>, _>>()?;
+        let measured = measured_at.iter().map(|path| load_recording(path));
+        let measured = measured.collect::<Result<Vec<_>, _>>()?;
+        let problem = Problem::new(job, scenes, measured.iter().map(to_measured).collect());
+        let problem = problem.map_err(|error| Failure::Input(format!("{file}: {error}")))?;
+        let folder = files::containing_folder(&path).to_owned();
+        Ok(Self {
+            folder,
+            path,
+            file,
+            problem,
+            scene_files,
+            doubts,
+            recording_paths: measured_at,
+            measured,
+            drivers,
+        })
+    }
+
+    pub(crate) fn job(&self) -> &Job {
+        self.problem.job()
+    }
+
+    /// Every recording with where it lies.
+    pub(crate) fn recordings(&self) -> impl Iterator<Item = (&Path, &LoadedRecording)> {
+        self.recording_paths.iter().map(PathBuf::as_path).zip(&self.measured)
+    }
+}
+
+fn to_measured(loaded: &LoadedRecording) -> MeasuredRecording {
+    let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
+    MeasuredRecording { recording: loaded.recording.clone(), exposure_s }
+}
