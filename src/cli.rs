@@ -135,7 +135,7 @@ impl Command {
     pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         match self {
             Self::Demo(args) => args.run(global),
-            Self::Import(args) => args.run(global),
+            Self::Import(args) => args.typed.run(global),
             Self::Init(args) => args.run(global),
             Self::Inspect(args) => args.run(global),
             Self::Spectrum(args) => args.run(global),

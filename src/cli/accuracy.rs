@@ -59,10 +59,9 @@ impl AccuracyArgs {
             (WORK_PRECISION.to_owned(), write_work_precision_csv(&rows).into_bytes()),
             (ACCURACY.to_owned(), write_accuracy_csv(&reference, &rows).into_bytes()),
         ];
-        outputs.extend(files::figure_files(
-            "work-precision",
-            &draw_figure(&work_precision_diagram(&scene, &reference, &rows)),
-        ));
+        let diagram = draw_figure(&work_precision_diagram(&scene, &reference, &rows));
+        outputs.extend(files::figure_files("work-precision", &diagram));
+
         files::write_outputs(&self.out, &writer, &outputs)?;
         if !global.quiet {
             print_study(&scene, &reference, &rows);
@@ -95,83 +94,55 @@ fn work_precision_diagram(
     reference: &ReferenceRun<'_>,
     rows: &[AccuracyRow],
 ) -> WorkPrecision {
-    let transitions = reference.run_result().transitions;
-    let length_s = (1e4 * (reference.run_result().stopped_at_s - scene.start_s)).round() / 1e4;
+    let run = reference.run_result();
+    let length_s = (1e4 * (run.stopped_at_s - scene.start_s)).round() / 1e4;
     // without transitions, or with references that disagree on them, the error is that of the deflection
-    let timed = transitions > 0 && reference.lists_agree;
-    let error = |row: &AccuracyRow| if timed { row.lists.worst_s } else { Some(row.state_worst) };
-    let point = |row: &AccuracyRow| {
-        let wrong_transitions = if timed { row.lists.missed + row.lists.invented } else { 0 };
-        WorkPrecisionRun {
-            method: row.setting.name().to_owned(),
-            wall_s: row.wall_s,
-            error: error(row),
-            wrong_transitions,
-        }
+    let timed = run.transitions > 0 && reference.lists_agree;
+    let (unit, error_label, floor) = if timed {
+        (" s", "worst error of a transition time, s", reference.apart_s)
+    } else {
+        ("", "worst error of the deflection over its range", Some(reference.state_apart))
     };
+    let error = |row: &AccuracyRow| if timed { row.lists.worst_s } else { Some(row.state_worst) };
+    let point = |row: &AccuracyRow| WorkPrecisionRun {
+        method: row.setting.name().to_owned(),
+        wall_s: row.wall_s,
+        error: error(row),
+        wrong_transitions: if timed { row.lists.missed + row.lists.invented } else { 0 },
+    };
+    let (title, transitions) = (scene.title(), run.transitions);
     WorkPrecision {
-        title: diagram_title(rows, error, if timed { " s" } else { "" }),
-        subtitle: format!(
-            "work-precision of {}: {transitions} transitions in {length_s} s of motion",
-            scene.title()
-        ),
-        error_label: if timed {
-            "worst error of a transition time, s"
-        } else {
-            "worst error of the deflection over its range"
-        }
-        .to_owned(),
+        title: diagram_title(rows, error, unit),
+        subtitle: format!("work-precision of {title}: {transitions} transitions in {length_s} s of motion"),
+        error_label: error_label.to_owned(),
         points: rows.iter().map(point).collect(),
-        floor: if timed { reference.apart_s } else { Some(reference.state_apart) }
-            .filter(|floor| *floor > 0.0),
+        floor: floor.filter(|floor| *floor > 0.0),
     }
 }
 
 /// The claim of the diagram: the setting with the least error, and its time.
 fn diagram_title(rows: &[AccuracyRow], error: impl Fn(&AccuracyRow) -> Option<f64>, unit: &str) -> String {
     let least = rows.iter().filter_map(|row| Some((error(row)?, row))).min_by(|a, b| a.0.total_cmp(&b.0));
-    match least {
-        Some((error, row)) => format!(
-            "Least error {}{unit}: {} in {} ms",
-            format_digits(error, 2),
-            row.setting.name(),
-            format_digits(1e3 * row.wall_s, 2)
-        ),
-        None => "No setting has an error to show".to_owned(),
-    }
+    let Some((error, row)) = least else { return "No setting has an error to show".to_owned() };
+    let (error, wall_ms) = (format_digits(error, 2), format_digits(1e3 * row.wall_s, 2));
+    format!("Least error {error}{unit}: {} in {wall_ms} ms", row.setting.name())
 }
 
 fn print_study(scene: &Scene, reference: &ReferenceRun<'_>, rows: &[AccuracyRow]) {
     let run = reference.run_result();
-    let method = IntegrationMethod::default().name();
-    print_line!(
-        "{}: {} transitions from {} s to {} s",
-        scene.title(),
-        run.transitions,
-        scene.start_s,
-        run.stopped_at_s
-    );
+
+    let (title, start_s, stop_s) = (scene.title(), scene.start_s, run.stopped_at_s);
+    print_line!("{title}: {} transitions from {start_s} s to {stop_s} s", run.transitions);
+
     if let Some(how) = describe_early_end(run) {
         print_line!("the reference ends early: {how}");
     }
-    print_reference_error(reference, method);
+    print_reference_error(reference);
     let [low, high] = [LOW_COMPONENT, HIGH_COMPONENT]
         .map(|i| reference.components.hz[i].map_or("none".to_owned(), |hz| format!("{hz:.3} Hz")));
     print_line!("components of the reference: low {low}, high {high}");
     print_line!(
-        "{:<17} {:>9} {:>11} {:>13} {:>6} {:>8} {:>12} {:>11} {:>9} {:>9} {:>10} {:>11}",
-        "method",
-        "tolerance",
-        "transitions",
-        "worst time, s",
-        "missed",
-        "invented",
-        "deflection",
-        "rms",
-        "low, Hz",
-        "high, Hz",
-        "wall, ms",
-        "rhs"
+        "method            tolerance transitions worst time, s missed invented   deflection         rms   low, Hz  high, Hz   wall, ms         rhs"
     );
     rows.iter().for_each(|row| print_row(reference, row));
     print_line!(
@@ -179,23 +150,22 @@ fn print_study(scene: &Scene, reference: &ReferenceRun<'_>, rows: &[AccuracyRow]
     );
 }
 
-/// What the reference is worth.
-fn print_reference_error(reference: &ReferenceRun<'_>, method: &str) {
-    let finest = TOLERANCES.iter().fold(f64::INFINITY, |a: f64, b| a.min(*b));
-    let other = reference.checked_by.name();
+/// How far the reference can be trusted.
+fn print_reference_error(reference: &ReferenceRun<'_>) {
+    let (method, other) = (IntegrationMethod::default().name(), reference.checked_by.name());
     if !reference.lists_agree {
         print_line!(
             "reference: {method} and {other} at {REFERENCE_TOLERANCE:e} have different transitions: errors of transition times are not to be trusted"
         );
         return;
     }
-    let apart = reference
-        .apart_s
-        .map_or("without transitions".to_owned(), |s| format!("{s:.1e} s apart in the transition times"));
+    let apart = reference.apart_s.map(|s| format!("{s:.1e} s apart in the transition times"));
     print_line!(
-        "reference: {method} at {REFERENCE_TOLERANCE:e}; {other} at the same is {apart}, {:.1e} of its range in the deflection",
+        "reference: {method} at {REFERENCE_TOLERANCE:e}; {other} at the same is {}, {:.1e} of its range in the deflection",
+        apart.as_deref().unwrap_or("without transitions"),
         reference.state_apart
     );
+    let finest = TOLERANCES.iter().fold(f64::INFINITY, |a: f64, b| a.min(*b));
     if let Some(apart) = reference.apart_s.filter(|apart| *apart > finest) {
         print_line!(
             "that is more than the finest tolerance, {finest:e}: errors below {apart:.1e} s do not count"
@@ -205,24 +175,18 @@ fn print_reference_error(reference: &ReferenceRun<'_>, method: &str) {
 
 fn print_row(reference: &ReferenceRun<'_>, row: &AccuracyRow) {
     let small = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.1e}"));
-    let error = row
-        .lists
-        .worst_s
-        .map_or("-".to_owned(), |s| format!("{}{s:.1e}", if reference.resolves_error(s) { "" } else { "<" }));
-    let sets = row.setting.relative_tolerance.map_or_else(
-        || row.setting.method.step_s().map_or(String::new(), |h| format!("{h:e} s")),
-        |r| format!("{r:e}"),
-    );
+    let bound = |s| if reference.resolves_error(s) { "" } else { "<" };
+    let error = row.lists.worst_s.map_or("-".to_owned(), |s| format!("{}{s:.1e}", bound(s)));
+    let step = || row.setting.method.step_s().map_or(String::new(), |h| format!("{h:e} s"));
+    let sets = row.setting.relative_tolerance.map_or_else(step, |r| format!("{r:e}"));
+    let [worst, rms] = [row.state_worst, row.state_rms].map(|error| small(Some(error)));
+    let [low, high] = [LOW_COMPONENT, HIGH_COMPONENT].map(|i| small(row.components_hz[i]));
     print_line!(
-        "{:<17} {sets:>9} {:>11} {error:>13} {:>6} {:>8} {:>12} {:>11} {:>9} {:>9} {:>10.3} {:>11}",
+        "{:<17} {sets:>9} {:>11} {error:>13} {:>6} {:>8} {worst:>12} {rms:>11} {low:>9} {high:>9} {:>10.3} {:>11}",
         row.setting.name(),
         row.run.transitions,
         row.lists.missed,
         row.lists.invented,
-        small(Some(row.state_worst)),
-        small(Some(row.state_rms)),
-        small(row.components_hz[LOW_COMPONENT]),
-        small(row.components_hz[HIGH_COMPONENT]),
         1e3 * row.wall_s,
         row.run.work.rhs_evaluations
     );

@@ -4,7 +4,7 @@ use super::load::{print_warnings, read_scene};
 use super::prelude::*;
 use crate::model::plausibility::PlausibilityFinding;
 use crate::model::section::{BladeEstimate, BladeSection};
-use crate::simulate::bench_checks::{BenchChecks, ChecksPerMetre, SteadySlipCheck};
+use crate::simulate::bench_checks::BenchChecks;
 use crate::text::{format_short, to_ascii};
 use serde::Serialize;
 
@@ -67,7 +67,7 @@ impl BladeArgs {
         let table = estimate.to_toml();
         let answer = to_json(estimate, findings)?;
         self.write_files(&[("blade.toml", table.clone().into_bytes()), ("blade.json", answer)])?;
-        output::write_stdout(&output::escape_lines(&table));
+        output::print_lines(&table);
         Ok(())
     }
 
@@ -114,12 +114,10 @@ fn print_weights(checks: &BenchChecks) {
     print_number("head, neck and lip", 1e3 * checks.mass_kg, "g");
     print_number("their weight", checks.weight_n, "N");
     print_number("force on the glass, upright", checks.preload_force_n, "N");
-    if let Some(ChecksPerMetre { rubber_mass_kg_per_m, mass_kg_per_m, press_force_n_per_m }) =
-        checks.per_metre
-    {
-        print_number("neck and lip per metre", 1e3 * rubber_mass_kg_per_m, "g/m");
-        print_number("head, neck and lip per metre", 1e3 * mass_kg_per_m, "g/m");
-        print_number("force on the glass per metre", press_force_n_per_m, "N/m");
+    if let Some(per_metre) = checks.per_metre {
+        print_number("neck and lip per metre", 1e3 * per_metre.rubber_mass_kg_per_m, "g/m");
+        print_number("head, neck and lip per metre", 1e3 * per_metre.mass_kg_per_m, "g/m");
+        print_number("force on the glass per metre", per_metre.press_force_n_per_m, "N/m");
     }
 }
 
@@ -130,15 +128,13 @@ fn print_deflections(checks: &BenchChecks) {
     print_number(&by_force("tip in free air, head held, by"), 1e3 * checks.tip_displacement_m, "mm");
     print_number(&by_force("tip in free air, neck held, by"), 1e3 * checks.lip_displacement_m, "mm");
     print_number("support under the force on the glass", 1e3 * checks.preload_displacement_m, "mm");
-    if let Some(SteadySlipCheck { speed_m_per_s, deflection_m, head_drop_m, neck_angle_rad, lip_angle_rad }) =
-        checks.slide
-    {
+    if let Some(slide) = checks.slide {
         print_heading("in steady slip at the head's top speed");
-        print_number("speed", speed_m_per_s, "m/s");
-        print_number("tip behind the head", 1e3 * deflection_m, "mm");
-        print_number("drop of the head", 1e3 * head_drop_m, "mm");
-        print_number("lean of the neck", neck_angle_rad.to_degrees(), "degrees");
-        print_number("lean of the lip", lip_angle_rad.to_degrees(), "degrees");
+        print_number("speed", slide.speed_m_per_s, "m/s");
+        print_number("tip behind the head", 1e3 * slide.deflection_m, "mm");
+        print_number("drop of the head", 1e3 * slide.head_drop_m, "mm");
+        print_number("lean of the neck", slide.neck_angle_rad.to_degrees(), "degrees");
+        print_number("lean of the lip", slide.lip_angle_rad.to_degrees(), "degrees");
     }
 }
 
@@ -152,12 +148,10 @@ fn print_frequencies(checks: &BenchChecks) {
         ("blade on the glass, tip slides", &checks.sliding_tip_hz),
         ("blade on the glass, tip held", &checks.held_tip_hz),
     ];
-    for (words, frequencies) in coupled {
-        for frequency in frequencies {
-            match frequency {
-                Some(hz) => print_number(words, *hz, "Hz"),
-                None => print_line!("  {words:<52} {:>10}", "unstable"),
-            }
+    for (words, frequency) in coupled.iter().flat_map(|(words, all)| all.iter().map(move |hz| (words, hz))) {
+        match frequency {
+            Some(hz) => print_number(words, *hz, "Hz"),
+            None => print_line!("  {words:<52} {:>10}", "unstable"),
         }
     }
 }

@@ -80,11 +80,13 @@ impl CheckpointWriter {
         take: impl FnOnce(&File, CheckpointReader<R, BufReader<&File>>) -> Outcome<(T, CheckpointEnd)>,
     ) -> OpenedCheckpoint<T> {
         let name = path.display().to_string();
-        let mut opened = Self::open_locked(path, R::KIND)?;
+        let due = Some(PendingAction::SetAside);
+        let mut opened =
+            Self { path: path.to_owned(), file: lock_existing(path, R::KIND)?, due, kind: R::KIND };
         let refused = |error: io::Error| Failure::Input(format!("{name}: cannot be read: {error}"));
         let Some(file) = &opened.file else {
             if resume {
-                opened.plan_resume(&name, R::KIND, true, None);
+                opened.plan_resume(&name, true, None);
             }
             return Ok((opened, None));
         };
@@ -97,21 +99,16 @@ impl CheckpointWriter {
         let is_empty = file.metadata().map_err(refused)?.len() == 0;
         let stream = CheckpointReader::<R, _>::open(&name, BufReader::new(file)).map_err(Failure::input)?;
         let Some(stream) = stream else {
-            opened.plan_resume(&name, R::KIND, is_empty, None);
+            opened.plan_resume(&name, is_empty, None);
             return Ok((opened, None));
         };
         let (taken, end) = take(file, stream)?;
-        opened.plan_resume(&name, R::KIND, is_empty, Some(end));
+        opened.plan_resume(&name, is_empty, Some(end));
         Ok((opened, Some(taken)))
     }
 
-    fn open_locked(path: &Path, kind: CheckpointKind) -> Outcome<Self> {
-        let file = lock_existing(path, kind)?;
-        Ok(Self { path: path.to_owned(), file, due: Some(PendingAction::SetAside), kind })
-    }
-
     /// Notes how a journal goes on that ends like this; `None` where it has no complete header.
-    fn plan_resume(&mut self, name: &str, kind: CheckpointKind, is_empty: bool, end: Option<CheckpointEnd>) {
+    fn plan_resume(&mut self, name: &str, is_empty: bool, end: Option<CheckpointEnd>) {
         self.due = Some(match end {
             None => {
                 let lack = if is_empty { "" } else { "no complete header, so " };
@@ -121,7 +118,7 @@ impl CheckpointWriter {
             }
             Some(CheckpointEnd { intact_bytes, torn, unended }) => {
                 if torn {
-                    let record = kind.record();
+                    let record = self.kind.record();
                     warn_line!(
                         "warning: {name}: the last line is incomplete and was dropped; its {record} is computed again"
                     );
@@ -154,21 +151,20 @@ impl CheckpointWriter {
             _ => Ok(()),
         }
     }
-
-    fn append_lines(&mut self, lines: &str) -> Result<(), String> {
-        let refused = |error: io::Error| error.to_string();
-        self.apply_pending()?;
-        let file = match &mut self.file {
-            Some(file) => file,
-            none => none.insert(create_checkpoint(&self.path, self.kind)?),
-        };
-        file.write_all(lines.as_bytes()).and_then(|()| file.sync_data()).map_err(refused)
-    }
 }
 
 impl CheckpointSink for CheckpointWriter {
     fn append(&mut self, lines: &str) -> Result<(), String> {
-        self.append_lines(lines).map_err(|problem| format!("{}: {problem}", self.path.display()))
+        self.apply_pending()
+            .and_then(|()| {
+                let file = match &mut self.file {
+                    Some(file) => file,
+                    none => none.insert(create_checkpoint(&self.path, self.kind)?),
+                };
+                let written = file.write_all(lines.as_bytes()).and_then(|()| file.sync_data());
+                written.map_err(|error| error.to_string())
+            })
+            .map_err(|problem| format!("{}: {problem}", self.path.display()))
     }
 }
 
@@ -179,14 +175,10 @@ fn create_checkpoint(path: &Path, kind: CheckpointKind) -> Result<File, String> 
     fs::create_dir_all(folder).map_err(refused)?;
     let file = OpenOptions::new().create(true).append(true).open(path).map_err(refused)?;
     lock_file(&file, kind)?;
-    sync_folder(folder);
-    Ok(file)
-}
-
-/// Waits until the disk has the names in a folder, where the system can.
-fn sync_folder(folder: &Path) {
     let folder = if folder.as_os_str().is_empty() { Path::new(".") } else { folder };
-    let _ = File::open(folder).and_then(|folder| folder.sync_all()); // (Windows opens no folder)
+    let _ = File::open(folder).and_then(|folder| folder.sync_all()); // Windows opens no folder
+
+    Ok(file)
 }
 
 /// The file, if there is one.
@@ -195,10 +187,8 @@ fn lock_existing(path: &Path, kind: CheckpointKind) -> Outcome<Option<File>> {
     let file = match OpenOptions::new().read(true).append(true).open(path) {
         Ok(file) => file,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(None),
-        Err(error) => {
-            return Err(refused(format!(
-                "cannot be read and written: {error}; correct that, or move it away"
-            )));
+        Err(e) => {
+            return Err(refused(format!("cannot be read and written: {e}; correct that, or move it away")));
         }
     };
     if !file.metadata().is_ok_and(|found| found.is_file()) {

@@ -54,9 +54,8 @@ impl CollectArgs {
                 print_missing(&what, &tasks, of, &format!("fit JOBS --shard K/{of}, with the same jobs"));
             }
         }
-        let all_explained =
-            standings.iter().all(|standing| *standing == BatchJobState::Done(CommandOutcome::Done));
-        Ok(CommandOutcome::done_if(all_explained))
+        let is_done = |standing: &BatchJobState| *standing == BatchJobState::Done(CommandOutcome::Done);
+        Ok(CommandOutcome::done_if(standings.iter().all(is_done)))
     }
 
     fn collect_study(&self, dir: &Path, global: &GlobalArgs) -> Outcome {
@@ -101,15 +100,12 @@ fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Outcome<TaskLi
 
 /// Why a file alone is not collected.
 fn one_file_failure(file: &Path) -> Outcome<Failure> {
-    let (found, expected) = if is_study(file)? {
-        ("a study", "the folder of its shards: `wiperlab collect DIR` with the --out of `wiperlab sweep`")
+    let problem = if is_study(file)? {
+        "found a study, expected the folder of its shards: `wiperlab collect DIR` with the --out of `wiperlab sweep`"
     } else {
-        (
-            "one file",
-            "the folder of a study or a list of jobs, as a fit is not divided; run `wiperlab fit` with it",
-        )
+        "found one file, expected the folder of a study or a list of jobs, as a fit is not divided; run `wiperlab fit` with it"
     };
-    Ok(Failure::at(file.display(), format!("found {found}, expected {expected}")))
+    Ok(Failure::at(file.display(), problem))
 }
 
 fn too_many_shards(of: usize) -> Failure {

@@ -52,11 +52,10 @@ impl DemoArgs {
         }
 
         let fit = self.out.join("fits").join(NAME);
-        print_progress(
-            global.quiet,
-            &format!("3/4 fit       {} (some ten seconds)", fit.join("job.toml").display()),
-        );
-        let problem = LoadedJob::load(&fit.join("job.toml"))?;
+        let job = fit.join("job.toml");
+        print_progress(global.quiet, &format!("3/4 fit       {} (some ten seconds)", job.display()));
+        let problem = LoadedJob::load(&job)?;
+
         let solved = problem.solve(global, false, self.max_evaluations, self.overwrite)?;
         if solved.result.status == FitStatus::Interrupted {
             return Ok(CommandOutcome::StoppedEarly);
@@ -64,22 +63,15 @@ impl DemoArgs {
 
         let page = self.out.join("reports").join(NAME);
         print_progress(global.quiet, &format!("4/4 report    {}", page.join("index.html").display()));
-        let missed = report::write_report(
-            &fit,
-            &page,
-            &global.write_policy(OutputCommand::Report, self.overwrite),
-            &quiet,
-        )?;
+        let writer = global.write_policy(OutputCommand::Report, self.overwrite);
+        let missed = report::write_report(&fit, &page, &writer, &quiet)?;
+
         if !global.quiet {
             print_summary(&solved);
             print_truth(&solved.result)?;
             print_line!("open {}", page.join("index.html").display());
         }
-        Ok(if missed || solved.result.status != FitStatus::Converged {
-            CommandOutcome::StoppedEarly
-        } else {
-            CommandOutcome::Done
-        })
+        Ok(CommandOutcome::done_if(!missed && solved.result.status == FitStatus::Converged))
     }
 
     /// Refuses before anything is written what one of the steps would refuse.
@@ -98,13 +90,11 @@ impl DemoArgs {
 
     /// The bundled export, scene and job, laid out as a project has them.
     fn write_bundled_files(&self) -> Outcome<()> {
+        let writer = WritePolicy::new(OutputCommand::Demo, self.overwrite);
         let write = |folder: PathBuf, name: &str, text: &str| {
-            files::write_outputs(
-                &folder,
-                &WritePolicy::new(OutputCommand::Demo, self.overwrite),
-                &[(name, text.as_bytes().to_vec())],
-            )
+            files::write_outputs(&folder, &writer, &[(name, text.as_bytes().to_vec())])
         };
+
         write(self.out.join("data").join("scenes"), "actual-blade.toml", SCENE)?;
         write(self.out.join("fits").join(NAME), "job.toml", JOB)
     }
@@ -124,19 +114,15 @@ fn import_export(folder: &Path, overwrite: Overwrite) -> Outcome<()> {
         twin: Some(("twin.toml".to_owned(), TWIN.to_owned())),
         ..ImportOptions::default()
     };
-    import_into(
-        folder,
-        &[ImportSource::without_companions(EXPORT, EXPORT_TEXT.as_bytes().to_vec())],
-        &options,
-        overwrite,
-    )
+    let export = ImportSource::without_companions(EXPORT, EXPORT_TEXT.as_bytes().to_vec());
+    import_into(folder, &[export], &options, overwrite)
 }
 
 /// The truth behind the synthetic recording, next to the estimates.
 fn print_truth(result: &FitResult) -> Outcome<()> {
     let twin: toml::Table = TWIN.parse().map_err(Failure::internal)?;
     let truth = twin.get("truth").and_then(toml::Value::as_table);
-    print_line!("{:<36} {:>12} {:>12}  in the interval", "parameter", "estimate", "truth");
+    print_line!("parameter                                estimate        truth  in the interval");
     for (name, p) in &result.parameters {
         let Some(truth) = truth.and_then(|t| t.get(name)).and_then(toml::Value::as_float) else { continue };
         let inside = p.lower_95.is_some_and(|l| l <= truth) && p.upper_95.is_some_and(|u| truth <= u);

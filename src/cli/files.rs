@@ -7,17 +7,16 @@ mod marker;
 mod preserved_files;
 mod staging;
 
-use super::args::GlobalArgs;
 use super::failure::{Failure, Outcome};
 use crate::chart::{Figure, Medium};
 use crate::toml_file;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use guard::OutputGuard;
 pub(crate) use input::{
     FileSize, check_data_size, is_standard_input, read_data, read_json, read_text, read_toml,
 };
 use marker::MARKER_FILE;
-pub(crate) use marker::{FolderMarker, OutputCommand, Overwrite, WritePolicy};
+pub(crate) use marker::{CsvDialect, FolderMarker, OutputCommand, Overwrite, WritePolicy};
 pub(crate) use preserved_files::{SIMULATION_SUMMARY, is_simulation_summary};
 pub(crate) use staging::{OutputStaging, check_path_free};
 use std::fs::File;
@@ -91,16 +90,18 @@ pub(crate) fn write_outputs(
     writer: &WritePolicy,
     files: &[(impl AsRef<str>, Vec<u8>)],
 ) -> Outcome<()> {
-    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
     OutputFolder::find_writable_ancestor(folder)?;
-    commit_files(OutputStaging::new(folder, writer, &names)?, files)
+    commit_files(OutputStaging::new(folder, writer, &file_names(files))?, files)
 }
 
 /// The same for files that no marker lists, of which the caller knows that they replace nothing of value.
 pub(crate) fn write_unmarked(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Outcome<()> {
-    let names: Vec<&str> = files.iter().map(|(name, _)| name.as_ref()).collect();
     OutputFolder::find_writable_ancestor(folder)?;
-    commit_files(OutputStaging::new_unmarked(folder, &names)?, files)
+    commit_files(OutputStaging::new_unmarked(folder, &file_names(files))?, files)
+}
+
+fn file_names(files: &[(impl AsRef<str>, Vec<u8>)]) -> Vec<&str> {
+    files.iter().map(|(name, _)| name.as_ref()).collect()
 }
 
 fn commit_files(mut staging: OutputStaging, files: &[(impl AsRef<str>, Vec<u8>)]) -> Outcome<()> {
@@ -170,12 +171,8 @@ impl OutputFolder {
 
     /// What there is of the way to a folder, which can be written to.
     fn find_writable_ancestor(folder: &Path) -> Outcome<PathBuf> {
-        let near = folder
-            .ancestors()
-            .find(|path| path.exists() || path.is_symlink())
-            .unwrap_or(Path::new(""))
-            .to_owned();
-        let near = if near.as_os_str().is_empty() { PathBuf::from(".") } else { near };
+        let near = folder.ancestors().find(|path| path.exists() || path.is_symlink());
+        let near = near.filter(|path| !path.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
         if !near.is_dir() {
             let found = if near.exists() { "a file" } else { "a broken link" };
             return Err(Failure::at(
@@ -209,17 +206,13 @@ impl OutputFolder {
         others: &[(impl AsRef<str>, Vec<u8>)],
     ) -> Outcome<()> {
         let files = files.into_iter().map(PendingFile::into_rewound_file).collect::<Result<Vec<_>, _>>()?;
-        let others = others.iter().map(|(name, bytes)| (name.as_ref(), bytes.as_slice()));
-        let names: Vec<&str> =
-            files.iter().map(|(name, _)| *name).chain(others.clone().map(|(name, _)| name)).collect();
+        let grown = files.iter().map(|(name, _)| *name);
+        let names: Vec<&str> = grown.chain(file_names(others)).collect();
         let mut staging = OutputStaging::new(&self.folder, &self.writer, &names)?;
         for (name, file) in files {
             staging.stage_file(name, file)?;
         }
-        for (name, bytes) in others {
-            staging.stage_file(name, bytes)?;
-        }
-        staging.commit()
+        commit_files(staging, others)
     }
 }
 
@@ -280,71 +273,24 @@ impl FigureArgs {
         let files = names.iter().flat_map(|name| figure_files(name, &Figure::default()));
         let names: Vec<String> = files.map(|(name, _)| name).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
-        OutputFolder::check(folder, &figure_policy(overwrite), &names).map(|_| ())
+        OutputFolder::check(folder, &WritePolicy::new(OutputCommand::Figures, overwrite), &names).map(|_| ())
     }
 
     /// Writes named figures, where they are wanted.
     pub(crate) fn write_figures(
         &self,
         overwrite: Overwrite,
-        global: &GlobalArgs,
+        quiet: bool,
         figures: impl FnOnce() -> Vec<(&'static str, Figure)>,
     ) -> Outcome<()> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let figures = figures();
         let files: Vec<_> = figures.iter().flat_map(|(name, figure)| figure_files(name, figure)).collect();
-        write_outputs(folder, &figure_policy(overwrite), &files)?;
-        for (name, _) in figures.iter().filter(|_| !global.quiet) {
+        write_outputs(folder, &WritePolicy::new(OutputCommand::Figures, overwrite), &files)?;
+        for (name, _) in figures.iter().filter(|_| !quiet) {
             print_line!("figure: {}", folder.join(format!("{name}.svg")).display());
         }
         Ok(())
-    }
-}
-
-fn figure_policy(overwrite: Overwrite) -> WritePolicy {
-    WritePolicy::new(OutputCommand::Figures, overwrite)
-}
-
-// Tables as a spreadsheet opens them.
-
-/// How tables are written for those who open them with a double click.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
-pub(crate) enum CsvDialect {
-    /// Commas between cells, decimal points (RFC 4180 with line feeds): what every program reads
-    #[default]
-    Plain,
-    /// Excel where a comma is decimal, as in Germany: semicolons between cells, decimal commas
-    ExcelDe,
-    /// Excel where a point is decimal, as in the US
-    ExcelUs,
-}
-
-/// What tells Excel that a file is UTF-8.
-const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-
-impl CsvDialect {
-    /// Whether a table that is written with commas and points has to be written anew.
-    pub(crate) fn needs_conversion(self) -> bool {
-        self != Self::Plain
-    }
-
-    /// A table in this dialect. Cells that are numbers get its decimal mark, all others stay as they are.
-    pub(crate) fn convert_table(self, plain: impl Read, mut to: impl Write) -> io::Result<()> {
-        to.write_all(BYTE_ORDER_MARK)?;
-        let decimal_comma = self == Self::ExcelDe;
-        let mut table = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(plain);
-        let mut writer = csv::WriterBuilder::new();
-        writer.delimiter(if decimal_comma { b';' } else { b',' }).flexible(true);
-        let mut writer = writer.terminator(csv::Terminator::CRLF).from_writer(to);
-        for row in table.records() {
-            let row = row?;
-            let cells = row.iter().map(|cell| {
-                let decimal = decimal_comma && cell.contains('.') && cell.parse::<f64>().is_ok();
-                if decimal { cell.replace('.', ",") } else { cell.to_owned() }
-            });
-            writer.write_record(cells)?;
-        }
-        writer.flush()
     }
 }
 

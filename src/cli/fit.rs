@@ -3,20 +3,22 @@
 mod batch;
 mod outputs;
 mod summary;
-mod traces;
 
 use super::args::{TimeLimit, parse_count};
 use super::checkpoint::{CHECKPOINT_FILE, CheckpointWriter};
 use super::job::LoadedJob;
 use super::load::print_warnings;
 use super::prelude::*;
-use crate::checkpoint::Shard;
+use crate::checkpoint::{CheckpointFile, CheckpointRecord, Shard};
 use crate::fit::evaluation::EvaluationStage;
 use crate::fit::ledger::FitProgress;
 use crate::fit::result::{FitResult, FitStatus};
+use crate::fit::trace::UncertaintyRun;
+use crate::fit::trace_ledger::TraceProgress;
 use crate::fit::{FitContext, FitError};
 pub(crate) use batch::{BatchJobState, check_distinct_folders};
 use indicatif::ProgressBar;
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
@@ -78,21 +80,15 @@ impl FitArgs {
         }
         problem.doubts.iter().for_each(|(scene, findings)| print_warnings(scene, findings, global));
         let solved = problem.solve(global, resume, self.max_evaluations, self.overwrite)?;
-        Ok(solved.print_outcome(problem, global))
-    }
-}
-
-impl CompletedFit {
-    /// Says what was found and where it is.
-    pub(crate) fn print_outcome(&self, problem: &LoadedJob, global: &GlobalArgs) -> CommandOutcome {
+        let result = &solved.result;
         if !global.quiet {
-            print_summary(self);
+            print_summary(&solved);
+            if result.status != FitStatus::Interrupted {
+                print_line!("written to {}", problem.folder.join(files::RESULT_FILE).display());
+            }
         }
-        if !global.quiet && self.result.status != FitStatus::Interrupted {
-            print_line!("written to {}", problem.folder.join(files::RESULT_FILE).display());
-        }
-        let done = self.result.status == FitStatus::Converged && self.result.explains_recordings();
-        CommandOutcome::done_if(done)
+        let done = result.status == FitStatus::Converged && result.explains_recordings();
+        Ok(CommandOutcome::done_if(done))
     }
 }
 
@@ -102,42 +98,73 @@ impl LoadedJob {
         &self,
         global: &GlobalArgs,
         resume: bool,
-        max_evaluations: Option<usize>,
+        most: Option<usize>,
         overwrite: Overwrite,
     ) -> Outcome<CompletedFit> {
-        if !self.problem.traces().is_empty() {
-            return self.solve_traces(global, resume, max_evaluations, overwrite);
+        let limit = most.unwrap_or(usize::MAX);
+        if self.problem.traces().is_empty() {
+            let expected = self.expected_evaluations().min(limit);
+            return self.search(
+                global,
+                resume,
+                overwrite,
+                ("evaluations", expected),
+                |resume, sink, shown| {
+                    let context = FitContext { max_evaluations: most, resume, ..self.problem.new_context() };
+                    self.problem.fit_with(&context, sink, &mut |now: &FitProgress| {
+                        let journaled = if now.stage == EvaluationStage::Gate { 0 } else { now.evaluations };
+                        let words = format!("{}, cost {:.4}", now.stage.name(), now.best_cost);
+                        shown.advance(now.evaluations, now.replayed, journaled, words)
+                    })
+                },
+            );
         }
+        let expected = self.expected_iterates().min(limit);
+        let stages = self.problem.segment_s();
+        self.search(global, resume, overwrite, ("iterates", expected), |resume, sink, shown| {
+            self.problem.fit_traces(resume, most, sink, &mut |now: &TraceProgress| {
+                shown.advance(now.iterates, now.replayed, now.iterates, describe_stage(now, stages))
+            })
+        })
+    }
+
+    /// Runs a search with its journal, whose records have the name `records`; `expected` is about their number.
+    fn search<R: CheckpointRecord>(
+        &self,
+        global: &GlobalArgs,
+        resume: bool,
+        overwrite: Overwrite,
+        (records, expected): (&'static str, usize),
+        search: impl FnOnce(ResumedCheckpoint<R>, &mut CheckpointWriter, &mut SearchDisplay) -> FitOutcome,
+    ) -> Outcome<CompletedFit> {
         let writer = global.write_policy(OutputCommand::Fit, overwrite);
         self.check_outputs(&writer)?;
         let path = self.folder.join(CHECKPOINT_FILE);
         let name = path.display().to_string();
         let (mut sink, resumed) = CheckpointWriter::open(&path, resume)?;
-        let bar = progress::start_bar(
-            self.expected_evaluations(max_evaluations) as u64,
-            "fit",
-            "evaluations",
-            global.quiet,
-        );
-        let mut replayed = 0;
-        let journaled = Arc::new(AtomicUsize::new(resumed.as_ref().map_or(0, |found| found.records.len())));
-        let kept = self.saved_progress(&name, "evaluations", &journaled);
-        let stops = interrupt::register_stoppable(kept.clone());
-        let mut on_progress = |now: &FitProgress| {
-            update_progress_bar(&bar, now, replayed);
-            replayed = now.replayed;
-            if now.stage != EvaluationStage::Gate {
-                journaled.fetch_max(now.evaluations, Ordering::Relaxed);
+        let bar = progress::start_bar(expected as u64, "fit", records, global.quiet);
+        let found = resumed.as_ref().map_or(0, |found: &CheckpointFile<R>| found.records.len());
+        let journaled = Arc::new(AtomicUsize::new(found));
+        let kept = {
+            let (journal, job, journaled) = (name.clone(), self.file.clone(), Arc::clone(&journaled));
+            move || match journaled.load(Ordering::Relaxed) {
+                0 => "the search had not begun, and there is no journal of it".to_owned(),
+                count => {
+                    format!("{journal} holds {count} {records}; go on with `wiperlab fit {job} --resume`")
+                }
             }
-            interrupt::control_flow()
         };
-        let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
-        let context = FitContext { max_evaluations, resume, ..self.problem.new_context() };
+        let stops = interrupt::register_stoppable(kept.clone());
+        let mut shown = SearchDisplay { bar, replayed: 0, journaled };
         let clock = Instant::now();
-        let fitted = self.problem.fit_with(&context, &mut sink, &mut on_progress);
-        let result = fitted.map_err(|error| self.fit_failure(&error))?;
+        let resume = resumed.as_ref().map(|journal| (name.as_str(), journal));
+        let result = search(resume, &mut sink, &mut shown).map_err(|error| match error {
+            FitError::JournalWrite { .. } => Failure::internal(error),
+            FitError::Journal(_) | FitError::OtherSeed { .. } => Failure::input(error),
+            _ => Failure::at(&self.file, error),
+        })?;
         let wall = clock.elapsed();
-        bar.finish_and_clear();
+        shown.bar.finish_and_clear();
         sink.finish()?;
         if result.status == FitStatus::Interrupted {
             // an earlier result stays: what is new is in the journal, and a resumed fit gives its result
@@ -145,54 +172,68 @@ impl LoadedJob {
         } else {
             self.write_outputs(&result, &writer)?;
         }
-        Ok(CompletedFit { result, replayed, wall })
+        Ok(CompletedFit { result, replayed: shown.replayed, wall })
     }
 
-    /// Why the fit did not run.
-    fn fit_failure(&self, error: &FitError) -> Failure {
-        match error {
-            FitError::JournalWrite { .. } => Failure::Internal(error.to_string()),
-            FitError::Journal(_) | FitError::OtherSeed { .. } => Failure::input(error),
-            _ => Failure::Input(format!("{}: {error}", self.file)),
-        }
-    }
-
-    /// What is on the disk when the fit is interrupted.
-    fn saved_progress(
-        &self,
-        journal: &str,
-        records: &'static str,
-        journaled: &Arc<AtomicUsize>,
-    ) -> impl Fn() -> String + Clone + use<> {
-        let (journal, job, journaled) = (journal.to_owned(), self.file.clone(), Arc::clone(journaled));
-        move || match journaled.load(Ordering::Relaxed) {
-            0 => "the search had not begun, and there is no journal of it".to_owned(),
-            count => format!("{journal} holds {count} {records}; go on with `wiperlab fit {job} --resume`"),
-        }
-    }
-
-    /// Evaluations to be expected, for the progress: the budget, and about what gate, profiles and twins
-    /// take.
-    fn expected_evaluations(&self, max_evaluations: Option<usize>) -> usize {
+    /// About the number of evaluations: the budget, and what gate, profiles and twins take.
+    fn expected_evaluations(&self) -> usize {
         let (job, parameters) = (self.job(), self.job().parameters.len());
         let gate = crate::fit::identifiability::PROBE_COUNT * (2 * parameters + 1);
         let profiles = if job.intervals.profile { 60 * parameters } else { 0 };
-        let all = gate
-            + job.search.global_evaluations
-            + job.search.local_evaluations
-            + profiles
-            + 3 * job.intervals.bootstrap;
-        all.min(max_evaluations.unwrap_or(usize::MAX))
+        let budget = job.search.global_evaluations + job.search.local_evaluations;
+        gate + budget + profiles + 3 * job.intervals.bootstrap
+    }
+
+    /// About the number of iterates of a fit to traces.
+    fn expected_iterates(&self) -> usize {
+        let search = STARTS * self.problem.segment_s().len() * ITERATES_A_STAGE;
+        let (twins, parameters) = (self.job().intervals.bootstrap, self.job().parameters.len());
+        search + ITERATES_A_TWIN * twins + 2 * ITERATES_A_SIDE * parameters
     }
 }
 
-/// Moves the bar; the time left follows from the evaluations that are made, not from those that were just
-/// replayed.
-fn update_progress_bar(bar: &ProgressBar, now: &FitProgress, replayed_before: usize) {
-    bar.set_length(bar.length().unwrap_or(0).max(now.evaluations as u64));
-    bar.set_position(now.evaluations as u64);
-    if now.replayed > replayed_before {
-        bar.reset_eta();
+/// The journal that a search goes on from, with its name.
+type ResumedCheckpoint<'a, R> = Option<(&'a str, &'a CheckpointFile<R>)>;
+type FitOutcome = Result<FitResult, FitError>;
+
+/// Iterates that a stage takes, about, from the recovery study: for the estimate of the time left.
+const ITERATES_A_STAGE: usize = 14;
+/// Starts that most fits take: two that agree.
+const STARTS: usize = 2;
+/// Iterates that a twin takes, about, and a side of a parameter.
+const ITERATES_A_TWIN: usize = 5;
+const ITERATES_A_SIDE: usize = 2;
+
+/// The bar of a search, and the number of records in its journal.
+struct SearchDisplay {
+    bar: ProgressBar,
+    replayed: usize,
+    journaled: Arc<AtomicUsize>,
+}
+
+impl SearchDisplay {
+    /// Moves the bar. The time left is estimated from evaluations that are computed, not from replayed ones.
+    fn advance(&mut self, made: usize, replayed: usize, journaled: usize, words: String) -> ControlFlow<()> {
+        self.bar.set_length(self.bar.length().unwrap_or(0).max(made as u64));
+        self.bar.set_position(made as u64);
+        if replayed > self.replayed {
+            self.bar.reset_eta();
+        }
+        self.bar.set_message(words);
+        self.replayed = replayed;
+        self.journaled.fetch_max(journaled, Ordering::Relaxed);
+        interrupt::control_flow()
     }
-    bar.set_message(format!("{}, cost {:.4}", now.stage.name(), now.best_cost));
+}
+
+/// What a fit to traces is at.
+fn describe_stage(now: &TraceProgress, stages: &[f64]) -> String {
+    let (bad, all) = (now.bad_segments, now.segments);
+    let length_ms = 1e3 * stages.get(now.stage).copied().unwrap_or_default();
+    let chain = match UncertaintyRun::from_chain_number(now.start) {
+        None => format!("start {}", now.start + 1),
+        Some(UncertaintyRun::Twin(twin)) => format!("twin {}", twin + 1),
+        Some(UncertaintyRun::Shorter | UncertaintyRun::Side { .. }) => "intervals".to_owned(),
+    };
+    format!("{chain}, segments of {length_ms} ms, {bad} of {all} bad, cost {:.1}", now.cost)
 }

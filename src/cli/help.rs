@@ -2,7 +2,6 @@
 
 mod markdown;
 
-use super::output::{escape_lines, write_stdout};
 use super::prelude::*;
 use crate::fit::job::Job;
 use crate::model::section::BladeSection;
@@ -64,9 +63,8 @@ const PAGES: [HelpPage; 12] = [
 /// The list of the pages, below the help of the program.
 pub(crate) fn list_help_pages() -> String {
     let width = PAGES.iter().map(|(name, ..)| name.len()).max().unwrap_or_default();
-    let rows = PAGES.iter().map(|(name, about, _)| format!("  {name:<width$}  {about}"));
-    let rows: Vec<String> = rows.collect();
-    format!("Pages of `wiperlab help`:\n{}", rows.join("\n"))
+    let rows = PAGES.iter().map(|(name, about, _)| format!("\n  {name:<width$}  {about}"));
+    format!("Pages of `wiperlab help`:{}", rows.collect::<String>())
 }
 
 impl HelpArgs {
@@ -75,7 +73,7 @@ impl HelpArgs {
             Some(content) => content.render(),
             None => self.command_help(program)?,
         };
-        write_stdout(&escape_lines(text.trim_end()));
+        output::print_lines(text.trim_end());
         Ok(CommandOutcome::Done)
     }
 
@@ -100,8 +98,7 @@ fn unknown_command_failure(word: &str, program: &Command) -> Failure {
 /// The page of a name; a kind of file has it with and without its ending, unless a command has that name.
 fn find_help_page(word: &str) -> Option<&'static HelpContent> {
     let stem = word.strip_suffix(".toml").unwrap_or(word);
-    let page = PAGES.iter().find(|(name, ..)| *name == word || *name == stem);
-    page.map(|(.., content)| content)
+    PAGES.iter().find(|(name, ..)| *name == word || *name == stem).map(|(.., content)| content)
 }
 
 impl HelpContent {
@@ -165,7 +162,7 @@ impl CompletionsArgs {
     pub(crate) fn run(&self, program: &mut Command) -> Outcome {
         let mut script = Vec::new();
         generate(self.shell, program, "wiperlab", &mut script);
-        write_stdout(&escape_lines(&String::from_utf8_lossy(&script)));
+        output::print_lines(&String::from_utf8_lossy(&script));
         Ok(CommandOutcome::Done)
     }
 }

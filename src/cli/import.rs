@@ -15,12 +15,10 @@ use serde::Serialize;
 const NAMES_A_LINE: usize = 8;
 
 fn after_help() -> String {
-    let names: Vec<String> =
+    let lines: Vec<String> =
         import::format_names().chunks(NAMES_A_LINE).map(|names| names.join(", ")).collect();
-    format!(
-        "The format is found from the content (docs/formats.md describes each):\n{}.\n\n{DETAILS}",
-        names.join(",\n")
-    )
+    let names = lines.join(",\n");
+    format!("The format is found from the content (docs/formats.md describes each):\n{names}.\n\n{DETAILS}")
 }
 
 const DETAILS: &str = "\
@@ -45,13 +43,7 @@ Examples:
 #[command(after_help = after_help())]
 pub(crate) struct ImportArgs {
     #[command(flatten)]
-    typed: Box<ImportOptionArgs>, // far larger than the arguments of any other command
-}
-
-impl ImportArgs {
-    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
-        self.typed.run(global)
-    }
+    pub typed: Box<ImportOptionArgs>, // far larger than the arguments of any other command
 }
 
 #[derive(Debug, Args)]
@@ -131,7 +123,7 @@ pub(crate) enum TimeMeaning {
 }
 
 impl ImportOptionArgs {
-    fn run(&self, global: &GlobalArgs) -> Outcome {
+    pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let options = self.import_options()?;
         let steps = progress::start_steps("import", global.quiet);
         steps.show_step("reading the export");
@@ -146,7 +138,7 @@ impl ImportOptionArgs {
         drop(steps);
         if self.json {
             let text = serde_json::to_string_pretty(&self.json_summary(&imported, &sources));
-            output::write_stdout(&output::escape_lines(&text.map_err(Failure::internal)?));
+            output::print_lines(&text.map_err(Failure::internal)?);
         } else if global.quiet {
             imported.report.warnings().for_each(|warning| warn_line!("warning: {warning}"));
         } else {
@@ -157,18 +149,14 @@ impl ImportOptionArgs {
 
     /// The options as typed become the library's.
     fn import_options(&self) -> Outcome<ImportOptions> {
+        let named = self.out.file_name().map(|name| name.to_string_lossy().into_owned());
         let mut options = ImportOptions {
-            name: self
-                .out
-                .file_name()
-                .map_or_else(|| self.out.display().to_string(), |name| name.to_string_lossy().into_owned()),
+            name: named.unwrap_or_else(|| self.out.display().to_string()),
             format: Some(self.format.clone()),
             encoding: self.encoding.clone(),
             frame_rate_hz: self.frame_rate_hz,
             scale: self.scale.as_deref().map(CoordinateScale::parse).transpose().map_err(Failure::input)?,
-            y_axis: self
-                .y_axis
-                .map(|direction| if direction == YDirection::Up { YAxis::Up } else { YAxis::Down }),
+            y_axis: self.y_axis.map(|to| if to == YDirection::Up { YAxis::Up } else { YAxis::Down }),
             exposure_s: self.exposure_s,
             time: self.time.map(|meaning| match meaning {
                 TimeMeaning::Real => TimeColumn::Real,
@@ -196,10 +184,8 @@ impl ImportOptionArgs {
 
     /// A folder keeps one recording, and a measured one for ever.
     fn write_policy(&self, sources: &[ImportSource]) -> WritePolicy {
-        let exports = import::preserved_files(sources)
-            .into_iter()
-            .map(|(_, bytes)| crate::text::sha256(bytes))
-            .collect();
+        let exports = import::preserved_files(sources).into_iter();
+        let exports = exports.map(|(_, bytes)| crate::text::sha256(bytes)).collect();
         WritePolicy { exports, ..WritePolicy::new(OutputCommand::Import, self.overwrite) }
     }
 
@@ -219,24 +205,15 @@ impl ImportOptionArgs {
         let grid = imported.recording.grid();
         let verb = if self.dry_run { "would write" } else { "wrote" };
         let kind = if imported.recording.is_synthetic() { "synthetic recording" } else { "recording" };
-        print_line!(
-            "{verb} {}: {kind}, {} frames at {} frames/s, {:.6} s",
-            self.out.display(),
-            grid.frames,
-            grid.frame_rate_hz,
-            grid.duration_s()
-        );
+        let (out, rate, duration_s) = (self.out.display(), grid.frame_rate_hz, grid.duration_s());
+        print_line!("{verb} {out}: {kind}, {} frames at {rate} frames/s, {duration_s:.6} s", grid.frames);
         print_line!("format: {} ({})", imported.report.format, imported.report.reason);
-        for note in &imported.report.notes {
-            print_line!("note: {note}");
-        }
+        imported.report.notes.iter().for_each(|note| print_line!("note: {note}"));
         if self.dry_run {
             print_preview(imported, sources);
         }
         let inspection = Inspection::from_import(&imported.recording, &imported.file);
-        for line in inspection.verdict_lines() {
-            print_line!("verdict: {line}");
-        }
+        inspection.verdict_lines().iter().for_each(|line| print_line!("verdict: {line}"));
     }
 }
 
@@ -305,10 +282,8 @@ fn read_source(path: &Path) -> Outcome<ImportSource> {
     names.retain(|companion| *companion != name && Path::new(companion).is_file());
     // one file under two spellings where the file system knows no capitals
     names.dedup_by(|a, b| a.eq_ignore_ascii_case(b));
-    let companions = names
-        .into_iter()
-        .map(|name| Ok(CompanionFile { bytes: files::read_data(Path::new(&name))?, name }))
-        .collect::<Outcome<Vec<_>>>()?;
+    let read = |name: String| Ok(CompanionFile { bytes: files::read_data(Path::new(&name))?, name });
+    let companions = names.into_iter().map(read).collect::<Outcome<Vec<_>>>()?;
     Ok(ImportSource { bytes: read_table(path)?, name, companions })
 }
 
@@ -326,9 +301,8 @@ pub(crate) fn import_into(
 /// What the user noted in a description which is replaced, and the command line does not give, stays: facts
 /// of the test, and where the pictures of its frames are.
 fn keep_user_notes(folder: &Path, description: &mut RecordingFile) {
-    let replaced = files::read_text(&folder.join(DESCRIPTION_FILE)).ok();
-    let replaced = replaced.and_then(|text| RecordingFile::parse(DESCRIPTION_FILE, &text).ok());
-    let Some(replaced) = replaced else { return };
+    let Ok(text) = files::read_text(&folder.join(DESCRIPTION_FILE)) else { return };
+    let Ok(replaced) = RecordingFile::parse(DESCRIPTION_FILE, &text) else { return };
     description.video = replaced.video;
     for (key, value) in replaced.conditions {
         description.conditions.entry(key).or_insert(value);

@@ -41,21 +41,18 @@ pub(crate) struct InitArgs {
 }
 
 /// Files with their names, and what they rest on.
-struct DraftFiles {
-    texts: Vec<(&'static str, String)>,
-    words: Vec<String>,
-}
+type DraftFiles = (Vec<(&'static str, String)>, Vec<String>);
 
 impl InitArgs {
     pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let writer = WritePolicy::new(OutputCommand::Init, self.overwrite);
         let names: &[&str] = if self.scene { &[SCENE] } else { &[SCENE, JOB] };
         OutputFolder::check(&self.out, &writer, names)?;
-        let DraftFiles { texts, words } = match &self.recording {
+        let (texts, words) = match &self.recording {
             Some(recording) => self.draft_for_recording(recording)?,
             None => {
                 let scene = draft::write_scene_alone(!self.no_shoulder).map_err(Failure::internal)?;
-                DraftFiles { texts: vec![(SCENE, scene)], words: Vec::new() }
+                (vec![(SCENE, scene)], Vec::new())
             }
         };
         let outputs: Vec<_> = texts.into_iter().map(|(name, text)| (name, text.into_bytes())).collect();
@@ -74,7 +71,7 @@ impl InitArgs {
             )));
         }
         let loaded = load_recording(path)?;
-        let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
+        let exposure_s = loaded.exposure_s();
         let found = draft::DraftFindings::from_recording(&loaded.recording, exposure_s, self.known_stroke()?)
             .map_err(|error| Failure::at(path.display(), error))?;
         let seen = files::relative_path(&self.out, path)?;
@@ -85,37 +82,29 @@ impl InitArgs {
                 Failure::at(path.display(), format!("found {:.4} s, too short or too slow a motion for a run to start in; expected a head that moves by several millimetres; film more of the stroke ({error})", found.length_s()))
             })?;
         let job = draft::write_job(&found, &loaded.recording, [&seen, SCENE], !self.no_shoulder);
-        Ok(DraftFiles { texts: vec![(SCENE, scene), (JOB, job)], words: found.describe() })
+        Ok((vec![(SCENE, scene), (JOB, job)], found.describe()))
     }
 
     /// The stroke as typed.
     fn known_stroke(&self) -> Outcome<KnownStroke> {
         let typed = [("--amplitude-m", self.amplitude_m), ("--frequency-hz", self.frequency_hz)];
-        for (option, value) in typed {
-            if let Some(value) = value.filter(|value| !(value.is_finite() && *value > 0.0)) {
-                return Err(Failure::Input(format!("{option}: found {value}, expected a number above 0")));
-            }
+        let is_wrong = |value: &f64| !(value.is_finite() && *value > 0.0);
+        if let Some((option, value)) = typed.into_iter().find_map(|(o, x)| Some((o, x.filter(is_wrong)?))) {
+            return Err(Failure::at(option, format!("found {value}, expected a number above 0")));
         }
         Ok(KnownStroke { amplitude_m: self.amplitude_m, frequency_hz: self.frequency_hz })
     }
 
     fn print_next_steps(&self, words: &[String]) {
         words.iter().for_each(|line| print_line!("found: {line}"));
-        let (scene, job) = (self.out.join(SCENE), self.out.join(JOB));
+        let [scene, job, run] = [SCENE, JOB, "run"].map(|name| self.out.join(name).display().to_string());
         print_line!("written to {}", self.out.display());
-        print_line!(
-            "next: replace the numbers marked {} in {}; they are those of an example",
-            draft::YOURS_MARK,
-            scene.display()
-        );
+        let mark = draft::YOURS_MARK;
+        print_line!("next: replace the numbers marked {mark} in {scene}; they are those of an example");
         if self.scene {
-            print_line!(
-                "then: wiperlab simulate {} --out {}",
-                scene.display(),
-                self.out.join("run").display()
-            );
+            print_line!("then: wiperlab simulate {scene} --out {run}");
         } else {
-            print_line!("then: wiperlab fit {}", job.display());
+            print_line!("then: wiperlab fit {job}");
         }
     }
 }

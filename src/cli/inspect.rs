@@ -49,27 +49,21 @@ impl InspectArgs {
         let loaded = load_recording(&self.recording)?;
         let changed = loaded.changed_sources(&self.recording).into_iter().collect();
         let found = Inspection::from_folder(&loaded.recording, loaded.file.as_ref(), changed, scene.as_ref());
-        let turns_s = found.reversal_times_s();
-        let drawn =
-            || vec![(FIGURE, recorded::draw_figure(&loaded.recording, &turns_s, &found.verdict_headline()))];
+        let turns_s: Vec<f64> = found.reversals.iter().map(|turn| turn.reversal_s).collect();
+        let headline = found.verdict_lines().into_iter().next().unwrap_or_default();
+        let drawn = || vec![(FIGURE, recorded::draw_figure(&loaded.recording, &turns_s, &headline))];
         if self.json {
             let text = serde_json::to_string_pretty(&found).map_err(Failure::internal)?;
-            output::write_stdout(&output::escape_lines(&text));
-            let silent = GlobalArgs { quiet: true, ..global.clone() };
-            self.figures.write_figures(self.overwrite, &silent, drawn)?;
+            output::print_lines(&text);
+            self.figures.write_figures(self.overwrite, true, drawn)?;
             return Ok(CommandOutcome::Done);
         }
         if !global.quiet {
-            print_line!(
-                "{}{}",
-                found.recording,
-                if found.synthetic { " (synthetic: no camera took it)" } else { "" }
-            );
+            let kind = if found.synthetic { " (synthetic: no camera took it)" } else { "" };
+            print_line!("{}{kind}", found.recording);
             print_origin(&loaded);
-            output::write_stdout(&output::escape_lines(&quality::measurement_table(
-                &found.measurements,
-                loaded.recording.grid().start_s,
-            )));
+            let start_s = loaded.recording.grid().start_s;
+            output::print_lines(&quality::measurement_table(&found.measurements, start_s));
             print_slope(&found);
             print_reversals(&found.reversals);
             print_components(&found.components);
@@ -77,7 +71,7 @@ impl InspectArgs {
         for line in found.verdict_lines() {
             print_line!("verdict: {line}");
         }
-        self.figures.write_figures(self.overwrite, global, drawn)?;
+        self.figures.write_figures(self.overwrite, global.quiet, drawn)?;
         Ok(CommandOutcome::Done)
     }
 }
@@ -93,12 +87,8 @@ fn print_origin(loaded: &LoadedRecording) {
         print_line!("trace             not verified: recording.toml has no SHA-256 of it");
     }
     if let Some(source) = &file.source {
-        print_line!(
-            "source            {} ({}, {})",
-            source.file.as_slice().join(", "),
-            source.detected_format,
-            source.encoding
-        );
+        let (names, format) = (source.file.as_slice().join(", "), &source.detected_format);
+        print_line!("source            {names} ({format}, {})", source.encoding);
     }
     for (key, value) in &file.conditions {
         print_line!("condition         {key} = {value}");
@@ -107,12 +97,10 @@ fn print_origin(loaded: &LoadedRecording) {
 
 fn print_slope(found: &Inspection) {
     match &found.tilt {
-        GlassSlope::Tilt(tilt) => {
+        GlassSlope::Tilt(CameraTilt { angle_rad, sd_rad, frames, frames_off_glass: off, .. }) => {
+            let tilt = format_degrees(*angle_rad, *sd_rad);
             print_line!(
-                "tilt              {}, the slope of the glass in {} frames (off the glass: {})",
-                format_degrees(tilt.angle_rad, tilt.sd_rad),
-                tilt.frames,
-                tilt.frames_off_glass
+                "tilt              {tilt}, the slope of the glass in {frames} frames (off the glass: {off})"
             );
         }
         GlassSlope::NoTilt(reason) => print_line!("tilt              not known: {reason}"),
@@ -138,13 +126,8 @@ fn print_reversals(turns: &[InspectedReversal]) {
 
 fn print_components(components: &InspectedComponents) {
     print_line!("components        of the {}", components.source);
-    for component in &components.shown {
-        print_line!(
-            "  {:<36}{:>9.1} Hz  {}",
-            component.name,
-            component.showing.frequency_hz,
-            component.showing.describe()
-        );
+    for InspectedComponent { name, showing } in &components.shown {
+        print_line!("  {name:<36}{:>9.1} Hz  {}", showing.frequency_hz, showing.describe());
     }
 }
 
@@ -196,12 +179,6 @@ pub(crate) struct InspectedReversal {
     pub release_s: Option<f64>,
 }
 
-impl From<&Reversal> for InspectedReversal {
-    fn from(turn: &Reversal) -> Self {
-        Self { hold_s: turn.hold_s, reversal_s: turn.reversal_s, release_s: turn.release_s }
-    }
-}
-
 impl Inspection {
     /// Everything that is said of a recording with its description; `more` findings are of its folder.
     pub(crate) fn from_folder(
@@ -238,29 +215,22 @@ impl Inspection {
         let import: Vec<QualityFinding> = more.into_iter().chain(kept).collect();
         let findings = quality::collect_findings(recording, &measurements, &optics, &instants, &import);
         let slope = quality::measure_tilt(recording, &instants, &measurements);
+        let reversal = |turn: &Reversal| InspectedReversal {
+            hold_s: turn.hold_s,
+            reversal_s: turn.reversal_s,
+            release_s: turn.release_s,
+        };
         Self {
             recording: recording.name().to_owned(),
             synthetic: recording.is_synthetic(),
             grade: quality::grade_findings(&findings),
             tilt: slope.map_or_else(|reason| GlassSlope::NoTilt(reason.to_string()), GlassSlope::Tilt),
             level: file.and_then(|file| file.level.clone()),
-            components: scene
-                .map_or_else(published_components, scene_components)
-                .check_visibility(&measurements),
+            components: inspect_components(scene, &measurements),
             measurements,
             findings,
-            reversals: instants.reversals.iter().map(InspectedReversal::from).collect(),
+            reversals: instants.reversals.iter().map(reversal).collect(),
         }
-    }
-
-    /// Instants of the reversals, s.
-    pub(crate) fn reversal_times_s(&self) -> Vec<f64> {
-        self.reversals.iter().map(|turn| turn.reversal_s).collect()
-    }
-
-    /// The first line of the verdict.
-    pub(crate) fn verdict_headline(&self) -> String {
-        self.verdict_lines().into_iter().next().unwrap_or_default()
     }
 
     /// The verdict as lines for reading, worst first.
@@ -269,46 +239,33 @@ impl Inspection {
     }
 }
 
-/// Components to look for, before it is known what the recording makes of them.
-struct SoughtComponents {
-    source: String,
-    named: Vec<(String, f64)>,
-}
-
-impl SoughtComponents {
-    fn check_visibility(self, measurements: &Quality) -> InspectedComponents {
-        let shown = self.named.into_iter().map(|(name, frequency_hz)| InspectedComponent {
-            name,
-            showing: measurements.component_visibility(frequency_hz),
-        });
-        InspectedComponents { source: self.source, shown: shown.collect() }
+/// The modes of a scene, or the published components, and what the recording makes of them.
+fn inspect_components(scene: Option<&Scene>, measurements: &Quality) -> InspectedComponents {
+    let published = || PUBLISHED_COMPONENTS_HZ.map(|(name, hz)| (name.to_owned(), hz)).to_vec();
+    let sought = scene.map_or_else(published, scene_components);
+    let component = |(name, hz)| InspectedComponent { name, showing: measurements.component_visibility(hz) };
+    InspectedComponents {
+        source: scene.map_or_else(
+            || format!("published experiment, \"{PUBLISHED_TITLE}\""),
+            |scene| format!("modes of the scene \"{}\"", scene.title()),
+        ),
+        shown: sought.into_iter().map(component).collect(),
     }
 }
 
-fn published_components() -> SoughtComponents {
-    let named = PUBLISHED_COMPONENTS_HZ.map(|(name, frequency_hz)| (name.to_owned(), frequency_hz)).to_vec();
-    SoughtComponents { source: format!("published experiment, \"{PUBLISHED_TITLE}\""), named }
-}
-
-/// The head on its spring and the coupled modes of the links; a mode that does not oscillate has nothing to
-/// show.
-fn scene_components(scene: &Scene) -> SoughtComponents {
+/// The head on its spring and the coupled modes of the links, Hz; a mode that does not oscillate is left out.
+fn scene_components(scene: &Scene) -> Vec<(String, f64)> {
     let blade = &scene.linkage;
     let mut found = vec![("head on its spring".to_owned(), body_frequencies(blade).head_hz)];
     let sides: &[bool] = if blade.shoulder.is_some() { &[false, true] } else { &[false] };
     for &on_shoulder in sides {
+        let leaning = if on_shoulder { ", on the shoulder" } else { "" };
         for (tip, word) in [(TipConstraint::Held, "tip held"), (TipConstraint::Free, "tip slides")] {
-            let leaning = if on_shoulder { ", on the shoulder" } else { "" };
-            let oscillating = natural_modes(blade, tip, on_shoulder)
-                .into_iter()
-                .filter_map(|mode| mode.damped_frequency_hz);
-            found.extend(
-                oscillating
-                    .enumerate()
-                    .map(|(i, frequency_hz)| (format!("{word}{leaning}, mode {}", i + 1), frequency_hz)),
-            );
+            let modes = natural_modes(blade, tip, on_shoulder).into_iter();
+            let oscillating = modes.filter_map(|mode| mode.damped_frequency_hz).enumerate();
+            found.extend(oscillating.map(|(i, hz)| (format!("{word}{leaning}, mode {}", i + 1), hz)));
         }
     }
     found.retain(|(_, frequency_hz)| frequency_hz.is_finite() && *frequency_hz > 0.0);
-    SoughtComponents { source: format!("modes of the scene \"{}\"", scene.title()), named: found }
+    found
 }

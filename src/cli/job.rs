@@ -40,9 +40,8 @@ impl LoadedJob {
         let path = job_path(named);
         if files::is_standard_input(&path) {
             let expected = "a file: journal and result of a fit lie next to its job";
-            return Err(Failure::Input(format!(
-                "-: found standard input, expected {expected}; save it as job.toml"
-            )));
+            let problem = format!("found standard input, expected {expected}; save it as job.toml");
+            return Err(Failure::at("-", problem));
         }
         let file = path.display().to_string();
         let job = Job::parse(&file, &files::read_toml(&path)?).map_err(Failure::input)?;
@@ -60,6 +59,10 @@ impl LoadedJob {
         let measured_at = measured_at.collect::<Result<Vec<_>, _>>()?;
         let measured = measured_at.iter().map(|path| load_recording(path));
         let measured = measured.collect::<Result<Vec<_>, _>>()?;
+        let to_measured = |loaded: &LoadedRecording| MeasuredRecording {
+            recording: loaded.recording.clone(),
+            exposure_s: loaded.exposure_s(),
+        };
         let problem = Problem::new(job, scenes, measured.iter().map(to_measured).collect());
         let problem = problem.map_err(|error| Failure::Input(format!("{file}: {error}")))?;
         let folder = files::containing_folder(&path).to_owned();
@@ -84,9 +87,4 @@ impl LoadedJob {
     pub(crate) fn recordings(&self) -> impl Iterator<Item = (&Path, &LoadedRecording)> {
         self.recording_paths.iter().map(PathBuf::as_path).zip(&self.measured)
     }
-}
-
-fn to_measured(loaded: &LoadedRecording) -> MeasuredRecording {
-    let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
-    MeasuredRecording { recording: loaded.recording.clone(), exposure_s }
 }

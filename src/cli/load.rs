@@ -48,6 +48,10 @@ pub(crate) struct LoadedRecording {
 }
 
 impl LoadedRecording {
+    /// Exposure of a frame, s, as its description has it.
+    pub(crate) fn exposure_s(&self) -> Option<f64> {
+        self.file.as_ref().and_then(|file| file.camera.exposure_s)
+    }
     /// Sources that lie in the folder of the recording at `path` but are no longer what was imported.
     pub(crate) fn changed_sources(&self, path: &Path) -> Option<QualityFinding> {
         let source = self.file.as_ref()?.source.as_ref()?;
@@ -62,10 +66,9 @@ impl LoadedRecording {
             1 => format!("{} is not the file that was imported (its SHA-256 differs)", names[0]),
             _ => format!("{} are not the files that were imported (their SHA-256 differ)", names.join(", ")),
         };
-        Some(
-            QualityFinding::new(Check::SourceChanged, Severity::Caution, names.len() as f64, "files", words)
-                .with_advice("import it into a new folder"),
-        )
+        let (check, severity, count) = (Check::SourceChanged, Severity::Caution, names.len() as f64);
+        let finding = QualityFinding::new(check, severity, count, "files", words);
+        Some(finding.with_advice("import it into a new folder"))
     }
 }
 
@@ -75,17 +78,18 @@ pub(crate) fn load_recording(path: &Path) -> Outcome<LoadedRecording> {
     let trace = trace_path(path)?;
     let text = files::read_text(&trace)?;
     let description = description_path(path);
-    let file = if description.is_file() && !files::is_standard_input(path) {
-        let shown = description.display().to_string();
-        Some(RecordingFile::parse(&shown, &files::read_toml(&description)?).map_err(Failure::input)?)
-    } else {
-        None
-    };
-    let name = files::display_name(if path.is_dir() { path } else { &trace });
-    let recording =
-        read_recording(&name, &trace.display().to_string(), &text, file.as_ref()).map_err(Failure::input)?;
-    let recording =
-        if file.is_none() && is_simulated(&trace, &text)? { mark_synthetic(recording)? } else { recording };
+    let mut file = None;
+    if description.is_file() && !files::is_standard_input(path) {
+        let (shown, text) = (description.display().to_string(), files::read_toml(&description)?);
+        file = Some(RecordingFile::parse(&shown, &text).map_err(Failure::input)?);
+    }
+    let (name, shown) = (if path.is_dir() { path } else { &trace }, trace.display().to_string());
+    let recording = read_recording(&files::display_name(name), &shown, &text, file.as_ref());
+    let mut recording = recording.map_err(Failure::input)?;
+    if file.is_none() && is_simulated(&trace, &text)? {
+        let (name, traces) = (recording.name(), recording.traces().clone());
+        recording = Recording::new(name, recording.grid(), traces, true).map_err(Failure::internal)?;
+    }
     Ok(LoadedRecording { recording, file })
 }
 
@@ -127,11 +131,6 @@ fn trace_path(path: &Path) -> Outcome<PathBuf> {
         return Err(Failure::at(path.display(), format!("found no {TRACE_FILE}, {advice}")));
     }
     Ok(trace)
-}
-
-fn mark_synthetic(recording: Recording) -> Outcome<Recording> {
-    Recording::new(recording.name(), recording.grid(), recording.traces().clone(), true)
-        .map_err(Failure::internal)
 }
 
 /// Whether a file is written as a study: it has axes or maps, which no job has.

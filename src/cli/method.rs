@@ -65,19 +65,16 @@ impl MethodArgs {
             MethodName::Slack => IntegrationMethod::Slack,
         };
         if self.method != MethodName::FixedStep {
-            let [transitions, step, gain] = [
-                self.transitions.map(|w| value_name(&w)),
-                self.step.map(|x| x.to_string()),
-                self.gain.map(|x| x.to_string()),
+            let typed = [
+                ("--step", self.step.map(|x| x.to_string())),
+                ("--transitions", self.transitions.map(|w| value_name(&w))),
+                ("--gain", self.gain.map(|x| x.to_string())),
             ];
-            for (option, found) in [("--step", step), ("--transitions", transitions), ("--gain", gain)] {
-                if let Some(found) = found {
-                    let with = value_name(&self.method);
-                    let message = format!(
-                        "{option}: found {found} with --method {with}, expected it with --method fixed-step alone; remove it or choose that method"
-                    );
-                    return Err(Failure::Input(message));
-                }
+            if let Some((option, found)) = typed.into_iter().find_map(|(option, x)| Some((option, x?))) {
+                let with = value_name(&self.method);
+                return Err(Failure::Input(format!(
+                    "{option}: found {found} with --method {with}, expected it with --method fixed-step alone; remove it or choose that method"
+                )));
             }
         }
         Ok(SolverOptions { method, relative_tolerance: tolerance, ..SolverOptions::from_scene(scene) })
@@ -88,29 +85,19 @@ impl MethodArgs {
             Err(Failure::Input(format!("{option}: found {found}, expected {expected}")))
         };
         if let Some(tolerance) = self.relative_tolerance {
-            return refuse(
-                "--relative-tolerance",
-                &format!("{tolerance} with --method fixed-step"),
-                "none, as the step sets the error; remove it",
-            );
+            let found = format!("{tolerance} with --method fixed-step");
+            return refuse("--relative-tolerance", &found, "none, as the step sets the error; remove it");
         }
         refuse_flight(scene)?;
         let Some(step_s) = self.step else {
-            return refuse(
-                "--step",
-                "nothing",
-                "a length in seconds, as --method fixed-step needs one; add --step 1e-5",
-            );
+            let expected = "a length in seconds, as --method fixed-step needs one; add --step 1e-5";
+            return refuse("--step", "nothing", expected);
         };
         let length = scene.run.stop_s - scene.start_s;
         if !(step_s > 0.0 && step_s <= length && length / step_s <= MOST_STEPS) {
-            return refuse(
-                "--step",
-                &step_s.to_string(),
-                &format!(
-                    "a number of seconds above 0, at most the run's {length}, in at most {MOST_STEPS:e} steps"
-                ),
-            );
+            let most = format!("at most the run's {length}, in at most {MOST_STEPS:e} steps");
+            let expected = format!("a number of seconds above 0, {most}");
+            return refuse("--step", &step_s.to_string(), &expected);
         }
         let gain_per_s = self.gain.unwrap_or(DEFAULT_GAIN_PER_S);
         let most = LARGEST_GAIN_TIMES_STEP / step_s;
@@ -130,19 +117,16 @@ impl MethodArgs {
 
 /// The fixed-step scheme has neither flight nor impacts.
 fn refuse_flight(scene: &Scene) -> Outcome<()> {
-    let [loss, jam] = [
-        ("contact.loss", "fly", scene.loss == ContactLossRule::Fly),
-        ("contact.jam", "impact", scene.jam == JamRule::Impact),
-    ];
-    for (key, found, is_set) in [loss, jam] {
-        if is_set {
-            let message = format!(
-                "--method fixed-step: found {key} = \"{found}\", expected \"stop\"; the fixed-step scheme has no flight: change the key or the method"
-            );
-            return Err(Failure::Input(message));
-        }
-    }
-    Ok(())
+    let (key, found) = if scene.loss == ContactLossRule::Fly {
+        ("contact.loss", "fly")
+    } else if scene.jam == JamRule::Impact {
+        ("contact.jam", "impact")
+    } else {
+        return Ok(());
+    };
+    Err(Failure::Input(format!(
+        "--method fixed-step: found {key} = \"{found}\", expected \"stop\"; the fixed-step scheme has no flight: change the key or the method"
+    )))
 }
 
 fn value_name(value: &impl ValueEnum) -> String {

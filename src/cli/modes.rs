@@ -33,20 +33,13 @@ impl ModesArgs {
             let neck = if on_shoulder { ", neck on the shoulder" } else { "" };
             print_line!("");
             print_line!("coupled modes about the upright position, no friction{neck}");
-            print_line!(
-                "  {:12} {:>12} {:>12} {:>9} {:>9}",
-                "tip",
-                "undamped Hz",
-                "damped Hz",
-                "ratio",
-                "lip/neck"
-            );
+            print_line!("  tip           undamped Hz    damped Hz     ratio  lip/neck");
             for (tip, word) in [(TipConstraint::Free, "slides"), (TipConstraint::Held, "held")] {
                 natural_modes(blade, tip, on_shoulder).iter().for_each(|mode| print_mode(word, mode));
             }
         }
         let drawn = || FIGURES.into_iter().zip(draw_figures(scene.title(), blade)).collect();
-        self.figures.write_figures(self.overwrite, global, drawn)?;
+        self.figures.write_figures(self.overwrite, global.quiet, drawn)?;
         Ok(CommandOutcome::Done)
     }
 }
@@ -58,11 +51,7 @@ fn print_mode(tip: &str, mode: &NaturalMode) {
     let number = |value: Option<f64>, digits: usize, none: &str| {
         value.map_or(none.to_owned(), |v| format!("{v:.digits$}"))
     };
-    print_line!(
-        "  {tip:12} {:>12} {:>12} {:>9} {:>9.3}",
-        number(mode.frequency_hz, 3, "unstable"),
-        number(mode.damped_frequency_hz, 3, "-"),
-        number(mode.damping_ratio, 4, "-"),
-        mode.lip_over_neck
-    );
+    let undamped = number(mode.frequency_hz, 3, "unstable");
+    let (damped, ratio) = (number(mode.damped_frequency_hz, 3, "-"), number(mode.damping_ratio, 4, "-"));
+    print_line!("  {tip:12} {undamped:>12} {damped:>12} {ratio:>9} {:>9.3}", mode.lip_over_neck);
 }

@@ -45,6 +45,11 @@ pub(crate) fn write_stdout(text: &str) {
     }
 }
 
+/// Lines to standard output.
+pub(crate) fn print_lines(text: &str) {
+    write_stdout(&escape_lines(text));
+}
+
 /// Text that has passed the filter to standard error.
 pub(crate) fn write_stderr(text: &str) {
     let _ = io::stderr().lock().write_all(text.as_bytes()); // (there is no place left to say so)

@@ -1,6 +1,5 @@
 //! Progress on a terminal, silence elsewhere.
 
-use super::args::GlobalArgs;
 use super::interrupt;
 use crate::simulate::{Observer, SolutionSegment};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -134,8 +133,8 @@ pub(crate) struct ProgressObserver {
 
 impl ProgressObserver {
     /// Of a run from one instant to another, s.
-    pub(crate) fn new([start_s, stop_s]: [f64; 2], command: &'static str, global: &GlobalArgs) -> Self {
-        let bar = start_bar(to_milliseconds(stop_s - start_s), command, "ms of the model", global.quiet);
+    pub(crate) fn new([start_s, stop_s]: [f64; 2], command: &'static str, quiet: bool) -> Self {
+        let bar = start_bar(to_milliseconds(stop_s - start_s), command, "ms of the model", quiet);
         Self { bar, start_s, pieces: 0 }
     }
 }

@@ -24,7 +24,7 @@ pub fn read_scene(path: &Path) -> Result<(Scene, Option<PathBuf>), Failure> {
 /// As [`read_scene`].
 pub fn read_recording(path: &Path) -> Result<(Recording, Option<f64>), Failure> {
     let loaded = load_recording(path)?;
-    let exposure_s = loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
+    let exposure_s = loaded.exposure_s();
     Ok((loaded.recording, exposure_s))
 }
 

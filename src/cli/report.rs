@@ -106,9 +106,8 @@ impl ReportedFit {
 
     fn run_best_models(&self) -> Outcome<Vec<ModelRun>> {
         let model = self.problem.problem.fitted_model(&self.result).map_err(Failure::input)?;
-        let best = run_conditions(self.problem.job(), &model, &self.result);
-        let best = best
-            .map_err(|why| Failure::Internal(format!("{}: the best model does not run: {why}", self.name)))?;
+        let failure = |why| Failure::Internal(format!("{}: the best model does not run: {why}", self.name));
+        let best = run_conditions(self.problem.job(), &model, &self.result).map_err(failure)?;
         for how in best.iter().filter_map(|best| describe_early_end(&best.view.run)) {
             warn_line!("warning: {}: the best model's run ended early: {how}", self.name);
         }
@@ -137,19 +136,16 @@ pub(crate) fn write_report(
 ) -> Outcome<bool> {
     check_report_folder(out, writer)?;
     let steps = progress::start_steps("report", global.quiet);
-    let report = {
-        steps.show_step("reading the fit");
-        let fit = ReportedFit::load(fit)?;
-        steps.show_step("running the model");
-        let best = fit.run_best_models()?;
-        steps.show_step("comparing and drawing");
-        fit.build_report(assembly::build_report, &best)?
-    };
+    steps.show_step("reading the fit");
+    let fit = ReportedFit::load(fit)?;
+    steps.show_step("running the model");
+    let best = fit.run_best_models()?;
+    steps.show_step("comparing and drawing");
+    let report = fit.build_report(assembly::build_report, &best)?;
     let verdict = ReportVerdict::from_report(&report);
-    let json = report_json(&report).map_err(Failure::internal)?;
     let output = ReportFiles {
         figures: report.all_figures().collect(),
-        json,
+        json: report_json(&report).map_err(Failure::internal)?,
         tables: &report.tables,
         page: render_page(&report),
         summary: verdict.summary(),
@@ -163,7 +159,6 @@ pub(crate) fn write_report(
 
 const JSON_FILE: &str = "report.json";
 const PAGE_FILE: &str = "index.html";
-const FIGURE_EXTENSION: &str = ".svg";
 
 /// What goes into a folder.
 pub(crate) struct ReportFiles<'a> {
@@ -192,9 +187,8 @@ impl ReportFiles<'_> {
 
     fn to_files(&self) -> Vec<(String, Vec<u8>)> {
         let figure = |block: &&FigureBlock| match &block.drawing {
-            Drawing::Chart(figure) => {
-                figure_files(block.file.trim_end_matches(FIGURE_EXTENSION), figure).to_vec()
-            }
+            Drawing::Chart(figure) => figure_files(block.file.trim_end_matches(".svg"), figure).to_vec(),
+
             Drawing::Moving(svg) => vec![(block.file.clone(), svg.clone().into_bytes())],
         };
         let page = [(JSON_FILE, &self.json), (PAGE_FILE, &self.page)]

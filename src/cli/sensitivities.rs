@@ -40,8 +40,7 @@ impl SensitivityRequest {
             return Ok(None);
         }
         let refuse = |found: &str, expected: &str, advice: &str| {
-            let message = format!("--sensitivities: found {found}, expected {expected}; {advice}");
-            Err(Failure::Input(message))
+            Err(Failure::at("--sensitivities", format!("found {found}, expected {expected}; {advice}")))
         };
         if effort.method != IntegrationMethod::Taylor {
             let found = format!("it with the method `{}`", effort.method.name());
@@ -77,13 +76,10 @@ impl SensitivityRequest {
         };
         let columns: String = COLUMNS.iter().map(|(_, column)| by(column)).collect();
         let [samples, events] = SENSITIVITY_FILES;
+        let events_header = format!("{EVENTS_HEADER}{}", by("time_s"));
         let mut rows = SensitivityTables {
             samples: StreamedTable::new(place.create_file(samples)?, &format!("time_s{columns}"), 1),
-            events: StreamedTable::new(
-                place.create_file(events)?,
-                &format!("{EVENTS_HEADER}{}", by("time_s")),
-                1,
-            ),
+            events: StreamedTable::new(place.create_file(events)?, &events_header, 1),
             times: times.peekable(),
             row: vec![0.0; self.names.len()],
         };

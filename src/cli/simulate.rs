@@ -43,7 +43,7 @@ impl SimulateArgs {
         let effort = self.method.integration_effort(&scene)?;
         let sensitivities = SensitivityRequest::parse(&scene, &self.sensitivities, &effort)?;
         let writer = global.write_policy(OutputCommand::Simulate, self.overwrite);
-        let watch = ProgressObserver::new([scene.start_s, scene.run.stop_s], "simulate", global);
+        let watch = ProgressObserver::new([scene.start_s, scene.run.stop_s], "simulate", global.quiet);
         let names = output_names(&scene, sensitivities.is_some());
         let place = OutputFolder::check(&self.out, &writer, &names)?;
         self.figures.check_folder(&[FIGURE], self.overwrite)?;
@@ -54,7 +54,7 @@ impl SimulateArgs {
         }
         // (a run more than the tables need: they hold no more than a row of it)
         let drawn = || vec![(FIGURE, motion::draw_figure(scene.title(), &RunMotion::simulate(&scene)))];
-        self.figures.write_figures(self.overwrite, global, drawn)?;
+        self.figures.write_figures(self.overwrite, global.quiet, drawn)?;
         Ok(CommandOutcome::done_if(summary.status == RunStatus::Completed))
     }
 }
@@ -84,12 +84,8 @@ fn run_to_files(
     mut watch: ProgressObserver,
 ) -> Outcome<SimulationSummary> {
     let table = |output: OutputTable, name, header: &str, least_rows| {
-        scene
-            .run
-            .outputs
-            .contains(&output)
-            .then(|| Ok(StreamedTable::new(place.create_file(name)?, header, least_rows)))
-            .transpose()
+        let new = || Ok(StreamedTable::new(place.create_file(name)?, header, least_rows));
+        scene.run.outputs.contains(&output).then(new).transpose()
     };
     // a trace of one row would have no frame rate
     let mut trace = table(OutputTable::Trace, "trace.csv", HEADER, 2)?;
@@ -102,9 +98,8 @@ fn run_to_files(
         state.iter_mut().for_each(|table| table.add_row(|row| push_state_row(row, sample)));
     });
     let mut audit = EnergyAudit::default();
-    let stops = interrupt::register_stoppable(|| {
-        "the run did not stop in time, and nothing of it is written".to_owned()
-    });
+    let late = "the run did not stop in time, and nothing of it is written";
+    let stops = interrupt::register_stoppable(|| late.to_owned());
     let clock = Instant::now();
     let mut observers = ((sampler, EventTableWriter(events.as_mut())), (&mut audit, &mut watch));
     let run = run_scene_with(scene, effort, &mut observers);
@@ -137,20 +132,13 @@ impl Observer for EventTableWriter<'_> {
 
 fn print_summary(summary: &SimulationSummary, out: &Path) {
     print_line!("{}: {}", summary.status.name(), summary.status_meaning);
+    let SimulationSummary { stopped_at_s, transitions, rhs_evaluations, steps, rejected_steps, .. } = summary;
+    let wall_ms = 1e3 * summary.wall_s;
     print_line!(
-        "stopped at {} s after {} transitions, {} right-hand sides, {} steps ({} rejected), {:.1} ms",
-        summary.stopped_at_s,
-        summary.transitions,
-        summary.rhs_evaluations,
-        summary.steps,
-        summary.rejected_steps,
-        1e3 * summary.wall_s
+        "stopped at {stopped_at_s} s after {transitions} transitions, {rhs_evaluations} right-hand sides, {steps} steps ({rejected_steps} rejected), {wall_ms:.1} ms"
     );
-    print_line!(
-        "energy residual {:.1e}, drift in stick {:.1e} m",
-        summary.energy_residual_relative,
-        summary.max_constraint_drift_m
-    );
+    let (energy, drift_m) = (summary.energy_residual_relative, summary.max_constraint_drift_m);
+    print_line!("energy residual {energy:.1e}, drift in stick {drift_m:.1e} m");
     print_line!("model parts: {}", summary.model_parts.join(", "));
     print_line!("written to {}", out.display());
 }

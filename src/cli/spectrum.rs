@@ -129,22 +129,15 @@ impl SpectrumArgs {
         };
         let model = load_recording(like)?;
         let exposure_s = self.exposure_for(&model)?;
-        let filmed =
-            film_like_recording(&loaded.recording, &model.recording, exposure_s.unwrap_or(0.0), FILM_SEED)
-                .map_err(|e| {
-                    Failure::Input(format!("{} like {}: {e}", self.recording.display(), like.display()))
-                })?;
+        let blur_s = exposure_s.unwrap_or(0.0);
+        let place = format!("{} like {}", self.recording.display(), like.display());
+        let filmed = film_like_recording(&loaded.recording, &model.recording, blur_s, FILM_SEED)
+            .map_err(|error| Failure::at(place, error))?;
         let mut simulated = request.study_recording(exposure_s, filmed.recording)?;
-        let frames = if filmed.dropouts == DropoutPattern::SameFrames {
-            "the same frames lost"
-        } else {
-            "as many frames lost"
-        };
-        simulated.note = format!(
-            "{}; seen as in {}: its rate, exposure and noise, {frames}",
-            simulated.note,
-            model.recording.name()
-        );
+        let same = filmed.dropouts == DropoutPattern::SameFrames;
+        let (frames, name) = (if same { "the same" } else { "as many" }, model.recording.name());
+        let seen = format!("; seen as in {name}: its rate, exposure and noise, {frames} frames lost");
+        simulated.note.push_str(&seen);
         let measured = request.study_recording(exposure_s, model.recording)?;
         let mut outputs = request.output_files(&simulated)?;
         outputs.push(("components-like.json".to_owned(), tables::components_json(&measured)?));
@@ -173,40 +166,32 @@ impl SpectrumArgs {
 
     /// Exposure as given, or as the recording says.
     fn exposure_for(&self, loaded: &LoadedRecording) -> Outcome<Option<f64>> {
-        let recorded = || loaded.file.as_ref().and_then(|file| file.camera.exposure_s);
-        Ok(self.given_exposure_s()?.or_else(recorded))
+        Ok(self.given_exposure_s()?.or_else(|| loaded.exposure_s()))
     }
 
     fn given_exposure_s(&self) -> Outcome<Option<f64>> {
         match self.exposure_s {
-            Some(found) if !(found.is_finite() && found > 0.0) => Err(Failure::Input(format!(
-                "--exposure-s: found {found}, expected a time in seconds above 0, like 0.0002"
-            ))),
+            Some(found) if !(found.is_finite() && found > 0.0) => {
+                let problem = format!("found {found}, expected a time in seconds above 0, like 0.0002");
+                Err(Failure::at("--exposure-s", problem))
+            }
             given => Ok(given),
         }
     }
 
     fn parse_request(&self) -> Outcome<SpectrumRequest> {
-        let named =
-            |option: &str, error: &dyn std::fmt::Display| Failure::Input(format!("{option}: {error}"));
-        let channel = Channel::parse(&self.channel).map_err(|e| named("--channel", &e))?;
-        let window = Window::parse(&self.window).map_err(|e| named("--window", &e))?;
+        let channel = Channel::parse(&self.channel).map_err(|e| Failure::at("--channel", e))?;
+        let window = Window::parse(&self.window).map_err(|e| Failure::at("--window", e))?;
         let detrend = (self.detrend != AUTO).then(|| Detrend::parse(&self.detrend)).transpose();
-        let detrend = detrend.map_err(|e| named("--detrend", &format!("{e}, or `{AUTO}`")))?;
+        let detrend = detrend.map_err(|e| Failure::at("--detrend", format!("{e}, or `{AUTO}`")))?;
         let band_hz = self.band.as_deref().map(parse_band).transpose()?;
-        if !(self.fastest_hz.is_finite() && self.fastest_hz > 0.0) {
-            return Err(Failure::Input(format!(
-                "--fastest-hz: found {}, expected a frequency in Hz above 0",
-                self.fastest_hz
-            )));
+        let (max_components, fastest_hz) = (self.max_components, self.fastest_hz);
+        if !(fastest_hz.is_finite() && fastest_hz > 0.0) {
+            let problem = format!("found {fastest_hz}, expected a frequency in Hz above 0");
+            return Err(Failure::at("--fastest-hz", problem));
         }
-        let settings = SpectrumSettings {
-            detrend,
-            band_hz,
-            max_components: self.max_components,
-            fastest_hz: self.fastest_hz,
-            ..SpectrumSettings::default()
-        };
+        let settings =
+            SpectrumSettings { detrend, band_hz, max_components, fastest_hz, ..SpectrumSettings::default() };
         Ok(SpectrumRequest { channel, window, settings })
     }
 }
@@ -226,22 +211,13 @@ impl SpectrumRequest {
         let hint = flip_hint(&instants, (grid.time_s(frames.start), grid.time_s(frames.end)));
         let frames = frames.start + analysis.skipped_frames..frames.end;
         let (from_s, to_s) = (grid.time_s(frames.start), grid.time_s(frames.end));
-        let cut = if analysis.skipped_frames >= analysis.stride {
-            ", cut behind a flip that no trend describes"
-        } else {
-            ""
-        };
-        let kept = match analysis.stride {
-            1 => String::new(),
-            stride => {
-                format!(" (one of {stride} is tracked: {:.6} frames/s)", grid.frame_rate_hz / stride as f64)
-            }
-        };
-        let note = format!(
-            "{from_s:.4} s to {to_s:.4} s{cut}, {} frames{kept}, {} removed",
-            frames.len(),
-            analysis.removed
-        );
+        let (stride, removed, count) = (analysis.stride, &analysis.removed, frames.len());
+        let behind_flip = ", cut behind a flip that no trend describes";
+        let cut = if analysis.skipped_frames >= stride { behind_flip } else { "" };
+        let rate = grid.frame_rate_hz / stride as f64;
+        let every = || format!(" (one of {stride} is tracked: {rate:.6} frames/s)");
+        let kept = if stride == 1 { String::new() } else { every() };
+        let note = format!("{from_s:.4} s to {to_s:.4} s{cut}, {count} frames{kept}, {removed} removed");
         Ok(StudiedWindow { recording, exposure_s, frames, analysis, note, hint })
     }
 
@@ -265,15 +241,12 @@ impl SpectrumRequest {
 
     /// Both spectra in one figure.
     fn comparison_figure(&self, simulated: &StudiedWindow, measured: &StudiedWindow) -> Figure {
+        let [model, recording] =
+            [simulated, measured].map(|studied| (studied.recording.name(), &studied.note));
+        let ((simulated_name, model), (name, recording)) = (model, recording);
         let shown = SpectraPlot {
             quantity: self.channel.to_string(),
-            note: format!(
-                "spectra of {} and {}; model: {}; recording: {}",
-                measured.recording.name(),
-                simulated.recording.name(),
-                simulated.note,
-                measured.note
-            ),
+            note: format!("spectra of {name} and {simulated_name}; model: {model}; recording: {recording}"),
             synthetic: measured.recording.is_synthetic(),
             ..compare_spectra(Some(&measured.analysis), Some(&simulated.analysis))
         };
@@ -284,20 +257,18 @@ impl SpectrumRequest {
 /// What to do where the window holds a whole flip and more: nothing slow and steady describes both of its
 /// sides.
 fn flip_hint(instants: &ReversalInstants, (from_s, to_s): (f64, f64)) -> Option<String> {
-    let flips =
-        instants.reversals.iter().enumerate().filter_map(|(i, reversal)| Some((i + 1, reversal.flip?)));
-    let (k, flip) = flips.into_iter().find(|(_, flip)| from_s < flip.start_s && flip.end_s < to_s)?;
+    let mut flips = (1..).zip(&instants.reversals).filter_map(|(k, reversal)| Some((k, reversal.flip?)));
+    let (k, flip) = flips.find(|(_, flip)| from_s < flip.start_s && flip.end_s < to_s)?;
     let after = if instants.reversals.len() > 1 { format!("after[{k}]") } else { "after".to_owned() };
+    let (start_s, end_s) = (flip.start_s, flip.end_s);
     Some(format!(
-        "the window holds the flip from {:.4} s to {:.4} s; `--window {after}` starts behind it",
-        flip.start_s, flip.end_s
+        "the window holds the flip from {start_s:.4} s to {end_s:.4} s; `--window {after}` starts behind it"
     ))
 }
 
 fn parse_band(text: &str) -> Outcome<(f64, f64)> {
-    let ends = text
-        .split_once("..")
-        .and_then(|(low, high)| Some((low.trim().parse().ok()?, high.trim().parse().ok()?)));
+    let number = |text: &str| text.trim().parse().ok();
+    let ends = text.split_once("..").and_then(|(low, high)| number(low).zip(number(high)));
     let ordered = ends.filter(|(low, high): &(f64, f64)| *low >= 0.0 && low < high && high.is_finite());
     ordered.ok_or_else(|| {
         Failure::Input(format!("--band: found `{text}`, expected two frequencies in Hz with `..` between them, the lower first, like `60..100`"))

@@ -67,10 +67,8 @@ impl SubmitArgs {
     fn make_plan(&self, global: &GlobalArgs) -> Outcome<SubmissionPlan> {
         let tasks = self.tasks.clone().unwrap_or_else(|| TaskList::all(self.shards));
         if let Some(last) = tasks.last().filter(|last| *last >= self.shards) {
-            return Err(Failure::Input(format!(
-                "--tasks: found {last}, expected numbers below the {} of --shards; correct one of them",
-                self.shards
-            )));
+            let expected = format!("numbers below the {} of --shards; correct one of them", self.shards);
+            return Err(Failure::at("--tasks", format!("found {last}, expected {expected}")));
         }
         if let Some(line) = self.directives.iter().find(|line| line.contains(char::is_control)) {
             return Err(Failure::Input(format!(
@@ -121,30 +119,23 @@ impl SubmitArgs {
             )));
         }
         let scripts = scripts.map(|(name, text)| (name, text.into_bytes()));
-        files::write_outputs(
-            &plan.scripts_folder(),
-            &WritePolicy::new(OutputCommand::Submit, self.overwrite),
-            &scripts,
-        )?;
-        let script = plan.scripts_folder().join(slurm::SUBMIT_SH);
+        let (folder, writer) =
+            (plan.scripts_folder(), WritePolicy::new(OutputCommand::Submit, self.overwrite));
+        files::write_outputs(&folder, &writer, &scripts)?;
+        let script = folder.join(slurm::SUBMIT_SH);
         let ran = Command::new("/bin/sh").arg(&script).output();
         let ran = ran.map_err(|error| Failure::Internal(format!("/bin/sh: cannot be run: {error}")))?;
         let submitted = String::from_utf8_lossy(&ran.stdout);
-        super::output::write_stdout(&super::output::escape_lines(&submitted));
+        output::print_lines(&submitted);
         let complaint = String::from_utf8_lossy(&ran.stderr);
-        if ran.status.success() {
-            super::output::write_stderr(&super::output::escape_lines(&complaint));
-        } else {
+        if !ran.status.success() {
             return Err(submission_failure(&script.display().to_string(), &submitted, &complaint));
         }
+        output::write_stderr(&output::escape_lines(&complaint));
         if !global.quiet {
-            print_line!(
-                "{} tasks with {} each; logs: {}",
-                plan.tasks.len(),
-                plan.describe_cores(),
-                plan.logs_folder().display()
-            );
-            print_line!("scripts: {}", plan.scripts_folder().display());
+            let (tasks, cores, logs) = (plan.tasks.len(), plan.describe_cores(), plan.logs_folder());
+            print_line!("{tasks} tasks with {cores} each; logs: {}", logs.display());
+            print_line!("scripts: {}", folder.display());
         }
         Ok(CommandOutcome::Done)
     }
@@ -164,7 +155,7 @@ fn print_scripts(scripts: &[(&str, String)]) {
             print_line!("");
         }
         print_line!("# ---- {name} ----");
-        super::output::write_stdout(&super::output::escape_lines(text));
+        output::print_lines(text);
     }
 }
 

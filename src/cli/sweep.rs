@@ -96,12 +96,10 @@ impl LoadedStudy {
         let refused = |problem: String| Failure::Input(format!("{name}: {problem}"));
         let file = File::open(journal).map_err(|error| refused(format!("cannot be read: {error}")))?;
         let added = points.add_journal(&name, BufReader::new(file)).map_err(collection_failure)?;
-        match added {
-            None => warn_line!("warning: {name}: holds no complete line"),
-            Some(added) if added.end.torn => {
-                warn_line!("warning: {name}: the last line is incomplete and left out")
-            }
-            Some(_) => {}
+        if added.is_none() {
+            warn_line!("warning: {name}: holds no complete line");
+        } else if added.is_some_and(|added| added.end.torn) {
+            warn_line!("warning: {name}: the last line is incomplete and left out");
         }
         Ok(())
     }

@@ -40,7 +40,7 @@ impl TwinArgs {
         self.figures.check_folder(&[FIGURE], self.overwrite)?;
         let [start_s, stop_s] = spec.window_within(&file, &scene).map_err(Failure::input)?;
 
-        let mut watch = ProgressObserver::new([scene.start_s, scene.run.stop_s], "twin", global);
+        let mut watch = ProgressObserver::new([scene.start_s, scene.run.stop_s], "twin", global.quiet);
         let effort = SolverOptions::from_scene(&scene);
         let seen = film_scene_with_observer(&scene, &spec.camera, [start_s, stop_s], effort, &mut watch)
             .map_err(Failure::input)?;
@@ -56,21 +56,15 @@ impl TwinArgs {
         ];
         if spec.tracker_export {
             let table = toml::to_string(&description.twin).map_err(Failure::internal)?;
-            outputs.push((
-                EXPORT_FILE,
-                twin::write_tracker_table(&recording, spec.tracking.metres_per_pixel).into_bytes(),
-            ));
-            outputs.push((SPEC_FILE, table.into_bytes()));
+            let export = twin::write_tracker_table(&recording, spec.tracking.metres_per_pixel);
+            outputs.extend([(EXPORT_FILE, export.into_bytes()), (SPEC_FILE, table.into_bytes())]);
         }
         files::write_outputs(&self.out, &writer, &outputs)?;
         let early = describe_early_end(&seen.run);
         if !global.quiet {
-            print_line!(
-                "synthetic recording of \"{}\": {} frames at {} 1/s",
-                scene.title(),
-                recording.grid().frames,
-                recording.grid().frame_rate_hz
-            );
+            let (title, frames, rate) =
+                (scene.title(), recording.grid().frames, recording.grid().frame_rate_hz);
+            print_line!("synthetic recording of \"{title}\": {frames} frames at {rate} 1/s");
             print_line!("written to {}", self.out.display());
         }
         self.draw_figure(&spec, &scene, &seen, &recording, global)?;
@@ -79,9 +73,6 @@ impl TwinArgs {
             CommandOutcome::StoppedEarly
         }))
     }
-}
-
-impl TwinArgs {
     /// The figure, where it is wanted: the motion between the frames takes a run of its own.
     fn draw_figure(
         &self,
@@ -108,7 +99,8 @@ impl TwinArgs {
             noise_m: spec.tracking.noise_px * spec.tracking.metres_per_pixel,
             stick_s: &seen.stick_s,
         };
-        self.figures.write_figures(self.overwrite, global, || vec![(FIGURE, figure::draw_figure(&shown))])
+        self.figures
+            .write_figures(self.overwrite, global.quiet, || vec![(FIGURE, figure::draw_figure(&shown))])
     }
 }
 

@@ -39,52 +39,34 @@ fn assemble_page(report: &Report, narrow: bool) -> String {
     let (first, evidence) = evidence_html(report, narrow);
     let open = |id, heading, html: String| PageSection { id, heading, html, folded: false };
     let folded = |id, heading, html: String| PageSection { id, heading, html, folded: true };
+    let answer = [summary_html(report), first, agreement::components_table(&report.components)].concat();
+    let statements = statements_html(&verdict.statements);
+    let blade = [events_table(&report.runs), subject_figures_html(report, FigureSubject::Blade)].concat();
+    let parameters = [
+        parameters::parameters_html(report),
+        agreement::nuisances_table(&report.nuisances),
+        subject_figures_html(report, FigureSubject::Parameters),
+    ]
+    .concat();
+    let measured = if report.recordings.is_empty() { "The model alone" } else { "Measured against model" };
+    // a gate looks at features, which a fit to traces does not rest on
+    let search = if report.misfit.is_some() { "Search" } else { "Search and gate" };
     let sections = [
-        open(
-            "answer",
-            "Answer",
-            [summary_html(report), first, agreement::components_table(&report.components)].concat(),
-        ),
+        open("answer", "Answer", answer),
         open("evidence", "Evidence", evidence),
-        folded(
-            "verdict",
-            "Every finding",
-            format!("<div class=\"verdict\">\n{}</div>\n", statements_html(&verdict.statements)),
-        ),
+        folded("verdict", "Every finding", format!("<div class=\"verdict\">\n{statements}</div>\n")),
         folded("features", "Features", agreement::features_table(&report.features)),
         folded("held-out", "Held-out predictions", agreement::held_out_table(&report.held_out)),
         folded("misfit", "Residuals", agreement::misfit_html(report.misfit.as_ref())),
-        folded("measured", measured_heading(report), subject_figures_html(report, FigureSubject::Measured)),
-        folded(
-            "blade",
-            "The blade of the best model",
-            [events_table(&report.runs), subject_figures_html(report, FigureSubject::Blade)].concat(),
-        ),
-        folded(
-            "parameters",
-            "Parameters",
-            [
-                parameters::parameters_html(report),
-                agreement::nuisances_table(&report.nuisances),
-                subject_figures_html(report, FigureSubject::Parameters),
-            ]
-            .concat(),
-        ),
+        folded("measured", measured, subject_figures_html(report, FigureSubject::Measured)),
+        folded("blade", "The blade of the best model", blade),
+        folded("parameters", "Parameters", parameters),
         folded("data", "Data quality", recordings::recordings_html(&report.recordings)),
-        folded("search", search_heading(report), parameters::search_html(report)),
+        folded("search", search, parameters::search_html(report)),
         folded("reservations", "Reservations", sentence_list(&report.notes)),
         folded("provenance", "Provenance", provenance_html(&report.provenance)),
     ];
     render_document(&report.title, &data_banner(report), &sections)
-}
-
-/// A gate looks at features, which a fit to traces does not rest on.
-fn search_heading(report: &Report) -> &'static str {
-    if report.misfit.is_some() { "Search" } else { "Search and gate" }
-}
-
-fn measured_heading(report: &Report) -> &'static str {
-    if report.recordings.is_empty() { "The model alone" } else { "Measured against model" }
 }
 
 /// What the data are, before anything else is said.
@@ -116,10 +98,8 @@ fn figures_of_subject(report: &Report, subject: FigureSubject) -> (Vec<&FigureBl
 fn evidence_html(report: &Report, narrow: bool) -> (String, String) {
     let (all, before) = figures_of_subject(report, FigureSubject::Evidence);
     let (first, rest) = all.split_at(all.len().min(1));
-    (
-        figures_html(first.iter().copied(), before, narrow),
-        figures_html(rest.iter().copied(), before + first.len(), narrow),
-    )
+    let html = |part: &[&FigureBlock], before| figures_html(part.iter().copied(), before, narrow);
+    (html(first, before), html(rest, before + first.len()))
 }
 
 /// The figures of a subject.
@@ -142,13 +122,9 @@ pub(super) fn summary_html(report: &Report) -> String {
 }
 
 fn headline_html(said: &Statement) -> String {
-    let class = match said.good {
-        Some(true) => " good",
-        Some(false) => " bad",
-        None => "",
-    };
-    let details: String = said.details.iter().map(|d| format!("<li>{}</li>\n", sentence_html(d))).collect();
-    let details = if details.is_empty() { details } else { format!("<ul>\n{details}</ul>\n") };
+    let class = said.good.map_or("", |good| if good { " good" } else { " bad" });
+    let details = items_html(said.details.iter().map(sentence_html));
+
     format!("<div class=\"headline{class}\"><p>{}</p>\n{details}</div>\n", sentence_html(&said.statement))
 }
 
@@ -210,23 +186,16 @@ fn commands_html(p: &Provenance) -> String {
     if p.commands.is_empty() {
         return String::new();
     }
-    let imported = if p.files.iter().any(|f| f.kind == EXPORT_KIND) {
-        reading_hint(
-            "The command that imported a recording is not kept: its trace.csv and recording.toml were made \
-             by wiperlab import from the exports above, with the rate and scale that recording.toml holds.",
-        )
-    } else {
-        String::new()
-    };
+    let words = "The command that imported a recording is not kept: its trace.csv and recording.toml were made \
+                 by wiperlab import from the exports above, with the rate and scale that recording.toml holds.";
+    let has_exports = p.files.iter().any(|f| f.kind == "export");
+    let imported = if has_exports { reading_hint(words) } else { String::new() };
     let lines = p.commands.iter().map(|command| escape_text(command)).collect::<Vec<_>>().join("\n");
     format!(
         "<p>To make it again:</p>\n<pre tabindex=\"0\" role=\"region\" \
          aria-label=\"Commands\">{lines}</pre>\n{imported}"
     )
 }
-
-/// Kind of a file that a tracking program wrote.
-const EXPORT_KIND: &str = "export";
 
 // How the best model ran, and its hard events: a zero is said as plainly as a number.
 

@@ -8,7 +8,7 @@ use serde::{Serialize, Serializer};
 
 /// A sentence: own words and names in turn.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Sentence(Vec<SentencePart>);
+pub struct Sentence(pub(crate) Vec<SentencePart>);
 
 /// A part of a sentence.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -45,11 +45,6 @@ impl Sentence {
         names.into_iter().enumerate().fold(self, joined)
     }
 
-    /// Its parts in order.
-    pub(crate) fn parts(&self) -> &[SentencePart] {
-        &self.0
-    }
-
     /// As text without markup.
     pub(crate) fn plain_text(&self) -> String {
         self.0
@@ -58,6 +53,12 @@ impl Sentence {
                 SentencePart::Words(text) | SentencePart::Name(text) => text.as_str(),
             })
             .collect()
+    }
+}
+
+impl<T: Into<String>> From<T> for Sentence {
+    fn from(words: T) -> Self {
+        Self::new(words)
     }
 }
 
@@ -80,8 +81,17 @@ pub struct Statement {
 
 impl Statement {
     /// A statement without details.
-    pub(crate) fn new(statement: Sentence) -> Self {
-        Self { statement, ..Self::default() }
+    pub(crate) fn new(statement: impl Into<Sentence>) -> Self {
+        Self { statement: statement.into(), ..Self::default() }
+    }
+
+    /// A statement with its details, good or bad.
+    pub(crate) fn with_details(
+        statement: impl Into<Sentence>,
+        details: Vec<Sentence>,
+        good: Option<bool>,
+    ) -> Self {
+        Self { statement: statement.into(), details, good }
     }
 
     /// The same, being as one would have it or not.

@@ -10,7 +10,9 @@ use crate::figures::evidence::NOTHING_LEFT;
 use crate::figures::friction::FrictionLine;
 use crate::fit::misfit::{ChannelMisfit, TraceMisfit, WorstSegment, far_from_priors};
 use crate::model::parameters;
-use crate::text::{capitalise, format_digits, format_length, format_speed, join_with_and, pluralise};
+use crate::text::{
+    capitalise, format_decimals, format_digits, format_length, format_speed, join_with_and, pluralise,
+};
 use serde::Serialize;
 
 /// Residual over noise above which a run is seen to be off.
@@ -120,33 +122,24 @@ fn worst_channel(misfit: &TraceMisfit) -> Option<&ChannelMisfit> {
 
 fn trace_headline(report: &Report, misfit: &TraceMisfit) -> Statement {
     let shown = if misfit.explained { misfit.channels.first() } else { worst_channel(misfit) };
-    let left = shown.map(|c| {
-        let (point, ratio) = (channel_point_name(&c.channel), c.residual_rms_m / c.noise_m);
+    let left = shown.map_or_else(String::new, |c| {
+        let (point, ratio) = (channel_point_name(&c.channel), format_digits(c.residual_rms_m / c.noise_m, 2));
         let (residual, noise) = (format_length(c.residual_rms_m), format_length(c.noise_m));
-        if misfit.explained {
-            format!(
-                "what is left of the {point} is {residual} rms, and the noise of the recording is {noise}"
-            )
-        } else {
-            format!(
-                "it misses the {point} by {residual} rms, {} times the noise of {noise}",
-                format_digits(ratio, 2)
-            )
+        match misfit.explained {
+            true => {
+                format!(": what is left of the {point} is {residual} rms, and the noise of the recording is {noise}")
+            }
+            false => format!(": it misses the {point} by {residual} rms, {ratio} times the noise of {noise}"),
         }
     });
-    let left = left.map_or_else(String::new, |left| format!(": {left}"));
-    let words = if misfit.explained {
-        format!("The model explains the recording{left}.")
-    } else {
-        format!(
-            "The model does not explain the recording{left}. What was fitted need not be the blade\u{2019}s."
-        )
+    let doubt = "What was fitted need not be the blade\u{2019}s.";
+    let words = match misfit.explained {
+        true => format!("The model explains the recording{left}."),
+        false => format!("The model does not explain the recording{left}. {doubt}"),
     };
     let why = misfit.reasons.iter().map(|reason| Sentence::new(capitalise(reason)));
-    Statement {
-        details: why.chain(missed_target_sentences(report)).chain(single_run_sentence(report)).collect(),
-        ..Statement::new(Sentence::new(words)).with_verdict(misfit.explained)
-    }
+    let details = why.chain(missed_target_sentences(report)).chain(single_run_sentence(report)).collect();
+    Statement::with_details(words, details, Some(misfit.explained))
 }
 
 /// How far a run leads that is started once; traces are fitted in segments.
@@ -159,12 +152,10 @@ fn single_run_sentence(report: &Report) -> Option<Sentence> {
         Sentence::new("Run")
     };
     let drift = report.misfit.as_ref().is_some_and(|misfit| misfit.explained);
+    let why = if drift { ": small errors of its frequency add up." } else { "." };
+    let (rms, channel, ratio) = (format_length(r.rms_m), r.channel, format_digits(ratio, 2));
     Some(of.with_words(format!(
-        " once from its start, the model lies {} rms off the {}, {} times the noise{}",
-        format_length(r.rms_m),
-        r.channel,
-        format_digits(ratio, 2),
-        if drift { ": small errors of its frequency add up." } else { "." }
+        " once from its start, the model lies {rms} rms off the {channel}, {ratio} times the noise{why}"
     )))
 }
 
@@ -217,10 +208,8 @@ fn missed_target_sentences(report: &Report) -> Vec<Sentence> {
     let far = |c: &&Comparison| c.pass && apart(c).is_some_and(|sds| sds > FAR_SD);
     let missed = fitted_targets(report).filter(|c| !c.pass).map(comparison_sentence);
     let met = fitted_targets(report).filter(far).map(|c| {
-        comparison_sentence(c).with_words(format!(
-            ", yet {} standard deviations off",
-            format_digits(apart(c).unwrap_or(0.0), 2)
-        ))
+        let sds = format_digits(apart(c).unwrap_or(0.0), 2);
+        comparison_sentence(c).with_words(format!(", yet {sds} standard deviations off"))
     });
     missed.chain(met).collect()
 }
@@ -231,51 +220,44 @@ fn feature_headline(report: &Report) -> Statement {
         Some((_, r)) => {
             let (channel, ratio) = (r.channel, r.rms_over_noise.unwrap_or(f64::INFINITY));
             let rms = format_length(r.rms_m);
+            let (joint, times) =
+                (if ratio > SEEN && all_met { ", but" } else { ";" }, format_digits(ratio, 2));
             if ratio <= NOTHING_LEFT {
                 (format!("; one run of it follows the {channel} to within its noise"), Some(all_met))
             } else {
                 let words = format!(
-                    "{}one run of it misses the {channel} by {rms} rms, {} times its noise",
-                    if ratio > SEEN && all_met { ", but " } else { "; " },
-                    format_digits(ratio, 2)
+                    "{joint} one run of it misses the {channel} by {rms} rms, {times} times its noise"
                 );
-                (words, if ratio > SEEN { Some(false) } else { (!all_met).then_some(false) })
+                (words, (ratio > SEEN || !all_met).then_some(false))
             }
         }
         None => (String::new(), Some(all_met)),
     };
     let words = format!("The model meets {count}{followed}.");
-    Statement { statement: Sentence::new(words), details: missed_target_sentences(report), good }
+    Statement::with_details(words, missed_target_sentences(report), good)
 }
 
 fn published_headline(report: &Report) -> Statement {
     let (all_met, count) = count_met_targets(report);
-    let (open, good) = describe_undetermined(report, all_met);
-    let words =
-        format!("The model meets {count} from publications or assumptions{open}. No recording was compared.");
-    Statement { statement: Sentence::new(words), details: missed_target_sentences(report), good }
-}
-
-/// What is said of targets that are met and leave parameters open, and whether that is good.
-fn describe_undetermined(report: &Report, all_met: bool) -> (String, Option<bool>) {
     let open = report.parameters.iter().filter(|p| !p.is_identified()).count();
     let all = report.parameters.len();
-    match (all_met, open) {
+    let (open, good) = match (all_met, open) {
         (true, 0) => (String::new(), Some(true)),
         (true, open) => (format!(", which leave {open} of {all} {} open", pluralise("parameter", all)), None),
         (false, _) => (String::new(), Some(false)),
-    }
+    };
+    let words =
+        format!("The model meets {count} from publications or assumptions{open}. No recording was compared.");
+    Statement::with_details(words, missed_target_sentences(report), good)
 }
 
 fn certainty_sentence(report: &Report) -> Sentence {
     let all = report.parameters.len();
     let (known, open): (Vec<_>, Vec<_>) = report.parameters.iter().partition(|p| p.is_identified());
-    let words = |list: &[&ParameterLine]| {
-        let name = |p: &&ParameterLine| {
-            parameters::find_parameter(&p.name).map_or_else(|| p.name.clone(), |row| row.symbol.to_owned())
-        };
-        join_with_and(&list.iter().map(name).collect::<Vec<_>>())
+    let name = |p: &&ParameterLine| {
+        parameters::find_parameter(&p.name).map_or_else(|| p.name.clone(), |row| row.symbol.to_owned())
     };
+    let open_names = join_with_and(&open.iter().map(name).collect::<Vec<_>>());
     if all == 0 {
         return Sentence::new("No parameter was fitted.");
     }
@@ -289,10 +271,10 @@ fn certainty_sentence(report: &Report) -> Sentence {
     let known_words = match (known.len(), all) {
         (1, 1) => "The data determine the one parameter that was fitted.".to_owned(),
         (n, all) if n == all => format!("The data determine all {all} fitted parameters."),
-        (0, 1) => format!("The data do not determine {}: {why}.", words(&open)),
-        (0, _) => format!("The data determine none of {} alone: {why}.", words(&open)),
+        (0, 1) => format!("The data do not determine {open_names}: {why}."),
+        (0, _) => format!("The data determine none of {open_names} alone: {why}."),
         (n, all) => {
-            format!("The data determine {n} of {all} fitted parameters, and not {}: {why}.", words(&open))
+            format!("The data determine {n} of {all} fitted parameters, and not {open_names}: {why}.")
         }
     };
     let constants = if report.nuisances.iter().any(|n| n.recording.is_none()) {
@@ -373,15 +355,13 @@ fn describe_unexplained(report: &Report, misfit: &TraceMisfit) -> Sentence {
     let worst = misfit.channels.iter().flat_map(|c| c.worst.iter().map(move |w| (c, w)));
     let worst = worst.max_by(|(_, a): &(_, &WorstSegment), (_, b)| a.chi2_per_dof.total_cmp(&b.chi2_per_dof));
     match worst.filter(|_| misfit.stages.last().is_some_and(|stage| stage.bad_segments > 0)) {
-        Some((c, w)) => Sentence::new(format!(
-            "Look at {} to {} s of ",
-            crate::text::format_decimals(w.start_s, 4),
-            crate::text::format_decimals(w.end_s, 4)
-        ))
-        .with_name(&c.recording)
-        .with_words(
-            ", where it fits worst: a point that the tracker lost, or a motion that the model does not have?",
-        ),
+        Some((c, w)) => {
+            let [from, to] = [w.start_s, w.end_s].map(|s| format_decimals(s, 4));
+            let why = "a point that the tracker lost, or a motion that the model does not have?";
+            Sentence::new(format!("Look at {from} to {to} s of "))
+                .with_name(&c.recording)
+                .with_words(format!(", where it fits worst: {why}"))
+        }
         None => Sentence::new(
             "Check what the fit holds fixed \u{2013} masses, dampings, preload, the drive \u{2013} or set it \
              free within a prior (`nuisance`), and fit again.",

@@ -45,7 +45,10 @@ impl ReportVerdict {
     pub(crate) fn from_report(report: &Report) -> Self {
         let met = |list: &[Comparison]| list.iter().all(|c| c.pass);
         Self {
-            model_explains_recording: is_explained(report),
+            model_explains_recording: match &report.misfit {
+                Some(misfit) => misfit.explained,
+                None => far_from_priors(&report.nuisances).is_empty(),
+            },
             all_components_met: met(&report.components),
             all_features_met: met(&report.features),
             all_held_out_met: met(&report.held_out),
@@ -76,48 +79,35 @@ fn verdict_statements(report: &Report) -> Vec<Statement> {
         found.push(Statement { details: Vec::new(), ..summary::report_headline(report) });
     }
     found.extend(met_statement("component", "", &report.components, |_| true));
-    found.extend(met_statement(
-        "feature",
-        " within 1.96 standard deviations of the target",
-        &report.features,
-        |c| !c.pass,
-    ));
+    let how = " within 1.96 standard deviations of the target";
+    found.extend(met_statement("feature", how, &report.features, |c| !c.pass));
     found.extend(met_statement("value that was held out of the fit", "", &report.held_out, |_| true));
     if found.is_empty() {
-        found.push(Statement::new(Sentence::new("Nothing was compared.")));
+        found.push(Statement::new("Nothing was compared."));
     }
     let (known, open): (Vec<_>, Vec<_>) = report.parameters.iter().partition(|p| p.is_identified());
     let all = report.parameters.len();
+    let noun = pluralise("parameter", all);
+    let sentences = |list: &[&ParameterLine]| list.iter().map(|p| parameter_sentence(p)).collect();
     if !known.is_empty() {
-        found.push(parameter_statement(
-            format!("The data determine {} of {all} {}", known.len(), pluralise("parameter", all)),
-            &known,
-            open.is_empty().then_some(true),
-        ));
+        let words = format!("The data determine {} of {all} {noun}", known.len());
+        found.push(Statement::with_details(words, sentences(&known), open.is_empty().then_some(true)));
     }
     if !open.is_empty() {
-        found.push(parameter_statement(
-            format!(
-                "{} of {all} {} not determined",
-                open.len(),
-                noun_with_verb("parameter", open.len(), all)
-            ),
-            &open,
-            Some(false),
-        ));
+        let verb = if open.len() == 1 { "is" } else { "are" };
+        let words = format!("{} of {all} {noun} {verb} not determined", open.len());
+        found.push(Statement::with_details(words, sentences(&open), Some(false)));
     }
     found.extend(truth_statement(&report.parameters));
-    let details = report.advice.iter().map(|advice| Sentence::new(make_printable(advice)));
-    found.extend((!report.advice.is_empty()).then(|| Statement {
-        statement: Sentence::new("What to measure in addition"),
-        details: details.collect(),
-        good: None,
-    }));
+    if !report.advice.is_empty() {
+        let details = report.advice.iter().map(|advice| Sentence::new(make_printable(advice))).collect();
+        found.push(Statement::with_details("What to measure in addition", details, None));
+    }
     if report.recordings.is_empty() {
-        found.push(Statement::new(Sentence::new(
+        found.push(Statement::new(
             "Only published numbers were fitted, and those that the job assumes. There are no measured \
              traces, so the figures show the model alone.",
-        )));
+        ));
     }
     found.extend(ending_statements(report));
     // what does not fit is said before what does
@@ -125,49 +115,29 @@ fn verdict_statements(report: &Report) -> Vec<Statement> {
     found
 }
 
-fn is_explained(report: &Report) -> bool {
-    match &report.misfit {
-        Some(misfit) => misfit.explained,
-        None => far_from_priors(&report.nuisances).is_empty(),
-    }
-}
-
 /// Features that need a camera which is far from its prior.
 fn far_camera_statement(report: &Report) -> Option<Statement> {
     let reasons = far_from_priors(&report.nuisances);
-    let statement = || Statement::new(Sentence::new(unexplained_headline(&reasons))).with_verdict(false);
-    (report.misfit.is_none() && !reasons.is_empty()).then(statement)
+    let is_far = report.misfit.is_none() && !reasons.is_empty();
+    is_far.then(|| Statement::new(unexplained_headline(&reasons)).with_verdict(false))
 }
 
 /// Whether the model explains the traces, with the residuals of every channel.
 fn misfit_statement(misfit: &TraceMisfit) -> Statement {
-    Statement {
-        statement: Sentence::new(misfit.headline()),
-        details: misfit.channels.iter().map(residual_sentence).collect(),
-        good: Some(misfit.explained),
-    }
+    let details = misfit.channels.iter().map(residual_sentence).collect();
+    Statement::with_details(misfit.headline(), details, Some(misfit.explained))
 }
 
 /// Residuals of a channel against its noise, and where it fits worst.
 fn residual_sentence(c: &ChannelMisfit) -> Sentence {
-    let um = |metres: f64| format_number(1e6 * metres);
     let worst = c.worst.first().map_or_else(String::new, |w| {
-        let (from, to, chi2) =
-            (format_number(w.start_s), format_number(w.end_s), format_number(w.chi2_per_dof));
+        let [from, to, chi2] = [w.start_s, w.end_s, w.chi2_per_dof].map(format_number);
         format!("; worst from {from} s to {to} s, with {chi2} times the variance of the noise")
     });
-    let words = format!(
-        ", {}: residuals of {} \u{b5}m rms, noise of {} \u{b5}m{worst}",
-        c.channel,
-        um(c.residual_rms_m),
-        um(c.noise_m)
-    );
+    let [residual, noise] = [c.residual_rms_m, c.noise_m].map(|metres| format_number(1e6 * metres));
+    let words =
+        format!(", {}: residuals of {residual} \u{b5}m rms, noise of {noise} \u{b5}m{worst}", c.channel);
     Sentence::default().with_name(&c.recording).with_words(words)
-}
-
-/// "parameters are", "parameter is".
-fn noun_with_verb(noun: &str, count: usize, of: usize) -> String {
-    format!("{} {}", pluralise(noun, of), if count == 1 { "is" } else { "are" })
 }
 
 /// What is counted, and the same of several.
@@ -182,18 +152,12 @@ fn met_statement(
     listed: impl Fn(&&Comparison) -> bool,
 ) -> Option<Statement> {
     let (count, total) = (list.iter().filter(|c| c.pass).count(), list.len());
-    let noun = if total == 1 {
-        noun.to_owned()
-    } else {
-        NOUNS.iter().fold(noun.to_owned(), |noun, [one, many]| noun.replacen(one, many, 1))
-    };
+    let plural = || NOUNS.iter().fold(noun.to_owned(), |noun, [one, many]| noun.replacen(one, many, 1));
+    let noun = if total == 1 { noun.to_owned() } else { plural() };
     let verb = if count == 1 { "is" } else { "are" };
-    let statement = Sentence::new(format!("{count} of {total} {noun} {verb} met{how}"));
-    (total > 0).then(|| Statement {
-        statement,
-        details: list.iter().filter(listed).map(comparison_sentence).collect(),
-        good: Some(count == total),
-    })
+    let words = format!("{count} of {total} {noun} {verb} met{how}");
+    let details = list.iter().filter(listed).map(comparison_sentence).collect();
+    (total > 0).then(|| Statement::with_details(words, details, Some(count == total)))
 }
 
 /// Name, model, target with its deviation, error and tolerance.
@@ -202,36 +166,23 @@ pub(super) fn comparison_sentence(c: &Comparison) -> Sentence {
     let unit = if unit.is_empty() { unit } else { format!(" {unit}") };
     let target = format!("{}{unit}", format_with_sd(c.target * factor, c.target_sd.map(|sd| sd * factor)));
     let given = if c.given { " as given in the job" } else { "" };
-    let named = match &c.condition {
-        Some(condition) => {
-            Sentence::default().with_name(&c.name).with_words(" (").with_name(condition).with_words(")")
-        }
-        None => Sentence::default().with_name(&c.name),
-    };
+    let mut named = Sentence::default().with_name(&c.name);
+    if let Some(condition) = &c.condition {
+        named = named.with_words(" (").with_name(condition).with_words(")");
+    }
     let Some(model) = c.model else {
         let why = c.missing.as_ref().map_or_else(String::new, |why| format!(" ({why})"));
         return named.with_words(format!(" does not appear in the model{why}; target {target}{given}"));
     };
-    let error = c
-        .relative_error
-        .map_or_else(String::new, |error| format!(", off by {}", format_signed_percent(error)));
+    let off = |error| format!(", off by {}", format_signed_percent(error));
+    let error = c.relative_error.map_or_else(String::new, off);
     let within = if c.pass { "within" } else { "beyond" };
     let tolerance = match c.tolerance_relative {
         Some(tolerance) => format!(", {within} the tolerance of {}", format_percent(tolerance)),
         None => format!(", {within} the 95 % interval of the target"),
     };
-    named.with_words(format!(
-        ": model {}{unit}, target {target}{given}{error}{tolerance}",
-        format_number(model * factor)
-    ))
-}
-
-fn parameter_statement(statement: String, list: &[&ParameterLine], good: Option<bool>) -> Statement {
-    Statement {
-        statement: Sentence::new(statement),
-        details: list.iter().map(|p| parameter_sentence(p)).collect(),
-        good,
-    }
+    let model = format_number(model * factor);
+    named.with_words(format!(": model {model}{unit}, target {target}{given}{error}{tolerance}"))
 }
 
 fn parameter_sentence(p: &ParameterLine) -> Sentence {
@@ -246,9 +197,8 @@ fn parameter_sentence(p: &ParameterLine) -> Sentence {
         true => format!("equally good fits lie {at}{range}"),
         false => format!("95 % interval {range}"),
     };
-    Sentence::default()
-        .with_name(&p.name)
-        .with_words(format!(" = {}{unit}, {range}{why}", number(p.estimate)))
+    let words = format!(" = {}{unit}, {range}{why}", number(p.estimate));
+    Sentence::default().with_name(&p.name).with_words(words)
 }
 
 /// How many intervals hold the truth behind synthetic data.
@@ -258,27 +208,24 @@ fn truth_statement(parameters: &[ParameterLine]) -> Option<Statement> {
     if known.is_empty() {
         let all = "No 95 % interval has an end, so none can be compared with the values behind the synthetic \
                    data";
-        return (!open.is_empty()).then(|| Statement::new(Sentence::new(all)));
+        return (!open.is_empty()).then(|| Statement::new(all));
     }
     let inside = known.iter().filter(|(_, truth)| truth.inside_95).count();
     let without_end = match open.len() {
         0 => String::new(),
         n => format!("; {n} {} no end", if n == 1 { "more has" } else { "more have" }),
     };
-    let statement = Sentence::new(format!(
-        "The value behind the synthetic data lies inside the 95 % interval of {inside} of {} {}{without_end}",
-        known.len(),
-        pluralise("parameter", known.len())
-    ));
+    let (all, noun) = (known.len(), pluralise("parameter", known.len()));
+    let words = format!(
+        "The value behind the synthetic data lies inside the 95 % interval of {inside} of {all} {noun}{without_end}"
+    );
     let outside = known.iter().filter(|(_, truth)| !truth.inside_95);
     let detail = |(p, truth): &(&ParameterLine, Truth)| {
-        Sentence::default().with_name(&p.name).with_words(format!(
-            " is {} in truth, outside {}",
-            format_number(truth.value),
-            format_interval(p.lower_95, p.upper_95, format_number)
-        ))
+        let interval = format_interval(p.lower_95, p.upper_95, format_number);
+        let words = format!(" is {} in truth, outside {interval}", format_number(truth.value));
+        Sentence::default().with_name(&p.name).with_words(words)
     };
-    Some(Statement { statement, details: outside.map(detail).collect(), good: Some(inside == known.len()) })
+    Some(Statement::with_details(words, outside.map(detail).collect(), Some(inside == all)))
 }
 
 /// How search and best run ended.
@@ -293,54 +240,37 @@ fn ending_statements(report: &Report) -> Vec<Statement> {
         };
         let failed: usize = search.failed.iter().map(|f| f.count).sum();
         let failed = if failed == 0 { "none failed".to_owned() } else { format!("{failed} failed") };
-        let made = search.evaluations;
+        let (made, starts) = (search.evaluations, search.local_searches);
+        let [evaluations, iterates] = ["evaluation", "iterate"].map(|noun| pluralise(noun, made));
         let words = match report.misfit {
-            None => {
-                format!(
-                    "{how}, after {made} {} of the model, of which {failed}.",
-                    pluralise("evaluation", made)
-                )
-            }
-            Some(_) => {
-                let starts = search.local_searches;
-                format!("{how}, after {made} {} from {starts} starts.", pluralise("iterate", made))
-            }
+            None => format!("{how}, after {made} {evaluations} of the model, of which {failed}."),
+            Some(_) => format!("{how}, after {made} {iterates} from {starts} starts."),
         };
-        found.push(Statement::new(Sentence::new(words)).with_verdict(search.converged));
+        found.push(Statement::new(words).with_verdict(search.converged));
     }
-    found.extend(
-        report.runs.iter().filter(|run| run.status == RunStatus::Completed).filter_map(hard_event_statement),
-    );
+    let (completed, early): (Vec<&RunSummary>, Vec<_>) =
+        report.runs.iter().partition(|run| run.status == RunStatus::Completed);
+    found.extend(completed.into_iter().filter_map(hard_event_statement));
+    let about = |before: &str, run: &RunSummary, words: String| {
+        Statement::new(Sentence::new(before).with_name(&run.name).with_words(words)).with_verdict(false)
+    };
     for run in report.runs.iter().filter(|run| run.opposite_turn) {
-        let words = format!(": {}{}.", OPPOSED[..1].to_lowercase(), &OPPOSED[1..]);
-        found.push(
-            Statement::new(Sentence::new("In ").with_name(&run.name).with_words(words)).with_verdict(false),
-        );
+        found.push(about("In ", run, format!(": {}{}.", OPPOSED[..1].to_lowercase(), &OPPOSED[1..])));
     }
-    for run in report.runs.iter().filter(|run| run.status != RunStatus::Completed) {
-        let ended = format!(
-            " ended early, at {} s as {}: {}.",
-            format_number(run.stopped_at_s),
-            run.status.name(),
-            run.status.meaning()
-        );
-        found.push(
-            Statement::new(Sentence::new("The best model's run in ").with_name(&run.name).with_words(ended))
-                .with_verdict(false),
-        );
+    for run in early {
+        let (at, status) = (format_number(run.stopped_at_s), run.status);
+        let words = format!(" ended early, at {at} s as {}: {}.", status.name(), status.meaning());
+        found.push(about("The best model's run in ", run, words));
     }
     found
 }
 
 /// What a run went through and went on; nothing where the tip stays on the glass.
 fn hard_event_statement(run: &RunSummary) -> Option<Statement> {
-    let times = |count: usize, what: &str| {
-        (count > 0).then(|| format!("{what} {count} {}", pluralise("time", count)))
-    };
-    let events: Vec<String> = [times(run.contact_losses, "leaves the glass"), times(run.jams, "jams")]
-        .into_iter()
-        .flatten()
-        .collect();
+    let counts = [(run.contact_losses, "leaves the glass"), (run.jams, "jams")];
+    let happened = counts.into_iter().filter(|(count, _)| *count > 0);
+    let events: Vec<String> =
+        happened.map(|(count, what)| format!("{what} {count} {}", pluralise("time", count))).collect();
     let words = format!(" the best model's tip {}.", events.join(" and "));
     (!events.is_empty()).then(|| Statement::new(Sentence::new("In ").with_name(&run.name).with_words(words)))
 }

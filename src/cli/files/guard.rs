@@ -99,12 +99,8 @@ impl OutputGuard {
         let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
         let linked = path.ancestors().take_while(|path| *path != self.folder).any(Path::is_symlink);
         let is_file = fs::symlink_metadata(&path).is_ok_and(|found| found.is_file());
-        inside
-            && !linked
-            && is_file
-            && hash_file(&path).is_ok_and(|found| {
-                found.is_some_and(|found| self.marker.maker_if_unchanged(name, &found).is_some())
-            })
+        let is_own = |found: String| self.marker.maker_if_unchanged(name, &found).is_some();
+        inside && !linked && is_file && hash_file(&path).is_ok_and(|found| found.is_some_and(is_own))
     }
 
     /// A measured recording stays, whatever is asked for; an import of the same exports loses nothing of it.

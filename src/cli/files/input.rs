@@ -78,15 +78,13 @@ impl ReadLimit {
     fn check_open_file(self, path: &Path, file: &File) -> Outcome<()> {
         let found = file.metadata().map_err(|error| read_failure(path, &error))?;
         check_regular_file(path, &found)?;
-        if found.len() > self.largest.0 {
-            return Err(self.too_large_failure(path, &format!("{} bytes", found.len())));
-        }
-        Ok(())
+        let is_small = found.len() <= self.largest.0;
+        is_small.then_some(()).ok_or_else(|| self.too_large_failure(path, &format!("{} bytes", found.len())))
     }
 
     fn too_large_failure(self, path: &Path, found: &str) -> Failure {
         let Self { largest, advice } = self;
-        input_failure(path, &format!("found {found}, expected at most {largest}; {advice}"))
+        Failure::at(path.display(), format!("found {found}, expected at most {largest}; {advice}"))
     }
 }
 
@@ -158,14 +156,14 @@ fn read_at_most(from: impl Read, largest: FileSize) -> io::Result<Option<Vec<u8>
 
 /// Only a regular file has an end and gives the same twice.
 fn check_regular_file(path: &Path, found: &Metadata) -> Outcome<()> {
-    match found.file_type() {
-        kind if kind.is_file() => Ok(()),
-        kind if kind.is_dir() => Err(input_failure(path, "a folder, expected a file")),
-        _ => Err(input_failure(
-            path,
-            "a pipe, a socket or a device, expected a file; write what it gives into a file, or give it on standard input and name that `-`",
-        )),
-    }
+    let problem = match found.file_type() {
+        kind if kind.is_file() => return Ok(()),
+        kind if kind.is_dir() => "a folder, expected a file",
+        _ => {
+            "a pipe, a socket or a device, expected a file; write what it gives into a file, or give it on standard input and name that `-`"
+        }
+    };
+    Err(Failure::at(path.display(), problem))
 }
 
 fn read_failure(path: &Path, error: &io::Error) -> Failure {
@@ -174,12 +172,8 @@ fn read_failure(path: &Path, error: &io::Error) -> Failure {
         ErrorKind::PermissionDenied => "not readable; check its permissions",
         ErrorKind::IsADirectory => "a folder, expected a file",
         ErrorKind::NotADirectory => "no such file, as a part of its path is a file; check the path",
-        _ => return input_failure(path, &error.to_string()),
+        _ => return Failure::at(path.display(), error),
     };
-    input_failure(path, problem)
-}
-
-fn input_failure(path: &Path, problem: &str) -> Failure {
     Failure::at(path.display(), problem)
 }
 

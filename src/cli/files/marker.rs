@@ -1,13 +1,12 @@
 //! The marker of an output folder: which command made which file, and what was in it.
 
-use super::CsvDialect;
 use crate::cli::failure::{Failure, Outcome};
 use crate::text::TextHash;
-use clap::Args;
+use clap::{Args, ValueEnum};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 /// Name of the marker in a folder.
@@ -59,7 +58,7 @@ impl FolderMarker {
         }
         let bytes = read_small_file(&path);
         let parsed =
-            bytes.and_then(|bytes| serde_json::from_slice::<Self>(&bytes).map_err(|error| error.to_string()));
+            bytes.and_then(|bytes| serde_json::from_slice::<Self>(&bytes).map_err(|e| e.to_string()));
         let known = parsed.and_then(|marker| match marker.format {
             MARKER_FORMAT => Ok(marker),
             other => Err(format!("found format {other}, expected {MARKER_FORMAT}")),
@@ -68,12 +67,6 @@ impl FolderMarker {
             Ok(marker) => (marker, None),
             Err(why) => (Self::default(), Some(format!("{} cannot be read: {why}", path.display()))),
         })
-    }
-
-    pub(crate) fn to_bytes(&self) -> Outcome<Vec<u8>> {
-        let mut text = serde_json::to_vec_pretty(self).map_err(Failure::internal)?;
-        text.push(b'\n');
-        Ok(text)
     }
 
     /// Whether a file is, unchanged, what a command made; its maker.
@@ -102,22 +95,18 @@ pub(crate) fn hash_file(path: &Path) -> Outcome<Option<String>> {
     }
     let mut hashing = HashingReader::new(File::open(path).map_err(refused)?);
     io::copy(&mut hashing, &mut io::sink()).map_err(refused)?;
-    Ok(Some(hashing.finish()))
+    Ok(Some(hashing.hash.finish()))
 }
 
 /// A reader that hashes what passes through it.
 pub(crate) struct HashingReader<R> {
     from: R,
-    hash: TextHash,
+    pub hash: TextHash,
 }
 
 impl<R: Read> HashingReader<R> {
     pub(crate) fn new(from: R) -> Self {
         Self { from, hash: TextHash::default() }
-    }
-
-    pub(crate) fn finish(self) -> String {
-        self.hash.finish()
     }
 }
 
@@ -152,23 +141,9 @@ pub(crate) enum OutputCommand {
 }
 
 impl OutputCommand {
-    pub(crate) fn command_name(self) -> &'static str {
-        match self {
-            Self::Accuracy => "accuracy",
-            Self::Blade => "blade",
-            Self::Demo => "demo",
-            Self::Figures => "figures",
-            Self::Fit => "fit",
-            Self::Import => "import",
-            Self::Init => "init",
-            Self::Man => "man",
-            Self::Report => "report",
-            Self::Simulate => "simulate",
-            Self::Spectrum => "spectrum",
-            Self::Submit => "submit",
-            Self::Sweep => "sweep",
-            Self::Twin => "twin",
-        }
+    /// Its name on the command line, the same as in the marker.
+    pub(crate) fn command_name(self) -> String {
+        format!("{self:?}").to_lowercase()
     }
 
     /// Whether what it makes is a recording, of which a folder holds one.
@@ -217,5 +192,43 @@ pub(crate) struct WritePolicy {
 impl WritePolicy {
     pub(crate) fn new(maker: OutputCommand, overwrite: Overwrite) -> Self {
         Self { maker, force: overwrite.force, exports: Vec::new(), csv: CsvDialect::Plain }
+    }
+}
+
+// Tables as a spreadsheet opens them.
+
+/// How tables are written for those who open them with a double click.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
+pub(crate) enum CsvDialect {
+    /// Commas between cells, decimal points (RFC 4180 with line feeds): what every program reads
+    #[default]
+    Plain,
+    /// Excel where a comma is decimal, as in Germany: semicolons between cells, decimal commas
+    ExcelDe,
+    /// Excel where a point is decimal, as in the US
+    ExcelUs,
+}
+
+/// What tells Excel that a file is UTF-8.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+impl CsvDialect {
+    /// A table in this dialect. Cells that are numbers get its decimal mark, all others stay as they are.
+    pub(crate) fn convert_table(self, plain: impl Read, mut to: impl Write) -> io::Result<()> {
+        to.write_all(BYTE_ORDER_MARK)?;
+        let decimal_comma = self == Self::ExcelDe;
+        let mut table = csv::ReaderBuilder::new().has_headers(false).flexible(true).from_reader(plain);
+        let mut writer = csv::WriterBuilder::new();
+        writer.delimiter(if decimal_comma { b';' } else { b',' }).flexible(true);
+        let mut writer = writer.terminator(csv::Terminator::CRLF).from_writer(to);
+        for row in table.records() {
+            let row = row?;
+            let cells = row.iter().map(|cell| {
+                let decimal = decimal_comma && cell.contains('.') && cell.parse::<f64>().is_ok();
+                if decimal { cell.replace('.', ",") } else { cell.to_owned() }
+            });
+            writer.write_record(cells)?;
+        }
+        writer.flush()
     }
 }

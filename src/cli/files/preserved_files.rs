@@ -45,16 +45,14 @@ impl FolderRecording {
         Ok(match listed {
             Some(made) if made.matches_hash(&trace) && made.by != OutputCommand::Import => Self::Synthetic,
             None if is_simulation_summary(&folder.join(SIMULATION_SUMMARY)) => Self::Synthetic,
-            Some(made) if made.by != OutputCommand::Import => Self::new_measured(
-                marker,
-                format!("was changed since `wiperlab {}` wrote it", made.by.command_name()),
-                None,
-            ),
-            _ => Self::new_measured(
-                marker,
-                "has nothing next to it that says where it comes from".to_owned(),
-                None,
-            ),
+            Some(made) if made.by != OutputCommand::Import => {
+                let why = format!("was changed since `wiperlab {}` wrote it", made.by.command_name());
+                Self::new_measured(marker, why, None)
+            }
+            _ => {
+                let why = "has nothing next to it that says where it comes from";
+                Self::new_measured(marker, why.to_owned(), None)
+            }
         })
     }
 
@@ -72,33 +70,22 @@ impl FolderRecording {
     }
 }
 
-/// Of a folder with a description.
+/// The recording of a folder with a description; `trace` is the hash of its trace.
 fn from_description(folder: &Path, marker: &FolderMarker, trace: Option<&str>) -> FolderRecording {
-    let path = folder.join(DESCRIPTION_FILE);
-    let text =
-        read_small_file(&path).and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string()));
+    let bytes = read_small_file(&folder.join(DESCRIPTION_FILE));
+    let text = bytes.and_then(|bytes| String::from_utf8(bytes).map_err(|error| error.to_string()));
     let parsed = text.and_then(|text| {
-        RecordingFile::parse(DESCRIPTION_FILE, text.trim_start_matches('\u{feff}'))
-            .map_err(|error| error.to_string())
+        let text = text.trim_start_matches('\u{feff}');
+        RecordingFile::parse(DESCRIPTION_FILE, text).map_err(|error| error.to_string())
     });
-    match parsed {
-        Err(why) => FolderRecording::new_measured(
-            marker,
-            format!("has a {DESCRIPTION_FILE} that cannot be read ({why})"),
-            None,
-        ),
-        Ok(file) if !file.synthetic => FolderRecording::new_measured(
-            marker,
-            format!("is measured, as its {DESCRIPTION_FILE} says"),
-            Some(&file),
-        ),
-        Ok(file) if trace.zip(file.trace_sha256.as_deref()).is_some_and(|(found, said)| found != said) => {
-            FolderRecording::new_measured(
-                marker,
-                format!("is not the one that its {DESCRIPTION_FILE} describes"),
-                Some(&file),
-            )
-        }
-        Ok(_) => FolderRecording::Synthetic,
-    }
+    let is_other = |file: &RecordingFile| {
+        trace.zip(file.trace_sha256.as_deref()).is_some_and(|(found, said)| found != said)
+    };
+    let why = match &parsed {
+        Err(why) => format!("has a {DESCRIPTION_FILE} that cannot be read ({why})"),
+        Ok(file) if !file.synthetic => format!("is measured, as its {DESCRIPTION_FILE} says"),
+        Ok(file) if is_other(file) => format!("is not the one that its {DESCRIPTION_FILE} describes"),
+        Ok(_) => return FolderRecording::Synthetic,
+    };
+    FolderRecording::new_measured(marker, why, parsed.ok().as_ref())
 }

@@ -7,8 +7,8 @@
 //! after a loss of power, and the next run of the command can prove what it finds.
 
 use super::guard::{OutputGuard, refuse_measured};
-use super::marker::{FolderMarker, HashingReader, MARKER_FILE, MarkedFile, WritePolicy};
-use super::{CsvDialect, write_failure};
+use super::marker::{CsvDialect, FolderMarker, HashingReader, MARKER_FILE, MarkedFile, WritePolicy};
+use super::write_failure;
 use crate::cli::failure::{Failure, Outcome};
 use crate::cli::interrupt;
 use crate::recording::files::TRACE_FILE;
@@ -69,10 +69,11 @@ impl OutputStaging {
         let path = self.folder.join(name);
         self.made.create(path.parent().unwrap_or(Path::new("")))?;
         let dialect = self.guard.as_ref().map_or(CsvDialect::Plain, |(_, writer)| writer.csv);
-        let is_table = name.ends_with(".csv") && name != TRACE_FILE;
-        let staged = match is_table && dialect.needs_conversion() {
-            true => write_temporary_table(&path, contents, dialect),
-            false => write_temporary(&path, contents),
+        let is_converted = name.ends_with(".csv") && name != TRACE_FILE && dialect != CsvDialect::Plain;
+        let staged = if is_converted {
+            write_temporary_table(&path, contents, dialect)
+        } else {
+            write_temporary(&path, contents)
         };
         let (file, sha256) = staged.map_err(|error| write_failure(&path, &error))?;
         self.files.push(StagedFile { name: name.to_owned(), path, file, sha256: sha256.clone() });
@@ -169,10 +170,10 @@ impl<'a> MarkerUpdate<'a> {
 
     fn write_marker(&self, marker: &FolderMarker) -> Outcome<()> {
         let path = self.folder.join(MARKER_FILE);
-        let written = write_temporary(&path, marker.to_bytes()?.as_slice()).and_then(|(file, _)| {
+        let text = serde_json::to_string_pretty(marker).map_err(Failure::internal)? + "\n";
+        let written = write_temporary(&path, text.as_bytes()).and_then(|(file, _)| {
             file.as_file().sync_all()?;
-            file.persist(&path)?;
-            Ok(())
+            file.persist(&path).map_err(io::Error::from)
         });
         written.map_err(|error| write_failure(&path, &error))?;
         sync_folders(&BTreeSet::from([self.folder.to_owned()]))
@@ -202,9 +203,10 @@ struct CreatedFolders(Vec<PathBuf>);
 impl CreatedFolders {
     /// Makes a folder and what is missing of the way to it; the outermost is kept first.
     fn create(&mut self, folder: &Path) -> Outcome<()> {
-        let missing: Vec<&Path> =
-            folder.ancestors().take_while(|path| !path.as_os_str().is_empty() && !path.exists()).collect();
-        let missing: Vec<PathBuf> = missing.into_iter().rev().map(Path::to_owned).collect();
+        let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
+        let mut missing: Vec<PathBuf> =
+            folder.ancestors().take_while(is_missing).map(Path::to_owned).collect();
+        missing.reverse();
         self.0.extend_from_slice(&missing);
         interrupt::track_new_folders(missing, || fs::create_dir_all(folder))
             .map_err(|error| write_failure(folder, &error))
@@ -231,19 +233,19 @@ impl Drop for CreatedFolders {
 pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
     let taken = |at: &Path, found: &str, expected: &str| {
         let at = at.display();
-        Err(Failure::Input(format!(
-            "{at}: is {found}, expected {expected} or nothing; remove it or choose another folder"
-        )))
+        let problem =
+            format!("is {found}, expected {expected} or nothing; remove it or choose another folder");
+        Err(Failure::at(at, problem))
     };
     let found = fs::symlink_metadata(path);
     match path.parent() {
         _ if path.is_dir() => taken(path, "a folder", "a file"),
         Some(within) if within.exists() && !within.is_dir() => taken(within, "a file", "a folder"),
         // (a name that is too long, for instance)
-        _ => found
-            .err()
-            .filter(|error| error.kind() != ErrorKind::NotFound)
-            .map_or(Ok(()), |error| Err(write_failure(path, &error))),
+        _ => match found {
+            Err(error) if error.kind() != ErrorKind::NotFound => Err(write_failure(path, &error)),
+            _ => Ok(()),
+        },
     }
 }
 
@@ -256,7 +258,7 @@ fn write_temporary(path: &Path, contents: impl Read) -> io::Result<(NamedTempFil
     let _ = file.as_file().try_lock();
     let mut contents = HashingReader::new(contents);
     io::copy(&mut contents, file.as_file_mut())?;
-    Ok((file, contents.finish()))
+    Ok((file, contents.hash.finish()))
 }
 
 /// The same for a table in another dialect.

@@ -24,11 +24,10 @@ impl BatchJobState {
         let name = path.display().to_string();
         let text = path.exists().then(|| files::read_json(&path).ok()).flatten();
         let result = text.and_then(|text| FitResult::parse(&name, &text).ok());
+        let (fingerprint, version) = (problem.problem.fingerprint(), env!("CARGO_PKG_VERSION"));
         let done = result.filter(|result| {
             let of = (result.fingerprint.as_str(), result.version.as_str(), result.seed);
-            let expected =
-                (problem.problem.fingerprint(), env!("CARGO_PKG_VERSION"), problem.job().search.seed);
-            result.status == FitStatus::Converged && of == expected
+            result.status == FitStatus::Converged && of == (fingerprint, version, problem.job().search.seed)
         });
         let ended = |result: FitResult| CommandOutcome::done_if(result.explains_recordings());
         done.map_or(Self::Due, |result| Self::Done(ended(result)))
@@ -40,6 +39,7 @@ impl BatchJobState {
             Self::Done(CommandOutcome::StoppedEarly) => {
                 "converged, and the model does not explain the recording"
             }
+
             Self::Due => "no result of this job and version, or the search has not converged",
         }
     }
@@ -72,9 +72,9 @@ impl FitArgs {
     pub(crate) fn run_batch(&self, global: &GlobalArgs) -> Outcome {
         check_distinct_folders(&self.jobs)?;
         let (mut refused, mut early) = (None, Vec::new());
-        let mine =
-            self.jobs.iter().enumerate().filter(|(at, _)| self.shard.is_none_or(|of| of.contains(*at)));
-        let mine: Vec<&PathBuf> = mine.map(|(_, job)| job).collect();
+        let is_mine = |at: usize| self.shard.is_none_or(|of| of.contains(at));
+        let mine: Vec<&PathBuf> =
+            (0..self.jobs.len()).filter(|at| is_mine(*at)).map(|at| &self.jobs[at]).collect();
         for (at, job) in mine.iter().enumerate() {
             if interrupt::control_flow().is_break() {
                 let left = mine.len() - at;
@@ -98,11 +98,10 @@ impl FitArgs {
         }
         match refused {
             Some(Failure::Input(_)) => {
-                Err(Failure::Input("not every job of the list could be fitted, see above".to_owned()))
+                Err(Failure::input("not every job of the list could be fitted, see above"))
             }
             Some(internal) => Err(internal),
-            None if early.is_empty() => Ok(CommandOutcome::Done),
-            None => Ok(CommandOutcome::StoppedEarly),
+            None => Ok(CommandOutcome::done_if(early.is_empty())),
         }
     }
 

@@ -6,7 +6,7 @@ use crate::cli::prelude::*;
 use crate::compare::{COMPARISON_FILE, FittedRecording, ModelRun, comparison_table, run_conditions};
 use crate::draft::{FittedScene, write_fitted_scene};
 use crate::fit::job::HeadSource;
-use crate::fit::result::{FitResult, FitStatus, NuisanceResult};
+use crate::fit::result::{FitResult, FitStatus};
 
 /// The parameters in a row.
 const PARAMETERS_FILE: &str = "parameters.csv";
@@ -14,19 +14,12 @@ const PARAMETERS_FILE: &str = "parameters.csv";
 impl LoadedJob {
     /// Refuses a folder in which the files of this fit have no place.
     pub(crate) fn check_outputs(&self, writer: &WritePolicy) -> Outcome<()> {
-        let names = self.output_names();
+        let scenes = (0..self.job().conditions.len()).map(|at| self.scene_file_name(at));
+        let names = [files::RESULT_FILE, PARAMETERS_FILE, COMPARISON_FILE].map(str::to_owned);
+        let names: Vec<String> = names.into_iter().chain(scenes).collect();
         let names: Vec<&str> = names.iter().map(String::as_str).collect();
         OutputFolder::check(&self.folder, writer, &names)?;
         (0..self.job().conditions.len()).try_for_each(|at| self.driver_path(at).map(|_| ()))
-    }
-
-    fn output_names(&self) -> Vec<String> {
-        let scenes = (0..self.job().conditions.len()).map(|at| self.scene_file_name(at));
-        [files::RESULT_FILE, PARAMETERS_FILE, COMPARISON_FILE]
-            .map(str::to_owned)
-            .into_iter()
-            .chain(scenes)
-            .collect()
     }
 
     /// Writes what was found into the folder of the job.
@@ -61,17 +54,15 @@ impl LoadedJob {
             let ends = ["", "_lower_95", "_upper_95"].map(|end| format!("{name}{end}"));
             columns.extend(ends.into_iter().zip(found.map(number)));
         };
-        let of_scene = |nuisance: &&NuisanceResult| nuisance.recording.is_none();
-        for constant in result.nuisances.iter().filter(of_scene) {
+        for constant in result.nuisances.iter().filter(|nuisance| nuisance.recording.is_none()) {
             add(&constant.name, [Some(constant.estimate), constant.lower_95, constant.upper_95]);
         }
         for (name, found) in &result.parameters {
             add(name, [Some(found.estimate), found.lower_95, found.upper_95]);
         }
-        let verdicts = result.parameters.iter();
-        columns.extend(
-            verdicts.map(|(name, found)| (format!("{name}_verdict"), found.verdict.name().to_owned())),
-        );
+        for (name, found) in &result.parameters {
+            columns.push((format!("{name}_verdict"), found.verdict.name().to_owned()));
+        }
         let (names, values): (Vec<_>, Vec<_>) = columns.into_iter().unzip();
         let mut table = csv::Writer::from_writer(Vec::new());
         table.write_record(names).map_err(Failure::internal)?;
@@ -85,25 +76,25 @@ impl LoadedJob {
         let runs = match run_conditions(self.job(), &model, result) {
             Ok(runs) => runs,
             Err(why) => {
+                let file = &self.file;
                 warn_line!(
-                    "warning: {}: no {COMPARISON_FILE} and no scene: the best model does not run: {why}",
-                    self.file
+                    "warning: {file}: no {COMPARISON_FILE} and no scene: the best model does not run: {why}"
                 );
                 return Ok(Vec::new());
             }
         };
-        let measured = self.measured.iter();
-        let measured: Vec<_> = measured
-            .map(|m| FittedRecording { recording: &m.recording, file: m.file.as_ref(), film: None })
-            .collect();
+        let measured = self.measured.iter().map(|loaded| FittedRecording {
+            recording: &loaded.recording,
+            file: loaded.file.as_ref(),
+            film: None,
+        });
+        let measured: Vec<_> = measured.collect();
         let table = comparison_table(self.job(), &measured, &runs);
         let mut files: Vec<_> =
             table.into_iter().map(|table| (table.file.to_owned(), table.text.into_bytes())).collect();
         for (at, run) in runs.iter().enumerate() {
-            files.extend(
-                self.fitted_scene_text(at, run, result)?
-                    .map(|text| (self.scene_file_name(at), text.into_bytes())),
-            );
+            let scene = self.fitted_scene_text(at, run, result)?;
+            files.extend(scene.map(|text| (self.scene_file_name(at), text.into_bytes())));
         }
         Ok(files)
     }
@@ -111,9 +102,8 @@ impl LoadedJob {
     /// The recording that drives the fitted scene of a condition, as that scene names it.
     fn driver_path(&self, at: usize) -> Outcome<Option<String>> {
         let condition = &self.job().conditions[at];
-        let by_trace =
-            self.problem.traces().iter().find(|trace| trace.condition == at).map(|trace| trace.head);
-        let driven = [Some(condition.head), by_trace].contains(&Some(HeadSource::Recording));
+        let trace = self.problem.traces().iter().find(|trace| trace.condition == at);
+        let driven = [Some(condition.head), trace.map(|t| t.head)].contains(&Some(HeadSource::Recording));
         let driver = if driven { self.recording_paths.get(at) } else { self.drivers[at].as_ref() };
         driver.map(|path| files::relative_path(&self.folder, path)).transpose()
     }

@@ -4,7 +4,7 @@
 use super::CompletedFit;
 use crate::fit::linear_model::ParameterCombination;
 use crate::fit::misfit::{ChannelMisfit, TraceMisfit, far_from_priors, unexplained_headline};
-use crate::fit::result::{FeatureResult, FitResult, NuisanceResult, ParameterResult};
+use crate::fit::result::{FitResult, NuisanceResult};
 use crate::text::{self, format_digits, to_ascii};
 
 /// Digits of a number that is shown.
@@ -21,14 +21,10 @@ pub(crate) fn print_summary(solved: &CompletedFit) {
     print_line!("{}: {}; cost {:.4}", result.status.name(), describe_evaluations(solved), result.cost);
     print_features(result);
     print_line!("");
-    print_line!("{:<36} {:>11}  {:<25} verdict", "parameter", "estimate", "95 % interval");
+    print_line!("parameter                               estimate  95 % interval             verdict");
     for (name, p) in &result.parameters {
-        print_line!(
-            "{name:<36} {:>11}  {:<25} {}",
-            format_value(p.estimate),
-            format_interval(p),
-            p.verdict.name()
-        );
+        let interval = text::format_interval(p.lower_95, p.upper_95, format_value);
+        print_line!("{name:<36} {:>11}  {interval:<25} {}", format_value(p.estimate), p.verdict.name());
         p.reasons.iter().for_each(|why| print_line!("  {why}"));
     }
     print_nuisances(&result.nuisances);
@@ -48,9 +44,7 @@ fn describe_evaluations(solved: &CompletedFit) -> String {
     let made = match (solved.replayed, made) {
         (0, _) => format!("{total} {what} {rate}"),
         (_, 0) => format!("{total} {what}, all from the journal"),
-        (replayed, made) => {
-            format!("{total} {what}, {replayed} from the journal and {made} {rate}")
-        }
+        (replayed, made) => format!("{total} {what}, {replayed} from the journal and {made} {rate}"),
     };
     let failed: Vec<String> =
         evaluations.failed.iter().map(|(reason, count)| format!("{count} {reason}")).collect();
@@ -62,25 +56,15 @@ fn print_features(result: &FitResult) {
     if result.components.is_empty() && result.features.is_empty() && result.held_out.is_empty() {
         return;
     }
-    print_line!("{:<36} {:>11} {:>11} {:<4} {:>8}  met", "feature", "target", "model", "unit", "error, %");
+    print_line!("feature                                   target       model unit error, %  met");
     for c in &result.components {
         print_feature_row(&c.name, (c.target_hz, c.model_hz, "Hz"), c.relative_error, c.pass);
     }
-    for f in &result.features {
-        print_feature(f, "");
+    let held_out = result.held_out.iter().map(|f| ("held out: ", f));
+    for (prefix, f) in result.features.iter().map(|f| ("", f)).chain(held_out) {
+        let name = format!("{prefix}{}", f.name);
+        print_feature_row(&name, (f.target, f.value_seen(), &f.unit), f.relative_error, f.pass);
     }
-    for f in &result.held_out {
-        print_feature(f, "held out: ");
-    }
-}
-
-fn print_feature(f: &FeatureResult, prefix: &str) {
-    print_feature_row(
-        &format!("{prefix}{}", f.name),
-        (f.target, f.value_seen(), &f.unit),
-        f.relative_error,
-        f.pass,
-    );
 }
 
 fn print_feature_row(
@@ -91,23 +75,14 @@ fn print_feature_row(
 ) {
     let model = model.map_or("none".to_owned(), format_value);
     let error = error.map_or("-".to_owned(), |error| format!("{:+.2}", 100.0 * error));
-    print_line!(
-        "{name:<36} {:>11} {model:>11} {unit:<4} {error:>8}  {}",
-        format_value(target),
-        if met { "yes" } else { "no" }
-    );
-}
-
-fn format_interval(p: &ParameterResult) -> String {
-    text::format_interval(p.lower_95, p.upper_95, format_value)
+    let (target, met) = (format_value(target), if met { "yes" } else { "no" });
+    print_line!("{name:<36} {target:>11} {model:>11} {unit:<4} {error:>8}  {met}");
 }
 
 /// What was known before the search, what the features determine together, and the notes.
 fn print_notes(result: &FitResult) {
     print_line!("");
-    for combination in &result.combinations {
-        print_line!("{}", describe_combination(combination));
-    }
+    result.combinations.iter().for_each(|found| print_line!("{}", describe_combination(found)));
     for note in &result.notes {
         // those of the gate say when they were made
         print_line!("{}{note}", if result.gate.notes.contains(note) { "" } else { "note: " });
@@ -136,18 +111,10 @@ const MOST_SEGMENTS: usize = 3;
 /// The first sentence, residuals against noise, and the misfit over the length of the segments.
 pub(crate) fn print_misfit(misfit: &TraceMisfit) {
     print_line!("{}", text::to_ascii(&misfit.headline()));
-    print_line!(
-        "{:<24} {:<11} {:>12} {:>10} {:>9} {:>12}",
-        "recording",
-        "channel",
-        "residual, um",
-        "noise, um",
-        "chi2/dof",
-        "neighbours"
-    );
+    print_line!("recording                channel     residual, um  noise, um  chi2/dof   neighbours");
     misfit.channels.iter().for_each(print_channel_misfit);
     print_line!("");
-    print_line!("{:<24} {:>11} {:>12} {:>9}", "segments", "number", "bad ones", "chi2/dof");
+    print_line!("segments                      number     bad ones  chi2/dof");
     for stage in &misfit.stages {
         let length = format!("of {} ms", format_value(1e3 * stage.segment_s));
         let (count, bad, chi2) = (stage.segments, stage.bad_segments, format_value(stage.chi2_per_dof));
@@ -158,25 +125,16 @@ pub(crate) fn print_misfit(misfit: &TraceMisfit) {
 }
 
 fn print_channel_misfit(c: &ChannelMisfit) {
-    print_line!(
-        "{:<24} {:<11} {:>12} {:>10} {:>9} {:>12}",
-        c.recording,
-        c.channel,
-        format_value(1e6 * c.residual_rms_m),
-        format_value(1e6 * c.noise_m),
-        format_value(c.chi2_per_dof),
-        c.autocorrelation_1.map_or_else(|| "-".to_owned(), |r| format!("{r:+.2}"))
-    );
+    let [residual, noise, chi2] = [1e6 * c.residual_rms_m, 1e6 * c.noise_m, c.chi2_per_dof].map(format_value);
+    let next = c.autocorrelation_1.map_or_else(|| "-".to_owned(), |r| format!("{r:+.2}"));
+    let (recording, channel) = (&c.recording, &c.channel);
+    print_line!("{recording:<24} {channel:<11} {residual:>12} {noise:>10} {chi2:>9} {next:>12}");
 }
 
 fn print_worst_segments(c: &ChannelMisfit) {
     let segment = |w: &crate::fit::misfit::WorstSegment| {
-        format!(
-            "{} to {} s (chi2/dof {})",
-            format_value(w.start_s),
-            format_value(w.end_s),
-            format_value(w.chi2_per_dof)
-        )
+        let [from, to, chi2] = [w.start_s, w.end_s, w.chi2_per_dof].map(format_value);
+        format!("{from} to {to} s (chi2/dof {chi2})")
     };
     let named: Vec<String> = c.worst.iter().take(MOST_SEGMENTS).map(segment).collect();
     if !named.is_empty() {
@@ -191,10 +149,7 @@ pub(crate) fn print_nuisances(list: &[NuisanceResult]) {
     }
     print_line!("");
     print_line!(
-        "{:<36} {:>11}  {:<25} known beforehand",
-        "camera and constants",
-        "estimate",
-        "95 % interval"
+        "camera and constants                    estimate  95 % interval             known beforehand"
     );
     for n in list {
         let name = n.recording.as_ref().map_or_else(|| n.name.clone(), |of| format!("{of}: {}", n.name));

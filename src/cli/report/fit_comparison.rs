@@ -32,21 +32,18 @@ pub(crate) fn write_comparison(
         .map(|(fit, best)| fit.build_report(assembly::build_report_without_figures, best))
         .collect::<Result<Vec<_>, _>>()?;
     let measured: Vec<_> = fits.iter().map(ReportedFit::measured_recordings).collect();
-    let fitted = |((fit, report), (best, measured))| {
-        let fit: &ReportedFit = fit;
-        ComparisonInput { name: &fit.name, report, job: fit.problem.job(), measured, best }
+    let input = |i: usize| ComparisonInput {
+        name: &fits[i].name,
+        report: &reports[i],
+        job: fits[i].problem.job(),
+        measured: &measured[i],
+        best: &best[i],
     };
-    let fitted: Vec<ComparisonInput> = fits
-        .iter()
-        .zip(&reports)
-        .zip(best.iter().map(Vec::as_slice).zip(measured.iter().map(Vec::as_slice)))
-        .map(fitted)
-        .collect();
+    let fitted: Vec<ComparisonInput> = (0..fits.len()).map(input).collect();
     let several = compare_fits(&fitted);
-    let json = comparison_json(&several).map_err(Failure::internal)?;
     let output = ReportFiles {
         figures: several.figures.iter().collect(),
-        json,
+        json: comparison_json(&several).map_err(Failure::internal)?,
         tables: &[],
         page: render_page(&several),
         summary: several.summary(),

@@ -14,14 +14,10 @@ pub(crate) fn collect_provenance(fit: &ReportedFit) -> Outcome<Provenance> {
     let within = format!("fits/{}", fit.name);
     let named = |path: &str| normalise_path(&within, path);
     let job = fit.problem.path.file_name().unwrap_or_default().to_string_lossy();
+    let result = fit.problem.folder.join(RESULT_FILE);
     let mut files = vec![
         hash_source_file("job", named(&job), &fit.problem.path, false)?,
-        hash_source_file(
-            "result",
-            named(RESULT_FILE),
-            &fit.problem.folder.join(RESULT_FILE),
-            fit.result.synthetic,
-        )?,
+        hash_source_file("result", named(RESULT_FILE), &result, fit.result.synthetic)?,
     ];
     for (condition, file) in fit.problem.job().conditions.iter().zip(&fit.problem.scene_files) {
         files.extend(scene_files(named(&condition.scene), file)?);
@@ -38,9 +34,8 @@ pub(crate) fn collect_provenance(fit: &ReportedFit) -> Outcome<Provenance> {
     let file = format!("{within}/{job}");
     let reported = if job == JOB_FILE { &within } else { &file };
     let commands = vec![format!("wiperlab fit {file}"), format!("wiperlab report {reported}")];
-    let (version, seed, fingerprint) =
-        (fit.result.version.clone(), Some(fit.result.seed), fit.result.fingerprint.clone());
-    Ok(Provenance { version, seed, fingerprint, files: once, commands })
+    let (version, fingerprint) = (fit.result.version.clone(), fit.result.fingerprint.clone());
+    Ok(Provenance { version, seed: Some(fit.result.seed), fingerprint, files: once, commands })
 }
 
 fn hash_source_file(kind: &str, name: String, path: &Path, synthetic: bool) -> Outcome<SourceFile> {
@@ -80,16 +75,16 @@ fn recording_files(
         let kind = format!("{role}description");
         found.push(hash_source_file(&kind, placed(DESCRIPTION_FILE), &description, synthetic)?);
     }
-    let exports = loaded.file.iter().filter_map(|file| file.source.as_ref());
-    let export = |(name, sha256): (&String, &String)| SourceFile {
-        kind: format!("{role}export"),
-        name: placed(name),
-        sha256: sha256.clone(),
-        synthetic,
-    };
-    found.extend(exports.flat_map(|source| {
-        source.file.as_slice().iter().zip(source.sha256.as_slice()).map(export).collect::<Vec<_>>()
-    }));
+    if let Some(source) = loaded.file.as_ref().and_then(|file| file.source.as_ref()) {
+        let kind = format!("{role}export");
+        let export = |(name, sha256): (&String, &String)| SourceFile {
+            kind: kind.clone(),
+            name: placed(name),
+            sha256: sha256.clone(),
+            synthetic,
+        };
+        found.extend(source.file.as_slice().iter().zip(source.sha256.as_slice()).map(export));
+    }
     Ok(found)
 }
 

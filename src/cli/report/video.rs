@@ -39,14 +39,9 @@ impl FramePictures {
         let is_png = |path: &PathBuf| path.extension().is_some_and(|end| end.eq_ignore_ascii_case("png"));
         let mut files = vec![frames.clone()];
         if !(is_png(&frames) && frames.is_file()) {
-            let entries =
-                fs::read_dir(&frames).map_err(|error| refuse(&format!("cannot be read: {error}")))?;
-            files = entries
-                .flatten()
-                .map(|entry| entry.path())
-                .filter(is_png)
-                .filter(|path| path.is_file())
-                .collect();
+            let entries = fs::read_dir(&frames).map_err(|e| refuse(&format!("cannot be read: {e}")))?;
+            let is_picture = |path: &PathBuf| is_png(path) && path.is_file();
+            files = entries.flatten().map(|entry| entry.path()).filter(is_picture).collect();
         }
         if files.is_empty() {
             return Err(refuse("holds none"));

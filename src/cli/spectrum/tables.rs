@@ -128,10 +128,8 @@ pub(crate) fn ridge_csv(course: &[CoursePoint]) -> Vec<u8> {
     let speed = |speed: Option<f64>| speed.map_or_else(String::new, |speed| format!("{speed:e}"));
     let row = |p: &CoursePoint| {
         let speeds = [p.tip_speed_m_per_s, p.head_speed_m_per_s].map(speed);
-        format!(
-            "{},{},{},{:e},{},{}\n",
-            p.time_s, p.frequency_hz, p.frequency_sd_hz, p.amplitude_m, speeds[0], speeds[1]
-        )
+        let CoursePoint { time_s, frequency_hz, frequency_sd_hz, amplitude_m, .. } = p;
+        format!("{time_s},{frequency_hz},{frequency_sd_hz},{amplitude_m:e},{}\n", speeds.join(","))
     };
     let header = "time_s,frequency_hz,frequency_sd_hz,amplitude_m,tip_speed_m_per_s,head_speed_m_per_s\n";
     std::iter::once(header.to_owned()).chain(course.iter().map(row)).collect::<String>().into_bytes()
@@ -144,51 +142,35 @@ pub(crate) fn print_summary(channel: Channel, studied: &StudiedWindow) {
     print_line!("{}{synthetic}: {channel}, {}", recording.name(), studied.note);
     let from_s = recording.grid().time_s(studied.frames.start);
     let missing = 100.0 * (1.0 - spectrum.present);
+    let (resolution_hz, floor_um) = (spectrum.resolution_hz, spectrum.noise_floor_m * 1e6);
     print_line!(
-        "resolution {:.2} Hz, noise floor {:.4} um, {missing:.1} % of the frames missing",
-        spectrum.resolution_hz,
-        spectrum.noise_floor_m * 1e6
+        "resolution {resolution_hz:.2} Hz, noise floor {floor_um:.4} um, {missing:.1} % of the frames missing"
     );
     studied.hint.iter().for_each(|hint| print_line!("{hint}"));
     if spectrum.components.is_empty() {
         print_line!("no component stands out of the noise");
         return;
     }
-    print_line!(
-        "{:>18} {:>16} {:>16} {:>8}  verdict",
-        "frequency, Hz",
-        "amplitude, um",
-        "damping ratio",
-        "SNR, dB"
-    );
+    print_line!("     frequency, Hz    amplitude, um    damping ratio  SNR, dB  verdict");
     for c in &spectrum.components {
-        let damping = c
-            .damping_ratio
-            .zip(c.damping_ratio_sd)
-            .map_or_else(|| "-".to_owned(), |(ratio, sd)| ascii_with_sd(ratio, sd));
-        let (frequency, amplitude) = (
-            ascii_with_sd(c.frequency_hz, c.frequency_sd_hz),
-            ascii_with_sd(c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6),
-        );
+        let damping = c.damping_ratio.zip(c.damping_ratio_sd);
+        let damping = damping.map_or_else(|| "-".to_owned(), |(ratio, sd)| ascii_with_sd(ratio, sd));
+        let frequency = ascii_with_sd(c.frequency_hz, c.frequency_sd_hz);
+        let amplitude = ascii_with_sd(c.amplitude_m * 1e6, c.amplitude_sd_m * 1e6);
         print_line!("{frequency:>18} {amplitude:>16} {damping:>16} {:>8.1}  {}", c.snr_db, c.verdict.name());
         if let Some(begins_s) = c.begins_s {
             print_line!("{:>18} begins at {:.4} s", "", from_s + begins_s);
         }
         if let Some(range) = &c.range_hz {
-            print_line!(
-                "{:>18} drifts from {} to {} Hz",
-                "",
-                ascii_with_sd(range.low_hz, range.low_sd_hz),
-                ascii_with_sd(range.high_hz, range.high_sd_hz)
-            );
+            let low = ascii_with_sd(range.low_hz, range.low_sd_hz);
+            let high = ascii_with_sd(range.high_hz, range.high_sd_hz);
+            print_line!("{:>18} drifts from {low} to {high} Hz", "");
         }
-        c.reasons
-            .iter()
-            .for_each(|reason| print_line!("{:>18} {}: {}", "", reason.verdict.name(), reason.words));
-        if let Some(leakage_m) = c
-            .leakage_m
-            .filter(|leakage_m| *leakage_m > c.amplitude_m && c.verdict != ComponentVerdict::NotResolvable)
-        {
+        for reason in &c.reasons {
+            print_line!("{:>18} {}: {}", "", reason.verdict.name(), reason.words);
+        }
+        let is_resolvable = c.verdict != ComponentVerdict::NotResolvable;
+        if let Some(leakage_m) = c.leakage_m.filter(|leakage_m| is_resolvable && *leakage_m > c.amplitude_m) {
             print_line!("{:>18} the flip, not removed, would show {:.3} um here", "", leakage_m * 1e6);
         }
     }

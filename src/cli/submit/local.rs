@@ -37,14 +37,10 @@ pub(crate) fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
     plan.create_logs_folder()?;
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let at_once = (cores / plan.threads).max(1);
-    let kept = format!(
-        "the points that were done are in {}; the same command goes on",
-        plan.work.folder().display()
-    );
-    let stops = interrupt::register_stoppable({
-        let kept = kept.clone();
-        move || kept.clone()
-    });
+    let folder = plan.work.folder();
+    let kept = format!("the points that were done are in {}; the same command goes on", folder.display());
+    let late = kept.clone();
+    let stops = interrupt::register_stoppable(move || late.clone());
     let bar = progress::start_bar(plan.tasks.len() as u64, "submit", "tasks", global.quiet);
     let mut tasks = plan.tasks.iter();
     let (mut running, mut ended): (Vec<LocalTask>, Vec<FinishedTask>) = (Vec::new(), Vec::new());
@@ -97,8 +93,9 @@ fn run_collect(plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
         Some(0) => Ok(CommandOutcome::Done),
         Some(code) if code == i32::from(STOPPED_EARLY) => Ok(CommandOutcome::StoppedEarly),
         Some(code) if code == i32::from(BAD_INPUT) => {
-            Err(Failure::Input("the shards cannot be put together, see above".to_owned()))
+            Err(Failure::input("the shards cannot be put together, see above"))
         }
+
         _ => Err(Failure::Internal(format!("`wiperlab collect` failed ({status})"))),
     }
 }
@@ -164,9 +161,9 @@ impl FinishedTask {
     fn message(&self, plan: &SubmissionPlan) -> String {
         let text = fs::read(&self.log).unwrap_or_default();
         let text = String::from_utf8_lossy(&text);
-        let said = text.lines().rev().find(|line| !line.trim().is_empty());
-        let said = said
-            .map_or_else(|| self.status.to_string(), |line| line.trim_start_matches("error: ").to_owned());
+        let last = text.lines().rev().find(|line| !line.trim().is_empty());
+        let last = last.map(|line| line.trim_start_matches("error: ").to_owned());
+        let said = last.unwrap_or_else(|| self.status.to_string());
         format!("shard {}/{}: {said} ({})", self.number, plan.shards, self.log.display())
     }
 }

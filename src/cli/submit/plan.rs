@@ -48,7 +48,10 @@ impl SubmissionPlan {
 
     /// After what time a task ends by itself.
     pub(crate) fn time_limit(&self) -> Option<Duration> {
-        self.walltime.map(|walltime| walltime.saturating_sub(time_margin(walltime)))
+        self.walltime.map(|walltime| {
+            let margin_s = (walltime.as_secs() as f64 * MARGIN) as u64;
+            walltime.saturating_sub(Duration::from_secs(margin_s.clamp(MARGINS_S.0, MARGINS_S.1)))
+        })
     }
 
     /// Folder of the scripts.
@@ -71,12 +74,6 @@ impl SubmissionPlan {
     pub(crate) fn describe_cores(&self) -> String {
         format!("{} core{}", self.threads, if self.threads == 1 { "" } else { "s" })
     }
-}
-
-fn time_margin(walltime: Duration) -> Duration {
-    let (least, most) = MARGINS_S;
-    let margin_s = (walltime.as_secs() as f64 * MARGIN) as u64;
-    Duration::from_secs(margin_s.clamp(least, most))
 }
 
 /// Time that Slurm gives a task, for [`clap`].
@@ -135,9 +132,8 @@ impl SubmittedWork {
     }
 
     fn load_study(study: &Path, out: &Path, overwrite: Overwrite) -> Outcome<Self> {
-        let problem = sweep::LoadedStudy::load(study)?;
         let writer = WritePolicy::new(OutputCommand::Sweep, overwrite);
-        problem.check_outputs(out, &writer)?;
+        sweep::LoadedStudy::load(study)?.check_outputs(out, &writer)?;
         Ok(Self::Study { study: absolute_path(study)?, out: absolute_path(out)? })
     }
 
@@ -145,10 +141,7 @@ impl SubmittedWork {
         fit::check_distinct_folders(jobs)?;
         jobs.iter().try_for_each(|job| LoadedJob::load(job).map(|_| ()))?;
         let jobs = jobs.iter().map(|job| absolute_path(job)).collect::<Result<Vec<_>, _>>()?;
-        let out = match out {
-            Some(out) => absolute_path(out)?,
-            None => common_folder(&jobs),
-        };
+        let out = out.map_or_else(|| Ok(common_folder(&jobs)), absolute_path)?;
         Ok(Self::Jobs { jobs, out })
     }
 

@@ -81,11 +81,8 @@ impl LoadedStudy {
 /// A panic is a fault of the program, not of the study, and must not pass for one.
 fn warn_of_panic(index: usize, point: &Point) {
     if let Some(ended) = point.ended.as_ref().filter(|ended| ended.reason == MissingReason::Panicked) {
-        warn_line!(
-            "warning: point {} of the study: the program failed: {}; please report it",
-            index + 1,
-            ended.why
-        );
+        let (number, why) = (index + 1, &ended.why);
+        warn_line!("warning: point {number} of the study: the program failed: {why}; please report it");
     }
 }
 
@@ -95,24 +92,15 @@ fn print_summary(study: &Study, summary: &SweepSummary) {
     };
     print_line!("{}: {} simulated runs: {}", summary.title, summary.points, counts(&summary.status));
     for axis in &study.axes {
-        let ends = axis.values.first().zip(axis.values.last());
-        let (from, to) = ends.map_or((0.0, 0.0), |(from, to)| (*from, *to));
-        let values = match study.sample {
-            Some(_) => "sampled".to_owned(),
-            None => format!("{} values", axis.values.len()),
-        };
+        let [from, to] = [axis.values.first(), axis.values.last()].map(|end| end.copied().unwrap_or(0.0));
+        let count = || format!("{} values", axis.values.len());
+        let values = study.sample.as_ref().map_or_else(count, |_| "sampled".to_owned());
         print_line!("over {}: {values} from {from} to {to}", axis.parameter.name);
     }
-    print_line!("{:<28} {:>9} {:>13} {:>13}  without a value", "map", "values", "least", "greatest");
+    print_line!("map                             values         least      greatest  without a value");
     for map in &summary.maps {
         let end = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.6}"));
-        print_line!(
-            "{:<28} {:>9} {:>13} {:>13}  {}",
-            map.column,
-            map.values,
-            end(map.least),
-            end(map.greatest),
-            counts(&map.missing)
-        );
+        let (least, greatest, missing) = (end(map.least), end(map.greatest), counts(&map.missing));
+        print_line!("{:<28} {:>9} {least:>13} {greatest:>13}  {missing}", map.column, map.values);
     }
 }

@@ -31,7 +31,7 @@ impl LoadedStudy {
             resume: journal.exists(),
             journal: &journal,
             elsewhere,
-            advice: "the same command goes on".to_owned(),
+            advice: "the same command goes on",
             reports: true,
         };
         if !self.solve_part(&part, global)? {

@@ -18,7 +18,7 @@ pub(crate) struct StudyPart<'a> {
     /// Points that other journals hold.
     pub elsewhere: Vec<bool>,
     /// What to do with what is done when it stops early.
-    pub advice: String,
+    pub advice: &'static str,
     /// Whether progress is said where there is no terminal.
     pub reports: bool,
 }
@@ -26,10 +26,11 @@ pub(crate) struct StudyPart<'a> {
 impl LoadedStudy {
     /// Runs what the journal of the whole study does not hold; `false` where it was interrupted.
     pub(crate) fn solve(&self, journal: &Path, resume: bool, global: &GlobalArgs) -> Outcome<bool> {
-        let advice = "go on with --resume".to_owned();
-        let part =
-            StudyPart { shard: Shard::WHOLE, journal, resume, elsewhere: Vec::new(), advice, reports: false };
-        self.solve_part(&part, global)
+        let (elsewhere, advice) = (Vec::new(), "go on with --resume");
+        self.solve_part(
+            &StudyPart { shard: Shard::WHOLE, journal, resume, elsewhere, advice, reports: false },
+            global,
+        )
     }
 
     /// Runs what no journal holds of a part, and writes its journal as it goes; `false` where it was
@@ -53,8 +54,7 @@ impl LoadedStudy {
             recheck.offer_point(found);
             Ok(())
         };
-        let (mut sink, found) =
-            CheckpointWriter::open_each::<SweepPoint>(part.journal, part.resume, &mut each)?;
+        let (mut sink, found) = CheckpointWriter::open_each(part.journal, part.resume, &mut each)?;
         if let Some(found) = &found {
             found.check_matches::<SweepPoint>(&name, &header).map_err(Failure::input)?;
             recheck.check_points(&self.study, &self.scene, &name).map_err(Failure::input)?;
@@ -65,16 +65,14 @@ impl LoadedStudy {
         let all = part.shard.count_points(points);
         let taken = (0..all).filter(|place| known.get(part.shard.point_index(*place)) == Some(&true)).count();
         if taken > 0 {
-            progress::print_progress(
-                global.quiet,
-                &format!("{taken} of {all} points are taken from the journal"),
-            );
+            let line = format!("{taken} of {all} points are taken from the journal");
+            progress::print_progress(global.quiet, &line);
         }
         let bar = progress::start_bar((all - taken) as u64, "sweep", "points", global.quiet);
         let reporter = progress::ProgressReporter::new(&bar, part.reports && !global.quiet);
         let journaled = Arc::new(AtomicUsize::new(taken));
         let kept = {
-            let (advice, journaled) = (part.advice.clone(), Arc::clone(&journaled));
+            let (advice, journaled) = (part.advice, Arc::clone(&journaled));
             move || {
                 let done = journaled.load(Ordering::Relaxed);
                 format!("{name} holds {done} of {all} points; {advice}")
@@ -87,15 +85,8 @@ impl LoadedStudy {
             reporter.report_if_due();
         };
         let due = |index: usize| known.get(index) != Some(&true);
-        let ran = sweep::run_sweep(
-            &self.study,
-            &self.scene,
-            part.shard,
-            &due,
-            &mut sink,
-            &done,
-            &interrupt::control_flow,
-        );
+        let (study, scene, go_on) = (&self.study, &self.scene, &interrupt::control_flow);
+        let ran = sweep::run_sweep(study, scene, part.shard, &due, &mut sink, &done, go_on);
         bar.finish_and_clear();
         sink.finish()?;
         match ran {

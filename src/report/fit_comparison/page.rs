@@ -1,7 +1,7 @@
 //! The page of a comparison of fits.
 
 use super::intervals::estimate_text;
-use super::{ComparedFit, FitComparison, SharedParameter};
+use super::{ComparedFit, FitComparison, IntervalPair, SharedParameter};
 use crate::compare::{Comparison, ParameterLine};
 use crate::report::page::html::CellStyle::{Bad, Good, Prose, Words};
 use crate::report::page::html::*;
@@ -35,11 +35,8 @@ pub(crate) fn render_page(several: &FitComparison) -> String {
 
 /// What the data of a fit are, with its name.
 fn data_lead(entry: &ComparedFit) -> String {
-    data_banner(&entry.report).replacen(
-        "role=\"note\">",
-        &format!("role=\"note\">{}: ", isolate_name(&entry.name)),
-        1,
-    )
+    let named = format!("role=\"note\">{}: ", isolate_name(&entry.name));
+    data_banner(&entry.report).replacen("role=\"note\">", &named, 1)
 }
 
 /// The fits in a table.
@@ -48,26 +45,19 @@ fn fits_table(entries: &[ComparedFit]) -> String {
         let share = |met: usize, of: usize| (format!("{met} of {of}"), if met == of { Good } else { Bad });
         let of = |list: &[Comparison]| share(list.iter().filter(|c| c.pass).count(), list.len());
         let known = e.report.parameters.iter().filter(|p| p.is_identified()).count();
-        let data: Vec<String> = e
-            .report
-            .recordings
-            .iter()
-            .map(|r| format!("{}{}", isolate_name(&r.name), if r.synthetic { " (synthetic)" } else { "" }))
-            .collect();
+        let source = |synthetic| if synthetic { " (synthetic)" } else { "" };
+        let recordings = e.report.recordings.iter();
+        let data: Vec<String> = recordings.map(|r| isolate_name(&r.name) + source(r.synthetic)).collect();
         let data = if data.is_empty() { "published numbers".to_owned() } else { data.join(", ") };
-        let status = (
-            format_or_dash(e.report.search.status, |status| escape_text(status.name())),
-            if e.verdict.search_converged { Good } else { Bad },
-        );
-        let title = (isolate_name(&e.report.title), Prose);
+        let status = format_or_dash(e.report.search.status, |status| escape_text(status.name()));
         vec![
             (isolate_name(&e.name), Words),
-            title,
+            (isolate_name(&e.report.title), Prose),
             (data, Words),
             of(&e.report.components),
             of(&e.report.features),
             share(known, e.report.parameters.len()),
-            status,
+            (status, if e.verdict.search_converged { Good } else { Bad }),
         ]
     };
     let head = [
@@ -89,27 +79,14 @@ fn parameters_table(several: &FitComparison) -> String {
             format!("<br>truth {}{}", format_number(t.value), placed(t.inside_95))
         });
         let class = if line.is_identified() { "good" } else { "bad" };
-        (
-            format!(
-                "{estimate}<br>{interval}<br><span class=\"{class}\">{}</span>{truth}",
-                escape_text(line.verdict.name())
-            ),
-            Words,
-        )
+        let verdict = escape_text(line.verdict.name());
+        (format!("{estimate}<br>{interval}<br><span class=\"{class}\">{verdict}</span>{truth}"), Words)
     };
     let pairs = |p: &SharedParameter| -> HtmlCell {
-        let said: Vec<String> = p
-            .pairs
-            .iter()
-            .map(|pair| {
-                format!(
-                    "{} and {} {}",
-                    isolate_name(&pair.fits[0]),
-                    isolate_name(&pair.fits[1]),
-                    pair.relation.describe()
-                )
-            })
-            .collect();
+        let describe = |IntervalPair { fits, relation }: &IntervalPair| {
+            format!("{} and {} {}", isolate_name(&fits[0]), isolate_name(&fits[1]), relation.describe())
+        };
+        let said: Vec<String> = p.pairs.iter().map(describe).collect();
         (if said.is_empty() { DASH.to_owned() } else { said.join("<br>") }, Prose)
     };
     let row = |p: &SharedParameter| -> Vec<HtmlCell> {
@@ -140,10 +117,9 @@ fn merge_comparisons(
     let mut lines: Vec<Comparison> = Vec::new();
     for entry in &several.fits {
         for line in of(entry) {
-            let condition = line
-                .condition
-                .as_ref()
-                .map_or_else(|| entry.name.clone(), |condition| format!("{}: {condition}", entry.name));
+            let name = &entry.name;
+            let condition =
+                line.condition.as_ref().map_or_else(|| name.clone(), |of| format!("{name}: {of}"));
             let at = lines.iter().rposition(|l| l.name == line.name).map_or(lines.len(), |at| at + 1);
             lines.insert(at, Comparison { condition: Some(condition), ..line.clone() });
         }
@@ -153,9 +129,6 @@ fn merge_comparisons(
 
 /// Something of every fit, under its name.
 fn section_per_fit(several: &FitComparison, of: impl Fn(&ComparedFit) -> String) -> String {
-    several
-        .fits
-        .iter()
-        .map(|entry| format!("<h3>{}</h3>\n{}", isolate_name(&entry.name), of(entry)))
-        .collect()
+    let section = |entry: &ComparedFit| format!("<h3>{}</h3>\n{}", isolate_name(&entry.name), of(entry));
+    several.fits.iter().map(section).collect()
 }

@@ -3,7 +3,7 @@
 use super::html::CellStyle::{Name, Number, Prose, Words};
 use super::html::*;
 use crate::compare::Comparison;
-use crate::fit::misfit::{ChannelMisfit, StageMisfit, TraceMisfit};
+use crate::fit::misfit::{ChannelMisfit, StageMisfit, TraceMisfit, WorstSegment};
 use crate::fit::result::NuisanceResult;
 use crate::text::{
     self, format_decimals, format_digits, format_interval, format_number, format_or_dash, format_percent,
@@ -31,12 +31,9 @@ pub(super) fn held_out_table(list: &[Comparison]) -> String {
 
 /// Values of several fits, whose names stand in place of conditions.
 pub(in crate::report) fn fits_table(caption: &str, list: &[Comparison]) -> String {
-    comparison_table(
-        caption,
-        "Relative error is model / target \u{2212} 1; what counts as met is as on the page of each fit.",
-        ["name", "fit"],
-        list,
-    )
+    let words =
+        "Relative error is model / target \u{2212} 1; what counts as met is as on the page of each fit.";
+    comparison_table(caption, words, ["name", "fit"], list)
 }
 
 fn comparison_table(caption: &str, words: &str, [kind, condition]: [&str; 2], list: &[Comparison]) -> String {
@@ -102,11 +99,8 @@ fn value_remarks(c: &Comparison) -> String {
             .filter(|db| *db > 0.0)
             .map(|db| format!("the model\u{2019}s peak is {db:.1} dB below the strongest of its band")),
         c.next_peak.map(|p| {
-            format!(
-                "next peak of the model at {} Hz, {:.1} dB below the strongest",
-                format_number(p.frequency_hz),
-                p.below_db
-            )
+            let (hz, below_db) = (format_number(p.frequency_hz), p.below_db);
+            format!("next peak of the model at {hz} Hz, {below_db:.1} dB below the strongest")
         }),
         c.twin_sd.map(|sd| format!("scatters by {} over twins", size(sd))),
         c.model_scatter.filter(|s| c.target_sd.is_some_and(|sd| *s > sd)).map(|s| {
@@ -126,13 +120,9 @@ pub(super) fn misfit_html(misfit: Option<&TraceMisfit>) -> String {
     let words = "Measured minus model in every frame. Chi2 per degree of freedom is 1 where noise explains \
                  the residuals. A wrong model shows it above 1, growing with the length of the segments, or \
                  single segments that do not fit at all.";
-    [
-        reading_hint(words),
-        channels_table(&misfit.channels),
-        stages_table(&misfit.stages),
-        worst_segments_table(&misfit.channels),
-    ]
-    .concat()
+    let channels = channels_table(&misfit.channels);
+    let worst = worst_segments_table(&misfit.channels);
+    [reading_hint(words), channels, stages_table(&misfit.stages), worst].concat()
 }
 
 fn channels_table(list: &[ChannelMisfit]) -> String {
@@ -176,20 +166,17 @@ fn stages_table(list: &[StageMisfit]) -> String {
 
 fn worst_segments_table(list: &[ChannelMisfit]) -> String {
     let head = [(Words, "recording|channel"), (Number, "from|to|chi2 per degree of freedom")];
-    let rows = |c: &ChannelMisfit| -> Vec<Vec<HtmlCell>> {
-        let row = |w: &crate::fit::misfit::WorstSegment| -> Vec<HtmlCell> {
-            vec![
-                (isolate_name(&c.recording), Name),
-                (escape_text(&c.channel), Words),
-                (format!("{} s", format_number(w.start_s)), Number),
-                (format!("{} s", format_number(w.end_s)), Number),
-                (format_number(w.chi2_per_dof), Number),
-            ]
-        };
-        c.worst.iter().map(row).collect()
+    let row = |(c, w): (&ChannelMisfit, &WorstSegment)| {
+        vec![
+            (isolate_name(&c.recording), Name),
+            (escape_text(&c.channel), Words),
+            (format!("{} s", format_number(w.start_s)), Number),
+            (format!("{} s", format_number(w.end_s)), Number),
+            (format_number(w.chi2_per_dof), Number),
+        ]
     };
-    let rows = list.iter().flat_map(rows).collect();
-    render_table("Segments that fit worst", column_heads(&head), rows)
+    let worst = list.iter().flat_map(|c| c.worst.iter().map(move |w| (c, w)));
+    render_table("Segments that fit worst", column_heads(&head), worst.map(row).collect())
 }
 
 pub(super) fn nuisances_table(list: &[NuisanceResult]) -> String {
@@ -203,12 +190,9 @@ pub(super) fn nuisances_table(list: &[NuisanceResult]) -> String {
             (format_interval(n.lower_95, n.upper_95, format_number), Number),
         ]
     };
-    let html = render_table(
-        "Cameras, and constants within priors",
-        column_heads(&head),
-        list.iter().map(row).collect(),
-    );
     let words = "The unit stands in the name, as in a scene. An estimate several standard deviations away from \
                  what was known beforehand is a reason to look at the calibration, or at the constant.";
-    if html.is_empty() { html } else { reading_hint(words) + &html }
+    let rows: Vec<_> = list.iter().map(row).collect();
+    let words = if rows.is_empty() { String::new() } else { reading_hint(words) };
+    words + &render_table("Cameras, and constants within priors", column_heads(&head), rows)
 }

@@ -22,15 +22,18 @@ pub(in crate::report) fn breakable_key(raw: &str) -> String {
     format!("<code>{}</code>", escape_text(raw).replace('_', "_<wbr>").replace('.', ".<wbr>"))
 }
 
+/// Keys with commas between them.
+pub(in crate::report) fn keys_html(keys: &[impl AsRef<str>]) -> String {
+    keys.iter().map(|key| breakable_key(key.as_ref())).collect::<Vec<_>>().join(", ")
+}
+
 /// What a number is, in words, with the keys of a scene that it comes from in small print.
 pub(in crate::report) fn words_with_keys(words: &str, keys: &[&str]) -> String {
-    let keys: Vec<String> = keys.iter().map(|name| breakable_key(name)).collect();
-    let small = if keys.is_empty() {
-        String::new()
-    } else {
-        format!("<small class=\"key\">{}</small>", keys.join(", "))
-    };
-    escape_text(&capitalise(words)) + &small
+    let words = escape_text(&capitalise(words));
+    if keys.is_empty() {
+        return words;
+    }
+    format!("{words}<small class=\"key\">{}</small>", keys_html(keys))
 }
 
 /// A parameter of a scene in the same way; the key alone of one that no scene has.
@@ -46,17 +49,11 @@ pub(in crate::report) fn prose_html(raw: &str) -> String {
         // backticks that are not in pairs mark no names
         return format!("<span dir=\"auto\">{}</span>", escape_text(raw));
     }
-    parts
-        .iter()
-        .enumerate()
-        .map(|(i, part)| {
-            if i % 2 == 0 {
-                escape_text(part)
-            } else {
-                format!("<bdi class=\"name\">{}</bdi>", escape_text(part))
-            }
-        })
-        .collect()
+    let html = |(i, part): (usize, &&str)| match i % 2 {
+        0 => escape_text(part),
+        _ => format!("<bdi class=\"name\">{}</bdi>", escape_text(part)),
+    };
+    parts.iter().enumerate().map(html).collect()
 }
 
 /// A sentence with its names isolated.
@@ -65,16 +62,18 @@ pub(in crate::report) fn sentence_html(sentence: &Sentence) -> String {
         SentencePart::Words(words) => prose_html(words),
         SentencePart::Name(chosen) => isolate_name(chosen),
     };
-    sentence.parts().iter().map(piece).collect()
+    sentence.0.iter().map(piece).collect()
 }
 
 /// Statements as paragraphs, each with its details as a list.
 pub(in crate::report) fn statements_html(list: &[Statement]) -> String {
     let one = |s: &Statement| {
-        let details: String = s.details.iter().map(|d| format!("<li>{}</li>\n", sentence_html(d))).collect();
-        let details = if details.is_empty() { details } else { format!("<ul>\n{details}</ul>\n") };
         let class = s.good.map_or("", |good| if good { " class=\"good\"" } else { " class=\"bad\"" });
-        format!("<p{class}>{}</p>\n{details}", sentence_html(&s.statement))
+        format!(
+            "<p{class}>{}</p>\n{}",
+            sentence_html(&s.statement),
+            items_html(s.details.iter().map(sentence_html))
+        )
     };
     list.iter().map(one).collect()
 }
@@ -164,8 +163,13 @@ pub(in crate::report) fn facts_list(list: &[(String, String)]) -> String {
 
 /// Sentences as a list; nothing for none.
 pub(in crate::report) fn sentence_list(sentences: &[String]) -> String {
-    let items: String = sentences.iter().map(|s| format!("<li>{}</li>\n", prose_html(s))).collect();
-    if sentences.is_empty() { items } else { format!("<ul>\n{items}</ul>\n") }
+    items_html(sentences.iter().map(|sentence| prose_html(sentence)))
+}
+
+/// A list; nothing for none.
+pub(in crate::report) fn items_html(items: impl Iterator<Item = String>) -> String {
+    let items: String = items.map(|html| format!("<li>{html}</li>\n")).collect();
+    if items.is_empty() { items } else { format!("<ul>\n{items}</ul>\n") }
 }
 
 /// A paragraph that says how to read what follows.

@@ -10,16 +10,12 @@ pub(super) fn parameters_html(report: &Report) -> String {
     if report.parameters.is_empty() {
         return String::new();
     }
+    let estimates = estimates_table(&report.parameters);
     if report.misfit.is_some() {
-        return [reading_hint(OF_TRACES), estimates_table(&report.parameters)].concat();
+        return reading_hint(OF_TRACES) + &estimates;
     }
-    [
-        reading_hint(OF_FEATURES),
-        estimates_table(&report.parameters),
-        intervals_table(&report.parameters, report.search.twins),
-        combinations_table(&report.combinations),
-    ]
-    .concat()
+    let intervals = intervals_table(&report.parameters, report.search.twins);
+    [reading_hint(OF_FEATURES), estimates, intervals, combinations_table(&report.combinations)].concat()
 }
 
 const OF_FEATURES: &str = "The 95 % interval reaches as far as the profile, the twins and every equally good point of \
@@ -47,17 +43,14 @@ fn estimates_table(list: &[ParameterLine]) -> String {
             (parameter_html(&p.name), Words),
             (escape_text(&p.symbol), Words),
             (escape_text(&unit), Words),
-        ];
-        cells.extend([
             (number(p.estimate), Number),
             (format_interval(p.lower_95, p.upper_95, number), Number),
             verdict_cell(p.is_identified(), [p.verdict.name(); 2]),
-        ]);
+        ];
         if with_truth {
-            let inside = p.truth.filter(|_| p.is_bounded()).map_or_else(
-                || (DASH.to_owned(), Words),
-                |truth| verdict_cell(truth.inside_95, ["yes", "no"]),
-            );
+            let truth = p.truth.filter(|_| p.is_bounded());
+            let unknown = || (DASH.to_owned(), Words);
+            let inside = truth.map_or_else(unknown, |truth| verdict_cell(truth.inside_95, ["yes", "no"]));
             cells.extend([(format_or_dash(p.truth, |truth| number(truth.value)), Number), inside]);
         }
         cells.extend(with_reason.then(|| (format_or_dash(p.why.as_deref(), prose_html), Prose)));
@@ -78,10 +71,7 @@ fn intervals_table(list: &[ParameterLine], twins: usize) -> String {
         let (_, factor) = text::choose_prefix(&p.unit, [p.estimate]);
         let number = |value: f64| format_number(value * factor);
         let ends = |ends: Option<[f64; 2]>, none: &str| {
-            ends.map_or_else(
-                || none.to_owned(),
-                |[lower, upper]| format_interval(Some(lower), Some(upper), number),
-            )
+            ends.map_or_else(|| none.to_owned(), |[low, high]| format_interval(Some(low), Some(high), number))
         };
         vec![
             (parameter_html(&p.name), Words),
@@ -169,11 +159,8 @@ fn gate_table(probes: &[ProbeLine]) -> String {
     let row = |(i, p): (usize, &ProbeLine)| {
         let ran = p.failure.as_deref().map_or_else(|| ("ran".to_owned(), Good), |why| (prose_html(why), Bad));
         let condition = format_or_dash(p.condition, format_number);
-        let determines = if p.determines.is_empty() {
-            "none alone".to_owned()
-        } else {
-            p.determines.iter().map(|name| breakable_key(name)).collect::<Vec<_>>().join(", ")
-        };
+        let determines =
+            if p.determines.is_empty() { "none alone".to_owned() } else { keys_html(&p.determines) };
         let number = |count: usize| (count.to_string(), Number);
         vec![
             number(i + 1),
