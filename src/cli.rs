@@ -1,5 +1,5 @@
-//! The command-line program: parse, run, exit code. Everything that opens files, prints or shows progress is
-//! below this module; the Python package reads files by it, too.
+//! The command-line program: parse, run, exit code. Only this module opens files, prints and shows progress;
+//! the Python package reads files through it.
 
 #[macro_use]
 mod output;
@@ -156,15 +156,16 @@ impl Command {
     }
 }
 
-/// The same as [`run`] in a process that runs something else, such as Python: `path` starts the program.
+/// The same as [`run`] within another process such as Python; `path` is the program to start for further
+/// tasks.
 #[must_use]
 pub fn run_embedded(path: PathBuf, arguments: Vec<OsString>) -> u8 {
     set_executable_path(path);
     run(arguments)
 }
 
-/// Runs the program with its arguments, its name first, and gives the exit code. It answers signals, and may
-/// end the process to do so; a process runs it once.
+/// Runs the program with its arguments, its name first, and returns the exit code. It handles signals and may
+/// end the process; a process may call it once.
 #[must_use]
 pub fn run(arguments: Vec<OsString>) -> u8 {
     let program = match CommandLine::try_parse_from(&arguments) {
@@ -185,12 +186,10 @@ pub fn run(arguments: Vec<OsString>) -> u8 {
     }
 }
 
-// Where the program lies, for jobs that start it again.
-
-/// Its path where the process runs something else.
+/// Path of the program, if it runs within another process.
 static EXECUTABLE_PATH: OnceLock<PathBuf> = OnceLock::new();
 
-/// Says where it lies; the first word counts.
+/// Sets the path of the program; only the first call counts.
 pub(crate) fn set_executable_path(path: PathBuf) {
     let _ = EXECUTABLE_PATH.set(path);
 }

@@ -1,4 +1,4 @@
-//! wiperlab holds high-speed-video measurements of a windshield wiper blade against a stick-slip model of it.
+//! wiperlab compares high-speed-video measurements of a windshield wiper blade with a stick-slip model of it.
 //!
 //! # The pipeline
 //!
@@ -43,8 +43,8 @@
 //! | `l1`, `l2` | lengths of neck and lip | m |
 //! | `k0`, `k1`, `k2` | stiffness of the head's support, the neck, the lip | N/m, N m/rad |
 //!
-//! Everything is SI inside; files and fields carry their unit in the name. The parameters of a scene stand in
-//! one table, [`blade::parameters::PARAMETERS`].
+//! All quantities are in SI units; files and fields have their unit in the name. The parameters of a scene
+//! are in one table, [`blade::parameters::PARAMETERS`].
 //!
 //! # From a tracking export to a report
 //!

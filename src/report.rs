@@ -20,7 +20,7 @@ pub(crate) use view_model::{
     CombinationLine, FailureCount, ProbeLine, Provenance, RecordingLine, SearchLine, SourceFile,
 };
 
-/// What a report of one fit says. Sections without content are left out of the page.
+/// The report of one fit. Sections without content are left out of the page.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Report {
     /// Heading: what was fitted to what.
@@ -29,21 +29,21 @@ pub struct Report {
     pub search: SearchLine,
     /// How well the model explains the traces; `None` in a fit of features alone.
     pub misfit: Option<TraceMisfit>,
-    /// What was estimated of the cameras, and the constants that were freed.
+    /// Estimates of the cameras and of freed constants.
     pub nuisances: Vec<NuisanceResult>,
-    /// The recordings; none when only published numbers are known.
+    /// The recordings; empty if only published numbers were fitted.
     pub recordings: Vec<RecordingLine>,
     /// Frequencies of components, measured against model.
     pub components: Vec<Comparison>,
     /// Other features, measured against model.
     pub features: Vec<Comparison>,
-    /// Components and features that were not fitted but predicted.
+    /// Components and features that were predicted, not fitted.
     pub held_out: Vec<Comparison>,
     /// The fitted parameters.
     pub parameters: Vec<ParameterLine>,
     /// Friction of the best model at rest and at the tip's greatest speed.
     pub friction: Vec<FrictionLine>,
-    /// Products of powers of the parameters that the features determine or leave open.
+    /// Products of powers of parameters that the features determine or leave open.
     pub combinations: Vec<CombinationLine>,
     /// What to measure in addition, one sentence each.
     pub advice: Vec<String>,
@@ -51,9 +51,9 @@ pub struct Report {
     pub runs: Vec<RunSummary>,
     /// Each recording against the model.
     pub comparison: Vec<ComparisonSummary>,
-    /// What the gate saw before the search, place by place.
+    /// Probes of the gate before the search, one for each point.
     pub gate: Vec<ProbeLine>,
-    /// What the gate had to say, one sentence each.
+    /// Notes of the gate, one sentence each.
     pub gate_notes: Vec<String>,
     /// Figures in the order of the page.
     #[serde(skip)]
@@ -61,38 +61,38 @@ pub struct Report {
     /// Columns of the comparison, as files.
     #[serde(skip)]
     pub tables: Vec<ComparisonTable>,
-    /// Reservations that a reader must know, one sentence each.
+    /// Reservations, one sentence each.
     pub notes: Vec<String>,
-    /// Where the numbers come from.
+    /// Files, version and commands behind the numbers.
     pub provenance: Provenance,
 }
 
 /// Figures under one heading.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct FigureGroup {
-    /// What they show.
+    /// Subject of the group.
     pub subject: FigureSubject,
     /// The figures in order.
     pub figures: Vec<FigureBlock>,
 }
 
-/// What a group of figures shows: where on the page it belongs.
+/// Subject of a group of figures, which decides its place on the page.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum FigureSubject {
-    /// What the answer rests on: the recording against the model, friction, residuals, parameters.
+    /// Evidence for the answer: recording and model, friction, residuals, parameters.
     Evidence,
-    /// What was measured, against the model, in full.
+    /// All measurements compared with the model.
     #[default]
     Measured,
     /// How the blade of the best model moves.
     Blade,
-    /// What the fit knows of its parameters.
+    /// Parameters of the fit.
     Parameters,
 }
 
 impl Report {
-    /// Whether any recording is one that no camera took.
+    /// Whether any recording is synthetic.
     pub(crate) fn is_synthetic(&self) -> bool {
         self.recordings.iter().any(|r| r.synthetic)
     }

@@ -1,4 +1,4 @@
-//! Refusals and failures as the exceptions of `wiperlab.errors`.
+//! Failures as the exceptions of `wiperlab.errors`.
 
 use pyo3::PyErr;
 use pyo3::prelude::*;
@@ -16,12 +16,12 @@ pub fn input_error(py: Python<'_>, message: impl ToString) -> PyErr {
     new_exception(py, "InputError", message.to_string())
 }
 
-/// A defect.
+/// A defect of the program.
 pub fn internal_error(py: Python<'_>, message: impl ToString) -> PyErr {
     new_exception(py, "InternalError", message.to_string())
 }
 
-/// What the program refuses.
+/// The exception for a failure of the program.
 pub fn failure_error(py: Python<'_>, failure: Failure) -> PyErr {
     match failure {
         Failure::Input(message) => input_error(py, message),
@@ -35,7 +35,7 @@ pub fn catch_panic<T>(py: Python<'_>, work: impl FnOnce() -> PyResult<T>) -> PyR
         .unwrap_or_else(|panic| Err(internal_error(py, panic_message(&*panic))))
 }
 
-/// What a panic says.
+/// The message of a panic.
 pub fn panic_message(panic: &(dyn std::any::Any + Send)) -> String {
     let said = panic.downcast_ref::<String>().cloned();
     let said = said.or_else(|| panic.downcast_ref::<&str>().map(|text| (*text).to_owned()));

@@ -22,21 +22,18 @@ impl Job {
     fn read_point(&self, py: Python<'_>, of: &PointArray<'_>) -> PyResult<Vec<f64>> {
         let (found, expected) = (of.as_array().len(), self.posterior.unknowns().len());
         if found != expected {
-            let names = self.names().join(", ");
-            return Err(errors::input_error(
-                py,
-                format!("found {found} numbers, expected {expected}: {names}"),
-            ));
+            let problem = format!("found {found} numbers, expected {expected}: {}", self.names().join(", "));
+            return Err(errors::input_error(py, problem));
         }
         Ok(of.as_array().iter().copied().collect())
     }
 
-    fn evaluate_at(
+    fn evaluate_at<T: Send>(
         &self,
         py: Python<'_>,
         of: &PointArray<'_>,
-        what: impl Fn(&Posterior, &[f64]) -> f64 + Send,
-    ) -> PyResult<f64> {
+        what: impl Fn(&Posterior, &[f64]) -> T + Send,
+    ) -> PyResult<T> {
         let (point, posterior) = (self.read_point(py, of)?, Arc::clone(&self.posterior));
         workers::run_interruptible(py, None, move |_| what(&posterior, &point))
     }
@@ -53,7 +50,7 @@ impl Job {
         let posterior = read.map_err(|failure| errors::failure_error(py, failure))?;
         let refused = |error| errors::input_error(py, format!("{}: {error}", path.display()));
         let posterior = Arc::new(posterior.map_err(refused)?);
-        // (as a process in another folder may read it again)
+        // a process in another folder may read it again
         let path = std::path::absolute(&path).unwrap_or(path);
         Ok(Self { posterior, path })
     }
@@ -109,8 +106,7 @@ impl Job {
     }
 
     fn residuals<'py>(&self, py: Python<'py>, x: PointArray<'py>) -> PyResult<Bound<'py, PyArray1<f64>>> {
-        let (point, posterior) = (self.read_point(py, &x)?, Arc::clone(&self.posterior));
-        let found = workers::run_interruptible(py, None, move |_| posterior.residuals(&point))?;
+        let found = self.evaluate_at(py, &x, Posterior::residuals)?;
         Ok(PyArray1::from_vec(py, found.into_iter().map(|r| r.unwrap_or(f64::NAN)).collect()))
     }
 }

@@ -1,5 +1,5 @@
-//! What of wiperlab Python calls: thin classes and functions, with the texts and arrays that the package
-//! `wiperlab` makes its own classes of.
+//! The extension module behind the Python package `wiperlab`: thin classes and functions that exchange text
+//! and arrays with it.
 
 mod errors;
 mod job;

@@ -29,10 +29,9 @@ pub fn simulate_points<'py>(
     }
     let study = Study::parse_maps("read", maps).map_err(|error| errors::input_error(py, error))?;
     let scene = Arc::clone(&scene.inner);
-    // (an unknown name is a mistake in the call; a value that a scene refuses is the outcome of its point)
+    // an unknown name is an error of the call; a value that the scene refuses is the outcome of its point
     if let Some(name) = names.iter().find(|name| scene.value(name).is_none()) {
-        let refused =
-            scene.with_parameter(name, 1.0).err().map_or_else(String::new, |error| error.to_string());
+        let refused = scene.with_parameter(name, 1.0).err().map_or_else(String::new, |e| e.to_string());
         return Err(errors::input_error(py, format!("names: {refused}")));
     }
     study.check_scene("read", &scene).map_err(|error| errors::input_error(py, error))?;
@@ -46,7 +45,7 @@ pub fn simulate_points<'py>(
         let run = |row| PointOutcome::run_point_scene(&study, || at(row), || StopFlag(stop).flow());
         rows.par_iter().map(|row| StopFlag(stop).flow().is_continue().then(|| run(row))).collect()
     })?;
-    // (what was asked to stop has raised)
+    // an interrupted run has raised already
     let outcomes = outcomes.unwrap_or_default();
     let values = outcomes.iter().flat_map(|outcome| &outcome.values);
     let values: Vec<f64> = values.map(|value| *value.as_ref().unwrap_or(&f64::NAN)).collect();

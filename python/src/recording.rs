@@ -7,8 +7,7 @@ use pyo3::prelude::*;
 use pyo3::types::{PyBytes, PyDict};
 use std::path::PathBuf;
 use std::sync::Arc;
-use wiperlab::cli::read;
-use wiperlab::cli::read::SpectrumOptions;
+use wiperlab::cli::read::{self, SpectrumOptions};
 use wiperlab::recording::{self, FrameGrid, Traces};
 
 /// Tracked positions of tip and head on the frame grid.
@@ -20,9 +19,6 @@ pub struct Recording {
     #[pyo3(get)]
     exposure_s: Option<f64>,
 }
-
-/// Columns of a recording that it may lack.
-const CONFIDENCES: [&str; 2] = ["tip_confidence", "head_confidence"];
 
 #[pymethods]
 impl Recording {
@@ -59,14 +55,13 @@ impl Recording {
                 tip_y_m: place("tip_y_m")?,
                 head_x_m: place("head_x_m")?,
                 head_y_m: place("head_y_m")?,
-                tip_confidence: column(CONFIDENCES[0])?,
-                head_confidence: column(CONFIDENCES[1])?,
+                tip_confidence: column("tip_confidence")?,
+                head_confidence: column("head_confidence")?,
             };
             let grid = FrameGrid { start_s, frame_rate_hz, frames };
             let recording = recording::Recording::new(name, grid, traces, synthetic);
-            let inner =
-                Arc::new(recording.map_err(|error| errors::input_error(py, format!("{name}: {error}")))?);
-            Ok(Self { inner, exposure_s })
+            let recording = recording.map_err(|error| errors::input_error(py, format!("{name}: {error}")))?;
+            Ok(Self { inner: Arc::new(recording), exposure_s })
         })
     }
 

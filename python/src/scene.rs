@@ -13,16 +13,17 @@ use wiperlab::cli::read;
 use wiperlab::simulate::outputs::{
     EnergyAudit, SampleObserver, SimulationSummary, Transitions, recorded_points_m, sample_times,
 };
-use wiperlab::simulate::{self, ModelSample, Observer, SolutionSegment, SolverOptions, run_scene_with};
+use wiperlab::simulate::scene::Scene as Model;
+use wiperlab::simulate::{ModelSample, Observer, SolutionSegment, SolverOptions, run_scene_with};
 
-/// What makes a scene again.
+/// What a scene is restored from: name and text of its file, the recording that drives it, replaced values.
 type SceneParts = (String, String, Option<PathBuf>, Vec<(String, f64)>);
 
 /// A blade, its friction, its drive and what is to be computed.
 #[pyclass(module = "wiperlab", frozen, from_py_object)]
 #[derive(Clone)]
 pub struct Scene {
-    pub inner: Arc<simulate::scene::Scene>,
+    pub inner: Arc<Model>,
     file: String,
     text: String,
     driver: Option<PathBuf>,
@@ -36,13 +37,15 @@ impl Scene {
                 driver.clone().map_or_else(|| read::resolve_existing_path(Path::new(&file), named), Ok)?;
             read::read_recording(&path).map(|(recording, _)| recording).map_err(|error| error.to_string())
         };
-        let scene = simulate::scene::Scene::parse_with_recording(&file, &text, recording);
+        let scene = Model::parse_with_recording(&file, &text, recording);
         let scene = scene.map_err(|error| errors::input_error(py, error))?;
-        let with =
-            |scene: simulate::scene::Scene, (name, value): &(String, f64)| scene.with_parameter(name, *value);
-        let inner = set.iter().try_fold(scene, with).map_err(|error| errors::input_error(py, error))?;
-        Ok(Self { inner: Arc::new(inner), file, text, driver, set })
+        Ok(Self { inner: replace_values(py, scene, &set)?, file, text, driver, set })
     }
+}
+
+fn replace_values(py: Python<'_>, scene: Model, values: &[(String, f64)]) -> PyResult<Arc<Model>> {
+    let with = |scene: Model, (name, value): &(String, f64)| scene.with_parameter(name, *value);
+    values.iter().try_fold(scene, with).map(Arc::new).map_err(|error| errors::input_error(py, error))
 }
 
 #[pymethods]
@@ -75,11 +78,7 @@ impl Scene {
     /// The same scene with other values of its parameters.
     fn replace(&self, py: Python<'_>, values: Vec<(String, f64)>) -> PyResult<Self> {
         catch_panic(py, || {
-            let with = |scene: simulate::scene::Scene, (name, value): &(String, f64)| {
-                scene.with_parameter(name, *value)
-            };
-            let inner = values.iter().try_fold((*self.inner).clone(), with);
-            let inner = Arc::new(inner.map_err(|error| errors::input_error(py, error))?);
+            let inner = replace_values(py, (*self.inner).clone(), &values)?;
             Ok(Self { inner, set: [&self.set[..], &values].concat(), ..self.clone() })
         })
     }
@@ -147,21 +146,8 @@ impl Observer for StopFlag<'_> {
 }
 
 /// Names of the columns of numbers, those of trace.csv and state.csv.
-const COLUMNS: [&str; 13] = [
-    "time_s",
-    "tip_x_m",
-    "tip_y_m",
-    "head_x_m",
-    "head_y_m",
-    "neck_angle_rad",
-    "lip_angle_rad",
-    "neck_rate_rad_per_s",
-    "lip_rate_rad_per_s",
-    "head_drop_m",
-    "tip_velocity_m_per_s",
-    "normal_force_n",
-    "friction_force_n",
-];
+const COLUMNS: &str = "time_s,tip_x_m,tip_y_m,head_x_m,head_y_m,neck_angle_rad,lip_angle_rad,neck_rate_rad_per_s,\
+                       lip_rate_rad_per_s,head_drop_m,tip_velocity_m_per_s,normal_force_n,friction_force_n";
 
 /// Columns of samples, the modes among them, the columns of transitions, and the summary as JSON.
 type RunArrays<'py> = (Bound<'py, PyDict>, Vec<&'static str>, Bound<'py, PyDict>, String);
@@ -174,13 +160,12 @@ pub fn simulate_scene<'py>(
     scene: &Scene,
     times_s: Option<PyReadonlyArray1<'py, f64>>,
 ) -> PyResult<RunArrays<'py>> {
-    let times: Vec<f64> = match times_s {
-        Some(times) => times.as_array().iter().copied().collect(),
-        None => sample_times(&scene.inner).collect(),
-    };
+    let given = times_s.map(|times| times.as_array().iter().copied().collect());
+    let times: Vec<f64> = given.unwrap_or_else(|| sample_times(&scene.inner).collect());
     let scene = Arc::clone(&scene.inner);
     let (columns, modes, transitions, summary) = workers::run_interruptible(py, None, move |stop| {
-        let mut columns: Vec<Vec<f64>> = COLUMNS.iter().map(|_| Vec::with_capacity(times.len())).collect();
+        let mut columns: Vec<Vec<f64>> =
+            COLUMNS.split(',').map(|_| Vec::with_capacity(times.len())).collect();
         let mut modes = Vec::with_capacity(times.len());
         let sampler = SampleObserver::new(times.into_iter(), |sample: &ModelSample| {
             let ModelSample { time_s, pose, head_drop_m, tip_velocity_m_per_s, normal_n, friction_n, .. } =
@@ -202,7 +187,7 @@ pub fn simulate_scene<'py>(
     })?;
     let summary = summary.map_err(|error| errors::internal_error(py, error))?;
     let samples = PyDict::new(py);
-    for (name, column) in COLUMNS.iter().zip(columns) {
+    for (name, column) in COLUMNS.split(',').zip(columns) {
         samples.set_item(name, PyArray1::from_vec(py, column))?;
     }
     let events = PyDict::new(py);

@@ -9,10 +9,10 @@ use std::sync::mpsc::{self, RecvTimeoutError};
 use std::sync::{Arc, Condvar, Mutex, PoisonError};
 use std::time::Duration;
 
-/// How often signals are looked at while others work.
+/// Interval at which signals are checked.
 const POLL: Duration = Duration::from_millis(50);
 
-/// The threads of this process; those of a process that it was forked from do not run here.
+/// The thread pool with the id of its process: a forked process has no threads of its parent.
 static POOL: Mutex<Option<(u32, Arc<ThreadPool>)>> = Mutex::new(None);
 
 fn process_pool() -> Result<Arc<ThreadPool>, String> {
@@ -33,8 +33,8 @@ fn build_pool(threads: usize) -> Result<ThreadPool, String> {
     ThreadPoolBuilder::new().num_threads(threads).build().map_err(|error| error.to_string())
 }
 
-/// Runs work that cannot be asked to stop, on every core, while Python goes on. Ctrl-C leaves it to itself: it
-/// ends some time later, and what it gives is dropped.
+/// Runs work that cannot be interrupted, on every core, without the lock of the interpreter. After Ctrl-C it
+/// continues in the background, and its result is dropped.
 pub fn run_detached<T: Send + 'static>(
     py: Python<'_>,
     work: impl FnOnce() -> T + Send + 'static,
@@ -42,7 +42,7 @@ pub fn run_detached<T: Send + 'static>(
     let pool = process_pool().map_err(|error| no_threads_error(py, &error))?;
     let (send, mut receive) = mpsc::channel();
     pool.spawn(move || {
-        // (nobody waits any longer where this fails)
+        // fails only if nobody waits any longer
         let _ = send.send(catch_unwind(AssertUnwindSafe(work)));
     });
     loop {
@@ -62,8 +62,8 @@ fn no_threads_error(py: Python<'_>, error: &str) -> PyErr {
     errors::internal_error(py, format!("no threads can be started: {error}"))
 }
 
-/// Runs work on as many threads (on every core if `None`) while Python goes on; what it is given turns true
-/// once it is asked to stop.
+/// Runs work on `threads` threads (`None`: every core) without the lock of the interpreter. Ctrl-C sets the
+/// flag that the work is given.
 pub fn run_interruptible<T: Send>(
     py: Python<'_>,
     threads: Option<usize>,

@@ -24,10 +24,9 @@ pub(crate) struct AccuracyArgs {
     pub overwrite: Overwrite,
 }
 
-/// The tables of a study.
 const WORK_PRECISION: &str = "work-precision.csv";
 const ACCURACY: &str = "accuracy.csv";
-/// Everything that a study writes.
+/// Files of the command.
 const OUTPUTS: [&str; 5] = [
     WORK_PRECISION,
     ACCURACY,
@@ -35,10 +34,9 @@ const OUTPUTS: [&str; 5] = [
     "paper/work-precision-85mm.svg",
     "paper/work-precision-170mm.svg",
 ];
-/// Rounds in which every setting is timed once: what else the machine does then falls on all of them.
+/// Rounds in which every setting is timed once, so that other load on the machine affects all settings alike.
 const ROUNDS: u32 = 15;
-/// Rounds in which a setting takes part however long it takes, and what it may have taken in all to take part
-/// in more.
+/// Rounds that every setting takes part in, and the total time after which a setting takes part in no more.
 const MIN_TIMING: (u32, Duration) = (3, Duration::from_millis(250));
 
 impl AccuracyArgs {
@@ -71,7 +69,7 @@ impl AccuracyArgs {
     }
 }
 
-/// The least time of every setting over the rounds.
+/// Sets the wall time of every setting to its least over the rounds.
 fn time_settings(reference: &ReferenceRun<'_>, rows: &mut [AccuracyRow], after_round: impl Fn()) {
     let (least_rounds, long_enough) = MIN_TIMING;
     let mut taken = vec![Duration::ZERO; rows.len()];
@@ -96,7 +94,7 @@ fn work_precision_diagram(
 ) -> WorkPrecision {
     let run = reference.run_result();
     let length_s = (1e4 * (run.stopped_at_s - scene.start_s)).round() / 1e4;
-    // without transitions, or with references that disagree on them, the error is that of the deflection
+    // without transitions, or if the references disagree on them, the error is that of the deflection
     let timed = run.transitions > 0 && reference.lists_agree;
     let (unit, error_label, floor) = if timed {
         (" s", "worst error of a transition time, s", reference.apart_s)

@@ -14,8 +14,6 @@ pub(crate) fn parse_count(text: &str) -> Result<usize, String> {
     }
 }
 
-// What every command takes.
-
 #[derive(Debug, Clone, Args)]
 pub(crate) struct GlobalArgs {
     /// No progress and no summary; refusals are still shown
@@ -33,7 +31,8 @@ pub(crate) struct GlobalArgs {
     pub csv_dialect: CsvDialect,
 }
 
-/// Most threads: more than a machine has cores. Each takes megabytes, and a hundred thousand stop a machine.
+/// Most threads: more than a machine has cores. Each takes megabytes, so a hundred thousand would stop the
+/// machine.
 const MOST_THREADS: usize = 1024;
 
 fn parse_threads(text: &str) -> Result<usize, String> {
@@ -43,7 +42,7 @@ fn parse_threads(text: &str) -> Result<usize, String> {
 }
 
 impl GlobalArgs {
-    /// Sets what holds for the whole program, before anything runs.
+    /// Applies the settings of the whole program, before anything runs.
     pub(crate) fn apply_settings(&self) -> Outcome<()> {
         self.max_file_size.set_read_limit();
         let Some(threads) = self.threads else { return Ok(()) };
@@ -56,13 +55,11 @@ impl GlobalArgs {
     }
 }
 
-// How long a command may take, as people and schedulers write it.
-
 /// A time such as `90s`, `45min`, `1h30min`, `02:00:00` or `1-12:00:00`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct TimeLimit(pub Duration);
 
-/// Longest time that is taken, s: a year.
+/// Longest time limit, s: a year.
 const MAX_TIME_LIMIT_S: u64 = 366 * DAY_S;
 const DAY_S: u64 = 86_400;
 const TIME_LIMIT_UNITS: [(&str, u64); 5] = [("min", 60), ("d", DAY_S), ("h", 3600), ("m", 60), ("s", 1)];
@@ -90,7 +87,7 @@ fn parse_clock_time(text: &str) -> Option<u64> {
     in_range.then_some(total.checked_add(minutes * 60 + seconds)?)
 }
 
-/// Numbers, each with its unit.
+/// Sums numbers with their units, such as `1h30min`, s.
 fn parse_unit_time(text: &str) -> Option<u64> {
     let mut rest = text;
     let mut total: u64 = 0;

@@ -33,7 +33,7 @@ pub(crate) struct BladeArgs {
     pub overwrite: Overwrite,
 }
 
-/// About the weight of a gram: it moves the tip of a blade of some centimetres by tenths of a millimetre.
+/// About the weight of 1 g, which moves the tip of a blade of some centimetres by tenths of a millimetre.
 const DEFAULT_FORCE_N: f64 = 0.01;
 
 fn parse_above_zero(text: &str) -> Result<f64, String> {
@@ -41,7 +41,7 @@ fn parse_above_zero(text: &str) -> Result<f64, String> {
     number.ok_or_else(|| "expected a number above 0, without a unit".to_owned())
 }
 
-/// `blade.json` and `checks.json`: what was computed, with what is hard to believe in the file.
+/// `blade.json` and `checks.json`: the result, and implausible values of the file.
 #[derive(Serialize)]
 struct BladeJson<T> {
     #[serde(flatten)]
@@ -82,7 +82,7 @@ fn to_json(computed: impl Serialize, findings: Vec<PlausibilityFinding>) -> Outc
     serde_json::to_vec_pretty(&BladeJson { computed, findings }).map_err(Failure::internal)
 }
 
-// `wiperlab blade --check`: what one can check on a blade, as a table.
+// `wiperlab blade --check`
 
 impl BladeArgs {
     pub(super) fn check_scene(&self, path: &Path, global: &GlobalArgs) -> Outcome<()> {

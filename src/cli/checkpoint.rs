@@ -1,7 +1,8 @@
-//! A journal on disk: locked, shortened by nothing but a torn line, and kept when a new one is begun.
+//! A journal on disk. It is locked while it is written, loses nothing but a torn last line, and is kept when
+//! a new one begins.
 //!
-//! Every append waits until the disk has the lines (`fdatasync`), and a new file also until the disk has its
-//! name. What was counted or reported survives a power failure.
+//! Every append waits until the lines are on the disk (`fdatasync`), and a new file until its name is. So
+//! every record that was counted or reported survives a power failure.
 
 use super::prelude::*;
 use crate::checkpoint::{
@@ -22,29 +23,29 @@ pub(crate) struct CheckpointWriter {
     path: PathBuf,
     /// `None` before the first line of a new journal.
     file: Option<File>,
-    /// What has to be done with what is there, before the first line is appended.
+    /// What happens to the existing file before the first line is appended.
     due: Option<PendingAction>,
     kind: CheckpointKind,
 }
 
-/// A journal that is written, and what it holds if it is to be resumed.
+/// A journal open for writing, with its contents if it is resumed.
 type OpenedCheckpoint<T> = Outcome<(CheckpointWriter, Option<T>)>;
 
-/// What looks at the records of a journal, one by one.
+/// Visits the records of a journal one by one.
 type RecordVisitor<'a, R> = dyn FnMut(StoredRecord<R>) -> Result<(), CheckpointError> + 'a;
 
-/// What is done with a journal that is there.
+/// What happens to an existing journal before the first line is appended.
 #[derive(Clone, Copy)]
 enum PendingAction {
-    /// It is kept under another name: hours of work should not be lost because `--resume` was forgotten.
+    /// It is renamed: hours of work must not be lost because `--resume` was forgotten.
     SetAside,
-    /// It is continued after this number of bytes, and a line end where the last line has none.
+    /// It continues after this number of bytes, and with a line end if the last line has none.
     Continue { intact_bytes: usize, unended: bool },
 }
 
 impl CheckpointWriter {
-    /// The journal at `path`, or where it will be, and what it holds if it is to be resumed; nothing is
-    /// changed before the first line.
+    /// Opens the journal at `path`, with its contents if it is resumed. Nothing changes on disk before the
+    /// first line.
     pub(crate) fn open<R: CheckpointRecord>(
         path: &Path,
         resume: bool,
@@ -57,8 +58,8 @@ impl CheckpointWriter {
         })
     }
 
-    /// The same where what it holds may be larger than memory: `each` sees its records one by one, and the
-    /// header is given back.
+    /// The same for journals larger than memory: `each` visits the records one by one, and only the header is
+    /// returned.
     pub(crate) fn open_each<R: CheckpointRecord>(
         path: &Path,
         resume: bool,
@@ -73,7 +74,7 @@ impl CheckpointWriter {
         })
     }
 
-    /// Locks the file, and lets `take` read it where it is to be resumed and has a header.
+    /// Locks the file; `take` reads it if it is resumed and has a header.
     fn open_with<R: CheckpointRecord, T>(
         path: &Path,
         resume: bool,
@@ -107,7 +108,7 @@ impl CheckpointWriter {
         Ok((opened, Some(taken)))
     }
 
-    /// Notes how a journal goes on that ends like this; `None` where it has no complete header.
+    /// Sets how a journal with this end continues; `None` if it has no complete header.
     fn plan_resume(&mut self, name: &str, is_empty: bool, end: Option<CheckpointEnd>) {
         self.due = Some(match end {
             None => {
@@ -128,13 +129,13 @@ impl CheckpointWriter {
         });
     }
 
-    /// Drops what is torn, also where nothing had to be appended.
+    /// Drops a torn last line, even if nothing was appended.
     pub(crate) fn finish(mut self) -> Outcome<()> {
         self.apply_pending()
             .map_err(|problem| Failure::Internal(format!("{}: {problem}", self.path.display())))
     }
 
-    /// Does what is due.
+    /// Carries out the pending action.
     fn apply_pending(&mut self) -> Result<(), String> {
         let refused = |error: io::Error| error.to_string();
         match (self.due.take(), &mut self.file) {
@@ -168,7 +169,7 @@ impl CheckpointSink for CheckpointWriter {
     }
 }
 
-/// A new journal, whose name the disk has.
+/// Creates a journal and waits until its name is on the disk.
 fn create_checkpoint(path: &Path, kind: CheckpointKind) -> Result<File, String> {
     let refused = |error: io::Error| error.to_string();
     let folder = path.parent().unwrap_or(Path::new(""));
@@ -181,7 +182,7 @@ fn create_checkpoint(path: &Path, kind: CheckpointKind) -> Result<File, String> 
     Ok(file)
 }
 
-/// The file, if there is one.
+/// Opens and locks the file, if it exists.
 fn lock_existing(path: &Path, kind: CheckpointKind) -> Outcome<Option<File>> {
     let refused = |problem: String| Failure::at(path.display(), problem);
     let file = match OpenOptions::new().read(true).append(true).open(path) {
@@ -198,8 +199,8 @@ fn lock_existing(path: &Path, kind: CheckpointKind) -> Outcome<Option<File>> {
     Ok(Some(file))
 }
 
-/// Two programs that append to one file would tear each other's lines. File systems without locks are taken
-/// as they are.
+/// Two programs that append to one file would tear each other's lines. On file systems without locks nothing
+/// prevents that.
 fn lock_file(file: &File, kind: CheckpointKind) -> Result<(), String> {
     match file.try_lock() {
         Err(TryLockError::WouldBlock) => Err(format!(
@@ -209,8 +210,8 @@ fn lock_file(file: &File, kind: CheckpointKind) -> Result<(), String> {
     }
 }
 
-/// Only a journal of the same kind of input, or what is left of one, gives way to a new one: a job may turn
-/// from features to traces.
+/// Only a journal of the same kind of input, whole or torn, is replaced by a new one. The journals of a fit
+/// to features and of one to traces are of the same kind.
 fn check_same_kind(name: &str, bytes: &[u8], kind: CheckpointKind) -> Outcome<()> {
     if !has_whole_line(bytes) || detect_kind(bytes).is_some_and(|found| found.input() == kind.input()) {
         return Ok(());
@@ -220,12 +221,12 @@ fn check_same_kind(name: &str, bytes: &[u8], kind: CheckpointKind) -> Outcome<()
     )))
 }
 
-/// Gives a journal the next free name of its kind, `journal.previous-1.jsonl`: none is ever written over.
+/// Renames a journal to the next free name, such as `journal.previous-1.jsonl`. No journal is overwritten.
 fn set_aside(path: &Path) -> io::Result<PathBuf> {
     let mut number = 1;
     loop {
         let to = numbered_path(path, number);
-        // (a new file: whoever comes at the same time finds the name taken)
+        // creating the file reserves the name against a second program
         match File::create_new(&to) {
             Ok(_) => {
                 fs::rename(path, &to)?;

@@ -36,7 +36,7 @@ impl CollectArgs {
         }
     }
 
-    /// Says which jobs of a list have no result.
+    /// Prints which jobs of a list have no result.
     fn report_jobs(&self, jobs: &[PathBuf], global: &GlobalArgs) -> Outcome {
         check_distinct_folders(jobs)?;
         let of = self.shards.unwrap_or(jobs.len());
@@ -90,7 +90,7 @@ impl CollectArgs {
     }
 }
 
-/// Shards of so many that have points to do, rising.
+/// The shards, of `of`, whose points are not all known; in rising order.
 fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Outcome<TaskList> {
     Shard::new(0, of).ok_or_else(|| too_many_shards(of))?;
     let mut due = vec![false; of];
@@ -98,7 +98,7 @@ fn incomplete_tasks(points: &PointCollection<File>, of: usize) -> Outcome<TaskLi
     Ok((0..of).filter(|at| due[*at]).collect())
 }
 
-/// Why a file alone is not collected.
+/// The refusal of a single file.
 fn one_file_failure(file: &Path) -> Outcome<Failure> {
     let problem = if is_study(file)? {
         "found a study, expected the folder of its shards: `wiperlab collect DIR` with the --out of `wiperlab sweep`"
@@ -112,7 +112,7 @@ fn too_many_shards(of: usize) -> Failure {
     Failure::Input(format!("--shards: found {of}, expected fewer"))
 }
 
-/// Which tasks of so many have to run again, and with which command.
+/// Prints which of `of` tasks have to run again, and with which command.
 fn print_missing(what: &str, tasks: &TaskList, of: usize, command: &str) {
     print_line!("missing: {what}, in {} of {of} tasks", tasks.len());
     print_line!("tasks: {tasks}");

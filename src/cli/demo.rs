@@ -20,7 +20,7 @@ const TWIN: &str = include_str!("../../data/actual-blade-twin/twin.toml");
 const SCENE: &str = include_str!("../../data/scenes/actual-blade.toml");
 const JOB: &str = include_str!("../../fits/actual-blade-twin/job.toml");
 
-/// Channel and window of the two spectra that the demo shows.
+/// Folder, channel and window of the two spectra of the demo.
 const SPECTRA: [(&str, &str, &str); 2] =
     [("low", "head-drop", "release+0.01..release+0.2"), ("high", "deflection", "release+0.01..release+0.1")];
 
@@ -74,7 +74,7 @@ impl DemoArgs {
         Ok(CommandOutcome::done_if(!missed && solved.result.status == FitStatus::Converged))
     }
 
-    /// Refuses before anything is written what one of the steps would refuse.
+    /// Makes the checks of all four steps before anything is written.
     fn check_outputs(&self) -> Outcome<()> {
         let steps: [(OutputCommand, &str, &[&str]); 4] = [
             (OutputCommand::Import, "data", &[TRACE_FILE, DESCRIPTION_FILE, EXPORT]),
@@ -100,7 +100,7 @@ impl DemoArgs {
     }
 }
 
-/// What `wiperlab import` does with the export, its scale and rate.
+/// Imports the bundled export as `wiperlab import` does, with its scale and rate.
 fn import_export(folder: &Path, overwrite: Overwrite) -> Outcome<()> {
     let [tip, head] = SYNTHETIC_TRACK_NAMES;
     let options = ImportOptions {
@@ -118,7 +118,7 @@ fn import_export(folder: &Path, overwrite: Overwrite) -> Outcome<()> {
     import_into(folder, &[export], &options, overwrite)
 }
 
-/// The truth behind the synthetic recording, next to the estimates.
+/// Prints the true parameters of the synthetic recording next to the estimates.
 fn print_truth(result: &FitResult) -> Outcome<()> {
     let twin: toml::Table = TWIN.parse().map_err(Failure::internal)?;
     let truth = twin.get("truth").and_then(toml::Value::as_table);

@@ -1,4 +1,4 @@
-//! Exit codes and what goes to standard error.
+//! Exit codes and failures.
 
 use crate::simulate::{RunResult, RunStatus};
 
@@ -9,7 +9,7 @@ pub(crate) const INTERNAL: u8 = 1;
 /// The command ran but stopped early; what was computed is written and says so.
 pub(crate) const STOPPED_EARLY: u8 = 3;
 
-/// How a command that ran has ended.
+/// How a command ended that did not fail.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum CommandOutcome {
     Done,
@@ -45,7 +45,7 @@ pub enum Failure {
 }
 
 impl Failure {
-    /// Any typed refusal of the library is bad input.
+    /// Bad input, from a typed error of the library.
     pub(crate) fn input(error: impl std::fmt::Display) -> Self {
         Self::Input(error.to_string())
     }
@@ -55,14 +55,14 @@ impl Failure {
         Self::Input(format!("{place}: {problem}"))
     }
 
-    /// What should not happen.
+    /// A defect of the program or a failure of the machine.
     pub(crate) fn internal(error: impl std::fmt::Display) -> Self {
         Self::Internal(error.to_string())
     }
 
     /// Prints the message and gives the exit code.
     pub(crate) fn print_message(&self) -> u8 {
-        // (each problem of a file has a line of its own; no line but the first begins at the margin)
+        // each problem of a file has its own line; only the first begins at the margin
         for (i, line) in self.to_string().split('\n').enumerate() {
             warn_line!("{}{line}", if i == 0 { "error: " } else { "       " });
         }
@@ -73,9 +73,7 @@ impl Failure {
     }
 }
 
-// How a model run that did not complete ended, for the user.
-
-/// Status, time and meaning; `None` for a run that completed.
+/// Status, time and meaning of a run that ended early; `None` for one that completed.
 pub(crate) fn describe_early_end(run: &RunResult) -> Option<String> {
     (run.status != RunStatus::Completed)
         .then(|| format!("{} at {} s: {}", run.status.name(), run.stopped_at_s, run.status.meaning()))

@@ -1,4 +1,4 @@
-//! Reading and writing: outputs of a command appear all together or not at all, and replace nothing but what
+//! Reading and writing. Outputs of a command appear all together or not at all, and replace only files that
 //! the command made itself.
 
 mod guard;
@@ -24,7 +24,7 @@ use std::io::{self, BufWriter, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-/// What a fit found, in its folder.
+/// Result of a fit, in its folder.
 pub(crate) const RESULT_FILE: &str = "result.json";
 
 /// Name of a file or folder for messages and headings.
@@ -41,13 +41,13 @@ pub(crate) fn containing_folder(file: &Path) -> &Path {
     file.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
-/// Where a path leads that stands in `file`: it is relative to the folder of that file, whatever the working
-/// folder is.
+/// Resolves a path that is written in `file`: it is relative to the folder of that file, not to the working
+/// folder.
 pub(crate) fn resolve_path(file: &Path, named: &str) -> PathBuf {
     containing_folder(file).join(named)
 }
 
-/// The same where something has to be there; otherwise why it is refused.
+/// The same for a path that must exist; otherwise the reason of the refusal.
 pub(crate) fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf, String> {
     let path = resolve_path(file, named);
     if path.exists() {
@@ -60,13 +60,13 @@ pub(crate) fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf,
     ))
 }
 
-/// A path as a file in `folder` names it: from there, or in full where no way leads from one to the other.
+/// A path relative to `folder`, or absolute if there is no relative one.
 pub(crate) fn relative_path(folder: &Path, path: &Path) -> Outcome<String> {
     let in_full = |path: &Path| {
         std::path::absolute(path)
             .map_err(|error| Failure::at(path.display(), format!("cannot be found from here: {error}")))
     };
-    // (links are followed in what there is, as `..` behind a link leads elsewhere)
+    // links are followed as far as the path exists, because `..` behind a link leads elsewhere
     let real = |path: &Path| -> Outcome<PathBuf> {
         let full = in_full(path)?;
         let there = full.ancestors().find(|part| part.exists()).unwrap_or(Path::new(""));
@@ -94,7 +94,7 @@ pub(crate) fn write_outputs(
     commit_files(OutputStaging::new(folder, writer, &file_names(files))?, files)
 }
 
-/// The same for files that no marker lists, of which the caller knows that they replace nothing of value.
+/// The same for files that no marker lists; the caller knows that they replace nothing of value.
 pub(crate) fn write_unmarked(folder: &Path, files: &[(impl AsRef<str>, Vec<u8>)]) -> Outcome<()> {
     OutputFolder::find_writable_ancestor(folder)?;
     commit_files(OutputStaging::new_unmarked(folder, &file_names(files))?, files)
@@ -121,7 +121,7 @@ pub(crate) fn figure_files(name: &str, figure: &Figure) -> [(String, Vec<u8>); 3
     ]
 }
 
-/// Text that is made piece by piece, as a reader.
+/// A reader of text that is made piece by piece.
 pub(crate) struct ChunkReader<I> {
     pieces: I,
     present: io::Cursor<Vec<u8>>,
@@ -148,19 +148,19 @@ impl<I: Iterator<Item = String>> Read for ChunkReader<I> {
     }
 }
 
-/// A folder for results that are written while they are computed: nothing is seen of them before all are
-/// complete, and nothing is left of them when the program is killed.
+/// A folder for results that are written while they are computed. They appear when all are complete; nothing
+/// is left of them when the program is killed.
 #[derive(Debug)]
 pub(crate) struct OutputFolder {
     folder: PathBuf,
     writer: WritePolicy,
-    /// Where the nameless files are kept meanwhile: the folder, or what there is of the way to it.
+    /// Where nameless files lie meanwhile: the folder, or its nearest existing parent.
     temporary_folder: PathBuf,
 }
 
 impl OutputFolder {
-    /// Checks that `folder` is one or can be made, can be written to, and holds nothing that the files
-    /// `names` must not replace: asked before the work, as it is again when they are placed.
+    /// Checks before the work that `folder` exists or can be made, is writable, and holds nothing that the
+    /// files `names` must not replace. The same is checked again when they are written.
     pub(crate) fn check(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Outcome<Self> {
         let near = Self::find_writable_ancestor(folder)?;
         names.iter().chain([&MARKER_FILE]).try_for_each(|name| check_path_free(&folder.join(name)))?;
@@ -169,7 +169,7 @@ impl OutputFolder {
         Ok(Self { folder: folder.to_owned(), writer: writer.clone(), temporary_folder: near })
     }
 
-    /// What there is of the way to a folder, which can be written to.
+    /// The nearest existing parent of a folder, checked to be writable.
     fn find_writable_ancestor(folder: &Path) -> Outcome<PathBuf> {
         let near = folder.ancestors().find(|path| path.exists() || path.is_symlink());
         let near = near.filter(|path| !path.as_os_str().is_empty()).unwrap_or(Path::new(".")).to_owned();
@@ -199,7 +199,7 @@ impl OutputFolder {
         Ok(PendingFile { name, path, to: BufWriter::new(file), failed: None })
     }
 
-    /// Puts the files that grew and the others into the folder under their names, or none of them.
+    /// Puts the pending files and the others into the folder, or none of them.
     pub(crate) fn commit(
         &self,
         files: Vec<PendingFile>,
@@ -216,14 +216,14 @@ impl OutputFolder {
     }
 }
 
-/// A file without a name for what does not fit into memory, in a folder or in what there is of the way to it.
+/// A nameless file for data that do not fit into memory, in a folder or its nearest existing parent.
 pub(crate) fn create_scratch_file(folder: &Path) -> Outcome<File> {
     let near = OutputFolder::find_writable_ancestor(folder)?;
     tempfile::tempfile_in(&near).map_err(|error| write_failure(&near, &error))
 }
 
-/// A file on its way; after its first failure nothing more is written, and the failure is reported at the
-/// end.
+/// A file that is being written. After its first failure nothing more is written; the failure is reported at
+/// the end.
 #[derive(Debug)]
 pub(crate) struct PendingFile {
     name: &'static str,
@@ -239,7 +239,7 @@ impl PendingFile {
         }
     }
 
-    /// The whole file, to be read from its start.
+    /// The whole file, rewound.
     fn into_rewound_file(self) -> Outcome<(&'static str, File)> {
         let Self { name, path, to, failed } = self;
         let rewound = || {
@@ -256,8 +256,6 @@ fn write_failure(path: &Path, error: &io::Error) -> Failure {
     Failure::Internal(format!("{}: cannot be written: {error}", path.display()))
 }
 
-// Figures of commands that print or write tables.
-
 #[derive(Debug, Args)]
 pub(crate) struct FigureArgs {
     /// Draw figures into a folder, each in three files: one for a screen, and below paper/ one for a column
@@ -267,7 +265,7 @@ pub(crate) struct FigureArgs {
 }
 
 impl FigureArgs {
-    /// Refuses a folder that figures of these names cannot go to; asked before the work.
+    /// Checks before the work that figures of these names can be written.
     pub(crate) fn check_folder(&self, names: &[&str], overwrite: Overwrite) -> Outcome<()> {
         let Some(folder) = &self.folder else { return Ok(()) };
         let files = names.iter().flat_map(|name| figure_files(name, &Figure::default()));
@@ -276,7 +274,7 @@ impl FigureArgs {
         OutputFolder::check(folder, &WritePolicy::new(OutputCommand::Figures, overwrite), &names).map(|_| ())
     }
 
-    /// Writes named figures, where they are wanted.
+    /// Writes the figures, if a folder is given.
     pub(crate) fn write_figures(
         &self,
         overwrite: Overwrite,
@@ -294,16 +292,14 @@ impl FigureArgs {
     }
 }
 
-// Tables that are written row by row.
-
-/// A table on its way to its file.
+/// A table that is written row by row.
 pub(crate) struct StreamedTable {
     pub file: PendingFile,
     row: String,
-    /// Rows that are held back until there are enough of them, and how many those are.
+    /// Rows that are held back until there are enough of them, and how many are missing.
     held: String,
     missing: usize,
-    /// Time spent on text and file, which is not the run's.
+    /// Time spent on formatting and writing, which does not count as time of the run.
     pub spent: Duration,
 }
 

@@ -49,10 +49,10 @@ pub(crate) struct FitArgs {
     pub overwrite: Overwrite,
 }
 
-/// A result, and what it took.
+/// A result, and the work behind it.
 pub(crate) struct CompletedFit {
     pub result: FitResult,
-    /// How much of it was taken from journals.
+    /// Evaluations or iterates that were taken from the journal.
     pub replayed: usize,
     pub wall: Duration,
 }
@@ -93,7 +93,7 @@ impl FitArgs {
 }
 
 impl LoadedJob {
-    /// Fits, and writes the journal as it goes and the result at the end.
+    /// Runs the search; writes the journal meanwhile and the result at the end.
     pub(crate) fn solve(
         &self,
         global: &GlobalArgs,
@@ -167,7 +167,7 @@ impl LoadedJob {
         shown.bar.finish_and_clear();
         sink.finish()?;
         if result.status == FitStatus::Interrupted {
-            // an earlier result stays: what is new is in the journal, and a resumed fit gives its result
+            // an earlier result stays; a resumed fit goes on from the journal
             stops.announce_stop(&kept());
         } else {
             self.write_outputs(&result, &writer)?;

@@ -27,7 +27,7 @@ pub(crate) struct HelpArgs {
     pub word: Option<String>,
 }
 
-/// What a page shows.
+/// Content of a page.
 enum HelpContent {
     /// Every key of a kind of file.
     Keys(fn() -> Value),
@@ -37,7 +37,7 @@ enum HelpContent {
     Whole(&'static str),
 }
 
-/// A page, what it is about, and what it shows.
+/// Name, subject and content of a page.
 type HelpPage = (&'static str, &'static str, HelpContent);
 
 const FITS: &str = include_str!("../../docs/fits.md");
@@ -95,7 +95,8 @@ fn unknown_command_failure(word: &str, program: &Command) -> Failure {
     Failure::Input(format!("help: found `{word}`, expected a command or a page; {advice}"))
 }
 
-/// The page of a name; a kind of file has it with and without its ending, unless a command has that name.
+/// The page of a name. Pages of files are found with and without `.toml`, except `twin.toml`, as `twin` is a
+/// command.
 fn find_help_page(word: &str) -> Option<&'static HelpContent> {
     let stem = word.strip_suffix(".toml").unwrap_or(word);
     PAGES.iter().find(|(name, ..)| *name == word || *name == stem).map(|(.., content)| content)
@@ -141,7 +142,7 @@ fn render_keys(tables: &[KeyTable]) -> String {
     text
 }
 
-// `wiperlab completions`: what a shell completes.
+// `wiperlab completions`
 
 const COMPLETIONS_HELP: &str = "\
 For example:
@@ -167,7 +168,7 @@ impl CompletionsArgs {
     }
 }
 
-// `wiperlab man`: the help of every command as manual pages.
+// `wiperlab man`
 
 #[derive(Debug, Args)]
 pub(crate) struct ManArgs {
@@ -191,7 +192,7 @@ impl ManArgs {
     }
 }
 
-/// The page of a command and those of the commands in it.
+/// Adds the page of a command and of its subcommands.
 fn add_manual_page(pages: &mut Vec<(String, Vec<u8>)>, command: &Command, name: &str) -> Outcome<()> {
     let mut page = Vec::new();
     Man::new(command.clone()).render(&mut page).map_err(Failure::internal)?;

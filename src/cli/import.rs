@@ -147,7 +147,7 @@ impl ImportOptionArgs {
         Ok(CommandOutcome::Done)
     }
 
-    /// The options as typed become the library's.
+    /// Converts the options to those of the library.
     fn import_options(&self) -> Outcome<ImportOptions> {
         let named = self.out.file_name().map(|name| name.to_string_lossy().into_owned());
         let mut options = ImportOptions {
@@ -182,7 +182,7 @@ impl ImportOptionArgs {
         Ok(options)
     }
 
-    /// A folder keeps one recording, and a measured one for ever.
+    /// What the import may overwrite: a measured recording only if it comes from the same exports.
     fn write_policy(&self, sources: &[ImportSource]) -> WritePolicy {
         let exports = import::preserved_files(sources).into_iter();
         let exports = exports.map(|(_, bytes)| crate::text::sha256(bytes)).collect();
@@ -251,10 +251,11 @@ fn print_preview(imported: &Import, sources: &[ImportSource]) {
 
 /// Longest line of an export, bytes: a hundred thousand columns.
 const LONGEST_LINE: usize = 1_000_000;
-/// Bytes of it that a refusal shows.
+/// Bytes of a line that a refusal shows.
 const LINE_SHOWN: usize = 40;
 
-/// Bytes of a table; what has no lines is none, and its cells would fill memory. (Markup may be one line.)
+/// Reads a table. A file without line ends is refused, because its cells would fill the memory; markup may be
+/// one line.
 fn read_table(path: &Path) -> Outcome<Vec<u8>> {
     let bytes = files::read_data(path)?;
     let is_markup = bytes.iter().take(16).any(|byte| *byte == b'<');
@@ -280,7 +281,7 @@ fn read_source(path: &Path) -> Outcome<ImportSource> {
     let name = path.display().to_string();
     let mut names = import::companion_names(&name);
     names.retain(|companion| *companion != name && Path::new(companion).is_file());
-    // one file under two spellings where the file system knows no capitals
+    // on file systems that ignore case one file is found under two spellings
     names.dedup_by(|a, b| a.eq_ignore_ascii_case(b));
     let read = |name: String| Ok(CompanionFile { bytes: files::read_data(Path::new(&name))?, name });
     let companions = names.into_iter().map(read).collect::<Outcome<Vec<_>>>()?;
@@ -298,8 +299,8 @@ pub(crate) fn import_into(
     write_recording(folder, &WritePolicy::new(OutputCommand::Import, overwrite), sources, &imported)
 }
 
-/// What the user noted in a description which is replaced, and the command line does not give, stays: facts
-/// of the test, and where the pictures of its frames are.
+/// Keeps what the user wrote into a description that is replaced, unless the command line gives it: facts of
+/// the test, and the folder of the video frames.
 fn keep_user_notes(folder: &Path, description: &mut RecordingFile) {
     let Ok(text) = files::read_text(&folder.join(DESCRIPTION_FILE)) else { return };
     let Ok(replaced) = RecordingFile::parse(DESCRIPTION_FILE, &text) else { return };

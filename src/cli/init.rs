@@ -40,7 +40,7 @@ pub(crate) struct InitArgs {
     pub overwrite: Overwrite,
 }
 
-/// Files with their names, and what they rest on.
+/// The drafted files by name, and the findings that they rest on.
 type DraftFiles = (Vec<(&'static str, String)>, Vec<String>);
 
 impl InitArgs {

@@ -42,7 +42,7 @@ pub(crate) struct InspectArgs {
 }
 
 impl InspectArgs {
-    /// What is asked for is the text itself, so `--quiet` leaves the verdict.
+    /// `--quiet` still prints the verdict, because the command is run for it.
     pub(crate) fn run(&self, global: &GlobalArgs) -> Outcome {
         let scene = self.scene.as_deref().map(read_scene).transpose()?;
         self.figures.check_folder(&[FIGURE], self.overwrite)?;
@@ -131,9 +131,7 @@ fn print_components(components: &InspectedComponents) {
     }
 }
 
-// Everything that is said of a recording.
-
-/// Everything that is said of a recording; the JSON object.
+/// All findings on a recording; the JSON object of `--json`.
 #[derive(Debug, Serialize)]
 pub(crate) struct Inspection {
     pub recording: String,
@@ -180,7 +178,7 @@ pub(crate) struct InspectedReversal {
 }
 
 impl Inspection {
-    /// Everything that is said of a recording with its description; `more` findings are of its folder.
+    /// Inspects a recording with its description; `more` are findings on its folder.
     pub(crate) fn from_folder(
         recording: &Recording,
         file: Option<&RecordingFile>,
@@ -192,7 +190,7 @@ impl Inspection {
         Self::from_measurements(recording, file, measurements, more, scene)
     }
 
-    /// The same of a recording that was just imported, and measured for its description.
+    /// Inspects a recording that was just imported, with the quality in its description.
     pub(crate) fn from_import(recording: &Recording, file: &RecordingFile) -> Self {
         let measurements = file
             .quality
@@ -239,7 +237,7 @@ impl Inspection {
     }
 }
 
-/// The modes of a scene, or the published components, and what the recording makes of them.
+/// Whether the recording can show the modes of the scene, or without a scene the published components.
 fn inspect_components(scene: Option<&Scene>, measurements: &Quality) -> InspectedComponents {
     let published = || PUBLISHED_COMPONENTS_HZ.map(|(name, hz)| (name.to_owned(), hz)).to_vec();
     let sought = scene.map_or_else(published, scene_components);

@@ -1,6 +1,7 @@
-//! SIGINT, SIGTERM and the time limit. A command that can stop is asked to and finishes with what it has; any
-//! other, and one that does not stop in time, ends at once. Either way the program says what was computed and ends with the code of an early stop,
-//! and leaves neither half of its files nor a temporary one.
+//! SIGINT, SIGTERM and the time limit. A command that can stop early is asked to, and writes what it has. Any
+//! other command, and one that does not stop in time, is ended at once. In both cases the program prints what
+//! was computed, exits with the code of an early stop, and leaves neither a part of its files nor temporary
+//! ones.
 
 use super::failure::{Failure, Outcome, STOPPED_EARLY};
 use super::progress;
@@ -12,29 +13,29 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 use tempfile::NamedTempFile;
 
-/// How long a command that can stop may take to do so: with the rest, an answer comes within a second.
+/// Time that a command has to stop, so that the program answers within a second.
 const GRACE: Duration = Duration::from_millis(800);
 
 /// Whether the program was asked to stop.
 static STOP_REQUESTED: AtomicBool = AtomicBool::new(false);
 
-/// Whether the time that it may take is over.
+/// Whether the time limit has passed.
 static LATE: AtomicBool = AtomicBool::new(false);
 
 static STATE: Mutex<InterruptState> =
     Mutex::new(InterruptState { kept: None, finishing: false, passing: Vec::new() });
 
-/// What the end of the program has to know.
+/// State that the end of the program needs.
 struct InterruptState {
-    /// What is kept if the program ends now, where the command can stop.
+    /// Describes what is on the disk if the program ends now; set by commands that can stop.
     kept: Option<Box<dyn Fn() -> String + Send>>,
-    /// Whether the command has stopped and writes what it has.
+    /// Whether the command has stopped and is writing its results.
     finishing: bool,
-    /// Temporary files that have no place yet, and folders made for them.
+    /// Temporary files that are not renamed yet, and new folders without files.
     passing: Vec<PathBuf>,
 }
 
-/// Answers signals from now on.
+/// Handles signals from now on.
 pub(crate) fn install_handler() -> Outcome<()> {
     let mut signals = 0;
     let answer = move || {
@@ -49,7 +50,7 @@ pub(crate) fn install_handler() -> Outcome<()> {
         .map_err(|error| Failure::Internal(format!("signals cannot be answered: {error}")))
 }
 
-/// Whether a computation goes on.
+/// `Break` after a signal or at the time limit.
 pub(crate) fn control_flow() -> ControlFlow<()> {
     if STOP_REQUESTED.load(Ordering::Relaxed) || LATE.load(Ordering::Relaxed) {
         ControlFlow::Break(())
@@ -58,7 +59,7 @@ pub(crate) fn control_flow() -> ControlFlow<()> {
     }
 }
 
-/// From now on the command may take this long; then it is asked to stop as by a signal.
+/// Starts the time limit, after which the command is asked to stop as by a signal.
 pub(crate) fn set_time_limit(time: Duration) {
     std::thread::spawn(move || {
         std::thread::sleep(time);
@@ -67,20 +68,21 @@ pub(crate) fn set_time_limit(time: Duration) {
     });
 }
 
-/// A command that asks [`control_flow`] and stops; `kept` says what is on the disk if it does not in time.
+/// Registers a command that checks [`control_flow`]; `kept` describes what is on the disk if it does not stop
+/// in time.
 pub(crate) fn register_stoppable(kept: impl Fn() -> String + Send + 'static) -> StopGuard {
     lock_state().kept = Some(Box::new(kept));
     StopGuard
 }
 
-/// While it lives, the command stops by itself.
+/// Marks the command as one that can stop, until it is dropped.
 pub(crate) struct StopGuard;
 
 impl StopGuard {
-    /// The command has stopped and writes what it has: that takes what it takes, or until a second signal.
+    /// Announces that the command has stopped. It may then write for any time; only a second signal ends it.
     pub(crate) fn announce_stop(&self, what: &str) {
         lock_state().finishing = true;
-        progress::finish_in_words(); // the sentence says it better
+        progress::finish_in_words(); // the sentence replaces the bar
         warn_line!("{}: {what}", why());
     }
 }
@@ -92,7 +94,7 @@ impl Drop for StopGuard {
     }
 }
 
-/// Makes a temporary file that goes when the program ends before the file has its place.
+/// Makes a temporary file that is removed if the program ends before the file is renamed.
 pub(crate) fn track_temporary_file(
     make: impl FnOnce() -> io::Result<NamedTempFile>,
 ) -> io::Result<NamedTempFile> {
@@ -102,7 +104,7 @@ pub(crate) fn track_temporary_file(
     Ok(file)
 }
 
-/// Makes folders that go when the program ends before there is a file in them; the outermost is first.
+/// Makes folders, outermost first, that are removed if the program ends before they hold a file.
 pub(crate) fn track_new_folders(
     folders: Vec<PathBuf>,
     make: impl FnOnce() -> io::Result<()>,
@@ -113,7 +115,7 @@ pub(crate) fn track_new_folders(
     Ok(())
 }
 
-/// The program does not end while this is held: files that belong together get their names together.
+/// While it is held the program does not end, so that files are renamed together.
 pub(crate) fn lock_renames() -> RenameLock {
     RenameLock(lock_state())
 }
@@ -121,7 +123,7 @@ pub(crate) fn lock_renames() -> RenameLock {
 pub(crate) struct RenameLock(MutexGuard<'static, InterruptState>);
 
 impl RenameLock {
-    /// Every temporary file has its place.
+    /// To be called when every temporary file is renamed.
     pub(crate) fn forget_temporaries(mut self) {
         self.0.passing.clear();
     }
@@ -145,11 +147,11 @@ fn why() -> &'static str {
     if STOP_REQUESTED.load(Ordering::Relaxed) { "interrupted" } else { "stopped at the time limit" }
 }
 
-/// Ends the program; the state is held, so that nothing gets a name meanwhile.
+/// Ends the program. The state is locked, so that nothing is renamed meanwhile.
 fn end_program() -> ! {
     let state = lock_state();
     for path in state.passing.iter().rev() {
-        // (the next command clears what is left; of folders only an empty one goes)
+        // the next command removes what is left; only empty folders are removed
         let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
     }
     let kept = state.kept.as_ref().map_or_else(nothing_saved, |kept| kept());

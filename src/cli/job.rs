@@ -10,12 +10,12 @@ use std::collections::BTreeMap;
 /// The job of a fit in its folder.
 pub(crate) const JOB_FILE: &str = "job.toml";
 
-/// The file of a job that is named by that file or by its folder.
+/// The file of a job that is given by the file or its folder.
 pub(crate) fn job_path(named: &Path) -> PathBuf {
     if named.is_dir() { named.join(JOB_FILE) } else { named.to_owned() }
 }
 
-/// A problem with where it lies on disk.
+/// A fit problem with its paths.
 pub(crate) struct LoadedJob {
     pub folder: PathBuf,
     /// The file of the job, and its name in messages.
@@ -24,7 +24,7 @@ pub(crate) struct LoadedJob {
     pub problem: Problem,
     /// The file of the scene of each condition.
     pub scene_files: Vec<PathBuf>,
-    /// What is hard to believe in the scenes, each file once.
+    /// Implausible values of the scenes, by file.
     pub doubts: BTreeMap<PathBuf, Vec<PlausibilityFinding>>,
     /// Where the recordings lie, one for each condition of the job that has one.
     pub recording_paths: Vec<PathBuf>,

@@ -1,4 +1,5 @@
-//! Scenes from disk, and recordings: a folder with `trace.csv` and `recording.toml`, or a `trace.csv` alone.
+//! Scenes and recordings from disk. A recording is a folder with `trace.csv` and `recording.toml`, or a
+//! `trace.csv` alone.
 
 use super::files::{FolderMarker, SIMULATION_SUMMARY, is_simulation_summary};
 use super::prelude::*;
@@ -14,7 +15,7 @@ pub(crate) fn read_scene(path: &Path) -> Outcome<Scene> {
     Ok(read_driven_scene(path)?.0)
 }
 
-/// The same with the place of the recording that drives it, if one does.
+/// The same, with the path of the recording that drives it, if one does.
 pub(crate) fn read_driven_scene(path: &Path) -> Outcome<(Scene, Option<PathBuf>)> {
     let mut driver = None;
     let recording = |named: &str| {
@@ -27,7 +28,7 @@ pub(crate) fn read_driven_scene(path: &Path) -> Outcome<(Scene, Option<PathBuf>)
     scene.map(|scene| (scene, driver)).map_err(Failure::input)
 }
 
-/// Says what is hard to believe in a file.
+/// Prints implausible values of a file as warnings.
 pub(crate) fn print_warnings(file: &Path, findings: &[PlausibilityFinding], global: &GlobalArgs) {
     for finding in findings.iter().filter(|_| !global.quiet) {
         warn_line!("warning: {}: {finding}", file.display());
@@ -52,7 +53,7 @@ impl LoadedRecording {
     pub(crate) fn exposure_s(&self) -> Option<f64> {
         self.file.as_ref().and_then(|file| file.camera.exposure_s)
     }
-    /// Sources that lie in the folder of the recording at `path` but are no longer what was imported.
+    /// Finding on sources in the folder of the recording at `path` that have changed since the import.
     pub(crate) fn changed_sources(&self, path: &Path) -> Option<QualityFinding> {
         let source = self.file.as_ref()?.source.as_ref()?;
         let description = description_path(path);
@@ -72,8 +73,8 @@ impl LoadedRecording {
     }
 }
 
-/// Reads the recording at `path`: a folder, or a trace alone; a description next to the trace counts in
-/// either case.
+/// Reads the recording at `path`, a folder or a trace alone, with the description next to the trace in either
+/// case.
 pub(crate) fn load_recording(path: &Path) -> Outcome<LoadedRecording> {
     let trace = trace_path(path)?;
     let text = files::read_text(&trace)?;
@@ -93,8 +94,8 @@ pub(crate) fn load_recording(path: &Path) -> Outcome<LoadedRecording> {
     Ok(LoadedRecording { recording, file })
 }
 
-/// Whether a command made the trace without a description, as `simulate` does: the marker of its folder says
-/// so, or where there is none the summary of the simulation.
+/// Whether a command such as `simulate` made the trace, according to the marker of its folder or, without a
+/// marker, the summary of a simulation.
 fn is_simulated(trace: &Path, text: &str) -> Outcome<bool> {
     let folder = files::containing_folder(trace);
     let (marker, _) = FolderMarker::load(folder)?;
@@ -114,7 +115,7 @@ fn is_simulated(trace: &Path, text: &str) -> Outcome<bool> {
     ))
 }
 
-/// Where the description of the recording at `path` lies, if it has one.
+/// Path of the description of the recording at `path`, whether or not it exists.
 pub(crate) fn description_path(path: &Path) -> PathBuf {
     let folder = if path.is_dir() { path } else { files::containing_folder(path) };
     folder.join(DESCRIPTION_FILE)
@@ -133,7 +134,7 @@ fn trace_path(path: &Path) -> Outcome<PathBuf> {
     Ok(trace)
 }
 
-/// Whether a file is written as a study: it has axes or maps, which no job has.
+/// Whether a file is a study: it has axes or maps, which no job has.
 pub(crate) fn is_study(file: &Path) -> Outcome<bool> {
     let table: Option<toml::Table> = files::read_toml(file)?.parse().ok();
     Ok(table.is_some_and(|table| ["axis", "map"].iter().any(|key| table.contains_key(*key))))

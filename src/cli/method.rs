@@ -48,11 +48,11 @@ pub(crate) enum TransitionsAt {
     Slack,
 }
 
-/// Steps after which a run is refused: an hour of computing.
+/// Most steps of a run, about an hour of computing.
 const MOST_STEPS: f64 = 1e10;
 
 impl MethodArgs {
-    /// How the scene is integrated.
+    /// The solver options for the scene.
     pub(crate) fn integration_effort(&self, scene: &Scene) -> Outcome<SolverOptions> {
         let tolerance = self.relative_tolerance.unwrap_or(scene.run.relative_tolerance);
         check_tolerance(tolerance).map_err(|expected| {

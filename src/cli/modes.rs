@@ -44,7 +44,7 @@ impl ModesArgs {
     }
 }
 
-/// The answer of the tip, and the shapes.
+/// Names of the figures.
 const FIGURES: [&str; 2] = ["tip-compliance", "mode-shapes"];
 
 fn print_mode(tip: &str, mode: &NaturalMode) {

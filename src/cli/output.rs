@@ -1,6 +1,6 @@
-//! Everything that the program says. Nothing from a file or the command line steers a terminal: it all passes
-//! one filter here. A standard output that fails is reported at the end; one that nobody reads any more
-//! (`| head`) is no failure.
+//! Everything that the program prints passes one filter here, so that nothing from a file or the command line
+//! controls a terminal. A failure of standard output is reported at the end; a closed pipe (`| head`) is not
+//! a failure.
 
 use super::failure::{Failure, Outcome};
 use crate::text::escape_controls;
@@ -23,20 +23,20 @@ macro_rules! warn_line {
     };
 }
 
-/// The first failure of standard output, after which nothing more is written to it.
+/// The first failure of standard output; nothing more is written after it.
 static STDOUT_FAILURE: Mutex<Option<io::Error>> = Mutex::new(None);
 
-/// A line of text with its end; ends within it are escaped like everything else that steers.
+/// A line with its line end; line ends and other control characters within it are escaped.
 pub(crate) fn escape_line(words: Arguments<'_>) -> String {
     escape_controls(&words.to_string()) + "\n"
 }
 
-/// Lines that the program itself has broken, such as those of a table or of JSON.
+/// Lines with their line ends, such as a table or JSON; control characters within them are escaped.
 pub(crate) fn escape_lines(text: &str) -> String {
     text.lines().map(|line| escape_controls(line) + "\n").collect()
 }
 
-/// Text that has passed the filter to standard output.
+/// Writes filtered text to standard output.
 pub(crate) fn write_stdout(text: &str) {
     let mut failed = STDOUT_FAILURE.lock().unwrap_or_else(PoisonError::into_inner);
     if failed.is_none() {
@@ -50,12 +50,12 @@ pub(crate) fn print_lines(text: &str) {
     write_stdout(&escape_lines(text));
 }
 
-/// Text that has passed the filter to standard error.
+/// Writes filtered text to standard error.
 pub(crate) fn write_stderr(text: &str) {
-    let _ = io::stderr().lock().write_all(text.as_bytes()); // (there is no place left to say so)
+    let _ = io::stderr().lock().write_all(text.as_bytes()); // there is no other place to report it
 }
 
-/// Whether everything that was said was written.
+/// Fails if something could not be written to standard output.
 pub(crate) fn check_stdout() -> Outcome<()> {
     let failed = STDOUT_FAILURE.lock().unwrap_or_else(PoisonError::into_inner);
     match failed.as_ref() {
@@ -64,7 +64,7 @@ pub(crate) fn check_stdout() -> Outcome<()> {
     }
 }
 
-/// What clap says: help to standard output, a refusal to standard error. A refusal repeats what was typed.
+/// Prints help of clap to standard output, and refusals, which repeat what was typed, to standard error.
 pub(crate) fn print_usage(error: &clap::Error, arguments: &[OsString]) -> Outcome<()> {
     let typed = arguments.iter().any(|word| {
         let word = word.to_string_lossy();

@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// What is going on, and the unit that it is counted in.
+/// The bar of the current work, its name and the unit of its steps.
 static CURRENT_WORK: Mutex<Option<(ProgressBar, &'static str, &'static str)>> = Mutex::new(None);
 
 /// A bar over `total` steps of a unit such as `evaluations`; drawn unless `quiet`, where standard error is a
@@ -26,9 +26,9 @@ pub(crate) fn start_bar(total: u64, what: &'static str, unit: &'static str, quie
 /// Work in steps of unknown length.
 pub(crate) struct StepSpinner(ProgressBar);
 
-/// Steps of a command; drawn as a [`start_bar`] is.
+/// Shows the steps of a command; drawn under the same conditions as [`start_bar`].
 pub(crate) fn start_steps(what: &'static str, quiet: bool) -> StepSpinner {
-    /// From one sign of life to the next.
+    /// Interval of the spinner.
     const TICK: Duration = Duration::from_millis(200);
     let bar = ProgressBar::with_draw_target(None, draw_target(quiet));
     let style = ProgressStyle::with_template("{spinner} {prefix}: {wide_msg} {elapsed}");
@@ -59,7 +59,7 @@ fn draw_target(quiet: bool) -> ProgressDrawTarget {
     if is_drawn { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() }
 }
 
-/// How far the present work has come, in words; nothing more is drawn of it.
+/// Ends the current bar and returns its progress in words.
 pub(crate) fn finish_in_words() -> Option<String> {
     let present = CURRENT_WORK.lock().unwrap_or_else(PoisonError::into_inner);
     let (bar, what, unit) = present.as_ref().filter(|(bar, ..)| !bar.is_finished())?;
@@ -78,25 +78,25 @@ pub(crate) fn print_progress(quiet: bool, line: &str) {
     }
 }
 
-/// Says how far a bar has come where it is not drawn, such as in the log of a batch system.
+/// Prints the progress of a bar that is not drawn, for example in the log of a batch system.
 pub(crate) struct ProgressReporter {
     bar: ProgressBar,
     due: Mutex<Option<Instant>>,
 }
 
 impl ProgressReporter {
-    /// From one line to the next.
+    /// Interval between two lines.
     const PAUSE: Duration = Duration::from_secs(60);
-    /// Up to the first line: a typing error shows early.
+    /// Time to the first line, short so that a mistake shows early.
     const FIRST: Duration = Duration::from_secs(10);
 
-    /// Says nothing where `says` is false or the bar is drawn.
+    /// Prints nothing if `says` is false or the bar is drawn.
     pub(crate) fn new(bar: &ProgressBar, says: bool) -> Self {
         let due = (says && bar.is_hidden()).then(|| Instant::now() + Self::FIRST);
         Self { bar: bar.clone(), due: Mutex::new(due) }
     }
 
-    /// A line where one is due.
+    /// Prints a line if one is due.
     pub(crate) fn report_if_due(&self) {
         let now = Instant::now();
         let mut due = self.due.lock().unwrap_or_else(PoisonError::into_inner);
@@ -110,7 +110,7 @@ impl ProgressReporter {
     }
 }
 
-/// A time of which the order of magnitude matters.
+/// A time in its largest fitting unit.
 fn format_duration(time_s: f64) -> String {
     match time_s {
         time_s if time_s < 90.0 => format!("{time_s:.0} s"),
@@ -119,12 +119,10 @@ fn format_duration(time_s: f64) -> String {
     }
 }
 
-// Who watches a run of the model for the user: how far it has come, and whether it is to stop.
-
-/// Pieces from one look at the clock to the next: they take microseconds each.
+/// Segments between two updates of the bar; each takes microseconds.
 const PIECES_A_LOOK: u32 = 64;
 
-/// The observer of a run that a user waits for.
+/// Shows the progress of a run, and stops it on request.
 pub(crate) struct ProgressObserver {
     bar: ProgressBar,
     start_s: f64,
@@ -132,7 +130,7 @@ pub(crate) struct ProgressObserver {
 }
 
 impl ProgressObserver {
-    /// Of a run from one instant to another, s.
+    /// For a run between two instants, s.
     pub(crate) fn new([start_s, stop_s]: [f64; 2], command: &'static str, quiet: bool) -> Self {
         let bar = start_bar(to_milliseconds(stop_s - start_s), command, "ms of the model", quiet);
         Self { bar, start_s, pieces: 0 }

@@ -1,5 +1,4 @@
-//! What the program reads, for other programs: the same files, found and checked in the same way, refused in
-//! the same words.
+//! Readers for other programs: the same files, checks and messages as on the command line.
 
 pub use super::failure::Failure;
 use super::load::{load_recording, read_driven_scene};
@@ -9,7 +8,7 @@ use crate::recording::Recording;
 use crate::simulate::scene::Scene;
 use std::path::{Path, PathBuf};
 
-/// A scene, with the place of the recording that drives it, if one does.
+/// A scene, with the path of the recording that drives it, if one does.
 ///
 /// # Errors
 /// [`Failure::Input`] with file, key, what was found, what was expected and what to do.
@@ -36,10 +35,10 @@ pub fn read_problem(path: &Path) -> Result<Problem, Failure> {
     Ok(super::job::LoadedJob::load(path)?.problem)
 }
 
-/// Where a path leads that stands in a file: from the folder of that file.
+/// Resolves a path that is written in a file, from the folder of that file.
 ///
 /// # Errors
-/// Says where nothing is.
+/// A message if nothing exists there.
 pub fn resolve_existing_path(file: &Path, named: &str) -> Result<PathBuf, String> {
     super::files::resolve_existing_path(file, named)
 }
@@ -52,18 +51,18 @@ pub fn read_toml_text(path: &Path) -> Result<String, Failure> {
     super::files::read_toml(path)
 }
 
-/// What of a recording is analysed, as on the command line.
+/// Options of `wiperlab spectrum`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SpectrumOptions {
     /// Its channel, such as `head-drop`.
     pub channel: String,
     /// Its window, such as `after`.
     pub window: String,
-    /// What is removed first; `auto` for what the record asks for.
+    /// Trend that is removed first; `auto` chooses it from the record.
     pub detrend: String,
-    /// Where components are sought, Hz; everywhere if left out.
+    /// Band in which components are sought, Hz; `None` for all frequencies.
     pub band_hz: Option<(f64, f64)>,
-    /// Most components that are listed; the default if left out.
+    /// Most components that are listed; `None` for the default.
     pub max_components: Option<usize>,
     /// Exposure of a frame, s.
     pub exposure_s: Option<f64>,

@@ -55,7 +55,7 @@ fn default_reports_folder(fit: &Path) -> PathBuf {
     full.parent().and_then(Path::parent).unwrap_or(Path::new("")).join("reports")
 }
 
-/// A fit with its result, which belongs to the job as it is now.
+/// A fit with its result, checked to belong to the job as it is now.
 struct ReportedFit {
     name: String,
     problem: LoadedJob,
@@ -64,7 +64,7 @@ struct ReportedFit {
     videos: Vec<Option<FramePictures>>,
 }
 
-/// What makes a report of the model at the estimates.
+/// A function that builds a report.
 type ReportBuilder = fn(&Job, &[FittedRecording], &[ModelRun], &FitResult) -> Report;
 
 impl ReportedFit {
@@ -114,8 +114,8 @@ impl ReportedFit {
         Ok(best)
     }
 
-    /// The report, made by [`comparison::build_report`] or, where its figures are not asked for, by
-    /// [`comparison::in_words`].
+    /// The report, made by [`assembly::build_report`] or [`assembly::build_report_without_figures`], with its
+    /// provenance.
     fn build_report(&self, made: ReportBuilder, best: &[ModelRun]) -> Outcome<Report> {
         let mut report = made(self.problem.job(), &self.measured_recordings(), best, &self.result);
         self.videos.iter().flatten().try_for_each(FramePictures::check_pictures)?;
@@ -127,7 +127,7 @@ impl ReportedFit {
     }
 }
 
-/// Writes the report of a fit; says whether the model does not explain the recording, or misses a component.
+/// Writes the report of a fit. True if the model does not explain the recording or misses a component.
 pub(crate) fn write_report(
     fit: &Path,
     out: &Path,
@@ -155,12 +155,10 @@ pub(crate) fn write_report(
     Ok(!verdict.passes())
 }
 
-// The folder of a report: what is written into it.
-
 const JSON_FILE: &str = "report.json";
 const PAGE_FILE: &str = "index.html";
 
-/// What goes into a folder.
+/// Contents of the folder of a report.
 pub(crate) struct ReportFiles<'a> {
     pub figures: Vec<&'a FigureBlock>,
     pub json: String,
@@ -198,7 +196,7 @@ impl ReportFiles<'_> {
     }
 }
 
-/// Refuses a folder that a report must not be written into, before the model is run.
+/// Checks the folder of a report before the model is run.
 pub(crate) fn check_report_folder(folder: &Path, writer: &WritePolicy) -> Outcome<()> {
     OutputFolder::check(folder, writer, &[JSON_FILE, PAGE_FILE]).map(|_| ())
 }

@@ -1,4 +1,4 @@
-//! `wiperlab simulate --sensitivities`: derivatives of a run by what the user names.
+//! `wiperlab simulate --sensitivities`: derivatives of a run with respect to named parameters.
 
 use super::files::StreamedTable;
 use super::prelude::*;
@@ -27,14 +27,14 @@ const COLUMNS: [(Channel, &str); 7] = [
     (Channel::TipVelocity, "tip_velocity_m_per_s"),
 ];
 
-/// What the user wants derivatives by.
+/// Parameters that a run is differentiated with respect to.
 pub(crate) struct SensitivityRequest {
     names: Vec<String>,
     seeds: TangentSeeds,
 }
 
 impl SensitivityRequest {
-    /// Of these names; `None` where there is none.
+    /// Checks the names; `None` if there are none.
     pub(crate) fn parse(scene: &Scene, names: &[String], effort: &SolverOptions) -> Outcome<Option<Self>> {
         if names.is_empty() {
             return Ok(None);
@@ -63,7 +63,7 @@ impl SensitivityRequest {
         Ok(Some(Self { names: names.to_vec(), seeds }))
     }
 
-    /// Runs the scene again with its derivatives, which go to their tables row by row.
+    /// Runs the scene again with derivatives, and writes them row by row.
     pub(crate) fn run_to_tables(
         &self,
         scene: &Scene,
@@ -88,7 +88,7 @@ impl SensitivityRequest {
     }
 }
 
-/// Writes what it sees.
+/// Writes derivatives to the two tables.
 struct SensitivityTables<I: Iterator<Item = f64>> {
     samples: StreamedTable,
     events: StreamedTable,
@@ -128,7 +128,7 @@ impl<I: Iterator<Item = f64>> TangentObserver for SensitivityTables<I> {
     }
 }
 
-/// Adds numbers as fields, empty ones where there are none.
+/// Appends numbers as cells, or `count` empty cells.
 fn push_numbers(text: &mut String, count: usize, numbers: Option<&[f64]>) {
     for i in 0..count {
         let _ = match numbers {

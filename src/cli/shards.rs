@@ -34,8 +34,8 @@ pub(crate) fn shard_files(folder: &Path) -> Outcome<Vec<(Shard, PathBuf)>> {
     Ok(shards)
 }
 
-/// Shows `each` what another shard has written, where that is `wanted`; one of another problem or version is
-/// refused, and one that is damaged is left to `wiperlab collect`.
+/// Calls `each` with the records of another shard, if they are `wanted`. A shard of another problem or
+/// version is refused; a damaged one is left to `wiperlab collect`.
 pub(crate) fn scan_shard<R: CheckpointRecord>(
     path: &Path,
     header: &CheckpointHeader<R::Body>,
@@ -66,7 +66,7 @@ pub(crate) fn scan_shard<R: CheckpointRecord>(
     }
 }
 
-/// The number of shards of most files; of two, the larger.
+/// The number of shards that most files have; of two equally frequent ones the larger.
 pub(crate) fn usual_shard_count(shards: &[(Shard, PathBuf)]) -> usize {
     let mut counts: BTreeMap<usize, usize> = BTreeMap::new();
     shards.iter().for_each(|(shard, _)| *counts.entry(shard.total()).or_default() += 1);

@@ -52,7 +52,7 @@ impl SimulateArgs {
         if !global.quiet {
             print_summary(&summary, &self.out);
         }
-        // (a run more than the tables need: they hold no more than a row of it)
+        // the figure needs a run of its own, because the tables keep only one row in memory
         let drawn = || vec![(FIGURE, motion::draw_figure(scene.title(), &RunMotion::simulate(&scene)))];
         self.figures.write_figures(self.overwrite, global.quiet, drawn)?;
         Ok(CommandOutcome::done_if(summary.status == RunStatus::Completed))
@@ -61,7 +61,7 @@ impl SimulateArgs {
 
 const FIGURE: &str = "motion";
 
-/// The tables of a run, and what each is called.
+/// The tables of a run with their file names.
 const TABLES: [(OutputTable, &str); 3] = [
     (OutputTable::Trace, "trace.csv"),
     (OutputTable::State, "state.csv"),
@@ -75,7 +75,7 @@ fn output_names(scene: &Scene, sensitivities: bool) -> Vec<&'static str> {
     asked.map(|(_, name)| name).chain(derivatives).chain([SIMULATION_SUMMARY]).collect()
 }
 
-/// Runs the scene; every row goes to its file as soon as it is known.
+/// Runs the scene and writes every row as soon as it is known.
 fn run_to_files(
     scene: &Scene,
     effort: SolverOptions,
@@ -120,7 +120,7 @@ fn run_to_files(
     Ok(summary)
 }
 
-/// Transitions to their table.
+/// Writes transitions to their table.
 struct EventTableWriter<'a>(Option<&'a mut StreamedTable>);
 
 impl Observer for EventTableWriter<'_> {

@@ -19,7 +19,7 @@ use std::ops::Range;
 
 /// The tables of a spectrum.
 const TABLES: [&str; 4] = ["components.json", "spectrum.json", "spectrum.csv", "ridge.csv"];
-/// How the trend is chosen from the record.
+/// Option value that chooses the trend from the record.
 const AUTO: &str = "auto";
 /// Seed of the tracking noise with which a simulated trace is filmed.
 const FILM_SEED: u64 = 0;
@@ -64,14 +64,14 @@ pub(crate) struct SpectrumArgs {
     pub overwrite: Overwrite,
 }
 
-/// The command line once checked.
+/// The checked command line.
 struct SpectrumRequest {
     channel: Channel,
     window: Window,
     settings: SpectrumSettings,
 }
 
-/// A recording, its window and what is in it.
+/// An analysed window of a recording.
 struct StudiedWindow {
     recording: Recording,
     exposure_s: Option<f64>,
@@ -84,7 +84,7 @@ struct StudiedWindow {
 }
 
 impl SpectrumArgs {
-    /// The command with its defaults.
+    /// The command with default options.
     pub(crate) fn new(
         recording: &Path,
         channel: &str,
@@ -107,7 +107,7 @@ impl SpectrumArgs {
         }
     }
 
-    /// The files of a recording at hand.
+    /// The files of a recording in memory.
     pub(crate) fn output_files(&self, recording: Recording) -> Outcome<Vec<(String, Vec<u8>)>> {
         let request = self.parse_request()?;
         let exposure_s = self.given_exposure_s()?;
@@ -254,8 +254,7 @@ impl SpectrumRequest {
     }
 }
 
-/// What to do where the window holds a whole flip and more: nothing slow and steady describes both of its
-/// sides.
+/// Advice if the window contains a whole flip: no smooth trend describes both sides of it.
 fn flip_hint(instants: &ReversalInstants, (from_s, to_s): (f64, f64)) -> Option<String> {
     let mut flips = (1..).zip(&instants.reversals).filter_map(|(k, reversal)| Some((k, reversal.flip?)));
     let (k, flip) = flips.find(|(_, flip)| from_s < flip.start_s && flip.end_s < to_s)?;

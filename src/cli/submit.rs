@@ -141,7 +141,7 @@ impl SubmitArgs {
     }
 }
 
-/// What the tasks have to be told to read the files that were read here.
+/// Options with which the tasks read the same files.
 fn task_options(global: &GlobalArgs) -> Vec<String> {
     let size = global.max_file_size;
     let words = ["--max-file-size".to_owned(), size.to_string().replace(' ', "")];
@@ -159,7 +159,7 @@ fn print_scripts(scripts: &[(&str, String)]) {
     }
 }
 
-/// Why nothing, or not everything, was submitted.
+/// The failure of a submission of which nothing, or a part, was submitted.
 fn submission_failure(script: &str, submitted: &str, complaint: &str) -> Failure {
     let state = if submitted.trim().is_empty() {
         "nothing was submitted: correct the cause and submit again"
@@ -171,9 +171,9 @@ fn submission_failure(script: &str, submitted: &str, complaint: &str) -> Failure
     Failure::Internal(format!("{script}: `{}` failed: {complaint}; {state}", slurm::SBATCH))
 }
 
-// Words and programs of the POSIX shell.
+// POSIX shell
 
-/// A word that the shell takes as it is.
+/// A word quoted for the shell, where needed.
 pub(crate) fn quote_word(word: &str) -> String {
     let plain = |c: char| c.is_ascii_alphanumeric() || "/._-+:,=@".contains(c);
     if !word.is_empty() && word.chars().all(plain) {

@@ -60,8 +60,6 @@ impl SweepArgs {
     }
 }
 
-// A study with its scene, read from disk.
-
 /// A checked study with its scene.
 pub(crate) struct LoadedStudy {
     pub study: Study,
@@ -85,7 +83,7 @@ impl LoadedStudy {
         study_header(&self.study, &self.fingerprint)
     }
 
-    /// No point yet; the temporary file lies where `out` will be.
+    /// An empty collection; its temporary file lies in `out` or its nearest existing parent.
     pub(crate) fn new_collection(&self, out: &Path) -> Outcome<PointCollection<File>> {
         Ok(PointCollection::new(self.header(), files::create_scratch_file(out)?))
     }

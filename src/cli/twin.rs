@@ -73,7 +73,7 @@ impl TwinArgs {
             CommandOutcome::StoppedEarly
         }))
     }
-    /// The figure, where it is wanted: the motion between the frames takes a run of its own.
+    /// Draws the figure, if wanted. It needs another run, for the motion between the frames.
     fn draw_figure(
         &self,
         spec: &TwinSpec,

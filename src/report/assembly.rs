@@ -22,8 +22,8 @@ use crate::fit::result::{FitResult, FitStatus};
 use rayon::prelude::*;
 
 impl Report {
-    /// The report of a fit that was made in the library: as the program writes it, without the description of
-    /// the recordings and the files behind them.
+    /// The report of a fit that was made with the library: the same as the program's, without the
+    /// descriptions of the recordings and without provenance.
     ///
     /// # Errors
     /// [`RunFailure`] when the model at the estimates does not run.
@@ -39,7 +39,7 @@ impl Report {
     }
 }
 
-/// The report of a fit, but for its provenance.
+/// The report of a fit, without its provenance.
 #[must_use]
 pub fn build_report(
     job: &Job,
@@ -50,27 +50,20 @@ pub fn build_report(
     let cases = ConditionComparison::compare_conditions(job, measured, models, result);
     let report = fill_report_sections(job, measured, &cases, result);
     let telling = summary::farthest_condition(&report.comparison).map_or(0, |(condition, _)| condition);
-    let answering = [
-        cases.get(telling).map_or_else(Vec::new, |case| {
-            make_file_names_unique(condition_figures(case, shared_law_case(&cases, telling)))
-        }),
-        summary_figures(job, result, &report),
-    ]
-    .concat();
+    let mut evidence = cases.get(telling).map_or_else(Vec::new, |case| {
+        make_file_names_unique(condition_figures(case, shared_law_case(&cases, telling)))
+    });
+    evidence.extend(summary_figures(job, result, &report));
+    let profiles = ProfilePlot::from_fit(job, result, &report.parameters).figure_block();
     let groups = [
-        (FigureSubject::Evidence, answering),
+        (FigureSubject::Evidence, evidence),
         (FigureSubject::Measured, measured_figures(&cases, telling)),
         (FigureSubject::Blade, blade_figures(&cases)),
-        (
-            FigureSubject::Parameters,
-            ProfilePlot::from_fit(job, result, &report.parameters).figure_block().into_iter().collect(),
-        ),
+        (FigureSubject::Parameters, profiles.into_iter().collect()),
     ];
-    Report {
-        tables: comparison_tables(&cases),
-        figures: groups.into_iter().map(figure_group).filter(|group| !group.figures.is_empty()).collect(),
-        ..report
-    }
+    let groups = groups.into_iter().filter(|(_, figures)| !figures.is_empty());
+    let figures = groups.map(|(subject, figures)| FigureGroup { subject, figures }).collect();
+    Report { tables: comparison_tables(&cases), figures, ..report }
 }
 
 /// The same without its figures, which take most of the time.
@@ -80,12 +73,8 @@ pub(crate) fn build_report_without_figures(
     models: &[ModelRun],
     result: &FitResult,
 ) -> Report {
-    fill_report_sections(
-        job,
-        measured,
-        &ConditionComparison::compare_conditions(job, measured, models, result),
-        result,
-    )
+    let cases = ConditionComparison::compare_conditions(job, measured, models, result);
+    fill_report_sections(job, measured, &cases, result)
 }
 
 fn fill_report_sections(
@@ -116,7 +105,7 @@ fn fill_report_sections(
     }
 }
 
-/// The condition whose figure of friction shows that of another, as it is the first with the same run.
+/// The condition whose friction figure stands for condition `of`, because both have the same run.
 fn shared_law_case<'a, 'b>(
     cases: &'b [ConditionComparison<'a>],
     of: usize,
@@ -125,8 +114,8 @@ fn shared_law_case<'a, 'b>(
     cases.iter().find(|case| case.same_run.as_ref().is_some_and(|same| shares(same, case)))
 }
 
-/// What shows at a glance whether the model explains a condition: both on one axis, the cycles over speed,
-/// friction, and what is left.
+/// The figures that show whether the model explains a condition: recording and model on one axis, cycles over
+/// speed, friction, residuals.
 fn condition_figures(case: &ConditionComparison, law: Option<&ConditionComparison>) -> Vec<FigureBlock> {
     let parts = [
         evidence::figure_block(case),
@@ -137,8 +126,8 @@ fn condition_figures(case: &ConditionComparison, law: Option<&ConditionCompariso
     parts.into_iter().flatten().collect()
 }
 
-/// Condition by condition: the motion itself, then what it is made of; of the conditions but the `telling`
-/// one also what the answer shows of that one.
+/// By condition: history, spectra, spectrograms and phase portraits; for all conditions but `telling` also
+/// the figures that the answer shows of that one.
 fn measured_figures(cases: &[ConditionComparison], telling: usize) -> Vec<FigureBlock> {
     let all = |(i, case): (usize, &ConditionComparison)| {
         let shown = shared_law_case(cases, telling).map(|law| law.condition);
@@ -155,18 +144,15 @@ fn measured_figures(cases: &[ConditionComparison], telling: usize) -> Vec<Figure
     make_file_names_unique(cases.par_iter().enumerate().flat_map_iter(all).collect())
 }
 
-/// Run by run: the blade itself, then over the frames of each video, and then every run in motion.
+/// Poses of the blade in every run, then over the frames of each video, then animations.
 fn blade_figures(cases: &[ConditionComparison]) -> Vec<FigureBlock> {
     let runs = || cases.iter().filter(|case| case.same_run.is_some());
     let filmed = cases.iter().filter_map(video_frames::block);
-    runs()
-        .filter_map(poses::figure_block)
-        .chain(filmed)
-        .chain(runs().filter_map(animation::figure_block))
-        .collect()
+    let moving = runs().filter_map(animation::figure_block);
+    runs().filter_map(poses::figure_block).chain(filmed).chain(moving).collect()
 }
 
-/// How the parameters hang together, and how far every target is from the model.
+/// Correlations of the parameters, and the distance of every target from the model.
 fn summary_figures(job: &Job, result: &FitResult, report: &Report) -> Vec<FigureBlock> {
     let features = [report.components.as_slice(), report.features.as_slice()];
     let blocks = [
@@ -176,16 +162,9 @@ fn summary_figures(job: &Job, result: &FitResult, report: &Report) -> Vec<Figure
     blocks.into_iter().flatten().collect()
 }
 
-fn figure_group((subject, figures): (FigureSubject, Vec<FigureBlock>)) -> FigureGroup {
-    FigureGroup { subject, figures }
-}
-
 fn search_line(result: &FitResult) -> SearchLine {
-    let failed = result
-        .evaluations
-        .failed
-        .iter()
-        .map(|(reason, count)| FailureCount { reason: reason.to_string(), count: *count });
+    let failed = result.evaluations.failed.iter();
+    let failed = failed.map(|(reason, count)| FailureCount { reason: reason.to_string(), count: *count });
     SearchLine {
         status: Some(result.status),
         converged: result.status == FitStatus::Converged,
@@ -214,20 +193,19 @@ fn probe_line(found: &crate::fit::identifiability::Probe) -> ProbeLine {
     }
 }
 
-/// Notes of the fit, but for those of the gate, which have a place of their own.
+/// Notes of the fit without those of the gate, which have a section of their own.
 fn fit_notes(measured: &[FittedRecording], result: &FitResult) -> Vec<String> {
     let mut notes: Vec<String> =
         result.notes.iter().filter(|note| !result.gate.notes.contains(note)).cloned().collect();
     let freed = result.nuisances.iter().any(|nuisance| nuisance.recording.is_none());
-    // (a fit to traces that frees none says so itself)
+    // a fit to traces that frees none has such a note already
     let exact = match (freed, &result.misfit) {
         (true, _) => Some("every number of the scene that is not freed"),
         (false, None) => Some("every other number of the scene"),
         (false, Some(_)) => None,
     };
-    notes.extend(
-        exact.map(|what| format!("{what} is taken as exact: the intervals do not include its error")),
-    );
+    let error = "is taken as exact: the intervals do not include its error";
+    notes.extend(exact.map(|what| format!("{what} {error}")));
     if measured.is_empty() {
         notes.push(
             "Only published values were fitted: there is no recording, and the traces shown are the model's \

@@ -1,4 +1,4 @@
-//! Several fits side by side: what each meets, where their parameters agree and where they do not.
+//! Several fits side by side: which components each meets, and whether their parameters agree.
 
 mod intervals;
 mod page;
@@ -30,10 +30,8 @@ pub fn compare_fits(fits: &[ComparisonInput]) -> FitComparison {
     let names: Vec<String> = fits.iter().map(|fit| fit.name.to_owned()).collect();
     FitComparison {
         title: format!("Comparison of {}", text::join_with_and(&names)),
-        figures: intervals::interval_figures(&entries, &parameters)
-            .into_iter()
-            .chain(spectra::spectra_figures(fits))
-            .collect(),
+        figures: [intervals::interval_figures(&entries, &parameters), spectra::spectra_figures(fits)]
+            .concat(),
         statements: verdict::comparison_statements(&entries, &parameters),
         fits: entries,
         parameters,
@@ -43,7 +41,7 @@ pub fn compare_fits(fits: &[ComparisonInput]) -> FitComparison {
 /// The comparison as JSON, with the verdict of the page and without the drawings.
 ///
 /// # Errors
-/// None in practice: every field can be written (a value that is no number becomes `null`).
+/// None in practice: every field can be serialised, and NaN becomes `null`.
 pub(crate) fn comparison_json(several: &FitComparison) -> Result<String, serde_json::Error> {
     #[derive(Serialize)]
     struct ComparedFitDocument<'a> {
@@ -64,35 +62,26 @@ pub(crate) fn comparison_json(several: &FitComparison) -> Result<String, serde_j
         fits: Vec<ComparedFitDocument<'a>>,
         figures: Vec<FigureEntry<'a>>,
     }
+    fn document(fit: &ComparedFit) -> ComparedFitDocument<'_> {
+        ComparedFitDocument { name: &fit.name, written: ReportDocument::new(&fit.report, &fit.verdict) }
+    }
+    let every = |is: fn(&ReportVerdict) -> bool| several.fits.iter().all(|fit| is(&fit.verdict));
     let file = FitComparisonFile {
         format: FORMAT,
         title: &several.title,
-        every_model_explains_recording: (several.fits.iter()).all(|fit| fit.verdict.model_explains_recording),
-        all_components_met: several.all_components_met(),
-        all_parameters_identified: several.fits.iter().all(|fit| fit.verdict.all_parameters_identified),
+        every_model_explains_recording: every(|verdict| verdict.model_explains_recording),
+        all_components_met: every(|verdict| verdict.all_components_met),
+        all_parameters_identified: every(|verdict| verdict.all_parameters_identified),
         summary: several.summary(),
         statements: &several.statements,
         parameters: &several.parameters,
-        fits: several
-            .fits
-            .iter()
-            .map(|fit| ComparedFitDocument {
-                name: &fit.name,
-                written: ReportDocument::new(&fit.report, &fit.verdict),
-            })
-            .collect(),
-        figures: several
-            .figures
-            .iter()
-            .map(|f| FigureEntry { file: &f.file, caption: &f.caption, details: &f.details, subject: None })
-            .collect(),
+        fits: several.fits.iter().map(document).collect(),
+        figures: several.figures.iter().map(|figure| FigureEntry::new(figure, None)).collect(),
     };
     serde_json::to_string_pretty(&file).map(|text| text + "\n")
 }
 
-// The fits that are compared, and what the comparison holds.
-
-/// A fit with everything that it is compared by.
+/// A fit as input of a comparison.
 #[derive(Debug, Clone, Copy)]
 pub struct ComparisonInput<'a> {
     /// Name of its folder.
@@ -139,27 +128,20 @@ impl FitComparison {
         self.statements.iter().map(Statement::plain_text).collect()
     }
 
-    /// Whether every component is met in every fit.
-    pub(crate) fn all_components_met(&self) -> bool {
-        self.fits.iter().all(|fit| fit.verdict.all_components_met)
-    }
-
     /// Whether every model explains its traces and meets every component.
     pub(crate) fn passes(&self) -> bool {
         self.fits.iter().all(|fit| fit.verdict.passes())
     }
 }
 
-/// A name that fits over a panel or into a legend.
+/// A name cut to the width of a panel title or legend.
 pub(super) fn shorten_name(name: &str) -> String {
-    /// Letters that a legend of one column of a journal takes.
+    /// Most letters in a legend of a figure as wide as a column.
     const MOST: usize = 24;
     text::truncate_text(name, MOST)
 }
 
-// Parameters of several fits side by side, and whether their intervals overlap.
-
-/// A parameter and what each fit knows of it.
+/// A parameter with its estimates in all fits.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SharedParameter {
     /// Name as in a scene.
@@ -168,9 +150,9 @@ pub struct SharedParameter {
     pub symbol: String,
     /// Unit; empty for a plain number.
     pub unit: String,
-    /// What each fit knows, in the order of the fits; `None` where it is not free there.
+    /// Estimates in the order of the fits; `None` if it is not free in a fit.
     pub lines: Vec<Option<ParameterLine>>,
-    /// Every pair of fits that have it.
+    /// Pairs of fits in which it is free.
     pub pairs: Vec<IntervalPair>,
 }
 
@@ -183,7 +165,7 @@ pub struct IntervalPair {
     pub relation: IntervalRelation,
 }
 
-/// How two 95 % intervals lie.
+/// Relation of two 95 % intervals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum IntervalRelation {
@@ -191,7 +173,7 @@ pub enum IntervalRelation {
     Disjoint,
     /// They have values in common, which does not show that the parameters are equal.
     Overlap,
-    /// The interval of one of them does not say what the data know: it is not identified, or at a bound.
+    /// One parameter is not identified or at a bound, so that its interval does not reflect the data.
     NotComparable,
 }
 
@@ -205,7 +187,7 @@ impl IntervalRelation {
     }
 }
 
-/// Verdicts whose interval is one of the data: an open end reaches beyond every value.
+/// Verdicts whose interval reflects the data; an open end extends to infinity.
 const COMPARABLE_VERDICTS: [ParameterVerdict; 3] =
     [ParameterVerdict::Identified, ParameterVerdict::OpenBelow, ParameterVerdict::OpenAbove];
 
@@ -234,24 +216,19 @@ pub(super) fn shared_parameters(entries: &[ComparedFit]) -> Vec<SharedParameter>
 }
 
 fn shared_parameter(of: &ParameterLine, entries: &[ComparedFit]) -> SharedParameter {
-    let lines: Vec<Option<ParameterLine>> = entries
-        .iter()
-        .map(|entry| entry.report.parameters.iter().find(|p| p.name == of.name).cloned())
-        .collect();
-    let having: Vec<(&str, &ParameterLine)> = entries
-        .iter()
-        .zip(&lines)
-        .filter_map(|(entry, line)| Some((entry.name.as_str(), line.as_ref()?)))
-        .collect();
-    let pair = |(i, (name, a)): (usize, &(&str, &ParameterLine))| {
-        let (name, a) = ((*name).to_owned(), (*a).clone());
+    let find = |entry: &ComparedFit| entry.report.parameters.iter().find(|p| p.name == of.name).cloned();
+    let lines: Vec<Option<ParameterLine>> = entries.iter().map(find).collect();
+    let fits = entries.iter().zip(&lines);
+    let having: Vec<(&str, &ParameterLine)> =
+        fits.filter_map(|(entry, line)| Some((entry.name.as_str(), line.as_ref()?))).collect();
+    let mut pairs = Vec::new();
+    for (i, (name, a)) in having.iter().enumerate() {
         let with = |(other, b): &(&str, &ParameterLine)| IntervalPair {
-            fits: [name.clone(), (*other).to_owned()],
-            relation: interval_relation(&a, b),
+            fits: [*name, *other].map(str::to_owned),
+            relation: interval_relation(a, b),
         };
-        having.iter().skip(i + 1).map(with).collect::<Vec<_>>()
-    };
-    let pairs = having.iter().enumerate().flat_map(pair).collect();
+        pairs.extend(having[i + 1..].iter().map(with));
+    }
     SharedParameter { name: of.name.clone(), symbol: of.symbol.clone(), unit: of.unit.clone(), lines, pairs }
 }
 

@@ -3,6 +3,7 @@
 use super::rich_text::Statement;
 use super::verdict::ReportVerdict;
 use super::{FigureSubject, Report, ReportSummary};
+use crate::figures::FigureBlock;
 use serde::Serialize;
 
 /// Version of the keys.
@@ -16,6 +17,12 @@ pub(super) struct FigureEntry<'a> {
     pub details: &'a str,
     #[serde(skip_serializing_if = "Option::is_none")]
     pub subject: Option<FigureSubject>,
+}
+
+impl<'a> FigureEntry<'a> {
+    pub(super) fn new(figure: &'a FigureBlock, subject: Option<FigureSubject>) -> Self {
+        Self { file: &figure.file, caption: &figure.caption, details: &figure.details, subject }
+    }
 }
 
 /// What the JSON says of one fit.
@@ -34,12 +41,7 @@ pub(super) struct ReportDocument<'a> {
 impl<'a> ReportDocument<'a> {
     pub(crate) fn new(report: &'a Report, verdict: &'a ReportVerdict) -> Self {
         let listed = report.figures.iter().flat_map(|group| {
-            group.figures.iter().map(|f| FigureEntry {
-                file: &f.file,
-                caption: &f.caption,
-                details: &f.details,
-                subject: Some(group.subject),
-            })
+            group.figures.iter().map(|figure| FigureEntry::new(figure, Some(group.subject)))
         });
         Self {
             verdict,
@@ -55,7 +57,7 @@ impl<'a> ReportDocument<'a> {
 /// The report as JSON, with the verdict of the page and without the drawings.
 ///
 /// # Errors
-/// None in practice: every field can be written (a value that is no number becomes `null`).
+/// None in practice: every field can be serialised, and NaN becomes `null`.
 pub(crate) fn report_json(report: &Report) -> Result<String, serde_json::Error> {
     #[derive(Serialize)]
     struct ReportFile<'a> {
@@ -64,11 +66,8 @@ pub(crate) fn report_json(report: &Report) -> Result<String, serde_json::Error> 
         written: ReportDocument<'a>,
     }
     let verdict = ReportVerdict::from_report(report);
-    serde_json::to_string_pretty(&ReportFile {
-        format: FORMAT,
-        written: ReportDocument::new(report, &verdict),
-    })
-    .map(|text| text + "\n")
+    let file = ReportFile { format: FORMAT, written: ReportDocument::new(report, &verdict) };
+    serde_json::to_string_pretty(&file).map(|text| text + "\n")
 }
 
 #[cfg(test)]

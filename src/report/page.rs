@@ -1,5 +1,5 @@
-//! The page of a report: one HTML file with its style, figures and script inside, which asks for nothing from
-//! elsewhere and is complete without its script.
+//! The page of a report: one HTML file with its style, figures and script, which loads nothing else and is
+//! complete without its script.
 
 pub(super) mod agreement;
 pub(super) mod html;
@@ -23,17 +23,17 @@ impl Report {
     }
 }
 
-/// Most bytes of a page that has figures drawn for telephones besides.
+/// Most bytes of a page with extra figures for telephones.
 const MOST_BYTES: usize = 1_000_000;
 
-/// The page; the same report always gives the same bytes. One that would be too large for it does without the
-/// figures for telephones, which show the others smaller.
+/// The page; the same report always gives the same bytes. A page that would be too large has no extra figures
+/// for telephones, which then show the wide ones smaller.
 pub(crate) fn render_page(report: &Report) -> String {
     let whole = assemble_page(report, true);
     if whole.len() <= MOST_BYTES { whole } else { assemble_page(report, false) }
 }
 
-/// The page, with figures for `narrow` screens besides.
+/// The page, with `narrow` also with figures for narrow screens.
 fn assemble_page(report: &Report, narrow: bool) -> String {
     let verdict = ReportVerdict::from_report(report);
     let (first, evidence) = evidence_html(report, narrow);
@@ -69,7 +69,7 @@ fn assemble_page(report: &Report, narrow: bool) -> String {
     render_document(&report.title, &data_banner(report), &sections)
 }
 
-/// What the data are, before anything else is said.
+/// Banner that says if the data are synthetic or published.
 pub(super) fn data_banner(report: &Report) -> String {
     let named: Vec<_> =
         report.recordings.iter().filter(|r| r.synthetic).map(|r| isolate_name(&r.name)).collect();
@@ -87,7 +87,7 @@ pub(super) fn data_banner(report: &Report) -> String {
     }
 }
 
-/// Figures of a subject, with the number of those before them: numbers run through the whole page.
+/// Figures of a subject, and the number of figures before them on the page.
 fn figures_of_subject(report: &Report, subject: FigureSubject) -> (Vec<&FigureBlock>, usize) {
     let groups = || report.figures.iter();
     let before = groups().take_while(|group| group.subject != subject).map(|group| group.figures.len()).sum();
@@ -107,8 +107,6 @@ fn subject_figures_html(report: &Report, subject: FigureSubject) -> String {
     let (all, before) = figures_of_subject(report, subject);
     figures_html(all, before, false)
 }
-
-// The first screen: whether the model explains the recording, the blade's numbers, and what to do next.
 
 pub(super) fn summary_html(report: &Report) -> String {
     let answer = ReportSummary::from_report(report);
@@ -154,8 +152,6 @@ fn quantity_row(q: &SummaryQuantity) -> Vec<HtmlCell> {
     ]
 }
 
-// Where the numbers come from and how they are made again.
-
 pub(in crate::report) fn provenance_html(p: &Provenance) -> String {
     let mut list = vec![("wiperlab", p.version.clone())];
     list.extend(p.seed.map(|seed| ("seed", seed.to_string())));
@@ -197,9 +193,7 @@ fn commands_html(p: &Provenance) -> String {
     )
 }
 
-// How the best model ran, and its hard events: a zero is said as plainly as a number.
-
-/// A row: what is counted, what of a run, and whether it is a hard event that is better absent.
+/// A row: its name, its value in a run, and whether any value but `none` is bad.
 type EventRow = (&'static str, fn(&RunSummary) -> String, bool);
 
 const EVENT_ROWS: [EventRow; 12] = [
@@ -257,7 +251,7 @@ fn text_or_none(value: Option<f64>, text: impl Fn(f64) -> String) -> String {
     value.map_or_else(|| NO_EVENTS.to_owned(), text)
 }
 
-/// The table, a column a condition.
+/// The table, with a column for each condition.
 pub(super) fn events_table(runs: &[RunSummary]) -> String {
     let one = |(what, of, hard): &EventRow| -> Vec<HtmlCell> {
         let cell = |run| {

@@ -68,14 +68,14 @@ impl Serialize for Sentence {
     }
 }
 
-/// A statement with what it rests on.
+/// A statement with details that support it.
 #[derive(Debug, Clone, PartialEq, Eq, Default, Serialize)]
 pub struct Statement {
     /// What is stated.
     pub statement: Sentence,
     /// Details, one a line.
     pub details: Vec<Sentence>,
-    /// Whether it is as one would have it; `None` where it is neither good nor bad.
+    /// Whether it is good; `None` if it is neither good nor bad.
     pub good: Option<bool>,
 }
 
@@ -94,7 +94,7 @@ impl Statement {
         Self { statement: statement.into(), details, good }
     }
 
-    /// The same, being as one would have it or not.
+    /// The same with a verdict.
     pub(crate) fn with_verdict(self, good: bool) -> Self {
         Self { good: Some(good), ..self }
     }
@@ -118,7 +118,7 @@ mod tests {
     #[test]
     fn a_statement_is_one_line_with_its_details() {
         let names = Sentence::new("open: ").with_names(["a\u{202e}", "b"]);
-        assert_eq!(names.parts().len(), 4);
+        assert_eq!(names.0.len(), 4);
         let statement = Statement {
             statement: Sentence::new("One is met."),
             details: vec![names, Sentence::new("x")],

@@ -1,5 +1,5 @@
-//! What a reader wants to know first, in plain words: whether the model explains the recording, the blade's
-//! numbers, how sure they are, and what to do next.
+//! The answer at the top of a report: whether the model explains the recording, the numbers of the blade, how
+//! certain they are, and what to do next.
 
 use super::Report;
 use super::rich_text::{Sentence, Statement};
@@ -15,9 +15,9 @@ use crate::text::{
 };
 use serde::Serialize;
 
-/// Residual over noise above which a run is seen to be off.
+/// Ratio of residual to noise above which a run visibly deviates.
 const SEEN: f64 = 3.0;
-/// Standard deviations between model and target that are worth a word.
+/// Deviation of the model from a met target that is mentioned, in standard deviations.
 const FAR_SD: f64 = 1.96;
 
 /// The answer of a report.
@@ -27,7 +27,7 @@ pub(crate) struct ReportSummary {
     pub headline: Statement,
     /// The numbers of the blade: friction at rest and at speed, then every other parameter.
     pub quantities: Vec<SummaryQuantity>,
-    /// How sure they are.
+    /// How certain they are.
     pub certainty: Sentence,
     /// What to do next.
     pub next: Sentence,
@@ -36,7 +36,7 @@ pub(crate) struct ReportSummary {
 /// A number of the blade, in SI units.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub(crate) struct SummaryQuantity {
-    /// What it is, in words.
+    /// Its meaning.
     pub name: String,
     /// The keys of a scene that it comes from.
     pub keys: Vec<&'static str>,
@@ -49,7 +49,7 @@ pub(crate) struct SummaryQuantity {
     pub upper_95: Option<f64>,
     /// Whether the data determine it.
     pub identified: bool,
-    /// Whether anything of it was fitted.
+    /// Whether a parameter that it depends on was fitted.
     pub fitted: bool,
 }
 
@@ -65,7 +65,8 @@ impl ReportSummary {
     }
 }
 
-/// The coefficients of the friction law, which say less than friction at rest and at speed.
+/// Whether a parameter is a coefficient of the friction law. The summary has friction at rest and at speed
+/// instead.
 fn is_friction_coefficient(name: &str) -> bool {
     name.starts_with("friction.")
 }
@@ -114,7 +115,7 @@ pub(in crate::report) fn report_headline(report: &Report) -> Statement {
     }
 }
 
-/// The channel whose segments are farthest from their noise.
+/// The channel with the largest ratio of residual to noise.
 fn worst_channel(misfit: &TraceMisfit) -> Option<&ChannelMisfit> {
     let ratio = |c: &&ChannelMisfit| c.residual_rms_m / c.noise_m;
     misfit.channels.iter().filter(|c| c.frames > 0).max_by(|a, b| ratio(a).total_cmp(&ratio(b)))
@@ -142,7 +143,7 @@ fn trace_headline(report: &Report, misfit: &TraceMisfit) -> Statement {
     Statement::with_details(words, details, Some(misfit.explained))
 }
 
-/// How far a run leads that is started once; traces are fitted in segments.
+/// Deviation of a single run from the start; traces are fitted in segments.
 fn single_run_sentence(report: &Report) -> Option<Sentence> {
     let (condition, r) = farthest_residual(report)?;
     let ratio = r.rms_over_noise.filter(|ratio| *ratio > NOTHING_LEFT)?;
@@ -169,8 +170,7 @@ fn channel_point_name(channel: &str) -> &str {
     }
 }
 
-/// The condition in which one run of the model is farthest from the recording, for its noise, and what is
-/// left there.
+/// The condition whose single run has the largest ratio of residual to noise, with that residual.
 pub(in crate::report) fn farthest_condition(
     conditions: &[ComparisonSummary],
 ) -> Option<(usize, &ResidualSummary)> {
@@ -180,7 +180,7 @@ pub(in crate::report) fn farthest_condition(
     left.max_by(|(i, a), (j, b)| ratio(a).total_cmp(&ratio(b)).then(j.cmp(i)))
 }
 
-/// What one run leaves where it is farthest from its recording.
+/// The name of that condition, with the residual.
 fn farthest_residual(report: &Report) -> Option<(&str, &ResidualSummary)> {
     let (condition, line) = farthest_condition(&report.comparison)?;
     Some((report.comparison.get(condition)?.condition.as_str(), line))
@@ -202,7 +202,7 @@ fn count_met_targets(report: &Report) -> (bool, String) {
     (met == all, count)
 }
 
-/// The targets that are missed, then those that are met and yet far for their deviation.
+/// The missed targets, then met ones that are more than [`FAR_SD`] standard deviations off.
 fn missed_target_sentences(report: &Report) -> Vec<Sentence> {
     let apart = |c: &Comparison| c.model.zip(c.target_sd).map(|(m, sd)| (m - c.target).abs() / sd);
     let far = |c: &&Comparison| c.pass && apart(c).is_some_and(|sds| sds > FAR_SD);
@@ -285,7 +285,7 @@ fn certainty_sentence(report: &Report) -> Sentence {
     Sentence::new(known_words + constants)
 }
 
-/// Why parameters are open, where one reason holds for all of them.
+/// The reason why parameters are open, if all have the same.
 fn shared_reason<'a>(open: &[&'a ParameterLine]) -> Option<&'a str> {
     let (first, rest) = open.split_first()?;
     let why = first.why.as_deref()?;
@@ -338,7 +338,7 @@ fn next_step_sentence(report: &Report) -> Sentence {
     Sentence::new("Test the model on a recording that was not fitted, at another speed or preload.")
 }
 
-/// Share of the way between its bounds within which an estimate lies at one.
+/// An estimate closer to a bound than this fraction of the range lies at it.
 const AT_BOUND: f64 = 1e-3;
 
 /// Whether a search ended at a bound: the best value may lie beyond.

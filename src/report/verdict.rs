@@ -1,4 +1,4 @@
-//! What a report says of a fit, built once for the page, the JSON and the terminal.
+//! The verdict on a fit, built once for the page, the JSON and the terminal.
 
 use super::rich_text::{Sentence, Statement};
 use super::{Report, summary};
@@ -31,11 +31,11 @@ pub struct ReportVerdict {
     pub search_converged: bool,
     /// Whether the best model's run reached its stop time in every condition.
     pub all_runs_completed: bool,
-    /// Whether any recording is one that no camera took.
+    /// Whether any recording is synthetic.
     pub synthetic: bool,
     /// Whether there is no recording, and only published numbers were fitted.
     pub published_only: bool,
-    /// The same in words, the most important first.
+    /// The verdict in words, most important first.
     #[serde(skip)]
     pub statements: Vec<Statement>,
 }
@@ -110,12 +110,12 @@ fn verdict_statements(report: &Report) -> Vec<Statement> {
         ));
     }
     found.extend(ending_statements(report));
-    // what does not fit is said before what does
+    // bad statements come first
     found.sort_by_key(|statement| statement.good != Some(false));
     found
 }
 
-/// Features that need a camera which is far from its prior.
+/// Statement if the features are met only with a camera far from its prior.
 fn far_camera_statement(report: &Report) -> Option<Statement> {
     let reasons = far_from_priors(&report.nuisances);
     let is_far = report.misfit.is_none() && !reasons.is_empty();
@@ -128,7 +128,7 @@ fn misfit_statement(misfit: &TraceMisfit) -> Statement {
     Statement::with_details(misfit.headline(), details, Some(misfit.explained))
 }
 
-/// Residuals of a channel against its noise, and where it fits worst.
+/// Residuals of a channel compared with its noise, and the segment that fits worst.
 fn residual_sentence(c: &ChannelMisfit) -> Sentence {
     let worst = c.worst.first().map_or_else(String::new, |w| {
         let [from, to, chi2] = [w.start_s, w.end_s, w.chi2_per_dof].map(format_number);
@@ -140,7 +140,7 @@ fn residual_sentence(c: &ChannelMisfit) -> Sentence {
     Sentence::default().with_name(&c.recording).with_words(words)
 }
 
-/// What is counted, and the same of several.
+/// Singular and plural of what is counted.
 const NOUNS: [[&str; 2]; 3] =
     [["value that was", "values that were"], ["component", "components"], ["feature", "features"]];
 
@@ -201,7 +201,7 @@ fn parameter_sentence(p: &ParameterLine) -> Sentence {
     Sentence::default().with_name(&p.name).with_words(words)
 }
 
-/// How many intervals hold the truth behind synthetic data.
+/// Number of intervals that contain the true values of synthetic data.
 fn truth_statement(parameters: &[ParameterLine]) -> Option<Statement> {
     let (known, open): (Vec<_>, Vec<_>) =
         parameters.iter().filter_map(|p| p.truth.map(|truth| (p, truth))).partition(|(p, _)| p.is_bounded());
@@ -265,7 +265,7 @@ fn ending_statements(report: &Report) -> Vec<Statement> {
     found
 }
 
-/// What a run went through and went on; nothing where the tip stays on the glass.
+/// Contact losses and jams of a run that went on after them; `None` if there were none.
 fn hard_event_statement(run: &RunSummary) -> Option<Statement> {
     let counts = [(run.contact_losses, "leaves the glass"), (run.jams, "jams")];
     let happened = counts.into_iter().filter(|(count, _)| *count > 0);

@@ -92,7 +92,7 @@ pub struct ProbeLine {
     pub failure: Option<String>,
 }
 
-/// Where the numbers come from.
+/// Files, version and commands behind the numbers.
 #[derive(Debug, Clone, PartialEq, Default, Serialize)]
 pub struct Provenance {
     /// Version of the program.

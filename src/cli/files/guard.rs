@@ -1,5 +1,5 @@
-//! What a command may overwrite: what it made itself and can prove, the rest with `--force`, and never a
-//! measured recording.
+//! What a command may overwrite: files that it provably made itself, others only with `--force`, a measured
+//! recording never.
 
 use super::marker::{FolderMarker, OutputCommand, WritePolicy, hash_file};
 use super::preserved_files::{FolderRecording, SIMULATION_SUMMARY, is_simulation_summary};
@@ -8,7 +8,7 @@ use crate::recording::files::{DESCRIPTION_FILE, TRACE_FILE};
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-/// Refuses files that are those of a measured recording: no command replaces them, whatever it knows of them.
+/// Refuses to replace files of a measured recording.
 pub(crate) fn refuse_measured(folder: &Path, names: &[&str]) -> Outcome<()> {
     let (marker, _) = FolderMarker::load(folder)?;
     let FolderRecording::Measured { why, files, .. } = FolderRecording::detect(folder, &marker)? else {
@@ -28,7 +28,7 @@ fn other_recording_failure(path: &Path, why: &str, advice: &str) -> Failure {
     )
 }
 
-/// A folder before a command writes into it.
+/// The state of a folder before a command writes into it.
 #[derive(Debug)]
 pub(crate) struct OutputGuard {
     folder: PathBuf,
@@ -39,8 +39,7 @@ pub(crate) struct OutputGuard {
 }
 
 impl OutputGuard {
-    /// Refuses a folder whose recording the command would destroy or contradict; `names` are the files that
-    /// it writes.
+    /// Refuses a folder whose recording the command would destroy or contradict by writing the files `names`.
     pub(crate) fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Outcome<Self> {
         let (marker, unreadable) = FolderMarker::load(folder)?;
         let guard = Self { folder: folder.to_owned(), writer: writer.clone(), marker, unreadable };
@@ -49,9 +48,8 @@ impl OutputGuard {
         Ok(guard)
     }
 
-    /// Refuses to overwrite a file that is not provably the command's own; gives the hash of one that is.
-    /// `coming` is the hash of what is to be written, where it is known: writing what is there changes
-    /// nothing.
+    /// Refuses to overwrite a file that is not provably the command's own, and returns the hash of one that
+    /// is. `coming` is the hash of the new contents, if known: identical contents are always allowed.
     pub(crate) fn check_overwrite(&self, name: &str, coming: Option<&str>) -> Outcome<Option<String>> {
         let path = self.folder.join(name);
         let Some(found) = hash_file(&path)? else { return Ok(None) };
@@ -81,8 +79,8 @@ impl OutputGuard {
         ))
     }
 
-    /// Files in the folder that go when the command has written `names`, none of which anything else holds:
-    /// those of the same command's last run, and with `--force` those of another recording.
+    /// Files to remove after the command has written `names`: unchanged ones of its last run, and with
+    /// `--force` unchanged ones of another recording.
     pub(crate) fn outdated_files(&self, names: &[&str]) -> Vec<String> {
         let maker = self.writer.maker;
         let of_last_run = |by: OutputCommand| by == maker && maker.replaces_last_run();
@@ -93,7 +91,7 @@ impl OutputGuard {
         listed.filter(|(name, _)| self.is_unchanged(name)).map(|(name, _)| name.clone()).collect()
     }
 
-    /// Whether a listed file lies in the folder itself, or below it without a link, as a command made it.
+    /// Whether a listed file is unchanged and lies in or below the folder, not behind a link.
     fn is_unchanged(&self, name: &str) -> bool {
         let path = self.folder.join(name);
         let inside = Path::new(name).components().all(|part| matches!(part, Component::Normal(_)));
@@ -103,7 +101,8 @@ impl OutputGuard {
         inside && !linked && is_file && hash_file(&path).is_ok_and(|found| found.is_some_and(is_own))
     }
 
-    /// A measured recording stays, whatever is asked for; an import of the same exports loses nothing of it.
+    /// Protects a measured recording from everything but a new import of the same exports, which loses
+    /// nothing.
     fn protect_recording(&self, names: &[&str]) -> Outcome<()> {
         let FolderRecording::Measured { why, exports, files } =
             FolderRecording::detect(&self.folder, &self.marker)?
@@ -134,7 +133,7 @@ impl OutputGuard {
         Err(other_recording_failure(&self.folder.join(name), &why, advice))
     }
 
-    /// The description of one recording must not stand next to the trace of another.
+    /// Refuses to put a trace next to the description of another recording.
     fn refuse_contradiction(&self, names: &[&str]) -> Outcome<()> {
         let other = match self.writer.maker {
             OutputCommand::Simulate => Some(DESCRIPTION_FILE).filter(|name| self.folder.join(name).exists()),

@@ -1,5 +1,5 @@
-//! Reading what the user names: regular files and, as `-`, standard input, up to a stated size. The size is
-//! checked before a byte is read and again while reading: a file may be sparse, grow, or have none.
+//! Reading of regular files and, as `-`, of standard input, up to a size limit. The size is checked before
+//! and while reading, because a file may grow and standard input has no size.
 
 use crate::cli::failure::{Failure, Outcome};
 use std::fmt;
@@ -11,11 +11,11 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// The name of standard input on the command line.
 const STANDARD_INPUT: &str = "-";
-/// Largest file that people write by hand: a thousand components have a quarter of it. Parsed, it takes up to
-/// a hundred times as much memory.
+/// Largest TOML file. A job with a thousand components has a quarter of this size. Parsing takes up to a
+/// hundred times as much memory.
 const TOML_LIMIT: ReadLimit =
     ReadLimit { largest: FileSize(500_000), advice: "this is no file that people write; name another one" };
-/// Largest result of a fit: some hundred times those that are committed.
+/// Largest result of a fit: about a hundred times the results in this repository.
 const JSON_LIMIT: ReadLimit =
     ReadLimit { largest: FileSize(16_000_000), advice: "this program writes none so large; make it again" };
 
@@ -27,12 +27,12 @@ static MAX_DATA_BYTES: AtomicU64 = AtomicU64::new(FileSize::DEFAULT.0);
 pub(crate) struct FileSize(u64);
 
 impl FileSize {
-    /// The longest recording that is read, ten million frames, has about so much.
+    /// About the size of the longest recording that is read, ten million frames.
     pub(crate) const DEFAULT: Self = Self(1_000_000_000);
     const UNITS: [(&str, u64); 5] =
         [("GB", 1_000_000_000), ("MB", 1_000_000), ("kB", 1_000), ("B", 1), ("", 1)];
 
-    /// Reads no file with data above this size from now on.
+    /// Sets the size limit of all data files that are read afterwards.
     pub(crate) fn set_read_limit(self) {
         MAX_DATA_BYTES.store(self.0, Ordering::Relaxed);
     }
@@ -135,7 +135,7 @@ fn read_limited(path: &Path, limit: ReadLimit) -> Outcome<Vec<u8>> {
     if is_standard_input(path) {
         return read_all(path, io::stdin().lock(), limit);
     }
-    // asked before it is opened: to open a pipe waits for whoever writes into it
+    // checked before opening, because opening a pipe waits for its writer
     check_regular_file(path, &fs::metadata(path).map_err(|error| read_failure(path, &error))?)?;
     let file = File::open(path).map_err(|error| read_failure(path, &error))?;
     limit.check_open_file(path, &file)?;
@@ -147,14 +147,14 @@ fn read_all(path: &Path, from: impl Read, limit: ReadLimit) -> Outcome<Vec<u8>> 
     bytes.ok_or_else(|| limit.too_large_failure(path, &format!("more than {}", limit.largest)))
 }
 
-/// All bytes, or `None` where there are more than allowed.
+/// All bytes, or `None` if there are more than `largest`.
 fn read_at_most(from: impl Read, largest: FileSize) -> io::Result<Option<Vec<u8>>> {
     let mut bytes = Vec::new();
     from.take(largest.0.saturating_add(1)).read_to_end(&mut bytes)?;
     Ok((bytes.len() as u64 <= largest.0).then_some(bytes))
 }
 
-/// Only a regular file has an end and gives the same twice.
+/// Only a regular file has an end and can be read twice with the same result.
 fn check_regular_file(path: &Path, found: &Metadata) -> Outcome<()> {
     let problem = match found.file_type() {
         kind if kind.is_file() => return Ok(()),

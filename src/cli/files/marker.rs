@@ -1,4 +1,4 @@
-//! The marker of an output folder: which command made which file, and what was in it.
+//! The marker of an output folder: which command made which file, and the hash of its contents.
 
 use crate::cli::failure::{Failure, Outcome};
 use crate::text::TextHash;
@@ -13,7 +13,7 @@ use std::path::Path;
 pub(crate) const MARKER_FILE: &str = ".wiperlab.json";
 const MARKER_FORMAT: u32 = 1;
 
-/// What the commands made in a folder. It holds no times: the same outputs have the same marker.
+/// The files that commands made in a folder. It has no timestamps, so the same outputs have the same marker.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(crate) struct FolderMarker {
@@ -28,10 +28,10 @@ pub(crate) struct FolderMarker {
 pub(crate) struct MarkedFile {
     pub by: OutputCommand,
     pub version: String,
-    /// Of its contents as a text: line ends and a byte-order mark do not count.
+    /// Hash of the contents as text, without line ends and byte-order mark.
     pub sha256: String,
-    /// Hash of the file that it takes the place of, if a command made that too: while the files get their
-    /// names either may be there, also after the program was killed.
+    /// Hash of the file that it replaces, if a command made that too. Until all files are renamed, or if the
+    /// program is killed meanwhile, either file may be on the disk.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub replaces: Option<String>,
 }
@@ -49,8 +49,8 @@ impl Default for FolderMarker {
 }
 
 impl FolderMarker {
-    /// The marker of a folder; an empty one where there is none. One that cannot be read proves nothing, and
-    /// the reason is given.
+    /// Reads the marker of a folder; an empty one if there is none or it cannot be read, then with the
+    /// reason.
     pub(crate) fn load(folder: &Path) -> Outcome<(Self, Option<String>)> {
         let path = folder.join(MARKER_FILE);
         if !path.exists() {
@@ -69,16 +69,16 @@ impl FolderMarker {
         })
     }
 
-    /// Whether a file is, unchanged, what a command made; its maker.
+    /// The command that made a file, if the file is unchanged.
     pub(crate) fn maker_if_unchanged(&self, name: &str, sha256: &str) -> Option<OutputCommand> {
         self.files.get(name).filter(|made| made.matches_hash(sha256)).map(|made| made.by)
     }
 }
 
-/// Largest file that says what is in a folder, bytes; this program writes none so large.
+/// Largest marker, description or summary that is read, bytes; this program writes none that large.
 const MAX_MARKER_BYTES: u64 = 16_000_000;
 
-/// Bytes of a file that says what is in a folder, if it is a file and no larger than such files are.
+/// Reads a marker, description or summary, if it is a file of at most [`MAX_MARKER_BYTES`].
 pub(crate) fn read_small_file(path: &Path) -> Result<Vec<u8>, String> {
     let found = fs::metadata(path).map_err(|error| error.to_string())?;
     if !found.is_file() || found.len() > MAX_MARKER_BYTES {
@@ -87,7 +87,7 @@ pub(crate) fn read_small_file(path: &Path) -> Result<Vec<u8>, String> {
     fs::read(path).map_err(|error| error.to_string())
 }
 
-/// Hash of a file as markers have it; `None` where there is no file.
+/// Hash of a file as in markers; `None` if there is no file.
 pub(crate) fn hash_file(path: &Path) -> Outcome<Option<String>> {
     let refused = |error: io::Error| Failure::at(path.display(), format!("cannot be read: {error}"));
     if !path.is_file() {
@@ -98,7 +98,7 @@ pub(crate) fn hash_file(path: &Path) -> Outcome<Option<String>> {
     Ok(Some(hashing.hash.finish()))
 }
 
-/// A reader that hashes what passes through it.
+/// A reader that hashes what is read through it.
 pub(crate) struct HashingReader<R> {
     from: R,
     pub hash: TextHash,
@@ -118,9 +118,7 @@ impl<R: Read> Read for HashingReader<R> {
     }
 }
 
-// Who writes an output folder.
-
-/// A command that writes files into a folder; the word that the marker keeps.
+/// A command that writes files into a folder, as the marker records it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum OutputCommand {
@@ -146,14 +144,13 @@ impl OutputCommand {
         format!("{self:?}").to_lowercase()
     }
 
-    /// Whether what it makes is a recording, of which a folder holds one.
+    /// Whether it makes a recording; a folder holds one recording.
     pub(crate) fn makes_recordings(self) -> bool {
         matches!(self, Self::Import | Self::Simulate | Self::Twin)
     }
 
-    /// Whether all its files in a folder are of one run: those of an earlier run that the next one does not
-    /// make are then removed. An import keeps exports, and init, demo and figures write next
-    /// to files of others.
+    /// Whether a run replaces the whole last one: files of the last run that are not written again are
+    /// removed. An import keeps exports; init, demo and figures write next to files of other commands.
     pub(crate) fn replaces_last_run(self) -> bool {
         !matches!(self, Self::Demo | Self::Figures | Self::Import | Self::Init)
     }
@@ -182,10 +179,10 @@ pub(crate) struct Overwrite {
 pub(crate) struct WritePolicy {
     pub maker: OutputCommand,
     pub force: bool,
-    /// SHA-256 of the exports that an import reads; a measured recording gives way to an import of the same
-    /// ones.
+    /// SHA-256 of the exports that an import reads; an import of the same exports may replace a measured
+    /// recording.
     pub exports: Vec<String>,
-    /// How its tables are written; a trace is always plain, as programs read it.
+    /// Dialect of its tables; a trace is always plain, because programs read it.
     pub csv: CsvDialect,
 }
 
@@ -194,8 +191,6 @@ impl WritePolicy {
         Self { maker, force: overwrite.force, exports: Vec::new(), csv: CsvDialect::Plain }
     }
 }
-
-// Tables as a spreadsheet opens them.
 
 /// How tables are written for those who open them with a double click.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, ValueEnum)]
@@ -209,7 +204,7 @@ pub(crate) enum CsvDialect {
     ExcelUs,
 }
 
-/// What tells Excel that a file is UTF-8.
+/// Marks a file as UTF-8 for Excel.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 impl CsvDialect {

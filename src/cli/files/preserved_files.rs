@@ -1,16 +1,16 @@
-//! Which recording a folder holds, and what of it no command overwrites.
+//! Which recording a folder holds, and which of its files no command overwrites.
 
 use super::marker::{FolderMarker, OutputCommand, hash_file, read_small_file};
 use crate::cli::failure::Outcome;
 use crate::recording::files::{DESCRIPTION_FILE, RecordingFile, TRACE_FILE};
 use std::path::Path;
 
-/// What `simulate` writes next to its trace and no import does.
+/// Summary that `simulate` writes next to its trace, and no import does.
 pub(crate) const SIMULATION_SUMMARY: &str = "summary.json";
-/// Keys that the summary of a simulation has and that of a study has not.
+/// Keys of the summary of a simulation that the summary of a study does not have.
 const KEYS_OF_A_SIMULATION: [&str; 2] = ["stopped_at_s", "rhs_evaluations"];
 
-/// Whether there is the summary of a simulation.
+/// Whether the file is the summary of a simulation.
 pub(crate) fn is_simulation_summary(path: &Path) -> bool {
     let summary: Option<serde_json::Value> =
         path.is_file().then(|| serde_json::from_slice(&read_small_file(path).ok()?).ok()).flatten();
@@ -21,9 +21,9 @@ pub(crate) fn is_simulation_summary(path: &Path) -> bool {
 #[derive(Debug, PartialEq, Eq)]
 pub(crate) enum FolderRecording {
     Nothing,
-    /// One that is proven to be synthetic.
+    /// Proven to be synthetic.
     Synthetic,
-    /// One that a camera took, or of which nothing proves that none did.
+    /// Taken by a camera, or not proven to be synthetic.
     Measured {
         /// Why it counts as measured.
         why: String,

@@ -1,5 +1,4 @@
-//! Files that appear all together or not at all: written next to their places under temporary names, then
-//! renamed.
+//! Files that appear all together or not at all: they are written under temporary names, then renamed.
 //!
 //! What is on the disk when: every file is flushed before any gets its name; then the folder's marker says
 //! what comes and what it replaces, and is flushed too; then the files are renamed one by one and the names
@@ -19,10 +18,10 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 use tempfile::NamedTempFile;
 
-/// How passing names begin and end.
+/// Prefix and suffix of temporary names.
 const TEMPORARY_NAME: (&str, &str) = (".wiperlab-", ".tmp");
-/// A file on its way is locked microseconds after it is made, and the lock goes with the program. One that is
-/// older than this and not locked belongs to a program that was killed.
+/// A temporary file is locked microseconds after it is made, until the program ends. An older one without a
+/// lock belongs to a program that was killed.
 const ABANDONED_AFTER: Duration = Duration::from_secs(60);
 
 /// Files of a command on their way into a folder. Dropped before [`OutputStaging::commit`], nothing is left of them.
@@ -33,7 +32,7 @@ pub(crate) struct OutputStaging {
     made: CreatedFolders,
 }
 
-/// A file under a temporary name next to its place.
+/// A file under a temporary name.
 struct StagedFile {
     name: String,
     path: PathBuf,
@@ -42,13 +41,13 @@ struct StagedFile {
 }
 
 impl OutputStaging {
-    /// For the files `names`; refuses what [`OutputGuard`] refuses.
+    /// Prepares the files `names`; refuses what [`OutputGuard`] refuses.
     pub(crate) fn new(folder: &Path, writer: &WritePolicy, names: &[&str]) -> Outcome<Self> {
         let guard = OutputGuard::new(folder, writer, names)?;
         Ok(Self { guard: Some((guard, writer.clone())), ..Self::new_unguarded(folder, names)? })
     }
 
-    /// For files of which the caller knows that nothing is lost with what they replace.
+    /// Prepares files that no marker lists; the caller knows that they replace nothing of value.
     pub(crate) fn new_unmarked(folder: &Path, names: &[&str]) -> Outcome<Self> {
         refuse_measured(folder, names)?;
         Self::new_unguarded(folder, names)
@@ -64,7 +63,7 @@ impl OutputStaging {
         })
     }
 
-    /// Writes a file next to its place; gives the hash of its contents.
+    /// Writes a file under a temporary name and returns the hash of its contents.
     pub(crate) fn stage_file(&mut self, name: &str, contents: impl Read) -> Outcome<String> {
         let path = self.folder.join(name);
         self.made.create(path.parent().unwrap_or(Path::new("")))?;
@@ -80,9 +79,9 @@ impl OutputStaging {
         Ok(sha256)
     }
 
-    /// Gives every file its name, or none.
+    /// Renames all files, or none.
     pub(crate) fn commit(self) -> Outcome<()> {
-        let (made, files) = (self.made, self.files); // (folders are dropped after what is in them)
+        let (made, files) = (self.made, self.files); // folders are dropped after their files
         let (folder, guard) = (self.folder, self.guard);
         flush_files(&files)?;
         let within: BTreeSet<PathBuf> =
@@ -113,11 +112,11 @@ fn rename_staged(files: Vec<StagedFile>) -> Outcome<()> {
     Ok(())
 }
 
-/// What the marker of a folder says while files get their names, and afterwards.
+/// The marker of a folder while files are renamed, and afterwards.
 struct MarkerUpdate<'a> {
     folder: &'a Path,
     before: &'a FolderMarker,
-    /// Of every file what it is and what it replaces: true before, between and after the renaming.
+    /// Lists the new and the replaced hash of every file, so it holds before, during and after the renaming.
     pending: FolderMarker,
     after: FolderMarker,
     outdated: Vec<String>,
@@ -155,7 +154,7 @@ impl<'a> MarkerUpdate<'a> {
         if self.pending == *self.before { Ok(()) } else { self.write_marker(&self.pending) }
     }
 
-    /// Removes what is outdated, then says what is there.
+    /// Removes outdated files, then writes the final marker.
     fn write_final(&self) -> Outcome<()> {
         for path in self.outdated.iter().map(|name| self.folder.join(name)) {
             if let Err(error) = fs::remove_file(&path) {
@@ -180,8 +179,8 @@ impl<'a> MarkerUpdate<'a> {
     }
 }
 
-/// Puts the names of files on the disk: a file that was flushed is found again after a loss of power only if
-/// its name was too. A file system that cannot flush folders does it by itself or not at all.
+/// Flushes folders, so that the names of new files survive a loss of power. File systems that cannot flush
+/// folders are skipped.
 fn sync_folders(folders: &BTreeSet<PathBuf>) -> Outcome<()> {
     #[cfg(unix)]
     for folder in folders {
@@ -196,12 +195,12 @@ fn sync_folders(folders: &BTreeSet<PathBuf>) -> Outcome<()> {
     Ok(())
 }
 
-/// Folders that were made for files; those that stay empty go.
+/// Folders that were made for files. Those that stay empty are removed.
 #[derive(Default)]
 struct CreatedFolders(Vec<PathBuf>);
 
 impl CreatedFolders {
-    /// Makes a folder and what is missing of the way to it; the outermost is kept first.
+    /// Makes a folder with its missing parents and records them, outermost first.
     fn create(&mut self, folder: &Path) -> Outcome<()> {
         let is_missing = |path: &&Path| !path.as_os_str().is_empty() && !path.exists();
         let mut missing: Vec<PathBuf> =
@@ -212,7 +211,7 @@ impl CreatedFolders {
             .map_err(|error| write_failure(folder, &error))
     }
 
-    /// They hold files now.
+    /// Keeps the folders and flushes their names.
     fn keep(mut self) -> Outcome<()> {
         let parents = std::mem::take(&mut self.0);
         sync_folders(&parents.iter().filter_map(|made| made.parent()).map(Path::to_owned).collect())
@@ -222,14 +221,14 @@ impl CreatedFolders {
 impl Drop for CreatedFolders {
     fn drop(&mut self) {
         for folder in self.0.iter().rev() {
-            // only an empty one goes; the failure itself is reported
+            // only an empty folder is removed; the failure itself is reported elsewhere
             let _ = fs::remove_dir(folder);
         }
     }
 }
 
-/// Refuses a place that something else than a file takes, or that no file can take: asked of all before any
-/// gets its name, so that none is left alone.
+/// Refuses a path that is taken by something else than a file, or that no file can have. All paths are
+/// checked before the first renaming, so that files appear together.
 pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
     let taken = |at: &Path, found: &str, expected: &str| {
         let at = at.display();
@@ -241,7 +240,7 @@ pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
     match path.parent() {
         _ if path.is_dir() => taken(path, "a folder", "a file"),
         Some(within) if within.exists() && !within.is_dir() => taken(within, "a file", "a folder"),
-        // (a name that is too long, for instance)
+        // a name that is too long, for instance
         _ => match found {
             Err(error) if error.kind() != ErrorKind::NotFound => Err(write_failure(path, &error)),
             _ => Ok(()),
@@ -249,7 +248,7 @@ pub(crate) fn check_path_free(path: &Path) -> Outcome<()> {
     }
 }
 
-/// The file under a temporary name next to its place, locked where the file system can, and its hash.
+/// Writes a file under a temporary name, locked if the file system can; returns it with its hash.
 fn write_temporary(path: &Path, contents: impl Read) -> io::Result<(NamedTempFile, String)> {
     let within = path.parent().unwrap_or(Path::new(""));
     let mut builder = tempfile::Builder::new();
@@ -273,12 +272,12 @@ fn write_temporary_table(
     write_temporary(path, converted)
 }
 
-/// Removes what programs that were killed left in a folder on its way.
+/// Removes temporary files of programs that were killed.
 fn remove_abandoned(folder: &Path) {
     let passing = |name: &str| name.starts_with(TEMPORARY_NAME.0) && name.ends_with(TEMPORARY_NAME.1);
     for entry in fs::read_dir(folder).into_iter().flatten().flatten() {
         if passing(&entry.file_name().to_string_lossy()) && is_abandoned(&entry.path()) {
-            let _ = fs::remove_file(entry.path()); // (it does no harm; the next command tries again)
+            let _ = fs::remove_file(entry.path()); // harmless; the next command tries again
         }
     }
 }
@@ -292,8 +291,7 @@ fn is_abandoned(path: &Path) -> bool {
         && File::open(path).is_ok_and(|file| file.try_lock().is_ok())
 }
 
-/// Flushes files to the disk side by side: one commit of the file system then serves many, where one after
-/// the other would wait for one each.
+/// Flushes files in parallel: one commit of the file system then serves many of them.
 fn flush_files(staged: &[StagedFile]) -> Outcome<()> {
     const AT_ONCE: usize = 64;
     let flushed = |staged: &StagedFile| {
@@ -308,8 +306,7 @@ fn flush_files(staged: &[StagedFile]) -> Outcome<()> {
     })
 }
 
-/// What a new file gets from an ordinary program (the user's mask still applies); temporary files are private
-/// otherwise.
+/// Permissions of an ordinary new file (the user's mask still applies); temporary files would be private.
 #[cfg(unix)]
 fn readable_by_all() -> fs::Permissions {
     std::os::unix::fs::PermissionsExt::from_mode(0o666)

@@ -8,13 +8,12 @@ use crate::cli::prelude::*;
 use crate::fit::result::{FitResult, FitStatus};
 use std::collections::BTreeMap;
 
-/// How a job of a list stands.
+/// State of a job in a list.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum BatchJobState {
-    /// Its result lies next to it, is of this job and version, and the search had converged; with how the fit
-    /// ended then.
+    /// It has a result of this job and version whose search had converged; with the outcome of that fit.
     Done(CommandOutcome),
-    /// There is none, or it is of something else, or the search had not converged.
+    /// It has no such result.
     Due,
 }
 
@@ -67,8 +66,8 @@ pub(crate) fn check_distinct_folders(jobs: &[PathBuf]) -> Outcome<()> {
 }
 
 impl FitArgs {
-    /// Fits the jobs of the list that are in the shard and not done yet. One that is refused does not stop
-    /// the others.
+    /// Fits the jobs of the list that are in the shard and not done yet. A refused job does not stop the
+    /// others.
     pub(crate) fn run_batch(&self, global: &GlobalArgs) -> Outcome {
         check_distinct_folders(&self.jobs)?;
         let (mut refused, mut early) = (None, Vec::new());

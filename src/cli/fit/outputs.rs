@@ -1,5 +1,5 @@
-//! What a fit leaves next to its result: the parameters in a row, the recordings beside the model, and the
-//! scenes at the estimates.
+//! Files that a fit writes next to its result: the parameters in a row, the recordings compared with the
+//! model, and the scenes at the estimates.
 
 use crate::cli::job::LoadedJob;
 use crate::cli::prelude::*;
@@ -12,7 +12,7 @@ use crate::fit::result::{FitResult, FitStatus};
 const PARAMETERS_FILE: &str = "parameters.csv";
 
 impl LoadedJob {
-    /// Refuses a folder in which the files of this fit have no place.
+    /// Refuses a folder that the files of this fit cannot be written to.
     pub(crate) fn check_outputs(&self, writer: &WritePolicy) -> Outcome<()> {
         let scenes = (0..self.job().conditions.len()).map(|at| self.scene_file_name(at));
         let names = [files::RESULT_FILE, PARAMETERS_FILE, COMPARISON_FILE].map(str::to_owned);
@@ -32,7 +32,7 @@ impl LoadedJob {
         files::write_outputs(&self.folder, writer, &files)
     }
 
-    /// A file for each condition; of one condition alone without a number.
+    /// Name of the scene of a condition, numbered if there are several.
     fn scene_file_name(&self, condition: usize) -> String {
         match self.job().conditions.len() {
             1 => "fitted-scene.toml".to_owned(),
@@ -40,7 +40,7 @@ impl LoadedJob {
         }
     }
 
-    /// Every estimate with its interval in one row, so that rows of many fits make a table.
+    /// Every estimate with its interval in one row, so that the rows of many fits make a table.
     fn parameters_csv(&self, result: &FitResult) -> Outcome<Vec<u8>> {
         let number = |value: Option<f64>| value.map_or_else(String::new, |value| format!("{value:?}"));
         let synthetic = self.measured.iter().any(|loaded| loaded.recording.is_synthetic());
@@ -70,7 +70,7 @@ impl LoadedJob {
         table.into_inner().map_err(Failure::internal)
     }
 
-    /// The recordings beside the model, and the scenes.
+    /// The recordings compared with the model, and the scenes.
     fn comparison_files(&self, result: &FitResult) -> Outcome<Vec<(String, Vec<u8>)>> {
         let model = self.problem.fitted_model(result).map_err(Failure::input)?;
         let runs = match run_conditions(self.job(), &model, result) {

@@ -1,5 +1,4 @@
-//! What a fit found, on standard output: what is met, what is known of the parameters, and what a reader has
-//! to know.
+//! The result of a fit on standard output: targets, parameters and notes.
 
 use super::CompletedFit;
 use crate::fit::linear_model::ParameterCombination;
@@ -10,7 +9,7 @@ use crate::text::{self, format_digits, to_ascii};
 /// Digits of a number that is shown.
 const DIGITS: usize = 5;
 
-/// Features, parameters and reservations.
+/// Prints misfit, features, parameters and notes.
 pub(crate) fn print_summary(solved: &CompletedFit) {
     let result = &solved.result;
     if let Some(misfit) = &result.misfit {
@@ -79,12 +78,12 @@ fn print_feature_row(
     print_line!("{name:<36} {target:>11} {model:>11} {unit:<4} {error:>8}  {met}");
 }
 
-/// What was known before the search, what the features determine together, and the notes.
+/// Prints combinations of parameters that the features determine, and the notes.
 fn print_notes(result: &FitResult) {
     print_line!("");
     result.combinations.iter().for_each(|found| print_line!("{}", describe_combination(found)));
     for note in &result.notes {
-        // those of the gate say when they were made
+        // notes of the gate say themselves when they were made
         print_line!("{}{note}", if result.gate.notes.contains(note) { "" } else { "note: " });
     }
 }
@@ -103,9 +102,7 @@ pub(super) fn format_value(value: f64) -> String {
     to_ascii(&format_digits(value, DIGITS))
 }
 
-// Residuals of the traces on standard output, before anything else is said.
-
-/// Most segments of a channel that are named.
+/// Most segments of a channel that are listed.
 const MOST_SEGMENTS: usize = 3;
 
 /// The first sentence, residuals against noise, and the misfit over the length of the segments.
@@ -142,7 +139,7 @@ fn print_worst_segments(c: &ChannelMisfit) {
     }
 }
 
-/// What was estimated besides the parameters.
+/// Prints what was estimated in addition to the parameters.
 pub(crate) fn print_nuisances(list: &[NuisanceResult]) {
     if list.is_empty() {
         return;

@@ -1,9 +1,8 @@
-//! Pages of the documentation for a terminal: what the pages use of Markdown, no more.
+//! Pages of the documentation for a terminal: the part of Markdown that the pages use.
 
 use crate::text::wrap_words;
 
-/// A section without those below it, by the text of its heading; with an empty heading what stands before the
-/// first one.
+/// The section of a heading, with its subsections; with an empty heading the text before the first section.
 pub(crate) fn find_section<'a>(page: &'a str, heading: &str) -> &'a str {
     let level = |line: &str| line.bytes().take_while(|byte| *byte == b'#').count();
     let mut places = page.split_inclusive('\n').scan(0, |at, line| {
@@ -19,8 +18,8 @@ pub(crate) fn find_section<'a>(page: &'a str, heading: &str) -> &'a str {
     &page[start..end.map_or(page.len(), |(end, _)| end)]
 }
 
-/// A page with lines of at most so many characters: links as their words, the rows of a table one below the
-/// other, code as it is.
+/// A page with lines of at most `width` characters: links as their words, each row of a table as a list, code
+/// unchanged.
 pub(crate) fn render_for_terminal(page: &str, width: usize) -> String {
     let mut out = String::new();
     let mut paragraph = String::new();
@@ -66,7 +65,7 @@ fn starts_item(line: &str) -> bool {
     line.starts_with("- ") || line.split_once(". ").is_some_and(|(number, _)| number.parse::<u8>().is_ok())
 }
 
-/// A paragraph or an item, indented as it was.
+/// Prints a paragraph or an item with its indentation.
 fn flush_paragraph(out: &mut String, paragraph: &mut String, width: usize) {
     let indent = paragraph.len() - paragraph.trim_start_matches(' ').len();
     let hanging = if starts_item(paragraph) { indent + 2 } else { indent };
@@ -77,7 +76,7 @@ fn flush_paragraph(out: &mut String, paragraph: &mut String, width: usize) {
     paragraph.clear();
 }
 
-/// The first row names the columns; of the others the first cell stands alone, with the rest below it.
+/// Prints a row of a table as a list: its first cell, then each other cell with the name of its column.
 fn push_table_row(out: &mut String, line: &str, columns: &mut Option<Vec<String>>, width: usize) {
     let cells = line.replace("\\|", "\u{1}");
     let cells: Vec<String> =
@@ -97,7 +96,7 @@ fn push_table_row(out: &mut String, line: &str, columns: &mut Option<Vec<String>
     }
 }
 
-/// Words without their links, bold and slanted letters.
+/// Text without links and emphasis.
 fn strip_markup(words: &str) -> String {
     let mut plain = String::new();
     let mut rest = words;

@@ -6,12 +6,10 @@ use crate::cli::report;
 use crate::report::assembly;
 use crate::report::fit_comparison::{ComparisonInput, compare_fits, comparison_json, render_page};
 
-/// Longest name of a folder that is made up: far from what file systems take, and still one that a person
-/// types.
+/// Longest name of a folder that is made from names of fits; file systems allow more.
 const LONGEST_NAME: usize = 100;
 
-/// Writes the comparison of fits; says whether any of them does not explain its recording or misses a
-/// component.
+/// Writes the comparison of fits. True if one of them does not explain its recording or misses a component.
 pub(crate) fn write_comparison(
     jobs: &[PathBuf],
     out: Option<&Path>,
@@ -53,7 +51,7 @@ pub(crate) fn write_comparison(
     Ok(!several.passes())
 }
 
-/// Refuses a fit that is given twice, and two fits that would go by the same name.
+/// Refuses a fit that is given twice, and two fits with the same name.
 fn check_distinct_fits(fits: &[&Path]) -> Outcome<()> {
     let place = |fit: &Path| fit.canonicalize().unwrap_or_else(|_| fit.to_owned());
     for (i, fit) in fits.iter().enumerate() {

@@ -1,4 +1,4 @@
-//! Where the numbers of a fit come from: its files with their hashes, and the commands that make it again.
+//! Provenance of a fit: its files with their hashes, and the commands that reproduce it.
 
 use super::ReportedFit;
 use crate::cli::files::RESULT_FILE;
@@ -92,8 +92,8 @@ fn parent_folder(name: &str) -> String {
     name.rsplit_once('/').map_or_else(String::new, |(folder, _)| folder.to_owned())
 }
 
-/// A path relative to where the folder `within` lies, without its detours; one that leads further up, or
-/// starts at the root, as written.
+/// A path in the folder `within`, without `.` and `..`. An absolute path, or one that leaves the project,
+/// stays as written.
 fn normalise_path(within: &str, path: &str) -> String {
     let whole = Path::new(within).join(path);
     let mut parts: Vec<String> = Vec::new();

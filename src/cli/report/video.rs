@@ -72,8 +72,8 @@ impl PictureSource for FramePictures {
     }
 }
 
-/// What names with numbers in them are ordered by, frame9 before frame10: texts, and numbers by how many
-/// digits they have and then as texts; of equals by the whole name.
+/// Sort key that puts frame9 before frame10: numbers are compared by their number of digits, then as text;
+/// equal keys by the whole name.
 fn natural_sort_key(name: &str) -> (Vec<(usize, String)>, String) {
     let mut parts: Vec<(bool, String)> = Vec::new();
     for letter in name.chars() {

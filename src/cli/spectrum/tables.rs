@@ -1,4 +1,4 @@
-//! What `spectrum_csv` writes and prints in addition to its figures.
+//! Tables and printed summary of `wiperlab spectrum`.
 
 use super::{SpectrumRequest, StudiedWindow};
 use crate::cli::failure::{Failure, Outcome};
@@ -11,10 +11,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 use std::fmt::Write;
 
-/// Rows of text that are made at a time; of a long record many such blocks are made in parallel.
+/// Rows of a block of text; the blocks of a long record are made in parallel.
 const BLOCK_ROWS: usize = 4096;
 
-/// `components.json`; what begins inside the window does so at a time of the recording.
+/// `components.json`; the start of a component is a time of the recording.
 pub(crate) fn components_json(studied: &StudiedWindow) -> Outcome<Vec<u8>> {
     let from_s = studied.recording.grid().time_s(studied.frames.start);
     let timed = |c: &Component| Component { begins_s: c.begins_s.map(|s| from_s + s), ..c.clone() };
@@ -89,7 +89,7 @@ pub(crate) fn description_json(request: &SpectrumRequest, studied: &StudiedWindo
     })
 }
 
-/// `spectrum.csv`: a row a bin; what a long or gappy record has not is empty.
+/// `spectrum.csv`, a row for each bin; cells that a long or gappy record lacks are empty.
 pub(crate) fn spectrum_csv(analysis: &SpectralAnalysis) -> Vec<u8> {
     let spectrum = &analysis.spectrum;
     let cell = |text: &mut String, value: Option<f64>| match value {

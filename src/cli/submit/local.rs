@@ -1,5 +1,4 @@
-//! Tasks as processes on this machine: several at once, each with its cores. Then the shards are put
-//! together.
+//! Tasks as processes on this machine, several at once; then the shards are put together.
 
 use super::plan::SubmissionPlan;
 use crate::cli::failure::{BAD_INPUT, STOPPED_EARLY};
@@ -10,7 +9,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::sleep;
 use std::time::Duration;
 
-/// From one look at the processes to the next.
+/// Interval at which the processes are checked.
 const PAUSE: Duration = Duration::from_millis(20);
 
 /// The command of a task, as words.
@@ -46,12 +45,12 @@ pub(crate) fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
     let (mut running, mut ended): (Vec<LocalTask>, Vec<FinishedTask>) = (Vec::new(), Vec::new());
     loop {
         if interrupt::control_flow().is_break() {
-            drop(running); // (they are killed)
+            drop(running); // dropping them kills them
             bar.finish_and_clear();
             stops.announce_stop(&kept);
             return Ok(CommandOutcome::StoppedEarly);
         }
-        // what one refuses the others refuse too
+        // the other tasks would refuse the same input
         let refused = ended.iter().any(FinishedTask::is_refused);
         while !refused && running.len() < at_once {
             let Some(task) = tasks.next() else { break };
@@ -84,7 +83,7 @@ pub(crate) fn run_tasks(plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
     run_collect(plan, global)
 }
 
-/// The job at the end: it says by itself what is missing.
+/// Runs the job at the end, which prints what is missing.
 fn run_collect(plan: &SubmissionPlan, global: &GlobalArgs) -> Outcome {
     let mut command = Command::new(&plan.program);
     command.args(plan.collect_command()).args(global.quiet.then_some("--quiet"));
@@ -104,7 +103,7 @@ fn start_failure(plan: &SubmissionPlan, error: &std::io::Error) -> Failure {
     Failure::Internal(format!("{}: cannot be started: {error}", plan.program))
 }
 
-/// A task that runs; dropped, it is killed, and loses the points on which it was working.
+/// A running task. When dropped it is killed and loses the points in progress.
 struct LocalTask {
     number: usize,
     child: Child,
@@ -152,12 +151,12 @@ impl FinishedTask {
         self.status.code() == Some(i32::from(BAD_INPUT))
     }
 
-    /// Whether it neither did its points nor stopped at its time.
+    /// Whether it neither succeeded nor stopped at its time limit.
     fn has_failed(&self) -> bool {
         !self.status.success() && self.status.code() != Some(i32::from(STOPPED_EARLY))
     }
 
-    /// Its last line, or where it printed nothing how it ended.
+    /// Its last line of output, or its exit status if there is none.
     fn message(&self, plan: &SubmissionPlan) -> String {
         let text = fs::read(&self.log).unwrap_or_default();
         let text = String::from_utf8_lossy(&text);

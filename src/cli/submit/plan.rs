@@ -9,10 +9,10 @@ use crate::cli::{fit, sweep};
 use std::fs;
 use std::time::Duration;
 
-/// Shortest walltime, s: Slurm counts in minutes.
+/// Shortest walltime, s, because Slurm counts in minutes.
 const SHORTEST_S: u64 = 60;
 
-/// Part of the walltime by which a task ends earlier: enough to finish points and to be started late.
+/// Fraction of the walltime by which a task ends earlier, for points in progress and a late start.
 const MARGIN: f64 = 0.05;
 /// Smallest and largest of these margins, s.
 const MARGINS_S: (u64, u64) = (30, 300);
@@ -22,7 +22,7 @@ const MARGINS_S: (u64, u64) = (30, 300);
 pub(crate) struct SubmissionPlan {
     /// This program, for other machines.
     pub program: String,
-    /// Where the tasks run: names in scenes may start from here.
+    /// Working folder of the tasks.
     pub folder: String,
     pub work: SubmittedWork,
     pub shards: usize,
@@ -46,12 +46,9 @@ impl SubmissionPlan {
         [self.work.collect_command(self.shards), self.options.clone()].concat()
     }
 
-    /// After what time a task ends by itself.
+    /// Time limit of a task.
     pub(crate) fn time_limit(&self) -> Option<Duration> {
-        self.walltime.map(|walltime| {
-            let margin_s = (walltime.as_secs() as f64 * MARGIN) as u64;
-            walltime.saturating_sub(Duration::from_secs(margin_s.clamp(MARGINS_S.0, MARGINS_S.1)))
-        })
+        self.walltime.map(|walltime| walltime.saturating_sub(time_margin(walltime)))
     }
 
     /// Folder of the scripts.
@@ -76,6 +73,11 @@ impl SubmissionPlan {
     }
 }
 
+fn time_margin(walltime: Duration) -> Duration {
+    let margin_s = (walltime.as_secs() as f64 * MARGIN) as u64;
+    Duration::from_secs(margin_s.clamp(MARGINS_S.0, MARGINS_S.1))
+}
+
 /// Time that Slurm gives a task, for [`clap`].
 pub(crate) fn parse_walltime(text: &str) -> Result<TimeLimit, String> {
     let limit: TimeLimit = text.parse()?;
@@ -85,9 +87,7 @@ pub(crate) fn parse_walltime(text: &str) -> Result<TimeLimit, String> {
     Ok(limit)
 }
 
-// What is divided among tasks: the commands that a task and the last job run.
-
-/// What is divided, by absolute paths.
+/// The work that is divided among tasks, with absolute paths.
 #[derive(Debug, Clone)]
 pub(crate) enum SubmittedWork {
     /// A parameter study, whose shards and results lie in a folder.
@@ -97,7 +97,7 @@ pub(crate) enum SubmittedWork {
 }
 
 impl SubmittedWork {
-    /// A study or jobs that were read and checked as `wiperlab sweep` and `wiperlab fit` do.
+    /// Reads and checks a study or jobs as `wiperlab sweep` and `wiperlab fit` do.
     pub(crate) fn load(files: &[PathBuf], out: Option<&Path>, overwrite: Overwrite) -> Outcome<Self> {
         if let Some(name) = files.iter().find(|file| files::is_standard_input(file)) {
             return Err(Failure::at(
@@ -170,8 +170,7 @@ impl SubmittedWork {
         Path::new(out).join(crate::cli::shards::SHARDS_FOLDER)
     }
 
-    /// Name of the tasks for the scheduler, with which the names of their logs start: at most 15 plain letters
-    /// and digits.
+    /// Name of the tasks for the scheduler and prefix of their logs: at most 15 letters, digits and hyphens.
     pub(crate) fn job_name(&self) -> String {
         const LONGEST: usize = 15;
         let stem = match self {
@@ -198,7 +197,7 @@ fn to_strings(words: &[&str]) -> Vec<String> {
     words.iter().map(|word| (*word).to_owned()).collect()
 }
 
-/// A path as text that stands in a script and holds in every folder.
+/// An absolute path as text for a script.
 pub(crate) fn absolute_path(path: &Path) -> Outcome<String> {
     let refused = |problem: &str| Failure::at(path.display(), problem);
     let whole = std::path::absolute(path).map_err(|error| refused(&error.to_string()))?;

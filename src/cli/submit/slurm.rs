@@ -1,9 +1,9 @@
 //! Slurm: `sbatch` (<https://slurm.schedmd.com/sbatch.html>) takes a script of a task and one of the job that
 //! puts the shards together; a third script submits both.
 //!
-//! No directive has a path, which would need quotes of its own: jobs are submitted from the folder of their
-//! logs. `--signal=B:` names the process of the script itself, which is the program; without `B:` only steps
-//! of `srun` would get the signal. After the loss of a node a task is queued again and goes on.
+//! No directive contains a path, which would need quoting: jobs are submitted from the folder of their logs.
+//! `--signal=B:` signals the process of the script itself, which is the program; without `B:` only steps of
+//! `srun` get the signal. After the loss of a node a task is queued again and goes on.
 
 use super::plan::SubmissionPlan;
 use crate::cli::submit;
@@ -26,7 +26,7 @@ pub(crate) fn slurm_scripts(plan: &SubmissionPlan) -> [(&'static str, String); 3
     [("array.sh", array_script(plan)), ("collect.sh", collect_script(plan)), (SUBMIT_SH, submit_script(plan))]
 }
 
-/// A script of a task. The program takes the place of the shell, so that it gets every signal itself.
+/// Script of a task. The program replaces the shell (`exec`), so that it receives signals itself.
 fn array_script(plan: &SubmissionPlan) -> String {
     let own = [format!("--job-name={}", plan.work.job_name()), format!("--array={}", plan.tasks)];
     let limit =
@@ -43,7 +43,7 @@ fn array_script(plan: &SubmissionPlan) -> String {
     )
 }
 
-/// A script of the job that puts the shards together.
+/// Script of the job that puts the shards together.
 fn collect_script(plan: &SubmissionPlan) -> String {
     format!(
         "#!/bin/sh\n# Puts the shards together. Made by `wiperlab submit`.\n{}\n{}\n",
@@ -52,7 +52,7 @@ fn collect_script(plan: &SubmissionPlan) -> String {
     )
 }
 
-/// A script that submits, from the folder of the logs.
+/// Script that submits the others from the folder of the logs.
 fn submit_script(plan: &SubmissionPlan) -> String {
     let logs = submit::quote_word(&plan.logs_folder().to_string_lossy());
     format!(
@@ -76,7 +76,7 @@ fn directive_lines(plan: &SubmissionPlan, own: &[String], cores: usize, log: &st
     lines.iter().chain(&plan.directives).map(|line| format!("#SBATCH {line}\n")).collect()
 }
 
-/// `HH:MM:SS` with as many hours as it takes.
+/// `HH:MM:SS`, hours without a limit.
 fn format_clock(time: Duration) -> String {
     let s = time.as_secs();
     format!("{:02}:{:02}:{:02}", s / 3600, s / 60 % 60, s % 60)

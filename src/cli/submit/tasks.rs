@@ -4,8 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt;
 use std::str::FromStr;
 
-/// Most tasks of an array: Slurm takes indices up to 1,000 (MaxArraySize 1001) where nobody has raised the
-/// limit.
+/// Most tasks of an array: the default limit of Slurm (MaxArraySize 1001).
 pub(crate) const MAX_TASKS: usize = 1000;
 
 /// Numbers of tasks, rising.
@@ -30,7 +29,7 @@ impl TaskList {
     }
 }
 
-/// Of numbers in any order.
+/// From numbers in any order.
 impl FromIterator<usize> for TaskList {
     fn from_iter<I: IntoIterator<Item = usize>>(numbers: I) -> Self {
         Self(numbers.into_iter().collect::<BTreeSet<usize>>().into_iter().collect())

@@ -1,4 +1,4 @@
-//! A shard of a study, and which study the shards in a folder are of.
+//! A shard of a study, and the note that names the study of the shards in a folder.
 
 use super::LoadedStudy;
 use super::solve::StudyPart;
@@ -9,10 +9,10 @@ use crate::sweep::journal::SweepPoint;
 use serde::{Deserialize, Serialize};
 use std::fs;
 
-/// Which study they are of.
+/// File that names the study of the shards.
 const NOTE: &str = "study.json";
 
-/// What the note says.
+/// Contents of the note.
 #[derive(Serialize, Deserialize)]
 struct StudyNote {
     /// Path of the study from the folder of the note.
@@ -20,7 +20,7 @@ struct StudyNote {
 }
 
 impl LoadedStudy {
-    /// Runs what no shard in the folder holds of a shard.
+    /// Runs the points of a shard that no shard in the folder holds.
     pub(crate) fn solve_shard(&self, study: &Path, out: &Path, shard: Shard, global: &GlobalArgs) -> Outcome {
         let journal = shard_checkpoint(out, shard);
         files::check_path_free(&journal)?;
@@ -45,7 +45,7 @@ impl LoadedStudy {
         Ok(CommandOutcome::Done)
     }
 
-    /// Which points the other shards hold: they need not be done again when a study is divided anew.
+    /// Points that other shards hold. They are not computed again when a study is divided anew.
     fn points_in_other_shards(&self, out: &Path, own: Shard) -> Outcome<Vec<bool>> {
         let header = self.header();
         let mut held = vec![false; self.study.point_count()];
@@ -60,12 +60,12 @@ impl LoadedStudy {
     }
 }
 
-/// Says which study the shards are of, for whoever collects them.
+/// Writes the note that names the study of the shards.
 fn write_study_note(study: &Path, out: &Path) -> Outcome<()> {
     let folder = out.join(SHARDS_FOLDER);
     let made = |error| Failure::Internal(format!("{}: cannot be made: {error}", folder.display()));
     fs::create_dir_all(&folder).map_err(made)?;
-    // (a folder that several machines share may have another place on each)
+    // relative, because a shared folder may have another path on each machine
     let study = files::relative_path(&folder, study)?;
     let note = serde_json::to_string(&StudyNote { study }).map_err(Failure::internal)? + "\n";
     if fs::read_to_string(folder.join(NOTE)).is_ok_and(|found| found == note) {

@@ -1,4 +1,4 @@
-//! The runs of a study, or of a part of it, into a journal.
+//! Runs the points of a study, or of a part of it, into a journal.
 
 use super::LoadedStudy;
 use crate::checkpoint::{CheckpointSink, Shard, StoredRecord, format_header_line};
@@ -9,22 +9,22 @@ use crate::sweep::{self, PointRecheck, SweepError};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-/// A part of a study on its way into a journal.
+/// A part of a study and its journal.
 pub(crate) struct StudyPart<'a> {
     pub shard: Shard,
     pub journal: &'a Path,
-    /// Whether the journal goes on; without it a new one is begun.
+    /// Whether the journal is continued; otherwise a new one is begun.
     pub resume: bool,
     /// Points that other journals hold.
     pub elsewhere: Vec<bool>,
-    /// What to do with what is done when it stops early.
+    /// How to go on after an early stop.
     pub advice: &'static str,
-    /// Whether progress is said where there is no terminal.
+    /// Whether progress is printed without a terminal.
     pub reports: bool,
 }
 
 impl LoadedStudy {
-    /// Runs what the journal of the whole study does not hold; `false` where it was interrupted.
+    /// Runs the points that the journal of the whole study does not hold; `false` if interrupted.
     pub(crate) fn solve(&self, journal: &Path, resume: bool, global: &GlobalArgs) -> Outcome<bool> {
         let (elsewhere, advice) = (Vec::new(), "go on with --resume");
         self.solve_part(
@@ -33,7 +33,7 @@ impl LoadedStudy {
         )
     }
 
-    /// Runs what no journal holds of a part, and writes its journal as it goes; `false` where it was
+    /// Runs the points of a part that no journal holds, and appends them to its journal; `false` if
     /// interrupted.
     pub(crate) fn solve_part(&self, part: &StudyPart, global: &GlobalArgs) -> Outcome<bool> {
         let (header, name) = (self.header(), part.journal.display().to_string());

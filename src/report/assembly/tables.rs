@@ -1,7 +1,7 @@
-//! The lines of a report's tables from a job, its recordings and its result.
+//! Rows of the tables of a report, from a job, its recordings and its result.
 
 use crate::compare::{Comparison, FittedRecording, NextPeak, ParameterLine, Truth};
-use crate::fit::job::{FitTarget, FreeParameter, Job, TargetSource};
+use crate::fit::job::{FreeParameter, Job, TargetSource};
 use crate::fit::result::{ComponentResult, FeatureResult, FitResult, FitStatus, ParameterResult};
 use crate::fit::uncertainty::ParameterVerdict;
 use crate::model::parameters;
@@ -11,20 +11,15 @@ use crate::recording::quality::{self, Optics, QualityFinding};
 use crate::report::RecordingLine;
 use crate::text::format_number;
 
-/// A recording with everything that `wiperlab inspect` says of it.
+/// A recording with the findings of `wiperlab inspect`.
 pub(super) fn recording_line(measured: &FittedRecording) -> RecordingLine {
-    let (recording, source) =
-        (measured.recording, measured.file.and_then(|file: &RecordingFile| file.source.as_ref()));
+    let recording = measured.recording;
+    let source = measured.file.and_then(|file: &RecordingFile| file.source.as_ref());
     let optics = measured.file.map_or_else(Optics::default, |file| Optics::from(&file.camera));
     let measurements = quality::measure_quality(recording, optics.exposure_s);
     let kept: Vec<QualityFinding> = source.map_or_else(Vec::new, |source| source.findings.clone());
-    let findings = quality::collect_findings(
-        recording,
-        &measurements,
-        &optics,
-        &ReversalInstants::find_instants(recording),
-        &kept,
-    );
+    let instants = ReversalInstants::find_instants(recording);
+    let findings = quality::collect_findings(recording, &measurements, &optics, &instants, &kept);
     RecordingLine {
         name: recording.name().to_owned(),
         synthetic: recording.is_synthetic(),
@@ -36,27 +31,20 @@ pub(super) fn recording_line(measured: &FittedRecording) -> RecordingLine {
     }
 }
 
-/// What the job says of a value by its name.
-fn find_fit_target<'a>(job: &'a Job, name: &str) -> Option<&'a FitTarget> {
-    job.targets.iter().find(|aim| aim.feature.name == name)
-}
-
-/// A line with what the job says: where the target comes from, and of which condition it is.
+/// A row with what the job says of a target: its source, condition and tolerance.
 fn comparison_line(job: &Job, measured: &[FittedRecording], name: &str) -> Comparison {
-    let aim = find_fit_target(job, name);
-    let several = job.conditions.len() > 1;
+    let Some(target) = job.targets.iter().find(|target| target.feature.name == name) else {
+        return Comparison { name: name.to_owned(), ..Comparison::default() };
+    };
+    let at = target.feature.condition;
+    let condition = job.conditions.get(at).filter(|_| job.conditions.len() > 1);
+    let is_measured = matches!(target.source, TargetSource::Measured { .. });
     Comparison {
         name: name.to_owned(),
-        condition: aim
-            .filter(|_| several)
-            .and_then(|aim| job.conditions.get(aim.feature.condition))
-            .map(|condition| condition.name.clone()),
-        given: aim.is_some_and(|aim| matches!(aim.source, TargetSource::Given { .. })),
-        synthetic: aim
-            .filter(|aim| matches!(aim.source, TargetSource::Measured { .. }))
-            .and_then(|aim| measured.get(aim.feature.condition))
-            .is_some_and(|m| m.recording.is_synthetic()),
-        tolerance_relative: aim.and_then(|aim| aim.tolerance_relative),
+        condition: condition.map(|condition| condition.name.clone()),
+        given: matches!(target.source, TargetSource::Given { .. }),
+        synthetic: is_measured && measured.get(at).is_some_and(|m| m.recording.is_synthetic()),
+        tolerance_relative: target.tolerance_relative,
         ..Comparison::default()
     }
 }
@@ -77,9 +65,7 @@ pub(super) fn component_lines(
         twin_sd: c.twin_sd_hz,
         model_scatter: c.model_scatter_hz,
         below_db: c.below_db,
-        next_peak: c
-            .runner_up
-            .map(|peak| NextPeak { frequency_hz: peak.frequency_hz, below_db: peak.below_db }),
+        next_peak: c.runner_up.map(|p| NextPeak { frequency_hz: p.frequency_hz, below_db: p.below_db }),
         missing: c.missing.clone(),
         ..comparison_line(job, measured, &c.name)
     };
@@ -119,12 +105,10 @@ pub(super) fn parameter_lines(
     };
     let truth = twin.and_then(|t| t.get("truth")).and_then(toml::Value::as_table);
     let value = |name: &str| truth.and_then(|t| t.get(name)).and_then(toml::Value::as_float);
-    job.parameters
-        .iter()
-        .filter_map(|free| {
-            Some(parameter_line(free, result.parameters.get(&free.name)?, result, value(&free.name)))
-        })
-        .collect()
+    let line = |free: &FreeParameter| {
+        Some(parameter_line(free, result.parameters.get(&free.name)?, result, value(&free.name)))
+    };
+    job.parameters.iter().filter_map(line).collect()
 }
 
 fn parameter_line(
@@ -134,6 +118,7 @@ fn parameter_line(
     truth: Option<f64>,
 ) -> ParameterLine {
     let row = parameters::find_parameter(&free.name);
+    let reasons = (!found.reasons.is_empty()).then(|| found.reasons.join("; "));
     let mut line = ParameterLine {
         name: free.name.clone(),
         symbol: row.map_or_else(String::new, |p| p.symbol.to_owned()),
@@ -142,11 +127,7 @@ fn parameter_line(
         lower_95: found.lower_95,
         upper_95: found.upper_95,
         verdict: found.verdict,
-        why: if found.reasons.is_empty() {
-            unidentified_reason(free, found.verdict, result)
-        } else {
-            Some(found.reasons.join("; "))
-        },
+        why: reasons.or_else(|| unidentified_reason(free, found.verdict, result)),
         bounds: [free.bounds.lower(), free.bounds.upper()],
         prior: free.prior.is_some(),
         linear_95: found.linear_95,
@@ -164,20 +145,20 @@ fn unidentified_reason(
     verdict: ParameterVerdict,
     result: &FitResult,
 ) -> Option<String> {
-    let (lower, upper) = (format_number(free.bounds.lower()), format_number(free.bounds.upper()));
-    match verdict {
-        ParameterVerdict::Identified => None,
-        ParameterVerdict::OpenBelow => Some(format!(
+    let [lower, upper] = [free.bounds.lower(), free.bounds.upper()].map(format_number);
+    Some(match verdict {
+        ParameterVerdict::Identified => return None,
+        ParameterVerdict::OpenBelow => format!(
             "only an upper limit is known, the interval reaches the lower bound of the search, {lower}"
-        )),
-        ParameterVerdict::OpenAbove => Some(format!(
+        ),
+        ParameterVerdict::OpenAbove => format!(
             "only a lower limit is known, the interval reaches the upper bound of the search, {upper}"
-        )),
-        ParameterVerdict::AtBound => Some(format!(
+        ),
+        ParameterVerdict::AtBound => format!(
             "the best value is a bound of the search, {lower} to {upper}: the optimum may lie outside"
-        )),
-        ParameterVerdict::NotIdentified => Some(undetermined_reason(&free.name, result)),
-    }
+        ),
+        ParameterVerdict::NotIdentified => undetermined_reason(&free.name, result),
+    })
 }
 
 fn undetermined_reason(name: &str, result: &FitResult) -> String {

@@ -1,5 +1,5 @@
 //! Estimates with their 95 % intervals: a panel for each parameter that at least two fits have, a row for
-//! each of them.
+//! each fit.
 
 use super::{ComparedFit, IntervalRelation, SharedParameter, shorten_name};
 use crate::chart::{
@@ -13,23 +13,20 @@ use crate::text::{format_interval, format_number};
 
 const ROW_MM: f64 = 5.5;
 const LEAST_HEIGHT_MM: f64 = 16.0;
-/// Room beyond the farthest finite end, as a share of what the ends span.
+/// Margin of the axis beyond the farthest finite end, as a fraction of the span of the ends.
 const ROOM: f64 = 0.12;
-/// The same as a share of the value, where there is but one end.
+/// The same as a fraction of the value, if there is only one end.
 const ALONE: f64 = 0.1;
-/// From this ratio of the largest to the smallest end on the axis is logarithmic.
+/// The axis is logarithmic above this ratio of the largest to the smallest end.
 const WIDE: f64 = 30.0;
 
-/// The figures, none where no parameter is shared: as few as have room in a column of a journal, with rows as
-/// high as their letters.
+/// The figures, none if no parameter is shared. There are as few as fit into a column of a journal.
 pub(super) fn interval_figures(entries: &[ComparedFit], parameters: &[SharedParameter]) -> Vec<FigureBlock> {
     let shared: Vec<&SharedParameter> = parameters.iter().filter(|p| !p.pairs.is_empty()).collect();
-    let fits = |figures: &Vec<Figure>| {
-        figures.iter().all(|figure| figure.height_mm(Medium::Column) <= MAX_HEIGHT_MM)
-    };
+    let fits = |figures: &[Figure]| figures.iter().all(|f| f.height_mm(Medium::Column) <= MAX_HEIGHT_MM);
     let parted = |parts: usize| shared.chunks(shared.len().div_ceil(parts));
     let drawn = |parts: usize| parted(parts).map(|part| draw_figure(entries, part)).collect::<Vec<Figure>>();
-    // a figure that one parameter alone makes too high stays so
+    // a single parameter may make a figure too high
     let Some(parts) = (1..=shared.len()).find(|parts| fits(&drawn(*parts)) || *parts == shared.len()) else {
         return Vec::new();
     };
@@ -44,20 +41,20 @@ pub(super) fn interval_figures(entries: &[ComparedFit], parameters: &[SharedPara
 }
 
 fn draw_figure(entries: &[ComparedFit], parameters: &[&SharedParameter]) -> Figure {
+    let description =
+        "A panel a parameter, a row a fit: estimate and 95 % interval; an open end reaches the frame.";
     Figure {
         title: claim_sentence(parameters),
         subtitle: describe_sources(entries),
         watermarked: entries.iter().any(|e| e.verdict.synthetic),
-        description:
-            "A panel a parameter, a row a fit: estimate and 95 % interval; an open end reaches the frame."
-                .to_owned(),
+        description: description.to_owned(),
         width_mm: FULL_WIDTH_MM,
         columns: 2,
         panels: parameters.iter().map(|p| draw_panel(entries, p)).collect(),
     }
 }
 
-/// What the estimates rest on, where that is not a film.
+/// Fits to something else than a film, for the subtitle.
 fn describe_sources(entries: &[ComparedFit]) -> String {
     let names = |is: fn(&&ComparedFit) -> bool| {
         entries.iter().filter(is).map(|e| shorten_name(&e.name)).collect::<Vec<_>>().join(", ")
@@ -73,10 +70,8 @@ fn describe_sources(entries: &[ComparedFit]) -> String {
 /// How many pairs of intervals can be compared, and how many of them do not overlap.
 fn count_pairs(parameters: &[&SharedParameter]) -> (usize, usize) {
     let pairs = || parameters.iter().flat_map(|p| p.pairs.iter().map(|pair| pair.relation));
-    (
-        pairs().filter(|r| *r != IntervalRelation::NotComparable).count(),
-        pairs().filter(|r| *r == IntervalRelation::Disjoint).count(),
-    )
+    let comparable = pairs().filter(|r| *r != IntervalRelation::NotComparable).count();
+    (comparable, pairs().filter(|r| *r == IntervalRelation::Disjoint).count())
 }
 
 /// The claim with its number.
@@ -108,7 +103,7 @@ fn figure_details(parameters: &[&SharedParameter]) -> String {
     )
 }
 
-/// Looks of an estimate: label, colour, mark, and whether it is of an identified parameter.
+/// Style of an estimate: label, colour, mark, and whether the parameter is identified.
 const LOOKS: [(&str, Colour, Mark, bool); 2] = [
     ("identified", Colour::Blue, Mark::Joined(MarkerShape::Disc), true),
     ("not identified, or a limit", Colour::Vermilion, Mark::Hollow(MarkerShape::Diamond), false),
@@ -116,12 +111,9 @@ const LOOKS: [(&str, Colour, Mark, bool); 2] = [
 
 fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
     // the first fit stands at the top, and an axis counts from the bottom
-    let having: Vec<(&ComparedFit, &ParameterLine)> = entries
-        .iter()
-        .zip(&parameter.lines)
-        .rev()
-        .filter_map(|(entry, line)| Some((entry, line.as_ref()?)))
-        .collect();
+    let lines = entries.iter().zip(&parameter.lines).rev();
+    let having: Vec<(&ComparedFit, &ParameterLine)> =
+        lines.filter_map(|(entry, line)| Some((entry, line.as_ref()?))).collect();
     let (log, low, high) = axis_range(&having);
     let label =
         if parameter.symbol.is_empty() { shorten_name(&parameter.name) } else { parameter.symbol.clone() };
@@ -129,7 +121,7 @@ fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
     let x = if log { ChartAxis::log(label) } else { ChartAxis::linear(label) };
     let series = |(label, colour, mark, identified): &(&str, Colour, Mark, bool)| -> Vec<Series> {
         let of = having.iter().enumerate().filter(|(_, (_, line))| line.is_identified() == *identified);
-        // a series each: the symbols of one would be joined
+        // one series for each row, because the symbols of a series are joined
         of.map(|(row, (_, line))| Series {
             label: (*label).to_owned(),
             colour: *colour,
@@ -139,16 +131,12 @@ fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
         })
         .collect()
     };
-    let truths: Vec<_> = having
-        .iter()
-        .enumerate()
-        .filter_map(|(row, (_, line))| Some(Some((line.truth?.value, row as f64))))
-        .collect();
+    let rows = having.iter().enumerate();
     let truth = Series {
         label: "truth (synthetic)".to_owned(),
         colour: Colour::Black,
         mark: Mark::Crosses,
-        points: truths,
+        points: rows.filter_map(|(row, (_, p))| Some(Some((p.truth?.value, row as f64)))).collect(),
         ..Series::default()
     };
     Panel {
@@ -161,7 +149,7 @@ fn draw_panel(entries: &[ComparedFit], parameter: &SharedParameter) -> Panel {
     }
 }
 
-/// The 95 % interval; an open end lies beyond the frame, which cuts it without a cap.
+/// The 95 % interval. An open end lies beyond the frame, which clips it without a cap.
 fn interval_bar(line: &ParameterLine, y: f64, (log, low, high): (bool, f64, f64)) -> ErrorBar {
     let beyond = if log { (low / 10.0, high * 10.0) } else { (2.0 * low - high, 2.0 * high - low) };
     ErrorBar::Horizontal { y, from: line.lower_95.unwrap_or(beyond.0), to: line.upper_95.unwrap_or(beyond.1) }
@@ -171,10 +159,9 @@ fn interval_bar(line: &ParameterLine, y: f64, (log, low, high): (bool, f64, f64)
 fn axis_range(having: &[(&ComparedFit, &ParameterLine)]) -> (bool, f64, f64) {
     let ends =
         having.iter().flat_map(|(_, p)| [Some(p.estimate), p.lower_95, p.upper_95, p.truth.map(|t| t.value)]);
-    let (low, high) = ends
-        .flatten()
-        .filter(|x| x.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h): (f64, f64), x| (l.min(x), h.max(x)));
+    let wider = |(l, h): (f64, f64), x| (l.min(x), h.max(x));
+    let finite = ends.flatten().filter(|x| x.is_finite());
+    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), wider);
     if low > high {
         return (false, 0.0, 1.0);
     }

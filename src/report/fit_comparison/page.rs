@@ -33,7 +33,7 @@ pub(crate) fn render_page(several: &FitComparison) -> String {
     render_document(&several.title, &several.fits.iter().map(data_lead).collect::<String>(), &sections)
 }
 
-/// What the data of a fit are, with its name.
+/// The banner on the data of a fit, with the name of the fit.
 fn data_lead(entry: &ComparedFit) -> String {
     let named = format!("role=\"note\">{}: ", isolate_name(&entry.name));
     data_banner(&entry.report).replacen("role=\"note\">", &named, 1)
@@ -109,7 +109,7 @@ fn parameters_table(several: &FitComparison) -> String {
         + &render_table("Parameters, by fit", head, several.parameters.iter().map(row).collect())
 }
 
-/// Lines of all fits, those of the same name together, each with the name of its fit.
+/// Rows of all fits, sorted by name, each with the name of its fit as condition.
 fn merge_comparisons(
     several: &FitComparison,
     of: impl Fn(&ComparedFit) -> &Vec<Comparison>,
@@ -127,7 +127,7 @@ fn merge_comparisons(
     lines
 }
 
-/// Something of every fit, under its name.
+/// The section of every fit under its name.
 fn section_per_fit(several: &FitComparison, of: impl Fn(&ComparedFit) -> String) -> String {
     let section = |entry: &ComparedFit| format!("<h3>{}</h3>\n{}", isolate_name(&entry.name), of(entry));
     several.fits.iter().map(section).collect()

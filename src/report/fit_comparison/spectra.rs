@@ -1,23 +1,24 @@
-//! Spectra of several fits: those of a channel in windows that begin and end at the same instants, over each
-//! other or in a panel each.
+//! Spectra of several fits: those of one channel in windows with the same instants, in one panel or in one
+//! for each fit.
 
 use super::{ComparisonInput, shorten_name};
 use crate::chart::{ChartAxis, Colour, FULL_WIDTH_MM, Figure, Mark, Panel, Series, VerticalLine};
+use crate::compare::Comparison;
 use crate::feature::{FeatureBand, Reading};
 use crate::figures::{Drawing, FigureBlock, NO_TRACES, subtitle};
 use crate::fit::job::FitTarget;
 use crate::recording::Recording;
 use crate::recording::channel::{Channel, InstantKind, ReversalInstants, WindowEnd};
-use crate::spectrum::{self, Spectrum, SpectrumSettings};
+use crate::spectrum::{self, SpectrumSettings};
 use crate::text::{format_digits, format_trimmed, join_with_and};
 
 const MICROMETRES: f64 = 1e6;
 
-/// What stands under the heading where recordings of both kinds are drawn.
+/// Subtitle if recordings of both kinds are drawn.
 const MIXED: &str = "some recordings are synthetic: no camera took those marked so";
 
-/// What the windows of a group have in common: the channel, at which instants they begin and end, and which
-/// one of its fit each is.
+/// What the windows of a group have in common: the channel, the instants at which they begin and end, and
+/// their number within their fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct WindowKind {
     channel: Channel,
@@ -43,25 +44,18 @@ pub(super) fn spectra_figures(fits: &[ComparisonInput]) -> Vec<FigureBlock> {
         }
     }
     let groups = kinds.into_iter().map(|kind| members.iter().filter(|m| m.kind == kind).collect::<Vec<_>>());
-    groups
-        .filter(|group| group.len() > 1)
-        .filter_map(|group| draw_figure(&group))
-        .enumerate()
-        .map(|(i, f)| figure_block(i, f))
-        .collect()
-}
-
-fn figure_block(index: usize, (figure, caption, details): (Figure, String, String)) -> FigureBlock {
-    FigureBlock {
+    let drawn = groups.filter(|group| group.len() > 1).filter_map(|group| draw_figure(&group));
+    let block = |(number, (figure, caption, details))| FigureBlock {
         condition: None,
-        file: format!("spectra-{}.svg", index + 1),
+        file: format!("spectra-{number}.svg"),
         caption,
         details,
         drawing: Drawing::Chart(figure),
-    }
+    };
+    (1..).zip(drawn).map(block).collect()
 }
 
-/// The components of a fit; several windows of a kind are distinguished by their order.
+/// The components of a fit; windows of the same kind are numbered.
 fn group_members<'a>(fitted: &'a ComparisonInput<'a>) -> Vec<SpectrumGroupMember<'a>> {
     let anchor = |end: WindowEnd| if let WindowEnd::Found { anchor, .. } = end { Some(anchor) } else { None };
     let mut found: Vec<SpectrumGroupMember> = Vec::new();
@@ -78,28 +72,18 @@ fn group_members<'a>(fitted: &'a ComparisonInput<'a>) -> Vec<SpectrumGroupMember
     found
 }
 
-fn window_spectrum(band: &FeatureBand, recording: &Recording) -> Option<Spectrum> {
+fn window_spectrum(band: &FeatureBand, recording: &Recording) -> Option<SpectrumPoints> {
     let frames = band.window.resolve_frames(recording, &ReversalInstants::find_instants(recording)).ok()?;
     let samples = band.channel.samples(recording);
-    spectrum::analyse_spectrum(
-        samples.get(frames)?,
-        recording.grid().frame_rate_hz,
-        &SpectrumSettings { detrend: Some(band.detrend), ..SpectrumSettings::default() },
-    )
-    .ok()
+    let settings = SpectrumSettings { detrend: Some(band.detrend), ..SpectrumSettings::default() };
+    let rate_hz = recording.grid().frame_rate_hz;
+    let spectrum = spectrum::analyse_spectrum(samples.get(frames)?, rate_hz, &settings).ok()?;
+    let bins = spectrum.frequency_hz.iter().zip(&spectrum.amplitude_m);
+    Some(bins.map(|(f, a)| Some((*f, a * MICROMETRES))).collect())
 }
 
 /// Amplitude, um, over frequency, Hz.
 type SpectrumPoints = Vec<Option<(f64, f64)>>;
-
-fn spectrum_points(spectrum: &Spectrum) -> SpectrumPoints {
-    spectrum
-        .frequency_hz
-        .iter()
-        .zip(&spectrum.amplitude_m)
-        .map(|(f, a)| Some((*f, a * MICROMETRES)))
-        .collect()
-}
 
 impl<'a> SpectrumGroupMember<'a> {
     fn measured_recording(&self) -> Option<&'a Recording> {
@@ -107,47 +91,29 @@ impl<'a> SpectrumGroupMember<'a> {
     }
 
     fn measured_spectrum(&self) -> Option<SpectrumPoints> {
-        Some(spectrum_points(&window_spectrum(self.band, self.measured_recording()?)?))
+        window_spectrum(self.band, self.measured_recording()?)
     }
 
     fn model_spectrum(&self) -> Option<SpectrumPoints> {
-        Some(spectrum_points(&window_spectrum(
-            self.band,
-            &self.fitted.best.get(self.aim.feature.condition)?.view.recording,
-        )?))
+        window_spectrum(self.band, &self.fitted.best.get(self.aim.feature.condition)?.view.recording)
     }
 
-    /// Target, or what was measured in its place.
-    fn target_hz(&self) -> Option<f64> {
-        self.fitted
-            .report
-            .components
-            .iter()
-            .chain(&self.fitted.report.held_out)
-            .find(|c| c.name == self.aim.feature.name)
-            .map(|c| c.target)
+    /// The lines of the report about the component.
+    fn comparisons(&self) -> impl Iterator<Item = &'a Comparison> {
+        let (report, name) = (self.fitted.report, &self.aim.feature.name);
+        report.components.iter().chain(&report.held_out).filter(move |c| c.name == *name)
     }
 
     /// Frequency of the model, Hz.
     fn model_hz(&self) -> Option<f64> {
-        let report = &self.fitted.report;
-        let all = report.components.iter().chain(&report.held_out);
-        all.filter(|c| c.name == self.aim.feature.name).find_map(|c| c.model)
+        self.comparisons().find_map(|c| c.model)
     }
 
     fn describe(&self) -> String {
-        let found = self
-            .fitted
-            .report
-            .components
-            .iter()
-            .chain(&self.fitted.report.held_out)
-            .find(|c| c.name == self.aim.feature.name);
-        let model = found
-            .and_then(|c| c.model)
-            .map_or_else(|| "absent".to_owned(), |hz| format!("{} Hz", format_trimmed(hz, 4)));
-        let target =
-            found.map_or_else(String::new, |c| format!(" (target {} Hz)", format_trimmed(c.target, 4)));
+        let found = self.comparisons().next();
+        let hz = |value| format!("{} Hz", format_trimmed(value, 4));
+        let model = found.and_then(|c| c.model).map_or_else(|| "absent".to_owned(), hz);
+        let target = found.map_or_else(String::new, |c| format!(" (target {})", hz(c.target)));
         format!(
             "`{}` of `{}`, window {}: {model}{target}",
             self.aim.feature.name, self.fitted.name, self.band.window
@@ -185,11 +151,8 @@ fn draw_figure(group: &[&SpectrumGroupMember]) -> Option<(Figure, String, String
         panels,
     };
     let says: Vec<String> = group.iter().map(|m| m.describe()).collect();
-    let lone = if group.iter().any(|m| m.measured_recording().is_none()) {
-        " Fits to published numbers have no measured spectrum."
-    } else {
-        ""
-    };
+    let published = group.iter().any(|m| m.measured_recording().is_none());
+    let lone = if published { " Fits to published numbers have no measured spectrum." } else { "" };
     let caption = format!(
         "Amplitude spectra of the {channel} in {} fits; vertical lines mark the targets.{a_panel_each}",
         group.len()
@@ -202,24 +165,23 @@ fn draw_figure(group: &[&SpectrumGroupMember]) -> Option<(Figure, String, String
     Some((figure, caption, details))
 }
 
-// The panels: the spectra of a few fits over each other, those of more in a panel each.
+// Panels
 
-/// Most fits whose spectra lie over each other: with as many recordings they make six lines, and of more the
-/// last would hide the others.
+/// Most fits whose spectra share a panel: with their recordings they make six lines, and more would hide each
+/// other.
 const MOST_OVER_EACH_OTHER: usize = 3;
 /// Heights, mm: of all spectra in one panel, and of those of one fit.
 const HEIGHT_MM: f64 = 70.0;
 const EACH_HEIGHT_MM: f64 = 36.0;
-/// The axes reach this factor beyond the bands in which components are sought, this one over the highest peak
-/// and this one below it.
+/// Factors by which the axes extend beyond the bands of the components, above the highest peak and below it.
 const BAND_MARGIN: f64 = 2.0;
 const OVER_PEAK: f64 = 2.0;
 const UNDER_PEAK: f64 = 2e-4;
-/// Looks of models that lie over each other.
+/// Styles of models that share a panel.
 const MODEL_LOOKS: [(Colour, Mark); MOST_OVER_EACH_OTHER] =
     [(Colour::Vermilion, Mark::Line), (Colour::Blue, Mark::Dashed), (Colour::Green, Mark::Dotted)];
 
-/// What the panels of a group show; `None` where none of it has a spectrum.
+/// The panels of a group; `None` if it has no spectrum.
 fn draw_panels(group: &[&SpectrumGroupMember]) -> Option<Vec<Panel>> {
     let panels = if group.len() > MOST_OVER_EACH_OTHER {
         group.iter().map(|m| draw_fit_panel(m)).collect()
@@ -231,13 +193,11 @@ fn draw_panels(group: &[&SpectrumGroupMember]) -> Option<Vec<Panel>> {
     Some(panels.into_iter().map(|panel| Panel { x: x.clone(), y: y.clone(), ..panel }).collect())
 }
 
-/// The axes that all have in common.
+/// The common axes of all panels.
 fn common_axes(group: &[&SpectrumGroupMember], panels: &[Panel]) -> Option<(ChartAxis, ChartAxis)> {
     let bands = || group.iter().map(|m| m.band.band_hz);
-    let (low, high) = (
-        bands().fold(f64::INFINITY, |l, b| l.min(b.0)) / BAND_MARGIN,
-        bands().fold(0.0, |h: f64, b| h.max(b.1)) * BAND_MARGIN,
-    );
+    let low = bands().fold(f64::INFINITY, |l, b| l.min(b.0)) / BAND_MARGIN;
+    let high = bands().fold(0.0, |h: f64, b| h.max(b.1)) * BAND_MARGIN;
     let points = || panels.iter().flat_map(|p| &p.series).flat_map(|s| s.points.iter().flatten());
     let shown = points().filter(|(f, a)| *f >= low && *f <= high && a.is_finite());
     let peak = shown.map(|(_, a)| *a).fold(0.0, f64::max);
@@ -252,7 +212,7 @@ fn spectrum_line(label: String, (colour, mark): (Colour, Mark), points: Spectrum
 }
 
 fn target_line(member: &SpectrumGroupMember, colour: Colour) -> Option<VerticalLine> {
-    let at = member.target_hz()?;
+    let at = member.comparisons().next()?.target;
     Some(VerticalLine {
         label: format!("{} Hz", format_trimmed(at, 4)),
         colour,
@@ -264,17 +224,11 @@ fn target_line(member: &SpectrumGroupMember, colour: Colour) -> Option<VerticalL
 
 /// One fit: its model under its recording.
 fn draw_fit_panel(member: &SpectrumGroupMember) -> Panel {
-    let what = if member.measured_recording().is_some_and(Recording::is_synthetic) {
-        "synthetic recording"
-    } else {
-        "recording"
-    };
-    let model = member
-        .model_spectrum()
-        .map(|points| spectrum_line("model".to_owned(), (Colour::Vermilion, Mark::Thick), points));
-    let measured = member
-        .measured_spectrum()
-        .map(|points| spectrum_line(what.to_owned(), (Colour::Black, Mark::Thin), points));
+    let synthetic = member.measured_recording().is_some_and(Recording::is_synthetic);
+    let what = if synthetic { "synthetic recording" } else { "recording" };
+    let line = |label: &str, look, points| spectrum_line(label.to_owned(), look, points);
+    let model = member.model_spectrum().map(|points| line("model", (Colour::Vermilion, Mark::Thick), points));
+    let measured = member.measured_spectrum().map(|points| line(what, (Colour::Black, Mark::Thin), points));
     Panel {
         title: shorten_name(member.fitted.name),
         height_mm: EACH_HEIGHT_MM,
@@ -291,7 +245,7 @@ fn draw_overlay_panel(group: &[&SpectrumGroupMember]) -> Panel {
     });
     let mut rules: Vec<VerticalLine> = Vec::new();
     for rule in looking().filter_map(|(m, (colour, _))| target_line(m, colour)) {
-        // several that are written alike are one line
+        // equal labels share one line
         if rules.iter().all(|known| known.label != rule.label) {
             rules.push(rule);
         }
@@ -304,7 +258,7 @@ fn draw_overlay_panel(group: &[&SpectrumGroupMember]) -> Panel {
     }
 }
 
-/// The measured spectra, one a recording and window however many fits share it.
+/// The measured spectra; fits with the same recording and window share one.
 fn measured_series(group: &[&SpectrumGroupMember]) -> Vec<Series> {
     let mut drawn: Vec<(&Recording, &SpectrumGroupMember)> = Vec::new();
     for (recording, member) in group.iter().filter_map(|m| Some((m.measured_recording()?, *m))) {
@@ -318,11 +272,8 @@ fn measured_series(group: &[&SpectrumGroupMember]) -> Vec<Series> {
     let series = |(i, (recording, member)): (usize, &(&Recording, &SpectrumGroupMember))| {
         let look = if i % 2 == 0 { (Colour::Black, Mark::Thin) } else { (Colour::Grey, Mark::ThinDashed) };
         let what = if recording.is_synthetic() { "synthetic" } else { "measured" };
-        Some(spectrum_line(
-            format!("{what}, {}", shorten_name(recording.name())),
-            look,
-            member.measured_spectrum()?,
-        ))
+        let label = format!("{what}, {}", shorten_name(recording.name()));
+        Some(spectrum_line(label, look, member.measured_spectrum()?))
     };
     drawn.iter().enumerate().filter_map(series).collect()
 }

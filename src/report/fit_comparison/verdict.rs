@@ -1,4 +1,4 @@
-//! What a comparison says, in words.
+//! Statements of a comparison.
 
 use super::{ComparedFit, IntervalPair, IntervalRelation, SharedParameter};
 use crate::report::rich_text::{Sentence, Statement};
@@ -34,7 +34,7 @@ fn fit_sentence(entry: &ComparedFit) -> Sentence {
     if met == components.len() { line } else { line.with_words("; missed: ").with_names(missed) }
 }
 
-/// Of more pairs than this only the number is given, parameter by parameter: the table has them all.
+/// Longest list of pairs; of more only the counts by parameter are given, as the table has them all.
 const MOST_PAIRS: usize = 12;
 
 type SharedPair<'a> = (&'a SharedParameter, &'a IntervalPair);
@@ -93,7 +93,7 @@ fn overlap_statements(parameters: &[SharedParameter]) -> Vec<Statement> {
     found
 }
 
-/// The fits to something else than a film.
+/// Names the fits to synthetic or published data.
 fn source_statements(entries: &[ComparedFit]) -> Vec<Statement> {
     let of = |words: &str, is: fn(&ComparedFit) -> bool| {
         let names: Vec<&str> = entries.iter().filter(|e| is(e)).map(|e| e.name.as_str()).collect();

@@ -1,4 +1,4 @@
-//! Tables of what was measured and what the model shows.
+//! Tables that compare targets and model.
 
 use super::html::CellStyle::{Name, Number, Prose, Words};
 use super::html::*;
@@ -29,7 +29,7 @@ pub(super) fn held_out_table(list: &[Comparison]) -> String {
     comparison_table("Held-out values: target against prediction", words, ["value", "condition"], list)
 }
 
-/// Values of several fits, whose names stand in place of conditions.
+/// Values of several fits, with the name of the fit as condition.
 pub(in crate::report) fn fits_table(caption: &str, list: &[Comparison]) -> String {
     let words =
         "Relative error is model / target \u{2212} 1; what counts as met is as on the page of each fit.";
@@ -81,10 +81,10 @@ fn comparison_row(c: &Comparison, several: bool) -> Vec<HtmlCell> {
     cells
 }
 
-/// What else is known of a value.
+/// Remarks on a value.
 fn value_remarks(c: &Comparison) -> String {
     let size = |value: f64| {
-        // nobody reads millihertz
+        // no prefixes for Hz
         let (unit, factor) =
             if c.unit == "Hz" { (c.unit.clone(), 1.0) } else { text::choose_prefix(&c.unit, [value]) };
         format!("{} {unit}", format_digits(value * factor, 2)).trim_end().to_owned()
@@ -109,8 +109,6 @@ fn value_remarks(c: &Comparison) -> String {
     ];
     parts.into_iter().flatten().collect::<Vec<_>>().join("; ")
 }
-
-// Residuals of the traces, and what was estimated besides the parameters.
 
 /// Decimals of a correlation.
 const DECIMALS: usize = 2;

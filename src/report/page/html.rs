@@ -1,4 +1,4 @@
-//! Parts of a page: text that stays text, tables, figures, sections, the document.
+//! HTML parts of a page: escaped text, tables, figures, sections, the document.
 
 use crate::chart::Medium;
 use crate::figures::{Drawing, FigureBlock};
@@ -7,12 +7,12 @@ use crate::report::rich_text::{Sentence, SentencePart, Statement};
 use crate::text::{capitalise, make_printable};
 use html_escape::encode_safe;
 
-/// Text from anywhere as HTML.
+/// Any text escaped for HTML.
 pub(in crate::report) fn escape_text(raw: &str) -> String {
     encode_safe(&make_printable(raw)).into_owned()
 }
 
-/// A name that a user chose: whichever way it is written, it does not turn its neighbours.
+/// A name that a user chose, isolated so that right-to-left names do not reorder the text around them.
 pub(in crate::report) fn isolate_name(raw: &str) -> String {
     format!("<bdi>{}</bdi>", escape_text(raw))
 }
@@ -27,7 +27,7 @@ pub(in crate::report) fn keys_html(keys: &[impl AsRef<str>]) -> String {
     keys.iter().map(|key| breakable_key(key.as_ref())).collect::<Vec<_>>().join(", ")
 }
 
-/// What a number is, in words, with the keys of a scene that it comes from in small print.
+/// The meaning of a number, with the keys of the scene that it comes from in small print.
 pub(in crate::report) fn words_with_keys(words: &str, keys: &[&str]) -> String {
     let words = escape_text(&capitalise(words));
     if keys.is_empty() {
@@ -36,17 +36,17 @@ pub(in crate::report) fn words_with_keys(words: &str, keys: &[&str]) -> String {
     format!("{words}<small class=\"key\">{}</small>", keys_html(keys))
 }
 
-/// A parameter of a scene in the same way; the key alone of one that no scene has.
+/// The meaning and key of a parameter; the key alone if no scene has it.
 pub(in crate::report) fn parameter_html(name: &str) -> String {
     parameters::find_parameter(name)
         .map_or_else(|| breakable_key(name), |row| words_with_keys(row.meaning, &[row.name]))
 }
 
-/// Prose in which names stand between backticks.
+/// Prose whose names between backticks are isolated.
 pub(in crate::report) fn prose_html(raw: &str) -> String {
     let parts: Vec<&str> = raw.split('`').collect();
     if parts.len().is_multiple_of(2) {
-        // backticks that are not in pairs mark no names
+        // unpaired backticks mark no names
         return format!("<span dir=\"auto\">{}</span>", escape_text(raw));
     }
     let html = |(i, part): (usize, &&str)| match i % 2 {
@@ -78,19 +78,19 @@ pub(in crate::report) fn statements_html(list: &[Statement]) -> String {
     list.iter().map(one).collect()
 }
 
-/// A cell: its contents as HTML, and how it is set.
+/// A cell: its HTML and its style.
 pub(in crate::report) type HtmlCell = (String, CellStyle);
 
-/// How a cell is set.
+/// Style of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::report) enum CellStyle {
-    /// Words, from their own side.
+    /// Text, aligned at its start.
     Words,
-    /// Longer words, which may fill a wide column.
+    /// Longer text, which may fill a wide column.
     Prose,
-    /// A name that a user chose, of any length: it is broken before it pushes the numbers off the page.
+    /// A name of any length that a user chose; it is broken rather than push the numbers off the page.
     Name,
-    /// A number, from the right.
+    /// A number, aligned at the right.
     Number,
     Good,
     Bad,
@@ -109,7 +109,7 @@ impl CellStyle {
     }
 }
 
-/// A verdict as a word in its colour.
+/// A cell with the word for good or bad in its colour.
 pub(in crate::report) fn verdict_cell(good: bool, words: [&str; 2]) -> HtmlCell {
     if good { (escape_text(words[0]), CellStyle::Good) } else { (escape_text(words[1]), CellStyle::Bad) }
 }
@@ -177,8 +177,7 @@ pub(in crate::report) fn reading_hint(words: &str) -> String {
     format!("<p class=\"about\">{}</p>\n", escape_text(words))
 }
 
-/// Figures with their captions, numbered on from `before`; with `narrow` also as a telephone shows them, with
-/// letters that can be read there.
+/// Figures with their captions, numbered from `before` + 1; with `narrow` also in a version for telephones.
 pub(in crate::report) fn figures_html<'a>(
     blocks: impl IntoIterator<Item = &'a FigureBlock>,
     before: usize,
@@ -198,7 +197,7 @@ pub(in crate::report) fn figures_html<'a>(
     blocks.into_iter().enumerate().map(one).collect()
 }
 
-/// A figure for wide screens, and the same for narrow ones where it is wanted and does not move.
+/// A figure for wide screens, and with `narrow` also for narrow ones, unless it is animated.
 fn responsive_figure(block: &FigureBlock, narrow: bool) -> String {
     let wide = block.drawing.on_screen();
     match &block.drawing {
@@ -210,7 +209,7 @@ fn responsive_figure(block: &FigureBlock, narrow: bool) -> String {
     }
 }
 
-/// How a figure was made, folded away, a paragraph a line; nothing for none.
+/// The details of a figure, folded, a paragraph for each line; nothing if there are none.
 fn details_html(text: &str) -> String {
     let paragraph = |words: &str| format!("<p>{}</p>\n", prose_html(words));
     let told: String = text.lines().filter(|line| !line.is_empty()).map(paragraph).collect();
@@ -220,12 +219,12 @@ fn details_html(text: &str) -> String {
     format!("\n<details class=\"how\"><summary>How this was made</summary>\n{told}</details>")
 }
 
-/// A section of the page: where a link finds it, its heading and its contents.
+/// A section of the page.
 pub(in crate::report) struct PageSection {
     pub id: &'static str,
     pub heading: &'static str,
     pub html: String,
-    /// Whether its contents are folded away until a reader asks for them.
+    /// Whether its contents are folded at first.
     pub folded: bool,
 }
 

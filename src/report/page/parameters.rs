@@ -1,4 +1,4 @@
-//! Sections on what is known of the parameters, and on how the search and the gate before it went.
+//! Sections on the parameters, the search and the gate.
 
 use super::html::CellStyle::{Bad, Good, Number, Prose, Words};
 use super::html::*;

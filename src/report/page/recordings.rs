@@ -1,4 +1,4 @@
-//! What each recording can show and what is wrong with it, as `wiperlab inspect` finds it.
+//! Quality of each recording, with the findings of `wiperlab inspect`.
 
 use super::html::CellStyle::{Bad, Number, Prose, Words};
 use super::html::*;
@@ -15,7 +15,7 @@ fn count_noun(count: usize, noun: &str) -> String {
     format!("{count} {}", pluralise(noun, count))
 }
 
-/// What a terminal says in its letters, in those of the page.
+/// Replaces the ASCII `um` of terminal text by micrometres.
 fn typeset_text(said: &str) -> String {
     said.replace(" um", " \u{b5}m")
 }
