@@ -6,10 +6,10 @@
 //! |---|---|---|---|
 //! | import | [`import`] | text of a tracking program | [`recording::Recording`], on the frame grid, SI |
 //! | look | [`recording`], [`spectrum`] | a recording | quality, instants, components |
-//! | model | [`blade`], [`ode`], [`simulate`] | a scene | motion, transitions, summary |
-//! | dimensions | [`section`], [`plausibility`] | the section of a blade, a scene | a first `[blade]` table, numbers to check, doubts |
-//! | check the model | [`accuracy`] | a scene | error against work of every method |
-//! | camera | [`twin`] | a scene | a synthetic recording |
+//! | model | [`model`], [`ode`], [`simulate`] | a scene | motion, transitions, summary |
+//! | dimensions | [`model::section`], [`model::plausibility`] | the section of a blade, a scene | a first `[blade]` table, numbers to check, doubts |
+//! | check the model | [`simulate::accuracy`] | a scene | error against work of every method |
+//! | camera | [`simulate::twin`] | a scene | a synthetic recording |
 //! | read | [`feature`] | a recording | frequencies, durations, deflections, or why they are missing |
 //! | fit | [`fit`] | a job, recordings | estimates, intervals, verdicts |
 //! | compare | [`compare`] | recordings, the fitted model | clock shift, residuals, ridges, transitions |
@@ -18,13 +18,13 @@
 //! | show | [`report`] | results | one HTML page |
 //!
 //! These modules read no files and print nothing: text and numbers in, typed values and text out. Only
-//! [`program`], the command-line program, opens files.
+//! [`cli`], the command-line program, opens files.
 //!
 //! # The equations
 //!
 //! The model is that of the paper "Investigation of the dynamics of the wiper blade around the reversal":
-//! equations (1) to (3) for neck, lip and normal force ([`blade`]), (4) and (5) for friction
-//! ([`blade::friction`]). In reduced form, with `q = (theta, phi)`,
+//! equations (1) to (3) for neck, lip and normal force ([`model`]), (4) and (5) for friction
+//! ([`model::friction`]). In reduced form, with `q = (theta, phi)`,
 //!
 //! ```text
 //! A qdd + b = f w      N = n.qdd + N0
@@ -44,7 +44,7 @@
 //! | `k0`, `k1`, `k2` | stiffness of the head's support, the neck, the lip | N/m, N m/rad |
 //!
 //! All quantities are in SI units; files and fields have their unit in the name. The parameters of a scene
-//! are in one table, [`blade::parameters::PARAMETERS`].
+//! are in one table, [`model::parameters::PARAMETERS`].
 //!
 //! # From a tracking export to a report
 //!
@@ -53,27 +53,28 @@
 //!
 //! // a synthetic export of a tracking program: 5,000 frames/s, 20 um a pixel, y points up
 //! let export = include_bytes!("../data/actual-blade-twin/synthetic-tracker-export.txt").to_vec();
-//! let options = Options {
+//! let options = ImportOptions {
 //!     frame_rate_hz: Some(5000.0),
-//!     scale: Some(Scale::parse("20um/px")?),
+//!     scale: Some(CoordinateScale::parse("20um/px")?),
 //!     y_axis: Some(YAxis::Up),
 //!     tip: Some("synthetic tip".to_owned()),
 //!     head: Some("synthetic head".to_owned()),
-//!     ..Options::default()
+//!     ..ImportOptions::default()
 //! };
-//! let recording = import(&[Source::alone("export.txt", export)], &options)?.recording;
+//! let recording = import(&[ImportSource::without_companions("export.txt", export)], &options)?.recording;
 //!
 //! // the low component of the head's drop after the flip
-//! let frames = Window::parse("after")?.resolve(&recording, &Instants::find(&recording))?;
+//! let instants = ReversalInstants::find_instants(&recording);
+//! let frames = Window::parse("after")?.resolve_frames(&recording, &instants)?;
 //! let samples = &Channel::HeadDrop.samples(&recording)[frames];
-//! let record = Record { samples, frame_rate_hz: 5000.0, exposure_s: Some(5e-5) };
-//! let components = Analysis::of(&record, &Settings::default())?.spectrum.components;
+//! let record = SampledRecord { samples, frame_rate_hz: 5000.0, exposure_s: Some(5e-5) };
+//! let components = SpectralAnalysis::from_record(&record, &SpectrumSettings::default())?.spectrum.components;
 //! assert!((components[0].frequency_hz - 74.8).abs() < 1.0);
 //!
 //! // a reversal of the model, transition by transition
 //! let scene = Scene::parse("scene.toml", include_str!("../data/scenes/actual-blade.toml"))?;
 //! let mut transitions = Transitions::default();
-//! assert_eq!(run(&scene, &mut transitions).status, Status::Completed);
+//! assert_eq!(run_scene(&scene, &mut transitions).status, RunStatus::Completed);
 //! assert_eq!(transitions.0.len(), 380);
 //!
 //! // friction and neck stiffness from the recording: 12 evaluations here, thousands in a real fit
@@ -82,8 +83,8 @@
 //! let result = problem.fit_within(12)?;
 //!
 //! // the page as text; nothing was written
-//! let report = Report::of(&problem, &result)?;
-//! assert!(report.page().contains("Actual blade fitted to its synthetic recording"));
+//! let report = Report::from_fit(&problem, &result)?;
+//! assert!(report.render_page().contains("Actual blade fitted to its synthetic recording"));
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
