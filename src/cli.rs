@@ -25,6 +25,7 @@ mod prelude;
 mod progress;
 pub mod read;
 mod report;
+mod run_observer;
 mod sensitivities;
 mod shards;
 mod simulate;
@@ -35,10 +36,9 @@ mod twin;
 
 use args::GlobalArgs;
 use clap::{CommandFactory, Parser, Subcommand};
-use failure::{Failure, Outcome};
+use failure::Outcome;
 use std::ffi::OsString;
 use std::path::PathBuf;
-use std::sync::OnceLock;
 
 /// How the program was built.
 const LONG_VERSION: &str = concat!(
@@ -160,7 +160,7 @@ impl Command {
 /// tasks.
 #[must_use]
 pub fn run_embedded(path: PathBuf, arguments: Vec<OsString>) -> u8 {
-    set_executable_path(path);
+    submit::set_executable_path(path);
     run(arguments)
 }
 
@@ -184,17 +184,4 @@ pub fn run(arguments: Vec<OsString>) -> u8 {
         Ok(outcome) => outcome.exit_code(),
         Err(failure) => failure.print_message(),
     }
-}
-
-/// Path of the program, if it runs within another process.
-static EXECUTABLE_PATH: OnceLock<PathBuf> = OnceLock::new();
-
-/// Sets the path of the program; only the first call counts.
-pub(crate) fn set_executable_path(path: PathBuf) {
-    let _ = EXECUTABLE_PATH.set(path);
-}
-
-pub(crate) fn executable_path() -> Result<PathBuf, Failure> {
-    let unknown = |error| Failure::Internal(format!("the path of this program is not known: {error}"));
-    EXECUTABLE_PATH.get().map_or_else(|| std::env::current_exe().map_err(unknown), |path| Ok(path.clone()))
 }

@@ -128,7 +128,7 @@ impl LoadedJob {
         })
     }
 
-    /// Runs a search with its journal, whose records have the name `records`; `expected` is about their number.
+    /// Runs a search with its journal, whose records are called `records`; about `expected` are made.
     fn search<R: CheckpointRecord>(
         &self,
         global: &GlobalArgs,

@@ -4,7 +4,7 @@ use super::files::{SIMULATION_SUMMARY, StreamedTable};
 use super::load::{print_warnings, read_scene};
 use super::method::MethodArgs;
 use super::prelude::*;
-use super::progress::ProgressObserver;
+use super::run_observer::ProgressObserver;
 use super::sensitivities::{self, SensitivityRequest};
 use crate::figures::motion;
 use crate::recording::files::{HEADER, push_trace_row};

@@ -8,10 +8,10 @@ mod tasks;
 use super::args::TimeLimit;
 use super::files::FileSize;
 use super::prelude::*;
-use crate::cli;
 use clap::ValueEnum;
 use plan::{SubmissionPlan, SubmittedWork, absolute_path};
 use std::process::Command;
+use std::sync::OnceLock;
 pub(crate) use tasks::TaskList;
 
 /// Who runs the tasks.
@@ -78,7 +78,7 @@ impl SubmitArgs {
         let here = |error| Failure::Input(format!("the working directory cannot be found: {error}"));
         Ok(SubmissionPlan {
             work: SubmittedWork::load(&self.files, self.out.as_deref(), self.overwrite)?,
-            program: absolute_path(&cli::executable_path()?)?,
+            program: absolute_path(&executable_path()?)?,
             folder: absolute_path(&std::env::current_dir().map_err(here)?)?,
             shards: self.shards,
             tasks,
@@ -169,6 +169,19 @@ fn submission_failure(script: &str, submitted: &str, complaint: &str) -> Failure
     };
     let complaint = complaint.split_whitespace().collect::<Vec<_>>().join(" ");
     Failure::Internal(format!("{script}: `{}` failed: {complaint}; {state}", slurm::SBATCH))
+}
+
+/// Path of the program, if it runs within another process.
+static EXECUTABLE_PATH: OnceLock<PathBuf> = OnceLock::new();
+
+/// Sets the path of the program; only the first call counts.
+pub(crate) fn set_executable_path(path: PathBuf) {
+    let _ = EXECUTABLE_PATH.set(path);
+}
+
+fn executable_path() -> Outcome<PathBuf> {
+    let unknown = |error| Failure::Internal(format!("the path of this program is not known: {error}"));
+    EXECUTABLE_PATH.get().map_or_else(|| std::env::current_exe().map_err(unknown), |path| Ok(path.clone()))
 }
 
 // POSIX shell

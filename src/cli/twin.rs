@@ -3,7 +3,7 @@
 use super::failure::describe_early_end;
 use super::load::read_named_scene;
 use super::prelude::*;
-use super::progress::ProgressObserver;
+use super::run_observer::ProgressObserver;
 use crate::figures::twin as figure;
 use crate::recording::Recording;
 use crate::recording::files::{CameraEntry, DESCRIPTION_FILE, RecordingFile, TRACE_FILE, YAxis, trace_csv};

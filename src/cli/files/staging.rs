@@ -24,7 +24,7 @@ const TEMPORARY_NAME: (&str, &str) = (".wiperlab-", ".tmp");
 /// lock belongs to a program that was killed.
 const ABANDONED_AFTER: Duration = Duration::from_secs(60);
 
-/// Files of a command on their way into a folder. Dropped before [`OutputStaging::commit`], nothing is left of them.
+/// Files of a command under temporary names. Dropped before [`OutputStaging::commit`] they are removed.
 pub(crate) struct OutputStaging {
     folder: PathBuf,
     guard: Option<(OutputGuard, WritePolicy)>,

@@ -1,0 +1,47 @@
+//! The observer of a run that a user waits for.
+
+use super::{interrupt, progress};
+use crate::simulate::{Observer, SolutionSegment};
+use indicatif::ProgressBar;
+use std::ops::ControlFlow;
+
+/// Segments between two updates of the bar; each takes microseconds.
+const PIECES_A_LOOK: u32 = 64;
+
+/// Shows the progress of a run, and stops it on request.
+pub(crate) struct ProgressObserver {
+    bar: ProgressBar,
+    start_s: f64,
+    pieces: u32,
+}
+
+impl ProgressObserver {
+    /// For a run between two instants, s.
+    pub(crate) fn new([start_s, stop_s]: [f64; 2], command: &'static str, quiet: bool) -> Self {
+        let bar = progress::start_bar(to_milliseconds(stop_s - start_s), command, "ms of the model", quiet);
+        Self { bar, start_s, pieces: 0 }
+    }
+}
+
+impl Observer for ProgressObserver {
+    fn observe_segment(&mut self, piece: &SolutionSegment<'_>) {
+        self.pieces = (self.pieces + 1) % PIECES_A_LOOK;
+        if self.pieces == 0 {
+            self.bar.set_position(to_milliseconds(piece.end_s - self.start_s));
+        }
+    }
+
+    fn control_flow(&self) -> ControlFlow<()> {
+        interrupt::control_flow()
+    }
+}
+
+impl Drop for ProgressObserver {
+    fn drop(&mut self) {
+        self.bar.finish_and_clear();
+    }
+}
+
+fn to_milliseconds(time_s: f64) -> u64 {
+    (1e3 * time_s) as u64
+}
