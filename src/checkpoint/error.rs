@@ -12,7 +12,7 @@ pub enum CheckpointError {
     Layout {
         /// File as named by the user.
         file: String,
-        /// What it is of.
+        /// Kind of its computation.
         kind: CheckpointKind,
         /// Layout of the file.
         found: u32,
@@ -24,9 +24,9 @@ pub enum CheckpointError {
     OtherKind {
         /// File as named by the user.
         file: String,
-        /// What it is of.
+        /// Kind of its computation.
         found: CheckpointKind,
-        /// What was expected.
+        /// Expected kind.
         expected: CheckpointKind,
     },
     /// Another version of the program wrote the journal.
@@ -49,7 +49,7 @@ pub enum CheckpointError {
     OtherProblem {
         /// File as named by the user.
         file: String,
-        /// What it is of.
+        /// Kind of its computation.
         kind: CheckpointKind,
         /// Fingerprint in its header.
         found: String,
@@ -61,7 +61,7 @@ pub enum CheckpointError {
     Unreadable {
         /// File as named by the user.
         file: String,
-        /// Why.
+        /// Reason.
         problem: String,
     },
     /// The first line is not a valid header.
@@ -84,7 +84,7 @@ pub enum CheckpointError {
         file: String,
         /// 1-based line.
         line: usize,
-        /// What it is of.
+        /// Kind of its computation.
         kind: CheckpointKind,
         /// What was found and what was expected.
         problem: String,
@@ -99,11 +99,11 @@ pub enum CheckpointError {
         file: String,
         /// 1-based line.
         line: usize,
-        /// What it is of.
+        /// Kind of its computation.
         kind: CheckpointKind,
-        /// What the line says.
+        /// Value in the line.
         found: String,
-        /// What is computed.
+        /// Recomputed value.
         computed: String,
     },
     /// Two journals disagree about one record.
@@ -115,13 +115,13 @@ pub enum CheckpointError {
         file: String,
         /// 1-based line in that file.
         line: usize,
-        /// What is found there.
+        /// Its value there.
         found: String,
         /// The file that was read before.
         other_file: String,
         /// 1-based line in that file.
         other_line: usize,
-        /// What is found there.
+        /// Its value there.
         expected: String,
     },
 }
